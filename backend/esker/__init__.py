@@ -1,0 +1,1 @@
+"""Esker: sketch one landscape together. ``from esker import Terrain, Stroke, connect``."""

@@ -1,0 +1,588 @@
+"""The one source of every constant, wire format and shared struct (DESIGN 2, 3, 4, 6).
+
+Nothing here does I/O. ``contract_emit.py`` turns this module into the committed TypeScript, WGSL, OpenCL and
+GLSL files; a test regenerates them and compares. Change a number here, run ``make generate``, commit both.
+
+Conventions (DESIGN 3): metres, seconds, degrees at the interface; x east, y north, z up; little-endian.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import Annotated, Any, Final, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, StringConstraints, TypeAdapter
+
+# --- protocol ---------------------------------------------------------------------------------------------------
+
+PROTOCOL_VERSION: Final = 1
+SUBPROTOCOL: Final = "esker.1"
+
+# --- grid (DESIGN 3) --------------------------------------------------------------------------------------------
+
+TILE_CELLS: Final = 64
+TILE_SAMPLES: Final = 65
+PATCH_CELLS: Final = 16
+SUBPATCHES: Final = 4
+"""Sub-patches along one side of a tile: each 16x16-cell patch is selected and drawn by itself (DESIGN 9)."""
+MAX_LEVEL: Final = 6
+"""The finest level that may be solved globally (4097 samples a side)."""
+DEFAULT_LEVEL: Final = 4
+QUANTA_PER_CELL: Final = 256
+"""Quantisation step of level l: q_l = s_l / 256, so that the slope error is the same at every level (DESIGN 6)."""
+DEFAULT_SIZE_M: Final = 4096.0
+MIN_SIZE_M: Final = 64.0
+MAX_SIZE_M: Final = 65536.0
+DEFAULT_REACH_FRACTION: Final = 1.0 / 32.0
+
+# --- solver (DESIGN 5.2, 5.3) -----------------------------------------------------------------------------------
+
+CREST_STIFFNESS: Final = 4.0
+SATURATION: Final = 0.12
+SPRING_CELLS: Final = 30.0
+"""Flank spring a_i = (30 s_l / extent)^2."""
+SPRING_FULL_FRACTION: Final = 0.7
+CHEBYSHEV_SWEEPS: Final = 4
+CHEBYSHEV_LOW: Final = 0.5
+CHEBYSHEV_HIGH: Final = 2.0
+
+# --- stroke defaults (DESIGN 5.2, 12) ---------------------------------------------------------------------------
+
+DEFAULT_SLOPE_DEG: Final = 35.0
+DEFAULT_EXTENT_FRACTION: Final = 1.0 / 8.0
+"""Default flank extent as a fraction of the domain: generous, the band ends where it meets the base anyway."""
+MAX_SLOPE_DEG: Final = 85.0
+
+# --- limits (DESIGN 4); settings may lower them, never raise them --------------------------------------------------
+
+MAX_STROKES: Final = 5_000
+MAX_POINTS_PER_STROKE: Final = 4_096
+MAX_POINTS_PER_APPEND: Final = 256
+MAX_MESSAGE_BYTES: Final = 64 * 1024
+MAX_OPS_PER_SECOND: Final = 120
+OPS_BURST: Final = 240
+MAX_PRESENCE_PER_SECOND: Final = 30
+MAX_VIEWS_PER_SECOND: Final = 60
+MAX_MEMBERS: Final = 200
+MAX_NAME_LENGTH: Final = 80
+MAX_OPS_PER_MESSAGE: Final = 256
+MAX_OPS_PER_GROUP: Final = 64
+DOMAIN_MARGIN: Final = 10.0
+"""Points farther than ten times the domain size from its origin are refused."""
+PRESENCE_HZ: Final = 20
+TICK_MS: Final = 33
+BYTE_WINDOW: Final = 1 * 1024 * 1024
+"""Tile bytes that may be in flight to one client before it returns credits (DESIGN 8)."""
+MAX_BACKLOG_BYTES: Final = 3 * 1024 * 1024
+"""Control bytes queued for a client that does not read; above it the client is closed and resumes."""
+STALL_SECONDS: Final = 8.0
+"""A client whose socket accepted nothing for this long while bytes were waiting is evicted."""
+DEFAULT_TAU_PX: Final = 1.5
+
+# --- scalar types -----------------------------------------------------------------------------------------------
+
+ABSOLUTE_BOUND_M: Final = DOMAIN_MARGIN * MAX_SIZE_M
+Metres = Annotated[float, Field(ge=-ABSOLUTE_BOUND_M, le=ABSOLUTE_BOUND_M, allow_inf_nan=False)]
+Length = Annotated[float, Field(ge=0, le=ABSOLUTE_BOUND_M, allow_inf_nan=False)]
+Unit = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
+FrameCoord = Annotated[float, Field(ge=-1e7, le=1e7, allow_inf_nan=False)]
+Vec3 = tuple[Metres, Metres, Metres]
+CurvePoint = tuple[FrameCoord, FrameCoord]
+Id = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_-]{1,40}$")]
+OpId = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_-]{1,40}:[0-9]{1,12}$")]
+Name = Annotated[str, StringConstraints(max_length=MAX_NAME_LENGTH)]
+Secret = Annotated[str, StringConstraints(min_length=1, max_length=128)]
+Colour = Annotated[str, StringConstraints(pattern=r"^#[0-9a-f]{6}$")]
+Clock = Annotated[int, Field(ge=0, le=2**53)]
+
+StrokeKind = Literal["profile", "level"]
+FlankShape = Literal["straight", "concave", "convex"]
+Border = Literal["free", "pinned"]
+Look = Literal["natural", "alpine", "desert", "paper"]
+Role = Literal["owner", "edit", "view"]
+Which = Literal["first", "last"]
+
+
+class Wire(BaseModel):
+    """Base of every wire value: immutable, no unknown fields, no silent coercion, no NaN."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+
+# --- document (DESIGN 4) ----------------------------------------------------------------------------------------
+
+
+class Flank(Wire):
+    """One side of a cross-section. ``slope_deg`` None lets the diffusion decide; ``extent_m`` bounds the band."""
+
+    slope_deg: Annotated[float, Field(ge=0, le=MAX_SLOPE_DEG, allow_inf_nan=False)] | None = DEFAULT_SLOPE_DEG
+    extent_m: Length = DEFAULT_SIZE_M * DEFAULT_EXTENT_FRACTION
+    shape: FlankShape = "concave"
+
+
+class Stroke(Wire):
+    """One stroke (immutable). Curve points live in the frame of the anchors, so moving an anchor re-projects.
+
+    ``profile``: curve point (u, w) is ``lerp(first, last, u) + (0, 0, w)``: u along first->last (0..1 between the
+    anchors, outside allowed), w metres above the straight line between the anchors.
+    ``level``: curve point (u, v) is ``first.xy + u*d + v*perp(d)`` at height ``first.z``, where
+    ``d = last.xy - first.xy`` and ``perp((x, y)) = (-y, x)`` (left of the direction of travel).
+    ``left``/``right`` are the flanks left and right of the direction of travel; None means no flank on that side.
+    """
+
+    id: Id
+    author: Name = ""
+    kind: StrokeKind
+    first: Vec3
+    last: Vec3
+    curve: Annotated[tuple[CurvePoint, ...], Field(max_length=MAX_POINTS_PER_STROKE)]
+    left: Flank | None = None
+    right: Flank | None = None
+    plateau_radius_m: Length = 0.0
+    amplitude_m: Length = 0.0
+    roughness: Unit = 0.5
+    locked: bool = False
+    hidden: bool = False
+    label: Name = ""
+    finished: bool = False
+
+
+class StrokeFields(Wire):
+    """The fields that ``stroke.set`` may change. Absent means unchanged (see ``model_fields_set``)."""
+
+    first: Vec3 | None = None
+    last: Vec3 | None = None
+    curve: Annotated[tuple[CurvePoint, ...], Field(max_length=MAX_POINTS_PER_STROKE)] | None = None
+    left: Flank | None = None
+    right: Flank | None = None
+    plateau_radius_m: Length | None = None
+    amplitude_m: Length | None = None
+    roughness: Unit | None = None
+    locked: bool | None = None
+    hidden: bool | None = None
+    label: Name | None = None
+
+
+NULLABLE_STROKE_FIELDS: Final = frozenset({"left", "right"})
+"""Fields of ``StrokeFields`` for which an explicit null is a value (no flank), not an error."""
+
+
+class TerrainSettings(Wire):
+    """Settings of a terrain. ``reach_m`` None is infinity: the papers' pure, global diffusion (DESIGN 5.1)."""
+
+    size_m: Annotated[float, Field(ge=MIN_SIZE_M, le=MAX_SIZE_M)] = DEFAULT_SIZE_M
+    title: Name = "Untitled terrain"
+    reach_m: Annotated[float, Field(gt=0, le=ABSOLUTE_BOUND_M)] | None = DEFAULT_SIZE_M * DEFAULT_REACH_FRACTION
+    border: Border = "free"
+    sea_level_m: Metres | None = None
+    seed: Annotated[int, Field(ge=0, lt=2**32)] = 1
+    look: Look = "natural"
+    sun_azimuth_deg: Annotated[float, Field(ge=0, le=360)] = 115.0
+    sun_elevation_deg: Annotated[float, Field(ge=0, le=90)] = 24.0
+
+
+class TerrainFields(Wire):
+    """The settings that ``terrain.set`` may change (the size is fixed at birth)."""
+
+    title: Name | None = None
+    reach_m: Annotated[float, Field(gt=0, le=ABSOLUTE_BOUND_M)] | None = None
+    border: Border | None = None
+    sea_level_m: Metres | None = None
+    seed: Annotated[int, Field(ge=0, lt=2**32)] | None = None
+    look: Look | None = None
+    sun_azimuth_deg: Annotated[float, Field(ge=0, le=360)] | None = None
+    sun_elevation_deg: Annotated[float, Field(ge=0, le=90)] | None = None
+
+
+NULLABLE_TERRAIN_FIELDS: Final = frozenset({"reach_m", "sea_level_m"})
+
+
+class Document(Wire):
+    """A whole terrain at one clock. ``deleted`` keeps removed strokes so that a delete can be undone."""
+
+    id: Id
+    clock: Clock = 0
+    settings: TerrainSettings = TerrainSettings()
+    strokes: tuple[Stroke, ...] = ()
+    deleted: tuple[Stroke, ...] = ()
+
+
+# --- operations (DESIGN 4) --------------------------------------------------------------------------------------
+
+
+class BeginStroke(Wire):
+    type: Literal["stroke.begin"] = "stroke.begin"
+    stroke: Stroke
+
+
+class AppendPoints(Wire):
+    """Replace the curve from index ``start`` on by ``points`` and move ``last``.
+
+    ``start`` equal to the curve's length appends; a smaller one re-projects the tail, as happens when the plane of
+    a profile turns with the pen (DESIGN 12).
+    """
+
+    type: Literal["stroke.append"] = "stroke.append"
+    stroke: Id
+    start: Annotated[int, Field(ge=0, le=MAX_POINTS_PER_STROKE)]
+    points: Annotated[tuple[CurvePoint, ...], Field(max_length=MAX_POINTS_PER_APPEND)]
+    last: Vec3
+
+
+class FinishStroke(Wire):
+    type: Literal["stroke.finish"] = "stroke.finish"
+    stroke: Id
+
+
+class SetStroke(Wire):
+    type: Literal["stroke.set"] = "stroke.set"
+    stroke: Id
+    fields: StrokeFields
+
+
+class MoveAnchor(Wire):
+    type: Literal["stroke.anchor"] = "stroke.anchor"
+    stroke: Id
+    which: Which
+    to: Vec3
+
+
+class DeleteStroke(Wire):
+    type: Literal["stroke.delete"] = "stroke.delete"
+    stroke: Id
+
+
+class RestoreStroke(Wire):
+    type: Literal["stroke.restore"] = "stroke.restore"
+    stroke: Id
+
+
+class SetTerrain(Wire):
+    type: Literal["terrain.set"] = "terrain.set"
+    fields: TerrainFields
+
+
+SimpleOp = Annotated[
+    BeginStroke | AppendPoints | FinishStroke | SetStroke | MoveAnchor | DeleteStroke | RestoreStroke | SetTerrain,
+    Field(discriminator="type"),
+]
+
+
+class Group(Wire):
+    """Operations that apply together or not at all; one tick of the clock."""
+
+    type: Literal["group"] = "group"
+    ops: Annotated[tuple[SimpleOp, ...], Field(min_length=1, max_length=MAX_OPS_PER_GROUP)]
+
+
+Op = Annotated[
+    BeginStroke
+    | AppendPoints
+    | FinishStroke
+    | SetStroke
+    | MoveAnchor
+    | DeleteStroke
+    | RestoreStroke
+    | SetTerrain
+    | Group,
+    Field(discriminator="type"),
+]
+
+
+class OpEnvelope(Wire):
+    """An operation with the id that makes it idempotent: ``client:counter``."""
+
+    id: OpId
+    op: Op
+
+
+class OrderedOp(Wire):
+    """An operation as the server ordered it."""
+
+    clock: Clock
+    id: OpId
+    author: Name
+    op: Op
+
+
+RejectCode = Literal[
+    "malformed",
+    "unknown_stroke",
+    "duplicate_stroke",
+    "deleted_stroke",
+    "locked_stroke",
+    "too_many_strokes",
+    "too_many_points",
+    "out_of_domain",
+    "bad_index",
+    "bad_field",
+    "view_only",
+    "rate_limited",
+    "too_large",
+    "unavailable",
+]
+
+CloseCode = Literal[
+    "bad_protocol",
+    "bad_hello",
+    "bad_secret",
+    "revoked",
+    "no_terrain",
+    "room_full",
+    "too_large",
+    "malformed",
+    "slow_client",
+    "rate_limited",
+    "bad_origin",
+    "server_error",
+    "shutting_down",
+]
+
+WS_CLOSE: Final[dict[str, int]] = {
+    "bad_protocol": 4000,
+    "bad_hello": 4001,
+    "bad_secret": 4003,
+    "revoked": 4004,
+    "no_terrain": 4005,
+    "room_full": 4006,
+    "too_large": 4007,
+    "malformed": 4008,
+    "slow_client": 4009,
+    "rate_limited": 4010,
+    "bad_origin": 4011,
+    "server_error": 4500,
+    "shutting_down": 4501,
+}
+"""Websocket close codes. 4000..4008 and 4011 are final for the page; it reconnects after any other."""
+
+
+# --- messages: client to server ---------------------------------------------------------------------------------
+
+
+class Hello(Wire):
+    """First message on a socket. ``clock`` asks to resume: the server answers with the missing ops if it can."""
+
+    type: Literal["hello"] = "hello"
+    protocol: int
+    terrain: Id
+    secret: Secret
+    client: Id
+    name: Name = ""
+    colour: Colour | None = None
+    clock: Clock | None = None
+
+
+class Ops(Wire):
+    type: Literal["ops"] = "ops"
+    ops: Annotated[tuple[OpEnvelope, ...], Field(min_length=1, max_length=MAX_OPS_PER_MESSAGE)]
+
+
+class View(Wire):
+    """The camera, from which the server selects the tiles this client needs (DESIGN 7)."""
+
+    type: Literal["view"] = "view"
+    eye: Vec3
+    target: Vec3
+    fov_deg: Annotated[float, Field(gt=1, lt=170)] = 50.0
+    width: Annotated[int, Field(ge=1, le=16384)] = 1024
+    height: Annotated[int, Field(ge=1, le=16384)] = 768
+    tau_px: Annotated[float, Field(ge=0.25, le=64)] = DEFAULT_TAU_PX
+
+
+class Presence(Wire):
+    """Ephemeral: never journaled, never on the document clock."""
+
+    type: Literal["presence"] = "presence"
+    cursor: Vec3 | None = None
+    tool: Annotated[str, StringConstraints(max_length=24)] = ""
+    stroke: Id | None = None
+    eye: Vec3 | None = None
+    target: Vec3 | None = None
+
+
+class Credit(Wire):
+    """Bytes of tile frames that the client has applied since its last credit."""
+
+    type: Literal["credit"] = "credit"
+    bytes: Annotated[int, Field(ge=0, le=2**31)]
+
+
+class Rename(Wire):
+    type: Literal["rename"] = "rename"
+    name: Name
+    colour: Colour | None = None
+
+
+class Ping(Wire):
+    type: Literal["ping"] = "ping"
+    t: float
+
+
+ClientMessage = Annotated[Hello | Ops | View | Presence | Credit | Rename | Ping, Field(discriminator="type")]
+
+# --- messages: server to client ---------------------------------------------------------------------------------
+
+
+class Member(Wire):
+    client: Id
+    name: Name
+    colour: Colour
+    role: Role
+
+
+class Welcome(Wire):
+    """Answer to ``hello``: either ``document`` (a snapshot) or ``ops`` (what was missed since the client's clock)."""
+
+    type: Literal["welcome"] = "welcome"
+    protocol: int
+    server: str
+    client: Id
+    role: Role
+    colour: Colour
+    levels: int
+    """Finest globally solved level G."""
+    clock: Clock
+    document: Document | None = None
+    ops: tuple[OrderedOp, ...] | None = None
+    members: tuple[Member, ...]
+    device: str
+
+
+class Ack(Wire):
+    """These ops are committed to the journal. ``clocks[i]`` belongs to ``ids[i]``."""
+
+    type: Literal["ack"] = "ack"
+    ids: tuple[OpId, ...]
+    clocks: tuple[Clock, ...]
+
+
+class Reject(Wire):
+    type: Literal["reject"] = "reject"
+    id: OpId
+    code: RejectCode
+    message: str
+
+
+class OpsBroadcast(Wire):
+    type: Literal["ordered"] = "ordered"
+    ops: tuple[OrderedOp, ...]
+
+
+class Members(Wire):
+    type: Literal["members"] = "members"
+    members: tuple[Member, ...]
+
+
+class MemberPresence(Wire):
+    client: Id
+    cursor: Vec3 | None = None
+    tool: str = ""
+    stroke: Id | None = None
+    eye: Vec3 | None = None
+    target: Vec3 | None = None
+
+
+class PresenceBroadcast(Wire):
+    type: Literal["presences"] = "presences"
+    members: tuple[MemberPresence, ...]
+
+
+class Progress(Wire):
+    """Where the solver stands. ``settled`` is true when every level is final for ``clock``."""
+
+    type: Literal["progress"] = "progress"
+    clock: Clock
+    level: int
+    of: int
+    settled: bool
+    note: str = ""
+
+
+class ErrorMessage(Wire):
+    type: Literal["error"] = "error"
+    code: CloseCode
+    message: str
+    fatal: bool
+
+
+class Pong(Wire):
+    type: Literal["pong"] = "pong"
+    t: float
+
+
+ServerMessage = Annotated[
+    Welcome | Ack | Reject | OpsBroadcast | Members | PresenceBroadcast | Progress | ErrorMessage | Pong,
+    Field(discriminator="type"),
+]
+
+OP: Final[TypeAdapter[Any]] = TypeAdapter(Op)
+CLIENT_MESSAGE: Final[TypeAdapter[Any]] = TypeAdapter(ClientMessage)
+SERVER_MESSAGE: Final[TypeAdapter[Any]] = TypeAdapter(ServerMessage)
+
+# --- binary frames (DESIGN 6) -----------------------------------------------------------------------------------
+
+FRAME_MAGIC: Final = 0x4B53  # "SK" on the wire
+
+
+class FrameKind(IntEnum):
+    """What a binary frame means for the tiles of its level that it does not carry.
+
+    LEVEL: the level is complete for this clock; held tiles of the level that are neither carried nor dropped are
+    confirmed as they are. FILL: only adds tiles (the view moved); says nothing of the others.
+    """
+
+    LEVEL = 0
+    FILL = 1
+
+
+class Predictor(IntEnum):
+    ZERO = 0
+    PARENT = 1
+    PREVIOUS = 2
+
+
+class Channel(IntEnum):
+    HEIGHT = 0
+    AMPLITUDE = 1
+    ROUGHNESS = 2
+
+
+FRAME_HEADER: Final = np.dtype(
+    [
+        ("magic", "<u2"),
+        ("protocol", "u1"),
+        ("kind", "u1"),
+        ("level", "u1"),
+        ("channel", "u1"),
+        ("flags", "<u2"),
+        ("clock", "<u4"),
+        ("tiles", "<u2"),
+        ("drops", "<u2"),
+    ]
+)
+"""Starts a binary frame: then ``drops`` x TILE_DROP, then ``tiles`` x (TILE_HEADER, payload of ``bytes`` bytes).
+flags bit 0: the level is final (settled) for this clock."""
+FRAME_SETTLED: Final = 1
+
+TILE_DROP: Final = np.dtype([("x", "<u2"), ("y", "<u2")])
+"""A tile of this level that the client must forget: its content changed and is not being sent."""
+
+TILE_HEADER: Final = np.dtype(
+    [
+        ("x", "<u2"),
+        ("y", "<u2"),
+        ("predictor", "u1"),
+        ("planes", "u1"),
+        ("reserved", "<u2"),
+        ("version", "<u4"),
+        ("base_version", "<u4"),
+        ("bytes", "<u4"),
+        ("sub_min", "<i4", (SUBPATCHES * SUBPATCHES,)),
+        ("sub_max", "<i4", (SUBPATCHES * SUBPATCHES,)),
+        ("sub_error", "<u4", (SUBPATCHES * SUBPATCHES,)),
+    ]
+)
+"""``version``: of this tile; ``base_version``: of the parent (or previous) tile that it was predicted from;
+``planes``: byte planes before deflate (1..4); ``sub_*``: per 16-cell sub-patch [row*4 + col], in quanta of the level:
+lowest, highest sample, and the largest distance to what the parent level would draw there (``sub_error``)."""

@@ -1,0 +1,210 @@
+"""Applying operations to a document (DESIGN 4). Pure: a document and an op give a new document or a Refusal.
+
+``apply`` is the only way a document changes, on the server, in the Python client and (as ``doc/apply.ts``) in the
+page; ``tests/vectors/ops.json`` holds the cases that both languages read.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from esker import contract as c
+from esker.contract import Op, RejectCode, Stroke, TerrainSettings
+from esker.document.strokes import bounds, world_points
+from esker.grid import Rect
+
+
+class Refusal(Exception):
+    """An op that cannot apply: ``code`` for machines, the message for a person. The document is unchanged."""
+
+    def __init__(self, code: RejectCode, message: str) -> None:
+        super().__init__(message)
+        self.code: RejectCode = code
+        self.message = message
+
+
+@dataclass(frozen=True)
+class StrokeSet:
+    """The document as the room holds it: strokes by id, tombstones by id, settings, clock. Treat as immutable."""
+
+    id: str
+    settings: TerrainSettings = field(default_factory=TerrainSettings)
+    strokes: dict[str, Stroke] = field(default_factory=dict)
+    deleted: dict[str, Stroke] = field(default_factory=dict)
+    clock: int = 0
+
+    @classmethod
+    def from_document(cls, document: c.Document) -> StrokeSet:
+        """The set that a snapshot describes."""
+        return cls(
+            document.id,
+            document.settings,
+            {s.id: s for s in document.strokes},
+            {s.id: s for s in document.deleted},
+            document.clock,
+        )
+
+    def to_document(self) -> c.Document:
+        """A snapshot as sent and stored."""
+        return c.Document(
+            id=self.id,
+            clock=self.clock,
+            settings=self.settings,
+            strokes=tuple(self.strokes.values()),
+            deleted=tuple(self.deleted.values()),
+        )
+
+    def apply(self, op: Op, limits: Limits | None = None) -> tuple[StrokeSet, Rect | None]:
+        """The set after ``op`` (clock + 1) and the ground whose constraints changed.
+
+        Raises Refusal, leaving this set as it was.
+        """
+        editor = _Editor(self, limits or Limits())
+        editor.run(op)
+        return (
+            StrokeSet(self.id, editor.settings, editor.strokes, editor.deleted, self.clock + 1),
+            editor.dirty,
+        )
+
+
+@dataclass(frozen=True)
+class Limits:
+    """The document limits of DESIGN 4; settings may lower them."""
+
+    strokes: int = c.MAX_STROKES
+    points: int = c.MAX_POINTS_PER_STROKE
+
+
+class _Editor:
+    """One application in progress. Copies the dictionaries on first write only."""
+
+    def __init__(self, base: StrokeSet, limits: Limits) -> None:
+        self.strokes, self.deleted, self.settings = base.strokes, base.deleted, base.settings
+        self.limits = limits
+        self.dirty: Rect | None = None
+        self._copied = False
+
+    def run(self, op: Op) -> None:
+        if isinstance(op, c.Group):
+            for part in op.ops:
+                self._one(part)
+        else:
+            self._one(op)
+
+    def _one(self, op: c.SimpleOp) -> None:
+        match op:
+            case c.BeginStroke():
+                self._begin(op.stroke)
+            case c.AppendPoints():
+                self._append(op)
+            case c.FinishStroke():
+                self._put(self._live(op.stroke).model_copy(update={"finished": True}))
+            case c.SetStroke():
+                self._set(op)
+            case c.MoveAnchor():
+                old = self._editable(op.stroke)
+                self._put(old.model_copy(update={op.which: op.to}))
+            case c.DeleteStroke():
+                self._delete(op.stroke)
+            case c.RestoreStroke():
+                self._restore(op.stroke)
+            case c.SetTerrain():
+                self._set_terrain(op)
+
+    def _own(self) -> None:
+        if not self._copied:
+            self.strokes, self.deleted, self._copied = dict(self.strokes), dict(self.deleted), True
+
+    def _live(self, stroke_id: str) -> Stroke:
+        stroke = self.strokes.get(stroke_id)
+        if stroke is None:
+            if stroke_id in self.deleted:
+                raise Refusal("deleted_stroke", "This stroke was deleted. Restore it before you change it.")
+            raise Refusal("unknown_stroke", "There is no such stroke in this terrain.")
+        return stroke
+
+    def _editable(self, stroke_id: str) -> Stroke:
+        stroke = self._live(stroke_id)
+        if stroke.locked:
+            raise Refusal("locked_stroke", "This stroke is locked. Unlock it to change it.")
+        return stroke
+
+    def _put(self, stroke: Stroke) -> None:
+        self._check(stroke)
+        self._own()
+        old = self.strokes.get(stroke.id)
+        self._touch(old)
+        self._touch(stroke)
+        self.strokes[stroke.id] = stroke
+
+    def _touch(self, stroke: Stroke | None) -> None:
+        rect = bounds(stroke) if stroke is not None else None
+        if rect is not None:
+            self.dirty = rect.union(self.dirty)
+
+    def _check(self, stroke: Stroke) -> None:
+        if len(stroke.curve) > self.limits.points:
+            raise Refusal("too_many_points", f"A stroke holds at most {self.limits.points} points.")
+        bound = c.DOMAIN_MARGIN * self.settings.size_m
+        anchors = (*stroke.first, *stroke.last)
+        if any(abs(v) > bound for v in anchors):
+            raise Refusal("out_of_domain", "An anchor lies farther than ten times the terrain from its corner.")
+        if stroke.curve and abs(world_points(stroke)).max() > bound:
+            raise Refusal("out_of_domain", "A point lies farther than ten times the terrain from its corner.")
+
+    def _begin(self, stroke: Stroke) -> None:
+        if stroke.id in self.strokes or stroke.id in self.deleted:
+            raise Refusal("duplicate_stroke", "A stroke with this id exists already.")
+        if len(self.strokes) >= self.limits.strokes:
+            raise Refusal("too_many_strokes", f"A terrain holds at most {self.limits.strokes} strokes.")
+        self._put(stroke)
+
+    def _append(self, op: c.AppendPoints) -> None:
+        old = self._editable(op.stroke)
+        if op.start > len(old.curve):
+            raise Refusal("bad_index", "The points do not continue the stroke that the server holds.")
+        self._put(old.model_copy(update={"curve": old.curve[: op.start] + op.points, "last": op.last}))
+
+    def _set(self, op: c.SetStroke) -> None:
+        old = self._live(op.stroke)
+        update = changed(op.fields, c.NULLABLE_STROKE_FIELDS)
+        if old.locked and set(update) - {"locked"}:
+            raise Refusal("locked_stroke", "This stroke is locked. Unlock it to change it.")
+        self._put(old.model_copy(update=update))
+
+    def _delete(self, stroke_id: str) -> None:
+        old = self._editable(stroke_id)
+        self._own()
+        self._touch(old)
+        del self.strokes[stroke_id]
+        self.deleted[stroke_id] = old
+        while len(self.deleted) > self.limits.strokes:
+            del self.deleted[next(iter(self.deleted))]
+
+    def _restore(self, stroke_id: str) -> None:
+        if stroke_id in self.strokes:
+            raise Refusal("duplicate_stroke", "This stroke is not deleted.")
+        stroke = self.deleted.get(stroke_id)
+        if stroke is None:
+            raise Refusal("unknown_stroke", "There is no such deleted stroke to restore.")
+        if len(self.strokes) >= self.limits.strokes:
+            raise Refusal("too_many_strokes", f"A terrain holds at most {self.limits.strokes} strokes.")
+        self._own()
+        del self.deleted[stroke_id]
+        self._put(stroke)
+
+    def _set_terrain(self, op: c.SetTerrain) -> None:
+        update = changed(op.fields, c.NULLABLE_TERRAIN_FIELDS)
+        self.settings = self.settings.model_copy(update=update)
+        if update.keys() & {"reach_m", "border"}:
+            size = self.settings.size_m
+            self.dirty = Rect(0, 0, size, size).union(self.dirty)
+
+
+def changed(fields: c.StrokeFields | c.TerrainFields, nullable: frozenset[str]) -> dict[str, object]:
+    """The fields that a partial update really sets. Raises Refusal when a field that has no null is null."""
+    update = {name: getattr(fields, name) for name in fields.model_fields_set}
+    for name, value in update.items():
+        if value is None and name not in nullable:
+            raise Refusal("bad_field", f"'{name}' needs a value.")
+    return update

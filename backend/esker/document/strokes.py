@@ -1,0 +1,69 @@
+"""Strokes as geometry: frames, world points, bounds (DESIGN 4, 5.2; paper 0, III-B). Pure functions of a Stroke."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from esker.contract import CurvePoint, Flank, Stroke, Vec3
+from esker.grid import Rect
+
+Points = NDArray[np.float64]
+
+
+def world_points(stroke: Stroke) -> Points:
+    """The crest polyline, shape (n, 3), float64, metres: the curve taken out of the frame of the anchors."""
+    curve = np.asarray(stroke.curve, dtype=np.float64).reshape(-1, 2)
+    first, last = np.asarray(stroke.first, dtype=np.float64), np.asarray(stroke.last, dtype=np.float64)
+    out = np.empty((len(curve), 3))
+    if stroke.kind == "profile":
+        out[:] = first + curve[:, :1] * (last - first)
+        out[:, 2] += curve[:, 1]
+        return out
+    d = last[:2] - first[:2]
+    perp = np.array([-d[1], d[0]])
+    out[:, :2] = first[:2] + curve[:, :1] * d + curve[:, 1:] * perp
+    out[:, 2] = first[2]
+    return out
+
+
+def profile_curve(points: Points, first: Vec3, last: Vec3) -> tuple[CurvePoint, ...]:
+    """World points, shape (n, 3), seen in the profile frame of the anchors: the inverse of ``world_points``.
+
+    Points off the plane are projected on it along its horizontal normal. A zero-length frame puts all u at 0.
+    """
+    a, b = np.asarray(first, dtype=np.float64), np.asarray(last, dtype=np.float64)
+    d = b[:2] - a[:2]
+    length2 = float(d @ d)
+    u = (points[:, :2] - a[:2]) @ d / length2 if length2 > 0 else np.zeros(len(points))
+    w = points[:, 2] - (a[2] + u * (b[2] - a[2]))
+    return tuple((float(p), float(q)) for p, q in zip(u, w, strict=True))
+
+
+def level_curve(points: Points, first: Vec3, last: Vec3) -> tuple[CurvePoint, ...]:
+    """World points, shape (n, 2) or (n, 3), in the similarity frame of the anchors (heights are dropped)."""
+    a, b = np.asarray(first, dtype=np.float64), np.asarray(last, dtype=np.float64)
+    d = b[:2] - a[:2]
+    length2 = float(d @ d)
+    if length2 == 0:
+        return tuple((0.0, 0.0) for _ in points)
+    q = points[:, :2] - a[:2]
+    u, v = q @ d / length2, q @ np.array([-d[1], d[0]]) / length2
+    return tuple((float(p), float(r)) for p, r in zip(u, v, strict=True))
+
+
+def influence_extent(stroke: Stroke) -> float:
+    """Farthest horizontal distance from the crest at which the stroke constrains anything, metres."""
+    sides: Sequence[Flank | None] = (stroke.left, stroke.right)
+    return stroke.plateau_radius_m + max((f.extent_m for f in sides if f is not None), default=0.0)
+
+
+def bounds(stroke: Stroke) -> Rect | None:
+    """The rectangle outside which the stroke constrains nothing; None for a stroke without effect."""
+    if stroke.hidden or not stroke.curve:
+        return None
+    xy = world_points(stroke)[:, :2]
+    low, high = xy.min(axis=0), xy.max(axis=0)
+    return Rect(float(low[0]), float(low[1]), float(high[0]), float(high[1])).grown(influence_extent(stroke))

@@ -1,0 +1,95 @@
+"""World <-> sample <-> tile (DESIGN 3). Pure arithmetic, no state.
+
+Grids are vertex-centred: level l has 64*2^l + 1 samples a side; arrays are [row, col], row 0 is south.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from esker.contract import QUANTA_PER_CELL, TILE_CELLS
+
+
+def cells(level: int) -> int:
+    """Cells along one side of a level."""
+    return TILE_CELLS << level
+
+
+def samples(level: int) -> int:
+    """Samples along one side of a level: 65, 129, 257, 513, 1025, 2049, 4097."""
+    return cells(level) + 1
+
+
+def spacing(level: int, size_m: float) -> float:
+    """Distance between neighbouring samples, metres."""
+    return size_m / cells(level)
+
+
+def quantum(level: int, size_m: float) -> float:
+    """Height quantisation step of a level, metres (DESIGN 6)."""
+    return spacing(level, size_m) / QUANTA_PER_CELL
+
+
+class TileKey(NamedTuple):
+    """A tile: 64x64 cells of a level. ``x`` counts tiles from the west, ``y`` from the south."""
+
+    level: int
+    x: int
+    y: int
+
+    def parent(self) -> TileKey:
+        """The tile of the next coarser level that covers this one. Raises ValueError at the root."""
+        if self.level == 0:
+            raise ValueError("the root tile has no parent")
+        return TileKey(self.level - 1, self.x >> 1, self.y >> 1)
+
+    def children(self) -> tuple[TileKey, TileKey, TileKey, TileKey]:
+        """South-west, south-east, north-west, north-east."""
+        n, x, y = self.level + 1, 2 * self.x, 2 * self.y
+        return TileKey(n, x, y), TileKey(n, x + 1, y), TileKey(n, x, y + 1), TileKey(n, x + 1, y + 1)
+
+
+def tiles(level: int) -> Iterator[TileKey]:
+    """All tiles of a level, row by row from the south."""
+    n = 1 << level
+    return (TileKey(level, x, y) for y in range(n) for x in range(n))
+
+
+@dataclass(frozen=True, slots=True)
+class Rect:
+    """Axis-aligned rectangle in world metres, x0 <= x1 and y0 <= y1."""
+
+    x0: float
+    y0: float
+    x1: float
+    y1: float
+
+    def union(self, other: Rect | None) -> Rect:
+        """Smallest rectangle that holds both."""
+        if other is None:
+            return self
+        return Rect(min(self.x0, other.x0), min(self.y0, other.y0), max(self.x1, other.x1), max(self.y1, other.y1))
+
+    def grown(self, margin: float) -> Rect:
+        """Moved outward by ``margin`` metres on every side."""
+        return Rect(self.x0 - margin, self.y0 - margin, self.x1 + margin, self.y1 + margin)
+
+    def intersects(self, other: Rect) -> bool:
+        """True when the closed rectangles share a point."""
+        return self.x0 <= other.x1 and other.x0 <= self.x1 and self.y0 <= other.y1 and other.y0 <= self.y1
+
+    def sample_window(self, level: int, size_m: float) -> tuple[int, int, int, int]:
+        """Rows and columns ``(r0, r1, c0, c1)`` (half open, clipped) of the samples inside."""
+        s, n = spacing(level, size_m), samples(level)
+        r0, r1 = math.ceil(self.y0 / s), math.floor(self.y1 / s) + 1
+        c0, c1 = math.ceil(self.x0 / s), math.floor(self.x1 / s) + 1
+        return max(0, r0), min(n, max(0, r1)), max(0, c0), min(n, max(0, c1))
+
+
+def tile_rect(key: TileKey, size_m: float) -> Rect:
+    """The ground a tile covers."""
+    w = size_m / (1 << key.level)
+    return Rect(key.x * w, key.y * w, (key.x + 1) * w, (key.y + 1) * w)

@@ -1,0 +1,171 @@
+/**
+ * The values that pass between the rooms of the page (DESIGN 2). No DOM, no GPU, no logic.
+ *
+ * Metres; x east, y north, z up; `[row, col]` with row 0 south.
+ */
+
+import type { Stroke, StrokeKind, TerrainSettings } from "../generated/contract.ts";
+
+export type Vec3 = readonly [number, number, number];
+export type Rgba = readonly [number, number, number, number];
+
+/** A camera at one moment. `Camera.state` (core/camera.ts) makes these; nobody else does. */
+export interface CameraState {
+  readonly mode: "orbit" | "fly" | "map";
+  readonly eye: Vec3;
+  readonly target: Vec3;
+  readonly up: Vec3;
+  /** Vertical field of view, degrees. In map mode the camera is orthographic. */
+  readonly fovDeg: number;
+  /** Height of the view in metres in map mode, else 0. */
+  readonly orthoHeight: number;
+  readonly near: number;
+  readonly far: number;
+  /** Canvas size in device pixels. */
+  readonly width: number;
+  readonly height: number;
+  /** Column-major 4x4, WebGPU clip space (z 0..1). */
+  readonly viewProj: Float32Array;
+  readonly invViewProj: Float32Array;
+}
+
+export interface Ray {
+  readonly origin: Vec3;
+  readonly dir: Vec3;
+}
+
+/** A heightfield that answers for its whole domain [0, size]^2; outside, heights are those of the nearest border. */
+export interface Ground {
+  readonly sizeM: number;
+  heightAt(x: number, y: number): number;
+  /** First hit of the ray with the ground inside the domain, or null. */
+  raycast(ray: Ray): Vec3 | null;
+}
+
+/** One tile as it is drawn now. Immutable: a change makes a new object with a greater `stamp`. */
+export interface Tile {
+  readonly level: number;
+  readonly x: number;
+  readonly y: number;
+  /** Version on the server of the exact samples; display may run ahead while `exact` is false. */
+  readonly version: number;
+  /** False while the heights are the last exact ones moved along with a newer parent (a preview). */
+  readonly exact: boolean;
+  /** Rises with every change of any tile of the store; renderers upload what is newer than what they hold. */
+  readonly stamp: number;
+  /** 65 x 65 display heights in metres. */
+  readonly heights: Float32Array;
+  /** Per 16-cell sub-patch [row*4 + col], metres. `subError`: distance to what the parent would draw there. */
+  readonly subMin: Float32Array;
+  readonly subMax: Float32Array;
+  readonly subError: Float32Array;
+}
+
+/** What selection, renderers and picking read of the tile store. */
+export interface TileView {
+  readonly sizeM: number;
+  /** Finest level that can exist. */
+  readonly levels: number;
+  /** Rises when any tile changes. */
+  readonly stamp: number;
+  tile(level: number, x: number, y: number): Tile | undefined;
+  tiles(): Iterable<Tile>;
+}
+
+/** A binary frame after decoding (net/decode.ts), applied atomically by tiles/store.ts. */
+export interface DecodedTile {
+  readonly x: number;
+  readonly y: number;
+  readonly version: number;
+  /** 65 x 65 exact samples in quanta of the level. */
+  readonly samples: Int32Array;
+  readonly subMin: Int32Array;
+  readonly subMax: Int32Array;
+  readonly subError: Uint32Array;
+}
+
+export interface DecodedFrame {
+  readonly kind: number;
+  readonly level: number;
+  readonly channel: number;
+  readonly clock: number;
+  readonly settled: boolean;
+  readonly drops: readonly { readonly x: number; readonly y: number }[];
+  readonly tiles: readonly DecodedTile[];
+  /** Bytes on the wire: returned to the server as credit once applied. */
+  readonly bytes: number;
+}
+
+/** A stroke as the renderers draw it: world points of its crest. */
+export interface StrokeVisual {
+  readonly id: string;
+  readonly kind: StrokeKind;
+  /** xyz triples, metres. */
+  readonly points: Float32Array;
+  readonly colour: Rgba;
+  readonly selected: boolean;
+  readonly hovered: boolean;
+  /** Under way: drawn by somebody at this moment. */
+  readonly live: boolean;
+}
+
+/** The plane that is being drawn on, and the shadow of the stroke on the frozen ground. */
+export interface GhostVisual {
+  readonly corners: readonly [Vec3, Vec3, Vec3, Vec3];
+  /** xyz triples on the ground under the stroke. */
+  readonly shadow: Float32Array;
+  readonly colour: Rgba;
+}
+
+/** A ring on the ground: somebody's cursor, or mine. */
+export interface CursorVisual {
+  readonly position: Vec3;
+  readonly colour: Rgba;
+  readonly radiusPx: number;
+}
+
+/** All that one frame shows. Built anew by the app each frame; renderers only read it. */
+export interface Scene {
+  readonly camera: CameraState;
+  readonly tiles: TileView;
+  readonly settings: TerrainSettings;
+  readonly strokes: readonly StrokeVisual[];
+  readonly ghost: GhostVisual | null;
+  readonly cursors: readonly CursorVisual[];
+  /** Screen-error bound in pixels. */
+  readonly tauPx: number;
+  /** Seconds, for water and the like. */
+  readonly time: number;
+  readonly overlay: "none" | "contours" | "slope" | "patches";
+  readonly showStrokes: boolean;
+}
+
+export interface FrameStats {
+  readonly patches: number;
+  readonly triangles: number;
+  readonly selectMs: number;
+  readonly cpuMs: number;
+  readonly uploads: number;
+  /** True when another frame is needed even if nothing changes (uploads pending, something moving). */
+  readonly busy: boolean;
+}
+
+/** The 3D renderer and the 2D map both are one of these. */
+export interface SceneRenderer {
+  readonly kind: "webgpu" | "map";
+  /** Short words for the status line: adapter or "2D map". */
+  readonly description: string;
+  /** Draws one frame; cheap when nothing changed. */
+  render(scene: Scene): FrameStats;
+  /** Resolves to a reason when the device is lost. */
+  readonly lost: Promise<string>;
+  destroy(): void;
+}
+
+export interface TemplateInfo {
+  readonly id: string;
+  readonly title: string;
+  readonly description: string;
+}
+
+export type { Stroke, TerrainSettings };

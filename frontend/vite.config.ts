@@ -1,0 +1,11 @@
+import { resolve } from "node:path";
+import { defineConfig } from "vite";
+
+// The page is built once and served by the Python server from the same origin; shaders are imported with `?raw`.
+export default defineConfig({
+  base: "/",
+  resolve: { alias: { "@shaders": resolve(import.meta.dirname, "../shaders") } },
+  server: { fs: { allow: [resolve(import.meta.dirname, "..")] } },
+  build: { target: "es2023", outDir: "dist", assetsInlineLimit: 0, chunkSizeWarningLimit: 1500 },
+  worker: { format: "es" },
+});
