@@ -1,0 +1,418 @@
+/**
+ * The camera: one pose (pivot, distance, heading, pitch) seen in three modes (DESIGN 12).
+ *
+ * orbit turns about the pivot, fly turns about the eye, map looks straight down with an orthographic projection of
+ * the same scale. Pixels are device pixels of the canvas, origin at the top left corner; angles are radians inside
+ * and degrees at the interface. The only mutable state is the pose; `state` is published after each change.
+ */
+
+import { type ReadonlySignal, signal } from "@preact/signals-core";
+import { cameraState, FOV_DEG, fitDistance, type Pose, poseBasis, poseEye } from "./camerastate.ts";
+import { add, addScaled, clamp, DEG, distance, dot, mix, mix3, normalize, sub, wrapAngle } from "./math.ts";
+import type { CameraState, Ground, Ray, Vec3 } from "./types.ts";
+
+export type CameraMode = CameraState["mode"];
+
+/** A remembered view: plain data, safe to store. */
+export interface SavedView {
+  readonly mode: CameraMode;
+  readonly eye: Vec3;
+  readonly target: Vec3;
+}
+
+export interface Projection {
+  /** Device pixels from the top left corner. */
+  readonly x: number;
+  readonly y: number;
+  /** Metres along the view direction; negative behind the eye. */
+  readonly depth: number;
+  /** In front of the eye and inside the canvas. (Nothing is said about ground in between.) */
+  readonly visible: boolean;
+}
+
+export interface FrameRect {
+  readonly x0: number;
+  readonly y0: number;
+  readonly x1: number;
+  readonly y1: number;
+}
+
+interface Flight {
+  readonly from: Pose;
+  readonly to: Pose;
+  readonly durationS: number;
+  elapsedS: number;
+}
+
+const MAX_PITCH = 30 * DEG;
+const MIN_PITCH = -89 * DEG;
+const FLY_PITCH = 85 * DEG;
+const HOME_HEADING = 20 * DEG;
+const HOME_PITCH = -30 * DEG;
+/** Time in which a smooth zoom covers 63 % of its way. */
+const ZOOM_TAU_S = 0.07;
+
+export class Camera {
+  readonly #sizeM: number;
+  readonly #state;
+  readonly #views = signal<ReadonlyMap<string, SavedView>>(new Map());
+  #pose: Pose;
+  #beforeMap: { heading: number; pitch: number } | null = null;
+  #flight: Flight | null = null;
+  #zoomLeft = 0;
+  #zoomAnchor: Vec3 | undefined;
+  #clearance: number;
+  #width = 1;
+  #height = 1;
+
+  /** Starts in orbit mode at the home view of a terrain of `sizeM` metres. */
+  constructor(sizeM: number) {
+    this.#sizeM = sizeM;
+    this.#clearance = sizeM / 4;
+    this.#pose = this.#homePose("orbit");
+    this.#state = signal<CameraState>(this.#snapshot());
+  }
+
+  /** The camera as everybody reads it. */
+  get state(): ReadonlySignal<CameraState> {
+    return this.#state;
+  }
+
+  /** Remembered views by slot. */
+  get views(): ReadonlySignal<ReadonlyMap<string, SavedView>> {
+    return this.#views;
+  }
+
+  /** True when an animation is under way, so that `update` must be called again. */
+  get moving(): boolean {
+    return this.#flight !== null || this.#zoomLeft !== 0;
+  }
+
+  /** Canvas size in device pixels. */
+  resize(width: number, height: number): void {
+    this.#width = Math.max(1, Math.round(width));
+    this.#height = Math.max(1, Math.round(height));
+    this.#publish();
+  }
+
+  /** Turns about the pivot (about the eye in fly mode; the map turns about its centre). */
+  orbit(dxPx: number, dyPx: number): void {
+    if (this.#pose.mode === "fly") {
+      this.look(-dxPx, -dyPx);
+      return;
+    }
+    const k = Math.PI / this.#height;
+    const { heading, pitch, mode } = this.#pose;
+    if (mode === "map") this.#set({ heading: wrapAngle(heading + dxPx * k) });
+    else this.#set({ heading: wrapAngle(heading + dxPx * k), pitch: clamp(pitch - dyPx * k, MIN_PITCH, MAX_PITCH) });
+  }
+
+  /** Turns by an angle (degrees, clockwise seen from above) about the pivot: the two-finger twist. */
+  twist(angleDeg: number): void {
+    this.#set({ heading: wrapAngle(this.#pose.heading + angleDeg * DEG) });
+  }
+
+  /** Drags the ground with the pointer; the pivot follows the height of the ground. */
+  pan(dxPx: number, dyPx: number, ground: Ground): void {
+    const { forward, right, up } = poseBasis(this.#pose);
+    const perPixel = this.#metresPerPixel();
+    const pivot = this.#pose.pivot;
+    if (this.#pose.mode === "fly") {
+      this.#set({ pivot: addScaled(addScaled(pivot, right, -dxPx * perPixel), up, dyPx * perPixel) });
+      return;
+    }
+    const north: Vec3 = [Math.sin(this.#pose.heading), Math.cos(this.#pose.heading), 0];
+    // Near the horizon a pixel covers much ground: the divisor is bounded so that the ground never runs away.
+    const foreshortening = Math.max(0.25, -forward[2]);
+    const moved = addScaled(addScaled(pivot, right, -dxPx * perPixel), north, (dyPx * perPixel) / foreshortening);
+    const lift = ground.heightAt(moved[0], moved[1]) - ground.heightAt(pivot[0], pivot[1]);
+    this.#set({ pivot: this.#leash([moved[0], moved[1], moved[2] + lift]) });
+  }
+
+  /**
+   * Magnifies by `factor` (> 1 comes nearer). The anchor, a point in the world, stays where it is on the screen:
+   * eye and pivot move on the lines toward it (a homothety). With `smooth` the way is covered by `update`.
+   */
+  zoom(factor: number, anchor?: Vec3, smooth = false): void {
+    if (!(factor > 0) || !Number.isFinite(factor)) return;
+    if (smooth) {
+      this.#flight = null;
+      this.#zoomLeft += Math.log(factor);
+      this.#zoomAnchor = anchor;
+      return;
+    }
+    const { pivot, distanceM } = this.#pose;
+    const next = clamp(distanceM / factor, this.#nearest, this.#farthest);
+    const k = next / distanceM;
+    if (k === 1) {
+      this.#zoomLeft = 0;
+      return;
+    }
+    const centre = anchor ?? pivot;
+    this.#set({ distanceM: next, pivot: this.#leash(addScaled(centre, sub(pivot, centre), k)) });
+  }
+
+  /** Switches the mode. The place stays: the map shows what was around the pivot at the same scale. */
+  setMode(mode: CameraMode): void {
+    const from = this.#pose.mode;
+    if (mode === from) return;
+    this.#flight = null;
+    this.#zoomLeft = 0;
+    if (mode === "map") {
+      this.#beforeMap = { heading: this.#pose.heading, pitch: this.#pose.pitch };
+      this.#set({ mode, heading: 0, pitch: -90 * DEG });
+      return;
+    }
+    const back = from === "map" ? (this.#beforeMap ?? { heading: 0, pitch: HOME_PITCH }) : {};
+    this.#set({ mode, ...back });
+  }
+
+  /** Moves the eye in fly mode; arguments in -1..1, speed follows the height above the ground. */
+  fly(forward: number, right: number, up: number, dtS: number): void {
+    const basis = poseBasis(this.#pose);
+    const step = clamp(this.#clearance * 0.9, this.#sizeM / 200, this.#sizeM) * dtS;
+    let pivot = addScaled(this.#pose.pivot, basis.forward, forward * step);
+    pivot = addScaled(pivot, basis.right, right * step);
+    pivot = add(pivot, [0, 0, up * step]);
+    const eye = poseEye(this.#pose);
+    const shift = sub(pivot, this.#pose.pivot);
+    const allowed = sub(this.#leash(add(eye, shift)), eye);
+    this.#set({ pivot: add(this.#pose.pivot, allowed) });
+  }
+
+  /** Turns the view about the eye. */
+  look(dxPx: number, dyPx: number): void {
+    const k = (this.#pose.fovDeg * DEG) / this.#height;
+    this.#keepEye(
+      wrapAngle(this.#pose.heading + dxPx * k),
+      clamp(this.#pose.pitch - dyPx * k, -FLY_PITCH, FLY_PITCH),
+      this.#pose.distanceM,
+    );
+  }
+
+  /** Moves the pivot along the view to the depth of `point`, so that orbiting turns about what is looked at. */
+  pivotAt(point: Vec3): void {
+    if (this.#pose.mode === "map") return;
+    const eye = poseEye(this.#pose);
+    const depth = dot(sub(point, eye), poseBasis(this.#pose).forward);
+    this.#keepEye(this.#pose.heading, this.#pose.pitch, clamp(depth, this.#nearest, this.#farthest));
+  }
+
+  /** Flies to where the rectangle (at ground level) or all points are in view. */
+  frame(what: FrameRect | readonly Vec3[], durationMs = 450): void {
+    const points: readonly Vec3[] =
+      "x0" in what ? [[what.x0, what.y0, 0] as const, [what.x1, what.y1, 0] as const] : what;
+    if (points.length === 0) return;
+    const low = points.reduce<Vec3>(
+      (a, p) => [Math.min(a[0], p[0]), Math.min(a[1], p[1]), Math.min(a[2], p[2])],
+      points[0]!,
+    );
+    const high = points.reduce<Vec3>(
+      (a, p) => [Math.max(a[0], p[0]), Math.max(a[1], p[1]), Math.max(a[2], p[2])],
+      points[0]!,
+    );
+    const pitch = this.#pose.mode === "map" ? this.#pose.pitch : clamp(this.#pose.pitch, -75 * DEG, -15 * DEG);
+    const pose: Pose = { ...this.#pose, pivot: mix3(low, high, 0.5), pitch };
+    const distanceM = fitDistance(pose, points, this.#width / this.#height, 0.2, this.#sizeM / 40);
+    this.#flyTo({ ...pose, distanceM: clamp(distanceM, this.#nearest, this.#farthest) }, durationMs);
+  }
+
+  /** Flies to a pose given by its eye and target. In map mode only place and scale are taken. */
+  goTo(eye: Vec3, target: Vec3, durationMs = 600): void {
+    const d = sub(target, eye);
+    const distanceM = clamp(distance(eye, target), this.#nearest, this.#farthest);
+    const dir = normalize(d);
+    const flat = Math.hypot(dir[0], dir[1]);
+    const heading = flat > 1e-6 ? Math.atan2(dir[0], dir[1]) : this.#pose.heading;
+    const angles =
+      this.#pose.mode === "map" ? {} : { heading, pitch: clamp(Math.atan2(dir[2], flat), MIN_PITCH, FLY_PITCH) };
+    this.#flyTo({ ...this.#pose, ...angles, pivot: target, distanceM }, durationMs);
+  }
+
+  /** Flies back to the view of the whole terrain. */
+  home(durationMs = 600): void {
+    this.#flyTo(this.#homePose(this.#pose.mode), durationMs);
+  }
+
+  /**
+   * One step of time: animates and keeps the eye above the ground (walk height in fly mode).
+   * Returns true while anything moves, so that the caller draws another frame.
+   */
+  update(dtS: number, ground: Ground): boolean {
+    const before = this.#pose;
+    this.#stepFlight(dtS);
+    this.#stepZoom(dtS);
+    this.#keepAbove(ground);
+    return this.moving || this.#pose !== before;
+  }
+
+  /** The ray through a device pixel. */
+  ray(xPx: number, yPx: number): Ray {
+    const { forward, right, up } = poseBasis(this.#pose);
+    const nx = (2 * xPx) / this.#width - 1;
+    const ny = 1 - (2 * yPx) / this.#height;
+    const t = Math.tan((this.#pose.fovDeg * DEG) / 2);
+    const aspect = this.#width / this.#height;
+    const eye = poseEye(this.#pose);
+    if (this.#pose.mode === "map") {
+      const half = this.#pose.distanceM * t;
+      const onPlane = addScaled(addScaled(eye, right, nx * half * aspect), up, ny * half);
+      // Start above everything: the eye of a close map view may be lower than a summit beside it.
+      return { origin: [onPlane[0], onPlane[1], onPlane[2] + 2 * this.#sizeM], dir: forward };
+    }
+    return { origin: eye, dir: normalize(addScaled(addScaled(forward, right, nx * t * aspect), up, ny * t)) };
+  }
+
+  /** Where a world point is on the canvas. */
+  project(p: Vec3): Projection {
+    const { forward, right, up } = poseBasis(this.#pose);
+    const q = sub(p, poseEye(this.#pose));
+    const depth = dot(q, forward);
+    const map = this.#pose.mode === "map";
+    const half = Math.tan((this.#pose.fovDeg * DEG) / 2) * (map ? this.#pose.distanceM : depth);
+    const nx = dot(q, right) / (half * (this.#width / this.#height));
+    const ny = dot(q, up) / half;
+    const x = ((nx + 1) / 2) * this.#width;
+    const y = ((1 - ny) / 2) * this.#height;
+    const inFront = map || depth > 0;
+    return { x, y, depth, visible: inFront && Math.abs(nx) <= 1 && Math.abs(ny) <= 1 };
+  }
+
+  /** Metres that one device pixel covers at a world point. */
+  metresPerPixelAt(p: Vec3): number {
+    if (this.#pose.mode === "map") return this.#metresPerPixel();
+    const depth = Math.max(0.1, dot(sub(p, poseEye(this.#pose)), poseBasis(this.#pose).forward));
+    return (2 * depth * Math.tan((this.#pose.fovDeg * DEG) / 2)) / this.#height;
+  }
+
+  /** Remembers the present view under a name. */
+  saveView(slot: string): SavedView {
+    const view: SavedView = { mode: this.#pose.mode, eye: poseEye(this.#pose), target: this.#pose.pivot };
+    this.#views.value = new Map(this.#views.value).set(slot, view);
+    return view;
+  }
+
+  /** Takes over remembered views, as read from storage. */
+  loadViews(views: Iterable<readonly [string, SavedView]>): void {
+    this.#views.value = new Map(views);
+  }
+
+  /** Flies to a remembered view; false when the slot is empty. */
+  restoreView(slot: string, durationMs = 600): boolean {
+    const view = this.#views.value.get(slot);
+    if (view === undefined) return false;
+    this.setMode(view.mode);
+    this.goTo(view.eye, view.target, durationMs);
+    return true;
+  }
+
+  get #nearest(): number {
+    return Math.max(2, this.#sizeM / 2000);
+  }
+
+  get #farthest(): number {
+    return this.#sizeM * 8;
+  }
+
+  #homePose(mode: CameraMode): Pose {
+    const half = this.#sizeM / 2;
+    const angles = mode === "map" ? { heading: 0, pitch: -90 * DEG } : { heading: HOME_HEADING, pitch: HOME_PITCH };
+    const pose: Pose = { mode, pivot: [half, half, 0], distanceM: 1, fovDeg: FOV_DEG, ...angles };
+    const corners: Vec3[] = [0, this.#sizeM].flatMap((x) => [0, this.#sizeM].map((y): Vec3 => [x, y, 0]));
+    const distanceM = fitDistance(pose, corners, this.#width / this.#height, 0.06, this.#sizeM / 2);
+    return { ...pose, distanceM: Math.min(distanceM, this.#farthest) };
+  }
+
+  #metresPerPixel(): number {
+    return (2 * this.#pose.distanceM * Math.tan((this.#pose.fovDeg * DEG) / 2)) / this.#height;
+  }
+
+  #leash(p: Vec3): Vec3 {
+    const m = this.#sizeM * 0.75;
+    const s = this.#sizeM;
+    return [clamp(p[0], -m, s + m), clamp(p[1], -m, s + m), clamp(p[2], -4 * s, 4 * s)];
+  }
+
+  #keepEye(heading: number, pitch: number, distanceM: number): void {
+    const eye = poseEye(this.#pose);
+    const turned: Pose = { ...this.#pose, heading, pitch, distanceM };
+    this.#set({ heading, pitch, distanceM, pivot: addScaled(eye, poseBasis(turned).forward, distanceM) });
+  }
+
+  #set(change: Partial<Pose>): void {
+    this.#flight = null;
+    this.#pose = { ...this.#pose, ...change };
+    this.#publish();
+  }
+
+  #flyTo(to: Pose, durationMs: number): void {
+    this.#zoomLeft = 0;
+    if (durationMs <= 0) {
+      this.#set(to);
+      return;
+    }
+    this.#flight = { from: this.#pose, to, durationS: durationMs / 1000, elapsedS: 0 };
+  }
+
+  #stepFlight(dtS: number): void {
+    const flight = this.#flight;
+    if (flight === null) return;
+    flight.elapsedS += dtS;
+    const t = clamp(flight.elapsedS / flight.durationS, 0, 1);
+    const e = t * t * (3 - 2 * t);
+    const { from, to } = flight;
+    this.#pose = {
+      ...to,
+      pivot: mix3(from.pivot, to.pivot, e),
+      distanceM: from.distanceM * (to.distanceM / from.distanceM) ** e,
+      heading: wrapAngle(from.heading + wrapAngle(to.heading - from.heading) * e),
+      pitch: mix(from.pitch, to.pitch, e),
+    };
+    if (t >= 1) {
+      this.#pose = to;
+      this.#flight = null;
+    }
+    this.#publish();
+  }
+
+  #stepZoom(dtS: number): void {
+    if (this.#zoomLeft === 0) return;
+    const part = Math.abs(this.#zoomLeft) < 1e-3 ? this.#zoomLeft : this.#zoomLeft * (1 - Math.exp(-dtS / ZOOM_TAU_S));
+    this.#zoomLeft -= part;
+    this.zoom(Math.exp(part), this.#zoomAnchor);
+  }
+
+  #keepAbove(ground: Ground): void {
+    const eye = poseEye(this.#pose);
+    const floor = ground.heightAt(eye[0], eye[1]);
+    const walk = Math.max(1.7, this.#sizeM / 2400);
+    const clearance = Math.max(walk, eye[2] - floor);
+    const low = this.#pose.mode !== "map" && eye[2] < floor + walk;
+    if (!low && Math.abs(clearance - this.#clearance) < 1e-3 * this.#clearance) return;
+    this.#clearance = clearance;
+    if (low) this.#raiseEye([eye[0], eye[1], floor + walk]);
+    this.#publish();
+  }
+
+  /** Lifts the eye. Orbit keeps looking at its pivot; fly keeps its direction. */
+  #raiseEye(eye: Vec3): void {
+    const { pivot, mode, distanceM } = this.#pose;
+    if (mode === "fly") {
+      this.#pose = { ...this.#pose, pivot: addScaled(eye, poseBasis(this.#pose).forward, distanceM) };
+      return;
+    }
+    const d = sub(pivot, eye);
+    const flat = Math.hypot(d[0], d[1]);
+    const pitch = clamp(Math.atan2(d[2], flat), MIN_PITCH, MAX_PITCH);
+    const lifted: Pose = { ...this.#pose, pitch, distanceM: Math.max(this.#nearest, distance(eye, pivot)) };
+    this.#pose = { ...lifted, pivot: addScaled(eye, poseBasis(lifted).forward, lifted.distanceM) };
+  }
+
+  #snapshot(): CameraState {
+    return cameraState(this.#pose, this.#width, this.#height, this.#sizeM, this.#clearance);
+  }
+
+  #publish(): void {
+    this.#state.value = this.#snapshot();
+  }
+}

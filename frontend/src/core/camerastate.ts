@@ -1,0 +1,122 @@
+/** From a pose to the matrices that renderers read. Pure. */
+
+import { mat4d } from "wgpu-matrix";
+import { addScaled, DEG, dot, sub } from "./math.ts";
+import type { CameraState, Vec3 } from "./types.ts";
+
+/** Vertical field of view, degrees; the map covers at its pivot what the perspective view does. */
+export const FOV_DEG = 45;
+
+/** Where the camera is. `heading` clockwise from north, `pitch` above the horizon, radians. */
+export interface Pose {
+  readonly mode: CameraState["mode"];
+  readonly pivot: Vec3;
+  readonly distanceM: number;
+  readonly heading: number;
+  readonly pitch: number;
+  readonly fovDeg: number;
+}
+
+export interface Basis {
+  readonly forward: Vec3;
+  readonly right: Vec3;
+  readonly up: Vec3;
+}
+
+/** Orthonormal view axes in world coordinates; `right` is always horizontal. */
+export function poseBasis(pose: Pose): Basis {
+  const sh = Math.sin(pose.heading);
+  const ch = Math.cos(pose.heading);
+  const map = pose.mode === "map";
+  const sp = map ? -1 : Math.sin(pose.pitch);
+  const cp = map ? 0 : Math.cos(pose.pitch);
+  return { forward: [cp * sh, cp * ch, sp], right: [ch, -sh, 0], up: [-sh * sp, -ch * sp, cp] };
+}
+
+export function poseEye(pose: Pose): Vec3 {
+  return addScaled(pose.pivot, poseBasis(pose).forward, -pose.distanceM);
+}
+
+/**
+ * The smallest distance from the pivot at which all points lie inside the view, kept clear of
+ * its border by `margin` (fraction of the half view). The direction of the pose stays.
+ */
+export function fitDistance(pose: Pose, points: readonly Vec3[], aspect: number, margin: number, from: number): number {
+  const { forward, right, up } = poseBasis(pose);
+  const tan = Math.tan((pose.fovDeg * DEG) / 2) * (1 - margin);
+  let distanceM = from;
+  for (const p of points) {
+    const q = sub(p, pose.pivot);
+    const spread = Math.max(Math.abs(dot(q, up)), Math.abs(dot(q, right)) / aspect) / tan;
+    // In perspective the depth of the point counts: spread <= distance + depth offset.
+    distanceM = Math.max(distanceM, pose.mode === "map" ? spread : spread - dot(q, forward));
+  }
+  return distanceM;
+}
+
+/**
+ * The published state of a pose.
+ *
+ * `clearanceM` is the height of the eye above the ground: it bounds the near plane, so that depth keeps its precision
+ * from a walk to a view from space. Matrices are built in float64 and rounded once.
+ */
+export function cameraState(pose: Pose, width: number, height: number, sizeM: number, clearanceM: number): CameraState {
+  const basis = poseBasis(pose);
+  const eye = poseEye(pose);
+  const map = pose.mode === "map";
+  const reach = Math.hypot(eye[0] - sizeM / 2, eye[1] - sizeM / 2, eye[2]) + 2 * sizeM;
+  const near = map ? pose.distanceM - 2 * sizeM : Math.max(0.1, Math.min(pose.distanceM * 0.02, clearanceM * 0.25));
+  const far = map ? pose.distanceM + 2 * sizeM : 2 * reach;
+  const tan = Math.tan((pose.fovDeg * DEG) / 2);
+  const orthoHeight = map ? 2 * pose.distanceM * tan : 0;
+  const viewProj = map
+    ? orthographic(basis, eye, orthoHeight, width / height, near, far)
+    : perspective(basis, eye, tan, width / height, near, far);
+  return {
+    mode: pose.mode,
+    eye,
+    target: pose.pivot,
+    up: basis.up,
+    fovDeg: pose.fovDeg,
+    orthoHeight,
+    near,
+    far,
+    width,
+    height,
+    viewProj: new Float32Array(viewProj),
+    invViewProj: new Float32Array(mat4d.invert(viewProj)),
+  };
+}
+
+/** Column-major; row r of the matrix is `rows[r]`, an affine form (x, y, z, constant). */
+function fromRows(rows: readonly (readonly number[])[]): Float64Array {
+  const m = new Float64Array(16);
+  for (let r = 0; r < 4; r++) for (let c = 0; c < 4; c++) m[4 * c + r] = rows[r]![c]!;
+  return m;
+}
+
+/** k·(axis · (p − eye)) + constant as an affine form of p. */
+function form(axis: Vec3, eye: Vec3, k: number, constant: number): number[] {
+  const offset = axis[0] * eye[0] + axis[1] * eye[1] + axis[2] * eye[2];
+  return [k * axis[0], k * axis[1], k * axis[2], constant - k * offset];
+}
+
+function perspective(b: Basis, eye: Vec3, tan: number, aspect: number, near: number, far: number): Float64Array {
+  const depth = far / (far - near);
+  return fromRows([
+    form(b.right, eye, 1 / (tan * aspect), 0),
+    form(b.up, eye, 1 / tan, 0),
+    form(b.forward, eye, depth, -depth * near),
+    form(b.forward, eye, 1, 0),
+  ]);
+}
+
+function orthographic(b: Basis, eye: Vec3, tall: number, aspect: number, near: number, far: number): Float64Array {
+  const depth = 1 / (far - near);
+  return fromRows([
+    form(b.right, eye, 2 / (tall * aspect), 0),
+    form(b.up, eye, 2 / tall, 0),
+    form(b.forward, eye, depth, -depth * near),
+    [0, 0, 0, 1],
+  ]);
+}

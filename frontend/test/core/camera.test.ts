@@ -1,0 +1,268 @@
+// The camera's projections, modes and animations (SPEC I1-I9).
+
+import { describe, expect, it } from "vitest";
+import { mat4d } from "wgpu-matrix";
+import { Camera } from "../../src/core/camera.ts";
+import { addScaled, distance, distanceXY, dot, normalize, sub } from "../../src/core/math.ts";
+import type { Ground, Vec3 } from "../../src/core/types.ts";
+
+const SIZE = 4096;
+const flat = (z = 0): Ground => ({ sizeM: SIZE, heightAt: () => z, raycast: () => null });
+const hill: Ground = {
+  sizeM: SIZE,
+  heightAt: (x, y) => 1500 * Math.exp(-((x - 2048) ** 2 + (y - 2048) ** 2) / 400 ** 2),
+  raycast: () => null,
+};
+
+function camera(mode: "orbit" | "fly" | "map" = "orbit"): Camera {
+  const c = new Camera(SIZE);
+  c.resize(1200, 800);
+  c.setMode(mode);
+  return c;
+}
+
+/** Clip coordinates of a point through the published matrix. */
+function clip(c: Camera, p: Vec3): { x: number; y: number; z: number } {
+  const m = c.state.value.viewProj;
+  const r = [0, 1, 2, 3].map((i) => m[i]! * p[0] + m[4 + i]! * p[1] + m[8 + i]! * p[2] + m[12 + i]!);
+  return { x: r[0]! / r[3]!, y: r[1]! / r[3]!, z: r[2]! / r[3]! };
+}
+
+/** Runs an animation to its end, 60 steps a second. */
+function settle(c: Camera, ground: Ground = flat()): void {
+  for (let i = 0; i < 600 && c.update(1 / 60, ground); i++);
+}
+
+describe("projection (SPEC I1)", () => {
+  it.each(["orbit", "fly", "map"] as const)("%s: project inverts ray, and agrees with viewProj", (mode) => {
+    const c = camera(mode);
+    c.orbit(123, 45);
+    for (const [x, y] of [
+      [0, 0],
+      [600, 400],
+      [1199, 13],
+      [77, 780],
+    ] as const) {
+      const ray = c.ray(x, y);
+      const p = addScaled(ray.origin, ray.dir, mode === "map" ? ray.origin[2] : 3000);
+      const q = c.project(p);
+      expect(q.x).toBeCloseTo(x, 6);
+      expect(q.y).toBeCloseTo(y, 6);
+      expect(q.visible).toBe(x > 0);
+      const ndc = clip(c, p);
+      expect(((ndc.x + 1) / 2) * 1200).toBeCloseTo(x, 1);
+      expect(((1 - ndc.y) / 2) * 800).toBeCloseTo(y, 1);
+      expect(ndc.z).toBeGreaterThan(0);
+      expect(ndc.z).toBeLessThan(1);
+    }
+  });
+
+  it("the inverse matrix is the inverse", () => {
+    for (const mode of ["orbit", "map"] as const) {
+      const s = camera(mode).state.value;
+      const product = mat4d.multiply(new Float64Array(s.invViewProj), new Float64Array(s.viewProj));
+      for (let i = 0; i < 16; i++) expect(product[i]).toBeCloseTo(i % 5 === 0 ? 1 : 0, 1);
+    }
+  });
+
+  it("points behind the eye are not visible", () => {
+    const c = camera("fly");
+    const { eye, target } = c.state.value;
+    const behind = addScaled(eye, normalize(sub(target, eye)), -100);
+    expect(c.project(behind).visible).toBe(false);
+    expect(c.project(target).visible).toBe(true);
+  });
+
+  it("the whole domain is visible from home, on a wide and on a tall canvas", () => {
+    for (const [w, h] of [
+      [1600, 900],
+      [360, 740],
+    ] as const) {
+      const c = new Camera(SIZE);
+      c.resize(w, h);
+      c.home(0);
+      for (const x of [0, SIZE]) for (const y of [0, SIZE]) expect(c.project([x, y, 0]).visible).toBe(true);
+    }
+  });
+
+  it("the map has north up and east right, and covers orthoHeight metres", () => {
+    const c = camera("map");
+    const a = c.project([2048, 2048, 0]);
+    expect(c.project([2048, 2148, 0]).y).toBeLessThan(a.y);
+    expect(c.project([2148, 2048, 0]).x).toBeGreaterThan(a.x);
+    const { orthoHeight } = c.state.value;
+    expect(c.project([2048, 2048 + orthoHeight / 2, 0]).y).toBeCloseTo(0, 6);
+    expect(c.metresPerPixelAt([0, 0, 0])).toBeCloseTo(orthoHeight / 800, 9);
+  });
+});
+
+describe("moves", () => {
+  it("zoom keeps the anchor under the pointer (SPEC I2)", () => {
+    for (const mode of ["orbit", "fly", "map"] as const) {
+      const c = camera(mode);
+      const anchor: Vec3 = [1200, 2600, 80];
+      const before = c.project(anchor);
+      c.zoom(1.7, anchor);
+      expect(c.project(anchor).x).toBeCloseTo(before.x, 6);
+      expect(c.project(anchor).y).toBeCloseTo(before.y, 6);
+      expect(c.metresPerPixelAt(anchor)).toBeLessThan(camera(mode).metresPerPixelAt(anchor) / 1.69);
+    }
+  });
+
+  it("a smooth zoom ends where a plain one does", () => {
+    const a = camera();
+    const b = camera();
+    const anchor: Vec3 = [1200, 2600, 80];
+    a.zoom(1.5, anchor);
+    b.zoom(1.5, anchor, true);
+    expect(b.moving).toBe(true);
+    settle(b);
+    expect(b.moving).toBe(false);
+    expect(distance(a.state.value.eye, b.state.value.eye)).toBeLessThan(1e-6);
+  });
+
+  it("orbit keeps the pivot and its distance; the eye goes against the pointer", () => {
+    const c = camera();
+    const before = c.state.value;
+    c.orbit(100, 0);
+    const after = c.state.value;
+    expect(after.target).toEqual(before.target);
+    expect(distance(after.eye, after.target)).toBeCloseTo(distance(before.eye, before.target), 6);
+    const right: Vec3 = [Math.cos(20 * (Math.PI / 180)), -Math.sin(20 * (Math.PI / 180)), 0];
+    expect(dot(sub(after.eye, before.eye), right)).toBeLessThan(0);
+  });
+
+  it("look keeps the eye and turns toward the pointer", () => {
+    const c = camera("fly");
+    const eye = c.state.value.eye;
+    const right = c.project(addScaled(c.state.value.target, [1, 0, 0], 300));
+    c.look(50, 0);
+    expect(distance(c.state.value.eye, eye)).toBeLessThan(1e-6);
+    expect(c.project(addScaled(c.state.value.target, [1, 0, 0], 300)).x).not.toBeCloseTo(right.x + 1000, 0);
+  });
+
+  it("pan drags the ground: the point under the pointer follows it", () => {
+    for (const mode of ["orbit", "map"] as const) {
+      const c = camera(mode);
+      const p = c.state.value.target;
+      const before = c.project(p);
+      c.pan(40, 25, flat());
+      const after = c.project(p);
+      expect(after.x - before.x).toBeGreaterThan(38);
+      expect(after.x - before.x).toBeLessThan(43);
+      expect(after.y - before.y).toBeGreaterThan(23);
+      expect(after.y - before.y).toBeLessThan(28);
+    }
+  });
+
+  it("pan follows the height of the ground, and never leaves the neighbourhood of the terrain", () => {
+    const c = camera();
+    c.pan(0, 200, hill);
+    const { target } = c.state.value;
+    expect(target[2]).toBeCloseTo(hill.heightAt(target[0], target[1]) - 1500, 6);
+    for (let i = 0; i < 300; i++) c.pan(500, 500, flat());
+    expect(c.state.value.target[0]).toBeGreaterThanOrEqual(-0.76 * SIZE);
+    expect(c.state.value.target[1]).toBeLessThanOrEqual(1.76 * SIZE);
+  });
+
+  it("fly moves along the view, faster higher up", () => {
+    const c = camera("fly");
+    const high = c.state.value.eye;
+    c.update(0, flat());
+    c.fly(1, 0, 0, 0.1);
+    const fast = distance(high, c.state.value.eye);
+    c.goTo([2048, 100, 20], [2048, 600, 20], 0);
+    c.update(0, flat());
+    const low = c.state.value.eye;
+    c.fly(1, 0, 0, 0.1);
+    expect(distance(low, c.state.value.eye)).toBeLessThan(fast / 5);
+    expect(c.state.value.eye[1]).toBeGreaterThan(low[1]);
+  });
+
+  it("pivotAt changes neither eye nor direction", () => {
+    const c = camera();
+    const before = c.state.value;
+    c.pivotAt([1500, 1500, 0]);
+    const after = c.state.value;
+    expect(distance(after.eye, before.eye)).toBeLessThan(1e-6);
+    expect(c.project(before.target).x).toBeCloseTo(600, 4);
+    expect(distance(after.eye, after.target)).not.toBeCloseTo(distance(before.eye, before.target), 0);
+  });
+});
+
+describe("modes and flights", () => {
+  it("the map keeps place and scale, and going back restores the view (SPEC I3)", () => {
+    const c = camera();
+    const before = c.state.value;
+    const scale = c.metresPerPixelAt(before.target);
+    c.setMode("map");
+    expect(c.state.value.target).toEqual(before.target);
+    expect(c.metresPerPixelAt(before.target)).toBeCloseTo(scale, 6);
+    c.setMode("orbit");
+    expect(distance(c.state.value.eye, before.eye)).toBeLessThan(1e-6);
+  });
+
+  it("goTo arrives exactly, and a user's move ends the flight", () => {
+    const c = camera();
+    c.goTo([100, 200, 900], [2000, 2500, 100], 300);
+    expect(c.update(0.1, flat())).toBe(true);
+    settle(c);
+    expect(distance(c.state.value.eye, [100, 200, 900])).toBeLessThan(1e-6);
+    expect(distance(c.state.value.target, [2000, 2500, 100])).toBeLessThan(1e-6);
+    expect(c.moving).toBe(false);
+    c.home();
+    c.update(0.1, flat());
+    c.orbit(1, 0);
+    expect(c.moving).toBe(false);
+  });
+
+  it("frame brings all points into view", () => {
+    for (const mode of ["orbit", "map"] as const) {
+      const c = camera(mode);
+      const points: Vec3[] = [
+        [300, 300, 0],
+        [900, 700, 400],
+        [500, 1200, -50],
+      ];
+      c.frame(points, 0);
+      for (const p of points) expect(c.project(p).visible).toBe(true);
+      c.frame({ x0: 1000, y0: 1000, x1: 1400, y1: 1300 }, 0);
+      expect(c.project([1000, 1000, 0]).visible && c.project([1400, 1300, 0]).visible).toBe(true);
+      expect(distanceXY(c.state.value.target, [1200, 1150, 0])).toBeLessThan(1e-6);
+    }
+  });
+
+  it("update keeps the eye above the ground (SPEC I4)", () => {
+    for (const mode of ["orbit", "fly"] as const) {
+      const c = camera(mode);
+      c.goTo([2048, 1900, 300], [2048, 2600, 200], 0);
+      settle(c, hill);
+      const { eye } = c.state.value;
+      expect(eye[2]).toBeGreaterThanOrEqual(hill.heightAt(eye[0], eye[1]) + 1.6);
+    }
+  });
+
+  it("the near plane follows the height above the ground", () => {
+    const c = camera("fly");
+    c.goTo([2048, 100, 5], [2048, 3000, 5], 0);
+    settle(c);
+    expect(c.state.value.near).toBeLessThan(1.3);
+    c.goTo([2048, 100, 3000], [2048, 3000, 5], 0);
+    settle(c);
+    expect(c.state.value.near).toBeGreaterThan(20);
+  });
+
+  it("views are remembered by slot (SPEC I5)", () => {
+    const c = camera();
+    c.orbit(200, 100);
+    const saved = c.saveView("1");
+    const { eye } = c.state.value;
+    c.home(0);
+    const other = camera("map");
+    other.loadViews([["1", saved]]);
+    expect(other.restoreView("1", 0)).toBe(true);
+    expect(other.state.value.mode).toBe("orbit");
+    expect(distance(other.state.value.eye, eye)).toBeLessThan(1e-6);
+    expect(other.restoreView("2")).toBe(false);
+  });
+});
