@@ -1,0 +1,45 @@
+"""Writes the vectors that pytest and vitest both read: ops.json, undo.json, messages.json.
+
+``python tests/vectors/make.py`` rewrites them; ``tests/unit/test_vectors.py`` checks that doing so changes nothing.
+The expected outcome of every case is named here by hand (refusal code, or that it applies); the resulting documents
+come from the Python implementation and are reviewed as a diff.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE.parent.parent))
+
+from tests.vectors.message_cases import message_vectors  # noqa: E402
+from tests.vectors.op_cases import op_vectors  # noqa: E402
+from tests.vectors.undo_cases import undo_vectors  # noqa: E402
+
+
+def text(about: str, cases: list[dict[str, Any]]) -> str:
+    """One case a line, so that a change reads as a change of lines."""
+    lines = ",\n".join(json.dumps(case, ensure_ascii=False, allow_nan=False, separators=(",", ":")) for case in cases)
+    return f'{{"about":{json.dumps(about)},\n"cases":[\n{lines}\n]}}\n'
+
+
+def build() -> dict[str, str]:
+    """File name to content."""
+    return {
+        "ops.json": text("document + op -> result document, or a refusal code", op_vectors()),
+        "undo.json": text("scripts of mine / theirs / undo / redo with the ops and sentences expected", undo_vectors()),
+        "messages.json": text("texts a client may send: accepted, or refused (accept false)", message_vectors()),
+    }
+
+
+def main() -> None:
+    """Writes all files."""
+    for name, content in build().items():
+        (HERE / name).write_text(content, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,115 @@
+"""Texts that a client may send, each accepted or refused by the contract."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from pydantic import ValidationError
+
+from esker import contract as c
+from tests.vectors.op_cases import NEW
+from tests.vectors.scenes import Json, op
+
+HELLO: Json = {"type": "hello", "protocol": 1, "terrain": "t1", "secret": "s", "client": "c1"}
+VIEW: Json = {"type": "view", "eye": [0, 0, 100], "target": [1, 1, 0]}
+PRESENCE: Json = {"type": "presence", "cursor": [1, 2, 3.5], "tool": "mountain", "stroke": "c1-1"}
+
+
+def ops(*raw: Json) -> Json:
+    return {"type": "ops", "ops": [{"id": f"c1:{i}", "op": o} for i, o in enumerate(raw)]}
+
+
+def _set(**fields: Any) -> Json:
+    return op("stroke.set", stroke="a", fields=fields)
+
+
+ACCEPT: list[tuple[str, Json]] = [
+    ("hello, short", HELLO),
+    ("hello, full", HELLO | {"name": "Ada", "colour": "#00ffaa", "clock": 12}),
+    ("hello of another protocol is well formed", HELLO | {"protocol": 99}),
+    ("ops", ops(op("stroke.begin", stroke=NEW), op("stroke.finish", stroke="n"))),
+    ("group", ops(op("group", ops=[_set(label="x"), op("stroke.delete", stroke="a")]))),
+    ("null flank", ops(_set(left=None))),
+    ("integers where floats are expected", ops(op("stroke.anchor", stroke="a", which="last", to=[1, 2, 3]))),
+    ("view, short", VIEW),
+    ("view, full", VIEW | {"fov_deg": 60, "width": 360, "height": 740, "tau_px": 2}),
+    ("presence", PRESENCE),
+    ("presence, empty", {"type": "presence"}),
+    ("credit", {"type": "credit", "bytes": 65536}),
+    ("rename", {"type": "rename", "name": "Grace", "colour": "#123456"}),
+    ("ping", {"type": "ping", "t": 12.5}),
+]
+
+REFUSE: list[tuple[str, Json | str]] = [
+    ("not JSON", "{"),
+    ("empty text", ""),
+    ("a bare number", "1"),
+    ("an array", "[]"),
+    ("no type", {}),
+    ("unknown type", {"type": "teleport"}),
+    ("null type", {"type": None}),
+    ("a field that does not exist", HELLO | {"admin": True}),
+    ("hello without secret", {k: v for k, v in HELLO.items() if k != "secret"}),
+    ("hello with an empty secret", HELLO | {"secret": ""}),
+    ("hello with a secret of 129 characters", HELLO | {"secret": "s" * 129}),
+    ("hello with a slash in the id", HELLO | {"terrain": "../t1"}),
+    ("hello with a long client id", HELLO | {"client": "c" * 41}),
+    ("hello with a negative clock", HELLO | {"clock": -1}),
+    ("hello with a fractional clock", HELLO | {"clock": 1.5}),
+    ("hello with a name of 81 characters", HELLO | {"name": "n" * 81}),
+    ("hello with a bad colour", HELLO | {"colour": "red"}),
+    ("protocol as text", HELLO | {"protocol": "1"}),
+    ("no ops", {"type": "ops", "ops": []}),
+    ("257 ops in a message", ops(*[op("stroke.finish", stroke="a")] * 257)),
+    ("op id without counter", {"type": "ops", "ops": [{"id": "c1", "op": op("stroke.finish", stroke="a")}]}),
+    ("unknown op", ops(op("stroke.explode", stroke="a"))),
+    ("group in a group", ops(op("group", ops=[op("group", ops=[op("stroke.finish", stroke="a")])]))),
+    ("empty group", ops(op("group", ops=[]))),
+    ("65 ops in a group", ops(op("group", ops=[op("stroke.finish", stroke="a")] * 65))),
+    ("257 points in an append", ops(op("stroke.append", stroke="a", start=0, points=[[0, 0]] * 257, last=[0, 0, 0]))),
+    ("4097 points in a curve", ops(_set(curve=[[0, 0]] * 4097))),
+    ("point with three numbers", ops(op("stroke.append", stroke="a", start=0, points=[[0, 0, 0]], last=[0, 0, 0]))),
+    ("anchor with two numbers", ops(op("stroke.anchor", stroke="a", which="last", to=[1, 2]))),
+    ("anchor in the middle", ops(op("stroke.anchor", stroke="a", which="middle", to=[1, 2, 3]))),
+    ("number as text", ops(op("stroke.anchor", stroke="a", which="last", to=["1", 2, 3]))),
+    ("true as a number", ops(op("stroke.anchor", stroke="a", which="last", to=[True, 2, 3]))),
+    ("NaN", '{"type":"presence","cursor":[NaN,0,0]}'),
+    ("Infinity", '{"type":"presence","cursor":[Infinity,0,0]}'),
+    ("a number beyond float64", '{"type":"presence","cursor":[1e999,0,0]}'),
+    ("farther than ten times the largest domain", PRESENCE | {"cursor": [655361, 0, 0]}),
+    ("negative start", ops(op("stroke.append", stroke="a", start=-1, points=[], last=[0, 0, 0]))),
+    ("negative extent", ops(_set(left={"slope_deg": 30, "extent_m": -1}))),
+    ("slope of 86 degrees", ops(_set(left={"slope_deg": 86}))),
+    ("roughness of 1.5", ops(_set(roughness=1.5))),
+    ("the size of a terrain cannot be set", ops(op("terrain.set", fields={"size_m": 128}))),
+    ("the author of a stroke cannot be set", ops(_set(author="eve"))),
+    ("reach of zero", ops(op("terrain.set", fields={"reach_m": 0}))),
+    ("unknown look", ops(op("terrain.set", fields={"look": "neon"}))),
+    ("negative credit", {"type": "credit", "bytes": -1}),
+    ("credit of a fraction", {"type": "credit", "bytes": 0.5}),
+    ("view with a flat lens", VIEW | {"fov_deg": 0}),
+    ("view of no pixels", VIEW | {"width": 0}),
+    ("tool of 25 characters", PRESENCE | {"tool": "t" * 25}),
+    ("ping without time", {"type": "ping"}),
+    ("a server's message", {"type": "ack", "ids": [], "clocks": []}),
+]
+
+
+def message_vectors() -> list[Json]:
+    """All cases; raises AssertionError when the contract disagrees with the outcome named here."""
+    out: list[Json] = []
+    for accept, cases in ((True, ACCEPT), (False, REFUSE)):
+        for name, raw in cases:
+            text = raw if isinstance(raw, str) else json.dumps(raw, separators=(",", ":"))
+            assert _accepted(text) == accept, name
+            out.append({"name": name, "text": text, "accept": accept})
+    return out
+
+
+def _accepted(text: str) -> bool:
+    try:
+        c.CLIENT_MESSAGE.validate_json(text)
+    except ValidationError:
+        return False
+    return True

@@ -1,0 +1,150 @@
+"""Cases of ``StrokeSet.apply``: every op, every refusal that a small document can show."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from esker import contract as c
+from esker.document.ops import Refusal, StrokeSet
+from tests.vectors.scenes import Json, document, dump, op, stroke
+
+RIDGE = stroke("a")
+MESA = stroke("m", kind="level", first=[1000, 1000, 120], last=[1500, 1000, 120], curve=[[0, 0], [0.5, 0.25], [1, 0]])
+LOCKED = stroke("l", locked=True, label="Grandmother's hill")
+GONE = stroke("g", label="gone")
+LONG = stroke("x", curve=[[0.5, 1]] * c.MAX_POINTS_PER_STROKE)
+BASE = document(RIDGE, MESA, LOCKED, deleted=(GONE,))
+NEW = stroke("n", curve=[], finished=False, first=[0, 0, 0], last=[0, 0, 0])
+
+
+def _applies() -> list[tuple[str, Json, Json]]:
+    """(name, document, op) of cases that must apply."""
+    set_ = "stroke.set"
+    return [
+        ("begin on an empty terrain", document(), op("stroke.begin", stroke=NEW)),
+        ("begin with defaults left out", document(), op("stroke.begin", stroke=_short())),
+        (
+            "append continues the curve",
+            BASE,
+            op("stroke.append", stroke="a", start=3, points=[[1.25, 3]], last=[9, 9, 9]),
+        ),
+        (
+            "append replaces the tail",
+            BASE,
+            op("stroke.append", stroke="a", start=1, points=[[0.3, 2]], last=[3500, 1, 0]),
+        ),
+        ("append replaces everything", BASE, op("stroke.append", stroke="a", start=0, points=[[0, 1]], last=[1, 2, 3])),
+        (
+            "append of no points cuts the curve",
+            BASE,
+            op("stroke.append", stroke="a", start=2, points=[], last=[1, 2, 3]),
+        ),
+        ("finish", document(NEW), op("stroke.finish", stroke="n")),
+        ("finish twice changes nothing", BASE, op("stroke.finish", stroke="a")),
+        ("finish works on a locked stroke", BASE, op("stroke.finish", stroke="l")),
+        ("set one field", BASE, op(set_, stroke="a", fields={"label": "Äskulap — 山"})),
+        (
+            "set many fields",
+            BASE,
+            op(set_, stroke="m", fields={"plateau_radius_m": 40.5, "hidden": True, "roughness": 1}),
+        ),
+        ("set no field", BASE, op(set_, stroke="a", fields={})),
+        ("null flank means no flank", BASE, op(set_, stroke="a", fields={"left": None})),
+        (
+            "set a flank",
+            BASE,
+            op(set_, stroke="a", fields={"right": {"slope_deg": 60, "extent_m": 1, "shape": "convex"}}),
+        ),
+        ("a flank's own defaults are filled in", BASE, op(set_, stroke="a", fields={"right": {}})),
+        ("set the whole curve", BASE, op(set_, stroke="a", fields={"curve": [[0, 0.5], [1, 0.5]]})),
+        ("lock", BASE, op(set_, stroke="a", fields={"locked": True})),
+        ("unlock alone", BASE, op(set_, stroke="l", fields={"locked": False})),
+        ("anchor first", BASE, op("stroke.anchor", stroke="a", which="first", to=[0.125, -3, 7])),
+        ("anchor last", BASE, op("stroke.anchor", stroke="m", which="last", to=[1500.5, 1400, 99])),
+        ("delete keeps a tombstone", BASE, op("stroke.delete", stroke="a")),
+        ("restore", BASE, op("stroke.restore", stroke="g")),
+        ("terrain title", BASE, op("terrain.set", fields={"title": "Tor"})),
+        ("terrain reach null is infinity", BASE, op("terrain.set", fields={"reach_m": None, "border": "pinned"})),
+        ("terrain sea on", BASE, op("terrain.set", fields={"sea_level_m": 12.5, "look": "desert", "seed": 4294967295})),
+        ("terrain sea off", document(sea_level_m=3), op("terrain.set", fields={"sea_level_m": None})),
+        ("terrain sun", BASE, op("terrain.set", fields={"sun_azimuth_deg": 0, "sun_elevation_deg": 90})),
+        ("group is one tick", BASE, op("group", ops=[_set("a", label="1"), _set("m", label="2")])),
+        (
+            "group sees its own effects",
+            BASE,
+            op("group", ops=[_set("l", locked=False), op("stroke.delete", stroke="l")]),
+        ),
+        ("group begin and fill", BASE, op("group", ops=[op("stroke.begin", stroke=NEW), _append("n"), _finish("n")])),
+        ("point at the bound", document(NEW), op("stroke.anchor", stroke="n", which="last", to=[40960, -40960, 40960])),
+        ("exactly the most points", document(NEW), op("stroke.begin", stroke=LONG)),
+    ]
+
+
+def _refuses() -> list[tuple[str, Json, Json, str]]:
+    """(name, document, op, code) of cases that must be refused."""
+    return [
+        ("begin twice", BASE, op("stroke.begin", stroke=RIDGE), "duplicate_stroke"),
+        ("begin with the id of a deleted stroke", BASE, op("stroke.begin", stroke=GONE), "duplicate_stroke"),
+        ("append to nothing", BASE, _append("zz"), "unknown_stroke"),
+        ("append to a deleted stroke", BASE, _append("g"), "deleted_stroke"),
+        ("append to a locked stroke", BASE, _append("l"), "locked_stroke"),
+        ("append leaves a gap", BASE, op("stroke.append", stroke="a", start=4, points=[[1, 1]], last=[1, 1, 1]), "bad_index"),
+        ("append too far", BASE, op("stroke.append", stroke="a", start=3, points=[[14, 0]], last=[3500, 2000, 0]), "out_of_domain"),
+        ("append one too many", document(LONG), op("stroke.append", stroke="x", start=4096, points=[[1, 1]], last=[3500, 2000, 0]), "too_many_points"),
+        ("finish nothing", BASE, _finish("zz"), "unknown_stroke"),
+        ("finish a deleted stroke", BASE, _finish("g"), "deleted_stroke"),
+        ("set on nothing", BASE, _set("zz", label="x"), "unknown_stroke"),
+        ("set on a deleted stroke", BASE, _set("g", label="x"), "deleted_stroke"),
+        ("set on a locked stroke", BASE, _set("l", label="x"), "locked_stroke"),
+        ("unlock together with a change", BASE, _set("l", locked=False, label="x"), "locked_stroke"),
+        ("null where a value is needed", BASE, _set("a", label=None), "bad_field"),
+        ("anchor of a locked stroke", BASE, op("stroke.anchor", stroke="l", which="last", to=[0, 0, 0]), "locked_stroke"),
+        ("anchor too far", BASE, op("stroke.anchor", stroke="a", which="last", to=[40961, 0, 0]), "out_of_domain"),
+        ("anchor too high", BASE, op("stroke.anchor", stroke="a", which="last", to=[0, 0, 40961]), "out_of_domain"),
+        ("curve point too high", BASE, _set("a", curve=[[0, 50000]]), "out_of_domain"),
+        ("delete nothing", BASE, op("stroke.delete", stroke="zz"), "unknown_stroke"),
+        ("delete twice", BASE, op("stroke.delete", stroke="g"), "deleted_stroke"),
+        ("delete a locked stroke", BASE, op("stroke.delete", stroke="l"), "locked_stroke"),
+        ("restore a live stroke", BASE, op("stroke.restore", stroke="a"), "duplicate_stroke"),
+        ("restore nothing", BASE, op("stroke.restore", stroke="zz"), "unknown_stroke"),
+        ("terrain title null", BASE, op("terrain.set", fields={"title": None}), "bad_field"),
+        ("group is all or nothing", BASE, op("group", ops=[_set("a", label="1"), _set("zz", label="2")]), "unknown_stroke"),
+    ]  # fmt: skip
+
+
+def _short() -> Json:
+    return {"id": "s", "kind": "level", "first": [1, 2, 3], "last": [4, 5, 6], "curve": []}
+
+
+def _set(stroke_id: str, **fields: Any) -> Json:
+    return op("stroke.set", stroke=stroke_id, fields=fields)
+
+
+def _append(stroke_id: str) -> Json:
+    return op("stroke.append", stroke=stroke_id, start=0, points=[[0, 0], [1, 2.5]], last=[100, 200, 30])
+
+
+def _finish(stroke_id: str) -> Json:
+    return op("stroke.finish", stroke=stroke_id)
+
+
+def op_vectors() -> list[Json]:
+    """All cases; raises AssertionError when the implementation disagrees with the outcome named here."""
+    out: list[Json] = []
+    for name, before, raw in _applies():
+        after, _ = _set_of(before).apply(c.OP.validate_json(json.dumps(raw)))
+        out.append({"name": name, "document": before, "op": raw, "result": dump(after.to_document())})
+    for name, before, raw, code in _refuses():
+        try:
+            _set_of(before).apply(c.OP.validate_json(json.dumps(raw)))
+        except Refusal as refusal:
+            assert refusal.code == code, (name, refusal.code)
+            out.append({"name": name, "document": before, "op": raw, "refusal": code})
+        else:
+            raise AssertionError(f"{name}: not refused")
+    return out
+
+
+def _set_of(raw: Json) -> StrokeSet:
+    return StrokeSet.from_document(c.Document.model_validate_json(json.dumps(raw)))
