@@ -45,7 +45,11 @@ SCRIPTS: list[tuple[str, Json, list[Json]]] = [
     ("a drag is one step", BASE, [*DRAG, UNDO, REDO]),
     ("others' other field is untouched", BASE, [*DRAG, theirs(_set("a", label="theirs")), UNDO, REDO]),
     ("others' same field is kept", BASE, [*DRAG, theirs(_anchor(1)), UNDO, REDO]),
-    ("one field kept, one undone", BASE, [mine(_set("a", label="1", hidden=True)), theirs(_set("a", label="2")), UNDO, REDO]),
+    (
+        "one field kept, one undone",
+        BASE,
+        [mine(_set("a", label="1", hidden=True)), theirs(_set("a", label="2")), UNDO, REDO],
+    ),
     ("another's change in the midst of my drag", BASE, [DRAG[0], theirs(_set("a", label="x")), *DRAG[1:], UNDO]),
     ("delete and undo", BASE, [mine(DELETE), UNDO, REDO, UNDO]),
     ("delete, restored by another", BASE, [mine(DELETE), theirs(op("stroke.restore", stroke="a")), UNDO]),
@@ -53,24 +57,68 @@ SCRIPTS: list[tuple[str, Json, list[Json]]] = [
     ("restore, changed by another", BASE, [mine(RESTORE), theirs(_set("g", roughness=0)), UNDO]),
     ("change of a stroke that another deleted", BASE, [*DRAG, theirs(DELETE), UNDO]),
     ("lock and undo", BASE, [mine(_set("a", locked=True)), UNDO, REDO]),
-    ("unlock, change, undo as one gesture", BASE, [mine(_set("l", locked=False), "u"), mine(_set("l", label="x"), "u"), UNDO, REDO]),
-    ("change and lock as one gesture", BASE, [mine(_set("a", label="x"), "u"), mine(_set("a", locked=True), "u"), UNDO, REDO]),
+    (
+        "unlock, change, undo as one gesture",
+        BASE,
+        [mine(_set("l", locked=False), "u"), mine(_set("l", label="x"), "u"), UNDO, REDO],
+    ),
+    (
+        "change and lock as one gesture",
+        BASE,
+        [mine(_set("a", label="x"), "u"), mine(_set("a", locked=True), "u"), UNDO, REDO],
+    ),
     ("another locked it", BASE, [*DRAG, theirs(_set("a", locked=True)), UNDO]),
     ("terrain settings", BASE, [mine(op("terrain.set", fields={"title": "A", "seed": 5})), UNDO, REDO]),
-    ("terrain title changed by another", BASE, [mine(op("terrain.set", fields={"title": "A", "seed": 5})), theirs(op("terrain.set", fields={"title": "B"})), UNDO]),
-    ("reach back from infinity", document(reach_m=100), [mine(op("terrain.set", fields={"reach_m": None})), UNDO, REDO]),
+    (
+        "terrain title changed by another",
+        BASE,
+        [
+            mine(op("terrain.set", fields={"title": "A", "seed": 5})),
+            theirs(op("terrain.set", fields={"title": "B"})),
+            UNDO,
+        ],
+    ),
+    (
+        "reach back from infinity",
+        document(reach_m=100),
+        [mine(op("terrain.set", fields={"reach_m": None})), UNDO, REDO],
+    ),
     ("null flank comes back", BASE, [mine(_set("a", left=None)), UNDO]),
-    ("a group is one step", BASE, [mine(op("group", ops=[_set("a", label="1"), _set("m", label="2"), RESTORE])), UNDO, REDO]),
-    ("a group with one part kept", BASE, [mine(op("group", ops=[_set("a", label="1"), _set("m", label="2")])), theirs(_set("m", label="3")), UNDO]),
+    (
+        "a group is one step",
+        BASE,
+        [mine(op("group", ops=[_set("a", label="1"), _set("m", label="2"), RESTORE])), UNDO, REDO],
+    ),
+    (
+        "a group with one part kept",
+        BASE,
+        [mine(op("group", ops=[_set("a", label="1"), _set("m", label="2")])), theirs(_set("m", label="3")), UNDO],
+    ),
     ("no effect, no step", BASE, [mine(_set("a", label="x")), mine(_set("m", label="")), UNDO]),
     ("a new op clears redo", BASE, [mine(_set("a", label="x")), UNDO, mine(_set("a", label="y")), REDO, UNDO]),
-    ("steps come back in reverse order", BASE, [mine(_set("a", label="1")), mine(_set("a", label="2")), UNDO, UNDO, REDO, REDO]),
+    (
+        "steps come back in reverse order",
+        BASE,
+        [mine(_set("a", label="1")), mine(_set("a", label="2")), UNDO, UNDO, REDO, REDO],
+    ),
     ("different gestures are different steps", BASE, [mine(_anchor(1), "p"), mine(_anchor(2), "q"), UNDO, UNDO]),
     ("no gesture never merges", BASE, [mine(_set("a", label="1")), mine(_set("a", label="2")), UNDO]),
-    ("append on a finished stroke", BASE, [mine(op("stroke.append", stroke="a", start=2, points=[[0.75, 60], [1, 1]], last=[3000, 2000, 0])), UNDO, REDO]),
-    ("a long curve comes back by appends", document(*(s for s in BASE["strokes"]), NEW | {"curve": [[0.25, 1]] * 1100}), [mine(_set("n", curve=[[0, 0]])), UNDO]),
-    ("deleted stroke that is gone for good", document(deleted=(GONE,)), [mine(RESTORE), theirs(op("stroke.delete", stroke="g")), UNDO]),
-]  # fmt: skip
+    (
+        "append on a finished stroke",
+        BASE,
+        [mine(op("stroke.append", stroke="a", start=2, points=[[0.75, 60], [1, 1]], last=[3000, 2000, 0])), UNDO, REDO],
+    ),
+    (
+        "a long curve comes back by appends",
+        document(*(s for s in BASE["strokes"]), NEW | {"curve": [[0.25, 1]] * 1100}),
+        [mine(_set("n", curve=[[0, 0]])), UNDO],
+    ),
+    (
+        "deleted stroke that is gone for good",
+        document(deleted=(GONE,)),
+        [mine(RESTORE), theirs(op("stroke.delete", stroke="g")), UNDO],
+    ),
+]
 
 
 def undo_vectors() -> list[Json]:
