@@ -1,0 +1,131 @@
+"""A steady hand for drawing starting terrains in code: ridges, crevices, plateaux and rings as strokes.
+
+A profile stroke lies in one vertical plane, so a chain that bends is drawn leg by leg, as a person would.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+
+from esker.contract import Document, Flank, FlankShape, Stroke, StrokeKind, TerrainSettings
+from esker.document.strokes import level_curve
+
+Point = tuple[float, float, float]
+Side = tuple[float, float] | None
+
+
+class Pen:
+    """Collects strokes. Every wobble comes from the seed, so drawing twice gives the same document."""
+
+    def __init__(self, name: str, seed: int, shape: FlankShape = "concave") -> None:
+        self.name, self.shape = name, shape
+        self.rng = np.random.default_rng(seed)
+        self.strokes: list[Stroke] = []
+
+    def chain(self, points: Sequence[Point], left: Side, right: Side, *, wobble: float = 0.05, label: str = "") -> None:
+        """A mountain chain or a crevice through ``points`` (x, y, height in metres), one profile stroke a leg.
+
+        Heights follow a monotone spline along the whole chain; ``wobble`` roughens the silhouette by that part of the
+        local height, less towards the joints, so that legs meet. Flanks are (slope in degrees, extent in metres).
+        """
+        pts = np.asarray(points, dtype=np.float64)
+        run = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(pts[:, :2], axis=0).T))])
+        height = PchipInterpolator(run, pts[:, 2])
+        for i in range(len(pts) - 1):
+            n = max(6, round(float(run[i + 1] - run[i]) / 40))
+            u = np.linspace(0, 1, n + 1)
+            z = height(run[i] + u * (run[i + 1] - run[i]))
+            z += z * wobble * self._noise(u) * np.sin(math.pi * u) ** 0.5
+            ends = tuple((round(float(pts[j, 0]), 2), round(float(pts[j, 1]), 2), 0.0) for j in (i, i + 1))
+            curve = tuple((round(float(a), 5), round(float(b), 2)) for a, b in zip(u, z, strict=True))
+            self._put("profile", ends[0], ends[1], curve, left, right, label=label)
+
+    def plateau(
+        self,
+        outline: Sequence[tuple[float, float]],
+        height: float,
+        flank: Side,
+        *,
+        radius: float = 0.0,
+        closed: bool = True,
+        label: str = "",
+        smooth: int = 8,
+    ) -> None:
+        """A plateau at ``height`` metres along a smooth curve through ``outline``; a closed one is flat inside."""
+        path = smooth_path(outline, closed, smooth)
+        first = (round(float(path[0, 0]), 2), round(float(path[0, 1]), 2), height)
+        far = int(np.argmax(np.hypot(*(path - path[0]).T))) if closed else len(path) - 1
+        last = (round(float(path[far, 0]), 2), round(float(path[far, 1]), 2), height)
+        curve = tuple((round(a, 5), round(b, 5)) for a, b in level_curve(path, first, last))
+        self._put("level", first, last, curve, flank, flank, radius=radius, label=label)
+
+    def ring(self, x: float, y: float, r: float, height: float, flank: Side, *, uneven: float = 0.12, n: int = 9) -> None:
+        """A roughly round closed plateau."""
+        angle = np.linspace(0, 2 * math.pi, n, endpoint=False) + self.rng.uniform(0, 1)
+        radius = r * (1 + uneven * self.rng.uniform(-1, 1, n))
+        self.plateau([(x + q * math.cos(a), y + q * math.sin(a)) for a, q in zip(angle, radius, strict=True)], height, flank)
+
+    def _noise(self, u: np.ndarray) -> np.ndarray:
+        """Fractal wobble in -1..1 along a leg."""
+        out = np.zeros_like(u)
+        for octave in range(1, 5):
+            out += np.sin(2 * math.pi * (u * 1.7 * 2**octave / 2 + self.rng.uniform())) / 1.8**octave
+        return out
+
+    def _put(
+        self,
+        kind: StrokeKind,
+        first: Point,
+        last: Point,
+        curve: tuple[tuple[float, float], ...],
+        left: Side,
+        right: Side,
+        *,
+        radius: float = 0.0,
+        label: str = "",
+    ) -> None:
+        flanks = [
+            Flank(slope_deg=float(s[0]), extent_m=float(s[1]), shape=self.shape) if s is not None else None
+            for s in (left, right)
+        ]
+        self.strokes.append(
+            Stroke(
+                id=f"{self.name}-{len(self.strokes) + 1:03d}",
+                author="Esker",
+                kind=kind,
+                first=first,
+                last=last,
+                curve=curve,
+                left=flanks[0],
+                right=flanks[1],
+                plateau_radius_m=radius,
+                label=label,
+                finished=True,
+            )
+        )
+
+    def document(self, settings: TerrainSettings) -> Document:
+        """The drawing as a document at clock 0."""
+        return Document(id=self.name, clock=0, settings=settings, strokes=tuple(self.strokes))
+
+
+def smooth_path(points: Sequence[tuple[float, float]], closed: bool, each: int) -> np.ndarray:
+    """Centripetal Catmull-Rom curve through the points, shape (n, 2), ``each`` samples a span."""
+    p = np.asarray(points, dtype=np.float64)
+    p = np.vstack([p[-1], p, p[0], p[1]]) if closed else np.vstack([2 * p[0] - p[1], p, 2 * p[-1] - p[-2]])
+    out = []
+    for a, b, c, d in zip(p, p[1:], p[2:], p[3:], strict=False):
+        knots = np.concatenate([[0.0], np.cumsum([max(np.hypot(*(q - r)), 1e-9) ** 0.5 for q, r in ((b, a), (c, b), (d, c))])])
+        t = np.linspace(knots[1], knots[2], each, endpoint=False)[:, None]
+        a1 = (knots[1] - t) / (knots[1] - knots[0]) * a + (t - knots[0]) / (knots[1] - knots[0]) * b
+        a2 = (knots[2] - t) / (knots[2] - knots[1]) * b + (t - knots[1]) / (knots[2] - knots[1]) * c
+        a3 = (knots[3] - t) / (knots[3] - knots[2]) * c + (t - knots[2]) / (knots[3] - knots[2]) * d
+        b1 = (knots[2] - t) / (knots[2] - knots[0]) * a1 + (t - knots[0]) / (knots[2] - knots[0]) * a2
+        b2 = (knots[3] - t) / (knots[3] - knots[1]) * a2 + (t - knots[1]) / (knots[3] - knots[1]) * a3
+        out.append((knots[2] - t) / (knots[2] - knots[1]) * b1 + (t - knots[1]) / (knots[2] - knots[1]) * b2)
+    path = np.vstack(out)
+    return np.vstack([path, path[0] if closed else p[-2]])
