@@ -63,11 +63,15 @@ class Pen:
         curve = tuple((round(a, 5), round(b, 5)) for a, b in level_curve(path, first, last))
         self._put("level", first, last, curve, flank, flank, radius=radius, label=label)
 
-    def ring(self, x: float, y: float, r: float, height: float, flank: Side, *, uneven: float = 0.12, n: int = 9) -> None:
+    def ring(
+        self, x: float, y: float, r: float, height: float, flank: Side, *, uneven: float = 0.12, n: int = 9
+    ) -> None:
         """A roughly round closed plateau."""
         angle = np.linspace(0, 2 * math.pi, n, endpoint=False) + self.rng.uniform(0, 1)
         radius = r * (1 + uneven * self.rng.uniform(-1, 1, n))
-        self.plateau([(x + q * math.cos(a), y + q * math.sin(a)) for a, q in zip(angle, radius, strict=True)], height, flank)
+        self.plateau(
+            [(x + q * math.cos(a), y + q * math.sin(a)) for a, q in zip(angle, radius, strict=True)], height, flank
+        )
 
     def _noise(self, u: np.ndarray) -> np.ndarray:
         """Fractal wobble in -1..1 along a leg."""
@@ -119,7 +123,9 @@ def smooth_path(points: Sequence[tuple[float, float]], closed: bool, each: int) 
     p = np.vstack([p[-1], p, p[0], p[1]]) if closed else np.vstack([2 * p[0] - p[1], p, 2 * p[-1] - p[-2]])
     out = []
     for a, b, c, d in zip(p, p[1:], p[2:], p[3:], strict=False):
-        knots = np.concatenate([[0.0], np.cumsum([max(np.hypot(*(q - r)), 1e-9) ** 0.5 for q, r in ((b, a), (c, b), (d, c))])])
+        knots = np.concatenate(
+            [[0.0], np.cumsum([max(np.hypot(*(q - r)), 1e-9) ** 0.5 for q, r in ((b, a), (c, b), (d, c))])]
+        )
         t = np.linspace(knots[1], knots[2], each, endpoint=False)[:, None]
         a1 = (knots[1] - t) / (knots[1] - knots[0]) * a + (t - knots[0]) / (knots[1] - knots[0]) * b
         a2 = (knots[2] - t) / (knots[2] - knots[1]) * b + (t - knots[1]) / (knots[2] - knots[1]) * c

@@ -1,0 +1,183 @@
+"""A real server process and a real Chromium for the end-to-end tests (SPEC E)."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.sync_api import Browser, BrowserContext, Page, sync_playwright
+
+ROOT = Path(__file__).resolve().parents[2]
+ARTIFACTS = ROOT / "tests" / "artifacts" / "e2e"
+# WebGPU in headless Chromium on a machine without a GPU needs all of these (DESIGN 16).
+FLAGS = [
+    "--no-sandbox",
+    "--enable-unsafe-webgpu",
+    "--enable-features=Vulkan",
+    "--use-vulkan=swiftshader",
+    "--use-angle=swiftshader",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-backgrounding-occluded-windows",
+    "--disable-renderer-backgrounding",
+]
+
+
+def free_port() -> int:
+    """A TCP port that nobody listens on now."""
+    with socket.socket() as s:
+        s.bind(("127.0.0.1", 0))
+        return int(s.getsockname()[1])
+
+
+@dataclass
+class Server:
+    """A server process that can be killed and started again on the same port and data."""
+
+    data: Path
+    port: int = field(default_factory=free_port)
+    process: subprocess.Popen[bytes] | None = None
+
+    @property
+    def url(self) -> str:
+        return f"http://127.0.0.1:{self.port}"
+
+    def start(self) -> None:
+        """Start and wait until /healthz answers. Raises RuntimeError with the log when it does not."""
+        log = (self.data.parent / "server.log").open("ab")
+        command = [sys.executable, "-m", "esker", "serve", "--port", str(self.port), "--data", str(self.data)]
+        self.process = subprocess.Popen(command, cwd=ROOT, stdout=log, stderr=log)
+        deadline = time.monotonic() + 90
+        while time.monotonic() < deadline:
+            if self.process.poll() is not None:
+                break
+            try:
+                with urllib.request.urlopen(f"{self.url}/healthz", timeout=1) as answer:
+                    if answer.status == 200:
+                        return
+            except (urllib.error.URLError, OSError):
+                time.sleep(0.1)
+        raise RuntimeError((self.data.parent / "server.log").read_text(errors="replace")[-4000:])
+
+    def kill(self, number: int = signal.SIGKILL) -> None:
+        """Send a signal and reap the process."""
+        if self.process is not None and self.process.poll() is None:
+            os.kill(self.process.pid, number)
+            self.process.wait(30)
+
+    def request(self, method: str, path: str, body: Any = None, secret: str | None = None) -> bytes:
+        """One HTTP request; raises on an error status."""
+        headers = {"Content-Type": "application/json"}
+        if secret:
+            headers["Authorization"] = f"Bearer {secret}"
+        data = None if body is None else json.dumps(body).encode()
+        call = urllib.request.Request(self.url + path, data=data, headers=headers, method=method)
+        with urllib.request.urlopen(call, timeout=30) as answer:
+            return bytes(answer.read())
+
+    def create(self, **body: Any) -> tuple[str, str]:
+        """A new terrain: id and owner secret."""
+        made = json.loads(self.request("POST", "/api/terrains", body))
+        return made["id"], made["secret"]
+
+
+@pytest.fixture
+def server(tmp_path: Path) -> Iterator[Server]:
+    """A fresh server on an empty data folder."""
+    if not (ROOT / "frontend" / "dist" / "index.html").exists():
+        pytest.fail("The page is not built: run `make test`, which builds it first.")
+    made = Server(tmp_path / "data")
+    made.start()
+    yield made
+    made.kill(signal.SIGTERM)
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Browser]:
+    """Headless Chromium with WebGPU on the software adapter."""
+    path = os.environ.get("CHROMIUM") or shutil.which("chromium") or shutil.which("chromium-browser")
+    if path is None:
+        pytest.fail("Chromium is missing: run `make browser`.")
+    with sync_playwright() as playwright:
+        made = playwright.chromium.launch(executable_path=path, args=FLAGS)
+        yield made
+        made.close()
+
+
+@dataclass
+class Visitor:
+    """One person: a browser context with one page, whose requests and console are watched."""
+
+    context: BrowserContext
+    page: Page
+    origin: str
+    foreign: list[str] = field(default_factory=list)
+    errors: list[str] = field(default_factory=list)
+
+    def watch(self) -> None:
+        def seen(url: str) -> None:
+            host = re.match(r"^(?:https?|wss?)://([^/]+)", url)
+            if host and host.group(1) != self.origin.split("//")[1]:
+                self.foreign.append(url)
+
+        self.page.on("request", lambda request: seen(request.url))
+        self.page.on("websocket", lambda socket: seen(socket.url))
+        self.page.on("pageerror", lambda error: self.errors.append(str(error)))
+        self.page.on("console", lambda line: self.errors.append(line.text) if line.type == "error" else None)
+
+    def open(self, path: str) -> None:
+        """Open a path of the server and wait for the terrain to be there."""
+        self.page.goto(self.origin + path)
+        self.page.wait_for_function("window.esker && window.esker.ready()", timeout=90_000)
+
+    def js(self, expression: str, argument: Any = None) -> Any:
+        """Evaluate in the page."""
+        return self.page.evaluate(expression, argument)
+
+    def shot(self, name: str) -> Path:
+        """Keep a screenshot as a test artefact."""
+        ARTIFACTS.mkdir(parents=True, exist_ok=True)
+        path = ARTIFACTS / f"{name}.png"
+        self.page.screenshot(path=path)
+        return path
+
+
+class Visitors:
+    """Makes visitors; closes them all at the end."""
+
+    def __init__(self, browser: Browser, server: Server) -> None:
+        self.browser, self.server = browser, server
+        self.made: list[Visitor] = []
+
+    def __call__(self, width: int = 800, height: int = 600, **options: Any) -> Visitor:
+        context = self.browser.new_context(viewport={"width": width, "height": height}, **options)
+        visitor = Visitor(context, context.new_page(), self.server.url)
+        visitor.watch()
+        self.made.append(visitor)
+        return visitor
+
+
+@pytest.fixture
+def visitors(browser: Browser, server: Server) -> Iterator[Visitors]:
+    """``visitors()`` gives a new person on the server."""
+    made = Visitors(browser, server)
+    yield made
+    for visitor in made.made:
+        visitor.context.close()
