@@ -578,11 +578,8 @@ TILE_HEADER: Final = np.dtype(
         ("version", "<u4"),
         ("base_version", "<u4"),
         ("bytes", "<u4"),
-        ("sub_min", "<i4", (SUBPATCHES * SUBPATCHES,)),
-        ("sub_max", "<i4", (SUBPATCHES * SUBPATCHES,)),
-        ("sub_error", "<u4", (SUBPATCHES * SUBPATCHES,)),
     ]
 )
 """``version``: of this tile; ``base_version``: of the parent (or previous) tile that it was predicted from;
-``planes``: byte planes before deflate (1..4); ``sub_*``: per 16-cell sub-patch [row*4 + col], in quanta of the level:
-lowest, highest sample, and the largest distance to what the parent level would draw there (``sub_error``)."""
+``planes``: byte planes before deflate (1..4). Bounds and errors of the 16-cell sub-patches follow from the samples
+and the parent, both of which the decoder holds, so they do not travel (docs/decisions/0003-derived-bounds.md)."""

@@ -510,7 +510,7 @@ export const TILE_DROP = {
 } as const;
 
 export const TILE_HEADER = {
-  size: 212,
+  size: 20,
   x: { offset: 0, type: "Uint16", count: 1 },
   y: { offset: 2, type: "Uint16", count: 1 },
   predictor: { offset: 4, type: "Uint8", count: 1 },
@@ -519,7 +519,4 @@ export const TILE_HEADER = {
   version: { offset: 8, type: "Uint32", count: 1 },
   base_version: { offset: 12, type: "Uint32", count: 1 },
   bytes: { offset: 16, type: "Uint32", count: 1 },
-  sub_min: { offset: 20, type: "Int32", count: 16 },
-  sub_max: { offset: 84, type: "Int32", count: 16 },
-  sub_error: { offset: 148, type: "Uint32", count: 16 },
 } as const;
