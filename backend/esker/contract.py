@@ -450,7 +450,11 @@ class Welcome(Wire):
 
 
 class Ack(Wire):
-    """These ops are committed to the journal. ``clocks[i]`` belongs to ``ids[i]``."""
+    """These ops are committed to the journal. ``clocks[i]`` belongs to ``ids[i]``; sent to their author.
+
+    For ops ordered now it follows the ``ordered`` message that carries them. For an op sent again that the journal
+    already holds (a resume), it comes alone: the client got the op itself in ``welcome``.
+    """
 
     type: Literal["ack"] = "ack"
     ids: tuple[OpId, ...]
@@ -465,6 +469,12 @@ class Reject(Wire):
 
 
 class OpsBroadcast(Wire):
+    """What one tick committed, in clock order, without gaps, the same text for every member.
+
+    It holds the reader's own ops too: apply them to the confirmed document at their place and drop them from the
+    unconfirmed ones (by id); the ``ack`` that follows then names ids that are no longer pending, which is fine.
+    """
+
     type: Literal["ordered"] = "ordered"
     ops: tuple[OrderedOp, ...]
 
