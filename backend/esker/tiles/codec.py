@@ -1,0 +1,128 @@
+"""Tile payloads: integer prediction from the parent, zig-zag residuals, byte planes, raw deflate (DESIGN 6).
+
+Everything is exact integer arithmetic, mirrored by ``frontend/src/core/predict.ts`` and ``net/decode.ts``; both read
+``tests/vectors/tiles.json``. Arrays are ``[row, col]``, row 0 south; a tile is 65x65 int32 in quanta of its level.
+"""
+
+from __future__ import annotations
+
+import zlib
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from esker.contract import TILE_CELLS, TILE_SAMPLES
+
+Ints = NDArray[np.int32]
+Wide = NDArray[np.signedinteger]
+
+SAMPLE_LIMIT: Final = 1 << 28
+"""Samples are within +-2^28 quanta, so that a residual always fits 32 bits (see ``predict``)."""
+TILE_AREA: Final = TILE_SAMPLES * TILE_SAMPLES
+MAX_PAYLOAD: Final = 4 * TILE_AREA + 1024
+"""Above this a payload is malformed: deflate never grows 16,900 bytes by more than a few stored-block headers."""
+
+_NARROW_LIMIT: Final = (1 << 31) // (26 * 26) - 1
+"""Largest |parent sample| for which the two-dimensional sums below fit in int32 (weights add up to at most 26)."""
+_DEFLATE_LEVEL: Final = 6
+
+
+class CodecError(ValueError):
+    """A payload that no encoder could have written."""
+
+
+def _upsample(a: Wide) -> Wide:
+    """Along the last axis, n -> 2n-1 samples, scaled by 16: interpolating 4-point rule, one-sided at both ends."""
+    out = np.empty((*a.shape[:-1], 2 * a.shape[-1] - 1), dtype=a.dtype)
+    np.multiply(a, 16, out=out[..., 0::2])
+    odd = out[..., 1::2]
+    inner = odd[..., 1:-1]
+    np.add(a[..., 1:-2], a[..., 2:-1], out=inner)
+    inner *= 9
+    inner -= a[..., :-3]
+    inner -= a[..., 3:]
+    odd[..., 0] = 5 * a[..., 0] + 15 * a[..., 1] - 5 * a[..., 2] + a[..., 3]
+    odd[..., -1] = 5 * a[..., -1] + 15 * a[..., -2] - 5 * a[..., -3] + a[..., -4]
+    return out
+
+
+def predict(parents: Ints) -> Wide:
+    """All four children of each parent at once, as one 129x129 grid.
+
+    Args:
+        parents: (..., 65, 65) int32, |sample| <= 2^28, in quanta of the parent's level.
+    Returns:
+        (..., 129, 129) int32 or int64 in quanta of the child's level (half as large, hence the factor two): the
+        tensor product of (-1, 9, 9, -1)/16, at the parent tile's border of (5, 15, -5, 1)/16, times two, rounded
+        once, halves upward: ``floor((sum + 64) / 128)``. Even samples are exactly twice the parent's. |result| is
+        below 2^30.5. Child (cx, cy) is ``[64*cy : 64*cy+65, 64*cx : 64*cx+65]``.
+    """
+    small = parents.size == 0 or max(int(parents.max()), -int(parents.min())) <= _NARROW_LIMIT
+    wide: Wide = parents if small else parents.astype(np.int64)
+    cols = _upsample(wide)
+    # The rows are upsampled through a transposed view: same kernel, same rounding, symmetric in x and y.
+    both = _upsample(np.ascontiguousarray(np.swapaxes(cols, -1, -2)))
+    both += 64
+    both >>= 7
+    return np.swapaxes(both, -1, -2)
+
+
+def child_window(prediction: Wide, x: int, y: int) -> Wide:
+    """The 65x65 part of ``predict``'s grid that belongs to child tile (x, y); only their parities matter."""
+    r, c = TILE_CELLS * (y & 1), TILE_CELLS * (x & 1)
+    return prediction[..., r : r + TILE_SAMPLES, c : c + TILE_SAMPLES]
+
+
+def zigzag(residual: Wide) -> NDArray[np.uint32]:
+    """0, -1, 1, -2, 2 ... -> 0, 1, 2, 3, 4 ...; residuals must fit in int32."""
+    r = residual.astype(np.int32)
+    return ((r << 1) ^ (r >> 31)).view(np.uint32)
+
+
+def unzigzag(codes: NDArray[np.uint32]) -> Ints:
+    """Inverse of ``zigzag``."""
+    return ((codes >> 1) ^ (0 - (codes & 1))).view(np.int32)
+
+
+def pack(residual: Wide) -> tuple[int, bytes]:
+    """One tile's residual, shape (65, 65), as ``(planes, payload)``.
+
+    The zig-zag codes are split into ``planes`` (1..4) byte planes, lowest first, each 4,225 bytes in row-major order,
+    and deflated raw (RFC 1951, no zlib header).
+    """
+    codes = np.ascontiguousarray(zigzag(residual)).reshape(-1)
+    planes = max(1, (int(codes.max()).bit_length() + 7) // 8)
+    raw = codes.astype("<u4", copy=False).view(np.uint8).reshape(TILE_AREA, 4)[:, :planes].T.tobytes()
+    deflate = zlib.compressobj(_DEFLATE_LEVEL, zlib.DEFLATED, -15)
+    return planes, deflate.compress(raw) + deflate.flush()
+
+
+def unpack(planes: int, payload: bytes | memoryview) -> Ints:
+    """Inverse of ``pack``: the residual, (65, 65) int32. Never inflates more than ``planes`` planes plus one byte.
+
+    Raises CodecError for a wrong number of planes, an oversize payload, a broken stream or a wrong length.
+    """
+    if not 1 <= planes <= 4:
+        raise CodecError(f"a tile has 1 to 4 byte planes, not {planes}")
+    if len(payload) > MAX_PAYLOAD:
+        raise CodecError(f"a tile payload has at most {MAX_PAYLOAD} bytes, not {len(payload)}")
+    want = planes * TILE_AREA
+    inflate = zlib.decompressobj(-15)
+    try:
+        raw = inflate.decompress(payload, want + 1)
+    except zlib.error as e:
+        raise CodecError(f"a tile payload does not inflate: {e}") from e
+    if len(raw) != want or not inflate.eof:
+        raise CodecError(f"a tile payload inflates to {len(raw)} bytes, not {want}")
+    codes = np.zeros((TILE_AREA, 4), dtype=np.uint8)
+    codes[:, :planes] = np.frombuffer(raw, dtype=np.uint8).reshape(planes, TILE_AREA).T
+    return unzigzag(codes.reshape(-1).view("<u4").astype(np.uint32, copy=False)).reshape(TILE_SAMPLES, TILE_SAMPLES)
+
+
+def reconstruct(prediction: Wide | None, residual: Ints) -> Ints:
+    """Samples from prediction (None: zero) and residual. Raises CodecError beyond +-2^28, which no encoder sends."""
+    samples = residual.astype(np.int64) if prediction is None else prediction.astype(np.int64) + residual
+    if samples.min() < -SAMPLE_LIMIT or samples.max() > SAMPLE_LIMIT:
+        raise CodecError("a tile sample is out of range")
+    return samples.astype(np.int32)

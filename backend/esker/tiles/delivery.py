@@ -1,0 +1,298 @@
+"""What to send to whom, next (DESIGN 6, 7, 8): one ``TileServer`` a room, one ``ClientTiles`` a client.
+
+Nothing is queued. A client's next frame is planned from the newest levels when its byte window has room, so a newer
+version of a tile replaces an older one by construction, and a slow client sees fewer steps but the same end.
+
+Two rules keep every client's ground consistent while levels arrive coarse to fine and solves restart:
+
+- A level is *current* when no coarser level changed after it was put. A LEVEL frame is sent only of a current level:
+  else the fine ground, which the page moves along with its parents, would jump back to an older solve.
+- A FILL adds a tile only when its content is of the same put as what the client holds of that level, or older and
+  unchanged since, and no ancestor changed since the level was put. So it fits its neighbours to the bit.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import OrderedDict
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from esker.contract import FrameKind, Predictor, View
+from esker.grid import TileKey
+from esker.tiles.codec import Ints, child_window, pack, predict
+from esker.tiles.frame import FrameHead, TileRecord, write_frame, write_tile
+from esker.tiles.pyramid import Counts, Level, Mask, Pyramid
+from esker.tiles.quadtree import default_selection, select
+
+FILL_TILES: Final = 48
+"""Most tiles in one FILL frame: about 64 KiB where a tile takes 1 to 1.5 KB."""
+CACHE_BYTES: Final = 32 * 1024 * 1024
+
+CacheKey = tuple[TileKey, int, int]
+
+
+class EncodedTiles:
+    """LRU of coded tiles by (key, version, base version), shared by all clients of a room; safe across threads."""
+
+    def __init__(self, limit: int = CACHE_BYTES) -> None:
+        self._limit = limit
+        self._lock = threading.Lock()
+        self._items: OrderedDict[CacheKey, bytes] = OrderedDict()
+        self._bytes = 0
+
+    def get(self, key: CacheKey) -> bytes | None:
+        """The coded tile, or None."""
+        with self._lock:
+            found = self._items.get(key)
+            if found is not None:
+                self._items.move_to_end(key)
+            return found
+
+    def put(self, key: CacheKey, value: bytes) -> None:
+        """Keeps a coded tile and forgets the least recently used ones above the limit."""
+        with self._lock:
+            if key in self._items:
+                return
+            self._items[key] = value
+            self._bytes += len(value)
+            while self._bytes > self._limit and len(self._items) > 1:
+                self._bytes -= len(self._items.popitem(last=False)[1])
+
+    @property
+    def bytes(self) -> int:
+        """Bytes held."""
+        return self._bytes
+
+
+@dataclass(frozen=True, eq=False)
+class FramePlan:
+    """A frame decided but not yet coded. Captures immutable levels: ``encode`` may run in any thread, any time."""
+
+    kind: FrameKind
+    level: Level
+    parent: Level | None
+    keys: tuple[TileKey, ...]
+    drops: tuple[TileKey, ...]
+    cache: EncodedTiles
+
+    def encode(self) -> bytes:
+        """The binary frame. Pure: the same plan always gives the same bytes."""
+        coded: dict[TileKey, bytes] = {}
+        missing: dict[TileKey | None, list[TileKey]] = {}
+        for key in self.keys:
+            found = self.cache.get(self._cache_key(key))
+            if found is None:
+                missing.setdefault(key.parent() if self.parent is not None else None, []).append(key)
+            else:
+                coded[key] = found
+        for parent, children in missing.items():
+            prediction = None if parent is None or self.parent is None else predict(_window(self.parent, parent))
+            for key in children:
+                samples = _window(self.level, key)
+                residual = samples if prediction is None else samples - child_window(prediction, key.x, key.y)
+                coded[key] = self._write(key, residual)
+                self.cache.put(self._cache_key(key), coded[key])
+        head = FrameHead(self.kind, self.level.level, self.level.clock, self.level.settled)
+        return write_frame(head, [(d.x, d.y) for d in self.drops], [coded[key] for key in self.keys])
+
+    def _write(self, key: TileKey, residual: NDArray[np.signedinteger]) -> bytes:
+        planes, payload = pack(residual)
+        predictor = Predictor.ZERO if self.parent is None else Predictor.PARENT
+        _, version, base = self._cache_key(key)
+        return write_tile(TileRecord(key.x, key.y, predictor, planes, version, base, payload))
+
+    def _cache_key(self, key: TileKey) -> CacheKey:
+        base = 0 if self.parent is None else int(self.parent.versions[key.y >> 1, key.x >> 1])
+        return key, int(self.level.versions[key.y, key.x]), base
+
+
+def _window(level: Level, key: TileKey) -> Ints:
+    """The 65x65 samples of a tile."""
+    r, c = 64 * key.y, 64 * key.x
+    return level.samples[r : r + 65, c : c + 65]
+
+
+class TileServer:
+    """The newest ground of one room, as tiles. Mutable; owned by the room, used from one thread."""
+
+    def __init__(self, size_m: float, levels: int) -> None:
+        self.pyramid = Pyramid(size_m, levels)
+        self.cache = EncodedTiles()
+        self._lineage: list[Counts] = []
+        self._lineage_stamp = -1
+
+    @property
+    def levels(self) -> int:
+        """The finest level that can be put."""
+        return self.pyramid.levels
+
+    def put_level(self, clock: int, level: int, heights: NDArray[np.float32], settled: bool) -> int:
+        """Takes a level of a solve: (N_l, N_l) float32 metres, row 0 south. Returns the number of changed tiles.
+
+        A tile changes when a sample moved by at least one quantum; a settled level is exact. Raises ValueError for a
+        wrong level, shape, NaN or infinity, and changes nothing then.
+        """
+        return self.pyramid.put(clock, level, heights, settled)
+
+    def lineage(self) -> list[Counts]:
+        """Per level, (2^l, 2^l): the newest version among a tile's ancestors, itself not counted."""
+        if self._lineage_stamp != self.pyramid.stamp:
+            newest = np.zeros((1, 1), dtype=np.uint32)
+            self._lineage = [newest]
+            for level in range(self.levels):
+                found = self.pyramid.level(level)
+                if found is not None:
+                    newest = np.maximum(newest, found.versions)
+                newest = newest.repeat(2, axis=0).repeat(2, axis=1)
+                self._lineage.append(newest)
+            self._lineage_stamp = self.pyramid.stamp
+        return self._lineage
+
+
+class ClientTiles:
+    """What one client holds and wants. Mutable; used from the room's thread; one plan is outstanding at a time."""
+
+    def __init__(self, tiles: TileServer) -> None:
+        self._server = tiles
+        n = tiles.levels + 1
+        self._held: list[Counts] = [np.zeros((1 << level, 1 << level), dtype=np.uint32) for level in range(n)]
+        """Version that the client holds, 0 for none."""
+        self._stamps = [0] * n
+        """The put of each level of which the client has, or needs, nothing more."""
+        self._moved = [False] * n
+        """The client shows a preview of this level: an ancestor was sent since its last LEVEL frame."""
+        self._settled = [False] * n
+        self._view: View | None = None
+        self._wanted = default_selection(tiles.levels)
+        self._errors: list[NDArray[np.float32]] | None = None
+        self._selected_generation = -1
+        self._view_changed = False
+        self._idle_stamp = -1
+
+    def set_view(self, view: View) -> None:
+        """The client's camera. Selection follows at the next ``plan``."""
+        if view != self._view:
+            self._view = view
+            self._view_changed = True
+
+    def held(self) -> dict[TileKey, int]:
+        """Versions that the client holds once it has applied every committed frame."""
+        return {
+            TileKey(level, int(x), int(y)): int(versions[y, x])
+            for level, versions in enumerate(self._held)
+            for y, x in np.argwhere(versions > 0)
+        }
+
+    def wanted(self) -> list[Mask]:
+        """The present selection, one (2^l, 2^l) mask per level."""
+        self._select()
+        return self._wanted
+
+    def plan(self) -> FramePlan | None:
+        """The most useful next frame, or None when there is nothing to send now. Cheap; changes nothing held.
+
+        Levels coarse to fine: a LEVEL frame where a newer put waits; then FILL frames for tiles that came into view,
+        coarse to fine and by projected error.
+        """
+        pyramid = self._server.pyramid
+        if self._idle_stamp == pyramid.stamp and not self._view_changed:
+            return None
+        self._select()
+        for level in range(self._server.levels + 1):
+            plan = self._plan_level(level)
+            if plan is not None:
+                return plan
+        for level in range(self._server.levels + 1):
+            plan = self._plan_fill(level)
+            if plan is not None:
+                return plan
+        self._idle_stamp = pyramid.stamp
+        return None
+
+    def commit(self, plan: FramePlan) -> None:
+        """The frame was handed to the socket: from now on the client counts as holding it."""
+        level = plan.level.level
+        held = self._held[level]
+        for key in plan.drops:
+            for below in range(level, self._server.levels + 1):
+                r, c, n = key.y << (below - level), key.x << (below - level), 1 << (below - level)
+                self._held[below][r : r + n, c : c + n] = 0
+        if plan.keys:
+            rows = np.fromiter((k.y for k in plan.keys), dtype=np.intp, count=len(plan.keys))
+            cols = np.fromiter((k.x for k in plan.keys), dtype=np.intp, count=len(plan.keys))
+            held[rows, cols] = plan.level.versions[rows, cols]
+        if plan.kind == FrameKind.LEVEL:
+            self._stamps[level] = plan.level.stamp
+            self._moved[level] = False
+            self._settled[level] = plan.level.settled
+            if plan.keys:
+                for below in range(level + 1, self._server.levels + 1):
+                    self._moved[below] = True
+        self._idle_stamp = -1
+
+    def _select(self) -> None:
+        """Selects again when the view moved or the ground changed since the last selection."""
+        pyramid = self._server.pyramid
+        if self._view is None or not (self._view_changed or self._selected_generation != pyramid.generation):
+            return
+        self._wanted, self._errors = select(pyramid.bounds(), self._view)
+        self._selected_generation = pyramid.generation
+        self._view_changed = False
+        self._idle_stamp = -1
+
+    def _parents_held(self, level: int) -> Mask | bool:
+        """Where the parent's newest version is held, so that a child may be predicted from it."""
+        if level == 0:
+            return True
+        parent = self._server.pyramid.level(level - 1)
+        if parent is None:
+            return False
+        ok = self._held[level - 1] == parent.versions
+        return np.asarray(ok.repeat(2, axis=0).repeat(2, axis=1), dtype=np.bool_)
+
+    def _plan_level(self, index: int) -> FramePlan | None:
+        pyramid = self._server.pyramid
+        level = pyramid.level(index)
+        if level is None or level.stamp == self._stamps[index]:
+            return None
+        coarser = [pyramid.level(i) for i in range(index)]
+        if any(c is not None and c.changed > level.stamp for c in coarser):
+            return None
+        held = self._held[index]
+        stale = held != level.versions
+        send = stale & self._wanted[index] & self._parents_held(index)
+        drop = stale & (held > 0) & ~send
+        preview = bool(held.any()) and (self._moved[index] or level.settled != self._settled[index])
+        if not send.any() and not drop.any() and not preview:
+            self._stamps[index] = level.stamp  # nothing that the client shows differs from this put
+            return None
+        return self._frame(FrameKind.LEVEL, level, _keys(index, send), _keys(index, drop))
+
+    def _plan_fill(self, index: int) -> FramePlan | None:
+        level = self._server.pyramid.level(index)
+        if level is None:
+            return None
+        held = self._held[index]
+        send = self._wanted[index] & (held == 0)
+        if not send.any():
+            return None
+        send &= self._parents_held(index)
+        send &= level.versions <= self._stamps[index]
+        send &= self._server.lineage()[index] <= level.stamp
+        keys = _keys(index, send)
+        if self._errors is not None:
+            error = self._errors[index]
+            keys.sort(key=lambda k: -float(error[k.y, k.x]))
+        return self._frame(FrameKind.FILL, level, keys[:FILL_TILES], []) if keys else None
+
+    def _frame(self, kind: FrameKind, level: Level, keys: list[TileKey], drops: list[TileKey]) -> FramePlan:
+        parent = self._server.pyramid.level(level.level - 1) if level.level else None
+        return FramePlan(kind, level, parent, tuple(keys), tuple(drops), self._server.cache)
+
+
+def _keys(level: int, mask: Mask) -> list[TileKey]:
+    return [TileKey(level, int(x), int(y)) for y, x in np.argwhere(mask)]

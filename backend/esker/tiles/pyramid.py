@@ -1,0 +1,132 @@
+"""Quantised levels with versions (DESIGN 6, 7): what the server knows of the ground, as integers.
+
+A ``Level`` is immutable, so that frames can be encoded from it in another thread; ``Pyramid.put`` replaces it.
+Heights are int32 in quanta ``q_l = s_l / 256``, ``[row, col]``, row 0 south.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from esker import grid
+from esker.contract import TILE_CELLS
+from esker.tiles.bounds import Bounds, SubPatches, block_reduce, nest
+from esker.tiles.codec import SAMPLE_LIMIT, Ints
+
+Counts = NDArray[np.uint32]
+Mask = NDArray[np.bool_]
+
+DEAD_ZONE: Final = 1.0
+"""Quanta that a sample may move in a preview before it counts as changed. Settled levels are exact."""
+
+
+@dataclass(frozen=True)
+class Level:
+    """One level at one moment.
+
+    ``samples``: (N_l, N_l) int32, read-only. ``versions``: (2^l, 2^l) uint32, the stamp at which each tile last
+    changed. ``stamp``: when the level was last put, changed or not; ``changed``: the newest of ``versions``.
+    """
+
+    level: int
+    samples: Ints
+    versions: Counts
+    stamp: int
+    changed: int
+    clock: int
+    settled: bool
+
+
+def quantise(heights: NDArray[np.float32], level: int, size_m: float, kept: Ints | None = None) -> Ints:
+    """Metres to quanta of the level, halves to even, saturating at +-2^28 quanta.
+
+    With ``kept`` (same shape) a sample that is still within ``DEAD_ZONE`` of its kept value keeps it. The decision is
+    made per sample of the level, so the shared edges of neighbouring tiles stay equal. Raises ValueError on NaN and
+    infinity.
+    """
+    steps = heights * np.float32(1.0 / grid.quantum(level, size_m))
+    np.clip(steps, -SAMPLE_LIMIT, SAMPLE_LIMIT, out=steps)  # lets NaN through
+    if not np.isfinite(float(steps.sum(dtype=np.float64))) or not np.isfinite(heights).all():
+        raise ValueError(f"level {level} has heights that are not finite")
+    if kept is None:
+        return np.rint(steps).astype(np.int32)
+    moved = np.abs(steps - kept) >= DEAD_ZONE
+    return np.asarray(np.where(moved, np.rint(steps), kept), dtype=np.int32)
+
+
+class Pyramid:
+    """The newest quantised levels of one terrain. Mutable; owned by ``delivery.TileServer``."""
+
+    def __init__(self, size_m: float, levels: int) -> None:
+        self.size_m = size_m
+        self.levels = levels
+        self.stamp = 0
+        """Counts ``put``; every version and stamp is a value of this counter."""
+        self.generation = 0
+        """Rises when bounds may have changed enough to select again: see ``put``."""
+        self._levels: list[Level | None] = [None] * (levels + 1)
+        self._subs = [SubPatches(level) for level in range(levels + 1)]
+        self._dirty: list[Mask] = [np.zeros((1 << level, 1 << level), dtype=np.bool_) for level in range(levels + 1)]
+        self._bounds: Bounds | None = None
+        self._bounds_stamp = -1
+
+    def level(self, level: int) -> Level | None:
+        """The level as it is now, None before its first ``put``."""
+        return self._levels[level]
+
+    def put(self, clock: int, level: int, heights: NDArray[np.float32], settled: bool) -> int:
+        """Replaces a level; returns the number of tiles of which a sample changed.
+
+        ``heights``: (N_l, N_l) float32 metres. Unsettled heights have a dead zone of one quantum; settled ones are
+        rounded exactly. Raises ValueError for a wrong level or shape or heights that are not finite, and changes
+        nothing then.
+        """
+        if not 0 <= level <= self.levels:
+            raise ValueError(f"level {level} is not one of 0..{self.levels}")
+        n = grid.samples(level)
+        if heights.shape != (n, n):
+            raise ValueError(f"level {level} has {n}x{n} samples, not {heights.shape}")
+        old = self._levels[level]
+        samples = quantise(heights, level, self.size_m, old.samples if old is not None and not settled else None)
+        stamp = self.stamp + 1
+        if old is None:
+            changed = np.ones((1 << level, 1 << level), dtype=np.bool_)
+        else:
+            changed = np.asarray(block_reduce(np.logical_or, samples != old.samples, TILE_CELLS), dtype=np.bool_)
+        count = int(np.count_nonzero(changed))
+        if old is not None and not count:
+            self._levels[level] = replace(old, stamp=stamp, clock=clock, settled=settled)
+        else:
+            samples.flags.writeable = False
+            versions = np.where(changed, np.uint32(stamp), 0 if old is None else old.versions).astype(np.uint32)
+            versions.flags.writeable = False
+            self._levels[level] = Level(level, samples, versions, stamp, stamp, clock, settled)
+            self._mark(level, changed)
+        self.stamp = stamp
+        if old is None or level == self.levels:
+            self.generation += 1
+        return count
+
+    def _mark(self, level: int, changed: Mask) -> None:
+        """Bounds to recompute: of the changed tiles, and of their children, whose error is against them."""
+        self._dirty[level] |= changed
+        if level < self.levels:
+            self._dirty[level + 1] |= changed.repeat(2, axis=0).repeat(2, axis=1)
+
+    def bounds(self) -> Bounds:
+        """Bounds of the newest levels, recomputed where samples changed since the last call."""
+        if self._bounds is not None and self._bounds_stamp == self.stamp:
+            return self._bounds
+        for i, level in enumerate(self._levels):
+            if level is None:
+                continue
+            parent = self._levels[i - 1] if i else None
+            self._subs[i].update(level.samples, None if parent is None else parent.samples, self._dirty[i])
+            self._dirty[i][:] = False
+        self._bounds = nest(self._subs, [level is not None for level in self._levels], self.size_m)
+        self._bounds_stamp = self.stamp
+        return self._bounds

@@ -1,0 +1,116 @@
+"""View-dependent selection of tiles, as array operations (DESIGN 7; paper 0, III-A; paper 1, 3.2).
+
+The server selects what a client's view needs; the client selects again, per 16-cell sub-patch, among what it holds.
+A tile is wanted when its ground is in view and drawing its parent there would be seen: the error that it or a
+descendant corrects projects to more than a fraction of tau, and the parent's cells are still larger than a pixel
+or so. Flat land is therefore never refined. The set is closed under parents and restricted: the eight neighbours of
+a wanted tile's parent are wanted, so neighbours in the drawn cut, corners too, differ by at most one level.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from esker.contract import View
+from esker.tiles.bounds import Bounds, Floats
+
+Mask = NDArray[np.bool_]
+Vector = NDArray[np.float64]
+
+ALWAYS: Final = 2
+"""Levels 0..2 are always wanted, whatever the view: they are small, and shading and picking lean on them."""
+ERROR_FRACTION: Final = 0.5
+"""Tiles are sent when their error exceeds this part of tau: the client refines at tau, and lighting shows sooner."""
+CELL_PX: Final = 1.0
+"""A parent whose cells project to at most this many pixels is never refined."""
+FRUSTUM_MARGIN: Final = 1.15
+"""The half-angle tangents of the frustum are enlarged by this factor, so that a turning camera finds tiles."""
+_NEAR_CELLS: Final = 4.0
+"""Distances are not taken below this many cells of level 6 or one metre, whichever is larger."""
+
+
+def default_selection(levels: int) -> list[Mask]:
+    """What a client gets before it has sent a view: levels 0..2, one (2^l, 2^l) mask per level."""
+    return [np.full((1 << level, 1 << level), level <= ALWAYS, dtype=np.bool_) for level in range(levels + 1)]
+
+
+def _axes(view: View) -> tuple[Vector, Vector, Vector, Vector]:
+    """Eye and unit vectors forward, right, up; some valid frame when eye and target coincide or lie on a plumb line."""
+    eye = np.asarray(view.eye, dtype=np.float64)
+    forward = np.asarray(view.target, dtype=np.float64) - eye
+    length = float(np.linalg.norm(forward))
+    forward = forward / length if length > 0 else np.array([0.0, 1.0, 0.0])
+    right = np.cross(forward, [0.0, 0.0, 1.0])
+    across = float(np.linalg.norm(right))
+    right = right / across if across > 1e-6 else np.array([1.0, 0.0, 0.0])
+    up: Vector = np.cross(right, forward)
+    return eye, forward, np.asarray(right, dtype=np.float64), up
+
+
+def screen_error(bounds: Bounds, view: View) -> tuple[Mask, Floats, Floats]:
+    """Per tile of ``bounds``: is its box in the enlarged frustum; its error; its parent's cell size. Both in pixels.
+
+    Lengths are projected at the nearest point of the tile's box, a bound from above. The frustum has no far plane;
+    the near plane passes through the eye.
+    """
+    eye, forward, right, up = _axes(view)
+    tan_y = math.tan(math.radians(view.fov_deg) / 2)
+    tan_x = tan_y * view.width / view.height
+    mid = (bounds.low + bounds.high) * np.float32(0.5)
+    tall = bounds.high - mid
+    dx, dy, dz = bounds.x - np.float32(eye[0]), bounds.y - np.float32(eye[1]), mid - np.float32(eye[2])
+    half = bounds.half
+
+    inside = bounds.valid.copy()
+    planes = [forward]
+    for side, tan in ((right, tan_x), (up, tan_y)):
+        planes += [forward * (tan * FRUSTUM_MARGIN) - side, forward * (tan * FRUSTUM_MARGIN) + side]
+    for n in planes:
+        a, b, c = (np.float32(v) for v in n)
+        reach = dx * a + dy * b + dz * c + half * (abs(a) + abs(b)) + tall * abs(c)
+        inside &= reach >= 0
+
+    px = np.maximum(np.abs(dx) - half, 0)
+    py = np.maximum(np.abs(dy) - half, 0)
+    pz = np.maximum(np.abs(dz) - tall, 0)
+    nearest = max(1.0, _NEAR_CELLS * bounds.size_m / 4096)
+    distance = np.maximum(np.sqrt(px * px + py * py + pz * pz), np.float32(nearest))
+    pixels = np.float32(view.height / (2 * tan_y)) / distance
+    return inside, bounds.error * pixels, bounds.spacing * (2 * pixels)
+
+
+def _dilate(mask: Mask) -> Mask:
+    """Also the eight neighbours of every True."""
+    rows = mask.copy()
+    rows[1:] |= mask[:-1]
+    rows[:-1] |= mask[1:]
+    out = rows.copy()
+    out[:, 1:] |= rows[:, :-1]
+    out[:, :-1] |= rows[:, 1:]
+    return out
+
+
+def restrict(masks: list[Mask]) -> list[Mask]:
+    """Smallest superset that holds every tile's parent and the parent's eight neighbours; changes ``masks``."""
+    for level in range(len(masks) - 1, 0, -1):
+        n = 1 << (level - 1)
+        parents: Mask = np.asarray(masks[level].reshape(n, 2, n, 2).any(axis=(1, 3)), dtype=np.bool_)
+        masks[level - 1] |= _dilate(parents)
+    return masks
+
+
+def select(bounds: Bounds, view: View) -> tuple[list[Mask], list[Floats]]:
+    """Wanted tiles and their projected errors (pixels), one (2^l, 2^l) array per level, rows from the south."""
+    inside, error, cell = screen_error(bounds, view)
+    wanted = inside & (error > ERROR_FRACTION * view.tau_px) & (cell > CELL_PX)
+    wanted[: (4 ** (ALWAYS + 1) - 1) // 3] = True
+    masks, errors = [], []
+    for level, start in enumerate(bounds.starts):
+        n = 1 << level
+        masks.append(wanted[start : start + n * n].reshape(n, n))
+        errors.append(error[start : start + n * n].reshape(n, n))
+    return restrict(masks), errors
