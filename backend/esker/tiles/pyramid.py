@@ -53,7 +53,7 @@ def quantise(heights: NDArray[np.float32], level: int, size_m: float, kept: Ints
     if not np.isfinite(float(steps.sum(dtype=np.float64))) or not np.isfinite(heights).all():
         raise ValueError(f"level {level} has heights that are not finite")
     if kept is None:
-        return np.rint(steps).astype(np.int32)
+        return np.asarray(np.rint(steps), dtype=np.int32)
     moved = np.abs(steps - kept) >= DEAD_ZONE
     return np.asarray(np.where(moved, np.rint(steps), kept), dtype=np.int32)
 

@@ -1,0 +1,216 @@
+/**
+ * Binary frames to exact samples (DESIGN 6). Twin of `backend/esker/tiles/{frame,decoder}.py`: both read
+ * `tests/vectors/tiles.json`. A frame is decoded wholly before anything held changes.
+ */
+
+import { inflateSync } from "fflate";
+import { subDistance, subRange } from "../core/bounds.ts";
+import { predictInts } from "../core/predict.ts";
+import { isUnder, parentKey, tileKey } from "../core/tilekey.ts";
+import type { DecodedFrame, DecodedTile } from "../core/types.ts";
+import {
+  Channel,
+  FRAME_HEADER,
+  FRAME_MAGIC,
+  FRAME_SETTLED,
+  FrameKind,
+  MAX_LEVEL,
+  PROTOCOL_VERSION,
+  Predictor,
+  SUBPATCHES,
+  TILE_DROP,
+  TILE_HEADER,
+  TILE_SAMPLES,
+} from "../generated/contract.ts";
+
+/** A frame that is truncated, malformed or does not fit what is held. */
+export class FrameError extends Error {
+  override name = "FrameError";
+}
+
+const AREA = TILE_SAMPLES * TILE_SAMPLES;
+const SUBS = SUBPATCHES * SUBPATCHES;
+/** Above this a payload is malformed: deflate never grows four planes by more than a few block headers. */
+const MAX_PAYLOAD = 4 * AREA + 1024;
+const SAMPLE_LIMIT = 2 ** 28;
+
+interface Head {
+  readonly kind: number;
+  readonly level: number;
+  readonly channel: number;
+  readonly clock: number;
+  readonly settled: boolean;
+  readonly tiles: number;
+  readonly drops: number;
+}
+
+interface TileHead {
+  readonly x: number;
+  readonly y: number;
+  readonly predictor: number;
+  readonly planes: number;
+  readonly version: number;
+  readonly baseVersion: number;
+  readonly bytes: number;
+}
+
+interface Held {
+  readonly version: number;
+  readonly samples: Int32Array;
+}
+
+/** Keeps the exact samples of the tiles that the page holds, and applies frames to them in order. */
+export class FrameDecoder {
+  private readonly held = new Map<number, Held>();
+
+  /** Forgets everything, as after a reconnect. */
+  reset(): void {
+    this.held.clear();
+  }
+
+  /** Tiles held now. */
+  get size(): number {
+    return this.held.size;
+  }
+
+  /** Decodes and applies one frame. Throws FrameError, and then changes nothing that is held. */
+  decode(buffer: ArrayBuffer): DecodedFrame {
+    const view = new DataView(buffer);
+    const head = readHead(view);
+    const drops = readDrops(view, head);
+    const dropped = new Set(drops.map((d) => tileKey(head.level, d.x, d.y)));
+    const tiles: DecodedTile[] = [];
+    const seen = new Set<number>();
+    let at = FRAME_HEADER.size + head.drops * TILE_DROP.size;
+    for (let i = 0; i < head.tiles; i++) {
+      const tile = readTileHead(view, at, head.level);
+      at += TILE_HEADER.size;
+      if (at + tile.bytes > buffer.byteLength) throw new FrameError("the frame ends inside a tile payload");
+      const key = tileKey(head.level, tile.x, tile.y);
+      if (seen.has(key)) throw new FrameError("a tile occurs twice");
+      if (dropped.has(key)) throw new FrameError("a tile is both sent and dropped");
+      seen.add(key);
+      tiles.push(this.decodeTile(head.level, key, tile, new Uint8Array(buffer, at, tile.bytes)));
+      at += tile.bytes;
+    }
+    if (at !== buffer.byteLength) throw new FrameError(`${buffer.byteLength - at} bytes follow the last tile`);
+    this.commit(head.level, dropped, tiles);
+    const { kind, level, channel, clock, settled } = head;
+    return { kind, level, channel, clock, settled, drops, tiles, bytes: buffer.byteLength };
+  }
+
+  private commit(level: number, dropped: ReadonlySet<number>, tiles: readonly DecodedTile[]): void {
+    for (const gone of dropped) for (const key of this.held.keys()) if (isUnder(key, gone)) this.held.delete(key);
+    for (const t of tiles) this.held.set(tileKey(level, t.x, t.y), { version: t.version, samples: t.samples });
+  }
+
+  private decodeTile(level: number, key: number, tile: TileHead, payload: Uint8Array): DecodedTile {
+    const samples = new Int32Array(AREA);
+    const parent = level > 0 ? this.held.get(parentKey(key)) : undefined;
+    if (tile.predictor === Predictor.PARENT) {
+      if (!parent) throw new FrameError("a tile is predicted from a parent that is not held");
+      if (parent.version !== tile.baseVersion)
+        throw new FrameError(
+          `a tile is predicted from version ${tile.baseVersion}, not ${parent.version}, of its parent`,
+        );
+      predictInts(parent.samples, tile.x, tile.y, samples);
+    }
+    addResidual(samples, inflatePlanes(payload, tile.planes), tile.planes);
+    const subMin = new Int32Array(SUBS);
+    const subMax = new Int32Array(SUBS);
+    const subError = new Uint32Array(SUBS);
+    subRange(samples, subMin, subMax);
+    if (parent) {
+      const distance = new Float64Array(SUBS);
+      subDistance(samples, parent.samples, 2, tile.x, tile.y, distance);
+      for (let i = 0; i < SUBS; i++) subError[i] = Math.ceil(distance[i]! / 2);
+    }
+    return { x: tile.x, y: tile.y, version: tile.version, samples, subMin, subMax, subError };
+  }
+}
+
+function readHead(view: DataView): Head {
+  const f = FRAME_HEADER;
+  if (view.byteLength < f.size) throw new FrameError("the frame ends inside its header");
+  if (view.getUint16(f.magic.offset, true) !== FRAME_MAGIC) throw new FrameError("this is not an Esker frame");
+  const protocol = view.getUint8(f.protocol.offset);
+  if (protocol !== PROTOCOL_VERSION) throw new FrameError(`frame protocol ${protocol} is not ${PROTOCOL_VERSION}`);
+  const kind = view.getUint8(f.kind.offset);
+  if (kind !== FrameKind.LEVEL && kind !== FrameKind.FILL) throw new FrameError(`unknown frame kind ${kind}`);
+  const level = view.getUint8(f.level.offset);
+  if (level > MAX_LEVEL) throw new FrameError(`level ${level} is above ${MAX_LEVEL}`);
+  const channel = view.getUint8(f.channel.offset);
+  if (channel !== Channel.HEIGHT) throw new FrameError(`unknown channel ${channel}`);
+  return {
+    kind,
+    level,
+    channel,
+    clock: view.getUint32(f.clock.offset, true),
+    settled: (view.getUint16(f.flags.offset, true) & FRAME_SETTLED) !== 0,
+    tiles: view.getUint16(f.tiles.offset, true),
+    drops: view.getUint16(f.drops.offset, true),
+  };
+}
+
+function readDrops(view: DataView, head: Head): { x: number; y: number }[] {
+  const end = FRAME_HEADER.size + head.drops * TILE_DROP.size;
+  if (view.byteLength < end) throw new FrameError("the frame ends inside its list of dropped tiles");
+  const drops: { x: number; y: number }[] = [];
+  for (let at: number = FRAME_HEADER.size; at < end; at += TILE_DROP.size) {
+    const x = view.getUint16(at + TILE_DROP.x.offset, true);
+    const y = view.getUint16(at + TILE_DROP.y.offset, true);
+    checkPlace(head.level, x, y);
+    drops.push({ x, y });
+  }
+  return drops;
+}
+
+function readTileHead(view: DataView, at: number, level: number): TileHead {
+  const f = TILE_HEADER;
+  if (at + f.size > view.byteLength) throw new FrameError("the frame ends inside a tile header");
+  const tile: TileHead = {
+    x: view.getUint16(at + f.x.offset, true),
+    y: view.getUint16(at + f.y.offset, true),
+    predictor: view.getUint8(at + f.predictor.offset),
+    planes: view.getUint8(at + f.planes.offset),
+    version: view.getUint32(at + f.version.offset, true),
+    baseVersion: view.getUint32(at + f.base_version.offset, true),
+    bytes: view.getUint32(at + f.bytes.offset, true),
+  };
+  checkPlace(level, tile.x, tile.y);
+  if (tile.predictor !== Predictor.ZERO && tile.predictor !== Predictor.PARENT)
+    throw new FrameError(`unknown predictor ${tile.predictor}`);
+  if (tile.planes < 1 || tile.planes > 4) throw new FrameError(`a tile has 1 to 4 byte planes, not ${tile.planes}`);
+  if (tile.bytes > MAX_PAYLOAD) throw new FrameError(`a tile payload of ${tile.bytes} bytes is too large`);
+  return tile;
+}
+
+function checkPlace(level: number, x: number, y: number): void {
+  if (x >= 1 << level || y >= 1 << level) throw new FrameError(`a tile lies outside level ${level}`);
+}
+
+/** Inflates raw deflate into at most one byte more than the planes need. */
+function inflatePlanes(payload: Uint8Array, planes: number): Uint8Array {
+  const want = planes * AREA;
+  let raw: Uint8Array;
+  try {
+    raw = inflateSync(payload, { out: new Uint8Array(want + 1) });
+  } catch (e) {
+    throw new FrameError(`a tile payload does not inflate: ${e instanceof Error ? e.message : String(e)}`);
+  }
+  if (raw.length !== want) throw new FrameError(`a tile payload inflates to ${raw.length} bytes, not ${want}`);
+  return raw;
+}
+
+/** Adds the zig-zag coded residual, lowest byte plane first, to the prediction in `samples`. */
+function addResidual(samples: Int32Array, raw: Uint8Array, planes: number): void {
+  for (let i = 0; i < AREA; i++) {
+    let code = raw[i]!;
+    if (planes > 1) code |= raw[AREA + i]! << 8;
+    if (planes > 2) code |= raw[2 * AREA + i]! << 16;
+    if (planes > 3) code |= raw[3 * AREA + i]! << 24;
+    const value = samples[i]! + ((code >>> 1) ^ -(code & 1));
+    if (value > SAMPLE_LIMIT || value < -SAMPLE_LIMIT) throw new FrameError("a tile sample is out of range");
+    samples[i] = value;
+  }
+}

@@ -1,0 +1,186 @@
+"""Writes ``tiles.json``: frames and what they decode to, read by pytest and vitest (DESIGN 6, 14).
+
+Run ``python tests/vectors/make_tiles.py`` after a change of the wire format. Samples are given as the SHA-256 of their
+little-endian int32 bytes, row 0 south.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from esker import grid
+from esker.contract import FRAME_HEADER, TILE_HEADER, FrameKind, Predictor, View
+from esker.tiles.bounds import block_reduce, sub_error
+from esker.tiles.codec import SAMPLE_LIMIT, pack, predict
+from esker.tiles.decoder import DecodedFrame, FrameDecoder
+from esker.tiles.delivery import ClientTiles, TileServer
+from esker.tiles.frame import FrameHead, TileRecord, write_frame, write_tile
+
+PATH = Path(__file__).with_name("tiles.json")
+SIZE_M = 1000.0
+LEVELS = 3
+NEAR = View(eye=(430.0, 380.0, 60.0), target=(520.0, 900.0, 40.0), width=640, height=480)
+
+
+def surface(level: int, seed: int) -> NDArray[np.float32]:
+    """A ridge with one spike, metres; the same ground at every level, but for the spike."""
+    n = grid.samples(level)
+    y, x = np.mgrid[0:n, 0:n] * (SIZE_M / (n - 1))
+    bump = 120 * np.exp(-(((x - 400 - 9 * seed) / 90) ** 2)) * np.cos(y / 130)
+    bump[n // 5, n // 3] += 0.5
+    return np.asarray(bump, dtype=np.float32)
+
+
+def session() -> list[bytes]:
+    """Every frame of a client that opens, looks closer, and sees two edits and a drop."""
+    server = TileServer(SIZE_M, LEVELS)
+    client = ClientTiles(server)
+    frames: list[bytes] = []
+
+    def drain() -> None:
+        while (plan := client.plan()) is not None:
+            frames.append(plan.encode())
+            client.commit(plan)
+
+    for level in range(LEVELS + 1):
+        server.put_level(1, level, surface(level, 0), settled=False)
+    drain()
+    client.set_view(NEAR)
+    drain()
+    for level in range(LEVELS + 1):
+        server.put_level(2, level, surface(level, 1), settled=False)
+        drain()
+    client.set_view(NEAR.model_copy(update={"target": (430.0, -900.0, 40.0)}))
+    for level in range(LEVELS + 1):
+        server.put_level(3, level, surface(level, 2), settled=True)
+    drain()
+    return frames
+
+
+def extreme() -> list[bytes]:
+    """Samples at both limits, so that every intermediate value is as large as it can be."""
+    sign = np.where(np.indices((65, 65)).sum(axis=0) % 2, 1, -1)
+    parent = (sign * SAMPLE_LIMIT).astype(np.int32)
+    child = np.ascontiguousarray(np.flipud(-parent) + np.eye(65, dtype=np.int32))
+    np.clip(child, -SAMPLE_LIMIT, SAMPLE_LIMIT, out=child)
+    frames = []
+    for level, samples, base in ((0, parent, None), (1, child, parent)):
+        residual = samples if base is None else samples - predict(base)[64:, 64:]
+        planes, payload = pack(residual)
+        kind = Predictor.ZERO if base is None else Predictor.PARENT
+        at = 0 if base is None else 1
+        record = TileRecord(at, at, kind, planes, level + 1, 0 if base is None else 1, payload)
+        frames.append(write_frame(FrameHead(FrameKind.FILL, level, 7, False), [], [write_tile(record)]))
+    return frames
+
+
+def malformed() -> list[dict[str, str]]:
+    """Frames that every decoder must refuse, each applied to the state that ``session``'s first two frames leave."""
+    first, second = session()[:2]
+    head, tile = FRAME_HEADER.itemsize, FRAME_HEADER.itemsize + TILE_HEADER.itemsize
+    offset = {name: FRAME_HEADER.fields[name][1] for name in FRAME_HEADER.names or ()}  # type: ignore[index]
+    inner = {name: head + TILE_HEADER.fields[name][1] for name in TILE_HEADER.names or ()}  # type: ignore[index]
+
+    def patched(data: bytes, at: int, value: bytes) -> bytes:
+        return data[:at] + value + data[at + len(value) :]
+
+    def retold(level: int, records: list[TileRecord], drops: list[tuple[int, int]]) -> bytes:
+        return write_frame(FrameHead(FrameKind.LEVEL, level, 1, False), drops, [write_tile(r) for r in records])
+
+    planes, payload = pack(np.zeros((65, 65), dtype=np.int32))
+    flat = TileRecord(0, 0, Predictor.ZERO, planes, 9, 0, payload)
+    wide = pack(np.full((65, 65), 1 << 29, dtype=np.int32))
+    cases = {
+        "empty": b"",
+        "header cut": first[: head - 1],
+        "wrong magic": patched(first, 0, b"\0\0"),
+        "wrong protocol": patched(first, offset["protocol"], b"\x63"),
+        "unknown kind": patched(first, offset["kind"], b"\x09"),
+        "level too fine": patched(first, offset["level"], b"\x07"),
+        "unknown channel": patched(first, offset["channel"], b"\x09"),
+        "more tiles than bytes": patched(first, offset["tiles"], b"\xff\xff"),
+        "more drops than bytes": patched(first, offset["drops"], b"\xff\xff"),
+        "tile header cut": first[: tile - 3],
+        "payload cut": first[:-5],
+        "bytes after the end": first + b"\0",
+        "tile outside": patched(first, inner["x"], b"\x01\x00"),
+        "drop outside": retold(1, [], [(2, 0)]),
+        "unknown predictor": patched(first, inner["predictor"], b"\x07"),
+        "no planes": patched(first, inner["planes"], b"\x00"),
+        "five planes": patched(first, inner["planes"], b"\x05"),
+        "fewer planes than sent": patched(first, inner["planes"], b"\x01"),
+        "payload length beyond any tile": patched(first, inner["bytes"], b"\xff\xff\xff\x7f"),
+        "deflate garbage": retold(0, [TileRecord(0, 0, Predictor.ZERO, 1, 9, 0, b"\xff" * 40)], []),
+        "deflate cut": retold(0, [TileRecord(0, 0, Predictor.ZERO, 1, 9, 0, payload[:-2])], []),
+        "deflate bomb": retold(0, [TileRecord(0, 0, Predictor.ZERO, 1, 9, 0, _bomb())], []),
+        "parent not held": retold(3, [TileRecord(0, 0, Predictor.PARENT, planes, 9, 1, payload)], []),
+        "wrong parent version": patched(second, inner["base_version"], b"\x63\x00\x00\x00"),
+        "root predicted from a parent": patched(first, inner["predictor"], bytes([Predictor.PARENT])),
+        "tile twice": retold(0, [flat, flat], []),
+        "tile sent and dropped": retold(0, [flat], [(0, 0)]),
+        "sample out of range": retold(0, [TileRecord(0, 0, Predictor.ZERO, wide[0], 9, 0, wide[1])], []),
+    }
+    return [{"name": name, "frame": base64.b64encode(data).decode()} for name, data in cases.items()]
+
+
+def _bomb() -> bytes:
+    import zlib
+
+    deflate = zlib.compressobj(9, zlib.DEFLATED, -15)
+    return deflate.compress(bytes(4_000_000)) + deflate.flush()
+
+
+def told(decoder: FrameDecoder, frame: bytes) -> dict[str, Any]:
+    """What a decoder must make of the next frame."""
+    before = dict(decoder.held)
+    out: DecodedFrame = decoder.decode(frame)
+    tiles = []
+    for key, tile in out.tiles.items():
+        low = block_reduce(np.minimum, tile.samples, 16).ravel()
+        high = block_reduce(np.maximum, tile.samples, 16).ravel()
+        error = np.zeros(16, dtype=np.uint32)
+        if key.level:
+            r, c = 32 * (key.y & 1), 32 * (key.x & 1)
+            error = sub_error(tile.samples, before[key.parent()].samples[r : r + 33, c : c + 33]).ravel()
+        tiles.append(
+            {
+                "x": key.x,
+                "y": key.y,
+                "version": tile.version,
+                "samples": hashlib.sha256(tile.samples.astype("<i4").tobytes()).hexdigest(),
+                "corners": [int(tile.samples[r, c]) for r in (0, 64) for c in (0, 64)],
+                "sub_min": low.tolist(),
+                "sub_max": high.tolist(),
+                "sub_error": error.tolist(),
+            }
+        )
+    return {
+        "kind": int(out.kind),
+        "level": out.level,
+        "clock": out.clock,
+        "settled": out.settled,
+        "drops": [[d.x, d.y] for d in out.drops],
+        "tiles": tiles,
+        "held": len(decoder.held),
+    }
+
+
+def build() -> dict[str, Any]:
+    """The whole file."""
+    sessions = []
+    for name, frames in (("session", session()), ("extreme", extreme())):
+        decoder = FrameDecoder()
+        steps = [{"frame": base64.b64encode(f).decode(), "decoded": told(decoder, f)} for f in frames]
+        sessions.append({"name": name, "steps": steps})
+    return {"sessions": sessions, "malformed": malformed()}
+
+
+if __name__ == "__main__":
+    PATH.write_text(json.dumps(build(), indent=1) + "\n")
