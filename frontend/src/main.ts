@@ -1,0 +1,27 @@
+/** The page's start: theme, then the page that the address means. The landing page never loads the 3D view. */
+
+import "./ui/styles/theme.css";
+import { route } from "./ui/router.ts";
+import { startTheme } from "./ui/theme.ts";
+
+async function show(): Promise<void> {
+  const target = route(new URL(window.location.href));
+  const app = document.getElementById("app");
+  if (!app) throw new Error("index.html has no #app");
+  if (target.page === "terrain") {
+    const { openTerrain } = await import("./ui/terrain-page.ts");
+    app.replaceChildren(openTerrain(target.id, target.secret));
+  } else if (target.page === "landing") {
+    await import("./ui/landing.ts");
+    app.replaceChildren(document.createElement("esk-landing"));
+  } else {
+    const { missingPage } = await import("./ui/missing.ts");
+    app.replaceChildren(missingPage(target.path));
+  }
+}
+
+startTheme();
+// A link pasted over an open terrain changes only the fragment, which loads nothing by itself.
+window.addEventListener("hashchange", () => window.location.reload());
+window.addEventListener("popstate", () => void show());
+void show();

@@ -1,0 +1,102 @@
+/** The server's JSON interface (docs/protocol.md). Secrets travel in the Authorization header only. */
+
+import type { TemplateInfo } from "../core/types.ts";
+import type { Role } from "../generated/contract.ts";
+
+/** A refusal or failure with a sentence for a person. */
+export class ApiError extends Error {
+  readonly code: string;
+
+  constructor(code: string, message: string) {
+    super(message);
+    this.code = code;
+  }
+}
+
+export interface OpenedTerrain {
+  readonly id: string;
+  readonly secret: string;
+  readonly role: Role;
+}
+
+export interface AccessLink {
+  readonly id: string;
+  readonly role: Role;
+  readonly name: string;
+  readonly created: string | number;
+  readonly revoked: string | number | boolean | null;
+}
+
+export interface JoinCode {
+  readonly code: string;
+  readonly expires_s: number;
+}
+
+type Method = "GET" | "POST" | "DELETE";
+
+async function request(method: Method, path: string, secret?: string, body?: unknown): Promise<Response> {
+  const headers: Record<string, string> = {};
+  if (secret) headers["Authorization"] = `Bearer ${secret}`;
+  const init: RequestInit = { method, headers };
+  if (body instanceof Blob) {
+    headers["Content-Type"] = "application/octet-stream";
+    init.body = body;
+  } else if (body !== undefined) {
+    headers["Content-Type"] = "application/json";
+    init.body = JSON.stringify(body);
+  }
+  let response: Response;
+  try {
+    response = await fetch(path, init);
+  } catch {
+    throw new ApiError("unreachable", "The server does not answer. Check the connection and try again.");
+  }
+  if (!response.ok) throw await refusal(response);
+  return response;
+}
+
+async function refusal(response: Response): Promise<ApiError> {
+  try {
+    const body: unknown = await response.json();
+    const { code, message } = body as { code?: unknown; message?: unknown };
+    if (typeof message === "string") return new ApiError(String(code ?? response.status), message);
+  } catch {
+    // Not JSON: a proxy answered. The status says enough.
+  }
+  return new ApiError(String(response.status), `The server refused (${response.status}). Try again in a moment.`);
+}
+
+async function json<T>(method: Method, path: string, secret?: string, body?: unknown): Promise<T> {
+  return (await (await request(method, path, secret, body)).json()) as T;
+}
+
+export const api = {
+  templates: (): Promise<TemplateInfo[]> => json("GET", "/api/templates"),
+
+  create: (template?: string): Promise<OpenedTerrain> =>
+    json("POST", "/api/terrains", undefined, template ? { template } : {}),
+
+  open: (file: Blob): Promise<OpenedTerrain> => json("POST", "/api/terrains/import", undefined, file),
+
+  join: (code: string): Promise<OpenedTerrain> => json("POST", "/api/join", undefined, { code }),
+
+  archive: async (id: string, secret: string): Promise<Blob> =>
+    (await request("GET", `/api/terrains/${id}/archive`, secret)).blob(),
+
+  links: (id: string, secret: string): Promise<AccessLink[]> => json("GET", `/api/terrains/${id}/links`, secret),
+
+  addLink: (id: string, secret: string, role: Role, name: string): Promise<AccessLink & { secret: string }> =>
+    json("POST", `/api/terrains/${id}/links`, secret, { role, name }),
+
+  rotateLink: (id: string, secret: string, link: string): Promise<{ secret: string }> =>
+    json("POST", `/api/terrains/${id}/links/${link}/rotate`, secret),
+
+  revokeLink: async (id: string, secret: string, link: string): Promise<void> => {
+    await request("DELETE", `/api/terrains/${id}/links/${link}`, secret);
+  },
+
+  code: (id: string, secret: string, role: Role): Promise<JoinCode> =>
+    json("POST", `/api/terrains/${id}/codes`, secret, { role }),
+};
+
+export type Api = typeof api;

@@ -1,0 +1,225 @@
+/**
+ * The cross-section of a stroke as a picture that can be dragged (DESIGN 5.2, 12). Pure geometry, no DOM.
+ *
+ * The picture has equal scales, so angles are true. It shows what the stroke prescribes on flat ground: the crest, the
+ * flat top of the plateau radius, each flank down to where it meets the base or its extent, whichever is nearer.
+ */
+
+import { type Flank, MAX_SLOPE_DEG } from "../generated/contract.ts";
+
+export interface Section {
+  readonly left: Flank | null;
+  readonly right: Flank | null;
+  readonly plateauRadiusM: number;
+  /** Height of the crest over the base, metres; negative for a crevice. */
+  readonly reliefM: number;
+}
+
+export type Side = "left" | "right";
+export type KnobId = `${Side}-slope` | `${Side}-extent` | "plateau";
+
+/** Where the section stands on the picture: pixels, y down. Kept still while a knob is dragged. */
+export interface Frame {
+  readonly width: number;
+  readonly height: number;
+  readonly pxPerM: number;
+  readonly centreX: number;
+  readonly baseY: number;
+  readonly crestY: number;
+}
+
+export interface Knob {
+  readonly id: KnobId;
+  readonly x: number;
+  readonly y: number;
+  readonly value: number;
+  readonly unit: "°" | "m";
+  readonly label: string;
+}
+
+export interface SectionLimits {
+  readonly maxExtentM: number;
+  readonly maxPlateauM: number;
+}
+
+const DEG = Math.PI / 180;
+const PAD_X = 14;
+const PAD_Y = 16;
+const SIDES: readonly Side[] = ["left", "right"];
+
+/** The widest horizontal distance that the section reaches from its crest line, metres. */
+function halfWidth(section: Section): number {
+  const extent = Math.max(section.left?.extent_m ?? 0, section.right?.extent_m ?? 0);
+  return Math.max(section.plateauRadiusM + extent, 1);
+}
+
+/** Fits the section into a picture of the given size in pixels. A flat section is drawn with a height to grip. */
+export function fit(section: Section, width: number, height: number): Frame {
+  const half = halfWidth(section);
+  const relief = Math.max(Math.abs(section.reliefM), 0.22 * half);
+  const pxPerM = Math.min((width / 2 - PAD_X) / half, (height - 2 * PAD_Y) / relief);
+  const sign = section.reliefM < 0 ? -1 : 1;
+  const reliefPx = relief * pxPerM;
+  const baseY = height / 2 + (sign * reliefPx) / 2;
+  return { width, height, pxPerM, centreX: width / 2, baseY, crestY: baseY - sign * reliefPx };
+}
+
+/** Horizontal distance from the edge of the plateau to the foot of a flank, metres. */
+export function footM(flank: Flank, reliefM: number): number {
+  if (flank.slope_deg === null) return flank.extent_m;
+  const tangent = Math.tan(flank.slope_deg * DEG);
+  return tangent > 0 ? Math.min(flank.extent_m, Math.abs(reliefM) / tangent) : flank.extent_m;
+}
+
+/** Height of a flank over the base as a share of the relief, `t` metres out from the plateau's edge. */
+export function flankShare(flank: Flank, reliefM: number, t: number): number {
+  const foot = footM(flank, reliefM);
+  const u = foot > 0 ? Math.min(Math.max(t / foot, 0), 1) : 1;
+  if (flank.slope_deg === null) return 1 - u * u * (3 - 2 * u);
+  const fall = (Math.tan(flank.slope_deg * DEG) * foot) / Math.max(Math.abs(reliefM), 1e-9);
+  const bend = flank.shape === "concave" ? u + 0.35 * u * (1 - u) : flank.shape === "convex" ? u - 0.35 * u * (1 - u) : u;
+  return 1 - Math.min(fall, 1) * bend;
+}
+
+function reliefOf(frame: Frame): number {
+  return (frame.baseY - frame.crestY) / frame.pxPerM;
+}
+
+/** One half of the outline from the crest outwards, as points in pixels. */
+function half(section: Section, frame: Frame, side: Side): [number, number][] {
+  const dir = side === "left" ? -1 : 1;
+  const relief = reliefOf(frame);
+  const edge = section.plateauRadiusM;
+  const at = (m: number, share: number): [number, number] => [
+    frame.centreX + dir * m * frame.pxPerM,
+    frame.baseY - share * relief * frame.pxPerM,
+  ];
+  const points = [at(0, 1), at(edge, 1)];
+  const flank = section[side];
+  if (flank === null) {
+    points.push(at(edge, 0));
+  } else {
+    const foot = footM(flank, relief);
+    for (let i = 1; i <= 16; i++) points.push(at(edge + (foot * i) / 16, flankShare(flank, relief, (foot * i) / 16)));
+    points.push(at(edge + foot, 0));
+  }
+  return points;
+}
+
+/** The filled outline of the section and, where a side has no flank, nothing but the drop to the base. */
+export function outline(section: Section, frame: Frame): string {
+  const left = half(section, frame, "left").reverse();
+  const right = half(section, frame, "right");
+  const text = [...left, ...right].map(([x, y]) => `${x.toFixed(1)} ${y.toFixed(1)}`);
+  return `M${text.join(" L")} Z`;
+}
+
+/** The knobs of the section. A side without a flank has none; a side whose slope is free has no slope knob. */
+export function knobs(section: Section, frame: Frame): Knob[] {
+  const relief = reliefOf(frame);
+  const out: Knob[] = [];
+  for (const side of SIDES) {
+    const flank = section[side];
+    if (flank === null) continue;
+    const dir = side === "left" ? -1 : 1;
+    const edge = section.plateauRadiusM;
+    if (flank.slope_deg !== null) {
+      const t = footM(flank, relief) / 2;
+      out.push({
+        id: `${side}-slope`,
+        x: frame.centreX + dir * (edge + t) * frame.pxPerM,
+        y: frame.baseY - flankShare(flank, relief, t) * relief * frame.pxPerM,
+        value: flank.slope_deg,
+        unit: "°",
+        label: `Slope ${side}`,
+      });
+    }
+    out.push({
+      id: `${side}-extent`,
+      x: frame.centreX + dir * (edge + flank.extent_m) * frame.pxPerM,
+      y: frame.baseY,
+      value: flank.extent_m,
+      unit: "m",
+      label: `Extent ${side}`,
+    });
+  }
+  out.push({
+    id: "plateau",
+    x: frame.centreX + section.plateauRadiusM * frame.pxPerM,
+    y: frame.crestY,
+    value: section.plateauRadiusM,
+    unit: "m",
+    label: "Plateau radius",
+  });
+  return out;
+}
+
+function clamp(x: number, low: number, high: number): number {
+  return Math.min(Math.max(x, low), high);
+}
+
+function withFlank(section: Section, side: Side, change: Partial<Flank>, linked: boolean): Section {
+  const sides = linked ? SIDES : [side];
+  let next = section;
+  for (const s of sides) {
+    const flank = next[s];
+    if (flank !== null) next = { ...next, [s]: { ...flank, ...change } };
+  }
+  return next;
+}
+
+/**
+ * The section after a knob was moved to (x, y) pixels of a still frame. Linked sides change together. Slopes are whole
+ * degrees; lengths are rounded to about a pixel, so that dragging gives numbers one would type.
+ */
+export function drag(
+  section: Section,
+  frame: Frame,
+  knob: KnobId,
+  at: { readonly x: number; readonly y: number },
+  linked: boolean,
+  limits: SectionLimits,
+): Section {
+  const relief = Math.abs(reliefOf(frame));
+  const out = Math.abs(at.x - frame.centreX) / frame.pxPerM;
+  if (knob === "plateau") {
+    return { ...section, plateauRadiusM: clamp(nice((at.x - frame.centreX) / frame.pxPerM, frame), 0, limits.maxPlateauM) };
+  }
+  const [side, what] = knob.split("-") as [Side, "slope" | "extent"];
+  const t = Math.max(out - section.plateauRadiusM, 0);
+  if (what === "extent") {
+    return withFlank(section, side, { extent_m: clamp(nice(t, frame), nice(2 / frame.pxPerM, frame), limits.maxExtentM) }, linked);
+  }
+  const drop = clamp(Math.abs(at.y - frame.crestY) / frame.pxPerM, 0, relief);
+  const slope = Math.atan2(drop, Math.max(t, 1e-6)) / DEG;
+  return withFlank(section, side, { slope_deg: clamp(Math.round(slope), 1, MAX_SLOPE_DEG) }, linked);
+}
+
+/** The section after an arrow key on a knob: one degree, or about a hundredth of the picture. */
+export function nudge(section: Section, frame: Frame, knob: KnobId, steps: number, linked: boolean, limits: SectionLimits): Section {
+  const stepM = nice(frame.width / frame.pxPerM / 100, frame);
+  if (knob === "plateau") {
+    return { ...section, plateauRadiusM: clamp(section.plateauRadiusM + steps * stepM, 0, limits.maxPlateauM) };
+  }
+  const [side, what] = knob.split("-") as [Side, "slope" | "extent"];
+  const flank = section[side];
+  if (flank === null) return section;
+  if (what === "extent") {
+    return withFlank(section, side, { extent_m: clamp(flank.extent_m + steps * stepM, stepM, limits.maxExtentM) }, linked);
+  }
+  if (flank.slope_deg === null) return section;
+  return withFlank(section, side, { slope_deg: clamp(flank.slope_deg + steps, 0, MAX_SLOPE_DEG) }, linked);
+}
+
+/** Rounds a length to the power of ten below one pixel, at least a tenth of a metre. */
+function nice(m: number, frame: Frame): number {
+  const step = Math.max(10 ** Math.floor(Math.log10(1 / frame.pxPerM)), 0.1);
+  return Math.round(Math.round(m / step) * step * 10) / 10;
+}
+
+/** Whether both flanks say the same, so that the inspector may show one for both. */
+export function symmetric(section: Pick<Section, "left" | "right">): boolean {
+  const { left, right } = section;
+  if (left === null || right === null) return left === right;
+  return left.slope_deg === right.slope_deg && left.extent_m === right.extent_m && left.shape === right.shape;
+}

@@ -1,0 +1,267 @@
+import { html, LitElement, nothing, svg, type TemplateResult } from "lit";
+import type { TemplateInfo } from "../core/types.ts";
+import { ApiError, api, type OpenedTerrain } from "./api.ts";
+import { icon } from "./icons.ts";
+import { readJoinInput, terrainPath } from "./links.ts";
+import { type Layer, penRidge, ridgeLayers, seedOf } from "./ridges.ts";
+import { deviceStore, forgetTerrain, type RecentTerrain, recentTerrains } from "./storage.ts";
+import { landingStyles } from "./styles/landing.ts";
+import { shared } from "./styles/shared.ts";
+import { chooseTheme, themeChoice } from "./theme.ts";
+import { ago } from "./words.ts";
+
+/** `/`: what Esker is, a new terrain, joining, what this device opened lately, the starting terrains. */
+export class EskLanding extends LitElement {
+  static override styles = [shared, landingStyles];
+  static override properties = {
+    templates: { state: true },
+    recents: { state: true },
+    busy: { state: true },
+    problem: { state: true },
+    templateProblem: { state: true },
+  };
+
+  declare templates: readonly TemplateInfo[] | null;
+  declare recents: readonly RecentTerrain[];
+  declare busy: string;
+  declare problem: string;
+  declare templateProblem: string;
+
+  readonly #store = deviceStore();
+
+  constructor() {
+    super();
+    this.templates = null;
+    this.recents = recentTerrains(this.#store);
+    this.busy = "";
+    this.problem = "";
+    this.templateProblem = "";
+  }
+
+  override connectedCallback(): void {
+    super.connectedCallback();
+    document.title = "Esker";
+    void this.#loadTemplates();
+  }
+
+  async #loadTemplates(): Promise<void> {
+    try {
+      this.templates = await api.templates();
+    } catch (error) {
+      this.templates = [];
+      this.templateProblem = sentence(error);
+    }
+  }
+
+  async #open(what: string, get: () => Promise<OpenedTerrain>): Promise<void> {
+    if (this.busy) return;
+    this.busy = what;
+    this.problem = "";
+    try {
+      const terrain = await get();
+      window.location.assign(terrainPath(terrain.id, terrain.secret));
+    } catch (error) {
+      this.problem = sentence(error);
+      this.busy = "";
+    }
+  }
+
+  #join(event: SubmitEvent): void {
+    event.preventDefault();
+    const field = this.renderRoot.querySelector<HTMLInputElement>("#join");
+    const input = readJoinInput(field?.value ?? "", window.location.origin);
+    if (input.kind === "unreadable") {
+      this.problem = input.message;
+      field?.focus();
+    } else if (input.kind === "link") {
+      window.location.assign(terrainPath(input.id, input.secret));
+    } else {
+      void this.#open("join", () => api.join(input.code));
+    }
+  }
+
+  #openFile(event: Event): void {
+    const field = event.target as HTMLInputElement;
+    const file = field.files?.[0];
+    field.value = "";
+    if (file) void this.#open("file", () => api.open(file));
+  }
+
+  #forget(id: string): void {
+    forgetTerrain(this.#store, id);
+    this.recents = recentTerrains(this.#store);
+  }
+
+  protected override render(): TemplateResult {
+    return html`
+      ${this.#hero()}
+      <main>
+        ${this.recents.length > 0 ? this.#recentSection() : nothing} ${this.#templateSection()}
+      </main>
+      <footer>
+        <span>A terrain is its strokes: nothing is ever baked.</span>
+        <span>Everything stays on this server. No account, no tracking.</span>
+      </footer>
+    `;
+  }
+
+  #hero(): TemplateResult {
+    return html`
+      <header class="hero">
+        ${heroPicture()}
+        <nav>
+          <span class="brand"><img src="/favicon.svg" alt="" width="28" height="28" />Esker</span>
+          <button class="icon-btn" aria-label="Switch between dark and light" @click=${toggleTheme}>
+            ${icon("moon")}
+          </button>
+        </nav>
+        <div class="pitch">
+          <h1>Sketch a landscape together.</h1>
+          <p>Draw a line across the land and the ground rises to meet it, for everybody who has the link.</p>
+          <div class="start">
+            <button class="btn primary big" ?disabled=${this.busy !== ""} @click=${() => this.#open("new", () => api.create())}>
+              ${icon("plus")} ${this.busy === "new" ? "Making a terrain…" : "New terrain"}
+            </button>
+            <form class="join" @submit=${this.#join}>
+              <label class="visually-hidden" for="join">Join code or link</label>
+              <input
+                id="join"
+                class="field"
+                placeholder="Join code or link"
+                autocomplete="off"
+                autocapitalize="characters"
+                spellcheck="false"
+                aria-describedby="problem"
+                @input=${() => {
+                  this.problem = "";
+                }}
+              />
+              <button class="btn solid" ?disabled=${this.busy !== ""}>${this.busy === "join" ? "Joining…" : "Join"}</button>
+            </form>
+          </div>
+          <p id="problem" class="problem" role="alert">${this.problem}</p>
+          <label class="file">
+            ${icon("upload")} ${this.busy === "file" ? "Opening the file…" : "Open an .esker file"}
+            <input class="visually-hidden" type="file" accept=".esker,application/zip" @change=${this.#openFile} />
+          </label>
+        </div>
+      </header>
+    `;
+  }
+
+  #recentSection(): TemplateResult {
+    return html`
+      <section aria-labelledby="recent-title">
+        <h2 id="recent-title">Recent on this device</h2>
+        <ul class="recents">
+          ${this.recents.map(
+            (r) => html`
+              <li>
+                <a class="recent" href=${terrainPath(r.id, r.secret)}>
+                  <span class="thumb">${ridgePicture(r.id)}</span>
+                  <span class="words">
+                    <strong>${r.title || "Untitled terrain"}</strong>
+                    <span class="quiet">${ROLE_WORDS[r.role]} · ${ago(Date.now() - r.opened)}</span>
+                  </span>
+                </a>
+                <button
+                  class="icon-btn small"
+                  title="Remove from this list"
+                  aria-label=${`Remove ${r.title || "Untitled terrain"} from this list`}
+                  @click=${() => this.#forget(r.id)}
+                >
+                  ${icon("xmark")}
+                </button>
+              </li>
+            `,
+          )}
+        </ul>
+      </section>
+    `;
+  }
+
+  #templateSection(): TemplateResult | typeof nothing {
+    if (this.templates !== null && this.templates.length === 0 && !this.templateProblem) return nothing;
+    return html`
+      <section aria-labelledby="templates-title">
+        <h2 id="templates-title">Start from a terrain</h2>
+        ${this.templateProblem ? html`<p class="quiet">${this.templateProblem}</p>` : nothing}
+        <ul class="cards">
+          ${
+            this.templates === null
+              ? [0, 1, 2, 3, 4].map(() => html`<li class="card ghost" aria-hidden="true"></li>`)
+              : this.templates.map((t) => this.#card(t))
+          }
+        </ul>
+      </section>
+    `;
+  }
+
+  #card(template: TemplateInfo): TemplateResult {
+    const busy = this.busy === template.id;
+    return html`
+      <li>
+        <button
+          class="card"
+          ?disabled=${this.busy !== ""}
+          @click=${() => this.#open(template.id, () => api.create(template.id))}
+        >
+          <span class="picture">
+            ${ridgePicture(template.id)}
+            <img src=${`/templates/${template.id}.webp`} alt="" loading="lazy" @error=${hideImage} />
+          </span>
+          <strong>${busy ? "Making a copy…" : template.title}</strong>
+          <span class="quiet">${template.description}</span>
+        </button>
+      </li>
+    `;
+  }
+}
+
+const ROLE_WORDS = { owner: "Yours", edit: "You can draw", view: "View only" } as const;
+
+function sentence(error: unknown): string {
+  return error instanceof ApiError ? error.message : "Something went wrong. Reload the page and try again.";
+}
+
+function hideImage(event: Event): void {
+  (event.target as HTMLImageElement).hidden = true;
+}
+
+function toggleTheme(): void {
+  const dark = document.documentElement.classList.contains("wa-dark");
+  chooseTheme(themeChoice.value === "system" ? (dark ? "light" : "dark") : dark ? "light" : "dark");
+}
+
+function heroPicture(): TemplateResult {
+  const [width, height] = [1600, 640];
+  const layers = ridgeLayers(23, 5, width, height, 0.6);
+  const pen = penRidge(5, width, height, 500, 905, 1545);
+  const draw = (l: Layer): TemplateResult =>
+    svg`<path class="ridge" style=${`--depth:${l.depth.toFixed(2)}`} d=${l.path} />` as unknown as TemplateResult;
+  return html`
+    <svg class="scene" viewBox="0 0 ${width} ${height}" preserveAspectRatio="xMaxYMax slice" aria-hidden="true">
+      ${svg`<circle class="disc" cx="1215" cy="205" r="58" />`}
+      ${layers.slice(0, 2).map(draw)}
+      ${svg`
+        <path class="ridge" style="--depth:0.42" d=${pen.land} />
+        <path class="stroke" d=${pen.line} pathLength="100" />
+        <circle class="knob" cx=${pen.start[0]} cy=${pen.start[1]} r="6.5" />
+        <circle class="knob last" cx=${pen.end[0]} cy=${pen.end[1]} r="6.5" />
+      `}
+      ${layers.slice(3).map(draw)}
+    </svg>
+  `;
+}
+
+function ridgePicture(id: string): TemplateResult {
+  return html`
+    <svg viewBox="0 0 320 180" preserveAspectRatio="xMidYMax slice" aria-hidden="true">
+      ${ridgeLayers(seedOf(id), 4, 320, 180).map(
+        (l) => svg`<path class="ridge" style=${`--depth:${l.depth.toFixed(2)}`} d=${l.path} />`,
+      )}
+    </svg>
+  `;
+}
+
+customElements.define("esk-landing", EskLanding);

@@ -1,0 +1,127 @@
+import { css, html, nothing, svg, type TemplateResult } from "lit";
+import type { Vec3 } from "../core/types.ts";
+import type { HandleVisual } from "../input/controller.ts";
+import { memberName } from "./people.ts";
+import { cursorOf } from "./scene.ts";
+import { SignalElement } from "./signal-element.ts";
+import type { Stage } from "./stage.ts";
+import { inkOn } from "./styles/colours.ts";
+import { shared } from "./styles/shared.ts";
+
+/** Handles of the selected stroke and the names at other people's cursors, over the picture. Takes no pointer. */
+export class EskOverlay extends SignalElement {
+  static override properties = { stage: { attribute: false } };
+  static override styles = [
+    shared,
+    css`
+      :host {
+        position: absolute;
+        inset: 0;
+        overflow: hidden;
+        pointer-events: none;
+      }
+      svg {
+        position: absolute;
+        inset: 0;
+        width: 100%;
+        height: 100%;
+      }
+      .halo {
+        fill: rgb(12 18 24 / 28%);
+      }
+      .dot {
+        fill: #fff;
+        stroke: #1b2631;
+        stroke-width: 1.5;
+      }
+      .handle.crest .dot,
+      .handle.move .dot {
+        fill: #ffd9c7;
+      }
+      .handle.active .dot {
+        fill: #f46a45;
+        stroke: #fff;
+      }
+      .glyph {
+        fill: none;
+        stroke: #1b2631;
+        stroke-width: 1.5;
+        stroke-linecap: round;
+        stroke-linejoin: round;
+      }
+      .tip {
+        fill: #fff;
+        font: 600 11px var(--wa-font-family-body);
+        text-anchor: middle;
+        paint-order: stroke;
+        stroke: rgb(12 18 24 / 75%);
+        stroke-width: 3px;
+        stroke-linejoin: round;
+      }
+      .name {
+        position: absolute;
+        top: 0;
+        left: 0;
+        padding: 2px 7px;
+        border-radius: 3px 9px 9px 9px;
+        font: 600 0.6875rem/1.4 var(--wa-font-family-body);
+        white-space: nowrap;
+        will-change: transform;
+      }
+    `,
+  ];
+
+  declare stage: Stage;
+
+  /** A world point in CSS pixels of the window, or null when it is out of view. */
+  #at(position: Vec3): { x: number; y: number } | null {
+    const p = this.stage.camera.project(position);
+    if (!p.visible) return null;
+    const { width } = this.stage.camera.state.value;
+    const ratio = width / Math.max(1, this.clientWidth);
+    return { x: p.x / ratio, y: p.y / ratio };
+  }
+
+  protected override render(): TemplateResult {
+    this.stage.camera.state.value;
+    return html`
+      <svg aria-hidden="true">${this.stage.input.handles.value.map((h) => this.#handle(h))}</svg>
+      ${this.#cursors()}
+    `;
+  }
+
+  #handle(handle: HandleVisual): TemplateResult | typeof nothing {
+    const at = this.#at(handle.position);
+    if (!at) return nothing;
+    const radius = handle.active ? 8 : 6.5;
+    return svg`
+      <g class="handle ${handle.kind} ${handle.active ? "active" : ""}" transform="translate(${at.x.toFixed(1)} ${at.y.toFixed(1)})">
+        <circle class="halo" r=${radius + 4}></circle>
+        <circle class="dot" r=${radius}></circle>
+        ${GLYPHS[handle.kind] ?? nothing}
+        ${handle.active ? svg`<text class="tip" y="-16">${handle.label}</text>` : nothing}
+      </g>
+    ` as unknown as TemplateResult;
+  }
+
+  #cursors(): (TemplateResult | typeof nothing)[] {
+    const people = this.stage.session.people.value;
+    return people.members.map((member) => {
+      const position = cursorOf(people, member.client);
+      const at = position && this.#at(position);
+      if (!at) return nothing;
+      const style = `background:${member.colour};color:${inkOn(member.colour)};transform:translate(${at.x + 10}px,${at.y + 8}px)`;
+      return html`<span class="name" style=${style}>${memberName(member)}</span>`;
+    });
+  }
+}
+
+/** What each handle does, drawn on it: up and down, in and out, all ways. */
+const GLYPHS: Readonly<Partial<Record<HandleVisual["kind"], unknown>>> = {
+  crest: svg`<path class="glyph" d="M0-3.5v7M-2-1.800 0-3.800 2-1.800M-2 1.800 0 3.800 2 1.800"></path>`,
+  move: svg`<path class="glyph" d="M-3.500 0h7M0-3.500v7"></path>`,
+  left: svg`<path class="glyph" d="M-3 0h6M-1.500-2-3.500 0l2 2M1.500-2l2 2-2 2"></path>`,
+  right: svg`<path class="glyph" d="M-3 0h6M-1.500-2-3.500 0l2 2M1.500-2l2 2-2 2"></path>`,
+};
+
+customElements.define("esk-overlay", EskOverlay);

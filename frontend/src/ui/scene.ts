@@ -1,0 +1,100 @@
+/** From the document and the people to what one frame shows. Pure apart from a cache keyed by immutable strokes. */
+
+import type { CursorVisual, StrokeVisual, Vec3 } from "../core/types.ts";
+import type { Doc } from "../doc/document.ts";
+import { worldPoints } from "../doc/strokes.ts";
+import type { Member, MemberPresence, Stroke } from "../generated/contract.ts";
+import { hexColour, lighten, strokeColour } from "./styles/colours.ts";
+
+interface Shape {
+  readonly points: Float32Array;
+  readonly sinks: boolean;
+}
+
+const shapes = new WeakMap<Stroke, Shape>();
+
+/** World points of a stroke's crest and whether it lies below the line between its anchors. */
+export function shapeOf(stroke: Stroke): Shape {
+  const known = shapes.get(stroke);
+  if (known) return known;
+  const shape: Shape = { points: new Float32Array(worldPoints(stroke)), sinks: meanHeight(stroke) < 0 };
+  shapes.set(stroke, shape);
+  return shape;
+}
+
+function meanHeight(stroke: Stroke): number {
+  if (stroke.kind === "level" || stroke.curve.length === 0) return 0;
+  return stroke.curve.reduce((sum, point) => sum + point[1], 0) / stroke.curve.length;
+}
+
+/** Greatest height of the crest over (or, negative, under) the line between the anchors, metres. */
+export function reliefOf(stroke: Stroke): number {
+  if (stroke.kind === "level") return 0;
+  return stroke.curve.reduce((peak, point) => (Math.abs(point[1]) > Math.abs(peak) ? point[1] : peak), 0);
+}
+
+export interface People {
+  readonly members: readonly Member[];
+  readonly presences: ReadonlyMap<string, MemberPresence>;
+  /** Me: my own cursor is not drawn. */
+  readonly me: string;
+  readonly myColour: string;
+}
+
+export interface Marks {
+  readonly selection: string | null;
+  readonly hovered: string | null;
+  /** The stroke that I am drawing. */
+  readonly drawing: string | null;
+}
+
+/** Who draws which stroke at this moment, as colours by stroke id. */
+function liveColours(people: People, drawing: string | null): Map<string, string> {
+  const colours = new Map<string, string>();
+  for (const member of people.members) {
+    const stroke = people.presences.get(member.client)?.stroke;
+    if (stroke) colours.set(stroke, member.colour);
+  }
+  if (drawing) colours.set(drawing, people.myColour);
+  return colours;
+}
+
+/** The strokes to draw. Hidden ones show only while selected; the one under way wears its author's colour. */
+export function strokeVisuals(doc: Doc, marks: Marks, people: People): StrokeVisual[] {
+  const live = liveColours(people, marks.drawing);
+  const out: StrokeVisual[] = [];
+  for (const stroke of doc.strokes.values()) {
+    const selected = stroke.id === marks.selection;
+    const { points, sinks } = shapeOf(stroke);
+    if (points.length < 6 || (stroke.hidden && !selected)) continue;
+    const author = live.get(stroke.id);
+    const hovered = stroke.id === marks.hovered;
+    const base = author ? hexColour(author) : strokeColour(stroke.kind, sinks);
+    out.push({
+      id: stroke.id,
+      kind: stroke.kind,
+      points,
+      colour: hovered && !selected ? lighten(base, 0.3) : base,
+      selected,
+      hovered,
+      live: author !== undefined,
+    });
+  }
+  return out;
+}
+
+/** Rings on the ground where the others point. */
+export function cursorVisuals(people: People): CursorVisual[] {
+  const out: CursorVisual[] = [];
+  for (const member of people.members) {
+    const position = cursorOf(people, member.client);
+    if (position) out.push({ position, colour: hexColour(member.colour), radiusPx: 9 });
+  }
+  return out;
+}
+
+/** Where another member points, or null: not at the ground, gone, or it is me. */
+export function cursorOf(people: People, client: string): Vec3 | null {
+  if (client === people.me) return null;
+  return people.presences.get(client)?.cursor ?? null;
+}

@@ -1,0 +1,286 @@
+/**
+ * One open terrain: the connection, the document, the people and, once the server has said how large the terrain is,
+ * the stage on which it is seen (stage.ts). The page's components read its signals and call its methods.
+ */
+
+import { computed, effect, type ReadonlySignal, signal } from "@preact/signals-core";
+import type { DecodedFrame } from "../core/types.ts";
+import { type Doc, Refusal } from "../doc/document.ts";
+import { SyncDoc } from "../doc/sync.ts";
+import type {
+  Hello,
+  Member,
+  MemberPresence,
+  Op,
+  Progress,
+  Role,
+  ServerMessage,
+  StrokeFields,
+  TerrainFields,
+  Welcome,
+} from "../generated/contract.ts";
+import { MAX_PRESENCE_PER_SECOND, PRESENCE_HZ, PROTOCOL_VERSION } from "../generated/contract.ts";
+import { Connection } from "../net/connection.ts";
+import type { People } from "./scene.ts";
+import { Stage } from "./stage.ts";
+import { type Status, status } from "./status.ts";
+import { deviceStore, type Identity, identity, rememberIdentity, rememberTerrain, type Store } from "./storage.ts";
+import { Throttle } from "./throttle.ts";
+import { ToastList } from "./toasts.ts";
+
+const VIEWS_PER_SECOND = 10;
+
+/** What the server told of itself. */
+export interface ServerInfo {
+  readonly version: string;
+  readonly device: string;
+  readonly levels: number;
+}
+
+export class TerrainSession {
+  readonly id: string;
+  readonly secret: string;
+  readonly client: string;
+  readonly store: Store = deviceStore();
+  readonly toasts = new ToastList();
+  readonly doc: SyncDoc;
+  readonly connection: Connection;
+  readonly role = signal<Role | null>(null);
+  readonly members = signal<readonly Member[]>([]);
+  readonly presences = signal<ReadonlyMap<string, MemberPresence>>(new Map());
+  readonly progress = signal<Progress | null>(null);
+  readonly server = signal<ServerInfo | null>(null);
+  readonly me = signal<Identity>({ name: "", colour: "#888888" });
+  readonly stage = signal<Stage | null>(null);
+  readonly canEdit: ReadonlySignal<boolean>;
+  readonly status: ReadonlySignal<Status>;
+  readonly people: ReadonlySignal<People>;
+  readonly #viewport: HTMLElement;
+  readonly #views: Throttle;
+  readonly #presence: Throttle;
+  readonly #stops: (() => void)[] = [];
+  #gesture = 0;
+
+  constructor(id: string, secret: string, viewport: HTMLElement) {
+    this.id = id;
+    this.secret = secret;
+    this.client = crypto.randomUUID().replaceAll("-", "");
+    this.#viewport = viewport;
+    this.me.value = identity(this.store, Math.random);
+    this.doc = new SyncDoc(this.client);
+    this.doc.onRefused((refusal) => this.toasts.show(refusal.message, "warn"));
+    this.connection = new Connection({
+      url: `${window.location.protocol === "https:" ? "wss" : "ws"}://${window.location.host}/ws`,
+      hello: () => this.#hello(),
+      onMessage: (message) => this.#receive(message),
+      onFrame: (frame) => this.#frame(frame),
+    });
+    this.canEdit = computed(() => this.role.value === "owner" || this.role.value === "edit");
+    this.status = computed(() =>
+      status({
+        connection: this.connection.state.value,
+        reason: this.connection.reason.value,
+        pending: this.doc.pending.value,
+        canEdit: this.canEdit.value,
+      }),
+    );
+    this.people = computed(() => ({
+      members: this.members.value,
+      presences: this.presences.value,
+      me: this.client,
+      myColour: this.members.value.find((m) => m.client === this.client)?.colour ?? this.me.value.colour,
+    }));
+    this.#views = new Throttle(VIEWS_PER_SECOND, () => this.#sendView());
+    this.#presence = new Throttle(Math.min(PRESENCE_HZ, MAX_PRESENCE_PER_SECOND), () => this.#sendPresence());
+    this.#watch();
+  }
+
+  /** Applies an op at once and sends it; a refusal becomes a toast. True when it was applied. */
+  submit(op: Op, gesture?: string): boolean {
+    if (!this.canEdit.value) {
+      this.toasts.show("This link lets you look, not draw. Ask for an edit link to change the terrain.", "warn");
+      return false;
+    }
+    const refusal = this.doc.submit(op, gesture);
+    if (refusal instanceof Refusal) this.toasts.show(refusal.message, "warn");
+    return refusal === null;
+  }
+
+  /** Changes fields of a stroke; one gesture is one step of undo. */
+  setStroke(stroke: string, fields: StrokeFields, gesture?: string): boolean {
+    return this.submit({ type: "stroke.set", stroke, fields }, gesture);
+  }
+
+  /** Changes settings of the terrain. */
+  setTerrain(fields: TerrainFields, gesture?: string): boolean {
+    return this.submit({ type: "terrain.set", fields }, gesture);
+  }
+
+  /** A name for a gesture that no other has. */
+  newGesture(): string {
+    this.#gesture += 1;
+    return `panel-${this.#gesture}`;
+  }
+
+  rename(who: Identity): void {
+    const name = who.name.trim().slice(0, 80);
+    this.me.value = { name, colour: who.colour };
+    rememberIdentity(this.store, this.me.value);
+    this.connection.send({ type: "rename", name, colour: who.colour });
+  }
+
+  /** Asks for a presence message; many requests become few messages. */
+  presenceChanged(): void {
+    this.#presence.request();
+  }
+
+  viewChanged(): void {
+    this.#views.request();
+  }
+
+  dispose(): void {
+    for (const stop of this.#stops) stop();
+    this.#views.stop();
+    this.#presence.stop();
+    this.toasts.dispose();
+    this.connection.close();
+    this.stage.value?.dispose();
+    this.stage.value = null;
+  }
+
+  #hello(): Hello {
+    return {
+      type: "hello",
+      protocol: PROTOCOL_VERSION,
+      terrain: this.id,
+      secret: this.secret,
+      client: this.client,
+      name: this.me.value.name,
+      colour: this.me.value.colour,
+      clock: this.doc.clock,
+    };
+  }
+
+  /** Sends what waits whenever something waits, and keeps the title and this device's memory up to date. */
+  #watch(): void {
+    this.#stops.push(
+      effect(() => {
+        if (this.doc.pending.value > 0) queueMicrotask(() => this.#flush());
+      }),
+      effect(() => {
+        const doc = this.doc.doc.value;
+        const role = this.role.value;
+        if (!doc || !role) return;
+        document.title = `${doc.settings.title || "Untitled terrain"} · Esker`;
+      }),
+      effect(() => {
+        const title = this.doc.doc.value?.settings.title;
+        const role = this.role.value;
+        if (title === undefined || !role) return;
+        rememberTerrain(this.store, { id: this.id, secret: this.secret, title, role, opened: Date.now() });
+      }),
+    );
+  }
+
+  #flush(): void {
+    if (this.connection.state.value !== "online" || this.role.value === null) return;
+    const ops = this.doc.outgoing();
+    if (ops.length > 0) this.connection.send({ type: "ops", ops });
+  }
+
+  #receive(message: ServerMessage): void {
+    switch (message.type) {
+      case "welcome":
+        this.#welcome(message);
+        break;
+      case "ack":
+        this.doc.ack(message);
+        break;
+      case "reject":
+        this.doc.reject(message);
+        break;
+      case "ordered":
+        this.doc.ordered(message);
+        break;
+      case "members":
+        this.#setMembers(message.members);
+        break;
+      case "presences":
+        this.#setPresences(message.members);
+        break;
+      case "progress":
+        this.progress.value = message;
+        if (message.note) this.toasts.show(message.note, "warn");
+        break;
+      case "error":
+        if (!message.fatal) this.toasts.show(message.message, "warn");
+        break;
+      case "pong":
+        break;
+    }
+  }
+
+  #welcome(message: Welcome): void {
+    this.doc.welcome(message);
+    this.role.value = message.role;
+    this.server.value = { version: message.server, device: message.device, levels: message.levels };
+    this.#setMembers(message.members);
+    const doc = this.doc.doc.value;
+    if (doc && this.stage.value === null) this.#openStage(doc, message.levels);
+    else this.stage.value?.restart();
+    this.viewChanged();
+    this.#flush();
+  }
+
+  #openStage(doc: Doc, levels: number): void {
+    const stage = new Stage({ session: this, sizeM: doc.settings.size_m, levels, viewport: this.#viewport });
+    this.stage.value = stage;
+    void stage.start();
+  }
+
+  #frame(frame: DecodedFrame): void {
+    this.stage.value?.apply(frame);
+  }
+
+  #setMembers(members: readonly Member[]): void {
+    this.members.value = members;
+    const here = new Set(members.map((m) => m.client));
+    const kept = [...this.presences.value].filter(([client]) => here.has(client));
+    if (kept.length !== this.presences.value.size) this.presences.value = new Map(kept);
+  }
+
+  #setPresences(changed: readonly MemberPresence[]): void {
+    const next = new Map(this.presences.value);
+    for (const presence of changed) next.set(presence.client, presence);
+    this.presences.value = next;
+    this.stage.value?.followed(changed);
+  }
+
+  #sendView(): void {
+    const camera = this.stage.value?.camera.state.value;
+    if (!camera || this.connection.state.value !== "online") return;
+    this.connection.send({
+      type: "view",
+      eye: [...camera.eye],
+      target: [...camera.target],
+      fov_deg: camera.fovDeg,
+      width: Math.max(1, Math.min(16384, camera.width)),
+      height: Math.max(1, Math.min(16384, camera.height)),
+    });
+  }
+
+  #sendPresence(): void {
+    const stage = this.stage.value;
+    if (!stage || this.connection.state.value !== "online") return;
+    const { eye, target } = stage.camera.state.value;
+    const cursor = stage.cursor.value;
+    this.connection.send({
+      type: "presence",
+      cursor: cursor ? [...cursor] : null,
+      tool: stage.input.tool.value,
+      stroke: stage.input.drawing.value,
+      eye: [...eye],
+      target: [...target],
+    });
+  }
+}

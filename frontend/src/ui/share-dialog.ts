@@ -1,0 +1,230 @@
+import "@awesome.me/webawesome/dist/components/copy-button/copy-button.js";
+import "@awesome.me/webawesome/dist/components/dialog/dialog.js";
+import "@awesome.me/webawesome/dist/components/qr-code/qr-code.js";
+import { html, nothing, type TemplateResult } from "lit";
+import { type AccessLink, ApiError, api, type JoinCode } from "./api.ts";
+import { icon } from "./icons.ts";
+import { terrainLink } from "./links.ts";
+import "./segmented.ts";
+import { type MadeLinks, madeLinks, rememberLink, type ShareRole } from "./share-links.ts";
+import { SignalElement } from "./signal-element.ts";
+import type { Stage } from "./stage.ts";
+import { shareStyles } from "./styles/share.ts";
+import { shared } from "./styles/shared.ts";
+
+type Tab = "edit" | "view" | "owner";
+
+const WORDS: Readonly<Record<Tab, { readonly label: string; readonly says: string }>> = {
+  edit: { label: "Can draw", says: "Everybody with this link draws along." },
+  view: { label: "Can look", says: "Everybody with this link watches, and changes nothing." },
+  owner: { label: "Owner", says: "This link can do everything, also revoke the others. Keep it to yourself." },
+};
+
+/** Links to give away, with QR code and join code; for the owner also the list of links, to rotate and revoke. */
+export class EskShare extends SignalElement {
+  static override properties = {
+    stage: { attribute: false },
+    open: { type: Boolean },
+    tab: { state: true },
+    made: { state: true },
+    links: { state: true },
+    code: { state: true },
+    problem: { state: true },
+    busy: { state: true },
+  };
+  static override styles = [shared, shareStyles];
+
+  declare stage: Stage;
+  declare open: boolean;
+  declare tab: Tab;
+  declare made: MadeLinks;
+  declare links: readonly AccessLink[] | null;
+  declare code: (JoinCode & { readonly role: Tab }) | null;
+  declare problem: string;
+  declare busy: boolean;
+
+  constructor() {
+    super();
+    this.open = false;
+    this.tab = "edit";
+    this.made = {};
+    this.links = null;
+    this.code = null;
+    this.problem = "";
+    this.busy = false;
+  }
+
+  protected override willUpdate(changed: Map<PropertyKey, unknown>): void {
+    if (changed.has("open") && this.open) this.#opened();
+  }
+
+  #opened(): void {
+    const { session } = this.stage;
+    this.made = madeLinks(session.store, session.id);
+    this.code = null;
+    this.problem = "";
+    this.tab = session.role.value === "view" ? "view" : "edit";
+    if (session.role.value === "owner") void this.#try(() => this.#loadLinks());
+  }
+
+  async #loadLinks(): Promise<void> {
+    const { session } = this.stage;
+    this.links = await api.links(session.id, session.secret);
+    for (const role of ["edit", "view"] as const) {
+      const known = this.made[role];
+      const alive = known && this.links.some((l) => l.id === known.link && !l.revoked);
+      if (known && !alive) this.made = rememberLink(session.store, session.id, role, null);
+    }
+  }
+
+  async #try(what: () => Promise<void>): Promise<void> {
+    this.busy = true;
+    this.problem = "";
+    try {
+      await what();
+    } catch (error) {
+      this.problem = error instanceof ApiError ? error.message : "Something went wrong. Close this and try again.";
+    } finally {
+      this.busy = false;
+    }
+  }
+
+  /** The secret for the chosen kind of link, if this device has it. */
+  get #secret(): string | null {
+    const { session } = this.stage;
+    if (this.tab === session.role.value) return session.secret;
+    return this.tab === "owner" ? null : (this.made[this.tab]?.secret ?? null);
+  }
+
+  async #make(role: ShareRole): Promise<void> {
+    const { session } = this.stage;
+    const name = role === "edit" ? "Shared for drawing" : "Shared for looking";
+    const link = await api.addLink(session.id, session.secret, role, name);
+    this.made = rememberLink(session.store, session.id, role, { link: link.id, secret: link.secret });
+    await this.#loadLinks();
+  }
+
+  async #makeCode(role: Tab): Promise<void> {
+    const { session } = this.stage;
+    this.code = { ...(await api.code(session.id, session.secret, role)), role };
+  }
+
+  async #rotate(link: AccessLink): Promise<void> {
+    const { session } = this.stage;
+    const { secret } = await api.rotateLink(session.id, session.secret, link.id);
+    if (link.role !== "owner") {
+      this.made = rememberLink(session.store, session.id, link.role, { link: link.id, secret });
+      this.tab = link.role;
+    }
+    await this.#loadLinks();
+    session.toasts.show("The old link no longer works. The new one is shown here.");
+  }
+
+  async #revoke(link: AccessLink): Promise<void> {
+    const { session } = this.stage;
+    await api.revokeLink(session.id, session.secret, link.id);
+    await this.#loadLinks();
+  }
+
+  protected override render(): TemplateResult {
+    const role = this.stage.session.role.value;
+    const tabs: Tab[] = role === "owner" ? ["edit", "view", "owner"] : role === "edit" ? ["edit"] : ["view"];
+    return html`
+      <wa-dialog label="Share this terrain" light-dismiss ?open=${this.open} @wa-after-hide=${this.#hidden}>
+        ${
+          tabs.length > 1
+            ? html`<esk-segmented
+                label="Kind of link"
+                .segments=${tabs.map((t) => ({ value: t, label: WORDS[t].label }))}
+                .value=${this.tab}
+                @pick=${(e: CustomEvent<Tab>) => {
+                  this.tab = e.detail;
+                }}
+              ></esk-segmented>`
+            : nothing
+        }
+        <p class="says">${WORDS[this.tab].says}</p>
+        ${this.#link()}
+        <p class="problem" role="alert">${this.problem}</p>
+        ${role !== "view" && this.tab !== "owner" ? this.#codeRow(this.tab) : nothing}
+        ${role === "owner" && this.links ? this.#list(this.links) : nothing}
+      </wa-dialog>
+    `;
+  }
+
+  #link(): TemplateResult {
+    const secret = this.#secret;
+    const tab = this.tab;
+    if (secret === null && tab !== "owner") {
+      return html`<button class="btn primary make" ?disabled=${this.busy} @click=${() => this.#try(() => this.#make(tab))}>
+        ${icon("link")} Make a link
+      </button>`;
+    }
+    const link = terrainLink(window.location.origin, this.stage.session.id, secret ?? "");
+    return html`
+      <div class="link">
+        <input class="field" readonly aria-label="Link" .value=${link} @focus=${(e: Event) => (e.target as HTMLInputElement).select()} />
+        <wa-copy-button .value=${link} copy-label="Copy the link"></wa-copy-button>
+      </div>
+      ${
+        tab === "owner"
+          ? nothing
+          : html`<div class="qr"><wa-qr-code .value=${link} label="QR code of the link" size="168"></wa-qr-code></div>`
+      }
+    `;
+  }
+
+  #codeRow(tab: Tab): TemplateResult {
+    const code = this.code?.role === tab ? this.code : null;
+    return html`
+      <div class="code">
+        ${
+          code
+            ? html`<span>
+                  <strong>${code.code.slice(0, 3)} ${code.code.slice(3)}</strong>
+                  <span class="quiet">Valid for ${Math.round(code.expires_s / 60)} minutes. Type it at ${window.location.host}.</span>
+                </span>
+                <wa-copy-button .value=${code.code} copy-label="Copy the code"></wa-copy-button>`
+            : html`<span class="quiet">For a classroom: a short code to type instead of the link.</span>
+                <button class="btn outline" ?disabled=${this.busy} @click=${() => this.#try(() => this.#makeCode(tab))}>
+                  ${icon("key")} Show a code
+                </button>`
+        }
+      </div>
+    `;
+  }
+
+  #list(links: readonly AccessLink[]): TemplateResult {
+    const alive = links.filter((l) => !l.revoked);
+    return html`
+      <details>
+        <summary>Links of this terrain (${alive.length})</summary>
+        <ul>
+          ${alive.map(
+            (l) => html`
+              <li>
+                <span class="name">${l.name || WORDS[l.role].label}</span>
+                <span class="quiet">${WORDS[l.role].label}</span>
+                ${
+                  l.role === "owner"
+                    ? html`<span class="quiet">yours</span>`
+                    : html`
+                        <button class="icon-btn small" title="Replace by a new link" aria-label="Replace by a new link"
+                          ?disabled=${this.busy} @click=${() => this.#try(() => this.#rotate(l))}>${icon("rotate")}</button>
+                        <button class="icon-btn small" title="Revoke" aria-label="Revoke"
+                          ?disabled=${this.busy} @click=${() => this.#try(() => this.#revoke(l))}>${icon("trash")}</button>`
+                }
+              </li>
+            `,
+          )}
+        </ul>
+      </details>
+    `;
+  }
+
+  #hidden(event: Event): void {
+    if (event.target === event.currentTarget) this.dispatchEvent(new CustomEvent("close"));
+  }
+}
+
+customElements.define("esk-share", EskShare);

@@ -1,0 +1,250 @@
+/** Where the terrain is seen and touched: tiles, camera, input, renderer and the loop that draws frames. */
+
+import { effect, signal } from "@preact/signals-core";
+import { Camera } from "../core/camera.ts";
+import type { DecodedFrame, FrameStats, Scene, SceneRenderer, Vec3 } from "../core/types.ts";
+import type { MemberPresence } from "../generated/contract.ts";
+import { DEFAULT_TAU_PX } from "../generated/contract.ts";
+import { createMapRenderer, createRenderer, NoWebGpu } from "../gpu/index.ts";
+import { InputController } from "../input/controller.ts";
+import { TileStore } from "../tiles/store.ts";
+import { FrameLoop } from "./frame-loop.ts";
+import { cursorVisuals, strokeVisuals } from "./scene.ts";
+import type { TerrainSession } from "./session.ts";
+
+export interface RendererInfo {
+  readonly kind: SceneRenderer["kind"];
+  readonly description: string;
+}
+
+export interface StageOptions {
+  readonly session: TerrainSession;
+  readonly sizeM: number;
+  readonly levels: number;
+  /** The element that fills the window: holds the canvas, takes the pointer and the keys. */
+  readonly viewport: HTMLElement;
+}
+
+export class Stage {
+  readonly session: TerrainSession;
+  readonly sizeM: number;
+  readonly levels: number;
+  readonly camera: Camera;
+  readonly tiles: TileStore;
+  readonly input: InputController;
+  readonly loop: FrameLoop;
+  readonly overlay = signal<Scene["overlay"]>("none");
+  readonly showStrokes = signal(true);
+  readonly cursor = signal<Vec3 | null>(null);
+  readonly renderer = signal<RendererInfo | null>(null);
+  /** Why there is no 3D view, as a sentence; null while there is one. */
+  readonly note = signal<string | null>(null);
+  readonly following = signal<string | null>(null);
+  readonly stats = signal<FrameStats | null>(null);
+  readonly #viewport: HTMLElement;
+  readonly #calm = window.matchMedia("(prefers-reduced-motion: reduce)");
+  readonly #stops: (() => void)[] = [];
+  #renderer: SceneRenderer | null = null;
+  #disposed = false;
+
+  constructor({ session, sizeM, levels, viewport }: StageOptions) {
+    this.session = session;
+    this.sizeM = sizeM;
+    this.levels = levels;
+    this.#viewport = viewport;
+    this.camera = new Camera(sizeM);
+    this.tiles = new TileStore(sizeM, levels);
+    this.loop = new FrameLoop((dt, time) => this.#draw(dt, time));
+    this.input = new InputController({
+      canvas: viewport,
+      camera: this.camera,
+      doc: session.doc,
+      ground: () => this.tiles.ground,
+      freeze: () => this.tiles.freeze(),
+      clientId: session.client,
+      canEdit: () => session.canEdit.value,
+      onCursor: (point) => {
+        this.cursor.value = point;
+      },
+      onMessage: (text) => session.toasts.show(text),
+    });
+  }
+
+  /** Finds a renderer and starts drawing. */
+  async start(): Promise<void> {
+    this.#watch();
+    await this.#openRenderer();
+    if (this.#disposed) return;
+    this.camera.home(0);
+    this.loop.start();
+  }
+
+  apply(frame: DecodedFrame): void {
+    this.tiles.apply(frame);
+  }
+
+  /** The server starts anew after a reconnect and sends every tile again. */
+  restart(): void {
+    this.tiles.clear();
+  }
+
+  /** Follows a person's view until I move the camera myself; the same person again stops it. */
+  follow(client: string | null): void {
+    this.following.value = this.following.value === client ? null : client;
+    if (this.following.value) this.#goToView(this.session.presences.value.get(this.following.value), 700);
+  }
+
+  /** New presences have come: the view goes along with the person that is followed. */
+  followed(changed: readonly MemberPresence[]): void {
+    const leader = changed.find((p) => p.client === this.following.value);
+    if (leader) this.#goToView(leader, 180);
+  }
+
+  setOverlay(overlay: Scene["overlay"]): void {
+    this.overlay.value = overlay;
+  }
+
+  dispose(): void {
+    this.#disposed = true;
+    this.loop.stop();
+    for (const stop of this.#stops) stop();
+    this.input.dispose();
+    this.#renderer?.destroy();
+    this.#renderer = null;
+  }
+
+  #goToView(presence: MemberPresence | undefined, durationMs: number): void {
+    if (!presence?.eye || !presence.target) return;
+    this.camera.goTo(presence.eye, presence.target, this.#calm.matches ? 0 : durationMs);
+    this.loop.invalidate();
+  }
+
+  /** Redraws on every change that a frame shows, and tells the server where I look. */
+  #watch(): void {
+    const { session, input } = this;
+    const stopFollowing = (): void => {
+      this.following.value = null;
+    };
+    for (const type of ["pointerdown", "wheel"] as const) {
+      this.#viewport.addEventListener(type, stopFollowing, { passive: true });
+      this.#stops.push(() => this.#viewport.removeEventListener(type, stopFollowing));
+    }
+    this.#stops.push(
+      effect(() => {
+        this.camera.state.value;
+        session.viewChanged();
+        session.presenceChanged();
+        this.loop.invalidate();
+      }),
+      effect(() => {
+        this.cursor.value;
+        input.drawing.value;
+        input.tool.value;
+        session.presenceChanged();
+      }),
+      effect(() => {
+        this.tiles.revision.value;
+        session.doc.doc.value;
+        session.people.value;
+        input.selection.value;
+        input.hovered.value;
+        input.ghost.value;
+        input.drawing.value;
+        this.overlay.value;
+        this.showStrokes.value;
+        this.loop.invalidate();
+      }),
+    );
+    this.#watchSize();
+  }
+
+  #watchSize(): void {
+    const resize = (): void => {
+      const canvas = this.#viewport.querySelector("canvas");
+      const ratio = Math.min(window.devicePixelRatio, 2);
+      const width = Math.max(1, Math.round(this.#viewport.clientWidth * ratio));
+      const height = Math.max(1, Math.round(this.#viewport.clientHeight * ratio));
+      if (canvas && (canvas.width !== width || canvas.height !== height)) Object.assign(canvas, { width, height });
+      this.camera.resize(width, height);
+      this.loop.invalidate();
+    };
+    const observer = new ResizeObserver(resize);
+    observer.observe(this.#viewport);
+    this.#stops.push(() => observer.disconnect());
+    resize();
+  }
+
+  /** Opens the 3D view, or the map where there is no WebGPU. A canvas that was asked for one cannot give the other. */
+  async #openRenderer(): Promise<void> {
+    try {
+      this.#use(await createRenderer(this.#newCanvas()));
+      this.note.value = null;
+    } catch (error) {
+      if (this.#disposed) return;
+      const reason = error instanceof NoWebGpu ? error.message : "The 3D view could not start.";
+      if (!(error instanceof NoWebGpu)) console.error(error);
+      this.note.value = reason;
+      this.camera.setMode("map");
+      this.#use(createMapRenderer(this.#newCanvas()));
+    }
+  }
+
+  #newCanvas(): HTMLCanvasElement {
+    const canvas = document.createElement("canvas");
+    const { width, height } = this.camera.state.value;
+    Object.assign(canvas, { width, height });
+    canvas.setAttribute("aria-hidden", "true");
+    this.#viewport.querySelector("canvas")?.remove();
+    this.#viewport.prepend(canvas);
+    return canvas;
+  }
+
+  #use(renderer: SceneRenderer): void {
+    if (this.#disposed) {
+      renderer.destroy();
+      return;
+    }
+    this.#renderer = renderer;
+    this.renderer.value = { kind: renderer.kind, description: renderer.description };
+    void renderer.lost.then((reason) => this.#lost(renderer, reason));
+    this.loop.invalidate();
+  }
+
+  /** The graphics device went away (driver update, sleep, too little memory): opens another. */
+  async #lost(renderer: SceneRenderer, reason: string): Promise<void> {
+    if (this.#disposed || this.#renderer !== renderer) return;
+    console.warn(`The graphics device was lost: ${reason}`);
+    this.#renderer = null;
+    renderer.destroy();
+    await this.#openRenderer();
+  }
+
+  #draw(dtS: number, timeS: number): boolean {
+    const moving = this.camera.update(dtS, this.tiles.ground);
+    const doc = this.session.doc.doc.value;
+    if (!this.#renderer || !doc) return moving;
+    const people = this.session.people.value;
+    const stats = this.#renderer.render({
+      camera: this.camera.state.value,
+      tiles: this.tiles,
+      settings: doc.settings,
+      strokes: strokeVisuals(doc, this.#marks(), people),
+      ghost: this.input.ghost.value,
+      cursors: cursorVisuals(people),
+      tauPx: DEFAULT_TAU_PX,
+      time: this.#calm.matches ? 0 : timeS,
+      overlay: this.overlay.value,
+      showStrokes: this.showStrokes.value,
+    });
+    this.stats.value = stats;
+    return moving || stats.busy;
+  }
+
+  #marks(): { selection: string | null; hovered: string | null; drawing: string | null } {
+    return {
+      selection: this.input.selection.value,
+      hovered: this.input.hovered.value,
+      drawing: this.input.drawing.value,
+    };
+  }
+}

@@ -1,0 +1,133 @@
+import { css, html, nothing, type TemplateResult } from "lit";
+import type { Progress } from "../generated/contract.ts";
+import { icon } from "./icons.ts";
+import { SignalElement } from "./signal-element.ts";
+import type { Stage } from "./stage.ts";
+import { shared } from "./styles/shared.ts";
+import { height, metres, roundBelow } from "./words.ts";
+
+const BAR_PX = 96;
+
+/** How far the solver is, in words for the tooltip. */
+export function progressText(progress: Progress | null, levels: number): string {
+  if (!progress) return `Waiting for the ground: ${levels + 1} levels of detail`;
+  if (progress.settled) return `Settled: all ${levels + 1} levels of detail are final`;
+  return `Settling: level ${progress.level} of ${progress.of}`;
+}
+
+/** Height under the cursor, scale, levels of detail, and what draws the picture. */
+export class EskStatusLine extends SignalElement {
+  static override properties = { stage: { attribute: false } };
+  static override styles = [
+    shared,
+    css`
+      :host {
+        display: flex;
+        align-items: center;
+        gap: 14px;
+        height: 32px;
+        padding: 0 12px;
+        font-size: 0.75rem;
+        font-variant-numeric: tabular-nums;
+        color: var(--esk-quiet);
+        white-space: nowrap;
+      }
+      .height {
+        min-width: 4.6em;
+        color: var(--esk-text);
+        font-weight: 550;
+      }
+      .scale {
+        display: inline-flex;
+        align-items: center;
+        gap: 7px;
+      }
+      .bar {
+        height: 5px;
+        border: 1.5px solid currentColor;
+        border-top: 0;
+      }
+      .levels {
+        display: inline-flex;
+        align-items: center;
+        gap: 3px;
+      }
+      .dot {
+        width: 6px;
+        height: 6px;
+        border-radius: 50%;
+        background: var(--esk-line-strong);
+        transition: background-color 160ms;
+      }
+      .dot.done {
+        background: var(--esk-accent);
+      }
+      .settled .dot.done {
+        background: var(--esk-ok);
+      }
+      .levels .icon {
+        width: 13px;
+        height: 13px;
+        margin-left: 2px;
+        color: var(--esk-ok);
+      }
+      .renderer {
+        overflow: hidden;
+        text-overflow: ellipsis;
+        max-width: 220px;
+      }
+      @media (max-width: 720px) {
+        :host {
+          gap: 10px;
+          height: 26px;
+          padding: 0 9px;
+        }
+        .renderer {
+          display: none;
+        }
+      }
+      @media (max-width: 460px) {
+        .height {
+          display: none;
+        }
+      }
+    `,
+  ];
+
+  declare stage: Stage;
+
+  protected override render(): TemplateResult {
+    const { cursor, session, levels, renderer } = this.stage;
+    const point = cursor.value;
+    return html`
+      <span class="height" title="Height of the ground under the cursor">${point ? height(point[2]) : "–"}</span>
+      ${this.#scale()} ${this.#levels(session.progress.value, levels)}
+      <span class="renderer" title=${this.stage.note.value ?? ""}>${renderer.value?.description ?? nothing}</span>
+    `;
+  }
+
+  #scale(): TemplateResult | typeof nothing {
+    const { camera } = this.stage;
+    const state = camera.state.value;
+    const cssPixel = camera.metresPerPixelAt(state.target) * Math.min(window.devicePixelRatio, 2);
+    const length = roundBelow(BAR_PX * cssPixel);
+    if (length === 0) return nothing;
+    return html`<span class="scale" title="Scale at the centre of the view">
+      <span class="bar" style=${`width:${Math.round(length / cssPixel)}px`}></span>${metres(length)}
+    </span>`;
+  }
+
+  #levels(progress: Progress | null, levels: number): TemplateResult {
+    const settled = progress?.settled === true;
+    const text = progressText(progress, levels);
+    return html`<span class="levels ${settled ? "settled" : ""}" role="img" aria-label=${text} title=${text}>
+      ${Array.from({ length: levels + 1 }, (_, i) => {
+        const done = progress !== null && (settled || i <= progress.level);
+        return html`<span class="dot ${done ? "done" : ""}"></span>`;
+      })}
+      ${settled ? icon("check") : nothing}
+    </span>`;
+  }
+}
+
+customElements.define("esk-status-line", EskStatusLine);

@@ -1,0 +1,192 @@
+import { html, nothing, type TemplateResult } from "lit";
+import type { Stroke } from "../generated/contract.ts";
+import { icon } from "./icons.ts";
+import { reliefOf, shapeOf } from "./scene.ts";
+import type { SectionChange } from "./section-form.ts";
+import "./section-form.ts";
+import { SignalElement } from "./signal-element.ts";
+import type { Stage } from "./stage.ts";
+import { panelStyles } from "./styles/panel.ts";
+import { shared } from "./styles/shared.ts";
+import { type DrawTool, defaultsFor, setDefaults } from "./tool-defaults.ts";
+
+const LISTED = 200;
+
+/** What a stroke is, in a word. */
+export function kindWord(stroke: Stroke): string {
+  if (stroke.kind === "level") return "Plateau";
+  return shapeOf(stroke).sinks ? "Crevice" : "Mountain";
+}
+
+/** The inspector: the selected stroke, else what the drawing tool will make, else the list of strokes. */
+export class EskStrokePanel extends SignalElement {
+  static override properties = { stage: { attribute: false }, filter: { state: true } };
+  static override styles = [shared, panelStyles];
+
+  declare stage: Stage;
+  declare filter: string;
+  #gesture: string | null = null;
+
+  constructor() {
+    super();
+    this.filter = "";
+  }
+
+  protected override render(): TemplateResult {
+    const { input, session } = this.stage;
+    const doc = session.doc.doc.value;
+    const stroke = doc?.strokes.get(input.selection.value ?? "");
+    if (stroke) return this.#selected(stroke);
+    const tool = input.tool.value;
+    if (tool !== "select" && session.canEdit.value) return this.#defaults(tool);
+    return this.#list([...(doc?.strokes.values() ?? [])]);
+  }
+
+  #set(stroke: Stroke, change: SectionChange): void {
+    this.#gesture ??= this.stage.session.newGesture();
+    this.stage.session.setStroke(stroke.id, change.fields, this.#gesture);
+    if (change.settled) this.#gesture = null;
+  }
+
+  #selected(stroke: Stroke): TemplateResult {
+    const { session, sizeM } = this.stage;
+    const disabled = !session.canEdit.value || stroke.locked;
+    const up = !shapeOf(stroke).sinks;
+    return html`
+      <div class="title">
+        <span class="swatch ${stroke.kind === "level" ? "plateau" : up ? "mountain" : "crevice"}"></span>
+        <input
+          class="field name"
+          aria-label="Name of the stroke"
+          maxlength="80"
+          placeholder=${kindWord(stroke)}
+          .value=${stroke.label}
+          ?disabled=${disabled}
+          @change=${(e: Event) => session.setStroke(stroke.id, { label: (e.target as HTMLInputElement).value.trim() })}
+          @keydown=${blurOnEnter}
+        />
+      </div>
+      ${this.#buttons(stroke, disabled)}
+      ${stroke.locked ? html`<p class="note">${icon("lock")} Locked. Unlock it to change it.</p>` : nothing}
+      <esk-section-form
+        style=${stroke.kind === "level" ? "--land: var(--esk-plateau)" : ""}
+        .fields=${{ left: stroke.left, right: stroke.right, plateau_radius_m: stroke.plateau_radius_m }}
+        .reliefM=${stroke.kind === "level" ? this.#levelRelief(stroke) : reliefOf(stroke)}
+        .sizeM=${sizeM}
+        .sense=${up ? "up" : "down"}
+        ?disabled=${disabled}
+        @change=${(e: CustomEvent<SectionChange>) => this.#set(stroke, e.detail)}
+      ></esk-section-form>
+      ${stroke.author ? html`<p class="quiet small">Drawn by ${stroke.author}</p>` : nothing}
+    `;
+  }
+
+  /** A plateau's own height over zero, bounded so that the picture stays readable. */
+  #levelRelief(stroke: Stroke): number {
+    const relief = stroke.first[2];
+    return Math.abs(relief) < this.stage.sizeM / 200 ? this.stage.sizeM / 40 : relief;
+  }
+
+  #buttons(stroke: Stroke, disabled: boolean): TemplateResult {
+    const { session, input } = this.stage;
+    const edit = session.canEdit.value;
+    return html`
+      <div class="row" role="toolbar" aria-label="Stroke">
+        ${iconButton("frame", "Look at it", true, false, () => input.actions.get("frame-selection")?.run())}
+        ${iconButton("copy", "Duplicate", edit, false, () => input.actions.get("duplicate")?.run())}
+        ${iconButton("swap", "Swap left and right", !disabled, false, () =>
+          session.setStroke(stroke.id, { left: stroke.right, right: stroke.left }),
+        )}
+        ${iconButton(stroke.hidden ? "eye-slash" : "eye", stroke.hidden ? "Show" : "Hide", !disabled, stroke.hidden, () =>
+          session.setStroke(stroke.id, { hidden: !stroke.hidden }),
+        )}
+        ${iconButton(stroke.locked ? "lock" : "unlock", stroke.locked ? "Unlock" : "Lock", edit, stroke.locked, () =>
+          session.setStroke(stroke.id, { locked: !stroke.locked }),
+        )}
+        ${iconButton("trash", "Delete", !disabled, false, () => input.actions.get("delete")?.run())}
+      </div>
+    `;
+  }
+
+  #defaults(tool: DrawTool): TemplateResult {
+    const { input, sizeM } = this.stage;
+    const fields = defaultsFor(input, tool);
+    const down = tool === "crevice";
+    return html`
+      <p class="lead">New ${tool === "plateau" ? "plateaus" : tool === "crevice" ? "crevices" : "mountains"} get this cross-section.</p>
+      <esk-section-form
+        style=${tool === "plateau" ? "--land: var(--esk-plateau)" : ""}
+        .fields=${fields}
+        .reliefM=${(down ? -1 : 1) * sizeM * 0.05}
+        .sizeM=${sizeM}
+        .sense=${down ? "down" : "up"}
+        @change=${(e: CustomEvent<SectionChange>) => setDefaults(input, tool, e.detail.fields)}
+      ></esk-section-form>
+    `;
+  }
+
+  #list(strokes: Stroke[]): TemplateResult {
+    if (strokes.length === 0) {
+      return html`<div class="empty">${icon("sketch")}<p>No strokes yet. Pick a tool and draw a line across the land.</p></div>`;
+    }
+    const wanted = this.filter.trim().toLowerCase();
+    const found = strokes.filter((s) => `${s.label} ${kindWord(s)} ${s.author}`.toLowerCase().includes(wanted));
+    return html`
+      <p class="lead">${strokes.length === 1 ? "One stroke makes" : `${strokes.length} strokes make`} this terrain. Select one to shape it.</p>
+      ${
+        strokes.length > 8
+          ? html`<input class="field" type="search" placeholder="Find a stroke" aria-label="Find a stroke" .value=${this.filter}
+              @input=${(e: Event) => {
+                this.filter = (e.target as HTMLInputElement).value;
+              }} @keydown=${(e: Event) => e.stopPropagation()} />`
+          : nothing
+      }
+      <ul class="strokes">
+        ${found
+          .slice(-LISTED)
+          .reverse()
+          .map((s) => this.#item(s))}
+      </ul>
+      ${found.length > LISTED ? html`<p class="quiet small">The newest ${LISTED} are listed. Search to find others.</p>` : nothing}
+    `;
+  }
+
+  #item(stroke: Stroke): TemplateResult {
+    const tone = stroke.kind === "level" ? "plateau" : shapeOf(stroke).sinks ? "crevice" : "mountain";
+    return html`
+      <li>
+        <button class="btn item" @click=${() => this.#select(stroke.id)}>
+          <span class="swatch ${tone}"></span>
+          <span class="label">${stroke.label || kindWord(stroke)}</span>
+          ${stroke.hidden ? icon("eye-slash") : nothing} ${stroke.locked ? icon("lock") : nothing}
+        </button>
+      </li>
+    `;
+  }
+
+  #select(id: string): void {
+    this.stage.input.selection.value = id;
+    this.stage.input.actions.get("frame-selection")?.run();
+  }
+}
+
+function iconButton(name: string, label: string, enabled: boolean, pressed: boolean, run: () => void): TemplateResult {
+  return html`<button
+    class="icon-btn small"
+    aria-label=${label}
+    title=${label}
+    aria-pressed=${pressed ? "true" : nothing}
+    ?disabled=${!enabled}
+    @click=${run}
+  >
+    ${icon(name)}
+  </button>`;
+}
+
+/** Enter in a text field means: done. Keys stay in the field. */
+export function blurOnEnter(event: KeyboardEvent): void {
+  event.stopPropagation();
+  if (event.key === "Enter" || event.key === "Escape") (event.target as HTMLElement).blur();
+}
+
+customElements.define("esk-stroke-panel", EskStrokePanel);

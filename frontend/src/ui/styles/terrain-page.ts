@@ -1,0 +1,194 @@
+import { css } from "lit";
+
+export const terrainPageStyles = css`
+  :host {
+    position: fixed;
+    inset: 0;
+    overflow: hidden;
+    background: var(--esk-bg);
+    --edge: 12px;
+  }
+  .viewport {
+    position: absolute;
+    inset: 0;
+    outline-offset: -3px;
+    touch-action: none;
+    user-select: none;
+    -webkit-user-select: none;
+  }
+  .viewport canvas {
+    position: absolute;
+    inset: 0;
+    width: 100%;
+    height: 100%;
+    display: block;
+  }
+  esk-top-bar {
+    position: absolute;
+    inset: var(--edge) var(--edge) auto;
+  }
+  esk-tools {
+    position: absolute;
+    left: var(--edge);
+    top: 50%;
+    transform: translateY(-50%);
+  }
+  .foot {
+    position: absolute;
+    inset: auto var(--edge) var(--edge);
+    display: flex;
+    align-items: flex-end;
+    justify-content: space-between;
+    gap: var(--esk-gap);
+    pointer-events: none;
+  }
+  .foot > * {
+    pointer-events: auto;
+  }
+  .side {
+    position: absolute;
+    top: calc(var(--edge) + 60px);
+    right: var(--edge);
+    width: 312px;
+    max-height: calc(100% - 2 * var(--edge) - 60px - 54px);
+    display: flex;
+    flex-direction: column;
+    overflow: hidden;
+    animation: arrive 160ms ease-out;
+  }
+  @keyframes arrive {
+    from {
+      opacity: 0;
+      transform: translateX(10px);
+    }
+  }
+  .side header {
+    display: flex;
+    align-items: center;
+    gap: 8px;
+    padding: 10px 10px 8px 14px;
+  }
+  .side header esk-segmented {
+    flex: 1;
+  }
+  .scroll {
+    overflow-y: auto;
+    padding: 6px 16px 18px;
+    scrollbar-width: thin;
+  }
+  .hint,
+  .closed {
+    position: absolute;
+    left: 50%;
+    bottom: 64px;
+    transform: translateX(-50%);
+    display: flex;
+    align-items: center;
+    gap: 10px;
+    max-width: calc(100% - 2 * var(--edge));
+    padding: 11px 18px 11px 14px;
+    font-weight: 500;
+    pointer-events: none;
+  }
+  .hint .icon {
+    color: var(--esk-accent-text);
+  }
+  .closed {
+    bottom: auto;
+    top: 74px;
+    pointer-events: auto;
+  }
+  .closed .icon {
+    color: var(--esk-bad);
+  }
+  esk-toasts {
+    position: absolute;
+    left: 50%;
+    bottom: 116px;
+    width: max-content;
+    max-width: calc(100% - 2 * var(--edge));
+    transform: translateX(-50%);
+  }
+  .veil {
+    position: absolute;
+    inset: 0;
+    display: grid;
+    place-content: center;
+    justify-items: center;
+    gap: 12px;
+    padding: 24px;
+    text-align: center;
+  }
+  .veil h1 {
+    font-size: 1.375rem;
+    font-weight: 650;
+    letter-spacing: -0.015em;
+  }
+  .veil p {
+    max-width: 40ch;
+    color: var(--esk-quiet);
+  }
+  .breathing {
+    animation: breathe 1.4s ease-in-out infinite alternate;
+  }
+  @keyframes breathe {
+    from {
+      opacity: 0.45;
+    }
+  }
+  .facts {
+    display: grid;
+    grid-template-columns: auto 1fr;
+    gap: 8px 20px;
+    margin: 0 0 12px;
+  }
+  .facts dt {
+    color: var(--esk-quiet);
+  }
+  .facts dd {
+    margin: 0;
+    text-align: right;
+    overflow-wrap: anywhere;
+  }
+  @media (max-width: 720px) {
+    :host {
+      --edge: 8px;
+    }
+    esk-tools {
+      left: 50%;
+      top: auto;
+      bottom: calc(var(--edge) + env(safe-area-inset-bottom));
+      transform: translateX(-50%);
+    }
+    .foot {
+      bottom: calc(var(--edge) + 62px + env(safe-area-inset-bottom));
+    }
+    .side {
+      top: auto;
+      left: 0;
+      right: 0;
+      bottom: 0;
+      width: auto;
+      max-height: min(56%, 520px);
+      border-radius: var(--esk-radius) var(--esk-radius) 0 0;
+      padding-bottom: env(safe-area-inset-bottom);
+    }
+    @keyframes arrive {
+      from {
+        transform: translateY(24px);
+      }
+    }
+    .hint,
+    esk-toasts {
+      bottom: calc(118px + env(safe-area-inset-bottom));
+      width: max-content;
+    }
+    .hint {
+      font-size: 0.8125rem;
+      padding: 9px 14px 9px 12px;
+    }
+    esk-toasts {
+      bottom: calc(170px + env(safe-area-inset-bottom));
+    }
+  }
+`;

@@ -1,0 +1,250 @@
+import { effect, signal } from "@preact/signals-core";
+import { html, nothing, type TemplateResult } from "lit";
+import { ApiError, api } from "./api.ts";
+import "./help-dialog.ts";
+import "./icon-library.ts";
+import { icon } from "./icons.ts";
+import "./overlay.ts";
+import { pageActions } from "./page-actions.ts";
+import "./profile-dialog.ts";
+import { TerrainSession } from "./session.ts";
+import "./share-dialog.ts";
+import { SignalElement } from "./signal-element.ts";
+import type { Stage } from "./stage.ts";
+import "./status-line.ts";
+import { flag, setFlag } from "./storage.ts";
+import "./stroke-panel.ts";
+import { shared } from "./styles/shared.ts";
+import { terrainPageStyles } from "./styles/terrain-page.ts";
+import "./terrain-panel.ts";
+import { installTestHook } from "./test-hook.ts";
+import "./toasts.ts";
+import "./tool-rail.ts";
+import "./top-bar.ts";
+import type { PageCommand } from "./top-bar.ts";
+import "./view-bar.ts";
+
+type PanelTab = "stroke" | "terrain";
+type DialogId = "share" | "profile" | "help" | "about";
+
+const WIDE = "(min-width: 1000px)";
+
+/** `/t/{id}`: the picture over the whole window, and calm chrome that floats on it. */
+export class EskTerrain extends SignalElement {
+  static override styles = [shared, terrainPageStyles];
+  terrain = "";
+  secret = "";
+  readonly #session = signal<TerrainSession | null>(null);
+  readonly #panel = signal<PanelTab | null>(null);
+  readonly #dialog = signal<DialogId | null>(null);
+  /** Set while the panel is open only because a stroke was selected. */
+  #openedBySelection = false;
+  #stops: (() => void)[] = [];
+
+  protected override firstUpdated(): void {
+    if (!this.secret) return;
+    const viewport = this.renderRoot.querySelector<HTMLElement>(".viewport");
+    if (!viewport) throw new Error("The page has no viewport.");
+    const session = new TerrainSession(this.terrain, this.secret, viewport);
+    this.#session.value = session;
+    this.#stops = [
+      effect(() => {
+        const stage = session.stage.value;
+        if (stage) pageActions(stage, { panel: () => this.#togglePanel(), help: () => this.#show("help"), share: () => this.#show("share") });
+      }),
+      effect(() => this.#followSelection(session.stage.value?.input.selection.value ?? null)),
+      effect(() => {
+        if ((session.doc.doc.value?.strokes.size ?? 0) > 0) setFlag(session.store, "drawn");
+      }),
+      installTestHook(session),
+    ];
+  }
+
+  override disconnectedCallback(): void {
+    super.disconnectedCallback();
+    for (const stop of this.#stops) stop();
+    this.#session.value?.dispose();
+  }
+
+  /** On a wide window the inspector comes with a selection and goes with it. */
+  #followSelection(selection: string | null): void {
+    if (selection !== null && this.#panel.peek() === null && window.matchMedia(WIDE).matches) {
+      this.#panel.value = "stroke";
+      this.#openedBySelection = true;
+    } else if (selection === null && this.#openedBySelection) {
+      this.#panel.value = null;
+      this.#openedBySelection = false;
+    }
+  }
+
+  #togglePanel(): void {
+    this.#openedBySelection = false;
+    this.#panel.value = this.#panel.peek() === null ? "stroke" : null;
+  }
+
+  #show(dialog: DialogId): void {
+    this.#dialog.value = dialog;
+  }
+
+  #command(event: CustomEvent<PageCommand>): void {
+    const command = event.detail;
+    if (command === "panel") this.#togglePanel();
+    else if (command === "download") void this.#download();
+    else this.#show(command);
+  }
+
+  async #download(): Promise<void> {
+    const session = this.#session.value;
+    if (!session) return;
+    try {
+      const url = URL.createObjectURL(await api.archive(session.id, session.secret));
+      const title = session.doc.doc.value?.settings.title ?? "terrain";
+      const name = title.replace(/[^\p{L}\p{N}]+/gu, "-").replace(/^-|-$/g, "").toLowerCase() || "terrain";
+      Object.assign(document.createElement("a"), { href: url, download: `${name}.esker` }).click();
+      setTimeout(() => URL.revokeObjectURL(url), 10_000);
+    } catch (error) {
+      session.toasts.show(error instanceof ApiError ? error.message : "The download failed. Try again.", "warn");
+    }
+  }
+
+  protected override render(): TemplateResult {
+    const session = this.#session.value;
+    const stage = session?.stage.value ?? null;
+    return html`
+      <div class="viewport" tabindex="0" role="application" aria-label="Terrain. Press ? for the keys."></div>
+      ${stage ? this.#chrome(stage) : this.#veil(session)}
+      ${session ? html`<esk-toasts .toasts=${session.toasts}></esk-toasts>` : nothing}
+    `;
+  }
+
+  #veil(session: TerrainSession | null): TemplateResult {
+    const closed = !this.secret || session?.connection.state.value === "closed";
+    const reason = this.secret
+      ? (session?.connection.reason.value ?? "The connection was closed.")
+      : "This link is incomplete: the part after # is missing. Ask for the whole link.";
+    const waiting = session?.connection.state.value === "reconnecting" ? session.connection.reason.value : "Opening the terrain…";
+    return html`
+      <div class="veil" role="status">
+        <img src="/favicon.svg" alt="" width="52" height="52" class=${closed ? "" : "breathing"} />
+        ${
+          closed
+            ? html`<h1>This terrain cannot be opened.</h1>
+                <p>${reason}</p>
+                <a class="btn outline" href="/">Go to the start page</a>`
+            : html`<p>${waiting}</p>`
+        }
+      </div>
+    `;
+  }
+
+  #chrome(stage: Stage): TemplateResult {
+    return html`
+      <esk-overlay .stage=${stage}></esk-overlay>
+      <esk-top-bar .stage=${stage} .panelOpen=${this.#panel.value !== null} @command=${this.#command}></esk-top-bar>
+      <esk-tools class="panel" .stage=${stage}></esk-tools>
+      <div class="foot">
+        <esk-status-line class="panel" .stage=${stage}></esk-status-line>
+        <esk-view-bar class="panel" .stage=${stage}></esk-view-bar>
+      </div>
+      ${this.#hint(stage)} ${this.#following(stage)} ${this.#closedBar(stage)}
+      ${this.#panel.value === null ? nothing : this.#side(stage, this.#panel.value)}
+      <esk-share .stage=${stage} .open=${this.#dialog.value === "share"} @close=${this.#closeDialog}></esk-share>
+      <esk-profile .stage=${stage} .open=${this.#dialog.value === "profile"} @close=${this.#closeDialog}></esk-profile>
+      <esk-help .stage=${stage} .open=${this.#dialog.value === "help"} @close=${this.#closeDialog}></esk-help>
+      ${this.#about(stage)}
+    `;
+  }
+
+  readonly #closeDialog = (): void => {
+    this.#dialog.value = null;
+  };
+
+  #side(stage: Stage, tab: PanelTab): TemplateResult {
+    return html`
+      <aside class="side panel" aria-label="Inspector">
+        <header>
+          <esk-segmented
+            label="Inspector"
+            .segments=${[
+              { value: "stroke", label: "Stroke" },
+              { value: "terrain", label: "Terrain" },
+            ]}
+            .value=${tab}
+            @pick=${(e: CustomEvent<PanelTab>) => {
+              this.#openedBySelection = false;
+              this.#panel.value = e.detail;
+            }}
+          ></esk-segmented>
+          <button class="icon-btn small" aria-label="Close the inspector" @click=${() => this.#togglePanel()}>${icon("xmark")}</button>
+        </header>
+        <div class="scroll">
+          ${
+            tab === "stroke"
+              ? html`<esk-stroke-panel .stage=${stage}></esk-stroke-panel>`
+              : html`<esk-terrain-panel .stage=${stage}></esk-terrain-panel>`
+          }
+        </div>
+      </aside>
+    `;
+  }
+
+  /** The first-run hint: goes with the first stroke and does not come back on this device's later empty terrains. */
+  #hint(stage: Stage): TemplateResult | typeof nothing {
+    const { session, input } = stage;
+    const empty = (session.doc.doc.value?.strokes.size ?? 0) === 0;
+    if (!empty || !session.canEdit.value || input.drawing.value !== null) return nothing;
+    const drawn = flag(session.store, "drawn");
+    const flat = stage.camera.state.value.mode === "map";
+    const first = flat ? "Draw a ridge on the map — the ground rises along it." : "Draw a line across the land — the ground rises to meet it.";
+    return html`<div class="hint panel">
+      ${icon("sketch")}<span>${drawn ? "An empty land. Draw a line." : first}</span>
+    </div>`;
+  }
+
+  #following(stage: Stage): TemplateResult | typeof nothing {
+    const leader = stage.session.members.value.find((m) => m.client === stage.following.value);
+    if (!leader) return nothing;
+    return html`<div class="hint panel" style="border-color:${leader.colour}">
+      ${icon("eye")}<span>Following ${leader.name || "Guest"}. Move the view to stop.</span>
+    </div>`;
+  }
+
+  /** The connection ended for good while the terrain is open: says why and what to do. */
+  #closedBar(stage: Stage): TemplateResult | typeof nothing {
+    const { connection, status } = stage.session;
+    if (connection.state.value !== "closed") return nothing;
+    return html`<div class="closed panel" role="alert">
+      ${icon("warning")}<span>${status.value.detail}</span>
+      <button class="btn outline" @click=${() => window.location.reload()}>Reload</button>
+    </div>`;
+  }
+
+  #about(stage: Stage): TemplateResult {
+    const { session, sizeM } = stage;
+    const server = session.server.value;
+    const facts = [
+      ["Size", `${(sizeM / 1000).toFixed(sizeM < 10_000 ? 2 : 0)} km a side`],
+      ["Strokes", String(session.doc.doc.value?.strokes.size ?? 0)],
+      ["Operations so far", String(session.doc.doc.value?.clock ?? 0)],
+      ["Finest solved level", `${stage.levels} (${64 * 2 ** stage.levels + 1} samples a side)`],
+      ["Drawn by", stage.renderer.value?.description ?? "–"],
+      ["Solved on", server?.device ?? "–"],
+      ["Server", server ? `Esker ${server.version}` : "–"],
+      ["Round trip", session.connection.rttMs.value === null ? "–" : `${Math.round(session.connection.rttMs.value)} ms`],
+    ];
+    return html`<wa-dialog label="About this terrain" light-dismiss ?open=${this.#dialog.value === "about"} @wa-after-hide=${this.#closeDialog}>
+      <dl class="facts">${facts.map(([k, v]) => html`<dt>${k}</dt><dd>${v}</dd>`)}</dl>
+      ${stage.note.value ? html`<p class="quiet">${stage.note.value}</p>` : nothing}
+    </wa-dialog>`;
+  }
+}
+
+customElements.define("esk-terrain", EskTerrain);
+
+/** The page of one terrain, to be put into the document. */
+export function openTerrain(id: string, secret: string): HTMLElement {
+  const page = document.createElement("esk-terrain") as EskTerrain;
+  page.terrain = id;
+  page.secret = secret;
+  return page;
+}

@@ -1,0 +1,133 @@
+import { css, html, type TemplateResult } from "lit";
+import type { ActionId } from "../input/actions.ts";
+import type { ToolId } from "../input/controller.ts";
+import { icon } from "./icons.ts";
+import { keyText } from "./keys.ts";
+import { SignalElement } from "./signal-element.ts";
+import type { Stage } from "./stage.ts";
+import { shared } from "./styles/shared.ts";
+
+const TOOLS: readonly { readonly id: ToolId; readonly icon: string; readonly label: string }[] = [
+  { id: "select", icon: "select", label: "Select" },
+  { id: "mountain", icon: "mountain", label: "Mountain" },
+  { id: "crevice", icon: "crevice", label: "Crevice" },
+  { id: "plateau", icon: "plateau", label: "Plateau" },
+];
+
+/** The tools, then undo and redo. Vertical at the left; a row at the bottom of a narrow window. */
+export class EskTools extends SignalElement {
+  static override properties = { stage: { attribute: false } };
+  static override styles = [
+    shared,
+    css`
+      :host {
+        display: flex;
+        flex-direction: column;
+        gap: 4px;
+        padding: 5px;
+      }
+      hr {
+        align-self: stretch;
+        margin: 2px 6px;
+        border: 0;
+        border-top: 1px solid var(--esk-line);
+      }
+      [role="radiogroup"] {
+        display: contents;
+      }
+      .mountain[aria-checked="true"],
+      .crevice[aria-checked="true"] {
+        background: color-mix(in oklab, var(--esk-mountain) 18%, transparent);
+        color: var(--esk-mountain);
+      }
+      .plateau[aria-checked="true"] {
+        background: color-mix(in oklab, var(--esk-plateau) 18%, transparent);
+        color: var(--esk-plateau);
+      }
+      .icon-btn {
+        font-size: 18px;
+      }
+      @media (max-width: 720px) {
+        :host {
+          flex-direction: row;
+        }
+        hr {
+          margin: 6px 2px;
+          border-top: 0;
+          border-left: 1px solid var(--esk-line);
+        }
+        .icon-btn {
+          width: 44px;
+          height: 44px;
+        }
+      }
+      @media (max-width: 380px) {
+        .icon-btn {
+          width: 40px;
+        }
+      }
+    `,
+  ];
+
+  declare stage: Stage;
+
+  #run(id: ActionId): void {
+    this.stage.input.actions.get(id)?.run();
+  }
+
+  #key(event: KeyboardEvent): void {
+    const step = { ArrowDown: 1, ArrowRight: 1, ArrowUp: -1, ArrowLeft: -1 }[event.key];
+    if (step === undefined) return;
+    event.preventDefault();
+    event.stopPropagation();
+    const at = TOOLS.findIndex((t) => t.id === this.stage.input.tool.value);
+    const next = TOOLS[(at + step + TOOLS.length) % TOOLS.length]!;
+    this.#run(next.id);
+    void this.updateComplete.then(() => this.renderRoot.querySelector<HTMLElement>(`.${next.id}`)?.focus());
+  }
+
+  protected override render(): TemplateResult {
+    const { input, session } = this.stage;
+    const editable = session.canEdit.value;
+    return html`
+      <div role="radiogroup" aria-label="Tool" @keydown=${this.#key}>
+        ${TOOLS.map((t) => {
+          const on = input.tool.value === t.id;
+          return html`
+            <button
+              class="icon-btn ${t.id}"
+              role="radio"
+              aria-checked=${on}
+              aria-label=${t.label}
+              title=${keyText(t.label, input.actions.get(t.id))}
+              tabindex=${on ? 0 : -1}
+              ?disabled=${!editable && t.id !== "select"}
+              @click=${() => this.#run(t.id)}
+            >
+              ${icon(t.icon)}
+            </button>
+          `;
+        })}
+      </div>
+      <hr />
+      ${this.#history("undo", "Undo", session.doc.canUndo.value && editable)}
+      ${this.#history("redo", "Redo", session.doc.canRedo.value && editable)}
+    `;
+  }
+
+  #history(id: "undo" | "redo", label: string, enabled: boolean): TemplateResult {
+    return html`
+      <button
+        class="icon-btn"
+        aria-label=${label}
+        title=${keyText(label, this.stage.input.actions.get(id))}
+        ?disabled=${!enabled}
+        @click=${() => this.#run(id)}
+      >
+        ${icon(id)}
+      </button>
+    `;
+  }
+}
+
+customElements.define("esk-tools", EskTools);

@@ -1,0 +1,218 @@
+import "@awesome.me/webawesome/dist/components/dropdown/dropdown.js";
+import "@awesome.me/webawesome/dist/components/dropdown-item/dropdown-item.js";
+import { css, html, type TemplateResult } from "lit";
+import { icon } from "./icons.ts";
+import "./people.ts";
+import { SignalElement } from "./signal-element.ts";
+import type { Stage } from "./stage.ts";
+import { blurOnEnter } from "./stroke-panel.ts";
+import { shared } from "./styles/shared.ts";
+import { chooseTheme, type ThemeChoice, themeChoice } from "./theme.ts";
+
+/** What the top bar asks of the page. */
+export type PageCommand = "share" | "profile" | "help" | "panel" | "download" | "about";
+
+const THEMES: readonly { readonly value: ThemeChoice; readonly label: string }[] = [
+  { value: "system", label: "Colours like the system" },
+  { value: "light", label: "Light" },
+  { value: "dark", label: "Dark" },
+];
+
+/** Title, saved state, people, sharing, menu. Fires `command`. */
+export class EskTopBar extends SignalElement {
+  static override properties = { stage: { attribute: false }, panelOpen: { type: Boolean } };
+  static override styles = [
+    shared,
+    css`
+      :host {
+        display: flex;
+        justify-content: space-between;
+        align-items: flex-start;
+        gap: var(--esk-gap);
+        pointer-events: none;
+      }
+      .panel {
+        display: flex;
+        align-items: center;
+        gap: 4px;
+        height: 48px;
+        padding: 0 6px;
+        pointer-events: auto;
+        min-width: 0;
+      }
+      .home {
+        flex: none;
+        display: grid;
+        place-items: center;
+        width: 36px;
+        height: 36px;
+        border-radius: 10px;
+      }
+      .home:hover {
+        background: var(--esk-hover);
+      }
+      .title {
+        width: 190px;
+        min-width: 60px;
+        height: 34px;
+        border-color: transparent;
+        background: transparent;
+        font-size: 0.9375rem;
+        font-weight: 620;
+        text-overflow: ellipsis;
+      }
+      .title:hover:not(:disabled),
+      .title:focus {
+        border-color: var(--esk-line-strong);
+        background: var(--esk-field);
+      }
+      .title:disabled {
+        opacity: 1;
+      }
+      .state {
+        display: inline-flex;
+        align-items: center;
+        gap: 6px;
+        padding: 0 10px 0 8px;
+        font-size: 0.8125rem;
+        white-space: nowrap;
+        color: var(--esk-quiet);
+      }
+      .state.ok .icon {
+        color: var(--esk-ok);
+      }
+      .state.warn {
+        color: var(--esk-warn);
+      }
+      .state.bad {
+        color: var(--esk-bad);
+      }
+      .state.busy .icon {
+        animation: pulse 1.1s ease-in-out infinite alternate;
+      }
+      @keyframes pulse {
+        from {
+          opacity: 0.35;
+        }
+      }
+      esk-people {
+        padding: 0 6px 0 4px;
+      }
+      .theme {
+        font-size: 0.75rem;
+        color: var(--esk-quiet);
+        padding: 4px 12px;
+      }
+      wa-dropdown-item .icon {
+        color: var(--esk-quiet);
+      }
+      @media (max-width: 720px) {
+        :host {
+          gap: 6px;
+        }
+        .panel {
+          height: 44px;
+          padding: 0 4px;
+        }
+        .title {
+          width: auto;
+          flex: 1 1 90px;
+          padding: 0 4px;
+        }
+        .left {
+          flex: 1 1 auto;
+        }
+        .state span,
+        .share span {
+          display: none;
+        }
+        .state {
+          padding: 0 6px;
+        }
+        .share {
+          width: 36px;
+          padding: 0;
+        }
+        esk-people {
+          padding: 0 2px;
+        }
+      }
+    `,
+  ];
+
+  declare stage: Stage;
+  declare panelOpen: boolean;
+
+  #command(command: PageCommand): void {
+    this.dispatchEvent(new CustomEvent<PageCommand>("command", { detail: command }));
+  }
+
+  #menu(event: CustomEvent<{ item: { value: string } }>): void {
+    const value = event.detail.item.value;
+    const theme = THEMES.find((t) => `theme-${t.value}` === value);
+    if (theme) chooseTheme(theme.value);
+    else this.#command(value as PageCommand);
+  }
+
+  protected override render(): TemplateResult {
+    const { session } = this.stage;
+    const title = session.doc.doc.value?.settings.title ?? "";
+    return html`
+      <div class="panel left">
+        <a class="home" href="/" title="All terrains" aria-label="Start page"><img src="/favicon.svg" alt="" width="24" height="24" /></a>
+        <input
+          class="field title"
+          aria-label="Title of the terrain"
+          maxlength="80"
+          placeholder="Untitled terrain"
+          .value=${title}
+          ?disabled=${!session.canEdit.value}
+          @change=${(e: Event) => session.setTerrain({ title: (e.target as HTMLInputElement).value.trim() })}
+          @keydown=${blurOnEnter}
+        />
+        ${this.#state()}
+      </div>
+      <div class="panel">
+        <esk-people .stage=${this.stage} @profile=${() => this.#command("profile")}></esk-people>
+        <button class="btn primary share" aria-label="Share" @click=${() => this.#command("share")}>
+          ${icon("share")} <span>Share</span>
+        </button>
+        <button
+          class="icon-btn small"
+          aria-label="Inspector"
+          title="Inspector (I)"
+          aria-pressed=${this.panelOpen}
+          @click=${() => this.#command("panel")}
+        >
+          ${icon("settings")}
+        </button>
+        ${this.#more()}
+      </div>
+    `;
+  }
+
+  #state(): TemplateResult {
+    const { tone, icon: name, text, detail } = this.stage.session.status.value;
+    return html`<span class="state ${tone}" role="status" title=${detail} data-tone=${tone}>
+      ${icon(name)}<span>${text}</span>
+    </span>`;
+  }
+
+  #more(): TemplateResult {
+    return html`
+      <wa-dropdown placement="bottom-end" @wa-select=${this.#menu}>
+        <button slot="trigger" class="icon-btn small" aria-label="More" title="More">${icon("ellipsis")}</button>
+        <wa-dropdown-item value="download">Download a copy (.esker)</wa-dropdown-item>
+        <wa-dropdown-item value="help">Keys and help</wa-dropdown-item>
+        <wa-dropdown-item value="about">About this terrain</wa-dropdown-item>
+        ${THEMES.map(
+          (t) => html`<wa-dropdown-item type="checkbox" value=${`theme-${t.value}`} ?checked=${themeChoice.value === t.value}>
+            ${t.label}
+          </wa-dropdown-item>`,
+        )}
+      </wa-dropdown>
+    `;
+  }
+}
+
+customElements.define("esk-top-bar", EskTopBar);

@@ -1,0 +1,93 @@
+import "@awesome.me/webawesome/dist/components/dropdown/dropdown.js";
+import "@awesome.me/webawesome/dist/components/dropdown-item/dropdown-item.js";
+import { css, html, type TemplateResult } from "lit";
+import type { Scene } from "../core/types.ts";
+import { icon } from "./icons.ts";
+import { keyText } from "./keys.ts";
+import "./segmented.ts";
+import { SignalElement } from "./signal-element.ts";
+import type { Stage } from "./stage.ts";
+import { shared } from "./styles/shared.ts";
+
+const OVERLAYS: readonly { readonly value: Scene["overlay"]; readonly label: string }[] = [
+  { value: "none", label: "Plain ground" },
+  { value: "contours", label: "Contour lines" },
+  { value: "slope", label: "Steepness" },
+  { value: "patches", label: "Levels of detail" },
+];
+
+/** How the terrain is looked at: camera mode, the whole terrain, overlays. */
+export class EskViewBar extends SignalElement {
+  static override properties = { stage: { attribute: false } };
+  static override styles = [
+    shared,
+    css`
+      :host {
+        display: flex;
+        align-items: center;
+        gap: 2px;
+        padding: 4px;
+      }
+      esk-segmented {
+        margin-right: 2px;
+      }
+    `,
+  ];
+
+  declare stage: Stage;
+
+  #run(id: string): void {
+    const actions: ReadonlyMap<string, { run(): void }> = this.stage.input.actions;
+    actions.get(id)?.run();
+  }
+
+  #overlay(event: CustomEvent<{ item: { value: string } }>): void {
+    const value = event.detail.item.value;
+    if (value === "strokes") this.stage.showStrokes.value = !this.stage.showStrokes.value;
+    else this.stage.setOverlay(value as Scene["overlay"]);
+  }
+
+  protected override render(): TemplateResult {
+    const { camera, input, overlay, showStrokes, renderer } = this.stage;
+    const flat = renderer.value?.kind === "map";
+    const modes = [
+      { value: "orbit", label: "Orbit", icon: "orbit", title: keyText("Orbit", input.actions.get("camera-orbit")) },
+      { value: "fly", label: "Fly", icon: "fly", title: keyText("Fly", input.actions.get("camera-fly")) },
+      { value: "map", label: "Map", icon: "map", title: keyText("Map", input.actions.get("camera-map")) },
+    ];
+    return html`
+      ${
+        flat
+          ? null
+          : html`<esk-segmented
+              compact
+              label="Camera"
+              .segments=${modes}
+              .value=${camera.state.value.mode}
+              @pick=${(e: CustomEvent<string>) => this.#run(`camera-${e.detail}`)}
+            ></esk-segmented>`
+      }
+      <button
+        class="icon-btn small"
+        aria-label="See the whole terrain"
+        title=${keyText("See the whole terrain", input.actions.get("home"))}
+        @click=${() => this.#run("home")}
+      >
+        ${icon("frame")}
+      </button>
+      <wa-dropdown placement="top-end" @wa-select=${this.#overlay}>
+        <button slot="trigger" class="icon-btn small" aria-label="Overlays" title="Overlays" aria-pressed=${overlay.value !== "none"}>
+          ${icon("layers")}
+        </button>
+        ${OVERLAYS.map(
+          (o) => html`
+            <wa-dropdown-item type="checkbox" value=${o.value} ?checked=${overlay.value === o.value}>${o.label}</wa-dropdown-item>
+          `,
+        )}
+        <wa-dropdown-item type="checkbox" value="strokes" ?checked=${showStrokes.value}>Show strokes</wa-dropdown-item>
+      </wa-dropdown>
+    `;
+  }
+}
+
+customElements.define("esk-view-bar", EskViewBar);

@@ -1,0 +1,50 @@
+/** Numbers and times in words. */
+
+/** How long ago, in words. */
+export function ago(ms: number): string {
+  const minutes = Math.round(ms / 60_000);
+  if (minutes < 2) return "just now";
+  if (minutes < 60) return `${minutes} minutes ago`;
+  const hours = Math.round(minutes / 60);
+  if (hours < 24) return hours === 1 ? "an hour ago" : `${hours} hours ago`;
+  const days = Math.round(hours / 24);
+  if (days < 14) return days === 1 ? "yesterday" : `${days} days ago`;
+  return new Date(Date.now() - ms).toLocaleDateString(undefined, { day: "numeric", month: "short", year: "numeric" });
+}
+
+/** A length in metres, with as many digits as help: "8.4 m", "312 m", "4.1 km". */
+export function metres(m: number): string {
+  const a = Math.abs(m);
+  if (a >= 1000) return `${(m / 1000).toFixed(a >= 10_000 ? 0 : 1)} km`;
+  return `${m.toFixed(a < 10 ? 1 : 0)} m`;
+}
+
+/** A signed height: always metres, one digit below 100 m. */
+export function height(m: number): string {
+  const text = Math.abs(m) < 100 ? m.toFixed(1) : m.toFixed(0);
+  return `${text === "-0.0" ? "0.0" : text} m`;
+}
+
+const POINTS = ["north", "north-east", "east", "south-east", "south", "south-west", "west", "north-west"] as const;
+
+/** The compass point of an azimuth in degrees, clockwise from north. */
+export function compass(azimuthDeg: number): string {
+  return POINTS[Math.round((((azimuthDeg % 360) + 360) % 360) / 45) % 8] ?? "north";
+}
+
+/** The largest round number (1, 2, 5 times a power of ten) that is not above `x`; 0 for no positive number. */
+export function roundBelow(x: number): number {
+  if (!(x > 0) || !Number.isFinite(x)) return 0;
+  const power = 10 ** Math.floor(Math.log10(x));
+  const lead = x / power;
+  return (lead >= 5 ? 5 : lead >= 2 ? 2 : 1) * power;
+}
+
+/** The initials of a name for an avatar. */
+export function initials(name: string): string {
+  const parts = name.trim().split(/\s+/).filter(Boolean);
+  if (parts.length === 0) return "";
+  const first = [...parts[0]!][0] ?? "";
+  const last = parts.length > 1 ? ([...parts[parts.length - 1]!][0] ?? "") : "";
+  return (first + last).toUpperCase();
+}
