@@ -18,7 +18,7 @@ PACKAGE = ROOT / "backend" / "esker"
 
 # A room may import the rooms to its left and itself (DESIGN 2).
 LAYERS: tuple[frozenset[str], ...] = (
-    frozenset({"contract"}),
+    frozenset({"contract", "version"}),
     frozenset({"contract_emit", "grid"}),
     frozenset({"document"}),
     frozenset({"templates"}),
@@ -26,6 +26,7 @@ LAYERS: tuple[frozenset[str], ...] = (
     frozenset({"session", "terrain"}),
     frozenset({"client", "tls"}),
     frozenset({"server"}),
+    frozenset({"run"}),
     frozenset({"bench"}),
     frozenset({"cli"}),
     frozenset({"__main__"}),
@@ -38,7 +39,7 @@ ONLY = {
     "fastapi": {"server"},
     "starlette": {"server"},
     "moderngl": {"render"},
-    "uvicorn": {"server", "cli"},
+    "uvicorn": {"run"},
     "sqlite3": {"store"},
 }
 

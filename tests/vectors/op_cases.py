@@ -23,7 +23,6 @@ def _applies() -> list[tuple[str, Json, Json]]:
     set_ = "stroke.set"
     return [
         ("begin on an empty terrain", document(), op("stroke.begin", stroke=NEW)),
-        ("begin with defaults left out", document(), op("stroke.begin", stroke=_short())),
         (
             "append continues the curve",
             BASE,
@@ -56,7 +55,6 @@ def _applies() -> list[tuple[str, Json, Json]]:
             BASE,
             op(set_, stroke="a", fields={"right": {"slope_deg": 60, "extent_m": 1, "shape": "convex"}}),
         ),
-        ("a flank's own defaults are filled in", BASE, op(set_, stroke="a", fields={"right": {}})),
         ("set the whole curve", BASE, op(set_, stroke="a", fields={"curve": [[0, 0.5], [1, 0.5]]})),
         ("lock", BASE, op(set_, stroke="a", fields={"locked": True})),
         ("unlock alone", BASE, op(set_, stroke="l", fields={"locked": False})),
@@ -136,10 +134,6 @@ def _refuses() -> list[tuple[str, Json, Json, str]]:
             "unknown_stroke",
         ),
     ]
-
-
-def _short() -> Json:
-    return {"id": "s", "kind": "level", "first": [1, 2, 3], "last": [4, 5, 6], "curve": []}
 
 
 def _set(stroke_id: str, **fields: Any) -> Json:

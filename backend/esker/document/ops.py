@@ -178,7 +178,7 @@ class _Editor:
         self._touch(old)
         del self.strokes[stroke_id]
         self.deleted[stroke_id] = old
-        while len(self.deleted) > self.limits.strokes:
+        while len(self.deleted) > c.MAX_STROKES:  # never a setting: a replay must forget what was forgotten then
             del self.deleted[next(iter(self.deleted))]
 
     def _restore(self, stroke_id: str) -> None:

@@ -1,0 +1,97 @@
+"""``esker serve | solve | bench | --version``; ``python -m esker`` is the same."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import importlib.util
+import logging
+import sys
+from pathlib import Path
+
+from esker import contract as c
+from esker.version import VERSION
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Runs a command; returns the exit status."""
+    arguments = sys.argv[1:] if argv is None else argv
+    # What follows `solve` and `bench NAME` belongs to those commands, options and --help included.
+    if arguments[:1] == ["solve"]:
+        return _run("esker.solve.command", arguments[1:])
+    if arguments[:1] == ["bench"] and len(arguments) > 1 and not arguments[1].startswith("-"):
+        return _bench(arguments[1], arguments[2:])
+    parsed = _parser().parse_args(arguments)
+    if parsed.command == "serve":
+        return _serve(parsed)
+    if parsed.command == "bench":
+        sys.stdout.write("".join(f"{name}\n" for name in _benches()))
+        return 0
+    _parser().print_help()
+    return 2
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="esker", description="Sketch one terrain together.")
+    parser.add_argument("--version", action="version", version=f"esker {VERSION}")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND")
+    serve = commands.add_parser("serve", help="run the server", description="Run the server. Every option has an "
+                                "environment variable: --port is ESKER_PORT, and so on.")  # fmt: skip
+    serve.add_argument("--host", help="address to listen on (default 127.0.0.1)")
+    serve.add_argument("--port", type=int, help="port to listen on (default 8000; 0: any free one)")
+    serve.add_argument("--data", type=Path, metavar="DIR", help="folder of the database (default ./data)")
+    serve.add_argument("--lan", action="store_true", default=None, help="HTTPS for every device on this network")
+    serve.add_argument("--public-url", metavar="URL", help="where people reach this server, behind a proxy")
+    serve.add_argument("--level", type=int, help=f"finest solved level, 0 to {c.MAX_LEVEL} (default {c.DEFAULT_LEVEL})")
+    serve.add_argument("--device", help="part of the name of the OpenCL device, or numpy")
+    serve.add_argument("--threads", type=int, help="threads of a CPU device (default: cores - 1)")
+    serve.add_argument("--log-level", choices=("debug", "info", "warning", "error"))
+    commands.add_parser("solve", help="solve a terrain file into heights (see esker solve --help)", add_help=False)
+    commands.add_parser("bench", help="measure: esker bench NAME --json (without NAME: the list)", add_help=False)
+    return parser
+
+
+def _serve(parsed: argparse.Namespace) -> int:
+    from esker.settings import BadSetting, from_environment
+
+    try:
+        settings = from_environment(**{k: v for k, v in vars(parsed).items() if k != "command"})
+    except BadSetting as error:
+        return _fail(str(error))
+    logging.basicConfig(
+        level=settings.log_level.upper(), format="%(asctime)s %(levelname).1s %(name)s: %(message)s", stream=sys.stderr
+    )
+    logging.getLogger("uvicorn").setLevel("WARNING")
+    from esker.run import CannotServe, serve
+    from esker.store.journal import CorruptDatabase
+
+    try:
+        serve(settings)
+    except (CannotServe, CorruptDatabase) as error:
+        return _fail(str(error))
+    except OSError as error:
+        return _fail(f"Cannot use the data folder {settings.data}: {error}")
+    return 0
+
+
+def _benches() -> list[str]:
+    folder = Path(__file__).parent / "bench"
+    return sorted(path.stem for path in folder.glob("*.py") if not path.stem.startswith("_"))
+
+
+def _bench(name: str, argv: list[str]) -> int:
+    if name not in _benches():
+        return _fail(f"There is no benchmark {name!r}. There are: {', '.join(_benches())}.")
+    return _run(f"esker.bench.{name}", argv)
+
+
+def _run(module: str, argv: list[str]) -> int:
+    if importlib.util.find_spec(module) is None:
+        return _fail(f"This installation lacks {module}.")
+    result: int = importlib.import_module(module).main(argv)
+    return result
+
+
+def _fail(message: str) -> int:
+    sys.stderr.write(f"esker: {message}\n")
+    return 1

@@ -1,0 +1,195 @@
+"""Puts the server together and runs it: journal, solver thread, tiles, HTTP (DESIGN 8)."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import socket
+import ssl
+import sys
+import threading
+import time
+from collections.abc import Callable
+from typing import Any, Final
+
+import segno
+import uvicorn
+from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
+
+from esker import contract as c
+from esker.document.ops import Limits
+from esker.server import create_app
+from esker.session.hub import Hub
+from esker.session.ports import Solver
+from esker.session.worker import Worker
+from esker.settings import Settings
+from esker.solve.solver import Solver as OpenClSolver
+from esker.store.access import Access
+from esker.store.journal import Journal
+from esker.tiles.delivery import ClientTiles, TileServer
+from esker.tls import CA_FILE, lan_address, server_context
+
+log = logging.getLogger("esker")
+
+BACKUP_SECONDS: Final = 3600.0
+GOODBYE_SECONDS: Final = 0.3
+"""Time for the farewells to leave before the sockets are closed."""
+HARD_MESSAGE_LIMIT: Final = 4 * c.MAX_MESSAGE_BYTES
+"""Above ``MAX_MESSAGE_BYTES`` a client gets a sentence (4007); above this the websocket library hangs up (1009)."""
+
+
+class CannotServe(Exception):
+    """The server cannot start; the message says why in one sentence."""
+
+
+class _Tiles:
+    """``session.ports.Tiles`` by the real tiles."""
+
+    def server(self, size_m: float, levels: int) -> TileServer:
+        return TileServer(size_m, levels)
+
+    def client(self, server: Any) -> ClientTiles:
+        return ClientTiles(server)
+
+
+class _WebSocketProtocol(WebSocketsSansIOProtocol):
+    """Lets the application drop a connection whose peer does not read."""
+
+    async def run_asgi(self) -> None:
+        self.scope["esker.abort"] = self.transport.abort  # type: ignore[typeddict-unknown-key]
+        await super().run_asgi()
+
+
+class _Server(uvicorn.Server):
+    """Says goodbye to the members of all rooms before the sockets are closed."""
+
+    def __init__(self, config: uvicorn.Config, hub: Hub, started: Callable[[], Any]) -> None:
+        super().__init__(config)
+        self._hub, self._announce = hub, started
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        await super().startup(sockets)
+        if self.started:
+            await self._announce()
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        await self._hub.close()
+        await asyncio.sleep(GOODBYE_SECONDS)
+        await super().shutdown(sockets)
+
+
+def serve(settings: Settings) -> None:
+    """Runs until SIGINT or SIGTERM. Raises CannotServe, store.journal.CorruptDatabase."""
+    host = "0.0.0.0" if settings.lan and settings.host == "127.0.0.1" else settings.host
+    address = lan_address() if settings.lan else ("127.0.0.1" if host in ("0.0.0.0", "::") else host)
+    listener = _listen(host, settings.port)
+    port = int(listener.getsockname()[1])
+    context = server_context(settings.data, address) if settings.lan else None
+    base = settings.public_url or f"{'https' if context else 'http'}://{address}:{port}"
+    journal = Journal(settings.data)
+    worker = Worker(lambda device: _solver(settings, device), settings.device)
+    backups = _Backups(journal)
+    try:
+        worker.start()
+        log.info("solver: %s, levels 0 to %d", worker.device_name, settings.level)
+        hub = Hub(
+            journal,
+            Access(journal),
+            worker,
+            _Tiles(),
+            levels=settings.level,
+            limits=Limits(settings.max_strokes, settings.max_points),
+            max_members=settings.max_members,
+        )
+        app = create_app(hub, settings.page, settings.data)
+
+        async def announce() -> None:
+            await _announce(hub, base, settings)
+
+        backups.start()
+        _Server(_config(app, settings, context), hub, announce).run(sockets=[listener])
+    finally:
+        backups.stop()
+        worker.stop()
+        journal.close()
+        listener.close()
+    log.info("stopped; everything is saved")
+
+
+def _solver(settings: Settings, device: str | None) -> Solver:
+    return OpenClSolver(device=device, max_level=settings.level, threads=settings.threads)
+
+
+def _listen(host: str, port: int) -> socket.socket:
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    listener = socket.socket(family, socket.SOCK_STREAM)
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listener.bind((host, port))
+    except OSError as error:
+        listener.close()
+        hint = "Another program uses it; choose another one with --port." if error.errno == 98 else str(error)
+        raise CannotServe(f"Cannot listen on {host}, port {port}. {hint}") from error
+    return listener
+
+
+def _config(app: Any, settings: Settings, context: ssl.SSLContext | None) -> uvicorn.Config:
+    config = uvicorn.Config(
+        app,
+        ws=_WebSocketProtocol,
+        ws_max_size=HARD_MESSAGE_LIMIT,
+        # Tiles are deflated already, and control texts are small: a second deflate costs more than it saves.
+        ws_per_message_deflate=False,
+        ws_ping_interval=20,
+        ws_ping_timeout=20,
+        http="httptools",
+        log_config=None,
+        access_log=False,
+        server_header=False,
+        timeout_graceful_shutdown=5,
+        forwarded_allow_ips=settings.forwarded_allow_ips,
+    )
+    config.load()
+    config.ssl = context
+    return config
+
+
+async def _announce(hub: Hub, base: str, settings: Settings) -> None:
+    """Makes a terrain and prints how to reach it."""
+    born, _, secret = await hub.create(c.Document(id="new"))
+    link = f"{base}/t/{born.id}#{secret}"
+    lines = ["", f"  Esker is ready: {base}", f"  A new terrain:  {link}"]
+    if settings.lan:
+        lines.append(f"  To have no warning, trust this certificate once on each device: {base}/{CA_FILE}")
+    sys.stdout.write("\n".join(lines) + "\n\n")
+    if settings.lan:
+        segno.make(link, error="l").terminal(out=sys.stdout, compact=True)
+    sys.stdout.flush()
+
+
+class _Backups:
+    """Copies the database at the start and every hour, in a thread of its own."""
+
+    def __init__(self, journal: Journal) -> None:
+        self._journal = journal
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="backup", daemon=True)
+
+    def start(self) -> None:
+        self._thread.start()
+
+    def stop(self) -> None:
+        self._stop.set()
+        if self._thread.is_alive():
+            self._thread.join(timeout=60)
+
+    def _run(self) -> None:
+        while True:
+            started = time.monotonic()
+            try:
+                path = self._journal.backup()
+                log.debug("backup %s in %.1f s", path, time.monotonic() - started)
+            except Exception as error:
+                log.error("the backup failed: %s", error)
+            if self._stop.wait(BACKUP_SECONDS):
+                return

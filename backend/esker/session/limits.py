@@ -1,0 +1,43 @@
+"""Rates (DESIGN 4). The clock is injected."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+
+@dataclass
+class TokenBucket:
+    """``rate`` tokens a second, at most ``burst`` saved up. Starts full."""
+
+    rate: float
+    burst: float
+    _tokens: float = field(default=-1.0, init=False)
+    _at: float = field(default=0.0, init=False)
+
+    def take(self, now: float, n: float = 1.0) -> bool:
+        """Takes ``n`` tokens at time ``now`` (seconds, never running backwards); False when there are too few."""
+        if self._tokens < 0:
+            self._tokens = self.burst
+        else:
+            self._tokens = min(self.burst, self._tokens + max(0.0, now - self._at) * self.rate)
+        self._at = now
+        if self._tokens < n:
+            return False
+        self._tokens -= n
+        return True
+
+
+class RateByKey:
+    """A bucket for each key (an address), forgetting keys whose bucket is full again."""
+
+    def __init__(self, rate: float, burst: float, most_keys: int = 10_000) -> None:
+        self._rate, self._burst, self._most = rate, burst, most_keys
+        self._buckets: dict[str, TokenBucket] = {}
+
+    def take(self, key: str, now: float) -> bool:
+        """One token of ``key``. When too many keys are known the oldest are forgotten."""
+        bucket = self._buckets.pop(key, None) or TokenBucket(self._rate, self._burst)
+        self._buckets[key] = bucket  # most recently used last
+        while len(self._buckets) > self._most:
+            del self._buckets[next(iter(self._buckets))]
+        return bucket.take(now)

@@ -1,0 +1,81 @@
+"""What the room needs from other rooms of the house, as protocols: so it can be tested without any of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from esker import contract as c
+from esker.store.journal import Loaded, Row
+
+
+class FramePlan(Protocol):
+    """A binary frame decided but not yet encoded. ``encode`` is pure and may run in any thread."""
+
+    def encode(self) -> bytes: ...
+
+
+class ClientTiles(Protocol):
+    """What one client holds and looks at (``tiles/delivery.py``)."""
+
+    def set_view(self, view: c.View) -> None: ...
+
+    def plan(self) -> Any: ...
+
+    def commit(self, plan: Any) -> None: ...
+
+
+class TileServer(Protocol):
+    """The tiles of one terrain (``tiles/delivery.py``)."""
+
+    def put_level(self, clock: int, level: int, heights: NDArray[np.float32], settled: bool) -> int: ...
+
+
+class Tiles(Protocol):
+    """Makes the two above."""
+
+    def server(self, size_m: float, levels: int) -> TileServer: ...
+
+    def client(self, server: TileServer) -> ClientTiles: ...
+
+
+class LevelResult(Protocol):
+    """One solved level (``solve/solver.py``)."""
+
+    @property
+    def level(self) -> int: ...
+
+    @property
+    def heights(self) -> NDArray[np.float32]: ...
+
+    @property
+    def settled(self) -> bool: ...
+
+
+class Solver(Protocol):
+    """The solver as the worker uses it (``solve/solver.py``)."""
+
+    @property
+    def device_name(self) -> str: ...
+
+    def steps(
+        self, strokes: Sequence[c.Stroke], settings: c.TerrainSettings, levels: int | None = None
+    ) -> Iterator[LevelResult]: ...
+
+
+SolverFactory = Callable[[str | None], Solver]
+"""Makes a solver for a device name (None: the default device). Called in the worker's thread."""
+
+
+class Journal(Protocol):
+    """The part of ``store.journal.Journal`` that a room uses."""
+
+    def append(self, terrain: str, rows: Sequence[Row], snapshot: c.Document | None = None) -> Future[None]: ...
+
+    def find(self, terrain: str, client: str, counter: int) -> int | None: ...
+
+    def load(self, terrain: str, upto: int | None = None) -> Loaded | None: ...

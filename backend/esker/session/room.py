@@ -1,0 +1,214 @@
+"""The room: one open terrain, the only owner of its document, members and tiles (DESIGN 8).
+
+Everything here runs in the event loop's thread; the journal's writer, the solver and the tile thread call back into
+it. ``core.py`` holds the rules; this file holds the timers.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable
+from concurrent.futures import Executor, Future
+from typing import Final
+
+from esker import contract as c
+from esker.contract import Role
+from esker.session import protocol
+from esker.session.core import Batch, RoomCore, RoomInfo
+from esker.session.feed import Stream, TileFeed
+from esker.session.members import Member
+from esker.session.outbox import Outbox
+from esker.session.ports import Journal, Tiles
+from esker.session.worker import Job, Worker
+
+log = logging.getLogger("esker.room")
+
+TICK: Final = c.TICK_MS / 1000
+PRESENCE_TICK: Final = 1 / c.PRESENCE_HZ
+
+
+class Guest:
+    """A member together with its tiles: what a connection holds on to."""
+
+    def __init__(self, member: Member, stream: Stream) -> None:
+        self.member, self.stream = member, stream
+
+
+class Room:
+    """Wires one ``RoomCore`` to the journal, the solver and the clock."""
+
+    def __init__(
+        self,
+        core: RoomCore,
+        *,
+        journal: Journal,
+        worker: Worker,
+        tiles: Tiles,
+        executor: Executor,
+        info: RoomInfo,
+        on_empty: Callable[[], None],
+    ) -> None:
+        self.core, self.info = core, info
+        self.id = core.document.id
+        self._journal, self._worker, self._on_empty = journal, worker, on_empty
+        self._loop = asyncio.get_running_loop()
+        size_m = core.document.settings.size_m
+        self._feed = TileFeed(tiles, size_m, info.levels, executor, self._loop, self._level_taken)
+        self._solve_client = worker.add(info.levels, self._feed.put, self._solve_failed)
+        self._tick_timer: asyncio.TimerHandle | None = None
+        self._tick_at = float("-inf")
+        self._presence_timer: asyncio.TimerHandle | None = None
+        self._solve_due = False
+        self._requested_clock = -1
+        self._progress = c.Progress(clock=core.head.clock, level=0, of=info.levels, settled=False)
+        self._progress_due = False
+        self._flushed = asyncio.Event()
+        self._flushed.set()
+        self.closed = False
+        self._request_solve()
+
+    # --- people -------------------------------------------------------------------------------------------------
+
+    def join(self, hello: c.Hello, role: Role, link: str, outbox: Outbox) -> Guest:
+        """Lets a client in. Raises Denied."""
+        member = self.core.join(hello, role, link, outbox, self.info)
+        outbox.message(self._progress)
+        guest = Guest(member, self._feed.add(outbox))
+        self._presence_soon()
+        return guest
+
+    def leave(self, guest: Guest) -> None:
+        """The connection of a client ended."""
+        self._feed.remove(guest.stream)
+        self.core.leave(guest.member)
+        self._presence_soon()
+        if not len(self.core.members):
+            self._on_empty()
+
+    def receive(self, guest: Guest, event: protocol.Event) -> None:
+        """What a member sent, after the protocol has checked it."""
+        match event:
+            case protocol.Accepted(ops):
+                if self.core.submit(guest.member, ops):
+                    self._ordered()
+            case protocol.Refused(op_id, code, message):
+                self.core.refuse(guest.member, op_id, code, message)
+            case protocol.Message(c.View() as view):
+                self._feed.view(guest.stream, view)
+            case protocol.Message(c.Credit() as credit):
+                self._feed.credit(guest.stream, credit.bytes)
+            case protocol.Message(c.Presence() as presence):
+                self.core.members.moved(guest.member, presence)
+                self._presence_soon()
+            case protocol.Message(c.Rename() as rename):
+                self.core.members.rename(guest.member, rename.name, rename.colour)
+                self._presence_soon()
+            case protocol.Reply(message):
+                guest.member.outbox.message(message)
+
+    def frame(self, guest: Guest) -> bytes | None:
+        """The binary frame that waits for this member's socket, if there is one."""
+        return self._feed.sent(guest.stream)
+
+    def _presence_soon(self) -> None:
+        if self._presence_timer is None and not self.closed:
+            self._presence_timer = self._loop.call_later(PRESENCE_TICK, self._presence_tick)
+
+    def _presence_tick(self) -> None:
+        self._presence_timer = None
+        if self.core.members.pending:
+            self.core.members.tick()
+        if self._progress_due:
+            self._send_progress()
+
+    # --- ticks --------------------------------------------------------------------------------------------------
+
+    def _ordered(self) -> None:
+        """Ops were ordered: they are committed with the next tick, and solved at once."""
+        if not self._solve_due:
+            self._solve_due = True
+            self._loop.call_soon(self._solve)
+        self._tick_soon()
+
+    def _tick_soon(self) -> None:
+        if self._tick_timer is None and self.core.waiting:
+            # An op that comes after a pause is committed at once (with all that is read in the same turn of the loop).
+            self._tick_timer = self._loop.call_at(max(self._loop.time(), self._tick_at + TICK), self._tick)
+
+    def _tick(self) -> None:
+        self._tick_timer = None
+        batch = self.core.take()
+        if batch is None:
+            return
+        self._tick_at = self._loop.time()
+        self._flushed.clear()
+        future = self._journal.append(self.id, batch.rows, batch.snapshot)
+        future.add_done_callback(lambda f: self._loop.call_soon_threadsafe(self._committed, batch, f))
+
+    def _committed(self, batch: Batch, future: Future[None]) -> None:
+        error = future.exception()
+        if error is None:
+            self.core.committed(batch)
+        else:
+            log.error("terrain %s: a commit failed: %s", self.id, error)
+            self.core.failed()
+            self._request_solve()
+        if self.core.waiting:
+            self._tick_soon()
+        else:
+            self._flushed.set()
+
+    # --- the ground ---------------------------------------------------------------------------------------------
+
+    def _solve(self) -> None:
+        self._solve_due = False
+        if self.core.geometry_clock > self._requested_clock:
+            self._request_solve()
+        elif self._progress.settled:
+            self._note_progress(self._progress.model_copy(update={"clock": self.core.head.clock}))
+
+    def _request_solve(self) -> None:
+        head = self.core.head
+        self._requested_clock = head.clock
+        self._worker.request(self._solve_client, Job(head.clock, tuple(head.strokes.values()), head.settings))
+
+    def _level_taken(self, clock: int, level: int, settled: bool) -> None:
+        """A level became tiles. An op that does not touch the ground leaves an older solve as good as new."""
+        if clock >= self.core.geometry_clock:
+            clock = self.core.head.clock
+        done = settled and level >= self.info.levels
+        self._note_progress(c.Progress(clock=clock, level=level, of=self.info.levels, settled=done))
+
+    def _note_progress(self, progress: c.Progress) -> None:
+        self._progress, self._progress_due = progress, True
+        self._presence_soon()
+
+    def _send_progress(self) -> None:
+        self._progress_due = False
+        text = self._progress.model_dump_json()
+        for member in self.core.members:
+            member.outbox.push(text)
+
+    def _solve_failed(self, clock: int, note: str) -> None:
+        """Called in the solver's thread."""
+        progress = c.Progress(clock=clock, level=0, of=self.info.levels, settled=False, note=note)
+        self._loop.call_soon_threadsafe(self._note_progress, progress)
+
+    # --- the end ------------------------------------------------------------------------------------------------
+
+    async def flush(self) -> None:
+        """Returns when every op that was ordered so far is committed or refused."""
+        await self._flushed.wait()
+        while self.core.waiting:
+            self._flushed.clear()
+            self._tick_soon()
+            await self._flushed.wait()
+
+    def shut(self) -> None:
+        """Stops the timers and the solver's work for this room. Call ``flush`` first."""
+        self.closed = True
+        self._worker.remove(self._solve_client)
+        for timer in (self._tick_timer, self._presence_timer):
+            if timer is not None:
+                timer.cancel()
