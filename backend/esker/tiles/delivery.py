@@ -21,7 +21,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from esker.contract import FrameKind, Predictor, View
+from esker.contract import DEFAULT_LEVEL, FrameKind, Predictor, View
 from esker.grid import TileKey
 from esker.tiles.codec import Ints, child_window, pack, predict
 from esker.tiles.frame import FrameHead, TileRecord, write_frame, write_tile
@@ -138,6 +138,11 @@ class TileServer:
         """
         return self.pyramid.put(clock, level, heights, settled)
 
+    def settled(self) -> bool:
+        """True when every level is final for one and the same clock."""
+        levels = [self.pyramid.level(level) for level in range(self.levels + 1)]
+        return all(level is not None and level.settled for level in levels) and len({v.clock for v in levels if v}) == 1
+
     def lineage(self) -> list[Counts]:
         """Per level, (2^l, 2^l): the newest version among a tile's ancestors, itself not counted."""
         if self._lineage_stamp != self.pyramid.stamp:
@@ -154,10 +159,15 @@ class TileServer:
 
 
 class ClientTiles:
-    """What one client holds and wants. Mutable; used from the room's thread; one plan is outstanding at a time."""
+    """What one client holds and wants. Mutable; used from the room's thread; one plan is outstanding at a time.
 
-    def __init__(self, tiles: TileServer) -> None:
+    ``rest_level``: once the ground is settled and the view is served, the client gets every other tile up to this
+    level too, so that a turning camera finds full detail and all pages answer ``heightAt`` alike everywhere; -1 never.
+    """
+
+    def __init__(self, tiles: TileServer, rest_level: int = DEFAULT_LEVEL) -> None:
         self._server = tiles
+        self._rest_level = min(rest_level, tiles.levels)
         n = tiles.levels + 1
         self._held: list[Counts] = [np.zeros((1 << level, 1 << level), dtype=np.uint32) for level in range(n)]
         """Version that the client holds, 0 for none."""
@@ -196,7 +206,7 @@ class ClientTiles:
         """The most useful next frame, or None when there is nothing to send now. Cheap; changes nothing held.
 
         Levels coarse to fine: a LEVEL frame where a newer put waits; then FILL frames for tiles that came into view,
-        coarse to fine and by projected error.
+        coarse to fine and by projected error; then, when the ground is settled, for all others.
         """
         pyramid = self._server.pyramid
         if self._idle_stamp == pyramid.stamp and not self._view_changed:
@@ -207,9 +217,14 @@ class ClientTiles:
             if plan is not None:
                 return plan
         for level in range(self._server.levels + 1):
-            plan = self._plan_fill(level)
+            plan = self._plan_fill(level, self._wanted[level])
             if plan is not None:
                 return plan
+        if self._server.settled():
+            for level in range(self._rest_level + 1):
+                plan = self._plan_fill(level, np.True_)
+                if plan is not None:
+                    return plan
         self._idle_stamp = pyramid.stamp
         return None
 
@@ -268,16 +283,17 @@ class ClientTiles:
         drop = stale & (held > 0) & ~send
         preview = bool(held.any()) and (self._moved[index] or level.settled != self._settled[index])
         if not send.any() and not drop.any() and not preview:
-            self._stamps[index] = level.stamp  # nothing that the client shows differs from this put
+            # Nothing that the client shows differs from this put.
+            self._stamps[index], self._moved[index], self._settled[index] = level.stamp, False, level.settled
             return None
         return self._frame(FrameKind.LEVEL, level, _keys(index, send), _keys(index, drop))
 
-    def _plan_fill(self, index: int) -> FramePlan | None:
+    def _plan_fill(self, index: int, wanted: Mask | np.bool_) -> FramePlan | None:
         level = self._server.pyramid.level(index)
         if level is None:
             return None
         held = self._held[index]
-        send = self._wanted[index] & (held == 0)
+        send = wanted & (held == 0)
         if not send.any():
             return None
         send &= self._parents_held(index)

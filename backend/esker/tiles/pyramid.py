@@ -48,10 +48,12 @@ def quantise(heights: NDArray[np.float32], level: int, size_m: float, kept: Ints
     made per sample of the level, so the shared edges of neighbouring tiles stay equal. Raises ValueError on NaN and
     infinity.
     """
-    steps = heights * np.float32(1.0 / grid.quantum(level, size_m))
-    np.clip(steps, -SAMPLE_LIMIT, SAMPLE_LIMIT, out=steps)  # lets NaN through
-    if not np.isfinite(float(steps.sum(dtype=np.float64))) or not np.isfinite(heights).all():
+    if not np.isfinite(heights).all():
         raise ValueError(f"level {level} has heights that are not finite")
+    quantum = grid.quantum(level, size_m)
+    bound = np.float32(SAMPLE_LIMIT * quantum)
+    steps = np.clip(heights, -bound, bound) * np.float32(1.0 / quantum)
+    np.clip(steps, -SAMPLE_LIMIT, SAMPLE_LIMIT, out=steps)  # the product may round beyond the limit
     if kept is None:
         return np.asarray(np.rint(steps), dtype=np.int32)
     moved = np.abs(steps - kept) >= DEAD_ZONE

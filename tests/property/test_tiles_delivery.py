@@ -1,0 +1,309 @@
+"""Random solves, views and interruptions: what clients hold is whole, seamless and in the end the newest
+(SPEC T7 to T14)."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterable
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from esker import grid
+from esker.contract import FrameKind, View
+from esker.grid import TileKey
+from esker.tiles.decoder import FrameDecoder
+from esker.tiles.delivery import ClientTiles, FramePlan, TileServer
+
+SIZE_M = 512.0
+LEVELS = 4
+
+
+class Ground:
+    """A ground that edits change locally, seen at every level; previews of coarse levels are a little wrong."""
+
+    def __init__(self, rng: random.Random) -> None:
+        self.rng = rng
+        n = grid.samples(LEVELS)
+        self.fine = np.zeros((n, n), dtype=np.float32)
+
+    def edit(self) -> None:
+        n = self.fine.shape[0]
+        r, c, w = self.rng.randrange(n), self.rng.randrange(n), self.rng.choice([3, 9, 40, 200])
+        window = self.fine[max(0, r - w) : r + w, max(0, c - w) : c + w]
+        y, x = np.mgrid[0 : window.shape[0], 0 : window.shape[1]]
+        bump = np.sin(np.pi * y / window.shape[0]) * np.sin(np.pi * x / window.shape[1])
+        window += np.float32(self.rng.uniform(-30, 30)) * bump.astype(np.float32)
+
+    def level(self, level: int, settled: bool) -> NDArray[np.float32]:
+        out = self.fine[:: 1 << (LEVELS - level), :: 1 << (LEVELS - level)].copy()
+        if not settled:
+            out *= np.float32(1 - 0.02 * (LEVELS - level))
+        return out
+
+
+class Client:
+    """A client's half on the server, and the decoder that the page would run."""
+
+    def __init__(self, server: TileServer, rest_level: int = 4) -> None:
+        self.server = server
+        self.tiles = ClientTiles(server, rest_level)
+        self.decoder = FrameDecoder()
+        self.waiting: FramePlan | None = None
+        self.log: list[tuple[FrameKind, int]] = []
+
+    def begin(self) -> bool:
+        """Plans a frame, as the room does before it hands the plan to an encoding thread."""
+        if self.waiting is None:
+            self.waiting = self.tiles.plan()
+        return self.waiting is not None
+
+    def finish(self) -> None:
+        """The frame was coded and sent; the ground may have changed meanwhile."""
+        plan = self.waiting
+        if plan is None:
+            return
+        self.waiting = None
+        self.decoder.decode(plan.encode())
+        self.tiles.commit(plan)
+        self.log.append((plan.kind, plan.level.level))
+        self.check()
+
+    def drain(self) -> None:
+        self.finish()
+        while self.begin():
+            self.finish()
+
+    def check(self) -> None:
+        held = self.decoder.held
+        assert self.tiles.held() == {k: t.version for k, t in held.items()}
+        assert all(k.level == 0 or k.parent() in held for k in held)
+        for key, tile in held.items():
+            east, north = held.get(key._replace(x=key.x + 1)), held.get(key._replace(y=key.y + 1))
+            assert east is None or np.array_equal(tile.samples[:, -1], east.samples[:, 0]), key
+            assert north is None or np.array_equal(tile.samples[-1], north.samples[0]), key
+
+    def check_newest(self) -> None:
+        held = self.decoder.held
+        for level, wanted in enumerate(self.tiles.wanted()):
+            newest = self.server.pyramid.level(level)
+            assert newest is not None
+            for y, x in np.argwhere(wanted):
+                assert TileKey(level, int(x), int(y)) in held
+        for key, tile in held.items():
+            newest = self.server.pyramid.level(key.level)
+            assert newest is not None
+            r, c = 64 * key.y, 64 * key.x
+            assert np.array_equal(tile.samples, newest.samples[r : r + 65, c : c + 65])
+            assert tile.version == newest.versions[key.y, key.x]
+
+
+def a_view(rng: random.Random) -> View:
+    eye = (rng.uniform(-200, 700), rng.uniform(-200, 700), rng.uniform(5, 400))
+    target = (rng.uniform(0, 512), rng.uniform(0, 512), 0.0)
+    return View(eye=eye, target=target, width=800, height=600, tau_px=rng.choice([0.5, 1.5, 4.0]))
+
+
+def solve(server: TileServer, ground: Ground, clock: int, settled: bool, levels: Iterable[int]) -> None:
+    for level in levels:
+        server.put_level(clock, level, ground.level(level, settled), settled)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_random_sessions_end_with_the_newest_ground(seed: int) -> None:
+    rng = random.Random(seed)
+    server, ground = TileServer(SIZE_M, LEVELS), Ground(rng)
+    clients = [Client(server) for _ in range(3)]
+    for clock in range(1, 22):
+        ground.edit()
+        for level in range(rng.choice([1, 2, 3, LEVELS + 1, LEVELS + 1])):
+            server.put_level(clock, level, ground.level(level, False), False)
+            for client in clients:
+                if rng.random() < 0.5:
+                    client.finish()
+                if rng.random() < 0.6:
+                    client.begin()
+        for client in clients:
+            if rng.random() < 0.3:
+                client.tiles.set_view(a_view(rng))
+            if rng.random() < 0.1:
+                client.drain()
+    solve(server, ground, 99, False, range(LEVELS + 1))
+    solve(server, ground, 99, True, range(LEVELS + 1))
+    for client in clients:
+        client.drain()
+        client.check_newest()
+        assert client.tiles.plan() is None
+        assert len(client.decoder.held) == sum(4**level for level in range(LEVELS + 1))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_complete_preview_serves_every_wanted_tile(seed: int) -> None:
+    rng = random.Random(1000 + seed)
+    server, ground = TileServer(SIZE_M, LEVELS), Ground(rng)
+    client = Client(server)
+    client.tiles.set_view(a_view(rng))
+    for clock in range(6):
+        ground.edit()
+        solve(server, ground, clock, False, range(LEVELS + 1))
+        client.drain()
+        client.check_newest()
+
+
+def test_levels_go_coarse_to_fine_then_fills() -> None:
+    rng = random.Random(5)
+    server, ground = TileServer(SIZE_M, LEVELS), Ground(rng)
+    for _ in range(6):
+        ground.edit()
+    solve(server, ground, 1, False, range(LEVELS + 1))
+    client = Client(server)
+    client.drain()
+    assert client.log == [(FrameKind.LEVEL, 0), (FrameKind.LEVEL, 1), (FrameKind.LEVEL, 2)]
+    client.log.clear()
+    client.tiles.set_view(View(eye=(250.0, 200.0, 30.0), target=(260.0, 300.0, 0.0), tau_px=0.25))
+    client.drain()
+    assert client.log
+    assert all(kind == FrameKind.FILL for kind, _ in client.log)
+    assert [level for _, level in client.log] == sorted(level for _, level in client.log)
+
+
+def test_fills_go_by_projected_error() -> None:
+    rng = random.Random(6)
+    server, ground = TileServer(SIZE_M, LEVELS), Ground(rng)
+    for _ in range(8):
+        ground.edit()
+    client = Client(server, rest_level=-1)
+    solve(server, ground, 1, True, range(LEVELS + 1))
+    client.drain()
+    view = View(eye=(250.0, 200.0, 30.0), target=(260.0, 300.0, 0.0), tau_px=0.25)
+    client.tiles.set_view(view)
+    plan = client.tiles.plan()
+    assert plan is not None
+    from esker.tiles.quadtree import select
+
+    error = select(server.pyramid.bounds(), view)[1][plan.level.level]
+    order = [float(error[k.y, k.x]) for k in plan.keys]
+    assert len(order) > 3
+    assert order == sorted(order, reverse=True)
+
+
+def test_without_a_view_levels_0_to_2_and_nothing_else_while_unsettled() -> None:
+    server, ground = TileServer(SIZE_M, LEVELS), Ground(random.Random(1))
+    client = Client(server)
+    assert client.tiles.plan() is None
+    ground.edit()
+    solve(server, ground, 1, False, range(LEVELS + 1))
+    client.drain()
+    assert {k.level for k in client.decoder.held} == {0, 1, 2}
+    assert len(client.decoder.held) == 21
+
+
+def test_an_overtaken_level_is_never_sent() -> None:
+    server, ground = TileServer(SIZE_M, LEVELS), Ground(random.Random(2))
+    for _ in range(5):
+        ground.edit()
+    client = Client(server)
+    client.tiles.set_view(View(eye=(250.0, 200.0, 30.0), target=(260.0, 300.0, 0.0), tau_px=0.25))
+    solve(server, ground, 1, False, range(LEVELS + 1))
+    client.drain()
+    before = {k: t.version for k, t in client.decoder.held.items() if k.level > 1}
+    ground.fine += 5
+    solve(server, ground, 2, False, range(LEVELS + 1))
+    ground.fine += 5
+    solve(server, ground, 3, False, range(2))
+    client.drain()
+    assert {k: t.version for k, t in client.decoder.held.items() if k.level > 1} == before
+    solve(server, ground, 3, False, range(2, LEVELS + 1))
+    client.drain()
+    client.check_newest()
+
+
+def test_new_tiles_wait_while_their_ancestors_are_newer() -> None:
+    """A fine tile of an old solve beside moved neighbours would crack; elsewhere it may go."""
+    server, ground = TileServer(SIZE_M, LEVELS), Ground(random.Random(3))
+    y, x = np.mgrid[0 : ground.fine.shape[0], 0 : ground.fine.shape[1]]
+    ground.fine += np.where((x + y) % 2 == 0, 2.0, -2.0).astype(np.float32)
+    ground.fine[::2, ::2] = 0  # rough at the finest level only, everywhere
+    client = Client(server)
+    solve(server, ground, 1, False, range(LEVELS + 1))
+    client.drain()
+    ground.fine[:400, :400] += 50
+    solve(server, ground, 2, False, range(2))
+    client.drain()
+    client.tiles.set_view(View(eye=(256.0, 256.0, 700.0), target=(256.0, 257.0, 0.0), tau_px=0.25))
+    client.drain()
+    assert not any(k.level > 2 for k in client.decoder.held)
+    ground.fine[600:, 600:] += 1
+    solve(server, ground, 2, False, range(2, LEVELS + 1))
+    client.drain()
+    client.check_newest()
+    assert any(k.level == 4 for k in client.decoder.held)
+
+
+def test_dropping_a_tile_drops_its_descendants() -> None:
+    server, ground = TileServer(SIZE_M, LEVELS), Ground(random.Random(4))
+    for _ in range(9):
+        ground.edit()
+    client = Client(server, rest_level=-1)
+    client.tiles.set_view(View(eye=(100.0, 100.0, 30.0), target=(110.0, 140.0, 0.0), tau_px=0.25))
+    solve(server, ground, 1, False, range(LEVELS + 1))
+    client.drain()
+    assert any(k.level == 4 for k in client.decoder.held)
+    client.tiles.set_view(View(eye=(500.0, 500.0, 900.0), target=(1000.0, 1000.0, 1200.0)))
+    ground.fine += 9
+    solve(server, ground, 2, False, range(LEVELS + 1))
+    client.drain()
+    assert not any(k.level == 4 for k in client.decoder.held)
+    client.check_newest()
+
+
+def test_an_uncommitted_plan_changes_nothing_and_encodes_alike_in_any_thread() -> None:
+    server, ground = TileServer(SIZE_M, LEVELS), Ground(random.Random(7))
+    ground.edit()
+    solve(server, ground, 1, False, range(LEVELS + 1))
+    client = ClientTiles(server)
+    plan = client.plan()
+    assert plan is not None
+    first = plan.encode()
+    for _ in range(3):
+        ground.edit()
+    solve(server, ground, 2, True, range(LEVELS + 1))
+    server.cache = type(server.cache)()
+    with ThreadPoolExecutor(4) as pool:
+        assert set(pool.map(lambda _: plan.encode(), range(12))) == {first}
+    again = client.plan()
+    assert again is not None
+    assert again.level.level == 0
+    assert again.level.clock == 2
+    assert client.held() == {}
+
+
+def test_nothing_changed_means_nothing_sent() -> None:
+    server, ground = TileServer(SIZE_M, LEVELS), Ground(random.Random(8))
+    ground.edit()
+    solve(server, ground, 1, True, range(LEVELS + 1))
+    client = Client(server)
+    client.drain()
+    client.log.clear()
+    for level in range(LEVELS + 1):
+        assert server.put_level(2, level, ground.level(level, True), True) == 0
+    client.drain()
+    assert client.log == []
+
+
+def test_levels_that_moved_with_their_parents_are_confirmed() -> None:
+    """A fine level that ends where it was still needs its LEVEL frame: the page shows a preview of it."""
+    server, ground = TileServer(SIZE_M, LEVELS), Ground(random.Random(9))
+    for _ in range(4):
+        ground.edit()
+    solve(server, ground, 1, True, range(LEVELS + 1))
+    client = Client(server)
+    client.drain()
+    client.log.clear()
+    server.put_level(2, 0, ground.level(0, True) + 3, False)
+    client.drain()
+    solve(server, ground, 2, True, range(LEVELS + 1))
+    client.drain()
+    assert [(FrameKind.LEVEL, level) for level in range(1, LEVELS + 1)] == client.log[2:]

@@ -1,0 +1,77 @@
+"""Frames against the committed vectors, and what is malformed (SPEC T4, T6). The page reads the same file."""
+
+from __future__ import annotations
+
+import base64
+import json
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from tests.vectors import make_tiles
+
+from esker.tiles.decoder import FrameDecoder
+from esker.tiles.frame import FrameError
+
+VECTORS: dict[str, Any] = json.loads(make_tiles.PATH.read_text())
+SESSION = [base64.b64decode(step["frame"]) for step in VECTORS["sessions"][0]["steps"]]
+
+
+def opened() -> FrameDecoder:
+    decoder = FrameDecoder()
+    for frame in SESSION[:2]:
+        decoder.decode(frame)
+    return decoder
+
+
+@pytest.mark.parametrize("session", VECTORS["sessions"], ids=lambda s: str(s["name"]))
+def test_committed_frames_decode_to_what_they_say(session: dict[str, Any]) -> None:
+    decoder = FrameDecoder()
+    for step in session["steps"]:
+        assert make_tiles.told(decoder, base64.b64decode(step["frame"])) == step["decoded"]
+
+
+def test_regenerating_the_vectors_changes_no_sample() -> None:
+    """Deflate streams may differ between zlib builds, so frames are compared by what they decode to."""
+    new = make_tiles.build()
+    for mine, theirs in zip(new["sessions"], VECTORS["sessions"], strict=True):
+        assert [s["decoded"] for s in mine["steps"]] == [s["decoded"] for s in theirs["steps"]]
+    assert [m["name"] for m in new["malformed"]] == [m["name"] for m in VECTORS["malformed"]]
+
+
+@pytest.mark.parametrize("case", VECTORS["malformed"], ids=lambda c: str(c["name"]))
+def test_malformed_frames_are_refused_and_change_nothing(case: dict[str, str]) -> None:
+    decoder = opened()
+    before = dict(decoder.held)
+    with pytest.raises(FrameError):
+        decoder.decode(base64.b64decode(case["frame"]))
+    assert decoder.held == before
+    decoder.decode(SESSION[2])
+
+
+@given(st.integers(0, len(SESSION[2]) - 1))
+@settings(max_examples=60, deadline=None)
+def test_every_truncation_is_refused(length: int) -> None:
+    with pytest.raises(FrameError):
+        opened().decode(SESSION[2][:length])
+
+
+@given(st.lists(st.tuples(st.integers(0, len(SESSION[2]) - 1), st.integers(0, 255)), min_size=1, max_size=6))
+@settings(max_examples=100, deadline=None)
+def test_damaged_frames_decode_or_raise_frame_error(damage: list[tuple[int, int]]) -> None:
+    frame = bytearray(SESSION[2])
+    for at, value in damage:
+        frame[at] = value
+    decoder = opened()
+    try:
+        decoder.decode(bytes(frame))
+    except FrameError:
+        assert len(decoder.held) == 5
+
+
+def test_reset_forgets() -> None:
+    decoder = opened()
+    decoder.reset()
+    with pytest.raises(FrameError, match="not held"):
+        decoder.decode(SESSION[1])

@@ -1,0 +1,212 @@
+"""Quantised levels, versions and bounds (SPEC T3, T7, T15, Q6)."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from esker import grid
+from esker.grid import TileKey
+from esker.tiles.codec import SAMPLE_LIMIT
+from esker.tiles.delivery import EncodedTiles, TileServer
+from esker.tiles.pyramid import Pyramid, quantise
+
+SIZE_M = 1024.0
+LEVELS = 3
+
+
+def heights(level: int, seed: int = 0, scale: float = 40.0) -> NDArray[np.float32]:
+    n = grid.samples(level)
+    return (np.random.default_rng(seed).normal(size=(n, n)) * scale).astype(np.float32)
+
+
+def filled(seed: int = 0) -> Pyramid:
+    pyramid = Pyramid(SIZE_M, LEVELS)
+    for level in range(LEVELS + 1):
+        pyramid.put(1, level, heights(level, seed + level), True)
+    return pyramid
+
+
+def test_quantisation_is_half_to_even_in_steps_of_a_256th_of_a_cell() -> None:
+    q = grid.quantum(0, SIZE_M)
+    assert q == 1024 / 64 / 256
+    steps = np.array([0.5, 1.5, 2.5, -0.5, -1.5, 0.49, 0.51, 7.0], dtype=np.float32)
+    h = np.zeros((65, 65), dtype=np.float32)
+    h[0, :8] = steps * np.float32(q)
+    assert quantise(h, 0, SIZE_M)[0, :8].tolist() == [0, 2, 2, 0, -2, 0, 1, 7]
+
+
+def test_quantisation_saturates() -> None:
+    h = np.zeros((65, 65), dtype=np.float32)
+    h[0, 0], h[0, 1] = 3e38, -3e38
+    assert quantise(h, 0, SIZE_M)[0, :2].tolist() == [SAMPLE_LIMIT, -SAMPLE_LIMIT]
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_heights_that_are_not_finite_are_refused_and_change_nothing(bad: float) -> None:
+    pyramid = filled()
+    before, stamp = pyramid.level(1), pyramid.stamp
+    h = heights(1, 77)
+    h[5, 6] = bad
+    with pytest.raises(ValueError, match="not finite"):
+        pyramid.put(2, 1, h, False)
+    assert pyramid.level(1) is before
+    assert pyramid.stamp == stamp
+
+
+def test_wrong_levels_and_shapes_are_refused() -> None:
+    pyramid = Pyramid(SIZE_M, LEVELS)
+    with pytest.raises(ValueError, match="level 4"):
+        pyramid.put(1, 4, heights(4), False)
+    with pytest.raises(ValueError, match="65x65"):
+        pyramid.put(1, 0, heights(1), False)
+
+
+def test_a_preview_keeps_samples_that_moved_less_than_a_quantum_and_settling_does_not() -> None:
+    q = np.float32(grid.quantum(0, SIZE_M))
+    pyramid = Pyramid(SIZE_M, 0)
+    base = np.full((65, 65), 10 * q, dtype=np.float32)
+    pyramid.put(1, 0, base, False)
+    moved = base.copy()
+    moved[3, 3] += np.float32(0.9) * q
+    assert pyramid.put(2, 0, moved, False) == 0
+    moved[4, 4] += np.float32(1.1) * q
+    assert pyramid.put(3, 0, moved, False) == 1
+    level = pyramid.level(0)
+    assert level is not None
+    assert level.samples[3, 3] == 10
+    assert level.samples[4, 4] == 11
+    assert pyramid.put(4, 0, moved, True) == 1
+    level = pyramid.level(0)
+    assert level is not None
+    assert level.samples[3, 3] == 11
+    assert np.array_equal(level.samples, quantise(moved, 0, SIZE_M))
+
+
+@pytest.mark.parametrize(
+    ("row", "col", "changed"),
+    [
+        (10, 10, {(0, 0)}),
+        (64, 10, {(0, 0), (0, 1)}),
+        (10, 64, {(0, 0), (1, 0)}),
+        (64, 64, {(0, 0), (0, 1), (1, 0), (1, 1)}),
+        (512, 512, {(7, 7)}),
+        (0, 512, {(7, 0)}),
+        (128, 511, {(7, 1), (7, 2)}),
+    ],
+)
+def test_versions_change_where_samples_do_and_nowhere_else(row: int, col: int, changed: set[tuple[int, int]]) -> None:
+    pyramid = Pyramid(SIZE_M, LEVELS)
+    h = heights(LEVELS)
+    assert pyramid.put(1, LEVELS, h, True) == 64
+    before = pyramid.level(LEVELS)
+    h[row, col] += 5
+    assert pyramid.put(2, LEVELS, h, True) == len(changed)
+    after = pyramid.level(LEVELS)
+    assert before is not None
+    assert after is not None
+    assert {(int(x), int(y)) for y, x in np.argwhere(before.versions != after.versions)} == changed
+    assert after.versions.max() == after.changed == after.stamp
+    assert not after.samples.flags.writeable
+
+
+def test_an_unchanged_level_keeps_its_samples_and_versions_but_is_newer() -> None:
+    pyramid = filled()
+    before = pyramid.level(2)
+    assert pyramid.put(5, 2, heights(2, 2), True) == 0
+    after = pyramid.level(2)
+    assert before is not None
+    assert after is not None
+    assert after.samples is before.samples
+    assert after.stamp > before.stamp
+    assert after.changed == before.changed
+    assert after.clock == 5
+
+
+def brute(pyramid: Pyramid, key: TileKey) -> tuple[float, float, float]:
+    """Lowest, highest and largest error of a tile and all its descendants, sample by sample."""
+    q = grid.quantum(key.level, SIZE_M)
+    level = pyramid.level(key.level)
+    assert level is not None
+    r, c = 64 * key.y, 64 * key.x
+    mine = level.samples[r : r + 65, c : c + 65] * q
+    low, high, error = float(mine.min()), float(mine.max()), 0.0
+    parent = pyramid.level(key.level - 1) if key.level else None
+    if parent is not None:
+        p = parent.samples * (2 * q)
+        at = np.arange(65) / 2
+        rows, cols = r / 2 + at, c / 2 + at
+        r0, r1 = np.floor(rows).astype(int), np.ceil(rows).astype(int)
+        c0, c1 = np.floor(cols).astype(int), np.ceil(cols).astype(int)
+        drawn = (p[np.ix_(r0, c0)] + p[np.ix_(r0, c1)] + p[np.ix_(r1, c0)] + p[np.ix_(r1, c1)]) / 4
+        error = float(np.abs(mine - drawn).max())
+    if key.level < LEVELS:
+        for child in key.children():
+            below = brute(pyramid, child)
+            low, high, error = min(low, below[0]), max(high, below[1]), max(error, below[2])
+    return low, high, error
+
+
+def assert_bounds(pyramid: Pyramid) -> None:
+    bounds = pyramid.bounds()
+    for level in range(LEVELS + 1):
+        for key in grid.tiles(level):
+            i = bounds.starts[level] + (key.y << level) + key.x
+            low, high, error = brute(pyramid, key)
+            assert bounds.low[i] == pytest.approx(low, abs=1e-3)
+            assert bounds.high[i] == pytest.approx(high, abs=1e-3)
+            assert error - 1e-3 <= bounds.error[i] <= error + grid.quantum(0, SIZE_M)
+            ground = grid.tile_rect(key, SIZE_M)
+            assert bounds.x[i] - bounds.half[i] == ground.x0
+            assert bounds.y[i] + bounds.half[i] == ground.y1
+            assert bounds.spacing[i] == grid.spacing(level, SIZE_M)
+
+
+def test_bounds_hold_every_sample_and_every_error_also_after_local_edits() -> None:
+    pyramid = filled()
+    assert_bounds(pyramid)
+    for level in range(LEVELS + 1):
+        h = heights(level, level)
+        n = h.shape[0]
+        h[n // 3, n // 5 : n // 5 + 4] += 500
+        pyramid.put(2, level, h, True)
+    assert_bounds(pyramid)
+    coarse = heights(1, 1)
+    coarse[20, 20] -= 900  # changes the error of level 2, whose own samples stay
+    pyramid.put(3, 1, coarse, True)
+    assert_bounds(pyramid)
+
+
+def test_levels_that_were_never_put_are_not_valid() -> None:
+    pyramid = Pyramid(SIZE_M, LEVELS)
+    pyramid.put(1, 0, heights(0), False)
+    pyramid.put(1, 1, heights(1), False)
+    assert pyramid.bounds().valid.tolist() == [True] * 5 + [False] * 80
+
+
+def test_the_cache_of_coded_tiles_is_bounded_and_forgets_the_oldest() -> None:
+    cache = EncodedTiles(limit=1000)
+    for i in range(30):
+        cache.put((TileKey(0, 0, 0), i, 0), bytes(100))
+        assert cache.get((TileKey(0, 0, 0), 0, 0)) is not None  # used again and again, so it stays
+    assert cache.bytes <= 1000
+    assert cache.get((TileKey(0, 0, 0), 1, 0)) is None
+    assert cache.get((TileKey(0, 0, 0), 29, 0)) is not None
+
+
+def test_clients_share_coded_tiles() -> None:
+    from esker.tiles.delivery import ClientTiles
+
+    server = TileServer(SIZE_M, LEVELS)
+    for level in range(LEVELS + 1):
+        server.put_level(1, level, heights(level, level), True)
+    plans = []
+    for _ in range(2):
+        client = ClientTiles(server)
+        while (plan := client.plan()) is not None:
+            plans.append(plan.encode())
+            client.commit(plan)
+    half = len(plans) // 2
+    assert plans[:half] == plans[half:]
+    assert server.cache.bytes < sum(len(p) for p in plans[:half])
