@@ -1,0 +1,194 @@
+/** What all passes of a frame bind: the view uniform, the atlas, the sky tables, the noise (shaders/wgsl/view.wgsl). */
+
+import type { Scene, Vec3 } from "../core/types.ts";
+import type { Atlas } from "./atlas.ts";
+import { StructWriter, structLayout } from "./layout.ts";
+import { contourInterval, LOOKS } from "./looks.ts";
+import { VIEW_SOURCE } from "./shaders.ts";
+import type { SkyTables } from "./sky.ts";
+
+const MAX_CURSORS = 32;
+const OVERLAYS = { none: 0, contours: 1, slope: 2, patches: 3 } as const;
+
+/** What a frame is drawn with besides the scene. */
+export interface FrameFacts {
+  readonly width: number;
+  readonly height: number;
+  readonly low: number;
+  readonly high: number;
+}
+
+/** Unit vector towards the sun; azimuth clockwise from north (the y axis), degrees. */
+export function sunDirection(azimuthDeg: number, elevationDeg: number): Vec3 {
+  const a = (azimuthDeg * Math.PI) / 180;
+  const e = (Math.max(elevationDeg, 0.5) * Math.PI) / 180;
+  return [Math.sin(a) * Math.cos(e), Math.cos(a) * Math.cos(e), Math.sin(e)];
+}
+
+export class FrameBindings {
+  readonly layout: GPUBindGroupLayout;
+  private readonly writer = new StructWriter(structLayout(VIEW_SOURCE, "View"));
+  private readonly uniform: GPUBuffer;
+  private readonly clamp: GPUSampler;
+  private readonly repeat: GPUSampler;
+  private group: GPUBindGroup | null = null;
+
+  constructor(
+    private readonly device: GPUDevice,
+    private readonly sky: SkyTables,
+    private readonly noise: GPUTexture,
+    anisotropy: number,
+  ) {
+    const visibility = GPUShaderStage.VERTEX | GPUShaderStage.FRAGMENT;
+    const texture = (
+      binding: number,
+      sampleType: GPUTextureSampleType,
+      viewDimension: GPUTextureViewDimension,
+    ): GPUBindGroupLayoutEntry => ({ binding, visibility, texture: { sampleType, viewDimension } });
+    this.layout = device.createBindGroupLayout({
+      label: "frame",
+      entries: [
+        { binding: 0, visibility, buffer: { type: "uniform" } },
+        texture(1, "unfilterable-float", "2d-array"),
+        texture(2, "float", "2d-array"),
+        texture(3, "float", "2d-array"),
+        texture(4, "float", "2d"),
+        texture(5, "float", "2d"),
+        texture(6, "float", "2d"),
+        { binding: 7, visibility, sampler: { type: "filtering" } },
+        { binding: 8, visibility, sampler: { type: "filtering" } },
+      ],
+    });
+    this.uniform = device.createBuffer({
+      label: "view",
+      size: this.writer.layout.size,
+      usage: GPUBufferUsage.UNIFORM | GPUBufferUsage.COPY_DST,
+    });
+    this.clamp = device.createSampler({ label: "clamp", magFilter: "linear", minFilter: "linear" });
+    this.repeat = device.createSampler({
+      label: "repeat",
+      addressModeU: "repeat",
+      addressModeV: "repeat",
+      magFilter: "linear",
+      minFilter: "linear",
+      mipmapFilter: "linear",
+      maxAnisotropy: anisotropy,
+    });
+  }
+
+  /** Binds another atlas. */
+  attach(atlas: Atlas): void {
+    const array = (texture: GPUTexture): GPUTextureView => texture.createView({ dimension: "2d-array" });
+    this.group = this.device.createBindGroup({
+      label: "frame",
+      layout: this.layout,
+      entries: [
+        { binding: 0, resource: { buffer: this.uniform } },
+        { binding: 1, resource: array(atlas.heights) },
+        { binding: 2, resource: array(atlas.slopes) },
+        { binding: 3, resource: array(atlas.light) },
+        { binding: 4, resource: this.sky.radiance.createView() },
+        { binding: 5, resource: this.sky.ambient.createView() },
+        { binding: 6, resource: this.noise.createView() },
+        { binding: 7, resource: this.clamp },
+        { binding: 8, resource: this.repeat },
+      ],
+    });
+  }
+
+  /** The bind group; `attach` must have been called. */
+  get bindGroup(): GPUBindGroup {
+    if (this.group === null) throw new Error("frame: no atlas attached");
+    return this.group;
+  }
+
+  /** Writes the uniform for this frame. */
+  update(scene: Scene, facts: FrameFacts): void {
+    this.writeCamera(scene, facts);
+    const w = this.writer;
+    const { settings } = scene;
+    const size = scene.tiles.sizeM;
+    const look = LOOKS[settings.look];
+    const sun = sunDirection(settings.sun_azimuth_deg, settings.sun_elevation_deg);
+    const relief = facts.high - facts.low;
+    w.set("sun", [...sun, sun[2]]);
+    w.set("time", scene.time % 3600);
+    w.set("size", size);
+    w.set("base", baseHeight(facts.low, size));
+    w.set("sea", settings.sea_level_m ?? 0);
+    w.set("has_sea", settings.sea_level_m === null ? 0 : 1);
+    w.set("exposure", look.exposure * exposureFor(settings.look === "paper" ? 90 : settings.sun_elevation_deg));
+    w.set("haze", look.haze / size);
+    w.set("low", facts.low);
+    w.set("high", facts.high);
+    w.set("grid", 1 - smoothstep(0.02, 0.1, relief / size));
+    w.set("contour", contourInterval(relief));
+    w.set("contour_strength", relief > 0 ? look.contours : 0);
+    w.set("look", look.index);
+    w.set("overlay", OVERLAYS[scene.overlay]);
+    this.writeCursors(scene);
+    this.device.queue.writeBuffer(this.uniform, 0, w.buffer);
+  }
+
+  destroy(): void {
+    this.uniform.destroy();
+  }
+
+  private writeCamera(scene: Scene, facts: FrameFacts): void {
+    const w = this.writer;
+    const { camera } = scene;
+    const { forward, right, up } = axes(camera.eye, camera.target, camera.up);
+    const ortho = camera.orthoHeight > 0;
+    const tan = Math.tan((camera.fovDeg * Math.PI) / 360);
+    w.set("view_proj", camera.viewProj);
+    w.set("eye", [...camera.eye, ortho ? 1 : 0]);
+    w.set("right", [...right, (tan * facts.width) / facts.height]);
+    w.set("up", [...up, tan]);
+    w.set("forward", [...forward, ortho ? camera.orthoHeight / facts.height : (2 * tan) / facts.height]);
+    w.set("viewport", [facts.width, facts.height]);
+  }
+
+  private writeCursors(scene: Scene): void {
+    const shown = scene.cursors.slice(0, MAX_CURSORS);
+    const { camera } = scene;
+    const scale = camera.orthoHeight > 0 ? camera.orthoHeight : 2 * Math.tan((camera.fovDeg * Math.PI) / 360);
+    shown.forEach((cursor, i) => {
+      const [x, y, z] = cursor.position;
+      const away = camera.orthoHeight > 0 ? 1 : Math.hypot(x - camera.eye[0], y - camera.eye[1], z - camera.eye[2]);
+      const pixel = (scale * away) / camera.height;
+      this.writer.set("cursors", [x, y, cursor.radiusPx * pixel, 1.6 * pixel, ...cursor.colour], i * 8);
+    });
+    this.writer.set("cursor_count", shown.length);
+  }
+}
+
+/** Where the block's foot lies: steps with the relief, so that it does not creep while somebody draws. */
+export function baseHeight(low: number, sizeM: number): number {
+  const step = sizeM / 32;
+  return Math.floor((low - 0.02 * sizeM) / step) * step;
+}
+
+/** Opens up as the sun sinks, as an eye does. */
+function exposureFor(elevationDeg: number): number {
+  return 1 + 1.1 * (1 - smoothstep(0, 32, elevationDeg));
+}
+
+function smoothstep(a: number, b: number, v: number): number {
+  const t = Math.min(1, Math.max(0, (v - a) / (b - a)));
+  return t * t * (3 - 2 * t);
+}
+
+function axes(eye: Vec3, target: Vec3, upHint: Vec3): { forward: Vec3; right: Vec3; up: Vec3 } {
+  const forward = unit([target[0] - eye[0], target[1] - eye[1], target[2] - eye[2]]);
+  const right = unit(cross(forward, upHint));
+  return { forward, right, up: cross(right, forward) };
+}
+
+function cross(a: Vec3, b: Vec3): Vec3 {
+  return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+}
+
+function unit(v: Vec3): Vec3 {
+  const l = Math.hypot(...v) || 1;
+  return [v[0] / l, v[1] / l, v[2] / l];
+}

@@ -1,0 +1,12 @@
+/** Makes the renderers of the page: the 3D view, and the map for browsers without WebGPU. */
+
+import type { SceneRenderer } from "../core/types.ts";
+import { NoWebGpu, openGpu } from "./device.ts";
+import { GpuRenderer } from "./renderer.ts";
+
+export { NoWebGpu };
+
+/** The WebGPU renderer on this canvas. Throws `NoWebGpu` with a reason a person can read. */
+export async function createRenderer(canvas: HTMLCanvasElement): Promise<SceneRenderer> {
+  return GpuRenderer.create(canvas, await openGpu(canvas));
+}

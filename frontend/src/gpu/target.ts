@@ -1,0 +1,100 @@
+/** Colour and depth attachments, multisampled on real GPUs, and the stretch to the canvas when drawn smaller. */
+
+import blit from "@shaders/wgsl/blit.wgsl?raw";
+
+export const DEPTH_FORMAT = "depth32float" as const;
+
+export class Target {
+  private depth: GPUTexture | null = null;
+  private multisampled: GPUTexture | null = null;
+  private scaled: GPUTexture | null = null;
+  private blitGroup: GPUBindGroup | null = null;
+  private readonly sampler: GPUSampler;
+  private key = "";
+
+  private constructor(
+    private readonly device: GPUDevice,
+    private readonly format: GPUTextureFormat,
+    readonly samples: number,
+    private readonly blitPipeline: GPURenderPipeline,
+  ) {
+    this.sampler = device.createSampler({ magFilter: "linear", minFilter: "linear" });
+  }
+
+  static async create(device: GPUDevice, format: GPUTextureFormat, samples: number): Promise<Target> {
+    const module = device.createShaderModule({ label: "blit", code: blit });
+    const pipeline = await device.createRenderPipelineAsync({
+      label: "blit",
+      layout: "auto",
+      vertex: { module },
+      fragment: { module, targets: [{ format }] },
+    });
+    return new Target(device, format, samples, pipeline);
+  }
+
+  /**
+   * Attachments for a frame of `width` x `height` pixels shown on `canvas`. When the sizes differ, `finish` stretches the
+   * picture.
+   */
+  begin(canvas: GPUTexture, width: number, height: number): GPURenderPassDescriptor {
+    this.resize(canvas, width, height);
+    const resolved = (this.scaled ?? canvas).createView();
+    const colour: GPURenderPassColorAttachment = {
+      view: this.multisampled === null ? resolved : this.multisampled.createView(),
+      clearValue: [0, 0, 0, 1],
+      loadOp: "clear",
+      storeOp: this.multisampled === null ? "store" : "discard",
+    };
+    if (this.multisampled !== null) colour.resolveTarget = resolved;
+    return {
+      label: "scene",
+      colorAttachments: [colour],
+      depthStencilAttachment: {
+        view: this.depth!.createView(),
+        depthClearValue: 1,
+        depthLoadOp: "clear",
+        depthStoreOp: "discard",
+      },
+    };
+  }
+
+  finish(encoder: GPUCommandEncoder, canvas: GPUTexture): void {
+    if (this.scaled === null) return;
+    const pass = encoder.beginRenderPass({
+      label: "blit",
+      colorAttachments: [{ view: canvas.createView(), loadOp: "clear", storeOp: "store" }],
+    });
+    pass.setPipeline(this.blitPipeline);
+    pass.setBindGroup(0, this.blitGroup);
+    pass.draw(3);
+    pass.end();
+  }
+
+  destroy(): void {
+    for (const texture of [this.depth, this.multisampled, this.scaled]) texture?.destroy();
+    this.key = "";
+  }
+
+  private resize(canvas: GPUTexture, width: number, height: number): void {
+    const key = `${canvas.width} ${canvas.height} ${width} ${height}`;
+    if (key === this.key) return;
+    this.destroy();
+    this.key = key;
+    const usage = GPUTextureUsage.RENDER_ATTACHMENT;
+    const make = (label: string, format: GPUTextureFormat, sampleCount: number, more = 0): GPUTexture =>
+      this.device.createTexture({ label, format, sampleCount, size: [width, height], usage: usage | more });
+    this.depth = make("depth", DEPTH_FORMAT, this.samples);
+    this.multisampled = this.samples > 1 ? make("colour", this.format, this.samples) : null;
+    this.scaled = null;
+    if (width !== canvas.width || height !== canvas.height) {
+      this.scaled = make("scaled", this.format, 1, GPUTextureUsage.TEXTURE_BINDING);
+      this.blitGroup = this.device.createBindGroup({
+        layout: this.blitPipeline.getBindGroupLayout(0),
+        entries: [
+          { binding: 0, resource: this.scaled.createView() },
+          { binding: 1, resource: this.sampler },
+        ],
+      });
+    }
+  }
+}

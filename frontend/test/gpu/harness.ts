@@ -1,0 +1,158 @@
+/** The page behind frontend/dev/renderer.html: scenes for screenshots and for the tests that drive a browser. */
+
+import type {
+  CursorVisual,
+  FrameStats,
+  GhostVisual,
+  Scene,
+  SceneRenderer,
+  StrokeVisual,
+  TerrainSettings,
+  TileView,
+  Vec3,
+} from "../../src/core/types.ts";
+import { createRenderer } from "../../src/gpu/index.ts";
+import { alpineField, FieldView, lookAt, mapCamera } from "./world.ts";
+
+export const SETTINGS: TerrainSettings = {
+  size_m: 4096,
+  title: "Harness",
+  reach_m: 128,
+  border: "free",
+  sea_level_m: null,
+  seed: 1,
+  look: "natural",
+  sun_azimuth_deg: 115,
+  sun_elevation_deg: 24,
+};
+
+const worlds = new Map<string, TileView>();
+
+function world(name: string, levels: number): TileView {
+  const key = `${name}${levels}`;
+  let view = worlds.get(key);
+  if (view === undefined) {
+    const smooth = alpineField(0);
+    const rough = alpineField(1);
+    const fields = {
+      flat: () => 0,
+      smooth: (x: number, y: number) => smooth(x, y, 0),
+      rough: (x: number, y: number) => rough(x, y, 0),
+      island: (x: number, y: number) => {
+        const d = Math.hypot(x - 2048, y - 2048) / 2048;
+        return rough(x, y, 0) * Math.max(0, 1 - d * d) - 60 * d * d + 12;
+      },
+    };
+    view = new FieldView(4096, levels, fields[name as keyof typeof fields]);
+    worlds.set(key, view);
+  }
+  return view;
+}
+
+interface Shot {
+  world: string;
+  levels?: number;
+  eye: Vec3;
+  target: Vec3;
+  settings?: Partial<TerrainSettings>;
+  overlay?: Scene["overlay"];
+  strokes?: boolean;
+  map?: number;
+  tau?: number;
+  width?: number;
+  height?: number;
+}
+
+function demoStrokes(view: TileView): { strokes: StrokeVisual[]; ghost: GhostVisual; cursors: CursorVisual[] } {
+  const ground = (x: number, y: number): number => {
+    const n = 1 << view.levels;
+    const w = view.sizeM / n;
+    const tile = view.tile(view.levels, Math.floor(x / w), Math.floor(y / w));
+    return tile?.heights[Math.round(((y % w) / w) * 64) * 65 + Math.round(((x % w) / w) * 64)] ?? 0;
+  };
+  const line = (a: [number, number], b: [number, number], rise: number): Float32Array => {
+    const out: number[] = [];
+    for (let i = 0; i <= 40; i += 1) {
+      const t = i / 40;
+      const x = a[0] + (b[0] - a[0]) * t;
+      const y = a[1] + (b[1] - a[1]) * t;
+      out.push(x, y, ground(x, y) + rise * Math.sin(Math.PI * t));
+    }
+    return Float32Array.from(out);
+  };
+  const visual = (
+    id: string,
+    points: Float32Array,
+    colour: [number, number, number, number],
+    selected = false,
+  ): StrokeVisual => ({
+    id,
+    kind: "profile",
+    points,
+    colour,
+    selected,
+    hovered: false,
+    live: false,
+  });
+  const shadow = line([900, 1000], [2300, 900], 0);
+  return {
+    strokes: [
+      visual("a", line([500, 2300], [3700, 2700], 60), [0.95, 0.55, 0.2, 1]),
+      visual("b", line([1300, 2650], [1300, 1500], 0), [0.3, 0.75, 0.95, 1]),
+      visual("c", line([900, 1000], [2300, 900], 320), [0.95, 0.85, 0.3, 1], true),
+    ],
+    ghost: {
+      corners: [
+        [800, 1007, ground(900, 1000) - 20],
+        [2400, 893, ground(2300, 900) - 20],
+        [2400, 893, 520],
+        [800, 1007, 520],
+      ],
+      shadow,
+      colour: [0.55, 0.8, 1, 0.8],
+    },
+    cursors: [
+      { position: [2700, 1100, ground(2700, 1100)], colour: [0.4, 0.9, 0.5, 1], radiusPx: 18 },
+      { position: [2300, 900, ground(2300, 900)], colour: [0.95, 0.85, 0.3, 1], radiusPx: 12 },
+    ],
+  };
+}
+
+function scene(shot: Shot, width: number, height: number): Scene {
+  const view = world(shot.world, shot.levels ?? 4);
+  const demo = shot.strokes === true ? demoStrokes(view) : { strokes: [], ghost: null, cursors: [] };
+  return {
+    camera:
+      shot.map === undefined
+        ? lookAt(shot.eye, shot.target, width, height)
+        : mapCamera(shot.target, shot.map, width, height),
+    tiles: view,
+    settings: { ...SETTINGS, ...shot.settings },
+    strokes: demo.strokes,
+    ghost: demo.ghost,
+    cursors: demo.cursors,
+    tauPx: shot.tau ?? 1.5,
+    time: 12,
+    overlay: shot.overlay ?? "none",
+    showStrokes: true,
+  };
+}
+
+let renderer: SceneRenderer | null = null;
+
+/** Draws until the renderer rests; returns the last frame's figures with the number of frames. */
+async function shoot(shot: Shot): Promise<FrameStats & { frames: number; description: string; ms: number }> {
+  const canvas = document.querySelector("canvas")!;
+  renderer ??= await createRenderer(canvas);
+  const s = scene(shot, shot.width ?? 1280, shot.height ?? 720);
+  const began = performance.now();
+  for (let frames = 1; ; frames += 1) {
+    const stats = renderer.render(s);
+    await new Promise((done) => setTimeout(done, 16));
+    if (!stats.busy && frames > 2)
+      return { ...stats, frames, description: renderer.description, ms: performance.now() - began };
+    if (frames > 3000) throw new Error("the renderer never rests");
+  }
+}
+
+Object.assign(globalThis, { esker: { shoot } });

@@ -1,0 +1,82 @@
+// Behind everything: sky, the sun's disc, thin cloud, and the plane on which the block stands or the open sea.
+struct BackgroundVertex {
+  @builtin(position) position: vec4f,
+  @location(0) ndc: vec2f,
+};
+
+@vertex
+fn background_vertex(@builtin(vertex_index) index: u32) -> BackgroundVertex {
+  let ndc = vec2f(f32(index & 1u) * 4.0 - 1.0, f32(index >> 1u) * 4.0 - 1.0);
+  return BackgroundVertex(vec4f(ndc, 1.0, 1.0), ndc);
+}
+
+fn clouds(dir: vec3f, base: vec3f) -> vec3f {
+  if (view.look == LOOK_PAPER || dir.z < 0.02) { return base; }
+  // Two thin sheets, stretched by the wind.
+  let at = dir.xy / (dir.z + 0.12);
+  let a = textureSampleLevel(noise, smooth_repeat, at * vec2f(0.055, 0.11) + 0.13, 0.0);
+  let b = textureSampleLevel(noise, smooth_repeat, at * vec2f(0.16, 0.27) + 0.61, 1.0);
+  let amount = smoothstep(0.50, 0.86, a.r * 0.72 + b.r * 0.34) * smoothstep(0.02, 0.22, dir.z);
+  let towards = max(dot(dir, view.sun.xyz), 0.0);
+  let lit = sun_light() * (0.055 + 0.16 * pow(towards, 8.0)) + base * 0.75;
+  return mix(base, lit, amount * 0.5);
+}
+
+fn sky_with_sun(dir: vec3f) -> vec3f {
+  var colour = clouds(dir, sky_colour(dir));
+  if (view.look != LOOK_PAPER) {
+    let c = dot(dir, view.sun.xyz);
+    let disc = smoothstep(0.99996, 0.999985, c) * smoothstep(-0.02, 0.0, dir.z);
+    colour += sun_light() * (disc * 40.0 + pow(max(c, 0.0), 900.0) * 0.5 + pow(max(c, 0.0), 60.0) * 0.03);
+  }
+  return colour;
+}
+
+fn plane_albedo() -> vec3f {
+  switch (view.look) {
+    case LOOK_ALPINE: { return vec3f(0.33, 0.35, 0.38); }
+    case LOOK_DESERT: { return vec3f(0.36, 0.27, 0.18); }
+    case LOOK_PAPER: { return vec3f(0.50, 0.47, 0.42); }
+    default: { return vec3f(0.125, 0.130, 0.095); }
+  }
+}
+
+fn ground_plane(p: vec3f, dir: vec3f, footprint: f32) -> vec3f {
+  let away = outside_domain(p.xy);
+  // Contact shade round the block, and its soft shadow away from the sun.
+  let shade = 1.0 - 0.55 * exp(-away / (0.035 * view.size)) - 0.2 * exp(-away / (0.16 * view.size));
+  let tall = 0.5 * (view.low + view.high) - view.base;
+  let reach = tall * length(view.sun.xy) / max(view.sun.z, 0.12);
+  let toward = p.xy + normalize(view.sun.xy + vec2f(1.0e-5)) * min(reach, view.size) * 0.5;
+  let shadow = smoothstep(0.0, 0.5 * min(reach, view.size) + 1.0, outside_domain(toward));
+  let lod = log2(max(footprint, 1.0e-3) * 256.0 / (view.size * 1.7));
+  let tint = 0.86 + 0.28 * textureSampleLevel(noise, smooth_repeat, p.xy / (view.size * 1.7), clamp(lod, 0.0, 8.0)).r;
+  let light = sun_light() * max(view.sun.z, 0.0) / 3.14159265 * mix(0.25, 1.0, shadow) + ambient_light(vec3f(0.0, 0.0, 1.0));
+  return plane_albedo() * tint * light * max(shade, 0.0);
+}
+
+@fragment
+fn background_fragment(v: BackgroundVertex) -> @location(0) vec4f {
+  let dir = ray_through(v.ndc);
+  let pixel = v.position.xy;
+  if (view.eye.w > 0.5) {
+    // The map lies on a plain sheet.
+    return display(plane_albedo() * (ambient_light(vec3f(0.0, 0.0, 1.0)) + sun_light() * 0.12), pixel);
+  }
+  var colour = sky_with_sun(dir);
+  let level = select(view.base, view.sea, view.has_sea > 0.5);
+  let down = view.eye.z - level;
+  if (dir.z < -1.0e-4 && down > 0.0) {
+    let distance = down / -dir.z;
+    let p = view.eye.xyz + dir * distance;
+    if (view.has_sea > 0.5) {
+      colour = water_surface(p, dir, sea_depth(p.xy), vec3f(0.0), sea_bed(p.xy)).rgb;
+    } else {
+      colour = ground_plane(p, dir, pixel_size(p) / max(-dir.z, 0.02));
+    }
+    colour = through_air(colour, dir, distance);
+  } else if (dir.z < 0.0) {
+    colour = sky_colour(vec3f(dir.xy, 0.0));
+  }
+  return display(colour, pixel);
+}

@@ -1,0 +1,56 @@
+// Lines and tints over the ground: contours, slope, patches, the scale grid, cursors. All are anti-aliased by the
+// pixel's footprint and fade out before they could become moire.
+
+// Coverage of lines at the multiples of `every`, `half` pixels wide, where the value changes by `rate` per pixel.
+fn lines(value: f32, every: f32, rate: f32, half: f32) -> f32 {
+  let away = abs(fract(value / every - 0.5) - 0.5) * every;
+  let width = max(rate, 1.0e-6);
+  let cover = clamp(half + 0.5 - away / width, 0.0, 1.0);
+  return cover * (1.0 - smoothstep(0.12, 0.38, width / every));
+}
+
+fn contours(z: f32, rate: f32) -> f32 {
+  let minor = lines(z, view.contour, rate, 0.35) * 0.5;
+  let major = lines(z, view.contour * 5.0, rate, 0.7);
+  return max(minor, major);
+}
+
+// A sixteenth of the domain, so that a first look reads scale and perspective.
+fn scale_grid(p: vec2f, f: Footprint) -> f32 {
+  let rate = abs(f.dx.xy) + abs(f.dy.xy);
+  let every = view.size / 16.0;
+  let fine = max(lines(p.x, every, rate.x, 0.35), lines(p.y, every, rate.y, 0.35));
+  let coarse = max(lines(p.x, every * 4.0, rate.x, 0.6), lines(p.y, every * 4.0, rate.y, 0.6));
+  return max(fine * 0.55, coarse);
+}
+
+fn slope_tint(steep: f32) -> vec3f {
+  let degrees = atan(steep) * 57.29578;
+  let a = mix(vec3f(0.16, 0.42, 0.22), vec3f(0.80, 0.72, 0.16), smoothstep(5.0, 25.0, degrees));
+  let b = mix(a, vec3f(0.78, 0.22, 0.08), smoothstep(25.0, 40.0, degrees));
+  return mix(b, vec3f(0.36, 0.05, 0.22), smoothstep(40.0, 60.0, degrees));
+}
+
+fn level_tint(level: u32) -> vec3f {
+  let hue = f32(level) * 0.61803;
+  return 0.5 + 0.45 * cos(6.2831853 * (vec3f(hue) + vec3f(0.0, 0.33, 0.67)));
+}
+
+// Cursor rings lie on the ground: drawn where the ground is at the ring's distance. Display-encoded colours.
+fn with_cursors(colour: vec3f, p: vec3f) -> vec3f {
+  var c = colour;
+  for (var i = 0u; i < view.cursor_count; i += 1u) {
+    let ring = view.cursors[2u * i];
+    let tint = view.cursors[2u * i + 1u];
+    let away = distance(p.xy, ring.xy);
+    if (away < ring.z * 1.6) {
+      let line = clamp(1.5 - abs(away - ring.z) / ring.w, 0.0, 1.0);
+      let centre = clamp(2.2 - away / ring.w, 0.0, 1.0);
+      let halo = clamp(2.8 - abs(away - ring.z) / ring.w, 0.0, 1.0) * 0.30;
+      c = mix(c, vec3f(0.0), halo * tint.a);
+      c = mix(c, mix(c, tint.rgb, 0.14), f32(away < ring.z) * tint.a);
+      c = mix(c, tint.rgb, max(line, centre) * tint.a);
+    }
+  }
+  return c;
+}

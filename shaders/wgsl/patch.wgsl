@@ -1,0 +1,105 @@
+// The vertices of a drawn patch: 17 x 17 samples of a tile, morphed towards the parent's surface (DESIGN 9).
+// Terrain, water and walls use the same function, so that they meet exactly.
+struct PatchIn {
+  @location(0) record: vec4u,  // see Cut.records in frontend/src/tiles/selection.ts
+};
+
+struct PatchVertex {
+  world: vec3f,
+  at: vec2f,      // sample position in the own tile, 0..64
+  morph: f32,
+};
+
+override PITCH: u32 = 17u;     // vertex numbering: row stride of the index buffer
+
+fn patch_slot(record: vec4u) -> u32 { return record.y & 0xffffu; }
+fn patch_parent(record: vec4u) -> u32 { return record.y >> 16u; }
+fn patch_level(record: vec4u) -> u32 { return record.z & 0xffu; }
+fn patch_corner(record: vec4u) -> vec2i { return vec2i(i32(record.x & 0xffffu), i32(record.x >> 16u)); }
+
+// Sample position in the parent's tile of a sample position of the tile.
+fn parent_at(record: vec4u, at: vec2f) -> vec2f {
+  let corner = patch_corner(record);
+  let quadrant = vec2f(vec2i((corner.x / TILE_CELLS) & 1, (corner.y / TILE_CELLS) & 1));
+  return (at + quadrant * f32(TILE_CELLS)) * 0.5;
+}
+
+fn sample_height(slot: u32, at: vec2i) -> f32 {
+  return textureLoad(heights, slot_origin(slot) + at, slot_layer(slot), 0).x;
+}
+
+// The parent's surface at a sample of the tile: its own sample, or the middle of the edge or diagonal it lies on.
+fn parent_height(record: vec4u, at: vec2i) -> f32 {
+  let corner = patch_corner(record);
+  let quadrant = vec2i((corner.x / TILE_CELLS) & 1, (corner.y / TILE_CELLS) & 1);
+  let low = quadrant * (TILE_CELLS / 2) + (at >> vec2u(1u));
+  let odd = at & vec2i(1);
+  let slot = patch_parent(record);
+  return 0.5 * (sample_height(slot, low + vec2i(odd.x, 0)) + sample_height(slot, low + vec2i(0, odd.y)));
+}
+
+// Exact at both ends, whatever the compiler makes of it: neighbours must compute the same bits.
+fn exact_mix(a: f32, b: f32, t: f32) -> f32 {
+  if (t <= 0.0) { return a; }
+  if (t >= 1.0) { return b; }
+  return a * (1.0 - t) + b * t;
+}
+
+// Morph weight of vertex g (0..16) from the weights of the corners; on an edge only its two corners count.
+fn patch_morph(record: vec4u, g: vec2i) -> f32 {
+  let c = unpack4x8unorm(record.w);
+  let t = vec2f(g) / f32(PATCH_CELLS);
+  if (g.x == 0) { return exact_mix(c.x, c.z, t.y); }
+  if (g.x == PATCH_CELLS) { return exact_mix(c.y, c.w, t.y); }
+  if (g.y == 0) { return exact_mix(c.x, c.y, t.x); }
+  if (g.y == PATCH_CELLS) { return exact_mix(c.z, c.w, t.x); }
+  return mix(mix(c.x, c.y, t.x), mix(c.z, c.w, t.x), t.y);
+}
+
+fn patch_vertex(record: vec4u, grid: vec2i) -> PatchVertex {
+  var g = grid;
+  let edges = (record.z >> 8u) & 15u;
+  let odd = g & vec2i(1);
+  // Beside a coarser neighbour only every second vertex exists: the odd ones collapse onto the even ones.
+  if ((g.x == 0 && (edges & 1u) != 0u) || (g.x == PATCH_CELLS && (edges & 2u) != 0u)) { g.y -= odd.y; }
+  if ((g.y == 0 && (edges & 4u) != 0u) || (g.y == PATCH_CELLS && (edges & 8u) != 0u)) { g.x -= odd.x; }
+  let corner = patch_corner(record);
+  let at = (corner & vec2i(TILE_CELLS - 1)) + g;
+  let morph = patch_morph(record, g);
+  var z: f32;
+  if (morph >= 1.0) {
+    z = parent_height(record, at);
+  } else {
+    z = sample_height(patch_slot(record), at);
+    if (morph > 0.0) { z = exact_mix(z, parent_height(record, at), morph); }
+  }
+  // Integer lattice times a cell that halves exactly from level to level: the same bits on both sides of a seam.
+  let cell = view.size / f32(u32(TILE_CELLS) << patch_level(record));
+  var out: PatchVertex;
+  out.world = vec3f(vec2f(corner + g) * cell, z);
+  out.at = vec2f(at);
+  out.morph = morph;
+  return out;
+}
+
+// Surface gradient (dz/dx, dz/dy), sun and sky visibility at a point of a patch, morphed like the heights.
+struct Surface {
+  gradient: vec2f,
+  curvature: f32,
+  sun: f32,
+  sky: f32,
+};
+
+fn patch_surface(record: vec4u, at: vec2f, morph: f32) -> Surface {
+  let own = patch_slot(record);
+  let uv = slot_uv(own, at);
+  var s = textureSampleLevel(slopes, smooth_clamp, uv, slot_layer(own), 0.0);
+  var l = textureSampleLevel(light, smooth_clamp, uv, slot_layer(own), 0.0);
+  if (morph > 0.0) {
+    let parent = patch_parent(record);
+    let up = slot_uv(parent, parent_at(record, at));
+    s = mix(s, textureSampleLevel(slopes, smooth_clamp, up, slot_layer(parent), 0.0), morph);
+    l = mix(l, textureSampleLevel(light, smooth_clamp, up, slot_layer(parent), 0.0), morph);
+  }
+  return Surface(s.xy, s.z, l.x, l.y);
+}

@@ -1,0 +1,50 @@
+// Reading the baked sky: radiance, ambient light by normal, aerial perspective.
+
+fn paper_backdrop(dir: vec3f) -> vec3f {
+  let t = clamp(dir.z * 0.8 + 0.35, 0.0, 1.0);
+  return mix(vec3f(0.62, 0.58, 0.51), vec3f(0.86, 0.83, 0.77), t);
+}
+
+fn sky_colour(dir: vec3f) -> vec3f {
+  if (view.look == LOOK_PAPER) { return paper_backdrop(dir); }
+  let flat = max(length(dir.xy), 1.0e-5);
+  let sun_flat = max(length(view.sun.xy), 1.0e-5);
+  let azimuth = acos(clamp(dot(dir.xy, view.sun.xy) / (flat * sun_flat), -1.0, 1.0)) / 3.14159265;
+  let elevation = sqrt(clamp(asin(clamp(dir.z, 0.0, 1.0)) / 1.57079633, 0.0, 1.0));
+  let size = vec2f(textureDimensions(sky_lut));
+  let uv = (vec2f(azimuth, elevation) * (size - 1.0) + 0.5) / size;
+  return textureSampleLevel(sky_lut, smooth_clamp, uv, 0.0).rgb;
+}
+
+fn sun_light() -> vec3f {
+  if (view.look == LOOK_PAPER) { return vec3f(2.75, 2.66, 2.5); }
+  return textureLoad(ambient_lut, vec2i(6, 0), 0).rgb;
+}
+
+// Diffuse light of sky and far ground on a surface with this normal (irradiance / pi).
+fn ambient_light(n: vec3f) -> vec3f {
+  if (view.look == LOOK_PAPER) { return mix(vec3f(0.20, 0.19, 0.18), vec3f(0.40, 0.41, 0.43), n.z * 0.5 + 0.5); }
+  let q = n * n;
+  let x = textureLoad(ambient_lut, vec2i(select(0, 1, n.x < 0.0), 0), 0).rgb;
+  let y = textureLoad(ambient_lut, vec2i(select(2, 3, n.y < 0.0), 0), 0).rgb;
+  let z = textureLoad(ambient_lut, vec2i(select(4, 5, n.z < 0.0), 0), 0).rgb;
+  return q.x * x + q.y * y + q.z * z;
+}
+
+// Extinction between the eye and a point at `distance` along `dir`: haze that thins out with height.
+fn haze_depth(dir: vec3f, distance: f32) -> f32 {
+  let scale = 0.16 * view.size;
+  let k = dir.z / scale;
+  let start = exp(-max(view.eye.z - view.low, -scale) / scale);
+  let along = select((1.0 - exp(-clamp(k * distance, -20.0, 40.0))) / k, distance, abs(k * distance) < 1.0e-3);
+  return view.haze * start * along;
+}
+
+// Light that reaches the eye from `colour` through the air.
+fn through_air(colour: vec3f, dir: vec3f, distance: f32) -> vec3f {
+  if (view.eye.w > 0.5) { return colour; }
+  let depth = haze_depth(dir, distance);
+  let through = exp(-depth * vec3f(0.72, 0.92, 1.22));
+  let glow = sky_colour(normalize(vec3f(dir.xy, max(dir.z, 0.0) + 0.035)));
+  return colour * through + glow * (vec3f(1.0) - through);
+}

@@ -1,0 +1,73 @@
+// The ground: one instanced draw of all patches.
+struct TerrainVertex {
+  @builtin(position) position: vec4f,
+  @location(0) world: vec3f,
+  @location(1) at: vec2f,
+  @location(2) morph: f32,
+  @location(3) @interpolate(flat) record: vec4u,
+};
+
+@vertex
+fn terrain_vertex(@builtin(vertex_index) index: u32, patch_in: PatchIn) -> TerrainVertex {
+  let v = patch_vertex(patch_in.record, vec2i(i32(index % PITCH), i32(index / PITCH)));
+  var out: TerrainVertex;
+  out.position = view.view_proj * vec4f(v.world, 1.0);
+  out.world = v.world;
+  out.at = v.at;
+  out.morph = v.morph;
+  out.record = patch_in.record;
+  return out;
+}
+
+// Sun, sky and the far ground on a rough surface.
+fn shade(m: Material, gradient: vec2f, surface: Surface, dir: vec3f) -> vec3f {
+  let n = normalize(vec3f(-(gradient + m.slope), 1.0));
+  let broad = normalize(vec3f(-gradient, 1.0));
+  // Facing the sun counts for the fine relief; whether the sun is up at all for the broad one.
+  let facing = max(dot(n, view.sun.xyz), 0.0) * smoothstep(-0.08, 0.12, dot(broad, view.sun.xyz));
+  let hollow = clamp(1.0 - max(surface.curvature, 0.0) * 0.35, 0.6, 1.0);
+  let open = surface.sky * hollow;
+  let sun = sun_light() * (facing * surface.sun / 3.14159265);
+  let sky = ambient_light(n) * open;
+  // Light from the slopes around, strongest where little sky is seen.
+  let bounce = sun_light() * (0.055 * max(view.sun.z, 0.0)) * (1.0 - open * 0.75);
+  var colour = m.albedo * (sun + sky + bounce);
+  if (m.gloss > 0.0) {
+    let half_way = normalize(view.sun.xyz - dir);
+    let sheen = pow(max(dot(n, half_way), 0.0), 24.0) * 0.10 + pow(max(dot(dir, view.sun.xyz), 0.0), 6.0) * 0.05;
+    colour += sun_light() * surface.sun * sheen * m.gloss * facing;
+  }
+  return colour;
+}
+
+@fragment
+fn terrain_fragment(v: TerrainVertex) -> @location(0) vec4f {
+  let f = Footprint(dpdx(v.world), dpdy(v.world));
+  let rate = abs(f.dx.z) + abs(f.dy.z);
+  let surface = patch_surface(v.record, v.at, v.morph);
+  let site = survey(v.world, surface.gradient, surface.curvature, f);
+  var m = ground_material(site);
+  if (view.overlay == OVERLAY_SLOPE) {
+    m.albedo = mix(m.albedo, slope_tint(site.steep), 0.8);
+    m.gloss = 0.0;
+  } else if (view.overlay == OVERLAY_PATCHES) {
+    m.albedo = mix(m.albedo, level_tint(patch_level(v.record)) * 0.5, 0.7);
+  }
+  let dir = ray_to(v.world);
+  var colour = shade(m, surface.gradient, surface, dir);
+  if (view.grid > 0.0) {
+    let line = scale_grid(v.world.xy, f) * view.grid * exp(-distance(v.world, view.eye.xyz) / (1.1 * view.size) * (1.0 - view.eye.w));
+    colour = mix(colour, colour * 1.9 + vec3f(0.05), line * 0.42);
+  }
+  let strength = select(view.contour_strength, max(view.contour_strength, 0.8), view.overlay == OVERLAY_CONTOURS);
+  if (strength > 0.0) {
+    colour *= 1.0 - contours(v.world.z, rate) * strength * 0.75;
+  }
+  if (view.overlay == OVERLAY_PATCHES) {
+    let cell = abs(fract(v.at / f32(PATCH_CELLS) - 0.5) - 0.5) * f32(PATCH_CELLS);
+    colour = mix(colour, vec3f(0.9), 0.6 * (1.0 - smoothstep(0.1, 0.5, min(cell.x, cell.y))));
+  }
+  colour = through_air(colour, dir, distance(v.world, view.eye.xyz));
+  let shown = display(colour, v.position.xy);
+  return vec4f(with_cursors(shown.rgb, v.world), 1.0);
+}

@@ -1,0 +1,65 @@
+// Everything that all passes of one frame share. The host reads the layout of `View` from this text (gpu/layout.ts).
+struct View {
+  view_proj: mat4x4f,
+  eye: vec4f,            // xyz; w = 1 for an orthographic camera
+  right: vec4f,          // camera axes; w of right, up: tangent of half the field of view, horizontally and vertically
+  up: vec4f,
+  forward: vec4f,        // w: metres per pixel at distance 1 (orthographic: metres per pixel)
+  sun: vec4f,            // unit vector to the sun; w = sine of its elevation
+  viewport: vec2f,       // pixels that are drawn
+  time: f32,
+  size: f32,             // side of the domain, metres
+  base: f32,             // height of the plane on which the block stands, metres
+  sea: f32,              // sea level, metres
+  has_sea: f32,          // 1 or 0
+  exposure: f32,
+  haze: f32,             // extinction per metre at the ground
+  low: f32,              // lowest and highest ground, metres
+  high: f32,
+  grid: f32,             // strength of the scale grid, 0..1
+  contour: f32,          // contour interval, metres
+  contour_strength: f32,
+  look: u32,
+  overlay: u32,
+  cursor_count: u32,
+  cursors: array<vec4f, 64>,  // pairs: (x, y, radius in metres, line width in metres), (rgb, opacity)
+};
+
+const LOOK_NATURAL: u32 = 0u;
+const LOOK_ALPINE: u32 = 1u;
+const LOOK_DESERT: u32 = 2u;
+const LOOK_PAPER: u32 = 3u;
+
+const OVERLAY_NONE: u32 = 0u;
+const OVERLAY_CONTOURS: u32 = 1u;
+const OVERLAY_SLOPE: u32 = 2u;
+const OVERLAY_PATCHES: u32 = 3u;
+
+// 2: everything; 1: fewer noise octaves for software adapters.
+override DETAIL: u32 = 2u;
+
+@group(0) @binding(0) var<uniform> view: View;
+@group(0) @binding(1) var heights: texture_2d_array<f32>;
+@group(0) @binding(2) var slopes: texture_2d_array<f32>;
+@group(0) @binding(3) var light: texture_2d_array<f32>;
+@group(0) @binding(4) var sky_lut: texture_2d<f32>;
+@group(0) @binding(5) var ambient_lut: texture_2d<f32>;
+@group(0) @binding(6) var noise: texture_2d<f32>;
+@group(0) @binding(7) var smooth_clamp: sampler;
+@group(0) @binding(8) var smooth_repeat: sampler;
+
+// Vector from the eye to a point; for an orthographic camera all rays are parallel.
+fn ray_to(p: vec3f) -> vec3f {
+  return select(normalize(p - view.eye.xyz), view.forward.xyz, view.eye.w > 0.5);
+}
+
+// Ray through a pixel, not normalised. `ndc` from -1 to 1.
+fn ray_through(ndc: vec2f) -> vec3f {
+  let d = view.forward.xyz + ndc.x * view.right.w * view.right.xyz + ndc.y * view.up.w * view.up.xyz;
+  return select(normalize(d), view.forward.xyz, view.eye.w > 0.5);
+}
+
+// Metres that one pixel covers at a point.
+fn pixel_size(p: vec3f) -> f32 {
+  return select(distance(p, view.eye.xyz), 1.0, view.eye.w > 0.5) * view.forward.w;
+}

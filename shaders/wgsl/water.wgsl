@@ -1,0 +1,101 @@
+// The sea: absorption by depth, waves, Fresnel reflection of the sky, the sun's glitter, foam at the shore. Inside the
+// domain it is drawn on the patches themselves, so that its shore is exactly the ground's contour; outside it is part of
+// the background.
+
+// Absorption per metre of clear water, and what it scatters back.
+const WATER_ABSORB: vec3f = vec3f(0.16, 0.055, 0.040);
+const WATER_SCATTER: vec3f = vec3f(0.008, 0.042, 0.052);
+
+fn wave_slope(p: vec2f, distance: f32) -> vec2f {
+  let lod = log2(max(distance * view.forward.w, 1.0e-3) * 256.0);
+  var slope = vec2f(0.0);
+  let drift = view.time * vec2f(0.6, 0.35);
+  let a = textureSampleLevel(noise, smooth_repeat, (p + drift * 6.0) / 160.0, max(lod - log2(160.0), 0.0));
+  let b = textureSampleLevel(noise, smooth_repeat, (p.yx * vec2f(1.0, -1.0) - drift * 3.0) / 47.0, max(lod - log2(47.0), 0.0));
+  slope += noise_slope(a) * 0.030 + noise_slope(b).yx * 0.035;
+  if (DETAIL > 1u) {
+    let c = textureSampleLevel(noise, smooth_repeat, (p - drift * 1.7) / 11.0, max(lod - log2(11.0), 0.0));
+    slope += noise_slope(c) * 0.035;
+  }
+  return slope;
+}
+
+// Colour of the water (not yet through the air) and how much of it hides what is below.
+// `bed` is the lit ground under it, used where there is no ground to blend with (then the result is opaque).
+fn water_surface(p: vec3f, dir: vec3f, depth: f32, foam_noise: vec3f, bed: vec3f) -> vec4f {
+  let distance = distance(p, view.eye.xyz) * (1.0 - view.eye.w) + view.eye.w * 1.0;
+  let n = normalize(vec3f(-wave_slope(p.xy, distance), 1.0));
+  let facing = max(dot(n, -dir), 0.0);
+  let fresnel = 0.02 + 0.98 * pow(1.0 - facing, 5.0);
+  var mirror = reflect(dir, n);
+  mirror.z = abs(mirror.z);
+  let light = sun_light() * max(view.sun.z, 0.0) / 3.14159265 + ambient_light(vec3f(0.0, 0.0, 1.0));
+  let path = max(depth, 0.0) * (1.0 + 1.0 / max(facing, 0.25)) * 0.5 * clamp(4096.0 / view.size, 0.25, 4.0);
+  let through = exp(-WATER_ABSORB * path);
+  let body = WATER_SCATTER * light * (vec3f(1.0) - through) + bed * through;
+  let half_way = normalize(view.sun.xyz - dir);
+  let glitter = pow(max(dot(n, half_way), 0.0), 420.0) * 9.0 + pow(max(dot(n, half_way), 0.0), 60.0) * 0.25;
+  var colour = body * (1.0 - fresnel) + (sky_colour(normalize(mirror)) + sun_light() * glitter) * fresnel;
+  var hides = clamp(1.0 - (1.0 - fresnel) * dot(through, vec3f(0.2, 0.4, 0.4)), 0.0, 1.0);
+  if (foam_noise.z > 0.0) {
+    let band = depth / (0.0011 * view.size);
+    let wash = 0.5 + 0.5 * sin(band * 9.0 - view.time * 1.1 + foam_noise.x * 9.0);
+    let foam = (1.0 - smoothstep(0.0, 1.0, band)) * smoothstep(0.40, 0.72, foam_noise.y * 0.8 + wash * 0.25 + (1.0 - band) * 0.25);
+    colour = mix(colour, vec3f(0.75) * light, foam * 0.75);
+    hides = max(hides, foam * 0.75);
+    hides *= smoothstep(0.0, 0.0002 * view.size, depth);
+  }
+  return vec4f(colour, hides);
+}
+
+// The root tile is the first to enter the atlas and never leaves.
+const ROOT_SLOT: u32 = 0u;
+
+// Distance outside the square of the domain.
+fn outside_domain(p: vec2f) -> f32 {
+  return length(max(max(-p, p - vec2f(view.size)), vec2f(0.0)));
+}
+
+// Depth of the sea outside the domain: the bed falls away from the border's height.
+fn sea_depth(p: vec2f) -> f32 {
+  let at = clamp(p / view.size, vec2f(0.0), vec2f(1.0)) * f32(TILE_CELLS);
+  let i = min(vec2i(at), vec2i(TILE_CELLS - 1));
+  let f = at - vec2f(i);
+  let o = slot_origin(ROOT_SLOT) + i;
+  let layer = slot_layer(ROOT_SLOT);
+  let south = mix(textureLoad(heights, o, layer, 0).x, textureLoad(heights, o + vec2i(1, 0), layer, 0).x, f.x);
+  let north = mix(textureLoad(heights, o + vec2i(0, 1), layer, 0).x, textureLoad(heights, o + vec2i(1, 1), layer, 0).x, f.x);
+  return max(view.sea - mix(south, north, f.y), 0.0) + outside_domain(p) * 0.22;
+}
+
+fn sea_bed(p: vec2f) -> vec3f {
+  let light = sun_light() * max(view.sun.z, 0.0) / 3.14159265 + ambient_light(vec3f(0.0, 0.0, 1.0));
+  return vec3f(0.22, 0.17, 0.11) * light;
+}
+
+struct WaterVertex {
+  @builtin(position) position: vec4f,
+  @location(0) world: vec3f,
+  @location(1) depth: f32,
+};
+
+@vertex
+fn water_vertex(@builtin(vertex_index) index: u32, patch_in: PatchIn) -> WaterVertex {
+  let v = patch_vertex(patch_in.record, vec2i(i32(index % PITCH), i32(index / PITCH)));
+  let world = vec3f(v.world.xy, view.sea);
+  return WaterVertex(view.view_proj * vec4f(world, 1.0), world, view.sea - v.world.z);
+}
+
+@fragment
+fn water_fragment(v: WaterVertex) -> @location(0) vec4f {
+  let f = Footprint(dpdx(v.world), dpdy(v.world));
+  if (v.depth < 0.0) { discard; }
+  let a = ground_noise(v.world, f, 23.0);
+  let b = ground_noise(v.world + vec3f(view.time * 0.8, 0.0, 0.0), f, 7.0);
+  let dir = ray_to(v.world);
+  let water = water_surface(v.world, dir, v.depth, vec3f(a.r, mix(a.g, b.g, 0.5), 1.0), vec3f(0.0));
+  // Over the ground, the bed shows through by blending; its share was left out of the colour.
+  let colour = through_air(water.rgb / max(water.a, 0.02), dir, distance(v.world, view.eye.xyz));
+  let shown = display(colour, v.position.xy);
+  return vec4f(with_cursors(shown.rgb, v.world), water.a);
+}
