@@ -36,7 +36,7 @@ type Method = "GET" | "POST" | "DELETE";
 
 async function request(method: Method, path: string, secret?: string, body?: unknown): Promise<Response> {
   const headers: Record<string, string> = {};
-  if (secret) headers["Authorization"] = `Bearer ${secret}`;
+  if (secret) headers.Authorization = `Bearer ${secret}`;
   const init: RequestInit = { method, headers };
   if (body instanceof Blob) {
     headers["Content-Type"] = "application/octet-stream";
@@ -79,6 +79,10 @@ export const api = {
   open: (file: Blob): Promise<OpenedTerrain> => json("POST", "/api/terrains/import", undefined, file),
 
   join: (code: string): Promise<OpenedTerrain> => json("POST", "/api/join", undefined, { code }),
+
+  /** Answers only to a living secret. */
+  about: (id: string, secret: string): Promise<{ readonly id: string; readonly role: Role }> =>
+    json("GET", `/api/terrains/${id}`, secret),
 
   archive: async (id: string, secret: string): Promise<Blob> =>
     (await request("GET", `/api/terrains/${id}/archive`, secret)).blob(),

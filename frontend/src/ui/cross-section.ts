@@ -54,7 +54,7 @@ function halfWidth(section: Section): number {
 }
 
 /** Fits the section into a picture of the given size in pixels. A flat section is drawn with a height to grip. */
-export function fit(section: Section, width: number, height: number): Frame {
+export function fitFrame(section: Section, width: number, height: number): Frame {
   const half = halfWidth(section);
   const relief = Math.max(Math.abs(section.reliefM), 0.22 * half);
   const pxPerM = Math.min((width / 2 - PAD_X) / half, (height - 2 * PAD_Y) / relief);
@@ -77,7 +77,8 @@ export function flankShare(flank: Flank, reliefM: number, t: number): number {
   const u = foot > 0 ? Math.min(Math.max(t / foot, 0), 1) : 1;
   if (flank.slope_deg === null) return 1 - u * u * (3 - 2 * u);
   const fall = (Math.tan(flank.slope_deg * DEG) * foot) / Math.max(Math.abs(reliefM), 1e-9);
-  const bend = flank.shape === "concave" ? u + 0.35 * u * (1 - u) : flank.shape === "convex" ? u - 0.35 * u * (1 - u) : u;
+  const bend =
+    flank.shape === "concave" ? u + 0.35 * u * (1 - u) : flank.shape === "convex" ? u - 0.35 * u * (1 - u) : u;
   return 1 - Math.min(fall, 1) * bend;
 }
 
@@ -183,12 +184,20 @@ export function drag(
   const relief = Math.abs(reliefOf(frame));
   const out = Math.abs(at.x - frame.centreX) / frame.pxPerM;
   if (knob === "plateau") {
-    return { ...section, plateauRadiusM: clamp(nice((at.x - frame.centreX) / frame.pxPerM, frame), 0, limits.maxPlateauM) };
+    return {
+      ...section,
+      plateauRadiusM: clamp(nice((at.x - frame.centreX) / frame.pxPerM, frame), 0, limits.maxPlateauM),
+    };
   }
   const [side, what] = knob.split("-") as [Side, "slope" | "extent"];
   const t = Math.max(out - section.plateauRadiusM, 0);
   if (what === "extent") {
-    return withFlank(section, side, { extent_m: clamp(nice(t, frame), nice(2 / frame.pxPerM, frame), limits.maxExtentM) }, linked);
+    return withFlank(
+      section,
+      side,
+      { extent_m: clamp(nice(t, frame), nice(2 / frame.pxPerM, frame), limits.maxExtentM) },
+      linked,
+    );
   }
   const drop = clamp(Math.abs(at.y - frame.crestY) / frame.pxPerM, 0, relief);
   const slope = Math.atan2(drop, Math.max(t, 1e-6)) / DEG;
@@ -196,7 +205,14 @@ export function drag(
 }
 
 /** The section after an arrow key on a knob: one degree, or about a hundredth of the picture. */
-export function nudge(section: Section, frame: Frame, knob: KnobId, steps: number, linked: boolean, limits: SectionLimits): Section {
+export function nudge(
+  section: Section,
+  frame: Frame,
+  knob: KnobId,
+  steps: number,
+  linked: boolean,
+  limits: SectionLimits,
+): Section {
   const stepM = nice(frame.width / frame.pxPerM / 100, frame);
   if (knob === "plateau") {
     return { ...section, plateauRadiusM: clamp(section.plateauRadiusM + steps * stepM, 0, limits.maxPlateauM) };
@@ -205,7 +221,12 @@ export function nudge(section: Section, frame: Frame, knob: KnobId, steps: numbe
   const flank = section[side];
   if (flank === null) return section;
   if (what === "extent") {
-    return withFlank(section, side, { extent_m: clamp(flank.extent_m + steps * stepM, stepM, limits.maxExtentM) }, linked);
+    return withFlank(
+      section,
+      side,
+      { extent_m: clamp(flank.extent_m + steps * stepM, stepM, limits.maxExtentM) },
+      linked,
+    );
   }
   if (flank.slope_deg === null) return section;
   return withFlank(section, side, { slope_deg: clamp(flank.slope_deg + steps, 0, MAX_SLOPE_DEG) }, linked);

@@ -84,7 +84,8 @@ export class EskHelp extends SignalElement {
           <h3>Keys</h3>
           <dl>
             ${[...this.stage.input.actions.values()].map(
-              (a) => html`<div class="pair"><dt>${a.title}</dt><dd>${a.keys.map((k, i) => keyCombination(k, i > 0))}</dd></div>`,
+              (a) =>
+                html`<div class="pair"><dt>${a.title}</dt><dd>${a.keys.map((k, i) => keyCombination(k, i > 0))}</dd></div>`,
             )}
           </dl>
         </div>

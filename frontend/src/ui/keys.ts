@@ -19,8 +19,7 @@ const NAMES: Readonly<Record<string, string>> = {
 
 /** One combination such as `Ctrl+Shift+z` as the parts that are printed: ["Ctrl", "Shift", "Z"]. */
 export function keyParts(combination: string): string[] {
-  const parts = combination === "+" ? ["+"] : combination.split("+").map((p) => (p === "" ? "+" : p));
-  return parts.map((part) => NAMES[part] ?? (part.length === 1 ? part.toUpperCase() : part));
+  return combination.split(/\+(?=.)/).map((part) => NAMES[part] ?? (part.length === 1 ? part.toUpperCase() : part));
 }
 
 export function keyLabel(combination: string): string {

@@ -40,10 +40,16 @@ export function readJoinInput(text: string, origin: string): JoinInput {
     return { kind: "unreadable", message: "This is neither a code of six characters nor a link to a terrain." };
   }
   if (url.origin !== origin) {
-    return { kind: "unreadable", message: `This link belongs to another server (${url.host}). Open it in its own tab.` };
+    return {
+      kind: "unreadable",
+      message: `This link belongs to another server (${url.host}). Open it in its own tab.`,
+    };
   }
   if (target.secret === "") {
-    return { kind: "unreadable", message: "The part after # is missing. Copy the whole link, including what follows #." };
+    return {
+      kind: "unreadable",
+      message: "The part after # is missing. Copy the whole link, including what follows #.",
+    };
   }
   return { kind: "link", id: target.id, secret: target.secret };
 }

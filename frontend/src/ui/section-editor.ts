@@ -1,5 +1,16 @@
 import { css, html, LitElement, svg, type TemplateResult } from "lit";
-import { drag, type Frame, fit, type Knob, type KnobId, knobs, nudge, outline, type Section, type SectionLimits } from "./cross-section.ts";
+import {
+  drag,
+  type Frame,
+  fitFrame,
+  type Knob,
+  type KnobId,
+  knobs,
+  nudge,
+  outline,
+  type Section,
+  type SectionLimits,
+} from "./cross-section.ts";
 import { shared } from "./styles/shared.ts";
 import { metres } from "./words.ts";
 
@@ -106,7 +117,7 @@ export class EskSection extends LitElement {
     const target = event.currentTarget as SVGElement;
     target.setPointerCapture(event.pointerId);
     target.focus();
-    this.frame = fit(this.section, WIDTH, HEIGHT);
+    this.frame = fitFrame(this.section, WIDTH, HEIGHT);
     this.active = id;
   }
 
@@ -133,7 +144,7 @@ export class EskSection extends LitElement {
     if (steps === undefined || this.disabled) return;
     event.preventDefault();
     event.stopPropagation();
-    this.section = nudge(this.section, fit(this.section, WIDTH, HEIGHT), id, steps, this.linked, this.limits);
+    this.section = nudge(this.section, fitFrame(this.section, WIDTH, HEIGHT), id, steps, this.linked, this.limits);
     this.#emit("section", this.section);
     this.#emit("settle", this.section);
   }
@@ -163,7 +174,7 @@ export class EskSection extends LitElement {
   }
 
   protected override render(): TemplateResult {
-    const frame = this.frame ?? fit(this.section, WIDTH, HEIGHT);
+    const frame = this.frame ?? fitFrame(this.section, WIDTH, HEIGHT);
     return html`
       <svg viewBox="0 0 ${WIDTH} ${HEIGHT}" role="group" aria-label="Cross-section, seen along the stroke">
         ${svg`<line class="ground" x1="0" x2=${WIDTH} y1=${frame.baseY} y2=${frame.baseY}></line>

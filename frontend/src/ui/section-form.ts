@@ -138,7 +138,8 @@ export class EskSectionForm extends LitElement {
       ></esk-section>
       <div class="presets" role="group" aria-label="Presets">
         ${presetsFor(this.sense).map(
-          (p) => html`<button class="btn" ?disabled=${this.disabled} @click=${() => this.#preset(p)}>${p.title}</button>`,
+          (p) =>
+            html`<button class="btn" ?disabled=${this.disabled} @click=${() => this.#preset(p)}>${p.title}</button>`,
         )}
       </div>
       <esk-range

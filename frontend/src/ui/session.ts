@@ -8,6 +8,7 @@ import type { DecodedFrame } from "../core/types.ts";
 import { type Doc, Refusal } from "../doc/document.ts";
 import { SyncDoc } from "../doc/sync.ts";
 import type {
+  ErrorMessage,
   Hello,
   Member,
   MemberPresence,
@@ -21,10 +22,19 @@ import type {
 } from "../generated/contract.ts";
 import { MAX_PRESENCE_PER_SECOND, PRESENCE_HZ, PROTOCOL_VERSION } from "../generated/contract.ts";
 import { Connection } from "../net/connection.ts";
+import { terrainPath } from "./links.ts";
 import type { People } from "./scene.ts";
 import { Stage } from "./stage.ts";
 import { type Status, status } from "./status.ts";
-import { deviceStore, type Identity, identity, rememberIdentity, rememberTerrain, type Store } from "./storage.ts";
+import {
+  deviceStore,
+  forgetSecret,
+  type Identity,
+  identity,
+  rememberIdentity,
+  rememberTerrain,
+  type Store,
+} from "./storage.ts";
 import { Throttle } from "./throttle.ts";
 import { ToastList } from "./toasts.ts";
 
@@ -39,7 +49,7 @@ export interface ServerInfo {
 
 export class TerrainSession {
   readonly id: string;
-  readonly secret: string;
+  secret: string;
   readonly client: string;
   readonly store: Store = deviceStore();
   readonly toasts = new ToastList();
@@ -69,6 +79,7 @@ export class TerrainSession {
     this.me.value = identity(this.store, Math.random);
     this.doc = new SyncDoc(this.client);
     this.doc.onRefused((refusal) => this.toasts.show(refusal.message, "warn"));
+    this.doc.onDiverged(() => this.connection.reconnect());
     this.connection = new Connection({
       url: `${window.location.protocol === "https:" ? "wss" : "ws"}://${window.location.host}/ws`,
       hello: () => this.#hello(),
@@ -122,6 +133,17 @@ export class TerrainSession {
     return `panel-${this.#gesture}`;
   }
 
+  /** Goes on with a new secret for the same link, in the address bar and in this device's memory too. */
+  adoptSecret(secret: string): void {
+    forgetSecret(this.store, this.id, this.secret);
+    this.secret = secret;
+    window.history.replaceState(null, "", terrainPath(this.id, secret));
+    const doc = this.doc.doc.peek();
+    const role = this.role.peek();
+    if (!doc || !role) return;
+    rememberTerrain(this.store, { id: this.id, secret, title: doc.settings.title, role, opened: Date.now() });
+  }
+
   rename(who: Identity): void {
     const name = who.name.trim().slice(0, 80);
     this.me.value = { name, colour: who.colour };
@@ -165,7 +187,11 @@ export class TerrainSession {
   #watch(): void {
     this.#stops.push(
       effect(() => {
+        this.doc.doc.value;
         if (this.doc.pending.value > 0) queueMicrotask(() => this.#flush());
+      }),
+      effect(() => {
+        if (this.connection.state.value === "reconnecting") this.doc.disconnected();
       }),
       effect(() => {
         const doc = this.doc.doc.value;
@@ -213,11 +239,18 @@ export class TerrainSession {
         if (message.note) this.toasts.show(message.note, "warn");
         break;
       case "error":
-        if (!message.fatal) this.toasts.show(message.message, "warn");
+        this.#error(message);
         break;
       case "pong":
         break;
     }
+  }
+
+  #error(message: ErrorMessage): void {
+    if (!message.fatal) this.toasts.show(message.message, "warn");
+    // A dead link must not stand among the recent terrains, nor keep a living one from taking its place.
+    else if (["bad_secret", "revoked", "no_terrain"].includes(message.code))
+      forgetSecret(this.store, this.id, this.secret);
   }
 
   #welcome(message: Welcome): void {

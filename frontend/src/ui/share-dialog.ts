@@ -112,7 +112,9 @@ export class EskShare extends SignalElement {
   async #rotate(link: AccessLink): Promise<void> {
     const { session } = this.stage;
     const { secret } = await api.rotateLink(session.id, session.secret, link.id);
-    if (link.role !== "owner") {
+    if (link.role === "owner") {
+      if (await dead(session.id, session.secret)) session.adoptSecret(secret);
+    } else {
       this.made = rememberLink(session.store, session.id, link.role, { link: link.id, secret });
       this.tab = link.role;
     }
@@ -205,15 +207,24 @@ export class EskShare extends SignalElement {
               <li>
                 <span class="name">${l.name || WORDS[l.role].label}</span>
                 <span class="quiet">${WORDS[l.role].label}</span>
-                ${
-                  l.role === "owner"
-                    ? html`<span class="quiet">yours</span>`
-                    : html`
-                        <button class="icon-btn small" title="Replace by a new link" aria-label="Replace by a new link"
-                          ?disabled=${this.busy} @click=${() => this.#try(() => this.#rotate(l))}>${icon("rotate")}</button>
-                        <button class="icon-btn small" title="Revoke" aria-label="Revoke"
-                          ?disabled=${this.busy} @click=${() => this.#try(() => this.#revoke(l))}>${icon("trash")}</button>`
-                }
+                <button
+                  class="icon-btn small"
+                  title="Replace by a new link"
+                  aria-label=${`Replace ${l.name || WORDS[l.role].label} by a new link`}
+                  ?disabled=${this.busy}
+                  @click=${() => this.#try(() => this.#rotate(l))}
+                >
+                  ${icon("rotate")}
+                </button>
+                <button
+                  class="icon-btn small"
+                  title="Revoke"
+                  aria-label=${`Revoke ${l.name || WORDS[l.role].label}`}
+                  ?disabled=${this.busy}
+                  @click=${() => this.#try(() => this.#revoke(l))}
+                >
+                  ${icon("trash")}
+                </button>
               </li>
             `,
           )}
@@ -224,6 +235,16 @@ export class EskShare extends SignalElement {
 
   #hidden(event: Event): void {
     if (event.target === event.currentTarget) this.dispatchEvent(new CustomEvent("close"));
+  }
+}
+
+/** Whether a secret no longer opens the terrain. */
+async function dead(id: string, secret: string): Promise<boolean> {
+  try {
+    await api.about(id, secret);
+    return false;
+  } catch (error) {
+    return error instanceof ApiError && ["bad_secret", "revoked"].includes(error.code);
   }
 }
 

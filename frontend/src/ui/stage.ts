@@ -7,8 +7,10 @@ import type { MemberPresence } from "../generated/contract.ts";
 import { DEFAULT_TAU_PX } from "../generated/contract.ts";
 import { createMapRenderer, createRenderer, NoWebGpu } from "../gpu/index.ts";
 import { InputController } from "../input/controller.ts";
+import { type ToolDefaults, toolDefaults } from "../input/defaults.ts";
 import { TileStore } from "../tiles/store.ts";
 import { FrameLoop } from "./frame-loop.ts";
+import { FreshTiles } from "./fresh-tiles.ts";
 import { cursorVisuals, strokeVisuals } from "./scene.ts";
 import type { TerrainSession } from "./session.ts";
 
@@ -32,6 +34,7 @@ export class Stage {
   readonly camera: Camera;
   readonly tiles: TileStore;
   readonly input: InputController;
+  readonly defaults: ToolDefaults;
   readonly loop: FrameLoop;
   readonly overlay = signal<Scene["overlay"]>("none");
   readonly showStrokes = signal(true);
@@ -45,6 +48,7 @@ export class Stage {
   readonly #calm = window.matchMedia("(prefers-reduced-motion: reduce)");
   readonly #stops: (() => void)[] = [];
   #renderer: SceneRenderer | null = null;
+  #fresh: FreshTiles | null = null;
   #disposed = false;
 
   constructor({ session, sizeM, levels, viewport }: StageOptions) {
@@ -54,6 +58,7 @@ export class Stage {
     this.#viewport = viewport;
     this.camera = new Camera(sizeM);
     this.tiles = new TileStore(sizeM, levels);
+    this.defaults = toolDefaults(sizeM);
     this.loop = new FrameLoop((dt, time) => this.#draw(dt, time));
     this.input = new InputController({
       canvas: viewport,
@@ -63,6 +68,7 @@ export class Stage {
       freeze: () => this.tiles.freeze(),
       clientId: session.client,
       canEdit: () => session.canEdit.value,
+      defaults: this.defaults,
       onCursor: (point) => {
         this.cursor.value = point;
       },
@@ -80,12 +86,24 @@ export class Stage {
   }
 
   apply(frame: DecodedFrame): void {
-    this.tiles.apply(frame);
+    if (this.#fresh) this.#fresh.apply(frame);
+    else this.tiles.apply(frame);
   }
 
-  /** The server starts anew after a reconnect and sends every tile again. */
+  /** The server starts anew after a reconnect and sends every tile again: the old ground stays until the new is here. */
   restart(): void {
-    this.tiles.clear();
+    this.#fresh?.stop();
+    this.#fresh = new FreshTiles(this.tiles, () => {
+      this.#fresh = null;
+    });
+  }
+
+  /** Where a world point is in the window: CSS pixels. */
+  toWindow(point: Vec3): { x: number; y: number; visible: boolean } {
+    const p = this.camera.project(point);
+    const box = this.#viewport.getBoundingClientRect();
+    const ratio = this.camera.state.peek().width / Math.max(1, box.width);
+    return { x: box.left + p.x / ratio, y: box.top + p.y / ratio, visible: p.visible };
   }
 
   /** Follows a person's view until I move the camera myself; the same person again stops it. */
@@ -106,6 +124,7 @@ export class Stage {
 
   dispose(): void {
     this.#disposed = true;
+    this.#fresh?.stop();
     this.loop.stop();
     for (const stop of this.#stops) stop();
     this.input.dispose();

@@ -38,11 +38,11 @@ function isRecent(value: unknown): value is RecentTerrain {
   if (typeof value !== "object" || value === null) return false;
   const v = value as Record<string, unknown>;
   return (
-    typeof v["id"] === "string" &&
-    typeof v["title"] === "string" &&
-    typeof v["secret"] === "string" &&
-    typeof v["opened"] === "number" &&
-    ["owner", "edit", "view"].includes(String(v["role"]))
+    typeof v.id === "string" &&
+    typeof v.title === "string" &&
+    typeof v.secret === "string" &&
+    typeof v.opened === "number" &&
+    ["owner", "edit", "view"].includes(String(v.role))
   );
 }
 
@@ -70,6 +70,11 @@ export function rememberTerrain(store: Store, entry: RecentTerrain): void {
 
 export function forgetTerrain(store: Store, id: string): void {
   write(store, RECENT_KEY, JSON.stringify(recentTerrains(store).filter((r) => r.id !== id)));
+}
+
+/** Forgets a terrain if it is remembered with this secret. */
+export function forgetSecret(store: Store, id: string, secret: string): void {
+  if (recentTerrains(store).some((r) => r.id === id && r.secret === secret)) forgetTerrain(store, id);
 }
 
 function write(store: Store, key: string, value: string): void {

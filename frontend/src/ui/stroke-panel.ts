@@ -1,5 +1,6 @@
 import { html, nothing, type TemplateResult } from "lit";
 import type { Stroke } from "../generated/contract.ts";
+import type { DrawToolId } from "../input/defaults.ts";
 import { icon } from "./icons.ts";
 import { reliefOf, shapeOf } from "./scene.ts";
 import type { SectionChange } from "./section-form.ts";
@@ -8,7 +9,6 @@ import { SignalElement } from "./signal-element.ts";
 import type { Stage } from "./stage.ts";
 import { panelStyles } from "./styles/panel.ts";
 import { shared } from "./styles/shared.ts";
-import { type DrawTool, defaultsFor, setDefaults } from "./tool-defaults.ts";
 
 const LISTED = 200;
 
@@ -97,8 +97,12 @@ export class EskStrokePanel extends SignalElement {
         ${iconButton("swap", "Swap left and right", !disabled, false, () =>
           session.setStroke(stroke.id, { left: stroke.right, right: stroke.left }),
         )}
-        ${iconButton(stroke.hidden ? "eye-slash" : "eye", stroke.hidden ? "Show" : "Hide", !disabled, stroke.hidden, () =>
-          session.setStroke(stroke.id, { hidden: !stroke.hidden }),
+        ${iconButton(
+          stroke.hidden ? "eye-slash" : "eye",
+          stroke.hidden ? "Show" : "Hide",
+          !disabled,
+          stroke.hidden,
+          () => session.setStroke(stroke.id, { hidden: !stroke.hidden }),
         )}
         ${iconButton(stroke.locked ? "lock" : "unlock", stroke.locked ? "Unlock" : "Lock", edit, stroke.locked, () =>
           session.setStroke(stroke.id, { locked: !stroke.locked }),
@@ -108,19 +112,22 @@ export class EskStrokePanel extends SignalElement {
     `;
   }
 
-  #defaults(tool: DrawTool): TemplateResult {
-    const { input, sizeM } = this.stage;
-    const fields = defaultsFor(input, tool);
+  #defaults(tool: DrawToolId): TemplateResult {
+    const { defaults, sizeM } = this.stage;
+    const style = defaults[tool];
+    const { left, right, plateau_radius_m } = style.value;
     const down = tool === "crevice";
     return html`
       <p class="lead">New ${tool === "plateau" ? "plateaus" : tool === "crevice" ? "crevices" : "mountains"} get this cross-section.</p>
       <esk-section-form
         style=${tool === "plateau" ? "--land: var(--esk-plateau)" : ""}
-        .fields=${fields}
+        .fields=${{ left, right, plateau_radius_m }}
         .reliefM=${(down ? -1 : 1) * sizeM * 0.05}
         .sizeM=${sizeM}
         .sense=${down ? "down" : "up"}
-        @change=${(e: CustomEvent<SectionChange>) => setDefaults(input, tool, e.detail.fields)}
+        @change=${(e: CustomEvent<SectionChange>) => {
+          style.value = { ...style.value, ...e.detail.fields };
+        }}
       ></esk-section-form>
     `;
   }

@@ -31,6 +31,7 @@ export function sunWords({ azimuthDeg, elevationDeg }: SunPosition): string {
   const from = `from the ${compass(azimuthDeg)}`;
   if (elevationDeg < 4) return `On the horizon, ${from}`;
   const east = azimuthDeg > 0 && azimuthDeg < 180;
-  const day = elevationDeg > 50 ? "High midday" : `${elevationDeg < 18 ? "Low" : "Soft"} ${east ? "morning" : "evening"}`;
+  const day =
+    elevationDeg > 50 ? "High midday" : `${elevationDeg < 18 ? "Low" : "Soft"} ${east ? "morning" : "evening"}`;
   return `${day} light ${from}, ${Math.round(elevationDeg)}° high`;
 }

@@ -50,7 +50,12 @@ export class EskTerrain extends SignalElement {
     this.#stops = [
       effect(() => {
         const stage = session.stage.value;
-        if (stage) pageActions(stage, { panel: () => this.#togglePanel(), help: () => this.#show("help"), share: () => this.#show("share") });
+        if (stage)
+          pageActions(stage, {
+            panel: () => this.#togglePanel(),
+            help: () => this.#show("help"),
+            share: () => this.#show("share"),
+          });
       }),
       effect(() => this.#followSelection(session.stage.value?.input.selection.value ?? null)),
       effect(() => {
@@ -99,7 +104,11 @@ export class EskTerrain extends SignalElement {
     try {
       const url = URL.createObjectURL(await api.archive(session.id, session.secret));
       const title = session.doc.doc.value?.settings.title ?? "terrain";
-      const name = title.replace(/[^\p{L}\p{N}]+/gu, "-").replace(/^-|-$/g, "").toLowerCase() || "terrain";
+      const name =
+        title
+          .replace(/[^\p{L}\p{N}]+/gu, "-")
+          .replace(/^-|-$/g, "")
+          .toLowerCase() || "terrain";
       Object.assign(document.createElement("a"), { href: url, download: `${name}.esker` }).click();
       setTimeout(() => URL.revokeObjectURL(url), 10_000);
     } catch (error) {
@@ -122,7 +131,8 @@ export class EskTerrain extends SignalElement {
     const reason = this.secret
       ? (session?.connection.reason.value ?? "The connection was closed.")
       : "This link is incomplete: the part after # is missing. Ask for the whole link.";
-    const waiting = session?.connection.state.value === "reconnecting" ? session.connection.reason.value : "Opening the terrain…";
+    const waiting =
+      session?.connection.state.value === "reconnecting" ? session.connection.reason.value : "Opening the terrain…";
     return html`
       <div class="veil" role="status">
         <img src="/favicon.svg" alt="" width="52" height="52" class=${closed ? "" : "breathing"} />
@@ -165,10 +175,7 @@ export class EskTerrain extends SignalElement {
         <header>
           <esk-segmented
             label="Inspector"
-            .segments=${[
-              { value: "stroke", label: "Stroke" },
-              { value: "terrain", label: "Terrain" },
-            ]}
+            .segments=${[{ value: "stroke", label: "Stroke" }, { value: "terrain", label: "Terrain" }]}
             .value=${tab}
             @pick=${(e: CustomEvent<PanelTab>) => {
               this.#openedBySelection = false;
@@ -195,7 +202,9 @@ export class EskTerrain extends SignalElement {
     if (!empty || !session.canEdit.value || input.drawing.value !== null) return nothing;
     const drawn = flag(session.store, "drawn");
     const flat = stage.camera.state.value.mode === "map";
-    const first = flat ? "Draw a ridge on the map — the ground rises along it." : "Draw a line across the land — the ground rises to meet it.";
+    const first = flat
+      ? "Draw a ridge on the map — the ground rises along it."
+      : "Draw a line across the land — the ground rises to meet it.";
     return html`<div class="hint panel">
       ${icon("sketch")}<span>${drawn ? "An empty land. Draw a line." : first}</span>
     </div>`;
@@ -230,7 +239,10 @@ export class EskTerrain extends SignalElement {
       ["Drawn by", stage.renderer.value?.description ?? "–"],
       ["Solved on", server?.device ?? "–"],
       ["Server", server ? `Esker ${server.version}` : "–"],
-      ["Round trip", session.connection.rttMs.value === null ? "–" : `${Math.round(session.connection.rttMs.value)} ms`],
+      [
+        "Round trip",
+        session.connection.rttMs.value === null ? "–" : `${Math.round(session.connection.rttMs.value)} ms`,
+      ],
     ];
     return html`<wa-dialog label="About this terrain" light-dismiss ?open=${this.#dialog.value === "about"} @wa-after-hide=${this.#closeDialog}>
       <dl class="facts">${facts.map(([k, v]) => html`<dt>${k}</dt><dd>${v}</dd>`)}</dl>

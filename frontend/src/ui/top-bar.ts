@@ -206,7 +206,9 @@ export class EskTopBar extends SignalElement {
         <wa-dropdown-item value="help">Keys and help</wa-dropdown-item>
         <wa-dropdown-item value="about">About this terrain</wa-dropdown-item>
         ${THEMES.map(
-          (t) => html`<wa-dropdown-item type="checkbox" value=${`theme-${t.value}`} ?checked=${themeChoice.value === t.value}>
+          (
+            t,
+          ) => html`<wa-dropdown-item type="checkbox" value=${`theme-${t.value}`} ?checked=${themeChoice.value === t.value}>
             ${t.label}
           </wa-dropdown-item>`,
         )}

@@ -1,0 +1,98 @@
+/**
+ * `window.esker`: what the page shows, readable from outside. Read-only; for end-to-end tests, for measuring and for the
+ * curious in the console. docs/user-guide.md lists it.
+ */
+
+import type { CameraState, FrameStats } from "../core/types.ts";
+import type { Stroke } from "../generated/contract.ts";
+import type { TerrainSession } from "./session.ts";
+
+export interface PageView {
+  /** Connected, the ground has come and a frame was drawn. */
+  ready(): boolean;
+  /** Height in metres of the ground as shown, or null before it has come. */
+  heightAt(x: number, y: number): number | null;
+  /** Document clock as confirmed here. */
+  clock(): number | null;
+  /** The solver has finished for the present clock and nothing of mine is on its way. */
+  settled(): boolean;
+  /** My operations that are not yet in the server's journal. */
+  pending(): number;
+  strokes(): Stroke[];
+  title(): string;
+  role(): string | null;
+  members(): string[];
+  connection(): string;
+  status(): string;
+  selection(): string | null;
+  tool(): string | null;
+  renderer(): string | null;
+  camera(): Pick<CameraState, "mode" | "eye" | "target" | "fovDeg" | "orthoHeight" | "width" | "height"> | null;
+  /** CSS pixels of the window for a point of the world. */
+  project(x: number, y: number, z: number): { x: number; y: number; visible: boolean } | null;
+  /** Tiles held, and how many of them are exact. */
+  tiles(): { held: number; exact: number };
+  stats(): FrameStats | null;
+  /** Frames drawn so far. */
+  readonly frames: number;
+}
+
+declare global {
+  interface Window {
+    esker?: PageView;
+  }
+}
+
+/** Puts the view of a session on the window; the result takes it away again. */
+export function installTestHook(session: TerrainSession): () => void {
+  const stage = () => session.stage.peek();
+  const doc = () => session.doc.doc.peek();
+  const view: PageView = {
+    ready: () => session.connection.state.peek() === "online" && (stage()?.tiles.size ?? 0) > 0 && view.frames > 0,
+    heightAt: (x, y) => ((stage()?.tiles.size ?? 0) > 0 ? (stage()?.tiles.ground.heightAt(x, y) ?? null) : null),
+    clock: () => session.doc.clock,
+    settled: () => {
+      const progress = session.progress.peek();
+      const clock = session.doc.clock;
+      return (
+        session.doc.pending.peek() === 0 && progress?.settled === true && progress.clock === clock && allExact(session)
+      );
+    },
+    pending: () => session.doc.pending.peek(),
+    strokes: () => [...(doc()?.strokes.values() ?? [])],
+    title: () => doc()?.settings.title ?? "",
+    role: () => session.role.peek(),
+    members: () => session.members.peek().map((m) => m.name),
+    connection: () => session.connection.state.peek(),
+    status: () => session.status.peek().text,
+    selection: () => stage()?.input.selection.peek() ?? null,
+    tool: () => stage()?.input.tool.peek() ?? null,
+    renderer: () => stage()?.renderer.peek()?.kind ?? null,
+    camera: () => {
+      const state = stage()?.camera.state.peek();
+      if (!state) return null;
+      const { mode, eye, target, fovDeg, orthoHeight, width, height } = state;
+      return { mode, eye, target, fovDeg, orthoHeight, width, height };
+    },
+    project: (x, y, z) => stage()?.toWindow([x, y, z]) ?? null,
+    tiles: () => ({ held: stage()?.tiles.size ?? 0, exact: count(session) }),
+    stats: () => stage()?.stats.peek() ?? null,
+    get frames() {
+      return stage()?.loop.frames ?? 0;
+    },
+  };
+  window.esker = view;
+  return () => {
+    if (window.esker === view) delete window.esker;
+  };
+}
+
+function count(session: TerrainSession): number {
+  let exact = 0;
+  for (const tile of session.stage.peek()?.tiles.tiles() ?? []) if (tile.exact) exact++;
+  return exact;
+}
+
+function allExact(session: TerrainSession): boolean {
+  return count(session) === (session.stage.peek()?.tiles.size ?? 0);
+}

@@ -1,0 +1,187 @@
+// SPEC U6, U7, U8
+import fc from "fast-check";
+import { describe, expect, it } from "vitest";
+import { type Flank, MAX_SIZE_M, MAX_SLOPE_DEG, MIN_SIZE_M } from "../../src/generated/contract.ts";
+import {
+  drag,
+  fitFrame,
+  flankShare,
+  footM,
+  type KnobId,
+  knobs,
+  nudge,
+  outline,
+  type Section,
+  symmetric,
+} from "../../src/ui/cross-section.ts";
+import { PRESETS, presetsFor } from "../../src/ui/presets.ts";
+
+const flank = (slope_deg: number | null, extent_m: number, shape: Flank["shape"] = "straight"): Flank => ({
+  slope_deg,
+  extent_m,
+  shape,
+});
+const ridge: Section = { left: flank(45, 512), right: flank(30, 300), plateauRadiusM: 20, reliefM: 200 };
+const limits = { maxExtentM: 2048, maxPlateauM: 1024 };
+const knob = (section: Section, id: KnobId) => knobs(section, fitFrame(section, 268, 124)).find((k) => k.id === id)!;
+
+const anyFlank = fc.option(
+  fc.record({
+    slope_deg: fc.option(fc.double({ min: 0, max: MAX_SLOPE_DEG, noNaN: true })),
+    extent_m: fc.double({ min: 0, max: 4000, noNaN: true }),
+    shape: fc.constantFrom<Flank["shape"]>("straight", "concave", "convex"),
+  }),
+);
+const anySection: fc.Arbitrary<Section> = fc.record({
+  left: anyFlank,
+  right: anyFlank,
+  plateauRadiusM: fc.double({ min: 0, max: 1000, noNaN: true }),
+  reliefM: fc.double({ min: -2000, max: 2000, noNaN: true }),
+});
+
+describe("the picture", () => {
+  it("is to scale: a flank of 45° falls as far as it runs", () => {
+    const frame = fitFrame(ridge, 268, 124);
+    const slope = knob(ridge, "left-slope");
+    const edge = frame.centreX - 20 * frame.pxPerM;
+    expect(edge - slope.x).toBeCloseTo(slope.y - frame.crestY, 6);
+  });
+
+  it("puts the foot where the slope meets the base, or at the extent", () => {
+    expect(footM(flank(45, 512), 200)).toBeCloseTo(200, 9);
+    expect(footM(flank(45, 120), 200)).toBe(120);
+    expect(footM(flank(0, 120), 200)).toBe(120);
+    expect(footM(flank(null, 120), 200)).toBe(120);
+    expect(flankShare(flank(45, 512), 200, 100)).toBeCloseTo(0.5, 9);
+    expect(flankShare(flank(45, 512), 200, 500)).toBeCloseTo(0, 9);
+  });
+
+  it("bends concave flanks below and convex ones above the straight line", () => {
+    const share = (shape: Flank["shape"]) => flankShare(flank(40, 512, shape), 200, 100);
+    expect(share("concave")).toBeLessThan(share("straight"));
+    expect(share("convex")).toBeGreaterThan(share("straight"));
+  });
+
+  it("stays inside its box for every cross-section, with finite numbers", () => {
+    fc.assert(
+      fc.property(anySection, (section) => {
+        const frame = fitFrame(section, 268, 124);
+        expect(outline(section, frame)).not.toMatch(/NaN|Infinity/);
+        for (const k of knobs(section, frame)) {
+          expect(k.x).toBeGreaterThanOrEqual(0);
+          expect(k.x).toBeLessThanOrEqual(268);
+          expect(k.y).toBeGreaterThanOrEqual(0);
+          expect(k.y).toBeLessThanOrEqual(124);
+        }
+      }),
+    );
+  });
+
+  it("turns upside down for a crevice", () => {
+    const frame = fitFrame({ ...ridge, reliefM: -200 }, 268, 124);
+    expect(frame.crestY).toBeGreaterThan(frame.baseY);
+  });
+
+  it("has no knobs for a side without a flank and no slope knob for a free slope", () => {
+    const section: Section = { ...ridge, left: null, right: flank(null, 300) };
+    expect(knobs(section, fitFrame(section, 268, 124)).map((k) => k.id)).toEqual(["right-extent", "plateau"]);
+  });
+});
+
+describe("dragging", () => {
+  const ids: KnobId[] = ["left-slope", "right-slope", "left-extent", "right-extent", "plateau"];
+
+  it.each(ids)("%s dropped where it stands changes next to nothing", (id) => {
+    const frame = fitFrame(ridge, 268, 124);
+    const at = knob(ridge, id);
+    const after = drag(ridge, frame, id, at, false, limits);
+    const metre = 1 / frame.pxPerM;
+    expect(Math.abs(after.plateauRadiusM - ridge.plateauRadiusM)).toBeLessThanOrEqual(metre);
+    for (const side of ["left", "right"] as const) {
+      expect(Math.abs(after[side]!.extent_m - ridge[side]!.extent_m)).toBeLessThanOrEqual(metre);
+      expect(Math.abs(after[side]!.slope_deg! - ridge[side]!.slope_deg!)).toBeLessThanOrEqual(1);
+    }
+  });
+
+  it("an extent knob follows the pointer and moves only its side", () => {
+    const frame = fitFrame(ridge, 268, 124);
+    const after = drag(ridge, frame, "left-extent", { x: frame.centreX - 220 * frame.pxPerM, y: 0 }, false, limits);
+    expect(after.left!.extent_m).toBeCloseTo(200, 0);
+    expect(after.right).toEqual(ridge.right);
+  });
+
+  it("linked sides change together, each keeping what was not touched", () => {
+    const frame = fitFrame(ridge, 268, 124);
+    const after = drag(ridge, frame, "left-extent", { x: frame.centreX - 220 * frame.pxPerM, y: 0 }, true, limits);
+    expect(after.right!.extent_m).toBe(after.left!.extent_m);
+    expect(after.right!.slope_deg).toBe(30);
+  });
+
+  it("stays within the limits wherever the pointer goes", () => {
+    fc.assert(
+      fc.property(
+        anySection,
+        fc.constantFrom(...ids),
+        fc.double({ min: -5000, max: 5000, noNaN: true }),
+        fc.double({ min: -5000, max: 5000, noNaN: true }),
+        fc.boolean(),
+        (section, id, x, y, linked) => {
+          const after = drag(section, fitFrame(section, 268, 124), id, { x, y }, linked, limits);
+          if (id === "plateau") {
+            expect(after.plateauRadiusM).toBeGreaterThanOrEqual(0);
+            expect(after.plateauRadiusM).toBeLessThanOrEqual(limits.maxPlateauM);
+            return;
+          }
+          const side = after[id.startsWith("left") ? "left" : "right"];
+          if (!side) return;
+          if (id.endsWith("extent")) {
+            expect(side.extent_m).toBeGreaterThan(0);
+            expect(side.extent_m).toBeLessThanOrEqual(limits.maxExtentM);
+          } else {
+            expect(side.slope_deg).toBeGreaterThanOrEqual(1);
+            expect(side.slope_deg).toBeLessThanOrEqual(MAX_SLOPE_DEG);
+          }
+        },
+      ),
+    );
+  });
+
+  it("an arrow key changes a slope by a degree and stops at the limits", () => {
+    const frame = fitFrame(ridge, 268, 124);
+    expect(nudge(ridge, frame, "left-slope", 1, false, limits).left!.slope_deg).toBe(46);
+    expect(nudge(ridge, frame, "left-slope", 999, false, limits).left!.slope_deg).toBe(MAX_SLOPE_DEG);
+    expect(nudge(ridge, frame, "plateau", -999, false, limits).plateauRadiusM).toBe(0);
+    expect(nudge(ridge, frame, "right-extent", 1, true, limits).left!.extent_m).toBeGreaterThan(300);
+  });
+});
+
+describe("presets", () => {
+  it.each(PRESETS.map((p) => p.id))("%s is valid for every size of terrain", (id) => {
+    const preset = PRESETS.find((p) => p.id === id)!;
+    for (const size of [MIN_SIZE_M, 4096, MAX_SIZE_M]) {
+      const { left, right, plateau_radius_m } = preset.section(size);
+      expect(plateau_radius_m).toBeGreaterThanOrEqual(0);
+      for (const side of [left, right]) {
+        expect(side!.extent_m).toBeGreaterThan(0);
+        expect(side!.extent_m).toBeLessThanOrEqual(size / 2);
+        expect(side!.slope_deg).toBeGreaterThanOrEqual(0);
+        expect(side!.slope_deg).toBeLessThanOrEqual(MAX_SLOPE_DEG);
+      }
+    }
+  });
+
+  it("come with those that suit the stroke first, and all of them", () => {
+    expect(presetsFor("down")[0]!.sense).toBe("down");
+    expect(presetsFor("up")[0]!.sense).toBe("up");
+    expect(new Set(presetsFor("down"))).toEqual(new Set(PRESETS));
+  });
+});
+
+describe("symmetric", () => {
+  it("compares what both sides say", () => {
+    expect(symmetric({ left: flank(30, 100), right: flank(30, 100) })).toBe(true);
+    expect(symmetric({ left: flank(30, 100), right: flank(31, 100) })).toBe(false);
+    expect(symmetric({ left: null, right: null })).toBe(true);
+    expect(symmetric({ left: null, right: flank(30, 100) })).toBe(false);
+  });
+});

@@ -1,0 +1,110 @@
+// SPEC U12
+import { describe, expect, it } from "vitest";
+import { type Doc, fromDocument, fullStroke } from "../../src/doc/document.ts";
+import type { Member, MemberPresence, Stroke } from "../../src/generated/contract.ts";
+import { cursorVisuals, type People, reliefOf, shapeOf, strokeVisuals } from "../../src/ui/scene.ts";
+import { hexColour, inkOn, strokeColour } from "../../src/ui/styles/colours.ts";
+
+function stroke(id: string, change: Partial<Stroke> = {}): Stroke {
+  return fullStroke({
+    id,
+    kind: "profile",
+    first: [0, 0, 10],
+    last: [100, 0, 10],
+    curve: [
+      [0, 0],
+      [0.5, 40],
+      [1, 0],
+    ],
+    ...change,
+  });
+}
+
+function doc(...strokes: Stroke[]): Doc {
+  return fromDocument({ id: "t", clock: 1, settings: {} as Doc["settings"], strokes, deleted: [] });
+}
+
+const member = (client: string, colour: string): Member => ({ client, colour, name: client, role: "edit" });
+const presence = (client: string, change: Partial<MemberPresence> = {}): MemberPresence => ({
+  client,
+  cursor: null,
+  tool: "",
+  stroke: null,
+  eye: null,
+  target: null,
+  ...change,
+});
+const nobody: People = { members: [], presences: new Map(), me: "me", myColour: "#00ff00" };
+const still = { selection: null, hovered: null, drawing: null };
+
+describe("strokes as they are drawn", () => {
+  it("are blue for mountains and crevices, red for plateaus", () => {
+    const crevice = stroke("c", {
+      curve: [
+        [0, 0],
+        [0.5, -40],
+        [1, 0],
+      ],
+    });
+    const [m, c, p] = strokeVisuals(doc(stroke("m"), crevice, stroke("p", { kind: "level" })), still, nobody);
+    expect(m!.colour).toEqual(strokeColour("profile", false));
+    expect(c!.colour).toEqual(strokeColour("profile", true));
+    for (const blue of [m!, c!]) expect(blue.colour[2]).toBeGreaterThan(blue.colour[0]);
+    expect(p!.colour[0]).toBeGreaterThan(p!.colour[2]);
+    expect([...m!.points]).toEqual([0, 0, 10, 50, 0, 50, 100, 0, 10]);
+  });
+
+  it("wear the author's colour while under way, mine while I draw", () => {
+    const people: People = {
+      ...nobody,
+      members: [member("ana", "#ff8000")],
+      presences: new Map([["ana", presence("ana", { stroke: "a" })]]),
+    };
+    const [a, b, c] = strokeVisuals(doc(stroke("a"), stroke("b"), stroke("c")), { ...still, drawing: "b" }, people);
+    expect(a).toMatchObject({ live: true, colour: hexColour("#ff8000") });
+    expect(b).toMatchObject({ live: true, colour: hexColour("#00ff00") });
+    expect(c!.live).toBe(false);
+  });
+
+  it("are left out while hidden, unless selected, and while they are no line yet", () => {
+    const hidden = stroke("h", { hidden: true });
+    expect(strokeVisuals(doc(hidden, stroke("dot", { curve: [[0, 0]] })), still, nobody)).toEqual([]);
+    expect(strokeVisuals(doc(hidden), { ...still, selection: "h" }, nobody)).toMatchObject([
+      { id: "h", selected: true },
+    ]);
+  });
+
+  it("keep their points as long as the stroke does", () => {
+    const s = stroke("s");
+    expect(shapeOf(s).points).toBe(shapeOf(s).points);
+    expect(reliefOf(s)).toBe(40);
+  });
+});
+
+describe("cursors", () => {
+  it("are those of the others that point at the ground", () => {
+    const people: People = {
+      members: [member("me", "#111111"), member("ana", "#ff8000"), member("bo", "#0000ff")],
+      presences: new Map([
+        ["me", presence("me", { cursor: [1, 1, 1] })],
+        ["ana", presence("ana", { cursor: [2, 3, 4] })],
+        ["bo", presence("bo")],
+      ]),
+      me: "me",
+      myColour: "#111111",
+    };
+    expect(cursorVisuals(people)).toEqual([{ position: [2, 3, 4], colour: hexColour("#ff8000"), radiusPx: 9 }]);
+  });
+});
+
+describe("colours", () => {
+  it("are read from hex, and grey when unreadable", () => {
+    expect(hexColour("#ff0080")).toEqual([1, 0, 128 / 255, 1]);
+    expect(hexColour("tomato")).toEqual([0.5, 0.5, 0.5, 1]);
+  });
+
+  it("carry the ink that reads on them", () => {
+    expect(inkOn("#ffffff")).toBe("#14191f");
+    expect(inkOn("#7c4dd6")).toBe("#ffffff");
+  });
+});
