@@ -2,9 +2,10 @@
 
 import type { SceneRenderer } from "../core/types.ts";
 import { NoWebGpu, openGpu } from "./device.ts";
+import { createMapRenderer } from "./map.ts";
 import { GpuRenderer } from "./renderer.ts";
 
-export { NoWebGpu };
+export { createMapRenderer, NoWebGpu };
 
 /** The WebGPU renderer on this canvas. Throws `NoWebGpu` with a reason a person can read. */
 export async function createRenderer(canvas: HTMLCanvasElement): Promise<SceneRenderer> {

@@ -11,7 +11,7 @@ import type {
   TileView,
   Vec3,
 } from "../../src/core/types.ts";
-import { createRenderer } from "../../src/gpu/index.ts";
+import { createMapRenderer, createRenderer } from "../../src/gpu/index.ts";
 import { alpineField, FieldView, lookAt, mapCamera } from "./world.ts";
 
 export const SETTINGS: TerrainSettings = {
@@ -58,6 +58,8 @@ interface Shot {
   overlay?: Scene["overlay"];
   strokes?: boolean;
   map?: number;
+  /** Draw with the 2D map. */
+  sheet?: boolean;
   tau?: number;
   width?: number;
   height?: number;
@@ -139,18 +141,24 @@ function scene(shot: Shot, width: number, height: number): Scene {
 }
 
 let renderer: SceneRenderer | null = null;
+let sheet: SceneRenderer | null = null;
 
 /** Draws until the renderer rests; returns the last frame's figures with the number of frames. */
 async function shoot(shot: Shot): Promise<FrameStats & { frames: number; description: string; ms: number }> {
   const canvas = document.querySelector("canvas")!;
+  const sheetCanvas = document.querySelector<HTMLCanvasElement>("#sheet")!;
   renderer ??= await createRenderer(canvas);
+  sheet ??= createMapRenderer(sheetCanvas);
+  const used = shot.sheet === true ? sheet : renderer;
+  canvas.hidden = shot.sheet === true;
+  sheetCanvas.hidden = shot.sheet !== true;
   const s = scene(shot, shot.width ?? 1280, shot.height ?? 720);
   const began = performance.now();
   for (let frames = 1; ; frames += 1) {
-    const stats = renderer.render(s);
+    const stats = used.render(s);
     await new Promise((done) => setTimeout(done, 16));
     if (!stats.busy && frames > 2)
-      return { ...stats, frames, description: renderer.description, ms: performance.now() - began };
+      return { ...stats, frames, description: used.description, ms: performance.now() - began };
     if (frames > 3000) throw new Error("the renderer never rests");
   }
 }
