@@ -1,0 +1,107 @@
+"""From strokes to crest polylines that the rasteriser can read (DESIGN 4, 5.2). Pure NumPy, float64.
+
+Every awkward stroke is made ordinary here, once, for both back ends: repeated points are dropped, a folded profile
+becomes single-valued, a closed plateau outline gets its closing segment, a point stays a point.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from esker.contract import Stroke
+from esker.document.strokes import world_points
+
+Points = NDArray[np.float64]
+
+CLOSED_FRACTION = 0.15
+"""A level stroke whose ends are nearer than this share of its length encloses a plateau."""
+_ENVELOPE_BLOCK = 1 << 20
+
+
+@dataclass(frozen=True)
+class Crest:
+    """A crest line ready to be rasterised.
+
+    points: (n, 3) float64, metres, no two neighbours equal in plan; n = 1 is a single summit.
+    closed: the last point joins the first and the inside is plateau.
+    """
+
+    stroke: Stroke
+    points: Points
+    closed: bool
+
+
+def crest_of(stroke: Stroke) -> Crest | None:
+    """The crest line of a stroke, or None for a stroke that constrains nothing (hidden, or without points)."""
+    if stroke.hidden or not stroke.curve:
+        return None
+    points = world_points(stroke)
+    if stroke.kind == "profile":
+        return Crest(stroke, _single_valued(points, stroke), closed=False)
+    points = _without_repeats(points)
+    closed = is_closed(points)
+    if closed and np.array_equal(points[0, :2], points[-1, :2]):
+        points = points[:-1]
+    return Crest(stroke, points, closed)
+
+
+def is_closed(points: Points) -> bool:
+    """True for an outline of three corners or more whose ends are within CLOSED_FRACTION of its length."""
+    if len(points) < 3:
+        return False
+    steps = np.diff(points[:, :2], axis=0)
+    length = float(np.hypot(steps[:, 0], steps[:, 1]).sum())
+    gap = float(np.hypot(*(points[-1, :2] - points[0, :2])))
+    corners = len(np.unique(points[:, :2], axis=0))
+    return corners >= 3 and gap <= CLOSED_FRACTION * length
+
+
+def _without_repeats(points: Points) -> Points:
+    keep = np.ones(len(points), dtype=bool)
+    keep[1:] = (np.diff(points[:, :2], axis=0) != 0).any(axis=1)
+    return points[keep]
+
+
+def _single_valued(points: Points, stroke: Stroke) -> Points:
+    """The part of a profile that the ground can have: over each place the height farthest from the base.
+
+    A pen that goes back over its own line would make an overhang. Knots are the profile's own; where several
+    branches cover a knot the one with the greatest absolute height stays. Direction: from first towards last.
+    """
+    first, last = np.array(stroke.first[:2]), np.array(stroke.last[:2])
+    axis = last - first
+    if not axis.any():
+        return points[[int(np.argmax(np.abs(points[:, 2])))]]
+    u = np.array([p for p, _ in stroke.curve])
+    steps = np.diff(u)
+    if (steps > 0).all():
+        return _without_repeats(points)
+    if (steps < 0).all():
+        return _without_repeats(points)
+    knots = np.unique(u)
+    heights = _envelope(u, points[:, 2], knots)
+    if u[-1] < u[0]:
+        knots, heights = knots[::-1], heights[::-1]
+    return _without_repeats(np.column_stack([first + knots[:, None] * axis, heights]))
+
+
+def _envelope(u: NDArray[np.float64], z: NDArray[np.float64], knots: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Per knot the height of greatest magnitude among all segments (u_i, z_i)-(u_i+1, z_i+1) that cover it."""
+    if len(u) == 1:
+        return z.copy()
+    low, high = np.minimum(u[:-1], u[1:]), np.maximum(u[:-1], u[1:])
+    run = np.where(u[1:] == u[:-1], 1.0, u[1:] - u[:-1])
+    out = np.zeros(len(knots))
+    block = max(1, _ENVELOPE_BLOCK // len(low))
+    for k in range(0, len(knots), block):
+        at = knots[k : k + block, None]
+        value = z[:-1] + np.clip((at - u[:-1]) / run, 0, 1) * (z[1:] - z[:-1])
+        upright = np.where(np.abs(z[1:]) > np.abs(z[:-1]), z[1:], z[:-1])
+        value = np.where(u[1:] == u[:-1], upright, value)
+        value = np.where((at >= low) & (at <= high), value, 0.0)
+        best = np.argmax(np.abs(value), axis=1)
+        out[k : k + block] = value[np.arange(len(best)), best]
+    return out

@@ -1,0 +1,269 @@
+"""Levels on an OpenCL device: memory, kernel launches, reading back (DESIGN 5.3). State that can be rebuilt.
+
+Layout (shaders/opencl/rows.cl): a level is n rows of ``pitch`` floats with PAD floats before sample 0; channels lie
+behind each other. Level 0's buffers also hold the levels below it, which the bottom kernels alone touch.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from esker import grid
+from esker.contract import CHEBYSHEV_SWEEPS, TILE_CELLS, Stroke, TerrainSettings
+from esker.solve.constraints import Packer, Tables, Window, bins
+from esker.solve.device import Device
+from esker.solve.reference import BOTTOM_LEVELS, chebyshev_weights
+
+PAD = 16
+RING_ROWS = 4 * (CHEBYSHEV_SWEEPS + 2) + 17
+ALIGN = 64
+MIN_STRIP = 16
+
+
+def pitch_of(samples: int) -> int:
+    """Floats from one row to the next."""
+    return PAD + -(-samples // 32) * 32 + 2 * PAD
+
+
+@dataclass(frozen=True)
+class Shape:
+    """One level's layout; ``stride`` floats from one channel to the next."""
+
+    level: int
+    n: int
+    pitch: int
+    stride: int
+
+
+def _round(size: int) -> int:
+    return -(-size // ALIGN) * ALIGN
+
+
+def bottom_table() -> tuple[NDArray[np.int32], int]:
+    """(offset, n, pitch, 0) of levels 0, -1, ... and the stride of a channel that holds them all."""
+    rows, at = [], 0
+    for k in range(BOTTOM_LEVELS + 1):
+        n = (TILE_CELLS >> k) + 1
+        rows.append((at, n, pitch_of(n), 0))
+        at += _round(n * pitch_of(n) + PAD)
+    return np.array(rows, dtype=np.int32), at
+
+
+def shape_of(level: int) -> Shape:
+    n = grid.samples(level)
+    stride = bottom_table()[1] if level == 0 else _round(n * pitch_of(n) + PAD)
+    return Shape(level, n, pitch_of(n), stride)
+
+
+class Launcher:
+    """A queue with its kernels, scratch and constant tables, for one finest level."""
+
+    def __init__(self, device: Device, top: int) -> None:
+        import pyopencl as cl
+
+        self.cl, self.device, self.queue = cl, device, device.queue
+        self.kernels = {k.function_name: k for k in device.program.all_kernels()}
+        self.scratch_stride = _round(RING_ROWS * pitch_of(grid.samples(top)))
+        self.scratch = self.zeros(2 * device.strips * self.scratch_stride)
+        self.weights = self.constant(chebyshev_weights().astype(np.float32))
+        self.table = self.constant(bottom_table()[0])
+
+    def zeros(self, floats: int) -> Any:
+        """A new buffer of zeros."""
+        buffer = self.cl.Buffer(self.device.context, self.cl.mem_flags.READ_WRITE, size=4 * max(floats, 1))
+        self.cl.enqueue_fill_buffer(self.queue, buffer, np.zeros(1, dtype=np.float32), 0, buffer.size)
+        return buffer
+
+    def constant(self, array: NDArray[Any]) -> Any:
+        """A read-only copy of a host array (one zero when it is empty)."""
+        host = np.ascontiguousarray(array) if array.size else np.zeros(1, dtype=array.dtype)
+        flags = self.cl.mem_flags.READ_ONLY | self.cl.mem_flags.COPY_HOST_PTR
+        return self.cl.Buffer(self.device.context, flags, hostbuf=host)
+
+    def run(self, name: str, size: tuple[int, ...], *args: Any) -> None:
+        """Enqueue one kernel, one work-item a work-group."""
+        kernel = self.kernels[name]
+        kernel.set_args(*args)
+        self.cl.enqueue_nd_range_kernel(self.queue, kernel, size, (1,) * len(size))
+
+    def strips(self, rows: int) -> tuple[int, int]:
+        """How to cut ``rows`` rows: (strips, rows a strip, even)."""
+        count = max(1, min(self.device.strips, rows // MIN_STRIP))
+        each = -(-rows // count)
+        each += each & 1
+        return -(-rows // each), each
+
+
+class ClSystem:
+    """``multigrid.System`` on a device. Fields and their meaning: see there; ``s`` is the static part of f."""
+
+    def __init__(self, launcher: Launcher, top: int, channels: int, static: str) -> None:
+        self.top, self.channels, self.static = top, channels, static
+        self.launch = launcher
+        self.shapes = {level: shape_of(level) for level in range(top + 1)}
+        self.eps = dict.fromkeys(range(top + 1), 0.0)
+        names = {"f", "u", "v", static}
+        self.fields: dict[tuple[str, int], Any] = {}
+        for level, shape in self.shapes.items():
+            inner = set() if level == top and top > 0 else {"b", "e", "t"}
+            for name in names | inner:
+                self.fields[name, level] = launcher.zeros(channels * shape.stride + PAD)
+            self.fields["d", level] = launcher.zeros(shape.stride + PAD)
+
+    def coarsen(self, screening: float) -> None:
+        """Constraints of all coarser levels from those of the top."""
+        run, i = self.launch.run, np.int32
+        self.eps = {level: screening * 4.0 ** (self.top - level) for level in self.shapes}
+        for level in range(self.top, 0, -1):
+            fine, under = self.shapes[level], self.shapes[level - 1]
+            strips, rows = self.launch.strips(under.n)
+            d, f = ("d", level), (self.static, level)
+            d2, f2 = ("d", level - 1), (self.static, level - 1)
+            run(
+                "coarsen", (strips, self.channels), *(self.fields[k] for k in (d, f, d2, f2)), i(fine.n), i(fine.pitch),
+                i(under.pitch), i(fine.stride), i(under.stride), self.launch.scratch, i(self.launch.scratch_stride),
+                i(rows),
+            )  # fmt: skip
+        run(
+            "coarsen_bottom", (1,), self.fields["d", 0], self.fields[self.static, 0], self.launch.table,
+            i(BOTTOM_LEVELS), i(self.channels), i(self.shapes[0].stride), self.launch.scratch,
+        )  # fmt: skip
+
+    def visit(
+        self, level: int, *, rhs: str, out: str, guess: str | None, correction: str | None, residual: bool
+    ) -> None:
+        i, fine = np.int32, self.shapes[level]
+        under = self.shapes[level - 1]
+        strips, rows = self.launch.strips(fine.n)
+        self.launch.run(
+            "visit", (strips, self.channels), self.fields[guess, level] if guess else None,
+            self.fields[correction, level - 1] if correction else None, self.fields[rhs, level],
+            self.fields["d", level], self.fields[out, level], self.fields["b", level - 1] if residual else None,
+            i(fine.n), i(fine.pitch), i(under.pitch), i(fine.stride), i(under.stride), np.float32(self.eps[level]),
+            self.launch.scratch, i(self.launch.scratch_stride), i(rows), self.launch.weights,
+        )  # fmt: skip
+
+    def restrict(self, level: int) -> None:
+        i, fine, under = np.int32, self.shapes[level], self.shapes[level - 1]
+        strips, rows = self.launch.strips(under.n)
+        self.launch.run(
+            "restriction", (strips, self.channels), self.fields["b", level], self.fields["b", level - 1], i(fine.n),
+            i(fine.pitch), i(under.pitch), i(fine.stride), i(under.stride), self.launch.scratch,
+            i(self.launch.scratch_stride), i(rows),
+        )  # fmt: skip
+
+    def bottom(self, *, rhs: str, out: str, cycles: int) -> None:
+        i = np.int32
+        self.launch.run(
+            "bottom", (self.channels,), self.fields[rhs, 0], self.fields["d", 0], self.fields[out, 0],
+            self.fields["t", 0], self.launch.table, i(BOTTOM_LEVELS), i(self.shapes[0].stride),
+            np.float32(self.eps[0]), self.launch.scratch, i(self.launch.scratch_stride), self.launch.weights, i(cycles),
+        )  # fmt: skip
+
+    def swap(self, level: int) -> None:
+        self.fields["u", level], self.fields["v", level] = self.fields["v", level], self.fields["u", level]
+
+    def change(self, old: str, new: str) -> float:
+        i, shape = np.int32, self.shapes[self.top]
+        strips, rows = self.launch.strips(shape.n)
+        self.launch.run(
+            "change", (strips,), self.fields[old, self.top], self.fields[new, self.top], self.launch.scratch,
+            i(shape.n), i(shape.pitch), i(shape.stride), i(self.channels), i(rows),
+        )  # fmt: skip
+        out = np.empty(strips, dtype=np.float32)
+        self.launch.cl.enqueue_copy(self.launch.queue, out, self.launch.scratch)
+        return float(out.max())
+
+    def get(self, name: str, level: int) -> NDArray[np.float32]:
+        """A field as (channels, n, n); d has one channel."""
+        shape = self.shapes[level]
+        channels = 1 if name == "d" else self.channels
+        out = np.empty((channels, shape.n, shape.n), dtype=np.float32)
+        for c in range(channels):
+            self.launch.cl.enqueue_copy(self.launch.queue, out[c], self.fields[name, level], **_window(shape, c))
+        return out
+
+    def put(self, name: str, level: int, value: NDArray[Any]) -> None:
+        """Set a field from (channels, n, n)."""
+        for c, channel in enumerate(value):
+            host = np.ascontiguousarray(channel, dtype=np.float32)
+            self.launch.cl.enqueue_copy(
+                self.launch.queue, self.fields[name, level], host, **_window(self.shapes[level], c)
+            )
+
+
+def _window(shape: Shape, channel: int) -> dict[str, Any]:
+    """A channel's samples, without padding, for a rectangular copy."""
+    return {
+        "host_pitches": (4 * shape.n,),
+        "host_origin": (0, 0),
+        "region": (4 * shape.n, shape.n),
+        "buffer_pitches": (4 * shape.pitch,),
+        "buffer_origin": (4 * (PAD + channel * shape.stride), 0),
+    }
+
+
+class ClWorkspace:
+    """``solver.Workspace`` on an OpenCL device."""
+
+    def __init__(self, device: Device, top: int) -> None:
+        self.top = top
+        self.launch = Launcher(device, top)
+        self.gradient = ClSystem(self.launch, top, 2, "f")
+        self.height = ClSystem(self.launch, top, 1, "s")
+        self.packer = Packer(top)
+        self.size_m = 1.0
+
+    def load(self, strokes: Sequence[Stroke], settings: TerrainSettings) -> None:
+        """Rasterise what changed since the last set, and coarsen."""
+        tables, windows = self.packer.pack(strokes, settings)
+        self.size_m = tables.size_m
+        count = bins(tables.samples)
+        self.rasterise(tables, [(0, count, 0, count)] if windows is None else windows)
+        self.gradient.coarsen(tables.screening)
+        self.height.coarsen(tables.screening)
+
+    def warm(self, heights: NDArray[np.float32]) -> None:
+        """Start the height step from these heights of the finest level instead of from coarser levels."""
+        fixed = self.height.get("d", self.top) < 0
+        value = np.where(fixed, self.height.get("s", self.top), heights[None])
+        self.height.put("u", self.top, value)
+
+    def rasterise(self, tables: Tables, windows: Sequence[Window]) -> None:
+        """Constraints of the finest level inside these windows of bins."""
+        put, i, f = self.launch.constant, np.int32, np.float32
+        single = (tables.segments, tables.strokes)
+        segments, strokes = (put(a.astype(np.float32)) for a in single)
+        whole = (tables.index, tables.row_start, tables.row_items, tables.span_index)
+        index, row_start, row_items, span_index = (put(a.astype(np.int32)) for a in whole)
+        spans = put(tables.spans.astype(np.float32))
+        shape = self.height.shapes[self.top]
+        h, g = self.height.fields, self.gradient.fields
+        for r0, r1, c0, c1 in windows:
+            if r1 <= r0 or c1 <= c0:
+                continue
+            self.launch.run(
+                "rasterise", (c1 - c0, r1 - r0), segments, i(tables.segments.shape[1]), strokes, index, row_start,
+                row_items, span_index, spans, h["d", self.top], h["s", self.top], g["d", self.top], g["f", self.top],
+                i(shape.n), i(shape.pitch), i(shape.stride), f(tables.spacing_m), f(tables.screening),
+                f(tables.exit_length_m), i(tables.pinned), i(c0), i(r0),
+            )  # fmt: skip
+
+    def guide(self, level: int) -> None:
+        """f of the height step at ``level`` from u of the gradient step."""
+        i, shape = np.int32, self.height.shapes[level]
+        strips, rows = self.launch.strips(shape.n)
+        h = self.height.fields
+        self.launch.run(
+            "divergence", (strips,), h["s", level], h["d", level], self.gradient.fields["u", level], h["f", level],
+            i(shape.n), i(shape.pitch), i(shape.stride), np.float32(grid.spacing(level, self.size_m)), i(rows),
+        )  # fmt: skip
+
+    def read(self, level: int) -> NDArray[np.float32]:
+        """Heights of a level, metres."""
+        return np.asarray(self.height.get("u", level)[0])

@@ -1,0 +1,86 @@
+"""The cycle, as data flow (DESIGN 5.3): full multigrid and F(0,4)-cycles over any back end.
+
+A back end is a ``System``: named fields on levels top..0 (below level 0, ``bottom`` solves for itself). Field names:
+``f`` right-hand side of the problem, ``u``/``v`` the solution and its successor, ``b`` right-hand side of a
+correction equation, ``e``/``t`` the correction and its predecessor. A call works on all channels of the system.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+FMG_BOTTOM_CYCLES = 4
+"""Bottom cycles that start the full multigrid."""
+LONE_BOTTOM_CYCLES = 24
+"""Bottom cycles when level 0 is the finest: they must settle it."""
+
+
+class System(Protocol):
+    """One family of equations A u = f, all channels with the same A, on every level."""
+
+    top: int
+
+    def visit(
+        self, level: int, *, rhs: str, out: str, guess: str | None, correction: str | None, residual: bool
+    ) -> None:
+        """out = S(guess + P correction), S the Chebyshev sweeps; with ``residual``: b of level - 1 = R (rhs - A out).
+
+        Without guess the start is zero, at fixed samples their value. P correction vanishes at fixed samples. The
+        correction is a field of level - 1.
+        """
+
+    def restrict(self, level: int) -> None:
+        """b of level - 1 = R b."""
+
+    def bottom(self, *, rhs: str, out: str, cycles: int) -> None:
+        """out = V-cycles from zero for level 0 and the levels below it."""
+
+    def swap(self, level: int) -> None:
+        """Exchange u and v of a level."""
+
+    def change(self, old: str, new: str) -> float:
+        """Largest absolute difference of two fields of the finest level."""
+
+
+def correct(system: System, level: int, *, full: bool) -> None:
+    """e of ``level`` = approximate solution of A e = b from zero: an F-cycle if ``full``, else a V-cycle."""
+    if level == 0:
+        system.bottom(rhs="b", out="e", cycles=2 if full else 1)
+        return
+    system.restrict(level)
+    correct(system, level - 1, full=full)
+    if not full:
+        system.visit(level, rhs="b", out="e", guess=None, correction="e", residual=False)
+        return
+    system.visit(level, rhs="b", out="t", guess=None, correction="e", residual=True)
+    correct(system, level - 1, full=False)
+    system.visit(level, rhs="b", out="e", guess="t", correction="e", residual=False)
+
+
+def start(system: System, level: int) -> None:
+    """u of ``level`` from u of level - 1, ready for cycles: b of level - 1 holds its residual (full multigrid)."""
+    if level == 0:
+        system.bottom(rhs="f", out="u", cycles=FMG_BOTTOM_CYCLES if system.top > 0 else LONE_BOTTOM_CYCLES)
+    else:
+        system.visit(level, rhs="f", out="u", guess=None, correction="u", residual=True)
+
+
+def finish(system: System, level: int) -> None:
+    """One F-cycle on a level between the bottom and the top: its preview, and what the next level starts from."""
+    if level > 0:
+        correct(system, level - 1, full=True)
+        system.visit(level, rhs="f", out="v", guess="u", correction="e", residual=False)
+        system.swap(level)
+
+
+def refresh(system: System) -> None:
+    """Sweep u of the finest level once more after its right-hand side changed, leaving the new residual."""
+    system.visit(system.top, rhs="f", out="v", guess="u", correction=None, residual=True)
+    system.swap(system.top)
+
+
+def cycle(system: System) -> None:
+    """One F-cycle on the finest level. Needs its residual in b of the next; leaves the new one there."""
+    correct(system, system.top - 1, full=True)
+    system.visit(system.top, rhs="f", out="v", guess="u", correction="e", residual=True)
+    system.swap(system.top)

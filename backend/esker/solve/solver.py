@@ -1,0 +1,259 @@
+"""The terrain as a pure function of its strokes (DESIGN 5): previews coarse to fine, then the settled levels.
+
+Equations: minimise over the samples of the finest level G
+
+    sum_edges (d_j - d_i - g_ij)^2 + sum_i a_i (d_i - c_i)^2 + eps sum_i (d_i - w_i c_i)^2
+
+(DESIGN 5.1; see docs/solver.md for the last term), first for the two gradient components with g = 0, then for the
+heights with the diffused gradient as guidance g. The result depends on the set of strokes and on the settings alone:
+every solve starts from zero, strokes are ordered by id, and no cache changes a bit of it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Generator, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from esker import grid
+from esker.contract import MAX_LEVEL, Stroke, TerrainSettings
+from esker.solve import multigrid
+from esker.solve.constraints import Packer
+from esker.solve.device import NUMPY_NAME, Device, open_device
+from esker.solve.levels import ClWorkspace
+from esker.solve.reference import NumpyWorkspace
+
+PREVIEW_GRADIENT_CYCLES = 1
+PREVIEW_HEIGHT_CYCLES = 2
+MAX_CYCLES = 40
+UPDATE_SHARE = 0.5
+"""Error after a cycle as a share of its last update: convergence factors are below 0.4 (DESIGN 5.3)."""
+HEIGHT_SHARE = 0.25
+"""Error, in quanta of the finest level, at which the heights are at rest: half of what DESIGN 5.3 asks for."""
+GRADIENT_SHARE = 1 / 16
+"""Share of a quantum that the gradient's own error may cost the heights."""
+STALLED = 0.8
+STALLED_AFTER = 8
+"""After this many cycles a ratio of two updates above STALLED means that float32 has nothing left to gain."""
+CYCLES_PER_PULSE = 2
+"""While settling, level 0 is given out once in so many cycles, so that a caller can stop or show progress."""
+SPARE_WORKSPACES = 4
+"""Idle workspaces kept (about 90 MB each at level 4), with the raster of the strokes that they last solved."""
+
+
+@dataclass(frozen=True)
+class LevelResult:
+    """One finished level. heights: (N_l, N_l) float32, metres, row 0 south, read-only. ``settled`` False: a preview
+    that later results correct; True: final for this stroke set, and the injection of the next finer level."""
+
+    level: int
+    heights: NDArray[np.float32]
+    settled: bool
+
+
+@dataclass(frozen=True)
+class Pyramid:
+    """Levels 0..G of one solve, coarse to fine; ``settled`` False when it was stopped early."""
+
+    levels: tuple[NDArray[np.float32], ...]
+    settled: bool
+
+    def __getitem__(self, level: int) -> NDArray[np.float32]:
+        return self.levels[level]
+
+    def __len__(self) -> int:
+        return len(self.levels)
+
+
+class Workspace(Protocol):
+    """Memory and kernels for one solve at a time of one finest level; ``levels.ClWorkspace`` says what each does."""
+
+    top: int
+    packer: Packer
+
+    @property
+    def gradient(self) -> multigrid.System: ...
+    @property
+    def height(self) -> multigrid.System: ...
+    def load(self, strokes: Sequence[Stroke], settings: TerrainSettings) -> None: ...
+    def guide(self, level: int) -> None: ...
+    def warm(self, heights: NDArray[np.float32]) -> None: ...
+    def read(self, level: int) -> NDArray[np.float32]: ...
+
+
+class Solver:
+    """Solves stroke sets on one device. Use it from one thread; solves may be interleaved level by level.
+
+    ``device``: part of the name of an OpenCL platform or device, or "numpy"; None takes the best there is.
+    ``threads`` limits PoCL and counts for the first solver of a process (default: cores - 1). Raises NoDeviceError
+    when a device that was asked for by name is missing, ValueError for a level that is not solved globally.
+    """
+
+    def __init__(self, device: str | None = None, max_level: int = 4, threads: int | None = None) -> None:
+        if not 0 <= max_level <= MAX_LEVEL:
+            raise ValueError(f"max_level must be 0..{MAX_LEVEL}, not {max_level}")
+        self.max_level = max_level
+        self._device: Device | None = open_device(device, threads)
+        self._spare: list[Workspace] = []
+        if self._device is not None:
+            self._warm_up()
+
+    @property
+    def device_name(self) -> str:
+        """What solves, for logs and people."""
+        return NUMPY_NAME if self._device is None else self._device.name
+
+    def steps(
+        self, strokes: Sequence[Stroke], settings: TerrainSettings, levels: int | None = None
+    ) -> Iterator[LevelResult]:
+        """Previews of levels 0..G, each when it is finished, then 0..G settled.
+
+        Between the last preview and the settled levels, level 0 comes again from time to time as a better preview.
+        Close the generator to stop; G is ``levels`` or the solver's ``max_level``. Raises ValueError for a level
+        outside 0..MAX_LEVEL.
+        """
+        return self._run(strokes, settings, self._level(levels), None)
+
+    def solve(
+        self,
+        strokes: Sequence[Stroke],
+        settings: TerrainSettings,
+        levels: int | None = None,
+        on_level: Callable[[LevelResult], None] | None = None,
+        should_stop: Callable[[], bool] | None = None,
+        guess: Pyramid | None = None,
+    ) -> Pyramid:
+        """The settled pyramid (DESIGN 5.7), or what there was when ``should_stop`` said so after some level.
+
+        ``guess``: heights of a similar stroke set at the same levels; saves the previews and a cycle or two.
+        """
+        top = self._level(levels)
+        warm = guess.levels[top] if guess is not None and len(guess) == top + 1 else None
+        latest: dict[int, LevelResult] = {}
+        run = self._run(strokes, settings, top, warm)
+        for result in run:
+            latest[result.level] = result
+            if on_level is not None:
+                on_level(result)
+            if should_stop is not None and should_stop():
+                run.close()
+                break
+        done = [latest[level] for level in range(top + 1) if level in latest]
+        return Pyramid(tuple(r.heights for r in done), len(done) == top + 1 and all(r.settled for r in done))
+
+    def _warm_up(self) -> None:
+        """Compile the kernels now, not under somebody's first stroke."""
+        for _ in self._run((), TerrainSettings(), 1, None):
+            pass
+        self._spare.clear()
+
+    def _level(self, levels: int | None) -> int:
+        top = self.max_level if levels is None else levels
+        if not 0 <= top <= MAX_LEVEL:
+            raise ValueError(f"level must be 0..{MAX_LEVEL}, not {top}")
+        return top
+
+    def _run(
+        self, strokes: Sequence[Stroke], settings: TerrainSettings, top: int, warm: NDArray[np.float32] | None
+    ) -> Generator[LevelResult]:
+        workspace = self._take(strokes, settings, top)
+        try:
+            workspace.load(strokes, settings)
+            if warm is None:
+                yield from _previews(workspace)
+            else:
+                _gradients(workspace)
+                workspace.warm(warm)
+            yield from _settle(workspace, settings)
+        except GeneratorExit:
+            raise
+        except BaseException:
+            workspace.packer.forget()
+            raise
+        finally:
+            self._give(workspace)
+
+    def _take(self, strokes: Sequence[Stroke], settings: TerrainSettings, top: int) -> Workspace:
+        """An idle workspace, the one that has most of these strokes rasterised already; or a new one."""
+        idle = [w for w in self._spare if w.top == top]
+        best = max(idle, key=lambda w: w.packer.likeness(strokes, settings), default=None)
+        room = len(self._spare) < SPARE_WORKSPACES
+        if best is not None and (best.packer.likeness(strokes, settings) > 0 or not room or not strokes):
+            self._spare.remove(best)
+            return best
+        if not room:
+            self._spare.pop(0)
+        return NumpyWorkspace(top) if self._device is None else ClWorkspace(self._device, top)
+
+    def _give(self, workspace: Workspace) -> None:
+        self._spare.append(workspace)
+        del self._spare[:-SPARE_WORKSPACES]
+
+
+def _previews(w: Workspace) -> Iterator[LevelResult]:
+    """Full multigrid, both steps level by level, so that a coarse level is out before the next one is touched."""
+    for level in range(w.top):
+        multigrid.start(w.gradient, level)
+        multigrid.finish(w.gradient, level)
+        w.guide(level)
+        multigrid.start(w.height, level)
+        multigrid.finish(w.height, level)
+        yield LevelResult(level, _frozen(w.read(level)), settled=False)
+    _cycles(w.gradient, PREVIEW_GRADIENT_CYCLES)
+    w.guide(w.top)
+    _cycles(w.height, PREVIEW_HEIGHT_CYCLES)
+    yield LevelResult(w.top, _frozen(w.read(w.top)), settled=False)
+
+
+def _cycles(system: multigrid.System, count: int) -> None:
+    """Start the finest level from the next coarser and cycle."""
+    multigrid.start(system, system.top)
+    for _ in range(count if system.top > 0 else 0):
+        multigrid.cycle(system)
+
+
+def _gradients(w: Workspace) -> None:
+    """The gradient step alone, up to the finest level."""
+    for level in range(w.top):
+        multigrid.start(w.gradient, level)
+        multigrid.finish(w.gradient, level)
+    _cycles(w.gradient, PREVIEW_GRADIENT_CYCLES)
+
+
+def _settle(w: Workspace, settings: TerrainSettings) -> Iterator[LevelResult]:
+    """Cycle to rest, then give out all levels: the finest, and its injections."""
+    quantum = grid.quantum(w.top, settings.size_m)
+    span = min(settings.reach_m or settings.size_m / 4, settings.size_m / 4)
+    if w.top > 0:
+        yield from _to_rest(w, w.gradient, GRADIENT_SHARE * quantum / span)
+        w.guide(w.top)
+        multigrid.refresh(w.height)
+        yield from _to_rest(w, w.height, HEIGHT_SHARE * quantum)
+    heights = _frozen(w.read(w.top))
+    for level in range(w.top + 1):
+        step = 1 << (w.top - level)
+        yield LevelResult(level, _frozen(heights[::step, ::step]), settled=True)
+
+
+def _to_rest(w: Workspace, system: multigrid.System, tolerance: float) -> Iterator[LevelResult]:
+    """Cycles until the estimated error is below ``tolerance``."""
+    before = math.inf
+    for k in range(1, MAX_CYCLES + 1):
+        multigrid.cycle(system)
+        update = system.change("v", "u")
+        if update * UPDATE_SHARE < tolerance or (k >= STALLED_AFTER and update > STALLED * before):
+            return
+        before = update
+        if k % CYCLES_PER_PULSE == 0:
+            step = 1 << w.top
+            yield LevelResult(0, _frozen(w.read(w.top)[::step, ::step]), settled=False)
+
+
+def _frozen(heights: NDArray[np.float32]) -> NDArray[np.float32]:
+    out = np.ascontiguousarray(heights)
+    out.flags.writeable = False
+    return out

@@ -1,0 +1,33 @@
+// Rows of a level, for kernels that work a row at a time (CPU devices). Twins: backend/esker/solve/reference.py.
+//
+// A level is n rows of `pitch` floats; sample (y, x) is at y * pitch + PAD + x. A channel is a whole level; channels lie
+// behind each other. PAD floats on both sides let vectors run past the ends. Borders are mirrored: before a row is used
+// as a neighbour its ghosts [-1] and [n] are set.
+#define PAD 16
+#define VW 16
+#define HARD_VALUE(d, soft) select(d, (float16)(soft), d < 0.0f)
+
+typedef global float *row_t;
+typedef global const float *crow_t;
+
+inline crow_t crow(crow_t a, int y, int pitch) { return a + (size_t)y * pitch + PAD; }
+inline row_t row(row_t a, int y, int pitch) { return a + (size_t)y * pitch + PAD; }
+inline int mirror(int y, int n) { return y < 0 ? -y : (y >= n ? 2 * n - 2 - y : y); }
+
+inline void ghosts(row_t r, int n) {
+    r[-1] = r[1];
+    r[n] = r[n - 2];
+}
+
+// One coarse row of R = P^T: `a`, `b`, `c` are the fine rows 2J-1, 2J, 2J+1; `tmp` is scratch for one fine row.
+inline void restrict_row(row_t out, crow_t a, crow_t b, crow_t c, row_t tmp, int n) {
+    int nc = n / 2 + 1;
+    for (int x = 0; x < n; x += VW)
+        vstore16(vload16(0, b + x) + 0.5f * (vload16(0, a + x) + vload16(0, c + x)), 0, tmp + x);
+    ghosts(tmp, n);
+    for (int x = 0; x < nc; x += VW) {
+        row_t t = tmp + 2 * x;
+        float16 u = vload16(0, t), v = vload16(0, t + VW), l = vload16(0, t - 1), m = vload16(0, t + VW - 1);
+        vstore16((float16)(u.even + 0.5f * (u.odd + l.even), v.even + 0.5f * (v.odd + m.even)), 0, out + x);
+    }
+}

@@ -1,0 +1,83 @@
+// From rasterised constraints to the hierarchy of levels (DESIGN 5.3). Twins: reference.coarsen, reference.divergence.
+
+// Springs of one coarse row: d' = S / (1 + SATURATION S), f' = R f / (1 + SATURATION S), S = R d. Fixed samples count
+// as springs of CREST_STIFFNESS. `tmp` holds four fine rows. d is written by channel 0 only.
+inline void coarsen_row(crow_t d, crow_t f, row_t d2, row_t f2, int J, int n, int pitch, int pitch2, row_t tmp,
+                        int write_d) {
+    int ys[3] = {mirror(2 * J - 1, n), 2 * J, mirror(2 * J + 1, n)}, nc = n / 2 + 1;
+    row_t sd = tmp + PAD, sf = tmp + pitch + PAD, t = tmp + 2 * pitch + PAD, kd = tmp + 3 * pitch + PAD;
+    for (int x = 0; x < n; x += VW) {
+        float16 ad = 0.0f, af = 0.0f;
+        for (int i = 0; i < 3; i++) {
+            float16 dv = vload16(0, crow(d, ys[i], pitch) + x), fv = vload16(0, crow(f, ys[i], pitch) + x);
+            float16 fixed = select((float16)(1.0f), (float16)(CREST_STIFFNESS), dv < 0.0f);
+            float w = i == 1 ? 1.0f : 0.5f;
+            ad += w * HARD_VALUE(dv, CREST_STIFFNESS);
+            af += w * fixed * fv;
+        }
+        vstore16(ad, 0, sd + x);
+        vstore16(af, 0, sf + x);
+    }
+    ghosts(sd, n);
+    ghosts(sf, n);
+    row_t od = row(d2, J, pitch2), of = row(f2, J, pitch2);
+    for (int x = 0; x < nc; x += VW) {
+        float16 s[2];
+        for (int i = 0; i < 2; i++) {
+            row_t r = (i ? sf : sd) + 2 * x;
+            float16 u = vload16(0, r), v = vload16(0, r + VW), l = vload16(0, r - 1), m = vload16(0, r + VW - 1);
+            s[i] = (float16)(u.even + 0.5f * (u.odd + l.even), v.even + 0.5f * (v.odd + m.even));
+        }
+        float16 k = 1.0f / (1.0f + SATURATION * s[0]);
+        if (write_d) vstore16(s[0] * k, 0, od + x);
+        vstore16(s[1] * k, 0, of + x);
+    }
+}
+
+// Global size (strips, channels).
+kernel void coarsen(crow_t d, crow_t f, row_t d2, row_t f2, int n, int pitch, int pitch2, int stride, int stride2,
+                    row_t scratch, int scratch_stride, int rows) {
+    int s = get_global_id(0), c = get_global_id(1), nc = n / 2 + 1;
+    row_t tmp = scratch + (size_t)(c * get_global_size(0) + s) * scratch_stride;
+    for (int J = s * rows; J < min(nc, (s + 1) * rows); J++)
+        coarsen_row(d, f + (size_t)c * stride, d2, f2 + (size_t)c * stride2, J, n, pitch, pitch2, tmp, c == 0);
+}
+
+// The levels below level 0, by one work-item: they lie behind level 0 in the same buffers.
+// tab[4 k]: offset, n, pitch of level -k.
+kernel void coarsen_bottom(row_t d, row_t f, constant int *tab, int levels, int channels, int stride, row_t scratch) {
+    for (int k = 0; k < levels; k++) {
+        constant int *a = tab + 4 * k, *b = a + 4;
+        for (int c = 0; c < channels; c++)
+            for (int J = 0; J < b[1]; J++)
+                coarsen_row(d + a[0], f + (size_t)c * stride + a[0], d + b[0], f + (size_t)c * stride + b[0], J, a[1],
+                            a[2], b[2], scratch, c == 0);
+    }
+}
+
+inline float16 half_difference(float16 before, float16 after) { return -0.5f * (after - before); }
+
+// rhs = f - spacing * div g, at fixed samples f. g: two channels `stride` apart. Global size (strips).
+kernel void divergence(crow_t f, crow_t d, crow_t g, row_t rhs, int n, int pitch, int stride, float spacing, int rows) {
+    int s = get_global_id(0);
+    for (int y = s * rows; y < min(n, (s + 1) * rows); y++) {
+        crow_t gx = crow(g, y, pitch), gy = crow(g + stride, y, pitch), dr = crow(d, y, pitch), fr = crow(f, y, pitch);
+        crow_t gs = crow(g + stride, max(y - 1, 0), pitch), gn = crow(g + stride, min(y + 1, n - 1), pitch);
+        float up = y == 0 ? -1.0f : (y == n - 1 ? 1.0f : 0.0f);
+        row_t out = row(rhs, y, pitch);
+        for (int x = 0; x < n; x += VW) {
+            float16 across = half_difference(vload16(0, gx + x - 1), vload16(0, gx + x + 1));
+            float16 north = vload16(0, gn + x), south = vload16(0, gs + x);
+            float16 along = up == 0.0f ? half_difference(south, north) : up * (south + north);
+            float16 fv = vload16(0, fr + x);
+            vstore16(select(fv + spacing * (across + along), fv, vload16(0, dr + x) < 0.0f), 0, out + x);
+        }
+        // at the west and east border the row of the operator is doubled
+        for (int e = 0; e < 2; e++) {
+            int x = e ? n - 1 : 0, i = e ? n - 2 : 1;
+            float across = (e ? 1.0f : -1.0f) * (gx[x] + gx[i]);
+            float along = up == 0.0f ? -0.5f * (gn[x] - gs[x]) : up * (gs[x] + gn[x]);
+            if (dr[x] >= 0.0f) out[x] = fr[x] + spacing * (across + along);
+        }
+    }
+}
