@@ -26,7 +26,9 @@ class Pen:
         self.rng = np.random.default_rng(seed)
         self.strokes: list[Stroke] = []
 
-    def chain(self, points: Sequence[Point], left: Side, right: Side, *, wobble: float = 0.05, label: str = "") -> None:
+    def chain(
+        self, points: Sequence[Point], left: Side, right: Side, *, wobble: float = 0.025, label: str = ""
+    ) -> None:
         """A mountain chain or a crevice through ``points`` (x, y, height in metres), one profile stroke a leg.
 
         Heights follow a monotone spline along the whole chain; ``wobble`` roughens the silhouette by that part of the
@@ -43,6 +45,65 @@ class Pen:
             ends = tuple((round(float(pts[j, 0]), 2), round(float(pts[j, 1]), 2), 0.0) for j in (i, i + 1))
             curve = tuple((round(float(a), 5), round(float(b), 2)) for a, b in zip(u, z, strict=True))
             self._put("profile", ends[0], ends[1], curve, left, right, label=label)
+
+    def massif(
+        self,
+        crest: Sequence[Point],
+        slope: float,
+        *,
+        spacing: float = 420.0,
+        reach: float = 1.35,
+        spurs: int = 2,
+        label: str = "",
+        meander: float = 0.1,
+    ) -> None:
+        """A ridge with spurs that branch off on both sides, again with spurs of their own (``spurs`` generations).
+
+        A spur falls more gently than the flank it stands on, so that it stays above it: ``reach`` is its length over
+        the width of that flank.
+        """
+        path = self._bent(crest, meander)
+        self.chain(path, (slope, 4000), (slope, 4000), wobble=0.025, label=label)
+        self._branch(path, slope, spacing, reach, spurs, label)
+
+    def _branch(self, path: Sequence[Point], slope: float, spacing: float, reach: float, left: int, label: str) -> None:
+        pts = np.asarray(path)
+        run = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(pts[:, :2], axis=0).T))])
+        side = float(self.rng.choice([-1.0, 1.0]))
+        at = spacing * self.rng.uniform(0.35, 0.7)
+        while left > 0 and at < run[-1] - 0.3 * spacing:
+            x, y, z = (float(np.interp(at, run, pts[:, i])) for i in range(3))
+            ahead = min(at + 60, run[-1])
+            tx, ty = (float(np.interp(ahead, run, pts[:, i]) - np.interp(ahead - 120, run, pts[:, i])) for i in (0, 1))
+            length = reach * z / math.tan(math.radians(slope)) * float(self.rng.uniform(0.85, 1.15))
+            if length > 0.5 * spacing:
+                angle = math.atan2(ty, tx) + side * math.radians(float(self.rng.uniform(58, 84)))
+                spur = self.spur((x, y, z * 0.985), angle, length)
+                self.chain(spur, (slope, 4000), (slope, 4000), wobble=0.03, label=f"{label} spur")
+                self._branch(spur, slope, spacing * 0.72, reach * 0.9, left - 1, label)
+            side = -side
+            at += 0.5 * spacing * float(self.rng.uniform(0.75, 1.3))
+
+    def spur(self, root: Point, angle: float, length: float, legs: int = 0) -> list[Point]:
+        """A spur in a few legs that wander off the straight line, from the root down to the base."""
+        legs = legs or max(3, round(length / 260))
+        out = [root]
+        x, y, _ = root
+        for i in range(1, legs + 1):
+            angle += math.radians(float(self.rng.normal(0, 11)))
+            x, y = x + length / legs * math.cos(angle), y + length / legs * math.sin(angle)
+            t = i / legs
+            out.append((x, y, root[2] * (1 - t) ** 1.12 * (1 if i == legs else float(self.rng.uniform(0.93, 1.07)))))
+        return out
+
+    def _bent(self, points: Sequence[Point], meander: float) -> list[Point]:
+        """The chain with every leg split in two, its middle moved sideways and a little up or down."""
+        out: list[Point] = [points[0]]
+        for (ax, ay, az), (bx, by, bz) in zip(points, points[1:], strict=False):
+            q = meander * float(self.rng.uniform(-1, 1))
+            mid = (0.5 * (az + bz)) * float(self.rng.uniform(0.92, 1.06))
+            out += [(0.5 * (ax + bx) - q * (by - ay), 0.5 * (ay + by) + q * (bx - ax), mid), (bx, by, bz)]
+        return out
 
     def plateau(
         self,
