@@ -220,26 +220,58 @@ def test_an_overtaken_level_is_never_sent() -> None:
     client.check_newest()
 
 
-def test_new_tiles_wait_while_their_ancestors_are_newer() -> None:
-    """A fine tile of an old solve beside moved neighbours would crack; elsewhere it may go."""
-    server, ground = TileServer(SIZE_M, LEVELS), Ground(random.Random(3))
+ABOVE = View(eye=(256.0, 256.0, 700.0), target=(256.0, 257.0, 0.0), tau_px=0.25)
+
+
+def rough_everywhere() -> Ground:
+    """Rough at the finest level only, so that a view from above wants every tile."""
+    ground = Ground(random.Random(3))
     y, x = np.mgrid[0 : ground.fine.shape[0], 0 : ground.fine.shape[1]]
     ground.fine += np.where((x + y) % 2 == 0, 2.0, -2.0).astype(np.float32)
-    ground.fine[::2, ::2] = 0  # rough at the finest level only, everywhere
+    ground.fine[::2, ::2] = 0
+    return ground
+
+
+def test_new_tiles_wait_where_their_ancestors_are_newer_and_only_there() -> None:
+    """A fine tile of an old solve beside moved neighbours would crack; far from the edit it may go."""
+    server, ground = TileServer(SIZE_M, LEVELS), rough_everywhere()
     client = Client(server)
     solve(server, ground, 1, False, range(LEVELS + 1))
     client.drain()
     ground.fine[:400, :400] += 50
     solve(server, ground, 2, False, range(2))
     client.drain()
-    client.tiles.set_view(View(eye=(256.0, 256.0, 700.0), target=(256.0, 257.0, 0.0), tau_px=0.25))
+    client.tiles.set_view(ABOVE)
     client.drain()
-    assert not any(k.level > 2 for k in client.decoder.held)
-    ground.fine[600:, 600:] += 1
+    fine = {(k.x, k.y) for k in client.decoder.held if k.level == 4}
+    # Level 0 moved up to its sample 24, which blocks 5 and 6 share (4 cells: one fine tile); one block more makes 7.
+    assert fine == {(x, y) for x in range(16) for y in range(16) if x > 7 or y > 7}
     solve(server, ground, 2, False, range(2, LEVELS + 1))
     client.drain()
     client.check_newest()
-    assert any(k.level == 4 for k in client.decoder.held)
+    assert sum(k.level == 4 for k in client.decoder.held) == 256
+
+
+def test_new_tiles_wait_while_their_neighbours_are_of_an_older_put() -> None:
+    server, ground = TileServer(SIZE_M, LEVELS), rough_everywhere()
+    client = Client(server, rest_level=-1)
+    client.tiles.set_view(View(eye=(100.0, 256.0, 20.0), target=(100.0, 257.0, 0.0), tau_px=4.0))
+    solve(server, ground, 1, False, range(LEVELS + 1))
+    client.drain()
+    first = {k for k in client.decoder.held if k.level == 4}
+    assert 0 < len(first) < 100
+    ground.fine[:, :1000] += 3  # moves all tiles of levels 3 and 4 that are held, and more
+    for level in (3, 4):
+        server.put_level(2, level, ground.level(level, False), False)
+    ground.fine[1024, 1024] += 90
+    server.put_level(3, 0, ground.level(0, False), False)  # far away; yet it overtakes both levels
+    client.tiles.set_view(ABOVE)
+    client.drain()
+    assert {k for k in client.decoder.held if k.level == 4} == first
+    solve(server, ground, 3, False, range(LEVELS + 1))
+    client.drain()
+    client.check_newest()
+    assert sum(k.level == 4 for k in client.decoder.held) == 256
 
 
 def test_dropping_a_tile_drops_its_descendants() -> None:

@@ -41,7 +41,7 @@ def surface(level: int, seed: int) -> NDArray[np.float32]:
 def session() -> list[bytes]:
     """Every frame of a client that opens, looks closer, and sees two edits and a drop."""
     server = TileServer(SIZE_M, LEVELS)
-    client = ClientTiles(server)
+    client = ClientTiles(server, rest_level=-1)
     frames: list[bytes] = []
 
     def drain() -> None:
@@ -61,6 +61,42 @@ def session() -> list[bytes]:
     for level in range(LEVELS + 1):
         server.put_level(3, level, surface(level, 2), settled=True)
     drain()
+    return frames
+
+
+def interrupted() -> list[bytes]:
+    """A slow client while somebody draws: solves are cut short, views move, frames come late (seeded)."""
+    rng = np.random.default_rng(11)
+    server = TileServer(SIZE_M, LEVELS)
+    client = ClientTiles(server)
+    frames: list[bytes] = []
+    n = grid.samples(LEVELS)
+    ground = np.zeros((n, n), dtype=np.float32)
+
+    def send(most: int) -> None:
+        for _ in range(most):
+            plan = client.plan()
+            if plan is None:
+                return
+            frames.append(plan.encode())
+            client.commit(plan)
+
+    for clock in range(1, 13):
+        r, c, w = int(rng.integers(n)), int(rng.integers(n)), int(rng.integers(8, 90))
+        window = ground[max(0, r - w) : r + w, max(0, c - w) : c + w]
+        window += np.outer(*(np.sin(np.linspace(0, np.pi, k)) for k in window.shape)).astype(np.float32) * 60
+        if clock % 3 == 0:
+            eye = (float(rng.uniform(0, 1000)), float(rng.uniform(0, 1000)), 300.0)
+            client.set_view(View(eye=eye, target=(500.0, 500.0, 0.0), width=640, height=480, tau_px=0.5))
+        for level in range(LEVELS + 1 if clock % 4 == 0 else int(rng.integers(1, LEVELS + 1))):
+            preview = ground[:: 1 << (LEVELS - level), :: 1 << (LEVELS - level)] * np.float32(
+                1 - 0.03 * (LEVELS - level)
+            )
+            server.put_level(clock, level, preview, settled=False)
+            send(int(rng.integers(0, 3)))
+    for level in range(LEVELS + 1):
+        server.put_level(12, level, ground[:: 1 << (LEVELS - level), :: 1 << (LEVELS - level)].copy(), settled=True)
+    send(100)
     return frames
 
 
@@ -175,7 +211,7 @@ def told(decoder: FrameDecoder, frame: bytes) -> dict[str, Any]:
 def build() -> dict[str, Any]:
     """The whole file."""
     sessions = []
-    for name, frames in (("session", session()), ("extreme", extreme())):
+    for name, frames in (("session", session()), ("interrupted", interrupted()), ("extreme", extreme())):
         decoder = FrameDecoder()
         steps = [{"frame": base64.b64encode(f).decode(), "decoded": told(decoder, f)} for f in frames]
         sessions.append({"name": name, "steps": steps})
@@ -183,4 +219,4 @@ def build() -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    PATH.write_text(json.dumps(build(), indent=1) + "\n")
+    PATH.write_text(json.dumps(build(), separators=(",", ":")).replace('{"frame"', '\n{"frame"') + "\n")

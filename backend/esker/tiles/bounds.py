@@ -36,6 +36,17 @@ def block_reduce(ufunc: np.ufunc, a: NDArray[T], cells: int) -> NDArray[T]:
     return a
 
 
+def dilate(a: NDArray[T]) -> NDArray[T]:
+    """The largest of each value and its eight neighbours; on booleans, also the neighbours of every True."""
+    rows = a.copy()
+    np.maximum(rows[1:], a[:-1], out=rows[1:])
+    np.maximum(rows[:-1], a[1:], out=rows[:-1])
+    out = rows.copy()
+    np.maximum(out[:, 1:], rows[:, :-1], out=out[:, 1:])
+    np.maximum(out[:, :-1], rows[:, 1:], out=out[:, :-1])
+    return out
+
+
 def parent_distance(samples: Ints, parent: Ints) -> Ints:
     """Twice |sample - what the parent would draw there|, in quanta of the child, same shape as ``samples``.
 

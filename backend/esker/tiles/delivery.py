@@ -8,7 +8,7 @@ Two rules keep every client's ground consistent while levels arrive coarse to fi
 - A level is *current* when no coarser level changed after it was put. A LEVEL frame is sent only of a current level:
   else the fine ground, which the page moves along with its parents, would jump back to an older solve.
 - A FILL adds a tile only when its content is of the same put as what the client holds of that level, or older and
-  unchanged since, and no ancestor changed since the level was put. So it fits its neighbours to the bit.
+  unchanged since, and no ancestor changed there since the level was put. So it fits its neighbours to the bit.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from esker.grid import TileKey
 from esker.tiles.codec import Ints, child_window, pack, predict
 from esker.tiles.frame import FrameHead, TileRecord, write_frame, write_tile
 from esker.tiles.pyramid import Counts, Level, Mask, Pyramid
-from esker.tiles.quadtree import default_selection, select
+from esker.tiles.quadtree import ALWAYS, default_selection, select
 
 FILL_TILES: Final = 48
 """Most tiles in one FILL frame: about 64 KiB where a tile takes 1 to 1.5 KB."""
@@ -122,8 +122,6 @@ class TileServer:
     def __init__(self, size_m: float, levels: int) -> None:
         self.pyramid = Pyramid(size_m, levels)
         self.cache = EncodedTiles()
-        self._lineage: list[Counts] = []
-        self._lineage_stamp = -1
 
     @property
     def levels(self) -> int:
@@ -142,20 +140,6 @@ class TileServer:
         """True when every level is final for one and the same clock."""
         levels = [self.pyramid.level(level) for level in range(self.levels + 1)]
         return all(level is not None and level.settled for level in levels) and len({v.clock for v in levels if v}) == 1
-
-    def lineage(self) -> list[Counts]:
-        """Per level, (2^l, 2^l): the newest version among a tile's ancestors, itself not counted."""
-        if self._lineage_stamp != self.pyramid.stamp:
-            newest = np.zeros((1, 1), dtype=np.uint32)
-            self._lineage = [newest]
-            for level in range(self.levels):
-                found = self.pyramid.level(level)
-                if found is not None:
-                    newest = np.maximum(newest, found.versions)
-                newest = newest.repeat(2, axis=0).repeat(2, axis=1)
-                self._lineage.append(newest)
-            self._lineage_stamp = self.pyramid.stamp
-        return self._lineage
 
 
 class ClientTiles:
@@ -274,14 +258,18 @@ class ClientTiles:
         level = pyramid.level(index)
         if level is None or level.stamp == self._stamps[index]:
             return None
+        held = self._held[index]
+        if index > ALWAYS and not held.any():
+            # Nothing to keep in step: FILL frames bring the level by and by, the most visible tiles first.
+            self._stamps[index], self._moved[index], self._settled[index] = level.stamp, False, level.settled
+            return None
         coarser = [pyramid.level(i) for i in range(index)]
         if any(c is not None and c.changed > level.stamp for c in coarser):
             return None
-        held = self._held[index]
         stale = held != level.versions
         send = stale & self._wanted[index] & self._parents_held(index)
         drop = stale & (held > 0) & ~send
-        preview = bool(held.any()) and (self._moved[index] or level.settled != self._settled[index])
+        preview = self._moved[index] or level.settled != self._settled[index]
         if not send.any() and not drop.any() and not preview:
             # Nothing that the client shows differs from this put.
             self._stamps[index], self._moved[index], self._settled[index] = level.stamp, False, level.settled
@@ -298,7 +286,7 @@ class ClientTiles:
             return None
         send &= self._parents_held(index)
         send &= level.versions <= self._stamps[index]
-        send &= self._server.lineage()[index] <= level.stamp
+        send &= self._server.pyramid.lineage()[index] <= level.stamp
         keys = _keys(index, send)
         if self._errors is not None:
             error = self._errors[index]

@@ -14,8 +14,12 @@ from numpy.typing import NDArray
 
 from esker import grid
 from esker.contract import TILE_CELLS
-from esker.tiles.bounds import Bounds, SubPatches, block_reduce, nest
+from esker.tiles.bounds import Bounds, SubPatches, block_reduce, dilate, nest
 from esker.tiles.codec import SAMPLE_LIMIT, Ints
+
+BLOCK_CELLS: Final = 4
+"""Changes are remembered per block of this many cells. What a changed sample moves on finer levels, through the
+prediction's stencil of three samples a level, ends less than one block away."""
 
 Counts = NDArray[np.uint32]
 Mask = NDArray[np.bool_]
@@ -73,6 +77,10 @@ class Pyramid:
         self._levels: list[Level | None] = [None] * (levels + 1)
         self._subs = [SubPatches(level) for level in range(levels + 1)]
         self._dirty: list[Mask] = [np.zeros((1 << level, 1 << level), dtype=np.bool_) for level in range(levels + 1)]
+        self._touched = [np.zeros((16 << level, 16 << level), dtype=np.uint32) for level in range(levels)]
+        """Per block: the stamp of its last change. The finest level moves nothing below it and keeps none."""
+        self._lineage: list[Counts] = []
+        self._lineage_stamp = -1
         self._bounds: Bounds | None = None
         self._bounds_stamp = -1
 
@@ -95,10 +103,8 @@ class Pyramid:
         old = self._levels[level]
         samples = quantise(heights, level, self.size_m, old.samples if old is not None and not settled else None)
         stamp = self.stamp + 1
-        if old is None:
-            changed = np.ones((1 << level, 1 << level), dtype=np.bool_)
-        else:
-            changed = np.asarray(block_reduce(np.logical_or, samples != old.samples, TILE_CELLS), dtype=np.bool_)
+        moved = np.ones((n, n), dtype=np.bool_) if old is None else samples != old.samples
+        changed = self._touch(level, moved, stamp)
         count = int(np.count_nonzero(changed))
         if old is not None and not count:
             self._levels[level] = replace(old, stamp=stamp, clock=clock, settled=settled)
@@ -112,6 +118,33 @@ class Pyramid:
         if old is None or level == self.levels:
             self.generation += 1
         return count
+
+    def _touch(self, level: int, moved: Mask, stamp: int) -> Mask:
+        """Remembers which blocks hold a moved sample; returns which tiles do."""
+        if level == self.levels:
+            return block_reduce(np.logical_or, moved, TILE_CELLS)
+        blocks = block_reduce(np.logical_or, moved, BLOCK_CELLS)
+        self._touched[level][blocks] = stamp
+        side, per = 1 << level, TILE_CELLS // BLOCK_CELLS
+        return np.asarray(blocks.reshape(side, per, side, per).any(axis=(1, 3)), dtype=np.bool_)
+
+    def lineage(self) -> list[Counts]:
+        """Per level, (2^l, 2^l): when an ancestor last changed where it moves this tile, 0 for never."""
+        if self._lineage_stamp == self.stamp:
+            return self._lineage
+        self._lineage = [np.zeros((1 << level, 1 << level), dtype=np.uint32) for level in range(self.levels + 1)]
+        for ancestor, touched in enumerate(self._touched):
+            near = dilate(touched)
+            for level in range(ancestor + 1, self.levels + 1):
+                side, blocks = 1 << level, near.shape[0]
+                if blocks >= side:
+                    per = blocks // side
+                    found = near.reshape(side, per, side, per).max(axis=(1, 3))
+                else:
+                    found = near.repeat(side // blocks, axis=0).repeat(side // blocks, axis=1)
+                np.maximum(self._lineage[level], found, out=self._lineage[level])
+        self._lineage_stamp = self.stamp
+        return self._lineage
 
     def _mark(self, level: int, changed: Mask) -> None:
         """Bounds to recompute: of the changed tiles, and of their children, whose error is against them."""

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from esker.contract import View
-from esker.tiles.bounds import Bounds, Floats
+from esker.tiles.bounds import Bounds, Floats, dilate
 
 Mask = NDArray[np.bool_]
 Vector = NDArray[np.float64]
@@ -83,23 +83,12 @@ def screen_error(bounds: Bounds, view: View) -> tuple[Mask, Floats, Floats]:
     return inside, bounds.error * pixels, bounds.spacing * (2 * pixels)
 
 
-def _dilate(mask: Mask) -> Mask:
-    """Also the eight neighbours of every True."""
-    rows = mask.copy()
-    rows[1:] |= mask[:-1]
-    rows[:-1] |= mask[1:]
-    out = rows.copy()
-    out[:, 1:] |= rows[:, :-1]
-    out[:, :-1] |= rows[:, 1:]
-    return out
-
-
 def restrict(masks: list[Mask]) -> list[Mask]:
     """Smallest superset that holds every tile's parent and the parent's eight neighbours; changes ``masks``."""
     for level in range(len(masks) - 1, 0, -1):
         n = 1 << (level - 1)
         parents: Mask = np.asarray(masks[level].reshape(n, 2, n, 2).any(axis=(1, 3)), dtype=np.bool_)
-        masks[level - 1] |= _dilate(parents)
+        masks[level - 1] |= dilate(parents)
     return masks
 
 

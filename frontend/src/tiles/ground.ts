@@ -48,7 +48,7 @@ export class TileGround implements Ground {
     const [ox, oy, oz] = ray.origin;
     const [dx, dy, dz] = ray.dir;
     const span = { from: 0, to: Number.POSITIVE_INFINITY };
-    if (!root || !clip(span, ox, dx, 0, this.sizeM) || !clip(span, oy, dy, 0, this.sizeM)) return null;
+    if (!root || !clip(span, ox, dx, 0, this.sizeM, true) || !clip(span, oy, dy, 0, this.sizeM, true)) return null;
     const above = oz + span.from * dz >= this.heightAt(ox + span.from * dx, oy + span.from * dy);
     if (!above && span.from > 0) return null;
     const march: March = { ox, oy, oz, dx, dy, dz, above };
@@ -75,9 +75,6 @@ export class TileGround implements Ground {
 
   /** Marches a tile and the held tiles below it over ray parameters [from, to]. */
   private visit(tile: Tile, march: March, from: number, to: number): number | null {
-    const width = this.sizeM / 2 ** tile.level;
-    const x0 = tile.x * width;
-    const y0 = tile.y * width;
     if (passesOver(march, from, to, this.summits!.get(tileKey(tile.level, tile.x, tile.y))!)) return null;
     const flip = (march.dx < 0 ? 1 : 0) | (march.dy < 0 ? 2 : 0);
     for (let i = 0; i < 4; i++) {
@@ -85,8 +82,10 @@ export class TileGround implements Ground {
       const qx = q & 1;
       const qy = q >> 1;
       const span = { from, to };
-      if (!clipSquare(span, march, x0 + (qx * width) / 2, y0 + (qy * width) / 2, width / 2)) continue;
-      const child = this.tiles.get(tileKey(tile.level + 1, 2 * tile.x + qx, 2 * tile.y + qy));
+      const x = 2 * tile.x + qx;
+      const y = 2 * tile.y + qy;
+      if (!clipSquare(span, march, x, y, 2 << tile.level, this.sizeM)) continue;
+      const child = this.tiles.get(tileKey(tile.level + 1, x, y));
       const t = child
         ? this.visit(child, march, span.from, span.to)
         : this.visitQuarter(tile, qx, qy, flip, march, span.from, span.to);
@@ -106,18 +105,26 @@ export class TileGround implements Ground {
     to: number,
   ): number | null {
     const cell = this.sizeM / (TILE_CELLS * 2 ** tile.level);
-    const size = cell * PATCH_CELLS;
     for (let i = 0; i < 4; i++) {
       const s = i ^ flip;
       const col = 2 * qx + (s & 1);
       const row = 2 * qy + (s >> 1);
-      const x0 = (tile.x * SUBPATCHES + col) * size;
-      const y0 = (tile.y * SUBPATCHES + row) * size;
+      const x = tile.x * SUBPATCHES + col;
+      const y = tile.y * SUBPATCHES + row;
       const span = { from, to };
-      if (!clipSquare(span, march, x0, y0, size)) continue;
+      if (!clipSquare(span, march, x, y, SUBPATCHES << tile.level, this.sizeM)) continue;
       if (passesOver(march, span.from, span.to, tile.subMax[row * SUBPATCHES + col]!)) continue;
       const origin = PATCH_CELLS * (row * TILE_SAMPLES + col);
-      const t = marchPatch(tile.heights, origin, x0, y0, cell, march, span.from, span.to);
+      const t = marchPatch(
+        tile.heights,
+        origin,
+        x * PATCH_CELLS * cell,
+        y * PATCH_CELLS * cell,
+        cell,
+        march,
+        span.from,
+        span.to,
+      );
       if (t !== null) return t;
     }
     return null;
@@ -141,9 +148,12 @@ interface Span {
   to: number;
 }
 
-/** Narrows the span to where `origin + t * dir` is in [low, high]; false when nothing is left. */
-function clip(span: Span, origin: number, dir: number, low: number, high: number): boolean {
-  if (dir === 0) return origin >= low && origin <= high;
+/**
+ * Narrows the span to where `origin + t * dir` is in [low, high]; false when nothing is left. A ray along a shared edge
+ * belongs to the upper side, as in `heightAt`, unless `last`: the edge is the domain's.
+ */
+function clip(span: Span, origin: number, dir: number, low: number, high: number, last: boolean): boolean {
+  if (dir === 0) return origin >= low && (origin < high || (last && origin === high));
   const a = (low - origin) / dir;
   const b = (high - origin) / dir;
   span.from = Math.max(span.from, Math.min(a, b));
@@ -151,8 +161,13 @@ function clip(span: Span, origin: number, dir: number, low: number, high: number
   return span.from <= span.to;
 }
 
-function clipSquare(span: Span, m: March, x0: number, y0: number, size: number): boolean {
-  return clip(span, m.ox, m.dx, x0, x0 + size) && clip(span, m.oy, m.dy, y0, y0 + size);
+/** Narrows the span to square (x, y) of a grid with `count` squares a side of the domain. */
+function clipSquare(span: Span, m: March, x: number, y: number, count: number, sizeM: number): boolean {
+  const low = (i: number) => (sizeM * i) / count;
+  return (
+    clip(span, m.ox, m.dx, low(x), low(x + 1), x + 1 === count) &&
+    clip(span, m.oy, m.dy, low(y), low(y + 1), y + 1 === count)
+  );
 }
 
 /** True when the ray, known to be above the ground, stays above `top` all the way. */
