@@ -9,7 +9,7 @@ import ssl
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from typing import Any, Final
 
 import segno
@@ -20,7 +20,7 @@ from esker import contract as c
 from esker.document.ops import Limits
 from esker.server import create_app
 from esker.session.hub import Hub
-from esker.session.ports import Solver
+from esker.session.ports import Solver, SolverFactory
 from esker.session.worker import Worker
 from esker.settings import Settings
 from esker.solve.solver import Solver as OpenClSolver
@@ -63,7 +63,7 @@ class _WebSocketProtocol(WebSocketsSansIOProtocol):
 class _Server(uvicorn.Server):
     """Says goodbye to the members of all rooms before the sockets are closed."""
 
-    def __init__(self, config: uvicorn.Config, hub: Hub, started: Callable[[], Any]) -> None:
+    def __init__(self, config: uvicorn.Config, hub: Hub, started: Callable[[], Awaitable[None]]) -> None:
         super().__init__(config)
         self._hub, self._announce = hub, started
 
@@ -78,46 +78,91 @@ class _Server(uvicorn.Server):
         await super().shutdown(sockets)
 
 
-def serve(settings: Settings) -> None:
-    """Runs until SIGINT or SIGTERM. Raises CannotServe, store.journal.CorruptDatabase."""
-    host = "0.0.0.0" if settings.lan and settings.host == "127.0.0.1" else settings.host
-    address = lan_address() if settings.lan else ("127.0.0.1" if host in ("0.0.0.0", "::") else host)
-    listener = _listen(host, settings.port)
-    port = int(listener.getsockname()[1])
-    context = server_context(settings.data, address) if settings.lan else None
-    base = settings.public_url or f"{'https' if context else 'http'}://{address}:{port}"
-    journal = Journal(settings.data)
-    worker = Worker(lambda device: _solver(settings, device), settings.device)
-    backups = _Backups(journal)
-    try:
-        worker.start()
-        log.info("solver: %s, levels 0 to %d", worker.device_name, settings.level)
-        hub = Hub(
-            journal,
-            Access(journal),
-            worker,
+class Assembly:
+    """A server put together but not yet running. ``close`` must be called, whatever happened."""
+
+    def __init__(self, settings: Settings, make_solver: SolverFactory | None = None) -> None:
+        """Takes the port, opens the journal, starts the solver's thread.
+
+        ``make_solver``: another solver, for tests. Raises CannotServe, store.journal.CorruptDatabase, OSError.
+        """
+        self.settings = settings
+        host = "0.0.0.0" if settings.lan and settings.host == "127.0.0.1" else settings.host
+        self.address = lan_address() if settings.lan else ("127.0.0.1" if host in ("0.0.0.0", "::") else host)
+        self._listener = _listen(host, settings.port)
+        self.port = int(self._listener.getsockname()[1])
+        self._context: ssl.SSLContext | None = None
+        self._worker: Worker | None = None
+        self._journal: Journal | None = None
+        self._backups: _Backups | None = None
+        try:
+            self._open(make_solver or self._solver)
+        except BaseException:
+            self.close()
+            raise
+
+    @property
+    def base(self) -> str:
+        """Where people reach this server."""
+        scheme = "https" if self._context else "http"
+        return (self.settings.public_url or f"{scheme}://{self.address}:{self.port}").rstrip("/")
+
+    def _open(self, make_solver: SolverFactory) -> None:
+        settings = self.settings
+        self._context = server_context(settings.data, self.address) if settings.lan else None
+        self._journal = Journal(settings.data)
+        self._worker = Worker(make_solver, settings.device)
+        self._worker.start()
+        log.info("solver: %s, levels 0 to %d", self._worker.device_name, settings.level)
+        self.hub = Hub(
+            self._journal,
+            Access(self._journal),
+            self._worker,
             _Tiles(),
             levels=settings.level,
             limits=Limits(settings.max_strokes, settings.max_points),
             max_members=settings.max_members,
         )
-        app = create_app(hub, settings.page, settings.data)
+        self._backups = _Backups(self._journal)
 
-        async def announce() -> None:
-            await _announce(hub, base, settings)
+    def _solver(self, device: str | None) -> Solver:
+        return OpenClSolver(device=device, max_level=self.settings.level, threads=self.settings.threads)
 
-        backups.start()
-        _Server(_config(app, settings, context), hub, announce).run(sockets=[listener])
+    def server(self, announce: bool = True) -> _Server:
+        """The HTTP server, to be run with ``run``."""
+        app = create_app(self.hub, self.settings.page, self.settings.data)
+
+        async def started() -> None:
+            if announce:
+                await _announce(self.hub, self.base, self.settings)
+
+        return _Server(_config(app, self.settings, self._context), self.hub, started)
+
+    def run(self, server: _Server) -> None:
+        """Serves until the server is told to stop."""
+        if self._backups is not None:
+            self._backups.start()
+        server.run(sockets=[self._listener])
+
+    def close(self) -> None:
+        """Stops the threads, commits what is queued, frees the port."""
+        if self._backups is not None:
+            self._backups.stop()
+        if self._worker is not None:
+            self._worker.stop()
+        if self._journal is not None:
+            self._journal.close()
+        self._listener.close()
+
+
+def serve(settings: Settings) -> None:
+    """Runs until SIGINT or SIGTERM. Raises CannotServe, store.journal.CorruptDatabase, OSError."""
+    assembly = Assembly(settings)
+    try:
+        assembly.run(assembly.server())
     finally:
-        backups.stop()
-        worker.stop()
-        journal.close()
-        listener.close()
+        assembly.close()
     log.info("stopped; everything is saved")
-
-
-def _solver(settings: Settings, device: str | None) -> Solver:
-    return OpenClSolver(device=device, max_level=settings.level, threads=settings.threads)
 
 
 def _listen(host: str, port: int) -> socket.socket:

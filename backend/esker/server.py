@@ -21,6 +21,7 @@ from starlette.staticfiles import StaticFiles
 from esker import contract as c
 from esker import templates
 from esker.contract import Role
+from esker.document import archive
 from esker.session.core import Denied
 from esker.session.hub import Hub
 from esker.session.limits import RateByKey
@@ -32,10 +33,10 @@ from esker.version import VERSION
 log = logging.getLogger("esker.server")
 
 MAX_IMPORT_BYTES: Final = 16 * 1024 * 1024
-NEW_TERRAINS: Final = (1 / 3, 30)
-"""New terrains by address: rate a second, burst."""
-CODE_TRIES: Final = (1 / 6, 10)
-"""Join codes by address: a code has 30 bits, so guessing one in its fifteen minutes is hopeless at this rate."""
+NEW_TERRAINS: Final = (1 / 3, 60)
+"""New terrains by address: rate a second, burst. A whole class may sit behind one address."""
+CODE_TRIES: Final = (1 / 3, 60)
+"""Join codes by address: of 31^6 codes a guesser tries 360 in the fifteen minutes that one lives."""
 RENEWED_AFTER: Final = 1.0
 STATUS: Final = {
     "bad_secret": 403,
@@ -227,8 +228,6 @@ def _add_terrains(app: FastAPI, hub: Hub) -> None:
     @app.post("/api/terrains/import", status_code=201)
     async def upload(request: Request) -> dict[str, str]:
         _limited(request, app.state.new_terrains, "new terrains came")
-        from esker.document import archive
-
         content = await _body(request, MAX_IMPORT_BYTES)
         try:
             document = await asyncio.to_thread(archive.loads, content)
@@ -249,8 +248,6 @@ def _add_terrains(app: FastAPI, hub: Hub) -> None:
 
     @app.get("/api/terrains/{terrain}/archive")
     async def download(terrain: str, link: AnyLink) -> Response:  # noqa: ARG001
-        from esker.document import archive
-
         document = await hub.document(terrain)
         content = await asyncio.to_thread(archive.dumps, document)
         name = f'attachment; filename="{terrain}.esker"'

@@ -161,11 +161,13 @@ class Journal:
                 try:
                     outcomes.append((future, write(db), None))
                 except Exception as error:
+                    if not db.in_transaction:  # SQLite gave the whole transaction up: a full disk, an I/O error
+                        raise
                     db.execute("ROLLBACK TO item")
                     outcomes.append((future, None, error))
                 db.execute("RELEASE item")
             db.execute("COMMIT")
-        except sqlite3.Error as error:  # a full disk, an unwritable file: nothing of this batch is durable
+        except sqlite3.Error as error:  # nothing of this batch is durable
             if db.in_transaction:
                 db.execute("ROLLBACK")
             outcomes = [(future, None, error) for _, future in batch]

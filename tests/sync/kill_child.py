@@ -1,0 +1,86 @@
+"""A room with its journal in a process of its own, to be killed. Writes each acknowledged op's id to stdout.
+
+``python kill_child.py DATA FIRST``: client c submits ops c:FIRST, c:FIRST+1 … as fast as the room takes them.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+from esker import contract as c
+from esker.session import protocol
+from esker.session.core import RoomCore, RoomInfo
+from esker.session.outbox import Outbox
+from esker.session.room import Guest, Room
+from esker.session.worker import Worker
+from esker.store.journal import Journal
+
+
+class _NoSolver:
+    device_name = "none"
+
+    def steps(self, *_: Any) -> Any:
+        return iter(())
+
+
+class _NoTiles:
+    def server(self, *_: Any) -> Any:
+        return self
+
+    def client(self, *_: Any) -> Any:
+        return self
+
+    def plan(self) -> None:
+        return None
+
+
+async def main(data: Path, first: int) -> None:
+    """Runs until it is killed."""
+    journal = Journal(data)
+    if not journal.exists("t"):
+        await asyncio.wrap_future(journal.create(c.Document(id="t")))
+    loaded = journal.load("t")
+    assert loaded is not None
+    worker = Worker(lambda _: _NoSolver())
+    worker.start()
+    core = RoomCore(loaded, lambda client, counter: journal.find("t", client, counter))
+    room = Room(
+        core,
+        journal=journal,
+        worker=worker,
+        tiles=_NoTiles(),
+        executor=ThreadPoolExecutor(1),
+        info=RoomInfo(0, "none"),
+        on_empty=lambda: None,
+    )
+    wake = asyncio.Event()
+    outbox = Outbox(wake.set)
+    guest: Guest = room.join(c.Hello(protocol=1, terrain="t", secret="s", client="c"), "edit", "link", outbox)
+    counter = first
+    while True:
+        ops = []
+        for _ in range(3):
+            fields = c.StrokeFields(label=str(counter))
+            begin = c.BeginStroke(stroke=_stroke("s")) if counter == 0 else c.SetStroke(stroke="s", fields=fields)
+            ops.append(c.OpEnvelope(id=f"c:{counter}", op=begin))
+            counter += 1
+        room.receive(guest, protocol.Accepted(tuple(ops)))
+        await asyncio.sleep(0.002)
+        while (text := outbox.pop()) is not None:
+            message = c.SERVER_MESSAGE.validate_json(text)
+            if isinstance(message, c.Ack):
+                os.write(1, ("".join(f"{i} {k}\n" for i, k in zip(message.ids, message.clocks, strict=True))).encode())
+            assert not isinstance(message, c.Reject), message
+
+
+def _stroke(stroke_id: str) -> c.Stroke:
+    return c.Stroke(id=stroke_id, kind="profile", first=(0, 0, 0), last=(1, 1, 1), curve=((0, 0),))
+
+
+if __name__ == "__main__":
+    asyncio.run(main(Path(sys.argv[1]), int(sys.argv[2])))

@@ -1,0 +1,220 @@
+"""The journal alone: commits, replay, damage, backups (SPEC J1 to J9)."""
+
+from __future__ import annotations
+
+import shutil
+import sqlite3
+import threading
+from concurrent.futures import wait
+from pathlib import Path
+
+import pytest
+
+from esker import contract as c
+from esker.document.ops import StrokeSet
+from esker.document.wire import op_json
+from esker.store import backup
+from esker.store.journal import CorruptDatabase, DamagedTerrain, Journal, Row
+
+BIRTH = c.Document(id="t")
+
+
+def _stroke(stroke_id: str) -> c.Stroke:
+    return c.Stroke(id=stroke_id, kind="profile", first=(0, 0, 0), last=(1, 1, 1), curve=((0, 0),))
+
+
+def _rows(first: int, count: int) -> list[Row]:
+    ops = (c.BeginStroke(stroke=_stroke(f"s{i}")) for i in range(first, first + count))
+    return [Row(first + i, "c", first + i, "c", op_json(op)) for i, op in enumerate(ops)]
+
+
+@pytest.fixture
+def journal(tmp_path: Path) -> Journal:
+    made = Journal(tmp_path)
+    made.create(BIRTH).result()
+    return made
+
+
+def test_what_was_appended_is_there_after_a_restart(journal: Journal, tmp_path: Path) -> None:
+    journal.append("t", _rows(1, 3)).result()
+    journal.append("t", _rows(4, 2)).result()
+    journal.close()
+    again = Journal(tmp_path)
+    loaded = again.load("t")
+    assert loaded is not None
+    assert loaded.document.clock == 5
+    assert list(loaded.document.strokes) == [f"s{i}" for i in range(1, 6)]
+    assert loaded.counters == {"c": 5}
+    assert [row.clock for row in loaded.recent] == [1, 2, 3, 4, 5]
+    assert again.find("t", "c", 4) == 4
+    assert again.find("t", "c", 6) is None
+    assert again.find("t", "d", 4) is None
+    assert again.load("nothing") is None
+    again.close()
+
+
+def test_a_clock_or_an_id_is_used_once(journal: Journal) -> None:
+    journal.append("t", _rows(1, 1)).result()
+    with pytest.raises(sqlite3.IntegrityError):
+        journal.append("t", _rows(1, 1)).result()
+    with pytest.raises(sqlite3.IntegrityError):
+        journal.append("t", [_rows(1, 1)[0]._replace(clock=2)]).result()
+    with pytest.raises(sqlite3.IntegrityError):
+        journal.create(BIRTH).result()
+    journal.close()
+
+
+def test_a_refused_item_does_not_undo_the_rest_of_its_commit(journal: Journal) -> None:
+    journal.append("t", _rows(1, 1)).result()
+    gate = threading.Event()
+    hold = journal.submit(lambda _: gate.wait(5))  # the next three wait together behind this one
+    futures = [journal.append("t", rows) for rows in (_rows(2, 1), _rows(1, 1), _rows(3, 1))]
+    gate.set()
+    wait([hold, *futures])
+    assert futures[0].exception() is None
+    assert isinstance(futures[1].exception(), sqlite3.IntegrityError)
+    assert futures[2].exception() is None
+    assert [row.clock for row in journal.rows("t", 0)] == [1, 2, 3]
+    journal.close()
+
+
+def test_many_rooms_share_a_commit(journal: Journal, tmp_path: Path) -> None:
+    commits = 0
+
+    def count(statement: str) -> None:
+        nonlocal commits
+        commits += statement == "COMMIT"
+
+    journal._writer_db.set_trace_callback(count)
+    gate = threading.Event()
+    journal.submit(lambda _: gate.wait(5))
+    futures = [journal.append(f"room{i}", _rows(1, 1)) for i in range(50)]
+    gate.set()
+    wait(futures)
+    assert all(f.exception() is None for f in futures)
+    assert 1 <= commits <= 2
+    journal.close()
+
+
+def test_a_full_disk_is_reported_and_survived(journal: Journal) -> None:
+    journal._writer_db.execute("PRAGMA max_page_count=1").fetchone()
+    pages = journal._writer_db.execute("PRAGMA page_count").fetchone()[0]
+    journal._writer_db.execute(f"PRAGMA max_page_count={pages}")
+    big = c.SetTerrain(fields=c.TerrainFields(title="x" * 80))
+    rows = [Row(i, "c", i, "c", op_json(big)) for i in range(1, 5000)]
+    with pytest.raises(sqlite3.OperationalError, match="full"):
+        journal.append("t", rows).result()
+    journal._writer_db.execute("PRAGMA max_page_count=1000000")
+    journal.append("t", _rows(1, 1)).result()
+    assert [row.clock for row in journal.rows("t", 0)] == [1]
+    journal.close()
+
+
+def test_snapshots_shorten_the_replay_and_change_nothing(journal: Journal) -> None:
+    document = StrokeSet.from_document(BIRTH)
+    for first in range(1, 50, 7):
+        rows = _rows(first, 7)
+        for row in rows:
+            document, _ = document.apply(c.OP.validate_json(row.op))
+        journal.append("t", rows, document.to_document()).result()
+    loaded = journal.load("t")
+    assert loaded is not None
+    assert loaded.document == document
+    assert loaded.recent == []
+    kept = [row[0] for row in journal.reader().execute("SELECT clock FROM snapshots ORDER BY clock")]
+    assert kept == [0, 42, 49]
+    past = journal.load("t", upto=20)
+    assert past is not None
+    assert (past.document.clock, len(past.document.strokes)) == (20, 20)
+    journal.close()
+
+
+def test_a_gap_or_an_op_that_does_not_apply_is_named(journal: Journal) -> None:
+    journal.append("t", [_rows(2, 1)[0]]).result()
+    with pytest.raises(DamagedTerrain, match="op 2 follows op 0"):
+        journal.load("t")
+    journal.create(c.Document(id="u")).result()
+    journal.append("u", [_rows(1, 1)[0]._replace(op='{"type":"stroke.finish","stroke":"no"}')]).result()
+    with pytest.raises(DamagedTerrain, match="op 1 of u"):
+        journal.load("u")
+    journal.close()
+
+
+@pytest.mark.parametrize("damage", ["header", "middle", "truncated", "text", "newer"])
+def test_a_damaged_database_is_refused_and_left_alone(journal: Journal, tmp_path: Path, damage: str) -> None:
+    for i in range(40):
+        journal.append("t", _rows(1 + 20 * i, 20)).result()
+    good = journal.backup()
+    journal.close()
+    path = tmp_path / "esker.db"
+    content = bytearray(path.read_bytes())
+    if damage == "header":
+        content[:100] = bytes(100)
+    elif damage == "middle":
+        content[4096 * 3 : 4096 * 6] = b"\xff" * (4096 * 3)
+    elif damage == "truncated":
+        del content[len(content) // 2 :]
+    elif damage == "text":
+        content = bytearray(b"this is no database\n" * 500)
+    else:
+        content[60:64] = (99).to_bytes(4, "big")  # user_version
+    path.write_bytes(content)
+    with pytest.raises(CorruptDatabase) as caught:
+        Journal(tmp_path)
+    assert str(path) in str(caught.value)
+    assert str(good) in str(caught.value)
+    assert path.read_bytes() == bytes(content), "a damaged file must not be touched"
+    # The way out that the sentence describes works.
+    path.unlink()
+    shutil.copy(good, path)
+    restored = Journal(tmp_path)
+    loaded = restored.load("t")
+    assert loaded is not None
+    assert loaded.document.clock == 800
+    restored.close()
+
+
+def test_without_a_copy_the_sentence_says_so(tmp_path: Path) -> None:
+    (tmp_path / "esker.db").write_bytes(b"nonsense" * 1000)
+    with pytest.raises(CorruptDatabase, match="no earlier copy"):
+        Journal(tmp_path)
+
+
+def test_backups_are_complete_while_the_journal_is_written(journal: Journal, tmp_path: Path) -> None:
+    stop = threading.Event()
+    appended = [0]
+
+    def write() -> None:
+        while not stop.is_set():
+            journal.append("t", _rows(appended[0] + 1, 1)).result()
+            appended[0] += 1
+
+    thread = threading.Thread(target=write)
+    thread.start()
+    copies = []
+    for i in range(8):
+        before = appended[0]
+        journal._now = lambda i=i: 1000.0 + i  # type: ignore[misc]
+        path = journal.backup()
+        with sqlite3.connect(path) as db:
+            assert db.execute("PRAGMA integrity_check").fetchone()[0] == "ok"
+            count = db.execute("SELECT count(*), max(clock) FROM ops").fetchone()
+        db.close()
+        assert count[0] == (count[1] or 0) >= before
+        copies.append(path)
+    stop.set()
+    thread.join()
+    assert [p.exists() for p in copies] == [False] * 3 + [True] * backup.KEPT
+    assert backup.last_backup(tmp_path) == copies[-1]
+    assert not list((tmp_path / "backup").glob("*.part"))
+    journal.close()
+
+
+def test_a_closed_journal_has_committed_everything(tmp_path: Path) -> None:
+    journal = Journal(tmp_path)
+    journal.create(BIRTH)
+    futures = [journal.append("t", _rows(i, 1)) for i in range(1, 400)]
+    journal.close()
+    assert all(f.done() and f.exception() is None for f in futures)
+    with pytest.raises(RuntimeError):
+        journal.append("t", _rows(400, 1))
