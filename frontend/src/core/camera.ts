@@ -139,6 +139,7 @@ export class Camera {
       this.#flight = null;
       this.#zoomLeft += Math.log(factor);
       this.#zoomAnchor = anchor;
+      this.#publish(); // whoever draws frames learns that there is something to animate
       return;
     }
     const { pivot, distanceM } = this.#pose;
@@ -352,6 +353,7 @@ export class Camera {
       return;
     }
     this.#flight = { from: this.#pose, to, durationS: durationMs / 1000, elapsedS: 0 };
+    this.#publish();
   }
 
   #stepFlight(dtS: number): void {

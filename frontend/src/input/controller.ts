@@ -1,0 +1,458 @@
+/**
+ * Pointers and keys on the terrain: which tool gets them, and what they change (DESIGN 12).
+ *
+ * One pointer is the main one and does one thing at a time (`Activity`): draw, drag a handle, move a stroke, or move the
+ * camera. A second finger, or Esc, ends it. Events come in CSS pixels and become device pixels here, at the DOM's edge.
+ */
+
+import { computed, type ReadonlySignal, type Signal, signal } from "@preact/signals-core";
+import type { Camera } from "../core/camera.ts";
+import type { GhostVisual, Ground, Vec3 } from "../core/types.ts";
+import type { SyncDoc } from "../doc/sync.ts";
+import type { Stroke } from "../generated/contract.ts";
+import { type Action, createActions, type ToolId } from "./actions.ts";
+import type { ToolDefaults } from "./defaults.ts";
+import { type HandleVisual, handlesOf } from "./handles.ts";
+import { HandleTool } from "./handletool.ts";
+import { Keyboard } from "./keyboard.ts";
+import { type Finger, Navigation, type NavigationMode } from "./navigation.ts";
+import { type Picked, pickHandle, pickStroke } from "./picking.ts";
+import type { Sample } from "./sketch.ts";
+import { type InkVisual, StrokeTool } from "./stroketool.ts";
+
+export type { ActionId, ToolId } from "./actions.ts";
+export type { HandleVisual } from "./handles.ts";
+
+export type InputMode = "idle" | "draw" | "handle" | NavigationMode;
+
+export interface InputOptions {
+  /** The element that takes the pointer; its box is the picture of `camera`. */
+  readonly canvas: HTMLElement;
+  readonly camera: Camera;
+  readonly doc: SyncDoc;
+  /** The ground as it is drawn now. */
+  readonly ground: () => Ground;
+  /** The same, held fast for one stroke or drag. */
+  readonly freeze: () => Ground;
+  readonly clientId: string;
+  readonly canEdit: () => boolean;
+  readonly defaults: ToolDefaults;
+  /** Where the pointer is on the ground; null when it has left. */
+  readonly onCursor: (p: Vec3 | null) => void;
+  readonly onMessage: (text: string) => void;
+  /** The name that new strokes carry. */
+  readonly author?: () => string;
+  /** Milliseconds. */
+  readonly now?: () => number;
+}
+
+type Activity =
+  | { readonly kind: "press"; readonly picked: Picked | null; readonly navigate: NavigationMode }
+  | { readonly kind: "draw" }
+  | { readonly kind: "drag" }
+  | { readonly kind: "navigate"; readonly mode: NavigationMode };
+
+interface Main {
+  readonly pointerId: number;
+  readonly touch: boolean;
+  readonly startX: number;
+  readonly startY: number;
+  moved: boolean;
+  activity: Activity;
+}
+
+/** CSS pixels a pointer may tremble within a click. */
+const CLICK_PX = 4;
+const STROKE_PX = { fine: 12, touch: 24 } as const;
+const HANDLE_PX = { fine: 14, touch: 24 } as const;
+const VIEW_ONLY = "This link lets you look, not draw. Ask for an edit link to change the terrain.";
+const LOCKED = "This stroke is locked. Unlock it to change it.";
+const OFF_GROUND = "Begin the line on the ground.";
+
+export class InputController {
+  readonly tool: Signal<ToolId> = signal<ToolId>("mountain");
+  readonly selection: Signal<string | null> = signal<string | null>(null);
+  /** Whether one finger draws; becomes false when a pen is seen. */
+  readonly fingerDraws: Signal<boolean> = signal(true);
+  readonly actions: Map<string, Action>;
+  readonly #o: InputOptions;
+  readonly #hovered = signal<string | null>(null);
+  readonly #mode = signal<InputMode>("idle");
+  readonly #handles: ReadonlySignal<readonly HandleVisual[]>;
+  readonly #strokes: StrokeTool;
+  readonly #drags: HandleTool;
+  readonly #navigation: Navigation;
+  readonly #keyboard: Keyboard;
+  readonly #touches = new Map<number, Finger>();
+  readonly #abort = new AbortController();
+  #main: Main | null = null;
+  #penDown = false;
+  #penSeen = false;
+  #toldViewOnly = false;
+
+  constructor(options: InputOptions) {
+    this.#o = options;
+    const now = options.now ?? (() => performance.timeOrigin + performance.now());
+    this.#navigation = new Navigation(options.camera, options.ground);
+    this.#strokes = new StrokeTool({ author: () => "", ...options, now });
+    this.#drags = new HandleTool({ ...options, now });
+    this.#handles = computed(() => this.#visibleHandles());
+    this.actions = createActions({
+      ...options,
+      tool: this.tool,
+      selection: this.selection,
+      fingerDraws: this.fingerDraws,
+      newId: () => this.#strokes.newId(),
+      cancel: () => this.#cancel(),
+      now,
+    });
+    this.#keyboard = new Keyboard(options.camera, this.#navigation, this.actions);
+    this.#listen();
+  }
+
+  get hovered(): ReadonlySignal<string | null> {
+    return this.#hovered;
+  }
+
+  /** Handles of the selected stroke, in the select tool. */
+  get handles(): ReadonlySignal<readonly HandleVisual[]> {
+    return this.#handles;
+  }
+
+  get ghost(): ReadonlySignal<GhostVisual | null> {
+    return this.#strokes.ghost;
+  }
+
+  /** Id of the stroke under way. */
+  get drawing(): ReadonlySignal<string | null> {
+    return this.#strokes.drawing;
+  }
+
+  /** The line under the pen, in device pixels. */
+  get ink(): ReadonlySignal<InkVisual | null> {
+    return this.#strokes.ink;
+  }
+
+  /** What the main pointer is doing. */
+  get inputMode(): ReadonlySignal<InputMode> {
+    return this.#mode;
+  }
+
+  /** Ends everything under way and all listening. */
+  dispose(): void {
+    this.#cancel();
+    this.#abort.abort();
+    this.#keyboard.dispose();
+    this.#navigation.dispose();
+  }
+
+  #listen(): void {
+    const { canvas } = this.#o;
+    const on = <K extends keyof HTMLElementEventMap>(
+      type: K,
+      run: (e: HTMLElementEventMap[K]) => void,
+      passive = true,
+    ): void => {
+      canvas.addEventListener(type, run, { passive, signal: this.#abort.signal });
+    };
+    canvas.style.touchAction = "none";
+    on("pointerdown", (e) => this.#down(e), false);
+    on("pointermove", (e) => this.#move(e));
+    on("pointerup", (e) => this.#up(e));
+    on("pointercancel", (e) => this.#lost(e));
+    on("pointerleave", () => this.#leave());
+    on("wheel", (e) => this.#wheel(e), false);
+    on("dblclick", (e) => this.#navigation.flyTo(...this.#pixel(e)));
+    on("contextmenu", (e) => e.preventDefault(), false);
+  }
+
+  /** Device pixels per CSS pixel, from what the camera believes and the box that is on the screen. */
+  get #ratio(): number {
+    return this.#o.camera.state.value.width / Math.max(1, this.#o.canvas.getBoundingClientRect().width);
+  }
+
+  #pixel(e: MouseEvent): [number, number] {
+    const box = this.#o.canvas.getBoundingClientRect();
+    const { width, height } = this.#o.camera.state.value;
+    return [
+      ((e.clientX - box.left) * width) / Math.max(1, box.width),
+      ((e.clientY - box.top) * height) / Math.max(1, box.height),
+    ];
+  }
+
+  #sample(e: PointerEvent): Sample {
+    const [x, y] = this.#pixel(e);
+    const pressure = e.pointerType === "pen" && e.pressure > 0 ? e.pressure : 0.5;
+    return { x, y, ray: this.#o.camera.ray(x, y), pressure };
+  }
+
+  #down(e: PointerEvent): void {
+    if (e.pointerType === "touch" && this.#penDown) return;
+    e.preventDefault();
+    if (e.pointerType === "pen") this.#pen();
+    const [x, y] = this.#pixel(e);
+    if (e.pointerType === "touch") {
+      this.#touches.set(e.pointerId, { id: e.pointerId, x, y });
+      if (this.#touches.size > 1) {
+        this.#beginPinch();
+        return;
+      }
+    }
+    if (this.#main !== null) return;
+    capture(this.#o.canvas, e.pointerId);
+    this.#main = {
+      pointerId: e.pointerId,
+      touch: e.pointerType === "touch",
+      startX: x,
+      startY: y,
+      moved: false,
+      activity: this.#activityFor(e, x, y),
+    };
+    this.#publishMode();
+  }
+
+  /** A pen has come: fingers that rest on the glass are not meant, and from now on one finger moves the view. */
+  #pen(): void {
+    this.#penDown = true;
+    if (!this.#penSeen) this.fingerDraws.value = false;
+    this.#penSeen = true;
+    if (this.#touches.size > 0) this.#cancel();
+    this.#touches.clear();
+    this.#navigation.endPinch();
+  }
+
+  #beginPinch(): void {
+    this.#cancel();
+    const [a, b] = [...this.#touches.values()];
+    if (this.#touches.size === 2) this.#navigation.beginPinch(a!, b!);
+    this.#publishMode();
+  }
+
+  #activityFor(e: PointerEvent, x: number, y: number): Activity {
+    const navigate = (mode: NavigationMode): Activity => {
+      this.#navigation.begin(mode, x, y);
+      return { kind: "navigate", mode };
+    };
+    if (e.button === 1 || (e.button === 2 && e.shiftKey) || (e.button === 0 && this.#keyboard.spaceHeld))
+      return navigate("pan");
+    if (e.button !== 0) return navigate(this.#turning());
+    if (this.tool.value === "select") return this.#select(e, x, y);
+    if (e.pointerType === "touch" && !this.fingerDraws.value) return this.#press(null);
+    if (!this.#o.canEdit()) {
+      if (!this.#toldViewOnly) this.#o.onMessage(VIEW_ONLY);
+      this.#toldViewOnly = true;
+      return this.#press(null);
+    }
+    if (this.#strokes.start(this.tool.value, this.#sample(e), e.pointerType === "pen")) return { kind: "draw" };
+    this.#o.onMessage(OFF_GROUND);
+    return this.#press(null);
+  }
+
+  #press(picked: Picked | null): Activity {
+    const map = this.#o.camera.state.value.mode === "map";
+    return { kind: "press", picked, navigate: map ? "pan" : this.#turning() };
+  }
+
+  #turning(): NavigationMode {
+    return this.#o.camera.state.value.mode === "fly" ? "look" : "orbit";
+  }
+
+  #select(e: PointerEvent, x: number, y: number): Activity {
+    const reach = e.pointerType === "touch" ? "touch" : "fine";
+    const handle = pickHandle(this.#handles.value, this.#o.camera, x, y, HANDLE_PX[reach] * this.#ratio);
+    if (handle !== null) return this.#beginDrag(handle, x, y);
+    const doc = this.#o.doc.doc.value;
+    const picked = doc && pickStroke(doc, this.#o.camera, x, y, STROKE_PX[reach] * this.#ratio);
+    return this.#press(picked);
+  }
+
+  #beginDrag(handle: Pick<HandleVisual, "kind" | "position">, x: number, y: number): Activity {
+    this.#drags.start(this.#selectedStroke()!, handle, x, y);
+    return { kind: "drag" };
+  }
+
+  #move(e: PointerEvent): void {
+    const [x, y] = this.#pixel(e);
+    const finger = this.#touches.get(e.pointerId);
+    if (finger !== undefined) Object.assign(finger, { x, y });
+    if (this.#navigation.mode === "pinch" && finger !== undefined) {
+      const [a, b] = [...this.#touches.values()];
+      if (a !== undefined && b !== undefined) this.#navigation.pinch(a, b);
+      return;
+    }
+    const main = this.#main;
+    if (main === null) {
+      if (e.pointerType !== "touch") this.#hover(e, x, y);
+      return;
+    }
+    if (e.pointerId !== main.pointerId) return;
+    if (!main.moved) {
+      if (Math.hypot(x - main.startX, y - main.startY) <= CLICK_PX * this.#ratio) return;
+      main.moved = true;
+      this.#firstMove(main);
+    }
+    this.#continue(main, e, x, y);
+  }
+
+  /** The pointer has left the place where it went down: a press becomes a drag of the stroke or of the view. */
+  #firstMove(main: Main): void {
+    if (main.activity.kind !== "press") return;
+    const { picked, navigate } = main.activity;
+    if (picked !== null && picked.stroke.id === this.selection.value) {
+      if (picked.stroke.locked) this.#o.onMessage(LOCKED);
+      else if (this.#o.canEdit()) {
+        main.activity = this.#beginDrag({ kind: "move", position: picked.point }, main.startX, main.startY);
+        this.#publishMode();
+        return;
+      }
+    }
+    this.#navigation.begin(navigate, main.startX, main.startY);
+    main.activity = { kind: "navigate", mode: navigate };
+    this.#publishMode();
+  }
+
+  #continue(main: Main, e: PointerEvent, x: number, y: number): void {
+    const { activity } = main;
+    if (activity.kind === "draw") {
+      const samples = eventsOf(e, "getCoalescedEvents");
+      this.#strokes.move(
+        (samples.length > 0 ? samples : [e]).map((s) => this.#sample(s)),
+        eventsOf(e, "getPredictedEvents").map((s) => this.#sample(s)),
+      );
+      this.#cursor(x, y);
+    } else if (activity.kind === "navigate") this.#navigation.drag(x, y);
+    else if (activity.kind === "drag") {
+      this.#drags.move(x, y, !e.altKey);
+      this.#cursor(x, y);
+    }
+  }
+
+  #up(e: PointerEvent): void {
+    if (e.pointerType === "pen") this.#penDown = false;
+    this.#touches.delete(e.pointerId);
+    if (this.#navigation.mode === "pinch") {
+      this.#navigation.endPinch();
+      this.#publishMode();
+      return;
+    }
+    const main = this.#main;
+    if (main === null || e.pointerId !== main.pointerId) return;
+    const { activity } = main;
+    if (!main.moved) this.#click(activity, e);
+    else if (activity.kind === "draw") {
+      const id = this.#strokes.finish();
+      if (id !== null) this.selection.value = id;
+    } else if (activity.kind === "drag") {
+      this.#drags.move(...this.#pixel(e), !e.altKey);
+      this.#drags.finish();
+    }
+    this.#endMain();
+  }
+
+  /** A click without movement selects the stroke under it, or nothing. */
+  #click(activity: Activity, e: PointerEvent): void {
+    if (activity.kind === "draw") this.#strokes.cancel();
+    if (activity.kind === "drag") this.#drags.cancel();
+    if (e.button !== 0 || activity.kind === "drag" || activity.kind === "navigate") return;
+    const [x, y] = this.#pixel(e);
+    const reach = e.pointerType === "touch" ? STROKE_PX.touch : STROKE_PX.fine;
+    const doc = this.#o.doc.doc.value;
+    this.selection.value = (doc && pickStroke(doc, this.#o.camera, x, y, reach * this.#ratio)?.stroke.id) ?? null;
+  }
+
+  /** The system took the pointer away: what was being drawn is given up. */
+  #lost(e: PointerEvent): void {
+    if (e.pointerType === "pen") this.#penDown = false;
+    this.#touches.delete(e.pointerId);
+    if (this.#navigation.mode === "pinch") this.#navigation.endPinch();
+    if (this.#main?.pointerId === e.pointerId) this.#cancel();
+    this.#publishMode();
+  }
+
+  #leave(): void {
+    if (this.#main !== null) return;
+    this.#hovered.value = null;
+    this.#drags.hover(null);
+    this.#o.onCursor(null);
+  }
+
+  #hover(e: PointerEvent, x: number, y: number): void {
+    this.#cursor(x, y);
+    if (e.pointerType === "pen" && !this.#penSeen) {
+      this.#penSeen = true;
+      this.fingerDraws.value = false;
+    }
+    const handle = pickHandle(this.#handles.value, this.#o.camera, x, y, HANDLE_PX.fine * this.#ratio);
+    this.#drags.hover(handle?.kind ?? null);
+    const doc = this.#o.doc.doc.value;
+    const over =
+      handle === null && doc !== null && this.tool.value === "select"
+        ? pickStroke(doc, this.#o.camera, x, y, STROKE_PX.fine * this.#ratio)
+        : null;
+    this.#hovered.value = over?.stroke.id ?? null;
+    this.#showCursor(handle !== null || over !== null);
+  }
+
+  #cursor(x: number, y: number): void {
+    this.#o.onCursor(this.#navigation.hit(x, y));
+  }
+
+  #wheel(e: WheelEvent): void {
+    e.preventDefault();
+    const [x, y] = this.#pixel(e);
+    this.#navigation.wheel(e.deltaY, e.deltaMode, e.ctrlKey, x, y);
+  }
+
+  /** Gives up what is under way: a stroke being drawn is deleted, a drag is taken back. True when there was one. */
+  #cancel(): boolean {
+    const main = this.#main;
+    if (main === null) return false;
+    this.#endMain();
+    if (main.activity.kind === "draw") this.#strokes.cancel();
+    else if (main.activity.kind === "drag") this.#drags.cancel();
+    return main.activity.kind === "draw" || main.activity.kind === "drag";
+  }
+
+  #endMain(): void {
+    this.#main = null;
+    this.#navigation.end();
+    this.#publishMode();
+  }
+
+  #publishMode(): void {
+    const activity = this.#main?.activity;
+    const navigation = this.#navigation.mode;
+    if (navigation !== null) this.#mode.value = navigation;
+    else this.#mode.value = activity?.kind === "draw" ? "draw" : activity?.kind === "drag" ? "handle" : "idle";
+    this.#showCursor(false);
+  }
+
+  #showCursor(over: boolean): void {
+    const idle = this.tool.value === "select" ? (over ? "pointer" : "default") : over ? "pointer" : "crosshair";
+    const mode = this.#mode.value;
+    this.#o.canvas.style.cursor = mode === "idle" || mode === "draw" ? idle : "grabbing";
+  }
+
+  #selectedStroke(): Stroke | null {
+    return this.#o.doc.doc.value?.strokes.get(this.selection.value ?? "") ?? null;
+  }
+
+  #visibleHandles(): readonly HandleVisual[] {
+    const stroke = this.#selectedStroke();
+    if (stroke === null || stroke.locked || this.tool.value !== "select" || !this.#o.canEdit()) return [];
+    return handlesOf(stroke, this.#o.ground(), this.#drags.active.value);
+  }
+}
+
+/** Follows the pointer outside the element; events made by scripts have no pointer to capture. */
+function capture(element: HTMLElement, pointerId: number): void {
+  try {
+    element.setPointerCapture(pointerId);
+  } catch {
+    // Without capture the gesture ends at the border of the element; nothing else depends on it.
+  }
+}
+
+function eventsOf(e: PointerEvent, method: "getCoalescedEvents" | "getPredictedEvents"): PointerEvent[] {
+  return typeof e[method] === "function" ? e[method]() : [];
+}

@@ -1,0 +1,44 @@
+/** What a new stroke starts with, per tool: signals that the inspector writes and the stroke tool reads. */
+
+import { type Signal, signal } from "@preact/signals-core";
+import type { Flank, Stroke } from "../generated/contract.ts";
+import { DEFAULT_EXTENT_FRACTION, DEFAULT_SLOPE_DEG } from "../generated/contract.ts";
+
+export type DrawToolId = "mountain" | "crevice" | "plateau";
+
+/** Cross-section and noise of the next stroke of a tool. */
+export type ToolStyle = Pick<Stroke, "left" | "right" | "plateau_radius_m" | "amplitude_m" | "roughness">;
+
+export interface ToolDefaults {
+  readonly mountain: Signal<ToolStyle>;
+  readonly crevice: Signal<ToolStyle>;
+  readonly plateau: Signal<ToolStyle>;
+  /** What the pressure of a pen changes. */
+  readonly pressure: Signal<"none" | "extent">;
+}
+
+const CREVICE_SLOPE_DEG = 50;
+const PLATEAU_SLOPE_DEG = 30;
+
+function style(slopeDeg: number, extentM: number, plateauRadiusM: number): ToolStyle {
+  const flank: Flank = { slope_deg: slopeDeg, extent_m: extentM, shape: "concave" };
+  return { left: flank, right: { ...flank }, plateau_radius_m: plateauRadiusM, amplitude_m: 0, roughness: 0.5 };
+}
+
+/** The defaults for a terrain of `sizeM` metres. */
+export function toolDefaults(sizeM: number): ToolDefaults {
+  return {
+    mountain: signal(style(DEFAULT_SLOPE_DEG, sizeM * DEFAULT_EXTENT_FRACTION, 0)),
+    crevice: signal(style(CREVICE_SLOPE_DEG, sizeM / 16, 0)),
+    plateau: signal(style(PLATEAU_SLOPE_DEG, sizeM * DEFAULT_EXTENT_FRACTION, sizeM / 40)),
+    pressure: signal("extent"),
+  };
+}
+
+/** The style with its extents scaled by pen pressure: a light touch makes a slender ridge, full pressure a broad one. */
+export function pressed(base: ToolStyle, pressure: number): ToolStyle {
+  const k = 0.4 + 1.2 * pressure;
+  const scaled = (f: Flank | null): Flank | null =>
+    f === null ? null : { ...f, extent_m: Math.round(f.extent_m * k * 10) / 10 };
+  return { ...base, left: scaled(base.left), right: scaled(base.right) };
+}

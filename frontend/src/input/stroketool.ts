@@ -1,0 +1,250 @@
+/**
+ * Drawing one stroke: pen samples in, ops out (DESIGN 12). At most every 33 ms the whole curve is submitted anew, since
+ * a turning plane re-projects it; one gesture, so that the stroke is one step of undo.
+ */
+
+import { type ReadonlySignal, signal } from "@preact/signals-core";
+import type { Camera } from "../core/camera.ts";
+import type { GhostVisual, Ground, Rgba } from "../core/types.ts";
+import type { SyncDoc } from "../doc/sync.ts";
+import { MAX_POINTS_PER_STROKE, type Op, type Stroke, TICK_MS } from "../generated/contract.ts";
+import { type DrawToolId, pressed, type ToolDefaults } from "./defaults.ts";
+import { LevelSketch, RidgeSketch } from "./levelsketch.ts";
+import { ProfileSketch } from "./profilesketch.ts";
+import { meanPressure, type Sample, type Sketch, type SketchShape, type SketchStart } from "./sketch.ts";
+import { appendOps, frameCurve, metres } from "./strokeops.ts";
+
+/** Samples of the line under the pen in device pixels, for an ink overlay; `predicted` is never part of the stroke. */
+export interface InkVisual {
+  readonly points: readonly { readonly x: number; readonly y: number; readonly pressure: number }[];
+  readonly predicted: readonly { readonly x: number; readonly y: number }[];
+}
+
+export interface StrokeToolOptions {
+  readonly camera: Camera;
+  readonly doc: SyncDoc;
+  readonly defaults: ToolDefaults;
+  readonly clientId: string;
+  /** The name that the stroke carries. */
+  readonly author: () => string;
+  readonly freeze: () => Ground;
+  readonly onMessage: (text: string) => void;
+  /** Milliseconds. */
+  readonly now: () => number;
+}
+
+/** While drawing, so few that one append holds them; at the end, what the screen can show. */
+const LIVE_POINTS = 240;
+const FINAL_POINTS = Math.min(2048, MAX_POINTS_PER_STROKE);
+/** Looking down more steeply than this, a vertical plane is seen edge-on. */
+const STEEP = Math.sin((78 * Math.PI) / 180);
+
+const COLOURS: Readonly<Record<DrawToolId, Rgba>> = {
+  mountain: [0.25, 0.5, 0.95, 0.22],
+  crevice: [0.2, 0.65, 0.8, 0.22],
+  plateau: [0.95, 0.4, 0.3, 0.22],
+};
+
+interface Session {
+  readonly tool: DrawToolId;
+  readonly ground: Ground;
+  readonly sketch: Sketch & { readonly samples: readonly Sample[] };
+  readonly id: string;
+  readonly gesture: string;
+  readonly pen: boolean;
+  begun: boolean;
+  sentAt: number;
+}
+
+export class StrokeTool {
+  readonly #o: StrokeToolOptions;
+  readonly #ghost = signal<GhostVisual | null>(null);
+  readonly #drawing = signal<string | null>(null);
+  readonly #ink = signal<InkVisual | null>(null);
+  #session: Session | null = null;
+  #timer: ReturnType<typeof setTimeout> | undefined;
+  #count = 0;
+
+  constructor(options: StrokeToolOptions) {
+    this.#o = options;
+  }
+
+  get ghost(): ReadonlySignal<GhostVisual | null> {
+    return this.#ghost;
+  }
+
+  /** Id of the stroke under way. */
+  get drawing(): ReadonlySignal<string | null> {
+    return this.#drawing;
+  }
+
+  get ink(): ReadonlySignal<InkVisual | null> {
+    return this.#ink;
+  }
+
+  get active(): boolean {
+    return this.#session !== null;
+  }
+
+  /** Puts the pen down. False when the ray misses the ground: there is nothing to draw on. */
+  start(tool: DrawToolId, sample: Sample, pen: boolean): boolean {
+    const ground = this.#o.freeze();
+    const hit = ground.raycast(sample.ray);
+    if (hit === null) return false;
+    const nowMs = this.#o.now();
+    const start: SketchStart = { camera: this.#o.camera, ground, hit, sample, nowMs };
+    const id = this.newId();
+    const sketch = sketchFor(tool, start);
+    this.#session = { tool, ground, sketch, id, gesture: `draw-${id}`, pen, begun: false, sentAt: -Infinity };
+    return true;
+  }
+
+  /** An id that no stroke has had. */
+  newId(): string {
+    this.#count += 1;
+    return `${this.#o.clientId.slice(0, 24)}-${Math.floor(this.#o.now()).toString(36)}${this.#count.toString(36)}`.slice(
+      -40,
+    );
+  }
+
+  /** Takes the samples of one event; `predicted` ones are shown as ink only. */
+  move(samples: readonly Sample[], predicted: readonly Sample[] = []): void {
+    const session = this.#session;
+    if (session === null || samples.length === 0) return;
+    for (const sample of samples) session.sketch.add(sample);
+    if (!session.begun) this.#begin(session);
+    if (this.#session === null) return;
+    this.#ink.value = { points: session.sketch.samples, predicted };
+    this.#drawing.value = session.id;
+    this.#schedule(session);
+  }
+
+  /** Lifts the pen: the exact stroke is submitted and finished. Returns its id, or null when there was none. */
+  finish(): string | null {
+    const session = this.#session;
+    if (session === null) return null;
+    if (session.begun) {
+      this.#submitShape(session, true);
+      if (this.#session !== null) this.#submit(session, { type: "stroke.finish", stroke: session.id });
+    }
+    const done = this.#session !== null && session.begun;
+    this.#clear();
+    return done ? session.id : null;
+  }
+
+  /** Gives the stroke up: whatever of it was submitted is deleted again. */
+  cancel(): void {
+    const session = this.#session;
+    this.#clear();
+    if (session?.begun && this.#o.doc.doc.value?.strokes.has(session.id))
+      this.#o.doc.submit({ type: "stroke.delete", stroke: session.id }, session.gesture);
+  }
+
+  #begin(session: Session): void {
+    session.begun = true;
+    const shape = session.sketch.shape(this.#o.now(), false, LIVE_POINTS);
+    const style = this.#style(session);
+    const stroke: Stroke = {
+      id: session.id,
+      author: this.#o.author(),
+      kind: session.tool === "plateau" ? "level" : "profile",
+      first: metres(shape.first),
+      last: metres(shape.last),
+      curve: [],
+      ...style,
+      locked: false,
+      hidden: false,
+      label: "",
+      finished: false,
+    };
+    this.#submit(session, { type: "stroke.begin", stroke });
+  }
+
+  #style(session: Session): Pick<Stroke, "left" | "right" | "plateau_radius_m" | "amplitude_m" | "roughness"> {
+    const base = this.#o.defaults[session.tool].value;
+    if (!session.pen || this.#o.defaults.pressure.value === "none") return base;
+    return pressed(base, meanPressure(session.sketch.samples));
+  }
+
+  /** Submits now if the last time is long enough ago, else when it is; goes on while the plane still turns. */
+  #schedule(session: Session): void {
+    if (this.#timer !== undefined) return;
+    const wait = session.sentAt + TICK_MS - this.#o.now();
+    if (wait <= 0) this.#tick(session);
+    else this.#timer = setTimeout(() => this.#tick(session), wait);
+  }
+
+  #tick(session: Session): void {
+    this.#timer = undefined;
+    if (this.#session !== session) return;
+    this.#submitShape(session, false);
+    if (this.#session === session && session.sketch.settling) this.#schedule(session);
+  }
+
+  #submitShape(session: Session, exact: boolean): void {
+    session.sentAt = this.#o.now();
+    const shape = session.sketch.shape(session.sentAt, exact, exact ? FINAL_POINTS : LIVE_POINTS);
+    const kind = session.tool === "plateau" ? "level" : "profile";
+    const last = metres(shape.last);
+    const curve = frameCurve(kind, shape.points, metres(shape.first), last);
+    for (const op of appendOps(session.id, curve, last)) if (!this.#submit(session, op)) return;
+    if (exact && session.pen && this.#o.defaults.pressure.value !== "none") {
+      const { left, right } = this.#style(session);
+      this.#submit(session, { type: "stroke.set", stroke: session.id, fields: { left, right } });
+    }
+    this.#ghost.value = exact ? null : this.#ghostOf(session, shape);
+  }
+
+  /** False when the op was refused: then the stroke is gone and the person knows why. */
+  #submit(session: Session, op: Op): boolean {
+    const refusal = this.#o.doc.submit(op, session.gesture);
+    if (refusal === null) return true;
+    this.#o.onMessage(refusal.message);
+    this.cancel();
+    return false;
+  }
+
+  #ghostOf(session: Session, shape: SketchShape): GhostVisual {
+    return {
+      corners: session.sketch.corners(shape),
+      shadow: shadowOf(shape.points, session.ground),
+      colour: COLOURS[session.tool],
+    };
+  }
+
+  #clear(): void {
+    clearTimeout(this.#timer);
+    this.#timer = undefined;
+    this.#session = null;
+    this.#ghost.value = null;
+    this.#ink.value = null;
+    this.#drawing.value = null;
+  }
+}
+
+function sketchFor(tool: DrawToolId, start: SketchStart): Sketch & { readonly samples: readonly Sample[] } {
+  if (tool === "plateau") return new LevelSketch(start);
+  const sense = tool === "mountain" ? "up" : "down";
+  const edgeOn = start.camera.state.value.mode === "map" || Math.abs(start.sample.ray.dir[2]) > STEEP;
+  return edgeOn ? new RidgeSketch(start, sense) : new ProfileSketch(start, sense);
+}
+
+/** The path dropped on the ground, dense enough to follow it (at least 48 steps along its length). */
+export function shadowOf(points: Float64Array, ground: Ground): Float32Array {
+  const n = points.length / 3;
+  const out: number[] = [];
+  const drop = (x: number, y: number): void => void out.push(x, y, ground.heightAt(x, y));
+  const parts = Math.max(1, Math.ceil(48 / Math.max(1, n - 1)));
+  for (let i = 0; i + 1 < n; i++)
+    for (let k = 0; k < parts; k++) {
+      const t = k / parts;
+      drop(mixAt(points, i, 0, t), mixAt(points, i, 1, t));
+    }
+  if (n > 0) drop(points[3 * n - 3]!, points[3 * n - 2]!);
+  return new Float32Array(out);
+}
+
+function mixAt(points: Float64Array, i: number, axis: number, t: number): number {
+  const a = points[3 * i + axis]!;
+  return a + (points[3 * i + 3 + axis]! - a) * t;
+}
