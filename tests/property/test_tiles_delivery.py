@@ -238,14 +238,14 @@ def test_new_tiles_wait_where_their_ancestors_are_newer_and_only_there() -> None
     client = Client(server)
     solve(server, ground, 1, False, range(LEVELS + 1))
     client.drain()
-    ground.fine[:400, :400] += 50
+    ground.fine[:500, :500] += 50
     solve(server, ground, 2, False, range(2))
     client.drain()
     client.tiles.set_view(ABOVE)
     client.drain()
     fine = {(k.x, k.y) for k in client.decoder.held if k.level == 4}
-    # Level 0 moved up to its sample 24, which blocks 5 and 6 share (4 cells: one fine tile); one block more makes 7.
-    assert fine == {(x, y) for x in range(16) for y in range(16) if x > 7 or y > 7}
+    # Level 0 moved up to its sample 31, in block 7 (4 cells: one fine tile); one block more holds back level 3's tile 4.
+    assert fine == {(x, y) for x in range(16) for y in range(16) if x > 9 or y > 9}
     solve(server, ground, 2, False, range(2, LEVELS + 1))
     client.drain()
     client.check_newest()

@@ -41,32 +41,40 @@ export function subDistance(
 ): void {
   const half = ratio / 2;
   const origin = (TILE_CELLS / 2) * ((y & 1) * N + (x & 1));
-  out.fill(0);
-  for (let r = 0; r < N; r++) {
-    // The four parent samples around: at even rows and columns two or all of them are the same one.
-    const below = origin + (r >> 1) * N;
-    const above = r & 1 ? below + N : below;
-    for (let c = 0; c < N; c++) {
-      const west = c >> 1;
-      const east = (c & 1) + west;
-      const drawn =
-        half * (parent[below + west]! + parent[below + east]! + parent[above + west]! + parent[above + east]!);
-      const distance = Math.abs(2 * samples[r * N + c]! - drawn);
-      widen(out, r, c, distance);
+  for (let sub = 0; sub < SUBPATCHES * SUBPATCHES; sub++) {
+    const r0 = PATCH_CELLS * Math.floor(sub / SUBPATCHES);
+    const c0 = PATCH_CELLS * (sub % SUBPATCHES);
+    let worst = 0;
+    for (let r = r0; r <= r0 + PATCH_CELLS; r++) {
+      const row = r * N + c0;
+      const south = origin + (r >> 1) * N + (c0 >> 1);
+      const found = rowDistance(samples, row, parent, south, south + (r & 1) * N, half);
+      if (found > worst) worst = found;
     }
+    out[sub] = worst;
   }
 }
 
-/** Counts a distance for every sub-patch that has the sample: one, on shared edges two, at shared corners four. */
-function widen(out: Float64Array, r: number, c: number, distance: number): void {
-  const row = Math.min(r >> 4, SUBPATCHES - 1);
-  const col = Math.min(c >> 4, SUBPATCHES - 1);
-  const at = row * SUBPATCHES + col;
-  if (distance <= out[at]! && (r & 15) !== 0 && (c & 15) !== 0) return;
-  const west = (c & 15) === 0 && c > 0 && c < TILE_CELLS;
-  const south = (r & 15) === 0 && r > 0 && r < TILE_CELLS;
-  if (distance > out[at]!) out[at] = distance;
-  if (west && distance > out[at - 1]!) out[at - 1] = distance;
-  if (south && distance > out[at - SUBPATCHES]!) out[at - SUBPATCHES] = distance;
-  if (west && south && distance > out[at - SUBPATCHES - 1]!) out[at - SUBPATCHES - 1] = distance;
+/** Twice the largest distance along 17 samples, whose even ones lie between parent samples `south` and `north`. */
+function rowDistance(
+  samples: Samples,
+  row: number,
+  parent: Samples,
+  south: number,
+  north: number,
+  half: number,
+): number {
+  let worst = 0;
+  let west = half * (parent[south]! + parent[north]!);
+  let d = Math.abs(2 * samples[row]! - 2 * west);
+  if (d > worst) worst = d;
+  for (let i = 1; i <= PATCH_CELLS / 2; i++) {
+    const east = half * (parent[south + i]! + parent[north + i]!);
+    d = Math.abs(2 * samples[row + 2 * i - 1]! - west - east);
+    if (d > worst) worst = d;
+    d = Math.abs(2 * samples[row + 2 * i]! - 2 * east);
+    if (d > worst) worst = d;
+    west = east;
+  }
+  return worst;
 }
