@@ -1,4 +1,5 @@
 import { css, html, nothing, svg, type TemplateResult } from "lit";
+import { getStroke } from "perfect-freehand";
 import type { Vec3 } from "../core/types.ts";
 import type { HandleVisual } from "../input/controller.ts";
 import { memberName } from "./people.ts";
@@ -25,6 +26,9 @@ export class EskOverlay extends SignalElement {
         inset: 0;
         width: 100%;
         height: 100%;
+      }
+      .ink {
+        opacity: 0.55;
       }
       .halo {
         fill: rgb(12 18 24 / 28%);
@@ -77,17 +81,35 @@ export class EskOverlay extends SignalElement {
   #at(position: Vec3): { x: number; y: number } | null {
     const p = this.stage.camera.project(position);
     if (!p.visible) return null;
-    const { width } = this.stage.camera.state.value;
-    const ratio = width / Math.max(1, this.clientWidth);
-    return { x: p.x / ratio, y: p.y / ratio };
+    return { x: p.x / this.#ratio, y: p.y / this.#ratio };
+  }
+
+  /** Device pixels of the picture for one CSS pixel. */
+  get #ratio(): number {
+    return this.stage.camera.state.value.width / Math.max(1, this.clientWidth);
   }
 
   protected override render(): TemplateResult {
     this.stage.camera.state.value;
     return html`
-      <svg aria-hidden="true">${this.stage.input.handles.value.map((h) => this.#handle(h))}</svg>
+      <svg aria-hidden="true">${this.#ink()} ${this.stage.input.handles.value.map((h) => this.#handle(h))}</svg>
       ${this.#cursors()}
     `;
+  }
+
+  /** The line under the pen itself: it is there before the ground has answered. */
+  #ink(): TemplateResult | typeof nothing {
+    const ink = this.stage.input.ink.value;
+    if (!ink) return nothing;
+    const ratio = this.#ratio;
+    const line = [...ink.points, ...ink.predicted.map((p) => ({ ...p, pressure: ink.points.at(-1)?.pressure ?? 0.5 }))];
+    const outline = getStroke(
+      line.map((p) => [p.x / ratio, p.y / ratio, p.pressure]),
+      { size: 4, thinning: 0.4, simulatePressure: false, streamline: 0.2 },
+    );
+    if (outline.length < 3) return nothing;
+    const path = outline.map(([x, y]) => `${x!.toFixed(1)} ${y!.toFixed(1)}`).join(" L");
+    return svg`<path class="ink" fill=${this.stage.session.people.value.myColour} d=${`M${path} Z`}></path>` as unknown as TemplateResult;
   }
 
   #handle(handle: HandleVisual): TemplateResult | typeof nothing {

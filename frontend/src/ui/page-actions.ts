@@ -1,6 +1,8 @@
 /** Actions that belong to the page alone join those of the input controller, so that one help sheet shows all. */
 
+import type { Action } from "../input/actions.ts";
 import type { Stage } from "./stage.ts";
+import { OVERLAYS } from "./view-bar.ts";
 
 export interface PageCommands {
   panel(): void;
@@ -8,9 +10,23 @@ export interface PageCommands {
   share(): void;
 }
 
-/** Adds the page's actions to the controller's map. */
-export function pageActions(stage: Stage, commands: PageCommands): void {
-  const { actions } = stage.input;
-  void actions;
-  void commands;
+/** Adds the page's actions to a map of actions. */
+export function pageActions(
+  actions: Map<string, Action>,
+  stage: Pick<Stage, "showStrokes" | "overlay">,
+  commands: PageCommands,
+): void {
+  const put = (id: string, title: string, keys: string[], run: () => void): void => {
+    actions.set(id, { title, keys, run, enabled: () => true });
+  };
+  put("toggle-strokes", "Show or hide all strokes", ["s"], () => {
+    stage.showStrokes.value = !stage.showStrokes.value;
+  });
+  put("next-overlay", "Next overlay: contours, steepness, levels", ["x"], () => {
+    const at = OVERLAYS.findIndex((o) => o.value === stage.overlay.value);
+    stage.overlay.value = OVERLAYS[(at + 1) % OVERLAYS.length]!.value;
+  });
+  put("inspector", "Open or close the inspector", ["i"], commands.panel);
+  put("share", "Share", ["Shift+s"], commands.share);
+  put("help", "Keys and help", ["?"], commands.help);
 }

@@ -53,7 +53,7 @@ export class EskSegmented extends LitElement {
         color: var(--esk-text);
       }
       button[aria-checked="true"] {
-        background: var(--esk-panel-solid);
+        background: var(--esk-chosen);
         color: var(--esk-text);
         box-shadow: 0 1px 2px rgb(0 0 0 / 16%);
       }

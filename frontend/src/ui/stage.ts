@@ -11,6 +11,7 @@ import { type ToolDefaults, toolDefaults } from "../input/defaults.ts";
 import { TileStore } from "../tiles/store.ts";
 import { FrameLoop } from "./frame-loop.ts";
 import { FreshTiles } from "./fresh-tiles.ts";
+import { keepViews, keptViews } from "./kept-views.ts";
 import { cursorVisuals, strokeVisuals } from "./scene.ts";
 import type { TerrainSession } from "./session.ts";
 
@@ -73,15 +74,19 @@ export class Stage {
         this.cursor.value = point;
       },
       onMessage: (text) => session.toasts.show(text),
+      author: () => session.me.value.name,
     });
   }
 
   /** Finds a renderer and starts drawing. */
   async start(): Promise<void> {
+    this.camera.loadViews(keptViews(this.session.store, this.session.id));
     this.#watch();
+    const empty = (this.session.doc.doc.value?.strokes.size ?? 0) === 0;
+    this.input.tool.value = empty && this.session.canEdit.value ? "mountain" : "select";
+    this.camera.home(0);
     await this.#openRenderer();
     if (this.#disposed) return;
-    this.camera.home(0);
     this.loop.start();
   }
 
@@ -144,6 +149,10 @@ export class Stage {
     const stopFollowing = (): void => {
       this.following.value = null;
     };
+    // Drawing prevents the default of the pointer, so a field that had the keys would keep them.
+    const takeKeys = (): void => blurField();
+    this.#viewport.addEventListener("pointerdown", takeKeys);
+    this.#stops.push(() => this.#viewport.removeEventListener("pointerdown", takeKeys));
     for (const type of ["pointerdown", "wheel"] as const) {
       this.#viewport.addEventListener(type, stopFollowing, { passive: true });
       this.#stops.push(() => this.#viewport.removeEventListener(type, stopFollowing));
@@ -155,6 +164,7 @@ export class Stage {
         session.presenceChanged();
         this.loop.invalidate();
       }),
+      effect(() => keepViews(session.store, session.id, this.camera.views.value)),
       effect(() => {
         this.cursor.value;
         input.drawing.value;
@@ -266,4 +276,11 @@ export class Stage {
       drawing: this.input.drawing.value,
     };
   }
+}
+
+/** Takes the focus from whatever field has it, through shadow roots. */
+function blurField(): void {
+  let active = document.activeElement;
+  while (active?.shadowRoot?.activeElement) active = active.shadowRoot.activeElement;
+  if (active instanceof HTMLElement && active !== document.body) active.blur();
 }

@@ -7,6 +7,7 @@ import { shared } from "./styles/shared.ts";
 import { height, metres, roundBelow } from "./words.ts";
 
 const BAR_PX = 96;
+const NARROW_BAR_PX = 52;
 
 /** How far the solver is, in words for the tooltip. */
 export function progressText(progress: Progress | null, levels: number): string {
@@ -78,9 +79,10 @@ export class EskStatusLine extends SignalElement {
       }
       @media (max-width: 720px) {
         :host {
-          gap: 10px;
-          height: 26px;
+          gap: 9px;
+          height: 28px;
           padding: 0 9px;
+          font-size: 0.6875rem;
         }
         .renderer {
           display: none;
@@ -110,7 +112,7 @@ export class EskStatusLine extends SignalElement {
     const { camera } = this.stage;
     const state = camera.state.value;
     const cssPixel = camera.metresPerPixelAt(state.target) * Math.min(window.devicePixelRatio, 2);
-    const length = roundBelow(BAR_PX * cssPixel);
+    const length = roundBelow((window.innerWidth < 480 ? NARROW_BAR_PX : BAR_PX) * cssPixel);
     if (length === 0) return nothing;
     return html`<span class="scale" title="Scale at the centre of the view">
       <span class="bar" style=${`width:${Math.round(length / cssPixel)}px`}></span>${metres(length)}

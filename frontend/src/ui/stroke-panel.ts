@@ -118,7 +118,7 @@ export class EskStrokePanel extends SignalElement {
     const { left, right, plateau_radius_m } = style.value;
     const down = tool === "crevice";
     return html`
-      <p class="lead">New ${tool === "plateau" ? "plateaus" : tool === "crevice" ? "crevices" : "mountains"} get this cross-section.</p>
+      <p class="lead">New ${tool === "plateau" ? "plateaux" : tool === "crevice" ? "crevices" : "mountains"} get this cross-section.</p>
       <esk-section-form
         style=${tool === "plateau" ? "--land: var(--esk-plateau)" : ""}
         .fields=${{ left, right, plateau_radius_m }}

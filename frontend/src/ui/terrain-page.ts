@@ -50,14 +50,17 @@ export class EskTerrain extends SignalElement {
     this.#stops = [
       effect(() => {
         const stage = session.stage.value;
-        if (stage)
-          pageActions(stage, {
-            panel: () => this.#togglePanel(),
-            help: () => this.#show("help"),
-            share: () => this.#show("share"),
-          });
+        if (!stage) return;
+        pageActions(stage.input.actions, stage, {
+          panel: () => this.#togglePanel(),
+          help: () => this.#show("help"),
+          share: () => this.#show("share"),
+        });
       }),
-      effect(() => this.#followSelection(session.stage.value?.input.selection.value ?? null)),
+      effect(() => {
+        const input = session.stage.value?.input;
+        this.#followSelection(input?.selection.value ?? null, input?.tool.peek() === "select");
+      }),
       effect(() => {
         if ((session.doc.doc.value?.strokes.size ?? 0) > 0) setFlag(session.store, "drawn");
       }),
@@ -71,9 +74,9 @@ export class EskTerrain extends SignalElement {
     this.#session.value?.dispose();
   }
 
-  /** On a wide window the inspector comes with a selection and goes with it. */
-  #followSelection(selection: string | null): void {
-    if (selection !== null && this.#panel.peek() === null && window.matchMedia(WIDE).matches) {
+  /** On a wide window the inspector comes with a selection and goes with it; a stroke just drawn does not call it. */
+  #followSelection(selection: string | null, picked: boolean): void {
+    if (selection !== null && picked && this.#panel.peek() === null && window.matchMedia(WIDE).matches) {
       this.#panel.value = "stroke";
       this.#openedBySelection = true;
     } else if (selection === null && this.#openedBySelection) {

@@ -1,6 +1,5 @@
-import { css, html, type TemplateResult } from "lit";
-import type { ActionId } from "../input/actions.ts";
-import type { ToolId } from "../input/controller.ts";
+import { css, html, nothing, type TemplateResult } from "lit";
+import type { ActionId, ToolId } from "../input/actions.ts";
 import { icon } from "./icons.ts";
 import { keyText } from "./keys.ts";
 import { SignalElement } from "./signal-element.ts";
@@ -63,13 +62,17 @@ export class EskTools extends SignalElement {
       }
       @media (max-width: 380px) {
         .icon-btn {
-          width: 40px;
+          width: 38px;
+        }
+        :host {
+          gap: 2px;
         }
       }
     `,
   ];
 
   declare stage: Stage;
+  readonly #coarse = window.matchMedia("(pointer: coarse)");
 
   #run(id: ActionId): void {
     this.stage.input.actions.get(id)?.run();
@@ -112,7 +115,23 @@ export class EskTools extends SignalElement {
       <hr />
       ${this.#history("undo", "Undo", session.doc.canUndo.value && editable)}
       ${this.#history("redo", "Redo", session.doc.canRedo.value && editable)}
+      ${this.#coarse.matches && editable ? this.#finger() : nothing}
     `;
+  }
+
+  /** On a touch screen: does one finger draw, or move the view? */
+  #finger(): TemplateResult {
+    const draws = this.stage.input.fingerDraws.value;
+    const label = draws ? "One finger draws. Let it move the view" : "One finger moves the view. Let it draw";
+    return html`<button
+      class="icon-btn"
+      aria-label=${label}
+      title=${label}
+      aria-pressed=${draws}
+      @click=${() => this.#run("finger-draws")}
+    >
+      ${icon("finger")}
+    </button>`;
   }
 
   #history(id: "undo" | "redo", label: string, enabled: boolean): TemplateResult {

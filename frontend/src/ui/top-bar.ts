@@ -120,7 +120,10 @@ export class EskTopBar extends SignalElement {
           padding: 0 4px;
         }
         .left {
-          flex: 1 1 auto;
+          flex: 1 1 0;
+        }
+        .right {
+          flex: none;
         }
         .state span,
         .share span {
@@ -130,8 +133,12 @@ export class EskTopBar extends SignalElement {
           padding: 0 6px;
         }
         .share {
+          flex: none;
           width: 36px;
           padding: 0;
+        }
+        .icon-btn {
+          flex: none;
         }
         esk-people {
           padding: 0 2px;
@@ -172,7 +179,7 @@ export class EskTopBar extends SignalElement {
         />
         ${this.#state()}
       </div>
-      <div class="panel">
+      <div class="panel right">
         <esk-people .stage=${this.stage} @profile=${() => this.#command("profile")}></esk-people>
         <button class="btn primary share" aria-label="Share" @click=${() => this.#command("share")}>
           ${icon("share")} <span>Share</span>

@@ -9,7 +9,8 @@ import { SignalElement } from "./signal-element.ts";
 import type { Stage } from "./stage.ts";
 import { shared } from "./styles/shared.ts";
 
-const OVERLAYS: readonly { readonly value: Scene["overlay"]; readonly label: string }[] = [
+/** Overlays in the order of the menu. */
+export const OVERLAYS: readonly { readonly value: Scene["overlay"]; readonly label: string }[] = [
   { value: "none", label: "Plain ground" },
   { value: "contours", label: "Contour lines" },
   { value: "slope", label: "Steepness" },
@@ -37,8 +38,7 @@ export class EskViewBar extends SignalElement {
   declare stage: Stage;
 
   #run(id: string): void {
-    const actions: ReadonlyMap<string, { run(): void }> = this.stage.input.actions;
-    actions.get(id)?.run();
+    this.stage.input.actions.get(id)?.run();
   }
 
   #overlay(event: CustomEvent<{ item: { value: string } }>): void {

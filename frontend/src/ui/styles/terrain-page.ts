@@ -170,7 +170,9 @@ export const terrainPageStyles = css`
       bottom: 0;
       width: auto;
       max-height: min(56%, 520px);
+      z-index: 2;
       border-radius: var(--esk-radius) var(--esk-radius) 0 0;
+      background: var(--esk-panel-solid);
       padding-bottom: env(safe-area-inset-bottom);
     }
     @keyframes arrive {
