@@ -116,9 +116,7 @@ class LiveServer:
         protocols: Any = [subprotocol] if subprotocol else None
         url = f"ws://127.0.0.1:{self.port}/ws"
         opening = connect(url, subprotocols=protocols, max_size=None, compression=None, proxy=None, **options)
-        opened: ClientConnection = (
-            opening.__enter__()
-        )  # closed by hand: most tests end with a close from the other side
+        opened: ClientConnection = opening.__enter__()  # closed by hand
         return opened
 
     def join(self, terrain: str, secret: str, client: str = "c1", **hello: Any) -> Peer:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 import sqlite3
 import threading
-from concurrent.futures import wait
+from concurrent.futures import Future, wait
 from pathlib import Path
 
 import pytest
@@ -67,10 +67,11 @@ def test_a_clock_or_an_id_is_used_once(journal: Journal) -> None:
 def test_a_refused_item_does_not_undo_the_rest_of_its_commit(journal: Journal) -> None:
     journal.append("t", _rows(1, 1)).result()
     gate = threading.Event()
-    hold = journal.submit(lambda _: gate.wait(5))  # the next three wait together behind this one
+    hold: Future[bool] = journal.submit(lambda _: gate.wait(5))  # the next three wait together behind this one
     futures = [journal.append("t", rows) for rows in (_rows(2, 1), _rows(1, 1), _rows(3, 1))]
     gate.set()
-    wait([hold, *futures])
+    wait(futures)
+    assert hold.result()
     assert futures[0].exception() is None
     assert isinstance(futures[1].exception(), sqlite3.IntegrityError)
     assert futures[2].exception() is None

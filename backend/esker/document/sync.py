@@ -100,6 +100,10 @@ class SyncDoc:
         for entry in self._pending:
             entry.sent = False
 
+    def start_over(self) -> None:
+        """Forgets the confirmed document, so that the next ``hello`` asks for a snapshot."""
+        self._confirmed = None
+
     def welcome(self, message: c.Welcome) -> None:
         """A snapshot, or the ops that I missed. Raises Diverged."""
         self.disconnected()

@@ -1,0 +1,418 @@
+"""A live terrain from Python (DESIGN 5.7): ``esker.connect(link)`` has the methods of ``Terrain`` and of a session.
+
+    with esker.connect("http://127.0.0.1:8000/t/abc#secret") as t:
+        ridge = t.add(Stroke.profile([(500, 2000, 0), (2000, 2200, 900), (3500, 2000, 0)]))
+        t.set(ridge, label="Ridge")
+        h = t.heights(level=4)
+
+A thread holds the socket. Calls apply at once here and are confirmed by the server; after a cut the thread reconnects
+and sends again what was not acknowledged. Heights are solved here from the document, not taken from tiles.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import random
+import re
+import secrets
+import ssl
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Final, Self
+from urllib.parse import urlsplit
+
+import numpy as np
+from numpy.typing import NDArray
+from websockets.asyncio.client import ClientConnection
+from websockets.asyncio.client import connect as open_socket
+from websockets.exceptions import ConnectionClosed, InvalidHandshake, InvalidMessage
+
+from esker import contract as c
+from esker.contract import Document, Op, Stroke, TerrainSettings
+from esker.document.ops import Refusal
+from esker.document.sync import Diverged, SyncDoc
+from esker.document.undo import UndoPlan
+from esker.document.wire import op_json
+from esker.session.limits import TokenBucket
+from esker.terrain import Terrain
+
+log = logging.getLogger("esker.client")
+
+RATE: Final = 0.8 * c.MAX_OPS_PER_SECOND
+BURST: Final = 0.5 * c.OPS_BURST
+"""A little below the server's own, so that nothing is refused for its rate."""
+MESSAGE_BYTES: Final = c.MAX_MESSAGE_BYTES - 1024
+MAX_CURVE_POINTS: Final = 1_024
+"""A longer curve is sent by appends: one message does not hold it."""
+BACKOFF_SECONDS: Final = (0.2, 10.0)
+FINAL_CODES: Final = frozenset(code for code in c.WS_CLOSE.values() if code <= 4008 or code == 4011)
+CONNECT_SECONDS: Final = 15.0
+
+
+class Refused(Exception):
+    """The server refused something; ``code`` is for machines, the message for people."""
+
+    def __init__(self, code: str, message: str) -> None:
+        super().__init__(message)
+        self.code = code
+
+
+class Link:
+    """A share link taken apart: where to connect, which terrain, with which secret."""
+
+    def __init__(self, link: str) -> None:
+        """Raises ValueError when it is not a link to a terrain."""
+        parts = urlsplit(link)
+        match = re.fullmatch(r"/t/([A-Za-z0-9_-]{1,40})", parts.path)
+        if parts.scheme not in ("http", "https") or not parts.netloc or match is None or not parts.fragment:
+            raise ValueError("a link looks like https://host/t/terrain#secret")
+        self.terrain, self.secret = match.group(1), parts.fragment
+        self.secure = parts.scheme == "https"
+        self.url = f"{'wss' if self.secure else 'ws'}://{parts.netloc}/ws"
+
+
+class LiveTerrain:
+    """A terrain that others may be changing too. All methods may be called from any thread."""
+
+    def __init__(
+        self,
+        link: str,
+        name: str = "Python",
+        *,
+        ca_file: str | Path | None = None,
+        timeout: float = CONNECT_SECONDS,
+        solver: Any = None,
+    ) -> None:
+        """Connects and waits for the document. ``ca_file``: the ``esker-ca.pem`` of a classroom server.
+
+        Raises ValueError for what is no link, Refused when the server does not let us in, TimeoutError.
+        """
+        self._link, self._name, self._solver = Link(link), name, solver
+        self._tls = ssl.create_default_context(cafile=ca_file) if self._link.secure else None
+        self._client = f"py-{secrets.token_hex(8)}"
+        self._sync = SyncDoc(self._client)
+        self._changed = threading.Condition()
+        self._failure: Refused | None = None
+        self._refusals: list[Refused] = []
+        self._online = False
+        self._closing = False
+        self._role: c.Role = "view"
+        self._members: tuple[c.Member, ...] = ()
+        self._bucket = TokenBucket(RATE, BURST)
+        self._local: tuple[Document, Terrain] | None = None
+        self._loop = asyncio.new_event_loop()
+        self._wake = asyncio.Event()
+        self._thread = threading.Thread(target=self._run, name="esker-client", daemon=True)
+        self._thread.start()
+        try:
+            self._await(lambda: self._sync.clock is not None, timeout, "no answer from the server")
+        except BaseException:
+            self.close()
+            raise
+
+    # --- reading ------------------------------------------------------------------------------------------------
+
+    @property
+    def id(self) -> str:
+        """The terrain's id."""
+        return self._link.terrain
+
+    @property
+    def role(self) -> c.Role:
+        """What this link allows."""
+        return self._role
+
+    @property
+    def online(self) -> bool:
+        """False while the connection is being made again."""
+        return self._online
+
+    @property
+    def members(self) -> tuple[c.Member, ...]:
+        """Who is here, ourselves included."""
+        with self._changed:
+            return self._members
+
+    @property
+    def strokes(self) -> tuple[Stroke, ...]:
+        """The strokes as seen from here: confirmed, with our unconfirmed changes on top."""
+        with self._changed:
+            return tuple(self._sync.document.strokes.values())
+
+    @property
+    def settings(self) -> TerrainSettings:
+        """The terrain's settings."""
+        with self._changed:
+            return self._sync.document.settings
+
+    @property
+    def clock(self) -> int:
+        """Clock of the confirmed document."""
+        with self._changed:
+            return self._sync.confirmed.clock
+
+    @property
+    def document(self) -> Document:
+        """The confirmed document."""
+        with self._changed:
+            return self._sync.confirmed.to_document()
+
+    def heights(self, level: int = c.DEFAULT_LEVEL) -> NDArray[np.float32]:
+        """Settled heights of the confirmed document, solved here; see ``Terrain.heights``."""
+        return self._offline().heights(level)
+
+    def assemble(self, level: int) -> Any:
+        """The sparse system of the confirmed document; see ``Terrain.assemble``."""
+        return self._offline().assemble(level)
+
+    def save(self, path: str | Path) -> None:
+        """Writes the confirmed document as an ``.esker`` file."""
+        self._offline().save(path)
+
+    def _offline(self) -> Terrain:
+        with self._changed:
+            document = self._sync.confirmed.to_document()
+        if self._local is None or self._local[0] != document:
+            terrain = Terrain.from_document(document)
+            if self._solver is not None:
+                terrain = Terrain(document.settings.size_m, solver=self._solver)
+                terrain.settings = document.settings
+                for stroke in document.strokes:
+                    terrain.add(stroke)
+            self._local = (document, terrain)
+        return self._local[1]
+
+    # --- changing -----------------------------------------------------------------------------------------------
+
+    def add(self, stroke: Stroke) -> str:
+        """Adds a stroke, or replaces the one of the same id; returns the id. One undo step. Raises Refused."""
+        gesture = f"add-{secrets.token_hex(4)}"
+        with self._changed:
+            exists = stroke.id in self._sync.document.strokes
+        long = len(stroke.curve) > MAX_CURVE_POINTS
+        if exists:
+            fields = {n: getattr(stroke, n) for n in c.StrokeFields.model_fields if not (long and n == "curve")}
+            self._submit(c.SetStroke(stroke=stroke.id, fields=c.StrokeFields.model_validate(fields)), gesture)
+        else:
+            born = stroke.model_copy(update={"curve": (), "finished": False, "locked": False}) if long else stroke
+            self._submit(c.BeginStroke(stroke=born), gesture)
+        if long:
+            step = c.MAX_POINTS_PER_APPEND
+            for start in range(0, len(stroke.curve), step):
+                points = stroke.curve[start : start + step]
+                op = c.AppendPoints(stroke=stroke.id, start=start, points=points, last=stroke.last)
+                self._submit(op, gesture)
+            if stroke.finished:
+                self._submit(c.FinishStroke(stroke=stroke.id), gesture)
+            if stroke.locked:
+                self._submit(c.SetStroke(stroke=stroke.id, fields=c.StrokeFields(locked=True)), gesture)
+        return stroke.id
+
+    def remove(self, stroke_id: str) -> None:
+        """Deletes a stroke. Raises Refused."""
+        self._submit(c.DeleteStroke(stroke=stroke_id))
+
+    def restore(self, stroke_id: str) -> None:
+        """Brings a deleted stroke back. Raises Refused."""
+        self._submit(c.RestoreStroke(stroke=stroke_id))
+
+    def set(self, stroke_id: str, **fields: Any) -> None:
+        """Changes fields of a stroke: ``label``, ``left``, ``hidden`` … Raises Refused, pydantic.ValidationError."""
+        self._submit(c.SetStroke(stroke=stroke_id, fields=c.StrokeFields.model_validate(fields)))
+
+    def set_terrain(self, **fields: Any) -> None:
+        """Changes settings: ``title``, ``sea_level_m``, ``look`` … Raises Refused, pydantic.ValidationError."""
+        self._submit(c.SetTerrain(fields=c.TerrainFields.model_validate(fields)))
+
+    def apply(self, op: Op) -> None:
+        """Any op of the contract. Raises Refused when it does not apply here."""
+        self._submit(op)
+
+    def undo(self) -> UndoPlan:
+        """Takes back our own last step; never what others did since (``skipped`` says what was left)."""
+        return self._travel(self._sync.undo)
+
+    def redo(self) -> UndoPlan:
+        """Takes back our own last undo."""
+        return self._travel(self._sync.redo)
+
+    def wait(self, timeout: float = CONNECT_SECONDS) -> int:
+        """Returns the clock once all our changes are in the server's journal.
+
+        Raises TimeoutError, and Refused when the server refused one of them since the last ``wait``.
+        """
+        self._await(lambda: not self._sync.pending, timeout, "the server has not saved everything")
+        with self._changed:
+            refusals, self._refusals = self._refusals, []
+            if refusals:
+                raise refusals[0]
+            return self._sync.confirmed.clock
+
+    def wait_clock(self, clock: int, timeout: float = CONNECT_SECONDS) -> None:
+        """Returns once the confirmed document has reached ``clock``. Raises TimeoutError."""
+        self._await(lambda: self._sync.confirmed.clock >= clock, timeout, f"clock {clock} did not come")
+
+    def close(self) -> None:
+        """Leaves. What is unsent then is lost: call ``wait`` first."""
+        if self._closing:
+            return
+        self._closing = True
+        self._poke()
+        self._thread.join(timeout=10)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        try:
+            if kind is None:
+                self.wait()
+        finally:
+            self.close()
+
+    def _submit(self, op: Op, gesture: str | None = None) -> None:
+        if len(op_json(op)) > MESSAGE_BYTES:
+            raise Refused("too_large", "This change is too large for one message.")
+        with self._changed:
+            self._raise_failure()
+            try:
+                self._sync.submit(op, gesture)
+            except Refusal as refusal:
+                raise Refused(refusal.code, refusal.message) from None
+        self._poke()
+
+    def _travel(self, move: Callable[[], UndoPlan]) -> UndoPlan:
+        with self._changed:
+            self._raise_failure()
+            plan = move()
+        self._poke()
+        return plan
+
+    def _raise_failure(self) -> None:
+        if self._failure is not None:
+            raise self._failure
+
+    def _await(self, ready: Callable[[], bool], timeout: float, what: str) -> None:
+        with self._changed:
+            done = self._changed.wait_for(lambda: self._failure is not None or ready(), timeout)
+            if not ready():
+                self._raise_failure()
+            if not done:
+                raise TimeoutError(what)
+
+    def _poke(self) -> None:
+        if not self._loop.is_closed():
+            self._loop.call_soon_threadsafe(self._wake.set)
+
+    # --- the thread ---------------------------------------------------------------------------------------------
+
+    def _run(self) -> None:
+        try:
+            self._loop.run_until_complete(self._stay_connected())
+        finally:
+            self._loop.close()
+
+    async def _stay_connected(self) -> None:
+        low, high = BACKOFF_SECONDS
+        delay = low
+        while not self._closing and self._failure is None:
+            started = time.monotonic()
+            try:
+                await self._connection()
+            except (OSError, ConnectionClosed, InvalidHandshake, InvalidMessage, TimeoutError, Diverged) as error:
+                log.info("connection lost: %s", error)
+                if isinstance(error, Diverged):
+                    with self._changed:
+                        self._sync.start_over()
+            with self._changed:
+                self._online = False
+                self._sync.disconnected()
+                self._changed.notify_all()
+            if self._closing or self._failure is not None:
+                return
+            delay = low if time.monotonic() - started > high else min(high, delay * 2)
+            self._wake.clear()
+            await self._sleep(delay * random.uniform(0.5, 1.0))
+
+    async def _sleep(self, seconds: float) -> None:
+        end = time.monotonic() + seconds
+        while not self._closing and time.monotonic() < end:
+            await asyncio.sleep(min(0.1, seconds))
+
+    async def _connection(self) -> None:
+        options: dict[str, Any] = {"ssl": self._tls} if self._tls else {}
+        async with open_socket(
+            self._link.url,
+            subprotocols=[c.SUBPROTOCOL],  # type: ignore[list-item]
+            max_size=None,
+            compression=None,
+            open_timeout=10,
+            **options,
+        ) as socket:
+            hello = c.Hello(
+                protocol=c.PROTOCOL_VERSION,
+                terrain=self._link.terrain,
+                secret=self._link.secret,
+                client=self._client,
+                name=self._name,
+                clock=self._sync.clock,
+            )
+            await socket.send(hello.model_dump_json())
+            sender = asyncio.create_task(self._send(socket))
+            try:
+                async for message in socket:
+                    # Heights are solved here, so tile frames are not read and no credit is given for them.
+                    if isinstance(message, str):
+                        self._receive(c.SERVER_MESSAGE.validate_json(message))
+            finally:
+                sender.cancel()
+                await asyncio.gather(sender, return_exceptions=True)
+
+    async def _send(self, socket: ClientConnection) -> None:
+        while True:
+            await self._wake.wait()
+            self._wake.clear()
+            if self._closing:
+                await socket.close()
+                return
+            while self._online and not self._closing:
+                with self._changed:
+                    envelopes = self._sync.outgoing(1) if self._bucket.take(time.monotonic()) else None
+                if envelopes is None:
+                    await asyncio.sleep(1 / RATE)
+                    continue
+                if not envelopes:
+                    break
+                envelope = envelopes[0]
+                await socket.send(f'{{"type":"ops","ops":[{{"id":"{envelope.id}","op":{op_json(envelope.op)}}}]}}')
+
+    def _receive(self, message: object) -> None:
+        with self._changed:
+            match message:
+                case c.Welcome():
+                    self._sync.welcome(message)
+                    self._role, self._members, self._online = message.role, message.members, True
+                    self._wake.set()
+                case c.OpsBroadcast():
+                    self._sync.ordered(message)
+                case c.Ack():
+                    self._sync.ack(message)
+                case c.Reject():
+                    self._sync.reject(message)
+                    self._refusals.append(Refused(message.code, message.message))
+                case c.Members():
+                    self._members = message.members
+                case c.ErrorMessage() if message.fatal and c.WS_CLOSE[message.code] in FINAL_CODES:
+                    self._failure = Refused(message.code, message.message)
+            self._changed.notify_all()
+
+
+def connect(link: str, name: str = "Python", **options: Any) -> LiveTerrain:
+    """A live terrain by its share link; see ``LiveTerrain``. Raises ValueError, Refused, TimeoutError."""
+    return LiveTerrain(link, name, **options)
