@@ -36,6 +36,8 @@ GOODBYE_SECONDS: Final = 0.3
 """Time for the farewells to leave before the sockets are closed."""
 HARD_MESSAGE_LIMIT: Final = 4 * c.MAX_MESSAGE_BYTES
 """Above ``MAX_MESSAGE_BYTES`` a client gets a sentence (4007); above this the websocket library hangs up (1009)."""
+SEND_BUFFER: Final = 256 * 1024
+"""The kernel would queue megabytes for a client that does not read, and show it old tiles when it does."""
 
 
 class CannotServe(Exception):
@@ -169,6 +171,7 @@ def _listen(host: str, port: int) -> socket.socket:
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     listener = socket.socket(family, socket.SOCK_STREAM)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER)  # accepted sockets inherit it
     try:
         listener.bind((host, port))
     except OSError as error:

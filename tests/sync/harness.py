@@ -210,3 +210,20 @@ def set_op(stroke_id: str = "s1", **fields: Any) -> dict[str, Any]:
 def raw_socket(port: int) -> socket.socket:
     """A plain TCP connection to the server."""
     return socket.create_connection(("127.0.0.1", port), timeout=10)
+
+
+def sleeping_member(port: int, terrain: str, secret: str) -> socket.socket:
+    """A member that said hello and then never reads a byte."""
+    tcp = socket.socket()
+    tcp.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    tcp.connect(("127.0.0.1", port))
+    tcp.sendall(
+        b"GET /ws HTTP/1.1\r\nHost: x\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+        b"Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Protocol: esker.1\r\n\r\n"
+    )
+    assert b"101" in tcp.recv(64)
+    hello = {"type": "hello", "protocol": 1, "terrain": terrain, "secret": secret, "client": "sleeper"}
+    payload = json.dumps(hello).encode()
+    header = bytes([0x81, 0x80 | 126]) + len(payload).to_bytes(2, "big")
+    tcp.sendall(header + bytes(4) + payload)  # masked with zeros
+    return tcp
