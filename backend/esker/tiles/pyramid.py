@@ -16,6 +16,7 @@ from esker import grid
 from esker.contract import TILE_CELLS
 from esker.tiles.bounds import Bounds, SubPatches, block_reduce, dilate, nest
 from esker.tiles.codec import SAMPLE_LIMIT, Ints
+from esker.tiles.steady import Steadier
 
 BLOCK_CELLS: Final = 4
 """Changes are remembered per block of this many cells. What a changed sample moves on finer levels, through the
@@ -49,11 +50,8 @@ def quantise(heights: NDArray[np.float32], level: int, size_m: float, kept: Ints
     """Metres to quanta of the level, halves to even, saturating at +-2^28 quanta.
 
     With ``kept`` (same shape) a sample that is still within ``DEAD_ZONE`` of its kept value keeps it. The decision is
-    made per sample of the level, so the shared edges of neighbouring tiles stay equal. Raises ValueError on NaN and
-    infinity.
+    made per sample of the level, so the shared edges of neighbouring tiles stay equal. Heights must be finite.
     """
-    if not np.isfinite(heights).all():
-        raise ValueError(f"level {level} has heights that are not finite")
     quantum = grid.quantum(level, size_m)
     bound = np.float32(SAMPLE_LIMIT * quantum)
     steps = np.clip(heights, -bound, bound) * np.float32(1.0 / quantum)
@@ -77,6 +75,9 @@ class Pyramid:
         self._levels: list[Level | None] = [None] * (levels + 1)
         self._subs = [SubPatches(level) for level in range(levels + 1)]
         self._dirty: list[Mask] = [np.zeros((1 << level, 1 << level), dtype=np.bool_) for level in range(levels + 1)]
+        self._steadiers = [Steadier() for _ in range(levels + 1)]
+        self._previewed = -1
+        """Clock of the newest preview of the finest level."""
         self._touched = [np.zeros((16 << level, 16 << level), dtype=np.uint32) for level in range(levels)]
         """Per block: the stamp of its last change. The finest level moves nothing below it and keeps none."""
         self._lineage: list[Counts] = []
@@ -91,17 +92,22 @@ class Pyramid:
     def put(self, clock: int, level: int, heights: NDArray[np.float32], settled: bool) -> int:
         """Replaces a level; returns the number of tiles of which a sample changed.
 
-        ``heights``: (N_l, N_l) float32 metres. Unsettled heights have a dead zone of one quantum; settled ones are
-        rounded exactly. Raises ValueError for a wrong level or shape or heights that are not finite, and changes
-        nothing then.
+        ``heights``: (N_l, N_l) float32 metres, not to be changed afterwards. Unsettled heights are steadied (see
+        ``steady``) and have a dead zone of one quantum; settled ones are rounded exactly. Between a complete preview
+        and the settled levels of the same clock a solver may repeat coarse levels as a sign of life: these are
+        ignored, as they would only move the ground there and back. Raises ValueError for a wrong level or shape or
+        heights that are not finite, and changes nothing then.
         """
         if not 0 <= level <= self.levels:
             raise ValueError(f"level {level} is not one of 0..{self.levels}")
         n = grid.samples(level)
         if heights.shape != (n, n):
             raise ValueError(f"level {level} has {n}x{n} samples, not {heights.shape}")
+        if not settled and level < self.levels and self._previewed == clock:
+            return 0
         old = self._levels[level]
-        samples = quantise(heights, level, self.size_m, old.samples if old is not None and not settled else None)
+        steady = self._steady(clock, level, heights, settled)
+        samples = quantise(steady, level, self.size_m, old.samples if old is not None and not settled else None)
         stamp = self.stamp + 1
         moved = np.ones((n, n), dtype=np.bool_) if old is None else samples != old.samples
         changed = self._touch(level, moved, stamp)
@@ -118,6 +124,17 @@ class Pyramid:
         if old is None or level == self.levels:
             self.generation += 1
         return count
+
+    def _steady(self, clock: int, level: int, heights: NDArray[np.float32], settled: bool) -> NDArray[np.float32]:
+        """What to show of a level that the solver gives out. Refuses heights that are not finite."""
+        if not np.isfinite(heights).all():
+            raise ValueError(f"level {level} has heights that are not finite")
+        if settled:
+            self._steadiers[level].settled(clock, heights)
+            return heights
+        if level == self.levels:
+            self._previewed = clock
+        return self._steadiers[level].preview(clock, heights)
 
     def _touch(self, level: int, moved: Mask, stamp: int) -> Mask:
         """Remembers which blocks hold a moved sample; returns which tiles do."""

@@ -1,0 +1,51 @@
+"""Previews that move the ground only where the drawing does (DESIGN 5.3, 8).
+
+A preview of a coarse level differs from the settled ground beside strokes, by up to a third of the relief, everywhere:
+shown as it is, the whole landscape would wobble, and be sent again, whenever anybody starts or stops to draw. But both
+are pure functions of the document, so the difference is known from the last settled solve. With its preview ``p0`` and
+its settled heights ``s0``, a new preview ``p1`` is shown as
+
+    p1 + sign(b) * max(|b| - |p1 - p0|, 0),    b = s0 - p0
+
+which is the settled ground where the preview has not changed, and the new preview where it changed by more than the
+correction is worth. The rule is local to a sample, so neighbouring tiles agree on shared edges.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Heights = NDArray[np.float32]
+
+
+class Steadier:
+    """One level's memory of its last settled solve. Keeps references to the arrays given; they must not change."""
+
+    def __init__(self) -> None:
+        self._preview: tuple[int, Heights] | None = None
+        self._reference: tuple[Heights, Heights] | None = None
+
+    def settled(self, clock: int, heights: Heights) -> None:
+        """The level is final for ``clock``; its preview, if it was one of the same clock, becomes the reference."""
+        if self._preview is None or self._preview[0] != clock:
+            self._reference = None
+            return
+        preview = self._preview[1]
+        self._reference = (preview, heights - preview)
+
+    def preview(self, clock: int, heights: Heights) -> Heights:
+        """What to show for a preview; ``heights`` itself when nothing is known."""
+        self._preview = (clock, heights)
+        if self._reference is None:
+            return heights
+        before, correction = self._reference
+        moved = np.abs(heights - before)
+        if not moved.any():
+            return before + correction
+        left = np.abs(correction)
+        left -= moved
+        np.maximum(left, 0, out=left)
+        np.copysign(left, correction, out=left)
+        left += heights
+        return left
