@@ -129,6 +129,12 @@ export class Camera {
     this.#set({ pivot: this.#leash([moved[0], moved[1], moved[2] + lift]) });
   }
 
+  /** Moves the camera over the map by metres, height and direction unchanged. */
+  translate(dx: number, dy: number): void {
+    const [x, y, z] = this.#pose.pivot;
+    this.#set({ pivot: this.#leash([x + dx, y + dy, z]) });
+  }
+
   /**
    * Magnifies by `factor` (> 1 comes nearer). The anchor, a point in the world, stays where it is on the screen:
    * eye and pivot move on the lines toward it (a homothety). With `smooth` the way is covered by `update`.

@@ -157,7 +157,7 @@ function cameraActions(c: ActionContext, edits: StrokeActions, put: Put): void {
   put("home", "See the whole terrain", ["Home"], () => camera.home());
   put("camera-orbit", "Orbit camera", ["o"], () => camera.setMode("orbit"));
   put("camera-fly", "Fly camera (W A S D, Q E)", ["g"], () => camera.setMode("fly"));
-  put("camera-map", "Map", ["t"], () => camera.setMode("map"));
+  put("camera-map", "Map from above", ["t"], () => camera.setMode("map"));
   put("zoom-in", "Zoom in", ["+", "="], () => camera.zoom(1.25, undefined, true));
   put("zoom-out", "Zoom out", ["-"], () => camera.zoom(0.8, undefined, true));
   put("turn-left", "Turn the view left", [","], () => camera.twist(-15));

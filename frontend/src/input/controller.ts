@@ -16,8 +16,8 @@ import { type HandleVisual, handlesOf } from "./handles.ts";
 import { HandleTool } from "./handletool.ts";
 import { Keyboard } from "./keyboard.ts";
 import { type Finger, Navigation, type NavigationMode } from "./navigation.ts";
-import { type Picked, pickHandle, pickStroke } from "./picking.ts";
-import type { Sample } from "./sketch.ts";
+import type { Picked } from "./picking.ts";
+import { Pointing, takePointer } from "./pointing.ts";
 import { type InkVisual, StrokeTool } from "./stroketool.ts";
 
 export type { ActionId, ToolId } from "./actions.ts";
@@ -47,14 +47,18 @@ export interface InputOptions {
 }
 
 type Activity =
-  | { readonly kind: "press"; readonly picked: Picked | null; readonly navigate: NavigationMode }
+  | {
+      readonly kind: "press";
+      readonly picked: Picked | null;
+      readonly navigate: NavigationMode;
+      readonly notice: string | null;
+    }
   | { readonly kind: "draw" }
   | { readonly kind: "drag" }
   | { readonly kind: "navigate"; readonly mode: NavigationMode };
 
 interface Main {
   readonly pointerId: number;
-  readonly touch: boolean;
   readonly startX: number;
   readonly startY: number;
   moved: boolean;
@@ -63,8 +67,6 @@ interface Main {
 
 /** CSS pixels a pointer may tremble within a click. */
 const CLICK_PX = 4;
-const STROKE_PX = { fine: 12, touch: 24 } as const;
-const HANDLE_PX = { fine: 14, touch: 24 } as const;
 const VIEW_ONLY = "This link lets you look, not draw. Ask for an edit link to change the terrain.";
 const LOCKED = "This stroke is locked. Unlock it to change it.";
 const OFF_GROUND = "Begin the line on the ground.";
@@ -82,6 +84,7 @@ export class InputController {
   readonly #strokes: StrokeTool;
   readonly #drags: HandleTool;
   readonly #navigation: Navigation;
+  readonly #pointing: Pointing;
   readonly #keyboard: Keyboard;
   readonly #touches = new Map<number, Finger>();
   readonly #abort = new AbortController();
@@ -94,6 +97,7 @@ export class InputController {
     this.#o = options;
     const now = options.now ?? (() => performance.timeOrigin + performance.now());
     this.#navigation = new Navigation(options.camera, options.ground);
+    this.#pointing = new Pointing(options.canvas, options.camera, options.doc);
     this.#strokes = new StrokeTool({ author: () => "", ...options, now });
     this.#drags = new HandleTool({ ...options, now });
     this.#handles = computed(() => this.#visibleHandles());
@@ -162,35 +166,15 @@ export class InputController {
     on("pointercancel", (e) => this.#lost(e));
     on("pointerleave", () => this.#leave());
     on("wheel", (e) => this.#wheel(e), false);
-    on("dblclick", (e) => this.#navigation.flyTo(...this.#pixel(e)));
+    on("dblclick", (e) => this.#navigation.flyTo(...this.#pointing.pixel(e)));
     on("contextmenu", (e) => e.preventDefault(), false);
-  }
-
-  /** Device pixels per CSS pixel, from what the camera believes and the box that is on the screen. */
-  get #ratio(): number {
-    return this.#o.camera.state.value.width / Math.max(1, this.#o.canvas.getBoundingClientRect().width);
-  }
-
-  #pixel(e: MouseEvent): [number, number] {
-    const box = this.#o.canvas.getBoundingClientRect();
-    const { width, height } = this.#o.camera.state.value;
-    return [
-      ((e.clientX - box.left) * width) / Math.max(1, box.width),
-      ((e.clientY - box.top) * height) / Math.max(1, box.height),
-    ];
-  }
-
-  #sample(e: PointerEvent): Sample {
-    const [x, y] = this.#pixel(e);
-    const pressure = e.pointerType === "pen" && e.pressure > 0 ? e.pressure : 0.5;
-    return { x, y, ray: this.#o.camera.ray(x, y), pressure };
   }
 
   #down(e: PointerEvent): void {
     if (e.pointerType === "touch" && this.#penDown) return;
     e.preventDefault();
     if (e.pointerType === "pen") this.#pen();
-    const [x, y] = this.#pixel(e);
+    const [x, y] = this.#pointing.pixel(e);
     if (e.pointerType === "touch") {
       this.#touches.set(e.pointerId, { id: e.pointerId, x, y });
       if (this.#touches.size > 1) {
@@ -199,10 +183,9 @@ export class InputController {
       }
     }
     if (this.#main !== null) return;
-    capture(this.#o.canvas, e.pointerId);
+    takePointer(this.#o.canvas, e.pointerId);
     this.#main = {
       pointerId: e.pointerId,
-      touch: e.pointerType === "touch",
       startX: x,
       startY: y,
       moved: false,
@@ -239,18 +222,19 @@ export class InputController {
     if (this.tool.value === "select") return this.#select(e, x, y);
     if (e.pointerType === "touch" && !this.fingerDraws.value) return this.#press(null);
     if (!this.#o.canEdit()) {
-      if (!this.#toldViewOnly) this.#o.onMessage(VIEW_ONLY);
+      const notice = this.#toldViewOnly ? null : VIEW_ONLY;
       this.#toldViewOnly = true;
-      return this.#press(null);
+      return this.#press(null, notice);
     }
-    if (this.#strokes.start(this.tool.value, this.#sample(e), e.pointerType === "pen")) return { kind: "draw" };
-    this.#o.onMessage(OFF_GROUND);
-    return this.#press(null);
+    if (this.#strokes.start(this.tool.value, this.#pointing.sample(e), e.pointerType === "pen"))
+      return { kind: "draw" };
+    return this.#press(null, OFF_GROUND);
   }
 
-  #press(picked: Picked | null): Activity {
+  /** Nothing yet: a click, or with movement a drag of the picked stroke or of the view, which `notice` then explains. */
+  #press(picked: Picked | null, notice: string | null = null): Activity {
     const map = this.#o.camera.state.value.mode === "map";
-    return { kind: "press", picked, navigate: map ? "pan" : this.#turning() };
+    return { kind: "press", picked, navigate: map ? "pan" : this.#turning(), notice };
   }
 
   #turning(): NavigationMode {
@@ -258,12 +242,9 @@ export class InputController {
   }
 
   #select(e: PointerEvent, x: number, y: number): Activity {
-    const reach = e.pointerType === "touch" ? "touch" : "fine";
-    const handle = pickHandle(this.#handles.value, this.#o.camera, x, y, HANDLE_PX[reach] * this.#ratio);
+    const handle = this.#pointing.handle(this.#handles.value, e);
     if (handle !== null) return this.#beginDrag(handle, x, y);
-    const doc = this.#o.doc.doc.value;
-    const picked = doc && pickStroke(doc, this.#o.camera, x, y, STROKE_PX[reach] * this.#ratio);
-    return this.#press(picked);
+    return this.#press(this.#pointing.stroke(e));
   }
 
   #beginDrag(handle: Pick<HandleVisual, "kind" | "position">, x: number, y: number): Activity {
@@ -272,7 +253,7 @@ export class InputController {
   }
 
   #move(e: PointerEvent): void {
-    const [x, y] = this.#pixel(e);
+    const [x, y] = this.#pointing.pixel(e);
     const finger = this.#touches.get(e.pointerId);
     if (finger !== undefined) Object.assign(finger, { x, y });
     if (this.#navigation.mode === "pinch" && finger !== undefined) {
@@ -287,7 +268,7 @@ export class InputController {
     }
     if (e.pointerId !== main.pointerId) return;
     if (!main.moved) {
-      if (Math.hypot(x - main.startX, y - main.startY) <= CLICK_PX * this.#ratio) return;
+      if (Math.hypot(x - main.startX, y - main.startY) <= CLICK_PX * this.#pointing.ratio) return;
       main.moved = true;
       this.#firstMove(main);
     }
@@ -297,7 +278,8 @@ export class InputController {
   /** The pointer has left the place where it went down: a press becomes a drag of the stroke or of the view. */
   #firstMove(main: Main): void {
     if (main.activity.kind !== "press") return;
-    const { picked, navigate } = main.activity;
+    const { picked, navigate, notice } = main.activity;
+    if (notice !== null) this.#o.onMessage(notice);
     if (picked !== null && picked.stroke.id === this.selection.value) {
       if (picked.stroke.locked) this.#o.onMessage(LOCKED);
       else if (this.#o.canEdit()) {
@@ -314,11 +296,7 @@ export class InputController {
   #continue(main: Main, e: PointerEvent, x: number, y: number): void {
     const { activity } = main;
     if (activity.kind === "draw") {
-      const samples = eventsOf(e, "getCoalescedEvents");
-      this.#strokes.move(
-        (samples.length > 0 ? samples : [e]).map((s) => this.#sample(s)),
-        eventsOf(e, "getPredictedEvents").map((s) => this.#sample(s)),
-      );
+      this.#strokes.move(this.#pointing.samples(e), this.#pointing.predicted(e));
       this.#cursor(x, y);
     } else if (activity.kind === "navigate") this.#navigation.drag(x, y);
     else if (activity.kind === "drag") {
@@ -343,7 +321,7 @@ export class InputController {
       const id = this.#strokes.finish();
       if (id !== null) this.selection.value = id;
     } else if (activity.kind === "drag") {
-      this.#drags.move(...this.#pixel(e), !e.altKey);
+      this.#drags.move(...this.#pointing.pixel(e), !e.altKey);
       this.#drags.finish();
     }
     this.#endMain();
@@ -354,10 +332,7 @@ export class InputController {
     if (activity.kind === "draw") this.#strokes.cancel();
     if (activity.kind === "drag") this.#drags.cancel();
     if (e.button !== 0 || activity.kind === "drag" || activity.kind === "navigate") return;
-    const [x, y] = this.#pixel(e);
-    const reach = e.pointerType === "touch" ? STROKE_PX.touch : STROKE_PX.fine;
-    const doc = this.#o.doc.doc.value;
-    this.selection.value = (doc && pickStroke(doc, this.#o.camera, x, y, reach * this.#ratio)?.stroke.id) ?? null;
+    this.selection.value = this.#pointing.stroke(e)?.stroke.id ?? null;
   }
 
   /** The system took the pointer away: what was being drawn is given up. */
@@ -382,13 +357,9 @@ export class InputController {
       this.#penSeen = true;
       this.fingerDraws.value = false;
     }
-    const handle = pickHandle(this.#handles.value, this.#o.camera, x, y, HANDLE_PX.fine * this.#ratio);
+    const handle = this.#pointing.handle(this.#handles.value, e);
     this.#drags.hover(handle?.kind ?? null);
-    const doc = this.#o.doc.doc.value;
-    const over =
-      handle === null && doc !== null && this.tool.value === "select"
-        ? pickStroke(doc, this.#o.camera, x, y, STROKE_PX.fine * this.#ratio)
-        : null;
+    const over = handle === null && this.tool.value === "select" ? this.#pointing.stroke(e) : null;
     this.#hovered.value = over?.stroke.id ?? null;
     this.#showCursor(handle !== null || over !== null);
   }
@@ -399,7 +370,7 @@ export class InputController {
 
   #wheel(e: WheelEvent): void {
     e.preventDefault();
-    const [x, y] = this.#pixel(e);
+    const [x, y] = this.#pointing.pixel(e);
     this.#navigation.wheel(e.deltaY, e.deltaMode, e.ctrlKey, x, y);
   }
 
@@ -442,17 +413,4 @@ export class InputController {
     if (stroke === null || stroke.locked || this.tool.value !== "select" || !this.#o.canEdit()) return [];
     return handlesOf(stroke, this.#o.ground(), this.#drags.active.value);
   }
-}
-
-/** Follows the pointer outside the element; events made by scripts have no pointer to capture. */
-function capture(element: HTMLElement, pointerId: number): void {
-  try {
-    element.setPointerCapture(pointerId);
-  } catch {
-    // Without capture the gesture ends at the border of the element; nothing else depends on it.
-  }
-}
-
-function eventsOf(e: PointerEvent, method: "getCoalescedEvents" | "getPredictedEvents"): PointerEvent[] {
-  return typeof e[method] === "function" ? e[method]() : [];
 }

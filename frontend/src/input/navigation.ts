@@ -1,6 +1,8 @@
 /** Moving the camera with pointers, wheel and keys. Knows no strokes. */
 
 import type { Camera } from "../core/camera.ts";
+import { along, rayPlane } from "../core/geometry.ts";
+import { distance, wrapAngle } from "../core/math.ts";
 import type { Ground, Vec3 } from "../core/types.ts";
 
 export type NavigationMode = "orbit" | "look" | "pan" | "pinch";
@@ -14,17 +16,19 @@ export interface Finger {
 interface Pinch {
   readonly a: Finger;
   readonly b: Finger;
-  anchor: Vec3 | undefined;
+  readonly anchor: Vec3 | undefined;
 }
 
 /** A wheel notch of 100 pixels magnifies by this much. */
 const NOTCH = 1.22;
 const LINE_PX = 33;
+/** Near the horizon a pixel covers kilometres: beyond this many times the grabbed distance the ground is not held. */
+const FAR = 3;
 
 export class Navigation {
   readonly #camera: Camera;
   readonly #ground: () => Ground;
-  #drag: { mode: NavigationMode; x: number; y: number } | null = null;
+  #drag: { mode: NavigationMode; x: number; y: number; grabbed: Vec3 | null } | null = null;
   #pinch: Pinch | null = null;
   readonly #flying = new Map<string, number>();
   #frame = 0;
@@ -38,12 +42,12 @@ export class Navigation {
     return this.#pinch !== null ? "pinch" : (this.#drag?.mode ?? null);
   }
 
-  /** Starts a drag at a device pixel. On the map an orbit with the main button would only turn it: it pans instead. */
+  /** Starts a drag at a device pixel: a pan holds the ground there, an orbit turns about the ground in the middle. */
   begin(mode: NavigationMode, x: number, y: number): void {
-    this.#drag = { mode, x, y };
     const { width, height } = this.#camera.state.value;
-    const onGround = mode === "pan" ? this.hit(x, y) : this.hit(width / 2, height / 2);
-    if (onGround !== null && mode !== "look") this.#camera.pivotAt(onGround);
+    const grabbed = mode === "pan" ? this.hit(x, y) : this.hit(width / 2, height / 2);
+    this.#drag = { mode, x, y, grabbed };
+    if (grabbed !== null && mode !== "look") this.#camera.pivotAt(grabbed);
   }
 
   drag(x: number, y: number): void {
@@ -53,9 +57,20 @@ export class Navigation {
     const dy = y - drag.y;
     drag.x = x;
     drag.y = y;
-    if (drag.mode === "pan") this.#camera.pan(dx, dy, this.#ground());
+    if (drag.mode === "pan") this.#hold(drag.grabbed, x, y, dx, dy);
     else if (drag.mode === "look") this.#camera.look(dx, dy);
     else this.#camera.orbit(dx, dy);
+  }
+
+  /** Brings the grabbed point under the pixel; over the horizon, or with nothing grabbed, pans by the pixels moved. */
+  #hold(grabbed: Vec3 | null, x: number, y: number, dx: number, dy: number): void {
+    const ray = this.#camera.ray(x, y);
+    const t = grabbed === null ? null : rayPlane(ray, grabbed, [0, 0, 1]);
+    const to = t === null ? null : along(ray, t);
+    const { eye } = this.#camera.state.value;
+    if (grabbed !== null && to !== null && distance(eye, to) < FAR * distance(eye, grabbed))
+      this.#camera.translate(grabbed[0] - to[0], grabbed[1] - to[1]);
+    else this.#camera.pan(dx, dy, this.#ground());
   }
 
   end(): void {
@@ -76,10 +91,11 @@ export class Navigation {
     const { a: a0, b: b0 } = pinch;
     const before = Math.max(8, Math.hypot(b0.x - a0.x, b0.y - a0.y));
     const after = Math.max(8, Math.hypot(b.x - a.x, b.y - a.y));
-    this.#camera.pan((a.x + b.x - a0.x - b0.x) / 2, (a.y + b.y - a0.y - b0.y) / 2, this.#ground());
-    this.#camera.zoom(after / before, this.hit((a.x + b.x) / 2, (a.y + b.y) / 2) ?? pinch.anchor);
     const turned = Math.atan2(b.y - a.y, b.x - a.x) - Math.atan2(b0.y - a0.y, b0.x - a0.x);
-    this.#camera.twist(-(((turned * 180) / Math.PI + 540) % 360) + 180);
+    this.#camera.zoom(after / before, pinch.anchor);
+    this.#camera.twist(-(wrapAngle(turned) * 180) / Math.PI);
+    const [x, y] = [(a.x + b.x) / 2, (a.y + b.y) / 2];
+    this.#hold(pinch.anchor ?? null, x, y, x - (a0.x + b0.x) / 2, y - (a0.y + b0.y) / 2);
     Object.assign(a0, a);
     Object.assign(b0, b);
   }
