@@ -1,5 +1,6 @@
 import "@awesome.me/webawesome/dist/components/switch/switch.js";
 import { css, html, LitElement, nothing, type TemplateResult } from "lit";
+import { live } from "lit/directives/live.js";
 import type { Flank } from "../generated/contract.ts";
 import { MAX_SLOPE_DEG } from "../generated/contract.ts";
 import { type Section, type SectionLimits, type Side, symmetric } from "./cross-section.ts";
@@ -172,7 +173,7 @@ export class EskSectionForm extends LitElement {
         </div>
         <wa-switch
           size="s"
-          ?checked=${flank !== null}
+          .checked=${live(flank !== null)}
           ?disabled=${this.disabled}
           @change=${(e: Event) => this.#toggle(side, (e.target as HTMLInputElement).checked)}
           >Flank</wa-switch
@@ -206,7 +207,7 @@ export class EskSectionForm extends LitElement {
     return html`
       <wa-switch
         size="s"
-        ?checked=${flank.slope_deg === null}
+        .checked=${live(flank.slope_deg === null)}
         ?disabled=${this.disabled}
         @change=${(e: Event) => this.#flank(side, { slope_deg: (e.target as HTMLInputElement).checked ? null : 35 }, true)}
         >Slope finds itself</wa-switch

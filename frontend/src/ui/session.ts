@@ -20,7 +20,7 @@ import type {
   TerrainFields,
   Welcome,
 } from "../generated/contract.ts";
-import { MAX_PRESENCE_PER_SECOND, PRESENCE_HZ, PROTOCOL_VERSION } from "../generated/contract.ts";
+import { MAX_PRESENCE_PER_SECOND, PRESENCE_HZ, PROTOCOL_VERSION, TICK_MS } from "../generated/contract.ts";
 import { Connection } from "../net/connection.ts";
 import { terrainPath } from "./links.ts";
 import type { People } from "./scene.ts";
@@ -70,6 +70,7 @@ export class TerrainSession {
   readonly #presence: Throttle;
   readonly #stops: (() => void)[] = [];
   #gesture = 0;
+  #again: ReturnType<typeof setTimeout> | undefined;
 
   constructor(id: string, secret: string, viewport: HTMLElement) {
     this.id = id;
@@ -162,6 +163,7 @@ export class TerrainSession {
 
   dispose(): void {
     for (const stop of this.#stops) stop();
+    clearTimeout(this.#again);
     this.#views.stop();
     this.#presence.stop();
     this.toasts.dispose();
@@ -191,7 +193,10 @@ export class TerrainSession {
         if (this.doc.pending.value > 0) queueMicrotask(() => this.#flush());
       }),
       effect(() => {
-        if (this.connection.state.value === "reconnecting") this.doc.disconnected();
+        const state = this.connection.state.value;
+        if (state === "reconnecting") this.doc.disconnected();
+        // Without a connection nobody knows where the others point.
+        if (state !== "online") this.presences.value = new Map();
       }),
       effect(() => {
         const doc = this.doc.doc.value;
@@ -208,10 +213,14 @@ export class TerrainSession {
     );
   }
 
+  /** Sends what may be sent now, and comes back for the rest until the server has acknowledged all. */
   #flush(): void {
-    if (this.connection.state.value !== "online" || this.role.value === null) return;
+    clearTimeout(this.#again);
+    this.#again = undefined;
+    if (this.connection.state.peek() !== "online" || this.role.peek() === null) return;
     const ops = this.doc.outgoing();
     if (ops.length > 0) this.connection.send({ type: "ops", ops });
+    if (this.doc.pending.peek() > 0) this.#again = setTimeout(() => this.#flush(), TICK_MS);
   }
 
   #receive(message: ServerMessage): void {

@@ -212,6 +212,7 @@ export class Stage {
       if (this.#disposed) return;
       const reason = error instanceof NoWebGpu ? error.message : "The 3D view could not start.";
       if (!(error instanceof NoWebGpu)) console.error(error);
+      if (this.note.value === null) this.session.toasts.show(`${reason} You can draw on the map too.`);
       this.note.value = reason;
       this.camera.setMode("map");
       this.#use(createMapRenderer(this.#newCanvas()));

@@ -1,5 +1,6 @@
 import "@awesome.me/webawesome/dist/components/switch/switch.js";
 import { html, nothing, type TemplateResult } from "lit";
+import { live } from "lit/directives/live.js";
 import type { Border, Look, TerrainFields, TerrainSettings } from "../generated/contract.ts";
 import { DEFAULT_REACH_FRACTION } from "../generated/contract.ts";
 import "./range-field.ts";
@@ -92,7 +93,7 @@ export class EskTerrainPanel extends SignalElement {
       <div class="group">
         <wa-switch
           size="s"
-          ?checked=${level !== null}
+          .checked=${live(level !== null)}
           ?disabled=${disabled}
           @change=${(e: Event) => this.#set({ sea_level_m: (e.target as HTMLInputElement).checked ? 0 : null })}
           >Sea</wa-switch
@@ -122,7 +123,7 @@ export class EskTerrainPanel extends SignalElement {
       <div class="group">
         <wa-switch
           size="s"
-          ?checked=${reach === null}
+          .checked=${live(reach === null)}
           ?disabled=${disabled}
           @change=${(e: Event) =>
             this.#set({ reach_m: (e.target as HTMLInputElement).checked ? null : size * DEFAULT_REACH_FRACTION })}

@@ -12,6 +12,8 @@ export interface PageView {
   ready(): boolean;
   /** Height in metres of the ground as shown, or null before it has come. */
   heightAt(x: number, y: number): number | null;
+  /** Level of the finest tile held at a place, -1 before the ground has come. */
+  levelAt(x: number, y: number): number;
   /** Document clock as confirmed here. */
   clock(): number | null;
   /** The solver has finished for the present clock and nothing of mine is on its way. */
@@ -50,6 +52,7 @@ export function installTestHook(session: TerrainSession): () => void {
   const view: PageView = {
     ready: () => session.connection.state.peek() === "online" && (stage()?.tiles.size ?? 0) > 0 && view.frames > 0,
     heightAt: (x, y) => ((stage()?.tiles.size ?? 0) > 0 ? (stage()?.tiles.ground.heightAt(x, y) ?? null) : null),
+    levelAt: (x, y) => finestLevel(session, x, y),
     clock: () => session.doc.clock,
     settled: () => {
       const progress = session.progress.peek();
@@ -95,4 +98,15 @@ function count(session: TerrainSession): number {
 
 function allExact(session: TerrainSession): boolean {
   return count(session) === (session.stage.peek()?.tiles.size ?? 0);
+}
+
+function finestLevel(session: TerrainSession, x: number, y: number): number {
+  const tiles = session.stage.peek()?.tiles;
+  if (!tiles) return -1;
+  for (let level = tiles.levels; level >= 0; level--) {
+    const n = 2 ** level;
+    const at = (v: number) => Math.min(n - 1, Math.max(0, Math.floor((v / tiles.sizeM) * n)));
+    if (tiles.tile(level, at(x), at(y))) return level;
+  }
+  return -1;
 }

@@ -1,6 +1,7 @@
 import "@awesome.me/webawesome/dist/components/dropdown/dropdown.js";
 import "@awesome.me/webawesome/dist/components/dropdown-item/dropdown-item.js";
 import { css, html, type TemplateResult } from "lit";
+import { live } from "lit/directives/live.js";
 import { icon } from "./icons.ts";
 import "./people.ts";
 import { SignalElement } from "./signal-element.ts";
@@ -159,6 +160,8 @@ export class EskTopBar extends SignalElement {
     const theme = THEMES.find((t) => `theme-${t.value}` === value);
     if (theme) chooseTheme(theme.value);
     else this.#command(value as PageCommand);
+    // The item has ticked itself: ticks follow the state, also where the choice changed nothing.
+    this.requestUpdate();
   }
 
   protected override render(): TemplateResult {
@@ -215,7 +218,7 @@ export class EskTopBar extends SignalElement {
         ${THEMES.map(
           (
             t,
-          ) => html`<wa-dropdown-item type="checkbox" value=${`theme-${t.value}`} ?checked=${themeChoice.value === t.value}>
+          ) => html`<wa-dropdown-item type="checkbox" value=${`theme-${t.value}`} .checked=${live(themeChoice.value === t.value)}>
             ${t.label}
           </wa-dropdown-item>`,
         )}

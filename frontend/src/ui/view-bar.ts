@@ -1,6 +1,7 @@
 import "@awesome.me/webawesome/dist/components/dropdown/dropdown.js";
 import "@awesome.me/webawesome/dist/components/dropdown-item/dropdown-item.js";
 import { css, html, type TemplateResult } from "lit";
+import { live } from "lit/directives/live.js";
 import type { Scene } from "../core/types.ts";
 import { icon } from "./icons.ts";
 import { keyText } from "./keys.ts";
@@ -45,6 +46,8 @@ export class EskViewBar extends SignalElement {
     const value = event.detail.item.value;
     if (value === "strokes") this.stage.showStrokes.value = !this.stage.showStrokes.value;
     else this.stage.setOverlay(value as Scene["overlay"]);
+    // The item has ticked itself: ticks follow the state, also where the choice changed nothing.
+    this.requestUpdate();
   }
 
   protected override render(): TemplateResult {
@@ -81,10 +84,10 @@ export class EskViewBar extends SignalElement {
         </button>
         ${OVERLAYS.map(
           (o) => html`
-            <wa-dropdown-item type="checkbox" value=${o.value} ?checked=${overlay.value === o.value}>${o.label}</wa-dropdown-item>
+            <wa-dropdown-item type="checkbox" value=${o.value} .checked=${live(overlay.value === o.value)}>${o.label}</wa-dropdown-item>
           `,
         )}
-        <wa-dropdown-item type="checkbox" value="strokes" ?checked=${showStrokes.value}>Show strokes</wa-dropdown-item>
+        <wa-dropdown-item type="checkbox" value="strokes" .checked=${live(showStrokes.value)}>Show strokes</wa-dropdown-item>
       </wa-dropdown>
     `;
   }
