@@ -37,7 +37,7 @@ fn plane_albedo() -> vec3f {
     case LOOK_ALPINE: { return vec3f(0.33, 0.35, 0.38); }
     case LOOK_DESERT: { return vec3f(0.36, 0.27, 0.18); }
     case LOOK_PAPER: { return vec3f(0.50, 0.47, 0.42); }
-    default: { return vec3f(0.125, 0.130, 0.095); }
+    default: { return vec3f(0.118, 0.122, 0.062); }
   }
 }
 
@@ -49,10 +49,32 @@ fn ground_plane(p: vec3f, dir: vec3f, footprint: f32) -> vec3f {
   let reach = tall * length(view.sun.xy) / max(view.sun.z, 0.12);
   let toward = p.xy + normalize(view.sun.xy + vec2f(1.0e-5)) * min(reach, view.size) * 0.5;
   let shadow = smoothstep(0.0, 0.5 * min(reach, view.size) + 1.0, outside_domain(toward));
-  let lod = log2(max(footprint, 1.0e-3) * 256.0 / (view.size * 1.7));
-  let tint = 0.86 + 0.28 * textureSampleLevel(noise, smooth_repeat, p.xy / (view.size * 1.7), clamp(lod, 0.0, 8.0)).r;
+  // Far country: fields and woods, only hinted at.
+  let texel = log2(max(footprint, 1.0e-3) * 256.0 / view.size);
+  let broad = textureSampleLevel(noise, smooth_repeat, p.xy / (view.size * 5.3), clamp(texel - 2.4, 0.0, 8.0));
+  let fine = textureSampleLevel(noise, smooth_repeat, p.yx / (view.size * 1.3) + 0.37, clamp(texel - 0.4, 0.0, 8.0));
+  let tint = mix(vec3f(0.78, 0.86, 0.80), vec3f(1.28, 1.16, 1.02), smoothstep(0.2, 0.8, broad.r * 0.7 + fine.g * 0.3));
   let light = sun_light() * max(view.sun.z, 0.0) / 3.14159265 * mix(0.25, 1.0, shadow) + ambient_light(vec3f(0.0, 0.0, 1.0));
   return plane_albedo() * tint * light * max(shade, 0.0);
+}
+
+// Silhouettes of far ranges on the horizon, paler the further they are.
+fn far_ranges(dir: vec3f, sky: vec3f) -> vec3f {
+  if (view.look == LOOK_PAPER || view.has_sea > 0.5 || dir.z > 0.09) { return sky; }
+  let azimuth = atan2(dir.y, dir.x) / 6.2831853;
+  let glow = haze_glow(dir);
+  let body = plane_albedo() * (sun_light() * 0.12 + ambient_light(vec3f(0.0, 0.0, 1.0)) * 0.8);
+  var colour = sky;
+  for (var i = 0; i < 3; i += 1) {
+    let k = f32(i);
+    let a = textureSampleLevel(noise, smooth_repeat, vec2f(azimuth * (3.0 + k), 0.13 + 0.29 * k), 0.0);
+    let b = textureSampleLevel(noise, smooth_repeat, vec2f(azimuth * (9.0 + 2.0 * k), 0.71 - 0.17 * k), 0.0);
+    let top = (0.050 - 0.014 * k) * (0.25 + 0.55 * a.g + 0.45 * a.r * b.g) - 0.004;
+    let inside = 1.0 - smoothstep(top - 0.0009, top + 0.0009, dir.z);
+    let mist = mix(0.94 - 0.07 * k, 1.0, 1.0 - smoothstep(-0.004, 0.030, dir.z));
+    colour = mix(colour, mix(body, glow, mist), inside);
+  }
+  return colour;
 }
 
 @fragment
@@ -63,7 +85,7 @@ fn background_fragment(v: BackgroundVertex) -> @location(0) vec4f {
     // The map lies on a plain sheet.
     return display(plane_albedo() * (ambient_light(vec3f(0.0, 0.0, 1.0)) + sun_light() * 0.12), pixel);
   }
-  var colour = sky_with_sun(dir);
+  var colour = far_ranges(dir, sky_with_sun(dir));
   let level = select(view.base, view.sea, view.has_sea > 0.5);
   let down = view.eye.z - level;
   if (dir.z < -1.0e-4 && down > 0.0) {
@@ -75,8 +97,6 @@ fn background_fragment(v: BackgroundVertex) -> @location(0) vec4f {
       colour = ground_plane(p, dir, pixel_size(p) / max(-dir.z, 0.02));
     }
     colour = through_air(colour, dir, distance);
-  } else if (dir.z < 0.0) {
-    colour = sky_colour(vec3f(dir.xy, 0.0));
   }
   return display(colour, pixel);
 }

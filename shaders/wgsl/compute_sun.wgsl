@@ -18,9 +18,11 @@ struct SunList {
 };
 
 const NO_SLOT: u32 = 0xffffffffu;
-const SUN_STEPS: i32 = 40;
-const SKY_DIRECTIONS: i32 = 8;
-const SKY_STEPS: i32 = 6;
+// Fewer on software adapters (gpu/tilecompute.ts).
+override SUN_STEPS: i32 = 40;
+override SUN_GROWTH: f32 = 0.14;
+override SKY_DIRECTIONS: i32 = 8;
+override SKY_STEPS: i32 = 6;
 
 @group(0) @binding(0) var<storage, read> list: SunList;
 @group(0) @binding(1) var heights: texture_2d_array<f32>;
@@ -32,29 +34,41 @@ fn page(level: u32, tile: vec2u) -> u32 {
   return pages[first + (tile.y << level) + tile.x];
 }
 
-// Height at a world position, bilinear, from `level` or the nearest coarser level that is in the atlas.
-fn ground(at: vec2f, wanted: u32) -> f32 {
+struct Place {
+  texel: vec2i,
+  layer: i32,
+  part: vec2f,
+};
+
+// Where a world position lies in the atlas: in `wanted` or the nearest coarser level that is there.
+fn locate(at: vec2f, wanted: u32) -> Place {
   var level = wanted;
   let p = clamp(at / list.size, vec2f(0.0), vec2f(0.999999));
   loop {
     let across = f32(1u << level);
     let tile = vec2u(p * across);
     let slot = page(level, tile);
-    if (slot != NO_SLOT) {
+    if (slot != NO_SLOT || level == 0u) {
       let s = (p * across - vec2f(tile)) * f32(TILE_CELLS);
       let i = vec2i(s);
-      let f = s - vec2f(i);
-      let o = slot_origin(slot) + i;
-      let layer = slot_layer(slot);
-      let a = textureLoad(heights, o, layer, 0).x;
-      let b = textureLoad(heights, o + vec2i(1, 0), layer, 0).x;
-      let c = textureLoad(heights, o + vec2i(0, 1), layer, 0).x;
-      let d = textureLoad(heights, o + vec2i(1, 1), layer, 0).x;
-      return mix(mix(a, b, f.x), mix(c, d, f.x), f.y);
+      return Place(slot_origin(slot) + i, slot_layer(slot), s - vec2f(i));
     }
-    if (level == 0u) { return -1.0e9; }
     level -= 1u;
   }
+}
+
+fn ground(at: vec2f, wanted: u32) -> f32 {
+  let q = locate(at, wanted);
+  let a = textureLoad(heights, q.texel, q.layer, 0).x;
+  let b = textureLoad(heights, q.texel + vec2i(1, 0), q.layer, 0).x;
+  let c = textureLoad(heights, q.texel + vec2i(0, 1), q.layer, 0).x;
+  let d = textureLoad(heights, q.texel + vec2i(1, 1), q.layer, 0).x;
+  return mix(mix(a, b, q.part.x), mix(c, d, q.part.x), q.part.y);
+}
+
+fn nearest_ground(at: vec2f, wanted: u32) -> f32 {
+  let q = locate(at, wanted);
+  return textureLoad(heights, q.texel + vec2i(q.part + 0.5), q.layer, 0).x;
 }
 
 // The level whose cells suit a step of this length.
@@ -80,9 +94,9 @@ fn sun_visibility(origin_m: vec3f, cell: f32, level: u32) -> f32 {
     let at = origin_m.xy + dir * t;
     let z = origin_m.z + rise * t;
     if (z > list.high || !inside(at)) { break; }
-    let step = max(cell, t * 0.14);
-    // Signed angle between the ray and the ground below it, in half penumbras.
-    let gap = (z - ground(at, level_for(step, level))) / (t * list.sun.w);
+    let step = max(cell, t * SUN_GROWTH);
+    // How far the ray clears the ground, in half penumbras; never sharper than the samples can show.
+    let gap = (z - ground(at, level_for(step, level))) / (t * list.sun.w + 0.5 * cell * rise);
     free = min(free, 0.5 + 0.5 * gap);
     if (free <= 0.0) { return 0.0; }
     t += step;
@@ -92,6 +106,7 @@ fn sun_visibility(origin_m: vec3f, cell: f32, level: u32) -> f32 {
 
 // Part of the sky, weighted by the cosine, that is above the horizon.
 fn sky_visibility(origin_m: vec3f, cell: f32, level: u32) -> f32 {
+  if (origin_m.z >= list.high) { return 1.0; }
   var open = 0.0;
   for (var k = 0; k < SKY_DIRECTIONS; k += 1) {
     let a = (f32(k) + 0.5) * 6.2831853 / f32(SKY_DIRECTIONS);
@@ -101,7 +116,7 @@ fn sky_visibility(origin_m: vec3f, cell: f32, level: u32) -> f32 {
     for (var i = 0; i < SKY_STEPS; i += 1) {
       let at = origin_m.xy + dir * t;
       if (!inside(at)) { break; }
-      horizon = max(horizon, (ground(at, level_for(t * 0.5, level)) - origin_m.z) / t);
+      horizon = max(horizon, (nearest_ground(at, level_for(t * 0.5, level)) - origin_m.z) / t);
       t *= 2.0;
     }
     // Cosine-weighted openness of a sector above elevation e is cos(e)^2 = 1 / (1 + tan(e)^2).

@@ -11,9 +11,9 @@ struct Site {
   steep: f32,        // tangent of the slope
   height: f32,       // above the sea or zero, as a fraction of the domain
   curvature: f32,
-  macro1: vec4f,     // noise at an eighth, and a fiftieth of the domain
+  macro1: vec4f,     // features of a third and of a fifteenth of the domain
   macro2: vec4f,
-  fine1: vec4f,      // noise at 48 m, 9 m and 1.7 m
+  fine1: vec4f,      // features of some 25 m, 6 m and 1 m
   fine2: vec4f,
   fine3: vec4f,
 };
@@ -26,14 +26,14 @@ fn survey(p: vec3f, gradient: vec2f, curvature: f32, f: Footprint) -> Site {
   s.steep = length(gradient);
   s.height = (p.z - select(0.0, view.sea, view.has_sea > 0.5)) / view.size;
   s.curvature = curvature;
-  s.macro1 = ground_noise(p, f, view.size * 0.23);
-  s.macro2 = ground_noise(p + vec3f(37.0, 11.0, 0.0), f, view.size * 0.047);
-  s.fine1 = rock_noise(p, n, f, 61.0);
+  s.macro1 = ground_noise(p, f, view.size * 1.37, vec2f(0.917, -0.399));
+  s.macro2 = ground_noise(p, f, view.size * 0.27, vec2f(0.602, 0.799));
+  s.fine1 = rock_noise(p, n, f, 103.0);
   if (DETAIL > 1u) {
-    s.fine2 = rock_noise(p, n, f, 13.0);
-    s.fine3 = ground_noise(p, f, 2.9);
+    s.fine2 = rock_noise(p, n, f, 25.0);
+    s.fine3 = ground_noise(p, f, 4.9, vec2f(0.707, -0.707));
   } else {
-    s.fine2 = ground_noise(p, f, 13.0);
+    s.fine2 = vec4f(s.fine1.g, s.fine1.r, s.fine1.ba);
     s.fine3 = vec4f(0.5);
   }
   return s;
@@ -41,19 +41,19 @@ fn survey(p: vec3f, gradient: vec2f, curvature: f32, f: Footprint) -> Site {
 
 // 1 where the ground is steeper than `at`, wandering with the noise.
 fn steeper(s: Site, at: f32, soft: f32) -> f32 {
-  return smoothstep(at - soft, at + soft, s.steep + (s.fine1.r - 0.5) * 0.34 + (s.macro2.r - 0.5) * 0.26);
+  return smoothstep(at - soft, at + soft, s.steep + (s.fine1.r - 0.5) * 0.30 + (s.macro2.r - 0.5) * 0.22);
 }
 
 fn fine_slope(s: Site, strength: f32) -> vec2f {
-  return strength * (0.35 * noise_slope(s.macro2) * 0.5 + 0.6 * noise_slope(s.fine1) + 0.55 * noise_slope(s.fine2) + 0.4 * noise_slope(s.fine3));
+  return strength * (0.22 * noise_slope(s.macro2) + 0.34 * noise_slope(s.fine1) + 0.42 * noise_slope(s.fine2) + 0.36 * noise_slope(s.fine3));
 }
 
 fn rock_colour(s: Site, light: vec3f, dark: vec3f) -> vec3f {
-  // Beds, tilted and warped.
-  let z = s.p.z + 0.12 * s.p.x + (s.macro2.r - 0.5) * view.size * 0.03 + (s.fine1.r - 0.5) * 9.0;
-  let bed = 0.5 + 0.5 * sin(z * 402.0 / view.size + 2.0 * sin(z * 131.0 / view.size));
-  let grain = 0.55 * s.fine1.g + 0.3 * s.fine2.g + 0.15 * s.fine3.r;
-  return mix(dark, light, clamp(grain * 0.75 + bed * 0.3 - 0.06, 0.0, 1.0));
+  // Beds, tilted and warped, and the grain of weathered faces.
+  let z = s.p.z + 0.10 * s.p.x + (s.macro2.r - 0.5) * view.size * 0.035 + (s.fine1.r - 0.5) * 12.0;
+  let bed = 0.5 + 0.5 * sin(z * 380.0 / view.size + 2.0 * sin(z * 97.0 / view.size));
+  let grain = 0.42 * s.fine1.g + 0.32 * s.fine2.g + 0.16 * s.macro2.g + 0.10 * s.fine3.r;
+  return mix(dark, light, clamp((grain - 0.5) * 1.5 + 0.42 + (bed - 0.5) * 0.26, 0.0, 1.0));
 }
 
 fn mix_in(under: Material, over: Material, amount: f32) -> Material {
@@ -63,7 +63,7 @@ fn mix_in(under: Material, over: Material, amount: f32) -> Material {
 fn shore(m: Material, s: Site) -> Material {
   if (view.has_sea < 0.5) { return m; }
   let wander = (s.macro2.r - 0.5) * 0.006 + (s.fine1.r - 0.5) * 0.003;
-  let low = 1.0 - smoothstep(0.0016, 0.0052, s.height + wander);
+  let low = 1.0 - smoothstep(0.0012, 0.0034, s.height + wander * 0.7);
   let gentle = 1.0 - smoothstep(0.42, 0.75, s.steep);
   let dry = vec3f(0.44, 0.37, 0.25) * (0.86 + 0.28 * s.fine2.r);
   // Wet below and just above the water line.
@@ -73,26 +73,31 @@ fn shore(m: Material, s: Site) -> Material {
 }
 
 fn natural(s: Site) -> Material {
-  let dry = clamp((s.macro1.r - 0.42) * 2.2 + s.height * 4.0 + (s.macro2.g - 0.5) * 0.7, 0.0, 1.0);
-  let meadow = mix(vec3f(0.082, 0.118, 0.030), vec3f(0.190, 0.170, 0.070), dry) * (0.74 + 0.34 * s.fine1.r + 0.28 * s.fine2.r);
-  var m = Material(meadow, fine_slope(s, 0.16), 0.0);
-  // Forest keeps to gentle ground below the tree line, thins out upwards and in hollows' mouths.
-  let line = 0.088 + (s.macro1.g - 0.5) * 0.035;
-  let trees = (1.0 - smoothstep(line * 0.55, line, s.height)) * (1.0 - smoothstep(0.62, 0.9, s.steep));
-  let wood = smoothstep(0.47, 0.60, s.macro2.r * 0.62 + s.macro1.g * 0.30 + s.fine1.r * 0.16 + clamp(s.steep * 0.22, 0.0, 0.09)) * trees;
-  let crown = vec3f(0.022, 0.044, 0.016) * (0.55 + 0.95 * s.fine2.r);
-  m = mix_in(m, Material(crown, fine_slope(s, 0.62), 0.0), wood);
-  let rubble = Material(vec3f(0.205, 0.185, 0.158) * (0.66 + 0.62 * s.fine2.r), fine_slope(s, 0.34), 0.0);
-  m = mix_in(m, rubble, steeper(s, 0.66, 0.14) * 0.85);
-  let alp = smoothstep(0.10, 0.16, s.height + (s.macro2.r - 0.5) * 0.04);
-  m = mix_in(m, rubble, alp * 0.8);
-  let rock = Material(rock_colour(s, vec3f(0.285, 0.255, 0.222), vec3f(0.105, 0.095, 0.086)), fine_slope(s, 0.80), 0.0);
-  m = mix_in(m, rock, steeper(s, 0.88, 0.15));
+  // Meadows: lush in hollows and low down, dry and pale on rises and higher up.
+  let dry = smoothstep(0.25, 0.85, 0.5 + (s.macro1.r - 0.5) * 1.5 + (s.macro2.r - 0.5) * 0.7 + s.height * 3.2 - s.curvature * 0.8);
+  let tone = 0.86 + 0.26 * (s.fine1.r - 0.5) + 0.30 * (s.fine2.r - 0.5) + 0.20 * (s.macro2.g - 0.5);
+  let meadow = mix(vec3f(0.088, 0.122, 0.034), vec3f(0.215, 0.186, 0.084), dry) * tone;
+  var m = Material(meadow, fine_slope(s, 0.13), 0.0);
+  // Forest in large woods with frayed edges, on gentle and moderate slopes below the tree line.
+  let line = 0.085 + (s.macro1.g - 0.5) * 0.03 + (s.macro2.r - 0.5) * 0.02;
+  let below = 1.0 - smoothstep(line * 0.62, line, s.height);
+  let grows = (1.0 - smoothstep(0.62, 0.92, s.steep)) * below;
+  let cover = s.macro1.g * 0.50 + s.macro2.r * 0.42 + s.fine1.r * 0.12 + clamp(s.steep, 0.0, 0.6) * 0.16 + clamp(s.curvature, -0.1, 0.1) * 0.9;
+  let wood = smoothstep(0.575, 0.64, cover) * grows;
+  let crown = mix(vec3f(0.024, 0.046, 0.018), vec3f(0.052, 0.074, 0.024), s.macro2.g) * (0.55 + 0.9 * s.fine2.r);
+  m = mix_in(m, Material(crown, fine_slope(s, 0.55), 0.0), wood * 0.94);
+  // Scree and rubble below the faces, and the bare ground above the meadows.
+  let rubble = Material(vec3f(0.225, 0.200, 0.168) * (0.74 + 0.5 * s.fine2.r), fine_slope(s, 0.26), 0.0);
+  m = mix_in(m, rubble, steeper(s, 0.60, 0.16) * 0.8);
+  let alp = smoothstep(0.105, 0.165, s.height + (s.macro2.r - 0.5) * 0.05 + (s.fine1.r - 0.5) * 0.02);
+  m = mix_in(m, rubble, alp * 0.75);
+  let rock = Material(rock_colour(s, vec3f(0.300, 0.262, 0.222), vec3f(0.098, 0.088, 0.080)), fine_slope(s, 0.62), 0.0);
+  m = mix_in(m, rock, steeper(s, 0.80, 0.17));
   m = shore(m, s);
   // Snow: high, not too steep, lower on the north side and in hollows.
-  let snow_line = 0.150 - 0.030 * clamp(s.n.y, -1.0, 1.0) - clamp(s.curvature, -0.4, 0.4) * 0.03 + (s.macro2.r - 0.5) * 0.045 + (s.fine1.r - 0.5) * 0.022;
-  let snow = smoothstep(snow_line, snow_line + 0.012, s.height) * (1.0 - smoothstep(0.95, 1.35, s.steep + (s.fine1.g - 0.5) * 0.7));
-  return mix_in(m, Material(vec3f(0.80, 0.83, 0.87), fine_slope(s, 0.12), 0.5), snow);
+  let snow_line = 0.150 - 0.030 * clamp(s.n.y, -1.0, 1.0) - clamp(s.curvature, -0.4, 0.4) * 0.05 + (s.macro2.r - 0.5) * 0.040 + (s.fine1.r - 0.5) * 0.022;
+  let snow = smoothstep(snow_line, snow_line + 0.014, s.height) * (1.0 - smoothstep(0.85, 1.35, s.steep + (s.fine1.g - 0.5) * 0.8));
+  return mix_in(m, Material(vec3f(0.80, 0.83, 0.87), fine_slope(s, 0.10), 0.5), snow);
 }
 
 fn alpine(s: Site) -> Material {
@@ -100,7 +105,8 @@ fn alpine(s: Site) -> Material {
   var m = Material(snow_colour, fine_slope(s, 0.15), 0.5);
   let line = 0.075 + (s.macro1.g - 0.5) * 0.03;
   let trees = (1.0 - smoothstep(line * 0.6, line, s.height)) * (1.0 - smoothstep(0.7, 1.0, s.steep));
-  let wood = smoothstep(0.47, 0.62, s.macro2.r * 0.66 + s.macro1.g * 0.28 + s.fine1.r * 0.14 + clamp(s.steep * 0.3, 0.0, 0.12)) * trees;
+  let cover = s.macro1.g * 0.48 + s.macro2.r * 0.42 + s.fine1.r * 0.14 + clamp(s.steep, 0.0, 0.6) * 0.2 + clamp(s.curvature, -0.1, 0.1) * 0.9;
+  let wood = smoothstep(0.56, 0.64, cover) * trees;
   let crown = mix(vec3f(0.026, 0.038, 0.030), vec3f(0.34, 0.37, 0.40), smoothstep(0.52, 0.75, s.fine2.r));
   m = mix_in(m, Material(crown, fine_slope(s, 0.6), 0.1), wood * 0.92);
   let rock = Material(rock_colour(s, vec3f(0.215, 0.200, 0.190), vec3f(0.070, 0.068, 0.070)), fine_slope(s, 0.85), 0.0);

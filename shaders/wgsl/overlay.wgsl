@@ -9,7 +9,9 @@ fn lines(value: f32, every: f32, rate: f32, half: f32) -> f32 {
   return cover * (1.0 - smoothstep(0.12, 0.38, width / every));
 }
 
-fn contours(z: f32, rate: f32) -> f32 {
+fn contours(height: f32, rate: f32) -> f32 {
+  // A hair above the round value: ground that is flat at exactly that height is not one wide line.
+  let z = height - 0.01 * view.contour;
   let minor = lines(z, view.contour, rate, 0.35) * 0.5;
   let major = lines(z, view.contour * 5.0, rate, 0.7);
   return max(minor, major);

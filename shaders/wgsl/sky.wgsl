@@ -18,7 +18,8 @@ fn sky_colour(dir: vec3f) -> vec3f {
 
 fn sun_light() -> vec3f {
   if (view.look == LOOK_PAPER) { return vec3f(2.75, 2.66, 2.5); }
-  return textureLoad(ambient_lut, vec2i(6, 0), 0).rgb;
+  // A touch warmer than clear air makes it: morning haze.
+  return textureLoad(ambient_lut, vec2i(6, 0), 0).rgb * vec3f(1.10, 1.0, 0.86);
 }
 
 // Diffuse light of sky and far ground on a surface with this normal (irradiance / pi).
@@ -40,11 +41,16 @@ fn haze_depth(dir: vec3f, distance: f32) -> f32 {
   return view.haze * start * along;
 }
 
+// What the haze itself sends to the eye: the pale horizon, blued by the sky above it.
+fn haze_glow(dir: vec3f) -> vec3f {
+  let up = max(dir.z, 0.0);
+  return mix(sky_colour(normalize(vec3f(dir.xy, up + 0.03))), sky_colour(normalize(vec3f(dir.xy, up + 0.26))), 0.5);
+}
+
 // Light that reaches the eye from `colour` through the air.
 fn through_air(colour: vec3f, dir: vec3f, distance: f32) -> vec3f {
   if (view.eye.w > 0.5) { return colour; }
   let depth = haze_depth(dir, distance);
   let through = exp(-depth * vec3f(0.72, 0.92, 1.22));
-  let glow = sky_colour(normalize(vec3f(dir.xy, max(dir.z, 0.0) + 0.035)));
-  return colour * through + glow * (vec3f(1.0) - through);
+  return colour * through + haze_glow(dir) * (vec3f(1.0) - through);
 }

@@ -3,7 +3,7 @@
 // the background.
 
 // Absorption per metre of clear water, and what it scatters back.
-const WATER_ABSORB: vec3f = vec3f(0.16, 0.055, 0.040);
+const WATER_ABSORB: vec3f = vec3f(0.30, 0.105, 0.080);
 const WATER_SCATTER: vec3f = vec3f(0.008, 0.042, 0.052);
 
 fn wave_slope(p: vec2f, distance: f32) -> vec2f {
@@ -90,12 +90,37 @@ fn water_vertex(@builtin(vertex_index) index: u32, patch_in: PatchIn) -> WaterVe
 fn water_fragment(v: WaterVertex) -> @location(0) vec4f {
   let f = Footprint(dpdx(v.world), dpdy(v.world));
   if (v.depth < 0.0) { discard; }
-  let a = ground_noise(v.world, f, 23.0);
-  let b = ground_noise(v.world + vec3f(view.time * 0.8, 0.0, 0.0), f, 7.0);
+  let a = ground_noise(v.world, f, 61.0, vec2f(0.9, 0.436));
+  let b = ground_noise(v.world + vec3f(view.time * 0.8, 0.0, 0.0), f, 17.0, vec2f(0.6, -0.8));
   let dir = ray_to(v.world);
   let water = water_surface(v.world, dir, v.depth, vec3f(a.r, mix(a.g, b.g, 0.5), 1.0), vec3f(0.0));
   // Over the ground, the bed shows through by blending; its share was left out of the colour.
   let colour = through_air(water.rgb / max(water.a, 0.02), dir, distance(v.world, view.eye.xyz));
   let shown = display(colour, v.position.xy);
   return vec4f(with_cursors(shown.rgb, v.world), water.a);
+}
+
+// The open sea near the domain, as geometry: it must hide the bed inside the domain where the sight enters outside it.
+// Four quads around the square; further out the background shows the same.
+struct OpenSeaVertex {
+  @builtin(position) position: vec4f,
+  @location(0) world: vec3f,
+};
+
+@vertex
+fn open_sea_vertex(@builtin(vertex_index) index: u32) -> OpenSeaVertex {
+  let corner = array<vec2f, 6>(vec2f(0.0, 0.0), vec2f(1.0, 0.0), vec2f(0.0, 1.0), vec2f(0.0, 1.0), vec2f(1.0, 0.0), vec2f(1.0, 1.0))[index % 6u];
+  let far = 3.0;
+  // Low and high corner of each quad, in sides of the domain: west, east, south, north.
+  let low = array<vec2f, 4>(vec2f(-far, -far), vec2f(1.0, -far), vec2f(0.0, -far), vec2f(0.0, 1.0))[index / 6u];
+  let high = array<vec2f, 4>(vec2f(0.0, 1.0 + far), vec2f(1.0 + far, 1.0 + far), vec2f(1.0, 0.0), vec2f(1.0, 1.0 + far))[index / 6u];
+  let world = vec3f(mix(low, high, corner) * view.size, view.sea);
+  return OpenSeaVertex(view.view_proj * vec4f(world, 1.0), world);
+}
+
+@fragment
+fn open_sea_fragment(v: OpenSeaVertex) -> @location(0) vec4f {
+  let dir = ray_to(v.world);
+  let water = water_surface(v.world, dir, sea_depth(v.world.xy), vec3f(0.0), sea_bed(v.world.xy));
+  return display(through_air(water.rgb, dir, distance(v.world, view.eye.xyz)), v.position.xy);
 }

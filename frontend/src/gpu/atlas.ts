@@ -27,8 +27,6 @@ export interface Resident {
   neighbours: number;
   /** Frame in which the cut last rested on it. */
   used: number;
-  /** Its sun and sky visibility are older than the ground. */
-  sunStale: boolean;
 }
 
 /** Called when a tile enters or leaves. */
@@ -96,6 +94,11 @@ export class Atlas implements Slots {
     return resident.used === this.frame;
   }
 
+  /** False once the tile has been evicted. */
+  holds(resident: Resident): boolean {
+    return this.bySlot[resident.slot] === resident;
+  }
+
   /** Resident tiles, in no order. */
   *residents(): Iterable<Resident> {
     for (const resident of this.bySlot) if (resident !== undefined) yield resident;
@@ -141,15 +144,7 @@ export class Atlas implements Slots {
       if (this.at(level, x, y) === undefined || this.slot(level, x, y) !== NO_SLOT) continue;
       const slot = level === 0 ? 0 : this.takeSlot();
       if (slot === undefined) break;
-      const resident: Resident = {
-        level,
-        x,
-        y,
-        slot,
-        ...this.signature(level, x, y),
-        used: this.frame,
-        sunStale: true,
-      };
+      const resident: Resident = { level, x, y, slot, ...this.signature(level, x, y), used: this.frame };
       this.bySlot[slot] = resident;
       this.pageTable[pageStart(level) + (y << level) + x] = slot;
       this.pagesDirty = true;

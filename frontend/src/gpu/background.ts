@@ -4,11 +4,14 @@ import { createPass, type PassContext } from "./pipeline.ts";
 import { SOURCES } from "./shaders.ts";
 
 export class BackgroundPass {
-  private constructor(private readonly pipeline: GPURenderPipeline) {}
+  private constructor(
+    private readonly pipeline: GPURenderPipeline,
+    private readonly openSea: GPURenderPipeline,
+  ) {}
 
   static async create(context: PassContext): Promise<BackgroundPass> {
-    return new BackgroundPass(
-      await createPass(context, {
+    const [sky, openSea] = await Promise.all([
+      createPass(context, {
         label: "background",
         code: SOURCES.background,
         vertex: "background_vertex",
@@ -16,10 +19,22 @@ export class BackgroundPass {
         depthCompare: "less-equal",
         depthWrite: false,
       }),
-    );
+      createPass(context, {
+        label: "open sea",
+        code: SOURCES.background,
+        vertex: "open_sea_vertex",
+        fragment: "open_sea_fragment",
+      }),
+    ]);
+    return new BackgroundPass(sky, openSea);
   }
 
-  draw(pass: GPURenderPassEncoder): void {
+  /** `sea`: with the open sea around the domain. */
+  draw(pass: GPURenderPassEncoder, sea: boolean): void {
+    if (sea) {
+      pass.setPipeline(this.openSea);
+      pass.draw(24);
+    }
     pass.setPipeline(this.pipeline);
     pass.draw(3);
   }

@@ -37,7 +37,7 @@ export class FrameBindings {
     private readonly device: GPUDevice,
     private readonly sky: SkyTables,
     private readonly noise: GPUTexture,
-    anisotropy: number,
+    software: boolean,
   ) {
     const visibility = GPUShaderStage.VERTEX | GPUShaderStage.FRAGMENT;
     const texture = (
@@ -71,8 +71,8 @@ export class FrameBindings {
       addressModeV: "repeat",
       magFilter: "linear",
       minFilter: "linear",
-      mipmapFilter: "linear",
-      maxAnisotropy: anisotropy,
+      mipmapFilter: software ? "nearest" : "linear",
+      maxAnisotropy: software ? 1 : 8,
     });
   }
 

@@ -107,7 +107,9 @@ export function hillshade(gx: number, gy: number): number {
 }
 
 /** Ink of contour lines, 0..1, at height z where it changes by `rate` metres a pixel. */
-function contourInk(z: number, rate: number, every: number): number {
+function contourInk(height: number, rate: number, every: number): number {
+  // A hair above the round value: ground that is flat at exactly that height is not one wide line.
+  const z = height - 0.01 * every;
   const width = Math.max(rate, 1e-6);
   const line = (interval: number, half: number): number => {
     const away = Math.abs(z / interval - Math.round(z / interval)) * interval;

@@ -1,12 +1,13 @@
 /** The WebGPU renderer: one frame from a scene (DESIGN 9). */
 
-import type { FrameStats, Scene, SceneRenderer } from "../core/types.ts";
+import type { FrameStats, Scene, SceneRenderer, Vec3 } from "../core/types.ts";
 import { Selection } from "../tiles/selection.ts";
 import { Atlas, NEW_TILES_PER_FRAME, type Resident } from "./atlas.ts";
 import { BackgroundPass } from "./background.ts";
 import type { Gpu } from "./device.ts";
 import { FrameBindings, sunDirection } from "./frame.ts";
 import { GhostPass } from "./ghostplane.ts";
+import { LightQueue } from "./lightqueue.ts";
 import { createNoiseTexture } from "./noise.ts";
 import { PatchPasses } from "./patches.ts";
 import type { PassContext } from "./pipeline.ts";
@@ -16,8 +17,8 @@ import { SkyTables } from "./sky.ts";
 import { Target } from "./target.ts";
 import { NormalsPass, SunPass } from "./tilecompute.ts";
 
-/** Tiles whose light is marched in one frame. */
-const SUN_TILES = { hardware: 256, software: 8 } as const;
+/** Tiles whose light is marched in one frame: while the picture moves, and at rest. */
+const LIGHT_TILES = { hardware: { moving: 128, rest: 256 }, software: { moving: 2, rest: 6 } } as const;
 const FRAMES_IN_FLIGHT = { hardware: 2, software: 1 } as const;
 
 interface Passes {
@@ -36,6 +37,7 @@ interface Passes {
 interface World {
   readonly tiles: Scene["tiles"];
   readonly atlas: Atlas;
+  readonly light: LightQueue;
   readonly selection: Selection;
 }
 
@@ -48,7 +50,13 @@ export class GpuRenderer implements SceneRenderer {
   private last: Scene | null = null;
   private lastStamp = -1;
   private lastQuality: Quality | null = null;
-  private sunKey = "";
+  /** Highest ground of the last cut, metres. */
+  private high = 0;
+  /** Held tiles were asked for that are not in the atlas yet. */
+  private tilesDue = false;
+  /** Batches of light marched, and those that the last picture shows. */
+  private lightMarched = 0;
+  private lightDrawn = 0;
   private inFlight = 0;
   private destroyed = false;
   private stats: FrameStats = { patches: 0, triangles: 0, selectMs: 0, cpuMs: 0, uploads: 0, busy: false };
@@ -67,12 +75,12 @@ export class GpuRenderer implements SceneRenderer {
     const { device, format } = gpu;
     const samples = gpu.software ? 1 : 4;
     const sky = await SkyTables.create(device);
-    const frame = new FrameBindings(device, sky, createNoiseTexture(device), gpu.software ? 1 : 8);
+    const frame = new FrameBindings(device, sky, createNoiseTexture(device), gpu.software);
     const context: PassContext = { device, frameLayout: frame.layout, format, samples, detail: gpu.software ? 1 : 2 };
     const [target, normals, sun, background, patches, ribbons, ghost] = await Promise.all([
       Target.create(device, format, samples),
       NormalsPass.create(device),
-      SunPass.create(device),
+      SunPass.create(device, gpu.software),
       BackgroundPass.create(context),
       PatchPasses.create(context),
       RibbonPass.create(context),
@@ -83,21 +91,27 @@ export class GpuRenderer implements SceneRenderer {
 
   render(scene: Scene): FrameStats {
     if (this.destroyed) return this.stats;
-    const limit = this.gpu.software ? FRAMES_IN_FLIGHT.software : FRAMES_IN_FLIGHT.hardware;
+    const { software } = this.gpu;
+    const limit = software ? FRAMES_IN_FLIGHT.software : FRAMES_IN_FLIGHT.hardware;
     // The device is behind: what would be drawn now is drawn when it has caught up.
     if (this.inFlight >= limit) return this.report({ busy: true, uploads: 0 });
     const began = performance.now();
     const world = this.worldOf(scene);
     const moved = this.changed(scene);
     const quality = this.quality.next(began, moved);
-    const waves = scene.settings.sea_level_m !== null && !this.gpu.software;
-    if (!moved && !this.stats.busy && !waves && sameQuality(quality, this.lastQuality)) {
-      return this.report({ busy: this.quality.pending, uploads: 0 });
+    const waves = scene.settings.sea_level_m !== null && !software;
+    const due = this.tilesDue || this.lightDrawn !== this.lightMarched || !sameQuality(quality, this.lastQuality);
+    if (!moved && software && world.light.pending && !this.tilesDue) {
+      // On the CPU a picture costs more than the light of many tiles: march them all, then draw once.
+      this.marchOnly(scene, world);
+      return this.report({ busy: true, uploads: 0 });
     }
+    if (!moved && !waves && !due && !world.light.pending)
+      return this.report({ busy: this.quality.pending, uploads: 0 });
     this.remember(scene, quality);
-    this.draw(scene, world, quality, began);
-    if (waves || this.quality.pending) this.report({ busy: true });
-    return this.stats;
+    this.draw(scene, world, quality, { began, moved });
+    const busy = waves || this.quality.pending || this.tilesDue || world.light.pending;
+    return this.report({ busy });
   }
 
   destroy(): void {
@@ -123,8 +137,7 @@ export class GpuRenderer implements SceneRenderer {
     this.passes.frame.attach(atlas);
     this.passes.normals.attach(atlas);
     this.passes.sun.attach(atlas);
-    this.sunKey = "";
-    this.world = { tiles: scene.tiles, atlas, selection };
+    this.world = { tiles: scene.tiles, atlas, selection, light: new LightQueue(this.passes.sun, atlas) };
     return this.world;
   }
 
@@ -154,7 +167,7 @@ export class GpuRenderer implements SceneRenderer {
     this.lastQuality = quality;
   }
 
-  private draw(scene: Scene, world: World, quality: Quality, began: number): void {
+  private draw(scene: Scene, world: World, quality: Quality, how: { began: number; moved: boolean }): void {
     const { camera } = scene;
     const { device, context } = this.gpu;
     if (this.canvas.width !== camera.width) this.canvas.width = camera.width;
@@ -166,24 +179,26 @@ export class GpuRenderer implements SceneRenderer {
     const selecting = performance.now();
     const { cut, entered } = this.choose(scene, world, quality);
     const selectMs = performance.now() - selecting;
+    this.high = cut.maxHeight;
+    this.tilesDue = cut.requests.length > 0;
 
     const encoder = device.createCommandEncoder({ label: "frame" });
-    const pendingSun = this.compute(encoder, scene, world, changed, entered, cut.maxHeight);
+    this.compute(encoder, scene, world, { changed, entered, moved: how.moved });
     this.passes.frame.update(scene, { width, height, low: cut.minHeight, high: cut.maxHeight });
     this.passes.patches.update(cut);
     this.passes.ribbons.update(scene.showStrokes ? scene.strokes : [], scene.ghost, quality.scale * pixelRatio());
     this.passes.ghost.update(scene.ghost);
     this.encode(encoder, scene, context.getCurrentTexture(), width, height);
     device.queue.submit([encoder.finish()]);
-    this.measure();
-    this.stats = {
+    this.measure(true);
+    this.lightDrawn = this.lightMarched;
+    this.report({
       patches: cut.count,
       triangles: this.passes.patches.triangles,
       selectMs,
-      cpuMs: performance.now() - began,
+      cpuMs: performance.now() - how.began,
       uploads: changed.length + entered.length,
-      busy: pendingSun || cut.requests.length > 0,
-    };
+    });
   }
 
   /** Selects, lets requested tiles in and selects again, so that coarse levels arrive together in the first frame. */
@@ -194,46 +209,41 @@ export class GpuRenderer implements SceneRenderer {
   ): { cut: ReturnType<Selection["select"]>; entered: Resident[] } {
     const entered: Resident[] = [];
     const tau = scene.tauPx * quality.tauFactor;
+    const sea = scene.settings.sea_level_m ?? Number.NEGATIVE_INFINITY;
     for (;;) {
-      const cut = world.selection.select(scene.tiles, scene.camera, tau, world.atlas, quality.scale);
+      const cut = world.selection.select(scene.tiles, scene.camera, tau, world.atlas, quality.scale, sea);
       const more = world.atlas.admit(cut.requests, NEW_TILES_PER_FRAME - entered.length);
       if (more.length === 0) return { cut, entered };
       entered.push(...more);
     }
   }
 
-  /** Gradients at once; light within the budget. Returns true when light is still due somewhere. */
+  /** Gradients at once; light within the budget. */
   private compute(
     encoder: GPUCommandEncoder,
     scene: Scene,
     world: World,
-    changed: readonly Resident[],
-    entered: readonly Resident[],
-    high: number,
-  ): boolean {
-    const { settings } = scene;
-    const sun = sunDirection(settings.sun_azimuth_deg, settings.sun_elevation_deg);
-    const sizeM = scene.tiles.sizeM;
+    what: { changed: readonly Resident[]; entered: readonly Resident[]; moved: boolean },
+  ): void {
+    const sun = sunOf(scene);
     this.passes.sky.bake(this.gpu.device, encoder, sun);
     world.atlas.flushPages();
-    this.passes.normals.run(encoder, sizeM, [...new Set([...changed, ...entered])]);
-    const sunKey = sun.join();
-    const all = changed.length > 0 || sunKey !== this.sunKey;
-    this.sunKey = sunKey;
-    if (all) for (const resident of world.atlas.residents()) resident.sunStale = true;
-    else staleNeighbours(world.atlas, entered);
-    const budget = this.gpu.software ? SUN_TILES.software : SUN_TILES.hardware;
-    const due = [...world.atlas.residents()].filter(
-      (r) => r.sunStale && (world.atlas.isCurrent(r) || entered.includes(r)),
-    );
-    // A tile that has just entered has no light at all yet: it never waits.
-    const fresh = new Set(entered);
-    const rank = (r: Resident): number => (fresh.has(r) ? -1 : r.level);
-    due.sort((a, b) => rank(a) - rank(b));
-    const jobs = due.slice(0, Math.max(budget, entered.length));
-    for (const job of jobs) job.sunStale = false;
-    this.passes.sun.run(encoder, sizeM, world.atlas.levels, high, sun, jobs);
-    return due.length > jobs.length;
+    this.passes.normals.run(encoder, scene.tiles.sizeM, [...what.changed, ...what.entered]);
+    world.light.mark(what.changed, what.entered, sun);
+    const budget = LIGHT_TILES[this.gpu.software ? "software" : "hardware"];
+    this.march(encoder, scene, world, what.moved ? budget.moving : budget.rest);
+  }
+
+  private march(encoder: GPUCommandEncoder, scene: Scene, world: World, budget: number): void {
+    world.light.run(encoder, { sizeM: scene.tiles.sizeM, high: this.high, sun: sunOf(scene) }, budget);
+    this.lightMarched += 1;
+  }
+
+  private marchOnly(scene: Scene, world: World): void {
+    const encoder = this.gpu.device.createCommandEncoder({ label: "light" });
+    this.march(encoder, scene, world, LIGHT_TILES.software.rest);
+    this.gpu.device.queue.submit([encoder.finish()]);
+    this.measure(false);
   }
 
   private encode(encoder: GPUCommandEncoder, scene: Scene, canvas: GPUTexture, width: number, height: number): void {
@@ -242,21 +252,23 @@ export class GpuRenderer implements SceneRenderer {
     pass.setBindGroup(0, frame.bindGroup);
     patches.drawGround(pass);
     patches.drawWalls(pass);
-    background.draw(pass);
-    if (scene.settings.sea_level_m !== null) patches.drawSea(pass);
+    const sea = scene.settings.sea_level_m !== null;
+    background.draw(pass, sea);
+    if (sea) patches.drawSea(pass);
     ghost.draw(pass);
     ribbons.draw(pass);
     pass.end();
     target.finish(encoder, canvas);
   }
 
-  private measure(): void {
+  /** Follows a submission to its end; `frame`: its time says how fast frames are. */
+  private measure(frame: boolean): void {
     const submitted = performance.now();
     this.inFlight += 1;
     this.gpu.device.queue.onSubmittedWorkDone().then(
       () => {
         this.inFlight -= 1;
-        this.quality.measured(performance.now() - submitted);
+        if (frame) this.quality.measured(performance.now() - submitted);
       },
       () => {
         this.inFlight -= 1;
@@ -265,14 +277,8 @@ export class GpuRenderer implements SceneRenderer {
   }
 }
 
-/** A new tile changes what the light of its neighbours of the same level was marched on. */
-function staleNeighbours(atlas: Atlas, entered: readonly Resident[]): void {
-  if (entered.length === 0) return;
-  for (const resident of atlas.residents()) {
-    resident.sunStale ||= entered.some(
-      (e) => e.level === resident.level && Math.abs(e.x - resident.x) <= 1 && Math.abs(e.y - resident.y) <= 1,
-    );
-  }
+function sunOf(scene: Scene): Vec3 {
+  return sunDirection(scene.settings.sun_azimuth_deg, scene.settings.sun_elevation_deg);
 }
 
 function sameQuality(a: Quality, b: Quality | null): boolean {

@@ -61,9 +61,21 @@ class JobPass {
   }
 }
 
-function pipeline(device: GPUDevice, code: string, entryPoint: string): Promise<GPUComputePipeline> {
+/** A shorter march where the device computes on the CPU. */
+const SOFTWARE_MARCH = { SUN_STEPS: 24, SUN_GROWTH: 0.22, SKY_DIRECTIONS: 5, SKY_STEPS: 4 };
+
+function pipeline(
+  device: GPUDevice,
+  code: string,
+  entryPoint: string,
+  constants: Record<string, number> = {},
+): Promise<GPUComputePipeline> {
   const module = device.createShaderModule({ label: entryPoint, code });
-  return device.createComputePipelineAsync({ label: entryPoint, layout: "auto", compute: { module, entryPoint } });
+  return device.createComputePipelineAsync({
+    label: entryPoint,
+    layout: "auto",
+    compute: { module, entryPoint, constants },
+  });
 }
 
 export class NormalsPass extends JobPass {
@@ -86,8 +98,9 @@ export class NormalsPass extends JobPass {
 }
 
 export class SunPass extends JobPass {
-  static async create(device: GPUDevice): Promise<SunPass> {
-    return new SunPass(device, await pipeline(device, SOURCES.sun, "compute_sun"), "sun", 8);
+  static async create(device: GPUDevice, software: boolean): Promise<SunPass> {
+    const constants = software ? SOFTWARE_MARCH : {};
+    return new SunPass(device, await pipeline(device, SOURCES.sun, "compute_sun", constants), "sun", 8);
   }
 
   attach(atlas: Atlas): void {

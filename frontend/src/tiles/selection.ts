@@ -78,6 +78,7 @@ export class Selection {
   private ortho = false;
   private tau = 1;
   private sizeM = 1;
+  private seaM = Number.NEGATIVE_INFINITY;
   private slots: Slots | null = null;
 
   constructor(readonly levels: number) {
@@ -91,9 +92,18 @@ export class Selection {
   /**
    * Chooses the cut among the usable tiles.
    *
-   * `pixelScale` scales the camera's height to the pixels that are really drawn (adaptive resolution).
+   * `pixelScale` scales the camera's height to the pixels that are really drawn (adaptive resolution). `seaM`: patches
+   * below it are drawn as far as its surface is in view.
    */
-  select(view: TileView, camera: CameraState, tauPx: number, slots: Slots, pixelScale = 1): Cut {
+  select(
+    view: TileView,
+    camera: CameraState,
+    tauPx: number,
+    slots: Slots,
+    pixelScale = 1,
+    seaM: number = Number.NEGATIVE_INFINITY,
+  ): Cut {
+    this.seaM = seaM;
     this.tree.sync(view);
     this.tree.updateSplittable();
     this.begin(view, camera, tauPx, slots, pixelScale);
@@ -180,11 +190,13 @@ export class Selection {
     const x0 = px * w;
     const y0 = py * w;
     const p = this.planes;
+    const low = at.min[index]!;
+    const high = Math.max(at.max[index]!, this.seaM);
     for (let i = 0; i < 24; i += 4) {
       const a = p[i]!;
       const b = p[i + 1]!;
       const c = p[i + 2]!;
-      const far = a * (a > 0 ? x0 + w : x0) + b * (b > 0 ? y0 + w : y0) + c * (c > 0 ? at.max[index]! : at.min[index]!);
+      const far = a * (a > 0 ? x0 + w : x0) + b * (b > 0 ? y0 + w : y0) + c * (c > 0 ? high : low);
       if (far + p[i + 3]! < 0) return false;
     }
     return true;
