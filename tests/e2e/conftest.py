@@ -61,9 +61,9 @@ class Server:
 
     def start(self) -> None:
         """Start and wait until /healthz answers. Raises RuntimeError with the log when it does not."""
-        log = (self.data.parent / "server.log").open("ab")
         command = [sys.executable, "-m", "esker", "serve", "--port", str(self.port), "--data", str(self.data)]
-        self.process = subprocess.Popen(command, cwd=ROOT, stdout=log, stderr=log)
+        with (self.data.parent / "server.log").open("ab") as log:
+            self.process = subprocess.Popen(command, cwd=ROOT, stdout=log, stderr=log)
         deadline = time.monotonic() + 90
         while time.monotonic() < deadline:
             if self.process.poll() is not None:
@@ -145,11 +145,20 @@ class Visitor:
     def open(self, path: str) -> None:
         """Open a path of the server and wait for the terrain to be there."""
         self.page.goto(self.origin + path)
-        self.page.wait_for_function("window.esker && window.esker.ready()", timeout=90_000)
+        self.wait("() => window.esker !== undefined && window.esker.ready()", timeout=90)
 
     def js(self, expression: str, argument: Any = None) -> Any:
         """Evaluate in the page."""
         return self.page.evaluate(expression, argument)
+
+    def wait(self, condition: str, argument: Any = None, timeout: float = 60) -> None:
+        """Wait until a condition in the page holds. (Playwright's own wait needs `eval`, which our CSP forbids.)"""
+        deadline = time.monotonic() + timeout
+        while not self.page.evaluate(condition, argument):
+            if time.monotonic() > deadline:
+                self.shot("timeout")
+                raise TimeoutError(f"not so after {timeout} s: {condition} {argument!r}")
+            self.page.wait_for_timeout(50)
 
     def shot(self, name: str) -> Path:
         """Keep a screenshot as a test artefact."""
@@ -166,7 +175,7 @@ class Visitors:
         self.browser, self.server = browser, server
         self.made: list[Visitor] = []
 
-    def __call__(self, width: int = 800, height: int = 600, **options: Any) -> Visitor:
+    def __call__(self, width: int = 720, height: int = 540, **options: Any) -> Visitor:
         context = self.browser.new_context(viewport={"width": width, "height": height}, **options)
         visitor = Visitor(context, context.new_page(), self.server.url)
         visitor.watch()
