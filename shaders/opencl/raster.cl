@@ -5,6 +5,7 @@
 #define CANDIDATES 48
 #define HALF_DIAGONAL 10.6066017f
 #define TINY 1e-20f
+#define NOTHING 0x7fffffff  // the segment of a sample that has none near
 
 typedef struct {
     float16 d2, height, rx, ry, along_x, along_y, left;
@@ -41,85 +42,118 @@ inline float least16(float16 v) {
     return fmin(c.x, c.y);
 }
 
-// One segment against 16 samples of a row.
-inline void consider(nearest_t *out, segments_t s, int at, float16 x, float y) {
+inline int least_int16(int16 v) {
+    int8 a = min(v.lo, v.hi);
+    int4 b = min(a.lo, a.hi);
+    int2 c = min(b.lo, b.hi);
+    return min(c.x, c.y);
+}
+
+// Is segment `at` nearer to 16 samples of a row than what they have?
+inline void consider(float16 *best2, int16 *best, segments_t s, int at, float16 x, float y) {
     global const float *t = s.table + at;
     size_t m = s.m;
-    float dx = t[3 * m], dy = t[4 * m], dz = t[5 * m], il2 = t[6 * m];
-    float16 px = x - t[0];
-    float py = y - t[m];
-    float16 u = clamp((px * dx + py * dy) * il2, 0.0f, 1.0f);
+    float dx = t[3 * m], dy = t[4 * m], py = y - t[m];
+    float16 px = x - t[0], u = clamp((px * dx + py * dy) * t[6 * m], 0.0f, 1.0f);
     float16 rx = px - u * dx, ry = py - u * dy, d2 = rx * rx + ry * ry;
-    int16 better = d2 < out->d2;
-    if (!any(better)) return;
+    int16 better = d2 < *best2;
+    *best2 = select(*best2, d2, better);
+    *best = select(*best, (int16)(at), better);
+}
+
+// What the samples whose nearest segment is `at` need to know of their nearest crest point.
+inline void resolve(nearest_t *out, int16 mine, segments_t s, int at, float16 x, float y) {
+    global const float *t = s.table + at;
+    size_t m = s.m;
+    float dx = t[3 * m], dy = t[4 * m], dz = t[5 * m], il2 = t[6 * m], py = y - t[m];
+    float16 px = x - t[0], u = clamp((px * dx + py * dy) * il2, 0.0f, 1.0f);
+    float16 rx = px - u * dx, ry = py - u * dy, d2 = rx * rx + ry * ry;
     int16 at0 = u <= 0.0f, at1 = u >= 1.0f;
     float16 tx = select(select((float16)(dx), (float16)(t[9 * m]), at1), (float16)(t[7 * m]), at0);
     float16 ty = select(select((float16)(dy), (float16)(t[10 * m]), at1), (float16)(t[8 * m]), at0);
     float16 cross = tx * ry - ty * rx;
     int16 cap = (at0 && (int16)(t[11 * m] > 0.0f ? -1 : 0)) || (at1 && (int16)(t[12 * m] > 0.0f ? -1 : 0));
-    float16 around = 0.5f + 0.5f * cross / fmax(sqrt(d2), 1e-6f);
     float16 side = select(select((float16)(0.5f), (float16)(0.0f), cross < 0.0f), (float16)(1.0f), cross > 0.0f);
+    if (any(cap)) side = select(side, 0.5f + 0.5f * cross / fmax(sqrt(d2), 1e-6f), cap);
     float16 along = select((float16)(dz * il2), (float16)(0.0f), cap);
-    out->d2 = select(out->d2, d2, better);
-    out->height = select(out->height, t[2 * m] + u * dz, better);
-    out->rx = select(out->rx, rx, better);
-    out->ry = select(out->ry, ry, better);
-    out->along_x = select(out->along_x, along * dx, better);
-    out->along_y = select(out->along_y, along * dy, better);
-    out->left = select(out->left, select(side, around, cap), better);
+    out->d2 = select(out->d2, d2, mine);
+    out->height = select(out->height, t[2 * m] + u * dz, mine);
+    out->rx = select(out->rx, rx, mine);
+    out->ry = select(out->ry, ry, mine);
+    out->along_x = select(out->along_x, along * dx, mine);
+    out->along_y = select(out->along_y, along * dy, mine);
+    out->left = select(out->left, side, mine);
 }
 
-// Height, fall per metre and change with the crest height of a flank (reference_raster.flank_profile).
-inline void flank_profile(float16 top, float16 slope, float16 k, float16 f, float16 d, float16 *z, float16 *fall,
-                          float16 *lift) {
-    float16 end = (1.0f + k + f) * top / slope, safe = fmax(top, TINY);
-    float16 ktop = fmax(k * top, TINY), curl = slope * slope / (4.0f * fmax(f * top, TINY)), rest = fmax(end - d, 0.0f);
-    int16 shoulder = d < 2.0f * k * top / slope, foot = d > end - 2.0f * f * top / slope;
-    float16 drop = slope * slope * d / (4.0f * ktop);
-    *z = select((1.0f + k) * top - slope * d, top - drop * d, shoulder);
-    *fall = select(slope, 2.0f * drop, shoulder);
-    *lift = select(1.0f + k, 1.0f + drop * d / safe, shoulder);
-    *z = select(*z, curl * rest * rest, foot);
-    *fall = select(*fall, 2.0f * curl * rest, foot);
-    *lift = select(*lift, 2.0f * curl * rest * (1.0f + k + f) / slope - curl * rest * rest / safe, foot);
+inline nearest_t nearest_of_row(int16 best, segments_t s, float16 x, float y) {
+    nearest_t out = {1e30f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f};
+    for (int at = least_int16(best); at < NOTHING; at = least_int16(best)) {
+        int16 mine = best == at;
+        resolve(&out, mine, s, at, x, y);
+        best = select(best, (int16)(NOTHING), mine);
+    }
+    return out;
 }
 
-// Adds one stroke's cross-section to the sums (reference_raster.cross_section). p: STROKE_FIELDS; s: metres a cell.
-inline void cross_section(sums_t *sum, const nearest_t *near, int16 inside, global const float *p, float s,
-                          float exit_length) {
+// Height, fall per metre and change with the crest height of a flank (reference_raster.flank_profile). `run` is 1 / slope,
+// `end` the full width of the profile, d at most that.
+inline void flank_profile(float16 top, float16 slope, float16 run, float16 k, float16 f, float16 end, float16 d,
+                          float16 *z, float16 *fall, float16 *lift) {
+    float16 half_square = 0.5f * slope * slope, rest = end - d;
+    int16 shoulder = d < 2.0f * k * top * run, foot = rest < 2.0f * f * top * run;
+    *z = (1.0f + k) * top - slope * d;
+    *fall = slope;
+    *lift = 1.0f + k;
+    if (any(shoulder)) {
+        float16 curve = half_square / fmax(k * top, TINY), drop = 0.5f * curve * d;
+        *z = select(*z, top - drop * d, shoulder);
+        *fall = select(*fall, curve * d, shoulder);
+        *lift = select(*lift, 1.0f + drop * d / fmax(top, TINY), shoulder);
+    }
+    if (any(foot)) {
+        float16 curve = half_square / fmax(f * top, TINY), low = 0.5f * curve * rest * rest;
+        *z = select(*z, low, foot);
+        *fall = select(*fall, curve * rest, foot);
+        *lift = select(*lift, curve * rest * (1.0f + k + f) * run - low / fmax(top, TINY), foot);
+    }
+}
+
+// Adds one stroke's cross-section to the sums (reference_raster.cross_section). p: STROKE_FIELDS; s: metres a cell;
+// cells: 1 / s; decay: 1 / exit length.
+inline void cross_section(sums_t *sum, const nearest_t *near, int16 inside, global const float *p, float s, float cells,
+                          float decay) {
     float16 zero = 0.0f, one = 1.0f, distance = select(sqrt(near->d2), zero, inside);
-    int16 reached = inside || (near->d2 <= p[3] * p[3]);
-    if (!any(reached)) return;
-    float16 d = fmax(distance - p[0], 0.0f);
+    float16 d = fmax(distance - p[0], 0.0f), ds = d * s;
     int16 hard = d < CREST_HALF_WIDTH;
     float16 left = near->left * p[4], present = left + (1.0f - near->left) * p[9];
     int16 has = present > 0.0f;
-    float16 share = select(zero, left / fmax(present, TINY), has);
+    float16 share = left / fmax(present, TINY);
     float16 slope = select(one, p[10] + share * (p[5] - p[10]), has), extent = p[11] + share * (p[6] - p[11]);
-    float16 k = p[12] + share * (p[7] - p[12]), f = p[13] + share * (p[8] - p[13]);
-    float16 top = fabs(near->height), sign = select(one, -one, near->height < 0.0f);
-    float16 end = select(zero, fmin(extent, (1.0f + k + f) * top / slope), has);
-    float16 r = fmin(d * s / fmax(end, THINNEST_M), 1e6f), z, fall, lift;
-    flank_profile(top, slope, k, f, fmin(d * s, end), &z, &fall, &lift);
-    int16 beyond = r > 1.0f;
-    fall = select(fall, fmin(fall, z / exit_length), beyond);
-    lift = select(select(lift, zero, beyond), one, !has);
-    float16 down = select(zero, -sign * fall, has && distance > p[0]);
-    float16 near_weight = 1.0f / (1.0f + d * d), inner = fmax(1.0f - r, 0.0f), outer = fmax(1.0f - r / TOE, 0.0f);
-    float16 fade = present * (1.0f - smooth16((r - SPRING_FULL_FRACTION) / (1.0f - SPRING_FULL_FRACTION)));
-    float16 toe = select(zero, present * (1.0f - smooth16((r - 1.0f) / (TOE - 1.0f))), has);
-    fade = select(zero, select(fade, one, hard), reached);
-    toe = select(zero, toe, reached);
+    float16 k = p[12] + share * (p[7] - p[12]), f = p[13] + share * (p[8] - p[13]), run = 1.0f / slope;
+    float16 top = fabs(near->height), full = (1.0f + k + f) * top * run, end = select(zero, fmin(extent, full), has);
+    float16 wide = 1.0f / fmax(end, SPRING_FLOOR_CELLS * s), rt = ds * wide;
+    int16 reached = (inside || near->d2 <= p[3] * p[3]) && (hard || (has && rt < TOE));
+    if (!any(reached)) return;
+    float16 r = fmin(ds / fmax(end, THINNEST_M), 1e6f), z, fall, lift;
+    flank_profile(top, slope, run, k, f, full, fmin(ds, end), &z, &fall, &lift);
+    float16 free = smooth16((r - SPRING_FULL_FRACTION) * (1.0f / (1.0f - SPRING_FULL_FRACTION)));
+    float16 past = 1.0f + fmax(ds - end, 0.0f) * decay;
+    fall += free * (fmin(fall, EXIT_SHARE * decay * z) / (past * past) - fall);
+    lift = select(select(lift, zero, r > 1.0f), one, !has);
+    float16 sign = select(one, -one, near->height < 0.0f), down = select(zero, -sign * fall, has && distance > p[0]);
+    float16 near_weight = 1.0f / (1.0f + d * d), inner = fmax(1.0f - r, 0.0f), outer = fmax(1.0f - rt * (1.0f / TOE), 0.0f);
+    float16 fade = select(zero, select(present * (1.0f - free), one, hard), reached);
+    float16 toe = select(zero, present * (1.0f - smooth16((rt - 1.0f) * (1.0f / (TOE - 1.0f)))), reached && has);
     float16 w = near_weight * fade * select(inner * inner + TINY, one, hard), g = near_weight * toe * outer * outer;
-    float16 a = SPRING_CELLS / fmax(end / s, SPRING_FLOOR_CELLS), unit = fmax(distance, 0.5f);
-    float16 along_x = select(near->along_x, zero, inside), along_y = select(near->along_y, zero, inside);
+    float16 a = SPRING_CELLS * s * wide, unit = down / fmax(distance, 0.5f);
+    lift = select(lift * cells, zero, inside);
     sum->w += w;
     sum->wt += w * sign * z;
     sum->wa += w * a * a;
     sum->fade = fmax(sum->fade, fade);
     sum->g += g;
-    sum->gx += g * (down * near->rx / unit + lift * along_x / s);
-    sum->gy += g * (down * near->ry / unit + lift * along_y / s);
+    sum->gx += g * (unit * near->rx + lift * near->along_x);
+    sum->gy += g * (unit * near->ry + lift * near->along_y);
     sum->toe = fmax(sum->toe, toe);
     sum->hard = select(sum->hard, one, hard && reached);
 }
@@ -142,24 +176,23 @@ inline int collect(int *list, int *at, int end, float bound2, segments_t s, floa
     return found;
 }
 
-// The nearest crest points of the whole bin; false when the stroke cannot reach it.
-inline int nearest_in_bin(nearest_t *near, segments_t s, int first, int count, float reach, float x0, float y0) {
+// Per row of the bin the nearest segment of every sample; false when the stroke cannot reach the bin.
+inline int nearest_in_bin(int16 *best, segments_t s, int first, int count, float reach, float16 x, float x0, float y0) {
     float cx = x0 + 0.5f * (BIN - 1), cy = y0 + 0.5f * (BIN - 1), least = 1e30f;
     for (int at = first; at < first + count; at += 16) least = fmin(least, least16(middle_distance2(s, at, cx, cy)));
     least = sqrt(least);
     float bound = fmin(least + 2.0f * HALF_DIAGONAL, reach + HALF_DIAGONAL) + 1e-3f;
+    float16 best2[BIN];
     for (int y = 0; y < BIN; y++) {
-        near[y].d2 = 1e30f;
-        near[y].height = near[y].rx = near[y].ry = near[y].along_x = near[y].along_y = near[y].left = 0.0f;
+        best2[y] = 1e30f;
+        best[y] = NOTHING;
     }
     if (least > bound) return 0;
     int list[CANDIDATES], at = first;
-    float16 x = x0 + (float16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
     while (at < first + count) {
         int found = collect(list, &at, first + count, bound * bound, s, cx, cy);
         for (int y = 0; y < BIN; y++)
-            for (int i = 0; i < found; i++)
-                if (i == 0 || list[i] != list[i - 1]) consider(near + y, s, list[i], x, y0 + y);
+            for (int i = 0; i < found; i++) consider(best2 + y, best + y, s, list[i], x, y0 + y);
     }
     return 1;
 }
@@ -192,8 +225,9 @@ kernel void rasterise(global const float *segments, int m, global const float *s
     int bx = bx0 + get_global_id(0), by = by0 + get_global_id(1);
     segments_t s = {m, segments};
     sums_t sums[BIN];
-    nearest_t near[BIN];
+    int16 best[BIN];
     float x0 = bx * BIN, y0 = by * BIN;
+    float16 x = x0 + (float16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
     for (int y = 0; y < BIN; y++) {
         sums_t none = {0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f};
         sums[y] = none;
@@ -202,17 +236,17 @@ kernel void rasterise(global const float *segments, int m, global const float *s
         global const float *p = strokes + STROKE_STRIDE * row_items[i];
         global const int *at = index + INDEX_STRIDE * row_items[i];
         if (x0 > p[2] || x0 + BIN - 1 < p[1]) continue;
-        int reached = nearest_in_bin(near, s, at[0], at[1], p[3], x0, y0);
+        int reached = nearest_in_bin(best, s, at[0], at[1], p[3], x, x0, y0);
         if (!reached && at[2] < 0) continue;
-        float16 x = x0 + (float16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
         for (int y = 0; y < BIN; y++) {
             int16 in = 0;
             int gy = by * BIN + y;
+            nearest_t near = nearest_of_row(best[y], s, x, y0 + y);
             if (at[2] >= 0 && gy < n) {
                 in = inside_row(spans, span_index[at[2] + gy], span_index[at[2] + gy + 1], x);
-                near[y].height = select(near[y].height, (float16)(segments[at[0] + 2 * (size_t)m]), in);
+                near.height = select(near.height, (float16)(segments[at[0] + 2 * (size_t)m]), in);
             }
-            cross_section(sums + y, near + y, in, p, spacing, exit_length);
+            cross_section(sums + y, &near, in, p, spacing, 1.0f / spacing, 1.0f / exit_length);
         }
     }
     for (int y = 0; y < BIN; y++) {

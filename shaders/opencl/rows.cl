@@ -1,3 +1,6 @@
+// Vectors wider than the processor are passed by pieces: nothing that we would link against cares.
+#pragma clang diagnostic ignored "-Wpsabi"
+
 // Rows of a level, for kernels that work a row at a time (CPU devices). Twins: backend/esker/solve/reference.py.
 //
 // A level is n rows of `pitch` floats; sample (y, x) is at y * pitch + PAD + x. A channel is a whole level; channels lie

@@ -40,6 +40,9 @@ SPRING_FLOOR_CELLS = 8.0
 """A spring is never stiffer than that of a band this wide."""
 TOE = 1.3
 """Beyond its end a band still tells the gradient, fading out at this multiple of its width: nothing overshoots."""
+EXIT_SHARE = 0.25
+"""Where a band ends above the base the gradient leaves as if this share of the height there decayed over the reach:
+more, and the ground beyond sinks below the base; less, and a step shows."""
 SOFT_PART = 0.5
 """Share of the crest height that the round part of a concave foot or a convex shoulder takes."""
 FLATTEST = 1e-9
@@ -107,6 +110,7 @@ def defines() -> dict[str, float | int]:
         "CREST_HALF_WIDTH": CREST_HALF_WIDTH,
         "SPRING_FLOOR_CELLS": SPRING_FLOOR_CELLS,
         "TOE": TOE,
+        "EXIT_SHARE": EXIT_SHARE,
         "THINNEST_M": THINNEST_M,
         "STROKE_STRIDE": STROKE_STRIDE,
         "INDEX_STRIDE": INDEX_STRIDE,
@@ -225,7 +229,7 @@ def _reach(crest: Crest, s: float) -> float:
         present, slope, extent, shoulder, foot = _flank(side)
         if present:
             widest = max(widest, min(extent, (1 + shoulder + foot) * top / slope))
-    return crest.stroke.plateau_radius_m / s + max(CREST_HALF_WIDTH, TOE * widest / s) + 0.01
+    return crest.stroke.plateau_radius_m / s + TOE * max(SPRING_FLOOR_CELLS, widest / s) + 0.01
 
 
 def _pack_one(crest: Crest, s: float, n: int) -> _Packed | None:

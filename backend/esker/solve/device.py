@@ -19,6 +19,9 @@ NUMPY = "numpy"
 NUMPY_NAME = "NumPy float64 (no OpenCL device)"
 SOURCES = ("rows.cl", "raster.cl", "setup.cl", "visit.cl")
 _POCL_THREADS = "POCL_MAX_PTHREAD_COUNT"
+_POCL_CACHE = "POCL_KERNEL_CACHE"
+_opened: dict[str, Device] = {}
+"""Devices of this process by name: a program is compiled once."""
 
 
 class NoDeviceError(RuntimeError):
@@ -50,6 +53,8 @@ def open_device(wanted: str | None = None, threads: int | None = None) -> Device
     if wanted is not None and wanted.lower() == NUMPY:
         return None
     os.environ.setdefault(_POCL_THREADS, str(threads or default_threads()))
+    if not pocl_cpu.cache_works():
+        os.environ.setdefault(_POCL_CACHE, "0")
     try:
         found = _devices()
     except Exception as error:
@@ -61,7 +66,9 @@ def open_device(wanted: str | None = None, threads: int | None = None) -> Device
         found = [(name, d) for name, d in found if wanted.lower() in name.lower()] or _missing(wanted, found)
     for name, d in found:
         try:
-            return _open(name, d)
+            if name not in _opened:
+                _opened[name] = _open(name, d)
+            return _opened[name]
         except Exception as error:
             log.warning("OpenCL device %s does not work: %s", name, error)
             if wanted:
@@ -134,8 +141,15 @@ def _open(name: str, device: Any) -> Device:
 
 
 def _build(context: Any) -> Any:
+    program = _compile(context, _defines() + _source())
+    if "rasterise" not in program.kernel_names:
+        raise RuntimeError("the compiler returned a program without kernels")
+    return program
+
+
+def _compile(context: Any, source: str) -> Any:
     import pyopencl as cl
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", cl.CompilerWarning)
-        return cl.Program(context, _defines() + _source()).build(["-cl-mad-enable"])
+        return cl.Program(context, source).build(["-cl-mad-enable"], cache_dir=False)

@@ -34,6 +34,15 @@ def cpu_level(cpuinfo: Path = Path("/proc/cpuinfo")) -> str:
     return next(name for name, needed in _LEVELS if needed <= flags)
 
 
+def cache_works() -> bool:
+    """Whether PoCL 3.0's kernel cache can be trusted: with vectors narrower than float16 it gives back programs
+    without kernels, so that compiling at every start (a second) is the lesser evil."""
+    try:
+        return cpu_level() == _LEVELS[0][0]
+    except OSError:
+        return True
+
+
 def name_cpu(device_pointer: int) -> str | None:
     """Give the PoCL device at this address a CPU name that its compiler knows; the name, or None if not possible."""
     for field in _fields(device_pointer):

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from esker.contract import CREST_STIFFNESS, SPRING_CELLS, SPRING_FULL_FRACTION
-from esker.solve.constraints import BIN, CREST_HALF_WIDTH, SPRING_FLOOR_CELLS, THINNEST_M, TOE, Tables, bins
+from esker.solve.constraints import BIN, CREST_HALF_WIDTH, EXIT_SHARE, SPRING_FLOOR_CELLS, THINNEST_M, TOE, Tables, bins
 
 Floats = NDArray[np.float64]
 
@@ -105,19 +105,22 @@ def cross_section(near: _Nearest, inside: NDArray[np.bool_], params: Floats, tab
     r = np.minimum(d * s / np.maximum(end, THINNEST_M), 1e6)
     z, fall, lift = flank_profile(top, slope, k, f, np.minimum(d * s, end))
     beyond = r > 1
-    exit_slope = np.minimum(fall, z / tables.exit_length_m)
-    fall, lift = np.where(beyond, exit_slope, fall), np.where(beyond, 0.0, lift)
+    free = smoothstep((r - SPRING_FULL_FRACTION) / (1 - SPRING_FULL_FRACTION))
+    past = 1 + np.maximum(d * s - end, 0.0) / tables.exit_length_m
+    fall = fall + free * (np.minimum(fall, EXIT_SHARE * z / tables.exit_length_m) / past**2 - fall)
+    lift = np.where(beyond, 0.0, lift)
     unit = np.maximum(distance, 0.5)
     off_plateau = distance > plateau
     down = np.where(off_plateau, -sign * fall, 0.0) * (present > 0)
     lift = np.where(present > 0, lift, 1.0)
     near_weight = 1 / (1 + d * d)
-    fade = np.where(hard, 1.0, present * (1 - smoothstep((r - SPRING_FULL_FRACTION) / (1 - SPRING_FULL_FRACTION))))
-    toe_fade = np.where(present > 0, present * (1 - smoothstep((r - 1) / (TOE - 1))), 0.0)
+    fade = np.where(hard, 1.0, present * (1 - free))
+    rt = np.minimum(d * s / np.maximum(end, SPRING_FLOOR_CELLS * s), 1e6)
+    toe_fade = np.where(present > 0, present * (1 - smoothstep((rt - 1) / (TOE - 1))), 0.0)
     return _Band(
         hard=hard,
         weight=near_weight * fade * np.where(hard, 1.0, np.maximum(1 - r, 0.0) ** 2 + _TINY),
-        toe_weight=near_weight * toe_fade * np.maximum(1 - r / TOE, 0.0) ** 2,
+        toe_weight=near_weight * toe_fade * np.maximum(1 - rt / TOE, 0.0) ** 2,
         target=sign * z,
         stiffness=(SPRING_CELLS / np.maximum(end / s, SPRING_FLOOR_CELLS)) ** 2,
         fade=fade,
