@@ -40,7 +40,7 @@ STALLED = 0.8
 STALLED_AFTER = 8
 """After this many cycles a ratio of two updates above STALLED means that float32 has nothing left to gain."""
 CYCLES_PER_PULSE = 2
-"""While settling, level 0 is given out once in so many cycles, so that a caller can stop or show progress."""
+"""While settling, the preview of level 0 is given out again once in so many cycles, so that a caller can stop."""
 SPARE_WORKSPACES = 4
 """Idle workspaces kept (about 90 MB each at level 4), with the raster of the strokes that they last solved."""
 
@@ -112,8 +112,8 @@ class Solver:
     ) -> Iterator[LevelResult]:
         """Previews of levels 0..G, each when it is finished, then 0..G settled.
 
-        Between the last preview and the settled levels, level 0 comes again from time to time as a better preview.
-        Close the generator to stop; G is ``levels`` or the solver's ``max_level``. Raises ValueError for a level
+        Between the last preview and the settled levels the same preview of level 0 comes again from time to time: a
+        chance to stop. Close the generator to stop; G is ``levels`` or the solver's ``max_level``. Raises ValueError for a level
         outside 0..MAX_LEVEL.
         """
         return self._run(strokes, settings, self._level(levels), None)
@@ -163,12 +163,15 @@ class Solver:
         workspace = self._take(strokes, settings, top)
         try:
             workspace.load(strokes, settings)
+            pulse = None
             if warm is None:
-                yield from _previews(workspace)
+                for preview in _previews(workspace):
+                    pulse = pulse or preview
+                    yield preview
             else:
                 _gradients(workspace)
                 workspace.warm(warm)
-            yield from _settle(workspace, settings)
+            yield from _settle(workspace, settings, pulse)
         except GeneratorExit:
             raise
         except BaseException:
@@ -224,22 +227,22 @@ def _gradients(w: Workspace) -> None:
     _cycles(w.gradient, PREVIEW_GRADIENT_CYCLES)
 
 
-def _settle(w: Workspace, settings: TerrainSettings) -> Iterator[LevelResult]:
-    """Cycle to rest, then give out all levels: the finest, and its injections."""
+def _settle(w: Workspace, settings: TerrainSettings, pulse: LevelResult | None) -> Iterator[LevelResult]:
+    """Cycle to rest, with a ``pulse`` between cycles, then give out all levels: the finest, and its injections."""
     quantum = grid.quantum(w.top, settings.size_m)
     span = min(settings.reach_m or settings.size_m / 4, settings.size_m / 4)
     if w.top > 0:
-        yield from _to_rest(w, w.gradient, GRADIENT_SHARE * quantum / span)
+        yield from _to_rest(w.gradient, GRADIENT_SHARE * quantum / span, pulse)
         w.guide(w.top)
         multigrid.refresh(w.height)
-        yield from _to_rest(w, w.height, HEIGHT_SHARE * quantum)
+        yield from _to_rest(w.height, HEIGHT_SHARE * quantum, pulse)
     heights = _frozen(w.read(w.top))
     for level in range(w.top + 1):
         step = 1 << (w.top - level)
         yield LevelResult(level, _frozen(heights[::step, ::step]), settled=True)
 
 
-def _to_rest(w: Workspace, system: multigrid.System, tolerance: float) -> Iterator[LevelResult]:
+def _to_rest(system: multigrid.System, tolerance: float, pulse: LevelResult | None) -> Iterator[LevelResult]:
     """Cycles until the estimated error is below ``tolerance``."""
     before = math.inf
     for k in range(1, MAX_CYCLES + 1):
@@ -248,9 +251,8 @@ def _to_rest(w: Workspace, system: multigrid.System, tolerance: float) -> Iterat
         if update * UPDATE_SHARE < tolerance or (k >= STALLED_AFTER and update > STALLED * before):
             return
         before = update
-        if k % CYCLES_PER_PULSE == 0:
-            step = 1 << w.top
-            yield LevelResult(0, _frozen(w.read(w.top)[::step, ::step]), settled=False)
+        if pulse is not None and k % CYCLES_PER_PULSE == 0:
+            yield pulse
 
 
 def _frozen(heights: NDArray[np.float32]) -> NDArray[np.float32]:
