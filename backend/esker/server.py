@@ -6,7 +6,7 @@ import asyncio
 import logging
 import time
 from collections.abc import AsyncIterator, Awaitable, Callable
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 from typing import Annotated, Any, Final
 from urllib.parse import urlsplit
@@ -17,6 +17,7 @@ from fastapi.responses import FileResponse, JSONResponse
 from pydantic import Field, StringConstraints
 from starlette.exceptions import HTTPException
 from starlette.staticfiles import StaticFiles
+from starlette.websockets import WebSocketDisconnect
 
 from esker import contract as c
 from esker import templates
@@ -358,13 +359,19 @@ class _Transport:
         self._abort: Callable[[], None] | None = socket.scope.get("esker.abort")
 
     async def send_text(self, text: str) -> None:
-        await self._socket.send({"type": "websocket.send", "text": text})
+        await self._send({"type": "websocket.send", "text": text})
 
     async def send_bytes(self, data: bytes) -> None:
-        await self._socket.send({"type": "websocket.send", "bytes": data})
+        await self._send({"type": "websocket.send", "bytes": data})
 
     async def close(self, code: int, reason: str) -> None:
-        await self._socket.close(code, reason)
+        await self._send({"type": "websocket.close", "code": code, "reason": reason})
+
+    async def _send(self, message: dict[str, Any]) -> None:
+        try:
+            await self._socket.send(message)
+        except (WebSocketDisconnect, RuntimeError) as error:  # Starlette's ways to say that the peer is gone
+            raise ConnectionResetError("the peer is gone") from error
 
     def abort(self) -> None:
         if self._abort is not None:
@@ -391,8 +398,10 @@ def _add_socket(app: FastAPI, hub: Hub) -> None:
         if origin is not None and urlsplit(origin).netloc.lower() != host.lower():
             sentence = "A page of another site may not open this socket."
             log.info("closed a connection from %s: bad_origin", _address(socket))
-            await transport.send_text(c.ErrorMessage(code="bad_origin", message=sentence, fatal=True).model_dump_json())
-            await transport.close(c.WS_CLOSE["bad_origin"], sentence)
+            text = c.ErrorMessage(code="bad_origin", message=sentence, fatal=True).model_dump_json()
+            with suppress(ConnectionResetError):
+                await transport.send_text(text)
+                await transport.close(c.WS_CLOSE["bad_origin"], sentence)
             return
         await Session(hub, transport, _address(socket), subprotocol).run(_messages(socket))
 

@@ -116,7 +116,8 @@ class Link:
         server.links.append(self)
 
     def _delay(self) -> float:
-        return self.world.random.uniform(0.001, 0.150)
+        rng = self.world.random
+        return rng.uniform(0.0002, 0.005) if rng.random() < 0.5 else rng.uniform(0.001, 0.150)
 
     def up(self, text: str) -> None:
         at = max(self.world.now + self._delay(), self._last_up)
@@ -184,7 +185,9 @@ class Client:
     def lost(self) -> None:
         self.link, self.online = None, False
         self.doc.disconnected()
-        self.world.after(self.world.random.uniform(0.01, 1.0), self.connect)
+        # Often at once: then the server still has ops under way that this client will send again.
+        rng = self.world.random
+        self.world.after(rng.uniform(0, 0.01) if rng.random() < 0.5 else rng.uniform(0.01, 1.0), self.connect)
 
     def receive(self, message: object) -> None:
         match message:

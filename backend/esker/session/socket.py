@@ -23,7 +23,10 @@ GOODBYE_SECONDS: Final = 1.0
 
 
 class Transport(Protocol):
-    """One websocket. ``send_*`` return when the socket has room again; ``abort`` drops it without a farewell."""
+    """One websocket. ``send_*`` return when the socket has room again; ``abort`` drops it without a farewell.
+
+    All but ``abort`` raise ConnectionError when the peer is gone.
+    """
 
     async def send_text(self, text: str) -> None: ...
 
@@ -71,7 +74,7 @@ class Session:
             if self.outbox.closing is not None:
                 self._transport.abort()
             for error in results:
-                if isinstance(error, Exception):
+                if isinstance(error, Exception) and not isinstance(error, ConnectionError):
                     log.error("a connection from %s failed: %s: %s", self._address, type(error).__name__, error)
 
     # --- reading ------------------------------------------------------------------------------------------------

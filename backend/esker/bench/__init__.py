@@ -1,0 +1,1 @@
+"""Benchmarks: ``esker bench NAME --json``. Each module has ``main(argv) -> int``; results are kept in bench/results."""

@@ -1,0 +1,307 @@
+"""Fan-out: many people drawing at once, validated and durable (DESIGN 15).
+
+A server process of its own; this process plays the clients: each sends ops at fixed times, round the clock of the
+schedule and not of the answers, and notes when each op of another reaches it. What is timed is from the *scheduled*
+moment of sending to the receipt at each of the others, so a client that falls behind counts against the result.
+
+Ops are appends of four points to the client's own stroke, which is hidden, so that the solver has nothing to do and
+the figure is that of the room alone; ``--solve`` shows the strokes and lets it work. ``--floor`` measures a bare relay
+in the same way: same messages, no validation, no order, nothing on disk.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import json
+import os
+import platform
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+import urllib.request
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import psutil
+import uvloop
+from websockets.asyncio.client import ClientConnection
+from websockets.asyncio.client import connect as open_socket
+from websockets.asyncio.server import ServerConnection
+from websockets.asyncio.server import serve as serve_sockets
+from websockets.exceptions import ConnectionClosed
+
+from esker import contract as c
+from esker.version import VERSION
+
+POINTS: Final = 4
+STROKE_POINTS: Final = 64
+"""The stroke starts again after so many points, as a drawn line has about that many."""
+WARM_UP: Final = 2.0
+
+
+@dataclass
+class _Run:
+    """What one run measures."""
+
+    clients: int
+    rate: float
+    seconds: float
+    show: bool
+    sent: dict[str, float] = field(default_factory=dict)
+    delays: list[float] = field(default_factory=list)
+    acks: list[float] = field(default_factory=list)
+    refused: int = 0
+    received_bytes: int = 0
+
+
+def _begin(client: str, show: bool) -> dict[str, Any]:
+    stroke = {
+        "id": client,
+        "kind": "profile",
+        "first": [100, 100, 0],
+        "last": [900, 100, 0],
+        "curve": [],
+        "hidden": not show,
+    }
+    return {"type": "stroke.begin", "stroke": stroke}
+
+
+def _append(client: str, n: int) -> dict[str, Any]:
+    start = n * POINTS % STROKE_POINTS
+    points = [[(start + i) / STROKE_POINTS, 10.0 + i + n % 7] for i in range(POINTS)]
+    return {"type": "stroke.append", "stroke": client, "start": start, "points": points, "last": [900, 100, 0]}
+
+
+class _Client:
+    """One person who draws."""
+
+    def __init__(self, index: int, run: _Run, ws: ClientConnection) -> None:
+        self.name, self.run, self.ws, self.index = f"c{index}", run, ws, index
+
+    async def draw(self, start: float) -> None:
+        """Sends one op each period, spread over the period by client."""
+        period = 1 / self.run.rate
+        total = int((self.run.seconds + WARM_UP) * self.run.rate)
+        for n in range(total):
+            at = start + (n + self.index / self.run.clients) * period
+            delay = at - time.perf_counter()
+            if delay > 0:
+                await asyncio.sleep(delay)
+            op_id = f"{self.name}:{n + 1}"
+            if at >= start + WARM_UP:
+                self.run.sent[op_id] = at
+            await self.ws.send(_message(op_id, _append(self.name, n)))
+
+    async def listen(self) -> None:
+        """Notes the arrival of every op of another."""
+        with suppress(ConnectionClosed):
+            async for message in self.ws:
+                self.run.received_bytes += len(message)
+                if isinstance(message, bytes):
+                    await self.ws.send(f'{{"type":"credit","bytes":{len(message)}}}')
+                else:
+                    self._note(json.loads(message), time.perf_counter())
+
+    def _note(self, message: dict[str, Any], now: float) -> None:
+        run, mine = self.run, f"{self.name}:"
+        kind = message["type"]
+        if kind in ("ordered", "ops"):
+            for op in message["ops"]:
+                at = run.sent.get(op["id"])
+                if at is not None and not op["id"].startswith(mine):
+                    run.delays.append(now - at)
+        elif kind == "ack":
+            run.acks += [now - run.sent[op_id] for op_id in message["ids"] if op_id in run.sent]
+        elif kind == "reject":
+            run.refused += 1
+
+
+def _message(op_id: str, op: dict[str, Any]) -> str:
+    return json.dumps({"type": "ops", "ops": [{"id": op_id, "op": op}]}, separators=(",", ":"))
+
+
+async def _play(run: _Run, url: str, hello: dict[str, Any] | None, process: psutil.Process) -> dict[str, Any]:
+    clients: list[_Client] = []
+    for i in range(run.clients):
+        ws = await open_socket(url, subprotocols=[c.SUBPROTOCOL], compression=None, max_size=None, proxy=None)  # type: ignore[list-item]
+        clients.append(_Client(i, run, ws))
+        if hello is not None:
+            await ws.send(json.dumps(hello | {"client": f"c{i}", "name": f"Client {i}"}))
+            await ws.send(_message(f"c{i}:0", _begin(f"c{i}", run.show)))
+    listeners = [asyncio.create_task(client.listen()) for client in clients]
+    await asyncio.sleep(1.0)
+    start = time.perf_counter() + 0.1
+    drawing = [asyncio.create_task(client.draw(start)) for client in clients]
+    await asyncio.sleep(start + WARM_UP - time.perf_counter())
+    before, own, wall = _cpu(process), _cpu(psutil.Process()), time.perf_counter()
+    await asyncio.gather(*drawing)
+    used, own_used, wall = _cpu(process) - before, _cpu(psutil.Process()) - own, time.perf_counter() - wall
+    rss = process.memory_info().rss
+    await asyncio.sleep(1.0)
+    for client in clients:
+        await client.ws.close()
+    await asyncio.gather(*listeners)
+    return _figures(run, used / wall, own_used / wall, rss, wall)
+
+
+def _cpu(process: psutil.Process) -> float:
+    times = process.cpu_times()
+    return float(times.user + times.system)
+
+
+def _figures(run: _Run, cores: float, own_cores: float, rss: int, wall: float) -> dict[str, Any]:
+    delays = np.array(run.delays) * 1000
+    expected = len(run.sent) * (run.clients - 1)
+    out: dict[str, Any] = {
+        "ops": len(run.sent),
+        "deliveries": len(delays),
+        "deliveries_expected": expected,
+        "deliveries_per_s": round(len(delays) / wall),
+        "delay_ms": {f"p{q}": round(float(np.percentile(delays, q)), 2) for q in (50, 90, 99, 99.9)},
+        "delay_max_ms": round(float(delays.max()), 2),
+        "server_cores": round(cores, 3),
+        "server_rss_mb": round(rss / 1e6, 1),
+        "clients_cores": round(own_cores, 3),
+        "received_mb_per_s": round(run.received_bytes / wall / 1e6, 2),
+        "refused": run.refused,
+    }
+    if run.acks:
+        acks = np.array(run.acks) * 1000
+        out["ack_ms"] = {f"p{q}": round(float(np.percentile(acks, q)), 2) for q in (50, 99)}
+    return out
+
+
+def _measure(arguments: argparse.Namespace, *, show: bool) -> dict[str, Any]:
+    run = _Run(arguments.clients, arguments.rate, arguments.seconds, show)
+    with tempfile.TemporaryDirectory(prefix="esker-bench-", dir=arguments.data) as folder:
+        port = _free_port()
+        command = [sys.executable, "-m", "esker", "serve", "--port", str(port), "--data", folder]
+        with subprocess.Popen([*command, "--log-level", "warning"], stdout=subprocess.DEVNULL) as server:
+            try:
+                base = f"http://127.0.0.1:{port}"
+                _wait(base, server)
+                made = _post(f"{base}/api/terrains", {})
+                hello = {
+                    "type": "hello",
+                    "protocol": c.PROTOCOL_VERSION,
+                    "terrain": made["id"],
+                    "secret": made["secret"],
+                }
+                url = f"ws://127.0.0.1:{port}/ws"
+                figures = uvloop.run(_play(run, url, hello, psutil.Process(server.pid)))
+                about = _get(f"{base}/api/terrains/{made['id']}", made["secret"])
+                figures["clock_after"] = about["clock"]
+            finally:
+                server.terminate()
+    return figures
+
+
+def _measure_floor(arguments: argparse.Namespace) -> dict[str, Any]:
+    run = _Run(arguments.clients, arguments.rate, arguments.seconds, False)
+    port = _free_port()
+    command = [sys.executable, "-m", "esker", "bench", "fanout", "--relay", str(port)]
+    with subprocess.Popen(command) as relay:
+        try:
+            time.sleep(1.5)
+            return uvloop.run(_play(run, f"ws://127.0.0.1:{port}/ws", None, psutil.Process(relay.pid)))
+        finally:
+            relay.terminate()
+
+
+async def _relay(port: int) -> None:
+    """The floor: every text goes to everybody else as it is."""
+    sockets: set[ServerConnection] = set()
+
+    async def handle(ws: ServerConnection) -> None:
+        sockets.add(ws)
+        with suppress(ConnectionClosed):
+            async for message in ws:
+                await asyncio.gather(*(other.send(message) for other in sockets if other is not ws))
+        sockets.discard(ws)
+
+    async with serve_sockets(handle, "127.0.0.1", port, compression=None, subprotocols=[c.SUBPROTOCOL]):  # type: ignore[list-item]
+        await asyncio.get_running_loop().create_future()
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def _wait(base: str, server: subprocess.Popen[bytes]) -> None:
+    deadline = time.monotonic() + 60
+    while time.monotonic() < deadline and server.poll() is None:
+        with suppress(OSError), urllib.request.urlopen(f"{base}/healthz", timeout=1):
+            return
+        time.sleep(0.1)
+    raise RuntimeError("the server did not start")
+
+
+def _post(url: str, body: dict[str, Any]) -> Any:
+    headers = {"Content-Type": "application/json"}
+    request = urllib.request.Request(url, json.dumps(body).encode(), headers, method="POST")
+    with urllib.request.urlopen(request, timeout=10) as answer:
+        return json.loads(answer.read())
+
+
+def _get(url: str, secret: str) -> Any:
+    request = urllib.request.Request(url, headers={"Authorization": f"Bearer {secret}"})
+    with urllib.request.urlopen(request, timeout=10) as answer:
+        return json.loads(answer.read())
+
+
+def _machine() -> dict[str, Any]:
+    model = platform.processor()
+    with suppress(OSError):
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+        model = next((line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")), model)
+    return {
+        "cpu": model,
+        "cores": os.cpu_count(),
+        "memory_gib": round(psutil.virtual_memory().total / 2**30, 1),
+        "python": platform.python_version(),
+        "load_before": round(os.getloadavg()[0], 2),
+    }
+
+
+def main(argv: list[str]) -> int:
+    """``esker bench fanout [--json] [--solve] [--floor]``."""
+    parser = argparse.ArgumentParser(prog="esker bench fanout", description=__doc__)
+    parser.add_argument("--clients", type=int, default=60)
+    parser.add_argument("--rate", type=float, default=20, help="ops a second of each client")
+    parser.add_argument("--seconds", type=float, default=15)
+    parser.add_argument("--data", type=Path, help="where the database is made (default: the temporary folder)")
+    parser.add_argument("--solve", action="store_true", help="measure again with the solver at work")
+    parser.add_argument("--floor", action="store_true", help="measure a bare relay too")
+    parser.add_argument("--json", action="store_true", help="print the result as JSON")
+    parser.add_argument("--relay", type=int, help=argparse.SUPPRESS)
+    arguments = parser.parse_args(argv)
+    if arguments.relay is not None:
+        with suppress(KeyboardInterrupt):
+            uvloop.run(_relay(arguments.relay))
+        return 0
+    result: dict[str, Any] = {
+        "bench": "fanout",
+        "version": VERSION,
+        "machine": _machine(),
+        "scene": {"clients": arguments.clients, "ops_per_s_each": arguments.rate, "seconds": arguments.seconds},
+        "esker": _measure(arguments, show=False),
+    }
+    if arguments.solve:
+        result["esker_while_solving"] = _measure(arguments, show=True)
+    if arguments.floor:
+        result["bare_relay"] = _measure_floor(arguments)
+    if arguments.json:
+        sys.stdout.write(json.dumps(result, indent=1) + "\n")
+    else:
+        for name in ("esker", "esker_while_solving", "bare_relay"):
+            for key, value in result.get(name, {}).items():
+                sys.stdout.write(f"{name}.{key}: {value}\n")
+    return 0

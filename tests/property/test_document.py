@@ -1,0 +1,231 @@
+"""Random ops on a document and everybody's undo, as a state machine (SPEC D1 to D21)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import hypothesis.strategies as st
+from hypothesis import HealthCheck, given, settings
+from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
+
+from esker import contract as c
+from esker.document.ops import Limits, Refusal, StrokeSet
+from esker.document.strokes import bounds
+from esker.document.undo import STROKE_WORDS, UndoStack, inverse
+from esker.document.wire import op_json
+from esker.grid import Rect
+
+PEOPLE = ("ada", "bob", "eve")
+IDS = tuple(f"s{i}" for i in range(4))
+LIMITS = Limits(strokes=4, points=6)
+
+metres = st.floats(-50_000, 50_000, allow_nan=False).map(lambda x: round(x, 3))
+near = st.floats(0, 4096).map(lambda x: round(x, 3))
+vec = st.tuples(near, near, near)
+curve = st.lists(st.tuples(st.floats(-1, 2), st.floats(-300, 300)), max_size=7).map(tuple)
+flank = st.one_of(
+    st.none(),
+    st.builds(
+        c.Flank,
+        slope_deg=st.one_of(st.none(), st.floats(0, 85)),
+        extent_m=st.floats(0, 1000),
+        shape=st.sampled_from(("straight", "concave", "convex")),
+    ),
+)
+stroke_id = st.sampled_from(IDS)
+strokes = st.builds(
+    c.Stroke,
+    id=stroke_id,
+    kind=st.sampled_from(("profile", "level")),
+    first=vec,
+    last=vec,
+    curve=curve,
+    left=flank,
+    right=flank,
+    hidden=st.booleans(),
+    locked=st.just(False),
+)
+field_values: dict[str, st.SearchStrategy[Any]] = {
+    "first": vec,
+    "last": st.one_of(vec, st.tuples(metres, metres, metres)),
+    "curve": curve,
+    "left": flank,
+    "right": flank,
+    "plateau_radius_m": st.floats(0, 500),
+    "amplitude_m": st.floats(0, 50),
+    "roughness": st.floats(0, 1),
+    "locked": st.booleans(),
+    "hidden": st.booleans(),
+    "label": st.sampled_from(("", "a", "b", "山")),
+}
+fields = st.sets(st.sampled_from(sorted(field_values)), max_size=4).flatmap(
+    lambda names: st.fixed_dictionaries({n: field_values[n] for n in sorted(names)})
+)
+terrain_fields = st.fixed_dictionaries(
+    {},
+    optional={
+        "title": st.sampled_from(("x", "y")),
+        "reach_m": st.one_of(st.none(), st.floats(1, 1000)),
+        "sea_level_m": st.one_of(st.none(), st.floats(-10, 10)),
+        "border": st.sampled_from(("free", "pinned")),
+        "seed": st.integers(0, 2**32 - 1),
+    },
+)
+simple = st.one_of(
+    st.builds(c.BeginStroke, stroke=strokes),
+    st.builds(c.AppendPoints, stroke=stroke_id, start=st.integers(0, 7), points=curve, last=vec),
+    st.builds(c.FinishStroke, stroke=stroke_id),
+    st.builds(c.SetStroke, stroke=stroke_id, fields=fields.map(c.StrokeFields.model_validate)),
+    st.builds(c.MoveAnchor, stroke=stroke_id, which=st.sampled_from(("first", "last")), to=vec),
+    st.builds(c.DeleteStroke, stroke=stroke_id),
+    st.builds(c.RestoreStroke, stroke=stroke_id),
+    st.builds(c.SetTerrain, fields=terrain_fields.map(c.TerrainFields.model_validate)),
+)
+ops = st.one_of(simple, st.lists(simple, min_size=1, max_size=4).map(lambda parts: c.Group(ops=tuple(parts))))
+
+
+def _state(document: StrokeSet) -> dict[str, object]:
+    """The whole content, field by field. ``finished`` is progress, not content: undo leaves it."""
+    found: dict[str, object] = {f"terrain.{k}": v for k, v in document.settings}
+    for place, some in (("live", document.strokes), ("deleted", document.deleted)):
+        for stroke in some.values():
+            found[f"{stroke.id}.state"] = place
+            found |= {f"{stroke.id}.{name}": getattr(stroke, name) for name in STROKE_WORDS}
+    return found
+
+
+@given(op=ops)
+def test_ops_survive_the_wire(op: c.Op) -> None:
+    text = op_json(op)
+    again = c.OP.validate_json(text)
+    assert again == op
+    assert op_json(again) == text
+    if isinstance(op, c.SetStroke | c.SetTerrain):
+        assert again.fields.model_fields_set == op.fields.model_fields_set
+
+
+@settings(suppress_health_check=[HealthCheck.too_slow], deadline=None)
+@given(before=st.lists(ops, max_size=12), op=ops)
+def test_an_inverse_takes_back_exactly_its_op(before: list[c.Op], op: c.Op) -> None:
+    document = StrokeSet("t")
+    for one in before:
+        document = _try(document, one) or document
+    after = _try(document, op)
+    if after is None:
+        return
+    back = after
+    for one in inverse(op, document):
+        back, _ = back.apply(one)
+    assert back.strokes.keys() == document.strokes.keys()
+    expected = _state(document)
+    for key, value in _state(back).items():
+        if key in expected and not _in_tombstone(key, document):
+            assert value == expected[key], key
+
+
+def _in_tombstone(key: str, document: StrokeSet) -> bool:
+    """What a deleted stroke holds inside is nobody's concern, only that it is deleted."""
+    stroke, _, name = key.partition(".")
+    return name != "state" and stroke in document.deleted
+
+
+def _try(document: StrokeSet, op: c.Op) -> StrokeSet | None:
+    try:
+        return document.apply(op, LIMITS)[0]
+    except Refusal:
+        return None
+
+
+def _apply(document: StrokeSet, op: c.Op) -> tuple[StrokeSet, Rect | None] | Refusal:
+    try:
+        return document.apply(op, LIMITS)
+    except Refusal as refusal:
+        return refusal
+
+
+class Session(RuleBasedStateMachine):
+    """Three people on one document, each with an undo stack."""
+
+    @initialize()
+    def start(self) -> None:
+        born = (c.Stroke(id=i, kind="profile", first=(0, 0, 0), last=(9, 9, 9), curve=((0, 0),)) for i in IDS[:3])
+        self.document = StrokeSet("t", strokes={stroke.id: stroke for stroke in born})
+        self.stacks = {name: UndoStack() for name in PEOPLE}
+        self.claims: dict[tuple[str, str], set[str]] = {}
+        """Who ever gave a field this value, by their own hand or by taking something back."""
+
+    def _note(self, who: str, before: StrokeSet, after: StrokeSet) -> None:
+        old, new = _state(before), _state(after)
+        for key in old.keys() | new.keys():
+            if old.get(key) != new.get(key):
+                self.claims.setdefault((key, repr(new.get(key))), set()).add(who)
+
+    @rule(who=st.sampled_from(PEOPLE), op=ops, gesture=st.sampled_from((None, "g1", "g2")))
+    def act(self, who: str, op: c.Op, gesture: str | None) -> None:
+        before = self.document
+        frozen = before.to_document()
+        applied = _apply(before, op)
+        assert before.to_document() == frozen, "apply never changes its operand, refused or not"
+        if isinstance(applied, Refusal):
+            assert len(applied.message) > 10
+            return
+        after, dirty = applied
+        assert after.clock == before.clock + 1
+        self._check_dirty(before, after, dirty)
+        self.stacks[who].record(before, op, after, gesture)
+        self._note(who, before, after)
+        self.document = after
+
+    def _check_dirty(self, before: StrokeSet, after: StrokeSet, dirty: Rect | None) -> None:
+        """Whatever constrains the ground differently lies in the dirty rectangle."""
+        for stroke in before.strokes.keys() | after.strokes.keys():
+            old, new = before.strokes.get(stroke), after.strokes.get(stroke)
+            if old == new:
+                continue
+            for rect in (bounds(s) for s in (old, new) if s is not None):
+                if rect is not None:
+                    assert dirty is not None
+                    assert dirty.x0 <= rect.x0
+                    assert dirty.y0 <= rect.y0
+                    assert dirty.x1 >= rect.x1
+                    assert dirty.y1 >= rect.y1
+
+    @rule(who=st.sampled_from(PEOPLE), stroke=stroke_id, name=st.sampled_from(("label", "first")), n=st.integers(0, 2))
+    def contend(self, who: str, stroke: str, name: str, n: int) -> None:
+        """Few fields, few values: people get in each other's way."""
+        value: object = str(n) if name == "label" else (float(n), 0.0, 0.0)
+        self.act(who, c.SetStroke(stroke=stroke, fields=c.StrokeFields.model_validate({name: value})), None)
+
+    @rule(who=st.sampled_from(PEOPLE), redo=st.booleans())
+    def travel(self, who: str, redo: bool) -> None:
+        before = self.document
+        stack = self.stacks[who]
+        plan = stack.redo(before) if redo else stack.undo(before)
+        after = before
+        for op in plan.ops:
+            after, _ = after.apply(op)  # limits of the room may refuse a restore; the plan itself must be sound
+        old, new = _state(before), _state(after)
+        for key in old.keys() & new.keys():
+            if old[key] != new[key] and not key.endswith(".state"):
+                claimed = self.claims.get((key, repr(old[key])), set())
+                assert who in claimed, f"{who} took back {key} = {old[key]}, which {claimed or 'nobody'} wrote"
+        if len(after.strokes) > LIMITS.strokes:
+            return
+        self._note(who, before, after)
+        self.document = after
+
+    @invariant()
+    def sound(self) -> None:
+        if not hasattr(self, "document"):
+            return
+        assert not self.document.strokes.keys() & self.document.deleted.keys()
+        assert len(self.document.strokes) <= LIMITS.strokes
+        assert all(len(s.curve) <= LIMITS.points for s in self.document.strokes.values())
+        text = self.document.to_document().model_dump_json()
+        assert StrokeSet.from_document(c.Document.model_validate_json(text)) == self.document
+
+
+Session.TestCase.settings = settings(
+    max_examples=50, stateful_step_count=30, deadline=None, suppress_health_check=[HealthCheck.too_slow]
+)
+TestSession = Session.TestCase
