@@ -1,4 +1,4 @@
-// Dependencies point one way (DESIGN 2): generated <- core <- {doc, net, tiles} <- {input, gpu} <- ui <- main.
+// Dependencies point one way (SPEC H2): generated <- core <- {doc, net, tiles} <- {input, gpu} <- ui <- main.
 import { readdirSync, readFileSync } from "node:fs";
 import { dirname, join, relative, resolve } from "node:path";
 import { describe, expect, it } from "vitest";

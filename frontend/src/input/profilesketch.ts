@@ -27,6 +27,15 @@ const DIRECTION_PX = 10;
 /** Anchors closer than this share of the length of the line make no usable frame. */
 const CLOSED = 0.05;
 
+/** A climb below this share of the canvas height is a line along the ground, not a pen in the air. */
+const CLIMB = 0.015;
+/**
+ * Share of its climb that the pen must have come back before its ray's end on the ground counts: much while it moves,
+ * so that saddles between peaks do not swing the plane; less at the end, so that a ridge may end on farther ground.
+ */
+const BACK_LIVE = 0.6;
+const BACK_END = 0.25;
+
 export type Sense = "up" | "down";
 
 export class ProfileSketch implements Sketch {
@@ -45,6 +54,8 @@ export class ProfileSketch implements Sketch {
   #turnedAt: number;
   /** Side of the line of sight on which the plane was last: it does not flicker across. */
   #side: 1 | -1 = 1;
+  /** Farthest way of the pen on the screen from its start to the tool's side, device pixels. */
+  #climb = 0;
 
   constructor(start: SketchStart, sense: Sense) {
     this.#camera = start.camera;
@@ -74,10 +85,11 @@ export class ProfileSketch implements Sketch {
 
   add(sample: Sample): void {
     this.#samples.push(sample);
+    this.#climb = Math.max(this.#climb, this.#way(sample));
   }
 
   shape(nowMs: number, exact: boolean, most: number): SketchShape {
-    this.#aim();
+    this.#aim(exact);
     const rested = 1 - Math.exp(-Math.max(0, nowMs - this.#turnedAt) / TURN_TAU_MS);
     this.#angle += turn(this.#angle, this.#target) * (exact ? 1 : rested);
     this.#turnedAt = nowMs;
@@ -125,9 +137,9 @@ export class ProfileSketch implements Sketch {
   }
 
   /** Turns the plane toward where the pen is now. */
-  #aim(): void {
+  #aim(exact: boolean): void {
     const sample = this.#samples.at(-1)!;
-    const end = this.#end(sample.ray);
+    const end = this.#end(sample.ray, this.#inTheAir(sample, exact));
     if (end === null) return;
     const metresPerPixel =
       (2 * this.#firstRange * Math.tan(0.5 * DEG * this.#camera.state.value.fovDeg)) / this.#camera.state.value.height;
@@ -135,9 +147,24 @@ export class ProfileSketch implements Sketch {
     this.#target = this.#clampToSight(Math.atan2(end[1] - this.#first[1], end[0] - this.#first[0]));
   }
 
-  /** Where the pen's ray ends on the ground; over the horizon or far behind it, the drop of the pen's point. */
-  #end(ray: Ray): Vec3 | null {
-    const hit = this.#ground.raycast(ray);
+  /** How far the sample lies from the start to the tool's side on the screen: up for a mountain, down for a crevice. */
+  #way(sample: Sample): number {
+    const up = this.#samples[0]!.y - sample.y;
+    return this.#sense === "up" ? up : -up;
+  }
+
+  /**
+   * Whether the pen is over a silhouette rather than over its end: it has climbed and not come back. The ground behind
+   * it is then only background: a plane through it would lay the line flat on that ground (docs/decisions).
+   */
+  #inTheAir(sample: Sample, exact: boolean): boolean {
+    if (this.#climb < CLIMB * this.#camera.state.value.height) return false;
+    return this.#climb - this.#way(sample) < (exact ? BACK_END : BACK_LIVE) * this.#climb;
+  }
+
+  /** Where the pen's ray ends on the ground; in the air or far behind, the drop of the pen's point. */
+  #end(ray: Ray, inTheAir: boolean): Vec3 | null {
+    const hit = inTheAir ? null : this.#ground.raycast(ray);
     if (hit !== null && distance(ray.origin, hit) <= FAR_HIT * this.#firstRange) return hit;
     const facing: Vec3 = [this.#sight[0], this.#sight[1], 0];
     const t = rayPlane(ray, this.#first, facing);

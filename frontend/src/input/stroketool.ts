@@ -40,9 +40,9 @@ const FINAL_POINTS = Math.min(2048, MAX_POINTS_PER_STROKE);
 const STEEP = Math.sin((78 * Math.PI) / 180);
 
 const COLOURS: Readonly<Record<DrawToolId, Rgba>> = {
-  mountain: [0.25, 0.5, 0.95, 0.22],
-  crevice: [0.2, 0.65, 0.8, 0.22],
-  plateau: [0.95, 0.4, 0.3, 0.22],
+  mountain: [0.25, 0.5, 0.95, 1],
+  crevice: [0.2, 0.65, 0.8, 1],
+  plateau: [0.95, 0.4, 0.3, 1],
 };
 
 interface Session {

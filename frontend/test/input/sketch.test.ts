@@ -117,16 +117,50 @@ describe("mountains (SPEC I10)", () => {
     expect(Math.abs(depth(end) - depth(shape.first)) / depth(shape.first)).toBeLessThan(0.15);
   });
 
+  it("a silhouette before far ground rises while it is drawn, and ends exactly (SPEC I18)", () => {
+    const c = camera();
+    const tall: readonly Vec3[] = [
+      [1400, 1500, 0],
+      [1700, 1600, 300],
+      [2000, 1700, 420],
+      [2300, 1800, 250],
+      [2600, 1900, 0],
+    ];
+    const peak = c.project(tall[2]!);
+    expect(FLAT.raycast(c.ray(peak.x, peak.y))).not.toBeNull(); // the pen is over ground all the time
+    const sketch = new ProfileSketch(startAt(c, FLAT, tall[0]!), "up");
+    draw(sketch, c, tall.slice(0, 3));
+    const highest = (s: SketchShape): number => Math.max(...triples(s).map((p) => p[2]));
+    expect(highest(sketch.shape(500, false, 500))).toBeGreaterThan(300);
+    draw(sketch, c, tall.slice(2));
+    const done = sketch.shape(1500, true, 500);
+    expect(distance(done.last, tall[4]!)).toBeLessThan(5);
+    expect(highest(done)).toBeCloseTo(420, -1);
+  });
+
+  it("a ridge may end on farther ground, higher on the screen", () => {
+    const c = camera();
+    const deep: readonly Vec3[] = [
+      [1700, 1200, 0],
+      [1900, 1700, 800],
+      [2300, 2700, 0],
+    ];
+    const sketch = new ProfileSketch(startAt(c, FLAT, deep[0]!), "up");
+    draw(sketch, c, deep);
+    expect(c.project(deep[2]!).y).toBeLessThan(c.project(deep[0]!).y);
+    expect(distance(sketch.shape(1500, true, 500).last, deep[2]!)).toBeLessThan(5);
+  });
+
   it("the plane stays 20° off the line of sight (SPEC I13)", () => {
     const c = camera();
     for (const dx of [-30, 30]) {
-      const sketch = new ProfileSketch(startAt(c, FLAT, [2048, 1000, 0]), "up");
+      const sketch = new ProfileSketch(startAt(c, FLAT, [2048, 2200, 0]), "up");
       draw(sketch, c, [
-        [2048, 1000, 0],
-        [2048 + dx, 2600, 0],
+        [2048, 2200, 0],
+        [2048 + dx, 900, 0],
       ]);
       const shape = sketch.shape(1000, true, 2000);
-      const sight = [2048 - c.state.value.eye[0], 1000 - c.state.value.eye[1]];
+      const sight = [2048 - c.state.value.eye[0], 2200 - c.state.value.eye[1]];
       const d = [shape.last[0] - shape.first[0], shape.last[1] - shape.first[1]];
       const cross = Math.abs(sight[0]! * d[1]! - sight[1]! * d[0]!) / Math.hypot(...sight) / Math.hypot(...d);
       expect(Math.asin(Math.min(1, cross)) * (180 / Math.PI)).toBeGreaterThan(19);
@@ -141,11 +175,11 @@ describe("mountains (SPEC I10)", () => {
       [2100, 1500, 0],
     ]);
     sketch.shape(0, true, 500);
-    sketch.add(sampleOf(c, [2100, 2300, 0]));
-    const heading = (s: SketchShape): number => Math.atan2(s.last[1] - s.first[1], s.last[0] - s.first[0]);
+    sketch.add(sampleOf(c, [2100, 900, 0]));
+    const heading = (s: SketchShape): number => Math.atan2(s.first[1] - s.last[1], s.last[0] - s.first[0]);
     const steps = Array.from({ length: 12 }, (_, i) => heading(sketch.shape(33 * (i + 1), false, 500)));
     const target = heading(sketch.shape(500, true, 500));
-    expect(target).toBeGreaterThan(0.85);
+    expect(target).toBeCloseTo(Math.PI / 4, 1);
     for (let i = 1; i < steps.length; i++) {
       expect(steps[i]!).toBeGreaterThan(steps[i - 1]!);
       expect(steps[i]! - steps[i - 1]!).toBeLessThan(0.5 * target);
