@@ -12,10 +12,11 @@ import pytest
 from numpy.typing import NDArray
 
 from esker import grid
-from esker.contract import FrameKind, View
+from esker.contract import FrameKind, Predictor, View
 from esker.grid import TileKey
 from esker.tiles.decoder import FrameDecoder
 from esker.tiles.delivery import ClientTiles, FramePlan, TileServer
+from esker.tiles.frame import read_frame
 
 SIZE_M = 512.0
 LEVELS = 4
@@ -244,7 +245,7 @@ def test_new_tiles_wait_where_their_ancestors_are_newer_and_only_there() -> None
     client.tiles.set_view(ABOVE)
     client.drain()
     fine = {(k.x, k.y) for k in client.decoder.held if k.level == 4}
-    # Level 0 moved up to its sample 31, in block 7 (4 cells: one fine tile); one block more holds back level 3's tile 4.
+    # Level 0 moved up to its sample 31, in block 7 (4 cells: one fine tile); a block more holds back level 3's tile 4.
     assert fine == {(x, y) for x in range(16) for y in range(16) if x > 9 or y > 9}
     solve(server, ground, 2, False, range(2, LEVELS + 1))
     client.drain()
@@ -310,6 +311,61 @@ def test_an_uncommitted_plan_changes_nothing_and_encodes_alike_in_any_thread() -
     assert again.level.level == 0
     assert again.level.clock == 2
     assert client.held() == {}
+
+
+def predictors(plan: FramePlan) -> list[Predictor]:
+    return [tile.predictor for tile in read_frame(plan.encode())[2]]
+
+
+def test_a_local_change_is_coded_as_a_change() -> None:
+    """The new tile is the old one moved along with its parent: what is left to send is small (SPEC T22)."""
+    server, ground = TileServer(SIZE_M, LEVELS), rough_everywhere()
+    ground.fine += np.random.default_rng(1).normal(size=ground.fine.shape).astype(np.float32)
+    client = Client(server)
+    solve(server, ground, 1, True, range(LEVELS + 1))
+    client.drain()
+    ground.fine[300:330, 300:330] += 3
+    solve(server, ground, 2, True, range(LEVELS + 1))
+    sizes = []
+    while client.begin():
+        assert client.waiting is not None
+        assert set(predictors(client.waiting)) <= {Predictor.PREVIOUS}
+        sizes.append(len(client.waiting.encode()))
+        client.finish()
+    client.check_newest()
+    assert sum(sizes) < 9000  # the same tiles coded afresh take 16 KB a level
+
+
+def test_a_client_far_behind_is_served_afresh() -> None:
+    """The server remembers a few past states only; tiles older than these are predicted from their parent."""
+    server, ground = TileServer(SIZE_M, LEVELS), Ground(random.Random(10))
+    for _ in range(5):
+        ground.edit()
+    solve(server, ground, 0, True, range(LEVELS + 1))
+    client = Client(server)
+    client.drain()
+    for clock in range(1, 12):
+        ground.fine += 1
+        solve(server, ground, clock, True, range(LEVELS + 1))
+    seen: set[Predictor] = set()
+    while client.begin():
+        assert client.waiting is not None
+        seen |= set(predictors(client.waiting))
+        client.finish()
+    client.check_newest()
+    assert seen == {Predictor.ZERO, Predictor.PARENT}
+
+
+def test_changes_beyond_32_bits_are_coded_afresh() -> None:
+    server = TileServer(SIZE_M, 1)
+    client = Client(server)
+    for clock, sign in enumerate((1, -1, 1)):
+        for level in range(2):
+            n = grid.samples(level)
+            stripes = np.where(np.arange(n) % 2 == 0, 1e30, -1e30).astype(np.float32) * sign
+            server.put_level(clock, level, np.broadcast_to(stripes, (n, n)).copy(), True)
+        client.drain()
+        client.check_newest()
 
 
 def test_nothing_changed_means_nothing_sent() -> None:

@@ -14,6 +14,7 @@ from esker.tiles.pyramid import Pyramid, quantise
 
 SIZE_M = 1024.0
 LEVELS = 3
+ROOT = TileKey(0, 0, 0)
 
 
 def heights(level: int, seed: int = 0, scale: float = 40.0) -> NDArray[np.float32]:
@@ -188,11 +189,11 @@ def test_levels_that_were_never_put_are_not_valid() -> None:
 def test_the_cache_of_coded_tiles_is_bounded_and_forgets_the_oldest() -> None:
     cache = EncodedTiles(limit=1000)
     for i in range(30):
-        cache.put((TileKey(0, 0, 0), i, 0), bytes(100))
-        assert cache.get((TileKey(0, 0, 0), 0, 0)) is not None  # used again and again, so it stays
+        cache.put((ROOT, i, 0, 0, 0), bytes(100))
+        assert cache.get((ROOT, 0, 0, 0, 0)) is not None  # used again and again, so it stays
     assert cache.bytes <= 1000
-    assert cache.get((TileKey(0, 0, 0), 1, 0)) is None
-    assert cache.get((TileKey(0, 0, 0), 29, 0)) is not None
+    assert cache.get((ROOT, 1, 0, 0, 0)) is None
+    assert cache.get((ROOT, 29, 0, 0, 0)) is not None
 
 
 def test_clients_share_coded_tiles() -> None:

@@ -158,6 +158,8 @@ def malformed() -> list[dict[str, str]]:
         "deflate bomb": retold(0, [TileRecord(0, 0, Predictor.ZERO, 1, 9, 0, _bomb())], []),
         "parent not held": retold(3, [TileRecord(0, 0, Predictor.PARENT, planes, 9, 1, payload)], []),
         "wrong parent version": patched(second, inner["base_version"], b"\x63\x00\x00\x00"),
+        "previous version not held": retold(1, [TileRecord(0, 0, Predictor.PREVIOUS, planes, 9, 77, payload)], []),
+        "previous of a tile not held": retold(2, [TileRecord(0, 0, Predictor.PREVIOUS, planes, 9, 1, payload)], []),
         "root predicted from a parent": patched(first, inner["predictor"], bytes([Predictor.PARENT])),
         "tile twice": retold(0, [flat, flat], []),
         "tile sent and dropped": retold(0, [flat], [(0, 0)]),

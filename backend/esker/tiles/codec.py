@@ -75,6 +75,23 @@ def child_window(prediction: Wide, x: int, y: int) -> Wide:
     return prediction[..., r : r + TILE_SAMPLES, c : c + TILE_SAMPLES]
 
 
+def follow(samples: Ints, then: Ints | None, now: Ints | None, x: int, y: int) -> Wide:
+    """A tile predicted from its previous samples: moved along with its parent, (65, 65) int64, |result| < 2^32.
+
+    ``then`` and ``now`` are the parent's 65x65 samples when ``samples`` were new and at present; both predictions are
+    rounded as in ``predict``. None, or the same array twice: the parent has not moved.
+    """
+    if then is None or now is None or then is now:
+        return samples.astype(np.int64)
+    before, after = (child_window(predict(p), x, y).astype(np.int64) for p in (then, now))
+    return np.asarray(samples + after - before)
+
+
+def cost(residual: Wide) -> float:
+    """Roughly the bits that a residual will take: enough to choose between two predictors."""
+    return float(np.log2(np.abs(residual).astype(np.float32) + 1).sum())
+
+
 def zigzag(residual: Wide) -> NDArray[np.uint32]:
     """0, -1, 1, -2, 2 ... -> 0, 1, 2, 3, 4 ...; residuals must fit in int32."""
     r = residual.astype(np.int32)

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from esker.contract import FrameKind, Predictor
 from esker.grid import TileKey
-from esker.tiles.codec import CodecError, Ints, child_window, predict, reconstruct, unpack
+from esker.tiles.codec import CodecError, Ints, Wide, child_window, follow, predict, reconstruct, unpack
 from esker.tiles.frame import FrameError, FrameHead, TileRecord, read_frame
 
 
 @dataclass(frozen=True)
 class HeldTile:
-    """A tile as the server last sent it: 65x65 int32 quanta of its level, read-only."""
+    """A tile as the server last sent it: 65x65 int32 quanta of its level, read-only.
+
+    ``parent_then``: the parent's samples when the tile was last sent or confirmed by a LEVEL frame; None at level 0.
+    """
 
     version: int
     samples: Ints
+    parent_then: Ints | None
 
 
 @dataclass(frozen=True)
@@ -52,18 +56,28 @@ class FrameDecoder:
             if key in dropped:
                 raise FrameError(f"tile {tuple(key)} is both sent and dropped")
             try:
-                tiles[key] = HeldTile(record.version, self._samples(head, key, record))
+                tiles[key] = HeldTile(record.version, self._samples(head, key, record), self._parent(key))
             except CodecError as e:
                 raise FrameError(f"tile {tuple(key)}: {e}") from e
         if dropped:
             self.held = {k: v for k, v in self.held.items() if not _under(k, dropped, head.level)}
         self.held.update(tiles)
+        if head.kind == FrameKind.LEVEL:
+            for key, tile in self.held.items():
+                if key.level == head.level:
+                    self.held[key] = replace(tile, parent_then=self._parent(key))
         return DecodedFrame(head.kind, head.level, head.clock, head.settled, drops, tiles, len(data))
+
+    def _parent(self, key: TileKey) -> Ints | None:
+        found = self.held.get(key.parent()) if key.level else None
+        return None if found is None else found.samples
 
     def _samples(self, head: FrameHead, key: TileKey, record: TileRecord) -> Ints:
         residual = unpack(record.planes, record.payload)
         if record.predictor == Predictor.ZERO:
             samples = reconstruct(None, residual)
+        elif record.predictor == Predictor.PREVIOUS:
+            samples = reconstruct(self._previous(key, record), residual)
         else:
             parent = self.held.get(key.parent()) if head.level > 0 else None
             if parent is None:
@@ -76,6 +90,16 @@ class FrameDecoder:
             samples = reconstruct(child_window(predict(parent.samples), key.x, key.y), residual)
         samples.flags.writeable = False
         return samples
+
+    def _previous(self, key: TileKey, record: TileRecord) -> Wide:
+        held = self.held.get(key)
+        if held is None:
+            raise FrameError(f"tile {tuple(key)} is predicted from itself but not held")
+        if held.version != record.base_version:
+            raise FrameError(
+                f"tile {tuple(key)} is predicted from its version {record.base_version}, not from {held.version}"
+            )
+        return follow(held.samples, held.parent_then, self._parent(key), key.x, key.y)
 
 
 def _under(key: TileKey, dropped: set[TileKey], level: int) -> bool:

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import threading
 from collections import OrderedDict
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
@@ -23,16 +24,21 @@ from numpy.typing import NDArray
 
 from esker.contract import DEFAULT_LEVEL, FrameKind, Predictor, View
 from esker.grid import TileKey
-from esker.tiles.codec import Ints, child_window, pack, predict
+from esker.tiles.codec import Ints, Wide, child_window, cost, pack, predict
 from esker.tiles.frame import FrameHead, TileRecord, write_frame, write_tile
 from esker.tiles.pyramid import Counts, Level, Mask, Pyramid
 from esker.tiles.quadtree import ALWAYS, default_selection, select
 
 FILL_TILES: Final = 48
 """Most tiles in one FILL frame: about 64 KiB where a tile takes 1 to 1.5 KB."""
+SPARE_TILES: Final = 32
+"""Most tiles out of view that a LEVEL frame brings up to date rather than drops."""
 CACHE_BYTES: Final = 32 * 1024 * 1024
 
-CacheKey = tuple[TileKey, int, int]
+CacheKey = tuple[TileKey, int, int, int, int]
+"""Tile, its version, its parent's; and the versions of both that it may be predicted from instead, 0 for none."""
+Base = tuple[Level, Level | None]
+"""States of a level and of its parent in which a client holds a tile and the parent that belongs to it."""
 
 
 class EncodedTiles:
@@ -77,37 +83,59 @@ class FramePlan:
     parent: Level | None
     keys: tuple[TileKey, ...]
     drops: tuple[TileKey, ...]
+    bases: tuple[Base | None, ...]
+    """For each key: what the client holds of the same tile, where the server still knows it."""
     cache: EncodedTiles
 
     def encode(self) -> bytes:
         """The binary frame. Pure: the same plan always gives the same bytes."""
-        coded: dict[TileKey, bytes] = {}
-        missing: dict[TileKey | None, list[TileKey]] = {}
-        for key in self.keys:
-            found = self.cache.get(self._cache_key(key))
-            if found is None:
-                missing.setdefault(key.parent() if self.parent is not None else None, []).append(key)
-            else:
-                coded[key] = found
-        for parent, children in missing.items():
-            prediction = None if parent is None or self.parent is None else predict(_window(self.parent, parent))
-            for key in children:
-                samples = _window(self.level, key)
-                residual = samples if prediction is None else samples - child_window(prediction, key.x, key.y)
-                coded[key] = self._write(key, residual)
-                self.cache.put(self._cache_key(key), coded[key])
+        predictions: dict[tuple[int, TileKey], Wide] = {}
+
+        def predicted(level: Level, key: TileKey) -> Wide:
+            """All four children of one tile: predicted once, used by each of them."""
+            place = (id(level), key)
+            if place not in predictions:
+                predictions[place] = predict(_window(level, key))
+            return predictions[place]
+
+        coded = []
+        for key, base in zip(self.keys, self.bases, strict=True):
+            name = self._cache_key(key, base)
+            tile = self.cache.get(name)
+            if tile is None:
+                tile = self._write(key, base, predicted)
+                self.cache.put(name, tile)
+            coded.append(tile)
         head = FrameHead(self.kind, self.level.level, self.level.clock, self.level.settled)
-        return write_frame(head, [(d.x, d.y) for d in self.drops], [coded[key] for key in self.keys])
+        return write_frame(head, [(d.x, d.y) for d in self.drops], coded)
 
-    def _write(self, key: TileKey, residual: NDArray[np.signedinteger]) -> bytes:
+    def _write(self, key: TileKey, base: Base | None, predicted: Callable[[Level, TileKey], Wide]) -> bytes:
+        """Codes a tile with the cheaper of its predictors."""
+        samples = _window(self.level, key)
+        _, version, parent_version, held_version, _ = self._cache_key(key, base)
+        kind, base_version = Predictor.ZERO, 0
+        residual: Wide = samples.astype(np.int64)
+        moved: Wide | None = None
+        if self.parent is not None:
+            own = child_window(predicted(self.parent, key.parent()), key.x, key.y)
+            kind, base_version, residual = Predictor.PARENT, parent_version, samples - own.astype(np.int64)
+            if base is not None and base[1] is not None:
+                then = child_window(predicted(base[1], key.parent()), key.x, key.y)
+                moved = own.astype(np.int64) - then
+        if base is not None:
+            change: Wide = samples - _window(base[0], key).astype(np.int64)
+            change = change if moved is None else change - moved
+            if np.abs(change).max() < 1 << 31 and cost(change) < cost(residual):
+                kind, base_version, residual = Predictor.PREVIOUS, held_version, change
         planes, payload = pack(residual)
-        predictor = Predictor.ZERO if self.parent is None else Predictor.PARENT
-        _, version, base = self._cache_key(key)
-        return write_tile(TileRecord(key.x, key.y, predictor, planes, version, base, payload))
+        return write_tile(TileRecord(key.x, key.y, kind, planes, version, base_version, payload))
 
-    def _cache_key(self, key: TileKey) -> CacheKey:
-        base = 0 if self.parent is None else int(self.parent.versions[key.y >> 1, key.x >> 1])
-        return key, int(self.level.versions[key.y, key.x]), base
+    def _cache_key(self, key: TileKey, base: Base | None) -> CacheKey:
+        at, above = (key.y, key.x), (key.y >> 1, key.x >> 1)
+        parent = 0 if self.parent is None else int(self.parent.versions[above])
+        held = 0 if base is None else int(base[0].versions[at])
+        held_parent = 0 if base is None or base[1] is None else int(base[1].versions[above])
+        return key, int(self.level.versions[at]), parent, held, held_parent
 
 
 def _window(level: Level, key: TileKey) -> Ints:
@@ -155,6 +183,8 @@ class ClientTiles:
         n = tiles.levels + 1
         self._held: list[Counts] = [np.zeros((1 << level, 1 << level), dtype=np.uint32) for level in range(n)]
         """Version that the client holds, 0 for none."""
+        self._bases: list[Counts] = [np.zeros_like(held) for held in self._held]
+        """Version of the parent when the client's tile was last sent or confirmed: its decoder remembers that one."""
         self._stamps = [0] * n
         """The put of each level of which the client has, or needs, nothing more."""
         self._moved = [False] * n
@@ -224,10 +254,14 @@ class ClientTiles:
             rows = np.fromiter((k.y for k in plan.keys), dtype=np.intp, count=len(plan.keys))
             cols = np.fromiter((k.x for k in plan.keys), dtype=np.intp, count=len(plan.keys))
             held[rows, cols] = plan.level.versions[rows, cols]
+            if level:
+                self._bases[level][rows, cols] = self._held[level - 1][rows >> 1, cols >> 1]
         if plan.kind == FrameKind.LEVEL:
             self._stamps[level] = plan.level.stamp
             self._moved[level] = False
             self._settled[level] = plan.level.settled
+            if level:
+                self._bases[level] = self._held[level - 1].repeat(2, axis=0).repeat(2, axis=1)
             if plan.keys:
                 for below in range(level + 1, self._server.levels + 1):
                     self._moved[below] = True
@@ -267,7 +301,11 @@ class ClientTiles:
         if any(c is not None and c.changed > level.stamp for c in coarser):
             return None
         stale = held != level.versions
-        send = stale & self._wanted[index] & self._parents_held(index)
+        possible = stale & self._parents_held(index)
+        send = possible & self._wanted[index]
+        spare = possible & (held > 0) & ~send
+        if index <= self._rest_level and np.count_nonzero(spare) <= SPARE_TILES:
+            send |= spare  # a change costs little; dropped, the whole tile would be sent again at rest
         drop = stale & (held > 0) & ~send
         preview = self._moved[index] or level.settled != self._settled[index]
         if not send.any() and not drop.any() and not preview:
@@ -295,7 +333,25 @@ class ClientTiles:
 
     def _frame(self, kind: FrameKind, level: Level, keys: list[TileKey], drops: list[TileKey]) -> FramePlan:
         parent = self._server.pyramid.level(level.level - 1) if level.level else None
-        return FramePlan(kind, level, parent, tuple(keys), tuple(drops), self._server.cache)
+        return FramePlan(
+            kind, level, parent, tuple(keys), tuple(drops), self._known(level.level, keys), self._server.cache
+        )
+
+    def _known(self, level: int, keys: list[TileKey]) -> tuple[Base | None, ...]:
+        """For each tile the states in which the client holds it and its parent, as far as the server remembers them."""
+        held = self._held[level]
+        if not any(held[k.y, k.x] for k in keys):
+            return (None,) * len(keys)
+        own = self._server.pyramid.states(level)
+        bases = self._bases[level]
+        above = self._server.pyramid.states(level - 1) if level else []
+        found: list[Base | None] = []
+        for k in keys:
+            at, up = (k.y, k.x), (k.y >> 1, k.x >> 1)
+            tile = next((state for state in own if state.versions[at] == held[at]), None)
+            parent = next((state for state in above if state.versions[up] == bases[at]), None)
+            found.append(None if tile is None or (level and parent is None) else (tile, parent))
+        return tuple(found)
 
 
 def _keys(level: int, mask: Mask) -> list[TileKey]:

@@ -41,7 +41,10 @@ class FrameHead:
 
 @dataclass(frozen=True)
 class TileRecord:
-    """One coded tile, with the header's fields by name. ``base_version`` is 0 for ``Predictor.ZERO``."""
+    """One coded tile, with the header's fields by name.
+
+    ``base_version``: of the parent for ``Predictor.PARENT``, of the same tile as held for ``PREVIOUS``, 0 for ``ZERO``.
+    """
 
     x: int
     y: int
@@ -124,7 +127,7 @@ def _head(start: np.void) -> FrameHead:
 
 
 def _record(h: np.void, payload: memoryview) -> TileRecord:
-    if h["predictor"] not in (Predictor.ZERO, Predictor.PARENT):
+    if h["predictor"] not in tuple(Predictor):
         raise FrameError(f"unknown predictor {h['predictor']}")
     return TileRecord(
         x=int(h["x"]),

@@ -6,6 +6,7 @@ Heights are int32 in quanta ``q_l = s_l / 256``, ``[row, col]``, row 0 south.
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -62,6 +63,11 @@ def quantise(heights: NDArray[np.float32], level: int, size_m: float, kept: Ints
     return np.asarray(np.where(moved, np.rint(steps), kept), dtype=np.int32)
 
 
+def _depth(level: int) -> int:
+    """Past states kept of a level: up to six, and no more than 64 MiB."""
+    return max(1, min(6, (64 << 20) // (4 * grid.samples(level) ** 2)))
+
+
 class Pyramid:
     """The newest quantised levels of one terrain. Mutable; owned by ``delivery.TileServer``."""
 
@@ -75,6 +81,7 @@ class Pyramid:
         self._levels: list[Level | None] = [None] * (levels + 1)
         self._subs = [SubPatches(level) for level in range(levels + 1)]
         self._dirty: list[Mask] = [np.zeros((1 << level, 1 << level), dtype=np.bool_) for level in range(levels + 1)]
+        self._past: list[deque[Level]] = [deque(maxlen=_depth(level)) for level in range(levels + 1)]
         self._steadiers = [Steadier() for _ in range(levels + 1)]
         self._previewed = -1
         """Clock of the newest preview of the finest level."""
@@ -84,6 +91,11 @@ class Pyramid:
         self._lineage_stamp = -1
         self._bounds: Bounds | None = None
         self._bounds_stamp = -1
+
+    def states(self, level: int) -> list[Level]:
+        """The level as it is and as it was before the last few changes, newest first."""
+        newest = self._levels[level]
+        return [] if newest is None else [newest, *self._past[level]]
 
     def level(self, level: int) -> Level | None:
         """The level as it is now, None before its first ``put``."""
@@ -115,6 +127,8 @@ class Pyramid:
         if old is not None and not count:
             self._levels[level] = replace(old, stamp=stamp, clock=clock, settled=settled)
         else:
+            if old is not None:
+                self._past[level].appendleft(old)
             samples.flags.writeable = False
             versions = np.where(changed, np.uint32(stamp), 0 if old is None else old.versions).astype(np.uint32)
             versions.flags.writeable = False

@@ -6,7 +6,7 @@
 import { inflateSync } from "fflate";
 import { subDistance, subRange } from "../core/bounds.ts";
 import { predictInts } from "../core/predict.ts";
-import { isUnder, parentKey, tileKey } from "../core/tilekey.ts";
+import { isUnder, keyLevel, parentKey, tileKey } from "../core/tilekey.ts";
 import type { DecodedFrame, DecodedTile } from "../core/types.ts";
 import {
   Channel,
@@ -57,7 +57,14 @@ interface TileHead {
 interface Held {
   readonly version: number;
   readonly samples: Int32Array;
+  /** The parent's samples when this tile was last sent or confirmed by a LEVEL frame; null at level 0. */
+  readonly parentThen: Int32Array | null;
 }
+
+/** A prediction, in float64: sums of 32-bit integers stay exact. */
+const base = new Float64Array(AREA);
+const before = new Int32Array(AREA);
+const after = new Int32Array(AREA);
 
 /** Keeps the exact samples of the tiles that the page holds, and applies frames to them in order. */
 export class FrameDecoder {
@@ -90,31 +97,38 @@ export class FrameDecoder {
       if (seen.has(key)) throw new FrameError("a tile occurs twice");
       if (dropped.has(key)) throw new FrameError("a tile is both sent and dropped");
       seen.add(key);
-      tiles.push(this.decodeTile(head.level, key, tile, new Uint8Array(buffer, at, tile.bytes)));
+      tiles.push(this.decodeTile(key, tile, new Uint8Array(buffer, at, tile.bytes)));
       at += tile.bytes;
     }
     if (at !== buffer.byteLength) throw new FrameError(`${buffer.byteLength - at} bytes follow the last tile`);
-    this.commit(head.level, dropped, tiles);
+    this.commit(head, dropped, tiles);
     const { kind, level, channel, clock, settled } = head;
     return { kind, level, channel, clock, settled, drops, tiles, bytes: buffer.byteLength };
   }
 
-  private commit(level: number, dropped: ReadonlySet<number>, tiles: readonly DecodedTile[]): void {
-    for (const gone of dropped) for (const key of this.held.keys()) if (isUnder(key, gone)) this.held.delete(key);
-    for (const t of tiles) this.held.set(tileKey(level, t.x, t.y), { version: t.version, samples: t.samples });
+  private commit(head: Head, dropped: ReadonlySet<number>, tiles: readonly DecodedTile[]): void {
+    const { held } = this;
+    for (const gone of dropped) for (const key of held.keys()) if (isUnder(key, gone)) held.delete(key);
+    for (const { x, y, version, samples } of tiles) {
+      const key = tileKey(head.level, x, y);
+      held.set(key, { version, samples, parentThen: this.parentSamples(key) });
+    }
+    if (head.kind !== FrameKind.LEVEL) return;
+    for (const [key, tile] of held) {
+      if (keyLevel(key) === head.level) held.set(key, { ...tile, parentThen: this.parentSamples(key) });
+    }
   }
 
-  private decodeTile(level: number, key: number, tile: TileHead, payload: Uint8Array): DecodedTile {
+  private parentSamples(key: number): Int32Array | null {
+    return keyLevel(key) > 0 ? (this.held.get(parentKey(key))?.samples ?? null) : null;
+  }
+
+  private decodeTile(key: number, tile: TileHead, payload: Uint8Array): DecodedTile {
     const samples = new Int32Array(AREA);
-    const parent = level > 0 ? this.held.get(parentKey(key)) : undefined;
-    if (tile.predictor === Predictor.PARENT) {
-      if (!parent) throw new FrameError("a tile is predicted from a parent that is not held");
-      if (parent.version !== tile.baseVersion)
-        throw new FrameError(
-          `a tile is predicted from version ${tile.baseVersion}, not ${parent.version}, of its parent`,
-        );
-      predictInts(parent.samples, tile.x, tile.y, samples);
-    }
+    const parent = this.parentSamples(key);
+    if (tile.predictor === Predictor.PARENT) this.predictFromParent(key, tile);
+    else if (tile.predictor === Predictor.PREVIOUS) this.predictFromPrevious(key, tile, parent);
+    else base.fill(0);
     addResidual(samples, inflatePlanes(payload, tile.planes), tile.planes);
     const subMin = new Int32Array(SUBS);
     const subMax = new Int32Array(SUBS);
@@ -122,10 +136,35 @@ export class FrameDecoder {
     subRange(samples, subMin, subMax);
     if (parent) {
       const distance = new Float64Array(SUBS);
-      subDistance(samples, parent.samples, 2, tile.x, tile.y, distance);
+      subDistance(samples, parent, 2, tile.x, tile.y, distance);
       for (let i = 0; i < SUBS; i++) subError[i] = Math.ceil(distance[i]! / 2);
     }
     return { x: tile.x, y: tile.y, version: tile.version, samples, subMin, subMax, subError };
+  }
+
+  private predictFromParent(key: number, tile: TileHead): void {
+    const parent = keyLevel(key) > 0 ? this.held.get(parentKey(key)) : undefined;
+    if (!parent) throw new FrameError("a tile is predicted from a parent that is not held");
+    if (parent.version !== tile.baseVersion)
+      throw new FrameError(
+        `a tile is predicted from version ${tile.baseVersion}, not ${parent.version}, of its parent`,
+      );
+    predictInts(parent.samples, tile.x, tile.y, after);
+    base.set(after);
+  }
+
+  /** The tile as it was, moved along with its parent since then. */
+  private predictFromPrevious(key: number, tile: TileHead, parent: Int32Array | null): void {
+    const held = this.held.get(key);
+    if (!held) throw new FrameError("a tile is predicted from itself but not held");
+    if (held.version !== tile.baseVersion)
+      throw new FrameError(`a tile is predicted from its version ${tile.baseVersion}, not from ${held.version}`);
+    base.set(held.samples);
+    const then = held.parentThen;
+    if (!then || !parent || then === parent) return;
+    predictInts(then, tile.x, tile.y, before);
+    predictInts(parent, tile.x, tile.y, after);
+    for (let i = 0; i < AREA; i++) base[i]! += after[i]! - before[i]!;
   }
 }
 
@@ -178,8 +217,7 @@ function readTileHead(view: DataView, at: number, level: number): TileHead {
     bytes: view.getUint32(at + f.bytes.offset, true),
   };
   checkPlace(level, tile.x, tile.y);
-  if (tile.predictor !== Predictor.ZERO && tile.predictor !== Predictor.PARENT)
-    throw new FrameError(`unknown predictor ${tile.predictor}`);
+  if (tile.predictor > Predictor.PREVIOUS) throw new FrameError(`unknown predictor ${tile.predictor}`);
   if (tile.planes < 1 || tile.planes > 4) throw new FrameError(`a tile has 1 to 4 byte planes, not ${tile.planes}`);
   if (tile.bytes > MAX_PAYLOAD) throw new FrameError(`a tile payload of ${tile.bytes} bytes is too large`);
   return tile;
@@ -202,14 +240,14 @@ function inflatePlanes(payload: Uint8Array, planes: number): Uint8Array {
   return raw;
 }
 
-/** Adds the zig-zag coded residual, lowest byte plane first, to the prediction in `samples`. */
+/** The prediction in `base` plus the zig-zag coded residual, lowest byte plane first. */
 function addResidual(samples: Int32Array, raw: Uint8Array, planes: number): void {
   for (let i = 0; i < AREA; i++) {
     let code = raw[i]!;
     if (planes > 1) code |= raw[AREA + i]! << 8;
     if (planes > 2) code |= raw[2 * AREA + i]! << 16;
     if (planes > 3) code |= raw[3 * AREA + i]! << 24;
-    const value = samples[i]! + ((code >>> 1) ^ -(code & 1));
+    const value = base[i]! + ((code >>> 1) ^ -(code & 1));
     if (value > SAMPLE_LIMIT || value < -SAMPLE_LIMIT) throw new FrameError("a tile sample is out of range");
     samples[i] = value;
   }
