@@ -57,6 +57,11 @@ export class EskSegmented extends LitElement {
         color: var(--esk-text);
         box-shadow: 0 1px 2px rgb(0 0 0 / 16%);
       }
+      @media (max-width: 460px) {
+        :host([compact]) button {
+          padding: 0 7px;
+        }
+      }
       button:disabled {
         cursor: default;
         opacity: 0.5;

@@ -1,8 +1,16 @@
 /** Where the terrain is seen and touched: tiles, camera, input, renderer and the loop that draws frames. */
 
-import { effect, signal } from "@preact/signals-core";
+import { computed, effect, type ReadonlySignal, signal } from "@preact/signals-core";
 import { Camera } from "../core/camera.ts";
-import type { DecodedFrame, FrameStats, Scene, SceneRenderer, Vec3 } from "../core/types.ts";
+import type {
+  CursorVisual,
+  DecodedFrame,
+  FrameStats,
+  Scene,
+  SceneRenderer,
+  StrokeVisual,
+  Vec3,
+} from "../core/types.ts";
 import type { MemberPresence } from "../generated/contract.ts";
 import { DEFAULT_TAU_PX } from "../generated/contract.ts";
 import { createMapRenderer, createRenderer, NoWebGpu } from "../gpu/index.ts";
@@ -46,6 +54,8 @@ export class Stage {
   readonly following = signal<string | null>(null);
   readonly stats = signal<FrameStats | null>(null);
   readonly #viewport: HTMLElement;
+  readonly #strokes: ReadonlySignal<readonly StrokeVisual[]>;
+  readonly #cursors: ReadonlySignal<readonly CursorVisual[]>;
   readonly #calm = window.matchMedia("(prefers-reduced-motion: reduce)");
   readonly #stops: (() => void)[] = [];
   #renderer: SceneRenderer | null = null;
@@ -76,6 +86,15 @@ export class Stage {
       onMessage: (text) => session.toasts.show(text),
       author: () => session.me.value.name,
     });
+    this.#strokes = computed(() => this.#visuals());
+    this.#cursors = computed(() => cursorVisuals(session.people.value));
+  }
+
+  #visuals(): StrokeVisual[] {
+    const doc = this.session.doc.doc.value;
+    const { selection, hovered, drawing } = this.input;
+    const marks = { selection: selection.value, hovered: hovered.value, drawing: drawing.value };
+    return doc ? strokeVisuals(doc, marks, this.session.people.value) : [];
   }
 
   /** Finds a renderer and starts drawing. */
@@ -174,11 +193,9 @@ export class Stage {
       effect(() => {
         this.tiles.revision.value;
         session.doc.doc.value;
-        session.people.value;
-        input.selection.value;
-        input.hovered.value;
+        this.#strokes.value;
+        this.#cursors.value;
         input.ghost.value;
-        input.drawing.value;
         this.overlay.value;
         this.showStrokes.value;
         this.loop.invalidate();
@@ -253,14 +270,13 @@ export class Stage {
     const moving = this.camera.update(dtS, this.tiles.ground);
     const doc = this.session.doc.doc.value;
     if (!this.#renderer || !doc) return moving;
-    const people = this.session.people.value;
     const stats = this.#renderer.render({
       camera: this.camera.state.value,
       tiles: this.tiles,
       settings: doc.settings,
-      strokes: strokeVisuals(doc, this.#marks(), people),
+      strokes: this.#strokes.value,
       ghost: this.input.ghost.value,
-      cursors: cursorVisuals(people),
+      cursors: this.#cursors.value,
       tauPx: DEFAULT_TAU_PX,
       time: this.#calm.matches ? 0 : timeS,
       overlay: this.overlay.value,
@@ -268,14 +284,6 @@ export class Stage {
     });
     this.stats.value = stats;
     return moving || stats.busy;
-  }
-
-  #marks(): { selection: string | null; hovered: string | null; drawing: string | null } {
-    return {
-      selection: this.input.selection.value,
-      hovered: this.input.hovered.value,
-      drawing: this.input.drawing.value,
-    };
   }
 }
 

@@ -204,12 +204,13 @@ export class EskTerrain extends SignalElement {
     const empty = (session.doc.doc.value?.strokes.size ?? 0) === 0;
     if (!empty || !session.canEdit.value || input.drawing.value !== null) return nothing;
     const drawn = flag(session.store, "drawn");
+    const ready = input.tool.value !== "select";
     const flat = stage.camera.state.value.mode === "map";
     const first = flat
       ? "Draw a ridge on the map — the ground rises along it."
       : "Draw a line across the land — the ground rises to meet it.";
     return html`<div class="hint panel">
-      ${icon("sketch")}<span>${drawn ? "An empty land. Draw a line." : first}</span>
+      ${icon("sketch")}<span>${ready ? (drawn ? "An empty land. Draw a line." : first) : "An empty land. Pick a tool and draw a line."}</span>
     </div>`;
   }
 

@@ -193,7 +193,7 @@ export const landingStyles = css`
     gap: 14px;
   }
   .cards {
-    grid-template-columns: repeat(auto-fill, minmax(min(200px, 100%), 1fr));
+    grid-template-columns: repeat(auto-fit, minmax(min(190px, 100%), 1fr));
   }
   .recents {
     grid-template-columns: repeat(auto-fill, minmax(min(280px, 100%), 1fr));

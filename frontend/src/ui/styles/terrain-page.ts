@@ -161,6 +161,7 @@ export const terrainPageStyles = css`
       transform: translateX(-50%);
     }
     .foot {
+      gap: 6px;
       bottom: calc(var(--edge) + 62px + env(safe-area-inset-bottom));
     }
     .side {
