@@ -1,8 +1,9 @@
 /** Plateaux on the horizontal plane of the first hit, and straight ridges on the map (DESIGN 12). */
 
+import type { Camera } from "../core/camera.ts";
 import { along, pathLength, rayPlane, simplifyTo } from "../core/geometry.ts";
 import { distance, distanceXY } from "../core/math.ts";
-import type { Ground, Vec3 } from "../core/types.ts";
+import type { Ground, Ray, Vec3 } from "../core/types.ts";
 import type { Sense } from "./profilesketch.ts";
 import {
   farthest,
@@ -11,6 +12,7 @@ import {
   type Sketch,
   type SketchShape,
   type SketchStart,
+  smoothedRay,
   smoothPixels,
 } from "./sketch.ts";
 
@@ -19,7 +21,7 @@ const FAR_POINT = 6;
 /** A line that comes back to within this share of its length is an outline. */
 const CLOSED = 0.25;
 
-/** The horizontal plane through the first hit, and the point of a sample's ray on it. */
+/** The horizontal plane through the first hit, and the point of a ray on it; null near the horizon. */
 class HorizontalPlane {
   readonly first: Vec3;
   readonly #range: number;
@@ -29,20 +31,22 @@ class HorizontalPlane {
     this.#range = distance(start.sample.ray.origin, start.hit);
   }
 
-  point(sample: Sample): Vec3 | null {
-    const t = rayPlane(sample.ray, this.first, [0, 0, 1]);
+  point(ray: Ray): Vec3 | null {
+    const t = rayPlane(ray, this.first, [0, 0, 1]);
     if (t === null || t > FAR_POINT * this.#range) return null;
-    const p = along(sample.ray, t);
+    const p = along(ray, t);
     return [p[0], p[1], this.first[2]];
   }
 }
 
 export class LevelSketch implements Sketch {
+  readonly #camera: Camera;
   readonly #plane: HorizontalPlane;
   readonly #samples: Sample[];
   readonly settling = false;
 
   constructor(start: SketchStart) {
+    this.#camera = start.camera;
     this.#plane = new HorizontalPlane(start);
     this.#samples = [start.sample];
   }
@@ -52,14 +56,17 @@ export class LevelSketch implements Sketch {
   }
 
   add(sample: Sample): void {
-    if (this.#plane.point(sample) !== null) this.#samples.push(sample);
+    if (this.#plane.point(sample.ray) !== null) this.#samples.push(sample);
   }
 
   shape(_nowMs: number, _exact: boolean, most: number): SketchShape {
     const { first } = this.#plane;
-    const kept = simplifyTo(smoothPixels(this.#samples), SIMPLIFY_PX, most);
+    const pixels = smoothPixels(this.#samples);
     const points: number[] = [...first];
-    for (const i of kept.slice(1)) points.push(...this.#plane.point(this.#samples[i]!)!);
+    for (const i of simplifyTo(pixels, SIMPLIFY_PX, most).slice(1)) {
+      const p = this.#plane.point(smoothedRay(this.#camera, this.#samples[i]!, pixels[2 * i]!, pixels[2 * i + 1]!));
+      if (p !== null) points.push(...p);
+    }
     const path = new Float64Array(points);
     const n = path.length;
     let last: Vec3 = [path[n - 3]!, path[n - 2]!, first[2]];
@@ -109,12 +116,12 @@ export class RidgeSketch implements Sketch {
   }
 
   add(sample: Sample): void {
-    if (this.#plane.point(sample) !== null) this.#samples.push(sample);
+    if (this.#plane.point(sample.ray) !== null) this.#samples.push(sample);
   }
 
   shape(): SketchShape {
     const { first } = this.#plane;
-    const end = this.#ground.raycast(this.#samples.at(-1)!.ray) ?? this.#plane.point(this.#samples.at(-1)!)!;
+    const end = this.#ground.raycast(this.#samples.at(-1)!.ray) ?? this.#plane.point(this.#samples.at(-1)!.ray)!;
     const last: Vec3 = [end[0], end[1], this.#ground.heightAt(end[0], end[1])];
     const height = this.#sign * RIDGE_HEIGHT * distanceXY(first, last);
     const points = new Float64Array(3 * RIDGE_POINTS);

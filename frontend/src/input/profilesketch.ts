@@ -11,6 +11,7 @@ import {
   type Sketch,
   type SketchShape,
   type SketchStart,
+  smoothedRay,
   smoothPixels,
 } from "./sketch.ts";
 
@@ -97,7 +98,8 @@ export class ProfileSketch implements Sketch {
     const kept = simplifyTo(pixels, SIMPLIFY_PX, most);
     const points: number[] = [...this.#first];
     for (const i of kept.slice(1)) {
-      const p = this.#project(this.#rayAt(pixels, i));
+      const ray = smoothedRay(this.#camera, this.#samples[i]!, pixels[2 * i]!, pixels[2 * i + 1]!);
+      const p = this.#project(ray);
       if (p !== null) points.push(...p);
     }
     const path = new Float64Array(points);
@@ -122,18 +124,6 @@ export class ProfileSketch implements Sketch {
       at(u1 + margin, z1 + margin),
       at(u0 - margin, z1 + margin),
     ];
-  }
-
-  /** The ray of a smoothed sample: its own, moved by the little that smoothing changed. */
-  #rayAt(pixels: Float64Array, i: number): Ray {
-    const s = this.#samples[i]!;
-    const dx = pixels[2 * i]! - s.x;
-    const dy = pixels[2 * i + 1]! - s.y;
-    if (dx === 0 && dy === 0) return s.ray;
-    const a = this.#camera.ray(s.x, s.y);
-    const b = this.#camera.ray(s.x + dx, s.y + dy);
-    const shifted = (v: Vec3, p: Vec3, q: Vec3): Vec3 => [v[0] + q[0] - p[0], v[1] + q[1] - p[1], v[2] + q[2] - p[2]];
-    return { origin: shifted(s.ray.origin, a.origin, b.origin), dir: shifted(s.ray.dir, a.dir, b.dir) };
   }
 
   /** Turns the plane toward where the pen is now. */

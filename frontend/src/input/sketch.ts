@@ -6,6 +6,7 @@
  */
 
 import type { Camera } from "../core/camera.ts";
+import { add, sub } from "../core/math.ts";
 import type { Ground, Ray, Vec3 } from "../core/types.ts";
 
 export interface Sample {
@@ -61,6 +62,15 @@ export function smoothPixels(samples: readonly Sample[]): Float64Array {
     out[2 * i + 1] = soft ? (before.y + 2 * s.y + after.y) / 4 : s.y;
   }
   return out;
+}
+
+/** The ray of a smoothed sample: its own, moved by the little that smoothing changed. */
+export function smoothedRay(camera: Camera, sample: Sample, x: number, y: number): Ray {
+  if (x === sample.x && y === sample.y) return sample.ray;
+  const a = camera.ray(sample.x, sample.y);
+  const b = camera.ray(x, y);
+  const { origin, dir } = sample.ray;
+  return { origin: add(origin, sub(b.origin, a.origin)), dir: add(dir, sub(b.dir, a.dir)) };
 }
 
 /**

@@ -123,6 +123,10 @@ export class StrokeTool {
   finish(): string | null {
     const session = this.#session;
     if (session === null) return null;
+    if (session.begun && session.sketch.shape(this.#o.now(), true, FINAL_POINTS).points.length < 6) {
+      this.cancel(); // nothing of the line could be projected
+      return null;
+    }
     if (session.begun) {
       this.#submitShape(session, true);
       if (this.#session !== null) this.#submit(session, { type: "stroke.finish", stroke: session.id });
