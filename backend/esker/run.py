@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import signal
 import socket
 import ssl
 import sys
@@ -144,6 +145,10 @@ class Assembly:
         """Serves until the server is told to stop."""
         if self._backups is not None:
             self._backups.start()
+        if threading.current_thread() is threading.main_thread():
+            # The HTTP server raises the signal that stopped it once more when it is done; by then it has been obeyed.
+            for number in (signal.SIGINT, signal.SIGTERM):
+                signal.signal(number, lambda *_: None)
         server.run(sockets=[self._listener])
 
     def close(self) -> None:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import random
 from typing import Any
 
 import hypothesis.strategies as st
+import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 
@@ -226,6 +228,32 @@ class Session(RuleBasedStateMachine):
 
 
 Session.TestCase.settings = settings(
-    max_examples=50, stateful_step_count=30, deadline=None, suppress_health_check=[HealthCheck.too_slow]
+    max_examples=120, stateful_step_count=30, deadline=None, suppress_health_check=[HealthCheck.too_slow]
 )
 TestSession = Session.TestCase
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_contention(seed: int) -> None:
+    """The same rules at random, but denser than a search for small examples makes them."""
+    rng = random.Random(seed)
+    session = Session()
+    session.start()
+    for n in range(150):
+        who, stroke = rng.choice(PEOPLE), rng.choice(IDS[:2])
+        roll = rng.random()
+        if roll < 0.3:
+            session.travel(who, redo=rng.random() < 0.3)
+        elif roll < 0.8:
+            session.contend(who, stroke, rng.choice(("label", "first")), n)
+        else:
+            name = rng.choice(("delete", "restore", "lock", "begin"))
+            born = c.Stroke(id=f"n{n}", kind="level", first=(n, 0, 0), last=(1, 1, 1), curve=())
+            choices: dict[str, c.Op] = {
+                "delete": c.DeleteStroke(stroke=stroke),
+                "restore": c.RestoreStroke(stroke=stroke),
+                "lock": c.SetStroke(stroke=stroke, fields=c.StrokeFields(locked=rng.random() < 0.3)),
+                "begin": c.BeginStroke(stroke=born),
+            }
+            session.act(who, choices[name], rng.choice((None, "g")))
+        session.sound()

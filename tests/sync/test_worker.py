@@ -1,0 +1,179 @@
+"""The solver's thread: newest job wins, nobody starves (SPEC P57 to P59; DESIGN 8)."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+
+from esker import contract as c
+from esker.session import worker as module
+from esker.session.worker import Job, Worker
+from tests.sync.harness import Level
+
+SETTINGS = c.TerrainSettings()
+FLAT = np.zeros((65, 65), dtype=np.float32)
+
+
+class Turnstile:
+    """A solver that makes one level each time the test lets it."""
+
+    device_name = "turnstile"
+
+    def __init__(self) -> None:
+        self.permits = threading.Semaphore(0)
+        self.closed: list[int] = []
+
+    def steps(
+        self, strokes: Sequence[c.Stroke], settings: c.TerrainSettings, levels: int | None = None
+    ) -> Iterator[Level]:
+        assert settings == SETTINGS
+        try:
+            for settled in (False, True):
+                for level in range((levels or 0) + 1):
+                    self.permits.acquire()
+                    yield Level(level, FLAT, settled)
+        finally:
+            self.closed.append(len(strokes))
+
+
+class Bench:
+    """A worker whose time is a number and whose deliveries are written down."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+        self.solver = Turnstile()
+        self.worker = Worker(lambda _: self.solver, now=lambda: self.now)
+        self.worker.start()
+        self.got: list[tuple[str, int, int, bool]] = []
+        self._arrived = threading.Condition()
+
+    def room(self, name: str, levels: int = 2) -> Any:
+        def deliver(clock: int, result: Any) -> None:
+            with self._arrived:
+                self.got.append((name, clock, result.level, result.settled))
+                self._arrived.notify()
+
+        return self.worker.add(levels, deliver, _unexpected)
+
+    def let(self, count: int) -> list[tuple[str, int, int, bool]]:
+        """Lets ``count`` levels be made; returns the deliveries so far."""
+        goal = len(self.got) + count
+        for _ in range(count):
+            self.solver.permits.release()
+        with self._arrived:
+            assert self._arrived.wait_for(lambda: len(self.got) >= goal, 5), self.got
+        return self.got
+
+    def idle(self) -> None:
+        """Waits until the worker stands at the turnstile or has nothing to do."""
+        time.sleep(0.02)
+
+    def stop(self) -> None:
+        self.solver.permits.release(100)
+        self.worker.stop()
+
+
+def _unexpected(clock: int, note: str) -> None:
+    raise AssertionError((clock, note))
+
+
+def _job(clock: int) -> Job:
+    return Job(clock, (), SETTINGS)
+
+
+def _bench(test: Callable[[Bench], None]) -> None:
+    bench = Bench()
+    try:
+        test(bench)
+    finally:
+        bench.stop()
+
+
+def test_levels_come_coarse_to_fine_then_settled() -> None:
+    def run(bench: Bench) -> None:
+        room = bench.room("a")
+        bench.worker.request(room, _job(1))
+        got = bench.let(6)
+        assert got == [("a", 1, level, settled) for settled in (False, True) for level in (0, 1, 2)]
+
+    _bench(run)
+
+
+def test_a_newer_job_stops_the_old_one_at_the_next_level() -> None:
+    def run(bench: Bench) -> None:
+        room = bench.room("a")
+        bench.worker.request(room, _job(1))
+        bench.let(4)  # the preview pass is through: the finest level was delivered just now
+        bench.idle()
+        bench.worker.request(room, _job(2))
+        bench.worker.request(room, _job(3))
+        got = bench.let(2)
+        # The level that was being made is delivered; then the newest job starts, the one between is skipped.
+        assert got[4:] == [("a", 1, 1, True), ("a", 3, 0, False)]
+
+    _bench(run)
+
+
+def test_drawing_without_a_pause_does_not_starve_the_fine_levels() -> None:
+    def run(bench: Bench) -> None:
+        room = bench.room("a")
+        bench.worker.request(room, _job(1))
+        bench.let(3)
+        finest: list[float] = [bench.now]
+        for clock in range(2, 40):
+            bench.worker.request(room, _job(clock))
+            bench.idle()
+            bench.now += 0.033
+            [*_, (_, _, level, _)] = bench.let(1)
+            if level == 2:
+                finest.append(bench.now)
+        gaps = np.diff(finest)
+        assert len(gaps) >= 4
+        assert max(gaps) <= module.FINEST_WITHIN + 4 * 0.033
+        coarse = [entry for entry in bench.got if entry[2] == 0]
+        assert len(coarse) > len(finest), "coarse levels still come more often than fine ones"
+
+    _bench(run)
+
+
+def test_rooms_take_turns() -> None:
+    def run(bench: Bench) -> None:
+        rooms = {name: bench.room(name) for name in "abc"}
+        for room in rooms.values():
+            bench.worker.request(room, _job(1))
+        got = bench.let(18)
+        # The first room may be a level ahead, as it asked first.
+        for count in range(3, 19):
+            made = [sum(entry[0] == name for entry in got[:count]) for name in rooms]
+            assert max(made) - min(made) <= 2, got
+
+    _bench(run)
+
+
+def test_a_closed_room_gets_nothing_more() -> None:
+    def run(bench: Bench) -> None:
+        room, other = bench.room("a"), bench.room("b")
+        bench.worker.request(room, _job(1))
+        bench.let(1)
+        bench.idle()
+        bench.worker.remove(room)
+        bench.solver.permits.release()
+        bench.idle()
+        bench.worker.request(other, _job(1))
+        bench.let(2)
+        assert [entry[0] for entry in bench.got] == ["a", "b", "b"]
+
+    _bench(run)
+
+
+def test_a_solver_that_cannot_be_made_is_an_error_at_the_start() -> None:
+    def broken(_: str | None) -> Any:
+        raise RuntimeError("no device")
+
+    with pytest.raises(RuntimeError, match="no device"):
+        Worker(broken).start()

@@ -1,0 +1,153 @@
+"""The command line: start, refusals at the start, stop (SPEC P60 to P64, J8)."""
+
+from __future__ import annotations
+
+import re
+import signal
+import socket
+import subprocess
+import sys
+import tomllib
+import urllib.request
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from esker import cli
+from esker.tls import authority, names, server_context
+from esker.version import VERSION
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def _esker(*arguments: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "esker", *arguments]
+    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=60)
+
+
+@contextmanager
+def _serving(*arguments: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """A server process and the link that it printed."""
+    command = [sys.executable, "-m", "esker", "serve", "--port", "0", "--device", "numpy", *arguments]
+    with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout is not None
+            for line in process.stdout:
+                found = re.search(r"https?://\S+/t/\S+#\S+", line)
+                if found:
+                    yield process, found.group()
+                    break
+            else:
+                assert process.stderr is not None
+                pytest.fail(process.stderr.read())
+        finally:
+            process.kill()
+
+
+def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as caught:
+        cli.main(["--version"])
+    assert caught.value.code == 0
+    assert capsys.readouterr().out == f"esker {VERSION}\n"
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert project["version"] == VERSION
+
+
+def test_without_a_command_it_helps(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main([]) == 2
+    assert "serve" in capsys.readouterr().out
+
+
+def test_bench_lists_and_names_what_there_is(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["bench"]) == 0
+    assert "fanout" in capsys.readouterr().out.split()
+    assert cli.main(["bench", "nonsense"]) == 1
+    assert "fanout" in capsys.readouterr().err
+
+
+def test_bad_settings_are_one_sentence() -> None:
+    done = _esker("serve", "--level", "9")
+    assert done.returncode == 1
+    assert done.stderr.count("\n") == 1
+    assert "level" in done.stderr
+
+
+def test_a_port_in_use_is_one_sentence(tmp_path: Path) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = str(taken.getsockname()[1])
+        done = _esker("serve", "--port", port, "--data", str(tmp_path / "data"))
+    assert done.returncode == 1
+    assert port in done.stderr
+    assert "--port" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_a_damaged_database_is_refused_at_the_start(tmp_path: Path) -> None:
+    (tmp_path / "backup").mkdir()
+    good = tmp_path / "backup" / "esker-20260101-000000.db"
+    good.write_bytes(b"")
+    (tmp_path / "esker.db").write_bytes(b"damaged" * 1000)
+    done = _esker("serve", "--port", "0", "--data", str(tmp_path))
+    assert done.returncode == 1
+    assert str(good) in done.stderr
+    assert "Traceback" not in done.stderr
+    assert (tmp_path / "esker.db").read_bytes() == b"damaged" * 1000
+
+
+def test_it_serves_and_stops_when_told(tmp_path: Path) -> None:
+    with _serving("--data", str(tmp_path)) as (process, link):
+        base = link.split("/t/")[0]
+        with urllib.request.urlopen(f"{base}/healthz", timeout=10) as answer:
+            assert b"NumPy" in answer.read()
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(20) in (0, -signal.SIGTERM)
+        assert process.stderr is not None
+        log = process.stderr.read()
+        assert "NumPy" in log, "the start log names the device"
+        assert "everything is saved" in log
+        assert link.split("#")[1] not in log, "no secret in the log"
+    assert list((tmp_path / "backup").glob("esker-*.db"))
+
+
+def test_the_lan_certificate(tmp_path: Path) -> None:
+    context = server_context(tmp_path, "192.168.1.20")
+    assert context.minimum_version.name == "TLSv1_2"
+    key = tmp_path / "tls" / "esker-ca.key"
+    assert key.stat().st_mode & 0o077 == 0, "nobody else reads the authority's key"
+    assert authority(tmp_path).cert_pem.bytes() == (tmp_path / "tls" / "esker-ca.pem").read_bytes()
+    found = names("192.168.1.20")
+    assert found[0] == "192.168.1.20"
+    assert {"localhost", "127.0.0.1"} <= set(found)
+    assert len(found) == len(set(found))
+
+
+def test_lan_prints_a_qr_code_and_where_the_certificate_is(tmp_path: Path) -> None:
+    command = [
+        sys.executable,
+        "-m",
+        "esker",
+        "serve",
+        "--port",
+        "0",
+        "--device",
+        "numpy",
+        "--lan",
+        "--data",
+        str(tmp_path),
+    ]
+    with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
+        assert process.stdout is not None
+        lines: list[str] = []
+        for line in process.stdout:
+            lines.append(line)
+            if len(lines) > 20:
+                break
+        process.kill()
+    text = "".join(lines)
+    assert "https://" in text
+    assert "/esker-ca.pem" in text
+    assert text.count("█") > 100
