@@ -95,7 +95,9 @@ def test_no_visible_error_is_left_out(seed: int) -> None:
         drawn = (p[np.ix_(lo, lo)] + p[np.ix_(lo, hi)] + p[np.ix_(hi, lo)] + p[np.ix_(hi, hi)]) / 4
         gy, gx = np.meshgrid(rows * s, rows * s, indexing="ij")
         inside, scale = seen(view, np.stack([gx.ravel(), gy.ravel(), h.ravel()], axis=1))
-        needed = inside & (np.abs(h - drawn).ravel() * scale > view.tau_px) & (2 * s * scale > 1)
+        off, cell = np.abs(h - drawn).ravel(), 2 * s * scale
+        lit = (off > 1.5 / 256 * 2 * s) & (cell > 5 * view.tau_px)
+        needed = inside & (cell > view.tau_px) & ((off * scale > view.tau_px) | lit)
         ty, tx = np.minimum(gy // (s * 64), 2**level - 1), np.minimum(gx // (s * 64), 2**level - 1)
         assert masks[level][ty.ravel()[needed].astype(int), tx.ravel()[needed].astype(int)].all()
 

@@ -1,10 +1,11 @@
 """View-dependent selection of tiles, as array operations (DESIGN 7; paper 0, III-A; paper 1, 3.2).
 
 The server selects what a client's view needs; the client selects again, per 16-cell sub-patch, among what it holds.
-A tile is wanted when its ground is in view and drawing its parent there would be seen: the error that it or a
-descendant corrects projects to more than a fraction of tau, and the parent's cells are still larger than a pixel
-or so. Flat land is therefore never refined. The set is closed under parents and restricted: the eight neighbours of
-a wanted tile's parent are wanted, so neighbours in the drawn cut, corners too, differ by at most one level.
+A tile is wanted when its ground is in view and drawing its parent there would be seen: the parent's cells are wider
+than tau, and the error that this tile or a descendant corrects projects to more than tau, or bends the light on cells
+that are wide on the screen. Flat land is therefore never refined. The set is closed under parents and restricted: the
+eight neighbours of a wanted tile's parent are wanted, so neighbours in the drawn cut, corners too, differ by at most
+one level.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from esker.contract import View
+from esker.contract import QUANTA_PER_CELL, View
 from esker.tiles.bounds import Bounds, Floats, dilate
 
 Mask = NDArray[np.bool_]
@@ -23,10 +24,12 @@ Vector = NDArray[np.float64]
 
 ALWAYS: Final = 2
 """Levels 0..2 are always wanted, whatever the view: they are small, and shading and picking lean on them."""
-ERROR_FRACTION: Final = 0.5
-"""Tiles are sent when their error exceeds this part of tau: the client refines at tau, and lighting shows sooner."""
-CELL_PX: Final = 1.0
-"""A parent whose cells project to at most this many pixels is never refined."""
+MARGIN: Final = 0.8
+"""The client refines at tau; the server sends at this part of it, so that a step nearer finds tiles."""
+SHADING_CELL_PX: Final = 5.0
+SHADING_ERROR: Final = 1.5 / QUANTA_PER_CELL
+"""Lighting shows more than height does: where the parent's cells are wider than SHADING_CELL_PX taus, an error of this
+part of such a cell is reason enough (as in ``frontend/src/tiles/selection.ts``)."""
 FRUSTUM_MARGIN: Final = 1.15
 """The half-angle tangents of the frustum are enlarged by this factor, so that a turning camera finds tiles."""
 _NEAR_CELLS: Final = 4.0
@@ -95,7 +98,9 @@ def restrict(masks: list[Mask]) -> list[Mask]:
 def select(bounds: Bounds, view: View) -> tuple[list[Mask], list[Floats]]:
     """Wanted tiles and their projected errors (pixels), one (2^l, 2^l) array per level, rows from the south."""
     inside, error, cell = screen_error(bounds, view)
-    wanted = inside & (error > ERROR_FRACTION * view.tau_px) & (cell > CELL_PX)
+    tau = MARGIN * view.tau_px
+    bends = (bounds.error > SHADING_ERROR * 2 * bounds.spacing) & (cell > SHADING_CELL_PX * tau)
+    wanted = inside & (cell > tau) & ((error > tau) | bends)
     wanted[: (4 ** (ALWAYS + 1) - 1) // 3] = True
     masks, errors = [], []
     for level, start in enumerate(bounds.starts):

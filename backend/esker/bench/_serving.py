@@ -1,0 +1,73 @@
+"""A server process of its own for a benchmark, and the machine that it ran on."""
+
+from __future__ import annotations
+
+import os
+import platform
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+import urllib.request
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+from esker import contract as c
+from esker.document import archive
+
+
+def machine(device: str) -> dict[str, Any]:
+    """What the figures depend on: processor, cores, Python, solver device, load before the run."""
+    model = platform.processor()
+    with suppress(OSError):
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+        model = next((line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")), model)
+    return {
+        "cpu": model,
+        "cores": os.cpu_count(),
+        "python": platform.python_version(),
+        "device": device,
+        "load_before": round(os.getloadavg()[0], 2),
+    }
+
+
+@contextmanager
+def server() -> Iterator[str]:
+    """Runs ``esker serve`` on a free loopback port over an empty folder; gives its base address.
+
+    Raises RuntimeError when it does not start.
+    """
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = int(probe.getsockname()[1])
+    with tempfile.TemporaryDirectory(prefix="esker-bench-") as folder:
+        command = [sys.executable, "-m", "esker", "serve", "--port", str(port), "--data", folder]
+        with subprocess.Popen([*command, "--log-level", "warning"], stdout=subprocess.DEVNULL) as process:
+            base = f"http://127.0.0.1:{port}"
+            try:
+                _wait(base, process)
+                yield base
+            finally:
+                process.terminate()
+
+
+def _wait(base: str, process: subprocess.Popen[bytes]) -> None:
+    deadline = time.monotonic() + 60
+    while time.monotonic() < deadline and process.poll() is None:
+        with suppress(OSError), urllib.request.urlopen(f"{base}/healthz", timeout=1):
+            return
+        time.sleep(0.1)
+    raise RuntimeError("the server did not start")
+
+
+def upload(base: str, document: c.Document) -> tuple[str, str]:
+    """Makes a terrain of a document; its id and the owner's secret."""
+    import json
+
+    request = urllib.request.Request(f"{base}/api/terrains/import", archive.dumps(document), method="POST")
+    with urllib.request.urlopen(request, timeout=30) as answer:
+        made = json.loads(answer.read())
+    return made["id"], made["secret"]
