@@ -10,18 +10,18 @@ const MIE_SCATTER: f32 = 3.996e-3;
 const MIE_EXTINCTION: f32 = 8.396e-3;
 const OZONE: vec3f = vec3f(0.650e-3, 1.881e-3, 0.085e-3);
 
-struct Air {
+struct AirDensity {
   rayleigh: f32,
   mie: f32,
   ozone: f32,
 };
 
-fn air_at(altitude: f32) -> Air {
+fn air_at(altitude: f32) -> AirDensity {
   let z = max(altitude, 0.0);
-  return Air(exp(-z / 8.0), exp(-z / 1.2), max(0.0, 1.0 - abs(z - 25.0) / 15.0));
+  return AirDensity(exp(-z / 8.0), exp(-z / 1.2), max(0.0, 1.0 - abs(z - 25.0) / 15.0));
 }
 
-fn air_extinction(a: Air) -> vec3f {
+fn air_extinction(a: AirDensity) -> vec3f {
   return RAYLEIGH * a.rayleigh + vec3f(MIE_EXTINCTION) * a.mie + OZONE * a.ozone;
 }
 

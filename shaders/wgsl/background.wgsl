@@ -96,7 +96,8 @@ fn background_fragment(v: BackgroundVertex) -> @location(0) vec4f {
     } else {
       colour = ground_plane(p, dir, pixel_size(p) / max(-dir.z, 0.02));
     }
-    colour = through_air(colour, dir, distance);
+    let air = air_to(p);
+    colour = colour * air.through + air.glow;
   }
   return display(colour, pixel);
 }

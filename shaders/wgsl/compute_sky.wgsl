@@ -9,7 +9,7 @@ const SKY_HEIGHT: u32 = 48u;
 @group(0) @binding(0) var<uniform> job: SkyJob;
 @group(0) @binding(1) var sky_out: texture_storage_2d<rgba16float, write>;
 @group(0) @binding(2) var sky_in: texture_2d<f32>;
-@group(0) @binding(3) var ambient_out: texture_storage_2d<rgba16float, write>;
+@group(0) @binding(3) var<storage, read_write> ambient_out: array<vec4f, 8>;
 
 fn sun_axis() -> vec2f {
   let flat = length(job.sun.xy);
@@ -32,13 +32,13 @@ fn bake_sky(@builtin(global_invocation_id) id: vec3u) {
   textureStore(sky_out, id.xy, vec4f(sky_radiance(direction_of(uv), job.sun.xyz), 1.0));
 }
 
-// Texels 0..5: irradiance / pi on faces +x, -x, +y, -y, +z, -z; 6: irradiance of the sun at the ground; 7: mean horizon.
+// Elements 0..5: irradiance / pi on faces +x, -x, +y, -y, +z, -z; 6: irradiance of the sun at the ground; 7: mean horizon.
 @compute @workgroup_size(8, 1, 1)
 fn bake_ambient(@builtin(global_invocation_id) id: vec3u) {
   if (id.x >= 8u) { return; }
   let lit = air_transmittance(VIEWER_KM, job.sun.z) * SUN_IRRADIANCE;
   if (id.x == 6u) {
-    textureStore(ambient_out, vec2u(6u, 0u), vec4f(lit, 1.0));
+    ambient_out[6] = vec4f(lit, 1.0);
     return;
   }
   let face = vec3f(
@@ -73,7 +73,7 @@ fn bake_ambient(@builtin(global_invocation_id) id: vec3u) {
     }
   }
   if (id.x == 7u) {
-    textureStore(ambient_out, vec2u(7u, 0u), vec4f(sum / weight, 1.0));
+    ambient_out[7] = vec4f(sum / weight, 1.0);
     return;
   }
   let above = overhead / overhead_weight;
@@ -81,5 +81,5 @@ fn bake_ambient(@builtin(global_invocation_id) id: vec3u) {
   // Part of the face's hemisphere that lies below the horizon.
   let ground_part = select(0.5, select(0.0, 1.0, face.z < -0.5), abs(face.z) > 0.5);
   let sky = select(sum / max(weight, 1.0e-4), vec3f(0.0), face.z < -0.5);
-  textureStore(ambient_out, vec2u(id.x, 0u), vec4f(sky * (1.0 - ground_part) * select(2.0, 1.0, abs(face.z) > 0.5) + below * ground_part, 1.0));
+  ambient_out[id.x] = vec4f(sky * (1.0 - ground_part) * select(2.0, 1.0, abs(face.z) > 0.5) + below * ground_part, 1.0);
 }

@@ -19,16 +19,16 @@ fn sky_colour(dir: vec3f) -> vec3f {
 fn sun_light() -> vec3f {
   if (view.look == LOOK_PAPER) { return vec3f(2.75, 2.66, 2.5); }
   // A touch warmer than clear air makes it: morning haze.
-  return textureLoad(ambient_lut, vec2i(6, 0), 0).rgb * vec3f(1.10, 1.0, 0.86);
+  return skylight[6].rgb * vec3f(1.10, 1.0, 0.86);
 }
 
 // Diffuse light of sky and far ground on a surface with this normal (irradiance / pi).
 fn ambient_light(n: vec3f) -> vec3f {
   if (view.look == LOOK_PAPER) { return mix(vec3f(0.20, 0.19, 0.18), vec3f(0.40, 0.41, 0.43), n.z * 0.5 + 0.5); }
   let q = n * n;
-  let x = textureLoad(ambient_lut, vec2i(select(0, 1, n.x < 0.0), 0), 0).rgb;
-  let y = textureLoad(ambient_lut, vec2i(select(2, 3, n.y < 0.0), 0), 0).rgb;
-  let z = textureLoad(ambient_lut, vec2i(select(4, 5, n.z < 0.0), 0), 0).rgb;
+  let x = select(skylight[0].rgb, skylight[1].rgb, n.x < 0.0);
+  let y = select(skylight[2].rgb, skylight[3].rgb, n.y < 0.0);
+  let z = select(skylight[4].rgb, skylight[5].rgb, n.z < 0.0);
   return q.x * x + q.y * y + q.z * z;
 }
 
@@ -47,10 +47,15 @@ fn haze_glow(dir: vec3f) -> vec3f {
   return mix(sky_colour(normalize(vec3f(dir.xy, up + 0.03))), sky_colour(normalize(vec3f(dir.xy, up + 0.26))), 0.5);
 }
 
-// Light that reaches the eye from `colour` through the air.
-fn through_air(colour: vec3f, dir: vec3f, distance: f32) -> vec3f {
-  if (view.eye.w > 0.5) { return colour; }
-  let depth = haze_depth(dir, distance);
-  let through = exp(-depth * vec3f(0.72, 0.92, 1.22));
-  return colour * through + haze_glow(dir) * (vec3f(1.0) - through);
+// The air between the eye and a point. It changes slowly, so passes with fine geometry take it at their vertices.
+struct Air {
+  through: vec3f,   // transmittance
+  glow: vec3f,      // light that the air adds
+};
+
+fn air_to(p: vec3f) -> Air {
+  if (view.eye.w > 0.5) { return Air(vec3f(1.0), vec3f(0.0)); }
+  let dir = ray_to(p);
+  let through = exp(-haze_depth(dir, distance(p, view.eye.xyz)) * vec3f(0.72, 0.92, 1.22));
+  return Air(through, haze_glow(dir) * (vec3f(1.0) - through));
 }

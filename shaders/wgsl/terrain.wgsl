@@ -5,6 +5,8 @@ struct TerrainVertex {
   @location(1) at: vec2f,
   @location(2) morph: f32,
   @location(3) @interpolate(flat) record: vec4u,
+  @location(4) through: vec3f,
+  @location(5) glow: vec3f,
 };
 
 @vertex
@@ -16,6 +18,9 @@ fn terrain_vertex(@builtin(vertex_index) index: u32, patch_in: PatchIn) -> Terra
   out.at = v.at;
   out.morph = v.morph;
   out.record = patch_in.record;
+  let air = air_to(v.world);
+  out.through = air.through;
+  out.glow = air.glow;
   return out;
 }
 
@@ -67,7 +72,7 @@ fn terrain_fragment(v: TerrainVertex) -> @location(0) vec4f {
     let cell = abs(fract(v.at / f32(PATCH_CELLS) - 0.5) - 0.5) * f32(PATCH_CELLS);
     colour = mix(colour, vec3f(0.9), 0.6 * (1.0 - smoothstep(0.1, 0.5, min(cell.x, cell.y))));
   }
-  colour = through_air(colour, dir, distance(v.world, view.eye.xyz));
+  colour = colour * v.through + v.glow;
   let shown = display(colour, v.position.xy);
   return vec4f(with_cursors(shown.rgb, v.world), 1.0);
 }

@@ -43,7 +43,7 @@ override DETAIL: u32 = 2u;
 @group(0) @binding(2) var slopes: texture_2d_array<f32>;
 @group(0) @binding(3) var light: texture_2d_array<f32>;
 @group(0) @binding(4) var sky_lut: texture_2d<f32>;
-@group(0) @binding(5) var ambient_lut: texture_2d<f32>;
+@group(0) @binding(5) var<uniform> skylight: array<vec4f, 8>;  // compute_sky.wgsl, bake_ambient
 @group(0) @binding(6) var noise: texture_2d<f32>;
 @group(0) @binding(7) var smooth_clamp: sampler;
 @group(0) @binding(8) var smooth_repeat: sampler;

@@ -5,6 +5,8 @@ struct WallVertex {
   @location(0) world: vec3f,
   @location(1) top: f32,
   @location(2) @interpolate(flat) normal: vec2f,
+  @location(3) through: vec3f,
+  @location(4) glow: vec3f,
 };
 
 @vertex
@@ -23,7 +25,8 @@ fn wall_vertex(@builtin(vertex_index) index: u32, @location(0) record: vec4u, @l
   let v = patch_vertex(record, g);
   var world = v.world;
   if (corner.y == 1u) { world.z = min(world.z, select(view.base, view.sea, view.has_sea > 0.5)); }
-  return WallVertex(view.view_proj * vec4f(world, 1.0), world, v.world.z, normal);
+  let air = air_to(world);
+  return WallVertex(view.view_proj * vec4f(world, 1.0), world, v.world.z, normal, air.through, air.glow);
 }
 
 @fragment
@@ -53,8 +56,6 @@ fn wall_fragment(v: WallVertex) -> @location(0) vec4f {
   if (view.look != LOOK_PAPER) { colour = mix(colour, vec3f(0.070, 0.048, 0.030), soil * 0.8); }
   let n = normalize(vec3f(v.normal, 0.12 * (fine.r - 0.5)));
   let foot = 1.0 - 0.45 * exp(-(v.world.z - view.base) / (0.02 * view.size));
-  let dir = ray_to(v.world);
   let lit = colour * (sun_light() * max(dot(n, view.sun.xyz), 0.0) / 3.14159265 + ambient_light(n) * 0.85) * foot;
-  let shown = through_air(lit, dir, distance(v.world, view.eye.xyz));
-  return display(shown, v.position.xy);
+  return display(lit * v.through + v.glow, v.position.xy);
 }

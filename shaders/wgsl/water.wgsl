@@ -77,13 +77,16 @@ struct WaterVertex {
   @builtin(position) position: vec4f,
   @location(0) world: vec3f,
   @location(1) depth: f32,
+  @location(2) through: vec3f,
+  @location(3) glow: vec3f,
 };
 
 @vertex
 fn water_vertex(@builtin(vertex_index) index: u32, patch_in: PatchIn) -> WaterVertex {
   let v = patch_vertex(patch_in.record, vec2i(i32(index % PITCH), i32(index / PITCH)));
   let world = vec3f(v.world.xy, view.sea);
-  return WaterVertex(view.view_proj * vec4f(world, 1.0), world, view.sea - v.world.z);
+  let air = air_to(world);
+  return WaterVertex(view.view_proj * vec4f(world, 1.0), world, view.sea - v.world.z, air.through, air.glow);
 }
 
 @fragment
@@ -95,7 +98,7 @@ fn water_fragment(v: WaterVertex) -> @location(0) vec4f {
   let dir = ray_to(v.world);
   let water = water_surface(v.world, dir, v.depth, vec3f(a.r, mix(a.g, b.g, 0.5), 1.0), vec3f(0.0));
   // Over the ground, the bed shows through by blending; its share was left out of the colour.
-  let colour = through_air(water.rgb / max(water.a, 0.02), dir, distance(v.world, view.eye.xyz));
+  let colour = water.rgb / max(water.a, 0.02) * v.through + v.glow;
   let shown = display(colour, v.position.xy);
   return vec4f(with_cursors(shown.rgb, v.world), water.a);
 }
@@ -122,5 +125,6 @@ fn open_sea_vertex(@builtin(vertex_index) index: u32) -> OpenSeaVertex {
 fn open_sea_fragment(v: OpenSeaVertex) -> @location(0) vec4f {
   let dir = ray_to(v.world);
   let water = water_surface(v.world, dir, sea_depth(v.world.xy), vec3f(0.0), sea_bed(v.world.xy));
-  return display(through_air(water.rgb, dir, distance(v.world, view.eye.xyz)), v.position.xy);
+  let air = air_to(v.world);
+  return display(water.rgb * air.through + air.glow, v.position.xy);
 }

@@ -13,6 +13,7 @@ import { PatchPasses } from "./patches.ts";
 import type { PassContext } from "./pipeline.ts";
 import { type Quality, QualityControl } from "./quality.ts";
 import { RibbonPass } from "./ribbons.ts";
+import { samePicture } from "./scenediff.ts";
 import { SkyTables } from "./sky.ts";
 import { Target } from "./target.ts";
 import { NormalsPass, SunPass } from "./tilecompute.ts";
@@ -142,23 +143,7 @@ export class GpuRenderer implements SceneRenderer {
   }
 
   private changed(scene: Scene): boolean {
-    const before = this.last;
-    if (before === null || scene.tiles.stamp !== this.lastStamp) return true;
-    const fields = [
-      "camera",
-      "tiles",
-      "settings",
-      "strokes",
-      "ghost",
-      "cursors",
-      "tauPx",
-      "overlay",
-      "showStrokes",
-    ] as const;
-    return fields.some((field) => {
-      if (field === "cursors" && before.cursors.length === 0 && scene.cursors.length === 0) return false;
-      return before[field] !== scene[field];
-    });
+    return this.last === null || !samePicture(this.last, this.lastStamp, scene, scene.tiles.stamp);
   }
 
   private remember(scene: Scene, quality: Quality): void {

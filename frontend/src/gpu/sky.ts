@@ -8,7 +8,8 @@ const HEIGHT = 48;
 
 export class SkyTables {
   readonly radiance: GPUTexture;
-  readonly ambient: GPUTexture;
+  /** Eight vec4f: see bake_ambient. */
+  readonly ambient: GPUBuffer;
   private readonly uniform: GPUBuffer;
   private readonly bakeSky: GPUComputePipeline;
   private readonly bakeAmbient: GPUComputePipeline;
@@ -19,15 +20,17 @@ export class SkyTables {
   private constructor(device: GPUDevice, bakeSky: GPUComputePipeline, bakeAmbient: GPUComputePipeline) {
     this.bakeSky = bakeSky;
     this.bakeAmbient = bakeAmbient;
-    const make = (label: string, size: [number, number]): GPUTexture =>
-      device.createTexture({
-        label,
-        size,
-        format: "rgba16float",
-        usage: GPUTextureUsage.TEXTURE_BINDING | GPUTextureUsage.STORAGE_BINDING,
-      });
-    this.radiance = make("sky radiance", [WIDTH, HEIGHT]);
-    this.ambient = make("sky ambient", [8, 1]);
+    this.radiance = device.createTexture({
+      label: "sky radiance",
+      size: [WIDTH, HEIGHT],
+      format: "rgba16float",
+      usage: GPUTextureUsage.TEXTURE_BINDING | GPUTextureUsage.STORAGE_BINDING,
+    });
+    this.ambient = device.createBuffer({
+      label: "skylight",
+      size: 8 * 16,
+      usage: GPUBufferUsage.UNIFORM | GPUBufferUsage.STORAGE,
+    });
     this.uniform = device.createBuffer({
       label: "sky job",
       size: 16,
@@ -43,7 +46,7 @@ export class SkyTables {
       entries: [
         sun,
         { binding: 2, resource: this.radiance.createView() },
-        { binding: 3, resource: this.ambient.createView() },
+        { binding: 3, resource: { buffer: this.ambient } },
       ],
     });
   }
