@@ -1,0 +1,69 @@
+/** Whether two scenes show the same picture. The app builds scenes anew each frame, so values count, not identity. */
+
+import type { CameraState, CursorVisual, GhostVisual, Scene, StrokeVisual } from "../core/types.ts";
+
+function sameNumbers(a: ArrayLike<number>, b: ArrayLike<number>): boolean {
+  if (a === b) return true;
+  if (a.length !== b.length) return false;
+  for (let i = 0; i < a.length; i += 1) if (a[i] !== b[i]) return false;
+  return true;
+}
+
+function sameList<T>(a: readonly T[], b: readonly T[], same: (x: T, y: T) => boolean): boolean {
+  return a === b || (a.length === b.length && a.every((x, i) => x === b[i] || same(x, b[i]!)));
+}
+
+function sameCamera(a: CameraState, b: CameraState): boolean {
+  return a === b || (a.width === b.width && a.height === b.height && sameNumbers(a.viewProj, b.viewProj));
+}
+
+function sameStroke(a: StrokeVisual, b: StrokeVisual): boolean {
+  return (
+    a.id === b.id &&
+    a.selected === b.selected &&
+    a.hovered === b.hovered &&
+    a.live === b.live &&
+    sameNumbers(a.colour, b.colour) &&
+    sameNumbers(a.points, b.points)
+  );
+}
+
+function sameCursor(a: CursorVisual, b: CursorVisual): boolean {
+  return a.radiusPx === b.radiusPx && sameNumbers(a.position, b.position) && sameNumbers(a.colour, b.colour);
+}
+
+function sameGhost(a: GhostVisual | null, b: GhostVisual | null): boolean {
+  if (a === null || b === null) return a === b;
+  return (
+    a === b ||
+    (sameNumbers(a.shadow, b.shadow) &&
+      sameNumbers(a.colour, b.colour) &&
+      a.corners.every((corner, i) => sameNumbers(corner, b.corners[i]!)))
+  );
+}
+
+function sameSettings(a: Scene["settings"], b: Scene["settings"]): boolean {
+  return (
+    a === b ||
+    (a.look === b.look &&
+      a.sea_level_m === b.sea_level_m &&
+      a.sun_azimuth_deg === b.sun_azimuth_deg &&
+      a.sun_elevation_deg === b.sun_elevation_deg)
+  );
+}
+
+/** True when `b`, with its store at `stampB`, shows what `a` showed at `stampA`; time is left out. */
+export function samePicture(a: Scene, stampA: number, b: Scene, stampB: number): boolean {
+  return (
+    a.tiles === b.tiles &&
+    stampA === stampB &&
+    a.tauPx === b.tauPx &&
+    a.overlay === b.overlay &&
+    a.showStrokes === b.showStrokes &&
+    sameCamera(a.camera, b.camera) &&
+    sameSettings(a.settings, b.settings) &&
+    sameGhost(a.ghost, b.ghost) &&
+    sameList(a.cursors, b.cursors, sameCursor) &&
+    sameList(a.strokes, b.strokes, sameStroke)
+  );
+}
