@@ -192,6 +192,7 @@ export class SyncDoc {
         // Sent again after a cut, but the snapshot or the missed ops held it already.
         known ||= entry !== undefined;
         this.#drop(id);
+        this.#undo.settle(id);
       } else if (entry !== undefined) this.#order(clock, { id, op: entry.op });
       else if (!this.#ready.has(clock)) {
         this.#diverged();
@@ -292,6 +293,7 @@ export class SyncDoc {
       const next = this.#ready.get(this.#confirmed.clock + 1);
       if (next === undefined) break;
       this.#ready.delete(this.#confirmed.clock + 1);
+      if (next.id.startsWith(`${this.#client}:`)) this.#undo.settle(next.id);
       if (this.#entries[0]?.id === next.id) this.#entries.shift();
       else {
         overtaken = true;

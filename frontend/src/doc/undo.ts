@@ -89,6 +89,32 @@ export class UndoStack {
     this.#undone = keep(this.#undone);
   }
 
+  /**
+   * An op that the server has committed can no longer be refused, so its changes are merged with those of the committed
+   * ops before it in the same step: a stroke of hundreds of appends is remembered by its first and last state alone.
+   */
+  settle(opId: string): void {
+    for (let i = this.#done.length - 1; i >= 0; i--) {
+      const { gesture, parts } = this.#done[i]!;
+      const at = parts.findIndex((p) => p.opId === opId);
+      if (at < 0) continue;
+      const before = parts[at - 1];
+      const merged = parts.slice(0, at);
+      if (before?.opId === null) merged.pop();
+      merged.push({
+        opId: null,
+        changes: before?.opId === null ? merge(before.changes, parts[at]!.changes) : parts[at]!.changes,
+      });
+      this.#done[i] = { gesture, parts: [...merged, ...parts.slice(at + 1)] };
+      return;
+    }
+  }
+
+  /** Ops that are remembered one by one, over all steps. */
+  get size(): number {
+    return this.#done.reduce((sum, step) => sum + step.parts.length, 0);
+  }
+
   /** Takes back my last step. The returned ops must be submitted in order; they are not recorded again. */
   undo(present: Doc): UndoPlan {
     return this.#move(this.#done, this.#undone, present);

@@ -529,6 +529,16 @@ describe("the camera (SPEC I47)", () => {
     expect(c.project(p).x).toBeCloseTo(x, 3);
   });
 
+  it("a double click flies there", () => {
+    const p: Vec3 = [1500, 2000, 0];
+    const [x, y] = at(p);
+    const before = distance(eye(), c.state.value.target);
+    canvas.dispatchEvent(new MouseEvent("dblclick", { clientX: 10 + x / 2, clientY: 20 + y / 2 }));
+    for (let i = 0; i < 100 && c.update(0.016, FLAT as Ground); i++);
+    expect(distance(c.state.value.target, p)).toBeLessThan(0.1);
+    expect(distance(eye(), p)).toBeCloseTo(before / 2, 3);
+  });
+
   it("the pointer's place on the ground is told, and that it has left", () => {
     fire("pointermove", ...at([1500, 2000, 0]));
     expect(distance(cursors.at(-1)!, [1500, 2000, 0])).toBeLessThan(0.1);
