@@ -12,7 +12,7 @@ typedef struct {
 } nearest_t;
 
 typedef struct {
-    float16 w, wt, wa, fade, g, gx, gy, toe, hard;
+    float16 w, wt, wa, fade, held, g, gx, gy, toe, hard;
 } sums_t;
 
 typedef struct {
@@ -137,8 +137,9 @@ inline void cross_section(sums_t *sum, const nearest_t *near, int16 inside, glob
     float16 r = fmin(ds / fmax(end, THINNEST_M), 1e6f), z, fall, lift;
     flank_profile(top, slope, run, k, f, full, fmin(ds, end), &z, &fall, &lift);
     float16 free = smooth16((r - SPRING_FULL_FRACTION) * (1.0f / (1.0f - SPRING_FULL_FRACTION)));
-    float16 past = 1.0f + fmax(ds - end, 0.0f) * decay;
-    fall += free * (fmin(fall, EXIT_SHARE * decay * z) / (past * past) - fall);
+    float16 past = 1.0f + fmax(ds - end, 0.0f) * decay, cut = fmin(8.0f * (1.0f - end / fmax(full, TINY)), 1.0f);
+    float16 leaving = select(free * cut, one, r > 1.0f);
+    fall += leaving * (fmin(fall, EXIT_SHARE * decay * z) / (past * past) - fall);
     lift = select(select(lift, zero, r > 1.0f), one, !has);
     float16 sign = select(one, -one, near->height < 0.0f), down = select(zero, -sign * fall, has && distance > p[0]);
     float16 near_weight = 1.0f / (1.0f + d * d), inner = fmax(1.0f - r, 0.0f), outer = fmax(1.0f - rt * (1.0f / TOE), 0.0f);
@@ -151,6 +152,8 @@ inline void cross_section(sums_t *sum, const nearest_t *near, int16 inside, glob
     sum->wt += w * sign * z;
     sum->wa += w * a * a;
     sum->fade = fmax(sum->fade, fade);
+    float16 held = present * (1.0f - smooth16((r - HELD_FRACTION) * (1.0f / (1.0f - HELD_FRACTION))));
+    sum->held = fmax(sum->held, select(zero, select(held, one, hard), reached));
     sum->g += g;
     sum->gx += g * (unit * near->rx + lift * near->along_x);
     sum->gy += g * (unit * near->ry + lift * near->along_y);
@@ -202,7 +205,7 @@ inline void write_row(const sums_t *sum, global float *hd, global float *hf, glo
     float16 w = fmax(sum->w, TINY), target = sum->wt / w, a = sum->wa / w * sum->fade, g = fmax(sum->g, TINY);
     int16 hard = sum->hard > 0.0f;
     float16 d = select(a, (float16)(-1.0f), hard);
-    float16 f = select((a + screening * sum->fade) * target, target, hard), toe = CREST_STIFFNESS * sum->toe;
+    float16 f = select((a + screening * sum->held) * target, target, hard), toe = CREST_STIFFNESS * sum->toe;
     if (pinned) {
         int16 at = x + (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
         int16 edge = at == 0 || at == n - 1 || (int16)(y == 0 || y == n - 1 ? -1 : 0);
@@ -229,7 +232,7 @@ kernel void rasterise(global const float *segments, int m, global const float *s
     float x0 = bx * BIN, y0 = by * BIN;
     float16 x = x0 + (float16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
     for (int y = 0; y < BIN; y++) {
-        sums_t none = {0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f};
+        sums_t none = {0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f};
         sums[y] = none;
     }
     for (int i = row_start[by]; i < row_start[by + 1]; i++) {

@@ -43,6 +43,8 @@ TOE = 1.3
 EXIT_SHARE = 0.25
 """Where a band ends above the base the gradient leaves as if this share of the height there decayed over the reach:
 more, and the ground beyond sinks below the base; less, and a step shows."""
+HELD_FRACTION = 0.93
+"""Up to this share of a band screening pulls to the profile instead of the base, then fades to the base at its end."""
 SOFT_PART = 0.5
 """Share of the crest height that the round part of a concave foot or a convex shoulder takes."""
 FLATTEST = 1e-9
@@ -110,6 +112,7 @@ def defines() -> dict[str, float | int]:
         "CREST_HALF_WIDTH": CREST_HALF_WIDTH,
         "SPRING_FLOOR_CELLS": SPRING_FLOOR_CELLS,
         "TOE": TOE,
+        "HELD_FRACTION": HELD_FRACTION,
         "EXIT_SHARE": EXIT_SHARE,
         "THINNEST_M": THINNEST_M,
         "STROKE_STRIDE": STROKE_STRIDE,

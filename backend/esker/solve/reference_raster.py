@@ -8,7 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from esker.contract import CREST_STIFFNESS, SPRING_CELLS, SPRING_FULL_FRACTION
-from esker.solve.constraints import BIN, CREST_HALF_WIDTH, EXIT_SHARE, SPRING_FLOOR_CELLS, THINNEST_M, TOE, Tables, bins
+from esker.solve.constraints import (
+    BIN,
+    CREST_HALF_WIDTH,
+    EXIT_SHARE,
+    HELD_FRACTION,
+    SPRING_FLOOR_CELLS,
+    THINNEST_M,
+    TOE,
+    Tables,
+    bins,
+)
 
 Floats = NDArray[np.float64]
 
@@ -60,6 +70,7 @@ class _Band:
     target: Floats
     stiffness: Floats
     fade: Floats
+    held: Floats
     toe_fade: Floats
     gx: Floats
     gy: Floats
@@ -107,7 +118,9 @@ def cross_section(near: _Nearest, inside: NDArray[np.bool_], params: Floats, tab
     beyond = r > 1
     free = smoothstep((r - SPRING_FULL_FRACTION) / (1 - SPRING_FULL_FRACTION))
     past = 1 + np.maximum(d * s - end, 0.0) / tables.exit_length_m
-    fall = fall + free * (np.minimum(fall, EXIT_SHARE * z / tables.exit_length_m) / past**2 - fall)
+    cut = np.minimum(8 * (1 - end / np.maximum((1 + k + f) * top / slope, _TINY)), 1.0)
+    leaving = np.where(beyond, 1.0, free * cut)
+    fall = fall + leaving * (np.minimum(fall, EXIT_SHARE * z / tables.exit_length_m) / past**2 - fall)
     lift = np.where(beyond, 0.0, lift)
     unit = np.maximum(distance, 0.5)
     off_plateau = distance > plateau
@@ -124,6 +137,7 @@ def cross_section(near: _Nearest, inside: NDArray[np.bool_], params: Floats, tab
         target=sign * z,
         stiffness=(SPRING_CELLS / np.maximum(end / s, SPRING_FLOOR_CELLS)) ** 2,
         fade=fade,
+        held=np.where(hard, 1.0, present * (1 - smoothstep((r - HELD_FRACTION) / (1 - HELD_FRACTION)))),
         toe_fade=toe_fade,
         gx=down * near.rx / unit + lift * near.along_x / s,
         gy=down * near.ry / unit + lift * near.along_y / s,
@@ -134,7 +148,7 @@ def rasterise(tables: Tables) -> Constraints:
     """The constraints of a level."""
     n = tables.samples
     size = bins(n) * BIN
-    total = {name: np.zeros((size, size)) for name in ("w", "wt", "wa", "fade", "g", "gx", "gy", "toe", "hard")}
+    total = {name: np.zeros((size, size)) for name in ("w", "wt", "wa", "fade", "held", "g", "gx", "gy", "toe", "hard")}
     for k in range(len(tables.index)):
         _add_stroke(tables, k, total)
     total = {name: a[:n, :n] for name, a in total.items()}
@@ -142,7 +156,7 @@ def rasterise(tables: Tables) -> Constraints:
     target, stiffness = total["wt"] / w, total["wa"] / w * total["fade"]
     hard = total["hard"] > 0
     height_d = np.where(hard, HARD, stiffness)
-    height_f = np.where(hard, target, (stiffness + tables.screening * total["fade"]) * target)
+    height_f = np.where(hard, target, (stiffness + tables.screening * total["held"]) * target)
     if tables.pinned:
         edge = np.ones((n, n), dtype=bool)
         edge[1:-1, 1:-1] = False
@@ -180,6 +194,7 @@ def _add_stroke(tables: Tables, k: int, total: dict[str, Floats]) -> None:
     total["wt"][y, x] += w * band.target
     total["wa"][y, x] += w * band.stiffness
     total["fade"][y, x] = np.maximum(total["fade"][y, x], np.where(reached, band.fade, 0.0))
+    total["held"][y, x] = np.maximum(total["held"][y, x], np.where(reached, band.held, 0.0))
     total["g"][y, x] += g
     total["gx"][y, x] += g * band.gx
     total["gy"][y, x] += g * band.gy

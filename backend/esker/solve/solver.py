@@ -113,8 +113,8 @@ class Solver:
         """Previews of levels 0..G, each when it is finished, then 0..G settled.
 
         Between the last preview and the settled levels the same preview of level 0 comes again from time to time: a
-        chance to stop. Close the generator to stop; G is ``levels`` or the solver's ``max_level``. Raises ValueError for a level
-        outside 0..MAX_LEVEL.
+        chance to stop. Close the generator to stop; G is ``levels`` or the solver's ``max_level``. Raises ValueError
+        for a level outside 0..MAX_LEVEL.
         """
         return self._run(strokes, settings, self._level(levels), None)
 

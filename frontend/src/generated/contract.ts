@@ -32,7 +32,7 @@ export const SATURATION = 0.12 as const;
 
 export const SPRING_CELLS = 30.0 as const;
 
-export const SPRING_FULL_FRACTION = 0.7 as const;
+export const SPRING_FULL_FRACTION = 0.85 as const;
 
 export const CHEBYSHEV_SWEEPS = 4 as const;
 

@@ -1,0 +1,201 @@
+"""The cross-section that artists prescribe (SPEC S10 to S14)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.ndimage import map_coordinates
+
+from esker.contract import Stroke, TerrainSettings
+from esker.solve.crest import crest_of, is_closed
+from esker.solve.solver import Solver
+from esker.terrain import Stroke as Make
+from tests.solver.scenes import SCENES, SETTINGS, SIZE, flank, loop, ridge, wall
+
+SMALL = TerrainSettings(size_m=1024.0, reach_m=32.0)
+"""4 m cells at level 2."""
+
+
+def profile(
+    h: np.ndarray, size: float, start: tuple[float, float], towards: float, distances: list[float]
+) -> np.ndarray:
+    """Heights at distances from a point in a direction, bilinear."""
+    s = size / (len(h) - 1)
+    x = start[0] + np.cos(towards) * np.array(distances)
+    y = start[1] + np.sin(towards) * np.array(distances)
+    return np.asarray(map_coordinates(h.astype(float), [y / s, x / s], order=1))
+
+
+@pytest.mark.parametrize("slope", [5, 10, 35, 45, 60])
+@pytest.mark.parametrize("angle", [0, 30, 45, 73, 90])
+@pytest.mark.parametrize("plateau", [0.0, 40.0])
+def test_prescribed_slope(solver: Solver, slope: float, angle: float, plateau: float) -> None:
+    """SPEC S10: a wall higher than its flank of 160 m can fall, so that the band ends at its extent."""
+    extent, rise = 160.0, math.tan(math.radians(slope))
+    stroke = wall(angle, rise * extent + 30, 600, flank(slope, extent, "straight"), 1024.0)
+    h = solver.solve([stroke.model_copy(update={"plateau_radius_m": plateau})], SMALL, 2)[2]
+    for side in (90, -90):
+        for share in (0.25, 0.5, 0.75):
+            at = plateau + share * extent
+            near, far = profile(h, 1024.0, (512, 512), math.radians(angle + side), [at - 8, at + 8])
+            assert (near - far) / 16 == pytest.approx(rise, rel=0.05)
+
+
+def test_slope_of_a_band_that_meets_the_base(solver: Solver) -> None:
+    """SPEC S10 where the foot lies on the base: 100 m at 35 degrees stand on 143 m."""
+    stroke = wall(20, 100, 600, flank(35, 400, "straight"), 1024.0)
+    h = solver.solve([stroke], SMALL, 2)[2]
+    for at in (36, 71, 107):
+        near, far = profile(h, 1024.0, (512, 512), math.radians(110), [at - 8, at + 8])
+        assert (near - far) / 16 == pytest.approx(math.tan(math.radians(35)), rel=0.05)
+
+
+def test_wide_flanks_keep_their_slope(solver: Solver) -> None:
+    """A band of eight reaches: screening pulls towards the profile there, not to the base (docs/solver.md)."""
+    stroke = wall(0, 1000, 3600, flank(30, 1024, "straight"))
+    h = solver.solve([stroke], SETTINGS, 2)[2]
+    for share in (0.25, 0.5, 0.75):
+        near, far = profile(h, SIZE, (2048, 2048), math.pi / 2, [share * 1024 - 32, share * 1024 + 32])
+        assert (near - far) / 64 == pytest.approx(math.tan(math.radians(30)), rel=0.05)
+
+
+def test_zero_slope_is_flat(solver: Solver) -> None:
+    h = solver.solve([wall(30, 80, 500, flank(0, 120, "straight"), 1024.0)], SMALL, 2)[2]
+    line = profile(h, 1024.0, (512, 512), math.radians(120), [10, 40, 60, 80])
+    assert np.abs(line - 80).max() < 0.05
+
+
+@pytest.mark.parametrize("shape", ["concave", "convex"])
+def test_round_flanks(solver: Solver, shape: str) -> None:
+    """A concave flank has its slope near the crest and a flat foot, a convex one the other way round; both end at 1.5
+    times height / slope."""
+    h = solver.solve([wall(0, 100, 700, flank(45, 400, shape), 1024.0)], SMALL, 2)[2]  # type: ignore[arg-type]
+    z = profile(h, 1024.0, (512, 512), math.pi / 2, [12, 28, 120, 136, 180])
+    near, foot = (z[0] - z[1]) / 16, (z[2] - z[3]) / 16
+    steep, flat = (near, foot) if shape == "concave" else (foot, near)
+    assert steep == pytest.approx(1.0, rel=0.1)
+    assert flat < 0.5
+    assert abs(z[4]) < 3
+
+
+def test_plateau_radius_is_flat(solver: Solver) -> None:
+    """SPEC S11."""
+    stroke = wall(35, 120, 500, flank(40, 200), 1024.0).model_copy(update={"plateau_radius_m": 60.0})
+    h = solver.solve([stroke], SMALL, 2)[2]
+    across = profile(h, 1024.0, (512, 512), math.radians(125), list(range(-56, 57, 8)))
+    assert np.abs(across - 120).max() < 1e-3
+
+
+@pytest.mark.parametrize("finished", [True, False])
+@pytest.mark.parametrize("turn", [1, -1])
+def test_closed_outline_is_plateau_inside(solver: Solver, finished: bool, turn: int) -> None:
+    """SPEC S11; in either direction of travel, while drawing and after."""
+    stroke = loop(2048, 2048, 700, 200, flank(35, 400)).model_copy(update={"finished": finished})
+    if turn < 0:
+        stroke = stroke.model_copy(update={"curve": stroke.curve[::-1]})
+    h = solver.solve([stroke], SETTINGS, 3)[3]
+    y, x = np.mgrid[:513, :513] * 8.0
+    inside = np.hypot(x - 2048, y - 2048) < 680
+    assert np.abs(h[inside] - 200).max() < 1e-3
+    assert abs(profile(h, SIZE, (2048, 2048), 0.3, [1250])[0]) < 2
+
+
+def test_open_outline_is_no_plateau(solver: Solver) -> None:
+    stroke = loop(2048, 2048, 700, 200, flank(35, 400))
+    half = stroke.model_copy(update={"curve": stroke.curve[:35]})
+    assert not is_closed(crest_of(half).points)  # type: ignore[union-attr]
+    assert solver.solve([half], SETTINGS, 3)[3][256, 256] < 50
+
+
+def test_foot_of_a_mountain(solver: Solver) -> None:
+    """SPEC S12: the design's own example."""
+    h = solver.solve([ridge((1200, 1500), (2800, 2400), 225, flank(35, 1000, "straight"))], SETTINGS, 4)[4]
+    y, x = np.mgrid[:1025, :1025] * 4.0
+    d = np.array([1600.0, 900.0]) / math.hypot(1600, 900)
+    along, across = (x - 1200) * d[0] + (y - 1500) * d[1], np.abs(-(x - 1200) * d[1] + (y - 1500) * d[0])
+    beyond = (across > 321 + 40) | (along < -40) | (along > math.hypot(1600, 900) + 40)
+    assert np.abs(h[beyond]).max() < 2
+    assert h.max() == pytest.approx(225, abs=1)
+
+
+def test_crevice_is_a_mountain_upside_down(solver: Solver) -> None:
+    up = solver.solve([ridge((900, 1500), (3000, 2400), 180, flank())], SETTINGS, 2)[2]
+    down = solver.solve([ridge((900, 1500), (3000, 2400), -180, flank())], SETTINGS, 2)[2]
+    assert np.abs(up + down).max() < 0.05
+
+
+def test_sides(solver: Solver) -> None:
+    """Left is left of the direction of travel: travelling east, north."""
+    points = [(800, 2048, 200), (3300, 2048, 200)]
+    h = solver.solve(
+        [Make.profile(points, left=flank(20, 400, "straight"), right=flank(60, 400, "straight"), id="a")], SETTINGS, 3
+    )[3]
+    north, south = h[256 + 12, 256], h[256 - 12, 256]
+    assert north == pytest.approx(200 - 96 * math.tan(math.radians(20)), abs=4)
+    assert south == pytest.approx(200 - 96 * math.tan(math.radians(60)), abs=8)
+
+
+def test_crossing_crests(solver: Solver) -> None:
+    """SPEC S13: between the two, near their mean, and without a step along either crest."""
+    high, low = wall(0, 300, 2600, flank(35), SIZE), wall(90, 100, 2600, flank(35), SIZE)
+    strokes = [high.model_copy(update={"id": "a"}), low.model_copy(update={"id": "b"})]
+    h = solver.solve(strokes, SETTINGS, 3)[3]
+    back = solver.solve(strokes[::-1], SETTINGS, 3)[3]
+    assert np.array_equal(h, back)
+    assert h[256, 256] == pytest.approx(200, abs=10)
+    assert h[256, 200:312].min() >= 190
+    assert h[200:312, 256].max() <= 300
+
+
+@pytest.mark.parametrize("side", [None, flank(40, 300)], ids=["bare", "flanks"])
+def test_degenerate_strokes(solver: Solver, side: object) -> None:
+    """SPEC S14."""
+    f = {"left": side, "right": side}
+    point = Make.profile([(2000, 2000, 150)], **f, id="point")  # type: ignore[arg-type]
+    still = Make.profile([(2000, 2000, 150)] * 5, **f, id="still")  # type: ignore[arg-type]
+    level = Make.level([(2000, 2000, 150)] * 3, **f, id="level")  # type: ignore[arg-type]
+    repeated = Make.profile(
+        [(1000, 1000, 0), (1000, 1000, 0), (2000, 1500, 200), (2000, 1500, 200), (3000, 2000, 0)],
+        **f,  # type: ignore[arg-type]
+        id="repeated",
+    )
+    upright = Make.profile([(1000, 1000, 0), (2000, 1500, 90), (2000, 1500, 200), (3000, 2000, 0)], **f, id="u")  # type: ignore[arg-type]
+    outside = Make.profile([(-40000, 2000, 900), (40000, 2100, 900)], **f, id="outside")  # type: ignore[arg-type]
+    for stroke in (point, still, level, repeated, upright, outside):
+        h = solver.solve([stroke], SETTINGS, 2)[2]
+        assert np.isfinite(h).all()
+        assert h.max() > 100
+    assert crest_of(still).points.shape == (1, 3)  # type: ignore[union-attr]
+
+
+def test_single_point_is_a_cone(solver: Solver) -> None:
+    """SPEC S14."""
+    f = flank(35, 400, "straight")
+    h = solver.solve([Make.profile([(512, 512, 100)], left=f, right=f, id="p")], SMALL, 2)[2]
+    ring = [profile(h, 1024.0, (512, 512), a, [70])[0] for a in np.linspace(0, 2 * math.pi, 24)]
+    assert np.ptp(ring) < 4
+    assert np.mean(ring) == pytest.approx(100 - 70 * math.tan(math.radians(35)), abs=3)
+
+
+def test_folded_profile_takes_its_outline() -> None:
+    """SPEC S14: an overhang becomes the height that is farthest from the base over each place."""
+    folded = Make.profile([(0, 0, 0), (600, 0, 300), (400, 0, 500), (1000, 0, 0)], id="f")
+    points = crest_of(folded).points  # type: ignore[union-attr]
+    assert (np.diff(points[:, 0]) > 0).all()
+    assert np.allclose(points, [(0, 0, 0), (400, 0, 500), (600, 0, 1000 / 3), (1000, 0, 0)])
+
+
+@pytest.mark.parametrize("scene", list(SCENES))
+def test_no_spikes(solver: Solver, scene: str) -> None:
+    """No sample is wilder than the strokes: heights stay within theirs by a tenth."""
+    h = solver.solve(SCENES[scene], SETTINGS, 3)[3]
+    top, low = _range(SCENES[scene])
+    assert h.max() <= max(top, 0) * 1.02 + 2
+    assert h.min() >= min(low, 0) * 1.1 - 0.05 * (top - low)
+
+
+def _range(strokes: list[Stroke]) -> tuple[float, float]:
+    z = np.concatenate([crest.points[:, 2] for s in strokes if (crest := crest_of(s))])
+    return float(z.max()), float(z.min())
