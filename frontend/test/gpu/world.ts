@@ -221,13 +221,14 @@ export function alpineField(rough: number): HeightField {
   };
 }
 
-/** A random rough ground whose levels differ, as previews do. */
+/** A random ground, rough in places, whose levels differ as previews do. */
 export function filteredField(seed: number, amplitude: number, sizeM = 4096): HeightField {
   return (x, y, level) => {
     let sum = 0;
+    const rough = amplitude * (0.02 + Math.max(0, 0.25 + noise2((3 * x) / sizeM, (3 * y) / sizeM, seed + 50)) ** 2);
     for (let k = 0; k <= level + 3; k += 1) {
       const f = (4 * 2 ** k) / sizeM;
-      sum += amplitude * 0.62 ** k * noise2(x * f, y * f, seed + k);
+      sum += (k < 2 ? amplitude : rough) * 0.62 ** k * noise2(x * f, y * f, seed + k);
     }
     return sum * (1 + 0.05 * Math.sin(level * 7));
   };
