@@ -47,17 +47,33 @@ const PAD_X = 14;
 const PAD_Y = 16;
 const SIDES: readonly Side[] = ["left", "right"];
 
-/** The widest horizontal distance that the section reaches from its crest line, metres. */
-function halfWidth(section: Section): number {
+/** The widest horizontal distance that the stroke prescribes anything at, metres. */
+function prescribedHalf(section: Section): number {
   const extent = Math.max(section.left?.extent_m ?? 0, section.right?.extent_m ?? 0);
   return Math.max(section.plateauRadiusM + extent, 1);
 }
 
-/** Fits the section into a picture of the given size in pixels. A flat section is drawn with a height to grip. */
+/** The relief of the picture: a flat section is drawn with a height to grip. */
+function drawnRelief(section: Section): number {
+  return Math.max(Math.abs(section.reliefM), 0.22 * prescribedHalf(section));
+}
+
+/** The widest horizontal distance of the picture from the crest line, metres. */
+function halfWidth(section: Section): number {
+  const relief = drawnRelief(section);
+  const ends = SIDES.map((side) => {
+    const flank = section[side];
+    if (flank !== null && flank.slope_deg === null) return section.plateauRadiusM + flank.extent_m;
+    const foot = flank === null ? 0 : footM(flank, relief);
+    return section.plateauRadiusM + foot + freeRun(section, side);
+  });
+  return Math.max(prescribedHalf(section), ...ends);
+}
+
+/** Fits the section into a picture of the given size in pixels. */
 export function fitFrame(section: Section, width: number, height: number): Frame {
-  const half = halfWidth(section);
-  const relief = Math.max(Math.abs(section.reliefM), 0.22 * half);
-  const pxPerM = Math.min((width / 2 - PAD_X) / half, (height - 2 * PAD_Y) / relief);
+  const relief = drawnRelief(section);
+  const pxPerM = Math.min((width / 2 - PAD_X) / halfWidth(section), (height - 2 * PAD_Y) / relief);
   const sign = section.reliefM < 0 ? -1 : 1;
   const reliefPx = relief * pxPerM;
   const baseY = height / 2 + (sign * reliefPx) / 2;
@@ -86,33 +102,75 @@ function reliefOf(frame: Frame): number {
   return (frame.baseY - frame.crestY) / frame.pxPerM;
 }
 
-/** One half of the outline from the crest outwards, as points in pixels. */
-function half(section: Section, frame: Frame, side: Side): [number, number][] {
+type Points = [number, number][];
+
+interface Half {
+  /** What the stroke prescribes, from the crest outwards. */
+  readonly firm: Points;
+  /** From there to the base: what the diffusion decides, drawn as a soft fall. */
+  readonly free: Points;
+}
+
+const CURVE_STEPS = 16;
+
+function half(section: Section, frame: Frame, side: Side): Half {
   const dir = side === "left" ? -1 : 1;
   const relief = reliefOf(frame);
   const edge = section.plateauRadiusM;
+  const flank = section[side];
   const at = (m: number, share: number): [number, number] => [
     frame.centreX + dir * m * frame.pxPerM,
     frame.baseY - share * relief * frame.pxPerM,
   ];
-  const points = [at(0, 1), at(edge, 1)];
-  const flank = section[side];
-  if (flank === null) {
-    points.push(at(edge, 0));
-  } else {
+  const firm = [at(0, 1), at(edge, 1)];
+  let end = edge;
+  let share = 1;
+  if (flank !== null && flank.slope_deg !== null) {
     const foot = footM(flank, relief);
-    for (let i = 1; i <= 16; i++) points.push(at(edge + (foot * i) / 16, flankShare(flank, relief, (foot * i) / 16)));
-    points.push(at(edge + foot, 0));
+    for (let i = 1; i <= CURVE_STEPS; i++) {
+      const t = (foot * i) / CURVE_STEPS;
+      firm.push(at(edge + t, flankShare(flank, relief, t)));
+    }
+    end = edge + foot;
+    share = flankShare(flank, relief, foot);
   }
-  return points;
+  const run = flank !== null && flank.slope_deg === null ? flank.extent_m : freeRun(section, side);
+  const free: Points = [];
+  for (let i = 0; i <= CURVE_STEPS; i++) {
+    const u = i / CURVE_STEPS;
+    free.push(at(end + run * u, share * (1 - u * u * (3 - 2 * u))));
+  }
+  return { firm, free };
 }
 
-/** The filled outline of the section and, where a side has no flank, nothing but the drop to the base. */
-export function outline(section: Section, frame: Frame): string {
-  const left = half(section, frame, "left").reverse();
+/** How far the soft fall beyond a side runs in the picture, metres: about as far as it falls, within bounds. */
+function freeRun(section: Section, side: Side): number {
+  const flank = section[side];
+  const relief = drawnRelief(section);
+  const share = flank === null ? 1 : flankShare(flank, relief, footM(flank, relief));
+  return share * Math.min(relief, 0.6 * (prescribedHalf(section) + relief));
+}
+
+export interface Outline {
+  /** The land, closed, to be filled. */
+  readonly land: string;
+  /** The prescribed surface. */
+  readonly firm: string;
+  /** The surface that the diffusion decides. */
+  readonly free: string;
+}
+
+/** The paths of the section. */
+export function outline(section: Section, frame: Frame): Outline {
+  const left = half(section, frame, "left");
   const right = half(section, frame, "right");
-  const text = [...left, ...right].map(([x, y]) => `${x.toFixed(1)} ${y.toFixed(1)}`);
-  return `M${text.join(" L")} Z`;
+  const text = (points: Points): string => points.map(([x, y]) => `${x.toFixed(1)} ${y.toFixed(1)}`).join(" L");
+  const reversed = (points: Points): Points => [...points].reverse();
+  return {
+    land: `M${text([...reversed(left.free), ...reversed(left.firm), ...right.firm, ...right.free])} Z`,
+    firm: `M${text([...reversed(left.firm), ...right.firm])}`,
+    free: `M${text(left.free)} M${text(right.free)}`,
+  };
 }
 
 /** The knobs of the section. A side without a flank has none; a side whose slope is free has no slope knob. */

@@ -49,9 +49,18 @@ export class EskSection extends LitElement {
       .land {
         fill: var(--land, var(--esk-mountain));
         fill-opacity: 0.2;
+      }
+      .firm,
+      .free {
+        fill: none;
         stroke: var(--land, var(--esk-mountain));
         stroke-width: 2;
         stroke-linejoin: round;
+        stroke-linecap: round;
+      }
+      .free {
+        stroke-width: 1.5;
+        stroke-dasharray: 1 4;
       }
       .knob {
         cursor: grab;
@@ -175,10 +184,13 @@ export class EskSection extends LitElement {
 
   protected override render(): TemplateResult {
     const frame = this.frame ?? fitFrame(this.section, WIDTH, HEIGHT);
+    const paths = outline(this.section, frame);
     return html`
       <svg viewBox="0 0 ${WIDTH} ${HEIGHT}" role="group" aria-label="Cross-section, seen along the stroke">
         ${svg`<line class="ground" x1="0" x2=${WIDTH} y1=${frame.baseY} y2=${frame.baseY}></line>
-        <path class="land" d=${outline(this.section, frame)}></path>`}
+        <path class="land" d=${paths.land}></path>
+        <path class="firm" d=${paths.firm}></path>
+        <path class="free" d=${paths.free}></path>`}
         ${knobs(this.section, frame).map((k) => this.#knob(k, frame))}
       </svg>
     `;

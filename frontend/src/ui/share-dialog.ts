@@ -199,7 +199,12 @@ export class EskShare extends SignalElement {
   #list(links: readonly AccessLink[]): TemplateResult {
     const alive = links.filter((l) => !l.revoked);
     return html`
-      <details>
+      <details
+        @toggle=${(e: Event) => {
+          // Others may have joined by code since: each of them has a link of their own.
+          if ((e.target as HTMLDetailsElement).open) void this.#try(() => this.#loadLinks());
+        }}
+      >
         <summary>Links of this terrain (${alive.length})</summary>
         <ul>
           ${alive.map(

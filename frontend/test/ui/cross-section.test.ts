@@ -66,7 +66,7 @@ describe("the picture", () => {
     fc.assert(
       fc.property(anySection, (section) => {
         const frame = fitFrame(section, 268, 124);
-        expect(outline(section, frame)).not.toMatch(/NaN|Infinity/);
+        expect(Object.values(outline(section, frame)).join()).not.toMatch(/NaN|Infinity/);
         for (const k of knobs(section, frame)) {
           expect(k.x).toBeGreaterThanOrEqual(0);
           expect(k.x).toBeLessThanOrEqual(268);
@@ -75,6 +75,21 @@ describe("the picture", () => {
         }
       }),
     );
+  });
+
+  it("shows what is prescribed apart from what is left free", () => {
+    const numbers = (path: string) =>
+      [...path.matchAll(/[ML]([-\d.]+) ([-\d.]+)/g)].map((m) => [Number(m[1]), Number(m[2])]);
+    const steep: Section = { left: flank(35, 512), right: null, plateauRadiusM: 0, reliefM: 900 };
+    const frame = fitFrame(steep, 268, 124);
+    const firm = numbers(outline(steep, frame).firm);
+    const end = 900 - 512 * Math.tan((35 * Math.PI) / 180);
+    expect(firm[0]![0]).toBeCloseTo(frame.centreX - 512 * frame.pxPerM, 0);
+    expect(firm[0]![1]).toBeCloseTo(frame.baseY - end * frame.pxPerM, 0);
+    expect(firm.at(-1)).toEqual([frame.centreX, Number(frame.crestY.toFixed(1))]);
+    const free = numbers(outline(steep, frame).free);
+    expect(free.at(-1)![1]).toBeCloseTo(frame.baseY, 0);
+    for (const [x] of free) expect(x).toBeLessThanOrEqual(268);
   });
 
   it("turns upside down for a crevice", () => {
