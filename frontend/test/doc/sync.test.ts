@@ -80,6 +80,27 @@ describe("one client", () => {
     expect(a.sync.outgoing()).toEqual([]);
   });
 
+  it("what was sent once keeps its content for good: after a cut it is sent again as it was", () => {
+    const world = new World();
+    const a = world.client("a");
+    a.sync.submit({ type: "stroke.begin", stroke: ridge("s") }, "g");
+    a.sync.submit(append("s", 0, [[0, 0]]), "g");
+    const sent = structuredClone(a.sync.outgoing());
+    a.sync.disconnected();
+    a.sync.submit(append("s", 1, [[0.5, 9]]), "g");
+    a.sync.submit(append("s", 2, [[1, 0]]), "g");
+    expect(a.sync.outgoing()).toEqual([]); // nobody is there
+    a.sync.welcome(world.server.welcome(0));
+    const again = a.sync.outgoing();
+    expect(again.slice(0, 2)).toEqual(sent);
+    expect(again.slice(2).map((e) => e.op)).toEqual([
+      append("s", 1, [
+        [0.5, 9],
+        [1, 0],
+      ]),
+    ]);
+  });
+
   it("keeps within the server's rate and message size", () => {
     const world = new World();
     const a = world.client("a");

@@ -607,9 +607,9 @@ describe("touch and pen (SPEC I48)", () => {
     const before = c.state.value.eye;
     fire("pointerdown", ...at(PEAK[0]!), pen);
     fire("pointermove", ...at(PEAK[1]!), pen);
-    fire("pointerdown", 100, 100, touch(2));
-    fire("pointermove", 300, 300, touch(2));
-    fire("pointerup", 300, 300, touch(2));
+    for (const finger of [2, 3]) fire("pointerdown", 100 * finger, 100, touch(finger));
+    for (const finger of [2, 3]) fire("pointermove", 300, 300 * finger, touch(finger));
+    for (const finger of [2, 3]) fire("pointerup", 300, 300, touch(finger));
     fire("pointermove", ...at(PEAK[2]!), pen);
     fire("pointerup", ...at(PEAK[2]!), pen);
     expect(only().finished).toBe(true);
