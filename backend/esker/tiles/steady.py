@@ -40,9 +40,8 @@ class Steadier:
         if self._reference is None:
             return heights
         before, correction = self._reference
-        moved = np.abs(heights - before)
-        if not moved.any():
-            return before + correction
+        moved = heights - before
+        np.abs(moved, out=moved)
         left = np.abs(correction)
         left -= moved
         np.maximum(left, 0, out=left)
