@@ -80,22 +80,50 @@ export function fitFrame(section: Section, width: number, height: number): Frame
   return { width, height, pxPerM, centreX: width / 2, baseY, crestY: baseY - sign * reliefPx };
 }
 
-/** Horizontal distance from the edge of the plateau to the foot of a flank, metres. */
-export function footM(flank: Flank, reliefM: number): number {
-  if (flank.slope_deg === null) return flank.extent_m;
-  const tangent = Math.tan(flank.slope_deg * DEG);
-  return tangent > 0 ? Math.min(flank.extent_m, Math.abs(reliefM) / tangent) : flank.extent_m;
+/** Shares of the crest height that a round shoulder and a round foot take, as the solver has them (SOFT_PART). */
+function rounding(flank: Flank): { readonly shoulder: number; readonly foot: number } {
+  return { shoulder: flank.shape === "convex" ? 0.5 : 0, foot: flank.shape === "concave" ? 0.5 : 0 };
 }
 
-/** Height of a flank over the base as a share of the relief, `t` metres out from the plateau's edge. */
+/** Horizontal distance from the edge of the plateau to where the band of a flank ends, metres. */
+export function footM(flank: Flank, reliefM: number): number {
+  if (flank.slope_deg === null) return flank.extent_m;
+  const { shoulder, foot } = rounding(flank);
+  const tangent = Math.tan(flank.slope_deg * DEG);
+  return tangent > 0 ? Math.min(flank.extent_m, ((1 + shoulder + foot) * Math.abs(reliefM)) / tangent) : flank.extent_m;
+}
+
+/**
+ * Height of a flank over the base as a share of the relief, `t` metres out from the plateau's edge: a parabolic
+ * shoulder, a straight part of the prescribed slope, a parabolic foot (backend/esker/solve/reference_raster.py).
+ */
 export function flankShare(flank: Flank, reliefM: number, t: number): number {
-  const foot = footM(flank, reliefM);
-  const u = foot > 0 ? Math.min(Math.max(t / foot, 0), 1) : 1;
-  if (flank.slope_deg === null) return 1 - u * u * (3 - 2 * u);
-  const fall = (Math.tan(flank.slope_deg * DEG) * foot) / Math.max(Math.abs(reliefM), 1e-9);
-  const bend =
-    flank.shape === "concave" ? u + 0.35 * u * (1 - u) : flank.shape === "convex" ? u - 0.35 * u * (1 - u) : u;
-  return 1 - Math.min(fall, 1) * bend;
+  if (flank.slope_deg === null) {
+    const u = flank.extent_m > 0 ? Math.min(Math.max(t / flank.extent_m, 0), 1) : 1;
+    return 1 - u * u * (3 - 2 * u);
+  }
+  const { shoulder: k, foot: f } = rounding(flank);
+  // In units of the relief: x is the distance in which the straight slope would fall by the whole relief.
+  const x = (Math.max(t, 0) * Math.tan(flank.slope_deg * DEG)) / Math.max(Math.abs(reliefM), 1e-9);
+  const rest = Math.max(1 + k + f - x, 0);
+  if (x < 2 * k) return 1 - (x * x) / (4 * k);
+  if (rest < 2 * f) return (rest * rest) / (4 * f);
+  return Math.max(1 + k - x, 0);
+}
+
+/** The slope, degrees, whose flank stands at a share 0..1 of the relief `t` metres out: the inverse of `flankShare`. */
+export function slopeThrough(flank: Flank, reliefM: number, t: number, share: number): number {
+  const { shoulder: k, foot: f } = rounding(flank);
+  const z = Math.min(Math.max(share, 0), 1);
+  const x = z > 1 - k ? 2 * Math.sqrt(k * (1 - z)) : z < f ? 1 + k + f - 2 * Math.sqrt(f * z) : 1 + k - z;
+  return Math.atan2(x * Math.abs(reliefM), Math.max(t, 1e-6)) / DEG;
+}
+
+/** Where the slope knob sits: the middle of the straight part, within the band. */
+function slopeKnobM(flank: Flank, slopeDeg: number, reliefM: number): number {
+  const { shoulder: k, foot: f } = rounding(flank);
+  const tangent = Math.max(Math.tan(slopeDeg * DEG), 1e-9);
+  return Math.min((((1 + 3 * k - f) / 2) * Math.abs(reliefM)) / tangent, 0.9 * flank.extent_m);
 }
 
 function reliefOf(frame: Frame): number {
@@ -183,7 +211,7 @@ export function knobs(section: Section, frame: Frame): Knob[] {
     const dir = side === "left" ? -1 : 1;
     const edge = section.plateauRadiusM;
     if (flank.slope_deg !== null) {
-      const t = footM(flank, relief) / 2;
+      const t = slopeKnobM(flank, flank.slope_deg, relief);
       out.push({
         id: `${side}-slope`,
         x: frame.centreX + dir * (edge + t) * frame.pxPerM,
@@ -257,8 +285,11 @@ export function drag(
       linked,
     );
   }
-  const drop = clamp(Math.abs(at.y - frame.crestY) / frame.pxPerM, 0, relief);
-  const slope = Math.atan2(drop, Math.max(t, 1e-6)) / DEG;
+  const flank = section[side];
+  if (flank === null) return section;
+  const share = 1 - Math.abs(at.y - frame.crestY) / Math.max(Math.abs(frame.baseY - frame.crestY), 1e-9);
+  const above = (at.y - frame.crestY) * (frame.baseY - frame.crestY) < 0;
+  const slope = slopeThrough(flank, relief, t, above ? 1 : share);
   return withFlank(section, side, { slope_deg: clamp(Math.round(slope), 1, MAX_SLOPE_DEG) }, linked);
 }
 

@@ -12,6 +12,7 @@ import {
   nudge,
   outline,
   type Section,
+  slopeThrough,
   symmetric,
 } from "../../src/ui/cross-section.ts";
 import { PRESETS, presetsFor } from "../../src/ui/presets.ts";
@@ -56,10 +57,31 @@ describe("the picture", () => {
     expect(flankShare(flank(45, 512), 200, 500)).toBeCloseTo(0, 9);
   });
 
-  it("bends concave flanks below and convex ones above the straight line", () => {
-    const share = (shape: Flank["shape"]) => flankShare(flank(40, 512, shape), 200, 100);
-    expect(share("concave")).toBeLessThan(share("straight"));
-    expect(share("convex")).toBeGreaterThan(share("straight"));
+  it("is the solver's flank: straight at the prescribed slope, round at a concave foot or a convex shoulder", () => {
+    const at = (shape: Flank["shape"], t: number) => 200 * flankShare(flank(45, 512, shape), 200, t);
+    expect([0, 100, 200, 300].map((t) => at("straight", t))).toEqual([200, 100, 0, 0].map((z) => expect.closeTo(z, 9)));
+    // Concave: straight down to half the height, then a parabola that ends level at 1.5 times the straight run.
+    expect([50, 100, 200, 300].map((t) => at("concave", t))).toEqual(
+      [150, 100, 25, 0].map((z) => expect.closeTo(z, 9)),
+    );
+    expect([100, 200, 300].map((t) => at("convex", t))).toEqual([175, 100, 0].map((z) => expect.closeTo(z, 9)));
+    expect(footM(flank(45, 512, "concave"), 200)).toBeCloseTo(300, 9);
+    expect(footM(flank(45, 512, "convex"), 200)).toBeCloseTo(300, 9);
+  });
+
+  it("finds the slope of the flank through any of its points", () => {
+    fc.assert(
+      fc.property(
+        fc.constantFrom<Flank["shape"]>("straight", "concave", "convex"),
+        fc.double({ min: 5, max: 80, noNaN: true }),
+        fc.double({ min: 0.05, max: 0.95, noNaN: true }),
+        (shape, slope, part) => {
+          const f = flank(slope, 1e6, shape);
+          const t = part * footM(f, 200);
+          expect(slopeThrough(f, 200, t, flankShare(f, 200, t))).toBeCloseTo(slope, 6);
+        },
+      ),
+    );
   });
 
   it("stays inside its box for every cross-section, with finite numbers", () => {
