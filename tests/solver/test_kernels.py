@@ -165,8 +165,8 @@ def test_restriction_is_the_transpose_of_prolongation() -> None:
 @pytest.mark.parametrize("scene", ["one", "cross", "loops", "fifty"])
 @pytest.mark.parametrize("settings", [SETTINGS, PINNED], ids=["free", "pinned"])
 def test_rasterise(device: Device, scene: str, settings: object) -> None:
-    """Float32 may pick the neighbouring segment within a few hundredths of a cell of a vertex, and see the slope of that
-    one; the heights hardly differ. So: tight for nearly all samples, loose for the rest."""
+    """Float32 may pick the neighbouring segment within a few hundredths of a cell of a vertex, and see the slope of
+    that one; the heights hardly differ. So: tight for nearly all samples, loose for the rest."""
     level = 3
     assert isinstance(settings, type(SETTINGS))
     tables = pack(SCENES[scene], settings, level)
@@ -187,13 +187,17 @@ def test_rasterise(device: Device, scene: str, settings: object) -> None:
     assert (fixed != twin).sum() <= 4
 
 
+def blocks(a: Field) -> Field:
+    """Samples of 17 x 17 bins, bin by bin."""
+    return a.reshape(17, 16, 17, 16).swapaxes(1, 2).reshape(-1, 16, 16)
+
+
 def test_nearest_segment_is_that_of_a_full_search() -> None:
     """The candidates of a bin always hold the nearest segment of every sample."""
     tables = pack(SCENES["cross"], SETTINGS, 2)
     for k, (first, count, _, _) in enumerate(tables.index):
         seg = tables.segments[:, first : first + count]
         y, x = np.mgrid[: bins(257) * 16 : 1, : bins(257) * 16 : 1].astype(float)
-        blocks = lambda a: a.reshape(17, 16, 17, 16).swapaxes(1, 2).reshape(-1, 16, 16)  # noqa: E731
         near = reference_raster._nearest(seg, blocks(x), blocks(y), tables.strokes[k, 3])
         best = np.full(x.shape, 1e30)
         for j in range(count):

@@ -11,8 +11,8 @@ from esker.contract import TerrainSettings
 from esker.solve import multigrid, reference, reference_raster
 from esker.solve.assembly import assemble
 from esker.solve.constraints import pack
-from esker.solve.levels import ClWorkspace
 from esker.solve.device import Device
+from esker.solve.levels import ClWorkspace
 from esker.solve.solver import Solver
 from tests.solver.scenes import ENDLESS, PINNED, SCENES, SETTINGS, SIZE, flank, ridge
 

@@ -55,6 +55,11 @@ def loads(data: bytes) -> Document:
             text = _read(file, _DOCUMENT, min(MAX_DOCUMENT_BYTES, MAX_RATIO * len(data) + MAX_HEADER_BYTES))
     except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, EOFError, OSError) as error:
         raise ArchiveError("This is not an .esker file, or it is damaged.") from error
+    return document_from_json(text)
+
+
+def document_from_json(text: bytes) -> Document:
+    """A document from JSON text. Raises ArchiveError that names the first field that is wrong."""
     try:
         return Document.model_validate_json(text)
     except ValidationError as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -40,20 +41,29 @@ def system(d: NDArray[np.float64], f: NDArray[np.float64], screening: float) -> 
     n = len(d)
     share = np.ones(n)
     share[[0, -1]] = 0.5
-    weight = np.outer(share, share)
+    weight = np.outer(share, share).ravel()
+    fixed = (d < 0).ravel()
+    a = _laplacian(n, share) + _diagonal(weight * (np.maximum(d, 0).ravel() + screening))
+    free = _diagonal((~fixed).astype(np.float64))
+    value = np.where(fixed, f.ravel(), 0.0)
+    b = np.where(fixed, value, weight * f.ravel() - a @ value)
+    out = sp.csr_array(free @ a @ free + _diagonal(fixed.astype(np.float64)))
+    out.eliminate_zeros()
+    return out, b
+
+
+def _diagonal(values: NDArray[np.float64]) -> Any:
+    return sp.diags_array(values, offsets=0, format="csr")
+
+
+def _laplacian(n: int, share: NDArray[np.float64]) -> Any:
+    """Sum of differences over the edges of an n x n grid; edges along a border count half."""
     degree = np.full(n, 2.0)
     degree[[0, -1]] = 1.0
-    line = sp.csr_array(sp.diags_array([degree, -np.ones(n - 1), -np.ones(n - 1)], offsets=[0, 1, -1]))
-    half = sp.diags_array(share)
-    a = sp.kron(half, line) + sp.kron(line, half)
-    fixed = (d < 0).ravel()
-    a = sp.csr_array(a + sp.diags_array((weight * (np.maximum(d, 0) + screening)).ravel()))
-    free = sp.diags_array((~fixed).astype(np.float64))
-    value = np.where(fixed, f.ravel(), 0.0)
-    b = np.where(fixed, value, (weight * f).ravel() - a @ value)
-    a = sp.csr_array(free @ a @ free + sp.diags_array(fixed.astype(np.float64)))
-    a.eliminate_zeros()
-    return a, b
+    side: Any = [degree, -np.ones(n - 1), -np.ones(n - 1)]
+    line: Any = sp.diags_array(side, offsets=[0, 1, -1], format="csr")
+    half = _diagonal(share)
+    return sp.csr_array(sp.kron(half, line) + sp.kron(line, half))
 
 
 def _diffuse(gradient: reference.NumpySystem) -> None:

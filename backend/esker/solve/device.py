@@ -152,4 +152,4 @@ def _compile(context: Any, source: str) -> Any:
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", cl.CompilerWarning)
-        return cl.Program(context, source).build(["-cl-mad-enable"], cache_dir=False)
+        return cl.Program(context, source).build(["-cl-mad-enable"])

@@ -1,0 +1,146 @@
+"""The terrain is a pure function of its strokes, and solving can be watched and stopped (SPEC S15 to S18)."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from esker import grid
+from esker.contract import Stroke
+from esker.solve.solver import LevelResult, Solver
+from tests.solver.scenes import PINNED, SCENES, SETTINGS, SIZE, flank, mixed, ridge
+
+TOP = 3
+"""Level 3 keeps the twenty orders under ten seconds on two slow cores; level 4 is covered once."""
+
+
+def edited(order: np.random.Generator, strokes: list[Stroke], solver: Solver, level: int) -> np.ndarray:
+    """The final set reached by a random walk: strokes come in any order, some drawn in pieces, some twice."""
+    now: dict[str, Stroke] = {}
+    for k in order.permutation(len(strokes)):
+        s = strokes[k]
+        now[s.id] = s.model_copy(update={"curve": s.curve[: max(1, len(s.curve) // 2)]})
+        if order.random() < 0.2:
+            now["passing"] = ridge((500, 500), (3000, 3000), 300, flank(), "passing")
+        if order.random() < 0.08:
+            solver.solve(list(now.values()), SETTINGS, level, should_stop=lambda: order.random() < 0.3)
+        now.pop("passing", None)
+        now[s.id] = s
+    return solver.solve(list(now.values()), SETTINGS, level)[level]
+
+
+def test_any_order_of_edits(solver: Solver) -> None:
+    """SPEC S15: twenty random edit orders of fifty strokes, bit by bit."""
+    strokes = mixed(50, 11)
+    fresh = Solver().solve(strokes, SETTINGS, TOP)[TOP]
+    for seed in range(20):
+        assert np.array_equal(edited(np.random.default_rng(seed), strokes, solver, TOP), fresh)
+
+
+def test_order_at_level_four(solver: Solver) -> None:
+    strokes = mixed(50, 11)
+    a, b = solver.solve(strokes, SETTINGS, 4)[4], Solver().solve(strokes[::-1], SETTINGS, 4)[4]
+    assert np.array_equal(a, b)
+
+
+@pytest.mark.parametrize("scene", ["five", "loops", "bare"])
+def test_warm_start(solver: Solver, scene: str) -> None:
+    """SPEC S15: a start from a wrong guess ends within one quantisation step."""
+    strokes = SCENES[scene]
+    cold = solver.solve(strokes, SETTINGS, TOP)
+    guess = solver.solve([*strokes, ridge((600, 3000), (3300, 600), 350, flank(), "gone")], SETTINGS, TOP)
+    warm = solver.solve(strokes, SETTINGS, TOP, guess=guess)
+    assert warm.settled
+    assert np.abs(warm[TOP] - cold[TOP]).max() < grid.quantum(TOP, SIZE)
+
+
+def test_steps_of_a_solve(solver: Solver) -> None:
+    """SPEC S16."""
+    results = list(solver.steps(SCENES["five"], SETTINGS, TOP))
+    previews = [r for r in results if not r.settled]
+    settled = [r for r in results if r.settled]
+    assert [r.level for r in previews[: TOP + 1]] == list(range(TOP + 1))
+    assert all(r.level == 0 and r.heights is previews[0].heights for r in previews[TOP + 1 :])
+    assert [r.level for r in settled] == list(range(TOP + 1))
+    for r in results:
+        assert r.heights.dtype == np.float32
+        assert r.heights.shape == (grid.samples(r.level),) * 2
+        assert r.heights.flags.c_contiguous
+        with pytest.raises(ValueError, match="read-only"):
+            r.heights[0, 0] = 1
+    for coarse, fine in pairwise(settled):
+        assert np.array_equal(coarse.heights, fine.heights[::2, ::2])
+
+
+@pytest.mark.parametrize("scene", list(SCENES))
+def test_previews_are_close(solver: Solver, scene: str) -> None:
+    """SPEC S18."""
+    results = [r for r in solver.steps(SCENES[scene], SETTINGS, TOP) if r.level == TOP]
+    preview, settled = results
+    relief = max(float(np.ptp(settled.heights)), 1.0)
+    assert np.abs(preview.heights - settled.heights).max() < 2e-2 * relief
+    assert np.sqrt(np.mean((preview.heights - settled.heights) ** 2)) < 2e-3 * relief
+
+
+def test_close_and_go_on(solver: Solver) -> None:
+    """SPEC S17: closing at every possible moment."""
+    whole = solver.solve(SCENES["five"], SETTINGS, 2)[2]
+    count = len(list(solver.steps(SCENES["five"], SETTINGS, 2)))
+    for stop in range(count):
+        run = solver.steps(SCENES["cross"], SETTINGS, 2)
+        for _ in range(stop):
+            next(run)
+        run.close()  # type: ignore[attr-defined]
+        assert np.array_equal(solver.solve(SCENES["five"], SETTINGS, 2)[2], whole)
+
+
+def test_interleaved_solves(solver: Solver) -> None:
+    """SPEC S15, S17: many rooms, round robin by level, of different sets, settings and sizes."""
+    jobs = [(SCENES[n], s, level) for n, s, level in
+            (("five", SETTINGS, 2), ("fifty", SETTINGS, 3), ("cross", PINNED, 2), ("tiny", SETTINGS, 1),
+             ("loops", SETTINGS, 3), ("one", SETTINGS, 0))]  # fmt: skip
+    alone = [Solver().solve(*job)[job[2]] for job in jobs]
+    running = {k: solver.steps(*job) for k, job in enumerate(jobs)}
+    last: dict[int, LevelResult] = {}
+    while running:
+        for k in list(running):
+            result = next(running[k], None)
+            if result is None:
+                del running[k]
+            else:
+                last[k] = result
+    for k, heights in enumerate(alone):
+        assert np.array_equal(last[k].heights, heights)
+
+
+def test_stop_between_levels(solver: Solver) -> None:
+    seen: list[LevelResult] = []
+    pyramid = solver.solve(SCENES["five"], SETTINGS, 3, on_level=seen.append, should_stop=lambda: len(seen) == 2)
+    assert not pyramid.settled
+    assert len(pyramid) == 2
+    assert [r.level for r in seen] == [0, 1]
+
+
+def test_levels_are_checked(solver: Solver) -> None:
+    for level in (-1, 7):
+        with pytest.raises(ValueError, match=r"0\.\.6"):
+            solver.steps([], SETTINGS, level)
+    with pytest.raises(ValueError, match="max_level"):
+        Solver(device="numpy", max_level=9)
+
+
+def test_an_error_while_loading_is_not_remembered(solver: Solver, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A raster that failed half-way is done again in full."""
+    good = solver.solve(SCENES["five"], SETTINGS, 2)[2]
+
+    def fail(*_: object) -> None:
+        raise RuntimeError("lost the device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr("esker.solve.levels.ClSystem.coarsen", fail)
+        patch.setattr("esker.solve.reference.coarsen", fail)
+        with pytest.raises(RuntimeError):
+            solver.solve(SCENES["five"][1:], SETTINGS, 2)
+    assert np.array_equal(solver.solve(SCENES["five"], SETTINGS, 2)[2], good)
