@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 
 from esker import contract as c
-from esker.document.ops import Limits, Refusal, StrokeSet
+from esker.document.ops import GROUND_FIELDS, Limits, Refusal, StrokeSet
 from esker.document.strokes import bounds
 from esker.document.undo import STROKE_WORDS, UndoStack, inverse
 from esker.document.wire import op_json
@@ -94,6 +94,17 @@ def _state(document: StrokeSet) -> dict[str, object]:
             found[f"{stroke.id}.state"] = place
             found |= {f"{stroke.id}.{name}": getattr(stroke, name) for name in STROKE_WORDS}
     return found
+
+
+def test_a_label_leaves_the_ground_alone() -> None:
+    document = StrokeSet(
+        "t", strokes={"s": c.Stroke(id="s", kind="level", first=(0, 0, 0), last=(9, 0, 0), curve=((0, 0),))}
+    )
+    for fields in ({"label": "x"}, {"locked": True}, {"locked": False}):
+        document, dirty = document.apply(c.SetStroke(stroke="s", fields=c.StrokeFields.model_validate(fields)))
+        assert dirty is None
+    _, dirty = document.apply(c.SetStroke(stroke="s", fields=c.StrokeFields(plateau_radius_m=5.0)))
+    assert dirty == Rect(-5, -5, 5, 5)
 
 
 @given(op=ops)
@@ -182,7 +193,7 @@ class Session(RuleBasedStateMachine):
         """Whatever constrains the ground differently lies in the dirty rectangle."""
         for stroke in before.strokes.keys() | after.strokes.keys():
             old, new = before.strokes.get(stroke), after.strokes.get(stroke)
-            if old == new:
+            if old is not None and new is not None and all(getattr(old, n) == getattr(new, n) for n in GROUND_FIELDS):
                 continue
             for rect in (bounds(s) for s in (old, new) if s is not None):
                 if rect is not None:

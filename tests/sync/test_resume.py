@@ -205,6 +205,27 @@ def test_presence_is_coalesced(server: LiveServer) -> None:
     bob.close()
 
 
+def test_an_idle_room_closes_and_opens_again(tmp_path: Path) -> None:
+    with LiveServer(tmp_path) as server:
+        hub = server.assembly.hub
+        hub._idle_seconds = 0.1
+        terrain, secret = server.create()
+        peer = server.join(terrain, secret)
+        peer.ops(("c1:1", stroke()))
+        _acked(peer, "c1:1")
+        peer.close()
+        deadline = time.monotonic() + 5
+        while hub.open_room(terrain) is not None:
+            assert time.monotonic() < deadline
+            time.sleep(0.02)
+        peer = server.join(terrain, secret, clock=0)
+        assert peer.welcome["ops"][0]["id"] == "c1:1"
+        time.sleep(0.3)
+        assert hub.open_room(terrain) is not None, "a room with somebody in it stays open"
+        peer.settled(1)
+        peer.close()
+
+
 @pytest.mark.parametrize("count", [60])
 def test_sixty_joins_at_once_into_a_cold_room(tmp_path: Path, count: int) -> None:
     import threading

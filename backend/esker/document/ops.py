@@ -7,11 +7,15 @@ page; ``tests/vectors/ops.json`` holds the cases that both languages read.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Final
 
 from esker import contract as c
 from esker.contract import Op, RejectCode, Stroke, TerrainSettings
-from esker.document.strokes import bounds, world_points
+from esker.document.strokes import Points, bounds, world_points
 from esker.grid import Rect
+
+GROUND_FIELDS: Final = frozenset(c.StrokeFields.model_fields) - {"label", "locked"}
+"""Fields of a stroke that the ground depends on; changing another one leaves the ground alone."""
 
 
 class Refusal(Exception):
@@ -32,6 +36,8 @@ class StrokeSet:
     strokes: dict[str, Stroke] = field(default_factory=dict)
     deleted: dict[str, Stroke] = field(default_factory=dict)
     clock: int = 0
+    _rects: dict[str, tuple[Stroke, Rect | None]] = field(default_factory=dict, compare=False, repr=False)
+    """Bounds of strokes as last seen, with the stroke they were computed for: a cache that successors share."""
 
     @classmethod
     def from_document(cls, document: c.Document) -> StrokeSet:
@@ -62,7 +68,7 @@ class StrokeSet:
         editor = _Editor(self, limits or Limits())
         editor.run(op)
         return (
-            StrokeSet(self.id, editor.settings, editor.strokes, editor.deleted, self.clock + 1),
+            StrokeSet(self.id, editor.settings, editor.strokes, editor.deleted, self.clock + 1, self._rects),
             editor.dirty,
         )
 
@@ -81,6 +87,7 @@ class _Editor:
     def __init__(self, base: StrokeSet, limits: Limits) -> None:
         self.strokes, self.deleted, self.settings = base.strokes, base.deleted, base.settings
         self.limits = limits
+        self._rects = base._rects
         self.dirty: Rect | None = None
         self._copied = False
 
@@ -98,7 +105,7 @@ class _Editor:
             case c.AppendPoints():
                 self._append(op)
             case c.FinishStroke():
-                self._put(self._live(op.stroke).model_copy(update={"finished": True}))
+                self._relabel(self._live(op.stroke).model_copy(update={"finished": True}))
             case c.SetStroke():
                 self._set(op)
             case c.MoveAnchor():
@@ -129,28 +136,47 @@ class _Editor:
             raise Refusal("locked_stroke", "This stroke is locked. Unlock it to change it.")
         return stroke
 
-    def _put(self, stroke: Stroke) -> None:
-        self._check(stroke)
+    def _relabel(self, stroke: Stroke) -> None:
+        """Replaces a stroke by one that is the same to the ground."""
         self._own()
-        old = self.strokes.get(stroke.id)
-        self._touch(old)
-        self._touch(stroke)
+        known = self._rects.get(stroke.id)
+        if known is not None and known[0] is self.strokes[stroke.id]:
+            self._rects[stroke.id] = (stroke, known[1])
         self.strokes[stroke.id] = stroke
 
-    def _touch(self, stroke: Stroke | None) -> None:
-        rect = bounds(stroke) if stroke is not None else None
+    def _put(self, stroke: Stroke) -> None:
+        points = self._check(stroke)
+        self._own()
+        old = self.strokes.get(stroke.id)
+        if old is not None:
+            self._touch(self._bounds(old))
+        rect = bounds(stroke, points)
+        self._rects[stroke.id] = (stroke, rect)
+        self._touch(rect)
+        self.strokes[stroke.id] = stroke
+
+    def _bounds(self, stroke: Stroke) -> Rect | None:
+        known = self._rects.get(stroke.id)
+        if known is None or known[0] is not stroke:
+            known = self._rects[stroke.id] = (stroke, bounds(stroke))
+        return known[1]
+
+    def _touch(self, rect: Rect | None) -> None:
         if rect is not None:
             self.dirty = rect.union(self.dirty)
 
-    def _check(self, stroke: Stroke) -> None:
+    def _check(self, stroke: Stroke) -> Points:
+        """The stroke's world points. Raises Refusal where there are too many or they lie too far away."""
         if len(stroke.curve) > self.limits.points:
             raise Refusal("too_many_points", f"A stroke holds at most {self.limits.points} points.")
         bound = c.DOMAIN_MARGIN * self.settings.size_m
         anchors = (*stroke.first, *stroke.last)
         if any(abs(v) > bound for v in anchors):
             raise Refusal("out_of_domain", "An anchor lies farther than ten times the terrain from its corner.")
-        if stroke.curve and abs(world_points(stroke)).max() > bound:
+        points = world_points(stroke)
+        if stroke.curve and abs(points).max() > bound:
             raise Refusal("out_of_domain", "A point lies farther than ten times the terrain from its corner.")
+        return points
 
     def _begin(self, stroke: Stroke) -> None:
         if stroke.id in self.strokes or stroke.id in self.deleted:
@@ -170,12 +196,17 @@ class _Editor:
         update = changed(op.fields, c.NULLABLE_STROKE_FIELDS)
         if old.locked and set(update) - {"locked"}:
             raise Refusal("locked_stroke", "This stroke is locked. Unlock it to change it.")
-        self._put(old.model_copy(update=update))
+        changed_stroke = old.model_copy(update=update)
+        if GROUND_FIELDS.isdisjoint(update):
+            self._relabel(changed_stroke)
+        else:
+            self._put(changed_stroke)
 
     def _delete(self, stroke_id: str) -> None:
         old = self._editable(stroke_id)
         self._own()
-        self._touch(old)
+        self._touch(self._bounds(old))
+        self._rects.pop(stroke_id, None)
         del self.strokes[stroke_id]
         self.deleted[stroke_id] = old
         while len(self.deleted) > c.MAX_STROKES:  # never a setting: a replay must forget what was forgotten then

@@ -60,10 +60,13 @@ def influence_extent(stroke: Stroke) -> float:
     return stroke.plateau_radius_m + max((f.extent_m for f in sides if f is not None), default=0.0)
 
 
-def bounds(stroke: Stroke) -> Rect | None:
-    """The rectangle outside which the stroke constrains nothing; None for a stroke without effect."""
+def bounds(stroke: Stroke, points: Points | None = None) -> Rect | None:
+    """The rectangle outside which the stroke constrains nothing; None for a stroke without effect.
+
+    ``points``: its ``world_points``, where the caller has them already.
+    """
     if stroke.hidden or not stroke.curve:
         return None
-    xy = world_points(stroke)[:, :2]
+    xy = (world_points(stroke) if points is None else points)[:, :2]
     low, high = xy.min(axis=0), xy.max(axis=0)
     return Rect(float(low[0]), float(low[1]), float(high[0]), float(high[1])).grown(influence_extent(stroke))

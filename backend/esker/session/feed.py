@@ -10,7 +10,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable
-from concurrent.futures import Executor, Future
+from concurrent.futures import CancelledError, Executor, Future
 from dataclasses import dataclass
 from typing import Final
 
@@ -91,9 +91,12 @@ class TileFeed:
 
     def put(self, clock: int, result: LevelResult) -> None:
         """Takes a solved level. Called in the solver's thread; waits while an earlier level is still being taken."""
-        while len(self._puts) > PUTS_AHEAD - 1:
-            self._puts.pop(0).result()
-        self._puts.append(self._executor.submit(self._put, clock, result))
+        try:
+            while len(self._puts) > PUTS_AHEAD - 1:
+                self._puts.pop(0).result()
+            self._puts.append(self._executor.submit(self._put, clock, result))
+        except (CancelledError, RuntimeError):
+            log.debug("the tile thread has stopped")
 
     # --- in the tile thread ---------------------------------------------------------------------------------------
 

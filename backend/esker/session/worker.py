@@ -60,6 +60,7 @@ class Worker:
         self._factory, self._device, self._now = factory, device, now
         self._changed = threading.Condition()
         self._clients: list[Client] = []
+        self._leaving: list[Client] = []
         self._stopping = False
         self._failures = 0
         self._solver: Solver | None = None
@@ -99,7 +100,9 @@ class Worker:
         with self._changed:
             if client in self._clients:
                 self._clients.remove(client)
+                self._leaving.append(client)
             client.newest = None
+            self._changed.notify()
 
     def stop(self) -> None:
         """Ends the thread at the next level boundary."""
@@ -121,11 +124,15 @@ class Worker:
             self._ready.set()
         while True:
             with self._changed:
-                while not self._stopping and not any(x.newest or x.steps for x in self._clients):
+                while not self._stopping and not self._leaving and not any(map(_active, self._clients)):
                     self._changed.wait()
                 if self._stopping:
                     return
-                turn = [x for x in self._clients if x.newest or x.steps]
+                turn = [x for x in self._clients if _active(x)]
+                leaving, self._leaving = self._leaving, []
+            for client in leaving:  # a solve must end in the thread that began it
+                _close(client.steps)
+                client.steps = None
             for client in turn:
                 if self._stopping:
                     return
@@ -150,7 +157,10 @@ class Worker:
             client.previewing = False
             client.finest_at = self._now()
         if client in self._clients:
-            client.deliver(job.clock, result)
+            try:
+                client.deliver(job.clock, result)
+            except Exception:
+                log.exception("level %d at clock %d could not be delivered", result.level, job.clock)
 
     def _maybe_restart(self, client: Client) -> None:
         with self._changed:
@@ -185,6 +195,10 @@ class Worker:
                 with self._changed:
                     other.newest = other.newest or other.running
         client.failed(job.clock, note)
+
+
+def _active(client: Client) -> bool:
+    return client.newest is not None or client.steps is not None
 
 
 def _close(steps: Iterator[LevelResult] | None) -> None:
