@@ -2,7 +2,7 @@
 FROM node:22-bookworm-slim AS page
 WORKDIR /esker
 COPY frontend/package.json frontend/package-lock.json frontend/.npmrc frontend/
-RUN npm --prefix frontend ci
+RUN npm --prefix frontend install --no-save
 COPY shaders shaders
 COPY frontend frontend
 RUN npm --prefix frontend run build

