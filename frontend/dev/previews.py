@@ -17,17 +17,22 @@ from playwright.sync_api import Page, sync_playwright
 
 OUT = Path(__file__).resolve().parents[1] / "public" / "templates"
 SIZE = (640, 400)
-FLAGS = (
-    "--no-sandbox --enable-unsafe-webgpu --enable-features=Vulkan --use-vulkan=swiftshader --use-angle=swiftshader "
-    "--disable-background-networking --disable-component-update --disable-sync --disable-quic --no-first-run"
-).split()
+FLAGS = [
+    "--no-sandbox",
+    "--enable-unsafe-webgpu",
+    "--enable-features=Vulkan",
+    "--use-vulkan=swiftshader",
+    "--use-angle=swiftshader",
+    "--disable-background-networking",
+    "--no-first-run",
+]
 # Drag with the right button (turn, tilt) and wheel, in pixels, from the view of the whole terrain.
 VIEWS = {
-    "figure-six": (60, -70, -420),
-    "alpine-ridge": (90, -110, -520),
-    "canyon": (-60, -50, -520),
-    "volcanic-island": (40, -90, -520),
-    "archipelago": (50, -80, -560),
+    "figure-six": (40, -40, -300),
+    "alpine-ridge": (70, -60, -330),
+    "canyon": (90, -10, -330),
+    "volcanic-island": (40, -55, -420),
+    "archipelago": (30, -25, -330),
 }
 CHROME = "esk-top-bar, esk-tools, .foot, .hint, esk-overlay, esk-toasts"
 
@@ -57,9 +62,10 @@ def picture(page: Page, base: str, template: str) -> None:
     page.mouse.move(x + dx, y + dy, steps=8)
     page.mouse.up(button="right")
     page.mouse.wheel(0, wheel)
-    hide = f"document.querySelector('esk-terrain').shadowRoot.querySelectorAll('{CHROME}').forEach(e => e.style.display = 'none')"
-    page.evaluate(hide)
-    page.wait_for_timeout(6000)
+    parts = f"document.querySelector('esk-terrain').shadowRoot.querySelectorAll('{CHROME}')"
+    page.evaluate(f"{parts}.forEach((part) => (part.style.display = 'none'))")
+    page.wait_for_timeout(3000)
+    wait(page, "!window.esker.stats().busy", 30)
     shot = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
     shot.resize(SIZE, Image.Resampling.LANCZOS).save(OUT / f"{template}.webp", quality=84, method=6)
     sys.stdout.write(f"{template}: {(OUT / f'{template}.webp').stat().st_size // 1024} KiB\n")

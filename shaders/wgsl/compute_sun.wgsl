@@ -19,8 +19,8 @@ struct SunList {
 
 const NO_SLOT: u32 = 0xffffffffu;
 // Fewer on software adapters (gpu/tilecompute.ts).
-override SUN_STEPS: i32 = 40;
-override SUN_GROWTH: f32 = 0.14;
+override SUN_STEPS: i32 = 60;
+override SUN_GROWTH: f32 = 0.1;
 override SKY_DIRECTIONS: i32 = 8;
 override SKY_STEPS: i32 = 6;
 
@@ -42,19 +42,16 @@ struct Place {
 
 // Where a world position lies in the atlas: in `wanted` or the nearest coarser level that is there.
 fn locate(at: vec2f, wanted: u32) -> Place {
-  var level = wanted;
   let p = clamp(at / list.size, vec2f(0.0), vec2f(0.999999));
-  loop {
-    let across = f32(1u << level);
-    let tile = vec2u(p * across);
-    let slot = page(level, tile);
-    if (slot != NO_SLOT || level == 0u) {
-      let s = (p * across - vec2f(tile)) * f32(TILE_CELLS);
-      let i = vec2i(s);
-      return Place(slot_origin(slot) + i, slot_layer(slot), s - vec2f(i));
-    }
+  var level = wanted;
+  var slot = page(level, vec2u(p * f32(1u << level)));
+  while (slot == NO_SLOT && level > 0u) {
     level -= 1u;
+    slot = page(level, vec2u(p * f32(1u << level)));
   }
+  let in_tile = fract(p * f32(1u << level)) * f32(TILE_CELLS);
+  let i = vec2i(in_tile);
+  return Place(slot_origin(slot) + i, slot_layer(slot), in_tile - vec2f(i));
 }
 
 fn ground(at: vec2f, wanted: u32) -> f32 {
@@ -96,7 +93,7 @@ fn sun_visibility(origin_m: vec3f, cell: f32, level: u32) -> f32 {
     if (z > list.high || !inside(at)) { break; }
     let step = max(cell, t * SUN_GROWTH);
     // How far the ray clears the ground, in half penumbras; never sharper than the samples can show.
-    let gap = (z - ground(at, level_for(step, level))) / (t * list.sun.w + 0.5 * cell * rise);
+    let gap = (z - ground(at, level_for(0.7 * step, level))) / (t * list.sun.w + 0.5 * cell * rise);
     free = min(free, 0.5 + 0.5 * gap);
     if (free <= 0.0) { return 0.0; }
     t += step;

@@ -62,7 +62,7 @@ class JobPass {
 }
 
 /** A shorter march where the device computes on the CPU. */
-const SOFTWARE_MARCH = { SUN_STEPS: 24, SUN_GROWTH: 0.22, SKY_DIRECTIONS: 5, SKY_STEPS: 4 };
+const SOFTWARE_MARCH = { SUN_STEPS: 32, SUN_GROWTH: 0.18, SKY_DIRECTIONS: 5, SKY_STEPS: 4 };
 
 function pipeline(
   device: GPUDevice,

@@ -12,6 +12,7 @@ import type {
   Vec3,
 } from "../../src/core/types.ts";
 import { createMapRenderer, createRenderer } from "../../src/gpu/index.ts";
+import { crackTest } from "./cracks.ts";
 import { alpineField, FieldView, lookAt, mapCamera } from "./world.ts";
 
 export const SETTINGS: TerrainSettings = {
@@ -163,6 +164,24 @@ async function shoot(shot: Shot): Promise<FrameStats & { frames: number; descrip
   }
 }
 
+/** The picture of a shot as a PNG data URL, read in the task that drew it. */
+async function picture(shot: Shot): Promise<string> {
+  await shoot(shot);
+  const canvas = document.querySelector<HTMLCanvasElement>(shot.sheet === true ? "#sheet" : "canvas")!;
+  if (shot.sheet !== true) {
+    // A WebGPU canvas keeps its picture only until the task ends: draw once more, changed by nothing that shows.
+    const used = renderer!;
+    const again = scene(shot, shot.width ?? 1280, shot.height ?? 720);
+    for (;;) {
+      const before = used.render({ ...again, tauPx: again.tauPx * (1 + 1e-9) }).busy;
+      const url = canvas.toDataURL("image/png");
+      if (!before) return url;
+      await new Promise((done) => setTimeout(done, 16));
+    }
+  }
+  return canvas.toDataURL("image/png");
+}
+
 /** Draws `frames` frames of a circling camera, waiting for the device after each; milliseconds per frame. */
 async function circle(shot: Shot, frames: number): Promise<{ ms: number; patches: number }> {
   const began = performance.now();
@@ -180,4 +199,4 @@ async function circle(shot: Shot, frames: number): Promise<{ ms: number; patches
   return { ms: (performance.now() - began) / frames, patches };
 }
 
-Object.assign(globalThis, { esker: { shoot, circle } });
+Object.assign(globalThis, { esker: { shoot, picture, circle, crackTest } });

@@ -1,0 +1,83 @@
+"""The renderer's harness page in a real Chromium: Vite serves the sources, nothing is built."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from playwright.sync_api import Page, sync_playwright
+
+FRONTEND = Path(__file__).resolve().parents[2] / "frontend"
+# WebGPU in headless Chromium on a machine without a GPU needs all of these (DESIGN 16).
+FLAGS = [
+    "--no-sandbox",
+    "--enable-unsafe-webgpu",
+    "--enable-features=Vulkan",
+    "--use-vulkan=swiftshader",
+    "--use-angle=swiftshader",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--disable-quic",
+    "--no-first-run",
+]
+
+
+def _free_port() -> int:
+    with socket.socket() as s:
+        s.bind(("127.0.0.1", 0))
+        return int(s.getsockname()[1])
+
+
+@contextmanager
+def _vite() -> Iterator[str]:
+    port = _free_port()
+    vite = FRONTEND / "node_modules" / "vite" / "bin" / "vite.js"
+    # No file watching: an edit during the run must not reload the page.
+    env = {**os.environ, "CI": "1", "CHOKIDAR_USEPOLLING": "0"}
+    process = subprocess.Popen(
+        ["node", str(vite), "--port", str(port), "--strictPort", "--host", "127.0.0.1", "--mode", "test"],
+        cwd=FRONTEND,
+        env=env,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        start_new_session=True,
+    )
+    assert process.stdout is not None
+    try:
+        seen = ""
+        for line in process.stdout:
+            seen += line
+            if "Local" in line:
+                break
+        else:
+            raise RuntimeError(f"vite did not start:\n{seen}")
+        yield f"http://127.0.0.1:{port}"
+    finally:
+        os.killpg(process.pid, signal.SIGTERM)
+        process.wait(20)
+        process.stdout.close()
+
+
+@contextmanager
+def open_harness() -> Iterator[Page]:
+    """The harness page, ready. Console errors fail the caller at the end."""
+    problems: list[str] = []
+    with _vite() as url, sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path="/usr/bin/chromium", args=FLAGS)
+        try:
+            page = browser.new_page(viewport={"width": 800, "height": 600})
+            page.on("pageerror", lambda error: problems.append(str(error)))
+            page.on("console", lambda m: problems.append(m.text) if m.type == "error" else None)
+            page.goto(f"{url}/dev/renderer.html")
+            page.wait_for_function("globalThis.esker !== undefined", timeout=60_000)
+            yield page
+        finally:
+            browser.close()
+    assert not problems, problems
