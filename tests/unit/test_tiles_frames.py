@@ -11,8 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.vectors import make_tiles
 
+from esker.contract import Predictor
 from esker.tiles.decoder import FrameDecoder
-from esker.tiles.frame import FrameError
+from esker.tiles.frame import FrameError, read_frame
 
 VECTORS: dict[str, Any] = json.loads(make_tiles.PATH.read_text())
 SESSION = [base64.b64decode(step["frame"]) for step in VECTORS["sessions"][0]["steps"]]
@@ -38,6 +39,16 @@ def test_regenerating_the_vectors_changes_no_sample() -> None:
     for mine, theirs in zip(new["sessions"], VECTORS["sessions"], strict=True):
         assert [s["decoded"] for s in mine["steps"]] == [s["decoded"] for s in theirs["steps"]]
     assert [m["name"] for m in new["malformed"]] == [m["name"] for m in VECTORS["malformed"]]
+
+
+def test_the_vectors_use_every_predictor_where_it_matters() -> None:
+    kinds = {
+        session["name"]: [{t.predictor for t in read_frame(base64.b64decode(s["frame"]))[2]} for s in session["steps"]]
+        for session in VECTORS["sessions"]
+    }
+    assert set().union(*kinds["interrupted"]) == set(Predictor)
+    assert kinds["confirmed"][-2:] == [{Predictor.PREVIOUS}, {Predictor.PREVIOUS}]
+    assert kinds["confirmed"][3] == set()  # the LEVEL frame that confirms and carries nothing
 
 
 @pytest.mark.parametrize("case", VECTORS["malformed"], ids=lambda c: str(c["name"]))

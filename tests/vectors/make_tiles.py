@@ -100,6 +100,22 @@ def interrupted() -> list[bytes]:
     return frames
 
 
+def confirmed() -> list[bytes]:
+    """A parent moves, its children are confirmed as they are, then all move: coded against the parent in between."""
+    server = TileServer(SIZE_M, 1)
+    client = ClientTiles(server)
+    noise = np.random.default_rng(5).normal(size=(129, 129)).astype(np.float32) * np.float32(0.06)
+    bump = np.outer(np.hanning(129), np.hanning(129)).astype(np.float32)
+    frames = []
+    for clock, (coarse, fine) in enumerate(((0, 0), (20, 0), (45, 20))):
+        server.put_level(clock, 0, (coarse * bump)[::2, ::2].copy(), settled=True)
+        server.put_level(clock, 1, fine * bump + noise, settled=True)
+        while (plan := client.plan()) is not None:
+            frames.append(plan.encode())
+            client.commit(plan)
+    return frames
+
+
 def extreme() -> list[bytes]:
     """Samples at both limits, so that every intermediate value is as large as it can be."""
     sign = np.where(np.indices((65, 65)).sum(axis=0) % 2, 1, -1)
@@ -213,7 +229,8 @@ def told(decoder: FrameDecoder, frame: bytes) -> dict[str, Any]:
 def build() -> dict[str, Any]:
     """The whole file."""
     sessions = []
-    for name, frames in (("session", session()), ("interrupted", interrupted()), ("extreme", extreme())):
+    for made in (session, interrupted, confirmed, extreme):
+        name, frames = made.__name__, made()
         decoder = FrameDecoder()
         steps = [{"frame": base64.b64encode(f).decode(), "decoded": told(decoder, f)} for f in frames]
         sessions.append({"name": name, "steps": steps})

@@ -168,6 +168,21 @@ describe("raycast", () => {
     expect(p[2]).toBeCloseTo(ground.heightAt(p[0], p[1]), 4);
   });
 
+  test("a step between two levels is hit where it stands", () => {
+    const g = new TileStore(SIZE, 1);
+    const flat = (level: number, x: number, y: number, z: number) => tileOf(level, x, y, 1, () => z, SIZE);
+    g.apply(frame("LEVEL", 0, [flat(0, 0, 0, 0)]));
+    g.apply(frame("FILL", 1, [flat(1, 1, 0, 50), flat(1, 1, 1, 50)]));
+    for (const dir of [
+      [1, 0, 0],
+      [0.31, 0.07, 0.001],
+    ] as const) {
+      const p = g.ground.raycast({ origin: [100, 200, 25], dir })!;
+      expect(p[0]).toBeCloseTo(SIZE / 2, 9);
+    }
+    expect(g.ground.raycast({ origin: [100, 200, 55], dir: [1, 0, 0] })).toBeNull();
+  });
+
   test("a spike thinner than a sub-patch is hit from any side", () => {
     const spike = (sx: number, sy: number) => (Math.hypot(sx - 400, sy - 400) < 9 ? 80 : 0);
     const g = mixed(spike).freeze();
