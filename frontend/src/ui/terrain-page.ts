@@ -169,7 +169,10 @@ export class EskTerrain extends SignalElement {
   }
 
   readonly #closeDialog = (): void => {
+    if (this.#dialog.peek() === null) return;
     this.#dialog.value = null;
+    // Keys belong to the terrain again.
+    this.renderRoot.querySelector<HTMLElement>(".viewport")?.focus({ preventScroll: true });
   };
 
   #side(stage: Stage, tab: PanelTab): TemplateResult {
