@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 from typing import Annotated, Any, Final
@@ -23,12 +23,14 @@ from esker import contract as c
 from esker import templates
 from esker.contract import Role
 from esker.document import archive
+from esker.headers import Headers
 from esker.session.core import Denied
 from esker.session.hub import Hub
 from esker.session.limits import RateByKey
 from esker.session.socket import Session
 from esker.store.access import CODE_SECONDS, Link, TooManyLinks
 from esker.tls import CA_FILE, FOLDER
+from esker.upload import read_archive
 from esker.version import VERSION
 
 log = logging.getLogger("esker.server")
@@ -47,18 +49,6 @@ STATUS: Final = {
     "server_error": 500,
     "shutting_down": 503,
 }
-HEADERS: Final = [
-    (
-        b"content-security-policy",
-        b"default-src 'self'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; "
-        b"connect-src 'self'; worker-src 'self' blob:; object-src 'none'; base-uri 'none'; form-action 'none'; "
-        b"frame-ancestors 'none'",
-    ),
-    (b"referrer-policy", b"no-referrer"),
-    (b"x-content-type-options", b"nosniff"),
-    (b"cross-origin-opener-policy", b"same-origin"),
-    (b"permissions-policy", b"camera=(), microphone=(), geolocation=()"),
-]
 
 
 class Problem(Exception):
@@ -96,29 +86,6 @@ class JoinCode(c.Wire):
     code: Annotated[str, StringConstraints(min_length=1, max_length=20)]
 
 
-class _Headers:
-    """Adds the security headers to every HTTP answer."""
-
-    def __init__(self, app: Any) -> None:
-        self.app = app
-
-    async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
-        if scope["type"] != "http":
-            await self.app(scope, receive, send)
-            return
-
-        async def with_headers(message: Any) -> None:
-            if message["type"] == "http.response.start":
-                message["headers"] = [*message["headers"], *HEADERS]
-                if scope["path"].startswith("/assets/") and message["status"] == 200:
-                    message["headers"].append((b"cache-control", b"public, max-age=31536000, immutable"))
-                elif not any(name == b"cache-control" for name, _ in message["headers"]):
-                    message["headers"].append((b"cache-control", b"no-cache"))
-            await send(message)
-
-        await self.app(scope, receive, with_headers)
-
-
 def create_app(hub: Hub, page: Path, data: Path) -> FastAPI:
     """The application over an open hub. ``page``: the built front-end; ``data``: where the LAN certificate lies."""
 
@@ -135,7 +102,7 @@ def create_app(hub: Hub, page: Path, data: Path) -> FastAPI:
         openapi_url="/api/openapi.json",
         lifespan=lifespan,
     )
-    app.add_middleware(_Headers)
+    app.add_middleware(Headers)
     app.state.hub = hub
     app.state.new_terrains = RateByKey(*NEW_TERRAINS)
     app.state.code_tries = RateByKey(*CODE_TRIES)
@@ -231,7 +198,7 @@ def _add_terrains(app: FastAPI, hub: Hub) -> None:
         _limited(request, app.state.new_terrains, "new terrains came")
         content = await _body(request, MAX_IMPORT_BYTES)
         try:
-            document = await asyncio.to_thread(archive.loads, content)
+            document = await read_archive(content)
         except archive.ArchiveError as error:
             raise Problem(400, "bad_archive", str(error)) from error
         return await _create(hub, document)
@@ -419,12 +386,8 @@ def _add_page(app: FastAPI, hub: Hub, page: Path, data: Path) -> None:
             return _answer(503, "no_page", "The page is not built yet. Run `make run`, which builds it.")
         return FileResponse(page / "index.html", media_type="text/html")
 
-    handler: Callable[[], Awaitable[Response]] = index
-    app.add_api_route("/", handler, include_in_schema=False, response_model=None)
-
-    @app.get("/t/{terrain}", include_in_schema=False)
-    async def terrain_page(terrain: str) -> Response:  # noqa: ARG001
-        return await index()
+    for path in ("/", "/t/{terrain}"):
+        app.add_api_route(path, index, methods=["GET", "HEAD"], include_in_schema=False, response_model=None)
 
     @app.get(f"/{CA_FILE}", include_in_schema=False)
     async def certificate() -> Response:

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from esker import contract as c
+from esker.document import archive
 from esker.store.access import CODE_SECONDS, Access
 from esker.store.journal import Journal
 from tests.sync.harness import LiveServer, Peer, set_op, stroke
@@ -73,6 +74,36 @@ def test_an_archive_goes_out_and_comes_in(server: LiveServer) -> None:
     assert (status, error["code"]) == (400, "bad_archive")
     status, error = server.http("POST", "/api/terrains/import", content[: len(content) // 2])
     assert (status, error["code"]) == (400, "bad_archive")
+
+
+def _archive(*strokes: c.Stroke) -> bytes:
+    return archive.dumps(c.Document(id="t", strokes=strokes))
+
+
+def test_an_archive_that_no_ops_could_have_made(server: LiveServer) -> None:
+    point = c.Stroke(id="s", kind="level", first=(0, 0, 0), last=(9, 0, 0), curve=((0, 0),))
+    far = point.model_copy(update={"curve": ((1e6, 0),)})
+    many = [point.model_copy(update={"id": f"s{i}"}) for i in range(c.MAX_STROKES + 1)]
+    for content, word in (
+        (_archive(point, point), "same id"),
+        (_archive(far), "farther"),
+        (_archive(*many), "at most"),
+    ):
+        status, error = server.http("POST", "/api/terrains/import", content)
+        assert (status, error["code"]) == (400, "bad_archive")
+        assert word in error["message"]
+    assert server.http("POST", "/api/terrains/import", _archive(*many[1:]))[0] == 201
+
+
+def test_an_archive_that_eats_memory_or_time_is_stopped(server: LiveServer, monkeypatch: pytest.MonkeyPatch) -> None:
+    terrain, secret = server.create()
+    _, content, _ = server.raw("GET", f"/api/terrains/{terrain}/archive", secret=secret)
+    monkeypatch.setattr("esker.upload.WALL_SECONDS", 0.01)
+    status, error = server.http("POST", "/api/terrains/import", content)
+    assert (status, error["code"]) == (400, "bad_archive")
+    assert "too long" in error["message"]
+    monkeypatch.undo()
+    assert server.http("POST", "/api/terrains/import", content)[0] == 201
 
 
 def test_too_large_an_archive(server: LiveServer) -> None:

@@ -24,7 +24,7 @@ LAYERS: tuple[frozenset[str], ...] = (
     frozenset({"templates"}),
     frozenset({"solve", "tiles", "store", "settings"}),
     frozenset({"session", "terrain"}),
-    frozenset({"client", "tls"}),
+    frozenset({"client", "tls", "headers", "upload"}),
     frozenset({"server"}),
     frozenset({"run"}),
     frozenset({"bench"}),

@@ -30,6 +30,7 @@ from typing import Any, Final
 import numpy as np
 import psutil
 import uvloop
+from numpy.typing import NDArray
 from websockets.asyncio.client import ClientConnection
 from websockets.asyncio.client import connect as open_socket
 from websockets.asyncio.server import ServerConnection
@@ -45,6 +46,18 @@ STROKE_POINTS: Final = 64
 WARM_UP: Final = 2.0
 
 
+@dataclass(frozen=True)
+class _Parsed:
+    """A message that was read once for all clients to whom the same text came: what it costs is the players' affair,
+    not the room's, and the players share the machine with the server."""
+
+    text: str
+    kind: str
+    ids: tuple[str, ...]
+    authors: NDArray[np.int64]
+    at: NDArray[np.float64]
+
+
 @dataclass
 class _Run:
     """What one run measures."""
@@ -54,7 +67,8 @@ class _Run:
     seconds: float
     show: bool
     sent: dict[str, float] = field(default_factory=dict)
-    delays: list[float] = field(default_factory=list)
+    delays: list[NDArray[np.float64]] = field(default_factory=list)
+    parsed: _Parsed | None = None
     acks: list[float] = field(default_factory=list)
     refused: int = 0
     received_bytes: int = 0
@@ -106,20 +120,29 @@ class _Client:
                 if isinstance(message, bytes):
                     await self.ws.send(f'{{"type":"credit","bytes":{len(message)}}}')
                 else:
-                    self._note(json.loads(message), time.perf_counter())
+                    self._note(message, time.perf_counter())
 
-    def _note(self, message: dict[str, Any], now: float) -> None:
-        run, mine = self.run, f"{self.name}:"
-        kind = message["type"]
-        if kind in ("ordered", "ops"):
-            for op in message["ops"]:
-                at = run.sent.get(op["id"])
-                if at is not None and not op["id"].startswith(mine):
-                    run.delays.append(now - at)
-        elif kind == "ack":
-            run.acks += [now - run.sent[op_id] for op_id in message["ids"] if op_id in run.sent]
-        elif kind == "reject":
+    def _note(self, text: str, now: float) -> None:
+        run = self.run
+        message = run.parsed
+        if message is None or message.text != text:
+            message = run.parsed = _parse(text, run.sent)
+        if message.kind in ("ordered", "ops"):
+            others = message.at[(message.authors != self.index) & (message.at > 0)]
+            if len(others):
+                run.delays.append(now - others)
+        elif message.kind == "ack":
+            run.acks += [now - run.sent[op_id] for op_id in message.ids if op_id in run.sent]
+        elif message.kind == "reject":
             run.refused += 1
+
+
+def _parse(text: str, sent: dict[str, float]) -> _Parsed:
+    message = json.loads(text)
+    ops = message["ops"] if message["type"] in ("ordered", "ops") else ()
+    ids = tuple(message["ids"]) if message["type"] == "ack" else tuple(op["id"] for op in ops)
+    authors = np.array([int(op_id[1 : op_id.index(":")]) for op_id in ids], dtype=np.int64)
+    return _Parsed(text, message["type"], ids, authors, np.array([sent.get(op_id, -1.0) for op_id in ids]))
 
 
 def _message(op_id: str, op: dict[str, Any]) -> str:
@@ -156,7 +179,7 @@ def _cpu(process: psutil.Process) -> float:
 
 
 def _figures(run: _Run, cores: float, own_cores: float, rss: int, wall: float) -> dict[str, Any]:
-    delays = np.array(run.delays) * 1000
+    delays = np.concatenate(run.delays) * 1000
     expected = len(run.sent) * (run.clients - 1)
     out: dict[str, Any] = {
         "ops": len(run.sent),

@@ -73,6 +73,22 @@ class StrokeSet:
         )
 
 
+def check_document(document: c.Document, limits: Limits | None = None) -> None:
+    """Refuses a document from outside that no sequence of ops could have made: ids used twice, limits, far points.
+
+    Raises Refusal.
+    """
+    limits = limits or Limits()
+    everything = (*document.strokes, *document.deleted)
+    if len({stroke.id for stroke in everything}) != len(everything):
+        raise Refusal("duplicate_stroke", "Two strokes have the same id.")
+    if len(document.strokes) > limits.strokes or len(document.deleted) > c.MAX_STROKES:
+        raise Refusal("too_many_strokes", f"A terrain holds at most {limits.strokes} strokes.")
+    editor = _Editor(StrokeSet(document.id, document.settings), limits)
+    for stroke in everything:
+        editor.check(stroke)
+
+
 @dataclass(frozen=True)
 class Limits:
     """The document limits of DESIGN 4; settings may lower them."""
@@ -145,7 +161,7 @@ class _Editor:
         self.strokes[stroke.id] = stroke
 
     def _put(self, stroke: Stroke) -> None:
-        points = self._check(stroke)
+        points = self.check(stroke)
         self._own()
         old = self.strokes.get(stroke.id)
         if old is not None:
@@ -165,7 +181,7 @@ class _Editor:
         if rect is not None:
             self.dirty = rect.union(self.dirty)
 
-    def _check(self, stroke: Stroke) -> Points:
+    def check(self, stroke: Stroke) -> Points:
         """The stroke's world points. Raises Refusal where there are too many or they lie too far away."""
         if len(stroke.curve) > self.limits.points:
             raise Refusal("too_many_points", f"A stroke holds at most {self.limits.points} points.")
