@@ -30,7 +30,7 @@ from esker.session.limits import RateByKey
 from esker.session.socket import Session
 from esker.store.access import CODE_SECONDS, Link, TooManyLinks
 from esker.tls import CA_FILE, FOLDER
-from esker.upload import read_archive
+from esker.upload import AT_ONCE, read_archive
 from esker.version import VERSION
 
 log = logging.getLogger("esker.server")
@@ -105,6 +105,7 @@ def create_app(hub: Hub, page: Path, data: Path) -> FastAPI:
     app.add_middleware(Headers)
     app.state.hub = hub
     app.state.new_terrains = RateByKey(*NEW_TERRAINS)
+    app.state.uploads = asyncio.Semaphore(AT_ONCE)
     app.state.code_tries = RateByKey(*CODE_TRIES)
     _add_errors(app)
     _add_terrains(app, hub)
@@ -198,7 +199,7 @@ def _add_terrains(app: FastAPI, hub: Hub) -> None:
         _limited(request, app.state.new_terrains, "new terrains came")
         content = await _body(request, MAX_IMPORT_BYTES)
         try:
-            document = await read_archive(content)
+            document = await read_archive(content, app.state.uploads)
         except archive.ArchiveError as error:
             raise Problem(400, "bad_archive", str(error)) from error
         return await _create(hub, document)

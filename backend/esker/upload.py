@@ -21,12 +21,13 @@ AT_ONCE: Final = 2
 BAD_FILE: Final = 3
 """Exit status for a file that is not good; anything else but 0 means that the reader itself was stopped."""
 
-_slots = asyncio.Semaphore(AT_ONCE)
 
+async def read_archive(content: bytes, slots: asyncio.Semaphore) -> Document:
+    """The document in an ``.esker`` file. Raises archive.ArchiveError with a sentence for a person.
 
-async def read_archive(content: bytes) -> Document:
-    """The document in an ``.esker`` file. Raises archive.ArchiveError with a sentence for a person."""
-    async with _slots:
+    ``slots``: at most ``AT_ONCE`` of these processes run at a time.
+    """
+    async with slots:
         process = await asyncio.create_subprocess_exec(
             sys.executable,
             "-m",

@@ -82,14 +82,19 @@ class Session:
     async def _read_all(self, messages: AsyncIterator[str | bytes]) -> None:
         for event in self._protocol.opened():
             await self._handle(event)
-        async for message in messages:
-            events = (
-                self._protocol.text(message, self._now())
-                if isinstance(message, str)
-                else self._protocol.binary(message)
-            )
-            for event in events:
-                await self._handle(event)
+        try:
+            async for message in messages:
+                if isinstance(message, str):
+                    events = self._protocol.text(message, self._now())
+                else:
+                    events = self._protocol.binary(message)
+                for event in events:
+                    await self._handle(event)
+        except ConnectionError:
+            raise
+        except Exception:
+            log.exception("a message from %s could not be handled", self._address)
+            self.outbox.close("server_error", "The server failed to handle a message. Your page will come back.")
 
     async def _handle(self, event: protocol.Event) -> None:
         if isinstance(event, protocol.Close):
