@@ -75,13 +75,14 @@ inline void resolve(nearest_t *out, int16 mine, segments_t s, int at, float16 x,
     int16 cap = (at0 && (int16)(t[11 * m] > 0.0f ? -1 : 0)) || (at1 && (int16)(t[12 * m] > 0.0f ? -1 : 0));
     float16 side = select(select((float16)(0.5f), (float16)(0.0f), cross < 0.0f), (float16)(1.0f), cross > 0.0f);
     if (any(cap)) side = select(side, 0.5f + 0.5f * cross / fmax(sqrt(d2), 1e-6f), cap);
-    float16 along = select((float16)(dz * il2), (float16)(0.0f), cap);
+    float16 near0 = fmax(1.0f - 2.0f * u, 0.0f), near1 = fmax(2.0f * u - 1.0f, 0.0f);
+    float16 along = (1.0f - near0 - near1) * (dz * il2);
     out->d2 = select(out->d2, d2, mine);
     out->height = select(out->height, t[2 * m] + u * dz, mine);
     out->rx = select(out->rx, rx, mine);
     out->ry = select(out->ry, ry, mine);
-    out->along_x = select(out->along_x, along * dx, mine);
-    out->along_y = select(out->along_y, along * dy, mine);
+    out->along_x = select(out->along_x, along * dx + near0 * t[13 * m] + near1 * t[15 * m], mine);
+    out->along_y = select(out->along_y, along * dy + near0 * t[14 * m] + near1 * t[16 * m], mine);
     out->left = select(out->left, side, mine);
 }
 

@@ -53,7 +53,10 @@ FLATTEST = 1e-9
 THINNEST_M = 1e-3
 """Bands narrower than this are as wide as this, so that the tip of a stroke is no special case."""
 
-SEGMENT_FIELDS = ("ax", "ay", "az", "dx", "dy", "dz", "il2", "t0x", "t0y", "t1x", "t1y", "cap0", "cap1")
+SEGMENT_FIELDS = (
+    *("ax", "ay", "az", "dx", "dy", "dz", "il2", "t0x", "t0y", "t1x", "t1y", "cap0", "cap1"),
+    *("s0x", "s0y", "s1x", "s1y"),
+)
 STROKE_FIELDS = ("plateau", "xmin", "xmax", "reach", "lh", "ls", "le", "lk", "lf", "rh", "rs", "re", "rk", "rf")
 STROKE_STRIDE = 16
 INDEX_FIELDS = ("first", "count", "spans")
@@ -64,8 +67,9 @@ INDEX_STRIDE = 4
 class Tables:
     """The constraints of one level, packed.
 
-    segments: (13, m) by SEGMENT_FIELDS. a: start; d: end - start; il2: 1 / plan length^2, or 0 for a point; t0, t1:
-      unit directions of travel at the ends; cap: 1 where the line ends there.
+    segments: (17, m) by SEGMENT_FIELDS. a: start; d: end - start; il2: 1 / plan length^2, or 0 for a point; t0, t1:
+      unit directions of travel at the ends; cap: 1 where the line ends there; s0, s1: slope of the crest at the ends
+      as a vector, metres a cell, the mean of the two segments that meet (0 at a cap).
     strokes: (k, 16) by STROKE_FIELDS. plateau, xmin, xmax, reach in cells (reach: outermost distance with any
       effect); per side h: 1 if there is a flank, s: slope (tangent), e: extent in metres, k and f: shares of the
       crest height taken by a round shoulder and a round foot.
@@ -256,7 +260,7 @@ def _pack_one(crest: Crest, s: float, n: int) -> _Packed | None:
 
 
 def _segments(points: Floats, closed: bool) -> Floats:
-    """SEGMENT_FIELDS of a polyline in cells, shape (13, segments); a single point is one segment of no length."""
+    """SEGMENT_FIELDS of a polyline in cells, shape (17, segments); a single point is one segment of no length."""
     if len(points) == 1:
         out = np.zeros((len(SEGMENT_FIELDS), 1))
         out[:3, 0] = points[0]
@@ -272,9 +276,13 @@ def _segments(points: Floats, closed: bool) -> Floats:
     after = np.vstack([joint, wrap if closed else unit[-1]])
     before, after = _unit_or(before, unit), _unit_or(after, unit)
     caps = np.zeros((2, len(d)))
+    slope = d[:, :2] * (d[:, 2] / length2)[:, None]
+    mean = (slope[:-1] + slope[1:]) / 2
+    turn = (slope[-1] + slope[0]) / 2 if closed else np.zeros(2)
     if not closed:
         caps[0, 0] = caps[1, -1] = 1.0
-    return np.vstack([ring[:-1].T, d.T, 1 / length2, before.T, after.T, caps])
+    slopes = np.vstack([turn, mean]), np.vstack([mean, turn])
+    return np.vstack([ring[:-1].T, d.T, 1 / length2, before.T, after.T, caps, slopes[0].T, slopes[1].T])
 
 
 def _unit_or(v: Floats, fallback: Floats) -> Floats:

@@ -82,13 +82,13 @@ def _missing(wanted: str, found: list[tuple[str, Any]]) -> list[tuple[str, Any]]
 
 
 def _devices() -> list[tuple[str, Any]]:
-    """(name, device), GPUs first, then as the platforms list them."""
+    """(name, device), CPUs first: the kernels work row by row, which suits them; a GPU is taken when asked for."""
     import pyopencl as cl
 
     out = [(_describe(p, d), d) for p in cl.get_platforms() for d in p.get_devices()]
     if not out:
         raise RuntimeError("no platform has a device")
-    return sorted(out, key=lambda pair: 0 if pair[1].type & cl.device_type.GPU else 1)
+    return sorted(out, key=lambda pair: 0 if pair[1].type & cl.device_type.CPU else 1)
 
 
 def _describe(platform: Any, device: Any) -> str:

@@ -224,7 +224,7 @@ def _distance2(seg: Floats, x: Floats, y: Floats) -> Floats:
 
 
 def _update(out: _Nearest, seg: Floats, x: Floats, y: Floats, blocks: NDArray[np.intp]) -> None:
-    ax, ay, az, dx, dy, dz, il2, t0x, t0y, t1x, t1y, cap0, cap1 = seg
+    ax, ay, az, dx, dy, dz, il2, t0x, t0y, t1x, t1y, cap0, cap1, s0x, s0y, s1x, s1y = seg
     u = np.clip(((x - ax) * dx + (y - ay) * dy) * il2, 0, 1)
     rx, ry = x - (ax + u * dx), y - (ay + u * dy)
     d2 = rx * rx + ry * ry
@@ -234,9 +234,11 @@ def _update(out: _Nearest, seg: Floats, x: Floats, y: Floats, blocks: NDArray[np
     cap = (at0 & (cap0 > 0)) | (at1 & (cap1 > 0))
     flat = 0.5 + 0.5 * cross / np.maximum(np.sqrt(d2), 1e-6)
     left = np.where(cap, flat, np.where(cross > 0, 1.0, np.where(cross < 0, 0.0, 0.5)))
-    along = np.where(cap, 0.0, dz * il2)
+    near0, near1 = np.maximum(1 - 2 * u, 0.0), np.maximum(2 * u - 1, 0.0)
+    along = (1 - near0 - near1) * dz * il2
+    along_x, along_y = along * dx + near0 * s0x + near1 * s1x, along * dy + near0 * s0y + near1 * s1y
     better = d2 < out.d2[blocks]
-    new = _Nearest(d2, az + u * dz, rx, ry, along * dx, along * dy, left)
+    new = _Nearest(d2, az + u * dz, rx, ry, along_x, along_y, left)
     for name, value in vars(new).items():
         field = getattr(out, name)
         field[blocks] = np.where(better, value, field[blocks])
