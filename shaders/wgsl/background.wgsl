@@ -36,8 +36,8 @@ fn plane_albedo() -> vec3f {
   switch (view.look) {
     case LOOK_ALPINE: { return vec3f(0.33, 0.35, 0.38); }
     case LOOK_DESERT: { return vec3f(0.36, 0.27, 0.18); }
-    case LOOK_PAPER: { return vec3f(0.50, 0.47, 0.42); }
-    default: { return vec3f(0.118, 0.122, 0.062); }
+    case LOOK_PAPER: { return vec3f(0.52, 0.465, 0.375); }
+    default: { return vec3f(0.185, 0.180, 0.135); }
   }
 }
 
@@ -53,7 +53,8 @@ fn ground_plane(p: vec3f, dir: vec3f, footprint: f32) -> vec3f {
   let texel = log2(max(footprint, 1.0e-3) * 256.0 / view.size);
   let broad = textureSampleLevel(noise, smooth_repeat, p.xy / (view.size * 5.3), clamp(texel - 2.4, 0.0, 8.0));
   let fine = textureSampleLevel(noise, smooth_repeat, p.yx / (view.size * 1.3) + 0.37, clamp(texel - 0.4, 0.0, 8.0));
-  let tint = mix(vec3f(0.78, 0.86, 0.80), vec3f(1.28, 1.16, 1.02), smoothstep(0.2, 0.8, broad.r * 0.7 + fine.g * 0.3));
+  let country = mix(vec3f(0.84, 0.90, 0.86), vec3f(1.16, 1.09, 1.0), smoothstep(0.2, 0.8, broad.r * 0.7 + fine.g * 0.3));
+  let tint = select(country, vec3f(1.0), view.look == LOOK_PAPER);
   let light = sun_light() * max(view.sun.z, 0.0) / 3.14159265 * mix(0.25, 1.0, shadow) + ambient_light(vec3f(0.0, 0.0, 1.0));
   return plane_albedo() * tint * light * max(shade, 0.0);
 }

@@ -111,7 +111,7 @@ fn alpine(s: Site) -> Material {
   m = mix_in(m, Material(crown, fine_slope(s, 0.6), 0.1), wood * 0.92);
   let rock = Material(rock_colour(s, vec3f(0.215, 0.200, 0.190), vec3f(0.070, 0.068, 0.070)), fine_slope(s, 0.85), 0.0);
   // Snow keeps to ledges: the fine relief decides.
-  let bare = smoothstep(0.72, 1.02, s.steep + (s.fine1.g - 0.5) * 0.75 + (s.macro2.r - 0.5) * 0.3 + clamp(-s.curvature, -0.3, 0.3) * 0.5);
+  let bare = smoothstep(0.78, 1.22, s.steep + (s.fine1.g - 0.5) * 0.62 + (s.fine2.r - 0.5) * 0.3 + (s.macro2.r - 0.5) * 0.3 + clamp(-s.curvature, -0.3, 0.3) * 0.6);
   m = mix_in(m, rock, bare);
   return shore(m, s);
 }
@@ -124,8 +124,8 @@ fn desert(s: Site) -> Material {
   let z = s.p.z + (s.macro2.r - 0.5) * view.size * 0.010 + (s.fine1.r - 0.5) * 5.0;
   let thick = fract(z * 27.0 / view.size);
   let thin = fract(z * 121.0 / view.size + 0.3);
-  var bed = mix(vec3f(0.42, 0.165, 0.080), vec3f(0.55, 0.300, 0.165), smoothstep(0.35, 0.5, thick) - smoothstep(0.86, 1.0, thick));
-  bed = mix(bed, vec3f(0.66, 0.50, 0.36), 0.55 * (smoothstep(0.62, 0.7, thin) - smoothstep(0.88, 0.96, thin)));
+  var bed = mix(vec3f(0.385, 0.185, 0.105), vec3f(0.50, 0.300, 0.180), smoothstep(0.25, 0.5, thick) - smoothstep(0.75, 1.0, thick));
+  bed = mix(bed, vec3f(0.62, 0.47, 0.34), 0.45 * (smoothstep(0.62, 0.7, thin) - smoothstep(0.88, 0.96, thin)));
   let varnish = mix(vec3f(0.55), vec3f(1.05), clamp(s.fine1.g * 0.7 + s.fine2.g * 0.45, 0.0, 1.0));
   let rock = Material(bed * varnish, fine_slope(s, 0.75), 0.0);
   m = mix_in(m, rock, steeper(s, 0.56, 0.16));
@@ -136,7 +136,7 @@ fn desert(s: Site) -> Material {
 
 fn paper(s: Site) -> Material {
   let grain = 0.97 + 0.05 * (s.fine2.r - 0.5) + 0.03 * (s.fine3.r - 0.5);
-  return Material(vec3f(0.80, 0.755, 0.66) * grain, fine_slope(s, 0.035), 0.0);
+  return Material(vec3f(0.80, 0.705, 0.545) * grain, fine_slope(s, 0.02), 0.0);
 }
 
 fn fwidth_safe(p: vec3f) -> vec2f {

@@ -2,7 +2,7 @@
 
 fn paper_backdrop(dir: vec3f) -> vec3f {
   let t = clamp(dir.z * 0.8 + 0.35, 0.0, 1.0);
-  return mix(vec3f(0.62, 0.58, 0.51), vec3f(0.86, 0.83, 0.77), t);
+  return mix(vec3f(0.66, 0.60, 0.50), vec3f(0.84, 0.80, 0.72), t);
 }
 
 fn sky_colour(dir: vec3f) -> vec3f {
@@ -17,7 +17,7 @@ fn sky_colour(dir: vec3f) -> vec3f {
 }
 
 fn sun_light() -> vec3f {
-  if (view.look == LOOK_PAPER) { return vec3f(2.75, 2.66, 2.5); }
+  if (view.look == LOOK_PAPER) { return vec3f(2.80, 2.62, 2.32); }
   // A touch warmer than clear air makes it: morning haze.
   return skylight[6].rgb * vec3f(1.10, 1.0, 0.86);
 }

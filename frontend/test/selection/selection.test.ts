@@ -1,4 +1,4 @@
-/** The drawn cut (SPEC Q20 to Q26 of tests/spec/renderer.md): restriction, bits, weights, parents, speed. */
+/** The drawn cut (SPEC R1 to R7): restriction, bits, weights, parents, speed. */
 
 import { beforeAll, describe, expect, it } from "vitest";
 import type { CameraState, Vec3 } from "../../src/core/types.ts";
@@ -92,14 +92,14 @@ describe("selection", () => {
     view = new FieldView(4096, levels, filteredField(3, 120));
   });
 
-  it("Q20: covers the visible domain exactly once, with patches that are held", () => {
+  it("R1: covers the visible domain exactly once, with patches that are held", () => {
     const cut = leaves(ready(view).select(view, above(), 1, new Everything()));
     const { at } = coverage(cut, levels);
     expect([...at].every((level) => level <= levels)).toBe(true);
     for (const leaf of cut) expect(leaf.slot).toBe(slotOf(leaf.level, leaf.px >> 2, leaf.py >> 2));
   });
 
-  it("Q21: neighbours differ by at most one level, across corners too, for random views and holes in the store", () => {
+  it("R2: neighbours differ by at most one level, across corners too, for random views and holes in the store", () => {
     const next = random(7);
     let broken = 0;
     for (let round = 0; round < 40; round += 1) {
@@ -133,7 +133,7 @@ describe("selection", () => {
     expect(broken).toBe(0);
   });
 
-  it("Q22: edge bits are set exactly where the neighbour is coarser", () => {
+  it("R3: edge bits are set exactly where the neighbour is coarser", () => {
     const cut = leaves(ready(view).select(view, above(), 0.6, new Everything()));
     const { side, at } = coverage(cut, levels);
     const levelsSeen = new Set(cut.map((leaf) => leaf.level));
@@ -159,7 +159,7 @@ describe("selection", () => {
     }
   });
 
-  it("Q23: all patches that meet in a point give it one weight: 1 beside a coarser one, 0 beside a finer one", () => {
+  it("R4: all patches that meet in a point give it one weight: 1 beside a coarser one, 0 beside a finer one", () => {
     for (const tau of [0.3, 0.6, 1.5]) {
       const cut = leaves(ready(view).select(view, above(), tau, new Everything()));
       const meetings = new Map<string, Leaf[]>();
@@ -186,7 +186,7 @@ describe("selection", () => {
     }
   });
 
-  it("Q24: the parent of every drawn tile, and all its ancestors, are touched and named", () => {
+  it("R5: the parent of every drawn tile, and all its ancestors, are touched and named", () => {
     const slots = new Everything();
     const cut = leaves(ready(view).select(view, above(), 0.5, slots));
     for (const leaf of cut) {
@@ -197,7 +197,7 @@ describe("selection", () => {
     }
   });
 
-  it("Q25: asks for held tiles that are not usable, coarse first, and needs nothing more once they are", () => {
+  it("R6: asks for held tiles that are not usable, coarse first, and needs nothing more once they are", () => {
     const selection = new Selection(levels);
     const order: TileRequest[] = [];
     for (let round = 0; round < 400; round += 1) {
@@ -215,7 +215,7 @@ describe("selection", () => {
     expect(got).toEqual(wanted);
   });
 
-  it("Q26: flat ground is not refined, however near", () => {
+  it("R7: flat ground is not refined, however near", () => {
     const flat = new FieldView(4096, levels, () => 0);
     const cut = ready(flat).select(flat, lookAt([2048, 2000, 3], [2048, 2100, 0], 800, 600), 1, new Everything());
     expect(leaves(cut).every((leaf) => leaf.level === 0)).toBe(true);

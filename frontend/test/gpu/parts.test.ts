@@ -1,0 +1,245 @@
+/** The parts of the renderer that need no device (SPEC R15, R16, R18, R19). */
+
+import view from "@shaders/wgsl/view.wgsl?raw";
+import { describe, expect, it, vi } from "vitest";
+import type { Scene, StrokeVisual } from "../../src/core/types.ts";
+import { NoWebGpu, openGpu } from "../../src/gpu/device.ts";
+import { baseHeight, sunDirection } from "../../src/gpu/frame.ts";
+import { StructWriter, structLayout } from "../../src/gpu/layout.ts";
+import { contourInterval } from "../../src/gpu/looks.ts";
+import { hillshade, shadeTile } from "../../src/gpu/mapshade.ts";
+import { NOISE_SIZE, noiseMipmaps } from "../../src/gpu/noise.ts";
+import { PITCH, patchIndices } from "../../src/gpu/patches.ts";
+import { QualityControl } from "../../src/gpu/quality.ts";
+import { RibbonBuilder } from "../../src/gpu/ribbons.ts";
+import { samePicture } from "../../src/gpu/scenediff.ts";
+import { FieldView, lookAt } from "./world.ts";
+
+describe("layout", () => {
+  it("R18: follows the alignment rules of WGSL", () => {
+    const layout = structLayout("struct A { a: f32, b: vec3f, c: f32, d: vec2f, e: u32, f: array<vec4f, 3>, };", "A");
+    expect(layout.offsets).toEqual({ a: 0, b: 16, c: 28, d: 32, e: 40, f: 48 });
+    expect(layout.size).toBe(96);
+  });
+
+  it("R18: reads the view uniform and refuses what it does not know", () => {
+    const layout = structLayout(view, "View");
+    expect(layout.offsets.eye).toBe(64);
+    expect(layout.size % 16).toBe(0);
+    expect(() => new StructWriter(layout).set("nothing", 1)).toThrow("no field");
+    expect(() => structLayout("struct A { a: f64 };", "A")).toThrow("unknown WGSL type");
+    expect(() => structLayout(view, "Nowhere")).toThrow("no struct");
+  });
+});
+
+describe("patch mesh", () => {
+  it("covers 16 x 16 cells with triangles of one winding and one diagonal", () => {
+    const indices = patchIndices();
+    expect(indices.length).toBe(16 * 16 * 6);
+    let area = 0;
+    for (let i = 0; i < indices.length; i += 3) {
+      const [a, b, c] = [indices[i]!, indices[i + 1]!, indices[i + 2]!].map((v) => [
+        v % PITCH,
+        Math.floor(v / PITCH),
+      ]) as [number[], number[], number[]];
+      const twice = (b[0]! - a[0]!) * (c[1]! - a[1]!) - (c[0]! - a[0]!) * (b[1]! - a[1]!);
+      expect(twice).toBe(1);
+      area += twice / 2;
+    }
+    expect(area).toBe(256);
+  });
+});
+
+describe("quality", () => {
+  it("R15: slow frames lower the resolution step by step, rest restores it", () => {
+    const control = new QualityControl(false);
+    for (let i = 0; i < 20; i += 1) {
+      control.next(16 * i, true);
+      control.measured(90);
+    }
+    const now = 320;
+    const slow = control.next(now, true);
+    expect(slow.scale).toBe(0.5);
+    expect(slow.tauFactor).toBeGreaterThan(1);
+    expect(control.pending).toBe(true);
+    expect(control.next(now + 1000, false)).toEqual({ scale: 1, tauFactor: 1 });
+    expect(control.pending).toBe(false);
+  });
+
+  it("R15: fast frames on a GPU stay at full quality", () => {
+    const control = new QualityControl(false);
+    for (let i = 0; i < 20; i += 1) {
+      expect(control.next(i * 16, true)).toEqual({ scale: 1, tauFactor: 1 });
+      control.measured(6);
+    }
+  });
+
+  it("R15: a CPU adapter starts low", () => {
+    expect(new QualityControl(true).next(0, true)).toEqual({ scale: 0.75, tauFactor: 2 });
+  });
+});
+
+function scene(): Scene {
+  const stroke: StrokeVisual = {
+    id: "a",
+    kind: "profile",
+    points: Float32Array.of(0, 0, 0, 10, 0, 0),
+    colour: [1, 0, 0, 1],
+    selected: false,
+    hovered: false,
+    live: false,
+  };
+  return {
+    camera: lookAt([0, 0, 10], [10, 10, 0], 100, 80),
+    tiles,
+    settings: {
+      size_m: 64,
+      title: "",
+      reach_m: null,
+      border: "free",
+      sea_level_m: null,
+      seed: 1,
+      look: "natural",
+      sun_azimuth_deg: 100,
+      sun_elevation_deg: 30,
+    },
+    strokes: [stroke],
+    ghost: null,
+    cursors: [{ position: [1, 2, 3], colour: [0, 1, 0, 1], radiusPx: 9 }],
+    tauPx: 1.5,
+    time: 0,
+    overlay: "none",
+    showStrokes: true,
+  };
+}
+const tiles = new FieldView(64, 0, () => 0);
+
+describe("scene comparison", () => {
+  it("R15: the same values built anew, at another time, are the same picture", () => {
+    expect(samePicture(scene(), 1, { ...scene(), time: 9 }, 1)).toBe(true);
+  });
+
+  it("R15: what shows makes a difference", () => {
+    const a = scene();
+    const b = scene();
+    const stroke = b.strokes[0]!;
+    const changes: Partial<Scene>[] = [
+      { camera: lookAt([0, 0, 11], [10, 10, 0], 100, 80) },
+      { settings: { ...b.settings, look: "paper" } },
+      { settings: { ...b.settings, sea_level_m: 0 } },
+      { strokes: [] },
+      { strokes: [{ ...stroke, selected: true }] },
+      { strokes: [{ ...stroke, points: Float32Array.of(0, 0, 0, 10, 0, 1) }] },
+      { cursors: [{ ...b.cursors[0]!, position: [1, 2, 4] }] },
+      { overlay: "slope" },
+      { showStrokes: false },
+      { tauPx: 2 },
+    ];
+    for (const change of changes) expect(samePicture(a, 1, { ...b, ...change }, 1)).toBe(false);
+    expect(samePicture(a, 1, b, 2)).toBe(false);
+  });
+});
+
+describe("ribbons", () => {
+  it("joins lines with gaps: a segment for each pair of points, none between lines", () => {
+    const builder = new RibbonBuilder();
+    const style = { colour: [1, 1, 1, 1], halfWidthPx: 1, haloPx: 0, hiddenOpacity: 0.3 } as const;
+    builder.add(Float32Array.of(0, 0, 0, 3, 4, 0, 3, 4, 12), style);
+    builder.add(Float32Array.of(9, 9, 9), style);
+    builder.add(Float32Array.of(50, 0, 0, 51, 0, 0), style);
+    expect(builder.points).toBe(9);
+    const starts = Array.from({ length: builder.points }, (_, i) => builder.data[12 * i + 11]);
+    expect(starts).toEqual([0, 1, 1, 0, 0, 0, 1, 0, 0]);
+    expect(builder.data[12 * 3 + 3]).toBe(17);
+    // Instance i draws from point i + 1 to i + 2: the last flag that counts is that of point n - 3.
+    expect(builder.instances).toBe(6);
+  });
+});
+
+describe("figures", () => {
+  it("the sun stands where the settings say: azimuth clockwise from north", () => {
+    expect(sunDirection(90, 0.5)[0]).toBeGreaterThan(0.99);
+    expect(sunDirection(0, 45)[1]).toBeCloseTo(Math.SQRT1_2);
+    expect(Math.hypot(...sunDirection(200, 33))).toBeCloseTo(1);
+  });
+
+  it("the block's foot lies below all ground and does not creep", () => {
+    for (let low = -500; low < 500; low += 7) expect(baseHeight(low, 4096)).toBeLessThan(low - 0.019 * 4096);
+    expect(baseHeight(-1, 4096)).toBe(baseHeight(-6, 4096));
+  });
+
+  it("contours come at 1, 2 or 5 times a power of ten", () => {
+    for (const relief of [3, 47, 220, 880, 5000]) {
+      const every = contourInterval(relief);
+      expect([1, 2, 5, 10]).toContain(Math.round(every / 10 ** Math.floor(Math.log10(every) + 1e-9)));
+      expect(relief / every).toBeGreaterThan(9);
+      expect(relief / every).toBeLessThan(25);
+    }
+  });
+
+  it("the noise tiles, has the wanted spread and fades to its mean", () => {
+    const levels = noiseMipmaps();
+    const finest = levels[0]!;
+    expect(levels).toHaveLength(Math.log2(NOISE_SIZE) + 1);
+    let mean = 0;
+    let seam = 0;
+    let inner = 0;
+    for (let r = 0; r < NOISE_SIZE; r += 1) {
+      const at = (c: number): number => finest[4 * (r * NOISE_SIZE + c)]!;
+      seam += Math.abs(at(0) - at(NOISE_SIZE - 1));
+      inner += Math.abs(at(100) - at(101));
+      for (let c = 0; c < NOISE_SIZE; c += 1) mean += at(c);
+    }
+    expect(mean / NOISE_SIZE ** 2).toBeCloseTo(127.5, -1);
+    expect(seam).toBeLessThan(2.5 * inner);
+    expect(Math.abs(levels.at(-1)![0]! - 128)).toBeLessThan(6);
+  });
+});
+
+describe("the map", () => {
+  it("R16: slopes to the north-west are lit, those to the south-east are in shade", () => {
+    const flat = hillshade(0, 0);
+    expect(hillshade(0.5, -0.5)).toBeGreaterThan(flat);
+    expect(hillshade(-0.5, 0.5)).toBeLessThan(0.6 * flat);
+  });
+
+  it("R16: draws sea below the level, land above, and no line over flat ground at a round height", () => {
+    const style = { look: "natural", sizeM: 4096, seaM: 0, contourM: 20, contours: true, slope: false } as const;
+    const slot = new Float32Array(69 * 69).fill(0);
+    const out = new Uint8ClampedArray(64 * 64 * 4);
+    shadeTile(slot, 0, 64, { ...style, seaM: null }, out);
+    const plain = [...out.subarray(0, 4)];
+    expect(plain[1]).toBeGreaterThan(180);
+    slot.fill(-40);
+    shadeTile(slot, 0, 64, style, out);
+    expect(out[2]).toBeGreaterThan(out[0]! + 20);
+  });
+});
+
+describe("opening a device", () => {
+  const canvas = {} as HTMLCanvasElement;
+
+  it("R19: says that a secure page is needed", async () => {
+    vi.stubGlobal("isSecureContext", false);
+    await expect(openGpu(canvas)).rejects.toThrow(/https/);
+    vi.unstubAllGlobals();
+  });
+
+  it("R19: says that the browser has no WebGPU, and that no device was found", async () => {
+    vi.stubGlobal("isSecureContext", true);
+    vi.stubGlobal("navigator", {});
+    await expect(openGpu(canvas)).rejects.toBeInstanceOf(NoWebGpu);
+    const asked: unknown[] = [];
+    vi.stubGlobal("navigator", {
+      gpu: {
+        requestAdapter: async (options: { featureLevel?: string }) => {
+          asked.push(options.featureLevel);
+          return null;
+        },
+      },
+    });
+    await expect(openGpu(canvas)).rejects.toThrow(/no graphics device/);
+    expect(asked).toEqual(["core", "compatibility"]);
+    vi.unstubAllGlobals();
+  });
+});
