@@ -41,7 +41,27 @@ export class EskLanding extends LitElement {
   override connectedCallback(): void {
     super.connectedCallback();
     document.title = "Esker";
+    window.addEventListener("pageshow", this.#shown);
+    this.addEventListener("dragover", (event) => event.preventDefault());
+    this.addEventListener("drop", (event) => this.#dropped(event));
     void this.#loadTemplates();
+  }
+
+  override disconnectedCallback(): void {
+    super.disconnectedCallback();
+    window.removeEventListener("pageshow", this.#shown);
+  }
+
+  /** Back from a terrain: the browser may show this page as it was left, busy and with an old list. */
+  readonly #shown = (): void => {
+    this.busy = "";
+    this.recents = recentTerrains(this.#store);
+  };
+
+  #dropped(event: DragEvent): void {
+    event.preventDefault();
+    const file = event.dataTransfer?.files[0];
+    if (file) void this.#open("file", () => api.open(file));
   }
 
   async #loadTemplates(): Promise<void> {

@@ -172,6 +172,11 @@ export class TerrainSession {
     this.stage.value = null;
   }
 
+  /** The browser asks before it closes a page that still holds work of mine. */
+  readonly #warn = (event: Event): void => {
+    if (this.doc.pending.peek() > 0) event.preventDefault();
+  };
+
   #hello(): Hello {
     return {
       type: "hello",
@@ -187,7 +192,9 @@ export class TerrainSession {
 
   /** Sends what waits whenever something waits, and keeps the title and this device's memory up to date. */
   #watch(): void {
+    window.addEventListener("beforeunload", this.#warn);
     this.#stops.push(
+      () => window.removeEventListener("beforeunload", this.#warn),
       effect(() => {
         this.doc.doc.value;
         if (this.doc.pending.value > 0) queueMicrotask(() => this.#flush());

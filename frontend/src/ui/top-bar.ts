@@ -3,6 +3,7 @@ import "@awesome.me/webawesome/dist/components/dropdown-item/dropdown-item.js";
 import { css, html, type TemplateResult } from "lit";
 import { live } from "lit/directives/live.js";
 import { icon } from "./icons.ts";
+import { keyText } from "./keys.ts";
 import "./people.ts";
 import { SignalElement } from "./signal-element.ts";
 import type { Stage } from "./stage.ts";
@@ -190,7 +191,7 @@ export class EskTopBar extends SignalElement {
         <button
           class="icon-btn small"
           aria-label="Inspector"
-          title="Inspector (I)"
+          title=${keyText("Inspector", this.stage.input.actions.get("inspector"))}
           aria-pressed=${this.panelOpen}
           @click=${() => this.#command("panel")}
         >

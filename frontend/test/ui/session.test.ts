@@ -238,6 +238,21 @@ describe("a session", () => {
     expect(server().of("presence").at(-1)).toMatchObject({ eye: [200, 0, 100], cursor: [1, 2, 3], tool: "mountain" });
   });
 
+  it("lets the browser ask before the page closes with unsaved work, and only then", async () => {
+    say(welcome());
+    const close = () => {
+      const event = new Event("beforeunload", { cancelable: true });
+      window.dispatchEvent(event);
+      return event.defaultPrevented;
+    };
+    expect(close()).toBe(false);
+    session.submit({ type: "stroke.begin", stroke: line });
+    expect(close()).toBe(true);
+    await settle();
+    say({ type: "ack", ids: [server().of("ops")[0]!.ops[0]!.id], clocks: [4] });
+    expect(close()).toBe(false);
+  });
+
   it("keeps the presence of those who are here only", () => {
     say(welcome());
     const presence = (client: string) => ({ client, cursor: null, tool: "", stroke: null, eye: null, target: null });
