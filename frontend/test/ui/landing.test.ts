@@ -1,0 +1,112 @@
+// SPEC U3, U4
+// @vitest-environment happy-dom
+import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
+import type { EskLanding } from "../../src/ui/landing.ts";
+import "../../src/ui/landing.ts";
+import { rememberTerrain } from "../../src/ui/storage.ts";
+
+type Answer = { readonly status?: number; readonly body: unknown };
+let answers: Record<string, Answer>;
+let asked: { path: string; init: RequestInit }[];
+const assign = vi.fn();
+
+beforeEach(() => {
+  localStorage.clear();
+  answers = { "GET /api/templates": { body: [{ id: "canyon", title: "Canyon", description: "A river." }] } };
+  asked = [];
+  assign.mockReset();
+  vi.spyOn(window.location, "assign").mockImplementation(assign);
+  vi.stubGlobal("fetch", async (path: string, init: RequestInit) => {
+    asked.push({ path, init });
+    const answer = answers[`${init.method} ${path}`];
+    if (!answer) throw new TypeError("network");
+    const status = answer.status ?? 200;
+    return { ok: status < 400, status, json: async () => answer.body };
+  });
+});
+afterEach(() => {
+  document.body.replaceChildren();
+  vi.unstubAllGlobals();
+  vi.restoreAllMocks();
+});
+
+async function landing(): Promise<EskLanding> {
+  const element = document.createElement("esk-landing") as EskLanding;
+  document.body.append(element);
+  await vi.waitFor(() => expect(element.templates).not.toBeNull());
+  await element.updateComplete;
+  return element;
+}
+
+const one = <T extends Element>(element: EskLanding, selector: string) =>
+  element.shadowRoot!.querySelector<T>(selector)!;
+
+async function join(element: EskLanding, text: string): Promise<void> {
+  one<HTMLInputElement>(element, "#join").value = text;
+  one(element, "form").dispatchEvent(new Event("submit", { cancelable: true }));
+  await new Promise((done) => setTimeout(done));
+  await element.updateComplete;
+}
+
+describe("the landing page", () => {
+  it("shows the starting terrains and opens a copy of one", async () => {
+    answers["POST /api/terrains"] = { status: 201, body: { id: "new1", secret: "s/1", role: "owner" } };
+    const element = await landing();
+    const card = one<HTMLButtonElement>(element, "button.card");
+    expect(card.textContent).toContain("Canyon");
+    card.click();
+    await vi.waitFor(() => expect(assign).toHaveBeenCalledWith("/t/new1#s%2F1"));
+    expect(asked.at(-1)!.init.body).toBe('{"template":"canyon"}');
+  });
+
+  it("says what the server said when it refuses, and lets one try again", async () => {
+    answers["POST /api/terrains"] = {
+      status: 429,
+      body: { code: "rate_limited", message: "Too many. Wait a minute." },
+    };
+    const element = await landing();
+    const button = one<HTMLButtonElement>(element, "button.primary");
+    button.click();
+    await vi.waitFor(() => expect(element.problem).toBe("Too many. Wait a minute."));
+    await element.updateComplete;
+    expect(button.disabled).toBe(false);
+    expect(one(element, "#problem").textContent).toBe("Too many. Wait a minute.");
+  });
+
+  it("joins by code and by link, and asks nothing of the server for what it cannot read", async () => {
+    answers["POST /api/join"] = { body: { id: "t1", secret: "fresh", role: "edit" } };
+    const element = await landing();
+    asked.length = 0;
+    await join(element, "what?");
+    expect(element.problem).toMatch(/neither a code/);
+    expect(asked).toEqual([]);
+    await join(element, `${window.location.origin}/t/t9#key`);
+    expect(assign).toHaveBeenLastCalledWith("/t/t9#key");
+    await join(element, "k7m 2qx");
+    await vi.waitFor(() => expect(assign).toHaveBeenLastCalledWith("/t/t1#fresh"));
+    expect(asked[0]!.init.body).toBe('{"code":"K7M2QX"}');
+  });
+
+  it("lists recent terrains and forgets one when asked", async () => {
+    rememberTerrain(localStorage, { id: "a", title: "Ana's land", secret: "s", role: "owner", opened: Date.now() });
+    const element = await landing();
+    expect(one<HTMLAnchorElement>(element, ".recent").getAttribute("href")).toBe("/t/a#s");
+    one<HTMLButtonElement>(element, ".recents button").click();
+    await element.updateComplete;
+    expect(one(element, ".recents")).toBeNull();
+  });
+
+  it("stands without the server, and says so", async () => {
+    answers = {};
+    const element = await landing();
+    expect(element.shadowRoot!.textContent).toContain("The server does not answer.");
+    expect(one<HTMLButtonElement>(element, "button.primary").disabled).toBe(false);
+  });
+
+  it("is not busy any more when one comes back to it", async () => {
+    const element = await landing();
+    element.busy = "new";
+    window.dispatchEvent(new Event("pageshow"));
+    expect(element.busy).toBe("");
+  });
+});
