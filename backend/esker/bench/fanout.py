@@ -304,6 +304,7 @@ def main(argv: list[str]) -> int:
     parser.add_argument("--solve", action="store_true", help="measure again with the solver at work")
     parser.add_argument("--floor", action="store_true", help="measure a bare relay too")
     parser.add_argument("--json", action="store_true", help="print the result as JSON")
+    parser.add_argument("--note", default="", help="a sentence about the circumstances, kept in the result")
     parser.add_argument("--relay", type=int, help=argparse.SUPPRESS)
     arguments = parser.parse_args(argv)
     if arguments.relay is not None:
@@ -314,6 +315,7 @@ def main(argv: list[str]) -> int:
         "bench": "fanout",
         "version": VERSION,
         "machine": _machine(),
+        "note": arguments.note,
         "scene": {"clients": arguments.clients, "ops_per_s_each": arguments.rate, "seconds": arguments.seconds},
         "esker": _measure(arguments, show=False),
     }

@@ -26,6 +26,8 @@ log = logging.getLogger("esker.room")
 
 TICK: Final = c.TICK_MS / 1000
 PRESENCE_TICK: Final = 1 / c.PRESENCE_HZ
+PROGRESS_TICK: Final = 0.1
+CLOCK_TICK: Final = 0.25
 
 
 class Guest:
@@ -62,7 +64,7 @@ class Room:
         self._solve_due = False
         self._requested_clock = -1
         self._progress = c.Progress(clock=core.head.clock, level=0, of=info.levels, settled=False)
-        self._progress_due = False
+        self._progress_timer: asyncio.TimerHandle | None = None
         self._flushed = asyncio.Event()
         self._flushed.set()
         self.closed = False
@@ -119,8 +121,6 @@ class Room:
         self._presence_timer = None
         if self.core.members.pending:
             self.core.members.tick()
-        if self._progress_due:
-            self._send_progress()
 
     # --- ticks --------------------------------------------------------------------------------------------------
 
@@ -166,7 +166,9 @@ class Room:
         if self.core.geometry_clock > self._requested_clock:
             self._request_solve()
         elif self._progress.settled:
-            self._note_progress(self._progress.model_copy(update={"clock": self.core.head.clock}))
+            # Nothing but the clock changed, and the members see that from the ops: no hurry.
+            progress = self._progress.model_copy(update={"clock": self.core.head.clock})
+            self._note_progress(progress, CLOCK_TICK)
 
     def _request_solve(self) -> None:
         head = self.core.head
@@ -180,12 +182,13 @@ class Room:
         done = settled and level >= self.info.levels
         self._note_progress(c.Progress(clock=clock, level=level, of=self.info.levels, settled=done))
 
-    def _note_progress(self, progress: c.Progress) -> None:
-        self._progress, self._progress_due = progress, True
-        self._presence_soon()
+    def _note_progress(self, progress: c.Progress, delay: float = PROGRESS_TICK) -> None:
+        self._progress = progress
+        if self._progress_timer is None and not self.closed:
+            self._progress_timer = self._loop.call_later(delay, self._send_progress)
 
     def _send_progress(self) -> None:
-        self._progress_due = False
+        self._progress_timer = None
         text = self._progress.model_dump_json()
         for member in self.core.members:
             member.outbox.push(text)
@@ -209,6 +212,6 @@ class Room:
         """Stops the timers and the solver's work for this room. Call ``flush`` first."""
         self.closed = True
         self._worker.remove(self._solve_client)
-        for timer in (self._tick_timer, self._presence_timer):
+        for timer in (self._tick_timer, self._presence_timer, self._progress_timer):
             if timer is not None:
                 timer.cancel()
