@@ -220,13 +220,14 @@ inline void write_row(const sums_t *sum, global float *hd, global float *hf, glo
     vstore16(toe * sum->gy / g, 0, gf + stride);
 }
 
-// Global size (bins, bins) of the dirty window, whose first bin is (bx0, by0). height_d, height_f, gradient_d: one channel; gradient_f: two.
+// Global size (most bins of a row, rows of bins); of row by0 + j the bins windows[2 j] .. windows[2 j + 1] - 1 are done. height_d, height_f, gradient_d: one channel; gradient_f: two.
 kernel void rasterise(global const float *segments, int m, global const float *strokes, global const int *index,
                       global const int *row_start, global const int *row_items, global const int *span_index,
                       global const float *spans, global float *height_d, global float *height_f,
                       global float *gradient_d, global float *gradient_f, int n, int pitch, int stride, float spacing,
-                      float screening, float exit_length, int pinned, int bx0, int by0) {
-    int bx = bx0 + get_global_id(0), by = by0 + get_global_id(1);
+                      float screening, float exit_length, int pinned, int by0, global const int *windows) {
+    int j = get_global_id(1), bx = windows[2 * j] + get_global_id(0), by = by0 + j;
+    if (bx >= windows[2 * j + 1]) return;
     segments_t s = {m, segments};
     sums_t sums[BIN];
     int16 best[BIN];

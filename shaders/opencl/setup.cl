@@ -34,12 +34,12 @@ inline void coarsen_row(crow_t d, crow_t f, row_t d2, row_t f2, int J, int n, in
     }
 }
 
-// Global size (strips, channels).
+// Coarse rows [from, to). Global size (strips, channels).
 kernel void coarsen(crow_t d, crow_t f, row_t d2, row_t f2, int n, int pitch, int pitch2, int stride, int stride2,
-                    row_t scratch, int scratch_stride, int rows) {
-    int s = get_global_id(0), c = get_global_id(1), nc = n / 2 + 1;
+                    row_t scratch, int scratch_stride, int rows, int from, int to) {
+    int s = get_global_id(0), c = get_global_id(1);
     row_t tmp = scratch + (size_t)(c * get_global_size(0) + s) * scratch_stride;
-    for (int J = s * rows; J < min(nc, (s + 1) * rows); J++)
+    for (int J = from + s * rows; J < min(to, from + (s + 1) * rows); J++)
         coarsen_row(d, f + (size_t)c * stride, d2, f2 + (size_t)c * stride2, J, n, pitch, pitch2, tmp, c == 0);
 }
 

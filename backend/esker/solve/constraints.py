@@ -132,8 +132,28 @@ def pack(strokes: Sequence[Stroke], settings: TerrainSettings, level: int) -> Ta
     return Packer(level).pack(strokes, settings)[0]
 
 
-Window = tuple[int, int, int, int]
-"""Bins (row0, row1, col0, col1), half open."""
+@dataclass(frozen=True)
+class Window:
+    """Bins: of row ``first + j`` the columns spans[j, 0] .. spans[j, 1] - 1. ``spans`` (rows, 2) int32."""
+
+    first: int
+    spans: Ints
+
+    @property
+    def sample_rows(self) -> tuple[int, int]:
+        """Sample rows that the bins cover, half open; may run past the last row."""
+        return self.first * BIN, (self.first + len(self.spans)) * BIN
+
+    @property
+    def width(self) -> int:
+        """Most bins of a row."""
+        return int((self.spans[:, 1] - self.spans[:, 0]).max(initial=0))
+
+
+def everything(samples: int) -> Window:
+    """All bins."""
+    count = bins(samples)
+    return Window(0, np.tile(np.array([0, count], dtype=np.int32), (count, 1)))
 
 
 class Packer:
@@ -150,8 +170,8 @@ class Packer:
             return -1
         return sum(1 for s in strokes if s.id in self._packed and self._packed[s.id][0] is s)
 
-    def pack(self, strokes: Sequence[Stroke], settings: TerrainSettings) -> tuple[Tables, list[Window] | None]:
-        """The tables, and the bins whose constraints differ from the last set's (None: all of them)."""
+    def pack(self, strokes: Sequence[Stroke], settings: TerrainSettings) -> tuple[Tables, Window | None]:
+        """The tables, and the bins whose constraints may differ from the last set's (None: no bin does)."""
         s, n = grid.spacing(self.level, settings.size_m), grid.samples(self.level)
         fresh = self._settings != _settings_key(settings)
         old = {} if fresh else self._packed
@@ -163,7 +183,7 @@ class Packer:
                 continue
             crest = crest_of(stroke)
             new[stroke.id] = (stroke, _pack_one(crest, s, n) if crest is not None else None)
-        windows = None if fresh else _changed(old, new)
+        window = everything(n) if fresh else _changed(old, new)
         self._settings, self._packed = _settings_key(settings), new
         reach = settings.reach_m
         tables = Tables(
@@ -174,7 +194,7 @@ class Packer:
             pinned=settings.border == "pinned",
             **_join([p for _, p in new.values() if p is not None], n),
         )
-        return tables, windows
+        return tables, window
 
     def forget(self) -> None:
         """Make the next set a fresh one."""
@@ -187,8 +207,8 @@ def _settings_key(settings: TerrainSettings) -> tuple[float, float | None, str]:
 
 def _changed(
     old: dict[str, tuple[Stroke, _Packed | None]], new: dict[str, tuple[Stroke, _Packed | None]]
-) -> list[Window]:
-    """One window around everything that strokes only in one of the sets, or different in both, can reach."""
+) -> Window | None:
+    """Bins that strokes only in one of the sets, or different in both, can reach."""
     touched = [
         side[key][1]
         for key in old.keys() | new.keys()
@@ -196,25 +216,24 @@ def _changed(
         for side in (old, new)
         if key in side
     ]
-    areas = [p for p in touched if p is not None]
-    if not areas:
-        return []
-    return [
-        (
-            min(p.rows[0] for p in areas),
-            max(p.rows[1] for p in areas) + 1,
-            min(p.cols[0] for p in areas),
-            max(p.cols[1] for p in areas) + 1,
-        )
-    ]
+    windows = [p.window for p in touched if p is not None]
+    if not windows:
+        return None
+    first, last = min(w.first for w in windows), max(w.first + len(w.spans) for w in windows)
+    low = np.full(last - first, 1 << 30, dtype=np.int32)
+    high = np.zeros(last - first, dtype=np.int32)
+    for w in windows:
+        rows = slice(w.first - first, w.first - first + len(w.spans))
+        low[rows] = np.minimum(low[rows], w.spans[:, 0])
+        high[rows] = np.maximum(high[rows], w.spans[:, 1])
+    return Window(first, np.column_stack([np.minimum(low, high), high]))
 
 
 @dataclass(frozen=True)
 class _Packed:
     segments: Floats
     params: list[float]
-    rows: tuple[int, int]
-    cols: tuple[int, int]
+    window: Window
     span_index: Ints | None
     spans: Floats | None
 
@@ -255,8 +274,26 @@ def _pack_one(crest: Crest, s: float, n: int) -> _Packed | None:
     segments = segments[:, near] if near.any() else segments[:, :1]
     pad = -segments.shape[1] % LANES
     params = [stroke.plateau_radius_m / s, low[0], high[0], reach, *_flank(stroke.left), *_flank(stroke.right)]
-    cols, rows = ((max(0, math.floor(low[k]) // BIN), min(bins(n) - 1, math.ceil(high[k]) // BIN)) for k in (0, 1))
-    return _Packed(np.pad(segments, ((0, 0), (0, pad)), mode="edge"), params, rows, cols, span_index, spans)
+    window = _window(segments, reach, n, points if crest.closed else None)
+    return _Packed(np.pad(segments, ((0, 0), (0, pad)), mode="edge"), params, window, span_index, spans)
+
+
+def _window(segments: Floats, reach: float, n: int, inside: Floats | None) -> Window:
+    """The bins that segments with this reach can touch, row by row; those of ``inside`` (an outline) besides."""
+    count = bins(n)
+    a, b = segments[:2], segments[:2] + segments[3:5]
+    low, high = np.minimum(a, b) - reach, np.maximum(a, b) + reach
+    if inside is not None:
+        low = np.column_stack([low, inside[:, :2].min(axis=0)])
+        high = np.column_stack([high, inside[:, :2].max(axis=0)])
+    low, high = np.floor(low / BIN), np.ceil(high / BIN)
+    first, last = int(max(0, low[1].min())), int(min(count, high[1].max() + 1))
+    row = np.arange(first, max(last, first + 1))[:, None]
+    meets = (low[1] <= row) & (row <= high[1])
+    left = np.where(meets, low[0], count).min(axis=1)
+    right = np.where(meets, high[0] + 1, 0).max(axis=1)
+    spans = np.clip(np.column_stack([left, np.maximum(left, right)]), 0, count)
+    return Window(first, spans.astype(np.int32))
 
 
 def _segments(points: Floats, closed: bool) -> Floats:
@@ -346,7 +383,7 @@ def _join(packed: list[_Packed], n: int) -> dict[str, Any]:
             spans.append(p.spans)
             at.index += len(p.span_index)
             at.span += len(p.spans)
-        for row in range(p.rows[0], p.rows[1] + 1):
+        for row in range(p.window.first, p.window.first + len(p.window.spans)):
             rows[row].append(k)
     return {
         "segments": np.hstack([p.segments for p in packed]) if packed else np.zeros((len(SEGMENT_FIELDS), 0)),

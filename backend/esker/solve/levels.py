@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from esker import grid
 from esker.contract import CHEBYSHEV_SWEEPS, TILE_CELLS, Stroke, TerrainSettings
-from esker.solve.constraints import Packer, Tables, Window, bins
+from esker.solve.constraints import Packer, Tables, Window
 from esker.solve.device import Device
 from esker.solve.reference import BOTTOM_LEVELS, chebyshev_weights
 
@@ -115,19 +115,21 @@ class ClSystem:
                 self.fields[name, level] = launcher.zeros(channels * shape.stride + PAD)
             self.fields["d", level] = launcher.zeros(shape.stride + PAD)
 
-    def coarsen(self, screening: float) -> None:
-        """Constraints of all coarser levels from those of the top."""
+    def coarsen(self, screening: float, rows: tuple[int, int] | None = None) -> None:
+        """Constraints of all coarser levels from those of the top, of which only ``rows`` (half open) changed."""
         run, i = self.launch.run, np.int32
         self.eps = {level: screening * 4.0 ** (self.top - level) for level in self.shapes}
+        first, last = rows or (0, self.shapes[self.top].n)
         for level in range(self.top, 0, -1):
             fine, under = self.shapes[level], self.shapes[level - 1]
-            strips, rows = self.launch.strips(under.n)
+            first, last = max(0, (first - 1) // 2), min(under.n, last // 2 + 1)
+            strips, each = self.launch.strips(last - first)
             d, f = ("d", level), (self.static, level)
             d2, f2 = ("d", level - 1), (self.static, level - 1)
             run(
                 "coarsen", (strips, self.channels), *(self.fields[k] for k in (d, f, d2, f2)), i(fine.n), i(fine.pitch),
                 i(under.pitch), i(fine.stride), i(under.stride), self.launch.scratch, i(self.launch.scratch_stride),
-                i(rows),
+                i(each), i(first), i(last),
             )  # fmt: skip
         run(
             "coarsen_bottom", (1,), self.fields["d", 0], self.fields[self.static, 0], self.launch.table,
@@ -221,12 +223,13 @@ class ClWorkspace:
 
     def load(self, strokes: Sequence[Stroke], settings: TerrainSettings) -> None:
         """Rasterise what changed since the last set, and coarsen."""
-        tables, windows = self.packer.pack(strokes, settings)
+        tables, window = self.packer.pack(strokes, settings)
         self.size_m = tables.size_m
-        count = bins(tables.samples)
-        self.rasterise(tables, [(0, count, 0, count)] if windows is None else windows)
-        self.gradient.coarsen(tables.screening)
-        self.height.coarsen(tables.screening)
+        if window is None:
+            return
+        self.rasterise(tables, window)
+        self.gradient.coarsen(tables.screening, window.sample_rows)
+        self.height.coarsen(tables.screening, window.sample_rows)
 
     def warm(self, heights: NDArray[np.float32]) -> None:
         """Start the height step from these heights of the finest level instead of from coarser levels."""
@@ -234,8 +237,8 @@ class ClWorkspace:
         value = np.where(fixed, self.height.get("s", self.top), heights[None])
         self.height.put("u", self.top, value)
 
-    def rasterise(self, tables: Tables, windows: Sequence[Window]) -> None:
-        """Constraints of the finest level inside these windows of bins."""
+    def rasterise(self, tables: Tables, window: Window) -> None:
+        """Constraints of the finest level inside a window of bins."""
         put, i, f = self.launch.constant, np.int32, np.float32
         single = (tables.segments, tables.strokes)
         segments, strokes = (put(a.astype(np.float32)) for a in single)
@@ -244,15 +247,14 @@ class ClWorkspace:
         spans = put(tables.spans.astype(np.float32))
         shape = self.height.shapes[self.top]
         h, g = self.height.fields, self.gradient.fields
-        for r0, r1, c0, c1 in windows:
-            if r1 <= r0 or c1 <= c0:
-                continue
-            self.launch.run(
-                "rasterise", (c1 - c0, r1 - r0), segments, i(tables.segments.shape[1]), strokes, index, row_start,
-                row_items, span_index, spans, h["d", self.top], h["s", self.top], g["d", self.top], g["f", self.top],
-                i(shape.n), i(shape.pitch), i(shape.stride), f(tables.spacing_m), f(tables.screening),
-                f(tables.exit_length_m), i(tables.pinned), i(c0), i(r0),
-            )  # fmt: skip
+        if window.width == 0:
+            return
+        self.launch.run(
+            "rasterise", (window.width, len(window.spans)), segments, i(tables.segments.shape[1]), strokes, index,
+            row_start, row_items, span_index, spans, h["d", self.top], h["s", self.top], g["d", self.top],
+            g["f", self.top], i(shape.n), i(shape.pitch), i(shape.stride), f(tables.spacing_m), f(tables.screening),
+            f(tables.exit_length_m), i(tables.pinned), i(window.first), put(window.spans),
+        )  # fmt: skip
 
     def guide(self, level: int) -> None:
         """f of the height step at ``level`` from u of the gradient step."""

@@ -202,8 +202,8 @@ class NumpyWorkspace:
 
     def load(self, strokes: Sequence[Stroke], settings: TerrainSettings) -> None:
         """Rasterise and coarsen."""
-        tables, windows = self.packer.pack(strokes, settings)
-        if windows == []:
+        tables, window = self.packer.pack(strokes, settings)
+        if window is None:
             return
         c = reference_raster.rasterise(tables)
         self.size_m = tables.size_m
