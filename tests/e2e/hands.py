@@ -13,6 +13,9 @@ from tests.e2e.conftest import Visitor
 
 Pixel = tuple[float, float]
 
+# Points that are samples of every level of a 4096 m terrain, so that heights compare without interpolation.
+COARSE = [(128.0 * col, 128.0 * row) for row in range(33) for col in range(33)]
+
 
 def polyline(points: Sequence[Pixel], steps: int = 8) -> list[Pixel]:
     """Points along straight legs, ``steps`` a leg."""

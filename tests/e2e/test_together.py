@@ -13,6 +13,7 @@ from esker.grid import quantum, spacing
 from esker.terrain import Terrain
 from tests.e2e.conftest import Server, Visitor, Visitors
 from tests.e2e.hands import (
+    COARSE,
     arch,
     draw,
     ellipse,
@@ -26,8 +27,6 @@ from tests.e2e.hands import (
 )
 
 SIZE = 4096.0
-# Points that are samples of every level, so that heights compare without interpolation.
-COARSE = [(x, y) for y in np.arange(0, SIZE + 1, 128.0).tolist() for x in np.arange(0, SIZE + 1, 128.0).tolist()]
 
 
 def two_people(visitors: Visitors, server: Server) -> tuple[Visitor, Visitor, str, str]:

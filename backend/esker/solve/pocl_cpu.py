@@ -4,7 +4,7 @@ The PoCL wheel carries LLVM 14 (2022). On a processor that LLVM 14 does not know
 CPU "generic", which its own front end then refuses ("unknown target CPU 'generic'"): nothing compiles. PoCL has no
 option for the name, but keeps it as a C string that its device structure points to. ``name_cpu`` lets that pointer
 point to the instruction set level that the processor says it has. It is called only after a compilation has failed
-in exactly that way; whatever it does not recognise it leaves alone. See docs/decisions/0006-pocl-on-new-processors.md.
+in exactly that way; whatever it does not recognise it leaves alone. See docs/decisions/0010-pocl-on-new-processors.md.
 """
 
 from __future__ import annotations
