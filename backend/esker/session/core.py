@@ -22,7 +22,8 @@ from esker.store.journal import SNAPSHOT_EVERY, Loaded, Row
 from esker.version import VERSION
 
 RECENT_OPS: Final = 2_000
-"""Ops kept as text for clients that resume; who missed more gets a snapshot."""
+RECENT_CHARACTERS: Final = 4 * 1024 * 1024
+"""Ops kept as text for clients that resume, at most so many and so long; who missed more gets a snapshot."""
 
 
 class Denied(Exception):
@@ -51,6 +52,27 @@ class RoomInfo:
     device: str
 
 
+class Recent:
+    """The newest committed ops as JSON text, bounded in number and size."""
+
+    def __init__(self) -> None:
+        self._ops: deque[tuple[int, str]] = deque()
+        self._characters = 0
+
+    def add(self, clock: int, text: str) -> None:
+        """The next op; clocks come without gaps."""
+        self._ops.append((clock, text))
+        self._characters += len(text)
+        while len(self._ops) > RECENT_OPS or self._characters > RECENT_CHARACTERS:
+            self._characters -= len(self._ops.popleft()[1])
+
+    def after(self, clock: int) -> list[str] | None:
+        """The ops after ``clock``, or None when they are not all here."""
+        if not self._ops or self._ops[0][0] > clock + 1:
+            return None
+        return [text for at, text in self._ops if at > clock]
+
+
 class RoomCore:
     """One terrain with its members."""
 
@@ -68,8 +90,9 @@ class RoomCore:
         self.members = Members()
         self._find, self._limits, self._max_members = find, limits or Limits(), max_members
         self._counters = dict(loaded.counters)
-        self._recent: deque[tuple[int, str]] = deque(maxlen=RECENT_OPS)
-        self._recent.extend((row.clock, row.ordered_json()) for row in loaded.recent)
+        self._recent = Recent()
+        for row in loaded.recent:
+            self._recent.add(row.clock, row.ordered_json())
         self._snapshot_clock = loaded.document.clock - len(loaded.recent)
         self._waiting: list[Row] = []
         self._in_flight: list[Row] = []
@@ -135,11 +158,7 @@ class RoomCore:
         now = self.document.clock
         if clock is None or clock > now:
             return None
-        if clock == now:
-            return []
-        if not self._recent or self._recent[0][0] > clock + 1:
-            return None
-        return [text for at, text in self._recent if at > clock]
+        return [] if clock == now else self._recent.after(clock)
 
     # --- ops ----------------------------------------------------------------------------------------------------
 
@@ -214,7 +233,8 @@ class RoomCore:
             self._snapshot_clock = batch.after.clock
         self._in_flight = []
         texts = [row.ordered_json() for row in batch.rows]
-        self._recent.extend((row.clock, text) for row, text in zip(batch.rows, texts, strict=True))
+        for row, text in zip(batch.rows, texts, strict=True):
+            self._recent.add(row.clock, text)
         shared = f'{{"type":"ordered","ops":[{",".join(texts)}]}}'
         for member in self.members:
             member.outbox.push(shared)
