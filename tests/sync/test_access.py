@@ -253,6 +253,16 @@ def test_codes_end_after_fifteen_minutes(tmp_path: Path) -> None:
     journal.close()
 
 
+def test_links_are_bounded(server: LiveServer, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("esker.store.access.MAX_LINKS", 2)
+    terrain, owner = server.create()
+    link, _ = _link(server, terrain, owner, "edit")
+    status, error = server.http("POST", f"/api/terrains/{terrain}/links", {"role": "edit"}, owner)
+    assert (status, error["code"]) == (409, "too_many_links")
+    assert server.raw("DELETE", f"/api/terrains/{terrain}/links/{link}", secret=owner)[0] == 204
+    _link(server, terrain, owner, "edit")
+
+
 def test_the_store_keeps_no_secret(tmp_path: Path) -> None:
     with LiveServer(tmp_path) as server:
         _, secret = server.create()

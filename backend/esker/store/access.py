@@ -22,7 +22,7 @@ CODE_SECONDS: Final = 15 * 60
 CODE_LENGTH: Final = 6
 CODE_ALPHABET: Final = "ABCDEFGHJKMNPQRSTUVWXYZ23456789"
 """No 0/O, 1/I/L: codes are read from a wall and typed by hand."""
-MAX_LINKS: Final = 200
+MAX_LINKS: Final = 2_000
 """Live links per terrain. Links made by join codes count too."""
 
 
