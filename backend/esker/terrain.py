@@ -28,6 +28,8 @@ DEFAULT_FLANK: Flank = Flank()
 LOOP_FRACTION = 0.25
 """A level stroke whose ends are nearer than this share of its length takes its farthest point as second anchor."""
 
+Strokes = tuple[contract.Stroke, ...]
+
 _solver: Solver | None = None
 
 
@@ -107,6 +109,11 @@ def _stroke(
     )
 
 
+def _same(a: Strokes, b: Strokes) -> bool:
+    """The very same values in the same order: strokes are immutable."""
+    return len(a) == len(b) and all(x is y for x, y in zip(a, b, strict=True))
+
+
 class Terrain:
     """A terrain without a server. Heights are a pure function of ``strokes`` and ``settings``.
 
@@ -130,10 +137,10 @@ class Terrain:
         self.settings = TerrainSettings(size_m=size, border=border, reach_m=reach)
         self._strokes: dict[str, contract.Stroke] = {}
         self._solver = solver
-        self._solved: dict[int, tuple[object, NDArray[np.float32]]] = {}
+        self._solved: dict[int, tuple[TerrainSettings, Strokes, NDArray[np.float32]]] = {}
 
     @property
-    def strokes(self) -> tuple[contract.Stroke, ...]:
+    def strokes(self) -> Strokes:
         """The strokes, oldest first."""
         return tuple(self._strokes.values())
 
@@ -153,13 +160,12 @@ class Terrain:
 
         Raises ValueError for a level outside 0..MAX_LEVEL.
         """
-        state = (self.settings, *(id(s) for s in self.strokes))
-        held = self._solved.get(level)
-        if held is None or held[0] != state:
+        strokes, held = self.strokes, self._solved.get(level)
+        if held is None or held[0] != self.settings or not _same(held[1], strokes):
             solver = self._solver or default_solver()
-            held = (state, solver.solve(self.strokes, self.settings, level)[level])
+            held = (self.settings, strokes, solver.solve(strokes, self.settings, level)[level])
             self._solved[level] = held
-        return held[1]
+        return held[2]
 
     def assemble(self, level: int) -> System:
         """(A, b): the float64 sparse system of the height step at ``level``, see ``esker.solve.assembly``."""

@@ -41,8 +41,10 @@ STALLED_AFTER = 8
 """After this many cycles a ratio of two updates above STALLED means that float32 has nothing left to gain."""
 CYCLES_PER_PULSE = 2
 """While settling, the preview of level 0 is given out again once in so many cycles, so that a caller can stop."""
+SPARE_LEVEL = 4
 SPARE_WORKSPACES = 4
-"""Idle workspaces kept (about 90 MB each at level 4), with the raster of the strokes that they last solved."""
+"""Idle workspaces kept, with the raster of the strokes that they last solved: 91 MB each at level 4. One at level 6
+takes 1.3 GB, so above SPARE_LEVEL only one is kept."""
 
 
 @dataclass(frozen=True)
@@ -184,17 +186,17 @@ class Solver:
         """An idle workspace, the one that has most of these strokes rasterised already; or a new one."""
         idle = [w for w in self._spare if w.top == top]
         best = max(idle, key=lambda w: w.packer.likeness(strokes, settings), default=None)
-        room = len(self._spare) < SPARE_WORKSPACES
+        room = len(self._spare) < (SPARE_WORKSPACES if top <= SPARE_LEVEL else 1)
         if best is not None and (best.packer.likeness(strokes, settings) > 0 or not room or not strokes):
             self._spare.remove(best)
             return best
-        if not room:
+        if not room and self._spare:
             self._spare.pop(0)
         return NumpyWorkspace(top) if self._device is None else ClWorkspace(self._device, top)
 
     def _give(self, workspace: Workspace) -> None:
         self._spare.append(workspace)
-        del self._spare[:-SPARE_WORKSPACES]
+        del self._spare[: -SPARE_WORKSPACES if workspace.top <= SPARE_LEVEL else -1]
 
 
 def _previews(w: Workspace) -> Iterator[LevelResult]:
