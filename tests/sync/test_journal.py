@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import sqlite3
 import threading
+import time
 from concurrent.futures import Future, wait
 from pathlib import Path
 
@@ -76,6 +77,19 @@ def test_a_refused_item_does_not_undo_the_rest_of_its_commit(journal: Journal) -
     assert isinstance(futures[1].exception(), sqlite3.IntegrityError)
     assert futures[2].exception() is None
     assert [row.clock for row in journal.rows("t", 0)] == [1, 2, 3]
+    journal.close()
+
+
+def test_a_cancelled_item_is_not_written_and_stops_nobody(journal: Journal) -> None:
+    gate = threading.Event()
+    hold: Future[bool] = journal.submit(lambda _: gate.wait(5))
+    while not hold.running():
+        time.sleep(0.001)
+    cancelled, kept = journal.append("t", _rows(1, 1)), journal.append("t", _rows(2, 1))
+    assert cancelled.cancel()
+    gate.set()
+    assert kept.result(5) is None
+    assert [row.clock for row in journal.rows("t", 0)] == [2]
     journal.close()
 
 

@@ -153,6 +153,8 @@ class Journal:
 
     def _commit(self, batch: list[tuple[Callable[[sqlite3.Connection], Any], Future[Any]]]) -> None:
         db = self._writer_db
+        # From here on an item cannot be cancelled any more; one that was (its HTTP client hung up) is not written.
+        batch = [(write, future) for write, future in batch if future.set_running_or_notify_cancel()]
         outcomes: list[tuple[Future[Any], Any, Exception | None]] = []
         try:
             db.execute("BEGIN IMMEDIATE")
