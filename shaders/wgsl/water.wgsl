@@ -6,8 +6,9 @@
 const WATER_ABSORB: vec3f = vec3f(0.30, 0.105, 0.080);
 const WATER_SCATTER: vec3f = vec3f(0.008, 0.042, 0.052);
 
-fn wave_slope(p: vec2f, distance: f32) -> vec2f {
-  let lod = log2(max(distance * view.forward.w, 1.0e-3) * 256.0);
+// `grazing`: sine of the angle between sight and surface; the footprint of a pixel grows as it shrinks.
+fn wave_slope(p: vec2f, distance: f32, grazing: f32) -> vec2f {
+  let lod = log2(max(distance * view.forward.w, 1.0e-3) * 256.0) - 0.8 * log2(max(grazing, 0.01));
   var slope = vec2f(0.0);
   let drift = view.time * vec2f(0.6, 0.35);
   let a = textureSampleLevel(noise, smooth_repeat, (p + drift * 6.0) / 160.0, max(lod - log2(160.0), 0.0));
@@ -24,7 +25,7 @@ fn wave_slope(p: vec2f, distance: f32) -> vec2f {
 // `bed` is the lit ground under it, used where there is no ground to blend with (then the result is opaque).
 fn water_surface(p: vec3f, dir: vec3f, depth: f32, foam_noise: vec3f, bed: vec3f) -> vec4f {
   let distance = distance(p, view.eye.xyz) * (1.0 - view.eye.w) + view.eye.w * 1.0;
-  let n = normalize(vec3f(-wave_slope(p.xy, distance), 1.0));
+  let n = normalize(vec3f(-wave_slope(p.xy, distance, abs(dir.z)), 1.0));
   let facing = max(dot(n, -dir), 0.0);
   let fresnel = 0.02 + 0.98 * pow(1.0 - facing, 5.0);
   var mirror = reflect(dir, n);

@@ -45,7 +45,7 @@ export class QualityControl {
 
   /** Milliseconds without change after which the picture counts as still. */
   get restMs(): number {
-    return this.software ? 350 : 60;
+    return this.software ? 900 : 60;
   }
 
   /** Takes in the measured time of a frame that was drawn at the moving quality. */

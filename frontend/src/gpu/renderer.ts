@@ -1,7 +1,7 @@
 /** The WebGPU renderer: one frame from a scene (DESIGN 9). */
 
 import type { FrameStats, Scene, SceneRenderer, Vec3 } from "../core/types.ts";
-import { Selection } from "../tiles/selection.ts";
+import { type Cut, Selection } from "../tiles/selection.ts";
 import { Atlas, NEW_TILES_PER_FRAME, type Resident } from "./atlas.ts";
 import { BackgroundPass } from "./background.ts";
 import type { Gpu } from "./device.ts";
@@ -20,6 +20,8 @@ import { NormalsPass, SunPass } from "./tilecompute.ts";
 
 /** Tiles whose light is marched in one frame: while the picture moves, and at rest. */
 const LIGHT_TILES = { hardware: { moving: 128, rest: 256 }, software: { moving: 2, rest: 6 } } as const;
+/** On a software adapter a picture at rest is drawn anew this often while tiles and light still come in. */
+const REDRAW_MS = 900;
 const FRAMES_IN_FLIGHT = { hardware: 2, software: 1 } as const;
 
 interface Passes {
@@ -58,6 +60,7 @@ export class GpuRenderer implements SceneRenderer {
   /** Batches of light marched, and those that the last picture shows. */
   private lightMarched = 0;
   private lightDrawn = 0;
+  private drawnAt = Number.NEGATIVE_INFINITY;
   private inFlight = 0;
   private destroyed = false;
   private stats: FrameStats = { patches: 0, triangles: 0, selectMs: 0, cpuMs: 0, uploads: 0, busy: false };
@@ -99,13 +102,13 @@ export class GpuRenderer implements SceneRenderer {
     const began = performance.now();
     const world = this.worldOf(scene);
     const moved = this.changed(scene);
-    const quality = this.quality.next(began, moved);
+    const quality = this.quality.next(began, moved || (software && (this.tilesDue || world.light.pending)));
     const waves = scene.settings.sea_level_m !== null && !software;
     const due = this.tilesDue || this.lightDrawn !== this.lightMarched || !sameQuality(quality, this.lastQuality);
-    if (!moved && software && world.light.pending && !this.tilesDue) {
-      // On the CPU a picture costs more than the light of many tiles: march them all, then draw once.
-      this.marchOnly(scene, world);
-      return this.report({ busy: true, uploads: 0 });
+    if (!moved && software && (world.light.pending || this.tilesDue) && began - this.drawnAt < REDRAW_MS) {
+      // On the CPU a picture costs more than the upload and light of many tiles: get them ready, then draw.
+      this.prepareOnly(scene, world, quality);
+      return this.report({ busy: true });
     }
     if (!moved && !waves && !due && !world.light.pending)
       return this.report({ busy: this.quality.pending, uploads: 0 });
@@ -160,15 +163,8 @@ export class GpuRenderer implements SceneRenderer {
     const width = Math.max(1, Math.round(camera.width * quality.scale));
     const height = Math.max(1, Math.round(camera.height * quality.scale));
 
-    const changed = world.atlas.refresh(scene.tiles);
-    const selecting = performance.now();
-    const { cut, entered } = this.choose(scene, world, quality);
-    const selectMs = performance.now() - selecting;
-    this.high = cut.maxHeight;
-    this.tilesDue = cut.requests.length > 0;
-
     const encoder = device.createCommandEncoder({ label: "frame" });
-    this.compute(encoder, scene, world, { changed, entered, moved: how.moved });
+    const { cut, uploads, selectMs } = this.prepare(encoder, scene, world, quality, how.moved);
     this.passes.frame.update(scene, { width, height, low: cut.minHeight, high: cut.maxHeight });
     this.passes.patches.update(cut);
     this.passes.ribbons.update(scene.showStrokes ? scene.strokes : [], scene.ghost, quality.scale * pixelRatio());
@@ -177,21 +173,18 @@ export class GpuRenderer implements SceneRenderer {
     device.queue.submit([encoder.finish()]);
     this.measure(true);
     this.lightDrawn = this.lightMarched;
+    this.drawnAt = Number.POSITIVE_INFINITY;
     this.report({
       patches: cut.count,
       triangles: this.passes.patches.triangles,
       selectMs,
       cpuMs: performance.now() - how.began,
-      uploads: changed.length + entered.length,
+      uploads,
     });
   }
 
   /** Selects, lets requested tiles in and selects again, so that coarse levels arrive together in the first frame. */
-  private choose(
-    scene: Scene,
-    world: World,
-    quality: Quality,
-  ): { cut: ReturnType<Selection["select"]>; entered: Resident[] } {
+  private choose(scene: Scene, world: World, quality: Quality): { cut: Cut; entered: Resident[] } {
     const entered: Resident[] = [];
     const tau = scene.tauPx * quality.tauFactor;
     const sea = scene.settings.sea_level_m ?? Number.NEGATIVE_INFINITY;
@@ -216,7 +209,9 @@ export class GpuRenderer implements SceneRenderer {
     this.passes.normals.run(encoder, scene.tiles.sizeM, [...what.changed, ...what.entered]);
     world.light.mark(what.changed, what.entered, sun);
     const budget = LIGHT_TILES[this.gpu.software ? "software" : "hardware"];
-    this.march(encoder, scene, world, what.moved ? budget.moving : budget.rest);
+    // While tiles still come in, on the CPU only their own light: their neighbours are due when all are there.
+    const rest = this.gpu.software && this.tilesDue ? 0 : budget.rest;
+    this.march(encoder, scene, world, what.moved ? budget.moving : rest);
   }
 
   private march(encoder: GPUCommandEncoder, scene: Scene, world: World, budget: number): void {
@@ -224,9 +219,29 @@ export class GpuRenderer implements SceneRenderer {
     this.lightMarched += 1;
   }
 
-  private marchOnly(scene: Scene, world: World): void {
-    const encoder = this.gpu.device.createCommandEncoder({ label: "light" });
-    this.march(encoder, scene, world, LIGHT_TILES.software.rest);
+  /** Brings atlas, cut and light up to date for a frame. */
+  private prepare(
+    encoder: GPUCommandEncoder,
+    scene: Scene,
+    world: World,
+    quality: Quality,
+    moved: boolean,
+  ): { cut: Cut; uploads: number; selectMs: number } {
+    const changed = world.atlas.refresh(scene.tiles);
+    const selecting = performance.now();
+    const { cut, entered } = this.choose(scene, world, quality);
+    const selectMs = performance.now() - selecting;
+    this.high = cut.maxHeight;
+    this.tilesDue = cut.requests.length > 0;
+    this.compute(encoder, scene, world, { changed, entered, moved });
+    return { cut, uploads: changed.length + entered.length, selectMs };
+  }
+
+  /** All of a frame but the picture. */
+  private prepareOnly(scene: Scene, world: World, quality: Quality): void {
+    const encoder = this.gpu.device.createCommandEncoder({ label: "prepare" });
+    const { uploads } = this.prepare(encoder, scene, world, quality, false);
+    this.report({ uploads });
     this.gpu.device.queue.submit([encoder.finish()]);
     this.measure(false);
   }
@@ -253,7 +268,9 @@ export class GpuRenderer implements SceneRenderer {
     this.gpu.device.queue.onSubmittedWorkDone().then(
       () => {
         this.inFlight -= 1;
-        if (frame) this.quality.measured(performance.now() - submitted);
+        if (!frame) return;
+        this.drawnAt = performance.now();
+        this.quality.measured(this.drawnAt - submitted);
       },
       () => {
         this.inFlight -= 1;

@@ -50,6 +50,14 @@ function world(name: string, levels: number): TileView {
   return view;
 }
 
+/** Loads a terrain from a raw little-endian float32 grid of (64 * 2^levels + 1)^2 heights, row 0 south. */
+async function load(name: string, url: string, levels: number, sizeM: number): Promise<void> {
+  const grid = new Float32Array(await (await fetch(url)).arrayBuffer());
+  const n = 64 * 2 ** levels + 1;
+  const at = (v: number): number => Math.round((v / sizeM) * (n - 1));
+  worlds.set(`${name}${levels}`, new FieldView(sizeM, levels, (x, y) => grid[at(y) * n + at(x)]!));
+}
+
 interface Shot {
   world: string;
   levels?: number;
@@ -199,4 +207,4 @@ async function circle(shot: Shot, frames: number): Promise<{ ms: number; patches
   return { ms: (performance.now() - began) / frames, patches };
 }
 
-Object.assign(globalThis, { esker: { shoot, picture, circle, crackTest } });
+Object.assign(globalThis, { esker: { load, shoot, picture, circle, crackTest } });
