@@ -185,16 +185,24 @@ class Worker:
         self._failures += 1
         note = "The ground could not be computed; it will be tried again with the next change."
         if self._failures >= MAX_FAILURES and self._device != FALLBACK_DEVICE:
-            self._device, self._failures = FALLBACK_DEVICE, 0
-            self._solver = self._factory(FALLBACK_DEVICE)
-            log.warning("the solver now runs on %s", self._solver.device_name)
-            note = f"The solver now runs on {self._solver.device_name}: slower, but it goes on."
-            for other in self._clients:
-                _close(other.steps)
-                other.steps = None
-                with self._changed:
-                    other.newest = other.newest or other.running
+            note = self._fall_back() or note
         client.failed(job.clock, note)
+
+    def _fall_back(self) -> str | None:
+        """Every room goes on with the NumPy solver; returns what to tell people, None when that cannot be made."""
+        self._device, self._failures = FALLBACK_DEVICE, 0
+        try:
+            self._solver = self._factory(FALLBACK_DEVICE)
+        except Exception:
+            log.exception("the fallback solver could not be made")
+            return None
+        log.warning("the solver now runs on %s", self._solver.device_name)
+        for other in self._clients:
+            _close(other.steps)
+            other.steps = None
+            with self._changed:
+                other.newest = other.newest or other.running
+        return f"The solver now runs on {self._solver.device_name}: slower, but it goes on."
 
 
 def _active(client: Client) -> bool:
