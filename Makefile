@@ -15,7 +15,7 @@ NPM = PATH="$(CURDIR)/$(BIN):$$PATH" npm --prefix frontend --no-fund --no-audit 
 NODE_OK := node -e 'const [a,b]=process.versions.node.split(".").map(Number);process.exit(a>22||(a==22&&b>=12)||(a==20&&b>=19)?0:1)'
 SOURCES := $(shell find frontend/src shaders frontend/public -type f 2>/dev/null)
 
-.PHONY: run test check format generate lock setup browser clean
+.PHONY: run test pictures check format generate lock setup browser clean
 
 run: setup frontend/dist/index.html ## set up, build, start the server, print the link of a new terrain
 	@exec $(BIN)/python -m esker serve $(ARGS)
@@ -77,6 +77,10 @@ frontend/dist/index.html: $(STAMPS)/node $(SOURCES) frontend/index.html frontend
 	@echo "Building the page ..."
 	$(NPM) run build --silent
 	@touch $@
+
+pictures: check browser frontend/dist/index.html ## draw the README's pictures again
+	$(BIN)/python -m pytest tests/e2e/test_pictures.py
+	mkdir -p docs/pictures && cp tests/artifacts/pictures/* docs/pictures/
 
 browser: ## the browser and the software graphics drivers that the tests draw with
 	@$(SHELL) .ci/browser-packages
