@@ -24,12 +24,13 @@ def picture(visitor: Visitor) -> Image.Image:
 
 
 def rest(visitor: Visitor) -> None:
-    """Until two pictures in a row are the same: tiles are uploaded, light is baked, quality is back to full."""
-    last = picture(visitor)
-    for _ in range(40):
+    """Until the picture has been the same for two seconds: tiles are uploaded, light is baked, quality is full."""
+    last, same = picture(visitor), 0
+    for _ in range(60):
         visitor.page.wait_for_timeout(500)
         now = picture(visitor)
-        if max(ImageStat.Stat(ImageChops.difference(last, now)).mean) < 0.05:
+        same = same + 1 if max(ImageStat.Stat(ImageChops.difference(last, now)).mean) < 0.05 else 0
+        if same == 4:
             return
         last = now
 
