@@ -16,10 +16,10 @@ fn sun_axis() -> vec2f {
   return select(vec2f(1.0, 0.0), job.sun.xy / max(flat, 1.0e-6), flat > 1.0e-6);
 }
 
-// u: azimuth away from the sun, 0..pi (the sky is symmetric); v: square root of the elevation.
+// u: sine of half the azimuth away from the sun (the sky is symmetric); v: square root of the sine of the elevation.
 fn direction_of(uv: vec2f) -> vec3f {
-  let azimuth = uv.x * 3.14159265;
-  let elevation = uv.y * uv.y * 1.57079633;
+  let azimuth = 2.0 * asin(uv.x);
+  let elevation = asin(uv.y * uv.y);
   let axis = sun_axis();
   let side = vec2f(-axis.y, axis.x);
   return vec3f((axis * cos(azimuth) + side * sin(azimuth)) * cos(elevation), sin(elevation));
@@ -58,7 +58,8 @@ fn bake_ambient(@builtin(global_invocation_id) id: vec3u) {
         let axis = sun_axis();
         dir = vec3f(2.0 * axis * dot(axis, dir.xy) - dir.xy, dir.z);
       }
-      let solid = uv.y * sqrt(max(0.0, 1.0 - dir.z * dir.z)) + 1.0e-4;
+      // Solid angle of a texel: d(azimuth) d(sine of elevation).
+      let solid = uv.y / sqrt(max(1.0 - uv.x * uv.x, 0.004)) + 1.0e-4;
       let value = textureLoad(sky_in, vec2u(mirrored, j), 0).rgb;
       let c = max(0.0, dot(dir, face)) * solid;
       sum += value * c;

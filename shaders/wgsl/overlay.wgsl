@@ -1,14 +1,6 @@
 // Lines and tints over the ground: contours, slope, patches, the scale grid, cursors. All are anti-aliased by the
 // pixel's footprint and fade out before they could become moire.
 
-// Coverage of lines at the multiples of `every`, `half` pixels wide, where the value changes by `rate` per pixel.
-fn lines(value: f32, every: f32, rate: f32, half: f32) -> f32 {
-  let away = abs(fract(value / every - 0.5) - 0.5) * every;
-  let width = max(rate, 1.0e-6);
-  let cover = clamp(half + 0.5 - away / width, 0.0, 1.0);
-  return cover * (1.0 - smoothstep(0.12, 0.38, width / every));
-}
-
 fn contours(height: f32, rate: f32) -> f32 {
   // A hair above the round value: ground that is flat at exactly that height is not one wide line.
   let z = height - 0.01 * view.contour;

@@ -7,10 +7,11 @@ fn paper_backdrop(dir: vec3f) -> vec3f {
 
 fn sky_colour(dir: vec3f) -> vec3f {
   if (view.look == LOOK_PAPER) { return paper_backdrop(dir); }
+  // The mapping of compute_sky.wgsl, without a single arc function.
   let flat = max(length(dir.xy), 1.0e-5);
   let sun_flat = max(length(view.sun.xy), 1.0e-5);
-  let azimuth = acos(clamp(dot(dir.xy, view.sun.xy) / (flat * sun_flat), -1.0, 1.0)) / 3.14159265;
-  let elevation = sqrt(clamp(asin(clamp(dir.z, 0.0, 1.0)) / 1.57079633, 0.0, 1.0));
+  let azimuth = sqrt(clamp(0.5 - 0.5 * dot(dir.xy, view.sun.xy) / (flat * sun_flat), 0.0, 1.0));
+  let elevation = sqrt(clamp(dir.z, 0.0, 1.0));
   let size = vec2f(textureDimensions(sky_lut));
   let uv = (vec2f(azimuth, elevation) * (size - 1.0) + 0.5) / size;
   return textureSampleLevel(sky_lut, smooth_clamp, uv, 0.0).rgb;

@@ -35,9 +35,6 @@ const OVERLAY_CONTOURS: u32 = 1u;
 const OVERLAY_SLOPE: u32 = 2u;
 const OVERLAY_PATCHES: u32 = 3u;
 
-// 2: everything; 1: fewer noise octaves for software adapters.
-override DETAIL: u32 = 2u;
-
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var heights: texture_2d_array<f32>;
 @group(0) @binding(2) var slopes: texture_2d_array<f32>;

@@ -14,11 +14,7 @@ fn wave_slope(p: vec2f, distance: f32, grazing: f32) -> vec2f {
   let a = textureSampleLevel(noise, smooth_repeat, (p + drift * 6.0) / 160.0, max(lod - log2(160.0), 0.0));
   let b = textureSampleLevel(noise, smooth_repeat, (p.yx * vec2f(1.0, -1.0) - drift * 3.0) / 47.0, max(lod - log2(47.0), 0.0));
   slope += noise_slope(a) * 0.030 + noise_slope(b).yx * 0.035;
-  if (DETAIL > 1u) {
-    let c = textureSampleLevel(noise, smooth_repeat, (p - drift * 1.7) / 11.0, max(lod - log2(11.0), 0.0));
-    slope += noise_slope(c) * 0.035;
-  }
-  return slope;
+  return slope + small_waves(p, drift, lod);
 }
 
 // Colour of the water (not yet through the air) and how much of it hides what is below.

@@ -13,20 +13,26 @@ FRONTEND = Path(__file__).resolve().parents[2] / "frontend" / "src" / "gpu"
 
 
 def modules() -> dict[str, list[Path]]:
-    """Files of each module, read from gpu/shaders.ts itself."""
+    """Files of each module in every variant, read from gpu/shaders.ts itself."""
     text = (FRONTEND / "shaders.ts").read_text()
-    files = dict(re.findall(r'import (\w+) from "@shaders/([\w/.]+)\?raw"', text))
+    files = {name: [SHADERS / path] for name, path in re.findall(r'import (\w+) from "@shaders/([\w/.]+)\?raw"', text)}
     common = re.search(r"const common = join\(([^)]*)\)", text)
     assert common is not None
-    shared = [name.strip() for name in common.group(1).split(",")]
-    found: dict[str, list[Path]] = {}
-    for name, parts in re.findall(r"^  (\w+): join\(([^)]*)\)", text, re.M):
-        expanded = [
-            file for part in parts.split(",") for file in (shared if part.strip() == "common" else [part.strip()])
-        ]
-        found[name] = [SHADERS / files[part] for part in expanded]
-    assert len(found) >= 8
-    return {**found, "blit": [SHADERS / "wgsl" / "blit.wgsl"]}
+    files["common"] = [file for name in common.group(1).split(",") for file in files[name.strip()]]
+
+    def joined(parts: str, **variants: str) -> list[Path]:
+        names = [variants.get(part.strip(), part.strip()) for part in parts.split(",")]
+        return [file for name in names for file in files[name]]
+
+    found: dict[str, list[Path]] = {"blit": [SHADERS / "wgsl" / "blit.wgsl"]}
+    for parts in re.findall(r"join\(((?:[^()]|\[\w+\])*)\)", text.split("export type Detail")[1]):
+        for detail in ("detailRich", "detailPlain"):
+            for look in ("lookNatural", "lookAlpine", "lookDesert", "lookPaper"):
+                chosen = joined(parts, **{"DETAILS[detail]": detail, "LOOKS[look]": look})
+                key = f"{chosen[-1].stem}-{detail if 'DETAILS' in parts else ''}-{look if 'LOOKS' in parts else ''}"
+                found[key] = chosen
+    assert len(found) == 1 + 8 + 4 + 5
+    return found
 
 
 @pytest.mark.parametrize("name", sorted(modules()))

@@ -1,7 +1,7 @@
 /** Sky, and the plane or sea around the block (shaders/wgsl/background.wgsl). */
 
 import { createPass, type PassContext } from "./pipeline.ts";
-import { SOURCES } from "./shaders.ts";
+import { sceneSource } from "./shaders.ts";
 
 export class BackgroundPass {
   private constructor(
@@ -13,7 +13,7 @@ export class BackgroundPass {
     const [sky, openSea] = await Promise.all([
       createPass(context, {
         label: "background",
-        code: SOURCES.background,
+        code: sceneSource("background", context.detail),
         vertex: "background_vertex",
         fragment: "background_fragment",
         depthCompare: "less-equal",
@@ -21,7 +21,7 @@ export class BackgroundPass {
       }),
       createPass(context, {
         label: "open sea",
-        code: SOURCES.background,
+        code: sceneSource("background", context.detail),
         vertex: "open_sea_vertex",
         fragment: "open_sea_fragment",
       }),

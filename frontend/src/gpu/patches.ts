@@ -1,9 +1,9 @@
 /** The passes that draw patches: ground, sea and walls share the patch records of the cut. */
 
-import { PATCH_CELLS } from "../generated/contract.ts";
-import { type Cut, EDGE_EAST, EDGE_NORTH, EDGE_SOUTH, EDGE_WEST, RECORD_WORDS } from "../tiles/selection.ts";
-import { createPass, GrowingBuffer, type PassContext } from "./pipeline.ts";
-import { SOURCES } from "./shaders.ts";
+import { type Look, PATCH_CELLS } from "../generated/contract.ts";
+import { type Cut, EDGE_EAST, EDGE_NORTH, EDGE_SOUTH, EDGE_WEST, RECORD_WORDS, WET } from "../tiles/selection.ts";
+import { createPass, describePass, GrowingBuffer, type PassContext } from "./pipeline.ts";
+import { sceneSource, terrainSource } from "./shaders.ts";
 
 /** Row stride of the vertex numbering; not the vertex count, so that small vertex caches do not thrash (DESIGN 9). */
 export const PITCH = 20;
@@ -32,25 +32,42 @@ const INDEX_COUNT = PATCH_CELLS * PATCH_CELLS * 6;
 const WALL_VERTICES = PATCH_CELLS * 6;
 const WALL_WORDS = RECORD_WORDS + 1;
 
+const WALL_LAYOUT: GPUVertexBufferLayout = {
+  arrayStride: WALL_WORDS * 4,
+  stepMode: "instance",
+  attributes: [
+    { shaderLocation: 0, offset: 0, format: "uint32x4" },
+    { shaderLocation: 1, offset: RECORD_WORDS * 4, format: "uint32" },
+  ],
+};
+
 /** The cut on the device, drawn by the ground, sea and wall pipelines. */
 export class PatchPasses {
   private readonly records: GrowingBuffer;
   private readonly walls: GrowingBuffer;
+  private readonly wet: GrowingBuffer;
+  private wetRecords = new Uint32Array(0);
+  private wetCount = 0;
+  private wetBuffer: GPUBuffer | null = null;
   private readonly indices: GPUBuffer;
   private wallRecords = new Uint32Array(WALL_WORDS * 256);
   private wallCount = 0;
   private count = 0;
+  private readonly looks = new Map<Look, GPURenderPipeline>();
+  private readonly coming = new Set<Look>();
+  private terrain: GPURenderPipeline | null = null;
   private recordBuffer: GPUBuffer | null = null;
   private wallBuffer: GPUBuffer | null = null;
 
   private constructor(
-    device: GPUDevice,
-    private readonly terrain: GPURenderPipeline,
+    private readonly context: PassContext,
     private readonly sea: GPURenderPipeline,
     private readonly wall: GPURenderPipeline,
   ) {
+    const { device } = context;
     this.records = new GrowingBuffer(device, "patch records");
     this.walls = new GrowingBuffer(device, "wall records");
+    this.wet = new GrowingBuffer(device, "sea records");
     const indices = patchIndices();
     this.indices = device.createBuffer({
       label: "patch indices",
@@ -61,60 +78,77 @@ export class PatchPasses {
   }
 
   static async create(context: PassContext): Promise<PatchPasses> {
-    const constants = { PITCH };
-    const buffers = [RECORD_LAYOUT];
-    const wallLayout: GPUVertexBufferLayout = {
-      arrayStride: WALL_WORDS * 4,
-      stepMode: "instance",
-      attributes: [
-        { shaderLocation: 0, offset: 0, format: "uint32x4" },
-        { shaderLocation: 1, offset: RECORD_WORDS * 4, format: "uint32" },
-      ],
-    };
-    const [terrain, sea, wall] = await Promise.all([
-      createPass(context, {
-        label: "terrain",
-        code: SOURCES.terrain,
-        vertex: "terrain_vertex",
-        fragment: "terrain_fragment",
-        buffers,
-        constants,
-      }),
+    const [sea, wall] = await Promise.all([
       createPass(context, {
         label: "sea",
-        code: SOURCES.background,
+        code: sceneSource("background", context.detail),
         vertex: "water_vertex",
         fragment: "water_fragment",
-        buffers,
-        constants,
+        buffers: [RECORD_LAYOUT],
+        vertexConstants: { PITCH },
         blend: true,
         depthWrite: false,
       }),
       createPass(context, {
         label: "wall",
-        code: SOURCES.wall,
+        code: sceneSource("wall", context.detail),
         vertex: "wall_vertex",
         fragment: "wall_fragment",
-        buffers: [wallLayout],
+        buffers: [WALL_LAYOUT],
       }),
     ]);
-    return new PatchPasses(context.device, terrain, sea, wall);
+    return new PatchPasses(context, sea, wall);
+  }
+
+  /**
+   * Makes the ground's pipeline of a look the current one. The first is made at once; a later one in the background, while
+   * the last look goes on. Returns false until the look is there.
+   */
+  useLook(look: Look): boolean {
+    const ready = this.looks.get(look);
+    if (ready !== undefined) {
+      this.terrain = ready;
+      return true;
+    }
+    if (this.coming.has(look)) return false;
+    const options = {
+      label: `terrain ${look}`,
+      code: terrainSource(look, this.context.detail),
+      vertex: "terrain_vertex",
+      fragment: "terrain_fragment",
+      buffers: [RECORD_LAYOUT],
+      vertexConstants: { PITCH },
+    };
+    if (this.terrain === null) {
+      this.terrain = this.context.device.createRenderPipeline(describePass(this.context, options));
+      this.looks.set(look, this.terrain);
+      return true;
+    }
+    this.coming.add(look);
+    createPass(this.context, options).then(
+      (pipeline) => this.looks.set(look, pipeline),
+      // A lost device: the renderer's `lost` tells.
+      () => this.coming.delete(look),
+    );
+    return false;
   }
 
   /** Uploads the cut. */
   update(cut: Cut): void {
     this.count = cut.count;
     this.recordBuffer = this.records.write(cut.records, cut.count * RECORD_WORDS);
+    this.collectWet(cut);
+    this.wetBuffer = this.wet.write(this.wetRecords, this.wetCount * RECORD_WORDS);
     this.collectWalls(cut);
     this.wallBuffer = this.walls.write(this.wallRecords, this.wallCount * WALL_WORDS);
   }
 
   drawGround(pass: GPURenderPassEncoder): void {
-    this.drawPatches(pass, this.terrain);
+    if (this.terrain !== null) this.drawPatches(pass, this.terrain, this.recordBuffer, this.count);
   }
 
   drawSea(pass: GPURenderPassEncoder): void {
-    this.drawPatches(pass, this.sea);
+    this.drawPatches(pass, this.sea, this.wetBuffer, this.wetCount);
   }
 
   drawWalls(pass: GPURenderPassEncoder): void {
@@ -131,15 +165,33 @@ export class PatchPasses {
   destroy(): void {
     this.records.destroy();
     this.walls.destroy();
+    this.wet.destroy();
     this.indices.destroy();
   }
 
-  private drawPatches(pass: GPURenderPassEncoder, pipeline: GPURenderPipeline): void {
-    if (this.count === 0) return;
+  private drawPatches(
+    pass: GPURenderPassEncoder,
+    pipeline: GPURenderPipeline,
+    records: GPUBuffer | null,
+    count: number,
+  ): void {
+    if (count === 0) return;
     pass.setPipeline(pipeline);
-    pass.setVertexBuffer(0, this.recordBuffer);
+    pass.setVertexBuffer(0, records);
     pass.setIndexBuffer(this.indices, "uint16");
-    pass.drawIndexed(INDEX_COUNT, this.count);
+    pass.drawIndexed(INDEX_COUNT, count);
+  }
+
+  private collectWet(cut: Cut): void {
+    if (this.wetRecords.length < cut.records.length) this.wetRecords = new Uint32Array(cut.records.length);
+    this.wetCount = 0;
+    for (let i = 0; i < cut.count; i += 1) {
+      const from = i * RECORD_WORDS;
+      if ((cut.records[from + 2]! & WET) === 0) continue;
+      const to = this.wetCount * RECORD_WORDS;
+      for (let k = 0; k < RECORD_WORDS; k += 1) this.wetRecords[to + k] = cut.records[from + k]!;
+      this.wetCount += 1;
+    }
   }
 
   private collectWalls(cut: Cut): void {

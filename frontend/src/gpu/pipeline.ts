@@ -1,5 +1,6 @@
 /** What the passes' pipelines have in common. */
 
+import type { Detail } from "./shaders.ts";
 import { DEPTH_FORMAT } from "./target.ts";
 
 /** Where and how finely passes draw. */
@@ -8,8 +9,7 @@ export interface PassContext {
   readonly frameLayout: GPUBindGroupLayout;
   readonly format: GPUTextureFormat;
   readonly samples: number;
-  /** The override DETAIL of view.wgsl. */
-  readonly detail: number;
+  readonly detail: Detail;
 }
 
 export interface PassOptions {
@@ -18,7 +18,8 @@ export interface PassOptions {
   readonly vertex: string;
   readonly fragment: string;
   readonly buffers?: readonly GPUVertexBufferLayout[];
-  readonly constants?: Readonly<Record<string, number>>;
+  readonly vertexConstants?: Readonly<Record<string, number>>;
+  readonly fragmentConstants?: Readonly<Record<string, number>>;
   readonly topology?: GPUPrimitiveTopology;
   readonly blend?: boolean;
   readonly depthCompare?: GPUCompareFunction;
@@ -31,22 +32,25 @@ const OVER: GPUBlendState = {
 };
 
 export function createPass(context: PassContext, options: PassOptions): Promise<GPURenderPipeline> {
+  return context.device.createRenderPipelineAsync(describePass(context, options));
+}
+
+export function describePass(context: PassContext, options: PassOptions): GPURenderPipelineDescriptor {
   const { device } = context;
   const module = device.createShaderModule({ label: options.label, code: options.code });
-  const constants = { DETAIL: context.detail, ...options.constants };
-  return device.createRenderPipelineAsync({
+  return {
     label: options.label,
     layout: device.createPipelineLayout({ bindGroupLayouts: [context.frameLayout] }),
     vertex: {
       module,
       entryPoint: options.vertex,
       buffers: [...(options.buffers ?? [])],
-      constants: vertexConstants(options.constants),
+      constants: { ...options.vertexConstants },
     },
     fragment: {
       module,
       entryPoint: options.fragment,
-      constants,
+      constants: { ...options.fragmentConstants },
       targets: [options.blend === true ? { format: context.format, blend: OVER } : { format: context.format }],
     },
     primitive: { topology: options.topology ?? "triangle-list", cullMode: "none" },
@@ -56,11 +60,7 @@ export function createPass(context: PassContext, options: PassOptions): Promise<
       depthCompare: options.depthCompare ?? "less",
     },
     multisample: { count: context.samples },
-  });
-}
-
-function vertexConstants(constants: Readonly<Record<string, number>> | undefined): Record<string, number> {
-  return { ...constants };
+  };
 }
 
 /** A vertex buffer that grows; contents are written whole. */

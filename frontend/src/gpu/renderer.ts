@@ -57,6 +57,8 @@ export class GpuRenderer implements SceneRenderer {
   private high = 0;
   /** Held tiles were asked for that are not in the atlas yet. */
   private tilesDue = false;
+  /** The shader of the scene's look is still being compiled. */
+  private lookDue = false;
   /** Batches of light marched, and those that the last picture shows. */
   private lightMarched = 0;
   private lightDrawn = 0;
@@ -80,7 +82,13 @@ export class GpuRenderer implements SceneRenderer {
     const samples = gpu.software ? 1 : 4;
     const sky = await SkyTables.create(device);
     const frame = new FrameBindings(device, sky, createNoiseTexture(device), gpu.software);
-    const context: PassContext = { device, frameLayout: frame.layout, format, samples, detail: gpu.software ? 1 : 2 };
+    const context: PassContext = {
+      device,
+      frameLayout: frame.layout,
+      format,
+      samples,
+      detail: gpu.software ? "plain" : "rich",
+    };
     const [target, normals, sun, background, patches, ribbons, ghost] = await Promise.all([
       Target.create(device, format, samples),
       NormalsPass.create(device),
@@ -104,7 +112,8 @@ export class GpuRenderer implements SceneRenderer {
     const moved = this.changed(scene);
     const quality = this.quality.next(began, moved || (software && (this.tilesDue || world.light.pending)));
     const waves = scene.settings.sea_level_m !== null && !software;
-    const due = this.tilesDue || this.lightDrawn !== this.lightMarched || !sameQuality(quality, this.lastQuality);
+    const due =
+      this.tilesDue || this.lookDue || this.lightDrawn !== this.lightMarched || !sameQuality(quality, this.lastQuality);
     if (!moved && software && (world.light.pending || this.tilesDue) && began - this.drawnAt < REDRAW_MS) {
       // On the CPU a picture costs more than the upload and light of many tiles: get them ready, then draw.
       this.prepareOnly(scene, world, quality);
@@ -114,7 +123,7 @@ export class GpuRenderer implements SceneRenderer {
       return this.report({ busy: this.quality.pending, uploads: 0 });
     this.remember(scene, quality);
     this.draw(scene, world, quality, { began, moved });
-    const busy = waves || this.quality.pending || this.tilesDue || world.light.pending;
+    const busy = waves || this.quality.pending || this.tilesDue || this.lookDue || world.light.pending;
     return this.report({ busy });
   }
 
@@ -167,6 +176,7 @@ export class GpuRenderer implements SceneRenderer {
     const { cut, uploads, selectMs } = this.prepare(encoder, scene, world, quality, how.moved);
     this.passes.frame.update(scene, { width, height, low: cut.minHeight, high: cut.maxHeight });
     this.passes.patches.update(cut);
+    this.lookDue = !this.passes.patches.useLook(scene.settings.look);
     this.passes.ribbons.update(scene.showStrokes ? scene.strokes : [], scene.ghost, quality.scale * pixelRatio());
     this.passes.ghost.update(scene.ghost);
     this.encode(encoder, scene, context.getCurrentTexture(), width, height);

@@ -117,7 +117,7 @@ export class RibbonPass {
         vertex: "ribbon_vertex",
         fragment: "ribbon_fragment",
         buffers: BUFFERS,
-        constants: { HIDDEN: hidden ? 1 : 0 },
+        fragmentConstants: { HIDDEN: hidden ? 1 : 0 },
         topology: "triangle-strip",
         blend: true,
         depthWrite: false,

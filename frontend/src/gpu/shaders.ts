@@ -6,7 +6,14 @@ import background from "@shaders/wgsl/background.wgsl?raw";
 import computeNormals from "@shaders/wgsl/compute_normals.wgsl?raw";
 import computeSky from "@shaders/wgsl/compute_sky.wgsl?raw";
 import computeSun from "@shaders/wgsl/compute_sun.wgsl?raw";
+import detailPlain from "@shaders/wgsl/detail_plain.wgsl?raw";
+import detailRich from "@shaders/wgsl/detail_rich.wgsl?raw";
 import ghost from "@shaders/wgsl/ghost.wgsl?raw";
+import overlayLines from "@shaders/wgsl/lines.wgsl?raw";
+import lookAlpine from "@shaders/wgsl/look_alpine.wgsl?raw";
+import lookDesert from "@shaders/wgsl/look_desert.wgsl?raw";
+import lookNatural from "@shaders/wgsl/look_natural.wgsl?raw";
+import lookPaper from "@shaders/wgsl/look_paper.wgsl?raw";
 import material from "@shaders/wgsl/material.wgsl?raw";
 import noise from "@shaders/wgsl/noise.wgsl?raw";
 import overlay from "@shaders/wgsl/overlay.wgsl?raw";
@@ -19,6 +26,7 @@ import tonemap from "@shaders/wgsl/tonemap.wgsl?raw";
 import view from "@shaders/wgsl/view.wgsl?raw";
 import wall from "@shaders/wgsl/wall.wgsl?raw";
 import water from "@shaders/wgsl/water.wgsl?raw";
+import type { Look } from "../generated/contract.ts";
 
 const join = (...parts: string[]): string => parts.join("\n");
 
@@ -27,12 +35,33 @@ const common = join(contract, view, tile, sky, noise, tonemap);
 export const VIEW_SOURCE = view;
 export const SUN_LIST_SOURCE = computeSun;
 
+/** How much detail a device can afford: `plain` on adapters that draw on the CPU. */
+export type Detail = "rich" | "plain";
+
+const LOOKS: Readonly<Record<Look, string>> = {
+  natural: lookNatural,
+  alpine: lookAlpine,
+  desert: lookDesert,
+  paper: lookPaper,
+};
+
+const DETAILS: Readonly<Record<Detail, string>> = { rich: detailRich, plain: detailPlain };
+
+/** The ground in one look. */
+export function terrainSource(look: Look, detail: Detail): string {
+  return join(common, DETAILS[detail], patch, material, LOOKS[look], overlayLines, overlay, terrain);
+}
+
+/** Walls, sea and background. */
+export function sceneSource(part: "wall" | "background", detail: Detail): string {
+  return part === "wall"
+    ? join(common, DETAILS[detail], patch, wall)
+    : join(common, DETAILS[detail], patch, overlayLines, overlay, water, background);
+}
+
 export const SOURCES = {
-  terrain: join(common, patch, material, overlay, terrain),
-  wall: join(common, patch, wall),
-  background: join(common, patch, overlay, water, background),
-  ribbon: join(common, ribbon),
-  ghost: join(common, overlay, ghost),
+  ribbon: join(contract, view, ribbon),
+  ghost: join(contract, view, overlayLines, ghost),
   normals: join(contract, tile, computeNormals),
   sun: join(contract, tile, computeSun),
   sky: join(atmosphere, computeSky),

@@ -20,6 +20,8 @@ export const EDGE_WEST = 1;
 export const EDGE_EAST = 2;
 export const EDGE_SOUTH = 4;
 export const EDGE_NORTH = 8;
+/** In a record's third word: some of the patch lies below the sea. */
+export const WET = 1 << 16;
 
 /** A cell is never split further once it covers fewer pixels than this many taus. */
 const SMALLEST_CELL = 1;
@@ -39,7 +41,7 @@ export interface Cut {
   readonly count: number;
   /**
    * Per patch four words: column | row << 16 of its south-west vertex in samples of its level; own slot | parent slot << 16;
-   * level | edge bits << 8 | border bits << 12; four corner morph weights as unorm8 (south-west, south-east, north-west,
+   * level | edge bits << 8 | border bits << 12 | (1 << 16 where some of it lies below the sea); four corner morph weights as unorm8 (south-west, south-east, north-west,
    * north-east).
    */
   readonly records: Uint32Array;
@@ -324,7 +326,8 @@ export class Selection {
     const at0 = this.count * RECORD_WORDS;
     this.records[at0] = ((px * 16) | ((py * 16) << 16)) >>> 0;
     this.records[at0 + 1] = (own | (parent << 16)) >>> 0;
-    this.records[at0 + 2] = level | (edges << 8) | (border << 12);
+    const wet = at.min[py * at.side + px]! < this.seaM ? WET : 0;
+    this.records[at0 + 2] = level | (edges << 8) | (border << 12) | wet;
     this.records[at0 + 3] = corners >>> 0;
     this.count += 1;
   }

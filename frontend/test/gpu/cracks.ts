@@ -54,7 +54,7 @@ async function makeRig(): Promise<Rig> {
   });
   const sky = await SkyTables.create(device);
   const frame = new FrameBindings(device, sky, createNoiseTexture(device), true);
-  const context: PassContext = { device, frameLayout: frame.layout, format: FORMAT, samples: 1, detail: 1 };
+  const context: PassContext = { device, frameLayout: frame.layout, format: FORMAT, samples: 1, detail: "plain" };
   const usage = GPUTextureUsage.RENDER_ATTACHMENT | GPUTextureUsage.COPY_SRC;
   return {
     device,
@@ -158,6 +158,7 @@ async function picture(
   world.light.run(encoder, { sizeM: SIZE, high: cut.maxHeight, sun }, 4);
   rig.frame.update(scene, { width: WIDTH, height: HEIGHT, low: cut.minHeight, high: cut.maxHeight });
   rig.patches.update(cut);
+  while (!rig.patches.useLook(scene.settings.look)) await new Promise((done) => setTimeout(done, 10));
   const pass = encoder.beginRenderPass({
     colorAttachments: [{ view: rig.colour.createView(), clearValue: [1, 0, 1, 0], loadOp: "clear", storeOp: "store" }],
     depthStencilAttachment: {
