@@ -32,10 +32,13 @@ export class QualityControl {
   next(now: number, moved: boolean): Quality {
     if (moved) this.movedAt = now;
     const still = now - this.movedAt >= this.restMs;
-    const scale = still ? 1 : this.moving;
-    const tauFactor = this.software ? (still ? 1.5 : 2) : still ? 1 : 1 / this.moving;
-    this.drawn = { scale, tauFactor };
+    this.drawn = still ? this.rest : { scale: this.moving, tauFactor: this.software ? 2 : 1 / this.moving };
     return this.drawn;
+  }
+
+  /** Quality of a picture at rest. */
+  get rest(): Quality {
+    return { scale: 1, tauFactor: this.software ? 1.5 : 1 };
   }
 
   /** True while a better picture than the last one is due. */
@@ -45,7 +48,7 @@ export class QualityControl {
 
   /** Milliseconds without change after which the picture counts as still. */
   get restMs(): number {
-    return this.software ? 900 : 60;
+    return this.software ? 300 : 60;
   }
 
   /** Takes in the measured time of a frame that was drawn at the moving quality. */

@@ -59,6 +59,8 @@ export class GpuRenderer implements SceneRenderer {
   private tilesDue = false;
   /** The shader of the scene's look is still being compiled. */
   private lookDue = false;
+  /** On a software adapter: all tiles and light of the picture at rest are there. */
+  private ready = false;
   /** Batches of light marched, and those that the last picture shows. */
   private lightMarched = 0;
   private lightDrawn = 0;
@@ -110,15 +112,17 @@ export class GpuRenderer implements SceneRenderer {
     const began = performance.now();
     const world = this.worldOf(scene);
     const moved = this.changed(scene);
-    const quality = this.quality.next(began, moved || (software && (this.tilesDue || world.light.pending)));
+    if (moved) this.ready = false;
+    const quality = this.quality.next(began, moved || (software && !this.ready));
+    if (software && !moved && !this.ready && began - this.drawnAt < REDRAW_MS) {
+      // On the CPU a picture costs more than the upload and light of many tiles: get them ready, then draw.
+      this.prepareOnly(scene, world);
+      this.ready = !this.tilesDue && !world.light.pending;
+      return this.report({ busy: true });
+    }
     const waves = scene.settings.sea_level_m !== null && !software;
     const due =
       this.tilesDue || this.lookDue || this.lightDrawn !== this.lightMarched || !sameQuality(quality, this.lastQuality);
-    if (!moved && software && (world.light.pending || this.tilesDue) && began - this.drawnAt < REDRAW_MS) {
-      // On the CPU a picture costs more than the upload and light of many tiles: get them ready, then draw.
-      this.prepareOnly(scene, world, quality);
-      return this.report({ busy: true });
-    }
     if (!moved && !waves && !due && !world.light.pending)
       return this.report({ busy: this.quality.pending, uploads: 0 });
     this.remember(scene, quality);
@@ -247,10 +251,10 @@ export class GpuRenderer implements SceneRenderer {
     return { cut, uploads: changed.length + entered.length, selectMs };
   }
 
-  /** All of a frame but the picture. */
-  private prepareOnly(scene: Scene, world: World, quality: Quality): void {
+  /** All of a frame but the picture, for the picture at rest. */
+  private prepareOnly(scene: Scene, world: World): void {
     const encoder = this.gpu.device.createCommandEncoder({ label: "prepare" });
-    const { uploads } = this.prepare(encoder, scene, world, quality, false);
+    const { uploads } = this.prepare(encoder, scene, world, this.quality.rest, false);
     this.report({ uploads });
     this.gpu.device.queue.submit([encoder.finish()]);
     this.measure(false);
