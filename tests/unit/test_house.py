@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from esker import contract_emit
+from esker.bench import report
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / "backend" / "esker"
@@ -127,6 +128,12 @@ def test_lock_files_pin_every_requirement() -> None:
     locked = set(re.findall(r"^([a-z0-9-]+)==", (ROOT / "requirements-dev.lock").read_text(), re.M))
     assert wanted <= locked
     assert "http" not in (ROOT / "frontend" / "package-lock.json").read_text().split('"packages"')[0]
+
+
+def test_figures_in_the_readme_come_from_committed_results() -> None:
+    """CONTRIBUTING: figures in docs come from committed benchmark output."""
+    text = report.README.read_text(encoding="utf-8")
+    assert report.readme(text) == text, "run python -m esker.bench.report"
 
 
 def test_file_sizes() -> None:

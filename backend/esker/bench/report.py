@@ -1,0 +1,115 @@
+"""Writes the README's table of figures from the committed results: ``python -m esker.bench.report [--check]``."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[3]
+RESULTS = ROOT / "bench" / "results"
+README = ROOT / "README.md"
+BEGIN, END = "<!-- figures: written by `python -m esker.bench.report` -->", "<!-- end of figures -->"
+
+
+def result(name: str) -> Any:
+    """One committed result."""
+    return json.loads((RESULTS / f"{name}.json").read_text(encoding="utf-8"))
+
+
+def milliseconds(value: float) -> str:
+    """Two significant digits below ten, whole above."""
+    return f"{value:.1f} ms" if value < 10 else f"{value:,.0f} ms"
+
+
+def kilobytes(value: float) -> str:
+    """Thousands of bytes."""
+    return f"{value / 1000:,.1f} KB" if value < 100_000 else f"{value / 1000:,.0f} KB"
+
+
+def pair(figures: dict[str, float]) -> str:
+    """Median and 99th percentile."""
+    return f"{milliseconds(figures['p50'])} / {milliseconds(figures['p99'])}"
+
+
+def rows() -> list[tuple[str, str, str]]:
+    """What, figure, and what it is compared with in the same run."""
+    solve, stream, fanout = result("solve"), result("stream"), result("fanout")
+    fifty = solve["scenes"]["fifty"]
+    fine, peer = fifty["levels"]["1025"], fifty["peer"]
+    canvas, flow = stream["scenes"]["fifty"], stream["scenes"]["fifty"]["socket"]
+    room = fanout["esker"]
+    coarser = fifty["levels"]["513"]["from_rest_ms"]["settled"]
+    return [
+        ("solver, 1025², 50 strokes: first level after an edit", milliseconds(fine["after_edit_ms"]["level_0"]), ""),
+        ("… all five levels as previews", milliseconds(fine["after_edit_ms"]["level_4"]), ""),
+        ("… settled, from nothing", milliseconds(fine["from_rest_ms"]["settled"]), ""),
+        (
+            "solver, 513², settled: both steps",
+            milliseconds(coarser),
+            f"sparse direct solve of the height step alone: {milliseconds(peer['spsolve_ms'])}",
+        ),
+        ("… largest error, of the relief", f"{peer['error_of_relief']:.0e}", "against that direct solve"),
+        (
+            "append → first coarse tile on the socket, at rest (p50 / p99)",
+            pair(flow["at_rest"]["first_coarse_tile_ms"]),
+            "",
+        ),
+        ("append → last tile of level 4, at rest (p50 / p99)", pair(flow["at_rest"]["level_4_preview_ms"]), ""),
+        (
+            "append → first coarse tile, drawing without a pause (p50 / p99)",
+            pair(flow["drawing"]["first_coarse_tile_ms"]),
+            "",
+        ),
+        (
+            "first full view, 1025², 50 strokes",
+            kilobytes(canvas["first_view_home"]["bytes"]),
+            f"raw uint16: {kilobytes(canvas['first_view_home']['raw_uint16_bytes'])}",
+        ),
+        (
+            "one appended segment",
+            kilobytes(canvas["segment_mean"]["bytes"]),
+            f"raw uint16: {kilobytes(canvas['segment_mean']['raw_uint16_bytes'])}",
+        ),
+        ("choosing one viewer's tiles (p50)", f"{canvas['selection_ms']['home']['p50']:.2f} ms", ""),
+        (
+            "fan-out, 60 clients × 20 ops/s, durable (p50 / p99)",
+            pair(room["delay_ms"]),
+            f"{room['deliveries_per_s']:,} deliveries/s, {room['server_cores']:.2f} of a core, "
+            f"{room['server_rss_mb']:.0f} MB",
+        ),
+    ]
+
+
+def table() -> str:
+    """The whole section between the markers."""
+    machine = result("stream")["machine"]
+    head = (
+        f"Measured on {machine['cores']} cores ({machine['cpu']}) with {machine['device']}; no GPU. "
+        "Other work ran on the machine at the same time where `load_before` in the files says so.\n\n"
+        "| what | measured | beside it |\n|---|---|---|\n"
+    )
+    return head + "\n".join(f"| {a} | {b} | {c} |" for a, b, c in rows())
+
+
+def readme(text: str) -> str:
+    """The README with the section renewed. Raises ValueError when the markers are missing."""
+    if BEGIN not in text or END not in text:
+        raise ValueError("README.md has no place for the figures")
+    before, after = text.split(BEGIN)[0], text.split(END)[1]
+    return f"{before}{BEGIN}\n\n{table()}\n\n{END}{after}"
+
+
+def main(argv: list[str]) -> int:
+    """Write the section, or with ``--check`` exit with 1 when it is stale."""
+    text = README.read_text(encoding="utf-8")
+    fresh = readme(text)
+    if "--check" in argv:
+        return int(text != fresh)
+    README.write_text(fresh, encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
