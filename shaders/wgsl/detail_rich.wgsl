@@ -20,12 +20,12 @@ fn rock_noise(p: vec3f, n: vec3f, f: Footprint, scale: f32) -> vec4f {
 }
 
 struct FineNoise {
-  medium: vec4f,   // features of some 6 m
+  medium: vec4f,   // features of some 9 m
   small: vec4f,    // and of 1 m
 };
 
 fn fine_noise(p: vec3f, n: vec3f, f: Footprint, coarse: vec4f) -> FineNoise {
-  return FineNoise(rock_noise(p, n, f, 25.0), ground_noise(p, f, 4.9, vec2f(0.707, -0.707)));
+  return FineNoise(rock_noise(p, n, f, 37.0), ground_noise(p, f, 4.9, vec2f(0.707, -0.707)));
 }
 
 // Slope of ripples (waves on water, wind on sand) at a phase, `footprint` metres a pixel.

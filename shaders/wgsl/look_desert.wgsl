@@ -12,7 +12,7 @@ fn ground_material(s: Site) -> Material {
   let varnish = mix(vec3f(0.55), vec3f(1.05), clamp(s.fine1.g * 0.7 + s.fine2.g * 0.45, 0.0, 1.0));
   let rock = Material(bed * varnish, fine_slope(s, 0.75), 0.0);
   m = mix_in(m, rock, steeper(s, 0.56, 0.16));
-  let brush = smoothstep(0.60, 0.70, s.fine2.r * 0.6 + s.macro2.r * 0.5) * (1.0 - smoothstep(0.2, 0.5, s.steep)) * 0.55;
+  let brush = smoothstep(0.58, 0.70, s.fine1.g * 0.42 + s.fine2.r * 0.22 + s.macro2.r * 0.46) * (1.0 - smoothstep(0.2, 0.5, s.steep)) * 0.55;
   m = mix_in(m, Material(vec3f(0.135, 0.125, 0.060), fine_slope(s, 0.4), 0.0), brush);
   return shore(m, s);
 }

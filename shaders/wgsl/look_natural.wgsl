@@ -11,7 +11,7 @@ fn ground_material(s: Site) -> Material {
   let grows = (1.0 - smoothstep(0.70, 1.0, s.steep)) * below;
   let cover = s.macro1.g * 0.50 + s.macro2.r * 0.42 + s.fine1.r * 0.12 + clamp(s.steep, 0.0, 0.6) * 0.16 + clamp(s.curvature, -0.1, 0.1) * 0.9;
   let wood = smoothstep(0.575, 0.64, cover) * grows;
-  let crown = mix(vec3f(0.024, 0.046, 0.018), vec3f(0.052, 0.074, 0.024), s.macro2.g) * (0.55 + 0.9 * s.fine2.r);
+  let crown = mix(vec3f(0.024, 0.046, 0.018), vec3f(0.052, 0.074, 0.024), s.macro2.g) * (0.55 + 0.5 * s.fine1.g + 0.4 * s.fine2.r);
   m = mix_in(m, Material(crown, fine_slope(s, 0.55), 0.0), wood * 0.94);
   // Scree and rubble below the faces, and the bare ground above the meadows.
   let rubble = Material(vec3f(0.225, 0.200, 0.168) * (0.74 + 0.5 * s.fine2.r), fine_slope(s, 0.26), 0.0);

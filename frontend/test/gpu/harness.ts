@@ -11,7 +11,9 @@ import type {
   TileView,
   Vec3,
 } from "../../src/core/types.ts";
+import { openGpu } from "../../src/gpu/device.ts";
 import { createMapRenderer, createRenderer } from "../../src/gpu/index.ts";
+import { GpuRenderer } from "../../src/gpu/renderer.ts";
 import { crackTest } from "./cracks.ts";
 import { alpineField, FieldView, lookAt, mapCamera } from "./world.ts";
 
@@ -69,6 +71,8 @@ interface Shot {
   map?: number;
   /** Draw with the 2D map. */
   sheet?: boolean;
+  /** Draw as on a real GPU: all detail, multisampled. */
+  rich?: boolean;
   tau?: number;
   width?: number;
   height?: number;
@@ -149,18 +153,28 @@ function scene(shot: Shot, width: number, height: number): Scene {
   };
 }
 
-let renderer: SceneRenderer | null = null;
-let sheet: SceneRenderer | null = null;
+const renderers = new Map<string, SceneRenderer>();
+
+const canvasOf = (shot: Shot): string => (shot.sheet === true ? "sheet" : shot.rich === true ? "rich" : "plain");
+
+/** The renderer that a shot asks for, its canvas shown. */
+async function rendererFor(shot: Shot): Promise<SceneRenderer> {
+  const id = canvasOf(shot);
+  for (const other of document.querySelectorAll("canvas")) other.hidden = other.id !== id;
+  const canvas = document.querySelector<HTMLCanvasElement>(`#${id}`)!;
+  let made = renderers.get(id);
+  if (made === undefined) {
+    if (id === "sheet") made = createMapRenderer(canvas);
+    else if (id === "rich") made = await GpuRenderer.create(canvas, { ...(await openGpu(canvas)), software: false });
+    else made = await createRenderer(canvas);
+    renderers.set(id, made);
+  }
+  return made;
+}
 
 /** Draws until the renderer rests; returns the last frame's figures with the number of frames. */
 async function shoot(shot: Shot): Promise<FrameStats & { frames: number; description: string; ms: number }> {
-  const canvas = document.querySelector("canvas")!;
-  const sheetCanvas = document.querySelector<HTMLCanvasElement>("#sheet")!;
-  renderer ??= await createRenderer(canvas);
-  sheet ??= createMapRenderer(sheetCanvas);
-  const used = shot.sheet === true ? sheet : renderer;
-  canvas.hidden = shot.sheet === true;
-  sheetCanvas.hidden = shot.sheet !== true;
+  const used = await rendererFor(shot);
   const s = scene(shot, shot.width ?? 1280, shot.height ?? 720);
   const began = performance.now();
   for (let frames = 1; ; frames += 1) {
@@ -168,22 +182,22 @@ async function shoot(shot: Shot): Promise<FrameStats & { frames: number; descrip
     await new Promise((done) => setTimeout(done, 16));
     if (!stats.busy && frames > 2)
       return { ...stats, frames, description: used.description, ms: performance.now() - began };
-    if (frames > 3000) throw new Error("the renderer never rests");
+    if (frames > 9000) throw new Error("the renderer never rests");
   }
 }
 
 /** The picture of a shot as a PNG data URL, read in the task that drew it. */
 async function picture(shot: Shot): Promise<string> {
   await shoot(shot);
-  const canvas = document.querySelector<HTMLCanvasElement>(shot.sheet === true ? "#sheet" : "canvas")!;
+  const canvas = document.querySelector<HTMLCanvasElement>(`#${canvasOf(shot)}`)!;
   if (shot.sheet !== true) {
     // A WebGPU canvas keeps its picture only until the task ends: draw once more, changed by nothing that shows.
-    const used = renderer!;
+    const used = await rendererFor(shot);
     const again = scene(shot, shot.width ?? 1280, shot.height ?? 720);
     for (;;) {
-      const before = used.render({ ...again, tauPx: again.tauPx * (1 + 1e-9) }).busy;
+      const { busy } = used.render({ ...again, tauPx: again.tauPx * (1 + 1e-9) });
       const url = canvas.toDataURL("image/png");
-      if (!before) return url;
+      if (!busy || shot.settings?.sea_level_m !== undefined) return url;
       await new Promise((done) => setTimeout(done, 16));
     }
   }
@@ -192,12 +206,13 @@ async function picture(shot: Shot): Promise<string> {
 
 /** Draws `frames` frames of a circling camera, waiting for the device after each; milliseconds per frame. */
 async function circle(shot: Shot, frames: number): Promise<{ ms: number; patches: number }> {
+  const used = await rendererFor(shot);
   const began = performance.now();
   let patches = 0;
   let cpuMs = -1;
   for (let i = 0; i < frames; ) {
     const turned: Shot = { ...shot, eye: [shot.eye[0] + i * 3, shot.eye[1], shot.eye[2]] };
-    const stats = renderer!.render(scene(turned, shot.width ?? 1280, shot.height ?? 720));
+    const stats = used.render(scene(turned, shot.width ?? 1280, shot.height ?? 720));
     // A frame that was skipped reports the figures of the last one.
     if (stats.cpuMs !== cpuMs) i += 1;
     cpuMs = stats.cpuMs;
