@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import socket
 import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,31 +11,14 @@ from pathlib import Path
 
 from playwright.sync_api import Page, sync_playwright
 
+from tests.browser import FLAGS, chromium_path, free_port
+
 FRONTEND = Path(__file__).resolve().parents[2] / "frontend"
-# WebGPU in headless Chromium on a machine without a GPU needs all of these (DESIGN 16).
-FLAGS = [
-    "--no-sandbox",
-    "--enable-unsafe-webgpu",
-    "--enable-features=Vulkan",
-    "--use-vulkan=swiftshader",
-    "--use-angle=swiftshader",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--disable-quic",
-    "--no-first-run",
-]
-
-
-def _free_port() -> int:
-    with socket.socket() as s:
-        s.bind(("127.0.0.1", 0))
-        return int(s.getsockname()[1])
 
 
 @contextmanager
 def _vite() -> Iterator[str]:
-    port = _free_port()
+    port = free_port()
     vite = FRONTEND / "node_modules" / "vite" / "bin" / "vite.js"
     # No file watching: an edit during the run must not reload the page.
     env = {**os.environ, "CI": "1", "CHOKIDAR_USEPOLLING": "0"}
@@ -70,7 +52,7 @@ def open_harness() -> Iterator[Page]:
     """The harness page, ready. Console errors fail the caller at the end."""
     problems: list[str] = []
     with _vite() as url, sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path="/usr/bin/chromium", args=FLAGS)
+        browser = playwright.chromium.launch(executable_path=chromium_path(), args=FLAGS)
         try:
             page = browser.new_page(viewport={"width": 800, "height": 600})
             page.on("pageerror", lambda error: problems.append(str(error)))

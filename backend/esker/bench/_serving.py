@@ -15,12 +15,14 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
+import psutil
+
 from esker import contract as c
 from esker.document import archive
 
 
-def machine(device: str) -> dict[str, Any]:
-    """What the figures depend on: processor, cores, Python, solver device, load before the run."""
+def machine(device: str | None = None) -> dict[str, Any]:
+    """What the figures depend on: processor, cores, memory, Python, load before the run, solver device."""
     model = platform.processor()
     with suppress(OSError):
         lines = Path("/proc/cpuinfo").read_text().splitlines()
@@ -28,10 +30,10 @@ def machine(device: str) -> dict[str, Any]:
     return {
         "cpu": model,
         "cores": os.cpu_count(),
+        "memory_gib": round(psutil.virtual_memory().total / 2**30, 1),
         "python": platform.python_version(),
-        "device": device,
         "load_before": round(os.getloadavg()[0], 2),
-    }
+    } | ({"device": device} if device else {})
 
 
 @contextmanager

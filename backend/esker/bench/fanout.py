@@ -14,8 +14,6 @@ from __future__ import annotations
 import argparse
 import asyncio
 import json
-import os
-import platform
 import socket
 import subprocess
 import sys
@@ -38,6 +36,7 @@ from websockets.asyncio.server import serve as serve_sockets
 from websockets.exceptions import ConnectionClosed
 
 from esker import contract as c
+from esker.bench import _serving
 from esker.version import VERSION
 
 POINTS: Final = 4
@@ -280,20 +279,6 @@ def _get(url: str, secret: str) -> Any:
         return json.loads(answer.read())
 
 
-def _machine() -> dict[str, Any]:
-    model = platform.processor()
-    with suppress(OSError):
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
-        model = next((line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")), model)
-    return {
-        "cpu": model,
-        "cores": os.cpu_count(),
-        "memory_gib": round(psutil.virtual_memory().total / 2**30, 1),
-        "python": platform.python_version(),
-        "load_before": round(os.getloadavg()[0], 2),
-    }
-
-
 def main(argv: list[str]) -> int:
     """``esker bench fanout [--json] [--solve] [--floor]``."""
     parser = argparse.ArgumentParser(prog="esker bench fanout", description=__doc__)
@@ -314,7 +299,7 @@ def main(argv: list[str]) -> int:
     result: dict[str, Any] = {
         "bench": "fanout",
         "version": VERSION,
-        "machine": _machine(),
+        "machine": _serving.machine(),
         "note": arguments.note,
         "scene": {"clients": arguments.clients, "ops_per_s_each": arguments.rate, "seconds": arguments.seconds},
         "esker": _measure(arguments, show=False),
