@@ -50,8 +50,9 @@ CHEBYSHEV_HIGH: Final = 2.0
 # --- stroke defaults (DESIGN 5.2, 12) ---------------------------------------------------------------------------
 
 DEFAULT_SLOPE_DEG: Final = 35.0
-DEFAULT_EXTENT_FRACTION: Final = 1.0 / 8.0
-"""Default flank extent as a fraction of the domain: generous, the band ends where it meets the base anyway."""
+DEFAULT_EXTENT_FRACTION: Final = 1.0 / 2.0
+"""Default flank extent as a fraction of the domain. So generous that a high flank is never cut off in a cliff: the band
+ends where it meets the base anyway."""
 MAX_SLOPE_DEG: Final = 85.0
 
 # --- limits (DESIGN 4); settings may lower them, never raise them --------------------------------------------------

@@ -42,7 +42,7 @@ export const CHEBYSHEV_HIGH = 2.0 as const;
 
 export const DEFAULT_SLOPE_DEG = 35.0 as const;
 
-export const DEFAULT_EXTENT_FRACTION = 0.125 as const;
+export const DEFAULT_EXTENT_FRACTION = 0.5 as const;
 
 export const MAX_SLOPE_DEG = 85.0 as const;
 

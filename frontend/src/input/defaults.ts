@@ -18,7 +18,10 @@ export interface ToolDefaults {
 }
 
 const CREVICE_SLOPE_DEG = 50;
+const CREVICE_EXTENT_FRACTION = 1 / 4;
 const PLATEAU_SLOPE_DEG = 30;
+/** Share of the extent that is left at no pressure at all. */
+const PRESSURE_FLOOR = 0.05;
 
 function style(slopeDeg: number, extentM: number, plateauRadiusM: number): ToolStyle {
   const flank: Flank = { slope_deg: slopeDeg, extent_m: extentM, shape: "concave" };
@@ -29,15 +32,18 @@ function style(slopeDeg: number, extentM: number, plateauRadiusM: number): ToolS
 export function toolDefaults(sizeM: number): ToolDefaults {
   return {
     mountain: signal(style(DEFAULT_SLOPE_DEG, sizeM * DEFAULT_EXTENT_FRACTION, 0)),
-    crevice: signal(style(CREVICE_SLOPE_DEG, sizeM / 16, 0)),
+    crevice: signal(style(CREVICE_SLOPE_DEG, sizeM * CREVICE_EXTENT_FRACTION, 0)),
     plateau: signal(style(PLATEAU_SLOPE_DEG, sizeM * DEFAULT_EXTENT_FRACTION, sizeM / 40)),
     pressure: signal("extent"),
   };
 }
 
-/** The style with its extents scaled by pen pressure: a light touch makes a slender ridge, full pressure a broad one. */
+/**
+ * The style with its extents scaled by pen pressure 0..1: full pressure gives them whole, a light touch a slender ridge.
+ * The square spreads the light touches, where extents are short enough to end a flank before its slope does.
+ */
 export function pressed(base: ToolStyle, pressure: number): ToolStyle {
-  const k = 0.4 + 1.2 * pressure;
+  const k = Math.min(1, PRESSURE_FLOOR + pressure ** 2);
   const scaled = (f: Flank | null): Flank | null =>
     f === null ? null : { ...f, extent_m: Math.round(f.extent_m * k * 10) / 10 };
   return { ...base, left: scaled(base.left), right: scaled(base.right) };

@@ -2,7 +2,8 @@
  * The cross-section of a stroke as a picture that can be dragged (DESIGN 5.2, 12). Pure geometry, no DOM.
  *
  * The picture has equal scales, so angles are true. It shows what the stroke prescribes on flat ground: the crest, the
- * flat top of the plateau radius, each flank down to where it meets the base or its extent, whichever is nearer.
+ * flat top of the plateau radius, each flank down to where it meets the base or its extent, whichever is nearer. The
+ * scale is that of the profile; an extent that ends outside the picture has its knob at the picture's edge.
  */
 
 import { type Flank, MAX_SLOPE_DEG } from "../generated/contract.ts";
@@ -35,6 +36,8 @@ export interface Knob {
   readonly value: number;
   readonly unit: "°" | "m";
   readonly label: string;
+  /** The value lies outside the picture; the knob stands at its edge. */
+  readonly beyond: boolean;
 }
 
 export interface SectionLimits {
@@ -53,9 +56,23 @@ function prescribedHalf(section: Section): number {
   return Math.max(section.plateauRadiusM + extent, 1);
 }
 
+/** How far beyond where its slope meets the base a flank is shown, as a share of that distance. */
+const ROOM = 1.6;
+
+/** How far out from the crest the profile is worth a look at a relief: past each foot, but not past its extent, metres. */
+function profileHalf(section: Section, reliefM: number): number {
+  const ends = SIDES.map((side) => {
+    const flank = section[side];
+    return flank === null ? 0 : Math.min(flank.extent_m, ROOM * footM(flank, reliefM));
+  });
+  return Math.max(section.plateauRadiusM + Math.max(...ends), 1);
+}
+
 /** The relief of the picture: a flat section is drawn with a height to grip. */
 function drawnRelief(section: Section): number {
-  return Math.max(Math.abs(section.reliefM), 0.22 * prescribedHalf(section));
+  const extents = SIDES.map((side) => section[side]?.extent_m ?? 0);
+  const least = Math.max(Math.abs(section.reliefM), 0.22 * section.plateauRadiusM, 0.02 * Math.max(...extents), 1);
+  return Math.max(least, 0.1 * profileHalf(section, least));
 }
 
 /** The widest horizontal distance of the picture from the crest line, metres. */
@@ -67,7 +84,7 @@ function halfWidth(section: Section): number {
     const foot = flank === null ? 0 : footM(flank, relief);
     return section.plateauRadiusM + foot + freeRun(section, side);
   });
-  return Math.max(prescribedHalf(section), ...ends);
+  return Math.max(profileHalf(section, relief), ...ends);
 }
 
 /** Fits the section into a picture of the given size in pixels. */
@@ -219,15 +236,17 @@ export function knobs(section: Section, frame: Frame): Knob[] {
         value: flank.slope_deg,
         unit: "°",
         label: `Slope ${side}`,
+        beyond: false,
       });
     }
     out.push({
       id: `${side}-extent`,
-      x: frame.centreX + dir * (edge + flank.extent_m) * frame.pxPerM,
+      x: frame.centreX + dir * Math.min((edge + flank.extent_m) * frame.pxPerM, edgePx(frame)),
       y: frame.baseY,
       value: flank.extent_m,
       unit: "m",
       label: `Extent ${side}`,
+      beyond: (edge + flank.extent_m) * frame.pxPerM > edgePx(frame) + 0.5,
     });
   }
   out.push({
@@ -237,8 +256,28 @@ export function knobs(section: Section, frame: Frame): Knob[] {
     value: section.plateauRadiusM,
     unit: "m",
     label: "Plateau radius",
+    beyond: false,
   });
   return out;
+}
+
+/** Where the picture ends: pixels from its middle. */
+function edgePx(frame: Frame): number {
+  return frame.width / 2 - PAD_X;
+}
+
+/** Pixels past the picture's edge in which an extent doubles. */
+const DOUBLING_PX = 16;
+
+/**
+ * The extent for a pointer `outPx` from the middle of the picture: to scale within it, faster and faster past its edge.
+ * One that ends outside already stays until the pointer comes inside.
+ */
+function draggedExtent(flank: Flank, plateauM: number, frame: Frame, outPx: number): number {
+  const past = outPx - edgePx(frame);
+  const t = Math.max(Math.min(outPx, edgePx(frame)) / frame.pxPerM - plateauM, 0);
+  if (past < -0.5) return t;
+  return Math.max(flank.extent_m, t * 2 ** Math.min(Math.max(past, 0) / DOUBLING_PX, 20));
 }
 
 function clamp(x: number, low: number, high: number): number {
@@ -277,16 +316,17 @@ export function drag(
   }
   const [side, what] = knob.split("-") as [Side, "slope" | "extent"];
   const t = Math.max(out - section.plateauRadiusM, 0);
+  const flank = section[side];
+  if (flank === null) return section;
   if (what === "extent") {
+    const extent = draggedExtent(flank, section.plateauRadiusM, frame, out * frame.pxPerM);
     return withFlank(
       section,
       side,
-      { extent_m: clamp(nice(t, frame), nice(2 / frame.pxPerM, frame), limits.maxExtentM) },
+      { extent_m: clamp(nice(extent, frame), nice(2 / frame.pxPerM, frame), limits.maxExtentM) },
       linked,
     );
   }
-  const flank = section[side];
-  if (flank === null) return section;
   const share = 1 - Math.abs(at.y - frame.crestY) / Math.max(Math.abs(frame.baseY - frame.crestY), 1e-9);
   const above = (at.y - frame.crestY) * (frame.baseY - frame.crestY) < 0;
   const slope = slopeThrough(flank, relief, t, above ? 1 : share);
@@ -310,10 +350,11 @@ export function nudge(
   const flank = section[side];
   if (flank === null) return section;
   if (what === "extent") {
+    const step = Math.max(stepM, nice(flank.extent_m / 50, frame)); // one outside the picture moves at its own scale
     return withFlank(
       section,
       side,
-      { extent_m: clamp(flank.extent_m + steps * stepM, stepM, limits.maxExtentM) },
+      { extent_m: clamp(flank.extent_m + steps * step, stepM, limits.maxExtentM) },
       linked,
     );
   }

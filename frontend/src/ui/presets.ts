@@ -20,8 +20,8 @@ const flank = (slope_deg: number, extent_m: number, shape: Flank["shape"]): Flan
 
 function both(slope: number, share: number, shape: Flank["shape"], plateauShare = 0): (sizeM: number) => SectionFields {
   return (sizeM) => ({
-    left: flank(slope, round(sizeM * share), shape),
-    right: flank(slope, round(sizeM * share), shape),
+    left: flank(slope, extent(sizeM, share), shape),
+    right: flank(slope, extent(sizeM, share), shape),
     plateau_radius_m: round(sizeM * plateauShare),
   });
 }
@@ -31,24 +31,29 @@ function round(m: number): number {
   return Number(m.toPrecision(3));
 }
 
+/** Half the terrain is the most that the inspector offers. */
+function extent(sizeM: number, share: number): number {
+  return Math.min(round(sizeM * share), sizeM / 2);
+}
+
 export const PRESETS: readonly Preset[] = [
-  { id: "ridge", title: "Ridge", sense: "up", section: both(38, 1 / 8, "concave") },
-  { id: "hill", title: "Hill", sense: "up", section: both(18, 1 / 10, "convex", 1 / 128) },
+  { id: "ridge", title: "Ridge", sense: "up", section: both(38, 1 / 2, "concave") },
+  { id: "hill", title: "Hill", sense: "up", section: both(18, 1 / 3, "convex", 1 / 128) },
   {
     id: "cliff",
     title: "Cliff",
     sense: "up",
     section: (sizeM) => ({
-      left: flank(76, round(sizeM / 24), "straight"),
-      right: flank(9, round(sizeM / 6), "concave"),
+      left: flank(76, extent(sizeM, 1 / 4), "straight"),
+      right: flank(9, extent(sizeM, 1 / 2), "concave"),
       plateau_radius_m: 0,
     }),
   },
-  { id: "plateau", title: "Plateau", sense: "up", section: both(42, 1 / 16, "concave", 1 / 32) },
-  { id: "valley", title: "Valley", sense: "down", section: both(24, 1 / 7, "concave", 1 / 128) },
-  { id: "canyon", title: "Canyon", sense: "down", section: both(70, 1 / 16, "straight", 1 / 96) },
-  { id: "riverbed", title: "Riverbed", sense: "down", section: both(14, 1 / 40, "convex", 1 / 256) },
-  { id: "crack", title: "Crack", sense: "down", section: both(80, 1 / 64, "straight") },
+  { id: "plateau", title: "Plateau", sense: "up", section: both(42, 1 / 4, "concave", 1 / 32) },
+  { id: "valley", title: "Valley", sense: "down", section: both(24, 1 / 3, "concave", 1 / 128) },
+  { id: "canyon", title: "Canyon", sense: "down", section: both(70, 1 / 6, "straight", 1 / 96) },
+  { id: "riverbed", title: "Riverbed", sense: "down", section: both(14, 1 / 24, "convex", 1 / 256) },
+  { id: "crack", title: "Crack", sense: "down", section: both(80, 1 / 24, "straight") },
 ];
 
 /** The presets with those that suit the stroke first. */

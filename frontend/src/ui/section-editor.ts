@@ -79,6 +79,14 @@ export class EskSection extends LitElement {
         fill: var(--esk-accent);
         stroke: var(--esk-accent);
       }
+      .knob .more {
+        fill: none;
+        stroke: var(--esk-text);
+        stroke-width: 1.5;
+        stroke-linecap: round;
+        stroke-linejoin: round;
+        pointer-events: none;
+      }
       .knob:focus-visible .dot {
         stroke: var(--esk-focus);
         stroke-width: 3;
@@ -177,7 +185,8 @@ export class EskSection extends LitElement {
       >
         <circle class="hit" cx=${knob.x} cy=${knob.y} r="13"></circle>
         <circle class="dot" cx=${knob.x} cy=${knob.y} r="5.5"></circle>
-        ${this.active === knob.id ? svg`<text x=${Math.min(Math.max(knob.x, 24), frame.width - 24)} y=${y}>${text}</text>` : null}
+        ${knob.beyond ? svg`<path class="more" d=${chevron(knob.x, knob.y, Math.sign(knob.x - frame.centreX))}></path>` : null}
+        ${this.active === knob.id || knob.beyond ? svg`<text x=${Math.min(Math.max(knob.x, 24), frame.width - 24)} y=${y}>${text}</text>` : null}
       </g>
     ` as unknown as TemplateResult;
   }
@@ -195,6 +204,11 @@ export class EskSection extends LitElement {
       </svg>
     `;
   }
+}
+
+/** An arrow head beside a knob that stands for a value outside the picture. */
+function chevron(x: number, y: number, dir: number): string {
+  return `M${x + dir * 8.5} ${y - 3.5} l${dir * 3.5} 3.5 l${dir * -3.5} 3.5`;
 }
 
 customElements.define("esk-section", EskSection);

@@ -2,7 +2,7 @@ import "@awesome.me/webawesome/dist/components/switch/switch.js";
 import { css, html, LitElement, nothing, type TemplateResult } from "lit";
 import { live } from "lit/directives/live.js";
 import type { Flank } from "../generated/contract.ts";
-import { MAX_SLOPE_DEG } from "../generated/contract.ts";
+import { DEFAULT_EXTENT_FRACTION, DEFAULT_SLOPE_DEG, MAX_SLOPE_DEG } from "../generated/contract.ts";
 import { type Section, type SectionLimits, type Side, symmetric } from "./cross-section.ts";
 import { icon } from "./icons.ts";
 import { type Preset, presetsFor, type SectionFields } from "./presets.ts";
@@ -116,7 +116,11 @@ export class EskSectionForm extends LitElement {
   }
 
   #toggle(side: Side, on: boolean): void {
-    const fallback: Flank = { slope_deg: 35, extent_m: this.sizeM / 8, shape: "concave" };
+    const fallback: Flank = {
+      slope_deg: DEFAULT_SLOPE_DEG,
+      extent_m: this.sizeM * DEFAULT_EXTENT_FRACTION,
+      shape: "concave",
+    };
     const next = on ? (this.fields[side === "left" ? "right" : "left"] ?? fallback) : null;
     this.#emit(this.#linked ? { left: next, right: next && { ...next } } : { [side]: next }, true);
   }
@@ -209,7 +213,7 @@ export class EskSectionForm extends LitElement {
         size="s"
         .checked=${live(flank.slope_deg === null)}
         ?disabled=${this.disabled}
-        @change=${(e: Event) => this.#flank(side, { slope_deg: (e.target as HTMLInputElement).checked ? null : 35 }, true)}
+        @change=${(e: Event) => this.#flank(side, { slope_deg: (e.target as HTMLInputElement).checked ? null : DEFAULT_SLOPE_DEG }, true)}
         >Slope finds itself</wa-switch
       >
       ${

@@ -114,6 +114,22 @@ describe("the picture", () => {
     for (const [x] of free) expect(x).toBeLessThanOrEqual(268);
   });
 
+  it("is as large as the profile allows; an extent outside it has its knob at the edge and says its true value", () => {
+    const wide: Section = { ...ridge, left: flank(45, 2048), right: flank(45, 250) };
+    const frame = fitFrame(wide, 268, 124);
+    expect(frame.pxPerM).toBeCloseTo(fitFrame({ ...wide, left: flank(45, 320) }, 268, 124).pxPerM, 6);
+    expect((frame.baseY - frame.crestY) / 124).toBeGreaterThan(0.5);
+    const [left, right] = (["left-extent", "right-extent"] as const).map((id) => knob(wide, id));
+    expect(left).toMatchObject({ x: 14, value: 2048, beyond: true });
+    expect(right!.beyond).toBe(false);
+    expect(right!.x).toBeCloseTo(frame.centreX + 270 * frame.pxPerM, 6);
+  });
+
+  it("shows the whole extent where it ends the flank before its slope does", () => {
+    const cut: Section = { ...ridge, left: flank(20, 300), right: null };
+    expect(knob(cut, "left-extent").beyond).toBe(false);
+  });
+
   it("turns upside down for a crevice", () => {
     const frame = fitFrame({ ...ridge, reliefM: -200 }, 268, 124);
     expect(frame.crestY).toBeGreaterThan(frame.baseY);
@@ -145,6 +161,21 @@ describe("dragging", () => {
     const after = drag(ridge, frame, "left-extent", { x: frame.centreX - 220 * frame.pxPerM, y: 0 }, false, limits);
     expect(after.left!.extent_m).toBeCloseTo(200, 0);
     expect(after.right).toEqual(ridge.right);
+  });
+
+  it("an extent knob at the edge stays at its value there, follows inside and grows past it", () => {
+    const wide: Section = { ...ridge, left: flank(45, 1500), right: flank(45, 250) };
+    const frame = fitFrame(wide, 268, 124);
+    const to = (section: Section, x: number) => drag(section, frame, "left-extent", { x, y: 0 }, false, limits);
+    const edge = knob(wide, "left-extent").x;
+    expect(to(wide, edge)).toEqual(wide);
+    expect(to(wide, edge - 3).left!.extent_m).toBe(1500);
+    const inside = to(wide, frame.centreX - 220 * frame.pxPerM);
+    expect(inside.left!.extent_m).toBeCloseTo(200, 0);
+    const edgeM = (frame.centreX - edge) / frame.pxPerM - 20;
+    expect(to(inside, edge - 16).left!.extent_m).toBeCloseTo(2 * edgeM, -1);
+    expect(to(inside, edge - 400).left!.extent_m).toBe(limits.maxExtentM);
+    expect(nudge(wide, frame, "left-extent", -1, false, limits).left!.extent_m).toBeLessThanOrEqual(1470);
   });
 
   it("linked sides change together, each keeping what was not touched", () => {
