@@ -7,7 +7,16 @@
  */
 
 import { type ReadonlySignal, signal } from "@preact/signals-core";
-import { cameraState, FOV_DEG, fitDistance, type Pose, poseBasis, poseEye } from "./camerastate.ts";
+import {
+  cameraState,
+  fitDistance,
+  HOME_HEADING,
+  HOME_PITCH,
+  homePose,
+  type Pose,
+  poseBasis,
+  poseEye,
+} from "./camerastate.ts";
 import { add, addScaled, clamp, DEG, distance, dot, mix, mix3, normalize, sub, wrapAngle } from "./math.ts";
 import type { CameraState, Ground, Ray, Vec3 } from "./types.ts";
 
@@ -47,8 +56,7 @@ interface Flight {
 const MAX_PITCH = 30 * DEG;
 const MIN_PITCH = -89 * DEG;
 const FLY_PITCH = 85 * DEG;
-const HOME_HEADING = 20 * DEG;
-const HOME_PITCH = -30 * DEG;
+const MAP_PITCH = -90 * DEG;
 /** Time in which a smooth zoom covers 63 % of its way. */
 const ZOOM_TAU_S = 0.07;
 
@@ -167,10 +175,10 @@ export class Camera {
     this.#zoomLeft = 0;
     if (mode === "map") {
       this.#beforeMap = { heading: this.#pose.heading, pitch: this.#pose.pitch };
-      this.#set({ mode, heading: 0, pitch: -90 * DEG });
+      this.#set({ mode, heading: 0, pitch: MAP_PITCH });
       return;
     }
-    const back = from === "map" ? (this.#beforeMap ?? { heading: 0, pitch: HOME_PITCH }) : {};
+    const back = from === "map" ? (this.#beforeMap ?? { heading: HOME_HEADING, pitch: HOME_PITCH }) : {};
     this.#set({ mode, ...back });
   }
 
@@ -322,12 +330,8 @@ export class Camera {
   }
 
   #homePose(mode: CameraMode): Pose {
-    const half = this.#sizeM / 2;
-    const angles = mode === "map" ? { heading: 0, pitch: -90 * DEG } : { heading: HOME_HEADING, pitch: HOME_PITCH };
-    const pose: Pose = { mode, pivot: [half, half, 0], distanceM: 1, fovDeg: FOV_DEG, ...angles };
-    const corners: Vec3[] = [0, this.#sizeM].flatMap((x) => [0, this.#sizeM].map((y): Vec3 => [x, y, 0]));
-    const distanceM = fitDistance(pose, corners, this.#width / this.#height, 0.06, this.#sizeM / 2);
-    return { ...pose, distanceM: Math.min(distanceM, this.#farthest) };
+    const pose = homePose(mode, this.#sizeM, this.#width / this.#height);
+    return { ...pose, distanceM: Math.min(pose.distanceM, this.#farthest) };
   }
 
   #metresPerPixel(): number {

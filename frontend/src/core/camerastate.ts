@@ -54,6 +54,31 @@ export function fitDistance(pose: Pose, points: readonly Vec3[], aspect: number,
   return distanceM;
 }
 
+/** Home looks from the south-south-west, so that two sides of the block show. */
+export const HOME_HEADING = 25 * DEG;
+/** How far home looks down: so little that the horizon and the sky above it stand in the upper third of the picture. */
+export const HOME_PITCH = -16 * DEG;
+/** How high home stands over the land: an angle at its middle. */
+const HOME_ELEVATION = 19 * DEG;
+const HOME_MARGIN = 0.06;
+
+/**
+ * The view of the whole terrain. The eye stands higher than its look is steep, so the pivot lies above the middle of the
+ * land: that puts the land in the lower two thirds, as large as fits, under a sky.
+ */
+export function homePose(mode: Pose["mode"], sizeM: number, aspect: number): Pose {
+  const half = sizeM / 2;
+  const corners: Vec3[] = [0, sizeM].flatMap((x) => [0, sizeM].map((y): Vec3 => [x, y, 0]));
+  const fitted = (pose: Pose): Pose => ({ ...pose, distanceM: fitDistance(pose, corners, aspect, HOME_MARGIN, half) });
+  const base = { mode, pivot: [half, half, 0] as Vec3, distanceM: 1, fovDeg: FOV_DEG };
+  if (mode === "map") return fitted({ ...base, heading: 0, pitch: -90 * DEG });
+  const lift = Math.cos(HOME_PITCH) * Math.tan(HOME_ELEVATION) + Math.sin(HOME_PITCH);
+  let pose = fitted({ ...base, heading: HOME_HEADING, pitch: HOME_PITCH });
+  // The height of the pivot follows from the distance, and that from the height: a few rounds agree to the metre.
+  for (let round = 0; round < 8; round++) pose = fitted({ ...pose, pivot: [half, half, lift * pose.distanceM] });
+  return pose;
+}
+
 /**
  * The published state of a pose.
  *

@@ -85,6 +85,29 @@ describe("projection (SPEC I1)", () => {
     }
   });
 
+  it("home shows the sky above a horizon in the upper third and the land large below it", () => {
+    for (const [w, h, least] of [
+      [1440, 900, 0.66],
+      [720, 540, 0.72],
+      [360, 740, 0.84],
+    ] as const) {
+      const c = new Camera(SIZE);
+      c.resize(w, h);
+      c.home(0);
+      const { eye, target } = c.state.value;
+      const away = sub(target, eye);
+      const horizon = c.project(addScaled(eye, normalize([away[0], away[1], 0]), 1e7)).y / h;
+      expect(horizon).toBeGreaterThan(0.1);
+      expect(horizon).toBeLessThan(0.33);
+      const corners = [0, SIZE].flatMap((x) => [0, SIZE].map((y) => c.project([x, y, 0])));
+      const xs = corners.map((p) => p.x / w);
+      expect(Math.max(...xs) - Math.min(...xs)).toBeGreaterThan(least);
+      expect(Math.min(...corners.map((p) => p.y / h))).toBeGreaterThan(horizon + 0.15);
+      expect(eye[0]).toBeLessThan(SIZE / 2);
+      expect(eye[1]).toBeLessThan(0);
+    }
+  });
+
   it("the map has north up and east right, and covers orthoHeight metres", () => {
     const c = camera("map");
     const a = c.project([2048, 2048, 0]);
@@ -144,6 +167,7 @@ describe("moves", () => {
   it("pan drags the ground: the point under the pointer follows it", () => {
     for (const mode of ["orbit", "map"] as const) {
       const c = camera(mode);
+      c.goTo([2048, -3000, 2500], [2048, 2048, 0], 0);
       const p = c.state.value.target;
       const before = c.project(p);
       c.pan(40, 25, flat());
@@ -157,6 +181,7 @@ describe("moves", () => {
 
   it("pan follows the height of the ground, and never leaves the neighbourhood of the terrain", () => {
     const c = camera();
+    c.goTo([2048, -3000, 2500], [2048, 2048, 0], 0);
     c.pan(0, 200, hill);
     const { target } = c.state.value;
     expect(target[2]).toBeCloseTo(hill.heightAt(target[0], target[1]) - 1500, 6);
