@@ -302,7 +302,7 @@ function drawStrokes(context: CanvasRenderingContext2D, frame: Frame, scene: Sce
       context.lineWidth = width + 8 * unit;
       context.stroke();
     }
-    context.strokeStyle = "rgba(255,253,247,0.85)";
+    context.strokeStyle = `rgba(255,253,247,${0.85 * stroke.colour[3]})`;
     context.lineWidth = width + 2 * unit;
     context.stroke();
     context.strokeStyle = css(stroke.colour);

@@ -4,7 +4,7 @@ import type { CursorVisual, StrokeVisual, Vec3 } from "../core/types.ts";
 import type { Doc } from "../doc/document.ts";
 import { worldPoints } from "../doc/strokes.ts";
 import type { Member, MemberPresence, Stroke } from "../generated/contract.ts";
-import { hexColour, lighten, strokeColour } from "./styles/colours.ts";
+import { hexColour, lighten, strokeColour, withAlpha } from "./styles/colours.ts";
 
 interface Shape {
   readonly points: Float32Array;
@@ -41,7 +41,14 @@ export interface People {
   readonly myColour: string;
 }
 
+/** How strongly finished strokes show that nobody points at: the land comes first. */
+const CALM_ALPHA = { select: 0.35, draw: 0.18 } as const;
+/** Share of the domain's size by which a line may leave it and still be seen. */
+const OUTSIDE = 0.02;
+
 export interface Marks {
+  /** In the select tool one looks for strokes, so they show more. */
+  readonly selecting: boolean;
   readonly selection: string | null;
   readonly hovered: string | null;
   /** The stroke that I am drawing. */
@@ -59,22 +66,44 @@ function liveColours(people: People, drawing: string | null): Map<string, string
   return colours;
 }
 
-/** The strokes to draw. Hidden ones show only while selected; the one under way wears its author's colour. */
+const inside = new WeakMap<Float32Array, Float32Array>();
+
+/** The points of a line that lie in the domain, give or take 2 % of its size; the line itself when all do. */
+export function insidePoints(points: Float32Array, sizeM: number): Float32Array {
+  const known = inside.get(points);
+  if (known) return known;
+  const [low, high] = [-OUTSIDE * sizeM, (1 + OUTSIDE) * sizeM];
+  const within = (i: number): boolean =>
+    points[i]! >= low && points[i]! <= high && points[i + 1]! >= low && points[i + 1]! <= high;
+  const kept: number[] = [];
+  for (let i = 0; i + 2 < points.length; i += 3) if (within(i)) kept.push(points[i]!, points[i + 1]!, points[i + 2]!);
+  const result = kept.length === points.length ? points : new Float32Array(kept);
+  inside.set(points, result);
+  return result;
+}
+
+/**
+ * The strokes to draw. Hidden ones show only while selected; the one under way wears its author's colour; finished ones
+ * that are neither selected nor pointed at step back behind the land.
+ */
 export function strokeVisuals(doc: Doc, marks: Marks, people: People): StrokeVisual[] {
   const live = liveColours(people, marks.drawing);
   const out: StrokeVisual[] = [];
   for (const stroke of doc.strokes.values()) {
     const selected = stroke.id === marks.selection;
-    const { points, sinks } = shapeOf(stroke);
+    const { points: all, sinks } = shapeOf(stroke);
+    const points = insidePoints(all, doc.settings.size_m);
     if (points.length < 6 || (stroke.hidden && !selected)) continue;
     const author = live.get(stroke.id);
     const hovered = stroke.id === marks.hovered;
     const base = author ? hexColour(author) : strokeColour(stroke.kind, sinks);
+    const calm = stroke.finished && !selected && !hovered && !author;
+    const alpha = calm ? CALM_ALPHA[marks.selecting ? "select" : "draw"] : 1;
     out.push({
       id: stroke.id,
       kind: stroke.kind,
       points,
-      colour: hovered && !selected ? lighten(base, 0.3) : base,
+      colour: withAlpha(hovered && !selected ? lighten(base, 0.3) : base, alpha),
       selected,
       hovered,
       live: author !== undefined,

@@ -92,8 +92,13 @@ export class Stage {
 
   #visuals(): StrokeVisual[] {
     const doc = this.session.doc.doc.value;
-    const { selection, hovered, drawing } = this.input;
-    const marks = { selection: selection.value, hovered: hovered.value, drawing: drawing.value };
+    const { selection, hovered, drawing, tool } = this.input;
+    const marks = {
+      selecting: tool.value === "select",
+      selection: selection.value,
+      hovered: hovered.value,
+      drawing: drawing.value,
+    };
     return doc ? strokeVisuals(doc, marks, this.session.people.value) : [];
   }
 

@@ -2,7 +2,7 @@
 import { describe, expect, it } from "vitest";
 import { type Doc, fromDocument, fullStroke } from "../../src/doc/document.ts";
 import type { Member, MemberPresence, Stroke } from "../../src/generated/contract.ts";
-import { cursorVisuals, type People, reliefOf, shapeOf, strokeVisuals } from "../../src/ui/scene.ts";
+import { cursorVisuals, insidePoints, type People, reliefOf, shapeOf, strokeVisuals } from "../../src/ui/scene.ts";
 import { hexColour, inkOn, strokeColour } from "../../src/ui/styles/colours.ts";
 
 function stroke(id: string, change: Partial<Stroke> = {}): Stroke {
@@ -21,7 +21,7 @@ function stroke(id: string, change: Partial<Stroke> = {}): Stroke {
 }
 
 function doc(...strokes: Stroke[]): Doc {
-  return fromDocument({ id: "t", clock: 1, settings: {} as Doc["settings"], strokes, deleted: [] });
+  return fromDocument({ id: "t", clock: 1, settings: { size_m: 1000 } as Doc["settings"], strokes, deleted: [] });
 }
 
 const member = (client: string, colour: string): Member => ({ client, colour, name: client, role: "edit" });
@@ -35,7 +35,7 @@ const presence = (client: string, change: Partial<MemberPresence> = {}): MemberP
   ...change,
 });
 const nobody: People = { members: [], presences: new Map(), me: "me", myColour: "#00ff00" };
-const still = { selection: null, hovered: null, drawing: null };
+const still = { selecting: false, selection: null, hovered: null, drawing: null };
 
 describe("strokes as they are drawn", () => {
   it("are blue for mountains and crevices, red for plateaus", () => {
@@ -64,6 +64,37 @@ describe("strokes as they are drawn", () => {
     expect(a).toMatchObject({ live: true, colour: hexColour("#ff8000") });
     expect(b).toMatchObject({ live: true, colour: hexColour("#00ff00") });
     expect(c!.live).toBe(false);
+  });
+
+  it("step back once finished, unless selected, pointed at or under way: the land comes first", () => {
+    const people: People = {
+      ...nobody,
+      members: [member("ana", "#ff8000")],
+      presences: new Map([["ana", presence("ana", { stroke: "live" })]]),
+    };
+    const all = doc(
+      ...["calm", "chosen", "under", "live"].map((id) => stroke(id, { finished: true })),
+      stroke("begun"),
+    );
+    const alphas = (selecting: boolean) =>
+      strokeVisuals(all, { ...still, selecting, selection: "chosen", hovered: "under" }, people).map(
+        (s) => s.colour[3],
+      );
+    expect(alphas(true)).toEqual([0.35, 1, 1, 1, 1]);
+    expect(alphas(false)).toEqual([0.18, 1, 1, 1, 1]);
+  });
+
+  it("lose what lies outside the domain by more than 2 % of its size", () => {
+    const far = stroke("far", {
+      first: [-100, 500, 0],
+      last: [1100, 500, 0],
+      curve: [-1, 0, 0.07, 0.5, 0.93, 1, 2].map((u) => [u, 0]),
+    });
+    const [seen] = strokeVisuals(doc(far), still, nobody);
+    expect([...seen!.points].filter((_, i) => i % 3 === 0).map(Math.round)).toEqual([-16, 500, 1016]);
+    const { points } = shapeOf(stroke("s"));
+    expect(insidePoints(points, 1000)).toBe(points);
+    expect(insidePoints(new Float32Array([0, 1021, 0, 0, 1019, 0]), 1000)).toEqual(new Float32Array([0, 1019, 0]));
   });
 
   it("are left out while hidden, unless selected, and while they are no line yet", () => {

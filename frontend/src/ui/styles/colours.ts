@@ -28,6 +28,10 @@ export function lighten(colour: Rgba, share: number): Rgba {
   return [mix(colour[0]), mix(colour[1]), mix(colour[2]), colour[3]];
 }
 
+export function withAlpha(colour: Rgba, alpha: number): Rgba {
+  return [colour[0], colour[1], colour[2], alpha];
+}
+
 /** White or near-black, whichever reads better on the colour (WCAG relative luminance). */
 export function inkOn(hex: string): "#ffffff" | "#14191f" {
   const linear = (c: number): number => (c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4);
