@@ -18,7 +18,7 @@ import { Keyboard } from "./keyboard.ts";
 import { type Finger, Navigation, type NavigationMode } from "./navigation.ts";
 import type { Picked } from "./picking.ts";
 import { Pointing, takePointer } from "./pointing.ts";
-import { type InkVisual, StrokeTool } from "./stroketool.ts";
+import { type FinishedStroke, type InkVisual, StrokeTool } from "./stroketool.ts";
 
 export type { ActionId, ToolId } from "./actions.ts";
 export type { HandleVisual } from "./handles.ts";
@@ -69,6 +69,7 @@ interface Main {
 const CLICK_PX = 4;
 const VIEW_ONLY = "This link lets you look, not draw. Ask for an edit link to change the terrain.";
 const LOCKED = "This stroke is locked. Unlock it to change it.";
+const FLUSH = "This plateau lies level with the ground. Drag its handle up to raise it.";
 const OFF_GROUND = "Begin the line on the ground.";
 
 export class InputController {
@@ -318,13 +319,21 @@ export class InputController {
     const { activity } = main;
     if (!main.moved) this.#click(activity, e);
     else if (activity.kind === "draw") {
-      const id = this.#strokes.finish();
-      if (id !== null) this.selection.value = id;
+      const made = this.#strokes.finish();
+      if (made !== null) this.#drawn(made);
     } else if (activity.kind === "drag") {
       this.#drags.move(...this.#pointing.pixel(e), !e.altKey);
       this.#drags.finish();
     }
     this.#endMain();
+  }
+
+  /** A new stroke is selected. A plateau that nobody can see yet is put in hand, with a word on what to do. */
+  #drawn(made: FinishedStroke): void {
+    this.selection.value = made.id;
+    if (!made.flush) return;
+    this.tool.value = "select";
+    this.#o.onMessage(FLUSH);
   }
 
   /** A click without movement selects the stroke under it, or nothing. */

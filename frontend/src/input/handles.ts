@@ -23,6 +23,9 @@ export interface Section {
 
 /** Relief below this gives a flank no slope to be dragged. */
 const FLAT_M = 1;
+/** Where the ground beside a flank is read, as a share of the run of its slope: a soft foot ends at one and a half. */
+const PAST_FOOT = 1.6;
+const FOOT_STEPS = 4;
 
 /** Index of the curve point whose height differs most from the line between the anchors; the middle of a flat one. */
 export function crestIndex(stroke: Stroke): number {
@@ -61,10 +64,19 @@ export function across(section: Section, distanceM: number): readonly [number, n
   return [section.crest[0] + distanceM * section.left[0], section.crest[1] + distanceM * section.left[1]];
 }
 
-/** Relief of the crest over the ground at the far end of a flank, metres; negative for a crevice. */
+/**
+ * Relief of the crest over the ground just beyond the foot of a flank, metres; negative for a crevice. The foot depends on
+ * the ground there, so it is found in a few steps from the end of the extent inwards.
+ */
 export function reliefBeside(stroke: Stroke, section: Section, flank: Flank, side: 1 | -1, ground: Ground): number {
-  const [x, y] = across(section, side * (stroke.plateau_radius_m + flank.extent_m));
-  return section.crest[2] - ground.heightAt(x, y);
+  let reach = flank.extent_m;
+  let relief = 0;
+  for (let step = 0; step < FOOT_STEPS; step++) {
+    const [x, y] = across(section, side * (stroke.plateau_radius_m + reach));
+    relief = section.crest[2] - ground.heightAt(x, y);
+    reach = Math.min(flank.extent_m, PAST_FOOT * footDistance(flank, relief));
+  }
+  return relief;
 }
 
 /** How far from the plateau's edge a flank reaches: its extent, or where its slope meets the ground. */
@@ -102,7 +114,9 @@ export function handlesOf(stroke: Stroke, ground: Ground, active: HandleKind | n
   ] as const) {
     const flank = stroke[kind];
     if (flank === null) continue;
-    const foot = footDistance(flank, reliefBeside(stroke, section, flank, side, ground));
+    const relief = reliefBeside(stroke, section, flank, side, ground);
+    if (flank.slope_deg !== null && Math.abs(relief) < FLAT_M) continue; // no slope to be dragged, and no foot
+    const foot = footDistance(flank, relief);
     const [x, y] = across(section, side * (stroke.plateau_radius_m + foot));
     const slope = flank.slope_deg === null ? "" : `${Math.round(flank.slope_deg)}° · `;
     const width = `${Math.round(foot)} m`;

@@ -45,6 +45,13 @@ const COLOURS: Readonly<Record<DrawToolId, Rgba>> = {
   plateau: [0.95, 0.4, 0.3, 1],
 };
 
+/** A stroke that has just been drawn. */
+export interface FinishedStroke {
+  readonly id: string;
+  /** A plateau that lies level with the ground all along, so that nothing is seen of it. */
+  readonly flush: boolean;
+}
+
 interface Session {
   readonly tool: DrawToolId;
   readonly ground: Ground;
@@ -119,21 +126,23 @@ export class StrokeTool {
     this.#schedule(session);
   }
 
-  /** Lifts the pen: the exact stroke is submitted and finished. Returns its id, or null when there was none. */
-  finish(): string | null {
+  /** Lifts the pen: the exact stroke is submitted and finished. Returns what was made, or null when there was nothing. */
+  finish(): FinishedStroke | null {
     const session = this.#session;
     if (session === null) return null;
-    if (session.begun && session.sketch.shape(this.#o.now(), true, FINAL_POINTS).points.length < 6) {
+    const { points } = session.sketch.shape(this.#o.now(), true, FINAL_POINTS);
+    if (session.begun && points.length < 6) {
       this.cancel(); // nothing of the line could be projected
       return null;
     }
+    const flush = session.tool === "plateau" && liesOnGround(points, session.ground);
     if (session.begun) {
       this.#submitShape(session, true);
       if (this.#session !== null) this.#submit(session, { type: "stroke.finish", stroke: session.id });
     }
     const done = this.#session !== null && session.begun;
     this.#clear();
-    return done ? session.id : null;
+    return done ? { id: session.id, flush } : null;
   }
 
   /** Gives the stroke up: whatever of it was submitted is deleted again. */
@@ -231,6 +240,16 @@ function sketchFor(tool: DrawToolId, start: SketchStart): Sketch & { readonly sa
   const sense = tool === "mountain" ? "up" : "down";
   const edgeOn = start.camera.state.value.mode === "map" || Math.abs(start.sample.ray.dir[2]) > STEEP;
   return edgeOn ? new RidgeSketch(start, sense) : new ProfileSketch(start, sense);
+}
+
+/** Closer to the ground than this all along, metres, a plateau changes nothing that one sees. */
+const FLUSH_M = 2;
+
+/** Whether every point (xyz triples) lies within two metres of the ground. */
+function liesOnGround(points: Float64Array, ground: Ground): boolean {
+  for (let i = 0; i + 2 < points.length; i += 3)
+    if (Math.abs(points[i + 2]! - ground.heightAt(points[i]!, points[i + 1]!)) > FLUSH_M) return false;
+  return true;
 }
 
 /** The path dropped on the ground, dense enough to follow it (at least 48 steps along its length). */

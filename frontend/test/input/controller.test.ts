@@ -9,9 +9,9 @@ import { SyncDoc } from "../../src/doc/sync.ts";
 import type { Op, Stroke } from "../../src/generated/contract.ts";
 import { InputController, type InputOptions } from "../../src/input/controller.ts";
 import { toolDefaults } from "../../src/input/defaults.ts";
-import type { HandleKind } from "../../src/input/handles.ts";
+import { type HandleKind, handlesOf } from "../../src/input/handles.ts";
 import { EMPTY, ridge } from "../doc/model.ts";
-import { camera, FLAT, SIZE } from "./scene.ts";
+import { camera, FLAT, groundOf, SIZE, SLOPE } from "./scene.ts";
 
 type PointerType = "mouse" | "pen" | "touch";
 
@@ -162,7 +162,7 @@ describe("drawing", () => {
     expect(distance(s.first, [1400, 1700, 0])).toBeLessThan(2);
     expect(distance(s.last, [2700, 1700, 0])).toBeLessThan(2);
     expect(Math.max(...s.curve.map(([, w]) => w))).toBeGreaterThan(280);
-    expect(s.left).toEqual({ slope_deg: 35, extent_m: 512, shape: "concave" });
+    expect(s.left).toEqual({ slope_deg: 35, extent_m: SIZE / 2, shape: "concave" });
     expect(input.selection.value).toBe(s.id);
     expect(input.drawing.value).toBeNull();
     expect(input.ghost.value).toBeNull();
@@ -226,6 +226,45 @@ describe("drawing", () => {
     const s = strokes()[1]!;
     expect(Math.min(...s.curve.map(([, w]) => w))).toBeLessThan(-90);
     expect(s.left?.slope_deg).toBe(50);
+  });
+
+  it("a plateau level with the ground comes to hand with a word on what to do; its handle raises it (SPEC I53)", () => {
+    input.tool.value = "plateau";
+    stroke([
+      [1400, 1500, 0],
+      [2400, 1900, 0],
+    ]);
+    expect(messages).toEqual(["This plateau lies level with the ground. Drag its handle up to raise it."]);
+    expect(input.tool.value).toBe("select");
+    expect(input.selection.value).toBe(only().id);
+    const crest = handle("crest");
+    expect(crest.position[2]).toBeCloseTo(0, 3);
+    expect(input.handles.value.map((h) => h.kind)).not.toContain("left");
+    const [x, y] = at(crest.position);
+    fire("pointerdown", x, y);
+    fire("pointermove", x, y - 10);
+    fire("pointermove", x, y - 60);
+    fire("pointermove", x, y - 60);
+    const live = only();
+    expect(live.first[2]).toBeGreaterThan(20);
+    expect(live.last[2]).toBe(live.first[2]);
+    fire("pointermove", x, y - 120);
+    fire("pointermove", x, y - 120);
+    expect(only().first[2]).toBeGreaterThan(1.7 * live.first[2]);
+    fire("pointerup", x, y - 120);
+    expect(input.handles.value.map((h) => h.kind)).toContain("left");
+    expect(input.handles.value.map((h) => h.label)).toContain(`Height ${Math.round(only().first[2])} m`);
+  });
+
+  it("a plateau that stands out of the ground stays with its tool", () => {
+    input.dispose();
+    open("orbit", { freeze: () => SLOPE, ground: () => SLOPE });
+    input.tool.value = "plateau";
+    const on = ([x, y]: readonly [number, number]): Vec3 => [x, y, SLOPE.heightAt(x, 1500)];
+    stroke([on([1400, 1500]), on([2000, 1900])]);
+    expect(only().kind).toBe("level");
+    expect(messages).toEqual([]);
+    expect(input.tool.value).toBe("plateau");
   });
 
   it("on the map a mountain is a ridge", () => {
@@ -305,6 +344,14 @@ describe("select and drag (SPEC I44)", () => {
     input.tool.value = "select";
     place();
     input.selection.value = "r";
+  });
+
+  it("finds the feet of flanks that could reach far beyond them", () => {
+    const high = groundOf((_x, y) => (y > 2600 ? 400 : Math.max(0, 300 - Math.abs(y - 1700) * 0.7)));
+    const wide = { slope_deg: 35, extent_m: SIZE / 2, shape: "concave" as const };
+    const s = place({ id: "wide", left: wide, right: null });
+    const foot = handlesOf(s, high, null).find((h) => h.kind === "left")!;
+    expect(foot.position[1] - 1700).toBeCloseTo(300 / Math.tan((35 * Math.PI) / 180), 0);
   });
 
   it("shows six handles where they belong", () => {
@@ -616,12 +663,19 @@ describe("touch and pen (SPEC I48)", () => {
     expect(c.state.value.eye).toEqual(before);
   });
 
-  it("pen pressure sets the extent of the flanks; a mouse leaves the default", () => {
-    stroke(PEAK, { pointerType: "pen", pointerId: 7, pressure: 1 });
-    expect(only().left!.extent_m).toBeCloseTo(512 * 1.6, 0);
-    doc.undo();
+  it("pen pressure sets the extent of the flanks, whole at full pressure; a mouse leaves the default", () => {
+    for (const [pressure, share] of [
+      [1, 1],
+      [0.5, 0.3],
+      [0.2, 0.09],
+    ] as const) {
+      stroke(PEAK, { pointerType: "pen", pointerId: 7, pressure });
+      expect(only().left!.extent_m).toBeCloseTo((share * SIZE) / 2, 0);
+      expect(only().right).toEqual(only().left);
+      doc.undo();
+    }
     stroke(PEAK);
-    expect(only().left!.extent_m).toBe(512);
+    expect(only().left!.extent_m).toBe(SIZE / 2);
   });
 
   it("a cancelled pointer gives the stroke up", () => {
