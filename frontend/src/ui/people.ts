@@ -1,6 +1,7 @@
 import { css, html, nothing, type TemplateResult } from "lit";
 import type { Member } from "../generated/contract.ts";
 import { icon } from "./icons.ts";
+import { friendlyName } from "./names.ts";
 import { SignalElement } from "./signal-element.ts";
 import type { Stage } from "./stage.ts";
 import { inkOn } from "./styles/colours.ts";
@@ -9,9 +10,9 @@ import { initials } from "./words.ts";
 
 const SHOWN = 5;
 
-/** The name to show for a member. */
-export function memberName(member: Pick<Member, "name">): string {
-  return member.name.trim() || "Guest";
+/** The name to show for a member; one who gave none (a script, say) goes by a friendly name made from the client's id. */
+export function memberName(member: Pick<Member, "client" | "name">): string {
+  return member.name.trim() || friendlyName(member.client);
 }
 
 /** Who is here. A click on a person flies to their view and follows it; a click on oneself opens one's own name. */
@@ -74,8 +75,8 @@ export class EskPeople extends SignalElement {
       <button
         class="avatar"
         style=${colours(me.myColour)}
-        title=${`${memberName(session.me.value)} (you): change name and colour`}
-        aria-label=${`${memberName(session.me.value)}, you: change name and colour`}
+        title=${`${session.me.value.name} (you): change name and colour`}
+        aria-label=${`${session.me.value.name}, you: change name and colour`}
         @click=${() => this.dispatchEvent(new CustomEvent("profile"))}
       >
         ${initials(session.me.value.name) || icon("user")}
@@ -96,7 +97,7 @@ export class EskPeople extends SignalElement {
       aria-pressed=${followed}
       @click=${() => this.stage.follow(member.client)}
     >
-      ${initials(member.name) || icon("user")}
+      ${initials(name) || icon("user")}
     </button>`;
   }
 }

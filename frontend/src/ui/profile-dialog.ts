@@ -1,6 +1,7 @@
 import "@awesome.me/webawesome/dist/components/dialog/dialog.js";
 import { css, html, type TemplateResult } from "lit";
 import { icon } from "./icons.ts";
+import { friendlyName } from "./names.ts";
 import { SignalElement } from "./signal-element.ts";
 import type { Stage } from "./stage.ts";
 import { MEMBER_COLOURS } from "./storage.ts";
@@ -67,7 +68,7 @@ export class EskProfile extends SignalElement {
         <form @submit=${this.#save}>
           <label>
             Name
-            <input id="name" class="field" maxlength="80" autocomplete="nickname" placeholder="Guest" .value=${me.name} autofocus />
+            <input id="name" class="field" maxlength="80" autocomplete="nickname" placeholder=${friendlyName(session.client)} .value=${me.name} autofocus />
           </label>
           <div class="colours" role="radiogroup" aria-label="Colour">
             ${MEMBER_COLOURS.map(

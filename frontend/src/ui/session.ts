@@ -23,6 +23,7 @@ import type {
 import { MAX_PRESENCE_PER_SECOND, PRESENCE_HZ, PROTOCOL_VERSION, TICK_MS } from "../generated/contract.ts";
 import { Connection } from "../net/connection.ts";
 import { terrainPath } from "./links.ts";
+import { friendlyName } from "./names.ts";
 import type { People } from "./scene.ts";
 import { Stage } from "./stage.ts";
 import { type Status, status } from "./status.ts";
@@ -77,7 +78,7 @@ export class TerrainSession {
     this.secret = secret;
     this.client = crypto.randomUUID().replaceAll("-", "");
     this.#viewport = viewport;
-    this.me.value = identity(this.store, Math.random);
+    this.me.value = identity(this.store, Math.random, this.client);
     this.doc = new SyncDoc(this.client);
     this.doc.onRefused((refusal) => this.toasts.show(refusal.message, "warn"));
     this.doc.onDiverged(() => this.connection.reconnect());
@@ -146,7 +147,7 @@ export class TerrainSession {
   }
 
   rename(who: Identity): void {
-    const name = who.name.trim().slice(0, 80);
+    const name = who.name.trim().slice(0, 80) || friendlyName(this.client);
     this.me.value = { name, colour: who.colour };
     rememberIdentity(this.store, this.me.value);
     this.connection.send({ type: "rename", name, colour: who.colour });

@@ -1,6 +1,7 @@
 /** What this device remembers: recent terrains, my name and colour, the theme. Storage may be blocked: then nothing. */
 
 import type { Role } from "../generated/contract.ts";
+import { friendlyName } from "./names.ts";
 
 export interface RecentTerrain {
   readonly id: string;
@@ -103,8 +104,16 @@ export const MEMBER_COLOURS = [
   "#a61e4d",
 ] as const;
 
-export function identity(store: Store, random: () => number): Identity {
-  const name = (store.getItem("esker.name") ?? "").slice(0, 80);
+/**
+ * Who I am on this device. Who never chose a name gets a friendly one from `client` (any string of one's own), which is
+ * kept from then on; an empty name that somebody saved means the same.
+ */
+export function identity(store: Store, random: () => number, client: string): Identity {
+  let name = (store.getItem("esker.name") ?? "").trim().slice(0, 80);
+  if (name === "") {
+    name = friendlyName(client);
+    write(store, "esker.name", name);
+  }
   const kept = store.getItem("esker.colour") ?? "";
   if (/^#[0-9a-f]{6}$/.test(kept)) return { name, colour: kept };
   const colour = MEMBER_COLOURS[Math.floor(random() * MEMBER_COLOURS.length)] ?? MEMBER_COLOURS[0];

@@ -6,6 +6,7 @@ import "./icon-library.ts";
 import { icon } from "./icons.ts";
 import "./overlay.ts";
 import { pageActions } from "./page-actions.ts";
+import { memberName } from "./people.ts";
 import "./profile-dialog.ts";
 import { TerrainSession } from "./session.ts";
 import "./share-dialog.ts";
@@ -221,7 +222,7 @@ export class EskTerrain extends SignalElement {
     const leader = stage.session.members.value.find((m) => m.client === stage.following.value);
     if (!leader) return nothing;
     return html`<div class="hint panel" style="border-color:${leader.colour}">
-      ${icon("eye")}<span>Following ${leader.name || "Guest"}. Move the view to stop.</span>
+      ${icon("eye")}<span>Following ${memberName(leader)}. Move the view to stop.</span>
     </div>`;
   }
 

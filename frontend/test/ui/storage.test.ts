@@ -1,5 +1,6 @@
 // SPEC U4
 import { describe, expect, it } from "vitest";
+import { friendlyName } from "../../src/ui/names.ts";
 import { madeLinks, rememberLink } from "../../src/ui/share-links.ts";
 import {
   forgetSecret,
@@ -95,20 +96,31 @@ describe("recent terrains", () => {
 });
 
 describe("identity", () => {
-  it("draws a colour once and keeps it", () => {
+  it("draws a colour and a friendly name once and keeps them", () => {
     const store = memory();
-    const first = identity(store, () => 0.99);
-    expect(first).toEqual({ name: "", colour: MEMBER_COLOURS.at(-1) });
-    expect(identity(store, () => 0)).toEqual(first);
+    const first = identity(store, () => 0.99, "c1");
+    expect(first).toEqual({ name: friendlyName("c1"), colour: MEMBER_COLOURS.at(-1) });
+    expect(identity(store, () => 0, "c2")).toEqual(first);
     rememberIdentity(store, { name: "Ana", colour: "#123456" });
-    expect(identity(store, () => 0)).toEqual({ name: "Ana", colour: "#123456" });
+    expect(identity(store, () => 0, "c3")).toEqual({ name: "Ana", colour: "#123456" });
+    rememberIdentity(store, { name: " ", colour: "#123456" });
+    expect(identity(store, () => 0, "c4").name).toBe(friendlyName("c4"));
+  });
+
+  it("friendly names are an adjective and an animal, steady for an id and distinct for most", () => {
+    const names = Array.from({ length: 40 }, (_, i) => friendlyName(`client${i}`));
+    for (const name of names) expect(name).toMatch(/^[A-Z][a-z]+ [A-Z][a-z]+$/);
+    expect(friendlyName("client7")).toBe(names[7]);
+    expect(new Set(names).size).toBeGreaterThan(36);
+    expect(new Set(names.map((n) => n.split(" ")[0])).size).toBeGreaterThan(15);
+    expect(new Set(names.map((n) => n.split(" ")[1])).size).toBeGreaterThan(15);
   });
 
   it("does not trust what is stored", () => {
     const store = memory();
     store.setItem("esker.colour", "red; background: url(x)");
     store.setItem("esker.name", "x".repeat(200));
-    const who = identity(store, () => 0);
+    const who = identity(store, () => 0, "c");
     expect(who.colour).toBe(MEMBER_COLOURS[0]);
     expect(who.name).toHaveLength(80);
   });
