@@ -120,7 +120,8 @@ export class GpuRenderer implements SceneRenderer {
       this.ready = !this.tilesDue && !world.light.pending;
       return this.report({ busy: true });
     }
-    const waves = scene.settings.sea_level_m !== null && !software;
+    // Time stands at zero for people who asked for less motion: then the sea is still.
+    const waves = scene.settings.sea_level_m !== null && !software && scene.time !== 0;
     const due =
       this.tilesDue || this.lookDue || this.lightDrawn !== this.lightMarched || !sameQuality(quality, this.lastQuality);
     if (!moved && !waves && !due && !world.light.pending)
