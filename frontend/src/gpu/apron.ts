@@ -32,15 +32,14 @@ const SPANS: readonly Span[] = [
 
 /** Fills `out` (69 x 69, row 0 south). */
 export function assembleSlot(tile: Tile, neighbour: Neighbour, out: Float32Array): void {
-  extrapolate(tile, out);
+  const sources = SPANS.flatMap((upward) =>
+    SPANS.map((across) => (across.d === 0 && upward.d === 0 ? tile : neighbour(across.d, upward.d))),
+  );
+  if (sources.includes(undefined)) extrapolate(tile, out);
   // North to south and east to west: the last writer of a shared sample is its owner.
-  for (let j = 2; j >= 0; j -= 1) {
-    for (let i = 2; i >= 0; i -= 1) {
-      const across = SPANS[i]!;
-      const upward = SPANS[j]!;
-      const source = across.d === 0 && upward.d === 0 ? tile : neighbour(across.d, upward.d);
-      if (source !== undefined) copyPart(source.heights, across, upward, out);
-    }
+  for (let k = 8; k >= 0; k -= 1) {
+    const source = sources[k];
+    if (source !== undefined) copyPart(source.heights, SPANS[k % 3]!, SPANS[Math.floor(k / 3)]!, out);
   }
 }
 

@@ -222,4 +222,25 @@ async function circle(shot: Shot, frames: number): Promise<{ ms: number; patches
   return { ms: (performance.now() - began) / frames, patches };
 }
 
-Object.assign(globalThis, { esker: { load, shoot, picture, circle, crackTest } });
+/** Changes all tiles of a rough world at once, as a live morph does, and gives the host's milliseconds for the frame. */
+async function morph(shot: Shot, rounds: number): Promise<{ uploads: number; cpuMs: number[] }> {
+  await shoot(shot);
+  const used = await rendererFor(shot);
+  const view = world(shot.world, shot.levels ?? 4) as FieldView;
+  const s = scene(shot, shot.width ?? 1280, shot.height ?? 720);
+  const cpuMs: number[] = [];
+  let uploads = 0;
+  for (let round = 0; round < rounds; round += 1) {
+    view.change((x, y) => 300 * Math.sin(x / 300 + round) * Math.cos(y / 400) + 20 * Math.sin((x * y) / 9000));
+    let stats = used.render(s);
+    while (stats.uploads === 0) {
+      await new Promise((done) => setTimeout(done, 5));
+      stats = used.render(s);
+    }
+    cpuMs.push(stats.cpuMs);
+    uploads = stats.uploads;
+  }
+  return { uploads, cpuMs };
+}
+
+Object.assign(globalThis, { esker: { morph, load, shoot, picture, circle, crackTest } });
