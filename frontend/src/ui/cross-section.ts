@@ -56,14 +56,16 @@ function prescribedHalf(section: Section): number {
   return Math.max(section.plateauRadiusM + extent, 1);
 }
 
-/** How far beyond where its slope meets the base a flank is shown, as a share of that distance. */
+/** How far out a flank is shown, in runs of its slope down to the base: a round shoulder or foot ends at one and a half. */
 const ROOM = 1.6;
 
 /** How far out from the crest the profile is worth a look at a relief: past each foot, but not past its extent, metres. */
 function profileHalf(section: Section, reliefM: number): number {
   const ends = SIDES.map((side) => {
     const flank = section[side];
-    return flank === null ? 0 : Math.min(flank.extent_m, ROOM * footM(flank, reliefM));
+    if (flank === null) return 0;
+    const tangent = Math.tan((flank.slope_deg ?? 0) * DEG);
+    return tangent > 0 ? Math.min(flank.extent_m, (ROOM * Math.abs(reliefM)) / tangent) : flank.extent_m;
   });
   return Math.max(section.plateauRadiusM + Math.max(...ends), 1);
 }
