@@ -34,10 +34,10 @@ fn sky_with_sun(dir: vec3f) -> vec3f {
 
 fn plane_albedo() -> vec3f {
   switch (view.look) {
-    case LOOK_ALPINE: { return vec3f(0.33, 0.35, 0.38); }
-    case LOOK_DESERT: { return vec3f(0.36, 0.27, 0.18); }
-    case LOOK_PAPER: { return vec3f(0.52, 0.465, 0.375); }
-    default: { return vec3f(0.185, 0.180, 0.135); }
+    case LOOK_ALPINE: { return vec3f(0.50, 0.53, 0.57); }
+    case LOOK_DESERT: { return vec3f(0.50, 0.415, 0.32); }
+    case LOOK_PAPER: { return vec3f(0.56, 0.505, 0.415); }
+    default: { return vec3f(0.385, 0.395, 0.345); }
   }
 }
 
@@ -53,9 +53,9 @@ fn ground_plane(p: vec3f, dir: vec3f, footprint: f32) -> vec3f {
   let texel = log2(max(footprint, 1.0e-3) * 256.0 / view.size);
   let broad = textureSampleLevel(noise, smooth_repeat, p.xy / (view.size * 5.3), clamp(texel - 2.4, 0.0, 8.0));
   let fine = textureSampleLevel(noise, smooth_repeat, p.yx / (view.size * 1.3) + 0.37, clamp(texel - 0.4, 0.0, 8.0));
-  let country = mix(vec3f(0.84, 0.90, 0.86), vec3f(1.16, 1.09, 1.0), smoothstep(0.2, 0.8, broad.r * 0.7 + fine.g * 0.3));
+  let country = mix(vec3f(0.93, 0.96, 0.95), vec3f(1.07, 1.04, 1.0), smoothstep(0.2, 0.8, broad.r * 0.7 + fine.g * 0.3));
   let tint = select(country, vec3f(1.0), view.look == LOOK_PAPER);
-  let light = sun_light() * max(view.sun.z, 0.0) / 3.14159265 * mix(0.25, 1.0, shadow) + ambient_light(vec3f(0.0, 0.0, 1.0));
+  let light = sun_light() * max(view.sun.z, 0.0) / 3.14159265 * mix(0.5, 1.0, shadow) + ambient_light(vec3f(0.0, 0.0, 1.0));
   return plane_albedo() * tint * light * max(shade, 0.0);
 }
 
@@ -64,7 +64,7 @@ fn far_ranges(dir: vec3f, sky: vec3f) -> vec3f {
   if (view.look == LOOK_PAPER || view.has_sea > 0.5 || dir.z > 0.09) { return sky; }
   let azimuth = atan2(dir.y, dir.x) / 6.2831853;
   let glow = haze_glow(dir);
-  let body = plane_albedo() * (sun_light() * 0.12 + ambient_light(vec3f(0.0, 0.0, 1.0)) * 0.8);
+  let body = plane_albedo() * 0.5 * (sun_light() * 0.12 + ambient_light(vec3f(0.0, 0.0, 1.0)) * 0.8);
   var colour = sky;
   for (var i = 0; i < 3; i += 1) {
     let k = f32(i);

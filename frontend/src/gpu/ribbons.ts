@@ -74,9 +74,9 @@ export function strokeStyle(stroke: StrokeVisual, scale: number): RibbonStyle {
   const lift = stroke.selected ? 0.35 : stroke.hovered ? 0.2 : 0;
   const [r, g, b, a] = stroke.colour;
   const brighter = (v: number): number => v + (1 - v) * lift;
-  const width = stroke.selected || stroke.live ? 2 : stroke.hovered ? 1.8 : 1.4;
+  const width = stroke.selected || stroke.live ? 2 : stroke.hovered ? 1.7 : 1.15;
   return {
-    colour: [brighter(r), brighter(g), brighter(b), a],
+    colour: [brighter(r), brighter(g), brighter(b), lift > 0 || stroke.live ? a : 0.88 * a],
     halfWidthPx: width * scale,
     haloPx: (stroke.selected ? 7 : stroke.hovered ? 4 : 0) * scale,
     hiddenOpacity: stroke.selected || stroke.live ? 0.6 : 0.32,
