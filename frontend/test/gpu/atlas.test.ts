@@ -40,7 +40,7 @@ function neighbourOf(view: FieldView, tile: Tile): (dx: number, dy: number) => T
 
 const at = (slot: Float32Array, col: number, row: number): number => slot[(row + BORDER) * SLOT_TEXELS + col + BORDER]!;
 
-describe("slots", () => {
+describe("slots", { timeout: 60_000 }, () => {
   const view = new FieldView(4096, 2, (x, y) => 0.1 * x - 0.03 * y + ((x * y) % 97));
 
   it("R10: the border is the neighbours' samples", () => {
@@ -91,7 +91,7 @@ describe("slots", () => {
   });
 });
 
-describe("atlas", () => {
+describe("atlas", { timeout: 60_000 }, () => {
   it("R11: all resident tiles that changed are uploaded in one frame, and only those", () => {
     const view = new FieldView(4096, 3, filteredField(1, 50));
     const { device, uploads } = recorder();

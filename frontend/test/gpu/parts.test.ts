@@ -156,7 +156,7 @@ describe("ribbons", () => {
   });
 });
 
-describe("figures", () => {
+describe("figures", { timeout: 60_000 }, () => {
   it("the sun stands where the settings say: azimuth clockwise from north", () => {
     expect(sunDirection(90, 0.5)[0]).toBeGreaterThan(0.99);
     expect(sunDirection(0, 45)[1]).toBeCloseTo(Math.SQRT1_2);

@@ -85,7 +85,8 @@ function randomCamera(next: () => number): CameraState {
 /** Straight down on everything, so that nothing is culled. */
 const above = (tall = 4200): CameraState => mapCamera([2048, 2048, 0], tall, 800, 800);
 
-describe("selection", () => {
+// Building the terrains takes seconds on a busy machine.
+describe("selection", { timeout: 60_000 }, () => {
   const levels = 4;
   let view: FieldView;
   beforeAll(() => {
