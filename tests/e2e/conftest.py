@@ -89,9 +89,9 @@ def server(tmp_path: Path) -> Iterator[Server]:
     made.kill(signal.SIGTERM)
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def browser() -> Iterator[Browser]:
-    """Headless Chromium with WebGPU on the software adapter."""
+    """Headless Chromium with WebGPU on the software adapter; ends with this folder's tests, and its event loop with it."""
     with sync_playwright() as playwright:
         made = playwright.chromium.launch(executable_path=chromium_path(), args=FLAGS + AWAKE)
         yield made
