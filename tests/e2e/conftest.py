@@ -91,7 +91,7 @@ def server(tmp_path: Path) -> Iterator[Server]:
 
 @pytest.fixture(scope="package")
 def browser() -> Iterator[Browser]:
-    """Headless Chromium with WebGPU on the software adapter; ends with this folder's tests, and its event loop with it."""
+    """Headless Chromium with WebGPU on the software adapter; its event loop ends with this folder."""
     with sync_playwright() as playwright:
         made = playwright.chromium.launch(executable_path=chromium_path(), args=FLAGS + AWAKE)
         yield made
