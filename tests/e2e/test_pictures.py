@@ -36,8 +36,8 @@ def rest(visitor: Visitor) -> None:
 
 
 def test_hero(visitors: Visitors, server: Server) -> None:
-    """The alpine ridge as a visitor sees it."""
-    terrain, secret = server.create(template="alpine-ridge", title="Alpine ridge")
+    """The landscape of the paper's figure 6 as a visitor sees it."""
+    terrain, secret = server.create(template="figure-six", title="Figure six")
     guest = visitors(1280, 800)
     guest.open(f"/t/{terrain}#{secret}")
     wait_settled(guest)
