@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, BrowserContext, Page, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, Error, Page, sync_playwright
 
 from tests.browser import FLAGS, chromium_path, free_port
 
@@ -131,11 +131,20 @@ class Visitor:
     def wait(self, condition: str, argument: Any = None, timeout: float = 60) -> None:
         """Wait until a condition in the page holds. (Playwright's own wait needs `eval`, which our CSP forbids.)"""
         deadline = time.monotonic() + timeout
-        while not self.page.evaluate(condition, argument):
+        while not self._holds(condition, argument):
             if time.monotonic() > deadline:
                 self.shot("timeout")
                 raise TimeoutError(f"not so after {timeout} s: {condition} {argument!r}")
             self.page.wait_for_timeout(50)
+
+    def _holds(self, condition: str, argument: Any) -> bool:
+        """False too while the page is on its way to another address: there is nobody to ask then."""
+        try:
+            return bool(self.page.evaluate(condition, argument))
+        except Error as error:
+            if "Execution context was destroyed" not in error.message:
+                raise
+            return False
 
     def shot(self, name: str) -> Path:
         """Keep a screenshot as a test artefact."""
