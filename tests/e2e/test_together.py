@@ -41,6 +41,8 @@ def two_people(visitors: Visitors, server: Server) -> tuple[Visitor, Visitor, st
 
 def same_ground(ada: Visitor, ben: Visitor, server: Server, terrain: str, secret: str, folder: Path) -> None:
     """Both pages show the same heights exactly, and those of the offline solve within one quantisation step."""
+    for person in (ada, ben):  # at rest everybody gets everything (docs/decisions/0005)
+        wait(person, "ps => ps.every(([x, y]) => window.esker.levelAt(x, y) === 4)", [list(p) for p in COARSE])
     here, there = heights(ada, COARSE), heights(ben, COARSE)
     assert here == there
     archive = folder / "now.esker"
