@@ -29,6 +29,9 @@ SUBPATCHES: Final = 4
 MAX_LEVEL: Final = 6
 """The finest level that may be solved globally (4097 samples a side)."""
 DEFAULT_LEVEL: Final = 4
+MAX_REFINED_LEVEL: Final = 10
+"""The finest level that may be refined tile by tile above the global ones (65,537 samples a side; DESIGN 5.6)."""
+DEFAULT_REFINED_LEVEL: Final = 8
 QUANTA_PER_CELL: Final = 256
 """Quantisation step of level l: q_l = s_l / 256, so that the slope error is the same at every level (DESIGN 6)."""
 DEFAULT_SIZE_M: Final = 4096.0
@@ -46,6 +49,17 @@ SPRING_FULL_FRACTION: Final = 0.85
 CHEBYSHEV_SWEEPS: Final = 4
 CHEBYSHEV_LOW: Final = 0.5
 CHEBYSHEV_HIGH: Final = 2.0
+
+# --- channels (DESIGN 5.4, 6) -----------------------------------------------------------------------------------
+
+CHANNEL_LEVELS_BELOW: Final = 2
+"""Amplitude and roughness are smooth: they are solved and sent up to this many levels below the heights."""
+AMPLITUDE_QUANTA_PER_M: Final = 64
+ROUGHNESS_QUANTA: Final = 1024
+"""Quantisation steps of roughness 1. Channels have the same step on every level."""
+BASE_AMPLITUDE_M: Final = 0.0
+BASE_ROUGHNESS: Final = 0.5
+"""What the channels are where no stroke says otherwise."""
 
 # --- stroke defaults (DESIGN 5.2, 12) ---------------------------------------------------------------------------
 
@@ -443,6 +457,8 @@ class Welcome(Wire):
     colour: Colour
     levels: int
     """Finest globally solved level G."""
+    finest: int
+    """Finest level that tiles are refined to where somebody looks; G when nothing is refined."""
     clock: Clock
     document: Document | None = None
     ops: tuple[OrderedOp, ...] | None = None

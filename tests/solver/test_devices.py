@@ -30,7 +30,7 @@ def test_numpy_gives_the_same(solver: Solver, scene: str, settings: object) -> N
 def test_numpy_says_so() -> None:
     twin = Solver(device="NumPy")
     assert twin.device_name == "NumPy float64 (no OpenCL device)"
-    results = list(twin.steps(SCENES["one"], SETTINGS, 1))
+    results = [r for r in twin.steps(SCENES["one"], SETTINGS, 1) if r is not None]
     assert [r.level for r in results if r.settled] == [0, 1]
     assert results[-1].heights.dtype == np.float32
     assert twin.solve(SCENES["one"], SETTINGS, 1)[1].max() > 200

@@ -55,7 +55,7 @@ async def main(data: Path, first: int) -> None:
         worker=worker,
         tiles=_NoTiles(),
         executor=ThreadPoolExecutor(1),
-        info=RoomInfo(0, "none"),
+        info=RoomInfo(0, 0, "none"),
         on_empty=lambda: None,
     )
     wake = asyncio.Event()

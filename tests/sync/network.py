@@ -23,7 +23,7 @@ from esker.session.members import Member
 from esker.session.outbox import Outbox
 from esker.store.journal import Loaded, Row, replay
 
-INFO = RoomInfo(levels=2, device="none")
+INFO = RoomInfo(levels=2, finest=2, device="none")
 TICK = 0.033
 
 

@@ -99,10 +99,10 @@ def stages(solver: Solver, strokes: Sequence[Stroke], settings: TerrainSettings,
     for _ in range(RUNS):
         start = time.perf_counter()
         for result in solver.steps(strokes, settings, level):
+            if result is None:
+                continue
             name = "settled" if result.settled else f"level_{result.level}"
             now = 1e3 * (time.perf_counter() - start)
-            if not result.settled and result.level == 0 and f"level_{level}" in best and now > best[f"level_{level}"]:
-                continue
             if result.settled and result.level < level:
                 continue
             best[name] = round(min(best.get(name, 1e9), now), 2)
@@ -125,6 +125,8 @@ def after_edit(solver: Solver, strokes: Sequence[Stroke], settings: TerrainSetti
         solver.solve(strokes, settings, level)
         start = time.perf_counter()
         for result in solver.steps(edited, settings, level):
+            if result is None:
+                continue
             now = 1e3 * (time.perf_counter() - start)
             if result.level == 0:
                 first.append(now)

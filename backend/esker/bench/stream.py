@@ -99,6 +99,8 @@ def _drain(client: ClientTiles) -> dict[str, int]:
 
 def _put(server: TileServer, solver: Solver, document: c.Document, clock: int, *, settle: bool = True) -> None:
     for result in solver.steps(document.strokes, document.settings, LEVEL):
+        if result is None:
+            continue
         server.put_level(clock, result.level, result.heights, result.settled)
         if result.level == LEVEL and not settle:
             return

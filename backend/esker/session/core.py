@@ -49,6 +49,7 @@ class RoomInfo:
     """What a welcome says about the server."""
 
     levels: int
+    finest: int
     device: str
 
 
@@ -139,6 +140,7 @@ class RoomCore:
             role=member.role,
             colour=member.colour,
             levels=info.levels,
+            finest=info.finest,
             clock=self.document.clock,
             members=self.members.public(),
             device=info.device,

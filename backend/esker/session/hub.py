@@ -127,7 +127,7 @@ class Hub:
             worker=self._worker,
             tiles=self._tiles,
             executor=self._tile_thread,
-            info=RoomInfo(self._levels, self._worker.device_name),
+            info=RoomInfo(self._levels, self._levels, self._worker.device_name),
             on_empty=lambda: self._empty(terrain),
         )
 

@@ -64,7 +64,7 @@ class Solver(Protocol):
 
     def steps(
         self, strokes: Sequence[c.Stroke], settings: c.TerrainSettings, levels: int | None = None
-    ) -> Iterator[LevelResult]: ...
+    ) -> Iterator[LevelResult | None]: ...
 
 
 SolverFactory = Callable[[str | None], Solver]

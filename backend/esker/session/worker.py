@@ -45,7 +45,7 @@ class Client:
     failed: Callable[[int, str], None]
     newest: Job | None = None
     running: Job | None = None
-    steps: Iterator[LevelResult] | None = None
+    steps: Iterator[LevelResult | None] | None = None
     previewing: bool = False
     finest_at: float = field(default=float("-inf"))
 
@@ -139,20 +139,22 @@ class Worker:
                 self._step(client)
 
     def _step(self, client: Client) -> None:
-        """One level of one room."""
+        """One level of one room, or a part of one that the solver can be left at."""
         self._maybe_restart(client)
         job, steps = client.running, client.steps
         if job is None or steps is None:
             return
         try:
-            result = next(steps, None)
+            result = next(steps)
+        except StopIteration:
+            client.steps = None
+            return
         except Exception as error:
             self._failed(client, job, error)
             return
-        if result is None:
-            client.steps = None
-            return
         self._failures = 0
+        if result is None:
+            return
         if result.level >= client.levels:
             client.previewing = False
             client.finest_at = self._now()
@@ -209,7 +211,7 @@ def _active(client: Client) -> bool:
     return client.newest is not None or client.steps is not None
 
 
-def _close(steps: Iterator[LevelResult] | None) -> None:
+def _close(steps: Iterator[LevelResult | None] | None) -> None:
     close = getattr(steps, "close", None)
     if close is not None:
         close()

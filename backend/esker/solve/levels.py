@@ -269,3 +269,7 @@ class ClWorkspace:
     def read(self, level: int) -> NDArray[np.float32]:
         """Heights of a level, metres."""
         return np.asarray(self.height.get("u", level)[0])
+
+    def read_gradient(self) -> NDArray[np.float32]:
+        """Both gradient components of the finest level, (2, n, n), metres per metre."""
+        return self.gradient.get("u", self.top)

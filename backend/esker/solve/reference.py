@@ -224,3 +224,7 @@ class NumpyWorkspace:
     def read(self, level: int) -> NDArray[np.float32]:
         """Heights of a level, metres."""
         return np.asarray(self.height.fields["u", level][0], dtype=np.float32)
+
+    def read_gradient(self) -> NDArray[np.float32]:
+        """Both gradient components of the finest level, (2, n, n), metres per metre."""
+        return np.asarray(self.gradient.fields["u", self.top], dtype=np.float32)

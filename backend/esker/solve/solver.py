@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from esker import grid
-from esker.contract import MAX_LEVEL, Stroke, TerrainSettings
+from esker.contract import MAX_LEVEL, Channel, Stroke, TerrainSettings
 from esker.solve import multigrid
 from esker.solve.constraints import Packer
 from esker.solve.device import NUMPY_NAME, Device, open_device
@@ -39,8 +39,6 @@ GRADIENT_SHARE = 1 / 16
 STALLED = 0.8
 STALLED_AFTER = 8
 """After this many cycles a ratio of two updates above STALLED means that float32 has nothing left to gain."""
-CYCLES_PER_PULSE = 2
-"""While settling, the preview of level 0 is given out again once in so many cycles, so that a caller can stop."""
 SPARE_LEVEL = 4
 SPARE_WORKSPACES = 4
 """Idle workspaces kept, with the raster of the strokes that they last solved: 91 MB each at level 4. One at level 6
@@ -48,13 +46,34 @@ takes 1.3 GB, so above SPARE_LEVEL only one is kept."""
 
 
 @dataclass(frozen=True)
+class Basis:
+    """What refinement above the global levels starts from (DESIGN 5.6): a settled solve.
+
+    heights: (N, N) float32 of level ``level``, metres; gradient: (2, N, N) float32, d/dx and d/dy, metres per metre.
+    Both read-only.
+    """
+
+    strokes: tuple[Stroke, ...]
+    settings: TerrainSettings
+    level: int
+    heights: NDArray[np.float32]
+    gradient: NDArray[np.float32]
+
+
+@dataclass(frozen=True)
 class LevelResult:
     """One finished level. heights: (N_l, N_l) float32, metres, row 0 south, read-only. ``settled`` False: a preview
-    that later results correct; True: final for this stroke set, and the injection of the next finer level."""
+    that later results correct; True: final for this stroke set, and the injection of the next finer level.
+
+    ``channel`` other than HEIGHT: ``heights`` holds that channel instead (amplitude in metres, roughness 0..1).
+    ``basis``: with the last result of a settled solve, if it was asked for.
+    """
 
     level: int
     heights: NDArray[np.float32]
     settled: bool
+    channel: Channel = Channel.HEIGHT
+    basis: Basis | None = None
 
 
 @dataclass(frozen=True)
@@ -85,6 +104,7 @@ class Workspace(Protocol):
     def guide(self, level: int) -> None: ...
     def warm(self, heights: NDArray[np.float32]) -> None: ...
     def read(self, level: int) -> NDArray[np.float32]: ...
+    def read_gradient(self) -> NDArray[np.float32]: ...
 
 
 class Solver:
@@ -110,15 +130,16 @@ class Solver:
         return NUMPY_NAME if self._device is None else self._device.name
 
     def steps(
-        self, strokes: Sequence[Stroke], settings: TerrainSettings, levels: int | None = None
-    ) -> Iterator[LevelResult]:
+        self, strokes: Sequence[Stroke], settings: TerrainSettings, levels: int | None = None, *, basis: bool = False
+    ) -> Iterator[LevelResult | None]:
         """Previews of levels 0..G, each when it is finished, then 0..G settled.
 
-        Between the last preview and the settled levels the same preview of level 0 comes again from time to time: a
-        chance to stop. Close the generator to stop; G is ``levels`` or the solver's ``max_level``. Raises ValueError
-        for a level outside 0..MAX_LEVEL.
+        None comes wherever the work can be left for a while, or for good: between the cycles of the finest level, so
+        that many rooms can share a device. Close the generator to stop; G is ``levels`` or the solver's ``max_level``.
+        With ``basis`` the last result carries what refinement starts from. Raises ValueError for a level outside
+        0..MAX_LEVEL.
         """
-        return self._run(strokes, settings, self._level(levels), None)
+        return self._run(strokes, settings, self._level(levels), None, basis)
 
     def solve(
         self,
@@ -136,10 +157,11 @@ class Solver:
         top = self._level(levels)
         warm = guess.levels[top] if guess is not None and len(guess) == top + 1 else None
         latest: dict[int, LevelResult] = {}
-        run = self._run(strokes, settings, top, warm)
+        run = self._run(strokes, settings, top, warm, basis=False)
         for result in run:
-            latest[result.level] = result
-            if on_level is not None:
+            if result is not None and result.channel == Channel.HEIGHT:
+                latest[result.level] = result
+            if result is not None and on_level is not None:
                 on_level(result)
             if should_stop is not None and should_stop():
                 run.close()
@@ -149,7 +171,7 @@ class Solver:
 
     def _warm_up(self) -> None:
         """Compile the kernels now, not under somebody's first stroke."""
-        for _ in self._run((), TerrainSettings(), 1, None):
+        for _ in self._run((), TerrainSettings(), 1, None, basis=False):
             pass
         self._spare.clear()
 
@@ -160,20 +182,23 @@ class Solver:
         return top
 
     def _run(
-        self, strokes: Sequence[Stroke], settings: TerrainSettings, top: int, warm: NDArray[np.float32] | None
-    ) -> Generator[LevelResult]:
+        self,
+        strokes: Sequence[Stroke],
+        settings: TerrainSettings,
+        top: int,
+        warm: NDArray[np.float32] | None,
+        basis: bool,
+    ) -> Generator[LevelResult | None]:
         workspace = self._take(strokes, settings, top)
         try:
             workspace.load(strokes, settings)
-            pulse = None
             if warm is None:
-                for preview in _previews(workspace):
-                    pulse = pulse or preview
-                    yield preview
+                yield from _previews(workspace)
             else:
                 _gradients(workspace)
                 workspace.warm(warm)
-            yield from _settle(workspace, settings, pulse)
+            yield from _to_rest(workspace, settings)
+            yield from _settled(workspace, strokes, settings, basis)
         except GeneratorExit:
             raise
         except BaseException:
@@ -199,7 +224,7 @@ class Solver:
         del self._spare[: -SPARE_WORKSPACES if workspace.top <= SPARE_LEVEL else -1]
 
 
-def _previews(w: Workspace) -> Iterator[LevelResult]:
+def _previews(w: Workspace) -> Iterator[LevelResult | None]:
     """Full multigrid, both steps level by level, so that a coarse level is out before the next one is touched."""
     for level in range(w.top):
         multigrid.start(w.gradient, level)
@@ -208,17 +233,18 @@ def _previews(w: Workspace) -> Iterator[LevelResult]:
         multigrid.start(w.height, level)
         multigrid.finish(w.height, level)
         yield LevelResult(level, _frozen(w.read(level)), settled=False)
-    _cycles(w.gradient, PREVIEW_GRADIENT_CYCLES)
+    yield from _cycles(w.gradient, PREVIEW_GRADIENT_CYCLES)
     w.guide(w.top)
-    _cycles(w.height, PREVIEW_HEIGHT_CYCLES)
+    yield from _cycles(w.height, PREVIEW_HEIGHT_CYCLES)
     yield LevelResult(w.top, _frozen(w.read(w.top)), settled=False)
 
 
-def _cycles(system: multigrid.System, count: int) -> None:
+def _cycles(system: multigrid.System, count: int) -> Iterator[None]:
     """Start the finest level from the next coarser and cycle."""
     multigrid.start(system, system.top)
     for _ in range(count if system.top > 0 else 0):
         multigrid.cycle(system)
+        yield
 
 
 def _gradients(w: Workspace) -> None:
@@ -226,25 +252,23 @@ def _gradients(w: Workspace) -> None:
     for level in range(w.top):
         multigrid.start(w.gradient, level)
         multigrid.finish(w.gradient, level)
-    _cycles(w.gradient, PREVIEW_GRADIENT_CYCLES)
+    for _ in _cycles(w.gradient, PREVIEW_GRADIENT_CYCLES):
+        pass
 
 
-def _settle(w: Workspace, settings: TerrainSettings, pulse: LevelResult | None) -> Iterator[LevelResult]:
-    """Cycle to rest, with a ``pulse`` between cycles, then give out all levels: the finest, and its injections."""
+def _to_rest(w: Workspace, settings: TerrainSettings) -> Iterator[None]:
+    """Cycle both steps until their error is too small to see."""
+    if w.top == 0:
+        return
     quantum = grid.quantum(w.top, settings.size_m)
     span = min(settings.reach_m or settings.size_m / 4, settings.size_m / 4)
-    if w.top > 0:
-        yield from _to_rest(w.gradient, GRADIENT_SHARE * quantum / span, pulse)
-        w.guide(w.top)
-        multigrid.refresh(w.height)
-        yield from _to_rest(w.height, HEIGHT_SHARE * quantum, pulse)
-    heights = _frozen(w.read(w.top))
-    for level in range(w.top + 1):
-        step = 1 << (w.top - level)
-        yield LevelResult(level, _frozen(heights[::step, ::step]), settled=True)
+    yield from _converge(w.gradient, GRADIENT_SHARE * quantum / span)
+    w.guide(w.top)
+    multigrid.refresh(w.height)
+    yield from _converge(w.height, HEIGHT_SHARE * quantum)
 
 
-def _to_rest(system: multigrid.System, tolerance: float, pulse: LevelResult | None) -> Iterator[LevelResult]:
+def _converge(system: multigrid.System, tolerance: float) -> Iterator[None]:
     """Cycles until the estimated error is below ``tolerance``."""
     before = math.inf
     for k in range(1, MAX_CYCLES + 1):
@@ -253,8 +277,17 @@ def _to_rest(system: multigrid.System, tolerance: float, pulse: LevelResult | No
         if update * UPDATE_SHARE < tolerance or (k >= STALLED_AFTER and update > STALLED * before):
             return
         before = update
-        if pulse is not None and k % CYCLES_PER_PULSE == 0:
-            yield pulse
+        yield
+
+
+def _settled(w: Workspace, strokes: Sequence[Stroke], settings: TerrainSettings, basis: bool) -> Iterator[LevelResult]:
+    """All levels of a system at rest: the finest, and its injections."""
+    heights = _frozen(w.read(w.top))
+    for level in range(w.top):
+        step = 1 << (w.top - level)
+        yield LevelResult(level, _frozen(heights[::step, ::step]), settled=True)
+    found = Basis(tuple(strokes), settings, w.top, heights, _frozen(w.read_gradient())) if basis else None
+    yield LevelResult(w.top, heights, settled=True, basis=found)
 
 
 def _frozen(heights: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -16,6 +16,10 @@ export const MAX_LEVEL = 6 as const;
 
 export const DEFAULT_LEVEL = 4 as const;
 
+export const MAX_REFINED_LEVEL = 10 as const;
+
+export const DEFAULT_REFINED_LEVEL = 8 as const;
+
 export const QUANTA_PER_CELL = 256 as const;
 
 export const DEFAULT_SIZE_M = 4096.0 as const;
@@ -39,6 +43,16 @@ export const CHEBYSHEV_SWEEPS = 4 as const;
 export const CHEBYSHEV_LOW = 0.5 as const;
 
 export const CHEBYSHEV_HIGH = 2.0 as const;
+
+export const CHANNEL_LEVELS_BELOW = 2 as const;
+
+export const AMPLITUDE_QUANTA_PER_M = 64 as const;
+
+export const ROUGHNESS_QUANTA = 1024 as const;
+
+export const BASE_AMPLITUDE_M = 0.0 as const;
+
+export const BASE_ROUGHNESS = 0.5 as const;
 
 export const DEFAULT_SLOPE_DEG = 35.0 as const;
 
@@ -425,6 +439,7 @@ export interface Welcome {
   role: "owner" | "edit" | "view";
   colour: string;
   levels: number;
+  finest: number;
   clock: number;
   document: Document | null;
   ops: OrderedOp[] | null;

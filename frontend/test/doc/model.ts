@@ -97,6 +97,7 @@ export class ServerModel {
       role: "edit",
       colour: "#000000",
       levels: 4,
+      finest: 4,
       clock: this.doc.clock,
       document: resume ? null : toDocument(this.doc),
       ops: resume ? this.journal.filter((o) => o.clock > clock) : null,

@@ -57,6 +57,7 @@ beforeEach(() => {
     role: "edit",
     colour: "#000000",
     levels: 4,
+    finest: 4,
     clock: 0,
     document: { ...EMPTY, strokes },
     ops: null,

@@ -40,6 +40,7 @@ function open(mode: "orbit" | "map" = "orbit", over: Partial<InputOptions> = {})
     role: "edit",
     colour: "#000000",
     levels: 4,
+    finest: 4,
     clock: 0,
     document: EMPTY,
     ops: null,

@@ -79,6 +79,7 @@ function welcome(role: Role = "owner", change: Partial<Welcome> = {}): Welcome {
     role,
     colour: "#ff8000",
     levels: 4,
+    finest: 4,
     clock: 3,
     document: { id: "t", clock: 3, settings: { ...SETTINGS }, strokes: [], deleted: [] },
     ops: null,
