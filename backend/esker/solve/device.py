@@ -17,7 +17,7 @@ log = logging.getLogger(__name__)
 
 NUMPY = "numpy"
 NUMPY_NAME = "NumPy float64 (no OpenCL device)"
-SOURCES = ("rows.cl", "raster.cl", "setup.cl", "visit.cl")
+SOURCES = ("rows.cl", "section.cl", "raster.cl", "setup.cl", "visit.cl")
 _POCL_THREADS = "POCL_MAX_PTHREAD_COUNT"
 _POCL_CACHE = "POCL_KERNEL_CACHE"
 _opened: dict[str, Device] = {}
