@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import math
+import re
 import zipfile
 from pathlib import Path
 
@@ -21,6 +22,7 @@ from esker.document.archive import ArchiveError
 from esker.document.strokes import world_points
 from esker.solve import command
 from esker.solve.crest import crest_of
+from esker.solve.solver import LevelResult
 from tests.solver.scenes import SCENES, mixed
 
 DOCUMENT = Document(
@@ -181,6 +183,54 @@ def test_solve_command(tmp_path: Path, kind: str, capsys: pytest.CaptureFixture[
     assert "settled" in capsys.readouterr().err
 
 
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def walk(progress: command.Progress, cycles: int, now: list[float]) -> None:
+    """What a solve of level 2 reports, a tenth of a second a step."""
+    ground = np.zeros((2, 2), dtype=np.float32)
+    steps = [*(LevelResult(level, ground, settled=False) for level in range(3)), *[None] * cycles]
+    for result in [*steps, LevelResult(2, ground, settled=True)]:
+        now[0] += 0.1
+        progress.step(result)
+
+
+@pytest.mark.parametrize("cycles", [3, 10, 40])
+def test_progress_on_a_terminal(cycles: int) -> None:
+    """SPEC S21: one line that changes; the share rises and stays below 100 % until the end."""
+    now, stream = [0.0], Terminal()
+    progress = command.Progress(stream, 2, lambda: now[0])
+    progress.show()
+    walk(progress, cycles, now)
+    assert 0.2 < progress.share() < 1
+    progress.close("done")
+    text = stream.getvalue()
+    assert text.count("\n") == 1
+    assert text.endswith("\r\x1b[Kdone\n")
+    shares = [int(s) for s in re.findall(r"(\d+) %", text)]
+    assert shares == sorted(shares)
+    assert "rasterising" in text
+    assert "level 2 (257 x 257): settling" in text
+    assert re.search(r"about \d+\.\d s left", text)
+
+
+def test_progress_in_a_log() -> None:
+    """Plain lines: one a level, and while nothing else is said one every two seconds."""
+    now, stream = [0.0], io.StringIO()
+    progress = command.Progress(stream, 2, lambda: now[0])
+    walk(progress, 45, now)
+    progress.close("done")
+    text = stream.getvalue()
+    assert "\r" not in text
+    assert "\x1b" not in text
+    assert text.count("preview after") == 3
+    assert text.count("settling") == 2
+    assert "level 2 (257 x 257) settled after 4.9 s" not in text
+    assert "level 2 (257 x 257) settled after 4.90 s" in text
+
+
 def test_solve_command_errors(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     good, out = tmp_path / "t.json", str(tmp_path / "h.npy")
     good.write_text(DOCUMENT.model_dump_json())
@@ -190,6 +240,7 @@ def test_solve_command_errors(tmp_path: Path, capsys: pytest.CaptureFixture[str]
         ([str(tmp_path / "none.esker"), "-o", out], "No such file"),
         ([str(bad), "-o", out], "not valid"),
         ([str(good), "-o", str(tmp_path / "h.png")], "npy"),
+        ([str(good), "-o", str(tmp_path / "no" / "h.npy")], "no folder"),
         ([str(good), "-o", out, "--device", "abacus"], "abacus"),
     ):
         assert command.main(argv) == 1

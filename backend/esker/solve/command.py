@@ -3,33 +3,47 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import TextIO
 
 import numpy as np
+from numpy.typing import NDArray
 
 from esker import grid
-from esker.contract import DEFAULT_LEVEL, MAX_LEVEL, Document
+from esker.contract import DEFAULT_LEVEL, MAX_LEVEL, Channel, Document
 from esker.document import archive
-from esker.solve.device import NoDeviceError
 from esker.solve.solver import LevelResult, Solver
+
+EXPECTED_CYCLES = 10
+"""Cycles of the finest level that most scenes take from nothing to rest, both steps together: for the estimate only."""
+PLAIN_SECONDS = 2.0
+"""Where nobody watches, a line as often as this while a long level is under way."""
+BAR = 24
 
 
 def main(argv: list[str]) -> int:
     """Run the command; 0, or 1 with one sentence on standard error. Bad arguments exit with 2, like argparse."""
     options = _parser().parse_args(argv)
     try:
-        document = _read(options.terrain)
-        solver = Solver(options.device, max_level=options.level)
         if options.output.suffix != ".npy":
             raise ValueError(f"Heights are written as .npy, not as '{options.output.suffix or options.output.name}'.")
+        if not options.output.absolute().parent.is_dir():
+            raise ValueError(f"There is no folder {options.output.absolute().parent}.")
+        document = _read(options.terrain)
+        solver = Solver(options.device, max_level=options.level)
         heights = _solve(solver, document, options.level, quiet=options.quiet)
         with options.output.open("wb") as file:
             np.save(file, heights)
-    except (OSError, ValueError, NoDeviceError) as error:
-        print(f"esker solve: {error}", file=sys.stderr)
+    except (OSError, ValueError, RuntimeError, MemoryError) as error:
+        print(f"esker solve: {str(error) or type(error).__name__}", file=sys.stderr)
         return 1
+    except KeyboardInterrupt:
+        print("\nesker solve: stopped, nothing was written.", file=sys.stderr)
+        return 130
     return 0
 
 
@@ -52,20 +66,91 @@ def _read(path: Path) -> Document:
     return archive.document_from_json(data)
 
 
-def _solve(solver: Solver, document: Document, level: int, *, quiet: bool) -> np.ndarray:
-    start = time.perf_counter()
+class Progress:
+    """What a person sees while a solve runs: one line that changes on a terminal, plain lines elsewhere.
 
-    def say(text: str) -> None:
-        if not quiet:
-            print(text, file=sys.stderr)
+    ``done`` counts in cycles of the finest level: a preview of a level l costs 4^(l - top) of one. How many cycles a
+    scene takes is known only when it is at rest, so the bar slows down where more than EXPECTED_CYCLES are needed.
+    """
 
-    def progress(result: LevelResult) -> None:
-        if result.settled == (result.level == level):
-            what = "settled" if result.settled else "preview"
-            elapsed = 1e3 * (time.perf_counter() - start)
-            say(f"  level {result.level} ({grid.samples(result.level)} samples a side) {what} after {elapsed:.0f} ms")
+    def __init__(self, stream: TextIO, top: int, clock: Callable[[], float] = time.perf_counter) -> None:
+        self.stream, self.top, self.clock = stream, top, clock
+        self.live = stream.isatty()
+        self.start = self.said = self.solving = clock()
+        self.done, self.what = 0.0, "rasterising"
 
-    say(f"{len(document.strokes)} strokes on {solver.device_name}")
-    heights = solver.solve(document.strokes, document.settings, level, on_level=progress)[level]
-    say(f"heights from {heights.min():.2f} to {heights.max():.2f} m")
+    def show(self) -> None:
+        """The present state: at once on a terminal, elsewhere when it is time for a line."""
+        now = self.clock()
+        if self.live:
+            self.stream.write(f"\r\x1b[K{self._line(now)}")
+            self.stream.flush()
+        elif now - self.said >= PLAIN_SECONDS:
+            self._plain(self._line(now).strip(), now)
+
+    def step(self, result: LevelResult | None) -> None:
+        """One step of ``Solver.steps`` was made."""
+        if result is None:
+            self.done += 1
+            self.show()
+            return
+        if result.channel != Channel.HEIGHT or (result.settled and result.level < self.top):
+            return
+        now = self.clock()
+        if result.level == 0:
+            self.solving = now  # what came before was rasterising, which says nothing of the cycles
+        self.done += 0 if result.settled else 4.0 ** (result.level - self.top)
+        if not self.live:
+            state = "settled" if result.settled else "preview"
+            self._plain(f"{_name(result.level)} {state} after {now - self.start:.2f} s", now)
+        if not result.settled:
+            last = result.level == self.top
+            self.what = f"{_name(self.top)}: settling" if last else f"{_name(result.level + 1)}: preview"
+            self.show()
+
+    def close(self, text: str) -> None:
+        """The last line."""
+        self.stream.write(f"\r\x1b[K{text}\n" if self.live else f"{text}\n")
+        self.stream.flush()
+
+    def share(self) -> float:
+        """Estimated share of the work that is done, 0..1, rising and below 1."""
+        plain = self.done / EXPECTED_CYCLES
+        return plain if plain < 0.75 else 1 - 0.25 * math.exp(-4 * (plain - 0.75))
+
+    def _line(self, now: float) -> str:
+        share, elapsed = self.share(), now - self.start
+        filled = round(BAR * share)
+        left = f", about {(now - self.solving) * (1 - share) / share:.1f} s left" if share > 0.05 else ""
+        return f"[{'=' * filled}{' ' * (BAR - filled)}] {100 * share:3.0f} %  {self.what}, {elapsed:.1f} s{left}"
+
+    def _plain(self, text: str, now: float) -> None:
+        self.stream.write(f"  {text}\n")
+        self.stream.flush()
+        self.said = now
+
+
+def _name(level: int) -> str:
+    n = grid.samples(level)
+    return f"level {level} ({n} x {n})"
+
+
+def _solve(solver: Solver, document: Document, level: int, *, quiet: bool) -> NDArray[np.float32]:
+    """The settled heights of ``level``, with progress on standard error unless ``quiet``."""
+    progress = None if quiet else Progress(sys.stderr, level)
+    if progress:
+        print(f"{len(document.strokes)} strokes on {solver.device_name}", file=sys.stderr)
+        progress.show()
+    heights: NDArray[np.float32] | None = None
+    for result in solver.steps(document.strokes, document.settings, level):
+        if progress:
+            progress.step(result)
+        if result is not None and result.settled and result.level == level and result.channel == Channel.HEIGHT:
+            heights = result.heights
+    if heights is None:
+        raise RuntimeError("The solve ended before the ground was settled.")
+    if progress:
+        elapsed = progress.clock() - progress.start
+        n = len(heights)
+        progress.close(f"{n} x {n} heights from {heights.min():.2f} to {heights.max():.2f} m in {elapsed:.2f} s")
     return heights
