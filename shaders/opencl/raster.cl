@@ -3,7 +3,6 @@
 // the few segments that can be nearest somewhere in the bin, then the nearest crest point of every sample, then the
 // stroke's cross-section, whose weighted sums do not depend on the order of edits.
 #define CANDIDATES 48
-#define HALF_DIAGONAL 10.6066017f
 #define NOTHING 0x7fffffff  // the segment of a sample that has none near
 
 // Squared distance of the bin's middle to 16 segments at once.
@@ -84,12 +83,15 @@ inline void write_row(const sums_t *sum, global float *hd, global float *hf, glo
     vstore16(c.gradient_fy, 0, gf + stride);
 }
 
-// Global size (most bins of a row, rows of bins); of row by0 + j the bins windows[2 j] .. windows[2 j + 1] - 1 are done. height_d, height_f, gradient_d: one channel; gradient_f: two.
+// Global size (most bins of a row, rows of bins); of row by0 + j the bins windows[2 j] .. windows[2 j + 1] - 1 are done.
+// Tables and outputs start at bin (row0, column0) of the level. height_d, height_f, gradient_d: one channel; gradient_f:
+// two.
 kernel void rasterise(global const float *segments, int m, global const float *strokes, global const int *index,
                       global const int *row_start, global const int *row_items, global const int *span_index,
                       global const float *spans, global float *height_d, global float *height_f,
                       global float *gradient_d, global float *gradient_f, int n, int pitch, int stride, float spacing,
-                      float screening, float exit_length, int pinned, int by0, global const int *windows) {
+                      float screening, float exit_length, int pinned, int row0, int column0, int by0,
+                      global const int *windows) {
     int j = get_global_id(1), bx = windows[2 * j] + get_global_id(0), by = by0 + j;
     if (bx >= windows[2 * j + 1]) return;
     segments_t s = {m, segments};
@@ -101,7 +103,7 @@ kernel void rasterise(global const float *segments, int m, global const float *s
         sums_t none = {0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f};
         sums[y] = none;
     }
-    for (int i = row_start[by]; i < row_start[by + 1]; i++) {
+    for (int i = row_start[by - row0]; i < row_start[by - row0 + 1]; i++) {
         global const float *p = strokes + STROKE_STRIDE * row_items[i];
         global const int *at = index + INDEX_STRIDE * row_items[i];
         if (x0 > p[2] || x0 + BIN - 1 < p[1]) continue;
@@ -112,7 +114,8 @@ kernel void rasterise(global const float *segments, int m, global const float *s
             int gy = by * BIN + y;
             nearest_t near = nearest_of_row(best[y], s, x, y0 + y);
             if (at[2] >= 0 && gy < n) {
-                in = inside_row(spans, span_index[at[2] + gy], span_index[at[2] + gy + 1], x);
+                global const int *span = span_index + at[2] + gy - row0 * BIN;
+                in = inside_row(spans, span[0], span[1], x);
                 near.height = select(near.height, (float16)(segments[at[0] + 2 * (size_t)m]), in);
             }
             cross_section(sums + y, &near, in, p, spacing, 1.0f / spacing, 1.0f / exit_length);
@@ -120,7 +123,7 @@ kernel void rasterise(global const float *segments, int m, global const float *s
     }
     for (int y = 0; y < BIN; y++) {
         int gy = by * BIN + y;
-        size_t o = (size_t)gy * pitch + PAD + bx * BIN;
+        size_t o = (size_t)(gy - row0 * BIN) * pitch + PAD + (bx - column0) * BIN;
         if (gy < n)
             write_row(sums + y, height_d + o, height_f + o, gradient_d + o, gradient_f + o, bx * BIN, gy, n, stride,
                       screening, pinned);

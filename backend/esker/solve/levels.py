@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from esker import grid
 from esker.contract import CHEBYSHEV_SWEEPS, TILE_CELLS, Stroke, TerrainSettings
+from esker.solve import raster
 from esker.solve.constraints import Packer, Tables, Window
 from esker.solve.device import Device
 from esker.solve.reference import BOTTOM_LEVELS, chebyshev_weights
@@ -239,22 +240,9 @@ class ClWorkspace:
 
     def rasterise(self, tables: Tables, window: Window) -> None:
         """Constraints of the finest level inside a window of bins."""
-        put, i, f = self.launch.constant, np.int32, np.float32
-        single = (tables.segments, tables.strokes)
-        segments, strokes = (put(a.astype(np.float32)) for a in single)
-        whole = (tables.index, tables.row_start, tables.row_items, tables.span_index)
-        index, row_start, row_items, span_index = (put(a.astype(np.int32)) for a in whole)
-        spans = put(tables.spans.astype(np.float32))
-        shape = self.height.shapes[self.top]
-        h, g = self.height.fields, self.gradient.fields
-        if window.width == 0:
-            return
-        self.launch.run(
-            "rasterise", (window.width, len(window.spans)), segments, i(tables.segments.shape[1]), strokes, index,
-            row_start, row_items, span_index, spans, h["d", self.top], h["s", self.top], g["d", self.top],
-            g["f", self.top], i(shape.n), i(shape.pitch), i(shape.stride), f(tables.spacing_m), f(tables.screening),
-            f(tables.exit_length_m), i(tables.pinned), i(window.first), put(window.spans),
-        )  # fmt: skip
+        shape, h, g = self.height.shapes[self.top], self.height.fields, self.gradient.fields
+        fields = (h["d", self.top], h["s", self.top], g["d", self.top], g["f", self.top])
+        raster.rasterise(self.launch, tables, window, raster.Target(*fields, pitch=shape.pitch, stride=shape.stride))
 
     def guide(self, level: int) -> None:
         """f of the height step at ``level`` from u of the gradient step."""

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from esker.contract import CREST_STIFFNESS, SPRING_CELLS, SPRING_FULL_FRACTION
-from esker.solve.constraints import (
+from esker.solve.tables import (
     BIN,
     CREST_HALF_WIDTH,
     EXIT_SHARE,
@@ -17,7 +18,6 @@ from esker.solve.constraints import (
     THINNEST_M,
     TOE,
     Tables,
-    bins,
 )
 
 Floats = NDArray[np.float64]
@@ -29,11 +29,11 @@ _TINY = 1e-20
 
 @dataclass(frozen=True)
 class Constraints:
-    """What the strokes say at one level; every array float64, (N, N) or (2, N, N), row 0 south.
+    """What the strokes say in a box of a level (all of it or a window).
 
-    height_d: spring stiffness, HARD where fixed. height_f: stiffness times target (plus what the screening must give
-    back), or the fixed height. gradient_d: stiffness for both gradient components. gradient_f: stiffness times
-    target (d/dx, d/dy), metres per metre.
+    Every array float64, (rows, columns) or (2, rows, columns), row 0 south. height_d: spring stiffness, HARD where
+    fixed. height_f: stiffness times target (plus what the screening must give back), or the fixed height. gradient_d:
+    stiffness for both gradient components. gradient_f: stiffness times target (d/dx, d/dy), metres per metre.
     """
 
     height_d: Floats
@@ -145,21 +145,22 @@ def cross_section(near: _Nearest, inside: NDArray[np.bool_], params: Floats, tab
 
 
 def rasterise(tables: Tables) -> Constraints:
-    """The constraints of a level."""
-    n = tables.samples
-    size = bins(n) * BIN
-    total = {name: np.zeros((size, size)) for name in ("w", "wt", "wa", "fade", "held", "g", "gx", "gy", "toe", "hard")}
+    """The constraints of the samples of the tables' box, shape ``tables.shape``."""
+    by0, by1, bx0, bx1 = tables.box
+    size = (by1 - by0) * BIN, (bx1 - bx0) * BIN
+    total = {name: np.zeros(size) for name in ("w", "wt", "wa", "fade", "held", "g", "gx", "gy", "toe", "hard")}
     for k in range(len(tables.index)):
         _add_stroke(tables, k, total)
-    total = {name: a[:n, :n] for name, a in total.items()}
+    rows, columns = tables.shape
+    total = {name: a[:rows, :columns] for name, a in total.items()}
     w = np.maximum(total["w"], _TINY)
     target, stiffness = total["wt"] / w, total["wa"] / w * total["fade"]
     hard = total["hard"] > 0
     height_d = np.where(hard, HARD, stiffness)
     height_f = np.where(hard, target, (stiffness + tables.screening * total["held"]) * target)
     if tables.pinned:
-        edge = np.ones((n, n), dtype=bool)
-        edge[1:-1, 1:-1] = False
+        y, x = (o + np.arange(count) for o, count in zip(tables.origin, tables.shape, strict=True))
+        edge = ((y == 0) | (y == tables.samples - 1))[:, None] | (x == 0) | (x == tables.samples - 1)
         height_d, height_f = np.where(edge, HARD, height_d), np.where(edge, 0.0, height_f)
     gradient_d = CREST_STIFFNESS * total["toe"]
     g = np.maximum(total["g"], _TINY)
@@ -170,11 +171,12 @@ def rasterise(tables: Tables) -> Constraints:
 
 def _add_stroke(tables: Tables, k: int, total: dict[str, Floats]) -> None:
     """One stroke's share in every sample that it can reach."""
-    count = bins(tables.samples)
+    by0, by1, bx0, bx1 = tables.box
     params, (first, number, span) = tables.strokes[k], tables.index[k, :3]
     segments = tables.segments[:, first : first + number]
-    bx = np.arange(max(0, int(params[1]) // BIN), min(count - 1, int(np.ceil(params[2])) // BIN) + 1)
-    rows = [b for b in range(count) if k in tables.row_items[tables.row_start[b] : tables.row_start[b + 1]]]
+    bx = np.arange(max(bx0, int(params[1]) // BIN), min(bx1 - 1, int(np.ceil(params[2])) // BIN) + 1)
+    items, start = tables.row_items, tables.row_start
+    rows = [by0 + b for b in range(by1 - by0) if k in items[start[b] : start[b + 1]]]
     if len(bx) == 0 or not rows:
         return
     gy, gx = (a.ravel() for a in np.meshgrid(rows, bx, indexing="ij"))
@@ -188,18 +190,18 @@ def _add_stroke(tables: Tables, k: int, total: dict[str, Floats]) -> None:
         setattr(near, name, np.where(inside, 0.0, getattr(near, name)))
     band = cross_section(near, inside, params, tables)
     reached = inside | (near.d2 <= params[3] ** 2)
-    hard = band.hard & reached
+    _accumulate(total, (y - by0 * BIN, x - bx0 * BIN), band, reached)
+
+
+def _accumulate(total: dict[str, Floats], at: tuple[Any, Any], band: _Band, reached: NDArray[np.bool_]) -> None:
+    """Adds a stroke's weights and weighted wishes to the sums at samples."""
     w, g = np.where(reached, band.weight, 0.0), np.where(reached, band.toe_weight, 0.0)
-    total["w"][y, x] += w
-    total["wt"][y, x] += w * band.target
-    total["wa"][y, x] += w * band.stiffness
-    total["fade"][y, x] = np.maximum(total["fade"][y, x], np.where(reached, band.fade, 0.0))
-    total["held"][y, x] = np.maximum(total["held"][y, x], np.where(reached, band.held, 0.0))
-    total["g"][y, x] += g
-    total["gx"][y, x] += g * band.gx
-    total["gy"][y, x] += g * band.gy
-    total["toe"][y, x] = np.maximum(total["toe"][y, x], np.where(reached, band.toe_fade, 0.0))
-    total["hard"][y, x] = np.maximum(total["hard"][y, x], hard)
+    for name, value in (("w", w), ("wt", w * band.target), ("wa", w * band.stiffness)):
+        total[name][at] += value
+    for name, value in (("g", g), ("gx", g * band.gx), ("gy", g * band.gy)):
+        total[name][at] += value
+    for name, value in (("fade", band.fade), ("held", band.held), ("toe", band.toe_fade), ("hard", band.hard)):
+        total[name][at] = np.maximum(total[name][at], np.where(reached, value, 0.0))
 
 
 def _nearest(segments: Floats, x: Floats, y: Floats, reach: float) -> _Nearest:
@@ -246,11 +248,12 @@ def _update(out: _Nearest, seg: Floats, x: Floats, y: Floats, blocks: NDArray[np
 
 def _inside(tables: Tables, span: int, x: NDArray[np.int_], y: NDArray[np.int_]) -> NDArray[np.bool_]:
     out = np.zeros(x.shape, dtype=bool)
-    index = tables.span_index[span : span + tables.samples + 1]
+    row0 = tables.box[0] * BIN
+    index = tables.span_index[span : span + (tables.box[1] - tables.box[0]) * BIN + 1]
     for block in range(len(x)):
         for row in range(BIN):
-            at = y[block, row, 0]
-            if at < tables.samples:
+            at = y[block, row, 0] - row0
+            if y[block, row, 0] < tables.samples:
                 for x0, x1 in tables.spans[index[at] : index[at + 1]]:
                     out[block, row] |= (x[block, row] >= x0) & (x[block, row] <= x1)
     return out
