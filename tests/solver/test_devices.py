@@ -11,7 +11,8 @@ import pytest
 
 from esker import grid
 from esker.solve import device, pocl_cpu
-from esker.solve.device import NoDeviceError, open_device
+from esker.solve.device import open_device
+from esker.solve.faults import NoDeviceError
 from esker.solve.solver import Solver
 from tests.solver.scenes import ENDLESS, PINNED, SCENES, SETTINGS, SIZE
 

@@ -1,42 +1,55 @@
-"""Choosing and opening the OpenCL device (DESIGN 5, 8, 16). Nothing here runs at import."""
+"""Choosing and opening the OpenCL device (DESIGN 5, 8, 16). Nothing here runs at import.
+
+Two sets of kernels do the same: row-wise ones for CPUs (rows.cl and what follows it), tiles in local memory for GPUs
+(gpu_*.cl). The kind of the device chooses; ESKER_KERNELS=rows or tiles overrides. See docs/decisions/0013-devices.md.
+"""
 
 from __future__ import annotations
 
 import logging
 import os
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, cast
 
 from esker.contract import CHEBYSHEV_SWEEPS, SATURATION
-from esker.solve import constraints, pocl_cpu, reference
+from esker.solve import gpu_program, pocl_cpu, reference, tables
+from esker.solve.faults import BuildError, NoDeviceError, build_error, finished
 
 log = logging.getLogger(__name__)
 
 NUMPY = "numpy"
 NUMPY_NAME = "NumPy float64 (no OpenCL device)"
 SOURCES = ("rows.cl", "section.cl", "raster.cl", "setup.cl", "visit.cl")
+Kernels = Literal["rows", "tiles"]
+_KERNELS = "ESKER_KERNELS"
 _POCL_THREADS = "POCL_MAX_PTHREAD_COUNT"
 _POCL_CACHE = "POCL_KERNEL_CACHE"
 _opened: dict[str, Device] = {}
 """Devices of this process by name: a program is compiled once."""
 
 
-class NoDeviceError(RuntimeError):
-    """The device that was asked for is not there; the message lists what is."""
-
-
 @dataclass(frozen=True)
 class Device:
-    """An opened device: its context, an in-order queue, the built program and how many strips keep it busy."""
+    """An opened device: its context, an in-order queue, the built program and how many strips keep it busy.
+
+    ``plan``: the tiles that a GPU's kernels were compiled for; None with row-wise kernels. ``memory`` and
+    ``largest``: bytes of global memory and of one buffer, 0 where unknown. ``forget`` makes the next opening of this
+    device a fresh one.
+    """
 
     name: str
     context: Any
     queue: Any
     program: Any
     strips: int
+    plan: gpu_program.Plan | None = None
+    memory: int = 0
+    largest: int = 0
+    forget: Callable[[], None] | None = None
 
 
 def default_threads() -> int:
@@ -44,19 +57,20 @@ def default_threads() -> int:
     return max(1, (os.cpu_count() or 1) - 1)
 
 
-def open_device(wanted: str | None = None, threads: int | None = None) -> Device | None:
+def open_device(
+    wanted: str | None = None, threads: int | None = None, check: Callable[[Device], None] | None = None
+) -> Device | None:
     """The device whose platform or device name contains ``wanted`` (any case); None: the best there is.
 
     Returns None for "numpy", and, when nothing was asked for, where no OpenCL works. Raises NoDeviceError when the
-    wanted one is missing. ``threads`` counts for PoCL only, and only for the first device opened in a process.
+    wanted one is missing or does not work. ``threads`` counts for PoCL only, and only for the first device opened in a
+    process. ``check`` is called once with a device that was just opened, and raises when its results are wrong.
     """
     if wanted is not None and wanted.lower() == NUMPY:
         return None
-    os.environ.setdefault(_POCL_THREADS, str(threads or default_threads()))
-    if not pocl_cpu.cache_works():
-        os.environ.setdefault(_POCL_CACHE, "0")
+    _asked_kernels()
     try:
-        found = _devices()
+        found = _found(threads)
     except Exception as error:
         if wanted:
             raise NoDeviceError(f"No OpenCL on this machine ({error}). Use --device numpy.") from error
@@ -67,7 +81,7 @@ def open_device(wanted: str | None = None, threads: int | None = None) -> Device
     for name, d in found:
         try:
             if name not in _opened:
-                _opened[name] = _open(name, d)
+                _opened[name] = _checked(_open(name, d), check)
             return _opened[name]
         except Exception as error:
             log.warning("OpenCL device %s does not work: %s", name, error)
@@ -76,26 +90,81 @@ def open_device(wanted: str | None = None, threads: int | None = None) -> Device
     return None
 
 
+def candidates(threads: int | None = None) -> list[str]:
+    """Names for ``open_device`` in order of preference, each one device; last always "numpy", which cannot fail."""
+    try:
+        return [*(name for name, _ in _found(threads)), NUMPY]
+    except Exception as error:
+        log.debug("no OpenCL: %s", error)
+        return [NUMPY]
+
+
+def _checked(device: Device, check: Callable[[Device], None] | None) -> Device:
+    if check is not None:
+        finished(device, lambda: check(device))
+    return device
+
+
 def _missing(wanted: str, found: list[tuple[str, Any]]) -> list[tuple[str, Any]]:
     there = ", ".join(name for name, _ in found) or "none"
     raise NoDeviceError(f"No OpenCL device is called like '{wanted}'. There are: {there}; or use 'numpy'.")
 
 
+def _found(threads: int | None) -> list[tuple[str, Any]]:
+    """``_devices`` with PoCL set up; a second device of the same name has its number behind it."""
+    os.environ.setdefault(_POCL_THREADS, str(threads or default_threads()))
+    if not pocl_cpu.cache_works():
+        os.environ.setdefault(_POCL_CACHE, "0")
+    names: dict[str, int] = {}
+    out = []
+    for name, d in _devices():
+        names[name] = names.get(name, 0) + 1
+        out.append((name if names[name] == 1 else f"{name} #{names[name]}", d))
+    return out
+
+
 def _devices() -> list[tuple[str, Any]]:
-    """(name, device), CPUs first: the kernels work row by row, which suits them; a GPU is taken when asked for."""
+    """(name, device), best first (``_rank``)."""
     import pyopencl as cl
 
-    out = [(_describe(p, d), d) for p in cl.get_platforms() for d in p.get_devices()]
-    if not out:
+    pairs = [(p, d) for p in cl.get_platforms() for d in p.get_devices()]
+    if not pairs:
         raise RuntimeError("no platform has a device")
-    return sorted(out, key=lambda pair: 0 if pair[1].type & cl.device_type.CPU else 1)
+    return [(_describe(p, d), d) for p, d in sorted(pairs, key=lambda pair: _rank(pair[1]))]
+
+
+def _rank(device: Any) -> int:
+    """GPUs with memory of their own, then CPUs, then what shares the CPU's memory (and its bandwidth), then others."""
+    import pyopencl as cl
+
+    if device.type & cl.device_type.GPU:
+        return 2 if device.host_unified_memory else 0
+    return 1 if device.type & cl.device_type.CPU else 3
+
+
+def kernels_for(device: Any) -> Kernels:
+    """Which kernels a pyopencl device gets: tiles for all but CPUs, if they fit it, unless ESKER_KERNELS says."""
+    import pyopencl as cl
+
+    wanted = _asked_kernels() or ("rows" if device.type & cl.device_type.CPU else "tiles")
+    if wanted == "tiles" and gpu_program.plan_of(device) is None:
+        log.warning("%s has too little local memory for tile kernels: row kernels.", device.name.strip())
+        return "rows"
+    return cast(Kernels, wanted)
+
+
+def _asked_kernels() -> str:
+    asked = os.environ.get(_KERNELS, "").lower()
+    if asked not in {"", "rows", "tiles"}:
+        raise NoDeviceError(f"{_KERNELS} must be 'rows' or 'tiles', not '{asked}'.")
+    return asked
 
 
 def _describe(platform: Any, device: Any) -> str:
-    units = device.max_compute_units
+    units, kernels = device.max_compute_units, f"{kernels_for(device)[:-1]} kernels"
     if "portable computing language" in platform.name.lower():
-        return f"PoCL {device.name.strip()} ({units} thread{'s' if units != 1 else ''})"
-    return f"{platform.name.strip()} {device.name.strip()}"
+        return f"PoCL {device.name.strip()} ({units} thread{'s' if units != 1 else ''}, {kernels})"
+    return f"{platform.name.strip()} {device.name.strip()} ({kernels})"
 
 
 def shader_folder() -> Path:
@@ -104,22 +173,29 @@ def shader_folder() -> Path:
 
 
 @lru_cache(maxsize=1)
-def _source() -> str:
-    return "\n".join((shader_folder() / name).read_text(encoding="utf-8") for name in SOURCES)
+def _files() -> dict[str, str]:
+    return {path.name: path.read_text(encoding="utf-8") for path in sorted(shader_folder().glob("*.cl"))}
+
+
+def _source(plan: gpu_program.Plan | None) -> str:
+    if plan is not None:
+        return _defines(gpu_program.defines(plan)) + gpu_program.source(plan, _files())
+    return _defines({}) + "\n".join(_files()[name] for name in SOURCES)
 
 
 def _literal(value: float | int) -> str:
     return f"{value!r}f" if isinstance(value, float) else str(value)
 
 
-def _defines() -> str:
+def _defines(more: dict[str, float | int]) -> str:
     values: dict[str, float | int] = {
-        **constraints.defines(),
+        **tables.defines(),
         "SATURATION": SATURATION,
         "CHEBYSHEV_SWEEPS": CHEBYSHEV_SWEEPS,
         "BOTTOM_LEVELS": reference.BOTTOM_LEVELS,
         "COARSEST_SWEEPS": reference.COARSEST_SWEEPS,
         "COARSEST_RELAXATION": reference.COARSEST_RELAXATION,
+        **more,
     }
     return "".join(f"#define {name} {_literal(value)}\n" for name, value in values.items())
 
@@ -128,28 +204,45 @@ def _open(name: str, device: Any) -> Device:
     import pyopencl as cl
 
     context = cl.Context([device])
-    try:
-        program = _build(context)
-    except cl.RuntimeError as error:
-        if pocl_cpu.COMPLAINT not in str(error):
-            raise
-        cpu = pocl_cpu.name_cpu(device.int_ptr)
-        log.info("PoCL does not know this processor: compiling for %s.", cpu)
-        program = _build(context)
+    plan = gpu_program.plan_of(device) if kernels_for(device) == "tiles" else None
+    program = _build(name, device, context, plan)
     units = int(device.max_compute_units)
-    return Device(name, context, cl.CommandQueue(context), program, units if units == 1 else 2 * units)
+    return Device(
+        name, context, cl.CommandQueue(context), program, units if units == 1 else 2 * units, plan,
+        int(device.global_mem_size), int(device.max_mem_alloc_size), lambda: _forget(name),
+    )  # fmt: skip
 
 
-def _build(context: Any) -> Any:
-    program = _compile(context, _defines() + _source())
+def _forget(name: str) -> None:
+    _opened.pop(name, None)
+
+
+def _build(name: str, device: Any, context: Any, plan: gpu_program.Plan | None) -> Any:
+    """The program; raises BuildError."""
+    import pyopencl as cl
+
+    source = _source(plan)
+    try:
+        try:
+            program = _compile(context, source, plan)
+        except cl.RuntimeError as error:
+            if pocl_cpu.COMPLAINT not in str(error):
+                raise
+            cpu = pocl_cpu.name_cpu(device.int_ptr)
+            log.info("PoCL does not know this processor: compiling for %s.", cpu)
+            program = _compile(context, source, plan)
+    except cl.Error as error:
+        log.debug("%s: %s", name, error)
+        raise build_error(error, name) from error
     if "rasterise" not in program.kernel_names:
-        raise RuntimeError("the compiler returned a program without kernels")
+        raise BuildError(f"{name}: the compiler returned a program without kernels.", name)
     return program
 
 
-def _compile(context: Any, source: str) -> Any:
+def _compile(context: Any, source: str, plan: gpu_program.Plan | None) -> Any:
     import pyopencl as cl
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", cl.CompilerWarning)
-        return cl.Program(context, source).build(["-cl-mad-enable"])
+        # tiles say themselves where they want fma, so that all of them round alike
+        return cl.Program(context, source).build(["-cl-mad-enable"] if plan is None else [])

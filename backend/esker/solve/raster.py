@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from esker.solve.tables import Tables, Window
 
-if TYPE_CHECKING:
-    from esker.solve.levels import Launcher
+
+class Launcher(Protocol):
+    """A queue: ``levels.Launcher`` with one work-item a bin, or that of ``gpu_levels`` with one a sample."""
+
+    def constant(self, array: NDArray[Any]) -> Any: ...
+    def run(self, name: str, size: tuple[int, ...], *args: Any) -> None: ...
 
 
 @dataclass(frozen=True)

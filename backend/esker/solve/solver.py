@@ -24,8 +24,7 @@ from esker.contract import MAX_LEVEL, Channel, Stroke, TerrainSettings
 from esker.solve import multigrid
 from esker.solve.constraints import Packer
 from esker.solve.device import NUMPY_NAME, Device, open_device
-from esker.solve.levels import ClWorkspace
-from esker.solve.reference import NumpyWorkspace
+from esker.solve.workspaces import new_workspace
 
 PREVIEW_GRADIENT_CYCLES = 1
 PREVIEW_HEIGHT_CYCLES = 2
@@ -217,7 +216,7 @@ class Solver:
             return best
         if not room and self._spare:
             self._spare.pop(0)
-        return NumpyWorkspace(top) if self._device is None else ClWorkspace(self._device, top)
+        return new_workspace(self._device, top)
 
     def _give(self, workspace: Workspace) -> None:
         self._spare.append(workspace)

@@ -1,0 +1,300 @@
+"""Levels on a GPU: memory, kernel launches, reading back (DESIGN 5.3). State that can be rebuilt.
+
+Layout (shaders/opencl/gpu_level.cl): a level is n rows of ``pitch`` floats, a multiple of 32, sample 0 first; channels
+lie behind each other. Level 0's buffers also hold the levels below it, which the bottom kernels alone touch.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from esker import grid
+from esker.contract import TILE_CELLS, Stroke, TerrainSettings
+from esker.solve import raster
+from esker.solve.constraints import Packer
+from esker.solve.device import Device
+from esker.solve.gpu_program import CHANGE_ITEMS, Plan
+from esker.solve.reference import BOTTOM_LEVELS, chebyshev_weights
+from esker.solve.tables import BIN, Tables, Window
+
+LINE = 32
+"""Floats of a cache line."""
+BLOCK = (32, 8)
+"""Work-group of the kernels that do one sample a work-item."""
+CHANGE_GROUPS = 512
+"""At most so many partial results of ``change`` are left to the host."""
+
+
+@dataclass(frozen=True)
+class Shape:
+    """One level's layout; ``stride`` floats from one channel to the next."""
+
+    level: int
+    n: int
+    pitch: int
+    stride: int
+
+
+def _lines(floats: int) -> int:
+    return -(-floats // LINE) * LINE
+
+
+def bottom_table() -> tuple[NDArray[np.int32], int]:
+    """(offset, n, pitch, 0) of levels 0, -1, ... and the stride of a channel that holds them all."""
+    rows, at = [], 0
+    for k in range(BOTTOM_LEVELS + 1):
+        n = (TILE_CELLS >> k) + 1
+        rows.append((at, n, _lines(n), 0))
+        at += n * _lines(n)
+    return np.array(rows, dtype=np.int32), at
+
+
+def shape_of(level: int) -> Shape:
+    """Layout of a level."""
+    n = grid.samples(level)
+    return Shape(level, n, _lines(n), bottom_table()[1] if level == 0 else n * _lines(n))
+
+
+def fields_of(top: int, static: str) -> list[tuple[str, int]]:
+    """Name and level of every field of a system (``multigrid``); ``static`` names the static part of f."""
+    out = []
+    for level in range(top + 1):
+        inner = set() if level == top and top > 0 else {"b", "e", "t"}
+        out += [(name, level) for name in sorted({"d", "f", "u", "v", static} | inner)]
+    return out
+
+
+class GpuLauncher:
+    """A queue with its kernels and constant tables. Arguments of a launch that comes again are set only once."""
+
+    def __init__(self, device: Device) -> None:
+        import pyopencl as cl
+
+        assert device.plan is not None, "opened for row-wise kernels"
+        self.cl, self.device, self.queue = cl, device, device.queue
+        self.plan: Plan = device.plan
+        self.bound: dict[tuple[Any, ...], Any] = {}
+        self.launches = 0
+        self.weights = self.constant(chebyshev_weights().astype(np.float32))
+        self.table = self.constant(bottom_table()[0])
+        self.partial = self.zeros(CHANGE_GROUPS)
+
+    def zeros(self, floats: int) -> Any:
+        """A new buffer of zeros."""
+        buffer = self.cl.Buffer(self.device.context, self.cl.mem_flags.READ_WRITE, size=4 * max(floats, 1))
+        self.cl.enqueue_fill_buffer(self.queue, buffer, np.zeros(1, dtype=np.float32), 0, buffer.size)
+        return buffer
+
+    def constant(self, array: NDArray[Any]) -> Any:
+        """A read-only copy of a host array (one zero when it is empty)."""
+        host = np.ascontiguousarray(array) if array.size else np.zeros(1, dtype=array.dtype)
+        flags = self.cl.mem_flags.READ_ONLY | self.cl.mem_flags.COPY_HOST_PTR
+        return self.cl.Buffer(self.device.context, flags, hostbuf=host)
+
+    def run(self, name: str, groups: tuple[int, ...], block: tuple[int, ...], *args: Any) -> None:
+        """Enqueue ``groups`` work-groups of ``block`` work-items, with arguments that live as long as the launcher."""
+        key = (name, groups, args)
+        kernel = self.bound.get(key)
+        if kernel is None:
+            kernel = self.bound[key] = self._kernel(name, args)
+        self._enqueue(kernel, groups, block)
+
+    def run_once(self, name: str, groups: tuple[int, ...], block: tuple[int, ...], *args: Any) -> None:
+        """The same with arguments that will not come again."""
+        self._enqueue(self._kernel(name, args), groups, block)
+
+    def _kernel(self, name: str, args: tuple[Any, ...]) -> Any:
+        kernel = self.cl.Kernel(self.device.program, name)
+        kernel.set_args(*args)
+        return kernel
+
+    def _enqueue(self, kernel: Any, groups: tuple[int, ...], block: tuple[int, ...]) -> None:
+        self.launches += 1
+        size = tuple(g * b for g, b in zip(groups, block, strict=True))
+        self.cl.enqueue_nd_range_kernel(self.queue, kernel, size, block)
+
+
+def _blocks(columns: int, rows: int) -> tuple[int, int]:
+    return -(-columns // BLOCK[0]), -(-rows // BLOCK[1])
+
+
+class GpuSystem:
+    """``multigrid.System`` on a GPU. Fields and their meaning: see there; ``static`` names the static part of f."""
+
+    def __init__(self, launcher: GpuLauncher, top: int, channels: int, static: str) -> None:
+        self.top, self.channels, self.static = top, channels, static
+        self.launch = launcher
+        self.shapes = {level: shape_of(level) for level in range(top + 1)}
+        self.eps = dict.fromkeys(range(top + 1), 0.0)
+        self.fields: dict[tuple[str, int], Any] = {
+            (name, level): launcher.zeros(self.shapes[level].stride * (1 if name == "d" else channels))
+            for name, level in fields_of(top, static)
+        }
+        coarsest = ((TILE_CELLS >> BOTTOM_LEVELS) + 1) ** 2
+        self.matrix = launcher.zeros(coarsest * coarsest)
+
+    def _layout(self, level: int) -> tuple[np.int32, ...]:
+        """n, pitch, stride, and pitch and stride of the next coarser level."""
+        fine, under = self.shapes[level], self.shapes[max(level - 1, 0)]
+        return tuple(np.int32(k) for k in (fine.n, fine.pitch, fine.stride, under.pitch, under.stride))
+
+    def coarsen(self, screening: float, rows: tuple[int, int] | None = None) -> None:
+        """Constraints of all coarser levels from those of the top, of which only ``rows`` (half open) changed."""
+        i, launch = np.int32, self.launch
+        self.eps = {level: screening * 4.0 ** (self.top - level) for level in self.shapes}
+        first, last = rows or (0, self.shapes[self.top].n)
+        for level in range(self.top, 0, -1):
+            under = self.shapes[level - 1]
+            first, last = max(0, (first - 1) // 2), min(under.n, last // 2 + 1)
+            fields = (("d", level), (self.static, level), ("d", level - 1), (self.static, level - 1))
+            launch.run_once(
+                "coarsen", _blocks(under.n, last - first), BLOCK, *(self.fields[k] for k in fields),
+                *self._layout(level), i(self.channels), i(first), i(last),
+            )  # fmt: skip
+        launch.run_once(
+            "coarsen_bottom", (1,), (launch.plan.bottom_items,), self.fields["d", 0], self.fields[self.static, 0],
+            self.matrix, launch.table, i(self.channels), i(self.shapes[0].stride), np.float32(self.eps[0]),
+        )  # fmt: skip
+
+    def visit(
+        self, level: int, *, rhs: str, out: str, guess: str | None, correction: str | None, residual: bool
+    ) -> None:
+        """See ``multigrid.System``."""
+        n = self.shapes[level].n
+        tile = self.launch.plan.tile(self.channels, n)
+        self.launch.run(
+            tile.kernel(self.channels), tile.groups(n), (tile.width, tile.strips),
+            self.fields[guess, level] if guess else None, self.fields[correction, level - 1] if correction else None,
+            self.fields[rhs, level], self.fields["d", level], self.fields[out, level],
+            self.fields["b", level - 1] if residual else None, *self._layout(level), np.float32(self.eps[level]),
+            self.launch.weights,
+        )  # fmt: skip
+
+    def restrict(self, level: int) -> None:
+        """See ``multigrid.System``."""
+        across, along = _blocks(self.shapes[level - 1].n, self.shapes[level - 1].n)
+        self.launch.run(
+            "restriction", (across, along, self.channels), (*BLOCK, 1), self.fields["b", level],
+            self.fields["b", level - 1], *self._layout(level),
+        )  # fmt: skip
+
+    def bottom(self, *, rhs: str, out: str, cycles: int) -> None:
+        """See ``multigrid.System``."""
+        self.launch.run(
+            "bottom", (self.channels,), (self.launch.plan.bottom_items,), self.fields[rhs, 0], self.fields["d", 0],
+            self.fields[out, 0], self.matrix, self.launch.table, np.int32(self.shapes[0].stride),
+            np.float32(self.eps[0]), self.launch.weights, np.int32(cycles),
+        )  # fmt: skip
+
+    def swap(self, level: int) -> None:
+        """See ``multigrid.System``."""
+        self.fields["u", level], self.fields["v", level] = self.fields["v", level], self.fields["u", level]
+
+    def change(self, old: str, new: str) -> float:
+        """See ``multigrid.System``."""
+        shape = self.shapes[self.top]
+        groups = min(CHANGE_GROUPS, shape.n * self.channels)
+        self.launch.run(
+            "change", (groups,), (CHANGE_ITEMS,), self.fields[old, self.top], self.fields[new, self.top],
+            self.launch.partial, np.int32(shape.n), np.int32(shape.pitch), np.int32(shape.stride),
+            np.int32(self.channels),
+        )  # fmt: skip
+        out = np.empty(groups, dtype=np.float32)
+        self.launch.cl.enqueue_copy(self.launch.queue, out, self.launch.partial)
+        return float(out.max())
+
+    def get(self, name: str, level: int) -> NDArray[np.float32]:
+        """A field as (channels, n, n); d has one channel."""
+        shape = self.shapes[level]
+        channels = 1 if name == "d" else self.channels
+        out = np.empty((channels, shape.n, shape.n), dtype=np.float32)
+        for c in range(channels):
+            self.launch.cl.enqueue_copy(self.launch.queue, out[c], self.fields[name, level], **_window(shape, c))
+        return out
+
+    def put(self, name: str, level: int, value: NDArray[Any]) -> None:
+        """Set a field from (channels, n, n)."""
+        for c, channel in enumerate(value):
+            host = np.ascontiguousarray(channel, dtype=np.float32)
+            field = self.fields[name, level]
+            self.launch.cl.enqueue_copy(self.launch.queue, field, host, **_window(self.shapes[level], c))
+
+
+def _window(shape: Shape, channel: int) -> dict[str, Any]:
+    """A channel's samples, without padding, for a rectangular copy."""
+    return {
+        "host_pitches": (4 * shape.n,),
+        "host_origin": (0, 0),
+        "region": (4 * shape.n, shape.n),
+        "buffer_pitches": (4 * shape.pitch,),
+        "buffer_origin": (4 * channel * shape.stride, 0),
+    }
+
+
+class _Bins:
+    """What ``raster.rasterise`` launches with: a work-group of one work-item a sample for every bin."""
+
+    def __init__(self, launch: GpuLauncher) -> None:
+        self.launch = launch
+
+    def constant(self, array: NDArray[Any]) -> Any:
+        return self.launch.constant(array)
+
+    def run(self, name: str, size: tuple[int, ...], *args: Any) -> None:
+        self.launch.run_once(name, size, (BIN, BIN), *args)
+
+
+class GpuWorkspace:
+    """``solver.Workspace`` on a GPU."""
+
+    def __init__(self, device: Device, top: int) -> None:
+        self.top = top
+        self.launch = GpuLauncher(device)
+        self.gradient = GpuSystem(self.launch, top, 2, "f")
+        self.height = GpuSystem(self.launch, top, 1, "s")
+        self.packer = Packer(top)
+        self.size_m = 1.0
+
+    def load(self, strokes: Sequence[Stroke], settings: TerrainSettings) -> None:
+        """Rasterise what changed since the last set, and coarsen."""
+        tables, window = self.packer.pack(strokes, settings)
+        self.size_m = tables.size_m
+        if window is None:
+            return
+        self.rasterise(tables, window)
+        self.gradient.coarsen(tables.screening, window.sample_rows)
+        self.height.coarsen(tables.screening, window.sample_rows)
+
+    def warm(self, heights: NDArray[np.float32]) -> None:
+        """Start the height step from these heights of the finest level instead of from coarser levels."""
+        fixed = self.height.get("d", self.top) < 0
+        self.height.put("u", self.top, np.where(fixed, self.height.get("s", self.top), heights[None]))
+
+    def rasterise(self, tables: Tables, window: Window) -> None:
+        """Constraints of the finest level inside a window of bins."""
+        shape, h, g = self.height.shapes[self.top], self.height.fields, self.gradient.fields
+        fields = (h["d", self.top], h["s", self.top], g["d", self.top], g["f", self.top])
+        target = raster.Target(*fields, shape.pitch, shape.stride)
+        raster.rasterise(_Bins(self.launch), tables, window, target)
+
+    def guide(self, level: int) -> None:
+        """f of the height step at ``level`` from u of the gradient step."""
+        i, shape, h = np.int32, self.height.shapes[level], self.height.fields
+        self.launch.run(
+            "divergence", _blocks(shape.n, shape.n), BLOCK, h["s", level], h["d", level],
+            self.gradient.fields["u", level], h["f", level], i(shape.n), i(shape.pitch), i(shape.stride),
+            np.float32(grid.spacing(level, self.size_m)),
+        )  # fmt: skip
+
+    def read(self, level: int) -> NDArray[np.float32]:
+        """Heights of a level, metres."""
+        return np.asarray(self.height.get("u", level)[0])
+
+    def read_gradient(self) -> NDArray[np.float32]:
+        """Both gradient components of the finest level, (2, n, n), metres per metre."""
+        return self.gradient.get("u", self.top)

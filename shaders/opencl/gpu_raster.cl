@@ -1,0 +1,88 @@
+// Strokes to the constraints of one level on a GPU (DESIGN 5.2, 5.5); after section.cl, scalar. Twin:
+// backend/esker/solve/reference_raster.py. A work-group of 16 x 16 does one bin: together its work-items find the least
+// distance of a stroke to the bin's middle and mark the segments that can be nearest somewhere in the bin, a bit each, so
+// that every one then tries them in the order of the table, whichever work-item found them: ties fall as on a CPU.
+#define NOTHING 0x7fffffff  // the segment of a sample that has none near
+#define BIN_ITEMS (BIN * BIN)
+
+// Squared distance of a point to a segment.
+inline float distance2(segments_t s, int at, float x, float y) {
+    global const float *t = s.table + at;
+    size_t m = s.m;
+    float dx = t[3 * m], dy = t[4 * m], u = clamp(((x - t[0]) * dx + (y - t[m]) * dy) * t[6 * m], 0.0f, 1.0f);
+    float rx = x - (t[0] + u * dx), ry = y - (t[m] + u * dy);
+    return rx * rx + ry * ry;
+}
+
+// Nearest segment of this work-item's sample; false when the stroke cannot reach the bin. least and marks are the
+// work-group's; floats above zero compare like their bits.
+inline int nearest_in_bin(int *best, segments_t s, int first, int count, float reach, float x, float y, float cx, float cy,
+                          local int *least_bits, local uint *marks) {
+    int lid = get_local_id(1) * BIN + get_local_id(0);
+    float best2 = 1e30f, mine = 1e30f;
+    *best = NOTHING;
+    barrier(CLK_LOCAL_MEM_FENCE);
+    if (lid == 0) *least_bits = as_int(1e30f);
+    barrier(CLK_LOCAL_MEM_FENCE);
+    for (int at = first + lid; at < first + count; at += BIN_ITEMS) mine = fmin(mine, distance2(s, at, cx, cy));
+    if (mine < 1e30f) atomic_min(least_bits, as_int(mine));
+    barrier(CLK_LOCAL_MEM_FENCE);
+    float least = sqrt(as_float(*least_bits));
+    float bound = fmin(least + 2.0f * HALF_DIAGONAL, reach + HALF_DIAGONAL) + 1e-3f;
+    if (least > bound) return 0;
+    for (int from = first; from < first + count; from += BIN_ITEMS) {
+        barrier(CLK_LOCAL_MEM_FENCE);
+        if (lid < BIN_ITEMS / 32) marks[lid] = 0;
+        barrier(CLK_LOCAL_MEM_FENCE);
+        int at = from + lid;
+        if (at < first + count && distance2(s, at, cx, cy) <= bound * bound) atomic_or(marks + lid / 32, 1u << (lid % 32));
+        barrier(CLK_LOCAL_MEM_FENCE);
+        for (int w = 0; w < BIN_ITEMS / 32; w++)
+            for (uint left = marks[w]; left; left &= left - 1)
+                consider(&best2, best, s, from + 32 * w + 31 - (int)clz(left & -left), x, y);
+    }
+    return 1;
+}
+
+// Work-groups (most bins of a row, rows of bins) of BIN x BIN; of row by0 + j the bins windows[2 j] .. windows[2 j + 1] - 1
+// are done. Arguments as in raster.cl.
+kernel __attribute__((reqd_work_group_size(BIN, BIN, 1)))
+void rasterise(global const float *segments, int m, global const float *strokes, global const int *index,
+               global const int *row_start, global const int *row_items, global const int *span_index,
+               global const float *spans, global float *height_d, global float *height_f, global float *gradient_d,
+               global float *gradient_f, int n, int pitch, int stride, float spacing, float screening, float exit_length,
+               int pinned, int row0, int column0, int by0, global const int *windows) {
+    local int least_bits;
+    local uint marks[BIN_ITEMS / 32];
+    int j = get_group_id(1), bx = windows[2 * j] + get_group_id(0), by = by0 + j;
+    if (bx >= windows[2 * j + 1]) return;
+    segments_t s = {m, segments};
+    sums_t sum = {0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f};
+    int gx = bx * BIN + get_local_id(0), gy = by * BIN + get_local_id(1);
+    float x0 = bx * BIN, y0 = by * BIN, x = gx, y = gy, middle = 0.5f * (BIN - 1);
+    for (int i = row_start[by - row0]; i < row_start[by - row0 + 1]; i++) {
+        global const float *p = strokes + STROKE_STRIDE * row_items[i];
+        global const int *at = index + INDEX_STRIDE * row_items[i];
+        if (x0 > p[2] || x0 + BIN - 1 < p[1]) continue;
+        int best;
+        int reached = nearest_in_bin(&best, s, at[0], at[1], p[3], x, y, x0 + middle, y0 + middle, &least_bits, marks);
+        if (!reached && at[2] < 0) continue;
+        nearest_t near = {1e30f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f};
+        if (best != NOTHING) resolve(&near, 1, s, best, x, y);
+        int in = 0;
+        if (at[2] >= 0 && gy < n) {
+            global const int *span = span_index + at[2] + gy - row0 * BIN;
+            in = inside_row(spans, span[0], span[1], x);
+            if (in) near.height = segments[at[0] + 2 * (size_t)m];
+        }
+        cross_section(&sum, &near, in, p, spacing, 1.0f / spacing, 1.0f / exit_length);
+    }
+    if (gx >= n || gy >= n) return;
+    constraint_t c = conclude(&sum, gx, gy, n, screening, pinned);
+    size_t o = (size_t)(gy - row0 * BIN) * pitch + gx - column0 * BIN;
+    height_d[o] = c.height_d;
+    height_f[o] = c.height_f;
+    gradient_d[o] = c.gradient_d;
+    gradient_f[o] = c.gradient_fx;
+    gradient_f[o + stride] = c.gradient_fy;
+}
