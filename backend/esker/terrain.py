@@ -44,8 +44,9 @@ def default_solver() -> Solver:
 class Stroke:
     """Makes strokes from world points; what is made is a ``contract.Stroke``.
 
-    left, right: (slope in degrees or None, extent in metres), a ``Flank``, or None for no flank on that side of the
-    direction of travel. Other keywords: ``plateau_radius_m``, ``amplitude_m``, ``roughness``, ``id``, ``label``.
+    left, right: (slope in degrees or None, extent in metres) for a straight flank, which has that slope from the crest
+    to its end; a ``Flank`` for any other; or None for no flank on that side of the direction of travel. Other keywords:
+    ``plateau_radius_m``, ``amplitude_m``, ``roughness``, ``id``, ``label``.
     Raises ValueError for points that are not finite (n, 3), or fields out of range.
     """
 
@@ -88,7 +89,7 @@ def _flank(side: FlankLike) -> Flank | None:
     if side is None or isinstance(side, Flank):
         return side
     slope, extent = side
-    return Flank(slope_deg=None if slope is None else float(slope), extent_m=float(extent))
+    return Flank(slope_deg=None if slope is None else float(slope), extent_m=float(extent), shape="straight")
 
 
 def _stroke(

@@ -137,7 +137,7 @@ def test_profile_takes_world_points() -> None:
     points = [(100, 100, 5), (600, 350, 80), (1100, 600, 20)]
     s = Stroke.profile(points, left=(30, 200), right=None, plateau_radius_m=10, amplitude_m=3, roughness=0.2)
     assert np.allclose(world_points(s), points)
-    assert s.left == Flank(slope_deg=30, extent_m=200)
+    assert s.left == Flank(slope_deg=30, extent_m=200, shape="straight")
     assert s.right is None
     assert (s.plateau_radius_m, s.amplitude_m, s.roughness) == (10, 3, 0.2)
     assert s.finished
