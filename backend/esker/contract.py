@@ -32,6 +32,8 @@ DEFAULT_LEVEL: Final = 4
 MAX_REFINED_LEVEL: Final = 10
 """The finest level that may be refined tile by tile above the global ones (65,537 samples a side; DESIGN 5.6)."""
 DEFAULT_REFINED_LEVEL: Final = 8
+MAX_REFINED_TILES: Final = 512
+"""Tiles above the global levels that one client is made to hold at most; the server drops what is least in view."""
 QUANTA_PER_CELL: Final = 256
 """Quantisation step of level l: q_l = s_l / 256, so that the slope error is the same at every level (DESIGN 6)."""
 DEFAULT_SIZE_M: Final = 4096.0
@@ -524,6 +526,8 @@ class Progress(Wire):
     of: int
     settled: bool
     note: str = ""
+    refining: Annotated[int, Field(ge=0)] = 0
+    """Tiles above the global levels that somebody looks at and that are still to be made."""
 
 
 class ErrorMessage(Wire):
@@ -564,9 +568,12 @@ class FrameKind(IntEnum):
 
 
 class Predictor(IntEnum):
+    """What a tile's residual adds to: nothing; the parent; the tile as held, moved along with its parent; as held."""
+
     ZERO = 0
     PARENT = 1
     PREVIOUS = 2
+    HELD = 3
 
 
 class Channel(IntEnum):
@@ -608,5 +615,5 @@ TILE_HEADER: Final = np.dtype(
     ]
 )
 """``version``: of this tile; ``base_version``: of the parent (or previous) tile that it was predicted from;
-``planes``: byte planes before deflate (1..4). Bounds and errors of the 16-cell sub-patches follow from the samples
+``planes``: byte planes before deflate (0..4; 0: no residual and no payload). Bounds and errors of the 16-cell sub-patches follow from the samples
 and the parent, both of which the decoder holds, so they do not travel (docs/decisions/0003-derived-bounds.md)."""

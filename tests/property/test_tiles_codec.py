@@ -93,7 +93,7 @@ def test_round_trip_is_exact(seed: int, parent_size: int, child_size: int, quadr
     assert np.array_equal(reconstruct(None, unpack(planes, payload)), child)
 
 
-@pytest.mark.parametrize(("largest", "planes"), [(0, 1), (127, 1), (128, 2), (32_767, 2), (32_768, 3), (1 << 23, 4)])
+@pytest.mark.parametrize(("largest", "planes"), [(0, 0), (127, 1), (128, 2), (32_767, 2), (32_768, 3), (1 << 23, 4)])
 def test_planes_are_as_few_as_the_largest_residual_needs(largest: int, planes: int) -> None:
     residual = np.zeros((65, 65), dtype=np.int32)
     residual[7, 9] = largest

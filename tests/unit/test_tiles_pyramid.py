@@ -64,24 +64,24 @@ def test_wrong_levels_and_shapes_are_refused() -> None:
         pyramid.put(1, 0, heights(1), False)
 
 
-def test_a_preview_keeps_samples_that_moved_less_than_a_quantum_and_settling_does_not() -> None:
+def test_a_preview_keeps_samples_that_moved_less_than_two_quanta_and_settling_does_not() -> None:
     q = np.float32(grid.quantum(0, SIZE_M))
     pyramid = Pyramid(SIZE_M, 0)
     base = np.full((65, 65), 10 * q, dtype=np.float32)
     pyramid.put(1, 0, base, False)
     moved = base.copy()
-    moved[3, 3] += np.float32(0.9) * q
+    moved[3, 3] += np.float32(1.9) * q
     assert pyramid.put(2, 0, moved, False) == 0
-    moved[4, 4] += np.float32(1.1) * q
+    moved[4, 4] += np.float32(2.1) * q
     assert pyramid.put(3, 0, moved, False) == 1
     level = pyramid.level(0)
     assert level is not None
     assert level.samples[3, 3] == 10
-    assert level.samples[4, 4] == 11
+    assert level.samples[4, 4] == 12
     assert pyramid.put(4, 0, moved, True) == 1
     level = pyramid.level(0)
     assert level is not None
-    assert level.samples[3, 3] == 11
+    assert level.samples[3, 3] == 12
     assert np.array_equal(level.samples, quantise(moved, 0, SIZE_M))
 
 

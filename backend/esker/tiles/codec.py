@@ -48,24 +48,27 @@ def _upsample(a: Wide) -> Wide:
     return out
 
 
-def predict(parents: Ints) -> Wide:
+def predict(parents: Ints, ratio: int = 2) -> Wide:
     """All four children of each parent at once, as one 129x129 grid.
 
     Args:
         parents: (..., 65, 65) int32, |sample| <= 2^28, in quanta of the parent's level.
+        ratio: quanta of the child's level in one of the parent's: 2 for heights, 1 for the other channels.
     Returns:
-        (..., 129, 129) int32 or int64 in quanta of the child's level (half as large, hence the factor two): the
-        tensor product of (-1, 9, 9, -1)/16, at the parent tile's border of (5, 15, -5, 1)/16, times two, rounded
-        once, halves upward: ``floor((sum + 64) / 128)``. Even samples are exactly twice the parent's. |result| is
-        below 2^30.5. Child (cx, cy) is ``[64*cy : 64*cy+65, 64*cx : 64*cx+65]``.
+        (..., 129, 129) int32 or int64 in quanta of the child's level: the tensor product of (-1, 9, 9, -1)/16, at the
+        parent tile's border of (5, 15, -5, 1)/16, times ``ratio``, rounded once, halves upward: with the sum S of
+        weights that add up to 256, ``floor((S + 64) / 128)`` or ``floor((S + 128) / 256)``. Even samples are exactly
+        ``ratio`` times the parent's. |result| is below 2^30.5. Child (cx, cy) is
+        ``[64*cy : 64*cy+65, 64*cx : 64*cx+65]``.
     """
+    shift = 9 - ratio
     small = parents.size == 0 or max(int(parents.max()), -int(parents.min())) <= _NARROW_LIMIT
     wide: Wide = parents if small else parents.astype(np.int64)
     cols = _upsample(wide)
     # The rows are upsampled through a transposed view: same kernel, same rounding, symmetric in x and y.
     both = _upsample(np.ascontiguousarray(np.swapaxes(cols, -1, -2)))
-    both += 64
-    both >>= 7
+    both += 1 << (shift - 1)
+    both >>= shift
     return np.swapaxes(both, -1, -2)
 
 
@@ -75,7 +78,7 @@ def child_window(prediction: Wide, x: int, y: int) -> Wide:
     return prediction[..., r : r + TILE_SAMPLES, c : c + TILE_SAMPLES]
 
 
-def follow(samples: Ints, then: Ints | None, now: Ints | None, x: int, y: int) -> Wide:
+def follow(samples: Ints, then: Ints | None, now: Ints | None, x: int, y: int, ratio: int = 2) -> Wide:
     """A tile predicted from its previous samples: moved along with its parent, (65, 65) int64, |result| < 2^32.
 
     ``then`` and ``now`` are the parent's 65x65 samples when ``samples`` were new and at present; both predictions are
@@ -83,7 +86,7 @@ def follow(samples: Ints, then: Ints | None, now: Ints | None, x: int, y: int) -
     """
     if then is None or now is None or then is now:
         return samples.astype(np.int64)
-    before, after = (child_window(predict(p), x, y).astype(np.int64) for p in (then, now))
+    before, after = (child_window(predict(p, ratio), x, y).astype(np.int64) for p in (then, now))
     return np.asarray(samples + after - before)
 
 
@@ -107,8 +110,10 @@ def pack(residual: Wide) -> tuple[int, bytes]:
     """One tile's residual, shape (65, 65), as ``(planes, payload)``.
 
     The zig-zag codes are split into ``planes`` (1..4) byte planes, lowest first, each 4,225 bytes in row-major order,
-    and deflated raw (RFC 1951, no zlib header).
+    and deflated raw (RFC 1951, no zlib header). A residual of zeros has no planes and no payload.
     """
+    if not residual.any():
+        return 0, b""
     codes = np.ascontiguousarray(zigzag(residual)).reshape(-1)
     planes = max(1, (int(codes.max()).bit_length() + 7) // 8)
     raw = codes.astype("<u4", copy=False).view(np.uint8).reshape(TILE_AREA, 4)[:, :planes].T.tobytes()
@@ -121,8 +126,12 @@ def unpack(planes: int, payload: bytes | memoryview) -> Ints:
 
     Raises CodecError for a wrong number of planes, an oversize payload, a broken stream or a wrong length.
     """
-    if not 1 <= planes <= 4:
-        raise CodecError(f"a tile has 1 to 4 byte planes, not {planes}")
+    if not 0 <= planes <= 4:
+        raise CodecError(f"a tile has 0 to 4 byte planes, not {planes}")
+    if planes == 0:
+        if len(payload):
+            raise CodecError("a tile without planes has no payload")
+        return np.zeros((TILE_SAMPLES, TILE_SAMPLES), dtype=np.int32)
     if len(payload) > MAX_PAYLOAD:
         raise CodecError(f"a tile payload has at most {MAX_PAYLOAD} bytes, not {len(payload)}")
     want = planes * TILE_AREA

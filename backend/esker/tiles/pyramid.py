@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from esker import grid
 from esker.contract import TILE_CELLS
 from esker.tiles.bounds import Bounds, SubPatches, block_reduce, dilate, nest
-from esker.tiles.codec import SAMPLE_LIMIT, Ints
+from esker.tiles.codec import SAMPLE_LIMIT, Ints, predict
 from esker.tiles.steady import Steadier
 
 BLOCK_CELLS: Final = 4
@@ -26,8 +26,12 @@ prediction's stencil of three samples a level, ends less than one block away."""
 Counts = NDArray[np.uint32]
 Mask = NDArray[np.bool_]
 
-DEAD_ZONE: Final = 1.0
-"""Quanta that a sample may move in a preview before it counts as changed. Settled levels are exact."""
+DEAD_ZONE: Final = 2.0
+"""Quanta that a sample of the finest level may be off in a preview (DESIGN 6). Settled levels are exact."""
+COARSE_DEAD_ZONE: Final = 0.5
+"""The same for the levels above: they are what finer ones are predicted from, and an error there counts twice below."""
+FOLLOW_TILES: Final = 256
+"""Most parents of which a level follows the movement; above, as after a change of all the ground, it starts afresh."""
 
 
 @dataclass(frozen=True)
@@ -47,11 +51,18 @@ class Level:
     settled: bool
 
 
-def quantise(heights: NDArray[np.float32], level: int, size_m: float, kept: Ints | None = None) -> Ints:
+def quantise(
+    heights: NDArray[np.float32],
+    level: int,
+    size_m: float,
+    kept: Ints | None = None,
+    dead_zone: float = COARSE_DEAD_ZONE,
+) -> Ints:
     """Metres to quanta of the level, halves to even, saturating at +-2^28 quanta.
 
-    With ``kept`` (same shape) a sample that is still within ``DEAD_ZONE`` of its kept value keeps it. The decision is
-    made per sample of the level, so the shared edges of neighbouring tiles stay equal. Heights must be finite.
+    With ``kept`` (same shape) a sample that is less than ``dead_zone`` quanta from its kept value keeps it. The
+    decision is made per sample of the level, so the shared edges of neighbouring tiles stay equal. Heights must be
+    finite.
     """
     with np.errstate(over="ignore"):
         steps = heights * np.float32(1.0 / grid.quantum(level, size_m))
@@ -61,9 +72,35 @@ def quantise(heights: NDArray[np.float32], level: int, size_m: float, kept: Ints
     # In float32 throughout: mixed with int32, numpy would compute in float64, four times as long.
     away = kept.astype(np.float32)
     np.subtract(steps, away, out=away)
-    moved = np.abs(away, out=away) >= DEAD_ZONE
+    moved = np.abs(away, out=away) >= dead_zone
     out = kept.copy()
     out[moved] = np.rint(steps[moved])
+    return out
+
+
+def follow_parents(samples: Ints, then: Level | None, now: Level | None) -> Ints:
+    """A level moved along with its parent, as every client's decoder moves it (``codec.follow``); no new array if not.
+
+    ``samples``: (N_l, N_l); ``then`` and ``now``: the level above when the samples were put, and at present. Each
+    parent tile moves its own four children. On an edge that two parents share both say the same, as the prediction
+    there depends on the samples of that edge alone.
+    """
+    if then is None or now is None or then.samples is now.samples:
+        return samples
+    moved = np.argwhere(then.versions != now.versions)
+    if not 0 < len(moved) <= FOLLOW_TILES:
+        return samples
+    out = samples.copy()
+    for y, x in moved:
+        place = np.s_[TILE_CELLS * y : TILE_CELLS * (y + 1) + 1, TILE_CELLS * x : TILE_CELLS * (x + 1) + 1]
+        if np.array_equal(now.samples[place], then.samples[place]):
+            continue
+        change = predict(now.samples[place]) - predict(then.samples[place])
+        under = np.s_[
+            2 * TILE_CELLS * y : 2 * TILE_CELLS * (y + 1) + 1, 2 * TILE_CELLS * x : 2 * TILE_CELLS * (x + 1) + 1
+        ]
+        change += samples[under]
+        out[under] = np.clip(change, -SAMPLE_LIMIT, SAMPLE_LIMIT)
     return out
 
 
@@ -87,6 +124,8 @@ class Pyramid:
         self._dirty: list[Mask] = [np.zeros((1 << level, 1 << level), dtype=np.bool_) for level in range(levels + 1)]
         self._past: list[deque[Level]] = [deque(maxlen=_depth(level)) for level in range(levels + 1)]
         self._steadiers = [Steadier() for _ in range(levels + 1)]
+        self._parents: list[Level | None] = [None] * (levels + 1)
+        """Per level: the level above as it was when this one was last put."""
         self._previewed = -1
         """Clock of the newest preview of the finest level."""
         self._touched = [np.zeros((16 << level, 16 << level), dtype=np.uint32) for level in range(levels)]
@@ -105,14 +144,16 @@ class Pyramid:
         """The level as it is now, None before its first ``put``."""
         return self._levels[level]
 
-    def put(self, clock: int, level: int, heights: NDArray[np.float32], settled: bool) -> int:
+    def put(self, clock: int, level: int, heights: NDArray[np.float32], settled: bool, show: bool = True) -> int:
         """Replaces a level; returns the number of tiles of which a sample changed.
 
         ``heights``: (N_l, N_l) float32 metres, not to be changed afterwards. Unsettled heights are steadied (see
-        ``steady``) and have a dead zone of one quantum; settled ones are rounded exactly. Between a complete preview
-        and the settled levels of the same clock a solver may repeat coarse levels as a sign of life: these are
-        ignored, as they would only move the ground there and back. Raises ValueError for a wrong level or shape or
-        heights that are not finite, and changes nothing then.
+        ``steady``), then kept as predicted wherever that is within the dead zone; settled ones are rounded exactly.
+        With ``show`` False a coarse preview is only noted: its level is injected from the finest preview, which is
+        expected soon (docs/decisions/0013-consistent-previews.md). Between a complete preview and the settled levels
+        of the same clock a solver may repeat coarse levels as a sign of life: these are ignored, as they would only
+        move the ground there and back. Raises ValueError for a wrong level or shape or heights that are not finite,
+        and changes nothing then.
         """
         if not 0 <= level <= self.levels:
             raise ValueError(f"level {level} is not one of 0..{self.levels}")
@@ -121,11 +162,38 @@ class Pyramid:
             raise ValueError(f"level {level} has {n}x{n} samples, not {heights.shape}")
         if not settled and level < self.levels and self._previewed == clock:
             return 0
+        if not np.isfinite(heights).all():
+            raise ValueError(f"level {level} has heights that are not finite")
+        steadier = self._steadiers[level]
+        if settled:
+            steadier.settled(clock, heights)
+            return self._store(clock, level, heights, settled)
+        if level < self.levels and not show:
+            steadier.note(clock, heights)
+            return 0
+        steady = steadier.preview(clock, heights)
+        if level < self.levels:
+            return self._store(clock, level, steady, settled)
+        self._previewed = clock
+        count = 0
+        for coarse in range(level):
+            old = self._levels[coarse]
+            if old is None or old.clock != clock:
+                step = 1 << (level - coarse)
+                count += self._store(clock, coarse, np.ascontiguousarray(steady[::step, ::step]), settled)
+        return count + self._store(clock, level, steady, settled)
+
+    def _store(self, clock: int, level: int, heights: NDArray[np.float32], settled: bool) -> int:
+        """Quantises what is to be shown of a level; versions rise where a sample changed. Returns how many tiles."""
         old = self._levels[level]
-        steady = self._steady(clock, level, heights, settled)
-        samples = quantise(steady, level, self.size_m, old.samples if old is not None and not settled else None)
+        parent = self._levels[level - 1] if level else None
+        kept = None
+        if old is not None and not settled:
+            kept = follow_parents(old.samples, self._parents[level], parent)
+        self._parents[level] = parent
+        samples = quantise(heights, level, self.size_m, kept, DEAD_ZONE if level == self.levels else COARSE_DEAD_ZONE)
         stamp = self.stamp + 1
-        moved = np.ones((n, n), dtype=np.bool_) if old is None else samples != old.samples
+        moved = np.ones(samples.shape, dtype=np.bool_) if old is None else samples != old.samples
         changed = self._touch(level, moved, stamp)
         count = int(np.count_nonzero(changed))
         if old is not None and not count:
@@ -142,17 +210,6 @@ class Pyramid:
         if old is None or level == self.levels:
             self.generation += 1
         return count
-
-    def _steady(self, clock: int, level: int, heights: NDArray[np.float32], settled: bool) -> NDArray[np.float32]:
-        """What to show of a level that the solver gives out. Refuses heights that are not finite."""
-        if not np.isfinite(heights).all():
-            raise ValueError(f"level {level} has heights that are not finite")
-        if settled:
-            self._steadiers[level].settled(clock, heights)
-            return heights
-        if level == self.levels:
-            self._previewed = clock
-        return self._steadiers[level].preview(clock, heights)
 
     def _touch(self, level: int, moved: Mask, stamp: int) -> Mask:
         """Remembers which blocks hold a moved sample; returns which tiles do."""

@@ -34,9 +34,13 @@ class Steadier:
         preview = self._preview[1]
         self._reference = (preview, heights - preview)
 
+    def note(self, clock: int, heights: Heights) -> None:
+        """A preview that is not shown: remembered as what the settled heights of its clock will be compared with."""
+        self._preview = (clock, heights)
+
     def preview(self, clock: int, heights: Heights) -> Heights:
         """What to show for a preview; ``heights`` itself when nothing is known."""
-        self._preview = (clock, heights)
+        self.note(clock, heights)
         if self._reference is None:
             return heights
         before, correction = self._reference

@@ -20,6 +20,8 @@ export const MAX_REFINED_LEVEL = 10 as const;
 
 export const DEFAULT_REFINED_LEVEL = 8 as const;
 
+export const MAX_REFINED_TILES = 512 as const;
+
 export const QUANTA_PER_CELL = 256 as const;
 
 export const DEFAULT_SIZE_M = 4096.0 as const;
@@ -133,6 +135,7 @@ export const Predictor = {
   ZERO: 0,
   PARENT: 1,
   PREVIOUS: 2,
+  HELD: 3,
 } as const;
 
 export const Channel = {
@@ -491,6 +494,7 @@ export interface Progress {
   of: number;
   settled: boolean;
   note: string;
+  refining: number;
 }
 
 export interface ErrorMessage {

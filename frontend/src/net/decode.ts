@@ -127,9 +127,11 @@ export class FrameDecoder {
     const samples = new Int32Array(AREA);
     const parent = this.parentSamples(key);
     if (tile.predictor === Predictor.PARENT) this.predictFromParent(key, tile);
-    else if (tile.predictor === Predictor.PREVIOUS) this.predictFromPrevious(key, tile, parent);
+    else if (tile.predictor !== Predictor.ZERO) this.predictFromHeld(key, tile, parent);
     else base.fill(0);
-    addResidual(samples, inflatePlanes(payload, tile.planes), tile.planes);
+    if (tile.planes === 0 && payload.length > 0) throw new FrameError("a tile without planes has no payload");
+    const raw = tile.planes === 0 ? new Uint8Array(0) : inflatePlanes(payload, tile.planes);
+    addResidual(samples, raw, tile.planes);
     const subMin = new Int32Array(SUBS);
     const subMax = new Int32Array(SUBS);
     const subError = new Uint32Array(SUBS);
@@ -153,15 +155,15 @@ export class FrameDecoder {
     base.set(after);
   }
 
-  /** The tile as it was, moved along with its parent since then. */
-  private predictFromPrevious(key: number, tile: TileHead, parent: Int32Array | null): void {
+  /** The tile as it was; for `PREVIOUS` moved along with its parent since then. */
+  private predictFromHeld(key: number, tile: TileHead, parent: Int32Array | null): void {
     const held = this.held.get(key);
     if (!held) throw new FrameError("a tile is predicted from itself but not held");
     if (held.version !== tile.baseVersion)
       throw new FrameError(`a tile is predicted from its version ${tile.baseVersion}, not from ${held.version}`);
     base.set(held.samples);
     const then = held.parentThen;
-    if (!then || !parent || then === parent) return;
+    if (tile.predictor === Predictor.HELD || !then || !parent || then === parent) return;
     predictInts(then, tile.x, tile.y, before);
     predictInts(parent, tile.x, tile.y, after);
     for (let i = 0; i < AREA; i++) base[i]! += after[i]! - before[i]!;
@@ -217,8 +219,8 @@ function readTileHead(view: DataView, at: number, level: number): TileHead {
     bytes: view.getUint32(at + f.bytes.offset, true),
   };
   checkPlace(level, tile.x, tile.y);
-  if (tile.predictor > Predictor.PREVIOUS) throw new FrameError(`unknown predictor ${tile.predictor}`);
-  if (tile.planes < 1 || tile.planes > 4) throw new FrameError(`a tile has 1 to 4 byte planes, not ${tile.planes}`);
+  if (tile.predictor > Predictor.HELD) throw new FrameError(`unknown predictor ${tile.predictor}`);
+  if (tile.planes > 4) throw new FrameError(`a tile has 0 to 4 byte planes, not ${tile.planes}`);
   if (tile.bytes > MAX_PAYLOAD) throw new FrameError(`a tile payload of ${tile.bytes} bytes is too large`);
   return tile;
 }
@@ -243,7 +245,7 @@ function inflatePlanes(payload: Uint8Array, planes: number): Uint8Array {
 /** The prediction in `base` plus the zig-zag coded residual, lowest byte plane first. */
 function addResidual(samples: Int32Array, raw: Uint8Array, planes: number): void {
   for (let i = 0; i < AREA; i++) {
-    let code = raw[i]!;
+    let code = planes > 0 ? raw[i]! : 0;
     if (planes > 1) code |= raw[AREA + i]! << 8;
     if (planes > 2) code |= raw[2 * AREA + i]! << 16;
     if (planes > 3) code |= raw[3 * AREA + i]! << 24;
