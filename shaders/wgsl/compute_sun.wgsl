@@ -18,6 +18,7 @@ struct SunList {
 };
 
 const NO_SLOT: u32 = 0xffffffffu;
+const PLACES: u32 = 4096u;
 // Fewer on software adapters (gpu/tilecompute.ts).
 override SUN_STEPS: i32 = 60;
 override SUN_GROWTH: f32 = 0.1;
@@ -26,12 +27,18 @@ override SKY_STEPS: i32 = 6;
 
 @group(0) @binding(0) var<storage, read> list: SunList;
 @group(0) @binding(1) var heights: texture_2d_array<f32>;
-@group(0) @binding(2) var<storage, read> pages: array<u32>;  // slot of tile (level, x, y), rows of a level in sequence
+@group(0) @binding(2) var<storage, read> pages: array<vec2u, PLACES>;  // (tile key, slot) by hash (gpu/pagetable.ts)
 @group(0) @binding(3) var light_out: texture_storage_2d_array<rgba8unorm, write>;
 
 fn page(level: u32, tile: vec2u) -> u32 {
-  let first = ((1u << (2u * level)) - 1u) / 3u;
-  return pages[first + (tile.y << level) + tile.x];
+  let key = (level << 24u) | (tile.y << 12u) | tile.x;
+  var place = (key * 0x9e3779b1u) >> 20u;
+  var entry = pages[place];
+  while (entry.x != key && entry.x != NO_SLOT) {
+    place = (place + 1u) % PLACES;
+    entry = pages[place];
+  }
+  return select(NO_SLOT, entry.y, entry.x == key);
 }
 
 struct Place {

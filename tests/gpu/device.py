@@ -141,3 +141,15 @@ def sun_list(
     words[4:8] = np.array(sun, np.float32).view(np.uint32)
     words[8 : 8 + 4 * len(jobs)] = np.array(jobs, np.uint32).ravel()
     return words
+
+
+def page_table(slots: dict[tuple[int, int, int], int]) -> NDArray[np.uint32]:
+    """The atlas's page table (gpu/pagetable.ts): 4096 pairs of tile key and slot, open addressing by hash."""
+    table = np.full((4096, 2), NO_SLOT, np.uint32)
+    for (level, x, y), slot in slots.items():
+        key = level << 24 | y << 12 | x
+        place = ((key * 0x9E3779B1) & 0xFFFFFFFF) >> 20
+        while table[place, 0] != NO_SLOT:
+            place = (place + 1) % len(table)
+        table[place] = key, slot
+    return table

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tests.gpu.device import BORDER, HEIGHTS, NO_SLOT, READ, SLOT, TinyAtlas, job_list, source, store, sun_list
+from tests.gpu.device import BORDER, HEIGHTS, READ, SLOT, TinyAtlas, job_list, page_table, source, store, sun_list
 
 SIZE = 4096.0
 Field = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
@@ -44,9 +44,7 @@ def normals(atlas: TinyAtlas, slots: dict[Tile, int]) -> None:
 
 def sunlight(atlas: TinyAtlas, slots: dict[Tile, int], high: float, sun: tuple[float, float, float, float]) -> None:
     levels = max(level for level, _, _ in slots)
-    pages = np.full(((4 ** (levels + 1)) - 1) // 3, NO_SLOT, np.uint32)
-    for (level, tx, ty), slot in slots.items():
-        pages[(4**level - 1) // 3 + (ty << level) + tx] = slot
+    pages = page_table(slots)
     jobs = [(slot, *tile) for tile, slot in slots.items()]
     bindings = [
         (READ, atlas.buffer(sun_list(SIZE, high, levels, sun, jobs))),

@@ -6,14 +6,15 @@
  * neighbours never disagree; only tiles that are new to the atlas are rationed.
  */
 
+import { tileKey } from "../core/tilekey.ts";
 import type { Tile, TileView } from "../core/types.ts";
 import type { Slots, TileRequest } from "../tiles/selection.ts";
 import { assembleSlot, SLOT_TEXELS } from "./apron.ts";
+import { NO_SLOT, PageTable } from "./pagetable.ts";
 
 export const SLOTS_ACROSS = 16;
 export const SLOTS_PER_LAYER = SLOTS_ACROSS * SLOTS_ACROSS;
 export const MAX_SLOTS = 1024;
-const NO_SLOT = 0xffffffff;
 /** New tiles that may enter in one frame. */
 export const NEW_TILES_PER_FRAME = 16;
 
@@ -36,13 +37,14 @@ export class Atlas implements Slots {
   readonly heights: GPUTexture;
   readonly slopes: GPUTexture;
   readonly light: GPUTexture;
-  /** Slot of each tile of each level, rows of a level in sequence; `NO_SLOT` where absent. */
+  /** Slot of each resident tile (pagetable.ts). */
   readonly pages: GPUBuffer;
   readonly capacity: number;
-  private readonly pageTable: Uint32Array;
+  private readonly pageTable = new PageTable();
+  private readonly byTile = new Map<number, Resident>();
   private readonly bySlot: (Resident | undefined)[];
   private readonly free: number[] = [];
-  private readonly grid: (Tile | undefined)[];
+  private view: TileView | null = null;
   private readonly staging = new Float32Array(SLOT_TEXELS * SLOT_TEXELS);
   private viewStamp = -1;
   private frame = 0;
@@ -54,8 +56,7 @@ export class Atlas implements Slots {
     private readonly onResidency: ResidencyListener,
     capacity = MAX_SLOTS,
   ) {
-    const tiles = pageStart(levels + 1);
-    const layers = Math.ceil(Math.min(capacity, tiles) / SLOTS_PER_LAYER);
+    const layers = Math.ceil(Math.min(capacity, tilesUpTo(levels)) / SLOTS_PER_LAYER);
     this.capacity = Math.min(capacity, layers * SLOTS_PER_LAYER);
     const side = SLOTS_ACROSS * SLOT_TEXELS;
     const make = (label: string, format: GPUTextureFormat, usage: GPUTextureUsageFlags): GPUTexture =>
@@ -68,24 +69,22 @@ export class Atlas implements Slots {
     this.heights = make("atlas heights", "r32float", GPUTextureUsage.COPY_DST | GPUTextureUsage.COPY_SRC);
     this.slopes = make("atlas slopes", "rgba16float", GPUTextureUsage.STORAGE_BINDING | GPUTextureUsage.COPY_SRC);
     this.light = make("atlas light", "rgba8unorm", GPUTextureUsage.STORAGE_BINDING | GPUTextureUsage.COPY_SRC);
-    this.pageTable = new Uint32Array(tiles).fill(NO_SLOT);
     this.pages = device.createBuffer({
       label: "atlas pages",
-      size: Math.max(16, tiles * 4),
+      size: this.pageTable.words.byteLength,
       usage: GPUBufferUsage.STORAGE | GPUBufferUsage.COPY_DST,
     });
-    this.grid = new Array<Tile | undefined>(tiles).fill(undefined);
     this.bySlot = new Array<Resident | undefined>(this.capacity).fill(undefined);
     // Slot 0 is the root's for good: the water outside the domain reads it (water.wgsl).
     for (let slot = this.capacity - 1; slot > 0; slot -= 1) this.free.push(slot);
   }
 
   slot(level: number, x: number, y: number): number {
-    return this.pageTable[pageStart(level) + (y << level) + x]!;
+    return this.byTile.get(tileKey(level, x, y))?.slot ?? NO_SLOT;
   }
 
   touch(level: number, x: number, y: number): void {
-    const resident = this.bySlot[this.slot(level, x, y)];
+    const resident = this.byTile.get(tileKey(level, x, y));
     if (resident !== undefined) resident.used = this.frame;
   }
 
@@ -100,8 +99,8 @@ export class Atlas implements Slots {
   }
 
   /** Resident tiles, in no order. */
-  *residents(): Iterable<Resident> {
-    for (const resident of this.bySlot) if (resident !== undefined) yield resident;
+  residents(): Iterable<Resident> {
+    return this.byTile.values();
   }
 
   get count(): number {
@@ -116,12 +115,9 @@ export class Atlas implements Slots {
     this.frame += 1;
     if (view.stamp === this.viewStamp) return [];
     this.viewStamp = view.stamp;
-    this.grid.fill(undefined);
-    for (const tile of view.tiles()) {
-      if (tile.level <= this.levels) this.grid[pageStart(tile.level) + (tile.y << tile.level) + tile.x] = tile;
-    }
+    this.view = view;
     const changed: Resident[] = [];
-    for (const resident of this.residents()) {
+    for (const resident of [...this.residents()]) {
       if (this.at(resident.level, resident.x, resident.y) === undefined) {
         this.evict(resident);
         continue;
@@ -146,7 +142,7 @@ export class Atlas implements Slots {
       if (slot === undefined) break;
       const resident: Resident = { level, x, y, slot, ...this.signature(level, x, y), used: this.frame };
       this.bySlot[slot] = resident;
-      this.pageTable[pageStart(level) + (y << level) + x] = slot;
+      this.byTile.set(tileKey(level, x, y), resident);
       this.pagesDirty = true;
       this.upload(resident);
       this.onResidency(level, x, y, true);
@@ -159,7 +155,8 @@ export class Atlas implements Slots {
   flushPages(): void {
     if (!this.pagesDirty) return;
     this.pagesDirty = false;
-    this.device.queue.writeBuffer(this.pages, 0, this.pageTable as Uint32Array<ArrayBuffer>);
+    this.pageTable.fill(this.residents());
+    this.device.queue.writeBuffer(this.pages, 0, this.pageTable.words);
   }
 
   destroy(): void {
@@ -170,7 +167,7 @@ export class Atlas implements Slots {
   private at(level: number, x: number, y: number): Tile | undefined {
     const side = 1 << level;
     if (x < 0 || y < 0 || x >= side || y >= side) return undefined;
-    return this.grid[pageStart(level) + y * side + x];
+    return this.view?.tile(level, x, y);
   }
 
   private signature(level: number, x: number, y: number): { stamp: number; neighbours: number } {
@@ -217,13 +214,13 @@ export class Atlas implements Slots {
   private evict(resident: Resident): void {
     this.bySlot[resident.slot] = undefined;
     if (resident.slot !== 0) this.free.push(resident.slot);
-    this.pageTable[pageStart(resident.level) + (resident.y << resident.level) + resident.x] = NO_SLOT;
+    this.byTile.delete(tileKey(resident.level, resident.x, resident.y));
     this.pagesDirty = true;
     this.onResidency(resident.level, resident.x, resident.y, false);
   }
 }
 
-/** Index of the first tile of a level when all levels lie one after another. */
-export function pageStart(level: number): number {
-  return ((1 << (2 * level)) - 1) / 3;
+/** How many tiles levels 0 to `level` can have. */
+function tilesUpTo(level: number): number {
+  return (4 ** (level + 1) - 1) / 3;
 }

@@ -1,174 +1,321 @@
 /**
- * What the selection knows of the ground: per 16-cell sub-patch of every level its bounds and the error of stopping
- * there, in flat arrays `[py * side + px]` (DESIGN 7, 9). A sub-patch is a node of the tree that is drawn: level l has
- * 4 * 2^l of them a side, and the four children of (l, px, py) are (l + 1, 2 px + {0,1}, 2 py + {0,1}), all in one tile.
+ * What the selection knows of the ground: per 16-cell sub-patch its bounds and the error of stopping there (DESIGN 7, 9).
+ *
+ * A tile that is held has a *page*: 16 *nodes*, its sub-patches `[row * 4 + col]`. Node = page * 16 + sub-patch. Pages come
+ * and go with the tiles and know their parent, their four children and their eight neighbours, so that the selection walks
+ * the tree without a look-up and memory follows what is held, not what the finest level could hold.
  *
  * Two masks say what may be drawn: `held` (the store has the tile) and `usable` (the renderer has it in its atlas).
  */
 
+import { tileKey } from "../core/tilekey.ts";
 import type { Tile, TileView } from "../core/types.ts";
 import { SUBPATCHES } from "../generated/contract.ts";
 
-/** One level of the tree. */
-export class PatchLevel {
-  /** Sub-patches along one side. */
-  readonly side: number;
-  /** Tiles along one side. */
-  readonly tileSide: number;
-  readonly ownMin: Float32Array;
-  readonly ownMax: Float32Array;
-  readonly ownError: Float32Array;
-  /** Bounds of the sub-patch and all its held descendants, metres. */
-  readonly min: Float32Array;
-  readonly max: Float32Array;
-  /** Largest distance, metres, between this sub-patch as drawn and its held descendants; 0 where there are none. */
-  readonly error: Float32Array;
-  readonly held: Uint8Array;
-  readonly usable: Uint8Array;
-  /** 1 where the sub-patch may be split without breaking the restriction, given the usable tiles. */
-  readonly splittable: Uint8Array;
-  /** Stamp of the tile whose figures the arrays hold. */
-  readonly stamps: Float64Array;
-
-  constructor(readonly level: number) {
-    this.tileSide = 1 << level;
-    this.side = SUBPATCHES << level;
-    const patches = this.side * this.side;
-    const tiles = this.tileSide * this.tileSide;
-    this.ownMin = new Float32Array(patches);
-    this.ownMax = new Float32Array(patches);
-    this.ownError = new Float32Array(patches);
-    this.min = new Float32Array(patches);
-    this.max = new Float32Array(patches);
-    this.error = new Float32Array(patches);
-    this.held = new Uint8Array(tiles);
-    this.usable = new Uint8Array(tiles);
-    this.splittable = new Uint8Array(patches);
-    this.stamps = new Float64Array(tiles).fill(-1);
-  }
-}
+const SUBS = SUBPATCHES * SUBPATCHES;
+const FIRST_PAGES = 512;
+/** Own place in `near`. */
+const SELF = 4;
 
 export class PatchTree {
-  readonly levels: readonly PatchLevel[];
+  /** Pages that the arrays have room for. */
+  capacity = FIRST_PAGES;
+
+  // Per page.
+  tileLevel = new Uint8Array(FIRST_PAGES);
+  tileX = new Uint16Array(FIRST_PAGES);
+  tileY = new Uint16Array(FIRST_PAGES);
+  /** Page of the tile one level coarser; -1 for the root. */
+  parent = new Int32Array(FIRST_PAGES);
+  /** Pages of the four quarters, `[page * 4 + (y & 1) * 2 + (x & 1)]`; -1 where none. */
+  child = new Int32Array(FIRST_PAGES * 4);
+  /** Pages of the tiles around, `[page * 9 + (dy + 1) * 3 + dx + 1]`; -1 where none. */
+  near = new Int32Array(FIRST_PAGES * 9);
+  held = new Uint8Array(FIRST_PAGES);
+  usable = new Uint8Array(FIRST_PAGES);
+  /** What is left of the tile's entrance, 1 to 0: it starts out as its parent's surface. */
+  fade = new Float32Array(FIRST_PAGES);
+
+  // Per node.
+  /** Bounds of the sub-patch and all its held descendants, metres. */
+  min = new Float32Array(FIRST_PAGES * SUBS);
+  max = new Float32Array(FIRST_PAGES * SUBS);
+  /** Largest distance, metres, between this sub-patch as drawn and its held descendants; 0 where there are none. */
+  error = new Float32Array(FIRST_PAGES * SUBS);
+  /** 1 where the sub-patch may be split without breaking the restriction, given the usable tiles. */
+  splittable = new Uint8Array(FIRST_PAGES * SUBS);
+
+  private ownMin = new Float32Array(FIRST_PAGES * SUBS);
+  private ownMax = new Float32Array(FIRST_PAGES * SUBS);
+  private ownError = new Float32Array(FIRST_PAGES * SUBS);
+  /** Stamp of the tile whose figures the page holds. */
+  private stamps = new Float64Array(FIRST_PAGES);
+  private seen = new Float64Array(FIRST_PAGES);
+
+  private readonly index = new Map<number, number>();
+  private readonly byLevel: number[][];
+  private readonly free: number[] = [];
+  private used = 0;
+  private round = 0;
   private syncedStamp = -1;
   private splittableStale = true;
 
   /** `levels`: the finest level that can exist. */
-  constructor(levels: number) {
-    this.levels = Array.from({ length: levels + 1 }, (_, level) => new PatchLevel(level));
+  constructor(readonly levels: number) {
+    this.byLevel = Array.from({ length: levels + 1 }, () => []);
+    this.page(0, 0, 0);
+  }
+
+  /** Pages in use. */
+  get pages(): number {
+    return this.index.size;
+  }
+
+  /** The node beside `node` on its level, or -1 when it is outside the domain or its tile has no page. */
+  neighbour(node: number, dx: number, dy: number): number {
+    const col = (node & 3) + dx;
+    const row = ((node >> 2) & 3) + dy;
+    if (((col | row) & ~3) === 0) return (node & ~15) | (row << 2) | col;
+    const page = this.near[(node >> 4) * 9 + (row < 0 ? 0 : row > 3 ? 6 : 3) + (col < 0 ? 0 : col > 3 ? 2 : 1)]!;
+    return page < 0 ? -1 : (page << 4) | ((row & 3) << 2) | (col & 3);
+  }
+
+  /** The node one level coarser that covers `node`; not for the root's nodes. */
+  above(node: number): number {
+    const page = node >> 4;
+    const col = 2 * (this.tileX[page]! & 1) + ((node & 3) >> 1);
+    const row = 2 * (this.tileY[page]! & 1) + ((node >> 3) & 1);
+    return (this.parent[page]! << 4) | (row << 2) | col;
+  }
+
+  /** Page of the tile that holds the four children of `node`, or -1. */
+  childPage(node: number): number {
+    return this.child[(node >> 4) * 4 + ((node >> 2) & 2) + ((node >> 1) & 1)]!;
+  }
+
+  /** First (south-west) child of a node in the page of its children; the others are 1, 4 and 5 further. */
+  firstChild(node: number, childPage: number): number {
+    return (childPage << 4) | ((node & 4) << 1) | ((node & 1) << 1);
   }
 
   /** Reads what changed in the store since the last call. Returns false when nothing did. */
   sync(view: TileView): boolean {
     if (view.stamp === this.syncedStamp) return false;
     this.syncedStamp = view.stamp;
-    for (const at of this.levels) at.held.fill(0);
+    this.round += 1;
     for (const tile of view.tiles()) {
-      const at = this.levels[tile.level];
-      if (at === undefined) continue;
-      const index = tile.y * at.tileSide + tile.x;
-      at.held[index] = 1;
-      if (at.stamps[index] !== tile.stamp) {
-        at.stamps[index] = tile.stamp;
-        readTile(at, tile);
-      }
+      if (tile.level > this.levels) continue;
+      const page = this.page(tile.level, tile.x, tile.y);
+      this.seen[page] = this.round;
+      this.held[page] = 1;
+      if (this.stamps[page] === tile.stamp) continue;
+      this.stamps[page] = tile.stamp;
+      this.read(page, tile);
     }
-    for (let level = this.levels.length - 1; level >= 0; level -= 1) this.merge(level);
+    for (let level = this.levels; level >= 0; level -= 1) {
+      this.prune(level);
+      for (const page of this.byLevel[level]!) this.merge(page);
+    }
     return true;
   }
 
-  /** Says whether a tile may be drawn (its slot in the atlas is filled). */
-  setUsable(level: number, x: number, y: number, usable: boolean): void {
-    const at = this.levels[level];
-    if (at === undefined) return;
-    const index = y * at.tileSide + x;
+  /** Says whether a tile may be drawn (its slot in the atlas is filled). `fade`: it enters as its parent's surface. */
+  setUsable(level: number, x: number, y: number, usable: boolean, fade = false): void {
+    if (level > this.levels) return;
+    const page = usable ? this.page(level, x, y) : (this.index.get(tileKey(level, x, y)) ?? -1);
     const value = usable ? 1 : 0;
-    if (at.usable[index] === value) return;
-    at.usable[index] = value;
+    if (page < 0 || this.usable[page] === value) return;
+    this.usable[page] = value;
+    this.fade[page] = usable && fade ? 1 : 0;
     this.splittableStale = true;
   }
 
+  /** Lets entrances go on by this share of their time; true while any is under way. */
+  advance(share: number): boolean {
+    let any = false;
+    for (const page of this.index.values()) {
+      const left = this.fade[page]!;
+      if (left === 0) continue;
+      const next = Math.max(0, left - share);
+      this.fade[page] = next;
+      if (next > 0) any = true;
+      else this.splittableStale = true;
+    }
+    return any;
+  }
+
   /**
-   * Brings `splittable` up to date: a sub-patch may be split when the tile of its children is usable and its eight
-   * neighbours can exist, so that no two drawn neighbours, corners too, ever differ by more than one level.
+   * Brings `splittable` up to date: a sub-patch may be split when the tile of its children is usable, its own tile has
+   * fully entered, and its eight neighbours can exist, so that no two drawn neighbours, corners too, ever differ by more
+   * than one level.
    */
   updateSplittable(): void {
     if (!this.splittableStale) return;
     this.splittableStale = false;
-    for (const at of this.levels) at.splittable.fill(0);
-    for (let level = 0; level + 1 < this.levels.length; level += 1) {
-      const at = this.levels[level]!;
-      const fine = this.levels[level + 1]!;
-      const coarse = level > 0 ? this.levels[level - 1]! : undefined;
+    this.splittable.fill(0);
+    for (let level = 0; level < this.levels; level += 1) {
       let any = false;
-      for (let ty = 0; ty < fine.tileSide; ty += 1) {
-        for (let tx = 0; tx < fine.tileSide; tx += 1) {
-          if (fine.usable[ty * fine.tileSide + tx] === 0) continue;
-          // A tile of the finer level covers 2 x 2 sub-patches of this one.
-          for (let i = 0; i < 4; i += 1) {
-            const px = 2 * tx + (i & 1);
-            const py = 2 * ty + (i >> 1);
-            if (coarse === undefined ? at.usable[0] === 1 : neighboursCanExist(coarse, at.side, px, py)) {
-              at.splittable[py * at.side + px] = 1;
-              any = true;
-            }
-          }
+      for (const fine of this.byLevel[level + 1]!) {
+        const page = this.parent[fine]!;
+        if (this.usable[fine] === 0 || this.usable[page] === 0 || this.fade[page]! > 0) continue;
+        const corner = (page << 4) | ((this.tileY[fine]! & 1) << 3) | ((this.tileX[fine]! & 1) << 1);
+        // A tile of the finer level covers 2 x 2 sub-patches of this one.
+        for (const node of [corner, corner + 1, corner + 4, corner + 5]) {
+          if (level > 0 && !this.neighboursCanExist(level, node)) continue;
+          this.splittable[node] = 1;
+          any = true;
         }
       }
       if (!any) break;
     }
   }
 
-  private merge(level: number): void {
-    const at = this.levels[level]!;
-    at.min.set(at.ownMin);
-    at.max.set(at.ownMax);
-    at.error.fill(0);
-    const fine = this.levels[level + 1];
-    if (fine === undefined) return;
-    for (let ty = 0; ty < fine.tileSide; ty += 1) {
-      for (let tx = 0; tx < fine.tileSide; tx += 1) {
-        if (fine.held[ty * fine.tileSide + tx] === 1) mergeTile(at, fine, tx, ty);
+  /** The nodes around one exist when the nodes above them are split: its own and those on the sides that it touches. */
+  private neighboursCanExist(level: number, node: number): boolean {
+    const page = node >> 4;
+    const last = (SUBPATCHES << level) - 1;
+    const dx = (node & 1) * 2 - 1;
+    const dy = ((node >> 2) & 1) * 2 - 1;
+    const px = this.tileX[page]! * SUBPATCHES + (node & 3) + dx;
+    const py = this.tileY[page]! * SUBPATCHES + ((node >> 2) & 3) + dy;
+    const inX = px >= 0 && px <= last;
+    const inY = py >= 0 && py <= last;
+    const up = this.above(node);
+    return (
+      this.splittable[up] === 1 &&
+      (!inX || this.canSplit(up, dx, 0)) &&
+      (!inY || this.canSplit(up, 0, dy)) &&
+      (!inX || !inY || this.canSplit(up, dx, dy))
+    );
+  }
+
+  private canSplit(node: number, dx: number, dy: number): boolean {
+    const to = this.neighbour(node, dx, dy);
+    return to >= 0 && this.splittable[to] === 1;
+  }
+
+  /** The page of a tile, made with those of its ancestors when it is new. */
+  private page(level: number, x: number, y: number): number {
+    const key = tileKey(level, x, y);
+    const known = this.index.get(key);
+    if (known !== undefined) return known;
+    const up = level > 0 ? this.page(level - 1, x >> 1, y >> 1) : -1;
+    const page = this.free.pop() ?? this.used++;
+    if (page >= this.capacity) this.grow();
+    this.index.set(key, page);
+    this.byLevel[level]!.push(page);
+    this.tileLevel[page] = level;
+    this.tileX[page] = x;
+    this.tileY[page] = y;
+    this.held[page] = 0;
+    this.usable[page] = 0;
+    this.fade[page] = 0;
+    this.stamps[page] = -1;
+    this.seen[page] = this.round;
+    for (const own of [this.ownMin, this.ownMax, this.ownError, this.min, this.max, this.error, this.splittable])
+      own.fill(0, page * SUBS, (page + 1) * SUBS);
+    this.child.fill(-1, page * 4, page * 4 + 4);
+    this.parent[page] = up;
+    if (up >= 0) this.child[up * 4 + 2 * (y & 1) + (x & 1)] = page;
+    this.link(page, true);
+    this.splittableStale = true;
+    return page;
+  }
+
+  /** Makes a page and its neighbours know each other, or forget. */
+  private link(page: number, on: boolean): void {
+    const level = this.tileLevel[page]!;
+    const last = (1 << level) - 1;
+    for (let i = 0; i < 9; i += 1) {
+      const x = this.tileX[page]! + (i % 3) - 1;
+      const y = this.tileY[page]! + Math.floor(i / 3) - 1;
+      const inside = i !== SELF && x >= 0 && y >= 0 && x <= last && y <= last;
+      const other = inside ? (this.index.get(tileKey(level, x, y)) ?? -1) : -1;
+      this.near[page * 9 + i] = i === SELF ? page : other;
+      if (other >= 0) this.near[other * 9 + 8 - i] = on ? page : -1;
+    }
+  }
+
+  /** Frees the pages of a level that nobody needs: their tile has gone from store and atlas, and so have its children. */
+  private prune(level: number): void {
+    const pages = this.byLevel[level]!;
+    let kept = 0;
+    for (const page of pages) {
+      if (this.seen[page] !== this.round) this.held[page] = 0;
+      const c = page * 4;
+      const leaf = this.child[c]! < 0 && this.child[c + 1]! < 0 && this.child[c + 2]! < 0 && this.child[c + 3]! < 0;
+      if (level === 0 || this.held[page] === 1 || this.usable[page] === 1 || !leaf) {
+        pages[kept++] = page;
+        continue;
       }
+      const [x, y] = [this.tileX[page]!, this.tileY[page]!];
+      this.index.delete(tileKey(level, x, y));
+      this.link(page, false);
+      this.child[this.parent[page]! * 4 + 2 * (y & 1) + (x & 1)] = -1;
+      this.free.push(page);
     }
+    pages.length = kept;
   }
-}
 
-function neighboursCanExist(coarse: PatchLevel, side: number, px: number, py: number): boolean {
-  const x0 = Math.max(0, px - 1) >> 1;
-  const x1 = Math.min(side - 1, px + 1) >> 1;
-  const y0 = Math.max(0, py - 1) >> 1;
-  const y1 = Math.min(side - 1, py + 1) >> 1;
-  for (let y = y0; y <= y1; y += 1) {
-    for (let x = x0; x <= x1; x += 1) if (coarse.splittable[y * coarse.side + x] === 0) return false;
+  private grow(): void {
+    this.capacity *= 2;
+    const wider = <A extends { length: number; set(from: A): void }>(old: A): A => {
+      const grown = new (old.constructor as new (n: number) => A)(old.length * 2);
+      grown.set(old);
+      return grown;
+    };
+    this.tileLevel = wider(this.tileLevel);
+    this.tileX = wider(this.tileX);
+    this.tileY = wider(this.tileY);
+    this.parent = wider(this.parent);
+    this.child = wider(this.child);
+    this.near = wider(this.near);
+    this.held = wider(this.held);
+    this.usable = wider(this.usable);
+    this.fade = wider(this.fade);
+    this.min = wider(this.min);
+    this.max = wider(this.max);
+    this.error = wider(this.error);
+    this.splittable = wider(this.splittable);
+    this.ownMin = wider(this.ownMin);
+    this.ownMax = wider(this.ownMax);
+    this.ownError = wider(this.ownError);
+    this.stamps = wider(this.stamps);
+    this.seen = wider(this.seen);
   }
-  return true;
-}
 
-function readTile(at: PatchLevel, tile: Tile): void {
-  for (let row = 0; row < SUBPATCHES; row += 1) {
-    const to = (tile.y * SUBPATCHES + row) * at.side + tile.x * SUBPATCHES;
-    const from = row * SUBPATCHES;
-    for (let col = 0; col < SUBPATCHES; col += 1) {
-      const error = tile.subError[from + col]!;
-      at.ownError[to + col] = error;
+  private read(page: number, tile: Tile): void {
+    for (let sub = 0; sub < SUBS; sub += 1) {
+      const node = page * SUBS + sub;
+      const error = tile.subError[sub]!;
+      this.ownError[node] = error;
       // The morph may show the parent's surface, which lies within `error` of this one.
-      at.ownMin[to + col] = tile.subMin[from + col]! - error;
-      at.ownMax[to + col] = tile.subMax[from + col]! + error;
+      this.ownMin[node] = tile.subMin[sub]! - error;
+      this.ownMax[node] = tile.subMax[sub]! + error;
     }
   }
-}
 
-function mergeTile(at: PatchLevel, fine: PatchLevel, tx: number, ty: number): void {
-  for (let i = 0; i < 4; i += 1) {
-    const px = 2 * tx + (i & 1);
-    const py = 2 * ty + (i >> 1);
-    const to = py * at.side + px;
-    for (let j = 0; j < 4; j += 1) {
-      const from = (2 * py + (j >> 1)) * fine.side + 2 * px + (j & 1);
-      at.min[to] = Math.min(at.min[to]!, fine.min[from]!);
-      at.max[to] = Math.max(at.max[to]!, fine.max[from]!);
-      at.error[to] = Math.max(at.error[to]!, fine.ownError[from]!, fine.error[from]!);
+  /** A page's figures from its own tile and its held children, which are merged already. */
+  private merge(page: number): void {
+    const { min, max, error, ownError } = this;
+    const first = page * SUBS;
+    for (let node = first; node < first + SUBS; node += 1) {
+      min[node] = this.ownMin[node]!;
+      max[node] = this.ownMax[node]!;
+      error[node] = 0;
+    }
+    for (let q = 0; q < 4; q += 1) {
+      const fine = this.child[page * 4 + q]!;
+      if (fine < 0 || this.held[fine] === 0) continue;
+      const corner = first + (q & 2) * 4 + (q & 1) * 2;
+      for (let sub = 0; sub < SUBS; sub += 1) {
+        const from = fine * SUBS + sub;
+        const to = corner + ((sub >> 3) << 2) + ((sub & 3) >> 1);
+        if (min[from]! < min[to]!) min[to] = min[from]!;
+        if (max[from]! > max[to]!) max[to] = max[from]!;
+        const worst = Math.max(ownError[from]!, error[from]!);
+        if (worst > error[to]!) error[to] = worst;
+      }
     }
   }
 }

@@ -10,8 +10,8 @@
  */
 
 import type { CameraState, TileView } from "../core/types.ts";
-import { QUANTA_PER_CELL } from "../generated/contract.ts";
-import { type PatchLevel, PatchTree } from "./patchtree.ts";
+import { PATCH_CELLS, QUANTA_PER_CELL, SUBPATCHES } from "../generated/contract.ts";
+import { PatchTree } from "./patchtree.ts";
 
 /** Uint32 words of a patch record; the vertex shader reads the same (terrain.wgsl, `PatchIn`). */
 export const RECORD_WORDS = 4;
@@ -64,13 +64,20 @@ interface Wish extends TileRequest {
   priority: number;
 }
 
+/** Pages that were wished for or touched in this call. */
+const WISHED = 1;
+const TOUCHED = 2;
+
 export class Selection {
   readonly tree: PatchTree;
-  private readonly split: Uint8Array[];
+  // Per node of the tree.
+  private split: Uint8Array;
   /** Screen error of a split patch in taus: its children morph towards it as this falls to 1. */
-  private readonly ratio: Float32Array[];
+  private ratio: Float32Array;
   private readonly splitList: number[][];
-  private readonly wished: Uint8Array[];
+  // Per page.
+  private flags: Uint8Array;
+  private slotOf: Int32Array;
   private wishes: Wish[] = [];
   private readonly planes = new Float64Array(24);
   private records = new Uint32Array(RECORD_WORDS * 1024);
@@ -83,12 +90,15 @@ export class Selection {
   private seaM = Number.NEGATIVE_INFINITY;
   private slots: Slots | null = null;
 
+  /** `levels`: the finest level that can exist. */
   constructor(readonly levels: number) {
     this.tree = new PatchTree(levels);
-    this.split = this.tree.levels.map((at) => new Uint8Array(at.side * at.side));
-    this.ratio = this.tree.levels.map((at) => new Float32Array(at.side * at.side));
-    this.splitList = this.tree.levels.map(() => []);
-    this.wished = this.tree.levels.map((at) => new Uint8Array(at.tileSide * at.tileSide));
+    const { capacity } = this.tree;
+    this.split = new Uint8Array(capacity * 16);
+    this.ratio = new Float32Array(capacity * 16);
+    this.flags = new Uint8Array(capacity);
+    this.slotOf = new Int32Array(capacity);
+    this.splitList = Array.from({ length: levels + 1 }, () => []);
   }
 
   /**
@@ -109,22 +119,22 @@ export class Selection {
     this.tree.sync(view);
     this.tree.updateSplittable();
     this.begin(view, camera, tauPx, slots, pixelScale);
-    const root = this.tree.levels[0]!;
-    if (root.usable[0] === 1) {
+    const { usable, held, min, max } = this.tree;
+    if (usable[0] === 1) {
       slots.touch(0, 0, 0);
-      for (let i = 0; i < root.side * root.side; i += 1) this.descend(0, i % root.side, Math.floor(i / root.side));
+      for (let node = 0; node < 16; node += 1) this.descend(0, node);
       this.enforce();
       this.touchSplit();
-      for (const index of this.rootOrder()) this.emit(0, index % root.side, Math.floor(index / root.side), 0);
-    } else if (root.held[0] === 1) {
-      this.wish(0, 0, 0, 1);
+      for (const node of this.rootOrder()) this.emit(0, node, 0);
+    } else if (held[0] === 1) {
+      this.wish(0, 1);
     }
     this.wishes.sort((a, b) => a.level - b.level || b.priority - a.priority);
     let minHeight = Number.POSITIVE_INFINITY;
     let maxHeight = Number.NEGATIVE_INFINITY;
-    for (let i = 0; i < root.min.length; i += 1) {
-      minHeight = Math.min(minHeight, root.min[i]!);
-      maxHeight = Math.max(maxHeight, root.max[i]!);
+    for (let node = 0; node < 16; node += 1) {
+      minHeight = Math.min(minHeight, min[node]!);
+      maxHeight = Math.max(maxHeight, max[node]!);
     }
     return { count: this.count, records: this.records, requests: this.wishes, minHeight, maxHeight };
   }
@@ -142,58 +152,77 @@ export class Selection {
       ? heightPx / camera.orthoHeight
       : heightPx / (2 * Math.tan((camera.fovDeg * Math.PI) / 360));
     frustumPlanes(camera.viewProj, this.planes);
-    for (let level = 0; level < this.split.length; level += 1) {
-      const flags = this.split[level]!;
-      for (const index of this.splitList[level]!) flags[index] = 0;
-      this.splitList[level]!.length = 0;
-      this.wished[level]!.fill(0);
+    for (const list of this.splitList) {
+      for (const node of list) this.split[node] = 0;
+      list.length = 0;
     }
+    const { capacity } = this.tree;
+    if (this.flags.length < capacity) {
+      this.split = new Uint8Array(capacity * 16);
+      this.ratio = new Float32Array(capacity * 16);
+      this.flags = new Uint8Array(capacity);
+      this.slotOf = new Int32Array(capacity);
+    }
+    this.flags.fill(0);
+    this.slotOf.fill(-1);
   }
 
-  private descend(level: number, px: number, py: number): void {
-    const at = this.tree.levels[level]!;
-    const index = py * at.side + px;
-    if (level >= this.levels || at.error[index] === 0 || !this.visible(at, px, py)) return;
-    const ratio = this.screenError(at, px, py);
+  private descend(level: number, node: number): void {
+    const { tree } = this;
+    if (level >= this.levels || tree.error[node] === 0 || !this.visible(level, node)) return;
+    const ratio = this.screenError(level, node);
     if (ratio <= 1) return;
-    if (at.splittable[index] === 0) {
-      this.wish(level + 1, px >> 1, py >> 1, ratio);
+    const page = tree.childPage(node);
+    if (tree.splittable[node] === 0) {
+      if (page >= 0) this.wish(page, ratio);
       return;
     }
-    this.markSplit(level, index, ratio);
-    for (let i = 0; i < 4; i += 1) this.descend(level + 1, 2 * px + (i & 1), 2 * py + (i >> 1));
+    this.markSplit(level, node, ratio);
+    const first = tree.firstChild(node, page);
+    this.descend(level + 1, first);
+    this.descend(level + 1, first + 1);
+    this.descend(level + 1, first + 4);
+    this.descend(level + 1, first + 5);
   }
 
   /** Error of stopping at this patch, in taus; at most 1 when it need not be split. */
-  private screenError(at: PatchLevel, px: number, py: number): number {
-    const index = py * at.side + px;
-    const cell = this.sizeM / (at.side * 16);
-    const scale = this.pixels / (this.ortho ? 1 : this.distance(at, px, py));
+  private screenError(level: number, node: number): number {
+    const cell = this.sizeM / ((SUBPATCHES << level) * PATCH_CELLS);
+    const scale = this.pixels / (this.ortho ? 1 : this.distance(level, node));
     const cellPx = cell * scale;
     if (cellPx <= SMALLEST_CELL * this.tau) return 0;
-    const error = at.error[index]!;
+    const error = this.tree.error[node]!;
     const geometric = (error * scale) / this.tau;
     const rough = error > SHADING_ERROR * cell ? cellPx / (SHADING_CELL_PX * this.tau) : 0;
     return Math.max(geometric, rough);
   }
 
-  private distance(at: PatchLevel, px: number, py: number): number {
-    const w = this.sizeM / at.side;
-    const index = py * at.side + px;
+  /** Column and row of a node on its level. */
+  private column(node: number): number {
+    return this.tree.tileX[node >> 4]! * SUBPATCHES + (node & 3);
+  }
+
+  private row(node: number): number {
+    return this.tree.tileY[node >> 4]! * SUBPATCHES + ((node >> 2) & 3);
+  }
+
+  private distance(level: number, node: number): number {
+    const w = this.sizeM / (SUBPATCHES << level);
+    const px = this.column(node);
+    const py = this.row(node);
     const dx = outside(this.eye[0]!, px * w, (px + 1) * w);
     const dy = outside(this.eye[1]!, py * w, (py + 1) * w);
-    const dz = outside(this.eye[2]!, at.min[index]!, at.max[index]!);
+    const dz = outside(this.eye[2]!, this.tree.min[node]!, this.tree.max[node]!);
     return Math.max(1e-3, Math.sqrt(dx * dx + dy * dy + dz * dz));
   }
 
-  private visible(at: PatchLevel, px: number, py: number): boolean {
-    const w = this.sizeM / at.side;
-    const index = py * at.side + px;
-    const x0 = px * w;
-    const y0 = py * w;
+  private visible(level: number, node: number): boolean {
+    const w = this.sizeM / (SUBPATCHES << level);
+    const x0 = this.column(node) * w;
+    const y0 = this.row(node) * w;
     const p = this.planes;
-    const low = at.min[index]!;
-    const high = Math.max(at.max[index]!, this.seaM);
+    const low = this.tree.min[node]!;
+    const high = Math.max(this.tree.max[node]!, this.seaM);
     for (let i = 0; i < 24; i += 4) {
       const a = p[i]!;
       const b = p[i + 1]!;
@@ -204,115 +233,113 @@ export class Selection {
     return true;
   }
 
-  private markSplit(level: number, index: number, ratio: number): void {
-    this.split[level]![index] = 1;
-    this.ratio[level]![index] = ratio;
-    this.splitList[level]!.push(index);
+  private markSplit(level: number, node: number, ratio: number): void {
+    this.split[node] = 1;
+    this.ratio[node] = ratio;
+    this.splitList[level]!.push(node);
   }
 
   /** Fine to coarse: the neighbours of a split patch must exist, so their parents are split as well. */
   private enforce(): void {
+    const { tree } = this;
     for (let level = this.levels - 1; level > 0; level -= 1) {
-      const at = this.tree.levels[level]!;
-      const coarse = this.tree.levels[level - 1]!;
-      const flags = this.split[level - 1]!;
-      for (const index of this.splitList[level]!) {
-        const px = index % at.side;
-        const py = (index - px) / at.side;
-        const x0 = Math.max(0, px - 1) >> 1;
-        const x1 = Math.min(at.side - 1, px + 1) >> 1;
-        const y0 = Math.max(0, py - 1) >> 1;
-        const y1 = Math.min(at.side - 1, py + 1) >> 1;
-        for (let y = y0; y <= y1; y += 1) {
-          for (let x = x0; x <= x1; x += 1) {
-            const to = y * coarse.side + x;
-            if (flags[to] === 0) this.markSplit(level - 1, to, 0);
-          }
-        }
+      for (const node of this.splitList[level]!) {
+        const up = tree.above(node);
+        const dx = (node & 1) * 2 - 1;
+        const dy = ((node >> 2) & 1) * 2 - 1;
+        this.ensureSplit(level - 1, up);
+        this.ensureSplit(level - 1, tree.neighbour(up, dx, 0));
+        this.ensureSplit(level - 1, tree.neighbour(up, 0, dy));
+        this.ensureSplit(level - 1, tree.neighbour(up, dx, dy));
       }
     }
   }
 
+  /** `node` may be -1: outside the domain. (Inside, `splittable` has seen to it that it is there.) */
+  private ensureSplit(level: number, node: number): void {
+    if (node >= 0 && this.split[node] === 0) this.markSplit(level, node, 0);
+  }
+
   private touchSplit(): void {
-    const slots = this.slots!;
-    const seen = this.wished;
+    const { tree, flags } = this;
     for (let level = 0; level < this.levels; level += 1) {
-      const side = this.tree.levels[level]!.side;
-      const tileSide = this.tree.levels[level + 1]!.tileSide;
-      for (const index of this.splitList[level]!) {
-        const px = index % side;
-        const tx = px >> 1;
-        const ty = ((index - px) / side) >> 1;
-        const flags = seen[level + 1]!;
-        if ((flags[ty * tileSide + tx]! & 2) !== 0) continue;
-        flags[ty * tileSide + tx]! |= 2;
-        slots.touch(level + 1, tx, ty);
+      for (const node of this.splitList[level]!) {
+        const page = tree.childPage(node);
+        if ((flags[page]! & TOUCHED) !== 0) continue;
+        flags[page]! |= TOUCHED;
+        this.slots!.touch(level + 1, tree.tileX[page]!, tree.tileY[page]!);
       }
     }
   }
 
   /** Asks for a tile and for the neighbours of its parents, without which it could not be drawn. */
-  private wish(level: number, x: number, y: number, priority: number): void {
-    const at = this.tree.levels[level]!;
-    const index = y * at.tileSide + x;
-    if ((this.wished[level]![index]! & 1) !== 0) return;
-    this.wished[level]![index]! |= 1;
-    if (at.held[index] === 1 && at.usable[index] === 0) this.wishes.push({ level, x, y, priority });
+  private wish(page: number, priority: number): void {
+    const { tree } = this;
+    if ((this.flags[page]! & WISHED) !== 0) return;
+    this.flags[page]! |= WISHED;
+    const level = tree.tileLevel[page]!;
+    const x = tree.tileX[page]!;
+    const y = tree.tileY[page]!;
+    if (tree.held[page] === 1 && tree.usable[page] === 0) this.wishes.push({ level, x, y, priority });
     if (level === 0) return;
-    for (let dy = -1; dy <= 1; dy += 1) {
-      for (let dx = -1; dx <= 1; dx += 1) {
-        const nx = x + dx;
-        const ny = y + dy;
-        if (nx < 0 || ny < 0 || nx >= at.tileSide || ny >= at.tileSide) continue;
-        this.wish(level - 1, nx >> 1, ny >> 1, priority);
-      }
+    const near = tree.parent[page]! * 9 + 4;
+    const dx = (x & 1) * 2 - 1;
+    const dy = (y & 1) * 6 - 3;
+    for (const step of [0, dx, dy, dx + dy]) {
+      const around = tree.near[near + step]!;
+      if (around >= 0) this.wish(around, priority);
     }
   }
 
   private rootOrder(): number[] {
-    const root = this.tree.levels[0]!;
-    const order = Array.from({ length: root.side * root.side }, (_, i) => i);
-    const away = order.map((i) => this.distance(root, i % root.side, Math.floor(i / root.side)));
+    const order = Array.from({ length: 16 }, (_, i) => i);
+    const away = order.map((node) => this.distance(0, node));
     return order.sort((a, b) => away[a]! - away[b]!);
   }
 
-  private emit(level: number, px: number, py: number, morph: number): void {
-    const at = this.tree.levels[level]!;
-    const index = py * at.side + px;
-    if (!this.visible(at, px, py)) return;
-    if (this.split[level]![index] === 0) {
-      this.write(at, px, py, morph);
+  private emit(level: number, node: number, morph: number): void {
+    const { tree } = this;
+    if (!this.visible(level, node)) return;
+    if (this.split[node] === 0) {
+      this.write(level, node, morph);
       return;
     }
-    const ratio = this.ratio[level]![index]!;
-    const childMorph = morphOf(ratio);
-    const w = this.sizeM / at.side;
+    const page = tree.childPage(node);
+    const childMorph = Math.max(morphOf(this.ratio[node]!), tree.fade[page]!);
+    const w = this.sizeM / (SUBPATCHES << level);
+    const first = tree.firstChild(node, page);
     // Nearest quadrant first, for early depth rejection.
-    const near = (this.eye[0]! > (px + 0.5) * w ? 1 : 0) | (this.eye[1]! > (py + 0.5) * w ? 2 : 0);
-    for (const flip of [0, 1, 2, 3]) {
+    const near =
+      (this.eye[0]! > (this.column(node) + 0.5) * w ? 1 : 0) | (this.eye[1]! > (this.row(node) + 0.5) * w ? 2 : 0);
+    for (let flip = 0; flip < 4; flip += 1) {
       const i = near ^ flip;
-      this.emit(level + 1, 2 * px + (i & 1), 2 * py + (i >> 1), childMorph);
+      this.emit(level + 1, first + (i & 1) + 2 * (i & 2), childMorph);
     }
   }
 
-  private write(at: PatchLevel, px: number, py: number, morph: number): void {
+  private write(level: number, node: number, morph: number): void {
     if ((this.count + 1) * RECORD_WORDS > this.records.length) {
       const grown = new Uint32Array(this.records.length * 2);
       grown.set(this.records);
       this.records = grown;
     }
-    const level = at.level;
-    const last = at.side - 1;
+    const { tree } = this;
+    const px = this.column(node);
+    const py = this.row(node);
+    const last = (SUBPATCHES << level) - 1;
     let edges = 0;
-    if (px > 0 && !this.exists(level, px - 1, py)) edges |= EDGE_WEST;
-    if (px < last && !this.exists(level, px + 1, py)) edges |= EDGE_EAST;
-    if (py > 0 && !this.exists(level, px, py - 1)) edges |= EDGE_SOUTH;
-    if (py < last && !this.exists(level, px, py + 1)) edges |= EDGE_NORTH;
+    if (px > 0 && !this.exists(level, tree.neighbour(node, -1, 0))) edges |= EDGE_WEST;
+    if (px < last && !this.exists(level, tree.neighbour(node, 1, 0))) edges |= EDGE_EAST;
+    if (py > 0 && !this.exists(level, tree.neighbour(node, 0, -1))) edges |= EDGE_SOUTH;
+    if (py < last && !this.exists(level, tree.neighbour(node, 0, 1))) edges |= EDGE_NORTH;
     let corners = 0;
     if (level > 0) {
       for (let corner = 0; corner < 4; corner += 1) {
-        const weight = this.cornerMorph(at, px, py, (corner & 1) * 2 - 1, (corner >> 1) * 2 - 1, morph);
-        corners |= Math.round(weight * 255) << (8 * corner);
+        const sx = (corner & 1) * 2 - 1;
+        const sy = (corner >> 1) * 2 - 1;
+        const inX = sx < 0 ? px > 0 : px < last;
+        const inY = sy < 0 ? py > 0 : py < last;
+        corners |= Math.round(this.cornerMorph(node, inX ? sx : 0, inY ? sy : 0, morph) * 255) << (8 * corner);
       }
     }
     const border =
@@ -320,38 +347,50 @@ export class Selection {
       (px === last ? EDGE_EAST : 0) |
       (py === 0 ? EDGE_SOUTH : 0) |
       (py === last ? EDGE_NORTH : 0);
-    const slots = this.slots!;
-    const own = slots.slot(level, px >> 2, py >> 2);
-    const parent = level > 0 ? slots.slot(level - 1, px >> 3, py >> 3) : own;
-    const at0 = this.count * RECORD_WORDS;
-    this.records[at0] = ((px * 16) | ((py * 16) << 16)) >>> 0;
-    this.records[at0 + 1] = (own | (parent << 16)) >>> 0;
-    const wet = at.min[py * at.side + px]! < this.seaM ? WET : 0;
-    this.records[at0 + 2] = level | (edges << 8) | (border << 12) | wet;
-    this.records[at0 + 3] = corners >>> 0;
+    const own = this.slot(node >> 4);
+    const parent = level > 0 ? this.slot(tree.parent[node >> 4]!) : own;
+    const at = this.count * RECORD_WORDS;
+    this.records[at] = ((px * PATCH_CELLS) | ((py * PATCH_CELLS) << 16)) >>> 0;
+    this.records[at + 1] = (own | (parent << 16)) >>> 0;
+    const wet = tree.min[node]! < this.seaM ? WET : 0;
+    this.records[at + 2] = level | (edges << 8) | (border << 12) | wet;
+    this.records[at + 3] = corners >>> 0;
     this.count += 1;
   }
 
-  /** Weight of the corner towards (sx, sy): the greatest wish of the patches of this level that meet there. */
-  private cornerMorph(at: PatchLevel, px: number, py: number, sx: number, sy: number, own: number): number {
+  private slot(page: number): number {
+    const known = this.slotOf[page]!;
+    if (known >= 0) return known;
+    const { tree } = this;
+    const found = this.slots!.slot(tree.tileLevel[page]!, tree.tileX[page]!, tree.tileY[page]!);
+    this.slotOf[page] = found;
+    return found;
+  }
+
+  /**
+   * Weight of the corner towards (sx, sy), 0 where the domain ends: the greatest wish of the patches of this level that
+   * meet there. Not for level 0.
+   */
+  private cornerMorph(node: number, sx: number, sy: number, own: number): number {
+    const { tree } = this;
     let weight = own;
     for (let i = 1; i < 4; i += 1) {
-      const nx = px + (i & 1) * sx;
-      const ny = py + (i >> 1) * sy;
-      if (nx < 0 || ny < 0 || nx >= at.side || ny >= at.side) continue;
-      if (!this.exists(at.level, nx, ny)) return 1;
-      if (this.split[at.level]![ny * at.side + nx] === 1) return 0;
-      const parent = this.tree.levels[at.level - 1]!;
-      weight = Math.max(weight, morphOf(this.ratio[at.level - 1]![(ny >> 1) * parent.side + (nx >> 1)]!));
+      const dx = (i & 1) * sx;
+      const dy = (i >> 1) * sy;
+      if ((i & 1 && dx === 0) || (i & 2 && dy === 0)) continue;
+      const at = tree.neighbour(node, dx, dy);
+      if (at < 0) return 1;
+      const up = tree.above(at);
+      if (this.split[up] === 0) return 1;
+      if (this.split[at] === 1) return 0;
+      weight = Math.max(weight, morphOf(this.ratio[up]!), tree.fade[at >> 4]!);
     }
     return weight;
   }
 
-  /** True when the patch is a node of the cut's tree (drawn or split): its parent is split. */
-  private exists(level: number, px: number, py: number): boolean {
-    if (level === 0) return true;
-    const side = this.tree.levels[level - 1]!.side;
-    return this.split[level - 1]![(py >> 1) * side + (px >> 1)] === 1;
+  /** True when the patch is a node of the cut's tree (drawn or split): its parent is split. -1: its tile is not there. */
+  private exists(level: number, node: number): boolean {
+    return level === 0 || (node >= 0 && this.split[this.tree.above(node)] === 1);
   }
 }
 
