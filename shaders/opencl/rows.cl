@@ -6,12 +6,20 @@
 // A level is n rows of `pitch` floats; sample (y, x) is at y * pitch + PAD + x. A channel is a whole level; channels lie
 // behind each other. PAD floats on both sides let vectors run past the ends. Borders are mirrored: before a row is used
 // as a neighbour its ghosts [-1] and [n] are set.
-#define PAD 16
 #define VW 16
 #define HARD_VALUE(d, soft) select(d, (float16)(soft), d < 0.0f)
 
 typedef global float *row_t;
 typedef global const float *crow_t;
+
+// The compiler's own vload16 takes sixteen floats in four pieces.
+typedef float16 __attribute__((aligned(4))) unaligned16;
+typedef float8 __attribute__((aligned(4))) unaligned8;
+#define FORCE_INLINE inline __attribute__((always_inline))
+FORCE_INLINE float16 load16(crow_t p) { return *(global const unaligned16 *)p; }
+FORCE_INLINE float8 load8(crow_t p) { return *(global const unaligned8 *)p; }
+FORCE_INLINE void prefetch_row(crow_t p) { __builtin_prefetch((const void *)(size_t)p); }
+FORCE_INLINE void store16(float16 v, row_t p) { *(global unaligned16 *)p = v; }
 
 inline crow_t crow(crow_t a, int y, int pitch) { return a + (size_t)y * pitch + PAD; }
 inline row_t row(row_t a, int y, int pitch) { return a + (size_t)y * pitch + PAD; }
@@ -26,11 +34,11 @@ inline void ghosts(row_t r, int n) {
 inline void restrict_row(row_t out, crow_t a, crow_t b, crow_t c, row_t tmp, int n) {
     int nc = n / 2 + 1;
     for (int x = 0; x < n; x += VW)
-        vstore16(vload16(0, b + x) + 0.5f * (vload16(0, a + x) + vload16(0, c + x)), 0, tmp + x);
+        store16(load16(b + x) + 0.5f * (load16(a + x) + load16(c + x)), tmp + x);
     ghosts(tmp, n);
     for (int x = 0; x < nc; x += VW) {
         row_t t = tmp + 2 * x;
-        float16 u = vload16(0, t), v = vload16(0, t + VW), l = vload16(0, t - 1), m = vload16(0, t + VW - 1);
-        vstore16((float16)(u.even + 0.5f * (u.odd + l.even), v.even + 0.5f * (v.odd + m.even)), 0, out + x);
+        float16 u = load16(t), v = load16(t + VW), l = load16(t - 1), m = load16(t + VW - 1);
+        store16((float16)(u.even + 0.5f * (u.odd + l.even), v.even + 0.5f * (v.odd + m.even)), out + x);
     }
 }

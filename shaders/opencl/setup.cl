@@ -9,14 +9,14 @@ inline void coarsen_row(crow_t d, crow_t f, row_t d2, row_t f2, int J, int n, in
     for (int x = 0; x < n; x += VW) {
         float16 ad = 0.0f, af = 0.0f;
         for (int i = 0; i < 3; i++) {
-            float16 dv = vload16(0, crow(d, ys[i], pitch) + x), fv = vload16(0, crow(f, ys[i], pitch) + x);
+            float16 dv = load16(crow(d, ys[i], pitch) + x), fv = load16(crow(f, ys[i], pitch) + x);
             float16 fixed = select((float16)(1.0f), (float16)(CREST_STIFFNESS), dv < 0.0f);
             float w = i == 1 ? 1.0f : 0.5f;
             ad += w * HARD_VALUE(dv, CREST_STIFFNESS);
             af += w * fixed * fv;
         }
-        vstore16(ad, 0, sd + x);
-        vstore16(af, 0, sf + x);
+        store16(ad, sd + x);
+        store16(af, sf + x);
     }
     ghosts(sd, n);
     ghosts(sf, n);
@@ -25,12 +25,12 @@ inline void coarsen_row(crow_t d, crow_t f, row_t d2, row_t f2, int J, int n, in
         float16 s[2];
         for (int i = 0; i < 2; i++) {
             row_t r = (i ? sf : sd) + 2 * x;
-            float16 u = vload16(0, r), v = vload16(0, r + VW), l = vload16(0, r - 1), m = vload16(0, r + VW - 1);
+            float16 u = load16(r), v = load16(r + VW), l = load16(r - 1), m = load16(r + VW - 1);
             s[i] = (float16)(u.even + 0.5f * (u.odd + l.even), v.even + 0.5f * (v.odd + m.even));
         }
         float16 k = 1.0f / (1.0f + SATURATION * s[0]);
-        if (write_d) vstore16(s[0] * k, 0, od + x);
-        vstore16(s[1] * k, 0, of + x);
+        if (write_d) store16(s[0] * k, od + x);
+        store16(s[1] * k, of + x);
     }
 }
 
@@ -66,11 +66,11 @@ kernel void divergence(crow_t f, crow_t d, crow_t g, row_t rhs, int n, int pitch
         float up = y == 0 ? -1.0f : (y == n - 1 ? 1.0f : 0.0f);
         row_t out = row(rhs, y, pitch);
         for (int x = 0; x < n; x += VW) {
-            float16 across = half_difference(vload16(0, gx + x - 1), vload16(0, gx + x + 1));
-            float16 north = vload16(0, gn + x), south = vload16(0, gs + x);
+            float16 across = half_difference(load16(gx + x - 1), load16(gx + x + 1));
+            float16 north = load16(gn + x), south = load16(gs + x);
             float16 along = up == 0.0f ? half_difference(south, north) : up * (south + north);
-            float16 fv = vload16(0, fr + x);
-            vstore16(select(fv + spacing * (across + along), fv, vload16(0, dr + x) < 0.0f), 0, out + x);
+            float16 fv = load16(fr + x);
+            store16(select(fv + spacing * (across + along), fv, load16(dr + x) < 0.0f), out + x);
         }
         // at the west and east border the row of the operator is doubled
         for (int e = 0; e < 2; e++) {

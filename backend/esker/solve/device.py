@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, Literal, cast
 
 from esker.contract import CHEBYSHEV_SWEEPS, SATURATION
-from esker.solve import gpu_program, pocl_cpu, reference, tables
+from esker.solve import gpu_program, pocl_cpu, reference, tables, wave
 from esker.solve.faults import BuildError, NoDeviceError, build_error, finished
 
 log = logging.getLogger(__name__)
@@ -190,6 +190,7 @@ def _literal(value: float | int) -> str:
 def _defines(more: dict[str, float | int]) -> str:
     values: dict[str, float | int] = {
         **tables.defines(),
+        **wave.defines(),
         "SATURATION": SATURATION,
         "CHEBYSHEV_SWEEPS": CHEBYSHEV_SWEEPS,
         "BOTTOM_LEVELS": reference.BOTTOM_LEVELS,

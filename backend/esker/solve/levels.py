@@ -14,16 +14,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from esker import grid
-from esker.contract import CHEBYSHEV_SWEEPS, TILE_CELLS, Stroke, TerrainSettings
-from esker.solve import raster
+from esker.contract import TILE_CELLS, Stroke, TerrainSettings
+from esker.solve import raster, wave
 from esker.solve.constraints import Packer, Tables, Window
 from esker.solve.device import Device
 from esker.solve.reference import BOTTOM_LEVELS, chebyshev_weights
 
-PAD = 16
-RING_ROWS = 4 * (CHEBYSHEV_SWEEPS + 2) + 17
+PAD = wave.PAD
 ALIGN = 64
 MIN_STRIP = 16
+MOST_BOUND = 512
+"""Kernels with arguments set that a launcher keeps; each costs a kilobyte or two, and setting them 50 microseconds."""
 
 
 def pitch_of(samples: int) -> int:
@@ -61,6 +62,11 @@ def shape_of(level: int) -> Shape:
     return Shape(level, n, pitch_of(n), stride)
 
 
+def scratch_floats(top: int) -> int:
+    """Scratch of one work-item: a wave's working set, or four rows of the finest level."""
+    return _round(max(wave.scratch_floats(), 4 * pitch_of(grid.samples(top)) + PAD))
+
+
 class Launcher:
     """A queue with its kernels, scratch and constant tables, for one finest level."""
 
@@ -68,8 +74,8 @@ class Launcher:
         import pyopencl as cl
 
         self.cl, self.device, self.queue = cl, device, device.queue
-        self.kernels = {k.function_name: k for k in device.program.all_kernels()}
-        self.scratch_stride = _round(RING_ROWS * pitch_of(grid.samples(top)))
+        self.bound: dict[tuple[Any, ...], Any] = {}
+        self.scratch_stride = scratch_floats(top)
         self.scratch = self.zeros(2 * device.strips * self.scratch_stride)
         self.weights = self.constant(chebyshev_weights().astype(np.float32))
         self.table = self.constant(bottom_table()[0])
@@ -88,8 +94,29 @@ class Launcher:
 
     def run(self, name: str, size: tuple[int, ...], *args: Any) -> None:
         """Enqueue one kernel, one work-item a work-group."""
-        kernel = self.kernels[name]
+        kernel = self.cl.Kernel(self.device.program, name)
         kernel.set_args(*args)
+        self._enqueue(kernel, size)
+
+    def again(self, name: str, size: tuple[int, ...], *args: Any, last: tuple[Any, ...] = ()) -> None:
+        """The same, for arguments that come again: setting them takes longer than most launches, so they are kept.
+
+        ``last``: arguments behind them that change, and are set every time.
+        """
+        key = (name, *args)
+        kernel = self.bound.pop(key, None)
+        if kernel is None:
+            kernel = self.cl.Kernel(self.device.program, name)
+            for k, value in enumerate(args):
+                kernel.set_arg(k, value)
+            if len(self.bound) >= MOST_BOUND:
+                del self.bound[next(iter(self.bound))]
+        self.bound[key] = kernel
+        for k, value in enumerate(last, len(args)):
+            kernel.set_arg(k, value)
+        self._enqueue(kernel, size)
+
+    def _enqueue(self, kernel: Any, size: tuple[int, ...]) -> None:
         self.cl.enqueue_nd_range_kernel(self.queue, kernel, size, (1,) * len(size))
 
     def strips(self, rows: int) -> tuple[int, int]:
@@ -118,7 +145,7 @@ class ClSystem:
 
     def coarsen(self, screening: float, rows: tuple[int, int] | None = None) -> None:
         """Constraints of all coarser levels from those of the top, of which only ``rows`` (half open) changed."""
-        run, i = self.launch.run, np.int32
+        run, i = self.launch.again, np.int32
         self.eps = {level: screening * 4.0 ** (self.top - level) for level in self.shapes}
         first, last = rows or (0, self.shapes[self.top].n)
         for level in range(self.top, 0, -1):
@@ -130,7 +157,7 @@ class ClSystem:
             run(
                 "coarsen", (strips, self.channels), *(self.fields[k] for k in (d, f, d2, f2)), i(fine.n), i(fine.pitch),
                 i(under.pitch), i(fine.stride), i(under.stride), self.launch.scratch, i(self.launch.scratch_stride),
-                i(each), i(first), i(last),
+                last=(i(each), i(first), i(last)),
             )  # fmt: skip
         run(
             "coarsen_bottom", (1,), self.fields["d", 0], self.fields[self.static, 0], self.launch.table,
@@ -143,18 +170,19 @@ class ClSystem:
         i, fine = np.int32, self.shapes[level]
         under = self.shapes[level - 1]
         strips, rows = self.launch.strips(fine.n)
-        self.launch.run(
-            "visit", (strips, self.channels), self.fields[guess, level] if guess else None,
+        self.launch.again(
+            "visit", (strips,), self.fields[guess, level] if guess else None,
             self.fields[correction, level - 1] if correction else None, self.fields[rhs, level],
             self.fields["d", level], self.fields[out, level], self.fields["b", level - 1] if residual else None,
-            i(fine.n), i(fine.pitch), i(under.pitch), i(fine.stride), i(under.stride), np.float32(self.eps[level]),
-            self.launch.scratch, i(self.launch.scratch_stride), i(rows), self.launch.weights,
+            i(fine.n), i(fine.pitch), i(under.pitch), i(self.channels), i(fine.stride), i(under.stride),
+            np.float32(self.eps[level]), self.launch.scratch, i(self.launch.scratch_stride), i(rows),
+            self.launch.weights,
         )  # fmt: skip
 
     def restrict(self, level: int) -> None:
         i, fine, under = np.int32, self.shapes[level], self.shapes[level - 1]
         strips, rows = self.launch.strips(under.n)
-        self.launch.run(
+        self.launch.again(
             "restriction", (strips, self.channels), self.fields["b", level], self.fields["b", level - 1], i(fine.n),
             i(fine.pitch), i(under.pitch), i(fine.stride), i(under.stride), self.launch.scratch,
             i(self.launch.scratch_stride), i(rows),
@@ -162,7 +190,7 @@ class ClSystem:
 
     def bottom(self, *, rhs: str, out: str, cycles: int) -> None:
         i = np.int32
-        self.launch.run(
+        self.launch.again(
             "bottom", (self.channels,), self.fields[rhs, 0], self.fields["d", 0], self.fields[out, 0],
             self.fields["t", 0], self.launch.table, i(BOTTOM_LEVELS), i(self.shapes[0].stride),
             np.float32(self.eps[0]), self.launch.scratch, i(self.launch.scratch_stride), self.launch.weights, i(cycles),
@@ -174,7 +202,7 @@ class ClSystem:
     def change(self, old: str, new: str) -> float:
         i, shape = np.int32, self.shapes[self.top]
         strips, rows = self.launch.strips(shape.n)
-        self.launch.run(
+        self.launch.again(
             "change", (strips,), self.fields[old, self.top], self.fields[new, self.top], self.launch.scratch,
             i(shape.n), i(shape.pitch), i(shape.stride), i(self.channels), i(rows),
         )  # fmt: skip
@@ -249,7 +277,7 @@ class ClWorkspace:
         i, shape = np.int32, self.height.shapes[level]
         strips, rows = self.launch.strips(shape.n)
         h = self.height.fields
-        self.launch.run(
+        self.launch.again(
             "divergence", (strips,), h["s", level], h["d", level], self.gradient.fields["u", level], h["f", level],
             i(shape.n), i(shape.pitch), i(shape.stride), np.float32(grid.spacing(level, self.size_m)), i(rows),
         )  # fmt: skip

@@ -73,7 +73,7 @@ def planned_bytes(device: Device, top: int) -> tuple[int, int]:
             stride = levels.shape_of(level).stride + levels.PAD if rows else gpu_levels.shape_of(level).stride
             floats.append(stride * (1 if name == "d" else channels))
     if rows:
-        floats.append(2 * device.strips * levels.RING_ROWS * levels.pitch_of(grid.samples(top)))
+        floats.append(2 * device.strips * levels.scratch_floats(top))
     return 4 * sum(floats), 4 * max(floats)
 
 
