@@ -69,7 +69,7 @@ class Client:
         self.waiting = None
         self.decoder.decode(plan.encode())
         self.tiles.commit(plan)
-        self.log.append((plan.kind, plan.level.level))
+        self.log.append((plan.kind, plan.level))
         self.check()
 
     def drain(self) -> None:
@@ -184,7 +184,7 @@ def test_fills_go_by_projected_error() -> None:
     assert plan is not None
     from esker.tiles.quadtree import select
 
-    error = select(server.pyramid.bounds(), view)[1][plan.level.level]
+    error = select(server.pyramid.bounds(), view)[1][plan.level]
     order = [float(error[k.y, k.x]) for k in plan.keys]
     assert len(order) > 3
     assert order == sorted(order, reverse=True)
@@ -308,8 +308,8 @@ def test_an_uncommitted_plan_changes_nothing_and_encodes_alike_in_any_thread() -
         assert set(pool.map(lambda _: plan.encode(), range(12))) == {first}
     again = client.plan()
     assert again is not None
-    assert again.level.level == 0
-    assert again.level.clock == 2
+    assert again.level == 0
+    assert again.clock == 2
     assert client.held() == {}
 
 
@@ -329,7 +329,7 @@ def test_a_local_change_is_coded_as_a_change() -> None:
     sizes = []
     while client.begin():
         assert client.waiting is not None
-        assert set(predictors(client.waiting)) <= {Predictor.PREVIOUS}
+        assert set(predictors(client.waiting)) <= {Predictor.PREVIOUS, Predictor.HELD}
         sizes.append(len(client.waiting.encode()))
         client.finish()
     client.check_newest()

@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.vectors import make_tiles
 
-from esker.contract import Predictor
+from esker.contract import CHANNEL_LEVELS_BELOW, MAX_LEVEL, MAX_REFINED_LEVEL, Channel, FrameKind, Predictor
 from esker.tiles.decoder import FrameDecoder
-from esker.tiles.frame import FrameError, read_frame
+from esker.tiles.frame import FrameError, FrameHead, read_frame, write_frame
 
 VECTORS: dict[str, Any] = json.loads(make_tiles.PATH.read_text())
 SESSION = [base64.b64decode(step["frame"]) for step in VECTORS["sessions"][0]["steps"]]
@@ -51,13 +51,43 @@ def test_the_vectors_use_every_predictor_where_it_matters() -> None:
     assert kinds["confirmed"][3] == set()  # the LEVEL frame that confirms and carries nothing
 
 
+def test_the_vectors_have_every_channel_and_the_finest_default_level_but_one() -> None:
+    """A change that leaves either out would leave the page's decoder untested."""
+    heads = {
+        session["name"]: [read_frame(base64.b64decode(s["frame"]))[0] for s in session["steps"]]
+        for session in VECTORS["sessions"]
+    }
+    assert {h.channel for h in heads["channels"]} == set(Channel)
+    fine = [h for h in heads["refined"] if h.level == 9]
+    assert {h.kind for h in fine} == set(FrameKind)
+    assert all(h.settled for h in heads["refined"])
+
+
+def test_levels_of_a_channel_end_below_those_of_the_heights() -> None:
+    for channel, finest in ((Channel.HEIGHT, MAX_REFINED_LEVEL), (Channel.ROUGHNESS, MAX_LEVEL - CHANNEL_LEVELS_BELOW)):
+        read_frame(write_frame(FrameHead(FrameKind.LEVEL, finest, 1, True, channel), [], []))
+        with pytest.raises(FrameError, match="above"):
+            read_frame(write_frame(FrameHead(FrameKind.LEVEL, finest + 1, 1, True, channel), [], []))
+
+
+def test_channels_are_kept_apart() -> None:
+    """A tile of one channel is never a parent, a base or a victim of another's (SPEC T23)."""
+    decoder = FrameDecoder()
+    for step in VECTORS["sessions"][4]["steps"]:
+        decoder.decode(base64.b64decode(step["frame"]))
+    sizes = {channel: len(held) for channel, held in decoder.channels.items()}
+    assert sizes == {Channel.HEIGHT: 85, Channel.AMPLITUDE: 5, Channel.ROUGHNESS: 5}
+    decoder.decode(write_frame(FrameHead(FrameKind.LEVEL, 0, 9, True, Channel.AMPLITUDE), [(0, 0)], []))
+    assert {c: len(h) for c, h in decoder.channels.items()} == sizes | {Channel.AMPLITUDE: 0}
+
+
 @pytest.mark.parametrize("case", VECTORS["malformed"], ids=lambda c: str(c["name"]))
 def test_malformed_frames_are_refused_and_change_nothing(case: dict[str, str]) -> None:
     decoder = opened()
-    before = dict(decoder.held)
+    before = {channel: dict(held) for channel, held in decoder.channels.items()}
     with pytest.raises(FrameError):
         decoder.decode(base64.b64decode(case["frame"]))
-    assert decoder.held == before
+    assert decoder.channels == before
     decoder.decode(SESSION[2])
 
 

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from esker import grid
 from esker.grid import TileKey
 from esker.tiles.codec import SAMPLE_LIMIT
-from esker.tiles.delivery import EncodedTiles, TileServer
+from esker.tiles.delivery import TileServer
+from esker.tiles.plans import EncodedTiles
 from esker.tiles.pyramid import Pyramid, quantise
 
 SIZE_M = 1024.0

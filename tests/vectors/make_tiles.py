@@ -16,12 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from esker import grid
-from esker.contract import FRAME_HEADER, TILE_HEADER, FrameKind, Predictor, View
-from esker.tiles.bounds import block_reduce, sub_error
+from esker.contract import FRAME_HEADER, TILE_HEADER, Channel, FrameKind, Predictor, View
+from esker.grid import TileKey
+from esker.tiles.bounds import block_reduce, parent_distance
 from esker.tiles.codec import SAMPLE_LIMIT, pack, predict
 from esker.tiles.decoder import DecodedFrame, FrameDecoder
 from esker.tiles.delivery import ClientTiles, TileServer
-from esker.tiles.frame import FrameHead, TileRecord, write_frame, write_tile
+from esker.tiles.frame import FrameHead, TileRecord, ratio, write_frame, write_tile
 
 PATH = Path(__file__).with_name("tiles.json")
 SIZE_M = 1000.0
@@ -133,6 +134,88 @@ def extreme() -> list[bytes]:
     return frames
 
 
+def channels() -> list[bytes]:
+    """Amplitude and roughness beside heights: flat, then a patch that grows and settles."""
+    server = TileServer(SIZE_M, LEVELS)
+    client = ClientTiles(server)
+    frames: list[bytes] = []
+    units = {Channel.HEIGHT: 40.0, Channel.AMPLITUDE: 30.0, Channel.ROUGHNESS: 0.4}
+
+    def drain() -> None:
+        while (plan := client.plan()) is not None:
+            frames.append(plan.encode())
+            client.commit(plan)
+
+    for clock in range(3):
+        for channel, unit in units.items():
+            for level in range(LEVELS + 1 if channel == Channel.HEIGHT else LEVELS - 1):
+                n = grid.samples(level)
+                y, x = np.mgrid[0:n, 0:n] * (SIZE_M / (n - 1))
+                patch = np.exp(-(((x - 300) / 80) ** 2) - ((y - 420) / 150) ** 2) * unit * clock
+                base = 0.5 if channel == Channel.ROUGHNESS else 0.0
+                server.put_level(clock, level, (base + patch).astype(np.float32), clock == 2, channel)
+        drain()
+    return frames
+
+
+class Made:
+    """A refined tile of an analytic ground: a crest with a kink, at any level the same function of the place."""
+
+    content = b""
+
+    def __init__(self, key: TileKey, lift: float, size_m: float = SIZE_M) -> None:
+        self.key = key
+        step = size_m / (64 << key.level)
+        y, x = (np.arange(65) + 64 * np.array([[key.y], [key.x]])) * step
+        self.heights = crest(x[None, :], y[:, None], lift)
+
+
+def crest(x: NDArray[np.float64], y: NDArray[np.float64], lift: float) -> NDArray[np.float32]:
+    """A roof along x = 437.3 m with wrinkles, lifted towards the north-west."""
+    h = (
+        90
+        - 0.9 * np.abs(x - 437.3 - 0.1 * y)
+        + 0.4 * np.abs(np.sin(y / 7.1))
+        + lift * np.exp(-(x**2 + (y - 900) ** 2) / 3e5)
+    )
+    return np.asarray(h, dtype=np.float32)
+
+
+def refined() -> list[bytes]:
+    """Tiles of levels 2 to 9 over levels 0 and 1: they come, ride along with an edit, are put right, and go."""
+    server = TileServer(SIZE_M, 1, 9)
+    client = ClientTiles(server)
+    frames: list[bytes] = []
+
+    def drain() -> None:
+        while (plan := client.plan()) is not None:
+            frames.append(plan.encode())
+            client.commit(plan)
+
+    def solve(clock: int, lift: float) -> None:
+        for level in (0, 1):
+            n = grid.samples(level)
+            y, x = np.mgrid[0:n, 0:n] * (SIZE_M / (n - 1))
+            server.put_level(clock, level, crest(x, y, lift), True)
+            drain()
+
+    def settle(clock: int, lift: float) -> None:
+        while wishes := server.wishes([client])[0]:
+            for key in wishes:
+                assert server.put_tile(clock, Made(key, lift))
+            drain()
+
+    client.set_view(View(eye=(486.0, 480.0, 91.3), target=(486.3, 483.0, 89.9), width=120, height=240, tau_px=6.0))
+    solve(1, 0)
+    settle(1, 0)
+    solve(2, 12)
+    settle(2, 12)
+    client.set_view(View(eye=(486.0, 480.0, 60.0), target=(486.3, -483.0, 80.0), width=120, height=240, tau_px=6.0))
+    solve(3, 9)
+    settle(3, 9)
+    return frames
+
+
 def malformed() -> list[dict[str, str]]:
     """Frames that every decoder must refuse, each applied to the state that ``session``'s first two frames leave."""
     first, second = session()[:2]
@@ -143,8 +226,11 @@ def malformed() -> list[dict[str, str]]:
     def patched(data: bytes, at: int, value: bytes) -> bytes:
         return data[:at] + value + data[at + len(value) :]
 
-    def retold(level: int, records: list[TileRecord], drops: list[tuple[int, int]]) -> bytes:
-        return write_frame(FrameHead(FrameKind.LEVEL, level, 1, False), drops, [write_tile(r) for r in records])
+    def retold(
+        level: int, records: list[TileRecord], drops: list[tuple[int, int]], channel: Channel = Channel.HEIGHT
+    ) -> bytes:
+        head = FrameHead(FrameKind.LEVEL, level, 1, False, channel)
+        return write_frame(head, drops, [write_tile(r) for r in records])
 
     planes, payload = pack(np.zeros((65, 65), dtype=np.int32))
     flat = TileRecord(0, 0, Predictor.ZERO, planes, 9, 0, payload)
@@ -155,7 +241,11 @@ def malformed() -> list[dict[str, str]]:
         "wrong magic": patched(first, 0, b"\0\0"),
         "wrong protocol": patched(first, offset["protocol"], b"\x63"),
         "unknown kind": patched(first, offset["kind"], b"\x09"),
-        "level too fine": patched(first, offset["level"], b"\x07"),
+        "level too fine": patched(first, offset["level"], b"\x0b"),
+        "channel level too fine": retold(5, [], [], Channel.AMPLITUDE),
+        "channel predicted from the heights": retold(
+            1, [TileRecord(0, 0, Predictor.PARENT, 0, 9, 1, b"")], [], Channel.ROUGHNESS
+        ),
         "unknown channel": patched(first, offset["channel"], b"\x09"),
         "more tiles than bytes": patched(first, offset["tiles"], b"\xff\xff"),
         "more drops than bytes": patched(first, offset["drops"], b"\xff\xff"),
@@ -193,7 +283,7 @@ def _bomb() -> bytes:
 
 def told(decoder: FrameDecoder, frame: bytes) -> dict[str, Any]:
     """What a decoder must make of the next frame."""
-    before = dict(decoder.held)
+    before = {channel: dict(held) for channel, held in decoder.channels.items()}
     out: DecodedFrame = decoder.decode(frame)
     tiles = []
     for key, tile in out.tiles.items():
@@ -202,7 +292,10 @@ def told(decoder: FrameDecoder, frame: bytes) -> dict[str, Any]:
         error = np.zeros(16, dtype=np.uint32)
         if key.level:
             r, c = 32 * (key.y & 1), 32 * (key.x & 1)
-            error = sub_error(tile.samples, before[key.parent()].samples[r : r + 33, c : c + 33]).ravel()
+            parent = before[out.channel][key.parent()].samples[r : r + 33, c : c + 33]
+            scale = ratio(out.channel)
+            worst = block_reduce(np.maximum, parent_distance(tile.samples * (2 // scale), parent), 16).ravel()
+            error = (-(-worst * scale // 4)).astype(np.uint32)
         tiles.append(
             {
                 "x": key.x,
@@ -217,19 +310,20 @@ def told(decoder: FrameDecoder, frame: bytes) -> dict[str, Any]:
         )
     return {
         "kind": int(out.kind),
+        "channel": int(out.channel),
         "level": out.level,
         "clock": out.clock,
         "settled": out.settled,
         "drops": [[d.x, d.y] for d in out.drops],
         "tiles": tiles,
-        "held": len(decoder.held),
+        "held": len(decoder.channels[out.channel]),
     }
 
 
 def build() -> dict[str, Any]:
     """The whole file."""
     sessions = []
-    for made in (session, interrupted, confirmed, extreme):
+    for made in (session, interrupted, confirmed, extreme, channels, refined):
         name, frames = made.__name__, made()
         decoder = FrameDecoder()
         steps = [{"frame": base64.b64encode(f).decode(), "decoded": told(decoder, f)} for f in frames]

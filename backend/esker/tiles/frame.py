@@ -11,10 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from esker.contract import (
+    CHANNEL_LEVELS_BELOW,
     FRAME_HEADER,
     FRAME_MAGIC,
     FRAME_SETTLED,
     MAX_LEVEL,
+    MAX_REFINED_LEVEL,
     PROTOCOL_VERSION,
     TILE_DROP,
     TILE_HEADER,
@@ -37,6 +39,17 @@ class FrameHead:
     level: int
     clock: int
     settled: bool
+    channel: Channel = Channel.HEIGHT
+
+
+def ratio(channel: Channel) -> int:
+    """Quanta of a level in one of the next coarser level: heights halve their step, the other channels keep it."""
+    return 2 if channel == Channel.HEIGHT else 1
+
+
+def finest_level(channel: Channel) -> int:
+    """The finest level that a frame of this channel may have."""
+    return MAX_REFINED_LEVEL if channel == Channel.HEIGHT else MAX_LEVEL - CHANNEL_LEVELS_BELOW
 
 
 @dataclass(frozen=True)
@@ -67,7 +80,7 @@ def write_frame(head: FrameHead, drops: Sequence[tuple[int, int]], tiles: Sequen
     """A whole frame. ``drops``: (x, y); ``tiles``: results of ``write_tile``."""
     start = np.zeros((), dtype=FRAME_HEADER)
     start["magic"], start["protocol"], start["kind"] = FRAME_MAGIC, PROTOCOL_VERSION, head.kind
-    start["level"], start["channel"], start["clock"] = head.level, Channel.HEIGHT, head.clock & 0xFFFFFFFF
+    start["level"], start["channel"], start["clock"] = head.level, head.channel, head.clock & 0xFFFFFFFF
     start["flags"] = FRAME_SETTLED if head.settled else 0
     start["tiles"], start["drops"] = len(tiles), len(drops)
     gone = np.array(list(drops), dtype=TILE_DROP)
@@ -118,12 +131,13 @@ def _head(start: np.void) -> FrameHead:
         raise FrameError(f"frame protocol {start['protocol']} is not {PROTOCOL_VERSION}")
     if start["kind"] not in (FrameKind.LEVEL, FrameKind.FILL):
         raise FrameError(f"unknown frame kind {start['kind']}")
-    if start["level"] > MAX_LEVEL:
-        raise FrameError(f"level {start['level']} is above {MAX_LEVEL}")
-    if start["channel"] != Channel.HEIGHT:
+    if start["channel"] not in tuple(Channel):
         raise FrameError(f"unknown channel {start['channel']}")
+    channel = Channel(int(start["channel"]))
+    if start["level"] > finest_level(channel):
+        raise FrameError(f"level {start['level']} is above {finest_level(channel)}")
     settled = bool(start["flags"] & FRAME_SETTLED)
-    return FrameHead(FrameKind(int(start["kind"])), int(start["level"]), int(start["clock"]), settled)
+    return FrameHead(FrameKind(int(start["kind"])), int(start["level"]), int(start["clock"]), settled, channel)
 
 
 def _record(h: np.void, payload: memoryview) -> TileRecord:

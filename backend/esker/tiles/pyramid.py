@@ -115,6 +115,8 @@ class Pyramid:
     def __init__(self, size_m: float, levels: int) -> None:
         self.size_m = size_m
         self.levels = levels
+        self.top = levels
+        """The finest level that is solved at present; see ``limit``."""
         self.stamp = 0
         """Counts ``put``; every version and stamp is a value of this counter."""
         self.generation = 0
@@ -243,6 +245,29 @@ class Pyramid:
         self._dirty[level] |= changed
         if level < self.levels:
             self._dirty[level + 1] |= changed.repeat(2, axis=0).repeat(2, axis=1)
+
+    def changes(self) -> Counts:
+        """Per tile of the finest level: when it or an ancestor last changed there, 0 for never."""
+        level = self._levels[self.levels]
+        above = self.lineage()[self.levels]
+        return above if level is None else np.maximum(above, level.versions)
+
+    def limit(self, top: int) -> None:
+        """From now on only levels 0..``top`` are solved: those above are forgotten. Raises ValueError."""
+        if not 0 <= top <= self.levels:
+            raise ValueError(f"level {top} is not one of 0..{self.levels}")
+        for level in range(top + 1, self.levels + 1):
+            self._levels[level] = None
+            self._past[level].clear()
+            self._steadiers[level] = Steadier()
+        self.top = top
+        self.stamp += 1
+        self.generation += 1
+
+    def sub_patches(self, level: int) -> SubPatches:
+        """Bounds of a level's sub-patches as they are now; not to be changed."""
+        self.bounds()
+        return self._subs[level]
 
     def bounds(self) -> Bounds:
         """Bounds of the newest levels, recomputed where samples changed since the last call."""

@@ -11,7 +11,7 @@ one level.
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,8 +54,31 @@ def _axes(view: View) -> tuple[Vector, Vector, Vector, Vector]:
     return eye, forward, np.asarray(right, dtype=np.float64), up
 
 
-def screen_error(bounds: Bounds, view: View) -> tuple[Mask, Floats, Floats]:
-    """Per tile of ``bounds``: is its box in the enlarged frustum; its error; its parent's cell size. Both in pixels.
+class Boxes(Protocol):
+    """Tiles as boxes with an error: the part of ``bounds.Bounds`` that projection needs, arrays of one length."""
+
+    @property
+    def size_m(self) -> float: ...
+    @property
+    def x(self) -> Floats: ...
+    @property
+    def y(self) -> Floats: ...
+    @property
+    def half(self) -> Floats: ...
+    @property
+    def spacing(self) -> Floats: ...
+    @property
+    def low(self) -> Floats: ...
+    @property
+    def high(self) -> Floats: ...
+    @property
+    def error(self) -> Floats: ...
+    @property
+    def valid(self) -> NDArray[np.bool_]: ...
+
+
+def screen_error(bounds: Boxes, view: View) -> tuple[Mask, Floats, Floats]:
+    """Per box: is it in the enlarged frustum; its error; its parent's cell size. Both in pixels.
 
     Lengths are projected at the nearest point of the tile's box, a bound from above. The frustum has no far plane;
     the near plane passes through the eye.

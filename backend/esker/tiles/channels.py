@@ -1,0 +1,55 @@
+"""Noise amplitude and roughness as levels of integers (DESIGN 5.4, 6).
+
+A channel has the same quantum on every level, and its base value (what it is where no stroke says otherwise) is
+subtracted, so untouched ground is all zeros. Its levels end ``CHANNEL_LEVELS_BELOW`` below those of the heights.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from esker.contract import (
+    AMPLITUDE_QUANTA_PER_M,
+    BASE_AMPLITUDE_M,
+    BASE_ROUGHNESS,
+    CHANNEL_LEVELS_BELOW,
+    QUANTA_PER_CELL,
+    ROUGHNESS_QUANTA,
+    TILE_CELLS,
+    Channel,
+)
+from esker.tiles.codec import Ints
+from esker.tiles.pyramid import Pyramid
+
+UNIT_SIZE_M: Final = float(TILE_CELLS * QUANTA_PER_CELL)
+"""A domain of this size has a quantum of exactly 2^-l on level l: values scaled by powers of two become integers by
+the rules of the heights, dead zone and steadiness included, without a rounding of their own."""
+QUANTA: Final = {Channel.AMPLITUDE: AMPLITUDE_QUANTA_PER_M, Channel.ROUGHNESS: ROUGHNESS_QUANTA}
+BASE: Final = {Channel.AMPLITUDE: BASE_AMPLITUDE_M, Channel.ROUGHNESS: BASE_ROUGHNESS}
+
+
+def channel_levels(levels: int) -> int:
+    """The finest level of a channel beside heights of levels 0..``levels``."""
+    return max(0, levels - CHANNEL_LEVELS_BELOW)
+
+
+def values(samples: Ints, channel: Channel) -> NDArray[np.float32]:
+    """Samples of a channel as metres (amplitude) or 0..1 (roughness), float32, same shape. KeyError for heights."""
+    return (samples / np.float64(QUANTA[channel]) + BASE[channel]).astype(np.float32)
+
+
+class ChannelPyramid(Pyramid):
+    """The newest levels of one channel; samples are ``(value - base) * quanta``, rounded half to even."""
+
+    def __init__(self, channel: Channel, levels: int) -> None:
+        super().__init__(UNIT_SIZE_M, channel_levels(levels))
+        self.channel = channel
+
+    def put(self, clock: int, level: int, heights: NDArray[np.float32], settled: bool, show: bool = True) -> int:
+        """Replaces a level of the channel: (N_l, N_l) float32 in its unit. See ``Pyramid.put``; raises the same."""
+        away = heights - np.float32(BASE[self.channel])
+        away *= np.float32(QUANTA[self.channel] / (1 << max(0, level)))
+        return super().put(clock, level, away, settled, show)

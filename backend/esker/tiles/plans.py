@@ -1,0 +1,152 @@
+"""Frames decided but not yet coded, and the cache of coded tiles (DESIGN 6).
+
+A plan holds immutable arrays only: it may be encoded in any thread, at any time, and always gives the same bytes.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import OrderedDict
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from esker.contract import Channel, FrameKind, Predictor
+from esker.grid import TileKey
+from esker.tiles.codec import Ints, Wide, child_window, cost, pack, predict
+from esker.tiles.frame import FrameHead, TileRecord, ratio, write_frame, write_tile
+
+CACHE_BYTES: Final = 32 * 1024 * 1024
+
+CacheKey = tuple[Channel, TileKey, int, int, int, int]
+"""Channel, tile, its version, its parent's; and the versions of both that it may be predicted from instead, 0 for
+none."""
+
+
+class EncodedTiles:
+    """LRU of coded tiles by (key, version, base version), shared by all clients of a room; safe across threads."""
+
+    def __init__(self, limit: int = CACHE_BYTES) -> None:
+        self._limit = limit
+        self._lock = threading.Lock()
+        self._items: OrderedDict[CacheKey, bytes] = OrderedDict()
+        self._bytes = 0
+
+    def get(self, key: CacheKey) -> bytes | None:
+        """The coded tile, or None."""
+        with self._lock:
+            found = self._items.get(key)
+            if found is not None:
+                self._items.move_to_end(key)
+            return found
+
+    def put(self, key: CacheKey, value: bytes) -> None:
+        """Keeps a coded tile and forgets the least recently used ones above the limit."""
+        with self._lock:
+            if key in self._items:
+                return
+            self._items[key] = value
+            self._bytes += len(value)
+            while self._bytes > self._limit and len(self._items) > 1:
+                self._bytes -= len(self._items.popitem(last=False)[1])
+
+    @property
+    def bytes(self) -> int:
+        """Bytes held."""
+        return self._bytes
+
+
+@dataclass(frozen=True, eq=False)
+class TileState:
+    """A tile at one of its versions: (65, 65) int32 quanta of its level, never changed."""
+
+    version: int
+    samples: Ints
+
+
+@dataclass(frozen=True, eq=False)
+class TilePlan:
+    """A tile to send, and all that it may be predicted from.
+
+    ``parent``: as the client holds it when the frame arrives; None at level 0. ``before``, ``parent_before``: the same
+    tile as the client holds it, and the parent as it was then, where the server still knows them.
+    """
+
+    key: TileKey
+    now: TileState
+    parent: TileState | None
+    before: TileState | None = None
+    parent_before: TileState | None = None
+
+    def cache_key(self, channel: Channel) -> CacheKey:
+        """What the coded bytes depend on."""
+        parent, before, above = (0 if s is None else s.version for s in (self.parent, self.before, self.parent_before))
+        return channel, self.key, self.now.version, parent, before, above
+
+
+@dataclass(frozen=True, eq=False)
+class FramePlan:
+    """A frame decided but not yet coded. ``source`` is for the ledger that planned it."""
+
+    kind: FrameKind
+    channel: Channel
+    level: int
+    clock: int
+    settled: bool
+    tiles: tuple[TilePlan, ...]
+    drops: tuple[TileKey, ...]
+    source: object
+    cache: EncodedTiles
+
+    @property
+    def keys(self) -> tuple[TileKey, ...]:
+        """The tiles that it carries."""
+        return tuple(tile.key for tile in self.tiles)
+
+    def encode(self) -> bytes:
+        """The binary frame. Pure: the same plan always gives the same bytes."""
+        predictions: dict[tuple[TileKey, int], Wide] = {}
+        scale = ratio(self.channel)
+
+        def predicted(key: TileKey, state: TileState) -> Wide:
+            """The part of its parent's prediction that belongs to ``key``: made once for all four children."""
+            place = (key.parent(), state.version)
+            if place not in predictions:
+                predictions[place] = predict(state.samples, scale)
+            return child_window(predictions[place], key.x, key.y)
+
+        coded = []
+        for tile in self.tiles:
+            name = tile.cache_key(self.channel)
+            data = self.cache.get(name)
+            if data is None:
+                data = _write(tile, predicted)
+                self.cache.put(name, data)
+            coded.append(data)
+        head = FrameHead(self.kind, self.level, self.clock, self.settled, self.channel)
+        return write_frame(head, [(d.x, d.y) for d in self.drops], coded)
+
+
+def _write(tile: TilePlan, predicted: Callable[[TileKey, TileState], Wide]) -> bytes:
+    """Codes a tile with the cheaper of its predictors."""
+    key, now, parent, before, then = tile.key, tile.now, tile.parent, tile.before, tile.parent_before
+    kind, base_version = Predictor.ZERO, 0
+    residual: Wide = now.samples.astype(np.int64)
+    moved: Wide | None = None
+    if parent is not None:
+        own = predicted(key, parent).astype(np.int64)
+        kind, base_version, residual = Predictor.PARENT, parent.version, now.samples - own
+        if then is not None:
+            moved = own - predicted(key, then)
+    if before is not None:
+        change: Wide = now.samples - before.samples.astype(np.int64)
+        options = [(Predictor.PREVIOUS if parent is None else Predictor.HELD, change)]
+        if moved is not None:
+            options.insert(0, (Predictor.PREVIOUS, change - moved))
+        for option, candidate in options:
+            if np.abs(candidate).max() < 1 << 31 and cost(candidate) < cost(residual):
+                kind, base_version, residual = option, before.version, candidate
+    planes, payload = pack(residual)
+    return write_tile(TileRecord(key.x, key.y, kind, planes, now.version, base_version, payload))

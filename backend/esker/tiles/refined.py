@@ -1,0 +1,195 @@
+"""Tiles above the levels that are solved as a whole, kept where somebody looks (DESIGN 5.6, 6).
+
+A tile is *verified* in an epoch: an epoch begins whenever the ground has settled, and ends with the next level of any
+solve. Made anew with the same samples, a tile keeps its version, so a change elsewhere sends nothing.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from esker import grid
+from esker.contract import MAX_REFINED_LEVEL, MAX_REFINED_TILES, PATCH_CELLS, TILE_SAMPLES
+from esker.grid import TileKey
+from esker.tiles.bounds import Floats, block_reduce, sub_error
+from esker.tiles.codec import SAMPLE_LIMIT, Ints
+from esker.tiles.ledger import state_of
+from esker.tiles.plans import TileState
+from esker.tiles.pyramid import Pyramid
+
+ROOM_TILES: Final = 4096
+"""Refined tiles that a room keeps: 70 MB of samples."""
+
+
+@dataclass(frozen=True, eq=False)
+class Refined:
+    """A refined tile. ``low``, ``high``, ``error``: (4, 4) float32 per sub-patch, metres; error: against its parent.
+
+    ``epoch``: the last one in which it was verified. ``ground``: the pyramid's stamp at that time. ``content``: the
+    refiner's digest of all that it depends on.
+    """
+
+    key: TileKey
+    state: TileState
+    content: bytes
+    epoch: int
+    ground: int
+    low: Floats
+    high: Floats
+    error: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Known:
+    """The tiles of one level as arrays: ``codes`` sorted (see ``code``), (n, 4, 4) bounds, and ``Refined.ground``."""
+
+    codes: NDArray[np.int64]
+    low: Floats
+    high: Floats
+    error: Floats
+    ground: NDArray[np.int64]
+
+
+def code(x: NDArray[np.int64], y: NDArray[np.int64], level: int) -> NDArray[np.int64]:
+    """Tiles of a level as integers that sort by rows."""
+    return (y << level) | x
+
+
+class RefinedTiles:
+    """Mutable; owned by ``delivery.TileServer``, used from its thread.
+
+    ``levels``: the finest level solved as a whole; ``finest``: the finest that is refined. ``client_tiles``: most that
+    one client holds.
+    """
+
+    def __init__(self, size_m: float, levels: int, finest: int, room_tiles: int | None = None) -> None:
+        if not levels <= finest <= MAX_REFINED_LEVEL:
+            raise ValueError(f"tiles are refined to level {levels}..{MAX_REFINED_LEVEL}, not {finest}")
+        self.size_m, self.levels, self.finest = size_m, levels, finest
+        self.room_tiles = ROOM_TILES if room_tiles is None else room_tiles
+        self.client_tiles = min(MAX_REFINED_TILES, self.room_tiles)
+        self.stamp = 0
+        """Rises with every change; versions are values of this counter."""
+        self.generation = 0
+        """Rises when a selection might come out differently."""
+        self.epoch = 0
+        self.active = False
+        self.clock = -1
+        """Clock of the settled ground of the present epoch."""
+        self._tiles: OrderedDict[TileKey, Refined] = OrderedDict()
+        self._known: dict[int, Known] = {}
+
+    def __len__(self) -> int:
+        return len(self._tiles)
+
+    def get(self, key: TileKey) -> Refined | None:
+        """The tile as it was last made."""
+        return self._tiles.get(key)
+
+    def verified(self, key: TileKey) -> Refined | None:
+        """The tile, if it belongs to the settled ground as it is."""
+        found = self._tiles.get(key)
+        return found if found is not None and self.active and found.epoch == self.epoch else None
+
+    def suspend(self) -> None:
+        """The ground moves: nothing is verified until it has settled again."""
+        if self.active:
+            self.active = False
+            self.stamp += 1
+
+    def begin(self, clock: int) -> None:
+        """The ground has settled at ``clock``."""
+        self.active, self.clock = True, clock
+        self.epoch += 1
+        self._changed()
+
+    def put(self, clock: int, key: TileKey, heights: NDArray[np.float32], content: bytes, pyramid: Pyramid) -> bool:
+        """Takes a tile of the settled solve at ``clock``; False when that is over, or the parent is not known.
+
+        Raises ValueError for a key that is not refined here, a wrong shape, NaN or infinity.
+        """
+        side = 1 << max(0, key.level)
+        if not (self.levels < key.level <= self.finest and 0 <= key.x < side and 0 <= key.y < side):
+            raise ValueError(f"tile {tuple(key)} is not refined here")
+        if heights.shape != (TILE_SAMPLES, TILE_SAMPLES) or not np.isfinite(heights).all():
+            raise ValueError(f"tile {tuple(key)} is not 65x65 finite heights")
+        above = self._parent(key, pyramid)
+        if not self.active or clock != self.clock or above is None:
+            return False
+        samples = _quantise(heights, key.level, self.size_m)
+        old = self._tiles.get(key)
+        if old is not None and np.array_equal(old.state.samples, samples):
+            state = old.state
+        else:
+            state = TileState(self.stamp + 1, samples)
+        self._tiles[key] = self._measured(key, state, above, content, pyramid.stamp)
+        self._tiles.move_to_end(key)
+        self._changed(key.level)
+        return True
+
+    def _parent(self, key: TileKey, pyramid: Pyramid) -> Ints | None:
+        """The parent's samples as they are now."""
+        if key.level - 1 > self.levels:
+            found = self.verified(key.parent())
+            return None if found is None else found.state.samples
+        level = pyramid.level(self.levels)
+        return None if level is None else state_of(level, key.parent()).samples
+
+    def _measured(self, key: TileKey, state: TileState, above: Ints, content: bytes, ground: int) -> Refined:
+        q = np.float32(grid.quantum(key.level, self.size_m))
+        r, c = 32 * (key.y & 1), 32 * (key.x & 1)
+        low = block_reduce(np.minimum, state.samples, PATCH_CELLS) * q
+        high = block_reduce(np.maximum, state.samples, PATCH_CELLS) * q
+        error = sub_error(state.samples, above[r : r + 33, c : c + 33]) * q
+        bounds = (a.astype(np.float32) for a in (low, high, error))
+        return Refined(key, state, content, self.epoch, ground, *bounds)
+
+    def known(self, level: int) -> Known:
+        """All tiles of a level, as arrays."""
+        found = self._known.get(level)
+        if found is None:
+            tiles = sorted((t for k, t in self._tiles.items() if k.level == level), key=lambda t: (t.key.y, t.key.x))
+            n = len(tiles)
+
+            def bounds(name: str) -> Floats:
+                return np.array([getattr(t, name) for t in tiles], dtype=np.float32).reshape(n, 4, 4)
+
+            codes = np.fromiter(((t.key.y << level) | t.key.x for t in tiles), dtype=np.int64, count=n)
+            ground = np.fromiter((t.ground for t in tiles), dtype=np.int64, count=n)
+            found = Known(codes, bounds("low"), bounds("high"), bounds("error"), ground)
+            self._known[level] = found
+        return found
+
+    def make_room(self, keep: set[TileKey]) -> int:
+        """Forgets the tiles made longest ago, other than ``keep``, above the limit; returns how many more may come."""
+        for key in list(self._tiles):
+            if len(self._tiles) + self._needed(keep) <= self.room_tiles:
+                break
+            if key not in keep:
+                del self._tiles[key]
+                self._known.pop(key.level, None)
+        return max(0, self.room_tiles - len(self._tiles))
+
+    def _needed(self, keep: set[TileKey]) -> int:
+        return sum(key not in self._tiles for key in keep)
+
+    def _changed(self, level: int | None = None) -> None:
+        self.stamp += 1
+        self.generation += 1
+        if level is None:
+            self._known.clear()
+        else:
+            self._known.pop(level, None)
+
+
+def _quantise(heights: NDArray[np.float32], level: int, size_m: float) -> Ints:
+    """Metres to quanta of the level, halves to even, saturating as the levels below do."""
+    steps = heights * np.float32(1.0 / grid.quantum(level, size_m))
+    samples: Ints = np.rint(np.clip(steps, -SAMPLE_LIMIT, SAMPLE_LIMIT)).astype(np.int32)
+    samples.flags.writeable = False
+    return samples

@@ -1,0 +1,240 @@
+"""What one client holds of the tiles above the levels that are solved as a whole, and what to send of them next.
+
+To the client these levels are like any other: while an ancestor has moved, a tile rides along with it, and a LEVEL
+frame of its own level puts it right. Such a frame waits until the ground has settled and every tile that rides along
+in view has been made anew; what rides along out of view is dropped. No frame ever leaves two neighbours that differ on
+the edge that they share: a tile whose neighbour is still of an older solve waits for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from esker.contract import Channel, FrameKind
+from esker.grid import TileKey
+from esker.tiles.codec import Ints
+from esker.tiles.ledger import FILL_TILES, Ledger
+from esker.tiles.plans import EncodedTiles, FramePlan, TilePlan, TileState
+from esker.tiles.refined import RefinedTiles
+from esker.tiles.sparse import Selection
+
+SPARE_ROOM: Final = 32
+"""Tiles dropped beyond what is needed when a client holds its fill, so that it is not done for each new tile."""
+AROUND: Final = tuple((dx, dy) for dy in (-1, 0, 1) for dx in (-1, 0, 1) if dx or dy)
+
+
+@dataclass(frozen=True, eq=False)
+class _Held:
+    """A tile as the client holds it, and its parent as it was when the tile was last sent or confirmed."""
+
+    state: TileState
+    base: TileState
+
+
+class _Blocked(Exception):
+    """A LEVEL frame is due but waits for tiles that are still being made."""
+
+
+class RefinedLedger:
+    """Mutable; used from the room's tile thread. ``below``: the ledger of the heights up to the finest whole level."""
+
+    def __init__(self, refined: RefinedTiles, below: Ledger, cache: EncodedTiles) -> None:
+        self._refined, self._below, self._cache = refined, below, cache
+        self._held: dict[int, dict[TileKey, _Held]] = {
+            level: {} for level in range(refined.levels + 1, refined.finest + 1)
+        }
+        """Per level, oldest first."""
+        self._moved: set[TileKey] = set()
+        """Held tiles of which an ancestor was sent since they were sent or confirmed."""
+
+    def held(self) -> dict[TileKey, int]:
+        """Versions that the client holds."""
+        return {key: tile.state.version for tiles in self._held.values() for key, tile in tiles.items()}
+
+    def keys(self) -> set[TileKey]:
+        """What the client holds."""
+        return {key for tiles in self._held.values() for key in tiles}
+
+    def missing(self, selection: Selection) -> list[tuple[TileKey, float]]:
+        """Wanted tiles that the settled ground has not been refined to yet, with their projected errors."""
+        return [(k, e) for k, e in selection.tiles.items() if self._refined.verified(k) is None]
+
+    # --- planning -----------------------------------------------------------------------------------------------
+
+    def plan(self, selection: Selection) -> FramePlan | None:
+        """The next frame on settled ground, when the levels below have nothing to send: LEVEL frames, then FILL."""
+        open_levels = []
+        for level in self._held:
+            try:
+                plan = self._plan_level(level, selection)
+            except _Blocked:
+                break
+            if plan is not None:
+                return plan
+            open_levels.append(level)
+        for level in open_levels:
+            plan = self._plan_fill(level, selection)
+            if plan is not None:
+                return plan
+        return None
+
+    def _plan_level(self, level: int, selection: Selection) -> FramePlan | None:
+        """Raises _Blocked when a tile that is to be replaced, or fits one that is, has not been made yet."""
+        held = self._held[level]
+        send: set[TileKey] = set()
+        drop: set[TileKey] = set()
+        moved = False
+        for key, tile in held.items():
+            newest = self._refined.verified(key)
+            if key in self._moved:
+                moved = True
+                if newest is None:
+                    if key in selection.tiles:
+                        raise _Blocked
+                    drop.add(key)
+                    continue
+            if newest is not None and newest.state.version != tile.state.version:
+                (send if key in selection.tiles else drop).add(key)
+        if not (moved or send or drop):
+            return None
+        drop |= self._misfits(level, send, drop, selection)
+        return self._frame(FrameKind.LEVEL, level, sorted(send), sorted(drop))
+
+    def _misfits(self, level: int, send: set[TileKey], drop: set[TileKey], selection: Selection) -> set[TileKey]:
+        """Held neighbours of older solves that tiles to send contradict and nobody looks at. Raises _Blocked."""
+        gone: set[TileKey] = set()
+        for key in send:
+            for other in self._contradicted(level, key, send | drop):
+                if other in selection.tiles:
+                    raise _Blocked
+                gone.add(other)
+        return gone
+
+    def _contradicted(self, level: int, key: TileKey, besides: set[TileKey]) -> Iterator[TileKey]:
+        """Held neighbours, not of the present solve, whose samples on the common edge are not those of ``key``."""
+        held, now = self._held[level], self._refined.verified(key)
+        assert now is not None
+        for dx, dy in AROUND:
+            other = TileKey(level, key.x + dx, key.y + dy)
+            theirs = held.get(other)
+            if theirs is None or other in besides or self._refined.verified(other) is not None:
+                continue
+            if not np.array_equal(_edge(now.state.samples, dx, dy), _edge(theirs.state.samples, -dx, -dy)):
+                yield other
+
+    def _plan_fill(self, level: int, selection: Selection) -> FramePlan | None:
+        held = self._held[level]
+        ready = [
+            key
+            for key in selection.tiles
+            if key.level == level
+            and key not in held
+            and self._refined.verified(key) is not None
+            and self._parent(key) is not None
+        ]
+        if not ready:
+            return None
+        over = len(ready) + sum(map(len, self._held.values())) - self._refined.client_tiles
+        if over > 0:
+            plan = self._plan_trim(over + SPARE_ROOM, selection)
+            if plan is not None:
+                return plan
+        ready.sort(key=lambda k: -selection.tiles[k])
+        send: list[TileKey] = []
+        drop: set[TileKey] = set()
+        for key in ready:
+            wrong = set(self._contradicted(level, key, drop))
+            if not wrong & selection.tiles.keys():
+                send.append(key)
+                drop |= wrong
+            if len(send) == FILL_TILES:
+                break
+        return self._frame(FrameKind.FILL, level, send, sorted(drop)) if send else None
+
+    def _plan_trim(self, count: int, selection: Selection) -> FramePlan | None:
+        """Drops tiles out of view, finest level and longest held first."""
+        for level in reversed(self._held):
+            gone = [key for key in self._held[level] if key not in selection.tiles][:count]
+            if gone:
+                return self._frame(FrameKind.FILL, level, (), gone)
+        return None
+
+    def _parent(self, key: TileKey) -> TileState | None:
+        """The parent as the client holds it, when that belongs to the ground as it is."""
+        up = key.parent()
+        if up.level == self._refined.levels:
+            return self._below.newest(up)
+        held, newest = self._held[up.level].get(up), self._refined.verified(up)
+        if held is None or newest is None or held.state.version != newest.state.version or up in self._moved:
+            return None
+        return held.state
+
+    def _frame(self, kind: FrameKind, level: int, keys: Iterable[TileKey], drops: Iterable[TileKey]) -> FramePlan:
+        tiles = []
+        for key in keys:
+            now, parent, held = self._refined.verified(key), self._parent(key), self._held[level].get(key)
+            assert now is not None
+            assert parent is not None
+            before, base = (None, None) if held is None else (held.state, held.base)
+            tiles.append(TilePlan(key, now.state, parent, before, base))
+        return FramePlan(
+            kind, Channel.HEIGHT, level, self._refined.clock, True, tuple(tiles), tuple(drops), self, self._cache
+        )
+
+    # --- what was sent ------------------------------------------------------------------------------------------
+
+    def commit(self, plan: FramePlan) -> None:
+        """A frame of heights was handed to the socket, of these levels or of one below (then committed there)."""
+        for key in plan.drops:
+            self._forget(key)
+        keys = set(plan.keys)
+        if plan.level > self._refined.levels:
+            held = self._held[plan.level]
+            for tile in plan.tiles:
+                assert tile.parent is not None
+                held[tile.key] = _Held(tile.now, _kept(tile.parent))
+            if plan.kind == FrameKind.LEVEL:
+                self._confirm(plan.level)
+        if plan.kind == FrameKind.LEVEL and keys:
+            self._move_under(keys, plan.level)
+
+    def _confirm(self, level: int) -> None:
+        held = self._held[level]
+        for key in [key for key in self._moved if key.level == level]:
+            self._moved.discard(key)
+            parent = self._parent(key)
+            assert parent is not None
+            held[key] = _Held(held[key].state, _kept(parent))
+
+    def _move_under(self, keys: set[TileKey], level: int) -> None:
+        """Everything held below these tiles rides along from now on."""
+        for below, tiles in self._held.items():
+            shift = below - level
+            if shift > 0:
+                self._moved |= {k for k in tiles if TileKey(level, k.x >> shift, k.y >> shift) in keys}
+
+    def _forget(self, gone: TileKey) -> None:
+        """A tile was dropped, and with it all its descendants."""
+        for below, tiles in self._held.items():
+            shift = below - gone.level
+            if shift < 0:
+                continue
+            for key in [k for k in tiles if (k.x >> shift, k.y >> shift) == (gone.x, gone.y)]:
+                del tiles[key]
+                self._moved.discard(key)
+
+
+def _edge(samples: Ints, dx: int, dy: int) -> Ints:
+    """The samples that a tile shares with its neighbour in this direction."""
+    rows = {-1: slice(0, 1), 0: slice(None), 1: slice(64, 65)}[dy]
+    cols = {-1: slice(0, 1), 0: slice(None), 1: slice(64, 65)}[dx]
+    return samples[rows, cols]
+
+
+def _kept(state: TileState) -> TileState:
+    """The state without the level that its samples may be a view of."""
+    return state if state.samples.base is None else TileState(state.version, state.samples.copy())
