@@ -152,7 +152,7 @@ class Pyramid:
         ``heights``: (N_l, N_l) float32 metres, not to be changed afterwards. Unsettled heights are steadied (see
         ``steady``), then kept as predicted wherever that is within the dead zone; settled ones are rounded exactly.
         With ``show`` False a coarse preview is only noted: its level is injected from the finest preview, which is
-        expected soon (docs/decisions/0013-consistent-previews.md). Between a complete preview and the settled levels
+        expected soon (docs/decisions/0014-consistent-previews.md). Between a complete preview and the settled levels
         of the same clock a solver may repeat coarse levels as a sign of life: these are ignored, as they would only
         move the ground there and back. Raises ValueError for a wrong level or shape or heights that are not finite,
         and changes nothing then.
@@ -162,7 +162,7 @@ class Pyramid:
         n = grid.samples(level)
         if heights.shape != (n, n):
             raise ValueError(f"level {level} has {n}x{n} samples, not {heights.shape}")
-        if not settled and level < self.levels and self._previewed == clock:
+        if level > self.top or (not settled and level < self.top and self._previewed == clock):
             return 0
         if not np.isfinite(heights).all():
             raise ValueError(f"level {level} has heights that are not finite")
@@ -170,11 +170,11 @@ class Pyramid:
         if settled:
             steadier.settled(clock, heights)
             return self._store(clock, level, heights, settled)
-        if level < self.levels and not show:
+        if level < self.top and not show:
             steadier.note(clock, heights)
             return 0
         steady = steadier.preview(clock, heights)
-        if level < self.levels:
+        if level < self.top:
             return self._store(clock, level, steady, settled)
         self._previewed = clock
         count = 0
@@ -193,7 +193,7 @@ class Pyramid:
         if old is not None and not settled:
             kept = follow_parents(old.samples, self._parents[level], parent)
         self._parents[level] = parent
-        samples = quantise(heights, level, self.size_m, kept, DEAD_ZONE if level == self.levels else COARSE_DEAD_ZONE)
+        samples = quantise(heights, level, self.size_m, kept, DEAD_ZONE if level == self.top else COARSE_DEAD_ZONE)
         stamp = self.stamp + 1
         moved = np.ones(samples.shape, dtype=np.bool_) if old is None else samples != old.samples
         changed = self._touch(level, moved, stamp)
@@ -209,7 +209,7 @@ class Pyramid:
             self._levels[level] = Level(level, samples, versions, stamp, stamp, clock, settled)
             self._mark(level, changed)
         self.stamp = stamp
-        if old is None or level == self.levels:
+        if old is None or level == self.top:
             self.generation += 1
         return count
 
