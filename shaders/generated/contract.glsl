@@ -4,6 +4,7 @@ const int TILE_SAMPLES = 65;
 const int PATCH_CELLS = 16;
 const int SUBPATCHES = 4;
 const int QUANTA_PER_CELL = 256;
+const int MAX_REFINED_LEVEL = 10;
 const float CREST_STIFFNESS = 4.0;
 const float SATURATION = 0.12;
 const float SPRING_CELLS = 30.0;

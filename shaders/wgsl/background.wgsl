@@ -7,7 +7,7 @@ struct BackgroundVertex {
 @vertex
 fn background_vertex(@builtin(vertex_index) index: u32) -> BackgroundVertex {
   let ndc = vec2f(f32(index & 1u) * 4.0 - 1.0, f32(index >> 1u) * 4.0 - 1.0);
-  return BackgroundVertex(vec4f(ndc, 1.0, 1.0), ndc);
+  return BackgroundVertex(vec4f(ndc, 0.0, 1.0), ndc);
 }
 
 fn clouds(dir: vec3f, base: vec3f) -> vec3f {

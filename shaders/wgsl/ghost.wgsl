@@ -16,7 +16,7 @@ fn ghost_vertex(
   let p = array<vec3f, 4>(p0, p1, p2, p3)[corner];
   let uv = array<vec2f, 4>(vec2f(0.0, 0.0), vec2f(1.0, 0.0), vec2f(1.0, 1.0), vec2f(0.0, 1.0))[corner];
   let sides = vec2f(distance(p0, p1), distance(p0, p3));
-  return GhostVertex(view.view_proj * vec4f(p, 1.0), uv * sides, uv, colour, view.size / 64.0);
+  return GhostVertex(to_clip(p), uv * sides, uv, colour, view.size / 64.0);
 }
 
 @fragment

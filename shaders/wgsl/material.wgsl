@@ -11,6 +11,7 @@ struct Site {
   steep: f32,        // tangent of the slope
   height: f32,       // above the sea or zero, as a fraction of the domain
   curvature: f32,
+  gain: vec4f,       // of the fine relief, features of a fifteenth of the domain to those of 1 m: 1 where nothing is asked
   macro1: vec4f,     // features of a third and of a fifteenth of the domain
   macro2: vec4f,
   fine1: vec4f,      // features of some 25 m, 6 m and 1 m
@@ -18,7 +19,13 @@ struct Site {
   fine3: vec4f,
 };
 
-fn survey(p: vec3f, gradient: vec2f, curvature: f32, f: Footprint) -> Site {
+// What strokes ask of the fine relief: amplitude raises all of it, roughness tips it from broad to small features.
+fn relief_gain(detail: vec2f) -> vec4f {
+  let strength = 1.0 + 3.0 * (1.0 - exp(-detail.x * view.amplitude / (0.004 * view.size)));
+  return strength * exp2((detail.y - 0.5) * vec4f(-1.6, 0.0, 1.6, 3.2));
+}
+
+fn survey(p: vec3f, gradient: vec2f, curvature: f32, f: Footprint, detail: vec2f) -> Site {
   let n = normalize(vec3f(-gradient, 1.0));
   var s: Site;
   s.p = p;
@@ -26,6 +33,7 @@ fn survey(p: vec3f, gradient: vec2f, curvature: f32, f: Footprint) -> Site {
   s.steep = length(gradient);
   s.height = (p.z - select(0.0, view.sea, view.has_sea > 0.5)) / view.size;
   s.curvature = curvature;
+  s.gain = relief_gain(detail);
   s.macro1 = ground_noise(p, f, view.size * 1.37, vec2f(0.917, -0.399));
   s.macro2 = ground_noise(p, f, view.size * 0.27, vec2f(0.602, 0.799));
   s.fine1 = rock_noise(p, n, f, 103.0);
@@ -37,11 +45,13 @@ fn survey(p: vec3f, gradient: vec2f, curvature: f32, f: Footprint) -> Site {
 
 // 1 where the ground is steeper than `at`, wandering with the noise.
 fn steeper(s: Site, at: f32, soft: f32) -> f32 {
-  return smoothstep(at - soft, at + soft, s.steep + (s.fine1.r - 0.5) * 0.30 + (s.macro2.r - 0.5) * 0.22);
+  return smoothstep(at - soft, at + soft, s.steep + (s.fine1.r - 0.5) * 0.30 * s.gain.y + (s.macro2.r - 0.5) * 0.22);
 }
 
 fn fine_slope(s: Site, strength: f32) -> vec2f {
-  return strength * (0.22 * noise_slope(s.macro2) + 0.34 * noise_slope(s.fine1) + 0.42 * noise_slope(s.fine2) + 0.36 * noise_slope(s.fine3));
+  let g = strength * s.gain;
+  return 0.22 * g.x * noise_slope(s.macro2) + 0.34 * g.y * noise_slope(s.fine1) + 0.42 * g.z * noise_slope(s.fine2)
+    + 0.36 * g.w * noise_slope(s.fine3);
 }
 
 fn rock_colour(s: Site, light: vec3f, dark: vec3f) -> vec3f {

@@ -6,6 +6,7 @@ struct PatchIn {
 
 struct PatchVertex {
   world: vec3f,
+  relative: vec3f,  // to the eye, exact where `world` has lost digits
   at: vec2f,      // sample position in the own tile, 0..64
   morph: f32,
 };
@@ -73,10 +74,11 @@ fn patch_vertex(record: vec4u, grid: vec2i) -> PatchVertex {
     z = sample_height(patch_slot(record), at);
     if (morph > 0.0) { z = exact_mix(z, parent_height(record, at), morph); }
   }
-  // Integer lattice times a cell that halves exactly from level to level: the same bits on both sides of a seam.
-  let cell = view.size / f32(u32(TILE_CELLS) << patch_level(record));
+  // On the lattice of the finest level both sides of a seam are the same integers, and so get the same bits.
+  let lattice = vec2f((corner + g) << vec2u(u32(MAX_REFINED_LEVEL) - patch_level(record)));
   var out: PatchVertex;
-  out.world = vec3f(vec2f(corner + g) * cell, z);
+  out.world = vec3f(lattice * view.finest_cell, z);
+  out.relative = vec3f((lattice - view.eye_cell) * view.finest_cell - view.eye_part, (z - view.eye.z) - view.eye_low.z);
   out.at = vec2f(at);
   out.morph = morph;
   return out;

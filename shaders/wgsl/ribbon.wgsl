@@ -28,7 +28,7 @@ fn to_pixels(clip: vec4f) -> vec2f {
 fn lifted(p: vec3f) -> vec4f {
   let away = distance(p, view.eye.xyz);
   let pull = min(0.004 * away + 0.0012 * view.size, 0.5 * away);
-  return view.view_proj * vec4f(p - ray_to(p) * pull, 1.0);
+  return to_clip(p - ray_to(p) * pull);
 }
 
 @vertex
@@ -38,9 +38,9 @@ fn ribbon_vertex(@builtin(vertex_index) index: u32, in: RibbonIn) -> RibbonVerte
   let here = select(in.start, in.stop, end == 1u);
   let clip = lifted(here.xyz);
   let p = to_pixels(clip);
-  let a = to_pixels(view.view_proj * vec4f(in.start.xyz, 1.0));
-  let b = to_pixels(view.view_proj * vec4f(in.stop.xyz, 1.0));
-  let other = to_pixels(view.view_proj * vec4f(select(in.before.xyz, in.after.xyz, end == 1u), 1.0));
+  let a = to_pixels(to_clip(in.start.xyz));
+  let b = to_pixels(to_clip(in.stop.xyz));
+  let other = to_pixels(to_clip(select(in.before.xyz, in.after.xyz, end == 1u)));
   let dir = unit(b - a, vec2f(1.0, 0.0));
   let next = unit(select(a - other, other - b, end == 1u), dir);
   let middle = unit(dir + next, dir);
@@ -49,7 +49,7 @@ fn ribbon_vertex(@builtin(vertex_index) index: u32, in: RibbonIn) -> RibbonVerte
   let reach = in.style.x + in.style.y + 1.0;
   let offset = normal * side * reach * stretch;
   var out: RibbonVertex;
-  let ok = in.style.w > 0.5 && (view.view_proj * vec4f(in.start.xyz, 1.0)).w > 0.0 && (view.view_proj * vec4f(in.stop.xyz, 1.0)).w > 0.0;
+  let ok = in.style.w > 0.5 && (to_clip(in.start.xyz)).w > 0.0 && (to_clip(in.stop.xyz)).w > 0.0;
   out.position = select(vec4f(0.0, 0.0, -2.0, 1.0), vec4f(clip.xy + offset * 2.0 / view.viewport * clip.w, clip.zw), ok);
   out.across = side * reach;
   out.along = here.w;

@@ -1,27 +1,35 @@
 // The ground: one instanced draw of all patches.
 struct TerrainVertex {
   @builtin(position) position: vec4f,
-  @location(0) world: vec3f,
+  @location(0) relative: vec3f,
   @location(1) at: vec2f,
   @location(2) morph: f32,
   @location(3) @interpolate(flat) record: vec4u,
   @location(4) through: vec3f,
   @location(5) glow: vec3f,
+  @location(6) detail: vec2f,
 };
 
 @vertex
 fn terrain_vertex(@builtin(vertex_index) index: u32, patch_in: PatchIn) -> TerrainVertex {
   let v = patch_vertex(patch_in.record, vec2i(i32(index % PITCH), i32(index / PITCH)));
   var out: TerrainVertex;
-  out.position = view.view_proj * vec4f(v.world, 1.0);
-  out.world = v.world;
+  out.position = clip_of(v.relative);
+  out.relative = v.relative;
   out.at = v.at;
   out.morph = v.morph;
   out.record = patch_in.record;
   let air = air_to(v.world);
   out.through = air.through;
   out.glow = air.glow;
+  out.detail = detail_at(v.world.xy);
   return out;
+}
+
+// Noise amplitude (1 = view.amplitude metres) and roughness at a place. They are smooth: taken at the vertices.
+fn detail_at(p: vec2f) -> vec2f {
+  let side = vec2f(textureDimensions(channels));
+  return textureSampleLevel(channels, smooth_clamp, (p / view.size * (side - 1.0) + 0.5) / side, 0.0).xy;
 }
 
 // Sun, sky and the far ground on a rough surface.
@@ -47,26 +55,30 @@ fn shade(m: Material, gradient: vec2f, surface: Surface, dir: vec3f) -> vec3f {
 
 @fragment
 fn terrain_fragment(v: TerrainVertex) -> @location(0) vec4f {
-  let f = Footprint(dpdx(v.world), dpdy(v.world));
+  let f = Footprint(dpdx(v.relative), dpdy(v.relative));
+  let world = v.relative + view.eye.xyz;
   let rate = abs(f.dx.z) + abs(f.dy.z);
   let surface = patch_surface(v.record, v.at, v.morph);
-  let site = survey(v.world, surface.gradient, surface.curvature, f);
+  let site = survey(world, surface.gradient, surface.curvature, f, v.detail);
   var m = ground_material(site);
   if (view.overlay == OVERLAY_SLOPE) {
     m.albedo = mix(m.albedo, slope_tint(site.steep), 0.8);
     m.gloss = 0.0;
+  } else if (view.overlay == OVERLAY_DETAIL) {
+    m.albedo = mix(m.albedo, detail_tint(v.detail), 0.8);
+    m.gloss = 0.0;
   } else if (view.overlay == OVERLAY_PATCHES) {
     m.albedo = mix(m.albedo, level_tint(patch_level(v.record)) * 0.5, 0.7);
   }
-  let dir = ray_to(v.world);
+  let dir = ray_to(world);
   var colour = shade(m, surface.gradient, surface, dir);
   if (view.grid > 0.0) {
-    let line = scale_grid(v.world.xy, f) * view.grid * exp(-distance(v.world, view.eye.xyz) / (1.1 * view.size) * (1.0 - view.eye.w));
+    let line = scale_grid(world.xy, f) * view.grid * exp(-distance(world, view.eye.xyz) / (1.1 * view.size) * (1.0 - view.eye.w));
     colour = mix(colour, colour * 1.9 + vec3f(0.05), line * 0.42);
   }
   let strength = select(view.contour_strength, max(view.contour_strength, 0.8), view.overlay == OVERLAY_CONTOURS);
   if (strength > 0.0) {
-    colour *= 1.0 - contours(v.world.z, rate) * strength * 0.75;
+    colour *= 1.0 - contours(world.z, rate) * strength * 0.75;
   }
   if (view.overlay == OVERLAY_PATCHES) {
     let cell = abs(fract(v.at / f32(PATCH_CELLS) - 0.5) - 0.5) * f32(PATCH_CELLS);
@@ -74,5 +86,5 @@ fn terrain_fragment(v: TerrainVertex) -> @location(0) vec4f {
   }
   colour = colour * v.through + v.glow;
   let shown = display(colour, v.position.xy);
-  return vec4f(with_cursors(shown.rgb, v.world), 1.0);
+  return vec4f(with_cursors(shown.rgb, world), 1.0);
 }

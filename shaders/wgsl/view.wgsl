@@ -1,7 +1,10 @@
 // Everything that all passes of one frame share. The host reads the layout of `View` from this text (gpu/layout.ts).
 struct View {
-  view_proj: mat4x4f,
+  eye_proj: mat4x4f,     // from places relative to the eye to clip space; depth 1 at the near plane, 0 at the far one
   eye: vec4f,            // xyz; w = 1 for an orthographic camera
+  eye_low: vec4f,        // xyz: what float32 leaves of the eye
+  eye_cell: vec2f,       // the eye on the lattice of the finest level, whole cells,
+  eye_part: vec2f,       // and the metres beyond
   right: vec4f,          // camera axes; w of right, up: tangent of half the field of view, horizontally and vertically
   up: vec4f,
   forward: vec4f,        // w: metres per pixel at distance 1 (orthographic: metres per pixel)
@@ -19,6 +22,8 @@ struct View {
   grid: f32,             // strength of the scale grid, 0..1
   contour: f32,          // contour interval, metres
   contour_strength: f32,
+  finest_cell: f32,      // metres between samples of level MAX_REFINED_LEVEL
+  amplitude: f32,        // metres of noise amplitude that the value 1 of `channels` stands for
   look: u32,
   overlay: u32,
   cursor_count: u32,
@@ -34,6 +39,7 @@ const OVERLAY_NONE: u32 = 0u;
 const OVERLAY_CONTOURS: u32 = 1u;
 const OVERLAY_SLOPE: u32 = 2u;
 const OVERLAY_PATCHES: u32 = 3u;
+const OVERLAY_DETAIL: u32 = 4u;
 
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var heights: texture_2d_array<f32>;
@@ -44,6 +50,16 @@ const OVERLAY_PATCHES: u32 = 3u;
 @group(0) @binding(6) var noise: texture_2d<f32>;
 @group(0) @binding(7) var smooth_clamp: sampler;
 @group(0) @binding(8) var smooth_repeat: sampler;
+@group(0) @binding(9) var channels: texture_2d<f32>;  // noise amplitude and roughness over the domain, 0..1
+
+// Clip position of a point given relative to the eye.
+fn clip_of(relative: vec3f) -> vec4f {
+  return view.eye_proj * vec4f(relative, 1.0);
+}
+
+fn to_clip(p: vec3f) -> vec4f {
+  return clip_of((p - view.eye.xyz) - view.eye_low.xyz);
+}
 
 // Vector from the eye to a point; for an orthographic camera all rays are parallel.
 fn ray_to(p: vec3f) -> vec3f {

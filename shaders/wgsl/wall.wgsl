@@ -24,9 +24,13 @@ fn wall_vertex(@builtin(vertex_index) index: u32, @location(0) record: vec4u, @l
   }
   let v = patch_vertex(record, g);
   var world = v.world;
-  if (corner.y == 1u) { world.z = min(world.z, select(view.base, view.sea, view.has_sea > 0.5)); }
+  var relative = v.relative;
+  if (corner.y == 1u) {
+    world.z = min(world.z, select(view.base, view.sea, view.has_sea > 0.5));
+    relative.z = (world.z - view.eye.z) - view.eye_low.z;
+  }
   let air = air_to(world);
-  return WallVertex(view.view_proj * vec4f(world, 1.0), world, v.world.z, normal, air.through, air.glow);
+  return WallVertex(clip_of(relative), world, v.world.z, normal, air.through, air.glow);
 }
 
 @fragment

@@ -72,7 +72,7 @@ fn sea_bed(p: vec2f) -> vec3f {
 
 struct WaterVertex {
   @builtin(position) position: vec4f,
-  @location(0) world: vec3f,
+  @location(0) relative: vec3f,
   @location(1) depth: f32,
   @location(2) through: vec3f,
   @location(3) glow: vec3f,
@@ -83,21 +83,23 @@ fn water_vertex(@builtin(vertex_index) index: u32, patch_in: PatchIn) -> WaterVe
   let v = patch_vertex(patch_in.record, vec2i(i32(index % PITCH), i32(index / PITCH)));
   let world = vec3f(v.world.xy, view.sea);
   let air = air_to(world);
-  return WaterVertex(view.view_proj * vec4f(world, 1.0), world, view.sea - v.world.z, air.through, air.glow);
+  let relative = vec3f(v.relative.xy, (view.sea - view.eye.z) - view.eye_low.z);
+  return WaterVertex(clip_of(relative), relative, view.sea - v.world.z, air.through, air.glow);
 }
 
 @fragment
 fn water_fragment(v: WaterVertex) -> @location(0) vec4f {
-  let f = Footprint(dpdx(v.world), dpdy(v.world));
+  let f = Footprint(dpdx(v.relative), dpdy(v.relative));
+  let world = v.relative + view.eye.xyz;
   if (v.depth < 0.0) { discard; }
-  let a = ground_noise(v.world, f, 61.0, vec2f(0.9, 0.436));
-  let b = ground_noise(v.world + vec3f(view.time * 0.8, 0.0, 0.0), f, 17.0, vec2f(0.6, -0.8));
-  let dir = ray_to(v.world);
-  let water = water_surface(v.world, dir, v.depth, vec3f(a.r, mix(a.g, b.g, 0.5), 1.0), vec3f(0.0));
+  let a = ground_noise(world, f, 61.0, vec2f(0.9, 0.436));
+  let b = ground_noise(world + vec3f(view.time * 0.8, 0.0, 0.0), f, 17.0, vec2f(0.6, -0.8));
+  let dir = ray_to(world);
+  let water = water_surface(world, dir, v.depth, vec3f(a.r, mix(a.g, b.g, 0.5), 1.0), vec3f(0.0));
   // Over the ground, the bed shows through by blending; its share was left out of the colour.
   let colour = water.rgb / max(water.a, 0.02) * v.through + v.glow;
   let shown = display(colour, v.position.xy);
-  return vec4f(with_cursors(shown.rgb, v.world), water.a);
+  return vec4f(with_cursors(shown.rgb, world), water.a);
 }
 
 // The open sea near the domain, as geometry: it must hide the bed inside the domain where the sight enters outside it.
@@ -115,7 +117,7 @@ fn open_sea_vertex(@builtin(vertex_index) index: u32) -> OpenSeaVertex {
   let low = array<vec2f, 4>(vec2f(-far, -far), vec2f(1.0, -far), vec2f(0.0, -far), vec2f(0.0, 1.0))[index / 6u];
   let high = array<vec2f, 4>(vec2f(0.0, 1.0 + far), vec2f(1.0 + far, 1.0 + far), vec2f(1.0, 0.0), vec2f(1.0, 1.0 + far))[index / 6u];
   let world = vec3f(mix(low, high, corner) * view.size, view.sea);
-  return OpenSeaVertex(view.view_proj * vec4f(world, 1.0), world);
+  return OpenSeaVertex(to_clip(world), world);
 }
 
 @fragment

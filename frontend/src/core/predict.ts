@@ -73,12 +73,14 @@ function middleRow(from: number, { at, weights }: Rule, to: number): void {
 }
 
 /**
- * Exact prediction in quanta of the child's level from the parent's quanta (twice as large):
- * `floor((sum + 64) / 128)`. `parent` and `out` are 65x65, row 0 south; (x, y) is the child, only parities matter.
+ * Exact prediction in quanta of the child's level. `ratio`: quanta of the child in one of the parent's, 2 for heights
+ * (`floor((sum + 64) / 128)`), 1 for the other channels (`floor((sum + 128) / 256)`). `parent` and `out` are 65x65, row 0
+ * south; (x, y) is the child, only parities matter.
  */
-export function predictInts(parent: Int32Array, x: number, y: number, out: Int32Array): void {
+export function predictInts(parent: Int32Array, x: number, y: number, out: Int32Array, ratio: 1 | 2 = 2): void {
   interpolate(parent, x, y);
-  for (let i = 0; i < N * N; i++) out[i] = Math.floor((scaled[i]! + 64) / 128);
+  const whole = 256 / ratio;
+  for (let i = 0; i < N * N; i++) out[i] = Math.floor((scaled[i]! + whole / 2) / whole);
 }
 
 /** The same rule in metres, without rounding to quanta: what a child moves by when its parent moves by `parent`. */

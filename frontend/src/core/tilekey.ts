@@ -22,8 +22,8 @@ export function parentKey(key: number): number {
   return tileKey(keyLevel(key) - 1, keyX(key) >> 1, keyY(key) >> 1);
 }
 
-/** True for `key` itself and for every tile below `ancestor`. */
-export function isUnder(key: number, ancestor: number): boolean {
-  const shift = keyLevel(key) - keyLevel(ancestor);
-  return shift >= 0 && keyX(key) >> shift === keyX(ancestor) && keyY(key) >> shift === keyY(ancestor);
+/** True for every tile at or below one of `ancestors`, all of them tiles of `level`. One look-up, however many there are. */
+export function isUnderAny(key: number, ancestors: ReadonlySet<number>, level: number): boolean {
+  const shift = keyLevel(key) - level;
+  return shift >= 0 && ancestors.has(tileKey(level, keyX(key) >> shift, keyY(key) >> shift));
 }

@@ -66,10 +66,28 @@ export interface TileView {
   readonly sizeM: number;
   /** Finest level that can exist. */
   readonly levels: number;
+  /** Finest level that is solved everywhere; above it tiles come and go where somebody looks. */
+  readonly solved: number;
   /** Rises when any tile changes. */
   readonly stamp: number;
   tile(level: number, x: number, y: number): Tile | undefined;
   tiles(): Iterable<Tile>;
+}
+
+/** A square grid of values over the domain, `[row * side + col]`, row 0 south, corners on the domain's corners. */
+export interface ChannelGrid {
+  readonly side: number;
+  readonly values: Float32Array;
+}
+
+/** What strokes ask of the detail that is synthesised on the ground (DESIGN 5.4). */
+export interface ChannelView {
+  /** Rises with every change. */
+  readonly stamp: number;
+  /** Noise amplitude, metres. */
+  readonly amplitude: ChannelGrid;
+  /** Roughness, 0..1. */
+  readonly roughness: ChannelGrid;
 }
 
 /** A binary frame after decoding (net/decode.ts), applied atomically by tiles/store.ts. */
@@ -128,6 +146,7 @@ export interface CursorVisual {
 export interface Scene {
   readonly camera: CameraState;
   readonly tiles: TileView;
+  readonly channels: ChannelView;
   readonly settings: TerrainSettings;
   readonly strokes: readonly StrokeVisual[];
   readonly ghost: GhostVisual | null;
@@ -136,7 +155,7 @@ export interface Scene {
   readonly tauPx: number;
   /** Seconds, for water and the like. */
   readonly time: number;
-  readonly overlay: "none" | "contours" | "slope" | "patches";
+  readonly overlay: "none" | "contours" | "slope" | "detail" | "patches";
   readonly showStrokes: boolean;
 }
 

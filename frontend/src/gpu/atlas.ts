@@ -45,7 +45,11 @@ export class Atlas implements Slots {
   private readonly bySlot: (Resident | undefined)[];
   private readonly free: number[] = [];
   private view: TileView | null = null;
+  /** The last refresh found tiles changed that were there before; finer tiles that only came do not count. */
+  groundMoved = false;
   private readonly staging = new Float32Array(SLOT_TEXELS * SLOT_TEXELS);
+  /** Stamps of the store's tiles at the last refresh. */
+  private stamps = new Map<number, number>();
   private viewStamp = -1;
   private frame = 0;
   private pagesDirty = true;
@@ -113,9 +117,11 @@ export class Atlas implements Slots {
    */
   refresh(view: TileView): Resident[] {
     this.frame += 1;
+    this.groundMoved = false;
     if (view.stamp === this.viewStamp) return [];
     this.viewStamp = view.stamp;
     this.view = view;
+    this.noteMoves(view);
     const changed: Resident[] = [];
     for (const resident of [...this.residents()]) {
       if (this.at(resident.level, resident.x, resident.y) === undefined) {
@@ -162,6 +168,16 @@ export class Atlas implements Slots {
   destroy(): void {
     for (const texture of [this.heights, this.slopes, this.light]) texture.destroy();
     this.pages.destroy();
+  }
+
+  private noteMoves(view: TileView): void {
+    const stamps = new Map<number, number>();
+    for (const { level, x, y, stamp } of view.tiles()) {
+      const key = tileKey(level, x, y);
+      if ((this.stamps.get(key) ?? stamp) !== stamp) this.groundMoved = true;
+      stamps.set(key, stamp);
+    }
+    this.stamps = stamps;
   }
 
   private at(level: number, x: number, y: number): Tile | undefined {

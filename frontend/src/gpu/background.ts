@@ -16,7 +16,7 @@ export class BackgroundPass {
         code: sceneSource("background", context.detail),
         vertex: "background_vertex",
         fragment: "background_fragment",
-        depthCompare: "less-equal",
+        depthCompare: "greater-equal",
         depthWrite: false,
       }),
       createPass(context, {

@@ -1,14 +1,17 @@
 /** What all passes of a frame bind: the view uniform, the atlas, the sky tables, the noise (shaders/wgsl/view.wgsl). */
 
+import { eyeProjection, reversedDepth, viewAxes } from "../core/eyeprojection.ts";
 import type { Scene, Vec3 } from "../core/types.ts";
+import { MAX_REFINED_LEVEL, TILE_CELLS } from "../generated/contract.ts";
 import type { Atlas } from "./atlas.ts";
+import { ChannelTexture } from "./channeltexture.ts";
 import { StructWriter, structLayout } from "./layout.ts";
 import { contourInterval, LOOKS } from "./looks.ts";
 import { VIEW_SOURCE } from "./shaders.ts";
 import type { SkyTables } from "./sky.ts";
 
 const MAX_CURSORS = 32;
-const OVERLAYS = { none: 0, contours: 1, slope: 2, patches: 3 } as const;
+const OVERLAYS = { none: 0, contours: 1, slope: 2, patches: 3, detail: 4 } as const;
 
 /** What a frame is drawn with besides the scene. */
 export interface FrameFacts {
@@ -31,6 +34,8 @@ export class FrameBindings {
   private readonly uniform: GPUBuffer;
   private readonly clamp: GPUSampler;
   private readonly repeat: GPUSampler;
+  private readonly channels: ChannelTexture;
+  private atlas: Atlas | null = null;
   private group: GPUBindGroup | null = null;
 
   constructor(
@@ -57,8 +62,10 @@ export class FrameBindings {
         texture(6, "float", "2d"),
         { binding: 7, visibility, sampler: { type: "filtering" } },
         { binding: 8, visibility, sampler: { type: "filtering" } },
+        texture(9, "float", "2d"),
       ],
     });
+    this.channels = new ChannelTexture(device);
     this.uniform = device.createBuffer({
       label: "view",
       size: this.writer.layout.size,
@@ -78,6 +85,7 @@ export class FrameBindings {
 
   /** Binds another atlas. */
   attach(atlas: Atlas): void {
+    this.atlas = atlas;
     const array = (texture: GPUTexture): GPUTextureView => texture.createView({ dimension: "2d-array" });
     this.group = this.device.createBindGroup({
       label: "frame",
@@ -92,6 +100,7 @@ export class FrameBindings {
         { binding: 6, resource: this.noise.createView() },
         { binding: 7, resource: this.clamp },
         { binding: 8, resource: this.repeat },
+        { binding: 9, resource: this.channels.texture.createView() },
       ],
     });
   }
@@ -104,6 +113,7 @@ export class FrameBindings {
 
   /** Writes the uniform for this frame. */
   update(scene: Scene, facts: FrameFacts): void {
+    if (this.channels.update(scene.channels) && this.atlas !== null) this.attach(this.atlas);
     this.writeCamera(scene, facts);
     const w = this.writer;
     const { settings } = scene;
@@ -125,6 +135,7 @@ export class FrameBindings {
     w.set("contour", contourInterval(relief));
     w.set("contour_strength", relief > 0 ? look.contours : 0);
     w.set("look", look.index);
+    w.set("amplitude", this.channels.fullScale);
     w.set("overlay", OVERLAYS[scene.overlay]);
     this.writeCursors(scene);
     this.device.queue.writeBuffer(this.uniform, 0, w.buffer);
@@ -132,16 +143,23 @@ export class FrameBindings {
 
   destroy(): void {
     this.uniform.destroy();
+    this.channels.destroy();
   }
 
   private writeCamera(scene: Scene, facts: FrameFacts): void {
     const w = this.writer;
     const { camera } = scene;
-    const { forward, right, up } = axes(camera.eye, camera.target, camera.up);
+    const { forward, right, up } = viewAxes(camera);
     const ortho = camera.orthoHeight > 0;
     const tan = Math.tan((camera.fovDeg * Math.PI) / 360);
-    w.set("view_proj", camera.viewProj);
+    w.set("eye_proj", reversedDepth(eyeProjection(camera)));
     w.set("eye", [...camera.eye, ortho ? 1 : 0]);
+    w.set("eye_low", [...camera.eye.map((v) => v - Math.fround(v)), 0]);
+    const cell = scene.tiles.sizeM / (TILE_CELLS << MAX_REFINED_LEVEL);
+    const whole = [camera.eye[0], camera.eye[1]].map((v) => Math.floor(v / cell));
+    w.set("eye_cell", whole);
+    w.set("eye_part", [camera.eye[0] - whole[0]! * cell, camera.eye[1] - whole[1]! * cell]);
+    w.set("finest_cell", cell);
     w.set("right", [...right, (tan * facts.width) / facts.height]);
     w.set("up", [...up, tan]);
     w.set("forward", [...forward, ortho ? camera.orthoHeight / facts.height : (2 * tan) / facts.height]);
@@ -176,19 +194,4 @@ function exposureFor(elevationDeg: number): number {
 function smoothstep(a: number, b: number, v: number): number {
   const t = Math.min(1, Math.max(0, (v - a) / (b - a)));
   return t * t * (3 - 2 * t);
-}
-
-function axes(eye: Vec3, target: Vec3, upHint: Vec3): { forward: Vec3; right: Vec3; up: Vec3 } {
-  const forward = unit([target[0] - eye[0], target[1] - eye[1], target[2] - eye[2]]);
-  const right = unit(cross(forward, upHint));
-  return { forward, right, up: cross(right, forward) };
-}
-
-function cross(a: Vec3, b: Vec3): Vec3 {
-  return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-}
-
-function unit(v: Vec3): Vec3 {
-  const l = Math.hypot(...v) || 1;
-  return [v[0] / l, v[1] / l, v[2] / l];
 }

@@ -28,13 +28,15 @@ export class LightQueue {
   /** Takes in what changed since the last frame. */
   mark(changed: readonly Resident[], entered: readonly Resident[], sun: Vec3): void {
     const key = sun.join();
-    if (changed.length > 0 || key !== this.sunKey) {
+    if (this.atlas.groundMoved || key !== this.sunKey) {
       // Shadows are long: any change of ground may touch any tile.
       for (const resident of this.atlas.residents()) this.stale.add(resident);
-    } else if (entered.length > 0) {
+    } else {
+      for (const resident of changed) this.stale.add(resident);
       // A new tile refines the ground that the light of its neighbours was marched on.
-      for (const resident of this.atlas.residents())
-        if (entered.some((e) => touches(e, resident))) this.stale.add(resident);
+      if (entered.length > 0)
+        for (const resident of this.atlas.residents())
+          if (entered.some((e) => touches(e, resident))) this.stale.add(resident);
     }
     this.sunKey = key;
     for (const resident of entered) this.fresh.add(resident);

@@ -57,7 +57,7 @@ export function describePass(context: PassContext, options: PassOptions): GPURen
     depthStencil: {
       format: DEPTH_FORMAT,
       depthWriteEnabled: options.depthWrite ?? true,
-      depthCompare: options.depthCompare ?? "less",
+      depthCompare: options.depthCompare ?? "greater",
     },
     multisample: { count: context.samples },
   };

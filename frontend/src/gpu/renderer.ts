@@ -22,6 +22,8 @@ import { NormalsPass, SunPass } from "./tilecompute.ts";
 const LIGHT_TILES = { hardware: { moving: 128, rest: 256 }, software: { moving: 2, rest: 6 } } as const;
 /** On a software adapter a picture at rest is drawn anew this often while tiles and light still come in. */
 const REDRAW_MS = 900;
+/** A refined tile turns from its parent's surface to its own in this time. */
+const ENTRANCE_MS = 350;
 const FRAMES_IN_FLIGHT = { hardware: 2, software: 1 } as const;
 
 interface Passes {
@@ -52,6 +54,10 @@ export class GpuRenderer implements SceneRenderer {
   private world: World | null = null;
   private last: Scene | null = null;
   private lastStamp = -1;
+  private lastChannels = -1;
+  /** Refined tiles fade in: not on the CPU, and not for people who asked for less motion. */
+  private fades = false;
+  private fadedAt = 0;
   private lastQuality: Quality | null = null;
   /** Highest ground of the last cut, metres. */
   private high = 0;
@@ -121,14 +127,19 @@ export class GpuRenderer implements SceneRenderer {
       return this.report({ busy: true });
     }
     // Time stands at zero for people who asked for less motion: then the sea is still.
+    const fading = this.advanceFades(scene, world, began);
     const waves = scene.settings.sea_level_m !== null && !software && scene.time !== 0;
     const due =
-      this.tilesDue || this.lookDue || this.lightDrawn !== this.lightMarched || !sameQuality(quality, this.lastQuality);
+      fading ||
+      this.tilesDue ||
+      this.lookDue ||
+      this.lightDrawn !== this.lightMarched ||
+      !sameQuality(quality, this.lastQuality);
     if (!moved && !waves && !due && !world.light.pending)
       return this.report({ busy: this.quality.pending, uploads: 0 });
     this.remember(scene, quality);
     this.draw(scene, world, quality, { began, moved });
-    const busy = waves || this.quality.pending || this.tilesDue || this.lookDue || world.light.pending;
+    const busy = waves || fading || this.quality.pending || this.tilesDue || this.lookDue || world.light.pending;
     return this.report({ busy });
   }
 
@@ -148,9 +159,10 @@ export class GpuRenderer implements SceneRenderer {
   private worldOf(scene: Scene): World {
     if (this.world?.tiles === scene.tiles) return this.world;
     this.world?.atlas.destroy();
-    const selection = new Selection(scene.tiles.levels);
-    const atlas = new Atlas(this.gpu.device, scene.tiles.levels, (level, x, y, usable) =>
-      selection.tree.setUsable(level, x, y, usable),
+    const { levels, solved } = scene.tiles;
+    const selection = new Selection(levels);
+    const atlas = new Atlas(this.gpu.device, levels, (level, x, y, usable) =>
+      selection.tree.setUsable(level, x, y, usable, this.fades && level > solved),
     );
     this.passes.frame.attach(atlas);
     this.passes.normals.attach(atlas);
@@ -159,13 +171,23 @@ export class GpuRenderer implements SceneRenderer {
     return this.world;
   }
 
+  /** Lets new refined tiles come in; true while any is on its way. */
+  private advanceFades(scene: Scene, world: World, now: number): boolean {
+    const passed = now - this.fadedAt;
+    this.fadedAt = now;
+    this.fades = !this.gpu.software && scene.time !== 0;
+    return world.selection.tree.advance(this.fades ? Math.min(passed, 50) / ENTRANCE_MS : 1);
+  }
+
   private changed(scene: Scene): boolean {
-    return this.last === null || !samePicture(this.last, this.lastStamp, scene, scene.tiles.stamp);
+    if (this.last === null || scene.channels.stamp !== this.lastChannels) return true;
+    return !samePicture(this.last, this.lastStamp, scene, scene.tiles.stamp);
   }
 
   private remember(scene: Scene, quality: Quality): void {
     this.last = scene;
     this.lastStamp = scene.tiles.stamp;
+    this.lastChannels = scene.channels.stamp;
     this.lastQuality = quality;
   }
 

@@ -121,7 +121,7 @@ export class RibbonPass {
         topology: "triangle-strip",
         blend: true,
         depthWrite: false,
-        depthCompare: hidden ? "greater" : "less-equal",
+        depthCompare: hidden ? "less" : "greater-equal",
       });
     const [shown, hidden] = await Promise.all([pipeline(false), pipeline(true)]);
     return new RibbonPass(context.device, shown, hidden);

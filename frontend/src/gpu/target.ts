@@ -2,6 +2,7 @@
 
 import blit from "@shaders/wgsl/blit.wgsl?raw";
 
+/** Depth is reversed, 1 near and 0 far (core/eyeprojection.ts): floats then hold it equally well everywhere. */
 export const DEPTH_FORMAT = "depth32float" as const;
 
 export class Target {
@@ -51,7 +52,7 @@ export class Target {
       colorAttachments: [colour],
       depthStencilAttachment: {
         view: this.depth!.createView(),
-        depthClearValue: 1,
+        depthClearValue: 0,
         depthLoadOp: "clear",
         depthStoreOp: "discard",
       },

@@ -6,15 +6,17 @@
 import { inflateSync } from "fflate";
 import { subDistance, subRange } from "../core/bounds.ts";
 import { predictInts } from "../core/predict.ts";
-import { isUnder, keyLevel, parentKey, tileKey } from "../core/tilekey.ts";
+import { isUnderAny, keyLevel, parentKey, tileKey } from "../core/tilekey.ts";
 import type { DecodedFrame, DecodedTile } from "../core/types.ts";
 import {
+  CHANNEL_LEVELS_BELOW,
   Channel,
   FRAME_HEADER,
   FRAME_MAGIC,
   FRAME_SETTLED,
   FrameKind,
   MAX_LEVEL,
+  MAX_REFINED_LEVEL,
   PROTOCOL_VERSION,
   Predictor,
   SUBPATCHES,
@@ -33,6 +35,7 @@ const SUBS = SUBPATCHES * SUBPATCHES;
 /** Above this a payload is malformed: deflate never grows four planes by more than a few block headers. */
 const MAX_PAYLOAD = 4 * AREA + 1024;
 const SAMPLE_LIMIT = 2 ** 28;
+const CHANNELS = Object.keys(Channel).length;
 
 interface Head {
   readonly kind: number;
@@ -66,18 +69,28 @@ const base = new Float64Array(AREA);
 const before = new Int32Array(AREA);
 const after = new Int32Array(AREA);
 
-/** Keeps the exact samples of the tiles that the page holds, and applies frames to them in order. */
+type Tiles = Map<number, Held>;
+
+/**
+ * Keeps the exact samples of the tiles that the page holds, and applies frames to them in order. Each channel is a stream
+ * of its own: its tiles are predicted from its own, and a drop names its own.
+ */
 export class FrameDecoder {
-  private readonly held = new Map<number, Held>();
+  private readonly channels: readonly Tiles[] = Array.from({ length: CHANNELS }, () => new Map());
 
   /** Forgets everything, as after a reconnect. */
   reset(): void {
-    this.held.clear();
+    for (const held of this.channels) held.clear();
   }
 
-  /** Tiles held now. */
+  /** Tiles of the heights held now. */
   get size(): number {
-    return this.held.size;
+    return this.sizeOf(Channel.HEIGHT);
+  }
+
+  /** Tiles of a channel held now. */
+  sizeOf(channel: number): number {
+    return this.channels[channel]?.size ?? 0;
   }
 
   /** Decodes and applies one frame. Throws FrameError, and then changes nothing that is held. */
@@ -86,6 +99,7 @@ export class FrameDecoder {
     const head = readHead(view);
     const drops = readDrops(view, head);
     const dropped = new Set(drops.map((d) => tileKey(head.level, d.x, d.y)));
+    const held = this.channels[head.channel]!;
     const tiles: DecodedTile[] = [];
     const seen = new Set<number>();
     let at = FRAME_HEADER.size + head.drops * TILE_DROP.size;
@@ -97,77 +111,76 @@ export class FrameDecoder {
       if (seen.has(key)) throw new FrameError("a tile occurs twice");
       if (dropped.has(key)) throw new FrameError("a tile is both sent and dropped");
       seen.add(key);
-      tiles.push(this.decodeTile(key, tile, new Uint8Array(buffer, at, tile.bytes)));
+      tiles.push(decodeTile(held, head, tile, new Uint8Array(buffer, at, tile.bytes)));
       at += tile.bytes;
     }
     if (at !== buffer.byteLength) throw new FrameError(`${buffer.byteLength - at} bytes follow the last tile`);
-    this.commit(head, dropped, tiles);
+    commit(held, head, dropped, tiles);
     const { kind, level, channel, clock, settled } = head;
     return { kind, level, channel, clock, settled, drops, tiles, bytes: buffer.byteLength };
   }
+}
 
-  private commit(head: Head, dropped: ReadonlySet<number>, tiles: readonly DecodedTile[]): void {
-    const { held } = this;
-    for (const gone of dropped) for (const key of held.keys()) if (isUnder(key, gone)) held.delete(key);
-    for (const { x, y, version, samples } of tiles) {
-      const key = tileKey(head.level, x, y);
-      held.set(key, { version, samples, parentThen: this.parentSamples(key) });
-    }
-    if (head.kind !== FrameKind.LEVEL) return;
-    for (const [key, tile] of held) {
-      if (keyLevel(key) === head.level) held.set(key, { ...tile, parentThen: this.parentSamples(key) });
-    }
+function commit(held: Tiles, head: Head, dropped: ReadonlySet<number>, tiles: readonly DecodedTile[]): void {
+  if (dropped.size > 0) for (const key of held.keys()) if (isUnderAny(key, dropped, head.level)) held.delete(key);
+  for (const { x, y, version, samples } of tiles) {
+    const key = tileKey(head.level, x, y);
+    held.set(key, { version, samples, parentThen: parentSamples(held, key) });
   }
+  if (head.kind !== FrameKind.LEVEL) return;
+  for (const [key, tile] of held) {
+    if (keyLevel(key) === head.level) held.set(key, { ...tile, parentThen: parentSamples(held, key) });
+  }
+}
 
-  private parentSamples(key: number): Int32Array | null {
-    return keyLevel(key) > 0 ? (this.held.get(parentKey(key))?.samples ?? null) : null;
-  }
+function parentSamples(held: Tiles, key: number): Int32Array | null {
+  return keyLevel(key) > 0 ? (held.get(parentKey(key))?.samples ?? null) : null;
+}
 
-  private decodeTile(key: number, tile: TileHead, payload: Uint8Array): DecodedTile {
-    const samples = new Int32Array(AREA);
-    const parent = this.parentSamples(key);
-    if (tile.predictor === Predictor.PARENT) this.predictFromParent(key, tile);
-    else if (tile.predictor !== Predictor.ZERO) this.predictFromHeld(key, tile, parent);
-    else base.fill(0);
-    if (tile.planes === 0 && payload.length > 0) throw new FrameError("a tile without planes has no payload");
-    const raw = tile.planes === 0 ? new Uint8Array(0) : inflatePlanes(payload, tile.planes);
-    addResidual(samples, raw, tile.planes);
-    const subMin = new Int32Array(SUBS);
-    const subMax = new Int32Array(SUBS);
-    const subError = new Uint32Array(SUBS);
-    subRange(samples, subMin, subMax);
-    if (parent) {
-      const distance = new Float64Array(SUBS);
-      subDistance(samples, parent, 2, tile.x, tile.y, distance);
-      for (let i = 0; i < SUBS; i++) subError[i] = Math.ceil(distance[i]! / 2);
-    }
-    return { x: tile.x, y: tile.y, version: tile.version, samples, subMin, subMax, subError };
+function decodeTile(held: Tiles, head: Head, tile: TileHead, payload: Uint8Array): DecodedTile {
+  const key = tileKey(head.level, tile.x, tile.y);
+  const ratio = head.channel === Channel.HEIGHT ? 2 : 1;
+  const samples = new Int32Array(AREA);
+  const parent = parentSamples(held, key);
+  if (tile.predictor === Predictor.PARENT) predictFromParent(held, key, tile, ratio);
+  else if (tile.predictor !== Predictor.ZERO) predictFromHeld(held, key, tile, parent, ratio);
+  else base.fill(0);
+  if (tile.planes === 0 && payload.length > 0) throw new FrameError("a tile without planes has no payload");
+  const raw = tile.planes === 0 ? new Uint8Array(0) : inflatePlanes(payload, tile.planes);
+  addResidual(samples, raw, tile.planes);
+  const subMin = new Int32Array(SUBS);
+  const subMax = new Int32Array(SUBS);
+  const subError = new Uint32Array(SUBS);
+  subRange(samples, subMin, subMax);
+  if (parent) {
+    const distance = new Float64Array(SUBS);
+    subDistance(samples, parent, ratio, tile.x, tile.y, distance);
+    for (let i = 0; i < SUBS; i++) subError[i] = Math.ceil(distance[i]! / 2);
   }
+  return { x: tile.x, y: tile.y, version: tile.version, samples, subMin, subMax, subError };
+}
 
-  private predictFromParent(key: number, tile: TileHead): void {
-    const parent = keyLevel(key) > 0 ? this.held.get(parentKey(key)) : undefined;
-    if (!parent) throw new FrameError("a tile is predicted from a parent that is not held");
-    if (parent.version !== tile.baseVersion)
-      throw new FrameError(
-        `a tile is predicted from version ${tile.baseVersion}, not ${parent.version}, of its parent`,
-      );
-    predictInts(parent.samples, tile.x, tile.y, after);
-    base.set(after);
-  }
+function predictFromParent(held: Tiles, key: number, tile: TileHead, ratio: 1 | 2): void {
+  const parent = keyLevel(key) > 0 ? held.get(parentKey(key)) : undefined;
+  if (!parent) throw new FrameError("a tile is predicted from a parent that is not held");
+  if (parent.version !== tile.baseVersion)
+    throw new FrameError(`a tile is predicted from version ${tile.baseVersion}, not ${parent.version}, of its parent`);
+  predictInts(parent.samples, tile.x, tile.y, after, ratio);
+  base.set(after);
+}
 
-  /** The tile as it was; for `PREVIOUS` moved along with its parent since then. */
-  private predictFromHeld(key: number, tile: TileHead, parent: Int32Array | null): void {
-    const held = this.held.get(key);
-    if (!held) throw new FrameError("a tile is predicted from itself but not held");
-    if (held.version !== tile.baseVersion)
-      throw new FrameError(`a tile is predicted from its version ${tile.baseVersion}, not from ${held.version}`);
-    base.set(held.samples);
-    const then = held.parentThen;
-    if (tile.predictor === Predictor.HELD || !then || !parent || then === parent) return;
-    predictInts(then, tile.x, tile.y, before);
-    predictInts(parent, tile.x, tile.y, after);
-    for (let i = 0; i < AREA; i++) base[i]! += after[i]! - before[i]!;
-  }
+/** The tile as it was; for `PREVIOUS` moved along with its parent since then. */
+function predictFromHeld(held: Tiles, key: number, tile: TileHead, parent: Int32Array | null, ratio: 1 | 2): void {
+  const own = held.get(key);
+  if (!own) throw new FrameError("a tile is predicted from itself but not held");
+  if (own.version !== tile.baseVersion)
+    throw new FrameError(`a tile is predicted from its version ${tile.baseVersion}, not from ${own.version}`);
+  base.set(own.samples);
+  const then = own.parentThen;
+  if (tile.predictor === Predictor.HELD || !then || !parent || then === parent) return;
+  predictInts(then, tile.x, tile.y, before, ratio);
+  predictInts(parent, tile.x, tile.y, after, ratio);
+  for (let i = 0; i < AREA; i++) base[i]! += after[i]! - before[i]!;
 }
 
 function readHead(view: DataView): Head {
@@ -178,10 +191,11 @@ function readHead(view: DataView): Head {
   if (protocol !== PROTOCOL_VERSION) throw new FrameError(`frame protocol ${protocol} is not ${PROTOCOL_VERSION}`);
   const kind = view.getUint8(f.kind.offset);
   if (kind !== FrameKind.LEVEL && kind !== FrameKind.FILL) throw new FrameError(`unknown frame kind ${kind}`);
-  const level = view.getUint8(f.level.offset);
-  if (level > MAX_LEVEL) throw new FrameError(`level ${level} is above ${MAX_LEVEL}`);
   const channel = view.getUint8(f.channel.offset);
-  if (channel !== Channel.HEIGHT) throw new FrameError(`unknown channel ${channel}`);
+  if (channel >= CHANNELS) throw new FrameError(`unknown channel ${channel}`);
+  const level = view.getUint8(f.level.offset);
+  const finest = channel === Channel.HEIGHT ? MAX_REFINED_LEVEL : MAX_LEVEL - CHANNEL_LEVELS_BELOW;
+  if (level > finest) throw new FrameError(`level ${level} is above ${finest}`);
   return {
     kind,
     level,

@@ -14,21 +14,24 @@ type Summits = Map<number, number>;
 /** A ground that never changes. */
 export class TileGround implements Ground {
   readonly sizeM: number;
-  private readonly levels: number;
+  /** Finest level of the tiles that are there. */
+  private readonly finest: number;
   private readonly tiles: ReadonlyMap<number, Tile>;
   private summits: Summits | null = null;
 
-  constructor(sizeM: number, levels: number, tiles: ReadonlyMap<number, Tile>) {
+  constructor(sizeM: number, tiles: ReadonlyMap<number, Tile>) {
     this.sizeM = sizeM;
-    this.levels = levels;
     this.tiles = tiles;
+    let finest = 0;
+    for (const tile of tiles.values()) if (tile.level > finest) finest = tile.level;
+    this.finest = finest;
   }
 
   /** Metres. Outside the domain the height of the nearest border; 0 while nothing is held. */
   heightAt(x: number, y: number): number {
     const px = Math.min(Math.max(x, 0), this.sizeM);
     const py = Math.min(Math.max(y, 0), this.sizeM);
-    for (let level = this.levels; level >= 0; level--) {
+    for (let level = this.finest; level >= 0; level--) {
       const width = this.sizeM / 2 ** level;
       const last = 2 ** level - 1;
       const tx = Math.min(Math.floor(px / width), last);
@@ -59,9 +62,10 @@ export class TileGround implements Ground {
 
   private findSummits(): Summits {
     const summits: Summits = new Map();
-    for (let level = this.levels; level >= 0; level--) {
-      for (const tile of this.tiles.values()) {
-        if (tile.level !== level) continue;
+    const byLevel: Tile[][] = Array.from({ length: this.finest + 1 }, () => []);
+    for (const tile of this.tiles.values()) byLevel[tile.level]!.push(tile);
+    for (let level = this.finest; level >= 0; level--) {
+      for (const tile of byLevel[level]!) {
         let top = Math.max(...tile.subMax);
         for (let q = 0; q < 4; q++) {
           const below = summits.get(tileKey(level + 1, 2 * tile.x + (q & 1), 2 * tile.y + (q >> 1)));

@@ -59,6 +59,7 @@ export class PatchTree {
   private round = 0;
   private syncedStamp = -1;
   private splittableStale = true;
+  private fading = false;
 
   /** `levels`: the finest level that can exist. */
   constructor(readonly levels: number) {
@@ -127,11 +128,13 @@ export class PatchTree {
     if (page < 0 || this.usable[page] === value) return;
     this.usable[page] = value;
     this.fade[page] = usable && fade ? 1 : 0;
+    this.fading ||= usable && fade;
     this.splittableStale = true;
   }
 
   /** Lets entrances go on by this share of their time; true while any is under way. */
   advance(share: number): boolean {
+    if (!this.fading) return false;
     let any = false;
     for (const page of this.index.values()) {
       const left = this.fade[page]!;
@@ -141,6 +144,7 @@ export class PatchTree {
       if (next > 0) any = true;
       else this.splittableStale = true;
     }
+    this.fading = any;
     return any;
   }
 

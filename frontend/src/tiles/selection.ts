@@ -9,6 +9,7 @@
  * shared edge, so patches meet exactly.
  */
 
+import { eyeProjection } from "../core/eyeprojection.ts";
 import type { CameraState, TileView } from "../core/types.ts";
 import { PATCH_CELLS, QUANTA_PER_CELL, SUBPATCHES } from "../generated/contract.ts";
 import { PatchTree } from "./patchtree.ts";
@@ -151,7 +152,7 @@ export class Selection {
     this.pixels = this.ortho
       ? heightPx / camera.orthoHeight
       : heightPx / (2 * Math.tan((camera.fovDeg * Math.PI) / 360));
-    frustumPlanes(camera.viewProj, this.planes);
+    frustumPlanes(eyeProjection(camera), this.planes);
     for (const list of this.splitList) {
       for (const node of list) this.split[node] = 0;
       list.length = 0;
@@ -218,11 +219,11 @@ export class Selection {
 
   private visible(level: number, node: number): boolean {
     const w = this.sizeM / (SUBPATCHES << level);
-    const x0 = this.column(node) * w;
-    const y0 = this.row(node) * w;
+    const x0 = this.column(node) * w - this.eye[0]!;
+    const y0 = this.row(node) * w - this.eye[1]!;
     const p = this.planes;
-    const low = this.tree.min[node]!;
-    const high = Math.max(this.tree.max[node]!, this.seaM);
+    const low = this.tree.min[node]! - this.eye[2]!;
+    const high = Math.max(this.tree.max[node]!, this.seaM) - this.eye[2]!;
     for (let i = 0; i < 24; i += 4) {
       const a = p[i]!;
       const b = p[i + 1]!;
@@ -404,7 +405,7 @@ function outside(v: number, low: number, high: number): number {
 }
 
 /** Six planes (a, b, c, d), positive inside, of a column-major matrix with z from 0 to 1. */
-export function frustumPlanes(m: Float32Array, out: Float64Array): void {
+export function frustumPlanes(m: ArrayLike<number>, out: Float64Array): void {
   for (let c = 0; c < 4; c += 1) {
     const x = m[4 * c]!;
     const y = m[4 * c + 1]!;

@@ -10,7 +10,7 @@
 import { type ReadonlySignal, signal } from "@preact/signals-core";
 import { subDistance, subRange } from "../core/bounds.ts";
 import { predictMetres } from "../core/predict.ts";
-import { isUnder, keyLevel, parentKey, tileKey } from "../core/tilekey.ts";
+import { isUnderAny, keyLevel, parentKey, tileKey } from "../core/tilekey.ts";
 import type { DecodedFrame, DecodedTile, Ground, Tile, TileView } from "../core/types.ts";
 import { FrameKind, QUANTA_PER_CELL, SUBPATCHES, TILE_CELLS, TILE_SAMPLES } from "../generated/contract.ts";
 import { TileGround } from "./ground.ts";
@@ -28,6 +28,7 @@ interface Entry {
 export class TileStore implements TileView {
   readonly sizeM: number;
   readonly levels: number;
+  readonly solved: number;
   /** The same as `stamp`, to subscribe to. */
   readonly revision: ReadonlySignal<number>;
   /** The ground as it is now; `freeze` gives one that stays. */
@@ -39,9 +40,11 @@ export class TileStore implements TileView {
   private readonly moved = new Float32Array(AREA);
   private readonly distance = new Float64Array(SUBS);
 
-  constructor(sizeM: number, levels: number) {
+  /** `levels`: the finest level that can exist; `solved`: the finest that exists everywhere. */
+  constructor(sizeM: number, levels: number, solved = levels) {
     this.sizeM = sizeM;
     this.levels = levels;
+    this.solved = solved;
     this.revision = this.rev;
     this.ground = {
       sizeM,
@@ -72,7 +75,7 @@ export class TileStore implements TileView {
     if (this.snapshot?.stamp !== this.stamp) {
       const tiles = new Map<number, Tile>();
       for (const [key, entry] of this.entries) tiles.set(key, entry.tile);
-      this.snapshot = { stamp: this.stamp, ground: new TileGround(this.sizeM, this.levels, tiles) };
+      this.snapshot = { stamp: this.stamp, ground: new TileGround(this.sizeM, tiles) };
     }
     return this.snapshot.ground;
   }
@@ -101,10 +104,9 @@ export class TileStore implements TileView {
   }
 
   private drop(next: Map<number, Entry>, frame: DecodedFrame): void {
-    for (const d of frame.drops) {
-      const gone = tileKey(frame.level, d.x, d.y);
-      for (const key of next.keys()) if (isUnder(key, gone)) next.delete(key);
-    }
+    if (frame.drops.length === 0) return;
+    const gone = new Set(frame.drops.map((d) => tileKey(frame.level, d.x, d.y)));
+    for (const key of next.keys()) if (isUnderAny(key, gone, frame.level)) next.delete(key);
   }
 
   private exactEntry(next: ReadonlyMap<number, Entry>, key: number, t: DecodedTile, stamp: number): Entry {

@@ -16,7 +16,8 @@ const PATIENCE_MS = 700;
 
 /** The part of the tile store that is needed. */
 export interface TileSink {
-  readonly levels: number;
+  /** Finest level that is solved everywhere. */
+  readonly solved: number;
   clear(): void;
   apply(frame: DecodedFrame): void;
 }
@@ -36,7 +37,7 @@ export class FreshTiles {
   apply(frame: DecodedFrame): void {
     this.#frames.push(frame);
     this.#timer ??= setTimeout(() => this.#show(), PATIENCE_MS);
-    const coarse = Math.min(COARSE, this.#tiles.levels);
+    const coarse = Math.min(COARSE, this.#tiles.solved);
     if (frame.kind === FrameKind.LEVEL && frame.level >= coarse) this.#show();
   }
 

@@ -253,7 +253,6 @@ export class TerrainSession {
         break;
       case "progress":
         this.progress.value = message;
-        if (message.note) this.toasts.show(message.note, "warn");
         break;
       case "error":
         this.#error(message);
@@ -276,20 +275,21 @@ export class TerrainSession {
     this.server.value = { version: message.server, device: message.device, levels: message.levels };
     this.#setMembers(message.members);
     const doc = this.doc.doc.value;
-    if (doc && this.stage.value === null) this.#openStage(doc, message.levels);
+    if (doc && this.stage.value === null) this.#openStage(doc, message);
     else this.stage.value?.restart();
     this.viewChanged();
     this.#flush();
   }
 
-  #openStage(doc: Doc, levels: number): void {
-    const stage = new Stage({ session: this, sizeM: doc.settings.size_m, levels, viewport: this.#viewport });
+  #openStage(doc: Doc, { levels, finest }: Welcome): void {
+    const sizeM = doc.settings.size_m;
+    const stage = new Stage({ session: this, sizeM, levels, finest, viewport: this.#viewport });
     this.stage.value = stage;
     void stage.start();
   }
 
   #frame(frame: DecodedFrame): void {
-    this.stage.value?.apply(frame);
+    if (this.stage.value?.apply(frame) === false) this.connection.reconnect();
   }
 
   #setMembers(members: readonly Member[]): void {

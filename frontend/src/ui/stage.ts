@@ -12,10 +12,11 @@ import type {
   Vec3,
 } from "../core/types.ts";
 import type { MemberPresence } from "../generated/contract.ts";
-import { DEFAULT_TAU_PX } from "../generated/contract.ts";
+import { Channel, DEFAULT_TAU_PX, MAX_REFINED_TILES } from "../generated/contract.ts";
 import { createMapRenderer, createRenderer, NoWebGpu } from "../gpu/index.ts";
 import { InputController } from "../input/controller.ts";
 import { type ToolDefaults, toolDefaults } from "../input/defaults.ts";
+import { ChannelStore } from "../tiles/channels.ts";
 import { TileStore } from "../tiles/store.ts";
 import { FrameLoop } from "./frame-loop.ts";
 import { FreshTiles } from "./fresh-tiles.ts";
@@ -31,7 +32,10 @@ export interface RendererInfo {
 export interface StageOptions {
   readonly session: TerrainSession;
   readonly sizeM: number;
+  /** Finest level that is solved everywhere. */
   readonly levels: number;
+  /** Finest level to which tiles are refined where somebody looks. */
+  readonly finest: number;
   /** The element that fills the window: holds the canvas, takes the pointer and the keys. */
   readonly viewport: HTMLElement;
 }
@@ -40,8 +44,10 @@ export class Stage {
   readonly session: TerrainSession;
   readonly sizeM: number;
   readonly levels: number;
+  readonly finest: number;
   readonly camera: Camera;
   readonly tiles: TileStore;
+  readonly channels: ChannelStore;
   readonly input: InputController;
   readonly defaults: ToolDefaults;
   readonly loop: FrameLoop;
@@ -62,13 +68,15 @@ export class Stage {
   #fresh: FreshTiles | null = null;
   #disposed = false;
 
-  constructor({ session, sizeM, levels, viewport }: StageOptions) {
+  constructor({ session, sizeM, levels, finest, viewport }: StageOptions) {
     this.session = session;
     this.sizeM = sizeM;
     this.levels = levels;
+    this.finest = finest;
     this.#viewport = viewport;
     this.camera = new Camera(sizeM);
-    this.tiles = new TileStore(sizeM, levels);
+    this.tiles = new TileStore(sizeM, finest, levels);
+    this.channels = new ChannelStore(sizeM);
     this.defaults = toolDefaults(sizeM);
     this.loop = new FrameLoop((dt, time) => this.#draw(dt, time));
     this.input = new InputController({
@@ -114,13 +122,20 @@ export class Stage {
     this.loop.start();
   }
 
-  apply(frame: DecodedFrame): void {
-    if (this.#fresh) this.#fresh.apply(frame);
+  /**
+   * Shows a frame. False when the page now holds more tiles than the server may have sent: the two no longer agree on what
+   * is held, and only a new connection helps.
+   */
+  apply(frame: DecodedFrame): boolean {
+    if (frame.channel !== Channel.HEIGHT) this.channels.apply(frame);
+    else if (this.#fresh) this.#fresh.apply(frame);
     else this.tiles.apply(frame);
+    return this.tiles.size <= (4 ** (this.levels + 1) - 1) / 3 + 2 * MAX_REFINED_TILES;
   }
 
   /** The server starts anew after a reconnect and sends every tile again: the old ground stays until the new is here. */
   restart(): void {
+    this.channels.restart();
     this.#fresh?.stop();
     this.#fresh = new FreshTiles(this.tiles, () => {
       this.#fresh = null;
@@ -197,6 +212,7 @@ export class Stage {
       }),
       effect(() => {
         this.tiles.revision.value;
+        this.channels.revision.value;
         session.doc.doc.value;
         this.#strokes.value;
         this.#cursors.value;
@@ -278,6 +294,7 @@ export class Stage {
     const stats = this.#renderer.render({
       camera: this.camera.state.value,
       tiles: this.tiles,
+      channels: this.channels,
       settings: doc.settings,
       strokes: this.#strokes.value,
       ghost: this.input.ghost.value,

@@ -14,7 +14,7 @@ import { SkyTables } from "../../src/gpu/sky.ts";
 import { DEPTH_FORMAT } from "../../src/gpu/target.ts";
 import { NormalsPass, SunPass } from "../../src/gpu/tilecompute.ts";
 import { Selection } from "../../src/tiles/selection.ts";
-import { FieldView, filteredField, lookAt, mapCamera, random } from "./world.ts";
+import { FieldView, filteredField, lookAt, mapCamera, PLAIN_CHANNELS, random } from "./world.ts";
 
 const WIDTH = 256;
 const HEIGHT = 192;
@@ -112,6 +112,7 @@ function sceneOf(view: FieldView, state: CameraState, look: Scene["settings"]["l
   return {
     camera: state,
     tiles: view,
+    channels: PLAIN_CHANNELS,
     settings: {
       size_m: SIZE,
       title: "",
@@ -163,7 +164,7 @@ async function picture(
     colorAttachments: [{ view: rig.colour.createView(), clearValue: [1, 0, 1, 0], loadOp: "clear", storeOp: "store" }],
     depthStencilAttachment: {
       view: rig.depth.createView(),
-      depthClearValue: 1,
+      depthClearValue: 0,
       depthLoadOp: "clear",
       depthStoreOp: "discard",
     },

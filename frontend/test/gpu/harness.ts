@@ -15,7 +15,7 @@ import { openGpu } from "../../src/gpu/device.ts";
 import { createMapRenderer, createRenderer } from "../../src/gpu/index.ts";
 import { GpuRenderer } from "../../src/gpu/renderer.ts";
 import { crackTest } from "./cracks.ts";
-import { alpineField, FieldView, lookAt, mapCamera } from "./world.ts";
+import { alpineField, FieldView, lookAt, mapCamera, PLAIN_CHANNELS } from "./world.ts";
 
 export const SETTINGS: TerrainSettings = {
   size_m: 4096,
@@ -142,6 +142,7 @@ function scene(shot: Shot, width: number, height: number): Scene {
         ? lookAt(shot.eye, shot.target, width, height)
         : mapCamera(shot.target, shot.map, width, height),
     tiles: view,
+    channels: PLAIN_CHANNELS,
     settings: { ...SETTINGS, ...shot.settings },
     strokes: demo.strokes,
     ghost: demo.ghost,

@@ -13,7 +13,7 @@ import { PITCH, patchIndices } from "../../src/gpu/patches.ts";
 import { QualityControl } from "../../src/gpu/quality.ts";
 import { RibbonBuilder } from "../../src/gpu/ribbons.ts";
 import { samePicture } from "../../src/gpu/scenediff.ts";
-import { FieldView, lookAt } from "./world.ts";
+import { FieldView, lookAt, PLAIN_CHANNELS } from "./world.ts";
 
 describe("layout", () => {
   it("R18: follows the alignment rules of WGSL", () => {
@@ -92,6 +92,7 @@ function scene(): Scene {
   return {
     camera: lookAt([0, 0, 10], [10, 10, 0], 100, 80),
     tiles,
+    channels: PLAIN_CHANNELS,
     settings: {
       size_m: 64,
       title: "",

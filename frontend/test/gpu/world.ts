@@ -1,7 +1,7 @@
 /** Analytic terrains as tile stores, and cameras, for tests and the renderer's harness. */
 
 import { mat4 } from "wgpu-matrix";
-import type { CameraState, Tile, TileView, Vec3 } from "../../src/core/types.ts";
+import type { CameraState, ChannelView, Tile, TileView, Vec3 } from "../../src/core/types.ts";
 import { SUBPATCHES, TILE_CELLS, TILE_SAMPLES } from "../../src/generated/contract.ts";
 
 export type HeightField = (x: number, y: number, level: number) => number;
@@ -20,6 +20,7 @@ export function random(seed: number): () => number {
 /** A store whose tiles sample a function of place and level: a filtered pyramid when the function depends on the level. */
 export class FieldView implements TileView {
   stamp = 1;
+  readonly solved: number;
   private readonly held = new Map<string, Tile>();
 
   constructor(
@@ -28,6 +29,7 @@ export class FieldView implements TileView {
     private field: HeightField,
     private readonly has: (level: number, x: number, y: number) => boolean = () => true,
   ) {
+    this.solved = levels;
     this.fill();
   }
 
@@ -284,3 +286,10 @@ export function mapCamera(centre: Vec3, orthoHeight: number, width: number, heig
     invViewProj: Float32Array.from(mat4.inverse(viewProj)),
   };
 }
+
+/** No stroke asks for anything: amplitude 0, roughness 0.5. */
+export const PLAIN_CHANNELS: ChannelView = {
+  stamp: 0,
+  amplitude: { side: 2, values: new Float32Array(4) },
+  roughness: { side: 2, values: new Float32Array(4).fill(0.5) },
+};

@@ -24,7 +24,14 @@ describe("shared vectors", () => {
       const buffer = bytesOf(frame);
       const out = decoder.decode(buffer);
       const { kind, level, clock, settled } = out;
-      expect({ kind, level, clock, settled, drops: out.drops.map((d) => [d.x, d.y]), held: decoder.size }).toEqual({
+      expect({
+        kind,
+        level,
+        clock,
+        settled,
+        drops: out.drops.map((d) => [d.x, d.y]),
+        held: decoder.sizeOf(out.channel),
+      }).toEqual({
         kind: decoded.kind,
         level: decoded.level,
         clock: decoded.clock,

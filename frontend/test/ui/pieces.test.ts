@@ -82,9 +82,9 @@ describe("FreshTiles", () => {
     bytes: 1,
   });
 
-  function sink(levels = 4) {
+  function sink(solved = 4) {
     const log: string[] = [];
-    return { log, levels, clear: () => log.push("clear"), apply: (f: DecodedFrame) => log.push(`level ${f.level}`) };
+    return { log, solved, clear: () => log.push("clear"), apply: (f: DecodedFrame) => log.push(`level ${f.level}`) };
   }
 
   it("keeps the old ground until the coarse levels are complete", () => {

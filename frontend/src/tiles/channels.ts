@@ -1,0 +1,125 @@
+/**
+ * Noise amplitude and roughness as the strokes ask for them (DESIGN 5.4): smooth, so whole coarse levels come, and they are
+ * shown at the finest level that is complete.
+ */
+
+import { type ReadonlySignal, signal } from "@preact/signals-core";
+import { isUnderAny, keyLevel, tileKey } from "../core/tilekey.ts";
+import type { ChannelGrid, ChannelView, DecodedFrame } from "../core/types.ts";
+import {
+  AMPLITUDE_QUANTA_PER_M,
+  BASE_AMPLITUDE_M,
+  BASE_ROUGHNESS,
+  Channel,
+  FrameKind,
+  ROUGHNESS_QUANTA,
+  TILE_CELLS,
+  TILE_SAMPLES,
+} from "../generated/contract.ts";
+
+interface Stream {
+  readonly tiles: Map<number, Int32Array>;
+  readonly quanta: number;
+  readonly base: number;
+}
+
+const stream = (quanta: number, base: number): Stream => ({ tiles: new Map(), quanta, base });
+
+export class ChannelStore implements ChannelView {
+  readonly sizeM: number;
+  /** Rises with every frame that was applied. */
+  readonly revision: ReadonlySignal<number>;
+  private readonly rev = signal(0);
+  private readonly streams = new Map<number, Stream>([
+    [Channel.AMPLITUDE, stream(AMPLITUDE_QUANTA_PER_M, BASE_AMPLITUDE_M)],
+    [Channel.ROUGHNESS, stream(ROUGHNESS_QUANTA, BASE_ROUGHNESS)],
+  ]);
+  private readonly grids = new Map<number, { readonly stamp: number; readonly grid: ChannelGrid }>();
+  /** The next frame of a new connection replaces everything. */
+  private stale = false;
+
+  constructor(sizeM: number) {
+    this.sizeM = sizeM;
+    this.revision = this.rev;
+  }
+
+  get stamp(): number {
+    return this.rev.peek();
+  }
+
+  get amplitude(): ChannelGrid {
+    return this.grid(Channel.AMPLITUDE);
+  }
+
+  get roughness(): ChannelGrid {
+    return this.grid(Channel.ROUGHNESS);
+  }
+
+  /** Noise amplitude in metres at a place; outside the domain that of the nearest border. */
+  amplitudeAt(x: number, y: number): number {
+    return sampleGrid(this.amplitude, x / this.sizeM, y / this.sizeM);
+  }
+
+  /** Roughness 0..1 at a place; outside the domain that of the nearest border. */
+  roughnessAt(x: number, y: number): number {
+    return sampleGrid(this.roughness, x / this.sizeM, y / this.sizeM);
+  }
+
+  /** A new connection begins: what is held goes when its first frame comes. */
+  restart(): void {
+    this.stale = true;
+  }
+
+  /** Applies a frame of one of the two channels; others are none of its business. */
+  apply(frame: DecodedFrame): void {
+    const into = this.streams.get(frame.channel);
+    if (into === undefined) return;
+    if (this.stale) for (const { tiles } of this.streams.values()) tiles.clear();
+    this.stale = false;
+    const gone = new Set(frame.drops.map((d) => tileKey(frame.level, d.x, d.y)));
+    if (gone.size > 0)
+      for (const key of into.tiles.keys()) if (isUnderAny(key, gone, frame.level)) into.tiles.delete(key);
+    for (const tile of frame.tiles) into.tiles.set(tileKey(frame.level, tile.x, tile.y), tile.samples);
+    if (frame.tiles.length > 0 || gone.size > 0 || frame.kind === FrameKind.LEVEL) this.rev.value += 1;
+  }
+
+  private grid(channel: number): ChannelGrid {
+    const known = this.grids.get(channel);
+    if (known?.stamp === this.stamp) return known.grid;
+    const grid = compose(this.streams.get(channel)!);
+    this.grids.set(channel, { stamp: this.stamp, grid });
+    return grid;
+  }
+}
+
+/** The finest complete level as one grid; a single cell of the base value while there is none. */
+function compose({ tiles, quanta, base }: Stream): ChannelGrid {
+  const counts: number[] = [];
+  for (const key of tiles.keys()) counts[keyLevel(key)] = (counts[keyLevel(key)] ?? 0) + 1;
+  let level = -1;
+  while (counts[level + 1] === 4 ** (level + 1)) level += 1;
+  if (level < 0) return { side: 2, values: new Float32Array(4).fill(base) };
+  const side = (TILE_CELLS << level) + 1;
+  const values = new Float32Array(side * side);
+  for (const [key, samples] of tiles) {
+    if (keyLevel(key) !== level) continue;
+    const origin = ((key >> 12) & 0xfff) * TILE_CELLS * side + (key & 0xfff) * TILE_CELLS;
+    for (let row = 0; row < TILE_SAMPLES; row += 1)
+      for (let col = 0; col < TILE_SAMPLES; col += 1)
+        values[origin + row * side + col] = samples[row * TILE_SAMPLES + col]! / quanta + base;
+  }
+  return { side, values };
+}
+
+/** Bilinear value at (u, v), fractions of the domain. */
+function sampleGrid({ side, values }: ChannelGrid, u: number, v: number): number {
+  const cells = side - 1;
+  const x = Math.min(Math.max(u, 0), 1) * cells;
+  const y = Math.min(Math.max(v, 0), 1) * cells;
+  const col = Math.min(Math.floor(x), cells - 1);
+  const row = Math.min(Math.floor(y), cells - 1);
+  const at = row * side + col;
+  const south = values[at]! * (1 - x + col) + values[at + 1]! * (x - col);
+  const north = values[at + side]! * (1 - x + col) + values[at + side + 1]! * (x - col);
+  return south * (1 - y + row) + north * (y - row);
+}
