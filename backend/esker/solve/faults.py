@@ -6,6 +6,7 @@ below. What to do about a fault (another device, a lower level, NumPy) is for th
 
 from __future__ import annotations
 
+import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, TypeVar
@@ -61,9 +62,9 @@ def classify(error: BaseException, device: Device | None) -> DeviceError | None:
     """
     if isinstance(error, DeviceError):
         return error
-    code = getattr(error, "code", None)
-    if not type(error).__module__.startswith("pyopencl") or not isinstance(code, int):
+    if not is_fault(error):
         return None
+    code = getattr(error, "code", None)
     name = device.name if device is not None else "the device"
     if code in _BUILD:
         return build_error(error, name)
@@ -75,6 +76,11 @@ def classify(error: BaseException, device: Device | None) -> DeviceError | None:
     if code in _NO_MEMORY or code == _OUT_OF_RESOURCES:
         return OutOfDeviceMemoryError(f"{name} has too little memory for this solve ({_short(error)}).", name)
     return DeviceError(f"{name} failed ({_short(error)}).", name)
+
+
+def is_fault(error: BaseException) -> bool:
+    """Whether an exception comes from a device: a DeviceError, or one of pyopencl."""
+    return isinstance(error, DeviceError) or type(error).__module__.startswith("pyopencl")
 
 
 def build_error(error: BaseException, name: str) -> BuildError:
@@ -106,12 +112,19 @@ def _alive(device: Device) -> bool:
 
 @contextmanager
 def guarded(device: Device | None) -> Iterator[None]:
-    """Errors of OpenCL that leave the block come out as DeviceError; all others as they are."""
+    """Errors of OpenCL that leave the block come out as DeviceError; all others as they are.
+
+    The frames that the error went through forget their variables, so that what was allocated is free again even while
+    somebody keeps the error.
+    """
     try:
         yield
     except Exception as error:
         fault = classify(error, device)
-        if fault is None or fault is error:
+        if fault is None:
+            raise
+        traceback.clear_frames(error.__traceback__)
+        if fault is error:
             raise
         raise fault from error
 

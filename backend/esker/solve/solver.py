@@ -12,6 +12,7 @@ every solve starts from zero, strokes are ordered by id, and no cache changes a 
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol
@@ -21,9 +22,10 @@ from numpy.typing import NDArray
 
 from esker import grid
 from esker.contract import MAX_LEVEL, Channel, Stroke, TerrainSettings
-from esker.solve import multigrid
+from esker.solve import multigrid, proof
 from esker.solve.constraints import Packer
-from esker.solve.device import NUMPY_NAME, Device, open_device
+from esker.solve.device import NUMPY, NUMPY_NAME, Device, open_device
+from esker.solve.faults import OutOfDeviceMemoryError, guarded, is_fault
 from esker.solve.workspaces import new_workspace
 
 PREVIEW_GRADIENT_CYCLES = 1
@@ -38,10 +40,11 @@ GRADIENT_SHARE = 1 / 16
 STALLED = 0.8
 STALLED_AFTER = 8
 """After this many cycles a ratio of two updates above STALLED means that float32 has nothing left to gain."""
-SPARE_LEVEL = 4
-SPARE_WORKSPACES = 4
-"""Idle workspaces kept, with the raster of the strokes that they last solved: 91 MB each at level 4. One at level 6
-takes 1.3 GB, so above SPARE_LEVEL only one is kept."""
+SPARE_BYTES = 3 << 30
+"""Memory that idle workspaces may keep, with the raster of the strokes that they last solved, but no more than an
+eighth of the machine's: a room whose workspace was given to another one has all its strokes rasterised again."""
+WORKSPACE_BYTES = 91 << 20
+"""At level 4; four times as much a level."""
 
 
 @dataclass(frozen=True)
@@ -118,10 +121,10 @@ class Solver:
         if not 0 <= max_level <= MAX_LEVEL:
             raise ValueError(f"max_level must be 0..{MAX_LEVEL}, not {max_level}")
         self.max_level = max_level
-        self._device: Device | None = open_device(device, threads)
         self._spare: list[Workspace] = []
-        if self._device is not None:
-            self._warm_up()
+        self._spare_bytes = min(SPARE_BYTES, os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // 8)
+        self._device: Device | None = None
+        self._device = open_device(device, threads, self._check)
 
     @property
     def device_name(self) -> str:
@@ -168,11 +171,15 @@ class Solver:
         done = [latest[level] for level in range(top + 1) if level in latest]
         return Pyramid(tuple(r.heights for r in done), len(done) == top + 1 and all(r.settled for r in done))
 
-    def _warm_up(self) -> None:
-        """Compile the kernels now, not under somebody's first stroke."""
-        for _ in self._run((), TerrainSettings(), 1, None, basis=False):
-            pass
+    def _check(self, device: Device) -> None:
+        """Compile the kernels now, not under somebody's first stroke, and trust none whose ground is not the twin's.
+
+        Raises DeviceError.
+        """
+        self._device = device
+        mine, twin = (s.solve(proof.STROKES, TerrainSettings(), proof.LEVEL) for s in (self, Solver(NUMPY)))
         self._spare.clear()
+        proof.compare(device, mine[proof.LEVEL], twin[proof.LEVEL])
 
     def _level(self, levels: int | None) -> int:
         top = self.max_level if levels is None else levels
@@ -188,39 +195,71 @@ class Solver:
         warm: NDArray[np.float32] | None,
         basis: bool,
     ) -> Generator[LevelResult | None]:
-        workspace = self._take(strokes, settings, top)
         try:
-            workspace.load(strokes, settings)
-            if warm is None:
-                yield from _previews(workspace)
-            else:
-                _gradients(workspace)
-                workspace.warm(warm)
-            yield from _to_rest(workspace, settings)
-            yield from _settled(workspace, strokes, settings, basis)
-        except GeneratorExit:
-            raise
-        except BaseException:
-            workspace.packer.forget()
-            raise
-        finally:
-            self._give(workspace)
+            yield from self._attempt(strokes, settings, top, warm, basis)
+            return
+        except OutOfDeviceMemoryError:
+            if not self._spare:
+                raise
+        self._spare.clear()
+        yield from self._attempt(strokes, settings, top, warm, basis)
+
+    def _attempt(
+        self,
+        strokes: Sequence[Stroke],
+        settings: TerrainSettings,
+        top: int,
+        warm: NDArray[np.float32] | None,
+        basis: bool,
+    ) -> Generator[LevelResult | None]:
+        """One solve. A workspace whose device failed is dropped, all others are kept for the next one."""
+        with guarded(self._device):
+            workspace = self._take(strokes, settings, top)
+            keep = True
+            try:
+                workspace.load(strokes, settings)
+                if warm is None:
+                    yield from _previews(workspace)
+                else:
+                    _gradients(workspace)
+                    workspace.warm(warm)
+                yield from _to_rest(workspace, settings)
+                yield from _settled(workspace, strokes, settings, basis)
+            except GeneratorExit:
+                raise
+            except BaseException as error:
+                workspace.packer.forget()
+                keep = not is_fault(error)
+                raise
+            finally:
+                if keep:
+                    self._give(workspace)
 
     def _take(self, strokes: Sequence[Stroke], settings: TerrainSettings, top: int) -> Workspace:
-        """An idle workspace, the one that has most of these strokes rasterised already; or a new one."""
+        """An idle workspace that has most of these strokes rasterised already; or a new one; or the longest idle."""
         idle = [w for w in self._spare if w.top == top]
         best = max(idle, key=lambda w: w.packer.likeness(strokes, settings), default=None)
-        room = len(self._spare) < (SPARE_WORKSPACES if top <= SPARE_LEVEL else 1)
-        if best is not None and (best.packer.likeness(strokes, settings) > 0 or not room or not strokes):
+        if best is not None and 2 * best.packer.likeness(strokes, settings) < len(strokes):
+            best = idle[0] if self._kept() + _bytes(top) > self._spare_bytes else None
+        if best is not None:
             self._spare.remove(best)
             return best
-        if not room and self._spare:
+        while self._spare and self._kept() + _bytes(top) > self._spare_bytes:
             self._spare.pop(0)
         return new_workspace(self._device, top)
 
+    def _kept(self) -> int:
+        return sum(_bytes(w.top) for w in self._spare)
+
     def _give(self, workspace: Workspace) -> None:
         self._spare.append(workspace)
-        del self._spare[: -SPARE_WORKSPACES if workspace.top <= SPARE_LEVEL else -1]
+        while len(self._spare) > 1 and self._kept() > self._spare_bytes:
+            self._spare.pop(0)
+
+
+def _bytes(top: int) -> int:
+    """What a workspace takes, about."""
+    return int(WORKSPACE_BYTES * 4.0 ** (top - 4))
 
 
 def _previews(w: Workspace) -> Iterator[LevelResult | None]:
