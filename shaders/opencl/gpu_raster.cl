@@ -9,7 +9,7 @@
 inline float distance2(segments_t s, int at, float x, float y) {
     global const float *t = s.table + at;
     size_t m = s.m;
-    float dx = t[3 * m], dy = t[4 * m], u = clamp(((x - t[0]) * dx + (y - t[m]) * dy) * t[6 * m], 0.0f, 1.0f);
+    float dx = t[2 * m], dy = t[3 * m], u = clamp(((x - t[0]) * dx + (y - t[m]) * dy) * t[4 * m], 0.0f, 1.0f);
     float rx = x - (t[0] + u * dx), ry = y - (t[m] + u * dy);
     return rx * rx + ry * ry;
 }
@@ -44,39 +44,50 @@ inline int nearest_in_bin(int *best, segments_t s, int first, int count, float r
     return 1;
 }
 
+// The sums of all strokes at this work-item's sample; (x0, y0): the bin's first.
+inline sums_t gather(const tables_t *t, int bx, int by, int gx, int gy, int n, local int *least_bits, local uint *marks,
+                     int channels) {
+    sums_t sum = {0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f};
+    float x = gx, y = gy, cx = bx * BIN + 0.5f * (BIN - 1), cy = by * BIN + 0.5f * (BIN - 1);
+    for (int i = t->row_start[by - t->row0]; i < t->row_start[by - t->row0 + 1]; i++) {
+        global const int *item = t->row_items + ITEM_STRIDE * i;
+        if (bx < item[1] || bx >= item[2]) continue;
+        global const float *p = t->strokes + STROKE_STRIDE * item[0];
+        global const int *at = t->index + INDEX_STRIDE * item[0];
+        nearest_t near = {1e15f, p[P_HEIGHT], 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f};
+        int in = 0, reached;
+        if (at[I_OCTAVES] < 0) {
+            int best;
+            reached = nearest_in_bin(&best, t->outlines, at[I_FIRST], at[I_COUNT], p[P_REACH], x, y, cx, cy, least_bits,
+                                     marks);
+            if (best != NOTHING) resolve(&near, 1, t->outlines, best, x, y);
+            if (at[I_SPANS] >= 0 && gy < n) {
+                global const int *span = t->span_index + at[I_SPANS] + gy - t->row0 * BIN;
+                in = inside_row(t->spans, span[0], span[1], x);
+            }
+            reached = reached || at[I_SPANS] >= 0;
+        } else {
+            reached = straight(&near, t, p, at, x, y);
+        }
+        if (reached && channels) channel_section(&sum, &near, in, p, t);
+        if (reached && !channels) cross_section(&sum, &near, in, p, t);
+    }
+    return sum;
+}
+
 // Work-groups (most bins of a row, rows of bins) of BIN x BIN; of row by0 + j the bins windows[2 j] .. windows[2 j + 1] - 1
 // are done. Arguments as in raster.cl.
 kernel __attribute__((reqd_work_group_size(BIN, BIN, 1)))
-void rasterise(global const float *segments, int m, global const float *strokes, global const int *index,
-               global const int *row_start, global const int *row_items, global const int *span_index,
-               global const float *spans, global float *height_d, global float *height_f, global float *gradient_d,
-               global float *gradient_f, int n, int pitch, int stride, float spacing, float screening, float exit_length,
-               int pinned, int row0, int column0, int by0, global const int *windows) {
+void rasterise(TABLE_ARGUMENTS, int by0, global const int *windows, int n, int pitch, int stride,
+               global float *gradient_d, global float *gradient_f, global float *height_d, global float *height_f,
+               float screening, int pinned) {
     local int least_bits;
     local uint marks[BIN_ITEMS / 32];
     int j = get_group_id(1), bx = windows[2 * j] + get_group_id(0), by = by0 + j;
     if (bx >= windows[2 * j + 1]) return;
-    segments_t s = {m, segments};
-    sums_t sum = {0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f};
+    tables_t t = TABLES;
     int gx = bx * BIN + get_local_id(0), gy = by * BIN + get_local_id(1);
-    float x0 = bx * BIN, y0 = by * BIN, x = gx, y = gy, middle = 0.5f * (BIN - 1);
-    for (int i = row_start[by - row0]; i < row_start[by - row0 + 1]; i++) {
-        global const float *p = strokes + STROKE_STRIDE * row_items[i];
-        global const int *at = index + INDEX_STRIDE * row_items[i];
-        if (x0 > p[2] || x0 + BIN - 1 < p[1]) continue;
-        int best;
-        int reached = nearest_in_bin(&best, s, at[0], at[1], p[3], x, y, x0 + middle, y0 + middle, &least_bits, marks);
-        if (!reached && at[2] < 0) continue;
-        nearest_t near = {1e30f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f};
-        if (best != NOTHING) resolve(&near, 1, s, best, x, y);
-        int in = 0;
-        if (at[2] >= 0 && gy < n) {
-            global const int *span = span_index + at[2] + gy - row0 * BIN;
-            in = inside_row(spans, span[0], span[1], x);
-            if (in) near.height = segments[at[0] + 2 * (size_t)m];
-        }
-        cross_section(&sum, &near, in, p, spacing, 1.0f / spacing, 1.0f / exit_length);
-    }
+    sums_t sum = gather(&t, bx, by, gx, gy, n, &least_bits, marks, 0);
     if (gx >= n || gy >= n) return;
     constraint_t c = conclude(&sum, gx, gy, n, screening, pinned);
     size_t o = (size_t)(gy - row0 * BIN) * pitch + gx - column0 * BIN;
@@ -85,4 +96,24 @@ void rasterise(global const float *segments, int m, global const float *strokes,
     gradient_d[o] = c.gradient_d;
     gradient_f[o] = c.gradient_fx;
     gradient_f[o + stride] = c.gradient_fy;
+}
+
+// The same for amplitude and roughness, as differences from their base: d one channel, f two.
+kernel __attribute__((reqd_work_group_size(BIN, BIN, 1)))
+void rasterise_channels(TABLE_ARGUMENTS, int by0, global const int *windows, int n, int pitch, int stride,
+                        global float *d, global float *f) {
+    local int least_bits;
+    local uint marks[BIN_ITEMS / 32];
+    int j = get_group_id(1), bx = windows[2 * j] + get_group_id(0), by = by0 + j;
+    if (bx >= windows[2 * j + 1]) return;
+    tables_t t = TABLES;
+    int gx = bx * BIN + get_local_id(0), gy = by * BIN + get_local_id(1);
+    sums_t sum = gather(&t, bx, by, gx, gy, n, &least_bits, marks, 1);
+    if (gx >= n || gy >= n) return;
+    constraint_t c;
+    conclude_two(&c, &sum);
+    size_t o = (size_t)(gy - row0 * BIN) * pitch + gx - column0 * BIN;
+    d[o] = c.gradient_d;
+    f[o] = c.gradient_fx;
+    f[o + stride] = c.gradient_fy;
 }

@@ -1,5 +1,5 @@
-// What strokes want of samples: nearest crest points, cross-sections, their commutative sums (DESIGN 5.2). Twin:
-// backend/esker/solve/reference_raster.py; tables and their fields: backend/esker/solve/constraints.py.
+// What strokes want of samples: nearest crest points, cross-sections, their commutative sums (DESIGN 5.2, 5.4). Twin:
+// backend/esker/solve/reference_section.py; tables, fields (P_..., I_...) and constants: backend/esker/solve/tables.py.
 //
 // Written once for two kinds of kernel. Row-wise ones (CPUs) compile it as it stands: REAL is a float16, 16 samples of
 // a row. Those with one work-item a sample (GPUs) define SECTION_SCALAR before it: REAL is a float. A MASK is the
@@ -9,16 +9,63 @@
 #define MASK int
 #define ANY(mask) ((mask) != 0)
 #define MASK_OF(truth) ((truth) ? 1 : 0)
+#define LEAST(v) (v)
+#define GREATEST(v) (v)
 #else
 #define REAL float16
 #define MASK int16
 #define ANY(mask) any(mask)
 #define MASK_OF(truth) ((int16)((truth) ? -1 : 0))
+#define LEAST(v) least16(v)
+#define GREATEST(v) (-least16(-(v)))
+
+inline float least16(float16 v) {
+    float8 a = fmin(v.lo, v.hi);
+    float4 b = fmin(a.lo, a.hi);
+    float2 c = fmin(b.lo, b.hi);
+    return fmin(c.x, c.y);
+}
 #endif
 #define TINY 1e-20f
+#define SLIGHT 1e-10f  // weight of a skirt beside a band's
+
+// The tables as a kernel's first arguments, and as it hands them on.
+#define TABLE_ARGUMENTS                                                                                          \
+    global const float *segments, int segment_count, global const float *knots, int knot_count,                 \
+        global const float *controls, global const int *octaves, global const float *strokes,                   \
+        global const int *index, global const int *row_start, global const int *row_items,                      \
+        global const int *span_index, global const float *spans, int row0, int column0, float spacing, float octave, \
+        float exit_length, float cliff
+#define TABLES                                                                                              \
+    {{segment_count, segments}, {knot_count, knots, controls, octaves}, strokes, index, row_start, row_items, \
+     span_index, spans, row0, column0, spacing, octave, 1.0f / exit_length, cliff}
 
 typedef struct {
-    REAL d2, height, rx, ry, along_x, along_y, left;
+    int m;                      // segments in all
+    global const float *table;  // SEGMENT_FIELDS x m
+} segments_t;
+
+typedef struct {
+    int m;                         // knots in all
+    global const float *knots;     // KNOT_FIELDS x m
+    global const float *controls;  // of cubic B-splines: crest heights smoothed, octave by octave
+    global const int *octaves;     // per stroke and octave: where piece 0 has its first control
+} profiles_t;
+
+typedef struct {
+    segments_t outlines;
+    profiles_t profiles;
+    global const float *strokes;                                // STROKE_STRIDE floats a stroke
+    global const int *index, *row_start, *row_items;            // INDEX_STRIDE, and by row of bins: ITEM_STRIDE ints
+    global const int *span_index;
+    global const float *spans;
+    int row0, column0;   // first bin of the tables
+    float s, octave;     // metres a cell; metres between the controls of the first octave
+    float decay, cliff;  // 1 / exit length; 1 / reach, or 0 for endless
+} tables_t;
+
+typedef struct {
+    REAL distance, height, rate, rx, ry, along_x, along_y, left;
 } nearest_t;
 
 typedef struct {
@@ -30,17 +77,14 @@ inline REAL smooth(REAL t) {
     return t * t * (3.0f - 2.0f * t);
 }
 
-typedef struct {
-    int m;                      // segments in all
-    global const float *table;  // SEGMENT_FIELDS x m
-} segments_t;
+// --- outlines: level crests, curved in plan ---
 
-// Is segment `at` nearer to 16 samples of a row than what they have?
+// Is segment `at` nearer to the samples of a row than what they have?
 inline void consider(REAL *best2, MASK *best, segments_t s, int at, REAL x, float y) {
     global const float *t = s.table + at;
     size_t m = s.m;
-    float dx = t[3 * m], dy = t[4 * m], py = y - t[m];
-    REAL px = x - t[0], u = clamp((px * dx + py * dy) * t[6 * m], 0.0f, 1.0f);
+    float dx = t[2 * m], dy = t[3 * m], py = y - t[m];
+    REAL px = x - t[0], u = clamp((px * dx + py * dy) * t[4 * m], 0.0f, 1.0f);
     REAL rx = px - u * dx, ry = py - u * dy, d2 = rx * rx + ry * ry;
     MASK better = d2 < *best2;
     *best2 = select(*best2, d2, better);
@@ -51,35 +95,164 @@ inline void consider(REAL *best2, MASK *best, segments_t s, int at, REAL x, floa
 inline void resolve(nearest_t *out, MASK mine, segments_t s, int at, REAL x, float y) {
     global const float *t = s.table + at;
     size_t m = s.m;
-    float dx = t[3 * m], dy = t[4 * m], dz = t[5 * m], il2 = t[6 * m], py = y - t[m];
-    REAL px = x - t[0], u = clamp((px * dx + py * dy) * il2, 0.0f, 1.0f);
-    REAL rx = px - u * dx, ry = py - u * dy, d2 = rx * rx + ry * ry;
+    float dx = t[2 * m], dy = t[3 * m], py = y - t[m];
+    REAL px = x - t[0], u = clamp((px * dx + py * dy) * t[4 * m], 0.0f, 1.0f);
+    REAL rx = px - u * dx, ry = py - u * dy, distance = sqrt(rx * rx + ry * ry);
     MASK at0 = u <= 0.0f, at1 = u >= 1.0f;
-    REAL tx = select(select((REAL)(dx), (REAL)(t[9 * m]), at1), (REAL)(t[7 * m]), at0);
-    REAL ty = select(select((REAL)(dy), (REAL)(t[10 * m]), at1), (REAL)(t[8 * m]), at0);
+    REAL tx = select(select((REAL)(dx), (REAL)(t[7 * m]), at1), (REAL)(t[5 * m]), at0);
+    REAL ty = select(select((REAL)(dy), (REAL)(t[8 * m]), at1), (REAL)(t[6 * m]), at0);
     REAL cross = tx * ry - ty * rx;
-    MASK cap = (at0 && MASK_OF(t[11 * m] > 0.0f)) || (at1 && MASK_OF(t[12 * m] > 0.0f));
+    MASK cap = (at0 && MASK_OF(t[9 * m] > 0.0f)) || (at1 && MASK_OF(t[10 * m] > 0.0f));
     REAL side = select(select((REAL)(0.5f), (REAL)(0.0f), cross < 0.0f), (REAL)(1.0f), cross > 0.0f);
-    if (ANY(cap)) side = select(side, 0.5f + 0.5f * cross / fmax(sqrt(d2), 1e-6f), cap);
-    REAL near0 = fmax(1.0f - 2.0f * u, 0.0f), near1 = fmax(2.0f * u - 1.0f, 0.0f);
-    REAL along = (1.0f - near0 - near1) * (dz * il2);
-    out->d2 = select(out->d2, d2, mine);
-    out->height = select(out->height, t[2 * m] + u * dz, mine);
+    if (ANY(cap)) side = select(side, 0.5f + 0.5f * cross / fmax(distance, 1e-6f), cap);
+    out->distance = select(out->distance, distance, mine);
     out->rx = select(out->rx, rx, mine);
     out->ry = select(out->ry, ry, mine);
-    out->along_x = select(out->along_x, along * dx + near0 * t[13 * m] + near1 * t[15 * m], mine);
-    out->along_y = select(out->along_y, along * dy + near0 * t[14 * m] + near1 * t[16 * m], mine);
     out->left = select(out->left, side, mine);
 }
 
-// Height, fall per metre and change with the crest height of a flank (reference_raster.flank_profile). `run` is 1 / slope,
-// `end` the full width of the profile, d at most that.
-inline void flank_profile(REAL top, REAL slope, REAL run, REAL k, REAL f, REAL end, REAL d,
-                          REAL *z, REAL *fall, REAL *lift) {
-    REAL half_square = 0.5f * slope * slope, rest = end - d;
-    MASK shoulder = d < 2.0f * k * top * run, foot = rest < 2.0f * f * top * run;
-    *z = (1.0f + k) * top - slope * d;
-    *fall = slope;
+inline MASK inside_row(global const float *spans, int from, int to, REAL x) {
+    MASK in = 0;
+    for (int i = from; i < to; i++) in = in || (x >= spans[2 * i] && x <= spans[2 * i + 1]);
+    return in;
+}
+
+// --- profiles: straight in plan, of varying height ---
+
+// Height of a crest and its slope per cell at q, by its knots. first, last: least and greatest q.
+inline void knots_at(REAL *z, REAL *slope, profiles_t t, int start, int count, REAL q, float first, float last,
+                     float steepest) {
+    global const float *at = t.knots + start, *height = at + t.m, *fall = at + 2 * (size_t)t.m;
+    int j = 0;
+    for (int step = count / 2, left = count; left > 1; left -= step, step = left / 2)
+        if (at[j + step] <= first) j += step;
+    *z = height[j] + fall[j] * (q - at[j]);
+    *slope = fall[j];
+    for (j++; j < count && at[j] <= last; j++) {
+        MASK mine = q >= at[j];
+        *z = select(*z, height[j] + fall[j] * (q - at[j]), mine);
+        *slope = select(*slope, (REAL)(fall[j]), mine);
+    }
+    *slope = clamp(*slope, -steepest, steepest);
+}
+
+// The same of a smoothed crest: uniform cubic B-spline, `inverse` pieces a cell.
+inline void spline_at(REAL *z, REAL *slope, global const float *controls, REAL q, float first, float last,
+                      float inverse) {
+    REAL u = q * inverse;
+    int j = (int)floor(first * inverse), end = (int)floor(last * inverse);
+    for (int k = j; k <= end; k++) {
+        global const float *c = controls + k;
+        float a0 = (c[0] + 4.0f * c[1] + c[2]) * (1.0f / 6.0f), a1 = (c[2] - c[0]) * 0.5f;
+        float a2 = (c[0] - 2.0f * c[1] + c[2]) * 0.5f, a3 = (c[3] - c[0] + 3.0f * (c[1] - c[2])) * (1.0f / 6.0f);
+        REAL f = u - (float)k, height = a0 + f * (a1 + f * (a2 + f * a3));
+        REAL along = (a1 + f * (2.0f * a2 + f * (3.0f * a3))) * inverse;
+        MASK mine = u >= (float)k || MASK_OF(k == j);
+        *z = select(*z, height, mine);
+        *slope = select(*slope, along, mine);
+    }
+}
+
+// The same in octave o: 0 is the crest itself, each further one is twice as smooth as the last.
+inline void octave_at(REAL *z, REAL *slope, const tables_t *t, global const int *at, int o, REAL q, float first,
+                      float last) {
+    if (o == 0) {
+        knots_at(z, slope, t->profiles, at[I_FIRST], at[I_COUNT], q, first, last, STEEPEST * t->s);
+        return;
+    }
+    global const float *controls = t->profiles.controls + t->profiles.octaves[at[I_OCTAVE] + o - 1];
+    spline_at(z, slope, controls, q, first, last, t->s / (t->octave * (1 << (o - 1))));
+}
+
+// Height of a crest at q for samples d metres beyond its plateau, its slope per cell and its change per metre of d: the
+// farther a sample, the smoother the crest that it sees (reference_section.crest_at).
+inline void crest_at(REAL *z, REAL *slope, REAL *rate, const tables_t *t, global const int *at, REAL q, REAL d) {
+    float first = LEAST(q), last = GREATEST(q), near = LEAST(d), far = GREATEST(d), unit = FAN * t->octave;
+    int count = at[I_OCTAVES], o = 0;
+    while (o < count && unit * ((2 << o) - 1) <= near) o++;
+    octave_at(z, slope, t, at, o, q, first, last);
+    *rate = 0.0f;
+    for (; o < count && unit * ((1 << o) - 1) < far; o++) {
+        float from = unit * ((1 << o) - 1), inverse = 1.0f / (unit * (1 << o));
+        REAL v = clamp((d - from) * inverse, 0.0f, 1.0f), share = v * v * (3.0f - 2.0f * v), smoother, along;
+        octave_at(&smoother, &along, t, at, o + 1, q, first, last);
+        *rate = *rate * (1.0f - share) + 6.0f * inverse * v * (1.0f - v) * (smoother - *z);
+        *z += share * (smoother - *z);
+        *slope += share * (along - *slope);
+    }
+}
+
+// The nearest crest point of a profile; false when no sample is within its reach. Products are differences of such with
+// the rounding of one made good, so that a crest of 100,000 cells has no grain.
+inline int straight(nearest_t *out, const tables_t *t, global const float *p, global const int *at, REAL x, float y) {
+    float tx = p[P_TX], ty = p[P_TY], py = y - p[P_AY], b = py * ty, c = py * tx;
+    REAL px = x - p[P_AX], zero = 0.0f, slope;
+    REAL along = fma(px, (REAL)(tx), (REAL)(b)) + fma(py, ty, -b);
+    REAL cross = fma(py, tx, -c) - fma(px, (REAL)(ty), (REAL)(-c));
+    REAL q = clamp(along, 0.0f, p[P_LENGTH]), past = along - q;
+    REAL distance = sqrt(past * past + cross * cross);
+    if (!ANY(distance <= p[P_REACH])) return 0;
+    REAL d = clamp(distance, p[P_PLATEAU], p[P_REACH]) - p[P_PLATEAU];
+    crest_at(&out->height, &slope, &out->rate, t, at, q, d * t->s);
+    MASK cap = past != 0.0f;
+    slope = select(slope, zero, cap);
+    out->distance = distance;
+    out->rx = past * tx - cross * ty;
+    out->ry = past * ty + cross * tx;
+    out->along_x = slope * tx;
+    out->along_y = slope * ty;
+    out->left = select(select((REAL)(0.5f), zero, cross < 0.0f), (REAL)(1.0f), cross > 0.0f);
+    if (ANY(cap)) out->left = select(out->left, 0.5f + 0.5f * cross / fmax(distance, 1e-6f), cap);
+    return 1;
+}
+
+// --- cross-sections ---
+
+// A stroke's band where samples are: its flank there, and how far it goes.
+typedef struct {
+    REAL d, ds, present, slope, run, extent, k, f, top, full, end;
+    MASK hard, has, within;
+} band_t;
+
+inline band_t band_of(const nearest_t *near, MASK inside, global const float *p, float s) {
+    band_t b;
+    REAL zero = 0.0f, one = 1.0f;
+    b.d = fmax(select(near->distance, zero, inside) - p[P_PLATEAU], 0.0f);
+    b.ds = b.d * s;
+    b.hard = b.d < CREST_HALF_WIDTH;
+    b.within = inside || near->distance <= p[P_REACH];
+    b.top = fabs(near->height);
+    if (p[P_SAME] > 0.0f) {
+        b.present = p[P_RH];
+        b.has = MASK_OF(p[P_RH] > 0.0f);
+        b.slope = p[P_RS];
+        b.run = p[P_RUN];
+        b.extent = p[P_RE];
+        b.k = p[P_RK];
+        b.f = p[P_RF];
+    } else {
+        REAL left = near->left * p[P_LH];
+        b.present = left + (1.0f - near->left) * p[P_RH];
+        b.has = b.present > 0.0f;
+        REAL share = left / fmax(b.present, TINY);
+        b.slope = select(one, p[P_RS] + share * (p[P_LS] - p[P_RS]), b.has);
+        b.run = 1.0f / b.slope;
+        b.extent = p[P_RE] + share * (p[P_LE] - p[P_RE]);
+        b.k = p[P_RK] + share * (p[P_LK] - p[P_RK]);
+        b.f = p[P_RF] + share * (p[P_LF] - p[P_RF]);
+    }
+    b.full = (1.0f + b.k + b.f) * b.top * b.run;
+    b.end = select(zero, fmin(b.extent, b.full), b.has);
+    return b;
+}
+
+// Height, fall per metre and change with the crest height of a flank d metres from the crest, at most its full width
+// (reference_section.flank_profile).
+inline void flank_profile(const band_t *b, REAL d, REAL *z, REAL *fall, REAL *lift) {
+    REAL half_square = 0.5f * b->slope * b->slope, rest = b->full - d, top = b->top, k = b->k, f = b->f;
+    MASK shoulder = d < 2.0f * k * top * b->run, foot = rest < 2.0f * f * top * b->run;
+    *z = (1.0f + k) * top - b->slope * d;
+    *fall = b->slope;
     *lift = 1.0f + k;
     if (ANY(shoulder)) {
         REAL curve = half_square / fmax(k * top, TINY), drop = 0.5f * curve * d;
@@ -91,57 +264,85 @@ inline void flank_profile(REAL top, REAL slope, REAL run, REAL k, REAL f, REAL e
         REAL curve = half_square / fmax(f * top, TINY), low = 0.5f * curve * rest * rest;
         *z = select(*z, low, foot);
         *fall = select(*fall, curve * rest, foot);
-        *lift = select(*lift, curve * rest * (1.0f + k + f) * run - low / fmax(top, TINY), foot);
+        *lift = select(*lift, curve * rest * (1.0f + k + f) * b->run - low / fmax(top, TINY), foot);
     }
 }
 
-// Adds one stroke's cross-section to the sums (reference_raster.cross_section). p: STROKE_FIELDS; s: metres a cell;
-// cells: 1 / s; decay: 1 / exit length.
-inline void cross_section(sums_t *sum, const nearest_t *near, MASK inside, global const float *p, float s, float cells,
-                          float decay) {
-    REAL zero = 0.0f, one = 1.0f, distance = select(sqrt(near->d2), zero, inside);
-    REAL d = fmax(distance - p[0], 0.0f), ds = d * s;
-    MASK hard = d < CREST_HALF_WIDTH;
-    REAL left = near->left * p[4], present = left + (1.0f - near->left) * p[9];
-    MASK has = present > 0.0f;
-    REAL share = left / fmax(present, TINY);
-    REAL slope = select(one, p[10] + share * (p[5] - p[10]), has), extent = p[11] + share * (p[6] - p[11]);
-    REAL k = p[12] + share * (p[7] - p[12]), f = p[13] + share * (p[8] - p[13]), run = 1.0f / slope;
-    REAL top = fabs(near->height), full = (1.0f + k + f) * top * run, end = select(zero, fmin(extent, full), has);
-    REAL wide = 1.0f / fmax(end, SPRING_FLOOR_CELLS * s), rt = ds * wide;
-    MASK reached = (inside || near->d2 <= p[3] * p[3]) && (hard || (has && rt < TOE));
+// Where a band's extent cuts it so high that the ground would break off: width of the skirt that leads down from there,
+// metres, and how much it is called for, 0..1 (reference_section.skirt).
+inline REAL skirt(const band_t *b, float cliff, REAL *width, REAL *height, REAL *lift) {
+    REAL fall;
+    flank_profile(b, b->end, height, &fall, lift);
+    REAL zero = 0.0f, need = select(zero, smooth(*height * cliff * (1.0f / SKIRT_SLOPE) - 0.5f), b->has);
+    *width = need * 2.0f * *height / fmax(fall, SKIRT_SLOPE);
+    return need;
+}
+
+// Adds one stroke's cross-section to the sums (reference_section.cross_section). p: STROKE_FIELDS.
+inline void cross_section(sums_t *sum, const nearest_t *near, MASK inside, global const float *p, const tables_t *t) {
+    band_t b = band_of(near, inside, p, t->s);
+    REAL zero = 0.0f, one = 1.0f, inverse = 1.0f / fmax(b.end, THINNEST_M);
+    REAL r = fmin(b.ds * inverse, 1e6f), wide = fmin(inverse, 1.0f / (SPRING_FLOOR_CELLS * t->s)), rt = b.ds * wide;
+    REAL toe_end = TOE, need = 0.0f, width = 0.0f, foot_height = 0.0f, foot_lift = 0.0f;
+    MASK cut = b.has && b.end < b.full;
+    if (t->cliff > 0.0f && ANY(cut)) {
+        need = skirt(&b, t->cliff, &width, &foot_height, &foot_lift);
+        toe_end = fmax(toe_end, 1.0f + width * wide);
+    }
+    MASK reached = b.within && (b.hard || (b.has && rt < toe_end));
     if (!ANY(reached)) return;
-    REAL r = fmin(ds / fmax(end, THINNEST_M), 1e6f), z, fall, lift;
-    flank_profile(top, slope, run, k, f, full, fmin(ds, end), &z, &fall, &lift);
-    REAL free = smooth((r - SPRING_FULL_FRACTION) * (1.0f / (1.0f - SPRING_FULL_FRACTION)));
-    REAL past = 1.0f + fmax(ds - end, 0.0f) * decay, cut = fmin(8.0f * (1.0f - end / fmax(full, TINY)), 1.0f);
-    REAL leaving = select(free * cut, one, r > 1.0f);
-    fall += leaving * (fmin(fall, EXIT_SHARE * decay * z) / (past * past) - fall);
-    lift = select(select(lift, zero, r > 1.0f), one, !has);
-    REAL sign = select(one, -one, near->height < 0.0f), down = select(zero, -sign * fall, has && distance > p[0]);
-    REAL near_weight = 1.0f / (1.0f + d * d), inner = fmax(1.0f - r, 0.0f), outer = fmax(1.0f - rt * (1.0f / TOE), 0.0f);
-    REAL fade = select(zero, select(present * (1.0f - free), one, hard), reached);
-    REAL toe = select(zero, present * (1.0f - smooth((rt - 1.0f) * (1.0f / (TOE - 1.0f)))), reached && has);
-    REAL w = near_weight * fade * select(inner * inner + TINY, one, hard), g = near_weight * toe * outer * outer;
-    REAL a = SPRING_CELLS * s * wide, unit = down / fmax(distance, 0.5f);
-    lift = select(lift * cells, zero, inside);
+    REAL z, fall, lift, free = 0.0f, skirted = 0.0f;
+    flank_profile(&b, fmin(b.ds, b.end), &z, &fall, &lift);
+    MASK beyond = r > 1.0f;
+    REAL held = 1.0f;
+    if (ANY(r > SPRING_FULL_FRACTION)) {
+        free = smooth((r - SPRING_FULL_FRACTION) * (1.0f / (1.0f - SPRING_FULL_FRACTION)));
+        REAL over = fmax(b.ds - b.end, 0.0f), past = 1.0f + over * t->decay;
+        REAL level = fmin(8.0f * (1.0f - b.end / fmax(b.full, TINY)), 1.0f), rest = fmax(1.0f - over / fmax(width, TINY), 0.0f);
+        REAL leaving = select(free * level * (1.0f - need), one, beyond);
+        REAL exit = fmin(fall, EXIT_SHARE * t->decay * z) / (past * past);
+        REAL down = 2.0f * foot_height * rest / fmax(width, TINY);
+        fall += leaving * (exit + need * (down - exit) - fall);
+        z += select(zero, need * (foot_height * rest * rest - z), beyond);
+        lift = select(lift, need * foot_lift * rest * rest, beyond);
+        REAL ends = b.ds / fmax(b.end + width, THINNEST_M);
+        held = 1.0f - smooth((ends - HELD_FRACTION) * (1.0f / (1.0f - HELD_FRACTION)));
+        skirted = select(zero, SLIGHT * held, beyond);
+    }
+    lift = select(one, lift, b.has);
+    REAL sign = select(one, -one, near->height < 0.0f);
+    REAL down = select(zero, lift * near->rate - sign * fall, b.has && near->distance > p[P_PLATEAU] && !inside);
+    REAL near_weight = 1.0f / (1.0f + b.d * b.d), inner = fmax(1.0f - r, 0.0f), outer = fmax(1.0f - rt / toe_end, 0.0f);
+    REAL fade = select(zero, select(b.present * (1.0f - free), one, b.hard), reached);
+    REAL toe = select(zero, b.present * (1.0f - smooth((rt - 1.0f) / (toe_end - 1.0f))), reached && b.has);
+    REAL w = near_weight * (fade * select(inner * inner + TINY, one, b.hard) + select(zero, skirted, reached));
+    REAL g = near_weight * toe * outer * outer, a = SPRING_CELLS * t->s * wide;
+    REAL unit = down / fmax(near->distance, 0.5f);
+    lift = select(lift * (1.0f / t->s), zero, inside);
     sum->w += w;
     sum->wt += w * sign * z;
     sum->wa += w * a * a;
     sum->fade = fmax(sum->fade, fade);
-    REAL held = present * (1.0f - smooth((r - HELD_FRACTION) * (1.0f / (1.0f - HELD_FRACTION))));
-    sum->held = fmax(sum->held, select(zero, select(held, one, hard), reached));
+    sum->held = fmax(sum->held, select(zero, select(b.present * held, one, b.hard), reached));
     sum->g += g;
     sum->gx += g * (unit * near->rx + lift * near->along_x);
     sum->gy += g * (unit * near->ry + lift * near->along_y);
     sum->toe = fmax(sum->toe, toe);
-    sum->hard = select(sum->hard, one, hard && reached);
+    sum->hard = select(sum->hard, one, b.hard && reached);
 }
 
-inline MASK inside_row(global const float *spans, int from, int to, REAL x) {
-    MASK in = 0;
-    for (int i = from; i < to; i++) in = in || (x >= spans[2 * i] && x <= spans[2 * i + 1]);
-    return in;
+// Adds what one stroke says of amplitude and roughness to gx, gy (weights in g, knowledge in toe) (DESIGN 5.4).
+inline void channel_section(sums_t *sum, const nearest_t *near, MASK inside, global const float *p, const tables_t *t) {
+    band_t b = band_of(near, inside, p, t->s);
+    REAL zero = 0.0f, one = 1.0f, r = b.ds / fmax(b.end, CHANNEL_FLOOR_CELLS * t->s);
+    REAL known = select(b.present * (1.0f - smooth((r - 1.0f) * (1.0f / (TOE - 1.0f)))), one, b.hard);
+    known = select(zero, known, b.within);
+    REAL outer = fmax(1.0f - r * (1.0f / TOE), 0.0f);
+    REAL g = known / (1.0f + b.d * b.d) * select(outer * outer, one, b.hard);
+    sum->g += g;
+    sum->gx += g * p[P_AMPLITUDE];
+    sum->gy += g * p[P_ROUGHNESS];
+    sum->toe = fmax(sum->toe, known);
 }
 
 // What all strokes together say of samples: D and f of both equations, stiffness -1 where fixed.
@@ -149,22 +350,27 @@ typedef struct {
     REAL height_d, height_f, gradient_d, gradient_fx, gradient_fy;
 } constraint_t;
 
+// D and f of the gradient, or of the channels.
+inline void conclude_two(constraint_t *out, const sums_t *sum) {
+    REAL toe = CREST_STIFFNESS * sum->toe, g = fmax(sum->g, TINY);
+    out->gradient_d = toe;
+    out->gradient_fx = toe * sum->gx / g;
+    out->gradient_fy = toe * sum->gy / g;
+}
+
 // x: columns of the samples, y their row, n samples a side; a pinned border is fixed at the base.
 inline constraint_t conclude(const sums_t *sum, MASK x, int y, int n, float screening, int pinned) {
     constraint_t out;
     REAL zero = 0.0f, fixed = -1.0f;
-    REAL w = fmax(sum->w, TINY), target = sum->wt / w, a = sum->wa / w * sum->fade, g = fmax(sum->g, TINY);
+    REAL w = fmax(sum->w, TINY), target = sum->wt / w, a = sum->wa / w * sum->fade;
     MASK hard = sum->hard > 0.0f;
     out.height_d = select(a, fixed, hard);
     out.height_f = select((a + screening * sum->held) * target, target, hard);
-    REAL toe = CREST_STIFFNESS * sum->toe;
     if (pinned) {
         MASK edge = x == 0 || x == n - 1 || MASK_OF(y == 0 || y == n - 1);
         out.height_d = select(out.height_d, fixed, edge);
         out.height_f = select(out.height_f, zero, edge);
     }
-    out.gradient_d = toe;
-    out.gradient_fx = toe * sum->gx / g;
-    out.gradient_fy = toe * sum->gy / g;
+    conclude_two(&out, sum);
     return out;
 }

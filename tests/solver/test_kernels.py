@@ -12,6 +12,7 @@ from esker.solve.constraints import Packer, bins, pack
 from esker.solve.device import Device
 from esker.solve.levels import ClSystem, ClWorkspace, Launcher
 from esker.solve.reference import BOTTOM_LEVELS
+from esker.solve.tables import STROKE_AT
 from tests.solver.scenes import PINNED, SCENES, SETTINGS
 
 Field = NDArray[np.float64]
@@ -194,16 +195,17 @@ def blocks(a: Field) -> Field:
 
 def test_nearest_segment_is_that_of_a_full_search() -> None:
     """The candidates of a bin always hold the nearest segment of every sample."""
-    tables = pack(SCENES["cross"], SETTINGS, 2)
-    for k, (first, count, _, _) in enumerate(tables.index):
+    tables = pack(SCENES["loops"], SETTINGS, 2)
+    for k, (first, count, *_) in enumerate(tables.index):
         seg = tables.segments[:, first : first + count]
         y, x = np.mgrid[: bins(257) * 16 : 1, : bins(257) * 16 : 1].astype(float)
-        near = reference_raster._nearest(seg, blocks(x), blocks(y), tables.strokes[k, 3])
+        near = reference_raster._nearest(tables, k, blocks(x), blocks(y))
         best = np.full(x.shape, 1e30)
         for j in range(count):
             best = np.minimum(best, reference_raster._distance2(seg[:, j], x, y))
-        within = blocks(best) <= tables.strokes[k, 3] ** 2
-        assert np.allclose(near.d2[within], blocks(best)[within])
+        best = np.sqrt(blocks(best))
+        within = best <= tables.strokes[k, STROKE_AT["reach"]]
+        assert np.allclose(near.distance[within], best[within])
 
 
 def test_a_dirty_window_gives_the_bits_of_a_full_raster(device: Device) -> None:

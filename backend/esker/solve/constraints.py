@@ -9,12 +9,13 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from esker import grid
 from esker.contract import DEFAULT_REACH_FRACTION, MAX_REFINED_LEVEL, Stroke, TerrainSettings
-from esker.solve.crest import Crest, crest_of
-from esker.solve.packing import Packed, join, pack_one, reach_of
-from esker.solve.tables import BIN, BinBox, Tables, Window, bins, defines, everything, whole
+from esker.solve.crest import crest_of
+from esker.solve.packing import Packed, Shape, join, pack_one, reach_m, shape_of
+from esker.solve.tables import BIN, BinBox, Floats, Tables, Window, bins, defines, everything, union, whole
 
 __all__ = [
     "BIN",
@@ -62,7 +63,7 @@ class Packer:
                 new[stroke.id] = (stroke, known[1])
                 continue
             crest = crest_of(stroke)
-            new[stroke.id] = (stroke, pack_one(crest, s, box) if crest is not None else None)
+            new[stroke.id] = (stroke, pack_one(shape_of(crest, settings), s, box) if crest is not None else None)
         window = everything(box) if fresh else _changed(old, new)
         self._settings, self._packed = _settings_key(settings), new
         tables = _tables(self.level, settings, [p for _, p in new.values() if p is not None], box)
@@ -88,17 +89,7 @@ def _changed(
         for side in (old, new)
         if key in side
     ]
-    windows = [p.window for p in touched if p is not None]
-    if not windows:
-        return None
-    first, last = min(w.first for w in windows), max(w.first + len(w.spans) for w in windows)
-    low = np.full(last - first, 1 << 30, dtype=np.int32)
-    high = np.zeros(last - first, dtype=np.int32)
-    for w in windows:
-        rows = slice(w.first - first, w.first - first + len(w.spans))
-        low[rows] = np.minimum(low[rows], w.spans[:, 0])
-        high[rows] = np.maximum(high[rows], w.spans[:, 1])
-    return Window(first, np.column_stack([np.minimum(low, high), high]))
+    return union([p.window for p in touched if p is not None])
 
 
 def _tables(level: int, settings: TerrainSettings, packed: list[Packed], box: BinBox) -> Tables:
@@ -107,7 +98,7 @@ def _tables(level: int, settings: TerrainSettings, packed: list[Packed], box: Bi
         level=level,
         size_m=settings.size_m,
         box=box,
-        screening=0.0 if reach is None else (grid.spacing(level, settings.size_m) / reach) ** 2,
+        reach_m=reach,
         exit_length_m=min(reach or math.inf, settings.size_m * DEFAULT_REACH_FRACTION),
         pinned=settings.border == "pinned",
         **join(packed, box),
@@ -123,16 +114,38 @@ class WindowPacker:
 
     def __init__(self, strokes: Sequence[Stroke], settings: TerrainSettings) -> None:
         self._settings = settings
-        ordered = sorted(strokes, key=lambda k: k.id)
-        self._crests: list[Crest] = [crest for s in ordered if (crest := crest_of(s)) is not None]
-        plan = [crest.points[:, :2] for crest in self._crests]
+        pairs = [(s, crest_of(s)) for s in sorted(strokes, key=lambda k: k.id)]
+        self._strokes = [s for s, crest in pairs if crest is not None]
+        crests = [crest for _, crest in pairs if crest is not None]
+        self._shapes: list[Shape] = [shape_of(crest, settings) for crest in crests]
+        plan = [crest.points[:, :2] for crest in crests]
         self._low = np.array([p.min(axis=0) for p in plan]).reshape(-1, 2)
         self._high = np.array([p.max(axis=0) for p in plan]).reshape(-1, 2)
-        self._reach: dict[int, np.ndarray[tuple[int, ...], np.dtype[np.float64]]] = {}
+        self._reach: dict[int, Floats] = {}
 
     def pack(self, level: int, box: BinBox) -> Tables:
         """The tables of the bins of ``box``. Raises ValueError for a level outside 0..MAX_REFINED_LEVEL or a box that
         is empty or sticks out of the level."""
+        s = grid.spacing(level, self._settings.size_m)
+        packed = [pack_one(self._shapes[k], s, box) for k in self._near(level, box)]
+        return _tables(level, self._settings, [p for p in packed if p is not None], box)
+
+    def reaching(self, level: int, box: BinBox) -> list[Stroke]:
+        """The strokes, by id, that may reach the bins of ``box``, at this or any finer level. Raises like ``pack``."""
+        return [self._strokes[k] for k in self._near(level, box)]
+
+    def _near(self, level: int, box: BinBox) -> NDArray[np.intp]:
+        packed = [
+            pack_one(self._shapes[k], grid.spacing(level, self._settings.size_m), box) for k in self._near(level, box)
+        ]
+        return _tables(level, self._settings, [p for p in packed if p is not None], box)
+
+    def reaching(self, level: int, box: BinBox) -> list[Stroke]:
+        """The strokes, by id, whose bounds with their reach meet the bins of ``box``: no other changes anything there.
+        Raises ValueError like ``pack``."""
+        return [self._shapes[k].crest.stroke for k in self._near(level, box)]
+
+    def _near(self, level: int, box: BinBox) -> list[int]:
         if not 0 <= level <= MAX_REFINED_LEVEL:
             raise ValueError(f"level must be 0..{MAX_REFINED_LEVEL}, not {level}")
         by0, by1, bx0, bx1 = box
@@ -141,9 +154,7 @@ class WindowPacker:
             raise ValueError(f"bins {box} are not within the {count} x {count} of level {level}")
         s = grid.spacing(level, self._settings.size_m)
         if level not in self._reach:
-            self._reach[level] = np.array([reach_of(crest, s) * s for crest in self._crests])[:, None]
+            self._reach[level] = np.array([reach_m(shape, s) for shape in self._shapes]).reshape(-1, 1)
         low, high = np.array([bx0, by0]) * BIN * s, np.array([bx1, by1]) * BIN * s
         reach = self._reach[level]
-        near = ((self._high + reach >= low) & (self._low - reach <= high)).all(axis=1)
-        packed = [pack_one(self._crests[k], s, box) for k in np.flatnonzero(near)]
-        return _tables(level, self._settings, [p for p in packed if p is not None], box)
+        return [int(k) for k in np.flatnonzero(((self._high + reach >= low) & (self._low - reach <= high)).all(axis=1))]

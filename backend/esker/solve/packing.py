@@ -9,18 +9,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from esker.contract import Flank
+from esker.contract import BASE_AMPLITUDE_M, BASE_ROUGHNESS, Flank, TerrainSettings
 from esker.solve.crest import Crest
+from esker.solve.outline import cut, segments_of, spans_of
+from esker.solve.silhouette import Silhouette, silhouette
 from esker.solve.tables import (
     BIN,
     FLATTEST,
     HALF_DIAGONAL,
+    INDEX_AT,
     INDEX_STRIDE,
+    ITEM_STRIDE,
+    KNOT_FIELDS,
     LANES,
-    LONGEST_CELLS,
     SEGMENT_FIELDS,
+    SKIRT_SLOPE,
     SOFT_PART,
     SPRING_FLOOR_CELLS,
+    STROKE_AT,
     STROKE_STRIDE,
     TOE,
     BinBox,
@@ -31,181 +37,251 @@ from esker.solve.tables import (
 
 
 @dataclass(frozen=True)
+class Side:
+    """One flank as numbers: slope (tangent), extent (metres), share of the height in a shoulder and in a foot."""
+
+    slope: float
+    extent: float
+    shoulder: float
+    foot: float
+
+
+@dataclass(frozen=True)
+class Shape:
+    """What the tables of any level and window are made from: a crest and its band, in metres.
+
+    cliff: 1 / reach of the terrain, 0 for endless; silhouette: of a profile, None of an outline.
+    """
+
+    crest: Crest
+    left: Side | None
+    right: Side | None
+    cliff: float
+    silhouette: Silhouette | None
+
+    def widths(self, tops: Floats) -> tuple[Floats, Floats]:
+        """Widest band and, where its extent cuts it high, widest skirt, for these crest heights; metres."""
+        sides = [side for side in (self.left, self.right) if side is not None]
+        wide, skirt = np.zeros(len(tops)), np.zeros(len(tops))
+        for side in sides:
+            round_part = 1 + side.shoulder + side.foot
+            wide = np.maximum(wide, np.minimum(side.extent, round_part * tops / side.slope))
+        if sides and self.cliff > 0:
+            slope, extent = min(s.slope for s in sides), min(s.extent for s in sides)
+            round_part = max(1 + s.shoulder + s.foot for s in sides)
+            cut_at = np.clip(round_part * tops - slope * extent, 0.0, tops)
+            need = np.clip(cut_at * self.cliff / SKIRT_SLOPE - 0.5, 0.0, 1.0)
+            skirt = need * need * (3 - 2 * need) * 2 * cut_at / SKIRT_SLOPE
+        return wide, skirt
+
+    def reach(self, tops: Floats, s: float) -> Floats:
+        """Outermost distance with any effect, cells, for these crest heights."""
+        wide, skirt = self.widths(tops)
+        wide = np.maximum(wide / s, SPRING_FLOOR_CELLS)
+        return self.crest.stroke.plateau_radius_m / s + np.maximum(TOE * wide, wide + skirt / s) + 0.01
+
+
+@dataclass(frozen=True)
 class Packed:
-    """One stroke's part of the tables. window: the bins that it can reach, within the box it was packed for."""
+    """One stroke's part of the tables. window: the bins that it can reach, within the box it was packed for.
 
-    segments: Floats
-    params: list[float]
+    segments of an outline; knots, controls and where each octave's piece 0 has its first control, of a profile.
+    """
+
+    params: Floats
     window: Window
-    span_index: Ints | None
-    spans: Floats | None
+    segments: Floats | None = None
+    knots: Floats | None = None
+    controls: Floats | None = None
+    octaves: tuple[int, ...] = ()
+    span_index: Ints | None = None
+    spans: Floats | None = None
 
 
-def _flank(flank: Flank | None) -> tuple[float, float, float, float, float]:
-    if flank is None or flank.slope_deg is None or flank.extent_m <= 0:
-        return 0.0, 0.0, 0.0, 0.0, 0.0
-    slope = max(math.tan(math.radians(flank.slope_deg)), FLATTEST)
-    shoulder = SOFT_PART if flank.shape == "convex" else 0.0
-    foot = SOFT_PART if flank.shape == "concave" else 0.0
-    return 1.0, slope, flank.extent_m, shoulder, foot
+def shape_of(crest: Crest, settings: TerrainSettings) -> Shape:
+    """A crest ready to be packed for any level."""
+    stroke = crest.stroke
+    left, right = _side(stroke.left), _side(stroke.right)
+    cliff = 0.0 if settings.reach_m is None else 1 / settings.reach_m
+    shape = Shape(crest, left, right, cliff, None)
+    if stroke.kind != "profile":
+        return shape
+    top = np.abs(crest.points[:, 2]).max()
+    wide, skirt = (float(w[0]) for w in shape.widths(np.array([top])))
+    return Shape(crest, left, right, cliff, silhouette(crest, settings.size_m, TOE * wide + skirt))
 
 
-def reach_of(crest: Crest, s: float) -> float:
-    """Outermost distance from the crest with any effect, cells."""
-    top = float(np.abs(crest.points[:, 2]).max())
-    widest = 0.0
-    for side in (crest.stroke.left, crest.stroke.right):
-        present, slope, extent, shoulder, foot = _flank(side)
-        if present:
-            widest = max(widest, min(extent, (1 + shoulder + foot) * top / slope))
-    return crest.stroke.plateau_radius_m / s + TOE * max(SPRING_FLOOR_CELLS, widest / s) + 0.01
+def reach_m(shape: Shape, s: float) -> float:
+    """Outermost distance of a stroke with any effect at spacing ``s``, metres."""
+    return float(shape.reach(np.abs(shape.crest.points[:, 2]), s).max()) * s
 
 
-def pack_one(crest: Crest, s: float, box: BinBox) -> Packed | None:
+def pack_one(shape: Shape, s: float, box: BinBox) -> Packed | None:
     """One stroke's part of the tables of a box of bins at spacing ``s``, or None when it cannot reach the box."""
-    points, stroke = crest.points.copy(), crest.stroke
-    points[:, :2] /= s
-    reach = reach_of(crest, s)
     by0, by1, bx0, bx1 = box
-    corner, far = np.array([bx0, by0]) * BIN, np.array([bx1, by1]) * BIN - 1
-    low, high = points[:, :2].min(axis=0) - reach, points[:, :2].max(axis=0) + reach
-    if (high < corner).any() or (low > far).any():
+    low, high = np.array([bx0, by0]) * BIN, np.array([bx1, by1]) * BIN - 1
+    return (_pack_profile if shape.silhouette is not None else _pack_outline)(shape, s, box, low, high)
+
+
+def _pack_profile(shape: Shape, s: float, box: BinBox, low: Ints, high: Ints) -> Packed | None:
+    line = shape.silhouette
+    assert line is not None
+    edges, tops = line.blocks
+    reach = shape.reach(tops, s)
+    ends = (line.start + edges[:, None] * line.unit) / s
+    a, b = ends[:-1].T, ends[1:].T
+    window = _window(np.minimum(a, b) - reach, np.maximum(a, b) + reach, box)
+    if window is None:
         return None
-    segments = _segments(points, crest.closed)
-    span_index, spans = _spans(points, by0 * BIN, by1 * BIN) if crest.closed else (None, None)
-    near = _near_box(segments, reach + HALF_DIAGONAL + 1, corner, far)
+    corners = np.array([(x, y) for x in (low[0], high[0]) for y in (low[1], high[1])])
+    along = np.clip((corners * s - line.start) @ line.unit, 0.0, line.length)
+    first, last = along.min() - s, along.max() + s
+    j0 = max(0, int(np.searchsorted(line.t, first, side="right")) - 2)
+    j1 = min(len(line.t), int(np.searchsorted(line.t, last)) + 2)
+    t, z = line.t / s, line.z
+    slope = np.append(np.diff(z) / np.diff(t), 0.0)
+    octaves, parts, at = [], [], 0
+    for o, controls in enumerate(line.octaves):
+        step = line.octave_m * 2**o
+        k0 = max(0, math.floor(first / step) - 1)
+        part = controls[k0 : math.floor(last / step) + 6]
+        octaves.append(at - k0)
+        parts.append(part)
+        at += len(part)
+    params = _params(shape, s, float(reach.max()))
+    for name, value in zip(("ax", "ay", "tx", "ty", "length"), (*line.start / s, *line.unit, t[-1]), strict=True):
+        params[STROKE_AT[name]] = value
+    knots = np.stack([t, z, slope])[:, j0:j1]
+    return Packed(params, window, None, knots, np.concatenate([np.zeros(0), *parts]), tuple(octaves))
+
+
+def _pack_outline(shape: Shape, s: float, box: BinBox, low: Ints, high: Ints) -> Packed | None:
+    points, closed = shape.crest.points[:, :2] / s, shape.crest.closed
+    height = float(shape.crest.points[0, 2])
+    reach = float(shape.reach(np.array([abs(height)]), s)[0])
+    if (points.min(axis=0) - reach > high).any() or (points.max(axis=0) + reach < low).any():
+        return None
+    segments = segments_of(cut(np.vstack([points, points[:1]]) if closed else points), closed)
+    span_index, spans = spans_of(points, box[0] * BIN, box[1] * BIN) if closed else (None, None)
+    ends = segments[:2], segments[:2] + segments[2:4]
+    near = _near_box(*ends, reach + HALF_DIAGONAL + 1, low, high)
     if not near.any() and (spans is None or len(spans) == 0):
         return None
     segments = segments[:, near] if near.any() else segments[:, :1]
-    pad = -segments.shape[1] % LANES
-    params = [stroke.plateau_radius_m / s, low[0], high[0], reach, *_flank(stroke.left), *_flank(stroke.right)]
-    window = _window(segments, reach, box, points if crest.closed else None)
-    return Packed(np.pad(segments, ((0, 0), (0, pad)), mode="edge"), params, window, span_index, spans)
+    from_, to = np.minimum(*ends)[:, near] - reach, np.maximum(*ends)[:, near] + reach
+    if closed:
+        from_ = np.column_stack([from_, points.min(axis=0)])
+        to = np.column_stack([to, points.max(axis=0)])
+    window = _window(from_, to, box)
+    if window is None:
+        return None
+    params = _params(shape, s, reach)
+    params[STROKE_AT["height"]] = height
+    padded = np.pad(segments, ((0, 0), (0, -segments.shape[1] % LANES)), mode="edge")
+    return Packed(params, window, padded, span_index=span_index, spans=spans)
 
 
-def _window(segments: Floats, reach: float, box: BinBox, inside: Floats | None) -> Window:
-    """The bins of a box that segments with this reach can touch, by row; those of ``inside`` (an outline) besides."""
+def _side(flank: Flank | None) -> Side | None:
+    if flank is None or flank.slope_deg is None or flank.extent_m <= 0:
+        return None
+    slope = max(math.tan(math.radians(flank.slope_deg)), FLATTEST)
+    shoulder = SOFT_PART if flank.shape == "convex" else 0.0
+    foot = SOFT_PART if flank.shape == "concave" else 0.0
+    return Side(slope, flank.extent_m, shoulder, foot)
+
+
+def _params(shape: Shape, s: float, reach: float) -> Floats:
+    """STROKE_FIELDS of a stroke, but for where its crest is."""
+    out, stroke = np.zeros(STROKE_STRIDE), shape.crest.stroke
+    values = {
+        "plateau": stroke.plateau_radius_m / s,
+        "reach": reach,
+        "same": float(shape.left == shape.right),
+        "run": 1.0,
+    }
+    values |= {"amplitude": stroke.amplitude_m - BASE_AMPLITUDE_M, "roughness": stroke.roughness - BASE_ROUGHNESS}
+    for letter, side in (("l", shape.left), ("r", shape.right)):
+        if side is None:
+            values[f"{letter}s"] = 1.0
+        else:
+            numbers = (1.0, side.slope, side.extent, side.shoulder, side.foot)
+            values |= {letter + name: value for name, value in zip("hsekf", numbers, strict=True)}
+    if shape.right is not None:
+        values["run"] = 1 / shape.right.slope
+    for name, value in values.items():
+        out[STROKE_AT[name]] = value
+    return out
+
+
+def _window(low: Floats, high: Floats, box: BinBox) -> Window | None:
+    """The bins of a box that rectangles (2, m) low .. high in cells touch, row by row; None of none."""
     by0, by1, bx0, bx1 = box
-    a, b = segments[:2], segments[:2] + segments[3:5]
-    low, high = np.minimum(a, b) - reach, np.maximum(a, b) + reach
-    if inside is not None:
-        low = np.column_stack([low, inside[:, :2].min(axis=0)])
-        high = np.column_stack([high, inside[:, :2].max(axis=0)])
     low, high = np.floor(low / BIN), np.ceil(high / BIN)
     first, last = int(np.clip(low[1].min(), by0, by1)), int(np.clip(high[1].max() + 1, by0, by1))
     row = np.arange(first, last)[:, None]
     meets = (low[1] <= row) & (row <= high[1])
     left = np.where(meets, low[0], bx1).min(axis=1, initial=bx1)
     right = np.where(meets, high[0] + 1, bx0).max(axis=1, initial=bx0)
-    spans = np.clip(np.column_stack([left, np.maximum(left, right)]), bx0, bx1)
-    return Window(first, spans.astype(np.int32))
+    spans = np.clip(np.column_stack([left, np.maximum(left, right)]), bx0, bx1).astype(np.int32)
+    return Window(first, spans) if (spans[:, 1] > spans[:, 0]).any() else None
 
 
-def _segments(points: Floats, closed: bool) -> Floats:
-    """SEGMENT_FIELDS of a polyline in cells, shape (17, segments); a single point is one segment of no length."""
-    if len(points) == 1:
-        out = np.zeros((len(SEGMENT_FIELDS), 1))
-        out[:3, 0] = points[0]
-        out[7], out[9], out[11], out[12] = 1.0, 1.0, 1.0, 1.0
-        return out
-    ring = _cut(np.vstack([points, points[:1]]) if closed else points)
-    d = np.diff(ring, axis=0)
-    length2 = d[:, 0] ** 2 + d[:, 1] ** 2
-    unit = d[:, :2] / np.sqrt(length2)[:, None]
-    joint = unit[:-1] + unit[1:]
-    wrap = unit[-1] + unit[0] if closed else unit[0]
-    before = np.vstack([wrap, joint])
-    after = np.vstack([joint, wrap if closed else unit[-1]])
-    before, after = _unit_or(before, unit), _unit_or(after, unit)
-    caps = np.zeros((2, len(d)))
-    slope = d[:, :2] * (d[:, 2] / length2)[:, None]
-    mean = (slope[:-1] + slope[1:]) / 2
-    turn = (slope[-1] + slope[0]) / 2 if closed else np.zeros(2)
-    if not closed:
-        caps[0, 0] = caps[1, -1] = 1.0
-    slopes = np.vstack([turn, mean]), np.vstack([mean, turn])
-    return np.vstack([ring[:-1].T, d.T, 1 / length2, before.T, after.T, caps, slopes[0].T, slopes[1].T])
+def _near_box(a: Floats, b: Floats, margin: float, low: Ints, high: Ints) -> NDArray[np.bool_]:
+    """Segments a .. b that come within ``margin`` of a box, cells. With the reach and half a bin's diagonal as margin
+    the others are no candidates of any bin of the box: so what a bin gets does not depend on its window."""
+    least, most = np.minimum(a, b) - margin, np.maximum(a, b) + margin
+    return np.asarray(((most >= low[:, None]) & (least <= high[:, None])).all(axis=0))
 
 
-def _cut(line: Floats) -> Floats:
-    """A polyline (n, 3) whose segments are at most LONGEST_CELLS long in plan."""
-    parts = np.ceil(np.hypot(*np.diff(line[:, :2], axis=0).T) / LONGEST_CELLS).astype(int)
-    if (parts <= 1).all():
-        return line
-    knots = np.concatenate([k + np.arange(m) / m for k, m in enumerate(np.maximum(parts, 1))] + [[len(line) - 1.0]])
-    return np.column_stack([np.interp(knots, np.arange(len(line)), line[:, axis]) for axis in range(3)])
-
-
-def _unit_or(v: Floats, fallback: Floats) -> Floats:
-    """Rows of ``v`` made unit length; rows that vanish (a fold) take the fallback."""
-    length = np.hypot(v[:, 0], v[:, 1])[:, None]
-    return np.where(length > 1e-6, v / np.maximum(length, 1e-30), fallback)
-
-
-def _near_box(segments: Floats, margin: float, low: Floats, high: Floats) -> NDArray[np.bool_]:
-    """Segments that come within ``margin`` of a box, cells. With the reach and half a bin's diagonal as margin the
-    others are no candidates of any bin of the box: so what a bin gets does not depend on the window that it is in."""
-    out = np.ones(segments.shape[1], dtype=bool)
-    for axis in (0, 1):
-        a, b = segments[axis], segments[axis] + segments[axis + 3]
-        out &= (np.maximum(a, b) + margin >= low[axis]) & (np.minimum(a, b) - margin <= high[axis])
-    return out
-
-
-def _spans(points: Floats, row0: int, row1: int) -> tuple[Ints, Floats]:
-    """Inside of a closed outline by non-zero winding: per sample row of row0 .. row1 - 1 intervals [x0, x1], cells.
-
-    Returns CSR: index (row1 - row0 + 1), spans (m, 2). A loop drawn twice, or an eight, is inside all that it encloses.
-    """
-    ring = np.vstack([points[:, :2], points[:1, :2]])
-    index, out = np.zeros(row1 - row0 + 1, dtype=np.int32), []
-    y0, y1 = ring[:-1, 1], ring[1:, 1]
-    first = max(row0, math.ceil(min(y0.min(), y1.min())))
-    last = min(row1 - 1, math.floor(max(y0.max(), y1.max())))
-    for row in range(first, last + 1):
-        cut = (y0 <= row) != (y1 <= row)
-        x = ring[:-1, 0][cut] + (row - y0[cut]) / (y1 - y0)[cut] * (ring[1:, 0] - ring[:-1, 0])[cut]
-        order = np.argsort(x, kind="stable")
-        winding = np.cumsum(np.where(y1[cut] > y0[cut], 1, -1)[order])
-        x = x[order]
-        pairs = [(x[k], x[k + 1]) for k in range(len(x) - 1) if winding[k]]
-        out += pairs
-        index[row - row0 + 1] = len(pairs)
-    return np.cumsum(index, dtype=np.int32), np.array(out).reshape(-1, 2)
-
-
-@dataclass
-class _Cursor:
-    segment: int = 0
-    index: int = 0
-    span: int = 0
+def _stack(parts: list[Any], rows: int) -> Floats:
+    return np.hstack(parts) if parts else np.zeros((rows, 0))
 
 
 def join(packed: list[Packed], box: BinBox) -> dict[str, Any]:
     """All strokes' tables behind each other, with the lists by row of bins."""
-    at = _Cursor()
-    rows: list[list[int]] = [[] for _ in range(box[1] - box[0])]
-    params = np.zeros((len(packed), STROKE_STRIDE))
     index = np.zeros((len(packed), INDEX_STRIDE), dtype=np.int32)
+    at = dict.fromkeys(("segment", "knot", "control", "octave", "index", "span"), 0)
+    octaves: list[int] = []
     span_indices, spans = [], []
     for k, p in enumerate(packed):
-        params[k, : len(p.params)] = p.params
-        index[k, :3] = at.segment, p.segments.shape[1], -1
-        at.segment += p.segments.shape[1]
+        outline = p.segments is not None
+        table = p.segments if p.segments is not None else p.knots
+        assert table is not None
+        kind = "segment" if outline else "knot"
+        index[k, :] = at[kind], table.shape[1], -1, len(octaves), -1 if outline else len(p.octaves)
+        at[kind] += table.shape[1]
+        octaves += [at["control"] + start for start in p.octaves]
+        at["control"] += 0 if p.controls is None else len(p.controls)
         if p.span_index is not None and p.spans is not None:
-            index[k, 2] = at.index
-            span_indices.append(p.span_index + at.span)
+            index[k, INDEX_AT["spans"]] = at["index"]
+            span_indices.append(p.span_index + at["span"])
             spans.append(p.spans)
-            at.index += len(p.span_index)
-            at.span += len(p.spans)
-        for row in range(p.window.first, p.window.first + len(p.window.spans)):
-            rows[row - box[0]].append(k)
+            at["index"] += len(p.span_index)
+            at["span"] += len(p.spans)
+    row_start, row_items = _rows(packed, box)
     return {
-        "segments": np.hstack([p.segments for p in packed]) if packed else np.zeros((len(SEGMENT_FIELDS), 0)),
-        "strokes": params,
+        "segments": _stack([p.segments for p in packed if p.segments is not None], len(SEGMENT_FIELDS)),
+        "knots": _stack([p.knots for p in packed if p.knots is not None], len(KNOT_FIELDS)),
+        "controls": np.concatenate([np.zeros(0), *(p.controls for p in packed if p.controls is not None)]),
+        "octaves": np.array(octaves, dtype=np.int32),
+        "strokes": np.array([p.params for p in packed]).reshape(-1, STROKE_STRIDE),
         "index": index,
-        "row_start": np.cumsum([0, *map(len, rows)]).astype(np.int32),
-        "row_items": np.array([k for row in rows for k in row], dtype=np.int32),
+        "row_start": row_start,
+        "row_items": row_items,
         "span_index": np.concatenate(span_indices).astype(np.int32) if span_indices else np.zeros(0, dtype=np.int32),
         "spans": np.vstack(spans) if spans else np.zeros((0, 2)),
     }
+
+
+def _rows(packed: list[Packed], box: BinBox) -> tuple[Ints, Ints]:
+    """row_start and row_items of ``Tables``; strokes keep their order within a row."""
+    count = box[1] - box[0]
+    if not packed:
+        return np.zeros(count + 1, dtype=np.int32), np.zeros((0, ITEM_STRIDE), dtype=np.int32)
+    spans = np.vstack([p.window.spans for p in packed])
+    rows = np.concatenate([p.window.first - box[0] + np.arange(len(p.window.spans)) for p in packed])
+    stroke = np.repeat(np.arange(len(packed)), [len(p.window.spans) for p in packed])
+    used = spans[:, 1] > spans[:, 0]
+    order = np.argsort(rows[used], kind="stable")
+    items = np.column_stack([stroke, spans])[used][order].astype(np.int32)
+    return np.concatenate([[0], np.cumsum(np.bincount(rows[used], minlength=count))]).astype(np.int32), items

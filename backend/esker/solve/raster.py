@@ -39,13 +39,40 @@ def rasterise(launch: Launcher, tables: Tables, window: Window, target: Target) 
     """Enqueue the constraints of the bins of ``window``, which lie within the tables' box."""
     if window.width == 0:
         return
-    put, i, f = launch.constant, np.int32, np.float32
-    floats = [put(a.astype(np.float32)) for a in (tables.segments, tables.strokes, tables.spans)]
-    ints = (tables.index, tables.row_start, tables.row_items, tables.span_index)
     launch.run(
-        "rasterise", (window.width, len(window.spans)), floats[0], i(tables.segments.shape[1]), floats[1],
-        *(put(a.astype(np.int32)) for a in ints), floats[2], target.height_d, target.height_f, target.gradient_d,
-        target.gradient_f, i(tables.samples), i(target.pitch), i(target.stride), f(tables.spacing_m),
-        f(tables.screening), f(tables.exit_length_m), i(tables.pinned), i(tables.box[0]), i(tables.box[2]),
-        i(window.first), put(window.spans),
+        "rasterise", (window.width, len(window.spans)), *_arguments(launch, tables, window),
+        np.int32(target.pitch), np.int32(target.stride), target.gradient_d, target.gradient_f, target.height_d,
+        target.height_f, np.float32(tables.screening), np.int32(tables.pinned),
+    )  # fmt: skip
+
+
+def rasterise_channels(
+    launch: Launcher, tables: Tables, window: Window, d: Any, f: Any, pitch: int, stride: int
+) -> None:
+    """Enqueue what the strokes say of amplitude (metres) and roughness, as differences from their base (DESIGN 5.4).
+
+    d: stiffness, one channel; f: stiffness times value, two channels. Layout: see ``Target``.
+    """
+    if window.width == 0:
+        return
+    launch.run(
+        "rasterise_channels", (window.width, len(window.spans)), *_arguments(launch, tables, window),
+        np.int32(pitch), np.int32(stride), d, f,
+    )  # fmt: skip
+
+
+def _arguments(launch: Launcher, tables: Tables, window: Window) -> tuple[Any, ...]:
+    """TABLE_ARGUMENTS of section.cl, then the window and the samples of the level."""
+
+    def put(array: NDArray[Any]) -> Any:
+        return launch.constant(array.astype(np.float32 if array.dtype.kind == "f" else np.int32))
+
+    i, f = np.int32, np.float32
+    cliff = 0.0 if tables.reach_m is None else 1 / tables.reach_m
+    return (
+        put(tables.segments), i(tables.segments.shape[1]), put(tables.knots), i(tables.knots.shape[1]),
+        put(tables.controls), put(tables.octaves), put(tables.strokes), put(tables.index), put(tables.row_start),
+        put(tables.row_items), put(tables.span_index), put(tables.spans), i(tables.box[0]), i(tables.box[2]),
+        f(tables.spacing_m), f(tables.octave_m), f(tables.exit_length_m), f(cliff), i(window.first),
+        put(window.spans), i(tables.samples),
     )  # fmt: skip

@@ -1,8 +1,12 @@
-"""The flat tables that the rasteriser reads: fields, constants, windows of bins (DESIGN 5.2, 5.5).
+"""The flat tables that the rasteriser reads: fields, constants, windows of bins (DESIGN 5.2, 5.4, 5.5).
 
 The ground is cut into bins of 16 x 16 samples, aligned to sample 0 of the level. Per row of bins the tables list the
-strokes that can reach it; the rasteriser finds for itself, per bin, the few segments of a stroke that can be nearest.
-Horizontal lengths are in cells of the level, heights in metres, coordinates those of the whole level.
+strokes that can reach it, and which of its bins. Horizontal lengths are in cells of the level, heights in metres,
+coordinates those of the whole level.
+
+There are two kinds of crests. A *profile* is straight in plan and varies in height: its heights are knots, and
+octaves of ever smoother heights. An *outline* is level and curved in plan: segments, among which the rasteriser finds
+the few that can be nearest to a bin.
 """
 
 from __future__ import annotations
@@ -29,47 +33,70 @@ CREST_HALF_WIDTH = 0.71
 """Samples nearer than this many cells to a crest line are crest: never a gap, at any angle."""
 SPRING_FLOOR_CELLS = 8.0
 """A spring is never stiffer than that of a band this wide."""
+CHANNEL_FLOOR_CELLS = 1.5
+"""Where a band is narrower, amplitude and roughness are known to this distance from the crest."""
 TOE = 1.3
 """Beyond its end a band still tells the gradient, fading out at this multiple of its width: nothing overshoots."""
 EXIT_SHARE = 0.25
 """Where a band ends above the base the gradient leaves as if this share of the height there decayed over the reach:
 more, and the ground beyond sinks below the base; less, and a step shows."""
+SKIRT_SLOPE = 0.7
+"""Where a band ends so high that screening would break the ground off, a skirt leads down at first with the flank's
+own slope or this one, whichever is steeper."""
 HELD_FRACTION = 0.93
 """Up to this share of a band screening pulls to the profile instead of the base, then fades to the base at its end."""
 SOFT_PART = 0.5
 """Share of the crest height that the round part of a concave foot or a convex shoulder takes."""
 FLATTEST = 1e-9
 """Slopes below this count as this: the width of a band is height / slope."""
+THINNEST_M = 1e-3
+"""Bands narrower than this are as wide as this, so that the tip of a stroke is no special case."""
 HALF_DIAGONAL = math.hypot(BIN - 1, BIN - 1) / 2
 """From the middle of a bin to its corners, cells."""
 LONGEST_CELLS = 1024.0
 """Longer segments are cut, so that float32 places every crest point to a small part of a quantum at any level."""
-THINNEST_M = 1e-3
-"""Bands narrower than this are as wide as this, so that the tip of a stroke is no special case."""
+STEEPEST = 60.0
+"""Slopes along a crest count as this at most: drawn lines have upright parts."""
+FIRST_OCTAVE = 1 / 1024
+"""Distance of the controls of the first octave of smoothed heights, as a share of the domain."""
+FAN = 2.0
+"""Octave o is what is seen from 2^o - 1 times this many first controls away from the plateau: more, and the teeth of a
+drawn silhouette run farther down the flank; less, and flanks are made of rubber."""
+OCTAVE_SHARE = 1 / 8
+"""The controls of the last octave are at most this share of the crest's length apart: its shape at large stays."""
 
-SEGMENT_FIELDS = (
-    *("ax", "ay", "az", "dx", "dy", "dz", "il2", "t0x", "t0y", "t1x", "t1y", "cap0", "cap1"),
-    *("s0x", "s0y", "s1x", "s1y"),
+SEGMENT_FIELDS = ("ax", "ay", "dx", "dy", "il2", "t0x", "t0y", "t1x", "t1y", "cap0", "cap1")
+KNOT_FIELDS = ("t", "z", "slope")
+STROKE_FIELDS = (
+    *("plateau", "reach", "lh", "ls", "le", "lk", "lf", "rh", "rs", "re", "rk", "rf", "same", "run"),
+    *("height", "ax", "ay", "tx", "ty", "length", "amplitude", "roughness"),
 )
-STROKE_FIELDS = ("plateau", "xmin", "xmax", "reach", "lh", "ls", "le", "lk", "lf", "rh", "rs", "re", "rk", "rf")
-STROKE_STRIDE = 16
-INDEX_FIELDS = ("first", "count", "spans")
-INDEX_STRIDE = 4
+STROKE_STRIDE = len(STROKE_FIELDS)
+INDEX_FIELDS = ("first", "count", "spans", "octave", "octaves")
+INDEX_STRIDE = len(INDEX_FIELDS)
+ITEM_STRIDE = 3
+STROKE_AT = {name: k for k, name in enumerate(STROKE_FIELDS)}
+INDEX_AT = {name: k for k, name in enumerate(INDEX_FIELDS)}
 
 
 @dataclass(frozen=True)
 class Tables:
     """The constraints of one level, packed.
 
-    segments: (17, m) by SEGMENT_FIELDS. a: start; d: end - start; il2: 1 / plan length^2, or 0 for a point; t0, t1:
-      unit directions of travel at the ends; cap: 1 where the line ends there; s0, s1: slope of the crest at the ends
-      as a vector, metres a cell, the mean of the two segments that meet (0 at a cap).
-    strokes: (k, 16) by STROKE_FIELDS. plateau, xmin, xmax, reach in cells (reach: outermost distance with any
-      effect); per side h: 1 if there is a flank, s: slope (tangent), e: extent in metres, k and f: shares of the
-      crest height taken by a round shoulder and a round foot.
-    index: (k, 4) by INDEX_FIELDS: first segment, number of segments, start in span_index or -1.
-    row_start, row_items: strokes by row of bins of ``box`` (CSR). span_index, spans: inside intervals of closed
-      outlines per sample row of ``box`` (CSR within the stroke), in cells.
+    segments: (11, m) by SEGMENT_FIELDS, of outlines. a: start; d: end - start; il2: 1 / length^2; t0, t1: unit
+      directions of travel at the ends; cap: 1 where the line ends there.
+    knots: (3, q) by KNOT_FIELDS, of profiles: distance from the crest's start, height, slope per cell up to the next.
+    controls: (c,) heights, controls of the uniform cubic B-splines of the octaves; octaves: (o,) per profile and octave
+      the place in ``controls`` where piece 0 has its first one (it may lie before the window's part).
+    strokes: (k, STROKE_STRIDE) by STROKE_FIELDS. plateau, reach in cells (reach: outermost distance with any effect);
+      per side h: 1 if there is a flank, s: slope (tangent), e: extent in metres, k and f: shares of the crest height
+      taken by a round shoulder and a round foot; same: 1 if both sides are alike, then run: 1 / slope; height: of an
+      outline; a, t, length: start, unit direction and length of a profile in plan; amplitude (metres) and roughness as
+      differences from their base.
+    index: (k, INDEX_STRIDE) by INDEX_FIELDS: first segment or knot, number of them, start in span_index or -1, start in
+      ``octaves``, number of octaves or -1 for an outline.
+    row_start, row_items: by row of bins of ``box`` (CSR), per stroke (stroke, first bin, end of bins). span_index,
+      spans: inside intervals of closed outlines per sample row of ``box`` (CSR within the stroke), in cells.
     box: the bins that the tables speak of; all of the level's, or a window.
     """
 
@@ -77,13 +104,16 @@ class Tables:
     size_m: float
     box: BinBox
     segments: Floats
+    knots: Floats
+    controls: Floats
+    octaves: Ints
     strokes: Floats
     index: Ints
     row_start: Ints
     row_items: Ints
     span_index: Ints
     spans: Floats
-    screening: float
+    reach_m: float | None
     exit_length_m: float
     pinned: bool
 
@@ -94,6 +124,16 @@ class Tables:
     @property
     def spacing_m(self) -> float:
         return grid.spacing(self.level, self.size_m)
+
+    @property
+    def screening(self) -> float:
+        """Weight of the screening term at this level (DESIGN 5.1)."""
+        return 0.0 if self.reach_m is None else (self.spacing_m / self.reach_m) ** 2
+
+    @property
+    def octave_m(self) -> float:
+        """Metres between the controls of the first octave."""
+        return self.size_m * FIRST_OCTAVE
 
     @property
     def origin(self) -> tuple[int, int]:
@@ -128,16 +168,23 @@ def defines() -> dict[str, float | int]:
         "BIN": BIN,
         "CREST_HALF_WIDTH": CREST_HALF_WIDTH,
         "SPRING_FLOOR_CELLS": SPRING_FLOOR_CELLS,
+        "CHANNEL_FLOOR_CELLS": CHANNEL_FLOOR_CELLS,
         "TOE": TOE,
         "HELD_FRACTION": HELD_FRACTION,
         "EXIT_SHARE": EXIT_SHARE,
+        "SKIRT_SLOPE": SKIRT_SLOPE,
         "HALF_DIAGONAL": HALF_DIAGONAL,
         "THINNEST_M": THINNEST_M,
+        "STEEPEST": STEEPEST,
+        "FAN": FAN,
         "STROKE_STRIDE": STROKE_STRIDE,
         "INDEX_STRIDE": INDEX_STRIDE,
+        "ITEM_STRIDE": ITEM_STRIDE,
         "CREST_STIFFNESS": CREST_STIFFNESS,
         "SPRING_CELLS": SPRING_CELLS,
         "SPRING_FULL_FRACTION": SPRING_FULL_FRACTION,
+        **{f"P_{name.upper()}": k for name, k in STROKE_AT.items()},
+        **{f"I_{name.upper()}": k for name, k in INDEX_AT.items()},
     }
 
 
@@ -163,3 +210,19 @@ def everything(box: BinBox) -> Window:
     """All bins of a box."""
     by0, by1, bx0, bx1 = box
     return Window(by0, np.tile(np.array([bx0, bx1], dtype=np.int32), (by1 - by0, 1)))
+
+
+def union(windows: list[Window]) -> Window | None:
+    """The least window that holds all of these; None of none."""
+    windows = [w for w in windows if len(w.spans)]
+    if not windows:
+        return None
+    first, last = min(w.first for w in windows), max(w.first + len(w.spans) for w in windows)
+    low = np.full(last - first, 1 << 30, dtype=np.int32)
+    high = np.zeros(last - first, dtype=np.int32)
+    for w in windows:
+        rows = slice(w.first - first, w.first - first + len(w.spans))
+        used = w.spans[:, 1] > w.spans[:, 0]
+        low[rows] = np.where(used, np.minimum(low[rows], w.spans[:, 0]), low[rows])
+        high[rows] = np.where(used, np.maximum(high[rows], w.spans[:, 1]), high[rows])
+    return Window(first, np.column_stack([np.minimum(low, high), high]))

@@ -1,0 +1,109 @@
+"""Heights of a profile's crest, at ever coarser scales (docs/decisions/0011-natural-flanks.md). NumPy float64.
+
+What a sample far from the crest sees of a jagged silhouette is a smooth one: else every tooth runs down the whole flank
+as a streak. The scales are octaves: a pyramid of binomial filters whose values are controls of cubic B-splines.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from esker.solve.crest import Crest
+from esker.solve.tables import FAN, FIRST_OCTAVE, OCTAVE_SHARE
+
+Floats = NDArray[np.float64]
+
+BLOCKS = 48
+"""Parts of a crest for which it is known how high it can seem from anywhere."""
+_MARGIN = 3
+"""Controls beyond the ends that the filter needs; two of them stay."""
+
+
+@dataclass(frozen=True)
+class Silhouette:
+    """A profile's crest. Lengths in metres, arrays float64.
+
+    start, unit: where it begins and its direction in plan; length in plan; t (n,): distances of the knots from the
+    start, rising; z (n,): their heights; octaves: per octave o the controls at multiples of 2^o first ones, the first
+    one at -1; a crest is constant beyond its ends.
+    """
+
+    start: Floats
+    unit: Floats
+    length: float
+    t: Floats
+    z: Floats
+    octaves: tuple[Floats, ...]
+    octave_m: float
+
+    @cached_property
+    def blocks(self) -> tuple[Floats, Floats]:
+        """Borders (m + 1,) of parts of the crest, metres, and the most (m,) that each can seem high."""
+        count = int(np.clip(math.ceil(self.length / (4 * self.octave_m)), 1, BLOCKS))
+        edges = np.linspace(0.0, self.length, count + 1)
+        high = np.abs(np.interp(edges, self.t, self.z))
+        tops = np.maximum(high[:-1], high[1:])
+        place = np.clip(np.searchsorted(edges, self.t, side="right") - 1, 0, count - 1)
+        np.maximum.at(tops, place, np.abs(self.z))
+        for o, controls in enumerate(self.octaves):
+            c = np.abs(controls)
+            piece = np.maximum(np.maximum(c[:-3], c[1:-2]), np.maximum(c[2:-1], c[3:]))
+            step = self.octave_m * 2**o
+            first, last = np.floor(edges[:-1] / step).astype(int), np.floor(edges[1:] / step).astype(int)
+            last = np.minimum(last, len(piece) - 1)
+            between = np.maximum.reduceat(piece, np.minimum(first, last))
+            tops = np.maximum(tops, np.maximum(between, piece[last]))
+        return edges, tops
+
+
+def silhouette(crest: Crest, size_m: float, farthest_m: float) -> Silhouette:
+    """The silhouette of a profile; octaves only as far as samples ``farthest_m`` from the plateau can see them."""
+    points, base = crest.points, size_m * FIRST_OCTAVE
+    start = points[0, :2]
+    axis = points[-1, :2] - start
+    length = float(np.hypot(*axis))
+    unit = axis / length if length > 0 else np.array([1.0, 0.0])
+    t = np.clip((points[:, :2] - start) @ unit, 0.0, length)
+    t[-1] = length
+    rising = np.append(np.maximum.accumulate(t)[:-1] < t[1:], True) if len(t) > 1 else np.ones(1, dtype=bool)
+    t, z = t[rising], points[rising, 2]
+    count = 0
+    while base * 2**count <= length * OCTAVE_SHARE and FAN * base * (2**count - 1) < farthest_m:
+        count += 1
+    return Silhouette(start, unit, length, t, z, tuple(_octaves(t, z, base, count)), base)
+
+
+def _octaves(t: Floats, z: Floats, base: float, count: int) -> list[Floats]:
+    """Controls of ``count`` octaves of a polyline (t, z), see ``Silhouette``."""
+    if count == 0:
+        return []
+    last = math.floor(t[-1] / base) + 1
+    edges = (np.arange(-_MARGIN, last + _MARGIN + 2) - 0.5) * base
+    level = np.diff(_area(t, z, edges)) / base
+    out = [level[_MARGIN - 1 : len(level) - _MARGIN + 2]]
+    while len(out) < count:
+        wide = np.pad(level, 2, mode="edge")
+        blurred = (wide[:-4] + wide[4:] + 4 * (wide[1:-3] + wide[3:-1]) + 6 * wide[2:-2]) / 16
+        last = last // 2 + 1
+        index = np.clip(2 * np.arange(-_MARGIN, last + _MARGIN + 1) + _MARGIN, 0, len(blurred) - 1)
+        level = blurred[index]
+        out.append(level[_MARGIN - 1 : len(level) - _MARGIN + 2])
+    return out
+
+
+def _area(t: Floats, z: Floats, at: Floats) -> Floats:
+    """Integral of the polyline (t, z), constant beyond its ends, from its start to each of ``at``."""
+    if len(t) == 1:
+        return np.asarray(z[0] * (at - t[0]))
+    slope = np.diff(z) / np.diff(t)
+    before = np.concatenate([[0.0], np.cumsum(np.diff(t) * (z[:-1] + z[1:]) / 2)])
+    inner = np.clip(at, t[0], t[-1])
+    j = np.clip(np.searchsorted(t, inner, side="right") - 1, 0, len(t) - 2)
+    u = inner - t[j]
+    outside = np.minimum(at - t[0], 0.0) * z[0] + np.maximum(at - t[-1], 0.0) * z[-1]
+    return np.asarray(before[j] + u * (z[j] + 0.5 * slope[j] * u) + outside)
