@@ -43,6 +43,8 @@ def _parser() -> argparse.ArgumentParser:
     serve.add_argument("--lan", action="store_true", default=None, help="HTTPS for every device on this network")
     serve.add_argument("--public-url", metavar="URL", help="where people reach this server, behind a proxy")
     serve.add_argument("--level", type=int, help=f"finest solved level, 0 to {c.MAX_LEVEL} (default {c.DEFAULT_LEVEL})")
+    serve.add_argument("--refine", type=int, metavar="LEVEL", help="finest level made where somebody looks, "
+                       f"0 to {c.MAX_REFINED_LEVEL} (default {c.DEFAULT_REFINED_LEVEL})")  # fmt: skip
     serve.add_argument("--device", help="part of the name of the OpenCL device, or numpy")
     serve.add_argument("--threads", type=int, help="threads of a CPU device (default: cores - 1)")
     serve.add_argument("--log-level", choices=("debug", "info", "warning", "error"))

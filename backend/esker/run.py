@@ -22,8 +22,11 @@ from esker.document.ops import Limits
 from esker.server import create_app
 from esker.session.hub import Hub
 from esker.session.ports import Solver, SolverFactory
+from esker.session.recovery import Fault
 from esker.session.worker import Worker
 from esker.settings import Settings
+from esker.solve.device import candidates
+from esker.solve.faults import DeviceError, OutOfDeviceMemoryError
 from esker.solve.solver import Solver as OpenClSolver
 from esker.store.access import Access
 from esker.store.journal import Journal
@@ -48,8 +51,8 @@ class CannotServe(Exception):
 class _Tiles:
     """``session.ports.Tiles`` by the real tiles."""
 
-    def server(self, size_m: float, levels: int) -> TileServer:
-        return TileServer(size_m, levels)
+    def server(self, size_m: float, levels: int, finest: int) -> TileServer:
+        return TileServer(size_m, levels, finest)
 
     def client(self, server: Any) -> ClientTiles:
         return ClientTiles(server)
@@ -114,7 +117,9 @@ class Assembly:
         settings = self.settings
         self._context = server_context(settings.data, self.address) if settings.lan else None
         self._journal = Journal(settings.data)
-        self._worker = Worker(make_solver, settings.device)
+        self._worker = Worker(
+            make_solver, settings.device, candidates=lambda: candidates(settings.threads), diagnose=diagnose
+        )
         self._worker.start()
         log.info("solver: %s, levels 0 to %d", self._worker.device_name, settings.level)
         self.hub = Hub(
@@ -123,6 +128,7 @@ class Assembly:
             self._worker,
             _Tiles(),
             levels=settings.level,
+            finest=settings.refine,
             limits=Limits(settings.max_strokes, settings.max_points),
             max_members=settings.max_members,
         )
@@ -170,6 +176,13 @@ def serve(settings: Settings) -> None:
     finally:
         assembly.close()
     log.info("stopped; everything is saved")
+
+
+def diagnose(error: Exception) -> Fault:
+    """What an exception of the solver means for the worker."""
+    if isinstance(error, (OutOfDeviceMemoryError, MemoryError)):
+        return Fault.MEMORY
+    return Fault.DEVICE if isinstance(error, DeviceError) else Fault.UNKNOWN
 
 
 def _listen(host: str, port: int) -> socket.socket:

@@ -31,6 +31,8 @@ class Settings:
     forwarded_allow_ips: str = "127.0.0.1"
     """Proxies whose X-Forwarded-For is believed ("*": all)."""
     level: int = c.DEFAULT_LEVEL
+    refine: int = c.DEFAULT_REFINED_LEVEL
+    """The finest level that is refined tile by tile where somebody looks; at or below ``level``: none is."""
     device: str | None = None
     threads: int | None = None
     max_members: int = c.MAX_MEMBERS
@@ -42,6 +44,7 @@ class Settings:
         bounds = {
             "port": (0, 65535),
             "level": (0, c.MAX_LEVEL),
+            "refine": (0, c.MAX_REFINED_LEVEL),
             "max_members": (1, c.MAX_MEMBERS),
             "max_strokes": (1, c.MAX_STROKES),
             "max_points": (2, c.MAX_POINTS_PER_STROKE),

@@ -191,11 +191,11 @@ def test_after_three_failures_numpy_takes_over(tmp_path: Path) -> None:
     worker = Worker(factory, "gpu")
     worker.start()
 
-    def deliver(_: int, level: Any) -> None:
+    def deliver(_: int, level: Any, show: bool) -> None:
         if level.settled:
             done.set()
 
-    client = worker.add(0, deliver, lambda _, note: notes.append(note))
+    client = worker.add(0, deliver, notes.append)
     for clock in range(1, 4):
         count = len(notes)
         worker.request(client, Job(clock, (), c.TerrainSettings()))

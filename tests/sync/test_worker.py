@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from esker import contract as c
-from esker.session import worker as module
+from esker.session import schedule as module
 from esker.session.worker import Job, Worker
 from tests.sync.harness import Level
 
@@ -53,7 +53,7 @@ class Bench:
         self._arrived = threading.Condition()
 
     def room(self, name: str, levels: int = 2) -> Any:
-        def deliver(clock: int, result: Any) -> None:
+        def deliver(clock: int, result: Any, show: bool) -> None:
             with self._arrived:
                 self.got.append((name, clock, result.level, result.settled))
                 self._arrived.notify()
@@ -78,8 +78,8 @@ class Bench:
         self.worker.stop()
 
 
-def _unexpected(clock: int, note: str) -> None:
-    raise AssertionError((clock, note))
+def _unexpected(note: str) -> None:
+    raise AssertionError(note)
 
 
 def _job(clock: int) -> Job:

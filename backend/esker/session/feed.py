@@ -1,27 +1,38 @@
-"""The way of solved levels to the clients of one room (DESIGN 8, "Flow control").
+"""The way of solved levels and refined tiles to the clients of one room (DESIGN 5.6; 8, "Flow control").
 
 All work on tiles (taking a level, planning, encoding) happens in one thread of its own, so the event loop never waits
 for it and no lock is needed. A client is planned for only while its byte window is open and its last frame has been
 handed to the socket: versions in between are skipped by construction, and nothing stale is ever queued.
+
+What the clients want refined goes the other way: the tile thread publishes it, the solver's thread reads it, and the
+tiles that come back are taken together, so that a hundred of them cost a few selections and not a hundred.
 """
 
 from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Sequence
 from concurrent.futures import CancelledError, Executor, Future
 from dataclasses import dataclass
 from typing import Final
 
 from esker import contract as c
+from esker.grid import TileKey
 from esker.session.outbox import Outbox
-from esker.session.ports import ClientTiles, LevelResult, Tiles
+from esker.session.ports import ClientTiles, LevelResult, RefinedTile, Tiles
 
 log = logging.getLogger("esker.feed")
 
 PUTS_AHEAD: Final = 1
 """Levels that may wait to become tiles while the solver goes on."""
+BATCH_SECONDS: Final = 0.03
+"""Refined tiles that come within this time are taken together."""
+BATCH_TILES: Final = 16
+"""So many are taken without waiting for more."""
+WISHES_SECONDS: Final = 0.05
+"""While cameras move, what is wanted is worked out at most this often."""
 
 
 @dataclass(eq=False)
@@ -34,7 +45,6 @@ class Stream:
     hungry: bool = True
     busy: bool = False
     frame: bytes | None = None
-    tiles: ClientTiles | None = None
 
     @property
     def ready(self) -> bool:
@@ -44,22 +54,36 @@ class Stream:
 
 
 class TileFeed:
-    """Tiles of one room. Except for ``put``, call it from the event loop's thread."""
+    """Tiles of one room. Call it from the event loop's thread, except where another is named."""
 
     def __init__(
         self,
         tiles: Tiles,
         size_m: float,
         levels: int,
+        finest: int,
         executor: Executor,
         loop: asyncio.AbstractEventLoop,
         on_level: Callable[[int, int, bool], None],
+        on_wishes: Callable[[int, bool], None],
     ) -> None:
-        """``executor`` has one thread; ``on_level(clock, level, settled)`` is called in the loop."""
-        self._tiles, self._executor, self._loop, self._on_level = tiles, executor, loop, on_level
-        self._server = tiles.server(size_m, levels)
+        """``executor`` has one thread. ``on_level(clock, level, settled)``, with whether now all levels are final, and
+        ``on_wishes(count, more)``, with the number of tiles that are wanted refined and whether the solver should look
+        at ``wanted`` again, are called in the loop."""
+        self._tiles, self._executor, self._loop = tiles, executor, loop
+        self._on_level, self._on_wishes = on_level, on_wishes
+        self._server = tiles.server(size_m, levels, finest)
+        self._refines = finest > levels
         self._streams: set[Stream] = set()
+        self._clients: dict[Stream, ClientTiles] = {}
+        """Of the tile thread."""
         self._puts: list[Future[None]] = []
+        self._lock = threading.Lock()
+        self._wishes: tuple[TileKey, ...] = ()
+        self._made: dict[TileKey, tuple[int, RefinedTile]] = {}
+        """Refined tiles that wait to be taken. This and ``_wishes`` need the lock."""
+        self._taking = False
+        self._wishes_timer: asyncio.TimerHandle | None = None
 
     def add(self, outbox: Outbox) -> Stream:
         """A new client."""
@@ -71,6 +95,7 @@ class TileFeed:
     def remove(self, stream: Stream) -> None:
         """The client left."""
         self._streams.discard(stream)
+        self._submit(self._forget, stream)
 
     def view(self, stream: Stream, view: c.View) -> None:
         """The client looks somewhere else."""
@@ -89,52 +114,127 @@ class TileFeed:
             self._loop.call_soon(self._feed, stream)
         return frame
 
-    def put(self, clock: int, result: LevelResult) -> None:
-        """Takes a solved level. Called in the solver's thread; waits while an earlier level is still being taken."""
+    # --- in the solver's thread -----------------------------------------------------------------------------------
+
+    def put(self, clock: int, result: LevelResult, show: bool = True) -> None:
+        """Takes a solved level; waits while an earlier level is still being taken.
+
+        ``show`` False: the finest level follows so soon that this one is only noted (``tiles/pyramid.py``).
+        """
         try:
             while len(self._puts) > PUTS_AHEAD - 1:
                 self._puts.pop(0).result()
-            self._puts.append(self._executor.submit(self._put, clock, result))
+            self._puts.append(self._executor.submit(self._put, clock, result, show))
         except (CancelledError, RuntimeError):
             log.debug("the tile thread has stopped")
 
+    def limit(self, top: int) -> None:
+        """From now on levels 0..``top`` are solved."""
+        self._submit(self._limit, top)
+
+    def wanted(self) -> Sequence[TileKey]:
+        """Tiles to refine next, most urgent first; none while the ground moves. From any thread."""
+        with self._lock:
+            return tuple(key for key in self._wishes if key not in self._made)
+
+    def deliver_tile(self, clock: int, tile: RefinedTile) -> None:
+        """Takes a refined tile of the settled solve at ``clock``. Never waits."""
+        with self._lock:
+            self._made[tile.key] = (clock, tile)
+            full = len(self._made) >= min(BATCH_TILES, len(self._wishes))
+            first, self._taking = not self._taking, True
+        if full:
+            self._submit(self._take)
+        elif first:
+            self._call(self._loop.call_later, BATCH_SECONDS, self._submit, self._take)
+
     # --- in the tile thread ---------------------------------------------------------------------------------------
 
-    def _put(self, clock: int, result: LevelResult) -> None:
+    def _put(self, clock: int, result: LevelResult, show: bool) -> None:
+        channel = getattr(result, "channel", c.Channel.HEIGHT)
         try:
-            self._server.put_level(clock, result.level, result.heights, result.settled)
+            self._server.put_level(clock, result.level, result.heights, result.settled, channel, show)
         except Exception:
-            log.exception("level %d at clock %d could not become tiles", result.level, clock)
+            log.exception("level %d of %s at clock %d could not become tiles", result.level, channel.name, clock)
             return
-        self._call(self._level_taken, clock, result.level, result.settled)
+        if channel != c.Channel.HEIGHT:
+            self._call(self._wake_all)
+            return
+        settled = self._server.settled()
+        self._publish(settled)
+        if show:
+            self._call(self._level_taken, clock, result.level, settled)
+
+    def _limit(self, top: int) -> None:
+        self._server.limit(top)
+        self._call(self._wake_all)
+
+    def _take(self) -> None:
+        """Takes the refined tiles that wait, and says what is wanted then."""
+        with self._lock:
+            made, self._taking = list(self._made.values()), False
+        taken = 0
+        for clock, tile in made:
+            try:
+                taken += self._server.put_tile(clock, tile)
+            except Exception:
+                log.exception("the refined tile %s at clock %d was refused", tuple(tile.key), clock)
+        self._publish(taken > 0, made)
+        if taken:
+            self._call(self._wake_all)
+
+    def _publish(self, look: bool, taken: Sequence[tuple[int, RefinedTile]] = ()) -> None:
+        """Works out what is wanted refined. ``look``: the solver should look even if that is the same as before."""
+        if not self._refines:
+            return
+        try:
+            wishes, count = self._server.wishes(list(self._clients.values()))
+        except Exception:
+            log.exception("what to refine could not be worked out")
+            return
+        with self._lock:
+            for made in taken:
+                if self._made.get(made[1].key) is made:
+                    del self._made[made[1].key]
+            look = bool(wishes) and (look or wishes != self._wishes)
+            self._wishes = wishes
+        self._call(self._on_wishes, count, look)
+
+    def _forget(self, stream: Stream) -> None:
+        if self._clients.pop(stream, None) is not None:
+            self._publish(False)
 
     def _make(self, stream: Stream, view: c.View | None) -> None:
         frame: bytes | None = None
         try:
-            if stream.tiles is None:
-                stream.tiles = self._tiles.client(self._server)
+            tiles = self._clients.get(stream)
+            if tiles is None:
+                tiles = self._clients[stream] = self._tiles.client(self._server)
             if view is not None:
-                stream.tiles.set_view(view)
-            plan = stream.tiles.plan()
+                tiles.set_view(view)
+            plan = tiles.plan()
             if plan is not None:
                 frame = plan.encode()
-                stream.tiles.commit(plan)
+                tiles.commit(plan)
         except Exception:
             log.exception("a tile frame could not be made")
             self._call(stream.outbox.close, "server_error", "The server failed to prepare the ground for you.")
             return
-        self._call(self._made, stream, frame)
+        self._call(self._frame_made, stream, frame)
 
-    def _call(self, callback: Callable[..., None], *args: object) -> None:
+    def _call(self, callback: Callable[..., object], *args: object) -> None:
         if not self._loop.is_closed():
             self._loop.call_soon_threadsafe(callback, *args)
 
     # --- in the loop ----------------------------------------------------------------------------------------------
 
     def _level_taken(self, clock: int, level: int, settled: bool) -> None:
+        self._wake_all()
+        self._on_level(clock, level, settled)
+
+    def _wake_all(self) -> None:
         for stream in self._streams:
             self._wake(stream)
-        self._on_level(clock, level, settled)
 
     def _wake(self, stream: Stream) -> None:
         stream.hungry = True
@@ -145,12 +245,24 @@ class TileFeed:
             return
         view, stream.view = stream.view, None
         stream.busy, stream.hungry = True, False
-        try:
-            self._executor.submit(self._make, stream, view)
-        except RuntimeError:  # the executor has been shut down: the server is stopping
+        if view is not None and self._refines and self._wishes_timer is None:
+            self._wishes_timer = self._loop.call_later(WISHES_SECONDS, self._wishes_due)
+        if not self._submit(self._make, stream, view):
             self._streams.discard(stream)
 
-    def _made(self, stream: Stream, frame: bytes | None) -> None:
+    def _wishes_due(self) -> None:
+        self._wishes_timer = None
+        self._submit(self._publish, False)
+
+    def _submit(self, work: Callable[..., None], *args: object) -> bool:
+        """Has the tile thread do something; False when it has been shut down: the server is stopping."""
+        try:
+            self._executor.submit(work, *args)
+        except RuntimeError:
+            return False
+        return True
+
+    def _frame_made(self, stream: Stream, frame: bytes | None) -> None:
         stream.busy = False
         if frame is None:
             self._feed(stream)  # only if something changed while it was planned

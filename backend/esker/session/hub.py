@@ -39,14 +39,17 @@ class Hub:
         tiles: Tiles,
         *,
         levels: int = c.DEFAULT_LEVEL,
+        finest: int | None = None,
         limits: Limits | None = None,
         max_members: int = c.MAX_MEMBERS,
         idle_seconds: float = IDLE_SECONDS,
         now: Callable[[], float] = time.monotonic,
     ) -> None:
+        """``levels``: the finest level solved as a whole; ``finest``: the finest refined (default: none is)."""
         self.journal, self.access = journal, access
         self._worker, self._tiles = worker, tiles
-        self._levels, self._limits, self._max_members = levels, limits or Limits(), max_members
+        self._levels, self._finest = levels, levels if finest is None else max(levels, finest)
+        self._limits, self._max_members = limits or Limits(), max_members
         self._idle_seconds, self._now = idle_seconds, now
         self._rooms: dict[str, asyncio.Task[Room | None]] = {}
         self._tile_thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="tiles")
@@ -127,7 +130,7 @@ class Hub:
             worker=self._worker,
             tiles=self._tiles,
             executor=self._tile_thread,
-            info=RoomInfo(self._levels, self._levels, self._worker.device_name),
+            info=RoomInfo(self._levels, self._finest, self._worker.device_name),
             on_empty=lambda: self._empty(terrain),
         )
 

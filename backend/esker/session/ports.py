@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from esker import contract as c
+from esker.grid import TileKey
 from esker.store.journal import Loaded, Row
 
 
@@ -32,13 +33,29 @@ class ClientTiles(Protocol):
 class TileServer(Protocol):
     """The tiles of one terrain (``tiles/delivery.py``)."""
 
-    def put_level(self, clock: int, level: int, heights: NDArray[np.float32], settled: bool) -> int: ...
+    def put_level(
+        self,
+        clock: int,
+        level: int,
+        heights: NDArray[np.float32],
+        settled: bool,
+        channel: c.Channel = ...,
+        show: bool = True,
+    ) -> int: ...
+
+    def settled(self) -> bool: ...
+
+    def put_tile(self, clock: int, tile: RefinedTile) -> bool: ...
+
+    def limit(self, top: int) -> None: ...
+
+    def wishes(self, clients: Sequence[Any]) -> tuple[tuple[TileKey, ...], int]: ...
 
 
 class Tiles(Protocol):
     """Makes the two above."""
 
-    def server(self, size_m: float, levels: int) -> TileServer: ...
+    def server(self, size_m: float, levels: int, finest: int) -> TileServer: ...
 
     def client(self, server: TileServer) -> ClientTiles: ...
 
@@ -54,6 +71,40 @@ class LevelResult(Protocol):
 
     @property
     def settled(self) -> bool: ...
+
+    @property
+    def channel(self) -> c.Channel: ...
+
+
+class RefinedTile(Protocol):
+    """One tile above the global levels (``solve/refine.py``)."""
+
+    @property
+    def key(self) -> TileKey: ...
+
+    @property
+    def heights(self) -> NDArray[np.float32]: ...
+
+    @property
+    def content(self) -> bytes: ...
+
+
+class Refiner(Protocol):
+    """Refines one settled solve, in the worker's thread (``solve/refine.py``)."""
+
+    def tiles(self, keys: Sequence[TileKey]) -> Iterator[RefinedTile | None]: ...
+
+
+class Refinement(Protocol):
+    """Which tiles above the global levels a room wants, and where they go (``feed.TileFeed``)."""
+
+    def wanted(self) -> Sequence[TileKey]:
+        """The next tiles to refine, most urgent first; none while the ground moves. From any thread."""
+        ...
+
+    def deliver_tile(self, clock: int, tile: RefinedTile) -> None:
+        """Takes a tile of the settled solve at ``clock``. In the worker's thread; never waits."""
+        ...
 
 
 class Solver(Protocol):

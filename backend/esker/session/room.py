@@ -56,8 +56,13 @@ class Room:
         self._journal, self._worker, self._on_empty = journal, worker, on_empty
         self._loop = asyncio.get_running_loop()
         size_m = core.document.settings.size_m
-        self._feed = TileFeed(tiles, size_m, info.levels, executor, self._loop, self._level_taken)
-        self._solve_client = worker.add(info.levels, self._feed.put, self._solve_failed)
+        self._feed = TileFeed(
+            tiles, size_m, info.levels, info.finest, executor, self._loop, self._level_taken, self._wishes_changed
+        )
+        refinement = self._feed if info.finest > info.levels else None
+        self._solve_client = worker.add(
+            info.levels, self._feed.put, self._solve_failed, refinement, limit=self._feed.limit
+        )
         self._tick_timer: asyncio.TimerHandle | None = None
         self._tick_at = float("-inf")
         self._presence_timer: asyncio.TimerHandle | None = None
@@ -65,6 +70,7 @@ class Room:
         self._requested_clock = -1
         self._progress = c.Progress(clock=core.head.clock, level=0, of=info.levels, settled=False)
         self._progress_timer: asyncio.TimerHandle | None = None
+        self._note = ""
         self._flushed = asyncio.Event()
         self._flushed.set()
         self.closed = False
@@ -179,8 +185,22 @@ class Room:
         """A level became tiles. An op that does not touch the ground leaves an older solve as good as new."""
         if clock >= self.core.geometry_clock:
             clock = self.core.head.clock
-        done = settled and level >= self.info.levels
-        self._note_progress(c.Progress(clock=clock, level=level, of=self.info.levels, settled=done))
+        self._note_progress(
+            c.Progress(
+                clock=clock,
+                level=level,
+                of=self.info.levels,
+                settled=settled,
+                refining=self._progress.refining if settled else 0,
+            )
+        )
+
+    def _wishes_changed(self, count: int, more: bool) -> None:
+        """``count`` refined tiles are wanted; ``more``: the solver does not know of all of them yet."""
+        if more and not self.closed:
+            self._worker.nudge(self._solve_client)
+        if count != self._progress.refining and (self._progress.settled or count == 0):
+            self._note_progress(self._progress.model_copy(update={"refining": count}))
 
     def _note_progress(self, progress: c.Progress, delay: float = PROGRESS_TICK) -> None:
         self._progress = progress
@@ -189,14 +209,19 @@ class Room:
 
     def _send_progress(self) -> None:
         self._progress_timer = None
-        text = self._progress.model_dump_json()
+        text = self._progress.model_copy(update={"note": self._note}).model_dump_json()
+        self._note = ""
         for member in self.core.members:
             member.outbox.push(text)
 
-    def _solve_failed(self, clock: int, note: str) -> None:
-        """Called in the solver's thread."""
-        progress = c.Progress(clock=clock, level=0, of=self.info.levels, settled=False, note=note)
-        self._loop.call_soon_threadsafe(self._note_progress, progress)
+    def _solve_failed(self, note: str) -> None:
+        """Something went wrong with the solver, or right again. Called in the solver's thread."""
+        self._loop.call_soon_threadsafe(self._tell, note)
+
+    def _tell(self, note: str) -> None:
+        """The note goes out with the next progress, whatever that is: no level may hide it."""
+        self._note = note
+        self._note_progress(self._progress)
 
     # --- the end ------------------------------------------------------------------------------------------------
 

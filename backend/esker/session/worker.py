@@ -1,8 +1,9 @@
 """The solver's thread: one for each device, shared by all rooms (DESIGN 8, "Newest job wins").
 
-A room's job is a snapshot of its strokes. A newer job replaces an older one at the next level boundary, except that a
-preview pass runs through to its finest level when that level was last delivered more than ``FINEST_WITHIN`` seconds
-ago: drawing without a pause must not starve the fine levels. Rooms take turns level by level.
+A room's job is a snapshot of its strokes. A newer job replaces an older one wherever the solver can be left, except in
+a preview pass that is about to end, or whose finest level was last delivered more than ``FINEST_WITHIN`` seconds ago:
+drawing without a pause must not starve the fine levels. Whose turn it is says ``schedule.py``; what happens when a
+device fails, ``recovery.py``.
 
 Results are handed to ``deliver`` in this thread; it returns when the room has taken them, which bounds what is held.
 """
@@ -12,59 +13,52 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
-from typing import Final
+from collections.abc import Callable, Sequence
+from typing import Any, Final
 
-from esker import contract as c
-from esker.session.ports import LevelResult, Solver, SolverFactory
+from esker.session.ports import LevelResult, Refinement, Solver, SolverFactory
+from esker.session.recovery import LAST_RESORT, Devices, Diagnose, Fault, unknown
+from esker.session.schedule import Client, Deliver, Job, Schedule
 
 log = logging.getLogger("esker.worker")
 
-FINEST_WITHIN: Final = 0.150
-MAX_FAILURES: Final = 3
-"""Failed jobs in a row before the solver is replaced by the NumPy one."""
-FALLBACK_DEVICE: Final = "numpy"
+__all__ = ["Client", "Job", "Worker"]
 
-
-@dataclass(frozen=True)
-class Job:
-    """What to solve. ``clock`` is the document's."""
-
-    clock: int
-    strokes: tuple[c.Stroke, ...]
-    settings: c.TerrainSettings
-
-
-@dataclass(eq=False)
-class Client:
-    """A room as the worker sees it. The callbacks are called in the worker's thread."""
-
-    levels: int
-    deliver: Callable[[int, LevelResult], None]
-    failed: Callable[[int, str], None]
-    newest: Job | None = None
-    running: Job | None = None
-    steps: Iterator[LevelResult | None] | None = None
-    previewing: bool = False
-    finest_at: float = field(default=float("-inf"))
+IDLE_CHECK: Final = 1.0
+"""Seconds between looks at what may be tried again, when nothing else wakes the thread."""
+AGAIN_AFTER: Final = 3.0
+"""Seconds until a job that failed for reasons unknown is tried again without a change."""
+AGAIN: Final = "The ground could not be computed; it will be tried again soon."
 
 
 class Worker:
     """Owns the solver and the thread it runs in."""
 
     def __init__(
-        self, factory: SolverFactory, device: str | None = None, now: Callable[[], float] = time.monotonic
+        self,
+        factory: SolverFactory,
+        device: str | None = None,
+        now: Callable[[], float] = time.monotonic,
+        *,
+        candidates: Callable[[], Sequence[str]] = lambda: [LAST_RESORT],
+        diagnose: Diagnose = unknown,
+        budget: int | None = None,
     ) -> None:
-        """Makes the solver in the new thread; ``start`` waits for it."""
-        self._factory, self._device, self._now = factory, device, now
+        """Makes the solver in the new thread; ``start`` waits for it.
+
+        ``candidates``: names of devices for ``factory``, best first; ``diagnose`` says what an exception of the solver
+        means; ``budget``: bytes that solves in progress may take together (default: ``schedule.BUDGET``).
+        """
+        self._factory, self._now, self._diagnose = factory, now, diagnose
+        self._devices = Devices(device, candidates)
         self._changed = threading.Condition()
-        self._clients: list[Client] = []
+        self._schedule = Schedule(now) if budget is None else Schedule(now, budget)
         self._leaving: list[Client] = []
         self._stopping = False
-        self._failures = 0
         self._solver: Solver | None = None
         self._broken: Exception | None = None
+        self._standing = ""
+        """What is wrong with the device for as long as it lasts, told to every room once."""
         self._ready = threading.Event()
         self._thread = threading.Thread(target=self._run, name="solver", daemon=True)
 
@@ -81,31 +75,48 @@ class Worker:
         return self._solver.device_name if self._solver is not None else "no solver"
 
     def add(
-        self, levels: int, deliver: Callable[[int, LevelResult], None], failed: Callable[[int, str], None]
+        self,
+        levels: int,
+        deliver: Deliver,
+        tell: Callable[[str], None],
+        refinement: Refinement | None = None,
+        limit: Callable[[int], None] | None = None,
     ) -> Client:
-        """A new room. ``deliver(clock, result)`` and ``failed(clock, sentence)`` are called in the worker's thread."""
-        client = Client(levels, deliver, failed)
+        """A new room. All callbacks are called in the worker's thread.
+
+        ``deliver(clock, result, show)``: ``show`` False for a coarse preview that the finest will replace at once.
+        ``tell(sentence)``: something went wrong, or right again. ``limit(top)``: from now on levels 0..top come, as
+        finer ones do not fit the device, or fit it again. ``refinement``: who wants tiles above the global levels.
+        """
+        client = Client(levels, deliver, tell, refinement, limit)
         with self._changed:
-            self._clients.append(client)
+            self._schedule.clients.append(client)
         return client
 
     def request(self, client: Client, job: Job) -> None:
         """The newest job of a room; replaces one that waits or runs."""
         with self._changed:
-            client.newest = job
+            client.request(job, self._now())
+            self._changed.notify()
+
+    def nudge(self, client: Client) -> None:
+        """The room may want other refined tiles than before."""
+        with self._changed:
+            client.refined.clear()
+            client.looking = True
             self._changed.notify()
 
     def remove(self, client: Client) -> None:
         """The room closes: whatever runs for it is dropped."""
         with self._changed:
-            if client in self._clients:
-                self._clients.remove(client)
+            if client in self._schedule.clients:
+                self._schedule.clients.remove(client)
                 self._leaving.append(client)
             client.newest = None
             self._changed.notify()
 
     def stop(self) -> None:
-        """Ends the thread at the next level boundary."""
+        """Ends the thread where the solver can next be left."""
         with self._changed:
             self._stopping = True
             self._changed.notify()
@@ -116,7 +127,10 @@ class Worker:
 
     def _run(self) -> None:
         try:
-            self._solver = self._factory(self._device)
+            self._solver = self._factory(self._devices.preferred)
+            self._devices.opened(self._solver.device_name, self._now())
+            if self._devices.better():
+                self._standing = f"The solver runs on {self._solver.device_name}: slower, but it goes on."
         except Exception as error:
             self._broken = error
             return
@@ -124,94 +138,191 @@ class Worker:
             self._ready.set()
         while True:
             with self._changed:
-                while not self._stopping and not self._leaving and not any(map(_active, self._clients)):
-                    self._changed.wait()
+                while (client := self._schedule.pick()) is None and not self._stopping and not self._leaving:
+                    if not self._changed.wait(IDLE_CHECK):
+                        break
                 if self._stopping:
-                    return
-                turn = [x for x in self._clients if _active(x)]
+                    break
                 leaving, self._leaving = self._leaving, []
-            for client in leaving:  # a solve must end in the thread that began it
-                _close(client.steps)
-                client.steps = None
-            for client in turn:
-                if self._stopping:
-                    return
+            for gone in leaving:  # a solve must end in the thread that began it
+                gone.drop()
+            self._retry()
+            if client is not None and client not in leaving:
                 self._step(client)
+        for left in self._schedule.clients:
+            left.drop()
 
     def _step(self, client: Client) -> None:
-        """One level of one room, or a part of one that the solver can be left at."""
-        self._maybe_restart(client)
+        """One slice of one room: what the solver does until it can be left."""
+        with self._changed:
+            job = self._schedule.begin(client)
+        if job is not None:
+            self._open(client, job)
+        if client.steps is not None:
+            self._solve(client)
+        elif client.refiner is not None:
+            self._refine(client)
+
+    def _open(self, client: Client, job: Job) -> None:
+        """Starts a solve; it takes memory of its own until it ends."""
+        assert self._solver is not None
+        if self._standing and client.told != self._standing:
+            client.told = self._standing
+            client.tell(self._standing)
+        refines = client.refinement is not None and hasattr(self._solver, "refiner")
+        options: dict[str, Any] = {"basis": True} if refines else {}
+        try:
+            client.steps = iter(self._solver.steps(job.strokes, job.settings, client.top, **options))
+        except Exception as error:
+            self._failed(client, job, error)
+
+    def _solve(self, client: Client) -> None:
         job, steps = client.running, client.steps
-        if job is None or steps is None:
-            return
+        assert job is not None
+        assert steps is not None
         try:
             result = next(steps)
         except StopIteration:
             client.steps = None
+            self._devices.settled()
+            if client.top == client.levels:
+                client.backoff.clear()
             return
         except Exception as error:
             self._failed(client, job, error)
             return
-        self._failures = 0
-        if result is None:
-            return
-        if result.level >= client.levels:
-            client.previewing = False
-            client.finest_at = self._now()
-        if client in self._clients:
-            try:
-                client.deliver(job.clock, result)
-            except Exception:
-                log.exception("level %d at clock %d could not be delivered", result.level, job.clock)
+        if result is not None:
+            show = client.took(result, self._now())
+            self._deliver(client, job, result, show)
 
-    def _maybe_restart(self, client: Client) -> None:
-        with self._changed:
-            if client.newest is None:
-                return
-            starving = self._now() - client.finest_at > FINEST_WITHIN
-            if client.steps is not None and client.previewing and starving:
-                return
-            client.running, client.newest = client.newest, None
-        _close(client.steps)
-        job = client.running
-        assert self._solver is not None
-        client.previewing = True
+    def _deliver(self, client: Client, job: Job, result: LevelResult, show: bool) -> None:
+        basis = getattr(result, "basis", None)
+        if basis is not None and self._solver is not None and hasattr(self._solver, "refiner"):
+            client.refiner, client.looking = self._solver.refiner(basis), True
+        if client not in self._schedule.clients:
+            return
         try:
-            client.steps = iter(self._solver.steps(job.strokes, job.settings, client.levels))
+            client.deliver(job.clock, result, show)
+        except Exception:
+            log.exception("level %d at clock %d could not be delivered", result.level, job.clock)
+
+    def _refine(self, client: Client) -> None:
+        """One slice of refinement: at most one tile is finished."""
+        job, refinement = client.running, client.refinement
+        assert job is not None
+        assert refinement is not None
+        try:
+            if client.tiles is None and not self._look(client, refinement):
+                return
+            assert client.tiles is not None
+            tile = next(client.tiles)
+        except StopIteration:
+            client.tiles = None
+            return
         except Exception as error:
-            self._failed(client, job, error)
+            if self._diagnose(error) != Fault.MEMORY:
+                self._failed(client, job, error)
+                return
+            log.warning("no memory to refine at clock %d: %s", job.clock, error)
+            client.drop()
+            client.tell(f"{self.device_name} has too little memory for finer detail just now.")
+            return
+        if tile is not None:
+            client.refined.add(tile.key)
+            refinement.deliver_tile(job.clock, tile)
+
+    def _look(self, client: Client, refinement: Refinement) -> bool:
+        """Starts on the tiles that are wanted now and were not made from this solve yet; False when there are none."""
+        assert client.refiner is not None
+        keys = [key for key in refinement.wanted() if key not in client.refined]
+        client.looking = bool(keys)
+        if keys:
+            client.tiles = iter(client.refiner.tiles(keys))
+        return bool(keys)
+
+    # --- faults -------------------------------------------------------------------------------------------------
 
     def _failed(self, client: Client, job: Job, error: Exception) -> None:
-        log.error("solving at clock %d failed: %s: %s", job.clock, type(error).__name__, error)
-        client.steps = None
-        self._failures += 1
-        note = "The ground could not be computed; it will be tried again with the next change."
-        if self._failures >= MAX_FAILURES and self._device != FALLBACK_DEVICE:
-            note = self._fall_back() or note
-        client.failed(job.clock, note)
+        fault = self._diagnose(error)
+        log.error("solving at clock %d failed (%s): %s: %s", job.clock, fault.value, type(error).__name__, error)
+        client.drop()
+        if fault == Fault.MEMORY and client.top > 0:
+            self._coarser(client)
+        elif not self._devices.blame(fault) or not self._next_device(error):
+            client.again_at = self._now() + AGAIN_AFTER
+            client.tell(AGAIN)
 
-    def _fall_back(self) -> str | None:
-        """Every room goes on with the NumPy solver; returns what to tell people, None when that cannot be made."""
-        self._device, self._failures = FALLBACK_DEVICE, 0
-        try:
-            self._solver = self._factory(FALLBACK_DEVICE)
-        except Exception:
-            log.exception("the fallback solver could not be made")
-            return None
-        log.warning("the solver now runs on %s", self._solver.device_name)
-        for other in self._clients:
-            _close(other.steps)
-            other.steps = None
-            with self._changed:
-                other.newest = other.newest or other.running
-        return f"The solver now runs on {self._solver.device_name}: slower, but it goes on."
+    def _coarser(self, client: Client) -> None:
+        """The room goes on one level coarser, until there may be memory again."""
+        client.top -= 1
+        client.backoff.failed(self._now())
+        client.tell(
+            f"{self.device_name} has too little memory for level {client.top + 1}: "
+            f"the ground is shown up to level {client.top} for now.",
+        )
+        self._limit(client)
+        self._again(client)
 
+    def _limit(self, client: Client) -> None:
+        if client.limit is not None:
+            client.limit(client.top)
 
-def _active(client: Client) -> bool:
-    return client.newest is not None or client.steps is not None
+    def _next_device(self, error: Exception) -> bool:
+        """Every room goes on with the next device that works. False when none could be had."""
+        left = self.device_name
+        for name in self._devices.others():
+            try:
+                solver = self._factory(name)
+            except Exception:
+                log.exception("the device %s cannot be used either", name)
+                continue
+            log.warning("the solver now runs on %s", solver.device_name)
+            self._solver = solver
+            self._devices.left(name, self._now())
+            why = str(error).strip().rstrip(".") or f"{left} failed"
+            self._standing = f"{why}. The solver now runs on {solver.device_name} and goes on."
+            for client in list(self._schedule.clients):
+                client.drop()
+                self._tell(client, self._standing)
+                self._again(client)
+            return True
+        return False
 
+    def _tell(self, client: Client, sentence: str) -> None:
+        client.told = sentence
+        client.tell(sentence)
 
-def _close(steps: Iterator[LevelResult | None] | None) -> None:
-    close = getattr(steps, "close", None)
-    if close is not None:
-        close()
+    def _again(self, client: Client) -> None:
+        with self._changed:
+            client.again(self._now())
+
+    def _retry(self) -> None:
+        """Tries better devices, finer levels and failed jobs again when it is time."""
+        now = self._now()
+        if self._devices.backoff.due(now):
+            self._better_device(now)
+        for client in list(self._schedule.clients):
+            if client.top < client.levels and client.backoff.due(now) and client.at_rest:
+                client.top = client.levels
+                self._limit(client)
+                self._again(client)
+            elif client.again_at <= now:
+                self._again(client)
+
+    def _better_device(self, now: float) -> None:
+        """Solves in progress end where they began; the next ones use the better device."""
+        for name in self._devices.better():
+            try:
+                solver = self._factory(name)
+            except Exception as error:
+                log.info("the device %s still does not work: %s", name, error)
+                continue
+            log.warning("the solver runs on %s again", solver.device_name)
+            self._solver, self._standing = solver, ""
+            self._devices.returned(name)
+            for client in list(self._schedule.clients):
+                if client.told:
+                    client.tell(f"The solver runs on {solver.device_name} again.")
+                client.told = ""
+            break
+        self._devices.backoff.failed(now)

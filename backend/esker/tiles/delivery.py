@@ -8,6 +8,7 @@ version of a tile replaces an older one by construction, and a slow client sees 
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from typing import Final, Protocol
 
@@ -118,15 +119,17 @@ class TileServer:
         if not self.refined.active:
             return (), 0
         errors: dict[TileKey, float] = {}
-        kept: set[TileKey] = set()
         for client in clients:
             client.refresh()
-            kept |= client.refined_keys()
             for key, error in client.missing():
                 errors[key] = max(error, errors.get(key, 0.0))
-        room = self.refined.make_room(kept | errors.keys())
         order = sorted(errors, key=lambda k: (k.level, -errors[k], k))
-        order = [k for i, k in enumerate(order) if self.refined.get(k) is not None or i < room]
+        if len(self.refined) + len(order) > self.refined.room_tiles:
+            wanted = {key for client in clients for key in client.wanted_refined()}
+            room = self.refined.make_room(wanted, {key for client in clients for key in client.held_refined()})
+            fresh = (key for key in order if self.refined.get(key) is None)
+            beyond = set(itertools.islice(fresh, room, None))
+            order = [key for key in order if key not in beyond]
         return tuple(order[:WISHES]), len(order)
 
 
@@ -176,9 +179,9 @@ class ClientTiles:
         self.refresh()
         return set(self._selection.tiles)
 
-    def refined_keys(self) -> set[TileKey]:
-        """Refined tiles that this client holds or wants."""
-        return self._refined.keys() | self._selection.tiles.keys()
+    def held_refined(self) -> set[TileKey]:
+        """What the client holds above these levels."""
+        return self._refined.keys()
 
     def missing(self) -> list[tuple[TileKey, float]]:
         """Wanted tiles that the settled ground has not been refined to yet, with their projected errors in pixels."""
@@ -259,6 +262,7 @@ class ClientTiles:
         server = self._server
         self._wanted, self._errors = select(server.pyramid.bounds(), view)
         if server.refined.finest == server.levels or server.pyramid.level(server.levels) is None:
+            self._selection = Selection.nothing(server.levels, server.refined.finest)
             return
         while True:
             found = select_refined(server.pyramid, server.refined, self._wanted[-1], view)

@@ -1,0 +1,116 @@
+"""What to do when the solver's device fails (DESIGN 8, 16): which device is next, and when to try a better one again.
+
+Pure policy, without threads or OpenCL: the worker tells what happened, asks, and acts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Final
+
+RETRY_SECONDS: Final = 60.0
+"""After a fault the better device, or the finer level, is tried again after so long, then twice as long, ..."""
+RETRY_AT_MOST: Final = 960.0
+MAX_FAILURES: Final = 3
+"""Failed jobs in a row, for reasons unknown, before the next device is taken."""
+LAST_RESORT: Final = "numpy"
+"""Name of the device that needs none."""
+
+
+class Fault(Enum):
+    """Why a solve failed."""
+
+    MEMORY = "memory"
+    """It does not fit the device; a coarser one may."""
+    DEVICE = "device"
+    """The device is lost, or does not work: it cannot be used for now."""
+    UNKNOWN = "unknown"
+    """Perhaps this job, perhaps the device."""
+
+
+Diagnose = Callable[[Exception], Fault]
+
+
+def unknown(_: Exception) -> Fault:
+    """A diagnosis for solvers of which nothing is known."""
+    return Fault.UNKNOWN
+
+
+@dataclass
+class Backoff:
+    """When to try again: after ``RETRY_SECONDS``, doubling up to ``RETRY_AT_MOST`` while it keeps failing."""
+
+    wait: float = RETRY_SECONDS
+    at: float | None = None
+
+    def failed(self, now: float) -> None:
+        """It failed (again)."""
+        self.wait = RETRY_SECONDS if self.at is None else min(2 * self.wait, RETRY_AT_MOST)
+        self.at = now + self.wait
+
+    def due(self, now: float) -> bool:
+        """Whether it is time to try."""
+        return self.at is not None and now >= self.at
+
+    def clear(self) -> None:
+        """It works."""
+        self.at = None
+
+
+@dataclass
+class Devices:
+    """The devices in order of preference, and the one in use.
+
+    ``preferred``: the name that was asked for, None for the best there is. ``candidates`` lists the names of all, best
+    first, LAST_RESORT last. ``current``: the name in use; None when it is not known under any.
+    """
+
+    preferred: str | None
+    candidates: Callable[[], Sequence[str]]
+    current: str | None = None
+    failures: int = 0
+    backoff: Backoff = field(default_factory=Backoff)
+
+    def opened(self, device_name: str, now: float) -> None:
+        """The solver that was asked for first runs on this device."""
+        self.current = self.preferred
+        if self.preferred is None:
+            numpy = device_name.lower().startswith(LAST_RESORT)
+            self.current = LAST_RESORT if numpy else next((x for x in self.candidates() if x == device_name), None)
+        if self.better():
+            self.backoff.failed(now)
+
+    def better(self) -> list[str]:
+        """Devices to be preferred to the present one, best first."""
+        listed = list(self.candidates())
+        if self.preferred is not None:
+            listed = [self.preferred, *(x for x in listed if x != self.preferred)]
+        return listed[: listed.index(self.current)] if self.current in listed else []
+
+    def others(self) -> list[str]:
+        """What to try when the present device has failed, best first; the last cannot fail."""
+        listed = [x for x in self.candidates() if x not in (self.current, LAST_RESORT)]
+        later = self.better()
+        return [*(x for x in listed if x not in later), LAST_RESORT]
+
+    def blame(self, fault: Fault) -> bool:
+        """Counts a failed job; True when the device should be left."""
+        self.failures += 1
+        return self.current != LAST_RESORT and (fault != Fault.UNKNOWN or self.failures >= MAX_FAILURES)
+
+    def left(self, name: str, now: float) -> None:
+        """The present device failed, and ``name`` takes over."""
+        self.current, self.failures = name, 0
+        self.backoff.failed(now)
+
+    def returned(self, name: str) -> None:
+        """A better device is in use again. Whether it lasts is seen when a solve has ``settled``."""
+        self.current, self.failures = name, 0
+
+    def settled(self) -> None:
+        """A whole solve went through on the present device."""
+        self.failures = 0
+        if not self.better():
+            self.backoff.clear()

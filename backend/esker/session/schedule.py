@@ -1,0 +1,217 @@
+"""Whose turn it is on the solver (DESIGN 8): rooms that wait for a first coarse preview, finer previews, settling, and
+refinement, in this order; in turn within each, a slice at a time.
+
+A lower class that has waited for ``PATIENCE`` gets a slice all the same, so nothing starves. A solve in progress holds
+memory, so only so many may be in progress as fit the budget: a room that waits for its coarse preview ends the settling
+solve that began last, which starts again later.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import Final
+
+from esker import contract as c
+from esker.grid import TileKey
+from esker.session.ports import LevelResult, RefinedTile, Refinement, Refiner
+from esker.session.recovery import Backoff
+
+FINEST_WITHIN: Final = 0.150
+HOLD: Final = 0.050
+"""A coarse preview that the finest follows within this time is not shown, and its pass is not stopped."""
+PATIENCE: Final = 0.150
+BUDGET: Final = 3 << 30
+"""Bytes for solves in progress, of all rooms together."""
+MOST_SOLVES: Final = 8
+LEVEL_4_BYTES: Final = 91 << 20
+"""One solve with 1025 x 1025 samples; four times as much a level."""
+
+COARSE, FINER, SETTLE, REFINE = range(4)
+
+Deliver = Callable[[int, LevelResult, bool], None]
+
+
+@dataclass(frozen=True)
+class Job:
+    """What to solve. ``clock`` is the document's."""
+
+    clock: int
+    strokes: tuple[c.Stroke, ...]
+    settings: c.TerrainSettings
+
+
+@dataclass(eq=False)
+class Client:
+    """A room as the worker sees it. ``top``: the finest level solved for it at present, of ``levels``."""
+
+    levels: int
+    deliver: Deliver
+    tell: Callable[[str], None]
+    refinement: Refinement | None = None
+    limit: Callable[[int], None] | None = None
+    newest: Job | None = None
+    running: Job | None = None
+    steps: Iterator[LevelResult | None] | None = None
+    refiner: Refiner | None = None
+    tiles: Iterator[RefinedTile | None] | None = None
+    refined: set[TileKey] = field(default_factory=set)
+    looking: bool = False
+    """Whether tiles may be wanted that were not made yet."""
+    top: int = field(init=False)
+    backoff: Backoff = field(default_factory=Backoff)
+    again_at: float = math.inf
+    """When a job that failed is tried again by itself."""
+    told: str = ""
+    turn: int = 0
+    ran_at: float = 0.0
+    """When it had its last slice, or began to wait."""
+    previewing: bool = False
+    finest_at: float = -math.inf
+    _reached: int = -1
+    _previewed: int = -1
+    """Clock of the last complete preview."""
+    _came: dict[int, float] = field(default_factory=dict)
+    _lead: dict[int, float] = field(default_factory=dict)
+    """Per level: how long before the finest its preview came, last time."""
+
+    def __post_init__(self) -> None:
+        self.top = self.levels
+
+    @property
+    def clock(self) -> int:
+        """Of the job that it solves, or solved last."""
+        return -1 if self.running is None else self.running.clock
+
+    @property
+    def at_rest(self) -> bool:
+        """Nothing to solve."""
+        return self.steps is None and self.newest is None
+
+    def request(self, job: Job, now: float) -> None:
+        """The newest job."""
+        if self.at_rest:
+            self.ran_at = now
+        self.newest, self.again_at = job, math.inf
+
+    def again(self, now: float) -> None:
+        """The job that was dropped, unless there is a newer one."""
+        if self.newest is None and self.running is not None:
+            self.request(self.running, now)
+
+    def drop(self) -> None:
+        """Ends what runs for it. In the solver's thread."""
+        for work in (self.steps, self.tiles):
+            close = getattr(work, "close", None)
+            if close is not None:
+                close()
+        self.steps = self.tiles = self.refiner = None
+        self.refined.clear()
+        self.looking = self.previewing = False
+
+    def starts(self, now: float) -> bool:
+        """Whether its newest job is to be begun: at once, but for a preview pass that should end first."""
+        if self.newest is None:
+            return False
+        if self.steps is None or not self.previewing:
+            return True
+        starving = now - self.finest_at > FINEST_WITHIN
+        return not starving and self._lead.get(self._reached, math.inf) > HOLD
+
+    def stage(self, now: float) -> int | None:
+        """Its class; None when it has nothing to do."""
+        if self.newest is not None and self.starts(now):
+            return SETTLE if self.newest.clock == self._previewed else COARSE
+        if self.steps is not None:
+            return SETTLE if not self.previewing else FINER if self._reached >= 0 else COARSE
+        return REFINE if self.refiner is not None and self.looking else None
+
+    def begin(self) -> Job:
+        """Takes up the newest job."""
+        assert self.newest is not None
+        self.drop()
+        self.running, self.newest = self.newest, None
+        self.previewing, self._reached, self.again_at = True, -1, math.inf
+        self._came.clear()
+        return self.running
+
+    def took(self, result: LevelResult, now: float) -> bool:
+        """Notes a result; returns whether to show it.
+
+        Of a preview that ends soon only the coarsest level is shown at once: what coarse levels say in between would be
+        corrected before anybody saw it (docs/decisions/0014-consistent-previews.md).
+        """
+        if not self.previewing or result.settled:
+            return True
+        level = self._reached = result.level
+        if level < self.top:
+            self._came[level] = now
+            return level == 0 or self._lead.get(level, math.inf) > HOLD
+        self._lead = {coarse: now - came for coarse, came in self._came.items()}
+        self.previewing, self.finest_at, self._previewed = False, now, self.clock
+        return True
+
+
+def solve_bytes(top: int) -> int:
+    """Memory that a solve up to level ``top`` holds, about."""
+    return int(LEVEL_4_BYTES * 4.0 ** (top - 4))
+
+
+class Schedule:
+    """Chooses among ``clients``. Call it under the worker's lock, in its thread."""
+
+    def __init__(self, now: Callable[[], float], budget: int = BUDGET) -> None:
+        self.clients: list[Client] = []
+        self._now, self._budget = now, budget
+        self._turns = 0
+        self._favoured_at = -math.inf
+
+    def pick(self) -> Client | None:
+        """The client whose turn it is, None when there is nothing to do."""
+        now = self._now()
+        staged = [(stage, x) for x in self.clients if (stage := x.stage(now)) is not None and self._fits(x, stage, now)]
+        if not staged:
+            return None
+        stage, best = min(staged, key=lambda s: (s[0], s[1].turn))
+        late = [x for other, x in staged if other > stage and now - x.ran_at > PATIENCE]
+        if late and now - self._favoured_at > PATIENCE:
+            self._favoured_at = now
+            best = min(late, key=lambda x: x.turn)
+        return best
+
+    def begin(self, client: Client) -> Job | None:
+        """The client's slice begins: the job to start, if it is to start one. Ends solves that are in its way."""
+        now = self._now()
+        self._turns += 1
+        client.turn, client.ran_at = self._turns, now
+        if not client.starts(now):
+            return None
+        for other in self._in_the_way(client):
+            other.drop()
+            other.again(now)
+        return client.begin()
+
+    def _fits(self, client: Client, stage: int, now: float) -> bool:
+        """Whether its slice may run: in what memory there is, or, for a coarse preview, in what others can leave."""
+        if client.steps is not None or not client.starts(now) or self._room(client, []):
+            return True
+        return stage == COARSE and self._room(client, self._settling(client))
+
+    def _settling(self, client: Client) -> list[Client]:
+        """Others that are only settling, longest first."""
+        found = [x for x in self.clients if x is not client and x.steps is not None and not x.previewing]
+        return sorted(found, key=lambda x: x.finest_at)
+
+    def _in_the_way(self, client: Client) -> list[Client]:
+        """The fewest settling solves, last begun first, without which the client's has room."""
+        gone: list[Client] = []
+        settling = self._settling(client)
+        while settling and not self._room(client, gone):
+            gone.append(settling.pop())
+        return gone
+
+    def _room(self, client: Client, gone: list[Client]) -> bool:
+        held = [x for x in self.clients if x is not client and x.steps is not None and x not in gone]
+        used = sum(solve_bytes(x.top) for x in held)
+        return not held or (len(held) < MOST_SOLVES and used + solve_bytes(client.top) <= self._budget)
