@@ -9,7 +9,6 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from esker import grid
 from esker.contract import DEFAULT_REACH_FRACTION, MAX_REFINED_LEVEL, Stroke, TerrainSettings
@@ -133,17 +132,6 @@ class WindowPacker:
     def reaching(self, level: int, box: BinBox) -> list[Stroke]:
         """The strokes, by id, that may reach the bins of ``box``, at this or any finer level. Raises like ``pack``."""
         return [self._strokes[k] for k in self._near(level, box)]
-
-    def _near(self, level: int, box: BinBox) -> NDArray[np.intp]:
-        packed = [
-            pack_one(self._shapes[k], grid.spacing(level, self._settings.size_m), box) for k in self._near(level, box)
-        ]
-        return _tables(level, self._settings, [p for p in packed if p is not None], box)
-
-    def reaching(self, level: int, box: BinBox) -> list[Stroke]:
-        """The strokes, by id, whose bounds with their reach meet the bins of ``box``: no other changes anything there.
-        Raises ValueError like ``pack``."""
-        return [self._shapes[k].crest.stroke for k in self._near(level, box)]
 
     def _near(self, level: int, box: BinBox) -> list[int]:
         if not 0 <= level <= MAX_REFINED_LEVEL:
