@@ -57,6 +57,11 @@ const MAX_PITCH = 30 * DEG;
 const MIN_PITCH = -89 * DEG;
 const FLY_PITCH = 85 * DEG;
 const MAP_PITCH = -90 * DEG;
+/** How near one may come to what is looked at, and how high the eye stands over the ground; nearer on small models. */
+const NEAREST_M = 2;
+const EYE_HEIGHT_M = 1.7;
+/** Slowest flight, metres a second. */
+const SLOWEST_M = 20;
 /** Time in which a smooth zoom covers 63 % of its way. */
 const ZOOM_TAU_S = 0.07;
 
@@ -185,7 +190,7 @@ export class Camera {
   /** Moves the eye in fly mode; arguments in -1..1, speed follows the height above the ground. */
   fly(forward: number, right: number, up: number, dtS: number): void {
     const basis = poseBasis(this.#pose);
-    const step = clamp(this.#clearance * 0.9, this.#sizeM / 200, this.#sizeM) * dtS;
+    const step = clamp(this.#clearance * 0.9, Math.min(this.#sizeM / 200, SLOWEST_M), this.#sizeM) * dtS;
     let pivot = addScaled(this.#pose.pivot, basis.forward, forward * step);
     pivot = addScaled(pivot, basis.right, right * step);
     pivot = add(pivot, [0, 0, up * step]);
@@ -322,7 +327,7 @@ export class Camera {
   }
 
   get #nearest(): number {
-    return Math.max(2, this.#sizeM / 2000);
+    return Math.min(NEAREST_M, this.#sizeM / 500);
   }
 
   get #farthest(): number {
@@ -397,7 +402,7 @@ export class Camera {
   #keepAbove(ground: Ground): void {
     const eye = poseEye(this.#pose);
     const floor = ground.heightAt(eye[0], eye[1]);
-    const walk = Math.max(1.7, this.#sizeM / 2400);
+    const walk = Math.min(EYE_HEIGHT_M, this.#sizeM / 100);
     const clearance = Math.max(walk, eye[2] - floor);
     const low = this.#pose.mode !== "map" && eye[2] < floor + walk;
     if (!low && Math.abs(clearance - this.#clearance) < 1e-3 * this.#clearance) return;

@@ -90,7 +90,9 @@ export function cameraState(pose: Pose, width: number, height: number, sizeM: nu
   const eye = poseEye(pose);
   const map = pose.mode === "map";
   const reach = Math.hypot(eye[0] - sizeM / 2, eye[1] - sizeM / 2, eye[2]) + 2 * sizeM;
-  const near = map ? pose.distanceM - 2 * sizeM : Math.max(0.1, Math.min(pose.distanceM * 0.02, clearanceM * 0.25));
+  const near = map
+    ? pose.distanceM - 2 * sizeM
+    : Math.max(Math.min(0.1, sizeM / 4096), Math.min(pose.distanceM * 0.02, clearanceM * 0.25));
   const far = map ? pose.distanceM + 2 * sizeM : 2 * reach;
   const tan = Math.tan((pose.fovDeg * DEG) / 2);
   const orthoHeight = map ? 2 * pose.distanceM * tan : 0;

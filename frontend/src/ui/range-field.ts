@@ -157,6 +157,6 @@ export class EskRange extends LitElement {
   }
 }
 
-const UNITS: Record<string, string> = { m: "metres", "°": "degrees" };
+const UNITS: Record<string, string> = { m: "metres", "°": "degrees", "%": "per cent" };
 
 customElements.define("esk-range", EskRange);

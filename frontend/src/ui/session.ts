@@ -60,6 +60,8 @@ export class TerrainSession {
   readonly members = signal<readonly Member[]>([]);
   readonly presences = signal<ReadonlyMap<string, MemberPresence>>(new Map());
   readonly progress = signal<Progress | null>(null);
+  /** What the server last said about its solver, until somebody has read it. */
+  readonly notice = signal<string | null>(null);
   readonly server = signal<ServerInfo | null>(null);
   readonly me = signal<Identity>({ name: "", colour: "#888888" });
   readonly stage = signal<Stage | null>(null);
@@ -70,6 +72,7 @@ export class TerrainSession {
   readonly #views: Throttle;
   readonly #presence: Throttle;
   readonly #stops: (() => void)[] = [];
+  readonly #read = new Set<string>();
   #gesture = 0;
   #again: ReturnType<typeof setTimeout> | undefined;
 
@@ -253,6 +256,7 @@ export class TerrainSession {
         break;
       case "progress":
         this.progress.value = message;
+        if (message.note) this.#setNotice(message.note);
         break;
       case "error":
         this.#error(message);
@@ -260,6 +264,16 @@ export class TerrainSession {
       case "pong":
         break;
     }
+  }
+
+  /** The notice has been read: the same sentence does not come again on this page. */
+  dismissNotice(): void {
+    if (this.notice.value !== null) this.#read.add(this.notice.value);
+    this.notice.value = null;
+  }
+
+  #setNotice(note: string): void {
+    if (!this.#read.has(note)) this.notice.value = note;
   }
 
   #error(message: ErrorMessage): void {

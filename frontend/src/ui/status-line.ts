@@ -9,9 +9,13 @@ import { height, metres, roundBelow } from "./words.ts";
 const BAR_PX = 96;
 const NARROW_BAR_PX = 52;
 
+const tiles = (n: number): string => (n === 1 ? "1 tile" : `${n} tiles`);
+
 /** How far the solver is, in words for the tooltip. */
 export function progressText(progress: Progress | null, levels: number): string {
   if (!progress) return `Waiting for the ground: ${levels + 1} levels of detail`;
+  if (progress.settled && progress.refining > 0)
+    return `Refining ${tiles(progress.refining)} where somebody looks closely`;
   if (progress.settled) return `Settled: all ${levels + 1} levels of detail are final`;
   return `Settling: level ${progress.level} of ${progress.of}`;
 }
@@ -65,6 +69,9 @@ export class EskStatusLine extends SignalElement {
       }
       .settled .dot.done {
         background: var(--esk-ok);
+      }
+      .refining {
+        margin-left: 4px;
       }
       .levels .icon {
         width: 13px;
@@ -121,13 +128,15 @@ export class EskStatusLine extends SignalElement {
 
   #levels(progress: Progress | null, levels: number): TemplateResult {
     const settled = progress?.settled === true;
+    const refining = progress?.refining ?? 0;
     const text = progressText(progress, levels);
     return html`<span class="levels ${settled ? "settled" : ""}" role="img" aria-label=${text} title=${text}>
       ${Array.from({ length: levels + 1 }, (_, i) => {
         const done = progress !== null && (settled || i <= progress.level);
         return html`<span class="dot ${done ? "done" : ""}"></span>`;
       })}
-      ${settled ? icon("check") : nothing}
+      ${settled && refining === 0 ? icon("check") : nothing}
+      ${settled && refining > 0 ? html`<span class="refining">refining ${refining}</span>` : nothing}
     </span>`;
   }
 }

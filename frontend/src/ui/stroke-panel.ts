@@ -1,6 +1,8 @@
 import { html, nothing, type TemplateResult } from "lit";
 import type { Stroke } from "../generated/contract.ts";
 import type { DrawToolId } from "../input/defaults.ts";
+import type { DetailChange } from "./detail-form.ts";
+import "./detail-form.ts";
 import { icon } from "./icons.ts";
 import { reliefOf, shapeOf } from "./scene.ts";
 import type { SectionChange } from "./section-form.ts";
@@ -42,7 +44,7 @@ export class EskStrokePanel extends SignalElement {
     return this.#list([...(doc?.strokes.values() ?? [])]);
   }
 
-  #set(stroke: Stroke, change: SectionChange): void {
+  #set(stroke: Stroke, change: SectionChange | DetailChange): void {
     this.#gesture ??= this.stage.session.newGesture();
     this.stage.session.setStroke(stroke.id, change.fields, this.#gesture);
     if (change.settled) this.#gesture = null;
@@ -77,6 +79,12 @@ export class EskStrokePanel extends SignalElement {
         ?disabled=${disabled}
         @change=${(e: CustomEvent<SectionChange>) => this.#set(stroke, e.detail)}
       ></esk-section-form>
+      <esk-detail-form
+        .fields=${{ amplitude_m: stroke.amplitude_m, roughness: stroke.roughness }}
+        .sizeM=${sizeM}
+        ?disabled=${disabled}
+        @change=${(e: CustomEvent<DetailChange>) => this.#set(stroke, e.detail)}
+      ></esk-detail-form>
       ${stroke.author ? html`<p class="quiet small">Drawn by ${stroke.author}</p>` : nothing}
     `;
   }
@@ -115,7 +123,10 @@ export class EskStrokePanel extends SignalElement {
   #defaults(tool: DrawToolId): TemplateResult {
     const { defaults, sizeM } = this.stage;
     const style = defaults[tool];
-    const { left, right, plateau_radius_m } = style.value;
+    const { left, right, plateau_radius_m, amplitude_m, roughness } = style.value;
+    const change = (e: CustomEvent<SectionChange | DetailChange>): void => {
+      style.value = { ...style.value, ...e.detail.fields };
+    };
     const down = tool === "crevice";
     return html`
       <p class="lead">New ${tool === "plateau" ? "plateaux" : tool === "crevice" ? "crevices" : "mountains"} get this cross-section.</p>
@@ -125,10 +136,9 @@ export class EskStrokePanel extends SignalElement {
         .reliefM=${(down ? -1 : 1) * sizeM * 0.05}
         .sizeM=${sizeM}
         .sense=${down ? "down" : "up"}
-        @change=${(e: CustomEvent<SectionChange>) => {
-          style.value = { ...style.value, ...e.detail.fields };
-        }}
+        @change=${change}
       ></esk-section-form>
+      <esk-detail-form .fields=${{ amplitude_m, roughness }} .sizeM=${sizeM} @change=${change}></esk-detail-form>
     `;
   }
 

@@ -4,6 +4,7 @@ import { ApiError, api } from "./api.ts";
 import "./help-dialog.ts";
 import "./icon-library.ts";
 import { icon } from "./icons.ts";
+import "./legend.ts";
 import "./overlay.ts";
 import { pageActions } from "./page-actions.ts";
 import { memberName } from "./people.ts";
@@ -157,10 +158,13 @@ export class EskTerrain extends SignalElement {
       <esk-top-bar .stage=${stage} .panelOpen=${this.#panel.value !== null} @command=${this.#command}></esk-top-bar>
       <esk-tools class="panel" .stage=${stage}></esk-tools>
       <div class="foot">
-        <esk-status-line class="panel" .stage=${stage}></esk-status-line>
+        <div class="notes">
+          <esk-legend class="panel" .stage=${stage}></esk-legend>
+          <esk-status-line class="panel" .stage=${stage}></esk-status-line>
+        </div>
         <esk-view-bar class="panel" .stage=${stage}></esk-view-bar>
       </div>
-      ${this.#hint(stage)} ${this.#following(stage)} ${this.#closedBar(stage)}
+      ${this.#hint(stage)} ${this.#following(stage)} ${this.#closedBar(stage)} ${this.#notice(stage)}
       ${this.#panel.value === null ? nothing : this.#side(stage, this.#panel.value)}
       <esk-share .stage=${stage} .open=${this.#dialog.value === "share"} @close=${this.#closeDialog}></esk-share>
       <esk-profile .stage=${stage} .open=${this.#dialog.value === "profile"} @close=${this.#closeDialog}></esk-profile>
@@ -236,6 +240,16 @@ export class EskTerrain extends SignalElement {
     </div>`;
   }
 
+  /** What the server said about its solver: another device, a lower level. Stands until it is read. */
+  #notice(stage: Stage): TemplateResult | typeof nothing {
+    const { connection, notice } = stage.session;
+    if (notice.value === null || connection.state.value === "closed") return nothing;
+    return html`<div class="closed notice panel" role="status">
+      ${icon("info")}<span>${notice.value}</span>
+      <button class="icon-btn small" aria-label="Dismiss" @click=${() => stage.session.dismissNotice()}>${icon("xmark")}</button>
+    </div>`;
+  }
+
   #about(stage: Stage): TemplateResult {
     const { session, sizeM } = stage;
     const server = session.server.value;
@@ -244,6 +258,7 @@ export class EskTerrain extends SignalElement {
       ["Strokes", String(session.doc.doc.value?.strokes.size ?? 0)],
       ["Operations so far", String(session.doc.doc.value?.clock ?? 0)],
       ["Finest solved level", `${stage.levels} (${64 * 2 ** stage.levels + 1} samples a side)`],
+      ["Refined where one looks", stage.finest > stage.levels ? `to level ${stage.finest}` : "no"],
       ["Drawn by", stage.renderer.value?.description ?? "–"],
       ["Solved on", server?.device ?? "–"],
       ["Server", server ? `Esker ${server.version}` : "–"],

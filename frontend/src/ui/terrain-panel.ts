@@ -24,6 +24,11 @@ const BORDERS = [
   { value: "pinned", label: "Pinned", title: "The border stays at the base height" },
 ];
 
+const BORDER_WORDS: Readonly<Record<Border, string>> = {
+  free: "The ground may rise and fall at the border of the terrain.",
+  pinned: "The ground at the border of the terrain stays at height zero.",
+};
+
 /** Settings of the whole terrain: look, sun, sea, and how far strokes reach. */
 export class EskTerrainPanel extends SignalElement {
   static override properties = { stage: { attribute: false } };
@@ -63,6 +68,7 @@ export class EskTerrainPanel extends SignalElement {
           ?disabled=${disabled}
           @pick=${(e: CustomEvent<Border>) => this.#set({ border: e.detail })}
         ></esk-segmented>
+        <p class="lead">${BORDER_WORDS[settings.border]}</p>
       </div>
     `;
   }
@@ -121,19 +127,20 @@ export class EskTerrainPanel extends SignalElement {
     const { reach_m: reach, size_m: size } = settings;
     return html`
       <div class="group">
+        <h3>Reach</h3>
         <wa-switch
           size="s"
           .checked=${live(reach === null)}
           ?disabled=${disabled}
           @change=${(e: Event) =>
             this.#set({ reach_m: (e.target as HTMLInputElement).checked ? null : size * DEFAULT_REACH_FRACTION })}
-          >Strokes reach without end</wa-switch
+          >Unlimited</wa-switch
         >
         ${
           reach === null
             ? html`<p class="lead">Every stroke moves the whole terrain, as on a rubber sheet.</p>`
             : html`<esk-range
-                label="Reach of a stroke"
+                label="Distance"
                 unit="m"
                 log
                 min=${size / 256}
@@ -142,7 +149,8 @@ export class EskTerrainPanel extends SignalElement {
                 ?disabled=${disabled}
                 @value=${(e: CustomEvent<number>) => this.#set({ reach_m: e.detail }, false)}
                 @settle=${(e: CustomEvent<number>) => this.#set({ reach_m: e.detail })}
-              ></esk-range>`
+              ></esk-range>
+              <p class="lead">Beyond its flanks a stroke moves the ground about this far.</p>`
         }
       </div>
     `;

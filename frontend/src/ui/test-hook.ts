@@ -14,6 +14,15 @@ export interface PageView {
   heightAt(x: number, y: number): number | null;
   /** Level of the finest tile held at a place, -1 before the ground has come. */
   levelAt(x: number, y: number): number;
+  /** Noise amplitude in metres and roughness 0..1 that the strokes ask for at a place, or null before they have come. */
+  amplitudeAt(x: number, y: number): number | null;
+  roughnessAt(x: number, y: number): number | null;
+  /** Finest level that is solved everywhere, finest to which tiles are refined. */
+  levels(): { solved: number; finest: number } | null;
+  /** Tiles that the server is still refining for somebody. */
+  refining(): number;
+  /** What the server last said about its solver, if nobody has read it away. */
+  notice(): string | null;
   /** Document clock as confirmed here. */
   clock(): number | null;
   /** The solver has finished for the present clock and nothing of mine is on its way. */
@@ -32,8 +41,8 @@ export interface PageView {
   camera(): Pick<CameraState, "mode" | "eye" | "target" | "fovDeg" | "orthoHeight" | "width" | "height"> | null;
   /** CSS pixels of the window for a point of the world. */
   project(x: number, y: number, z: number): { x: number; y: number; visible: boolean } | null;
-  /** Tiles held, and how many of them are exact. */
-  tiles(): { held: number; exact: number };
+  /** Tiles held, how many of them are exact, and how many there are of each level. */
+  tiles(): { held: number; exact: number; levels: number[] };
   stats(): FrameStats | null;
   /** Frames drawn so far. */
   readonly frames: number;
@@ -53,6 +62,14 @@ export function installTestHook(session: TerrainSession): () => void {
     ready: () => session.connection.state.peek() === "online" && (stage()?.tiles.size ?? 0) > 0 && view.frames > 0,
     heightAt: (x, y) => ((stage()?.tiles.size ?? 0) > 0 ? (stage()?.tiles.ground.heightAt(x, y) ?? null) : null),
     levelAt: (x, y) => finestLevel(session, x, y),
+    amplitudeAt: (x, y) => stage()?.channels.amplitudeAt(x, y) ?? null,
+    roughnessAt: (x, y) => stage()?.channels.roughnessAt(x, y) ?? null,
+    levels: () => {
+      const tiles = stage()?.tiles;
+      return tiles ? { solved: tiles.solved, finest: tiles.levels } : null;
+    },
+    refining: () => session.progress.peek()?.refining ?? 0,
+    notice: () => session.notice.peek(),
     clock: () => session.doc.clock,
     settled: () => {
       const progress = session.progress.peek();
@@ -78,7 +95,7 @@ export function installTestHook(session: TerrainSession): () => void {
       return { mode, eye, target, fovDeg, orthoHeight, width, height };
     },
     project: (x, y, z) => stage()?.toWindow([x, y, z]) ?? null,
-    tiles: () => ({ held: stage()?.tiles.size ?? 0, exact: count(session) }),
+    tiles: () => ({ held: stage()?.tiles.size ?? 0, exact: count(session), levels: byLevel(session) }),
     stats: () => stage()?.stats.peek() ?? null,
     get frames() {
       return stage()?.loop.frames ?? 0;
@@ -94,6 +111,15 @@ function count(session: TerrainSession): number {
   let exact = 0;
   for (const tile of session.stage.peek()?.tiles.tiles() ?? []) if (tile.exact) exact++;
   return exact;
+}
+
+function byLevel(session: TerrainSession): number[] {
+  const counts: number[] = [];
+  for (const { level } of session.stage.peek()?.tiles.tiles() ?? []) {
+    while (counts.length <= level) counts.push(0);
+    counts[level]! += 1;
+  }
+  return counts;
 }
 
 function allExact(session: TerrainSession): boolean {

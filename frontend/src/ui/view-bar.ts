@@ -15,6 +15,7 @@ export const OVERLAYS: readonly { readonly value: Scene["overlay"]; readonly lab
   { value: "none", label: "Plain ground" },
   { value: "contours", label: "Contour lines" },
   { value: "slope", label: "Steepness" },
+  { value: "detail", label: "Roughness and amplitude" },
   { value: "patches", label: "Levels of detail" },
 ];
 

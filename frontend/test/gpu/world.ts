@@ -1,6 +1,7 @@
 /** Analytic terrains as tile stores, and cameras, for tests and the renderer's harness. */
 
 import { mat4 } from "wgpu-matrix";
+import { tileKey } from "../../src/core/tilekey.ts";
 import type { CameraState, ChannelView, Tile, TileView, Vec3 } from "../../src/core/types.ts";
 import { SUBPATCHES, TILE_CELLS, TILE_SAMPLES } from "../../src/generated/contract.ts";
 
@@ -293,3 +294,80 @@ export const PLAIN_CHANNELS: ChannelView = {
   amplitude: { side: 2, values: new Float32Array(4) },
   roughness: { side: 2, values: new Float32Array(4).fill(0.5) },
 };
+
+/** Levels up to `solved` everywhere, finer ones only where asked for: what the page holds near the ground. */
+export class SparseView implements TileView {
+  stamp = 1;
+  private readonly held = new Map<number, Tile>();
+
+  constructor(
+    readonly sizeM: number,
+    readonly levels: number,
+    readonly solved: number,
+    private readonly field: HeightField,
+  ) {
+    for (let level = 0; level <= solved; level += 1)
+      for (let y = 0; y < 1 << level; y += 1) for (let x = 0; x < 1 << level; x += 1) this.hold(level, x, y);
+  }
+
+  tile(level: number, x: number, y: number): Tile | undefined {
+    return this.held.get(tileKey(level, x, y));
+  }
+
+  tiles(): Iterable<Tile> {
+    return this.held.values();
+  }
+
+  heightAt(x: number, y: number): number {
+    return this.field(x, y, this.levels);
+  }
+
+  /** Holds the tiles within `reach(level)` tiles of a place, as far as their parents are held. */
+  refineAround(x: number, y: number, reach: (level: number) => number): void {
+    this.stamp += 1;
+    for (let level = this.solved + 1; level <= this.levels; level += 1) {
+      const side = 1 << level;
+      const around = reach(level);
+      const tx = Math.min(side - 1, Math.floor((x / this.sizeM) * side));
+      const ty = Math.min(side - 1, Math.floor((y / this.sizeM) * side));
+      for (let j = Math.max(0, ty - around); j <= Math.min(side - 1, ty + around); j += 1)
+        for (let i = Math.max(0, tx - around); i <= Math.min(side - 1, tx + around); i += 1)
+          if (this.tile(level - 1, i >> 1, j >> 1) !== undefined) this.hold(level, i, j);
+    }
+  }
+
+  /** Drops all tiles above the solved levels. */
+  forgetRefined(): void {
+    this.stamp += 1;
+    for (const [key, tile] of this.held) if (tile.level > this.solved) this.held.delete(key);
+  }
+
+  private hold(level: number, x: number, y: number): void {
+    const cell = this.sizeM / (TILE_CELLS << level);
+    const heights = new Float32Array(TILE_SAMPLES * TILE_SAMPLES);
+    for (let r = 0; r < TILE_SAMPLES; r += 1)
+      for (let c = 0; c < TILE_SAMPLES; c += 1)
+        heights[r * TILE_SAMPLES + c] = this.field((x * TILE_CELLS + c) * cell, (y * TILE_CELLS + r) * cell, level);
+    const parent = level > 0 ? this.tile(level - 1, x >> 1, y >> 1) : undefined;
+    const tile = { level, x, y, version: 1, exact: true, stamp: this.stamp, heights };
+    this.held.set(tileKey(level, x, y), { ...tile, ...subFigures(heights, x, y, parent) });
+  }
+}
+
+/** Ground with features of every size down to a few metres; levels differ a little, as filtered ones do. */
+export function craggyField(seed: number, sizeM: number): HeightField {
+  const waves = Array.from({ length: 8 }, (_, k) => ({
+    f: (4 * Math.PI * 3.7 ** k) / sizeM,
+    a: 0.02 * sizeM * 0.3 ** k,
+    turn: seed + 1.7 * k,
+  }));
+  return (x, y, level) => {
+    let sum = 0;
+    for (const { f, a, turn } of waves) {
+      const u = Math.cos(turn) * x + Math.sin(turn) * y;
+      const v = Math.cos(turn) * y - Math.sin(turn) * x;
+      sum += a * Math.sin(f * u + turn) * Math.cos(0.83 * f * v);
+    }
+    return sum * (1 + 0.002 * Math.sin(level * 7));
+  };
+}

@@ -18,7 +18,10 @@ const flat: Ground = { sizeM: 4096, heightAt: () => 0, raycast: () => null };
 
 function everyAction() {
   const commands = { panel: vi.fn(), help: vi.fn(), share: vi.fn() };
-  const stage = { showStrokes: signal(true), overlay: signal<"none" | "contours" | "slope" | "patches">("none") };
+  const stage = {
+    showStrokes: signal(true),
+    overlay: signal<"none" | "contours" | "slope" | "detail" | "patches">("none"),
+  };
   const actions: Map<string, Action> = createActions({
     camera: new Camera(4096),
     doc: new SyncDoc("me", () => 0),
@@ -58,11 +61,11 @@ describe("actions", () => {
     expect([commands.help, commands.panel, commands.share].map((f) => f.mock.calls.length)).toEqual([1, 1, 1]);
     actions.get("toggle-strokes")!.run();
     expect(stage.showStrokes.value).toBe(false);
-    const overlays = Array.from({ length: 4 }, () => {
+    const overlays = Array.from({ length: 5 }, () => {
       actions.get("next-overlay")!.run();
       return stage.overlay.value;
     });
-    expect(overlays).toEqual(["contours", "slope", "patches", "none"]);
+    expect(overlays).toEqual(["contours", "slope", "detail", "patches", "none"]);
   });
 
   // To write the table anew: ESKER_WRITE_GUIDE=1 npx vitest run test/ui/actions

@@ -101,6 +101,18 @@ export const terrainPageStyles = css`
   .closed .icon {
     color: var(--esk-bad);
   }
+  .notice .icon {
+    color: var(--esk-accent-text);
+  }
+  .notes {
+    display: grid;
+    justify-items: start;
+    gap: var(--esk-gap);
+    pointer-events: none;
+  }
+  .notes > * {
+    pointer-events: auto;
+  }
   esk-toasts {
     position: absolute;
     left: 50%;

@@ -1,0 +1,100 @@
+import { css, html, nothing, type TemplateResult } from "lit";
+import { SignalElement } from "./signal-element.ts";
+import type { Stage } from "./stage.ts";
+import { shared } from "./styles/shared.ts";
+import { metres } from "./words.ts";
+
+/** The words under the ends of a scale. */
+export function amplitudeEnds(greatestM: number): [string, string] {
+  return ["0", greatestM > 0 ? metres(greatestM) : "none yet"];
+}
+
+/** What the colours of an overlay mean. Nothing while the overlay needs no words. */
+export class EskLegend extends SignalElement {
+  static override properties = { stage: { attribute: false } };
+  static override styles = [
+    shared,
+    css`
+      :host {
+        display: grid;
+        gap: 8px;
+        width: 196px;
+        padding: 10px 12px;
+        font-size: 0.75rem;
+        color: var(--esk-quiet);
+      }
+      :host([hidden]) {
+        display: none;
+      }
+      .scale {
+        display: grid;
+        gap: 3px;
+      }
+      .name {
+        color: var(--esk-text);
+        font-weight: 550;
+      }
+      .bar {
+        height: 8px;
+        border-radius: 4px;
+      }
+      .ends {
+        display: flex;
+        justify-content: space-between;
+        font-variant-numeric: tabular-nums;
+      }
+      /* The colours of slope_tint and detail_tint in overlay.wgsl, as they look on lit ground. */
+      .slope {
+        background: linear-gradient(
+          to right,
+          #6fa57c 0%,
+          #6fa57c 8%,
+          #e0d66f 38%,
+          #dc7a4e 64%,
+          #93405f 100%
+        );
+      }
+      .roughness {
+        background: linear-gradient(to right, #3d7da3, #a9a06c 50%, #b34a58);
+      }
+      .amplitude {
+        background: linear-gradient(to right, #8d8d8d, #a9a06c);
+      }
+    `,
+  ];
+
+  declare stage: Stage;
+
+  protected override render(): TemplateResult | typeof nothing {
+    const overlay = this.stage.overlay.value;
+    this.toggleAttribute("hidden", overlay !== "slope" && overlay !== "detail");
+    if (overlay === "slope") return scale("Steepness", "slope", ["0°", "30°", "60°"]);
+    if (overlay !== "detail") return nothing;
+    this.stage.channels.revision.value;
+    const greatest = this.stage.channels.amplitude.values.reduce((a, b) => Math.max(a, b), 0);
+    return html`
+      ${scale("Roughness", "roughness", ["smooth", "rough"])} ${scale("Amplitude", "amplitude", amplitudeEnds(greatest))}
+      ${this.#here()}
+    `;
+  }
+
+  /** The two values under the cursor. */
+  #here(): TemplateResult | typeof nothing {
+    const at = this.stage.cursor.value;
+    if (!at) return nothing;
+    const { channels } = this.stage;
+    const amplitude = metres(Math.max(0, channels.amplitudeAt(at[0], at[1])));
+    const roughness = Math.round(100 * channels.roughnessAt(at[0], at[1]));
+    return html`<div class="ends"><span>Here</span><span>${amplitude}, ${roughness} % rough</span></div>`;
+  }
+}
+
+function scale(name: string, kind: string, ends: readonly string[]): TemplateResult {
+  return html`<div class="scale" role="img" aria-label=${`${name}: ${ends.join(" to ")}`}>
+    <span class="name">${name}</span>
+    <span class="bar ${kind}"></span>
+    <span class="ends">${ends.map((end) => html`<span>${end}</span>`)}</span>
+  </div>`;
+}
+
+customElements.define("esk-legend", EskLegend);
