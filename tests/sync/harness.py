@@ -30,6 +30,7 @@ class Level:
     level: int
     heights: NDArray[np.float32]
     settled: bool
+    channel: c.Channel = c.Channel.HEIGHT
 
 
 class PlainSolver:

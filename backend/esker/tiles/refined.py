@@ -7,6 +7,7 @@ solve. Made anew with the same samples, a tile keeps its version, so a change el
 from __future__ import annotations
 
 from collections import OrderedDict
+from collections.abc import Set
 from dataclasses import dataclass
 from typing import Final
 
@@ -165,18 +166,18 @@ class RefinedTiles:
             self._known[level] = found
         return found
 
-    def make_room(self, keep: set[TileKey]) -> int:
-        """Forgets the tiles made longest ago, other than ``keep``, above the limit; returns how many more may come."""
-        for key in list(self._tiles):
-            if len(self._tiles) + self._needed(keep) <= self.room_tiles:
-                break
-            if key not in keep:
+    def make_room(self, wanted: Set[TileKey], held: Set[TileKey]) -> int:
+        """Forgets tiles, those made longest ago first, so that all of ``wanted`` fit; returns how many more may come.
+
+        Tiles that somebody holds are forgotten last: they are sent again when they are looked at again.
+        """
+        over = len(self._tiles) + sum(key not in self._tiles for key in wanted) - self.room_tiles
+        for spared in (wanted | held, wanted):
+            for key in [key for key in self._tiles if key not in spared][: max(0, over)]:
                 del self._tiles[key]
                 self._known.pop(key.level, None)
+                over -= 1
         return max(0, self.room_tiles - len(self._tiles))
-
-    def _needed(self, keep: set[TileKey]) -> int:
-        return sum(key not in self._tiles for key in keep)
 
     def _changed(self, level: int | None = None) -> None:
         self.stamp += 1

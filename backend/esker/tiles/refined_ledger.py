@@ -1,9 +1,9 @@
 """What one client holds of the tiles above the levels that are solved as a whole, and what to send of them next.
 
 To the client these levels are like any other: while an ancestor has moved, a tile rides along with it, and a LEVEL
-frame of its own level puts it right. Such a frame waits until the ground has settled and every tile that rides along
-in view has been made anew; what rides along out of view is dropped. No frame ever leaves two neighbours that differ on
-the edge that they share: a tile whose neighbour is still of an older solve waits for it.
+frame of its own level puts it right. Such a frame waits until the ground has settled and every tile in view whose
+parent has come to rest elsewhere has been made anew; such tiles out of view are dropped. No frame ever leaves two
+neighbours that differ on the edge that they share: a tile whose neighbour is still of an older solve waits for it.
 """
 
 from __future__ import annotations
@@ -48,8 +48,8 @@ class RefinedLedger:
             level: {} for level in range(refined.levels + 1, refined.finest + 1)
         }
         """Per level, oldest first."""
-        self._moved: set[TileKey] = set()
-        """Held tiles of which an ancestor was sent since they were sent or confirmed."""
+        self._moved: set[int] = set()
+        """Levels that may show a preview: an ancestor was sent since their last LEVEL frame."""
 
     def held(self) -> dict[TileKey, int]:
         """Versions that the client holds."""
@@ -85,21 +85,21 @@ class RefinedLedger:
     def _plan_level(self, level: int, selection: Selection) -> FramePlan | None:
         """Raises _Blocked when a tile that is to be replaced, or fits one that is, has not been made yet."""
         held = self._held[level]
+        if not held:
+            self._moved.discard(level)
+            return None
         send: set[TileKey] = set()
         drop: set[TileKey] = set()
-        moved = False
         for key, tile in held.items():
             newest = self._refined.verified(key)
-            if key in self._moved:
-                moved = True
-                if newest is None:
+            if newest is None:
+                if self._held_parent(key).version != tile.base.version:
                     if key in selection.tiles:
                         raise _Blocked
                     drop.add(key)
-                    continue
-            if newest is not None and newest.state.version != tile.state.version:
+            elif newest.state.version != tile.state.version:
                 (send if key in selection.tiles else drop).add(key)
-        if not (moved or send or drop):
+        if not (level in self._moved or send or drop):
             return None
         drop |= self._misfits(level, send, drop, selection)
         return self._frame(FrameKind.LEVEL, level, sorted(send), sorted(drop))
@@ -169,9 +169,18 @@ class RefinedLedger:
         if up.level == self._refined.levels:
             return self._below.newest(up)
         held, newest = self._held[up.level].get(up), self._refined.verified(up)
-        if held is None or newest is None or held.state.version != newest.state.version or up in self._moved:
+        if held is None or newest is None or held.state.version != newest.state.version:
             return None
         return held.state
+
+    def _held_parent(self, key: TileKey) -> TileState:
+        """The parent of a held tile as the client holds it, once the levels below have been sent."""
+        up = key.parent()
+        if up.level > self._refined.levels:
+            return self._held[up.level][up].state
+        found = self._below.newest(up)
+        assert found is not None, "the levels below are sent first"
+        return found
 
     def _frame(self, kind: FrameKind, level: int, keys: Iterable[TileKey], drops: Iterable[TileKey]) -> FramePlan:
         tiles = []
@@ -191,7 +200,6 @@ class RefinedLedger:
         """A frame of heights was handed to the socket, of these levels or of one below (then committed there)."""
         for key in plan.drops:
             self._forget(key)
-        keys = set(plan.keys)
         if plan.level > self._refined.levels:
             held = self._held[plan.level]
             for tile in plan.tiles:
@@ -199,23 +207,17 @@ class RefinedLedger:
                 held[tile.key] = _Held(tile.now, _kept(tile.parent))
             if plan.kind == FrameKind.LEVEL:
                 self._confirm(plan.level)
-        if plan.kind == FrameKind.LEVEL and keys:
-            self._move_under(keys, plan.level)
+        if plan.kind == FrameKind.LEVEL and plan.tiles:
+            self._moved |= {level for level, tiles in self._held.items() if level > plan.level and tiles}
 
     def _confirm(self, level: int) -> None:
+        """All tiles of the level are exact: their decoder takes their parents as they are now."""
+        self._moved.discard(level)
         held = self._held[level]
-        for key in [key for key in self._moved if key.level == level]:
-            self._moved.discard(key)
-            parent = self._parent(key)
-            assert parent is not None
-            held[key] = _Held(held[key].state, _kept(parent))
-
-    def _move_under(self, keys: set[TileKey], level: int) -> None:
-        """Everything held below these tiles rides along from now on."""
-        for below, tiles in self._held.items():
-            shift = below - level
-            if shift > 0:
-                self._moved |= {k for k in tiles if TileKey(level, k.x >> shift, k.y >> shift) in keys}
+        for key, tile in held.items():
+            parent = self._held_parent(key)
+            if parent.version != tile.base.version:
+                held[key] = _Held(tile.state, _kept(parent))
 
     def _forget(self, gone: TileKey) -> None:
         """A tile was dropped, and with it all its descendants."""
@@ -225,7 +227,6 @@ class RefinedLedger:
                 continue
             for key in [k for k in tiles if (k.x >> shift, k.y >> shift) == (gone.x, gone.y)]:
                 del tiles[key]
-                self._moved.discard(key)
 
 
 def _edge(samples: Ints, dx: int, dy: int) -> Ints:

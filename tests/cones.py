@@ -1,0 +1,185 @@
+"""Cones, a client that checks all that it is sent, and a refiner of arithmetic: for the tests of refined tiles."""
+
+from __future__ import annotations
+
+import math
+import random
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from esker import grid
+from esker.contract import View
+from esker.grid import TileKey
+from esker.tiles.codec import Wide, child_window, predict
+from esker.tiles.decoder import FrameDecoder, HeldTile
+from esker.tiles.delivery import WISHES, ClientTiles, TileServer
+from esker.tiles.plans import FramePlan
+
+SIZE_M = 512.0
+LEVELS, FINEST = 2, 6
+Floats = NDArray[np.floating[Any]]
+
+
+@dataclass(frozen=True)
+class Bump:
+    x: float
+    y: float
+    radius: float
+    height: float
+
+    def at(self, x: Floats, y: Floats) -> Floats:
+        """A cone: its tip and its foot have errors that shrink by a half a level."""
+        return np.maximum(0, 1 - np.hypot(x - self.x, y - self.y) / self.radius) * self.height
+
+
+class Ground:
+    """Cones: the same function of the place at every level, so neighbouring tiles agree to the bit."""
+
+    def __init__(self, bumps: Iterable[Bump] = ()) -> None:
+        self.bumps = list(bumps)
+        self.scale = 1.0
+
+    def heights(self, x: Floats, y: Floats) -> NDArray[np.float32]:
+        out = np.zeros(np.broadcast_shapes(x.shape, y.shape))
+        for bump in self.bumps:
+            out += bump.at(x, y)
+        return (out * self.scale).astype(np.float32)
+
+    def level(self, level: int, settled: bool = True) -> NDArray[np.float32]:
+        at = np.arange(grid.samples(level)) * grid.spacing(level, SIZE_M)
+        found = self.heights(at[None, :], at[:, None])
+        return found if settled else found * np.float32(1 - 0.02 * (LEVELS + 1 - level))
+
+    def tile(self, key: TileKey) -> Made:
+        step = grid.spacing(key.level, SIZE_M)
+        x, y = ((np.arange(65) + 64 * place) * step for place in (key.x, key.y))
+        return Made(key, self.heights(x[None, :], y[:, None]))
+
+    def edit(self, rng: random.Random) -> None:
+        """Another cone, sometimes one less; or all a little higher, by less than a quantum of the coarse levels."""
+        if rng.random() < 0.3:
+            self.scale *= 1 + rng.uniform(-1e-4, 1e-4)
+            return
+        if len(self.bumps) > 4 and rng.random() < 0.4:
+            self.bumps.pop(rng.randrange(len(self.bumps)))
+        place = rng.uniform(0, SIZE_M), rng.uniform(0, SIZE_M)
+        self.bumps.append(Bump(*place, rng.choice([9.0, 40.0, 150.0]), rng.uniform(-30, 30)))
+
+
+@dataclass(frozen=True)
+class Made:
+    key: TileKey
+    heights: NDArray[np.float32]
+    content: bytes = b""
+
+
+def edge(samples: Wide, dx: int, dy: int) -> Wide:
+    """What a tile shares with its neighbour in this direction: a row, a column or a corner."""
+    rows = samples if dy == 0 else samples[64:] if dy > 0 else samples[:1]
+    return rows if dx == 0 else rows[:, 64:] if dx > 0 else rows[:, :1]
+
+
+def shown(held: dict[TileKey, HeldTile], key: TileKey, memo: dict[TileKey, Wide]) -> Wide:
+    """What the page shows of a tile: its samples, moved along with its parent since then (in whole quanta)."""
+    if key not in memo:
+        tile = held[key]
+        out: Wide = tile.samples.astype(np.int64)
+        if key.level:
+            assert tile.parent_then is not None
+            now = shown(held, key.parent(), memo)
+            then = tile.parent_then
+            if not np.array_equal(now, then):
+                out = out + child_window(predict(now.astype(np.int32)), key.x, key.y)
+                out = out - child_window(predict(then), key.x, key.y)
+        memo[key] = out
+    return memo[key]
+
+
+class Client:
+    """A client's half on the server, and the decoder that the page would run."""
+
+    def __init__(self, server: TileServer) -> None:
+        self.server = server
+        self.tiles = ClientTiles(server)
+        self.decoder = FrameDecoder()
+        self.log: list[FramePlan] = []
+
+    def step(self) -> bool:
+        plan = self.tiles.plan()
+        if plan is None:
+            return False
+        self.decoder.decode(plan.encode())
+        self.tiles.commit(plan)
+        self.log.append(plan)
+        self.check()
+        return True
+
+    def drain(self) -> None:
+        while self.step():
+            pass
+
+    def check(self) -> None:
+        held = self.decoder.held
+        assert self.tiles.held() == {k: t.version for k, t in held.items()}
+        assert all(k.level == 0 or k.parent() in held for k in held)
+        assert sum(k.level > LEVELS for k in held) <= self.server.refined.client_tiles
+        memo: dict[TileKey, Wide] = {}
+        for key, tile in held.items():
+            for dx, dy in ((1, 0), (0, 1), (1, 1), (1, -1)):
+                other = key._replace(x=key.x + dx, y=key.y + dy)
+                if other in held:
+                    assert np.array_equal(edge(tile.samples, dx, dy), edge(held[other].samples, -dx, -dy)), (key, other)
+                    mine, theirs = shown(held, key, memo), shown(held, other, memo)
+                    assert np.array_equal(edge(mine, dx, dy), edge(theirs, -dx, -dy)), (key, other)
+
+    def check_newest(self, ground: Ground) -> None:
+        """All that is wanted is held, as the ground is, and nothing moves along any more."""
+        held = self.decoder.held
+        wanted = self.tiles.wanted_refined()
+        assert wanted <= held.keys()
+        memo: dict[TileKey, Wide] = {}
+        for key, tile in held.items():
+            assert shown(held, key, memo) is not None
+            assert np.array_equal(memo[key], tile.samples), "a tile still rides along"
+            if key.level <= LEVELS or key in wanted:
+                want = np.rint(ground.tile(key).heights * np.float32(1 / grid.quantum(key.level, SIZE_M)))
+                assert np.array_equal(tile.samples, want.astype(np.int32)), key
+
+
+def near(x: float, y: float, z: float = 6.0, turn: float = 0.0, **fields: object) -> View:
+    target = (x + 40 * math.sin(turn), y + 40 * math.cos(turn), 0.0)
+    settings = {"width": 400, "height": 300, "tau_px": 2.0} | fields
+    return View.model_validate({"eye": (x, y, z), "target": target, **settings})
+
+
+def a_view(rng: random.Random, ground: Ground) -> View:
+    """Near one of the cones, looking anywhere."""
+    bump = rng.choice(ground.bumps)
+    x, y = (min(SIZE_M, max(0.0, at + rng.gauss(0, 30))) for at in (bump.x, bump.y))
+    return near(x, y, rng.choice([3.0, 15.0, 80.0]), rng.uniform(0, 6.28))
+
+
+def solve(server: TileServer, ground: Ground, clock: int, settled: bool, levels: Iterable[int] | None = None) -> None:
+    for level in range(LEVELS + 1) if levels is None else levels:
+        server.put_level(clock, level, ground.level(level, settled), settled)
+
+
+def settle(server: TileServer, ground: Ground, clock: int, clients: Iterable[Client]) -> int:
+    """Refines whatever is wanted, sends whatever is owed, until neither is left; returns how many tiles were made."""
+    made = 0
+    clients = list(clients)
+    for _ in range(200):
+        wishes, count = server.wishes([client.tiles for client in clients])
+        assert len(wishes) <= min(count, WISHES)
+        for key in wishes:
+            assert server.put_tile(clock, ground.tile(key))
+            made += 1
+        for client in clients:
+            client.drain()
+        if not wishes:
+            return made
+    raise AssertionError("it never comes to rest")

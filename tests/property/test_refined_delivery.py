@@ -1,0 +1,47 @@
+"""Refined tiles while solves, cameras and the refiner interrupt each other (SPEC T24 to T31)."""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+from tests.cones import FINEST, LEVELS, SIZE_M, Client, Ground, a_view, settle, solve
+
+from esker.contract import FrameKind
+from esker.tiles.delivery import TileServer
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_random_sessions_come_to_rest_on_the_refined_ground(seed: int) -> None:
+    rng = random.Random(seed)
+    server, ground = TileServer(SIZE_M, LEVELS, FINEST), Ground()
+    for _ in range(5):
+        ground.edit(rng)
+    clients = [Client(server) for _ in range(2)]
+    for client in clients:
+        client.tiles.set_view(a_view(rng, ground))
+    for clock in range(1, 9):
+        if clock > 1 and rng.random() < 0.8:
+            ground.edit(rng)
+        for settled in (False, True):
+            for level in range(LEVELS + 1 if rng.random() < 0.8 else 1):
+                server.put_level(clock, level, ground.level(level, settled), settled)
+                for client in clients:
+                    if rng.random() < 0.7:
+                        client.step()
+        for _ in range(rng.choice([0, 1, 3, 8])):
+            wishes = list(server.wishes([client.tiles for client in clients])[0])
+            rng.shuffle(wishes)
+            for key in wishes[: rng.choice([3, 20, 64])]:
+                server.put_tile(clock, ground.tile(key))
+            for client in clients:
+                for _ in range(rng.choice([0, 1, 5, 40])):
+                    client.step()
+                if rng.random() < 0.2:
+                    client.tiles.set_view(a_view(rng, ground))
+    solve(server, ground, 99, False)
+    solve(server, ground, 99, True)
+    settle(server, ground, 99, clients)
+    for client in clients:
+        client.check_newest(ground)
+        assert any(plan.level > LEVELS and plan.kind == FrameKind.FILL for plan in client.log)

@@ -1,0 +1,370 @@
+"""Store, selection and delivery of tiles above the global levels, and the other channels (SPEC T23 to T32, Q7, Q8)."""
+
+from __future__ import annotations
+
+import random
+
+import numpy as np
+import pytest
+from tests.cones import FINEST, LEVELS, SIZE_M, Bump, Client, Ground, Made, a_view, near, settle, solve
+
+from esker import grid
+from esker.contract import MAX_REFINED_LEVEL, MAX_REFINED_TILES, Channel, FrameKind, Predictor
+from esker.grid import TileKey
+from esker.tiles.delivery import ClientTiles, TileServer
+from esker.tiles.frame import read_frame
+from esker.tiles.pyramid import Pyramid
+
+TIP = Bump(200.0, 300.0, 40.0, 60.0)
+LOOK = near(200.0, 275.0, 40.0, tau_px=0.7)
+
+
+def at_rest(view: object = LOOK, finest: int = FINEST, **limits: int) -> tuple[TileServer, Ground, Client]:
+    """A client that has all that it wants of one cone."""
+    server, ground = TileServer(SIZE_M, LEVELS, finest, **limits), Ground([TIP])
+    client = Client(server)
+    client.tiles.set_view(view)  # type: ignore[arg-type]
+    solve(server, ground, 1, True)
+    settle(server, ground, 1, [client])
+    client.check_newest(ground)
+    client.log.clear()
+    return server, ground, client
+
+
+def levels_of(client: Client) -> list[int]:
+    return [sum(k.level == level for k in client.decoder.held) for level in range(FINEST + 1)]
+
+
+# --- what is wanted ---------------------------------------------------------------------------------------------------
+
+
+def test_crests_are_refined_to_the_finest_level_and_only_where_one_looks() -> None:
+    _, _, client = at_rest()
+    counts = levels_of(client)
+    assert all(counts[LEVELS + 1 :])
+    assert counts[FINEST] < 60, "the whole level has 4096"
+    finest = [k for k in client.decoder.held if k.level == FINEST]
+    width = SIZE_M / (1 << FINEST)
+    assert all(np.hypot((k.x + 0.5) * width - TIP.x, (k.y + 0.5) * width - TIP.y) < 60 for k in finest)
+
+
+def test_smooth_land_is_looked_into_once_and_not_sent() -> None:
+    """A dome: its error falls to a quarter a level, so half the parent's is no good guess."""
+    server = TileServer(SIZE_M, LEVELS, FINEST)
+
+    class Dome(Ground):
+        def heights(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+            return np.asarray(-((x - 256) ** 2 + (y - 256) ** 2) / 100, dtype=np.float32)
+
+    ground, client = Dome(), Client(server)
+    client.tiles.set_view(near(200.0, 280.0, 40.0))
+    solve(server, ground, 1, True)
+    made = settle(server, ground, 1, [client])
+    assert 0 < made < 40
+    assert levels_of(client)[FINEST] == 0
+    assert settle(server, ground, 1, [client]) == 0
+
+
+def test_flat_land_is_never_refined() -> None:
+    server, ground = TileServer(SIZE_M, LEVELS, FINEST), Ground()
+    client = Client(server)
+    client.tiles.set_view(near(200.0, 280.0, 1.8))
+    solve(server, ground, 1, True)
+    assert settle(server, ground, 1, [client]) == 0
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_selection_is_closed_under_parents_and_restricted(seed: int) -> None:
+    rng = random.Random(seed)
+    server, ground = TileServer(SIZE_M, LEVELS, FINEST), Ground()
+    for _ in range(6):
+        ground.edit(rng)
+    client = Client(server)
+    client.tiles.set_view(a_view(rng, ground))
+    solve(server, ground, 1, True)
+    settle(server, ground, 1, [client])
+    wanted, below = client.tiles.wanted_refined(), client.tiles.wanted()
+    assert wanted
+    for key in wanted:
+        up = key.parent()
+        for dy in (-1, 0, 1):
+            for dx in (-1, 0, 1):
+                x, y = up.x + dx, up.y + dy
+                if 0 <= x < 1 << up.level and 0 <= y < 1 << up.level:
+                    assert TileKey(up.level, x, y) in wanted if up.level > LEVELS else below[LEVELS][y, x]
+
+
+def test_wishes_go_coarse_to_fine_then_by_screen_error_and_never_beyond_one_unknown_level() -> None:
+    server, ground = TileServer(SIZE_M, LEVELS, FINEST), Ground([TIP, Bump(220.0, 330.0, 9.0, 4.0)])
+    client = ClientTiles(server)
+    client.set_view(LOOK)
+    solve(server, ground, 1, True)
+    seen: list[int] = []
+    while wishes := server.wishes([client])[0]:
+        assert [k.level for k in wishes] == sorted(k.level for k in wishes)
+        errors = dict(client.missing())
+        for level in {k.level for k in wishes}:
+            here = [errors[k] for k in wishes if k.level == level]
+            assert here == sorted(here, reverse=True)
+        for key in wishes:
+            assert key.level == LEVELS + 1 or server.refined.get(key.parent()) or key.parent() in wishes
+            server.put_tile(1, ground.tile(key))
+        seen += [k.level for k in wishes]
+    assert set(seen) == set(range(LEVELS + 1, FINEST + 1))
+
+
+def test_clients_wishes_are_merged() -> None:
+    server, ground = TileServer(SIZE_M, LEVELS, FINEST), Ground([TIP])
+    clients = [ClientTiles(server) for _ in range(3)]
+    for client, view in zip(clients, (LOOK, LOOK, near(100.0, 300.0, 5.0, turn=1.57)), strict=True):
+        client.set_view(view)
+    solve(server, ground, 1, True)
+    wishes, count = server.wishes(clients)
+    assert len(wishes) == len(set(wishes)) == count
+    assert set(wishes) == {key for client in clients for key, _ in client.missing()}
+
+
+def test_nothing_is_wanted_while_the_ground_moves() -> None:
+    server, ground, client = at_rest()
+    client.tiles.set_view(near(220.0, 320.0, 5.0))
+    assert server.wishes([client.tiles])[0]
+    solve(server, ground, 2, False, range(1))
+    assert server.wishes([client.tiles]) == ((), 0)
+    assert not server.put_tile(1, ground.tile(TileKey(LEVELS + 1, 3, 4)))
+
+
+def test_a_new_crest_on_land_that_was_found_smooth_is_found() -> None:
+    """What was learnt of a tile counts only while its ground stays."""
+    server, ground = TileServer(SIZE_M, LEVELS, FINEST), Ground([Bump(200.0, 300.0, 400.0, 3.0)])
+    client = Client(server)
+    client.tiles.set_view(LOOK)
+    solve(server, ground, 1, True)
+    settle(server, ground, 1, [client])
+    ground.bumps.append(TIP)
+    solve(server, ground, 2, True)
+    settle(server, ground, 2, [client])
+    assert levels_of(client)[FINEST] > 0
+    client.check_newest(ground)
+
+
+# --- what is sent -----------------------------------------------------------------------------------------------------
+
+
+def test_refined_tiles_ride_along_with_an_edit_and_are_put_right_at_rest() -> None:
+    """Nothing is dropped while somebody draws in view (docs/decisions/0015-refined-tiles.md)."""
+    server, ground, client = at_rest()
+    before = {k for k in client.decoder.held if k.level > LEVELS}
+    ground.bumps[0] = Bump(TIP.x, TIP.y, TIP.radius, TIP.height + 3)
+    solve(server, ground, 2, False)
+    client.drain()
+    assert before <= client.decoder.held.keys()
+    assert {plan.level for plan in client.log} == {0, 1, 2}
+    client.log.clear()
+    solve(server, ground, 2, True)
+    client.drain()
+    assert not any(plan.level > LEVELS for plan in client.log), "not before it has been made anew"
+    client.log.clear()
+    settle(server, ground, 2, [client])
+    client.check_newest(ground)
+    frames = [plan for plan in client.log if plan.kind == FrameKind.LEVEL]
+    assert [plan.level for plan in frames] == list(range(LEVELS + 1, FINEST + 1))
+    used = {tile.predictor for plan in frames for tile in read_frame(plan.encode())[2]}
+    assert used & {Predictor.PREVIOUS, Predictor.HELD}
+
+
+def test_a_change_is_small_to_send() -> None:
+    server, ground, client = at_rest()
+    fresh = Client(server)
+    fresh.tiles.set_view(LOOK)
+    fresh.drain()
+    whole = sum(len(plan.encode()) for plan in fresh.log if plan.level > LEVELS)
+    ground.bumps.append(Bump(TIP.x - 14, TIP.y - 14, 6.0, 0.5))
+    solve(server, ground, 2, True)
+    settle(server, ground, 2, [client])
+    client.check_newest(ground)
+    changed = sum(len(plan.encode()) for plan in client.log if plan.level > LEVELS)
+    assert 0 < changed < whole / 3
+
+
+def test_made_anew_with_the_same_samples_nothing_is_sent() -> None:
+    server, ground, client = at_rest()
+    solve(server, ground, 2, True)
+    assert settle(server, ground, 2, [client]) > 0
+    assert [(plan.level, plan.keys, plan.drops) for plan in client.log if plan.level > LEVELS] == []
+
+
+def test_tiles_out_of_view_that_moved_are_dropped() -> None:
+    server, ground, client = at_rest()
+    client.tiles.set_view(near(200.0, 275.0, 40.0, turn=3.14, tau_px=0.7))
+    ground.bumps[0] = Bump(TIP.x, TIP.y, TIP.radius, TIP.height + 3)
+    solve(server, ground, 2, True)
+    settle(server, ground, 2, [client])
+    client.check_newest(ground)
+    assert any(plan.drops for plan in client.log)
+    for key, tile in client.decoder.held.items():
+        want = np.rint(ground.tile(key).heights * np.float32(1 / grid.quantum(key.level, SIZE_M)))
+        assert np.array_equal(tile.samples, want), "nothing old is left"
+
+
+def test_tiles_out_of_view_that_did_not_move_stay() -> None:
+    server, ground, client = at_rest()
+    before = {k for k in client.decoder.held if k.level > LEVELS}
+    client.tiles.set_view(near(200.0, 275.0, 40.0, turn=3.14, tau_px=0.7))
+    ground.bumps.append(Bump(480.0, 40.0, 9.0, 5.0))
+    solve(server, ground, 2, True)
+    settle(server, ground, 2, [client])
+    assert before <= client.decoder.held.keys()
+
+
+def test_a_tile_waits_for_a_neighbour_that_it_would_not_fit() -> None:
+    """The ground moved by less than a quantum of the whole levels: nothing rides along, yet fine samples differ."""
+    server, ground, client = at_rest()
+    level = LEVELS + 2
+    held = {k for k in client.decoder.held if k.level == level}
+    ground.scale = 1 + 5e-5
+    solve(server, ground, 2, True)
+    client.drain()
+    wishes = [k for k in server.wishes([client.tiles])[0] if k.level <= level]
+    late = max((k for k in wishes if k in held), key=lambda k: abs(client.decoder.held[k].samples).max())
+    for key in wishes:
+        if key != late:
+            assert server.put_tile(2, ground.tile(key))
+    client.drain()
+    assert level not in {plan.level for plan in client.log if plan.kind == FrameKind.LEVEL}
+    assert server.put_tile(2, ground.tile(late))
+    client.drain()
+    assert level in {plan.level for plan in client.log if plan.kind == FrameKind.LEVEL}
+    assert late in client.decoder.held
+
+
+def test_a_client_holds_no_more_than_its_share_and_keeps_what_it_looks_at() -> None:
+    server, ground, client = at_rest(room_tiles=60)
+    assert server.refined.client_tiles == 60
+    rng = random.Random(4)
+    for clock in range(6):
+        client.tiles.set_view(near(200.0 + 5 * clock, 280.0, rng.choice([3.0, 18.0]), rng.uniform(-1, 1), tau_px=1.0))
+        settle(server, ground, 1, [client])
+        client.check_newest(ground)
+        assert len(client.tiles.wanted_refined()) <= 60
+        assert len(server.refined) <= 60
+    assert any(plan.drops and plan.kind == FrameKind.FILL for plan in client.log)
+
+
+def test_the_room_is_bounded_whatever_everybody_wants() -> None:
+    server, ground = TileServer(SIZE_M, LEVELS, FINEST, room_tiles=50), Ground([TIP, Bump(400.0, 100.0, 60.0, 30.0)])
+    clients = [Client(server) for _ in range(2)]
+    clients[0].tiles.set_view(LOOK)
+    clients[1].tiles.set_view(near(400.0, 80.0, 10.0, tau_px=1.0))
+    solve(server, ground, 1, True)
+    settle(server, ground, 1, clients)
+    assert len(server.refined) <= 50
+    assert server.wishes([c.tiles for c in clients]) == ((), 0), "what there is no room for is not asked for"
+
+
+def test_a_client_may_hold_what_the_contract_says() -> None:
+    assert TileServer(SIZE_M, 4, 8).refined.client_tiles == MAX_REFINED_TILES
+
+
+# --- what is refused --------------------------------------------------------------------------------------------------
+
+
+def test_levels_that_cannot_be_refined_are_refused() -> None:
+    for levels, finest in ((4, MAX_REFINED_LEVEL + 1), (4, 3)):
+        with pytest.raises(ValueError, match="refined to level"):
+            TileServer(SIZE_M, levels, finest)
+    server, ground, _ = at_rest()
+    for key in (TileKey(LEVELS, 0, 0), TileKey(FINEST + 1, 0, 0), TileKey(FINEST, 64, 0), TileKey(FINEST, 0, -1)):
+        with pytest.raises(ValueError, match="not refined here"):
+            server.put_tile(1, ground.tile(key))
+
+
+def test_heights_that_are_not_a_tile_are_refused_and_change_nothing() -> None:
+    server, ground, _ = at_rest()
+    key = next(k for k in server.wishes([])[0] or [TileKey(LEVELS + 1, 3, 4)])
+    before, stamp = server.refined.get(key), server.refined.stamp
+    bad = ground.tile(key).heights.copy()
+    bad[3, 3] = np.nan
+    for heights in (bad, np.zeros((64, 65), dtype=np.float32)):
+        with pytest.raises(ValueError, match="65x65"):
+            server.put_tile(1, Made(key, heights))
+    assert (server.refined.get(key), server.refined.stamp) == (before, stamp)
+
+
+def test_a_tile_of_an_older_solve_or_without_its_parent_is_not_taken() -> None:
+    server, ground, _ = at_rest()
+    solve(server, ground, 5, True)
+    assert not server.put_tile(4, ground.tile(TileKey(LEVELS + 1, 3, 4)))
+    assert not server.put_tile(5, ground.tile(TileKey(LEVELS + 2, 6, 9))), "its parent is not of this solve yet"
+    assert server.put_tile(5, ground.tile(TileKey(LEVELS + 1, 3, 4)))
+    assert server.put_tile(5, ground.tile(TileKey(LEVELS + 2, 6, 9)))
+
+
+# --- levels that are not solved for a while ---------------------------------------------------------------------------
+
+
+def test_levels_above_a_limit_are_forgotten_and_come_back() -> None:
+    server, ground, client = at_rest()
+    server.limit(1)
+    for level in range(2):
+        server.put_level(2, level, ground.level(level), True)
+    client.drain()
+    assert {k.level for k in client.decoder.held} == {0, 1}
+    assert server.settled()
+    assert server.wishes([client.tiles]) == ((), 0)
+    server.limit(LEVELS)
+    assert not server.settled()
+    solve(server, ground, 3, True)
+    settle(server, ground, 3, [client])
+    client.check_newest(ground)
+    assert levels_of(client)[FINEST] > 0
+
+
+# --- the other channels -----------------------------------------------------------------------------------------------
+
+
+def test_channels_go_whole_coarse_to_fine_after_the_heights() -> None:
+    server = TileServer(SIZE_M, 4)
+    client = Client(server)
+    for level in range(5):
+        n = grid.samples(level)
+        server.put_level(1, level, np.zeros((n, n), dtype=np.float32), True)
+    for channel, base in ((Channel.AMPLITUDE, 0.0), (Channel.ROUGHNESS, 0.5)):
+        for level in range(3):
+            n = grid.samples(level)
+            server.put_level(1, level, np.full((n, n), base, dtype=np.float32), True, channel)
+    client.drain()
+    order = [(plan.channel, plan.level) for plan in client.log]
+    assert order[3:9] == [(ch, level) for ch in (Channel.AMPLITUDE, Channel.ROUGHNESS) for level in range(3)]
+    untouched = sum(len(plan.encode()) for plan in client.log if plan.channel != Channel.HEIGHT)
+    assert untouched < 1000, "untouched ground costs next to nothing"
+    assert all(len(held) == 21 for ch, held in client.decoder.channels.items() if ch != Channel.HEIGHT)
+    assert client.tiles.held(Channel.AMPLITUDE).keys() == client.decoder.channels[Channel.AMPLITUDE].keys()
+
+
+@pytest.mark.parametrize(("channel", "scale", "base"), [(Channel.AMPLITUDE, 64, 0.0), (Channel.ROUGHNESS, 1024, 0.5)])
+def test_channels_have_the_same_quantum_on_every_level(channel: Channel, scale: int, base: float) -> None:
+    from esker.tiles.channels import values
+
+    server = TileServer(SIZE_M, 4)
+    rng = np.random.default_rng(3)
+    for level in range(3):
+        n = grid.samples(level)
+        wanted = rng.uniform(0, 1, (n, n)).astype(np.float32)
+        server.put_level(1, level, wanted, True, channel)
+        found = server.channels[channel].level(level)
+        assert found is not None
+        assert np.array_equal(found.samples, np.rint((wanted - np.float32(base)) * scale).astype(np.int32))
+        assert np.abs(values(found.samples, channel) - wanted).max() <= 0.5 / scale + 1e-6
+    with pytest.raises(ValueError, match="level 3"):
+        server.put_level(1, 3, np.zeros((513, 513), dtype=np.float32), True, channel)
+
+
+def test_a_pyramid_knows_where_its_ground_last_changed() -> None:
+    pyramid = Pyramid(SIZE_M, 2)
+    for level in range(3):
+        pyramid.put(1, level, np.zeros((grid.samples(level),) * 2, dtype=np.float32), True)
+    first = pyramid.changes().copy()
+    h = np.zeros((grid.samples(2),) * 2, dtype=np.float32)
+    h[10, 10] = 5
+    pyramid.put(2, 2, h, True)
+    assert (pyramid.changes() > first).tolist() == [[y == x == 0 for x in range(4)] for y in range(4)]
