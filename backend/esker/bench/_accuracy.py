@@ -10,12 +10,16 @@ import gc
 from typing import Any
 
 import numpy as np
+import scipy.sparse.linalg as spla
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from esker import grid
 from esker.bench import _exact, gallery
 from esker.contract import Channel, Document
-from esker.solve import multigrid
+from esker.solve import multigrid, reference_raster
+from esker.solve.assembly import assemble
+from esker.solve.constraints import pack
 from esker.solve.device import open_device
 from esker.solve.levels import ClWorkspace
 from esker.solve.solver import Solver
@@ -29,6 +33,11 @@ MAP_SCENES = ("fifty", "figure-six")
 MAP_LEVEL = 4
 MAP_SAMPLES = 256
 """Side of the committed error maps: the largest error of each block, so that no spot is averaged away."""
+
+
+TIES_LEVEL = 2
+"""Ties are counted up to this level: the twins are NumPy."""
+TIE_OF_RELIEF, TIE_OF_STIFFNESS, TIE_SAMPLES = 1e-5, 1e-3, 3
 
 
 def significant(value: float, digits: int = 3) -> float:
@@ -66,9 +75,14 @@ def two_steps(w: ClWorkspace, gradient_cycles: int, height_cycles: int) -> None:
 
 
 def measure(
-    w: ClWorkspace, document: Document, shown: tuple[Field, Field, int], maps: dict[str, Field] | None = None
+    w: ClWorkspace,
+    document: Document,
+    shown: tuple[Field, Field, int],
+    maps: dict[str, Field] | None = None,
+    previews: bool = True,
 ) -> dict[str, Any]:
-    """One scene at the level of ``w``. ``shown``: see ``product``. Error maps are added to ``maps``."""
+    """One scene at the level of ``w``. ``shown``: see ``product``. Error maps are added to ``maps``; ``previews`` adds
+    the errors of PREVIEWS."""
     settings = document.settings
     c = _exact.load(w, document.strokes, settings)
     exact = _exact.exact(w, c)
@@ -92,15 +106,44 @@ def measure(
     if maps is not None:
         maps |= {"heights": pooled(exact.heights, np.mean), "preview": pooled(np.abs(preview - exact.heights), np.max)}
         maps["settled"] = pooled(np.abs(settled - exact.heights), np.max)
-    variants = {}
-    for g, h in PREVIEWS:
+    _exact.load(w, document.strokes, settings)
+    two_steps(w, *PREVIEWS[0])
+    out["preview_by_cycles"] = {}
+    for g, h in PREVIEWS if previews else ():
         _exact.load(w, document.strokes, settings)
         two_steps(w, g, h)
-        variants[f"{g}+{h}"] = significant(off(w.read(w.top)) / exact.relief)
-    out["preview_by_cycles"] = variants
+        out["preview_by_cycles"][f"{g}+{h}"] = significant(off(w.read(w.top)) / exact.relief)
     w.height.put("f", w.top, exact.f[None])
     curve = [e / exact.relief for e in _exact.errors_per_cycle(w.height, exact.heights, CURVE_CYCLES)]
     return out | {"curve_of_relief": [significant(e) for e in curve], "floor_of_relief": significant(curve[-1])}
+
+
+def ties(document: Document, c: _exact.Constraints, exact: _exact.Exact) -> dict[str, Any]:
+    """Samples whose constraint float32 makes another than float64, and how far that moves the ground.
+
+    Where two strokes, or two segments of one, are equally near, rounding decides which counts: a tie. The float64
+    ground is a sparse direct solve of ``assemble``; ``elsewhere`` is farther than TIE_SAMPLES from every tie.
+    """
+    level, strokes, settings = c.level, document.strokes, document.settings
+    twin = reference_raster.rasterise(pack(strokes, settings, level))
+    a, b = assemble(strokes, settings, level)
+    heights = spla.spsolve(a.tocsc(), b).reshape(exact.heights.shape)
+    d, f = c.height_d.astype(np.float64), c.height_f.astype(np.float64)
+    tied = np.abs(_target(d, f) - _target(twin.height_d, twin.height_f)) > TIE_OF_RELIEF * exact.relief
+    tied |= np.abs(d - twin.height_d) > TIE_OF_STIFFNESS * (1 + np.abs(twin.height_d))
+    tied |= np.abs(c.gradient_d - twin.gradient_d) > TIE_OF_STIFFNESS
+    error = np.abs(heights - exact.heights) / exact.relief
+    near = ndimage.binary_dilation(tied, iterations=TIE_SAMPLES) if tied.any() else tied
+    return {
+        "samples": int(tied.sum()),
+        "error_of_relief": significant(float(error.max())),
+        "error_elsewhere_of_relief": significant(float(error[~near].max())),
+    }
+
+
+def _target(d: NDArray[np.float64], f: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The height that a constraint asks for, 0 where there is none."""
+    return np.where(d < 0, f, np.where(d > TIE_OF_STIFFNESS, f / np.maximum(d, TIE_OF_STIFFNESS), 0))
 
 
 def pooled(field: NDArray[Any], take: Any) -> Field:
@@ -124,6 +167,10 @@ def run(names: tuple[str, ...], levels: range, say: Any) -> tuple[dict[str, Any]
             gc.collect()
             here: dict[str, Field] | None = {} if level == MAP_LEVEL and name in MAP_SCENES else None
             figures = measure(ClWorkspace(device, level), document, shown, here)
+            if level <= TIES_LEVEL:
+                w = ClWorkspace(device, level)
+                c = _exact.load(w, document.strokes, document.settings)
+                figures["ties"] = ties(document, c, _exact.exact(w, c))
             gc.collect()
             out[name][str(grid.samples(level))] = figures
             maps |= {f"{name}.{key}": value for key, value in (here or {}).items()}

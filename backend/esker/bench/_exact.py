@@ -151,7 +151,7 @@ def factor(system: ClSystem, d: Field32, seed: int = 1) -> float:
 
 @dataclass(frozen=True)
 class Exact:
-    """Float64 solutions in metres: heights (n, n), their relief (highest minus lowest), and f (n, n), the right-hand
+    """Float64 solutions in metres. heights: (n, n); relief: highest minus lowest, base included; f: (n, n), right-hand
     side of the height step with the exact gradient."""
 
     f: Field
@@ -165,7 +165,8 @@ def exact(w: ClWorkspace, c: Constraints) -> Exact:
     static, d = c.height_f[None].astype(np.float64), c.height_d[None].astype(np.float64)
     f = reference.divergence(static, d, gradient, c.spacing_m)
     heights = solve(w.height, f, c.height_d, c.screening, at_fixed(f, c.height_d))[0]
-    return Exact(f[0], heights, max(float(np.ptp(heights)), 1e-9))
+    # Ground that is one crest's height everywhere has that height as its relief.
+    return Exact(f[0], heights, max(float(np.ptp(heights)), float(np.abs(heights).max()), 1e-9))
 
 
 def errors_per_cycle(system: ClSystem, want: Field, count: int) -> Iterator[float]:
