@@ -3,15 +3,15 @@
 //
 // This file is compiled several times: VISIT names the kernel, CHANNELS says how many share d; a work-group of
 // TILE_WIDTH x TILE_STRIPS work-items does a tile of TILE_WIDTH x (TILE_STRIPS * TILE_ROWS) samples, of which the outer
-// HALO are there for their neighbours' sake only. A work-item owns a column of TILE_ROWS samples: all that belongs to a
+// TILE_HALO are there for their neighbours' sake only. A work-item owns a column of TILE_ROWS samples: all that belongs to a
 // sample stays in its registers, and local memory only carries the solution to the neighbours. The outermost samples see
 // themselves instead of what lies beyond; the error grows inwards by one sample a sweep and never leaves the halo. Beyond
 // the border of the level the tile holds mirror images, which sweep by sweep remain mirror images to the bit.
 #define TILE_HEIGHT (TILE_STRIPS * TILE_ROWS)
 #define TILE_AREA (TILE_WIDTH * TILE_HEIGHT)
-#define HALO (CHEBYSHEV_SWEEPS + 2)
-#define INNER_WIDTH (TILE_WIDTH - 2 * HALO)
-#define INNER_HEIGHT (TILE_HEIGHT - 2 * HALO)
+#define TILE_HALO (CHEBYSHEV_SWEEPS + 2)
+#define INNER_WIDTH (TILE_WIDTH - 2 * TILE_HALO)
+#define INNER_HEIGHT (TILE_HEIGHT - 2 * TILE_HALO)
 
 // guess, correction, coarse may be null. rhs, d, out: this level; correction, coarse: the next coarser one.
 kernel __attribute__((reqd_work_group_size(TILE_WIDTH, TILE_STRIPS, 1)))
@@ -20,7 +20,7 @@ void VISIT(cfield_t guess, cfield_t correction, cfield_t rhs, cfield_t d, field_
     local float tile[CHANNELS * TILE_AREA];
     const int lx = get_local_id(0), ly = get_local_id(1) * TILE_ROWS;
     const int x0 = get_group_id(0) * INNER_WIDTH, y0 = get_group_id(1) * INNER_HEIGHT;
-    const int gx = x0 - HALO + lx, gy = y0 - HALO + ly;
+    const int gx = x0 - TILE_HALO + lx, gy = y0 - TILE_HALO + ly;
     const int west = max(lx - 1, 0), east = min(lx + 1, TILE_WIDTH - 1);
     const int south = max(ly - 1, 0) * TILE_WIDTH + lx, north = min(ly + TILE_ROWS, TILE_HEIGHT - 1) * TILE_WIDTH + lx;
     float u[CHANNELS][TILE_ROWS], f[CHANNELS][TILE_ROWS], t[TILE_ROWS], q[TILE_ROWS];
@@ -66,8 +66,8 @@ void VISIT(cfield_t guess, cfield_t correction, cfield_t rhs, cfield_t d, field_
             #pragma unroll
             for (int r = 0; r < TILE_ROWS; r++) {
                 tile[c * TILE_AREA + (ly + r) * TILE_WIDTH + lx] = u[c][r];
-                if (k == CHEBYSHEV_SWEEPS - 1 && lx >= HALO && lx < TILE_WIDTH - HALO && ly + r >= HALO &&
-                    ly + r < TILE_HEIGHT - HALO && gx < n && gy + r < n)
+                if (k == CHEBYSHEV_SWEEPS - 1 && lx >= TILE_HALO && lx < TILE_WIDTH - TILE_HALO && ly + r >= TILE_HALO &&
+                    ly + r < TILE_HEIGHT - TILE_HALO && gx < n && gy + r < n)
                     out[(size_t)c * stride + (size_t)(gy + r) * pitch + gx] = u[c][r];
             }
         }
@@ -79,7 +79,7 @@ void VISIT(cfield_t guess, cfield_t correction, cfield_t rhs, cfield_t d, field_
         int c = i / ((INNER_WIDTH / 2) * (INNER_HEIGHT / 2)), j = i % ((INNER_WIDTH / 2) * (INNER_HEIGHT / 2));
         int cy = j / (INNER_WIDTH / 2), cx = j % (INNER_WIDTH / 2), Y = y0 / 2 + cy, X = x0 / 2 + cx;
         if (Y >= nc || X >= nc) continue;
-        local const float *v = tile + c * TILE_AREA + (HALO + 2 * cy) * TILE_WIDTH + HALO + 2 * cx;
+        local const float *v = tile + c * TILE_AREA + (TILE_HALO + 2 * cy) * TILE_WIDTH + TILE_HALO + 2 * cx;
         float sides = (v[-TILE_WIDTH] + v[TILE_WIDTH]) + (v[-1] + v[1]);
         float corners = (v[-TILE_WIDTH - 1] + v[TILE_WIDTH + 1]) + (v[-TILE_WIDTH + 1] + v[TILE_WIDTH - 1]);
         coarse[(size_t)c * stride2 + (size_t)Y * pitch2 + X] = restricted(v[0], sides, corners);
@@ -88,6 +88,6 @@ void VISIT(cfield_t guess, cfield_t correction, cfield_t rhs, cfield_t d, field_
 
 #undef TILE_HEIGHT
 #undef TILE_AREA
-#undef HALO
+#undef TILE_HALO
 #undef INNER_WIDTH
 #undef INNER_HEIGHT

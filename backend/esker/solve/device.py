@@ -10,7 +10,7 @@ import logging
 import os
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal, cast
@@ -23,11 +23,13 @@ log = logging.getLogger(__name__)
 
 NUMPY = "numpy"
 NUMPY_NAME = "NumPy float64 (no OpenCL device)"
-SOURCES = ("rows.cl", "section.cl", "raster.cl", "setup.cl", "visit.cl")
+SOURCES = ("rows.cl", "section.cl", "raster.cl", "setup.cl", "visit.cl", "refine.cl")
 Kernels = Literal["rows", "tiles"]
 _KERNELS = "ESKER_KERNELS"
+_ROWS_TOO = ", rows too"
 _POCL_THREADS = "POCL_MAX_PTHREAD_COUNT"
 _POCL_CACHE = "POCL_KERNEL_CACHE"
+_POCL_FOLDER = "POCL_CACHE_DIR"
 _opened: dict[str, Device] = {}
 """Devices of this process by name: a program is compiled once."""
 
@@ -113,8 +115,9 @@ def _missing(wanted: str, found: list[tuple[str, Any]]) -> list[tuple[str, Any]]
 def _found(threads: int | None) -> list[tuple[str, Any]]:
     """``_devices`` with PoCL set up; a second device of the same name has its number behind it."""
     os.environ.setdefault(_POCL_THREADS, str(threads or default_threads()))
-    if not pocl_cpu.cache_works():
-        os.environ.setdefault(_POCL_CACHE, "0")
+    if _POCL_FOLDER not in os.environ and _POCL_CACHE not in os.environ:
+        folder = pocl_cpu.cache_folder()
+        os.environ.update({_POCL_FOLDER: folder} if folder else {_POCL_CACHE: "0"})
     names: dict[str, int] = {}
     out = []
     for name, d in _devices():
@@ -214,8 +217,23 @@ def _open(name: str, device: Any) -> Device:
     )  # fmt: skip
 
 
+def row_kernels(device: Device) -> Device:
+    """The same device, context and queue with row-wise kernels: for what has no others, correct anywhere.
+
+    Raises BuildError.
+    """
+    if device.plan is None:
+        return device
+    key = device.name + _ROWS_TOO
+    if key not in _opened:
+        program = _build(device.name, device.context.devices[0], device.context, None)
+        _opened[key] = replace(device, program=program, plan=None)
+    return _opened[key]
+
+
 def _forget(name: str) -> None:
     _opened.pop(name, None)
+    _opened.pop(name + _ROWS_TOO, None)
 
 
 def _build(name: str, device: Any, context: Any, plan: gpu_program.Plan | None) -> Any:

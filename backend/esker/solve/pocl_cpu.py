@@ -10,6 +10,7 @@ in exactly that way; whatever it does not recognise it leaves alone. See docs/de
 from __future__ import annotations
 
 import ctypes
+import os
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -17,36 +18,47 @@ UNKNOWN = b"generic\0"
 COMPLAINT = "unknown target CPU 'generic'"
 _STRUCT_BYTES = 4096
 _LEVELS = (
-    ("skylake-avx512", {"avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl"}),
-    ("haswell", {"avx2", "fma", "bmi2", "f16c"}),
-    ("x86-64", set[str]()),
+    ("avx512f", "skylake-avx512", {"avx512bw", "avx512cd", "avx512dq", "avx512vl"}),
+    ("avx2", "haswell", {"fma", "bmi2", "f16c"}),
+    ("avx", "sandybridge", set[str]()),
+    ("sse2", "x86-64", set[str]()),
 )
+"""What makes PoCL choose a library of built-in functions, best first; the CPU that this library was compiled for, as
+far as vectors are passed; what else such a CPU has. Library and kernels must agree, or vectors are lost in calls."""
 _kept: list[ctypes.Array[ctypes.c_char]] = []
 
 
-def cpu_level(cpuinfo: Path = Path("/proc/cpuinfo")) -> str:
-    """The newest x86-64 CPU name of LLVM 14 whose vector instructions this processor has."""
+def cpu_level(cpuinfo: Path = Path("/proc/cpuinfo")) -> str | None:
+    """The CPU of LLVM 14 that this processor can pass for; None when there is none that fits PoCL's library."""
     flags: set[str] = set()
     for line in cpuinfo.read_text(encoding="utf-8", errors="replace").splitlines():
         if line.startswith("flags"):
             flags = set(line.partition(":")[2].split())
             break
-    return next(name for name, needed in _LEVELS if needed <= flags)
+    return next((name if needed <= flags else None for first, name, needed in _LEVELS if first in flags), None)
 
 
-def cache_works() -> bool:
-    """Whether PoCL 3.0's kernel cache can be trusted: with vectors narrower than float16 it gives back programs
-    without kernels, so that compiling at every start (a second) is the lesser evil."""
+def cache_folder() -> str | None:
+    """A folder of its own for what PoCL compiles, None where it cannot be made: then nothing should be kept.
+
+    PoCL's key does not know the CPU's name: code for one, found by another in a folder that they share, has no
+    kernels or crashes. It happens when a home moves to another machine, or a container's image does.
+    """
+    home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
     try:
-        return cpu_level() == _LEVELS[0][0]
+        folder = Path(home) / "esker" / f"pocl-{cpu_level()}"
+        folder.mkdir(parents=True, exist_ok=True)
+        return str(folder) if os.access(folder, os.W_OK) else None
     except OSError:
-        return True
+        return None
 
 
 def name_cpu(device_pointer: int) -> str | None:
     """Give the PoCL device at this address a CPU name that its compiler knows; the name, or None if not possible."""
     for field in _fields(device_pointer):
         name = cpu_level()
+        if name is None:
+            return None
         text = ctypes.create_string_buffer(name.encode())
         _kept.append(text)
         ctypes.c_uint64.from_address(field).value = ctypes.addressof(text)

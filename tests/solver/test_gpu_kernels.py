@@ -1,0 +1,322 @@
+"""The kernels for GPUs against their NumPy float64 twins and against the row-wise kernels (SPEC S2, S15, S22).
+
+Where there is no GPU they run on PoCL's CPU device, which has work-groups and local memory too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from esker import grid
+from esker.contract import Stroke, TerrainSettings
+from esker.solve import device as devices
+from esker.solve import gpu_program, reference, reference_raster
+from esker.solve.constraints import pack
+from esker.solve.device import Device, open_device
+from esker.solve.gpu_levels import GpuLauncher, GpuSystem, GpuWorkspace
+from esker.solve.gpu_program import Plan, plan
+from esker.solve.levels import ClWorkspace
+from esker.solve.solver import Solver, _previews, _to_rest
+from tests.solver.scenes import ENDLESS, PINNED, SCENES, SETTINGS, SIZE
+
+Field = NDArray[np.float64]
+LEVELS = (1, 2, 3)
+EPS = 0.01
+SMALLEST = plan(256, 30 << 10, 1)
+"""Tiles for an integrated GPU with work-groups of 256 and less than 32 KiB of local memory."""
+
+
+@pytest.fixture(scope="module", params=["full", "smallest"])
+def tiles(request: pytest.FixtureRequest) -> Device:
+    """A device with tile kernels, as large as it can hold them and as small as they come."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("ESKER_KERNELS", "tiles")
+        patch.setattr(devices, "_opened", {})
+        if request.param == "smallest":
+            patch.setattr(gpu_program, "plan_of", lambda _: SMALLEST)
+        found = open_device()
+    if found is None:
+        pytest.skip("no OpenCL device")
+    return found
+
+
+@pytest.fixture(scope="module")
+def tile_solver() -> Solver:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("ESKER_KERNELS", "tiles")
+        return Solver()
+
+
+def plan_of(device: Device) -> Plan:
+    assert device.plan is not None
+    return device.plan
+
+
+def noise(shape: tuple[int, ...], seed: int = 0) -> Field:
+    return np.random.default_rng(seed).normal(size=shape).astype(np.float32).astype(np.float64)
+
+
+def stiffness(n: int, seed: int = 1) -> Field:
+    """Free, sprung and fixed samples, shape (1, n, n)."""
+    rng = np.random.default_rng(seed)
+    d = np.where(rng.random((1, n, n)) < 0.3, rng.random((1, n, n)), 0.0)
+    return np.where(rng.random((1, n, n)) < 0.05, -1.0, d).astype(np.float32).astype(np.float64)
+
+
+def close(actual: NDArray[np.float32], expected: Field, scale: float = 1.0) -> None:
+    assert actual.shape == expected.shape
+    assert np.abs(actual - expected).max() < 2e-5 * scale * max(1.0, np.abs(expected).max())
+
+
+def system(device: Device, level: int, channels: int) -> tuple[GpuSystem, dict[str, Field]]:
+    """A system whose fields of ``level`` and ``level - 1`` are noise, and the same fields for the twin."""
+    n, m = grid.samples(level), grid.samples(level - 1)
+    s = GpuSystem(GpuLauncher(device), level, channels, "f")
+    s.eps = {k: EPS * 4.0 ** (level - k) for k in range(level + 1)}
+    host = {"d": stiffness(n), "f": noise((channels, n, n), 2), "u": noise((channels, n, n), 3)}
+    host["e"] = noise((channels, m, m), 4)
+    for name in ("d", "f", "u"):
+        s.put(name, level, host[name])
+    s.put("e", level - 1, host["e"])
+    return s, host
+
+
+@pytest.mark.parametrize("level", LEVELS)
+@pytest.mark.parametrize("channels", [1, 2])
+@pytest.mark.parametrize("start", ["zero", "guess", "both"])
+def test_visit(tiles: Device, level: int, channels: int, start: str) -> None:
+    s, host = system(tiles, level, channels)
+    guess = None if start == "zero" else "u"
+    correction = None if start == "guess" else "e"
+    s.visit(level, rhs="f", out="v", guess=guess, correction=correction, residual=True)
+    u, coarse = reference.visit(
+        host["u"] if guess else None, host["e"] if correction else None, host["f"], host["d"], EPS
+    )
+    close(s.get("v", level), u)
+    close(s.get("b", level - 1), coarse)
+
+
+@pytest.mark.parametrize("channels", [1, 2])
+def test_visit_does_not_depend_on_the_tile(tiles: Device, channels: int) -> None:
+    """SPEC S15: which work-group does a sample, and with which neighbours, changes not one bit."""
+    results = []
+    for units in (1, 1 << 20):
+        s, _ = system(replace(tiles, plan=replace(plan_of(tiles), units=units)), 3, channels)
+        s.visit(3, rhs="f", out="v", guess="u", correction="e", residual=True)
+        results.append((s.launch.plan.tile(channels, grid.samples(3)), s.get("v", 3), s.get("b", 2)))
+    assert results[0][0] != results[1][0]
+    assert np.array_equal(results[0][1], results[1][1])
+    assert np.array_equal(results[0][2], results[1][2])
+
+
+@pytest.mark.parametrize("channels", [1, 2])
+def test_visit_mirrors(tiles: Device, channels: int) -> None:
+    """SPEC S7, to the bit: what lies beyond a border behaves like a mirror image."""
+    s, host = system(tiles, 2, channels)
+    s.visit(2, rhs="f", out="v", guess="u", correction="e", residual=True)
+    straight = s.get("v", 2), s.get("b", 1)
+    for name in ("d", "f", "u"):
+        s.put(name, 2, host[name][:, ::-1, ::-1])
+    s.put("e", 1, host["e"][:, ::-1, ::-1])
+    s.visit(2, rhs="f", out="v", guess="u", correction="e", residual=True)
+    assert np.array_equal(s.get("v", 2)[:, ::-1, ::-1], straight[0])
+    assert np.array_equal(s.get("b", 1)[:, ::-1, ::-1], straight[1])
+
+
+def test_visit_without_residual(tiles: Device) -> None:
+    s, host = system(tiles, 2, 2)
+    b = noise(host["e"].shape, 8)
+    s.put("b", 1, b)
+    s.visit(2, rhs="f", out="v", guess="u", correction="e", residual=False)
+    close(s.get("v", 2), reference.visit(host["u"], host["e"], host["f"], host["d"], EPS)[0])
+    assert np.array_equal(s.get("b", 1), b), "nobody asked for it"
+
+
+@pytest.mark.parametrize("level", LEVELS)
+def test_restriction(tiles: Device, level: int) -> None:
+    s, _ = system(tiles, level + 1, 2)
+    b = noise((2, grid.samples(level), grid.samples(level)), 7)
+    s.put("b", level, b)
+    s.restrict(level)
+    close(s.get("b", level - 1), reference.restriction(b))
+
+
+@pytest.mark.parametrize("level", LEVELS)
+@pytest.mark.parametrize("channels", [1, 2])
+def test_coarsen(tiles: Device, level: int, channels: int) -> None:
+    s, host = system(tiles, level, channels)
+    s.coarsen(EPS)
+    d, f = host["d"], host["f"]
+    for k in range(level - 1, -1, -1):
+        d, f = reference.coarsen(d, f)
+        close(s.get("d", k), d)
+        close(s.get("f", k), f)
+
+
+@pytest.mark.parametrize("channels", [1, 2])
+@pytest.mark.parametrize("cycles", [1, 3])
+def test_bottom(tiles: Device, channels: int, cycles: int) -> None:
+    s, host = system(tiles, 1, channels)
+    s.coarsen(EPS)
+    twin = reference.NumpySystem(host["d"], host["f"], EPS, 1)
+    s.bottom(rhs="f", out="u", cycles=cycles)
+    twin.bottom(rhs="f", out="u", cycles=cycles)
+    close(s.get("u", 0), twin.fields["u", 0], scale=10)
+
+
+def test_lone_bottom_settles_fixed_samples(tiles: Device) -> None:
+    """Level 0 as the finest level has fixed samples: the bottom cycles alone must settle it."""
+    s = GpuSystem(GpuLauncher(tiles), 0, 1, "f")
+    d, f = stiffness(65), noise((1, 65, 65))
+    s.put("d", 0, d)
+    s.put("f", 0, f)
+    s.coarsen(EPS)
+    s.bottom(rhs="f", out="u", cycles=24)
+    u = s.get("u", 0).astype(np.float64)
+    assert np.array_equal(u[d < 0], f[d < 0])
+    assert np.abs(reference.residual(u, f, d, EPS)).max() < 1e-5
+
+
+@pytest.mark.parametrize("level", LEVELS)
+def test_divergence(tiles: Device, level: int) -> None:
+    w = GpuWorkspace(tiles, level)
+    w.size_m = 1000.0
+    n = grid.samples(level)
+    d, f, g = stiffness(n), noise((1, n, n), 2), noise((2, n, n), 3)
+    w.height.put("d", level, d)
+    w.height.put("s", level, f)
+    w.gradient.put("u", level, g)
+    w.guide(level)
+    close(w.height.get("f", level), reference.divergence(f, d, g, grid.spacing(level, 1000.0)))
+
+
+@pytest.mark.parametrize("level", [1, 3])
+def test_change(tiles: Device, level: int) -> None:
+    """The one sample that differs most is found wherever it is, and padding never is."""
+    s, host = system(tiles, level, 2)
+    v = host["u"].copy()
+    rng = np.random.default_rng(5)
+    for at in ((0, 0, 0), (1, -1, -1), (1, 0, -1), tuple(rng.integers(0, s.shapes[level].n, 2))):
+        v[(0, *at) if len(at) == 2 else at] += 3
+        s.put("v", level, v)
+        assert s.change("u", "v") == pytest.approx(np.abs(host["u"] - v).max(), rel=1e-6)
+        v = host["u"].copy()
+    s.put("v", level, v)
+    assert s.change("u", "v") == 0
+
+
+@pytest.mark.parametrize("scene", ["one", "cross", "loops", "fifty"])
+@pytest.mark.parametrize("settings", [SETTINGS, PINNED], ids=["free", "pinned"])
+def test_rasterise(tiles: Device, scene: str, settings: TerrainSettings) -> None:
+    """As for the row-wise kernel: float32 may pick the neighbouring segment near a vertex."""
+    level = 3
+    w = GpuWorkspace(tiles, level)
+    w.load(SCENES[scene], settings)
+    c = reference_raster.rasterise(pack(SCENES[scene], settings, level))
+    pairs = (
+        (w.height.get("d", level)[0], c.height_d, 2e-3),
+        (w.height.get("s", level)[0], c.height_f, 2e-3),
+        (w.gradient.get("d", level)[0], c.gradient_d, 2e-3),
+        (w.gradient.get("f", level), c.gradient_f, 5e-2),
+    )
+    for actual, expected, loose in pairs:
+        error = np.abs(actual - expected) / max(1.0, np.abs(expected).max())
+        assert np.quantile(error, 0.97) < 1e-4
+        assert (error > loose).mean() < 2e-2
+    assert ((pairs[0][0] < 0) != (c.height_d < 0)).sum() <= 4
+
+
+def edited(strokes: list[Stroke]) -> list[Stroke]:
+    return [*strokes[:20], strokes[20].model_copy(update={"plateau_radius_m": 90.0}), *strokes[21:-3]]
+
+
+def test_a_dirty_window_gives_the_bits_of_a_full_raster(tiles: Device) -> None:
+    """SPEC S15: rasterising only what changed changes nothing, on any level."""
+    level, strokes = 3, SCENES["fifty"]
+    w, fresh = GpuWorkspace(tiles, level), GpuWorkspace(tiles, level)
+    w.load(strokes, SETTINGS)
+    w.load(edited(strokes), SETTINGS)
+    fresh.load(edited(strokes), SETTINGS)
+    for a, b in ((w.height, fresh.height), (w.gradient, fresh.gradient)):
+        for name in ("d", a.static):
+            for k in range(level + 1):
+                assert np.array_equal(a.get(name, k), b.get(name, k))
+
+
+@pytest.mark.parametrize(
+    ("scene", "settings"),
+    [(scene, SETTINGS) for scene in ("five", "fifty", "loops", "cross", "tiny", "bare")]
+    + [("five", ENDLESS), ("bare", ENDLESS), ("five", PINNED)],
+    ids=lambda value: value if isinstance(value, str) else f"{value.border}-{value.reach_m}",
+)
+def test_settles_like_the_row_wise_kernels(
+    solver: Solver, tile_solver: Solver, scene: str, settings: TerrainSettings
+) -> None:
+    """SPEC S22. Two strokes at the same distance from a sample may be taken in another order by another compiler: such
+    a sample, a few in a hundred thousand, may be off by more."""
+    level = 3
+    rows, tile = (s.solve(SCENES[scene], settings, level)[level] for s in (solver, tile_solver))
+    error = np.abs(rows - tile) / grid.quantum(level, SIZE)
+    assert (error >= 1).sum() <= 4
+    assert error.max() < 4
+
+
+def test_the_same_constraints_settle_within_a_quantum(device: Device, tiles: Device) -> None:
+    """SPEC S22 without the rasteriser: the same systems, solved by both sets of kernels."""
+    level, strokes = 3, SCENES["fifty"]
+    rows, tile = ClWorkspace(device, level), GpuWorkspace(tiles, level)
+    rows.load(strokes, SETTINGS)
+    tile.load(strokes, SETTINGS)
+    for a, b in ((rows.gradient, tile.gradient), (rows.height, tile.height)):
+        for name in ("d", a.static):
+            b.put(name, level, a.get(name, level))
+        b.coarsen(rows.gradient.eps[level])
+    heights = []
+    for w in (rows, tile):
+        for step in (_previews(w), _to_rest(w, SETTINGS)):
+            for _ in step:
+                pass
+        heights.append(w.read(level))
+    assert np.abs(heights[0] - heights[1]).max() < grid.quantum(level, SIZE) / 4
+
+
+def test_history_changes_not_one_bit(tile_solver: Solver) -> None:
+    """SPEC S15 on a GPU's kernels: edits, stops and interleaving before do not matter."""
+    strokes = SCENES["fifty"]
+    first = tile_solver.solve(edited(strokes), SETTINGS, 2)[2]
+    tile_solver.solve(strokes, SETTINGS, 2)
+    tile_solver.solve(strokes[::-1], ENDLESS, 2, should_stop=lambda: True)
+    run = tile_solver.steps(strokes[:9], SETTINGS, 2)
+    next(run)
+    again = tile_solver.solve(edited(strokes)[::-1], SETTINGS, 2)[2]
+    run.close()
+    assert np.array_equal(first, again)
+
+
+@pytest.mark.parametrize(
+    ("items", "local", "units", "expected"),
+    [
+        pytest.param(1024, 48 << 10, 132, (64, 16, 1024), id="H100"),
+        pytest.param(1024, 64 << 10, 8, (64, 16, 1024), id="integrated AMD"),
+        pytest.param(256, 64 << 10, 24, (64, 16, 256), id="integrated Intel"),
+        pytest.param(512, 32 << 10, 4, (64, 16, 512), id="mobile"),
+        pytest.param(256, 30 << 10, 1, (64, 8, 256), id="tight"),
+        pytest.param(64, 32 << 10, 1, None, id="groups too small"),
+        pytest.param(1024, 16 << 10, 1, None, id="too little local memory"),
+    ],
+)
+def test_plan(items: int, local: int, units: int, expected: tuple[int, int, int] | None) -> None:
+    """What a device can hold: (width, rows) of the two-channel tile and work-items of the bottom kernel."""
+    found = plan(items, local, units)
+    if found is None:
+        assert expected is None
+        return
+    tile = found.wide[1]
+    assert (tile.width, tile.rows, found.bottom_items) == expected
+    assert all(t.items <= items and t.bytes(2) <= local for t in (tile, found.small))
+    assert found.tile(1, grid.samples(1)) is (found.wide[0] if units < 5 else found.small)
+    assert found.tile(1, grid.samples(6)) is found.wide[0]
