@@ -33,7 +33,7 @@ class Bump:
 
     def at(self, x: Floats, y: Floats) -> Floats:
         """A cone: its tip and its foot have errors that shrink by a half a level."""
-        return np.maximum(0, 1 - np.hypot(x - self.x, y - self.y) / self.radius) * self.height
+        return np.asarray(np.maximum(0, 1 - np.hypot(x - self.x, y - self.y) / self.radius) * self.height)
 
 
 class Ground:

@@ -47,13 +47,17 @@ class Refined:
 
 @dataclass(frozen=True, eq=False)
 class Known:
-    """The tiles of one level as arrays: ``codes`` sorted (see ``code``), (n, 4, 4) bounds, and ``Refined.ground``."""
+    """The tiles of one level as arrays: ``codes`` sorted (see ``code``), (n, 4, 4) bounds, ``Refined.ground``,
+    and the bounds of the whole tiles."""
 
     codes: NDArray[np.int64]
     low: Floats
     high: Floats
     error: Floats
     ground: NDArray[np.int64]
+    lowest: Floats
+    highest: Floats
+    worst: Floats
 
 
 def code(x: NDArray[np.int64], y: NDArray[np.int64], level: int) -> NDArray[np.int64]:
@@ -158,11 +162,14 @@ class RefinedTiles:
             n = len(tiles)
 
             def bounds(name: str) -> Floats:
-                return np.array([getattr(t, name) for t in tiles], dtype=np.float32).reshape(n, 4, 4)
+                rows = [getattr(t, name) for t in tiles]
+                return np.stack(rows) if rows else np.zeros((0, 4, 4), dtype=np.float32)
 
             codes = np.fromiter(((t.key.y << level) | t.key.x for t in tiles), dtype=np.int64, count=n)
             ground = np.fromiter((t.ground for t in tiles), dtype=np.int64, count=n)
-            found = Known(codes, bounds("low"), bounds("high"), bounds("error"), ground)
+            low, high, error = bounds("low"), bounds("high"), bounds("error")
+            whole = low.min(axis=(1, 2)), high.max(axis=(1, 2)), error.max(axis=(1, 2))
+            found = Known(codes, low, high, error, ground, *whole)
             self._known[level] = found
         return found
 

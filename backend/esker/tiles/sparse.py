@@ -22,7 +22,7 @@ from esker.grid import TileKey
 from esker.tiles.bounds import Floats
 from esker.tiles.pyramid import Mask, Pyramid
 from esker.tiles.quadtree import MARGIN, SHADING_CELL_PX, SHADING_ERROR, screen_error
-from esker.tiles.refined import RefinedTiles, code
+from esker.tiles.refined import Known, RefinedTiles, code
 
 Index = NDArray[np.int64]
 
@@ -87,9 +87,6 @@ class _Parents:
     high: Floats
     error: Floats
 
-    def take(self, mask: NDArray[np.bool_]) -> _Parents:
-        return _Parents(self.x[mask], self.y[mask], self.low[mask], self.high[mask], self.error[mask])
-
 
 def select_refined(pyramid: Pyramid, refined: RefinedTiles, wanted: Mask, view: View) -> Selection:
     """Wanted tiles of all levels above the pyramid's; ``wanted``: its selection of the finest level of its own.
@@ -102,7 +99,8 @@ def select_refined(pyramid: Pyramid, refined: RefinedTiles, wanted: Mask, view: 
     codes: list[Index] = []
     errors: list[Floats] = []
     for level in range(refined.levels + 1, refined.finest + 1):
-        boxes, below, known = _children(parents, level, refined, changed)
+        below = _children(parents, level, refined, changed)
+        boxes = below.boxes
         inside, error, cell = screen_error(boxes, view)
         tau = MARGIN * view.tau_px
         bends = (boxes.error > SHADING_ERROR * 2 * boxes.spacing) & (cell > SHADING_CELL_PX * tau)
@@ -111,7 +109,7 @@ def select_refined(pyramid: Pyramid, refined: RefinedTiles, wanted: Mask, view: 
         order = np.argsort(place)
         codes.append(place[order])
         errors.append(error[chosen][order])
-        parents = below.take(chosen & known)
+        parents = below.parents(chosen)
         if not len(parents.x):
             break
     for _ in range(refined.finest - refined.levels - len(codes)):
@@ -170,20 +168,42 @@ def _finest(pyramid: Pyramid, wanted: Mask) -> _Parents:
     )
 
 
-def _children(
-    parents: _Parents, level: int, refined: RefinedTiles, changed: NDArray[np.uint32]
-) -> tuple[_Boxes, _Parents, NDArray[np.bool_]]:
-    """The four children of each parent: as boxes, as possible parents, and which of them are known.
+@dataclass(frozen=True, eq=False)
+class _Children:
+    """The four children of each parent: places and boxes (4n,); which are known, and where in ``made``."""
 
-    ``changed``: per tile of the finest level below, the stamp of the last change of the ground there.
-    """
+    x: Index
+    y: Index
+    boxes: _Boxes
+    known: NDArray[np.bool_]
+    at: Index
+    same: NDArray[np.bool_]
+    """The ground there has not changed since the tile was made."""
+    made: Known
+
+    def parents(self, chosen: NDArray[np.bool_]) -> _Parents:
+        """The chosen ones that are known: from them selection goes on downward."""
+        mask = chosen & self.known
+        at, changed = self.at[mask], ~self.same[mask]
+        low, high, error = self.made.low[at], self.made.high[at], self.made.error[at]
+        if changed.any():
+            boxes = self.boxes
+            low[changed] = np.minimum(low[changed], boxes.low[mask][changed, None, None])
+            high[changed] = np.maximum(high[changed], boxes.high[mask][changed, None, None])
+            error[changed] = np.maximum(error[changed], boxes.error[mask][changed, None, None])
+        return _Parents(self.x[mask], self.y[mask], low, high, error)
+
+
+def _children(parents: _Parents, level: int, refined: RefinedTiles, changed: NDArray[np.uint32]) -> _Children:
+    """``changed``: per tile of the finest whole level, the stamp of the last change of the ground there."""
     n = len(parents.x)
     x = (2 * parents.x[:, None] + np.array([0, 1, 0, 1])).ravel()
     y = (2 * parents.y[:, None] + np.array([0, 0, 1, 1])).ravel()
 
     def quarters(ufunc: np.ufunc, a: Floats) -> Floats:
-        out: Floats = ufunc.reduce(a.reshape(n, 2, HALF, 2, HALF), axis=(2, 4)).reshape(4 * n, 1, 1)
-        return np.broadcast_to(out, (4 * n, SUBPATCHES, SUBPATCHES)).copy()
+        pairs = ufunc(a[:, :, 0::2], a[:, :, 1::2])
+        out: Floats = ufunc(pairs[:, 0::2], pairs[:, 1::2]).reshape(4 * n)
+        return out
 
     error = quarters(np.maximum, parents.error) * EXPECTED
     low, high = quarters(np.minimum, parents.low) - error, quarters(np.maximum, parents.high) + error
@@ -192,12 +212,14 @@ def _children(
     at = np.searchsorted(made.codes, place)
     known = at < len(made.codes)
     known[known] = made.codes[at[known]] == place[known]
+    same = np.zeros(4 * n, dtype=np.bool_)
     if known.any():
         up, mine = level - refined.levels, at[known]
-        same = (changed[y[known] >> up, x[known] >> up] <= made.ground[mine])[:, None, None]
-        low[known] = np.where(same, made.low[mine], np.minimum(made.low[mine], low[known]))
-        high[known] = np.where(same, made.high[mine], np.maximum(made.high[mine], high[known]))
-        error[known] = np.where(same, made.error[mine], np.maximum(made.error[mine], error[known]))
+        kept = changed[y[known] >> up, x[known] >> up] <= made.ground[mine]
+        same[known] = kept
+        low[known] = np.where(kept, made.lowest[mine], np.minimum(made.lowest[mine], low[known]))
+        high[known] = np.where(kept, made.highest[mine], np.maximum(made.highest[mine], high[known]))
+        error[known] = np.where(kept, made.worst[mine], np.maximum(made.worst[mine], error[known]))
     width = refined.size_m / (1 << level)
     boxes = _Boxes(
         refined.size_m,
@@ -205,9 +227,9 @@ def _children(
         ((y + 0.5) * width).astype(np.float32),
         np.full(4 * n, width / 2, dtype=np.float32),
         np.full(4 * n, grid.spacing(level, refined.size_m), dtype=np.float32),
-        low.min(axis=(1, 2)),
-        high.max(axis=(1, 2)),
-        error.max(axis=(1, 2)),
+        low,
+        high,
+        error,
         np.ones(4 * n, dtype=np.bool_),
     )
-    return boxes, _Parents(x, y, low, high, error), known
+    return _Children(x, y, boxes, known, at, same, made)
