@@ -1,4 +1,4 @@
-"""No crack pixel and no NaN, random trees and cameras, real selection and shaders (SPEC R8, R9)."""
+"""No crack pixel and no NaN, random trees and cameras, real selection and shaders (SPEC R8, R9, R20, R22)."""
 
 from __future__ import annotations
 
@@ -31,3 +31,13 @@ def test_no_crack_shows_from_above_below_and_the_side(page: Page, seed: int) -> 
 def test_without_edge_bits_cracks_do_show(page: Page) -> None:
     """The test can fail: the same views without edge bits and corner weights crack."""
     assert page.evaluate("() => esker.crackTest(1, 8, true)")["cracks"] > 0
+
+
+def test_no_crack_shows_near_the_ground_of_the_largest_terrain(page: Page) -> None:
+    """R8, R20, R22: metres from a ground 65 km wide, levels to 10 held around the place only, tiles still entering."""
+    report = page.evaluate("() => esker.deepCrackTest(5, 12)")
+    assert report["failures"] == []
+    assert report["nans"] == 0
+    assert report["covered"] > 12 * 256 * 192 * 0.6
+    assert report["deepest"] == 10
+    assert report["mixed"] >= 6

@@ -3,7 +3,7 @@
  * The real selection, atlas and shaders draw; only the target is the test's own.
  */
 
-import type { CameraState, FrameStats, Scene, Vec3 } from "../../src/core/types.ts";
+import type { CameraState, FrameStats, Scene, TileView, Vec3 } from "../../src/core/types.ts";
 import { Atlas } from "../../src/gpu/atlas.ts";
 import { FrameBindings, sunDirection } from "../../src/gpu/frame.ts";
 import { LightQueue } from "../../src/gpu/lightqueue.ts";
@@ -14,7 +14,16 @@ import { SkyTables } from "../../src/gpu/sky.ts";
 import { DEPTH_FORMAT } from "../../src/gpu/target.ts";
 import { NormalsPass, SunPass } from "../../src/gpu/tilecompute.ts";
 import { Selection } from "../../src/tiles/selection.ts";
-import { FieldView, filteredField, lookAt, mapCamera, PLAIN_CHANNELS, random } from "./world.ts";
+import {
+  craggyField,
+  FieldView,
+  filteredField,
+  lookAt,
+  mapCamera,
+  PLAIN_CHANNELS,
+  random,
+  SparseView,
+} from "./world.ts";
 
 const WIDTH = 256;
 const HEIGHT = 192;
@@ -108,13 +117,13 @@ function heightOf(view: FieldView, x: number, y: number): number {
   return root.heights[Math.round((y / SIZE) * 64) * 65 + Math.round((x / SIZE) * 64)]!;
 }
 
-function sceneOf(view: FieldView, state: CameraState, look: Scene["settings"]["look"]): Scene {
+function sceneOf(view: TileView, state: CameraState, look: Scene["settings"]["look"]): Scene {
   return {
     camera: state,
     tiles: view,
     channels: PLAIN_CHANNELS,
     settings: {
-      size_m: SIZE,
+      size_m: view.sizeM,
       title: "",
       reach_m: null,
       border: "free",
@@ -134,19 +143,40 @@ function sceneOf(view: FieldView, state: CameraState, look: Scene["settings"]["l
   };
 }
 
+interface World {
+  readonly atlas: Atlas;
+  readonly selection: Selection;
+  readonly light: LightQueue;
+}
+
+/** An empty atlas and selection for a store; `fades`: refined tiles enter by and by. */
+function makeWorld(rig: Rig, view: TileView, fades = false): World {
+  const selection = new Selection(view.levels);
+  const atlas = new Atlas(rig.device, view.levels, (l, x, y, usable) =>
+    selection.tree.setUsable(l, x, y, usable, fades && l > view.solved),
+  );
+  rig.frame.attach(atlas);
+  rig.normals.attach(atlas);
+  rig.sun.attach(atlas);
+  return { atlas, selection, light: new LightQueue(rig.sun, atlas) };
+}
+
 /** One picture as half-float words, and what was drawn. */
 async function picture(
   rig: Rig,
-  world: { view: FieldView; atlas: Atlas; selection: Selection; light: LightQueue },
+  world: World,
   scene: Scene,
   tau: number,
-): Promise<{ words: Uint16Array; stats: Pick<FrameStats, "patches">; mixed: boolean }> {
+  entrance: () => number = () => 1,
+): Promise<{ words: Uint16Array; stats: Pick<FrameStats, "patches">; mixed: boolean; deepest: number }> {
   const changed = world.atlas.refresh(scene.tiles);
   const entered = [];
   let cut = world.selection.select(scene.tiles, scene.camera, tau, world.atlas);
-  for (;;) {
+  for (let round = 0; ; round += 1) {
     const more = world.atlas.admit(cut.requests, 4096);
-    if (more.length === 0) break;
+    // Refined tiles are let in one level after the other, each when its parent has entered.
+    const entering = world.selection.tree.advance(entrance());
+    if (more.length === 0 && (!entering || round > 14)) break;
     entered.push(...more);
     cut = world.selection.select(scene.tiles, scene.camera, tau, world.atlas);
   }
@@ -154,9 +184,9 @@ async function picture(
   const encoder = rig.device.createCommandEncoder();
   rig.sky.bake(rig.device, encoder, sun);
   world.atlas.flushPages();
-  rig.normals.run(encoder, SIZE, [...changed, ...entered]);
+  rig.normals.run(encoder, scene.tiles.sizeM, [...changed, ...entered]);
   world.light.mark(changed, entered, sun);
-  world.light.run(encoder, { sizeM: SIZE, high: cut.maxHeight, sun }, 4);
+  world.light.run(encoder, { sizeM: scene.tiles.sizeM, high: cut.maxHeight, sun }, 4);
   rig.frame.update(scene, { width: WIDTH, height: HEIGHT, low: cut.minHeight, high: cut.maxHeight });
   rig.patches.update(cut);
   while (!rig.patches.useLook(scene.settings.look)) await new Promise((done) => setTimeout(done, 10));
@@ -182,7 +212,7 @@ async function picture(
   rig.readback.unmap();
   const levels = new Set<number>();
   for (let i = 0; i < cut.count; i += 1) levels.add(cut.records[4 * i + 2]! & 255);
-  return { words, stats: { patches: cut.count }, mixed: levels.size > 1 };
+  return { words, stats: { patches: cut.count }, mixed: levels.size > 1, deepest: Math.max(...levels) };
 }
 
 /** Pixels of the clear colour where ground must be, ground pixels, and NaNs. Alpha is 0 only where nothing was drawn. */
@@ -221,13 +251,8 @@ export async function crackTest(seed: number, views: number, spoil = false): Pro
       if (lost) gaps.add(`${level}/${x}/${y}`);
       return !lost;
     });
-    const selection = new Selection(view.levels);
-    const atlas = new Atlas(rig.device, view.levels, (l, x, y, usable) => selection.tree.setUsable(l, x, y, usable));
-    rig.frame.attach(atlas);
-    rig.normals.attach(atlas);
-    rig.sun.attach(atlas);
-    const world = { view, atlas, selection, light: new LightQueue(rig.sun, atlas) };
-    if (spoil) spoilRecords(selection);
+    const world = makeWorld(rig, view);
+    if (spoil) spoilRecords(world.selection);
     for (let k = 0; k < 4 && done < views; k += 1, done += 1) {
       const kind = kinds[k]!;
       const tau = 0.6 + 5 * next() ** 2;
@@ -241,7 +266,63 @@ export async function crackTest(seed: number, views: number, spoil = false): Pro
       total.mixed += mixed ? 1 : 0;
       if (found.cracks > 0) failures.push(`view ${done} ${kind} tau ${tau.toFixed(2)}: ${found.cracks}`);
     }
-    atlas.destroy();
+    world.atlas.destroy();
+  }
+  rig.device.destroy();
+  return { views, ...total, failures };
+}
+
+const LARGE = 65536;
+
+/** A camera a few metres from the ground, with the near and far planes that the page has there. */
+function closeCamera(kind: Kind, next: () => number, at: Vec3): CameraState {
+  const angle = next() * 2 * Math.PI;
+  const along: Vec3 = [Math.cos(angle), Math.sin(angle), 0];
+  const [x, y, z] = at;
+  const look = (eye: Vec3, target: Vec3, fov: number): CameraState =>
+    lookAt(eye, target, WIDTH, HEIGHT, fov, 0.1, 400_000);
+  if (kind === "map") return mapCamera([x, y, 0], 40 + next() * 300, WIDTH, HEIGHT);
+  if (kind === "below") {
+    const down = 150 + next() * 300;
+    return look([x, y, z - down], [x + along[0] * 20, y + along[1] * 20, z], 35);
+  }
+  const up = 6 + next() * 30;
+  if (kind === "above") return look([x, y, z + up], [x + along[0] * up * 0.4, y + along[1] * up * 0.4, z], 40);
+  return look([x, y, z + up], [x + along[0] * 60, y + along[1] * 60, z + up - 5 - 20 * next()], 45);
+}
+
+/**
+ * The crack test near the ground of the largest terrain: levels 4 to 10 held around a place only, with holes, some tiles
+ * still on their way in.
+ */
+export async function deepCrackTest(seed: number, views: number): Promise<CrackReport & { readonly deepest: number }> {
+  const rig = await makeRig();
+  const next = random(seed);
+  const kinds: Kind[] = ["above", "grazing", "below", "map"];
+  const total = { cracks: 0, nans: 0, covered: 0, patches: 0, mixed: 0, deepest: 0 };
+  const failures: string[] = [];
+  for (let done = 0; done < views; ) {
+    const view = new SparseView(LARGE, 10, 3, craggyField(Math.floor(next() * 1e6), LARGE));
+    const x = LARGE * (0.2 + 0.6 * next());
+    const y = LARGE * (0.2 + 0.6 * next());
+    view.refineAround(x, y, () => 1 + Math.round(next()));
+    view.lose(() => next() < 0.08);
+    const world = makeWorld(rig, view, true);
+    for (let k = 0; k < 4 && done < views; k += 1, done += 1) {
+      const kind = kinds[k]!;
+      const tau = 0.6 + 6 * next() ** 2;
+      const scene = sceneOf(view, closeCamera(kind, next, [x, y, view.shownHeightAt(x, y)]), "natural");
+      const { words, stats, mixed, deepest } = await picture(rig, world, scene, tau, () => 0.15 + 0.7 * next());
+      const found = count(words, kind);
+      total.cracks += found.cracks;
+      total.covered += found.covered;
+      total.nans += found.nans;
+      total.patches += stats.patches;
+      total.mixed += mixed ? 1 : 0;
+      total.deepest = Math.max(total.deepest, deepest);
+      if (found.cracks > 0) failures.push(`view ${done} ${kind} tau ${tau.toFixed(2)}: ${found.cracks}`);
+    }
+    world.atlas.destroy();
   }
   rig.device.destroy();
   return { views, ...total, failures };

@@ -14,7 +14,7 @@ import type {
 import { openGpu } from "../../src/gpu/device.ts";
 import { createMapRenderer, createRenderer } from "../../src/gpu/index.ts";
 import { GpuRenderer } from "../../src/gpu/renderer.ts";
-import { crackTest } from "./cracks.ts";
+import { crackTest, deepCrackTest } from "./cracks.ts";
 import { alpineField, FieldView, lookAt, mapCamera, PLAIN_CHANNELS } from "./world.ts";
 
 export const SETTINGS: TerrainSettings = {
@@ -244,4 +244,4 @@ async function morph(shot: Shot, rounds: number): Promise<{ uploads: number; cpu
   return { uploads, cpuMs };
 }
 
-Object.assign(globalThis, { esker: { morph, load, shoot, picture, circle, crackTest } });
+Object.assign(globalThis, { esker: { morph, load, shoot, picture, circle, crackTest, deepCrackTest } });

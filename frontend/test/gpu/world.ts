@@ -336,6 +336,24 @@ export class SparseView implements TileView {
     }
   }
 
+  /** Height of the finest tile that is held there. */
+  shownHeightAt(x: number, y: number): number {
+    for (let level = this.levels; level > 0; level -= 1) {
+      const w = this.sizeM / (1 << level);
+      if (this.tile(level, Math.floor(x / w), Math.floor(y / w)) !== undefined) return this.field(x, y, level);
+    }
+    return this.field(x, y, 0);
+  }
+
+  /** Drops refined tiles at random, each with all below it. */
+  lose(lost: () => boolean): void {
+    this.stamp += 1;
+    for (const [key, tile] of [...this.held].sort((a, b) => a[1].level - b[1].level)) {
+      if (tile.level <= this.solved) continue;
+      if (lost() || this.tile(tile.level - 1, tile.x >> 1, tile.y >> 1) === undefined) this.held.delete(key);
+    }
+  }
+
   /** Drops all tiles above the solved levels. */
   forgetRefined(): void {
     this.stamp += 1;
