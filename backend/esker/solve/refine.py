@@ -1,0 +1,341 @@
+"""Refinement above the global levels, tile by tile (DESIGN 5.6).
+
+A tile of level L is computed from its parent level's samples under it and a halo around (``refine_engine``); level by
+level down from the finest global one. Every sample is a pure function of the strokes, the settings and the settled
+solve: which tiles were asked for, in which order, in which groups and from what cache does not change a bit.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections import OrderedDict
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from hashlib import blake2b
+from typing import Final, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from esker import grid
+from esker.contract import MAX_REFINED_LEVEL, TILE_CELLS, TILE_SAMPLES, Stroke, TerrainSettings
+from esker.grid import TileKey
+from esker.solve.constraints import WindowPacker
+from esker.solve.device import Device
+from esker.solve.refine_engine import CHANNELS, ClEngine, Engine, Fields, NumpyEngine, Span, Step, step
+
+GROUP: Final = 4
+"""Tiles along a side of what one step computes at most: more, and a step takes too long to be left; fewer, and the
+halo costs more than the tiles."""
+CACHE_BYTES: Final = 64 << 20
+TILE_BYTES: Final = 4 * CHANNELS * TILE_SAMPLES**2
+_DIGEST: Final = 16
+_WITHOUT_EFFECT: Final = {"author", "label", "locked", "finished", "amplitude_m", "roughness"}
+"""Fields of a stroke that do not change heights."""
+
+Box = tuple[int, int, int, int]
+"""Tiles x0 .. x1 - 1, y0 .. y1 - 1 as (x0, y0, x1, y1)."""
+
+
+class Basis(Protocol):
+    """A settled solve (``solver.Basis``)."""
+
+    @property
+    def strokes(self) -> tuple[Stroke, ...]: ...
+    @property
+    def settings(self) -> TerrainSettings: ...
+    @property
+    def level(self) -> int: ...
+    @property
+    def heights(self) -> NDArray[np.float32]: ...
+    @property
+    def gradient(self) -> NDArray[np.float32]: ...
+
+
+@dataclass(frozen=True)
+class RefinedTile:
+    """A tile above the global levels.
+
+    heights: (65, 65) float32 metres, read-only; edges are bit-equal to the neighbours'. content: digest of all that it
+    depends on: equal content, same bits.
+    """
+
+    key: TileKey
+    heights: NDArray[np.float32]
+    content: bytes
+
+
+class FieldCache:
+    """Fields of refined tiles by content, least recently used dropped first; shared by the refiners of a solver."""
+
+    def __init__(self, bytes_: int = CACHE_BYTES) -> None:
+        self.most = max(1, bytes_ // TILE_BYTES)
+        self._held: OrderedDict[bytes, Fields] = OrderedDict()
+
+    def __len__(self) -> int:
+        return len(self._held)
+
+    def get(self, content: bytes) -> Fields | None:
+        """The fields (3, 65, 65) of this content, if they are held."""
+        found = self._held.get(content)
+        if found is not None:
+            self._held.move_to_end(content)
+        return found
+
+    def put(self, content: bytes, fields: Fields) -> None:
+        """Hold fields."""
+        self._held[content] = fields
+        self._held.move_to_end(content)
+        while len(self._held) > self.most:
+            self._held.popitem(last=False)
+
+    def clear(self) -> None:
+        """Drop everything."""
+        self._held.clear()
+
+
+class Refiner:
+    """Refines one settled solve. Use it from the solver's thread."""
+
+    def __init__(self, basis: Basis, engine: Engine, cache: FieldCache) -> None:
+        self.basis, self._engine, self._cache = basis, engine, cache
+        self._packer = WindowPacker(basis.strokes, basis.settings)
+        self._ground = np.concatenate([basis.gradient, basis.heights[None]])
+        self._digests: dict[TileKey, bytes] = {}
+        self._content: dict[TileKey, bytes] = {}
+        self._strokes = _Strokes(self._packer)
+        s = basis.settings
+        self._settings = repr((s.size_m, s.reach_m, s.border, basis.level)).encode()
+
+    def content(self, key: TileKey) -> bytes:
+        """Digest of all that a tile depends on: the key, the settings, the strokes that reach its windows at any level
+        of the chain, the settled samples under them. Raises ValueError for a tile that is not above the global levels
+        or not within the terrain."""
+        known = self._content.get(key)
+        if known is None:
+            known = self._content[key] = self._digest(key)
+        return known
+
+    def tiles(self, keys: Sequence[TileKey]) -> Iterator[RefinedTile | None]:
+        """Every tile of ``keys`` once, in that order; None wherever the work can be left.
+
+        Close the iterator to stop; what was finished stays in the cache. Raises ValueError like ``content``.
+        """
+        for key in keys:
+            self.content(key)
+        wanted = list(dict.fromkeys(keys))
+        for at, key in enumerate(wanted):
+            field = self._cache.get(self.content(key))
+            if field is None:
+                near = [k for k in wanted[at:] if k.level == key.level and _block(k) == _block(key)]
+                field = (yield from self._made(near))[key]
+            yield RefinedTile(key, field[2], self.content(key))
+
+    def window(
+        self, level: int, rows: slice, cols: slice, progress: Callable[[float], None] | None = None
+    ) -> NDArray[np.float32]:
+        """Heights of a rectangle of samples of any level up to MAX_REFINED_LEVEL: (rows, columns) float32, metres.
+
+        ``progress`` is told the share that is done. Raises ValueError for slices with steps or outside of the level.
+        """
+        if not 0 <= level <= MAX_REFINED_LEVEL:
+            raise ValueError(f"level must be 0..{MAX_REFINED_LEVEL}, not {level}")
+        span = Span(*_bounds(rows, level), *_bounds(cols, level))
+        if level <= self.basis.level:
+            jump = 1 << (self.basis.level - level)
+            whole = self.basis.heights[::jump, ::jump]
+            return np.ascontiguousarray(whole[span.r0 : span.r1, span.c0 : span.c1])
+        out = np.empty(span.shape, dtype=np.float32)
+        groups = _in_z_order(_boxes(_cover(span, level)))
+        for done, box in enumerate(groups):
+            keys = _keys(level, box)
+            for key, field in self._all(keys).items():
+                _paste(out[None], span, key, field[2:])
+            if progress is not None:
+                progress((done + 1) / len(groups))
+        return out
+
+    def _all(self, keys: list[TileKey]) -> dict[TileKey, Fields]:
+        """The fields of tiles, without leaving the work."""
+        work = self._made(keys)
+        while True:
+            try:
+                next(work)
+            except StopIteration as end:
+                found: dict[TileKey, Fields] = end.value
+                return found
+
+    def _made(self, keys: Iterable[TileKey]) -> Generator[None, None, dict[TileKey, Fields]]:
+        """Fields of tiles of one level, from the cache or made now; yields where the work can be left."""
+        out: dict[TileKey, Fields] = {}
+        missing: list[TileKey] = []
+        for key in keys:
+            held = self._cache.get(self.content(key))
+            if held is None:
+                missing.append(key)
+            else:
+                out[key] = held
+        if missing:
+            x, y = [k.x for k in missing], [k.y for k in missing]
+            for box in _boxes((min(x), min(y), max(x) + 1, max(y) + 1)):
+                if any(box[0] <= k.x < box[2] and box[1] <= k.y < box[3] for k in missing):
+                    out |= yield from self._computed(missing[0].level, box)
+        return out
+
+    def _computed(self, level: int, box: Box) -> Generator[None, None, dict[TileKey, Fields]]:
+        """The tiles of a box, computed in one step after what they need of the parent level."""
+        x0, y0, x1, y1 = box
+        at = step(level, Span(y0 * TILE_CELLS, y1 * TILE_CELLS + 1, x0 * TILE_CELLS, x1 * TILE_CELLS + 1))
+        parent = yield from self._parent(at)
+        tables = self._packer.pack(level, at.box)
+        fields = self._engine.run(at, tables, parent)
+        out = {}
+        for key in _keys(level, box):
+            r, c = (key.y - y0) * TILE_CELLS, (key.x - x0) * TILE_CELLS
+            tile = fields[:, r : r + TILE_SAMPLES, c : c + TILE_SAMPLES].copy()
+            tile.flags.writeable = False
+            out[key] = tile
+            self._cache.put(self.content(key), tile)
+        yield
+        return out
+
+    def _parent(self, at: Step) -> Generator[None, None, Fields]:
+        """What a step reads of the next coarser level."""
+        p = at.parent
+        if at.level - 1 == self.basis.level:
+            return self._ground[:, p.r0 : p.r1, p.c0 : p.c1]
+        out = np.empty((CHANNELS, *p.shape), dtype=np.float32)
+        tiles = yield from self._made(_keys(at.level - 1, _cover(p, at.level - 1)))
+        for key, field in tiles.items():
+            _paste(out, p, key, field)
+        return out
+
+    def _digest(self, key: TileKey) -> bytes:
+        low = self.basis.level
+        side = 1 << key.level if 0 <= key.level <= MAX_REFINED_LEVEL else 0
+        if key.level <= low or not (0 <= key.x < side and 0 <= key.y < side):
+            raise ValueError(f"{key} is not a tile of levels {low + 1}..{MAX_REFINED_LEVEL}")
+        span, level = _span(key), key.level
+        at = step(level, span)
+        while level > low + 1:
+            level -= 1
+            at = step(level, _tile_span(_cover(at.parent, level)))
+        out = blake2b(self._settings, digest_size=_DIGEST)
+        out.update(repr(tuple(key)).encode())
+        out.update(self._strokes.digest(at))
+        for ground in _keys(low, _cover(at.parent, low)):
+            out.update(self._ground_digest(ground))
+        return out.digest()
+
+    def _ground_digest(self, key: TileKey) -> bytes:
+        known = self._digests.get(key)
+        if known is None:
+            s = _span(key)
+            part = np.ascontiguousarray(self._ground[:, s.r0 : s.r1, s.c0 : s.c1])
+            known = self._digests[key] = blake2b(part.tobytes(), digest_size=_DIGEST).digest()
+        return known
+
+
+class _Strokes:
+    """Digests of the strokes that can reach a window. The coarsest window of a chain holds all finer ones, on the
+    ground, and strokes reach farthest at the coarsest level: so its strokes are those of the chain."""
+
+    def __init__(self, packer: WindowPacker) -> None:
+        self._packer = packer
+        self._digests: dict[str, bytes] = {}
+
+    def digest(self, at: Step) -> bytes:
+        out = blake2b(digest_size=_DIGEST)
+        for stroke in self._packer.reaching(at.level, at.box):
+            known = self._digests.get(stroke.id)
+            if known is None:
+                text = stroke.model_dump_json(exclude=_WITHOUT_EFFECT).encode()
+                known = self._digests[stroke.id] = blake2b(text, digest_size=_DIGEST).digest()
+            out.update(known)
+        return out.digest()
+
+
+def _block(key: TileKey) -> tuple[int, int]:
+    """Tiles of one block are made together."""
+    return key.x // GROUP, key.y // GROUP
+
+
+def _span(key: TileKey) -> Span:
+    return _tile_span((key.x, key.y, key.x + 1, key.y + 1))
+
+
+def _tile_span(box: Box) -> Span:
+    """The samples of a box of tiles, both edges included."""
+    x0, y0, x1, y1 = box
+    return Span(y0 * TILE_CELLS, y1 * TILE_CELLS + 1, x0 * TILE_CELLS, x1 * TILE_CELLS + 1)
+
+
+def _cover(span: Span, level: int) -> Box:
+    """The fewest tiles that hold a span."""
+    last = (1 << level) - 1
+    r, c = max(span.r1 - 2, span.r0), max(span.c1 - 2, span.c0)
+    return (
+        min(span.c0 // TILE_CELLS, last),
+        min(span.r0 // TILE_CELLS, last),
+        min(c // TILE_CELLS, last) + 1,
+        min(r // TILE_CELLS, last) + 1,
+    )
+
+
+def _keys(level: int, box: Box) -> list[TileKey]:
+    x0, y0, x1, y1 = box
+    return [TileKey(level, x, y) for y in range(y0, y1) for x in range(x0, x1)]
+
+
+def _boxes(box: Box) -> list[Box]:
+    """A box cut evenly into boxes of at most GROUP tiles a side."""
+    x0, y0, x1, y1 = box
+    across, along = _cuts(x0, x1), _cuts(y0, y1)
+    return [(a, b, c, d) for b, d in along for a, c in across]
+
+
+def _cuts(low: int, high: int) -> list[tuple[int, int]]:
+    parts = -(-(high - low) // GROUP)
+    edges = [low + (high - low) * k // parts for k in range(parts + 1)]
+    return list(itertools.pairwise(edges))
+
+
+def _in_z_order(boxes: list[Box]) -> list[Box]:
+    """So that boxes follow each other that share parents."""
+
+    def spread(v: int) -> int:
+        return sum(((v >> k) & 1) << (2 * k) for k in range(MAX_REFINED_LEVEL + 1))
+
+    return sorted(boxes, key=lambda b: spread(b[0]) | spread(b[1]) << 1)
+
+
+def _paste(out: Fields, span: Span, key: TileKey, tile: Fields) -> None:
+    """Copies what a tile shares with a span."""
+    at = _span(key)
+    r0, r1, c0, c1 = max(span.r0, at.r0), min(span.r1, at.r1), max(span.c0, at.c0), min(span.c1, at.c1)
+    out[:, r0 - span.r0 : r1 - span.r0, c0 - span.c0 : c1 - span.c0] = tile[
+        :, r0 - at.r0 : r1 - at.r0, c0 - at.c0 : c1 - at.c0
+    ]
+
+
+def _bounds(part: slice, level: int) -> tuple[int, int]:
+    n = grid.samples(level)
+    low, high, jump = part.indices(n)
+    if jump != 1 or low >= high or (part.stop is not None and part.stop > n) or (part.start or 0) < 0:
+        raise ValueError(f"not a range of the {n} samples of level {level}: {part}")
+    return low, high
+
+
+class Refinery:
+    """What the refiners of one solver share: the kernels' memory on ``device`` (None: NumPy) and the cache."""
+
+    def __init__(self, device: Device | None, cache_bytes: int = CACHE_BYTES) -> None:
+        self.cache = FieldCache(cache_bytes)
+        self._device = device
+        self._engine: Engine | None = None
+
+    def refiner(self, basis: Basis) -> Refiner:
+        """A refiner of a settled solve of the same solver."""
+        if self._engine is None:
+            self._engine = NumpyEngine() if self._device is None else ClEngine(self._device)
+        return Refiner(basis, self._engine, self.cache)
