@@ -1,0 +1,116 @@
+/** Amplitude and roughness on the page (SPEC R23). */
+
+import { describe, expect, it } from "vitest";
+import type { DecodedFrame } from "../../src/core/types.ts";
+import { AMPLITUDE_QUANTA_PER_M, Channel, FrameKind, ROUGHNESS_QUANTA } from "../../src/generated/contract.ts";
+import { channelTexels } from "../../src/gpu/channeltexture.ts";
+import { ChannelStore } from "../../src/tiles/channels.ts";
+
+const SIZE = 1000;
+
+/** A whole level of a channel whose samples are a function of column and row of the level. */
+function level(
+  channel: number,
+  at: number,
+  sample: (col: number, row: number) => number,
+  drops: { x: number; y: number }[] = [],
+  have: (x: number, y: number) => boolean = () => true,
+): DecodedFrame {
+  const tiles = [];
+  for (let y = 0; y < 1 << at; y += 1) {
+    for (let x = 0; x < 1 << at; x += 1) {
+      if (!have(x, y)) continue;
+      const samples = new Int32Array(65 * 65);
+      for (let r = 0; r < 65; r += 1)
+        for (let c = 0; c < 65; c += 1) samples[r * 65 + c] = Math.round(sample(64 * x + c, 64 * y + r));
+      const none = new Int32Array(16);
+      tiles.push({ x, y, version: 1, samples, subMin: none, subMax: none, subError: new Uint32Array(16) });
+    }
+  }
+  return { kind: FrameKind.LEVEL, level: at, channel, clock: 1, settled: true, drops, tiles, bytes: 1 };
+}
+
+describe("ChannelStore", () => {
+  it("R23: says the base values before anything has come", () => {
+    const store = new ChannelStore(SIZE);
+    expect(store.amplitudeAt(300, 400)).toBe(0);
+    expect(store.roughnessAt(300, 400)).toBe(0.5);
+  });
+
+  it("R23: gives metres and shares, bilinear between samples, the border's value outside", () => {
+    const store = new ChannelStore(SIZE);
+    store.apply(level(Channel.AMPLITUDE, 0, (c) => 4 * AMPLITUDE_QUANTA_PER_M * (c / 64)));
+    store.apply(level(Channel.ROUGHNESS, 0, (_, r) => ROUGHNESS_QUANTA * (r / 64 - 0.5)));
+    expect(store.amplitudeAt(500, 123)).toBeCloseTo(2, 2);
+    expect(store.amplitudeAt(507.8, 123)).toBeCloseTo(4 * 0.5078, 2);
+    expect(store.roughnessAt(1, 750)).toBeCloseTo(0.75, 2);
+    expect(store.amplitudeAt(-50, 9)).toBe(0);
+    expect(store.amplitudeAt(5000, 9)).toBe(4);
+  });
+
+  it("R23: shows the finest complete level of each channel; heights are none of its business", () => {
+    const store = new ChannelStore(SIZE);
+    store.apply(level(Channel.AMPLITUDE, 0, () => 64));
+    expect(store.stamp).toBe(1);
+    store.apply(level(Channel.HEIGHT, 0, () => 9999));
+    expect(store.stamp).toBe(1);
+    store.apply(
+      level(
+        Channel.AMPLITUDE,
+        1,
+        () => 128,
+        [],
+        (x, y) => x + y < 2,
+      ),
+    );
+    expect(store.amplitude.side).toBe(65);
+    expect(store.amplitudeAt(100, 100)).toBe(1);
+    store.apply(
+      level(
+        Channel.AMPLITUDE,
+        1,
+        () => 128,
+        [],
+        (x, y) => x + y === 2,
+      ),
+    );
+    expect(store.amplitude.side).toBe(129);
+    expect(store.amplitudeAt(100, 100)).toBe(2);
+    expect(store.roughness.side).toBe(2);
+    store.apply({
+      ...level(
+        Channel.AMPLITUDE,
+        1,
+        () => 0,
+        [{ x: 1, y: 0 }],
+        () => false,
+      ),
+    });
+    expect(store.amplitude.side).toBe(65);
+  });
+
+  it("R23: a new connection's first frame replaces everything", () => {
+    const store = new ChannelStore(SIZE);
+    store.apply(level(Channel.AMPLITUDE, 0, () => 64));
+    store.apply(level(Channel.AMPLITUDE, 1, () => 64));
+    store.restart();
+    expect(store.amplitudeAt(5, 5)).toBe(1);
+    store.apply(level(Channel.ROUGHNESS, 0, () => 0));
+    expect(store.amplitudeAt(5, 5)).toBe(0);
+  });
+});
+
+describe("channelTexels", () => {
+  it("R23: amplitude in parts of the greatest, roughness whole, on the finer grid", () => {
+    const store = new ChannelStore(SIZE);
+    store.apply(level(Channel.AMPLITUDE, 0, (c) => 6 * AMPLITUDE_QUANTA_PER_M * (c / 64)));
+    const { bytes, side, fullScale } = channelTexels(store);
+    expect([side, fullScale]).toEqual([65, 6]);
+    expect([bytes[0], bytes[2 * 64], bytes[2 * 32]]).toEqual([0, 255, 128]);
+    expect(bytes[1]).toBe(128);
+  });
+
+  it("R23: nothing asked for is amplitude 0, whatever the scale", () => {
+    expect([...channelTexels(new ChannelStore(SIZE)).bytes]).toEqual([0, 128, 0, 128, 0, 128, 0, 128]);
+  });
+});
