@@ -26,6 +26,7 @@ from esker.solve import multigrid, proof
 from esker.solve.constraints import Packer
 from esker.solve.device import NUMPY, NUMPY_NAME, Device, open_device
 from esker.solve.faults import OutOfDeviceMemoryError, guarded, is_fault
+from esker.solve.refine import Refiner, Refinery
 from esker.solve.workspaces import new_workspace
 
 PREVIEW_GRADIENT_CYCLES = 1
@@ -122,6 +123,7 @@ class Solver:
             raise ValueError(f"max_level must be 0..{MAX_LEVEL}, not {max_level}")
         self.max_level = max_level
         self._spare: list[Workspace] = []
+        self._refinery: Refinery | None = None
         self._spare_bytes = min(SPARE_BYTES, os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // 8)
         self._device: Device | None = None
         self._device = open_device(device, threads, self._check)
@@ -130,6 +132,12 @@ class Solver:
     def device_name(self) -> str:
         """What solves, for logs and people."""
         return NUMPY_NAME if self._device is None else self._device.name
+
+    def refiner(self, basis: Basis) -> Refiner:
+        """What refines a settled solve of this solver above its level (DESIGN 5.6). Refiners share a cache."""
+        if self._refinery is None:
+            self._refinery = Refinery(self._device)
+        return self._refinery.refiner(basis)
 
     def steps(
         self, strokes: Sequence[Stroke], settings: TerrainSettings, levels: int | None = None, *, basis: bool = False
