@@ -1,4 +1,4 @@
-"""The benchmark's own parts: exact solutions, byte model, peers under limits (SPEC S25, S26)."""
+"""The benchmark's own parts: exact solutions, byte model, peers under limits (SPEC S83, S84)."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def problem(device: Device, level: int, name: str) -> tuple[ClWorkspace, _exact.
 
 @pytest.mark.parametrize("name", ["fifty", "border", "tiny"])
 def test_refinement_gives_the_direct_solution(device: Device, name: str) -> None:
-    """SPEC S25: what everything is measured against is right, to float64 rounding."""
+    """SPEC S83: what everything is measured against is right, to float64 rounding."""
     _, c, exact = problem(device, 2, name)
     a, b = system(c.height_d.astype(np.float64), exact.f, c.screening)
     direct = spla.spsolve(a.tocsc(), b).reshape(exact.heights.shape)
@@ -64,7 +64,7 @@ def test_factor_of_a_cycle_that_does_nothing(device: Device, monkeypatch: pytest
 
 
 def test_byte_model() -> None:
-    """SPEC S26: a visit of one channel moves 4 1/2 floats a sample, of two channels 8; the bottom is one launch."""
+    """SPEC S84: a visit of one channel moves 4 1/2 floats a sample, of two channels 8; the bottom is one launch."""
     samples = grid.samples(4) ** 2
     one, two = _kernels.Recorder(4, 1), _kernels.Recorder(4, 2)
     for model in (one, two):
@@ -91,7 +91,7 @@ def saved(device: Device, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.parametrize("name", _peers.NAMES)
 def test_peers_solve_the_same_system(saved: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """SPEC S26: every peer reaches the errors that it was asked for, on the system that we solve."""
+    """SPEC S84: every peer reaches the errors that it was asked for, on the system that we solve."""
     pytest.importorskip(_peers.NEEDS[name])
     monkeypatch.setattr(_peers, "MOST_RUNS", 1)
     figures = _peers.solve(name, saved)
@@ -103,7 +103,7 @@ def test_peers_solve_the_same_system(saved: Path, name: str, monkeypatch: pytest
 
 
 def test_a_peer_without_enough_memory_or_time_or_package(saved: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """SPEC S26: a peer that cannot says why, and the run goes on."""
+    """SPEC S84: a peer that cannot says why, and the run goes on."""
     assert "memory" in _peers.run("superlu", saved, 0.3, 60)["failed"]
     assert _peers.run("superlu", saved, 8, 0.05)["failed"] == "out of time"
     monkeypatch.setitem(_peers.NEEDS, "superlu", "no_such_package")

@@ -1,4 +1,4 @@
-"""The committed gallery, and the solver's accuracy on all of it (SPEC S3, S4, S18, S22 to S24)."""
+"""The committed gallery, and the solver's accuracy on all of it (SPEC S3, S4, S18, S80 to S82)."""
 
 from __future__ import annotations
 
@@ -6,14 +6,17 @@ import numpy as np
 import pytest
 
 from esker import grid
-from esker.bench import gallery
+from esker.bench import _accuracy, _exact, gallery
+from esker.contract import Border
 from esker.document import archive
 from esker.solve import command
+from esker.solve.device import Device
+from esker.solve.levels import ClWorkspace
 from esker.solve.solver import Solver
 
 
 def test_drawing_again_changes_nothing() -> None:
-    """SPEC S22: what is committed is what the script draws."""
+    """SPEC S80: what is committed is what the script draws."""
     drawn = gallery.draw()
     assert list(drawn) == list(gallery.NAMES)
     assert {path.stem for path in gallery.FOLDER.iterdir()} == set(gallery.NAMES)
@@ -47,6 +50,48 @@ def test_solve_command_on_every_scene(name: str, tmp_path, capsys: pytest.Captur
     assert np.ptp(heights) > 5
     said = capsys.readouterr().err
     assert "level 2 (257 x 257) settled" in said
+
+
+@pytest.mark.parametrize("level", [2, 3])
+@pytest.mark.parametrize("name", gallery.NAMES)
+def test_accuracy(device: Device, solver: Solver, name: str, level: int) -> None:
+    """SPEC S3, S4, S18, S81, S82 on every scene; ``esker bench solve`` goes on to 4097 samples a side."""
+    document = gallery.load(name)
+    shown = _accuracy.product(solver, document, level)
+    figures = _accuracy.measure(ClWorkspace(device, level), document, shown, previews=False)
+    assert figures["gradient_factor"] <= 0.4
+    assert figures["height_factor"] <= 0.4
+    assert figures["preview_of_relief"] <= 1e-3
+    assert figures["rest_of_quantum"] < 0.5
+    assert figures["floor_of_relief"] <= 2e-6
+    assert figures["curve_of_relief"][3] <= 1e-3, "full multigrid and three cycles"
+
+
+@pytest.mark.parametrize("border", ["free", "pinned"])
+@pytest.mark.parametrize("reach_m", [128.0, None])
+def test_accuracy_of_the_borders(device: Device, solver: Solver, border: Border, reach_m: float | None) -> None:
+    """SPEC S3, S4, S82 with strokes on the border, free and pinned, with reach and without."""
+    document = gallery.load("border")
+    settings = document.settings.model_copy(update={"border": border, "reach_m": reach_m})
+    document = document.model_copy(update={"settings": settings})
+    shown = _accuracy.product(solver, document, 3)
+    figures = _accuracy.measure(ClWorkspace(device, 3), document, shown, previews=False)
+    assert max(figures["gradient_factor"], figures["height_factor"]) <= 0.4
+    assert figures["preview_of_relief"] <= (1e-3 if reach_m else 5e-3), "an endless reach asks for more gradient cycles"
+    assert figures["rest_of_quantum"] < 0.5
+    assert figures["floor_of_relief"] <= 2e-6
+
+
+@pytest.mark.parametrize("name", ["five", "crossing", "twins", "canyon"])
+def test_ties(device: Device, name: str) -> None:
+    """SPEC S4: where float32 and float64 see the same constraints they give the same ground."""
+    document = gallery.load(name)
+    w = ClWorkspace(device, 2)
+    c = _exact.load(w, document.strokes, document.settings)
+    figures = _accuracy.ties(document, c, _exact.exact(w, c))
+    assert figures["samples"] < 100
+    assert figures["error_of_relief"] < 1e-3
+    assert figures["error_elsewhere_of_relief"] < 5e-5
 
 
 def test_solver_is_shared(solver: Solver) -> None:

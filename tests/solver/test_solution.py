@@ -91,7 +91,7 @@ def pin(w: ClWorkspace, d: Field, f: Field) -> None:
 
 @pytest.mark.parametrize("level", [1, 2, 3])
 def test_manufactured_solution(device: Device, level: int) -> None:
-    """SPEC S27: exact differences as guidance and one pinned sample give a known field back, in float32."""
+    """SPEC S85: exact differences as guidance and one pinned sample give a known field back, in float32."""
     w, n = ClWorkspace(device, level), grid.samples(level)
     h = field(n)
     d, f = np.zeros_like(h), -reference.laplacian(h)
@@ -106,7 +106,7 @@ def test_manufactured_solution(device: Device, level: int) -> None:
 
 
 def test_manufactured_gradient(device: Device) -> None:
-    """SPEC S27 through the guidance kernel: the gradient of a quadratic ground gives its differences exactly."""
+    """SPEC S85 through the guidance kernel: the gradient of a quadratic ground gives its differences exactly."""
     level, size = 3, 4096.0
     w, n = ClWorkspace(device, level), grid.samples(level)
     y, x = np.mgrid[0:n, 0:n] * grid.spacing(level, size)

@@ -21,7 +21,6 @@ from esker.solve import multigrid, reference_raster
 from esker.solve.assembly import assemble
 from esker.solve.constraints import pack
 from esker.solve.device import open_device
-from esker.solve.levels import ClWorkspace
 from esker.solve.solver import Solver
 
 Field = NDArray[np.float32]
@@ -62,7 +61,7 @@ def product(solver: Solver, document: Document, level: int) -> tuple[Field, Fiel
     return settled if preview is None else preview, settled, steps
 
 
-def two_steps(w: ClWorkspace, gradient_cycles: int, height_cycles: int) -> None:
+def two_steps(w: _exact.DeviceWorkspace, gradient_cycles: int, height_cycles: int) -> None:
     """Full multigrid of both steps and so many cycles of the finest level: previews without reading them."""
     _exact.full_multigrid(w.gradient)
     for _ in range(gradient_cycles):
@@ -75,7 +74,7 @@ def two_steps(w: ClWorkspace, gradient_cycles: int, height_cycles: int) -> None:
 
 
 def measure(
-    w: ClWorkspace,
+    w: _exact.DeviceWorkspace,
     document: Document,
     shown: tuple[Field, Field, int],
     maps: dict[str, Field] | None = None,
@@ -166,9 +165,9 @@ def run(names: tuple[str, ...], levels: range, say: Any) -> tuple[dict[str, Any]
             shown = product(Solver(max_level=level), document, level)  # a solver of its own: its memory goes first
             gc.collect()
             here: dict[str, Field] | None = {} if level == MAP_LEVEL and name in MAP_SCENES else None
-            figures = measure(ClWorkspace(device, level), document, shown, here)
+            figures = measure(_exact.workspace(device, level), document, shown, here)
             if level <= TIES_LEVEL:
-                w = ClWorkspace(device, level)
+                w = _exact.workspace(device, level)
                 c = _exact.load(w, document.strokes, document.settings)
                 figures["ties"] = ties(document, c, _exact.exact(w, c))
             gc.collect()

@@ -16,10 +16,15 @@ from numpy.typing import NDArray
 from esker import grid
 from esker.contract import Stroke, TerrainSettings
 from esker.solve import multigrid, reference
+from esker.solve.device import Device
+from esker.solve.gpu_levels import GpuSystem, GpuWorkspace
 from esker.solve.levels import ClSystem, ClWorkspace
+from esker.solve.workspaces import new_workspace
 
 Field = NDArray[np.float64]
 Field32 = NDArray[np.float32]
+DeviceSystem = ClSystem | GpuSystem
+DeviceWorkspace = ClWorkspace | GpuWorkspace
 BLOCK = 128
 """Rows of a residual at once: a strip stays in the cache."""
 ROUNDS = 12
@@ -47,7 +52,14 @@ class Constraints:
     height_f: Field32
 
 
-def constraints(w: ClWorkspace, settings: TerrainSettings) -> Constraints:
+def workspace(device: Device, level: int) -> DeviceWorkspace:
+    """A workspace whose fields can be read and written, with the kernels of the device."""
+    made = new_workspace(device, level)
+    assert isinstance(made, ClWorkspace | GpuWorkspace), "NumPy comes without a device only"
+    return made
+
+
+def constraints(w: DeviceWorkspace, settings: TerrainSettings) -> Constraints:
     """The constraints of a workspace that was loaded and not solved yet."""
     return Constraints(
         w.top,
@@ -60,7 +72,7 @@ def constraints(w: ClWorkspace, settings: TerrainSettings) -> Constraints:
     )
 
 
-def full_multigrid(system: ClSystem) -> None:
+def full_multigrid(system: DeviceSystem) -> None:
     """u of the finest level from nothing, ready for cycles."""
     for level in range(system.top):
         multigrid.start(system, level)
@@ -68,7 +80,7 @@ def full_multigrid(system: ClSystem) -> None:
     multigrid.start(system, system.top)
 
 
-def load(w: ClWorkspace, strokes: tuple[Stroke, ...], settings: TerrainSettings) -> Constraints:
+def load(w: DeviceWorkspace, strokes: tuple[Stroke, ...], settings: TerrainSettings) -> Constraints:
     """Rasterise afresh, whatever the workspace held, and read the constraints."""
     w.packer.forget()
     w.load(strokes, settings)
@@ -94,7 +106,7 @@ def residual(u: Field, f: Field32 | Field, d: Field32, screening: float) -> tupl
     return out, largest
 
 
-def solve(system: ClSystem, f: Field32 | Field, d: Field32, screening: float, start: Field) -> Field:
+def solve(system: DeviceSystem, f: Field32 | Field, d: Field32, screening: float, start: Field) -> Field:
     """A u = f to float64 rest, from ``start`` (c, n, n), which holds the right values at fixed samples.
 
     Overwrites f and u of the system's finest level. Raises RuntimeError when refinement stalls above RELATIVE.
@@ -127,7 +139,7 @@ def at_fixed(f: Field32 | Field, d: Field32) -> Field:
     return np.where(d[None] < 0, f, 0).astype(np.float64)
 
 
-def factor(system: ClSystem, d: Field32, seed: int = 1) -> float:
+def factor(system: DeviceSystem, d: Field32, seed: int = 1) -> float:
     """Asymptotic convergence factor of the device's own cycle, largest norm, on A u = 0 from a random start.
 
     The error is the solution itself here, so float32 follows it down as far as one likes: no rounding floor.
@@ -159,7 +171,7 @@ class Exact:
     relief: float
 
 
-def exact(w: ClWorkspace, c: Constraints) -> Exact:
+def exact(w: DeviceWorkspace, c: Constraints) -> Exact:
     """Both steps to float64 rest. The workspace must be loaded; its finest f and u are overwritten."""
     gradient = solve(w.gradient, c.gradient_f, c.gradient_d, c.screening, at_fixed(c.gradient_f, c.gradient_d))
     static, d = c.height_f[None].astype(np.float64), c.height_d[None].astype(np.float64)
@@ -169,7 +181,7 @@ def exact(w: ClWorkspace, c: Constraints) -> Exact:
     return Exact(f[0], heights, max(float(np.ptp(heights)), float(np.abs(heights).max()), 1e-9))
 
 
-def errors_per_cycle(system: ClSystem, want: Field, count: int) -> Iterator[float]:
+def errors_per_cycle(system: DeviceSystem, want: Field, count: int) -> Iterator[float]:
     """Largest error of the finest u: after the full multigrid start, then after each cycle."""
     full_multigrid(system)
     yield float(np.abs(system.get("u", system.top)[0] - want).max())

@@ -25,7 +25,6 @@ from esker.bench._accuracy import significant, two_steps
 from esker.contract import CHEBYSHEV_SWEEPS, Channel, Stroke, TerrainSettings
 from esker.solve import multigrid
 from esker.solve.device import Device, open_device
-from esker.solve.levels import ClWorkspace
 from esker.solve.solver import PREVIEW_GRADIENT_CYCLES, PREVIEW_HEIGHT_CYCLES, Solver
 
 RUNS = 7
@@ -174,7 +173,7 @@ class Bench:
     """One scene on one workspace; every method leaves the queue empty."""
 
     def __init__(self, device: Device, level: int, scene: str, copy: float) -> None:
-        self.w = ClWorkspace(device, level)
+        self.w = _exact.workspace(device, level)
         self.document = gallery.load(scene)
         self.copy = copy
         self.queue = device.queue

@@ -25,7 +25,6 @@ from esker import grid
 from esker.bench import _accuracy, _exact, _kernels, _peers, _serving, gallery
 from esker.contract import MAX_LEVEL
 from esker.solve.device import open_device
-from esker.solve.levels import ClWorkspace
 
 PARTS = ("accuracy", "threads", "peers")
 TIMED = ("fifty", "alpine-ridge")
@@ -63,7 +62,7 @@ def problem(level: int, scene: str, ours: dict[str, Any], file: Path) -> int:
     if device is None:
         raise RuntimeError("No OpenCL device.")
     document = gallery.load(scene)
-    w = ClWorkspace(device, level)
+    w = _exact.workspace(device, level)
     c = _exact.load(w, document.strokes, document.settings)
     exact = _exact.exact(w, c)
     targets = {"preview": _kernels.TARGET * exact.relief, "rest": ours["heights_to_rest"]["error_m"]}

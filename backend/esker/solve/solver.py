@@ -30,7 +30,7 @@ from esker.solve.refine import Refiner, Refinery
 from esker.solve.workspaces import new_workspace
 
 PREVIEW_GRADIENT_CYCLES = 1
-PREVIEW_HEIGHT_CYCLES = 2
+PREVIEW_HEIGHT_CYCLES = 3
 MAX_CYCLES = 40
 UPDATE_SHARE = 0.5
 """Error after a cycle as a share of its last update: convergence factors are below 0.4 (DESIGN 5.3)."""
