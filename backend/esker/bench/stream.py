@@ -98,10 +98,12 @@ def _drain(client: ClientTiles) -> dict[str, int]:
 
 
 def _put(server: TileServer, solver: Solver, document: c.Document, clock: int, *, settle: bool = True) -> None:
+    """As the worker does where the finest preview comes within ``schedule.HOLD`` of the coarse ones."""
     for result in solver.steps(document.strokes, document.settings, LEVEL):
         if result is None:
             continue
-        server.put_level(clock, result.level, result.heights, result.settled)
+        show = result.settled or result.level in (0, LEVEL)
+        server.put_level(clock, result.level, result.heights, result.settled, result.channel, show)
         if result.level == LEVEL and not settle:
             return
 
