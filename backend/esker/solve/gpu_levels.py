@@ -26,6 +26,8 @@ LINE = 32
 """Floats of a cache line."""
 BLOCK = (32, 8)
 """Work-group of the kernels that do one sample a work-item."""
+MOST_BOUND = 512
+"""Kernels with their arguments set that a launcher keeps; a solve of seven levels comes back to some 200."""
 CHANGE_GROUPS = 512
 """At most so many partial results of ``change`` are left to the host."""
 
@@ -98,10 +100,13 @@ class GpuLauncher:
 
     def run(self, name: str, groups: tuple[int, ...], block: tuple[int, ...], *args: Any) -> None:
         """Enqueue ``groups`` work-groups of ``block`` work-items, with arguments that live as long as the launcher."""
-        key = (name, groups, args)
-        kernel = self.bound.get(key)
+        key = (name, args)
+        kernel = self.bound.pop(key, None)
         if kernel is None:
-            kernel = self.bound[key] = self._kernel(name, args)
+            kernel = self._kernel(name, args)
+            if len(self.bound) >= MOST_BOUND:
+                del self.bound[next(iter(self.bound))]
+        self.bound[key] = kernel
         self._enqueue(kernel, groups, block)
 
     def run_once(self, name: str, groups: tuple[int, ...], block: tuple[int, ...], *args: Any) -> None:
@@ -236,7 +241,7 @@ def _window(shape: Shape, channel: int) -> dict[str, Any]:
     }
 
 
-class _Bins:
+class Bins:
     """What ``raster.rasterise`` launches with: a work-group of one work-item a sample for every bin."""
 
     def __init__(self, launch: GpuLauncher) -> None:
@@ -280,7 +285,7 @@ class GpuWorkspace:
         shape, h, g = self.height.shapes[self.top], self.height.fields, self.gradient.fields
         fields = (h["d", self.top], h["s", self.top], g["d", self.top], g["f", self.top])
         target = raster.Target(*fields, shape.pitch, shape.stride)
-        raster.rasterise(_Bins(self.launch), tables, window, target)
+        raster.rasterise(Bins(self.launch), tables, window, target)
 
     def guide(self, level: int) -> None:
         """f of the height step at ``level`` from u of the gradient step."""

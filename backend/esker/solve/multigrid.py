@@ -7,12 +7,21 @@ correction equation, ``e``/``t`` the correction and its predecessor. A call work
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
 from typing import Protocol
 
 FMG_BOTTOM_CYCLES = 4
 """Bottom cycles that start the full multigrid."""
 LONE_BOTTOM_CYCLES = 24
 """Bottom cycles when level 0 is the finest: they must settle it."""
+
+MAX_CYCLES = 40
+UPDATE_SHARE = 0.5
+"""Error after a cycle as a share of its last update: convergence factors are below 0.4 (DESIGN 5.3)."""
+STALLED = 0.8
+STALLED_AFTER = 8
+"""After this many cycles a ratio of two updates above STALLED means that float32 has nothing left to gain."""
 
 
 class System(Protocol):
@@ -84,3 +93,15 @@ def cycle(system: System) -> None:
     correct(system, system.top - 1, full=True)
     system.visit(system.top, rhs="f", out="v", guess="u", correction="e", residual=True)
     system.swap(system.top)
+
+
+def converge(system: System, tolerance: float) -> Iterator[None]:
+    """Cycles until the estimated error of the finest level is below ``tolerance``; leaves off between them."""
+    before = math.inf
+    for k in range(1, MAX_CYCLES + 1):
+        cycle(system)
+        update = system.change("v", "u")
+        if update * UPDATE_SHARE < tolerance or (k >= STALLED_AFTER and update > STALLED * before):
+            return
+        before = update
+        yield

@@ -11,7 +11,6 @@ every solve starts from zero, strokes are ordered by id, and no cache changes a 
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass
@@ -21,8 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from esker import grid
-from esker.contract import MAX_LEVEL, Channel, Stroke, TerrainSettings
+from esker.contract import MAX_LEVEL, TILE_CELLS, Channel, Stroke, TerrainSettings
 from esker.solve import multigrid, proof
+from esker.solve.channels import ChannelSolver, channel_level
 from esker.solve.constraints import Packer
 from esker.solve.device import NUMPY, NUMPY_NAME, Device, open_device
 from esker.solve.faults import OutOfDeviceMemoryError, guarded, is_fault
@@ -31,16 +31,10 @@ from esker.solve.workspaces import new_workspace
 
 PREVIEW_GRADIENT_CYCLES = 1
 PREVIEW_HEIGHT_CYCLES = 3
-MAX_CYCLES = 40
-UPDATE_SHARE = 0.5
-"""Error after a cycle as a share of its last update: convergence factors are below 0.4 (DESIGN 5.3)."""
 HEIGHT_SHARE = 0.25
 """Error, in quanta of the finest level, at which the heights are at rest: half of what DESIGN 5.3 asks for."""
 GRADIENT_SHARE = 1 / 16
 """Share of a quantum that the gradient's own error may cost the heights."""
-STALLED = 0.8
-STALLED_AFTER = 8
-"""After this many cycles a ratio of two updates above STALLED means that float32 has nothing left to gain."""
 SPARE_BYTES = 3 << 30
 """Memory that idle workspaces may keep, with the raster of the strokes that they last solved, but no more than an
 eighth of the machine's: a room whose workspace was given to another one has all its strokes rasterised again."""
@@ -124,6 +118,7 @@ class Solver:
         self.max_level = max_level
         self._spare: list[Workspace] = []
         self._refinery: Refinery | None = None
+        self._channel_solvers: dict[int, ChannelSolver] = {}
         self._spare_bytes = min(SPARE_BYTES, os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // 8)
         self._device: Device | None = None
         self._device = open_device(device, threads, self._check)
@@ -171,8 +166,8 @@ class Solver:
         for result in run:
             if result is not None and result.channel == Channel.HEIGHT:
                 latest[result.level] = result
-            if result is not None and on_level is not None:
-                on_level(result)
+                if on_level is not None:
+                    on_level(result)
             if should_stop is not None and should_stop():
                 run.close()
                 break
@@ -232,6 +227,7 @@ class Solver:
                     _gradients(workspace)
                     workspace.warm(warm)
                 yield from _to_rest(workspace, settings)
+                yield from self._channels(strokes, settings, top)
                 yield from _settled(workspace, strokes, settings, basis)
             except GeneratorExit:
                 raise
@@ -242,6 +238,16 @@ class Solver:
             finally:
                 if keep:
                     self._give(workspace)
+                del workspace  # the traceback of an error would keep it
+
+    def _channels(self, strokes: Sequence[Stroke], settings: TerrainSettings, top: int) -> Iterator[LevelResult | None]:
+        """Amplitude and roughness, final, levels coarse to fine."""
+        level = channel_level(top)
+        solver = self._channel_solvers.setdefault(level, ChannelSolver(self._device, level))
+        for channel, values in solver.solve(strokes, settings):
+            for coarser, samples in enumerate(_injections(_frozen(values))):
+                yield LevelResult(coarser, samples, settled=True, channel=channel)
+        yield None
 
     def _take(self, strokes: Sequence[Stroke], settings: TerrainSettings, top: int) -> Workspace:
         """An idle workspace that has most of these strokes rasterised already; or a new one; or the longest idle."""
@@ -308,32 +314,26 @@ def _to_rest(w: Workspace, settings: TerrainSettings) -> Iterator[None]:
         return
     quantum = grid.quantum(w.top, settings.size_m)
     span = min(settings.reach_m or settings.size_m / 4, settings.size_m / 4)
-    yield from _converge(w.gradient, GRADIENT_SHARE * quantum / span)
+    yield from multigrid.converge(w.gradient, GRADIENT_SHARE * quantum / span)
     w.guide(w.top)
     multigrid.refresh(w.height)
-    yield from _converge(w.height, HEIGHT_SHARE * quantum)
-
-
-def _converge(system: multigrid.System, tolerance: float) -> Iterator[None]:
-    """Cycles until the estimated error is below ``tolerance``."""
-    before = math.inf
-    for k in range(1, MAX_CYCLES + 1):
-        multigrid.cycle(system)
-        update = system.change("v", "u")
-        if update * UPDATE_SHARE < tolerance or (k >= STALLED_AFTER and update > STALLED * before):
-            return
-        before = update
-        yield
+    yield from multigrid.converge(w.height, HEIGHT_SHARE * quantum)
 
 
 def _settled(w: Workspace, strokes: Sequence[Stroke], settings: TerrainSettings, basis: bool) -> Iterator[LevelResult]:
     """All levels of a system at rest: the finest, and its injections."""
     heights = _frozen(w.read(w.top))
-    for level in range(w.top):
-        step = 1 << (w.top - level)
-        yield LevelResult(level, _frozen(heights[::step, ::step]), settled=True)
+    *coarser, finest = enumerate(_injections(heights))
+    for level, samples in coarser:
+        yield LevelResult(level, samples, settled=True)
     found = Basis(tuple(strokes), settings, w.top, heights, _frozen(w.read_gradient())) if basis else None
-    yield LevelResult(w.top, heights, settled=True, basis=found)
+    yield LevelResult(finest[0], finest[1], settled=True, basis=found)
+
+
+def _injections(finest: NDArray[np.float32]) -> list[NDArray[np.float32]]:
+    """Levels 0, 1, ... of which each holds every second sample of the next; the last is ``finest`` itself."""
+    top = ((len(finest) - 1) // TILE_CELLS).bit_length() - 1
+    return [*(_frozen(finest[:: 1 << (top - level), :: 1 << (top - level)]) for level in range(top)), finest]
 
 
 def _frozen(heights: NDArray[np.float32]) -> NDArray[np.float32]:
