@@ -6,7 +6,14 @@
         h = t.heights(level=4)
 
 A thread holds the socket. Calls apply at once here and are confirmed by the server; after a cut the thread reconnects
-and sends again what was not acknowledged. Heights are solved here from the document, not taken from tiles.
+and sends again what was not acknowledged. ``heights`` are solved here from the document; with ``ground=True`` the
+client also takes what the server streams:
+
+    with esker.connect(link, ground=True) as t:
+        t.ground.look(eye=(2000, 1900, 40), target=(2000, 2000, 30))
+        t.ground.wait()
+        fine = t.ground.tile(8, 120, 131)   # (65, 65) float32, metres, where one looks
+        rough = t.ground.roughness(2)       # (257, 257)
 """
 
 from __future__ import annotations
@@ -14,7 +21,6 @@ from __future__ import annotations
 import asyncio
 import logging
 import random
-import re
 import secrets
 import ssl
 import threading
@@ -23,7 +29,6 @@ from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, Self
-from urllib.parse import urlsplit
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,10 +42,15 @@ from esker.document.ops import Refusal
 from esker.document.sync import Diverged, SyncDoc
 from esker.document.undo import UndoPlan
 from esker.document.wire import op_json
+from esker.ground import StreamedGround
+from esker.link import Link, Refused
 from esker.session.limits import TokenBucket
 from esker.terrain import Terrain
+from esker.tiles.frame import FrameError
 
 log = logging.getLogger("esker.client")
+
+__all__ = ["Link", "LiveTerrain", "Refused", "connect"]
 
 RATE: Final = 0.8 * c.MAX_OPS_PER_SECOND
 BURST: Final = 0.5 * c.OPS_BURST
@@ -51,28 +61,8 @@ MAX_CURVE_POINTS: Final = 1_024
 BACKOFF_SECONDS: Final = (0.2, 10.0)
 FINAL_CODES: Final = frozenset(code for code in c.WS_CLOSE.values() if code <= 4008 or code == 4011)
 CONNECT_SECONDS: Final = 15.0
-
-
-class Refused(Exception):
-    """The server refused something; ``code`` is for machines, the message for people."""
-
-    def __init__(self, code: str, message: str) -> None:
-        super().__init__(message)
-        self.code = code
-
-
-class Link:
-    """A share link taken apart: where to connect, which terrain, with which secret."""
-
-    def __init__(self, link: str) -> None:
-        """Raises ValueError when it is not a link to a terrain."""
-        parts = urlsplit(link)
-        match = re.fullmatch(r"/t/([A-Za-z0-9_-]{1,40})", parts.path)
-        if parts.scheme not in ("http", "https") or not parts.netloc or match is None or not parts.fragment:
-            raise ValueError("a link looks like https://host/t/terrain#secret")
-        self.terrain, self.secret = match.group(1), parts.fragment
-        self.secure = parts.scheme == "https"
-        self.url = f"{'wss' if self.secure else 'ws'}://{parts.netloc}/ws"
+LOST: Final = (OSError, ConnectionClosed, InvalidHandshake, InvalidMessage, TimeoutError, Diverged, FrameError)
+"""After these the client connects again."""
 
 
 class LiveTerrain:
@@ -86,8 +76,10 @@ class LiveTerrain:
         ca_file: str | Path | None = None,
         timeout: float = CONNECT_SECONDS,
         solver: Any = None,
+        ground: bool = False,
     ) -> None:
-        """Connects and waits for the document. ``ca_file``: the ``esker-ca.pem`` of a classroom server.
+        """Connects and waits for the document. ``ca_file``: the ``esker-ca.pem`` of a classroom server; ``ground``:
+        take the tiles that the server streams.
 
         Raises ValueError for what is no link, Refused when the server does not let us in, TimeoutError.
         """
@@ -104,6 +96,9 @@ class LiveTerrain:
         self._members: tuple[c.Member, ...] = ()
         self._bucket = TokenBucket(RATE, BURST)
         self._local: tuple[Document, Terrain] | None = None
+        self._ground: StreamedGround | None = None
+        if ground:
+            self._ground = StreamedGround(self._sync, self._changed, self._poke, self._raise_failure)
         self._loop = asyncio.new_event_loop()
         self._wake = asyncio.Event()
         self._thread = threading.Thread(target=self._run, name="esker-client", daemon=True)
@@ -160,6 +155,13 @@ class LiveTerrain:
         """The confirmed document."""
         with self._changed:
             return self._sync.confirmed.to_document()
+
+    @property
+    def ground(self) -> StreamedGround:
+        """What the server streams. Raises RuntimeError unless connected with ``ground=True``."""
+        if self._ground is None:
+            raise RuntimeError("connect with ground=True to take the ground that the server streams")
+        return self._ground
 
     def heights(self, level: int = c.DEFAULT_LEVEL) -> NDArray[np.float32]:
         """Settled heights of the confirmed document, solved here; see ``Terrain.heights``."""
@@ -325,7 +327,7 @@ class LiveTerrain:
             started = time.monotonic()
             try:
                 await self._connection()
-            except (OSError, ConnectionClosed, InvalidHandshake, InvalidMessage, TimeoutError, Diverged) as error:
+            except LOST as error:
                 log.info("connection lost: %s", error)
                 if isinstance(error, Diverged):
                     with self._changed:
@@ -364,12 +366,18 @@ class LiveTerrain:
                 clock=self._sync.clock,
             )
             await socket.send(hello.model_dump_json())
+            if self._ground is not None:
+                with self._changed:
+                    self._ground.connected()
             sender = asyncio.create_task(self._send(socket))
             try:
                 async for message in socket:
-                    # Heights are solved here, so tile frames are not read and no credit is given for them.
                     if isinstance(message, str):
                         self._receive(c.SERVER_MESSAGE.validate_json(message))
+                    elif self._ground is not None:  # else frames are not read, and no credit is given for them
+                        with self._changed:
+                            credit = self._ground.applied(message)
+                        await socket.send(credit.model_dump_json())
             finally:
                 sender.cancel()
                 await asyncio.gather(sender, return_exceptions=True)
@@ -381,6 +389,11 @@ class LiveTerrain:
             if self._closing:
                 await socket.close()
                 return
+            if self._ground is not None and self._online:
+                with self._changed:
+                    view = self._ground.unsent()
+                if view is not None:
+                    await socket.send(view.model_dump_json())
             while self._online and not self._closing:
                 with self._changed:
                     envelopes = self._sync.outgoing(1) if self._bucket.take(time.monotonic()) else None
@@ -408,6 +421,8 @@ class LiveTerrain:
                     self._refusals.append(Refused(message.code, message.message))
                 case c.Members():
                     self._members = message.members
+                case c.Progress() if self._ground is not None:
+                    self._ground.progressed(message)
                 case c.ErrorMessage() if message.fatal and c.WS_CLOSE[message.code] in FINAL_CODES:
                     self._failure = Refused(message.code, message.message)
             self._changed.notify_all()

@@ -25,6 +25,7 @@ LAYERS: tuple[frozenset[str], ...] = (
     frozenset({"templates"}),
     frozenset({"solve", "tiles", "store", "settings"}),
     frozenset({"session", "terrain"}),
+    frozenset({"ground", "link"}),
     frozenset({"client", "tls", "headers", "upload"}),
     frozenset({"server"}),
     frozenset({"run"}),
