@@ -5,6 +5,7 @@ Where there is no GPU they run on PoCL's CPU device, which has work-groups and l
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from dataclasses import replace
 
 import numpy as np
@@ -291,6 +292,7 @@ def test_history_changes_not_one_bit(tile_solver: Solver) -> None:
     tile_solver.solve(strokes, SETTINGS, 2)
     tile_solver.solve(strokes[::-1], ENDLESS, 2, should_stop=lambda: True)
     run = tile_solver.steps(strokes[:9], SETTINGS, 2)
+    assert isinstance(run, Generator)
     next(run)
     again = tile_solver.solve(edited(strokes)[::-1], SETTINGS, 2)[2]
     run.close()

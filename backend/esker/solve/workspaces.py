@@ -70,8 +70,8 @@ def planned_bytes(device: Device, top: int) -> tuple[int, int]:
     floats = []
     for channels, static in ((2, "f"), (1, "s")):
         for name, level in gpu_levels.fields_of(top, static):
-            stride = levels.shape_of(level).stride + levels.PAD if rows else gpu_levels.shape_of(level).stride
-            floats.append(stride * (1 if name == "d" else channels))
+            stride = (levels if rows else gpu_levels).shape_of(level).stride
+            floats.append(stride * (1 if name == "d" else channels) + (levels.PAD if rows else 0))
     if rows:
         floats.append(2 * device.strips * levels.scratch_floats(top))
     return 4 * sum(floats), 4 * max(floats)
