@@ -16,8 +16,8 @@ from pydantic import BaseModel, ConfigDict, Field, StringConstraints, TypeAdapte
 
 # --- protocol ---------------------------------------------------------------------------------------------------
 
-PROTOCOL_VERSION: Final = 1
-SUBPROTOCOL: Final = "esker.1"
+PROTOCOL_VERSION: Final = 2
+SUBPROTOCOL: Final = "esker.2"
 
 # --- grid (DESIGN 3) --------------------------------------------------------------------------------------------
 

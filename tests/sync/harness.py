@@ -57,8 +57,8 @@ def settings(data: Path, **over: Any) -> Settings:
 class LiveServer:
     """``with LiveServer(tmp_path) as server``: runs until the block ends."""
 
-    def __init__(self, data: Path, solver: Any = None, **over: Any) -> None:
-        self.assembly = Assembly(settings(data, **over), lambda _: solver or PlainSolver())
+    def __init__(self, data: Path, solver: Any = None, factory: Any = None, **over: Any) -> None:
+        self.assembly = Assembly(settings(data, **over), factory or (lambda _: solver or PlainSolver()))
         self._server = self.assembly.server(announce=False)
         self._thread = threading.Thread(target=self._serve, daemon=True)
         self.port = self.assembly.port
@@ -123,7 +123,7 @@ class LiveServer:
     def join(self, terrain: str, secret: str, client: str = "c1", **hello: Any) -> Peer:
         """A member that has had its welcome."""
         peer = Peer(self.socket())
-        peer.say("hello", protocol=1, terrain=terrain, secret=secret, client=client, **hello)
+        peer.say("hello", protocol=2, terrain=terrain, secret=secret, client=client, **hello)
         peer.welcome = peer.wait("welcome")
         return peer
 
@@ -220,10 +220,10 @@ def sleeping_member(port: int, terrain: str, secret: str) -> socket.socket:
     tcp.connect(("127.0.0.1", port))
     tcp.sendall(
         b"GET /ws HTTP/1.1\r\nHost: x\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
-        b"Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Protocol: esker.1\r\n\r\n"
+        b"Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Protocol: esker.2\r\n\r\n"
     )
     assert b"101" in tcp.recv(64)
-    hello = {"type": "hello", "protocol": 1, "terrain": terrain, "secret": secret, "client": "sleeper"}
+    hello = {"type": "hello", "protocol": 2, "terrain": terrain, "secret": secret, "client": "sleeper"}
     payload = json.dumps(hello).encode()
     header = bytes([0x81, 0x80 | 126]) + len(payload).to_bytes(2, "big")
     tcp.sendall(header + bytes(4) + payload)  # masked with zeros

@@ -162,7 +162,7 @@ def test_binary_from_a_client(scene: Scene, data: bytes) -> None:
 def _hello(scene: Scene, **over: Any) -> None:
     scene.peer.close()
     scene.peer = Peer(scene.server.socket())
-    hello = {"protocol": 1, "terrain": scene.terrain, "secret": scene.secret, "client": "c2"}
+    hello = {"protocol": 2, "terrain": scene.terrain, "secret": scene.secret, "client": "c2"}
     scene.peer.say("hello", **(hello | over))
 
 
@@ -184,7 +184,7 @@ def test_no_such_terrain(scene: Scene) -> None:
 
 def test_unknown_protocol_version(scene: Scene) -> None:
     _hello(scene, protocol=99)
-    assert "1" in scene.closes("bad_protocol")
+    assert str(c.PROTOCOL_VERSION) in scene.closes("bad_protocol")
 
 
 @pytest.mark.parametrize("subprotocol", [None, "esker.99"])
@@ -203,7 +203,7 @@ def test_anything_but_a_hello_first(scene: Scene, first: dict[str, Any]) -> None
 
 
 def test_hello_twice(scene: Scene) -> None:
-    scene.peer.say("hello", protocol=1, terrain=scene.terrain, secret=scene.secret, client="c1")
+    scene.peer.say("hello", protocol=2, terrain=scene.terrain, secret=scene.secret, client="c1")
     scene.closes("bad_hello")
 
 
@@ -216,7 +216,7 @@ def test_a_page_of_another_site(scene: Scene) -> None:
 def test_the_own_site_is_welcome(scene: Scene) -> None:
     origin = f"http://127.0.0.1:{scene.server.port}"
     peer = Peer(scene.server.socket(origin=origin))
-    peer.say("hello", protocol=1, terrain=scene.terrain, secret=scene.secret, client="c3")
+    peer.say("hello", protocol=2, terrain=scene.terrain, secret=scene.secret, client="c3")
     assert peer.wait("welcome")["clock"] == 5
     peer.close()
 

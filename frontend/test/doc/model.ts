@@ -91,7 +91,7 @@ export class ServerModel {
     const resume = clock !== null && this.doc.clock - clock <= this.keep;
     return {
       type: "welcome",
-      protocol: 1,
+      protocol: 2,
       server: "model",
       client: "c",
       role: "edit",

@@ -51,7 +51,7 @@ beforeEach(() => {
   ];
   doc.welcome({
     type: "welcome",
-    protocol: 1,
+    protocol: 2,
     server: "",
     client: "me",
     role: "edit",

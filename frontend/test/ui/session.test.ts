@@ -73,7 +73,7 @@ const SETTINGS = {
 function welcome(role: Role = "owner", change: Partial<Welcome> = {}): Welcome {
   return {
     type: "welcome",
-    protocol: 1,
+    protocol: 2,
     server: "0.1.0",
     client: "c",
     role,
