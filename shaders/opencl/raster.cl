@@ -16,6 +16,13 @@ inline float16 middle_distance2(segments_t s, int at, float cx, float cy) {
     return rx * rx + ry * ry;
 }
 
+inline float least16(float16 v) {
+    float8 a = fmin(v.lo, v.hi);
+    float4 b = fmin(a.lo, a.hi);
+    float2 c = fmin(b.lo, b.hi);
+    return fmin(c.x, c.y);
+}
+
 inline int least_int16(int16 v) {
     int8 a = min(v.lo, v.hi);
     int4 b = min(a.lo, a.hi);

@@ -9,35 +9,29 @@
 #define MASK int
 #define ANY(mask) ((mask) != 0)
 #define MASK_OF(truth) ((truth) ? 1 : 0)
-#define LEAST(v) (v)
-#define GREATEST(v) (v)
+#define FIRST(v) (v)
+#define LAST(v) (v)
 #else
 #define REAL float16
 #define MASK int16
 #define ANY(mask) any(mask)
 #define MASK_OF(truth) ((int16)((truth) ? -1 : 0))
-#define LEAST(v) least16(v)
-#define GREATEST(v) (-least16(-(v)))
-
-inline float least16(float16 v) {
-    float8 a = fmin(v.lo, v.hi);
-    float4 b = fmin(a.lo, a.hi);
-    float2 c = fmin(b.lo, b.hi);
-    return fmin(c.x, c.y);
-}
+#define FIRST(v) (v).s0
+#define LAST(v) (v).sf
 #endif
+#define INLINE inline __attribute__((always_inline))
 #define TINY 1e-20f
 #define SLIGHT 1e-10f  // weight of a skirt beside a band's
 
 // The tables as a kernel's first arguments, and as it hands them on.
 #define TABLE_ARGUMENTS                                                                                          \
     global const float *segments, int segment_count, global const float *knots, int knot_count,                 \
-        global const float *controls, global const int *octaves, global const float *strokes,                   \
+        global const float4 *pieces, global const int *octaves, global const float *strokes,                   \
         global const int *index, global const int *row_start, global const int *row_items,                      \
         global const int *span_index, global const float *spans, int row0, int column0, float spacing, float octave, \
         float exit_length, float cliff
 #define TABLES                                                                                              \
-    {{segment_count, segments}, {knot_count, knots, controls, octaves}, strokes, index, row_start, row_items, \
+    {{segment_count, segments}, {knot_count, knots, pieces, octaves}, strokes, index, row_start, row_items, \
      span_index, spans, row0, column0, spacing, octave, 1.0f / exit_length, cliff}
 
 typedef struct {
@@ -46,10 +40,10 @@ typedef struct {
 } segments_t;
 
 typedef struct {
-    int m;                         // knots in all
-    global const float *knots;     // KNOT_FIELDS x m
-    global const float *controls;  // of cubic B-splines: crest heights smoothed, octave by octave
-    global const int *octaves;     // per stroke and octave: where piece 0 has its first control
+    int m;                        // knots in all
+    global const float *knots;    // KNOT_FIELDS x m
+    global const float4 *pieces;  // crest heights smoothed, octave by octave: cubics
+    global const int *octaves;    // per stroke and octave: where piece 0 is
 } profiles_t;
 
 typedef struct {
@@ -72,7 +66,7 @@ typedef struct {
     REAL w, wt, wa, fade, held, g, gx, gy, toe, hard;
 } sums_t;
 
-inline REAL smooth(REAL t) {
+INLINE REAL smooth(REAL t) {
     t = clamp(t, 0.0f, 1.0f);
     return t * t * (3.0f - 2.0f * t);
 }
@@ -80,7 +74,7 @@ inline REAL smooth(REAL t) {
 // --- outlines: level crests, curved in plan ---
 
 // Is segment `at` nearer to the samples of a row than what they have?
-inline void consider(REAL *best2, MASK *best, segments_t s, int at, REAL x, float y) {
+INLINE void consider(REAL *best2, MASK *best, segments_t s, int at, REAL x, float y) {
     global const float *t = s.table + at;
     size_t m = s.m;
     float dx = t[2 * m], dy = t[3 * m], py = y - t[m];
@@ -92,7 +86,7 @@ inline void consider(REAL *best2, MASK *best, segments_t s, int at, REAL x, floa
 }
 
 // What the samples whose nearest segment is `at` need to know of their nearest crest point.
-inline void resolve(nearest_t *out, MASK mine, segments_t s, int at, REAL x, float y) {
+INLINE void resolve(nearest_t *out, MASK mine, segments_t s, int at, REAL x, float y) {
     global const float *t = s.table + at;
     size_t m = s.m;
     float dx = t[2 * m], dy = t[3 * m], py = y - t[m];
@@ -111,7 +105,7 @@ inline void resolve(nearest_t *out, MASK mine, segments_t s, int at, REAL x, flo
     out->left = select(out->left, side, mine);
 }
 
-inline MASK inside_row(global const float *spans, int from, int to, REAL x) {
+INLINE MASK inside_row(global const float *spans, int from, int to, REAL x) {
     MASK in = 0;
     for (int i = from; i < to; i++) in = in || (x >= spans[2 * i] && x <= spans[2 * i + 1]);
     return in;
@@ -120,7 +114,7 @@ inline MASK inside_row(global const float *spans, int from, int to, REAL x) {
 // --- profiles: straight in plan, of varying height ---
 
 // Height of a crest and its slope per cell at q, by its knots. first, last: least and greatest q.
-inline void knots_at(REAL *z, REAL *slope, profiles_t t, int start, int count, REAL q, float first, float last,
+INLINE void knots_at(REAL *z, REAL *slope, profiles_t t, int start, int count, REAL q, float first, float last,
                      float steepest) {
     global const float *at = t.knots + start, *height = at + t.m, *fall = at + 2 * (size_t)t.m;
     int j = 0;
@@ -136,38 +130,42 @@ inline void knots_at(REAL *z, REAL *slope, profiles_t t, int start, int count, R
     *slope = clamp(*slope, -steepest, steepest);
 }
 
-// The same of a smoothed crest: uniform cubic B-spline, `inverse` pieces a cell.
-inline void spline_at(REAL *z, REAL *slope, global const float *controls, REAL q, float first, float last,
+// The same of a smoothed crest: a cubic per piece, `inverse` pieces a cell.
+INLINE void spline_at(REAL *z, REAL *slope, global const float4 *pieces, REAL q, float first, float last,
                       float inverse) {
     REAL u = q * inverse;
-    int j = (int)floor(first * inverse), end = (int)floor(last * inverse);
-    for (int k = j; k <= end; k++) {
-        global const float *c = controls + k;
-        float a0 = (c[0] + 4.0f * c[1] + c[2]) * (1.0f / 6.0f), a1 = (c[2] - c[0]) * 0.5f;
-        float a2 = (c[0] - 2.0f * c[1] + c[2]) * 0.5f, a3 = (c[3] - c[0] + 3.0f * (c[1] - c[2])) * (1.0f / 6.0f);
-        REAL f = u - (float)k, height = a0 + f * (a1 + f * (a2 + f * a3));
-        REAL along = (a1 + f * (2.0f * a2 + f * (3.0f * a3))) * inverse;
-        MASK mine = u >= (float)k || MASK_OF(k == j);
-        *z = select(*z, height, mine);
-        *slope = select(*slope, along, mine);
+    int k = (int)floor(first * inverse), end = (int)floor(last * inverse);
+    float4 a = pieces[k];
+    REAL f = u - (float)k;
+    *z = a.x + f * (a.y + f * (a.z + f * a.w));
+    *slope = a.y + f * (2.0f * a.z + f * (3.0f * a.w));
+    while (++k <= end) {
+        a = pieces[k];
+        f = u - (float)k;
+        MASK mine = f >= 0.0f;
+        *z = select(*z, a.x + f * (a.y + f * (a.z + f * a.w)), mine);
+        *slope = select(*slope, a.y + f * (2.0f * a.z + f * (3.0f * a.w)), mine);
     }
+    *slope *= inverse;
 }
 
 // The same in octave o: 0 is the crest itself, each further one is twice as smooth as the last.
-inline void octave_at(REAL *z, REAL *slope, const tables_t *t, global const int *at, int o, REAL q, float first,
+INLINE void octave_at(REAL *z, REAL *slope, const tables_t *t, global const int *at, int o, REAL q, float first,
                       float last) {
     if (o == 0) {
         knots_at(z, slope, t->profiles, at[I_FIRST], at[I_COUNT], q, first, last, STEEPEST * t->s);
         return;
     }
-    global const float *controls = t->profiles.controls + t->profiles.octaves[at[I_OCTAVE] + o - 1];
-    spline_at(z, slope, controls, q, first, last, t->s / (t->octave * (1 << (o - 1))));
+    global const float4 *pieces = t->profiles.pieces + t->profiles.octaves[at[I_OCTAVE] + o - 1];
+    spline_at(z, slope, pieces, q, first, last, t->s / (t->octave * (1 << (o - 1))));
 }
 
 // Height of a crest at q for samples d metres beyond its plateau, its slope per cell and its change per metre of d: the
 // farther a sample, the smoother the crest that it sees (reference_section.crest_at).
-inline void crest_at(REAL *z, REAL *slope, REAL *rate, const tables_t *t, global const int *at, REAL q, REAL d) {
-    float first = LEAST(q), last = GREATEST(q), near = LEAST(d), far = GREATEST(d), unit = FAN * t->octave;
+// q is between first and last, d between near and far.
+INLINE void crest_at(REAL *z, REAL *slope, REAL *rate, const tables_t *t, global const int *at, REAL q, float first,
+                     float last, REAL d, float near, float far) {
+    float unit = FAN * t->octave;
     int count = at[I_OCTAVES], o = 0;
     while (o < count && unit * ((2 << o) - 1) <= near) o++;
     octave_at(z, slope, t, at, o, q, first, last);
@@ -182,18 +180,28 @@ inline void crest_at(REAL *z, REAL *slope, REAL *rate, const tables_t *t, global
     }
 }
 
+// Least magnitude between two values on a straight line.
+INLINE float nearest_zero(float a, float b) {
+    return a * b <= 0.0f ? 0.0f : fmin(fabs(a), fabs(b));
+}
+
+INLINE float hypotenuse(float a, float b) {
+    return sqrt(a * a + b * b);
+}
+
 // The nearest crest point of a profile; false when no sample is within its reach. Products are differences of such with
 // the rounding of one made good, so that a crest of 100,000 cells has no grain.
-inline int straight(nearest_t *out, const tables_t *t, global const float *p, global const int *at, REAL x, float y) {
+INLINE int straight(nearest_t *out, const tables_t *t, global const float *p, global const int *at, REAL x, float y) {
     float tx = p[P_TX], ty = p[P_TY], py = y - p[P_AY], b = py * ty, c = py * tx;
     REAL px = x - p[P_AX], zero = 0.0f, slope;
     REAL along = fma(px, (REAL)(tx), (REAL)(b)) + fma(py, ty, -b);
     REAL cross = fma(py, tx, -c) - fma(px, (REAL)(ty), (REAL)(-c));
     REAL q = clamp(along, 0.0f, p[P_LENGTH]), past = along - q;
-    REAL distance = sqrt(past * past + cross * cross);
-    if (!ANY(distance <= p[P_REACH])) return 0;
-    REAL d = clamp(distance, p[P_PLATEAU], p[P_REACH]) - p[P_PLATEAU];
-    crest_at(&out->height, &slope, &out->rate, t, at, q, d * t->s);
+    float least = hypotenuse(nearest_zero(FIRST(past), LAST(past)), nearest_zero(FIRST(cross), LAST(cross)));
+    if (least > p[P_REACH]) return 0;
+    REAL distance = sqrt(past * past + cross * cross), d = clamp(distance, p[P_PLATEAU], p[P_REACH]) - p[P_PLATEAU];
+    float q0 = FIRST(q), q1 = LAST(q), near = fmax(least - p[P_PLATEAU], 0.0f), far = fmax(FIRST(d), LAST(d));
+    crest_at(&out->height, &slope, &out->rate, t, at, q, fmin(q0, q1), fmax(q0, q1), d * t->s, near * t->s, far * t->s);
     MASK cap = past != 0.0f;
     slope = select(slope, zero, cap);
     out->distance = distance;
@@ -214,7 +222,7 @@ typedef struct {
     MASK hard, has, within;
 } band_t;
 
-inline band_t band_of(const nearest_t *near, MASK inside, global const float *p, float s) {
+INLINE band_t band_of(const nearest_t *near, MASK inside, global const float *p, float s) {
     band_t b;
     REAL zero = 0.0f, one = 1.0f;
     b.d = fmax(select(near->distance, zero, inside) - p[P_PLATEAU], 0.0f);
@@ -248,29 +256,29 @@ inline band_t band_of(const nearest_t *near, MASK inside, global const float *p,
 
 // Height, fall per metre and change with the crest height of a flank d metres from the crest, at most its full width
 // (reference_section.flank_profile).
-inline void flank_profile(const band_t *b, REAL d, REAL *z, REAL *fall, REAL *lift) {
+INLINE void flank_profile(const band_t *b, REAL d, REAL *z, REAL *fall, REAL *lift) {
     REAL half_square = 0.5f * b->slope * b->slope, rest = b->full - d, top = b->top, k = b->k, f = b->f;
     MASK shoulder = d < 2.0f * k * top * b->run, foot = rest < 2.0f * f * top * b->run;
     *z = (1.0f + k) * top - b->slope * d;
     *fall = b->slope;
     *lift = 1.0f + k;
     if (ANY(shoulder)) {
-        REAL curve = half_square / fmax(k * top, TINY), drop = 0.5f * curve * d;
+        REAL over = 1.0f / fmax(k * top, TINY), curve = half_square * over, drop = 0.5f * curve * d;
         *z = select(*z, top - drop * d, shoulder);
         *fall = select(*fall, curve * d, shoulder);
-        *lift = select(*lift, 1.0f + drop * d / fmax(top, TINY), shoulder);
+        *lift = select(*lift, 1.0f + drop * d * k * over, shoulder);
     }
     if (ANY(foot)) {
-        REAL curve = half_square / fmax(f * top, TINY), low = 0.5f * curve * rest * rest;
+        REAL over = 1.0f / fmax(f * top, TINY), curve = half_square * over, low = 0.5f * curve * rest * rest;
         *z = select(*z, low, foot);
         *fall = select(*fall, curve * rest, foot);
-        *lift = select(*lift, curve * rest * (1.0f + k + f) * b->run - low / fmax(top, TINY), foot);
+        *lift = select(*lift, curve * rest * (1.0f + k + f) * b->run - low * f * over, foot);
     }
 }
 
 // Where a band's extent cuts it so high that the ground would break off: width of the skirt that leads down from there,
 // metres, and how much it is called for, 0..1 (reference_section.skirt).
-inline REAL skirt(const band_t *b, float cliff, REAL *width, REAL *height, REAL *lift) {
+INLINE REAL skirt(const band_t *b, float cliff, REAL *width, REAL *height, REAL *lift) {
     REAL fall;
     flank_profile(b, b->end, height, &fall, lift);
     REAL zero = 0.0f, need = select(zero, smooth(*height * cliff * (1.0f / SKIRT_SLOPE) - 0.5f), b->has);
@@ -279,7 +287,7 @@ inline REAL skirt(const band_t *b, float cliff, REAL *width, REAL *height, REAL 
 }
 
 // Adds one stroke's cross-section to the sums (reference_section.cross_section). p: STROKE_FIELDS.
-inline void cross_section(sums_t *sum, const nearest_t *near, MASK inside, global const float *p, const tables_t *t) {
+INLINE void cross_section(sums_t *sum, const nearest_t *near, MASK inside, global const float *p, const tables_t *t) {
     band_t b = band_of(near, inside, p, t->s);
     REAL zero = 0.0f, one = 1.0f, inverse = 1.0f / fmax(b.end, THINNEST_M);
     REAL r = fmin(b.ds * inverse, 1e6f), wide = fmin(inverse, 1.0f / (SPRING_FLOOR_CELLS * t->s)), rt = b.ds * wide;
@@ -332,7 +340,7 @@ inline void cross_section(sums_t *sum, const nearest_t *near, MASK inside, globa
 }
 
 // Adds what one stroke says of amplitude and roughness to gx, gy (weights in g, knowledge in toe) (DESIGN 5.4).
-inline void channel_section(sums_t *sum, const nearest_t *near, MASK inside, global const float *p, const tables_t *t) {
+INLINE void channel_section(sums_t *sum, const nearest_t *near, MASK inside, global const float *p, const tables_t *t) {
     band_t b = band_of(near, inside, p, t->s);
     REAL zero = 0.0f, one = 1.0f, r = b.ds / fmax(b.end, CHANNEL_FLOOR_CELLS * t->s);
     REAL known = select(b.present * (1.0f - smooth((r - 1.0f) * (1.0f / (TOE - 1.0f)))), one, b.hard);
@@ -351,7 +359,7 @@ typedef struct {
 } constraint_t;
 
 // D and f of the gradient, or of the channels.
-inline void conclude_two(constraint_t *out, const sums_t *sum) {
+INLINE void conclude_two(constraint_t *out, const sums_t *sum) {
     REAL toe = CREST_STIFFNESS * sum->toe, g = fmax(sum->g, TINY);
     out->gradient_d = toe;
     out->gradient_fx = toe * sum->gx / g;
@@ -359,7 +367,7 @@ inline void conclude_two(constraint_t *out, const sums_t *sum) {
 }
 
 // x: columns of the samples, y their row, n samples a side; a pinned border is fixed at the base.
-inline constraint_t conclude(const sums_t *sum, MASK x, int y, int n, float screening, int pinned) {
+INLINE constraint_t conclude(const sums_t *sum, MASK x, int y, int n, float screening, int pinned) {
     constraint_t out;
     REAL zero = 0.0f, fixed = -1.0f;
     REAL w = fmax(sum->w, TINY), target = sum->wt / w, a = sum->wa / w * sum->fade;

@@ -124,7 +124,7 @@ def test_far_strokes_cost_nothing() -> None:
     box = places(10)[0][0]
     alone = WindowPacker(SCENE, SETTINGS)
     assert np.array_equal(packer.pack(10, box).knots, alone.pack(10, box).knots)
-    assert len(alone.pack(10, box).controls) < 300
+    assert len(alone.pack(10, box).pieces) < 300
     assert packer.pack(10, places(10)[3][0]).empty
 
 

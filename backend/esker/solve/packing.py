@@ -85,14 +85,14 @@ class Shape:
 class Packed:
     """One stroke's part of the tables. window: the bins that it can reach, within the box it was packed for.
 
-    segments of an outline; knots, controls and where each octave's piece 0 has its first control, of a profile.
+    segments of an outline; knots, pieces and where each octave's piece 0 is among them, of a profile.
     """
 
     params: Floats
     window: Window
     segments: Floats | None = None
     knots: Floats | None = None
-    controls: Floats | None = None
+    pieces: Floats | None = None
     octaves: tuple[int, ...] = ()
     span_index: Ints | None = None
     spans: Floats | None = None
@@ -141,10 +141,10 @@ def _pack_profile(shape: Shape, s: float, box: BinBox, low: Ints, high: Ints) ->
     t, z = line.t / s, line.z
     slope = np.append(np.diff(z) / np.diff(t), 0.0)
     octaves, parts, at = [], [], 0
-    for o, controls in enumerate(line.octaves):
+    for o, pieces in enumerate(line.pieces):
         step = line.octave_m * 2**o
         k0 = max(0, math.floor(first / step) - 1)
-        part = controls[k0 : math.floor(last / step) + 6]
+        part = pieces[k0 : math.floor(last / step) + 3]
         octaves.append(at - k0)
         parts.append(part)
         at += len(part)
@@ -152,7 +152,7 @@ def _pack_profile(shape: Shape, s: float, box: BinBox, low: Ints, high: Ints) ->
     for name, value in zip(("ax", "ay", "tx", "ty", "length"), (*line.start / s, *line.unit, t[-1]), strict=True):
         params[STROKE_AT[name]] = value
     knots = np.stack([t, z, slope])[:, j0:j1]
-    return Packed(params, window, None, knots, np.concatenate([np.zeros(0), *parts]), tuple(octaves))
+    return Packed(params, window, None, knots, np.concatenate([np.zeros((0, 4)), *parts]), tuple(octaves))
 
 
 def _pack_outline(shape: Shape, s: float, box: BinBox, low: Ints, high: Ints) -> Packed | None:
@@ -240,7 +240,7 @@ def _stack(parts: list[Any], rows: int) -> Floats:
 def join(packed: list[Packed], box: BinBox) -> dict[str, Any]:
     """All strokes' tables behind each other, with the lists by row of bins."""
     index = np.zeros((len(packed), INDEX_STRIDE), dtype=np.int32)
-    at = dict.fromkeys(("segment", "knot", "control", "octave", "index", "span"), 0)
+    at = dict.fromkeys(("segment", "knot", "piece", "octave", "index", "span"), 0)
     octaves: list[int] = []
     span_indices, spans = [], []
     for k, p in enumerate(packed):
@@ -250,8 +250,8 @@ def join(packed: list[Packed], box: BinBox) -> dict[str, Any]:
         kind = "segment" if outline else "knot"
         index[k, :] = at[kind], table.shape[1], -1, len(octaves), -1 if outline else len(p.octaves)
         at[kind] += table.shape[1]
-        octaves += [at["control"] + start for start in p.octaves]
-        at["control"] += 0 if p.controls is None else len(p.controls)
+        octaves += [at["piece"] + start for start in p.octaves]
+        at["piece"] += 0 if p.pieces is None else len(p.pieces)
         if p.span_index is not None and p.spans is not None:
             index[k, INDEX_AT["spans"]] = at["index"]
             span_indices.append(p.span_index + at["span"])
@@ -262,7 +262,7 @@ def join(packed: list[Packed], box: BinBox) -> dict[str, Any]:
     return {
         "segments": _stack([p.segments for p in packed if p.segments is not None], len(SEGMENT_FIELDS)),
         "knots": _stack([p.knots for p in packed if p.knots is not None], len(KNOT_FIELDS)),
-        "controls": np.concatenate([np.zeros(0), *(p.controls for p in packed if p.controls is not None)]),
+        "pieces": np.concatenate([np.zeros((0, 4)), *(p.pieces for p in packed if p.pieces is not None)]),
         "octaves": np.array(octaves, dtype=np.int32),
         "strokes": np.array([p.params for p in packed]).reshape(-1, STROKE_STRIDE),
         "index": index,

@@ -71,7 +71,7 @@ def _arguments(launch: Launcher, tables: Tables, window: Window) -> tuple[Any, .
     cliff = 0.0 if tables.reach_m is None else 1 / tables.reach_m
     return (
         put(tables.segments), i(tables.segments.shape[1]), put(tables.knots), i(tables.knots.shape[1]),
-        put(tables.controls), put(tables.octaves), put(tables.strokes), put(tables.index), put(tables.row_start),
+        put(tables.pieces), put(tables.octaves), put(tables.strokes), put(tables.index), put(tables.row_start),
         put(tables.row_items), put(tables.span_index), put(tables.spans), i(tables.box[0]), i(tables.box[2]),
         f(tables.spacing_m), f(tables.octave_m), f(tables.exit_length_m), f(cliff), i(window.first),
         put(window.spans), i(tables.samples),

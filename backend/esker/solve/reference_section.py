@@ -107,9 +107,7 @@ def _octave_at(tables: Tables, k: int, o: int, q: Floats) -> tuple[Floats, Float
     u = q * inverse
     j = np.floor(u).astype(int)
     f = u - j
-    c = tables.controls[tables.octaves[at["octave"] + o - 1] + j + np.arange(4).reshape(4, *(1,) * j.ndim)]
-    a0, a1 = (c[0] + 4 * c[1] + c[2]) / 6, (c[2] - c[0]) / 2
-    a2, a3 = (c[0] - 2 * c[1] + c[2]) / 2, (c[3] - c[0] + 3 * (c[1] - c[2])) / 6
+    a0, a1, a2, a3 = np.moveaxis(tables.pieces[tables.octaves[at["octave"] + o - 1] + j], -1, 0)
     return a0 + f * (a1 + f * (a2 + f * a3)), (a1 + f * (2 * a2 + f * 3 * a3)) * inverse
 
 

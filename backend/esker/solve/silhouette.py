@@ -20,6 +20,7 @@ Floats = NDArray[np.float64]
 
 BLOCKS = 48
 """Parts of a crest for which it is known how high it can seem from anywhere."""
+_B_SPLINE = np.array([[1, 4, 1, 0], [-3, 0, 3, 0], [3, -6, 3, 0], [-1, 3, -3, 1]]) / 6
 _MARGIN = 3
 """Controls beyond the ends that the filter needs; two of them stay."""
 
@@ -40,6 +41,11 @@ class Silhouette:
     z: Floats
     octaves: tuple[Floats, ...]
     octave_m: float
+
+    @cached_property
+    def pieces(self) -> tuple[Floats, ...]:
+        """Per octave the cubics (m, 4) between its controls: coefficients of 1, f, f^2, f^3 at the share f of a piece."""
+        return tuple((_B_SPLINE @ np.stack([c[:-3], c[1:-2], c[2:-1], c[3:]])).T for c in self.octaves)
 
     @cached_property
     def blocks(self) -> tuple[Floats, Floats]:

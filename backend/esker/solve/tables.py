@@ -86,8 +86,8 @@ class Tables:
     segments: (11, m) by SEGMENT_FIELDS, of outlines. a: start; d: end - start; il2: 1 / length^2; t0, t1: unit
       directions of travel at the ends; cap: 1 where the line ends there.
     knots: (3, q) by KNOT_FIELDS, of profiles: distance from the crest's start, height, slope per cell up to the next.
-    controls: (c,) heights, controls of the uniform cubic B-splines of the octaves; octaves: (o,) per profile and octave
-      the place in ``controls`` where piece 0 has its first one (it may lie before the window's part).
+    pieces: (c, 4) cubics of the octaves: height a0 + a1 f + a2 f^2 + a3 f^3 at the share f of a piece; octaves: (o,)
+      per profile and octave the place in ``pieces`` of piece 0 (which may lie before the window's part).
     strokes: (k, STROKE_STRIDE) by STROKE_FIELDS. plateau, reach in cells (reach: outermost distance with any effect);
       per side h: 1 if there is a flank, s: slope (tangent), e: extent in metres, k and f: shares of the crest height
       taken by a round shoulder and a round foot; same: 1 if both sides are alike, then run: 1 / slope; height: of an
@@ -105,7 +105,7 @@ class Tables:
     box: BinBox
     segments: Floats
     knots: Floats
-    controls: Floats
+    pieces: Floats
     octaves: Ints
     strokes: Floats
     index: Ints
