@@ -82,6 +82,11 @@ class Devices:
         if self.better():
             self.backoff.failed(now)
 
+    @property
+    def second_best(self) -> bool:
+        """Whether the device in use is not what one would wish for."""
+        return bool(self.better()) or (self.current == LAST_RESORT and self.preferred is None)
+
     def better(self) -> list[str]:
         """Devices to be preferred to the present one, best first."""
         listed = list(self.candidates())

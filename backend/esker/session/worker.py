@@ -129,7 +129,7 @@ class Worker:
         try:
             self._solver = self._factory(self._devices.preferred)
             self._devices.opened(self._solver.device_name, self._now())
-            if self._devices.better():
+            if self._devices.second_best:
                 self._standing = f"The solver runs on {self._solver.device_name}: slower, but it goes on."
         except Exception as error:
             self._broken = error

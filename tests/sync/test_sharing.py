@@ -1,0 +1,333 @@
+"""Whose turn it is on the solver, and what is ended for whom (SPEC P57 to P59, P70 to P74; DESIGN 8)."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pytest
+
+from esker import contract as c
+from esker import grid
+from esker.bench import stream
+from esker.grid import TileKey
+from esker.session import schedule as module
+from esker.session.schedule import Client, Job, Schedule, solve_bytes
+from esker.session.worker import Worker
+from esker.solve.solver import Solver
+from tests.sync.harness import Level
+
+SETTINGS = c.TerrainSettings()
+
+
+def ignore(*_: Any) -> None:
+    """A callback that does nothing."""
+
+
+class Desk:
+    """A schedule driven by hand: every slice is one level of a solve with levels 0..2, or one cycle of settling."""
+
+    def __init__(self, budget: int = module.BUDGET) -> None:
+        self.now = 0.0
+        self.schedule = Schedule(lambda: self.now, budget)
+        self.log: list[tuple[Client, str]] = []
+
+    def client(self, levels: int = 2) -> Client:
+        client = Client(levels, ignore, ignore)
+        self.schedule.clients.append(client)
+        return client
+
+    def ask(self, client: Client, clock: int = 1) -> None:
+        client.request(Job(clock, (), SETTINGS), self.now)
+
+    def slice(self, seconds: float = 0.001) -> Client | None:
+        """One turn, as the worker takes it."""
+        client = self.schedule.pick()
+        if client is None:
+            return None
+        if self.schedule.begin(client) is not None:
+            client.steps = _levels(client.top)
+        assert client.steps is not None
+        result = next(client.steps, None)
+        self.now += seconds
+        if result is None:
+            client.steps = None
+        else:
+            client.took(result, self.now)
+            self.log.append((client, f"{result.level}{'s' if result.settled else ''}"))
+        return client
+
+    def until(self, client: Client, what: str, most: int = 200) -> int:
+        """Slices until a client has got something."""
+        for count in range(1, most):
+            self.slice()
+            if (client, what) in self.log:
+                return count
+        raise AssertionError((what, self.log))
+
+
+def _levels(top: int) -> Iterator[Any]:
+    for settled in (False, True):
+        for level in range(top + 1):
+            yield Level(level, np.zeros((1, 1), dtype=np.float32), settled)
+
+
+def test_a_coarse_preview_goes_before_finer_ones_and_before_settling() -> None:
+    desk = Desk()
+    first, second, third = (desk.client() for _ in range(3))
+    desk.ask(first)
+    desk.until(first, "0s")
+    desk.ask(second)
+    desk.until(second, "0")
+    desk.ask(third)
+    assert desk.until(third, "0") == 1
+    assert {desk.slice() for _ in range(4)} == {second, third}, "finer previews before settling, in turn"
+    assert desk.until(first, "2s") < 10
+
+
+def test_settling_gets_its_share_while_others_draw_without_end() -> None:
+    desk = Desk()
+    drawing, settling = desk.client(), desk.client()
+    desk.ask(settling)
+    desk.until(settling, "2")
+    for clock in range(1, 400):
+        desk.ask(drawing, clock)
+        desk.slice(0.02)
+        if (settling, "2s") in desk.log:
+            break
+    assert desk.now < 4 * 3 * module.PATIENCE
+
+
+def test_a_coarse_preview_ends_the_settling_solve_that_began_last_and_that_settles_later() -> None:
+    desk = Desk(budget=2 * solve_bytes(4))
+    early, late, new = (desk.client(4) for _ in range(3))
+    for client in (early, late):
+        desk.ask(client)
+        desk.until(client, "4")
+    desk.ask(new)
+    assert desk.until(new, "0") == 1
+    assert early.steps is not None
+    assert late.steps is None
+    assert late.newest is not None
+    for client in (early, new, late):
+        desk.until(client, "4s")
+
+
+def test_previews_are_not_ended_for_a_coarse_one_and_never_more_solves_run_than_fit() -> None:
+    desk = Desk(budget=3 * solve_bytes(4))
+    clients = [desk.client(4) for _ in range(12)]
+    for client in clients:
+        desk.ask(client)
+    most = 0
+    while desk.slice() is not None:
+        most = max(most, sum(x.steps is not None for x in clients))
+    assert most == 3
+    for client in clients:
+        assert [what for x, what in desk.log if x is client].count("4s") == 1
+        got = [what for x, what in desk.log if x is client]
+        assert got.count("0") == got.count("4"), "a preview that was begun is shown whole"
+
+
+def test_a_solve_bigger_than_the_budget_still_runs_alone() -> None:
+    desk = Desk(budget=solve_bytes(4))
+    big, small = desk.client(6), desk.client(4)
+    desk.ask(big)
+    desk.until(big, "6")
+    desk.ask(small)
+    desk.until(small, "4s")
+    desk.until(big, "6s")
+
+
+def test_a_preview_that_is_about_to_end_is_shown_whole_and_not_stopped() -> None:
+    client = Client(2, ignore, ignore)
+    shown: list[list[bool]] = []
+    now = 0.0
+    for clock in (1, 2):
+        client.request(Job(clock, (), SETTINGS), now)
+        client.begin()
+        client.steps = iter(())
+        row = []
+        for level, takes in ((0, 0.005), (1, 0.1), (2, 0.02)):
+            now += takes
+            row.append(client.took(Level(level, np.zeros((1, 1), dtype=np.float32), False), now))
+            if clock == 2 and level < 2:
+                client.request(Job(9, (), SETTINGS), now)
+                assert client.starts(now) == (level == 0), "0.12 s before the end, but not 0.02 s before it"
+                client.newest = None
+        shown.append(row)
+    # Nothing is known of the first pass; in the second, level 1 comes 20 ms before the finest and is not worth a look.
+    assert shown == [[True, True, True], [True, False, True]]
+
+
+# --- refinement -----------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Tile:
+    key: TileKey
+    heights: Any = None
+    content: bytes = b""
+
+
+@dataclass(frozen=True)
+class Finest:
+    level: int
+    heights: Any
+    settled: bool
+    basis: object = None
+
+
+class Refining:
+    """A solver whose solves take no time and whose tiles are counted."""
+
+    device_name = "refining"
+
+    def __init__(self) -> None:
+        self.closed = 0
+        self.pace = 0.0
+
+    def steps(self, strokes: Sequence[c.Stroke], settings: Any, levels: int, *, basis: bool) -> Iterator[Any]:
+        assert basis
+        assert settings == SETTINGS
+        yield Finest(levels, None, False)
+        yield Finest(levels, None, True, basis=len(strokes))
+
+    def refiner(self, basis: object) -> Refining:
+        assert basis is not None
+        return self
+
+    def tiles(self, keys: Sequence[TileKey]) -> Iterator[Tile | None]:
+        try:
+            for key in keys:
+                yield None
+                time.sleep(self.pace)
+                yield Tile(key)
+        except GeneratorExit:
+            self.closed += 1
+            raise
+
+
+@dataclass
+class Viewer:
+    """Wants tiles; takes what is made."""
+
+    keys: tuple[TileKey, ...] = ()
+    got: list[tuple[int, TileKey]] = field(default_factory=list)
+    asked: int = 0
+
+    def wanted(self) -> Sequence[TileKey]:
+        self.asked += 1
+        return self.keys
+
+    def deliver_tile(self, clock: int, tile: Any) -> None:
+        self.got.append((clock, tile.key))
+
+
+@pytest.fixture
+def refining() -> Iterator[tuple[Refining, Worker, Viewer, Client]]:
+    solver, viewer = Refining(), Viewer()
+    made: Any = solver
+    worker = Worker(lambda _: made)
+    worker.start()
+    client = worker.add(1, ignore, ignore, viewer)
+    yield solver, worker, viewer, client
+    worker.stop()
+
+
+def wait(condition: Any) -> None:
+    deadline = time.monotonic() + 5
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.001)
+
+
+A, B, C = (TileKey(5, x, 0) for x in range(3))
+
+
+def test_at_rest_what_is_wanted_is_refined_once_and_asked_for_again(refining: Any) -> None:
+    _, worker, viewer, client = refining
+    viewer.keys = (B, A)
+    worker.request(client, Job(7, (), SETTINGS))
+    wait(lambda: len(viewer.got) == 2)
+    assert viewer.got == [(7, B), (7, A)], "in the order asked"
+    wait(lambda: viewer.asked >= 2)
+    asked = viewer.asked
+    time.sleep(0.03)
+    assert viewer.asked == asked, "nothing new is wanted: no busy loop"
+    viewer.keys = (B, A, C)
+    worker.nudge(client)
+    wait(lambda: (7, C) in viewer.got)
+
+
+def test_a_new_job_ends_refinement_at_once_and_it_starts_again_from_the_new_ground(refining: Any) -> None:
+    solver, worker, viewer, client = refining
+    solver.pace = 0.01
+    viewer.keys = tuple(TileKey(6, x, y) for x in range(20) for y in range(20))
+    worker.request(client, Job(1, (), SETTINGS))
+    wait(lambda: len(viewer.got) >= 2)
+    worker.request(client, Job(2, (), SETTINGS))
+    wait(lambda: any(clock == 2 for clock, _ in viewer.got))
+    clocks = [clock for clock, _ in viewer.got]
+    assert clocks == sorted(clocks)
+    assert clocks.count(1) < 20
+    assert solver.closed == 1
+
+
+# --- with the real solver -------------------------------------------------------------------------------------------
+
+
+class Watched:
+    """The real solver at work in a worker, every slice noted."""
+
+    def __init__(self, levels: int) -> None:
+        self.solver, self.levels = Solver(max_level=levels), levels
+        self.device_name = self.solver.device_name
+        self.open: list[int] = []
+        self.done: list[tuple[int, int, bool, float]] = []
+        made: Any = self
+        self.worker = Worker(lambda _: made)
+        self.worker.start()
+        self.client = self.worker.add(levels, self.deliver, ignore)
+
+    def steps(self, strokes: Any, settings: Any, levels: int) -> Iterator[Any]:
+        self.open.append(len(strokes))
+        return self.solver.steps(strokes, settings, levels)
+
+    def deliver(self, clock: int, result: Any, show: bool) -> None:
+        assert show or not result.settled
+        if result.channel == c.Channel.HEIGHT:
+            self.done.append((clock, result.level, result.settled, time.monotonic()))
+
+    def ask(self, clock: int, strokes: tuple[c.Stroke, ...]) -> None:
+        self.worker.request(self.client, Job(clock, strokes, SETTINGS))
+
+    def at(self, clock: int, level: int, settled: bool) -> bool:
+        return any(entry[:3] == (clock, level, settled) for entry in self.done)
+
+
+def test_ops_during_a_fine_level_stop_it_within_one_level_and_at_rest_the_fine_levels_complete() -> None:
+    watched = Watched(3)
+    strokes = stream.fifty().strokes
+    try:
+        watched.ask(1, strokes)
+        wait(lambda: watched.at(1, 3, False))  # now it settles: its finest level is being worked on
+        watched.ask(2, strokes[:-1])
+        wait(lambda: watched.at(2, 0, False))
+        asked = [entry for entry in watched.done if entry[0] == 1]
+        assert not any(settled for *_, settled, _ in asked), "it was stopped before it had settled"
+        after = watched.done[len(asked) :]
+        assert after[0][:3] == (2, 0, False), "nothing of the old clock comes after the op"
+        for clock in range(3, 12):  # a hand that draws: 30 ops a second
+            watched.ask(clock, strokes[: -1 - clock])
+            time.sleep(0.033)
+        wait(lambda: watched.at(11, 3, True))
+        finest = [entry for entry in watched.done if entry[0] == 11]
+        assert [entry[1:3] for entry in finest[-4:]] == [(level, True) for level in range(4)]
+        heights = watched.solver.solve(strokes[:-12], SETTINGS, 3)
+        assert heights.settled
+        assert heights[3].shape == (grid.samples(3),) * 2
+    finally:
+        watched.worker.stop()
