@@ -80,10 +80,39 @@ def test_cpu_level(tmp_path: Path) -> None:
         ("fpu avx2 fma bmi2 f16c avx512f avx512bw avx512cd avx512dq avx512vl", "skylake-avx512"),
         ("fpu sse2 avx avx2 fma bmi2 f16c", "haswell"),
         ("fpu sse2", "x86-64"),
+        ("fpu sse2 avx f16c", "sandybridge"),
+        ("fpu sse2 avx avx2 fma bmi2 f16c avx512f avx512cd", None),
+        ("fpu sse2 avx avx2", None),
+        ("swp half thumb", None),
     ):
         info = tmp_path / "cpuinfo"
         info.write_text(f"processor : 0\nflags : {flags}\n\nprocessor : 1\nflags : other\n")
         assert pocl_cpu.cpu_level(info) == name
+
+
+def test_what_pocl_compiles_is_kept_by_processor(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """SPEC S28: code for one processor is never found by another."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    folders = []
+    for level in ("skylake-avx512", "haswell"):
+        monkeypatch.setattr(pocl_cpu, "cpu_level", lambda level=level: level)
+        folders.append(pocl_cpu.cache_folder())
+    assert len(set(folders)) == 2
+    assert all(folder is not None and Path(folder).is_dir() for folder in folders)
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    assert pocl_cpu.cache_folder() is None
+
+
+@pytest.mark.parametrize("given", [{}, {"POCL_CACHE_DIR": "/mine"}, {"POCL_KERNEL_CACHE": "1"}])
+def test_pocl_is_set_up_unless_somebody_did(monkeypatch: pytest.MonkeyPatch, given: dict[str, str]) -> None:
+    environment = {"HOME": "/nowhere"} | given
+    monkeypatch.setattr("os.environ", environment)
+    monkeypatch.setattr(device, "_devices", list)
+    monkeypatch.setattr(pocl_cpu, "cache_folder", lambda: None)
+    assert device.candidates(threads=3) == ["numpy"]
+    assert environment["POCL_MAX_PTHREAD_COUNT"] == "3"
+    assert environment.get("POCL_KERNEL_CACHE") == ("0" if not given else given.get("POCL_KERNEL_CACHE"))
 
 
 def test_threads_change_nothing(solver: Solver) -> None:
