@@ -68,7 +68,7 @@ def _figure(width: float, height: float, rows: int = 1, columns: int = 1, **opti
 def _save(figure: Any, path: Path) -> None:
     from matplotlib import pyplot
 
-    options: dict[str, Any] = {"metadata": {"Date": None}} if path.suffix == ".svg" else {"dpi": 130}
+    options: dict[str, Any] = {"metadata": {"Date": None}} if path.suffix == ".svg" else {"dpi": 115}
     figure.savefig(path, **options)
     pyplot.close(figure)
 
@@ -83,8 +83,8 @@ def convergence(accuracy: dict[str, Any], path: Path) -> None:
             curve = row["curve_of_relief"]
             left.semilogy(range(len(curve)), curve, color=shades[int(n)], lw=0.9, alpha=0.75)
     cycles = np.arange(0, 13)
-    left.semilogy(cycles, 0.1 * 0.4**cycles, color=INK, lw=1, ls=":")
-    left.text(10.6, 0.1 * 0.4**10.2, "0.4 a cycle", rotation=-21, ha="center", va="bottom", fontsize=8)
+    left.semilogy(cycles, 0.4**cycles, color=INK, lw=1, ls=":")
+    left.text(6.0, 1.25 * 0.4**6.0, "0.4 a cycle", ha="left", va="bottom", fontsize=8)
     left.axhline(1e-3, color=INK, lw=0.8, ls="--")
     left.text(12.1, 1.15e-3, "preview: 10⁻³", ha="right", fontsize=8)
     left.axhline(2e-6, color=INK, lw=0.8, ls="--")
@@ -92,7 +92,7 @@ def convergence(accuracy: dict[str, Any], path: Path) -> None:
     for n, shade in shades.items():
         left.plot([], [], color=shade, label=f"{n}²")
     left.legend(loc="lower left")
-    left.set(xlabel="cycles after full multigrid", ylabel="largest error / relief", xlim=(0, 12.2), ylim=(3e-8, 0.2))
+    left.set(xlabel="cycles after full multigrid", ylabel="largest error / relief", xlim=(0, 12.2), ylim=(3e-8, 1))
     left.set_title("Heights, every scene of the gallery", loc="left")
     for rows in accuracy.values():
         n = sorted(int(k) for k in rows)
@@ -119,12 +119,18 @@ def _shade(t: float) -> tuple[float, ...]:
 
 
 def hillshade(heights: NDArray[np.float32], spacing: float) -> NDArray[np.float64]:
-    """Light from the north-west on (n, n) heights, 0..1."""
+    """Soft light from the north-west on (n, n) heights, 0..1: a low sun and the sky."""
     dy, dx = np.gradient(heights.astype(np.float64), spacing)
     normal = np.stack([-dx, -dy, np.ones_like(dx)])
     normal /= np.linalg.norm(normal, axis=0)
-    sun = np.array([-1.0, 1.0, 1.1]) / np.linalg.norm([-1.0, 1.0, 1.1])
-    return np.clip(np.tensordot(sun, normal, 1), 0, 1)
+    sun = np.array([-1.0, 1.0, 1.4]) / np.linalg.norm([-1.0, 1.0, 1.4])
+    return np.asarray(0.68 * np.clip(np.tensordot(sun, normal, 1), 0, 1) + 0.27 * normal[2])
+
+
+def _power(value: float) -> str:
+    """2·10⁻³ for 0.002."""
+    digits, exponent = f"{value:.0e}".split("e")
+    return f"{digits}·10{str(int(exponent)).translate(str.maketrans('-0123456789', '⁻⁰¹²³⁴⁵⁶⁷⁸⁹'))}"
 
 
 def errors(maps: dict[str, NDArray[np.float32]], accuracy: dict[str, Any], size_m: float, path: Path) -> None:
@@ -142,7 +148,7 @@ def errors(maps: dict[str, NDArray[np.float32]], accuracy: dict[str, Any], size_
         for axis, kind, title in ((axes[1], "preview", "finest preview"), (axes[2], "settled", "settled")):
             share = np.maximum(maps[f"{scene}.{kind}"] / relief, 1e-9)
             picture = axis.imshow(share, cmap="magma", origin="lower", norm=LogNorm(1e-8, 1e-2))
-            axis.set_title(f"{title}: at most {share.max():.0e} of it", loc="left")
+            axis.set_title(f"{title}: error at most {_power(share.max())}", loc="left")
         for axis in axes:
             axis.set(xticks=[], yticks=[])
             axis.spines[:].set_visible(True)
@@ -154,37 +160,44 @@ def errors(maps: dict[str, NDArray[np.float32]], accuracy: dict[str, Any], size_
 
 def roofline(threads: dict[str, Any], scene: str, path: Path) -> None:
     """Kernels of the finest level under the roofs of copy bandwidth and multiply-add peak, by threads."""
-    figure, grid = _figure(9.2, 4.2, 1, len(threads), squeeze=False, sharey=True)
-    colours = {"gradient": ORANGE, "height": BLUE}
+    figure, grid = _figure(9.2, 4.9, 1, len(threads), squeeze=False, sharey=True)
     for axis, (count, run) in zip(grid[0], sorted(threads.items()), strict=True):
         rows = run["scenes"][scene]
         copy, peak = run["copy_gb_per_s"], run["peak_gflop_per_s"]
-        x = np.geomspace(0.1, 40, 200)
+        x = np.geomspace(0.1, 30, 200)
         axis.loglog(x, np.minimum(x * copy, peak), color=INK, lw=1.4)
-        axis.text(0.115, 0.125 * copy, f"copy {copy:.0f} GB/s", rotation=38, fontsize=8, va="bottom")
-        axis.text(38, peak * 1.06, f"multiply-add {peak:.0f} GFLOP/s", ha="right", fontsize=8, va="bottom")
+        axis.text(0.11, 0.2 * copy, f"copy\n{copy:.0f} GB/s", fontsize=8, va="bottom")
+        axis.text(29, peak * 1.08, f"multiply-add {peak:.0f} GFLOP/s", ha="right", fontsize=8, va="bottom")
         shown = [n for n in ("1025", "4097") if n in rows] or [max(rows, key=int)]
-        for size, marker in zip(shown, ("o", "s"), strict=False):
+        for size in shown:
             for name, figures in rows[size]["kernels"].items():
-                colour = colours.get(name.split(" ")[0], GREEN)
-                axis.plot(figures["flop_per_byte"], figures["gflop_per_s"], marker, color=colour, ms=5.5, alpha=0.85)
-        for name, figures in rows[shown[-1]]["kernels"].items():
-            text = f"{name} ({100 * figures['share_of_copy']:.0f} %)"
-            where = (figures["flop_per_byte"], figures["gflop_per_s"])
-            axis.annotate(text, where, xytext=(6, -3), textcoords="offset points", fontsize=6.5, ha="left")
-        axis.set(xlabel="flop / byte, both by model", xlim=(0.1, 40))
-        axis.set_title(f"{count} thread{'s' if count != '1' else ''}, in brackets the share of copy", loc="left")
+                colour, marker = _kernel_look(name)
+                share = 100 * figures["share_of_copy"]
+                filled = size == shown[-1]
+                label = f"{name}: {share:.0f} % of copy" if filled else None
+                where = figures["flop_per_byte"], figures["gflop_per_s"]
+                face = colour if filled else "none"
+                axis.plot(*where, marker, color=colour, mfc=face, ms=6, mew=1.2, ls="", label=label)
+        axis.set(xlabel="flop / byte, both by model", xlim=(0.1, 30), ylim=(3, 2.2 * peak))
+        sizes = f"filled {shown[-1]}²" + (f", hollow {shown[0]}²" if len(shown) > 1 else "")
+        axis.set_title(f"{count} thread{'s' if count != '1' else ''} ({sizes})", loc="left")
         axis.grid(True, which="major")
-        for size, marker in zip(shown, ("o", "s"), strict=False):
-            axis.plot([], [], marker, color=INK, label=f"{size}²")
-        axis.legend(loc="lower right")
+        axis.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncol=2, fontsize=7)
     grid[0][0].set_ylabel("GFLOP/s")
     _save(figure, path)
 
 
+def _kernel_look(name: str) -> tuple[str, str]:
+    """Colour by the system that a kernel works on, marker by what it does."""
+    colours = {"gradient": ORANGE, "height": BLUE}
+    markers = {"first visit": "^", "visit": "o", "bottom": "v", "coarsen": "s", "divergence": "D", "change": "P"}
+    marker = next(m for what, m in markers.items() if name.endswith(what))
+    return colours.get(name.split(" ")[0], GREEN), marker
+
+
 def peers(result: dict[str, Any], threads: dict[str, Any], path: Path) -> None:
     """Time to 10^-3 of the relief and to rest over the number of unknowns, set-up included."""
-    figure, grid = _figure(9.2, 4.0, 1, 2, sharey=True)
+    figure, grid = _figure(9.2, 4.6, 1, 2, sharey=True)
     levels = {int(n): row for n, row in result["levels"].items()}
     sizes = sorted(levels)
     for axis, target, ours, title in (
@@ -211,7 +224,8 @@ def peers(result: dict[str, Any], threads: dict[str, Any], path: Path) -> None:
     failed = [f"{NAMES[k]} at {n}²: {levels[n][k]['failed']}" for n in sizes for k in NAMES if "failed" in levels[n][k]]
     if failed:
         grid[1].text(0.98, 0.02, "\n".join(failed), transform=grid[1].transAxes, ha="right", va="bottom", fontsize=6.5)
-    grid[0].legend(loc="upper left")
+    handles, labels = grid[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncol=3)
     _save(figure, path)
 
 

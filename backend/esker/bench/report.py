@@ -1,4 +1,4 @@
-"""Writes the README's table of figures from the committed results: ``python -m esker.bench.report [--check]``."""
+"""Figures of README and docs/solver.md from the committed results: ``python -m esker.bench.report [--check]``."""
 
 from __future__ import annotations
 
@@ -7,9 +7,12 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from esker.bench import _solver
+
 ROOT = Path(__file__).resolve().parents[3]
 RESULTS = ROOT / "bench" / "results"
 README = ROOT / "README.md"
+SOLVER = ROOT / "docs" / "solver.md"
 BEGIN, END = "<!-- figures: written by `python -m esker.bench.report` -->", "<!-- end of figures -->"
 
 
@@ -36,21 +39,10 @@ def pair(figures: dict[str, float]) -> str:
 def rows() -> list[tuple[str, str, str]]:
     """What, figure, and what it is compared with in the same run."""
     solve, stream, fanout = result("solve"), result("stream"), result("fanout")
-    fifty = solve["scenes"]["fifty"]
-    fine, peer = fifty["levels"]["1025"], fifty["peer"]
     canvas, flow = stream["scenes"]["fifty"], stream["scenes"]["fifty"]["socket"]
     room = fanout["esker"]
-    coarser = fifty["levels"]["513"]["from_rest_ms"]["settled"]
     return [
-        ("solver, 1025², 50 strokes: first level after an edit", milliseconds(fine["after_edit_ms"]["level_0"]), ""),
-        ("… all five levels as previews", milliseconds(fine["after_edit_ms"]["level_4"]), ""),
-        ("… settled, from nothing", milliseconds(fine["from_rest_ms"]["settled"]), ""),
-        (
-            "solver, 513², settled: both steps",
-            milliseconds(coarser),
-            f"sparse direct solve of the height step alone: {milliseconds(peer['spsolve_ms'])}",
-        ),
-        ("… largest error, of the relief", f"{peer['error_of_relief']:.0e}", "against that direct solve"),
+        *_solver.rows(solve),
         (
             "append → first coarse tile on the socket, at rest (p50 / p99)",
             pair(flow["at_rest"]["first_coarse_tile_ms"]),
@@ -101,13 +93,19 @@ def readme(text: str) -> str:
     return f"{before}{BEGIN}\n\n{table()}\n\n{END}{after}"
 
 
+def documents() -> dict[Path, str]:
+    """Every document that carries figures, with its text renewed."""
+    out = {README: readme(README.read_text(encoding="utf-8"))}
+    return out | {SOLVER: _solver.document(SOLVER.read_text(encoding="utf-8"), result("solve"))}
+
+
 def main(argv: list[str]) -> int:
-    """Write the section, or with ``--check`` exit with 1 when it is stale."""
-    text = README.read_text(encoding="utf-8")
-    fresh = readme(text)
+    """Write the sections, or with ``--check`` exit with 1 when one is stale."""
+    fresh = documents()
     if "--check" in argv:
-        return int(text != fresh)
-    README.write_text(fresh, encoding="utf-8")
+        return int(any(path.read_text(encoding="utf-8") != text for path, text in fresh.items()))
+    for path, text in fresh.items():
+        path.write_text(text, encoding="utf-8")
     return 0
 
 

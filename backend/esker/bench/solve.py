@@ -32,7 +32,7 @@ TIMED = ("fifty", "alpine-ridge")
 ACCURACY_FROM, TIMES_FROM = 2, 3
 QUICK_ACCURACY, QUICK_TIMES, QUICK_PEERS = 3, 4, 3
 """Finest levels of a quick run."""
-MAPS = Path(__file__).resolve().parents[3] / "bench" / "results" / "solve-maps.npz"
+MAPS = "bench/results/solve-maps.npz"
 
 
 def say(text: str) -> None:
@@ -86,6 +86,9 @@ def peers(finest: int, threads: dict[str, Any], gib: float, seconds: float) -> d
     levels: dict[str, Any] = {}
     for level in range(min(TIMES_FROM, finest), finest + 1):
         size = str(grid.samples(level))
+        if any(size not in rows["scenes"][scene] for rows in threads.values()):
+            say(f"peers {size}²: left out, as our own times at this size are not in the result")
+            continue
         ours = {count: rows["scenes"][scene][size] for count, rows in threads.items()}
         row: dict[str, Any] = {}
         with tempfile.TemporaryDirectory(prefix="esker-bench-") as folder:
@@ -102,41 +105,56 @@ def peers(finest: int, threads: dict[str, Any], gib: float, seconds: float) -> d
 
 
 def main(argv: list[str]) -> int:
-    """``esker bench solve [--json] [--quick] [--part NAME ...] [--finest N] [--scene NAME ...]``."""
+    """``esker bench solve [--json] [--quick] [--part NAME ...] [--finest N] [--scene NAME ...] [-o FILE]``."""
     options = _parser().parse_args(argv)
     finest: int = options.finest
     parts = options.part or PARTS
+    kept = options.output is not None and options.output.exists()
+    result: dict[str, Any] = json.loads(options.output.read_text(encoding="utf-8")) if kept else {"runs": {}}
 
     def upto(quick: int) -> int:
         return min(quick, finest) if options.quick else finest
 
-    result: dict[str, Any] = {
-        "machine": _serving.machine(),
-        "started": time.strftime("%Y-%m-%d %H:%M"),
-        "quick": options.quick,
-    }
-    names = tuple(options.scene or gallery.NAMES)
+    def put(part: str, figures: Any, started: dict[str, Any]) -> None:
+        """Into the result, and to the file at once: a part takes many minutes."""
+        result[part] = figures
+        result["runs"][part] = started
+        if options.output:
+            options.output.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+
+    def started() -> dict[str, Any]:
+        return _serving.machine() | {"started": time.strftime("%Y-%m-%d %H:%M"), "quick": options.quick}
+
     if "accuracy" in parts:
-        result["accuracy"], maps = apart(accuracy, names, upto(QUICK_ACCURACY))
+        now = started()
+        figures, maps = apart(accuracy, tuple(options.scene or gallery.NAMES), upto(QUICK_ACCURACY))
+        put("accuracy", figures, now)
         if maps and options.maps:
-            np.savez_compressed(options.maps, **{name: field.astype(np.float16) for name, field in maps.items()})
-    if "threads" in parts or "peers" in parts:
-        result["threads"] = {str(count): apart(times, count, upto(QUICK_TIMES)) for count in (1, 2)}
+            # Errors need a digit, heights need not show steps.
+            halves = {k: v if k.endswith("heights") else v.astype(np.float16) for k, v in maps.items()}
+            np.savez_compressed(options.maps, **halves)
+    if "threads" in parts or ("peers" in parts and "threads" not in result):
+        now = started()
+        put("threads", {str(count): apart(times, count, upto(QUICK_TIMES)) for count in (1, 2)}, now)
     if "peers" in parts:
-        result["peers"] = peers(upto(QUICK_PEERS), result["threads"], options.peer_gib, options.peer_seconds)
-    sys.stdout.write(json.dumps(result, indent=1 if options.json else None) + "\n")
+        now = started()
+        put("peers", peers(upto(QUICK_PEERS), result["threads"], options.peer_gib, options.peer_seconds), now)
+    if not options.output:
+        sys.stdout.write(json.dumps(result, indent=1 if options.json else None) + "\n")
     return 0
 
 
 def _parser() -> argparse.ArgumentParser:
     p = argparse.ArgumentParser(prog="esker bench solve", description=(__doc__ or "").split("\n", 1)[0])
     p.add_argument("--json", action="store_true", help="print the result as indented JSON")
+    keep = "write the result here instead, part by part; parts that are not run are kept from the file"
+    p.add_argument("-o", "--output", type=Path, metavar="FILE.json", help=keep)
     p.add_argument("--quick", action="store_true", help="small grids only: about a minute")
-    p.add_argument("--part", action="append", choices=PARTS, help="default: all")
-    finest = f"finest level, 1..{MAX_LEVEL} (default {MAX_LEVEL})"
-    p.add_argument("--finest", type=int, choices=range(1, MAX_LEVEL + 1), default=MAX_LEVEL, metavar="N", help=finest)
+    p.add_argument("--part", action="append", choices=PARTS, help="default: all; peers need threads")
+    levels = f"finest level, 1..{MAX_LEVEL} (default {MAX_LEVEL})"
+    p.add_argument("--finest", type=int, choices=range(1, MAX_LEVEL + 1), default=MAX_LEVEL, metavar="N", help=levels)
     p.add_argument("--scene", action="append", choices=gallery.NAMES, metavar="NAME", help="accuracy of these alone")
-    p.add_argument("--maps", type=Path, metavar="FILE.npz", help=f"write error maps (committed: {MAPS.name})")
+    p.add_argument("--maps", type=Path, metavar="FILE.npz", help=f"write error maps (committed: {MAPS})")
     p.add_argument("--peer-gib", type=float, default=14.0, metavar="GIB", help="memory limit of a peer (default 14)")
     p.add_argument("--peer-seconds", type=float, default=600.0, metavar="S", help="its time limit (default 600)")
     return p
