@@ -18,7 +18,8 @@ typedef float8 __attribute__((aligned(4))) unaligned8;
 #define FORCE_INLINE inline __attribute__((always_inline))
 FORCE_INLINE float16 load16(crow_t p) { return *(global const unaligned16 *)p; }
 FORCE_INLINE float8 load8(crow_t p) { return *(global const unaligned8 *)p; }
-FORCE_INLINE void prefetch_row(crow_t p) { __builtin_prefetch((const void *)(size_t)p); }
+FORCE_INLINE void prefetch_read(crow_t p) { __builtin_prefetch((const void *)(size_t)p); }
+FORCE_INLINE void prefetch_write(row_t p) { __builtin_prefetch((const void *)(size_t)p, 1); }
 FORCE_INLINE void store16(float16 v, row_t p) { *(global unaligned16 *)p = v; }
 
 inline crow_t crow(crow_t a, int y, int pitch) { return a + (size_t)y * pitch + PAD; }

@@ -3,9 +3,14 @@
 // do row t - k, so all sweeps of a row happen while it is in cache; and the row that sweep k needs to the north is what
 // sweep k - 1 has just made, in a register. Strips repeat a few rows of their neighbours, blocks of columns a few
 // columns, and all agree to the bit: every sample is made by the same operations, none of which the compiler may fuse.
+// The sizes are those of backend/esker/solve/wave.py.
 #if CHEBYSHEV_SWEEPS != 4
-#error "wave_row does four sweeps"
+#error "a wave has four sweeps"
 #endif
+#if (TILE_CELLS >> (BOTTOM_LEVELS - 1)) != 8
+#error "the smallest level that is swept has nine samples a side"
+#endif
+#define AHEAD 4  // rows that are fetched before they are needed
 
 typedef struct {
     int n, pitch, pitch2, channels, stride, stride2;
@@ -14,55 +19,54 @@ typedef struct {
 
 // Scratch of one work-item, lanes of LANE floats. A slot holds what entered with one row: q = 1 / (4 + t), or 0 where
 // fixed; t = d + screening; and per channel the start and the right-hand side. Behind the slots, per channel: the rows
-// that sweeps 1 to 4 made last, of even and of odd rows; four rows of the residual; one for its restriction.
-#define RING_LANES (SLOTS * SLOT_LANES + 2 * OWN_LANES)
-#define AHEAD 2  // rows that are fetched before they are needed
-#define SLOT(y) (ring + ((y) % SLOTS) * (2 + 2 * g.channels) * LANE + PAD)
+// that sweeps 1 to 4 made last, of even and of odd rows; four rows of the residual.
+#define SLOT(y) (ring + (((y) + SLOTS) % SLOTS) * (2 + 2 * g.channels) * LANE + PAD)
 #define T_LANE LANE
 #define START_LANE(channel) ((2 + 2 * (channel)) * LANE)
 #define RHS_LANE(channel) ((3 + 2 * (channel)) * LANE)
 #define OWN(channel) (ring + (SLOTS * SLOT_LANES + (channel) * OWN_LANES) * LANE + PAD)
 #define PARITY(own, y) (own + ((y) & 1) * 4 * LANE)
 #define RESIDUAL(own, y) (own + (8 + ((y) & 3)) * LANE)
-#define TEMP(own) (own + 12 * LANE)
 
 // Where a row of one channel enters from; guess and the two coarse rows of the correction may be null.
 typedef struct {
     crow_t d, guess, rhs, c0, c1;
-    int ahead;  // floats from a row to one that the caches should fetch meanwhile
+    int ahead, ahead2;  // floats to the rows that the caches should fetch meanwhile
     float screening;
 } source_t;
 
-// 16 samples of P (mean of c0, c1).
-FORCE_INLINE float16 prolong16(crow_t c0, crow_t c1, long x) {
-    float8 c = 0.5f * (load8(c0 + x / 2) + load8(c1 + x / 2));
-    float8 b = 0.5f * (load8(c0 + x / 2 + 1) + load8(c1 + x / 2 + 1)), m = 0.5f * (c + b);
-    return __builtin_shufflevector(c, m, 0, 8, 1, 9, 2, 10, 3, 11, 4, 12, 5, 13, 6, 14, 7, 15);
+// 16 samples of P of the coarse rows c0 and c1 added to base. The mean of two or four is taken last: exact either way.
+FORCE_INLINE float16 add_prolonged(float16 base, crow_t c0, crow_t c1) {
+    const float16 share = {0.5f, 0.25f, 0.5f, 0.25f, 0.5f, 0.25f, 0.5f, 0.25f,
+                           0.5f, 0.25f, 0.5f, 0.25f, 0.5f, 0.25f, 0.5f, 0.25f};
+    float8 two = load8(c0) + load8(c1), four = two + (load8(c0 + 1) + load8(c1 + 1));
+    return fma(__builtin_shufflevector(two, four, 0, 8, 1, 9, 2, 10, 3, 11, 4, 12, 5, 13, 6, 14, 7, 15), share, base);
 }
 
 // A row enters at x: what the operator needs, by channel 0; start = guess + P correction, the correction only where not
-// fixed, without guess zero, or fixed; the right-hand side. Returns the start.
-FORCE_INLINE float16 enter16(row_t slot, const source_t *in, long x, const int channel) {
-    float16 q;
-    prefetch_row(in->rhs + in->ahead + x);
+// fixed, without guess zero, or fixed; the right-hand side.
+FORCE_INLINE void enter16(row_t slot, const source_t *in, long x, const int channel) {
+    int16 fixed;
+    prefetch_read(in->rhs + in->ahead + x);
     if (channel == 0) {
         float16 d = load16(in->d + x), t = d + in->screening;
-        prefetch_row(in->d + in->ahead + x);
-        q = select(1.0f / (4.0f + t), (float16)(0.0f), d < 0.0f);
-        store16(q, slot + x);
+        prefetch_read(in->d + in->ahead + x);
+        fixed = d < 0.0f;
+        store16(select(1.0f / (4.0f + t), (float16)(0.0f), fixed), slot + x);
         store16(t, slot + T_LANE + x);
     } else
-        q = load16(slot + x);
-    float16 f = load16(in->rhs + x), base = 0.0f, held = f;
+        fixed = load16(slot + x) == 0.0f;
+    float16 f = load16(in->rhs + x), start = 0.0f, held = f;
     if (in->guess) {
-        held = base = load16(in->guess + x);
-        prefetch_row(in->guess + in->ahead + x);
+        held = start = load16(in->guess + x);
+        prefetch_read(in->guess + in->ahead + x);
     }
-    if (in->c0) base += prolong16(in->c0, in->c1, x);
-    float16 start = select(base, held, q == 0.0f);
-    store16(start, slot + START_LANE(channel) + x);
+    if (in->c0) {
+        start = add_prolonged(start, in->c0 + x / 2, in->c1 + x / 2);
+        prefetch_read(in->c1 + in->ahead2 + x / 2);
+    }
+    store16(select(start, held, fixed), slot + START_LANE(channel) + x);
     store16(f, slot + RHS_LANE(channel) + x);
-    return start;
 }
 
 // What a stage carries from one vector of a row to the next: the samples, and their differences to the east.
@@ -70,109 +74,139 @@ typedef struct {
     float16 c, east;
 } carry_t;
 
-FORCE_INLINE carry_t carry(crow_t here) {
-    carry_t k = {load16(here), load16(here + 1 - VW) - load16(here - VW)};
+// The 16 samples that begin with the second of a; with the last of a.
+FORCE_INLINE float16 one_on(float16 a, float16 b) {
+    return __builtin_shufflevector(a, b, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16);
+}
+FORCE_INLINE float16 one_back(float16 a, float16 b) {
+    return __builtin_shufflevector(a, b, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29, 30);
+}
+
+// The difference across the western border is mirrored; at the western end of a block's halo it does not matter. Nine
+// samples have their eastern border within the vector.
+FORCE_INLINE carry_t carry(crow_t here, int n) {
+    float16 c = load16(here);
+    if (n < VW) c.s9 = c.s7;
+    carry_t k = {c, (float16)(c.s0 - c.s1)};
     return k;
 }
 
-// Stage k of row y at x. `before`, `here`: rows y - 1 and y of the stage before; north: row y + 1 of it, kept in `before`
-// when it is not there yet. Returns rhs - A u, and c, the sample itself.
-FORCE_INLINE float16 stage(float16 *centre, carry_t *k, float16 north, row_t before, crow_t here, crow_t slot, long x, int y,
-                     int n, const int channel, const int keep, const int edge) {
-    float16 c = k->c, south = load16(before + x), beyond = south, next = load16(here + x + VW);
+// Stage k of row y at x: rhs - A u of what the stage before made, whose rows y - 1 and y are `before` and `here`, and
+// row y + 1 is `north`; kept in `before` when it is not there yet. *c: u itself. `edge`: y may be 0 or n - 1. `end`: x is
+// the eastern border, which whole vectors always leave over.
+FORCE_INLINE float16 stage(float16 *c, carry_t *k, float16 north, row_t before, crow_t here, crow_t slot, long x, int y,
+                           int n, const int channel, const int keep, const int edge, const int end) {
+    float16 south = load16(before + x), beyond = south, next = k->c, west, east;
+    *c = k->c;
     if (keep) store16(north, before + x);
     if (edge && y == 0) south = north;
     if (edge && y == n - 1) north = beyond;
-    float16 east = __builtin_shufflevector(c, next, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16) - c;
-    float16 west = __builtin_shufflevector(k->east, east, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29, 30);
+    if (end) {
+        west = one_back(k->east, k->east);
+        east = -west;
+    } else {
+        next = load16(here + x + VW);
+        east = one_on(*c, next) - *c;
+        west = one_back(k->east, east);
+    }
     k->c = next;
     k->east = east;
-    *centre = c;
-    float16 rest = fma(-load16(slot + T_LANE + x), c, (east - west) + ((south - c) + load16(slot + RHS_LANE(channel) + x)));
-    return rest + (north - c);
+    float16 rest = (east - west) + ((south - *c) + load16(slot + RHS_LANE(channel) + x));
+    return fma(-load16(slot + T_LANE + x), *c, rest) + (north - *c);
 }
 
-// One time step of b columns: row t enters, sweep k does row t - k, the residual is that of row t - 5. The last sweep
-// also goes to `out`, columns [out_a, out_b). `edge`: some of these rows may be rows 0 or n - 1, or there is none left.
-FORCE_INLINE void wave_row(row_t ring, level_t g, source_t in, row_t out, int t, int entering, long b, long out_a, long out_b,
-                           constant float *w, const int channel, const int edge) {
-    row_t own = OWN(channel), even = PARITY(own, t), odd = PARITY(own, t - 1), residual = RESIDUAL(own, t - 5);
-    row_t s0 = SLOT(t + SLOTS), s1 = SLOT(t - 1 + SLOTS), s2 = SLOT(t - 2 + SLOTS), s3 = SLOT(t - 3 + SLOTS), s4 = SLOT(t - 4 + SLOTS), s5 = SLOT(t - 5 + SLOTS);
-    const int start = START_LANE(channel);
-    float w0 = w[0], w1 = w[1], w2 = w[2], w3 = w[3];
-    int n = g.n;
-    carry_t k1 = carry(s1 + start), k2 = carry(even), k3 = carry(odd + LANE), k4 = carry(even + 2 * LANE), k5 = carry(odd + 3 * LANE);
-    for (long x = 0; x < b; x += VW) {
-        float16 c, r, u = 0.0f;
-        if (!edge || entering) u = enter16(s0, &in, x, channel);
-        r = stage(&c, &k1, u, s2 + start, s1 + start, s1, x, t - 1, n, channel, 0, edge);
-        u = fma(w0 * load16(s1 + x), r, c);
-        r = stage(&c, &k2, u, odd, even, s2, x, t - 2, n, channel, 1, edge);
-        u = fma(w1 * load16(s2 + x), r, c);
-        r = stage(&c, &k3, u, even + LANE, odd + LANE, s3, x, t - 3, n, channel, 1, edge);
-        u = fma(w2 * load16(s3 + x), r, c);
-        r = stage(&c, &k4, u, odd + 2 * LANE, even + 2 * LANE, s4, x, t - 4, n, channel, 1, edge);
-        u = fma(w3 * load16(s4 + x), r, c);
-        if (x >= out_a && x < out_b) store16(u, out + x);
-        r = stage(&c, &k5, u, even + 3 * LANE, odd + 3 * LANE, s5, x, t - 5, n, channel, 1, edge);
-        store16(select(r, (float16)(0.0f), load16(s5 + x) == 0.0f), residual + x);
+// Rows of one time step, and what its stages carry along them.
+typedef struct {
+    row_t next, s0, s1, s2, s3, s4, s5, even, odd, residual, out;
+    long out_a, out_b;
+    carry_t k1, k2, k3, k4, k5;
+} step_t;
+
+FORCE_INLINE void wave16(step_t *s, level_t g, const source_t *in, int t, int entering, long x, float4 w, const int channel,
+                         const int edge, const int end) {
+    const int start = START_LANE(channel), n = g.n;
+    float16 c, r, u = load16(s->s0 + start + x);
+    if (!edge || entering) enter16(s->next, in, x, channel);
+    r = stage(&c, &s->k1, u, s->s2 + start, s->s1 + start, s->s1, x, t - 1, n, channel, 0, edge, end);
+    u = fma(w.x * load16(s->s1 + x), r, c);
+    r = stage(&c, &s->k2, u, s->odd, s->even, s->s2, x, t - 2, n, channel, 1, edge, end);
+    u = fma(w.y * load16(s->s2 + x), r, c);
+    r = stage(&c, &s->k3, u, s->even + LANE, s->odd + LANE, s->s3, x, t - 3, n, channel, 1, edge, end);
+    u = fma(w.z * load16(s->s3 + x), r, c);
+    r = stage(&c, &s->k4, u, s->odd + 2 * LANE, s->even + 2 * LANE, s->s4, x, t - 4, n, channel, 1, edge, end);
+    u = fma(w.w * load16(s->s4 + x), r, c);
+    if (x >= s->out_a && x < s->out_b) {
+        store16(u, s->out + x);
+        prefetch_write(s->out + in->ahead + x);
     }
+    r = stage(&c, &s->k5, u, s->even + 3 * LANE, s->odd + 3 * LANE, s->s5, x, t - 5, n, channel, 1, edge, end);
+    store16(select(r, (float16)(0.0f), load16(s->s5 + x) == 0.0f), s->residual + x);
 }
 
-// Mirror images beside the block's rows, where the domain ends: of the rows that time step t has made.
-FORCE_INLINE void mirror_columns(row_t ring, level_t g, int t, int m, int left, int right, int channel) {
-    row_t own = OWN(channel), rows[5] = {SLOT(t + SLOTS) + START_LANE(channel), PARITY(own, t - 1), PARITY(own, t) + LANE,
-                                         PARITY(own, t - 1) + 2 * LANE, PARITY(own, t) + 3 * LANE};
-    for (int k = 0; k < 5; k++) {
-        if (left) rows[k][-1] = rows[k][1];
-        if (right) rows[k][m] = rows[k][m - 2];
+// One time step of m columns: row t + 1 enters, sweep k does row t - k, the residual is that of row t - 5. The last sweep
+// also goes to `out`, columns [out_a, out_b). `edge`: rows 0 or n - 1 may be among these, or no row be left to enter.
+FORCE_INLINE void wave_row(row_t ring, level_t g, source_t in, row_t out, int t, int entering, long m, int right,
+                           long out_a, long out_b, float4 w, const int channel, const int edge) {
+    row_t own = OWN(channel), even = PARITY(own, t), odd = PARITY(own, t - 1);
+    step_t s = {SLOT(t + 1), SLOT(t), SLOT(t - 1), SLOT(t - 2), SLOT(t - 3), SLOT(t - 4), SLOT(t - 5), even, odd,
+                RESIDUAL(own, t - 5), out, out_a, out_b, carry(SLOT(t - 1) + START_LANE(channel), g.n), carry(even, g.n),
+                carry(odd + LANE, g.n), carry(even + 2 * LANE, g.n), carry(odd + 3 * LANE, g.n)};
+    for (long x = 0; x < m - right; x += VW) wave16(&s, g, &in, t, entering, x, w, channel, edge, 0);
+    if (right) wave16(&s, g, &in, t, entering, m - 1, w, channel, edge, 1);
+}
+
+// `count` coarse samples from three rows of the residual's columns from `from` on, and one more at the eastern border.
+FORCE_INLINE void restrict_lanes(row_t out, crow_t a, crow_t b, crow_t c, long from, long count, int left, int right) {
+    float16 before = 0.0f;
+    if (!left) before = load16(b + from - VW) + 0.5f * (load16(a + from - VW) + load16(c + from - VW));
+    for (long x = 0; x < count; x += VW) {
+        long at = from + 2 * x;
+        float16 u = load16(b + at) + 0.5f * (load16(a + at) + load16(c + at));
+        float16 v = load16(b + at + VW) + 0.5f * (load16(a + at + VW) + load16(c + at + VW));
+        float16 even = __builtin_shufflevector(u, v, 0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
+        float16 odd = __builtin_shufflevector(u, v, 1, 3, 5, 7, 9, 11, 13, 15, 17, 19, 21, 23, 25, 27, 29, 31);
+        if (left && x == 0) before = (float16)(odd.s0);
+        store16(even + 0.5f * (odd + one_back(before, odd)), out + x);
+        before = odd;
     }
-}
-
-// Coarse columns [0, count) of out from a row of the residual and its neighbours.
-FORCE_INLINE void restrict_lane(row_t out, crow_t a, crow_t b, crow_t c, row_t tmp, int from, int m, int left, int right, int count) {
-    for (int x = 0; x < m; x += VW)
-        store16(load16(b + x) + 0.5f * (load16(a + x) + load16(c + x)), tmp + x);
-    if (left) tmp[-1] = tmp[1];
-    if (right) tmp[m] = tmp[m - 2];
-    for (int x = 0; x < count; x += VW) {
-        row_t r = tmp + from + 2 * x;
-        float16 u = load16(r), v = load16(r + VW), l = load16(r - 1), o = load16(r + VW - 1);
-        store16((float16)(u.even + 0.5f * (u.odd + l.even), v.even + 0.5f * (v.odd + o.even)), out + x);
+    if (right) {
+        long at = from + 2 * count;
+        out[count] = (b[at] + 0.5f * (a[at] + c[at])) + (b[at - 1] + 0.5f * (a[at - 1] + c[at - 1]));
     }
 }
 
 // Rows [y0, y1), columns [x0, x1) of out = sweeps of (guess + P correction); coarse = R (rhs - A out) if given. guess,
 // correction and coarse may be null. All channels: what belongs to the operator is made once.
 FORCE_INLINE void visit_block(crow_t guess, crow_t correction, crow_t rhs, crow_t d, row_t out, row_t coarse, level_t g,
-                        row_t ring, int y0, int y1, int x0, int x1, constant float *w) {
+                              row_t ring, int y0, int y1, int x0, int x1, constant float *weights) {
     int n = g.n, halo = CHEBYSHEV_SWEEPS + (coarse ? 2 : 0), lo = max(0, y0 - halo), hi = min(n, y1 + halo);
-    int xa = max(0, x0 - HALO), xb = min(n, x1 + HALO), m = xb - xa, left = xa == 0, right = xb == n;
-    int out_a = x0 - xa, out_b = x1 - xa, last = y1 - 1 + CHEBYSHEV_SWEEPS + (coarse ? 1 : 0);
-    for (int t = lo; t <= last; t++) {
+    int xa = max(0, x0 - HALO), xb = min(n, x1 + HALO), m = xb - xa, left = xa == 0, right = xb == n && n > VW;
+    int last = y1 - 1 + CHEBYSHEV_SWEEPS + (coarse ? 1 : 0);
+    float4 w = {weights[0], weights[1], weights[2], weights[3]};
+    for (int t = lo - 1; t <= last; t++)
         for (int c = 0; c < g.channels; c++) {
-            size_t fine = (size_t)c * g.stride + xa, under = (size_t)c * g.stride2 + xa / 2;
-            int y = t - CHEBYSHEV_SWEEPS, inside = y >= y0 && y < y1, entering = t < hi, out_end = inside ? out_b : 0;
-            int edge = t < CHEBYSHEV_SWEEPS + 2 || t >= n;
-            source_t in = {crow(d, t, g.pitch) + xa, guess ? crow(guess, t, g.pitch) + fine : 0,
-                           crow(rhs, t, g.pitch) + fine, correction ? crow(correction, t / 2, g.pitch2) + under : 0,
-                           correction ? crow(correction, (t + 1) / 2, g.pitch2) + under : 0, AHEAD * g.pitch,
-                           g.screening};
-            row_t o = inside ? row(out, y, g.pitch) + fine : 0;
-            if (c == 0 && edge) wave_row(ring, g, in, o, t, entering, m, out_a, out_end, w, 0, 1);
-            if (c == 0 && !edge) wave_row(ring, g, in, o, t, entering, m, out_a, out_end, w, 0, 0);
-            if (c == 1 && edge) wave_row(ring, g, in, o, t, entering, m, out_a, out_end, w, 1, 1);
-            if (c == 1 && !edge) wave_row(ring, g, in, o, t, entering, m, out_a, out_end, w, 1, 0);
-            mirror_columns(ring, g, t, m, left, right, c);
-            y = t - CHEBYSHEV_SWEEPS - 1;
-            int centre = (y & 1) ? y - 1 : (y == n - 1 ? y : -1);
+            size_t fine = (size_t)c * g.stride + xa, under = (size_t)c * g.stride2;
+            int in_y = t + 1, out_y = t - CHEBYSHEV_SWEEPS, inside = out_y >= y0 && out_y < y1, entering = in_y < hi;
+            source_t in = {crow(d, in_y, g.pitch) + xa,
+                           guess ? crow(guess, in_y, g.pitch) + fine : 0,
+                           crow(rhs, in_y, g.pitch) + fine,
+                           correction ? crow(correction, in_y / 2, g.pitch2) + under + xa / 2 : 0,
+                           correction ? crow(correction, (in_y + 1) / 2, g.pitch2) + under + xa / 2 : 0,
+                           AHEAD * g.pitch, AHEAD / 2 * g.pitch2, g.screening};
+            row_t o = inside ? row(out, out_y, g.pitch) + fine : 0;
+            int out_a = x0 - xa, out_b = inside ? x1 - xa : 0, edge = t < CHEBYSHEV_SWEEPS + 2 || t >= n - 1;
+            if (c == 0 && edge) wave_row(ring, g, in, o, t, entering, m, right, out_a, out_b, w, 0, 1);
+            if (c == 0 && !edge) wave_row(ring, g, in, o, t, entering, m, right, out_a, out_b, w, 0, 0);
+            if (c == 1 && edge) wave_row(ring, g, in, o, t, entering, m, right, out_a, out_b, w, 1, 1);
+            if (c == 1 && !edge) wave_row(ring, g, in, o, t, entering, m, right, out_a, out_b, w, 1, 0);
+            int y = t - CHEBYSHEV_SWEEPS - 1, centre = (y & 1) ? y - 1 : (y == n - 1 ? y : -1);
             if (coarse && centre >= y0 && centre < y1) {
                 row_t own = OWN(c);
-                restrict_lane(row(coarse, centre / 2, g.pitch2) + under - xa / 2 + x0 / 2, RESIDUAL(own, mirror(centre - 1, n)), RESIDUAL(own, centre),
-                              RESIDUAL(own, mirror(centre + 1, n)), TEMP(own), out_a, m, left, right, x1 == n ? n / 2 + 1 - x0 / 2 : (x1 - x0) / 2);
+                restrict_lanes(row(coarse, centre / 2, g.pitch2) + under + x0 / 2, RESIDUAL(own, mirror(centre - 1, n)),
+                               RESIDUAL(own, centre), RESIDUAL(own, mirror(centre + 1, n)), out_a, (x1 - x0) / 2, left,
+                               right);
             }
         }
-    }
 }
 
 // Global size (strips); d is shared by the channels. `rows` is even. Blocks of columns one after the other.

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import dataclasses
+import warnings
+from typing import Any
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from esker import grid
+from esker.solve import device as device_module
 from esker.solve import reference, reference_raster
 from esker.solve.constraints import Packer, bins, pack
 from esker.solve.device import Device
-from esker.solve.levels import ClSystem, ClWorkspace, Launcher
+from esker.solve.levels import PAD, ClSystem, ClWorkspace, Launcher
 from esker.solve.reference import BOTTOM_LEVELS
 from esker.solve.tables import STROKE_AT
 from tests.solver.scenes import PINNED, SCENES, SETTINGS
@@ -36,10 +41,12 @@ def close(actual: NDArray[np.float32], expected: Field, scale: float = 1.0) -> N
     assert np.abs(actual - expected).max() < 2e-5 * scale * max(1.0, np.abs(expected).max())
 
 
-def system(device: Device, level: int, channels: int) -> tuple[ClSystem, dict[str, Field]]:
+def system(
+    device: Device, level: int, channels: int, launch: Launcher | None = None
+) -> tuple[ClSystem, dict[str, Field]]:
     """A system whose fields of ``level`` and ``level - 1`` are noise, and the same fields for the twin."""
     n, m = grid.samples(level), grid.samples(level - 1)
-    s = ClSystem(Launcher(device, level), level, channels, "f")
+    s = ClSystem(launch or Launcher(device, level), level, channels, "f")
     s.eps = {k: EPS * 4.0 ** (level - k) for k in range(level + 1)}
     host = {"d": stiffness(n), "f": noise((channels, n, n), 2), "u": noise((channels, n, n), 3)}
     host["e"] = noise((channels, m, m), 4)
@@ -64,18 +71,58 @@ def test_visit(device: Device, level: int, channels: int, start: str) -> None:
     close(s.get("b", level - 1), coarse)
 
 
+@pytest.mark.parametrize("channels", [1, 2])
 @pytest.mark.parametrize("strips", [1, 2, 5])
-def test_visit_does_not_depend_on_the_strips(device: Device, strips: int) -> None:
+def test_visit_does_not_depend_on_the_strips(device: Device, strips: int, channels: int) -> None:
     """SPEC S15: the number of threads changes not one bit."""
-    s, _ = system(device, 2, 2)
-    s.visit(2, rhs="f", out="v", guess="u", correction="e", residual=True)
-    one = Device(device.name, device.context, device.queue, device.program, strips)
-    t = ClSystem(Launcher(one, 2), 2, 2, "f")
+    s, _ = system(device, 3, channels)
+    s.visit(3, rhs="f", out="v", guess="u", correction="e", residual=True)
+    one = dataclasses.replace(device, strips=strips)
+    t = ClSystem(Launcher(one, 3), 3, channels, "f")
     t.eps = s.eps
-    t.fields = s.fields | {("v", 2): t.fields["v", 2], ("b", 1): t.fields["b", 1]}
-    t.visit(2, rhs="f", out="v", guess="u", correction="e", residual=True)
-    assert np.array_equal(s.get("v", 2), t.get("v", 2))
-    assert np.array_equal(s.get("b", 1), t.get("b", 1))
+    t.fields = s.fields | {("v", 3): t.fields["v", 3], ("b", 2): t.fields["b", 2]}
+    t.visit(3, rhs="f", out="v", guess="u", correction="e", residual=True)
+    assert np.array_equal(s.get("v", 3), t.get("v", 3))
+    assert np.array_equal(s.get("b", 2), t.get("b", 2))
+
+
+@pytest.fixture(scope="module")
+def plain(device: Device) -> dict[str, Any]:
+    """The kernels of plain.cl, which the product does not use."""
+    cl = pytest.importorskip("pyopencl")
+    folder = device_module.shader_folder()
+    source = "".join((folder / name).read_text() for name in ("rows.cl", "plain.cl"))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", cl.CompilerWarning)
+        program = cl.Program(device.context, device_module._defines({}) + source).build(["-cl-mad-enable"])
+    return {kernel.function_name.removeprefix("plain_"): kernel for kernel in program.all_kernels()}
+
+
+@pytest.mark.parametrize("level", [*LEVELS, 4])
+@pytest.mark.parametrize("start", ["zero", "guess", "both"])
+def test_visit_has_the_bits_of_its_steps(device: Device, plain: dict[str, Any], level: int, start: str) -> None:
+    """The fused kernel against its plain twin, with several strips and blocks."""
+    launch = Launcher(dataclasses.replace(device, strips=3), level)
+    s, _ = system(device, level, 1, launch)
+    n, m = s.shapes[level], s.shapes[level - 1]
+    guess, correction = None if start == "zero" else "u", None if start == "guess" else "e"
+    s.visit(level, rhs="f", out="v", guess=guess, correction=correction, residual=True)
+    fields, queue = s.fields, device.queue
+    pair = [launch.zeros(n.stride + PAD) for _ in range(2)]
+    coarse = launch.zeros(m.stride + PAD)
+    i, eps, f, d = np.int32, np.float32(EPS), fields["f", level], fields["d", level]
+    plain["start"](
+        queue, (n.n, n.n), None, fields[guess, level] if guess else None,
+        fields[correction, level - 1] if correction else None, f, d, pair[0], i(n.pitch), i(m.pitch),
+    )  # fmt: skip
+    for w in reference.chebyshev_weights().astype(np.float32):
+        plain["sweep"](queue, (n.n, n.n), None, pair[0], f, d, pair[1], i(n.n), i(n.pitch), eps, w)
+        pair.reverse()
+    plain["residual"](queue, (n.n, n.n), None, pair[0], f, d, pair[1], i(n.n), i(n.pitch), eps)
+    plain["restriction"](queue, (m.n, m.n), None, pair[1], coarse, i(n.n), i(n.pitch), i(m.pitch))
+    s.fields["plain", level], s.fields["plain", level - 1] = pair[0], coarse
+    assert np.array_equal(s.get("v", level), s.get("plain", level))
+    assert np.array_equal(s.get("b", level - 1), s.get("plain", level - 1))
 
 
 @pytest.mark.parametrize("level", LEVELS)
