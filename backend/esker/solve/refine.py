@@ -89,6 +89,10 @@ class FieldCache:
         while len(self._held) > self.most:
             self._held.popitem(last=False)
 
+    def drop(self, content: bytes) -> None:
+        """Forget one tile."""
+        self._held.pop(content, None)
+
     def clear(self) -> None:
         """Drop everything."""
         self._held.clear()
@@ -98,7 +102,7 @@ class Refiner:
     """Refines one settled solve. Use it from the solver's thread."""
 
     def __init__(self, basis: Basis, engine: Engine, cache: FieldCache) -> None:
-        self.basis, self._engine, self._cache = basis, engine, cache
+        self.basis, self.cache, self._engine = basis, cache, engine
         self._packer = WindowPacker(basis.strokes, basis.settings)
         self._ground = np.concatenate([basis.gradient, basis.heights[None]])
         self._digests: dict[TileKey, bytes] = {}
@@ -125,11 +129,16 @@ class Refiner:
             self.content(key)
         wanted = list(dict.fromkeys(keys))
         for at, key in enumerate(wanted):
-            field = self._cache.get(self.content(key))
+            field = self.cache.get(self.content(key))
             if field is None:
                 near = [k for k in wanted[at:] if k.level == key.level and _block(k) == _block(key)]
                 field = (yield from self._made(near))[key]
             yield RefinedTile(key, field[2], self.content(key))
+
+    def forget(self, keys: Iterable[TileKey]) -> None:
+        """Drop tiles from the cache."""
+        for key in keys:
+            self.cache.drop(self.content(key))
 
     def window(
         self, level: int, rows: slice, cols: slice, progress: Callable[[float], None] | None = None
@@ -170,7 +179,7 @@ class Refiner:
         out: dict[TileKey, Fields] = {}
         missing: list[TileKey] = []
         for key in keys:
-            held = self._cache.get(self.content(key))
+            held = self.cache.get(self.content(key))
             if held is None:
                 missing.append(key)
             else:
@@ -195,7 +204,7 @@ class Refiner:
             tile = fields[:, r : r + TILE_SAMPLES, c : c + TILE_SAMPLES].copy()
             tile.flags.writeable = False
             out[key] = tile
-            self._cache.put(self.content(key), tile)
+            self.cache.put(self.content(key), tile)
         yield
         return out
 
