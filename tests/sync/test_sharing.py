@@ -308,6 +308,23 @@ class Watched:
         return any(entry[:3] == (clock, level, settled) for entry in self.done)
 
 
+def test_a_solve_left_while_it_rasterises_leaves_no_trace(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("esker.solve.levels.RASTER_BINS", 40)
+    monkeypatch.setattr("esker.solve.gpu_levels.RASTER_BINS", 40)
+    strokes = stream.fifty().strokes
+    solver = Solver(max_level=2)
+    if solver.device_name.startswith("NumPy"):
+        pytest.skip("NumPy rasterises in one piece")
+    want = solver.solve(strokes, SETTINGS)
+    solver.solve(strokes[:30], SETTINGS)
+    steps = solver.steps(strokes, SETTINGS)
+    assert next(steps) is None, "between two bands of bins"
+    steps.close()  # type: ignore[attr-defined]
+    got = solver.solve(strokes, SETTINGS)
+    for level in range(3):
+        np.testing.assert_array_equal(got[level], want[level])
+
+
 def test_ops_during_a_fine_level_stop_it_within_one_level_and_at_rest_the_fine_levels_complete() -> None:
     watched = Watched(3)
     strokes = stream.fifty().strokes

@@ -6,7 +6,7 @@ lie behind each other. Level 0's buffers also hold the levels below it, which th
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,7 +20,7 @@ from esker.solve.constraints import Packer
 from esker.solve.device import Device
 from esker.solve.gpu_program import CHANGE_ITEMS, Plan
 from esker.solve.reference import BOTTOM_LEVELS, chebyshev_weights
-from esker.solve.tables import BIN, Tables, Window
+from esker.solve.tables import BIN, RASTER_BINS, Tables, Window
 
 LINE = 32
 """Floats of a cache line."""
@@ -266,12 +266,21 @@ class GpuWorkspace:
         self.size_m = 1.0
 
     def load(self, strokes: Sequence[Stroke], settings: TerrainSettings) -> None:
-        """Rasterise what changed since the last set, and coarsen."""
+        """``loading`` without a pause."""
+        for _ in self.loading(strokes, settings):
+            pass
+
+    def loading(self, strokes: Sequence[Stroke], settings: TerrainSettings) -> Iterator[None]:
+        """Rasterise what changed since the last set, and coarsen; may be left between bands of bins."""
         tables, window = self.packer.pack(strokes, settings)
         self.size_m = tables.size_m
         if window is None:
             return
-        self.rasterise(tables, window)
+        for count, band in enumerate(window.bands(RASTER_BINS)):
+            if count:
+                self.launch.queue.finish()
+                yield
+            self.rasterise(tables, band)
         self.gradient.coarsen(tables.screening, window.sample_rows)
         self.height.coarsen(tables.screening, window.sample_rows)
 

@@ -6,7 +6,7 @@ behind each other. Level 0's buffers also hold the levels below it, which the bo
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,6 +19,7 @@ from esker.solve import raster, wave
 from esker.solve.constraints import Packer, Tables, Window
 from esker.solve.device import Device
 from esker.solve.reference import BOTTOM_LEVELS, chebyshev_weights
+from esker.solve.tables import RASTER_BINS
 
 PAD = wave.PAD
 ALIGN = 64
@@ -251,12 +252,21 @@ class ClWorkspace:
         self.size_m = 1.0
 
     def load(self, strokes: Sequence[Stroke], settings: TerrainSettings) -> None:
-        """Rasterise what changed since the last set, and coarsen."""
+        """``loading`` without a pause."""
+        for _ in self.loading(strokes, settings):
+            pass
+
+    def loading(self, strokes: Sequence[Stroke], settings: TerrainSettings) -> Iterator[None]:
+        """Rasterise what changed since the last set, and coarsen; may be left between bands of bins."""
         tables, window = self.packer.pack(strokes, settings)
         self.size_m = tables.size_m
         if window is None:
             return
-        self.rasterise(tables, window)
+        for count, band in enumerate(window.bands(RASTER_BINS)):
+            if count:
+                self.launch.queue.finish()
+                yield
+            self.rasterise(tables, band)
         self.gradient.coarsen(tables.screening, window.sample_rows)
         self.height.coarsen(tables.screening, window.sample_rows)
 

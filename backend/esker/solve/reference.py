@@ -6,7 +6,7 @@ is the energy's (half control volume) doubled. Stiffness ``d`` excludes screenin
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -209,6 +209,11 @@ class NumpyWorkspace:
         self.size_m = tables.size_m
         self.gradient = NumpySystem(c.gradient_d[None], c.gradient_f, tables.screening, self.top)
         self.height = NumpySystem(c.height_d[None], c.height_f[None], tables.screening, self.top)
+
+    def loading(self, strokes: Sequence[Stroke], settings: TerrainSettings) -> Iterator[None]:
+        """The same, in one piece."""
+        self.load(strokes, settings)
+        yield
 
     def warm(self, heights: NDArray[np.float32]) -> None:
         """Start the height step from these heights of the finest level instead of from coarser levels."""

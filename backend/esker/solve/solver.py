@@ -38,6 +38,8 @@ GRADIENT_SHARE = 1 / 16
 SPARE_BYTES = 3 << 30
 """Memory that idle workspaces may keep, with the raster of the strokes that they last solved, but no more than an
 eighth of the machine's: a room whose workspace was given to another one has all its strokes rasterised again."""
+PACED_ABOVE = 4
+"""Up to this level a whole preview takes less time than one cycle of a big terrain."""
 WORKSPACE_BYTES = 91 << 20
 """At level 4; four times as much a level."""
 
@@ -98,6 +100,7 @@ class Workspace(Protocol):
     @property
     def height(self) -> multigrid.System: ...
     def load(self, strokes: Sequence[Stroke], settings: TerrainSettings) -> None: ...
+    def loading(self, strokes: Sequence[Stroke], settings: TerrainSettings) -> Iterator[None]: ...
     def guide(self, level: int) -> None: ...
     def warm(self, heights: NDArray[np.float32]) -> None: ...
     def read(self, level: int) -> NDArray[np.float32]: ...
@@ -218,11 +221,12 @@ class Solver:
         """One solve. A workspace whose device failed is dropped, all others are kept for the next one."""
         with guarded(self._device):
             workspace = self._take(strokes, settings, top)
-            keep = True
+            keep, loaded = True, False
             try:
-                workspace.load(strokes, settings)
+                yield from workspace.loading(strokes, settings)
+                loaded = True
                 if warm is None:
-                    yield from _previews(workspace)
+                    yield from self._paced(_previews(workspace), top)
                 else:
                     _gradients(workspace)
                     workspace.warm(warm)
@@ -230,6 +234,8 @@ class Solver:
                 yield from self._channels(strokes, settings, top)
                 yield from _settled(workspace, strokes, settings, basis)
             except GeneratorExit:
+                if not loaded:
+                    workspace.packer.forget()
                 raise
             except BaseException as error:
                 workspace.packer.forget()
@@ -239,6 +245,13 @@ class Solver:
                 if keep:
                     self._give(workspace)
                 del workspace  # the traceback of an error would keep it
+
+    def _paced(self, steps: Iterator[LevelResult | None], top: int) -> Iterator[LevelResult | None]:
+        """On big levels what is enqueued is done before somebody else has a turn: the queue is in order."""
+        for result in steps:
+            if result is None and self._device is not None and top > PACED_ABOVE:
+                self._device.queue.finish()
+            yield result
 
     def _channels(self, strokes: Sequence[Stroke], settings: TerrainSettings, top: int) -> Iterator[LevelResult | None]:
         """Amplitude and roughness, final, levels coarse to fine."""

@@ -12,6 +12,7 @@ the few that can be nearest to a bin.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,6 +28,8 @@ BinBox = tuple[int, int, int, int]
 
 BIN = 16
 """Samples along one side of a bin: one float16 vector wide."""
+RASTER_BINS = 5000
+"""Bins rasterised at a stretch: all of a level with 1025 x 1025 samples, a thirteenth of one with 4097 x 4097."""
 LANES = 16
 """Segment tables are padded per stroke to a multiple of this with copies of the last segment."""
 CREST_HALF_WIDTH = 0.71
@@ -204,6 +207,21 @@ class Window:
     def width(self) -> int:
         """Most bins of a row."""
         return int((self.spans[:, 1] - self.spans[:, 0]).max(initial=0))
+
+    def bands(self, bins: int) -> Iterator[Window]:
+        """The same bins in bands of whole rows with about ``bins`` of them at most, for work that may be left."""
+        rows = max(1, bins // max(1, self.width))
+        for row in range(0, len(self.spans), rows):
+            yield Window(self.first + row, self.spans[row : row + rows])
+
+    def within(self, other: Window) -> Window | None:
+        """The bins that both hold; None if there are none."""
+        first = max(self.first, other.first)
+        last = min(self.first + len(self.spans), other.first + len(other.spans))
+        a, b = (w.spans[first - w.first : max(last, first) - w.first] for w in (self, other))
+        left = np.maximum(a[:, 0], b[:, 0])
+        spans = np.column_stack([left, np.maximum(np.minimum(a[:, 1], b[:, 1]), left)])
+        return Window(first, spans) if (spans[:, 1] > spans[:, 0]).any() else None
 
 
 def everything(box: BinBox) -> Window:
