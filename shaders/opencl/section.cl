@@ -175,8 +175,9 @@ INLINE void crest_at(REAL *z, REAL *slope, REAL *rate, const tables_t *t, global
         REAL v = clamp((d - from) * inverse, 0.0f, 1.0f), share = v * v * (3.0f - 2.0f * v), smoother, along;
         octave_at(&smoother, &along, t, at, o + 1, q, first, last);
         *rate = *rate * (1.0f - share) + 6.0f * inverse * v * (1.0f - v) * (smoother - *z);
-        *z += share * (smoother - *z);
-        *slope += share * (along - *slope);
+        MASK all = v >= 1.0f;  // to the bit: what a sample gets does not depend on where its neighbours begin
+        *z = select(*z + share * (smoother - *z), smoother, all);
+        *slope = select(*slope + share * (along - *slope), along, all);
     }
 }
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from esker import grid
 from esker.contract import DEFAULT_REACH_FRACTION, MAX_REFINED_LEVEL, Stroke, TerrainSettings
+from esker.solve import dirty
 from esker.solve.crest import crest_of
 from esker.solve.packing import Packed, Shape, join, pack_one, reach_m, shape_of
 from esker.solve.tables import BIN, BinBox, Floats, Tables, Window, bins, defines, everything, union, whole
@@ -63,7 +64,7 @@ class Packer:
                 continue
             crest = crest_of(stroke)
             new[stroke.id] = (stroke, pack_one(shape_of(crest, settings), s, box) if crest is not None else None)
-        window = everything(box) if fresh else _changed(old, new)
+        window = everything(box) if fresh else _changed(old, new, box)
         self._settings, self._packed = _settings_key(settings), new
         tables = _tables(self.level, settings, [p for _, p in new.values() if p is not None], box)
         return tables, window
@@ -78,17 +79,13 @@ def _settings_key(settings: TerrainSettings) -> tuple[float, float | None, str]:
 
 
 def _changed(
-    old: dict[str, tuple[Stroke, Packed | None]], new: dict[str, tuple[Stroke, Packed | None]]
+    old: dict[str, tuple[Stroke, Packed | None]], new: dict[str, tuple[Stroke, Packed | None]], box: BinBox
 ) -> Window | None:
-    """Bins that strokes only in one of the sets, or different in both, can reach."""
-    touched = [
-        side[key][1]
-        for key in old.keys() | new.keys()
-        if key not in old or key not in new or old[key][1] is not new[key][1]
-        for side in (old, new)
-        if key in side
-    ]
-    return union([p.window for p in touched if p is not None])
+    """Bins that strokes only in one of the sets, or the parts that differ of those in both, can reach."""
+    nothing = (None, None)
+    pairs = [(old.get(key, nothing)[1], new.get(key, nothing)[1]) for key in old.keys() | new.keys()]
+    windows = [dirty.changed(a, b, box) for a, b in pairs if a is not b]
+    return union([w for w in windows if w is not None])
 
 
 def _tables(level: int, settings: TerrainSettings, packed: list[Packed], box: BinBox) -> Tables:

@@ -85,7 +85,8 @@ class Shape:
 class Packed:
     """One stroke's part of the tables. window: the bins that it can reach, within the box it was packed for.
 
-    segments of an outline; knots, pieces and where each octave's piece 0 is among them, of a profile.
+    segments of an outline; knots, pieces, where each octave's piece 0 is among them, and the length of a piece of the
+    first octave in cells, and how many pieces of each are left out at the beginning, of a profile.
     """
 
     params: Floats
@@ -94,8 +95,16 @@ class Packed:
     knots: Floats | None = None
     pieces: Floats | None = None
     octaves: tuple[int, ...] = ()
+    octave_cells: float = 1.0
+    culled: tuple[int, ...] = ()
     span_index: Ints | None = None
     spans: Floats | None = None
+
+    def octave(self, o: int) -> Floats:
+        """The pieces (m, 4) of octave ``o`` of a profile, from piece ``culled[o]`` on."""
+        assert self.pieces is not None
+        ends = [start + k for start, k in zip(self.octaves, self.culled, strict=True)] + [len(self.pieces)]
+        return self.pieces[ends[o] : ends[o + 1]]
 
 
 def shape_of(crest: Crest, settings: TerrainSettings) -> Shape:
@@ -130,7 +139,7 @@ def _pack_profile(shape: Shape, s: float, box: BinBox, low: Ints, high: Ints) ->
     reach = shape.reach(tops, s)
     ends = (line.start + edges[:, None] * line.unit) / s
     a, b = ends[:-1].T, ends[1:].T
-    window = _window(np.minimum(a, b) - reach, np.maximum(a, b) + reach, box)
+    window = window_of(np.minimum(a, b) - reach, np.maximum(a, b) + reach, box)
     if window is None:
         return None
     corners = np.array([(x, y) for x in (low[0], high[0]) for y in (low[1], high[1])])
@@ -140,19 +149,29 @@ def _pack_profile(shape: Shape, s: float, box: BinBox, low: Ints, high: Ints) ->
     j1 = min(len(line.t), int(np.searchsorted(line.t, last)) + 2)
     t, z = line.t / s, line.z
     slope = np.append(np.diff(z) / np.diff(t), 0.0)
-    octaves, parts, at = [], [], 0
+    octaves, culled, parts, at = [], [], [], 0
     for o, pieces in enumerate(line.pieces):
         step = line.octave_m * 2**o
         k0 = max(0, math.floor(first / step) - 1)
         part = pieces[k0 : math.floor(last / step) + 3]
         octaves.append(at - k0)
+        culled.append(k0)
         parts.append(part)
         at += len(part)
     params = _params(shape, s, float(reach.max()))
     for name, value in zip(("ax", "ay", "tx", "ty", "length"), (*line.start / s, *line.unit, t[-1]), strict=True):
         params[STROKE_AT[name]] = value
     knots = np.stack([t, z, slope])[:, j0:j1]
-    return Packed(params, window, None, knots, np.concatenate([np.zeros((0, 4)), *parts]), tuple(octaves))
+    return Packed(
+        params,
+        window,
+        None,
+        knots,
+        np.concatenate([np.zeros((0, 4)), *parts]),
+        tuple(octaves),
+        line.octave_m / s,
+        tuple(culled),
+    )
 
 
 def _pack_outline(shape: Shape, s: float, box: BinBox, low: Ints, high: Ints) -> Packed | None:
@@ -172,7 +191,7 @@ def _pack_outline(shape: Shape, s: float, box: BinBox, low: Ints, high: Ints) ->
     if closed:
         from_ = np.column_stack([from_, points.min(axis=0)])
         to = np.column_stack([to, points.max(axis=0)])
-    window = _window(from_, to, box)
+    window = window_of(from_, to, box)
     if window is None:
         return None
     params = _params(shape, s, reach)
@@ -213,7 +232,7 @@ def _params(shape: Shape, s: float, reach: float) -> Floats:
     return out
 
 
-def _window(low: Floats, high: Floats, box: BinBox) -> Window | None:
+def window_of(low: Floats, high: Floats, box: BinBox) -> Window | None:
     """The bins of a box that rectangles (2, m) low .. high in cells touch, row by row; None of none."""
     by0, by1, bx0, bx1 = box
     low, high = np.floor(low / BIN), np.ceil(high / BIN)
