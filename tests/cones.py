@@ -127,6 +127,11 @@ class Client:
         assert self.tiles.held() == {k: t.version for k, t in held.items()}
         assert all(k.level == 0 or k.parent() in held for k in held)
         assert sum(k.level > LEVELS for k in held) <= self.server.refined.client_tiles
+        for tiles in self.tiles._refined._held.values():
+            for key, known in tiles.items():
+                then = held[key].parent_then
+                assert then is not None
+                assert np.array_equal(known.base.samples, then), "both sides predict from the same parent"
         memo: dict[TileKey, Wide] = {}
         for key, tile in held.items():
             for dx, dy in ((1, 0), (0, 1), (1, 1), (1, -1)):

@@ -6,7 +6,7 @@ import random
 
 import numpy as np
 import pytest
-from tests.cones import FINEST, LEVELS, SIZE_M, Bump, Client, Ground, Made, a_view, near, settle, solve
+from tests.cones import FINEST, LEVELS, SIZE_M, Bump, Client, Ground, Made, near, settle, solve
 
 from esker import grid
 from esker.contract import MAX_REFINED_LEVEL, MAX_REFINED_TILES, Channel, FrameKind, Predictor
@@ -73,17 +73,20 @@ def test_flat_land_is_never_refined() -> None:
     assert settle(server, ground, 1, [client]) == 0
 
 
-@pytest.mark.parametrize("seed", range(6))
-def test_the_selection_is_closed_under_parents_and_restricted(seed: int) -> None:
+@pytest.mark.parametrize("levels", [LEVELS, 4])
+@pytest.mark.parametrize("seed", range(4))
+def test_the_selection_is_closed_under_parents_and_restricted(seed: int, levels: int) -> None:
     rng = random.Random(seed)
-    server, ground = TileServer(SIZE_M, LEVELS, FINEST), Ground()
+    server, ground = TileServer(SIZE_M, levels, FINEST), Ground()
     for _ in range(6):
         ground.edit(rng)
-    client = Client(server)
-    client.tiles.set_view(a_view(rng, ground))
-    solve(server, ground, 1, True)
-    settle(server, ground, 1, [client])
-    wanted, below = client.tiles.wanted_refined(), client.tiles.wanted()
+    ground.bumps.append(TIP)
+    client = ClientTiles(server)
+    client.set_view(near(200.0, 275.0, 50.0, rng.uniform(-0.5, 0.5), tau_px=0.5))
+    solve(server, ground, 1, True, range(levels + 1))
+    while wishes := server.wishes([client])[0]:
+        assert all(server.put_tile(1, ground.tile(key)) for key in wishes)
+    wanted, below = client.wanted_refined(), client.wanted()
     assert wanted
     for key in wanted:
         up = key.parent()
@@ -91,7 +94,10 @@ def test_the_selection_is_closed_under_parents_and_restricted(seed: int) -> None
             for dx in (-1, 0, 1):
                 x, y = up.x + dx, up.y + dy
                 if 0 <= x < 1 << up.level and 0 <= y < 1 << up.level:
-                    assert TileKey(up.level, x, y) in wanted if up.level > LEVELS else below[LEVELS][y, x]
+                    assert TileKey(up.level, x, y) in wanted if up.level > levels else below[levels][y, x]
+    for level in range(1, levels + 1):
+        for y, x in np.argwhere(below[level]):
+            assert below[level - 1][y >> 1, x >> 1]
 
 
 def test_wishes_go_coarse_to_fine_then_by_screen_error_and_never_beyond_one_unknown_level() -> None:
@@ -212,29 +218,81 @@ def test_tiles_out_of_view_that_did_not_move_stay() -> None:
     client.tiles.set_view(near(200.0, 275.0, 40.0, turn=3.14, tau_px=0.7))
     ground.bumps.append(Bump(480.0, 40.0, 9.0, 5.0))
     solve(server, ground, 2, True)
-    settle(server, ground, 2, [client])
+    client.drain()
     assert before <= client.decoder.held.keys()
+    frames = [plan for plan in client.log if plan.level > LEVELS]
+    assert [(plan.kind, plan.level) for plan in frames] == [(FrameKind.LEVEL, i) for i in range(LEVELS + 1, FINEST + 1)]
+    assert not any(plan.tiles or plan.drops for plan in frames), "they were previews only while the root was shown"
 
 
-def test_a_tile_waits_for_a_neighbour_that_it_would_not_fit() -> None:
-    """The ground moved by less than a quantum of the whole levels: nothing rides along, yet fine samples differ."""
+def crumb(key: TileKey, other: TileKey) -> Bump:
+    """A bump so small that only one sample of two neighbours sees it, on their common edge, and no coarser one."""
+    step = grid.spacing(key.level, SIZE_M)
+    if key.y == other.y:
+        col, row = 64 * max(key.x, other.x), 64 * key.y + 33
+    else:
+        col, row = 64 * key.x + 33, 64 * max(key.y, other.y)
+    return Bump(col * step, row * step, 0.9 * step, 0.05)
+
+
+def pairs(keys: set[TileKey], others: set[TileKey], level: int) -> list[tuple[TileKey, TileKey]]:
+    """Tiles of a level in ``keys`` beside one in ``others``."""
+    near_by = [(k, k._replace(x=k.x + dx, y=k.y + dy)) for k in keys for dx, dy in ((1, 0), (-1, 0), (0, 1), (0, -1))]
+    return sorted((k, n) for k, n in near_by if k.level == level and n in others)
+
+
+def make_all_but(server: TileServer, ground: Ground, clock: int, client: Client, late: TileKey) -> None:
+    """Refines what is wanted, without one tile and what depends on it."""
+    for _ in range(20):
+        wishes = [k for k in server.wishes([client.tiles])[0] if k.level <= late.level and k != late]
+        for key in wishes:
+            server.put_tile(clock, ground.tile(key))
+        client.drain()
+    assert {k for k, _ in client.tiles.missing() if k.level <= late.level} == {late}
+
+
+def test_a_new_version_waits_for_a_neighbour_that_it_would_not_fit() -> None:
+    """The whole levels do not see the change: nothing rides along, and yet two tiles differ on their common edge."""
     server, ground, client = at_rest()
-    level = LEVELS + 2
-    held = {k for k in client.decoder.held if k.level == level}
-    ground.scale = 1 + 5e-5
+    wanted = client.tiles.wanted_refined()
+    one, late = pairs(wanted, wanted, LEVELS + 2)[0]
+    before = client.decoder.held[one].version
+    ground.bumps.append(crumb(one, late))
     solve(server, ground, 2, True)
-    client.drain()
-    wishes = [k for k in server.wishes([client.tiles])[0] if k.level <= level]
-    late = max((k for k in wishes if k in held), key=lambda k: abs(client.decoder.held[k].samples).max())
-    for key in wishes:
-        if key != late:
-            assert server.put_tile(2, ground.tile(key))
-    client.drain()
-    assert level not in {plan.level for plan in client.log if plan.kind == FrameKind.LEVEL}
+    make_all_but(server, ground, 2, client, late)
+    assert client.decoder.held[one].version == before
     assert server.put_tile(2, ground.tile(late))
     client.drain()
-    assert level in {plan.level for plan in client.log if plan.kind == FrameKind.LEVEL}
-    assert late in client.decoder.held
+    assert client.decoder.held[one].version > before
+    assert server.refined.verified(late)
+
+
+def test_a_new_tile_waits_for_a_neighbour_that_it_would_not_fit() -> None:
+    server, ground, client = at_rest()
+    old = {k for k in client.decoder.held if k.level > LEVELS}
+    client.tiles.set_view(near(200.0, 275.0, 40.0, turn=0.6, tau_px=0.7))
+    fresh = client.tiles.wanted_refined() - old
+    one, late = pairs(fresh, old & client.tiles.wanted_refined(), LEVELS + 2)[0]
+    ground.bumps.append(crumb(one, late))
+    solve(server, ground, 2, True)
+    make_all_but(server, ground, 2, client, late)
+    assert one not in client.decoder.held
+    assert server.put_tile(2, ground.tile(late))
+    client.drain()
+    assert one in client.decoder.held
+
+
+def test_a_neighbour_that_nobody_looks_at_makes_way() -> None:
+    server, ground, client = at_rest()
+    old = {k for k in client.decoder.held if k.level > LEVELS}
+    client.tiles.set_view(near(200.0, 275.0, 40.0, turn=0.9, tau_px=0.7))
+    wanted = client.tiles.wanted_refined()
+    one, left = pairs(wanted & old, old - wanted, LEVELS + 2)[0]
+    ground.bumps.append(crumb(one, left))
+    solve(server, ground, 2, True)
+    settle(server, ground, 2, [client])
+    client.check_newest(ground)
+    assert left not in client.decoder.held
 
 
 def test_a_client_holds_no_more_than_its_share_and_keeps_what_it_looks_at() -> None:

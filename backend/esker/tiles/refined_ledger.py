@@ -164,22 +164,17 @@ class RefinedLedger:
         return None
 
     def _parent(self, key: TileKey) -> TileState | None:
-        """The parent as the client holds it, when that belongs to the ground as it is."""
+        """The parent as the client holds it, if it does. It is the newest: the levels below were brought up to date."""
         up = key.parent()
         if up.level == self._refined.levels:
             return self._below.newest(up)
-        held, newest = self._held[up.level].get(up), self._refined.verified(up)
-        if held is None or newest is None or held.state.version != newest.state.version:
-            return None
-        return held.state
+        held = self._held[up.level].get(up)
+        return None if held is None else held.state
 
     def _held_parent(self, key: TileKey) -> TileState:
-        """The parent of a held tile as the client holds it, once the levels below have been sent."""
-        up = key.parent()
-        if up.level > self._refined.levels:
-            return self._held[up.level][up].state
-        found = self._below.newest(up)
-        assert found is not None, "the levels below are sent first"
+        """The parent of a held tile."""
+        found = self._parent(key)
+        assert found is not None, "whoever holds a tile holds its parent"
         return found
 
     def _frame(self, kind: FrameKind, level: int, keys: Iterable[TileKey], drops: Iterable[TileKey]) -> FramePlan:
