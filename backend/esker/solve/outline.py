@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from esker.solve.tables import LONGEST_CELLS, SEGMENT_FIELDS, Floats, Ints
@@ -54,18 +52,16 @@ def spans_of(points: Floats, row0: int, row1: int) -> tuple[Ints, Floats]:
     encloses.
     """
     ring = np.vstack([points, points[:1]])
-    index, out = np.zeros(row1 - row0 + 1, dtype=np.int32), []
-    y0, y1 = ring[:-1, 1], ring[1:, 1]
-    first = max(row0, math.ceil(ring[:, 1].min()))
-    last = min(row1 - 1, math.floor(ring[:, 1].max()))
-    for row in range(first, last + 1):
-        crossed = (y0 <= row) != (y1 <= row)
-        run = (ring[1:, 0] - ring[:-1, 0])[crossed]
-        x = ring[:-1, 0][crossed] + (row - y0[crossed]) / (y1 - y0)[crossed] * run
-        order = np.argsort(x, kind="stable")
-        winding = np.cumsum(np.where(y1[crossed] > y0[crossed], 1, -1)[order])
-        x = x[order]
-        pairs = [(x[k], x[k + 1]) for k in range(len(x) - 1) if winding[k]]
-        out += pairs
-        index[row - row0 + 1] = len(pairs)
-    return np.cumsum(index, dtype=np.int32), np.array(out).reshape(-1, 2)
+    (x0, y0), (x1, y1) = ring[:-1].T, ring[1:].T
+    first = np.clip(np.ceil(np.minimum(y0, y1)), row0, row1).astype(np.int64)
+    count = np.maximum(np.clip(np.ceil(np.maximum(y0, y1)), row0, row1).astype(np.int64) - first, 0)
+    edge = np.repeat(np.arange(len(count)), count)
+    row = np.arange(len(edge)) - np.repeat(np.cumsum(count) - count, count) + first[edge]
+    x = x0[edge] + (row - y0[edge]) / (y1 - y0)[edge] * (x1 - x0)[edge]
+    order = np.lexsort((x, row))
+    x, row = x[order], row[order]
+    # a closed line crosses a row as often upwards as downwards: the sum is 0 again at the end of each row
+    inside = np.flatnonzero(np.cumsum(np.where(y1 > y0, 1, -1)[edge][order])[:-1])
+    index = np.zeros(row1 - row0 + 1, dtype=np.int32)
+    np.add.at(index, row[inside] - row0 + 1, 1)
+    return np.cumsum(index, dtype=np.int32), np.column_stack([x[inside], x[inside + 1]]).reshape(-1, 2)
