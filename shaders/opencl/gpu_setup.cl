@@ -17,6 +17,44 @@ kernel void restriction(cfield_t fine, field_t coarse, int n, int pitch, int str
         coarse[(size_t)c * stride2 + (size_t)Y * pitch2 + X] = restriction_at(fine + (size_t)c * stride, Y, X, n, pitch);
 }
 
+// Two or three restrictions behind each other: out1 = R fine, out2 = R out1, out3 = R out2 (may be null), the same bits as
+// one by one. A work-group does CHAIN x CHAIN samples of out3 and all that lies under them; what it needs of its
+// neighbours it computes again. Global size (columns, rows of groups, channels).
+#define CHAIN1 (4 * CHAIN + 3)
+#define CHAIN2 (2 * CHAIN + 1)
+inline float restricted_local(local const float *v, int width) {
+    float sides = (v[-width] + v[width]) + (v[-1] + v[1]);
+    return restricted(v[0], sides, (v[-width - 1] + v[width + 1]) + (v[-width + 1] + v[width - 1]));
+}
+
+kernel __attribute__((reqd_work_group_size(CHAIN_ITEMS, 1, 1)))
+void restriction_chain(cfield_t fine, field_t out1, field_t out2, field_t out3, int n, int pitch, int stride, int pitch1,
+                       int stride1, int pitch2, int stride2, int pitch3, int stride3) {
+    local float a[CHAIN1 * CHAIN1], b[CHAIN2 * CHAIN2];
+    const int lid = get_local_id(0), x0 = get_group_id(0) * CHAIN, y0 = get_group_id(1) * CHAIN;
+    const int n1 = n / 2 + 1, n2 = n1 / 2 + 1, n3 = n2 / 2 + 1;
+    const size_t c = get_group_id(2);
+    for (int i = lid; i < CHAIN1 * CHAIN1; i += CHAIN_ITEMS) {
+        int y = i / CHAIN1 - 3, x = i % CHAIN1 - 3, Y = 4 * y0 + y, X = 4 * x0 + x;
+        a[i] = restriction_at(fine + c * stride, mirrored(Y, n1), mirrored(X, n1), n, pitch);
+        if (y >= 0 && x >= 0 && y < 4 * CHAIN && x < 4 * CHAIN && Y < n1 && X < n1)
+            out1[c * stride1 + (size_t)Y * pitch1 + X] = a[i];
+    }
+    barrier(CLK_LOCAL_MEM_FENCE);
+    for (int i = lid; i < CHAIN2 * CHAIN2; i += CHAIN_ITEMS) {
+        int y = i / CHAIN2 - 1, x = i % CHAIN2 - 1, Y = 2 * y0 + y, X = 2 * x0 + x;
+        b[i] = restricted_local(a + (2 * y + 3) * CHAIN1 + 2 * x + 3, CHAIN1);
+        if (y >= 0 && x >= 0 && Y < n2 && X < n2) out2[c * stride2 + (size_t)Y * pitch2 + X] = b[i];
+    }
+    barrier(CLK_LOCAL_MEM_FENCE);
+    if (!out3) return;
+    for (int i = lid; i < CHAIN * CHAIN; i += CHAIN_ITEMS) {
+        int y = i / CHAIN, x = i % CHAIN, Y = y0 + y, X = x0 + x;
+        if (Y < n3 && X < n3)
+            out3[c * stride3 + (size_t)Y * pitch3 + X] = restricted_local(b + (2 * y + 1) * CHAIN2 + 2 * x + 1, CHAIN2);
+    }
+}
+
 // Springs of one coarse sample: d' = S / (1 + SATURATION S), f' = R f / (1 + SATURATION S), S = R d. Fixed samples count
 // as springs of CREST_STIFFNESS.
 inline void coarsen_at(cfield_t d, cfield_t f, field_t d2, field_t f2, int Y, int X, int channels, level_t g) {

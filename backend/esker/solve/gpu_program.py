@@ -17,6 +17,9 @@ HALO = CHEBYSHEV_SWEEPS + 2
 """A sample more a side for every sweep, one for the residual, one for its restriction."""
 CHANNELS = (1, 2)
 CHANGE_ITEMS = 256
+CHAIN = 8
+"""Samples a side of the coarsest of three levels that one work-group restricts to in one launch."""
+CHAIN_ITEMS = 256
 BIN_ITEMS = 256
 """Work-items of a rasteriser's bin, one a sample."""
 BOTTOM_SAMPLES = sum(((TILE_CELLS >> k) + 1) ** 2 for k in range(BOTTOM_LEVELS + 1))
@@ -86,7 +89,7 @@ def plan(items: int, local_bytes: int, units: int) -> Plan | None:
     wide = [best(WIDE, channels) for channels in CHANNELS]
     small = best(SMALL, max(CHANNELS))
     fitting = [count for count in _ITEMS if count <= items]
-    if small is None or items < max(CHANGE_ITEMS, BIN_ITEMS) or not fitting or local_bytes < _BOTTOM_BYTES:
+    if small is None or items < max(CHANGE_ITEMS, CHAIN_ITEMS, BIN_ITEMS) or not fitting or local_bytes < _BOTTOM_BYTES:
         return None
     return Plan(tuple(t for t in wide if t is not None), small, fitting[0], units)
 
@@ -102,6 +105,8 @@ def defines(of: Plan) -> dict[str, float | int]:
         "BOTTOM_ITEMS": of.bottom_items,
         "BOTTOM_SAMPLES": BOTTOM_SAMPLES,
         "CHANGE_ITEMS": CHANGE_ITEMS,
+        "CHAIN": CHAIN,
+        "CHAIN_ITEMS": CHAIN_ITEMS,
         "TILE_CELLS": TILE_CELLS,
     }
 
