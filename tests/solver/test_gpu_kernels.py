@@ -13,6 +13,7 @@ import pytest
 from numpy.typing import NDArray
 
 from esker import grid
+from esker.bench import gpu_model
 from esker.contract import Stroke, TerrainSettings
 from esker.solve import device as devices
 from esker.solve import gpu_program, reference, reference_raster
@@ -144,6 +145,24 @@ def test_restriction(tiles: Device, level: int) -> None:
     s.put("b", level, b)
     s.restrict(level)
     close(s.get("b", level - 1), reference.restriction(b))
+
+
+@pytest.mark.parametrize("channels", [1, 2])
+@pytest.mark.parametrize(("level", "launches"), [(2, 1), (3, 1), (4, 2), (5, 2)])
+def test_restrictions_behind_each_other(tiles: Device, channels: int, level: int, launches: int) -> None:
+    """Down to level 0 in few launches, with the bits of one launch a level."""
+    s, _ = system(tiles, level + 1, channels)
+    b = noise((channels, grid.samples(level), grid.samples(level)), 7)
+    s.put("b", level, b)
+    before = s.launch.launches
+    for k in range(level, 0, -1):
+        s.restrict(k)
+    fused = [s.get("b", k) for k in range(level)]
+    assert s.launch.launches - before == launches
+    for k in range(level, 0, -1):
+        s.restrict(k)
+        assert np.array_equal(s.get("b", k - 1), fused[k - 1])
+    close(fused[-1], reference.restriction(b))
 
 
 @pytest.mark.parametrize("level", LEVELS)
@@ -297,6 +316,18 @@ def test_history_changes_not_one_bit(tile_solver: Solver) -> None:
     again = tile_solver.solve(edited(strokes)[::-1], SETTINGS, 2)[2]
     run.close()
     assert np.array_equal(first, again)
+
+
+@pytest.mark.parametrize("top", [1, 3])
+def test_launches_are_those_of_the_model(tiles: Device, top: int) -> None:
+    """Few launches: what docs/decisions/0013-devices.md says of 4097² is counted by the same model."""
+    w = GpuWorkspace(tiles, top)
+    w.load(SCENES["five"], SETTINGS)
+    before = w.launch.launches
+    for _ in _previews(w):
+        pass
+    assert w.launch.launches - before == gpu_model.two_step(top)["launches"]
+    assert gpu_model.two_step(6)["launches"] < 300
 
 
 @pytest.mark.parametrize(

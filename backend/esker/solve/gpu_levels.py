@@ -18,7 +18,7 @@ from esker.contract import TILE_CELLS, Stroke, TerrainSettings
 from esker.solve import raster
 from esker.solve.constraints import Packer
 from esker.solve.device import Device
-from esker.solve.gpu_program import CHANGE_ITEMS, Plan
+from esker.solve.gpu_program import CHAIN, CHAIN_ITEMS, CHANGE_ITEMS, Plan
 from esker.solve.reference import BOTTOM_LEVELS, chebyshev_weights
 from esker.solve.tables import BIN, RASTER_BINS, Tables, Window
 
@@ -28,6 +28,8 @@ BLOCK = (32, 8)
 """Work-group of the kernels that do one sample a work-item."""
 MOST_BOUND = 512
 """Kernels with their arguments set that a launcher keeps; a solve of seven levels comes back to some 200."""
+MOST_CHAINED = 3
+"""Restrictions that one launch does."""
 CHANGE_GROUPS = 512
 """At most so many partial results of ``change`` are left to the host."""
 
@@ -136,6 +138,7 @@ class GpuSystem:
         self.launch = launcher
         self.shapes = {level: shape_of(level) for level in range(top + 1)}
         self.eps = dict.fromkeys(range(top + 1), 0.0)
+        self._waiting: list[int] = []
         self.fields: dict[tuple[str, int], Any] = {
             (name, level): launcher.zeros(self.shapes[level].stride * (1 if name == "d" else channels))
             for name, level in fields_of(top, static)
@@ -170,6 +173,7 @@ class GpuSystem:
         self, level: int, *, rhs: str, out: str, guess: str | None, correction: str | None, residual: bool
     ) -> None:
         """See ``multigrid.System``."""
+        self._restrict_now()
         n = self.shapes[level].n
         tile = self.launch.plan.tile(self.channels, n)
         self.launch.run(
@@ -181,15 +185,34 @@ class GpuSystem:
         )  # fmt: skip
 
     def restrict(self, level: int) -> None:
-        """See ``multigrid.System``."""
-        across, along = _blocks(self.shapes[level - 1].n, self.shapes[level - 1].n)
-        self.launch.run(
-            "restriction", (across, along, self.channels), (*BLOCK, 1), self.fields["b", level],
-            self.fields["b", level - 1], *self._layout(level),
-        )  # fmt: skip
+        """See ``multigrid.System``. Restrictions behind each other wait for the others: up to three are one launch."""
+        if self._waiting and self._waiting[-1] != level + 1:
+            self._restrict_now()
+        self._waiting.append(level)
+        if len(self._waiting) == MOST_CHAINED:
+            self._restrict_now()
+
+    def _restrict_now(self) -> None:
+        """Launch the restrictions that wait. Everything that reads or writes a field calls this first."""
+        if not self._waiting:
+            return
+        level, count = self._waiting[0], len(self._waiting)
+        self._waiting = []
+        under = [self.shapes[max(level - k, 0)] for k in range(1, MOST_CHAINED + 1)]
+        fields = [self.fields["b", level - k] if k <= count else None for k in range(MOST_CHAINED + 1)]
+        if count == 1:
+            groups = (*_blocks(under[0].n, under[0].n), self.channels)
+            self.launch.run("restriction", groups, (*BLOCK, 1), *fields[:2], *self._layout(level))
+            return
+        fine = self.shapes[level]
+        across = -(-(fine.n // 8 + 1) // CHAIN)
+        layout = (fine.n, fine.pitch, fine.stride, *(k for s in under for k in (s.pitch, s.stride)))
+        groups = (across, across, self.channels)
+        self.launch.run("restriction_chain", groups, (CHAIN_ITEMS, 1, 1), *fields, *(np.int32(k) for k in layout))
 
     def bottom(self, *, rhs: str, out: str, cycles: int) -> None:
         """See ``multigrid.System``."""
+        self._restrict_now()
         self.launch.run(
             "bottom", (self.channels,), (self.launch.plan.bottom_items,), self.fields[rhs, 0], self.fields["d", 0],
             self.fields[out, 0], self.matrix, self.launch.table, np.int32(self.shapes[0].stride),
@@ -202,6 +225,7 @@ class GpuSystem:
 
     def change(self, old: str, new: str) -> float:
         """See ``multigrid.System``."""
+        self._restrict_now()
         shape = self.shapes[self.top]
         groups = min(CHANGE_GROUPS, shape.n * self.channels)
         self.launch.run(
@@ -215,6 +239,7 @@ class GpuSystem:
 
     def get(self, name: str, level: int) -> NDArray[np.float32]:
         """A field as (channels, n, n); d has one channel."""
+        self._restrict_now()
         shape = self.shapes[level]
         channels = 1 if name == "d" else self.channels
         out = np.empty((channels, shape.n, shape.n), dtype=np.float32)
@@ -224,6 +249,7 @@ class GpuSystem:
 
     def put(self, name: str, level: int, value: NDArray[Any]) -> None:
         """Set a field from (channels, n, n)."""
+        self._restrict_now()
         for c, channel in enumerate(value):
             host = np.ascontiguousarray(channel, dtype=np.float32)
             field = self.fields[name, level]
