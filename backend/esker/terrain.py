@@ -10,18 +10,20 @@ from __future__ import annotations
 
 import math
 import secrets
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from esker import contract
+from esker import contract, grid
 from esker.contract import Border, Document, Flank, TerrainSettings, Vec3
 from esker.document import archive
 from esker.document.strokes import level_curve, profile_curve
 from esker.solve.assembly import System, assemble
-from esker.solve.solver import Solver
+from esker.solve.solver import Basis, Solver
 
 FlankLike = tuple[float | None, float] | Flank | None
 DEFAULT_FLANK: Flank = Flank()
@@ -115,6 +117,17 @@ def _same(a: Strokes, b: Strokes) -> bool:
     return len(a) == len(b) and all(x is y for x, y in zip(a, b, strict=True))
 
 
+@dataclass(frozen=True)
+class HeightWindow:
+    """Heights of a rectangle. heights: (rows, columns) float32, metres, row 0 south; sample [0, 0] lies at world
+    (x_m, y_m), neighbours ``spacing_m`` apart."""
+
+    heights: NDArray[np.float32]
+    x_m: float
+    y_m: float
+    spacing_m: float
+
+
 class Terrain:
     """A terrain without a server. Heights are a pure function of ``strokes`` and ``settings``.
 
@@ -139,6 +152,7 @@ class Terrain:
         self._strokes: dict[str, contract.Stroke] = {}
         self._solver = solver
         self._solved: dict[int, tuple[TerrainSettings, Strokes, NDArray[np.float32]]] = {}
+        self._basis: Basis | None = None
 
     @property
     def strokes(self) -> Strokes:
@@ -167,6 +181,46 @@ class Terrain:
             held = (self.settings, strokes, solver.solve(strokes, self.settings, level)[level])
             self._solved[level] = held
         return held[2]
+
+    def window(
+        self,
+        level: int,
+        x0: float,
+        y0: float,
+        x1: float,
+        y1: float,
+        *,
+        global_level: int = contract.DEFAULT_LEVEL,
+        progress: Callable[[float], None] | None = None,
+    ) -> HeightWindow:
+        """Settled heights of the samples of ``level`` inside a rectangle of world metres, at what the rectangle costs.
+
+        Levels 0..``global_level`` are solved as a whole, those above, up to MAX_REFINED_LEVEL, are refined from them
+        where they are looked at (DESIGN 5.6). ``progress`` is told the share of the refinement that is done. Raises
+        ValueError for a level out of range and for a rectangle that holds no sample.
+        """
+        if not 0 <= level <= contract.MAX_REFINED_LEVEL:
+            raise ValueError(f"level must be 0..{contract.MAX_REFINED_LEVEL}, not {level}")
+        size = self.settings.size_m
+        r0, r1, c0, c1 = grid.Rect(x0, y0, x1, y1).sample_window(level, size)
+        if r0 >= r1 or c0 >= c1:
+            raise ValueError(
+                f"no sample of level {level} lies in ({x0}, {y0})..({x1}, {y1}); the terrain is {size} m wide"
+            )
+        solver = self._solver or default_solver()
+        refiner = solver.refiner(self._settled(solver, min(level, global_level)))
+        s = grid.spacing(level, size)
+        return HeightWindow(refiner.window(level, slice(r0, r1), slice(c0, c1), progress), c0 * s, r0 * s, s)
+
+    def _settled(self, solver: Solver, level: int) -> Basis:
+        """What refinement starts from; that of the last time if nothing has changed."""
+        strokes, held = self.strokes, self._basis
+        if held is None or held.level != level or held.settings != self.settings or not _same(held.strokes, strokes):
+            for result in solver.steps(strokes, self.settings, level, basis=True):
+                held = result.basis if result is not None and result.basis is not None else held
+        assert held is not None, "a solve that is not stopped ends with its basis"
+        self._basis = held
+        return held
 
     def assemble(self, level: int) -> System:
         """(A, b): the float64 sparse system of the height step at ``level``, see ``esker.solve.assembly``."""

@@ -1,4 +1,4 @@
-"""Refinement above the global levels (SPEC S30..S36): windows that agree to the bit, purity, stopping, accuracy."""
+"""Refinement above the global levels (SPEC S50..S56): windows that agree to the bit, purity, stopping, accuracy."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def random_spans(rng: random.Random, n: int) -> Iterator[tuple[Span, Span, Span]
 def test_windows_agree_to_the_bit_on_what_they_share(
     solver: Solver, engine: ClEngine, settings: TerrainSettings
 ) -> None:
-    """SPEC S30: whatever their extent, and at the borders of the level."""
+    """SPEC S50: whatever their extent, and at the borders of the level."""
     start = settled(solver, SCENES["five"], settings, 2)
     for one, other, both in random_spans(random.Random(5), grid.samples(3)):
         parts = [
@@ -117,7 +117,7 @@ def test_kernels_are_their_twin(engine: ClEngine, basis: Basis) -> None:
 
 
 def test_neighbouring_tiles_share_their_edges(engine: ClEngine, basis: Basis) -> None:
-    """SPEC S30: also across the groups that are computed together, and on levels above each other."""
+    """SPEC S50: also across the groups that are computed together, and on levels above each other."""
     for level in (LOW + 1, LOW + 3):
         side = min(6, 1 << level)
         tiles = made(Refiner(basis, engine, FieldCache()), patch(level, (1 << level) - side, 0, side))
@@ -128,7 +128,7 @@ def test_neighbouring_tiles_share_their_edges(engine: ClEngine, basis: Basis) ->
 
 
 def test_order_cache_and_interleaving_do_not_change_bits(engine: ClEngine, basis: Basis) -> None:
-    """SPEC S31."""
+    """SPEC S51."""
     keys = [*patch(LOW + 2, 1, 2, 3), *patch(LOW + 3, 6, 7, 2)]
     expected = bits(made(Refiner(basis, engine, FieldCache()), keys))
     shuffled = random.Random(1).sample(keys, len(keys))
@@ -149,7 +149,7 @@ def test_order_cache_and_interleaving_do_not_change_bits(engine: ClEngine, basis
 
 
 def test_content_says_what_a_tile_depends_on(engine: ClEngine) -> None:
-    """SPEC S32: equal content, and the tile comes from the cache; strokes within reach, settings, ground change it."""
+    """SPEC S52: equal content, and the tile comes from the cache; strokes within reach, settings, ground change it."""
     n = grid.samples(4)
     basis = Basis(tuple(SCENES["five"]), SETTINGS, 4, np.zeros((n, n), np.float32), np.zeros((2, n, n), np.float32))
     counting, cache, key = Counting(engine), FieldCache(), TileKey(6, 8, 8)
@@ -178,7 +178,7 @@ def test_content_says_what_a_tile_depends_on(engine: ClEngine) -> None:
 
 
 def test_a_closed_run_harms_nothing_and_what_it_made_is_kept(engine: ClEngine, basis: Basis) -> None:
-    """SPEC S33: stop between steps, resume cheaply."""
+    """SPEC S53: stop between steps, resume cheaply."""
     keys, counting = patch(LOW + 3, 2, 2, 5), Counting(engine)
     expected = bits(made(Refiner(basis, counting, FieldCache()), keys))
     whole, counting.steps = counting.steps, 0
@@ -196,7 +196,7 @@ def test_a_closed_run_harms_nothing_and_what_it_made_is_kept(engine: ClEngine, b
 
 
 def test_no_step_is_longer_than_a_group(engine: ClEngine, basis: Basis) -> None:
-    """SPEC S33: None after every step, so that solves take precedence."""
+    """SPEC S53: None after every step, so that solves take precedence."""
     counting = Counting(engine)
     seen = 0
     for item in Refiner(basis, counting, FieldCache()).tiles(patch(LOW + 3, 0, 0, 9)):
@@ -206,7 +206,7 @@ def test_no_step_is_longer_than_a_group(engine: ClEngine, basis: Basis) -> None:
 
 
 def test_pinned_borders_stay_pinned(solver: Solver, engine: ClEngine) -> None:
-    """SPEC S34: the border is at its base on every level; beyond a free one the ground goes on."""
+    """SPEC S54: the border is at its base on every level; beyond a free one the ground goes on."""
     across = [ridge((-500, 1000), (2000, 1300), 200, flank(), "across")]
     pinned = Refiner(settled(solver, across, PINNED, LOW), engine, FieldCache())
     free = Refiner(settled(solver, across, SETTINGS, LOW), engine, FieldCache())
@@ -222,7 +222,7 @@ def test_pinned_borders_stay_pinned(solver: Solver, engine: ClEngine) -> None:
 def test_refined_heights_are_close_to_a_global_solve(
     solver: Solver, engine: ClEngine, scene: str, most: float, mean: float
 ) -> None:
-    """SPEC S35: against solves of the finer level. Coarse grids: twice the error of 1025."""
+    """SPEC S55: against solves of the finer level. Coarse grids: twice the error of 1025."""
     refiner = Refiner(settled(solver, SCENES[scene], SETTINGS, 3), engine, FieldCache())
     exact, n = solver.solve(SCENES[scene], SETTINGS, 4)[4], grid.samples(4)
     error = np.abs(refiner.window(4, slice(0, n), slice(0, n)) - exact) / np.ptp(exact)
@@ -237,7 +237,7 @@ def test_flat_ground_stays_flat(solver: Solver, engine: ClEngine) -> None:
 
 
 def test_the_finest_level_costs_what_is_looked_at(engine: ClEngine, basis: Basis) -> None:
-    """SPEC S36: corner tiles of level 10 with memory for their neighbourhoods alone, and sharper than their parents."""
+    """SPEC S56: corner tiles of level 10 with memory for their neighbourhoods alone, and sharper than their parents."""
     refiner, last = Refiner(basis, engine, FieldCache()), (1 << MAX_REFINED_LEVEL) - 1
     keys = [TileKey(MAX_REFINED_LEVEL, x, y) for x in (0, last) for y in (0, last)]
     tracemalloc.start()
@@ -252,7 +252,7 @@ def test_the_finest_level_costs_what_is_looked_at(engine: ClEngine, basis: Basis
 
 
 def test_windows_for_exports(engine: ClEngine, basis: Basis) -> None:
-    """SPEC S36: any rectangle of samples, of the global levels too; wrong ones are refused."""
+    """SPEC S56: any rectangle of samples, of the global levels too; wrong ones are refused."""
     refiner = Refiner(basis, engine, FieldCache())
     level = LOW + 2
     said: list[float] = []

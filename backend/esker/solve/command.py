@@ -6,7 +6,7 @@ import argparse
 import math
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TextIO
 
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from esker import grid
-from esker.contract import DEFAULT_LEVEL, MAX_LEVEL, Channel, Document
+from esker.contract import DEFAULT_LEVEL, MAX_LEVEL, MAX_REFINED_LEVEL, Channel, Document
 from esker.document import archive
 from esker.solve.solver import LevelResult, Solver
 
@@ -27,15 +27,23 @@ BAR = 24
 
 def main(argv: list[str]) -> int:
     """Run the command; 0, or 1 with one sentence on standard error. Bad arguments exit with 2, like argparse."""
-    options = _parser().parse_args(argv)
+    parser = _parser()
+    options = parser.parse_args(argv)
+    if options.level > MAX_LEVEL and options.window is None:
+        parser.error(f"levels above {MAX_LEVEL} are made where they are looked at: say --window X0 Y0 X1 Y1")
     try:
         if options.output.suffix != ".npy":
             raise ValueError(f"Heights are written as .npy, not as '{options.output.suffix or options.output.name}'.")
         if not options.output.absolute().parent.is_dir():
             raise ValueError(f"There is no folder {options.output.absolute().parent}.")
         document = _read(options.terrain)
-        solver = Solver(options.device, max_level=options.level)
-        heights = _solve(solver, document, options.level, quiet=options.quiet)
+        solver = Solver(
+            options.device, max_level=min(options.level, MAX_LEVEL if options.window is None else DEFAULT_LEVEL)
+        )
+        if options.window is None:
+            heights = _solve(solver, document, options.level, quiet=options.quiet)
+        else:
+            heights = _window(solver, document, options.level, options.window, quiet=options.quiet)
         with options.output.open("wb") as file:
             np.save(file, heights)
     except (OSError, ValueError, RuntimeError, MemoryError) as error:
@@ -51,8 +59,12 @@ def _parser() -> argparse.ArgumentParser:
     p = argparse.ArgumentParser(prog="esker solve", description="Settled heights of a terrain, as a NumPy file.")
     p.add_argument("terrain", type=Path, help="an .esker file, or a document as .json")
     p.add_argument("-o", "--output", type=Path, required=True, help="heights.npy: float32, metres, row 0 south")
-    samples = f"finest level, 0..{MAX_LEVEL}; 64 * 2^N + 1 samples a side (default {DEFAULT_LEVEL})"
-    p.add_argument("--level", type=int, choices=range(MAX_LEVEL + 1), default=DEFAULT_LEVEL, metavar="N", help=samples)
+    samples = f"finest level, 0..{MAX_LEVEL}, with --window to {MAX_REFINED_LEVEL}; 64 * 2^N + 1 samples a side"
+    p.add_argument("--level", type=int, choices=range(MAX_REFINED_LEVEL + 1), default=DEFAULT_LEVEL, metavar="N",
+                   help=f"{samples} (default {DEFAULT_LEVEL})")  # fmt: skip
+    p.add_argument("--window", type=float, nargs=4, metavar=("X0", "Y0", "X1", "Y1"),
+                   help="only the samples in this rectangle of world metres, refined from level "
+                   f"{DEFAULT_LEVEL} where N is above it")  # fmt: skip
     p.add_argument("--device", help="part of an OpenCL device's name, or 'numpy'")
     p.add_argument("-q", "--quiet", action="store_true", help="no progress on standard error")
     return p
@@ -153,4 +165,32 @@ def _solve(solver: Solver, document: Document, level: int, *, quiet: bool) -> ND
         elapsed = progress.clock() - progress.start
         n = len(heights)
         progress.close(f"{n} x {n} heights from {heights.min():.2f} to {heights.max():.2f} m in {elapsed:.2f} s")
+    return heights
+
+
+def _window(
+    solver: Solver, document: Document, level: int, corners: Sequence[float], *, quiet: bool
+) -> NDArray[np.float32]:
+    """The heights of a rectangle of ``level``; raises ValueError for one without samples."""
+    size = document.settings.size_m
+    r0, r1, c0, c1 = grid.Rect(*corners).sample_window(level, size)
+    if r0 >= r1 or c0 >= c1:
+        raise ValueError(f"No sample of level {level} lies in that window; the terrain is {size:g} m wide.")
+    basis = None
+    for result in solver.steps(document.strokes, document.settings, min(level, DEFAULT_LEVEL), basis=True):
+        basis = result.basis if result is not None and result.basis is not None else basis
+    if basis is None:
+        raise RuntimeError("The solve ended before the ground was settled.")
+    live = not quiet and sys.stderr.isatty()
+
+    def show(share: float) -> None:
+        if live:
+            print(f"\r\x1b[Krefining to {_name(level)}: {100 * share:3.0f} %", end="", file=sys.stderr, flush=True)
+
+    heights = solver.refiner(basis).window(level, slice(r0, r1), slice(c0, c1), show)
+    if not quiet:
+        s = grid.spacing(level, size)
+        where = f"sample [0, 0] at x {c0 * s:g} m, y {r0 * s:g} m, {s:g} m apart"
+        clear = "\r\x1b[K" if live else ""
+        print(f"{clear}{r1 - r0} x {c1 - c0} heights of {_name(level)}, {where}", file=sys.stderr)
     return heights
