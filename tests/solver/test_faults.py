@@ -61,12 +61,13 @@ class Failing:
 
 @pytest.fixture(params=["rows", "tiles"])
 def used(request: pytest.FixtureRequest) -> Solver:
-    """A solver that has solved, with an idle workspace of level 2."""
+    """A solver that has solved, with an idle workspace of level 2, on a device of a name of its own."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("ESKER_KERNELS", request.param)
         made = Solver()
     if made._device is None:
         pytest.skip("no OpenCL device")
+    made._device = replace(made._device, name=f"{request.param} under test")
     made.solve(STROKES, SETTINGS, 2)
     return made
 
