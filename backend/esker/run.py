@@ -44,6 +44,10 @@ SEND_BUFFER: Final = 256 * 1024
 """The kernel would queue megabytes for a client that does not read, and show it old tiles when it does."""
 
 
+SWITCH_SECONDS: Final = 0.0005
+"""An append passes four threads on its way to the screen; at each Python would let the other go on for 5 ms first."""
+
+
 class CannotServe(Exception):
     """The server cannot start; the message says why in one sentence."""
 
@@ -149,6 +153,7 @@ class Assembly:
 
     def run(self, server: _Server) -> None:
         """Serves until the server is told to stop."""
+        sys.setswitchinterval(SWITCH_SECONDS)
         if self._backups is not None:
             self._backups.start()
         if threading.current_thread() is threading.main_thread():

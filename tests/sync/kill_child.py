@@ -8,7 +8,6 @@ from __future__ import annotations
 import asyncio
 import os
 import sys
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +16,7 @@ from esker.session import protocol
 from esker.session.core import RoomCore, RoomInfo
 from esker.session.outbox import Outbox
 from esker.session.room import Guest, Room
+from esker.session.tilethread import TileThread
 from esker.session.worker import Worker
 from esker.store.journal import Journal
 
@@ -54,7 +54,7 @@ async def main(data: Path, first: int) -> None:
         journal=journal,
         worker=worker,
         tiles=_NoTiles(),
-        executor=ThreadPoolExecutor(1),
+        executor=TileThread(),
         info=RoomInfo(0, 0, "none"),
         on_empty=lambda: None,
     )

@@ -14,7 +14,8 @@ import asyncio
 import logging
 import threading
 from collections.abc import Callable, Sequence
-from concurrent.futures import CancelledError, Executor, Future
+from concurrent.futures import CancelledError, Future
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Final
 
@@ -22,6 +23,7 @@ from esker import contract as c
 from esker.grid import TileKey
 from esker.session.outbox import Outbox
 from esker.session.ports import ClientTiles, LevelResult, RefinedTile, Tiles
+from esker.session.tilethread import TileThread
 
 log = logging.getLogger("esker.feed")
 
@@ -62,7 +64,7 @@ class TileFeed:
         size_m: float,
         levels: int,
         finest: int,
-        executor: Executor,
+        executor: TileThread,
         loop: asyncio.AbstractEventLoop,
         on_level: Callable[[int, int, bool], None],
         on_wishes: Callable[[int, bool], None],
@@ -124,13 +126,14 @@ class TileFeed:
         try:
             while len(self._puts) > PUTS_AHEAD - 1:
                 self._puts.pop(0).result()
-            self._puts.append(self._executor.submit(self._put, clock, result, show))
+            self._puts.append(self._executor.first(self._put, clock, result, show))
         except (CancelledError, RuntimeError):
             log.debug("the tile thread has stopped")
 
     def limit(self, top: int) -> None:
         """From now on levels 0..``top`` are solved."""
-        self._submit(self._limit, top)
+        with suppress(RuntimeError):  # the tile thread has stopped
+            self._executor.first(self._limit, top)
 
     def wanted(self) -> Sequence[TileKey]:
         """Tiles to refine next, most urgent first; none while the ground moves. From any thread."""

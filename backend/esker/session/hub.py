@@ -7,7 +7,6 @@ import logging
 import secrets
 import time
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from typing import Final
 
 from esker import contract as c
@@ -17,6 +16,7 @@ from esker.session.limits import RateByKey
 from esker.session.outbox import Outbox
 from esker.session.ports import Tiles
 from esker.session.room import Guest, Room
+from esker.session.tilethread import TileThread
 from esker.session.worker import Worker
 from esker.store.access import Access, Link
 from esker.store.journal import DamagedTerrain, Journal
@@ -52,7 +52,7 @@ class Hub:
         self._limits, self._max_members = limits or Limits(), max_members
         self._idle_seconds, self._now = idle_seconds, now
         self._rooms: dict[str, asyncio.Task[Room | None]] = {}
-        self._tile_thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="tiles")
+        self._tile_thread = TileThread()
         self._wrong = RateByKey(WRONG_SECRETS_PER_MINUTE / 60, WRONG_SECRETS_PER_MINUTE)
         self._closing = False
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable
-from concurrent.futures import Executor, Future
+from concurrent.futures import Future
 from typing import Final
 
 from esker import contract as c
@@ -20,6 +20,7 @@ from esker.session.feed import Stream, TileFeed
 from esker.session.members import Member
 from esker.session.outbox import Outbox
 from esker.session.ports import Journal, Tiles
+from esker.session.tilethread import TileThread
 from esker.session.worker import Job, Worker
 
 log = logging.getLogger("esker.room")
@@ -47,7 +48,7 @@ class Room:
         journal: Journal,
         worker: Worker,
         tiles: Tiles,
-        executor: Executor,
+        executor: TileThread,
         info: RoomInfo,
         on_empty: Callable[[], None],
     ) -> None:
