@@ -287,6 +287,12 @@ INLINE REAL skirt(const band_t *b, float cliff, REAL *width, REAL *height, REAL 
     return need;
 }
 
+// Weight of a stroke beside others by the distance from its crest, cells (reference_section.nearness).
+INLINE REAL nearness(REAL d) {
+    REAL d2 = d * d, core = fmax(1.0f - d2 * (1.0f / (CORE_CELLS * CORE_CELLS)), 0.0f);
+    return core * core + FAR_SHARE / (1.0f + d2);
+}
+
 // Adds one stroke's cross-section to the sums (reference_section.cross_section). p: STROKE_FIELDS.
 INLINE void cross_section(sums_t *sum, const nearest_t *near, MASK inside, global const float *p, const tables_t *t) {
     band_t b = band_of(near, inside, p, t->s);
@@ -321,7 +327,7 @@ INLINE void cross_section(sums_t *sum, const nearest_t *near, MASK inside, globa
     lift = select(one, lift, b.has);
     REAL sign = select(one, -one, near->height < 0.0f);
     REAL down = select(zero, lift * near->rate - sign * fall, b.has && near->distance > p[P_PLATEAU] && !inside);
-    REAL near_weight = 1.0f / (1.0f + b.d * b.d), inner = fmax(1.0f - r, 0.0f), outer = fmax(1.0f - rt / toe_end, 0.0f);
+    REAL near_weight = nearness(b.d), inner = fmax(1.0f - r, 0.0f), outer = fmax(1.0f - rt / toe_end, 0.0f);
     REAL fade = select(zero, select(b.present * (1.0f - free), one, b.hard), reached);
     REAL toe = select(zero, b.present * (1.0f - smooth((rt - 1.0f) / (toe_end - 1.0f))), reached && b.has);
     REAL w = near_weight * (fade * select(inner * inner + TINY, one, b.hard) + select(zero, skirted, reached));
@@ -347,7 +353,7 @@ INLINE void channel_section(sums_t *sum, const nearest_t *near, MASK inside, glo
     REAL known = select(b.present * (1.0f - smooth((r - 1.0f) * (1.0f / (TOE - 1.0f)))), one, b.hard);
     known = select(zero, known, b.within);
     REAL outer = fmax(1.0f - r * (1.0f / TOE), 0.0f);
-    REAL g = known / (1.0f + b.d * b.d) * select(outer * outer, one, b.hard);
+    REAL g = known * nearness(b.d) * select(outer * outer, one, b.hard);
     sum->g += g;
     sum->gx += g * p[P_AMPLITUDE];
     sum->gy += g * p[P_ROUGHNESS];

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import map_coordinates
 
+from esker import grid
 from esker.contract import Stroke, TerrainSettings
 from esker.solve.crest import crest_of, is_closed
 from esker.solve.solver import Solver
@@ -28,19 +29,44 @@ def profile(
     return np.asarray(map_coordinates(h.astype(float), [y / s, x / s], order=1))
 
 
-@pytest.mark.parametrize("slope", [5, 10, 35, 45, 60])
-@pytest.mark.parametrize("angle", [0, 30, 45, 73, 90])
+@pytest.mark.parametrize("slope", [5, 10, 20, 35, 45, 60])
+@pytest.mark.parametrize("angle", [0, 17, 30, 45, 63, 90])
 @pytest.mark.parametrize("plateau", [0.0, 40.0])
 def test_prescribed_slope(solver: Solver, slope: float, angle: float, plateau: float) -> None:
-    """SPEC S10: a wall higher than its flank of 160 m can fall, so that the band ends at its extent."""
-    extent, rise = 160.0, math.tan(math.radians(slope))
-    stroke = wall(angle, rise * extent + 30, 600, flank(slope, extent, "straight"), 1024.0)
-    h = solver.solve([stroke.model_copy(update={"plateau_radius_m": plateau})], SMALL, 2)[2]
-    for side in (90, -90):
+    """SPEC S10: a wall higher than its flank of 160 m can fall, so that the band ends at its extent; the other flank
+    has its own slope and extent."""
+    other = 90 - slope if slope != 45 else 20
+    sides = {90: (slope, 160.0), -90: (min(other, 60), 120.0)}
+    rise = max(math.tan(math.radians(a)) * extent for a, extent in sides.values())
+    stroke = wall(angle, rise + 30, 600, None, 1024.0)
+    left, right = (flank(*sides[k], shape="straight") for k in (90, -90))
+    stroke = stroke.model_copy(update={"left": left, "right": right, "plateau_radius_m": plateau})
+    h = solver.solve([stroke], SMALL, 2)[2]
+    for side, (prescribed, extent) in sides.items():
         for share in (0.25, 0.5, 0.75):
             at = plateau + share * extent
             near, far = profile(h, 1024.0, (512, 512), math.radians(angle + side), [at - 8, at + 8])
-            assert (near - far) / 16 == pytest.approx(rise, rel=0.05)
+            assert (near - far) / 16 == pytest.approx(math.tan(math.radians(prescribed)), rel=0.05)
+
+
+@pytest.mark.parametrize("slope", [0, 5, 10, 35])
+@pytest.mark.parametrize("above", [150, 400])
+def test_a_band_cut_high_ends_in_no_cliff(solver: Solver, slope: float, above: float) -> None:
+    """SPEC S42: 5 to 12 reaches above the base screening would tear the ground off; the flank keeps its slope."""
+    rise = math.tan(math.radians(slope))
+    h = solver.solve([wall(30, rise * 160 + above, 600, flank(slope, 160, "straight"), 1024.0)], SMALL, 2)[2]
+    z = profile(h, 1024.0, (512, 512), math.radians(120), [float(d) for d in range(0, 481, 8)])
+    assert (-np.diff(z) / 8).max() < max(0.8, 1.1 * rise)
+    assert np.diff(z).max() < 0.1
+    near, far = profile(h, 1024.0, (512, 512), math.radians(120), [112, 128])
+    assert (near - far) / 16 == pytest.approx(rise, rel=0.05, abs=2e-3)
+
+
+def test_endless_reach_has_no_skirt(solver: Solver) -> None:
+    """SPEC S42: pure diffusion carries the ground beyond a band by itself."""
+    endless = TerrainSettings(size_m=1024.0, reach_m=None)
+    h = solver.solve([wall(0, 300, 600, flank(35, 160, "straight"), 1024.0)], endless, 2)[2]
+    assert profile(h, 1024.0, (512, 512), math.pi / 2, [400.0])[0] > 100
 
 
 def test_slope_of_a_band_that_meets_the_base(solver: Solver) -> None:
@@ -80,12 +106,17 @@ def test_round_flanks(solver: Solver, shape: str) -> None:
     assert abs(z[4]) < 3
 
 
-def test_plateau_radius_is_flat(solver: Solver) -> None:
-    """SPEC S11."""
-    stroke = wall(35, 120, 500, flank(40, 200), 1024.0).model_copy(update={"plateau_radius_m": 60.0})
+@pytest.mark.parametrize("angle", [0, 35, 90])
+def test_plateau_radius_is_flat(solver: Solver, angle: float) -> None:
+    """SPEC S11: to a quantum at every sample within the radius, round the ends too."""
+    stroke = wall(angle, 120, 500, flank(40, 200), 1024.0).model_copy(update={"plateau_radius_m": 60.0})
     h = solver.solve([stroke], SMALL, 2)[2]
-    across = profile(h, 1024.0, (512, 512), math.radians(125), list(range(-56, 57, 8)))
-    assert np.abs(across - 120).max() < 1e-3
+    y, x = np.mgrid[:257, :257] * 4.0 - 512.0
+    c, s = math.cos(math.radians(angle)), math.sin(math.radians(angle))
+    beyond = np.maximum(np.abs(x * c + y * s) - 250, 0)
+    top = np.hypot(beyond, y * c - x * s) <= 60
+    assert top.sum() > 4000
+    assert np.abs(h[top] - 120).max() <= grid.quantum(2, 1024.0)
 
 
 @pytest.mark.parametrize("finished", [True, False])
@@ -137,16 +168,50 @@ def test_sides(solver: Solver) -> None:
     assert south == pytest.approx(200 - 96 * math.tan(math.radians(60)), abs=8)
 
 
-def test_crossing_crests(solver: Solver) -> None:
-    """SPEC S13: between the two, near their mean, and without a step along either crest."""
-    high, low = wall(0, 300, 2600, flank(35), SIZE), wall(90, 100, 2600, flank(35), SIZE)
-    strokes = [high.model_copy(update={"id": "a"}), low.model_copy(update={"id": "b"})]
+@pytest.mark.parametrize("angles", [(0, 90), (20, 75), (0, 30)])
+@pytest.mark.parametrize("heights", [(300, 100), (200, -100)])
+def test_crossing_crests(solver: Solver, angles: tuple[int, int], heights: tuple[int, int]) -> None:
+    """SPEC S13: their mean where they meet, between the two along both, and without a kink."""
+    walls = [wall(a, z, 2600, flank(35), SIZE) for a, z in zip(angles, heights, strict=True)]
+    strokes = [w.model_copy(update={"id": name}) for w, name in zip(walls, "ab", strict=True)]
     h = solver.solve(strokes, SETTINGS, 3)[3]
-    back = solver.solve(strokes[::-1], SETTINGS, 3)[3]
-    assert np.array_equal(h, back)
-    assert h[256, 256] == pytest.approx(200, abs=10)
-    assert h[256, 200:312].min() >= 190
-    assert h[200:312, 256].max() <= 300
+    assert np.array_equal(h, solver.solve(strokes[::-1], SETTINGS, 3)[3])
+    renamed = [w.model_copy(update={"id": name}) for w, name in zip(walls, "ba", strict=True)]
+    assert np.abs(h - solver.solve(renamed, SETTINGS, 3)[3]).max() < grid.quantum(3, SIZE)
+    assert h[256, 256] == pytest.approx(sum(heights) / 2, abs=1)
+    apart = heights[0] - heights[1]
+    for angle, height in zip(angles, heights, strict=True):
+        z = profile(h, SIZE, (2048, 2048), math.radians(angle), [float(d) for d in range(-800, 801, 8)])
+        assert min(height, sum(heights) / 2) - 0.02 * apart <= z.min()
+        assert z.max() <= max(height, sum(heights) / 2) + 0.02 * apart
+        assert np.abs(np.diff(z, 2)).max() < 0.2 * apart
+
+
+def test_overlapping_strokes_commute(solver: Solver) -> None:
+    """SPEC S13: flanks over flanks, a stroke drawn twice, an outline over a ridge."""
+    a = ridge((900, 1500), (3000, 2400), 300, flank(), "a")
+    pile = [a, a.model_copy(update={"id": "b"}), ridge((900, 1650), (3000, 2500), 260, flank(25), "c")]
+    pile += [loop(1900, 2000, 500, 120, flank(40), "d")]
+    h = solver.solve(pile, SETTINGS, 2)[2]
+    assert np.array_equal(h, solver.solve(pile[::-1], SETTINGS, 2)[2])
+    alone, twice = (solver.solve(s, SETTINGS, 2)[2] for s in ([a], pile[:2]))
+    assert np.abs(alone - twice).max() < grid.quantum(2, SIZE)
+
+
+@pytest.mark.parametrize("slope", [None, 20, 60])
+@pytest.mark.parametrize("tip", [100, 20])
+def test_ends_blend_into_the_ground(solver: Solver, slope: float | None, tip: float) -> None:
+    """SPEC S14: beyond its end a stroke goes down without a spike or a moat, no steeper than its flank."""
+    side = None if slope is None else flank(slope, 400, "straight")
+    stroke = Make.profile([(312, 512, tip), (512, 512, 100), (712, 512, tip)], left=side, right=side, id="e")
+    h = solver.solve([stroke], SMALL, 3)[3]
+    z = profile(h, 1024.0, (712, 512), 0.0, [float(d) for d in range(0, 300, 2)])
+    assert z.max() <= tip * 1.001
+    assert z.min() >= -0.01 * tip
+    assert np.diff(z).max() < 0.002 * tip
+    if slope is not None:
+        assert (-np.diff(z) / 2).max() < 1.05 * math.tan(math.radians(slope))
+    assert h.max() <= 100.5
 
 
 @pytest.mark.parametrize("side", [None, flank(40, 300)], ids=["bare", "flanks"])
@@ -177,6 +242,41 @@ def test_single_point_is_a_cone(solver: Solver) -> None:
     ring = [profile(h, 1024.0, (512, 512), a, [70])[0] for a in np.linspace(0, 2 * math.pi, 24)]
     assert np.ptp(ring) < 4
     assert np.mean(ring) == pytest.approx(100 - 70 * math.tan(math.radians(35)), abs=3)
+
+
+def jagged(seed: int = 4) -> Stroke:
+    """A silhouette with teeth of up to 60 m on a broad back, 2,400 m long."""
+    rng = np.random.default_rng(seed)
+    u = np.linspace(0, 1, 121)
+    z = (300 + rng.uniform(-30, 30, 121)) * np.sin(math.pi * u) ** 0.5
+    side = flank(35, 2048, "straight")
+    return Make.profile(np.column_stack([850 + 2400 * u, np.full(121, 2048), z]), left=side, right=side, id="jagged")
+
+
+def test_teeth_do_not_run_down_the_flank(solver: Solver) -> None:
+    """SPEC S43: the crest is as drawn; the farther from it, the less is left of what is short along it."""
+    stroke = jagged()
+    h = solver.solve([stroke], SETTINGS, 4)[4].astype(float)
+    columns = np.arange(1400, 2700, 4) // 4
+
+    def teeth(row: int) -> float:
+        line = h[row, columns]
+        return float(np.abs(np.diff(line[::5], 2)).mean())
+
+    crest, near, far = teeth(512), teeth(512 + 20), teeth(512 + 60)
+    points = crest_of(stroke).points  # type: ignore[union-attr]
+    assert np.abs(np.interp(columns * 4.0, points[:, 0], points[:, 2]) - h[512, columns]).max() < 0.5
+    assert near < 0.6 * crest
+    assert far < 0.06 * crest
+
+
+def test_a_short_sharp_peak_keeps_its_height(solver: Solver) -> None:
+    """SPEC S43: the shape at large is left alone, however far from it: a cone's flank falls as prescribed."""
+    side = flank(35, 2048, "straight")
+    stroke = Make.profile([(1948, 2048, 0), (2048, 2048, 200), (2148, 2048, 0)], left=side, right=side, id="p")
+    h = solver.solve([stroke], SETTINGS, 4)[4]
+    assert h[512, 512] == pytest.approx(200, abs=0.01)
+    assert h[512 + 30, 512] == pytest.approx(200 - 120 * math.tan(math.radians(35)), abs=22)
 
 
 def test_folded_profile_takes_its_outline() -> None:

@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 from esker.contract import SPRING_CELLS, SPRING_FULL_FRACTION
 from esker.solve.tables import (
     CHANNEL_FLOOR_CELLS,
+    CORE_CELLS,
     CREST_HALF_WIDTH,
     EXIT_SHARE,
     FAN,
+    FAR_SHARE,
     HELD_FRACTION,
     INDEX_AT,
     SKIRT_SLOPE,
@@ -205,6 +207,11 @@ class Band:
     gy: Floats
 
 
+def nearness(d: Floats) -> Floats:
+    """Weight of a stroke beside others by the distance from its crest, cells: smooth where crests cross."""
+    return np.maximum(1 - (d / CORE_CELLS) ** 2, 0.0) ** 2 + FAR_SHARE / (1 + d * d)
+
+
 def cross_section(near: Nearest, inside: Mask, params: Floats, tables: Tables) -> Band:
     """What one stroke wants at samples whose nearest crest point is known (DESIGN 5.2)."""
     s, decay = tables.spacing_m, 1 / tables.exit_length_m
@@ -231,7 +238,7 @@ def cross_section(near: Nearest, inside: Mask, params: Floats, tables: Tables) -
     sign = np.where(near.height < 0, -1.0, 1.0)
     sloping = b.has & (near.distance > params[STROKE_AT["plateau"]]) & ~inside
     down = np.where(sloping, lift * near.rate - sign * fall, 0.0)
-    near_weight = 1 / (1 + b.d * b.d)
+    near_weight = nearness(b.d)
     fade = np.where(b.hard, 1.0, b.present * (1 - free))
     toe_fade = np.where(b.has, b.present * (1 - smoothstep((rt - 1) / (toe_end - 1))), 0.0)
     unit = down / np.maximum(near.distance, 0.5)
@@ -260,4 +267,4 @@ def channel_section(near: Nearest, inside: Mask, params: Floats, tables: Tables)
     known = np.where(b.hard, 1.0, b.present * (1 - smoothstep((r - 1) / (TOE - 1))))
     known = np.where(b.within, known, 0.0)
     outer = np.where(b.hard, 1.0, np.maximum(1 - r / TOE, 0.0) ** 2)
-    return known, known / (1 + b.d * b.d) * outer
+    return known, known * nearness(b.d) * outer

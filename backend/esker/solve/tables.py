@@ -38,6 +38,10 @@ SPRING_FLOOR_CELLS = 8.0
 """A spring is never stiffer than that of a band this wide."""
 CHANNEL_FLOOR_CELLS = 1.5
 """Where a band is narrower, amplitude and roughness are known to this distance from the crest."""
+CORE_CELLS = 5.0
+"""Crests that cross take a mean of their heights within this distance of each other."""
+FAR_SHARE = 0.25
+"""Strokes are weighed by the square of their distance; near its crest, by this factor less, one has more say."""
 TOE = 1.3
 """Beyond its end a band still tells the gradient, fading out at this multiple of its width: nothing overshoots."""
 EXIT_SHARE = 0.25
@@ -172,6 +176,8 @@ def defines() -> dict[str, float | int]:
         "CREST_HALF_WIDTH": CREST_HALF_WIDTH,
         "SPRING_FLOOR_CELLS": SPRING_FLOOR_CELLS,
         "CHANNEL_FLOOR_CELLS": CHANNEL_FLOOR_CELLS,
+        "CORE_CELLS": CORE_CELLS,
+        "FAR_SHARE": FAR_SHARE,
         "TOE": TOE,
         "HELD_FRACTION": HELD_FRACTION,
         "EXIT_SHARE": EXIT_SHARE,
