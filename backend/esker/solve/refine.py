@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 from collections import OrderedDict
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence, Set
 from dataclasses import dataclass
 from hashlib import blake2b
 from typing import Final, Protocol
@@ -21,7 +21,7 @@ from esker import grid
 from esker.contract import MAX_REFINED_LEVEL, TILE_CELLS, TILE_SAMPLES, Stroke, TerrainSettings
 from esker.grid import TileKey
 from esker.solve.constraints import WindowPacker
-from esker.solve.device import Device
+from esker.solve.device import Device, row_kernels
 from esker.solve.refine_engine import CHANNELS, ClEngine, Engine, Fields, NumpyEngine, Span, Step, step
 
 GROUP: Final = 4
@@ -74,6 +74,9 @@ class FieldCache:
 
     def __len__(self) -> int:
         return len(self._held)
+
+    def __contains__(self, content: bytes) -> bool:
+        return content in self._held
 
     def get(self, content: bytes) -> Fields | None:
         """The fields (3, 65, 65) of this content, if they are held."""
@@ -131,8 +134,8 @@ class Refiner:
         for at, key in enumerate(wanted):
             field = self.cache.get(self.content(key))
             if field is None:
-                near = [k for k in wanted[at:] if k.level == key.level and _block(k) == _block(key)]
-                field = (yield from self._made(near))[key]
+                left = {k for k in wanted[at:] if k.level == key.level and self.content(k) not in self.cache}
+                field = (yield from self._computed(key.level, _group(key, left)))[key]
             yield RefinedTile(key, field[2], self.content(key))
 
     def forget(self, keys: Iterable[TileKey]) -> None:
@@ -184,11 +187,13 @@ class Refiner:
                 missing.append(key)
             else:
                 out[key] = held
-        if missing:
-            x, y = [k.x for k in missing], [k.y for k in missing]
-            for box in _boxes((min(x), min(y), max(x) + 1, max(y) + 1)):
-                if any(box[0] <= k.x < box[2] and box[1] <= k.y < box[3] for k in missing):
-                    out |= yield from self._computed(missing[0].level, box)
+        left = dict.fromkeys(missing)
+        while left:
+            first = next(iter(left))
+            made = yield from self._computed(first.level, _group(first, left.keys()))
+            for key in made.keys() & left.keys():
+                out[key] = made[key]
+                del left[key]
         return out
 
     def _computed(self, level: int, box: Box) -> Generator[None, None, dict[TileKey, Fields]]:
@@ -264,9 +269,15 @@ class _Strokes:
         return out.digest()
 
 
-def _block(key: TileKey) -> tuple[int, int]:
-    """Tiles of one block are made together."""
-    return key.x // GROUP, key.y // GROUP
+def _group(key: TileKey, left: Set[TileKey]) -> Box:
+    """The box of at most GROUP tiles a side around ``key`` that holds most of the tiles that are left to make."""
+    best: list[TileKey] = []
+    for y0 in range(key.y - GROUP + 1, key.y + 1):
+        for x0 in range(key.x - GROUP + 1, key.x + 1):
+            held = [k for k in _keys(key.level, (x0, y0, x0 + GROUP, y0 + GROUP)) if k in left]
+            best = max(best, held, key=len)
+    x, y = [k.x for k in best], [k.y for k in best]
+    return min(x), min(y), max(x) + 1, max(y) + 1
 
 
 def _span(key: TileKey) -> Span:
@@ -336,7 +347,10 @@ def _bounds(part: slice, level: int) -> tuple[int, int]:
 
 
 class Refinery:
-    """What the refiners of one solver share: the kernels' memory on ``device`` (None: NumPy) and the cache."""
+    """What the refiners of one solver share: the kernels' memory on ``device`` (None: NumPy) and the cache.
+
+    Refinement has row-wise kernels only; a GPU runs them too, correctly and slowly.
+    """
 
     def __init__(self, device: Device | None, cache_bytes: int = CACHE_BYTES) -> None:
         self.cache = FieldCache(cache_bytes)
@@ -344,7 +358,7 @@ class Refinery:
         self._engine: Engine | None = None
 
     def refiner(self, basis: Basis) -> Refiner:
-        """A refiner of a settled solve of the same solver."""
+        """A refiner of a settled solve of the same solver. Raises DeviceError."""
         if self._engine is None:
-            self._engine = NumpyEngine() if self._device is None else ClEngine(self._device)
+            self._engine = NumpyEngine() if self._device is None else ClEngine(row_kernels(self._device))
         return Refiner(basis, self._engine, self.cache)
