@@ -576,6 +576,18 @@ class Predictor(IntEnum):
     HELD = 3
 
 
+class Filter(IntEnum):
+    """How a tile's residual was made smaller before it was coded: what is left of a sample after taking away ...
+
+    NONE: nothing. ROW: the one to its west; in the first column the one to its south. PLANE: west + south - south-west.
+    What lies outside the tile is zero.
+    """
+
+    NONE = 0
+    ROW = 1
+    PLANE = 2
+
+
 class Channel(IntEnum):
     HEIGHT = 0
     AMPLITUDE = 1
@@ -608,12 +620,14 @@ TILE_HEADER: Final = np.dtype(
         ("y", "<u2"),
         ("predictor", "u1"),
         ("planes", "u1"),
-        ("reserved", "<u2"),
+        ("filter", "u1"),
+        ("reserved", "u1"),
         ("version", "<u4"),
         ("base_version", "<u4"),
         ("bytes", "<u4"),
     ]
 )
 """``version``: of this tile; ``base_version``: of the parent (or previous) tile that it was predicted from;
-``planes``: byte planes before deflate (0..4; 0: no residual and no payload). Bounds and errors of the 16-cell sub-patches follow from the samples
-and the parent, both of which the decoder holds, so they do not travel (docs/decisions/0003-derived-bounds.md)."""
+``planes``: byte planes before deflate (0..4; 0: no residual and no payload). Bounds and errors of the 16-cell
+sub-patches follow from the samples and the parent, both of which the decoder holds, so they do not travel
+(docs/decisions/0003-derived-bounds.md)."""

@@ -255,6 +255,7 @@ def malformed() -> list[dict[str, str]]:
         "tile outside": patched(first, inner["x"], b"\x01\x00"),
         "drop outside": retold(1, [], [(2, 0)]),
         "unknown predictor": patched(first, inner["predictor"], b"\x07"),
+        "unknown filter": patched(first, inner["filter"], b"\x03"),
         "no planes": patched(first, inner["planes"], b"\x00"),
         "five planes": patched(first, inner["planes"], b"\x05"),
         "fewer planes than sent": patched(first, inner["planes"], b"\x01"),

@@ -148,7 +148,7 @@ def unpack(planes: int, payload: bytes | memoryview) -> Ints:
     return unzigzag(codes.reshape(-1).view("<u4").astype(np.uint32, copy=False)).reshape(TILE_SAMPLES, TILE_SAMPLES)
 
 
-def reconstruct(prediction: Wide | None, residual: Ints) -> Ints:
+def reconstruct(prediction: Wide | None, residual: Wide) -> Ints:
     """Samples from prediction (None: zero) and residual. Raises CodecError beyond +-2^28, which no encoder sends."""
     samples = residual.astype(np.int64) if prediction is None else prediction.astype(np.int64) + residual
     if samples.min() < -SAMPLE_LIMIT or samples.max() > SAMPLE_LIMIT:

@@ -21,6 +21,7 @@ from esker.contract import (
     TILE_DROP,
     TILE_HEADER,
     Channel,
+    Filter,
     FrameKind,
     Predictor,
 )
@@ -66,6 +67,7 @@ class TileRecord:
     version: int
     base_version: int
     payload: bytes | memoryview
+    filter: Filter = Filter.NONE
 
 
 def write_tile(tile: TileRecord) -> bytes:
@@ -73,6 +75,7 @@ def write_tile(tile: TileRecord) -> bytes:
     head = np.zeros((), dtype=TILE_HEADER)
     head["x"], head["y"], head["predictor"], head["planes"] = tile.x, tile.y, tile.predictor, tile.planes
     head["version"], head["base_version"], head["bytes"] = tile.version, tile.base_version, len(tile.payload)
+    head["filter"] = tile.filter
     return head.tobytes() + bytes(tile.payload)
 
 
@@ -143,6 +146,8 @@ def _head(start: np.void) -> FrameHead:
 def _record(h: np.void, payload: memoryview) -> TileRecord:
     if h["predictor"] not in tuple(Predictor):
         raise FrameError(f"unknown predictor {h['predictor']}")
+    if h["filter"] not in tuple(Filter):
+        raise FrameError(f"unknown filter {h['filter']}")
     return TileRecord(
         x=int(h["x"]),
         y=int(h["y"]),
@@ -151,4 +156,5 @@ def _record(h: np.void, payload: memoryview) -> TileRecord:
         version=int(h["version"]),
         base_version=int(h["base_version"]),
         payload=payload,
+        filter=Filter(int(h["filter"])),
     )

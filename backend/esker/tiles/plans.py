@@ -13,9 +13,10 @@ from typing import Final
 
 import numpy as np
 
-from esker.contract import Channel, FrameKind, Predictor
+from esker.contract import Channel, Filter, FrameKind, Predictor
 from esker.grid import TileKey
 from esker.tiles.codec import Ints, Wide, child_window, cost, pack, predict
+from esker.tiles.filters import pack_smallest
 from esker.tiles.frame import FrameHead, TileRecord, ratio, write_frame, write_tile
 
 CACHE_BYTES: Final = 32 * 1024 * 1024
@@ -99,6 +100,8 @@ class FramePlan:
     drops: tuple[TileKey, ...]
     source: object
     cache: EncodedTiles
+    smooth: bool = False
+    """Residuals are smooth, so filters are worth trying: those of refined tiles."""
 
     @property
     def keys(self) -> tuple[TileKey, ...]:
@@ -122,15 +125,15 @@ class FramePlan:
             name = tile.cache_key(self.channel)
             data = self.cache.get(name)
             if data is None:
-                data = _write(tile, predicted)
+                data = _write(tile, predicted, self.smooth)
                 self.cache.put(name, data)
             coded.append(data)
         head = FrameHead(self.kind, self.level, self.clock, self.settled, self.channel)
         return write_frame(head, [(d.x, d.y) for d in self.drops], coded)
 
 
-def _write(tile: TilePlan, predicted: Callable[[TileKey, TileState], Wide]) -> bytes:
-    """Codes a tile with the cheaper of its predictors."""
+def _write(tile: TilePlan, predicted: Callable[[TileKey, TileState], Wide], smooth: bool) -> bytes:
+    """Codes a tile with the cheapest of its predictors, and of the filters."""
     key, now, parent, before, then = tile.key, tile.now, tile.parent, tile.before, tile.parent_before
     kind, base_version = Predictor.ZERO, 0
     residual: Wide = now.samples.astype(np.int64)
@@ -148,5 +151,5 @@ def _write(tile: TilePlan, predicted: Callable[[TileKey, TileState], Wide]) -> b
         for option, candidate in options:
             if np.abs(candidate).max() < 1 << 31 and cost(candidate) < cost(residual):
                 kind, base_version, residual = option, before.version, candidate
-    planes, payload = pack(residual)
-    return write_tile(TileRecord(key.x, key.y, kind, planes, now.version, base_version, payload))
+    made, planes, payload = pack_smallest(residual) if smooth else (Filter.NONE, *pack(residual))
+    return write_tile(TileRecord(key.x, key.y, kind, planes, now.version, base_version, payload, made))

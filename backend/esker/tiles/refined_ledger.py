@@ -185,8 +185,9 @@ class RefinedLedger:
             assert parent is not None
             before, base = (None, None) if held is None else (held.state, held.base)
             tiles.append(TilePlan(key, now.state, parent, before, base))
+        clock = self._refined.clock
         return FramePlan(
-            kind, Channel.HEIGHT, level, self._refined.clock, True, tuple(tiles), tuple(drops), self, self._cache
+            kind, Channel.HEIGHT, level, clock, True, tuple(tiles), tuple(drops), self, self._cache, smooth=True
         )
 
     # --- what was sent ------------------------------------------------------------------------------------------

@@ -138,6 +138,12 @@ export const Predictor = {
   HELD: 3,
 } as const;
 
+export const Filter = {
+  NONE: 0,
+  ROW: 1,
+  PLANE: 2,
+} as const;
+
 export const Channel = {
   HEIGHT: 0,
   AMPLITUDE: 1,
@@ -534,7 +540,8 @@ export const TILE_HEADER = {
   y: { offset: 2, type: "Uint16", count: 1 },
   predictor: { offset: 4, type: "Uint8", count: 1 },
   planes: { offset: 5, type: "Uint8", count: 1 },
-  reserved: { offset: 6, type: "Uint16", count: 1 },
+  filter: { offset: 6, type: "Uint8", count: 1 },
+  reserved: { offset: 7, type: "Uint8", count: 1 },
   version: { offset: 8, type: "Uint32", count: 1 },
   base_version: { offset: 12, type: "Uint32", count: 1 },
   bytes: { offset: 16, type: "Uint32", count: 1 },

@@ -11,6 +11,7 @@ import type { DecodedFrame, DecodedTile } from "../core/types.ts";
 import {
   CHANNEL_LEVELS_BELOW,
   Channel,
+  Filter,
   FRAME_HEADER,
   FRAME_MAGIC,
   FRAME_SETTLED,
@@ -52,6 +53,7 @@ interface TileHead {
   readonly y: number;
   readonly predictor: number;
   readonly planes: number;
+  readonly filter: number;
   readonly version: number;
   readonly baseVersion: number;
   readonly bytes: number;
@@ -66,6 +68,7 @@ interface Held {
 
 /** A prediction, in float64: sums of 32-bit integers stay exact. */
 const base = new Float64Array(AREA);
+const residual = new Float64Array(AREA);
 const before = new Int32Array(AREA);
 const after = new Int32Array(AREA);
 
@@ -147,7 +150,9 @@ function decodeTile(held: Tiles, head: Head, tile: TileHead, payload: Uint8Array
   else base.fill(0);
   if (tile.planes === 0 && payload.length > 0) throw new FrameError("a tile without planes has no payload");
   const raw = tile.planes === 0 ? new Uint8Array(0) : inflatePlanes(payload, tile.planes);
-  addResidual(samples, raw, tile.planes);
+  readResidual(raw, tile.planes);
+  undoFilter(tile.filter);
+  addResidual(samples);
   const subMin = new Int32Array(SUBS);
   const subMax = new Int32Array(SUBS);
   const subError = new Uint32Array(SUBS);
@@ -228,12 +233,14 @@ function readTileHead(view: DataView, at: number, level: number): TileHead {
     y: view.getUint16(at + f.y.offset, true),
     predictor: view.getUint8(at + f.predictor.offset),
     planes: view.getUint8(at + f.planes.offset),
+    filter: view.getUint8(at + f.filter.offset),
     version: view.getUint32(at + f.version.offset, true),
     baseVersion: view.getUint32(at + f.base_version.offset, true),
     bytes: view.getUint32(at + f.bytes.offset, true),
   };
   checkPlace(level, tile.x, tile.y);
   if (tile.predictor > Predictor.HELD) throw new FrameError(`unknown predictor ${tile.predictor}`);
+  if (tile.filter > Filter.PLANE) throw new FrameError(`unknown filter ${tile.filter}`);
   if (tile.planes > 4) throw new FrameError(`a tile has 0 to 4 byte planes, not ${tile.planes}`);
   if (tile.bytes > MAX_PAYLOAD) throw new FrameError(`a tile payload of ${tile.bytes} bytes is too large`);
   return tile;
@@ -256,14 +263,30 @@ function inflatePlanes(payload: Uint8Array, planes: number): Uint8Array {
   return raw;
 }
 
-/** The prediction in `base` plus the zig-zag coded residual, lowest byte plane first. */
-function addResidual(samples: Int32Array, raw: Uint8Array, planes: number): void {
+/** The zig-zag codes, lowest byte plane first, as numbers in `residual`. */
+function readResidual(raw: Uint8Array, planes: number): void {
   for (let i = 0; i < AREA; i++) {
     let code = planes > 0 ? raw[i]! : 0;
     if (planes > 1) code |= raw[AREA + i]! << 8;
     if (planes > 2) code |= raw[2 * AREA + i]! << 16;
     if (planes > 3) code |= raw[3 * AREA + i]! << 24;
-    const value = base[i]! + ((code >>> 1) ^ -(code & 1));
+    residual[i] = (code >>> 1) ^ -(code & 1);
+  }
+}
+
+/** Adds up the differences in `residual`. Sums of 4,225 numbers of 32 bits are exact in float64. */
+function undoFilter(filter: number): void {
+  if (filter === Filter.NONE) return;
+  const across = filter === Filter.ROW ? 1 : TILE_SAMPLES;
+  for (let row = 1; row < TILE_SAMPLES; row++)
+    for (let i = row * TILE_SAMPLES; i < row * TILE_SAMPLES + across; i++) residual[i]! += residual[i - TILE_SAMPLES]!;
+  for (let i = 0; i < AREA; i++) if (i % TILE_SAMPLES > 0) residual[i]! += residual[i - 1]!;
+}
+
+/** The prediction in `base` plus the residual. */
+function addResidual(samples: Int32Array): void {
+  for (let i = 0; i < AREA; i++) {
+    const value = base[i]! + residual[i]!;
     if (value > SAMPLE_LIMIT || value < -SAMPLE_LIMIT) throw new FrameError("a tile sample is out of range");
     samples[i] = value;
   }
