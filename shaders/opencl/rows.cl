@@ -18,7 +18,8 @@ typedef float8 __attribute__((aligned(4))) unaligned8;
 #define FORCE_INLINE inline __attribute__((always_inline))
 FORCE_INLINE float16 load16(crow_t p) { return *(global const unaligned16 *)p; }
 FORCE_INLINE float8 load8(crow_t p) { return *(global const unaligned8 *)p; }
-FORCE_INLINE void prefetch_read(crow_t p) { __builtin_prefetch((const void *)(size_t)p); }
+// Into the second cache: the first has no room to spare.
+FORCE_INLINE void prefetch_read(crow_t p) { __builtin_prefetch((const void *)(size_t)p, 0, 2); }
 FORCE_INLINE void prefetch_write(row_t p) { __builtin_prefetch((const void *)(size_t)p, 1); }
 FORCE_INLINE void store16(float16 v, row_t p) { *(global unaligned16 *)p = v; }
 

@@ -13,22 +13,21 @@
 #define AHEAD 4  // rows that are fetched before they are needed
 
 typedef struct {
-    int n, pitch, pitch2, channels, stride, stride2;
+    int n, pitch, pitch2;
     float screening;
 } level_t;
 
-// Scratch of one work-item, lanes of LANE floats. A slot holds what entered with one row: q = 1 / (4 + t), or 0 where
-// fixed; t = d + screening; and per channel the start and the right-hand side. Behind the slots, per channel: the rows
-// that sweeps 1 to 4 made last, of even and of odd rows; four rows of the residual.
-#define SLOT(y) (ring + (((y) + SLOTS) % SLOTS) * (2 + 2 * g.channels) * LANE + PAD)
+// Scratch of one work-item, lanes of LANE floats, few enough for a core's first cache. A slot holds what entered with a
+// row: q = 1 / (4 + t), or 0 where fixed; t = d + screening; the right-hand side. Behind the slots: three rows of the
+// start; what sweeps 1 to 4 made last, of even and of odd rows; three rows of the residual.
+#define SLOT(y) (ring + (((y) + SLOTS) % SLOTS) * 3 * LANE)
+#define START(y) (ring + (3 * SLOTS + ((y) + SLOTS) % 3) * LANE)
+#define SWEPT(y) (ring + (3 * SLOTS + 3 + ((y) & 1) * 4) * LANE)
+#define RESIDUAL(y) (ring + (3 * SLOTS + 11 + ((y) + SLOTS) % 3) * LANE)
 #define T_LANE LANE
-#define START_LANE(channel) ((2 + 2 * (channel)) * LANE)
-#define RHS_LANE(channel) ((3 + 2 * (channel)) * LANE)
-#define OWN(channel) (ring + (SLOTS * SLOT_LANES + (channel) * OWN_LANES) * LANE + PAD)
-#define PARITY(own, y) (own + ((y) & 1) * 4 * LANE)
-#define RESIDUAL(own, y) (own + (8 + ((y) & 3)) * LANE)
+#define RHS_LANE (2 * LANE)
 
-// Where a row of one channel enters from; guess and the two coarse rows of the correction may be null.
+// Where a row enters from; guess and the two coarse rows of the correction may be null.
 typedef struct {
     crow_t d, guess, rhs, c0, c1;
     int ahead, ahead2;  // floats to the rows that the caches should fetch meanwhile
@@ -43,30 +42,27 @@ FORCE_INLINE float16 add_prolonged(float16 base, crow_t c0, crow_t c1) {
     return fma(__builtin_shufflevector(two, four, 0, 8, 1, 9, 2, 10, 3, 11, 4, 12, 5, 13, 6, 14, 7, 15), share, base);
 }
 
-// A row enters at x: what the operator needs, by channel 0; start = guess + P correction, the correction only where not
-// fixed, without guess zero, or fixed; the right-hand side.
-FORCE_INLINE void enter16(row_t slot, const source_t *in, long x, const int channel) {
-    int16 fixed;
+// A row enters at x: what the operator needs; start = guess + P correction, the correction only where not fixed, without
+// guess zero, or fixed; the right-hand side. Returns the start.
+FORCE_INLINE float16 enter16(row_t slot, row_t start, const source_t *in, long x) {
+    float16 d = load16(in->d + x), t = d + in->screening, f = load16(in->rhs + x), u = 0.0f, held = f;
+    int16 fixed = d < 0.0f;
+    prefetch_read(in->d + in->ahead + x);
     prefetch_read(in->rhs + in->ahead + x);
-    if (channel == 0) {
-        float16 d = load16(in->d + x), t = d + in->screening;
-        prefetch_read(in->d + in->ahead + x);
-        fixed = d < 0.0f;
-        store16(select(1.0f / (4.0f + t), (float16)(0.0f), fixed), slot + x);
-        store16(t, slot + T_LANE + x);
-    } else
-        fixed = load16(slot + x) == 0.0f;
-    float16 f = load16(in->rhs + x), start = 0.0f, held = f;
     if (in->guess) {
-        held = start = load16(in->guess + x);
+        held = u = load16(in->guess + x);
         prefetch_read(in->guess + in->ahead + x);
     }
     if (in->c0) {
-        start = add_prolonged(start, in->c0 + x / 2, in->c1 + x / 2);
+        u = add_prolonged(u, in->c0 + x / 2, in->c1 + x / 2);
         prefetch_read(in->c1 + in->ahead2 + x / 2);
     }
-    store16(select(start, held, fixed), slot + START_LANE(channel) + x);
-    store16(f, slot + RHS_LANE(channel) + x);
+    u = select(u, held, fixed);
+    store16(select(1.0f / (4.0f + t), (float16)(0.0f), fixed), slot + x);
+    store16(t, slot + T_LANE + x);
+    store16(f, slot + RHS_LANE + x);
+    store16(u, start + x);
+    return u;
 }
 
 // What a stage carries from one vector of a row to the next: the samples, and their differences to the east.
@@ -95,7 +91,7 @@ FORCE_INLINE carry_t carry(crow_t here, int n) {
 // row y + 1 is `north`; kept in `before` when it is not there yet. *c: u itself. `edge`: y may be 0 or n - 1. `end`: x is
 // the eastern border, which whole vectors always leave over.
 FORCE_INLINE float16 stage(float16 *c, carry_t *k, float16 north, row_t before, crow_t here, crow_t slot, long x, int y,
-                           int n, const int channel, const int keep, const int edge, const int end) {
+                           int n, const int keep, const int edge, const int end) {
     float16 south = load16(before + x), beyond = south, next = k->c, west, east;
     *c = k->c;
     if (keep) store16(north, before + x);
@@ -111,48 +107,47 @@ FORCE_INLINE float16 stage(float16 *c, carry_t *k, float16 north, row_t before, 
     }
     k->c = next;
     k->east = east;
-    float16 rest = (east - west) + ((south - *c) + load16(slot + RHS_LANE(channel) + x));
+    float16 rest = (east - west) + ((south - *c) + load16(slot + RHS_LANE + x));
     return fma(-load16(slot + T_LANE + x), *c, rest) + (north - *c);
 }
 
 // Rows of one time step, and what its stages carry along them.
 typedef struct {
-    row_t next, s0, s1, s2, s3, s4, s5, even, odd, residual, out;
+    row_t s0, s1, s2, s3, s4, s5, start, start1, start2, even, odd, residual, out;
     long out_a, out_b;
     carry_t k1, k2, k3, k4, k5;
 } step_t;
 
-FORCE_INLINE void wave16(step_t *s, level_t g, const source_t *in, int t, int entering, long x, float4 w, const int channel,
-                         const int edge, const int end) {
-    const int start = START_LANE(channel), n = g.n;
-    float16 c, r, u = load16(s->s0 + start + x);
-    if (!edge || entering) enter16(s->next, in, x, channel);
-    r = stage(&c, &s->k1, u, s->s2 + start, s->s1 + start, s->s1, x, t - 1, n, channel, 0, edge, end);
+FORCE_INLINE void wave16(step_t *s, int n, const source_t *in, int t, int entering, long x, float4 w, const int edge,
+                         const int end) {
+    float16 c, r, u = 0.0f;
+    if (!edge || entering) u = enter16(s->s0, s->start, in, x);
+    r = stage(&c, &s->k1, u, s->start2, s->start1, s->s1, x, t - 1, n, 0, edge, end);
     u = fma(w.x * load16(s->s1 + x), r, c);
-    r = stage(&c, &s->k2, u, s->odd, s->even, s->s2, x, t - 2, n, channel, 1, edge, end);
+    r = stage(&c, &s->k2, u, s->odd, s->even, s->s2, x, t - 2, n, 1, edge, end);
     u = fma(w.y * load16(s->s2 + x), r, c);
-    r = stage(&c, &s->k3, u, s->even + LANE, s->odd + LANE, s->s3, x, t - 3, n, channel, 1, edge, end);
+    r = stage(&c, &s->k3, u, s->even + LANE, s->odd + LANE, s->s3, x, t - 3, n, 1, edge, end);
     u = fma(w.z * load16(s->s3 + x), r, c);
-    r = stage(&c, &s->k4, u, s->odd + 2 * LANE, s->even + 2 * LANE, s->s4, x, t - 4, n, channel, 1, edge, end);
+    r = stage(&c, &s->k4, u, s->odd + 2 * LANE, s->even + 2 * LANE, s->s4, x, t - 4, n, 1, edge, end);
     u = fma(w.w * load16(s->s4 + x), r, c);
     if (x >= s->out_a && x < s->out_b) {
         store16(u, s->out + x);
         prefetch_write(s->out + in->ahead + x);
     }
-    r = stage(&c, &s->k5, u, s->even + 3 * LANE, s->odd + 3 * LANE, s->s5, x, t - 5, n, channel, 1, edge, end);
-    store16(select(r, (float16)(0.0f), load16(s->s5 + x) == 0.0f), s->residual + x);
+    r = stage(&c, &s->k5, u, s->even + 3 * LANE, s->odd + 3 * LANE, s->s5, x, t - 5, n, 1, edge, end);
+    store16(select(r, (float16)(0.0f), load16(s->s5 + T_LANE + x) < 0.0f), s->residual + x);
 }
 
-// One time step of m columns: row t + 1 enters, sweep k does row t - k, the residual is that of row t - 5. The last sweep
-// also goes to `out`, columns [out_a, out_b). `edge`: rows 0 or n - 1 may be among these, or no row be left to enter.
-FORCE_INLINE void wave_row(row_t ring, level_t g, source_t in, row_t out, int t, int entering, long m, int right,
-                           long out_a, long out_b, float4 w, const int channel, const int edge) {
-    row_t own = OWN(channel), even = PARITY(own, t), odd = PARITY(own, t - 1);
-    step_t s = {SLOT(t + 1), SLOT(t), SLOT(t - 1), SLOT(t - 2), SLOT(t - 3), SLOT(t - 4), SLOT(t - 5), even, odd,
-                RESIDUAL(own, t - 5), out, out_a, out_b, carry(SLOT(t - 1) + START_LANE(channel), g.n), carry(even, g.n),
-                carry(odd + LANE, g.n), carry(even + 2 * LANE, g.n), carry(odd + 3 * LANE, g.n)};
-    for (long x = 0; x < m - right; x += VW) wave16(&s, g, &in, t, entering, x, w, channel, edge, 0);
-    if (right) wave16(&s, g, &in, t, entering, m - 1, w, channel, edge, 1);
+// One time step of m columns: row t enters, sweep k does row t - k, the residual is that of row t - 5. The last sweep also
+// goes to `out`, columns [out_a, out_b). `edge`: rows 0 or n - 1 may be among these, or no row be left to enter.
+FORCE_INLINE void wave_row(row_t ring, int n, source_t in, row_t out, int t, int entering, long m, int right, long out_a,
+                           long out_b, float4 w, const int edge) {
+    row_t even = SWEPT(t), odd = SWEPT(t - 1);
+    step_t s = {SLOT(t), SLOT(t - 1), SLOT(t - 2), SLOT(t - 3), SLOT(t - 4), SLOT(t - 5), START(t), START(t - 1),
+                START(t - 2), even, odd, RESIDUAL(t - 5), out, out_a, out_b, carry(START(t - 1), n), carry(even, n),
+                carry(odd + LANE, n), carry(even + 2 * LANE, n), carry(odd + 3 * LANE, n)};
+    for (long x = 0; x < m - right; x += VW) wave16(&s, n, &in, t, entering, x, w, edge, 0);
+    if (right) wave16(&s, n, &in, t, entering, m - 1, w, edge, 1);
 }
 
 // `count` coarse samples from three rows of the residual's columns from `from` on, and one more at the eastern border.
@@ -176,49 +171,45 @@ FORCE_INLINE void restrict_lanes(row_t out, crow_t a, crow_t b, crow_t c, long f
 }
 
 // Rows [y0, y1), columns [x0, x1) of out = sweeps of (guess + P correction); coarse = R (rhs - A out) if given. guess,
-// correction and coarse may be null. All channels: what belongs to the operator is made once.
+// correction and coarse may be null.
 FORCE_INLINE void visit_block(crow_t guess, crow_t correction, crow_t rhs, crow_t d, row_t out, row_t coarse, level_t g,
                               row_t ring, int y0, int y1, int x0, int x1, constant float *weights) {
     int n = g.n, halo = CHEBYSHEV_SWEEPS + (coarse ? 2 : 0), lo = max(0, y0 - halo), hi = min(n, y1 + halo);
     int xa = max(0, x0 - HALO), xb = min(n, x1 + HALO), m = xb - xa, left = xa == 0, right = xb == n && n > VW;
-    int last = y1 - 1 + CHEBYSHEV_SWEEPS + (coarse ? 1 : 0);
+    int last = y1 - 1 + CHEBYSHEV_SWEEPS + (coarse ? 1 : 0), out_a = x0 - xa;
     float4 w = {weights[0], weights[1], weights[2], weights[3]};
-    for (int t = lo - 1; t <= last; t++)
-        for (int c = 0; c < g.channels; c++) {
-            size_t fine = (size_t)c * g.stride + xa, under = (size_t)c * g.stride2;
-            int in_y = t + 1, out_y = t - CHEBYSHEV_SWEEPS, inside = out_y >= y0 && out_y < y1, entering = in_y < hi;
-            source_t in = {crow(d, in_y, g.pitch) + xa,
-                           guess ? crow(guess, in_y, g.pitch) + fine : 0,
-                           crow(rhs, in_y, g.pitch) + fine,
-                           correction ? crow(correction, in_y / 2, g.pitch2) + under + xa / 2 : 0,
-                           correction ? crow(correction, (in_y + 1) / 2, g.pitch2) + under + xa / 2 : 0,
-                           AHEAD * g.pitch, AHEAD / 2 * g.pitch2, g.screening};
-            row_t o = inside ? row(out, out_y, g.pitch) + fine : 0;
-            int out_a = x0 - xa, out_b = inside ? x1 - xa : 0, edge = t < CHEBYSHEV_SWEEPS + 2 || t >= n - 1;
-            if (c == 0 && edge) wave_row(ring, g, in, o, t, entering, m, right, out_a, out_b, w, 0, 1);
-            if (c == 0 && !edge) wave_row(ring, g, in, o, t, entering, m, right, out_a, out_b, w, 0, 0);
-            if (c == 1 && edge) wave_row(ring, g, in, o, t, entering, m, right, out_a, out_b, w, 1, 1);
-            if (c == 1 && !edge) wave_row(ring, g, in, o, t, entering, m, right, out_a, out_b, w, 1, 0);
-            int y = t - CHEBYSHEV_SWEEPS - 1, centre = (y & 1) ? y - 1 : (y == n - 1 ? y : -1);
-            if (coarse && centre >= y0 && centre < y1) {
-                row_t own = OWN(c);
-                restrict_lanes(row(coarse, centre / 2, g.pitch2) + under + x0 / 2, RESIDUAL(own, mirror(centre - 1, n)),
-                               RESIDUAL(own, centre), RESIDUAL(own, mirror(centre + 1, n)), out_a, (x1 - x0) / 2, left,
-                               right);
-            }
-        }
+    for (int t = lo; t <= last; t++) {
+        int out_y = t - CHEBYSHEV_SWEEPS, inside = out_y >= y0 && out_y < y1, out_b = inside ? x1 - xa : 0;
+        source_t in = {crow(d, t, g.pitch) + xa,
+                       guess ? crow(guess, t, g.pitch) + xa : 0,
+                       crow(rhs, t, g.pitch) + xa,
+                       correction ? crow(correction, t / 2, g.pitch2) + xa / 2 : 0,
+                       correction ? crow(correction, (t + 1) / 2, g.pitch2) + xa / 2 : 0,
+                       AHEAD * g.pitch, AHEAD / 2 * g.pitch2, g.screening};
+        row_t o = inside ? row(out, out_y, g.pitch) + xa : 0;
+        if (t < CHEBYSHEV_SWEEPS + 2 || t >= n)
+            wave_row(ring, n, in, o, t, t < hi, m, right, out_a, out_b, w, 1);
+        else
+            wave_row(ring, n, in, o, t, 1, m, right, out_a, out_b, w, 0);
+        int y = out_y - 1, centre = (y & 1) ? y - 1 : (y == n - 1 ? y : -1);
+        if (coarse && centre >= y0 && centre < y1)
+            restrict_lanes(row(coarse, centre / 2, g.pitch2) + x0 / 2, RESIDUAL(mirror(centre - 1, n)), RESIDUAL(centre),
+                           RESIDUAL(mirror(centre + 1, n)), out_a, (x1 - x0) / 2, left, right);
+    }
 }
 
-// Global size (strips); d is shared by the channels. `rows` is even. Blocks of columns one after the other.
+// Global size (strips, channels); d is shared by the channels. `rows` is even. Blocks of columns one after the other.
 kernel void visit(crow_t guess, crow_t correction, crow_t rhs, crow_t d, row_t out, row_t coarse, int n, int pitch,
-                  int pitch2, int channels, int stride, int stride2, float screening, row_t scratch, int scratch_stride,
-                  int rows, constant float *weights) {
-    int s = get_global_id(0), y0 = s * rows, y1 = min(n, y0 + rows);
-    level_t g = {n, pitch, pitch2, channels, stride, stride2, screening};
+                  int pitch2, int stride, int stride2, float screening, row_t scratch, int scratch_stride, int rows,
+                  constant float *weights) {
+    int s = get_global_id(0), c = get_global_id(1), y0 = s * rows, y1 = min(n, y0 + rows);
+    size_t fine = (size_t)c * stride, under = (size_t)c * stride2;
+    row_t ring = scratch + (size_t)(c * get_global_size(0) + s) * scratch_stride;
+    level_t g = {n, pitch, pitch2, screening};
     if (y0 >= n) return;
     for (int x0 = 0; x0 < n - 1; x0 += BLOCK)
-        visit_block(guess, correction, rhs, d, out, coarse, g, scratch + (size_t)s * scratch_stride, y0, y1, x0,
-                    x0 + BLOCK < n - 1 ? x0 + BLOCK : n, weights);
+        visit_block(guess ? guess + fine : 0, correction ? correction + under : 0, rhs + fine, d, out + fine,
+                    coarse ? coarse + under : 0, g, ring, y0, y1, x0, x0 + BLOCK < n - 1 ? x0 + BLOCK : n, weights);
 }
 
 // coarse = R fine. Global size (strips, channels).
@@ -237,7 +228,7 @@ FORCE_INLINE void restrict_residual(row_t u, crow_t rhs, crow_t d, row_t coarse,
     int n = g.n;
     for (int y = 0; y < n; y++) ghosts(row(u, y, g.pitch), n);
     for (int y = 0; y < n; y++) {
-        row_t here = row(u, y, g.pitch), r = ring + (y & 3) * LANE + PAD;
+        row_t here = row(u, y, g.pitch), r = ring + (y & 3) * LANE;
         crow_t f = crow(rhs, y, g.pitch), dr = crow(d, y, g.pitch), south = crow(u, mirror(y - 1, n), g.pitch);
         crow_t north = crow(u, mirror(y + 1, n), g.pitch);
         for (int x = 0; x < n; x += VW) {
@@ -248,7 +239,7 @@ FORCE_INLINE void restrict_residual(row_t u, crow_t rhs, crow_t d, row_t coarse,
         }
         int centre = (y & 1) ? y - 1 : (y == n - 1 ? y : -1);
         if (centre >= 0)
-            restrict_row(row(coarse, centre / 2, g.pitch2), ring + (mirror(centre - 1, n) & 3) * LANE + PAD, ring + (centre & 3) * LANE + PAD, ring + (mirror(centre + 1, n) & 3) * LANE + PAD,
+            restrict_row(row(coarse, centre / 2, g.pitch2), ring + (mirror(centre - 1, n) & 3) * LANE, ring + (centre & 3) * LANE, ring + (mirror(centre + 1, n) & 3) * LANE,
                          ring + 4 * LANE + PAD, n);
     }
 }
@@ -278,7 +269,7 @@ kernel void bottom(crow_t rhs, crow_t d, row_t out, row_t work, constant int *ta
     work += (size_t)c * stride;
     level_t g[BOTTOM_LEVELS + 1];
     for (int k = 0; k <= levels; k++) {
-        level_t of_k = {tab[4 * k + 1], tab[4 * k + 2], k < levels ? tab[4 * k + 6] : 0, 1, 0, 0, screening};
+        level_t of_k = {tab[4 * k + 1], tab[4 * k + 2], k < levels ? tab[4 * k + 6] : 0, screening};
         g[k] = of_k;
         screening *= 4.0f;
     }

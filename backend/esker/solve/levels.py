@@ -172,10 +172,10 @@ class ClSystem:
         under = self.shapes[level - 1]
         strips, rows = self.launch.strips(fine.n)
         self.launch.again(
-            "visit", (strips,), self.fields[guess, level] if guess else None,
+            "visit", (strips, self.channels), self.fields[guess, level] if guess else None,
             self.fields[correction, level - 1] if correction else None, self.fields[rhs, level],
             self.fields["d", level], self.fields[out, level], self.fields["b", level - 1] if residual else None,
-            i(fine.n), i(fine.pitch), i(under.pitch), i(self.channels), i(fine.stride), i(under.stride),
+            i(fine.n), i(fine.pitch), i(under.pitch), i(fine.stride), i(under.stride),
             np.float32(self.eps[level]), self.launch.scratch, i(self.launch.scratch_stride), i(rows),
             self.launch.weights,
         )  # fmt: skip

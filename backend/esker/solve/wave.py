@@ -10,18 +10,17 @@ BLOCK = 256
 """Columns of a block: the rows that a wave needs of so many stay in a core's first cache."""
 HALO = 16
 """Columns that a block repeats on either side: at least the stages of a wave (sweeps + 2), and whole vectors."""
-SLOTS = 7
-"""Rows entered that the stages still need, and the one that enters meanwhile: sweeps + 3."""
-SLOT_LANES = 6
-"""Lanes of a slot: two of the operator, two for each of two channels."""
-OWN_LANES = 12
-"""Lanes of a channel: two rows of each of four sweeps, four of the residual."""
-LANE = BLOCK + 2 * HALO + 4 * PAD
+SLOTS = 6
+"""Rows entered that the stages still need: sweeps + 2."""
+LANES = 3 * SLOTS + 14
+"""Rows of a block that a wave works on: see visit.cl."""
+LANE = BLOCK + 2 * HALO + 48
+"""Floats of a lane: the block, its halo, what vectors read beyond, and an odd number of cache lines."""
 
 
 def scratch_floats() -> int:
     """Scratch of one work-item."""
-    return (SLOTS * SLOT_LANES + 2 * OWN_LANES) * LANE
+    return LANES * LANE
 
 
 def defines() -> dict[str, float | int]:
@@ -32,7 +31,5 @@ def defines() -> dict[str, float | int]:
         "HALO": HALO,
         "LANE": LANE,
         "SLOTS": SLOTS,
-        "SLOT_LANES": SLOT_LANES,
-        "OWN_LANES": OWN_LANES,
         "TILE_CELLS": TILE_CELLS,
     }
