@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import subprocess
 import sys
@@ -129,10 +130,23 @@ def test_times_against_ours() -> None:
     assert bench.against({"failed": "out of memory"}, ours) == {}
 
 
-def test_the_whole_command() -> None:
-    """The smallest run of every part: valid JSON on standard output, progress on standard error."""
-    command = [sys.executable, "-m", "esker", "bench", "solve", "--finest", "1", "--scene", "tiny", "--json"]
-    done = subprocess.run([*command, "--part", "accuracy"], capture_output=True, text=True, timeout=120, check=True)
-    result = json.loads(done.stdout)
+def test_the_whole_command(tmp_path: Path) -> None:
+    """The smallest run of every part: progress on standard error; the file keeps parts that are not run again."""
+    out = tmp_path / "solve.json"
+    out.write_text(json.dumps({"runs": {"fanout": {}}, "fanout": "kept"}))
+    command = [sys.executable, "-m", "esker", "bench", "solve", "--finest", "1", "--scene", "tiny", "-o", str(out)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=True)
+    result = json.loads(out.read_text())
+    assert result["fanout"] == "kept"
     assert result["accuracy"]["tiny"]["129"]["height_factor"] < 0.4
-    assert "accuracy 129² tiny" in done.stderr
+    for count in ("1", "2"):
+        assert result["threads"][count]["scenes"]["fifty"]["129"]["two_step"]["error_of_relief"] < 1e-2
+    peers = result["peers"]["levels"]["129"]
+    assert set(peers) == {"unknowns", *_peers.NAMES}
+    for name in _peers.NAMES:
+        if importlib.util.find_spec(_peers.NEEDS[name]):
+            assert peers[name]["times_ours"]["2"]["preview"] > 1, "nobody is faster"
+    assert set(result["runs"]) == {"fanout", "accuracy", "threads", "peers"}
+    assert done.stdout == ""
+    for said in ("accuracy 129² tiny", "2 thread(s), 129² fifty", "peers 129²: superlu"):
+        assert said in done.stderr

@@ -31,6 +31,9 @@ from esker.solve.workspaces import new_workspace
 
 PREVIEW_GRADIENT_CYCLES = 1
 PREVIEW_HEIGHT_CYCLES = 3
+WIDE_REACHES = (1 / 16, 1 / 4)
+"""A reach above each of these shares of the domain takes one gradient cycle more: what full multigrid leaves of the
+gradient is smooth, and the farther it is felt the more height it adds up to."""
 HEIGHT_SHARE = 0.25
 """Error, in quanta of the finest level, at which the heights are at rest: half of what DESIGN 5.3 asks for."""
 GRADIENT_SHARE = 1 / 16
@@ -226,7 +229,7 @@ class Solver:
                 yield from workspace.loading(strokes, settings)
                 loaded = True
                 if warm is None:
-                    yield from self._paced(_previews(workspace), top)
+                    yield from self._paced(_previews(workspace, preview_gradient_cycles(settings)), top)
                 else:
                     _gradients(workspace)
                     workspace.warm(warm)
@@ -289,7 +292,13 @@ def _bytes(top: int) -> int:
     return int(WORKSPACE_BYTES * 4.0 ** (top - 4))
 
 
-def _previews(w: Workspace) -> Iterator[LevelResult | None]:
+def preview_gradient_cycles(settings: TerrainSettings) -> int:
+    """Gradient cycles of the finest preview that keep it within 10^-3 of the relief (docs/solver.md)."""
+    reach = settings.size_m if settings.reach_m is None else settings.reach_m
+    return PREVIEW_GRADIENT_CYCLES + sum(reach > share * settings.size_m for share in WIDE_REACHES)
+
+
+def _previews(w: Workspace, gradient_cycles: int = PREVIEW_GRADIENT_CYCLES) -> Iterator[LevelResult | None]:
     """Full multigrid, both steps level by level, so that a coarse level is out before the next one is touched."""
     for level in range(w.top):
         multigrid.start(w.gradient, level)
@@ -298,7 +307,7 @@ def _previews(w: Workspace) -> Iterator[LevelResult | None]:
         multigrid.start(w.height, level)
         multigrid.finish(w.height, level)
         yield LevelResult(level, _frozen(w.read(level)), settled=False)
-    yield from _cycles(w.gradient, PREVIEW_GRADIENT_CYCLES)
+    yield from _cycles(w.gradient, gradient_cycles)
     w.guide(w.top)
     yield from _cycles(w.height, PREVIEW_HEIGHT_CYCLES)
     yield LevelResult(w.top, _frozen(w.read(w.top)), settled=False)
