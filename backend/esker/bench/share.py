@@ -119,6 +119,8 @@ def measure(solver: Solver, rooms: int, big: int, seconds: float, level: int) ->
         giants = [_Room(stream.fifty(200 + i), BIG_LEVEL) for i in range(big)]
         for room in [*people, *giants]:
             room.client = worker.add(room.levels, room.deliver, _unexpected)
+        _warm(worker, [*people, *giants])
+        timed.slices.clear()
         _run(worker, people, giants, seconds)
     finally:
         worker.stop()
@@ -136,14 +138,24 @@ def measure(solver: Solver, rooms: int, big: int, seconds: float, level: int) ->
     }
 
 
+def _warm(worker: Worker, rooms: list[_Room]) -> None:
+    """Every room is open and at rest before anything is measured."""
+    for room in rooms:
+        room.draw(worker)
+        deadline = time.monotonic() + 120
+        while not room.settled:
+            if time.monotonic() > deadline:
+                raise RuntimeError("a room did not settle")
+            time.sleep(0.005)
+        room.settled, room.coarse, room.finest = 0, [], []
+
+
 def _run(worker: Worker, people: list[_Room], giants: list[_Room], seconds: float) -> None:
     """People draw and rest; a giant that has settled is asked again."""
     start = time.perf_counter()
     cycle = DRAWING + REST
     due = [start + cycle * i / max(1, len(people)) for i in range(len(people))]
-    done = [0] * len(giants)
-    for giant in giants:
-        giant.draw(worker)
+    done = [-1] * len(giants)
     while (now := time.perf_counter()) < start + seconds:
         for i, room in enumerate(people):
             if now >= due[i]:

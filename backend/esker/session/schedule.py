@@ -1,5 +1,6 @@
 """Whose turn it is on the solver (DESIGN 8): rooms that wait for a first coarse preview, finer previews, settling, and
-refinement, in this order; in turn within each, a slice at a time.
+refinement, in this order; in turn within each, a slice at a time. Finer previews are finished one after the other,
+the smallest terrains first: interleaved, all of them would come late.
 
 A lower class that has waited for ``PATIENCE`` gets a slice all the same, so nothing starves. A solve in progress holds
 memory, so only so many may be in progress as fit the budget: a room that waits for its coarse preview ends the settling
@@ -24,7 +25,6 @@ HOLD: Final = 0.050
 PATIENCE: Final = 0.150
 BUDGET: Final = 3 << 30
 """Bytes for solves in progress, of all rooms together."""
-MOST_SOLVES: Final = 8
 LEVEL_4_BYTES: Final = 91 << 20
 """One solve with 1025 x 1025 samples; four times as much a level."""
 
@@ -65,6 +65,9 @@ class Client:
     """When a job that failed is tried again by itself."""
     told: str = ""
     turn: int = 0
+    """Of its last slice, counted over all rooms."""
+    began: int = 0
+    """Turn at which its solve began."""
     ran_at: float = 0.0
     """When it had its last slice, or began to wait."""
     previewing: bool = False
@@ -173,7 +176,7 @@ class Schedule:
         staged = [(stage, x) for x in self.clients if (stage := x.stage(now)) is not None and self._fits(x, stage, now)]
         if not staged:
             return None
-        stage, best = min(staged, key=lambda s: (s[0], s[1].turn))
+        stage, best = min(staged, key=lambda s: (s[0], *_order(*s)))
         late = [x for other, x in staged if other > stage and now - x.ran_at > PATIENCE]
         if late and now - self._favoured_at > PATIENCE:
             self._favoured_at = now
@@ -190,6 +193,7 @@ class Schedule:
         for other in self._in_the_way(client):
             other.drop()
             other.again(now)
+        client.began = self._turns
         return client.begin()
 
     def _fits(self, client: Client, stage: int, now: float) -> bool:
@@ -214,4 +218,9 @@ class Schedule:
     def _room(self, client: Client, gone: list[Client]) -> bool:
         held = [x for x in self.clients if x is not client and x.steps is not None and x not in gone]
         used = sum(solve_bytes(x.top) for x in held)
-        return not held or (len(held) < MOST_SOLVES and used + solve_bytes(client.top) <= self._budget)
+        return not held or used + solve_bytes(client.top) <= self._budget
+
+
+def _order(stage: int, client: Client) -> tuple[int, int]:
+    """Within a class the least comes first."""
+    return (client.top, client.began) if stage == FINER else (0, client.turn)
