@@ -156,6 +156,43 @@ def peers(solve: dict[str, Any]) -> str:
     return "\n".join(out)
 
 
+def aims(solve: dict[str, Any]) -> str:
+    """DESIGN 15's aims beside what was reached, with two threads."""
+    two = _rows(solve, "2")
+    levels = solve["peers"]["levels"]
+    shares = [row["height_cycle"]["share_of_copy"] for size, row in two.items() if int(size) >= 1025]
+    out = ["| aim | reached |", "|---|---|"]
+    for size, aim in (("1025", 20), ("4097", 250)):
+        if size in two:
+            row = two[size]["two_step"]
+            out.append(f"| two steps at {size}²: {aim} ms | {number(row['ms']['least'])} ms ({row['cycles']} cycles) |")
+    out.append(
+        f"| height cycle at ≥ 60 % of copy bandwidth, 1025² and above | {min(shares):.0%} to {max(shares):.0%} |"
+    )
+    for name, aim in (("pyamg_ruge_stuben", 200), ("cholmod", 290)):
+        times = levels.get("1025", {}).get(name, {}).get("times_ours", {}).get("2", {})
+        if "preview" in times:
+            out.append(f"| ≥ {aim} × {PEERS[name]}, 1025², 10⁻³ of the relief | {times['preview']:,.0f} × |")
+    out.append("| on a GPU, 4097², two steps ≤ 3 ms | no GPU was to be had |")
+    return "\n".join(out)
+
+
+def ties(solve: dict[str, Any]) -> str:
+    """What float32 decides another way than float64, over the gallery, where it was counted."""
+    found = [(int(n), row["ties"]) for rows in solve["accuracy"].values() for n, row in rows.items() if "ties" in row]
+    if not found:
+        return "Ties were not counted in this run."
+    n = max(size for size, _ in found)
+    rows = [row for size, row in found if size == n]
+    counts = [row["samples"] for row in rows]
+    most = max(row["error_of_relief"] for row in rows)
+    away = max(row["error_elsewhere_of_relief"] for row in rows)
+    return (
+        f"At {n}² {min(counts)} to {max(counts)} of {n * n:,} samples of a scene are ties; the ground differs there by "
+        f"at most {most:.1e} of the relief, and by {away:.1e} more than three samples away."
+    )
+
+
 def machine(solve: dict[str, Any]) -> str:
     """What the figures were measured on, part by part."""
     lines = []
@@ -168,6 +205,7 @@ def machine(solve: dict[str, Any]) -> str:
 
 
 TABLES = {"machine": machine, "accuracy": accuracy, "times": times, "bandwidth": bandwidth, "peers": peers}
+TABLES |= {"ties": ties, "aims": aims}
 
 
 def document(text: str, solve: dict[str, Any]) -> str:
