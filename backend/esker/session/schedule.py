@@ -10,6 +10,7 @@ solve that began last, which starts again later.
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Final
@@ -23,7 +24,7 @@ FINEST_WITHIN: Final = 0.150
 HOLD: Final = 0.050
 """A coarse preview that the finest follows within this time is not shown, and its pass is not stopped."""
 PATIENCE: Final = 0.150
-BUDGET: Final = 3 << 30
+BUDGET: Final = min(3 << 30, os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // 8)
 """Bytes for solves in progress, of all rooms together."""
 LEVEL_4_BYTES: Final = 91 << 20
 """One solve with 1025 x 1025 samples; four times as much a level."""

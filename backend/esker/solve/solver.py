@@ -38,9 +38,9 @@ HEIGHT_SHARE = 0.25
 """Error, in quanta of the finest level, at which the heights are at rest: half of what DESIGN 5.3 asks for."""
 GRADIENT_SHARE = 1 / 16
 """Share of a quantum that the gradient's own error may cost the heights."""
-SPARE_BYTES = 3 << 30
-"""Memory that idle workspaces may keep, with the raster of the strokes that they last solved, but no more than an
-eighth of the machine's: a room whose workspace was given to another one has all its strokes rasterised again."""
+SPARE_BYTES = 5 << 30
+"""Memory that idle workspaces may keep, with the raster of the strokes that they last solved, but no more than a
+fifth of the machine's: a room whose workspace was given to another one has all its strokes rasterised again."""
 PACED_ABOVE = 4
 """Up to this level a whole preview takes less time than one cycle of a big terrain."""
 WORKSPACE_BYTES = 91 << 20
@@ -125,7 +125,7 @@ class Solver:
         self._spare: list[Workspace] = []
         self._refinery: Refinery | None = None
         self._channel_solvers: dict[int, ChannelSolver] = {}
-        self._spare_bytes = min(SPARE_BYTES, os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // 8)
+        self._spare_bytes = min(SPARE_BYTES, os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // 5)
         self._device: Device | None = None
         self._device = open_device(device, threads, self._check)
 
