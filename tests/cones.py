@@ -124,7 +124,8 @@ class Client:
 
     def check(self) -> None:
         held = self.decoder.held
-        assert self.tiles.held() == {k: t.version for k, t in held.items()}
+        for channel, sent in self.decoder.channels.items():
+            assert self.tiles.held(channel) == {k: t.version for k, t in sent.items()}
         assert all(k.level == 0 or k.parent() in held for k in held)
         assert sum(k.level > LEVELS for k in held) <= self.server.refined.client_tiles
         for tiles in self.tiles._refined._held.values():

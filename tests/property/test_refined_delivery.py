@@ -4,11 +4,23 @@ from __future__ import annotations
 
 import random
 
+import numpy as np
 import pytest
 from tests.cones import FINEST, LEVELS, SIZE_M, Client, Ground, a_view, settle, solve
 
-from esker.contract import FrameKind
+from esker.contract import Channel, FrameKind
+from esker.grid import TileKey
 from esker.tiles.delivery import TileServer
+
+
+def put_channel(
+    server: TileServer, rng: random.Random, clock: int, settled: bool, channel: Channel | None = None
+) -> None:
+    """Some level of amplitude or roughness: a patch somewhere."""
+    channel = channel or rng.choice(list(server.channels))
+    y, x = np.mgrid[0:65, 0:65]
+    values = np.maximum(0, 9 - np.hypot(x - rng.randrange(65), y - rng.randrange(65))) / 9
+    server.put_level(clock, 0, values.astype(np.float32), settled, channel)
 
 
 @pytest.mark.parametrize("seed", range(10))
@@ -26,6 +38,8 @@ def test_random_sessions_come_to_rest_on_the_refined_ground(seed: int) -> None:
         for settled in (False, True):
             for level in range(LEVELS + 1 if rng.random() < 0.8 else 1):
                 server.put_level(clock, level, ground.level(level, settled), settled)
+                if rng.random() < 0.5:
+                    put_channel(server, rng, clock, settled)
                 for client in clients:
                     if rng.random() < 0.7:
                         client.step()
@@ -41,7 +55,13 @@ def test_random_sessions_come_to_rest_on_the_refined_ground(seed: int) -> None:
                     client.tiles.set_view(a_view(rng, ground))
     solve(server, ground, 99, False)
     solve(server, ground, 99, True)
+    for channel in server.channels:
+        put_channel(server, rng, 99, True, channel)
     settle(server, ground, 99, clients)
     for client in clients:
         client.check_newest(ground)
+        for channel, pyramid in server.channels.items():
+            found, newest = client.decoder.channels[channel], pyramid.level(0)
+            assert newest is not None
+            assert np.array_equal(found[TileKey(0, 0, 0)].samples, newest.samples)
         assert any(plan.level > LEVELS and plan.kind == FrameKind.FILL for plan in client.log)

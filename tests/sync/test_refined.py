@@ -55,6 +55,7 @@ class RoofRefiner:
     def tiles(self, keys: Sequence[TileKey]) -> Iterator[Tile | None]:
         for key in keys:
             yield None
+            time.sleep(0.01)
             step = SIZE / (64 << key.level)
             y, x = (np.arange(65) + 64 * np.array([[key.y], [key.x]])) * step
             self.log.append(key)
@@ -139,6 +140,9 @@ def test_refined_tiles_come_where_one_looks_and_follow_edits(tmp_path: Path) -> 
         peer.ops(("c1:2", set_op(first=[100.0, 100.0, 26.0])))
         follow(peer, decoder, 2)
         assert check(decoder, 26.0)[2] > 0
+        told = [m["refining"] for m in peer.seen if m["type"] == "progress" and m["settled"] and m["clock"] == 2]
+        assert told[0] > 0, "the ground is not at rest while tiles are wanted"
+        assert told[-1] == 0
         second, other = server.join(terrain, secret, "c2"), FrameDecoder()
         second.say("view", **NEAR.model_dump(mode="json", exclude={"type"}))
         made = len(solver.made)

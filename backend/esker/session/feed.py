@@ -33,6 +33,8 @@ BATCH_SECONDS: Final = 0.03
 """Refined tiles that come within this time are taken together."""
 BATCH_TILES: Final = 16
 """So many are taken without waiting for more."""
+BATCH_SHARE: Final = 0.25
+"""Taking tiles, and working out what is wanted then for a room full of people, takes at most this share of the time."""
 WISHES_SECONDS: Final = 0.05
 """While cameras move, what is wanted is worked out at most this often."""
 
@@ -85,6 +87,8 @@ class TileFeed:
         self._made: dict[TileKey, tuple[int, RefinedTile]] = {}
         """Refined tiles that wait to be taken. This and ``_wishes`` need the lock."""
         self._taking = False
+        self._rest_until = 0.0
+        """When the next batch may be taken, by the loop's clock."""
         self._wishes_timer: asyncio.TimerHandle | None = None
 
     def add(self, outbox: Outbox) -> Stream:
@@ -146,10 +150,11 @@ class TileFeed:
             self._made[tile.key] = (clock, tile)
             full = len(self._made) >= min(BATCH_TILES, len(self._wishes))
             first, self._taking = not self._taking, True
-        if full:
+            rest = self._rest_until - self._loop.time()
+        if full and rest <= 0:
             self._submit(self._take)
         elif first:
-            self._call(self._loop.call_later, BATCH_SECONDS, self._submit, self._take)
+            self._call(self._loop.call_later, max(BATCH_SECONDS, rest), self._submit, self._take)
 
     # --- in the tile thread ---------------------------------------------------------------------------------------
 
@@ -176,6 +181,9 @@ class TileFeed:
         """Takes the refined tiles that wait, and says what is wanted then."""
         with self._lock:
             made, self._taking = list(self._made.values()), False
+        if not made:
+            return
+        began = self._loop.time()
         taken = 0
         for clock, tile in made:
             try:
@@ -183,6 +191,9 @@ class TileFeed:
             except Exception:
                 log.exception("the refined tile %s at clock %d was refused", tuple(tile.key), clock)
         self._publish(taken > 0, made)
+        ended = self._loop.time()
+        with self._lock:
+            self._rest_until = ended + (ended - began) * (1 / BATCH_SHARE - 1)
         if taken:
             self._call(self._wake_all)
 

@@ -72,6 +72,7 @@ class Room:
         self._progress = c.Progress(clock=core.head.clock, level=0, of=info.levels, settled=False)
         self._progress_timer: asyncio.TimerHandle | None = None
         self._note = ""
+        self._refining = 0
         self._flushed = asyncio.Event()
         self._flushed.set()
         self.closed = False
@@ -192,7 +193,7 @@ class Room:
                 level=level,
                 of=self.info.levels,
                 settled=settled,
-                refining=self._progress.refining if settled else 0,
+                refining=self._refining if settled else 0,
             )
         )
 
@@ -200,7 +201,8 @@ class Room:
         """``count`` refined tiles are wanted; ``more``: the solver does not know of all of them yet."""
         if more and not self.closed:
             self._worker.nudge(self._solve_client)
-        if count != self._progress.refining and (self._progress.settled or count == 0):
+        self._refining = count
+        if self._progress.settled and count != self._progress.refining:
             self._note_progress(self._progress.model_copy(update={"refining": count}))
 
     def _note_progress(self, progress: c.Progress, delay: float = PROGRESS_TICK) -> None:
