@@ -117,6 +117,31 @@ def test_a_window_is_a_part_of_the_level(device: Device, settings: TerrainSettin
     assert np.array_equal(on_host(packer.pack(level, box)).fields, twin.part(box, level))
 
 
+@pytest.mark.parametrize("level", [2, 7])
+def test_channels_of_a_window(device: Device, level: int) -> None:
+    """SPEC S40, S60: amplitude and roughness, kernel against twin, by windows."""
+    rough = [
+        s.model_copy(update={"amplitude_m": 10.0 + 7 * k, "roughness": 0.2 + 0.15 * k}) for k, s in enumerate(SCENE)
+    ]
+    packer = WindowPacker(rough, SETTINGS)
+    for box in [b for pair in places(level) for b in pair]:
+        tables = packer.pack(level, box)
+        launch, (rows, columns) = Launcher(device, 0), tables.shape
+        pitch = PAD + (box[3] - box[2]) * BIN
+        d, f = launch.zeros(rows * pitch + PAD), launch.zeros(2 * rows * pitch + PAD)
+        raster.rasterise_channels(launch, tables, everything(box), d, f, pitch, rows * pitch)
+        expected = reference_raster.rasterise_channels(tables)
+        for field, twin in ((d, expected[0][None]), (f, expected[1])):
+            host = np.empty(len(twin) * rows * pitch + PAD, dtype=np.float32)
+            launch.cl.enqueue_copy(launch.queue, host, field)
+            found = host[:-PAD].reshape(-1, rows, pitch)[:, :, PAD : PAD + columns]
+            assert np.quantile(np.abs(found - twin), 0.99) < 2e-3
+            assert (np.abs(found - twin) > 0.5).mean() < 1e-2
+    within = expected[0] == 4
+    means = expected[1] / np.maximum(expected[0], 1e-9)
+    assert not within.any() or (means[0][within].min() >= 10 and means[0][within].max() <= 10 + 7 * len(rough))
+
+
 def test_far_strokes_cost_nothing() -> None:
     """Only what lies near a window is packed for it."""
     far = [ridge((100 + 30 * k, 200), (140 + 30 * k, 900), 40, flank(35, 60), f"far{k}") for k in range(40)]

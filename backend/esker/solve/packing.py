@@ -69,8 +69,8 @@ class Shape:
         if sides and self.cliff > 0:
             slope, extent = min(s.slope for s in sides), min(s.extent for s in sides)
             round_part = max(1 + s.shoulder + s.foot for s in sides)
-            cut_at = np.clip(round_part * tops - slope * extent, 0.0, tops)
-            need = np.clip(cut_at * self.cliff / SKIRT_SLOPE - 0.5, 0.0, 1.0)
+            cut_at = np.minimum(np.maximum(round_part * tops - slope * extent, 0.0), tops)
+            need = np.minimum(np.maximum(cut_at * self.cliff / SKIRT_SLOPE - 0.5, 0.0), 1.0)
             skirt = need * need * (3 - 2 * need) * 2 * cut_at / SKIRT_SLOPE
         return wide, skirt
 
@@ -143,12 +143,13 @@ def _pack_profile(shape: Shape, s: float, box: BinBox, low: Ints, high: Ints) ->
     if window is None:
         return None
     corners = np.array([(x, y) for x in (low[0], high[0]) for y in (low[1], high[1])])
-    along = np.clip((corners * s - line.start) @ line.unit, 0.0, line.length)
-    first, last = along.min() - s, along.max() + s
-    j0 = max(0, int(np.searchsorted(line.t, first, side="right")) - 2)
-    j1 = min(len(line.t), int(np.searchsorted(line.t, last)) + 2)
+    along = (corners * s - line.start) @ line.unit
+    first, last = (min(max(float(v), 0.0), line.length) + e for v, e in ((along.min(), -s), (along.max(), s)))
+    j0 = max(0, int(line.t.searchsorted(first, side="right")) - 2)
+    j1 = min(len(line.t), int(line.t.searchsorted(last)) + 2)
     t, z = line.t / s, line.z
-    slope = np.append(np.diff(z) / np.diff(t), 0.0)
+    slope = np.zeros(len(t))
+    slope[:-1] = (z[1:] - z[:-1]) / (t[1:] - t[:-1])
     octaves, culled, parts, at = [], [], [], 0
     for o, pieces in enumerate(line.pieces):
         step = line.octave_m * 2**o
@@ -161,7 +162,7 @@ def _pack_profile(shape: Shape, s: float, box: BinBox, low: Ints, high: Ints) ->
     params = _params(shape, s, float(reach.max()))
     for name, value in zip(("ax", "ay", "tx", "ty", "length"), (*line.start / s, *line.unit, t[-1]), strict=True):
         params[STROKE_AT[name]] = value
-    knots = np.stack([t, z, slope])[:, j0:j1]
+    knots = np.array([t, z, slope])[:, j0:j1]
     return Packed(
         params,
         window,
@@ -236,12 +237,13 @@ def window_of(low: Floats, high: Floats, box: BinBox) -> Window | None:
     """The bins of a box that rectangles (2, m) low .. high in cells touch, row by row; None of none."""
     by0, by1, bx0, bx1 = box
     low, high = np.floor(low / BIN), np.ceil(high / BIN)
-    first, last = int(np.clip(low[1].min(), by0, by1)), int(np.clip(high[1].max() + 1, by0, by1))
+    first, last = (min(max(int(v), by0), by1) for v in (low[1].min(), high[1].max() + 1))
     row = np.arange(first, last)[:, None]
     meets = (low[1] <= row) & (row <= high[1])
     left = np.where(meets, low[0], bx1).min(axis=1, initial=bx1)
     right = np.where(meets, high[0] + 1, bx0).max(axis=1, initial=bx0)
-    spans = np.clip(np.column_stack([left, np.maximum(left, right)]), bx0, bx1).astype(np.int32)
+    spans = np.array([left, np.maximum(left, right)]).T
+    spans = np.minimum(np.maximum(spans, bx0), bx1).astype(np.int32)
     return Window(first, spans) if (spans[:, 1] > spans[:, 0]).any() else None
 
 

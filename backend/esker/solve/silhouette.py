@@ -52,20 +52,18 @@ class Silhouette:
     @cached_property
     def blocks(self) -> tuple[Floats, Floats]:
         """Borders (m + 1,) of parts of the crest, metres, and the most (m,) that each can seem high."""
-        count = int(np.clip(math.ceil(self.length / (4 * self.octave_m)), 1, BLOCKS))
-        edges = np.linspace(0.0, self.length, count + 1)
+        count = min(max(math.ceil(self.length / (4 * self.octave_m)), 1), BLOCKS)
+        edges = np.arange(count + 1, dtype=np.float64) * (self.length / count)
         high = np.abs(np.interp(edges, self.t, self.z))
-        tops = np.maximum(high[:-1], high[1:])
-        place = np.clip(np.searchsorted(edges, self.t, side="right") - 1, 0, count - 1)
+        tops: Floats = np.maximum(high[:-1], high[1:])
+        place = np.minimum(edges.searchsorted(self.t, side="right") - 1, count - 1)
         np.maximum.at(tops, place, np.abs(self.z))
         for o, controls in enumerate(self.octaves):
             c = np.abs(controls)
             piece = np.maximum(np.maximum(c[:-3], c[1:-2]), np.maximum(c[2:-1], c[3:]))
             step = self.octave_m * 2**o
-            first, last = np.floor(edges[:-1] / step).astype(int), np.floor(edges[1:] / step).astype(int)
-            last = np.minimum(last, len(piece) - 1)
-            between = np.maximum.reduceat(piece, np.minimum(first, last))
-            tops = np.maximum(tops, np.maximum(between, piece[last]))
+            at = np.minimum((edges / step).astype(int), len(piece) - 1)
+            tops = np.maximum(tops, np.maximum(np.maximum.reduceat(piece, at[:-1]), piece[at[1:]]))
         return edges, tops
 
 
@@ -76,7 +74,7 @@ def silhouette(crest: Crest, size_m: float, farthest_m: float) -> Silhouette:
     axis = points[-1, :2] - start
     length = float(np.hypot(*axis))
     unit = axis / length if length > 0 else np.array([1.0, 0.0])
-    t = np.clip((points[:, :2] - start) @ unit, 0.0, length)
+    t = np.minimum(np.maximum((points[:, :2] - start) @ unit, 0.0), length)
     t[-1] = length
     rising = np.append(np.maximum.accumulate(t)[:-1] < t[1:], True) if len(t) > 1 else np.ones(1, dtype=bool)
     t, z = t[rising], points[rising, 2]
@@ -96,10 +94,10 @@ def _octaves(t: Floats, z: Floats, base: float, count: int) -> list[Floats]:
     level = np.interp((nodes + _WITHIN) * base, t, z).mean(axis=1)
     out = [level[_MARGIN - 1 : len(level) - _MARGIN + 2]]
     while len(out) < count:
-        wide = np.pad(level, 2, mode="edge")
+        wide = np.concatenate([level[:1], level[:1], level, level[-1:], level[-1:]])
         blurred = (wide[:-4] + wide[4:] + 4 * (wide[1:-3] + wide[3:-1]) + 6 * wide[2:-2]) / 16
         last = last // 2 + 1
-        index = np.clip(2 * np.arange(-_MARGIN, last + _MARGIN + 1) + _MARGIN, 0, len(blurred) - 1)
+        index = np.minimum(np.maximum(np.arange(-_MARGIN, 2 * (last + _MARGIN) + _MARGIN + 1, 2), 0), len(blurred) - 1)
         level = blurred[index]
         out.append(level[_MARGIN - 1 : len(level) - _MARGIN + 2])
     return out
