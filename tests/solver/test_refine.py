@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 from esker import grid
 from esker.contract import MAX_REFINED_LEVEL, Stroke, TerrainSettings
 from esker.grid import TileKey
-from esker.solve.constraints import WindowPacker
 from esker.solve.device import Device
-from esker.solve.refine import FieldCache, RefinedTile, Refiner
+from esker.solve.refine import FieldCache, RefinedTile, Refiner, Strokes
 from esker.solve.refine_engine import (
     ClEngine,
     Engine,
@@ -24,6 +23,7 @@ from esker.solve.refine_engine import (
     NumpyEngine,
     Span,
     Step,
+    StrokeWindows,
     step,
     sweep_weights,
 )
@@ -55,9 +55,9 @@ class Counting:
     def __init__(self, engine: Engine) -> None:
         self.engine, self.steps = engine, 0
 
-    def run(self, at: Step, tables: object, parent: Fields) -> Fields:
+    def run(self, at: Step, strokes: StrokeWindows, parent: Fields) -> Fields:
         self.steps += 1
-        return self.engine.run(at, tables, parent)  # type: ignore[arg-type]
+        return self.engine.run(at, strokes, parent)
 
 
 def made(refiner: Refiner, keys: Sequence[TileKey]) -> dict[TileKey, RefinedTile]:
@@ -80,8 +80,7 @@ def computed(engine: Engine, basis: Basis, core: Span) -> Fields:
     at = step(basis.level + 1, core)
     p = at.parent
     ground = np.concatenate([basis.gradient, basis.heights[None]])
-    tables = WindowPacker(basis.strokes, basis.settings).pack(at.level, at.box)
-    return engine.run(at, tables, ground[:, p.r0 : p.r1, p.c0 : p.c1])
+    return engine.run(at, Strokes(basis.strokes, basis.settings), ground[:, p.r0 : p.r1, p.c0 : p.c1])
 
 
 def random_spans(rng: random.Random, n: int) -> Iterator[tuple[Span, Span, Span]]:
@@ -146,6 +145,27 @@ def test_order_cache_and_interleaving_do_not_change_bits(engine: ClEngine, basis
             elif item == "end":
                 runs.remove(run)
     assert bits(found) == expected
+
+
+def test_known_constraints_do_not_change_bits(device: Device, basis: Basis, monkeypatch: pytest.MonkeyPatch) -> None:
+    """SPEC S51: bins from the sheets are those of the rasteriser, whatever was kept, dropped or of other strokes."""
+    keys = [*patch(LOW + 3, 3, 3, 4), TileKey(LOW + 3, 15, 15)]
+    fresh = ClEngine(device)
+    expected = bits(made(Refiner(basis, fresh, FieldCache()), keys))
+    small = ClEngine(device)
+    small.sheets.most = 1
+    assert bits(made(Refiner(basis, small, FieldCache()), keys[::-1])) == expected
+    assert len(small.sheets) == 1
+    with monkeypatch.context() as patched:
+        patched.setattr(Strokes, "tables", None)
+        assert bits(made(Refiner(basis, fresh, FieldCache()), keys)) == expected
+    moved = dataclasses.replace(
+        basis, strokes=(*basis.strokes[1:], ridge((900, 900), (1500, 1400), 150, flank(), "new"))
+    )
+    assert bits(made(Refiner(moved, fresh, FieldCache()), keys)) == bits(
+        made(Refiner(moved, ClEngine(device), FieldCache()), keys)
+    )
+    assert bits(made(Refiner(basis, fresh, FieldCache()), keys)) == expected
 
 
 def test_content_says_what_a_tile_depends_on(engine: ClEngine) -> None:

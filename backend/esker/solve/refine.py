@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from esker import grid
 from esker.contract import MAX_REFINED_LEVEL, TILE_CELLS, TILE_SAMPLES, Stroke, TerrainSettings
 from esker.grid import TileKey
-from esker.solve.constraints import WindowPacker
+from esker.solve.constraints import BinBox, Tables, WindowPacker
 from esker.solve.device import Device, row_kernels
 from esker.solve.refine_engine import CHANNELS, ClEngine, Engine, Fields, NumpyEngine, Span, Step, step
 
@@ -106,13 +106,10 @@ class Refiner:
 
     def __init__(self, basis: Basis, engine: Engine, cache: FieldCache) -> None:
         self.basis, self.cache, self._engine = basis, cache, engine
-        self._packer = WindowPacker(basis.strokes, basis.settings)
         self._ground = np.concatenate([basis.gradient, basis.heights[None]])
         self._digests: dict[TileKey, bytes] = {}
         self._content: dict[TileKey, bytes] = {}
-        self._strokes = _Strokes(self._packer)
-        s = basis.settings
-        self._settings = repr((s.size_m, s.reach_m, s.border, basis.level)).encode()
+        self._strokes = Strokes(basis.strokes, basis.settings)
 
     def content(self, key: TileKey) -> bytes:
         """Digest of all that a tile depends on: the key, the settings, the strokes that reach its windows at any level
@@ -201,8 +198,7 @@ class Refiner:
         x0, y0, x1, y1 = box
         at = step(level, Span(y0 * TILE_CELLS, y1 * TILE_CELLS + 1, x0 * TILE_CELLS, x1 * TILE_CELLS + 1))
         parent = yield from self._parent(at)
-        tables = self._packer.pack(level, at.box)
-        fields = self._engine.run(at, tables, parent)
+        fields = self._engine.run(at, self._strokes, parent)
         out = {}
         for key in _keys(level, box):
             r, c = (key.y - y0) * TILE_CELLS, (key.x - x0) * TILE_CELLS
@@ -234,9 +230,8 @@ class Refiner:
         while level > low + 1:
             level -= 1
             at = step(level, _tile_span(_cover(at.parent, level)))
-        out = blake2b(self._settings, digest_size=_DIGEST)
-        out.update(repr(tuple(key)).encode())
-        out.update(self._strokes.digest(at))
+        out = blake2b(repr((low, tuple(key))).encode(), digest_size=_DIGEST)
+        out.update(self._strokes.digest(at.level, at.box))
         for ground in _keys(low, _cover(at.parent, low)):
             out.update(self._ground_digest(ground))
         return out.digest()
@@ -250,23 +245,40 @@ class Refiner:
         return known
 
 
-class _Strokes:
-    """Digests of the strokes that can reach a window. The coarsest window of a chain holds all finer ones, on the
-    ground, and strokes reach farthest at the coarsest level: so its strokes are those of the chain."""
+class Strokes:
+    """A stroke set as windows see it.
 
-    def __init__(self, packer: WindowPacker) -> None:
-        self._packer = packer
-        self._digests: dict[str, bytes] = {}
+    The coarsest window of a chain holds all finer ones, on the ground, and strokes reach farthest at the coarsest
+    level: so the digest of its strokes is that of the chain's.
+    """
 
-    def digest(self, at: Step) -> bytes:
-        out = blake2b(digest_size=_DIGEST)
-        for stroke in self._packer.reaching(at.level, at.box):
-            known = self._digests.get(stroke.id)
-            if known is None:
-                text = stroke.model_dump_json(exclude=_WITHOUT_EFFECT).encode()
-                known = self._digests[stroke.id] = blake2b(text, digest_size=_DIGEST).digest()
-            out.update(known)
-        return out.digest()
+    def __init__(self, strokes: Sequence[Stroke], settings: TerrainSettings) -> None:
+        self.settings = settings
+        self._packer = WindowPacker(strokes, settings)
+        self._own: dict[str, bytes] = {}
+        self._windows: dict[tuple[int, BinBox], bytes] = {}
+        self._start = repr((settings.size_m, settings.reach_m, settings.border)).encode()
+
+    def tables(self, level: int, box: BinBox) -> Tables:
+        """The rasteriser's tables of a box of bins."""
+        return self._packer.pack(level, box)
+
+    def digest(self, level: int, box: BinBox) -> bytes:
+        """Digest of all that decides the constraints of a box of bins, at this or any finer level."""
+        known = self._windows.get((level, box))
+        if known is None:
+            out = blake2b(self._start, digest_size=_DIGEST)
+            for stroke in self._packer.reaching(level, box):
+                out.update(self._digest(stroke))
+            known = self._windows[level, box] = out.digest()
+        return known
+
+    def _digest(self, stroke: Stroke) -> bytes:
+        known = self._own.get(stroke.id)
+        if known is None:
+            text = stroke.model_dump_json(exclude=_WITHOUT_EFFECT).encode()
+            known = self._own[stroke.id] = blake2b(text, digest_size=_DIGEST).digest()
+        return known
 
 
 def _group(key: TileKey, left: Set[TileKey]) -> Box:

@@ -15,11 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from esker import grid
-from esker.contract import CHEBYSHEV_HIGH
+from esker.contract import CHEBYSHEV_HIGH, TerrainSettings
 from esker.solve import raster, reference, reference_raster
-from esker.solve.constraints import BIN, BinBox, Tables, everything
+from esker.solve.constraints import BIN, BinBox, Tables
 from esker.solve.device import Device
+from esker.solve.faults import guarded
 from esker.solve.levels import PAD, Launcher
+from esker.solve.refine_sheets import Sheets, exchange, missing
 
 GRADIENT_SWEEPS: Final = 16
 HEIGHT_SWEEPS: Final = 64
@@ -115,17 +117,34 @@ def with_ghosts(parent: NDArray[Any], at: Step) -> NDArray[Any]:
     return out
 
 
+class StrokeWindows(Protocol):
+    """The strokes, as far as a step needs them."""
+
+    settings: TerrainSettings
+
+    def tables(self, level: int, box: BinBox) -> Tables:
+        """The rasteriser's tables of a box of bins."""
+
+    def digest(self, level: int, box: BinBox) -> bytes:
+        """Digest of all that decides the constraints of a box of bins."""
+
+
+_MEMORY: Final = {"u": 3, "v": 3, "gd": 1, "gf": 2, "hd": 1, "hf": 1, "q": 2, "rhs": 1}
+"""Fields of a window and their channels."""
+
+
 class Engine(Protocol):
     """Computes one step."""
 
-    def run(self, at: Step, tables: Tables, parent: Fields) -> Fields:
-        """``at.core``'s fields from the parent's on ``at.parent``; tables: of ``at.box``."""
+    def run(self, at: Step, strokes: StrokeWindows, parent: Fields) -> Fields:
+        """``at.core``'s fields from the parent's on ``at.parent``."""
 
 
 class NumpyEngine:
     """The twin in float64, and what serves without OpenCL."""
 
-    def run(self, at: Step, tables: Tables, parent: Fields) -> Fields:
+    def run(self, at: Step, strokes: StrokeWindows, parent: Fields) -> Fields:
+        tables = strokes.tables(at.level, at.box)
         c = reference_raster.rasterise(tables)
         u = prolongation(with_ghosts(parent.astype(np.float64), at), at.window)
         gradient = sweeps(u[:2], c.gradient_f, c.gradient_d[None], tables.screening, GRADIENT_SWEEPS)
@@ -167,6 +186,7 @@ class ClEngine:
         self.device = device
         self.launch = Launcher(device, 0)
         self.weights = {k: self.launch.constant(sweep_weights(k).astype(np.float32)) for k in _counts()}
+        self.sheets = Sheets()
         self.stride = 0
         self.fields: dict[str, Any] = {}
 
@@ -174,33 +194,30 @@ class ClEngine:
         """Memory for windows of ``stride`` floats a channel."""
         if stride > self.stride:
             self.stride = stride
-            for name, channels in (
-                ("u", 3),
-                ("v", 3),
-                ("gd", 1),
-                ("gf", 2),
-                ("hd", 1),
-                ("hf", 1),
-                ("q", 2),
-                ("rhs", 1),
-            ):
+            for name, channels in _MEMORY.items():
                 self.fields[name] = self.launch.zeros(channels * stride + 2 * PAD)
 
-    def run(self, at: Step, tables: Tables, parent: Fields) -> Fields:
+    def run(self, at: Step, strokes: StrokeWindows, parent: Fields) -> Fields:
+        with guarded(self.device):
+            return self._run(at, strokes, parent)
+
+    def _run(self, at: Step, strokes: StrokeWindows, parent: Fields) -> Fields:
         i, f = np.int32, np.float32
+        spacing = grid.spacing(at.level, strokes.settings.size_m)
+        reach = strokes.settings.reach_m
+        screening = 0.0 if reach is None else (spacing / reach) ** 2
         rows, columns = at.window.shape
         pitch = PAD + (at.box[3] - at.box[2]) * BIN + PAD
         self._room(rows * pitch)
         a, stride, run = self.fields, self.stride, self.launch.run
-        target = raster.Target(a["hd"], a["hf"], a["gd"], a["gf"], pitch=pitch, stride=stride)
-        raster.rasterise(self.launch, tables, everything(at.box), target)
+        self._constrain(at, strokes, pitch)
         shape = (i(rows), i(columns), i(pitch), i(stride))
         each = _STRIPS_ROWS
         strips = -(-rows // each)
         host = _padded(with_ghosts(parent, at), rows, columns)
         run(
             "refine_start", (strips, CHANNELS), self.launch.constant(host), i(host.shape[2]),
-            i(host.shape[1] * host.shape[2]), a["gd"], a["hd"], a["hf"], a["u"], a["q"], *shape, f(tables.screening),
+            i(host.shape[1] * host.shape[2]), a["gd"], a["hd"], a["hf"], a["u"], a["q"], *shape, f(screening),
             i(each),
         )  # fmt: skip
         core = at.core
@@ -209,10 +226,31 @@ class ClEngine:
         )
         wide = target_span.grown(HEIGHT_SWEEPS + 1, 1 << 30)
         wide = Span(wide.r0, min(rows, wide.r1), wide.c0, min(columns, wide.c1))
-        self._sweep(2, 0, "gf", "gd", 0, shape, tables.screening, GRADIENT_SWEEPS, wide)
-        run("refine_guide", (strips,), a["u"], a["hd"], a["hf"], a["rhs"], *shape, f(tables.spacing_m), i(each))
-        self._sweep(1, 2, "rhs", "hd", 1, shape, tables.screening, HEIGHT_SWEEPS, target_span)
+        self._sweep(2, 0, "gf", "gd", 0, shape, screening, GRADIENT_SWEEPS, wide)
+        run("refine_guide", (strips,), a["u"], a["hd"], a["hf"], a["rhs"], *shape, f(spacing), i(each))
+        self._sweep(1, 2, "rhs", "hd", 1, shape, screening, HEIGHT_SWEEPS, target_span)
         return self._read(target_span, pitch)
+
+    def _constrain(self, at: Step, strokes: StrokeWindows, pitch: int) -> None:
+        """The constraints of the window: bins that are known from the sheets, the others from the rasteriser."""
+        a, cl, queue = self.fields, self.launch.cl, self.launch.queue
+        parts = self.sheets.parts(at.level, at.box, strokes.digest)
+        fresh = missing(parts, at.box)
+        if fresh.width:
+            target = raster.Target(a["hd"], a["hf"], a["gd"], a["gf"], pitch=pitch, stride=self.stride)
+            raster.rasterise(self.launch, strokes.tables(at.level, at.box), fresh, target)
+        views, maps = [], []
+        (rows, columns), both = at.window.shape, cl.map_flags.READ | cl.map_flags.WRITE
+        for name, channels in (("hd", 1), ("hf", 1), ("gd", 1), ("gf", 2)):
+            host, _ = cl.enqueue_map_buffer(queue, a[name], both, 0, (a[name].size // 4,), np.float32)
+            maps.append(host)
+            for c in range(channels):
+                first = c * self.stride + PAD
+                views.append(host[first : first + rows * pitch].reshape(rows, pitch)[:, :columns])
+        exchange(parts, fresh, at.box, views)
+        for host in maps:
+            host.base.release(queue)
+        self.sheets.trim()
 
     def _sweep(
         self, channels: int, first: int, f: str, d: str, q: int, shape: tuple[Any, ...], screening: float, count: int,
