@@ -319,6 +319,20 @@ def test_the_room_is_bounded_whatever_everybody_wants() -> None:
     assert server.wishes([c.tiles for c in clients]) == ((), 0), "what there is no room for is not asked for"
 
 
+def test_clients_share_what_they_hold() -> None:
+    """Sixty people on one spot cost the samples once."""
+    server, ground = TileServer(SIZE_M, LEVELS, FINEST), Ground([TIP])
+    clients = [Client(server) for _ in range(2)]
+    for client in clients:
+        client.tiles.set_view(LOOK)
+    solve(server, ground, 1, True)
+    settle(server, ground, 1, clients)
+    mine, theirs = ([*c.tiles._refined._held.values()] for c in clients)
+    for a, b in zip(mine, theirs, strict=True):
+        assert a.keys() == b.keys()
+        assert all(a[k].state is b[k].state and a[k].base is b[k].base for k in a)
+
+
 def test_a_client_may_hold_what_the_contract_says() -> None:
     assert TileServer(SIZE_M, 4, 8).refined.client_tiles == MAX_REFINED_TILES
 

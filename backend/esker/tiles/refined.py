@@ -10,6 +10,7 @@ from collections import OrderedDict
 from collections.abc import Set
 from dataclasses import dataclass
 from typing import Final
+from weakref import WeakValueDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +24,8 @@ from esker.tiles.ledger import state_of
 from esker.tiles.plans import TileState
 from esker.tiles.pyramid import Pyramid
 
-ROOM_TILES: Final = 4096
-"""Refined tiles that a room keeps: 70 MB of samples."""
+ROOM_TILES: Final = 2048
+"""Refined tiles that a room keeps: 35 MB of samples."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +89,7 @@ class RefinedTiles:
         """Clock of the settled ground of the present epoch."""
         self._tiles: OrderedDict[TileKey, Refined] = OrderedDict()
         self._known: dict[int, Known] = {}
+        self._bases: WeakValueDictionary[tuple[TileKey, int], TileState] = WeakValueDictionary()
 
     def __len__(self) -> int:
         return len(self._tiles)
@@ -100,6 +102,15 @@ class RefinedTiles:
         """The tile, if it belongs to the settled ground as it is."""
         found = self._tiles.get(key)
         return found if found is not None and self.active and found.epoch == self.epoch else None
+
+    def kept(self, key: TileKey, state: TileState) -> TileState:
+        """The same tile without the level that its samples may be a view of: one copy for all clients."""
+        if state.samples.base is None:
+            return state
+        found = self._bases.get((key, state.version))
+        if found is None:
+            found = self._bases[key, state.version] = TileState(state.version, state.samples.copy())
+        return found
 
     def suspend(self) -> None:
         """The ground moves: nothing is verified until it has settled again."""

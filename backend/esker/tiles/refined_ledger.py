@@ -200,7 +200,7 @@ class RefinedLedger:
             held = self._held[plan.level]
             for tile in plan.tiles:
                 assert tile.parent is not None
-                held[tile.key] = _Held(tile.now, _kept(tile.parent))
+                held[tile.key] = _Held(tile.now, self._refined.kept(tile.key.parent(), tile.parent))
             if plan.kind == FrameKind.LEVEL:
                 self._confirm(plan.level)
         if plan.kind == FrameKind.LEVEL and plan.tiles:
@@ -213,7 +213,7 @@ class RefinedLedger:
         for key, tile in held.items():
             parent = self._held_parent(key)
             if parent.version != tile.base.version:
-                held[key] = _Held(tile.state, _kept(parent))
+                held[key] = _Held(tile.state, self._refined.kept(key.parent(), parent))
 
     def _forget(self, gone: TileKey) -> None:
         """A tile was dropped, and with it all its descendants."""
@@ -230,8 +230,3 @@ def _edge(samples: Ints, dx: int, dy: int) -> Ints:
     rows = {-1: slice(0, 1), 0: slice(None), 1: slice(64, 65)}[dy]
     cols = {-1: slice(0, 1), 0: slice(None), 1: slice(64, 65)}[dx]
     return samples[rows, cols]
-
-
-def _kept(state: TileState) -> TileState:
-    """The state without the level that its samples may be a view of."""
-    return state if state.samples.base is None else TileState(state.version, state.samples.copy())
