@@ -10,13 +10,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
 from esker import contract as c
 from esker import grid
 from esker.grid import TileKey
+from esker.settings import BadSetting, Settings, from_environment
 from esker.tiles.decoder import FrameDecoder
-from tests.sync.harness import LiveServer, Peer, set_op, stroke
+from tests.sync.harness import LiveServer, Peer, PlainSolver, set_op, stroke
 
 SIZE = c.DEFAULT_SIZE_M
 NEAR = c.View(eye=(1800.0, 1900.0, 12.0), target=(1803.0, 1960.0, 4.0), width=400, height=300, tau_px=4.0)
@@ -151,6 +153,32 @@ def test_refined_tiles_come_where_one_looks_and_follow_edits(tmp_path: Path) -> 
         assert len(solver.made) == made, "what one has is there for the other"
         peer.close()
         second.close()
+
+
+def test_the_finest_level_is_a_setting() -> None:
+    assert Settings().refine == c.DEFAULT_REFINED_LEVEL
+    assert from_environment({"ESKER_REFINE": "10", "ESKER_LEVEL": "3"}).refine == 10
+    with pytest.raises(BadSetting, match="refine must lie between 0 and 10"):
+        from_environment({"ESKER_REFINE": "11"})
+
+
+@pytest.mark.parametrize(("level", "refine", "finest"), [(1, 5, 5), (2, 1, 2), (2, 2, 2)])
+def test_nothing_is_refined_below_the_global_levels(tmp_path: Path, level: int, refine: int, finest: int) -> None:
+    with LiveServer(tmp_path, RoofSolver(), level=level, refine=refine) as server:
+        peer = server.join(*server.create())
+        assert (peer.welcome["levels"], peer.welcome["finest"]) == (level, finest)
+        peer.close()
+
+
+def test_a_solver_that_cannot_refine_serves_its_levels(tmp_path: Path) -> None:
+    with LiveServer(tmp_path, PlainSolver(), level=1, refine=5) as server:
+        terrain, secret = server.create()
+        peer, decoder = server.join(terrain, secret), FrameDecoder()
+        peer.say("view", **NEAR.model_dump(mode="json", exclude={"type"}))
+        peer.ops(("c1:1", stroke(height=20.0)))
+        follow(peer, decoder, 1)
+        assert {key.level for key in decoder.held} == {0, 1}
+        peer.close()
 
 
 def test_channels_arrive(tmp_path: Path) -> None:

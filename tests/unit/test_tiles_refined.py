@@ -139,6 +139,17 @@ def test_nothing_is_wanted_while_the_ground_moves() -> None:
     assert not server.put_tile(1, ground.tile(TileKey(LEVELS + 1, 3, 4)))
 
 
+def test_a_preview_that_is_only_noted_ends_nothing() -> None:
+    """The worker holds back coarse previews that the finest follows at once (docs/decisions/0014)."""
+    server, ground, client = at_rest()
+    epoch = server.refined.epoch
+    server.put_level(2, 0, ground.level(0, False), False, show=False)
+    assert (server.refined.active, server.refined.epoch, server.refined.clock) == (True, epoch, 1)
+    assert server.wishes([client.tiles]) == ((), 0), "what was made is still right"
+    server.put_level(2, LEVELS, ground.level(LEVELS, False), False)
+    assert not server.refined.active
+
+
 def test_a_new_crest_on_land_that_was_found_smooth_is_found() -> None:
     """What was learnt of a tile counts only while its ground stays."""
     server, ground = TileServer(SIZE_M, LEVELS, FINEST), Ground([Bump(200.0, 300.0, 400.0, 3.0)])

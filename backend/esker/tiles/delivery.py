@@ -87,10 +87,12 @@ class TileServer:
         """
         if channel != Channel.HEIGHT:
             return self.channels[channel].put(clock, level, heights, settled, show)
-        self.refined.suspend()
+        before = self.pyramid.stamp
         changed = self.pyramid.put(clock, level, heights, settled, show)
-        if self.settled() and self.pyramid.top == self.levels:
-            self.refined.begin(clock)
+        if self.pyramid.stamp != before:
+            self.refined.suspend()
+            if self.pyramid.top == self.levels and self.settled():
+                self.refined.begin(clock)
         return changed
 
     def put_tile(self, clock: int, tile: Made) -> bool:
