@@ -1,4 +1,4 @@
-"""Whose turn it is on the solver, and what is ended for whom (SPEC P57 to P59, P70 to P74; DESIGN 8)."""
+"""Whose turn it is on the solver, and what is ended for whom (SPEC P57 to P59, P70 to P73; DESIGN 8)."""
 
 from __future__ import annotations
 

@@ -1,0 +1,145 @@
+"""Previews that agree over the levels, and that cost what is new (SPEC T3, T34, T35)."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import settings as hypothesis_settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from esker import grid
+from esker.contract import View
+from esker.tiles.codec import SAMPLE_LIMIT, follow
+from esker.tiles.delivery import ClientTiles, TileServer
+from esker.tiles.frame import read_frame
+from esker.tiles.pyramid import COARSE_DEAD_ZONE, DEAD_ZONE, Level, Pyramid, follow_parents
+
+SIZE_M = 1024.0
+LEVELS = 3
+Heights = NDArray[np.float32]
+
+
+def ground(level: int, height: float, wrong: float = 0.0) -> Heights:
+    """A hill on waves; ``wrong``: by how much of its height a coarse level misses the hill."""
+    n = grid.samples(level)
+    y, x = np.mgrid[0:n, 0:n] * (SIZE_M / (n - 1))
+    hill = height * (1 - wrong) * np.exp(-((x - 400) ** 2 + (y - 300) ** 2) / 140**2)
+    return np.asarray(30 * np.sin(x / 60) * np.cos(y / 45) + hill, dtype=np.float32)
+
+
+def level(pyramid: Pyramid, index: int) -> Level:
+    found = pyramid.level(index)
+    assert found is not None
+    return found
+
+
+def solve(pyramid: Pyramid, clock: int, height: float, *, show: bool, settle: bool = False) -> None:
+    for index in range(LEVELS + 1):
+        wrong = 0.05 * (LEVELS - index)
+        pyramid.put(clock, index, ground(index, height, wrong), False, show or index in (0, LEVELS))
+    for index in range(LEVELS + 1) if settle else ():
+        pyramid.put(clock, index, ground(index, height), True)
+
+
+@pytest.fixture
+def settled() -> Pyramid:
+    pyramid = Pyramid(SIZE_M, LEVELS)
+    solve(pyramid, 1, 100.0, show=True, settle=True)
+    return pyramid
+
+
+def test_a_preview_that_is_not_shown_changes_nothing_until_the_finest_brings_its_injection(settled: Pyramid) -> None:
+    before = [level(settled, index) for index in range(LEVELS + 1)]
+    for index in (1, 2):
+        assert settled.put(2, index, ground(index, 130.0, 0.2), False, False) == 0
+        assert level(settled, index) is before[index]
+    settled.put(2, LEVELS, ground(LEVELS, 130.0), False)
+    stamps = [level(settled, index).stamp for index in range(LEVELS + 1)]
+    assert stamps == sorted(stamps), "coarse before fine"
+    for index in range(LEVELS + 1):
+        quantum = grid.quantum(index, SIZE_M)
+        off = np.abs(level(settled, index).samples * quantum - ground(index, 130.0)).max() / quantum
+        assert off <= (DEAD_ZONE if index == LEVELS else COARSE_DEAD_ZONE) + 0.05, "injected, not as solved there"
+        assert level(settled, index).clock == 2
+
+
+def test_a_coarse_preview_that_was_shown_stays_as_it_was_shown(settled: Pyramid) -> None:
+    solve(settled, 2, 130.0, show=True)
+    shown = [level(settled, index).samples.copy() for index in range(LEVELS)]
+    settled.put(2, LEVELS, ground(LEVELS, 130.0), False)
+    for index in range(LEVELS):
+        np.testing.assert_array_equal(level(settled, index).samples, shown[index])
+
+
+def test_agreeing_previews_cost_a_fraction_of_the_bytes() -> None:
+    spent = []
+    for show in (True, False):
+        server = TileServer(SIZE_M, LEVELS)
+        client = ClientTiles(server, rest_level=-1)
+        client.set_view(View(eye=(400, -300, 500), target=(400, 300, 0), tau_px=0.5))
+        solve(server.pyramid, 1, 100.0, show=show, settle=True)
+        _drain(client)
+        total = 0
+        for clock in range(2, 8):
+            solve(server.pyramid, clock, 100.0 + 5 * clock, show=show)
+            total += _drain(client)
+        spent.append(total)
+    assert spent[1] < 0.7 * spent[0]
+
+
+def _drain(client: ClientTiles) -> int:
+    total = 0
+    while (plan := client.plan()) is not None:
+        data = plan.encode()
+        read_frame(data)
+        total += len(data)
+        client.commit(plan)
+    return total
+
+
+def _level(index: int, samples: NDArray[np.int32], stamp: int, old: Level | None = None) -> Level:
+    side = 1 << index
+    versions = np.full((side, side), stamp, dtype=np.uint32)
+    if old is not None:
+        for y in range(side):
+            for x in range(side):
+                place = np.s_[64 * y : 64 * y + 65, 64 * x : 64 * x + 65]
+                if np.array_equal(old.samples[place], samples[place]):
+                    versions[y, x] = old.versions[y, x]
+    return Level(index, samples, versions, stamp, stamp, stamp, False)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(0, 1), st.sampled_from([10, 3000, SAMPLE_LIMIT]))
+@hypothesis_settings(max_examples=25, deadline=None)
+def test_a_level_follows_its_parents_as_every_decoder_does(seed: int, patches: int, scale: int) -> None:
+    rng = np.random.default_rng(seed)
+    samples = rng.integers(-scale, scale, (257, 257), dtype=np.int32, endpoint=True)
+    then = _level(1, rng.integers(-scale, scale, (129, 129), dtype=np.int32, endpoint=True), 1)
+    moved = then.samples.copy()
+    for _ in range(patches + 1):
+        r, c = rng.integers(0, 120, 2)
+        moved[r : r + 9, c : c + 9] = rng.integers(-scale, scale, moved[r : r + 9, c : c + 9].shape)
+    now = _level(1, moved, 2, then)
+    found = follow_parents(samples, then, now)
+    for y in range(4):
+        for x in range(4):
+            place = np.s_[64 * y : 64 * y + 65, 64 * x : 64 * x + 65]
+            above = np.s_[64 * (y // 2) : 64 * (y // 2) + 65, 64 * (x // 2) : 64 * (x // 2) + 65]
+            want = follow(samples[place], then.samples[above], now.samples[above], x, y)
+            np.testing.assert_array_equal(found[place], np.clip(want, -SAMPLE_LIMIT, SAMPLE_LIMIT))
+
+
+def test_errors_of_previews_are_bounded_however_long_one_draws(settled: Pyramid) -> None:
+    for clock in range(2, 20):
+        solve(settled, clock, 100.0 + 3.1 * clock, show=False)
+    for index in range(1, LEVELS + 1):
+        quantum = grid.quantum(index, SIZE_M)
+        want = ground(index, 100.0 + 3.1 * 19) / quantum
+        bound = DEAD_ZONE if index == LEVELS else COARSE_DEAD_ZONE
+        assert np.abs(level(settled, index).samples - want).max() <= bound + 0.05
+    solve(settled, 20, 120.0, show=False, settle=True)
+    for index in range(LEVELS + 1):
+        want = np.rint(ground(index, 120.0) / np.float32(grid.quantum(index, SIZE_M)))
+        np.testing.assert_array_equal(level(settled, index).samples, want)
