@@ -25,7 +25,7 @@ from esker.solve.refine_sheets import Sheets, exchange, missing
 
 GRADIENT_SWEEPS: Final = 16
 HEIGHT_SWEEPS: Final = 64
-"""Both even. docs/decisions/0016-refinement.md says why so many."""
+"""Both even. docs/decisions/0012-refinement.md says why so many."""
 LOWEST: Final = 16.0
 """The sweeps damp errors from this / sweeps^2 of the spectrum's scale upward."""
 HALO: Final = GRADIENT_SWEEPS + 1 + HEIGHT_SWEEPS
