@@ -7,6 +7,7 @@ float32 decides another way than float64 is not an error here; ``tests/solver`` 
 from __future__ import annotations
 
 import gc
+import time
 from typing import Any
 
 import numpy as np
@@ -92,6 +93,7 @@ def measure(
         return float(np.abs(heights - exact.heights).max())
 
     out: dict[str, Any] = {
+        "measured": time.strftime("%Y-%m-%d %H:%M"),
         "strokes": len(document.strokes),
         "relief_m": significant(exact.relief, 4),
         "gradient_factor": round(_exact.factor(w.gradient, c.gradient_d), 3),

@@ -46,9 +46,9 @@ def apart(work: Callable[..., Any], *args: Any) -> Any:
         return pool.submit(work, *args).result()
 
 
-def accuracy(names: tuple[str, ...], finest: int) -> tuple[dict[str, Any], dict[str, Any]]:
+def accuracy(names: tuple[str, ...], level: int) -> tuple[dict[str, Any], dict[str, Any]]:
     """See ``_accuracy.run``."""
-    return _accuracy.run(names, range(min(ACCURACY_FROM, finest), finest + 1), say)
+    return _accuracy.run(names, range(level, level + 1), say)
 
 
 def times(threads: int, finest: int) -> dict[str, Any]:
@@ -107,13 +107,12 @@ def peers(finest: int, threads: dict[str, Any], gib: float, seconds: float) -> d
 def main(argv: list[str]) -> int:
     """``esker bench solve [--json] [--quick] [--part NAME ...] [--finest N] [--scene NAME ...] [-o FILE]``."""
     options = _parser().parse_args(argv)
-    finest: int = options.finest
     parts = options.part or PARTS
     kept = options.output is not None and options.output.exists()
     result: dict[str, Any] = json.loads(options.output.read_text(encoding="utf-8")) if kept else {"runs": {}}
 
     def upto(quick: int) -> int:
-        return min(quick, finest) if options.quick else finest
+        return int(min(quick, options.finest) if options.quick else options.finest)
 
     def put(part: str, figures: Any, started: dict[str, Any]) -> None:
         """Into the result, and to the file at once: a part takes many minutes."""
@@ -126,13 +125,17 @@ def main(argv: list[str]) -> int:
         return _serving.machine() | {"started": time.strftime("%Y-%m-%d %H:%M"), "quick": options.quick}
 
     if "accuracy" in parts:
-        now = started()
-        figures, maps = apart(accuracy, tuple(options.scene or gallery.NAMES), upto(QUICK_ACCURACY))
-        put("accuracy", figures, now)
-        if maps and options.maps:
-            # Errors need a digit, heights need not show steps.
-            halves = {k: v if k.endswith("heights") else v.astype(np.float16) for k, v in maps.items()}
-            np.savez_compressed(options.maps, **halves)
+        now, finest = started(), upto(QUICK_ACCURACY)
+        rows: dict[str, Any] = result.get("accuracy", {})
+        for level in range(min(ACCURACY_FROM, finest), finest + 1):
+            figures, maps = apart(accuracy, tuple(options.scene or gallery.NAMES), level)
+            for name, sizes in figures.items():
+                rows.setdefault(name, {}).update(sizes)
+            put("accuracy", rows, now)
+            if maps and options.maps:
+                # Errors need a digit, heights need not show steps.
+                halves = {k: v if k.endswith("heights") else v.astype(np.float16) for k, v in maps.items()}
+                np.savez_compressed(options.maps, **halves)
     if "threads" in parts or ("peers" in parts and "threads" not in result):
         now = started()
         put("threads", {str(count): apart(times, count, upto(QUICK_TIMES)) for count in (1, 2)}, now)
@@ -147,7 +150,7 @@ def main(argv: list[str]) -> int:
 def _parser() -> argparse.ArgumentParser:
     p = argparse.ArgumentParser(prog="esker bench solve", description=(__doc__ or "").split("\n", 1)[0])
     p.add_argument("--json", action="store_true", help="print the result as indented JSON")
-    keep = "write the result here instead, part by part; parts that are not run are kept from the file"
+    keep = "write the result here instead, as it comes; parts and sizes that are not run are kept from the file"
     p.add_argument("-o", "--output", type=Path, metavar="FILE.json", help=keep)
     p.add_argument("--quick", action="store_true", help="small grids only: about a minute")
     p.add_argument("--part", action="append", choices=PARTS, help="default: all; peers need threads")
