@@ -33,17 +33,20 @@ void coarsen_bottom(field_t d, field_t f, field_t matrix, constant int *tab, int
     }
 }
 
+// i / n for the few thousand samples of a level: a division of integers costs a GPU more than a whole sweep.
+inline int row_of(int i, int n) { return (int)((i + 0.5f) * (1.0f / n)); }
+
 inline float differences_at(local const float *u, int n, int i) {
-    int y = i / n, x = i % n;
-    return sum_of_differences(u[mirrored(y - 1, n) * n + x], u[mirrored(y + 1, n) * n + x], u[y * n + mirrored(x - 1, n)],
-                              u[y * n + mirrored(x + 1, n)], u[i]);
+    int y = row_of(i, n), x = i - y * n;
+    float south = u[y > 0 ? i - n : i + n], north = u[y < n - 1 ? i + n : i - n];
+    return sum_of_differences(south, north, u[x > 0 ? i - 1 : i + 1], u[x < n - 1 ? i + 1 : i - 1], u[i]);
 }
 
 // out = R fine, both dense in local memory.
 inline void restrict_local(local float *out, local const float *fine, int n) {
     int nc = n / 2 + 1;
     for (int i = get_local_id(0); i < nc * nc; i += BOTTOM_ITEMS) {
-        int y = 2 * (i / nc), x = 2 * (i % nc), west = mirrored(x - 1, n), east = mirrored(x + 1, n);
+        int Y = row_of(i, nc), y = 2 * Y, x = 2 * (i - Y * nc), west = mirrored(x - 1, n), east = mirrored(x + 1, n);
         local const float *a = fine + mirrored(y - 1, n) * n, *b = fine + y * n, *c = fine + mirrored(y + 1, n) * n;
         out[i] = restricted(b[x], (a[x] + c[x]) + (b[west] + b[east]), (a[west] + c[east]) + (a[east] + c[west]));
     }
@@ -58,7 +61,7 @@ inline void relax_local(local float *u, local const float *correction, cfield_t 
     for (int o = 0; o < OWNED; o++) {
         int i = lid + o * BOTTOM_ITEMS;
         if (i >= n * n) continue;
-        int y = i / n, x = i % n, east = x & 1;
+        int y = row_of(i, n), x = i - y * n, east = x & 1;
         float dv = d[y * pitch + x];
         f[o] = rhs ? rhs[y * pitch + x] : b[i];
         t[o] = dv + screening;
@@ -89,7 +92,7 @@ inline void residual_down(local float *b, local float *u, cfield_t rhs, cfield_t
     for (int o = 0; o < OWNED; o++) {
         int i = lid + o * BOTTOM_ITEMS;
         if (i >= n * n) continue;
-        int at = (i / n) * pitch + i % n;
+        int y = row_of(i, n), at = y * pitch + i - y * n;
         keep[o] = u[i];
         residual[o] = d[at] < 0.0f ? 0.0f : fma(-(d[at] + screening), u[i], differences_at(u, n, i) + rhs[at]);
     }

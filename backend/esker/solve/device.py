@@ -141,7 +141,10 @@ def _rank(device: Any) -> int:
     import pyopencl as cl
 
     if device.type & cl.device_type.GPU:
-        return 2 if device.host_unified_memory else 0
+        try:
+            return 2 if device.host_unified_memory else 0
+        except cl.Error:  # deprecated since OpenCL 2.0: then the vendor thinks of discrete ones
+            return 0
     return 1 if device.type & cl.device_type.CPU else 3
 
 
