@@ -42,8 +42,8 @@ FORCE_INLINE float16 add_prolonged(float16 base, crow_t c0, crow_t c1) {
     return fma(__builtin_shufflevector(two, four, 0, 8, 1, 9, 2, 10, 3, 11, 4, 12, 5, 13, 6, 14, 7, 15), share, base);
 }
 
-// A row enters at x: what the operator needs; start = guess + P correction, the correction only where not fixed, without
-// guess zero, or fixed; the right-hand side. Returns the start.
+// A row enters at x: what the operator needs; start = guess + P correction, the correction only where not fixed,
+// without guess zero, or fixed; the right-hand side. Returns the start.
 FORCE_INLINE float16 enter16(row_t slot, row_t start, const source_t *in, long x) {
     float16 d = load16(in->d + x), t = d + in->screening, f = load16(in->rhs + x), u = 0.0f, held = f;
     int16 fixed = d < 0.0f;
@@ -88,8 +88,8 @@ FORCE_INLINE carry_t carry(crow_t here, int n) {
 }
 
 // Stage k of row y at x: rhs - A u of what the stage before made, whose rows y - 1 and y are `before` and `here`, and
-// row y + 1 is `north`; kept in `before` when it is not there yet. *c: u itself. `edge`: y may be 0 or n - 1. `end`: x is
-// the eastern border, which whole vectors always leave over.
+// row y + 1 is `north`; kept in `before` when it is not there yet. *c: u itself. `edge`: y may be 0 or n - 1. `end`: x
+// is the eastern border, which whole vectors always leave over.
 FORCE_INLINE float16 stage(float16 *c, carry_t *k, float16 north, row_t before, crow_t here, crow_t slot, long x, int y,
                            int n, const int keep, const int edge, const int end) {
     float16 south = load16(before + x), beyond = south, next = k->c, west, east;
@@ -114,6 +114,8 @@ FORCE_INLINE float16 stage(float16 *c, carry_t *k, float16 north, row_t before, 
 // Rows of one time step, and what its stages carry along them.
 typedef struct {
     row_t s0, s1, s2, s3, s4, s5, start, start1, start2, even, odd, residual, out;
+    crow_t old;   // what `out` is compared with, or null
+    float16 most;  // the largest change yet
     long out_a, out_b;
     carry_t k1, k2, k3, k4, k5;
 } step_t;
@@ -133,21 +135,27 @@ FORCE_INLINE void wave16(step_t *s, int n, const source_t *in, int t, int enteri
     if (x >= s->out_a && x < s->out_b) {
         store16(u, s->out + x);
         prefetch_write(s->out + in->ahead + x);
+        if (s->old) {
+            float16 change = fabs(u - load16(s->old + x));
+            s->most = fmax(s->most, end ? (float16)(change.s0) : change);
+        }
     }
     r = stage(&c, &s->k5, u, s->even + 3 * LANE, s->odd + 3 * LANE, s->s5, x, t - 5, n, 1, edge, end);
     store16(select(r, (float16)(0.0f), load16(s->s5 + T_LANE + x) < 0.0f), s->residual + x);
 }
 
-// One time step of m columns: row t enters, sweep k does row t - k, the residual is that of row t - 5. The last sweep also
-// goes to `out`, columns [out_a, out_b). `edge`: rows 0 or n - 1 may be among these, or no row be left to enter.
-FORCE_INLINE void wave_row(row_t ring, int n, source_t in, row_t out, int t, int entering, long m, int right, long out_a,
-                           long out_b, float4 w, const int edge) {
+// One time step of m columns: row t enters, sweep k does row t - k, the residual is that of row t - 5. The last sweep
+// also goes to `out`, columns [out_a, out_b); returned is its largest difference from `old`, if that is given, or
+// `most`, if that is larger. `edge`: rows 0 or n - 1 may be among these, or no row be left to enter.
+FORCE_INLINE float16 wave_row(row_t ring, int n, source_t in, row_t out, crow_t old, float16 most, int t, int entering,
+                              long m, int right, long out_a, long out_b, float4 w, const int edge) {
     row_t even = SWEPT(t), odd = SWEPT(t - 1);
     step_t s = {SLOT(t), SLOT(t - 1), SLOT(t - 2), SLOT(t - 3), SLOT(t - 4), SLOT(t - 5), START(t), START(t - 1),
-                START(t - 2), even, odd, RESIDUAL(t - 5), out, out_a, out_b, carry(START(t - 1), n), carry(even, n),
-                carry(odd + LANE, n), carry(even + 2 * LANE, n), carry(odd + 3 * LANE, n)};
+                START(t - 2), even, odd, RESIDUAL(t - 5), out, old, most, out_a, out_b, carry(START(t - 1), n),
+                carry(even, n), carry(odd + LANE, n), carry(even + 2 * LANE, n), carry(odd + 3 * LANE, n)};
     for (long x = 0; x < m - right; x += VW) wave16(&s, n, &in, t, entering, x, w, edge, 0);
     if (right) wave16(&s, n, &in, t, entering, m - 1, w, edge, 1);
+    return s.most;
 }
 
 // `count` coarse samples from three rows of the residual's columns from `from` on, and one more at the eastern border.
@@ -171,9 +179,10 @@ FORCE_INLINE void restrict_lanes(row_t out, crow_t a, crow_t b, crow_t c, long f
 }
 
 // Rows [y0, y1), columns [x0, x1) of out = sweeps of (guess + P correction); coarse = R (rhs - A out) if given. guess,
-// correction and coarse may be null.
-FORCE_INLINE void visit_block(crow_t guess, crow_t correction, crow_t rhs, crow_t d, row_t out, row_t coarse, level_t g,
-                              row_t ring, int y0, int y1, int x0, int x1, constant float *weights) {
+// correction and coarse may be null. Returns the largest change from the guess, if `compare` says so, and `most`.
+FORCE_INLINE float16 visit_block(crow_t guess, crow_t correction, crow_t rhs, crow_t d, row_t out, row_t coarse,
+                                 level_t g, row_t ring, int y0, int y1, int x0, int x1, constant float *weights,
+                                 int compare, float16 most) {
     int n = g.n, halo = CHEBYSHEV_SWEEPS + (coarse ? 2 : 0), lo = max(0, y0 - halo), hi = min(n, y1 + halo);
     int xa = max(0, x0 - HALO), xb = min(n, x1 + HALO), m = xb - xa, left = xa == 0, right = xb == n && n > VW;
     int last = y1 - 1 + CHEBYSHEV_SWEEPS + (coarse ? 1 : 0), out_a = x0 - xa;
@@ -187,29 +196,48 @@ FORCE_INLINE void visit_block(crow_t guess, crow_t correction, crow_t rhs, crow_
                        correction ? crow(correction, (t + 1) / 2, g.pitch2) + xa / 2 : 0,
                        AHEAD * g.pitch, AHEAD / 2 * g.pitch2, g.screening};
         row_t o = inside ? row(out, out_y, g.pitch) + xa : 0;
+        crow_t old = inside && compare ? crow(guess, out_y, g.pitch) + xa : 0;
         if (t < CHEBYSHEV_SWEEPS + 2 || t >= n)
-            wave_row(ring, n, in, o, t, t < hi, m, right, out_a, out_b, w, 1);
+            most = wave_row(ring, n, in, o, old, most, t, t < hi, m, right, out_a, out_b, w, 1);
         else
-            wave_row(ring, n, in, o, t, 1, m, right, out_a, out_b, w, 0);
+            most = wave_row(ring, n, in, o, old, most, t, 1, m, right, out_a, out_b, w, 0);
         int y = out_y - 1, centre = (y & 1) ? y - 1 : (y == n - 1 ? y : -1);
         if (coarse && centre >= y0 && centre < y1)
-            restrict_lanes(row(coarse, centre / 2, g.pitch2) + x0 / 2, RESIDUAL(mirror(centre - 1, n)), RESIDUAL(centre),
-                           RESIDUAL(mirror(centre + 1, n)), out_a, (x1 - x0) / 2, left, right);
+            restrict_lanes(row(coarse, centre / 2, g.pitch2) + x0 / 2, RESIDUAL(mirror(centre - 1, n)),
+                           RESIDUAL(centre), RESIDUAL(mirror(centre + 1, n)), out_a, (x1 - x0) / 2, left, right);
     }
+    return most;
+}
+
+inline float largest(float16 v) {
+    float8 a = fmax(v.lo, v.hi);
+    float4 b = fmax(a.lo, a.hi);
+    float2 c = fmax(b.lo, b.hi);
+    return fmax(c.x, c.y);
 }
 
 // Global size (strips, channels); d is shared by the channels. `rows` is even. Blocks of columns one after the other.
+// changes: if given, the largest change from the guess of every work-item.
 kernel void visit(crow_t guess, crow_t correction, crow_t rhs, crow_t d, row_t out, row_t coarse, int n, int pitch,
                   int pitch2, int stride, int stride2, float screening, row_t scratch, int scratch_stride, int rows,
-                  constant float *weights) {
+                  constant float *weights, row_t changes) {
     int s = get_global_id(0), c = get_global_id(1), y0 = s * rows, y1 = min(n, y0 + rows);
     size_t fine = (size_t)c * stride, under = (size_t)c * stride2;
     row_t ring = scratch + (size_t)(c * get_global_size(0) + s) * scratch_stride;
     level_t g = {n, pitch, pitch2, screening};
-    if (y0 >= n) return;
+    float16 most = 0.0f;
     for (int x0 = 0; x0 < n - 1; x0 += BLOCK)
-        visit_block(guess ? guess + fine : 0, correction ? correction + under : 0, rhs + fine, d, out + fine,
-                    coarse ? coarse + under : 0, g, ring, y0, y1, x0, x0 + BLOCK < n - 1 ? x0 + BLOCK : n, weights);
+        most = visit_block(guess ? guess + fine : 0, correction ? correction + under : 0, rhs + fine, d, out + fine,
+                           coarse ? coarse + under : 0, g, ring, y0, y1, x0, x0 + BLOCK < n - 1 ? x0 + BLOCK : n,
+                           weights, changes != 0, most);
+    if (changes) changes[c * get_global_size(0) + s] = largest(most);
+}
+
+// Coarse rows [from, to) of R fine. tmp: scratch for one fine row.
+FORCE_INLINE void restrict_rows(crow_t fine, row_t coarse, int n, int pitch, int pitch2, row_t tmp, int from, int to) {
+    for (int J = from; J < to; J++)
+        restrict_row(row(coarse, J, pitch2), crow(fine, mirror(2 * J - 1, n), pitch), crow(fine, 2 * J, pitch),
+                     crow(fine, mirror(2 * J + 1, n), pitch), tmp, n);
 }
 
 // coarse = R fine. Global size (strips, channels).
@@ -217,30 +245,30 @@ kernel void restriction(crow_t fine, row_t coarse, int n, int pitch, int pitch2,
                         int scratch_stride, int rows) {
     int s = get_global_id(0), c = get_global_id(1), nc = n / 2 + 1;
     row_t tmp = scratch + (size_t)(c * get_global_size(0) + s) * scratch_stride + PAD;
-    fine += (size_t)c * stride;
-    for (int J = s * rows; J < min(nc, (s + 1) * rows); J++)
-        restrict_row(row(coarse + (size_t)c * stride2, J, pitch2), crow(fine, mirror(2 * J - 1, n), pitch),
-                     crow(fine, 2 * J, pitch), crow(fine, mirror(2 * J + 1, n), pitch), tmp, n);
+    restrict_rows(fine + (size_t)c * stride, coarse + (size_t)c * stride2, n, pitch, pitch2, tmp, s * rows,
+                  min(nc, (s + 1) * rows));
 }
 
 // coarse = R (rhs - A u) of a level that fits a lane.
 FORCE_INLINE void restrict_residual(row_t u, crow_t rhs, crow_t d, row_t coarse, level_t g, row_t ring) {
+#define RESIDUAL_OF(y) (ring + (mirror(y, n) & 3) * LANE + PAD)
     int n = g.n;
     for (int y = 0; y < n; y++) ghosts(row(u, y, g.pitch), n);
     for (int y = 0; y < n; y++) {
-        row_t here = row(u, y, g.pitch), r = ring + (y & 3) * LANE;
+        row_t here = row(u, y, g.pitch), r = RESIDUAL_OF(y);
         crow_t f = crow(rhs, y, g.pitch), dr = crow(d, y, g.pitch), south = crow(u, mirror(y - 1, n), g.pitch);
         crow_t north = crow(u, mirror(y + 1, n), g.pitch);
         for (int x = 0; x < n; x += VW) {
             float16 c = load16(here + x), dv = load16(dr + x);
-            float16 across = (load16(here + x - 1) - c) + (load16(here + x + 1) - c);
-            float16 v = fma(-(dv + g.screening), c, across + ((load16(south + x) - c) + load16(f + x))) + (load16(north + x) - c);
+            float16 across = (load16(here + x + 1) - c) - (c - load16(here + x - 1));
+            float16 rest = across + ((load16(south + x) - c) + load16(f + x));
+            float16 v = fma(-(dv + g.screening), c, rest) + (load16(north + x) - c);
             store16(select(v, (float16)(0.0f), dv < 0.0f), r + x);
         }
         int centre = (y & 1) ? y - 1 : (y == n - 1 ? y : -1);
         if (centre >= 0)
-            restrict_row(row(coarse, centre / 2, g.pitch2), ring + (mirror(centre - 1, n) & 3) * LANE, ring + (centre & 3) * LANE, ring + (mirror(centre + 1, n) & 3) * LANE,
-                         ring + 4 * LANE + PAD, n);
+            restrict_row(row(coarse, centre / 2, g.pitch2), RESIDUAL_OF(centre - 1), RESIDUAL_OF(centre),
+                         RESIDUAL_OF(centre + 1), ring + 4 * LANE + PAD, n);
     }
 }
 
@@ -275,8 +303,8 @@ kernel void bottom(crow_t rhs, crow_t d, row_t out, row_t work, constant int *ta
     }
     for (int y = 0; y < g[0].n; y++)
         for (int x = 0; x < g[0].n; x += VW) {
-            float16 held = load16(crow(rhs, y, g[0].pitch) + x);
-            store16(select((float16)(0.0f), held, load16(crow(d, y, g[0].pitch) + x) < 0.0f), row(out, y, g[0].pitch) + x);
+            size_t at = (size_t)y * g[0].pitch + PAD + x;
+            store16(select((float16)(0.0f), load16(rhs + at), load16(d + at) < 0.0f), out + at);
         }
     for (int i = 0; i < cycles; i++) {
         for (int k = 0; k < levels; k++) {
@@ -284,17 +312,14 @@ kernel void bottom(crow_t rhs, crow_t d, row_t out, row_t work, constant int *ta
             if (k == 0)
                 restrict_residual(out, rhs, d, work + o2, g[0], ring);
             else
-                for (int J = 0; J < g[k + 1].n; J++)
-                    restrict_row(row(work + o2, J, g[k].pitch2), crow(work + o, mirror(2 * J - 1, g[k].n), g[k].pitch),
-                                 crow(work + o, 2 * J, g[k].pitch), crow(work + o, mirror(2 * J + 1, g[k].n), g[k].pitch),
-                                 ring + PAD, g[k].n);
+                restrict_rows(work + o, work + o2, g[k].n, g[k].pitch, g[k].pitch2, ring + PAD, 0, g[k + 1].n);
         }
         int o = tab[4 * levels];
         relax_coarsest(out + o, work + o, d + o, g[levels]);
         for (int k = levels - 1; k >= 0; k--) {
             int at = tab[4 * k], under = tab[4 * k + 4];
             visit_block(k ? 0 : out, out + under, k ? work + at : rhs, d + at, out + at, 0, g[k], ring, 0, g[k].n, 0,
-                        g[k].n, weights);
+                        g[k].n, weights, 0, 0.0f);
         }
     }
 }
@@ -309,9 +334,7 @@ kernel void change(crow_t a, crow_t b, row_t out, int n, int pitch, int stride, 
             int x = 0;
             float16 m = 0.0f;
             for (; x + VW <= n; x += VW) m = fmax(m, fabs(load16(p + x) - load16(q + x)));
-            float v[VW];
-            vstore16(m, 0, v);
-            for (int i = 0; i < VW; i++) most = fmax(most, v[i]);
+            most = fmax(most, largest(m));
             for (; x < n; x++) most = fmax(most, fabs(p[x] - q[x]));
         }
     out[s] = most;

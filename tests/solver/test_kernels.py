@@ -199,6 +199,21 @@ def test_change(device: Device) -> None:
     assert s.change("u", "v") == pytest.approx(np.abs(host["u"] - noise(host["u"].shape, 9)).max(), rel=1e-6)
 
 
+@pytest.mark.parametrize("strips", [1, 3])
+@pytest.mark.parametrize("channels", [1, 2])
+def test_a_visit_finds_the_change_on_its_way(device: Device, channels: int, strips: int) -> None:
+    """What a settling visit says of itself is what a pass over both fields says."""
+    s, _ = system(device, 3, channels, Launcher(dataclasses.replace(device, strips=strips), 3))
+    s.change("u", "v")
+    s.visit(3, rhs="f", out="v", guess="u", correction="e", residual=True)
+    s.swap(3)
+    assert s.changed == (s.fields["v", 3], s.fields["u", 3])
+    on_its_way = s.change("v", "u")
+    assert on_its_way == np.abs(s.get("u", 3) - s.get("v", 3)).max() > 0
+    s.put("v", 3, s.get("u", 3))
+    assert s.change("v", "u") == 0
+
+
 def test_restriction_is_the_transpose_of_prolongation() -> None:
     """SPEC S1, in the inner product of the half control volumes of each grid."""
     n, m = 17, 9

@@ -134,6 +134,9 @@ class ClSystem:
     def __init__(self, launcher: Launcher, top: int, channels: int, static: str) -> None:
         self.top, self.channels, self.static = top, channels, static
         self.launch = launcher
+        self.settling = False
+        self.changed: tuple[Any, Any] | None = None
+        self.changes = launcher.zeros(channels * launcher.device.strips)
         self.shapes = {level: shape_of(level) for level in range(top + 1)}
         self.eps = dict.fromkeys(range(top + 1), 0.0)
         names = {"f", "u", "v", static}
@@ -168,16 +171,19 @@ class ClSystem:
     def visit(
         self, level: int, *, rhs: str, out: str, guess: str | None, correction: str | None, residual: bool
     ) -> None:
-        i, fine = np.int32, self.shapes[level]
-        under = self.shapes[level - 1]
+        i, fine, under = np.int32, self.shapes[level], self.shapes[level - 1]
         strips, rows = self.launch.strips(fine.n)
+        before = self.fields[guess, level] if guess else None
+        if level == self.top:
+            self.settling = self.settling and before is not None
+            self.changed = (before, self.fields[out, level]) if self.settling else None
         self.launch.again(
-            "visit", (strips, self.channels), self.fields[guess, level] if guess else None,
-            self.fields[correction, level - 1] if correction else None, self.fields[rhs, level],
-            self.fields["d", level], self.fields[out, level], self.fields["b", level - 1] if residual else None,
-            i(fine.n), i(fine.pitch), i(under.pitch), i(fine.stride), i(under.stride),
-            np.float32(self.eps[level]), self.launch.scratch, i(self.launch.scratch_stride), i(rows),
-            self.launch.weights,
+            "visit", (strips, self.channels), before, self.fields[correction, level - 1] if correction else None,
+            self.fields[rhs, level], self.fields["d", level], self.fields[out, level],
+            self.fields["b", level - 1] if residual else None, i(fine.n), i(fine.pitch), i(under.pitch),
+            i(fine.stride), i(under.stride), np.float32(self.eps[level]), self.launch.scratch,
+            i(self.launch.scratch_stride), i(rows), self.launch.weights,
+            self.changes if level == self.top and self.settling else None,
         )  # fmt: skip
 
     def restrict(self, level: int) -> None:
@@ -201,14 +207,21 @@ class ClSystem:
         self.fields["u", level], self.fields["v", level] = self.fields["v", level], self.fields["u", level]
 
     def change(self, old: str, new: str) -> float:
-        i, shape = np.int32, self.shapes[self.top]
+        """See ``multigrid.System``. Who asks once will ask again: until the next start from a coarser level the visits
+        of the finest one find it on their way; only the first time needs a pass over both fields."""
+        shape = self.shapes[self.top]
         strips, rows = self.launch.strips(shape.n)
-        self.launch.again(
-            "change", (strips,), self.fields[old, self.top], self.fields[new, self.top], self.launch.scratch,
-            i(shape.n), i(shape.pitch), i(shape.stride), i(self.channels), i(rows),
-        )  # fmt: skip
-        out = np.empty(strips, dtype=np.float32)
-        self.launch.cl.enqueue_copy(self.launch.queue, out, self.launch.scratch)
+        pair = (self.fields[old, self.top], self.fields[new, self.top])
+        source, count = self.changes, strips * self.channels
+        if self.changed is None or pair != self.changed:
+            i, source, count = np.int32, self.launch.scratch, strips
+            self.launch.again(
+                "change", (strips,), *pair, source, i(shape.n), i(shape.pitch), i(shape.stride), i(self.channels),
+                i(rows),
+            )  # fmt: skip
+        self.settling = True
+        out = np.empty(count, dtype=np.float32)
+        self.launch.cl.enqueue_copy(self.launch.queue, out, source)
         return float(out.max())
 
     def get(self, name: str, level: int) -> NDArray[np.float32]:
@@ -222,6 +235,7 @@ class ClSystem:
 
     def put(self, name: str, level: int, value: NDArray[Any]) -> None:
         """Set a field from (channels, n, n)."""
+        self.changed = None
         for c, channel in enumerate(value):
             host = np.ascontiguousarray(channel, dtype=np.float32)
             self.launch.cl.enqueue_copy(
