@@ -140,10 +140,10 @@ def test_a_crest_sharpens_as_one_comes_near(visitors: Visitors, server: Server, 
 def test_reach_and_border_move_everybodys_ground(visitors: Visitors, server: Server) -> None:
     """E9: both settings by pointer and by keyboard, seen on the other page, taken back by undo."""
     ada, ben, _, _ = two_people(visitors, server, width=640, height=480)
-    draw(ada, "b", arch(on_screen(ada, 250, 300), on_screen(ada, 1500, 250), 90))
+    draw(ada, "b", arch(on_screen(ada, 1500, 350), on_screen(ada, 2700, 300), 90))
     wait_settled(ada, ben)
     # On the border below the ridge, and well beyond the ridge's flanks.
-    edge, beyond = (832.0, 0.0), (832.0, 1664.0)
+    edge, beyond = (2112.0, 0.0), (2112.0, 1664.0)
     free = heights(ben, [edge, beyond])
     assert free[0] > 5
     ada.page.keyboard.press("v")
