@@ -27,6 +27,9 @@ SOURCES = ("rows.cl", "section.cl", "raster.cl", "setup.cl", "visit.cl", "refine
 Kernels = Literal["rows", "tiles"]
 _KERNELS = "ESKER_KERNELS"
 _ROWS_TOO = ", rows too"
+_INLINE = "#undef inline\n#define inline static inline\n"
+"""C looks for inline functions elsewhere when a compiler does not inline them, and some drivers then fail to link. PoCL
+has a macro of its own for that."""
 _POCL_THREADS = "POCL_MAX_PTHREAD_COUNT"
 _POCL_CACHE = "POCL_KERNEL_CACHE"
 _POCL_FOLDER = "POCL_CACHE_DIR"
@@ -185,8 +188,8 @@ def _files() -> dict[str, str]:
 
 def _source(plan: gpu_program.Plan | None) -> str:
     if plan is not None:
-        return _defines(gpu_program.defines(plan)) + gpu_program.source(plan, _files())
-    return _defines({}) + "\n".join(_files()[name] for name in SOURCES)
+        return _INLINE + _defines(gpu_program.defines(plan)) + gpu_program.source(plan, _files())
+    return _INLINE + _defines({}) + "\n".join(_files()[name] for name in SOURCES)
 
 
 def _literal(value: float | int) -> str:

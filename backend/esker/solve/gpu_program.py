@@ -111,16 +111,15 @@ def defines(of: Plan) -> dict[str, float | int]:
     }
 
 
-HEAD = "#define SECTION_SCALAR\n#define inline static inline"
-"""Cross-sections of one sample; and functions of this program alone: C's inline ones, where a driver does not inline
-them, are looked for elsewhere."""
+SCALAR = "#define SECTION_SCALAR"
+"""Cross-sections of one sample, not of sixteen."""
 SOURCES = ("gpu_level.cl", "gpu_setup.cl", "gpu_bottom.cl", "section.cl", "gpu_raster.cl")
 VISIT = "gpu_visit.cl"
 
 
 def source(of: Plan, files: dict[str, str]) -> str:
     """The program's text from the files' texts; the visit comes once per tile and number of channels."""
-    parts = [HEAD, *(files[name] for name in SOURCES)]
+    parts = [SCALAR, *(files[name] for name in SOURCES)]
     for channels in CHANNELS:
         for tile in dict.fromkeys((of.wide[channels - 1], of.small)):
             values = {
