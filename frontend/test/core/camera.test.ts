@@ -267,6 +267,22 @@ describe("modes and flights", () => {
     }
   });
 
+  it("comes as near to the ground of the largest terrain as to that of a small one", () => {
+    const c = new Camera(65536);
+    c.resize(1000, 800);
+    c.goTo([30000, 30000, 1], [30000, 30003, 0], 0);
+    settle(c);
+    const { eye, target, near } = c.state.value;
+    expect(distance(eye, target)).toBeLessThan(4);
+    expect(eye[2]).toBeLessThan(2);
+    expect(near).toBe(0.1);
+    const small = new Camera(64);
+    small.resize(1000, 800);
+    small.zoom(1e6);
+    expect(distance(small.state.value.eye, small.state.value.target)).toBeLessThan(0.2);
+    expect(small.state.value.near).toBeLessThan(0.05);
+  });
+
   it("the near plane follows the height above the ground", () => {
     const c = camera("fly");
     c.goTo([2048, 100, 5], [2048, 3000, 5], 0);

@@ -163,4 +163,26 @@ describe("atlas", { timeout: 60_000 }, () => {
     atlas.refresh(view);
     expect([...atlas.residents()].some((r) => r.level === 1 && r.x === 1 && r.y === 0)).toBe(false);
   });
+
+  it("R25: ground that changed has moved; tiles that come or go have moved nothing", () => {
+    const have = new Set(["0/0/0", "1/0/0"]);
+    const view = new FieldView(
+      4096,
+      1,
+      () => 0,
+      (l, x, y) => have.has(`${l}/${x}/${y}`),
+    );
+    const { device } = recorder();
+    const atlas = new Atlas(device, 1, () => {});
+    atlas.refresh(view);
+    expect(atlas.groundMoved).toBe(false);
+    view.drop(1, 0, 0);
+    atlas.refresh(view);
+    expect(atlas.groundMoved).toBe(false);
+    view.change((x) => x);
+    atlas.refresh(view);
+    expect(atlas.groundMoved).toBe(true);
+    atlas.refresh(view);
+    expect(atlas.groundMoved).toBe(false);
+  });
 });

@@ -1,7 +1,8 @@
-// SPEC U4, U5, U10, U13
+// SPEC U4, U5, U10, U13, U18, U20
 // @vitest-environment happy-dom
 import { type Signal, signal } from "@preact/signals-core";
 import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
+import type { DecodedFrame } from "../../src/core/types.ts";
 import type { ClientMessage, Hello, Role, ServerMessage, Stroke, Welcome } from "../../src/generated/contract.ts";
 
 /** Stands for the websocket: the test plays the server. */
@@ -11,7 +12,7 @@ class FakeConnection {
   readonly reason: Signal<string | null> = signal(null);
   readonly rttMs = signal(null);
   readonly sent: ClientMessage[] = [];
-  readonly options: { hello(): Hello; onMessage(m: ServerMessage): void };
+  readonly options: { hello(): Hello; onMessage(m: ServerMessage): void; onFrame(f: DecodedFrame): void };
   reconnects = 0;
 
   constructor(options: FakeConnection["options"]) {
@@ -47,7 +48,10 @@ class FakeStage {
     FakeStage.restarts++;
   }
   followed(): void {}
-  apply(): void {}
+  static agrees = true;
+  apply(): boolean {
+    return FakeStage.agrees;
+  }
   dispose(): void {}
 }
 
@@ -271,5 +275,29 @@ describe("a session", () => {
     expect(window.location.hash).toBe("#fresh%2Fsecret");
     expect(window.location.search).toBe("");
     expect(recentTerrains(localStorage)).toMatchObject([{ secret: "fresh/secret", role: "owner" }]);
+  });
+
+  it("keeps what the server says about its solver until it is read, and says each thing once (U18)", () => {
+    say(welcome());
+    const progress = { type: "progress", clock: 3, level: 4, of: 4, settled: true, refining: 0 } as const;
+    say({ ...progress, note: "The graphics device is gone. Solving on the processor." });
+    say({ ...progress, note: "" });
+    expect(session.notice.value).toBe("The graphics device is gone. Solving on the processor.");
+    session.dismissNotice();
+    say({ ...progress, note: "The graphics device is gone. Solving on the processor." });
+    expect(session.notice.value).toBeNull();
+    say({ ...progress, note: "Too little memory for level 4. Solving to level 3." });
+    expect(session.notice.value).toBe("Too little memory for level 4. Solving to level 3.");
+  });
+
+  it("connects anew when it holds more tiles than the server can have sent (U20)", () => {
+    say(welcome());
+    const frame = { kind: 1, level: 9, channel: 0, clock: 3, settled: true, drops: [], tiles: [], bytes: 1 };
+    FakeStage.agrees = true;
+    server().options.onFrame(frame);
+    expect(server().reconnects).toBe(0);
+    FakeStage.agrees = false;
+    server().options.onFrame(frame);
+    expect(server().reconnects).toBe(1);
   });
 });
