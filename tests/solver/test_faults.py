@@ -170,6 +170,26 @@ def test_idle_workspaces_make_room(used: Solver, monkeypatch: pytest.MonkeyPatch
     assert [w.top for w in used._spare] == [1]
 
 
+def test_out_of_memory_in_the_middle_of_a_solve(used: Solver, monkeypatch: pytest.MonkeyPatch) -> None:
+    """SPEC S26: many drivers allocate when a kernel first touches a buffer. Tried again while there is what to drop."""
+    expected = heights(used)
+    run = used.steps(STROKES, SETTINGS, 1)
+    next(run)  # keeps a workspace of its own, so that there is an idle one beside that of the solve that fails
+    with monkeypatch.context() as patch:
+        failing = Failing(cl.enqueue_nd_range_kernel, NO_MEMORY, after=10, times=1)
+        patch.setattr(cl, "enqueue_nd_range_kernel", failing)
+        for _ in run:
+            pass
+        assert failing.calls > 30
+    assert [w.top for w in used._spare] == [1]
+    with monkeypatch.context() as patch:
+        used._spare.clear()
+        patch.setattr(cl, "enqueue_nd_range_kernel", Failing(cl.enqueue_nd_range_kernel, NO_MEMORY, after=30))
+        with pytest.raises(OutOfDeviceMemoryError):
+            heights(used)
+    assert np.array_equal(heights(used), expected)
+
+
 def test_out_of_memory_without_anything_to_drop(used: Solver, monkeypatch: pytest.MonkeyPatch) -> None:
     used._spare.clear()
     with monkeypatch.context() as patch:
