@@ -157,7 +157,7 @@ def test_known_constraints_do_not_change_bits(device: Device, basis: Basis, monk
     assert bits(made(Refiner(basis, small, FieldCache()), keys[::-1])) == expected
     assert len(small.sheets) == 1
     with monkeypatch.context() as patched:
-        patched.setattr(Strokes, "tables", None)
+        patched.setattr(Strokes, "shared_tables", None)
         assert bits(made(Refiner(basis, fresh, FieldCache()), keys)) == expected
     moved = dataclasses.replace(
         basis, strokes=(*basis.strokes[1:], ridge((900, 900), (1500, 1400), 150, flank(), "new"))
@@ -166,6 +166,15 @@ def test_known_constraints_do_not_change_bits(device: Device, basis: Basis, monk
         made(Refiner(moved, ClEngine(device), FieldCache()), keys)
     )
     assert bits(made(Refiner(basis, fresh, FieldCache()), keys)) == expected
+
+
+def test_tables_of_a_larger_box_serve(device: Device, solver: Solver, monkeypatch: pytest.MonkeyPatch) -> None:
+    """SPEC S51: with outlines, whose insides are listed by row, at every place in the larger box."""
+    start = settled(solver, [*SCENES["loops"], *SCENES["five"]], SETTINGS, LOW)
+    keys = [*patch(LOW + 4, 9, 10, 4), *patch(LOW + 4, 14, 13, 3), TileKey(LOW + 4, 31, 0)]
+    shared = bits(made(Refiner(start, ClEngine(device), FieldCache()), keys))
+    monkeypatch.setattr(Strokes, "shared_tables", Strokes.tables)
+    assert bits(made(Refiner(start, ClEngine(device), FieldCache()), keys)) == shared
 
 
 def test_content_says_what_a_tile_depends_on(engine: ClEngine) -> None:

@@ -235,6 +235,14 @@ def settle_view(scene: str, depth: int, low: int, least: int) -> dict[str, Any]:
     }
 
 
+def whole(scene: str, level: int) -> float:
+    """Milliseconds from nothing until a level is settled that is solved as a whole: the smaller world's alternative."""
+    document, solver = gallery.load(scene), Solver()
+    start = time.perf_counter()
+    settle(solver, document.strokes, document.settings, level)
+    return round(1e3 * (time.perf_counter() - start), 1)
+
+
 def views(scene: str, low: int, runs: int) -> dict[str, Any]:
     """``settle_view`` of both worlds, the quickest run of each, and their ratio."""
     out: dict[str, Any] = {}
@@ -245,6 +253,7 @@ def views(scene: str, low: int, runs: int) -> dict[str, Any]:
     for depth in DEPTHS:
         ordered = sorted(found[depth], key=lambda row: row["total_ms"])
         out[str(grid.samples(depth))] = ordered[0]
+    out["whole_ms"] = whole(scene, DEPTHS[0])
     for name, of in (("ratio", "total_ms"), ("cpu_ratio", "cpu_ms")):
         small, large = (out[str(grid.samples(depth))][of] for depth in DEPTHS)
         out[name] = round(large / small, 2)

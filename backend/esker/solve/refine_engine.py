@@ -125,6 +125,9 @@ class StrokeWindows(Protocol):
     def tables(self, level: int, box: BinBox) -> Tables:
         """The rasteriser's tables of a box of bins."""
 
+    def shared_tables(self, level: int, box: BinBox) -> Tables:
+        """The same for kernels: lists may name strokes that do not reach the box."""
+
     def digest(self, level: int, box: BinBox) -> bytes:
         """Digest of all that decides the constraints of a box of bins."""
 
@@ -238,7 +241,7 @@ class ClEngine:
         fresh = missing(parts, at.box)
         if fresh.width:
             target = raster.Target(a["hd"], a["hf"], a["gd"], a["gf"], pitch=pitch, stride=self.stride)
-            raster.rasterise(self.launch, strokes.tables(at.level, at.box), fresh, target)
+            raster.rasterise(self.launch, strokes.shared_tables(at.level, at.box), fresh, target)
         views, maps = [], []
         (rows, columns), both = at.window.shape, cl.map_flags.READ | cl.map_flags.WRITE
         for name, channels in (("hd", 1), ("hf", 1), ("gd", 1), ("gf", 2)):
