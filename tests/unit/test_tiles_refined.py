@@ -451,3 +451,18 @@ def test_a_pyramid_knows_where_its_ground_last_changed() -> None:
     h[10, 10] = 5
     pyramid.put(2, 2, h, True)
     assert (pyramid.changes() > first).tolist() == [[y == x == 0 for x in range(4)] for y in range(4)]
+
+
+def test_a_channel_follows_its_parents_without_doubling() -> None:
+    """A preview within the dead zone of what every decoder shows by itself costs nothing (SPEC T34)."""
+    server = TileServer(SIZE_M, 3)
+    amplitude = server.channels[Channel.AMPLITUDE]
+    for clock, (coarse, fine) in enumerate(((0.0, 0.0), (40.0, 41.4)), start=1):
+        for level, quanta in ((0, coarse), (1, fine)):
+            n = grid.samples(level)
+            server.put_level(
+                clock, level, np.full((n, n), quanta / 64, dtype=np.float32), clock == 1, amplitude.channel
+            )
+    found = amplitude.level(1)
+    assert found is not None
+    assert np.unique(found.samples).tolist() == [40]

@@ -6,7 +6,7 @@ subtracted, so untouched ground is all zeros. Its levels end ``CHANNEL_LEVELS_BE
 
 from __future__ import annotations
 
-from typing import Final
+from typing import ClassVar, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +43,8 @@ def values(samples: Ints, channel: Channel) -> NDArray[np.float32]:
 
 class ChannelPyramid(Pyramid):
     """The newest levels of one channel; samples are ``(value - base) * quanta``, rounded half to even."""
+
+    ratio: ClassVar[int] = 1
 
     def __init__(self, channel: Channel, levels: int) -> None:
         super().__init__(UNIT_SIZE_M, channel_levels(levels))

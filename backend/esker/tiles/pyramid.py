@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import ClassVar, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,7 +78,7 @@ def quantise(
     return out
 
 
-def follow_parents(samples: Ints, then: Level | None, now: Level | None) -> Ints:
+def follow_parents(samples: Ints, then: Level | None, now: Level | None, ratio: int = 2) -> Ints:
     """A level moved along with its parent, as every client's decoder moves it (``codec.follow``); no new array if not.
 
     ``samples``: (N_l, N_l); ``then`` and ``now``: the level above when the samples were put, and at present. Each
@@ -95,7 +95,7 @@ def follow_parents(samples: Ints, then: Level | None, now: Level | None) -> Ints
         place = np.s_[TILE_CELLS * y : TILE_CELLS * (y + 1) + 1, TILE_CELLS * x : TILE_CELLS * (x + 1) + 1]
         if np.array_equal(now.samples[place], then.samples[place]):
             continue
-        change = predict(now.samples[place]) - predict(then.samples[place])
+        change = predict(now.samples[place], ratio) - predict(then.samples[place], ratio)
         under = np.s_[
             2 * TILE_CELLS * y : 2 * TILE_CELLS * (y + 1) + 1, 2 * TILE_CELLS * x : 2 * TILE_CELLS * (x + 1) + 1
         ]
@@ -111,6 +111,9 @@ def _depth(level: int) -> int:
 
 class Pyramid:
     """The newest quantised levels of one terrain. Mutable; owned by ``delivery.TileServer``."""
+
+    ratio: ClassVar[int] = 2
+    """Quanta of a level in one of the next coarser level (see ``codec.predict``)."""
 
     def __init__(self, size_m: float, levels: int) -> None:
         self.size_m = size_m
@@ -191,7 +194,7 @@ class Pyramid:
         parent = self._levels[level - 1] if level else None
         kept = None
         if old is not None and not settled:
-            kept = follow_parents(old.samples, self._parents[level], parent)
+            kept = follow_parents(old.samples, self._parents[level], parent, self.ratio)
         self._parents[level] = parent
         samples = quantise(heights, level, self.size_m, kept, DEAD_ZONE if level == self.top else COARSE_DEAD_ZONE)
         stamp = self.stamp + 1
