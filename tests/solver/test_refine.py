@@ -15,7 +15,7 @@ from esker import grid
 from esker.contract import MAX_REFINED_LEVEL, Stroke, TerrainSettings
 from esker.grid import TileKey
 from esker.solve.device import Device
-from esker.solve.refine import FieldCache, RefinedTile, Refiner, Strokes
+from esker.solve.refine import FieldCache, RefinedTile, Refiner
 from esker.solve.refine_engine import (
     ClEngine,
     Engine,
@@ -27,6 +27,7 @@ from esker.solve.refine_engine import (
     step,
     sweep_weights,
 )
+from esker.solve.refine_strokes import Strokes
 from esker.solve.solver import Basis, Solver
 from tests.solver.scenes import PINNED, SCENES, SETTINGS, flank, ridge
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import itertools
 from collections import OrderedDict
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence, Set
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from hashlib import blake2b
 from typing import Final, Protocol
 
@@ -20,23 +20,15 @@ from numpy.typing import NDArray
 from esker import grid
 from esker.contract import MAX_REFINED_LEVEL, TILE_CELLS, TILE_SAMPLES, Stroke, TerrainSettings
 from esker.grid import TileKey
-from esker.solve.constraints import BIN, BinBox, Tables, WindowPacker, bins
 from esker.solve.device import Device, row_kernels
 from esker.solve.refine_engine import CHANNELS, ClEngine, Engine, Fields, NumpyEngine, Span, Step, step
-from esker.solve.tables import INDEX_FIELDS
+from esker.solve.refine_strokes import DIGEST_BYTES, Strokes
 
 GROUP: Final = 4
 """Tiles along a side of what one step computes at most: more, and a step takes too long to be left; fewer, and the
 halo costs more than the tiles."""
 CACHE_BYTES: Final = 64 << 20
 TILE_BYTES: Final = 4 * CHANNELS * TILE_SAMPLES**2
-PACK_AROUND: Final = 24
-"""Bins around a window that are packed with it."""
-PACKED: Final = 12
-"""Tables kept by a refiner."""
-_DIGEST: Final = 16
-_WITHOUT_EFFECT: Final = {"author", "label", "locked", "finished", "amplitude_m", "roughness"}
-"""Fields of a stroke that do not change heights."""
 
 Box = tuple[int, int, int, int]
 """Tiles x0 .. x1 - 1, y0 .. y1 - 1 as (x0, y0, x1, y1)."""
@@ -235,7 +227,7 @@ class Refiner:
         while level > low + 1:
             level -= 1
             at = step(level, _tile_span(_cover(at.parent, level)))
-        out = blake2b(repr((low, tuple(key))).encode(), digest_size=_DIGEST)
+        out = blake2b(repr((low, tuple(key))).encode(), digest_size=DIGEST_BYTES)
         out.update(self._strokes.digest(at.level, at.box))
         for ground in _keys(low, _cover(at.parent, low)):
             out.update(self._ground_digest(ground))
@@ -246,69 +238,8 @@ class Refiner:
         if known is None:
             s = _span(key)
             part = np.ascontiguousarray(self._ground[:, s.r0 : s.r1, s.c0 : s.c1])
-            known = self._digests[key] = blake2b(part.tobytes(), digest_size=_DIGEST).digest()
+            known = self._digests[key] = blake2b(part.tobytes(), digest_size=DIGEST_BYTES).digest()
         return known
-
-
-class Strokes:
-    """A stroke set as windows see it.
-
-    The coarsest window of a chain holds all finer ones, on the ground, and strokes reach farthest at the coarsest
-    level: so the digest of its strokes is that of the chain's.
-    """
-
-    def __init__(self, strokes: Sequence[Stroke], settings: TerrainSettings) -> None:
-        self.settings = settings
-        self._packer = WindowPacker(strokes, settings)
-        self._own: dict[str, bytes] = {}
-        self._windows: dict[tuple[int, BinBox], bytes] = {}
-        self._packed: list[Tables] = []
-        self._start = repr((settings.size_m, settings.reach_m, settings.border)).encode()
-
-    def tables(self, level: int, box: BinBox) -> Tables:
-        """The rasteriser's tables of a box of bins."""
-        return self._packer.pack(level, box)
-
-    def shared_tables(self, level: int, box: BinBox) -> Tables:
-        """Tables that serve for a box of bins, cut from those of a larger one around it: most of the time of packing
-        goes to strokes, not to bins, and the next windows are near. Their lists may name strokes beside the box."""
-        held = [t for t in self._packed if t.level == level and _holds(t.box, box)]
-        if not held:
-            count, more = bins(grid.samples(level)), PACK_AROUND
-            by0, by1, bx0, bx1 = box
-            around = max(0, by0 - more), min(count, by1 + more), max(0, bx0 - more), min(count, bx1 + more)
-            held = [self._packer.pack(level, around)]
-            self._packed = [*held, *self._packed[: PACKED - 1]]
-        return rows_of(held[0], box)
-
-    def digest(self, level: int, box: BinBox) -> bytes:
-        """Digest of all that decides the constraints of a box of bins, at this or any finer level."""
-        known = self._windows.get((level, box))
-        if known is None:
-            out = blake2b(self._start, digest_size=_DIGEST)
-            for stroke in self._packer.reaching(level, box):
-                out.update(self._digest(stroke))
-            known = self._windows[level, box] = out.digest()
-        return known
-
-    def _digest(self, stroke: Stroke) -> bytes:
-        known = self._own.get(stroke.id)
-        if known is None:
-            text = stroke.model_dump_json(exclude=_WITHOUT_EFFECT).encode()
-            known = self._own[stroke.id] = blake2b(text, digest_size=_DIGEST).digest()
-        return known
-
-
-def _holds(outer: BinBox, inner: BinBox) -> bool:
-    return outer[0] <= inner[0] and inner[1] <= outer[1] and outer[2] <= inner[2] and inner[3] <= outer[3]
-
-
-def rows_of(tables: Tables, box: BinBox) -> Tables:
-    """The tables of a larger box as the rasteriser's kernel reads them for a box within it."""
-    down, rows = box[0] - tables.box[0], box[1] - box[0]
-    index, at = tables.index.copy(), INDEX_FIELDS.index("spans")
-    index[:, at] = np.where(index[:, at] < 0, -1, index[:, at] + down * BIN)
-    return replace(tables, box=box, index=index, row_start=tables.row_start[down : down + rows + 1])
 
 
 def _group(key: TileKey, left: Set[TileKey]) -> Box:
