@@ -346,6 +346,15 @@ def test_order_and_kernels(monkeypatch: pytest.MonkeyPatch) -> None:
         Solver()
 
 
+def test_a_broken_platform_hides_no_other(monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:
+    """SPEC S23: a driver without its hardware, say."""
+    broken, other = Platform(), Platform(Fake("cpu", cl.device_type.CPU, True))
+    monkeypatch.setattr(broken, "get_devices", Failing(list, -9999))
+    monkeypatch.setattr(cl, "get_platforms", lambda: [broken, other])
+    assert candidates()[0].startswith("Vendor cpu")
+    assert "lists no devices" in caplog.text
+
+
 def test_every_candidate_opens_itself() -> None:
     for name in candidates():
         found = open_device(name)

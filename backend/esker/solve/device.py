@@ -133,7 +133,12 @@ def _devices() -> list[tuple[str, Any]]:
     """(name, device), best first (``_rank``)."""
     import pyopencl as cl
 
-    pairs = [(p, d) for p in cl.get_platforms() for d in p.get_devices()]
+    pairs: list[tuple[Any, Any]] = []
+    for platform in cl.get_platforms():
+        try:
+            pairs += [(platform, d) for d in platform.get_devices()]
+        except cl.Error as error:
+            log.warning("OpenCL platform %s lists no devices: %s", platform.name.strip(), error)
     if not pairs:
         raise RuntimeError("no platform has a device")
     return [(_describe(p, d), d) for p, d in sorted(pairs, key=lambda pair: _rank(pair[1]))]
