@@ -142,9 +142,10 @@ def _pack_profile(shape: Shape, s: float, box: BinBox, low: Ints, high: Ints) ->
     window = window_of(np.minimum(a, b) - reach, np.maximum(a, b) + reach, box)
     if window is None:
         return None
-    corners = np.array([(x, y) for x in (low[0], high[0]) for y in (low[1], high[1])])
-    along = (corners * s - line.start) @ line.unit
-    first, last = (min(max(float(v), 0.0), line.length) + e for v, e in ((along.min(), -s), (along.max(), s)))
+    ux, uy = line.unit.tolist()
+    x0, y0, x1, y1 = (float(v) * s - o for v, o in zip((*low, *high), (*line.start, *line.start), strict=True))
+    least, most = min(ux * x0, ux * x1) + min(uy * y0, uy * y1), max(ux * x0, ux * x1) + max(uy * y0, uy * y1)
+    first, last = (min(max(v, 0.0), line.length) + e for v, e in ((least, -s), (most, s)))
     j0 = max(0, int(line.t.searchsorted(first, side="right")) - 2)
     j1 = min(len(line.t), int(line.t.searchsorted(last)) + 2)
     t, z = line.t / s, line.z
@@ -160,8 +161,8 @@ def _pack_profile(shape: Shape, s: float, box: BinBox, low: Ints, high: Ints) ->
         parts.append(part)
         at += len(part)
     params = _params(shape, s, float(reach.max()))
-    for name, value in zip(("ax", "ay", "tx", "ty", "length"), (*line.start / s, *line.unit, t[-1]), strict=True):
-        params[STROKE_AT[name]] = value
+    at_crest = STROKE_AT["ax"]
+    params[at_crest : at_crest + 5] = (*line.start / s, *line.unit, t[-1])
     knots = np.array([t, z, slope])[:, j0:j1]
     return Packed(
         params,
@@ -238,10 +239,10 @@ def window_of(low: Floats, high: Floats, box: BinBox) -> Window | None:
     by0, by1, bx0, bx1 = box
     low, high = np.floor(low / BIN), np.ceil(high / BIN)
     first, last = (min(max(int(v), by0), by1) for v in (low[1].min(), high[1].max() + 1))
-    row = np.arange(first, last)[:, None]
-    meets = (low[1] <= row) & (row <= high[1])
-    left = np.where(meets, low[0], bx1).min(axis=1, initial=bx1)
-    right = np.where(meets, high[0] + 1, bx0).max(axis=1, initial=bx0)
+    row = np.arange(first, last)
+    meets = (low[1][:, None] <= row) & (row <= high[1][:, None])
+    left = np.where(meets, low[0][:, None], bx1).min(axis=0, initial=bx1)
+    right = np.where(meets, high[0][:, None] + 1, bx0).max(axis=0, initial=bx0)
     spans = np.array([left, np.maximum(left, right)]).T
     spans = np.minimum(np.maximum(spans, bx0), bx1).astype(np.int32)
     return Window(first, spans) if (spans[:, 1] > spans[:, 0]).any() else None

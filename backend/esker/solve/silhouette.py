@@ -47,7 +47,17 @@ class Silhouette:
     @cached_property
     def pieces(self) -> tuple[Floats, ...]:
         """Per octave the cubics (m, 4) between its controls: coefficients of 1, f, f^2, f^3, f the share of a piece."""
-        return tuple((_B_SPLINE @ np.stack([c[:-3], c[1:-2], c[2:-1], c[3:]])).T for c in self.octaves)
+        if not self.octaves:
+            return ()
+        c, starts = self._behind_each_other
+        table = (_B_SPLINE @ np.array([c[:-3], c[1:-2], c[2:-1], c[3:]])).T
+        return tuple(table[at : at + len(o) - 3] for at, o in zip(starts, self.octaves, strict=True))
+
+    @cached_property
+    def _behind_each_other(self) -> tuple[Floats, NDArray[np.int64]]:
+        """The controls of all octaves and where each begins: one pass of array calls serves them all."""
+        lengths = np.array([len(o) for o in self.octaves])
+        return np.concatenate(self.octaves), np.cumsum(lengths) - lengths
 
     @cached_property
     def blocks(self) -> tuple[Floats, Floats]:
@@ -58,12 +68,14 @@ class Silhouette:
         tops: Floats = np.maximum(high[:-1], high[1:])
         place = np.minimum(edges.searchsorted(self.t, side="right") - 1, count - 1)
         np.maximum.at(tops, place, np.abs(self.z))
-        for o, controls in enumerate(self.octaves):
+        if self.octaves:
+            controls, starts = self._behind_each_other
             c = np.abs(controls)
-            piece = np.maximum(np.maximum(c[:-3], c[1:-2]), np.maximum(c[2:-1], c[3:]))
-            step = self.octave_m * 2**o
-            at = np.minimum((edges / step).astype(int), len(piece) - 1)
-            tops = np.maximum(tops, np.maximum(np.maximum.reduceat(piece, at[:-1]), piece[at[1:]]))
+            seen = np.maximum(np.maximum(c[:-3], c[1:-2]), np.maximum(c[2:-1], c[3:]))
+            steps = self.octave_m * 2.0 ** np.arange(len(starts))[:, None]
+            at = starts[:, None] + np.minimum((edges / steps).astype(int), np.diff(starts, append=len(c))[:, None] - 4)
+            between = np.maximum.reduceat(seen, at[:, :-1].ravel()).reshape(len(starts), -1)
+            tops = np.maximum(tops, np.maximum(between, seen[at[:, 1:]]).max(axis=0))
         return edges, tops
 
 
