@@ -111,7 +111,7 @@ def test_kernels_are_their_twin(engine: ClEngine, basis: Basis) -> None:
     for core in (Span(0, 70, 0, 70), Span(n - 90, n, n - 77, n), Span(100, 171, 64, 129)):
         a, b = computed(engine, basis, core), computed(NumpyEngine(), basis, core)
         relief = float(np.ptp(basis.heights))
-        assert np.abs(a[2] - b[2]).max() < 2e-5 * relief
+        assert np.abs(a[2] - b[2]).max() < 1e-4 * relief
         assert np.quantile(np.abs(a[2] - b[2]), 0.99) < 1e-6 * relief
         assert np.abs(a[:2] - b[:2]).max() < 1e-3
 
