@@ -397,9 +397,8 @@ def test_a_processor_without_avx512(tmp_path: Path) -> None:
     wide.symlink_to(narrow)
     code = (
         "import numpy as np; from esker.solve import pocl_cpu; pocl_cpu.cpu_level = lambda *_: 'haswell';"
-        "from esker.solve.solver import Solver; from tests.solver.scenes import *; a, b = Solver(), Solver('numpy');"
-        "assert 'PoCL' in a.device_name, a.device_name;"
-        "x, y = (s.solve(SCENES['five'], SETTINGS, 2)[2] for s in (a, b));"
+        "from esker.solve.solver import Solver; from tests.solver.scenes import *;"
+        "x, y = (Solver(name).solve(SCENES['five'], SETTINGS, 2)[2] for name in ('pocl', 'numpy'));"
         "assert np.quantile(np.abs(x - y), 0.99) < 1 / 16, np.abs(x - y).max()"
     )
     env = os.environ | {
@@ -408,4 +407,4 @@ def test_a_processor_without_avx512(tmp_path: Path) -> None:
         "ESKER_KERNELS": "rows",
     }
     (tmp_path / "cache").mkdir()
-    subprocess.run([sys.executable, "-c", code], check=True, cwd=ROOT, env=env, timeout=120)
+    subprocess.run([sys.executable, "-c", code], check=True, cwd=ROOT, env=env, timeout=300)
