@@ -3,6 +3,7 @@
 import type { CameraState, FrameStats, Rgba, Scene, SceneRenderer, Tile, TileView } from "../core/types.ts";
 import { assembleSlot, SLOT_TEXELS } from "./apron.ts";
 import { contourInterval } from "./looks.ts";
+import { DetailPicture } from "./mapdetail.ts";
 import { type MapStyle, shadeTile } from "./mapshade.ts";
 
 /** Shading stops for this frame after so many milliseconds; what is left follows in the next frames. */
@@ -33,6 +34,7 @@ export class MapRenderer implements SceneRenderer {
   readonly lost: Promise<string> = new Promise(() => {});
   private readonly context: CanvasRenderingContext2D;
   private readonly pictures = new Map<string, Picture>();
+  private readonly detail = new DetailPicture();
   private readonly slot = new Float32Array(SLOT_TEXELS * SLOT_TEXELS);
   private frame = 0;
 
@@ -51,6 +53,7 @@ export class MapRenderer implements SceneRenderer {
     const frame = frameOf(camera);
     drawSheet(this.context, frame, scene.tiles.sizeM);
     const { drawn, uploads, busy } = this.drawTiles(scene, frame, began);
+    if (scene.overlay === "detail") this.drawDetail(scene, frame);
     drawGrid(this.context, frame, scene.tiles.sizeM);
     if (scene.showStrokes) drawStrokes(this.context, frame, scene);
     drawCursors(this.context, frame, scene);
@@ -123,6 +126,16 @@ export class MapRenderer implements SceneRenderer {
     const bottom = Math.round((frame.y1 - tile.y * w) * frame.scale);
     this.context.imageSmoothingQuality = "high";
     this.context.drawImage(picture, left, top, right - left, bottom - top);
+  }
+
+  /** Tints the relief, which shows through. */
+  private drawDetail(scene: Scene, frame: Frame): void {
+    const [left, top] = toSheet(frame, 0, scene.tiles.sizeM);
+    const wide = scene.tiles.sizeM * frame.scale;
+    this.context.save();
+    this.context.globalAlpha = 0.6;
+    this.context.drawImage(this.detail.of(scene.channels), left, top, wide, wide);
+    this.context.restore();
   }
 
   private forget(): void {

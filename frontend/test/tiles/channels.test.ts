@@ -4,6 +4,7 @@ import { describe, expect, it } from "vitest";
 import type { DecodedFrame } from "../../src/core/types.ts";
 import { AMPLITUDE_QUANTA_PER_M, Channel, FrameKind, ROUGHNESS_QUANTA } from "../../src/generated/contract.ts";
 import { channelTexels } from "../../src/gpu/channeltexture.ts";
+import { detailColour } from "../../src/gpu/mapdetail.ts";
 import { ChannelStore } from "../../src/tiles/channels.ts";
 
 const SIZE = 1000;
@@ -112,5 +113,15 @@ describe("channelTexels", () => {
 
   it("R23: nothing asked for is amplitude 0, whatever the scale", () => {
     expect([...channelTexels(new ChannelStore(SIZE)).bytes]).toEqual([0, 128, 0, 128, 0, 128, 0, 128]);
+  });
+});
+
+describe("detailColour", () => {
+  it("R23: hue goes with roughness, strength with amplitude", () => {
+    const strength = ([r, g, b]: readonly number[]): number => Math.max(r!, g!, b!) - Math.min(r!, g!, b!);
+    expect(strength(detailColour(1, 0))).toBeGreaterThan(3 * strength(detailColour(0, 0)));
+    const [smooth, rough] = [detailColour(1, 0), detailColour(1, 1)];
+    expect(smooth[2]).toBeGreaterThan(smooth[0]);
+    expect(rough[0]).toBeGreaterThan(rough[2]);
   });
 });

@@ -1,0 +1,51 @@
+/** The overlay of roughness and amplitude on the 2D map: one small picture of the whole domain, stretched over the sheet. */
+
+import type { ChannelView } from "../core/types.ts";
+import { channelTexels } from "./channeltexture.ts";
+
+type Rgb = readonly [number, number, number];
+
+/** The colours of ui/legend.ts. */
+const SMOOTH: Rgb = [0x3d, 0x7d, 0xa3];
+const MIDDLE: Rgb = [0xa9, 0xa0, 0x6c];
+const ROUGH: Rgb = [0xb3, 0x4a, 0x58];
+const NONE: Rgb = [0x8d, 0x8d, 0x8d];
+
+const mix = (a: Rgb, b: Rgb, t: number): Rgb => [
+  a[0] + (b[0] - a[0]) * t,
+  a[1] + (b[1] - a[1]) * t,
+  a[2] + (b[2] - a[2]) * t,
+];
+
+/** Colour for amplitude in parts of the greatest and roughness, both 0..1: hue by roughness, strength by amplitude. */
+export function detailColour(amplitude: number, roughness: number): Rgb {
+  const hue = roughness < 0.5 ? mix(SMOOTH, MIDDLE, 2 * roughness) : mix(MIDDLE, ROUGH, 2 * roughness - 1);
+  return mix(NONE, hue, 0.25 + 0.75 * Math.sqrt(amplitude));
+}
+
+export class DetailPicture {
+  private canvas: HTMLCanvasElement | null = null;
+  private source: ChannelView | null = null;
+  private stamp = -1;
+
+  /** The picture, north up. */
+  of(channels: ChannelView): HTMLCanvasElement {
+    if (this.canvas !== null && this.source === channels && this.stamp === channels.stamp) return this.canvas;
+    this.source = channels;
+    this.stamp = channels.stamp;
+    const { bytes, side } = channelTexels(channels);
+    this.canvas ??= document.createElement("canvas");
+    Object.assign(this.canvas, { width: side, height: side });
+    const context = this.canvas.getContext("2d")!;
+    const image = context.createImageData(side, side);
+    for (let row = 0; row < side; row += 1) {
+      for (let col = 0; col < side; col += 1) {
+        const from = 2 * (row * side + col);
+        const colour = detailColour(bytes[from]! / 255, bytes[from + 1]! / 255);
+        image.data.set([...colour, 255], 4 * ((side - 1 - row) * side + col));
+      }
+    }
+    context.putImageData(image, 0, 0);
+    return this.canvas;
+  }
+}
