@@ -276,6 +276,28 @@ def test_a_new_job_ends_refinement_at_once_and_it_starts_again_from_the_new_grou
     assert solver.closed == 1
 
 
+def test_when_refining_fails_the_ground_stays_and_people_are_told(refining: Any) -> None:
+    solver, worker, viewer, client = refining
+    told: list[str] = []
+    client.tell = told.append
+    viewer.keys = (A, B)
+
+    def broken(keys: Sequence[TileKey]) -> Iterator[Tile | None]:
+        yield Tile(keys[0])
+        raise MemoryError
+
+    solver.tiles = broken
+    worker.request(client, Job(1, (), SETTINGS))
+    wait(lambda: bool(told))
+    assert "detail" in told[0]
+    assert viewer.got == [(1, A)]
+    assert client.at_rest
+    del solver.tiles
+    worker.request(client, Job(2, (), SETTINGS))
+    wait(lambda: (2, B) in viewer.got)
+    assert len(told) == 1
+
+
 # --- with the real solver -------------------------------------------------------------------------------------------
 
 

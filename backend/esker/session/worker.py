@@ -220,16 +220,22 @@ class Worker:
             client.tiles = None
             return
         except Exception as error:
-            if self._diagnose(error) != Fault.MEMORY:
-                self._failed(client, job, error)
-                return
-            log.warning("no memory to refine at clock %d: %s", job.clock, error)
-            client.drop()
-            client.tell(f"{self.device_name} has too little memory for finer detail just now.")
+            self._unrefined(client, job, error)
             return
         if tile is not None:
             client.refined.add(tile.key)
             refinement.deliver_tile(job.clock, tile)
+
+    def _unrefined(self, client: Client, job: Job, error: Exception) -> None:
+        """Refining failed. The ground itself is there, so only a broken device is a reason to solve it again."""
+        fault = self._diagnose(error)
+        if fault == Fault.DEVICE:
+            self._failed(client, job, error)
+            return
+        log.error("refining at clock %d failed (%s): %s: %s", job.clock, fault.value, type(error).__name__, error)
+        client.drop()
+        memory = f"{self.device_name} has too little memory for finer detail just now."
+        client.tell(memory if fault == Fault.MEMORY else "Finer detail could not be computed here.")
 
     def _look(self, client: Client, refinement: Refinement) -> bool:
         """Starts on the tiles that are wanted now and were not made from this solve yet; False when there are none."""
