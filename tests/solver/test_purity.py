@@ -141,6 +141,7 @@ def test_an_error_while_loading_is_not_remembered(solver: Solver, monkeypatch: p
 
     with monkeypatch.context() as patch:
         patch.setattr("esker.solve.levels.ClSystem.coarsen", fail)
+        patch.setattr("esker.solve.gpu_levels.GpuSystem.coarsen", fail)
         patch.setattr("esker.solve.reference.coarsen", fail)
         with pytest.raises(RuntimeError):
             solver.solve(SCENES["five"][1:], SETTINGS, 2)
