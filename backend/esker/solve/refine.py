@@ -132,6 +132,11 @@ class Refiner:
                 field = (yield from self._computed(key.level, _group(key, left)))[key]
             yield RefinedTile(key, field[2], self.content(key))
 
+    def clear(self) -> None:
+        """Drop all that is kept, for all refiners of the solver: fields and rasterised constraints."""
+        self.cache.clear()
+        self._engine.clear()
+
     def forget(self, keys: Iterable[TileKey]) -> None:
         """Drop tiles from the cache."""
         for key in keys:

@@ -142,9 +142,15 @@ class Engine(Protocol):
     def run(self, at: Step, strokes: StrokeWindows, parent: Fields) -> Fields:
         """``at.core``'s fields from the parent's on ``at.parent``."""
 
+    def clear(self) -> None:
+        """Drop what is kept between steps."""
+
 
 class NumpyEngine:
     """The twin in float64, and what serves without OpenCL."""
+
+    def clear(self) -> None:
+        """Nothing is kept."""
 
     def run(self, at: Step, strokes: StrokeWindows, parent: Fields) -> Fields:
         tables = strokes.tables(at.level, at.box)
@@ -192,6 +198,10 @@ class ClEngine:
         self.sheets = Sheets()
         self.stride = 0
         self.fields: dict[str, Any] = {}
+
+    def clear(self) -> None:
+        """Drop the rasterised constraints."""
+        self.sheets.clear()
 
     def _room(self, stride: int) -> None:
         """Memory for windows of ``stride`` floats a channel."""

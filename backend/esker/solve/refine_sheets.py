@@ -78,6 +78,10 @@ class Sheets:
         while len(self._held) > self.most:
             self._held.popitem(last=False)
 
+    def clear(self) -> None:
+        """Drop everything."""
+        self._held.clear()
+
     def _parts(self, level: int, box: BinBox, digest: Digest) -> Iterator[Part]:
         by0, by1, bx0, bx1 = box
         count = bins(grid.samples(level))
