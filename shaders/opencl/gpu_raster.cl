@@ -47,7 +47,7 @@ inline int nearest_in_bin(int *best, segments_t s, int first, int count, float r
 // The sums of all strokes at this work-item's sample; (x0, y0): the bin's first.
 inline sums_t gather(const tables_t *t, int bx, int by, int gx, int gy, int n, local int *least_bits, local uint *marks,
                      int channels) {
-    sums_t sum = {0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f};
+    sums_t sum = {0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f};
     float x = gx, y = gy, cx = bx * BIN + 0.5f * (BIN - 1), cy = by * BIN + 0.5f * (BIN - 1);
     for (int i = t->row_start[by - t->row0]; i < t->row_start[by - t->row0 + 1]; i++) {
         global const int *item = t->row_items + ITEM_STRIDE * i;

@@ -101,7 +101,7 @@ inline void gather(sums_t *sums, const tables_t *t, int bx, int by, int rows, in
     float x0 = bx * BIN, y0 = by * BIN;
     float16 x = x0 + (float16)LANE_NUMBERS;
     for (int y = 0; y < rows; y++) {
-        sums_t none = {0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f};
+        sums_t none = {0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f};
         sums[y] = none;
     }
     for (int i = t->row_start[by - t->row0]; i < t->row_start[by - t->row0 + 1]; i++) {

@@ -63,7 +63,7 @@ typedef struct {
 } nearest_t;
 
 typedef struct {
-    REAL w, wt, wa, fade, held, g, gx, gy, toe, hard;
+    REAL w, wt, wtt, wa, fade, held, g, gx, gy, toe, hard;
 } sums_t;
 
 INLINE REAL smooth(REAL t) {
@@ -287,10 +287,10 @@ INLINE REAL skirt(const band_t *b, float cliff, REAL *width, REAL *height, REAL 
     return need;
 }
 
-// Weight of a stroke beside others by the distance from its crest, cells (reference_section.nearness).
-INLINE REAL nearness(REAL d) {
-    REAL d2 = d * d, core = fmax(1.0f - d2 * (1.0f / (CORE_CELLS * CORE_CELLS)), 0.0f);
-    return core * core + FAR_SHARE / (1.0f + d2);
+// Weight of a stroke beside others by the distance from its crest (reference_section.nearness).
+INLINE REAL nearness(const band_t *b, float s) {
+    REAL q = b->ds / fmax(NEAR_SHARE * b->end, 2.0f * s), near = 1.0f / (1.0f + q * q);
+    return near * near;
 }
 
 // Adds one stroke's cross-section to the sums (reference_section.cross_section). p: STROKE_FIELDS.
@@ -327,7 +327,7 @@ INLINE void cross_section(sums_t *sum, const nearest_t *near, MASK inside, globa
     lift = select(one, lift, b.has);
     REAL sign = select(one, -one, near->height < 0.0f);
     REAL down = select(zero, lift * near->rate - sign * fall, b.has && near->distance > p[P_PLATEAU] && !inside);
-    REAL near_weight = nearness(b.d), inner = fmax(1.0f - r, 0.0f), outer = fmax(1.0f - rt / toe_end, 0.0f);
+    REAL near_weight = nearness(&b, t->s), inner = fmax(1.0f - r, 0.0f), outer = fmax(1.0f - rt / toe_end, 0.0f);
     REAL fade = select(zero, select(b.present * (1.0f - free), one, b.hard), reached);
     REAL toe = select(zero, b.present * (1.0f - smooth((rt - 1.0f) / (toe_end - 1.0f))), reached && b.has);
     REAL w = near_weight * (fade * select(inner * inner + TINY, one, b.hard) + select(zero, skirted, reached));
@@ -336,6 +336,7 @@ INLINE void cross_section(sums_t *sum, const nearest_t *near, MASK inside, globa
     lift = select(lift * (1.0f / t->s), zero, inside);
     sum->w += w;
     sum->wt += w * sign * z;
+    sum->wtt += w * z * z;
     sum->wa += w * a * a;
     sum->fade = fmax(sum->fade, fade);
     sum->held = fmax(sum->held, select(zero, select(b.present * held, one, b.hard), reached));
@@ -353,7 +354,7 @@ INLINE void channel_section(sums_t *sum, const nearest_t *near, MASK inside, glo
     REAL known = select(b.present * (1.0f - smooth((r - 1.0f) * (1.0f / (TOE - 1.0f)))), one, b.hard);
     known = select(zero, known, b.within);
     REAL outer = fmax(1.0f - r * (1.0f / TOE), 0.0f);
-    REAL g = known * nearness(b.d) * select(outer * outer, one, b.hard);
+    REAL g = known * nearness(&b, t->s) * select(outer * outer, one, b.hard);
     sum->g += g;
     sum->gx += g * p[P_AMPLITUDE];
     sum->gy += g * p[P_ROUGHNESS];
@@ -377,7 +378,10 @@ INLINE void conclude_two(constraint_t *out, const sums_t *sum) {
 INLINE constraint_t conclude(const sums_t *sum, MASK x, int y, int n, float screening, int pinned) {
     constraint_t out;
     REAL zero = 0.0f, fixed = -1.0f;
-    REAL w = fmax(sum->w, TINY), target = sum->wt / w, a = sum->wa / w * sum->fade;
+    REAL w = fmax(sum->w, TINY), target = sum->wt / w;
+    REAL square = sum->wtt / w, apart = fmax(square * (1.0f - AGREEMENT_NOISE) - target * target, 0.0f);
+    REAL quarrel = apart / (apart + AGREEMENT * square + TINY);
+    REAL a = (sum->wa / w + OVERLAP_STIFFNESS * quarrel * quarrel) * sum->fade;
     MASK hard = sum->hard > 0.0f;
     out.height_d = select(a, fixed, hard);
     out.height_f = select((a + screening * sum->held) * target, target, hard);

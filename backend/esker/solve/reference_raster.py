@@ -10,14 +10,23 @@ from numpy.typing import NDArray
 
 from esker.contract import CREST_STIFFNESS
 from esker.solve.reference_section import TINY, Band, Nearest, channel_section, cross_section, straight
-from esker.solve.tables import BIN, HALF_DIAGONAL, INDEX_AT, STROKE_AT, Tables
+from esker.solve.tables import (
+    AGREEMENT,
+    AGREEMENT_NOISE,
+    BIN,
+    HALF_DIAGONAL,
+    INDEX_AT,
+    OVERLAP_STIFFNESS,
+    STROKE_AT,
+    Tables,
+)
 
 Floats = NDArray[np.float64]
 Places = tuple[NDArray[np.int64], NDArray[np.int64]]
 
 HARD = -1.0
 """Stiffness that marks a sample as fixed (a crest, or a pinned border)."""
-_SUMS = ("w", "wt", "wa", "fade", "held", "g", "gx", "gy", "toe", "hard")
+_SUMS = ("w", "wt", "wtt", "wa", "fade", "held", "g", "gx", "gy", "toe", "hard")
 
 
 @dataclass(frozen=True)
@@ -43,7 +52,10 @@ def rasterise(tables: Tables) -> Constraints:
     rows, columns = tables.shape
     total = {name: a[:rows, :columns] for name, a in total.items()}
     w = np.maximum(total["w"], TINY)
-    target, stiffness = total["wt"] / w, total["wa"] / w * total["fade"]
+    target, square = total["wt"] / w, total["wtt"] / w
+    apart = np.maximum(square * (1 - AGREEMENT_NOISE) - target**2, 0.0)
+    quarrel = apart / (apart + AGREEMENT * square + TINY)
+    stiffness = (total["wa"] / w + OVERLAP_STIFFNESS * quarrel**2) * total["fade"]
     hard = total["hard"] > 0
     height_d = np.where(hard, HARD, stiffness)
     height_f = np.where(hard, target, (stiffness + tables.screening * total["held"]) * target)
@@ -109,7 +121,7 @@ def _strokes(tables: Tables) -> Iterator[tuple[int, Places, Nearest, NDArray[np.
 def _add(total: dict[str, Floats], at: Places, band: Band) -> None:
     """Adds a stroke's weights and weighted wishes to the sums at samples."""
     w, g = np.where(band.reached, band.weight, 0.0), np.where(band.reached, band.toe_weight, 0.0)
-    for name, value in (("w", w), ("wt", w * band.target), ("wa", w * band.stiffness)):
+    for name, value in (("w", w), ("wt", w * band.target), ("wtt", w * band.target**2), ("wa", w * band.stiffness)):
         total[name][at] += value
     for name, value in (("g", g), ("gx", g * band.gx), ("gy", g * band.gy)):
         total[name][at] += value

@@ -10,13 +10,12 @@ from numpy.typing import NDArray
 from esker.contract import SPRING_CELLS, SPRING_FULL_FRACTION
 from esker.solve.tables import (
     CHANNEL_FLOOR_CELLS,
-    CORE_CELLS,
     CREST_HALF_WIDTH,
     EXIT_SHARE,
     FAN,
-    FAR_SHARE,
     HELD_FRACTION,
     INDEX_AT,
+    NEAR_SHARE,
     SKIRT_SLOPE,
     SPRING_FLOOR_CELLS,
     STEEPEST,
@@ -207,9 +206,9 @@ class Band:
     gy: Floats
 
 
-def nearness(d: Floats) -> Floats:
-    """Weight of a stroke beside others by the distance from its crest, cells: smooth where crests cross."""
-    return np.maximum(1 - (d / CORE_CELLS) ** 2, 0.0) ** 2 + FAR_SHARE / (1 + d * d)
+def nearness(b: Flanks, s: float) -> Floats:
+    """Weight of a stroke beside others by the distance from its crest: on any grid the same ground takes over."""
+    return np.asarray(1 / (1 + (b.ds / np.maximum(NEAR_SHARE * b.end, 2 * s)) ** 2) ** 2)
 
 
 def cross_section(near: Nearest, inside: Mask, params: Floats, tables: Tables) -> Band:
@@ -238,7 +237,7 @@ def cross_section(near: Nearest, inside: Mask, params: Floats, tables: Tables) -
     sign = np.where(near.height < 0, -1.0, 1.0)
     sloping = b.has & (near.distance > params[STROKE_AT["plateau"]]) & ~inside
     down = np.where(sloping, lift * near.rate - sign * fall, 0.0)
-    near_weight = nearness(b.d)
+    near_weight = nearness(b, s)
     fade = np.where(b.hard, 1.0, b.present * (1 - free))
     toe_fade = np.where(b.has, b.present * (1 - smoothstep((rt - 1) / (toe_end - 1))), 0.0)
     unit = down / np.maximum(near.distance, 0.5)
@@ -267,4 +266,4 @@ def channel_section(near: Nearest, inside: Mask, params: Floats, tables: Tables)
     known = np.where(b.hard, 1.0, b.present * (1 - smoothstep((r - 1) / (TOE - 1))))
     known = np.where(b.within, known, 0.0)
     outer = np.where(b.hard, 1.0, np.maximum(1 - r / TOE, 0.0) ** 2)
-    return known, known * nearness(b.d) * outer
+    return known, known * nearness(b, s) * outer

@@ -38,10 +38,16 @@ SPRING_FLOOR_CELLS = 8.0
 """A spring is never stiffer than that of a band this wide."""
 CHANNEL_FLOOR_CELLS = 1.5
 """Where a band is narrower, amplitude and roughness are known to this distance from the crest."""
-CORE_CELLS = 5.0
-"""Crests that cross take a mean of their heights within this distance of each other."""
-FAR_SHARE = 0.25
-"""Strokes are weighed by the square of their distance; near its crest, by this factor less, one has more say."""
+NEAR_SHARE = 1 / 28
+"""Strokes are weighed by the fourth power of their distance; nearer to its crest than this share of its width one has
+most of the say. A length on the ground (and at least two cells), so that every level sees the same crossing."""
+OVERLAP_STIFFNESS = 8.0
+"""Where strokes want different heights the springs are up to this much stiffer: the mean of their gradients is not the
+gradient of their mean height there, and a crest would stand out of the ground sample by sample."""
+AGREEMENT = 1e-3
+"""Variance of the wanted heights, as a share of their mean square, below which strokes count as agreeing."""
+AGREEMENT_NOISE = 1e-5
+"""The part of it that is rounding: a stroke alone agrees with itself exactly."""
 TOE = 1.3
 """Beyond its end a band still tells the gradient, fading out at this multiple of its width: nothing overshoots."""
 EXIT_SHARE = 0.25
@@ -176,8 +182,10 @@ def defines() -> dict[str, float | int]:
         "CREST_HALF_WIDTH": CREST_HALF_WIDTH,
         "SPRING_FLOOR_CELLS": SPRING_FLOOR_CELLS,
         "CHANNEL_FLOOR_CELLS": CHANNEL_FLOOR_CELLS,
-        "CORE_CELLS": CORE_CELLS,
-        "FAR_SHARE": FAR_SHARE,
+        "NEAR_SHARE": NEAR_SHARE,
+        "OVERLAP_STIFFNESS": OVERLAP_STIFFNESS,
+        "AGREEMENT": AGREEMENT,
+        "AGREEMENT_NOISE": AGREEMENT_NOISE,
         "TOE": TOE,
         "HELD_FRACTION": HELD_FRACTION,
         "EXIT_SHARE": EXIT_SHARE,
