@@ -19,10 +19,11 @@ struct Site {
   fine3: vec4f,
 };
 
-// What strokes ask of the fine relief: amplitude raises all of it, roughness tips it from broad to small features.
+// What strokes ask of the fine relief: amplitude raises all of it, most what does not repeat within sight; roughness tips
+// it from broad to small features.
 fn relief_gain(detail: vec2f) -> vec4f {
-  let strength = 1.0 + 3.0 * (1.0 - exp(-detail.x * view.amplitude / (0.004 * view.size)));
-  return strength * exp2((detail.y - 0.5) * vec4f(-1.6, 0.0, 1.6, 3.2));
+  let strength = 1.0 - exp(-detail.x * view.amplitude / (0.004 * view.size));
+  return (1.0 + strength * vec4f(6.0, 0.6, 1.5, 1.5)) * exp2((detail.y - 0.5) * vec4f(-1.2, 0.2, 1.2, 2.0));
 }
 
 fn survey(p: vec3f, gradient: vec2f, curvature: f32, f: Footprint, detail: vec2f) -> Site {
