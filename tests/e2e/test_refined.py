@@ -130,7 +130,7 @@ def test_a_crest_sharpens_as_one_comes_near(visitors: Visitors, server: Server, 
     wait(ada, "n => window.esker.strokes().length === n", 2)
     wait_refined(ada, (x, y), 7)
     after = heights(ada, places)
-    assert np.abs(np.subtract(after, before)).max() > 1
+    assert np.abs(np.subtract(after, before)).max() > 0.1  # the new stroke passes by, below the summit
     check(ada, places, Truth(server, terrain, secret, tmp_path))
     ada.shot("refined-2-crossed")
     assert not ada.errors
