@@ -34,6 +34,7 @@ class Desk:
         self.now = 0.0
         self.schedule = Schedule(lambda: self.now, budget)
         self.log: list[tuple[Client, str]] = []
+        self.pace: dict[Client, float] = {}
 
     def client(self, levels: int = 2) -> Client:
         client = Client(levels, ignore, ignore)
@@ -52,7 +53,8 @@ class Desk:
             client.steps = _levels(client.top)
         assert client.steps is not None
         result = next(client.steps, None)
-        self.now += seconds
+        self.now += self.pace.get(client, seconds)
+        self.schedule.ended(client)
         if result is None:
             client.steps = None
         else:
@@ -99,6 +101,23 @@ def test_settling_gets_its_share_while_others_draw_without_end() -> None:
         if (settling, "2s") in desk.log:
             break
     assert desk.now < 4 * 3 * module.PATIENCE
+
+
+def test_a_coarse_preview_waits_for_one_slice_of_a_big_terrain_however_long_they_are() -> None:
+    desk = Desk()
+    big = desk.client(6)
+    desk.pace[big] = 4 * module.PATIENCE
+    desk.ask(big)
+    desk.until(big, "6")
+    small = [desk.client() for _ in range(4)]
+    for clock in range(1, 40):
+        for client in small:
+            desk.ask(client, clock)
+        begun, out_of_turn = len(desk.log), 0
+        while len([1 for x, what in desk.log[begun:] if x in small and what == "0"]) < len(small):
+            out_of_turn += desk.slice() is big
+        assert out_of_turn <= 1
+        desk.slice()
 
 
 def test_a_coarse_preview_ends_the_settling_solve_that_began_last_and_that_settles_later() -> None:

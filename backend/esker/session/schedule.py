@@ -169,7 +169,8 @@ class Schedule:
         self.clients: list[Client] = []
         self._now, self._budget = now, budget
         self._turns = 0
-        self._favoured_at = -math.inf
+        self._favoured: Client | None = None
+        self._favour_after = -math.inf
 
     def pick(self) -> Client | None:
         """The client whose turn it is, None when there is nothing to do."""
@@ -179,10 +180,17 @@ class Schedule:
             return None
         stage, best = min(staged, key=lambda s: (s[0], *_order(*s)))
         late = [x for other, x in staged if other > stage and now - x.ran_at > PATIENCE]
-        if late and now - self._favoured_at > PATIENCE:
-            self._favoured_at = now
-            best = min(late, key=lambda x: x.turn)
+        self._favoured = None
+        if late and now > self._favour_after:
+            best = self._favoured = min(late, key=lambda x: x.turn)
         return best
+
+    def ended(self, client: Client) -> None:
+        """Its slice is over: from now on it waits. After a slice out of turn the others have at least as long."""
+        now = self._now()
+        if client is self._favoured:
+            self._favour_after = now + max(PATIENCE, now - client.ran_at)
+        client.ran_at = now
 
     def begin(self, client: Client) -> Job | None:
         """The client's slice begins: the job to start, if it is to start one. Ends solves that are in its way."""

@@ -162,6 +162,7 @@ class Worker:
             self._solve(client)
         elif client.refiner is not None:
             self._refine(client)
+        self._schedule.ended(client)
 
     def _open(self, client: Client, job: Job) -> None:
         """Starts a solve; it takes memory of its own until it ends."""
