@@ -289,8 +289,8 @@ INLINE REAL skirt(const band_t *b, float cliff, REAL *width, REAL *height, REAL 
 
 // Weight of a stroke beside others by the distance from its crest (reference_section.nearness).
 INLINE REAL nearness(const band_t *b, float s) {
-    REAL q = b->ds / fmax(NEAR_SHARE * b->end, 2.0f * s), near = 1.0f / (1.0f + q * q);
-    return near * near;
+    REAL q = b->ds / fmax(NEAR_SHARE * b->end, 2.0f * s);
+    return 1.0f / (1.0f + q * q);
 }
 
 // Adds one stroke's cross-section to the sums (reference_section.cross_section). p: STROKE_FIELDS.
@@ -381,7 +381,8 @@ INLINE constraint_t conclude(const sums_t *sum, MASK x, int y, int n, float scre
     REAL w = fmax(sum->w, TINY), target = sum->wt / w;
     REAL square = sum->wtt / w, apart = fmax(square * (1.0f - AGREEMENT_NOISE) - target * target, 0.0f);
     REAL quarrel = apart / (apart + AGREEMENT * square + TINY);
-    REAL a = (sum->wa / w + OVERLAP_STIFFNESS * quarrel * quarrel) * sum->fade;
+    REAL a = sum->wa / w;
+    a = (a + fmin(OVERLAP_STIFFENING * a, OVERLAP_STIFFEST) * quarrel * quarrel) * sum->fade;
     MASK hard = sum->hard > 0.0f;
     out.height_d = select(a, fixed, hard);
     out.height_f = select((a + screening * sum->held) * target, target, hard);

@@ -7,6 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from esker import grid
+from esker.contract import Channel
 from esker.grid import TileKey
 from esker.tiles.codec import SAMPLE_LIMIT
 from esker.tiles.delivery import TileServer
@@ -190,11 +191,11 @@ def test_levels_that_were_never_put_are_not_valid() -> None:
 def test_the_cache_of_coded_tiles_is_bounded_and_forgets_the_oldest() -> None:
     cache = EncodedTiles(limit=1000)
     for i in range(30):
-        cache.put((ROOT, i, 0, 0, 0), bytes(100))
-        assert cache.get((ROOT, 0, 0, 0, 0)) is not None  # used again and again, so it stays
+        cache.put((Channel.HEIGHT, ROOT, i, 0, 0, 0), bytes(100))
+        assert cache.get((Channel.HEIGHT, ROOT, 0, 0, 0, 0)) is not None  # used again and again, so it stays
     assert cache.bytes <= 1000
-    assert cache.get((ROOT, 1, 0, 0, 0)) is None
-    assert cache.get((ROOT, 29, 0, 0, 0)) is not None
+    assert cache.get((Channel.HEIGHT, ROOT, 1, 0, 0, 0)) is None
+    assert cache.get((Channel.HEIGHT, ROOT, 29, 0, 0, 0)) is not None
 
 
 def test_clients_share_coded_tiles() -> None:

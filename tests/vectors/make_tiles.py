@@ -295,7 +295,8 @@ def told(decoder: FrameDecoder, frame: bytes) -> dict[str, Any]:
             r, c = 32 * (key.y & 1), 32 * (key.x & 1)
             parent = before[out.channel][key.parent()].samples[r : r + 33, c : c + 33]
             scale = ratio(out.channel)
-            worst = block_reduce(np.maximum, parent_distance(tile.samples * (2 // scale), parent), 16).ravel().astype(np.int64)
+            apart = parent_distance(tile.samples * (2 // scale), parent)
+            worst = block_reduce(np.maximum, apart, 16).ravel().astype(np.int64)
             error = (-(-worst * scale // 4)).astype(np.uint32)
         tiles.append(
             {

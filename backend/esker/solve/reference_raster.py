@@ -16,7 +16,8 @@ from esker.solve.tables import (
     BIN,
     HALF_DIAGONAL,
     INDEX_AT,
-    OVERLAP_STIFFNESS,
+    OVERLAP_STIFFENING,
+    OVERLAP_STIFFEST,
     STROKE_AT,
     Tables,
 )
@@ -55,7 +56,9 @@ def rasterise(tables: Tables) -> Constraints:
     target, square = total["wt"] / w, total["wtt"] / w
     apart = np.maximum(square * (1 - AGREEMENT_NOISE) - target**2, 0.0)
     quarrel = apart / (apart + AGREEMENT * square + TINY)
-    stiffness = (total["wa"] / w + OVERLAP_STIFFNESS * quarrel**2) * total["fade"]
+    stiffness = total["wa"] / w
+    stiffer = np.minimum(OVERLAP_STIFFENING * stiffness, OVERLAP_STIFFEST) * quarrel**2
+    stiffness = (stiffness + stiffer) * total["fade"]
     hard = total["hard"] > 0
     height_d = np.where(hard, HARD, stiffness)
     height_f = np.where(hard, target, (stiffness + tables.screening * total["held"]) * target)

@@ -208,7 +208,7 @@ class Band:
 
 def nearness(b: Flanks, s: float) -> Floats:
     """Weight of a stroke beside others by the distance from its crest: on any grid the same ground takes over."""
-    return np.asarray(1 / (1 + (b.ds / np.maximum(NEAR_SHARE * b.end, 2 * s)) ** 2) ** 2)
+    return np.asarray(1 / (1 + (b.ds / np.maximum(NEAR_SHARE * b.end, 2 * s)) ** 2))
 
 
 def cross_section(near: Nearest, inside: Mask, params: Floats, tables: Tables) -> Band:

@@ -38,12 +38,14 @@ SPRING_FLOOR_CELLS = 8.0
 """A spring is never stiffer than that of a band this wide."""
 CHANNEL_FLOOR_CELLS = 1.5
 """Where a band is narrower, amplitude and roughness are known to this distance from the crest."""
-NEAR_SHARE = 1 / 28
-"""Strokes are weighed by the fourth power of their distance; nearer to its crest than this share of its width one has
-most of the say. A length on the ground (and at least two cells), so that every level sees the same crossing."""
-OVERLAP_STIFFNESS = 8.0
-"""Where strokes want different heights the springs are up to this much stiffer: the mean of their gradients is not the
-gradient of their mean height there, and a crest would stand out of the ground sample by sample."""
+NEAR_SHARE = 1 / 80
+"""Strokes are weighed by the square of their distance; nearer to its crest than this share of its width one has most of
+the say. A length on the ground (and at least two cells), so that every level sees the same crossing."""
+OVERLAP_STIFFENING = 200.0
+"""Where strokes want different heights the springs are up to this many times stiffer: the mean of their gradients is
+not the gradient of their mean height there, and a crest would stand out of the ground sample by sample."""
+OVERLAP_STIFFEST = 8.0
+"""... but no more than by this: coarse levels, whose springs saturate, could not follow."""
 AGREEMENT = 1e-3
 """Variance of the wanted heights, as a share of their mean square, below which strokes count as agreeing."""
 AGREEMENT_NOISE = 1e-5
@@ -183,7 +185,8 @@ def defines() -> dict[str, float | int]:
         "SPRING_FLOOR_CELLS": SPRING_FLOOR_CELLS,
         "CHANNEL_FLOOR_CELLS": CHANNEL_FLOOR_CELLS,
         "NEAR_SHARE": NEAR_SHARE,
-        "OVERLAP_STIFFNESS": OVERLAP_STIFFNESS,
+        "OVERLAP_STIFFENING": OVERLAP_STIFFENING,
+        "OVERLAP_STIFFEST": OVERLAP_STIFFEST,
         "AGREEMENT": AGREEMENT,
         "AGREEMENT_NOISE": AGREEMENT_NOISE,
         "TOE": TOE,
