@@ -208,9 +208,10 @@ class Solver:
             yield from self._attempt(strokes, settings, top, warm, basis)
             return
         except OutOfDeviceMemoryError:
-            if not self._spare:
+            if not self._spare and not self._channel_solvers:
                 raise
         self._spare.clear()
+        self._channel_solvers.clear()
         yield from self._attempt(strokes, settings, top, warm, basis)
 
     def _attempt(

@@ -36,6 +36,8 @@ export class TileStore implements TileView {
   private readonly rev = signal(0);
   private entries = new Map<number, Entry>();
   private snapshot: { readonly stamp: number; readonly ground: TileGround } | null = null;
+  /** Per level: whether its last LEVEL frame was final. */
+  private readonly finals = new Map<number, boolean>();
   private readonly delta = new Float32Array(AREA);
   private readonly moved = new Float32Array(AREA);
   private readonly distance = new Float64Array(SUBS);
@@ -55,6 +57,12 @@ export class TileStore implements TileView {
 
   get stamp(): number {
     return this.rev.peek();
+  }
+
+  /** True unless some level that is solved everywhere was last seen as a preview: its samples may be a little off. */
+  get settled(): boolean {
+    for (const [level, final] of this.finals) if (level <= this.solved && !final) return false;
+    return true;
   }
 
   tile(level: number, x: number, y: number): Tile | undefined {
@@ -83,6 +91,7 @@ export class TileStore implements TileView {
   /** Forgets all tiles, as the server does when a connection begins. */
   clear(): void {
     this.entries = new Map();
+    this.finals.clear();
     this.rev.value++;
   }
 
@@ -97,7 +106,10 @@ export class TileStore implements TileView {
       next.set(key, this.exactEntry(next, key, t, stamp));
       changed.add(key);
     }
-    if (frame.kind === FrameKind.LEVEL) this.confirm(next, frame.level, changed, stamp);
+    if (frame.kind === FrameKind.LEVEL) {
+      this.finals.set(frame.level, frame.settled);
+      this.confirm(next, frame.level, changed, stamp);
+    }
     this.moveBelow(next, frame.level, changed, stamp);
     this.entries = next;
     this.rev.value = stamp;

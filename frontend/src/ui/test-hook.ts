@@ -123,7 +123,8 @@ function byLevel(session: TerrainSession): number[] {
 }
 
 function allExact(session: TerrainSession): boolean {
-  return count(session) === (session.stage.peek()?.tiles.size ?? 0);
+  const tiles = session.stage.peek()?.tiles;
+  return tiles === undefined || (tiles.settled && count(session) === tiles.size);
 }
 
 function finestLevel(session: TerrainSession, x: number, y: number): number {

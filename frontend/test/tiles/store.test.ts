@@ -209,3 +209,30 @@ describe("frames are shown whole (T16)", () => {
     expect(store.tile(3, 7, 7)!.exact).toBe(true);
   });
 });
+
+describe("settled (T16)", () => {
+  const level = (at: number, settled: boolean) => ({ ...frame("LEVEL", at, all(at, 1, flat)), settled });
+
+  test("while the last frame of some level was a preview, the ground is not", () => {
+    const store = new TileStore(SIZE_M, LEVELS, 2);
+    for (let at = 0; at <= 2; at++) store.apply(level(at, true));
+    expect(store.settled).toBe(true);
+    store.apply(level(1, false));
+    expect(store.settled).toBe(false);
+    store.apply(level(2, true));
+    expect(store.settled).toBe(false);
+    store.apply(level(1, true));
+    expect(store.settled).toBe(true);
+  });
+
+  test("refined levels and levels that were never sent do not count; a new connection begins anew", () => {
+    const store = new TileStore(SIZE_M, LEVELS, 2);
+    expect(store.settled).toBe(true);
+    store.apply(level(0, false));
+    store.apply(level(3, false));
+    store.clear();
+    expect(store.settled).toBe(true);
+    store.apply(level(3, false));
+    expect(store.settled).toBe(true);
+  });
+});
