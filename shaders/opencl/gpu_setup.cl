@@ -56,7 +56,7 @@ void restriction_chain(cfield_t fine, field_t out1, field_t out2, field_t out3, 
 }
 
 // Springs of one coarse sample: d' = S / (1 + SATURATION S), f' = R f / (1 + SATURATION S), S = R d. Fixed samples count
-// as springs of CREST_STIFFNESS.
+// as springs of CREST_STIFFNESS; a pinned border stays as good as fixed.
 inline void coarsen_at(cfield_t d, cfield_t f, field_t d2, field_t f2, int Y, int X, int channels, level_t g) {
     float sd = 0.0f, sf[2] = {0.0f, 0.0f};
     for (int j = -1; j <= 1; j++)
@@ -68,9 +68,10 @@ inline void coarsen_at(cfield_t d, cfield_t f, field_t d2, field_t f2, int Y, in
             for (int c = 0; c < channels; c++) sf[c] = fma(share, f[at + (size_t)c * g.stride], sf[c]);
         }
     size_t to = (size_t)Y * g.pitch2 + X;
-    float k = 1.0f / fma(SATURATION, sd, 1.0f);
-    d2[to] = sd * k;
-    for (int c = 0; c < channels; c++) f2[to + (size_t)c * g.stride2] = sf[c] * k;
+    float k = 1.0f / fma(SATURATION, sd, 1.0f), here = d[(size_t)(2 * Y) * g.pitch + 2 * X];
+    int pinned = here <= PINNED || here >= 0.5f * PINNED_STIFFNESS;
+    d2[to] = pinned ? PINNED_STIFFNESS : sd * k;
+    for (int c = 0; c < channels; c++) f2[to + (size_t)c * g.stride2] = pinned ? 0.0f : sf[c] * k;
 }
 
 // Coarse rows [from, to). Global size (columns, to - from), rounded up.

@@ -388,7 +388,7 @@ INLINE constraint_t conclude(const sums_t *sum, MASK x, int y, int n, float scre
     out.height_f = select((a + screening * sum->held) * target, target, hard);
     if (pinned) {
         MASK edge = x == 0 || x == n - 1 || MASK_OF(y == 0 || y == n - 1);
-        out.height_d = select(out.height_d, fixed, edge);
+        out.height_d = select(out.height_d, PINNED, edge);
         out.height_f = select(out.height_f, zero, edge);
     }
     conclude_two(&out, sum);

@@ -1,7 +1,8 @@
 // From rasterised constraints to the hierarchy of levels (DESIGN 5.3). Twins: reference.coarsen, reference.divergence.
 
 // Springs of one coarse row: d' = S / (1 + SATURATION S), f' = R f / (1 + SATURATION S), S = R d. Fixed samples count
-// as springs of CREST_STIFFNESS. `tmp` holds four fine rows. d is written by channel 0 only.
+// as springs of CREST_STIFFNESS; a pinned border stays as good as fixed. `tmp` holds four fine rows. d is written by channel
+// 0 only.
 inline void coarsen_row(crow_t d, crow_t f, row_t d2, row_t f2, int J, int n, int pitch, int pitch2, row_t tmp,
                         int write_d) {
     int ys[3] = {mirror(2 * J - 1, n), 2 * J, mirror(2 * J + 1, n)}, nc = n / 2 + 1;
@@ -21,6 +22,7 @@ inline void coarsen_row(crow_t d, crow_t f, row_t d2, row_t f2, int J, int n, in
     ghosts(sd, n);
     ghosts(sf, n);
     row_t od = row(d2, J, pitch2), of = row(f2, J, pitch2);
+    crow_t centre = crow(d, 2 * J, pitch);
     for (int x = 0; x < nc; x += VW) {
         float16 s[2];
         for (int i = 0; i < 2; i++) {
@@ -28,9 +30,11 @@ inline void coarsen_row(crow_t d, crow_t f, row_t d2, row_t f2, int J, int n, in
             float16 u = load16(r), v = load16(r + VW), l = load16(r - 1), m = load16(r + VW - 1);
             s[i] = (float16)(u.even + 0.5f * (u.odd + l.even), v.even + 0.5f * (v.odd + m.even));
         }
-        float16 k = 1.0f / (1.0f + SATURATION * s[0]);
-        if (write_d) store16(s[0] * k, od + x);
-        store16(s[1] * k, of + x);
+        float16 k = 1.0f / (1.0f + SATURATION * s[0]), u = load16(centre + 2 * x), v = load16(centre + 2 * x + VW);
+        float16 here = (float16)(u.even, v.even);
+        int16 pinned = here <= PINNED || here >= 0.5f * PINNED_STIFFNESS;
+        if (write_d) store16(select(s[0] * k, (float16)(PINNED_STIFFNESS), pinned), od + x);
+        store16(select(s[1] * k, (float16)(0.0f), pinned), of + x);
     }
 }
 

@@ -199,3 +199,19 @@ def test_float32_noise_floor(device: Device) -> None:
             for k in range(4):
                 w.guide(k)
     assert w.height.change("v", "u") < grid.quantum(3, SIZE) / 16
+
+
+@pytest.mark.parametrize("reach", [1000.0, 4096.0, None])
+@pytest.mark.parametrize("device", [None, "numpy"])
+def test_a_pinned_border_holds_at_any_reach(device: str | None, reach: float | None) -> None:
+    """SPEC S4: a ridge along the border, whose cycle diverged as long as springs of the border saturated."""
+    settings = SETTINGS.model_copy(update={"border": "pinned", "reach_m": reach})
+    strokes = [ridge((1500, 350), (2700, 300), 300, flank(), "a")]
+    level = 2
+    a, b = assemble(strokes, settings, level)
+    exact = spla.spsolve(a.tocsc(), b).reshape(grid.samples(level), -1)
+    heights = Solver(device).solve(strokes, settings, level)[level]
+    assert np.abs(heights - exact).max() < 1e-3 * np.ptp(exact)
+    edge = np.ones(heights.shape, dtype=bool)
+    edge[1:-1, 1:-1] = False
+    assert not heights[edge].any()

@@ -23,6 +23,7 @@ from esker.contract import (
 from esker.grid import samples
 from esker.solve import reference_raster
 from esker.solve.constraints import Packer
+from esker.solve.tables import PINNED, PINNED_STIFFNESS
 
 Field = NDArray[np.float64]
 
@@ -67,13 +68,16 @@ def prolongation(c: Field) -> Field:
 def coarsen(d: Field, f: Field) -> tuple[Field, Field]:
     """Constraints one level coarser: springs summed by R, saturating like springs in series (DESIGN 5.3).
 
-    d: (1, n, n); f: (channels, n, n), stiffness times target (the value itself where fixed).
+    d: (1, n, n); f: (channels, n, n), stiffness times target (the value itself where fixed). A pinned border is
+    on every level: there it stays as good as fixed, at 0; with springs that saturate the cycle diverges.
     """
     hard = d < 0
     total = restriction(np.where(hard, CREST_STIFFNESS, d))
     pull = restriction(np.where(hard, CREST_STIFFNESS * f, f))
     k = 1 / (1 + SATURATION * total)
-    return total * k, pull * k
+    centre = d[:, ::2, ::2]
+    pinned = (centre <= PINNED) | (centre >= PINNED_STIFFNESS / 2)
+    return np.where(pinned, PINNED_STIFFNESS, total * k), np.where(pinned, 0.0, pull * k)
 
 
 def divergence(static: Field, d: Field, g: Field, spacing_m: float) -> Field:

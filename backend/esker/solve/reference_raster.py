@@ -18,6 +18,7 @@ from esker.solve.tables import (
     INDEX_AT,
     OVERLAP_STIFFENING,
     OVERLAP_STIFFEST,
+    PINNED,
     STROKE_AT,
     Tables,
 )
@@ -26,7 +27,7 @@ Floats = NDArray[np.float64]
 Places = tuple[NDArray[np.int64], NDArray[np.int64]]
 
 HARD = -1.0
-"""Stiffness that marks a sample as fixed (a crest, or a pinned border)."""
+"""Stiffness that marks a sample as fixed, on a crest; on a pinned border it is ``tables.PINNED``."""
 _SUMS = ("w", "wt", "wtt", "wa", "fade", "held", "g", "gx", "gy", "toe", "hard")
 
 
@@ -65,7 +66,7 @@ def rasterise(tables: Tables) -> Constraints:
     if tables.pinned:
         y, x = (o + np.arange(count) for o, count in zip(tables.origin, tables.shape, strict=True))
         edge = ((y == 0) | (y == tables.samples - 1))[:, None] | (x == 0) | (x == tables.samples - 1)
-        height_d, height_f = np.where(edge, HARD, height_d), np.where(edge, 0.0, height_f)
+        height_d, height_f = np.where(edge, PINNED, height_d), np.where(edge, 0.0, height_f)
     return Constraints(height_d, height_f, *_two(total))
 
 

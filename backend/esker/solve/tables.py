@@ -46,6 +46,10 @@ OVERLAP_STIFFENING = 200.0
 not the gradient of their mean height there, and a crest would stand out of the ground sample by sample."""
 OVERLAP_STIFFEST = 8.0
 """... but no more than by this: coarse levels, whose springs saturate, could not follow."""
+PINNED = -2.0
+"""Stiffness that marks a sample of a pinned border; like all that are negative it means a fixed sample."""
+PINNED_STIFFNESS = 1e6
+"""What it becomes on coarse levels: as good as fixed."""
 AGREEMENT = 1e-3
 """Variance of the wanted heights, as a share of their mean square, below which strokes count as agreeing."""
 AGREEMENT_NOISE = 1e-5
@@ -187,6 +191,8 @@ def defines() -> dict[str, float | int]:
         "NEAR_SHARE": NEAR_SHARE,
         "OVERLAP_STIFFENING": OVERLAP_STIFFENING,
         "OVERLAP_STIFFEST": OVERLAP_STIFFEST,
+        "PINNED": PINNED,
+        "PINNED_STIFFNESS": PINNED_STIFFNESS,
         "AGREEMENT": AGREEMENT,
         "AGREEMENT_NOISE": AGREEMENT_NOISE,
         "TOE": TOE,
