@@ -1,4 +1,7 @@
-"""Figures of README and docs/solver.md from the committed results: ``python -m esker.bench.report [--check]``."""
+"""Figures of README, docs/solver.md and docs/refinement.md from the committed results.
+
+``python -m esker.bench.report [--check]``.
+"""
 
 from __future__ import annotations
 
@@ -7,12 +10,13 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from esker.bench import _solver
+from esker.bench import _refine, _solver
 
 ROOT = Path(__file__).resolve().parents[3]
 RESULTS = ROOT / "bench" / "results"
 README = ROOT / "README.md"
 SOLVER = ROOT / "docs" / "solver.md"
+REFINEMENT = ROOT / "docs" / "refinement.md"
 BEGIN, END = "<!-- figures: written by `python -m esker.bench.report` -->", "<!-- end of figures -->"
 
 
@@ -96,7 +100,9 @@ def readme(text: str) -> str:
 def documents() -> dict[Path, str]:
     """Every document that carries figures, with its text renewed."""
     out = {README: readme(README.read_text(encoding="utf-8"))}
-    return out | {SOLVER: _solver.document(SOLVER.read_text(encoding="utf-8"), result("solve"))}
+    out[SOLVER] = _solver.document(SOLVER.read_text(encoding="utf-8"), result("solve"))
+    out[REFINEMENT] = _refine.document(REFINEMENT.read_text(encoding="utf-8"), result("refine"))
+    return out
 
 
 def main(argv: list[str]) -> int:
