@@ -143,7 +143,7 @@ def test_reach_and_border_move_everybodys_ground(visitors: Visitors, server: Ser
     draw(ada, "b", arch(on_screen(ada, 1500, 350), on_screen(ada, 2700, 300), 90))
     wait_settled(ada, ben)
     # On the border below the ridge, and well beyond the ridge's flanks.
-    edge, beyond = (2112.0, 0.0), (2112.0, 1664.0)
+    edge, beyond = (2112.0, 0.0), (2112.0, 2304.0)
     free = heights(ben, [edge, beyond])
     assert free[0] > 5
     ada.page.keyboard.press("v")
@@ -154,7 +154,7 @@ def test_reach_and_border_move_everybodys_ground(visitors: Visitors, server: Ser
     slider = ada.page.get_by_role("slider", name="Distance")
     slider.focus()
     ada.page.keyboard.press("End")
-    wait(ben, "([x, y, h]) => window.esker.heightAt(x, y) > h + 1", [*beyond, free[1]])
+    wait(ben, "([x, y, h]) => window.esker.heightAt(x, y) > h + 0.4 && window.esker.settled()", [*beyond, free[1]])
     ada.shot("settings-terrain")
     ada.page.locator(".viewport").focus()
     for _ in range(4):

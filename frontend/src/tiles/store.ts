@@ -36,7 +36,7 @@ export class TileStore implements TileView {
   private readonly rev = signal(0);
   private entries = new Map<number, Entry>();
   private snapshot: { readonly stamp: number; readonly ground: TileGround } | null = null;
-  /** Per level: whether its last LEVEL frame was final. */
+  /** Per level that is held: whether what was last said of all its tiles is final. */
   private readonly finals = new Map<number, boolean>();
   private readonly delta = new Float32Array(AREA);
   private readonly moved = new Float32Array(AREA);
@@ -100,6 +100,8 @@ export class TileStore implements TileView {
     const stamp = this.stamp + 1;
     const next = new Map(this.entries);
     this.drop(next, frame);
+    // Who holds nothing of a level is told nothing of it: the first tiles that fill it speak for themselves.
+    if (!holds(next, frame.level)) this.finals.set(frame.level, frame.settled || frame.tiles.length === 0);
     const changed = new Set<number>();
     for (const t of frame.tiles) {
       const key = tileKey(frame.level, t.x, t.y);
@@ -107,7 +109,7 @@ export class TileStore implements TileView {
       changed.add(key);
     }
     if (frame.kind === FrameKind.LEVEL) {
-      this.finals.set(frame.level, frame.settled);
+      if (frame.tiles.length > 0 || holds(next, frame.level)) this.finals.set(frame.level, frame.settled);
       this.confirm(next, frame.level, changed, stamp);
     }
     this.moveBelow(next, frame.level, changed, stamp);
@@ -229,4 +231,9 @@ export class TileStore implements TileView {
 function parentHeights(entries: ReadonlyMap<number, Entry>, key: number): Float32Array | null {
   if (keyLevel(key) === 0) return null;
   return entries.get(parentKey(key))?.tile.heights ?? null;
+}
+
+function holds(entries: ReadonlyMap<number, Entry>, level: number): boolean {
+  for (const key of entries.keys()) if (keyLevel(key) === level) return true;
+  return false;
 }

@@ -225,6 +225,19 @@ describe("settled (T16)", () => {
     expect(store.settled).toBe(true);
   });
 
+  test("a level of which all was dropped is as final as the tiles that fill it again", () => {
+    const store = new TileStore(SIZE_M, LEVELS, 2);
+    for (let at = 0; at <= 2; at++) store.apply(level(at, true));
+    const tiles = all(2, 1, flat);
+    store.apply({ ...frame("LEVEL", 2, [], tiles), settled: false });
+    expect(store.settled).toBe(true);
+    store.apply({ ...frame("FILL", 2, tiles), settled: true });
+    expect(store.settled).toBe(true);
+    store.apply({ ...frame("LEVEL", 2, [], tiles), settled: true });
+    store.apply({ ...frame("FILL", 2, tiles), settled: false });
+    expect(store.settled).toBe(false);
+  });
+
   test("refined levels and levels that were never sent do not count; a new connection begins anew", () => {
     const store = new TileStore(SIZE_M, LEVELS, 2);
     expect(store.settled).toBe(true);
