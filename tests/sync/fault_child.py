@@ -21,7 +21,7 @@ class Breaking(PlainSolver):
     def __init__(self) -> None:
         self.count = 0
 
-    def steps(self, *job: Any) -> Iterator[Level]:
+    def steps(self, *job: Any, **_: Any) -> Iterator[Level]:
         for level in super().steps(*job):
             self.count += 1
             kinds = (DeviceLostError, OutOfDeviceMemoryError, RuntimeError)

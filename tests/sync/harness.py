@@ -31,6 +31,7 @@ class Level:
     heights: NDArray[np.float32]
     settled: bool
     channel: c.Channel = c.Channel.HEIGHT
+    basis: Any = None
 
 
 class PlainSolver:
@@ -39,7 +40,7 @@ class PlainSolver:
     device_name = "arithmetic"
 
     def steps(
-        self, strokes: Sequence[c.Stroke], settings: c.TerrainSettings, levels: int | None = None
+        self, strokes: Sequence[c.Stroke], settings: c.TerrainSettings, levels: int | None = None, **_: Any
     ) -> Iterator[Level]:
         assert settings.size_m > 0
         height = float(sum(s.first[2] for s in strokes))
@@ -47,6 +48,9 @@ class PlainSolver:
             for level in range((levels or 0) + 1):
                 n = grid.samples(level)
                 yield Level(level, np.full((n, n), height, dtype=np.float32), settled)
+
+    def refiner(self, basis: object) -> Any:
+        raise AssertionError(f"nobody was given {basis}")
 
 
 def settings(data: Path, **over: Any) -> Settings:

@@ -24,8 +24,11 @@ from esker.store.journal import Journal
 class _NoSolver:
     device_name = "none"
 
-    def steps(self, *_: Any) -> Any:
+    def steps(self, *_: Any, **__: Any) -> Any:
         return iter(())
+
+    def refiner(self, _: Any) -> Any:
+        raise AssertionError("nothing is ever solved")
 
 
 class _NoTiles:

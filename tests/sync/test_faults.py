@@ -19,6 +19,7 @@ from esker.run import diagnose
 from esker.session import recovery
 from esker.session.recovery import Backoff, Devices, Fault
 from esker.solve.faults import BuildError, DeviceError, DeviceLostError, NoDeviceError, OutOfDeviceMemoryError
+from esker.solve.multigrid import DivergedError
 from esker.store.journal import Journal
 from tests.sync.harness import Level, LiveServer, Peer, PlainSolver, set_op, stroke
 
@@ -33,7 +34,7 @@ class Sick(PlainSolver):
         self.device_name, self.fault = device, fault
 
     def steps(
-        self, strokes: Sequence[c.Stroke], settings: c.TerrainSettings, levels: int | None = None
+        self, strokes: Sequence[c.Stroke], settings: c.TerrainSettings, levels: int | None = None, **_: Any
     ) -> Iterator[Level]:
         for result in super().steps(strokes, settings, levels):
             error = self.fault(result.level)
@@ -154,6 +155,22 @@ def test_errors_nobody_knows_are_tried_again_before_the_device_is_left(clinic: B
     peer.close()
 
 
+def test_equations_that_diverge_are_no_fault_of_the_device(clinic: Build) -> None:
+    """SPEC P80: however often it happens."""
+    ward, peer = clinic()
+    rest(peer, 0)
+    ward.faults["gpu"] = lambda _: DivergedError()
+    for n in range(1, 6):
+        draw(peer, n, 1)
+        assert note(peer, "not be settled") == str(DivergedError())
+        peer.seen.clear()
+    ward.faults.clear()
+    draw(peer, 6)
+    rest(peer, 10)
+    assert ward.made == ["gpu"]
+    peer.close()
+
+
 @pytest.mark.parametrize("names", [("numpy",), ("gpu", "numpy")])
 def test_without_a_device_that_works_the_room_says_so(clinic: Build, names: tuple[str, ...]) -> None:
     _, peer = clinic(names, unmakeable=("gpu",))
@@ -267,6 +284,7 @@ def test_what_an_exception_means() -> None:
     assert diagnose(MemoryError()) == Fault.MEMORY
     for kind in (DeviceLostError, BuildError, NoDeviceError, DeviceError):
         assert diagnose(kind("x")) == Fault.DEVICE
+    assert diagnose(DivergedError()) == Fault.JOB
     assert diagnose(ValueError("x")) == Fault.UNKNOWN
 
 

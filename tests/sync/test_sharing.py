@@ -196,6 +196,7 @@ class Finest:
     level: int
     heights: Any
     settled: bool
+    channel: c.Channel = c.Channel.HEIGHT
     basis: object = None
 
 
@@ -333,7 +334,7 @@ class Watched:
         self.worker.start()
         self.client = self.worker.add(levels, self.deliver, ignore)
 
-    def steps(self, strokes: Any, settings: Any, levels: int) -> Iterator[Any]:
+    def steps(self, strokes: Any, settings: Any, levels: int, **_: Any) -> Iterator[Any]:
         self.open.append(len(strokes))
         return self.solver.steps(strokes, settings, levels)
 

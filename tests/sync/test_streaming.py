@@ -55,7 +55,7 @@ def test_without_credit_the_window_closes(tmp_path: Path) -> None:
 
     class Noise(PlainSolver):
         def steps(
-            self, strokes: Sequence[c.Stroke], settings: c.TerrainSettings, levels: int | None = None
+            self, strokes: Sequence[c.Stroke], settings: c.TerrainSettings, levels: int | None = None, **_: Any
         ) -> Iterator[Level]:
             rng = np.random.default_rng(len(strokes))
             for level in super().steps(strokes, settings, levels):
@@ -145,7 +145,7 @@ class Failing(PlainSolver):
         self.calls = 0
 
     def steps(
-        self, strokes: Sequence[c.Stroke], settings: c.TerrainSettings, levels: int | None = None
+        self, strokes: Sequence[c.Stroke], settings: c.TerrainSettings, levels: int | None = None, **_: Any
     ) -> Iterator[Level]:
         for level in super().steps(strokes, settings, levels):
             self.calls += 1

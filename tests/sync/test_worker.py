@@ -29,7 +29,7 @@ class Turnstile:
         self.closed: list[int] = []
 
     def steps(
-        self, strokes: Sequence[c.Stroke], settings: c.TerrainSettings, levels: int | None = None
+        self, strokes: Sequence[c.Stroke], settings: c.TerrainSettings, levels: int | None = None, **_: Any
     ) -> Iterator[Level]:
         assert settings == SETTINGS
         try:
@@ -39,6 +39,9 @@ class Turnstile:
                     yield Level(level, FLAT, settled)
         finally:
             self.closed.append(len(strokes))
+
+    def refiner(self, basis: object) -> Any:
+        raise AssertionError(f"nobody was given {basis}")
 
 
 class Bench:

@@ -20,7 +20,7 @@ import numpy as np
 
 from esker import contract as c
 from esker.bench import _serving, stream
-from esker.session.ports import LevelResult
+from esker.session.ports import LevelResult, Refiner
 from esker.session.worker import Client, Job, Worker
 from esker.solve.solver import Solver
 from esker.version import VERSION
@@ -44,10 +44,15 @@ class _Timed:
         return self._solver.device_name
 
     def steps(
-        self, strokes: Sequence[c.Stroke], settings: c.TerrainSettings, levels: int | None = None
+        self,
+        strokes: Sequence[c.Stroke],
+        settings: c.TerrainSettings,
+        levels: int | None = None,
+        *,
+        basis: bool = False,
     ) -> Iterator[LevelResult | None]:
         """As of the solver."""
-        steps = self._solver.steps(strokes, settings, levels)
+        steps = self._solver.steps(strokes, settings, levels, basis=basis)
         took = self.slices.setdefault(self._solver.max_level if levels is None else levels, [])
         try:
             while True:
@@ -59,6 +64,10 @@ class _Timed:
                 yield result  # type: ignore[misc]
         finally:
             steps.close()  # type: ignore[attr-defined]
+
+    def refiner(self, basis: Any) -> Refiner:
+        """As of the solver."""
+        return self._solver.refiner(basis)
 
 
 _END: Final = object()

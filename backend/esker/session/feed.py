@@ -159,7 +159,7 @@ class TileFeed:
     # --- in the tile thread ---------------------------------------------------------------------------------------
 
     def _put(self, clock: int, result: LevelResult, show: bool) -> None:
-        channel = getattr(result, "channel", c.Channel.HEIGHT)
+        channel = result.channel
         try:
             self._server.put_level(clock, result.level, result.heights, result.settled, channel, show)
         except Exception:

@@ -75,6 +75,11 @@ class LevelResult(Protocol):
     @property
     def channel(self) -> c.Channel: ...
 
+    @property
+    def basis(self) -> Any:
+        """With the last result of a settled solve, if it was asked for: what ``Solver.refiner`` takes."""
+        ...
+
 
 class RefinedTile(Protocol):
     """One tile above the global levels (``solve/refine.py``)."""
@@ -114,8 +119,15 @@ class Solver(Protocol):
     def device_name(self) -> str: ...
 
     def steps(
-        self, strokes: Sequence[c.Stroke], settings: c.TerrainSettings, levels: int | None = None
+        self,
+        strokes: Sequence[c.Stroke],
+        settings: c.TerrainSettings,
+        levels: int | None = None,
+        *,
+        basis: bool = False,
     ) -> Iterator[LevelResult | None]: ...
+
+    def refiner(self, basis: Any) -> Refiner: ...
 
 
 SolverFactory = Callable[[str | None], Solver]

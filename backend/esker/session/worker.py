@@ -14,7 +14,7 @@ import logging
 import threading
 import time
 from collections.abc import Callable, Sequence
-from typing import Any, Final
+from typing import Final
 
 from esker.session.ports import LevelResult, Refinement, Solver, SolverFactory
 from esker.session.recovery import LAST_RESORT, Devices, Diagnose, Fault, unknown
@@ -170,10 +170,9 @@ class Worker:
         if self._standing and client.told != self._standing:
             client.told = self._standing
             client.tell(self._standing)
-        refines = client.refinement is not None and hasattr(self._solver, "refiner")
-        options: dict[str, Any] = {"basis": True} if refines else {}
+        refines = client.refinement is not None
         try:
-            client.steps = iter(self._solver.steps(job.strokes, job.settings, client.top, **options))
+            client.steps = iter(self._solver.steps(job.strokes, job.settings, client.top, basis=refines))
         except Exception as error:
             self._failed(client, job, error)
 
@@ -197,9 +196,8 @@ class Worker:
             self._deliver(client, job, result, show)
 
     def _deliver(self, client: Client, job: Job, result: LevelResult, show: bool) -> None:
-        basis = getattr(result, "basis", None)
-        if basis is not None and self._solver is not None and hasattr(self._solver, "refiner"):
-            client.refiner, client.looking = self._solver.refiner(basis), True
+        if result.basis is not None and self._solver is not None:
+            client.refiner, client.looking = self._solver.refiner(result.basis), True
         if client not in self._schedule.clients:
             return
         try:
@@ -255,6 +253,8 @@ class Worker:
         client.drop()
         if fault == Fault.MEMORY and client.top > 0:
             self._coarser(client)
+        elif fault == Fault.JOB:
+            client.tell(str(error))
         elif not self._devices.blame(fault) or not self._next_device(error):
             client.again_at = self._now() + AGAIN_AFTER
             client.tell(AGAIN)
