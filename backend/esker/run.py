@@ -27,6 +27,7 @@ from esker.session.worker import Worker
 from esker.settings import Settings
 from esker.solve.device import candidates
 from esker.solve.faults import DeviceError, OutOfDeviceMemoryError
+from esker.solve.multigrid import DivergedError
 from esker.solve.solver import Solver as OpenClSolver
 from esker.store.access import Access
 from esker.store.journal import Journal
@@ -187,6 +188,8 @@ def diagnose(error: Exception) -> Fault:
     """What an exception of the solver means for the worker."""
     if isinstance(error, (OutOfDeviceMemoryError, MemoryError)):
         return Fault.MEMORY
+    if isinstance(error, DivergedError):
+        return Fault.JOB
     return Fault.DEVICE if isinstance(error, DeviceError) else Fault.UNKNOWN
 
 

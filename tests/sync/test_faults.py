@@ -1,4 +1,4 @@
-"""Devices that fail under a room: it says so, goes on with less, loses no op, and comes back (SPEC P75 to P79)."""
+"""Devices that fail under a room: it says so, goes on with less, loses no op, and comes back (SPEC P75 to P80)."""
 
 from __future__ import annotations
 

@@ -26,6 +26,8 @@ class Fault(Enum):
     """It does not fit the device; a coarser one may."""
     DEVICE = "device"
     """The device is lost, or does not work: it cannot be used for now."""
+    JOB = "job"
+    """The job itself: no device would do better, and trying again is in vain until it changes."""
     UNKNOWN = "unknown"
     """Perhaps this job, perhaps the device."""
 
@@ -102,6 +104,8 @@ class Devices:
 
     def blame(self, fault: Fault) -> bool:
         """Counts a failed job; True when the device should be left."""
+        if fault == Fault.JOB:
+            return False
         self.failures += 1
         return self.current != LAST_RESORT and (fault != Fault.UNKNOWN or self.failures >= MAX_FAILURES)
 

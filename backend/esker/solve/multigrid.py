@@ -22,6 +22,17 @@ UPDATE_SHARE = 0.5
 STALLED = 0.8
 STALLED_AFTER = 8
 """After this many cycles a ratio of two updates above STALLED means that float32 has nothing left to gain."""
+DIVERGED = 10.0
+"""An update above this many times the first one does not come back: the corrections feed on themselves."""
+DOUBTFUL = 2.0
+"""What stalls above this many times its first update may diverge slowly: some cycles more tell."""
+
+
+class DivergedError(RuntimeError):
+    """The cycles lead away from the solution. The message is a sentence for people."""
+
+    def __init__(self, message: str = "The ground could not be settled: its equations did not converge.") -> None:
+        super().__init__(message)
 
 
 class System(Protocol):
@@ -96,12 +107,20 @@ def cycle(system: System) -> None:
 
 
 def converge(system: System, tolerance: float) -> Iterator[None]:
-    """Cycles until the estimated error of the finest level is below ``tolerance``; leaves off between them."""
-    before = math.inf
+    """Cycles until the estimated error of the finest level is below ``tolerance``; leaves off between them.
+
+    Raises DivergedError when an update is not finite, or above DIVERGED times the first.
+    """
+    first = before = math.inf
     for k in range(1, MAX_CYCLES + 1):
         cycle(system)
         update = system.change("v", "u")
-        if update * UPDATE_SHARE < tolerance or (k >= STALLED_AFTER and update > STALLED * before):
+        first = update if k == 1 else first
+        if not math.isfinite(update) or update > DIVERGED * first:
+            raise DivergedError
+        if update * UPDATE_SHARE < tolerance:
+            return
+        if k >= STALLED_AFTER and STALLED * before < update <= DOUBTFUL * first:
             return
         before = update
         yield

@@ -222,7 +222,7 @@ class Solver:
         warm: NDArray[np.float32] | None,
         basis: bool,
     ) -> Generator[LevelResult | None]:
-        """One solve. A workspace whose device failed is dropped, all others are kept for the next one."""
+        """One solve. A workspace whose device failed, or that diverged, is dropped, all others are kept."""
         with guarded(self._device):
             workspace = self._take(strokes, settings, top)
             keep, loaded = True, False
@@ -243,7 +243,7 @@ class Solver:
                 raise
             except BaseException as error:
                 workspace.packer.forget()
-                keep = not is_fault(error)
+                keep = not (is_fault(error) or isinstance(error, multigrid.DivergedError))
                 raise
             finally:
                 if keep:
@@ -344,8 +344,13 @@ def _to_rest(w: Workspace, settings: TerrainSettings) -> Iterator[None]:
 
 
 def _settled(w: Workspace, strokes: Sequence[Stroke], settings: TerrainSettings, basis: bool) -> Iterator[LevelResult]:
-    """All levels of a system at rest: the finest, and its injections."""
+    """All levels of a system at rest: the finest, and its injections.
+
+    Raises DivergedError for heights that are not finite: a kernel's largest update passes over what is not a number.
+    """
     heights = _frozen(w.read(w.top))
+    if not np.isfinite(heights).all():
+        raise multigrid.DivergedError
     *coarser, finest = enumerate(_injections(heights))
     for level, samples in coarser:
         yield LevelResult(level, samples, settled=True)
