@@ -12,6 +12,11 @@ from typing import NamedTuple
 
 from esker.contract import QUANTA_PER_CELL, TILE_CELLS
 
+SOLVE_FIELDS = 19
+"""Float32 a sample that a solve holds: 12 fields of the finest level, and a third of the 21 of those below it."""
+SOLVE_PADDING = 96
+"""Columns more that padded rows and scratch come to: in between, as kernels for GPUs need less than those for CPUs."""
+
 
 def cells(level: int) -> int:
     """Cells along one side of a level."""
@@ -31,6 +36,15 @@ def spacing(level: int, size_m: float) -> float:
 def quantum(level: int, size_m: float) -> float:
     """Height quantisation step of a level, metres (DESIGN 6)."""
     return spacing(level, size_m) / QUANTA_PER_CELL
+
+
+def solve_bytes(level: int) -> int:
+    """Memory that a solve up to ``level`` holds, to share it out by: 83 MiB at level 4, four times as much a level.
+
+    From level 3 up within a tenth of what ``solve.workspaces.planned_bytes`` says exactly, for a known device.
+    """
+    n = samples(level)
+    return 4 * SOLVE_FIELDS * n * (n + SOLVE_PADDING)
 
 
 class TileKey(NamedTuple):

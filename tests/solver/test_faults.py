@@ -18,6 +18,8 @@ import numpy as np
 import pyopencl as cl
 import pytest
 
+from esker import grid
+from esker.contract import MAX_LEVEL
 from esker.solve import device as devices
 from esker.solve import proof, workspaces
 from esker.solve.device import Device, candidates, open_device, row_kernels
@@ -245,6 +247,15 @@ def test_the_plan_is_what_is_allocated(used: Solver, monkeypatch: pytest.MonkeyP
     planned, largest = workspaces.planned_bytes(used._device, top)
     assert 0 <= sum(sizes) - planned < 100_000
     assert largest == max(sizes)
+
+
+@pytest.mark.parametrize("level", range(3, MAX_LEVEL + 1))
+@pytest.mark.parametrize("strips", [1, 8])
+def test_what_solves_are_shared_out_by_is_about_the_plan(used: Solver, strips: int, level: int) -> None:
+    """SPEC S26."""
+    assert used._device is not None
+    planned, _ = workspaces.planned_bytes(replace(used._device, strips=strips), level)
+    assert grid.solve_bytes(level) == pytest.approx(planned, rel=0.1)
 
 
 def test_build_failure(monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:

@@ -13,9 +13,9 @@ import pytest
 from esker import contract as c
 from esker import grid
 from esker.bench import stream
-from esker.grid import TileKey
+from esker.grid import TileKey, solve_bytes
 from esker.session import schedule as module
-from esker.session.schedule import Client, Job, Schedule, solve_bytes
+from esker.session.schedule import Client, Job, Schedule
 from esker.session.worker import Worker
 from esker.solve.solver import Solver
 from tests.sync.harness import Level

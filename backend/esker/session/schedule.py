@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from esker import contract as c
-from esker.grid import TileKey
+from esker.grid import TileKey, solve_bytes
 from esker.session.ports import LevelResult, RefinedTile, Refinement, Refiner
 from esker.session.recovery import Backoff
 
@@ -26,8 +26,6 @@ HOLD: Final = 0.050
 PATIENCE: Final = 0.150
 BUDGET: Final = min(3 << 30, os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // 8)
 """Bytes for solves in progress, of all rooms together."""
-LEVEL_4_BYTES: Final = 91 << 20
-"""One solve with 1025 x 1025 samples; four times as much a level."""
 
 COARSE, FINER, SETTLE, REFINE = range(4)
 
@@ -155,11 +153,6 @@ class Client:
         self._lead = {coarse: now - came for coarse, came in self._came.items()}
         self.previewing, self.finest_at, self._previewed = False, now, self.clock
         return True
-
-
-def solve_bytes(top: int) -> int:
-    """Memory that a solve up to level ``top`` holds, about."""
-    return int(LEVEL_4_BYTES * 4.0 ** (top - 4))
 
 
 class Schedule:

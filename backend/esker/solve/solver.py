@@ -43,8 +43,6 @@ SPARE_BYTES = 5 << 30
 fifth of the machine's: a room whose workspace was given to another one has all its strokes rasterised again."""
 PACED_ABOVE = 4
 """Up to this level a whole preview takes less time than one cycle of a big terrain."""
-WORKSPACE_BYTES = 91 << 20
-"""At level 4; four times as much a level."""
 
 
 @dataclass(frozen=True)
@@ -271,26 +269,21 @@ class Solver:
         idle = [w for w in self._spare if w.top == top]
         best = max(idle, key=lambda w: w.packer.likeness(strokes, settings), default=None)
         if best is not None and 2 * best.packer.likeness(strokes, settings) < len(strokes):
-            best = idle[0] if self._kept() + _bytes(top) > self._spare_bytes else None
+            best = idle[0] if self._kept() + grid.solve_bytes(top) > self._spare_bytes else None
         if best is not None:
             self._spare.remove(best)
             return best
-        while self._spare and self._kept() + _bytes(top) > self._spare_bytes:
+        while self._spare and self._kept() + grid.solve_bytes(top) > self._spare_bytes:
             self._spare.pop(0)
         return new_workspace(self._device, top)
 
     def _kept(self) -> int:
-        return sum(_bytes(w.top) for w in self._spare)
+        return sum(grid.solve_bytes(w.top) for w in self._spare)
 
     def _give(self, workspace: Workspace) -> None:
         self._spare.append(workspace)
         while len(self._spare) > 1 and self._kept() > self._spare_bytes:
             self._spare.pop(0)
-
-
-def _bytes(top: int) -> int:
-    """What a workspace takes, about."""
-    return int(WORKSPACE_BYTES * 4.0 ** (top - 4))
 
 
 def preview_gradient_cycles(settings: TerrainSettings) -> int:
