@@ -351,8 +351,7 @@ class Watched:
 
 
 def test_a_solve_left_while_it_rasterises_leaves_no_trace(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("esker.solve.levels.RASTER_BINS", 40)
-    monkeypatch.setattr("esker.solve.gpu_levels.RASTER_BINS", 40)
+    monkeypatch.setattr("esker.solve.device_workspace.RASTER_BINS", 40)
     strokes = stream.fifty().strokes
     solver = Solver(max_level=2)
     if solver.device_name.startswith("NumPy"):

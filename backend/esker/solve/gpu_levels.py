@@ -6,42 +6,29 @@ lie behind each other. Level 0's buffers also hold the levels below it, which th
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from esker import grid
-from esker.contract import TILE_CELLS, Stroke, TerrainSettings
-from esker.solve import raster
-from esker.solve.constraints import Packer
+from esker.contract import TILE_CELLS
 from esker.solve.device import Device
+from esker.solve.device_workspace import DeviceWorkspace
+from esker.solve.fields import Fields, Shape
 from esker.solve.gpu_program import CHAIN, CHAIN_ITEMS, CHANGE_ITEMS, Plan
-from esker.solve.reference import BOTTOM_LEVELS, chebyshev_weights
-from esker.solve.tables import BIN, RASTER_BINS, Tables, Window
+from esker.solve.queue import Queue
+from esker.solve.reference import BOTTOM_LEVELS
+from esker.solve.tables import BIN
 
 LINE = 32
 """Floats of a cache line."""
 BLOCK = (32, 8)
 """Work-group of the kernels that do one sample a work-item."""
-MOST_BOUND = 512
-"""Kernels with their arguments set that a launcher keeps; a solve of seven levels comes back to some 200."""
 MOST_CHAINED = 3
 """Restrictions that one launch does."""
 CHANGE_GROUPS = 512
 """At most so many partial results of ``change`` are left to the host."""
-
-
-@dataclass(frozen=True)
-class Shape:
-    """One level's layout; ``stride`` floats from one channel to the next."""
-
-    level: int
-    n: int
-    pitch: int
-    stride: int
 
 
 def _lines(floats: int) -> int:
@@ -64,61 +51,23 @@ def shape_of(level: int) -> Shape:
     return Shape(level, n, _lines(n), bottom_table()[1] if level == 0 else n * _lines(n))
 
 
-def fields_of(top: int, static: str) -> list[tuple[str, int]]:
-    """Name and level of every field of a system (``multigrid``); ``static`` names the static part of f."""
-    out = []
-    for level in range(top + 1):
-        inner = set() if level == top and top > 0 else {"b", "e", "t"}
-        out += [(name, level) for name in sorted({"d", "f", "u", "v", static} | inner)]
-    return out
-
-
-class GpuLauncher:
-    """A queue with its kernels and constant tables. Arguments of a launch that comes again are set only once."""
+class GpuLauncher(Queue):
+    """A queue with its kernels. Arguments of a launch that comes again are set only once."""
 
     def __init__(self, device: Device) -> None:
-        import pyopencl as cl
-
         assert device.plan is not None, "opened for row-wise kernels"
-        self.cl, self.device, self.queue = cl, device, device.queue
+        super().__init__(device, bottom_table()[0])
         self.plan: Plan = device.plan
-        self.bound: dict[tuple[Any, ...], Any] = {}
         self.launches = 0
-        self.weights = self.constant(chebyshev_weights().astype(np.float32))
-        self.table = self.constant(bottom_table()[0])
         self.partial = self.zeros(CHANGE_GROUPS)
-
-    def zeros(self, floats: int) -> Any:
-        """A new buffer of zeros."""
-        buffer = self.cl.Buffer(self.device.context, self.cl.mem_flags.READ_WRITE, size=4 * max(floats, 1))
-        self.cl.enqueue_fill_buffer(self.queue, buffer, np.zeros(1, dtype=np.float32), 0, buffer.size)
-        return buffer
-
-    def constant(self, array: NDArray[Any]) -> Any:
-        """A read-only copy of a host array (one zero when it is empty)."""
-        host = np.ascontiguousarray(array) if array.size else np.zeros(1, dtype=array.dtype)
-        flags = self.cl.mem_flags.READ_ONLY | self.cl.mem_flags.COPY_HOST_PTR
-        return self.cl.Buffer(self.device.context, flags, hostbuf=host)
 
     def run(self, name: str, groups: tuple[int, ...], block: tuple[int, ...], *args: Any) -> None:
         """Enqueue ``groups`` work-groups of ``block`` work-items, with arguments that live as long as the launcher."""
-        key = (name, args)
-        kernel = self.bound.pop(key, None)
-        if kernel is None:
-            kernel = self._kernel(name, args)
-            if len(self.bound) >= MOST_BOUND:
-                del self.bound[next(iter(self.bound))]
-        self.bound[key] = kernel
-        self._enqueue(kernel, groups, block)
+        self._enqueue(self.bound(name, *args), groups, block)
 
     def run_once(self, name: str, groups: tuple[int, ...], block: tuple[int, ...], *args: Any) -> None:
         """The same with arguments that will not come again."""
-        self._enqueue(self._kernel(name, args), groups, block)
-
-    def _kernel(self, name: str, args: tuple[Any, ...]) -> Any:
-        kernel = self.cl.Kernel(self.device.program, name)
-        kernel.set_args(*args)
-        return kernel
+        self._enqueue(self.once(name, args), groups, block)
 
     def _enqueue(self, kernel: Any, groups: tuple[int, ...], block: tuple[int, ...]) -> None:
         self.launches += 1
@@ -130,19 +79,13 @@ def _blocks(columns: int, rows: int) -> tuple[int, int]:
     return -(-columns // BLOCK[0]), -(-rows // BLOCK[1])
 
 
-class GpuSystem:
+class GpuSystem(Fields):
     """``multigrid.System`` on a GPU. Fields and their meaning: see there; ``static`` names the static part of f."""
 
     def __init__(self, launcher: GpuLauncher, top: int, channels: int, static: str) -> None:
-        self.top, self.channels, self.static = top, channels, static
+        super().__init__(launcher, shape_of, top, channels, static)
         self.launch = launcher
-        self.shapes = {level: shape_of(level) for level in range(top + 1)}
-        self.eps = dict.fromkeys(range(top + 1), 0.0)
         self._waiting: list[int] = []
-        self.fields: dict[tuple[str, int], Any] = {
-            (name, level): launcher.zeros(self.shapes[level].stride * (1 if name == "d" else channels))
-            for name, level in fields_of(top, static)
-        }
         coarsest = ((TILE_CELLS >> BOTTOM_LEVELS) + 1) ** 2
         self.matrix = launcher.zeros(coarsest * coarsest)
 
@@ -219,10 +162,6 @@ class GpuSystem:
             np.float32(self.eps[0]), self.launch.weights, np.int32(cycles),
         )  # fmt: skip
 
-    def swap(self, level: int) -> None:
-        """See ``multigrid.System``."""
-        self.fields["u", level], self.fields["v", level] = self.fields["v", level], self.fields["u", level]
-
     def change(self, old: str, new: str) -> float:
         """See ``multigrid.System``."""
         self._restrict_now()
@@ -240,31 +179,12 @@ class GpuSystem:
     def get(self, name: str, level: int) -> NDArray[np.float32]:
         """A field as (channels, n, n); d has one channel."""
         self._restrict_now()
-        shape = self.shapes[level]
-        channels = 1 if name == "d" else self.channels
-        out = np.empty((channels, shape.n, shape.n), dtype=np.float32)
-        for c in range(channels):
-            self.launch.cl.enqueue_copy(self.launch.queue, out[c], self.fields[name, level], **_window(shape, c))
-        return out
+        return super().get(name, level)
 
     def put(self, name: str, level: int, value: NDArray[Any]) -> None:
         """Set a field from (channels, n, n)."""
         self._restrict_now()
-        for c, channel in enumerate(value):
-            host = np.ascontiguousarray(channel, dtype=np.float32)
-            field = self.fields[name, level]
-            self.launch.cl.enqueue_copy(self.launch.queue, field, host, **_window(self.shapes[level], c))
-
-
-def _window(shape: Shape, channel: int) -> dict[str, Any]:
-    """A channel's samples, without padding, for a rectangular copy."""
-    return {
-        "host_pitches": (4 * shape.n,),
-        "host_origin": (0, 0),
-        "region": (4 * shape.n, shape.n),
-        "buffer_pitches": (4 * shape.pitch,),
-        "buffer_origin": (4 * channel * shape.stride, 0),
-    }
+        super().put(name, level, value)
 
 
 class Bins:
@@ -280,47 +200,13 @@ class Bins:
         self.launch.run_once(name, size, (BIN, BIN), *args)
 
 
-class GpuWorkspace:
+class GpuWorkspace(DeviceWorkspace[GpuSystem]):
     """``solver.Workspace`` on a GPU."""
 
     def __init__(self, device: Device, top: int) -> None:
-        self.top = top
         self.launch = GpuLauncher(device)
-        self.gradient = GpuSystem(self.launch, top, 2, "f")
-        self.height = GpuSystem(self.launch, top, 1, "s")
-        self.packer = Packer(top)
-        self.size_m = 1.0
-
-    def load(self, strokes: Sequence[Stroke], settings: TerrainSettings) -> None:
-        """``loading`` without a pause."""
-        for _ in self.loading(strokes, settings):
-            pass
-
-    def loading(self, strokes: Sequence[Stroke], settings: TerrainSettings) -> Iterator[None]:
-        """Rasterise what changed since the last set, and coarsen; may be left between bands of bins."""
-        tables, window = self.packer.pack(strokes, settings)
-        self.size_m = tables.size_m
-        if window is None:
-            return
-        for count, band in enumerate(window.bands(RASTER_BINS)):
-            if count:
-                self.launch.queue.finish()
-                yield
-            self.rasterise(tables, band)
-        self.gradient.coarsen(tables.screening, window.sample_rows)
-        self.height.coarsen(tables.screening, window.sample_rows)
-
-    def warm(self, heights: NDArray[np.float32]) -> None:
-        """Start the height step from these heights of the finest level instead of from coarser levels."""
-        fixed = self.height.get("d", self.top) < 0
-        self.height.put("u", self.top, np.where(fixed, self.height.get("s", self.top), heights[None]))
-
-    def rasterise(self, tables: Tables, window: Window) -> None:
-        """Constraints of the finest level inside a window of bins."""
-        shape, h, g = self.height.shapes[self.top], self.height.fields, self.gradient.fields
-        fields = (h["d", self.top], h["s", self.top], g["d", self.top], g["f", self.top])
-        target = raster.Target(*fields, shape.pitch, shape.stride)
-        raster.rasterise(Bins(self.launch), tables, window, target)
+        gradient, height = GpuSystem(self.launch, top, 2, "f"), GpuSystem(self.launch, top, 1, "s")
+        super().__init__(self.launch, gradient, height, Bins(self.launch))
 
     def guide(self, level: int) -> None:
         """f of the height step at ``level`` from u of the gradient step."""
@@ -330,11 +216,3 @@ class GpuWorkspace:
             self.gradient.fields["u", level], h["f", level], i(shape.n), i(shape.pitch), i(shape.stride),
             np.float32(grid.spacing(level, self.size_m)),
         )  # fmt: skip
-
-    def read(self, level: int) -> NDArray[np.float32]:
-        """Heights of a level, metres."""
-        return np.asarray(self.height.get("u", level)[0])
-
-    def read_gradient(self) -> NDArray[np.float32]:
-        """Both gradient components of the finest level, (2, n, n), metres per metre."""
-        return self.gradient.get("u", self.top)

@@ -195,7 +195,7 @@ class NumpySystem:
 
 
 class NumpyWorkspace:
-    """``levels.Workspace`` in float64 NumPy: serves when there is no OpenCL device."""
+    """``solver.Workspace`` in float64 NumPy: serves when there is no OpenCL device."""
 
     def __init__(self, top: int) -> None:
         self.top = top

@@ -91,7 +91,7 @@ class Pyramid:
 
 
 class Workspace(Protocol):
-    """Memory and kernels for one solve at a time of one finest level; ``levels.ClWorkspace`` says what each does."""
+    """Memory and kernels for one solve at a time of one finest level; ``device_workspace`` says what each does."""
 
     top: int
     packer: Packer

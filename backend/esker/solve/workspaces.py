@@ -15,6 +15,7 @@ from esker import grid
 from esker.solve import gpu_levels, levels
 from esker.solve.device import Device
 from esker.solve.faults import OutOfDeviceMemoryError, finished
+from esker.solve.fields import fields_of
 from esker.solve.reference import NumpyWorkspace
 
 if TYPE_CHECKING:
@@ -69,7 +70,7 @@ def planned_bytes(device: Device, top: int) -> tuple[int, int]:
     rows = device.plan is None
     floats = []
     for channels, static in ((2, "f"), (1, "s")):
-        for name, level in gpu_levels.fields_of(top, static):
+        for name, level in fields_of(top, static):
             stride = (levels if rows else gpu_levels).shape_of(level).stride
             floats.append(stride * (1 if name == "d" else channels) + (levels.PAD if rows else 0))
     if rows:
