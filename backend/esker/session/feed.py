@@ -22,8 +22,9 @@ from typing import Final
 from esker import contract as c
 from esker.grid import TileKey
 from esker.session.outbox import Outbox
-from esker.session.ports import ClientTiles, LevelResult, RefinedTile, Tiles
+from esker.session.ports import ClientTiles, LevelResult, Tiles
 from esker.session.tilethread import TileThread
+from esker.tiles.delivery import RefinedTile
 
 log = logging.getLogger("esker.feed")
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from esker import contract as c
 from esker.grid import TileKey
 from esker.store.journal import Loaded, Row
+from esker.tiles.delivery import RefinedTile
 
 
 class FramePlan(Protocol):
@@ -79,19 +80,6 @@ class LevelResult(Protocol):
     def basis(self) -> Any:
         """With the last result of a settled solve, if it was asked for: what ``Solver.refiner`` takes."""
         ...
-
-
-class RefinedTile(Protocol):
-    """One tile above the global levels (``solve/refine.py``)."""
-
-    @property
-    def key(self) -> TileKey: ...
-
-    @property
-    def heights(self) -> NDArray[np.float32]: ...
-
-    @property
-    def content(self) -> bytes: ...
 
 
 class Refiner(Protocol):

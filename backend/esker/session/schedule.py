@@ -17,8 +17,9 @@ from typing import Final
 
 from esker import contract as c
 from esker.grid import TileKey, solve_bytes
-from esker.session.ports import LevelResult, RefinedTile, Refinement, Refiner
+from esker.session.ports import LevelResult, Refinement, Refiner
 from esker.session.recovery import Backoff
+from esker.tiles.delivery import RefinedTile
 
 FINEST_WITHIN: Final = 0.150
 HOLD: Final = 0.050

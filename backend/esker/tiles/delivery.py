@@ -34,8 +34,9 @@ TAU_STEP: Final = 1.3
 AMPLITUDES: Final = (Channel.AMPLITUDE, Channel.ROUGHNESS)
 
 
-class Made(Protocol):
-    """A tile as the refiner makes it (``solve/refine.py``): heights (65, 65) float32, metres."""
+class RefinedTile(Protocol):
+    """A tile as the refiner makes it (``solve/refine.py``): heights (65, 65) float32, metres;
+    content: digest of all that it depends on."""
 
     @property
     def key(self) -> TileKey: ...
@@ -95,7 +96,7 @@ class TileServer:
                 self.refined.begin(clock)
         return changed
 
-    def put_tile(self, clock: int, tile: Made) -> bool:
+    def put_tile(self, clock: int, tile: RefinedTile) -> bool:
         """Takes a refined tile of the settled solve at ``clock``; False when it has been overtaken.
 
         Raises ValueError for a level that is not refined here, a wrong shape, NaN or infinity.
