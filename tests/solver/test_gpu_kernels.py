@@ -1,4 +1,4 @@
-"""The kernels for GPUs against their NumPy float64 twins and against the row-wise kernels (SPEC S2, S15, S22).
+"""The kernels for GPUs by themselves and against the row-wise ones (SPEC S2, S7, S15, S22); see ``test_every_kernel``.
 
 Where there is no GPU they run on PoCL's CPU device, which has work-groups and local memory too.
 """
@@ -10,37 +10,24 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from esker import grid
 from esker.bench import gpu_model
-from esker.contract import Stroke, TerrainSettings
-from esker.solve import device as devices
-from esker.solve import gpu_program, reference, reference_raster
-from esker.solve.constraints import pack
-from esker.solve.device import Device, open_device
+from esker.contract import TerrainSettings
+from esker.solve import reference
+from esker.solve.device import Device
 from esker.solve.gpu_levels import GpuLauncher, GpuSystem, GpuWorkspace
 from esker.solve.gpu_program import Plan, plan
 from esker.solve.levels import ClWorkspace
 from esker.solve.solver import Solver, _previews, _to_rest
 from tests.solver.scenes import ENDLESS, PINNED, SCENES, SETTINGS, SIZE
-
-Field = NDArray[np.float64]
-LEVELS = (1, 2, 3)
-EPS = 0.01
-SMALLEST = plan(256, 30 << 10, 1)
-"""Tiles for an integrated GPU with work-groups of 256 and less than 32 KiB of local memory."""
+from tests.solver.twins import Field, close, edited, fill, noise, tile_device
 
 
 @pytest.fixture(scope="module", params=["full", "smallest"])
 def tiles(request: pytest.FixtureRequest) -> Device:
     """A device with tile kernels, as large as it can hold them and as small as they come."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("ESKER_KERNELS", "tiles")
-        patch.setattr(devices, "_opened", {})
-        if request.param == "smallest":
-            patch.setattr(gpu_program, "plan_of", lambda _: SMALLEST)
-        found = open_device()
+    found = tile_device(request.param)
     if found is None:
         pytest.skip("no OpenCL device")
     return found
@@ -58,48 +45,10 @@ def plan_of(device: Device) -> Plan:
     return device.plan
 
 
-def noise(shape: tuple[int, ...], seed: int = 0) -> Field:
-    return np.random.default_rng(seed).normal(size=shape).astype(np.float32).astype(np.float64)
-
-
-def stiffness(n: int, seed: int = 1) -> Field:
-    """Free, sprung and fixed samples, shape (1, n, n)."""
-    rng = np.random.default_rng(seed)
-    d = np.where(rng.random((1, n, n)) < 0.3, rng.random((1, n, n)), 0.0)
-    return np.where(rng.random((1, n, n)) < 0.05, -1.0, d).astype(np.float32).astype(np.float64)
-
-
-def close(actual: NDArray[np.float32], expected: Field, scale: float = 1.0) -> None:
-    assert actual.shape == expected.shape
-    assert np.abs(actual - expected).max() < 2e-5 * scale * max(1.0, np.abs(expected).max())
-
-
 def system(device: Device, level: int, channels: int) -> tuple[GpuSystem, dict[str, Field]]:
-    """A system whose fields of ``level`` and ``level - 1`` are noise, and the same fields for the twin."""
-    n, m = grid.samples(level), grid.samples(level - 1)
+    """A system of noise, and the same fields for the twin."""
     s = GpuSystem(GpuLauncher(device), level, channels, "f")
-    s.eps = {k: EPS * 4.0 ** (level - k) for k in range(level + 1)}
-    host = {"d": stiffness(n), "f": noise((channels, n, n), 2), "u": noise((channels, n, n), 3)}
-    host["e"] = noise((channels, m, m), 4)
-    for name in ("d", "f", "u"):
-        s.put(name, level, host[name])
-    s.put("e", level - 1, host["e"])
-    return s, host
-
-
-@pytest.mark.parametrize("level", LEVELS)
-@pytest.mark.parametrize("channels", [1, 2])
-@pytest.mark.parametrize("start", ["zero", "guess", "both"])
-def test_visit(tiles: Device, level: int, channels: int, start: str) -> None:
-    s, host = system(tiles, level, channels)
-    guess = None if start == "zero" else "u"
-    correction = None if start == "guess" else "e"
-    s.visit(level, rhs="f", out="v", guess=guess, correction=correction, residual=True)
-    u, coarse = reference.visit(
-        host["u"] if guess else None, host["e"] if correction else None, host["f"], host["d"], EPS
-    )
-    close(s.get("v", level), u)
-    close(s.get("b", level - 1), coarse)
+    return s, fill(s)
 
 
 @pytest.mark.parametrize("channels", [1, 2])
@@ -129,24 +78,6 @@ def test_visit_mirrors(tiles: Device, channels: int) -> None:
     assert np.array_equal(s.get("b", 1)[:, ::-1, ::-1], straight[1])
 
 
-def test_visit_without_residual(tiles: Device) -> None:
-    s, host = system(tiles, 2, 2)
-    b = noise(host["e"].shape, 8)
-    s.put("b", 1, b)
-    s.visit(2, rhs="f", out="v", guess="u", correction="e", residual=False)
-    close(s.get("v", 2), reference.visit(host["u"], host["e"], host["f"], host["d"], EPS)[0])
-    assert np.array_equal(s.get("b", 1), b), "nobody asked for it"
-
-
-@pytest.mark.parametrize("level", LEVELS)
-def test_restriction(tiles: Device, level: int) -> None:
-    s, _ = system(tiles, level + 1, 2)
-    b = noise((2, grid.samples(level), grid.samples(level)), 7)
-    s.put("b", level, b)
-    s.restrict(level)
-    close(s.get("b", level - 1), reference.restriction(b))
-
-
 @pytest.mark.parametrize(("level", "channels", "launches"), [(2, 1, 1), (2, 2, 1), (3, 2, 1), (4, 1, 2)])
 def test_restrictions_behind_each_other(tiles: Device, channels: int, level: int, launches: int) -> None:
     """Down to level 0 in few launches, with the bits of one launch a level."""
@@ -164,55 +95,6 @@ def test_restrictions_behind_each_other(tiles: Device, channels: int, level: int
     close(fused[-1], reference.restriction(b))
 
 
-@pytest.mark.parametrize("level", LEVELS)
-@pytest.mark.parametrize("channels", [1, 2])
-def test_coarsen(tiles: Device, level: int, channels: int) -> None:
-    s, host = system(tiles, level, channels)
-    s.coarsen(EPS)
-    d, f = host["d"], host["f"]
-    for k in range(level - 1, -1, -1):
-        d, f = reference.coarsen(d, f)
-        close(s.get("d", k), d)
-        close(s.get("f", k), f)
-
-
-@pytest.mark.parametrize("channels", [1, 2])
-@pytest.mark.parametrize("cycles", [1, 3])
-def test_bottom(tiles: Device, channels: int, cycles: int) -> None:
-    s, host = system(tiles, 1, channels)
-    s.coarsen(EPS)
-    twin = reference.NumpySystem(host["d"], host["f"], EPS, 1)
-    s.bottom(rhs="f", out="u", cycles=cycles)
-    twin.bottom(rhs="f", out="u", cycles=cycles)
-    close(s.get("u", 0), twin.fields["u", 0], scale=10)
-
-
-def test_lone_bottom_settles_fixed_samples(tiles: Device) -> None:
-    """Level 0 as the finest level has fixed samples: the bottom cycles alone must settle it."""
-    s = GpuSystem(GpuLauncher(tiles), 0, 1, "f")
-    d, f = stiffness(65), noise((1, 65, 65))
-    s.put("d", 0, d)
-    s.put("f", 0, f)
-    s.coarsen(EPS)
-    s.bottom(rhs="f", out="u", cycles=24)
-    u = s.get("u", 0).astype(np.float64)
-    assert np.array_equal(u[d < 0], f[d < 0])
-    assert np.abs(reference.residual(u, f, d, EPS)).max() < 1e-5
-
-
-@pytest.mark.parametrize("level", LEVELS)
-def test_divergence(tiles: Device, level: int) -> None:
-    w = GpuWorkspace(tiles, level)
-    w.size_m = 1000.0
-    n = grid.samples(level)
-    d, f, g = stiffness(n), noise((1, n, n), 2), noise((2, n, n), 3)
-    w.height.put("d", level, d)
-    w.height.put("s", level, f)
-    w.gradient.put("u", level, g)
-    w.guide(level)
-    close(w.height.get("f", level), reference.divergence(f, d, g, grid.spacing(level, 1000.0)))
-
-
 @pytest.mark.parametrize("level", [1, 3])
 def test_change(tiles: Device, level: int) -> None:
     """The one sample that differs most is found wherever it is, and padding never is."""
@@ -228,44 +110,6 @@ def test_change(tiles: Device, level: int) -> None:
         v = host["u"].copy()
     s.put("v", level, v)
     assert s.change("u", "v") == 0
-
-
-@pytest.mark.parametrize("scene", ["one", "cross", "loops", "fifty"])
-@pytest.mark.parametrize("settings", [SETTINGS, PINNED], ids=["free", "pinned"])
-def test_rasterise(tiles: Device, scene: str, settings: TerrainSettings) -> None:
-    """As for the row-wise kernel: float32 may pick the neighbouring segment near a vertex."""
-    level = 3
-    w = GpuWorkspace(tiles, level)
-    w.load(SCENES[scene], settings)
-    c = reference_raster.rasterise(pack(SCENES[scene], settings, level))
-    pairs = (
-        (w.height.get("d", level)[0], c.height_d, 2e-3),
-        (w.height.get("s", level)[0], c.height_f, 2e-3),
-        (w.gradient.get("d", level)[0], c.gradient_d, 2e-3),
-        (w.gradient.get("f", level), c.gradient_f, 5e-2),
-    )
-    for actual, expected, loose in pairs:
-        error = np.abs(actual - expected) / max(1.0, np.abs(expected).max())
-        assert np.quantile(error, 0.97) < 1e-4
-        assert (error > loose).mean() < 2e-2
-    assert ((pairs[0][0] < 0) != (c.height_d < 0)).sum() <= 4
-
-
-def edited(strokes: list[Stroke]) -> list[Stroke]:
-    return [*strokes[:20], strokes[20].model_copy(update={"plateau_radius_m": 90.0}), *strokes[21:-3]]
-
-
-def test_a_dirty_window_gives_the_bits_of_a_full_raster(tiles: Device) -> None:
-    """SPEC S15: rasterising only what changed changes nothing, on any level."""
-    level, strokes = 3, SCENES["fifty"]
-    w, fresh = GpuWorkspace(tiles, level), GpuWorkspace(tiles, level)
-    w.load(strokes, SETTINGS)
-    w.load(edited(strokes), SETTINGS)
-    fresh.load(edited(strokes), SETTINGS)
-    for a, b in ((w.height, fresh.height), (w.gradient, fresh.gradient)):
-        for name in ("d", a.static):
-            for k in range(level + 1):
-                assert np.array_equal(a.get(name, k), b.get(name, k))
 
 
 @pytest.mark.parametrize(

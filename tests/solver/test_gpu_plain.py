@@ -12,17 +12,15 @@ from esker import grid
 from esker.contract import CHEBYSHEV_SWEEPS
 from esker.solve import device as devices
 from esker.solve import gpu_program
-from esker.solve.device import Device, open_device
+from esker.solve.device import Device
 from esker.solve.gpu_levels import BLOCK, GpuLauncher, GpuSystem, bottom_table
 from esker.solve.reference import BOTTOM_LEVELS, chebyshev_weights
-from tests.solver.test_gpu_kernels import EPS, noise, stiffness
+from tests.solver.twins import EPS, noise, stiffness, tile_device
 
 
 @pytest.fixture(scope="module")
 def tiles() -> Device:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("ESKER_KERNELS", "tiles")
-        found = open_device()
+    found = tile_device("full")
     if found is None:
         pytest.skip("no OpenCL device")
     return found

@@ -1,4 +1,4 @@
-"""Every OpenCL kernel against its NumPy float64 twin (SPEC S1, S2)."""
+"""The row-wise kernels by themselves, and their twins (SPEC S1, S2, S15); see ``test_every_kernel``."""
 
 from __future__ import annotations
 
@@ -8,67 +8,23 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
-from esker import grid
 from esker.solve import device as device_module
 from esker.solve import reference, reference_raster
 from esker.solve.constraints import Packer, bins, pack
 from esker.solve.device import Device
-from esker.solve.levels import PAD, ClSystem, ClWorkspace, Launcher
-from esker.solve.reference import BOTTOM_LEVELS
+from esker.solve.levels import PAD, ClSystem, Launcher
 from esker.solve.tables import STROKE_AT
 from tests.solver.scenes import PINNED, SCENES, SETTINGS
-
-Field = NDArray[np.float64]
-LEVELS = (1, 2, 3)
-EPS = 0.01
-
-
-def noise(shape: tuple[int, ...], seed: int = 0) -> Field:
-    return np.random.default_rng(seed).normal(size=shape).astype(np.float32).astype(np.float64)
-
-
-def stiffness(n: int, seed: int = 1) -> Field:
-    """Free, sprung and fixed samples, shape (1, n, n)."""
-    rng = np.random.default_rng(seed)
-    d = np.where(rng.random((1, n, n)) < 0.3, rng.random((1, n, n)), 0.0)
-    return np.where(rng.random((1, n, n)) < 0.05, -1.0, d).astype(np.float32).astype(np.float64)
-
-
-def close(actual: NDArray[np.float32], expected: Field, scale: float = 1.0) -> None:
-    assert actual.shape == expected.shape
-    assert np.abs(actual - expected).max() < 2e-5 * scale * max(1.0, np.abs(expected).max())
+from tests.solver.twins import EPS, LEVELS, Field, fill, noise
 
 
 def system(
     device: Device, level: int, channels: int, launch: Launcher | None = None
 ) -> tuple[ClSystem, dict[str, Field]]:
-    """A system whose fields of ``level`` and ``level - 1`` are noise, and the same fields for the twin."""
-    n, m = grid.samples(level), grid.samples(level - 1)
+    """A system of noise, and the same fields for the twin."""
     s = ClSystem(launch or Launcher(device, level), level, channels, "f")
-    s.eps = {k: EPS * 4.0 ** (level - k) for k in range(level + 1)}
-    host = {"d": stiffness(n), "f": noise((channels, n, n), 2), "u": noise((channels, n, n), 3)}
-    host["e"] = noise((channels, m, m), 4)
-    for name in ("d", "f", "u"):
-        s.put(name, level, host[name])
-    s.put("e", level - 1, host["e"])
-    return s, host
-
-
-@pytest.mark.parametrize("level", LEVELS)
-@pytest.mark.parametrize("channels", [1, 2])
-@pytest.mark.parametrize("start", ["zero", "guess", "both", "refresh"])
-def test_visit(device: Device, level: int, channels: int, start: str) -> None:
-    s, host = system(device, level, channels)
-    guess = None if start == "zero" else "u"
-    correction = None if start in ("guess", "refresh") else "e"
-    s.visit(level, rhs="f", out="v", guess=guess, correction=correction, residual=True)
-    u, coarse = reference.visit(
-        host["u"] if guess else None, host["e"] if correction else None, host["f"], host["d"], EPS
-    )
-    close(s.get("v", level), u)
-    close(s.get("b", level - 1), coarse)
+    return s, fill(s)
 
 
 @pytest.mark.parametrize("channels", [1, 2])
@@ -125,65 +81,6 @@ def test_visit_has_the_bits_of_its_steps(device: Device, plain: dict[str, Any], 
     assert np.array_equal(s.get("b", level - 1), s.get("plain", level - 1))
 
 
-@pytest.mark.parametrize("level", LEVELS)
-def test_restriction(device: Device, level: int) -> None:
-    s, _ = system(device, level + 1, 2)
-    b = noise((2, grid.samples(level), grid.samples(level)), 7)
-    s.put("b", level, b)
-    s.restrict(level)
-    close(s.get("b", level - 1), reference.restriction(b))
-
-
-@pytest.mark.parametrize("level", LEVELS)
-@pytest.mark.parametrize("channels", [1, 2])
-def test_coarsen(device: Device, level: int, channels: int) -> None:
-    s, host = system(device, level, channels)
-    s.coarsen(EPS)
-    d, f = host["d"], host["f"]
-    for k in range(level - 1, -1, -1):
-        d, f = reference.coarsen(d, f)
-        close(s.get("d", k), d)
-        close(s.get("f", k), f)
-
-
-@pytest.mark.parametrize("channels", [1, 2])
-@pytest.mark.parametrize("cycles", [1, 3])
-def test_bottom(device: Device, channels: int, cycles: int) -> None:
-    s, host = system(device, 1, channels)
-    s.coarsen(EPS)
-    twin = reference.NumpySystem(host["d"], host["f"], EPS, 1)
-    s.bottom(rhs="f", out="u", cycles=cycles)
-    twin.bottom(rhs="f", out="u", cycles=cycles)
-    close(s.get("u", 0), twin.fields["u", 0], scale=10)
-    assert len(twin.d) == 2 + BOTTOM_LEVELS
-
-
-def test_lone_bottom_settles_fixed_samples(device: Device) -> None:
-    """Level 0 as the finest level has fixed samples: the bottom cycles alone must settle it."""
-    s = ClSystem(Launcher(device, 0), 0, 1, "f")
-    d, f = stiffness(65), noise((1, 65, 65))
-    s.put("d", 0, d)
-    s.put("f", 0, f)
-    s.coarsen(EPS)
-    s.bottom(rhs="f", out="u", cycles=24)
-    u = s.get("u", 0).astype(np.float64)
-    assert np.array_equal(u[d < 0], f[d < 0])
-    assert np.abs(reference.residual(u, f, d, EPS)).max() < 1e-5
-
-
-@pytest.mark.parametrize("level", LEVELS)
-def test_divergence(device: Device, level: int) -> None:
-    w = ClWorkspace(device, level)
-    w.size_m = 1000.0
-    n = grid.samples(level)
-    d, f, g = stiffness(n), noise((1, n, n), 2), noise((2, n, n), 3)
-    w.height.put("d", level, d)
-    w.height.put("s", level, f)
-    w.gradient.put("u", level, g)
-    w.guide(level)
-    close(w.height.get("f", level), reference.divergence(f, d, g, grid.spacing(level, 1000.0)))
-
-
 def test_divergence_is_that_of_the_energy() -> None:
     """Half control volumes: weighted by them the divergence of any field sums to zero."""
     n = 17
@@ -225,31 +122,6 @@ def test_restriction_is_the_transpose_of_prolongation() -> None:
     assert left == pytest.approx(right, rel=1e-12)
 
 
-@pytest.mark.parametrize("scene", ["one", "cross", "loops", "fifty"])
-@pytest.mark.parametrize("settings", [SETTINGS, PINNED], ids=["free", "pinned"])
-def test_rasterise(device: Device, scene: str, settings: object) -> None:
-    """Float32 may pick the neighbouring segment within a few hundredths of a cell of a vertex, and see the slope of
-    that one; the heights hardly differ. So: tight for nearly all samples, loose for the rest."""
-    level = 3
-    assert isinstance(settings, type(SETTINGS))
-    tables = pack(SCENES[scene], settings, level)
-    w = ClWorkspace(device, level)
-    w.load(SCENES[scene], settings)
-    c = reference_raster.rasterise(tables)
-    pairs = (
-        (w.height.get("d", level)[0], c.height_d, 2e-3),
-        (w.height.get("s", level)[0], c.height_f, 2e-3),
-        (w.gradient.get("d", level)[0], c.gradient_d, 2e-3),
-        (w.gradient.get("f", level), c.gradient_f, 5e-2),
-    )
-    for actual, expected, loose in pairs:
-        error = np.abs(actual - expected) / max(1.0, np.abs(expected).max())
-        assert np.quantile(error, 0.97) < 1e-4
-        assert (error > loose).mean() < 2e-2
-    fixed, twin = pairs[0][0] < 0, c.height_d < 0
-    assert (fixed != twin).sum() <= 4
-
-
 def blocks(a: Field) -> Field:
     """Samples of 17 x 17 bins, bin by bin."""
     return a.reshape(17, 16, 17, 16).swapaxes(1, 2).reshape(-1, 16, 16)
@@ -268,19 +140,6 @@ def test_nearest_segment_is_that_of_a_full_search() -> None:
         best = np.sqrt(blocks(best))
         within = best <= tables.strokes[k, STROKE_AT["reach"]]
         assert np.allclose(near.distance[within], best[within])
-
-
-def test_a_dirty_window_gives_the_bits_of_a_full_raster(device: Device) -> None:
-    """SPEC S15: rasterising only what changed changes nothing."""
-    level, strokes = 3, SCENES["fifty"]
-    edited = [*strokes[:20], strokes[20].model_copy(update={"plateau_radius_m": 90.0}), *strokes[21:-3]]
-    w, fresh = ClWorkspace(device, level), ClWorkspace(device, level)
-    w.load(strokes, SETTINGS)
-    w.load(edited, SETTINGS)
-    fresh.load(edited, SETTINGS)
-    for a, b in ((w.height, fresh.height), (w.gradient, fresh.gradient)):
-        for name in ("d", a.static):
-            assert np.array_equal(a.get(name, level), b.get(name, level))
 
 
 def test_packer_finds_what_changed() -> None:

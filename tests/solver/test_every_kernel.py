@@ -1,0 +1,157 @@
+"""Row-wise and tile kernels against their NumPy float64 twins (SPEC S2, S15): what holds for the one and the other."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from esker import grid
+from esker.contract import TerrainSettings
+from esker.solve import reference, reference_raster
+from esker.solve.constraints import pack
+from esker.solve.device import Device
+from esker.solve.reference import BOTTOM_LEVELS
+from tests.solver.scenes import PINNED, SCENES, SETTINGS
+from tests.solver.twins import (
+    EPS,
+    LEVELS,
+    close,
+    edited,
+    fill,
+    new_system,
+    new_workspace,
+    noise,
+    stiffness,
+    tile_device,
+)
+
+
+@pytest.fixture(scope="module", params=["rows", "full", "smallest"])
+def kernels(request: pytest.FixtureRequest, device: Device) -> Device:
+    """A device with one kind of kernels: by rows, or by tiles as large or as small as they come."""
+    found = device if request.param == "rows" else tile_device(request.param)
+    assert found is not None, "the row-wise device is there"
+    assert (found.plan is None) == (request.param == "rows")
+    return found
+
+
+@pytest.mark.parametrize("level", LEVELS)
+@pytest.mark.parametrize("channels", [1, 2])
+@pytest.mark.parametrize("start", ["zero", "guess", "both"])
+def test_visit(kernels: Device, level: int, channels: int, start: str) -> None:
+    s = new_system(kernels, level, channels)
+    host = fill(s)
+    guess = None if start == "zero" else "u"
+    correction = None if start == "guess" else "e"
+    s.visit(level, rhs="f", out="v", guess=guess, correction=correction, residual=True)
+    u, coarse = reference.visit(
+        host["u"] if guess else None, host["e"] if correction else None, host["f"], host["d"], EPS
+    )
+    close(s.get("v", level), u)
+    close(s.get("b", level - 1), coarse)
+
+
+def test_visit_without_residual(kernels: Device) -> None:
+    s = new_system(kernels, 2, 2)
+    host = fill(s)
+    b = noise(host["e"].shape, 8)
+    s.put("b", 1, b)
+    s.visit(2, rhs="f", out="v", guess="u", correction="e", residual=False)
+    close(s.get("v", 2), reference.visit(host["u"], host["e"], host["f"], host["d"], EPS)[0])
+    assert np.array_equal(s.get("b", 1), b), "nobody asked for it"
+
+
+@pytest.mark.parametrize("level", LEVELS)
+def test_restriction(kernels: Device, level: int) -> None:
+    s = new_system(kernels, level + 1, 2)
+    b = noise((2, grid.samples(level), grid.samples(level)), 7)
+    s.put("b", level, b)
+    s.restrict(level)
+    close(s.get("b", level - 1), reference.restriction(b))
+
+
+@pytest.mark.parametrize("level", LEVELS)
+@pytest.mark.parametrize("channels", [1, 2])
+def test_coarsen(kernels: Device, level: int, channels: int) -> None:
+    s = new_system(kernels, level, channels)
+    host = fill(s)
+    s.coarsen(EPS)
+    d, f = host["d"], host["f"]
+    for k in range(level - 1, -1, -1):
+        d, f = reference.coarsen(d, f)
+        close(s.get("d", k), d)
+        close(s.get("f", k), f)
+
+
+@pytest.mark.parametrize("channels", [1, 2])
+@pytest.mark.parametrize("cycles", [1, 3])
+def test_bottom(kernels: Device, channels: int, cycles: int) -> None:
+    s = new_system(kernels, 1, channels)
+    host = fill(s)
+    s.coarsen(EPS)
+    twin = reference.NumpySystem(host["d"], host["f"], EPS, 1)
+    s.bottom(rhs="f", out="u", cycles=cycles)
+    twin.bottom(rhs="f", out="u", cycles=cycles)
+    close(s.get("u", 0), twin.fields["u", 0], scale=10)
+    assert len(twin.d) == 2 + BOTTOM_LEVELS
+
+
+def test_lone_bottom_settles_fixed_samples(kernels: Device) -> None:
+    """Level 0 as the finest level has fixed samples: the bottom cycles alone must settle it."""
+    s = new_system(kernels, 0, 1)
+    d, f = stiffness(65), noise((1, 65, 65))
+    s.put("d", 0, d)
+    s.put("f", 0, f)
+    s.coarsen(EPS)
+    s.bottom(rhs="f", out="u", cycles=24)
+    u = s.get("u", 0).astype(np.float64)
+    assert np.array_equal(u[d < 0], f[d < 0])
+    assert np.abs(reference.residual(u, f, d, EPS)).max() < 1e-5
+
+
+@pytest.mark.parametrize("level", LEVELS)
+def test_divergence(kernels: Device, level: int) -> None:
+    w = new_workspace(kernels, level)
+    w.size_m = 1000.0
+    n = grid.samples(level)
+    d, f, g = stiffness(n), noise((1, n, n), 2), noise((2, n, n), 3)
+    w.height.put("d", level, d)
+    w.height.put("s", level, f)
+    w.gradient.put("u", level, g)
+    w.guide(level)
+    close(w.height.get("f", level), reference.divergence(f, d, g, grid.spacing(level, 1000.0)))
+
+
+@pytest.mark.parametrize("scene", ["one", "cross", "loops", "fifty"])
+@pytest.mark.parametrize("settings", [SETTINGS, PINNED], ids=["free", "pinned"])
+def test_rasterise(kernels: Device, scene: str, settings: TerrainSettings) -> None:
+    """Float32 may pick the neighbouring segment within a few hundredths of a cell of a vertex, and see the slope of
+    that one; the heights hardly differ. So: tight for nearly all samples, loose for the rest."""
+    level = 3
+    w = new_workspace(kernels, level)
+    w.load(SCENES[scene], settings)
+    c = reference_raster.rasterise(pack(SCENES[scene], settings, level))
+    pairs = (
+        (w.height.get("d", level)[0], c.height_d, 2e-3),
+        (w.height.get("s", level)[0], c.height_f, 2e-3),
+        (w.gradient.get("d", level)[0], c.gradient_d, 2e-3),
+        (w.gradient.get("f", level), c.gradient_f, 5e-2),
+    )
+    for actual, expected, loose in pairs:
+        error = np.abs(actual - expected) / max(1.0, np.abs(expected).max())
+        assert np.quantile(error, 0.97) < 1e-4
+        assert (error > loose).mean() < 2e-2
+    assert ((pairs[0][0] < 0) != (c.height_d < 0)).sum() <= 4
+
+
+def test_a_dirty_window_gives_the_bits_of_a_full_raster(kernels: Device) -> None:
+    """SPEC S15: rasterising only what changed changes nothing, on any level."""
+    level, strokes = 3, SCENES["fifty"]
+    w, fresh = new_workspace(kernels, level), new_workspace(kernels, level)
+    w.load(strokes, SETTINGS)
+    w.load(edited(strokes), SETTINGS)
+    fresh.load(edited(strokes), SETTINGS)
+    for a, b in ((w.height, fresh.height), (w.gradient, fresh.gradient)):
+        for name in ("d", a.static):
+            for k in range(level + 1):
+                assert np.array_equal(a.get(name, k), b.get(name, k))
