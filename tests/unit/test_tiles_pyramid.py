@@ -213,3 +213,14 @@ def test_clients_share_coded_tiles() -> None:
     half = len(plans) // 2
     assert plans[:half] == plans[half:]
     assert server.cache.bytes < sum(len(p) for p in plans[:half])
+
+
+def test_a_pyramid_knows_where_its_ground_last_changed() -> None:
+    pyramid = Pyramid(SIZE_M, 2)
+    for level in range(3):
+        pyramid.put(1, level, np.zeros((grid.samples(level),) * 2, dtype=np.float32), True)
+    first = pyramid.changes().copy()
+    h = np.zeros((grid.samples(2),) * 2, dtype=np.float32)
+    h[10, 10] = 5
+    pyramid.put(2, 2, h, True)
+    assert (pyramid.changes() > first).tolist() == [[y == x == 0 for x in range(4)] for y in range(4)]

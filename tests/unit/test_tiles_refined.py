@@ -1,4 +1,4 @@
-"""Store, selection and delivery of tiles above the global levels, and the other channels (SPEC T23 to T32, Q7, Q8)."""
+"""Store, selection and delivery of tiles above the global levels (SPEC T24 to T32, Q7, Q8)."""
 
 from __future__ import annotations
 
@@ -9,11 +9,10 @@ import pytest
 from tests.cones import FINEST, LEVELS, SIZE_M, Bump, Client, Ground, Made, near, settle, solve
 
 from esker import grid
-from esker.contract import MAX_REFINED_LEVEL, MAX_REFINED_TILES, Channel, FrameKind, Predictor
+from esker.contract import MAX_REFINED_LEVEL, MAX_REFINED_TILES, FrameKind, Predictor
 from esker.grid import TileKey
 from esker.tiles.delivery import ClientTiles, TileServer
 from esker.tiles.frame import read_frame
-from esker.tiles.pyramid import Pyramid
 
 TIP = Bump(200.0, 300.0, 40.0, 60.0)
 LOOK = near(200.0, 275.0, 40.0, tau_px=0.7)
@@ -400,69 +399,3 @@ def test_levels_above_a_limit_are_forgotten_and_come_back() -> None:
     settle(server, ground, 3, [client])
     client.check_newest(ground)
     assert levels_of(client)[FINEST] > 0
-
-
-# --- the other channels -----------------------------------------------------------------------------------------------
-
-
-def test_channels_go_whole_coarse_to_fine_after_the_heights() -> None:
-    server = TileServer(SIZE_M, 4)
-    client = Client(server)
-    for level in range(5):
-        n = grid.samples(level)
-        server.put_level(1, level, np.zeros((n, n), dtype=np.float32), True)
-    for channel, base in ((Channel.AMPLITUDE, 0.0), (Channel.ROUGHNESS, 0.5)):
-        for level in range(3):
-            n = grid.samples(level)
-            server.put_level(1, level, np.full((n, n), base, dtype=np.float32), True, channel)
-    client.drain()
-    order = [(plan.channel, plan.level) for plan in client.log]
-    assert order[3:9] == [(ch, level) for ch in (Channel.AMPLITUDE, Channel.ROUGHNESS) for level in range(3)]
-    untouched = sum(len(plan.encode()) for plan in client.log if plan.channel != Channel.HEIGHT)
-    assert untouched < 1000, "untouched ground costs next to nothing"
-    assert all(len(held) == 21 for ch, held in client.decoder.channels.items() if ch != Channel.HEIGHT)
-    assert client.tiles.held(Channel.AMPLITUDE).keys() == client.decoder.channels[Channel.AMPLITUDE].keys()
-
-
-@pytest.mark.parametrize(("channel", "scale", "base"), [(Channel.AMPLITUDE, 64, 0.0), (Channel.ROUGHNESS, 1024, 0.5)])
-def test_channels_have_the_same_quantum_on_every_level(channel: Channel, scale: int, base: float) -> None:
-    from esker.tiles.channels import values
-
-    server = TileServer(SIZE_M, 4)
-    rng = np.random.default_rng(3)
-    for level in range(3):
-        n = grid.samples(level)
-        wanted = rng.uniform(0, 1, (n, n)).astype(np.float32)
-        server.put_level(1, level, wanted, True, channel)
-        found = server.channels[channel].level(level)
-        assert found is not None
-        assert np.array_equal(found.samples, np.rint((wanted - np.float32(base)) * scale).astype(np.int32))
-        assert np.abs(values(found.samples, channel) - wanted).max() <= 0.5 / scale + 1e-6
-    with pytest.raises(ValueError, match="level 3"):
-        server.put_level(1, 3, np.zeros((513, 513), dtype=np.float32), True, channel)
-
-
-def test_a_pyramid_knows_where_its_ground_last_changed() -> None:
-    pyramid = Pyramid(SIZE_M, 2)
-    for level in range(3):
-        pyramid.put(1, level, np.zeros((grid.samples(level),) * 2, dtype=np.float32), True)
-    first = pyramid.changes().copy()
-    h = np.zeros((grid.samples(2),) * 2, dtype=np.float32)
-    h[10, 10] = 5
-    pyramid.put(2, 2, h, True)
-    assert (pyramid.changes() > first).tolist() == [[y == x == 0 for x in range(4)] for y in range(4)]
-
-
-def test_a_channel_follows_its_parents_without_doubling() -> None:
-    """A preview within the dead zone of what every decoder shows by itself costs nothing (SPEC T34)."""
-    server = TileServer(SIZE_M, 3)
-    amplitude = server.channels[Channel.AMPLITUDE]
-    for clock, (coarse, fine) in enumerate(((0.0, 0.0), (40.0, 41.4)), start=1):
-        for level, quanta in ((0, coarse), (1, fine)):
-            n = grid.samples(level)
-            server.put_level(
-                clock, level, np.full((n, n), quanta / 64, dtype=np.float32), clock == 1, amplitude.channel
-            )
-    found = amplitude.level(1)
-    assert found is not None
-    assert np.unique(found.samples).tolist() == [40]
