@@ -16,8 +16,8 @@ from pydantic import BaseModel, ConfigDict, Field, StringConstraints, TypeAdapte
 
 # --- protocol ---------------------------------------------------------------------------------------------------
 
-PROTOCOL_VERSION: Final = 2
-SUBPROTOCOL: Final = "esker.2"
+PROTOCOL_VERSION: Final = 3
+SUBPROTOCOL: Final = "esker.3"
 
 # --- grid (DESIGN 3) --------------------------------------------------------------------------------------------
 
@@ -32,6 +32,8 @@ DEFAULT_LEVEL: Final = 4
 MAX_REFINED_LEVEL: Final = 10
 """The finest level that may be refined tile by tile above the global ones (65,537 samples a side; DESIGN 5.6)."""
 DEFAULT_REFINED_LEVEL: Final = 8
+MAX_SYNTHESIS_LEVEL: Final = 17
+"""The finest level that detail may be synthesised at: cells of 0.8 cm on the largest domain (DESIGN 10)."""
 MAX_REFINED_TILES: Final = 512
 """Tiles above the global levels that one client is made to hold at most; the server drops what is least in view."""
 QUANTA_PER_CELL: Final = 256
@@ -55,13 +57,22 @@ CHEBYSHEV_HIGH: Final = 2.0
 # --- channels (DESIGN 5.4, 6) -----------------------------------------------------------------------------------
 
 CHANNEL_LEVELS_BELOW: Final = 2
-"""Amplitude and roughness are smooth: they are solved and sent up to this many levels below the heights."""
+"""Channels are smooth: they are solved and sent up to this many levels below the heights."""
 AMPLITUDE_QUANTA_PER_M: Final = 64
 ROUGHNESS_QUANTA: Final = 1024
 """Quantisation steps of roughness 1. Channels have the same step on every level."""
+BIAS_QUANTA: Final = 1024
+"""Quantisation steps of a bias of 1: of snow, grass, forest and wetness."""
 BASE_AMPLITUDE_M: Final = 0.0
 BASE_ROUGHNESS: Final = 0.5
+BASE_BIAS: Final = 0.0
 """What the channels are where no stroke says otherwise."""
+
+# --- detail (DESIGN 10) -----------------------------------------------------------------------------------------
+
+DEFAULT_DETAIL: Final = 1.0
+MAX_DETAIL: Final = 4.0
+"""Strength of the natural detail: 0 takes it away, 1 is the rule's own."""
 
 # --- stroke defaults (DESIGN 5.2, 12) ---------------------------------------------------------------------------
 
@@ -113,10 +124,12 @@ Secret = Annotated[str, StringConstraints(min_length=1, max_length=128)]
 Colour = Annotated[str, StringConstraints(pattern=r"^#[0-9a-f]{6}$")]
 Clock = Annotated[int, Field(ge=0, le=2**53)]
 
-StrokeKind = Literal["profile", "level"]
+StrokeKind = Literal["profile", "level", "paint"]
+PaintChannel = Literal["roughness", "amplitude", "snow", "grass", "forest", "wetness"]
 FlankShape = Literal["straight", "concave", "convex"]
 Border = Literal["free", "pinned"]
 Look = Literal["natural", "alpine", "desert", "paper"]
+Rule = Literal["landscape", "smooth", "plain"]
 Role = Literal["owner", "edit", "view"]
 Which = Literal["first", "last"]
 
@@ -138,6 +151,17 @@ class Flank(Wire):
     shape: FlankShape = "concave"
 
 
+class Paint(Wire):
+    """What a paint stroke says of one channel within ``radius_m`` (horizontal metres) of its line.
+
+    ``value``: -1 takes all of it away, 0 is the base, 1 asks for all of it (docs/protocol.md, "Paint").
+    """
+
+    channel: PaintChannel
+    value: Annotated[float, Field(ge=-1, le=1, allow_inf_nan=False)]
+    radius_m: Length
+
+
 class Stroke(Wire):
     """One stroke (immutable). Curve points live in the frame of the anchors, so moving an anchor re-projects.
 
@@ -145,6 +169,8 @@ class Stroke(Wire):
     anchors, outside allowed), w metres above the straight line between the anchors.
     ``level``: curve point (u, v) is ``first.xy + u*d + v*perp(d)`` at height ``first.z``, where
     ``d = last.xy - first.xy`` and ``perp((x, y)) = (-y, x)`` (left of the direction of travel).
+    ``paint``: the line of a brush, in the frame of ``level``; it lies on the ground, and no height follows from it.
+    Strokes of this kind have ``paint``, and no others; flanks, plateau, amplitude and roughness mean nothing to them.
     ``left``/``right`` are the flanks left and right of the direction of travel; None means no flank on that side.
     """
 
@@ -159,6 +185,7 @@ class Stroke(Wire):
     plateau_radius_m: Length = 0.0
     amplitude_m: Length = 0.0
     roughness: Unit = 0.5
+    paint: Paint | None = None
     locked: bool = False
     hidden: bool = False
     label: Name = ""
@@ -176,6 +203,7 @@ class StrokeFields(Wire):
     plateau_radius_m: Length | None = None
     amplitude_m: Length | None = None
     roughness: Unit | None = None
+    paint: Paint | None = None
     locked: bool | None = None
     hidden: bool | None = None
     label: Name | None = None
@@ -186,7 +214,10 @@ NULLABLE_STROKE_FIELDS: Final = frozenset({"left", "right"})
 
 
 class TerrainSettings(Wire):
-    """Settings of a terrain. ``reach_m`` None is infinity: the papers' pure, global diffusion (DESIGN 5.1)."""
+    """Settings of a terrain. ``reach_m`` None is infinity: the papers' pure, global diffusion (DESIGN 5.1).
+
+    ``detail`` and ``rule`` are of the synthesis (DESIGN 10): no solved height depends on them.
+    """
 
     size_m: Annotated[float, Field(ge=MIN_SIZE_M, le=MAX_SIZE_M)] = DEFAULT_SIZE_M
     title: Name = "Untitled terrain"
@@ -195,6 +226,8 @@ class TerrainSettings(Wire):
     sea_level_m: Metres | None = None
     seed: Annotated[int, Field(ge=0, lt=2**32)] = 1
     look: Look = "natural"
+    detail: Annotated[float, Field(ge=0, le=MAX_DETAIL, allow_inf_nan=False)] = DEFAULT_DETAIL
+    rule: Rule = "landscape"
     sun_azimuth_deg: Annotated[float, Field(ge=0, le=360)] = 115.0
     sun_elevation_deg: Annotated[float, Field(ge=0, le=90)] = 24.0
 
@@ -208,6 +241,8 @@ class TerrainFields(Wire):
     sea_level_m: Metres | None = None
     seed: Annotated[int, Field(ge=0, lt=2**32)] | None = None
     look: Look | None = None
+    detail: Annotated[float, Field(ge=0, le=MAX_DETAIL, allow_inf_nan=False)] | None = None
+    rule: Rule | None = None
     sun_azimuth_deg: Annotated[float, Field(ge=0, le=360)] | None = None
     sun_elevation_deg: Annotated[float, Field(ge=0, le=90)] | None = None
 
@@ -592,6 +627,10 @@ class Channel(IntEnum):
     HEIGHT = 0
     AMPLITUDE = 1
     ROUGHNESS = 2
+    SNOW = 3
+    GRASS = 4
+    FOREST = 5
+    WETNESS = 6
 
 
 FRAME_HEADER: Final = np.dtype(

@@ -26,6 +26,7 @@ SHADER_CONSTANTS = (
     "SUBPATCHES",
     "QUANTA_PER_CELL",
     "MAX_REFINED_LEVEL",
+    "MAX_SYNTHESIS_LEVEL",
     "CREST_STIFFNESS",
     "SATURATION",
     "SPRING_CELLS",
@@ -115,7 +116,7 @@ def _unions() -> Iterable[str]:
     for name in ("SimpleOp", "Op", "ClientMessage", "ServerMessage"):
         members = [m.__name__ for m in contract.__dict__[name].__origin__.__args__]
         yield f"export type {name} =\n" + "\n".join(f"  | {m}" for m in members) + ";"
-    for name in ("StrokeKind", "FlankShape", "Border", "Look", "Role", "Which", "RejectCode", "CloseCode"):
+    for name in ("StrokeKind", "PaintChannel", "FlankShape", "Border", "Look", "Rule", "Role", "Which", "RejectCode", "CloseCode"):
         values = contract.__dict__[name].__args__
         yield f"export type {name} =\n" + "\n".join(f'  | "{v}"' for v in values) + ";"
 

@@ -5,6 +5,7 @@ const int PATCH_CELLS = 16;
 const int SUBPATCHES = 4;
 const int QUANTA_PER_CELL = 256;
 const int MAX_REFINED_LEVEL = 10;
+const int MAX_SYNTHESIS_LEVEL = 17;
 const float CREST_STIFFNESS = 4.0;
 const float SATURATION = 0.12;
 const float SPRING_CELLS = 30.0;

@@ -5,6 +5,7 @@ const PATCH_CELLS: i32 = 16;
 const SUBPATCHES: i32 = 4;
 const QUANTA_PER_CELL: i32 = 256;
 const MAX_REFINED_LEVEL: i32 = 10;
+const MAX_SYNTHESIS_LEVEL: i32 = 17;
 const CREST_STIFFNESS: f32 = 4.0;
 const SATURATION: f32 = 0.12;
 const SPRING_CELLS: f32 = 30.0;

@@ -162,7 +162,7 @@ def test_binary_from_a_client(scene: Scene, data: bytes) -> None:
 def _hello(scene: Scene, **over: Any) -> None:
     scene.peer.close()
     scene.peer = Peer(scene.server.socket())
-    hello = {"protocol": 2, "terrain": scene.terrain, "secret": scene.secret, "client": "c2"}
+    hello = {"protocol": c.PROTOCOL_VERSION, "terrain": scene.terrain, "secret": scene.secret, "client": "c2"}
     scene.peer.say("hello", **(hello | over))
 
 

@@ -135,11 +135,12 @@ def extreme() -> list[bytes]:
 
 
 def channels() -> list[bytes]:
-    """Amplitude and roughness beside heights: flat, then a patch that grows and settles."""
+    """Every channel beside heights: flat, then a patch that grows and settles."""
     server = TileServer(SIZE_M, LEVELS)
     client = ClientTiles(server)
     frames: list[bytes] = []
     units = {Channel.HEIGHT: 40.0, Channel.AMPLITUDE: 30.0, Channel.ROUGHNESS: 0.4}
+    units |= {Channel.SNOW: 1.0, Channel.GRASS: -1.0, Channel.FOREST: 0.3, Channel.WETNESS: -0.2}
 
     def drain() -> None:
         while (plan := client.plan()) is not None:

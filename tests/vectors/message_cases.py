@@ -8,10 +8,10 @@ from typing import Any
 from pydantic import ValidationError
 
 from esker import contract as c
-from tests.vectors.op_cases import NEW
+from tests.vectors.op_cases import NEW, PAINTED, SNOW
 from tests.vectors.scenes import Json, op
 
-HELLO: Json = {"type": "hello", "protocol": 2, "terrain": "t1", "secret": "s", "client": "c1"}
+HELLO: Json = {"type": "hello", "protocol": 3, "terrain": "t1", "secret": "s", "client": "c1"}
 VIEW: Json = {"type": "view", "eye": [0, 0, 100], "target": [1, 1, 0]}
 PRESENCE: Json = {"type": "presence", "cursor": [1, 2, 3.5], "tool": "mountain", "stroke": "c1-1"}
 
@@ -36,6 +36,8 @@ ACCEPT: list[tuple[str, Json]] = [
     ("view, full", VIEW | {"fov_deg": 60, "width": 360, "height": 740, "tau_px": 2}),
     ("presence", PRESENCE),
     ("presence, empty", {"type": "presence"}),
+    ("paint", ops(op("stroke.begin", stroke=PAINTED), _set(paint=SNOW | {"radius_m": 0}))),
+    ("strength and rule of the detail", ops(op("terrain.set", fields={"detail": 4, "rule": "smooth"}))),
     ("credit", {"type": "credit", "bytes": 65536}),
     ("rename", {"type": "rename", "name": "Grace", "colour": "#123456"}),
     ("ping", {"type": "ping", "t": 12.5}),
@@ -82,6 +84,15 @@ REFUSE: list[tuple[str, Json | str]] = [
     ("negative extent", ops(_set(left={"slope_deg": 30, "extent_m": -1}))),
     ("slope of 86 degrees", ops(_set(left={"slope_deg": 86}))),
     ("roughness of 1.5", ops(_set(roughness=1.5))),
+    ("paint of an unknown channel", ops(_set(paint=SNOW | {"channel": "height"}))),
+    ("paint stronger than 1", ops(_set(paint=SNOW | {"value": 1.01}))),
+    ("paint weaker than -1", ops(_set(paint=SNOW | {"value": -1.01}))),
+    ("paint of a negative radius", ops(_set(paint=SNOW | {"radius_m": -1}))),
+    ("paint without a radius", ops(_set(paint={"channel": "snow", "value": 1}))),
+    ("paint with a colour", ops(_set(paint=SNOW | {"colour": "#ffffff"}))),
+    ("detail of 4.5", ops(op("terrain.set", fields={"detail": 4.5}))),
+    ("unknown rule", ops(op("terrain.set", fields={"rule": "fractal"}))),
+    ("the kind of a stroke cannot be set", ops(_set(kind="paint"))),
     ("the size of a terrain cannot be set", ops(op("terrain.set", fields={"size_m": 128}))),
     ("the author of a stroke cannot be set", ops(_set(author="eve"))),
     ("reach of zero", ops(op("terrain.set", fields={"reach_m": 0}))),

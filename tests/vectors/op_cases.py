@@ -15,6 +15,10 @@ LOCKED = stroke("l", locked=True, label="Grandmother's hill")
 GONE = stroke("g", label="gone")
 LONG = stroke("x", curve=[[0.5, 1]] * c.MAX_POINTS_PER_STROKE)
 BASE = document(RIDGE, MESA, LOCKED, deleted=(GONE,))
+SNOW: Json = {"channel": "snow", "value": 1.0, "radius_m": 80.0}
+PAINTED = stroke(
+    "p", kind="paint", first=[500, 500, 0], last=[900, 700, 0], curve=[[0, 0], [0.5, 0.1], [1, 0]], paint=SNOW
+)
 NEW = stroke("n", curve=[], finished=False, first=[0, 0, 0], last=[0, 0, 0])
 
 
@@ -75,6 +79,19 @@ def _applies() -> list[tuple[str, Json, Json]]:
         ),
         ("group begin and fill", BASE, op("group", ops=[op("stroke.begin", stroke=NEW), _append("n"), _finish("n")])),
         ("point at the bound", document(NEW), op("stroke.anchor", stroke="n", which="last", to=[40960, -40960, 40960])),
+        ("begin paint", BASE, op("stroke.begin", stroke=PAINTED)),
+        (
+            "append to paint",
+            document(PAINTED),
+            op("stroke.append", stroke="p", start=3, points=[[1.5, -0.25]], last=[950, 700, 0]),
+        ),
+        (
+            "set paint",
+            document(PAINTED),
+            op(set_, stroke="p", fields={"paint": {"channel": "wetness", "value": -0.5, "radius_m": 12}}),
+        ),
+        ("delete paint", document(PAINTED), op("stroke.delete", stroke="p")),
+        ("terrain detail and rule", BASE, op("terrain.set", fields={"detail": 2.5, "rule": "plain"})),
         ("exactly the most points", document(NEW), op("stroke.begin", stroke=LONG)),
     ]
 
@@ -118,6 +135,12 @@ def _refuses() -> list[tuple[str, Json, Json, str]]:
             op("stroke.anchor", stroke="l", which="last", to=[0, 0, 0]),
             "locked_stroke",
         ),
+        ("paint without paint", BASE, op("stroke.begin", stroke=PAINTED | {"paint": None}), "bad_field"),
+        ("a mountain with paint", BASE, op("stroke.begin", stroke=NEW | {"paint": SNOW}), "bad_field"),
+        ("paint set on a mountain", BASE, _set("a", paint=SNOW), "bad_field"),
+        ("paint taken from a paint stroke", document(PAINTED), _set("p", paint=None), "bad_field"),
+        ("paint too far", document(PAINTED), _set("p", curve=[[200, 0]]), "out_of_domain"),
+        ("terrain detail null", BASE, op("terrain.set", fields={"detail": None}), "bad_field"),
         ("anchor too far", BASE, op("stroke.anchor", stroke="a", which="last", to=[40961, 0, 0]), "out_of_domain"),
         ("anchor too high", BASE, op("stroke.anchor", stroke="a", which="last", to=[0, 0, 40961]), "out_of_domain"),
         ("curve point too high", BASE, _set("a", curve=[[0, 50000]]), "out_of_domain"),

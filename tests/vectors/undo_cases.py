@@ -12,7 +12,7 @@ from typing import Any
 from esker import contract as c
 from esker.document.ops import StrokeSet
 from esker.document.undo import UndoStack
-from tests.vectors.op_cases import BASE, GONE, NEW, _append, _finish, _set
+from tests.vectors.op_cases import BASE, GONE, NEW, PAINTED, SNOW, _append, _finish, _set
 from tests.vectors.scenes import Json, document, dump, op
 
 UNDO: Json = {"undo": None}
@@ -82,6 +82,32 @@ SCRIPTS: list[tuple[str, Json, list[Json]]] = [
         "reach back from infinity",
         document(reach_m=100),
         [mine(op("terrain.set", fields={"reach_m": None})), UNDO, REDO],
+    ),
+    (
+        "strength and rule of the detail",
+        BASE,
+        [
+            mine(op("terrain.set", fields={"detail": 0, "rule": "smooth"})),
+            theirs(op("terrain.set", fields={"rule": "plain"})),
+            UNDO,
+            REDO,
+        ],
+    ),
+    (
+        "painted, then another channel",
+        document(),
+        [
+            mine(op("stroke.begin", stroke=PAINTED)),
+            mine(_set("p", paint=SNOW | {"channel": "forest"})),
+            UNDO,
+            UNDO,
+            REDO,
+        ],
+    ),
+    (
+        "paint that somebody changed is kept",
+        document(PAINTED),
+        [mine(_set("p", paint=SNOW | {"value": -1.0})), theirs(_set("p", paint=SNOW | {"radius_m": 9.0})), UNDO],
     ),
     ("null flank comes back", BASE, [mine(_set("a", left=None)), UNDO]),
     (

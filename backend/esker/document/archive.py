@@ -16,7 +16,8 @@ from pydantic import ValidationError
 from esker.contract import Document
 
 FORMAT = "esker-terrain"
-VERSION = 1
+VERSION = 2
+"""1 had neither paint nor settings of the detail; its documents are read as they are, with the defaults."""
 MAX_ARCHIVE_BYTES = 64 * 1024 * 1024
 MAX_DOCUMENT_BYTES = 512 * 1024 * 1024
 MAX_HEADER_BYTES = 64 * 1024
@@ -90,5 +91,6 @@ def _check_header(data: bytes) -> None:
         raise ArchiveError("This is not an .esker file, or it is damaged.") from error
     if not isinstance(header, dict) or header.get("format") != FORMAT:
         raise ArchiveError("This is not an .esker file.")
-    if header.get("version") != VERSION:
+    version = header.get("version")
+    if not isinstance(version, int) or not 1 <= version <= VERSION:
         raise ArchiveError("This file was made by a newer Esker. Update, then open it again.")

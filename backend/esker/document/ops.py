@@ -74,7 +74,8 @@ class StrokeSet:
 
 
 def check_document(document: c.Document, limits: Limits | None = None) -> None:
-    """Refuses a document from outside that no sequence of ops could have made: ids used twice, limits, far points.
+    """Refuses a document from outside that no sequence of ops could have made: ids used twice, limits, far points,
+    strokes that lack what their kind needs.
 
     Raises Refusal.
     """
@@ -182,13 +183,17 @@ class _Editor:
             self.dirty = rect.union(self.dirty)
 
     def check(self, stroke: Stroke) -> Points:
-        """The stroke's world points. Raises Refusal where there are too many or they lie too far away."""
+        """Its world points. Raises Refusal for too many or too far points, and for fields that are not of its kind."""
         if len(stroke.curve) > self.limits.points:
             raise Refusal("too_many_points", f"A stroke holds at most {self.limits.points} points.")
         bound = c.DOMAIN_MARGIN * self.settings.size_m
         anchors = (*stroke.first, *stroke.last)
         if any(abs(v) > bound for v in anchors):
             raise Refusal("out_of_domain", "An anchor lies farther than ten times the terrain from its corner.")
+        if (stroke.kind == "paint") != (stroke.paint is not None):
+            raise Refusal(
+                "bad_field", "A paint stroke needs 'paint' (channel, value, radius), and only a paint stroke."
+            )
         points = world_points(stroke)
         if stroke.curve and abs(points).max() > bound:
             raise Refusal("out_of_domain", "A point lies farther than ten times the terrain from its corner.")

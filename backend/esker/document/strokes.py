@@ -56,6 +56,8 @@ def level_curve(points: Points, first: Vec3, last: Vec3) -> tuple[CurvePoint, ..
 
 def influence_extent(stroke: Stroke) -> float:
     """Farthest horizontal distance from the crest at which the stroke constrains anything, metres."""
+    if stroke.paint is not None:
+        return stroke.paint.radius_m
     sides: Sequence[Flank | None] = (stroke.left, stroke.right)
     return stroke.plateau_radius_m + max((f.extent_m for f in sides if f is not None), default=0.0)
 

@@ -30,6 +30,7 @@ STROKE_WORDS: Final[dict[str, str]] = {
     "plateau_radius_m": "plateau radius",
     "amplitude_m": "noise amplitude",
     "roughness": "roughness",
+    "paint": "paint",
     "locked": "lock",
     "hidden": "visibility",
     "label": "label",
@@ -42,6 +43,8 @@ TERRAIN_WORDS: Final[dict[str, str]] = {
     "sea_level_m": "sea level",
     "seed": "seed",
     "look": "look",
+    "detail": "detail",
+    "rule": "rule",
     "sun_azimuth_deg": "direction of the sun",
     "sun_elevation_deg": "height of the sun",
 }

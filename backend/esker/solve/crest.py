@@ -35,8 +35,8 @@ class Crest:
 
 
 def crest_of(stroke: Stroke) -> Crest | None:
-    """The crest line of a stroke, or None for a stroke that constrains nothing (hidden, or without points)."""
-    if stroke.hidden or not stroke.curve:
+    """The crest line of a stroke, or None for one that constrains no height (hidden, without points, or paint)."""
+    if stroke.hidden or not stroke.curve or stroke.kind == "paint":
         return None
     points = world_points(stroke)
     if stroke.kind == "profile":

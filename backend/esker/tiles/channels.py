@@ -1,4 +1,4 @@
-"""Noise amplitude and roughness as levels of integers (DESIGN 5.4, 6).
+"""Noise amplitude, roughness and what is painted, as levels of integers (DESIGN 5.4, 6).
 
 A channel has the same quantum on every level, and its base value (what it is where no stroke says otherwise) is
 subtracted, so untouched ground is all zeros. Its levels end ``CHANNEL_LEVELS_BELOW`` below those of the heights.
@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 from esker.contract import (
     AMPLITUDE_QUANTA_PER_M,
     BASE_AMPLITUDE_M,
+    BASE_BIAS,
     BASE_ROUGHNESS,
+    BIAS_QUANTA,
     CHANNEL_LEVELS_BELOW,
     QUANTA_PER_CELL,
     ROUGHNESS_QUANTA,
@@ -27,8 +29,17 @@ from esker.tiles.pyramid import Pyramid
 UNIT_SIZE_M: Final = float(TILE_CELLS * QUANTA_PER_CELL)
 """A domain of this size has a quantum of exactly 2^-l on level l: values scaled by powers of two become integers by
 the rules of the heights, dead zone and steadiness included, without a rounding of their own."""
-QUANTA: Final = {Channel.AMPLITUDE: AMPLITUDE_QUANTA_PER_M, Channel.ROUGHNESS: ROUGHNESS_QUANTA}
-BASE: Final = {Channel.AMPLITUDE: BASE_AMPLITUDE_M, Channel.ROUGHNESS: BASE_ROUGHNESS}
+BIASES: Final = (Channel.SNOW, Channel.GRASS, Channel.FOREST, Channel.WETNESS)
+QUANTA: Final = {
+    Channel.AMPLITUDE: AMPLITUDE_QUANTA_PER_M,
+    Channel.ROUGHNESS: ROUGHNESS_QUANTA,
+    **dict.fromkeys(BIASES, BIAS_QUANTA),
+}
+BASE: Final = {
+    Channel.AMPLITUDE: BASE_AMPLITUDE_M,
+    Channel.ROUGHNESS: BASE_ROUGHNESS,
+    **dict.fromkeys(BIASES, BASE_BIAS),
+}
 
 
 def channel_levels(levels: int) -> int:
@@ -37,7 +48,10 @@ def channel_levels(levels: int) -> int:
 
 
 def values(samples: Ints, channel: Channel) -> NDArray[np.float32]:
-    """Samples of a channel as metres (amplitude) or 0..1 (roughness), float32, same shape. KeyError for heights."""
+    """Samples of a channel as metres (amplitude), 0..1 (roughness) or -1..1 (a bias), float32, same shape.
+
+    Raises KeyError for heights.
+    """
     return (samples / np.float64(QUANTA[channel]) + BASE[channel]).astype(np.float32)
 
 

@@ -31,7 +31,7 @@ WISHES: Final = 64
 TAU_STEP: Final = 1.3
 """Where a view wants more refined tiles than a client may hold, its tau grows by this factor until they fit."""
 
-AMPLITUDES: Final = (Channel.AMPLITUDE, Channel.ROUGHNESS)
+CHANNELS: Final = tuple(channel for channel in Channel if channel != Channel.HEIGHT)
 
 
 class RefinedTile(Protocol):
@@ -58,7 +58,7 @@ class TileServer:
         below ``levels`` or above MAX_REFINED_LEVEL.
         """
         self.pyramid = Pyramid(size_m, levels)
-        self.channels = {channel: ChannelPyramid(channel, levels) for channel in AMPLITUDES}
+        self.channels = {channel: ChannelPyramid(channel, levels) for channel in CHANNELS}
         self.refined = RefinedTiles(size_m, levels, levels if finest is None else finest, room_tiles)
         self.cache = EncodedTiles()
 

@@ -88,6 +88,11 @@ export interface ChannelView {
   readonly amplitude: ChannelGrid;
   /** Roughness, 0..1. */
   readonly roughness: ChannelGrid;
+  /** What paint adds to the rule's own snow, grass, forest and wetness, -1..1. */
+  readonly snow: ChannelGrid;
+  readonly grass: ChannelGrid;
+  readonly forest: ChannelGrid;
+  readonly wetness: ChannelGrid;
 }
 
 /** A binary frame after decoding (net/decode.ts), applied atomically by tiles/store.ts. */

@@ -8,6 +8,7 @@
 
 import {
   ABSOLUTE_BOUND_M,
+  MAX_DETAIL,
   MAX_NAME_LENGTH,
   MAX_OPS_PER_GROUP,
   MAX_OPS_PER_MESSAGE,
@@ -129,11 +130,16 @@ const flank = nullable(
   }),
 );
 const reach = number(0, ABSOLUTE_BOUND_M);
+const paint = record({
+  channel: need(oneOf("roughness", "amplitude", "snow", "grass", "forest", "wetness")),
+  value: need(number(-1, 1)),
+  radius_m: need(metreLength),
+});
 
 const strokeShape: Shape = {
   id: need(id),
   author: may(name),
-  kind: need(oneOf("profile", "level")),
+  kind: need(oneOf("profile", "level", "paint")),
   first: need(vec3),
   last: need(vec3),
   curve: need(curve),
@@ -142,6 +148,7 @@ const strokeShape: Shape = {
   plateau_radius_m: may(metreLength),
   amplitude_m: may(metreLength),
   roughness: may(number(0, 1)),
+  paint: may(nullable(paint)),
   locked: may(bool),
   hidden: may(bool),
   label: may(name),
@@ -164,6 +171,8 @@ const terrainFields = record({
   sea_level_m: may(nullable(metres)),
   seed: may(nullable(integer(0, 2 ** 32 - 1))),
   look: may(nullable(oneOf("natural", "alpine", "desert", "paper"))),
+  detail: may(nullable(number(0, MAX_DETAIL))),
+  rule: may(nullable(oneOf("landscape", "smooth", "plain"))),
   sun_azimuth_deg: may(nullable(number(0, 360))),
   sun_elevation_deg: may(nullable(number(0, 90))),
 });

@@ -113,6 +113,8 @@ class Editor {
     const outside = (v: number): boolean => !(Math.abs(v) <= bound);
     if (stroke.first.some(outside) || stroke.last.some(outside))
       throw new Refusal("out_of_domain", "An anchor lies farther than ten times the terrain from its corner.");
+    if ((stroke.kind === "paint") !== (stroke.paint !== null))
+      throw new Refusal("bad_field", "A paint stroke needs 'paint' (channel, value, radius), and only a paint stroke.");
     if (worldPoints(stroke).some(outside))
       throw new Refusal("out_of_domain", "A point lies farther than ten times the terrain from its corner.");
   }

@@ -17,6 +17,7 @@ export const STROKE_WORDS = {
   plateau_radius_m: "plateau radius",
   amplitude_m: "noise amplitude",
   roughness: "roughness",
+  paint: "paint",
   locked: "lock",
   hidden: "visibility",
   label: "label",
@@ -29,6 +30,8 @@ export const TERRAIN_WORDS = {
   sea_level_m: "sea level",
   seed: "seed",
   look: "look",
+  detail: "detail",
+  rule: "rule",
   sun_azimuth_deg: "direction of the sun",
   sun_elevation_deg: "height of the sun",
 } as const;

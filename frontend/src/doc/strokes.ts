@@ -64,7 +64,8 @@ export function levelCurve(points: ArrayLike<number>, first: Anchor, last: Ancho
 }
 
 /** Farthest horizontal distance from the crest at which the stroke constrains anything, metres. */
-export function influenceExtent(stroke: Pick<Stroke, "left" | "right" | "plateau_radius_m">): number {
+export function influenceExtent(stroke: Pick<Stroke, "left" | "right" | "plateau_radius_m" | "paint">): number {
+  if (stroke.paint !== null) return stroke.paint.radius_m;
   const extent = (f: Flank | null): number => f?.extent_m ?? 0;
   return stroke.plateau_radius_m + Math.max(extent(stroke.left), extent(stroke.right));
 }

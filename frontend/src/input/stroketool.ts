@@ -165,6 +165,7 @@ export class StrokeTool {
       last: metres(shape.last),
       curve: [],
       ...style,
+      paint: null,
       locked: false,
       hidden: false,
       label: "",

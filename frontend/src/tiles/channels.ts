@@ -1,6 +1,6 @@
 /**
- * Noise amplitude and roughness as the strokes ask for them (DESIGN 5.4): smooth, so whole coarse levels come, and they are
- * shown at the finest level that is complete.
+ * Noise amplitude and roughness as the strokes ask for them, and what is painted (DESIGN 5.4): smooth, so whole coarse
+ * levels come, and they are shown at the finest level that is complete.
  */
 
 import { type ReadonlySignal, signal } from "@preact/signals-core";
@@ -9,7 +9,9 @@ import type { ChannelGrid, ChannelView, DecodedFrame } from "../core/types.ts";
 import {
   AMPLITUDE_QUANTA_PER_M,
   BASE_AMPLITUDE_M,
+  BASE_BIAS,
   BASE_ROUGHNESS,
+  BIAS_QUANTA,
   Channel,
   FrameKind,
   ROUGHNESS_QUANTA,
@@ -25,14 +27,17 @@ interface Stream {
 
 const stream = (quanta: number, base: number): Stream => ({ tiles: new Map(), quanta, base });
 
+const BIASES: readonly number[] = [Channel.SNOW, Channel.GRASS, Channel.FOREST, Channel.WETNESS];
+
 export class ChannelStore implements ChannelView {
   readonly sizeM: number;
   /** Rises with every frame that was applied. */
   readonly revision: ReadonlySignal<number>;
   private readonly rev = signal(0);
-  private readonly streams = new Map<number, Stream>([
+  private readonly streams: ReadonlyMap<number, Stream> = new Map([
     [Channel.AMPLITUDE, stream(AMPLITUDE_QUANTA_PER_M, BASE_AMPLITUDE_M)],
     [Channel.ROUGHNESS, stream(ROUGHNESS_QUANTA, BASE_ROUGHNESS)],
+    ...BIASES.map((channel) => [channel, stream(BIAS_QUANTA, BASE_BIAS)] as const),
   ]);
   private readonly grids = new Map<number, { readonly stamp: number; readonly grid: ChannelGrid }>();
   /** The next frame of a new connection replaces everything. */
@@ -55,6 +60,22 @@ export class ChannelStore implements ChannelView {
     return this.grid(Channel.ROUGHNESS);
   }
 
+  get snow(): ChannelGrid {
+    return this.grid(Channel.SNOW);
+  }
+
+  get grass(): ChannelGrid {
+    return this.grid(Channel.GRASS);
+  }
+
+  get forest(): ChannelGrid {
+    return this.grid(Channel.FOREST);
+  }
+
+  get wetness(): ChannelGrid {
+    return this.grid(Channel.WETNESS);
+  }
+
   /** Noise amplitude in metres at a place; outside the domain that of the nearest border. */
   amplitudeAt(x: number, y: number): number {
     return sampleGrid(this.amplitude, x / this.sizeM, y / this.sizeM);
@@ -70,7 +91,7 @@ export class ChannelStore implements ChannelView {
     this.stale = true;
   }
 
-  /** Applies a frame of one of the two channels; others are none of its business. */
+  /** Applies a frame of one of the channels; heights are none of its business. */
   apply(frame: DecodedFrame): void {
     const into = this.streams.get(frame.channel);
     if (into === undefined) return;

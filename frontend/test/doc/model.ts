@@ -27,6 +27,8 @@ export const EMPTY: Document = {
     sea_level_m: null,
     seed: 1,
     look: "natural",
+    detail: 1,
+    rule: "landscape",
     sun_azimuth_deg: 115,
     sun_elevation_deg: 24,
   },
@@ -47,6 +49,7 @@ export function ridge(id: string, over: Partial<Stroke> = {}): Stroke {
     plateau_radius_m: 0,
     amplitude_m: 0,
     roughness: 0.5,
+    paint: null,
     locked: false,
     hidden: false,
     label: "",
@@ -91,7 +94,7 @@ export class ServerModel {
     const resume = clock !== null && this.doc.clock - clock <= this.keep;
     return {
       type: "welcome",
-      protocol: 2,
+      protocol: 3,
       server: "model",
       client: "c",
       role: "edit",

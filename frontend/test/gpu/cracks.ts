@@ -130,6 +130,8 @@ function sceneOf(view: TileView, state: CameraState, look: Scene["settings"]["lo
       sea_level_m: null,
       seed: 1,
       look,
+      detail: 1,
+      rule: "landscape",
       sun_azimuth_deg: 115,
       sun_elevation_deg: 24,
     },

@@ -25,6 +25,8 @@ export const SETTINGS: TerrainSettings = {
   sea_level_m: null,
   seed: 1,
   look: "natural",
+  detail: 1,
+  rule: "landscape",
   sun_azimuth_deg: 115,
   sun_elevation_deg: 24,
 };

@@ -101,6 +101,8 @@ function scene(): Scene {
       sea_level_m: null,
       seed: 1,
       look: "natural",
+      detail: 1,
+      rule: "landscape",
       sun_azimuth_deg: 100,
       sun_elevation_deg: 30,
     },

@@ -2,7 +2,7 @@
 
 import { mat4 } from "wgpu-matrix";
 import { tileKey } from "../../src/core/tilekey.ts";
-import type { CameraState, ChannelView, Tile, TileView, Vec3 } from "../../src/core/types.ts";
+import type { CameraState, ChannelGrid, ChannelView, Tile, TileView, Vec3 } from "../../src/core/types.ts";
 import { SUBPATCHES, TILE_CELLS, TILE_SAMPLES } from "../../src/generated/contract.ts";
 
 export type HeightField = (x: number, y: number, level: number) => number;
@@ -288,11 +288,17 @@ export function mapCamera(centre: Vec3, orthoHeight: number, width: number, heig
   };
 }
 
-/** No stroke asks for anything: amplitude 0, roughness 0.5. */
+const zero: ChannelGrid = { side: 2, values: new Float32Array(4) };
+
+/** No stroke asks for anything: roughness 0.5, all others 0. */
 export const PLAIN_CHANNELS: ChannelView = {
   stamp: 0,
-  amplitude: { side: 2, values: new Float32Array(4) },
+  amplitude: zero,
   roughness: { side: 2, values: new Float32Array(4).fill(0.5) },
+  snow: zero,
+  grass: zero,
+  forest: zero,
+  wetness: zero,
 };
 
 /** Levels up to `solved` everywhere, finer ones only where asked for: what the page holds near the ground. */

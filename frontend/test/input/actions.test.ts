@@ -51,7 +51,7 @@ beforeEach(() => {
   ];
   doc.welcome({
     type: "welcome",
-    protocol: 2,
+    protocol: 3,
     server: "",
     client: "me",
     role: "edit",

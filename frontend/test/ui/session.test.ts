@@ -70,6 +70,8 @@ const SETTINGS = {
   sea_level_m: null,
   seed: 1,
   look: "natural",
+  detail: 1,
+  rule: "landscape",
   sun_azimuth_deg: 115,
   sun_elevation_deg: 24,
 } as const;
@@ -77,7 +79,7 @@ const SETTINGS = {
 function welcome(role: Role = "owner", change: Partial<Welcome> = {}): Welcome {
   return {
     type: "welcome",
-    protocol: 2,
+    protocol: 3,
     server: "0.1.0",
     client: "c",
     role,
