@@ -127,7 +127,7 @@ class LiveServer:
     def join(self, terrain: str, secret: str, client: str = "c1", **hello: Any) -> Peer:
         """A member that has had its welcome."""
         peer = Peer(self.socket())
-        peer.say("hello", protocol=2, terrain=terrain, secret=secret, client=client, **hello)
+        peer.say("hello", protocol=c.PROTOCOL_VERSION, terrain=terrain, secret=secret, client=client, **hello)
         peer.welcome = peer.wait("welcome")
         return peer
 

@@ -63,7 +63,9 @@ async def main(data: Path, first: int) -> None:
     )
     wake = asyncio.Event()
     outbox = Outbox(wake.set)
-    guest: Guest = room.join(c.Hello(protocol=2, terrain="t", secret="s", client="c"), "edit", "link", outbox)
+    guest: Guest = room.join(
+        c.Hello(protocol=c.PROTOCOL_VERSION, terrain="t", secret="s", client="c"), "edit", "link", outbox
+    )
     counter = first
     while True:
         ops = []

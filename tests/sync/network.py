@@ -179,7 +179,7 @@ class Client:
         if self.link is not None:
             return
         self.link = Link(self, self.server)
-        hello = c.Hello(protocol=2, terrain="t", secret="s", client=self.name, clock=self.doc.clock)
+        hello = c.Hello(protocol=c.PROTOCOL_VERSION, terrain="t", secret="s", client=self.name, clock=self.doc.clock)
         self.link.up(hello.model_dump_json())
 
     def lost(self) -> None:

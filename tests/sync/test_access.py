@@ -23,7 +23,7 @@ def _link(server: LiveServer, terrain: str, owner: str, role: str, name: str = "
 
 def _denied(server: LiveServer, terrain: str, secret: str) -> str:
     peer = Peer(server.socket())
-    peer.say("hello", protocol=2, terrain=terrain, secret=secret, client="denied")
+    peer.say("hello", protocol=c.PROTOCOL_VERSION, terrain=terrain, secret=secret, client="denied")
     _, error = peer.closed()
     assert error is not None
     return str(error["code"])
@@ -292,7 +292,7 @@ def test_one_client_id_is_one_member(server: LiveServer) -> None:
     second = server.join(terrain, owner, "same")
     assert first.closed()[0] == c.WS_CLOSE["bad_hello"]
     thief = Peer(server.socket())
-    thief.say("hello", protocol=2, terrain=terrain, secret=edit, client="same")
+    thief.say("hello", protocol=c.PROTOCOL_VERSION, terrain=terrain, secret=edit, client="same")
     assert thief.closed()[0] == c.WS_CLOSE["bad_hello"]
     second.ops(("same:1", stroke()), ("same:2", set_op(label="x")))
     assert second.wait("ack")["ids"] == ["same:1", "same:2"]

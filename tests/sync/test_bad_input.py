@@ -203,7 +203,7 @@ def test_anything_but_a_hello_first(scene: Scene, first: dict[str, Any]) -> None
 
 
 def test_hello_twice(scene: Scene) -> None:
-    scene.peer.say("hello", protocol=2, terrain=scene.terrain, secret=scene.secret, client="c1")
+    scene.peer.say("hello", protocol=c.PROTOCOL_VERSION, terrain=scene.terrain, secret=scene.secret, client="c1")
     scene.closes("bad_hello")
 
 
@@ -216,7 +216,7 @@ def test_a_page_of_another_site(scene: Scene) -> None:
 def test_the_own_site_is_welcome(scene: Scene) -> None:
     origin = f"http://127.0.0.1:{scene.server.port}"
     peer = Peer(scene.server.socket(origin=origin))
-    peer.say("hello", protocol=2, terrain=scene.terrain, secret=scene.secret, client="c3")
+    peer.say("hello", protocol=c.PROTOCOL_VERSION, terrain=scene.terrain, secret=scene.secret, client="c3")
     assert peer.wait("welcome")["clock"] == 5
     peer.close()
 

@@ -131,7 +131,7 @@ def test_members_per_room(tmp_path: Path) -> None:
         terrain, secret = server.create()
         members = [server.join(terrain, secret, f"m{i}") for i in range(3)]
         late = Peer(server.socket())
-        late.say("hello", protocol=2, terrain=terrain, secret=secret, client="late")
+        late.say("hello", protocol=c.PROTOCOL_VERSION, terrain=terrain, secret=secret, client="late")
         number, error = late.closed()
         assert error is not None
         assert (number, error["code"]) == (c.WS_CLOSE["room_full"], "room_full")

@@ -243,7 +243,7 @@ def test_sixty_joins_at_once_into_a_cold_room(tmp_path: Path, count: int) -> Non
         times: list[float] = []
 
         def hello(i: int) -> None:
-            sockets[i].say("hello", protocol=2, terrain=terrain, secret=secret, client=f"m{i}")
+            sockets[i].say("hello", protocol=c.PROTOCOL_VERSION, terrain=terrain, secret=secret, client=f"m{i}")
             assert sockets[i].wait("welcome")["clock"] == 200
             times.append(time.monotonic() - started)
 
