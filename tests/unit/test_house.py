@@ -19,11 +19,11 @@ PACKAGE = ROOT / "backend" / "esker"
 
 # A room may import the rooms to its left and itself (DESIGN 2).
 LAYERS: tuple[frozenset[str], ...] = (
-    frozenset({"contract", "version"}),
+    frozenset({"contract", "fractal", "version"}),
     frozenset({"contract_emit", "grid"}),
     frozenset({"document"}),
     frozenset({"templates"}),
-    frozenset({"solve", "tiles", "store", "settings"}),
+    frozenset({"solve", "tiles", "store", "settings", "synthesis"}),
     frozenset({"session", "terrain"}),
     frozenset({"ground", "link"}),
     frozenset({"client", "tls", "headers", "upload"}),
@@ -36,8 +36,10 @@ LAYERS: tuple[frozenset[str], ...] = (
 RANK = {room: rank for rank, rooms in enumerate(LAYERS) for room in rooms}
 # Rooms of one rank that may not see each other, and rooms that a lower-ranked one may never see.
 FORBIDDEN = {("session", "solve"), ("tiles", "solve"), ("solve", "tiles"), ("store", "solve"), ("store", "tiles")}
+FORBIDDEN |= {(room, "synthesis") for room in ("session", "tiles", "store")}
+FORBIDDEN |= {("synthesis", room) for room in ("solve", "tiles", "store")}
 ONLY = {
-    "pyopencl": {"solve"},
+    "pyopencl": {"solve", "synthesis"},
     "fastapi": {"server"},
     "starlette": {"server"},
     "moderngl": {"render"},

@@ -1,0 +1,172 @@
+"""What the rule is told of a place besides its parent: settings, the solved ground, what strokes ask for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from esker import grid
+from esker.contract import BASE_ROUGHNESS, TILE_CELLS
+from esker.fractal import ALPHA, LOOKS, LookRule
+from esker.synthesis.interpolate import Window
+from esker.synthesis.state import Array, State
+
+BORDER: Final = 2
+"""Samples that a tile carries beyond each of its edges: 2k for k = 1 (paper 1, section 3.1)."""
+
+
+class Ground(NamedTuple):
+    """The parent's ground with its detail, at the child's samples. See docs/synthesis.md, "Interpolation".
+
+    ``height``: Z, metres; ``slope_x``, ``slope_y``: d/dx, d/dy; ``concavity``: v, -1..1, positive in valleys;
+    ``guide_slope``: steepness of the guide alone.
+    """
+
+    level: int
+    height: Array
+    slope_x: Array
+    slope_y: Array
+    concavity: Array
+    guide_slope: Array
+
+
+class Biases(NamedTuple):
+    """What strokes ask for. ``amplitude``: metres; ``roughness``: 0..1; the rest -1..1, and 0 where none asks."""
+
+    amplitude: Array
+    roughness: Array
+    snow: Array
+    grass: Array
+    forest: Array
+    wetness: Array
+
+
+Rule = Callable[["Site", Ground, State, Window, Biases], State]
+"""(site, ground, the parent's state at the child's samples, the child's window, biases) -> the child's state."""
+
+Grid = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Site:
+    """One terrain as the rule sees it. Immutable.
+
+    ``guides``: heights of levels 0..G as sent on the wire, metres, (N_l, N_l) float32; ``channels``: grids (n, n) over
+    the whole domain, corners on corners, n - 1 a power of two, by the names of ``Biases``; one that is missing is its
+    base everywhere. ``detail``: strength, 0..4. ``sea_level_m``: None where there is no sea. ``cyclic``: the domain's
+    east edge is its west edge, north its south. ``dtype``: of the arithmetic. Raises ValueError for what does not fit.
+    """
+
+    size_m: float
+    seed: int
+    guides: tuple[Grid, ...]
+    channels: Mapping[str, Grid] = field(default_factory=dict)
+    detail: float = 1.0
+    rule: str = "landscape"
+    look: str = "natural"
+    sea_level_m: float | None = None
+    cyclic: bool = False
+    dtype: DTypeLike = np.float64
+
+    def __post_init__(self) -> None:
+        if not self.guides:
+            raise ValueError("synthesis needs the heights of level 0 at least")
+        for level, heights in enumerate(self.guides):
+            n = grid.samples(level)
+            if heights.shape != (n, n):
+                raise ValueError(f"level {level} has {n}x{n} samples, not {heights.shape}")
+        for name, values in self.channels.items():
+            cells = len(values) - 1
+            if name not in Biases._fields or values.shape != (cells + 1,) * 2 or cells < 1 or cells & (cells - 1):
+                raise ValueError(f"no channel '{name}' of {values.shape} values")
+        if self.look not in LOOKS:
+            raise ValueError(f"no look is called '{self.look}'")
+
+    @property
+    def solved(self) -> int:
+        """Finest level G of the guide that was solved as a whole."""
+        return len(self.guides) - 1
+
+    @property
+    def look_rule(self) -> LookRule:
+        """Snow line, tree line and plants of the look."""
+        return LOOKS[self.look]
+
+    @property
+    def amplitude_m(self) -> float:
+        """Amplitude of the coarsest octave on steep ground, metres: detail * alpha * s_0."""
+        return self.detail * ALPHA * grid.spacing(0, self.size_m)
+
+    def spacing(self, level: int) -> float:
+        """Distance between samples of a level, metres."""
+        return grid.spacing(level, self.size_m)
+
+    def indices(self, index: NDArray[np.int64], level: int) -> NDArray[np.int64]:
+        """Global sample indices as the hash and the channels take them: wrapped where the domain is cyclic."""
+        return index % grid.cells(level) if self.cyclic else index
+
+    def guide(self, window: Window) -> Array:
+        """Guide heights of a level that was solved. Raises IndexError above it."""
+        return extended(self.guides[window.level], window, self.cyclic).astype(self.dtype)
+
+    def biases(self, window: Window) -> Biases:
+        """Channels at the samples of a window."""
+        rows, cols = (self.indices(a, window.level) for a in (window.rows, window.cols))
+        base = {"roughness": BASE_ROUGHNESS}
+        return Biases(*(
+            self._channel(self.channels[name], window.level, rows, cols)
+            if name in self.channels
+            else np.full(window.shape, base.get(name, 0.0), dtype=self.dtype)
+            for name in Biases._fields
+        ))  # fmt: skip
+
+    def _channel(self, values: Grid, level: int, rows: NDArray[np.int64], cols: NDArray[np.int64]) -> Array:
+        z = values.astype(self.dtype)
+        (j, v), (i, u) = (_place(a, level, len(values) - 1) for a in (rows, cols))
+        fx, fy = u.astype(self.dtype)[None, :], v.astype(self.dtype)[:, None]
+        south = z[np.ix_(j, i)] * (1 - fx) + z[np.ix_(j, i + 1)] * fx
+        north = z[np.ix_(j + 1, i)] * (1 - fx) + z[np.ix_(j + 1, i + 1)] * fx
+        return south * (1 - fy) + north * fy
+
+
+def _place(index: NDArray[np.int64], level: int, cells: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Cell of a channel's grid and place in it, 0..1, exact: both grids have powers of two cells."""
+    n = grid.cells(level)
+    scaled = np.clip(index, 0, n) * cells
+    cell = np.minimum(scaled // n, cells - 1)
+    return cell, (scaled - cell * n) / n
+
+
+def extended(heights: NDArray[np.floating], window: Window, cyclic: bool) -> NDArray[np.floating]:
+    """Heights of a whole level at a window that may reach over its edges by less than the domain.
+
+    Beyond an edge the ground goes on point-symmetrically, 2 z(edge) - z(as far inside), x first, then y: a function of
+    the global index alone, so tiles along the edge agree. Cyclic domains repeat.
+    """
+    rows, cols = window.rows, window.cols
+    last = len(heights) - 1
+    if cyclic:
+        repeated: NDArray[np.floating] = heights[np.ix_(rows % last, cols % last)]
+        return repeated
+    return _mirrored(_mirrored(heights, cols, last, 1), rows, last, 0)
+
+
+def _mirrored(z: NDArray[np.floating], index: NDArray[np.int64], last: int, axis: int) -> NDArray[np.floating]:
+    edge = np.clip(index, 0, last)
+    out: NDArray[np.floating] = np.take(z, edge, axis=axis)
+    away = np.flatnonzero(edge != index)
+    if away.size:
+        at = (slice(None), away) if axis else (away, slice(None))
+        inside = np.take(z, (2 * edge - index)[away], axis=axis)
+        out[at] = 2 * out[at] - inside
+    return out
+
+
+def tile_window(level: int, x: int, y: int) -> Window:
+    """The 69x69 samples of a tile with its border."""
+    c, r = TILE_CELLS * x, TILE_CELLS * y
+    return Window(level, r - BORDER, r + TILE_CELLS + 1 + BORDER, c - BORDER, c + TILE_CELLS + 1 + BORDER)
