@@ -125,12 +125,13 @@ class Site:
         ))  # fmt: skip
 
     def _channel(self, values: Grid, level: int, rows: NDArray[np.int64], cols: NDArray[np.int64]) -> Array:
-        z = values.astype(self.dtype)
+        z: Array = values.astype(self.dtype)
         (j, v), (i, u) = (_place(a, level, len(values) - 1) for a in (rows, cols))
         fx, fy = u.astype(self.dtype)[None, :], v.astype(self.dtype)[:, None]
         south = z[np.ix_(j, i)] * (1 - fx) + z[np.ix_(j, i + 1)] * fx
         north = z[np.ix_(j + 1, i)] * (1 - fx) + z[np.ix_(j + 1, i + 1)] * fx
-        return south * (1 - fy) + north * fy
+        between: Array = south * (1 - fy) + north * fy
+        return between
 
 
 def _place(index: NDArray[np.int64], level: int, cells: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
