@@ -2,9 +2,9 @@
 
 Run ``python tests/vectors/make_synthesis.py`` after a change of the rule or its constants. Arrays are rows from the
 south, flattened. ``hashes``: H(level, stream, i, j) of a seed. ``sites``: settings, channels, and the guide of levels
-0..solved as integers in quanta (size / (64 * 2^level) / 256). ``steps``: one subdivision of a parent window (r0, r1, c0,
-c1, half open, global indices), state given as four words a sample. ``places``: windows of any level made from the root.
-Expected: the guide and the base, metres (float32; base: of a terrain in which nothing is refined above the solved
+0..solved as integers in quanta (size / (64 * 2^level) / 256). ``steps``: one subdivision of a parent window (r0, r1,
+c0, c1, half open, global indices), state given as four words a sample. ``places``: windows of any level, made from the
+root. Expected: the guide and the base, metres (float32; base: of a terrain in which nothing is refined above the solved
 levels), and the state's words; d is word 0 as float32. Compare d and heights within ``metres`` of the cell (or float32
 rounding of the heights), and halves within ``unorm``.
 """
@@ -41,14 +41,15 @@ def quanta(level: int, size_m: float, periodic: bool) -> NDArray[np.int32]:
     else:
         z = 700 * np.exp(-(((x - 0.45) / 0.2) ** 2) - ((y - 0.4) / 0.15) ** 2) - 60 * np.cos(7 * x + 3 * y) + 120 * y
     q = grid.quantum(level, size_m)
-    return np.rint(z * (size_m / SIZE_M) / q).astype(np.int32)
+    out: NDArray[np.int32] = np.rint(z * (size_m / SIZE_M) / q).astype(np.int32)
+    return out
 
 
 def fields(name: str, **changes: Any) -> dict[str, Any]:
     """A site as JSON has it."""
     out: dict[str, Any] = {
         "name": name, "size_m": SIZE_M, "seed": 1, "detail": 1.0, "rule": "landscape", "look": "natural",
-        "sea_level_m": None, "cyclic": False, "solved": 1, "channels": {},
+        "sea_level_m": None, "cyclic": False, "solved": 0, "channels": {},
     }  # fmt: skip
     return out | changes
 
@@ -65,12 +66,12 @@ def strokes(seed: int) -> dict[str, list[list[float]]]:
 
 
 SITES = (
-    fields("hill", sea_level_m=5.0),
+    fields("hill", sea_level_m=5.0, solved=1),
     fields("painted", seed=4294967295, detail=2.5, look="alpine", channels=strokes(5)),
     fields("smooth", rule="smooth", sea_level_m=-20.0, channels=strokes(6)),
     fields("plain", rule="plain", look="desert", channels=strokes(7)),
-    fields("cyclic", cyclic=True, solved=0, seed=77, channels=strokes(8)),
-    fields("wide", size_m=65536.0, solved=0, seed=123456789, look="paper"),
+    fields("cyclic", cyclic=True, seed=77, channels=strokes(8)),
+    fields("wide", size_m=65536.0, seed=123456789, look="paper"),
 )
 
 
