@@ -1,0 +1,118 @@
+/**
+ * What a rule of the synthesis is given and gives for one sample (docs/synthesis.md). Twin of
+ * `backend/esker/synthesis/site.py`. One object serves all samples of a window: rules run some thousand times for one
+ * picked point, and objects made for each would cost more than the rule.
+ */
+
+import type { TerrainSettings } from "../../generated/contract.ts";
+import { SYNTH_ALPHA, SYNTH_LOOKS, TILE_CELLS } from "../../generated/contract.ts";
+
+/** One terrain as its rule sees it. */
+export interface Site {
+  readonly sizeM: number;
+  readonly seed: number;
+  /** Amplitude of the coarsest octave on steep ground, metres. */
+  readonly amplitudeM: number;
+  readonly seaLevelM: number | null;
+  readonly snowLine: number;
+  readonly treeLine: number;
+  readonly plants: number;
+}
+
+export type RuleSettings = Pick<TerrainSettings, "size_m" | "seed" | "sea_level_m" | "look" | "detail" | "rule">;
+
+/** The site that settings describe. */
+export function siteOf(settings: RuleSettings): Site {
+  const look = SYNTH_LOOKS[settings.look];
+  return {
+    sizeM: settings.size_m,
+    seed: settings.seed,
+    amplitudeM: (settings.detail * SYNTH_ALPHA * settings.size_m) / TILE_CELLS,
+    seaLevelM: settings.sea_level_m,
+    snowLine: look.snowLine,
+    treeLine: look.treeLine,
+    plants: look.plants,
+  };
+}
+
+/** A sample between its parent and its rule. The rule reads all and overwrites `d` to `foam`, and `sigma`. */
+export interface Sample {
+  level: number;
+  /** The parent's ground with its detail, metres, its slopes, its concavity -1..1, and the slope of the guide alone. */
+  height: number;
+  slopeX: number;
+  slopeY: number;
+  concavity: number;
+  guideSlope: number;
+  /** What strokes ask for: metres, 0..1, and biases -1..1. */
+  amplitude: number;
+  roughness: number;
+  snowBias: number;
+  grassBias: number;
+  forestBias: number;
+  wetBias: number;
+  /** Uniform in -1..1, one for each of the six values below. */
+  noiseD: number;
+  noiseH: number;
+  noiseSnow: number;
+  noiseWet: number;
+  noiseGrass: number;
+  noiseForest: number;
+  noiseFoam: number;
+  /** The parent's state here, then this level's: detail in metres, smoothness exponent, and shares 0..1. */
+  d: number;
+  h: number;
+  snow: number;
+  wet: number;
+  grass: number;
+  forest: number;
+  foam: number;
+  /** The most that this level added to or took from the detail, metres. */
+  sigma: number;
+}
+
+export function newSample(): Sample {
+  return {
+    level: 0,
+    height: 0,
+    slopeX: 0,
+    slopeY: 0,
+    concavity: 0,
+    guideSlope: 0,
+    amplitude: 0,
+    roughness: 0.5,
+    snowBias: 0,
+    grassBias: 0,
+    forestBias: 0,
+    wetBias: 0,
+    noiseD: 0,
+    noiseH: 0,
+    noiseSnow: 0,
+    noiseWet: 0,
+    noiseGrass: 0,
+    noiseForest: 0,
+    noiseFoam: 0,
+    d: 0,
+    h: 0,
+    snow: 0,
+    wet: 0,
+    grass: 0,
+    forest: 0,
+    foam: 0,
+    sigma: 0,
+  };
+}
+
+/**
+ * Makes a sample of its parent, in place. `relief` asks for the detail and what it depends on only (d, h, snow): the
+ * other channels then stay as they were.
+ */
+export type Rule = (site: Site, sample: Sample, relief: boolean) => void;
+
+/** 0 below a, 1 above b, smooth between. */
+export function smoothstep(a: number, b: number, x: number): number {
+  const t = x <= a ? 0 : x >= b ? 1 : (x - a) / (b - a);
+  return t * t * (3 - 2 * t);
+}
+
+export const clamp = (x: number, low: number, high: number): number => Math.min(Math.max(x, low), high);
