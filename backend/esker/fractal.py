@@ -22,9 +22,9 @@ HASH_STREAMS: Final = 8
 
 # --- detail height --------------------------------------------------------------------------------------------------
 
-ALPHA: Final = 1.0 / 24.0
+ALPHA: Final = 1.0 / 3.0
 """Amplitude of the coarsest octave on steep ground, in cells of level 0."""
-FLAT_SHARE: Final = 0.12
+FLAT_SHARE: Final = 0.08
 """What is left of it on level ground."""
 AMPLITUDE_SLOPE: Final = (0.03, 0.5)
 ROUGHNESS_TO_H: Final = 1.1
@@ -33,25 +33,25 @@ SNOW_TO_H: Final = 0.8
 """Thick snow damps detail: what full snow adds to the exponent (paper 1, section 4)."""
 H_RANGE: Final = (0.3, 2.5)
 """Exponents that an octave can have; the first bounds what may be added on a level, by which boxes grow."""
-PAINT_MORE: Final = 4.0
+PAINT_MORE: Final = 2.0
 PAINT_LESS: Final = 1.0
 """Amplitude that paint of value 1 adds, and of value -1 takes away, both times ALPHA s_0: the latter all there is."""
 
 # --- smoothness exponent h, a fractal itself ------------------------------------------------------------------------
 
-SMOOTHNESS: Final = 0.95
-SMOOTHNESS_MIN: Final = 0.45
+SMOOTHNESS: Final = 1.05
+SMOOTHNESS_MIN: Final = 0.72
 SMOOTHNESS_MAX: Final = 1.8
 SMOOTHNESS_FLAT: Final = 0.30
 SMOOTHNESS_FLAT_SLOPE: Final = (0.05, 0.35)
-SMOOTHNESS_STEEP: Final = 0.20
+SMOOTHNESS_STEEP: Final = 0.17
 SMOOTHNESS_STEEP_SLOPE: Final = (0.5, 1.1)
 SMOOTHNESS_VALLEY: Final = 0.15
 SMOOTHNESS_VALLEY_CONCAVITY: Final = (0.0, 0.3)
 SMOOTHNESS_LOW: Final = 0.10
 SMOOTHNESS_LOW_ELEVATION: Final = (0.0, 0.10)
-SMOOTHNESS_NOISE: Final = 0.12
-SMOOTHNESS_NOISE_DECAY: Final = 0.25
+SMOOTHNESS_NOISE: Final = 0.24
+SMOOTHNESS_NOISE_DECAY: Final = 0.2
 """Noise of h on level l: SMOOTHNESS_NOISE * 2^(-SMOOTHNESS_NOISE_DECAY * l)."""
 
 # --- how strictly channels follow height and slope: strictly on coarse levels, loosely on fine ones -----------------

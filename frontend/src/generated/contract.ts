@@ -144,9 +144,9 @@ export const SYNTH_HASH_MULTIPLIER_2 = 2221713035;
 
 export const SYNTH_HASH_STREAMS = 8;
 
-export const SYNTH_ALPHA = 0.041666666666666664;
+export const SYNTH_ALPHA = 0.3333333333333333;
 
-export const SYNTH_FLAT_SHARE = 0.12;
+export const SYNTH_FLAT_SHARE = 0.08;
 
 export const SYNTH_AMPLITUDE_SLOPE_FROM = 0.03;
 
@@ -160,13 +160,13 @@ export const SYNTH_H_RANGE_FROM = 0.3;
 
 export const SYNTH_H_RANGE_TO = 2.5;
 
-export const SYNTH_PAINT_MORE = 4.0;
+export const SYNTH_PAINT_MORE = 2.0;
 
 export const SYNTH_PAINT_LESS = 1.0;
 
-export const SYNTH_SMOOTHNESS = 0.95;
+export const SYNTH_SMOOTHNESS = 1.05;
 
-export const SYNTH_SMOOTHNESS_MIN = 0.45;
+export const SYNTH_SMOOTHNESS_MIN = 0.72;
 
 export const SYNTH_SMOOTHNESS_MAX = 1.8;
 
@@ -176,7 +176,7 @@ export const SYNTH_SMOOTHNESS_FLAT_SLOPE_FROM = 0.05;
 
 export const SYNTH_SMOOTHNESS_FLAT_SLOPE_TO = 0.35;
 
-export const SYNTH_SMOOTHNESS_STEEP = 0.2;
+export const SYNTH_SMOOTHNESS_STEEP = 0.17;
 
 export const SYNTH_SMOOTHNESS_STEEP_SLOPE_FROM = 0.5;
 
@@ -194,9 +194,9 @@ export const SYNTH_SMOOTHNESS_LOW_ELEVATION_FROM = 0.0;
 
 export const SYNTH_SMOOTHNESS_LOW_ELEVATION_TO = 0.1;
 
-export const SYNTH_SMOOTHNESS_NOISE = 0.12;
+export const SYNTH_SMOOTHNESS_NOISE = 0.24;
 
-export const SYNTH_SMOOTHNESS_NOISE_DECAY = 0.25;
+export const SYNTH_SMOOTHNESS_NOISE_DECAY = 0.2;
 
 export const SYNTH_TIE = 0.9;
 
