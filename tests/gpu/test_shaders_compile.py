@@ -28,10 +28,12 @@ def modules() -> dict[str, list[Path]]:
     for parts in re.findall(r"join\(((?:[^()]|\[\w+\])*)\)", text.split("export type Detail")[1]):
         for detail in ("detailRich", "detailPlain"):
             for look in ("lookNatural", "lookAlpine", "lookDesert", "lookPaper"):
-                chosen = joined(parts, **{"DETAILS[detail]": detail, "LOOKS[look]": look})
-                key = f"{chosen[-1].stem}-{detail if 'DETAILS' in parts else ''}-{look if 'LOOKS' in parts else ''}"
-                found[key] = chosen
-    assert len(found) == 1 + 8 + 4 + 5
+                for rule in ("ruleLandscape", "ruleSmooth", "rulePlain"):
+                    variant = {"DETAILS[detail]": detail, "LOOKS[look]": look, "RULES[rule]": rule}
+                    chosen = joined(parts, **variant)
+                    names = [name for place, name in variant.items() if place in parts]
+                    found["-".join([chosen[-1].stem, *names])] = chosen
+    assert len(found) == 1 + 8 + 4 + 6 + 3
     return found
 
 

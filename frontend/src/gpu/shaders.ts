@@ -3,9 +3,11 @@
 import contract from "@shaders/generated/contract.wgsl?raw";
 import atmosphere from "@shaders/wgsl/atmosphere.wgsl?raw";
 import background from "@shaders/wgsl/background.wgsl?raw";
+import computeBounds from "@shaders/wgsl/compute_bounds.wgsl?raw";
 import computeNormals from "@shaders/wgsl/compute_normals.wgsl?raw";
 import computeSky from "@shaders/wgsl/compute_sky.wgsl?raw";
 import computeSun from "@shaders/wgsl/compute_sun.wgsl?raw";
+import computeSynthesis from "@shaders/wgsl/compute_synthesis.wgsl?raw";
 import detailPlain from "@shaders/wgsl/detail_plain.wgsl?raw";
 import detailRich from "@shaders/wgsl/detail_rich.wgsl?raw";
 import ghost from "@shaders/wgsl/ghost.wgsl?raw";
@@ -19,7 +21,15 @@ import noise from "@shaders/wgsl/noise.wgsl?raw";
 import overlay from "@shaders/wgsl/overlay.wgsl?raw";
 import patch from "@shaders/wgsl/patch.wgsl?raw";
 import ribbon from "@shaders/wgsl/ribbon.wgsl?raw";
+import ruleLandscape from "@shaders/wgsl/rule_landscape.wgsl?raw";
+import rulePlain from "@shaders/wgsl/rule_plain.wgsl?raw";
+import ruleSmooth from "@shaders/wgsl/rule_smooth.wgsl?raw";
 import sky from "@shaders/wgsl/sky.wgsl?raw";
+import synthHash from "@shaders/wgsl/synth_hash.wgsl?raw";
+import synthInterpolate from "@shaders/wgsl/synth_interpolate.wgsl?raw";
+import synthSite from "@shaders/wgsl/synth_site.wgsl?raw";
+import synthSlots from "@shaders/wgsl/synth_slots.wgsl?raw";
+import synthTargets from "@shaders/wgsl/synth_targets.wgsl?raw";
 import terrain from "@shaders/wgsl/terrain.wgsl?raw";
 import tile from "@shaders/wgsl/tile.wgsl?raw";
 import tonemap from "@shaders/wgsl/tonemap.wgsl?raw";
@@ -27,6 +37,7 @@ import view from "@shaders/wgsl/view.wgsl?raw";
 import wall from "@shaders/wgsl/wall.wgsl?raw";
 import water from "@shaders/wgsl/water.wgsl?raw";
 import type { Look } from "../generated/contract.ts";
+import type { SynthesisRule } from "./synthsite.ts";
 
 const join = (...parts: string[]): string => parts.join("\n");
 
@@ -65,4 +76,26 @@ export const SOURCES = {
   normals: join(contract, tile, computeNormals),
   sun: join(contract, tile, computeSun),
   sky: join(atmosphere, computeSky),
+  bounds: join(contract, tile, computeBounds),
 } as const;
+
+const RULES: Readonly<Record<SynthesisRule, string>> = {
+  landscape: ruleLandscape,
+  smooth: ruleSmooth,
+  plain: rulePlain,
+};
+
+/** What makes the detail of the ground by one of the rules. */
+export function synthesisSource(rule: SynthesisRule): string {
+  return join(
+    contract,
+    tile,
+    synthHash,
+    synthInterpolate,
+    synthSite,
+    synthTargets,
+    RULES[rule],
+    synthSlots,
+    computeSynthesis,
+  );
+}

@@ -1,0 +1,43 @@
+/** What strokes ask of the detail, as the synthesis reads it: all six channels on one grid (synth_slots.wgsl). */
+
+import type { ChannelGrid, ChannelView } from "../core/types.ts";
+
+export interface ChannelWords {
+  /** Per node: amplitude, roughness, snow, grass, forest, wetness. Row 0 south. */
+  readonly values: Float32Array<ArrayBuffer>;
+  /** The grid has 2^bits cells a side. */
+  readonly bits: number;
+  /** Any of the last four is asked for anywhere. */
+  readonly biased: boolean;
+}
+
+/** The finest of the six grids serves; coarser ones are bilinear on it, which changes nothing between their nodes. */
+export function channelWords(view: ChannelView): ChannelWords {
+  const grids = [view.amplitude, view.roughness, view.snow, view.grass, view.forest, view.wetness];
+  const cells = Math.max(...grids.map((grid) => grid.side - 1));
+  const bits = Math.log2(cells);
+  if (!Number.isInteger(bits)) throw new RangeError(`channels have ${cells} cells a side: not a power of two`);
+  const side = cells + 1;
+  const values = new Float32Array(grids.length * side * side);
+  grids.forEach((grid, channel) => {
+    spread(grid, side, values, channel, grids.length);
+  });
+  const biased = grids.slice(2).some((grid) => grid.values.some((v) => v !== 0));
+  return { values, bits, biased };
+}
+
+function spread(grid: ChannelGrid, side: number, out: Float32Array, first: number, stride: number): void {
+  const scale = (grid.side - 1) / (side - 1);
+  for (let row = 0; row < side; row += 1) {
+    const j = Math.min(grid.side - 2, Math.floor(row * scale));
+    const v = row * scale - j;
+    for (let col = 0; col < side; col += 1) {
+      const i = Math.min(grid.side - 2, Math.floor(col * scale));
+      const u = col * scale - i;
+      const at = j * grid.side + i;
+      const south = grid.values[at]! * (1 - u) + grid.values[at + 1]! * u;
+      const north = grid.values[at + grid.side]! * (1 - u) + grid.values[at + grid.side + 1]! * u;
+      out[first + stride * (row * side + col)] = south * (1 - v) + north * v;
+    }
+  }
+}

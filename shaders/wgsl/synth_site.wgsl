@@ -1,0 +1,62 @@
+// What the rule is told of a place: settings (gpu/synthsite.ts writes them), the ground, what strokes ask for.
+// vec4f: the four children of a parent's cell, see synth_interpolate.wgsl.
+struct SynthLevel {
+  keys: vec4u,            // of the four streams of noise
+  inverse_spacing: f32,   // of the samples that derivatives are taken from, 1/m: the parent's; level 0: its own
+  tie: f32,               // how strictly channels follow their targets
+  channel_noise: f32,
+  smoothness_noise: f32,
+};
+
+struct SynthSite {
+  size: f32,              // side of the domain, metres
+  amplitude: f32,         // of the coarsest octave on steep ground, metres
+  sea: f32,               // elevations count from here, metres
+  has_sea: f32,           // 1 or 0
+  snow_line: f32,         // of the look, elevations as shares of the side
+  tree_line: f32,
+  plants: f32,
+  solved: u32,            // finest level whose guide is what was sent
+  cyclic: u32,            // 1: the domain's east edge is its west edge
+  channel_bits: u32,      // the channels' grid has 2^channel_bits cells a side
+  biased: u32,            // 1: paint asks for snow, plants or wetness somewhere
+  pad: u32,
+  levels: array<SynthLevel, 18>,
+};
+
+// The parent's ground with its detail.
+struct Ground {
+  height: vec4f,
+  slope_x: vec4f,
+  slope_y: vec4f,
+  concavity: vec4f,       // -1..1, positive in valleys
+  guide_slope: vec4f,     // steepness of the guide alone
+};
+
+struct Asked {
+  amplitude: vec4f,       // metres
+  roughness: vec4f,       // 0..1
+  snow: vec4f,            // the rest -1..1
+  grass: vec4f,
+  forest: vec4f,
+  wetness: vec4f,
+};
+
+struct SynthState {
+  d: vec4f,               // detail, metres
+  h: vec4f,               // smoothness exponent
+  snow: vec4f,
+  wet: vec4f,
+  grass: vec4f,
+  forest: vec4f,
+  foam: vec4f,
+  finer: vec4f,           // not stored: the most that the next level's noise would add here, metres
+};
+
+// Words of the four streams.
+struct SynthNoise {
+  a: vec4u,
+  b: vec4u,
+  c: vec4u,
+  d: vec4u,
+};
