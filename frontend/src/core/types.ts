@@ -147,6 +147,9 @@ export interface CursorVisual {
   readonly radiusPx: number;
 }
 
+/** What a picture trades: `automatic` holds the frame rate, the others hold their screen-error bound. */
+export type QualityMode = "automatic" | "fast" | "balanced" | "fine";
+
 /** All that one frame shows. Built anew by the app each frame; renderers only read it. */
 export interface Scene {
   readonly camera: CameraState;
@@ -158,6 +161,8 @@ export interface Scene {
   readonly cursors: readonly CursorVisual[];
   /** Screen-error bound in pixels. */
   readonly tauPx: number;
+  /** `automatic` where it is left out. */
+  readonly quality?: QualityMode;
   /** Seconds, for water and the like. */
   readonly time: number;
   readonly overlay: "none" | "contours" | "slope" | "detail" | "patches";

@@ -9,5 +9,11 @@ export { createMapRenderer, NoWebGpu };
 
 /** The WebGPU renderer on this canvas. Throws `NoWebGpu` with a reason a person can read. */
 export async function createRenderer(canvas: HTMLCanvasElement): Promise<SceneRenderer> {
-  return GpuRenderer.create(canvas, await openGpu(canvas));
+  const gpu = await openGpu(canvas);
+  try {
+    return await GpuRenderer.create(canvas, gpu);
+  } catch (error) {
+    gpu.device.destroy();
+    throw error;
+  }
 }

@@ -1,13 +1,17 @@
 /**
- * Keeps frames short: while the picture moves, resolution and detail follow the measured time of the device; a picture
- * that has come to rest is drawn once more at full quality.
+ * Keeps frames short. While the picture moves, resolution and detail follow the measured time of the device, or stay as
+ * somebody chose; a picture that has come to rest is drawn once more at full resolution.
  */
+
+import type { QualityMode } from "../core/types.ts";
 
 /** Frames longer than this lower the quality, milliseconds. */
 export const SLOW_MS = 40;
 const FAST_MS = 18;
 const LOWEST_SCALE = 0.5;
 const STEP = 0.85;
+/** Below the lowest resolution only coarser ground helps: the error bound may grow by this much more. */
+const COARSEST = 2.5;
 
 export interface Quality {
   /** Drawn pixels per canvas pixel, along one side. */
@@ -16,8 +20,15 @@ export interface Quality {
   readonly tauFactor: number;
 }
 
+/** Resolution while the picture moves, of the modes that do not follow the frame rate. */
+const FIXED_SCALE: Readonly<Record<Exclude<QualityMode, "automatic">, number>> = { fast: 0.5, balanced: 0.75, fine: 1 };
+
 export class QualityControl {
+  /** Somebody's choice: `automatic` holds the frame rate, the others hold the error bound that the scene asks for. */
+  mode: QualityMode = "automatic";
+  /** Resolution of the automatic mode, and how much coarser its ground is on top of that. */
   private moving: number;
+  private coarser = 1;
   private readonly start: number;
   private movedAt = Number.NEGATIVE_INFINITY;
   private drawn: Quality = { scale: 1, tauFactor: 1 };
@@ -32,13 +43,13 @@ export class QualityControl {
   next(now: number, moved: boolean): Quality {
     if (moved) this.movedAt = now;
     const still = now - this.movedAt >= this.restMs;
-    this.drawn = still ? this.rest : { scale: this.moving, tauFactor: this.software ? 2 : 1 / this.moving };
+    this.drawn = still ? this.rest : this.inMotion;
     return this.drawn;
   }
 
   /** Quality of a picture at rest. */
   get rest(): Quality {
-    return { scale: 1, tauFactor: this.software ? 1.5 : 1 };
+    return { scale: 1, tauFactor: this.software && this.mode === "automatic" ? 1.5 : 1 };
   }
 
   /** True while a better picture than the last one is due. */
@@ -51,10 +62,20 @@ export class QualityControl {
     return this.software ? 300 : 60;
   }
 
-  /** Takes in the measured time of a frame that was drawn at the moving quality. */
+  /** Takes in the measured time of a frame. Only frames of the automatic mode's moving quality say what that should be. */
   measured(frameMs: number): void {
-    if (this.drawn.scale >= 1 && this.moving < 1) return;
-    if (frameMs > SLOW_MS) this.moving = Math.max(LOWEST_SCALE, this.moving * STEP);
-    else if (frameMs < FAST_MS) this.moving = Math.min(this.start, this.moving / STEP);
+    if (this.mode !== "automatic" || (this.drawn.scale >= 1 && this.moving < 1)) return;
+    if (frameMs > SLOW_MS) {
+      if (this.moving > LOWEST_SCALE) this.moving = Math.max(LOWEST_SCALE, this.moving * STEP);
+      else this.coarser = Math.min(COARSEST, this.coarser / STEP);
+    } else if (frameMs < FAST_MS) {
+      if (this.coarser > 1) this.coarser = Math.max(1, this.coarser * STEP);
+      else this.moving = Math.min(this.start, this.moving / STEP);
+    }
+  }
+
+  private get inMotion(): Quality {
+    if (this.mode !== "automatic") return { scale: FIXED_SCALE[this.mode], tauFactor: 1 };
+    return { scale: this.moving, tauFactor: (this.software ? 2 : 1 / this.moving) * this.coarser };
   }
 }

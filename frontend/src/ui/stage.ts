@@ -2,32 +2,20 @@
 
 import { computed, effect, type ReadonlySignal, signal } from "@preact/signals-core";
 import { Camera } from "../core/camera.ts";
-import type {
-  CursorVisual,
-  DecodedFrame,
-  FrameStats,
-  Scene,
-  SceneRenderer,
-  StrokeVisual,
-  Vec3,
-} from "../core/types.ts";
+import type { CursorVisual, DecodedFrame, FrameStats, Scene, StrokeVisual, Vec3 } from "../core/types.ts";
 import type { MemberPresence } from "../generated/contract.ts";
-import { Channel, DEFAULT_TAU_PX, MAX_REFINED_TILES } from "../generated/contract.ts";
-import { createMapRenderer, createRenderer, NoWebGpu } from "../gpu/index.ts";
+import { Channel, MAX_REFINED_TILES } from "../generated/contract.ts";
 import { InputController } from "../input/controller.ts";
 import { type ToolDefaults, toolDefaults } from "../input/defaults.ts";
 import { ChannelStore } from "../tiles/channels.ts";
 import { TileStore } from "../tiles/store.ts";
 import { FrameLoop } from "./frame-loop.ts";
 import { FreshTiles } from "./fresh-tiles.ts";
+import { Graphics } from "./graphics.ts";
 import { keepViews, keptViews } from "./kept-views.ts";
+import { QualityChoice, TAU_PX } from "./quality-choice.ts";
 import { cursorVisuals, strokeVisuals } from "./scene.ts";
 import type { TerrainSession } from "./session.ts";
-
-export interface RendererInfo {
-  readonly kind: SceneRenderer["kind"];
-  readonly description: string;
-}
 
 export interface StageOptions {
   readonly session: TerrainSession;
@@ -54,9 +42,8 @@ export class Stage {
   readonly overlay = signal<Scene["overlay"]>("none");
   readonly showStrokes = signal(true);
   readonly cursor = signal<Vec3 | null>(null);
-  readonly renderer = signal<RendererInfo | null>(null);
-  /** Why there is no 3D view, as a sentence; null while there is one. */
-  readonly note = signal<string | null>(null);
+  readonly graphics: Graphics;
+  readonly quality: QualityChoice;
   readonly following = signal<string | null>(null);
   readonly stats = signal<FrameStats | null>(null);
   readonly #viewport: HTMLElement;
@@ -64,7 +51,6 @@ export class Stage {
   readonly #cursors: ReadonlySignal<readonly CursorVisual[]>;
   readonly #calm = window.matchMedia("(prefers-reduced-motion: reduce)");
   readonly #stops: (() => void)[] = [];
-  #renderer: SceneRenderer | null = null;
   #fresh: FreshTiles | null = null;
   #disposed = false;
 
@@ -79,6 +65,13 @@ export class Stage {
     this.channels = new ChannelStore(sizeM);
     this.defaults = toolDefaults(sizeM);
     this.loop = new FrameLoop((dt, time) => this.#draw(dt, time));
+    this.quality = new QualityChoice(session.store);
+    this.graphics = new Graphics({
+      viewport,
+      camera: this.camera,
+      say: (text) => session.toasts.show(text),
+      onOpened: () => this.loop.invalidate(),
+    });
     this.input = new InputController({
       canvas: viewport,
       camera: this.camera,
@@ -117,7 +110,7 @@ export class Stage {
     const empty = (this.session.doc.doc.value?.strokes.size ?? 0) === 0;
     this.input.tool.value = empty && this.session.canEdit.value ? "mountain" : "select";
     this.camera.home(0);
-    await this.#openRenderer();
+    await this.graphics.open();
     if (this.#disposed) return;
     this.loop.start();
   }
@@ -172,8 +165,7 @@ export class Stage {
     this.loop.stop();
     for (const stop of this.#stops) stop();
     this.input.dispose();
-    this.#renderer?.destroy();
-    this.#renderer = null;
+    this.graphics.dispose();
   }
 
   #goToView(presence: MemberPresence | undefined, durationMs: number): void {
@@ -218,6 +210,7 @@ export class Stage {
         this.#cursors.value;
         input.ghost.value;
         this.overlay.value;
+        this.quality.mode.value;
         this.showStrokes.value;
         this.loop.invalidate();
       }),
@@ -241,57 +234,13 @@ export class Stage {
     resize();
   }
 
-  /** Opens the 3D view, or the map where there is no WebGPU. A canvas that was asked for one cannot give the other. */
-  async #openRenderer(): Promise<void> {
-    try {
-      this.#use(await createRenderer(this.#newCanvas()));
-      this.note.value = null;
-    } catch (error) {
-      if (this.#disposed) return;
-      const reason = error instanceof NoWebGpu ? error.message : "The 3D view could not start.";
-      if (!(error instanceof NoWebGpu)) console.error(error);
-      if (this.note.value === null) this.session.toasts.show(`${reason} You can draw on the map too.`);
-      this.note.value = reason;
-      this.camera.setMode("map");
-      this.#use(createMapRenderer(this.#newCanvas()));
-    }
-  }
-
-  #newCanvas(): HTMLCanvasElement {
-    const canvas = document.createElement("canvas");
-    const { width, height } = this.camera.state.value;
-    Object.assign(canvas, { width, height });
-    canvas.setAttribute("aria-hidden", "true");
-    this.#viewport.querySelector("canvas")?.remove();
-    this.#viewport.prepend(canvas);
-    return canvas;
-  }
-
-  #use(renderer: SceneRenderer): void {
-    if (this.#disposed) {
-      renderer.destroy();
-      return;
-    }
-    this.#renderer = renderer;
-    this.renderer.value = { kind: renderer.kind, description: renderer.description };
-    void renderer.lost.then((reason) => this.#lost(renderer, reason));
-    this.loop.invalidate();
-  }
-
-  /** The graphics device went away (driver update, sleep, too little memory): opens another. */
-  async #lost(renderer: SceneRenderer, reason: string): Promise<void> {
-    if (this.#disposed || this.#renderer !== renderer) return;
-    console.warn(`The graphics device was lost: ${reason}`);
-    this.#renderer = null;
-    renderer.destroy();
-    await this.#openRenderer();
-  }
-
   #draw(dtS: number, timeS: number): boolean {
     const moving = this.camera.update(dtS, this.tiles.ground);
     const doc = this.session.doc.doc.value;
-    if (!this.#renderer || !doc) return moving;
-    const stats = this.#renderer.render({
+    const { renderer } = this.graphics;
+    const quality = this.quality.mode.peek();
+    if (!renderer || !doc) return moving;
+    const stats = renderer.render({
       camera: this.camera.state.value,
       tiles: this.tiles,
       channels: this.channels,
@@ -299,7 +248,8 @@ export class Stage {
       strokes: this.#strokes.value,
       ghost: this.input.ghost.value,
       cursors: this.#cursors.value,
-      tauPx: DEFAULT_TAU_PX,
+      tauPx: TAU_PX[quality],
+      quality,
       time: this.#calm.matches ? 0 : timeS,
       overlay: this.overlay.value,
       showStrokes: this.showStrokes.value,

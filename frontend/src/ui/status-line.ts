@@ -106,12 +106,12 @@ export class EskStatusLine extends SignalElement {
   declare stage: Stage;
 
   protected override render(): TemplateResult {
-    const { cursor, session, levels, renderer } = this.stage;
+    const { cursor, session, levels, graphics } = this.stage;
     const point = cursor.value;
     return html`
       <span class="height" title="Height of the ground under the cursor">${point ? height(point[2]) : "–"}</span>
       ${this.#scale()} ${this.#levels(session.progress.value, levels)}
-      <span class="renderer" title=${this.stage.note.value ?? ""}>${renderer.value?.description ?? nothing}</span>
+      <span class="renderer" title=${graphics.reason.value ?? ""}>${graphics.info.value?.description ?? nothing}</span>
     `;
   }
 

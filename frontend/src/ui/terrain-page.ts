@@ -164,7 +164,7 @@ export class EskTerrain extends SignalElement {
         </div>
         <esk-view-bar class="panel" .stage=${stage}></esk-view-bar>
       </div>
-      ${this.#hint(stage)} ${this.#following(stage)} ${this.#closedBar(stage)} ${this.#notice(stage)}
+      ${this.#hint(stage)} ${this.#following(stage)} ${this.#closedBar(stage)} ${this.#graphics(stage)} ${this.#notice(stage)}
       ${this.#panel.value === null ? nothing : this.#side(stage, this.#panel.value)}
       <esk-share .stage=${stage} .open=${this.#dialog.value === "share"} @close=${this.#closeDialog}></esk-share>
       <esk-profile .stage=${stage} .open=${this.#dialog.value === "profile"} @close=${this.#closeDialog}></esk-profile>
@@ -240,10 +240,24 @@ export class EskTerrain extends SignalElement {
     </div>`;
   }
 
+  /** The graphics device went away: what the page does about it, and a way back from the map. */
+  #graphics(stage: Stage): TemplateResult | typeof nothing {
+    const { graphics, session } = stage;
+    const notice = graphics.notice.value;
+    if (notice === null || session.connection.state.value === "closed") return nothing;
+    return html`<div class="closed notice panel" role="status">
+      ${icon("info")}<span>${notice.text}</span>
+      ${notice.retry ? html`<button class="btn outline" @click=${() => graphics.retry()}>Try the 3D view again</button>` : nothing}
+      <button class="icon-btn small" aria-label="Dismiss" @click=${() => graphics.dismiss()}>${icon("xmark")}</button>
+    </div>`;
+  }
+
   /** What the server said about its solver: another device, a lower level. Stands until it is read. */
   #notice(stage: Stage): TemplateResult | typeof nothing {
     const { connection, notice } = stage.session;
     if (notice.value === null || connection.state.value === "closed") return nothing;
+    // One at a time: they share a place.
+    if (stage.graphics.notice.value !== null) return nothing;
     return html`<div class="closed notice panel" role="status">
       ${icon("info")}<span>${notice.value}</span>
       <button class="icon-btn small" aria-label="Dismiss" @click=${() => stage.session.dismissNotice()}>${icon("xmark")}</button>
@@ -259,7 +273,7 @@ export class EskTerrain extends SignalElement {
       ["Operations so far", String(session.doc.doc.value?.clock ?? 0)],
       ["Finest solved level", `${stage.levels} (${64 * 2 ** stage.levels + 1} samples a side)`],
       ["Refined where one looks", stage.finest > stage.levels ? `to level ${stage.finest}` : "no"],
-      ["Drawn by", stage.renderer.value?.description ?? "–"],
+      ["Drawn by", stage.graphics.info.value?.description ?? "–"],
       ["Solved on", server?.device ?? "–"],
       ["Server", server ? `Esker ${server.version}` : "–"],
       [
@@ -269,7 +283,7 @@ export class EskTerrain extends SignalElement {
     ];
     return html`<wa-dialog label="About this terrain" light-dismiss ?open=${this.#dialog.value === "about"} @wa-after-hide=${this.#closeDialog}>
       <dl class="facts">${facts.map(([k, v]) => html`<dt>${k}</dt><dd>${v}</dd>`)}</dl>
-      ${stage.note.value ? html`<p class="quiet">${stage.note.value}</p>` : nothing}
+      ${stage.graphics.reason.value ? html`<p class="quiet">${stage.graphics.reason.value}</p>` : nothing}
     </wa-dialog>`;
   }
 }

@@ -87,7 +87,7 @@ export function installTestHook(session: TerrainSession): () => void {
     status: () => session.status.peek().text,
     selection: () => stage()?.input.selection.peek() ?? null,
     tool: () => stage()?.input.tool.peek() ?? null,
-    renderer: () => stage()?.renderer.peek()?.kind ?? null,
+    renderer: () => stage()?.graphics.info.peek()?.kind ?? null,
     camera: () => {
       const state = stage()?.camera.state.peek();
       if (!state) return null;

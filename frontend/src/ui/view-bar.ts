@@ -1,10 +1,12 @@
+import "@awesome.me/webawesome/dist/components/divider/divider.js";
 import "@awesome.me/webawesome/dist/components/dropdown/dropdown.js";
 import "@awesome.me/webawesome/dist/components/dropdown-item/dropdown-item.js";
 import { css, html, type TemplateResult } from "lit";
 import { live } from "lit/directives/live.js";
-import type { Scene } from "../core/types.ts";
+import type { QualityMode, Scene } from "../core/types.ts";
 import { icon } from "./icons.ts";
 import { keyText } from "./keys.ts";
+import { QUALITIES } from "./quality-choice.ts";
 import "./segmented.ts";
 import { SignalElement } from "./signal-element.ts";
 import type { Stage } from "./stage.ts";
@@ -34,6 +36,11 @@ export class EskViewBar extends SignalElement {
       esk-segmented {
         margin-right: 2px;
       }
+      .heading {
+        display: block;
+        padding: 2px 12px 4px;
+        color: var(--esk-quiet);
+      }
     `,
   ];
 
@@ -45,15 +52,29 @@ export class EskViewBar extends SignalElement {
 
   #overlay(event: CustomEvent<{ item: { value: string } }>): void {
     const value = event.detail.item.value;
-    if (value === "strokes") this.stage.showStrokes.value = !this.stage.showStrokes.value;
+    const quality = QUALITIES.find((q) => q.value === value);
+    if (quality) this.stage.quality.choose(quality.value);
+    else if (value === "strokes") this.stage.showStrokes.value = !this.stage.showStrokes.value;
     else this.stage.setOverlay(value as Scene["overlay"]);
     // The item has ticked itself: ticks follow the state, also where the choice changed nothing.
     this.requestUpdate();
   }
 
+  #qualities(chosen: QualityMode): TemplateResult {
+    return html`
+      <wa-divider></wa-divider>
+      <small class="heading">Quality</small>
+      ${QUALITIES.map(
+        (q) => html`
+          <wa-dropdown-item type="checkbox" value=${q.value} title=${q.title} .checked=${live(chosen === q.value)}>${q.label}</wa-dropdown-item>
+        `,
+      )}
+    `;
+  }
+
   protected override render(): TemplateResult {
-    const { camera, input, overlay, showStrokes, renderer } = this.stage;
-    const flat = renderer.value?.kind === "map";
+    const { camera, input, overlay, showStrokes, graphics, quality } = this.stage;
+    const flat = graphics.info.value?.kind === "map";
     const modes = [
       { value: "orbit", label: "Orbit", icon: "orbit", title: keyText("Orbit", input.actions.get("camera-orbit")) },
       { value: "fly", label: "Fly", icon: "fly", title: keyText("Fly", input.actions.get("camera-fly")) },
@@ -89,6 +110,7 @@ export class EskViewBar extends SignalElement {
           `,
         )}
         <wa-dropdown-item type="checkbox" value="strokes" .checked=${live(showStrokes.value)}>Show strokes</wa-dropdown-item>
+        ${flat ? null : this.#qualities(quality.mode.value)}
       </wa-dropdown>
     `;
   }

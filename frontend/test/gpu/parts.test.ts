@@ -74,6 +74,45 @@ describe("quality", () => {
     }
   });
 
+  it("R46: when the lowest resolution is still too slow the ground gets coarser, and finer again first", () => {
+    const control = new QualityControl(false);
+    let seen = { scale: 1, tauFactor: 1 };
+    const run = (frames: number, ms: number): void => {
+      for (let i = 0; i < frames; i += 1) {
+        seen = control.next(0, true);
+        control.measured(ms);
+      }
+    };
+    run(30, 90);
+    expect(seen).toEqual({ scale: 0.5, tauFactor: 5 });
+    run(3, 8);
+    expect(seen.scale).toBe(0.5);
+    expect(seen.tauFactor).toBeLessThan(5);
+    run(30, 8);
+    expect(seen).toEqual({ scale: 1, tauFactor: 1 });
+  });
+
+  it("R46: a chosen quality holds its error bound, however slow frames are", () => {
+    for (const software of [true, false]) {
+      const control = new QualityControl(software);
+      for (const [mode, scale] of [
+        ["fast", 0.5],
+        ["balanced", 0.75],
+        ["fine", 1],
+      ] as const) {
+        control.mode = mode;
+        for (let i = 0; i < 30; i += 1) {
+          expect(control.next(i, true)).toEqual({ scale, tauFactor: 1 });
+          control.measured(300);
+        }
+        expect(control.next(5000, false)).toEqual({ scale: 1, tauFactor: 1 });
+      }
+      control.mode = "automatic";
+      // What frames took meanwhile said nothing about the automatic mode.
+      expect(control.next(6000, true)).toEqual(new QualityControl(software).next(0, true));
+    }
+  });
+
   it("R15: a CPU adapter starts low", () => {
     expect(new QualityControl(true).next(0, true)).toEqual({ scale: 0.75, tauFactor: 2 });
   });
