@@ -1,4 +1,4 @@
-// Single scattering in the earth's atmosphere: Rayleigh, Mie and ozone with the coefficients of Hillaire, "A Scalable and
+// Scattering in the earth's atmosphere: Rayleigh, Mie and ozone with the coefficients of Hillaire, "A Scalable and
 // Production Ready Sky and Atmosphere Rendering Technique" (2020), table 1. Kilometres inside. The result is baked into
 // small tables (compute_sky.wgsl), so its cost does not matter.
 const PLANET_KM: f32 = 6360.0;
@@ -62,6 +62,22 @@ fn mie_phase(c: f32, g: f32) -> f32 {
   return k * (1.0 + c * c) / pow(max(1.0e-4, 1.0 + g * g - 2.0 * g * c), 1.5);
 }
 
+// Light of all orders from the second on that comes from every side at once, for a sun of irradiance 1: Hillaire's
+// Psi_ms (equations 5 to 10) over ground of albedo 0.3. The integral depends on altitude and the sun's height alone and
+// is smooth in both, so it is a polynomial of exp(-z/8) and of the logarithm of the softened sine of the sun's height,
+// fitted to the integral in double precision (tests/gpu/sky_twin.py; a test holds it within 10 % where the sun is up).
+fn multiple_scattering(altitude: f32, sun_up: f32) -> vec3f {
+  let s = log(0.5 * (sun_up + sqrt(sun_up * sun_up + 0.0064)));
+  let z = exp(-altitude / 8.0);
+  let a = vec3f(-3.1275, -3.1482, -3.0416) + s * (vec3f(0.6573, 0.5461, 0.3144) + s * (vec3f(-0.3458, -0.4405, -0.5261)
+    + s * (vec3f(-0.2228, -0.2756, -0.3324) + s * vec3f(-0.0398, -0.0519, -0.0628))));
+  let b = vec3f(0.2759, 0.6368, 1.1106) + s * (vec3f(-0.4424, -0.0234, 0.5996) + s * (vec3f(-0.8704, 0.0100, 1.1936)
+    + s * (vec3f(-0.5050, -0.0509, 0.6892) + s * vec3f(-0.0924, -0.0262, 0.0950))));
+  let c = vec3f(-0.0863, -0.3310, -0.7576) + s * (vec3f(0.4993, 0.2374, -0.1786) + s * (vec3f(0.8020, 0.1126, -0.9617)
+    + s * (vec3f(0.4672, 0.1216, -0.5057) + s * vec3f(0.0826, 0.0338, -0.0637))));
+  return exp(a + z * (b + z * c)) * smoothstep(-0.16, -0.06, sun_up);
+}
+
 // Radiance of the sky along `dir` (dir.z >= 0) with the sun at `sun`.
 fn sky_radiance(dir: vec3f, sun: vec3f) -> vec3f {
   let up = max(dir.z, 0.0);
@@ -83,13 +99,12 @@ fn sky_radiance(dir: vec3f, sun: vec3f) -> vec3f {
     // The local vertical turns along the ray.
     let r = PLANET_KM + z;
     let sun_up = (sun.z * (PLANET_KM + VIEWER_KM) + t * c) / r;
-    let lit = air_transmittance(z, sun_up);
-    let single = lit * (RAYLEIGH * air.rayleigh * phase_r + vec3f(MIE_SCATTER * air.mie * phase_m));
-    // Further orders, taken as isotropic: what reaches this height, scattered again.
-    let again = (lit * 0.5 + 0.12 * smoothstep(-0.15, 0.2, sun.z)) * (RAYLEIGH * air.rayleigh + vec3f(MIE_SCATTER * air.mie)) * 0.055;
+    let scatter_r = RAYLEIGH * air.rayleigh;
+    let scatter_m = vec3f(MIE_SCATTER * air.mie);
+    let direct = air_transmittance(z, sun_up) * (scatter_r * phase_r + scatter_m * phase_m);
+    let scattered = direct + multiple_scattering(z, sun_up) * (scatter_r + scatter_m);
     let step_through = exp(-extinction * length_km);
-    let scattered = (single + again) * (vec3f(1.0) - step_through) / max(extinction, vec3f(1.0e-7));
-    radiance += through * scattered;
+    radiance += through * scattered * (vec3f(1.0) - step_through) / max(extinction, vec3f(1.0e-7));
     through *= step_through;
   }
   return radiance * SUN_IRRADIANCE;

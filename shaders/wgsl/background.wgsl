@@ -34,45 +34,68 @@ fn sky_with_sun(dir: vec3f) -> vec3f {
 
 fn plane_albedo() -> vec3f {
   switch (view.look) {
-    case LOOK_ALPINE: { return vec3f(0.50, 0.53, 0.57); }
-    case LOOK_DESERT: { return vec3f(0.50, 0.415, 0.32); }
+    case LOOK_ALPINE: { return vec3f(0.56, 0.59, 0.63); }
+    case LOOK_DESERT: { return vec3f(0.47, 0.345, 0.215); }
     case LOOK_PAPER: { return vec3f(0.56, 0.505, 0.415); }
-    default: { return vec3f(0.385, 0.395, 0.345); }
+    default: { return vec3f(0.142, 0.140, 0.070); }
+  }
+}
+
+// Far country: open land and woods (bare ground where nothing grows), in patches that thin out with distance.
+fn country(p: vec2f, footprint: f32) -> vec3f {
+  let texel = log2(max(footprint, 1.0e-3) * 256.0 / view.size);
+  let broad = textureSampleLevel(noise, smooth_repeat, turned(p, vec2f(0.917, -0.399)) / (view.size * 4.7), clamp(texel - 2.2, 0.0, 8.0));
+  let fine = textureSampleLevel(noise, smooth_repeat, turned(p, vec2f(0.602, 0.799)) / (view.size * 1.13), clamp(texel - 0.2, 0.0, 8.0));
+  let open = plane_albedo() * (0.78 + 0.44 * broad.r + 0.30 * (fine.r - 0.5));
+  let wood = smoothstep(0.50, 0.66, broad.g * 0.55 + fine.g * 0.45);
+  switch (view.look) {
+    case LOOK_ALPINE: { return mix(open, vec3f(0.16, 0.18, 0.19), wood * 0.55); }
+    case LOOK_DESERT: { return mix(open, open * vec3f(0.62, 0.55, 0.52), wood * 0.6); }
+    case LOOK_PAPER: { return plane_albedo(); }
+    default: { return mix(open, vec3f(0.032, 0.048, 0.022), wood * 0.85); }
   }
 }
 
 fn ground_plane(p: vec3f, dir: vec3f, footprint: f32) -> vec3f {
   let away = outside_domain(p.xy);
   // Contact shade round the block, and its soft shadow away from the sun.
-  let shade = 1.0 - 0.55 * exp(-away / (0.035 * view.size)) - 0.2 * exp(-away / (0.16 * view.size));
+  let shade = 1.0 - 0.50 * exp(-away / (0.03 * view.size)) - 0.2 * exp(-away / (0.16 * view.size));
   let tall = 0.5 * (view.low + view.high) - view.base;
   let reach = tall * length(view.sun.xy) / max(view.sun.z, 0.12);
   let toward = p.xy + normalize(view.sun.xy + vec2f(1.0e-5)) * min(reach, view.size) * 0.5;
   let shadow = smoothstep(0.0, 0.5 * min(reach, view.size) + 1.0, outside_domain(toward));
-  // Far country: fields and woods, only hinted at.
-  let texel = log2(max(footprint, 1.0e-3) * 256.0 / view.size);
-  let broad = textureSampleLevel(noise, smooth_repeat, p.xy / (view.size * 5.3), clamp(texel - 2.4, 0.0, 8.0));
-  let fine = textureSampleLevel(noise, smooth_repeat, p.yx / (view.size * 1.3) + 0.37, clamp(texel - 0.4, 0.0, 8.0));
-  let country = mix(vec3f(0.93, 0.96, 0.95), vec3f(1.07, 1.04, 1.0), smoothstep(0.2, 0.8, broad.r * 0.7 + fine.g * 0.3));
-  let tint = select(country, vec3f(1.0), view.look == LOOK_PAPER);
-  let light = sun_light() * max(view.sun.z, 0.0) / 3.14159265 * mix(0.5, 1.0, shadow) + ambient_light(vec3f(0.0, 0.0, 1.0));
-  return plane_albedo() * tint * light * max(shade, 0.0);
+  let sun = sun_light() * max(view.sun.z, 0.0) / 3.14159265 * mix(0.35, 1.0, shadow);
+  let sky = ambient_light(vec3f(0.0, 0.0, 1.0));
+  var colour = country(p.xy, footprint) * (sun + sky) * max(shade, 0.0);
+  if (view.look != LOOK_PAPER) {
+    // Morning mist lies in the lowlands while the sun is low; it starts a way off the block.
+    let drift = textureSampleLevel(noise, smooth_repeat, turned(p.xy, vec2f(0.829, 0.559)) / (view.size * 7.9), clamp(log2(max(footprint, 1.0e-3) * 256.0 / (view.size * 7.9)), 0.0, 8.0));
+    let early = 1.0 - smoothstep(0.10, 0.62, view.sun.z);
+    let mist = early * smoothstep(0.42, 0.80, drift.r + 0.30 * smoothstep(0.6 * view.size, 5.0 * view.size, away)) * smoothstep(0.25 * view.size, 1.6 * view.size, away);
+    let towards = max(dot(dir, view.sun.xyz), 0.0);
+    colour = mix(colour, 0.62 * (sun + sky) + sun_light() * 0.05 * pow(towards, 6.0), mist * 0.8);
+  }
+  return colour;
 }
 
 // Silhouettes of far ranges on the horizon, paler the further they are.
 fn far_ranges(dir: vec3f, sky: vec3f) -> vec3f {
-  if (view.look == LOOK_PAPER || view.has_sea > 0.5 || dir.z > 0.09) { return sky; }
+  if (view.look == LOOK_PAPER || view.has_sea > 0.5 || dir.z > 0.10) { return sky; }
   let azimuth = atan2(dir.y, dir.x) / 6.2831853;
   let glow = haze_glow(dir);
-  let body = plane_albedo() * 0.5 * (sun_light() * 0.12 + ambient_light(vec3f(0.0, 0.0, 1.0)) * 0.8);
+  let light = sun_light() * 0.10 + ambient_light(vec3f(0.0, 0.0, 1.0)) * 0.8;
+  let snowy = select(0.0, 0.5, view.look == LOOK_ALPINE);
   var colour = sky;
   for (var i = 0; i < 3; i += 1) {
     let k = f32(i);
     let a = textureSampleLevel(noise, smooth_repeat, vec2f(azimuth * (3.0 + k), 0.13 + 0.29 * k), 0.0);
     let b = textureSampleLevel(noise, smooth_repeat, vec2f(azimuth * (9.0 + 2.0 * k), 0.71 - 0.17 * k), 0.0);
-    let top = (0.050 - 0.014 * k) * (0.25 + 0.55 * a.g + 0.45 * a.r * b.g) - 0.004;
-    let inside = 1.0 - smoothstep(top - 0.0009, top + 0.0009, dir.z);
-    let mist = mix(0.94 - 0.07 * k, 1.0, 1.0 - smoothstep(-0.004, 0.030, dir.z));
+    let top = (0.056 - 0.016 * k) * (0.20 + 0.60 * a.g + 0.50 * a.r * b.g) - 0.004;
+    let inside = 1.0 - smoothstep(top - 0.0007, top + 0.0007, dir.z);
+    let high = smoothstep(0.4, 0.9, dir.z / max(top, 1.0e-3) + (b.r - 0.5) * 0.5) * (1.0 - 0.4 * k);
+    let body = mix(plane_albedo() * 0.55, vec3f(0.62, 0.66, 0.72), high * max(snowy, 0.35 * f32(view.look == LOOK_NATURAL))) * light;
+    // Mist fills the valleys between the ranges.
+    let mist = mix(0.90 - 0.11 * k, 1.0, 1.0 - smoothstep(-0.006, 0.6 * top + 0.004, dir.z));
     colour = mix(colour, mix(body, glow, mist), inside);
   }
   return colour;
@@ -93,7 +116,7 @@ fn background_fragment(v: BackgroundVertex) -> @location(0) vec4f {
     let distance = down / -dir.z;
     let p = view.eye.xyz + dir * distance;
     if (view.has_sea > 0.5) {
-      colour = water_surface(p, dir, sea_depth(p.xy), vec3f(0.0), sea_bed(p.xy)).rgb;
+      colour = open_water(p, dir);
     } else {
       colour = ground_plane(p, dir, pixel_size(p) / max(-dir.z, 0.02));
     }

@@ -1,5 +1,7 @@
 // The functions of detail_rich.wgsl for adapters that draw on the CPU: one sample where the others take many.
 const NOISE_TEXELS: f32 = 256.0;
+// Steps of the march for what the water mirrors.
+const MIRROR_STEPS: i32 = 6;
 
 fn noise_sample(at: vec2f, dx: vec2f, dy: vec2f, scale: f32) -> vec4f {
   let k = 1.0 / scale;
@@ -7,13 +9,15 @@ fn noise_sample(at: vec2f, dx: vec2f, dy: vec2f, scale: f32) -> vec4f {
   return textureSampleLevel(noise, smooth_repeat, at * k, max(0.5 * log2(max(texels, 1.0e-6)), 0.0));
 }
 
-// On the plane that the surface faces most.
+// On the plane that the surface faces most; on faces drawn out downhill, as water cuts rock.
 fn rock_noise(p: vec3f, n: vec3f, f: Footprint, scale: f32) -> vec4f {
   let a = abs(n);
   if (a.z > 0.62) { return ground_noise(p, f, scale, vec2f(0.829, 0.559)); }
   let east = a.x > a.y;
-  return noise_sample(
-    vec2f(select(p.x, p.y, east), p.z), vec2f(select(f.dx.x, f.dx.y, east), f.dx.z), vec2f(select(f.dy.x, f.dy.y, east), f.dy.z), scale);
+  let s = noise_sample(
+    vec2f(select(p.x, p.y, east), p.z * 0.4), vec2f(select(f.dx.x, f.dx.y, east), f.dx.z * 0.4),
+    vec2f(select(f.dy.x, f.dy.y, east), f.dy.z * 0.4), scale);
+  return select(vec4f(s.rg, s.b, 0.5), vec4f(s.rg, 0.5, s.b), east);
 }
 
 struct FineNoise {
@@ -22,7 +26,8 @@ struct FineNoise {
 };
 
 fn fine_noise(p: vec3f, n: vec3f, f: Footprint, coarse: vec4f) -> FineNoise {
-  return FineNoise(vec4f(coarse.g, coarse.r, coarse.ba), vec4f(0.5));
+  let medium = ground_noise(p, f, 31.0, vec2f(0.707, -0.707));
+  return FineNoise(medium, vec4f(medium.g, medium.r, medium.ba));
 }
 
 fn ripple_slope(along: vec2f, phase: f32, footprint: f32) -> vec2f {

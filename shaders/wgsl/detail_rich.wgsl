@@ -1,22 +1,30 @@
 // Fine detail for real GPUs. detail_plain.wgsl has the same functions for adapters that draw on the CPU; one of the two
 // is part of each module. (Branches would not do: a CPU adapter computes both sides of them.)
 
+// Steps of the march for what the water mirrors.
+const MIRROR_STEPS: i32 = 20;
+
 // `scale`: metres (or whatever `at` is in) that the texture covers once.
 fn noise_sample(at: vec2f, dx: vec2f, dy: vec2f, scale: f32) -> vec4f {
   let k = 1.0 / scale;
   return textureSampleGrad(noise, smooth_repeat, at * k, dx * k, dy * k);
 }
 
-// The same rock on all faces: sampled on three planes, weighted by the normal.
+// The same rock on all faces: sampled on three planes, weighted by the normal. On faces it is drawn out downhill, as water
+// cuts it.
 fn rock_noise(p: vec3f, n: vec3f, f: Footprint, scale: f32) -> vec4f {
   var w = n * n;
   w = w * w;
   w /= w.x + w.y + w.z;
   let flat = ground_noise(p, f, scale, vec2f(0.829, 0.559));
   if (w.z > 0.97) { return flat; }
-  let east = noise_sample(p.yz, f.dx.yz, f.dy.yz, scale);
-  let north = noise_sample(p.xz, f.dx.xz, f.dy.xz, scale);
-  return flat * w.z + east * w.x + north * w.y;
+  let drawn = vec2f(1.0, 0.4);
+  let east = noise_sample(p.yz * drawn, f.dx.yz * drawn, f.dy.yz * drawn, scale);
+  let north = noise_sample(p.xz * drawn, f.dx.xz * drawn, f.dy.xz * drawn, scale);
+  // A face's own gradient runs along it and down: only the part along it turns a normal that is told by dz/dx, dz/dy.
+  let e = vec4f(east.rg, 0.5, east.b);
+  let o = vec4f(north.rg, north.b, 0.5);
+  return flat * w.z + e * w.x + o * w.y;
 }
 
 struct FineNoise {

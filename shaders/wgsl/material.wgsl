@@ -1,8 +1,20 @@
-// What the ground is made of, by slope, height, curvature and noise.
+// What the ground is made of: by what grows and lies on it (Attributes), slope, height, curvature and noise.
 struct Material {
   albedo: vec3f,
   slope: vec2f,      // gradient of the fine relief, added to that of the surface
-  gloss: f32,        // strength of the sun's sheen (snow, wet sand)
+  gloss: f32,        // strength of the sun's sheen (snow, wet ground)
+  soft: f32,         // how far light goes round the edge of a shadow (snow, leaves)
+};
+
+// What the synthesis says of a place (DESIGN 10), 0..1 each.
+struct Attributes {
+  snow: f32,
+  wet: f32,
+  foam: f32,
+  smoothness: f32,   // half the exponent h: 0 rough, 1 smooth
+  grass: f32,
+  forest: f32,
+  grain: f32,        // the noise of the place's own level
 };
 
 struct Site {
@@ -11,12 +23,14 @@ struct Site {
   steep: f32,        // tangent of the slope
   height: f32,       // above the sea or zero, as a fraction of the domain
   curvature: f32,
+  footprint: f32,    // metres that a pixel covers
   gain: vec4f,       // of the fine relief, features of a fifteenth of the domain to those of 1 m: 1 where nothing is asked
   macro1: vec4f,     // features of a third and of a fifteenth of the domain
   macro2: vec4f,
-  fine1: vec4f,      // features of some 25 m, 6 m and 1 m
+  fine1: vec4f,      // features of some 50 m, 8 m and 1 m
   fine2: vec4f,
   fine3: vec4f,
+  cover: Attributes,
 };
 
 // What strokes ask of the fine relief: amplitude raises all of it, most what does not repeat within sight; roughness tips
@@ -34,47 +48,111 @@ fn survey(p: vec3f, gradient: vec2f, curvature: f32, f: Footprint, detail: vec2f
   s.steep = length(gradient);
   s.height = (p.z - select(0.0, view.sea, view.has_sea > 0.5)) / view.size;
   s.curvature = curvature;
+  s.footprint = sqrt(max(max(dot(f.dx, f.dx), dot(f.dy, f.dy)), 1.0e-8));
   s.gain = relief_gain(detail);
   s.macro1 = ground_noise(p, f, view.size * 1.37, vec2f(0.917, -0.399));
   s.macro2 = ground_noise(p, f, view.size * 0.27, vec2f(0.602, 0.799));
-  s.fine1 = rock_noise(p, n, f, 103.0);
-  let fine = fine_noise(p, n, f, s.fine1);
+  // The finer layers are pushed about by the broader one: what repeats is not seen to repeat.
+  let bent = p + vec3f((s.macro2.ba - 0.5) * 90.0, (s.macro1.r - 0.5) * 40.0);
+  s.fine1 = rock_noise(bent, n, f, 211.0);
+  let fine = fine_noise(bent, n, f, s.fine1);
   s.fine2 = fine.medium;
   s.fine3 = fine.small;
   return s;
 }
 
+// The targets of the rule `landscape` (docs/synthesis.md) with the noise of the place, for ground without channels.
+fn estimate(s: Site) -> Attributes {
+  let hollow = clamp(s.curvature, -1.0, 1.0);
+  let broad = s.macro2.r - 0.5;
+  let fine = s.fine1.r - 0.5;
+  let line = SNOW_LINE - 0.030 * clamp(s.n.y, -1.0, 1.0) - 0.03 * clamp(hollow, -0.4, 0.4) + broad * 0.040 + fine * 0.022;
+  let lies = smoothstep(line - 0.004, line + 0.018, s.height) * (1.0 - smoothstep(0.8, 1.3, s.steep + (s.fine1.g - 0.5) * 0.8));
+  let tree = TREE_LINE + (s.macro1.g - 0.5) * 0.03 + broad * 0.02;
+  let grassy = (1.0 - smoothstep(0.55, 0.95, s.steep + fine * 0.3 + broad * 0.2)) * (1.0 - smoothstep(tree, 1.6 * tree, s.height + broad * 0.03));
+  let cover = s.macro1.g * 0.50 + s.macro2.r * 0.42 + s.fine1.r * 0.12 + clamp(s.steep, 0.0, 0.6) * 0.16 + clamp(hollow, -0.1, 0.1) * 0.9;
+  let wooded = smoothstep(0.545, 0.66, cover) * (1.0 - smoothstep(0.7, 1.0, s.steep)) * (1.0 - smoothstep(0.62 * tree, tree, s.height));
+  let shore = (1.0 - smoothstep(0.0, 0.006, s.height + broad * 0.004)) * view.has_sea;
+  let seep = 0.6 * smoothstep(0.05, 0.5, hollow) * (1.0 - smoothstep(0.3, 0.8, s.steep));
+  return Attributes(lies, max(shore, seep), 0.5, 0.5, PLANTS * grassy * (1.0 - lies), PLANTS * wooded * (1.0 - lies), s.fine2.r);
+}
+
+// 1 where there is more than half of a cover, its edge frayed by noise (`fray` about 0, a few tenths wide).
+fn covered(amount: f32, fray: f32, soft: f32) -> f32 {
+  return smoothstep(0.5 - soft, 0.5 + soft, amount + fray);
+}
+
 // 1 where the ground is steeper than `at`, wandering with the noise.
 fn steeper(s: Site, at: f32, soft: f32) -> f32 {
-  return smoothstep(at - soft, at + soft, s.steep + (s.fine1.r - 0.5) * 0.30 * s.gain.y + (s.macro2.r - 0.5) * 0.22);
+  return smoothstep(at - soft, at + soft, s.steep + (s.fine1.r - 0.5) * 0.36 * s.gain.y + (s.macro2.r - 0.5) * 0.22);
 }
 
 fn fine_slope(s: Site, strength: f32) -> vec2f {
   let g = strength * s.gain;
-  return 0.22 * g.x * noise_slope(s.macro2) + 0.34 * g.y * noise_slope(s.fine1) + 0.42 * g.z * noise_slope(s.fine2)
+  return 0.20 * g.x * noise_slope(s.macro2) + 0.40 * g.y * noise_slope(s.fine1) + 0.42 * g.z * noise_slope(s.fine2)
     + 0.36 * g.w * noise_slope(s.fine3);
 }
 
-fn rock_colour(s: Site, light: vec3f, dark: vec3f) -> vec3f {
-  // Beds, tilted and warped, and the grain of weathered faces.
-  let z = s.p.z + 0.10 * s.p.x + (s.macro2.r - 0.5) * view.size * 0.035 + (s.fine1.r - 0.5) * 12.0;
-  let bed = 0.5 + 0.5 * sin(z * 380.0 / view.size + 2.0 * sin(z * 97.0 / view.size));
-  let grain = 0.42 * s.fine1.g + 0.32 * s.fine2.g + 0.16 * s.macro2.g + 0.10 * s.fine3.r;
-  return mix(dark, light, clamp((grain - 0.5) * 1.5 + 0.42 + (bed - 0.5) * 0.26, 0.0, 1.0));
+// Beds of rock, tilted and warped: x 0..1 the bed's tone, y its ledge (-1 undercut .. 1 lit top), thick and thin ones.
+fn strata(s: Site) -> vec4f {
+  let unit = view.size / 4096.0;
+  let z = (s.p.z + 0.09 * s.p.x - 0.05 * s.p.y) / unit + (s.macro2.r - 0.5) * 140.0 + (s.fine1.r - 0.5) * 11.0;
+  let thick = z / 34.0;
+  let thin = z / 7.3 + 0.7 * sin(thick * 2.1);
+  // Beds finer than a few pixels are not drawn.
+  let rise = s.footprint / unit;
+  let seen = vec2f(1.0 - smoothstep(6.0, 17.0, rise), 1.0 - smoothstep(1.4, 3.6, rise));
+  let wave = vec2f(sin(6.2831853 * thick), sin(6.2831853 * thin)) * seen;
+  let slant = vec2f(cos(6.2831853 * thick), cos(6.2831853 * thin)) * seen;
+  return vec4f(wave, slant);
+}
+
+// Weathered rock: beds stand out as ledges, gullies and grain between.
+fn rock(s: Site, light: vec3f, dark: vec3f, relief: f32) -> Material {
+  let beds = strata(s);
+  let grain = 0.40 * s.fine1.g + 0.30 * s.fine2.g + 0.18 * s.macro2.g + 0.12 * s.fine3.r;
+  let tone = clamp((grain - 0.5) * 1.9 + 0.40 + beds.x * 0.10 + beds.y * 0.07, 0.0, 1.0);
+  // Warm where it is fresh, grey where lichen has had time, dark where water runs.
+  let hue = mix(vec3f(0.93, 0.99, 1.07), vec3f(1.06, 1.0, 0.92), smoothstep(0.3, 0.7, s.macro2.r + (s.fine2.r - 0.5) * 0.4));
+  let seep = smoothstep(0.05, 0.4, s.curvature + (s.fine1.r - 0.5) * 0.3);
+  let ledge = s.n.xy * (beds.z * 0.16 + beds.w * 0.11) * min(s.steep, 1.2);
+  return Material(mix(dark, light, tone) * hue * (1.0 - 0.22 * seep), fine_slope(s, relief) + ledge, 0.0, 0.0);
+}
+
+// Stones below the faces.
+fn scree(s: Site, colour: vec3f) -> Material {
+  let stones = 0.72 + 0.34 * s.fine2.g + 0.22 * s.fine3.r;
+  return Material(colour * stones, fine_slope(s, 0.26), 0.0, 0.0);
+}
+
+// Crowns: a relief of their own, dark between.
+fn canopy(s: Site, dark: vec3f, light: vec3f) -> Material {
+  let crown = clamp(0.9 * s.fine1.g + 0.7 * s.fine2.r + 0.3 * s.fine3.r - 0.45, 0.0, 1.0);
+  return Material(mix(dark, light, smoothstep(0.25, 0.85, s.macro2.g)) * (0.35 + 1.05 * crown), fine_slope(s, 0.62), 0.0, 0.25);
+}
+
+fn snowfield(s: Site) -> Material {
+  let drift = 0.97 + 0.05 * (s.macro2.r - 0.5) + 0.03 * (s.fine1.r - 0.5);
+  return Material(vec3f(0.80, 0.83, 0.87) * drift, fine_slope(s, 0.07), 0.5, 0.30);
 }
 
 fn mix_in(under: Material, over: Material, amount: f32) -> Material {
-  return Material(mix(under.albedo, over.albedo, amount), mix(under.slope, over.slope, amount), mix(under.gloss, over.gloss, amount));
+  return Material(mix(under.albedo, over.albedo, amount), mix(under.slope, over.slope, amount),
+    mix(under.gloss, over.gloss, amount), mix(under.soft, over.soft, amount));
 }
 
-fn shore(m: Material, s: Site) -> Material {
+// Wet ground is darker, richer in colour, and shines.
+fn soaked(m: Material, wet: f32) -> Material {
+  return Material(m.albedo * mix(vec3f(1.0), vec3f(0.58, 0.55, 0.52), wet), m.slope * (1.0 - 0.4 * wet), max(m.gloss, 0.22 * wet), m.soft);
+}
+
+fn shore(m: Material, s: Site, colour: vec3f) -> Material {
   if (view.has_sea < 0.5) { return m; }
   let wander = (s.macro2.r - 0.5) * 0.006 + (s.fine1.r - 0.5) * 0.003;
   let low = 1.0 - smoothstep(0.0012, 0.0034, s.height + wander * 0.7);
-  let gentle = 1.0 - smoothstep(0.42, 0.75, s.steep);
-  let dry = vec3f(0.44, 0.37, 0.25) * (0.86 + 0.28 * s.fine2.r);
-  // Wet below and just above the water line.
-  let wet = 1.0 - smoothstep(-0.0002, 0.0016, s.height + wander * 0.4);
-  let sand = Material(mix(dry, dry * vec3f(0.50, 0.47, 0.44), wet), fine_slope(s, 0.10), 0.15 * wet);
-  return mix_in(m, sand, low * gentle);
+  let gentle = 1.0 - smoothstep(0.42, 0.75, s.steep + (s.fine1.g - 0.5) * 0.3);
+  let sand = Material(colour * (0.86 + 0.28 * s.fine2.r), fine_slope(s, 0.08), 0.0, 0.0);
+  // Below the water and a hand above it.
+  let wet = 1.0 - smoothstep(-0.0002, 0.0010, s.height + wander * 0.3);
+  return soaked(mix_in(m, sand, low * gentle), wet);
 }

@@ -9,6 +9,12 @@ fn contours(height: f32, rate: f32) -> f32 {
   return max(minor, major);
 }
 
+// Contours in ink: brown on the paper model, else the ground's own colour, darker.
+fn inked(colour: vec3f, cover: f32) -> vec3f {
+  let ink = select(colour * 0.22, colour * vec3f(0.34, 0.23, 0.15), view.look == LOOK_PAPER);
+  return mix(colour, ink, cover);
+}
+
 // A sixteenth of the domain, so that a first look reads scale and perspective.
 fn scale_grid(p: vec2f, f: Footprint) -> f32 {
   let rate = abs(f.dx.xy) + abs(f.dy.xy);

@@ -35,17 +35,18 @@ fn ambient_light(n: vec3f) -> vec3f {
 
 // Extinction between the eye and a point at `distance` along `dir`: haze that thins out with height.
 fn haze_depth(dir: vec3f, distance: f32) -> f32 {
-  let scale = 0.16 * view.size;
+  let scale = 0.13 * view.size;
   let k = dir.z / scale;
   let start = exp(-max(view.eye.z - view.low, -scale) / scale);
   let along = select((1.0 - exp(-clamp(k * distance, -20.0, 40.0))) / k, distance, abs(k * distance) < 1.0e-3);
   return view.haze * start * along;
 }
 
-// What the haze itself sends to the eye: the pale horizon, blued by the sky above it.
+// What the haze itself sends to the eye: the same sky that shows at the end of the sight, so that what is far melts into
+// it, and a little of the blue above.
 fn haze_glow(dir: vec3f) -> vec3f {
   let up = max(dir.z, 0.0);
-  return mix(sky_colour(normalize(vec3f(dir.xy, up + 0.03))), sky_colour(normalize(vec3f(dir.xy, up + 0.26))), 0.5);
+  return mix(sky_colour(normalize(vec3f(dir.xy, up + 0.02))), sky_colour(normalize(vec3f(dir.xy, up + 0.30))), 0.42);
 }
 
 // The air between the eye and a point. It changes slowly, so passes with fine geometry take it at their vertices.
@@ -57,6 +58,7 @@ struct Air {
 fn air_to(p: vec3f) -> Air {
   if (view.eye.w > 0.5) { return Air(vec3f(1.0), vec3f(0.0)); }
   let dir = ray_to(p);
-  let through = exp(-haze_depth(dir, distance(p, view.eye.xyz)) * vec3f(0.72, 0.92, 1.22));
+  // Droplets take all colours alike, the air itself takes blue most.
+  let through = exp(-haze_depth(dir, distance(p, view.eye.xyz)) * vec3f(0.62, 0.90, 1.42));
   return Air(through, haze_glow(dir) * (vec3f(1.0) - through));
 }

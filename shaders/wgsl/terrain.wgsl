@@ -32,23 +32,36 @@ fn detail_at(p: vec2f) -> vec2f {
   return textureSampleLevel(channels, smooth_clamp, (p / view.size * (side - 1.0) + 0.5) / side, 0.0).xy;
 }
 
+// What lies and grows on the ground here.
+fn cover_of(surface: Surface, s: Site) -> Attributes {
+  return estimate(s);
+}
+
 // Sun, sky and the far ground on a rough surface.
 fn shade(m: Material, gradient: vec2f, surface: Surface, dir: vec3f) -> vec3f {
   let n = normalize(vec3f(-(gradient + m.slope), 1.0));
   let broad = normalize(vec3f(-gradient, 1.0));
-  // Facing the sun counts for the fine relief; whether the sun is up at all for the broad one.
-  let facing = max(dot(n, view.sun.xyz), 0.0) * smoothstep(-0.08, 0.12, dot(broad, view.sun.xyz));
-  let hollow = clamp(1.0 - max(surface.curvature, 0.0) * 0.35, 0.6, 1.0);
+  // Facing the sun counts for the fine relief; whether the sun is up at all for the broad one. Snow and leaves let light
+  // round the edge.
+  let turned_to = dot(n, view.sun.xyz);
+  let facing = max((turned_to + m.soft * 0.5) / (1.0 + m.soft * 0.5), max(turned_to, 0.0)) * smoothstep(-0.10, 0.14, dot(broad, view.sun.xyz));
+  let hollow = clamp(1.0 - max(surface.curvature, 0.0) * 0.35, 0.55, 1.0);
   let open = surface.sky * hollow;
-  let sun = sun_light() * (facing * surface.sun / 3.14159265);
-  let sky = ambient_light(n) * open;
-  // Light from the slopes around, strongest where little sky is seen.
-  let bounce = sun_light() * (0.055 * max(view.sun.z, 0.0)) * (1.0 - open * 0.75);
+  let sun = sun_light() * (max(facing, 0.0) * surface.sun / 3.14159265);
+  // Light that the ground passes on to itself takes its colour (Jimenez et al., "Practical Real-Time Strategies for
+  // Accurate Indirect Occlusion", 2016): hollows in snow stay bright, those in woods go dark.
+  let a = 2.0404 * m.albedo - vec3f(0.3324);
+  let b = -4.7951 * m.albedo + vec3f(0.6417);
+  let c = 2.7552 * m.albedo + vec3f(0.6903);
+  let lit = max(vec3f(open), ((open * a + b) * open + c) * open);
+  let sky = ambient_light(n) * lit;
+  // From the sunlit slopes around, strongest where little sky is seen.
+  let bounce = sun_light() * (0.32 * max(view.sun.z, 0.0) / 3.14159265) * (1.0 - open) * (m.albedo * 0.5 + vec3f(0.12));
   var colour = m.albedo * (sun + sky + bounce);
   if (m.gloss > 0.0) {
     let half_way = normalize(view.sun.xyz - dir);
     let sheen = pow(max(dot(n, half_way), 0.0), 24.0) * 0.10 + pow(max(dot(dir, view.sun.xyz), 0.0), 6.0) * 0.05;
-    colour += sun_light() * surface.sun * sheen * m.gloss * facing;
+    colour += sun_light() * surface.sun * sheen * m.gloss * max(facing, 0.0);
   }
   return colour;
 }
@@ -59,7 +72,8 @@ fn terrain_fragment(v: TerrainVertex) -> @location(0) vec4f {
   let world = v.relative + view.eye.xyz;
   let rate = abs(f.dx.z) + abs(f.dy.z);
   let surface = patch_surface(v.record, v.at, v.morph);
-  let site = survey(world, surface.gradient, surface.curvature, f, v.detail);
+  var site = survey(world, surface.gradient, surface.curvature, f, v.detail);
+  site.cover = cover_of(surface, site);
   var m = ground_material(site);
   if (view.overlay == OVERLAY_SLOPE) {
     m.albedo = mix(m.albedo, slope_tint(site.steep), 0.8);
@@ -78,7 +92,7 @@ fn terrain_fragment(v: TerrainVertex) -> @location(0) vec4f {
   }
   let strength = select(view.contour_strength, max(view.contour_strength, 0.8), view.overlay == OVERLAY_CONTOURS);
   if (strength > 0.0) {
-    colour *= 1.0 - contours(world.z, rate) * strength * 0.75;
+    colour = inked(colour, contours(world.z, rate) * strength);
   }
   if (view.overlay == OVERLAY_PATCHES) {
     let cell = abs(fract(v.at / f32(PATCH_CELLS) - 0.5) - 0.5) * f32(PATCH_CELLS);

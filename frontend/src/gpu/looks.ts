@@ -19,6 +19,15 @@ export const LOOKS: Readonly<Record<Look, LookFigures>> = {
   paper: { index: 3, exposure: 1.8, haze: 0.06, contours: 0.5 },
 };
 
+/**
+ * How far an eye opens as the sun sinks, 1 at 24 degrees. Light falls by a factor of thirty from there to half a degree; the
+ * eye makes up for most of it, so that twilight stays darker than morning but can be seen.
+ */
+export function adaptation(sunElevationDeg: number): number {
+  const s = Math.sin((Math.max(sunElevationDeg, 0) * Math.PI) / 180);
+  return ((s + 0.354) / (s + 0.004) / 1.85) ** 0.7;
+}
+
 /** A round contour interval (1, 2 or 5 times a power of ten) that gives about `wanted` lines over the relief. */
 export function contourInterval(reliefM: number, wanted = 24): number {
   const raw = Math.max(reliefM, 1e-3) / wanted;
