@@ -1,15 +1,16 @@
 // Interpolation of a parent's samples at its children (docs/synthesis.md, "Interpolation").
 // One invocation makes the four children of a parent's cell p: columns 2p, 2p + 1 of rows 2q, 2q + 1, always in the order
 // south-west, south-east, north-west, north-east. `r` holds p - 1 .. p + 2 of a row of parents; results along x are pairs
-// (even, odd child). Products are with powers of two: contracted to fused operations or not, they round alike, so that
-// different entry points make the same bits.
+// (even, odd child). Means are taken as a sample plus a part of differences, which keeps the rounding of high ground small;
+// products are with powers of two: contracted to fused operations or not, they round alike, so that different entry
+// points make the same bits.
 
 fn bspline_x(r: vec4f) -> vec2f {
-  return vec2f(((r.x + r.z) + 2.0 * r.y + 4.0 * r.y) * 0.125, (r.y + r.z) * 0.5);
+  return vec2f(r.y + ((r.x - r.y) + (r.z - r.y)) * 0.125, (r.y + r.z) * 0.5);
 }
 
 fn bspline_y(a: vec2f, b: vec2f, c: vec2f) -> vec4f {
-  return vec4f(((a + c) + 2.0 * b + 4.0 * b) * 0.125, (b + c) * 0.5);
+  return vec4f(b + ((a - b) + (c - b)) * 0.125, (b + c) * 0.5);
 }
 
 // Derivatives: times the parents' spacing.
@@ -32,13 +33,11 @@ fn second_y(a: vec2f, b: vec2f, c: vec2f, d: vec2f) -> vec4f {
 
 // (-1, 9, 9, -1) / 16: it keeps the parents' samples (Deslauriers and Dubuc).
 fn four_point_x(r: vec4f) -> vec2f {
-  let near = r.y + r.z;
-  return vec2f(r.y, ((8.0 * near + near) - (r.x + r.w)) * 0.0625);
+  return vec2f(r.y, (r.y + r.z) * 0.5 + ((r.y - r.x) + (r.z - r.w)) * 0.0625);
 }
 
 fn four_point_y(a: vec2f, b: vec2f, c: vec2f, d: vec2f) -> vec4f {
-  let near = b + c;
-  return vec4f(b, ((8.0 * near + near) - (a + d)) * 0.0625);
+  return vec4f(b, (b + c) * 0.5 + ((b - a) + (c - d)) * 0.0625);
 }
 
 // Two channels in a word each, unorm16: (even, odd child) of the low half, then of the high one.
@@ -46,7 +45,7 @@ fn bspline_words_x(a: u32, b: u32, c: u32) -> vec4f {
   let west = unpack2x16unorm(a);
   let mid = unpack2x16unorm(b);
   let east = unpack2x16unorm(c);
-  let even = ((west + east) + 2.0 * mid + 4.0 * mid) * 0.125;
+  let even = mid + ((west - mid) + (east - mid)) * 0.125;
   let odd = (mid + east) * 0.5;
   return vec4f(even.x, odd.x, even.y, odd.y);
 }
@@ -57,7 +56,7 @@ struct ChannelPair {
 };
 
 fn bspline_words_y(a: vec4f, b: vec4f, c: vec4f) -> ChannelPair {
-  let even = ((a + c) + 2.0 * b + 4.0 * b) * 0.125;
+  let even = b + ((a - b) + (c - b)) * 0.125;
   let odd = (b + c) * 0.5;
   return ChannelPair(vec4f(even.xy, odd.xy), vec4f(even.zw, odd.zw));
 }
