@@ -85,9 +85,10 @@ def subdivide(parent: Samples, window: Window, site: Site) -> Samples:
 
 
 def interpolated(z: Array, parent: Window, child: Window, rule: str = "landscape") -> Array:
-    """Heights that were not solved, as float32 holds them: 4-point, or B-spline for the base of rule ``smooth``."""
+    """Heights that were not solved: 4-point, or B-spline for the base of rule ``smooth``; float32 after each axis."""
     taps = B_SPLINE if rule == "smooth" else FOUR_POINT
-    return upsampled(z, taps, parent, child).astype(np.float32).astype(z.dtype)
+    across = along_x(z, taps, parent, child).astype(np.float32).astype(z.dtype)
+    return along_y(across, taps, parent, child).astype(np.float32).astype(z.dtype)
 
 
 def _ground(parent: Samples, window: Window, site: Site) -> Ground:

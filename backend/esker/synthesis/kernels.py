@@ -1,0 +1,135 @@
+"""The rule as an OpenCL kernel (shaders/opencl/synthesis*.cl): a window of a level at a time, from its parent's.
+
+Twin: ``subdivide``. The root is made in NumPy: 4,761 samples at most.
+"""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from typing import Any, Final, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from esker import contract_emit, grid
+from esker import fractal as f
+from esker.contract import BASE_ROUGHNESS
+from esker.synthesis.interpolate import Window
+from esker.synthesis.rules import RULES
+from esker.synthesis.rules.targets import tie
+from esker.synthesis.site import Biases, Site
+from esker.synthesis.state import WORDS, pack, unpack
+from esker.synthesis.subdivide import Samples, chain, root
+
+SOURCES: Final = ("synthesis.cl", "synthesis_rules.cl")
+GROUP: Final = (64, 1)
+"""Work-groups are always full: what compilers do with the rest of a row may round differently."""
+LAUNCH: Final = np.dtype(
+    [(name, "<i4") for name in ("level", "rule", "cyclic", "own_guide", "row", "col", "rows", "cols", "parent_row",
+                                "parent_col", "parent_rows", "parent_cols")]
+    + [("seed", "<u4"), ("sea", "<i4"), ("cells", "<i4"), ("pad", "<i4")]
+    + [(name, "<f4") for name in ("spacing", "size", "sea_level", "amplitude", "snow_line", "tree_line", "plants",
+                                  "tie", "grain", "strength")]
+    + [("offset", "<i4", 6), ("side", "<i4", 6)]
+)  # fmt: skip
+"""``Launch`` of synthesis.cl."""
+
+
+class ClDevice(Protocol):
+    """What is used of an opened OpenCL device."""
+
+    @property
+    def context(self) -> Any: ...
+    @property
+    def queue(self) -> Any: ...
+
+
+class Kernels:
+    """Makes samples on an OpenCL device. Use it from the thread that uses the device's queue.
+
+    Raises pyopencl errors for a device that compiles no kernel or has no memory left.
+    """
+
+    def __init__(self, device: ClDevice) -> None:
+        import pyopencl as cl
+
+        self._cl, self._context, self._queue = cl, device.context, device.queue
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", cl.CompilerWarning)
+            program = cl.Program(self._context, source()).build([])
+        self._kernel = cl.Kernel(program, "synthesise")
+
+    def detail(self, site: Site, window: Window) -> Samples:
+        """The same as ``subdivide.detail``, in float32."""
+        cl, flags = self._cl, self._cl.mem_flags
+        first, *rest = chain(window)
+        samples = root(site, first)
+        if not rest:
+            return Samples(first, samples.guide.astype(np.float32), unpack(pack(samples.state), np.float32))
+        grids, offsets, sides = _packed(site)
+        channels = self._copy(grids)
+        at, guide, state = first, self._copy(samples.guide.astype(np.float32)), self._copy(pack(samples.state))
+        for w in rest:
+            own = w.level <= site.solved
+            count = w.shape[0] * w.shape[1]
+            child = cl.Buffer(self._context, flags.READ_WRITE, size=4 * WORDS * count)
+            heights = (
+                self._copy(site.guide(w).astype(np.float32))
+                if own
+                else cl.Buffer(self._context, flags.READ_WRITE, size=4 * count)
+            )
+            launch = self._copy(_launch(site, at, w, offsets, sides))
+            size = (GROUP[0] * -(-w.shape[1] // GROUP[0]), w.shape[0])
+            self._kernel(self._queue, size, GROUP, launch, channels, guide, state, heights, child)
+            at, guide, state = w, heights, child
+        words = np.empty((*window.shape, WORDS), dtype=np.uint32)
+        out = np.empty(window.shape, dtype=np.float32)
+        cl.enqueue_copy(self._queue, words, state)
+        cl.enqueue_copy(self._queue, out, guide)
+        return Samples(window, out, unpack(words, np.float32))
+
+    def _copy(self, array: NDArray[Any]) -> Any:
+        flags = self._cl.mem_flags
+        return self._cl.Buffer(
+            self._context, flags.READ_ONLY | flags.COPY_HOST_PTR, hostbuf=np.ascontiguousarray(array)
+        )
+
+
+def source() -> str:
+    """The program's text: constants, then the rule."""
+    folder = Path(__file__).resolve().parents[3] / "shaders" / "opencl"
+    texts = [(folder / name).read_text(encoding="utf-8") for name in SOURCES]
+    return "\n".join([contract_emit.shader("cl"), f"#define SYNTH_BASE_ROUGHNESS {BASE_ROUGHNESS!r}f", *texts])
+
+
+def _packed(site: Site) -> tuple[NDArray[np.float32], list[int], list[int]]:
+    """All channels' grids in one array, where each starts, and samples along its side."""
+    grids = []
+    for name in Biases._fields:
+        base = BASE_ROUGHNESS if name == "roughness" else 0.0
+        grids.append(site.channels.get(name, np.full((2, 2), base, dtype=np.float32)))
+    offsets = np.cumsum([0, *(g.size for g in grids)])[:-1]
+    flat = np.concatenate([np.asarray(g, dtype=np.float32).ravel() for g in grids])
+    return flat, offsets.tolist(), [len(g) for g in grids]
+
+
+def _launch(site: Site, parent: Window, child: Window, offsets: list[int], sides: list[int]) -> NDArray[Any]:
+    look, level = site.look_rule, child.level
+    out = np.zeros(1, dtype=LAUNCH)
+    values = {
+        "level": level, "rule": list(RULES).index(site.rule), "cyclic": site.cyclic,
+        "own_guide": level <= site.solved, "row": child.r0, "col": child.c0,
+        "rows": child.shape[0], "cols": child.shape[1], "parent_row": parent.r0, "parent_col": parent.c0,
+        "parent_rows": parent.shape[0], "parent_cols": parent.shape[1],
+        "seed": site.seed, "sea": site.sea_level_m is not None, "cells": grid.cells(level),
+        "spacing": site.spacing(parent.level), "size": site.size_m, "sea_level": site.sea_level_m or 0.0,
+        "amplitude": site.amplitude_m, "snow_line": look.snow_line, "tree_line": look.tree_line,
+        "plants": look.plants, "tie": tie(level),
+        "grain": f.SMOOTHNESS_NOISE * 2.0 ** (-f.SMOOTHNESS_NOISE_DECAY * level),
+        "strength": f.CHANNEL_NOISE * 2.0 ** (-f.CHANNEL_NOISE_DECAY * level),
+        "offset": offsets, "side": sides,
+    }  # fmt: skip
+    for name, value in values.items():
+        out[name] = value
+    return out

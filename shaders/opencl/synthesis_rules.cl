@@ -1,0 +1,115 @@
+// The rules of synthesis (docs/synthesis.md) and the kernel that applies one. Twins: backend/esker/synthesis/rules/.
+
+float synth_step(float from, float to, float x) {
+    float t = clamp((x - from) / (to - from), 0.0f, 1.0f);
+    return t * t * (3.0f - 2.0f * t);
+}
+#define STEP(name, x) synth_step(SYNTH_##name##_FROM, SYNTH_##name##_TO, x)
+
+// What the ground asks of the channels; d is unused.
+State synth_targets(const Launch *l, Ground g) {
+    float e = (g.height - (l->sea ? l->sea_level : 0.0f)) / l->size;
+    float t2 = g.slope_x * g.slope_x + g.slope_y * g.slope_y;
+    float t = sqrt(t2), v = g.concavity, north = -g.slope_y / sqrt(1.0f + t2);
+    State s;
+    s.d = 0;
+    s.h = SYNTH_SMOOTHNESS + SYNTH_SMOOTHNESS_FLAT * (1.0f - STEP(SMOOTHNESS_FLAT_SLOPE, t)) -
+          SYNTH_SMOOTHNESS_STEEP * STEP(SMOOTHNESS_STEEP_SLOPE, t) +
+          SYNTH_SMOOTHNESS_VALLEY * STEP(SMOOTHNESS_VALLEY_CONCAVITY, v) +
+          SYNTH_SMOOTHNESS_LOW * (1.0f - STEP(SMOOTHNESS_LOW_ELEVATION, e));
+    float line = l->snow_line - SYNTH_SNOW_NORTH * north - SYNTH_SNOW_VALLEY * v;
+    s.snow = STEP(SNOW_EDGE, e - line) * (1.0f - STEP(SNOW_SLOPE, t));
+    float bare = 1.0f - s.snow, tree = l->tree_line;
+    s.grass = l->plants * (1.0f - STEP(GRASS_SLOPE, t)) *
+              (1.0f - synth_step(tree, SYNTH_GRASS_ABOVE_TREES * tree, e)) * bare;
+    s.forest = l->plants * (SYNTH_FOREST + SYNTH_FOREST_VALLEY * v) * (1.0f - STEP(FOREST_SLOPE, t)) *
+               (1.0f - synth_step(SYNTH_FOREST_THINS * tree, tree, e)) * bare;
+    s.wet = SYNTH_WET_VALLEY * STEP(WET_CONCAVITY, v) * (1.0f - STEP(WET_SLOPE, t));
+    if (l->sea) s.wet = max(s.wet, 1.0f - STEP(WET_SHORE, e));
+    s.foam = SYNTH_FOAM;
+    return s;
+}
+
+float synth_blended(const Launch *l, float before, float target) { return before * (1.0f - l->tie) + target * l->tie; }
+
+float synth_painted(float x, float bias) {
+    float strength = fabs(bias);
+    return x * (1.0f - strength) + (bias > 0.0f ? strength : 0.0f);
+}
+
+float synth_mixed(const Launch *l, float x, float target, float g) {
+    float undecided = SYNTH_CHANNEL_NOISE_PURE + 4.0f * (1.0f - SYNTH_CHANNEL_NOISE_PURE) * target * (1.0f - target);
+    return clamp(synth_blended(l, x + l->strength * g * undecided, target), 0.0f, 1.0f);
+}
+
+float synth_exponent(const Launch *l, float h, float target) {
+    return clamp(synth_blended(l, h, target), SYNTH_SMOOTHNESS_MIN, SYNTH_SMOOTHNESS_MAX);
+}
+
+State synth_landscape(const Launch *l, Ground g, State before, Biases bias, int i, int j) {
+    State t = synth_targets(l, g), s;
+    uint words[4];
+    for (uint stream = 0; stream < 4; stream++) words[stream] = synth_hash(l, stream, i, j);
+    s.h = synth_exponent(l, before.h + l->grain * synth_low(words[1]), t.h);
+    s.snow = synth_painted(synth_mixed(l, before.snow, t.snow, synth_high(words[1])), bias.snow);
+    s.wet = synth_painted(synth_mixed(l, before.wet, t.wet, synth_low(words[2])), bias.wetness);
+    s.grass = synth_painted(synth_mixed(l, before.grass, t.grass, synth_high(words[2])), bias.grass);
+    s.forest = synth_painted(synth_mixed(l, before.forest, t.forest, synth_low(words[3])), bias.forest);
+    s.foam = synth_mixed(l, before.foam, t.foam, synth_high(words[3]));
+    float exponent = s.h + SYNTH_ROUGHNESS_TO_H * (SYNTH_BASE_ROUGHNESS - bias.roughness) + SYNTH_SNOW_TO_H * s.snow;
+    float share = SYNTH_FLAT_SHARE + (1.0f - SYNTH_FLAT_SHARE) * STEP(AMPLITUDE_SLOPE, g.guide_slope);
+    float amplitude = max(0.0f, l->amplitude * share + bias.amplitude);
+    float size = amplitude * exp2(-(float)l->level * clamp(exponent, SYNTH_H_RANGE_FROM, SYNTH_H_RANGE_TO));
+    s.d = before.d + size * synth_full(words[0]);
+    return s;
+}
+
+State synth_smooth(const Launch *l, Ground g, State before, Biases bias) {
+    State t = synth_targets(l, g), s;
+    s.d = 0;
+    s.h = synth_exponent(l, before.h, t.h);
+    s.snow = synth_painted(clamp(synth_blended(l, before.snow, t.snow), 0.0f, 1.0f), bias.snow);
+    s.wet = synth_painted(clamp(synth_blended(l, before.wet, t.wet), 0.0f, 1.0f), bias.wetness);
+    s.grass = synth_painted(clamp(synth_blended(l, before.grass, t.grass), 0.0f, 1.0f), bias.grass);
+    s.forest = synth_painted(clamp(synth_blended(l, before.forest, t.forest), 0.0f, 1.0f), bias.forest);
+    s.foam = clamp(synth_blended(l, before.foam, t.foam), 0.0f, 1.0f);
+    return s;
+}
+
+State synth_plain(const Launch *l, Ground g, Biases bias) {
+    State s = synth_targets(l, g);
+    s.h = clamp(s.h, SYNTH_SMOOTHNESS_MIN, SYNTH_SMOOTHNESS_MAX);
+    s.snow = synth_painted(clamp(s.snow, 0.0f, 1.0f), bias.snow);
+    s.wet = synth_painted(clamp(s.wet, 0.0f, 1.0f), bias.wetness);
+    s.grass = synth_painted(clamp(s.grass, 0.0f, 1.0f), bias.grass);
+    s.forest = synth_painted(clamp(s.forest, 0.0f, 1.0f), bias.forest);
+    return s;
+}
+
+// One item a sample of the child's window; guide and state are (rows, cols) of it. With own_guide the guide is given.
+__kernel void synthesise(__global const Launch *launch, __global const float *grids,
+                         __global const float *parent_guide, __global const uint4 *parent_state,
+                         __global float *guide, __global uint4 *state) {
+    Launch l = *launch;
+    int col = get_global_id(0), row = get_global_id(1);
+    if (col >= l.cols || row >= l.rows) return;
+    int i = l.col + col, j = l.row + row;
+    Place p = synth_around(&l, i, j);
+    Ground ground = synth_ground(&l, parent_guide, parent_state, &p);
+    State before = synth_before(parent_state, &p);
+    int wi = i, wj = j;
+    if (l.cyclic) {
+        wi = i & (l.cells - 1), wj = j & (l.cells - 1);
+    }
+    Biases bias = {
+        synth_channel(&l, grids, 0, wi, wj), synth_channel(&l, grids, 1, wi, wj), synth_channel(&l, grids, 2, wi, wj),
+        synth_channel(&l, grids, 3, wi, wj), synth_channel(&l, grids, 4, wi, wj), synth_channel(&l, grids, 5, wi, wj),
+    };
+    State s;
+    if (l.rule == 0) s = synth_landscape(&l, ground, before, bias, wi, wj);
+    else if (l.rule == 1) s = synth_smooth(&l, ground, before, bias);
+    else s = synth_plain(&l, ground, bias);
+    int at = row * l.cols + col;
+    state[at] = synth_pack(s);
+    if (!l.own_guide) guide[at] = synth_guide(parent_guide, &p);
+}
