@@ -278,9 +278,14 @@ export class Camera {
       const half = this.#pose.distanceM * t;
       const onPlane = addScaled(addScaled(eye, right, nx * half * aspect), up, ny * half);
       // Start above everything: the eye of a close map view may be lower than a summit beside it.
-      return { origin: [onPlane[0], onPlane[1], onPlane[2] + 2 * this.#sizeM], dir: forward };
+      return {
+        origin: [onPlane[0], onPlane[1], onPlane[2] + 2 * this.#sizeM],
+        dir: forward,
+        spread: [this.#metresPerPixel(), 0],
+      };
     }
-    return { origin: eye, dir: normalize(addScaled(addScaled(forward, right, nx * t * aspect), up, ny * t)) };
+    const dir = normalize(addScaled(addScaled(forward, right, nx * t * aspect), up, ny * t));
+    return { origin: eye, dir, spread: [0, (2 * t) / this.#height] };
   }
 
   /** Where a world point is on the canvas. */

@@ -32,12 +32,17 @@ export interface CameraState {
 export interface Ray {
   readonly origin: Vec3;
   readonly dir: Vec3;
+  /** Metres that a pixel covers at the origin, and by how much more for each metre of way. */
+  readonly spread?: readonly [number, number];
 }
 
 /** A heightfield that answers for its whole domain [0, size]^2; outside, heights are those of the nearest border. */
 export interface Ground {
   readonly sizeM: number;
-  heightAt(x: number, y: number): number;
+  /** Metres. `cellM`: detail finer than cells of this size may be left out. */
+  heightAt(x: number, y: number, cellM?: number): number;
+  /** Metres without synthesised detail, which no stroke constrains; `heightAt` where there is none. */
+  solvedAt?(x: number, y: number): number;
   /** First hit of the ray with the ground inside the domain, or null. */
   raycast(ray: Ray): Vec3 | null;
 }

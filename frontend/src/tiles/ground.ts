@@ -6,40 +6,62 @@
 import { tileKey } from "../core/tilekey.ts";
 import type { Ground, Ray, Tile, Vec3 } from "../core/types.ts";
 import { PATCH_CELLS, SUBPATCHES, TILE_CELLS, TILE_SAMPLES } from "../generated/contract.ts";
-import { type March, marchPatch } from "./march.ts";
+import { clip, clipSquare, type March, marchPatch, passesOver } from "./march.ts";
 
-/** Highest point of a tile and of all held tiles below it. */
-type Summits = Map<number, number>;
+/** Highest point of a tile, and of each of its sub-patches [row*4 + col], with all held tiles below it. Metres. */
+export interface Summit {
+  readonly top: number;
+  readonly subs: Float32Array;
+}
+
+export type Summits = ReadonlyMap<number, Summit>;
 
 /** A ground that never changes. */
 export class TileGround implements Ground {
   readonly sizeM: number;
-  /** Finest level of the tiles that are there. */
-  private readonly finest: number;
+  /** Finest level of the tiles that are there; -1 while there are none. */
+  readonly finest: number;
   private readonly tiles: ReadonlyMap<number, Tile>;
-  private summits: Summits | null = null;
+  private found: Summits | null = null;
 
   constructor(sizeM: number, tiles: ReadonlyMap<number, Tile>) {
     this.sizeM = sizeM;
     this.tiles = tiles;
-    let finest = 0;
+    let finest = -1;
     for (const tile of tiles.values()) if (tile.level > finest) finest = tile.level;
     this.finest = finest;
   }
 
+  tile(level: number, x: number, y: number): Tile | undefined {
+    return this.tiles.get(tileKey(level, x, y));
+  }
+
   /** Metres. Outside the domain the height of the nearest border; 0 while nothing is held. */
   heightAt(x: number, y: number): number {
-    const px = Math.min(Math.max(x, 0), this.sizeM);
-    const py = Math.min(Math.max(y, 0), this.sizeM);
+    const [px, py] = [this.inside(x), this.inside(y)];
+    const tile = this.finestAt(px, py);
+    if (tile === undefined) return 0;
+    const width = this.sizeM / 2 ** tile.level;
+    return bilinear(tile.heights, (px / width - tile.x) * TILE_CELLS, (py / width - tile.y) * TILE_CELLS);
+  }
+
+  /** Level of the finest tile that covers a place; -1 while nothing is held. */
+  levelAt(x: number, y: number): number {
+    return this.finestAt(this.inside(x), this.inside(y))?.level ?? -1;
+  }
+
+  private inside(v: number): number {
+    return Math.min(Math.max(v, 0), this.sizeM);
+  }
+
+  private finestAt(x: number, y: number): Tile | undefined {
     for (let level = this.finest; level >= 0; level--) {
-      const width = this.sizeM / 2 ** level;
-      const last = 2 ** level - 1;
-      const tx = Math.min(Math.floor(px / width), last);
-      const ty = Math.min(Math.floor(py / width), last);
-      const tile = this.tiles.get(tileKey(level, tx, ty));
-      if (tile) return bilinear(tile.heights, (px / width - tx) * TILE_CELLS, (py / width - ty) * TILE_CELLS);
+      const n = 2 ** level;
+      const at = (v: number): number => Math.min(Math.floor((v / this.sizeM) * n), n - 1);
+      const tile = this.tiles.get(tileKey(level, at(x), at(y)));
+      if (tile !== undefined) return tile;
     }
-    return 0;
+    return undefined;
   }
 
   /**
@@ -55,23 +77,28 @@ export class TileGround implements Ground {
     const above = oz + span.from * dz >= this.heightAt(ox + span.from * dx, oy + span.from * dy);
     if (!above && span.from > 0) return null;
     const march: March = { ox, oy, oz, dx, dy, dz, above };
-    this.summits ??= this.findSummits();
     const t = this.visit(root, march, span.from, span.to);
     return t === null ? null : [ox + t * dx, oy + t * dy, oz + t * dz];
   }
 
+  /** The summits of all tiles, found when somebody first asks. */
+  get summits(): Summits {
+    this.found ??= this.findSummits();
+    return this.found;
+  }
+
   private findSummits(): Summits {
-    const summits: Summits = new Map();
+    const summits = new Map<number, Summit>();
     const byLevel: Tile[][] = Array.from({ length: this.finest + 1 }, () => []);
     for (const tile of this.tiles.values()) byLevel[tile.level]!.push(tile);
     for (let level = this.finest; level >= 0; level--) {
       for (const tile of byLevel[level]!) {
-        let top = Math.max(...tile.subMax);
+        const subs = tile.subMax.slice();
         for (let q = 0; q < 4; q++) {
           const below = summits.get(tileKey(level + 1, 2 * tile.x + (q & 1), 2 * tile.y + (q >> 1)));
-          if (below !== undefined && below > top) top = below;
+          if (below !== undefined) raise(subs, below.subs, q);
         }
-        summits.set(tileKey(level, tile.x, tile.y), top);
+        summits.set(tileKey(level, tile.x, tile.y), { top: Math.max(...subs), subs });
       }
     }
     return summits;
@@ -79,7 +106,7 @@ export class TileGround implements Ground {
 
   /** Marches a tile and the held tiles below it over ray parameters [from, to]. */
   private visit(tile: Tile, march: March, from: number, to: number): number | null {
-    if (passesOver(march, from, to, this.summits!.get(tileKey(tile.level, tile.x, tile.y))!)) return null;
+    if (passesOver(march, from, to, this.summits.get(tileKey(tile.level, tile.x, tile.y))!.top)) return null;
     const flip = (march.dx < 0 ? 1 : 0) | (march.dy < 0 ? 2 : 0);
     for (let i = 0; i < 4; i++) {
       const q = i ^ flip;
@@ -118,21 +145,30 @@ export class TileGround implements Ground {
       const span = { from, to };
       if (!clipSquare(span, march, x, y, SUBPATCHES << tile.level, this.sizeM)) continue;
       if (passesOver(march, span.from, span.to, tile.subMax[row * SUBPATCHES + col]!)) continue;
-      const origin = PATCH_CELLS * (row * TILE_SAMPLES + col);
-      const t = marchPatch(
-        tile.heights,
-        origin,
-        x * PATCH_CELLS * cell,
-        y * PATCH_CELLS * cell,
+      const patch = {
+        heights: tile.heights,
+        stride: TILE_SAMPLES,
+        origin: PATCH_CELLS * (row * TILE_SAMPLES + col),
+        x0: x * PATCH_CELLS * cell,
+        y0: y * PATCH_CELLS * cell,
         cell,
-        march,
-        span.from,
-        span.to,
-      );
+        cells: PATCH_CELLS,
+      };
+      const t = marchPatch(patch, march, span.from, span.to);
       if (t !== null) return t;
     }
     return null;
   }
+}
+
+/** Raises the sub-patches of a tile to those of its child in quarter `q`: four of the child's lie on one of the tile's. */
+function raise(subs: Float32Array, below: Float32Array, q: number): void {
+  const half = SUBPATCHES / 2;
+  for (let row = 0; row < SUBPATCHES; row++)
+    for (let col = 0; col < SUBPATCHES; col++) {
+      const at = ((q >> 1) * half + (row >> 1)) * SUBPATCHES + (q & 1) * half + (col >> 1);
+      subs[at] = Math.max(subs[at]!, below[row * SUBPATCHES + col]!);
+    }
 }
 
 /** Height at fractional column `c` and row `r` of a tile's 65x65 samples. */
@@ -145,38 +181,4 @@ function bilinear(heights: Float32Array, c: number, r: number): number {
   const south = heights[at]! * (1 - u) + heights[at + 1]! * u;
   const north = heights[at + TILE_SAMPLES]! * (1 - u) + heights[at + TILE_SAMPLES + 1]! * u;
   return south * (1 - v) + north * v;
-}
-
-interface Span {
-  from: number;
-  to: number;
-}
-
-/**
- * Narrows the span to where `origin + t * dir` is in [low, high]; false when nothing is left. A ray along a shared edge
- * belongs to the upper side, as in `heightAt`, unless `last`: the edge is the domain's.
- */
-function clip(span: Span, origin: number, dir: number, low: number, high: number, last: boolean): boolean {
-  if (dir === 0) return origin >= low && (origin < high || (last && origin === high));
-  const a = (low - origin) / dir;
-  const b = (high - origin) / dir;
-  span.from = Math.max(span.from, Math.min(a, b));
-  span.to = Math.min(span.to, Math.max(a, b));
-  return span.from <= span.to;
-}
-
-/** Narrows the span to square (x, y) of a grid with `count` squares a side of the domain. */
-function clipSquare(span: Span, m: March, x: number, y: number, count: number, sizeM: number): boolean {
-  const low = (i: number) => (sizeM * i) / count;
-  return (
-    clip(span, m.ox, m.dx, low(x), low(x + 1), x + 1 === count) &&
-    clip(span, m.oy, m.dy, low(y), low(y + 1), y + 1 === count)
-  );
-}
-
-/** True when the ray, known to be above the ground, stays above `top` all the way. */
-function passesOver(march: March, from: number, to: number, top: number): boolean {
-  if (!march.above) return false;
-  const lowest = march.dz < 0 ? march.oz + to * march.dz : march.oz + from * march.dz;
-  return lowest > top;
 }

@@ -6,16 +6,16 @@
 
 import type { Tile } from "../core/types.ts";
 import { TILE_CELLS, TILE_SAMPLES } from "../generated/contract.ts";
-import type { Window } from "./subdivide.ts";
+import type { Area } from "./subdivide.ts";
 
 /** Height of the sample in row j and column i of a level, inside the domain; undefined where it is not known. */
 export type HeightOf = (level: number, j: number, i: number) => number | undefined;
 
 /**
- * Writes the heights of a window of a level, in metres; false when one of them is not known. `window` reaches over the
- * domain's border by less than the domain.
+ * Writes the heights of an area of a level that are known, in metres, and NaN for the others; how many are. `area`
+ * reaches over the domain's border by less than the domain.
  */
-export function fillWindow(heightOf: HeightOf, { level, r0, r1, c0, c1 }: Window, out: Float64Array): boolean {
+export function fillKnown(heightOf: HeightOf, { level, r0, r1, c0, c1 }: Area, out: Float64Array): number {
   const last = TILE_CELLS * 2 ** level;
   const inRow = (j: number, i: number): number => {
     const edge = Math.min(Math.max(i, 0), last);
@@ -23,16 +23,22 @@ export function fillWindow(heightOf: HeightOf, { level, r0, r1, c0, c1 }: Window
     return edge === i ? here : Math.fround(2 * here - (heightOf(level, j, 2 * edge - i) ?? Number.NaN));
   };
   let k = 0;
+  let known = 0;
   for (let j = r0; j < r1; j += 1) {
     const edge = Math.min(Math.max(j, 0), last);
     for (let i = c0; i < c1; i += 1, k += 1) {
       const here = inRow(edge, i);
       const z = edge === j ? here : Math.fround(2 * here - inRow(2 * edge - j, i));
-      if (Number.isNaN(z)) return false;
       out[k] = z;
+      if (!Number.isNaN(z)) known += 1;
     }
   }
-  return true;
+  return known;
+}
+
+/** The same; false when one of them is not known. */
+export function fillArea(heightOf: HeightOf, area: Area, out: Float64Array): boolean {
+  return fillKnown(heightOf, area, out) === (area.r1 - area.r0) * (area.c1 - area.c0);
 }
 
 /**

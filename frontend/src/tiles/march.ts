@@ -1,6 +1,4 @@
-/** A ray through the cells of one sub-patch, met exactly with the bilinear surface of each cell. */
-
-import { PATCH_CELLS, TILE_SAMPLES } from "../generated/contract.ts";
+/** A ray through a square of cells, met exactly with the bilinear surface of each cell. */
 
 /** A ray under way. `above`: it was above the surface at the last point looked at. */
 export interface March {
@@ -13,26 +11,28 @@ export interface March {
   above: boolean;
 }
 
-/**
- * Ray parameter of the first crossing inside a 16x16-cell patch over [from, to], or null.
- *
- * `origin` is the index in `heights` of the patch's south-west sample, which lies at (x0, y0); `cell` is the spacing.
- */
-export function marchPatch(
-  heights: Float32Array,
-  origin: number,
-  x0: number,
-  y0: number,
-  cell: number,
-  march: March,
-  from: number,
-  to: number,
-): number | null {
+/** A square of cells in an array of heights. */
+export interface Patch {
+  readonly heights: Float32Array;
+  /** Samples in a row of the array. */
+  readonly stride: number;
+  /** Index of the south-west sample, which lies at (x0, y0) metres. */
+  readonly origin: number;
+  readonly x0: number;
+  readonly y0: number;
+  /** Spacing in metres, and cells on a side. */
+  readonly cell: number;
+  readonly cells: number;
+}
+
+/** Ray parameter of the first crossing inside a patch over [from, to], or null. */
+export function marchPatch(patch: Patch, march: March, from: number, to: number): number | null {
+  const { heights, stride, origin, x0, y0, cell, cells } = patch;
   const u = (march.ox - x0) / cell;
   const v = (march.oy - y0) / cell;
   const du = march.dx / cell;
   const dv = march.dy / cell;
-  const last = PATCH_CELLS - 1;
+  const last = cells - 1;
   let col = startCell(u + from * du, du, last);
   let row = startCell(v + from * dv, dv, last);
   let t = from;
@@ -40,7 +40,7 @@ export function marchPatch(
     const nextCol = du === 0 ? Number.POSITIVE_INFINITY : (col + (du > 0 ? 1 : 0) - u) / du;
     const nextRow = dv === 0 ? Number.POSITIVE_INFINITY : (row + (dv > 0 ? 1 : 0) - v) / dv;
     const end = Math.max(t, Math.min(nextCol, nextRow, to));
-    const hit = meetCell(heights, origin + row * TILE_SAMPLES + col, u - col, v - row, du, dv, march, t, end);
+    const hit = meetCell(heights, stride, origin + row * stride + col, u - col, v - row, du, dv, march, t, end);
     if (hit !== null) return hit;
     if (end >= to) return null;
     if (nextCol <= nextRow) col += du > 0 ? 1 : -1;
@@ -62,6 +62,7 @@ function startCell(at: number, step: number, last: number): number {
  */
 function meetCell(
   heights: Float32Array,
+  stride: number,
   at: number,
   u: number,
   v: number,
@@ -73,8 +74,8 @@ function meetCell(
 ): number | null {
   const h00 = heights[at]!;
   const east = heights[at + 1]! - h00;
-  const north = heights[at + TILE_SAMPLES]! - h00;
-  const twist = heights[at + TILE_SAMPLES + 1]! - h00 - east - north;
+  const north = heights[at + stride]! - h00;
+  const twist = heights[at + stride + 1]! - h00 - east - north;
   // Taken from the point where the ray enters: parameters from a far eye would cancel.
   const us = u + from * du;
   const vs = v + from * dv;
@@ -112,4 +113,39 @@ function firstRoot(a: number, b: number, c: number, length: number): number | nu
   for (const s of [q === 0 ? Number.NaN : c / q, a === 0 ? Number.NaN : q / a])
     if (s >= 0 && s <= length && s < best) best = s;
   return best === Number.POSITIVE_INFINITY ? null : best;
+}
+
+/** Ray parameters. */
+export interface Span {
+  from: number;
+  to: number;
+}
+
+/**
+ * Narrows the span to where `origin + t * dir` is in [low, high]; false when nothing is left. A ray along a shared edge
+ * belongs to the upper side, as in `heightAt`, unless `last`: the edge is the domain's.
+ */
+export function clip(span: Span, origin: number, dir: number, low: number, high: number, last: boolean): boolean {
+  if (dir === 0) return origin >= low && (origin < high || (last && origin === high));
+  const a = (low - origin) / dir;
+  const b = (high - origin) / dir;
+  span.from = Math.max(span.from, Math.min(a, b));
+  span.to = Math.min(span.to, Math.max(a, b));
+  return span.from <= span.to;
+}
+
+/** Narrows the span to square (x, y) of a grid with `count` squares a side of the domain. */
+export function clipSquare(span: Span, m: March, x: number, y: number, count: number, sizeM: number): boolean {
+  const low = (i: number) => (sizeM * i) / count;
+  return (
+    clip(span, m.ox, m.dx, low(x), low(x + 1), x + 1 === count) &&
+    clip(span, m.oy, m.dy, low(y), low(y + 1), y + 1 === count)
+  );
+}
+
+/** True when the ray, known to be above the ground, stays above `top` all the way. */
+export function passesOver(march: March, from: number, to: number, top: number): boolean {
+  if (!march.above) return false;
+  const lowest = march.dz < 0 ? march.oz + to * march.dz : march.oz + from * march.dz;
+  return lowest > top;
 }

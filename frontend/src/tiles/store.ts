@@ -79,7 +79,7 @@ export class TileStore implements TileView {
   }
 
   /** The ground at this moment, which no later frame changes. Cheap: tiles are immutable and shared. */
-  freeze(): Ground {
+  freeze(): TileGround {
     if (this.snapshot?.stamp !== this.stamp) {
       const tiles = new Map<number, Tile>();
       for (const [key, entry] of this.entries) tiles.set(key, entry.tile);

@@ -1,10 +1,10 @@
 /**
- * One step of the synthesis: the samples of a window from those of its parent (docs/synthesis.md). Twin of
+ * One step of the synthesis: the samples of an area from those of its parent (docs/synthesis.md). Twin of
  * `backend/esker/synthesis/subdivide.py` in float64; `tests/vectors/synthesis.json` holds what both must give.
  */
 
 import type { Rule as RuleName } from "../generated/contract.ts";
-import { SYNTH_CONCAVITY_SCALE, SYNTH_SMOOTHNESS, TILE_CELLS } from "../generated/contract.ts";
+import { SYNTH_CONCAVITY_SCALE, SYNTH_H_RANGE_TO, SYNTH_SMOOTHNESS, TILE_CELLS } from "../generated/contract.ts";
 import type { Biases } from "./biases.ts";
 import { full, hashAt, high, low, rowStart, streamStart } from "./noise.ts";
 import { landscape } from "./rules/landscape.ts";
@@ -19,7 +19,7 @@ export const RULES: Readonly<Record<RuleName, Rule>> = { landscape, smooth, plai
 export const BORDER = 2;
 
 /** A rectangle of samples of a level: rows r0..r1, columns c0..c1, half open, global indices, maybe outside the domain. */
-export interface Window {
+export interface Area {
   readonly level: number;
   readonly r0: number;
   readonly r1: number;
@@ -27,8 +27,8 @@ export interface Window {
   readonly c1: number;
 }
 
-/** The samples of the next coarser level from which the rule makes a window: p - 1 .. p + 2. */
-export function parentWindow({ level, r0, r1, c0, c1 }: Window): Window {
+/** The samples of the next coarser level from which the rule makes an area: p - 1 .. p + 2. */
+export function parentArea({ level, r0, r1, c0, c1 }: Area): Area {
   return {
     level: level - 1,
     r0: (r0 >> 1) - 1,
@@ -39,11 +39,11 @@ export function parentWindow({ level, r0, r1, c0, c1 }: Window): Window {
 }
 
 /**
- * Guide heights (metres, float32 values) and state of a window, `[row, col]`, row 0 south. `d`: metres; `h`: smoothness
+ * Guide heights (metres, float32 values) and state of an area, `[row, col]`, row 0 south. `d`: metres; `h`: smoothness
  * exponent 0..2; the rest 0..1, as stored in 16 bits. The last four are empty where only the relief was asked for.
  */
 export interface Samples {
-  readonly window: Window;
+  readonly area: Area;
   readonly guide: Float64Array;
   readonly d: Float64Array;
   readonly h: Float64Array;
@@ -52,8 +52,9 @@ export interface Samples {
   readonly grass: Float64Array;
   readonly forest: Float64Array;
   readonly foam: Float64Array;
-  /** The most that this level added to or took from the detail, metres. */
+  /** The most that this level could add to or take from the detail, metres; the least exponent by which that falls. */
   readonly sigma: number;
+  readonly exponent: number;
 }
 
 /** What the synthesis of a terrain is made from, besides the parent. */
@@ -61,8 +62,8 @@ export interface Recipe {
   readonly site: Site;
   readonly rule: Rule;
   readonly biases: Biases;
-  /** Writes guide heights of a window of a level that was solved; false where that level is not held, or was not solved. */
-  readonly guide: (window: Window, out: Float64Array) => boolean;
+  /** Writes guide heights of an area of a level that was solved; false where that level is not held, or was not solved. */
+  readonly guide: (area: Area, out: Float64Array) => boolean;
 }
 
 const NONE = new Float64Array(0);
@@ -73,14 +74,14 @@ const H_SCALE = 2;
 /** A share 0..1 as 16 bits hold it. */
 export const unorm16 = (x: number): number => Math.floor(0.5 + UNORM * clamp(x, 0, 1)) / UNORM;
 
-const rowsOf = (w: Window): number => w.r1 - w.r0;
-const colsOf = (w: Window): number => w.c1 - w.c0;
+const rowsOf = (w: Area): number => w.r1 - w.r0;
+const colsOf = (w: Area): number => w.c1 - w.c0;
 
-function emptySamples(window: Window, relief: boolean): { -readonly [K in keyof Samples]: Samples[K] } {
-  const n = rowsOf(window) * colsOf(window);
+function emptySamples(area: Area, relief: boolean): Out {
+  const n = rowsOf(area) * colsOf(area);
   const made = (wanted: boolean): Float64Array => (wanted ? new Float64Array(n) : NONE);
   return {
-    window,
+    area,
     guide: made(true),
     d: made(true),
     h: made(true),
@@ -90,6 +91,7 @@ function emptySamples(window: Window, relief: boolean): { -readonly [K in keyof 
     forest: made(!relief),
     foam: made(!relief),
     sigma: 0,
+    exponent: SYNTH_H_RANGE_TO,
   };
 }
 
@@ -108,7 +110,7 @@ const SECOND: Taps = { even: [1, -2, 1], odd: [1 / 2, -1 / 2, -1 / 2, 1 / 2] };
 /** Interpolating subdivision (Deslauriers and Dubuc): it keeps the parent's samples. */
 const FOUR_POINT: Taps = { even: [0, 1, 0], odd: [-1 / 16, 9 / 16, 9 / 16, -1 / 16] };
 
-/** A parent's window and its child's, as the passes read them. */
+/** A parent's area and its child's, as the passes read them. */
 interface Step {
   readonly rows: number;
   readonly cols: number;
@@ -121,7 +123,7 @@ interface Step {
   readonly parentCols: number;
 }
 
-function stepOf(parent: Window, child: Window): Step {
+function stepOf(parent: Area, child: Area): Step {
   return {
     rows: rowsOf(child),
     cols: colsOf(child),
@@ -191,12 +193,20 @@ function upsampled(z: Float64Array, taps: Taps, step: Step, out: Float64Array): 
   return alongY(alongX(z, taps, step, scratch.get(0, step.parentRows * step.cols)), taps, step, out);
 }
 
-/** Heights that were not solved, as float32 holds them: 4-point, or cubic B-spline for the base of rule `smooth`. */
-export function interpolated(z: Float64Array, parent: Window, child: Window, spline = false): Float64Array {
+/**
+ * Heights that were not solved, rounded to float32 along each axis: 4-point, or cubic B-spline for the base of rule
+ * `smooth`.
+ */
+export function interpolated(z: Float64Array, parent: Area, child: Area, spline = false): Float64Array {
   const step = stepOf(parent, child);
-  const out = upsampled(z, spline ? B_SPLINE : FOUR_POINT, step, new Float64Array(step.rows * step.cols));
-  for (let k = 0; k < out.length; k += 1) out[k] = Math.fround(out[k]!);
-  return out;
+  const taps = spline ? B_SPLINE : FOUR_POINT;
+  const columns = rounded(alongX(z, taps, step, scratch.get(0, step.parentRows * step.cols)));
+  return rounded(alongY(columns, taps, step, new Float64Array(step.rows * step.cols)));
+}
+
+function rounded(z: Float64Array): Float64Array {
+  for (let k = 0; k < z.length; k += 1) z[k] = Math.fround(z[k]!);
+  return z;
 }
 
 /** The parent's ground at the child's samples. The arrays are scratch: the next step writes over them. */
@@ -229,18 +239,18 @@ function groundOf(parent: Samples, step: Step): GroundArrays {
 }
 
 /**
- * The samples of a window of the next level. `parent` must hold `parentWindow(window)` as far as stencils reach;
+ * The samples of an area of the next level. `parent` must hold `parentArea(area)` as far as stencils reach;
  * `relief` leaves the channels out that no height depends on.
  */
-export function subdivide(parent: Samples, window: Window, recipe: Recipe, relief: boolean): Samples {
-  const step = stepOf(parent.window, window);
-  const out = emptySamples(window, relief);
-  if (!recipe.guide(window, out.guide)) out.guide = interpolated(parent.guide, parent.window, window);
+export function subdivide(parent: Samples, area: Area, recipe: Recipe, relief: boolean): Samples {
+  const step = stepOf(parent.area, area);
+  const out = emptySamples(area, relief);
+  if (!recipe.guide(area, out.guide)) out.guide = interpolated(parent.guide, parent.area, area);
   for (const name of ["d", "h", "snow", "wet", "grass", "forest", "foam"] as const)
     if (parent[name].length > 0 && out[name].length > 0) upsampled(parent[name], B_SPLINE, step, out[name]);
   const ground = groundOf(parent, step);
-  const spacing = recipe.site.sizeM / (TILE_CELLS * 2 ** parent.window.level);
-  out.sigma = applyRule(recipe, window, relief, out, (k) => {
+  const spacing = recipe.site.sizeM / (TILE_CELLS * 2 ** parent.area.level);
+  applyRule(recipe, area, relief, out, (k) => {
     sample.height = ground.height[k]!;
     sample.slopeX = ground.slopeX[k]! / spacing;
     sample.slopeY = ground.slopeY[k]! / spacing;
@@ -254,25 +264,25 @@ export function subdivide(parent: Samples, window: Window, recipe: Recipe, relie
  * Level 0: the rule on the guide itself, whose missing parent is replaced by constants and targets. Derivatives end at
  * the domain's border, where indices are clamped. Null while level 0 is not held.
  */
-export function root(window: Window, recipe: Recipe, relief: boolean): Samples | null {
+export function root(area: Area, recipe: Recipe, relief: boolean): Samples | null {
   const inside = (i: number): number => clamp(i, -BORDER, TILE_CELLS + BORDER);
-  const near: Window = {
+  const near: Area = {
     level: 0,
-    r0: inside(window.r0 - 1),
-    r1: inside(window.r1) + 1,
-    c0: inside(window.c0 - 1),
-    c1: inside(window.c1) + 1,
+    r0: inside(area.r0 - 1),
+    r1: inside(area.r1) + 1,
+    c0: inside(area.c0 - 1),
+    c1: inside(area.c1) + 1,
   };
   const width = colsOf(near);
   const z = new Float64Array(rowsOf(near) * width);
   if (!recipe.guide(near, z)) return null;
   const at = (j: number, i: number): number => z[(inside(j) - near.r0) * width + inside(i) - near.c0]!;
   const spacing = recipe.site.sizeM / TILE_CELLS;
-  const out = emptySamples(window, relief);
-  const cols = colsOf(window);
-  out.sigma = applyRule(recipe, window, relief, out, (k) => {
-    const j = window.r0 + Math.floor(k / cols);
-    const i = window.c0 + (k % cols);
+  const out = emptySamples(area, relief);
+  const cols = colsOf(area);
+  applyRule(recipe, area, relief, out, (k) => {
+    const j = area.r0 + Math.floor(k / cols);
+    const i = area.c0 + (k % cols);
     const here = at(j, i);
     out.guide[k] = here;
     sample.height = here;
@@ -296,31 +306,30 @@ export function root(window: Window, recipe: Recipe, relief: boolean): Samples |
   return out;
 }
 
-type Out = Pick<Samples, "d" | "h" | "snow" | "wet" | "grass" | "forest" | "foam">;
+type Out = { -readonly [K in keyof Samples]: Samples[K] };
 
 /**
- * Runs the rule on each sample of a window: `out` holds the parent's state there and then the new one as stored, `place`
- * fills in the ground (and at the root the state). The greatest sigma.
+ * Runs the rule on each sample of an area: `out` holds the parent's state there and then the new one as stored, `place`
+ * fills in the ground (and at the root the state).
  */
-function applyRule(recipe: Recipe, window: Window, relief: boolean, out: Out, place: (k: number) => void): number {
+function applyRule(recipe: Recipe, area: Area, relief: boolean, out: Out, place: (k: number) => void): void {
   const { site, rule, biases } = recipe;
-  const streams = [0, 1, 2, 3].map((stream) => streamStart(site.seed, window.level, stream));
-  const cols = colsOf(window);
-  let greatest = 0;
-  sample.level = window.level;
-  for (let j = window.r0, k = 0; j < window.r1; j += 1) {
+  const streams = [0, 1, 2, 3].map((stream) => streamStart(site.seed, area.level, stream));
+  const cols = colsOf(area);
+  sample.level = area.level;
+  for (let j = area.r0, k = 0; j < area.r1; j += 1) {
     const starts = streams.map((stream) => rowStart(stream, j));
-    for (let i = window.c0; i < window.c0 + cols; i += 1, k += 1) {
+    for (let i = area.c0; i < area.c0 + cols; i += 1, k += 1) {
       load(out, k, relief);
       place(k);
-      biases.at(window.level, j, i, relief, sample);
+      biases.at(area.level, j, i, relief, sample);
       noiseAt(starts, i, relief);
       rule(site, sample, relief);
       store(out, k, relief);
-      if (sample.sigma > greatest) greatest = sample.sigma;
+      out.sigma = Math.max(out.sigma, sample.sigma);
+      out.exponent = Math.min(out.exponent, sample.exponent);
     }
   }
-  return greatest;
 }
 
 function noiseAt(starts: readonly number[], i: number, relief: boolean): void {
@@ -359,10 +368,10 @@ function store(to: Out, k: number, relief: boolean): void {
   to.foam[k] = unorm16(sample.foam);
 }
 
-/** The samples of a window of any level, through windows of all levels above it, at what the window costs. */
-export function detailOf(window: Window, recipe: Recipe, relief: boolean): Samples | null {
-  const chain = [window];
-  while (chain[0]!.level > 0) chain.unshift(parentWindow(chain[0]!));
+/** The samples of an area of any level, through windows of all levels above it, at what the area costs. */
+export function detailOf(area: Area, recipe: Recipe, relief: boolean): Samples | null {
+  const chain = [area];
+  while (chain[0]!.level > 0) chain.unshift(parentArea(chain[0]!));
   let samples = root(chain[0]!, recipe, relief);
   for (const next of chain.slice(1)) if (samples !== null) samples = subdivide(samples, next, recipe, relief);
   return samples;

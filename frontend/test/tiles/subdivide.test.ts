@@ -1,10 +1,10 @@
-/** SPEC T21: the page's twin of the synthesis against the vectors of all languages. */
+/** SPEC T33: the page's twin of the synthesis against the vectors of all languages. */
 
 import { describe, expect, test } from "vitest";
 import { TILE_CELLS } from "../../src/generated/contract.ts";
 import { hashAt, rowStart, streamStart } from "../../src/tiles/noise.ts";
 import { detailOf, interpolated, type Samples, subdivide } from "../../src/tiles/subdivide.ts";
-import { recipeOf, samplesOf, unpacked, vectors, windowOf } from "./synthesis.ts";
+import { areaOf, recipeOf, samplesOf, unpacked, vectors } from "./synthesis.ts";
 
 /** Settings have no cyclic domains, so the page knows bounded ones only. */
 const sites = new Map(
@@ -41,7 +41,7 @@ describe.each([false, true])("with the relief alone: %s", (relief) => {
       const site = sites.get(step.site);
       if (site === undefined) continue;
       const parent = samplesOf(step.level - 1, step.parent);
-      const found = subdivide(parent, windowOf(step.level, step.window), site.recipe, relief);
+      const found = subdivide(parent, areaOf(step.level, step.window), site.recipe, relief);
       compare(found, step.guide, step.state, site.sizeM / (TILE_CELLS * 2 ** step.level), relief);
       compared += 1;
     }
@@ -53,7 +53,7 @@ describe.each([false, true])("with the relief alone: %s", (relief) => {
     for (const place of vectors.places) {
       const site = sites.get(place.site);
       if (site === undefined) continue;
-      const found = detailOf(windowOf(place.level, place.window), site.recipe, relief)!;
+      const found = detailOf(areaOf(place.level, place.window), site.recipe, relief)!;
       compare(found, place.guide, place.state, site.sizeM / (TILE_CELLS * 2 ** place.level), relief);
       compared += 1;
     }
@@ -63,9 +63,9 @@ describe.each([false, true])("with the relief alone: %s", (relief) => {
 
 describe("ground that was never solved", () => {
   test("keeps the parent's samples by the 4-point rule, and is a B-spline by the rule `smooth`", () => {
-    const parent = windowOf(3, [0, 6, 0, 6]);
+    const parent = areaOf(3, [0, 6, 0, 6]);
     const z = Float64Array.from({ length: 36 }, (_, k) => (k % 6) ** 2);
-    const child = windowOf(4, [4, 5, 4, 7]);
+    const child = areaOf(4, [4, 5, 4, 7]);
     expect([...interpolated(z, parent, child)]).toEqual([4, 6.25, 9]);
     expect([...interpolated(z, parent, child, true)]).toEqual([4.25, 6.5, 9.25]);
   });

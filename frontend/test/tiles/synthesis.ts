@@ -6,9 +6,9 @@ import type { ChannelGrid, ChannelView } from "../../src/core/types.ts";
 import type { Look, Rule } from "../../src/generated/contract.ts";
 import { QUANTA_PER_CELL, TILE_CELLS } from "../../src/generated/contract.ts";
 import { Biases } from "../../src/tiles/biases.ts";
-import { fillWindow } from "../../src/tiles/guide.ts";
+import { fillArea } from "../../src/tiles/guide.ts";
 import { siteOf } from "../../src/tiles/rules/rule.ts";
-import { type Recipe, RULES, type Samples, type Window } from "../../src/tiles/subdivide.ts";
+import { type Area, type Recipe, RULES, type Samples } from "../../src/tiles/subdivide.ts";
 
 export interface SiteVector {
   readonly name: string;
@@ -78,12 +78,11 @@ export function recipeOf(site: SiteVector): Recipe {
     site: siteOf(site),
     rule: RULES[site.rule],
     biases: new Biases(channelsOf(site.channels)),
-    guide: (window, out) =>
-      fillWindow((level, j, i) => heights[level]?.[j * (TILE_CELLS * 2 ** level + 1) + i], window, out),
+    guide: (area, out) => fillArea((level, j, i) => heights[level]?.[j * (TILE_CELLS * 2 ** level + 1) + i], area, out),
   };
 }
 
-export function windowOf(level: number, [r0, r1, c0, c1]: Corners): Window {
+export function areaOf(level: number, [r0, r1, c0, c1]: Corners): Area {
   return { level, r0, r1, c0, c1 };
 }
 
@@ -116,9 +115,10 @@ export function unpacked(
 /** The samples that a parent's vector gives. */
 export function samplesOf(level: number, given: StepVector["parent"]): Samples {
   return {
-    window: windowOf(level, given.window),
+    area: areaOf(level, given.window),
     guide: Float64Array.from(given.guide, Math.fround),
     ...unpacked(given.state),
     sigma: 0,
+    exponent: 1,
   };
 }

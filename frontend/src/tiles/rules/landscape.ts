@@ -60,8 +60,9 @@ export function landscape(site: Site, at: Sample, relief: boolean): void {
     at.foam = mixed(at.foam, wanted.foam, strength * at.noiseFoam, tied);
   }
   const exponent = at.h + SYNTH_ROUGHNESS_TO_H * (BASE_ROUGHNESS - at.roughness) + SYNTH_SNOW_TO_H * at.snow;
+  at.exponent = clamp(exponent, SYNTH_H_RANGE_FROM, SYNTH_H_RANGE_TO);
   const size = amplitude(site, at.guideSlope, at.amplitude);
-  at.sigma = size === 0 ? 0 : size * 2 ** (-at.level * clamp(exponent, SYNTH_H_RANGE_FROM, SYNTH_H_RANGE_TO));
+  at.sigma = size === 0 ? 0 : size * 2 ** (-at.level * at.exponent);
   at.d += at.sigma * at.noiseD;
 }
 

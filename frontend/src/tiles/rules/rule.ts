@@ -35,7 +35,7 @@ export function siteOf(settings: RuleSettings): Site {
   };
 }
 
-/** A sample between its parent and its rule. The rule reads all and overwrites `d` to `foam`, and `sigma`. */
+/** A sample between its parent and its rule. The rule reads all and overwrites `d` to `exponent`. */
 export interface Sample {
   level: number;
   /** The parent's ground with its detail, metres, its slopes, its concavity -1..1, and the slope of the guide alone. */
@@ -67,8 +67,9 @@ export interface Sample {
   grass: number;
   forest: number;
   foam: number;
-  /** The most that this level added to or took from the detail, metres. */
+  /** The most that this level could add to or take from the detail, metres, and how fast that falls: 2^-exponent a level. */
   sigma: number;
+  exponent: number;
 }
 
 export function newSample(): Sample {
@@ -100,6 +101,7 @@ export function newSample(): Sample {
     forest: 0,
     foam: 0,
     sigma: 0,
+    exponent: 1,
   };
 }
 

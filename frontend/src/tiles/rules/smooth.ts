@@ -21,4 +21,5 @@ export function smooth(site: Site, at: Sample, relief: boolean): void {
   }
   at.d = 0;
   at.sigma = 0;
+  at.exponent = 1;
 }
