@@ -11,7 +11,7 @@ fn contours(height: f32, rate: f32) -> f32 {
 
 // Contours in ink: brown on the paper model, else the ground's own colour, darker.
 fn inked(colour: vec3f, cover: f32) -> vec3f {
-  let ink = select(colour * 0.22, colour * vec3f(0.34, 0.23, 0.15), view.look == LOOK_PAPER);
+  let ink = select(colour * 0.22, colour * vec3f(0.42, 0.27, 0.17), view.look == LOOK_PAPER);
   return mix(colour, ink, cover);
 }
 

@@ -2,7 +2,7 @@
 
 fn paper_backdrop(dir: vec3f) -> vec3f {
   let t = clamp(dir.z * 0.8 + 0.35, 0.0, 1.0);
-  return mix(vec3f(0.66, 0.60, 0.50), vec3f(0.84, 0.80, 0.72), t);
+  return mix(vec3f(0.50, 0.455, 0.385), vec3f(0.70, 0.665, 0.61), t);
 }
 
 fn sky_colour(dir: vec3f) -> vec3f {
@@ -25,7 +25,7 @@ fn sun_light() -> vec3f {
 
 // Diffuse light of sky and far ground on a surface with this normal (irradiance / pi).
 fn ambient_light(n: vec3f) -> vec3f {
-  if (view.look == LOOK_PAPER) { return mix(vec3f(0.20, 0.19, 0.18), vec3f(0.40, 0.41, 0.43), n.z * 0.5 + 0.5); }
+  if (view.look == LOOK_PAPER) { return mix(vec3f(0.16, 0.15, 0.14), vec3f(0.30, 0.315, 0.34), n.z * 0.5 + 0.5); }
   let q = n * n;
   let x = select(skylight[0].rgb, skylight[1].rgb, n.x < 0.0);
   let y = select(skylight[2].rgb, skylight[3].rgb, n.y < 0.0);

@@ -54,7 +54,8 @@ fn wall_fragment(v: WallVertex) -> @location(0) vec4f {
   colour *= 0.80 + 0.30 * fine.g + 0.18 * smoothstep(0.0, 0.12, bed) * smoothstep(1.0, 0.8, bed);
   if (view.look == LOOK_DESERT) { colour = mix(vec3f(0.36, 0.165, 0.090), vec3f(0.56, 0.36, 0.21), shade) * (0.8 + 0.4 * fine.g); }
   if (view.look == LOOK_ALPINE) { colour = mix(vec3f(0.16, 0.16, 0.17), vec3f(0.27, 0.265, 0.265), shade) * (0.8 + 0.4 * fine.g); }
-  if (view.look == LOOK_PAPER) { colour = mix(vec3f(0.66, 0.60, 0.50), vec3f(0.73, 0.68, 0.58), f32(i32(floor(depth / view.contour)) & 1)); }
+  // Sheets of card, cut level.
+  if (view.look == LOOK_PAPER) { colour = mix(vec3f(0.62, 0.55, 0.44), vec3f(0.76, 0.69, 0.56), smoothstep(0.0, 0.25, fract(v.world.z / view.contour)) * smoothstep(1.0, 0.8, fract(v.world.z / view.contour))); }
   // Topsoil.
   let soil = 1.0 - smoothstep(5.0, 8.0, depth / unit + (fine.r - 0.5) * 5.0);
   if (view.look != LOOK_PAPER) { colour = mix(colour, vec3f(0.070, 0.048, 0.030), soil * 0.8); }

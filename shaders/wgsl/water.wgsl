@@ -4,8 +4,8 @@
 // the last hand's breadth of water blends with the ground.
 
 // Absorption per metre of clear water, and what it scatters back.
-const WATER_ABSORB: vec3f = vec3f(0.300, 0.098, 0.078);
-const WATER_SCATTER: vec3f = vec3f(0.0055, 0.036, 0.050);
+const WATER_ABSORB: vec3f = vec3f(0.210, 0.058, 0.046);
+const WATER_SCATTER: vec3f = vec3f(0.008, 0.064, 0.080);
 const WATER_INDEX: f32 = 1.33;
 
 // The root tile is the first to enter the atlas and never leaves.
