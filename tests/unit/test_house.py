@@ -26,7 +26,7 @@ LAYERS: tuple[frozenset[str], ...] = (
     frozenset({"solve", "tiles", "store", "settings", "synthesis"}),
     frozenset({"session", "terrain"}),
     frozenset({"ground", "link"}),
-    frozenset({"client", "tls", "headers", "upload"}),
+    frozenset({"client", "tls", "headers", "upload", "render"}),
     frozenset({"server"}),
     frozenset({"run"}),
     frozenset({"bench"}),

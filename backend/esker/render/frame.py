@@ -1,0 +1,139 @@
+"""What is drawn, and the uniform that all passes of a picture read (twin of frontend/src/gpu/frame.ts and looks.ts)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from esker.contract import MAX_SYNTHESIS_LEVEL, TILE_CELLS, TerrainSettings
+from esker.render.camera import Camera, Vec3, axes, eye_projection, part, reversed_depth
+
+Overlay = Literal["none", "contours", "slope", "patches", "detail"]
+Detail = Literal["rich", "plain"]
+OVERLAYS: Final[dict[str, int]] = {"none": 0, "contours": 1, "slope": 2, "patches": 3, "detail": 4}
+
+
+class LookFigures(NamedTuple):
+    """Of a look: number in view.wgsl, exposure, optical depth of the haze across the domain, strength of contours."""
+
+    index: int
+    exposure: float
+    haze: float
+    contours: float
+
+
+LOOKS: Final[dict[str, LookFigures]] = {
+    "natural": LookFigures(0, 1.3, 0.2, 0),
+    "alpine": LookFigures(1, 0.9, 0.2, 0),
+    "desert": LookFigures(2, 1.0, 0.2, 0),
+    "paper": LookFigures(3, 1.8, 0.06, 0.5),
+}
+
+
+@dataclass(frozen=True)
+class Scene:
+    """All that one picture shows. ``tau_px``: screen-error bound; ``time``: seconds, for waves."""
+
+    settings: TerrainSettings
+    camera: Camera
+    tau_px: float = 1.0
+    time: float = 12.0
+    overlay: Overlay = "none"
+
+
+class Rect(NamedTuple):
+    """Pixels of the picture that are drawn at a time; ``top`` counts from above."""
+
+    left: int
+    top: int
+    width: int
+    height: int
+
+
+def sun_direction(azimuth_deg: float, elevation_deg: float) -> Vec3:
+    """Unit vector towards the sun; azimuth clockwise from north."""
+    a, e = math.radians(azimuth_deg), math.radians(max(elevation_deg, 0.5))
+    return math.sin(a) * math.cos(e), math.cos(a) * math.cos(e), math.sin(e)
+
+
+def contour_interval(relief_m: float, wanted: float = 24) -> float:
+    """A round interval (1, 2 or 5 times a power of ten) that gives about ``wanted`` lines over the relief."""
+    raw = max(relief_m, 1e-3) / wanted
+    power = 10.0 ** math.floor(math.log10(raw))
+    mantissa = raw / power
+    return power * (1 if mantissa <= 1 else 2 if mantissa <= 2 else 5 if mantissa <= 5 else 10)
+
+
+def base_height(low: float, size_m: float) -> float:
+    """Where the block's foot lies."""
+    step = size_m / 32
+    return math.floor((low - 0.02 * size_m) / step) * step
+
+
+def view_values(scene: Scene, rect: Rect, low: float, high: float, amplitude: float) -> dict[str, ArrayLike]:
+    """Fields of ``View`` (view.wgsl). ``low``, ``high``: of the whole ground, metres; ``amplitude``: metres that the
+    value 1 of the channel texture stands for."""
+    settings, camera = scene.settings, scene.camera
+    look, relief = LOOKS[settings.look], high - low
+    sun = sun_direction(settings.sun_azimuth_deg, settings.sun_elevation_deg)
+    exposure = _exposure(90 if settings.look == "paper" else settings.sun_elevation_deg)
+    return {
+        **_camera_values(camera, rect, settings.size_m),
+        "sun": [*sun, sun[2]],
+        "time": scene.time % 3600,
+        "size": settings.size_m,
+        "base": base_height(low, settings.size_m),
+        "sea": settings.sea_level_m or 0.0,
+        "has_sea": 0.0 if settings.sea_level_m is None else 1.0,
+        "exposure": look.exposure * exposure,
+        "haze": look.haze / settings.size_m,
+        "low": low,
+        "high": high,
+        "grid": 1 - _smoothstep(0.02, 0.1, relief / settings.size_m),
+        "contour": contour_interval(relief),
+        "contour_strength": look.contours if relief > 0 else 0.0,
+        "look": look.index,
+        "amplitude": amplitude,
+        "overlay": OVERLAYS[scene.overlay],
+    }
+
+
+def _camera_values(camera: Camera, rect: Rect, size_m: float) -> dict[str, ArrayLike]:
+    forward, right, up = axes(camera)
+    eye = np.array(camera.eye)
+    cell = size_m / (TILE_CELLS << MAX_SYNTHESIS_LEVEL)
+    whole = np.floor(eye[:2] / cell)
+    ortho, tan = camera.ortho_height_m > 0, camera.tangent
+    per_pixel = camera.ortho_height_m / camera.height if ortho else 2 * tan / camera.height
+    if not ortho:
+        # The rays of a part of the picture start from its middle.
+        x = 2 * (rect.left + rect.width / 2) / camera.width - 1
+        y = 1 - 2 * (rect.top + rect.height / 2) / camera.height
+        forward = forward + x * tan * camera.aspect * right + y * tan * up
+    matrix = part(reversed_depth(eye_projection(camera)), camera, *rect)
+    return {
+        "eye_proj": matrix.T,
+        "eye": [*eye, 1.0 if ortho else 0.0],
+        "eye_low": [*(eye - eye.astype(np.float32)), 0.0],
+        "eye_cell": whole,
+        "eye_part": eye[:2] - whole * cell,
+        "finest_cell": cell,
+        "right": [*right, tan * camera.aspect * rect.width / camera.width],
+        "up": [*up, tan * rect.height / camera.height],
+        "forward": [*forward, per_pixel],
+        "viewport": [camera.width, camera.height],
+    }
+
+
+def _exposure(elevation_deg: float) -> float:
+    """Opens up as the sun sinks, as an eye does."""
+    return 1 + 1.1 * (1 - _smoothstep(0, 32, elevation_deg))
+
+
+def _smoothstep(a: float, b: float, v: float) -> float:
+    t = min(1.0, max(0.0, (v - a) / (b - a)))
+    return t * t * (3 - 2 * t)

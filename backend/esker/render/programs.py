@@ -1,0 +1,139 @@
+"""Programs from WGSL entry points, and what they bind by the names of the WGSL variables."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Final
+
+import moderngl
+
+from esker.contract import PATCH_CELLS
+from esker.render.glsl_stage import FRAME, Bindings, Feed, functions, translate
+from esker.render.wgsl_tree import Module
+
+PITCH: Final = PATCH_CELLS + 1
+PATCHES_PER_DRAW: Final = 200
+"""Patches of 17 x 17 vertices: below the 65,536 that llvmpipe of Mesa 22 can take at once."""
+
+_RECORD_VERTEX: Final = """#version 430
+layout(location = 0) in uvec4 a_0;
+out uvec4 record_in;
+void main() { record_in = a_0; }
+"""
+# A patch has 16 segments a side; 8 where its neighbour is coarser, which leaves exactly the vertices that both have.
+_CONTROL: Final = """#version 430
+layout(vertices = 1) out;
+in uvec4 record_in[];
+patch out uvec4 record_out;
+{functions}
+void main() {{
+  uvec4 record = record_in[0];
+  record_out = record;
+  uint edges = patch_edges(record);
+  float full = {cells}.0;
+  gl_TessLevelOuter[0] = (edges & 1u) != 0u ? 0.5 * full : full;
+  gl_TessLevelOuter[1] = (edges & 4u) != 0u ? 0.5 * full : full;
+  gl_TessLevelOuter[2] = (edges & 2u) != 0u ? 0.5 * full : full;
+  gl_TessLevelOuter[3] = (edges & 8u) != 0u ? 0.5 * full : full;
+  gl_TessLevelInner[0] = full;
+  gl_TessLevelInner[1] = full;
+}}
+"""
+_EVALUATION: Final = Feed(
+    built_in={"vertex_index": f"(uint(grid_point().x) + {PITCH}u * uint(grid_point().y))"},
+    locations={0: "record_out"},
+    head=(
+        "layout(quads, equal_spacing, ccw) in;\npatch in uvec4 record_out;\n"
+        f"ivec2 grid_point() {{ return ivec2(gl_TessCoord.xy * {PATCH_CELLS}.0 + 0.5); }}"
+    ),
+)
+
+
+@dataclass
+class Resources:
+    """What programs may bind, by the names of WGSL variables."""
+
+    textures: dict[str, moderngl.Texture | moderngl.TextureArray] = field(default_factory=dict)
+    samplers: dict[str, moderngl.Sampler] = field(default_factory=dict)
+    buffers: dict[str, moderngl.Buffer] = field(default_factory=dict)
+    images: dict[str, moderngl.Texture | moderngl.TextureArray] = field(default_factory=dict)
+
+    def bind(self, bindings: Bindings) -> None:
+        """Binds all that a program needs. Raises KeyError for what is not there."""
+        for name, unit in bindings.uniforms.items():
+            self.buffers[name].bind_to_uniform_block(unit)
+        for name, unit in bindings.storage.items():
+            self.buffers[name].bind_to_storage_buffer(unit)
+        for name, unit in bindings.images.items():
+            self.images[name].bind_to_image(unit, read=False, write=True)
+        for (texture, sampler), unit in bindings.samplers.items():
+            self.textures[texture].use(unit)
+            # Samplers of texelFetch do not matter, but a unit keeps the one it had.
+            self.samplers[sampler or "nearest"].use(unit)
+
+
+class Draw:
+    """A pass that draws: vertex and fragment entry point, with tessellation between them for patches."""
+
+    def __init__(
+        self, context: moderngl.Context, module: Module, vertex: str, fragment: str, *, patches: bool, half_depth: bool
+    ) -> None:
+        self.bindings = Bindings()
+        feed = _EVALUATION if patches else None
+        constants = {"PITCH": PITCH} if "PITCH" in module.declarations else {}
+        shape = translate(module, vertex, self.bindings, constants=constants, feed=feed, half_depth=half_depth)
+        colour = translate(module, fragment, self.bindings, constants=constants)
+        if patches:
+            control = _CONTROL.format(functions=functions(module, "patch_edges"), cells=PATCH_CELLS)
+            self.program = context.program(
+                vertex_shader=_RECORD_VERTEX,
+                tess_control_shader=control,
+                tess_evaluation_shader=shape,
+                fragment_shader=colour,
+            )
+        else:
+            self.program = context.program(vertex_shader=shape, fragment_shader=colour)
+        self._patches = patches
+        self._context = context
+
+    def run(
+        self,
+        resources: Resources,
+        frame: tuple[float, float],
+        *,
+        records: moderngl.Buffer | None = None,
+        layout: str = "",
+        count: int,
+    ) -> None:
+        """Draws ``count`` patches of ``records``, or instances of them with ``layout`` (see ``walls``), or vertices."""
+        resources.bind(self.bindings)
+        if FRAME in self.program:
+            self.program[FRAME].value = frame  # type: ignore[union-attr]
+        if records is None:
+            self._context.vertex_array(self.program, []).render(moderngl.TRIANGLES, vertices=count)
+        elif self._patches:
+            self._context.patch_vertices = 1
+            array = self._context.vertex_array(self.program, [(records, "4u4", "a_0")])
+            for first in range(0, count, PATCHES_PER_DRAW):
+                array.render(moderngl.PATCHES, vertices=min(PATCHES_PER_DRAW, count - first), first=first)
+        else:
+            array = self._context.vertex_array(self.program, [(records, layout, "a_0", "a_1")])
+            array.render(moderngl.TRIANGLES, vertices=6 * PATCH_CELLS, instances=count)
+
+
+class Compute:
+    """A compute entry point."""
+
+    def __init__(
+        self, context: moderngl.Context, module: Module, entry: str, constants: Mapping[str, float] | None = None
+    ) -> None:
+        self.bindings = Bindings()
+        self.shader = context.compute_shader(translate(module, entry, self.bindings, constants=constants))
+        self._context = context
+
+    def run(self, resources: Resources, groups: tuple[int, int, int]) -> None:
+        """Runs work groups and waits for what they write to be seen."""
+        resources.bind(self.bindings)
+        self.shader.run(*groups)
+        self._context.memory_barrier()

@@ -1,0 +1,300 @@
+"""The reference renderer: one picture of a scene, by tessellation and the page's own shaders (DESIGN 9)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Final, NamedTuple
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from esker.contract import PATCH_CELLS, SUBPATCHES
+from esker.render import sources
+from esker.render.atlas import MAX_SLOTS, PLAIN_MARCH, Atlas
+from esker.render.device import depth_buffer, half_depth, open_context
+from esker.render.frame import Detail, Rect, Scene, sun_direction, view_values
+from esker.render.layout import StructLayout
+from esker.render.programs import Compute, Draw, Resources
+from esker.render.select import Cut, choose
+from esker.render.surface import Surface
+from esker.render.tables import noise_mipmaps
+
+Pixels = NDArray[np.uint8]
+
+LARGEST_PART: Final = 2048
+"""Pixels along a side that are drawn at once; larger pictures are put together."""
+SAMPLES: Final = 4
+ANISOTROPY: Final = 8.0
+COARSER: Final = 1.25
+"""Factor on the screen error while a picture would need more tiles than the atlas holds."""
+
+
+class Channels(NamedTuple):
+    """What strokes ask of the detail: (n, n) grids over the domain. ``amplitude``: metres; ``roughness``: 0..1."""
+
+    amplitude: NDArray[np.float32]
+    roughness: NDArray[np.float32]
+
+
+PLAIN_CHANNELS: Final = Channels(np.zeros((2, 2), dtype=np.float32), np.full((2, 2), 0.5, dtype=np.float32))
+
+
+@dataclass(frozen=True)
+class Picture:
+    """``pixels``: (height, width, 3), row 0 above. ``tau_px``: the screen error that was kept; ``patches``: drawn."""
+
+    pixels: Pixels
+    tau_px: float
+    patches: int
+
+
+class Reference:
+    """Draws pictures one after the other. Not for several threads: a context belongs to the one that made it."""
+
+    def __init__(self, detail: Detail = "rich", *, clear: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> None:
+        """``detail``: "plain" draws what the page draws on adapters that are no GPU. ``clear``: what shows where
+        nothing is drawn. Raises device.NoGraphics."""
+        self.context = open_context()
+        self._half_depth = half_depth(self.context)
+        self._detail: Detail = detail
+        self._clear = clear
+        march = PLAIN_MARCH if detail == "plain" else {}
+        self._normals = Compute(self.context, sources.normals(), "compute_normals")
+        self._sun = Compute(self.context, sources.sun(), "compute_sun", march)
+        self._sky = [Compute(self.context, sources.sky(), entry) for entry in ("bake_sky", "bake_ambient")]
+        self._draws: dict[tuple[str, str], Draw] = {}
+        self._fixed = self._samplers()
+        self._noise = self._noise_texture()
+
+    @property
+    def device(self) -> str:
+        """What draws, in words."""
+        return str(self.context.info["GL_RENDERER"])
+
+    def draw(
+        self,
+        surface: Surface,
+        scene: Scene,
+        channels: Channels = PLAIN_CHANNELS,
+        progress: Callable[[float], None] | None = None,
+        *,
+        bare: bool = False,
+    ) -> Picture:
+        """The picture of a scene. ``progress`` is told the share that is done; ``bare``: only the ground is drawn."""
+        cut, tau = self._cut(surface, scene)
+        low, high, _ = surface.bounds(0, np.array([(x, y) for x in range(SUBPATCHES) for y in range(SUBPATCHES)]))
+        lowest, highest = float(low.min()), float(high.max())
+        atlas = Atlas(self.context, cut.tiles(), surface)
+        settings = scene.settings
+        sun = sun_direction(settings.sun_azimuth_deg, settings.sun_elevation_deg)
+        atlas.compute(self._normals, self._sun, settings.size_m, highest, sun)
+        resources, amplitude = self._resources(atlas, scene, channels)
+        records = _Records(self.context, cut, atlas)
+        out = np.empty((scene.camera.height, scene.camera.width, 3), dtype=np.uint8)
+        parts = _parts(scene.camera.width, scene.camera.height)
+        for done, rect in enumerate(parts):
+            if progress is not None:
+                progress(done / len(parts))
+            values = view_values(scene, rect, lowest, highest, amplitude)
+            view = StructLayout(sources.background(self._detail), "View").pack(values)
+            resources.buffers["view"] = self.context.buffer(view)
+            out[rect.top : rect.top + rect.height, rect.left : rect.left + rect.width] = self._part(
+                rect, scene, resources, records, bare=bare
+            )
+        atlas.release()
+        if progress is not None:
+            progress(1.0)
+        return Picture(out, tau, len(cut.level))
+
+    def _cut(self, surface: Surface, scene: Scene) -> tuple[Cut, float]:
+        tau = scene.tau_px
+        while True:
+            cut = choose(surface, scene.camera, tau, scene.settings.sea_level_m)
+            if len(cut.tiles()) <= MAX_SLOTS:
+                return cut, tau
+            tau *= COARSER
+
+    # --- what shaders read
+
+    def _samplers(self) -> dict[str, moderngl.Sampler]:
+        linear = (moderngl.LINEAR, moderngl.LINEAR)
+        plain = self._detail == "plain"
+        mips = (moderngl.LINEAR_MIPMAP_NEAREST if plain else moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
+        return {
+            "nearest": self.context.sampler(
+                repeat_x=False, repeat_y=False, filter=(moderngl.NEAREST, moderngl.NEAREST)
+            ),
+            "smooth_clamp": self.context.sampler(repeat_x=False, repeat_y=False, filter=linear),
+            "smooth_repeat": self.context.sampler(filter=mips, anisotropy=1.0 if plain else ANISOTROPY),
+        }
+
+    def _noise_texture(self) -> moderngl.Texture:
+        levels = noise_mipmaps()
+        texture = self.context.texture((len(levels[0]),) * 2, 4, levels[0].tobytes())
+        texture.build_mipmaps(0, len(levels) - 1)
+        for level, data in enumerate(levels):
+            texture.write(data.tobytes(), level=level, alignment=1)
+        return texture
+
+    def _resources(self, atlas: Atlas, scene: Scene, channels: Channels) -> tuple[Resources, float]:
+        """All that passes bind but the view, and the amplitude that the channel texture's 1 stands for."""
+        radiance, ambient = self._bake(scene)
+        texels, amplitude = channel_texels(channels)
+        grid = self.context.texture((texels.shape[1], texels.shape[0]), 2, texels.tobytes(), alignment=1)
+        textures: dict[str, moderngl.Texture | moderngl.TextureArray] = {
+            **atlas.textures,
+            "sky_lut": radiance,
+            "noise": self._noise,
+            "channels": grid,
+        }
+        return Resources(textures, self._fixed, {"skylight": ambient}), amplitude
+
+    def _bake(self, scene: Scene) -> tuple[moderngl.Texture, moderngl.Buffer]:
+        module = sources.sky()
+        width, height = (sources.number(module, name) for name in ("SKY_WIDTH", "SKY_HEIGHT"))
+        radiance = self.context.texture((width, height), 4, dtype="f2")
+        radiance.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        ambient = self.context.buffer(reserve=8 * 16)
+        settings = scene.settings
+        sun = np.array([*sun_direction(settings.sun_azimuth_deg, settings.sun_elevation_deg), 0.0], dtype="<f4")
+        buffers = {"job": self.context.buffer(sun.tobytes()), "ambient_out": ambient}
+        resources = Resources({"sky_in": radiance}, self._fixed, buffers, {"sky_out": radiance})
+        self._sky[0].run(resources, (-(-width // 8), -(-height // 8), 1))
+        self._sky[1].run(resources, (1, 1, 1))
+        return radiance, ambient
+
+    # --- passes
+
+    def _pass(self, name: str, look: str) -> Draw:
+        """The program of a pass, made at its first use."""
+        key = (name, look if name == "terrain" else "")
+        if key not in self._draws:
+            if name == "terrain":
+                module = sources.terrain(look, self._detail)
+            else:
+                module = sources.wall(self._detail) if name == "wall" else sources.background(self._detail)
+            self._draws[key] = Draw(
+                self.context,
+                module,
+                f"{name}_vertex",
+                f"{name}_fragment",
+                patches=name in ("terrain", "water"),
+                half_depth=self._half_depth,
+            )
+        return self._draws[key]
+
+    def _part(self, rect: Rect, scene: Scene, resources: Resources, records: _Records, *, bare: bool) -> Pixels:
+        """The pixels of one part of the picture."""
+        context, size = self.context, (rect.width, rect.height)
+        samples = 0 if self._detail == "plain" else SAMPLES
+        colour = context.renderbuffer(size, 4, samples=samples)
+        target = context.framebuffer([colour], depth_buffer(context, *size, samples))
+        target.use()
+        context.enable_only(moderngl.DEPTH_TEST)
+        target.clear(*self._clear, 1.0, depth=0.0 if self._half_depth else 0.5)
+        self._passes(target, rect, scene, resources, records, bare=bare)
+        result = target
+        if samples:
+            result = context.framebuffer([context.renderbuffer(size, 4)])
+            context.copy_framebuffer(result, target)
+        pixels = np.frombuffer(result.read(components=3, alignment=1), dtype=np.uint8).reshape(
+            rect.height, rect.width, 3
+        )
+        return pixels[::-1]
+
+    def _passes(
+        self,
+        target: moderngl.Framebuffer,
+        rect: Rect,
+        scene: Scene,
+        resources: Resources,
+        records: _Records,
+        *,
+        bare: bool,
+    ) -> None:
+        """The page's order: ground, walls, open sea, sky, sea over the ground (frontend/src/gpu/renderer.ts)."""
+        look = scene.settings.look
+        sea = scene.settings.sea_level_m is not None
+        frame = (float(rect.left), float(rect.top + rect.height))
+
+        def run(
+            name: str, records: moderngl.Buffer | None, count: int, *, test: str = ">", writes: bool = True
+        ) -> None:
+            if count == 0:
+                return
+            self.context.depth_func = test
+            target.depth_mask = writes
+            self._pass(name, look).run(resources, frame, records=records, layout="4u4 1u4 /i", count=count)
+
+        run("terrain", records.all, records.count)
+        if bare:
+            return
+        run("wall", records.walls, records.wall_count)
+        if sea:
+            run("open_sea", None, 24)
+        run("background", None, 3, test=">=", writes=False)
+        if sea:
+            self.context.enable(moderngl.BLEND)
+            over = (moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA)
+            self.context.blend_func = (*over, moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA)
+            run("water", records.wet, records.wet_count, writes=False)
+            self.context.disable(moderngl.BLEND)
+        target.depth_mask = True
+
+
+class _Records:
+    """The cut on the device; see patch.wgsl for what the words are."""
+
+    def __init__(self, context: moderngl.Context, cut: Cut, atlas: Atlas) -> None:
+        words = _words(cut, atlas)
+        sides = [(i, bit) for i, border in enumerate(cut.border.tolist()) for bit in (1, 2, 4, 8) if border & bit]
+        walls = np.array([[*words[i], bit] for i, bit in sides], dtype=np.uint32).reshape(-1, 5)
+        wet = words[cut.wet]
+        self.count, self.wall_count, self.wet_count = len(words), len(walls), len(wet)
+        self.all, self.walls, self.wet = (_buffer(context, data) for data in (words, walls, wet))
+
+
+def _buffer(context: moderngl.Context, data: NDArray[np.uint32]) -> moderngl.Buffer:
+    return context.buffer(np.ascontiguousarray(data).tobytes() or bytes(16))
+
+
+def _words(cut: Cut, atlas: Atlas) -> NDArray[np.uint32]:
+    """Patch records: (n, 4). Column, edge bits; row, level; own and parent's slot; four corner weights."""
+    own, parent = [], []
+    for level, (px, py) in zip(cut.level.tolist(), cut.nodes.tolist(), strict=True):
+        x, y = px // SUBPATCHES, py // SUBPATCHES
+        own.append(atlas.slots[level, x, y])
+        parent.append(atlas.slots[level - 1, x >> 1, y >> 1] if level else own[-1])
+    corner = cut.nodes * PATCH_CELLS
+    out = np.empty((len(cut.level), 4), dtype=np.uint32)
+    out[:, 0] = corner[:, 0] | cut.edges << 24 | cut.border << 28
+    out[:, 1] = corner[:, 1] | cut.level << 24 | cut.wet.astype(np.int64) << 29
+    out[:, 2] = np.array(own) | np.array(parent) << 16
+    out[:, 3] = np.ascontiguousarray(cut.corners).view("<u4")[:, 0]
+    return out
+
+
+def channel_texels(channels: Channels) -> tuple[Pixels, float]:
+    """(side, side, 2) bytes, amplitude in parts of its greatest value, and that value (gpu/channeltexture.ts)."""
+    side = max(len(channels.amplitude), len(channels.roughness))
+    grids = []
+    for values in channels:
+        at = np.floor(np.arange(side) * ((len(values) - 1) / (side - 1)) + 0.5).astype(np.int64)
+        grids.append(values[np.ix_(at, at)].astype(np.float64))
+    full = max(float(channels.amplitude.max()), 1e-3)
+    parts = (np.maximum(grids[0], 0) / full, np.clip(grids[1], 0, 1))
+    return np.floor(np.stack(parts, axis=-1) * 255 + 0.5).astype(np.uint8), full
+
+
+def _parts(width: int, height: int) -> list[Rect]:
+    """Rectangles that cover a picture, their corners on even pixels: derivatives are taken over squares of two."""
+    rows, cols = (range(0, n, LARGEST_PART) for n in (height, width))
+    return [Rect(x, y, min(LARGEST_PART, width - x), min(LARGEST_PART, height - y)) for y in rows for x in cols]
+
+
+def with_sun(scene: Scene, azimuth_deg: float, elevation_deg: float) -> Scene:
+    """The scene under another sun."""
+    change = {"sun_azimuth_deg": azimuth_deg % 360, "sun_elevation_deg": elevation_deg}
+    return replace(scene, settings=scene.settings.model_copy(update=change))

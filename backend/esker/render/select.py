@@ -1,0 +1,234 @@
+"""Which 16-cell patches are drawn: the rule of the page's selection (frontend/src/tiles/selection.ts) on arrays.
+
+A patch is split while it commits more than ``tau`` pixels of error; then neighbours, across corners too, are split
+until they differ by at most one level. Each corner of a drawn patch gets a morph weight that belongs to its point: 1
+where a coarser patch meets it, 0 where a finer one does, else the greatest wish of the patches there
+(docs/renderer.md).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from esker.contract import PATCH_CELLS, QUANTA_PER_CELL, SUBPATCHES
+from esker.render.camera import Camera, eye_projection
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Node = tuple[int, int]
+Split = list[dict[Node, float]]
+"""Per level: column and row of each split patch, and its screen error in taus (0: split for its neighbours' sake)."""
+
+SMALLEST_CELL: Final = 1.0
+SHADING_ERROR: Final = 1.5 / QUANTA_PER_CELL
+SHADING_CELL_PX: Final = 5.0
+WEST, EAST, SOUTH, NORTH = 1, 2, 4, 8
+
+
+class Figures(Protocol):
+    """What the selection asks of the ground."""
+
+    @property
+    def size_m(self) -> float:
+        """Side of the domain, metres."""
+
+    @property
+    def levels(self) -> int:
+        """Finest level that can be drawn."""
+
+    def bounds(self, level: int, nodes: Ints) -> tuple[Floats, Floats, Floats]:
+        """Of (n, 2) patches (column, row): lowest and highest ground of them and all below, and the largest distance,
+        metres, between a patch as drawn and what is below it (0: nothing is)."""
+
+
+@dataclass(frozen=True)
+class Cut:
+    """Drawn patches. ``nodes``: (n, 2) column and row on ``level``; ``edges``: bits of the sides with a coarser
+    neighbour, ``border``: of those on the domain's border; ``corners``: (n, 4) weights, south-west, south-east,
+    north-west, north-east, as unorm8; ``wet``: some of it lies below the sea."""
+
+    level: Ints
+    nodes: Ints
+    edges: Ints
+    border: Ints
+    corners: NDArray[np.uint8]
+    wet: NDArray[np.bool_]
+    split: Split
+
+    def tiles(self) -> list[tuple[int, int, int]]:
+        """(level, x, y) of all tiles that the cut rests on: the root, and those that hold the children of split
+        patches. Parents come first."""
+        found = {(0, 0, 0): None}
+        for level, nodes in enumerate(self.split):
+            for px, py in nodes:
+                found.setdefault((level + 1, px // 2, py // 2))
+        return sorted(found)
+
+
+def choose(ground: Figures, camera: Camera, tau_px: float, sea_m: float | None = None) -> Cut:
+    """The cut for a camera. ``sea_m``: patches below it are drawn as far as its surface is in view."""
+    walk = _Walk(ground, camera, tau_px, -np.inf if sea_m is None else sea_m)
+    split = walk.descend()
+    enforce(split)
+    return walk.emit(split)
+
+
+class _Walk:
+    """One selection."""
+
+    def __init__(self, ground: Figures, camera: Camera, tau_px: float, sea_m: float) -> None:
+        self.ground, self.tau, self.sea = ground, tau_px, sea_m
+        self.eye = np.array(camera.eye)
+        self.ortho = camera.ortho_height_m > 0
+        self.pixels = camera.height / (camera.ortho_height_m if self.ortho else 2 * camera.tangent)
+        m = eye_projection(camera)
+        self.planes = np.array([m[3] + m[0], m[3] - m[0], m[3] + m[1], m[3] - m[1], m[2], m[3] - m[2]])
+
+    def descend(self) -> Split:
+        """Splits what commits too much error, from the root down."""
+        split: Split = []
+        nodes = _roots()
+        for level in range(self.ground.levels):
+            seen = self._visible(level, nodes)
+            nodes = nodes[seen]
+            ratio = self._screen_error(level, nodes)
+            nodes, ratio = nodes[ratio > 1], ratio[ratio > 1]
+            split.append({(px, py): r for (px, py), r in zip(nodes.tolist(), ratio.tolist(), strict=True)})
+            if not len(nodes):
+                break
+            nodes = _children(nodes)
+        return split
+
+    def emit(self, split: Split) -> Cut:
+        """The visible leaves of the restricted tree."""
+        rows: list[tuple[int, int, int, int, int, int, int, int, int, int]] = []
+        nodes = _roots()
+        for level in range(len(split) + 1):
+            nodes = nodes[self._visible(level, nodes)]
+            inner = split[level] if level < len(split) else {}
+            last = (SUBPATCHES << level) - 1
+            deeper = []
+            for px, py in nodes.tolist():
+                if (px, py) in inner:
+                    deeper.append((px, py))
+                    continue
+                border = WEST * (px == 0) | EAST * (px == last) | SOUTH * (py == 0) | NORTH * (py == last)
+                corners = _corners(split, level, px, py) if level else (0, 0, 0, 0)
+                rows.append((level, px, py, _edges(split, level, px, py), border, *corners, 0))
+            if not deeper:
+                break
+            nodes = _children(np.array(deeper, dtype=np.int64))
+        table = np.array(rows, dtype=np.int64).reshape(-1, 10)
+        return Cut(
+            table[:, 0],
+            table[:, 1:3],
+            table[:, 3],
+            table[:, 4],
+            table[:, 5:9].astype(np.uint8),
+            self._wet(table),
+            split,
+        )
+
+    def _wet(self, table: Ints) -> NDArray[np.bool_]:
+        wet = np.zeros(len(table), dtype=np.bool_)
+        for level in np.unique(table[:, 0]):
+            here = table[:, 0] == level
+            wet[here] = self.ground.bounds(int(level), table[here, 1:3])[0] < self.sea
+        return wet
+
+    def _visible(self, level: int, nodes: Ints) -> NDArray[np.bool_]:
+        w = self.ground.size_m / (SUBPATCHES << level)
+        low, high, _ = self.ground.bounds(level, nodes)
+        near = np.column_stack((nodes * w - self.eye[:2], low - self.eye[2]))
+        far = np.column_stack((near[:, :2] + w, np.maximum(high, self.sea) - self.eye[2]))
+        inside = np.ones(len(nodes), dtype=np.bool_)
+        for plane in self.planes:
+            furthest = np.where(plane[:3] > 0, far, near)
+            inside &= furthest @ plane[:3] + plane[3] >= 0
+        return inside
+
+    def _screen_error(self, level: int, nodes: Ints) -> Floats:
+        """Error of stopping at these patches, in taus; at most 1 where they need not be split."""
+        cell = self.ground.size_m / ((SUBPATCHES << level) * PATCH_CELLS)
+        low, high, error = self.ground.bounds(level, nodes)
+        scale = self.pixels / (1.0 if self.ortho else self._distance(level, nodes, low, high))
+        cell_px = cell * scale
+        rough = np.where(error > SHADING_ERROR * cell, cell_px / (SHADING_CELL_PX * self.tau), 0.0)
+        found = np.maximum(error * scale / self.tau, rough)
+        return np.asarray(np.where((error == 0) | (cell_px <= SMALLEST_CELL * self.tau), 0.0, found))
+
+    def _distance(self, level: int, nodes: Ints, low: Floats, high: Floats) -> Floats:
+        w = self.ground.size_m / (SUBPATCHES << level)
+        near = np.column_stack((nodes * w, low))
+        far = np.column_stack(((nodes + 1) * w, high))
+        away = np.maximum(np.maximum(near - self.eye, self.eye - far), 0)
+        return np.asarray(np.maximum(1e-3, np.sqrt((away**2).sum(axis=1))))
+
+
+def _roots() -> Ints:
+    return np.array([(px, py) for py in range(SUBPATCHES) for px in range(SUBPATCHES)], dtype=np.int64)
+
+
+def _children(nodes: Ints) -> Ints:
+    return np.asarray((2 * nodes[:, None, :] + np.array([(0, 0), (1, 0), (0, 1), (1, 1)])).reshape(-1, 2))
+
+
+def enforce(split: Split) -> None:
+    """Fine to coarse: the neighbours of a split patch must exist, so their parents are split as well."""
+    for level in range(len(split) - 1, 0, -1):
+        last = (SUBPATCHES << (level - 1)) - 1
+        above = split[level - 1]
+        for px, py in split[level]:
+            ux, uy = px >> 1, py >> 1
+            dx, dy = 2 * (px & 1) - 1, 2 * (py & 1) - 1
+            for x, y in ((ux, uy), (ux + dx, uy), (ux, uy + dy), (ux + dx, uy + dy)):
+                if 0 <= x <= last and 0 <= y <= last:
+                    above.setdefault((x, y), 0.0)
+
+
+def _is_split(split: Split, level: int, px: int, py: int) -> bool:
+    return level < len(split) and (px, py) in split[level]
+
+
+def _exists(split: Split, level: int, px: int, py: int) -> bool:
+    """True when the patch is a node of the cut's tree: its parent is split. Outside the domain: true."""
+    last = (SUBPATCHES << level) - 1
+    return level == 0 or not (0 <= px <= last and 0 <= py <= last) or _is_split(split, level - 1, px >> 1, py >> 1)
+
+
+def _edges(split: Split, level: int, px: int, py: int) -> int:
+    sides = ((WEST, px - 1, py), (EAST, px + 1, py), (SOUTH, px, py - 1), (NORTH, px, py + 1))
+    return sum(bit for bit, x, y in sides if not _exists(split, level, x, y))
+
+
+def _morph(parent_ratio: float) -> float:
+    """1 when the parent's error is at the bound (about to be merged), 0 from twice the bound on."""
+    return min(1.0, max(0.0, 2.0 - parent_ratio))
+
+
+def _corners(split: Split, level: int, px: int, py: int) -> tuple[int, int, int, int]:
+    last = (SUBPATCHES << level) - 1
+    out = []
+    for sy in (-1, 1):
+        for sx in (-1, 1):
+            around = [(0, 0), (sx, 0), (0, sy), (sx, sy)]
+            inside = [(px + x, py + y) for x, y in around if 0 <= px + x <= last and 0 <= py + y <= last]
+            out.append(int(_weight(split, level, inside) * 255 + 0.5))
+    return out[0], out[1], out[2], out[3]
+
+
+def _weight(split: Split, level: int, patches: list[Node]) -> float:
+    """Weight of the point where these patches meet (the first is the one that is drawn)."""
+    weight = 0.0
+    for px, py in patches:
+        ratio = split[level - 1].get((px >> 1, py >> 1))
+        if ratio is None:
+            return 1.0
+        if _is_split(split, level, px, py):
+            return 0.0
+        weight = max(weight, _morph(ratio))
+    return weight

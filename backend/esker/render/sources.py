@@ -1,0 +1,59 @@
+"""The shader modules: the page's files joined in the page's order (frontend/src/gpu/shaders.ts)."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+from typing import Final
+
+from esker.render.wgsl import parse
+from esker.render.wgsl_tree import Constant, Literal, Module
+
+FOLDER: Final = Path(__file__).resolve().parents[3] / "shaders"
+_COMMON: Final = ("view", "tile", "sky", "noise", "tonemap")
+
+
+def terrain(look: str, detail: str) -> Module:
+    """The ground in one look, for one of the two amounts of detail."""
+    return _module(*_COMMON, f"detail_{detail}", "patch", "material", f"look_{look}", "lines", "overlay", "terrain")
+
+
+def wall(detail: str) -> Module:
+    """The sides of the block."""
+    return _module(*_COMMON, f"detail_{detail}", "patch", "wall")
+
+
+def background(detail: str) -> Module:
+    """Sea, sky and what lies around."""
+    return _module(*_COMMON, f"detail_{detail}", "patch", "lines", "overlay", "water", "background")
+
+
+def normals() -> Module:
+    """Gradients of tiles."""
+    return _module("tile", "compute_normals")
+
+
+def sun() -> Module:
+    """Sun and sky visibility of tiles."""
+    return _module("tile", "compute_sun")
+
+
+def sky() -> Module:
+    """Tables of the sky."""
+    return _module("atmosphere", "compute_sky", contract=False)
+
+
+def number(module: Module, name: str) -> int:
+    """A whole constant of a module. Raises KeyError where it has none of this name."""
+    found = module.declarations.get(name)
+    if not isinstance(found, Constant) or not isinstance(found.value, Literal):
+        raise KeyError(name)
+    return int(found.value.text, 0)
+
+
+@cache
+def _module(*names: str, contract: bool = True) -> Module:
+    texts = [(FOLDER / "wgsl" / f"{name}.wgsl").read_text(encoding="utf-8") for name in names]
+    if contract:
+        texts.insert(0, (FOLDER / "generated" / "contract.wgsl").read_text(encoding="utf-8"))
+    return parse("\n".join(texts))

@@ -1,0 +1,196 @@
+"""The ground as tiles: heights, attributes and bounds of any level, made where they are asked for.
+
+Levels up to the finest that was solved are held whole; finer tiles come from their parents by the synthesis rule, as on
+the page (docs/synthesis.md), and are kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from esker.contract import PATCH_CELLS, SUBPATCHES, TILE_CELLS, TILE_SAMPLES
+from esker.render.select import Floats, Ints
+from esker.synthesis.site import BORDER, Site, extended, tile_window
+from esker.synthesis.state import State
+from esker.synthesis.subdivide import Samples, root, subdivide, whole
+
+SLOT: Final = TILE_SAMPLES + 2 * BORDER
+DECAY: Final = 0.7
+"""Error that tiles not yet made are expected to add, in that of the tile above them: noise of the roughest ground falls
+by 2^-0.45 a level, common ground by 2^-1."""
+
+Tile = tuple[int, int, int]
+"""Level, column, row."""
+
+
+class SlotData(NamedTuple):
+    """Samples of one tile with a border of two, row 0 south. ``heights``: (69, 69) float32, metres; ``state``: what the
+    rule made there, None on ground without detail."""
+
+    heights: NDArray[np.float32]
+    state: State | None
+
+
+class _Sub(NamedTuple):
+    """Per 16-cell sub-patch (4 x 4, row, column), metres."""
+
+    low: Floats
+    high: Floats
+    error: Floats
+
+
+class Surface:
+    """The ground that is drawn; ``select.Figures``."""
+
+    def __init__(
+        self, size_m: float, levels: Sequence[NDArray[np.float32]], site: Site | None = None, top: int = 0
+    ) -> None:
+        """``levels``: solved heights of levels 0..G, (N, N) metres. ``site``: detail is added to them, on levels up to
+        ``top``; without, the ground ends at level G."""
+        self.size_m = size_m
+        self.solved = len(levels) - 1
+        self.levels = self.solved if site is None else max(top, self.solved)
+        self._site = site
+        self._whole: list[Samples] = []
+        self._heights: list[NDArray[np.float32]] = []
+        for level, heights in enumerate(levels):
+            if site is None:
+                self._heights.append(extended(heights, whole(level), cyclic=False).astype(np.float32))
+            else:
+                made = root(site) if level == 0 else subdivide(self._whole[-1], whole(level), site)
+                self._whole.append(made)
+                self._heights.append((made.guide + made.state.d).astype(np.float32))
+        self._made: dict[Tile, Samples] = {}
+        self._subs: dict[Tile, _Sub] = {}
+        self._bounds = self._merge()
+
+    def bounds(self, level: int, nodes: Ints) -> tuple[Floats, Floats, Floats]:
+        """See ``select.Figures``."""
+        px, py = nodes[:, 0], nodes[:, 1]
+        if level <= self.solved:
+            low, high, error = self._bounds[level]
+            return low[py, px], high[py, px], error[py, px]
+        out = np.empty((3, len(nodes)))
+        tiles = {}
+        for k, (x, y) in enumerate((nodes // SUBPATCHES).tolist()):
+            tiles.setdefault((x, y), []).append(k)
+        for (x, y), at in tiles.items():
+            sub = self._sub(level, x, y)
+            rows, cols = py[at] % SUBPATCHES, px[at] % SUBPATCHES
+            out[:, at] = self._grown(level, _Sub(*(a[rows, cols] for a in sub)))
+        return out[0], out[1], out[2]
+
+    def slot(self, level: int, x: int, y: int) -> SlotData:
+        """The samples of a tile. Raises ValueError outside of the domain or above ``levels``."""
+        if not (0 <= level <= self.levels and 0 <= x < 1 << level and 0 <= y < 1 << level):
+            raise ValueError(f"there is no tile ({level}, {x}, {y})")
+        if self._site is None:
+            return SlotData(self._heights[level][_within(level, x, y)], None)
+        made = self._samples(level, x, y)
+        return SlotData((made.guide + made.state.d).astype(np.float32), made.state)
+
+    def height_at(self, x_m: float, y_m: float, level: int | None = None) -> float:
+        """Height of the ground at a place, bilinear in the samples of a level (default: the finest solved one)."""
+        level = self.solved if level is None else level
+        side = 1 << level
+        u, v = (min(max(p / self.size_m, 0.0), 1.0) * side for p in (x_m, y_m))
+        x, y = min(int(u), side - 1), min(int(v), side - 1)
+        z = self.slot(level, x, y).heights
+        c, r = ((a - b) * TILE_CELLS + BORDER for a, b in ((u, x), (v, y)))
+        i, j = min(int(c), SLOT - 2), min(int(r), SLOT - 2)
+        fx, fy = c - i, r - j
+        south, north = z[j, i] * (1 - fx) + z[j, i + 1] * fx, z[j + 1, i] * (1 - fx) + z[j + 1, i + 1] * fx
+        return float(south * (1 - fy) + north * fy)
+
+    # --- what is behind them
+
+    def _samples(self, level: int, x: int, y: int) -> Samples:
+        """Samples of one tile with its border, through those of its ancestors."""
+        window = tile_window(level, x, y)
+        if level <= self.solved:
+            held = self._whole[level]
+            at = window.within(held.window)
+            return Samples(window, held.guide[at], State(*(a[at] for a in held.state)))
+        found = self._made.get((level, x, y))
+        if found is None:
+            assert self._site is not None
+            parent = self._samples(level - 1, x >> 1, y >> 1)
+            found = self._made[level, x, y] = subdivide(parent, window, self._site)
+        return found
+
+    def _sub(self, level: int, x: int, y: int) -> _Sub:
+        found = self._subs.get((level, x, y))
+        if found is None:
+            heights = self.slot(level, x, y).heights[BORDER:-BORDER, BORDER:-BORDER]
+            half = TILE_CELLS // 2
+            at = np.s_[half * (y & 1) : half * (y & 1) + half + 1, half * (x & 1) : half * (x & 1) + half + 1]
+            parent = self.slot(level - 1, x >> 1, y >> 1).heights[BORDER:-BORDER, BORDER:-BORDER][at]
+            found = self._subs[level, x, y] = _figures(heights, parent)
+        return found
+
+    def _grown(self, level: int, sub: _Sub) -> tuple[Floats, Floats, Floats]:
+        """Bounds with what finer tiles may add to them: a geometric series of expected errors."""
+        if level == self.levels:
+            return sub.low - sub.error, sub.high + sub.error, np.zeros_like(sub.error)
+        expected = DECAY * sub.error
+        reach = sub.error + expected / (1 - DECAY)
+        return sub.low - reach, sub.high + reach, expected
+
+    def _merge(self) -> list[tuple[Floats, Floats, Floats]]:
+        """Per solved level: bounds of each patch and all below it, and the error of stopping there."""
+        out: list[tuple[Floats, Floats, Floats]] = []
+        finer: Floats | None = None
+        for level in range(self.solved, -1, -1):
+            heights = self._heights[level][BORDER:-BORDER, BORDER:-BORDER]
+            parent = self._heights[level - 1][BORDER:-BORDER, BORDER:-BORDER] if level else None
+            sub = _figures(heights, parent)
+            if finer is None:
+                low, high, error = self._grown(level, sub)
+            else:
+                below = out[-1]
+                low = np.minimum(sub.low - sub.error, _quarters(np.minimum, below[0]))
+                high = np.maximum(sub.high + sub.error, _quarters(np.maximum, below[1]))
+                error = _quarters(np.maximum, np.maximum(below[2], finer))
+            finer = sub.error
+            out.append((low, high, error))
+        return out[::-1]
+
+
+def _within(level: int, x: int, y: int) -> tuple[slice, slice]:
+    return tile_window(level, x, y).within(whole(level))
+
+
+def _quarters(ufunc: np.ufunc, a: Floats) -> Floats:
+    n = len(a) // 2
+    out: Floats = ufunc.reduce(a.reshape(n, 2, n, 2), axis=(1, 3))
+    return out
+
+
+def _figures(heights: NDArray[np.float32], parent: NDArray[np.float32] | None) -> _Sub:
+    """Bounds per 16-cell block of closed squares of samples, and the distance to what the parent draws there."""
+    z = heights.astype(np.float64)
+    low, high = _blocks(np.minimum, z), _blocks(np.maximum, z)
+    if parent is None:
+        return _Sub(low, high, np.zeros_like(low))
+    p = parent.astype(np.float64)
+    away = z.copy()
+    away[::2, ::2] -= p
+    away[::2, 1::2] -= 0.5 * (p[:, 1:] + p[:, :-1])
+    away[1::2, ::2] -= 0.5 * (p[1:] + p[:-1])
+    # Cells are cut from their south-east to their north-west corner.
+    away[1::2, 1::2] -= 0.5 * (p[:-1, 1:] + p[1:, :-1])
+    return _Sub(low, high, _blocks(np.maximum, np.abs(away)))
+
+
+def _blocks(ufunc: np.ufunc, a: Floats) -> Floats:
+    for axis in (0, 1):
+        n = (a.shape[axis] - 1) // PATCH_CELLS
+        inner = ufunc.reduceat(a, np.arange(n) * PATCH_CELLS, axis=axis)
+        far = a[PATCH_CELLS::PATCH_CELLS] if axis == 0 else a[:, PATCH_CELLS::PATCH_CELLS]
+        # The last block of reduceat reaches to the end; the closing sample of the others is added here.
+        a = ufunc(inner, far)
+    return a
