@@ -21,7 +21,7 @@ def modules() -> dict[str, list[Path]]:
     files["common"] = [file for name in common.group(1).split(",") for file in files[name.strip()]]
 
     def joined(parts: str, **variants: str) -> list[Path]:
-        names = [variants.get(part.strip(), part.strip()) for part in parts.split(",")]
+        names = [variants.get(part.strip(), part.strip()) for part in parts.split(",") if part.strip()]
         return [file for name in names for file in files[name]]
 
     found: dict[str, list[Path]] = {"blit": [SHADERS / "wgsl" / "blit.wgsl"]}
@@ -33,7 +33,7 @@ def modules() -> dict[str, list[Path]]:
                     chosen = joined(parts, **variant)
                     names = [name for place, name in variant.items() if place in parts]
                     found["-".join([chosen[-1].stem, *names])] = chosen
-    assert len(found) == 1 + 8 + 4 + 6 + 3
+    assert len(found) == 1 + 8 + 4 + 7 + 3
     return found
 
 

@@ -1,4 +1,4 @@
-"""The synthesis pass of the page under wgpu-py: the same WGSL, buffers and jobs (frontend/src/gpu/synthesis.ts, bounds.ts).
+"""The page's synthesis pass under wgpu-py: the same WGSL, buffers and jobs (frontend/src/gpu/synthesis.ts, bounds.ts).
 
 For tests and benchmarks. Runs on any adapter that wgpu finds; Mesa's lavapipe on a machine without a GPU.
 """
@@ -36,7 +36,7 @@ TEXTURES: Final = ("heights", "attributes0", "attributes1")
 
 
 class Job(NamedTuple):
-    """One tile to make: ``parent`` is the parent's slot, ``held`` has bit (dy + 1) * 3 + dx + 1 where that tile is held."""
+    """One tile to make. ``parent``: its slot; ``held``: bit (dy + 1) * 3 + dx + 1 where that tile is held."""
 
     slot: int
     level: int
@@ -174,7 +174,7 @@ class SlotMaker:
         self.device.queue.write_buffer(self.jobs, 0, words)
 
     def bounds(self, jobs: Sequence[Job]) -> NDArray[np.float32]:
-        """Bounds of tiles that were made: (tiles, 4, 4, 4), sub-patch rows from the south, values of compute_bounds.wgsl."""
+        """What compute_bounds.wgsl finds in tiles that were made: (tiles, 4, 4, 4), sub-patch rows from the south."""
         if self._bounds is None:
             module = self.device.create_shader_module(code=source("tile", "compute_bounds"))
             self._bounds = self.device.create_compute_pipeline(
@@ -263,11 +263,6 @@ def _whole(buffer: Any) -> dict[str, Any]:
 def _by_level(jobs: Sequence[Job]) -> Iterator[tuple[int, list[Job]]]:
     for level in sorted({job.level for job in jobs}):
         yield level, [job for job in jobs if job.level == level]
-
-
-def spacing(job: Job, site: Site) -> float:
-    """Metres between samples of a job's tile."""
-    return grid.spacing(job.level, site.size_m)
 
 
 def child_of(job: Job, slot: int, east: int, north: int, held: int = 0) -> Job:
