@@ -142,27 +142,33 @@ def _place(index: NDArray[np.int64], level: int, cells: int) -> tuple[NDArray[np
     return cell, (scaled - cell * n) / n
 
 
-def extended(heights: NDArray[np.floating], window: Window, cyclic: bool) -> NDArray[np.floating]:
-    """Heights of a whole level at a window that may reach over its edges by less than the domain.
+def extended(
+    heights: NDArray[np.floating], window: Window, cyclic: bool = False, origin: tuple[int, int] = (0, 0)
+) -> NDArray[np.floating]:
+    """Heights of a level at a window that may reach over the domain's edges by less than the domain.
 
+    ``heights``: the whole level, or what is needed of it, its sample [0, 0] being (row, column) ``origin``.
     Beyond an edge the ground goes on point-symmetrically, 2 z(edge) - z(as far inside), x first, then y: a function of
     the global index alone, so tiles along the edge agree. Cyclic domains repeat.
     """
     rows, cols = window.rows, window.cols
-    last = len(heights) - 1
+    n = grid.cells(window.level)
     if cyclic:
-        repeated: NDArray[np.floating] = heights[np.ix_(rows % last, cols % last)]
+        repeated: NDArray[np.floating] = heights[np.ix_(rows % n - origin[0], cols % n - origin[1])]
         return repeated
-    return _mirrored(_mirrored(heights, cols, last, 1), rows, last, 0)
+    across = _mirrored(heights, cols - origin[1], (-origin[1], n - origin[1]), 1)
+    return _mirrored(across, rows - origin[0], (-origin[0], n - origin[0]), 0)
 
 
-def _mirrored(z: NDArray[np.floating], index: NDArray[np.int64], last: int, axis: int) -> NDArray[np.floating]:
-    edge = np.clip(index, 0, last)
-    out: NDArray[np.floating] = np.take(z, edge, axis=axis)
-    away = np.flatnonzero(edge != index)
+def _mirrored(
+    z: NDArray[np.floating], index: NDArray[np.int64], edges: tuple[int, int], axis: int
+) -> NDArray[np.floating]:
+    nearest = np.clip(index, *edges)
+    out: NDArray[np.floating] = np.take(z, nearest, axis=axis)
+    away = np.flatnonzero(nearest != index)
     if away.size:
         at = (slice(None), away) if axis else (away, slice(None))
-        inside = np.take(z, (2 * edge - index)[away], axis=axis)
+        inside = np.take(z, (2 * nearest - index)[away], axis=axis)
         out[at] = 2 * out[at] - inside
     return out
 

@@ -1,0 +1,77 @@
+"""From a solve to its detail: what the Python API and ``esker solve`` share (docs/synthesis.md).
+
+The room of synthesis knows arrays only; this gives it a solver's heights, channels, refinement and device.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from esker.contract import DEFAULT_REFINED_LEVEL, MAX_REFINED_LEVEL, Channel, Stroke, TerrainSettings
+from esker.solve.device import Device
+from esker.solve.faults import finished
+from esker.solve.solver import Basis, LevelResult, Solver
+from esker.synthesis.detailed import DetailedTerrain, site_of
+from esker.synthesis.interpolate import Window
+from esker.synthesis.kernels import Kernels
+from esker.synthesis.site import Site
+from esker.synthesis.subdivide import Samples
+
+
+@dataclass(frozen=True)
+class Settled:
+    """A settled solve with its channels, (n, n) float32 each, by name."""
+
+    basis: Basis
+    channels: Mapping[str, NDArray[np.float32]]
+
+
+def settle(
+    solver: Solver,
+    strokes: Sequence[Stroke],
+    settings: TerrainSettings,
+    level: int,
+    step: Callable[[LevelResult | None], None] | None = None,
+) -> Settled:
+    """Solve levels 0..``level`` to rest; ``step`` is told each step. Raises ValueError, DeviceErrors as solves do."""
+    basis: Basis | None = None
+    channels: dict[str, NDArray[np.float32]] = {}
+    for result in solver.steps(strokes, settings, level, basis=True):
+        if step is not None:
+            step(result)
+        if result is None:
+            continue
+        if result.channel != Channel.HEIGHT:
+            channels[result.channel.name.lower()] = result.heights  # coarse to fine: the last is the finest
+        basis = result.basis or basis
+    if basis is None:
+        raise RuntimeError("The solve ended before the ground was settled.")
+    return Settled(basis, channels)
+
+
+def detailed(solver: Solver, settled: Settled, refined_level: int = DEFAULT_REFINED_LEVEL) -> DetailedTerrain:
+    """What makes windows with detail of a settled solve, on the solver's device.
+
+    Raises ValueError for a level that is not refined, DeviceErrors for a device that fails.
+    """
+    if not 0 <= refined_level <= MAX_REFINED_LEVEL:
+        raise ValueError(f"tiles are refined to level 0..{MAX_REFINED_LEVEL}, not {refined_level}")
+    site = site_of(settled.basis.settings, settled.basis.heights, settled.channels)
+    maker = None if solver.device is None else _OnDevice(solver.device)
+    return DetailedTerrain(site, maker, solver.refiner(settled.basis).window, refined_level)
+
+
+class _OnDevice:
+    """Kernels whose faults are the solver's DeviceErrors."""
+
+    def __init__(self, device: Device) -> None:
+        self._device = device
+        self._kernels = finished(device, lambda: Kernels(device))
+
+    def detail(self, site: Site, window: Window) -> Samples:
+        """See ``Kernels.detail``."""
+        return finished(self._device, lambda: self._kernels.detail(site, window))
