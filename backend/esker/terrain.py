@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import math
 import secrets
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +23,10 @@ from esker.contract import Border, Document, Flank, TerrainSettings, Vec3
 from esker.document import archive
 from esker.document.strokes import level_curve, profile_curve
 from esker.solve.assembly import System, assemble
-from esker.solve.solver import Basis, Solver
+from esker.solve.detail import Settled, detailed, settle
+from esker.solve.solver import Solver
+from esker.synthesis.detailed import Detail, DetailedTerrain
+from esker.synthesis.subdivide import finest_level
 
 FlankLike = tuple[float | None, float] | Flank | None
 DEFAULT_FLANK: Flank = Flank()
@@ -120,12 +123,13 @@ def _same(a: Strokes, b: Strokes) -> bool:
 @dataclass(frozen=True)
 class HeightWindow:
     """Heights of a rectangle. heights: (rows, columns) float32, metres, row 0 south; sample [0, 0] lies at world
-    (x_m, y_m), neighbours ``spacing_m`` apart."""
+    (x_m, y_m), neighbours ``spacing_m`` apart. ``attributes``: with detail, what ``Terrain.attributes`` gives."""
 
     heights: NDArray[np.float32]
     x_m: float
     y_m: float
     spacing_m: float
+    attributes: Mapping[str, NDArray[np.float32]] = field(default_factory=dict)
 
 
 class Terrain:
@@ -151,8 +155,10 @@ class Terrain:
         self.settings = TerrainSettings(size_m=size, border=border, reach_m=reach)
         self._strokes: dict[str, contract.Stroke] = {}
         self._solver = solver
-        self._solved: dict[int, tuple[TerrainSettings, Strokes, NDArray[np.float32]]] = {}
-        self._basis: Basis | None = None
+        self._heights: dict[int, tuple[TerrainSettings, Strokes, NDArray[np.float32]]] = {}
+        self._settled: Settled | None = None
+        self._detailed: tuple[Settled, int, DetailedTerrain] | None = None
+        self._detail: tuple[DetailedTerrain, int, Detail] | None = None
 
     @property
     def strokes(self) -> Strokes:
@@ -170,17 +176,45 @@ class Terrain:
         """Take a stroke away. Raises KeyError when there is none of this id."""
         del self._strokes[stroke_id]
 
-    def heights(self, level: int = contract.DEFAULT_LEVEL) -> NDArray[np.float32]:
-        """Settled heights with ``level`` as the finest level: float32 (N, N), metres, row 0 south, read-only.
+    def heights(
+        self,
+        level: int = contract.DEFAULT_LEVEL,
+        detail: bool = False,
+        *,
+        global_level: int = contract.DEFAULT_LEVEL,
+        refined_level: int = contract.DEFAULT_REFINED_LEVEL,
+        progress: Callable[[float], None] | None = None,
+    ) -> NDArray[np.float32]:
+        """Settled heights of a level: float32 (N, N), metres, row 0 south, read-only.
 
-        Raises ValueError for a level outside 0..MAX_LEVEL.
+        Without ``detail``, the solve with ``level`` as its finest. With it, what the page shows: heights as they come
+        from a server that solves levels 0..``global_level`` as a whole and refines to ``refined_level``, and the detail
+        synthesised on them (docs/synthesis.md); ``progress`` is told the share of that which is done. Raises ValueError
+        for a level outside 0..MAX_LEVEL; ``window`` goes further.
         """
-        strokes, held = self.strokes, self._solved.get(level)
+        if detail:
+            return self._whole(level, global_level, refined_level, progress).heights
+        strokes, held = self.strokes, self._heights.get(level)
         if held is None or held[0] != self.settings or not _same(held[1], strokes):
             solver = self._solver or default_solver()
             held = (self.settings, strokes, solver.solve(strokes, self.settings, level)[level])
-            self._solved[level] = held
+            self._heights[level] = held
         return held[2]
+
+    def attributes(
+        self,
+        level: int = contract.DEFAULT_LEVEL,
+        *,
+        global_level: int = contract.DEFAULT_LEVEL,
+        refined_level: int = contract.DEFAULT_REFINED_LEVEL,
+        progress: Callable[[float], None] | None = None,
+    ) -> dict[str, NDArray[np.float32]]:
+        """Channels of the detail of a level, each float32 (N, N), row 0 south, read-only.
+
+        ``detail`` (metres, part of ``heights(level, detail=True)``), ``smoothness`` (the fractal's exponent, 0..2),
+        ``snow``, ``wetness``, ``grass``, ``forest``, ``foam`` (0..1). Raises ValueError as ``heights`` does.
+        """
+        return dict(self._whole(level, global_level, refined_level, progress).attributes)
 
     def window(
         self,
@@ -189,37 +223,73 @@ class Terrain:
         y0: float,
         x1: float,
         y1: float,
+        detail: bool = False,
         *,
         global_level: int = contract.DEFAULT_LEVEL,
+        refined_level: int = contract.DEFAULT_REFINED_LEVEL,
         progress: Callable[[float], None] | None = None,
     ) -> HeightWindow:
         """Settled heights of the samples of ``level`` inside a rectangle of world metres, at what the rectangle costs.
 
         Levels 0..``global_level`` are solved as a whole, those above, up to MAX_REFINED_LEVEL, are refined from them
-        where they are looked at (DESIGN 5.6). ``progress`` is told the share of the refinement that is done. Raises
-        ValueError for a level out of range and for a rectangle that holds no sample.
+        where they are looked at (DESIGN 5.6). With ``detail``, heights and attributes as the page shows them, down to
+        cells of a centimetre: refined to ``refined_level`` as a server does, interpolated beyond. ``progress`` is told
+        the share of the refinement, or of the detail, that is done. Raises ValueError for a level out of range and for
+        a rectangle that holds no sample.
         """
-        if not 0 <= level <= contract.MAX_REFINED_LEVEL:
-            raise ValueError(f"level must be 0..{contract.MAX_REFINED_LEVEL}, not {level}")
         size = self.settings.size_m
+        most = finest_level(size) if detail else contract.MAX_REFINED_LEVEL
+        if not 0 <= level <= most:
+            raise ValueError(f"level must be 0..{most}, not {level}")
         r0, r1, c0, c1 = grid.Rect(x0, y0, x1, y1).sample_window(level, size)
         if r0 >= r1 or c0 >= c1:
             raise ValueError(
                 f"no sample of level {level} lies in ({x0}, {y0})..({x1}, {y1}); the terrain is {size} m wide"
             )
-        solver = self._solver or default_solver()
-        refiner = solver.refiner(self._settled(solver, min(level, global_level)))
         s = grid.spacing(level, size)
-        return HeightWindow(refiner.window(level, slice(r0, r1), slice(c0, c1), progress), c0 * s, r0 * s, s)
+        rows, cols = slice(r0, r1), slice(c0, c1)
+        if detail:
+            made = self._with_detail(global_level, refined_level).window(level, rows, cols, progress)
+            return HeightWindow(made.heights, c0 * s, r0 * s, s, made.attributes)
+        solver = self._solver or default_solver()
+        refiner = solver.refiner(self._settle(solver, min(level, global_level)).basis)
+        return HeightWindow(refiner.window(level, rows, cols, progress), c0 * s, r0 * s, s)
 
-    def _settled(self, solver: Solver, level: int) -> Basis:
-        """What refinement starts from; that of the last time if nothing has changed."""
-        strokes, held = self.strokes, self._basis
-        if held is None or held.level != level or held.settings != self.settings or not _same(held.strokes, strokes):
-            for result in solver.steps(strokes, self.settings, level, basis=True):
-                held = result.basis if result is not None and result.basis is not None else held
-        assert held is not None, "a solve that is not stopped ends with its basis"
-        self._basis = held
+    def _whole(
+        self, level: int, global_level: int, refined_level: int, progress: Callable[[float], None] | None
+    ) -> Detail:
+        """A whole level with detail; that of the last time if nothing has changed."""
+        if not 0 <= level <= contract.MAX_LEVEL:
+            raise ValueError(f"level must be 0..{contract.MAX_LEVEL}, not {level}")
+        terrain, held = self._with_detail(global_level, refined_level), self._detail
+        if held is None or held[0] is not terrain or held[1] != level:
+            every = slice(0, grid.samples(level))
+            made = terrain.window(level, every, every, progress)
+            for values in (made.heights, *made.attributes.values()):
+                values.flags.writeable = False
+            held = self._detail = (terrain, level, made)
+        return held[2]
+
+    def _with_detail(self, global_level: int, refined_level: int) -> DetailedTerrain:
+        """What makes detail; that of the last time if nothing has changed."""
+        solver = self._solver or default_solver()
+        settled, held = self._settle(solver, global_level), self._detailed
+        if held is None or held[0] is not settled or held[1] != refined_level:
+            held = self._detailed = (settled, refined_level, detailed(solver, settled, refined_level))
+        return held[2]
+
+    def _settle(self, solver: Solver, level: int) -> Settled:
+        """What refinement and detail start from; that of the last time if nothing has changed."""
+        strokes, held = self.strokes, self._settled
+        basis = None if held is None else held.basis
+        if (
+            held is None
+            or basis is None
+            or basis.level != level
+            or basis.settings != self.settings
+            or not _same(basis.strokes, strokes)
+        ):
+            held = self._settled = settle(solver, strokes, self.settings, level)
         return held
 
     def assemble(self, level: int) -> System:

@@ -6,16 +6,17 @@ import argparse
 import math
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TextIO
+from typing import Any, TextIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from esker import grid
-from esker.contract import DEFAULT_LEVEL, MAX_LEVEL, MAX_REFINED_LEVEL, Channel, Document
+from esker.contract import DEFAULT_LEVEL, MAX_LEVEL, MAX_REFINED_LEVEL, MAX_SYNTHESIS_LEVEL, Channel, Document
 from esker.document import archive
+from esker.solve.detail import detailed, settle
 from esker.solve.solver import LevelResult, Solver
 
 EXPECTED_CYCLES = 10
@@ -29,23 +30,31 @@ def main(argv: list[str]) -> int:
     """Run the command; 0, or 1 with one sentence on standard error. Bad arguments exit with 2, like argparse."""
     parser = _parser()
     options = parser.parse_args(argv)
+    with_detail = options.detail or options.attributes is not None
+    most = MAX_SYNTHESIS_LEVEL if with_detail else MAX_REFINED_LEVEL
+    if options.level > most:
+        parser.error(f"levels above {most} need --detail")
     if options.level > MAX_LEVEL and options.window is None:
         parser.error(f"levels above {MAX_LEVEL} are made where they are looked at: say --window X0 Y0 X1 Y1")
     try:
-        if options.output.suffix != ".npy":
-            raise ValueError(f"Heights are written as .npy, not as '{options.output.suffix or options.output.name}'.")
-        if not options.output.absolute().parent.is_dir():
-            raise ValueError(f"There is no folder {options.output.absolute().parent}.")
+        _writable("Heights", options.output, ".npy")
+        if options.attributes is not None:
+            _writable("Attributes", options.attributes, ".npz")
         document = _read(options.terrain)
         solver = Solver(
             options.device, max_level=min(options.level, MAX_LEVEL if options.window is None else DEFAULT_LEVEL)
         )
-        if options.window is None:
+        attributes: Mapping[str, Any] = {}
+        if with_detail:
+            heights, attributes = _with_detail(solver, document, options.level, options.window, quiet=options.quiet)
+        elif options.window is None:
             heights = _solve(solver, document, options.level, quiet=options.quiet)
         else:
             heights = _window(solver, document, options.level, options.window, quiet=options.quiet)
         with options.output.open("wb") as file:
             np.save(file, heights)
+        if options.attributes is not None:
+            np.savez_compressed(options.attributes, **attributes)
     except (OSError, ValueError, RuntimeError, MemoryError) as error:
         print(f"esker solve: {str(error) or type(error).__name__}", file=sys.stderr)
         return 1
@@ -59,15 +68,29 @@ def _parser() -> argparse.ArgumentParser:
     p = argparse.ArgumentParser(prog="esker solve", description="Settled heights of a terrain, as a NumPy file.")
     p.add_argument("terrain", type=Path, help="an .esker file, or a document as .json")
     p.add_argument("-o", "--output", type=Path, required=True, help="heights.npy: float32, metres, row 0 south")
-    samples = f"finest level, 0..{MAX_LEVEL}, with --window to {MAX_REFINED_LEVEL}; 64 * 2^N + 1 samples a side"
-    p.add_argument("--level", type=int, choices=range(MAX_REFINED_LEVEL + 1), default=DEFAULT_LEVEL, metavar="N",
+    samples = (
+        f"finest level, 0..{MAX_LEVEL}, with --window to {MAX_REFINED_LEVEL}, with --detail as well to cells of a "
+        "centimetre; 64 * 2^N + 1 samples a side"
+    )
+    p.add_argument("--level", type=int, choices=range(MAX_SYNTHESIS_LEVEL + 1), default=DEFAULT_LEVEL, metavar="N",
                    help=f"{samples} (default {DEFAULT_LEVEL})")  # fmt: skip
     p.add_argument("--window", type=float, nargs=4, metavar=("X0", "Y0", "X1", "Y1"),
                    help="only the samples in this rectangle of world metres, refined from level "
                    f"{DEFAULT_LEVEL} where N is above it")  # fmt: skip
+    p.add_argument("--detail", action="store_true", help="heights as the page shows them, with synthesised detail")
+    p.add_argument("--attributes", type=Path, metavar="FILE.npz",
+                   help="also snow, wetness, plants and the like of every sample; implies --detail")  # fmt: skip
     p.add_argument("--device", help="part of an OpenCL device's name, or 'numpy'")
     p.add_argument("-q", "--quiet", action="store_true", help="no progress on standard error")
     return p
+
+
+def _writable(what: str, path: Path, suffix: str) -> None:
+    """Refuse a file of another kind, or in a folder that is not there, before anything is computed."""
+    if path.suffix != suffix:
+        raise ValueError(f"{what} are written as {suffix}, not as '{path.suffix or path.name}'.")
+    if not path.absolute().parent.is_dir():
+        raise ValueError(f"There is no folder {path.absolute().parent}.")
 
 
 def _read(path: Path) -> Document:
@@ -194,3 +217,34 @@ def _window(
         clear = "\r\x1b[K" if live else ""
         print(f"{clear}{r1 - r0} x {c1 - c0} heights of {_name(level)}, {where}", file=sys.stderr)
     return heights
+
+
+def _with_detail(
+    solver: Solver, document: Document, level: int, corners: Sequence[float] | None, *, quiet: bool
+) -> tuple[NDArray[np.float32], Mapping[str, NDArray[np.float32]]]:
+    """Heights and attributes as the page shows them, of a whole level or of a rectangle of it; raises ValueError."""
+    size, n = document.settings.size_m, grid.samples(level)
+    r0, r1, c0, c1 = (0, n, 0, n) if corners is None else grid.Rect(*corners).sample_window(level, size)
+    if r0 >= r1 or c0 >= c1:
+        raise ValueError(f"No sample of level {level} lies in that window; the terrain is {size:g} m wide.")
+    progress = None if quiet else Progress(sys.stderr, DEFAULT_LEVEL)
+    settled = settle(solver, document.strokes, document.settings, DEFAULT_LEVEL, progress.step if progress else None)
+    if progress:
+        progress.close(f"{_name(DEFAULT_LEVEL)} settled in {progress.clock() - progress.start:.2f} s")
+    live = not quiet and sys.stderr.isatty()
+
+    def show(share: float) -> None:
+        if live:
+            print(f"\r\x1b[Kdetail of {_name(level)}: {100 * share:3.0f} %", end="", file=sys.stderr, flush=True)
+
+    made = detailed(solver, settled).window(level, slice(r0, r1), slice(c0, c1), show)
+    if not quiet:
+        s = grid.spacing(level, size)
+        clear = "\r\x1b[K" if live else ""
+        low, high = made.heights.min(), made.heights.max()
+        print(
+            f"{clear}{r1 - r0} x {c1 - c0} heights with detail from {low:.2f} to {high:.2f} m, "
+            f"sample [0, 0] at x {c0 * s:g} m, y {r0 * s:g} m, {s:g} m apart",
+            file=sys.stderr,
+        )
+    return made.heights, made.attributes

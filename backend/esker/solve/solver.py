@@ -132,6 +132,11 @@ class Solver:
         """What solves, for logs and people."""
         return NUMPY_NAME if self._device is None else self._device.name
 
+    @property
+    def device(self) -> Device | None:
+        """The opened device, None with NumPy: for others that compute on it, from the same thread."""
+        return self._device
+
     def refiner(self, basis: Basis) -> Refiner:
         """What refines a settled solve of this solver above its level (DESIGN 5.6). Refiners share a cache."""
         if self._refinery is None:
