@@ -25,6 +25,7 @@ struct BoundsList {
 @group(0) @binding(2) var attributes1: texture_2d_array<f32>;
 @group(0) @binding(3) var<storage, read_write> bounds: array<vec4f>;  // (lowest, highest, error, finer), metres
 
+const FINER_MARGIN: f32 = 1.15;
 const ROWS_AT_ONCE: i32 = 4;
 var<workgroup> parts: array<vec4f, 64>;
 
@@ -40,14 +41,15 @@ fn distance_to_parent(job: BoundsJob, at: vec2i, z: f32) -> f32 {
   return abs(z - there);
 }
 
-// The most that the children's surface can differ from this one's: what smoothing and interpolating move, half of the bend, and the
-// next level's noise. The bend is that of the heights; the noise comes from the synthesis, coded (finer_code).
+// How far the surface of children that nobody holds can be from this one's: what interpolation makes of the bend, and the
+// next level's noise, which the synthesis left coded in the texel (finer_code). Curvature changes from sample to sample:
+// the margin takes that in.
 fn finer_at(job: BoundsJob, at: vec2i, z: f32, cell: f32) -> f32 {
   let x = height_at(job.slot, at - vec2i(1, 0)) + height_at(job.slot, at + vec2i(1, 0)) - 2.0 * z;
   let y = height_at(job.slot, at - vec2i(0, 1)) + height_at(job.slot, at + vec2i(0, 1)) - 2.0 * z;
   let code = textureLoad(attributes1, slot_origin(job.slot) + at, slot_layer(job.slot), 0).w;
   let noise = select(cell * exp2(16.0 * (code + 0.5 / 255.0) - 12.0), 0.0, code == 0.0);
-  return (abs(x) + abs(y)) * 0.125 + noise;
+  return FINER_MARGIN * ((abs(x) + abs(y)) * 0.125 + noise);
 }
 
 @compute @workgroup_size(64)
