@@ -38,6 +38,14 @@ fn detail_tint(detail: vec2f) -> vec3f {
   return mix(vec3f(0.30), hue, 0.25 + 0.75 * sqrt(detail.x));
 }
 
+// Where the selected stroke is felt: warm on its line and flanks, paling with distance; the rest of the ground goes grey.
+fn influence_tint(albedo: vec3f, felt: f32) -> vec3f {
+  let grey = vec3f(dot(albedo, vec3f(0.2126, 0.7152, 0.0722))) * 0.75 + vec3f(0.03);
+  let tint = mix(vec3f(0.48, 0.40, 0.14), vec3f(0.62, 0.11, 0.05), smoothstep(0.35, 1.0, felt));
+  let bands = smoothstep(0.47, 0.53, felt) * 0.12;
+  return mix(grey, tint * (0.45 + 1.6 * grey), clamp(smoothstep(0.02, 0.5, felt) * 0.72 + bands, 0.0, 0.9));
+}
+
 fn level_tint(level: u32) -> vec3f {
   let hue = f32(level) * 0.61803;
   return 0.5 + 0.45 * cos(6.2831853 * (vec3f(hue) + vec3f(0.0, 0.33, 0.67)));

@@ -7,7 +7,7 @@ struct TerrainVertex {
   @location(3) @interpolate(flat) record: vec4u,
   @location(4) through: vec3f,
   @location(5) glow: vec3f,
-  @location(6) detail: vec2f,
+  @location(6) detail: vec3f,
 };
 
 @vertex
@@ -26,10 +26,11 @@ fn terrain_vertex(@builtin(vertex_index) index: u32, patch_in: PatchIn) -> Terra
   return out;
 }
 
-// Noise amplitude (1 = view.amplitude metres) and roughness at a place. They are smooth: taken at the vertices.
-fn detail_at(p: vec2f) -> vec2f {
+// Noise amplitude (1 = view.amplitude metres), roughness, and how far the selected stroke is felt at a place. They are
+// smooth: taken at the vertices.
+fn detail_at(p: vec2f) -> vec3f {
   let side = vec2f(textureDimensions(channels));
-  return textureSampleLevel(channels, smooth_clamp, (p / view.size * (side - 1.0) + 0.5) / side, 0.0).xy;
+  return textureSampleLevel(channels, smooth_clamp, (p / view.size * (side - 1.0) + 0.5) / side, 0.0).xyz;
 }
 
 // What lies and grows on the ground here.
@@ -72,15 +73,18 @@ fn terrain_fragment(v: TerrainVertex) -> @location(0) vec4f {
   let world = v.relative + view.eye.xyz;
   let rate = abs(f.dx.z) + abs(f.dy.z);
   let surface = patch_surface(v.record, v.at, v.morph);
-  var site = survey(world, surface.gradient, surface.curvature, f, v.detail);
+  var site = survey(world, surface.gradient, surface.curvature, f, v.detail.xy);
   site.cover = cover_of(surface, site);
   var m = ground_material(site);
   if (view.overlay == OVERLAY_SLOPE) {
     m.albedo = mix(m.albedo, slope_tint(site.steep), 0.8);
     m.gloss = 0.0;
   } else if (view.overlay == OVERLAY_DETAIL) {
-    m.albedo = mix(m.albedo, detail_tint(v.detail), 0.8);
+    m.albedo = mix(m.albedo, detail_tint(v.detail.xy), 0.8);
     m.gloss = 0.0;
+  } else if (view.overlay == OVERLAY_INFLUENCE) {
+    m.albedo = influence_tint(m.albedo, v.detail.z);
+    m.gloss *= 1.0 - v.detail.z;
   } else if (view.overlay == OVERLAY_PATCHES) {
     m.albedo = mix(m.albedo, level_tint(patch_level(v.record)) * 0.5, 0.7);
   }

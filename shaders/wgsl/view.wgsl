@@ -40,6 +40,7 @@ const OVERLAY_CONTOURS: u32 = 1u;
 const OVERLAY_SLOPE: u32 = 2u;
 const OVERLAY_PATCHES: u32 = 3u;
 const OVERLAY_DETAIL: u32 = 4u;
+const OVERLAY_INFLUENCE: u32 = 5u;
 
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var heights: texture_2d_array<f32>;
@@ -50,7 +51,7 @@ const OVERLAY_DETAIL: u32 = 4u;
 @group(0) @binding(6) var noise: texture_2d<f32>;
 @group(0) @binding(7) var smooth_clamp: sampler;
 @group(0) @binding(8) var smooth_repeat: sampler;
-@group(0) @binding(9) var channels: texture_2d<f32>;  // noise amplitude and roughness over the domain, 0..1
+@group(0) @binding(9) var channels: texture_2d<f32>;  // over the domain, 0..1: amplitude, roughness, reach of a stroke
 
 // Clip position of a point given relative to the eye.
 fn clip_of(relative: vec3f) -> vec4f {

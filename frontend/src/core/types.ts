@@ -170,7 +170,9 @@ export interface Scene {
   readonly quality?: QualityMode;
   /** Seconds, for water and the like. */
   readonly time: number;
-  readonly overlay: "none" | "contours" | "slope" | "detail" | "patches";
+  readonly overlay: "none" | "contours" | "slope" | "detail" | "patches" | "influence";
+  /** Where the selected stroke is felt, 0..1, for the overlay of that name; null: none is selected. */
+  readonly influence?: ChannelGrid | null;
   readonly showStrokes: boolean;
 }
 

@@ -6,12 +6,12 @@ import { MAX_REFINED_LEVEL, TILE_CELLS } from "../generated/contract.ts";
 import type { Atlas } from "./atlas.ts";
 import { ChannelTexture } from "./channeltexture.ts";
 import { StructWriter, structLayout } from "./layout.ts";
-import { contourInterval, LOOKS } from "./looks.ts";
+import { adaptation, contourInterval, LOOKS } from "./looks.ts";
 import { VIEW_SOURCE } from "./shaders.ts";
 import type { SkyTables } from "./sky.ts";
 
 const MAX_CURSORS = 32;
-const OVERLAYS = { none: 0, contours: 1, slope: 2, patches: 3, detail: 4 } as const;
+const OVERLAYS = { none: 0, contours: 1, slope: 2, patches: 3, detail: 4, influence: 5 } as const;
 
 /** What a frame is drawn with besides the scene. */
 export interface FrameFacts {
@@ -113,7 +113,8 @@ export class FrameBindings {
 
   /** Writes the uniform for this frame. */
   update(scene: Scene, facts: FrameFacts): void {
-    if (this.channels.update(scene.channels) && this.atlas !== null) this.attach(this.atlas);
+    const influence = scene.overlay === "influence" ? (scene.influence ?? null) : null;
+    if (this.channels.update(scene.channels, influence) && this.atlas !== null) this.attach(this.atlas);
     this.writeCamera(scene, facts);
     const w = this.writer;
     const { settings } = scene;
@@ -127,7 +128,7 @@ export class FrameBindings {
     w.set("base", baseHeight(facts.low, size));
     w.set("sea", settings.sea_level_m ?? 0);
     w.set("has_sea", settings.sea_level_m === null ? 0 : 1);
-    w.set("exposure", look.exposure * exposureFor(settings.look === "paper" ? 90 : settings.sun_elevation_deg));
+    w.set("exposure", look.exposure * (settings.look === "paper" ? 1 : adaptation(settings.sun_elevation_deg)));
     w.set("haze", look.haze / size);
     w.set("low", facts.low);
     w.set("high", facts.high);
@@ -184,11 +185,6 @@ export class FrameBindings {
 export function baseHeight(low: number, sizeM: number): number {
   const step = sizeM / 32;
   return Math.floor((low - 0.02 * sizeM) / step) * step;
-}
-
-/** Opens up as the sun sinks, as an eye does. */
-function exposureFor(elevationDeg: number): number {
-  return 1 + 1.1 * (1 - smoothstep(0, 32, elevationDeg));
 }
 
 function smoothstep(a: number, b: number, v: number): number {

@@ -3,7 +3,7 @@
 import type { CameraState, FrameStats, Rgba, Scene, SceneRenderer, Tile, TileView } from "../core/types.ts";
 import { assembleSlot, SLOT_TEXELS } from "./apron.ts";
 import { contourInterval } from "./looks.ts";
-import { DetailPicture } from "./mapdetail.ts";
+import { DetailPicture, InfluencePicture } from "./mapdetail.ts";
 import { type MapStyle, shadeTile } from "./mapshade.ts";
 
 /** Shading stops for this frame after so many milliseconds; what is left follows in the next frames. */
@@ -35,6 +35,7 @@ export class MapRenderer implements SceneRenderer {
   private readonly context: CanvasRenderingContext2D;
   private readonly pictures = new Map<string, Picture>();
   private readonly detail = new DetailPicture();
+  private readonly felt = new InfluencePicture();
   private readonly slot = new Float32Array(SLOT_TEXELS * SLOT_TEXELS);
   private frame = 0;
 
@@ -53,7 +54,8 @@ export class MapRenderer implements SceneRenderer {
     const frame = frameOf(camera);
     drawSheet(this.context, frame, scene.tiles.sizeM);
     const { drawn, uploads, busy } = this.drawTiles(scene, frame, began);
-    if (scene.overlay === "detail") this.drawDetail(scene, frame);
+    if (scene.overlay === "detail") this.drawOver(this.detail.of(scene.channels), scene, frame);
+    if (scene.overlay === "influence" && scene.influence) this.drawOver(this.felt.of(scene.influence), scene, frame);
     drawGrid(this.context, frame, scene.tiles.sizeM);
     if (scene.showStrokes) drawStrokes(this.context, frame, scene);
     drawCursors(this.context, frame, scene);
@@ -129,12 +131,13 @@ export class MapRenderer implements SceneRenderer {
   }
 
   /** Tints the relief, which shows through. */
-  private drawDetail(scene: Scene, frame: Frame): void {
+  /** Stretches a picture of the whole domain over the sheet. */
+  private drawOver(picture: HTMLCanvasElement, scene: Scene, frame: Frame): void {
     const [left, top] = toSheet(frame, 0, scene.tiles.sizeM);
     const wide = scene.tiles.sizeM * frame.scale;
     this.context.save();
     this.context.globalAlpha = 0.6;
-    this.context.drawImage(this.detail.of(scene.channels), left, top, wide, wide);
+    this.context.drawImage(picture, left, top, wide, wide);
     this.context.restore();
   }
 

@@ -1,6 +1,6 @@
 /** The overlay of roughness and amplitude on the 2D map: one small picture of the whole domain, stretched over the sheet. */
 
-import type { ChannelView } from "../core/types.ts";
+import type { ChannelGrid, ChannelView } from "../core/types.ts";
 import { channelTexels } from "./channeltexture.ts";
 
 type Rgb = readonly [number, number, number];
@@ -40,11 +40,39 @@ export class DetailPicture {
     const image = context.createImageData(side, side);
     for (let row = 0; row < side; row += 1) {
       for (let col = 0; col < side; col += 1) {
-        const from = 2 * (row * side + col);
+        const from = 4 * (row * side + col);
         const colour = detailColour(bytes[from]! / 255, bytes[from + 1]! / 255);
         image.data.set([...colour, 255], 4 * ((side - 1 - row) * side + col));
       }
     }
+    context.putImageData(image, 0, 0);
+    return this.canvas;
+  }
+}
+
+/** The colours of influence_tint in overlay.wgsl. */
+const FELT_FAR: Rgb = [0xc9, 0xb8, 0x6e];
+const FELT_NEAR: Rgb = [0xd3, 0x5a, 0x3c];
+
+/** Where the selected stroke is felt, as a picture to lay over the map. */
+export class InfluencePicture {
+  private canvas: HTMLCanvasElement | null = null;
+  private source: ChannelGrid | null = null;
+
+  /** The picture, north up, clear where nothing is felt. */
+  of(influence: ChannelGrid): HTMLCanvasElement {
+    if (this.canvas !== null && this.source === influence) return this.canvas;
+    this.source = influence;
+    const { side, values } = influence;
+    this.canvas ??= document.createElement("canvas");
+    Object.assign(this.canvas, { width: side, height: side });
+    const context = this.canvas.getContext("2d")!;
+    const image = context.createImageData(side, side);
+    values.forEach((felt, k) => {
+      const colour = mix(FELT_FAR, FELT_NEAR, Math.min(1, Math.max(0, (felt - 0.35) / 0.65)));
+      const row = side - 1 - Math.floor(k / side);
+      image.data.set([...colour, 255 * Math.min(1, 2 * felt)], 4 * (row * side + (k % side)));
+    });
     context.putImageData(image, 0, 0);
     return this.canvas;
   }

@@ -24,6 +24,8 @@ export interface PassOptions {
   readonly blend?: boolean;
   readonly depthCompare?: GPUCompareFunction;
   readonly depthWrite?: boolean;
+  /** Bind groups after the frame's. */
+  readonly groups?: readonly GPUBindGroupLayout[];
 }
 
 const OVER: GPUBlendState = {
@@ -40,7 +42,7 @@ export function describePass(context: PassContext, options: PassOptions): GPURen
   const module = device.createShaderModule({ label: options.label, code: options.code });
   return {
     label: options.label,
-    layout: device.createPipelineLayout({ bindGroupLayouts: [context.frameLayout] }),
+    layout: device.createPipelineLayout({ bindGroupLayouts: [context.frameLayout, ...(options.groups ?? [])] }),
     vertex: {
       module,
       entryPoint: options.vertex,

@@ -7,6 +7,7 @@ import { BackgroundPass } from "./background.ts";
 import type { Gpu } from "./device.ts";
 import { FrameBindings, sunDirection } from "./frame.ts";
 import { GhostPass } from "./ghostplane.ts";
+import { LabelPass } from "./labels.ts";
 import { LightQueue } from "./lightqueue.ts";
 import { createNoiseTexture } from "./noise.ts";
 import { PatchPasses } from "./patches.ts";
@@ -36,6 +37,7 @@ interface Passes {
   readonly patches: PatchPasses;
   readonly ribbons: RibbonPass;
   readonly ghost: GhostPass;
+  readonly labels: LabelPass;
 }
 
 /** The tiles of one store on the device. */
@@ -97,7 +99,7 @@ export class GpuRenderer implements SceneRenderer {
       samples,
       detail: gpu.software ? "plain" : "rich",
     };
-    const [target, normals, sun, background, patches, ribbons, ghost] = await Promise.all([
+    const [target, normals, sun, background, patches, ribbons, ghost, labels] = await Promise.all([
       Target.create(device, format, samples),
       NormalsPass.create(device),
       SunPass.create(device, gpu.software),
@@ -105,8 +107,10 @@ export class GpuRenderer implements SceneRenderer {
       PatchPasses.create(context),
       RibbonPass.create(context),
       GhostPass.create(context),
+      LabelPass.create(context),
     ]);
-    return new GpuRenderer(canvas, gpu, { sky, frame, target, normals, sun, background, patches, ribbons, ghost });
+    const drawn = { background, patches, ribbons, ghost, labels };
+    return new GpuRenderer(canvas, gpu, { sky, frame, target, normals, sun, ...drawn });
   }
 
   render(scene: Scene): FrameStats {
@@ -206,6 +210,7 @@ export class GpuRenderer implements SceneRenderer {
     this.lookDue = !this.passes.patches.useLook(scene.settings.look);
     this.passes.ribbons.update(scene.showStrokes ? scene.strokes : [], scene.ghost, quality.scale * pixelRatio());
     this.passes.ghost.update(scene.ghost);
+    this.passes.labels.update(scene, cut.maxHeight - cut.minHeight, quality.scale * pixelRatio(), quality.scale);
     this.encode(encoder, scene, context.getCurrentTexture(), width, height);
     device.queue.submit([encoder.finish()]);
     this.measure(true);
@@ -284,7 +289,7 @@ export class GpuRenderer implements SceneRenderer {
   }
 
   private encode(encoder: GPUCommandEncoder, scene: Scene, canvas: GPUTexture, width: number, height: number): void {
-    const { target, frame, background, patches, ribbons, ghost } = this.passes;
+    const { target, frame, background, patches, ribbons, ghost, labels } = this.passes;
     const pass = encoder.beginRenderPass(target.begin(canvas, width, height));
     pass.setBindGroup(0, frame.bindGroup);
     patches.drawGround(pass);
@@ -293,6 +298,7 @@ export class GpuRenderer implements SceneRenderer {
     background.draw(pass, sea);
     if (sea) patches.drawSea(pass);
     ghost.draw(pass);
+    labels.draw(pass);
     ribbons.draw(pass);
     pass.end();
     target.finish(encoder, canvas);

@@ -51,6 +51,9 @@ function sameSettings(a: Scene["settings"], b: Scene["settings"]): boolean {
     a === b ||
     (a.look === b.look &&
       a.sea_level_m === b.sea_level_m &&
+      a.seed === b.seed &&
+      a.detail === b.detail &&
+      a.rule === b.rule &&
       a.sun_azimuth_deg === b.sun_azimuth_deg &&
       a.sun_elevation_deg === b.sun_elevation_deg)
   );
@@ -64,6 +67,7 @@ export function samePicture(a: Scene, stampA: number, b: Scene, stampB: number):
     a.channels === b.channels &&
     a.tauPx === b.tauPx &&
     a.overlay === b.overlay &&
+    (a.overlay !== "influence" || a.influence === b.influence) &&
     a.showStrokes === b.showStrokes &&
     sameCamera(a.camera, b.camera) &&
     sameSettings(a.settings, b.settings) &&

@@ -11,6 +11,7 @@ import computeSynthesis from "@shaders/wgsl/compute_synthesis.wgsl?raw";
 import detailPlain from "@shaders/wgsl/detail_plain.wgsl?raw";
 import detailRich from "@shaders/wgsl/detail_rich.wgsl?raw";
 import ghost from "@shaders/wgsl/ghost.wgsl?raw";
+import label from "@shaders/wgsl/label.wgsl?raw";
 import overlayLines from "@shaders/wgsl/lines.wgsl?raw";
 import lookAlpine from "@shaders/wgsl/look_alpine.wgsl?raw";
 import lookDesert from "@shaders/wgsl/look_desert.wgsl?raw";
@@ -73,6 +74,7 @@ export function sceneSource(part: "wall" | "background", detail: Detail): string
 export const SOURCES = {
   ribbon: join(contract, view, ribbon),
   ghost: join(contract, view, overlayLines, ghost),
+  label: join(contract, view, label),
   normals: join(contract, tile, computeNormals),
   sun: join(contract, tile, computeSun),
   sky: join(atmosphere, computeSky),

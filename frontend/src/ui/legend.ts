@@ -57,6 +57,9 @@ export class EskLegend extends SignalElement {
       .roughness {
         background: linear-gradient(to right, #3d7da3, #a9a06c 50%, #b34a58);
       }
+      .influence {
+        background: linear-gradient(to right, #a7a7a7, #d6c183 45%, #d35a3c);
+      }
       .amplitude {
         background: linear-gradient(to right, #8d8d8d, #a9a06c);
       }
@@ -67,8 +70,9 @@ export class EskLegend extends SignalElement {
 
   protected override render(): TemplateResult | typeof nothing {
     const overlay = this.stage.overlay.value;
-    this.toggleAttribute("hidden", overlay !== "slope" && overlay !== "detail");
+    this.toggleAttribute("hidden", overlay !== "slope" && overlay !== "detail" && overlay !== "influence");
     if (overlay === "slope") return scale("Steepness", "slope", ["0°", "30°", "60°"]);
+    if (overlay === "influence") return this.#influence();
     if (overlay !== "detail") return nothing;
     this.stage.channels.revision.value;
     const greatest = this.stage.channels.amplitude.values.reduce((a, b) => Math.max(a, b), 0);
@@ -76,6 +80,13 @@ export class EskLegend extends SignalElement {
       ${scale("Roughness", "roughness", ["smooth", "rough"])} ${scale("Amplitude", "amplitude", amplitudeEnds(greatest))}
       ${this.#here()}
     `;
+  }
+
+  #influence(): TemplateResult {
+    const { input, session } = this.stage;
+    const chosen = session.doc.doc.value?.strokes.has(input.selection.value ?? "") === true;
+    if (!chosen) return html`<div class="name">Select a stroke to see where it is felt.</div>`;
+    return scale("Felt from the selected stroke", "influence", ["far", "its flanks", "its line"]);
   }
 
   /** The two values under the cursor. */

@@ -2,7 +2,8 @@
 
 import { computed, effect, type ReadonlySignal, signal } from "@preact/signals-core";
 import { Camera } from "../core/camera.ts";
-import type { CursorVisual, DecodedFrame, FrameStats, Scene, StrokeVisual, Vec3 } from "../core/types.ts";
+import type { ChannelGrid, CursorVisual, DecodedFrame, FrameStats, Scene, StrokeVisual, Vec3 } from "../core/types.ts";
+import { strokeInfluence } from "../doc/influence.ts";
 import type { MemberPresence } from "../generated/contract.ts";
 import { Channel, MAX_REFINED_TILES } from "../generated/contract.ts";
 import { InputController } from "../input/controller.ts";
@@ -49,6 +50,8 @@ export class Stage {
   readonly #viewport: HTMLElement;
   readonly #strokes: ReadonlySignal<readonly StrokeVisual[]>;
   readonly #cursors: ReadonlySignal<readonly CursorVisual[]>;
+  /** Where the selected stroke is felt, while that overlay is shown. */
+  readonly #influence: ReadonlySignal<ChannelGrid | null>;
   readonly #calm = window.matchMedia("(prefers-reduced-motion: reduce)");
   readonly #stops: (() => void)[] = [];
   #fresh: FreshTiles | null = null;
@@ -89,6 +92,12 @@ export class Stage {
     });
     this.#strokes = computed(() => this.#visuals());
     this.#cursors = computed(() => cursorVisuals(session.people.value));
+    this.#influence = computed(() => {
+      if (this.overlay.value !== "influence") return null;
+      const doc = session.doc.doc.value;
+      const stroke = doc?.strokes.get(this.input.selection.value ?? "");
+      return doc && stroke ? strokeInfluence(stroke, doc.settings.reach_m, sizeM) : null;
+    });
   }
 
   #visuals(): StrokeVisual[] {
@@ -252,6 +261,7 @@ export class Stage {
       quality,
       time: this.#calm.matches ? 0 : timeS,
       overlay: this.overlay.value,
+      influence: this.#influence.value,
       showStrokes: this.showStrokes.value,
     });
     this.stats.value = stats;

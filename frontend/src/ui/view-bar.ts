@@ -18,6 +18,7 @@ export const OVERLAYS: readonly { readonly value: Scene["overlay"]; readonly lab
   { value: "contours", label: "Contour lines" },
   { value: "slope", label: "Steepness" },
   { value: "detail", label: "Roughness and amplitude" },
+  { value: "influence", label: "Reach of the selected stroke" },
   { value: "patches", label: "Levels of detail" },
 ];
 

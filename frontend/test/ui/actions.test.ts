@@ -20,7 +20,7 @@ function everyAction() {
   const commands = { panel: vi.fn(), help: vi.fn(), share: vi.fn() };
   const stage = {
     showStrokes: signal(true),
-    overlay: signal<"none" | "contours" | "slope" | "detail" | "patches">("none"),
+    overlay: signal<"none" | "contours" | "slope" | "detail" | "patches" | "influence">("none"),
   };
   const actions: Map<string, Action> = createActions({
     camera: new Camera(4096),
@@ -61,11 +61,11 @@ describe("actions", () => {
     expect([commands.help, commands.panel, commands.share].map((f) => f.mock.calls.length)).toEqual([1, 1, 1]);
     actions.get("toggle-strokes")!.run();
     expect(stage.showStrokes.value).toBe(false);
-    const overlays = Array.from({ length: 5 }, () => {
+    const overlays = Array.from({ length: 6 }, () => {
       actions.get("next-overlay")!.run();
       return stage.overlay.value;
     });
-    expect(overlays).toEqual(["contours", "slope", "detail", "patches", "none"]);
+    expect(overlays).toEqual(["contours", "slope", "detail", "influence", "patches", "none"]);
   });
 
   // To write the table anew: ESKER_WRITE_GUIDE=1 npx vitest run test/ui/actions
