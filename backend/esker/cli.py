@@ -1,4 +1,4 @@
-"""``esker serve | solve | bench | --version``; ``python -m esker`` is the same."""
+"""``esker serve | solve | render | bench | --version``; ``python -m esker`` is the same."""
 
 from __future__ import annotations
 
@@ -16,9 +16,11 @@ from esker.version import VERSION
 def main(argv: list[str] | None = None) -> int:
     """Runs a command; returns the exit status."""
     arguments = sys.argv[1:] if argv is None else argv
-    # What follows `solve` and `bench NAME` belongs to those commands, options and --help included.
+    # What follows `solve`, `render` and `bench NAME` belongs to those commands, options and --help included.
     if arguments[:1] == ["solve"]:
         return _run("esker.solve.command", arguments[1:])
+    if arguments[:1] == ["render"]:
+        return _run("esker.render.command", arguments[1:])
     if arguments[:1] == ["bench"] and len(arguments) > 1 and not arguments[1].startswith("-"):
         return _bench(arguments[1], arguments[2:])
     parsed = _parser().parse_args(arguments)
@@ -49,6 +51,7 @@ def _parser() -> argparse.ArgumentParser:
     serve.add_argument("--threads", type=int, help="threads of a CPU device (default: cores - 1)")
     serve.add_argument("--log-level", choices=("debug", "info", "warning", "error"))
     commands.add_parser("solve", help="solve a terrain file into heights (see esker solve --help)", add_help=False)
+    commands.add_parser("render", help="draw a terrain: pictures, turntables (see esker render --help)", add_help=False)
     commands.add_parser("bench", help="measure: esker bench NAME --json (without NAME: the list)", add_help=False)
     return parser
 

@@ -27,6 +27,8 @@ LARGEST_PART: Final = 2048
 """Pixels along a side that are drawn at once; larger pictures are put together."""
 SAMPLES: Final = 4
 ANISOTROPY: Final = 8.0
+NO_ANISOTROPY: Final = ("llvmpipe", "softpipe")
+"""Mesa's software drivers do not come back from anisotropic look-ups in multisampled passes (seen with Mesa 22.3)."""
 COARSER: Final = 1.25
 """Factor on the screen error while a picture would need more tiles than the atlas holds."""
 
@@ -121,13 +123,14 @@ class Reference:
     def _samplers(self) -> dict[str, moderngl.Sampler]:
         linear = (moderngl.LINEAR, moderngl.LINEAR)
         plain = self._detail == "plain"
+        sharp = not plain and not any(name in self.device for name in NO_ANISOTROPY)
         mips = (moderngl.LINEAR_MIPMAP_NEAREST if plain else moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
         return {
             "nearest": self.context.sampler(
                 repeat_x=False, repeat_y=False, filter=(moderngl.NEAREST, moderngl.NEAREST)
             ),
             "smooth_clamp": self.context.sampler(repeat_x=False, repeat_y=False, filter=linear),
-            "smooth_repeat": self.context.sampler(filter=mips, anisotropy=1.0 if plain else ANISOTROPY),
+            "smooth_repeat": self.context.sampler(filter=mips, anisotropy=ANISOTROPY if sharp else 1.0),
         }
 
     def _noise_texture(self) -> moderngl.Texture:

@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 
 from esker.contract import PATCH_CELLS, SUBPATCHES, TILE_CELLS, TILE_SAMPLES
 from esker.render.select import Floats, Ints
-from esker.synthesis.site import BORDER, Site, extended, tile_window
-from esker.synthesis.state import State
-from esker.synthesis.subdivide import Samples, root, subdivide, whole
+from esker.synthesis.detailed import DetailedTerrain
+from esker.synthesis.site import BORDER, extended, tile_window
+from esker.synthesis.state import Array, State
+from esker.synthesis.subdivide import Samples, interpolated, root, subdivide, whole
 
 SLOT: Final = TILE_SAMPLES + 2 * BORDER
 DECAY: Final = 0.7
@@ -43,30 +44,47 @@ class _Sub(NamedTuple):
     error: Floats
 
 
+class _Made(NamedTuple):
+    """Samples of one tile with its border, and its heights without detail, metres."""
+
+    samples: Samples
+    base: Array
+
+
 class Surface:
     """The ground that is drawn; ``select.Figures``."""
 
     def __init__(
-        self, size_m: float, levels: Sequence[NDArray[np.float32]], site: Site | None = None, top: int = 0
+        self,
+        size_m: float,
+        levels: Sequence[NDArray[np.float32]],
+        terrain: DetailedTerrain | None = None,
+        top: int = 0,
     ) -> None:
-        """``levels``: solved heights of levels 0..G, (N, N) metres. ``site``: detail is added to them, on levels up to
-        ``top``; without, the ground ends at level G."""
+        """``levels``: solved heights of levels 0..G, (N, N) metres. ``terrain``: its detail is added to them, on levels
+        up to ``top``; without, the ground ends at level G."""
         self.size_m = size_m
         self.solved = len(levels) - 1
-        self.levels = self.solved if site is None else max(top, self.solved)
-        self._site = site
+        self.levels = self.solved if terrain is None else max(top, self.solved)
+        self._terrain = terrain
         self._whole: list[Samples] = []
         self._heights: list[NDArray[np.float32]] = []
         for level, heights in enumerate(levels):
-            if site is None:
-                self._heights.append(extended(heights, whole(level), cyclic=False).astype(np.float32))
+            if terrain is None:
+                self._heights.append(extended(heights, whole(level)).astype(np.float32))
             else:
+                site = terrain.site
                 made = root(site) if level == 0 else subdivide(self._whole[-1], whole(level), site)
                 self._whole.append(made)
                 self._heights.append((made.guide + made.state.d).astype(np.float32))
-        self._made: dict[Tile, Samples] = {}
+        self._made: dict[Tile, _Made] = {}
         self._subs: dict[Tile, _Sub] = {}
         self._bounds = self._merge()
+
+    @classmethod
+    def of(cls, terrain: DetailedTerrain, top: int) -> Surface:
+        """The ground of a settled terrain with its detail."""
+        return cls(terrain.site.size_m, terrain.site.guides, terrain, top)
 
     def bounds(self, level: int, nodes: Ints) -> tuple[Floats, Floats, Floats]:
         """See ``select.Figures``."""
@@ -88,10 +106,10 @@ class Surface:
         """The samples of a tile. Raises ValueError outside of the domain or above ``levels``."""
         if not (0 <= level <= self.levels and 0 <= x < 1 << level and 0 <= y < 1 << level):
             raise ValueError(f"there is no tile ({level}, {x}, {y})")
-        if self._site is None:
+        if self._terrain is None:
             return SlotData(self._heights[level][_within(level, x, y)], None)
-        made = self._samples(level, x, y)
-        return SlotData((made.guide + made.state.d).astype(np.float32), made.state)
+        made = self._tile(level, x, y)
+        return SlotData((made.base + made.samples.state.d).astype(np.float32), made.samples.state)
 
     def height_at(self, x_m: float, y_m: float, level: int | None = None) -> float:
         """Height of the ground at a place, bilinear in the samples of a level (default: the finest solved one)."""
@@ -108,18 +126,24 @@ class Surface:
 
     # --- what is behind them
 
-    def _samples(self, level: int, x: int, y: int) -> Samples:
+    def _tile(self, level: int, x: int, y: int) -> _Made:
         """Samples of one tile with its border, through those of its ancestors."""
         window = tile_window(level, x, y)
         if level <= self.solved:
             held = self._whole[level]
             at = window.within(held.window)
-            return Samples(window, held.guide[at], State(*(a[at] for a in held.state)))
+            samples = Samples(window, held.guide[at], State(*(a[at] for a in held.state)))
+            return _Made(samples, samples.guide)
         found = self._made.get((level, x, y))
         if found is None:
-            assert self._site is not None
-            parent = self._samples(level - 1, x >> 1, y >> 1)
-            found = self._made[level, x, y] = subdivide(parent, window, self._site)
+            assert self._terrain is not None
+            parent, site = self._tile(level - 1, x >> 1, y >> 1), self._terrain.site
+            samples = subdivide(parent.samples, window, site)
+            if level <= self._terrain.finest:
+                base: Array = self._terrain.base(window).astype(np.float64)
+            else:
+                base = interpolated(parent.base, parent.samples.window, window, site.rule)
+            found = self._made[level, x, y] = _Made(samples, base)
         return found
 
     def _sub(self, level: int, x: int, y: int) -> _Sub:
