@@ -27,7 +27,7 @@ struct FineNoise {
 
 fn fine_noise(p: vec3f, n: vec3f, f: Footprint, coarse: vec4f) -> FineNoise {
   let medium = ground_noise(p, f, 31.0, vec2f(0.707, -0.707));
-  return FineNoise(medium, vec4f(medium.g, medium.r, medium.ba));
+  return FineNoise(medium, vec4f(medium.g, medium.r, 0.5, 0.5));
 }
 
 fn ripple_slope(along: vec2f, phase: f32, footprint: f32) -> vec2f {

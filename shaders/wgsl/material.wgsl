@@ -52,8 +52,8 @@ fn survey(p: vec3f, gradient: vec2f, curvature: f32, f: Footprint, detail: vec2f
   s.gain = relief_gain(detail);
   s.macro1 = ground_noise(p, f, view.size * 1.37, vec2f(0.917, -0.399));
   s.macro2 = ground_noise(p, f, view.size * 0.27, vec2f(0.602, 0.799));
-  // The finer layers are pushed about by the broader one: what repeats is not seen to repeat.
-  let bent = p + vec3f((s.macro2.ba - 0.5) * 90.0, (s.macro1.r - 0.5) * 40.0);
+  // The finer layers are pushed about by the broadest one: what repeats is not seen to repeat.
+  let bent = p + vec3f((s.macro1.rg - 0.5) * 150.0, 0.0);
   s.fine1 = rock_noise(bent, n, f, 211.0);
   let fine = fine_noise(bent, n, f, s.fine1);
   s.fine2 = fine.medium;
@@ -87,8 +87,10 @@ fn steeper(s: Site, at: f32, soft: f32) -> f32 {
   return smoothstep(at - soft, at + soft, s.steep + (s.fine1.r - 0.5) * 0.36 * s.gain.y + (s.macro2.r - 0.5) * 0.22);
 }
 
+// Where the eye is near, the ground's own samples show the relief that a layer stands for further off.
 fn fine_slope(s: Site, strength: f32) -> vec2f {
-  let g = strength * s.gain;
+  let near = 0.30 + 0.70 * smoothstep(vec4f(0.0), vec4f(6.0, 1.0, 0.16, 0.020), vec4f(s.footprint));
+  let g = strength * s.gain * near;
   return 0.20 * g.x * noise_slope(s.macro2) + 0.40 * g.y * noise_slope(s.fine1) + 0.42 * g.z * noise_slope(s.fine2)
     + 0.36 * g.w * noise_slope(s.fine3);
 }

@@ -55,7 +55,8 @@ fn shade(m: Material, gradient: vec2f, surface: Surface, dir: vec3f) -> vec3f {
   let b = -4.7951 * m.albedo + vec3f(0.6417);
   let c = 2.7552 * m.albedo + vec3f(0.6903);
   let lit = max(vec3f(open), ((open * a + b) * open + c) * open);
-  let sky = ambient_light(n) * lit;
+  // The lit land around adds to what comes from a clear sky.
+  let sky = ambient_light(n) * lit * 1.35;
   // From the sunlit slopes around, strongest where little sky is seen.
   let bounce = sun_light() * (0.32 * max(view.sun.z, 0.0) / 3.14159265) * (1.0 - open) * (m.albedo * 0.5 + vec3f(0.12));
   var colour = m.albedo * (sun + sky + bounce);

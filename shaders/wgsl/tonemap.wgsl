@@ -21,7 +21,7 @@ fn tone_map(linear: vec3f) -> vec3f {
   let v = clamp((log2(inset * exposed) - low) / (high - low), vec3f(0.0), vec3f(1.0));
   var c = agx_curve(v);
   // A little more contrast and colour than the neutral base.
-  c = pow(max(c, vec3f(0.0)), vec3f(1.32));
+  c = pow(max(c, vec3f(0.0)), vec3f(1.27));
   c = mix(vec3f(dot(c, vec3f(0.2126, 0.7152, 0.0722))), c, 1.34);
   return clamp(outset * c, vec3f(0.0), vec3f(1.0));
 }
