@@ -430,7 +430,7 @@ def drawn_parent(samples: NDArray[np.float32], east: int, north: int) -> NDArray
     rows, cols = low + 32 * north + BORDER, low + 32 * east + BORDER
     one = samples[np.ix_(rows, cols + odd)]
     two = samples[np.ix_(rows + odd, cols)]
-    return np.float32(0.5) * (one + two)
+    return np.asarray(np.float32(0.5) * (one + two), np.float32)
 
 
 def test_attribute_texels_show_the_state() -> None:

@@ -15,6 +15,7 @@ import { openGpu } from "../../src/gpu/device.ts";
 import { createMapRenderer, createRenderer } from "../../src/gpu/index.ts";
 import { GpuRenderer } from "../../src/gpu/renderer.ts";
 import { crackTest, deepCrackTest } from "./cracks.ts";
+import { synthesisVectors } from "./synthesis.ts";
 import { alpineField, FieldView, lookAt, mapCamera, PLAIN_CHANNELS } from "./world.ts";
 
 export const SETTINGS: TerrainSettings = {
@@ -246,4 +247,6 @@ async function morph(shot: Shot, rounds: number): Promise<{ uploads: number; cpu
   return { uploads, cpuMs };
 }
 
-Object.assign(globalThis, { esker: { morph, load, shoot, picture, circle, crackTest, deepCrackTest } });
+Object.assign(globalThis, {
+  esker: { morph, load, shoot, picture, circle, crackTest, deepCrackTest, synthesisVectors },
+});

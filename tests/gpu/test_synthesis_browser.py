@@ -1,0 +1,26 @@
+"""The page's synthesis passes in a real Chromium, on its software adapter (SPEC R26, R30)."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from tests.gpu.page import open_harness
+
+VECTORS = Path(__file__).parents[1] / "vectors" / "synthesis.json"
+
+
+def test_the_browser_makes_what_the_vectors_say() -> None:
+    """R26, R30: every rule, channel and domain of the vectors, from the root to cells of 8 mm; bounds are read back."""
+    vectors = json.loads(VECTORS.read_text())
+    with open_harness() as page:
+        found = page.evaluate("(vectors) => esker.synthesisVectors(vectors)", vectors)
+    assert len(found) == len(vectors["places"]) > 100
+    for place in found:
+        # A few units in the last place of float32 heights, gathered over the levels.
+        rounding = 5 * 2.0**-23 * max(abs(height) for height in place["range"])
+        assert place["ground"] <= max(vectors["metres"] * place["cellM"], rounding), place
+        assert place["detail"] <= max(vectors["metres"] * place["cellM"], rounding), place
+        # Rounding of heights over the cell is what slopes are wrong by; channels follow slopes loosely on fine levels.
+        assert place["halves"] <= vectors["unorm"] + 0.3 * 65535 * rounding / place["cellM"], place
+        assert place["bounds"] == place["range"], place
