@@ -4,7 +4,7 @@
  */
 
 import { type ReadonlySignal, signal } from "@preact/signals-core";
-import { isUnderAny, keyLevel, tileKey } from "../core/tilekey.ts";
+import { isUnderAny, keyLevel, keyX, keyY, tileKey } from "../core/tilekey.ts";
 import type { ChannelGrid, ChannelView, DecodedFrame } from "../core/types.ts";
 import {
   AMPLITUDE_QUANTA_PER_M,
@@ -14,6 +14,7 @@ import {
   BIAS_QUANTA,
   Channel,
   FrameKind,
+  type PaintChannel,
   ROUGHNESS_QUANTA,
   TILE_CELLS,
   TILE_SAMPLES,
@@ -81,6 +82,11 @@ export class ChannelStore implements ChannelView {
     return sampleGrid(this.amplitude, x / this.sizeM, y / this.sizeM);
   }
 
+  /** What strokes ask of any channel at a place: metres of amplitude, roughness 0..1, biases -1..1. */
+  valueAt(channel: PaintChannel, x: number, y: number): number {
+    return sampleGrid(this[channel], x / this.sizeM, y / this.sizeM);
+  }
+
   /** Roughness 0..1 at a place; outside the domain that of the nearest border. */
   roughnessAt(x: number, y: number): number {
     return sampleGrid(this.roughness, x / this.sizeM, y / this.sizeM);
@@ -91,12 +97,24 @@ export class ChannelStore implements ChannelView {
     this.stale = true;
   }
 
+  /**
+   * The ground of the new connection is here. What was held goes now if no frame of a channel came with it: a channel
+   * of which nobody asks anything any more is not sent.
+   */
+  renewed(): void {
+    if (!this.stale) return;
+    this.stale = false;
+    for (const { tiles } of this.streams.values()) {
+      if (tiles.size > 0) this.rev.value += 1;
+      tiles.clear();
+    }
+  }
+
   /** Applies a frame of one of the channels; heights are none of its business. */
   apply(frame: DecodedFrame): void {
     const into = this.streams.get(frame.channel);
     if (into === undefined) return;
-    if (this.stale) for (const { tiles } of this.streams.values()) tiles.clear();
-    this.stale = false;
+    this.renewed();
     const gone = new Set(frame.drops.map((d) => tileKey(frame.level, d.x, d.y)));
     if (gone.size > 0)
       for (const key of into.tiles.keys()) if (isUnderAny(key, gone, frame.level)) into.tiles.delete(key);
@@ -124,7 +142,7 @@ function compose({ tiles, quanta, base }: Stream): ChannelGrid {
   const values = new Float32Array(side * side);
   for (const [key, samples] of tiles) {
     if (keyLevel(key) !== level) continue;
-    const origin = ((key >> 12) & 0xfff) * TILE_CELLS * side + (key & 0xfff) * TILE_CELLS;
+    const origin = keyY(key) * TILE_CELLS * side + keyX(key) * TILE_CELLS;
     for (let row = 0; row < TILE_SAMPLES; row += 1)
       for (let col = 0; col < TILE_SAMPLES; col += 1)
         values[origin + row * side + col] = samples[row * TILE_SAMPLES + col]! / quanta + base;
