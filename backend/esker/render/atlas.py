@@ -7,13 +7,14 @@ from typing import Final
 
 import moderngl
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from esker.contract import MAX_SYNTHESIS_LEVEL, TILE_SAMPLES
 from esker.render import sources
 from esker.render.layout import StructLayout
-from esker.render.programs import Compute, Resources
+from esker.render.programs import Compute, Resources, Textured
 from esker.render.surface import SLOT, SlotData, Surface, Tile
+from esker.render.wgsl_tree import Module
 from esker.synthesis.state import H_SCALE, State
 
 SLOTS_ACROSS: Final = 16
@@ -61,10 +62,12 @@ class Atlas:
         """Gradients, then sun and sky visibility of all tiles."""
         jobs = np.array([(slot, *tile) for tile, slot in self.slots.items()], dtype=np.uint32)
         pages = self._context.buffer(page_table(self.slots).tobytes())
-        for compute, module, head, images in (
+        under: dict[str, ArrayLike] = {"high": high, "sun": [*direction, PENUMBRA]}
+        passes: list[tuple[Compute, Module, dict[str, ArrayLike], dict[str, Textured]]] = [
             (normals, sources.normals(), {}, {"slopes_out": self.slopes}),
-            (sun, sources.sun(), {"high": high, "sun": [*direction, PENUMBRA]}, {"light_out": self.light}),
-        ):
+            (sun, sources.sun(), under, {"light_out": self.light}),
+        ]
+        for compute, module, head, images in passes:
             layout = StructLayout(module, "JobList" if "JobList" in module.declarations else "SunList")
             for first in range(0, len(jobs), JOBS):
                 some = jobs[first : first + JOBS]
@@ -73,7 +76,7 @@ class Atlas:
                 data[at : at + some.nbytes] = some.tobytes()
                 buffers = {"list": self._context.buffer(bytes(data)), "pages": pages}
                 nearest = self._context.sampler(filter=(moderngl.NEAREST, moderngl.NEAREST))
-                resources = Resources(self.textures, {"nearest": nearest}, buffers, images)
+                resources = Resources(dict(self.textures), {"nearest": nearest}, buffers, images)
                 compute.run(resources, (GROUPS, GROUPS, len(some)))
 
     def release(self) -> None:

@@ -23,7 +23,7 @@ class NoGraphics(RuntimeError):
 def open_context() -> moderngl.Context:
     """A context of OpenGL 4.3 or later by EGL, with depth from 0 to 1 where that can be had. Raises NoGraphics."""
     try:
-        context = moderngl.create_context(require=GL_VERSION, standalone=True, backend="egl")
+        context = moderngl.create_context(require=GL_VERSION, standalone=True, backend="egl")  # type: ignore[arg-type]
     except Exception as error:  # what comes depends on the driver and on the libraries that are missing
         reason = str(error).strip().splitlines()[-1] if str(error).strip() else type(error).__name__
         raise NoGraphics(

@@ -20,7 +20,7 @@ OVERLAYS: Final[dict[str, int]] = {"none": 0, "contours": 1, "slope": 2, "patche
 class LookFigures(NamedTuple):
     """Of a look: number in view.wgsl, exposure, optical depth of the haze across the domain, strength of contours."""
 
-    index: int
+    number: int
     exposure: float
     haze: float
     contours: float
@@ -96,7 +96,7 @@ def view_values(scene: Scene, rect: Rect, low: float, high: float, amplitude: fl
         "grid": 1 - _smoothstep(0.02, 0.1, relief / settings.size_m),
         "contour": contour_interval(relief),
         "contour_strength": look.contours if relief > 0 else 0.0,
-        "look": look.index,
+        "look": look.number,
         "amplitude": amplitude,
         "overlay": OVERLAYS[scene.overlay],
     }

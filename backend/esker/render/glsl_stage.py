@@ -105,11 +105,11 @@ def _resources(used: Used, bindings: Bindings) -> list[str]:
         lines.append(_block(name, variable, kind, bindings))
     for (texture, sampler), name in used.samplers.items():
         variable = used.variables[texture]
-        shape = type_of(variable.type, variable.line)
-        assert isinstance(shape, Texture)
+        found = type_of(variable.type, variable.line)
+        assert isinstance(found, Texture)
         unit = bindings.samplers.setdefault((texture, sampler), len(bindings.samplers))
-        prefix = {"f32": "", "i32": "i", "u32": "u"}[shape.scalar]
-        lines.append(f"layout(binding = {unit}) uniform {prefix}sampler{'2DArray' if shape.array else '2D'} {name};")
+        prefix = {"f32": "", "i32": "i", "u32": "u"}[found.scalar]
+        lines.append(f"layout(binding = {unit}) uniform {prefix}sampler{'2DArray' if found.array else '2D'} {name};")
     return lines
 
 

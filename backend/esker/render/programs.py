@@ -50,14 +50,17 @@ _EVALUATION: Final = Feed(
 )
 
 
+Textured = moderngl.Texture | moderngl.TextureArray
+
+
 @dataclass
 class Resources:
     """What programs may bind, by the names of WGSL variables."""
 
-    textures: dict[str, moderngl.Texture | moderngl.TextureArray] = field(default_factory=dict)
+    textures: dict[str, Textured] = field(default_factory=dict)
     samplers: dict[str, moderngl.Sampler] = field(default_factory=dict)
     buffers: dict[str, moderngl.Buffer] = field(default_factory=dict)
-    images: dict[str, moderngl.Texture | moderngl.TextureArray] = field(default_factory=dict)
+    images: dict[str, Textured] = field(default_factory=dict)
 
     def bind(self, bindings: Bindings) -> None:
         """Binds all that a program needs. Raises KeyError for what is not there."""

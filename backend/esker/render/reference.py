@@ -241,7 +241,7 @@ class Reference:
         if sea:
             self.context.enable(moderngl.BLEND)
             over = (moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA)
-            self.context.blend_func = (*over, moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA)
+            self.context.blend_func = (*over, moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA)  # type: ignore[assignment]
             run("water", records.wet, records.wet_count, writes=False)
             self.context.disable(moderngl.BLEND)
         target.depth_mask = True

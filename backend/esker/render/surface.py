@@ -93,7 +93,7 @@ class Surface:
             low, high, error = self._bounds[level]
             return low[py, px], high[py, px], error[py, px]
         out = np.empty((3, len(nodes)))
-        tiles = {}
+        tiles: dict[tuple[int, int], list[int]] = {}
         for k, (x, y) in enumerate((nodes // SUBPATCHES).tolist()):
             tiles.setdefault((x, y), []).append(k)
         for (x, y), at in tiles.items():

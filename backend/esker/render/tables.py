@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 
 
 def _hash(x: NDArray[np.uint32], y: NDArray[np.uint32], seed: int) -> NDArray[np.uint32]:
-    h = (x * np.uint32(0x27D4EB2D)) ^ (y * np.uint32(0x165667B1)) ^ np.uint32((seed * 0x9E3779B9) & 0xFFFFFFFF)
+    h = (x * np.uint32(0x27D4EB2D)) ^ (y * np.uint32(0x165667B1)) ^ np.uint32((seed * 0x9E3779B1) & 0xFFFFFFFF)
     h = (h ^ (h >> np.uint32(15))) * np.uint32(0x85EBCA6B)
     h = (h ^ (h >> np.uint32(13))) * np.uint32(0xC2B2AE35)
     return np.asarray(h ^ (h >> np.uint32(16)))
@@ -52,7 +52,7 @@ def _sum(first: int, seed: int, decay: float, shape: Callable[[Floats], Floats])
     field = out.astype(np.float64)
     mean = field.mean()
     scaled = 0.5 + (field - mean) * (DEVIATION / np.sqrt(((field - mean) ** 2).mean()))
-    return np.clip(scaled, 0, 1).astype(np.float32).astype(np.float64)
+    return np.asarray(np.clip(scaled, 0, 1).astype(np.float32), dtype=np.float64)
 
 
 @cache

@@ -208,7 +208,8 @@ class _Parser:
             if not self._take(","):
                 self._expect(")")
                 break
-        result, result_attributes = None, ()
+        result: TypeRef | None = None
+        result_attributes: tuple[Attribute, ...] = ()
         if self._take("->"):
             result_attributes = self._attributes()
             result = self._type()
