@@ -24,8 +24,8 @@ Heights = NDArray[np.float32]
 class StreamedGround:
     """What the server has sent and not taken back. All public methods may be called from any thread.
 
-    Heights and amplitude in metres, roughness 0..1; float32, [row, col], row 0 south. They are those of the newest
-    frames, a preview while somebody draws; ``wait`` returns when they are final.
+    Heights and amplitude in metres, roughness 0..1, paint of the other channels -1..1; float32, [row, col], row 0
+    south. They are those of the newest frames, a preview while somebody draws; ``wait`` returns when they are final.
     """
 
     def __init__(
@@ -77,12 +77,24 @@ class StreamedGround:
         return self._whole(level, Channel.HEIGHT)
 
     def amplitude(self, level: int) -> Heights:
-        """Noise amplitude, a whole level: up to two below the finest that is solved. Raises KeyError."""
-        return self._whole(level, Channel.AMPLITUDE)
+        """Noise amplitude, metres. See ``channel``."""
+        return self.channel("amplitude", level)
 
     def roughness(self, level: int) -> Heights:
-        """Roughness, a whole level: up to two below the finest that is solved. Raises KeyError."""
-        return self._whole(level, Channel.ROUGHNESS)
+        """Roughness, 0..1. See ``channel``."""
+        return self.channel("roughness", level)
+
+    def channel(self, name: c.PaintChannel, level: int) -> Heights:
+        """A channel that strokes and paint speak of, a whole level, (N_l, N_l): up to two below the finest solved.
+
+        Its base everywhere while nobody has asked anything of it. Raises KeyError naming a tile that is not here.
+        """
+        channel = Channel[name.upper()]
+        with self._changed:
+            if not self._decoder.channels[channel]:
+                n = grid.samples(level)
+                return values(np.zeros((n, n), dtype=np.int32), channel)
+        return self._whole(level, channel)
 
     def _at_rest(self) -> bool:
         found = self._progress

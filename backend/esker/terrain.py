@@ -71,12 +71,37 @@ class Stroke:
         """A plateau outline or a level ridge: points (n, 3), all at the height of the first."""
         p = _points(points)
         p[:, 2] = p[0, 2]
-        steps = np.diff(p[:, :2], axis=0)
-        length = float(np.hypot(steps[:, 0], steps[:, 1]).sum())
-        gap = np.hypot(*(p[:, :2] - p[0, :2]).T)
-        far = int(np.argmax(gap)) if gap[-1] < LOOP_FRACTION * length else -1
-        first, last = _vec(p[0]), _vec(p[far])
+        first, last = _ends(p)
         return _stroke("level", first, last, level_curve(p, first, last), left, right, fields)
+
+    @staticmethod
+    def paint(
+        points: ArrayLike,
+        channel: contract.PaintChannel,
+        value: float = 1.0,
+        radius_m: float = contract.DEFAULT_SIZE_M / 50,
+        **fields: Any,
+    ) -> contract.Stroke:
+        """A line of paint on the ground: points (n, 2), or (n, 3) whose heights do not matter.
+
+        Within ``radius_m`` of it one channel of the detail is raised or lowered: "snow", "grass", "forest", "wetness",
+        "roughness" or "amplitude", by ``value`` from -1 (none of it) to 1 (all of it). No height is constrained.
+        """
+        p = np.asarray(points, dtype=np.float64)
+        p = _points(np.column_stack([p, np.zeros(len(p))]) if p.ndim == 2 and p.shape[1] == 2 else p)
+        p[:, 2] = 0.0
+        first, last = _ends(p)
+        paint = contract.Paint(channel=channel, value=float(value), radius_m=float(radius_m))
+        return _stroke("paint", first, last, level_curve(p, first, last), None, None, {**fields, "paint": paint})
+
+
+def _ends(p: NDArray[np.float64]) -> tuple[Vec3, Vec3]:
+    """Anchors of a level frame: the ends of the line, or of a loop its first point and the farthest from it."""
+    steps = np.diff(p[:, :2], axis=0)
+    length = float(np.hypot(steps[:, 0], steps[:, 1]).sum())
+    gap = np.hypot(*(p[:, :2] - p[0, :2]).T)
+    far = int(np.argmax(gap)) if gap[-1] < LOOP_FRACTION * length else -1
+    return _vec(p[0]), _vec(p[far])
 
 
 def _points(points: ArrayLike) -> NDArray[np.float64]:

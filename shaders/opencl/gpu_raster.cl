@@ -98,10 +98,10 @@ void rasterise(TABLE_ARGUMENTS, int by0, global const int *windows, int n, int p
     gradient_f[o + stride] = c.gradient_fy;
 }
 
-// The same for amplitude and roughness, as differences from their base: d one channel, f two.
+// The same for one of the other channels, as in raster.cl.
 kernel __attribute__((reqd_work_group_size(BIN, BIN, 1)))
-void rasterise_channels(TABLE_ARGUMENTS, int by0, global const int *windows, int n, int pitch, int stride,
-                        global float *d, global float *f) {
+void rasterise_channel(TABLE_ARGUMENTS, int by0, global const int *windows, int n, int pitch, int stride,
+                       global float *d, global float *f, float screening, int covered) {
     local int least_bits;
     local uint marks[BIN_ITEMS / 32];
     int j = get_group_id(1), bx = windows[2 * j] + get_group_id(0), by = by0 + j;
@@ -110,10 +110,10 @@ void rasterise_channels(TABLE_ARGUMENTS, int by0, global const int *windows, int
     int gx = bx * BIN + get_local_id(0), gy = by * BIN + get_local_id(1);
     sums_t sum = gather(&t, bx, by, gx, gy, n, &least_bits, marks, 1);
     if (gx >= n || gy >= n) return;
-    constraint_t c;
-    conclude_two(&c, &sum);
     size_t o = (size_t)(gy - row0 * BIN) * pitch + gx - column0 * BIN;
-    d[o] = c.gradient_d;
-    f[o] = c.gradient_fx;
-    f[o + stride] = c.gradient_fy;
+    float stiffness, pull, cover;
+    conclude_channel(&stiffness, &pull, &cover, &sum, screening);
+    d[o] = stiffness;
+    f[o] = pull;
+    if (covered) f[o + stride] = cover;
 }

@@ -142,9 +142,10 @@ kernel void rasterise(TABLE_ARGUMENTS, int by0, global const int *windows, int n
     }
 }
 
-// The same for amplitude and roughness, as differences from their base: d one channel, f two.
-kernel void rasterise_channels(TABLE_ARGUMENTS, int by0, global const int *windows, int n, int pitch, int stride,
-                               global float *d, global float *f) {
+// The same for one of the other channels, as differences from its base; where `covered`, f has a second channel, which
+// is its cover.
+kernel void rasterise_channel(TABLE_ARGUMENTS, int by0, global const int *windows, int n, int pitch, int stride,
+                              global float *d, global float *f, float screening, int covered) {
     int j = get_global_id(1), bx = windows[2 * j] + get_global_id(0), by = by0 + j, rows = min(BIN, n - by * BIN);
     if (bx >= windows[2 * j + 1]) return;
     tables_t t = TABLES;
@@ -152,10 +153,10 @@ kernel void rasterise_channels(TABLE_ARGUMENTS, int by0, global const int *windo
     gather(sums, &t, bx, by, rows, 1);
     size_t o = (size_t)(by - row0) * BIN * pitch + PAD + (bx - column0) * BIN;
     for (int y = 0; y < rows; y++, o += pitch) {
-        constraint_t c;
-        conclude_two(&c, sums + y);
-        vstore16(c.gradient_d, 0, d + o);
-        vstore16(c.gradient_fx, 0, f + o);
-        vstore16(c.gradient_fy, 0, f + stride + o);
+        float16 stiffness, pull, cover;
+        conclude_channel(&stiffness, &pull, &cover, sums + y, screening);
+        vstore16(stiffness, 0, d + o);
+        vstore16(pull, 0, f + o);
+        if (covered) vstore16(cover, 0, f + stride + o);
     }
 }

@@ -288,8 +288,8 @@ INLINE REAL skirt(const band_t *b, float cliff, REAL *width, REAL *height, REAL 
 }
 
 // Weight of a stroke beside others by the distance from its crest (reference_section.nearness).
-INLINE REAL nearness(const band_t *b, float s) {
-    REAL q = b->ds / fmax(NEAR_SHARE * b->end, 2.0f * s);
+INLINE REAL nearness(const band_t *b, const tables_t *t) {
+    REAL q = b->ds / fmax(NEAR_SHARE * b->end, NEAR_FLOOR * t->octave);
     return 1.0f / (1.0f + q * q);
 }
 
@@ -327,7 +327,7 @@ INLINE void cross_section(sums_t *sum, const nearest_t *near, MASK inside, globa
     lift = select(one, lift, b.has);
     REAL sign = select(one, -one, near->height < 0.0f);
     REAL down = select(zero, lift * near->rate - sign * fall, b.has && near->distance > p[P_PLATEAU] && !inside);
-    REAL near_weight = nearness(&b, t->s), inner = fmax(1.0f - r, 0.0f), outer = fmax(1.0f - rt / toe_end, 0.0f);
+    REAL near_weight = nearness(&b, t), inner = fmax(1.0f - r, 0.0f), outer = fmax(1.0f - rt / toe_end, 0.0f);
     REAL fade = select(zero, select(b.present * (1.0f - free), one, b.hard), reached);
     REAL toe = select(zero, b.present * (1.0f - smooth((rt - 1.0f) / (toe_end - 1.0f))), reached && b.has);
     REAL w = near_weight * (fade * select(inner * inner + TINY, one, b.hard) + select(zero, skirted, reached));
@@ -347,17 +347,23 @@ INLINE void cross_section(sums_t *sum, const nearest_t *near, MASK inside, globa
     sum->hard = select(sum->hard, one, b.hard && reached);
 }
 
-// Adds what one stroke says of amplitude and roughness to gx, gy (weights in g, knowledge in toe) (DESIGN 5.4).
+// Adds what one stroke, a crest or a brush, says of a channel to gx (weights in g, knowledge in toe) (DESIGN 5.4).
 INLINE void channel_section(sums_t *sum, const nearest_t *near, MASK inside, global const float *p, const tables_t *t) {
+    if (p[P_BRUSH] > 0.0f) {
+        REAL painted = 1.0f - smooth(near->distance * (1.0f / p[P_BRUSH]));
+        sum->g += painted;
+        sum->gx += painted * p[P_VALUE];
+        sum->toe = fmax(sum->toe, painted);
+        return;
+    }
     band_t b = band_of(near, inside, p, t->s);
     REAL zero = 0.0f, one = 1.0f, r = b.ds / fmax(b.end, CHANNEL_FLOOR_CELLS * t->s);
     REAL known = select(b.present * (1.0f - smooth((r - 1.0f) * (1.0f / (TOE - 1.0f)))), one, b.hard);
     known = select(zero, known, b.within);
     REAL outer = fmax(1.0f - r * (1.0f / TOE), 0.0f);
-    REAL g = known * nearness(&b, t->s) * select(outer * outer, one, b.hard);
+    REAL g = known * nearness(&b, t) * select(outer * outer, one, b.hard);
     sum->g += g;
-    sum->gx += g * p[P_AMPLITUDE];
-    sum->gy += g * p[P_ROUGHNESS];
+    sum->gx += g * p[P_VALUE];
     sum->toe = fmax(sum->toe, known);
 }
 
@@ -366,12 +372,11 @@ typedef struct {
     REAL height_d, height_f, gradient_d, gradient_fx, gradient_fy;
 } constraint_t;
 
-// D and f of the gradient, or of the channels.
-INLINE void conclude_two(constraint_t *out, const sums_t *sum) {
-    REAL toe = CREST_STIFFNESS * sum->toe, g = fmax(sum->g, TINY);
-    out->gradient_d = toe;
-    out->gradient_fx = toe * sum->gx / g;
-    out->gradient_fy = toe * sum->gy / g;
+// D and f of a channel, and f of its cover, which is 1 where the channel is known: there screening pulls to what is asked.
+INLINE void conclude_channel(REAL *d, REAL *f, REAL *cover, const sums_t *sum, float screening) {
+    *d = CREST_STIFFNESS * sum->toe;
+    *cover = *d + screening * sum->toe;
+    *f = *cover * sum->gx / fmax(sum->g, TINY);
 }
 
 // x: columns of the samples, y their row, n samples a side; a pinned border is fixed at the base.
@@ -391,6 +396,9 @@ INLINE constraint_t conclude(const sums_t *sum, MASK x, int y, int n, float scre
         out.height_d = select(out.height_d, PINNED, edge);
         out.height_f = select(out.height_f, zero, edge);
     }
-    conclude_two(&out, sum);
+    REAL toe = CREST_STIFFNESS * sum->toe, g = fmax(sum->g, TINY);
+    out.gradient_d = toe;
+    out.gradient_fx = toe * sum->gx / g;
+    out.gradient_fy = toe * sum->gy / g;
     return out;
 }

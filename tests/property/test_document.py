@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import random
-from typing import Any
+from typing import Any, get_args
 
 import hypothesis.strategies as st
 import pytest
@@ -11,13 +11,14 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 
 from esker import contract as c
-from esker.document.ops import GROUND_FIELDS, Limits, Refusal, StrokeSet
+from esker.document.ops import CHANNEL_FIELDS, GROUND_FIELDS, Limits, Refusal, StrokeSet
 from esker.document.strokes import bounds
 from esker.document.undo import STROKE_WORDS, UndoStack, inverse
 from esker.document.wire import op_json
 from esker.grid import Rect
 
 PEOPLE = ("ada", "bob", "eve")
+HEIGHT_FIELDS = GROUND_FIELDS - CHANNEL_FIELDS
 IDS = tuple(f"s{i}" for i in range(4))
 LIMITS = Limits(strokes=4, points=6)
 
@@ -35,7 +36,13 @@ flank = st.one_of(
     ),
 )
 stroke_id = st.sampled_from(IDS)
-strokes = st.builds(
+paint = st.builds(
+    c.Paint,
+    channel=st.sampled_from(get_args(c.PaintChannel)),
+    value=st.floats(-1, 1),
+    radius_m=st.floats(0, 500),
+)
+crests = st.builds(
     c.Stroke,
     id=stroke_id,
     kind=st.sampled_from(("profile", "level")),
@@ -47,6 +54,17 @@ strokes = st.builds(
     hidden=st.booleans(),
     locked=st.just(False),
 )
+brushes = st.builds(
+    c.Stroke,
+    id=stroke_id,
+    kind=st.just("paint"),
+    first=vec,
+    last=vec,
+    curve=curve,
+    paint=st.one_of(paint, paint, st.none()),
+    hidden=st.booleans(),
+)
+strokes = st.one_of(crests, crests, brushes)
 field_values: dict[str, st.SearchStrategy[Any]] = {
     "first": vec,
     "last": st.one_of(vec, st.tuples(metres, metres, metres)),
@@ -56,6 +74,7 @@ field_values: dict[str, st.SearchStrategy[Any]] = {
     "plateau_radius_m": st.floats(0, 500),
     "amplitude_m": st.floats(0, 50),
     "roughness": st.floats(0, 1),
+    "paint": paint,
     "locked": st.booleans(),
     "hidden": st.booleans(),
     "label": st.sampled_from(("", "a", "b", "山")),
@@ -71,6 +90,8 @@ terrain_fields = st.fixed_dictionaries(
         "sea_level_m": st.one_of(st.none(), st.floats(-10, 10)),
         "border": st.sampled_from(("free", "pinned")),
         "seed": st.integers(0, 2**32 - 1),
+        "detail": st.floats(0, 4),
+        "rule": st.sampled_from(get_args(c.Rule)),
     },
 )
 simple = st.one_of(
@@ -84,6 +105,37 @@ simple = st.one_of(
     st.builds(c.SetTerrain, fields=terrain_fields.map(c.TerrainFields.model_validate)),
 )
 ops = st.one_of(simple, st.lists(simple, min_size=1, max_size=4).map(lambda parts: c.Group(ops=tuple(parts))))
+
+
+def test_nothing_but_shape_dirties_the_heights() -> None:
+    """SPEC D11, D26: amplitude, roughness and paint are for the other channels."""
+    anchors: Any = {"first": (0, 0, 0), "last": (90, 0, 0), "curve": ((0, 0), (1, 0))}
+    snow = c.Paint(channel="snow", value=1, radius_m=5)
+    crest = c.Stroke(id="m", kind="level", **anchors)
+    brush = c.Stroke(id="p", kind="paint", paint=snow, **anchors)
+    document = StrokeSet("t", strokes={"m": crest, "p": brush})
+    untouched = (False, False)
+    cases: list[tuple[c.Op, tuple[bool, bool]]] = [
+        (c.SetStroke(stroke="m", fields=c.StrokeFields(amplitude_m=3, roughness=1)), (False, True)),
+        (c.SetStroke(stroke="m", fields=c.StrokeFields(amplitude_m=4, plateau_radius_m=1)), (True, True)),
+        (c.SetStroke(stroke="m", fields=c.StrokeFields(label="x")), untouched),
+        (c.SetStroke(stroke="p", fields=c.StrokeFields(paint=snow.model_copy(update={"value": -1.0}))), (False, True)),
+        (c.SetStroke(stroke="p", fields=c.StrokeFields(label="x")), untouched),
+        (c.MoveAnchor(stroke="p", which="last", to=(0, 90, 0)), (False, True)),
+        (c.AppendPoints(stroke="p", start=2, points=((2, 0),), last=(90, 90, 0)), (False, True)),
+        (c.FinishStroke(stroke="p"), untouched),
+        (c.DeleteStroke(stroke="p"), (False, True)),
+        (c.RestoreStroke(stroke="p"), (False, True)),
+        (c.SetStroke(stroke="p", fields=c.StrokeFields(hidden=True)), (False, True)),
+        (c.DeleteStroke(stroke="p"), untouched),
+        (c.SetTerrain(fields=c.TerrainFields(detail=2, rule="smooth", seed=9)), untouched),
+        (c.SetTerrain(fields=c.TerrainFields(reach_m=9)), (True, True)),
+    ]
+    for op, expected in cases:
+        after, dirty = document.apply(op)
+        found = after.shape is not document.shape, after.says is not document.says
+        assert (found, dirty is not None) == (expected, expected[0]), op
+        document = after
 
 
 def _state(document: StrokeSet) -> dict[str, object]:
@@ -194,6 +246,12 @@ class Session(RuleBasedStateMachine):
         for stroke in before.strokes.keys() | after.strokes.keys():
             old, new = before.strokes.get(stroke), after.strokes.get(stroke)
             if old is not None and new is not None and all(getattr(old, n) == getattr(new, n) for n in GROUND_FIELDS):
+                continue
+            if any(s is not None and not s.hidden and s.curve for s in (old, new)):
+                assert after.says is not before.says
+            if (old or new).kind == "paint":  # type: ignore[union-attr]
+                continue
+            if old is not None and new is not None and all(getattr(old, n) == getattr(new, n) for n in HEIGHT_FIELDS):
                 continue
             for rect in (bounds(s) for s in (old, new) if s is not None):
                 if rect is not None:

@@ -50,6 +50,20 @@ def test_archive_round_trip() -> None:
     assert archive.loads(zipped(esker_json=HEADER, document_json=BODY, layers_bin=b"later")) == DOCUMENT
 
 
+def test_a_file_from_before_paint_opens_unchanged() -> None:
+    """SPEC S20: version 1 knew neither paint nor detail; what it does not say has the defaults."""
+    body = DOCUMENT.model_dump(mode="json")
+    for stroke in body["strokes"]:
+        del stroke["paint"]
+    for name in ("detail", "rule"):
+        del body["settings"][name]
+    found = archive.loads(zipped(esker_json=HEADER, document_json=json.dumps(body).encode()))
+    assert found == DOCUMENT
+    assert (found.settings.detail, found.settings.rule) == (1.0, "landscape")
+    painted = DOCUMENT.model_copy(update={"strokes": (*DOCUMENT.strokes, Stroke.paint([(1, 2), (3, 4)], "snow"))})
+    assert archive.loads(archive.dumps(painted)) == painted
+
+
 @pytest.mark.parametrize(
     ("data", "says"),
     [
@@ -60,7 +74,7 @@ def test_archive_round_trip() -> None:
         (zipped(esker_json=HEADER), "has no document.json"),
         (zipped(esker_json=b"{", document_json=BODY), "damaged"),
         (zipped(esker_json=b"[]", document_json=BODY), "not an .esker file"),
-        (zipped(esker_json=b'{"format": "esker-terrain", "version": 2}', document_json=BODY), "newer"),
+        (zipped(esker_json=b'{"format": "esker-terrain", "version": 3}', document_json=BODY), "newer"),
         (zipped(esker_json=HEADER, document_json=b'{"id": "t", "strokes": 3}'), "strokes"),
         (zipped(esker_json=HEADER, document_json=b'{"id": "t", "clock": NaN}'), "not valid"),
         (zipped(esker_json=HEADER, document_json=b" " * 40_000_000), "unpacks to more"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,11 +10,13 @@ import pytest
 from numpy.typing import NDArray
 
 from esker import grid
-from esker.contract import MAX_REFINED_LEVEL, Stroke, TerrainSettings
+from esker.contract import MAX_REFINED_LEVEL, Channel, Stroke, TerrainSettings
+from esker.fractal import PAINT_LESS, PAINT_MORE
 from esker.solve import raster, reference_raster
 from esker.solve.constraints import BIN, BinBox, Tables, WindowPacker, bins, everything, pack
 from esker.solve.device import Device
 from esker.solve.levels import PAD, ClWorkspace, Launcher
+from esker.solve.sayings import Layer, natural_amplitude_m
 from esker.terrain import Stroke as Make
 from tests.solver.scenes import PINNED, SCENES, SETTINGS, SIZE, flank, loop, ridge
 
@@ -119,27 +122,32 @@ def test_a_window_is_a_part_of_the_level(device: Device, settings: TerrainSettin
 
 @pytest.mark.parametrize("level", [2, 7])
 def test_channels_of_a_window(device: Device, level: int) -> None:
-    """SPEC S40, S60: amplitude and roughness, kernel against twin, by windows."""
-    rough = [
-        s.model_copy(update={"amplitude_m": 10.0 + 7 * k, "roughness": 0.2 + 0.15 * k}) for k, s in enumerate(SCENE)
-    ]
-    packer = WindowPacker(rough, SETTINGS)
-    for box in [b for pair in places(level) for b in pair]:
+    """SPEC S40, S60, S64: what crests and what brushes say, kernel against twin, by windows."""
+    rough = [s.model_copy(update={"amplitude_m": 10.0 + 7 * k}) for k, s in enumerate(SCENE)]
+    for k, value in enumerate((1.0, -0.5)):
+        rough.append(Make.paint([(1400, 1700 + 60 * k), (2700, 2300)], "amplitude", value, radius_m=90, id=f"p{k}"))
+    natural = natural_amplitude_m(SETTINGS)
+    packers = [WindowPacker(rough, SETTINGS, Layer(Channel.AMPLITUDE, painted)) for painted in (False, True)]
+    for packer, box in itertools.product(packers, [b for pair in places(level) for b in pair]):
         tables = packer.pack(level, box)
         launch, (rows, columns) = Launcher(device, 0), tables.shape
         pitch = PAD + (box[3] - box[2]) * BIN
-        d, f = launch.zeros(rows * pitch + PAD), launch.zeros(2 * rows * pitch + PAD)
-        raster.rasterise_channels(launch, tables, everything(box), d, f, pitch, rows * pitch)
-        expected = reference_raster.rasterise_channels(tables)
-        for field, twin in ((d, expected[0][None]), (f, expected[1])):
-            host = np.empty(len(twin) * rows * pitch + PAD, dtype=np.float32)
-            launch.cl.enqueue_copy(launch.queue, host, field)
-            found = host[:-PAD].reshape(-1, rows, pitch)[:, :, PAD : PAD + columns]
+        d, f = (launch.zeros(k * rows * pitch + PAD) for k in (1, 2))
+        raster.rasterise_channel(launch, tables, everything(box), d, f, pitch, rows * pitch, covered=True)
+        host = np.empty(3 * rows * pitch + PAD, dtype=np.float32)
+        launch.cl.enqueue_copy(launch.queue, host[: rows * pitch + PAD], d)
+        launch.cl.enqueue_copy(launch.queue, host[rows * pitch :], f)
+        expected = reference_raster.rasterise_channel(tables)
+        for found, twin in zip(host[:-PAD].reshape(3, rows, pitch)[:, :, PAD : PAD + columns], expected, strict=True):
             assert np.quantile(np.abs(found - twin), 0.99) < 2e-3
             assert (np.abs(found - twin) > 0.5).mean() < 1e-2
-    within = expected[0] == 4
-    means = expected[1] / np.maximum(expected[0], 1e-9)
-    assert not within.any() or (means[0][within].min() >= 10 and means[0][within].max() <= 10 + 7 * len(rough))
+        d_, f_, cover = expected
+        means = f_[d_ > 0] / cover[d_ > 0]
+        low, high = (
+            (-0.5 * PAINT_LESS * natural, PAINT_MORE * natural) if packer is packers[1] else (0, 10 + 7 * len(SCENE))
+        )
+        assert low - 1e-9 <= means.min(initial=0)
+        assert means.max(initial=0) <= high + 1e-9
 
 
 def test_far_strokes_cost_nothing() -> None:

@@ -49,6 +49,9 @@ class PlainSolver:
                 n = grid.samples(level)
                 yield Level(level, np.full((n, n), height, dtype=np.float32), settled)
 
+    def channels(self, *_: Any) -> Iterator[Any]:
+        return iter(())
+
     def refiner(self, basis: object) -> Any:
         raise AssertionError(f"nobody was given {basis}")
 

@@ -27,6 +27,9 @@ class _NoSolver:
     def steps(self, *_: Any, **__: Any) -> Any:
         return iter(())
 
+    def channels(self, *_: Any) -> Any:
+        return iter(())
+
     def refiner(self, _: Any) -> Any:
         raise AssertionError("nothing is ever solved")
 

@@ -78,15 +78,18 @@ class RoofSolver:
         assert settings.size_m == SIZE
         top = levels or 0
         height = float(sum(s.first[2] for s in strokes))
-        amplitude = float(sum(s.amplitude_m for s in strokes))
         for settled in (False, True):
             for level in range(top + 1):
                 n = grid.samples(level)
                 y, x = np.mgrid[0:n, 0:n] * (SIZE / (n - 1))
                 found = Basis(height) if basis and settled and level == top else None
                 yield Level(level, ground(x, y, height), settled, basis=found)
-            for channel, value in ((c.Channel.AMPLITUDE, amplitude), (c.Channel.ROUGHNESS, 0.5)):
-                yield Level(0, np.full((65, 65), value, dtype=np.float32), settled, channel)
+        yield from self.channels(strokes)
+
+    def channels(self, strokes: Sequence[c.Stroke], *_: Any) -> Iterator[Level]:
+        amplitude = float(sum(s.amplitude_m for s in strokes))
+        for channel, value in ((c.Channel.AMPLITUDE, amplitude), (c.Channel.ROUGHNESS, 0.5)):
+            yield Level(0, np.full((65, 65), value, dtype=np.float32), True, channel)
 
     def refiner(self, basis: Basis) -> RoofRefiner:
         return RoofRefiner(basis.height, self.made)
@@ -188,8 +191,38 @@ def test_channels_arrive(tmp_path: Path) -> None:
         peer.ops(("c1:1", stroke(height=20.0)), ("c1:2", set_op(amplitude_m=12.5)))
         follow(peer, decoder, 2)
         root = TileKey(0, 0, 0)
+        assert not decoder.channels[c.Channel.ROUGHNESS], "nobody asks anything of it"
         assert np.unique(decoder.channels[c.Channel.AMPLITUDE][root].samples).tolist() == [
             12.5 * c.AMPLITUDE_QUANTA_PER_M
         ]
-        assert not decoder.channels[c.Channel.ROUGHNESS][root].samples.any()
+        peer.ops(("c1:3", set_op(amplitude_m=0.0)))
+        follow(peer, decoder, 3)
+        assert not decoder.channels[c.Channel.AMPLITUDE][root].samples.any()
+        late, fresh = server.join(terrain, secret, "late"), FrameDecoder()
+        follow(late, fresh, 3)
+        assert not fresh.channels[c.Channel.SNOW]
+        for guest in (peer, late):
+            guest.close()
+
+
+def test_paint_leaves_the_refined_ground_alone(tmp_path: Path) -> None:
+    """SPEC P81: no height is solved, sent or refined again, and the ground is final for the new clock."""
+    solver = RoofSolver()
+    with LiveServer(tmp_path, solver, level=1, refine=3) as server:
+        terrain, secret = server.create()
+        peer, decoder = server.join(terrain, secret), FrameDecoder()
+        peer.say("view", **NEAR.model_dump(mode="json", exclude={"type"}))
+        peer.ops(("c1:1", stroke(height=20.0)))
+        follow(peer, decoder, 1)
+        made, held = list(solver.made), dict(decoder.held)
+        assert made
+        peer.ops(("c1:2", set_op(amplitude_m=12.5)))
+        follow(peer, decoder, 2)
+        assert decoder.channels[c.Channel.AMPLITUDE][TileKey(0, 0, 0)].samples.any()
+        assert solver.made == made
+        assert decoder.held == held
+        peer.say("view", **(NEAR.model_dump(mode="json", exclude={"type"}) | {"tau_px": 0.5}))
+        follow(peer, decoder, 2)
+        assert len(solver.made) > len(made), "refinement goes on from the same ground"
+        assert len(decoder.held) > len(held)
         peer.close()

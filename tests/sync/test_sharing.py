@@ -215,6 +215,9 @@ class Refining:
         yield Finest(levels, None, False)
         yield Finest(levels, None, True, basis=len(strokes))
 
+    def channels(self, *_: Any) -> Iterator[Any]:
+        return iter(())
+
     def refiner(self, basis: object) -> Refining:
         assert basis is not None
         return self

@@ -40,6 +40,10 @@ class Turnstile:
         finally:
             self.closed.append(len(strokes))
 
+    def channels(self, *_: Any) -> Iterator[Level]:
+        self.permits.acquire()
+        yield Level(0, FLAT, True, c.Channel.SNOW)
+
     def refiner(self, basis: object) -> Any:
         raise AssertionError(f"nobody was given {basis}")
 
@@ -53,15 +57,20 @@ class Bench:
         self.worker = Worker(lambda _: self.solver, now=lambda: self.now)
         self.worker.start()
         self.got: list[tuple[str, int, int, bool]] = []
+        self.confirmed: list[tuple[int, int]] = []
         self._arrived = threading.Condition()
 
     def room(self, name: str, levels: int = 2) -> Any:
         def deliver(clock: int, result: Any, show: bool) -> None:
+            what = name if result.channel == c.Channel.HEIGHT else f"{name}.snow"
             with self._arrived:
-                self.got.append((name, clock, result.level, result.settled))
+                self.got.append((what, clock, result.level, result.settled))
                 self._arrived.notify()
 
-        return self.worker.add(levels, deliver, _unexpected)
+        def confirm(clock: int, level: int) -> None:
+            self.confirmed.append((clock, level))
+
+        return self.worker.add(levels, deliver, _unexpected, confirm=confirm)
 
     def let(self, count: int) -> list[tuple[str, int, int, bool]]:
         """Lets ``count`` levels be made; returns the deliveries so far."""
@@ -85,8 +94,9 @@ def _unexpected(note: str) -> None:
     raise AssertionError(note)
 
 
-def _job(clock: int) -> Job:
-    return Job(clock, (), SETTINGS)
+def _job(clock: int, shape: object = None) -> Job:
+    """Jobs of one shape have the same heights."""
+    return Job(clock, (), SETTINGS) if shape is None else Job(clock, (), SETTINGS, shape)
 
 
 def _bench(test: Callable[[Bench], None]) -> None:
@@ -140,6 +150,68 @@ def test_drawing_without_a_pause_does_not_starve_the_fine_levels() -> None:
         assert max(gaps) <= module.FINEST_WITHIN + 4 * 0.033
         coarse = [entry for entry in bench.got if entry[2] == 0]
         assert len(coarse) > len(finest), "coarse levels still come more often than fine ones"
+
+    _bench(run)
+
+
+def test_paint_leaves_settled_heights_alone() -> None:
+    """SPEC P81."""
+
+    def run(bench: Bench) -> None:
+        room = bench.room("a")
+        bench.worker.request(room, _job(1, "shape"))
+        bench.let(6)
+        bench.idle()
+        for clock in (2, 3):
+            bench.worker.request(room, _job(clock, "shape"))
+            assert bench.let(1)[-1] == ("a.snow", clock, 0, True)
+            bench.idle()
+            assert bench.confirmed[-1] == (clock, 2)
+        bench.worker.request(room, _job(4, "another"))
+        assert bench.let(1)[-1] == ("a", 4, 0, False)
+
+    _bench(run)
+
+
+def test_paint_does_not_stop_heights_that_settle() -> None:
+    """SPEC P81: it is solved in between, the newest alone, and confirmed when the heights are final."""
+
+    def run(bench: Bench) -> None:
+        room = bench.room("a")
+        bench.worker.request(room, _job(1, "shape"))
+        bench.let(1)
+        bench.idle()
+        bench.worker.request(room, _job(2, "shape"))
+        assert [entry[:3] for entry in bench.let(2)[1:]] == [("a", 1, 1), ("a", 1, 2)], "the preview goes on"
+        assert bench.let(1)[-1] == ("a.snow", 2, 0, True)
+        bench.let(1)
+        bench.idle()
+        bench.worker.request(room, _job(3, "shape"))
+        bench.worker.request(room, _job(4, "shape"))
+        assert bench.let(2)[-2:] == [("a", 1, 1, True), ("a.snow", 4, 0, True)]
+        assert bench.let(1)[-1] == ("a", 1, 2, True)
+        assert bench.confirmed == []
+        assert bench.let(1)[-1] == ("a.snow", 4, 0, True)
+        bench.idle()
+        assert bench.confirmed == [(4, 2)]
+
+    _bench(run)
+
+
+def test_a_stroke_amid_paint_starts_the_heights_anew() -> None:
+    """SPEC P81: heights that were not finished are nobody's ground."""
+
+    def run(bench: Bench) -> None:
+        room = bench.room("a")
+        bench.worker.request(room, _job(1, "shape"))
+        bench.let(4)
+        bench.idle()
+        bench.worker.request(room, _job(2, "another"))
+        assert bench.let(2)[-1] == ("a", 2, 0, False)
+        bench.idle()
+        bench.worker.request(room, _job(3, "shape"))
+        got = bench.let(5)
+        assert ("a.snow", 3, 0, True) not in got
 
     _bench(run)
 

@@ -18,17 +18,15 @@ def test_channels_go_whole_coarse_to_fine_after_the_heights() -> None:
     for level in range(5):
         n = grid.samples(level)
         server.put_level(1, level, np.zeros((n, n), dtype=np.float32), True)
-    for channel, base in ((Channel.AMPLITUDE, 0.0), (Channel.ROUGHNESS, 0.5)):
+    for channel, value in ((Channel.AMPLITUDE, 1.0), (Channel.SNOW, -1.0)):
         for level in range(3):
             n = grid.samples(level)
-            server.put_level(1, level, np.full((n, n), base, dtype=np.float32), True, channel)
+            server.put_level(1, level, np.full((n, n), value, dtype=np.float32), True, channel)
     client.drain()
     order = [(plan.channel, plan.level) for plan in client.log]
-    assert order[3:9] == [(ch, level) for ch in (Channel.AMPLITUDE, Channel.ROUGHNESS) for level in range(3)]
-    untouched = sum(len(plan.encode()) for plan in client.log if plan.channel != Channel.HEIGHT)
-    assert untouched < 1000, "untouched ground costs next to nothing"
+    assert order[3:9] == [(ch, level) for ch in (Channel.AMPLITUDE, Channel.SNOW) for level in range(3)]
     held = {ch: len(tiles) for ch, tiles in client.decoder.channels.items() if tiles and ch != Channel.HEIGHT}
-    assert held == {Channel.AMPLITUDE: 21, Channel.ROUGHNESS: 21}, "a channel that was never put sends nothing"
+    assert held == {Channel.AMPLITUDE: 21, Channel.SNOW: 21}, "a channel that was never put sends nothing"
     assert client.tiles.held(Channel.AMPLITUDE).keys() == client.decoder.channels[Channel.AMPLITUDE].keys()
 
 
@@ -55,7 +53,7 @@ def test_a_channel_follows_its_parents_without_doubling() -> None:
     """A preview within the dead zone of what every decoder shows by itself costs nothing (SPEC T34)."""
     server = TileServer(SIZE_M, 3)
     amplitude = server.channels[Channel.AMPLITUDE]
-    for clock, (coarse, fine) in enumerate(((0.0, 0.0), (40.0, 41.4)), start=1):
+    for clock, (coarse, fine) in enumerate(((8.0, 8.0), (48.0, 49.4)), start=1):
         for level, quanta in ((0, coarse), (1, fine)):
             n = grid.samples(level)
             server.put_level(
@@ -63,4 +61,34 @@ def test_a_channel_follows_its_parents_without_doubling() -> None:
             )
     found = amplitude.level(1)
     assert found is not None
-    assert np.unique(found.samples).tolist() == [40]
+    assert np.unique(found.samples).tolist() == [48]
+
+
+@pytest.mark.parametrize(("channel", "base"), [(Channel.ROUGHNESS, 0.5), (Channel.WETNESS, 0.0)])
+def test_a_channel_that_nobody_speaks_of_is_not_sent(channel: Channel, base: float) -> None:
+    """SPEC T35: until somebody does; then once more when it is back at its base."""
+    server = TileServer(SIZE_M, 4)
+    client = Client(server)
+
+    def put(clock: int, away: float) -> list[int]:
+        for level in range(3):
+            n = grid.samples(level)
+            values = np.full((n, n), base, dtype=np.float32)
+            if level == 2:  # between the samples of coarser levels
+                values[65, 65] += away
+            server.put_level(clock, level, values, True, channel)
+        before = len(client.log)
+        client.drain()
+        return [plan.level for plan in client.log[before:]]
+
+    assert put(1, 0.0) == []
+    assert put(2, 0.25) == [0, 1, 2]
+    assert len(client.decoder.channels[channel]) == 21
+    assert put(3, 0.25) == []
+    assert put(4, 0.0) == [2]
+    assert not any(tile.samples.any() for tile in client.decoder.channels[channel].values())
+    server.limit(3)
+    client.drain()
+    assert {key.level for key in client.decoder.channels[channel]} == {0, 1}
+    with pytest.raises(ValueError, match="65x65"):
+        TileServer(SIZE_M, 4).put_level(1, 0, np.zeros((9, 9), dtype=np.float32), True, Channel.SNOW)

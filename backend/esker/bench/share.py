@@ -65,6 +65,9 @@ class _Timed:
         finally:
             steps.close()  # type: ignore[attr-defined]
 
+    def channels(self, *job: Any) -> Iterator[Any]:
+        return self._solver.channels(*job)
+
     def refiner(self, basis: Any) -> Refiner:
         """As of the solver."""
         return self._solver.refiner(basis)

@@ -16,6 +16,8 @@ from esker.grid import Rect
 
 GROUND_FIELDS: Final = frozenset(c.StrokeFields.model_fields) - {"label", "locked"}
 """Fields of a stroke that the ground depends on; changing another one leaves the ground alone."""
+CHANNEL_FIELDS: Final = frozenset({"amplitude_m", "roughness", "paint"})
+"""Those of them that no height depends on, only the other channels."""
 
 
 class Refusal(Exception):
@@ -36,6 +38,10 @@ class StrokeSet:
     strokes: dict[str, Stroke] = field(default_factory=dict)
     deleted: dict[str, Stroke] = field(default_factory=dict)
     clock: int = 0
+    shape: object = field(default_factory=object, compare=False, repr=False)
+    """Of what the heights follow from. A successor has the same object exactly when nothing of that changed."""
+    says: object = field(default_factory=object, compare=False, repr=False)
+    """The same of what the other channels follow from: amplitude, roughness, paint, and where strokes lie."""
     _rects: dict[str, tuple[Stroke, Rect | None]] = field(default_factory=dict, compare=False, repr=False)
     """Bounds of strokes as last seen, with the stroke they were computed for: a cache that successors share."""
 
@@ -61,16 +67,18 @@ class StrokeSet:
         )
 
     def apply(self, op: Op, limits: Limits | None = None) -> tuple[StrokeSet, Rect | None]:
-        """The set after ``op`` (clock + 1) and the ground whose constraints changed.
+        """The set after ``op`` (clock + 1) and the ground where the constraints of heights changed (None: nowhere).
 
         Raises Refusal, leaving this set as it was.
         """
         editor = _Editor(self, limits or Limits())
         editor.run(op)
-        return (
-            StrokeSet(self.id, editor.settings, editor.strokes, editor.deleted, self.clock + 1, self._rects),
-            editor.dirty,
+        shape = self.shape if editor.dirty is None else object()
+        says = object() if editor.said or editor.dirty is not None else self.says
+        after = StrokeSet(
+            self.id, editor.settings, editor.strokes, editor.deleted, self.clock + 1, shape, says, self._rects
         )
+        return after, editor.dirty
 
 
 def check_document(document: c.Document, limits: Limits | None = None) -> None:
@@ -106,6 +114,8 @@ class _Editor:
         self.limits = limits
         self._rects = base._rects
         self.dirty: Rect | None = None
+        self.said = False
+        """Whether a channel other than the heights may have changed."""
         self._copied = False
 
     def run(self, op: Op) -> None:
@@ -161,15 +171,16 @@ class _Editor:
             self._rects[stroke.id] = (stroke, known[1])
         self.strokes[stroke.id] = stroke
 
-    def _put(self, stroke: Stroke) -> None:
+    def _put(self, stroke: Stroke, moved: bool = True) -> None:
+        """``moved`` False: no height follows from what changed."""
         points = self.check(stroke)
         self._own()
         old = self.strokes.get(stroke.id)
-        if old is not None:
-            self._touch(self._bounds(old))
+        before = None if old is None else self._bounds(old)
         rect = bounds(stroke, points)
         self._rects[stroke.id] = (stroke, rect)
-        self._touch(rect)
+        for touched in (before, rect):
+            self._touch(stroke, touched, moved)
         self.strokes[stroke.id] = stroke
 
     def _bounds(self, stroke: Stroke) -> Rect | None:
@@ -178,8 +189,11 @@ class _Editor:
             known = self._rects[stroke.id] = (stroke, bounds(stroke))
         return known[1]
 
-    def _touch(self, rect: Rect | None) -> None:
-        if rect is not None:
+    def _touch(self, stroke: Stroke, rect: Rect | None, moved: bool = True) -> None:
+        if rect is None:
+            return
+        self.said = True
+        if moved and stroke.kind != "paint":
             self.dirty = rect.union(self.dirty)
 
     def check(self, stroke: Stroke) -> Points:
@@ -221,12 +235,12 @@ class _Editor:
         if GROUND_FIELDS.isdisjoint(update):
             self._relabel(changed_stroke)
         else:
-            self._put(changed_stroke)
+            self._put(changed_stroke, moved=not CHANNEL_FIELDS.issuperset(update))
 
     def _delete(self, stroke_id: str) -> None:
         old = self._editable(stroke_id)
         self._own()
-        self._touch(self._bounds(old))
+        self._touch(old, self._bounds(old))
         self._rects.pop(stroke_id, None)
         del self.strokes[stroke_id]
         self.deleted[stroke_id] = old

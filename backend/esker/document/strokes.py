@@ -63,7 +63,7 @@ def influence_extent(stroke: Stroke) -> float:
 
 
 def bounds(stroke: Stroke, points: Points | None = None) -> Rect | None:
-    """The rectangle outside which the stroke constrains nothing; None for a stroke without effect.
+    """The rectangle outside which the stroke constrains nothing, of any channel; None for a stroke without effect.
 
     ``points``: its ``world_points``, where the caller has them already.
     """

@@ -187,13 +187,14 @@ class RoomCore:
             return False
         if counter <= self._counters.get(client, -1) and self._known(member, client, counter):
             return False
+        before = self.head
         try:
-            after, dirty = self.head.apply(envelope.op, self._limits)
+            after, _ = before.apply(envelope.op, self._limits)
         except Refusal as refusal:
             self.refuse(member, envelope.id, refusal.code, refusal.message)
             return False
         self.head = after
-        if dirty is not None:
+        if after.says is not before.says:
             self.geometry_clock = after.clock
         self._counters[client] = max(counter, self._counters.get(client, -1))
         self._waiting.append(Row(after.clock, client, counter, client, op_json(envelope.op)))

@@ -83,6 +83,8 @@ class TileFeed:
         self._clients: dict[Stream, ClientTiles] = {}
         """Of the tile thread."""
         self._puts: list[Future[None]] = []
+        self._newest: dict[tuple[c.Channel, int], object] = {}
+        """Of the solver's thread: the newest array of each level of the channels other than heights."""
         self._lock = threading.Lock()
         self._wishes: tuple[TileKey, ...] = ()
         self._made: dict[TileKey, tuple[int, RefinedTile]] = {}
@@ -128,6 +130,11 @@ class TileFeed:
 
         ``show`` False: the finest level follows so soon that this one is only noted (``tiles/pyramid.py``).
         """
+        place = (result.channel, result.level)
+        if result.channel != c.Channel.HEIGHT:
+            if self._newest.get(place) is result.heights:
+                return
+            self._newest[place] = result.heights
         try:
             while len(self._puts) > PUTS_AHEAD - 1:
                 self._puts.pop(0).result()
@@ -135,8 +142,14 @@ class TileFeed:
         except (CancelledError, RuntimeError):
             log.debug("the tile thread has stopped")
 
+    def confirm(self, clock: int, level: int) -> None:
+        """Heights up to ``level`` are final for ``clock`` too: only other channels followed from what has changed."""
+        with suppress(RuntimeError):  # the tile thread has stopped
+            self._executor.first(self._confirm, clock, level)
+
     def limit(self, top: int) -> None:
         """From now on levels 0..``top`` are solved."""
+        self._newest.clear()
         with suppress(RuntimeError):  # the tile thread has stopped
             self._executor.first(self._limit, top)
 
@@ -173,6 +186,9 @@ class TileFeed:
         self._publish(settled)
         if show:
             self._call(self._level_taken, clock, result.level, settled)
+
+    def _confirm(self, clock: int, level: int) -> None:
+        self._call(self._level_taken, clock, level, self._server.settled())
 
     def _limit(self, top: int) -> None:
         self._server.limit(top)

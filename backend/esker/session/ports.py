@@ -115,6 +115,10 @@ class Solver(Protocol):
         basis: bool = False,
     ) -> Iterator[LevelResult | None]: ...
 
+    def channels(
+        self, strokes: Sequence[c.Stroke], settings: c.TerrainSettings, levels: int | None = None
+    ) -> Iterator[LevelResult | None]: ...
+
     def refiner(self, basis: Any) -> Refiner: ...
 
 

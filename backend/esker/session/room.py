@@ -62,7 +62,12 @@ class Room:
         )
         refinement = self._feed if info.finest > info.levels else None
         self._solve_client = worker.add(
-            info.levels, self._feed.put, self._solve_failed, refinement, limit=self._feed.limit
+            info.levels,
+            self._feed.put,
+            self._solve_failed,
+            refinement,
+            limit=self._feed.limit,
+            confirm=self._feed.confirm,
         )
         self._tick_timer: asyncio.TimerHandle | None = None
         self._tick_at = float("-inf")
@@ -181,7 +186,8 @@ class Room:
     def _request_solve(self) -> None:
         head = self.core.head
         self._requested_clock = head.clock
-        self._worker.request(self._solve_client, Job(head.clock, tuple(head.strokes.values()), head.settings))
+        job = Job(head.clock, tuple(head.strokes.values()), head.settings, head.shape)
+        self._worker.request(self._solve_client, job)
 
     def _level_taken(self, clock: int, level: int, settled: bool) -> None:
         """A level became tiles. An op that does not touch the ground leaves an older solve as good as new."""

@@ -35,11 +35,13 @@ Deliver = Callable[[int, LevelResult, bool], None]
 
 @dataclass(frozen=True)
 class Job:
-    """What to solve. ``clock`` is the document's."""
+    """What to solve. ``clock`` is the document's; jobs of one room with the same ``shape`` have the same heights, and
+    differ in the other channels alone (``StrokeSet.shape``)."""
 
     clock: int
     strokes: tuple[c.Stroke, ...]
     settings: c.TerrainSettings
+    shape: object = field(default_factory=object, compare=False)
 
 
 @dataclass(eq=False)
@@ -51,6 +53,7 @@ class Client:
     tell: Callable[[str], None]
     refinement: Refinement | None = None
     limit: Callable[[int], None] | None = None
+    confirm: Callable[[int, int], None] | None = None
     newest: Job | None = None
     running: Job | None = None
     steps: Iterator[LevelResult | None] | None = None
@@ -70,6 +73,14 @@ class Client:
     """Turn at which its solve began."""
     ran_at: float = 0.0
     """When it had its last slice, or began to wait."""
+    ground: tuple[object, int] | None = None
+    """Shape and finest level of the heights that are settled here, and refined."""
+    ground_clock: int = -1
+    """Of the job whose heights they are, or will be."""
+    light: bool = False
+    """What runs are the channels of a job whose heights are settled."""
+    aside_clock: int = -1
+    """Of the newest job whose channels were solved while the heights went on."""
     previewing: bool = False
     finest_at: float = -math.inf
     _reached: int = -1
@@ -106,17 +117,30 @@ class Client:
     def drop(self) -> None:
         """Ends what runs for it. In the solver's thread."""
         for work in (self.steps, self.tiles):
-            close = getattr(work, "close", None)
-            if close is not None:
-                close()
-        self.steps = self.tiles = self.refiner = None
+            _close(work)
+        self.steps = self.tiles = self.refiner = self.ground = None
         self.refined.clear()
-        self.looking = self.previewing = False
+        self.looking = self.previewing = self.light = False
+
+    @property
+    def lighter(self) -> bool:
+        """Whether its newest job has the heights that are settled already."""
+        return self.newest is not None and self.ground == (self.newest.shape, self.top)
+
+    @property
+    def aside(self) -> bool:
+        """Whether channels of its newest job can be had while the heights, which are the same, go on settling."""
+        newest, running = self.newest, self.running
+        if newest is None or running is None or self.steps is None or self.light or self.previewing:
+            return False
+        return newest.shape is running.shape and newest.clock != self.aside_clock
 
     def starts(self, now: float) -> bool:
         """Whether its newest job is to be begun: at once, but for a preview pass that should end first."""
         if self.newest is None:
             return False
+        if self.steps is not None and self.running is not None and self.newest.shape is self.running.shape:
+            return self.light  # the heights go on
         if self.steps is None or not self.previewing:
             return True
         starving = now - self.finest_at > FINEST_WITHIN
@@ -124,6 +148,8 @@ class Client:
 
     def stage(self, now: float) -> int | None:
         """Its class; None when it has nothing to do."""
+        if self.aside:
+            return COARSE
         if self.newest is not None and self.starts(now):
             return SETTLE if self.newest.clock == self._previewed else COARSE
         if self.steps is not None:
@@ -133,11 +159,23 @@ class Client:
     def begin(self) -> Job:
         """Takes up the newest job."""
         assert self.newest is not None
+        if self.lighter:
+            _close(self.steps)
+            self.running, self.newest, self.light = self.newest, None, True
+            self.again_at = math.inf
+            return self.running
         self.drop()
+        self.ground_clock = self.newest.clock
         self.running, self.newest = self.newest, None
         self.previewing, self._reached, self.again_at = True, -1, math.inf
         self._came.clear()
         return self.running
+
+    def ended(self) -> None:
+        """Its solve came to its end."""
+        self.steps, self.previewing = None, False
+        if self.running is not None and not self.light:
+            self.ground = self.running.shape, self.top
 
     def took(self, result: LevelResult, now: float) -> bool:
         """Notes a result; returns whether to show it.
@@ -201,27 +239,39 @@ class Schedule:
 
     def _fits(self, client: Client, stage: int, now: float) -> bool:
         """Whether its slice may run: in what memory there is, or, for a coarse preview, in what others can leave."""
-        if client.steps is not None or not client.starts(now) or self._room(client, []):
+        if client.steps is not None or client.lighter or not client.starts(now) or self._room(client, []):
             return True
         return stage == COARSE and self._room(client, self._settling(client))
 
     def _settling(self, client: Client) -> list[Client]:
         """Others that are only settling, longest first."""
-        found = [x for x in self.clients if x is not client and x.steps is not None and not x.previewing]
+        found = [x for x in self._solving(client) if not x.previewing]
         return sorted(found, key=lambda x: x.finest_at)
+
+    def _solving(self, client: Client) -> list[Client]:
+        """Others whose solves hold memory."""
+        return [x for x in self.clients if x is not client and x.steps is not None and not x.light]
 
     def _in_the_way(self, client: Client) -> list[Client]:
         """The fewest settling solves, last begun first, without which the client's has room."""
         gone: list[Client] = []
+        if client.lighter:
+            return gone
         settling = self._settling(client)
         while settling and not self._room(client, gone):
             gone.append(settling.pop())
         return gone
 
     def _room(self, client: Client, gone: list[Client]) -> bool:
-        held = [x for x in self.clients if x is not client and x.steps is not None and x not in gone]
+        held = [x for x in self._solving(client) if x not in gone]
         used = sum(solve_bytes(x.top) for x in held)
         return not held or used + solve_bytes(client.top) <= self._budget
+
+
+def _close(work: object) -> None:
+    close = getattr(work, "close", None)
+    if close is not None:
+        close()
 
 
 def _order(stage: int, client: Client) -> tuple[int, int]:

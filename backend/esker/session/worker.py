@@ -81,14 +81,16 @@ class Worker:
         tell: Callable[[str], None],
         refinement: Refinement | None = None,
         limit: Callable[[int], None] | None = None,
+        confirm: Callable[[int, int], None] | None = None,
     ) -> Client:
         """A new room. All callbacks are called in the worker's thread.
 
         ``deliver(clock, result, show)``: ``show`` False for a coarse preview that the finest will replace at once.
         ``tell(sentence)``: something went wrong, or right again. ``limit(top)``: from now on levels 0..top come, as
         finer ones do not fit the device, or fit it again. ``refinement``: who wants tiles above the global levels.
+        ``confirm(clock, top)``: the heights that were delivered last are those of this job too; its channels have come.
         """
-        client = Client(levels, deliver, tell, refinement, limit)
+        client = Client(levels, deliver, tell, refinement, limit, confirm)
         with self._changed:
             self._schedule.clients.append(client)
         return client
@@ -158,7 +160,9 @@ class Worker:
             job = self._schedule.begin(client)
         if job is not None:
             self._open(client, job)
-        if client.steps is not None:
+        if client.aside:
+            self._aside(client)
+        elif client.steps is not None:
             self._solve(client)
         elif client.refiner is not None:
             self._refine(client)
@@ -172,7 +176,10 @@ class Worker:
             client.tell(self._standing)
         refines = client.refinement is not None
         try:
-            client.steps = iter(self._solver.steps(job.strokes, job.settings, client.top, basis=refines))
+            if client.light:
+                client.steps = iter(self._solver.channels(job.strokes, job.settings, client.top))
+            else:
+                client.steps = iter(self._solver.steps(job.strokes, job.settings, client.top, basis=refines))
         except Exception as error:
             self._failed(client, job, error)
 
@@ -183,7 +190,10 @@ class Worker:
         try:
             result = next(steps)
         except StopIteration:
-            client.steps = None
+            client.ended()
+            if client.light:
+                self._confirm(client, job)
+                return
             self._devices.settled()
             if client.top == client.levels:
                 client.backoff.clear()
@@ -194,6 +204,25 @@ class Worker:
         if result is not None:
             show = client.took(result, self._now())
             self._deliver(client, job, result, show)
+
+    def _aside(self, client: Client) -> None:
+        """The channels of the newest job, while its heights, which the running one has, go on settling."""
+        job = client.newest
+        assert job is not None
+        assert client.running is not None
+        assert self._solver is not None
+        client.aside_clock = job.clock
+        try:
+            for result in self._solver.channels(job.strokes, job.settings, client.top):
+                if result is not None:
+                    self._deliver(client, job, result, show=True)
+        except Exception as error:
+            self._failed(client, client.running, error)
+
+    def _confirm(self, client: Client, job: Job) -> None:
+        client.light = False
+        if client.confirm is not None and client in self._schedule.clients:
+            client.confirm(job.clock, client.top)
 
     def _deliver(self, client: Client, job: Job, result: LevelResult, show: bool) -> None:
         if result.basis is not None and self._solver is not None:
@@ -223,7 +252,7 @@ class Worker:
             return
         if tile is not None:
             client.refined.add(tile.key)
-            refinement.deliver_tile(job.clock, tile)
+            refinement.deliver_tile(client.ground_clock, tile)
 
     def _unrefined(self, client: Client, job: Job, error: Exception) -> None:
         """Refining failed. The ground itself is there, so only a broken device is a reason to solve it again."""
@@ -232,7 +261,9 @@ class Worker:
             self._failed(client, job, error)
             return
         log.error("refining at clock %d failed (%s): %s: %s", job.clock, fault.value, type(error).__name__, error)
+        ground = client.ground
         client.drop()
+        client.ground = ground
         memory = f"{self.device_name} has too little memory for finer detail just now."
         client.tell(memory if fault == Fault.MEMORY else "Finer detail could not be computed here.")
 

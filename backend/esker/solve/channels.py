@@ -1,21 +1,26 @@
-"""Amplitude and roughness, diffused from the strokes for synthesis to use (DESIGN 5.4).
+"""Amplitude, roughness and what is painted, diffused from the strokes for synthesis to use (DESIGN 5.4).
 
-Both are one system with two channels, E = sum_edges (c_j - c_i)^2 + sum_i a_i (c_i - t_i)^2 + eps sum_i (c_i - base)^2,
-solved CHANNEL_LEVELS_BELOW levels below the heights, as differences from the base: known on crests and in flank bands,
-free elsewhere, and back at the base a few reaches away.
+A channel is made from two layers, each with an equation of its own, solved CHANNEL_LEVELS_BELOW levels below the heights:
+sum_edges (c_j - c_i)^2 + sum_i a_i (c_i - t_i)^2 + eps sum_i (c_i - k_i t_i)^2 for c, the difference from the base, where
+k is how far a sample is known, 0..1. What strokes of the ground say is known on crests and in flank bands, free elsewhere,
+and back at the base a few reaches away. Paint is known under the brush and lies over it: beside the painted value its
+cover is diffused, 1 on its line, and the channel is strokes (1 - cover) + paint. A layer of which nobody asks anything
+costs nothing.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import lru_cache
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from esker import grid
 from esker.contract import (
-    BASE_AMPLITUDE_M,
-    BASE_ROUGHNESS,
+    AMPLITUDE_QUANTA_PER_M,
+    BIAS_QUANTA,
     CHANNEL_LEVELS_BELOW,
     ROUGHNESS_QUANTA,
     Channel,
@@ -26,15 +31,18 @@ from esker.solve import gpu_levels, levels, multigrid, raster, reference_raster
 from esker.solve.constraints import Packer
 from esker.solve.device import Device
 from esker.solve.faults import finished
+from esker.solve.injection import frozen, injections
 from esker.solve.reference import NumpySystem
+from esker.solve.sayings import BASES, STROKES_SPEAK, Layer, reach_of, spread
 
-BASES = ((Channel.AMPLITUDE, BASE_AMPLITUDE_M), (Channel.ROUGHNESS, BASE_ROUGHNESS))
-"""The channels in their order in the system, and what they are where no stroke says otherwise."""
-TOLERANCE = 0.25 / ROUGHNESS_QUANTA
-"""Error at which the channels are at rest: a quarter of a quantum of roughness, and far less of one of amplitude."""
+TOLERANCES = {
+    Channel.AMPLITUDE: 0.25 / AMPLITUDE_QUANTA_PER_M,
+    Channel.ROUGHNESS: 0.25 / ROUGHNESS_QUANTA,
+} | dict.fromkeys((Channel.SNOW, Channel.GRASS, Channel.FOREST, Channel.WETNESS), 0.25 / BIAS_QUANTA)
+"""Error at which a channel is at rest: a quarter of a quantum."""
 
-Strokes = tuple[Stroke, ...]
 Values = NDArray[np.float32]
+Levels = tuple[Values, ...]
 
 
 def channel_level(top: int) -> int:
@@ -42,104 +50,153 @@ def channel_level(top: int) -> int:
     return max(0, top - CHANNEL_LEVELS_BELOW)
 
 
-class ChannelWorkspace(Protocol):
-    """Memory and kernels for the channels of one level."""
+@lru_cache(maxsize=64)
+def at_base(channel: Channel, level: int) -> Levels:
+    """Levels 0..``level`` of a channel of which nothing is asked: the same arrays every time."""
+    n = grid.samples(level)
+    return tuple(injections(frozen(np.full((n, n), BASES[channel], dtype=np.float32))))
+
+
+class LayerWorkspace(Protocol):
+    """Memory and kernels for one layer of one level."""
 
     @property
     def system(self) -> multigrid.System: ...
 
-    def load(self, strokes: Sequence[Stroke], settings: TerrainSettings) -> None:
-        """Rasterise and coarsen what changed since the last stroke set."""
+    def load(self, strokes: Sequence[Stroke], settings: TerrainSettings) -> bool:
+        """Rasterise and coarsen what changed since the last stroke set; whether anything did."""
 
     def read(self) -> Values:
-        """Both channels as differences from their base, (2, n, n) float32."""
+        """The layer as a difference from the base, float32 (1, n, n), or (2, n, n) with its cover."""
 
 
-def new_channels(device: Device | None, level: int) -> ChannelWorkspace:
+def new_layer(device: Device | None, level: int, layer: Layer) -> LayerWorkspace:
     """A workspace on a device; None is NumPy. Raises DeviceErrors."""
     if device is None:
-        return _NumpyChannels(level)
-    return finished(
-        device, lambda: _RowChannels(device, level) if device.plan is None else _TileChannels(device, level)
-    )
+        return _NumpyLayer(level, layer)
+    kind = _RowLayer if device.plan is None else _TileLayer
+    return finished(device, lambda: kind(device, level, layer))
 
 
-class _NumpyChannels:
-    def __init__(self, level: int) -> None:
-        self.level, self.packer = level, Packer(level)
+def _covers(layer: Layer) -> bool:
+    """Whether there is something for this paint to lie over."""
+    return layer.painted and layer.channel in STROKES_SPEAK
+
+
+class _NumpyLayer:
+    def __init__(self, level: int, layer: Layer) -> None:
+        self.level, self.packer, self._covers = level, Packer(level, layer), _covers(layer)
         self.system: NumpySystem
 
-    def load(self, strokes: Sequence[Stroke], settings: TerrainSettings) -> None:
+    def load(self, strokes: Sequence[Stroke], settings: TerrainSettings) -> bool:
         tables, window = self.packer.pack(strokes, settings)
         if window is not None:
-            d, f = reference_raster.rasterise_channels(tables)
-            self.system = NumpySystem(d[None], f, tables.screening, self.level)
+            d, *f = reference_raster.rasterise_channel(tables)
+            self.system = NumpySystem(d[None], np.stack(f[: 1 + self._covers]), tables.screening, self.level)
+        return window is not None
 
     def read(self) -> Values:
         return np.asarray(self.system.fields["u", self.level], dtype=np.float32)
 
 
-class _ClChannels:
-    """Channels on an OpenCL device, whatever its kernels' layout."""
+class _ClLayer:
+    """A layer on an OpenCL device, whatever its kernels' layout."""
 
-    def __init__(self, system: levels.ClSystem | gpu_levels.GpuSystem, launch: raster.Launcher, level: int) -> None:
-        self.level, self.packer, self.system, self._launch = level, Packer(level), system, launch
+    def __init__(
+        self, system: levels.ClSystem | gpu_levels.GpuSystem, launch: raster.Launcher, level: int, layer: Layer
+    ) -> None:
+        self.level, self.packer, self.system, self._launch = level, Packer(level, layer), system, launch
 
-    def load(self, strokes: Sequence[Stroke], settings: TerrainSettings) -> None:
+    def load(self, strokes: Sequence[Stroke], settings: TerrainSettings) -> bool:
         tables, window = self.packer.pack(strokes, settings)
         if window is None:
-            return
+            return False
         shape, fields = self.system.shapes[self.level], self.system.fields
-        raster.rasterise_channels(
-            self._launch, tables, window, fields["d", self.level], fields["f", self.level], shape.pitch, shape.stride
-        )
+        d, f = fields["d", self.level], fields["f", self.level]
+        covered = self.system.channels > 1
+        raster.rasterise_channel(self._launch, tables, window, d, f, shape.pitch, shape.stride, covered)
         self.system.coarsen(tables.screening, window.sample_rows)
+        return True
 
     def read(self) -> Values:
         return self.system.get("u", self.level)
 
 
-class _RowChannels(_ClChannels):
-    def __init__(self, device: Device, level: int) -> None:
+class _RowLayer(_ClLayer):
+    def __init__(self, device: Device, level: int, layer: Layer) -> None:
         launch = levels.Launcher(device, level)
-        super().__init__(levels.ClSystem(launch, level, 2, "f"), launch, level)
+        super().__init__(levels.ClSystem(launch, level, 1 + _covers(layer), "f"), launch, level, layer)
 
 
-class _TileChannels(_ClChannels):
-    def __init__(self, device: Device, level: int) -> None:
+class _TileLayer(_ClLayer):
+    def __init__(self, device: Device, level: int, layer: Layer) -> None:
         launch = gpu_levels.GpuLauncher(device)
-        super().__init__(gpu_levels.GpuSystem(launch, level, 2, "f"), gpu_levels.Bins(launch), level)
+        system = gpu_levels.GpuSystem(launch, level, 1 + _covers(layer), "f")
+        super().__init__(system, gpu_levels.Bins(launch), level, layer)
 
 
 class ChannelSolver:
-    """Diffuses the channels of stroke sets of one level. Use it from one thread; a solve is a few milliseconds."""
+    """Diffuses the channels of stroke sets of one level. Use it from one thread; a channel is a few milliseconds."""
 
     def __init__(self, device: Device | None, level: int) -> None:
         self.level = level
         self._device = device
-        self._workspace: ChannelWorkspace | None = None
+        self._layers: dict[Layer, tuple[LayerWorkspace, tuple[float, float], Values]] = {}
+        """Per layer that was asked for last time its memory, the bounds of its values, and what came out."""
+        self._made: dict[Channel, tuple[Values | None, Values | None, Levels]] = {}
+        """Per channel the layers that it was made from last, and its levels."""
 
     def solve(self, strokes: Sequence[Stroke], settings: TerrainSettings) -> Iterator[tuple[Channel, Values]]:
-        """Each channel, (n, n) float32 of ``level``, amplitude in metres and roughness 0..1, row 0 south.
+        """Each channel, (n, n) float32 of ``level`` in its unit (metres, 0..1, -1..1), row 0 south, read-only.
 
         A pure function of the strokes and the settings. Raises DeviceErrors.
         """
-        workspace, self._workspace = self._workspace or new_channels(self._device, self.level), None
-        workspace.load(strokes, settings)
-        diffuse(workspace.system)
-        values = workspace.read()
-        self._workspace = workspace  # kept only if nothing failed: a raster that stopped half-way is not trusted
-        for (channel, base), difference in zip(BASES, values, strict=True):
-            top = 1.0 if channel == Channel.ROUGHNESS else np.inf
-            yield channel, np.clip(difference + np.float32(base), 0.0, top, dtype=np.float32)
+        for channel, pyramid in self.pyramids(strokes, settings):
+            yield channel, pyramid[-1]
+
+    def pyramids(self, strokes: Sequence[Stroke], settings: TerrainSettings) -> Iterator[tuple[Channel, Levels]]:
+        """The same, with levels 0..``level`` of each; what did not change since the last time are the same arrays."""
+        for channel in BASES:
+            ground, paint = (self._diffused(Layer(channel, painted), strokes, settings) for painted in (False, True))
+            made = self._made.get(channel)
+            if made is None or made[0] is not ground or made[1] is not paint:
+                made = ground, paint, self._composed(channel, ground, paint)
+            self._made[channel] = made
+            yield channel, made[2]
+
+    def _composed(self, channel: Channel, ground: Values | None, paint: Values | None) -> Levels:
+        """Levels of a channel from its layers; None: a layer of which nothing is asked."""
+        if ground is None and paint is None:
+            return at_base(channel, self.level)
+        over = 0 if ground is None else ground[0] * (1 - paint[1]) if paint is not None else ground[0]
+        finest = (0 if paint is None else paint[0]) + over + np.float32(BASES[channel])
+        return tuple(injections(frozen(np.asarray(finest, dtype=np.float32))))
+
+    def _diffused(self, layer: Layer, strokes: Sequence[Stroke], settings: TerrainSettings) -> Values | None:
+        """A layer as ``LayerWorkspace.read`` gives it, the same array as last time if nothing changed; None at zero."""
+        kept = self._layers.pop(layer, None)  # kept again only if nothing fails: half a raster is not to be trusted
+        bounds = spread(strokes, layer, settings)
+        if bounds == (0, 0):
+            return None
+        workspace = new_layer(self._device, self.level, layer) if kept is None else kept[0]
+        changed = workspace.load(strokes, settings.model_copy(update={"reach_m": reach_of(layer, settings)}))
+        if changed:
+            diffuse(workspace.system, TOLERANCES[layer.channel])
+        if kept is None or changed or kept[1] != bounds:
+            values = workspace.read()
+            np.clip(values[0], *bounds, out=values[0])
+            np.clip(values[1:], 0, 1, out=values[1:])
+            kept = workspace, bounds, values
+        self._layers[layer] = kept
+        return kept[2]
 
 
-def diffuse(system: multigrid.System) -> None:
+def diffuse(system: multigrid.System, tolerance: float) -> None:
     """Full multigrid, then cycles to rest."""
     for level in range(system.top):
         multigrid.start(system, level)
         multigrid.finish(system, level)
     multigrid.start(system, system.top)
     if system.top > 0:
-        for _ in multigrid.converge(system, TOLERANCE):
+        for _ in multigrid.converge(system, tolerance):
             pass

@@ -13,8 +13,8 @@ import numpy as np
 from esker import grid
 from esker.contract import DEFAULT_REACH_FRACTION, MAX_REFINED_LEVEL, Stroke, TerrainSettings
 from esker.solve import dirty
-from esker.solve.crest import crest_of
-from esker.solve.packing import Packed, Shape, join, pack_one, reach_m, shape_of
+from esker.solve.packing import Packed, Shape, join, pack_one, reach_m, shape_for
+from esker.solve.sayings import Layer
 from esker.solve.tables import BIN, BinBox, Floats, Tables, Window, bins, defines, everything, union, whole
 
 __all__ = [
@@ -32,16 +32,16 @@ __all__ = [
 ]
 
 
-def pack(strokes: Sequence[Stroke], settings: TerrainSettings, level: int) -> Tables:
+def pack(strokes: Sequence[Stroke], settings: TerrainSettings, level: int, layer: Layer | None = None) -> Tables:
     """The tables of a stroke set at one level. The order of ``strokes`` does not matter."""
-    return Packer(level).pack(strokes, settings)[0]
+    return Packer(level, layer).pack(strokes, settings)[0]
 
 
 class Packer:
-    """Packs stroke sets of one level, reusing what did not change since the last one."""
+    """Packs stroke sets of one level for the heights or one layer, reusing what did not change since the last one."""
 
-    def __init__(self, level: int) -> None:
-        self.level = level
+    def __init__(self, level: int, layer: Layer | None = None) -> None:
+        self.level, self.layer = level, layer
         self._settings: tuple[float, float | None, str] | None = None
         self._packed: dict[str, tuple[Stroke, Packed | None]] = {}
 
@@ -62,8 +62,8 @@ class Packer:
             if known is not None and (known[0] is stroke or known[0] == stroke):
                 new[stroke.id] = (stroke, known[1])
                 continue
-            crest = crest_of(stroke)
-            new[stroke.id] = (stroke, pack_one(shape_of(crest, settings), s, box) if crest is not None else None)
+            shape = shape_for(self.layer, stroke, settings)
+            new[stroke.id] = (stroke, None if shape is None else pack_one(shape, s, box))
         window = everything(box) if fresh else _changed(old, new, box)
         self._settings, self._packed = _settings_key(settings), new
         tables = _tables(self.level, settings, [p for _, p in new.values() if p is not None], box)
@@ -102,19 +102,19 @@ def _tables(level: int, settings: TerrainSettings, packed: list[Packed], box: Bi
 
 
 class WindowPacker:
-    """Packs windows of one stroke set at any level, also above those solved globally (DESIGN 5.6).
+    """Packs windows of one stroke set, for the heights or one layer, at any level, also above the global ones
+    (DESIGN 5.6).
 
     Costs what lies near the window: strokes are culled by their bounding boxes, then their segments. What a bin of a
     window gets is, to the bit, what it gets in any other window and in the whole level.
     """
 
-    def __init__(self, strokes: Sequence[Stroke], settings: TerrainSettings) -> None:
+    def __init__(self, strokes: Sequence[Stroke], settings: TerrainSettings, layer: Layer | None = None) -> None:
         self._settings = settings
-        pairs = [(s, crest_of(s)) for s in sorted(strokes, key=lambda k: k.id)]
-        self._strokes = [s for s, crest in pairs if crest is not None]
-        crests = [crest for _, crest in pairs if crest is not None]
-        self._shapes: list[Shape] = [shape_of(crest, settings) for crest in crests]
-        plan = [crest.points[:, :2] for crest in crests]
+        pairs = [(s, shape_for(layer, s, settings)) for s in sorted(strokes, key=lambda k: k.id)]
+        self._strokes = [s for s, shape in pairs if shape is not None]
+        self._shapes: list[Shape] = [shape for _, shape in pairs if shape is not None]
+        plan = [shape.crest.points[:, :2] for shape in self._shapes]
         self._low = np.array([p.min(axis=0) for p in plan]).reshape(-1, 2)
         self._high = np.array([p.max(axis=0) for p in plan]).reshape(-1, 2)
         self._reach: dict[int, Floats] = {}

@@ -48,6 +48,15 @@ def crest_of(stroke: Stroke) -> Crest | None:
     return Crest(stroke, points, closed)
 
 
+def line_of(stroke: Stroke) -> Crest | None:
+    """The line of a brush, heights zero, or None for one that paints nothing (hidden, or without points)."""
+    if stroke.hidden or not stroke.curve:
+        return None
+    points = _without_repeats(world_points(stroke))
+    points[:, 2] = 0.0
+    return Crest(stroke, points, closed=False)
+
+
 def is_closed(points: Points) -> bool:
     """True for an outline of three corners or more whose ends are within CLOSED_FRACTION of its length."""
     if len(points) < 3:

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from esker.contract import BASE_AMPLITUDE_M, BASE_ROUGHNESS, Flank, TerrainSettings
-from esker.solve.crest import Crest
+from esker.contract import Flank, Stroke, TerrainSettings
+from esker.solve.crest import Crest, crest_of, line_of
 from esker.solve.outline import cut, segments_of, spans_of
+from esker.solve.sayings import Layer, says
 from esker.solve.silhouette import Silhouette, silhouette
 from esker.solve.tables import (
     BIN,
+    CHANNEL_FLOOR_CELLS,
     FLATTEST,
     HALF_DIAGONAL,
     INDEX_AT,
@@ -50,7 +52,8 @@ class Side:
 class Shape:
     """What the tables of any level and window are made from: a crest and its band, in metres.
 
-    cliff: 1 / reach of the terrain, 0 for endless; silhouette: of a profile, None of an outline.
+    cliff: 1 / reach of the terrain, 0 for endless; silhouette: of a profile, None of an outline. For another channel
+    than the heights, value: what the stroke asks of it, as a difference from its base; brush_m: radius of paint.
     """
 
     crest: Crest
@@ -58,6 +61,12 @@ class Shape:
     right: Side | None
     cliff: float
     silhouette: Silhouette | None
+    value: float = 0.0
+    brush_m: float | None = None
+
+    def brush(self, s: float) -> float:
+        """Radius of paint in cells, 0 for a crest."""
+        return 0.0 if self.brush_m is None else max(self.brush_m / s, CHANNEL_FLOOR_CELLS)
 
     def widths(self, tops: Floats) -> tuple[Floats, Floats]:
         """Widest band and, where its extent cuts it high, widest skirt, for these crest heights; metres."""
@@ -76,6 +85,8 @@ class Shape:
 
     def reach(self, tops: Floats, s: float) -> Floats:
         """Outermost distance with any effect, cells, for these crest heights."""
+        if self.brush_m is not None:
+            return np.full(len(tops), self.brush(s) + 0.01)
         wide, skirt = self.widths(tops)
         wide = np.maximum(wide / s, SPRING_FLOOR_CELLS)
         return self.crest.stroke.plateau_radius_m / s + np.maximum(TOE * wide, wide + skirt / s) + 0.01
@@ -105,6 +116,18 @@ class Packed:
         assert self.pieces is not None
         ends = [start + k for start, k in zip(self.octaves, self.culled, strict=True)] + [len(self.pieces)]
         return self.pieces[ends[o] : ends[o + 1]]
+
+
+def shape_for(layer: Layer | None, stroke: Stroke, settings: TerrainSettings) -> Shape | None:
+    """A stroke ready to be packed into the tables of a layer (None: the heights); None when it says nothing of it."""
+    value = 0.0 if layer is None else says(stroke, layer, settings)
+    if value is None:
+        return None
+    if layer is not None and stroke.paint is not None:
+        line = line_of(stroke)
+        return None if line is None else Shape(line, None, None, 0.0, None, value, stroke.paint.radius_m)
+    crest = crest_of(stroke)
+    return None if crest is None else replace(shape_of(crest, settings), value=value)
 
 
 def shape_of(crest: Crest, settings: TerrainSettings) -> Shape:
@@ -220,7 +243,7 @@ def _params(shape: Shape, s: float, reach: float) -> Floats:
         "same": float(shape.left == shape.right),
         "run": 1.0,
     }
-    values |= {"amplitude": stroke.amplitude_m - BASE_AMPLITUDE_M, "roughness": stroke.roughness - BASE_ROUGHNESS}
+    values |= {"value": shape.value, "brush": shape.brush(s)}
     for letter, side in (("l", shape.left), ("r", shape.right)):
         if side is None:
             values[f"{letter}s"] = 1.0

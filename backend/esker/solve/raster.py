@@ -46,18 +46,19 @@ def rasterise(launch: Launcher, tables: Tables, window: Window, target: Target) 
     )  # fmt: skip
 
 
-def rasterise_channels(
-    launch: Launcher, tables: Tables, window: Window, d: Any, f: Any, pitch: int, stride: int
+def rasterise_channel(
+    launch: Launcher, tables: Tables, window: Window, d: Any, f: Any, pitch: int, stride: int, covered: bool
 ) -> None:
-    """Enqueue what the strokes say of amplitude (metres) and roughness, as differences from their base (DESIGN 5.4).
+    """Enqueue what the strokes say of the tables' channel, as a difference from its base (DESIGN 5.4).
 
-    d: stiffness, one channel; f: stiffness times value, two channels. Layout: see ``Target``.
+    d: stiffness; f: what it pulls to, and if ``covered``, in a second channel, that of a value of 1 (see
+    ``reference_raster.rasterise_channel``). Layout: see ``Target``.
     """
     if window.width == 0:
         return
     launch.run(
-        "rasterise_channels", (window.width, len(window.spans)), *_arguments(launch, tables, window),
-        np.int32(pitch), np.int32(stride), d, f,
+        "rasterise_channel", (window.width, len(window.spans)), *_arguments(launch, tables, window),
+        np.int32(pitch), np.int32(stride), d, f, np.float32(tables.screening), np.int32(covered),
     )  # fmt: skip
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from esker.contract import CREST_STIFFNESS
-from esker.solve.reference_section import TINY, Band, Nearest, channel_section, cross_section, straight
+from esker.solve.reference_section import TINY, Band, Nearest, brush_section, channel_section, cross_section, straight
 from esker.solve.tables import (
     AGREEMENT,
     AGREEMENT_NOISE,
@@ -70,21 +70,28 @@ def rasterise(tables: Tables) -> Constraints:
     return Constraints(height_d, height_f, *_two(total))
 
 
-def rasterise_channels(tables: Tables) -> tuple[Floats, Floats]:
-    """What the strokes say of amplitude (metres) and roughness, as differences from their base (DESIGN 5.4).
+def rasterise_channel(tables: Tables) -> tuple[Floats, Floats, Floats]:
+    """What the strokes say of the tables' channel, as a difference from its base (DESIGN 5.4).
 
-    d: stiffness, shape ``tables.shape``; f: stiffness times value, (2, rows, columns).
+    d: stiffness; f: stiffness times value; its cover, that of a value of 1; all of shape ``tables.shape``. As far as a
+    sample is known, screening pulls to its value too, and not to the base. Where strokes meet they come to a mean that
+    does not depend on their order: paint and paint by how near its line is in its radius.
     """
     total = _sums(tables)
     for k, at, near, inside in _strokes(tables):
         params = tables.strokes[k]
-        known, weight = channel_section(near, inside, params, tables)
+        if params[STROKE_AT["brush"]] > 0:
+            known = weight = brush_section(near, params)
+        else:
+            known, weight = channel_section(near, inside, params, tables)
         total["g"][at] += weight
-        total["gx"][at] += weight * params[STROKE_AT["amplitude"]]
-        total["gy"][at] += weight * params[STROKE_AT["roughness"]]
+        total["gx"][at] += weight * params[STROKE_AT["value"]]
         total["toe"][at] = np.maximum(total["toe"][at], known)
     rows, columns = tables.shape
-    return _two({name: a[:rows, :columns] for name, a in total.items()})
+    total = {name: a[:rows, :columns] for name, a in total.items()}
+    d = CREST_STIFFNESS * total["toe"]
+    cover = d + tables.screening * total["toe"]
+    return d, cover * total["gx"] / np.maximum(total["g"], TINY), cover
 
 
 def _sums(tables: Tables) -> dict[str, Floats]:
@@ -93,7 +100,7 @@ def _sums(tables: Tables) -> dict[str, Floats]:
 
 
 def _two(total: dict[str, Floats]) -> tuple[Floats, Floats]:
-    """D and f of the gradient, or of the channels."""
+    """D and f of the gradient."""
     d, g = CREST_STIFFNESS * total["toe"], np.maximum(total["g"], TINY)
     return d, np.stack([d * total["gx"] / g, d * total["gy"] / g])
 

@@ -15,6 +15,7 @@ from esker.solve.tables import (
     FAN,
     HELD_FRACTION,
     INDEX_AT,
+    NEAR_FLOOR,
     NEAR_SHARE,
     SKIRT_SLOPE,
     SPRING_FLOOR_CELLS,
@@ -206,9 +207,9 @@ class Band:
     gy: Floats
 
 
-def nearness(b: Flanks, s: float) -> Floats:
+def nearness(b: Flanks, tables: Tables) -> Floats:
     """Weight of a stroke beside others by the distance from its crest: on any grid the same ground takes over."""
-    return np.asarray(1 / (1 + (b.ds / np.maximum(NEAR_SHARE * b.end, 2 * s)) ** 2))
+    return np.asarray(1 / (1 + (b.ds / np.maximum(NEAR_SHARE * b.end, NEAR_FLOOR * tables.octave_m)) ** 2))
 
 
 def cross_section(near: Nearest, inside: Mask, params: Floats, tables: Tables) -> Band:
@@ -237,7 +238,7 @@ def cross_section(near: Nearest, inside: Mask, params: Floats, tables: Tables) -
     sign = np.where(near.height < 0, -1.0, 1.0)
     sloping = b.has & (near.distance > params[STROKE_AT["plateau"]]) & ~inside
     down = np.where(sloping, lift * near.rate - sign * fall, 0.0)
-    near_weight = nearness(b, s)
+    near_weight = nearness(b, tables)
     fade = np.where(b.hard, 1.0, b.present * (1 - free))
     toe_fade = np.where(b.has, b.present * (1 - smoothstep((rt - 1) / (toe_end - 1))), 0.0)
     unit = down / np.maximum(near.distance, 0.5)
@@ -259,11 +260,16 @@ def cross_section(near: Nearest, inside: Mask, params: Floats, tables: Tables) -
 
 
 def channel_section(near: Nearest, inside: Mask, params: Floats, tables: Tables) -> tuple[Floats, Floats]:
-    """How far samples know one stroke's amplitude and roughness, 0..1, and the weight of that (DESIGN 5.4)."""
+    """How far samples know what one stroke says of a channel, 0..1, and the weight of that (DESIGN 5.4)."""
     s = tables.spacing_m
     b = flanks_of(near, inside, params, s)
     r = b.ds / np.maximum(b.end, CHANNEL_FLOOR_CELLS * s)
     known = np.where(b.hard, 1.0, b.present * (1 - smoothstep((r - 1) / (TOE - 1))))
     known = np.where(b.within, known, 0.0)
     outer = np.where(b.hard, 1.0, np.maximum(1 - r / TOE, 0.0) ** 2)
-    return known, known * nearness(b, s) * outer
+    return known, known * nearness(b, tables) * outer
+
+
+def brush_section(near: Nearest, params: Floats) -> Floats:
+    """How far samples know what one brush has painted: 1 on its line, nothing at its radius (DESIGN 5.4)."""
+    return 1 - smoothstep(near.distance / params[STROKE_AT["brush"]])

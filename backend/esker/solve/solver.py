@@ -20,12 +20,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from esker import grid
-from esker.contract import MAX_LEVEL, TILE_CELLS, Channel, Stroke, TerrainSettings
+from esker.contract import MAX_LEVEL, Channel, Stroke, TerrainSettings
 from esker.solve import multigrid, proof
 from esker.solve.channels import ChannelSolver, channel_level
 from esker.solve.constraints import Packer
 from esker.solve.device import NUMPY, NUMPY_NAME, Device, open_device
 from esker.solve.faults import OutOfDeviceMemoryError, guarded, is_fault
+from esker.solve.injection import frozen, injections
 from esker.solve.refine import Refiner, Refinery
 from esker.solve.workspaces import new_workspace
 
@@ -65,7 +66,8 @@ class LevelResult:
     """One finished level. heights: (N_l, N_l) float32, metres, row 0 south, read-only. ``settled`` False: a preview
     that later results correct; True: final for this stroke set, and the injection of the next finer level.
 
-    ``channel`` other than HEIGHT: ``heights`` holds that channel instead (amplitude in metres, roughness 0..1).
+    ``channel`` other than HEIGHT: ``heights`` holds that channel instead, in its unit (metres, 0..1, -1..1); the same
+    array as last time if nothing of it changed.
     ``basis``: with the last result of a settled solve, if it was asked for.
     """
 
@@ -155,6 +157,15 @@ class Solver:
         """
         return self._run(strokes, settings, self._level(levels), None, basis)
 
+    def channels(
+        self, strokes: Sequence[Stroke], settings: TerrainSettings, levels: int | None = None
+    ) -> Iterator[LevelResult | None]:
+        """What ``steps`` gives out beside the heights, alone: for strokes of which only that has changed.
+
+        None comes wherever the work can be left. Raises ValueError like ``steps``.
+        """
+        return self._retried(lambda top: self._alone(strokes, settings, top), self._level(levels))
+
     def solve(
         self,
         strokes: Sequence[Stroke],
@@ -207,15 +218,21 @@ class Solver:
         warm: NDArray[np.float32] | None,
         basis: bool,
     ) -> Generator[LevelResult | None]:
+        yield from self._retried(lambda level: self._attempt(strokes, settings, level, warm, basis), top)
+
+    def _retried(
+        self, attempt: Callable[[int], Iterator[LevelResult | None]], top: int
+    ) -> Generator[LevelResult | None]:
+        """Without memory for it, once more without what is kept for later."""
         try:
-            yield from self._attempt(strokes, settings, top, warm, basis)
+            yield from attempt(top)
             return
         except OutOfDeviceMemoryError:
             if not self._spare and not self._channel_solvers:
                 raise
         self._spare.clear()
         self._channel_solvers.clear()
-        yield from self._attempt(strokes, settings, top, warm, basis)
+        yield from attempt(top)
 
     def _attempt(
         self,
@@ -233,12 +250,16 @@ class Solver:
                 yield from workspace.loading(strokes, settings)
                 loaded = True
                 if warm is None:
-                    yield from self._paced(_previews(workspace, preview_gradient_cycles(settings)), top)
+                    yield from self._with_channels(
+                        self._paced(_previews(workspace, preview_gradient_cycles(settings)), top),
+                        self._channels(strokes, settings, top),
+                        top,
+                    )
                 else:
                     _gradients(workspace)
                     workspace.warm(warm)
+                    yield from self._channels(strokes, settings, top)
                 yield from _to_rest(workspace, settings)
-                yield from self._channels(strokes, settings, top)
                 yield from _settled(workspace, strokes, settings, basis)
             except GeneratorExit:
                 if not loaded:
@@ -260,14 +281,27 @@ class Solver:
                 self._device.queue.finish()
             yield result
 
+    def _alone(self, strokes: Sequence[Stroke], settings: TerrainSettings, top: int) -> Iterator[LevelResult | None]:
+        with guarded(self._device):
+            yield from self._channels(strokes, settings, top)
+
     def _channels(self, strokes: Sequence[Stroke], settings: TerrainSettings, top: int) -> Iterator[LevelResult | None]:
-        """Amplitude and roughness, final, levels coarse to fine."""
+        """The other channels, final, levels coarse to fine."""
         level = channel_level(top)
         solver = self._channel_solvers.setdefault(level, ChannelSolver(self._device, level))
-        for channel, values in solver.solve(strokes, settings):
-            for coarser, samples in enumerate(_injections(_frozen(values))):
+        for channel, levels in solver.pyramids(strokes, settings):
+            for coarser, samples in enumerate(levels):
                 yield LevelResult(coarser, samples, settled=True, channel=channel)
-        yield None
+            yield None
+
+    def _with_channels(
+        self, previews: Iterator[LevelResult | None], channels: Iterator[LevelResult | None], top: int
+    ) -> Iterator[LevelResult | None]:
+        """The channels come before the finest preview: so what is painted keeps up with a pen that never rests."""
+        for result in previews:
+            if result is not None and result.level == top:
+                yield from channels
+            yield result
 
     def _take(self, strokes: Sequence[Stroke], settings: TerrainSettings, top: int) -> Workspace:
         """An idle workspace that has most of these strokes rasterised already; or a new one; or the longest idle."""
@@ -305,11 +339,11 @@ def _previews(w: Workspace, gradient_cycles: int = PREVIEW_GRADIENT_CYCLES) -> I
         w.guide(level)
         multigrid.start(w.height, level)
         multigrid.finish(w.height, level)
-        yield LevelResult(level, _frozen(w.read(level)), settled=False)
+        yield LevelResult(level, frozen(w.read(level)), settled=False)
     yield from _cycles(w.gradient, gradient_cycles)
     w.guide(w.top)
     yield from _cycles(w.height, PREVIEW_HEIGHT_CYCLES)
-    yield LevelResult(w.top, _frozen(w.read(w.top)), settled=False)
+    yield LevelResult(w.top, frozen(w.read(w.top)), settled=False)
 
 
 def _cycles(system: multigrid.System, count: int) -> Iterator[None]:
@@ -346,23 +380,11 @@ def _settled(w: Workspace, strokes: Sequence[Stroke], settings: TerrainSettings,
 
     Raises DivergedError for heights that are not finite: a kernel's largest update passes over what is not a number.
     """
-    heights = _frozen(w.read(w.top))
+    heights = frozen(w.read(w.top))
     if not np.isfinite(heights).all():
         raise multigrid.DivergedError
-    *coarser, finest = enumerate(_injections(heights))
+    *coarser, finest = enumerate(injections(heights))
     for level, samples in coarser:
         yield LevelResult(level, samples, settled=True)
-    found = Basis(tuple(strokes), settings, w.top, heights, _frozen(w.read_gradient())) if basis else None
+    found = Basis(tuple(strokes), settings, w.top, heights, frozen(w.read_gradient())) if basis else None
     yield LevelResult(finest[0], finest[1], settled=True, basis=found)
-
-
-def _injections(finest: NDArray[np.float32]) -> list[NDArray[np.float32]]:
-    """Levels 0, 1, ... of which each holds every second sample of the next; the last is ``finest`` itself."""
-    top = ((len(finest) - 1) // TILE_CELLS).bit_length() - 1
-    return [*(_frozen(finest[:: 1 << (top - level), :: 1 << (top - level)]) for level in range(top)), finest]
-
-
-def _frozen(heights: NDArray[np.float32]) -> NDArray[np.float32]:
-    out = np.ascontiguousarray(heights)
-    out.flags.writeable = False
-    return out

@@ -37,10 +37,12 @@ CREST_HALF_WIDTH = 0.71
 SPRING_FLOOR_CELLS = 8.0
 """A spring is never stiffer than that of a band this wide."""
 CHANNEL_FLOOR_CELLS = 1.5
-"""Where a band is narrower, amplitude and roughness are known to this distance from the crest."""
+"""Where a band or a brush is narrower, the other channels are known to this distance from the line."""
 NEAR_SHARE = 1 / 80
 """Strokes are weighed by the square of their distance; nearer to its crest than this share of its width one has most of
-the say. A length on the ground (and at least two cells), so that every level sees the same crossing."""
+the say. A length on the ground, so that every level sees the same crossing."""
+NEAR_FLOOR = 2.0
+"""That length is at least so many 1,024ths of the domain: a notch that level 4 could not show would turn into beads."""
 OVERLAP_STIFFENING = 200.0
 """Where strokes want different heights the springs are up to this many times stiffer: the mean of their gradients is
 not the gradient of their mean height there, and a crest would stand out of the ground sample by sample."""
@@ -88,7 +90,7 @@ SEGMENT_FIELDS = ("ax", "ay", "dx", "dy", "il2", "t0x", "t0y", "t1x", "t1y", "ca
 KNOT_FIELDS = ("t", "z", "slope")
 STROKE_FIELDS = (
     *("plateau", "reach", "lh", "ls", "le", "lk", "lf", "rh", "rs", "re", "rk", "rf", "same", "run"),
-    *("height", "ax", "ay", "tx", "ty", "length", "amplitude", "roughness"),
+    *("height", "ax", "ay", "tx", "ty", "length", "value", "brush"),
 )
 STROKE_STRIDE = len(STROKE_FIELDS)
 INDEX_FIELDS = ("first", "count", "spans", "octave", "octaves")
@@ -110,8 +112,8 @@ class Tables:
     strokes: (k, STROKE_STRIDE) by STROKE_FIELDS. plateau, reach in cells (reach: outermost distance with any effect);
       per side h: 1 if there is a flank, s: slope (tangent), e: extent in metres, k and f: shares of the crest height
       taken by a round shoulder and a round foot; same: 1 if both sides are alike, then run: 1 / slope; height: of an
-      outline; a, t, length: start, unit direction and length of a profile in plan; amplitude (metres) and roughness as
-      differences from their base.
+      outline; a, t, length: start, unit direction and length of a profile in plan. In tables of a channel other than
+      heights, value: what the stroke asks of it, as a difference from its base; brush: radius of paint in cells, or 0.
     index: (k, INDEX_STRIDE) by INDEX_FIELDS: first segment or knot, number of them, start in span_index or -1, start in
       ``octaves``, number of octaves or -1 for an outline.
     row_start, row_items: by row of bins of ``box`` (CSR), per stroke (stroke, first bin, end of bins). span_index,
@@ -189,6 +191,7 @@ def defines() -> dict[str, float | int]:
         "SPRING_FLOOR_CELLS": SPRING_FLOOR_CELLS,
         "CHANNEL_FLOOR_CELLS": CHANNEL_FLOOR_CELLS,
         "NEAR_SHARE": NEAR_SHARE,
+        "NEAR_FLOOR": NEAR_FLOOR,
         "OVERLAP_STIFFENING": OVERLAP_STIFFENING,
         "OVERLAP_STIFFEST": OVERLAP_STIFFEST,
         "PINNED": PINNED,

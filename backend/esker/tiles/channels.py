@@ -11,6 +11,7 @@ from typing import ClassVar, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from esker import grid
 from esker.contract import (
     AMPLITUDE_QUANTA_PER_M,
     BASE_AMPLITUDE_M,
@@ -65,7 +66,21 @@ class ChannelPyramid(Pyramid):
         self.channel = channel
 
     def put(self, clock: int, level: int, heights: NDArray[np.float32], settled: bool, show: bool = True) -> int:
-        """Replaces a level of the channel: (N_l, N_l) float32 in its unit. See ``Pyramid.put``; raises the same."""
+        """Replaces a level of the channel: (N_l, N_l) float32 in its unit. See ``Pyramid.put``; raises the same.
+
+        The base of a channel that was never anything else is not held: what nobody asks for is not sent.
+        """
         away = heights - np.float32(BASE[self.channel])
         away *= np.float32(QUANTA[self.channel] / (1 << max(0, level)))
+        if 0 <= level <= self.top and self.level(level) is None:
+            if heights.shape == (grid.samples(level),) * 2 and not away.any():
+                return 0
+            self._begin(clock, level)
         return super().put(clock, level, away, settled, show)
+
+    def _begin(self, clock: int, finest: int) -> None:
+        """The levels below the first that says anything."""
+        for level in range(finest):
+            if self.level(level) is None:
+                n = grid.samples(level)
+                super().put(clock, level, np.zeros((n, n), dtype=np.float32), settled=True)

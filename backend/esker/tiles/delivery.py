@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from esker.contract import DEFAULT_LEVEL, Channel, View
 from esker.grid import TileKey
-from esker.tiles.channels import ChannelPyramid
+from esker.tiles.channels import ChannelPyramid, channel_levels
 from esker.tiles.ledger import Ledger
 from esker.tiles.plans import EncodedTiles, FramePlan
 from esker.tiles.pyramid import Mask, Pyramid
@@ -31,7 +31,7 @@ WISHES: Final = 64
 TAU_STEP: Final = 1.3
 """Where a view wants more refined tiles than a client may hold, its tau grows by this factor until they fit."""
 
-CHANNELS: Final = tuple(channel for channel in Channel if channel != Channel.HEIGHT)
+CHANNELS: Final[tuple[Channel, ...]] = tuple(channel for channel in Channel if channel != Channel.HEIGHT)
 
 
 class RefinedTile(Protocol):
@@ -83,8 +83,9 @@ class TileServer:
     ) -> int:
         """Takes a level of a solve: (N_l, N_l) float32, row 0 south. Returns the number of changed tiles.
 
-        Heights and amplitude in metres, roughness 0..1. A tile changes when a sample moved by at least one quantum; a
-        settled level is exact. Raises ValueError for a wrong level, shape, NaN or infinity, and changes nothing then.
+        Heights and amplitude in metres, roughness 0..1, biases -1..1. A tile changes when a sample moved by at least
+        one quantum; a settled level is exact. Raises ValueError for a wrong level, shape, NaN or infinity, and changes
+        nothing then.
         """
         if channel != Channel.HEIGHT:
             return self.channels[channel].put(clock, level, heights, settled, show)
@@ -108,6 +109,8 @@ class TileServer:
         if top != self.pyramid.top:
             self.refined.suspend()
             self.pyramid.limit(top)
+            for channel in self.channels.values():
+                channel.limit(channel_levels(top))
 
     def settled(self) -> bool:
         """True when every level that is solved is final for one and the same clock."""
@@ -227,6 +230,9 @@ class ClientTiles:
 
     def _plan_channels(self) -> FramePlan | None:
         for ledger in self._channels.values():
+            plan = ledger.plan_limit()
+            if plan is not None:
+                return plan
             for level in range(ledger.levels + 1):
                 plan = ledger.plan_level(level, np.True_)
                 if plan is not None:

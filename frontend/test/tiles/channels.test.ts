@@ -2,7 +2,13 @@
 
 import { describe, expect, it } from "vitest";
 import type { DecodedFrame } from "../../src/core/types.ts";
-import { AMPLITUDE_QUANTA_PER_M, Channel, FrameKind, ROUGHNESS_QUANTA } from "../../src/generated/contract.ts";
+import {
+  AMPLITUDE_QUANTA_PER_M,
+  BIAS_QUANTA,
+  Channel,
+  FrameKind,
+  ROUGHNESS_QUANTA,
+} from "../../src/generated/contract.ts";
 import { channelTexels } from "../../src/gpu/channeltexture.ts";
 import { detailColour } from "../../src/gpu/mapdetail.ts";
 import { ChannelStore } from "../../src/tiles/channels.ts";
@@ -98,6 +104,33 @@ describe("ChannelStore", () => {
     expect(store.amplitudeAt(5, 5)).toBe(1);
     store.apply(level(Channel.ROUGHNESS, 0, () => 0));
     expect(store.amplitudeAt(5, 5)).toBe(0);
+  });
+
+  it("R23: what a new connection does not bring goes when its ground is here", () => {
+    const store = new ChannelStore(SIZE);
+    store.apply(level(Channel.SNOW, 0, () => BIAS_QUANTA));
+    store.renewed();
+    expect(store.snow.values[0]).toBe(1);
+    store.restart();
+    store.renewed();
+    expect(store.snow.side).toBe(2);
+    store.apply(level(Channel.SNOW, 0, () => BIAS_QUANTA));
+    store.renewed();
+    expect(store.snow.values[0]).toBe(1);
+  });
+
+  it("R23: paint comes like the others, -1 to 1, and is nothing where nobody painted", () => {
+    const store = new ChannelStore(SIZE);
+    for (const grid of [store.snow, store.grass, store.forest, store.wetness])
+      expect([...grid.values]).toEqual([0, 0, 0, 0]);
+    store.apply(level(Channel.SNOW, 0, () => BIAS_QUANTA));
+    store.apply(level(Channel.FOREST, 0, () => -BIAS_QUANTA / 2));
+    store.apply(level(Channel.WETNESS, 0, (c) => (c * BIAS_QUANTA) / 64));
+    expect(store.snow.values[100]).toBe(1);
+    expect(store.forest.values[100]).toBe(-0.5);
+    expect(store.wetness.values[64]).toBe(1);
+    expect(store.grass.values[0]).toBe(0);
+    expect(store.roughness.values[0]).toBe(0.5);
   });
 });
 

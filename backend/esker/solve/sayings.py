@@ -1,0 +1,98 @@
+"""What strokes ask of the channels other than the heights (DESIGN 5.4): numbers, as differences from the base."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+from esker.contract import (
+    BASE_AMPLITUDE_M,
+    BASE_BIAS,
+    BASE_ROUGHNESS,
+    TILE_CELLS,
+    Channel,
+    PaintChannel,
+    Stroke,
+    TerrainSettings,
+)
+from esker.fractal import ALPHA, PAINT_LESS, PAINT_MORE
+
+BASES: Final = {
+    Channel.AMPLITUDE: BASE_AMPLITUDE_M,
+    Channel.ROUGHNESS: BASE_ROUGHNESS,
+    Channel.SNOW: BASE_BIAS,
+    Channel.GRASS: BASE_BIAS,
+    Channel.FOREST: BASE_BIAS,
+    Channel.WETNESS: BASE_BIAS,
+}
+"""The channels in the order in which they are solved, and what they are where no stroke says otherwise."""
+PAINTED: Final[dict[PaintChannel, Channel]] = {
+    "amplitude": Channel.AMPLITUDE,
+    "roughness": Channel.ROUGHNESS,
+    "snow": Channel.SNOW,
+    "grass": Channel.GRASS,
+    "forest": Channel.FOREST,
+    "wetness": Channel.WETNESS,
+}
+STROKES_SPEAK: Final = frozenset({Channel.AMPLITUDE, Channel.ROUGHNESS})
+"""Channels of which every stroke of the ground says something, not paint alone."""
+PAINT_REACH_FRACTION: Final = 1 / 256
+"""How far paint is felt beyond its radius, as a share of the domain: a brush paints what its ring shows."""
+
+
+class Layer(NamedTuple):
+    """One of the two fields that a channel is made from: what strokes of the ground say of it, or what is painted."""
+
+    channel: Channel
+    painted: bool
+
+
+def says(stroke: Stroke, layer: Layer, settings: TerrainSettings) -> float | None:
+    """What a stroke asks of a layer, as a difference from its base, in its unit; None when it says nothing of it.
+
+    Paint of roughness asks for 0 (value -1) to 1; of amplitude, for PAINT_MORE times the natural detail of the terrain
+    (value 1), or to take PAINT_LESS of it away (value -1); of the others, for the value itself.
+    """
+    channel, paint = layer.channel, stroke.paint
+    if (paint is not None) != layer.painted:
+        return None
+    if paint is not None:
+        if PAINTED[paint.channel] != channel:
+            return None
+        if channel == Channel.AMPLITUDE:
+            return paint.value * (PAINT_MORE if paint.value > 0 else PAINT_LESS) * natural_amplitude_m(settings)
+        return 0.5 * paint.value if channel == Channel.ROUGHNESS else paint.value
+    if channel == Channel.AMPLITUDE:
+        return stroke.amplitude_m - BASE_AMPLITUDE_M
+    return stroke.roughness - BASE_ROUGHNESS if channel == Channel.ROUGHNESS else None
+
+
+def natural_amplitude_m(settings: TerrainSettings) -> float:
+    """Amplitude of the coarsest octave of natural detail on steep ground, metres (docs/synthesis.md)."""
+    return ALPHA * settings.size_m / TILE_CELLS
+
+
+def spread(strokes: Sequence[Stroke], layer: Layer, settings: TerrainSettings) -> tuple[float, float]:
+    """The least and the greatest that anything asks of a layer, 0 included.
+
+    (0, 0): it is 0 everywhere, as a diffused value lies between those that were asked for.
+    """
+    asked = [0.0]
+    for stroke in strokes:
+        if not stroke.hidden and stroke.curve:
+            value = says(stroke, layer, settings)
+            if value is not None:
+                asked.append(value)
+    return min(asked), max(asked)
+
+
+def reach_of(layer: Layer, settings: TerrainSettings) -> float | None:
+    """How far a layer's values are felt, metres; None for everywhere.
+
+    What strokes of the ground say, as far as their heights are. Paint hardly beyond its radius: with the papers'
+    endless diffusion a dab of snow would lie on everything.
+    """
+    if not layer.painted:
+        return settings.reach_m
+    most = settings.size_m * PAINT_REACH_FRACTION
+    return most if settings.reach_m is None else min(settings.reach_m, most)
