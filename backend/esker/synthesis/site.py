@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from esker import grid
+from esker import contract, grid
 from esker.contract import BASE_ROUGHNESS, TILE_CELLS
 from esker.fractal import ALPHA, LOOKS, LookRule
 from esker.synthesis.interpolate import Window
@@ -85,6 +85,8 @@ class Site:
                 raise ValueError(f"no channel '{name}' of {values.shape} values")
         if self.look not in LOOKS:
             raise ValueError(f"no look is called '{self.look}'")
+        if self.rule not in get_args(contract.Rule):
+            raise ValueError(f"no rule is called '{self.rule}'")
 
     @property
     def solved(self) -> int:

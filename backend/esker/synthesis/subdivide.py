@@ -10,9 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from esker import grid
+from esker import fractal, grid
 from esker.contract import MAX_SYNTHESIS_LEVEL
-from esker.fractal import CONCAVITY_SCALE, FINEST_CELL_M, SMOOTHNESS
 from esker.synthesis.interpolate import (
     B_SPLINE,
     DERIVATIVE,
@@ -39,7 +38,7 @@ class Samples(NamedTuple):
 
 def finest_level(size_m: float) -> int:
     """The coarsest level whose cells are no larger than a centimetre, but MAX_SYNTHESIS_LEVEL at most."""
-    return min(MAX_SYNTHESIS_LEVEL, max(0, int(np.ceil(np.log2(size_m / grid.cells(0) / FINEST_CELL_M)))))
+    return min(MAX_SYNTHESIS_LEVEL, max(0, int(np.ceil(np.log2(size_m / grid.cells(0) / fractal.FINEST_CELL_M)))))
 
 
 def root(site: Site, window: Window | None = None) -> Samples:
@@ -61,9 +60,9 @@ def root(site: Site, window: Window | None = None) -> Samples:
     gx = (z[1:-1, 2:] - z[1:-1, :-2]) / (2 * s)
     gy = (z[2:, 1:-1] - z[:-2, 1:-1]) / (2 * s)
     c = (z[1:-1, :-2] - 2 * mid + z[1:-1, 2:]) / s + (z[:-2, 1:-1] - 2 * mid + z[2:, 1:-1]) / s
-    ground = Ground(0, mid, gx, gy, np.clip(CONCAVITY_SCALE * c, -1, 1), np.sqrt(gx * gx + gy * gy))
+    ground = Ground(0, mid, gx, gy, np.clip(fractal.CONCAVITY_SCALE * c, -1, 1), np.sqrt(gx * gx + gy * gy))
     t = targets(site, ground)
-    before = State(np.zeros_like(mid), np.full_like(mid, SMOOTHNESS), *t[1:])
+    before = State(np.zeros_like(mid), np.full_like(mid, fractal.SMOOTHNESS), *t[1:])
     state = RULES[site.rule](site, ground, before, window, site.biases(window))
     return Samples(window, mid, stored(state))
 
@@ -102,7 +101,7 @@ def _ground(parent: Samples, window: Window, site: Site) -> Ground:
     guide_x = along_y(along_x(parent.guide, DERIVATIVE, at, window), B_SPLINE, at, window) / s
     guide_y = along_y(along_x(parent.guide, B_SPLINE, at, window), DERIVATIVE, at, window) / s
     steep = np.sqrt(guide_x * guide_x + guide_y * guide_y)
-    return Ground(window.level, height, gx, gy, np.clip(CONCAVITY_SCALE * c, -1, 1), steep)
+    return Ground(window.level, height, gx, gy, np.clip(fractal.CONCAVITY_SCALE * c, -1, 1), steep)
 
 
 def whole(level: int) -> Window:
