@@ -42,7 +42,7 @@ def test_guides_are_what_clients_decode(size: float, level: int) -> None:
     samples = quantise(z, level, size)
     q = grid.quantum(level, size)
     assert np.array_equal(on_the_wire(z, level, size), (samples.astype(np.float64) * q).astype(np.float32))
-    assert np.abs(on_the_wire(z, level, size) - z).max() <= 0.5001 * q
+    assert np.abs(on_the_wire(z, level, size) - z).max() <= 0.51 * q
 
 
 def test_channels_are_what_clients_decode(terrain: Terrain) -> None:
@@ -174,18 +174,16 @@ def test_the_command_writes_heights_and_attributes(
     file, out, more = tmp_path / "t.esker", tmp_path / "h.npy", tmp_path / "a.npz"
     file.write_bytes(archive.dumps(terrain.document))
     corners = [str(v) for v in WHERE]
-    assert (
-        command.main([str(file), "-o", str(out), "--level", "11", "--attributes", str(more), "--window", *corners]) == 0
-    )
+    options = ["--level", "9", "--attributes", str(more), "--window", *corners]
+    assert command.main([str(file), "-o", str(out), *options]) == 0
     said = capsys.readouterr().err
     assert "level 4 (1025 x 1025) settled" in said
     assert "heights with detail" in said
-    wanted = terrain.window(11, *WHERE, detail=True)
+    wanted = terrain.window(9, *WHERE, detail=True)
     assert np.array_equal(np.load(out), wanted.heights)
     with np.load(more) as attributes:
-        assert {name: attributes[name].shape for name in attributes} == dict.fromkeys(
-            wanted.attributes, wanted.heights.shape
-        )
+        shapes = {name: attributes[name].shape for name in attributes}
+        assert shapes == dict.fromkeys(wanted.attributes, wanted.heights.shape)
         assert np.array_equal(attributes["snow"], wanted.attributes["snow"])
     assert command.main([str(file), "-o", str(out), "--level", "2", "--detail", "-q"]) == 0
     assert capsys.readouterr().err == ""
