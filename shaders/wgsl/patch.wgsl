@@ -13,10 +13,11 @@ struct PatchVertex {
 
 override PITCH: u32 = 17u;     // vertex numbering: row stride of the index buffer
 
-fn patch_slot(record: vec4u) -> u32 { return record.y & 0xffffu; }
-fn patch_parent(record: vec4u) -> u32 { return record.y >> 16u; }
-fn patch_level(record: vec4u) -> u32 { return record.z & 0xffu; }
-fn patch_corner(record: vec4u) -> vec2i { return vec2i(i32(record.x & 0xffffu), i32(record.x >> 16u)); }
+fn patch_slot(record: vec4u) -> u32 { return record.z & 0xffffu; }
+fn patch_parent(record: vec4u) -> u32 { return record.z >> 16u; }
+fn patch_level(record: vec4u) -> u32 { return (record.y >> 24u) & 31u; }
+fn patch_edges(record: vec4u) -> u32 { return (record.x >> 24u) & 15u; }
+fn patch_corner(record: vec4u) -> vec2i { return vec2i(record.xy & vec2u(0xffffffu)); }
 
 // Sample position in the parent's tile of a sample position of the tile.
 fn parent_at(record: vec4u, at: vec2f) -> vec2f {
@@ -59,7 +60,7 @@ fn patch_morph(record: vec4u, g: vec2i) -> f32 {
 
 fn patch_vertex(record: vec4u, grid: vec2i) -> PatchVertex {
   var g = grid;
-  let edges = (record.z >> 8u) & 15u;
+  let edges = patch_edges(record);
   let odd = g & vec2i(1);
   // Beside a coarser neighbour only every second vertex exists: the odd ones collapse onto the even ones.
   if ((g.x == 0 && (edges & 1u) != 0u) || (g.x == PATCH_CELLS && (edges & 2u) != 0u)) { g.y -= odd.y; }
@@ -75,7 +76,7 @@ fn patch_vertex(record: vec4u, grid: vec2i) -> PatchVertex {
     if (morph > 0.0) { z = exact_mix(z, parent_height(record, at), morph); }
   }
   // On the lattice of the finest level both sides of a seam are the same integers, and so get the same bits.
-  let lattice = vec2f((corner + g) << vec2u(u32(MAX_REFINED_LEVEL) - patch_level(record)));
+  let lattice = vec2f((corner + g) << vec2u(u32(MAX_SYNTHESIS_LEVEL) - patch_level(record)));
   var out: PatchVertex;
   out.world = vec3f(lattice * view.finest_cell, z);
   out.relative = vec3f((lattice - view.eye_cell) * view.finest_cell - view.eye_part, (z - view.eye.z) - view.eye_low.z);
@@ -84,12 +85,15 @@ fn patch_vertex(record: vec4u, grid: vec2i) -> PatchVertex {
   return out;
 }
 
-// Surface gradient (dz/dx, dz/dy), sun and sky visibility at a point of a patch, morphed like the heights.
+// Surface gradient (dz/dx, dz/dy), sun and sky visibility and synthesised channels at a point of a patch, morphed like the
+// heights.
 struct Surface {
   gradient: vec2f,
   curvature: f32,
   sun: f32,
   sky: f32,
+  attributes0: vec4f,  // snow, wet, foam, smoothness / 2
+  attributes1: vec4f,  // grass, forest, grain, size of the next level's detail
 };
 
 fn patch_surface(record: vec4u, at: vec2f, morph: f32) -> Surface {
@@ -97,11 +101,15 @@ fn patch_surface(record: vec4u, at: vec2f, morph: f32) -> Surface {
   let uv = slot_uv(own, at);
   var s = textureSampleLevel(slopes, smooth_clamp, uv, slot_layer(own), 0.0);
   var l = textureSampleLevel(light, smooth_clamp, uv, slot_layer(own), 0.0);
+  var a0 = textureSampleLevel(attributes0, smooth_clamp, uv, slot_layer(own), 0.0);
+  var a1 = textureSampleLevel(attributes1, smooth_clamp, uv, slot_layer(own), 0.0);
   if (morph > 0.0) {
     let parent = patch_parent(record);
     let up = slot_uv(parent, parent_at(record, at));
     s = mix(s, textureSampleLevel(slopes, smooth_clamp, up, slot_layer(parent), 0.0), morph);
     l = mix(l, textureSampleLevel(light, smooth_clamp, up, slot_layer(parent), 0.0), morph);
+    a0 = mix(a0, textureSampleLevel(attributes0, smooth_clamp, up, slot_layer(parent), 0.0), morph);
+    a1 = mix(a1, textureSampleLevel(attributes1, smooth_clamp, up, slot_layer(parent), 0.0), morph);
   }
-  return Surface(s.xy, s.z, l.x, l.y);
+  return Surface(s.xy, s.z, l.x, l.y, a0, a1);
 }

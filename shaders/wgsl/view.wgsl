@@ -22,7 +22,7 @@ struct View {
   grid: f32,             // strength of the scale grid, 0..1
   contour: f32,          // contour interval, metres
   contour_strength: f32,
-  finest_cell: f32,      // metres between samples of level MAX_REFINED_LEVEL
+  finest_cell: f32,      // metres between samples of level MAX_SYNTHESIS_LEVEL
   amplitude: f32,        // metres of noise amplitude that the value 1 of `channels` stands for
   look: u32,
   overlay: u32,
@@ -52,6 +52,8 @@ const OVERLAY_INFLUENCE: u32 = 5u;
 @group(0) @binding(7) var smooth_clamp: sampler;
 @group(0) @binding(8) var smooth_repeat: sampler;
 @group(0) @binding(9) var channels: texture_2d<f32>;  // over the domain, 0..1: amplitude, roughness, reach of a stroke
+@group(0) @binding(10) var attributes0: texture_2d_array<f32>;  // synthesised: snow, wet, foam, smoothness / 2
+@group(0) @binding(11) var attributes1: texture_2d_array<f32>;  // grass, forest, grain, size of the next level's detail
 
 // Clip position of a point given relative to the eye.
 fn clip_of(relative: vec3f) -> vec4f {

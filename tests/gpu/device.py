@@ -130,26 +130,25 @@ def job_list(size: float, jobs: list[tuple[int, int, int, int]]) -> NDArray[np.u
 
 
 def sun_list(
-    size: float, high: float, levels: int, sun: tuple[float, float, float, float], jobs: list[tuple[int, int, int, int]]
+    size: float, high: float, sun: tuple[float, float, float, float], jobs: list[tuple[int, int, int, int]]
 ) -> NDArray[np.uint32]:
     """`SunList` of compute_sun.wgsl: `sun` is the unit vector and the penumbra's tangent."""
     words = np.zeros(8 + 4 * 1024, np.uint32)
     words[0:1] = np.array([size], np.float32).view(np.uint32)
     words[1] = len(jobs)
     words[2:3] = np.array([high], np.float32).view(np.uint32)
-    words[3] = levels
     words[4:8] = np.array(sun, np.float32).view(np.uint32)
     words[8 : 8 + 4 * len(jobs)] = np.array(jobs, np.uint32).ravel()
     return words
 
 
 def page_table(slots: dict[tuple[int, int, int], int]) -> NDArray[np.uint32]:
-    """The atlas's page table (gpu/pagetable.ts): 4096 pairs of tile key and slot, open addressing by hash."""
+    """The atlas's page table (gpu/pagetable.ts): 4096 pairs of words, open addressing by hash."""
     table = np.full((4096, 2), NO_SLOT, np.uint32)
     for (level, x, y), slot in slots.items():
-        key = level << 24 | y << 12 | x
-        place = ((key * 0x9E3779B1) & 0xFFFFFFFF) >> 20
+        column = level << 17 | x
+        place = ((column * 0x9E3779B1 ^ y * 0x85EBCA77) & 0xFFFFFFFF) >> 20
         while table[place, 0] != NO_SLOT:
             place = (place + 1) % len(table)
-        table[place] = key, slot
+        table[place] = column, slot << 17 | y
     return table

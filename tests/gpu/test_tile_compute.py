@@ -43,11 +43,10 @@ def normals(atlas: TinyAtlas, slots: dict[Tile, int]) -> None:
 
 
 def sunlight(atlas: TinyAtlas, slots: dict[Tile, int], high: float, sun: tuple[float, float, float, float]) -> None:
-    levels = max(level for level, _, _ in slots)
     pages = page_table(slots)
     jobs = [(slot, *tile) for tile, slot in slots.items()]
     bindings = [
-        (READ, atlas.buffer(sun_list(SIZE, high, levels, sun, jobs))),
+        (READ, atlas.buffer(sun_list(SIZE, high, sun, jobs))),
         (HEIGHTS, atlas.view(atlas.heights)),
         (READ, atlas.buffer(pages)),
         (store("rgba8unorm"), atlas.view(atlas.light)),

@@ -1,20 +1,26 @@
 /** Tiles as numbers: map keys that need no strings. */
 
-/** Packs a tile into one integer below 2^31: `level << 24 | y << 12 | x`. */
+import { MAX_SYNTHESIS_LEVEL } from "../generated/contract.ts";
+
+/** Columns and rows of a level are below this. */
+const SIDE = 2 ** MAX_SYNTHESIS_LEVEL;
+const AREA = SIDE * SIDE;
+
+/** Packs a tile of a level up to MAX_SYNTHESIS_LEVEL into one whole number: level, row, column, 17 bits each below level. */
 export function tileKey(level: number, x: number, y: number): number {
-  return (level << 24) | (y << 12) | x;
+  return level * AREA + y * SIDE + x;
 }
 
 export function keyLevel(key: number): number {
-  return key >> 24;
+  return Math.floor(key / AREA);
 }
 
 export function keyX(key: number): number {
-  return key & 0xfff;
+  return key % SIDE;
 }
 
 export function keyY(key: number): number {
-  return (key >> 12) & 0xfff;
+  return Math.floor(key / SIDE) % SIDE;
 }
 
 /** Key of the tile one level coarser that covers this one. The root has none: check the level first. */

@@ -2,7 +2,7 @@
 
 import { eyeProjection, reversedDepth, viewAxes } from "../core/eyeprojection.ts";
 import type { Scene, Vec3 } from "../core/types.ts";
-import { MAX_REFINED_LEVEL, TILE_CELLS } from "../generated/contract.ts";
+import { MAX_SYNTHESIS_LEVEL, TILE_CELLS } from "../generated/contract.ts";
 import type { Atlas } from "./atlas.ts";
 import { ChannelTexture } from "./channeltexture.ts";
 import { StructWriter, structLayout } from "./layout.ts";
@@ -63,6 +63,8 @@ export class FrameBindings {
         { binding: 7, visibility, sampler: { type: "filtering" } },
         { binding: 8, visibility, sampler: { type: "filtering" } },
         texture(9, "float", "2d"),
+        texture(10, "float", "2d-array"),
+        texture(11, "float", "2d-array"),
       ],
     });
     this.channels = new ChannelTexture(device);
@@ -101,6 +103,8 @@ export class FrameBindings {
         { binding: 7, resource: this.clamp },
         { binding: 8, resource: this.repeat },
         { binding: 9, resource: this.channels.texture.createView() },
+        { binding: 10, resource: array(atlas.attributes0) },
+        { binding: 11, resource: array(atlas.attributes1) },
       ],
     });
   }
@@ -156,7 +160,7 @@ export class FrameBindings {
     w.set("eye_proj", reversedDepth(eyeProjection(camera)));
     w.set("eye", [...camera.eye, ortho ? 1 : 0]);
     w.set("eye_low", [...camera.eye.map((v) => v - Math.fround(v)), 0]);
-    const cell = scene.tiles.sizeM / (TILE_CELLS << MAX_REFINED_LEVEL);
+    const cell = scene.tiles.sizeM / (TILE_CELLS << MAX_SYNTHESIS_LEVEL);
     const whole = [camera.eye[0], camera.eye[1]].map((v) => Math.floor(v / cell));
     w.set("eye_cell", whole);
     w.set("eye_part", [camera.eye[0] - whole[0]! * cell, camera.eye[1] - whole[1]! * cell]);

@@ -2,11 +2,13 @@
  * Which tiles need their sun and sky visibility marched anew, and when (DESIGN 9: only when the tile or the sun changes).
  *
  * A tile that has just entered has no light at all and never waits. The others may show light that is a few frames old
- * while somebody draws.
+ * while somebody draws. Where the march costs too much, synthetic tiles take their light over from their parents.
  */
 
 import type { Vec3 } from "../core/types.ts";
+import { SELF_BIT } from "./apron.ts";
 import type { Atlas, Resident } from "./atlas.ts";
+import type { TakeLightPass } from "./takelight.ts";
 import type { SunPass } from "./tilecompute.ts";
 
 export interface LightFacts {
@@ -18,11 +20,14 @@ export interface LightFacts {
 export class LightQueue {
   private readonly stale = new Set<Resident>();
   private readonly fresh = new Set<Resident>();
+  /** Tiles whose light is their parent's. */
+  private readonly taken = new WeakSet<Resident>();
   private sunKey = "";
 
   constructor(
     private readonly pass: SunPass,
     private readonly atlas: Atlas,
+    private readonly taking: TakeLightPass | null = null,
   ) {}
 
   /** Takes in what changed since the last frame. */
@@ -44,26 +49,55 @@ export class LightQueue {
 
   /** True when tiles of the last cut still show old light. */
   get pending(): boolean {
-    for (const resident of this.stale) if (this.atlas.isCurrent(resident)) return true;
+    for (const resident of this.stale) if (this.atlas.isCurrent(resident) && !this.takes(resident)) return true;
     return false;
   }
 
   /** Marches the new tiles and up to `budget` others of the last cut, coarse first. */
   run(encoder: GPUCommandEncoder, facts: LightFacts, budget: number): void {
-    const jobs = [...this.fresh].filter((r) => this.atlas.holds(r));
+    const anew = [...this.fresh].filter((r) => this.atlas.holds(r));
+    const jobs = anew.filter((r) => !this.takes(r));
     this.fresh.clear();
-    for (const job of jobs) this.stale.delete(job);
+    for (const job of anew) this.stale.delete(job);
+    const changed = new Set(anew);
     const due: Resident[] = [];
     for (const resident of this.stale) {
       if (!this.atlas.holds(resident)) this.stale.delete(resident);
-      else if (this.atlas.isCurrent(resident)) due.push(resident);
+      else if (this.takes(resident)) {
+        // It follows its parent; what was marched while it was held is not its own any more.
+        if (!this.taken.has(resident)) changed.add(resident);
+        this.stale.delete(resident);
+      } else if (this.atlas.isCurrent(resident)) due.push(resident);
     }
     due.sort((a, b) => a.level - b.level);
     for (const job of due.slice(0, Math.max(0, budget - jobs.length))) {
       jobs.push(job);
       this.stale.delete(job);
     }
-    this.pass.run(encoder, facts.sizeM, this.atlas.levels, facts.high, facts.sun, jobs);
+    this.pass.run(encoder, facts.sizeM, facts.high, facts.sun, jobs);
+    for (const job of jobs) {
+      changed.add(job);
+      this.taken.delete(job);
+    }
+    this.taking?.run(encoder, this.takers(changed));
+  }
+
+  private takes(resident: Resident): boolean {
+    return this.taking !== null && (resident.held & SELF_BIT) === 0;
+  }
+
+  /** The tiles that take the light over that these tiles have now, each after its parent. */
+  private takers(changed: Set<Resident>): Resident[] {
+    if (this.taking === null || changed.size === 0) return [];
+    const found: Resident[] = [];
+    for (const resident of [...this.atlas.residents()].sort((a, b) => a.level - b.level)) {
+      if (!this.takes(resident)) continue;
+      if (!changed.has(resident) && !changed.has(this.atlas.parentOf(resident))) continue;
+      changed.add(resident);
+      this.taken.add(resident);
+      found.push(resident);
+    }
+    return found;
   }
 }
 

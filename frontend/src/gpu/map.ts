@@ -1,7 +1,7 @@
 /** The map: a printed relief sheet on a 2D canvas, for browsers without WebGPU (DESIGN 9). Same scenes, same tiles. */
 
 import type { CameraState, FrameStats, Rgba, Scene, SceneRenderer, Tile, TileView } from "../core/types.ts";
-import { assembleSlot, SLOT_TEXELS } from "./apron.ts";
+import { assembleBordered, SLOT_TEXELS } from "./apron.ts";
 import { contourInterval } from "./looks.ts";
 import { DetailPicture, InfluencePicture } from "./mapdetail.ts";
 import { type MapStyle, shadeTile } from "./mapshade.ts";
@@ -111,7 +111,7 @@ export class MapRenderer implements SceneRenderer {
     canvas.height = side;
     const context = canvas.getContext("2d", { alpha: false })!;
     const image = context.createImageData(side, side);
-    assembleSlot(tile, (dx, dy) => neighbour(view, tile, dx, dy), this.slot);
+    assembleBordered(tile.heights, (dx, dy) => neighbour(view, tile, dx, dy)?.heights, this.slot);
     shadeTile(this.slot, tile.level, side, style, image.data);
     context.putImageData(image, 0, 0);
     const picture = { canvas, key, used: this.frame };

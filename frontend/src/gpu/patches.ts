@@ -1,7 +1,8 @@
 /** The passes that draw patches: ground, sea and walls share the patch records of the cut. */
 
 import { type Look, PATCH_CELLS } from "../generated/contract.ts";
-import { type Cut, EDGE_EAST, EDGE_NORTH, EDGE_SOUTH, EDGE_WEST, RECORD_WORDS, WET } from "../tiles/selection.ts";
+import { EDGE_EAST, EDGE_NORTH, EDGE_SOUTH, EDGE_WEST, isWet, RECORD_WORDS, recordBorder } from "../tiles/records.ts";
+import type { Cut } from "../tiles/selection.ts";
 import { createPass, describePass, GrowingBuffer, type PassContext } from "./pipeline.ts";
 import { sceneSource, terrainSource } from "./shaders.ts";
 
@@ -187,7 +188,7 @@ export class PatchPasses {
     this.wetCount = 0;
     for (let i = 0; i < cut.count; i += 1) {
       const from = i * RECORD_WORDS;
-      if ((cut.records[from + 2]! & WET) === 0) continue;
+      if (!isWet(cut.records, i)) continue;
       const to = this.wetCount * RECORD_WORDS;
       for (let k = 0; k < RECORD_WORDS; k += 1) this.wetRecords[to + k] = cut.records[from + k]!;
       this.wetCount += 1;
@@ -197,7 +198,7 @@ export class PatchPasses {
   private collectWalls(cut: Cut): void {
     this.wallCount = 0;
     for (let i = 0; i < cut.count; i += 1) {
-      const border = (cut.records[i * RECORD_WORDS + 2]! >> 12) & 15;
+      const border = recordBorder(cut.records, i);
       if (border === 0) continue;
       for (const side of [EDGE_WEST, EDGE_EAST, EDGE_SOUTH, EDGE_NORTH]) {
         if ((border & side) === 0) continue;

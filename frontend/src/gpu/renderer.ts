@@ -2,7 +2,8 @@
 
 import type { FrameStats, Scene, SceneRenderer, Vec3 } from "../core/types.ts";
 import { type Cut, Selection } from "../tiles/selection.ts";
-import { Atlas, NEW_TILES_PER_FRAME, type Resident } from "./atlas.ts";
+import { expectation, finestSynthesisLevel } from "../tiles/synthetic.ts";
+import { Atlas, type Changes, MAX_SLOTS, type Resident, SOFTWARE_SLOTS } from "./atlas.ts";
 import { BackgroundPass } from "./background.ts";
 import type { Gpu } from "./device.ts";
 import { FrameBindings, sunDirection } from "./frame.ts";
@@ -16,11 +17,15 @@ import { type Quality, QualityControl } from "./quality.ts";
 import { RibbonPass } from "./ribbons.ts";
 import { samePicture } from "./scenediff.ts";
 import { SkyTables } from "./sky.ts";
+import { TakeLightPass } from "./takelight.ts";
 import { Target } from "./target.ts";
-import { NormalsPass, SunPass } from "./tilecompute.ts";
+import { SunPass } from "./tilecompute.ts";
+import { TileFill } from "./tilefill.ts";
 
 /** Tiles whose light is marched in one frame: while the picture moves, and at rest. */
 const LIGHT_TILES = { hardware: { moving: 128, rest: 256 }, software: { moving: 2, rest: 6 } } as const;
+/** Tiles that may enter in one frame. */
+const NEW_TILES = { hardware: 64, software: 16 } as const;
 /** On a software adapter a picture at rest is drawn anew this often while tiles and light still come in. */
 const REDRAW_MS = 900;
 /** A refined tile turns from its parent's surface to its own in this time. */
@@ -31,8 +36,9 @@ interface Passes {
   readonly sky: SkyTables;
   readonly frame: FrameBindings;
   readonly target: Target;
-  readonly normals: NormalsPass;
+  readonly fill: TileFill;
   readonly sun: SunPass;
+  readonly taking: TakeLightPass;
   readonly background: BackgroundPass;
   readonly patches: PatchPasses;
   readonly ribbons: RibbonPass;
@@ -60,6 +66,8 @@ export class GpuRenderer implements SceneRenderer {
   /** Refined tiles fade in: not on the CPU, and not for people who asked for less motion. */
   private fades = false;
   private fadedAt = 0;
+  /** Share of an entrance that passes with this frame. */
+  private entrance = 1;
   private lastQuality: Quality | null = null;
   /** Highest ground of the last cut, metres. */
   private high = 0;
@@ -99,18 +107,29 @@ export class GpuRenderer implements SceneRenderer {
       samples,
       detail: gpu.software ? "plain" : "rich",
     };
-    const [target, normals, sun, background, patches, ribbons, ghost, labels] = await Promise.all([
+    const [target, fill, sun, taking, background, patches, ribbons, ghost, labels] = await Promise.all([
       Target.create(device, format, samples),
-      NormalsPass.create(device),
+      TileFill.create(device),
       SunPass.create(device, gpu.software),
+      TakeLightPass.create(device),
       BackgroundPass.create(context),
       PatchPasses.create(context),
       RibbonPass.create(context),
       GhostPass.create(context),
       LabelPass.create(context),
     ]);
-    const drawn = { background, patches, ribbons, ghost, labels };
-    return new GpuRenderer(canvas, gpu, { sky, frame, target, normals, sun, ...drawn });
+    const compute = { fill, sun, taking };
+    return new GpuRenderer(canvas, gpu, {
+      sky,
+      frame,
+      target,
+      ...compute,
+      background,
+      patches,
+      ribbons,
+      ghost,
+      labels,
+    });
   }
 
   render(scene: Scene): FrameStats {
@@ -121,13 +140,15 @@ export class GpuRenderer implements SceneRenderer {
     if (this.inFlight >= limit) return this.report({ busy: true, uploads: 0 });
     const began = performance.now();
     const world = this.worldOf(scene);
+    const told = this.passes.fill.tell(world.selection.tree);
     const moved = this.changed(scene);
+    this.quality.mode = scene.quality ?? "automatic";
     if (moved) this.ready = false;
     const quality = this.quality.next(began, moved || (software && !this.ready));
     if (software && !moved && !this.ready && began - this.drawnAt < REDRAW_MS) {
       // On the CPU a picture costs more than the upload and light of many tiles: get them ready, then draw.
       this.prepareOnly(scene, world);
-      this.ready = !this.tilesDue && !world.light.pending;
+      this.ready = !this.tilesDue && !world.light.pending && !this.passes.fill.pending;
       return this.report({ busy: true });
     }
     // Time stands at zero for people who asked for less motion: then the sea is still.
@@ -135,15 +156,17 @@ export class GpuRenderer implements SceneRenderer {
     const waves = scene.settings.sea_level_m !== null && !software && scene.time !== 0;
     const due =
       fading ||
+      told ||
       this.tilesDue ||
       this.lookDue ||
       this.lightDrawn !== this.lightMarched ||
       !sameQuality(quality, this.lastQuality);
     if (!moved && !waves && !due && !world.light.pending)
-      return this.report({ busy: this.quality.pending, uploads: 0 });
+      return this.report({ busy: this.quality.pending || this.passes.fill.pending, uploads: 0 });
     this.remember(scene, quality);
     this.draw(scene, world, quality, { began, moved });
-    const busy = waves || fading || this.quality.pending || this.tilesDue || this.lookDue || world.light.pending;
+    const coming = this.tilesDue || this.lookDue || world.light.pending || this.passes.fill.pending;
+    const busy = waves || fading || this.quality.pending || coming;
     return this.report({ busy });
   }
 
@@ -163,15 +186,17 @@ export class GpuRenderer implements SceneRenderer {
   private worldOf(scene: Scene): World {
     if (this.world?.tiles === scene.tiles) return this.world;
     this.world?.atlas.destroy();
-    const { levels, solved } = scene.tiles;
-    const selection = new Selection(levels);
-    const atlas = new Atlas(this.gpu.device, levels, (level, x, y, usable) =>
-      selection.tree.setUsable(level, x, y, usable, this.fades && level > solved),
-    );
+    const { levels, solved, sizeM } = scene.tiles;
+    const selection = new Selection(Math.max(levels, finestSynthesisLevel(sizeM)));
+    const enter = (level: number, x: number, y: number, usable: boolean): void =>
+      selection.tree.setUsable(level, x, y, usable, this.fades && level > solved);
+    const atlas = new Atlas(this.gpu.device, enter, this.gpu.software ? SOFTWARE_SLOTS : MAX_SLOTS);
     this.passes.frame.attach(atlas);
-    this.passes.normals.attach(atlas);
+    this.passes.fill.attach(atlas);
     this.passes.sun.attach(atlas);
-    this.world = { tiles: scene.tiles, atlas, selection, light: new LightQueue(this.passes.sun, atlas) };
+    this.passes.taking.attach(atlas);
+    const light = new LightQueue(this.passes.sun, atlas, this.gpu.software ? this.passes.taking : null);
+    this.world = { tiles: scene.tiles, atlas, selection, light };
     return this.world;
   }
 
@@ -180,7 +205,8 @@ export class GpuRenderer implements SceneRenderer {
     const passed = now - this.fadedAt;
     this.fadedAt = now;
     this.fades = !this.gpu.software && scene.time !== 0;
-    return world.selection.tree.advance(this.fades ? Math.min(passed, 50) / ENTRANCE_MS : 1);
+    this.entrance = this.fades ? Math.min(passed, 50) / ENTRANCE_MS : 1;
+    return world.selection.tree.advance(this.entrance) || world.atlas.blending;
   }
 
   private changed(scene: Scene): boolean {
@@ -213,6 +239,7 @@ export class GpuRenderer implements SceneRenderer {
     this.passes.labels.update(scene, cut.maxHeight - cut.minHeight, quality.scale * pixelRatio(), quality.scale);
     this.encode(encoder, scene, context.getCurrentTexture(), width, height);
     device.queue.submit([encoder.finish()]);
+    this.passes.fill.submitted();
     this.measure(true);
     this.lightDrawn = this.lightMarched;
     this.drawnAt = Number.POSITIVE_INFINITY;
@@ -228,13 +255,17 @@ export class GpuRenderer implements SceneRenderer {
   /** Selects, lets requested tiles in and selects again, so that coarse levels arrive together in the first frame. */
   private choose(scene: Scene, world: World, quality: Quality): { cut: Cut; entered: Resident[] } {
     const entered: Resident[] = [];
+    const limit = NEW_TILES[this.gpu.software ? "software" : "hardware"];
     const tau = scene.tauPx * quality.tauFactor;
     const sea = scene.settings.sea_level_m ?? Number.NEGATIVE_INFINITY;
     for (;;) {
       const cut = world.selection.select(scene.tiles, scene.camera, tau, world.atlas, quality.scale, sea);
-      const more = world.atlas.admit(cut.requests, NEW_TILES_PER_FRAME - entered.length);
-      if (more.length === 0) return { cut, entered };
+      const more = world.atlas.admit(cut.requests, limit - entered.length);
       entered.push(...more);
+      if (more.length > 0) continue;
+      // What is only needed soon waits for a frame with room to spare; the CPU never has any.
+      if (!this.gpu.software) entered.push(...world.atlas.admit(cut.early, limit - entered.length));
+      return { cut, entered };
     }
   }
 
@@ -243,13 +274,13 @@ export class GpuRenderer implements SceneRenderer {
     encoder: GPUCommandEncoder,
     scene: Scene,
     world: World,
-    what: { changed: readonly Resident[]; entered: readonly Resident[]; moved: boolean },
+    what: { changes: Changes; entered: readonly Resident[]; moved: boolean },
   ): void {
     const sun = sunOf(scene);
     this.passes.sky.bake(this.gpu.device, encoder, sun);
     world.atlas.flushPages();
-    this.passes.normals.run(encoder, scene.tiles.sizeM, [...what.changed, ...what.entered]);
-    world.light.mark(what.changed, what.entered, sun);
+    this.passes.fill.run(encoder, scene.tiles.sizeM, what.changes, what.entered);
+    world.light.mark([...what.changes.remade, ...what.changes.moved], what.entered, sun);
     const budget = LIGHT_TILES[this.gpu.software ? "software" : "hardware"];
     // While tiles still come in, on the CPU only their own light: their neighbours are due when all are there.
     const rest = this.gpu.software && this.tilesDue ? 0 : budget.rest;
@@ -261,6 +292,25 @@ export class GpuRenderer implements SceneRenderer {
     this.lightMarched += 1;
   }
 
+  /** Takes over what all detail depends on. */
+  private configure(scene: Scene, world: World): void {
+    const { settings, channels, tiles } = scene;
+    const { synthesis } = this.passes.fill;
+    const changed = synthesis.configure({
+      sizeM: tiles.sizeM,
+      seed: settings.seed,
+      detail: settings.detail,
+      rule: settings.rule,
+      look: settings.look,
+      seaLevelM: settings.sea_level_m,
+      solved: tiles.solved,
+    });
+    if (synthesis.setChannels(channels) || changed) {
+      world.atlas.remakeAll();
+      world.selection.tree.expect(expectation(tiles.sizeM, settings, channels));
+    }
+  }
+
   /** Brings atlas, cut and light up to date for a frame. */
   private prepare(
     encoder: GPUCommandEncoder,
@@ -269,14 +319,17 @@ export class GpuRenderer implements SceneRenderer {
     quality: Quality,
     moved: boolean,
   ): { cut: Cut; uploads: number; selectMs: number } {
-    const changed = world.atlas.refresh(scene.tiles);
+    this.configure(scene, world);
+    const changes = world.atlas.refresh(scene.tiles, this.gpu.software, this.entrance);
+    for (const { level, x, y } of changes.remade) world.selection.tree.remade(level, x, y);
+    for (const { level, x, y } of changes.moved) world.selection.tree.remade(level, x, y);
     const selecting = performance.now();
     const { cut, entered } = this.choose(scene, world, quality);
     const selectMs = performance.now() - selecting;
-    this.high = cut.maxHeight;
-    this.tilesDue = cut.requests.length > 0;
-    this.compute(encoder, scene, world, { changed, entered, moved });
-    return { cut, uploads: changed.length + entered.length, selectMs };
+    this.high = cut.top;
+    this.tilesDue = cut.requests.length > 0 && !world.atlas.full;
+    this.compute(encoder, scene, world, { changes, entered, moved });
+    return { cut, uploads: changes.remade.length + changes.moved.length + entered.length, selectMs };
   }
 
   /** All of a frame but the picture, for the picture at rest. */
@@ -285,6 +338,7 @@ export class GpuRenderer implements SceneRenderer {
     const { uploads } = this.prepare(encoder, scene, world, this.quality.rest, false);
     this.report({ uploads });
     this.gpu.device.queue.submit([encoder.finish()]);
+    this.passes.fill.submitted();
     this.measure(false);
   }
 

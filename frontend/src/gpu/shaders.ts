@@ -4,6 +4,7 @@ import contract from "@shaders/generated/contract.wgsl?raw";
 import atmosphere from "@shaders/wgsl/atmosphere.wgsl?raw";
 import background from "@shaders/wgsl/background.wgsl?raw";
 import computeBounds from "@shaders/wgsl/compute_bounds.wgsl?raw";
+import computeLight from "@shaders/wgsl/compute_light.wgsl?raw";
 import computeNormals from "@shaders/wgsl/compute_normals.wgsl?raw";
 import computeSky from "@shaders/wgsl/compute_sky.wgsl?raw";
 import computeSun from "@shaders/wgsl/compute_sun.wgsl?raw";
@@ -77,6 +78,7 @@ export const SOURCES = {
   label: join(contract, view, label),
   normals: join(contract, tile, computeNormals),
   sun: join(contract, tile, computeSun),
+  light: join(contract, tile, computeLight),
   sky: join(atmosphere, computeSky),
   bounds: join(contract, tile, computeBounds),
 } as const;

@@ -5,13 +5,20 @@
 
 import type { Vec3 } from "../core/types.ts";
 import { TILE_SAMPLES } from "../generated/contract.ts";
-import { type Atlas, MAX_SLOTS, type Resident } from "./atlas.ts";
+import { type Atlas, MAX_SLOTS } from "./atlas.ts";
 import { SOURCES } from "./shaders.ts";
 
 /** Tangent of half the angle over which a shadow's edge softens: wider than the sun's disc, as air and grass blur it. */
 const PENUMBRA = 0.02;
 const GROUPS = Math.ceil((TILE_SAMPLES + 2) / 8);
 const JOB_WORDS = 4;
+
+export interface SlotJob {
+  readonly slot: number;
+  readonly level: number;
+  readonly x: number;
+  readonly y: number;
+}
 
 class JobPass {
   private group: GPUBindGroup | null = null;
@@ -42,7 +49,7 @@ class JobPass {
     });
   }
 
-  protected dispatch(encoder: GPUCommandEncoder, jobs: readonly Resident[]): void {
+  protected dispatch(encoder: GPUCommandEncoder, jobs: readonly SlotJob[]): void {
     if (jobs.length === 0 || this.group === null) return;
     this.words[1] = jobs.length;
     jobs.forEach((job, i) => {
@@ -91,7 +98,7 @@ export class NormalsPass extends JobPass {
   }
 
   /** Fills the gradients of these slots. */
-  run(encoder: GPUCommandEncoder, sizeM: number, jobs: readonly Resident[]): void {
+  run(encoder: GPUCommandEncoder, sizeM: number, jobs: readonly SlotJob[]): void {
     this.floats[0] = sizeM;
     this.dispatch(encoder, jobs);
   }
@@ -112,17 +119,9 @@ export class SunPass extends JobPass {
   }
 
   /** Fills sun and sky visibility of these slots. `high`: highest ground, metres. */
-  run(
-    encoder: GPUCommandEncoder,
-    sizeM: number,
-    levels: number,
-    high: number,
-    sun: Vec3,
-    jobs: readonly Resident[],
-  ): void {
+  run(encoder: GPUCommandEncoder, sizeM: number, high: number, sun: Vec3, jobs: readonly SlotJob[]): void {
     this.floats[0] = sizeM;
     this.floats[2] = high;
-    this.words[3] = levels;
     this.floats.set([...sun, PENUMBRA], 4);
     this.dispatch(encoder, jobs);
   }

@@ -1,30 +1,38 @@
 /**
  * What the selection knows of the ground: per 16-cell sub-patch its bounds and the error of stopping there (DESIGN 7, 9).
  *
- * A tile that is held has a *page*: 16 *nodes*, its sub-patches `[row * 4 + col]`. Node = page * 16 + sub-patch. Pages come
- * and go with the tiles and know their parent, their four children and their eight neighbours, so that the selection walks
- * the tree without a look-up and memory follows what is held, not what the finest level could hold.
+ * A tile that is held or drawn has a *page*: 16 *nodes*, its sub-patches `[row * 4 + col]`. Node = page * 16 + sub-patch.
+ * Pages come and go with the tiles and know their parent, their four children and their eight neighbours, so that the
+ * selection walks the tree without a look-up and memory follows what is held, not what the finest level could hold.
  *
- * Two masks say what may be drawn: `held` (the store has the tile) and `usable` (the renderer has it in its atlas).
+ * Two masks say what may be drawn: `held` (the store has the tile) and `usable` (the renderer has it in its atlas). A tile
+ * that is usable and not held is synthetic (DESIGN 10).
+ *
+ * Figures of a tile as it is drawn, with its detail, are measured on the device and come a few frames late (`measure`);
+ * until then they are guessed (`guess`), bounds so that nothing in sight is culled.
  */
 
 import { tileKey } from "../core/tilekey.ts";
-import type { Tile, TileView } from "../core/types.ts";
+import type { TileView } from "../core/types.ts";
 import { SUBPATCHES } from "../generated/contract.ts";
+import { type Expectation, Figures } from "./figures.ts";
 
 const SUBS = SUBPATCHES * SUBPATCHES;
 const FIRST_PAGES = 512;
 /** Own place in `near`. */
 const SELF = 4;
-
+/** Synthetic tiles fade in this many times faster than refined ones. */
+const SYNTHETIC_HASTE = 2.5;
+/** Stamp of a page whose tile is not held. */
+const NOT_HELD = -1;
 export class PatchTree {
   /** Pages that the arrays have room for. */
   capacity = FIRST_PAGES;
 
   // Per page.
   tileLevel = new Uint8Array(FIRST_PAGES);
-  tileX = new Uint16Array(FIRST_PAGES);
-  tileY = new Uint16Array(FIRST_PAGES);
+  tileX = new Int32Array(FIRST_PAGES);
+  tileY = new Int32Array(FIRST_PAGES);
   /** Page of the tile one level coarser; -1 for the root. */
   parent = new Int32Array(FIRST_PAGES);
   /** Pages of the four quarters, `[page * 4 + (y & 1) * 2 + (x & 1)]`; -1 where none. */
@@ -37,17 +45,18 @@ export class PatchTree {
   fade = new Float32Array(FIRST_PAGES);
 
   // Per node.
-  /** Bounds of the sub-patch and all its held descendants, metres. */
+  /** Bounds of the sub-patch and all its known descendants, metres. */
   min = new Float32Array(FIRST_PAGES * SUBS);
   max = new Float32Array(FIRST_PAGES * SUBS);
-  /** Largest distance, metres, between this sub-patch as drawn and its held descendants; 0 where there are none. */
+  /** Largest distance, metres, between this sub-patch as drawn and its descendants; 0 where there can be none. */
   error = new Float32Array(FIRST_PAGES * SUBS);
   /** 1 where the sub-patch may be split without breaking the restriction, given the usable tiles. */
   splittable = new Uint8Array(FIRST_PAGES * SUBS);
 
-  private ownMin = new Float32Array(FIRST_PAGES * SUBS);
-  private ownMax = new Float32Array(FIRST_PAGES * SUBS);
-  private ownError = new Float32Array(FIRST_PAGES * SUBS);
+  /** Lowest and highest ground that is held, metres, without detail. */
+  low = 0;
+  high = 0;
+
   /** Stamp of the tile whose figures the page holds. */
   private stamps = new Float64Array(FIRST_PAGES);
   private seen = new Float64Array(FIRST_PAGES);
@@ -59,7 +68,12 @@ export class PatchTree {
   private round = 0;
   private syncedStamp = -1;
   private splittableStale = true;
+  private figuresStale = true;
+  private pruneDue = false;
   private fading = false;
+  private readonly figures = new Figures(this, FIRST_PAGES);
+  /** Finest level that is solved everywhere. */
+  private solved = 0;
 
   /** `levels`: the finest level that can exist. */
   constructor(readonly levels: number) {
@@ -99,25 +113,79 @@ export class PatchTree {
     return (childPage << 4) | ((node & 4) << 1) | ((node & 1) << 1);
   }
 
-  /** Reads what changed in the store since the last call. Returns false when nothing did. */
+  /** True for a level whose tiles can be made where nobody holds them. */
+  canMake(level: number): boolean {
+    return this.figures.expected !== null && level > this.solved;
+  }
+
+  /** The page of a tile, or -1. */
+  find(level: number, x: number, y: number): number {
+    return this.index.get(tileKey(level, x, y)) ?? -1;
+  }
+
+  /** What detail to expect from now on. */
+  expect(expected: Expectation | null): void {
+    const [a, b] = [this.figures.expected, expected];
+    if (a === b || (a !== null && b !== null && a.amplitudeM === b.amplitudeM && a.ratio === b.ratio)) return;
+    this.figures.expected = expected;
+    this.figuresStale = true;
+    for (const page of this.index.values()) this.figures.forgetBelow(page);
+  }
+
+  /** Brings everything up to date with the store and with what was measured. Returns false when nothing changed. */
   sync(view: TileView): boolean {
-    if (view.stamp === this.syncedStamp) return false;
-    this.syncedStamp = view.stamp;
+    if (view.stamp !== this.syncedStamp) {
+      this.syncedStamp = view.stamp;
+      this.readStore(view);
+    }
+    if (this.pruneDue) for (let level = this.levels; level > 0; level -= 1) this.prune(level);
+    this.pruneDue = false;
+    if (!this.figuresStale) return false;
+    this.figuresStale = false;
+    for (const pages of this.byLevel) for (const page of pages) this.figures.settle(page);
+    for (let level = this.levels; level >= 0; level -= 1) for (const page of this.byLevel[level]!) this.merge(page);
+    return true;
+  }
+
+  private readStore(view: TileView): void {
     this.round += 1;
+    this.solved = view.solved;
+    this.low = Number.POSITIVE_INFINITY;
+    this.high = Number.NEGATIVE_INFINITY;
     for (const tile of view.tiles()) {
       if (tile.level > this.levels) continue;
       const page = this.page(tile.level, tile.x, tile.y);
       this.seen[page] = this.round;
       this.held[page] = 1;
-      if (this.stamps[page] === tile.stamp) continue;
+      if (this.stamps[page] !== tile.stamp) this.figures.hold(page, tile);
       this.stamps[page] = tile.stamp;
-      this.read(page, tile);
+      const { low, high } = this.figures.heldRange(page);
+      if (low < this.low) this.low = low;
+      if (high > this.high) this.high = high;
     }
-    for (let level = this.levels; level >= 0; level -= 1) {
-      this.prune(level);
-      for (const page of this.byLevel[level]!) this.merge(page);
+    for (const page of this.index.values()) {
+      if (this.held[page] === 0 || this.seen[page] === this.round) continue;
+      this.held[page] = 0;
+      this.stamps[page] = NOT_HELD;
     }
-    return true;
+    this.pruneDue = true;
+    this.figuresStale = true;
+  }
+
+  /** The tile in the atlas is being made anew: what was measured of it no longer bounds it. */
+  remade(level: number, x: number, y: number): void {
+    const page = this.find(level, x, y);
+    if (page < 0) return;
+    this.figures.outdate(page);
+    this.figuresStale = true;
+  }
+
+  /** Takes in what was measured of a tile as it is drawn (Figures.measure). */
+  measure(level: number, x: number, y: number, figures: Float32Array, at: number): void {
+    const page = this.find(level, x, y);
+    if (page < 0) return;
+    this.figures.measure(page, figures, at);
+    this.figuresStale = true;
   }
 
   /** Says whether a tile may be drawn (its slot in the atlas is filled). `fade`: it enters as its parent's surface. */
@@ -130,6 +198,9 @@ export class PatchTree {
     this.fade[page] = usable && fade ? 1 : 0;
     this.fading ||= usable && fade;
     this.splittableStale = true;
+    this.figuresStale = true;
+    this.figures.outdate(page);
+    if (!usable) this.pruneDue = true;
   }
 
   /** Lets entrances go on by this share of their time; true while any is under way. */
@@ -139,7 +210,8 @@ export class PatchTree {
     for (const page of this.index.values()) {
       const left = this.fade[page]!;
       if (left === 0) continue;
-      const next = Math.max(0, left - share);
+      // Synthetic tiles differ less from their parents, and many levels of them enter one after the other.
+      const next = Math.max(0, left - (this.held[page] === 1 ? share : SYNTHETIC_HASTE * share));
       this.fade[page] = next;
       if (next > 0) any = true;
       else this.splittableStale = true;
@@ -214,15 +286,16 @@ export class PatchTree {
     this.held[page] = 0;
     this.usable[page] = 0;
     this.fade[page] = 0;
-    this.stamps[page] = -1;
+    this.stamps[page] = NOT_HELD;
     this.seen[page] = this.round;
-    for (const own of [this.ownMin, this.ownMax, this.ownError, this.min, this.max, this.error, this.splittable])
-      own.fill(0, page * SUBS, (page + 1) * SUBS);
+    this.splittable.fill(0, page * SUBS, (page + 1) * SUBS);
+    this.figures.clear(page);
     this.child.fill(-1, page * 4, page * 4 + 4);
     this.parent[page] = up;
     if (up >= 0) this.child[up * 4 + 2 * (y & 1) + (x & 1)] = page;
     this.link(page, true);
     this.splittableStale = true;
+    this.figuresStale = true;
     return page;
   }
 
@@ -245,7 +318,6 @@ export class PatchTree {
     const pages = this.byLevel[level]!;
     let kept = 0;
     for (const page of pages) {
-      if (this.seen[page] !== this.round) this.held[page] = 0;
       const c = page * 4;
       const leaf = this.child[c]! < 0 && this.child[c + 1]! < 0 && this.child[c + 2]! < 0 && this.child[c + 3]! < 0;
       if (level === 0 || this.held[page] === 1 || this.usable[page] === 1 || !leaf) {
@@ -281,43 +353,30 @@ export class PatchTree {
     this.max = wider(this.max);
     this.error = wider(this.error);
     this.splittable = wider(this.splittable);
-    this.ownMin = wider(this.ownMin);
-    this.ownMax = wider(this.ownMax);
-    this.ownError = wider(this.ownError);
+    this.figures.grow(wider);
     this.stamps = wider(this.stamps);
     this.seen = wider(this.seen);
   }
 
-  private read(page: number, tile: Tile): void {
-    for (let sub = 0; sub < SUBS; sub += 1) {
-      const node = page * SUBS + sub;
-      const error = tile.subError[sub]!;
-      this.ownError[node] = error;
-      // The morph may show the parent's surface, which lies within `error` of this one.
-      this.ownMin[node] = tile.subMin[sub]! - error;
-      this.ownMax[node] = tile.subMax[sub]! + error;
-    }
-  }
-
-  /** A page's figures from its own tile and its held children, which are merged already. */
+  /** A page's figures from its own and those of its children, which are merged already. */
   private merge(page: number): void {
-    const { min, max, error, ownError } = this;
+    const { min, max, error, figures } = this;
     const first = page * SUBS;
     for (let node = first; node < first + SUBS; node += 1) {
-      min[node] = this.ownMin[node]!;
-      max[node] = this.ownMax[node]!;
-      error[node] = 0;
+      min[node] = figures.min[node]!;
+      max[node] = figures.max[node]!;
+      error[node] = this.childPage(node) < 0 ? figures.expectBelow(node) : 0;
     }
     for (let q = 0; q < 4; q += 1) {
       const fine = this.child[page * 4 + q]!;
-      if (fine < 0 || this.held[fine] === 0) continue;
+      if (fine < 0) continue;
       const corner = first + (q & 2) * 4 + (q & 1) * 2;
       for (let sub = 0; sub < SUBS; sub += 1) {
         const from = fine * SUBS + sub;
         const to = corner + ((sub >> 3) << 2) + ((sub & 3) >> 1);
         if (min[from]! < min[to]!) min[to] = min[from]!;
         if (max[from]! > max[to]!) max[to] = max[from]!;
-        const worst = Math.max(ownError[from]!, error[from]!);
+        const worst = Math.max(figures.error[from]!, error[from]!);
         if (worst > error[to]!) error[to] = worst;
       }
     }

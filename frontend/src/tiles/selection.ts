@@ -10,25 +10,20 @@
  */
 
 import { eyeProjection } from "../core/eyeprojection.ts";
-import type { CameraState, TileView } from "../core/types.ts";
-import { PATCH_CELLS, QUANTA_PER_CELL, SUBPATCHES } from "../generated/contract.ts";
+import { tileKey } from "../core/tilekey.ts";
+import type { CameraState, Tile, TileView } from "../core/types.ts";
+import { PATCH_CELLS, QUANTA_PER_CELL, SUBPATCHES, TILE_CELLS, TILE_SAMPLES } from "../generated/contract.ts";
+import { frontToBack, Horizon } from "./occlusion.ts";
 import { PatchTree } from "./patchtree.ts";
-
-/** Uint32 words of a patch record; the vertex shader reads the same (terrain.wgsl, `PatchIn`). */
-export const RECORD_WORDS = 4;
-
-export const EDGE_WEST = 1;
-export const EDGE_EAST = 2;
-export const EDGE_SOUTH = 4;
-export const EDGE_NORTH = 8;
-/** In a record's third word: some of the patch lies below the sea. */
-export const WET = 1 << 16;
+import { EDGE_EAST, EDGE_NORTH, EDGE_SOUTH, EDGE_WEST, RECORD_WORDS, writeRecord } from "./records.ts";
 
 /** A cell is never split further once it covers fewer pixels than this many taus. */
 const SMALLEST_CELL = 1;
 /** Where a cell is wide on the screen, what its children would add to the shading counts too: error per child cell. */
 const SHADING_ERROR = 1.5 / QUANTA_PER_CELL;
 const SHADING_CELL_PX = 5;
+/** From this error on, in taus, tiles are asked for that a nearer eye will need: they are there before they are drawn. */
+const EARLY = 0.7;
 
 export interface TileRequest {
   readonly level: number;
@@ -40,17 +35,17 @@ export interface TileRequest {
 export interface Cut {
   /** Drawn patches, roughly front to back. */
   readonly count: number;
-  /**
-   * Per patch four words: column | row << 16 of its south-west vertex in samples of its level; own slot | parent slot << 16;
-   * level | edge bits << 8 | border bits << 12 | (1 << 16 where some of it lies below the sea); four corner morph weights as unorm8 (south-west, south-east, north-west,
-   * north-east).
-   */
+  /** `RECORD_WORDS` words a patch. */
   readonly records: Uint32Array;
-  /** Held tiles that a finer picture needs and that are not usable yet, coarse first, then by screen error. */
+  /** Tiles that a finer picture needs and that are not usable yet, coarse first, then by screen error. */
   readonly requests: readonly TileRequest[];
-  /** Lowest and highest ground of the whole domain, metres. */
+  /** Tiles that will be needed when the eye comes a little nearer, in the same order. */
+  readonly early: readonly TileRequest[];
+  /** Lowest and highest ground of the whole domain, metres, without detail. */
   readonly minHeight: number;
   readonly maxHeight: number;
+  /** Nothing of the ground is higher, detail included. */
+  readonly top: number;
 }
 
 /** What the selection asks of the atlas. */
@@ -65,10 +60,6 @@ interface Wish extends TileRequest {
   priority: number;
 }
 
-/** Pages that were wished for or touched in this call. */
-const WISHED = 1;
-const TOUCHED = 2;
-
 export class Selection {
   readonly tree: PatchTree;
   // Per node of the tree.
@@ -77,9 +68,15 @@ export class Selection {
   private ratio: Float32Array;
   private readonly splitList: number[][];
   // Per page.
-  private flags: Uint8Array;
+  private touched: Uint8Array;
   private slotOf: Int32Array;
   private wishes: Wish[] = [];
+  private early: Wish[] = [];
+  private readonly wished = new Set<number>();
+  private readonly wishedEarly = new Set<number>();
+  /** Leaves out patches that nearer ground hides. Measurements and tests turn it off. */
+  occlusion = true;
+  private readonly horizon = new Horizon();
   private readonly planes = new Float64Array(24);
   private records = new Uint32Array(RECORD_WORDS * 1024);
   private count = 0;
@@ -97,7 +94,7 @@ export class Selection {
     const { capacity } = this.tree;
     this.split = new Uint8Array(capacity * 16);
     this.ratio = new Float32Array(capacity * 16);
-    this.flags = new Uint8Array(capacity);
+    this.touched = new Uint8Array(capacity);
     this.slotOf = new Int32Array(capacity);
     this.splitList = Array.from({ length: levels + 1 }, () => []);
   }
@@ -120,29 +117,32 @@ export class Selection {
     this.tree.sync(view);
     this.tree.updateSplittable();
     this.begin(view, camera, tauPx, slots, pixelScale);
-    const { usable, held, min, max } = this.tree;
+    const { usable, held, max, low, high } = this.tree;
     if (usable[0] === 1) {
       slots.touch(0, 0, 0);
       for (let node = 0; node < 16; node += 1) this.descend(0, node);
       this.enforce();
       this.touchSplit();
-      for (const node of this.rootOrder()) this.emit(0, node, 0);
+      this.horizon.begin(camera, this.occlusion && this.above(view));
+      for (const node of frontToBack(SUBPATCHES, this.sizeM, this.eye[0]!, this.eye[1]!)) this.emit(0, node, 0);
     } else if (held[0] === 1) {
-      this.wish(0, 1);
+      this.wish(this.wishes, this.wished, 0, 0, 0, 1);
     }
-    this.wishes.sort((a, b) => a.level - b.level || b.priority - a.priority);
-    let minHeight = Number.POSITIVE_INFINITY;
-    let maxHeight = Number.NEGATIVE_INFINITY;
-    for (let node = 0; node < 16; node += 1) {
-      minHeight = Math.min(minHeight, min[node]!);
-      maxHeight = Math.max(maxHeight, max[node]!);
-    }
-    return { count: this.count, records: this.records, requests: this.wishes, minHeight, maxHeight };
+    const order = (a: Wish, b: Wish): number => a.level - b.level || b.priority - a.priority;
+    this.wishes.sort(order);
+    this.early.sort(order);
+    let top = Number.NEGATIVE_INFINITY;
+    for (let node = 0; node < 16; node += 1) top = Math.max(top, max[node]!);
+    const { count, records, early } = this;
+    return { count, records, requests: this.wishes, early, minHeight: low, maxHeight: high, top };
   }
 
   private begin(view: TileView, camera: CameraState, tauPx: number, slots: Slots, pixelScale: number): void {
     this.count = 0;
     this.wishes = [];
+    this.early = [];
+    this.wished.clear();
+    this.wishedEarly.clear();
     this.slots = slots;
     this.tau = tauPx;
     this.sizeM = view.sizeM;
@@ -158,13 +158,13 @@ export class Selection {
       list.length = 0;
     }
     const { capacity } = this.tree;
-    if (this.flags.length < capacity) {
+    if (this.touched.length < capacity) {
       this.split = new Uint8Array(capacity * 16);
       this.ratio = new Float32Array(capacity * 16);
-      this.flags = new Uint8Array(capacity);
+      this.touched = new Uint8Array(capacity);
       this.slotOf = new Int32Array(capacity);
     }
-    this.flags.fill(0);
+    this.touched.fill(0);
     this.slotOf.fill(-1);
   }
 
@@ -172,18 +172,39 @@ export class Selection {
     const { tree } = this;
     if (level >= this.levels || tree.error[node] === 0 || !this.visible(level, node)) return;
     const ratio = this.screenError(level, node);
-    if (ratio <= 1) return;
-    const page = tree.childPage(node);
-    if (tree.splittable[node] === 0) {
-      if (page >= 0) this.wish(page, ratio);
+    if (ratio <= EARLY) return;
+    if (ratio <= 1) {
+      if (tree.splittable[node] === 0) this.wishBelow(this.early, this.wishedEarly, level, node, ratio);
       return;
     }
+    if (tree.splittable[node] === 0) {
+      this.wishBelow(this.wishes, this.wished, level, node, ratio);
+      this.lookAhead(level, node);
+      return;
+    }
+    const page = tree.childPage(node);
     this.markSplit(level, node, ratio);
     const first = tree.firstChild(node, page);
     this.descend(level + 1, first);
     this.descend(level + 1, first + 1);
     this.descend(level + 1, first + 4);
     this.descend(level + 1, first + 5);
+  }
+
+  /** While a tile still enters, those below it are asked for already. */
+  private lookAhead(level: number, node: number): void {
+    const { tree } = this;
+    const page = tree.childPage(node);
+    if (page < 0 || tree.usable[page] === 0 || level + 1 >= this.levels) return;
+    const first = tree.firstChild(node, page);
+    for (const child of [first, first + 1, first + 4, first + 5]) {
+      if (tree.error[child] === 0 || !this.visible(level + 1, child)) continue;
+      const ratio = this.screenError(level + 1, child);
+      if (ratio <= 1) continue;
+      const below = tree.childPage(child);
+      if (below < 0 || tree.usable[below] === 0) this.wishBelow(this.early, this.wishedEarly, level + 1, child, ratio);
+      else this.lookAhead(level + 1, child);
+    }
   }
 
   /** Error of stopping at this patch, in taus; at most 1 when it need not be split. */
@@ -262,56 +283,80 @@ export class Selection {
   }
 
   private touchSplit(): void {
-    const { tree, flags } = this;
+    const { tree, touched } = this;
     for (let level = 0; level < this.levels; level += 1) {
       for (const node of this.splitList[level]!) {
         const page = tree.childPage(node);
-        if ((flags[page]! & TOUCHED) !== 0) continue;
-        flags[page]! |= TOUCHED;
+        if (touched[page] === 1) continue;
+        touched[page] = 1;
         this.slots!.touch(level + 1, tree.tileX[page]!, tree.tileY[page]!);
       }
     }
   }
 
-  /** Asks for a tile and for the neighbours of its parents, without which it could not be drawn. */
-  private wish(page: number, priority: number): void {
-    const { tree } = this;
-    if ((this.flags[page]! & WISHED) !== 0) return;
-    this.flags[page]! |= WISHED;
-    const level = tree.tileLevel[page]!;
-    const x = tree.tileX[page]!;
-    const y = tree.tileY[page]!;
-    if (tree.held[page] === 1 && tree.usable[page] === 0) this.wishes.push({ level, x, y, priority });
-    if (level === 0) return;
-    const near = tree.parent[page]! * 9 + 4;
-    const dx = (x & 1) * 2 - 1;
-    const dy = (y & 1) * 6 - 3;
-    for (const step of [0, dx, dy, dx + dy]) {
-      const around = tree.near[near + step]!;
-      if (around >= 0) this.wish(around, priority);
-    }
+  /** Asks for the tile of a node's children. */
+  private wishBelow(list: Wish[], known: Set<number>, level: number, node: number, priority: number): void {
+    this.wish(list, known, level + 1, this.column(node) >> 1, this.row(node) >> 1, priority);
   }
 
-  private rootOrder(): number[] {
-    const order = Array.from({ length: 16 }, (_, i) => i);
-    const away = order.map((node) => this.distance(0, node));
-    return order.sort((a, b) => away[a]! - away[b]!);
+  /** Asks for a tile and for the neighbours of its parents, without which it could not be drawn. */
+  private wish(list: Wish[], known: Set<number>, level: number, x: number, y: number, priority: number): void {
+    const { tree } = this;
+    const side = 2 ** level;
+    if (x < 0 || y < 0 || x >= side || y >= side) return;
+    const key = tileKey(level, x, y);
+    if (known.has(key)) return;
+    known.add(key);
+    const page = tree.find(level, x, y);
+    const missing = page < 0 || tree.usable[page] === 0;
+    if (missing && (tree.canMake(level) || (page >= 0 && tree.held[page] === 1))) list.push({ level, x, y, priority });
+    if (level === 0) return;
+    const dx = (x & 1) * 2 - 1;
+    const dy = (y & 1) * 2 - 1;
+    for (let i = 0; i < 4; i += 1)
+      this.wish(list, known, level - 1, (x >> 1) + (i & 1) * dx, (y >> 1) + (i >> 1) * dy, priority);
+  }
+
+  /** Whether the eye is above the ground that is drawn: else nearer ground need not hide what is behind it. */
+  private above(view: TileView): boolean {
+    const { tree, sizeM } = this;
+    const [x, y, z] = this.eye as [number, number, number];
+    if (x < 0 || y < 0 || x >= sizeM || y >= sizeM) {
+      for (let node = 0; node < 16; node += 1) if (tree.max[node]! >= z) return false;
+      return true;
+    }
+    const cell = (level: number, v: number): number => Math.floor((v / sizeM) * (SUBPATCHES << level));
+    let level = 0;
+    let node = cell(0, y) * SUBPATCHES + cell(0, x);
+    while (this.split[node] === 1) {
+      level += 1;
+      node = tree.firstChild(node, tree.childPage(node)) + (cell(level, x) & 1) + 4 * (cell(level, y) & 1);
+    }
+    const high = tree.max[node]!;
+    if (high < z) return true;
+    // On a slope the patch below the eye may rise above it elsewhere: its samples around the eye say more.
+    const page = node >> 4;
+    const tile = view.tile(level, tree.tileX[page]!, tree.tileY[page]!);
+    return tile !== undefined && highestAround(tile, sizeM, x, y) + (high - tile.subMax[node & 15]!) < z;
   }
 
   private emit(level: number, node: number, morph: number): void {
     const { tree } = this;
     if (!this.visible(level, node)) return;
+    const w = this.sizeM / (SUBPATCHES << level);
+    const east = this.column(node) * w - this.eye[0]!;
+    const north = this.row(node) * w - this.eye[1]!;
+    if (this.horizon.hides(east, north, w, Math.max(tree.max[node]!, this.seaM) - this.eye[2]!)) return;
     if (this.split[node] === 0) {
       this.write(level, node, morph);
+      this.horizon.add(east, north, w, tree.min[node]! - this.eye[2]!);
       return;
     }
     const page = tree.childPage(node);
     const childMorph = Math.max(morphOf(this.ratio[node]!), tree.fade[page]!);
-    const w = this.sizeM / (SUBPATCHES << level);
     const first = tree.firstChild(node, page);
-    // Nearest quadrant first, for early depth rejection.
-    const near =
-      (this.eye[0]! > (this.column(node) + 0.5) * w ? 1 : 0) | (this.eye[1]! > (this.row(node) + 0.5) * w ? 2 : 0);
+    // Nearest quadrant first: for the horizon, and for early depth rejection.
+    const near = (east < -0.5 * w ? 1 : 0) | (north < -0.5 * w ? 2 : 0);
     for (let flip = 0; flip < 4; flip += 1) {
       const i = near ^ flip;
       this.emit(level + 1, first + (i & 1) + 2 * (i & 2), childMorph);
@@ -350,12 +395,17 @@ export class Selection {
       (py === last ? EDGE_NORTH : 0);
     const own = this.slot(node >> 4);
     const parent = level > 0 ? this.slot(tree.parent[node >> 4]!) : own;
-    const at = this.count * RECORD_WORDS;
-    this.records[at] = ((px * PATCH_CELLS) | ((py * PATCH_CELLS) << 16)) >>> 0;
-    this.records[at + 1] = (own | (parent << 16)) >>> 0;
-    const wet = tree.min[node]! < this.seaM ? WET : 0;
-    this.records[at + 2] = level | (edges << 8) | (border << 12) | wet;
-    this.records[at + 3] = corners >>> 0;
+    writeRecord(this.records, this.count, {
+      level,
+      column: px * PATCH_CELLS,
+      row: py * PATCH_CELLS,
+      slot: own,
+      parent,
+      edges,
+      border,
+      wet: tree.min[node]! < this.seaM,
+      corners,
+    });
     this.count += 1;
   }
 
@@ -398,6 +448,14 @@ export class Selection {
 /** 1 when the parent's error is at the bound (about to be merged), 0 from twice the bound on. */
 function morphOf(parentRatio: number): number {
   return Math.min(1, Math.max(0, 2 - parentRatio));
+}
+
+/** Highest of the four samples around a place of the tile, metres. */
+function highestAround({ level, x, y, heights }: Tile, sizeM: number, atX: number, atY: number): number {
+  const cells = TILE_CELLS * 2 ** level;
+  const column = Math.floor((atX / sizeM) * cells) - x * TILE_CELLS;
+  const at = (Math.floor((atY / sizeM) * cells) - y * TILE_CELLS) * TILE_SAMPLES + column;
+  return Math.max(heights[at]!, heights[at + 1]!, heights[at + TILE_SAMPLES]!, heights[at + TILE_SAMPLES + 1]!);
 }
 
 function outside(v: number, low: number, high: number): number {

@@ -11,9 +11,13 @@ import { createNoiseTexture } from "../../src/gpu/noise.ts";
 import { PatchPasses } from "../../src/gpu/patches.ts";
 import type { PassContext } from "../../src/gpu/pipeline.ts";
 import { SkyTables } from "../../src/gpu/sky.ts";
+import { TakeLightPass } from "../../src/gpu/takelight.ts";
 import { DEPTH_FORMAT } from "../../src/gpu/target.ts";
-import { NormalsPass, SunPass } from "../../src/gpu/tilecompute.ts";
+import { SunPass } from "../../src/gpu/tilecompute.ts";
+import { TileFill } from "../../src/gpu/tilefill.ts";
+import { RECORD_WORDS, recordLevel } from "../../src/tiles/records.ts";
 import { Selection } from "../../src/tiles/selection.ts";
+import { expectation, finestSynthesisLevel } from "../../src/tiles/synthetic.ts";
 import {
   craggyField,
   FieldView,
@@ -46,8 +50,9 @@ interface Rig {
   readonly device: GPUDevice;
   readonly frame: FrameBindings;
   readonly patches: PatchPasses;
-  readonly normals: NormalsPass;
+  readonly fill: TileFill;
   readonly sun: SunPass;
+  readonly taking: TakeLightPass;
   readonly sky: SkyTables;
   readonly colour: GPUTexture;
   readonly depth: GPUTexture;
@@ -70,7 +75,8 @@ async function makeRig(): Promise<Rig> {
     frame,
     sky,
     patches: await PatchPasses.create(context),
-    normals: await NormalsPass.create(device),
+    fill: await TileFill.create(device),
+    taking: await TakeLightPass.create(device),
     sun: await SunPass.create(device, true),
     colour: device.createTexture({ size: [WIDTH, HEIGHT], format: FORMAT, usage }),
     depth: device.createTexture({
@@ -153,14 +159,12 @@ interface World {
 
 /** An empty atlas and selection for a store; `fades`: refined tiles enter by and by. */
 function makeWorld(rig: Rig, view: TileView, fades = false): World {
-  const selection = new Selection(view.levels);
-  const atlas = new Atlas(rig.device, view.levels, (l, x, y, usable) =>
+  const selection = new Selection(finestSynthesisLevel(view.sizeM));
+  const atlas = new Atlas(rig.device, (l, x, y, usable) =>
     selection.tree.setUsable(l, x, y, usable, fades && l > view.solved),
   );
-  rig.frame.attach(atlas);
-  rig.normals.attach(atlas);
-  rig.sun.attach(atlas);
-  return { atlas, selection, light: new LightQueue(rig.sun, atlas) };
+  for (const pass of [rig.frame, rig.fill, rig.sun, rig.taking]) pass.attach(atlas);
+  return { atlas, selection, light: new LightQueue(rig.sun, atlas, rig.taking) };
 }
 
 /** One picture as half-float words, and what was drawn. */
@@ -171,24 +175,31 @@ async function picture(
   tau: number,
   entrance: () => number = () => 1,
 ): Promise<{ words: Uint16Array; stats: Pick<FrameStats, "patches">; mixed: boolean; deepest: number }> {
-  const changed = world.atlas.refresh(scene.tiles);
+  const { tiles, settings, channels } = scene;
+  const detail = { sizeM: tiles.sizeM, seed: settings.seed, detail: settings.detail, rule: settings.rule };
+  const { synthesis } = rig.fill;
+  const anew = synthesis.configure({ ...detail, look: settings.look, seaLevelM: null, solved: tiles.solved });
+  if (synthesis.setChannels(channels) || anew) world.atlas.remakeAll();
+  world.selection.tree.expect(expectation(tiles.sizeM, settings, channels));
+  rig.fill.tell(world.selection.tree);
+  const changes = world.atlas.refresh(tiles);
   const entered = [];
-  let cut = world.selection.select(scene.tiles, scene.camera, tau, world.atlas);
+  let cut = world.selection.select(tiles, scene.camera, tau, world.atlas);
   for (let round = 0; ; round += 1) {
     const more = world.atlas.admit(cut.requests, 4096);
     // Refined tiles are let in one level after the other, each when its parent has entered.
     const entering = world.selection.tree.advance(entrance());
-    if (more.length === 0 && (!entering || round > 14)) break;
+    if (more.length === 0 && (!entering || round > 20)) break;
     entered.push(...more);
-    cut = world.selection.select(scene.tiles, scene.camera, tau, world.atlas);
+    cut = world.selection.select(tiles, scene.camera, tau, world.atlas);
   }
   const sun = sunDirection(115, 24);
   const encoder = rig.device.createCommandEncoder();
   rig.sky.bake(rig.device, encoder, sun);
   world.atlas.flushPages();
-  rig.normals.run(encoder, scene.tiles.sizeM, [...changed, ...entered]);
-  world.light.mark(changed, entered, sun);
-  world.light.run(encoder, { sizeM: scene.tiles.sizeM, high: cut.maxHeight, sun }, 4);
+  rig.fill.run(encoder, tiles.sizeM, changes, entered);
+  world.light.mark([...changes.remade, ...changes.moved], entered, sun);
+  world.light.run(encoder, { sizeM: tiles.sizeM, high: cut.top, sun }, 4);
   rig.frame.update(scene, { width: WIDTH, height: HEIGHT, low: cut.minHeight, high: cut.maxHeight });
   rig.patches.update(cut);
   while (!rig.patches.useLook(scene.settings.look)) await new Promise((done) => setTimeout(done, 10));
@@ -209,11 +220,12 @@ async function picture(
     HEIGHT,
   ]);
   rig.device.queue.submit([encoder.finish()]);
+  rig.fill.submitted();
   await rig.readback.mapAsync(GPUMapMode.READ);
   const words = new Uint16Array(rig.readback.getMappedRange().slice(0));
   rig.readback.unmap();
   const levels = new Set<number>();
-  for (let i = 0; i < cut.count; i += 1) levels.add(cut.records[4 * i + 2]! & 255);
+  for (let i = 0; i < cut.count; i += 1) levels.add(recordLevel(cut.records, i));
   return { words, stats: { patches: cut.count }, mixed: levels.size > 1, deepest: Math.max(...levels) };
 }
 
@@ -336,8 +348,8 @@ function spoilRecords(selection: Selection): void {
   selection.select = (...args) => {
     const cut = select(...args);
     for (let i = 0; i < cut.count; i += 1) {
-      cut.records[4 * i + 2]! &= ~0xf00;
-      cut.records[4 * i + 3] = 0;
+      cut.records[RECORD_WORDS * i]! &= ~(15 << 24);
+      cut.records[RECORD_WORDS * i + 3] = 0;
     }
     return cut;
   };

@@ -3,6 +3,7 @@
 import { describe, expect, it } from "vitest";
 import type { Atlas, Resident } from "../../src/gpu/atlas.ts";
 import { LightQueue } from "../../src/gpu/lightqueue.ts";
+import type { TakeLightPass } from "../../src/gpu/takelight.ts";
 import type { SunPass } from "../../src/gpu/tilecompute.ts";
 
 const tile = (level: number, x: number, y: number): Resident => ({
@@ -11,7 +12,8 @@ const tile = (level: number, x: number, y: number): Resident => ({
   y,
   slot: 0,
   stamp: 0,
-  neighbours: 0,
+  held: 0,
+  version: 0,
   used: 0,
 });
 
@@ -19,7 +21,6 @@ const tile = (level: number, x: number, y: number): Resident => ({
 function queue(residents: Resident[]) {
   const atlas = {
     groundMoved: false,
-    levels: 10,
     residents: () => residents,
     holds: () => true,
     isCurrent: () => true,
@@ -27,7 +28,7 @@ function queue(residents: Resident[]) {
   let marched: readonly Resident[] = [];
   const pass = {
     run(...args: unknown[]) {
-      marched = args[5] as readonly Resident[];
+      marched = args[4] as readonly Resident[];
     },
   };
   const made = new LightQueue(pass as unknown as SunPass, atlas as unknown as Atlas);
@@ -64,5 +65,50 @@ describe("LightQueue", () => {
     atlas.groundMoved = false;
     made.mark([], [], [1, 0, 0]);
     expect(run()).toEqual(["5/1/1", "5/20/20"]);
+  });
+
+  it("R55: synthetic tiles take their light from their parents, and again when those are marched", () => {
+    const held: Resident = { ...tile(4, 1, 1), held: 16 };
+    const [a, b, far] = [tile(5, 2, 2), tile(6, 4, 4), tile(6, 40, 40)];
+    const parents = new Map([
+      [a, held],
+      [b, a],
+    ]);
+    const atlas = {
+      groundMoved: false,
+      residents: () => [b, held, far, a],
+      holds: () => true,
+      isCurrent: () => true,
+      parentOf: (r: Resident) => parents.get(r) ?? r,
+    };
+    let taken: readonly Resident[] = [];
+    const taking = {
+      run(_: unknown, jobs: readonly Resident[]) {
+        taken = jobs;
+      },
+    };
+    const pass = { run() {} };
+    const made = new LightQueue(
+      pass as unknown as SunPass,
+      atlas as unknown as Atlas,
+      taking as unknown as TakeLightPass,
+    );
+    const run = (): readonly Resident[] => {
+      made.run({} as GPUCommandEncoder, { sizeM: 1, high: 1, sun: [0, 0, 1] }, 100);
+      return taken;
+    };
+    made.mark([], [held, a, b, far], SUN);
+    expect(run()).toEqual([a, b, far]);
+    expect(made.pending).toBe(false);
+    made.mark([held], [], SUN);
+    expect(made.pending).toBe(true);
+    expect(run()).toEqual([a, b]);
+    // A tile that is held no more gives up its own light.
+    held.held = 0;
+    made.mark([held, a, b], [], SUN);
+    expect(made.pending).toBe(false);
+    expect(run()).toEqual([held, a, b]);
+    made.mark([b], [], SUN);
+    expect(run()).toEqual([]);
   });
 });

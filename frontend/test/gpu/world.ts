@@ -310,10 +310,10 @@ export class SparseView implements TileView {
     readonly sizeM: number,
     readonly levels: number,
     readonly solved: number,
-    private readonly field: HeightField,
+    private field: HeightField,
   ) {
     for (let level = 0; level <= solved; level += 1)
-      for (let y = 0; y < 1 << level; y += 1) for (let x = 0; x < 1 << level; x += 1) this.hold(level, x, y);
+      for (let y = 0; y < 1 << level; y += 1) for (let x = 0; x < 1 << level; x += 1) this.make(level, x, y);
   }
 
   tile(level: number, x: number, y: number): Tile | undefined {
@@ -338,7 +338,7 @@ export class SparseView implements TileView {
       const ty = Math.min(side - 1, Math.floor((y / this.sizeM) * side));
       for (let j = Math.max(0, ty - around); j <= Math.min(side - 1, ty + around); j += 1)
         for (let i = Math.max(0, tx - around); i <= Math.min(side - 1, tx + around); i += 1)
-          if (this.tile(level - 1, i >> 1, j >> 1) !== undefined) this.hold(level, i, j);
+          if (this.tile(level - 1, i >> 1, j >> 1) !== undefined) this.make(level, i, j);
     }
   }
 
@@ -366,7 +366,26 @@ export class SparseView implements TileView {
     for (const [key, tile] of this.held) if (tile.level > this.solved) this.held.delete(key);
   }
 
-  private hold(level: number, x: number, y: number): void {
+  /** Replaces the ground under all that is held. */
+  change(field: HeightField): void {
+    this.stamp += 1;
+    this.field = field;
+    for (const { level, x, y } of [...this.held.values()].sort((a, b) => a.level - b.level)) this.make(level, x, y);
+  }
+
+  /** Drops one tile. */
+  drop(level: number, x: number, y: number): void {
+    this.stamp += 1;
+    this.held.delete(tileKey(level, x, y));
+  }
+
+  /** Holds one tile more. */
+  hold(level: number, x: number, y: number): void {
+    this.stamp += 1;
+    this.make(level, x, y);
+  }
+
+  private make(level: number, x: number, y: number): void {
     const cell = this.sizeM / (TILE_CELLS << level);
     const heights = new Float32Array(TILE_SAMPLES * TILE_SAMPLES);
     for (let r = 0; r < TILE_SAMPLES; r += 1)

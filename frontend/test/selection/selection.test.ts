@@ -3,14 +3,17 @@
 import { beforeAll, describe, expect, it } from "vitest";
 import type { CameraState, Vec3 } from "../../src/core/types.ts";
 import {
-  type Cut,
   EDGE_EAST,
   EDGE_NORTH,
   EDGE_SOUTH,
   EDGE_WEST,
-  Selection,
-  type TileRequest,
-} from "../../src/tiles/selection.ts";
+  recordBorder,
+  recordColumn,
+  recordEdges,
+  recordLevel,
+  recordRow,
+} from "../../src/tiles/records.ts";
+import { type Cut, Selection, type TileRequest } from "../../src/tiles/selection.ts";
 import { FieldView, filteredField, lookAt, mapCamera, random } from "../gpu/world.ts";
 
 interface Leaf {
@@ -26,15 +29,15 @@ interface Leaf {
 
 function leaves(cut: Cut): Leaf[] {
   return Array.from({ length: cut.count }, (_, i) => {
-    const [a, b, c, d] = cut.records.subarray(4 * i, 4 * i + 4) as unknown as [number, number, number, number];
+    const [, , c, d] = cut.records.subarray(4 * i, 4 * i + 4) as unknown as [number, number, number, number];
     return {
-      level: c & 255,
-      px: (a & 0xffff) / 16,
-      py: (a >>> 16) / 16,
-      slot: b & 0xffff,
-      parent: b >>> 16,
-      edges: (c >> 8) & 15,
-      border: (c >> 12) & 15,
+      level: recordLevel(cut.records, i),
+      px: recordColumn(cut.records, i) / 16,
+      py: recordRow(cut.records, i) / 16,
+      slot: c & 0xffff,
+      parent: c >>> 16,
+      edges: recordEdges(cut.records, i),
+      border: recordBorder(cut.records, i),
       corners: [0, 8, 16, 24].map((shift) => (d >>> shift) & 255),
     };
   });

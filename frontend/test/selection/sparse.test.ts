@@ -3,6 +3,7 @@
 import { describe, expect, it } from "vitest";
 import type { CameraState, Vec3 } from "../../src/core/types.ts";
 import { PatchTree } from "../../src/tiles/patchtree.ts";
+import { recordColumn, recordLevel, recordRow } from "../../src/tiles/records.ts";
 import { type Cut, Selection } from "../../src/tiles/selection.ts";
 import { craggyField, lookAt, random, SparseView } from "../gpu/world.ts";
 
@@ -19,11 +20,11 @@ interface Leaf {
 
 function leaves(cut: Cut): Leaf[] {
   return Array.from({ length: cut.count }, (_, i) => {
-    const [a, , c, d] = cut.records.subarray(4 * i, 4 * i + 4) as unknown as [number, number, number, number];
+    const d = cut.records[4 * i + 3]!;
     return {
-      level: c & 255,
-      px: (a & 0xffff) / 16,
-      py: (a >>> 16) / 16,
+      level: recordLevel(cut.records, i),
+      px: recordColumn(cut.records, i) / 16,
+      py: recordRow(cut.records, i) / 16,
       corners: [0, 8, 16, 24].map((shift) => (d >>> shift) & 255),
     };
   });
