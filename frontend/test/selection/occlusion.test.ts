@@ -157,7 +157,6 @@ describe("hidden patches", { timeout: 60_000 }, () => {
     }
     expect(ground).toBeGreaterThan(20 * 256 * 192 * 0.4);
     const share = (place: Place): number => 1 - saved[place][1] / saved[place][0];
-    console.info(Object.entries(saved).map(([place, [all, kept]]) => `${place}: ${all} patches, ${kept} drawn`));
-    expect(share("ground")).toBeGreaterThan(0.15);
+    expect(share("ground")).toBeGreaterThan(0.3);
   });
 });
