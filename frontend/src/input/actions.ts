@@ -4,13 +4,15 @@ import type { Signal } from "@preact/signals-core";
 import type { Camera, CameraMode } from "../core/camera.ts";
 import type { Ground } from "../core/types.ts";
 import type { SyncDoc } from "../doc/sync.ts";
-import type { Op, Stroke } from "../generated/contract.ts";
+import type { Op, Paint, Stroke } from "../generated/contract.ts";
+import { brushActions } from "./brushactions.ts";
+import type { PenToolId, ToolDefaults } from "./defaults.ts";
 import { moveOps, raiseOps } from "./handledrag.ts";
 import { handlesOf } from "./handles.ts";
-import { shapeOf } from "./picking.ts";
+import { drapedOf, shapeOf } from "./picking.ts";
 import { createOps, metres } from "./strokeops.ts";
 
-export type ToolId = "select" | "mountain" | "crevice" | "plateau";
+export type ToolId = "select" | PenToolId;
 
 export type ActionId =
   | ToolId
@@ -23,6 +25,12 @@ export type ActionId =
   | "hide"
   | "raise"
   | "lower"
+  | "brush-smaller"
+  | "brush-larger"
+  | "brush-weaker"
+  | "brush-stronger"
+  | "brush-channel"
+  | "brush-opposite"
   | "next-stroke"
   | "previous-stroke"
   | "cancel"
@@ -52,10 +60,13 @@ export interface ActionContext {
   readonly camera: Camera;
   readonly doc: SyncDoc;
   readonly ground: () => Ground;
+  /** The same, held fast. */
+  readonly freeze: () => Ground;
   readonly canEdit: () => boolean;
   readonly tool: Signal<ToolId>;
   readonly selection: Signal<string | null>;
   readonly fingerDraws: Signal<boolean>;
+  readonly defaults: ToolDefaults;
   readonly newId: () => string;
   readonly onMessage: (text: string) => void;
   /** Gives up what is being drawn or dragged; true when there was something. */
@@ -70,6 +81,7 @@ const TOOL_TITLES: Readonly<Record<ToolId, string>> = {
   mountain: "Draw mountains",
   crevice: "Draw crevices",
   plateau: "Draw plateaux",
+  paint: "Paint snow, plants, wetness and roughness",
 };
 
 /** Builds the map of actions. Its owner may add more (page-only ones such as the help sheet). */
@@ -88,6 +100,7 @@ export function createActions(c: ActionContext): Map<string, Action> {
     ["mountain", ["b", "1"]],
     ["crevice", ["c", "2"]],
     ["plateau", ["p", "3"]],
+    ["paint", ["k", "4"]],
   ] as const)
     put(id, TOOL_TITLES[id], [...keys], () => {
       c.tool.value = id;
@@ -108,13 +121,14 @@ export function createActions(c: ActionContext): Map<string, Action> {
   );
   put("delete", "Delete the stroke", ["Delete", "Backspace"], () => edits.remove(), edits.usable);
   put("duplicate", "Duplicate the stroke", ["Ctrl+d"], () => edits.duplicate(), edits.selected);
-  put("mirror", "Swap the stroke's flanks", ["m"], () => edits.mirror(), edits.usable);
+  put("mirror", "Swap the stroke's flanks", ["m"], () => edits.mirror(), edits.shaped);
   put("lock", "Lock or unlock the stroke", ["l"], () => edits.toggle("locked"), edits.selected);
   put("hide", "Hide or show the stroke", ["h"], () => edits.toggle("hidden"), edits.usable);
-  put("raise", "Raise the stroke", ["PageUp"], () => edits.raise(1), edits.usable);
-  put("lower", "Lower the stroke", ["PageDown"], () => edits.raise(-1), edits.usable);
-  put("next-stroke", "Select the next stroke", ["]"], () => edits.step(1), edits.any);
-  put("previous-stroke", "Select the previous stroke", ["["], () => edits.step(-1), edits.any);
+  put("raise", "Raise the stroke", ["PageUp"], () => edits.raise(1), edits.shaped);
+  put("lower", "Lower the stroke", ["PageDown"], () => edits.raise(-1), edits.shaped);
+  brushActions(c, edits, put);
+  put("next-stroke", "Select the next stroke", ["n"], () => edits.step(1), edits.any);
+  put("previous-stroke", "Select the previous stroke", ["Shift+n"], () => edits.step(-1), edits.any);
   put("cancel", "Cancel, or select nothing", ["Escape"], () => {
     if (!c.cancel()) c.selection.value = null;
   });
@@ -127,7 +141,7 @@ export function createActions(c: ActionContext): Map<string, Action> {
   return actions;
 }
 
-type Put = (id: ActionId, title: string, keys: string[], run: () => void, enabled?: () => boolean) => void;
+export type Put = (id: ActionId, title: string, keys: string[], run: () => void, enabled?: () => boolean) => void;
 
 function nudgeActions(c: ActionContext, edits: StrokeActions, put: Put): void {
   const arrows = [
@@ -178,7 +192,7 @@ function cameraActions(c: ActionContext, edits: StrokeActions, put: Put): void {
 }
 
 /** What can be done to the selected stroke. */
-class StrokeActions {
+export class StrokeActions {
   readonly #c: ActionContext;
   #gesture = { name: "", kind: "", at: -Infinity };
 
@@ -193,6 +207,8 @@ class StrokeActions {
 
   readonly selected = (): boolean => this.#c.canEdit() && this.stroke() !== null;
   readonly usable = (): boolean => this.selected() && this.stroke()?.locked === false;
+  /** There is height and a section to change: paint has neither. */
+  readonly shaped = (): boolean => this.usable() && this.stroke()?.kind !== "paint";
   readonly any = (): boolean => (this.#c.doc.doc.value?.strokes.size ?? 0) > 0;
 
   travel(way: "undo" | "redo"): void {
@@ -241,6 +257,12 @@ class StrokeActions {
     if (s !== null) this.#submit(raiseOps(s, (sign * this.#c.ground().sizeM) / 400), this.#repeated("raise"));
   }
 
+  /** Changes the paint of the selected stroke; repeats within a moment are one step of undo. */
+  repaint(paint: Paint): void {
+    const s = this.stroke();
+    if (s !== null) this.#submit([{ type: "stroke.set", stroke: s.id, fields: { paint } }], this.#repeated("paint"));
+  }
+
   /** Moves the stroke by a small step as seen on the screen. */
   nudge(right: number, away: number): void {
     const s = this.stroke();
@@ -263,7 +285,7 @@ class StrokeActions {
       this.#c.camera.home();
       return;
     }
-    const { points } = shapeOf(s);
+    const { points } = s.kind === "paint" ? drapedOf(s, this.#c.freeze()) : shapeOf(s);
     const crest = Array.from(
       { length: points.length / 3 },
       (_, i) => [...points.subarray(3 * i, 3 * i + 3)] as Stroke["first"],

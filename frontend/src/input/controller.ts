@@ -16,7 +16,7 @@ import { type HandleVisual, handlesOf } from "./handles.ts";
 import { HandleTool } from "./handletool.ts";
 import { Keyboard } from "./keyboard.ts";
 import { type Finger, Navigation, type NavigationMode } from "./navigation.ts";
-import type { Picked } from "./picking.ts";
+import type { Picked, PickOrder } from "./picking.ts";
 import { Pointing, takePointer } from "./pointing.ts";
 import { type FinishedStroke, type InkVisual, StrokeTool } from "./stroketool.ts";
 
@@ -67,6 +67,16 @@ interface Main {
 
 /** CSS pixels a pointer may tremble within a click. */
 const CLICK_PX = 4;
+/** Number of the button that the other end of a pen presses. */
+const ERASER = 5;
+/** What a click takes: paint lies over the land like a veil, so it comes last, and the drawing tools do not see it. */
+const PICKS: Readonly<Record<ToolId, PickOrder>> = {
+  select: ["land", "paint"],
+  mountain: ["land"],
+  crevice: ["land"],
+  plateau: ["land"],
+  paint: ["paint"],
+};
 const VIEW_ONLY = "This link lets you look, not draw. Ask for an edit link to change the terrain.";
 const LOCKED = "This stroke is locked. Unlock it to change it.";
 const FLUSH = "This plateau lies level with the ground. Drag its handle up to raise it.";
@@ -217,9 +227,10 @@ export class InputController {
       this.#navigation.begin(mode, x, y);
       return { kind: "navigate", mode };
     };
+    const erases = e.button === ERASER && this.tool.value === "paint";
     if (e.button === 1 || (e.button === 2 && e.shiftKey) || (e.button === 0 && this.#keyboard.spaceHeld))
       return navigate("pan");
-    if (e.button !== 0) return navigate(this.#turning());
+    if (e.button !== 0 && !erases) return navigate(this.#turning());
     if (this.tool.value === "select") return this.#select(e, x, y);
     if (e.pointerType === "touch" && !this.fingerDraws.value) return this.#press(null);
     if (!this.#o.canEdit()) {
@@ -227,7 +238,8 @@ export class InputController {
       this.#toldViewOnly = true;
       return this.#press(null, notice);
     }
-    if (this.#strokes.start(this.tool.value, this.#pointing.sample(e), e.pointerType === "pen"))
+    const opposite = this.tool.value === "paint" && (erases || e.altKey);
+    if (this.#strokes.start(this.tool.value, this.#pointing.sample(e), e.pointerType === "pen", opposite))
       return { kind: "draw" };
     return this.#press(null, OFF_GROUND);
   }
@@ -245,7 +257,7 @@ export class InputController {
   #select(e: PointerEvent, x: number, y: number): Activity {
     const handle = this.#pointing.handle(this.#handles.value, e);
     if (handle !== null) return this.#beginDrag(handle, x, y);
-    return this.#press(this.#pointing.stroke(e));
+    return this.#press(this.#pick(e));
   }
 
   #beginDrag(handle: Pick<HandleVisual, "kind" | "position">, x: number, y: number): Activity {
@@ -336,12 +348,25 @@ export class InputController {
     this.#o.onMessage(FLUSH);
   }
 
-  /** A click without movement selects the stroke under it, or nothing. */
+  /** A click without movement selects the stroke under it, or nothing; with the brush, beside all paint, it is a dab. */
   #click(activity: Activity, e: PointerEvent): void {
+    const picked = this.#pick(e);
+    if (activity.kind === "draw" && picked === null) {
+      const made = this.#strokes.touch();
+      if (made !== null) {
+        this.#drawn(made);
+        return;
+      }
+    }
     if (activity.kind === "draw") this.#strokes.cancel();
     if (activity.kind === "drag") this.#drags.cancel();
     if (e.button !== 0 || activity.kind === "drag" || activity.kind === "navigate") return;
-    this.selection.value = this.#pointing.stroke(e)?.stroke.id ?? null;
+    this.selection.value = picked?.stroke.id ?? null;
+  }
+
+  /** What lies under the pointer, of what the tool shows. */
+  #pick(e: PointerEvent): Picked | null {
+    return this.#pointing.stroke(e, this.#o.freeze(), PICKS[this.tool.value]);
   }
 
   /** The system took the pointer away: what was being drawn is given up. */
@@ -368,7 +393,8 @@ export class InputController {
     }
     const handle = this.#pointing.handle(this.#handles.value, e);
     this.#drags.hover(handle?.kind ?? null);
-    const over = handle === null && this.tool.value === "select" ? this.#pointing.stroke(e) : null;
+    const picks = this.tool.value === "select" || this.tool.value === "paint";
+    const over = handle === null && picks ? this.#pick(e) : null;
     this.#hovered.value = over?.stroke.id ?? null;
     this.#showCursor(handle !== null || over !== null);
   }

@@ -1,10 +1,13 @@
 /** What a new stroke starts with, per tool: signals that the inspector writes and the stroke tool reads. */
 
 import { type Signal, signal } from "@preact/signals-core";
-import type { Flank, Stroke } from "../generated/contract.ts";
+import type { Flank, Paint, Stroke } from "../generated/contract.ts";
 import { DEFAULT_EXTENT_FRACTION, DEFAULT_SLOPE_DEG } from "../generated/contract.ts";
+import { brushRadius } from "./painttool.ts";
 
 export type DrawToolId = "mountain" | "crevice" | "plateau";
+/** Tools that put strokes on the ground. */
+export type PenToolId = DrawToolId | "paint";
 
 /** Cross-section and noise of the next stroke of a tool. */
 export type ToolStyle = Pick<Stroke, "left" | "right" | "plateau_radius_m" | "amplitude_m" | "roughness">;
@@ -13,13 +16,18 @@ export interface ToolDefaults {
   readonly mountain: Signal<ToolStyle>;
   readonly crevice: Signal<ToolStyle>;
   readonly plateau: Signal<ToolStyle>;
-  /** What the pressure of a pen changes. */
+  /** The brush. */
+  readonly paint: Signal<Paint>;
+  /** What the pressure of a pen changes: the extent of flanks, the radius of the brush. */
   readonly pressure: Signal<"none" | "extent">;
 }
 
 const CREVICE_SLOPE_DEG = 50;
 const CREVICE_EXTENT_FRACTION = 1 / 4;
 const PLATEAU_SLOPE_DEG = 30;
+/** Strength of a new brush, and its radius as a share of the terrain. */
+const BRUSH_VALUE = 0.8;
+const BRUSH_RADIUS = 1 / 40;
 /** Share of the extent that is left at no pressure at all. */
 const PRESSURE_FLOOR = 0.05;
 
@@ -34,6 +42,7 @@ export function toolDefaults(sizeM: number): ToolDefaults {
     mountain: signal(style(DEFAULT_SLOPE_DEG, sizeM * DEFAULT_EXTENT_FRACTION, 0)),
     crevice: signal(style(CREVICE_SLOPE_DEG, sizeM * CREVICE_EXTENT_FRACTION, 0)),
     plateau: signal(style(PLATEAU_SLOPE_DEG, sizeM * DEFAULT_EXTENT_FRACTION, sizeM / 40)),
+    paint: signal({ channel: "snow", value: BRUSH_VALUE, radius_m: brushRadius(sizeM * BRUSH_RADIUS, sizeM) }),
     pressure: signal("extent"),
   };
 }

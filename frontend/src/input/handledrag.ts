@@ -15,7 +15,8 @@ import {
   type Section,
   sectionOf,
 } from "./handles.ts";
-import { curveOps, metres, roundCurve } from "./strokeops.ts";
+import { brushRadius } from "./painttool.ts";
+import { anchorOn, curveOps, metres, roundCurve, solvedHeight } from "./strokeops.ts";
 
 /** A plane near the horizon turns a pixel into kilometres: farther than this many times the handle is not believed. */
 const FAR = 4;
@@ -64,6 +65,8 @@ export class HandleDrag {
       case "left":
       case "right":
         return this.#flank(ray, this.kind, both);
+      case "radius":
+        return this.#radius(ray);
       case "move":
         return this.#move(ray);
     }
@@ -74,7 +77,7 @@ export class HandleDrag {
     const hit = ground.raycast(ray);
     const point = hit !== null && distance(ray.origin, hit) <= FAR * this.#range ? hit : this.#drop(ray);
     if (point === null) return [];
-    const to = metres(point);
+    const to = anchorOn(ground, point);
     if (stroke.kind === "profile") return [{ type: "stroke.anchor", stroke: stroke.id, which, to }];
     // A level stroke lies at the height of its first anchor; the last only turns and scales it.
     if (which === "last") {
@@ -130,6 +133,15 @@ export class HandleDrag {
     return [{ type: "stroke.set", stroke: stroke.id, fields }];
   }
 
+  #radius(ray: Ray): Op[] {
+    const { stroke, ground } = this.#o;
+    const point = this.#onLevel(ray);
+    if (stroke.paint === null || point === null) return [];
+    const [cx, cy] = across(this.#section, 0);
+    const radius_m = brushRadius(Math.hypot(point[0] - cx, point[1] - cy), ground.sizeM);
+    return [{ type: "stroke.set", stroke: stroke.id, fields: { paint: { ...stroke.paint, radius_m } } }];
+  }
+
   #move(ray: Ray): Op[] {
     const point = this.#onLevel(ray);
     if (point === null) return [];
@@ -146,7 +158,7 @@ export class HandleDrag {
 
 /** Ops that raise the crest by `rise` metres: a profile is scaled (or bulged when flat), a level stroke lifted. */
 export function raiseOps(stroke: Stroke, rise: number): Op[] {
-  if (stroke.kind === "level") {
+  if (stroke.kind !== "profile") {
     const lift = (p: Vec3): [number, number, number] => metres([p[0], p[1], stroke.first[2] + rise]);
     return [{ type: "stroke.set", stroke: stroke.id, fields: { first: lift(stroke.first), last: lift(stroke.last) } }];
   }
@@ -161,7 +173,7 @@ export function raiseOps(stroke: Stroke, rise: number): Op[] {
 /** Ops that move a stroke over the ground; its height follows the ground under its anchors. */
 export function moveOps(stroke: Stroke, dx: number, dy: number, ground: Ground): Op[] {
   const moved = (p: Vec3): [number, number, number] => {
-    const rise = ground.heightAt(p[0] + dx, p[1] + dy) - ground.heightAt(p[0], p[1]);
+    const rise = solvedHeight(ground, p[0] + dx, p[1] + dy) - solvedHeight(ground, p[0], p[1]);
     return metres([p[0] + dx, p[1] + dy, p[2] + rise]);
   };
   const first = moved(stroke.first);

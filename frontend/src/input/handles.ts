@@ -1,11 +1,11 @@
 /** The handles of a stroke: where they are and what dragging one does (DESIGN 12). Pure. */
 
 import type { Ground, Vec3 } from "../core/types.ts";
-import type { Flank, Stroke } from "../generated/contract.ts";
+import type { Flank, Paint, Stroke } from "../generated/contract.ts";
 import { MAX_SLOPE_DEG } from "../generated/contract.ts";
 import { shapeOf } from "./picking.ts";
 
-export type HandleKind = "first" | "last" | "crest" | "left" | "right" | "move";
+export type HandleKind = "first" | "last" | "crest" | "left" | "right" | "move" | "radius";
 
 export interface HandleVisual {
   readonly id: string;
@@ -26,12 +26,14 @@ const FLAT_M = 1;
 /** Where the ground beside a flank is read, as a share of the run of its slope: a soft foot ends at one and a half. */
 const PAST_FOOT = 1.6;
 const FOOT_STEPS = 4;
+/** A line of paint shorter than this many radii has no ends to take hold of. */
+const SHORT = 0.25;
 
 /** Index of the curve point whose height differs most from the line between the anchors; the middle of a flat one. */
 export function crestIndex(stroke: Stroke): number {
   const { curve } = stroke;
   const middle = curve.length >> 1;
-  if (stroke.kind === "level") return middle;
+  if (stroke.kind !== "profile") return middle;
   let best = -1;
   let most = 1e-6;
   for (const [i, [, w]] of curve.entries())
@@ -49,7 +51,7 @@ export function sectionOf(stroke: Stroke): Section {
   const crest: Vec3 = [points[3 * i]!, points[3 * i + 1]!, points[3 * i + 2]!];
   let dx = stroke.last[0] - stroke.first[0];
   let dy = stroke.last[1] - stroke.first[1];
-  if (stroke.kind === "level") {
+  if (stroke.kind !== "profile") {
     const [a, b] = [Math.max(0, i - 1), Math.min(stroke.curve.length - 1, i + 1)];
     const tx = points[3 * b]! - points[3 * a]!;
     const ty = points[3 * b + 1]! - points[3 * a + 1]!;
@@ -102,6 +104,7 @@ export function flankWithFoot(flank: Flank, relief: number, foot: number): Flank
 /** All handles of a stroke; none for one that has no shape yet. */
 export function handlesOf(stroke: Stroke, ground: Ground, active: HandleKind | null): HandleVisual[] {
   if (stroke.curve.length < 2) return [];
+  if (stroke.paint !== null) return paintHandles(stroke, stroke.paint, ground, active);
   const section = sectionOf(stroke);
   const out: HandleVisual[] = [];
   const put = (kind: HandleKind, position: Vec3, label: string): void => {
@@ -126,6 +129,26 @@ export function handlesOf(stroke: Stroke, ground: Ground, active: HandleKind | n
   put("last", stroke.kind === "level" ? [stroke.last[0], stroke.last[1], stroke.first[2]] : stroke.last, "End");
   put("crest", section.crest, `Height ${Math.round(crestHeight(stroke))} m`);
   return out;
+}
+
+/** Handles of paint lie on the ground: both ends, the middle that moves it, and the rim of the brush beside that. */
+function paintHandles(stroke: Stroke, paint: Paint, ground: Ground, active: HandleKind | null): HandleVisual[] {
+  const section = sectionOf(stroke);
+  const onGround = (p: readonly [number, number]): Vec3 => [p[0], p[1], ground.heightAt(p[0], p[1])];
+  const handle = (kind: HandleKind, p: readonly [number, number], label: string): HandleVisual => ({
+    id: `${stroke.id}/${kind}`,
+    kind,
+    position: onGround(p),
+    label,
+    active: kind === active,
+  });
+  const { first, last } = stroke;
+  const dab = Math.hypot(last[0] - first[0], last[1] - first[1]) < SHORT * paint.radius_m;
+  return [
+    handle("move", across(section, 0), "Move"),
+    handle("radius", across(section, paint.radius_m), `Radius ${Math.round(paint.radius_m)} m`),
+    ...(dab ? [] : [handle("first", [first[0], first[1]], "Start"), handle("last", [last[0], last[1]], "End")]),
+  ];
 }
 
 /** What the crest handle shows: height over the line between the anchors, or of the plateau above zero. */

@@ -2,10 +2,11 @@
 
 import type { Camera } from "../core/camera.ts";
 import { segmentDistance } from "../core/geometry.ts";
-import type { Vec3 } from "../core/types.ts";
+import type { Ground, Vec3 } from "../core/types.ts";
 import type { Doc } from "../doc/document.ts";
 import { worldPoints } from "../doc/strokes.ts";
 import type { Stroke } from "../generated/contract.ts";
+import { solvedHeight } from "./strokeops.ts";
 
 export interface Shape {
   /** xyz triples. */
@@ -27,6 +28,44 @@ export function shapeOf(stroke: Stroke): Shape {
   return shape;
 }
 
+/** Lines of paint on the ground, remembered while neither changes. */
+const draped = new WeakMap<Stroke, { readonly ground: Ground; readonly shape: Shape }>();
+/** Points of a draped line lie at most this share of the domain apart. */
+const DRAPE_STEP = 1 / 256;
+/** A line far outside of the domain is no reason for a million points. */
+const MOST_PARTS = 256;
+
+/** The line of a paint stroke on the solved ground, which stays as it is, and a ball around it. */
+export function drapedOf(stroke: Stroke, ground: Ground): Shape {
+  const known = draped.get(stroke);
+  if (known?.ground === ground) return known.shape;
+  const points = drape(worldPoints(stroke), ground.sizeM * DRAPE_STEP, (x, y) => solvedHeight(ground, x, y));
+  const shape = measure(points);
+  draped.set(stroke, { ground, shape });
+  return shape;
+}
+
+/** The line (xyz triples) at other heights, with points at most `stepM` metres apart on the map. */
+export function drape(
+  line: ArrayLike<number>,
+  stepM: number,
+  heightAt: (x: number, y: number) => number,
+): Float64Array {
+  const out: number[] = [];
+  const n = line.length / 3;
+  for (let i = 0; i + 1 < n; i++) {
+    const [x, y] = [line[3 * i]!, line[3 * i + 1]!];
+    const [dx, dy] = [line[3 * i + 3]! - x, line[3 * i + 4]! - y];
+    const parts = Math.max(1, Math.min(MOST_PARTS, Math.ceil(Math.hypot(dx, dy) / stepM)));
+    for (let k = 0; k < parts; k++) {
+      const [px, py] = [x + (k / parts) * dx, y + (k / parts) * dy];
+      out.push(px, py, heightAt(px, py));
+    }
+  }
+  if (n > 0) out.push(line[3 * n - 3]!, line[3 * n - 2]!, heightAt(line[3 * n - 3]!, line[3 * n - 2]!));
+  return new Float64Array(out);
+}
+
 function measure(points: Float64Array): Shape {
   const low = [Infinity, Infinity, Infinity];
   const high = [-Infinity, -Infinity, -Infinity];
@@ -46,19 +85,46 @@ export interface Picked {
   readonly distancePx: number;
 }
 
-/** The visible stroke whose crest passes nearest to the pixel, within `radiusPx`; null when there is none. */
-export function pickStroke(doc: Doc, camera: Camera, x: number, y: number, radiusPx: number): Picked | null {
-  let best: Picked | null = null;
-  for (const stroke of doc.strokes.values()) {
-    if (stroke.hidden || stroke.curve.length === 0) continue;
-    const found = nearest(stroke, camera, x, y, best?.distancePx ?? radiusPx);
-    if (found !== null) best = found;
+/** Kinds of strokes in the order in which they are looked for: those that make heights, and paint. */
+export type PickOrder = readonly ("land" | "paint")[];
+
+/**
+ * The visible stroke whose line passes nearest to the pixel, within `radiusPx`, of the first kind in `order` that has one;
+ * null when there is none. Lines of paint lie on `ground`.
+ */
+export function pickStroke(
+  doc: Doc,
+  camera: Camera,
+  ground: Ground,
+  x: number,
+  y: number,
+  radiusPx: number,
+  order: PickOrder = ["land", "paint"],
+): Picked | null {
+  for (const kind of order) {
+    let best: Picked | null = null;
+    let within = radiusPx;
+    for (const stroke of doc.strokes.values()) {
+      if (stroke.hidden || stroke.curve.length === 0 || (stroke.kind === "paint") !== (kind === "paint")) continue;
+      const shape = kind === "paint" ? drapedOf(stroke, ground) : shapeOf(stroke);
+      const found = nearest(stroke, shape, camera, x, y, within);
+      if (found === null) continue;
+      best = found;
+      within = found.distancePx;
+    }
+    if (best !== null) return best;
   }
-  return best;
+  return null;
 }
 
-function nearest(stroke: Stroke, camera: Camera, x: number, y: number, within: number): Picked | null {
-  const { points, centre, radius } = shapeOf(stroke);
+function nearest(
+  stroke: Stroke,
+  { points, centre, radius }: Shape,
+  camera: Camera,
+  x: number,
+  y: number,
+  within: number,
+): Picked | null {
   const c = camera.project(centre);
   const reach = radius / camera.metresPerPixelAt(centre);
   if (c.depth > 2 * radius && Math.hypot(c.x - x, c.y - y) > 1.5 * reach + within) return null;

@@ -1,9 +1,10 @@
 /** From events in CSS pixels to device pixels, rays and what lies under them: the DOM's edge of the input room. */
 
 import type { Camera } from "../core/camera.ts";
+import type { Ground } from "../core/types.ts";
 import type { SyncDoc } from "../doc/sync.ts";
 import type { HandleVisual } from "./handles.ts";
-import { type Picked, pickHandle, pickStroke } from "./picking.ts";
+import { type Picked, type PickOrder, pickHandle, pickStroke } from "./picking.ts";
 import type { Sample } from "./sketch.ts";
 
 /** How near is a hit, in CSS pixels, by what points. */
@@ -53,11 +54,12 @@ export class Pointing {
     return typeof e.getPredictedEvents === "function" ? e.getPredictedEvents().map((s) => this.sample(s)) : [];
   }
 
-  stroke(e: PointerEvent): Picked | null {
+  /** The stroke under the pointer, of the kinds in `order`, the first kind first. */
+  stroke(e: PointerEvent, ground: Ground, order: PickOrder): Picked | null {
     const doc = this.#doc.doc.value;
     if (doc === null) return null;
     const [x, y] = this.pixel(e);
-    return pickStroke(doc, this.#camera, x, y, STROKE_PX[reachOf(e)] * this.ratio);
+    return pickStroke(doc, this.#camera, ground, x, y, STROKE_PX[reachOf(e)] * this.ratio, order);
   }
 
   handle(handles: readonly HandleVisual[], e: PointerEvent): HandleVisual | null {

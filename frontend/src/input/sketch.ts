@@ -31,8 +31,8 @@ export interface Sketch {
   shape(nowMs: number, exact: boolean, most: number): SketchShape;
   /** True while the shape still changes although the pen rests. */
   readonly settling: boolean;
-  /** Corners of the plane that is drawn on. */
-  corners(shape: SketchShape): readonly [Vec3, Vec3, Vec3, Vec3];
+  /** Corners of the plane that is drawn on; null where the ground itself is. */
+  corners(shape: SketchShape): readonly [Vec3, Vec3, Vec3, Vec3] | null;
 }
 
 export interface SketchStart {
@@ -46,6 +46,8 @@ export interface SketchStart {
 
 /** Tolerance of the simplification in device pixels. */
 export const SIMPLIFY_PX = 1;
+/** Neighbouring samples nearer than this, in device pixels, are averaged. */
+export const SMOOTH_PX = 8;
 
 /**
  * Samples as xy pixels with their jitter averaged away: integer mouse positions would otherwise become stairs on the
@@ -56,7 +58,8 @@ export function smoothPixels(samples: readonly Sample[]): Float64Array {
   for (const [i, s] of samples.entries()) {
     const before = samples[i - 1];
     const after = samples[i + 1];
-    const near = (o: Sample | undefined): o is Sample => o !== undefined && Math.hypot(o.x - s.x, o.y - s.y) < 8;
+    const near = (o: Sample | undefined): o is Sample =>
+      o !== undefined && Math.hypot(o.x - s.x, o.y - s.y) < SMOOTH_PX;
     const soft = near(before) && near(after);
     out[2 * i] = soft ? (before.x + 2 * s.x + after.x) / 4 : s.x;
     out[2 * i + 1] = soft ? (before.y + 2 * s.y + after.y) / 4 : s.y;

@@ -1,6 +1,6 @@
 /** Ops for whole strokes, within the limits of the wire. Pure. */
 
-import type { Vec3 } from "../core/types.ts";
+import type { Ground, Vec3 } from "../core/types.ts";
 import { type CurvePoint, levelCurve, profileCurve } from "../doc/strokes.ts";
 import { MAX_POINTS_PER_APPEND, type Op, type Stroke } from "../generated/contract.ts";
 
@@ -13,6 +13,16 @@ const MOST_POINTS_IN_SET = 1024;
 export function metres(p: Vec3): Triple {
   const r = (v: number): number => Math.round(v * 1000) / 1000;
   return [r(p[0]), r(p[1]), r(p[2])];
+}
+
+/** Height without synthesised detail: strokes constrain the solved ground, and detail is added to it. */
+export function solvedHeight(ground: Ground, x: number, y: number): number {
+  return ground.solvedAt?.(x, y) ?? ground.heightAt(x, y);
+}
+
+/** A point on the ground as it is drawn, as an anchor: lowered by the detail there. */
+export function anchorOn(ground: Ground, p: Vec3): Triple {
+  return metres([p[0], p[1], p[2] - ground.heightAt(p[0], p[1]) + solvedHeight(ground, p[0], p[1])]);
 }
 
 /** Curve coordinates to 10⁻⁷ of the frame and a millimetre. */

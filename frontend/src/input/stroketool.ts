@@ -8,11 +8,12 @@ import type { Camera } from "../core/camera.ts";
 import type { GhostVisual, Ground, Rgba } from "../core/types.ts";
 import type { SyncDoc } from "../doc/sync.ts";
 import { MAX_POINTS_PER_STROKE, type Op, type Stroke, TICK_MS } from "../generated/contract.ts";
-import { type DrawToolId, pressed, type ToolDefaults } from "./defaults.ts";
+import { type PenToolId, pressed, type ToolDefaults } from "./defaults.ts";
 import { LevelSketch, RidgeSketch } from "./levelsketch.ts";
+import { BrushSketch, dabShape, NO_SECTION, pressedPaint } from "./painttool.ts";
 import { ProfileSketch } from "./profilesketch.ts";
 import { meanPressure, type Sample, type Sketch, type SketchShape, type SketchStart } from "./sketch.ts";
-import { appendOps, frameCurve, metres } from "./strokeops.ts";
+import { anchorOn, appendOps, frameCurve, metres, type Triple } from "./strokeops.ts";
 
 /** Samples of the line under the pen in device pixels, for an ink overlay; `predicted` is never part of the stroke. */
 export interface InkVisual {
@@ -39,10 +40,11 @@ const FINAL_POINTS = Math.min(2048, MAX_POINTS_PER_STROKE);
 /** Looking down more steeply than this, a vertical plane is seen edge-on. */
 const STEEP = Math.sin((78 * Math.PI) / 180);
 
-const COLOURS: Readonly<Record<DrawToolId, Rgba>> = {
+const COLOURS: Readonly<Record<PenToolId, Rgba>> = {
   mountain: [0.25, 0.5, 0.95, 1],
   crevice: [0.2, 0.65, 0.8, 1],
   plateau: [0.95, 0.4, 0.3, 1],
+  paint: [0.95, 0.95, 0.98, 1],
 };
 
 /** A stroke that has just been drawn. */
@@ -53,7 +55,10 @@ export interface FinishedStroke {
 }
 
 interface Session {
-  readonly tool: DrawToolId;
+  readonly tool: PenToolId;
+  readonly start: SketchStart;
+  /** The brush does the opposite of what it is set to. */
+  readonly opposite: boolean;
   readonly ground: Ground;
   readonly sketch: Sketch & { readonly samples: readonly Sample[] };
   readonly id: string;
@@ -93,8 +98,8 @@ export class StrokeTool {
     return this.#session !== null;
   }
 
-  /** Puts the pen down. False when the ray misses the ground: there is nothing to draw on. */
-  start(tool: DrawToolId, sample: Sample, pen: boolean): boolean {
+  /** Puts the pen down; `opposite`: a brush takes away what it would add. False when the ray misses the ground: there is nothing to draw on. */
+  start(tool: PenToolId, sample: Sample, pen: boolean, opposite = false): boolean {
     const ground = this.#o.freeze();
     const hit = ground.raycast(sample.ray);
     if (hit === null) return false;
@@ -102,7 +107,8 @@ export class StrokeTool {
     const start: SketchStart = { camera: this.#o.camera, ground, hit, sample, nowMs };
     const id = this.newId();
     const sketch = sketchFor(tool, start);
-    this.#session = { tool, ground, sketch, id, gesture: `draw-${id}`, pen, begun: false, sentAt: -Infinity };
+    const gesture = `draw-${id}`;
+    this.#session = { tool, start, opposite, ground, sketch, id, gesture, pen, begun: false, sentAt: -Infinity };
     return true;
   }
 
@@ -145,6 +151,21 @@ export class StrokeTool {
     return done ? { id: session.id, flush } : null;
   }
 
+  /** A touch without a line: a brush leaves a dab, other tools nothing. Returns what was made. */
+  touch(): FinishedStroke | null {
+    const session = this.#session;
+    if (session?.tool !== "paint") {
+      this.cancel();
+      return null;
+    }
+    const shape = dabShape(session.start, this.#o.defaults.paint.value.radius_m);
+    this.#begin(session, shape);
+    if (this.#session === null || !this.#submitCurve(session, shape)) return null;
+    if (!this.#submit(session, { type: "stroke.finish", stroke: session.id })) return null;
+    this.#clear();
+    return { id: session.id, flush: false };
+  }
+
   /** Gives the stroke up: whatever of it was submitted is deleted again. */
   cancel(): void {
     const session = this.#session;
@@ -153,19 +174,17 @@ export class StrokeTool {
       this.#o.doc.submit({ type: "stroke.delete", stroke: session.id }, session.gesture);
   }
 
-  #begin(session: Session): void {
+  #begin(session: Session, shape = session.sketch.shape(this.#o.now(), false, LIVE_POINTS)): void {
     session.begun = true;
-    const shape = session.sketch.shape(this.#o.now(), false, LIVE_POINTS);
-    const style = this.#style(session);
+    const [first, last] = anchors(session, shape);
     const stroke: Stroke = {
       id: session.id,
       author: this.#o.author(),
-      kind: session.tool === "plateau" ? "level" : "profile",
-      first: metres(shape.first),
-      last: metres(shape.last),
+      kind: KINDS[session.tool],
+      first,
+      last,
       curve: [],
-      ...style,
-      paint: null,
+      ...this.#style(session),
       locked: false,
       hidden: false,
       label: "",
@@ -174,10 +193,17 @@ export class StrokeTool {
     this.#submit(session, { type: "stroke.begin", stroke });
   }
 
-  #style(session: Session): Pick<Stroke, "left" | "right" | "plateau_radius_m" | "amplitude_m" | "roughness"> {
-    const base = this.#o.defaults[session.tool].value;
-    if (!session.pen || this.#o.defaults.pressure.value === "none") return base;
-    return pressed(base, meanPressure(session.sketch.samples));
+  /** What the tool's defaults make of the stroke, and the pen's pressure of those. */
+  #style(session: Session): Style {
+    const { defaults } = this.#o;
+    const pressure = session.pen && defaults.pressure.value !== "none" ? meanPressure(session.sketch.samples) : null;
+    if (session.tool !== "paint") {
+      const base = defaults[session.tool].value;
+      return { ...(pressure === null ? base : pressed(base, pressure)), paint: null };
+    }
+    const base = defaults.paint.value;
+    const paint = pressure === null ? base : pressedPaint(base, pressure);
+    return { ...NO_SECTION, paint: session.opposite ? { ...paint, value: -paint.value } : paint };
   }
 
   /** Submits now if the last time is long enough ago, else when it is; goes on while the plane still turns. */
@@ -196,17 +222,21 @@ export class StrokeTool {
   }
 
   #submitShape(session: Session, exact: boolean): void {
-    session.sentAt = this.#o.now();
-    const shape = session.sketch.shape(session.sentAt, exact, exact ? FINAL_POINTS : LIVE_POINTS);
-    const kind = session.tool === "plateau" ? "level" : "profile";
-    const last = metres(shape.last);
-    const curve = frameCurve(kind, shape.points, metres(shape.first), last);
-    for (const op of appendOps(session.id, curve, last)) if (!this.#submit(session, op)) return;
+    const shape = session.sketch.shape(this.#o.now(), exact, exact ? FINAL_POINTS : LIVE_POINTS);
+    if (!this.#submitCurve(session, shape)) return;
     if (exact && session.pen && this.#o.defaults.pressure.value !== "none") {
-      const { left, right } = this.#style(session);
-      this.#submit(session, { type: "stroke.set", stroke: session.id, fields: { left, right } });
+      const { left, right, paint } = this.#style(session);
+      const fields = paint === null ? { left, right } : { paint };
+      this.#submit(session, { type: "stroke.set", stroke: session.id, fields });
     }
     this.#ghost.value = exact ? null : this.#ghostOf(session, shape);
+  }
+
+  /** The curve is that of the line as drawn; its frame stands on the solved ground. */
+  #submitCurve(session: Session, shape: SketchShape): boolean {
+    session.sentAt = this.#o.now();
+    const curve = frameCurve(KINDS[session.tool], shape.points, metres(shape.first), metres(shape.last));
+    return appendOps(session.id, curve, anchors(session, shape)[1]).every((op) => this.#submit(session, op));
   }
 
   /** False when the op was refused: then the stroke is gone and the person knows why. */
@@ -218,9 +248,11 @@ export class StrokeTool {
     return false;
   }
 
-  #ghostOf(session: Session, shape: SketchShape): GhostVisual {
+  #ghostOf(session: Session, shape: SketchShape): GhostVisual | null {
+    const corners = session.sketch.corners(shape);
+    if (corners === null) return null;
     return {
-      corners: session.sketch.corners(shape),
+      corners,
       shadow: shadowOf(shape.points, session.ground),
       colour: COLOURS[session.tool],
     };
@@ -236,8 +268,26 @@ export class StrokeTool {
   }
 }
 
-function sketchFor(tool: DrawToolId, start: SketchStart): Sketch & { readonly samples: readonly Sample[] } {
+type Style = Pick<Stroke, "left" | "right" | "plateau_radius_m" | "amplitude_m" | "roughness" | "paint">;
+
+const KINDS: Readonly<Record<PenToolId, Stroke["kind"]>> = {
+  mountain: "profile",
+  crevice: "profile",
+  plateau: "level",
+  paint: "paint",
+};
+
+/** First and last anchor of a shape. The ground was drawn with its detail, which comes on top of what a stroke makes. */
+function anchors({ tool, ground }: Session, shape: SketchShape): [Triple, Triple] {
+  const first = anchorOn(ground, shape.first);
+  const last = anchorOn(ground, shape.last);
+  if (tool === "plateau") last[2] = first[2];
+  return [first, last];
+}
+
+function sketchFor(tool: PenToolId, start: SketchStart): Sketch & { readonly samples: readonly Sample[] } {
   if (tool === "plateau") return new LevelSketch(start);
+  if (tool === "paint") return new BrushSketch(start);
   const sense = tool === "mountain" ? "up" : "down";
   const edgeOn = start.camera.state.value.mode === "map" || Math.abs(start.sample.ray.dir[2]) > STEEP;
   return edgeOn ? new RidgeSketch(start, sense) : new ProfileSketch(start, sense);

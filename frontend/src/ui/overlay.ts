@@ -1,7 +1,8 @@
 import { css, html, nothing, svg, type TemplateResult } from "lit";
 import { getStroke } from "perfect-freehand";
-import type { Vec3 } from "../core/types.ts";
+import type { Ground, Vec3 } from "../core/types.ts";
 import type { HandleVisual } from "../input/controller.ts";
+import { SUBSTANCES } from "./paints.ts";
 import { memberName } from "./people.ts";
 import { cursorOf } from "./scene.ts";
 import { SignalElement } from "./signal-element.ts";
@@ -26,6 +27,19 @@ export class EskOverlay extends SignalElement {
         inset: 0;
         width: 100%;
         height: 100%;
+      }
+      .rim {
+        fill: rgb(255 255 255 / 7%);
+        stroke-width: 2;
+        stroke-linejoin: round;
+      }
+      .rim.under {
+        fill: none;
+        stroke: rgb(12 18 24 / 55%);
+        stroke-width: 4;
+      }
+      .rim.less {
+        stroke-dasharray: 7 6;
       }
       .ink {
         opacity: 0.55;
@@ -92,9 +106,24 @@ export class EskOverlay extends SignalElement {
   protected override render(): TemplateResult {
     this.stage.camera.state.value;
     return html`
-      <svg aria-hidden="true">${this.#ink()} ${this.stage.input.handles.value.map((h) => this.#handle(h))}</svg>
+      <svg aria-hidden="true">${this.#brush()} ${this.#ink()} ${this.stage.input.handles.value.map((h) => this.#handle(h))}</svg>
       ${this.#cursors()}
     `;
+  }
+
+  /** The rim of the brush on the ground, dashed where it takes away. */
+  #brush(): TemplateResult | typeof nothing {
+    const { cursor, defaults, input, shown, session } = this.stage;
+    const at = cursor.value;
+    if (input.tool.value !== "paint" || at === null || !session.canEdit.value) return nothing;
+    const { channel, radius_m, value } = defaults.paint.value;
+    const points = brushRim(at, radius_m, shown.ground).map((p) => this.stage.camera.project(p));
+    if (points.some((p) => p.depth <= 0) && this.stage.camera.state.value.mode !== "map") return nothing;
+    const path = points.map((p) => `${(p.x / this.#ratio).toFixed(1)} ${(p.y / this.#ratio).toFixed(1)}`).join(" L");
+    return svg`
+      <path class="rim under" d=${`M${path} Z`}></path>
+      <path class="rim ${value < 0 ? "less" : ""}" stroke=${SUBSTANCES[channel].colour} d=${`M${path} Z`}></path>
+    ` as unknown as TemplateResult;
   }
 
   /** The line under the pen itself: it is there before the ground has answered. */
@@ -138,10 +167,22 @@ export class EskOverlay extends SignalElement {
   }
 }
 
+const RIM_POINTS = 64;
+
+/** Points on the ground all round a place, `radiusM` metres away on the map. */
+export function brushRim([x, y]: Vec3, radiusM: number, ground: Ground): Vec3[] {
+  return Array.from({ length: RIM_POINTS }, (_, k) => {
+    const angle = (k / RIM_POINTS) * 2 * Math.PI;
+    const [px, py] = [x + radiusM * Math.cos(angle), y + radiusM * Math.sin(angle)];
+    return [px, py, ground.heightAt(px, py, radiusM / 8)];
+  });
+}
+
 /** What each handle does, drawn on it: up and down, in and out, all ways. */
 const GLYPHS: Readonly<Partial<Record<HandleVisual["kind"], unknown>>> = {
   crest: svg`<path class="glyph" d="M0-3.5v7M-2-1.800 0-3.800 2-1.800M-2 1.800 0 3.800 2 1.800"></path>`,
   move: svg`<path class="glyph" d="M-3.500 0h7M0-3.500v7"></path>`,
+  radius: svg`<path class="glyph" d="M-3 0h6M-1.500-2-3.500 0l2 2M1.500-2l2 2-2 2"></path>`,
   left: svg`<path class="glyph" d="M-3 0h6M-1.500-2-3.500 0l2 2M1.500-2l2 2-2 2"></path>`,
   right: svg`<path class="glyph" d="M-3 0h6M-1.500-2-3.500 0l2 2M1.500-2l2 2-2 2"></path>`,
 };

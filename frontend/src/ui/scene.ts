@@ -1,10 +1,11 @@
 /** From the document and the people to what one frame shows. Pure apart from a cache keyed by immutable strokes. */
 
-import type { CursorVisual, StrokeVisual, Vec3 } from "../core/types.ts";
+import type { CursorVisual, Ground, StrokeVisual, Vec3 } from "../core/types.ts";
 import type { Doc } from "../doc/document.ts";
 import { worldPoints } from "../doc/strokes.ts";
 import type { Member, MemberPresence, Stroke } from "../generated/contract.ts";
-import { hexColour, lighten, strokeColour, withAlpha } from "./styles/colours.ts";
+import { drapedOf } from "../input/picking.ts";
+import { hexColour, lighten, paintColour, strokeColour, withAlpha } from "./styles/colours.ts";
 
 interface Shape {
   readonly points: Float32Array;
@@ -23,13 +24,13 @@ export function shapeOf(stroke: Stroke): Shape {
 }
 
 function meanHeight(stroke: Stroke): number {
-  if (stroke.kind === "level" || stroke.curve.length === 0) return 0;
+  if (stroke.kind !== "profile" || stroke.curve.length === 0) return 0;
   return stroke.curve.reduce((sum, point) => sum + point[1], 0) / stroke.curve.length;
 }
 
 /** Greatest height of the crest over (or, negative, under) the line between the anchors, metres. */
 export function reliefOf(stroke: Stroke): number {
-  if (stroke.kind === "level") return 0;
+  if (stroke.kind !== "profile") return 0;
   return stroke.curve.reduce((peak, point) => (Math.abs(point[1]) > Math.abs(peak) ? point[1] : peak), 0);
 }
 
@@ -41,14 +42,31 @@ export interface People {
   readonly myColour: string;
 }
 
+/** Lines of paint on the ground, for as long as neither stroke nor ground changes: renderers know lines by their array. */
+const painted = new WeakMap<
+  Stroke,
+  { readonly ground: Ground; readonly near: boolean; readonly points: Float32Array }
+>();
+
+/** The line of a paint stroke: on the ground with its detail where one looks at it, else on the solved one, which is cheap. */
+function paintedLine(stroke: Stroke, ground: Ground, near: boolean): Float32Array {
+  const known = painted.get(stroke);
+  if (known?.ground === ground && known.near === near) return known.points;
+  const line = drapedOf(stroke, ground).points;
+  const points = new Float32Array(line);
+  if (near) for (let i = 0; i < points.length; i += 3) points[i + 2] = ground.heightAt(line[i]!, line[i + 1]!);
+  painted.set(stroke, { ground, near, points });
+  return points;
+}
+
 /** How strongly finished strokes show that nobody points at: the land comes first. */
 const CALM_ALPHA = { select: 0.35, draw: 0.18 } as const;
 /** Share of the domain's size by which a line may leave it and still be seen. */
 const OUTSIDE = 0.02;
 
 export interface Marks {
-  /** In the select tool one looks for strokes, so they show more. */
-  readonly selecting: boolean;
+  /** In the select tool one looks for strokes, so they show more; lines of paint show with the brush only. */
+  readonly tool: "select" | "paint" | "draw";
   readonly selection: string | null;
   readonly hovered: string | null;
   /** The stroke that I am drawing. */
@@ -86,19 +104,26 @@ export function insidePoints(points: Float32Array, sizeM: number): Float32Array 
  * The strokes to draw. Hidden ones show only while selected; the one under way wears its author's colour; finished ones
  * that are neither selected nor pointed at step back behind the land.
  */
-export function strokeVisuals(doc: Doc, marks: Marks, people: People): StrokeVisual[] {
+export function strokeVisuals(doc: Doc, marks: Marks, people: People, ground: Ground): StrokeVisual[] {
   const live = liveColours(people, marks.drawing);
   const out: StrokeVisual[] = [];
   for (const stroke of doc.strokes.values()) {
     const selected = stroke.id === marks.selection;
-    const { points: all, sinks } = shapeOf(stroke);
-    const points = insidePoints(all, doc.settings.size_m);
-    if (points.length < 6 || (stroke.hidden && !selected)) continue;
+    if (stroke.curve.length < 2 || (stroke.hidden && !selected)) continue;
     const author = live.get(stroke.id);
     const hovered = stroke.id === marks.hovered;
-    const base = author ? hexColour(author) : strokeColour(stroke.kind, sinks);
     const calm = stroke.finished && !selected && !hovered && !author;
-    const alpha = calm ? CALM_ALPHA[marks.selecting ? "select" : "draw"] : 1;
+    if (stroke.paint !== null && calm && marks.tool !== "paint") continue;
+    const { points: straight, sinks } = shapeOf(stroke);
+    const all = stroke.paint === null ? straight : paintedLine(stroke, ground, !calm);
+    const points = insidePoints(all, doc.settings.size_m);
+    if (points.length < 6) continue;
+    const base = author
+      ? hexColour(author)
+      : stroke.paint
+        ? paintColour(stroke.paint)
+        : strokeColour(stroke.kind, sinks);
+    const alpha = calm ? calmAlpha(marks.tool, stroke) : 1;
     out.push({
       id: stroke.id,
       kind: stroke.kind,
@@ -110,6 +135,11 @@ export function strokeVisuals(doc: Doc, marks: Marks, people: People): StrokeVis
     });
   }
   return out;
+}
+
+function calmAlpha(tool: Marks["tool"], stroke: Stroke): number {
+  const looked = tool === "paint" ? stroke.paint !== null : tool === "select";
+  return CALM_ALPHA[looked ? "select" : "draw"];
 }
 
 /** Rings on the ground where the others point. */

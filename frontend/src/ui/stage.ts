@@ -2,13 +2,24 @@
 
 import { computed, effect, type ReadonlySignal, signal } from "@preact/signals-core";
 import { Camera } from "../core/camera.ts";
-import type { ChannelGrid, CursorVisual, DecodedFrame, FrameStats, Scene, StrokeVisual, Vec3 } from "../core/types.ts";
+import type {
+  ChannelGrid,
+  CursorVisual,
+  DecodedFrame,
+  FrameStats,
+  Ground,
+  Scene,
+  StrokeVisual,
+  Vec3,
+} from "../core/types.ts";
+import type { Doc } from "../doc/document.ts";
 import { strokeInfluence } from "../doc/influence.ts";
 import type { MemberPresence } from "../generated/contract.ts";
 import { Channel, MAX_REFINED_TILES } from "../generated/contract.ts";
 import { InputController } from "../input/controller.ts";
 import { type ToolDefaults, toolDefaults } from "../input/defaults.ts";
 import { ChannelStore } from "../tiles/channels.ts";
+import { ShownTerrain } from "../tiles/shownterrain.ts";
 import { TileStore } from "../tiles/store.ts";
 import { FrameLoop } from "./frame-loop.ts";
 import { FreshTiles } from "./fresh-tiles.ts";
@@ -37,6 +48,8 @@ export class Stage {
   readonly camera: Camera;
   readonly tiles: TileStore;
   readonly channels: ChannelStore;
+  /** The ground as it is drawn: solved heights with synthesised detail. */
+  readonly shown: ShownTerrain;
   readonly input: InputController;
   readonly defaults: ToolDefaults;
   readonly loop: FrameLoop;
@@ -54,6 +67,8 @@ export class Stage {
   readonly #influence: ReadonlySignal<ChannelGrid | null>;
   readonly #calm = window.matchMedia("(prefers-reduced-motion: reduce)");
   readonly #stops: (() => void)[] = [];
+  /** What the eye may not dip under. */
+  readonly #floor: Ground;
   #fresh: FreshTiles | null = null;
   #disposed = false;
 
@@ -66,6 +81,11 @@ export class Stage {
     this.camera = new Camera(sizeM);
     this.tiles = new TileStore(sizeM, finest, levels);
     this.channels = new ChannelStore(sizeM);
+    this.shown = new ShownTerrain(this.tiles, this.channels, () => session.doc.doc.peek()?.settings ?? null);
+    this.#floor = {
+      ...this.shown.ground,
+      heightAt: (x, y) => this.shown.floorUnder(x, y, this.camera.state.peek().eye[2]),
+    };
     this.defaults = toolDefaults(sizeM);
     this.loop = new FrameLoop((dt, time) => this.#draw(dt, time));
     this.quality = new QualityChoice(session.store);
@@ -79,8 +99,8 @@ export class Stage {
       canvas: viewport,
       camera: this.camera,
       doc: session.doc,
-      ground: () => this.tiles.ground,
-      freeze: () => this.tiles.freeze(),
+      ground: () => this.shown.ground,
+      freeze: () => this.shown.freeze(),
       clientId: session.client,
       canEdit: () => session.canEdit.value,
       defaults: this.defaults,
@@ -104,12 +124,14 @@ export class Stage {
     const doc = this.session.doc.doc.value;
     const { selection, hovered, drawing, tool } = this.input;
     const marks = {
-      selecting: tool.value === "select",
+      tool: tool.value === "select" || tool.value === "paint" ? tool.value : ("draw" as const),
       selection: selection.value,
       hovered: hovered.value,
       drawing: drawing.value,
     };
-    return doc ? strokeVisuals(doc, marks, this.session.people.value) : [];
+    // Lines of paint lie on the ground and move with it.
+    if (hasPaint(doc)) this.tiles.revision.value;
+    return doc ? strokeVisuals(doc, marks, this.session.people.value, this.shown.freeze()) : [];
   }
 
   /** Finds a renderer and starts drawing. */
@@ -141,6 +163,7 @@ export class Stage {
     this.#fresh?.stop();
     this.#fresh = new FreshTiles(this.tiles, () => {
       this.#fresh = null;
+      this.channels.renewed();
     });
   }
 
@@ -244,7 +267,7 @@ export class Stage {
   }
 
   #draw(dtS: number, timeS: number): boolean {
-    const moving = this.camera.update(dtS, this.tiles.ground);
+    const moving = this.camera.update(dtS, this.#floor);
     const doc = this.session.doc.doc.value;
     const { renderer } = this.graphics;
     const quality = this.quality.mode.peek();
@@ -267,6 +290,11 @@ export class Stage {
     this.stats.value = stats;
     return moving || stats.busy;
   }
+}
+
+function hasPaint(doc: Doc | null): boolean {
+  for (const stroke of doc?.strokes.values() ?? []) if (stroke.paint !== null) return true;
+  return false;
 }
 
 /** Takes the focus from whatever field has it, through shadow roots. */

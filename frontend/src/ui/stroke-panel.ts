@@ -1,9 +1,12 @@
 import { html, nothing, type TemplateResult } from "lit";
-import type { Stroke } from "../generated/contract.ts";
+import type { Paint, Stroke, StrokeFields } from "../generated/contract.ts";
 import type { DrawToolId } from "../input/defaults.ts";
 import type { DetailChange } from "./detail-form.ts";
 import "./detail-form.ts";
 import { icon } from "./icons.ts";
+import type { PaintChange } from "./paint-form.ts";
+import "./paint-form.ts";
+import { paintName, SUBSTANCES } from "./paints.ts";
 import { reliefOf, shapeOf } from "./scene.ts";
 import type { SectionChange } from "./section-form.ts";
 import "./section-form.ts";
@@ -16,8 +19,17 @@ const LISTED = 200;
 
 /** What a stroke is, in a word. */
 export function kindWord(stroke: Stroke): string {
+  if (stroke.paint !== null) return paintName(stroke.paint);
   if (stroke.kind === "level") return "Plateau";
   return shapeOf(stroke).sinks ? "Crevice" : "Mountain";
+}
+
+/** The dot before a stroke's name. */
+function swatch(stroke: Stroke): TemplateResult {
+  if (stroke.paint !== null)
+    return html`<span class="swatch paint" style=${`background:${SUBSTANCES[stroke.paint.channel].colour}`}></span>`;
+  const tone = stroke.kind === "level" ? "plateau" : shapeOf(stroke).sinks ? "crevice" : "mountain";
+  return html`<span class="swatch ${tone}"></span>`;
 }
 
 /** The inspector: the selected stroke, else what the drawing tool will make, else the list of strokes. */
@@ -40,23 +52,23 @@ export class EskStrokePanel extends SignalElement {
     const stroke = doc?.strokes.get(input.selection.value ?? "");
     if (stroke) return this.#selected(stroke);
     const tool = input.tool.value;
-    if (tool !== "select" && session.canEdit.value) return this.#defaults(tool);
+    if (tool === "paint" && session.canEdit.value) return this.#brush();
+    if (tool !== "select" && tool !== "paint" && session.canEdit.value) return this.#defaults(tool);
     return this.#list([...(doc?.strokes.values() ?? [])]);
   }
 
-  #set(stroke: Stroke, change: SectionChange | DetailChange): void {
+  #set(stroke: Stroke, fields: StrokeFields, settled: boolean): void {
     this.#gesture ??= this.stage.session.newGesture();
-    this.stage.session.setStroke(stroke.id, change.fields, this.#gesture);
-    if (change.settled) this.#gesture = null;
+    this.stage.session.setStroke(stroke.id, fields, this.#gesture);
+    if (settled) this.#gesture = null;
   }
 
   #selected(stroke: Stroke): TemplateResult {
-    const { session, sizeM } = this.stage;
+    const { session } = this.stage;
     const disabled = !session.canEdit.value || stroke.locked;
-    const up = !shapeOf(stroke).sinks;
     return html`
       <div class="title">
-        <span class="swatch ${stroke.kind === "level" ? "plateau" : up ? "mountain" : "crevice"}"></span>
+        ${swatch(stroke)}
         <input
           class="field name"
           aria-label="Name of the stroke"
@@ -70,6 +82,39 @@ export class EskStrokePanel extends SignalElement {
       </div>
       ${this.#buttons(stroke, disabled)}
       ${stroke.locked ? html`<p class="note">${icon("lock")} Locked. Unlock it to change it.</p>` : nothing}
+      ${stroke.paint === null ? this.#section(stroke, disabled) : this.#paint(stroke, stroke.paint, disabled)}
+      ${stroke.author ? html`<p class="quiet small">Drawn by ${stroke.author}</p>` : nothing}
+    `;
+  }
+
+  #paint(stroke: Stroke, paint: Paint, disabled: boolean): TemplateResult {
+    return html`<esk-paint-form
+      .paint=${paint}
+      .sizeM=${this.stage.sizeM}
+      ?disabled=${disabled}
+      @change=${(e: CustomEvent<PaintChange>) => this.#set(stroke, { paint: e.detail.paint }, e.detail.settled)}
+    ></esk-paint-form>`;
+  }
+
+  /** What the brush will paint. */
+  #brush(): TemplateResult {
+    const { defaults, sizeM } = this.stage;
+    return html`
+      <p class="lead">Draw on the ground to paint. Alt, or the other end of a pen, does the opposite.</p>
+      <esk-paint-form
+        .paint=${defaults.paint.value}
+        .sizeM=${sizeM}
+        @change=${(e: CustomEvent<PaintChange>) => {
+          defaults.paint.value = e.detail.paint;
+        }}
+      ></esk-paint-form>
+    `;
+  }
+
+  #section(stroke: Stroke, disabled: boolean): TemplateResult {
+    const { sizeM } = this.stage;
+    const up = !shapeOf(stroke).sinks;
+    return html`
       <esk-section-form
         style=${stroke.kind === "level" ? "--land: var(--esk-plateau)" : ""}
         .fields=${{ left: stroke.left, right: stroke.right, plateau_radius_m: stroke.plateau_radius_m }}
@@ -77,15 +122,14 @@ export class EskStrokePanel extends SignalElement {
         .sizeM=${sizeM}
         .sense=${up ? "up" : "down"}
         ?disabled=${disabled}
-        @change=${(e: CustomEvent<SectionChange>) => this.#set(stroke, e.detail)}
+        @change=${(e: CustomEvent<SectionChange>) => this.#set(stroke, e.detail.fields, e.detail.settled)}
       ></esk-section-form>
       <esk-detail-form
         .fields=${{ amplitude_m: stroke.amplitude_m, roughness: stroke.roughness }}
         .sizeM=${sizeM}
         ?disabled=${disabled}
-        @change=${(e: CustomEvent<DetailChange>) => this.#set(stroke, e.detail)}
+        @change=${(e: CustomEvent<DetailChange>) => this.#set(stroke, e.detail.fields, e.detail.settled)}
       ></esk-detail-form>
-      ${stroke.author ? html`<p class="quiet small">Drawn by ${stroke.author}</p>` : nothing}
     `;
   }
 
@@ -102,9 +146,13 @@ export class EskStrokePanel extends SignalElement {
       <div class="row" role="toolbar" aria-label="Stroke">
         ${iconButton("frame", "Look at it", true, false, () => input.actions.get("frame-selection")?.run())}
         ${iconButton("copy", "Duplicate", edit, false, () => input.actions.get("duplicate")?.run())}
-        ${iconButton("swap", "Swap left and right", !disabled, false, () =>
-          session.setStroke(stroke.id, { left: stroke.right, right: stroke.left }),
-        )}
+        ${
+          stroke.paint !== null
+            ? nothing
+            : iconButton("swap", "Swap left and right", !disabled, false, () =>
+                session.setStroke(stroke.id, { left: stroke.right, right: stroke.left }),
+              )
+        }
         ${iconButton(
           stroke.hidden ? "eye-slash" : "eye",
           stroke.hidden ? "Show" : "Hide",
@@ -169,11 +217,10 @@ export class EskStrokePanel extends SignalElement {
   }
 
   #item(stroke: Stroke): TemplateResult {
-    const tone = stroke.kind === "level" ? "plateau" : shapeOf(stroke).sinks ? "crevice" : "mountain";
     return html`
       <li>
         <button class="btn item" @click=${() => this.#select(stroke.id)}>
-          <span class="swatch ${tone}"></span>
+          ${swatch(stroke)}
           <span class="label">${stroke.label || kindWord(stroke)}</span>
           ${stroke.hidden ? icon("eye-slash") : nothing} ${stroke.locked ? icon("lock") : nothing}
         </button>

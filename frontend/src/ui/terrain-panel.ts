@@ -1,8 +1,8 @@
 import "@awesome.me/webawesome/dist/components/switch/switch.js";
 import { html, nothing, type TemplateResult } from "lit";
 import { live } from "lit/directives/live.js";
-import type { Border, Look, TerrainFields, TerrainSettings } from "../generated/contract.ts";
-import { DEFAULT_REACH_FRACTION } from "../generated/contract.ts";
+import type { Border, Look, Rule, TerrainFields, TerrainSettings } from "../generated/contract.ts";
+import { DEFAULT_REACH_FRACTION, MAX_DETAIL } from "../generated/contract.ts";
 import "./range-field.ts";
 import "./segmented.ts";
 import { SignalElement } from "./signal-element.ts";
@@ -29,7 +29,34 @@ const BORDER_WORDS: Readonly<Record<Border, string>> = {
   pinned: "The ground at the border of the terrain stays at height zero.",
 };
 
-/** Settings of the whole terrain: look, sun, sea, and how far strokes reach. */
+const RULES = [
+  {
+    value: "landscape",
+    label: "Landscape",
+    title: "Crags and meadows that know slope and height, down to a centimetre",
+  },
+  { value: "smooth", label: "Smooth", title: "Soft ground without noise" },
+  { value: "plain", label: "Plain", title: "The strokes' own ground, nothing added" },
+];
+
+const RULE_WORDS: Readonly<Record<Rule, string>> = {
+  landscape: "Rough on steep faces, calm in valleys, on down to a centimetre.",
+  smooth: "No noise; ground between the solved samples is a soft curve.",
+  plain: "What the strokes make, and nothing else.",
+};
+
+/** What a strength of the detail looks like. */
+export function detailWords(detail: number): string {
+  if (detail === 0) return "None: only strokes with an amplitude of their own are broken.";
+  if (detail < 0.7) return "Gentle: old, worn hills.";
+  if (detail <= 1.4) return "Natural.";
+  if (detail <= 2.5) return "Rugged: broken rock, steep gullies.";
+  return "Wild: the ground bristles.";
+}
+
+const tenth = (v: number): number => Math.round(10 * v) / 10;
+
+/** Settings of the whole terrain: look, detail, sun, sea, and how far strokes reach. */
 export class EskTerrainPanel extends SignalElement {
   static override properties = { stage: { attribute: false } };
   static override styles = [shared, panelStyles];
@@ -58,7 +85,7 @@ export class EskTerrainPanel extends SignalElement {
           @pick=${(e: CustomEvent<Look>) => this.#set({ look: e.detail })}
         ></esk-segmented>
       </div>
-      ${this.#sun(settings, disabled)} ${this.#sea(settings, disabled)} ${this.#reach(settings, disabled)}
+      ${this.#detail(settings, disabled)} ${this.#sun(settings, disabled)} ${this.#sea(settings, disabled)} ${this.#reach(settings, disabled)}
       <div class="group">
         <h3>Border</h3>
         <esk-segmented
@@ -69,6 +96,38 @@ export class EskTerrainPanel extends SignalElement {
           @pick=${(e: CustomEvent<Border>) => this.#set({ border: e.detail })}
         ></esk-segmented>
         <p class="lead">${BORDER_WORDS[settings.border]}</p>
+      </div>
+    `;
+  }
+
+  #detail({ rule, detail }: TerrainSettings, disabled: boolean): TemplateResult {
+    return html`
+      <div class="group">
+        <h3>Detail</h3>
+        <esk-segmented
+          label="Rule of the detail"
+          .segments=${RULES}
+          .value=${rule}
+          ?disabled=${disabled}
+          @pick=${(e: CustomEvent<Rule>) => this.#set({ rule: e.detail })}
+        ></esk-segmented>
+        <p class="lead">${RULE_WORDS[rule]}</p>
+        ${
+          rule === "landscape"
+            ? html`<esk-range
+                  label="Strength"
+                  unit="×"
+                  min="0"
+                  max=${MAX_DETAIL}
+                  step="0.1"
+                  .value=${detail}
+                  ?disabled=${disabled}
+                  @value=${(e: CustomEvent<number>) => this.#set({ detail: tenth(e.detail) }, false)}
+                  @settle=${(e: CustomEvent<number>) => this.#set({ detail: tenth(e.detail) })}
+                ></esk-range>
+                <p class="lead">${detailWords(detail)}</p>`
+            : nothing
+        }
       </div>
     `;
   }

@@ -4,14 +4,21 @@
  */
 
 import type { CameraState, FrameStats } from "../core/types.ts";
-import type { Stroke } from "../generated/contract.ts";
+import type { PaintChannel, Stroke } from "../generated/contract.ts";
+import type { Attributes } from "../tiles/detail.ts";
 import type { TerrainSession } from "./session.ts";
 
 export interface PageView {
   /** Connected, the ground has come and a frame was drawn. */
   ready(): boolean;
-  /** Height in metres of the ground as shown, or null before it has come. */
+  /** Height in metres of the solved ground as shown, without detail, or null before it has come. */
   heightAt(x: number, y: number): number | null;
+  /** Height in metres of the ground as drawn, with synthesised detail down to cells of `cellM` metres. */
+  shownAt(x: number, y: number, cellM?: number): number | null;
+  /** What grows and lies at a place, shares 0..1; null before the ground has come. */
+  attributesAt(x: number, y: number): Attributes | null;
+  /** What strokes ask of a channel at a place: metres of amplitude, roughness 0..1, biases -1..1. */
+  channelAt(channel: PaintChannel, x: number, y: number): number | null;
   /** Level of the finest tile held at a place, -1 before the ground has come. */
   levelAt(x: number, y: number): number;
   /** Noise amplitude in metres and roughness 0..1 that the strokes ask for at a place, or null before they have come. */
@@ -61,6 +68,10 @@ export function installTestHook(session: TerrainSession): () => void {
   const view: PageView = {
     ready: () => session.connection.state.peek() === "online" && (stage()?.tiles.size ?? 0) > 0 && view.frames > 0,
     heightAt: (x, y) => ((stage()?.tiles.size ?? 0) > 0 ? (stage()?.tiles.ground.heightAt(x, y) ?? null) : null),
+    shownAt: (x, y, cellM) =>
+      (stage()?.tiles.size ?? 0) > 0 ? (stage()?.shown.ground.heightAt(x, y, cellM) ?? null) : null,
+    attributesAt: (x, y) => stage()?.shown.attributesAt(x, y) ?? null,
+    channelAt: (channel, x, y) => stage()?.channels.valueAt(channel, x, y) ?? null,
     levelAt: (x, y) => finestLevel(session, x, y),
     amplitudeAt: (x, y) => stage()?.channels.amplitudeAt(x, y) ?? null,
     roughnessAt: (x, y) => stage()?.channels.roughnessAt(x, y) ?? null,

@@ -11,6 +11,7 @@ const TOOLS: readonly { readonly id: ToolId; readonly icon: string; readonly lab
   { id: "mountain", icon: "mountain", label: "Mountain" },
   { id: "crevice", icon: "crevice", label: "Crevice" },
   { id: "plateau", icon: "plateau", label: "Plateau" },
+  { id: "paint", icon: "brush", label: "Paint" },
 ];
 
 /** The tools, then undo and redo. Vertical at the left; a row at the bottom of a narrow window. */
@@ -42,6 +43,10 @@ export class EskTools extends SignalElement {
       .plateau[aria-checked="true"] {
         background: color-mix(in oklab, var(--esk-plateau) 18%, transparent);
         color: var(--esk-plateau);
+      }
+      .paint[aria-checked="true"] {
+        background: color-mix(in oklab, var(--esk-accent) 18%, transparent);
+        color: var(--esk-accent);
       }
       .icon-btn {
         font-size: 18px;

@@ -6,11 +6,12 @@ import type { Camera } from "../../src/core/camera.ts";
 import { distance } from "../../src/core/math.ts";
 import { SyncDoc } from "../../src/doc/sync.ts";
 import { type Action, type ActionId, createActions, type ToolId } from "../../src/input/actions.ts";
+import { toolDefaults } from "../../src/input/defaults.ts";
 import { actionFor, combination, Keyboard, meantForCanvas } from "../../src/input/keyboard.ts";
 import { Navigation } from "../../src/input/navigation.ts";
 import { createOps } from "../../src/input/strokeops.ts";
 import { EMPTY, ridge } from "../doc/model.ts";
-import { camera, FLAT } from "./scene.ts";
+import { camera, FLAT, SIZE } from "./scene.ts";
 
 let c: Camera;
 let doc: SyncDoc;
@@ -71,10 +72,12 @@ beforeEach(() => {
     camera: c,
     doc,
     ground: () => FLAT,
+    freeze: () => FLAT,
     canEdit: () => editable,
     tool,
     selection,
     fingerDraws,
+    defaults: toolDefaults(SIZE),
     newId: () => `copy${ids++}`,
     onMessage: () => {},
     cancel: () => false,

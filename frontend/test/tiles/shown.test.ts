@@ -177,7 +177,7 @@ function bruteForce(g: Ground, ray: Ray, cellM: number, length: number): Vec3 | 
   const at = (t: number): Vec3 => [0, 1, 2].map((k) => ray.origin[k]! + t * ray.dir[k]!) as unknown as Vec3;
   const over = (p: Vec3): number => p[2] - g.heightAt(p[0], p[1], cellM);
   let last: number | null = null;
-  for (let t = 0; t < length; t += 0.25) {
+  for (let t = 0; t < length; t += 0.4) {
     const p = at(t);
     if (p[0] < 0 || p[1] < 0 || p[0] > SIZE || p[1] > SIZE) {
       if (last !== null) return null;
@@ -225,9 +225,9 @@ describe("raycast", () => {
         expect(reached).toBeLessThan(wanted + 0.3);
         expect(Math.abs(fast![2] - ground.heightAt(fast![0], fast![1], cell))).toBeLessThan(0.3);
       }),
-      { numRuns: 60, seed: 11 },
+      { numRuns: 24, seed: 11 },
     );
-    expect(hits).toBeGreaterThan(40);
+    expect(hits).toBeGreaterThan(15);
   });
 
   test("sees nothing but what a pixel shows: far rays are cheap, near ones meet centimetres", () => {

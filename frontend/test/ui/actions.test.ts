@@ -8,6 +8,7 @@ import { Camera } from "../../src/core/camera.ts";
 import type { Ground } from "../../src/core/types.ts";
 import { SyncDoc } from "../../src/doc/sync.ts";
 import { type Action, createActions, type ToolId } from "../../src/input/actions.ts";
+import { toolDefaults } from "../../src/input/defaults.ts";
 import { keyLabel } from "../../src/ui/keys.ts";
 import { pageActions } from "../../src/ui/page-actions.ts";
 
@@ -26,6 +27,8 @@ function everyAction() {
     camera: new Camera(4096),
     doc: new SyncDoc("me", () => 0),
     ground: () => flat,
+    freeze: () => flat,
+    defaults: toolDefaults(4096),
     canEdit: () => true,
     tool: signal<ToolId>("select"),
     selection: signal<string | null>(null),

@@ -1,5 +1,6 @@
 // SPEC U12
 import { describe, expect, it } from "vitest";
+import type { Ground } from "../../src/core/types.ts";
 import { type Doc, fromDocument, fullStroke } from "../../src/doc/document.ts";
 import type { Member, MemberPresence, Stroke } from "../../src/generated/contract.ts";
 import { cursorVisuals, insidePoints, type People, reliefOf, shapeOf, strokeVisuals } from "../../src/ui/scene.ts";
@@ -34,8 +35,9 @@ const presence = (client: string, change: Partial<MemberPresence> = {}): MemberP
   target: null,
   ...change,
 });
+const flat: Ground = { sizeM: 1000, heightAt: (x) => x / 10, solvedAt: () => 5, raycast: () => null };
 const nobody: People = { members: [], presences: new Map(), me: "me", myColour: "#00ff00" };
-const still = { selecting: false, selection: null, hovered: null, drawing: null };
+const still = { tool: "draw" as const, selection: null, hovered: null, drawing: null };
 
 describe("strokes as they are drawn", () => {
   it("are blue for mountains and crevices, red for plateaus", () => {
@@ -46,7 +48,7 @@ describe("strokes as they are drawn", () => {
         [1, 0],
       ],
     });
-    const [m, c, p] = strokeVisuals(doc(stroke("m"), crevice, stroke("p", { kind: "level" })), still, nobody);
+    const [m, c, p] = strokeVisuals(doc(stroke("m"), crevice, stroke("p", { kind: "level" })), still, nobody, flat);
     expect(m!.colour).toEqual(strokeColour("profile", false));
     expect(c!.colour).toEqual(strokeColour("profile", true));
     for (const blue of [m!, c!]) expect(blue.colour[2]).toBeGreaterThan(blue.colour[0]);
@@ -60,7 +62,12 @@ describe("strokes as they are drawn", () => {
       members: [member("ana", "#ff8000")],
       presences: new Map([["ana", presence("ana", { stroke: "a" })]]),
     };
-    const [a, b, c] = strokeVisuals(doc(stroke("a"), stroke("b"), stroke("c")), { ...still, drawing: "b" }, people);
+    const [a, b, c] = strokeVisuals(
+      doc(stroke("a"), stroke("b"), stroke("c")),
+      { ...still, drawing: "b" },
+      people,
+      flat,
+    );
     expect(a).toMatchObject({ live: true, colour: hexColour("#ff8000") });
     expect(b).toMatchObject({ live: true, colour: hexColour("#00ff00") });
     expect(c!.live).toBe(false);
@@ -76,12 +83,12 @@ describe("strokes as they are drawn", () => {
       ...["calm", "chosen", "under", "live"].map((id) => stroke(id, { finished: true })),
       stroke("begun"),
     );
-    const alphas = (selecting: boolean) =>
-      strokeVisuals(all, { ...still, selecting, selection: "chosen", hovered: "under" }, people).map(
+    const alphas = (tool: "select" | "draw" | "paint") =>
+      strokeVisuals(all, { ...still, tool, selection: "chosen", hovered: "under" }, people, flat).map(
         (s) => s.colour[3],
       );
-    expect(alphas(true)).toEqual([0.35, 1, 1, 1, 1]);
-    expect(alphas(false)).toEqual([0.18, 1, 1, 1, 1]);
+    expect(alphas("select")).toEqual([0.35, 1, 1, 1, 1]);
+    expect(alphas("draw")).toEqual([0.18, 1, 1, 1, 1]);
   });
 
   it("lose what lies outside the domain by more than 2 % of its size", () => {
@@ -90,7 +97,7 @@ describe("strokes as they are drawn", () => {
       last: [1100, 500, 0],
       curve: [-1, 0, 0.07, 0.5, 0.93, 1, 2].map((u) => [u, 0]),
     });
-    const [seen] = strokeVisuals(doc(far), still, nobody);
+    const [seen] = strokeVisuals(doc(far), still, nobody, flat);
     expect([...seen!.points].filter((_, i) => i % 3 === 0).map(Math.round)).toEqual([-16, 500, 1016]);
     const { points } = shapeOf(stroke("s"));
     expect(insidePoints(points, 1000)).toBe(points);
@@ -99,8 +106,8 @@ describe("strokes as they are drawn", () => {
 
   it("are left out while hidden, unless selected, and while they are no line yet", () => {
     const hidden = stroke("h", { hidden: true });
-    expect(strokeVisuals(doc(hidden, stroke("dot", { curve: [[0, 0]] })), still, nobody)).toEqual([]);
-    expect(strokeVisuals(doc(hidden), { ...still, selection: "h" }, nobody)).toMatchObject([
+    expect(strokeVisuals(doc(hidden, stroke("dot", { curve: [[0, 0]] })), still, nobody, flat)).toEqual([]);
+    expect(strokeVisuals(doc(hidden), { ...still, selection: "h" }, nobody, flat)).toMatchObject([
       { id: "h", selected: true },
     ]);
   });

@@ -1,12 +1,20 @@
 /** Stroke and member colours as renderers take them: sRGB components in 0..1. */
 
 import type { Rgba } from "../../core/types.ts";
-import type { StrokeKind } from "../../generated/contract.ts";
+import type { Paint, StrokeKind } from "../../generated/contract.ts";
+import { SUBSTANCES } from "../paints.ts";
 
 /** Paper 0, figure 6: mountains and crevices in blue, plateaus in red. */
 const MOUNTAIN: Rgba = [0.16, 0.42, 0.86, 1];
 const CREVICE: Rgba = [0.05, 0.52, 0.72, 1];
 const PLATEAU: Rgba = [0.83, 0.23, 0.2, 1];
+
+/** The colour of a line of paint: that of its channel, darker where it takes away. */
+export function paintColour({ channel, value }: Paint): Rgba {
+  const [r, g, b] = hexColour(SUBSTANCES[channel].colour);
+  const k = value < 0 ? 0.45 : 1;
+  return [r * k, g * k, b * k, 1];
+}
 
 /** The colour of a finished stroke by what it makes of the land. */
 export function strokeColour(kind: StrokeKind, sinks: boolean): Rgba {

@@ -36,6 +36,10 @@ export const panelStyles = css`
   .swatch.plateau {
     background: var(--esk-plateau);
   }
+  .swatch.paint {
+    border: 1px solid rgb(0 0 0 / 25%);
+    border-radius: 3px;
+  }
   .row {
     display: flex;
     justify-content: space-between;
