@@ -131,8 +131,9 @@ def test_a_solve_gives_out_its_channels() -> None:
         assert all(r.heights.shape == (grid.samples(r.level),) * 2 for r in mine)
         for coarse, fine in itertools.pairwise(mine):
             assert np.array_equal(coarse.heights, fine.heights[::2, ::2])
-    order = [(r.channel == Channel.HEIGHT, r.level, r.settled) for r in results]
-    assert order.index((False, 0, True)) < order.index((True, 3, False)), "before the finest preview"
+    order = [(r.channel, r.level, r.settled) for r in results]
+    preview, final = (order.index((Channel.HEIGHT, 3, settled)) for settled in (False, True))
+    assert order.index((Channel.SNOW, 0, True)) < preview < order.index((Channel.AMPLITUDE, 0, True)) < final
     finest: LevelResult = results[-1]
     assert finest.channel == Channel.HEIGHT
     assert finest.level == 3

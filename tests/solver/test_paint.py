@@ -19,7 +19,7 @@ from esker.solve.assembly import system
 from esker.solve.channels import ChannelSolver, at_base
 from esker.solve.constraints import Packer, WindowPacker, pack
 from esker.solve.device import Device, open_device
-from esker.solve.sayings import PAINTED, Layer
+from esker.solve.sayings import PAINTED, Layer, speakers
 from esker.solve.solver import Solver
 from tests.solver.twins import tile_device
 
@@ -165,9 +165,9 @@ def test_what_did_not_change_is_the_same_array() -> None:
     """SPEC S67: so nobody quantises, compares or sends it again."""
     solver = ChannelSolver(open_device(), LEVEL)
     snow, wet = paint("snow", 1.0), paint("wetness", 1.0)
-    first = dict(solver.pyramids([snow, wet, MOUNTAIN], SETTINGS))
+    first = dict(solver.pyramids(speakers([snow, wet, MOUNTAIN], SETTINGS), SETTINGS))
     moved = MOUNTAIN.model_copy(update={"amplitude_m": 3.0})
-    second = dict(solver.pyramids([snow.model_copy(update={"label": "x"}), moved], SETTINGS))
+    second = dict(solver.pyramids(speakers([snow.model_copy(update={"label": "x"}), moved], SETTINGS), SETTINGS))
     same = {channel for channel in first if all(a is b for a, b in zip(first[channel], second[channel], strict=True))}
     assert same == set(first) - {Channel.AMPLITUDE, Channel.WETNESS}
 
@@ -193,8 +193,10 @@ def test_channels_alone_are_those_of_a_solve() -> None:
     solver = Solver()
     whole = [r for r in solver.steps(strokes, SETTINGS, 3) if r is not None and r.channel != Channel.HEIGHT]
     alone = [r for r in Solver().channels(strokes, SETTINGS, 3) if r is not None]
-    assert [(r.channel, r.level, r.settled) for r in whole] == [(r.channel, r.level, r.settled) for r in alone]
-    assert all(np.array_equal(a.heights, b.heights) for a, b in zip(whole, alone, strict=True))
+    one, other = ({(r.channel, r.level, r.settled): r.heights for r in some} for some in (whole, alone))
+    assert len(whole) == len(one) == len(alone)
+    assert one.keys() == other.keys()
+    assert all(np.array_equal(one[key], other[key]) for key in one)
     with pytest.raises(ValueError, match="level must be"):
         next(iter(solver.channels(strokes, SETTINGS, 7)))
 

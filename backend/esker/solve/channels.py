@@ -1,16 +1,16 @@
 """Amplitude, roughness and what is painted, diffused from the strokes for synthesis to use (DESIGN 5.4).
 
-A channel is made from two layers, each with an equation of its own, solved CHANNEL_LEVELS_BELOW levels below the heights:
-sum_edges (c_j - c_i)^2 + sum_i a_i (c_i - t_i)^2 + eps sum_i (c_i - k_i t_i)^2 for c, the difference from the base, where
-k is how far a sample is known, 0..1. What strokes of the ground say is known on crests and in flank bands, free elsewhere,
-and back at the base a few reaches away. Paint is known under the brush and lies over it: beside the painted value its
-cover is diffused, 1 on its line, and the channel is strokes (1 - cover) + paint. A layer of which nobody asks anything
-costs nothing.
+A channel is made from two layers, each with an equation of its own, solved CHANNEL_LEVELS_BELOW levels below the
+heights: sum_edges (c_j - c_i)^2 + sum_i a_i (c_i - t_i)^2 + eps sum_i (c_i - k_i t_i)^2 for c, the difference from the
+base, where k is how far a sample is known, 0..1. What strokes of the ground say is known on crests and in flank bands,
+free elsewhere, and back at the base a few reaches away. Paint is known under the brush and lies over it: beside the
+painted value its cover is diffused, 1 on its line, and the channel is strokes (1 - cover) + paint. A layer of which
+nobody asks anything costs nothing.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from typing import Protocol
 
@@ -33,7 +33,7 @@ from esker.solve.device import Device
 from esker.solve.faults import finished
 from esker.solve.injection import frozen, injections
 from esker.solve.reference import NumpySystem
-from esker.solve.sayings import BASES, STROKES_SPEAK, Layer, reach_of, spread
+from esker.solve.sayings import BASES, STROKES_SPEAK, Layer, Speakers, reach_of, speakers
 
 TOLERANCES = {
     Channel.AMPLITUDE: 0.25 / AMPLITUDE_QUANTA_PER_M,
@@ -151,13 +151,17 @@ class ChannelSolver:
 
         A pure function of the strokes and the settings. Raises DeviceErrors.
         """
-        for channel, pyramid in self.pyramids(strokes, settings):
+        for channel, pyramid in self.pyramids(speakers(strokes, settings), settings):
             yield channel, pyramid[-1]
 
-    def pyramids(self, strokes: Sequence[Stroke], settings: TerrainSettings) -> Iterator[tuple[Channel, Levels]]:
-        """The same, with levels 0..``level`` of each; what did not change since the last time are the same arrays."""
-        for channel in BASES:
-            ground, paint = (self._diffused(Layer(channel, painted), strokes, settings) for painted in (False, True))
+    def pyramids(
+        self, spoken: Mapping[Layer, Speakers], settings: TerrainSettings, channels: Iterable[Channel] = BASES
+    ) -> Iterator[tuple[Channel, Levels]]:
+        """The same for some channels, with levels 0..``level`` of each; what did not change since the last time are
+        the same arrays. ``spoken``: ``sayings.speakers`` of the strokes."""
+        for channel in channels:
+            layers = (Layer(channel, painted) for painted in (False, True))
+            ground, paint = (self._diffused(layer, spoken.get(layer), settings) for layer in layers)
             made = self._made.get(channel)
             if made is None or made[0] is not ground or made[1] is not paint:
                 made = ground, paint, self._composed(channel, ground, paint)
@@ -172,21 +176,20 @@ class ChannelSolver:
         finest = (0 if paint is None else paint[0]) + over + np.float32(BASES[channel])
         return tuple(injections(frozen(np.asarray(finest, dtype=np.float32))))
 
-    def _diffused(self, layer: Layer, strokes: Sequence[Stroke], settings: TerrainSettings) -> Values | None:
+    def _diffused(self, layer: Layer, said: Speakers | None, settings: TerrainSettings) -> Values | None:
         """A layer as ``LayerWorkspace.read`` gives it, the same array as last time if nothing changed; None at zero."""
         kept = self._layers.pop(layer, None)  # kept again only if nothing fails: half a raster is not to be trusted
-        bounds = spread(strokes, layer, settings)
-        if bounds == (0, 0):
+        if said is None:
             return None
         workspace = new_layer(self._device, self.level, layer) if kept is None else kept[0]
-        changed = workspace.load(strokes, settings.model_copy(update={"reach_m": reach_of(layer, settings)}))
+        changed = workspace.load(said.strokes, settings.model_copy(update={"reach_m": reach_of(layer, settings)}))
         if changed:
             diffuse(workspace.system, TOLERANCES[layer.channel])
-        if kept is None or changed or kept[1] != bounds:
+        if kept is None or changed or kept[1] != said.bounds:
             values = workspace.read()
-            np.clip(values[0], *bounds, out=values[0])
+            np.clip(values[0], *said.bounds, out=values[0])
             np.clip(values[1:], 0, 1, out=values[1:])
-            kept = workspace, bounds, values
+            kept = workspace, said.bounds, values
         self._layers[layer] = kept
         return kept[2]
 

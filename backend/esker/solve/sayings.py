@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 from esker.contract import (
@@ -47,6 +48,9 @@ class Layer(NamedTuple):
     painted: bool
 
 
+GROUND_LAYERS: Final[tuple[Layer, ...]] = tuple(Layer(channel, painted=False) for channel in sorted(STROKES_SPEAK))
+
+
 def says(stroke: Stroke, layer: Layer, settings: TerrainSettings) -> float | None:
     """What a stroke asks of a layer, as a difference from its base, in its unit; None when it says nothing of it.
 
@@ -72,18 +76,39 @@ def natural_amplitude_m(settings: TerrainSettings) -> float:
     return ALPHA * settings.size_m / TILE_CELLS
 
 
-def spread(strokes: Sequence[Stroke], layer: Layer, settings: TerrainSettings) -> tuple[float, float]:
-    """The least and the greatest that anything asks of a layer, 0 included.
+@dataclass
+class Speakers:
+    """The visible strokes that speak of a layer, and the least and the greatest that any of them asks, 0 included."""
 
-    (0, 0): it is 0 everywhere, as a diffused value lies between those that were asked for.
-    """
-    asked = [0.0]
+    strokes: list[Stroke]
+    low: float = 0.0
+    high: float = 0.0
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Between these lies every value of the layer, as a diffused one lies between those that were asked for."""
+        return self.low, self.high
+
+
+def speakers(strokes: Sequence[Stroke], settings: TerrainSettings) -> dict[Layer, Speakers]:
+    """Who speaks of each layer of which anybody asks anything but its base; the others are their base everywhere."""
+    crests: list[Stroke] = []
+    found = {layer: Speakers(crests) for layer in GROUND_LAYERS}
     for stroke in strokes:
-        if not stroke.hidden and stroke.curve:
-            value = says(stroke, layer, settings)
-            if value is not None:
-                asked.append(value)
-    return min(asked), max(asked)
+        if stroke.hidden or not stroke.curve:
+            continue
+        if stroke.paint is None:
+            crests.append(stroke)
+            if stroke.amplitude_m == BASE_AMPLITUDE_M and stroke.roughness == BASE_ROUGHNESS:
+                continue  # most strokes
+            layers = GROUND_LAYERS
+        else:
+            layers = (Layer(PAINTED[stroke.paint.channel], painted=True),)
+            found.setdefault(layers[0], Speakers([])).strokes.append(stroke)
+        for layer in layers:
+            value, mine = says(stroke, layer, settings) or 0.0, found[layer]
+            mine.low, mine.high = min(mine.low, value), max(mine.high, value)
+    return {layer: mine for layer, mine in found.items() if mine.bounds != (0, 0)}
 
 
 def reach_of(layer: Layer, settings: TerrainSettings) -> float | None:

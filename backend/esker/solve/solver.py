@@ -12,7 +12,7 @@ every solve starts from zero, strokes are ordered by id, and no cache changes a 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -28,6 +28,7 @@ from esker.solve.device import NUMPY, NUMPY_NAME, Device, open_device
 from esker.solve.faults import OutOfDeviceMemoryError, guarded, is_fault
 from esker.solve.injection import frozen, injections
 from esker.solve.refine import Refiner, Refinery
+from esker.solve.sayings import BASES, Layer, Speakers, speakers
 from esker.solve.workspaces import new_workspace
 
 PREVIEW_GRADIENT_CYCLES = 1
@@ -244,6 +245,9 @@ class Solver:
     ) -> Generator[LevelResult | None]:
         """One solve. A workspace whose device failed, or that diverged, is dropped, all others are kept."""
         with guarded(self._device):
+            spoken = speakers(strokes, settings)
+            late = [layer.channel for layer in spoken if not layer.painted]
+            early = [channel for channel in BASES if channel not in late]
             workspace = self._take(strokes, settings, top)
             keep, loaded = True, False
             try:
@@ -252,14 +256,15 @@ class Solver:
                 if warm is None:
                     yield from self._with_channels(
                         self._paced(_previews(workspace, preview_gradient_cycles(settings)), top),
-                        self._channels(strokes, settings, top),
+                        self._channels(spoken, settings, top, early),
                         top,
                     )
                 else:
                     _gradients(workspace)
                     workspace.warm(warm)
-                    yield from self._channels(strokes, settings, top)
+                    yield from self._channels(spoken, settings, top, early)
                 yield from _to_rest(workspace, settings)
+                yield from self._channels(spoken, settings, top, late)
                 yield from _settled(workspace, strokes, settings, basis)
             except GeneratorExit:
                 if not loaded:
@@ -283,13 +288,15 @@ class Solver:
 
     def _alone(self, strokes: Sequence[Stroke], settings: TerrainSettings, top: int) -> Iterator[LevelResult | None]:
         with guarded(self._device):
-            yield from self._channels(strokes, settings, top)
+            yield from self._channels(speakers(strokes, settings), settings, top, BASES)
 
-    def _channels(self, strokes: Sequence[Stroke], settings: TerrainSettings, top: int) -> Iterator[LevelResult | None]:
-        """The other channels, final, levels coarse to fine."""
+    def _channels(
+        self, spoken: Mapping[Layer, Speakers], settings: TerrainSettings, top: int, channels: Iterable[Channel]
+    ) -> Iterator[LevelResult | None]:
+        """Channels other than the heights, final, levels coarse to fine."""
         level = channel_level(top)
         solver = self._channel_solvers.setdefault(level, ChannelSolver(self._device, level))
-        for channel, levels in solver.pyramids(strokes, settings):
+        for channel, levels in solver.pyramids(spoken, settings, channels):
             for coarser, samples in enumerate(levels):
                 yield LevelResult(coarser, samples, settled=True, channel=channel)
             yield None
@@ -297,7 +304,8 @@ class Solver:
     def _with_channels(
         self, previews: Iterator[LevelResult | None], channels: Iterator[LevelResult | None], top: int
     ) -> Iterator[LevelResult | None]:
-        """The channels come before the finest preview: so what is painted keeps up with a pen that never rests."""
+        """Channels before the finest preview: so what is painted keeps up with a pen that never rests. (Those of which
+        the strokes speak that the pen draws would hold it up, and come when it does rest.)"""
         for result in previews:
             if result is not None and result.level == top:
                 yield from channels
