@@ -1,8 +1,4 @@
 // Meadows, woods, scree, rock and snow. One look_*.wgsl is part of the terrain module.
-const SNOW_LINE: f32 = 0.150;
-const TREE_LINE: f32 = 0.085;
-const PLANTS: f32 = 1.0;
-
 fn ground_material(s: Site) -> Material {
   let c = s.cover;
   // Bare ground: stones high up, earth and short grass lower down.

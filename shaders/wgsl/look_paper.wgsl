@@ -1,8 +1,4 @@
 // A teaching model of stacked card. One look_*.wgsl is part of the terrain module.
-const SNOW_LINE: f32 = 9.0;
-const TREE_LINE: f32 = 0.085;
-const PLANTS: f32 = 1.0;
-
 fn ground_material(s: Site) -> Material {
   let grain = 0.98 + 0.04 * (s.fine2.r - 0.5) + 0.03 * (s.fine3.r - 0.5);
   // Each contour is the edge of a sheet: a soft shade at its foot, a light rim at its top.

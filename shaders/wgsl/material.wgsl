@@ -24,7 +24,6 @@ struct Site {
   height: f32,       // above the sea or zero, as a fraction of the domain
   curvature: f32,
   footprint: f32,    // metres that a pixel covers
-  gain: vec4f,       // of the fine relief, features of a fifteenth of the domain to those of 1 m: 1 where nothing is asked
   macro1: vec4f,     // features of a third and of a fifteenth of the domain
   macro2: vec4f,
   fine1: vec4f,      // features of some 50 m, 8 m and 1 m
@@ -33,14 +32,7 @@ struct Site {
   cover: Attributes,
 };
 
-// What strokes ask of the fine relief: amplitude raises all of it, most what does not repeat within sight; roughness tips
-// it from broad to small features.
-fn relief_gain(detail: vec2f) -> vec4f {
-  let strength = 1.0 - exp(-detail.x * view.amplitude / (0.004 * view.size));
-  return (1.0 + strength * vec4f(6.0, 0.6, 1.5, 1.5)) * exp2((detail.y - 0.5) * vec4f(-1.2, 0.2, 1.2, 2.0));
-}
-
-fn survey(p: vec3f, gradient: vec2f, curvature: f32, f: Footprint, detail: vec2f) -> Site {
+fn survey(p: vec3f, gradient: vec2f, curvature: f32, f: Footprint, cover: Attributes) -> Site {
   let n = normalize(vec3f(-gradient, 1.0));
   var s: Site;
   s.p = p;
@@ -49,7 +41,6 @@ fn survey(p: vec3f, gradient: vec2f, curvature: f32, f: Footprint, detail: vec2f
   s.height = (p.z - select(0.0, view.sea, view.has_sea > 0.5)) / view.size;
   s.curvature = curvature;
   s.footprint = sqrt(max(max(dot(f.dx, f.dx), dot(f.dy, f.dy)), 1.0e-8));
-  s.gain = relief_gain(detail);
   s.macro1 = ground_noise(p, f, view.size * 1.37, vec2f(0.917, -0.399));
   s.macro2 = ground_noise(p, f, view.size * 0.27, vec2f(0.602, 0.799));
   // The finer layers are pushed about by the broadest one: what repeats is not seen to repeat.
@@ -58,23 +49,8 @@ fn survey(p: vec3f, gradient: vec2f, curvature: f32, f: Footprint, detail: vec2f
   let fine = fine_noise(bent, n, f, s.fine1);
   s.fine2 = fine.medium;
   s.fine3 = fine.small;
+  s.cover = cover;
   return s;
-}
-
-// The targets of the rule `landscape` (docs/synthesis.md) with the noise of the place, for ground without channels.
-fn estimate(s: Site) -> Attributes {
-  let hollow = clamp(s.curvature, -1.0, 1.0);
-  let broad = s.macro2.r - 0.5;
-  let fine = s.fine1.r - 0.5;
-  let line = SNOW_LINE - 0.030 * clamp(s.n.y, -1.0, 1.0) - 0.03 * clamp(hollow, -0.4, 0.4) + broad * 0.040 + fine * 0.022;
-  let lies = smoothstep(line - 0.004, line + 0.018, s.height) * (1.0 - smoothstep(0.8, 1.3, s.steep + (s.fine1.g - 0.5) * 0.8));
-  let tree = TREE_LINE + (s.macro1.g - 0.5) * 0.03 + broad * 0.02;
-  let grassy = (1.0 - smoothstep(0.55, 0.95, s.steep + fine * 0.3 + broad * 0.2)) * (1.0 - smoothstep(tree, 1.6 * tree, s.height + broad * 0.03));
-  let cover = s.macro1.g * 0.50 + s.macro2.r * 0.42 + s.fine1.r * 0.12 + clamp(s.steep, 0.0, 0.6) * 0.16 + clamp(hollow, -0.1, 0.1) * 0.9;
-  let wooded = smoothstep(0.545, 0.66, cover) * (1.0 - smoothstep(0.7, 1.0, s.steep)) * (1.0 - smoothstep(0.62 * tree, tree, s.height));
-  let shore = (1.0 - smoothstep(0.0, 0.006, s.height + broad * 0.004)) * view.has_sea;
-  let seep = 0.6 * smoothstep(0.05, 0.5, hollow) * (1.0 - smoothstep(0.3, 0.8, s.steep));
-  return Attributes(lies, max(shore, seep), 0.5, 0.5, PLANTS * grassy * (1.0 - lies), PLANTS * wooded * (1.0 - lies), s.fine2.r);
 }
 
 // 1 where there is more than half of a cover, its edge frayed by noise (`fray` about 0, a few tenths wide).
@@ -84,13 +60,14 @@ fn covered(amount: f32, fray: f32, soft: f32) -> f32 {
 
 // 1 where the ground is steeper than `at`, wandering with the noise.
 fn steeper(s: Site, at: f32, soft: f32) -> f32 {
-  return smoothstep(at - soft, at + soft, s.steep + (s.fine1.r - 0.5) * 0.36 * s.gain.y + (s.macro2.r - 0.5) * 0.22);
+  return smoothstep(at - soft, at + soft, s.steep + (s.fine1.r - 0.5) * 0.36 + (s.macro2.r - 0.5) * 0.22);
 }
 
 // Where the eye is near, the ground's own samples show the relief that a layer stands for further off.
 fn fine_slope(s: Site, strength: f32) -> vec2f {
   let near = 0.30 + 0.70 * smoothstep(vec4f(0.0), vec4f(6.0, 1.0, 0.16, 0.020), vec4f(s.footprint));
-  let g = strength * s.gain * near;
+  // Rough ground is rough at every size: the smoothness channel sets the drawn relief too.
+  let g = strength * near * (1.35 - 0.7 * s.cover.smoothness);
   return 0.20 * g.x * noise_slope(s.macro2) + 0.40 * g.y * noise_slope(s.fine1) + 0.42 * g.z * noise_slope(s.fine2)
     + 0.36 * g.w * noise_slope(s.fine3);
 }

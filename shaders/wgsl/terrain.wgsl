@@ -33,9 +33,11 @@ fn detail_at(p: vec2f) -> vec3f {
   return textureSampleLevel(channels, smooth_clamp, (p / view.size * (side - 1.0) + 0.5) / side, 0.0).xyz;
 }
 
-// What lies and grows on the ground here.
-fn cover_of(surface: Surface, s: Site) -> Attributes {
-  return estimate(s);
+// What lies and grows on the ground here (the words of compute_synthesis.wgsl).
+fn cover_of(surface: Surface) -> Attributes {
+  let a = surface.attributes0;
+  let b = surface.attributes1;
+  return Attributes(a.x, a.y, a.z, a.w, b.x, b.y, b.z);
 }
 
 // Sun, sky and the far ground on a rough surface.
@@ -74,8 +76,7 @@ fn terrain_fragment(v: TerrainVertex) -> @location(0) vec4f {
   let world = v.relative + view.eye.xyz;
   let rate = abs(f.dx.z) + abs(f.dy.z);
   let surface = patch_surface(v.record, v.at, v.morph);
-  var site = survey(world, surface.gradient, surface.curvature, f, v.detail.xy);
-  site.cover = cover_of(surface, site);
+  let site = survey(world, surface.gradient, surface.curvature, f, cover_of(surface));
   var m = ground_material(site);
   if (view.overlay == OVERLAY_SLOPE) {
     m.albedo = mix(m.albedo, slope_tint(site.steep), 0.8);

@@ -177,7 +177,8 @@ fn water_vertex(@builtin(vertex_index) index: u32, patch_in: PatchIn) -> WaterVe
 
 // Foam of the ground's channel at a place of a patch.
 fn shore_foam(record: vec4u, at: vec2f) -> f32 {
-  return 0.5;
+  let own = patch_slot(record);
+  return textureSampleLevel(attributes0, smooth_clamp, slot_uv(own, at), slot_layer(own), 0.0).z;
 }
 
 @fragment

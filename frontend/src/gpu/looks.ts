@@ -14,7 +14,7 @@ export interface LookFigures {
 
 export const LOOKS: Readonly<Record<Look, LookFigures>> = {
   natural: { index: 0, exposure: 1.3, haze: 0.2, contours: 0 },
-  alpine: { index: 1, exposure: 0.9, haze: 0.2, contours: 0 },
+  alpine: { index: 1, exposure: 0.82, haze: 0.2, contours: 0 },
   desert: { index: 2, exposure: 1.0, haze: 0.2, contours: 0 },
   paper: { index: 3, exposure: 1.45, haze: 0.05, contours: 0.6 },
 };
