@@ -209,8 +209,8 @@ class StrokeFields(Wire):
     label: Name | None = None
 
 
-NULLABLE_STROKE_FIELDS: Final = frozenset({"left", "right"})
-"""Fields of ``StrokeFields`` for which an explicit null is a value (no flank), not an error."""
+NULLABLE_STROKE_FIELDS: Final = frozenset({"left", "right", "paint"})
+"""Fields of ``StrokeFields`` for which an explicit null is a value (no flank, no paint), not an error."""
 
 
 class TerrainSettings(Wire):

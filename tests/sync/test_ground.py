@@ -10,6 +10,8 @@ import pytest
 from esker import Stroke, Terrain, connect, grid
 from esker import contract as c
 from esker.grid import TileKey
+from esker.link import Refused
+from esker.solve.channels import ChannelSolver
 from esker.solve.solver import Solver
 from tests.sync.harness import LiveServer
 
@@ -58,6 +60,44 @@ def test_refined_ground_arrives_as_the_solver_makes_it(tmp_path: Path, solver: S
             assert np.array_equal(t.ground.heights(1), eve.ground.heights(1))
             with pytest.raises(KeyError, match="not here"):
                 t.ground.heights(3)
+
+
+def test_paint_on_a_live_terrain(tmp_path: Path, solver: Solver) -> None:
+    """SPEC P82: drawn by one, seen by the other, replaced, undone; the numbers are the solver's."""
+    snow = Stroke.paint([(1000, 1000), (2000, 1400), (3000, 1000)], "snow", 0.75, radius_m=200, id="snow")
+    with LiveServer(tmp_path, solver, level=2, refine=2) as server:
+        terrain, secret = server.create()
+        link = f"{server.base}/t/{terrain}#{secret}"
+        with connect(link, ground=True) as t, connect(link, "Eve", ground=True) as eve:
+            t.add(RIDGE)
+            t.add(snow)
+            t.wait()
+            eve.wait_clock(2)
+            for guest in (t, eve):
+                assert guest.ground.wait() == 2
+            seen = eve.ground.channel("snow", 0)
+            assert np.array_equal(seen, t.ground.channel("snow", 0))
+            expected = dict(ChannelSolver(None, 0).solve([snow], c.TerrainSettings()))[c.Channel.SNOW]
+            assert np.abs(seen - expected).max() < 2 / c.BIAS_QUANTA
+            assert not eve.ground.channel("wetness", 0).any()
+            heights = eve.ground.heights(2)
+            t.add(snow.model_copy(update={"paint": c.Paint(channel="wetness", value=-1.0, radius_m=90.0)}))
+            t.add(RIDGE)
+            t.set_terrain(detail=2.5, rule="smooth")
+            t.wait()
+            eve.wait_clock(5)
+            assert eve.ground.wait() == 5
+            assert not eve.ground.channel("snow", 0).any()
+            assert eve.ground.channel("wetness", 0).min() < -0.9
+            assert np.array_equal(eve.ground.heights(2), heights)
+            assert eve.settings.rule == "smooth"
+            for _ in range(2):  # adding what is there already was no step
+                t.undo()
+            t.wait()
+            t.ground.wait()
+            assert np.array_equal(t.ground.channel("snow", 0), seen)
+            with pytest.raises(Refused, match="only a paint stroke"):
+                t.set("ridge", paint=snow.paint)
 
 
 def check(ground: object, keys: set[TileKey], solver: Solver, **fields: float) -> None:

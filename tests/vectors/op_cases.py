@@ -53,6 +53,7 @@ def _applies() -> list[tuple[str, Json, Json]]:
             op(set_, stroke="m", fields={"plateau_radius_m": 40.5, "hidden": True, "roughness": 1}),
         ),
         ("set no field", BASE, op(set_, stroke="a", fields={})),
+        ("a mountain has null for paint", BASE, op(set_, stroke="a", fields={"label": "x", "paint": None})),
         ("null flank means no flank", BASE, op(set_, stroke="a", fields={"left": None})),
         (
             "set a flank",

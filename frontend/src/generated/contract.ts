@@ -112,7 +112,7 @@ export const DEFAULT_TAU_PX = 1.5 as const;
 
 export const ABSOLUTE_BOUND_M = 655360.0 as const;
 
-export const NULLABLE_STROKE_FIELDS = ["left", "right"] as const;
+export const NULLABLE_STROKE_FIELDS = ["left", "paint", "right"] as const;
 
 export const NULLABLE_TERRAIN_FIELDS = ["reach_m", "sea_level_m"] as const;
 
