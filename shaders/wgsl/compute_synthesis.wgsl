@@ -98,10 +98,12 @@ fn noise_of(level: u32, i: vec2i, j: vec2i) -> SynthNoise {
   return SynthNoise(synth_words(keys.x, u, v), synth_words(keys.y, u, v), synth_words(keys.z, u, v), synth_words(keys.w, u, v));
 }
 
-// Cell of the channels' grid and place in it of two neighbouring samples: exact, as both grids have powers of two cells.
+// Along one axis: the two nodes of the channels' grid from which two neighbouring samples take their values, and where
+// each lies between them. Exact, as both grids have powers of two cells: on levels coarser than the grid each sample is a
+// node, on finer ones both lie in one cell.
 struct ChannelPlace {
-  near: vec2u,
-  far: vec2u,
+  low: u32,
+  high: u32,
   part: vec2f,
 };
 
@@ -110,38 +112,45 @@ fn channel_place(level: u32, index: vec2i) -> ChannelPlace {
   let i = vec2u(clamp(index, vec2i(0), vec2i(1 << bits)));
   if (bits <= site.channel_bits) {
     let node = i << vec2u(site.channel_bits - bits);
-    return ChannelPlace(node, node, vec2f(0.0));
+    return ChannelPlace(node.x, node.y, vec2f(0.0, 1.0));
   }
   let shift = bits - site.channel_bits;
-  let near = min(i >> vec2u(shift), vec2u((1u << site.channel_bits) - 1u));
-  return ChannelPlace(near, near + 1u, vec2f(i - (near << vec2u(shift))) / f32(1u << shift));
+  let low = min(i.x >> shift, (1u << site.channel_bits) - 1u);
+  return ChannelPlace(low, low + 1u, vec2f(i - (low << shift)) / f32(1u << shift));
 }
 
 fn channel_value(row: u32, col: u32, which: u32) -> vec2f {
   return channels[3u * (row * ((1u << site.channel_bits) + 1u) + col) + which];
 }
 
-fn channel_at(x: ChannelPlace, y: ChannelPlace, cx: u32, cy: u32, which: u32) -> vec2f {
-  let fx = x.part[cx];
-  let fy = y.part[cy];
-  let south = channel_value(y.near[cy], x.near[cx], which) * (1.0 - fx) + channel_value(y.near[cy], x.far[cx], which) * fx;
-  let north = channel_value(y.far[cy], x.near[cx], which) * (1.0 - fx) + channel_value(y.far[cy], x.far[cx], which) * fx;
-  return south * (1.0 - fy) + north * fy;
+fn along(a: f32, b: f32, part: vec2f) -> vec2f {
+  return a * (1.0 - part) + b * part;
+}
+
+fn bilinear(south: vec2f, north: vec2f, part: vec2f) -> vec4f {
+  return vec4f(south * (1.0 - part.x) + north * part.x, south * (1.0 - part.y) + north * part.y);
 }
 
 fn channel_pair(x: ChannelPlace, y: ChannelPlace, which: u32) -> ChannelPair {
-  let a = channel_at(x, y, 0u, 0u, which);
-  let b = channel_at(x, y, 1u, 0u, which);
-  let c = channel_at(x, y, 0u, 1u, which);
-  let d = channel_at(x, y, 1u, 1u, which);
-  return ChannelPair(vec4f(a.x, b.x, c.x, d.x), vec4f(a.y, b.y, c.y, d.y));
+  let a = channel_value(y.low, x.low, which);
+  let b = channel_value(y.low, x.high, which);
+  let c = channel_value(y.high, x.low, which);
+  let d = channel_value(y.high, x.high, which);
+  return ChannelPair(
+    bilinear(along(a.x, b.x, x.part), along(c.x, d.x, x.part), y.part),
+    bilinear(along(a.y, b.y, x.part), along(c.y, d.y, x.part), y.part));
 }
 
 fn asked_of(level: u32, i: vec2i, j: vec2i) -> Asked {
+  var out: Asked;
+  if (site.varied == 0u) {
+    out.amplitude = vec4f(channels[0].x);
+    out.roughness = vec4f(channels[0].y);
+    return out;
+  }
   let x = channel_place(level, i);
   let y = channel_place(level, j);
   let size = channel_pair(x, y, 0u);
-  var out: Asked;
   out.amplitude = size.low;
   out.roughness = size.high;
   if (site.biased == 1u) {

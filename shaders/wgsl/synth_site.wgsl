@@ -19,8 +19,8 @@ struct SynthSite {
   solved: u32,            // finest level whose guide is what was sent
   cyclic: u32,            // 1: the domain's east edge is its west edge
   channel_bits: u32,      // the channels' grid has 2^channel_bits cells a side
+  varied: u32,            // 1: the channels differ from place to place
   biased: u32,            // 1: paint asks for snow, plants or wetness somewhere
-  pad: u32,
   levels: array<SynthLevel, 18>,
 };
 

@@ -52,13 +52,13 @@ def source(*names: str) -> str:
     return "\n".join(Path(file).read_text() for file in files)
 
 
-def site_words(site: Site, bits: int, biased: bool) -> NDArray[np.uint32]:
+def site_words(site: Site, bits: int, varied: bool, biased: bool) -> NDArray[np.uint32]:
     """``SynthSite`` of synth_site.wgsl: gpu/synthsite.ts in Python."""
     look, sea = site.look_rule, site.sea_level_m
     head = [site.size_m, site.amplitude_m, sea or 0.0, 0.0 if sea is None else 1.0, *look]
     words = [
         np.array(head, np.float32).view(np.uint32),
-        np.array([site.solved, site.cyclic, bits, biased, 0], np.uint32),
+        np.array([site.solved, site.cyclic, bits, varied, biased], np.uint32),
     ]
     for level in range(MAX_SYNTHESIS_LEVEL + 1):
         starts = [site.seed + fractal.HASH_STEP * (fractal.HASH_STREAMS * level + stream) for stream in range(4)]
@@ -73,8 +73,8 @@ def site_words(site: Site, bits: int, biased: bool) -> NDArray[np.uint32]:
     return np.concatenate(words)
 
 
-def channel_values(site: Site) -> tuple[NDArray[np.float32], int, bool]:
-    """All channels on the finest of their grids, (n, n, 6); log2(n - 1); whether any bias is asked for."""
+def channel_values(site: Site) -> tuple[NDArray[np.float32], int, bool, bool]:
+    """All channels on the finest of their grids, (n, n, 6); log2(n - 1); do they vary; is any bias asked for."""
     cells = max([1, *(len(values) - 1 for values in site.channels.values())])
     out = np.zeros((cells + 1, cells + 1, 6), np.float32)
     out[..., 1] = BASE_ROUGHNESS
@@ -84,7 +84,8 @@ def channel_values(site: Site) -> tuple[NDArray[np.float32], int, bool]:
             while len(values) <= cells:
                 values = _refined(values)
             out[..., k] = values
-    return out, cells.bit_length() - 1, bool(out[..., 2:].any())
+    biased = bool(out[..., 2:].any())
+    return out, cells.bit_length() - 1, biased or bool((out != out[0, 0]).any()), biased
 
 
 def _refined(z: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -131,9 +132,9 @@ class SlotMaker:
         """Another terrain, or other settings, in the same slots."""
         self.site = site
         usage = self.wgpu.BufferUsage
-        values, bits, biased = channel_values(site)
+        values, *facts = channel_values(site)
         channels = self.device.create_buffer_with_data(data=values, usage=usage.STORAGE)
-        words = self.device.create_buffer_with_data(data=site_words(site, bits, biased), usage=usage.UNIFORM)
+        words = self.device.create_buffer_with_data(data=site_words(site, *facts), usage=usage.UNIFORM)
         code = source(*PARTS, f"rule_{site.rule}", "synth_slots", "compute_synthesis")
         module = self.device.create_shader_module(code=code)
         layout = self.device.create_pipeline_layout(bind_group_layouts=[self._layout])

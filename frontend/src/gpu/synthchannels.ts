@@ -2,13 +2,18 @@
 
 import type { ChannelGrid, ChannelView } from "../core/types.ts";
 
-export interface ChannelWords {
-  /** Per node: amplitude, roughness, snow, grass, forest, wetness. Row 0 south. */
-  readonly values: Float32Array<ArrayBuffer>;
+export interface ChannelFacts {
   /** The grid has 2^bits cells a side. */
   readonly bits: number;
-  /** Any of the last four is asked for anywhere. */
+  /** The channels differ from place to place. */
+  readonly varied: boolean;
+  /** Snow, grass, forest or wetness is asked for anywhere. */
   readonly biased: boolean;
+}
+
+export interface ChannelWords extends ChannelFacts {
+  /** Per node: amplitude, roughness, snow, grass, forest, wetness. Row 0 south. */
+  readonly values: Float32Array<ArrayBuffer>;
 }
 
 /** The finest of the six grids serves; coarser ones are bilinear on it, which changes nothing between their nodes. */
@@ -23,7 +28,8 @@ export function channelWords(view: ChannelView): ChannelWords {
     spread(grid, side, values, channel, grids.length);
   });
   const biased = grids.slice(2).some((grid) => grid.values.some((v) => v !== 0));
-  return { values, bits, biased };
+  const varied = biased || grids.some((grid) => grid.values.some((v) => v !== grid.values[0]));
+  return { values, bits, varied, biased };
 }
 
 function spread(grid: ChannelGrid, side: number, out: Float32Array, first: number, stride: number): void {

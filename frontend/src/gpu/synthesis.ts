@@ -12,7 +12,7 @@
 import type { ChannelView } from "../core/types.ts";
 import { MAX_SYNTHESIS_LEVEL, TILE_SAMPLES } from "../generated/contract.ts";
 import { synthesisSource } from "./shaders.ts";
-import { channelWords } from "./synthchannels.ts";
+import { type ChannelFacts, channelWords } from "./synthchannels.ts";
 import { SITE_BYTES, type SynthesisRule, type SynthesisSettings, sameSettings, siteWords } from "./synthsite.ts";
 
 export type { SynthesisRule, SynthesisSettings } from "./synthsite.ts";
@@ -73,8 +73,7 @@ export class SynthesisPass {
   private channels: GPUBuffer | null = null;
   private channelSource: ChannelView | null = null;
   private channelStamp = -1;
-  private channelBits = 0;
-  private biased = false;
+  private channelFacts: ChannelFacts = { bits: 0, varied: false, biased: false };
   private settings: SynthesisSettings | null = null;
   private atlas: SynthesisAtlas | null = null;
   private group: GPUBindGroup | null = null;
@@ -125,7 +124,7 @@ export class SynthesisPass {
     if (channels === this.channelSource && channels.stamp === this.channelStamp) return false;
     this.channelSource = channels;
     this.channelStamp = channels.stamp;
-    const { values, bits, biased } = channelWords(channels);
+    const { values, ...facts } = channelWords(channels);
     if (this.channels?.size !== values.byteLength) {
       this.channels?.destroy();
       const usage = GPUBufferUsage.STORAGE | GPUBufferUsage.COPY_DST;
@@ -133,8 +132,7 @@ export class SynthesisPass {
       this.group = null;
     }
     this.device.queue.writeBuffer(this.channels, 0, values);
-    this.channelBits = bits;
-    this.biased = biased;
+    this.channelFacts = facts;
     this.writeSite();
     return true;
   }
@@ -189,7 +187,7 @@ export class SynthesisPass {
 
   private writeSite(): void {
     if (this.settings === null) return;
-    this.device.queue.writeBuffer(this.site, 0, siteWords(this.settings, this.channelBits, this.biased));
+    this.device.queue.writeBuffer(this.site, 0, siteWords(this.settings, this.channelFacts));
   }
 
   private bindGroup(): GPUBindGroup {

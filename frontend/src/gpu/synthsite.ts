@@ -12,6 +12,7 @@ import {
 import { streamStart } from "../tiles/noise.ts";
 import { siteOf } from "../tiles/rules/rule.ts";
 import { tie } from "../tiles/rules/targets.ts";
+import type { ChannelFacts } from "./synthchannels.ts";
 
 export type SynthesisRule = Rule;
 
@@ -35,8 +36,8 @@ const HEAD_WORDS = 12;
 const LEVEL_WORDS = 8;
 export const SITE_BYTES: number = 4 * (HEAD_WORDS + LEVELS * LEVEL_WORDS);
 
-/** The words of `SynthSite`. `channelBits`: the channels' grid has 2^channelBits cells a side; `biased`: with paint. */
-export function siteWords(s: SynthesisSettings, channelBits: number, biased: boolean): Uint32Array<ArrayBuffer> {
+/** The words of `SynthSite`. */
+export function siteWords(s: SynthesisSettings, channels: ChannelFacts): Uint32Array<ArrayBuffer> {
   const words = new Uint32Array(SITE_BYTES / 4);
   const floats = new Float32Array(words.buffer);
   const { sizeM, seaLevelM } = s;
@@ -50,7 +51,8 @@ export function siteWords(s: SynthesisSettings, channelBits: number, biased: boo
   });
   floats.set([sizeM, site.amplitudeM, seaLevelM ?? 0, seaLevelM === null ? 0 : 1]);
   floats.set([site.snowLine, site.treeLine, site.plants], 4);
-  words.set([s.solved, s.cyclic === true ? 1 : 0, channelBits, biased ? 1 : 0], 7);
+  const { bits, varied, biased } = channels;
+  words.set([s.solved, s.cyclic === true ? 1 : 0, bits, varied ? 1 : 0, biased ? 1 : 0], 7);
   for (let level = 0; level < LEVELS; level += 1) {
     const at = HEAD_WORDS + LEVEL_WORDS * level;
     for (let stream = 0; stream < 4; stream += 1) words[at + stream] = streamStart(s.seed, level, stream);
