@@ -19,7 +19,8 @@ from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIO
 
 from esker import contract as c
 from esker.document.ops import Limits
-from esker.server import create_app
+from esker.render.previews import Previews
+from esker.server import Pictures, create_app
 from esker.session.hub import Hub
 from esker.session.ports import Solver, SolverFactory
 from esker.session.recovery import Fault
@@ -31,6 +32,7 @@ from esker.solve.multigrid import DivergedError
 from esker.solve.solver import Solver as OpenClSolver
 from esker.store.access import Access
 from esker.store.journal import Journal
+from esker.store.previews import PreviewTokens
 from esker.tiles.delivery import ClientTiles, TileServer
 from esker.tls import CA_FILE, lan_address, server_context
 
@@ -144,7 +146,13 @@ class Assembly:
 
     def server(self, announce: bool = True) -> _Server:
         """The HTTP server, to be run with ``run``."""
-        app = create_app(self.hub, self.settings.page, self.settings.data)
+        assert self._journal is not None, "an assembly is open until it is closed"
+        pictures = Pictures(
+            Previews(self.settings.data / "previews", self.settings.device),
+            PreviewTokens(self._journal),
+            self.settings.public_url.rstrip("/") if self.settings.public_url else None,
+        )
+        app = create_app(self.hub, self.settings.page, self.settings.data, pictures)
 
         async def started() -> None:
             if announce:

@@ -6,14 +6,16 @@ import asyncio
 import logging
 import time
 from collections.abc import AsyncIterator, Callable
+from concurrent.futures import Future
 from contextlib import asynccontextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Final
 from urllib.parse import urlsplit
 
-from fastapi import Depends, FastAPI, Request, Response, WebSocket
+from fastapi import Depends, FastAPI, Query, Request, Response, WebSocket
 from fastapi.exceptions import RequestValidationError
-from fastapi.responses import FileResponse, JSONResponse
+from fastapi.responses import FileResponse, HTMLResponse, JSONResponse
 from pydantic import Field, StringConstraints
 from starlette.exceptions import HTTPException
 from starlette.staticfiles import StaticFiles
@@ -24,11 +26,14 @@ from esker import templates
 from esker.contract import Role
 from esker.document import archive
 from esker.headers import Headers
+from esker.render import card
+from esker.render.previews import HEIGHT, WIDTH, Busy, CannotDraw, Previews
 from esker.session.core import Denied
 from esker.session.hub import Hub
 from esker.session.limits import RateByKey
 from esker.session.socket import Session
 from esker.store.access import CODE_SECONDS, Link, TooManyLinks
+from esker.store.previews import Preview, PreviewTokens
 from esker.tls import CA_FILE, FOLDER
 from esker.upload import AT_ONCE, read_archive
 from esker.version import VERSION
@@ -41,6 +46,10 @@ NEW_TERRAINS: Final = (1 / 3, 60)
 CODE_TRIES: Final = (1 / 3, 60)
 """Join codes by address: of 31^6 codes a guesser tries 360 in the fifteen minutes that one lives."""
 RENEWED_AFTER: Final = 1.0
+PICTURES: Final = (1.0, 60)
+"""Preview pictures by address."""
+PICTURE_SECONDS: Final = 20.0
+"""So long an answer waits for a picture that is being drawn."""
 STATUS: Final = {
     "bad_secret": 403,
     "revoked": 403,
@@ -80,18 +89,35 @@ class NewCode(c.Wire):
     role: Role = "edit"
 
 
+class PreviewChange(c.Wire):
+    """Body of POST /api/terrains/{id}/preview."""
+
+    shown: bool | None = None
+    renew: bool = False
+
+
 class JoinCode(c.Wire):
     """Body of POST /api/join."""
 
     code: Annotated[str, StringConstraints(min_length=1, max_length=20)]
 
 
-def create_app(hub: Hub, page: Path, data: Path) -> FastAPI:
+@dataclass(frozen=True)
+class Pictures:
+    """Preview pictures and who may see them. ``base``: where people reach this server; None: as each asks for it."""
+
+    previews: Previews
+    tokens: PreviewTokens
+    base: str | None = None
+
+
+def create_app(hub: Hub, page: Path, data: Path, pictures: Pictures) -> FastAPI:
     """The application over an open hub. ``page``: the built front-end; ``data``: where the LAN certificate lies."""
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:  # noqa: ARG001
         yield
+        await pictures.previews.close()
         await hub.close()
 
     app = FastAPI(
@@ -111,7 +137,8 @@ def create_app(hub: Hub, page: Path, data: Path) -> FastAPI:
     _add_terrains(app, hub)
     _add_links(app, hub)
     _add_socket(app, hub)
-    _add_page(app, hub, page, data)
+    _add_previews(app, hub, pictures)
+    _add_page(app, hub, page, data, pictures)
     return app
 
 
@@ -374,21 +401,90 @@ def _add_socket(app: FastAPI, hub: Hub) -> None:
         await Session(hub, transport, _address(socket), subprotocol).run(_messages(socket))
 
 
+# --- preview pictures -------------------------------------------------------------------------------------------
+
+
+def _add_previews(app: FastAPI, hub: Hub, pictures: Pictures) -> None:
+    previews, tokens = pictures.previews, pictures.tokens
+    app.state.pictures = RateByKey(*PICTURES)
+
+    async def answer(terrain: str, found: Future[Preview]) -> dict[str, Any]:
+        preview = await asyncio.wrap_future(found)
+        if preview.shown:
+            await _draw_ahead(hub, pictures, terrain)
+        return {"token": preview.token, "shown": preview.shown, "available": previews.available}
+
+    @app.get("/api/terrains/{terrain}/preview")
+    async def preview(terrain: str, link: AnyLink) -> dict[str, Any]:  # noqa: ARG001
+        return await answer(terrain, tokens.of(terrain))
+
+    @app.post("/api/terrains/{terrain}/preview")
+    async def change(terrain: str, link: OwnerLink, body: PreviewChange) -> dict[str, Any]:  # noqa: ARG001
+        if body.shown is False:
+            previews.forget(terrain)
+        return await answer(terrain, tokens.change(terrain, shown=body.shown, renew=body.renew))
+
+    @app.api_route("/preview/{token}.jpg", methods=["GET", "HEAD"], include_in_schema=False)
+    async def picture(request: Request, token: str) -> Response:
+        _limited(request, app.state.pictures, "pictures were asked for")
+        terrain = tokens.terrain(token)
+        if terrain is None:
+            raise Problem(404, "not_found", "There is no picture at this address.")
+        try:
+            path = await asyncio.wait_for(previews.picture(await hub.document(terrain)), PICTURE_SECONDS)
+        except CannotDraw:
+            raise Problem(404, "no_pictures", "This server cannot draw pictures.") from None
+        except (Busy, TimeoutError):
+            raise Problem(503, "busy", "The picture is still being drawn. Ask again in a moment.") from None
+        return FileResponse(path, media_type="image/jpeg")
+
+
+async def _draw_ahead(hub: Hub, pictures: Pictures, terrain: str) -> c.Document | None:
+    """Begins the picture of a terrain, so that it is there when it is asked for. Returns the document, None if none."""
+    try:
+        document = await hub.document(terrain)
+    except Denied:
+        return None
+    pictures.previews.begin(document)
+    return document
+
+
 # --- the page ---------------------------------------------------------------------------------------------------
 
 
-def _add_page(app: FastAPI, hub: Hub, page: Path, data: Path) -> None:
+async def _card(hub: Hub, pictures: Pictures, request: Request, terrain: str, token: str) -> str:
+    """Tags for programs that unfold links: of this terrain, where the token opens its picture; else of none."""
+    if pictures.tokens.terrain(token) != terrain or not pictures.previews.available:
+        return ""
+    document = await _draw_ahead(hub, pictures, terrain)
+    if document is None:
+        return ""
+    base = pictures.base or str(request.base_url).rstrip("/")
+    title = document.settings.title
+    image = f"{base}/preview/{token}.jpg?v={document.clock}"
+    return card.tags(f"{base}/t/{terrain}?p={token}", title, image, (WIDTH, HEIGHT), f"{title}, seen from the air")
+
+
+def _add_page(app: FastAPI, hub: Hub, page: Path, data: Path, pictures: Pictures) -> None:
     @app.get("/healthz")
     async def healthz() -> dict[str, Any]:
         return {"ok": True, "version": VERSION, "device": hub.device}
 
-    async def index() -> Response:
-        if not (page / "index.html").is_file():
+    def index(more: str = "") -> Response:
+        path = page / "index.html"
+        if not path.is_file():
             return _answer(503, "no_page", "The page is not built yet. Run `make run`, which builds it.")
-        return FileResponse(page / "index.html", media_type="text/html")
+        if not more:
+            return FileResponse(path, media_type="text/html")
+        return HTMLResponse(card.with_tags(path.read_text(encoding="utf-8"), more))
 
-    for path in ("/", "/t/{terrain}"):
-        app.add_api_route(path, index, methods=["GET", "HEAD"], include_in_schema=False, response_model=None)
+    @app.api_route("/", methods=["GET", "HEAD"], include_in_schema=False)
+    async def landing() -> Response:
+        return index()
+
+    @app.api_route("/t/{terrain}", methods=["GET", "HEAD"], include_in_schema=False)
+    async def shared(request: Request, terrain: str, p: Annotated[str, Query(max_length=40)] = "") -> Response:
+        return index(await _card(hub, pictures, request, terrain, p) if p else "")
 
     @app.get(f"/{CA_FILE}", include_in_schema=False)
     async def certificate() -> Response:

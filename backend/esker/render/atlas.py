@@ -15,7 +15,7 @@ from esker.render.layout import StructLayout
 from esker.render.programs import Compute, Resources, Textured
 from esker.render.surface import SLOT, SlotData, Surface, Tile
 from esker.render.wgsl_tree import Module
-from esker.synthesis.state import H_SCALE, State
+from esker.synthesis.state import H_SCALE, Array, State
 
 SLOTS_ACROSS: Final = 16
 SLOTS_PER_LAYER: Final = SLOTS_ACROSS**2
@@ -88,19 +88,18 @@ class Atlas:
         col, row, layer = slot % SLOTS_ACROSS, slot // SLOTS_ACROSS % SLOTS_ACROSS, slot // SLOTS_PER_LAYER
         place = (col * SLOT, row * SLOT, layer, SLOT, SLOT, 1)
         self.heights.write(np.ascontiguousarray(data.heights, dtype="<f4").tobytes(), viewport=place)
-        if data.state is not None:
-            first, second = attribute_texels(data.state)
+        if data.state is not None and data.grain is not None:
+            first, second = attribute_texels(data.state, data.grain)
             self.attributes0.write(first.tobytes(), viewport=place)
             self.attributes1.write(second.tobytes(), viewport=place)
 
 
-def attribute_texels(state: State) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-    """(69, 69, 4) each, as compute_synthesis.wgsl writes them: snow, wet, foam, h/2; grass, forest, and two of the
-    page's own that are not known here: grain as in the middle, nothing to come."""
-    middle = np.full_like(state.d, 0.5)
+def attribute_texels(state: State, grain: Array) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+    """(69, 69, 4) each, as compute_synthesis.wgsl writes them: snow, wet, foam, h/2; grass, forest, grain, and 0 where
+    the page tells its selection of the next level."""
     pairs = (
         (state.snow, state.wet, state.foam, state.h / H_SCALE),
-        (state.grass, state.forest, middle, np.zeros_like(middle)),
+        (state.grass, state.forest, 0.5 + 0.5 * grain, np.zeros_like(grain)),
     )
     first, second = (np.floor(np.clip(np.stack(p, axis=-1), 0, 1) * 255 + 0.5).astype(np.uint8) for p in pairs)
     return first, second

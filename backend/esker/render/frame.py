@@ -30,7 +30,7 @@ LOOKS: Final[dict[str, LookFigures]] = {
     "natural": LookFigures(0, 1.3, 0.2, 0),
     "alpine": LookFigures(1, 0.9, 0.2, 0),
     "desert": LookFigures(2, 1.0, 0.2, 0),
-    "paper": LookFigures(3, 1.8, 0.06, 0.5),
+    "paper": LookFigures(3, 1.45, 0.05, 0.6),
 }
 
 
@@ -60,6 +60,12 @@ def sun_direction(azimuth_deg: float, elevation_deg: float) -> Vec3:
     return math.sin(a) * math.cos(e), math.cos(a) * math.cos(e), math.sin(e)
 
 
+def adaptation(elevation_deg: float) -> float:
+    """How far an eye opens as the sun sinks, 1 at 24 degrees: light falls by thirty from there to half a degree."""
+    s = math.sin(math.radians(max(elevation_deg, 0.0)))
+    return float(((s + 0.354) / (s + 0.004) / 1.85) ** 0.7)
+
+
 def contour_interval(relief_m: float, wanted: float = 24) -> float:
     """A round interval (1, 2 or 5 times a power of ten) that gives about ``wanted`` lines over the relief."""
     raw = max(relief_m, 1e-3) / wanted
@@ -74,13 +80,14 @@ def base_height(low: float, size_m: float) -> float:
     return math.floor((low - 0.02 * size_m) / step) * step
 
 
-def view_values(scene: Scene, rect: Rect, low: float, high: float, amplitude: float) -> dict[str, ArrayLike]:
-    """Fields of ``View`` (view.wgsl). ``low``, ``high``: of the whole ground, metres; ``amplitude``: metres that the
+def view_values(scene: Scene, rect: Rect, range_m: tuple[float, float], amplitude: float) -> dict[str, ArrayLike]:
+    """Fields of ``View`` (view.wgsl). ``range_m``: lowest and highest solved ground; ``amplitude``: metres that the
     value 1 of the channel texture stands for."""
+    low, high = range_m
     settings, camera = scene.settings, scene.camera
     look, relief = LOOKS[settings.look], high - low
     sun = sun_direction(settings.sun_azimuth_deg, settings.sun_elevation_deg)
-    exposure = _exposure(90 if settings.look == "paper" else settings.sun_elevation_deg)
+    exposure = 1.0 if settings.look == "paper" else adaptation(settings.sun_elevation_deg)
     return {
         **_camera_values(camera, rect, settings.size_m),
         "sun": [*sun, sun[2]],
@@ -127,11 +134,6 @@ def _camera_values(camera: Camera, rect: Rect, size_m: float) -> dict[str, Array
         "forward": [*forward, per_pixel],
         "viewport": [camera.width, camera.height],
     }
-
-
-def _exposure(elevation_deg: float) -> float:
-    """Opens up as the sun sinks, as an eye does."""
-    return 1 + 1.1 * (1 - _smoothstep(0, 32, elevation_deg))
 
 
 def _smoothstep(a: float, b: float, v: float) -> float:

@@ -86,12 +86,11 @@ class Reference:
     ) -> Picture:
         """The picture of a scene. ``progress`` is told the share that is done; ``bare``: only the ground is drawn."""
         cut, tau = self._cut(surface, scene)
-        low, high, _ = surface.bounds(0, np.array([(x, y) for x in range(SUBPATCHES) for y in range(SUBPATCHES)]))
-        lowest, highest = float(low.min()), float(high.max())
+        _, high, _ = surface.bounds(0, np.array([(x, y) for x in range(SUBPATCHES) for y in range(SUBPATCHES)]))
         atlas = Atlas(self.context, cut.tiles(), surface)
         settings = scene.settings
         sun = sun_direction(settings.sun_azimuth_deg, settings.sun_elevation_deg)
-        atlas.compute(self._normals, self._sun, settings.size_m, highest, sun)
+        atlas.compute(self._normals, self._sun, settings.size_m, float(high.max()), sun)
         resources, amplitude = self._resources(atlas, scene, channels)
         records = _Records(self.context, cut, atlas)
         out = np.empty((scene.camera.height, scene.camera.width, 3), dtype=np.uint8)
@@ -99,7 +98,7 @@ class Reference:
         for done, rect in enumerate(parts):
             if progress is not None:
                 progress(done / len(parts))
-            values = view_values(scene, rect, lowest, highest, amplitude)
+            values = view_values(scene, rect, surface.range_m, amplitude)
             view = StructLayout(sources.background(self._detail), "View").pack(values)
             resources.buffers["view"] = self.context.buffer(view)
             out[rect.top : rect.top + rect.height, rect.left : rect.left + rect.width] = self._part(
@@ -273,7 +272,7 @@ def _words(cut: Cut, atlas: Atlas) -> NDArray[np.uint32]:
     corner = cut.nodes * PATCH_CELLS
     out = np.empty((len(cut.level), 4), dtype=np.uint32)
     out[:, 0] = corner[:, 0] | cut.edges << 24 | cut.border << 28
-    out[:, 1] = corner[:, 1] | cut.level << 24 | cut.wet.astype(np.int64) << 29
+    out[:, 1] = corner[:, 1] | cut.level << 24 | cut.wet.astype(np.int64) << 31
     out[:, 2] = np.array(own) | np.array(parent) << 16
     out[:, 3] = np.ascontiguousarray(cut.corners).view("<u4")[:, 0]
     return out

@@ -13,16 +13,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from esker.contract import PATCH_CELLS, SUBPATCHES, TILE_CELLS, TILE_SAMPLES
+from esker.fractal import H_RANGE
 from esker.render.select import Floats, Ints
 from esker.synthesis.detailed import DetailedTerrain
+from esker.synthesis.hash import full, hashed
 from esker.synthesis.site import BORDER, extended, tile_window
 from esker.synthesis.state import Array, State
 from esker.synthesis.subdivide import Samples, interpolated, root, subdivide, whole
 
 SLOT: Final = TILE_SAMPLES + 2 * BORDER
-DECAY: Final = 0.7
-"""Error that tiles not yet made are expected to add, in that of the tile above them: noise of the roughest ground falls
-by 2^-0.45 a level, common ground by 2^-1."""
+RATIOS: Final = {"landscape": 0.5, "smooth": 0.25, "plain": 0.25}
+"""Error of a level that is not made yet in that of the one above it: what is likely (frontend/src/tiles/synthetic.ts)."""
+FALL: Final = 2.0 ** -H_RANGE[0]
+"""What a level may add falls by this at least: for bounds."""
 
 Tile = tuple[int, int, int]
 """Level, column, row."""
@@ -30,10 +33,11 @@ Tile = tuple[int, int, int]
 
 class SlotData(NamedTuple):
     """Samples of one tile with a border of two, row 0 south. ``heights``: (69, 69) float32, metres; ``state``: what the
-    rule made there, None on ground without detail."""
+    rule made there, and ``grain``, the noise that it was made with, -1..1; None on ground without detail."""
 
     heights: NDArray[np.float32]
-    state: State | None
+    state: State | None = None
+    grain: Array | None = None
 
 
 class _Sub(NamedTuple):
@@ -65,6 +69,8 @@ class Surface:
         up to ``top``; without, the ground ends at level G."""
         self.size_m = size_m
         self.solved = len(levels) - 1
+        self.range_m = float(min(z.min() for z in levels)), float(max(z.max() for z in levels))
+        """Lowest and highest solved ground, without detail."""
         self.levels = self.solved if terrain is None else max(top, self.solved)
         self._terrain = terrain
         self._whole: list[Samples] = []
@@ -107,9 +113,12 @@ class Surface:
         if not (0 <= level <= self.levels and 0 <= x < 1 << level and 0 <= y < 1 << level):
             raise ValueError(f"there is no tile ({level}, {x}, {y})")
         if self._terrain is None:
-            return SlotData(self._heights[level][_within(level, x, y)], None)
+            return SlotData(self._heights[level][_within(level, x, y)])
         made = self._tile(level, x, y)
-        return SlotData((made.base + made.samples.state.d).astype(np.float32), made.samples.state)
+        window, site = made.samples.window, self._terrain.site
+        words = hashed(site.seed, level, 0, site.indices(window.rows, level), site.indices(window.cols, level))
+        heights = (made.base + made.samples.state.d).astype(np.float32)
+        return SlotData(heights, made.samples.state, full(words, np.float64))
 
     def height_at(self, x_m: float, y_m: float, level: int | None = None) -> float:
         """Height of the ground at a place, bilinear in the samples of a level (default: the finest solved one)."""
@@ -157,12 +166,11 @@ class Surface:
         return found
 
     def _grown(self, level: int, sub: _Sub) -> tuple[Floats, Floats, Floats]:
-        """Bounds with what finer tiles may add to them: a geometric series of expected errors."""
-        if level == self.levels:
+        """Bounds with what finer tiles may add to them, a geometric series, and the error that they are likely to."""
+        if level == self.levels or self._terrain is None:
             return sub.low - sub.error, sub.high + sub.error, np.zeros_like(sub.error)
-        expected = DECAY * sub.error
-        reach = sub.error + expected / (1 - DECAY)
-        return sub.low - reach, sub.high + reach, expected
+        reach = sub.error / (1 - FALL)
+        return sub.low - reach, sub.high + reach, RATIOS[self._terrain.site.rule] * sub.error
 
     def _merge(self) -> list[tuple[Floats, Floats, Floats]]:
         """Per solved level: bounds of each patch and all below it, and the error of stopping there."""
