@@ -1,0 +1,108 @@
+/** What the host tells the synthesis (SPEC R18, R26, R29). */
+
+import synthSite from "@shaders/wgsl/synth_site.wgsl?raw";
+import { describe, expect, it } from "vitest";
+import vectors from "../../../tests/vectors/synthesis.json";
+import type { ChannelGrid, ChannelView } from "../../src/core/types.ts";
+import { structLayout } from "../../src/gpu/layout.ts";
+import { channelWords } from "../../src/gpu/synthchannels.ts";
+import { SITE_BYTES, type SynthesisSettings, sameSettings, siteWords } from "../../src/gpu/synthsite.ts";
+import { mixBits } from "../../src/tiles/noise.ts";
+
+const SETTINGS: SynthesisSettings = {
+  sizeM: 4096,
+  seed: 7,
+  detail: 2,
+  rule: "landscape",
+  look: "natural",
+  seaLevelM: -12,
+  solved: 4,
+  cyclic: true,
+};
+
+const grid = (side: number, at: (row: number, col: number) => number): ChannelGrid => ({
+  side,
+  values: Float32Array.from({ length: side * side }, (_, i) => at(Math.floor(i / side), i % side)),
+});
+
+const flat = (value: number, side = 3): ChannelGrid => grid(side, () => value);
+
+function view(change: Partial<ChannelView> = {}): ChannelView {
+  const none = flat(0);
+  const base = { amplitude: none, roughness: flat(0.5), snow: none, grass: none, forest: none, wetness: none };
+  return { stamp: 1, ...base, ...change };
+}
+
+describe("siteWords", () => {
+  it("R18: lies where the shader's struct says", () => {
+    const head = synthSite.replace(/\s*levels: array<SynthLevel, 18>,/, "");
+    const layout = structLayout(head, "SynthSite");
+    const words = siteWords(SETTINGS, { bits: 6, varied: true, biased: false });
+    const floats = new Float32Array(words.buffer);
+    const at = (field: string): number => layout.offsets[field]! / 4;
+    expect(floats[at("size")]).toBe(4096);
+    expect(floats[at("amplitude")]).toBeGreaterThan(0);
+    expect(floats[at("sea")]).toBe(-12);
+    expect(floats[at("has_sea")]).toBe(1);
+    expect(floats[at("tree_line")]).toBeCloseTo(0.085);
+    expect([words[at("solved")], words[at("cyclic")], words[at("channel_bits")]]).toEqual([4, 1, 6]);
+    expect([words[at("varied")], words[at("biased")]]).toEqual([1, 0]);
+    const level = structLayout(synthSite, "SynthLevel");
+    expect(words.byteLength).toBe(SITE_BYTES);
+    expect(layout.size + 18 * level.size).toBe(SITE_BYTES);
+    const third = (layout.size + 3 * level.size) / 4;
+    expect(floats[third + level.offsets.inverse_spacing! / 4]).toBe(1 / 16);
+    expect(floats[third + level.offsets.tie! / 4]).toBeGreaterThan(floats[third + 8 + level.offsets.tie! / 4]!);
+  });
+
+  it("R26: keys are where the hashes of the vectors start", () => {
+    for (const { seed, level, stream, i, j, hash } of vectors.hashes) {
+      const words = siteWords({ ...SETTINGS, seed }, { bits: 0, varied: false, biased: false });
+      const key = words[12 + 8 * level + stream]!;
+      expect(mixBits((mixBits((key + j) >>> 0) + i) >>> 0)).toBe(hash);
+    }
+  });
+
+  it("R29: settings that differ in anything are not the same", () => {
+    expect(sameSettings(SETTINGS, { ...SETTINGS })).toBe(true);
+    expect(sameSettings({ ...SETTINGS, cyclic: false }, { ...SETTINGS, cyclic: undefined as unknown as boolean })).toBe(
+      true,
+    );
+    const others: Partial<SynthesisSettings>[] = [
+      { sizeM: 8192 },
+      { seed: 8 },
+      { detail: 1 },
+      { rule: "plain" },
+      { look: "paper" },
+      { seaLevelM: null },
+      { solved: 3 },
+      { cyclic: false },
+    ];
+    for (const other of others) expect(sameSettings(SETTINGS, { ...SETTINGS, ...other })).toBe(false);
+  });
+});
+
+describe("channelWords", () => {
+  it("R26: puts all channels on the finest grid, bilinear between the nodes of coarser ones", () => {
+    const words = channelWords(view({ amplitude: grid(5, (r, c) => r * 10 + c), snow: grid(3, (r, c) => r - c) }));
+    expect([words.bits, words.varied, words.biased]).toEqual([2, true, true]);
+    const at = (row: number, col: number): number[] => [
+      ...words.values.subarray(6 * (row * 5 + col), 6 * (row * 5 + col) + 6),
+    ];
+    expect(at(0, 0)).toEqual([0, 0.5, 0, 0, 0, 0]);
+    expect(at(3, 1)).toEqual([31, 0.5, 1, 0, 0, 0]);
+    expect(at(1, 4)).toEqual([14, 0.5, -1.5, 0, 0, 0]);
+    expect(at(4, 4)).toEqual([44, 0.5, 0, 0, 0, 0]);
+  });
+
+  it("tells whether anything is asked for", () => {
+    expect(channelWords(view())).toMatchObject({ varied: false, biased: false });
+    expect(channelWords(view({ roughness: flat(0.75) }))).toMatchObject({ varied: false, biased: false });
+    expect(channelWords(view({ roughness: grid(3, (r) => r) }))).toMatchObject({ varied: true, biased: false });
+    expect(channelWords(view({ wetness: flat(1) }))).toMatchObject({ varied: true, biased: true });
+  });
+
+  it("refuses grids that are no power of two", () => {
+    expect(() => channelWords(view({ snow: flat(0, 4) }))).toThrow(RangeError);
+  });
+});
