@@ -16,6 +16,7 @@ function stronger(paint: Paint, sign: number): Paint {
 }
 
 export function brushActions(c: ActionContext, edits: StrokeActions, put: Put): void {
+  /** Of the selected stroke; the brush's own where none, or no paint, is selected. */
   const selected = (): Paint | null => edits.stroke()?.paint ?? null;
   const change = (to: (paint: Paint) => Paint): void => {
     const paint = selected();

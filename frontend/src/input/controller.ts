@@ -342,7 +342,8 @@ export class InputController {
 
   /** A new stroke is selected. A plateau that nobody can see yet is put in hand, with a word on what to do. */
   #drawn(made: FinishedStroke): void {
-    this.selection.value = made.id;
+    // With the brush one goes on painting: keys and inspector stay with the brush.
+    this.selection.value = this.tool.value === "paint" ? null : made.id;
     if (!made.flush) return;
     this.tool.value = "select";
     this.#o.onMessage(FLUSH);

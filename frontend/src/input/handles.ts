@@ -47,6 +47,7 @@ export function crestIndex(stroke: Stroke): number {
 /** Where the cross-section is shown and dragged. */
 export function sectionOf(stroke: Stroke): Section {
   const { points } = shapeOf(stroke);
+  if (stroke.kind === "paint") return middleOf(points);
   const i = crestIndex(stroke);
   const crest: Vec3 = [points[3 * i]!, points[3 * i + 1]!, points[3 * i + 2]!];
   let dx = stroke.last[0] - stroke.first[0];
@@ -59,6 +60,22 @@ export function sectionOf(stroke: Stroke): Section {
   }
   const n = Math.hypot(dx, dy) || 1;
   return { crest, left: [-dy / n, dx / n] };
+}
+
+/** Half-way along a line (xyz triples), as one walks it on the map. */
+function middleOf(points: Float64Array): Section {
+  const leg = (i: number): number => Math.hypot(points[i + 3]! - points[i]!, points[i + 4]! - points[i + 1]!);
+  const ends = points.length - 3;
+  let left = 0;
+  for (let i = 0; i < ends; i += 3) left += leg(i) / 2;
+  let i = 0;
+  while (i + 3 < ends && leg(i) < left) {
+    left -= leg(i);
+    i += 3;
+  }
+  const n = leg(i) || 1;
+  const [dx, dy] = [(points[i + 3]! - points[i]!) / n, (points[i + 4]! - points[i + 1]!) / n];
+  return { crest: [points[i]! + left * dx, points[i + 1]! + left * dy, points[i + 2]!], left: [-dy, dx] };
 }
 
 /** The point at a distance across the stroke from the crest; negative is right of the direction of travel. */

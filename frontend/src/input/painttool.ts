@@ -15,7 +15,6 @@ import {
   type SketchShape,
   type SketchStart,
   SMOOTH_PX,
-  smoothPixels,
 } from "./sketch.ts";
 
 /** Channels in the order in which a key and the inspector go through them. */
@@ -66,12 +65,15 @@ export class BrushSketch implements Sketch {
   readonly settling = false;
   readonly #ground: Ground;
   readonly #range: number;
+  /** A pixel where the line began, metres. */
+  readonly #tolerance: number;
   readonly #touches: Touch[];
   readonly #samples: Sample[];
 
   constructor(start: SketchStart) {
     this.#ground = start.ground;
     this.#range = distance(start.sample.ray.origin, start.hit);
+    this.#tolerance = SIMPLIFY_PX * start.camera.metresPerPixelAt(start.hit);
     this.#touches = [{ sample: start.sample, at: start.hit }];
     this.#samples = [start.sample];
   }
@@ -88,9 +90,9 @@ export class BrushSketch implements Sketch {
   }
 
   shape(_nowMs: number, _exact: boolean, most: number): SketchShape {
-    const pixels = smoothPixels(this.#samples);
-    const points = simplifyTo(pixels, SIMPLIFY_PX, most).flatMap((i) => this.#smoothed(i));
-    const path = new Float64Array(points);
+    // On the map, not on the screen: what is straight there bends over a hill.
+    const xy = this.#touches.flatMap(({ at }) => [at[0], at[1]]);
+    const path = new Float64Array(simplifyTo(xy, this.#tolerance, most).flatMap((i) => this.#smoothed(i)));
     const first = this.#touches[0]!.at;
     const n = path.length;
     let last: Vec3 = [path[n - 3]!, path[n - 2]!, path[n - 1]!];
@@ -103,7 +105,7 @@ export class BrushSketch implements Sketch {
     return null;
   }
 
-  /** Where a sample touched, its jitter averaged away as `smoothPixels` does. */
+  /** Where a sample touched, its jitter averaged away as `smoothPixels` does it. */
   #smoothed(i: number): readonly number[] {
     const [before, here, after] = [this.#touches[i - 1], this.#touches[i]!, this.#touches[i + 1]];
     if (before === undefined || after === undefined || !near(before, here) || !near(after, here)) return here.at;

@@ -33,7 +33,7 @@ export class EskPaintForm extends LitElement {
       }
       .channels {
         display: grid;
-        grid-template-columns: repeat(3, 1fr);
+        grid-template-columns: repeat(2, minmax(0, 1fr));
         gap: 4px;
       }
       .channel {

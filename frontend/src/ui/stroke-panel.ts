@@ -50,8 +50,9 @@ export class EskStrokePanel extends SignalElement {
     const { input, session } = this.stage;
     const doc = session.doc.doc.value;
     const stroke = doc?.strokes.get(input.selection.value ?? "");
-    if (stroke) return this.#selected(stroke);
     const tool = input.tool.value;
+    const beside = tool === "paint" && stroke?.paint === null && session.canEdit.value;
+    if (stroke && !beside) return this.#selected(stroke);
     if (tool === "paint" && session.canEdit.value) return this.#brush();
     if (tool !== "select" && tool !== "paint" && session.canEdit.value) return this.#defaults(tool);
     return this.#list([...(doc?.strokes.values() ?? [])]);

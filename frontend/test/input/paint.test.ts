@@ -23,7 +23,7 @@ import {
   stroke,
   strokes,
 } from "./hands.ts";
-import { camera, groundOf, SIZE, SLOPE, sampleOf } from "./scene.ts";
+import { camera, groundOf, SIZE, SLOPE, sampleAt, sampleOf } from "./scene.ts";
 
 const LINE: readonly Vec3[] = [
   [1500, 1400, 0],
@@ -49,7 +49,7 @@ describe("the brush", () => {
         nearest = Math.min(nearest, Math.hypot(points[i]! - corner[0], points[i + 1]! - corner[1]));
       expect(nearest).toBeLessThan(30);
     }
-    expect(input.selection.value).toBe(s.id);
+    expect(input.selection.value).toBeNull();
     doc.undo();
     expect(strokes()).toEqual([]);
   });
@@ -136,6 +136,7 @@ describe("keys of the brush", () => {
     run("brush-channel");
     run("brush-opposite");
     stroke(LINE);
+    input.selection.value = only().id;
     const radius = brushRadius(brushRadius(SIZE / 40, SIZE) * 1.25, SIZE);
     expect(only().paint).toEqual({ channel: "forest", value: -0.7, radius_m: radius });
     pass(2000);
@@ -160,6 +161,7 @@ describe("keys of the brush", () => {
       expect(input.actions.get(id)!.enabled()).toBe(false);
     paint();
     stroke(LINE);
+    input.selection.value = only().id;
     expect(input.actions.get("brush-larger")!.enabled()).toBe(true);
     run("lock");
     expect(input.actions.get("brush-larger")!.enabled()).toBe(false);
@@ -178,11 +180,8 @@ describe("keys of the brush", () => {
     paint();
     const seen = PAINT_CHANNELS.map(() => {
       run("brush-channel");
-      input.selection.value = null;
       stroke(LINE);
-      const { channel } = strokes().at(-1)!.paint!;
-      input.selection.value = null;
-      return channel;
+      return strokes().at(-1)!.paint!.channel;
     });
     expect(new Set(seen).size).toBe(PAINT_CHANNELS.length);
     expect(seen.at(-1)).toBe("snow");
@@ -196,6 +195,7 @@ describe("a line of paint", () => {
     paint();
     stroke(LINE);
     const { id, first } = only();
+    input.selection.value = id;
     expect(input.actions.get("mirror")!.enabled()).toBe(false);
     expect(input.actions.get("raise")!.enabled()).toBe(false);
     input.actions.get("nudge-right")!.run();
@@ -213,6 +213,7 @@ describe("a line of paint", () => {
     paint();
     stroke(LINE);
     input.tool.value = "select";
+    input.selection.value = only().id;
     expect(input.handles.value.map((h) => h.kind).sort()).toEqual(["first", "last", "move", "radius"]);
     const { radius_m } = only().paint!;
     const rim = handle("radius").position;
@@ -304,7 +305,24 @@ describe("where paint lies", () => {
     sketch.add(sampleOf(cam, [2100, 1250, 0]));
     sketch.add({ ...sampleOf(cam, [2100, 1250, 0]), ray: { origin: [2048, 900, 1000], dir: [0, 1, -0.2] } });
     const { points } = sketch.shape(0, true, 100);
+    expect(points.length).toBe(6);
     for (let i = 1; i < points.length; i += 3) expect(points[i]).toBeLessThan(1600);
+  });
+
+  it("keeps the bends that a straight line on the screen makes over a hill", () => {
+    const hill = groundOf((x, y) => 500 * Math.exp(-((x - 2048) ** 2 + (y - 1800) ** 2) / 160_000));
+    const cam = camera();
+    const on = (x: number, y: number): Vec3 => [x, y, hill.heightAt(x, y)];
+    const [a, b] = [cam.project(on(1500, 1500)), cam.project(on(2600, 1500))];
+    const path = Array.from({ length: 40 }, (_, k) =>
+      sampleAt(cam, a.x + ((b.x - a.x) * k) / 39, a.y + ((b.y - a.y) * k) / 39),
+    );
+    const sketch = new BrushSketch({ camera: cam, ground: hill, hit: on(1500, 1500), sample: path[0]!, nowMs: 0 });
+    for (const sample of path.slice(1)) sketch.add(sample);
+    const { points } = sketch.shape(0, true, 100);
+    expect(points.length).toBeGreaterThan(3 * 5);
+    const ys = [...points].filter((_, i) => i % 3 === 1);
+    expect(Math.max(...ys) - Math.min(...ys)).toBeGreaterThan(50);
   });
 
   it("follows the ground in steps, however far apart its points are", () => {
