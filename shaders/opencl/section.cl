@@ -289,7 +289,7 @@ INLINE REAL skirt(const band_t *b, float cliff, REAL *width, REAL *height, REAL 
 
 // Weight of a stroke beside others by the distance from its crest (reference_section.nearness).
 INLINE REAL nearness(const band_t *b, const tables_t *t) {
-    REAL q = b->ds / fmax(NEAR_SHARE * b->end, NEAR_FLOOR * t->octave);
+    REAL q = b->ds / fmax(NEAR_SHARE * b->end, NEAR_FLOOR * fmax(t->s, t->octave));
     return 1.0f / (1.0f + q * q);
 }
 

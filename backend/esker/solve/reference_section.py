@@ -209,7 +209,8 @@ class Band:
 
 def nearness(b: Flanks, tables: Tables) -> Floats:
     """Weight of a stroke beside others by the distance from its crest: on any grid the same ground takes over."""
-    return np.asarray(1 / (1 + (b.ds / np.maximum(NEAR_SHARE * b.end, NEAR_FLOOR * tables.octave_m)) ** 2))
+    least = NEAR_FLOOR * max(tables.spacing_m, tables.octave_m)
+    return np.asarray(1 / (1 + (b.ds / np.maximum(NEAR_SHARE * b.end, least)) ** 2))
 
 
 def cross_section(near: Nearest, inside: Mask, params: Floats, tables: Tables) -> Band:

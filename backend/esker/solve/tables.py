@@ -42,7 +42,8 @@ NEAR_SHARE = 1 / 80
 """Strokes are weighed by the square of their distance; nearer to its crest than this share of its width one has most of
 the say. A length on the ground, so that every level sees the same crossing."""
 NEAR_FLOOR = 2.0
-"""That length is at least so many 1,024ths of the domain: a notch that level 4 could not show would turn into beads."""
+"""That length is at least so many 1,024ths of the domain, or cells of a level coarser than 4: a narrower notch would
+turn into beads."""
 OVERLAP_STIFFENING = 200.0
 """Where strokes want different heights the springs are up to this many times stiffer: the mean of their gradients is
 not the gradient of their mean height there, and a crest would stand out of the ground sample by sample."""
