@@ -6,6 +6,7 @@ A seed that ever failed is kept by name in ``KEPT``.
 from __future__ import annotations
 
 import random
+from typing import Any
 
 import pytest
 
@@ -28,8 +29,17 @@ def _stroke(stroke_id: str, x: float) -> c.Stroke:
     return c.Stroke(id=stroke_id, kind="profile", first=(x, 0, 0), last=(x, 500, 0), curve=((0, 0), (1, 5)))
 
 
+def _paint(value: float) -> c.Paint:
+    return c.Paint(channel="forest", value=value, radius_m=50.0)
+
+
+def _line(stroke_id: str, x: float) -> c.Stroke:
+    anchors: Any = {"first": (x, 0, 0), "last": (x, 500, 0), "curve": ((0, 0), (1, 0.5))}
+    return c.Stroke(id=stroke_id, kind="paint", paint=_paint(1.0), **anchors)
+
+
 def _birth() -> StrokeSet:
-    shared = {f"s{i}": _stroke(f"s{i}", 100.0 * i) for i in range(3)}
+    shared = {f"s{i}": _stroke(f"s{i}", 100.0 * i) for i in range(3)} | {"p0": _line("p0", 300.0)}
     return StrokeSet("t", strokes=shared)
 
 
@@ -43,7 +53,8 @@ def _random_op(rng: random.Random, client: Client, n: int) -> tuple[c.Op, str | 
     x = float(rng.randrange(4000))
     kind = rng.randrange(8)
     if kind == 0:
-        return c.BeginStroke(stroke=_stroke(f"{client.name}-{n}", x)), f"g{n}"
+        make = _line if n % 3 == 0 else _stroke
+        return c.BeginStroke(stroke=make(f"{client.name}-{n}", x)), f"g{n}"
     if kind == 1:
         return c.AppendPoints(stroke=target, start=rng.randrange(4), points=((0.5, x),), last=(x, x, 0)), None
     if kind == 2:
@@ -60,6 +71,9 @@ def _random_op(rng: random.Random, client: Client, n: int) -> tuple[c.Op, str | 
             c.MoveAnchor(stroke=target, which="last", to=(x, 3, 4)),
         )
         return c.Group(ops=parts), None
+    found = client.doc.document.strokes.get(target)
+    if found is not None and found.paint is not None and n % 2:
+        return c.SetStroke(stroke=target, fields=_fields(paint=_paint(round(rng.uniform(-1, 1), 3)))), None
     return c.SetStroke(stroke=target, fields=_fields(locked=rng.random() < 0.2, label=f"{n}")), None
 
 

@@ -79,4 +79,12 @@ describe("bounds", () => {
     expect(bounds({ ...s, hidden: true })).toBeNull();
     expect(bounds({ ...s, curve: [] })).toBeNull();
   });
+
+  it("hold the ring of a brush, whatever its flanks", () => {
+    const paint = { channel: "snow" as const, value: 1, radius_m: 30 };
+    const flank = { slope_deg: 30, extent_m: 500, shape: "straight" as const };
+    const s = ridge("p", { kind: "paint", paint, left: flank, plateau_radius_m: 99, curve: [[1, 0.5]] });
+    expect([...worldPoints(s)]).toEqual([900, 500, 0]);
+    expect(bounds(s)).toEqual({ x0: 870, y0: 470, x1: 930, y1: 530 });
+  });
 });
