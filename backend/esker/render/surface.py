@@ -23,7 +23,7 @@ from esker.synthesis.subdivide import Samples, interpolated, root, subdivide, wh
 
 SLOT: Final = TILE_SAMPLES + 2 * BORDER
 RATIOS: Final = {"landscape": 0.5, "smooth": 0.25, "plain": 0.25}
-"""Error of a level that is not made yet in that of the one above it: what is likely (frontend/src/tiles/synthetic.ts)."""
+"""Likely error of a level that is not made yet, in that of the one above it (frontend/src/tiles/synthetic.ts)."""
 FALL: Final = 2.0 ** -H_RANGE[0]
 """What a level may add falls by this at least: for bounds."""
 
