@@ -27,7 +27,7 @@ fn label_vertex(@builtin(vertex_index) index: u32, in: LabelIn) -> LabelVertex {
   let size = in.along.w;
   let at = way * (in.place.w + (corner.x - 0.5) * LETTER_WIDTH * size) + vec2f(-way.y, way.x) * (corner.y - 0.5) * size;
   // A little towards the eye, so that the ground it lies on does not cut into it.
-  let near = select(1.02 * clip.z, clip.z + 0.01, view.eye.w > 0.5);
+  let near = select(1.12 * clip.z, clip.z + 0.01, view.eye.w > 0.5);
   let uv = vec2f((in.along.z + corner.x) / LETTERS, 1.0 - corner.y);
   return LabelVertex(vec4f(clip.xy + at / pixels * clip.w, min(near, clip.w), clip.w), uv);
 }

@@ -15,7 +15,7 @@ const ADVANCE = 0.5;
 const SPACE = 0.22;
 const FLOATS = 8;
 /** Height of a letter's cell in CSS pixels. */
-const SIZE_PX = 19;
+const SIZE_PX = 20;
 
 export class LabelPass {
   private readonly buffer: GrowingBuffer;

@@ -29,9 +29,10 @@ export interface LabelOptions {
 /** A cell is looked at while it covers more pixels than this. */
 const CELL_PX = 7;
 const MOST_TILES = 320;
-/** A line may bend by this share of the index interval under a label. */
-const BEND = 0.1;
-const NEAREST = 8;
+/** In heights of a letter: half the length of a label, how far its line may bend away under it, room to the next label. */
+const HALF_LENGTH = 1.2;
+const BEND = 0.55;
+const NEAREST = 7;
 
 interface Candidate extends ContourLabel {
   readonly px: number;
@@ -173,13 +174,13 @@ function consider(
   const across =
     Math.abs((next[0] - middle[0]) * (along[1] - middle[1]) - (next[1] - middle[1]) * (along[0] - middle[0])) /
     Math.max(perMetre * cell, 1e-9);
-  if (across < 1.5 * sizePx) return null;
-  const half = (1.6 * sizePx) / Math.max(perMetre, 1e-9) / cell;
-  if (half > 12) return null;
+  if (across < 0.9 * sizePx) return null;
+  const half = (HALF_LENGTH * sizePx) / Math.max(perMetre, 1e-9) / cell;
+  if (half > TILE_CELLS / 4) return null;
   for (const s of [-half, half]) {
     const [c, r] = [at + s * dx, row + s * dy];
     if (c < 0 || r < 0 || c > TILE_CELLS || r > TILE_CELLS) return null;
-    if (Math.abs(bilinear(tile, c, r) - z) > BEND * everyM) return null;
+    if ((Math.abs(bilinear(tile, c, r) - z) / everyM) * across > BEND * sizePx) return null;
   }
   return { x, y, z, dx, dy, text: "", px: middle[0], py: middle[1], rank: rank(x, y, cell) };
 }
