@@ -31,7 +31,7 @@ ROUGHNESS_TO_H: Final = 1.1
 """How far roughness 0 (smooth) or 1 moves the exponent, twice the distance from the middle."""
 SNOW_TO_H: Final = 0.8
 """Thick snow damps detail: what full snow adds to the exponent (paper 1, section 4)."""
-H_RANGE: Final = (0.3, 2.5)
+H_RANGE: Final = (0.75, 2.5)
 """Exponents that an octave can have; the first bounds what may be added on a level, by which boxes grow."""
 PAINT_MORE: Final = 2.0
 PAINT_LESS: Final = 1.0

@@ -2,77 +2,31 @@
 
 from __future__ import annotations
 
-import itertools
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from esker import fractal, grid
-from esker.solve.device import open_device
-from esker.synthesis.interpolate import Window
-from esker.synthesis.kernels import Kernels
-from esker.synthesis.site import Site
-from tests.synthesis.sites import SIZE
-
-LEVEL = 5
-OCTAVES = (40.0, 160.0)
-"""Cycles along the domain between which the spectrum is fitted: whole octaves, above the coarsest level's 32, and two
-octaves below the finest level's end, where the next octave is missing."""
-
-
-def fractal_of(h: float, patch: pytest.MonkeyPatch) -> NDArray[np.float32]:
-    """Detail of a flat, cyclic domain of constant exponent: without what ties it to slope, height and itself."""
-    for name in ("FLAT", "STEEP", "VALLEY", "LOW", "NOISE"):
-        patch.setattr(fractal, f"SMOOTHNESS_{name}", 0.0)
-    patch.setattr(fractal, "SMOOTHNESS", h)
-    patch.setattr(fractal, "SMOOTHNESS_MIN", 0.3)
-    patch.setattr(fractal, "FLAT_SHARE", 1.0)
-    device = open_device()
-    if device is None:
-        pytest.skip("four million samples are for a device")
-    site = Site(SIZE, 3, (np.zeros((65, 65), dtype=np.float32),), look="paper", cyclic=True)
-    n = grid.cells(LEVEL)
-    made = Kernels(device).detail(site, Window(LEVEL, 0, n, 0, n)).state
-    assert abs(made.h - h).max() < 1e-4
-    return np.asarray(made.d, dtype=np.float32)
+from esker.bench import synthesis_statistics as bench
 
 
 @pytest.fixture(scope="module", params=[0.75, 1.1])
 def asked(request: pytest.FixtureRequest) -> tuple[float, NDArray[np.float32]]:
-    """An exponent, and detail that was made with it."""
-    with pytest.MonkeyPatch.context() as patch:
-        return request.param, fractal_of(request.param, patch)
-
-
-def spectrum(d: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Power of one half plane of frequencies, and the frequencies, cycles along the domain."""
-    power = np.abs(np.fft.rfft2(d)) ** 2
-    n = len(d)
-    ky, kx = np.meshgrid(np.fft.fftfreq(n, 1 / n), np.arange(n // 2 + 1), indexing="ij")
-    return power, kx.astype(np.float64), ky
-
-
-def radial(power: NDArray[np.float64], radius: NDArray[np.float64], bins: int) -> tuple[list[float], list[float]]:
-    """Logarithms of mean radius and mean power of rings."""
-    edges = np.geomspace(*OCTAVES, bins + 1)
-    rings = [(radius >= low) & (radius < high) for low, high in itertools.pairwise(edges)]
-    return [float(np.log(radius[r]).mean()) for r in rings], [float(np.log(power[r].mean())) for r in rings]
+    """An exponent, and detail of a flat, cyclic domain that was made with it."""
+    return request.param, bench.surface(request.param)
 
 
 def test_the_spectrum_falls_as_asked(asked: tuple[float, NDArray[np.float32]]) -> None:
     """SPEC F15: radial power of a surface of exponent H falls as f^-(2H + 2); within 10 %."""
     h, d = asked
-    power, kx, ky = spectrum(d)
-    f, p = radial(power, np.hypot(kx, ky), 16)
-    slope = -float(np.polyfit(f, p, 1)[0])
+    power, kx, ky = bench.power(d)
+    slope = bench.fitted_slope(power, np.hypot(kx, ky))
     assert slope == pytest.approx(2 * h + 2, rel=0.1)
 
 
 def test_no_lattice_shows_in_the_spectrum(asked: tuple[float, NDArray[np.float32]]) -> None:
     """SPEC F16: not along the axes, nor the diagonals, nor in lines or points at the lattices of coarser levels."""
     _, d = asked
-    power, kx, ky = spectrum(d)
+    power, kx, ky = bench.power(d)
     radius = np.hypot(kx, ky)
     for centre in (40, 64, 100, 128, 200, 256, 400):
         ring = np.abs(radius - centre) < 0.1 * centre

@@ -156,7 +156,7 @@ export const SYNTH_ROUGHNESS_TO_H = 1.1;
 
 export const SYNTH_SNOW_TO_H = 0.8;
 
-export const SYNTH_H_RANGE_FROM = 0.3;
+export const SYNTH_H_RANGE_FROM = 0.75;
 
 export const SYNTH_H_RANGE_TO = 2.5;
 
