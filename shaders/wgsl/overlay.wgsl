@@ -46,6 +46,12 @@ fn influence_tint(albedo: vec3f, felt: f32) -> vec3f {
   return mix(grey, tint * (0.45 + 1.6 * grey), clamp(smoothstep(0.02, 0.5, felt) * 0.72 + bands, 0.0, 0.9));
 }
 
+// A painted channel: 0 took all of it away, 0.5 left it as it grows, 1 asked for all of it.
+fn painted_tint(share: f32) -> vec3f {
+  let toward = mix(vec3f(0.46, 0.17, 0.05), vec3f(0.03, 0.30, 0.44), step(0.5, share));
+  return mix(vec3f(0.30), toward, sqrt(clamp(abs(share - 0.5) * 2.0 - 0.01, 0.0, 1.0)));
+}
+
 fn level_tint(level: u32) -> vec3f {
   let hue = f32(level) * 0.61803;
   return 0.5 + 0.45 * cos(6.2831853 * (vec3f(hue) + vec3f(0.0, 0.33, 0.67)));

@@ -87,6 +87,9 @@ fn terrain_fragment(v: TerrainVertex) -> @location(0) vec4f {
   } else if (view.overlay == OVERLAY_INFLUENCE) {
     m.albedo = influence_tint(m.albedo, v.detail.z);
     m.gloss *= 1.0 - v.detail.z;
+  } else if (view.overlay == OVERLAY_PAINTED) {
+    m.albedo = mix(m.albedo, painted_tint(v.detail.z), 0.8);
+    m.gloss = 0.0;
   } else if (view.overlay == OVERLAY_PATCHES) {
     m.albedo = mix(m.albedo, level_tint(patch_level(v.record)) * 0.5, 0.7);
   }

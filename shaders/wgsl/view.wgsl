@@ -41,6 +41,7 @@ const OVERLAY_SLOPE: u32 = 2u;
 const OVERLAY_PATCHES: u32 = 3u;
 const OVERLAY_DETAIL: u32 = 4u;
 const OVERLAY_INFLUENCE: u32 = 5u;
+const OVERLAY_PAINTED: u32 = 6u;
 
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var heights: texture_2d_array<f32>;

@@ -155,6 +155,9 @@ export interface CursorVisual {
 /** What a picture trades: `automatic` holds the frame rate, the others hold their screen-error bound. */
 export type QualityMode = "automatic" | "fast" | "balanced" | "fine";
 
+/** Overlays of what paint adds to a channel, or takes from it. */
+export type PaintedOverlay = "snow" | "forest" | "grass" | "wetness";
+
 /** All that one frame shows. Built anew by the app each frame; renderers only read it. */
 export interface Scene {
   readonly camera: CameraState;
@@ -170,7 +173,7 @@ export interface Scene {
   readonly quality?: QualityMode;
   /** Seconds, for water and the like. */
   readonly time: number;
-  readonly overlay: "none" | "contours" | "slope" | "detail" | "patches" | "influence";
+  readonly overlay: "none" | "contours" | "slope" | "detail" | PaintedOverlay | "patches" | "influence";
   /** Where the selected stroke is felt, 0..1, for the overlay of that name; null: none is selected. */
   readonly influence?: ChannelGrid | null;
   readonly showStrokes: boolean;

@@ -1,11 +1,25 @@
 /**
  * What the ground's overlays read over the whole domain, as one small texture (rgba8unorm; `detail_at` in terrain.wgsl): noise
- * amplitude, roughness, and where the selected stroke is felt.
+ * amplitude, roughness, and where the selected stroke is felt or a channel is painted.
  */
 
-import type { ChannelGrid, ChannelView } from "../core/types.ts";
+import type { ChannelGrid, ChannelView, Scene } from "../core/types.ts";
 
 const TEXEL_BYTES = 4;
+
+const shares = new WeakMap<ChannelGrid, ChannelGrid>();
+
+/** What the third component of the texture shows: influence, or a painted channel as 0.5 + bias / 2; null with other overlays. */
+export function overlayGrid({ overlay, influence, channels }: Scene): ChannelGrid | null {
+  if (overlay === "influence") return influence ?? null;
+  if (overlay !== "snow" && overlay !== "forest" && overlay !== "grass" && overlay !== "wetness") return null;
+  const grid = channels[overlay];
+  const known = shares.get(grid);
+  if (known !== undefined) return known;
+  const made = { side: grid.side, values: grid.values.map((bias) => 0.5 + bias / 2) };
+  shares.set(grid, made);
+  return made;
+}
 
 export class ChannelTexture {
   texture: GPUTexture;

@@ -4,14 +4,25 @@ import { eyeProjection, reversedDepth, viewAxes } from "../core/eyeprojection.ts
 import type { Scene, Vec3 } from "../core/types.ts";
 import { MAX_SYNTHESIS_LEVEL, TILE_CELLS } from "../generated/contract.ts";
 import type { Atlas } from "./atlas.ts";
-import { ChannelTexture } from "./channeltexture.ts";
+import { ChannelTexture, overlayGrid } from "./channeltexture.ts";
 import { StructWriter, structLayout } from "./layout.ts";
 import { adaptation, contourInterval, LOOKS } from "./looks.ts";
 import { VIEW_SOURCE } from "./shaders.ts";
 import type { SkyTables } from "./sky.ts";
 
 const MAX_CURSORS = 32;
-const OVERLAYS = { none: 0, contours: 1, slope: 2, patches: 3, detail: 4, influence: 5 } as const;
+const OVERLAYS = {
+  none: 0,
+  contours: 1,
+  slope: 2,
+  patches: 3,
+  detail: 4,
+  influence: 5,
+  snow: 6,
+  forest: 6,
+  grass: 6,
+  wetness: 6,
+} as const;
 
 /** What a frame is drawn with besides the scene. */
 export interface FrameFacts {
@@ -117,8 +128,7 @@ export class FrameBindings {
 
   /** Writes the uniform for this frame. */
   update(scene: Scene, facts: FrameFacts): void {
-    const influence = scene.overlay === "influence" ? (scene.influence ?? null) : null;
-    if (this.channels.update(scene.channels, influence) && this.atlas !== null) this.attach(this.atlas);
+    if (this.channels.update(scene.channels, overlayGrid(scene)) && this.atlas !== null) this.attach(this.atlas);
     this.writeCamera(scene, facts);
     const w = this.writer;
     const { settings } = scene;

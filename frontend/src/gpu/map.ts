@@ -2,8 +2,9 @@
 
 import type { CameraState, FrameStats, Rgba, Scene, SceneRenderer, Tile, TileView } from "../core/types.ts";
 import { assembleBordered, SLOT_TEXELS } from "./apron.ts";
+import { overlayGrid } from "./channeltexture.ts";
 import { contourInterval } from "./looks.ts";
-import { DetailPicture, InfluencePicture } from "./mapdetail.ts";
+import { DetailPicture, InfluencePicture, PaintedPicture } from "./mapdetail.ts";
 import { type MapStyle, shadeTile } from "./mapshade.ts";
 
 /** Shading stops for this frame after so many milliseconds; what is left follows in the next frames. */
@@ -36,6 +37,7 @@ export class MapRenderer implements SceneRenderer {
   private readonly pictures = new Map<string, Picture>();
   private readonly detail = new DetailPicture();
   private readonly felt = new InfluencePicture();
+  private readonly painted = new PaintedPicture();
   private readonly slot = new Float32Array(SLOT_TEXELS * SLOT_TEXELS);
   private frame = 0;
 
@@ -55,7 +57,11 @@ export class MapRenderer implements SceneRenderer {
     drawSheet(this.context, frame, scene.tiles.sizeM);
     const { drawn, uploads, busy } = this.drawTiles(scene, frame, began);
     if (scene.overlay === "detail") this.drawOver(this.detail.of(scene.channels), scene, frame);
-    if (scene.overlay === "influence" && scene.influence) this.drawOver(this.felt.of(scene.influence), scene, frame);
+    const shares = overlayGrid(scene);
+    if (shares !== null) {
+      const picture = scene.overlay === "influence" ? this.felt.of(shares) : this.painted.of(shares);
+      this.drawOver(picture, scene, frame);
+    }
     drawGrid(this.context, frame, scene.tiles.sizeM);
     if (scene.showStrokes) drawStrokes(this.context, frame, scene);
     drawCursors(this.context, frame, scene);

@@ -54,6 +54,39 @@ export class DetailPicture {
 const FELT_FAR: Rgb = [0xc9, 0xb8, 0x6e];
 const FELT_NEAR: Rgb = [0xd3, 0x5a, 0x3c];
 
+/** The colours of painted_tint in overlay.wgsl and of ui/legend.ts. */
+const LESS: Rgb = [0xb3, 0x74, 0x42];
+const MORE: Rgb = [0x35, 0x95, 0xb3];
+
+/** Colour for a painted channel: 0 less of it, 0.5 as it grows, 1 more. */
+export function paintedColour(share: number): Rgb {
+  const strength = Math.sqrt(Math.min(1, Math.max(0, 2 * Math.abs(share - 0.5) - 0.01)));
+  return mix(NONE, share < 0.5 ? LESS : MORE, strength);
+}
+
+/** What is painted of a channel, as a picture to lay over the map. */
+export class PaintedPicture {
+  private canvas: HTMLCanvasElement | null = null;
+  private source: ChannelGrid | null = null;
+
+  /** The picture, north up. `shares`: 0..1, south row first (`overlayGrid`). */
+  of(shares: ChannelGrid): HTMLCanvasElement {
+    if (this.canvas !== null && this.source === shares) return this.canvas;
+    this.source = shares;
+    const { side, values } = shares;
+    this.canvas ??= document.createElement("canvas");
+    Object.assign(this.canvas, { width: side, height: side });
+    const context = this.canvas.getContext("2d")!;
+    const image = context.createImageData(side, side);
+    values.forEach((share, k) => {
+      const row = side - 1 - Math.floor(k / side);
+      image.data.set([...paintedColour(share), 255], 4 * (row * side + (k % side)));
+    });
+    context.putImageData(image, 0, 0);
+    return this.canvas;
+  }
+}
+
 /** Where the selected stroke is felt, as a picture to lay over the map. */
 export class InfluencePicture {
   private canvas: HTMLCanvasElement | null = null;

@@ -1,4 +1,6 @@
 import { css, html, nothing, type TemplateResult } from "lit";
+import type { PaintedOverlay } from "../core/types.ts";
+import { SUBSTANCES } from "./paints.ts";
 import { SignalElement } from "./signal-element.ts";
 import type { Stage } from "./stage.ts";
 import { shared } from "./styles/shared.ts";
@@ -60,6 +62,9 @@ export class EskLegend extends SignalElement {
       .influence {
         background: linear-gradient(to right, #a7a7a7, #d6c183 45%, #d35a3c);
       }
+      .painted {
+        background: linear-gradient(to right, #b37442, #8d8d8d 50%, #3595b3);
+      }
       .amplitude {
         background: linear-gradient(to right, #8d8d8d, #a9a06c);
       }
@@ -70,11 +75,13 @@ export class EskLegend extends SignalElement {
 
   protected override render(): TemplateResult | typeof nothing {
     const overlay = this.stage.overlay.value;
-    this.toggleAttribute("hidden", overlay !== "slope" && overlay !== "detail" && overlay !== "influence");
+    const plain = overlay === "none" || overlay === "contours" || overlay === "patches";
+    this.toggleAttribute("hidden", plain);
+    if (plain) return nothing;
     if (overlay === "slope") return scale("Steepness", "slope", ["0°", "30°", "60°"]);
     if (overlay === "influence") return this.#influence();
-    if (overlay !== "detail") return nothing;
     this.stage.channels.revision.value;
+    if (overlay !== "detail") return this.#painted(overlay);
     const greatest = this.stage.channels.amplitude.values.reduce((a, b) => Math.max(a, b), 0);
     return html`
       ${scale("Roughness", "roughness", ["smooth", "rough"])} ${scale("Amplitude", "amplitude", amplitudeEnds(greatest))}
@@ -89,16 +96,33 @@ export class EskLegend extends SignalElement {
     return scale("Felt from the selected stroke", "influence", ["far", "its flanks", "its line"]);
   }
 
+  /** What paint says of a channel, and how much of it there is in the end under the cursor. */
+  #painted(channel: PaintedOverlay): TemplateResult {
+    const name = `Painted ${SUBSTANCES[channel].title.toLowerCase()}`;
+    return html`${scale(name, "painted", ["less", "as it grows", "more"])} ${this.#share(channel)}`;
+  }
+
+  #share(channel: PaintedOverlay): TemplateResult | typeof nothing {
+    const at = this.stage.cursor.value;
+    const found = at && this.stage.shown.attributesAt(at[0], at[1]);
+    if (!at || !found) return nothing;
+    const bias = Math.round(100 * this.stage.channels.valueAt(channel, at[0], at[1]));
+    const share = Math.round(100 * found[channel === "wetness" ? "wet" : channel]);
+    return html`<div class="ends"><span>Here</span><span>${signed(bias)} %, which makes ${share} %</span></div>`;
+  }
+
   /** The two values under the cursor. */
   #here(): TemplateResult | typeof nothing {
     const at = this.stage.cursor.value;
     if (!at) return nothing;
     const { channels } = this.stage;
-    const amplitude = metres(Math.max(0, channels.amplitudeAt(at[0], at[1])));
+    const amplitude = metres(channels.amplitudeAt(at[0], at[1]));
     const roughness = Math.round(100 * channels.roughnessAt(at[0], at[1]));
     return html`<div class="ends"><span>Here</span><span>${amplitude}, ${roughness} % rough</span></div>`;
   }
 }
+
+const signed = (v: number): string => (v > 0 ? `+${v}` : v < 0 ? `−${-v}` : "0");
 
 function scale(name: string, kind: string, ends: readonly string[]): TemplateResult {
   return html`<div class="scale" role="img" aria-label=${`${name}: ${ends.join(" to ")}`}>

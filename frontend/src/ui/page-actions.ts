@@ -22,7 +22,7 @@ export function pageActions(
   put("toggle-strokes", "Show or hide all strokes", ["s"], () => {
     stage.showStrokes.value = !stage.showStrokes.value;
   });
-  put("next-overlay", "Next overlay: contours, steepness, detail, reach, levels", ["x"], () => {
+  put("next-overlay", "Next overlay: contours, steepness, detail, paint, reach, levels", ["x"], () => {
     const at = OVERLAYS.findIndex((o) => o.value === stage.overlay.value);
     stage.overlay.value = OVERLAYS[(at + 1) % OVERLAYS.length]!.value;
   });

@@ -18,6 +18,10 @@ export const OVERLAYS: readonly { readonly value: Scene["overlay"]; readonly lab
   { value: "contours", label: "Contour lines" },
   { value: "slope", label: "Steepness" },
   { value: "detail", label: "Roughness and amplitude" },
+  { value: "snow", label: "Painted snow" },
+  { value: "forest", label: "Painted forest" },
+  { value: "grass", label: "Painted meadow" },
+  { value: "wetness", label: "Painted wetness" },
   { value: "influence", label: "Reach of the selected stroke" },
   { value: "patches", label: "Levels of detail" },
 ];

@@ -1,7 +1,7 @@
 /** Amplitude and roughness on the page (SPEC R23). */
 
 import { describe, expect, it } from "vitest";
-import type { DecodedFrame } from "../../src/core/types.ts";
+import type { ChannelGrid, DecodedFrame, Scene } from "../../src/core/types.ts";
 import {
   AMPLITUDE_QUANTA_PER_M,
   BIAS_QUANTA,
@@ -9,8 +9,8 @@ import {
   FrameKind,
   ROUGHNESS_QUANTA,
 } from "../../src/generated/contract.ts";
-import { channelTexels } from "../../src/gpu/channeltexture.ts";
-import { detailColour } from "../../src/gpu/mapdetail.ts";
+import { channelTexels, overlayGrid } from "../../src/gpu/channeltexture.ts";
+import { detailColour, paintedColour } from "../../src/gpu/mapdetail.ts";
 import { ChannelStore } from "../../src/tiles/channels.ts";
 
 const SIZE = 1000;
@@ -131,6 +131,32 @@ describe("ChannelStore", () => {
     expect(store.wetness.values[64]).toBe(1);
     expect(store.grass.values[0]).toBe(0);
     expect(store.roughness.values[0]).toBe(0.5);
+  });
+});
+
+describe("overlayGrid", () => {
+  const store = new ChannelStore(SIZE);
+  const scene = (overlay: Scene["overlay"], influence: ChannelGrid | null = null): Scene =>
+    ({ overlay, influence, channels: store }) as unknown as Scene;
+
+  it("is what the overlay shows: a painted channel about a half, the influence as it is, else nothing", () => {
+    const painted = { stamp: 1, snow: { side: 2, values: new Float32Array([-1, 0, 0.5, 1]) } };
+    const shares = overlayGrid({ overlay: "snow", channels: painted } as unknown as Scene)!;
+    expect([...shares.values]).toEqual([0, 0.5, 0.75, 1]);
+    expect(overlayGrid({ overlay: "snow", channels: painted } as unknown as Scene)).toBe(shares);
+    expect([...overlayGrid(scene("wetness"))!.values]).toEqual([0.5, 0.5, 0.5, 0.5]);
+    const felt = { side: 2, values: new Float32Array(4) };
+    expect(overlayGrid(scene("influence", felt))).toBe(felt);
+    expect(overlayGrid(scene("snow", felt))).not.toBe(felt);
+    for (const overlay of ["none", "contours", "slope", "detail", "patches"] as const)
+      expect(overlayGrid(scene(overlay, felt))).toBeNull();
+  });
+
+  it("is brown for less, blue for more and grey where nothing is painted, on the map too", () => {
+    const [less, none, more] = [0, 0.5, 1].map(paintedColour);
+    expect(less![0]).toBeGreaterThan(less![2]);
+    expect(more![2]).toBeGreaterThan(more![0]);
+    expect(Math.max(...none!) - Math.min(...none!)).toBe(0);
   });
 });
 

@@ -5,12 +5,13 @@ import { resolve } from "node:path";
 import { signal } from "@preact/signals-core";
 import { describe, expect, it, vi } from "vitest";
 import { Camera } from "../../src/core/camera.ts";
-import type { Ground } from "../../src/core/types.ts";
+import type { Ground, Scene } from "../../src/core/types.ts";
 import { SyncDoc } from "../../src/doc/sync.ts";
 import { type Action, createActions, type ToolId } from "../../src/input/actions.ts";
 import { toolDefaults } from "../../src/input/defaults.ts";
 import { keyLabel } from "../../src/ui/keys.ts";
 import { pageActions } from "../../src/ui/page-actions.ts";
+import { OVERLAYS } from "../../src/ui/view-bar.ts";
 
 const GUIDE = resolve(import.meta.dirname, "../../../docs/user-guide.md");
 const MARKS = /(<!-- keys:.*?-->\n\| what \| keys \|\n\|---\|---\|\n)([\s\S]*?)(<!-- \/keys -->)/;
@@ -21,7 +22,7 @@ function everyAction() {
   const commands = { panel: vi.fn(), help: vi.fn(), share: vi.fn() };
   const stage = {
     showStrokes: signal(true),
-    overlay: signal<"none" | "contours" | "slope" | "detail" | "patches" | "influence">("none"),
+    overlay: signal<Scene["overlay"]>("none"),
   };
   const actions: Map<string, Action> = createActions({
     camera: new Camera(4096),
@@ -64,11 +65,13 @@ describe("actions", () => {
     expect([commands.help, commands.panel, commands.share].map((f) => f.mock.calls.length)).toEqual([1, 1, 1]);
     actions.get("toggle-strokes")!.run();
     expect(stage.showStrokes.value).toBe(false);
-    const overlays = Array.from({ length: 6 }, () => {
+    const overlays = Array.from({ length: OVERLAYS.length }, () => {
       actions.get("next-overlay")!.run();
       return stage.overlay.value;
     });
-    expect(overlays).toEqual(["contours", "slope", "detail", "influence", "patches", "none"]);
+    expect(overlays).toEqual([
+      ...["contours", "slope", "detail", "snow", "forest", "grass", "wetness", "influence", "patches", "none"],
+    ]);
   });
 
   // To write the table anew: ESKER_WRITE_GUIDE=1 npx vitest run test/ui/actions
