@@ -116,6 +116,29 @@ def spectra() -> dict[str, Any]:
     return out
 
 
+def lattice() -> dict[str, Any]:
+    """How far what lies on a lattice stands out: power on axes and diagonals over that of their ring, the farthest from
+    1; mean squares of samples on coarser levels over those of all, the farthest from 1."""
+    d = surface(EXPONENTS[1]).astype(np.float64)
+    p, kx, ky = power(d.astype(np.float32))
+    radius = np.hypot(kx, ky)
+    lines = {"axes": (kx == 0) | (ky == 0), "diagonals": np.abs(kx - np.abs(ky)) <= 1}
+    out: dict[str, Any] = {}
+    for name, part in lines.items():
+        ratios = []
+        for centre in (40, 64, 100, 128, 200, 256, 400):
+            ring = np.abs(radius - centre) < 0.1 * centre
+            ratios.append(float(p[ring & part].mean() / p[ring].mean()))
+        out[name] = round(max(ratios, key=lambda r: abs(np.log(r))), 2)
+    slope, bend = np.roll(d, -1, 1) - d, np.roll(d, -1, 1) - 2 * d + np.roll(d, 1, 1)
+    for name, z in (("height", d), ("slope", slope), ("bend", bend)):
+        means = [
+            np.mean(z[j::step, i::step] ** 2) for step in (2, 4, 8) for j in (0, step // 2) for i in (0, step // 2)
+        ]
+        out[name] = round(max((float(m / np.mean(z * z)) for m in means), key=lambda r: abs(np.log(r))), 3)
+    return out
+
+
 def _plane(slope: float, middle: float, channels: Mapping[str, float]) -> Site:
     y = np.linspace(-0.5, 0.5, grid.samples(0))[:, None] * SIZE
     z = np.asarray(middle * SIZE + slope * y * np.ones(grid.samples(0)), dtype=np.float32)
@@ -176,6 +199,7 @@ def main() -> int:
     data = {
         "device": "NumPy" if device is None else device.name,
         "spectra": spectra(),
+        "lattice": lattice(),
         "roughness": roughness(),
         "agreement": agreement(),
     }
