@@ -60,10 +60,10 @@ const JOB_WORDS = 8;
 const JOB_ALIGN = 256 / (4 * JOB_WORDS);
 /** Workgroups of 64 parents' cells that make one slot. */
 const GROUPS = Math.ceil((TILE_SAMPLES / 2 + 2.5) ** 2 / 64);
-const ENTRIES = ["synthesise", "synthesise_root", "compose", "compose_root"] as const;
-const RULES: readonly SynthesisRule[] = ["landscape", "smooth", "plain"];
-type Entry = (typeof ENTRIES)[number];
-type Pipelines = Readonly<Record<Entry, GPUComputePipeline>>;
+type Entry = "synthesise" | "synthesise_root" | "compose" | "compose_root";
+/** Pipelines that are ready from the start; another rule's are made when first asked for: compiling takes its time. */
+const FIRST_RULE: SynthesisRule = "landscape";
+const FIRST_ENTRIES: readonly Entry[] = ["synthesise", "synthesise_root", "compose"];
 
 export class SynthesisPass {
   private readonly site: GPUBuffer;
@@ -81,7 +81,7 @@ export class SynthesisPass {
   private constructor(
     private readonly device: GPUDevice,
     private readonly layout: GPUBindGroupLayout,
-    private readonly pipelines: Readonly<Record<SynthesisRule, Pipelines>>,
+    private readonly pipelines: Map<string, GPUComputePipeline>,
   ) {
     const usage = GPUBufferUsage.COPY_DST;
     this.site = device.createBuffer({ label: "site", size: SITE_BYTES, usage: usage | GPUBufferUsage.UNIFORM });
@@ -91,18 +91,11 @@ export class SynthesisPass {
 
   static async create(device: GPUDevice): Promise<SynthesisPass> {
     const layout = synthesisLayout(device);
-    const pipelineLayout = device.createPipelineLayout({ bindGroupLayouts: [layout] });
-    const made = RULES.map(async (rule): Promise<[SynthesisRule, Pipelines]> => {
-      const module = device.createShaderModule({ label: `synthesis ${rule}`, code: synthesisSource(rule) });
-      const stages = ENTRIES.map(async (entryPoint): Promise<[Entry, GPUComputePipeline]> => {
-        const label = `${entryPoint} ${rule}`;
-        const compute = { module, entryPoint };
-        return [entryPoint, await device.createComputePipelineAsync({ label, layout: pipelineLayout, compute })];
-      });
-      return [rule, Object.fromEntries(await Promise.all(stages)) as Pipelines];
-    });
-    const pipelines = Object.fromEntries(await Promise.all(made)) as Record<SynthesisRule, Pipelines>;
-    return new SynthesisPass(device, layout, pipelines);
+    const made = FIRST_ENTRIES.map((entry) =>
+      device.createComputePipelineAsync(describeStage(device, layout, FIRST_RULE, entry)),
+    );
+    const first = await Promise.all(made);
+    return new SynthesisPass(device, layout, new Map(first.map((pipeline) => [pipeline.label, pipeline])));
   }
 
   /** Works on this atlas from now on. */
@@ -154,7 +147,7 @@ export class SynthesisPass {
   private dispatch(encoder: GPUCommandEncoder, jobs: readonly SynthesisJob[], what: "synthesise" | "compose"): void {
     if (jobs.length === 0) return;
     if (this.settings === null) throw new Error("synthesis: configure, setChannels and attach come before run");
-    const pipelines = this.pipelines[this.settings.rule];
+    const { rule } = this.settings;
     const levels = byLevel(jobs);
     const first = this.reserve(levels);
     const group = this.bindGroup();
@@ -164,7 +157,7 @@ export class SynthesisPass {
       level.forEach((job, i) => {
         this.words.set([job.slot, job.level, job.x, job.y, job.parentSlot, job.held], JOB_WORDS * (at + i));
       });
-      pass.setPipeline(pipelines[level[0]!.level === 0 ? (`${what}_root` as const) : what]);
+      pass.setPipeline(this.pipeline(rule, level[0]!.level === 0 ? `${what}_root` : what));
       pass.setBindGroup(0, group, [4 * JOB_WORDS * at]);
       pass.dispatchWorkgroups(GROUPS, level.length);
       at += padded(level.length);
@@ -172,6 +165,14 @@ export class SynthesisPass {
     pass.end();
     const from = JOB_WORDS * first;
     this.device.queue.writeBuffer(this.jobs, 4 * from, this.words, from, JOB_WORDS * (at - first));
+  }
+
+  private pipeline(rule: SynthesisRule, entry: Entry): GPUComputePipeline {
+    const known = this.pipelines.get(labelOf(rule, entry));
+    if (known !== undefined) return known;
+    const made = this.device.createComputePipeline(describeStage(this.device, this.layout, rule, entry));
+    this.pipelines.set(made.label, made);
+    return made;
   }
 
   /** Room for the jobs of one call. Throws RangeError when there are too many. */
@@ -213,6 +214,24 @@ function byLevel(jobs: readonly SynthesisJob[]): SynthesisJob[][] {
   const levels = Array.from({ length: MAX_SYNTHESIS_LEVEL + 1 }, (): SynthesisJob[] => []);
   for (const job of jobs) levels[job.level]!.push(job);
   return levels.filter((level) => level.length > 0);
+}
+
+function labelOf(rule: SynthesisRule, entry: Entry): string {
+  return `${entry} ${rule}`;
+}
+
+function describeStage(
+  device: GPUDevice,
+  layout: GPUBindGroupLayout,
+  rule: SynthesisRule,
+  entryPoint: Entry,
+): GPUComputePipelineDescriptor {
+  const module = device.createShaderModule({ label: `synthesis ${rule}`, code: synthesisSource(rule) });
+  return {
+    label: labelOf(rule, entryPoint),
+    layout: device.createPipelineLayout({ bindGroupLayouts: [layout] }),
+    compute: { module, entryPoint },
+  };
 }
 
 function padded(jobs: number): number {
