@@ -132,10 +132,10 @@ def lattice() -> dict[str, Any]:
         out[name] = round(max(ratios, key=lambda r: abs(np.log(r))), 2)
     slope, bend = np.roll(d, -1, 1) - d, np.roll(d, -1, 1) - 2 * d + np.roll(d, 1, 1)
     for name, z in (("height", d), ("slope", slope), ("bend", bend)):
-        means = [
-            np.mean(z[j::step, i::step] ** 2) for step in (2, 4, 8) for j in (0, step // 2) for i in (0, step // 2)
-        ]
-        out[name] = round(max((float(m / np.mean(z * z)) for m in means), key=lambda r: abs(np.log(r))), 3)
+        squares: NDArray[np.float64] = z * z
+        places = [(step, j, i) for step in (2, 4, 8) for j in (0, step // 2) for i in (0, step // 2)]
+        parts = [float(squares[j::step, i::step].mean() / squares.mean()) for step, j, i in places]
+        out[name] = round(max(parts, key=lambda r: abs(np.log(r))), 3)
     return out
 
 
