@@ -197,14 +197,11 @@ fn put_children(job: SynthJob, at: vec2i, ground: Grounds, s: SynthState, noise:
   let finer = finer_code(s.finer, site.size / f32(u32(TILE_CELLS) << job.level));
   let guide = ground.guide;
   let base = ground.base;
-  put_child(job, at, vec2f(guide.x, base.x), vec4u(d.x, hs.x, wg.x, ff.x),
-    vec4f(s.snow.x, s.wet.x, s.foam.x, 0.5 * s.h.x), vec4f(s.grass.x, s.forest.x, grain.x, finer.x));
-  put_child(job, at + vec2i(1, 0), vec2f(guide.y, base.y), vec4u(d.y, hs.y, wg.y, ff.y),
-    vec4f(s.snow.y, s.wet.y, s.foam.y, 0.5 * s.h.y), vec4f(s.grass.y, s.forest.y, grain.y, finer.y));
-  put_child(job, at + vec2i(0, 1), vec2f(guide.z, base.z), vec4u(d.z, hs.z, wg.z, ff.z),
-    vec4f(s.snow.z, s.wet.z, s.foam.z, 0.5 * s.h.z), vec4f(s.grass.z, s.forest.z, grain.z, finer.z));
-  put_child(job, at + vec2i(1, 1), vec2f(guide.w, base.w), vec4u(d.w, hs.w, wg.w, ff.w),
-    vec4f(s.snow.w, s.wet.w, s.foam.w, 0.5 * s.h.w), vec4f(s.grass.w, s.forest.w, grain.w, finer.w));
+  // A loop, not four calls: compilers put each call's code in place, and on the CPU that took seconds.
+  for (var k = 0u; k < 4u; k += 1u) {
+    put_child(job, at + vec2i(vec2u(k & 1u, k >> 1u)), vec2f(guide[k], base[k]), vec4u(d[k], hs[k], wg[k], ff[k]),
+      vec4f(s.snow[k], s.wet[k], s.foam[k], 0.5 * s.h[k]), vec4f(s.grass[k], s.forest[k], grain[k], finer[k]));
+  }
 }
 
 @compute @workgroup_size(64)
@@ -247,20 +244,15 @@ fn compose(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index)
   let cell = cell_of(group, lane);
   if (cell.child.y > LAST_SAMPLE) { return; }
   let g = interpolated(ground_row(cell, 0u), ground_row(cell, 1u), ground_row(cell, 2u), ground_row(cell, cell.far.y));
-  put_composed(cell.job, cell.child, vec2f(g.guide.x, g.base.x));
-  put_composed(cell.job, cell.child + vec2i(1, 0), vec2f(g.guide.y, g.base.y));
-  put_composed(cell.job, cell.child + vec2i(0, 1), vec2f(g.guide.z, g.base.z));
-  put_composed(cell.job, cell.child + vec2i(1, 1), vec2f(g.guide.w, g.base.w));
+  for (var k = 0u; k < 4u; k += 1u) {
+    put_composed(cell.job, cell.child + vec2i(vec2u(k & 1u, k >> 1u)), vec2f(g.guide[k], g.base[k]));
+  }
 }
 
 // Guide of level 0 beside a sample: in a bounded domain indices end at the border.
 fn root_guide(job: SynthJob, at: vec2i) -> f32 {
   if (site.cyclic == 1u) { return grounds[slot_texel(job.slot, at & vec2i(TILE_CELLS - 1))].x; }
   return held_ground(job, clamp(at, vec2i(-SLOT_BORDER), vec2i(LAST_SAMPLE))).x;
-}
-
-fn root_row(job: SynthJob, at: vec2i) -> vec4f {
-  return vec4f(root_guide(job, at - vec2i(1, 0)), root_guide(job, at), root_guide(job, at + vec2i(1, 0)), root_guide(job, at + vec2i(2, 0)));
 }
 
 // Level 0: the rule on the guide itself; constants and targets stand for the parent that it does not have.
@@ -270,10 +262,14 @@ fn synthesise_root(@builtin(workgroup_id) group: vec3u, @builtin(local_invocatio
   let k = group.x * 64u + lane;
   let at = 2 * (vec2i(i32(k % CELLS_ACROSS), i32(k / CELLS_ACROSS)) - 1);
   if (at.y > LAST_SAMPLE) { return; }
-  let a = root_row(job, at - vec2i(0, 1));
-  let b = root_row(job, at);
-  let c = root_row(job, at + vec2i(0, 1));
-  let d = root_row(job, at + vec2i(0, 2));
+  var rows: array<vec4f, 4>;
+  for (var row = 0; row < 4; row += 1) {
+    for (var col = 0; col < 4; col += 1) { rows[row][col] = root_guide(job, at + vec2i(col, row) - 1); }
+  }
+  let a = rows[0];
+  let b = rows[1];
+  let c = rows[2];
+  let d = rows[3];
   let per_m = site.levels[0].inverse_spacing;
   let z = vec4f(b.yz, c.yz);
   let west = vec4f(b.xy, c.xy);
