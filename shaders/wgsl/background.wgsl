@@ -37,7 +37,7 @@ fn plane_albedo() -> vec3f {
     case LOOK_ALPINE: { return vec3f(0.56, 0.59, 0.63); }
     case LOOK_DESERT: { return vec3f(0.47, 0.345, 0.215); }
     case LOOK_PAPER: { return vec3f(0.50, 0.455, 0.385); }
-    default: { return vec3f(0.235, 0.228, 0.150); }
+    default: { return vec3f(0.250, 0.246, 0.172); }
   }
 }
 
@@ -52,14 +52,14 @@ fn country(p: vec2f, footprint: f32) -> vec3f {
     case LOOK_ALPINE: { return mix(open, vec3f(0.16, 0.18, 0.19), wood * 0.55); }
     case LOOK_DESERT: { return mix(open, open * vec3f(0.66, 0.58, 0.54), wood * 0.6); }
     case LOOK_PAPER: { return plane_albedo(); }
-    default: { return mix(open, vec3f(0.090, 0.105, 0.062), wood * 0.60); }
+    default: { return mix(open, vec3f(0.105, 0.120, 0.072), wood * 0.42); }
   }
 }
 
 fn ground_plane(p: vec3f, dir: vec3f, footprint: f32) -> vec3f {
   let away = outside_domain(p.xy);
   // Contact shade round the block, and its soft shadow away from the sun.
-  let shade = 1.0 - 0.50 * exp(-away / (0.03 * view.size)) - 0.2 * exp(-away / (0.16 * view.size));
+  let shade = 1.0 - 0.45 * exp(-away / (0.025 * view.size)) - 0.12 * exp(-away / (0.12 * view.size));
   let tall = 0.5 * (view.low + view.high) - view.base;
   let reach = tall * length(view.sun.xy) / max(view.sun.z, 0.12);
   let toward = p.xy + normalize(view.sun.xy + vec2f(1.0e-5)) * min(reach, view.size) * 0.5;

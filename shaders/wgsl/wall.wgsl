@@ -50,7 +50,7 @@ fn wall_fragment(v: WallVertex) -> @location(0) vec4f {
   let bed = fract(z / 46.0);
   let id = floor(z / 46.0);
   let shade = fract(sin(id * 12.9898) * 43758.547);
-  var colour = mix(vec3f(0.215, 0.172, 0.128), vec3f(0.335, 0.285, 0.222), shade);
+  var colour = mix(vec3f(0.150, 0.128, 0.106), vec3f(0.232, 0.208, 0.178), shade);
   colour *= 0.80 + 0.30 * fine.g + 0.18 * smoothstep(0.0, 0.12, bed) * smoothstep(1.0, 0.8, bed);
   if (view.look == LOOK_DESERT) { colour = mix(vec3f(0.36, 0.165, 0.090), vec3f(0.56, 0.36, 0.21), shade) * (0.8 + 0.4 * fine.g); }
   if (view.look == LOOK_ALPINE) { colour = mix(vec3f(0.16, 0.16, 0.17), vec3f(0.27, 0.265, 0.265), shade) * (0.8 + 0.4 * fine.g); }
