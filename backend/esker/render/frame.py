@@ -28,7 +28,7 @@ class LookFigures(NamedTuple):
 
 LOOKS: Final[dict[str, LookFigures]] = {
     "natural": LookFigures(0, 1.3, 0.2, 0),
-    "alpine": LookFigures(1, 0.9, 0.2, 0),
+    "alpine": LookFigures(1, 0.82, 0.2, 0),
     "desert": LookFigures(2, 1.0, 0.2, 0),
     "paper": LookFigures(3, 1.45, 0.05, 0.6),
 }
