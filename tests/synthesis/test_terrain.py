@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from esker import Stroke, Terrain, grid
-from esker.contract import DEFAULT_LEVEL, Channel
+from esker.contract import DEFAULT_LEVEL, Channel, PaintChannel
 from esker.document import archive
 from esker.solve import command
 from esker.solve.detail import settle
@@ -209,3 +209,26 @@ def test_the_command_says_what_is_wrong(
     with pytest.raises(SystemExit):
         command.main([str(file), "-o", str(out), "--level", "12", "--window", "0", "0", "9", "9"])
     assert "--detail" in capsys.readouterr().err
+
+
+def test_what_is_painted_is_there(terrain: Terrain) -> None:
+    """SPEC F12, F18: along the line in the attributes, far away not at all, and no base height moves."""
+    painted = Terrain.from_document(terrain.document)
+    low, high = (1000.0, 3200.0), (1700.0, 3400.0)
+    asked: dict[PaintChannel, float] = {"snow": 1.0, "forest": -1.0, "amplitude": -1.0}
+    for channel, value in asked.items():
+        painted.add(Stroke.paint([low, high], channel=channel, value=value, radius_m=120.0))
+    level = 4
+    before, after = terrain.attributes(level), painted.attributes(level)
+    s = grid.spacing(level, SIZE)
+    on = round(0.5 * (low[1] + high[1]) / s), round(0.5 * (low[0] + high[0]) / s)
+    assert after["snow"][on] > 0.97 > 0.3 > before["snow"][on]
+    assert after["forest"][on] < 0.03 < before["forest"][on]
+    near = np.s_[on[0] - 4 : on[0] + 5, on[1] - 4 : on[1] + 5]
+    finest_octaves = [np.abs(np.diff(a["detail"][near], 2, axis=0)).mean() for a in (before, after)]
+    assert finest_octaves[1] < 0.2 * finest_octaves[0]
+    base = [t.heights(level, detail=True) - a["detail"] for t, a in ((terrain, before), (painted, after))]
+    assert np.abs(base[1] - base[0]).max() < 1e-3
+    far = np.s_[: round(800 / s), round(3000 / s) :]
+    for name in before:
+        assert np.abs(after[name][far] - before[name][far]).max() < 1e-3

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import math
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -116,6 +117,10 @@ def spectra() -> dict[str, Any]:
     return out
 
 
+def _apart(ratio: float) -> float:
+    return abs(math.log(ratio))
+
+
 def lattice() -> dict[str, Any]:
     """How far what lies on a lattice stands out: power on axes and diagonals over that of their ring, the farthest from
     1; mean squares of samples on coarser levels over those of all, the farthest from 1."""
@@ -125,17 +130,17 @@ def lattice() -> dict[str, Any]:
     lines = {"axes": (kx == 0) | (ky == 0), "diagonals": np.abs(kx - np.abs(ky)) <= 1}
     out: dict[str, Any] = {}
     for name, part in lines.items():
-        ratios = []
+        ratios: list[float] = []
         for centre in (40, 64, 100, 128, 200, 256, 400):
             ring = np.abs(radius - centre) < 0.1 * centre
             ratios.append(float(p[ring & part].mean() / p[ring].mean()))
-        out[name] = round(max(ratios, key=lambda r: abs(np.log(r))), 2)
+        out[name] = round(float(max(ratios, key=_apart)), 2)
     slope, bend = np.roll(d, -1, 1) - d, np.roll(d, -1, 1) - 2 * d + np.roll(d, 1, 1)
     for name, z in (("height", d), ("slope", slope), ("bend", bend)):
         squares: NDArray[np.float64] = z * z
         places = [(step, j, i) for step in (2, 4, 8) for j in (0, step // 2) for i in (0, step // 2)]
-        parts = [float(squares[j::step, i::step].mean() / squares.mean()) for step, j, i in places]
-        out[name] = round(max(parts, key=lambda r: abs(np.log(r))), 3)
+        parts: list[float] = [float(squares[j::step, i::step].mean() / squares.mean()) for step, j, i in places]
+        out[name] = round(float(max(parts, key=_apart)), 3)
     return out
 
 
