@@ -15,8 +15,9 @@ import { TakeLightPass } from "../../src/gpu/takelight.ts";
 import { DEPTH_FORMAT } from "../../src/gpu/target.ts";
 import { SunPass } from "../../src/gpu/tilecompute.ts";
 import { TileFill } from "../../src/gpu/tilefill.ts";
+import type { PatchTree } from "../../src/tiles/patchtree.ts";
 import { RECORD_WORDS, recordLevel } from "../../src/tiles/records.ts";
-import { Selection } from "../../src/tiles/selection.ts";
+import { type Cut, Selection } from "../../src/tiles/selection.ts";
 import { expectation, finestSynthesisLevel } from "../../src/tiles/synthetic.ts";
 import {
   craggyField,
@@ -167,14 +168,14 @@ function makeWorld(rig: Rig, view: TileView, fades = false): World {
   return { atlas, selection, light: new LightQueue(rig.sun, atlas, rig.taking) };
 }
 
-/** One picture as half-float words, and what was drawn. */
-async function picture(
+/** Brings the atlas up to date for a view, as a frame does. Returns the cut and how many tiles were made. */
+function prepare(
   rig: Rig,
   world: World,
   scene: Scene,
   tau: number,
-  entrance: () => number = () => 1,
-): Promise<{ words: Uint16Array; stats: Pick<FrameStats, "patches">; mixed: boolean; deepest: number }> {
+  entrance: () => number,
+): { cut: Cut; made: number } {
   const { tiles, settings, channels } = scene;
   const detail = { sizeM: tiles.sizeM, seed: settings.seed, detail: settings.detail, rule: settings.rule };
   const { synthesis } = rig.fill;
@@ -183,6 +184,7 @@ async function picture(
   world.selection.tree.expect(expectation(tiles.sizeM, settings, channels));
   rig.fill.tell(world.selection.tree);
   const changes = world.atlas.refresh(tiles);
+  for (const { level, x, y } of [...changes.remade, ...changes.moved]) world.selection.tree.remade(level, x, y);
   const entered = [];
   let cut = world.selection.select(tiles, scene.camera, tau, world.atlas);
   for (let round = 0; ; round += 1) {
@@ -200,6 +202,36 @@ async function picture(
   rig.fill.run(encoder, tiles.sizeM, changes, entered);
   world.light.mark([...changes.remade, ...changes.moved], entered, sun);
   world.light.run(encoder, { sizeM: tiles.sizeM, high: cut.top, sun }, 4);
+  rig.device.queue.submit([encoder.finish()]);
+  rig.fill.submitted();
+  return { cut, made: changes.remade.length + changes.moved.length + entered.length };
+}
+
+/** The same until the view asks for no more, `rounds` times at most: figures of what was made come in between. */
+async function settle(
+  rig: Rig,
+  world: World,
+  scene: Scene,
+  tau: number,
+  how: { readonly entrance?: () => number; readonly rounds?: number } = {},
+): Promise<Cut> {
+  for (let round = 1; ; round += 1) {
+    const { cut, made } = prepare(rig, world, scene, tau, how.entrance ?? (() => 1));
+    if (made === 0 || round === (how.rounds ?? 1)) return cut;
+    while (!rig.fill.tell(world.selection.tree)) await new Promise((done) => setTimeout(done, 2));
+  }
+}
+
+/** One picture as half-float words, and what was drawn. */
+async function picture(
+  rig: Rig,
+  world: World,
+  scene: Scene,
+  tau: number,
+  how: { readonly entrance?: () => number; readonly rounds?: number } = {},
+): Promise<{ words: Uint16Array; stats: Pick<FrameStats, "patches">; mixed: boolean; deepest: number }> {
+  const cut = await settle(rig, world, scene, tau, how);
+  const encoder = rig.device.createCommandEncoder();
   rig.frame.update(scene, { width: WIDTH, height: HEIGHT, low: cut.minHeight, high: cut.maxHeight });
   rig.patches.update(cut);
   while (!rig.patches.useLook(scene.settings.look)) await new Promise((done) => setTimeout(done, 10));
@@ -220,7 +252,6 @@ async function picture(
     HEIGHT,
   ]);
   rig.device.queue.submit([encoder.finish()]);
-  rig.fill.submitted();
   await rig.readback.mapAsync(GPUMapMode.READ);
   const words = new Uint16Array(rig.readback.getMappedRange().slice(0));
   rig.readback.unmap();
@@ -326,7 +357,72 @@ export async function deepCrackTest(seed: number, views: number): Promise<CrackR
       const kind = kinds[k]!;
       const tau = 0.6 + 6 * next() ** 2;
       const scene = sceneOf(view, closeCamera(kind, next, [x, y, view.shownHeightAt(x, y)]), "natural");
-      const { words, stats, mixed, deepest } = await picture(rig, world, scene, tau, () => 0.15 + 0.7 * next());
+      const { words, stats, mixed, deepest } = await picture(rig, world, scene, tau, {
+        entrance: () => 0.15 + 0.7 * next(),
+      });
+      const found = count(words, kind);
+      total.cracks += found.cracks;
+      total.covered += found.covered;
+      total.nans += found.nans;
+      total.patches += stats.patches;
+      total.mixed += mixed ? 1 : 0;
+      total.deepest = Math.max(total.deepest, deepest);
+      if (found.cracks > 0) failures.push(`view ${done} ${kind} tau ${tau.toFixed(2)}: ${found.cracks}`);
+    }
+    world.atlas.destroy();
+  }
+  rig.device.destroy();
+  return { views, ...total, failures };
+}
+
+/** Height of the drawn ground at a place, as the finest tile that is there tells it. */
+function drawnHeight(tree: PatchTree, sizeM: number, x: number, y: number): number {
+  let found = 0;
+  for (let level = 0; level <= tree.levels; level += 1) {
+    const w = sizeM / 2 ** level;
+    const page = tree.find(level, Math.floor(x / w), Math.floor(y / w));
+    if (page < 0 || tree.usable[page] === 0) break;
+    const node = page * 16 + Math.floor((4 * (y % w)) / w) * 4 + Math.floor((4 * (x % w)) / w);
+    found = 0.5 * (tree.min[node]! + tree.max[node]!);
+  }
+  return found;
+}
+
+/**
+ * The crack test a metre from the ground, after an approach from above as people come: synthetic levels to the finest, beside
+ * refined ones and places where those have just come or gone.
+ */
+export async function walkCrackTest(seed: number, views: number): Promise<CrackReport & { readonly deepest: number }> {
+  const rig = await makeRig();
+  const next = random(seed);
+  const total = { cracks: 0, nans: 0, covered: 0, patches: 0, mixed: 0, deepest: 0 };
+  const failures: string[] = [];
+  for (let done = 0; done < views; ) {
+    const view = new SparseView(LARGE, 10, 2, craggyField(Math.floor(next() * 1e6), LARGE));
+    const [x, y] = [LARGE * (0.2 + 0.6 * next()), LARGE * (0.2 + 0.6 * next())];
+    const world = makeWorld(rig, view);
+    for (const up of [20_000, 1500, 120, 10]) {
+      const z = drawnHeight(world.selection.tree, LARGE, x, y);
+      const eye: Vec3 = [x, y - 0.2 * up, z + up];
+      await settle(rig, world, sceneOf(view, lookAt(eye, [x, y, z], WIDTH, HEIGHT, 40, 0.1, 4e5), "natural"), 2, {
+        rounds: 9,
+      });
+    }
+    for (let k = 0; k < 4 && done < views; k += 1, done += 1) {
+      const kind = k % 2 === 0 ? "above" : "map";
+      const z = drawnHeight(world.selection.tree, LARGE, x, y);
+      const up = 1 + 2 * next();
+      const state =
+        kind === "map"
+          ? mapCamera([x, y, 0], 0.4 + 3 * next(), WIDTH, HEIGHT)
+          : lookAt([x, y - 0.3 * up, z + up], [x, y, z], WIDTH, HEIGHT, 40, 0.05, 4e5);
+      // Refined tiles come, and later some go.
+      if (k === 1) view.refineAround(x, y, () => Math.round(next()));
+      if (k === 3) view.lose(() => next() < 0.3);
+      const tau = 0.6 + 2 * next();
+      const { words, stats, mixed, deepest } = await picture(rig, world, sceneOf(view, state, "alpine"), tau, {
+        rounds: 5,
+      });
       const found = count(words, kind);
       total.cracks += found.cracks;
       total.covered += found.covered;

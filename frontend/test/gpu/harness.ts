@@ -14,7 +14,7 @@ import type {
 import { openGpu } from "../../src/gpu/device.ts";
 import { createMapRenderer, createRenderer } from "../../src/gpu/index.ts";
 import { GpuRenderer } from "../../src/gpu/renderer.ts";
-import { crackTest, deepCrackTest } from "./cracks.ts";
+import { crackTest, deepCrackTest, walkCrackTest } from "./cracks.ts";
 import { synthesisVectors } from "./synthesis.ts";
 import { alpineField, FieldView, lookAt, mapCamera, PLAIN_CHANNELS } from "./world.ts";
 
@@ -248,5 +248,5 @@ async function morph(shot: Shot, rounds: number): Promise<{ uploads: number; cpu
 }
 
 Object.assign(globalThis, {
-  esker: { morph, load, shoot, picture, circle, crackTest, deepCrackTest, synthesisVectors },
+  esker: { morph, load, shoot, picture, circle, crackTest, deepCrackTest, walkCrackTest, synthesisVectors },
 });
