@@ -139,16 +139,16 @@ function stepOf(parent: Area, child: Area): Step {
 /** Values of the parent's rows at the child's columns. */
 function alongX(z: Float64Array, { even, odd }: Taps, step: Step, out: Float64Array): Float64Array {
   const { cols, parentCols, parentRows, firstCol, oddCol } = step;
+  const [e0, e1, e2] = even;
+  const [o0, o1, o2, o3] = odd;
   for (let row = 0; row < parentRows; row += 1) {
-    const from = row * parentCols + firstCol;
     const to = row * cols;
-    for (let col = 0; col < cols; col += 1) {
-      const at = from + ((col + oddCol) >> 1);
-      out[to + col] =
-        (col + oddCol) & 1
-          ? odd[0] * z[at - 1]! + odd[1] * z[at]! + odd[2] * z[at + 1]! + odd[3] * z[at + 2]!
-          : even[0] * z[at - 1]! + even[1] * z[at]! + even[2] * z[at + 1]!;
-    }
+    let at = row * parentCols + firstCol;
+    for (let col = oddCol; col < cols; col += 2, at += 1)
+      out[to + col] = e0 * z[at + oddCol - 1]! + e1 * z[at + oddCol]! + e2 * z[at + oddCol + 1]!;
+    at = row * parentCols + firstCol;
+    for (let col = 1 - oddCol; col < cols; col += 2, at += 1)
+      out[to + col] = o0 * z[at - 1]! + o1 * z[at]! + o2 * z[at + 1]! + o3 * z[at + 2]!;
   }
   return out;
 }
@@ -156,16 +156,16 @@ function alongX(z: Float64Array, { even, odd }: Taps, step: Step, out: Float64Ar
 /** Values of the child's rows, of an array with the parent's rows and the child's columns. */
 function alongY(z: Float64Array, { even, odd }: Taps, step: Step, out: Float64Array): Float64Array {
   const { rows, cols, firstRow, oddRow } = step;
+  const [e0, e1, e2] = even;
+  const [o0, o1, o2, o3] = odd;
   for (let row = 0; row < rows; row += 1) {
-    const from = (firstRow + ((row + oddRow) >> 1)) * cols;
+    let at = (firstRow + ((row + oddRow) >> 1)) * cols;
     const to = row * cols;
-    const isOdd = (row + oddRow) & 1;
-    for (let col = 0; col < cols; col += 1) {
-      const at = from + col;
-      out[to + col] = isOdd
-        ? odd[0] * z[at - cols]! + odd[1] * z[at]! + odd[2] * z[at + cols]! + odd[3] * z[at + 2 * cols]!
-        : even[0] * z[at - cols]! + even[1] * z[at]! + even[2] * z[at + cols]!;
-    }
+    if ((row + oddRow) & 1)
+      for (let k = to; k < to + cols; k += 1, at += 1)
+        out[k] = o0 * z[at - cols]! + o1 * z[at]! + o2 * z[at + cols]! + o3 * z[at + 2 * cols]!;
+    else
+      for (let k = to; k < to + cols; k += 1, at += 1) out[k] = e0 * z[at - cols]! + e1 * z[at]! + e2 * z[at + cols]!;
   }
   return out;
 }

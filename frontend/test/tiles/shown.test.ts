@@ -99,9 +99,9 @@ describe("a block of detail", () => {
         expect([...block.snow]).toEqual([...plain.snow]);
         if (x + 1 === n) continue;
         const east = field.block(level, x + 1, y)!;
-        for (let row = 0; row < BLOCK_SIDE; row++)
-          for (let col = BLOCK_CELLS; col < BLOCK_SIDE; col++)
-            expect(block.d[row * BLOCK_SIDE + col]).toBe(east.d[row * BLOCK_SIDE + col - BLOCK_CELLS]);
+        const shared = (of: Float64Array, from: number): number[] =>
+          [...of].filter((_, k) => k % BLOCK_SIDE >= from && k % BLOCK_SIDE < from + BLOCK_SIDE - BLOCK_CELLS);
+        expect(shared(block.d, BLOCK_CELLS)).toEqual(shared(east.d, 0));
       }
     }
   });
@@ -225,9 +225,9 @@ describe("raycast", () => {
         expect(reached).toBeLessThan(wanted + 0.3);
         expect(Math.abs(fast![2] - ground.heightAt(fast![0], fast![1], cell))).toBeLessThan(0.3);
       }),
-      { numRuns: 24, seed: 11 },
+      { numRuns: 14, seed: 11 },
     );
-    expect(hits).toBeGreaterThan(15);
+    expect(hits).toBeGreaterThan(8);
   });
 
   test("sees nothing but what a pixel shows: far rays are cheap, near ones meet centimetres", () => {

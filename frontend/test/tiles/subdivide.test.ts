@@ -15,7 +15,9 @@ function compare(found: Samples, guide: readonly number[], words: readonly numbe
   const wanted = unpacked(words);
   const close = (a: ArrayLike<number>, b: ArrayLike<number>, tolerance: number): void => {
     expect(a.length).toBe(b.length);
-    for (let k = 0; k < a.length; k++) expect(Math.abs(a[k]! - b[k]!)).toBeLessThanOrEqual(tolerance);
+    let worst = 0;
+    for (let k = 0; k < a.length; k++) worst = Math.max(worst, Math.abs(a[k]! - b[k]!));
+    expect(worst).toBeLessThanOrEqual(tolerance);
   };
   const rounding = 2 ** -22 * Math.max(...guide.map(Math.abs));
   close(found.guide, guide.map(Math.fround), rounding);
