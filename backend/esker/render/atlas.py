@@ -79,11 +79,6 @@ class Atlas:
                 resources = Resources(dict(self.textures), {"nearest": nearest}, buffers, images)
                 compute.run(resources, (GROUPS, GROUPS, len(some)))
 
-    def release(self) -> None:
-        """Frees the textures."""
-        for texture in self.textures.values():
-            texture.release()
-
     def _upload(self, slot: int, data: SlotData) -> None:
         col, row, layer = slot % SLOTS_ACROSS, slot // SLOTS_ACROSS % SLOTS_ACROSS, slot // SLOTS_PER_LAYER
         place = (col * SLOT, row * SLOT, layer, SLOT, SLOT, 1)

@@ -85,6 +85,21 @@ class Reference:
         bare: bool = False,
     ) -> Picture:
         """The picture of a scene. ``progress`` is told the share that is done; ``bare``: only the ground is drawn."""
+        # Another context may have been made, or used, in between.
+        with self.context:
+            made = self._picture(surface, scene, channels, progress, bare=bare)
+            self.context.gc()
+            return made
+
+    def _picture(
+        self,
+        surface: Surface,
+        scene: Scene,
+        channels: Channels,
+        progress: Callable[[float], None] | None,
+        *,
+        bare: bool,
+    ) -> Picture:
         cut, tau = self._cut(surface, scene)
         _, high, _ = surface.bounds(0, np.array([(x, y) for x in range(SUBPATCHES) for y in range(SUBPATCHES)]))
         atlas = Atlas(self.context, cut.tiles(), surface)
@@ -104,7 +119,6 @@ class Reference:
             out[rect.top : rect.top + rect.height, rect.left : rect.left + rect.width] = self._part(
                 rect, scene, resources, records, bare=bare
             )
-        atlas.release()
         if progress is not None:
             progress(1.0)
         return Picture(out, tau, len(cut.level))

@@ -1,4 +1,4 @@
-"""Preview tokens: who may see the picture of a terrain without its secret (docs/decisions/0017-preview-tokens.md).
+"""Preview tokens: who may see the picture of a terrain without its secret (docs/decisions/0018-preview-tokens.md).
 
 Programs that unfold links never see the fragment with the secret. A link that is meant to be shared carries a token
 beside it, ``/t/{id}?p={token}#{secret}``, which opens the picture and the title, and nothing else.
