@@ -128,6 +128,8 @@ def test_a_refined_base_is_held_like_tiles_hold_it() -> None:
         parent = child.parent()
         found = terrain.base(child)
         assert np.allclose(found, interpolated(extended(fine, parent).astype(np.float64), parent, child), atol=1e-4)
+    for narrow in (Window(5, -2, 0, -2, -1), Window(5, n, n + 2, n + 1, n + 2), Window(5, -1, 1, n - 1, n + 1)):
+        assert np.array_equal(terrain.base(narrow), extended(fine, narrow))
     for level, rows, cols in asked:
         assert level == 5
         assert 0 <= rows.start < rows.stop <= n
