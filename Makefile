@@ -81,6 +81,7 @@ frontend/dist/index.html: $(STAMPS)/node $(SOURCES) frontend/index.html frontend
 pictures: check browser frontend/dist/index.html ## draw the README's pictures again
 	$(BIN)/python -m pytest tests/e2e/test_pictures.py
 	mkdir -p docs/pictures && cp tests/artifacts/pictures/* docs/pictures/
+	$(BIN)/python docs/pictures/gallery.py
 
 browser: ## the browser and the software graphics drivers that the tests draw with
 	@$(SHELL) .ci/browser-packages

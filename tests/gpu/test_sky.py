@@ -1,4 +1,4 @@
-"""The baked sky against the float64 twin, and the light that it gives (SPEC R52)."""
+"""The baked sky against the float64 twin, and the light that it gives (SPEC R62)."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def direction(col: int, row: int) -> NDArray[np.float64]:
 
 @pytest.mark.parametrize("elevation", [2.0, 15.0, 50.0])
 def test_the_sky_is_that_of_its_twin(elevation: float) -> None:
-    """R52: all orders of scattering, within 10 % of the brightest channel there, 15 % with the sun at 2 degrees."""
+    """R62: all orders of scattering, within 10 % of the brightest channel there, 15 % with the sun at 2 degrees."""
     sky, _ = bake(elevation)
     assert np.isfinite(sky).all()
     sun = sun_at(elevation)
@@ -85,7 +85,7 @@ def test_the_sky_is_that_of_its_twin(elevation: float) -> None:
 
 
 def test_light_falls_and_reddens_towards_sunset() -> None:
-    """R52: a lower sun is dimmer and redder; the sky still gives light when it is at the horizon."""
+    """R62: a lower sun is dimmer and redder; the sky still gives light when it is at the horizon."""
     suns = [bake(elevation)[1] for elevation in (0.5, 5.0, 20.0, 60.0)]
     light = [vectors[6] for vectors in suns]
     for lower, higher in pairwise(light):

@@ -1,4 +1,4 @@
-/** Where a stroke is felt (R51). */
+/** Where a stroke is felt (R61). */
 
 import { describe, expect, test } from "vitest";
 import { INFLUENCE_SIDE, strokeInfluence } from "../../src/doc/influence.ts";
@@ -34,7 +34,7 @@ const at = (grid: { values: Float32Array }, x: number, y: number): number =>
   ]!;
 
 describe("influence of a stroke", () => {
-  test("R51: whole on the line, a half at the end of each flank", () => {
+  test("R61: whole on the line, a half at the end of each flank", () => {
     const grid = strokeInfluence(ridge, 200, SIZE);
     expect(at(grid, 2048, 2048)).toBe(1);
     // Travel goes east: north is left.
@@ -43,13 +43,13 @@ describe("influence of a stroke", () => {
     expect(at(grid, 2048, 2048 + 320)).toBeGreaterThan(0.8);
   });
 
-  test("R51: beyond the flanks it decays by e for every reach; an infinite one goes further", () => {
+  test("R61: beyond the flanks it decays by e for every reach; an infinite one goes further", () => {
     const grid = strokeInfluence(ridge, 256, SIZE);
     expect(at(grid, 2048, 2048 - 320 - 256)).toBeCloseTo(0.5 / Math.E, 5);
     expect(at(strokeInfluence(ridge, null, SIZE), 2048, 64)).toBeGreaterThan(2 * at(grid, 2048, 64));
   });
 
-  test("R51: a brush is felt within its radius alone; a stroke without points nowhere", () => {
+  test("R61: a brush is felt within its radius alone; a stroke without points nowhere", () => {
     const brush: Stroke = {
       ...ridge,
       kind: "paint",

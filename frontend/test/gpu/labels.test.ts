@@ -1,4 +1,4 @@
-/** Labels on index contours (R50). */
+/** Labels on index contours (R60). */
 
 import { describe, expect, test } from "vitest";
 import { LETTERS, letterInstances } from "../../src/gpu/labels.ts";
@@ -12,7 +12,7 @@ describe("labels on index contours", () => {
   const camera = lookAt([2000, -1800, 2600], [2000, 2100, 400], 1280, 720);
   const labels = contourLabels(dome, camera, options);
 
-  test("R50: each lies on its line and runs along it", () => {
+  test("R60: each lies on its line and runs along it", () => {
     expect(labels.length).toBeGreaterThan(6);
     for (const { x, y, z, dx, dy, text } of labels) {
       expect(Math.abs(z % 100)).toBe(0);
@@ -26,7 +26,7 @@ describe("labels on index contours", () => {
     }
   });
 
-  test("R50: none is near another, and the same view gives the same ones", () => {
+  test("R60: none is near another, and the same view gives the same ones", () => {
     const pixel = ({ x, y, z }: (typeof labels)[number]): [number, number] => {
       const m = camera.viewProj;
       const w = m[3]! * x + m[7]! * y + m[11]! * z + m[15]!;
@@ -44,24 +44,24 @@ describe("labels on index contours", () => {
     expect(contourLabels(dome, camera, options)).toEqual(labels);
   });
 
-  test("R50: flat ground and lines too close together get none", () => {
+  test("R60: flat ground and lines too close together get none", () => {
     const flat = new FieldView(4096, 2, () => 100);
     expect(contourLabels(flat, camera, options)).toEqual([]);
     expect(contourLabels(dome, camera, { everyM: 4, sizePx: 19 })).toEqual([]);
   });
 
-  test("R50: the map is labelled too", () => {
+  test("R60: the map is labelled too", () => {
     expect(contourLabels(dome, mapCamera([2048, 2048, 0], 4400, 900, 700), options).length).toBeGreaterThan(5);
   });
 
-  test("R50: heights are whole metres unless the interval is finer", () => {
+  test("R60: heights are whole metres unless the interval is finer", () => {
     expect(heightText(1250, 250)).toBe("1250 m");
     expect(heightText(-50, 50)).toBe("−50 m");
     expect(heightText(0.75, 0.25)).toBe("0.75 m");
     expect(heightText(-0, 10)).toBe("0 m");
   });
 
-  test("R50: letters are centred on the label and known to the sheet", () => {
+  test("R60: letters are centred on the label and known to the sheet", () => {
     const [label] = labels;
     const data = letterInstances([label!], camera, 20);
     const letters = [...label!.text].filter((c) => c !== " ");
