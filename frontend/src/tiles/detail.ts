@@ -54,10 +54,17 @@ export class DetailField {
   /** Ground that was never solved is a B-spline (rule `smooth`). */
   readonly spline: boolean;
   private readonly recipe: Recipe;
-  private readonly blocks = new Memo<Samples>(REMEMBERED);
+  private readonly blocks: Memo<Samples>;
 
   /** `heightOf`: heights of the levels up to `solved`, which are held as a whole. */
-  constructor(settings: RuleSettings, channels: ChannelView, heightOf: HeightOf, solved: number) {
+  constructor(
+    settings: RuleSettings,
+    channels: ChannelView,
+    heightOf: HeightOf,
+    solved: number,
+    remembered: number = REMEMBERED,
+  ) {
+    this.blocks = new Memo(remembered);
     this.sizeM = settings.size_m;
     this.finest = finestLevel(settings.size_m);
     this.spline = settings.rule === "smooth";

@@ -1,4 +1,4 @@
-/** SPEC T33, T34: the ground as it is drawn, against windows made at once and against brute force. */
+/** SPEC T40, T41: the ground as it is drawn, against windows made at once and against brute force. */
 
 import fc from "fast-check";
 import { describe, expect, test } from "vitest";

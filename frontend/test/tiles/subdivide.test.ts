@@ -1,4 +1,4 @@
-/** SPEC T33: the page's twin of the synthesis against the vectors of all languages. */
+/** SPEC T40: the page's twin of the synthesis against the vectors of all languages. */
 
 import { describe, expect, test } from "vitest";
 import { TILE_CELLS } from "../../src/generated/contract.ts";
