@@ -159,15 +159,15 @@ Shape synth_shape(const float4 rows[4], int odd_x, int odd_y) {
     float4 west = (float4)(rows[0].x, rows[1].x, rows[2].x, rows[3].x);
     float4 here = (float4)(rows[0].y, rows[1].y, rows[2].y, rows[3].y);
     float4 east = (float4)(rows[0].z, rows[1].z, rows[2].z, rows[3].z);
-    float4 far = (float4)(rows[0].w, rows[1].w, rows[2].w, rows[3].w);
+    float4 last = (float4)(rows[0].w, rows[1].w, rows[2].w, rows[3].w);
     Shape s;
     s.height = synth_sum(by, (float4)(b[0], b[1], b[2], b[3]));
     s.slope_x = synth_sum(by, (float4)(d[0], d[1], d[2], d[3]));
     s.slope_y = synth_sum(bx, (float4)(synth_first(odd_y, west), synth_first(odd_y, here), synth_first(odd_y, east),
-                                       synth_first(odd_y, far)));
+                                       synth_first(odd_y, last)));
     s.bend = synth_sum(by, (float4)(c[0], c[1], c[2], c[3])) +
              synth_sum(bx, (float4)(synth_second(odd_y, west), synth_second(odd_y, here), synth_second(odd_y, east),
-                                    synth_second(odd_y, far)));
+                                    synth_second(odd_y, last)));
     return s;
 }
 
