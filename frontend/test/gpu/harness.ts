@@ -1,6 +1,8 @@
 /** The page behind frontend/dev/renderer.html: scenes for screenshots and for the tests that drive a browser. */
 
 import type {
+  ChannelGrid,
+  ChannelView,
   CursorVisual,
   FrameStats,
   GhostVisual,
@@ -76,6 +78,8 @@ interface Shot {
   sheet?: boolean;
   /** Draw as on a real GPU: all detail, multisampled. */
   rich?: boolean;
+  /** Paint over the whole domain: values of channels, -1..1. */
+  paint?: Partial<Record<"snow" | "grass" | "forest" | "wetness", number>>;
   tau?: number;
   width?: number;
   height?: number;
@@ -145,7 +149,7 @@ function scene(shot: Shot, width: number, height: number): Scene {
         ? lookAt(shot.eye, shot.target, width, height)
         : mapCamera(shot.target, shot.map, width, height),
     tiles: view,
-    channels: PLAIN_CHANNELS,
+    channels: shot.paint === undefined ? PLAIN_CHANNELS : painted(shot.paint),
     settings: { ...SETTINGS, ...shot.settings },
     strokes: demo.strokes,
     ghost: demo.ghost,
@@ -155,6 +159,20 @@ function scene(shot: Shot, width: number, height: number): Scene {
     overlay: shot.overlay ?? "none",
     showStrokes: true,
   };
+}
+
+const paints = new Map<string, ChannelView>();
+
+/** Channels that say the same everywhere. */
+function painted(paint: NonNullable<Shot["paint"]>): ChannelView {
+  const key = JSON.stringify(paint);
+  const all = (value: number): ChannelGrid => ({ side: 2, values: new Float32Array(4).fill(value) });
+  const made = paints.get(key) ?? {
+    ...PLAIN_CHANNELS,
+    ...Object.fromEntries(Object.entries(paint).map(([name, value]) => [name, all(value)])),
+  };
+  paints.set(key, made);
+  return made;
 }
 
 const renderers = new Map<string, SceneRenderer>();
