@@ -129,7 +129,7 @@ export class InputController {
     return this.#hovered;
   }
 
-  /** Handles of the selected stroke, in the select tool. */
+  /** Handles of the selected stroke, in the select tool; of selected paint with the brush too. */
   get handles(): ReadonlySignal<readonly HandleVisual[]> {
     return this.#handles;
   }
@@ -238,6 +238,8 @@ export class InputController {
       this.#toldViewOnly = true;
       return this.#press(null, notice);
     }
+    const handle = this.#pointing.handle(this.#handles.value, e);
+    if (handle !== null && !erases) return this.#beginDrag(handle, x, y);
     const opposite = this.tool.value === "paint" && (erases || e.altKey);
     if (this.#strokes.start(this.tool.value, this.#pointing.sample(e), e.pointerType === "pen", opposite))
       return { kind: "draw" };
@@ -446,7 +448,8 @@ export class InputController {
 
   #visibleHandles(): readonly HandleVisual[] {
     const stroke = this.#selectedStroke();
-    if (stroke === null || stroke.locked || this.tool.value !== "select" || !this.#o.canEdit()) return [];
+    const inHand = this.tool.value === "select" || (this.tool.value === "paint" && stroke?.kind === "paint");
+    if (stroke === null || stroke.locked || !inHand || !this.#o.canEdit()) return [];
     return handlesOf(stroke, this.#o.ground(), this.#drags.active.value);
   }
 }

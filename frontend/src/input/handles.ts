@@ -4,6 +4,7 @@ import type { Ground, Vec3 } from "../core/types.ts";
 import type { Flank, Paint, Stroke } from "../generated/contract.ts";
 import { MAX_SLOPE_DEG } from "../generated/contract.ts";
 import { shapeOf } from "./picking.ts";
+import { solvedHeight } from "./strokeops.ts";
 
 export type HandleKind = "first" | "last" | "crest" | "left" | "right" | "move" | "radius";
 
@@ -92,7 +93,7 @@ export function reliefBeside(stroke: Stroke, section: Section, flank: Flank, sid
   let relief = 0;
   for (let step = 0; step < FOOT_STEPS; step++) {
     const [x, y] = across(section, side * (stroke.plateau_radius_m + reach));
-    relief = section.crest[2] - ground.heightAt(x, y);
+    relief = section.crest[2] - solvedHeight(ground, x, y);
     reach = Math.min(flank.extent_m, PAST_FOOT * footDistance(flank, relief));
   }
   return relief;

@@ -13,7 +13,7 @@ import { LevelSketch, RidgeSketch } from "./levelsketch.ts";
 import { BrushSketch, dabShape, NO_SECTION, pressedPaint } from "./painttool.ts";
 import { ProfileSketch } from "./profilesketch.ts";
 import { meanPressure, type Sample, type Sketch, type SketchShape, type SketchStart } from "./sketch.ts";
-import { anchorOn, appendOps, frameCurve, metres, type Triple } from "./strokeops.ts";
+import { anchorOn, appendOps, frameCurve, metres, solvedHeight, type Triple } from "./strokeops.ts";
 
 /** Samples of the line under the pen in device pixels, for an ink overlay; `predicted` is never part of the stroke. */
 export interface InkVisual {
@@ -307,7 +307,7 @@ function liesOnGround(points: Float64Array, ground: Ground): boolean {
 export function shadowOf(points: Float64Array, ground: Ground): Float32Array {
   const n = points.length / 3;
   const out: number[] = [];
-  const drop = (x: number, y: number): void => void out.push(x, y, ground.heightAt(x, y));
+  const drop = (x: number, y: number): void => void out.push(x, y, solvedHeight(ground, x, y));
   const parts = Math.max(1, Math.ceil(48 / Math.max(1, n - 1)));
   for (let i = 0; i + 1 < n; i++)
     for (let k = 0; k < parts; k++) {

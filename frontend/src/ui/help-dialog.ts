@@ -8,6 +8,7 @@ import { shared } from "./styles/shared.ts";
 /** What pointers do; the keys come from the actions themselves. */
 const POINTERS: readonly { readonly what: string; readonly how: string }[] = [
   { what: "Draw, or use the chosen tool", how: "Left button, pen or one finger" },
+  { what: "Paint the opposite", how: "Alt with the brush, or the other end of a pen" },
   { what: "Orbit", how: "Right button; left button on empty ground with Select" },
   { what: "Pan", how: "Middle button, Shift + right button, Space + left button, or two fingers" },
   { what: "Zoom", how: "Wheel, or two fingers" },

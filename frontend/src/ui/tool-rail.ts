@@ -65,7 +65,7 @@ export class EskTools extends SignalElement {
           height: 44px;
         }
       }
-      @media (max-width: 380px) {
+      @media (max-width: 430px) {
         .icon-btn {
           width: 38px;
         }

@@ -109,6 +109,22 @@ describe("the brush", () => {
     expect(messages[0]).toMatch(/edit link/);
   });
 
+  it("is a finger where a finger draws; a second finger takes the line back and moves the view", () => {
+    paint();
+    stroke(LINE, { pointerType: "touch" });
+    expect(only().kind).toBe("paint");
+    doc.undo();
+    stroke(LINE, { pointerType: "touch", pointerId: 1 }, false);
+    expect(strokes().length).toBe(1);
+    fire("pointerdown", 200, 200, { pointerType: "touch", pointerId: 2 });
+    expect(strokes()).toEqual([]);
+    fire("pointerup", 200, 200, { pointerType: "touch", pointerId: 2 });
+    fire("pointerup", 300, 200, { pointerType: "touch", pointerId: 1 });
+    input.fingerDraws.value = false;
+    stroke(LINE, { pointerType: "touch" });
+    expect(strokes()).toEqual([]);
+  });
+
   it("is given up with Escape", () => {
     paint();
     stroke(LINE, {}, false);
@@ -214,7 +230,12 @@ describe("a line of paint", () => {
     stroke(LINE);
     input.tool.value = "select";
     input.selection.value = only().id;
-    expect(input.handles.value.map((h) => h.kind).sort()).toEqual(["first", "last", "move", "radius"]);
+    const all = ["first", "last", "move", "radius"];
+    expect(input.handles.value.map((h) => h.kind).sort()).toEqual(all);
+    input.tool.value = "mountain";
+    expect(input.handles.value).toEqual([]);
+    paint();
+    expect(input.handles.value.map((h) => h.kind).sort()).toEqual(all);
     const { radius_m } = only().paint!;
     const rim = handle("radius").position;
     const middle = handle("move").position;
