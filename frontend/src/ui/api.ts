@@ -32,6 +32,14 @@ export interface JoinCode {
   readonly expires_s: number;
 }
 
+/** The picture that a link shows where it is pasted. */
+export interface Preview {
+  readonly token: string;
+  readonly shown: boolean;
+  /** False where the server cannot draw. */
+  readonly available: boolean;
+}
+
 type Method = "GET" | "POST" | "DELETE";
 
 async function request(method: Method, path: string, secret?: string, body?: unknown): Promise<Response> {
@@ -98,6 +106,11 @@ export const api = {
   revokeLink: async (id: string, secret: string, link: string): Promise<void> => {
     await request("DELETE", `/api/terrains/${id}/links/${link}`, secret);
   },
+
+  preview: (id: string, secret: string): Promise<Preview> => json("GET", `/api/terrains/${id}/preview`, secret),
+
+  showPreview: (id: string, secret: string, shown: boolean): Promise<Preview> =>
+    json("POST", `/api/terrains/${id}/preview`, secret, { shown, renew: !shown }),
 
   code: (id: string, secret: string, role: Role): Promise<JoinCode> =>
     json("POST", `/api/terrains/${id}/codes`, secret, { role }),

@@ -18,9 +18,13 @@ export function terrainPath(id: string, secret: string): string {
   return `/t/${encodeURIComponent(id)}#${encodeURIComponent(secret)}`;
 }
 
-/** The whole link, to copy or to show as a QR code. */
-export function terrainLink(origin: string, id: string, secret: string): string {
-  return origin + terrainPath(id, secret);
+/**
+ * The whole link, to copy or to show as a QR code. `preview`: the token by which programs that unfold links may see the
+ * terrain's picture; it opens nothing else.
+ */
+export function terrainLink(origin: string, id: string, secret: string, preview: string | null = null): string {
+  const query = preview === null ? "" : `?p=${encodeURIComponent(preview)}`;
+  return origin + terrainPath(id, secret).replace("#", `${query}#`);
 }
 
 /** Reads a join code ("K7M 2QX") or a link to a terrain of this server. */

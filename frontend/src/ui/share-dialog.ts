@@ -1,8 +1,9 @@
 import "@awesome.me/webawesome/dist/components/copy-button/copy-button.js";
 import "@awesome.me/webawesome/dist/components/dialog/dialog.js";
 import "@awesome.me/webawesome/dist/components/qr-code/qr-code.js";
+import "@awesome.me/webawesome/dist/components/switch/switch.js";
 import { html, nothing, type TemplateResult } from "lit";
-import { type AccessLink, ApiError, api, type JoinCode } from "./api.ts";
+import { type AccessLink, ApiError, api, type JoinCode, type Preview } from "./api.ts";
 import { icon } from "./icons.ts";
 import { terrainLink } from "./links.ts";
 import "./segmented.ts";
@@ -29,6 +30,7 @@ export class EskShare extends SignalElement {
     made: { state: true },
     links: { state: true },
     code: { state: true },
+    preview: { state: true },
     problem: { state: true },
     busy: { state: true },
   };
@@ -40,6 +42,7 @@ export class EskShare extends SignalElement {
   declare made: MadeLinks;
   declare links: readonly AccessLink[] | null;
   declare code: (JoinCode & { readonly role: Tab }) | null;
+  declare preview: Preview | null;
   declare problem: string;
   declare busy: boolean;
 
@@ -50,6 +53,7 @@ export class EskShare extends SignalElement {
     this.made = {};
     this.links = null;
     this.code = null;
+    this.preview = null;
     this.problem = "";
     this.busy = false;
   }
@@ -64,7 +68,16 @@ export class EskShare extends SignalElement {
     this.code = null;
     this.problem = "";
     this.tab = session.role.value === "view" ? "view" : "edit";
-    if (session.role.value === "owner") void this.#try(() => this.#loadLinks());
+    void this.#try(async () => {
+      // Asking for the picture also has it drawn, so that it is there when the link is pasted.
+      this.preview = await api.preview(session.id, session.secret);
+      if (session.role.value === "owner") await this.#loadLinks();
+    });
+  }
+
+  async #showPreview(shown: boolean): Promise<void> {
+    const { session } = this.stage;
+    this.preview = await api.showPreview(session.id, session.secret, shown);
   }
 
   async #loadLinks(): Promise<void> {
@@ -149,6 +162,7 @@ export class EskShare extends SignalElement {
         ${this.#link()}
         <p class="problem" role="alert">${this.problem}</p>
         ${role !== "view" && this.tab !== "owner" ? this.#codeRow(this.tab) : nothing}
+        ${role === "owner" && this.preview?.available ? this.#picture(this.preview) : nothing}
         ${role === "owner" && this.links ? this.#list(this.links) : nothing}
       </wa-dialog>
     `;
@@ -162,7 +176,9 @@ export class EskShare extends SignalElement {
         ${icon("link")} Make a link
       </button>`;
     }
-    const link = terrainLink(window.location.origin, this.stage.session.id, secret ?? "");
+    const { preview } = this;
+    const token = tab !== "owner" && preview?.shown && preview.available ? preview.token : null;
+    const link = terrainLink(window.location.origin, this.stage.session.id, secret ?? "", token);
     return html`
       <div class="link">
         <input class="field" readonly aria-label="Link" .value=${link} @focus=${(e: Event) => (e.target as HTMLInputElement).select()} />
@@ -193,6 +209,18 @@ export class EskShare extends SignalElement {
                 </button>`
         }
       </div>
+    `;
+  }
+
+  #picture(preview: Preview): TemplateResult {
+    return html`
+      <wa-switch
+        size="small"
+        ?checked=${preview.shown}
+        ?disabled=${this.busy}
+        @change=${(e: Event) => this.#try(() => this.#showPreview((e.target as HTMLInputElement).checked))}
+        >Links show a picture of the terrain where they are pasted</wa-switch
+      >
     `;
   }
 

@@ -28,6 +28,14 @@ describe("route", () => {
 });
 
 describe("links", () => {
+  it("carries the token of the picture beside the secret, which stays in the fragment", () => {
+    const url = new URL(terrainLink(ORIGIN, "abc", "s3cret", "t/k"));
+    expect(url.searchParams.get("p")).toBe("t/k");
+    expect(url.hash).toBe("#s3cret");
+    expect(route(url)).toEqual({ page: "terrain", id: "abc", secret: "s3cret" });
+    expect(terrainLink(ORIGIN, "abc", "s3cret")).not.toContain("?");
+  });
+
   it.each(["plain", "with/slash", "ü #?&%", "a+b=c"])("puts the secret %j in the fragment only", (secret) => {
     const url = new URL(terrainLink(ORIGIN, "abc", secret));
     expect(url.search).toBe("");
