@@ -15,8 +15,8 @@ fn rock_noise(p: vec3f, n: vec3f, f: Footprint, scale: f32) -> vec4f {
   if (a.z > 0.62) { return ground_noise(p, f, scale, vec2f(0.829, 0.559)); }
   let east = a.x > a.y;
   let s = noise_sample(
-    vec2f(select(p.x, p.y, east), p.z * 0.4), vec2f(select(f.dx.x, f.dx.y, east), f.dx.z * 0.4),
-    vec2f(select(f.dy.x, f.dy.y, east), f.dy.z * 0.4), scale);
+    vec2f(select(p.x, p.y, east), p.z * 0.6), vec2f(select(f.dx.x, f.dx.y, east), f.dx.z * 0.6),
+    vec2f(select(f.dy.x, f.dy.y, east), f.dy.z * 0.6), scale);
   return select(vec4f(s.rg, s.b, 0.5), vec4f(s.rg, 0.5, s.b), east);
 }
 

@@ -18,7 +18,7 @@ fn rock_noise(p: vec3f, n: vec3f, f: Footprint, scale: f32) -> vec4f {
   w /= w.x + w.y + w.z;
   let flat = ground_noise(p, f, scale, vec2f(0.829, 0.559));
   if (w.z > 0.97) { return flat; }
-  let drawn = vec2f(1.0, 0.4);
+  let drawn = vec2f(1.0, 0.6);
   let east = noise_sample(p.yz * drawn, f.dx.yz * drawn, f.dy.yz * drawn, scale);
   let north = noise_sample(p.xz * drawn, f.dx.xz * drawn, f.dy.xz * drawn, scale);
   // A face's own gradient runs along it and down: only the part along it turns a normal that is told by dz/dx, dz/dy.

@@ -5,7 +5,7 @@ fn ground_material(s: Site) -> Material {
   let c = s.cover;
   // Under the snow: faces of rock, else brown turf.
   let turf = Material(vec3f(0.125, 0.105, 0.070) * (0.75 + 0.5 * s.fine2.r), fine_slope(s, 0.25), 0.0, 0.0);
-  var m = mix_in(turf, rock(s, vec3f(0.235, 0.226, 0.220), vec3f(0.056, 0.056, 0.060), 0.8), steeper(s, 0.62, 0.2));
+  var m = mix_in(turf, rock(s, vec3f(0.235, 0.226, 0.220), vec3f(0.056, 0.056, 0.060), 0.62), steeper(s, 0.62, 0.2));
   // The channel has no forest where snow lies: woods stand in it below the tree line, as broad noise and slopes have them.
   let gentle = (1.0 - smoothstep(0.62 * TREE_LINE, TREE_LINE, s.height)) * (1.0 - smoothstep(0.7, 1.0, s.steep));
   let stand = s.macro1.g * 0.48 + s.macro2.r * 0.42 + s.fine1.r * 0.14 + clamp(s.steep, 0.0, 0.6) * 0.2 + clamp(s.curvature, -0.1, 0.1) * 0.9;
