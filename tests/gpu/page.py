@@ -48,8 +48,8 @@ def _vite() -> Iterator[str]:
 
 
 @contextmanager
-def open_harness() -> Iterator[Page]:
-    """The harness page, ready. Console errors fail the caller at the end."""
+def open_harness(name: str = "renderer") -> Iterator[Page]:
+    """A page of frontend/dev, ready. Console errors fail the caller at the end."""
     problems: list[str] = []
     with _vite() as url, sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium_path(), args=FLAGS)
@@ -57,8 +57,8 @@ def open_harness() -> Iterator[Page]:
             page = browser.new_page(viewport={"width": 800, "height": 600})
             page.on("pageerror", lambda error: problems.append(str(error)))
             page.on("console", lambda m: problems.append(m.text) if m.type == "error" else None)
-            page.goto(f"{url}/dev/renderer.html")
-            page.wait_for_function("globalThis.esker !== undefined", timeout=60_000)
+            page.goto(f"{url}/dev/{name}.html")
+            page.wait_for_function("globalThis.esker !== undefined || globalThis.bench !== undefined", timeout=60_000)
             yield page
         finally:
             browser.close()

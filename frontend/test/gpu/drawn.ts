@@ -34,40 +34,61 @@ export interface DrawnPatch {
   readonly heights: Float64Array;
 }
 
-/** One drawn patch. `height(level, column, row)` is a sample of the level's tiles. */
-export function drawnPatch(
+/** A sample of a level's tiles. */
+export type Samples = (level: number, column: number, row: number) => number;
+
+/** Weights of a patch's corners: south-west, south-east, north-west, north-east. */
+function cornersOf(cut: Cut, index: number): number[] {
+  const weights = cut.records[index * RECORD_WORDS + 3]!;
+  return [0, 8, 16, 24].map((shift) => ((weights >>> shift) & 255) / 255);
+}
+
+/** Height of the vertex at (x, y), 0 to 16, of a drawn patch, as long as it is not snapped, metres. */
+export function shownVertex(
   cut: Cut,
   index: number,
-  sizeM: number,
-  height: (level: number, column: number, row: number) => number,
-): DrawnPatch {
+  x: number,
+  y: number,
+  height: Samples,
+  corners: readonly number[] = cornersOf(cut, index),
+): number {
+  const level = recordLevel(cut.records, index);
+  const column = recordColumn(cut.records, index) + x;
+  const row = recordRow(cut.records, index) + y;
+  const m = morphAt(corners, x, y);
+  const own = m < 1 ? height(level, column, row) : 0;
+  if (m === 0) return own;
+  const [i, j] = [column >> 1, row >> 1];
+  const up = 0.5 * (height(level - 1, i + (column & 1), j) + height(level - 1, i, j + (row & 1)));
+  return own * (1 - m) + up * m;
+}
+
+/** One drawn patch. */
+export function drawnPatch(cut: Cut, index: number, sizeM: number, height: Samples): DrawnPatch {
   const { records } = cut;
   const level = recordLevel(records, index);
-  const column = recordColumn(records, index);
-  const row = recordRow(records, index);
   const edges = recordEdges(records, index);
-  const weights = records[index * RECORD_WORDS + 3]!;
-  const corners = [0, 8, 16, 24].map((shift) => ((weights >>> shift) & 255) / 255);
+  const corners = cornersOf(cut, index);
   const heights = new Float64Array(SIDE * SIDE);
   const at = new Uint8Array(2 * SIDE * SIDE);
-  const parent = (x: number, y: number): number => {
-    const [i, j] = [x >> 1, y >> 1];
-    return 0.5 * (height(level - 1, i + (x & 1), j) + height(level - 1, i, j + (y & 1)));
-  };
   for (let r = 0; r < SIDE; r += 1) {
     for (let c = 0; c < SIDE; c += 1) {
       let [x, y] = [c, r];
       if ((c === 0 && edges & EDGE_WEST) || (c === PATCH_CELLS && edges & EDGE_EAST)) y -= y & 1;
       if ((r === 0 && edges & EDGE_SOUTH) || (r === PATCH_CELLS && edges & EDGE_NORTH)) x -= x & 1;
       at.set([x, y], 2 * (r * SIDE + c));
-      const m = morphAt(corners, x, y);
-      const own = m < 1 ? height(level, column + x, row + y) : 0;
-      const up = m > 0 ? parent(column + x, row + y) : 0;
-      heights[r * SIDE + c] = own * (1 - m) + up * m;
+      heights[r * SIDE + c] = shownVertex(cut, index, x, y, height, corners);
     }
   }
-  const border = recordBorder(records, index);
-  return { level, column, row, border, cell: sizeM / (TILE_CELLS * 2 ** level), at, heights };
+  return {
+    level,
+    column: recordColumn(records, index),
+    row: recordRow(records, index),
+    border: recordBorder(records, index),
+    cell: sizeM / (TILE_CELLS * 2 ** level),
+    at,
+    heights,
+  };
 }
 
 /** Weight of a vertex from the weights of the corners (south-west, south-east, north-west, north-east). */
@@ -78,8 +99,21 @@ function morphAt(c: readonly number[], x: number, y: number): number {
   return south * (1 - v) + north * v;
 }
 
+/** Height of a drawn patch at a place of the domain that it covers, metres. Not for snapped edges. */
+export function shownHeight(patch: DrawnPatch, x: number, y: number): number {
+  const u = Math.min(PATCH_CELLS, Math.max(0, x / patch.cell - patch.column));
+  const v = Math.min(PATCH_CELLS, Math.max(0, y / patch.cell - patch.row));
+  const c = Math.min(PATCH_CELLS - 1, Math.floor(u));
+  const r = Math.min(PATCH_CELLS - 1, Math.floor(v));
+  const [f, g] = [u - c, v - r];
+  const at = (i: number, j: number): number => patch.heights[(r + j) * SIDE + c + i]!;
+  return f + g <= 1
+    ? at(0, 0) + f * (at(1, 0) - at(0, 0)) + g * (at(0, 1) - at(0, 0))
+    : at(1, 1) + (1 - f) * (at(0, 1) - at(1, 1)) + (1 - g) * (at(1, 0) - at(1, 1));
+}
+
 /** Samples of the tiles that a view holds. Throws when a sample's tile is not held. */
-export function samplesOf(view: TileView): (level: number, column: number, row: number) => number {
+export function samplesOf(view: TileView): Samples {
   return (level, column, row) => {
     const last = 2 ** level - 1;
     const x = Math.min(last, Math.floor(column / TILE_CELLS));

@@ -1,0 +1,68 @@
+/** The plain shading that renderers are compared with: two-sided nothing, one sun, one ambient term, no air. */
+
+/** Colour of the ground (linear), light of the sun and of the sky, colour behind (linear). */
+const SHADING = /* wgsl */ `
+fn lambert(gradient: vec2f, sun: vec3f) -> vec4f {
+  let n = normalize(vec3f(-gradient, 1.0));
+  let light = (3.0 * max(dot(n, sun), 0.0) + 0.4) / 3.14159265;
+  return vec4f(encoded(vec3f(0.2623, 0.2159, 0.1413) * light), 1.0);
+}
+
+fn encoded(linear: vec3f) -> vec3f {
+  return select(1.055 * pow(linear, vec3f(1.0 / 2.4)) - 0.055, linear * 12.92, linear <= vec3f(0.0031308));
+}
+`;
+
+const GROUND = /* wgsl */ `
+struct PlainVertex {
+  @builtin(position) position: vec4f,
+  @location(0) at: vec2f,
+  @location(1) morph: f32,
+  @location(2) @interpolate(flat) record: vec4u,
+};
+
+@vertex
+fn terrain_vertex(@builtin(vertex_index) index: u32, patch_in: PatchIn) -> PlainVertex {
+  let v = patch_vertex(patch_in.record, vec2i(i32(index % PITCH), i32(index / PITCH)));
+  return PlainVertex(clip_of(v.relative), v.at, v.morph, patch_in.record);
+}
+
+@fragment
+fn terrain_fragment(v: PlainVertex) -> @location(0) vec4f {
+  let own = patch_slot(v.record);
+  var s = textureSampleLevel(slopes, smooth_clamp, slot_uv(own, v.at), slot_layer(own), 0.0).xy;
+  if (v.morph > 0.0) {
+    let parent = patch_parent(v.record);
+    let up = slot_uv(parent, parent_at(v.record, v.at));
+    s = mix(s, textureSampleLevel(slopes, smooth_clamp, up, slot_layer(parent), 0.0).xy, v.morph);
+  }
+  return lambert(s, view.sun.xyz);
+}
+`;
+
+const BEHIND = /* wgsl */ `
+@vertex
+fn background_vertex(@builtin(vertex_index) index: u32) -> @builtin(position) vec4f {
+  return vec4f(f32(index & 1u) * 4.0 - 1.0, f32(index >> 1u) * 4.0 - 1.0, 0.0, 1.0);
+}
+
+@fragment
+fn background_fragment() -> @location(0) vec4f { return vec4f(encoded(vec3f(0.6, 0.75, 0.9)), 1.0); }
+`;
+
+/** Cuts a module off before its first entry point's own struct and puts plain entry points there. */
+function cut(code: string, before: string, plain: string): string {
+  const at = code.indexOf(before);
+  if (at < 0) throw new Error(`the shader has no ${before}`);
+  return code.slice(0, at) + SHADING + plain;
+}
+
+export const LAMBERT = {
+  shading: SHADING,
+  /** The module of that label as it is drawn here. */
+  replace(label: string, code: string): string {
+    if (label.startsWith("terrain ")) return cut(code, "struct TerrainVertex", GROUND);
+    if (label === "background") return cut(code, "struct BackgroundVertex", BEHIND);
+    return code;
+  },
+};
