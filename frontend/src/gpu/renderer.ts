@@ -1,8 +1,9 @@
 /** The WebGPU renderer: one frame from a scene (DESIGN 9). */
 
 import type { FrameStats, Scene, SceneRenderer, Vec3 } from "../core/types.ts";
+import { finestLevel } from "../tiles/detail.ts";
 import { type Cut, Selection } from "../tiles/selection.ts";
-import { expectation, finestSynthesisLevel } from "../tiles/synthetic.ts";
+import { expectation } from "../tiles/synthetic.ts";
 import { Atlas, type Changes, MAX_SLOTS, type Resident, SOFTWARE_SLOTS } from "./atlas.ts";
 import { BackgroundPass } from "./background.ts";
 import type { Gpu } from "./device.ts";
@@ -26,8 +27,10 @@ import { TileFill } from "./tilefill.ts";
 const LIGHT_TILES = { hardware: { moving: 128, rest: 256 }, software: { moving: 2, rest: 6 } } as const;
 /** Tiles that may enter in one frame. */
 const NEW_TILES = { hardware: 64, software: 16 } as const;
-/** On a software adapter a picture at rest is drawn anew this often while tiles and light still come in. */
+/** On a software adapter a picture at rest is drawn anew this often while tiles and light still come in, or less often: */
 const REDRAW_MS = 900;
+/** so many times as long as it took to draw. */
+const REDRAW_FRAMES = 4;
 /** A refined tile turns from its parent's surface to its own in this time. */
 const ENTRANCE_MS = 350;
 const FRAMES_IN_FLIGHT = { hardware: 2, software: 1 } as const;
@@ -81,6 +84,8 @@ export class GpuRenderer implements SceneRenderer {
   private lightMarched = 0;
   private lightDrawn = 0;
   private drawnAt = Number.NEGATIVE_INFINITY;
+  /** How long the device took for the last picture. */
+  private frameMs = 0;
   private inFlight = 0;
   private destroyed = false;
   private stats: FrameStats = { patches: 0, triangles: 0, selectMs: 0, cpuMs: 0, uploads: 0, busy: false };
@@ -145,7 +150,7 @@ export class GpuRenderer implements SceneRenderer {
     this.quality.mode = scene.quality ?? "automatic";
     if (moved) this.ready = false;
     const quality = this.quality.next(began, moved || (software && !this.ready));
-    if (software && !moved && !this.ready && began - this.drawnAt < REDRAW_MS) {
+    if (software && !moved && !this.ready && began - this.drawnAt < Math.max(REDRAW_MS, REDRAW_FRAMES * this.frameMs)) {
       // On the CPU a picture costs more than the upload and light of many tiles: get them ready, then draw.
       this.prepareOnly(scene, world);
       this.ready = !this.tilesDue && !world.light.pending && !this.passes.fill.pending;
@@ -187,7 +192,7 @@ export class GpuRenderer implements SceneRenderer {
     if (this.world?.tiles === scene.tiles) return this.world;
     this.world?.atlas.destroy();
     const { levels, solved, sizeM } = scene.tiles;
-    const selection = new Selection(Math.max(levels, finestSynthesisLevel(sizeM)));
+    const selection = new Selection(Math.max(levels, finestLevel(sizeM)));
     const enter = (level: number, x: number, y: number, usable: boolean): void =>
       selection.tree.setUsable(level, x, y, usable, this.fades && level > solved);
     const atlas = new Atlas(this.gpu.device, enter, this.gpu.software ? SOFTWARE_SLOTS : MAX_SLOTS);
@@ -367,7 +372,8 @@ export class GpuRenderer implements SceneRenderer {
         this.inFlight -= 1;
         if (!frame) return;
         this.drawnAt = performance.now();
-        this.quality.measured(this.drawnAt - submitted);
+        this.frameMs = this.drawnAt - submitted;
+        this.quality.measured(this.frameMs);
       },
       () => {
         this.inFlight -= 1;

@@ -1,7 +1,7 @@
 /** Detail that is made where somebody looks, level by level, without a fixed end (DESIGN 10): what the selection needs to know. */
 
 import type { ChannelView, TerrainSettings } from "../core/types.ts";
-import { MAX_SYNTHESIS_LEVEL, SYNTH_ALPHA, SYNTH_FINEST_CELL_M, TILE_CELLS } from "../generated/contract.ts";
+import { SYNTH_ALPHA, TILE_CELLS } from "../generated/contract.ts";
 import type { Expectation } from "./figures.ts";
 
 /**
@@ -9,12 +9,6 @@ import type { Expectation } from "./figures.ts";
  * middle, or each level that waits for its figures would ask for one too many. Smooth ground's error falls by four.
  */
 const RATIOS = { landscape: 0.5, smooth: 0.25, plain: 0.25 } as const;
-
-/** The finest level that is made: its cells are a centimetre wide or a little less. */
-export function finestSynthesisLevel(sizeM: number): number {
-  const cells = sizeM / TILE_CELLS / SYNTH_FINEST_CELL_M;
-  return Math.max(0, Math.min(MAX_SYNTHESIS_LEVEL, Math.ceil(Math.log2(cells))));
-}
 
 /** What detail to expect of levels that have not been made. */
 export function expectation(sizeM: number, settings: TerrainSettings, channels: ChannelView): Expectation {

@@ -15,10 +15,11 @@ import { TakeLightPass } from "../../src/gpu/takelight.ts";
 import { DEPTH_FORMAT } from "../../src/gpu/target.ts";
 import { SunPass } from "../../src/gpu/tilecompute.ts";
 import { TileFill } from "../../src/gpu/tilefill.ts";
+import { finestLevel } from "../../src/tiles/detail.ts";
 import type { PatchTree } from "../../src/tiles/patchtree.ts";
 import { RECORD_WORDS, recordLevel } from "../../src/tiles/records.ts";
 import { type Cut, Selection } from "../../src/tiles/selection.ts";
-import { expectation, finestSynthesisLevel } from "../../src/tiles/synthetic.ts";
+import { expectation } from "../../src/tiles/synthetic.ts";
 import {
   craggyField,
   FieldView,
@@ -160,7 +161,7 @@ interface World {
 
 /** An empty atlas and selection for a store; `fades`: refined tiles enter by and by. */
 function makeWorld(rig: Rig, view: TileView, fades = false): World {
-  const selection = new Selection(finestSynthesisLevel(view.sizeM));
+  const selection = new Selection(finestLevel(view.sizeM));
   const atlas = new Atlas(rig.device, (l, x, y, usable) =>
     selection.tree.setUsable(l, x, y, usable, fades && l > view.solved),
   );

@@ -81,6 +81,8 @@ interface Shot {
   /** Paint over the whole domain: values of channels, -1..1. */
   paint?: Partial<Record<"snow" | "grass" | "forest" | "wetness", number>>;
   tau?: number;
+  /** Near plane, metres. */
+  near?: number;
   width?: number;
   height?: number;
 }
@@ -146,7 +148,7 @@ function scene(shot: Shot, width: number, height: number): Scene {
   return {
     camera:
       shot.map === undefined
-        ? lookAt(shot.eye, shot.target, width, height)
+        ? lookAt(shot.eye, shot.target, width, height, 45, shot.near ?? 2)
         : mapCamera(shot.target, shot.map, width, height),
     tiles: view,
     channels: shot.paint === undefined ? PLAIN_CHANNELS : painted(shot.paint),

@@ -3,9 +3,10 @@
 import { beforeAll, describe, expect, it } from "vitest";
 import type { CameraState, TerrainSettings } from "../../src/core/types.ts";
 import { Atlas, type Resident } from "../../src/gpu/atlas.ts";
+import { finestLevel } from "../../src/tiles/detail.ts";
 import { recordColumn, recordLevel, recordRow } from "../../src/tiles/records.ts";
 import { type Cut, Selection } from "../../src/tiles/selection.ts";
-import { expectation, finestSynthesisLevel } from "../../src/tiles/synthetic.ts";
+import { expectation } from "../../src/tiles/synthetic.ts";
 import { alpineField, FieldView, lookAt, PLAIN_CHANNELS } from "../gpu/world.ts";
 
 const SIZE = 4096;
@@ -111,12 +112,12 @@ describe("synthetic levels", { timeout: 60_000 }, () => {
 
   it("R50: the finest level has cells of a centimetre or a little less, whatever the size", () => {
     for (const size of [512, 4096, 20000]) {
-      const cell = size / 64 / 2 ** finestSynthesisLevel(size);
+      const cell = size / 64 / 2 ** finestLevel(size);
       expect(cell).toBeLessThanOrEqual(0.01);
       expect(cell).toBeGreaterThan(0.005);
     }
-    expect(finestSynthesisLevel(65536)).toBe(17);
-    expect(finestSynthesisLevel(4096)).toBe(FINEST);
+    expect(finestLevel(65536)).toBe(17);
+    expect(finestLevel(4096)).toBe(FINEST);
   });
 
   it("R50: who stands on the ground sees the finest level, in a few frames, with fewer tiles than the atlas has", () => {
