@@ -14,7 +14,7 @@ typedef struct {
     int row, col, rows, cols;                          // the child's window
     int parent_row, parent_col, parent_rows, parent_cols;
     uint seed;
-    int sea, cells, pad;                               // is there a sea; cells of the level along one side
+    int sea, cells, shift;                             // is there a sea; 2^shift cells of the level along one side
     float spacing, size, sea_level, amplitude;         // of the parent; of the domain; detail * alpha * s_0
     float snow_line, tree_line, plants, tie;
     float grain, strength;                             // of the noise of h, and of the other channels
@@ -64,15 +64,15 @@ float synth_four_point(int odd, float4 z) {
 }
 
 // Cell of a channel's grid and place in it: exact, as both grids have powers of two cells.
-float synth_place(int index, int cells, int side, int *cell) {
-    long scaled = (long)clamp(index, 0, cells) * (side - 1);
-    *cell = min((int)(scaled / cells), side - 2);
-    return (float)(scaled - (long)*cell * cells) / (float)cells;
+float synth_place(const Launch *l, int index, int side, int *cell) {
+    long scaled = (long)clamp(index, 0, l->cells) * (side - 1);
+    *cell = min((int)(scaled >> l->shift), side - 2);
+    return (float)(scaled - ((long)*cell << l->shift)) / (float)l->cells;
 }
 
 float synth_channel(const Launch *l, __global const float *grids, int k, int i, int j) {
     int col, row, side = l->side[k];
-    float x = synth_place(i, l->cells, side, &col), y = synth_place(j, l->cells, side, &row);
+    float x = synth_place(l, i, side, &col), y = synth_place(l, j, side, &row);
     __global const float *at = grids + l->offset[k] + row * side + col;
     float south = at[0] * (1.0f - x) + at[1] * x;
     float north = at[side] * (1.0f - x) + at[side + 1] * x;
@@ -87,8 +87,8 @@ uint4 synth_pack(State s) {
                    synth_pair(s.forest, s.foam));
 }
 
-float synth_low_half(uint word) { return (float)(word & 0xffffu) / UNORM; }
-float synth_high_half(uint word) { return (float)(word >> 16) / UNORM; }
+float synth_low_half(uint word) { return (float)(word & 0xffffu); }
+float synth_high_half(uint word) { return (float)(word >> 16); }
 
 // A parent's window around a child: the first of the 4x4 samples, and the steps that stay inside of it.
 typedef struct {
@@ -131,7 +131,7 @@ State synth_before(__global const uint4 *state, const Place *p) {
             uint4 q = state[p->row[k] + p->col[m]];
             float w = wx[m];
             r.d += w * as_float(q.x);
-            r.h += w * (2.0f * synth_low_half(q.y));
+            r.h += w * synth_low_half(q.y);
             r.snow += w * synth_high_half(q.y);
             r.wet += w * synth_low_half(q.z);
             r.grass += w * synth_high_half(q.z);
@@ -142,6 +142,9 @@ State synth_before(__global const uint4 *state, const Place *p) {
         s.d += w * r.d, s.h += w * r.h, s.snow += w * r.snow, s.wet += w * r.wet;
         s.grass += w * r.grass, s.forest += w * r.forest, s.foam += w * r.foam;
     }
+    s.h *= 2.0f / UNORM;
+    s.snow *= 1.0f / UNORM, s.wet *= 1.0f / UNORM, s.grass *= 1.0f / UNORM;
+    s.forest *= 1.0f / UNORM, s.foam *= 1.0f / UNORM;
     return s;
 }
 

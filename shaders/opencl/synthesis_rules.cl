@@ -87,12 +87,13 @@ State synth_plain(const Launch *l, Ground g, Biases bias) {
 }
 
 // One item a sample of the child's window; guide and state are (rows, cols) of it. With own_guide the guide is given.
+__attribute__((reqd_work_group_size(SYNTH_GROUP, 1, 1)))
 __kernel void synthesise(__global const Launch *launch, __global const float *grids,
                          __global const float *parent_guide, __global const uint4 *parent_state,
                          __global float *guide, __global uint4 *state) {
     Launch l = *launch;
-    int col = get_global_id(0), row = get_global_id(1);
-    if (col >= l.cols || row >= l.rows) return;
+    int row = get_global_id(1);
+    int col = min((int)get_global_id(0), l.cols - 1);  // items beyond the row go along, so that groups stay full
     int i = l.col + col, j = l.row + row;
     Place p = synth_around(&l, i, j);
     Ground ground = synth_ground(&l, parent_guide, parent_state, &p);
@@ -109,6 +110,7 @@ __kernel void synthesise(__global const Launch *launch, __global const float *gr
     if (l.rule == 0) s = synth_landscape(&l, ground, before, bias, wi, wj);
     else if (l.rule == 1) s = synth_smooth(&l, ground, before, bias);
     else s = synth_plain(&l, ground, bias);
+    if ((int)get_global_id(0) >= l.cols) return;
     int at = row * l.cols + col;
     state[at] = synth_pack(s);
     if (!l.own_guide) guide[at] = synth_guide(parent_guide, &p);

@@ -23,12 +23,12 @@ from esker.synthesis.state import WORDS, pack, unpack
 from esker.synthesis.subdivide import Samples, chain, root
 
 SOURCES: Final = ("synthesis.cl", "synthesis_rules.cl")
-GROUP: Final = (64, 1)
+GROUP: Final = 64
 """Work-groups are always full: what compilers do with the rest of a row may round differently."""
 LAUNCH: Final = np.dtype(
     [(name, "<i4") for name in ("level", "rule", "cyclic", "own_guide", "row", "col", "rows", "cols", "parent_row",
                                 "parent_col", "parent_rows", "parent_cols")]
-    + [("seed", "<u4"), ("sea", "<i4"), ("cells", "<i4"), ("pad", "<i4")]
+    + [("seed", "<u4"), ("sea", "<i4"), ("cells", "<i4"), ("shift", "<i4")]
     + [(name, "<f4") for name in ("spacing", "size", "sea_level", "amplitude", "snow_line", "tree_line", "plants",
                                   "tie", "grain", "strength")]
     + [("offset", "<i4", 6), ("side", "<i4", 6)]
@@ -80,8 +80,8 @@ class Kernels:
                 else cl.Buffer(self._context, flags.READ_WRITE, size=4 * count)
             )
             launch = self._copy(_launch(site, at, w, offsets, sides))
-            size = (GROUP[0] * -(-w.shape[1] // GROUP[0]), w.shape[0])
-            self._kernel(self._queue, size, GROUP, launch, channels, guide, state, heights, child)
+            size = (GROUP * -(-w.shape[1] // GROUP), w.shape[0])
+            self._kernel(self._queue, size, (GROUP, 1), launch, channels, guide, state, heights, child)
             at, guide, state = w, heights, child
         words = np.empty((*window.shape, WORDS), dtype=np.uint32)
         out = np.empty(window.shape, dtype=np.float32)
@@ -100,7 +100,8 @@ def source() -> str:
     """The program's text: constants, then the rule."""
     folder = Path(__file__).resolve().parents[3] / "shaders" / "opencl"
     texts = [(folder / name).read_text(encoding="utf-8") for name in SOURCES]
-    return "\n".join([contract_emit.shader("cl"), f"#define SYNTH_BASE_ROUGHNESS {BASE_ROUGHNESS!r}f", *texts])
+    defines = f"#define SYNTH_BASE_ROUGHNESS {BASE_ROUGHNESS!r}f\n#define SYNTH_GROUP {GROUP}"
+    return "\n".join([contract_emit.shader("cl"), defines, *texts])
 
 
 def _packed(site: Site) -> tuple[NDArray[np.float32], list[int], list[int]]:
@@ -123,6 +124,7 @@ def _launch(site: Site, parent: Window, child: Window, offsets: list[int], sides
         "rows": child.shape[0], "cols": child.shape[1], "parent_row": parent.r0, "parent_col": parent.c0,
         "parent_rows": parent.shape[0], "parent_cols": parent.shape[1],
         "seed": site.seed, "sea": site.sea_level_m is not None, "cells": grid.cells(level),
+        "shift": grid.cells(level).bit_length() - 1,
         "spacing": site.spacing(parent.level), "size": site.size_m, "sea_level": site.sea_level_m or 0.0,
         "amplitude": site.amplitude_m, "snow_line": look.snow_line, "tree_line": look.tree_line,
         "plants": look.plants, "tie": tie(level),
