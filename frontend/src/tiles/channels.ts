@@ -13,7 +13,6 @@ import {
   BASE_ROUGHNESS,
   BIAS_QUANTA,
   Channel,
-  FrameKind,
   type PaintChannel,
   ROUGHNESS_QUANTA,
   TILE_CELLS,
@@ -24,15 +23,19 @@ interface Stream {
   readonly tiles: Map<number, Int32Array>;
   readonly quanta: number;
   readonly base: number;
+  /** The finest complete level, -1 for none: what is shown. */
+  level: number;
+  /** What is shown, until it changes. */
+  grid: ChannelGrid | null;
 }
 
-const stream = (quanta: number, base: number): Stream => ({ tiles: new Map(), quanta, base });
+const stream = (quanta: number, base: number): Stream => ({ tiles: new Map(), quanta, base, level: -1, grid: null });
 
 const BIASES: readonly number[] = [Channel.SNOW, Channel.GRASS, Channel.FOREST, Channel.WETNESS];
 
 export class ChannelStore implements ChannelView {
   readonly sizeM: number;
-  /** Rises with every frame that was applied. */
+  /** Rises when what is shown of a channel changes. Those that did not change keep their grids. */
   readonly revision: ReadonlySignal<number>;
   private readonly rev = signal(0);
   private readonly streams: ReadonlyMap<number, Stream> = new Map([
@@ -40,7 +43,6 @@ export class ChannelStore implements ChannelView {
     [Channel.ROUGHNESS, stream(ROUGHNESS_QUANTA, BASE_ROUGHNESS)],
     ...BIASES.map((channel) => [channel, stream(BIAS_QUANTA, BASE_BIAS)] as const),
   ]);
-  private readonly grids = new Map<number, { readonly stamp: number; readonly grid: ChannelGrid }>();
   /** The next frame of a new connection replaces everything. */
   private stale = false;
 
@@ -104,9 +106,10 @@ export class ChannelStore implements ChannelView {
   renewed(): void {
     if (!this.stale) return;
     this.stale = false;
-    for (const { tiles } of this.streams.values()) {
-      if (tiles.size > 0) this.rev.value += 1;
-      tiles.clear();
+    for (const stream of this.streams.values()) {
+      if (stream.tiles.size === 0) continue;
+      stream.tiles.clear();
+      this.show(stream, -1);
     }
   }
 
@@ -119,24 +122,33 @@ export class ChannelStore implements ChannelView {
     if (gone.size > 0)
       for (const key of into.tiles.keys()) if (isUnderAny(key, gone, frame.level)) into.tiles.delete(key);
     for (const tile of frame.tiles) into.tiles.set(tileKey(frame.level, tile.x, tile.y), tile.samples);
-    if (frame.tiles.length > 0 || gone.size > 0 || frame.kind === FrameKind.LEVEL) this.rev.value += 1;
+    const level = finestComplete(into.tiles);
+    if (level !== into.level || (level === frame.level && frame.tiles.length > 0)) this.show(into, level);
+  }
+
+  private show(stream: Stream, level: number): void {
+    stream.level = level;
+    stream.grid = null;
+    this.rev.value += 1;
   }
 
   private grid(channel: number): ChannelGrid {
-    const known = this.grids.get(channel);
-    if (known?.stamp === this.stamp) return known.grid;
-    const grid = compose(this.streams.get(channel)!);
-    this.grids.set(channel, { stamp: this.stamp, grid });
-    return grid;
+    const stream = this.streams.get(channel)!;
+    stream.grid ??= compose(stream);
+    return stream.grid;
   }
 }
 
-/** The finest complete level as one grid; a single cell of the base value while there is none. */
-function compose({ tiles, quanta, base }: Stream): ChannelGrid {
+function finestComplete(tiles: ReadonlyMap<number, unknown>): number {
   const counts: number[] = [];
   for (const key of tiles.keys()) counts[keyLevel(key)] = (counts[keyLevel(key)] ?? 0) + 1;
   let level = -1;
   while (counts[level + 1] === 4 ** (level + 1)) level += 1;
+  return level;
+}
+
+/** The finest complete level as one grid; a single cell of the base value while there is none. */
+function compose({ tiles, quanta, base, level }: Stream): ChannelGrid {
   if (level < 0) return { side: 2, values: new Float32Array(4).fill(base) };
   const side = (TILE_CELLS << level) + 1;
   const values = new Float32Array(side * side);

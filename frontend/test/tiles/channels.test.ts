@@ -119,6 +119,21 @@ describe("ChannelStore", () => {
     expect(store.snow.values[0]).toBe(1);
   });
 
+  it("R23: only what is shown counts: a coarse level under a fine one changes nothing, nor another channel's grid", () => {
+    const store = new ChannelStore(SIZE);
+    store.apply(level(Channel.SNOW, 0, () => 0));
+    store.apply(level(Channel.SNOW, 1, () => 0));
+    store.apply(level(Channel.GRASS, 0, () => 0));
+    const [stamp, snow, grass] = [store.stamp, store.snow, store.grass];
+    store.apply(level(Channel.SNOW, 0, () => BIAS_QUANTA));
+    expect(store.stamp).toBe(stamp);
+    expect(store.snow).toBe(snow);
+    store.apply(level(Channel.SNOW, 1, () => BIAS_QUANTA));
+    expect(store.stamp).toBe(stamp + 1);
+    expect(store.snow.values[5]).toBe(1);
+    expect(store.grass).toBe(grass);
+  });
+
   it("R23: paint comes like the others, -1 to 1, and is nothing where nobody painted", () => {
     const store = new ChannelStore(SIZE);
     for (const grid of [store.snow, store.grass, store.forest, store.wetness])
