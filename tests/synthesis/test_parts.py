@@ -41,6 +41,30 @@ def test_noise_is_even_and_its_streams_are_strangers() -> None:
         assert abs(flips - 0.5) < 0.005
 
 
+def _spelled_out(seed: int, level: int, stream: int, i: int, j: int) -> int:
+    """The hash in whole numbers of any length, as docs/synthesis.md has it."""
+
+    def mix(x: int) -> int:
+        x ^= x >> 16
+        x = x * 0x7FEB352D % 2**32
+        x ^= x >> 15
+        x = x * 0x846CA68B % 2**32
+        return x ^ x >> 16
+
+    word = mix((seed + 0x9E3779B9 * (8 * level + stream)) % 2**32)
+    return mix((mix((word + j) % 2**32) + i) % 2**32)
+
+
+@pytest.mark.parametrize(
+    "key", [(0, 0, 0, 0, 0), (1, 0, 3, -2, 5), (2**32 - 1, 17, 2, 8388610, -1), (77, 9, 1, 5, 32768)]
+)
+def test_noise_is_the_hash_that_is_written_down(key: tuple[int, int, int, int, int]) -> None:
+    """SPEC F1."""
+    seed, level, stream, i, j = key
+    found = noise.hashed(seed, level, stream, np.array([j]), np.array([i]))
+    assert int(found[0, 0]) == _spelled_out(*key)
+
+
 def test_noise_is_exact_in_float32() -> None:
     words = noise.hashed(3, 17, 3, ROWS, ROWS)
     for value in (noise.full, noise.low, noise.high):
