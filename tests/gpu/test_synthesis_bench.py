@@ -53,3 +53,12 @@ def test_figures_of_a_small_view_and_flight() -> None:
     assert flight["frames"] == 3
     assert flight["tiles_made"]["most"] < view["tiles"]
     assert bench.copy_rate(maker, 1) > 1e7
+
+
+def test_agreement_tells_how_far_two_adapters_are_apart() -> None:
+    """An adapter agrees with itself to the bit; a changed d shows."""
+    own = bench.states(None)
+    assert len(own) == 13
+    assert bench.agreement(own, bench.states(None)) == {"detail_m": 0, "channel_units": 0, "equal_details": 1}
+    other = [*own[:-1], own[-1]._replace(d=own[-1].d + 0.5, snow=own[-1].snow + 2 / 65535)]
+    assert bench.agreement(other, own) == {"detail_m": 0.5, "channel_units": 2, "equal_details": round(12 / 13, 4)}

@@ -33,6 +33,7 @@ from esker.bench import _serving
 from esker.bench._slots import AREA, HELD, Job, SlotMaker, child_of
 from esker.contract import PATCH_CELLS, SUBPATCHES
 from esker.synthesis.site import Site, tile_window
+from esker.synthesis.state import State, unpack
 from esker.synthesis.subdivide import finest_level
 from esker.version import VERSION
 
@@ -338,6 +339,27 @@ def measure(adapter: Any, repeats: int, frames: int) -> dict[str, Any]:
     }
 
 
+def states(adapter: Any) -> list[State]:
+    """A tile of every level to 12, the same on every adapter but for the rounding of its arithmetic."""
+    site = replace(terrain(), channels=strokes())
+    maker = SlotMaker(site, 16, adapter)
+    cache = Cache(maker)
+    jobs = cache.want(frozenset((level, 1365 >> (12 - level), 2730 >> (12 - level)) for level in range(13)))
+    cache.fill(jobs)
+    return [unpack(maker.state(job.slot)) for job in jobs]
+
+
+def agreement(found: list[State], first: list[State]) -> dict[str, Any]:
+    """How far one adapter's detail is from another's: metres, units of 16 bits, share of equal d."""
+    pairs = list(zip(found, first, strict=True))
+    units = [np.abs(a - b).max() * 65535 for one, two in pairs for a, b in zip(one[2:], two[2:], strict=True)]
+    return {
+        "detail_m": float(max(np.abs(one.d - two.d).max() for one, two in pairs)),
+        "channel_units": round(float(max(units))),
+        "equal_details": round(float(np.mean([np.mean(one.d == two.d) for one, two in pairs])), 4),
+    }
+
+
 def main(argv: list[str]) -> int:
     """``esker bench synthesis [--json] [-o FILE] [--quick]``."""
     parser = argparse.ArgumentParser(prog="esker bench synthesis", description=__doc__)
@@ -350,6 +372,9 @@ def main(argv: list[str]) -> int:
     if not found:
         sys.stderr.write("no adapter: install mesa-vulkan-drivers, or a GPU's driver\n")
         return 1
+    made = [states(adapter) for adapter in adapters()]
+    for one, own in zip(found, made, strict=True):
+        one["agreement_with_first"] = agreement(own, made[0])
     result = {
         "bench": "synthesis",
         "version": VERSION,
