@@ -1,7 +1,7 @@
 // The functions of detail_rich.wgsl for adapters that draw on the CPU: one sample where the others take many.
 const NOISE_TEXELS: f32 = 256.0;
 // Steps of the march for what the water mirrors.
-const MIRROR_STEPS: i32 = 6;
+const MIRROR_STEPS: i32 = 4;
 
 fn noise_sample(at: vec2f, dx: vec2f, dy: vec2f, scale: f32) -> vec4f {
   let k = 1.0 / scale;

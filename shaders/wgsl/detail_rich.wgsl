@@ -2,7 +2,7 @@
 // is part of each module. (Branches would not do: a CPU adapter computes both sides of them.)
 
 // Steps of the march for what the water mirrors.
-const MIRROR_STEPS: i32 = 20;
+const MIRROR_STEPS: i32 = 16;
 
 // `scale`: metres (or whatever `at` is in) that the texture covers once.
 fn noise_sample(at: vec2f, dx: vec2f, dy: vec2f, scale: f32) -> vec4f {
