@@ -136,8 +136,8 @@ function heldGround(site: VectorSite, level: number, x: number, y: number): { he
 }
 
 /** Makes every place of the vectors from the root and returns how far it is off. Throws on any validation error. */
-export async function synthesisVectors(vectors: Vectors): Promise<Deviation[]> {
-  const adapter = await navigator.gpu.requestAdapter();
+export async function synthesisVectors(vectors: Vectors, featureLevel = "core"): Promise<Deviation[]> {
+  const adapter = await navigator.gpu.requestAdapter({ featureLevel });
   const device = await adapter!.requestDevice();
   device.pushErrorScope("validation");
   const pass = await SynthesisPass.create(device);
