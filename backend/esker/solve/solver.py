@@ -254,11 +254,12 @@ class Solver:
                 yield from workspace.loading(strokes, settings)
                 loaded = True
                 if warm is None:
-                    yield from self._with_channels(
-                        self._paced(_previews(workspace, preview_gradient_cycles(settings)), top),
-                        self._channels(spoken, settings, top, early),
-                        top,
-                    )
+                    previews = self._paced(_previews(workspace, preview_gradient_cycles(settings)), top)
+                    yield next(previews)
+                    # so what is painted keeps up with a pen that never rests; channels of which the strokes speak that
+                    # the pen draws would hold it up, and come when it does rest
+                    yield from self._channels(spoken, settings, top, early)
+                    yield from previews
                 else:
                     _gradients(workspace)
                     workspace.warm(warm)
@@ -300,16 +301,6 @@ class Solver:
             for coarser, samples in enumerate(levels):
                 yield LevelResult(coarser, samples, settled=True, channel=channel)
             yield None
-
-    def _with_channels(
-        self, previews: Iterator[LevelResult | None], channels: Iterator[LevelResult | None], top: int
-    ) -> Iterator[LevelResult | None]:
-        """Channels before the finest preview: so what is painted keeps up with a pen that never rests. (Those of which
-        the strokes speak that the pen draws would hold it up, and come when it does rest.)"""
-        for result in previews:
-            if result is not None and result.level == top:
-                yield from channels
-            yield result
 
     def _take(self, strokes: Sequence[Stroke], settings: TerrainSettings, top: int) -> Workspace:
         """An idle workspace that has most of these strokes rasterised already; or a new one; or the longest idle."""
