@@ -71,6 +71,12 @@ def off(a: NDArray[np.int16], b: NDArray[np.int16]) -> float:
     return round(100 * float((np.abs(a - b).max(axis=2) > OFF).mean()), 4)
 
 
+def _tell(*words: object) -> None:
+    """Where a long run is."""
+    sys.stderr.write(" ".join(str(word) for word in words) + "\n")
+    sys.stderr.flush()
+
+
 def _rounded(error: dict[str, Any]) -> dict[str, Any]:
     return {k: v if k == "places" else round(float(v), 3) for k, v in error.items()}
 
@@ -101,6 +107,7 @@ def ours(browser: Browser, base: str, ground: dict[str, Any], args: argparse.Nam
                     page.evaluate("t => bench.settle(t, 'fine')", tau)
                     row["pixels_off_percent"] = off(picture(page.evaluate("() => bench.picture()")), reference)
                 out.setdefault(shading, {})[f"tau {tau:g}"] = row
+                _tell(shading, f"tau {tau:g}", row)
     return out
 
 
@@ -115,6 +122,7 @@ def growth(browser: Browser, base: str, ground: dict[str, Any], args: argparse.N
             stats = page.evaluate("() => bench.settle(1.5, 'fine')")
             still, said = Meter(page, "bench", args.frames, args.runs).measure(False)
             side = 64 * 2**level + 1
+            _tell("growth", side, said)
             out[f"{side}x{side}"] = {
                 "still_gpu_process_ms": still,
                 "select_ms": round(said["select"], 2),
@@ -150,6 +158,7 @@ def peers(browser: Browser, base: str, ground: dict[str, Any], args: argparse.Na
         except Exception as error:
             # Whatever a foreign renderer raises is a result: it could not draw this here.
             out[name] = {"failed": str(error).splitlines()[0][:300]}
+        _tell(name, out[name])
     return out
 
 
