@@ -47,6 +47,9 @@ class Feed:
     locations: Mapping[int, str] = field(default_factory=dict)
     head: str = ""
     """Declarations and layout qualifiers of the stage."""
+    mix: str = ""
+    """Statements that set ``uint at[3]`` and ``float share[3]``: the vertex lies between three others, whose outputs
+    are mixed by these shares. ``built_in["vertex_index"]`` is then ``at[k]``."""
 
 
 def translate(
@@ -165,6 +168,8 @@ class _Stage:
             before.append(f"  {made} {name} = {made}({fields});")
             args.append(name)
         call = f"{safe(self.found.name)}({', '.join(args)})"
+        if self.feed.mix:
+            before.append(f"  {self.feed.mix}")
         after = self._outputs(call, declared)
         return declared, "\n".join(("void main() {", *before, *after, "}"))
 
@@ -202,7 +207,13 @@ class _Stage:
         if struct is None:
             result = Field("result", self.found.result, self.found.result_attributes)
             return self._output(result, kind, call, declared)
-        lines = [f"  {self.writer.need_type(kind)} made = {call};"]
+        made = self.writer.need_type(kind)
+        lines = [f"  {made} made = {call};"]
+        if self.feed.mix:
+            fields = [safe(f.name) for f in struct.fields if not _flat(f)]
+            mixed = " ".join(f"made.{f} = share[0] * a.{f} + share[1] * b.{f} + share[2] * c.{f};" for f in fields)
+            calls = (f"{made} {name} = {call.replace('at[k]', f'at[{k}]')};" for k, name in enumerate("abc"))
+            lines = [f"  {' '.join(calls)} {made} made = a;", f"  {mixed}"]
         for f in struct.fields:
             lines += self._output(f, type_of(f.type, struct.line), f"made.{safe(f.name)}", declared)
         return lines

@@ -13,8 +13,8 @@ from esker.render.glsl_stage import FRAME, Bindings, Feed, functions, translate
 from esker.render.wgsl_tree import Module
 
 PITCH: Final = PATCH_CELLS + 1
-PATCHES_PER_DRAW: Final = 200
-"""Patches of 17 x 17 vertices: below the 65,536 that llvmpipe of Mesa 22 can take at once."""
+VERTICES_PER_DRAW: Final = 60_000
+"""llvmpipe of Mesa 22 can take 65,536 tessellated vertices at once."""
 
 _RECORD_VERTEX: Final = """#version 430
 layout(location = 0) in uvec4 a_0;
@@ -40,14 +40,31 @@ void main() {{
   gl_TessLevelInner[1] = full;
 }}
 """
-_EVALUATION: Final = Feed(
-    built_in={"vertex_index": f"(uint(grid_point().x) + {PITCH}u * uint(grid_point().y))"},
-    locations={0: "record_out"},
-    head=(
-        "layout(quads, equal_spacing, ccw) in;\npatch in uvec4 record_out;\n"
-        f"ivec2 grid_point() {{ return ivec2(gl_TessCoord.xy * {PATCH_CELLS}.0 + 0.5); }}"
-    ),
-)
+_HEAD: Final = "layout(quads, equal_spacing, ccw) in;\npatch in uvec4 record_out;"
+_NEAREST: Final = f"""
+uint grid_point() {{
+  uvec2 g = uvec2(gl_TessCoord.xy * {PATCH_CELLS}.0 + 0.5);
+  return g.x + {PITCH}u * g.y;
+}}"""
+# Between the samples the surface is that of two triangles a cell, cut from its south-east to its north-west corner.
+_BETWEEN: Final = f"""ivec2 g = ivec2(gl_TessCoord.xy * {PATCH_CELLS}.0 * {{factor}}.0 + 0.5);
+  ivec2 cell = min(g / {{factor}}, ivec2({PATCH_CELLS - 1}));
+  vec2 f = vec2(g - cell * {{factor}}) / {{factor}}.0;
+  bool low = f.x + f.y <= 1.0;
+  uint south = uint(cell.x) + {PITCH}u * uint(cell.y);
+  uint at[3] = uint[3](low ? south : south + {PITCH + 1}u, south + 1u, south + {PITCH}u);
+  float share[3];
+  share[1] = low ? f.x : 1.0 - f.y;
+  share[2] = low ? f.y : 1.0 - f.x;
+  share[0] = 1.0 - share[1] - share[2];"""
+
+
+def _evaluation(factor: int) -> Feed:
+    """What the tessellation evaluation stage feeds to a vertex entry point, ``factor`` segments a cell."""
+    locations = {0: "record_out"}
+    if factor == 1:
+        return Feed({"vertex_index": "grid_point()"}, locations, _HEAD + _NEAREST)
+    return Feed({"vertex_index": "at[k]"}, locations, _HEAD, _BETWEEN.format(factor=factor))
 
 
 Textured = moderngl.Texture | moderngl.TextureArray
@@ -80,15 +97,16 @@ class Draw:
     """A pass that draws: vertex and fragment entry point, with tessellation between them for patches."""
 
     def __init__(
-        self, context: moderngl.Context, module: Module, vertex: str, fragment: str, *, patches: bool, half_depth: bool
+        self, context: moderngl.Context, module: Module, vertex: str, fragment: str, *, patches: int, half_depth: bool
     ) -> None:
+        """``patches``: segments a cell of tessellated patches; 0 for what is no patch."""
         self.bindings = Bindings()
-        feed = _EVALUATION if patches else None
+        feed = _evaluation(patches) if patches else None
         constants = {"PITCH": PITCH} if "PITCH" in module.declarations else {}
         shape = translate(module, vertex, self.bindings, constants=constants, feed=feed, half_depth=half_depth)
         colour = translate(module, fragment, self.bindings, constants=constants)
         if patches:
-            control = _CONTROL.format(functions=functions(module, "patch_edges"), cells=PATCH_CELLS)
+            control = _CONTROL.format(functions=functions(module, "patch_edges"), cells=PATCH_CELLS * patches)
             self.program = context.program(
                 vertex_shader=_RECORD_VERTEX,
                 tess_control_shader=control,
@@ -118,8 +136,9 @@ class Draw:
         elif self._patches:
             self._context.patch_vertices = 1
             array = self._context.vertex_array(self.program, [(records, "4u4", "a_0")])
-            for first in range(0, count, PATCHES_PER_DRAW):
-                array.render(moderngl.PATCHES, vertices=min(PATCHES_PER_DRAW, count - first), first=first)
+            step = VERTICES_PER_DRAW // (PATCH_CELLS * self._patches + 1) ** 2
+            for first in range(0, count, step):
+                array.render(moderngl.PATCHES, vertices=min(step, count - first), first=first)
         else:
             array = self._context.vertex_array(self.program, [(records, layout, "a_0", "a_1")])
             array.render(moderngl.TRIANGLES, vertices=6 * PATCH_CELLS, instances=count)

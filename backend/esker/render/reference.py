@@ -55,13 +55,17 @@ class Picture:
 class Reference:
     """Draws pictures one after the other. Not for several threads: a context belongs to the one that made it."""
 
-    def __init__(self, detail: Detail = "rich", *, clear: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> None:
-        """``detail``: "plain" draws what the page draws on adapters that are no GPU. ``clear``: what shows where
-        nothing is drawn. Raises device.NoGraphics."""
+    def __init__(
+        self, detail: Detail = "rich", *, factor: int = 1, clear: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    ) -> None:
+        """``detail``: "plain" draws what the page draws on adapters that are no GPU. ``factor``: segments a cell, 1 to
+        4; with more, how a driver cuts a cell in two matters less. ``clear``: what shows where nothing is drawn. Raises
+        device.NoGraphics."""
         self.context = open_context()
         self._half_depth = half_depth(self.context)
         self._detail: Detail = detail
         self._clear = clear
+        self._factor = factor
         march = PLAIN_MARCH if detail == "plain" else {}
         self._normals = Compute(self.context, sources.normals(), "compute_normals")
         self._sun = Compute(self.context, sources.sun(), "compute_sun", march)
@@ -196,7 +200,7 @@ class Reference:
                 module,
                 f"{name}_vertex",
                 f"{name}_fragment",
-                patches=name in ("terrain", "water"),
+                patches=self._factor if name in ("terrain", "water") else 0,
                 half_depth=self._half_depth,
             )
         return self._draws[key]
