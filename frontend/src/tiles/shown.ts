@@ -218,6 +218,7 @@ function dressed(base: Float64Array, d: Float64Array, finer: number): Surface {
   let top = Number.NEGATIVE_INFINITY;
   let relief = Number.NEGATIVE_INFINITY;
   let bend = 0;
+  let wrinkle = 0;
   for (let row = 0; row < SAMPLES; row += 1) {
     for (let col = 0; col < SAMPLES; col += 1) {
       const at = (row + BORDER) * BLOCK_SIDE + col + BORDER;
@@ -225,14 +226,21 @@ function dressed(base: Float64Array, d: Float64Array, finer: number): Surface {
       heights[row * SAMPLES + col] = z;
       top = Math.max(top, z);
       relief = Math.max(relief, d[at]!);
-      const across = base[at - 1]! - 2 * base[at]! + base[at + 1]!;
-      const upward = base[at - BLOCK_SIDE]! - 2 * base[at]! + base[at + BLOCK_SIDE]!;
-      bend = Math.max(bend, Math.abs(across), Math.abs(upward));
+      bend = Math.max(bend, bendAt(base, at));
+      wrinkle = Math.max(wrinkle, bendAt(d, at));
     }
   }
-  // Between samples the 4-point rule leaves the line by an eighth of the second difference at most, per axis.
-  const rest = finer + bend / 4;
+  // Between samples the 4-point rule leaves the line by an eighth of the second difference at most, per axis. The B-spline
+  // rule moves the detail's own samples by an eighth of theirs, and a quarter of that on each further level.
+  const rest = finer + bend / 4 + wrinkle / 3;
   return { base, heights, rest, top: top + rest, relief };
+}
+
+/** Greatest second difference of a sample of a block with its border, along either axis. */
+function bendAt(z: Float64Array, at: number): number {
+  const across = z[at - 1]! - 2 * z[at]! + z[at + 1]!;
+  const upward = z[at - BLOCK_SIDE]! - 2 * z[at]! + z[at + BLOCK_SIDE]!;
+  return Math.max(Math.abs(across), Math.abs(upward));
 }
 
 /** Height at fractional column `c` and row `r` of a block. */

@@ -13,7 +13,7 @@ import { ShownGround } from "../../src/tiles/shown.ts";
 import { TileStore } from "../../src/tiles/store.ts";
 import { detailOf, RULES } from "../../src/tiles/subdivide.ts";
 import { frame, tileOf } from "./frames.ts";
-import { channelsOf } from "./synthesis.ts";
+import { channelsOf, type SiteVector, unpacked, vectors } from "./synthesis.ts";
 
 const SIZE = 1024;
 const SOLVED = 2;
@@ -169,6 +169,52 @@ describe("heightAt", () => {
     expect(none.heightAt(3, 4)).toBe(0);
     expect(none.heightAt(3, 4, 0.1)).toBe(0);
     expect(none.raycast({ origin: [5, 5, 100], dir: [0, 0, -1] })).toBeNull();
+  });
+});
+
+describe("heights of all languages", () => {
+  /** The levels of a site's vectors as held tiles. */
+  function storeOf(site: SiteVector): TileStore {
+    const tiles = new TileStore(site.size_m, 17, site.solved);
+    site.quanta.forEach((quanta, level) => {
+      const side = TILE_CELLS * 2 ** level + 1;
+      const cell = site.size_m / (side - 1);
+      const at = (v: number): number => Math.round(v / cell);
+      const height = (x: number, y: number): number => (quanta[at(y) * side + at(x)]! * cell) / 256;
+      const n = 2 ** level;
+      const all = Array.from({ length: n * n }, (_, k) =>
+        tileOf(level, k % n, Math.floor(k / n), 1, height, site.size_m),
+      );
+      tiles.apply(frame("LEVEL", level, all));
+    });
+    return tiles;
+  }
+
+  test("base and detail are those of the vectors, at every level, with every rule", () => {
+    let compared = 0;
+    let worst = 0;
+    for (const site of vectors.sites.filter((s) => !s.cyclic)) {
+      const tiles = storeOf(site);
+      const of = heightsOfTiles((l, x, y) => tiles.tile(l, x, y));
+      const field = new DetailField(site, channelsOf(site.channels), of, site.solved);
+      const ground = new ShownGround(tiles.freeze(), site.solved, field);
+      for (const { level, window, base, state } of vectors.places.filter((p) => p.site === site.name)) {
+        if (level > field.finest) continue;
+        const cell = site.size_m / (TILE_CELLS * 2 ** level);
+        const [r0, r1, c0, c1] = window;
+        const { d } = unpacked(state);
+        for (let j = Math.max(0, r0), n = TILE_CELLS * 2 ** level; j < Math.min(r1, n); j++)
+          for (let i = Math.max(0, c0); i < Math.min(c1, n); i++) {
+            const k = (j - r0) * (c1 - c0) + i - c0;
+            // Half a cell finer than asked for would be the next level; what is left out is a tenth of a cell.
+            const found = ground.heightAt(i * cell, j * cell, cell);
+            worst = Math.max(worst, Math.abs(found - base[k]! - d[k]!) / (0.11 * cell + 2e-3));
+            compared++;
+          }
+      }
+    }
+    expect(compared).toBeGreaterThan(1000);
+    expect(worst).toBeLessThan(1);
   });
 });
 
