@@ -19,7 +19,7 @@ SHOTS: dict[str, list[str]] = {
         *("--camera", "eye:700,300,620,target:2000,2500,420"),
     ],
     "look-desert": ["canyon", "--sun", "236,20", "--camera", "eye:1500,1400,420,target:2400,2500,60"],
-    "look-paper": ["figure-six", "--look", "paper", "--camera", "orbit:205,33,5600"],
+    "look-paper": ["figure-six", "--look", "paper", "--camera", "eye:3500,-2900,2700,target:2080,1850,20"],
     "water": ["volcanic-island", "--sun", "110,12", "--camera", "eye:3500,300,90,target:2200,1900,150"],
     "close-up": [
         *("alpine-ridge", "--sun", "128,20", "--refine", "10"),

@@ -29,7 +29,8 @@ def densities(z: ArrayLike) -> tuple[FLOATS, FLOATS, FLOATS]:
 def extinction(z: ArrayLike) -> FLOATS:
     """Per kilometre, (..., 3)."""
     r, m, o = densities(z)
-    return r[..., None] * RAYLEIGH + m[..., None] * MIE_EXTINCTION + o[..., None] * OZONE
+    out: FLOATS = r[..., None] * RAYLEIGH + m[..., None] * MIE_EXTINCTION + o[..., None] * OZONE
+    return out
 
 
 def to_top(z: FLOATS, up: FLOATS) -> FLOATS:
