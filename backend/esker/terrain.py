@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from esker import contract, grid
 from esker.contract import Border, Document, Flank, TerrainSettings, Vec3
 from esker.document import archive
-from esker.document.strokes import level_curve, profile_curve
+from esker.document.strokes import level_curve, misfit, profile_curve
 from esker.solve.assembly import System, assemble
 from esker.solve.detail import Settled, detailed, settle
 from esker.solve.solver import Solver
@@ -191,7 +191,13 @@ class Terrain:
         return tuple(self._strokes.values())
 
     def add(self, stroke: contract.Stroke) -> str:
-        """Add a stroke, or replace the one of the same id; returns the id. Raises ValueError beyond the limits."""
+        """Add a stroke, or replace the one of the same id; returns the id.
+
+        Raises ValueError beyond the limits, and for fields that are not of its kind.
+        """
+        wrong = misfit(stroke)
+        if wrong is not None:
+            raise ValueError(wrong)
         if stroke.id not in self._strokes and len(self._strokes) >= contract.MAX_STROKES:
             raise ValueError(f"a terrain holds at most {contract.MAX_STROKES} strokes")
         self._strokes[stroke.id] = stroke

@@ -11,6 +11,7 @@ import scipy.sparse.linalg as spla
 from numpy.typing import NDArray
 
 from esker import Stroke as Make
+from esker import Terrain
 from esker import contract as c
 from esker.contract import AMPLITUDE_QUANTA_PER_M, BIAS_QUANTA, Channel, Stroke, TerrainSettings
 from esker.fractal import ALPHA, PAINT_LESS, PAINT_MORE
@@ -225,6 +226,8 @@ def test_what_a_paint_stroke_must_be() -> None:
         Make.paint(LINE, "height")  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="points must be finite"):
         Make.paint([(1, np.nan)], "snow")
+    with pytest.raises(ValueError, match="only a paint stroke"):
+        Terrain().add(MOUNTAIN.model_copy(update={"paint": c.Paint(channel="snow", value=1.0, radius_m=9.0)}))
     stroke = Make.paint([(1, 2, 3), (4, 5, 6)], "grass", -1, 7, label="meadow")
     assert (stroke.kind, stroke.first, stroke.last, stroke.label) == ("paint", (1, 2, 0), (4, 5, 0), "meadow")
     assert stroke.paint == c.Paint(channel="grass", value=-1.0, radius_m=7.0)

@@ -11,7 +11,7 @@ from typing import Final
 
 from esker import contract as c
 from esker.contract import Op, RejectCode, Stroke, TerrainSettings
-from esker.document.strokes import Points, bounds, world_points
+from esker.document.strokes import Points, bounds, misfit, world_points
 from esker.grid import Rect
 
 GROUND_FIELDS: Final = frozenset(c.StrokeFields.model_fields) - {"label", "locked"}
@@ -204,10 +204,9 @@ class _Editor:
         anchors = (*stroke.first, *stroke.last)
         if any(abs(v) > bound for v in anchors):
             raise Refusal("out_of_domain", "An anchor lies farther than ten times the terrain from its corner.")
-        if (stroke.kind == "paint") != (stroke.paint is not None):
-            raise Refusal(
-                "bad_field", "A paint stroke needs 'paint' (channel, value, radius), and only a paint stroke."
-            )
+        wrong = misfit(stroke)
+        if wrong is not None:
+            raise Refusal("bad_field", wrong)
         points = world_points(stroke)
         if stroke.curve and abs(points).max() > bound:
             raise Refusal("out_of_domain", "A point lies farther than ten times the terrain from its corner.")

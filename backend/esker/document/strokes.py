@@ -54,6 +54,13 @@ def level_curve(points: Points, first: Vec3, last: Vec3) -> tuple[CurvePoint, ..
     return tuple((float(p), float(r)) for p, r in zip(u, v, strict=True))
 
 
+def misfit(stroke: Stroke) -> str | None:
+    """What is wrong with the fields of a stroke of its kind, for a person; None when nothing is."""
+    if (stroke.kind == "paint") == (stroke.paint is not None):
+        return None
+    return "A paint stroke needs 'paint' (channel, value, radius), and only a paint stroke."
+
+
 def influence_extent(stroke: Stroke) -> float:
     """Farthest horizontal distance from the crest at which the stroke constrains anything, metres."""
     if stroke.paint is not None:
