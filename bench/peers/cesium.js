@@ -113,9 +113,12 @@ export async function openCesium(ground) {
   };
   look(0);
   const began = performance.now();
-  for (let k = 0; (!scene.globe.tilesLoaded || k < 60) && performance.now() - began < 120_000; k += 1) {
+  // Loaded for now is not loaded for good: what has come asks for more.
+  let loaded = 0;
+  while (loaded < 80 && performance.now() - began < 240_000) {
     scene.render();
-    await new Promise((done) => setTimeout(done, 5));
+    await new Promise((done) => setTimeout(done, 20));
+    loaded = scene.globe.tilesLoaded ? loaded + 1 : 0;
   }
   let triangles = 0;
   let tiles = 0;
@@ -132,7 +135,7 @@ export async function openCesium(ground) {
       version: C.VERSION,
       backend: "webgl2",
       screen_space_error: ground.sse,
-      settled: scene.globe.tilesLoaded,
+      settled: loaded >= 80,
       tiles,
       triangles,
       screen_error_px: screenError(C, scene, ground),

@@ -1,4 +1,4 @@
-"""A flight on the device: memory stays bounded, a picture at rest is still (SPEC R49, R50)."""
+"""A flight on the device: memory stays bounded, a picture at rest is still (SPEC R49, R56)."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def test_memory_of_the_device_stays_bounded(page: Page) -> None:
 
 
 def test_a_picture_at_rest_is_still(page: Page) -> None:
-    """R50: once settled, consecutive frames do not differ in a single pixel."""
+    """R56: once settled, consecutive frames do not differ in a single pixel."""
     page.evaluate("() => bench.hills()")
     still = page.evaluate("() => bench.flicker(3)")
     assert still == {"differing": 0, "largest": 0}

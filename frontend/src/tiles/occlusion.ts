@@ -10,7 +10,8 @@
  * A patch counts for the columns that it crosses from side to side; where two meet inside of a column, both together do.
  */
 
-import type { CameraState } from "../core/types.ts";
+import type { CameraState, Tile } from "../core/types.ts";
+import { TILE_CELLS, TILE_SAMPLES } from "../generated/contract.ts";
 
 const COLUMNS = 1024;
 /** A view whose lowest rays are steeper than this looks down on the ground: nothing to hide, and columns degenerate. */
@@ -130,4 +131,12 @@ export function frontToBack(side: number, size: number, x: number, y: number): n
   const row = Math.min(side - 1, Math.max(0, Math.floor((y / size) * side)));
   const away = (cell: number): number => Math.abs((cell % side) - column) + Math.abs(Math.floor(cell / side) - row);
   return Array.from({ length: side * side }, (_, cell) => cell).sort((a, b) => away(a) - away(b));
+}
+
+/** Highest of the four samples around a place of the tile, metres. */
+export function highestAround({ level, x, y, heights }: Tile, sizeM: number, atX: number, atY: number): number {
+  const cells = TILE_CELLS * 2 ** level;
+  const column = Math.floor((atX / sizeM) * cells) - x * TILE_CELLS;
+  const at = (Math.floor((atY / sizeM) * cells) - y * TILE_CELLS) * TILE_SAMPLES + column;
+  return Math.max(heights[at]!, heights[at + 1]!, heights[at + TILE_SAMPLES]!, heights[at + TILE_SAMPLES + 1]!);
 }

@@ -81,6 +81,11 @@ export class PatchTree {
     this.page(0, 0, 0);
   }
 
+  /** True when no detail is added to what tiles hold. */
+  get plain(): boolean {
+    return (this.figures.expected?.amplitudeM ?? 0) === 0;
+  }
+
   /** Pages in use. */
   get pages(): number {
     return this.index.size;

@@ -11,9 +11,9 @@
 
 import { eyeProjection } from "../core/eyeprojection.ts";
 import { tileKey } from "../core/tilekey.ts";
-import type { CameraState, Tile, TileView } from "../core/types.ts";
-import { PATCH_CELLS, QUANTA_PER_CELL, SUBPATCHES, TILE_CELLS, TILE_SAMPLES } from "../generated/contract.ts";
-import { frontToBack, Horizon } from "./occlusion.ts";
+import type { CameraState, TileView } from "../core/types.ts";
+import { PATCH_CELLS, QUANTA_PER_CELL, SUBPATCHES } from "../generated/contract.ts";
+import { frontToBack, Horizon, highestAround } from "./occlusion.ts";
 import { PatchTree } from "./patchtree.ts";
 import { EDGE_EAST, EDGE_NORTH, EDGE_SOUTH, EDGE_WEST, RECORD_WORDS, writeRecord } from "./records.ts";
 
@@ -334,10 +334,12 @@ export class Selection {
     }
     const high = tree.max[node]!;
     if (high < z) return true;
-    // On a slope the patch below the eye may rise above it elsewhere: its samples around the eye say more.
+    // On a slope the patch below the eye may rise above it elsewhere: samples around the eye say more, where they are all.
     const page = node >> 4;
-    const tile = view.tile(level, tree.tileX[page]!, tree.tileY[page]!);
-    return tile !== undefined && highestAround(tile, sizeM, x, y) + (high - tile.subMax[node & 15]!) < z;
+    const tile = tree.plain ? view.tile(level, tree.tileX[page]!, tree.tileY[page]!) : undefined;
+    if (tile === undefined) return false;
+    const sub = node & 15;
+    return highestAround(tile, sizeM, x, y) + tile.subError[sub]! + Math.max(0, high - tile.subMax[sub]!) < z;
   }
 
   private emit(level: number, node: number, morph: number): void {
@@ -448,14 +450,6 @@ export class Selection {
 /** 1 when the parent's error is at the bound (about to be merged), 0 from twice the bound on. */
 function morphOf(parentRatio: number): number {
   return Math.min(1, Math.max(0, 2 - parentRatio));
-}
-
-/** Highest of the four samples around a place of the tile, metres. */
-function highestAround({ level, x, y, heights }: Tile, sizeM: number, atX: number, atY: number): number {
-  const cells = TILE_CELLS * 2 ** level;
-  const column = Math.floor((atX / sizeM) * cells) - x * TILE_CELLS;
-  const at = (Math.floor((atY / sizeM) * cells) - y * TILE_CELLS) * TILE_SAMPLES + column;
-  return Math.max(heights[at]!, heights[at + 1]!, heights[at + TILE_SAMPLES]!, heights[at + TILE_SAMPLES + 1]!);
 }
 
 function outside(v: number, low: number, high: number): number {

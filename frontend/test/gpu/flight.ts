@@ -1,4 +1,4 @@
-/** A flight low over endless ground: that memory stays bounded, and that a picture at rest does not flicker (SPEC R48, R49). */
+/** A flight low over endless ground: that memory stays bounded, and that a picture at rest does not flicker (SPEC R49, R56). */
 
 import type { CameraState, FrameStats, Scene, TileView, Vec3 } from "../../src/core/types.ts";
 import type { GpuRenderer } from "../../src/gpu/renderer.ts";
