@@ -4,15 +4,23 @@ from __future__ import annotations
 
 import io
 from functools import cache
+from typing import Final
 
 from PIL import Image
 
 from esker.contract import Document
-from esker.render.camera import home
+from esker.render.camera import Camera, orbit
 from esker.render.frame import Scene
 from esker.render.reference import Reference
-from esker.render.studio import prepare
+from esker.render.studio import Stage, prepare
 from esker.solve.solver import Solver
+
+BESIDE_SUN_DEG: Final = 55.0
+ELEVATION_DEG: Final = 16.0
+DISTANCE: Final = 0.78
+"""From the middle, in sides of the domain."""
+SIGHT_HEIGHT: Final = 0.3
+"""Of the middle of the picture, in the relief."""
 
 
 @cache
@@ -25,11 +33,23 @@ def _solver(device: str | None, level: int) -> Solver:
     return Solver(device, max_level=level, threads=1)
 
 
+def camera_for(stage: Stage, width: int, height: int) -> Camera:
+    """A view that fills the picture: half to the side of the sun, so that slopes have light and shade, and near."""
+    settings = stage.document.settings
+    size = settings.size_m
+    low, high = stage.surface.range_m
+    if settings.sea_level_m is not None:
+        low = max(low, min(settings.sea_level_m, high))
+    pivot = (size / 2, size / 2, low + SIGHT_HEIGHT * (high - low))
+    azimuth, distance = settings.sun_azimuth_deg + BESIDE_SUN_DEG, DISTANCE * size
+    return orbit(azimuth, ELEVATION_DEG, distance, pivot, size, width, height, clearance_m=size / 20)
+
+
 def picture(document: Document, device: str | None, size: tuple[int, int], level: int, quality: int) -> bytes:
-    """The whole terrain in its own look and light, as JPEG. Raises device.NoGraphics, and what solves raise."""
+    """The terrain in its own look and light, as JPEG. Raises device.NoGraphics, and what solves raise."""
     reference = _reference()
     stage = prepare(document, _solver(device, level), level=level, refined=level)
-    scene = Scene(document.settings, home(document.settings.size_m, *size))
+    scene = Scene(document.settings, camera_for(stage, *size))
     made = reference.draw(stage.surface, scene, stage.channels)
     out = io.BytesIO()
     Image.fromarray(made.pixels).save(out, "JPEG", quality=quality, optimize=True)
