@@ -108,7 +108,10 @@ export class EskLegend extends SignalElement {
     if (!at || !found) return nothing;
     const bias = Math.round(100 * this.stage.channels.valueAt(channel, at[0], at[1]));
     const share = Math.round(100 * found[channel === "wetness" ? "wet" : channel]);
-    return html`<div class="ends"><span>Here</span><span>${signed(bias)} %, which makes ${share} %</span></div>`;
+    return html`<div>
+      <div class="ends"><span>Paint here</span><span>${signed(bias)} %</span></div>
+      <div class="ends"><span>${SUBSTANCES[channel].title} here</span><span>${share} %</span></div>
+    </div>`;
   }
 
   /** The two values under the cursor. */

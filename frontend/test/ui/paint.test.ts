@@ -210,7 +210,8 @@ describe("the legend of a painted channel", () => {
     const element = await put<EskLegend>("esk-legend", { stage: stage(snow, [1, 2, 3]) });
     const text = element.shadowRoot!.textContent!.replace(/\s+/g, " ");
     expect(text).toContain("Painted snow");
-    expect(text).toContain("−25 %, which makes 62 %");
+    expect(text).toContain("Paint here−25 %");
+    expect(text).toContain("Snow here62 %");
     expect(element.hasAttribute("hidden")).toBe(false);
     const plain = await put<EskLegend>("esk-legend", { stage: stage(snow, [1, 2, 3], "paint", "patches") });
     expect(plain.hasAttribute("hidden")).toBe(true);
