@@ -96,6 +96,7 @@ export const terrainPageStyles = css`
   .closed {
     bottom: auto;
     top: 74px;
+    width: max-content;
     pointer-events: auto;
   }
   .closed .icon {
