@@ -134,6 +134,8 @@ def test_nothing_but_shape_dirties_the_heights() -> None:
     for op, expected in cases:
         after, dirty = document.apply(op)
         found = after.shape is not document.shape, after.says is not document.says
+        brushed = isinstance(op, c.SetTerrain) or getattr(op, "stroke", "") == "p"
+        assert (after.painted is not document.painted) == (expected[1] and brushed), op
         assert (found, dirty is not None) == (expected, expected[0]), op
         document = after
 

@@ -27,6 +27,7 @@ class Turnstile:
     def __init__(self) -> None:
         self.permits = threading.Semaphore(0)
         self.closed: list[int] = []
+        self.speaks = False
 
     def steps(
         self, strokes: Sequence[c.Stroke], settings: c.TerrainSettings, levels: int | None = None, **_: Any
@@ -37,6 +38,8 @@ class Turnstile:
                 for level in range((levels or 0) + 1):
                     self.permits.acquire()
                     yield Level(level, FLAT, settled)
+                    if self.speaks and level == 0 and not settled:
+                        yield from self.channels()
         finally:
             self.closed.append(len(strokes))
 
@@ -94,9 +97,9 @@ def _unexpected(note: str) -> None:
     raise AssertionError(note)
 
 
-def _job(clock: int, shape: object = None) -> Job:
+def _job(clock: int, shape: object = None, painted: object = None) -> Job:
     """Jobs of one shape have the same heights."""
-    return Job(clock, (), SETTINGS) if shape is None else Job(clock, (), SETTINGS, shape)
+    return Job(clock, (), SETTINGS, object() if shape is None else shape, painted)
 
 
 def _bench(test: Callable[[Bench], None]) -> None:
@@ -194,6 +197,46 @@ def test_paint_does_not_stop_heights_that_settle() -> None:
         assert bench.let(1)[-1] == ("a.snow", 4, 0, True)
         bench.idle()
         assert bench.confirmed == [(4, 2)]
+
+    _bench(run)
+
+
+def test_paint_does_not_wait_for_a_pen_that_never_rests() -> None:
+    """SPEC P81: between two levels of somebody's stroke; and older channels of that one come no more."""
+
+    def run(bench: Bench) -> None:
+        room = bench.room("a")
+        bench.solver.speaks = True
+        bench.worker.request(room, _job(1))
+        assert bench.let(1) == [("a", 1, 0, False)]
+        bench.idle()
+        bench.worker.request(room, _job(2))
+        bench.worker.request(room, _job(3, painted="snow"))
+        assert bench.let(2)[1:] == [("a.snow", 1, 0, True), ("a.snow", 3, 0, True)]
+        room.finest_at = -1.0  # the pass is to end first
+        bench.idle()
+        assert bench.let(1)[-1] == ("a", 1, 1, False)
+        bench.worker.request(room, _job(4, painted="snow"))
+        assert bench.let(1)[-1] == ("a", 1, 2, False)
+        bench.idle()
+        assert bench.let(1)[-1] == ("a", 4, 0, False), "no more paint, no more of it"
+        assert bench.let(1)[-1] == ("a.snow", 4, 0, True)
+
+    _bench(run)
+
+
+def test_older_paint_does_not_come_after_newer() -> None:
+    """SPEC P81."""
+
+    def run(bench: Bench) -> None:
+        room = bench.room("a")
+        bench.solver.speaks = True
+        bench.worker.request(room, _job(1))
+        bench.idle()  # at level 0
+        bench.worker.request(room, _job(2, painted="snow"))
+        assert bench.let(2) == [("a", 1, 0, False), ("a.snow", 2, 0, True)]
+        bench.solver.permits.release()  # for the channels of the first job
+        assert bench.let(1)[2:] == [("a", 1, 1, False)]
 
     _bench(run)
 

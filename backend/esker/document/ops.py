@@ -42,6 +42,8 @@ class StrokeSet:
     """Of what the heights follow from. A successor has the same object exactly when nothing of that changed."""
     says: object = field(default_factory=object, compare=False, repr=False)
     """The same of what the other channels follow from: amplitude, roughness, paint, and where strokes lie."""
+    painted: object = field(default_factory=object, compare=False, repr=False)
+    """The same of what paint alone says."""
     _rects: dict[str, tuple[Stroke, Rect | None]] = field(default_factory=dict, compare=False, repr=False)
     """Bounds of strokes as last seen, with the stroke they were computed for: a cache that successors share."""
 
@@ -75,8 +77,9 @@ class StrokeSet:
         editor.run(op)
         shape = self.shape if editor.dirty is None else object()
         says = object() if editor.said or editor.dirty is not None else self.says
+        painted = object() if editor.painted else self.painted
         after = StrokeSet(
-            self.id, editor.settings, editor.strokes, editor.deleted, self.clock + 1, shape, says, self._rects
+            self.id, editor.settings, editor.strokes, editor.deleted, self.clock + 1, shape, says, painted, self._rects
         )
         return after, editor.dirty
 
@@ -116,6 +119,8 @@ class _Editor:
         self.dirty: Rect | None = None
         self.said = False
         """Whether a channel other than the heights may have changed."""
+        self.painted = False
+        """Whether it may have by paint."""
         self._copied = False
 
     def run(self, op: Op) -> None:
@@ -193,7 +198,9 @@ class _Editor:
         if rect is None:
             return
         self.said = True
-        if moved and stroke.kind != "paint":
+        if stroke.kind == "paint":
+            self.painted = True
+        elif moved:
             self.dirty = rect.union(self.dirty)
 
     def check(self, stroke: Stroke) -> Points:
@@ -264,6 +271,7 @@ class _Editor:
         if update.keys() & {"reach_m", "border"}:
             size = self.settings.size_m
             self.dirty = Rect(0, 0, size, size).union(self.dirty)
+            self.painted = True
 
 
 def changed(fields: c.StrokeFields | c.TerrainFields, nullable: frozenset[str]) -> dict[str, object]:

@@ -186,7 +186,7 @@ class Room:
     def _request_solve(self) -> None:
         head = self.core.head
         self._requested_clock = head.clock
-        job = Job(head.clock, tuple(head.strokes.values()), head.settings, head.shape)
+        job = Job(head.clock, tuple(head.strokes.values()), head.settings, head.shape, head.painted)
         self._worker.request(self._solve_client, job)
 
     def _level_taken(self, clock: int, level: int, settled: bool) -> None:

@@ -36,12 +36,13 @@ Deliver = Callable[[int, LevelResult, bool], None]
 @dataclass(frozen=True)
 class Job:
     """What to solve. ``clock`` is the document's; jobs of one room with the same ``shape`` have the same heights, and
-    differ in the other channels alone (``StrokeSet.shape``)."""
+    differ in the other channels alone, those with the same ``painted`` not by paint (``StrokeSet``)."""
 
     clock: int
     strokes: tuple[c.Stroke, ...]
     settings: c.TerrainSettings
     shape: object = field(default_factory=object, compare=False)
+    painted: object = field(default=None, compare=False)
 
 
 @dataclass(eq=False)
@@ -80,7 +81,9 @@ class Client:
     light: bool = False
     """What runs are the channels of a job whose heights are settled."""
     aside_clock: int = -1
-    """Of the newest job whose channels were solved while the heights went on."""
+    """Of the newest job whose channels were solved while the running one went on; -1 for none."""
+    painted: object = None
+    """Of the job whose channels came last, or will come."""
     previewing: bool = False
     finest_at: float = -math.inf
     _reached: int = -1
@@ -129,11 +132,13 @@ class Client:
 
     @property
     def aside(self) -> bool:
-        """Whether channels of its newest job can be had while the heights, which are the same, go on settling."""
+        """Whether the channels of its newest job are to be had while the running one goes on: because they were painted
+        on, which must not wait for a pass to end, or because the heights, which are the same, are settling."""
         newest, running = self.newest, self.running
-        if newest is None or running is None or self.steps is None or self.light or self.previewing:
+        if newest is None or running is None or self.steps is None or self.light or newest.clock == self.aside_clock:
             return False
-        return newest.shape is running.shape and newest.clock != self.aside_clock
+        settling = newest.shape is running.shape and not self.previewing
+        return settling or newest.painted is not self.painted
 
     def starts(self, now: float) -> bool:
         """Whether its newest job is to be begun: at once, but for a preview pass that should end first."""
@@ -159,6 +164,7 @@ class Client:
     def begin(self) -> Job:
         """Takes up the newest job."""
         assert self.newest is not None
+        self.painted, self.aside_clock = self.newest.painted, -1
         if self.lighter:
             _close(self.steps)
             self.running, self.newest, self.light = self.newest, None, True

@@ -16,6 +16,7 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Final
 
+from esker import contract as c
 from esker.session.ports import LevelResult, Refinement, Solver, SolverFactory
 from esker.session.recovery import LAST_RESORT, Devices, Diagnose, Fault, unknown
 from esker.session.schedule import Client, Deliver, Job, Schedule
@@ -206,12 +207,12 @@ class Worker:
             self._deliver(client, job, result, show)
 
     def _aside(self, client: Client) -> None:
-        """The channels of the newest job, while its heights, which the running one has, go on settling."""
+        """The channels of the newest job, while the running one goes on."""
         job = client.newest
         assert job is not None
         assert client.running is not None
         assert self._solver is not None
-        client.aside_clock = job.clock
+        client.aside_clock, client.painted = job.clock, job.painted
         try:
             for result in self._solver.channels(job.strokes, job.settings, client.top):
                 if result is not None:
@@ -229,6 +230,8 @@ class Worker:
             client.refiner, client.looking = self._solver.refiner(result.basis), True
         if client not in self._schedule.clients:
             return
+        if result.channel != c.Channel.HEIGHT and job.clock < client.aside_clock:
+            return  # newer ones have come already
         try:
             client.deliver(job.clock, result, show)
         except Exception:
