@@ -33,7 +33,9 @@ struct FineNoise {
 };
 
 fn fine_noise(p: vec3f, n: vec3f, f: Footprint, coarse: vec4f) -> FineNoise {
-  return FineNoise(rock_noise(p, n, f, 37.0), ground_noise(p, f, 4.9, vec2f(0.707, -0.707)));
+  // Two sizes of small features, so that a texel is never seen large.
+  let small = 0.55 * ground_noise(p, f, 4.9, vec2f(0.707, -0.707)) + 0.45 * ground_noise(p, f, 0.57, vec2f(0.436, 0.900));
+  return FineNoise(rock_noise(p, n, f, 37.0), small);
 }
 
 // Slope of ripples (waves on water, wind on sand) at a phase, `footprint` metres a pixel.

@@ -65,7 +65,7 @@ fn steeper(s: Site, at: f32, soft: f32) -> f32 {
 
 // Where the eye is near, the ground's own samples show the relief that a layer stands for further off.
 fn fine_slope(s: Site, strength: f32) -> vec2f {
-  let near = 0.30 + 0.70 * smoothstep(vec4f(0.0), vec4f(6.0, 1.0, 0.16, 0.020), vec4f(s.footprint));
+  let near = 0.45 + 0.55 * smoothstep(vec4f(0.0), vec4f(6.0, 1.0, 0.16, 0.020), vec4f(s.footprint));
   // Rough ground is rough at every size: the smoothness channel sets the drawn relief too.
   let g = strength * near * (1.35 - 0.7 * s.cover.smoothness);
   return 0.20 * g.x * noise_slope(s.macro2) + 0.40 * g.y * noise_slope(s.fine1) + 0.42 * g.z * noise_slope(s.fine2)
