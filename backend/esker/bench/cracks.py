@@ -1,7 +1,7 @@
 """Cracks: random restricted trees on filtered pyramids, random cameras, in the browser; not one pixel may show through.
 
-The views of CI's test, thousands of them. Each seed draws ``VIEWS`` views of random trees with missing branches from
-above, below, the side and straight down, then as many metres from the ground of the largest terrain. With
+The views of CI's tests, thousands of them. Each seed draws ``VIEWS`` views of random trees with missing branches from
+above, below, the side and straight down, then as many a metre from the ground, on levels without an end. With
 ``--keep FILE`` a run that was stopped goes on where it ended, and the file is the result.
 """
 
@@ -18,7 +18,7 @@ from esker.version import VERSION
 
 VIEWS: Final = 20
 FIRST_SEED: Final = 1000
-KINDS: Final = {"trees": "crackTest", "near_ground": "deepCrackTest"}
+KINDS: Final = {"trees": "crackTest", "a_metre_from_the_ground": "walkCrackTest"}
 SUMS: Final = ("views", "cracks", "nans", "covered", "patches", "mixed")
 
 

@@ -36,7 +36,7 @@ CAMERAS: Final = {
     "ground": {"eye": (1500.0, 1500.0, 130.0), "target": (2600.0, 2100.0, 300.0)},
 }
 LENS: Final = {"fovDeg": 50, "near": 4, "far": 20000, "stepM": 3}
-TAUS: Final = (0.5, 1.0, 1.5, 3.0, 6.0, 12.0)
+TAUS: Final = (1.0, 1.5, 3.0, 6.0, 12.0)
 THREE: Final = ("three-webgl", "three-webgl-displacement", "three-webgpu")
 SCREEN_SPACE_ERRORS: Final = (1.0, 2.0, 4.0)
 GROWTH: Final = (4, 6, 8, 10)
