@@ -129,7 +129,7 @@ def test_paint_is_a_stroke_that_can_be_taken_in_hand(visitors: Visitors, server:
     # Rule and strength of the detail are settings that everybody shares.
     def spread() -> float:
         rows = ada.js("() => Array.from({length: 40}, (_, k) => window.esker.shownAt(1500 + 10 * k, 2000, 2))")
-        return max(rows) - min(rows)
+        return float(max(rows) - min(rows))
 
     assert spread() > 0.01
     ada.page.get_by_role("radio", name="Terrain").click()
