@@ -72,7 +72,7 @@ def test_paint_reaches_everybody_live_and_touches_no_height(visitors: Visitors, 
     assert ada.js("([x, y]) => window.esker.attributesAt(x, y).snow", list(snow)) > 0.5
     ben.shot("paint-2-painted-ben")
 
-    # What the page shows is what the document makes offline: channels as sent are a step apart at most.
+    # A copy of the terrain carries the paint.
     archive = tmp_path / "now.esker"
     archive.write_bytes(server.request("GET", f"/api/terrains/{terrain}/archive", secret=secret))
     kinds = [s.kind for s in Terrain.load(archive).document.strokes]
