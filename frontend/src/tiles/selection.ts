@@ -10,12 +10,14 @@
  */
 
 import { eyeProjection } from "../core/eyeprojection.ts";
-import { tileKey } from "../core/tilekey.ts";
 import type { CameraState, TileView } from "../core/types.ts";
 import { PATCH_CELLS, QUANTA_PER_CELL, SUBPATCHES } from "../generated/contract.ts";
 import { frontToBack, Horizon, highestAround } from "./occlusion.ts";
 import { PatchTree } from "./patchtree.ts";
 import { EDGE_EAST, EDGE_NORTH, EDGE_SOUTH, EDGE_WEST, RECORD_WORDS, writeRecord } from "./records.ts";
+import { type TileRequest, Wishes } from "./wishes.ts";
+
+export type { TileRequest } from "./wishes.ts";
 
 /** A cell is never split further once it covers fewer pixels than this many taus. */
 const SMALLEST_CELL = 1;
@@ -24,12 +26,6 @@ const SHADING_ERROR = 1.5 / QUANTA_PER_CELL;
 const SHADING_CELL_PX = 5;
 /** From this error on, in taus, tiles are asked for that a nearer eye will need: they are there before they are drawn. */
 const EARLY = 0.7;
-
-export interface TileRequest {
-  readonly level: number;
-  readonly x: number;
-  readonly y: number;
-}
 
 /** The drawn cut. Arrays are reused by the next call of `select`. */
 export interface Cut {
@@ -56,10 +52,6 @@ export interface Slots {
   touch(level: number, x: number, y: number): void;
 }
 
-interface Wish extends TileRequest {
-  priority: number;
-}
-
 export class Selection {
   readonly tree: PatchTree;
   // Per node of the tree.
@@ -70,10 +62,9 @@ export class Selection {
   // Per page.
   private touched: Uint8Array;
   private slotOf: Int32Array;
-  private wishes: Wish[] = [];
-  private early: Wish[] = [];
-  private readonly wished = new Set<number>();
-  private readonly wishedEarly = new Set<number>();
+  /** Tiles that the cut lacks, and those that it will soon need. */
+  private readonly wishes: Wishes;
+  private readonly early: Wishes;
   /** Leaves out patches that nearer ground hides. Measurements and tests turn it off. */
   occlusion = true;
   private readonly horizon = new Horizon();
@@ -91,6 +82,8 @@ export class Selection {
   /** `levels`: the finest level that can exist. */
   constructor(readonly levels: number) {
     this.tree = new PatchTree(levels);
+    this.wishes = new Wishes(this.tree);
+    this.early = new Wishes(this.tree);
     const { capacity } = this.tree;
     this.split = new Uint8Array(capacity * 16);
     this.ratio = new Float32Array(capacity * 16);
@@ -126,23 +119,19 @@ export class Selection {
       this.horizon.begin(camera, this.occlusion && this.above(view));
       for (const node of frontToBack(SUBPATCHES, this.sizeM, this.eye[0]!, this.eye[1]!)) this.emit(0, node, 0);
     } else if (held[0] === 1) {
-      this.wish(this.wishes, this.wished, 0, 0, 0, 1);
+      this.wishes.ask(0, 0, 0, 1);
     }
-    const order = (a: Wish, b: Wish): number => a.level - b.level || b.priority - a.priority;
-    this.wishes.sort(order);
-    this.early.sort(order);
     let top = Number.NEGATIVE_INFINITY;
     for (let node = 0; node < 16; node += 1) top = Math.max(top, max[node]!);
-    const { count, records, early } = this;
-    return { count, records, requests: this.wishes, early, minHeight: low, maxHeight: high, top };
+    const { count, records } = this;
+    const [requests, early] = [this.wishes.sorted(), this.early.sorted()];
+    return { count, records, requests, early, minHeight: low, maxHeight: high, top };
   }
 
   private begin(view: TileView, camera: CameraState, tauPx: number, slots: Slots, pixelScale: number): void {
     this.count = 0;
-    this.wishes = [];
-    this.early = [];
-    this.wished.clear();
-    this.wishedEarly.clear();
+    this.wishes.clear();
+    this.early.clear();
     this.slots = slots;
     this.tau = tauPx;
     this.sizeM = view.sizeM;
@@ -174,11 +163,11 @@ export class Selection {
     const ratio = this.screenError(level, node);
     if (ratio <= EARLY) return;
     if (ratio <= 1) {
-      if (tree.splittable[node] === 0) this.wishBelow(this.early, this.wishedEarly, level, node, ratio);
+      if (tree.splittable[node] === 0) this.early.askBelow(level, node, ratio);
       return;
     }
     if (tree.splittable[node] === 0) {
-      this.wishBelow(this.wishes, this.wished, level, node, ratio);
+      this.wishes.askBelow(level, node, ratio);
       this.lookAhead(level, node);
       return;
     }
@@ -202,7 +191,7 @@ export class Selection {
       const ratio = this.screenError(level + 1, child);
       if (ratio <= 1) continue;
       const below = tree.childPage(child);
-      if (below < 0 || tree.usable[below] === 0) this.wishBelow(this.early, this.wishedEarly, level + 1, child, ratio);
+      if (below < 0 || tree.usable[below] === 0) this.early.askBelow(level + 1, child, ratio);
       else this.lookAhead(level + 1, child);
     }
   }
@@ -292,29 +281,6 @@ export class Selection {
         this.slots!.touch(level + 1, tree.tileX[page]!, tree.tileY[page]!);
       }
     }
-  }
-
-  /** Asks for the tile of a node's children. */
-  private wishBelow(list: Wish[], known: Set<number>, level: number, node: number, priority: number): void {
-    this.wish(list, known, level + 1, this.column(node) >> 1, this.row(node) >> 1, priority);
-  }
-
-  /** Asks for a tile and for the neighbours of its parents, without which it could not be drawn. */
-  private wish(list: Wish[], known: Set<number>, level: number, x: number, y: number, priority: number): void {
-    const { tree } = this;
-    const side = 2 ** level;
-    if (x < 0 || y < 0 || x >= side || y >= side) return;
-    const key = tileKey(level, x, y);
-    if (known.has(key)) return;
-    known.add(key);
-    const page = tree.find(level, x, y);
-    const missing = page < 0 || tree.usable[page] === 0;
-    if (missing && (tree.canMake(level) || (page >= 0 && tree.held[page] === 1))) list.push({ level, x, y, priority });
-    if (level === 0) return;
-    const dx = (x & 1) * 2 - 1;
-    const dy = (y & 1) * 2 - 1;
-    for (let i = 0; i < 4; i += 1)
-      this.wish(list, known, level - 1, (x >> 1) + (i & 1) * dx, (y >> 1) + (i >> 1) * dy, priority);
   }
 
   /** Whether the eye is above the ground that is drawn: else nearer ground need not hide what is behind it. */
