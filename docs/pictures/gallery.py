@@ -22,7 +22,7 @@ SHOTS: dict[str, list[str]] = {
     "look-paper": ["figure-six", "--look", "paper", "--camera", "eye:3500,-2900,2700,target:2080,1850,20"],
     "water": ["volcanic-island", "--sun", "110,12", "--camera", "eye:3500,300,90,target:2200,1900,150"],
     "close-up": [
-        *("alpine-ridge", "--sun", "128,20", "--refine", "10"),
+        *("alpine-ridge", "--sun", "205,24", "--refine", "9"),
         *("--camera", "eye:1502,1500,target:1540,1560"),
     ],
 }
