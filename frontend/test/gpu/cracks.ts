@@ -424,6 +424,8 @@ export async function walkCrackTest(seed: number, views: number): Promise<CrackR
         share: k === 0 ? 1 : 0.3,
       });
       const found = count(words, kind);
+      // The ground rose over the eye: nothing is in sight, and nothing can crack.
+      if (found.covered === 0) continue;
       total.cracks += found.cracks;
       total.covered += found.covered;
       total.nans += found.nans;
