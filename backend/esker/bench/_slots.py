@@ -132,9 +132,9 @@ class SlotMaker:
         """Another terrain, or other settings, in the same slots."""
         self.site = site
         usage = self.wgpu.BufferUsage
-        values, *facts = channel_values(site)
+        values, bits, varied, biased = channel_values(site)
         channels = self.device.create_buffer_with_data(data=values, usage=usage.STORAGE)
-        words = self.device.create_buffer_with_data(data=site_words(site, *facts), usage=usage.UNIFORM)
+        words = self.device.create_buffer_with_data(data=site_words(site, bits, varied, biased), usage=usage.UNIFORM)
         code = source(*PARTS, f"rule_{site.rule}", "synth_slots", "compute_synthesis")
         module = self.device.create_shader_module(code=code)
         layout = self.device.create_pipeline_layout(bind_group_layouts=[self._layout])
