@@ -204,64 +204,21 @@ fn put_children(job: SynthJob, at: vec2i, ground: Grounds, s: SynthState, noise:
   }
 }
 
-@compute @workgroup_size(64)
-fn synthesise(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
-  let cell = cell_of(group, lane);
-  if (cell.child.y > LAST_SAMPLE) { return; }
-  let job = cell.job;
-  let a = ground_row(cell, 0u);
-  let b = ground_row(cell, 1u);
-  let c = ground_row(cell, 2u);
-  let d = ground_row(cell, cell.far.y);
-  let sa = state_row(cell, 0u);
-  let sb = state_row(cell, 1u);
-  let sc = state_row(cell, 2u);
-  let sd = state_row(cell, cell.far.y);
-
-  let constants = site.levels[job.level];
-  let ground = ground_of(a, b, c, a.guide + sa.d, b.guide + sb.d, c.guide + sc.d, d.guide + sd.d, constants.inverse_spacing);
-  let hs = bspline_words_y(sa.hs, sb.hs, sc.hs);
-  let wg = bspline_words_y(sa.wg, sb.wg, sc.wg);
-  let ff = bspline_words_y(sa.ff, sb.ff, sc.ff);
-  let before = SynthState(bspline_y(bspline_x(sa.d), bspline_x(sb.d), bspline_x(sc.d)),
-    2.0 * hs.low, hs.high, wg.low, wg.high, ff.low, ff.high, vec4f(0.0));
-  let i = global_pair(job.x, cell.child.x, job.level);
-  let j = global_pair(job.y, cell.child.y, job.level);
-  let noise = noise_of(job.level, i, j);
-  let made = rule(site, job.level, ground, before, asked_of(job.level, i, j), noise);
-  put_children(job, cell.child, interpolated(a, b, c, d), made, noise);
-}
-
-fn put_composed(job: SynthJob, at: vec2i, ground: vec2f) {
-  if (any(at > vec2i(LAST_SAMPLE))) { return; }
-  let settled = settle_ground(job, at, ground);
-  let height = settled.y + bitcast<f32>(states[slot_texel(job.slot, at)].x);
-  textureStore(heights_out, slot_origin(job.slot) + at, slot_layer(job.slot), vec4f(height, 0.0, 0.0, 0.0));
-}
-
-@compute @workgroup_size(64)
-fn compose(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
-  let cell = cell_of(group, lane);
-  if (cell.child.y > LAST_SAMPLE) { return; }
-  let g = interpolated(ground_row(cell, 0u), ground_row(cell, 1u), ground_row(cell, 2u), ground_row(cell, cell.far.y));
-  for (var k = 0u; k < 4u; k += 1u) {
-    put_composed(cell.job, cell.child + vec2i(vec2u(k & 1u, k >> 1u)), vec2f(g.guide[k], g.base[k]));
-  }
-}
-
 // Guide of level 0 beside a sample: in a bounded domain indices end at the border.
 fn root_guide(job: SynthJob, at: vec2i) -> f32 {
   if (site.cyclic == 1u) { return grounds[slot_texel(job.slot, at & vec2i(TILE_CELLS - 1))].x; }
   return held_ground(job, clamp(at, vec2i(-SLOT_BORDER), vec2i(LAST_SAMPLE))).x;
 }
 
+// What a rule starts from at the children of a cell.
+struct Start {
+  ground: Ground,
+  before: SynthState,
+  grounds: Grounds,
+};
+
 // Level 0: the rule on the guide itself; constants and targets stand for the parent that it does not have.
-@compute @workgroup_size(64)
-fn synthesise_root(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
-  let job = jobs[group.y];
-  let k = group.x * 64u + lane;
-  let at = 2 * (vec2i(i32(k % CELLS_ACROSS), i32(k / CELLS_ACROSS)) - 1);
-  if (at.y > LAST_SAMPLE) { return; }
+fn root_start(job: SynthJob, at: vec2i) -> Start {
   var rows: array<vec4f, 4>;
   for (var row = 0; row < 4; row += 1) {
     for (var col = 0; col < 4; col += 1) { rows[row][col] = root_guide(job, at + vec2i(col, row) - 1); }
@@ -282,10 +239,59 @@ fn synthesise_root(@builtin(workgroup_id) group: vec3u, @builtin(local_invocatio
   let ground = Ground(z, slope_x, slope_y, concavity(second * per_m), sqrt(slope_x * slope_x + slope_y * slope_y));
   let goal = targets(site, ground);
   let before = SynthState(vec4f(0.0), vec4f(SYNTH_SMOOTHNESS), goal.snow, goal.wet, goal.grass, goal.forest, goal.foam, vec4f(0.0));
-  let i = global_pair(job.x, at.x, 0u);
-  let j = global_pair(job.y, at.y, 0u);
-  let noise = noise_of(0u, i, j);
-  put_children(job, at, Grounds(z, z), rule(site, 0u, ground, before, asked_of(0u, i, j), noise), noise);
+  return Start(ground, before, Grounds(z, z));
+}
+
+// The same from the parent's samples.
+fn child_start(cell: Cell) -> Start {
+  let a = ground_row(cell, 0u);
+  let b = ground_row(cell, 1u);
+  let c = ground_row(cell, 2u);
+  let d = ground_row(cell, cell.far.y);
+  let sa = state_row(cell, 0u);
+  let sb = state_row(cell, 1u);
+  let sc = state_row(cell, 2u);
+  let sd = state_row(cell, cell.far.y);
+  let per_m = site.levels[cell.job.level].inverse_spacing;
+  let ground = ground_of(a, b, c, a.guide + sa.d, b.guide + sb.d, c.guide + sc.d, d.guide + sd.d, per_m);
+  let hs = bspline_words_y(sa.hs, sb.hs, sc.hs);
+  let wg = bspline_words_y(sa.wg, sb.wg, sc.wg);
+  let ff = bspline_words_y(sa.ff, sb.ff, sc.ff);
+  let before = SynthState(bspline_y(bspline_x(sa.d), bspline_x(sb.d), bspline_x(sc.d)),
+    2.0 * hs.low, hs.high, wg.low, wg.high, ff.low, ff.high, vec4f(0.0));
+  return Start(ground, before, interpolated(a, b, c, d));
+}
+
+// One entry for all levels: a second one for the root would compile the rule, most of the code, a second time.
+@compute @workgroup_size(64)
+fn synthesise(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
+  let cell = cell_of(group, lane);
+  if (cell.child.y > LAST_SAMPLE) { return; }
+  let job = cell.job;
+  var start: Start;
+  if (job.level == 0u) { start = root_start(job, cell.child); } else { start = child_start(cell); }
+  let i = global_pair(job.x, cell.child.x, job.level);
+  let j = global_pair(job.y, cell.child.y, job.level);
+  let noise = noise_of(job.level, i, j);
+  let made = rule(site, job.level, start.ground, start.before, asked_of(job.level, i, j), noise);
+  put_children(job, cell.child, start.grounds, made, noise);
+}
+
+fn put_composed(job: SynthJob, at: vec2i, ground: vec2f) {
+  if (any(at > vec2i(LAST_SAMPLE))) { return; }
+  let settled = settle_ground(job, at, ground);
+  let height = settled.y + bitcast<f32>(states[slot_texel(job.slot, at)].x);
+  textureStore(heights_out, slot_origin(job.slot) + at, slot_layer(job.slot), vec4f(height, 0.0, 0.0, 0.0));
+}
+
+@compute @workgroup_size(64)
+fn compose(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
+  let cell = cell_of(group, lane);
+  if (cell.child.y > LAST_SAMPLE) { return; }
+  let g = interpolated(ground_row(cell, 0u), ground_row(cell, 1u), ground_row(cell, 2u), ground_row(cell, cell.far.y));
+  for (var k = 0u; k < 4u; k += 1u) {
+    put_composed(cell.job, cell.child + vec2i(vec2u(k & 1u, k >> 1u)), vec2f(g.guide[k], g.base[k]));
+  }
 }
 
 @compute @workgroup_size(64)

@@ -140,7 +140,7 @@ class SlotMaker:
         layout = self.device.create_pipeline_layout(bind_group_layouts=[self._layout])
         self._pipelines = {
             entry: self.device.create_compute_pipeline(layout=layout, compute={"module": module, "entry_point": entry})
-            for entry in ("synthesise", "synthesise_root", "compose", "compose_root")
+            for entry in ("synthesise", "compose", "compose_root")
         }
         buffers = [words, self.jobs, self.grounds, self.states, channels]
         resources: list[Any] = [{"buffer": b, "offset": 0, "size": b.size} for b in buffers]
@@ -165,7 +165,7 @@ class SlotMaker:
         words = np.zeros((0, JOB_WORDS), np.uint32)
         compute = encoder.begin_compute_pass()
         for level, batch in _by_level(jobs):
-            compute.set_pipeline(self._pipelines[what if level else f"{what}_root"])
+            compute.set_pipeline(self._pipelines["compose_root" if what == "compose" and not level else what])
             compute.set_bind_group(0, self._group, [words.nbytes])
             compute.dispatch_workgroups(GROUPS, len(batch))
             block = np.zeros((-(-len(batch) // JOB_ALIGN) * JOB_ALIGN, JOB_WORDS), np.uint32)

@@ -60,10 +60,10 @@ const JOB_WORDS = 8;
 const JOB_ALIGN = 256 / (4 * JOB_WORDS);
 /** Workgroups of 64 parents' cells that make one slot. */
 const GROUPS = Math.ceil((TILE_SAMPLES / 2 + 2.5) ** 2 / 64);
-type Entry = "synthesise" | "synthesise_root" | "compose" | "compose_root";
+type Entry = "synthesise" | "compose" | "compose_root";
 /** Pipelines that are ready from the start; another rule's are made when first asked for: compiling takes its time. */
 const FIRST_RULE: SynthesisRule = "landscape";
-const FIRST_ENTRIES: readonly Entry[] = ["synthesise", "synthesise_root", "compose"];
+const FIRST_ENTRIES: readonly Entry[] = ["synthesise", "compose"];
 
 export class SynthesisPass {
   private readonly site: GPUBuffer;
@@ -157,7 +157,7 @@ export class SynthesisPass {
       level.forEach((job, i) => {
         this.words.set([job.slot, job.level, job.x, job.y, job.parentSlot, job.held], JOB_WORDS * (at + i));
       });
-      pass.setPipeline(this.pipeline(rule, level[0]!.level === 0 ? `${what}_root` : what));
+      pass.setPipeline(this.pipeline(rule, what === "compose" && level[0]!.level === 0 ? "compose_root" : what));
       pass.setBindGroup(0, group, [4 * JOB_WORDS * at]);
       pass.dispatchWorkgroups(GROUPS, level.length);
       at += padded(level.length);
