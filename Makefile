@@ -16,14 +16,13 @@ NODE_OK := node -e 'const [a,b]=process.versions.node.split(".").map(Number);pro
 DRAWN := tests/e2e tests/golden tests/gpu tests/render
 SOURCES := $(shell find frontend/src shaders frontend/public -type f 2>/dev/null)
 
-.PHONY: run test test-drawn test-rest pictures check format generate lock setup browser clean
+.PHONY: run test test-drawn test-rest test-page pictures check format generate lock setup browser clean
 
 run: setup frontend/dist/index.html ## set up, build, start the server, print the link of a new terrain
 	@exec $(BIN)/python -m esker serve $(ARGS)
 
 test: check browser frontend/dist/index.html ## set up, then run every check and every test
-	$(NPM) test
-	@if [ -n "$(ARGS)" ]; then exec $(BIN)/python -m pytest $(ARGS); else exec $(MAKE) --no-print-directory -j2 test-drawn test-rest; fi
+	@if [ -n "$(ARGS)" ]; then exec $(BIN)/python -m pytest $(ARGS); else exec $(MAKE) --no-print-directory -j2 test-drawn test-rest test-page; fi
 
 # What draws in a browser leaves half a core idle, and so do the others: side by side they take two thirds of the time.
 test-drawn:
@@ -31,6 +30,9 @@ test-drawn:
 
 test-rest:
 	$(BIN)/python -m pytest $(DRAWN:%=--ignore=%)
+
+test-page:
+	$(NPM) test
 
 check: $(STAMPS)/dev $(STAMPS)/node ## linters, formatters, type checkers, generated files
 	$(BIN)/ruff check .

@@ -7,6 +7,7 @@ import os
 import signal
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 
 import numpy as np
 import psutil
@@ -102,8 +103,12 @@ def own_browser(browser: Browser) -> Iterator[Browser]:
 
 
 def _gpu_processes() -> set[int]:
-    children = psutil.Process().children(recursive=True)
-    return {p.pid for p in children if "--type=gpu-process" in p.cmdline()}
+    found = set()
+    for process in psutil.Process().children(recursive=True):
+        with suppress(psutil.Error):  # it has ended meanwhile
+            if "--type=gpu-process" in process.cmdline():
+                found.add(process.pid)
+    return found
 
 
 def test_a_crash_of_the_graphics_process_is_survived(
