@@ -165,6 +165,7 @@ def test_a_preview_that_is_about_to_end_is_shown_whole_and_not_stopped() -> None
     shown: list[list[bool]] = []
     now = 0.0
     for clock in (1, 2):
+        now += 1.0
         client.request(Job(clock, (), SETTINGS), now)
         client.begin()
         client.steps = iter(())
@@ -179,6 +180,25 @@ def test_a_preview_that_is_about_to_end_is_shown_whole_and_not_stopped() -> None
         shown.append(row)
     # Nothing is known of the first pass; in the second, level 1 comes 20 ms before the finest and is not worth a look.
     assert shown == [[True, True, True], [True, False, True]]
+
+
+def test_the_finest_preview_has_time_to_be_sent() -> None:
+    """A newer coarse preview would bar it: who draws without a pause would never see the finest level (SPEC P71)."""
+    client = Client(1, ignore, ignore)
+    flat = np.zeros((1, 1), dtype=np.float32)
+
+    def passing(clock: int, coarse_at: float) -> bool:
+        client.request(Job(clock, (), SETTINGS), coarse_at)
+        client.begin()
+        client.steps = iter(())
+        return client.took(Level(0, flat, False), coarse_at)
+
+    assert passing(1, 10.0), "the first is shown at once"
+    assert client.took(Level(1, flat, False), 10.1)
+    assert not passing(2, 10.12)
+    assert not passing(3, 10.15)
+    assert passing(4, 10.17)
+    assert client.took(Level(1, flat, False), 10.27)
 
 
 # --- refinement -----------------------------------------------------------------------------------------------------

@@ -24,6 +24,9 @@ from esker.tiles.delivery import RefinedTile
 FINEST_WITHIN: Final = 0.150
 HOLD: Final = 0.050
 """A coarse preview that the finest follows within this time is not shown, and its pass is not stopped."""
+FRAMES: Final = 0.060
+"""The finest preview has this time to become frames before a coarse one is shown again: what is coarser and newer would
+bar it, and who draws without a pause would never see more than coarse levels."""
 PATIENCE: Final = 0.150
 BUDGET: Final = min(3 << 30, os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // 8)
 """Bytes for solves in progress, of all rooms together."""
@@ -194,7 +197,8 @@ class Client:
         level = self._reached = result.level
         if level < self.top:
             self._came[level] = now
-            return level == 0 or self._lead.get(level, math.inf) > HOLD
+            telling = level == 0 or self._lead.get(level, math.inf) > HOLD
+            return telling and now - self.finest_at >= FRAMES
         self._lead = {coarse: now - came for coarse, came in self._came.items()}
         self.previewing, self.finest_at, self._previewed = False, now, self.clock
         return True
