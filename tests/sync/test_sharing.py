@@ -165,7 +165,7 @@ def test_a_preview_that_is_about_to_end_is_shown_whole_and_not_stopped() -> None
     shown: list[list[bool]] = []
     now = 0.0
     for clock in (1, 2):
-        now += 1.0
+        now += 0.1
         client.request(Job(clock, (), SETTINGS), now)
         client.begin()
         client.steps = iter(())
