@@ -67,6 +67,20 @@ def desk(tmp_path: Path) -> Desk:
     return Desk(tmp_path / "previews")
 
 
+def test_terrains_whose_names_begin_alike_keep_their_own_pictures(desk: Desk) -> None:
+    """V10: ids may hold dashes."""
+
+    async def go() -> None:
+        longer = await desk.previews.picture(document("t1-2", 7))
+        assert desk.previews.held("t1") is None
+        own = await desk.previews.picture(document("t1", 3))
+        desk.previews.forget("t1")
+        assert longer.exists()
+        assert not own.exists()
+
+    desk.run(go)
+
+
 def test_a_picture_is_drawn_once_a_clock_and_not_too_often(desk: Desk) -> None:
     """V10."""
 

@@ -76,8 +76,11 @@ class Previews:
 
     def held(self, terrain: str) -> Path | None:
         """The newest picture of a terrain on disk."""
-        found = sorted(self._folder.glob(f"{terrain}-*.jpg"), key=_clock)
-        return found[-1] if found else None
+        return max(self._of(terrain), key=_clock, default=None)
+
+    def _of(self, terrain: str) -> list[Path]:
+        """Its pictures, of all clocks. Ids may hold dashes, so the start of a name alone does not tell."""
+        return [p for p in self._folder.glob(f"{terrain}-*.jpg") if p.stem.rsplit("-", 1)[0] == terrain]
 
     async def picture(self, document: Document) -> Path:
         """The picture of a document: the one on disk if it is of this clock or was drawn a moment ago, else a new one.
@@ -112,7 +115,7 @@ class Previews:
 
     def forget(self, terrain: str) -> None:
         """Removes the pictures of a terrain from the disk."""
-        for path in self._folder.glob(f"{terrain}-*.jpg"):
+        for path in self._of(terrain):
             path.unlink(missing_ok=True)
         self._drawn.pop(terrain, None)
 
@@ -176,7 +179,7 @@ class Previews:
         part = path.with_suffix(".part")
         part.write_bytes(data)
         part.replace(path)
-        for old in self._folder.glob(f"{document.id}-*.jpg"):
+        for old in self._of(document.id):
             if old != path:
                 old.unlink(missing_ok=True)
         pictures = sorted(self._folder.glob("*.jpg"), key=lambda p: p.stat().st_mtime)

@@ -44,6 +44,8 @@ export interface CrackReport {
   readonly covered: number;
   readonly patches: number;
   readonly mixed: number;
+  /** Finest level of any patch drawn. */
+  readonly deepest: number;
   /** Views with a crack, for reproduction. */
   readonly failures: readonly string[];
 }
@@ -221,13 +223,14 @@ async function settle(rig: Rig, world: World, scene: Scene, tau: number, how: Pa
 }
 
 /** One picture as half-float words, and what was drawn. */
-async function picture(
-  rig: Rig,
-  world: World,
-  scene: Scene,
-  tau: number,
-  how: Pace = {},
-): Promise<{ words: Uint16Array; stats: Pick<FrameStats, "patches">; mixed: boolean; deepest: number }> {
+interface Drawn {
+  readonly words: Uint16Array;
+  readonly stats: Pick<FrameStats, "patches">;
+  readonly mixed: boolean;
+  readonly deepest: number;
+}
+
+async function picture(rig: Rig, world: World, scene: Scene, tau: number, how: Pace = {}): Promise<Drawn> {
   const cut = await settle(rig, world, scene, tau, how);
   const encoder = rig.device.createCommandEncoder();
   rig.frame.update(scene, { width: WIDTH, height: HEIGHT, low: cut.minHeight, high: cut.maxHeight });
@@ -277,14 +280,37 @@ function count(words: Uint16Array, kind: Kind): { cracks: number; covered: numbe
   return { cracks, covered, nans };
 }
 
+/** What all pictures of a test show together. */
+class Tally {
+  private total = { cracks: 0, nans: 0, covered: 0, patches: 0, mixed: 0, deepest: 0 };
+  private readonly failures: string[] = [];
+
+  /** `blind`: the ground may have risen over the eye; then nothing is in sight, and nothing can crack. */
+  add({ words, stats, mixed, deepest }: Drawn, kind: Kind, view: string, blind = false): void {
+    const { total } = this;
+    const found = count(words, kind);
+    if (blind && found.covered === 0) return;
+    total.cracks += found.cracks;
+    total.covered += found.covered;
+    total.nans += found.nans;
+    total.patches += stats.patches;
+    total.mixed += mixed ? 1 : 0;
+    total.deepest = Math.max(total.deepest, deepest);
+    if (found.cracks > 0) this.failures.push(`${view}: ${found.cracks}`);
+  }
+
+  report(views: number): CrackReport {
+    return { views, ...this.total, failures: this.failures };
+  }
+}
+
 /** Draws `views` random views of random trees, three to a terrain. `spoil` clears the edge bits, to see the test fail. */
 export async function crackTest(seed: number, views: number, spoil = false): Promise<CrackReport> {
   const rig = await makeRig();
   const next = random(seed);
   const kinds: Kind[] = ["above", "grazing", "below", "map"];
   const looks = ["natural", "alpine", "desert", "paper"] as const;
-  const total = { cracks: 0, nans: 0, covered: 0, patches: 0, mixed: 0 };
-  const failures: string[] = [];
+  const tally = new Tally();
   for (let done = 0; done < views; ) {
     const holes = random(Math.floor(next() * 1e9));
     const gaps = new Set<string>();
@@ -300,19 +326,13 @@ export async function crackTest(seed: number, views: number, spoil = false): Pro
       const kind = kinds[k]!;
       const tau = 0.6 + 5 * next() ** 2;
       const scene = sceneOf(view, camera(kind, next, view), looks[done % 4]!);
-      const { words, stats, mixed } = await picture(rig, world, scene, tau);
-      const found = count(words, kind);
-      total.cracks += found.cracks;
-      total.covered += found.covered;
-      total.nans += found.nans;
-      total.patches += stats.patches;
-      total.mixed += mixed ? 1 : 0;
-      if (found.cracks > 0) failures.push(`view ${done} ${kind} tau ${tau.toFixed(2)}: ${found.cracks}`);
+      const drawn = await picture(rig, world, scene, tau);
+      tally.add(drawn, kind, `view ${done} ${kind} tau ${tau.toFixed(2)}`);
     }
     world.atlas.destroy();
   }
   rig.device.destroy();
-  return { views, ...total, failures };
+  return tally.report(views);
 }
 
 const LARGE = 65536;
@@ -338,12 +358,11 @@ function closeCamera(kind: Kind, next: () => number, at: Vec3): CameraState {
  * The crack test near the ground of the largest terrain: levels 4 to 10 held around a place only, with holes, some tiles
  * still on their way in.
  */
-export async function deepCrackTest(seed: number, views: number): Promise<CrackReport & { readonly deepest: number }> {
+export async function deepCrackTest(seed: number, views: number): Promise<CrackReport> {
   const rig = await makeRig();
   const next = random(seed);
   const kinds: Kind[] = ["above", "grazing", "below", "map"];
-  const total = { cracks: 0, nans: 0, covered: 0, patches: 0, mixed: 0, deepest: 0 };
-  const failures: string[] = [];
+  const tally = new Tally();
   for (let done = 0; done < views; ) {
     const view = new SparseView(LARGE, 10, 3, craggyField(Math.floor(next() * 1e6), LARGE));
     const x = LARGE * (0.2 + 0.6 * next());
@@ -355,22 +374,15 @@ export async function deepCrackTest(seed: number, views: number): Promise<CrackR
       const kind = kinds[k]!;
       const tau = 0.6 + 6 * next() ** 2;
       const scene = sceneOf(view, closeCamera(kind, next, [x, y, view.shownHeightAt(x, y)]), "natural");
-      const { words, stats, mixed, deepest } = await picture(rig, world, scene, tau, {
+      const drawn = await picture(rig, world, scene, tau, {
         entrance: () => 0.15 + 0.7 * next(),
       });
-      const found = count(words, kind);
-      total.cracks += found.cracks;
-      total.covered += found.covered;
-      total.nans += found.nans;
-      total.patches += stats.patches;
-      total.mixed += mixed ? 1 : 0;
-      total.deepest = Math.max(total.deepest, deepest);
-      if (found.cracks > 0) failures.push(`view ${done} ${kind} tau ${tau.toFixed(2)}: ${found.cracks}`);
+      tally.add(drawn, kind, `view ${done} ${kind} tau ${tau.toFixed(2)}`);
     }
     world.atlas.destroy();
   }
   rig.device.destroy();
-  return { views, ...total, failures };
+  return tally.report(views);
 }
 
 /** Height of the drawn ground at a place, as the finest tile that is there tells it. */
@@ -390,11 +402,10 @@ function drawnHeight(tree: PatchTree, sizeM: number, x: number, y: number): numb
  * The crack test a metre from the ground, after an approach from above as people come: synthetic levels to the finest, beside
  * refined ones and places where those have just come or gone, the ground half way from the one to the other.
  */
-export async function walkCrackTest(seed: number, views: number): Promise<CrackReport & { readonly deepest: number }> {
+export async function walkCrackTest(seed: number, views: number): Promise<CrackReport> {
   const rig = await makeRig();
   const next = random(seed);
-  const total = { cracks: 0, nans: 0, covered: 0, patches: 0, mixed: 0, deepest: 0 };
-  const failures: string[] = [];
+  const tally = new Tally();
   for (let done = 0; done < views; ) {
     const view = new SparseView(LARGE, 10, 2, craggyField(Math.floor(next() * 1e6), LARGE));
     const [x, y] = [LARGE * (0.2 + 0.6 * next()), LARGE * (0.2 + 0.6 * next())];
@@ -419,25 +430,16 @@ export async function walkCrackTest(seed: number, views: number): Promise<CrackR
       if (k === 1) view.refineAround(x, y, () => Math.round(next()));
       if (k === 3) view.lose(() => next() < 0.3);
       const tau = 0.6 + 2 * next();
-      const { words, stats, mixed, deepest } = await picture(rig, world, sceneOf(view, state, "alpine"), tau, {
+      const drawn = await picture(rig, world, sceneOf(view, state, "alpine"), tau, {
         rounds: k === 0 ? 5 : 2,
         share: k === 0 ? 1 : 0.3,
       });
-      const found = count(words, kind);
-      // The ground rose over the eye: nothing is in sight, and nothing can crack.
-      if (found.covered === 0) continue;
-      total.cracks += found.cracks;
-      total.covered += found.covered;
-      total.nans += found.nans;
-      total.patches += stats.patches;
-      total.mixed += mixed ? 1 : 0;
-      total.deepest = Math.max(total.deepest, deepest);
-      if (found.cracks > 0) failures.push(`view ${done} ${kind} tau ${tau.toFixed(2)}: ${found.cracks}`);
+      tally.add(drawn, kind, `view ${done} ${kind} tau ${tau.toFixed(2)}`, true);
     }
     world.atlas.destroy();
   }
   rig.device.destroy();
-  return { views, ...total, failures };
+  return tally.report(views);
 }
 
 /** Takes the edge bits and corner weights away from every cut. */
