@@ -16,8 +16,8 @@ from pydantic import BaseModel, ConfigDict, Field, StringConstraints, TypeAdapte
 
 # --- protocol ---------------------------------------------------------------------------------------------------
 
-PROTOCOL_VERSION: Final = 3
-SUBPROTOCOL: Final = "esker.3"
+PROTOCOL_VERSION: Final = 4
+SUBPROTOCOL: Final = "esker.4"
 
 # --- grid (DESIGN 3) --------------------------------------------------------------------------------------------
 
@@ -67,6 +67,27 @@ BASE_AMPLITUDE_M: Final = 0.0
 BASE_ROUGHNESS: Final = 0.5
 BASE_BIAS: Final = 0.0
 """What the channels are where no stroke says otherwise."""
+
+SURVEY_QUANTA: Final = 256
+"""Quantisation steps of one level of the survey channel."""
+BASE_SURVEY: Final = -1.0
+"""The survey channel where no elevation grid lies: below level 0, so that no detail is held back there."""
+
+# --- elevation grids (DESIGN 11) --------------------------------------------------------------------------------
+
+PATCH_SAMPLES: Final = 32
+PATCH_KERNEL_CELLS: Final = 28
+PATCH_MARGIN_CELLS: Final = 1.5
+"""A patch has 32 x 32 samples (31 cells); its kernel is the 28 cells in the middle."""
+MAX_LAYERS: Final = 64
+MAX_GRID_SAMPLES: Final = 200_000_000
+"""Samples that a file may declare."""
+MAX_GRID_BYTES: Final = 256 * 1024 * 1024
+"""Bytes of an uploaded elevation file."""
+MIN_GRID_SIDE: Final = 4
+MAX_GRID_SPACING_M: Final = 100_000.0
+MIN_GRID_SPACING_M: Final = 0.001
+MAX_VERTICAL_SCALE: Final = 1_000.0
 
 # --- detail (DESIGN 10) -----------------------------------------------------------------------------------------
 
@@ -118,9 +139,11 @@ FrameCoord = Annotated[float, Field(ge=-1e7, le=1e7, allow_inf_nan=False)]
 Vec3 = tuple[Metres, Metres, Metres]
 CurvePoint = tuple[FrameCoord, FrameCoord]
 Id = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_-]{1,40}$")]
+Digest = Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{64}$")]
 OpId = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_-]{1,40}:[0-9]{1,12}$")]
 Name = Annotated[str, StringConstraints(max_length=MAX_NAME_LENGTH)]
 Secret = Annotated[str, StringConstraints(min_length=1, max_length=128)]
+Line = Annotated[str, StringConstraints(max_length=240)]
 Colour = Annotated[str, StringConstraints(pattern=r"^#[0-9a-f]{6}$")]
 Clock = Annotated[int, Field(ge=0, le=2**53)]
 
@@ -213,6 +236,84 @@ NULLABLE_STROKE_FIELDS: Final = frozenset({"left", "right", "paint"})
 """Fields of ``StrokeFields`` for which an explicit null is a value (no flank, no paint), not an error."""
 
 
+class GridFacts(Wire):
+    """What a stored elevation grid is, whatever its place. Immutable: it belongs to the content.
+
+    ``rows`` x ``cols`` samples; ``low_m``, ``high_m``: of its valid samples, before scale and lift; ``valid``: share of
+    samples that are valid; ``geo``: it came with a place on Earth; ``crs``: that of the file, as a person writes it.
+    """
+
+    rows: Annotated[int, Field(ge=MIN_GRID_SIDE, le=MAX_GRID_SAMPLES)]
+    cols: Annotated[int, Field(ge=MIN_GRID_SIDE, le=MAX_GRID_SAMPLES)]
+    low_m: Metres
+    high_m: Metres
+    valid: Unit = 1.0
+    geo: bool = False
+    crs: Name = ""
+    format: Name = ""
+    file: Name = ""
+
+
+Step = Annotated[float, Field(ge=MIN_GRID_SPACING_M, le=MAX_GRID_SPACING_M, allow_inf_nan=False)]
+Turn = Annotated[float, Field(ge=-360, le=360, allow_inf_nan=False)]
+Stretch = Annotated[float, Field(ge=-MAX_VERTICAL_SCALE, le=MAX_VERTICAL_SCALE, allow_inf_nan=False)]
+Priority = Annotated[int, Field(ge=-(10**6), le=10**6)]
+
+
+class Layer(Wire):
+    """An elevation layer: a stored grid, laid on the terrain (DESIGN 11, paper 2 section 3.1).
+
+    Sample [row, col] lies at ``anchor + R(rotation_deg) (col * spacing_m[0], row * spacing_m[1])``: ``anchor`` is the
+    world position of sample [0, 0], the rotation counter-clockwise, rows go north at rotation 0. (A grid that came with
+    a place on Earth also bends a little; that is part of the content.) Height = ``scale`` * sample + ``lift_m``.
+    ``accuracy_m``: largest error of the grid anywhere, metres. ``priority``: of overlapping layers that say different
+    things the greater is the newer survey and is believed. ``content`` names the stored grid.
+    """
+
+    id: Id
+    content: Digest
+    facts: GridFacts
+    author: Name = ""
+    name: Name = ""
+    anchor: tuple[Metres, Metres]
+    rotation_deg: Turn = 0.0
+    spacing_m: tuple[Step, Step]
+    scale: Stretch = 1.0
+    lift_m: Metres = 0.0
+    accuracy_m: Length
+    priority: Priority = 0
+    hidden: bool = False
+    outline: Unit = 0.35
+    """How strongly the footprint is drawn, 0 (not at all) to 1."""
+    source: Line = ""
+    licence: Line = ""
+
+
+class LayerFields(Wire):
+    """The fields that ``layer.set`` may change. Absent means unchanged."""
+
+    name: Name | None = None
+    anchor: tuple[Metres, Metres] | None = None
+    rotation_deg: Turn | None = None
+    spacing_m: tuple[Step, Step] | None = None
+    scale: Stretch | None = None
+    lift_m: Metres | None = None
+    accuracy_m: Length | None = None
+    priority: Priority | None = None
+    hidden: bool | None = None
+    outline: Unit | None = None
+    source: Line | None = None
+    licence: Line | None = None
+
+
+class Place(Wire):
+    """Where on Earth the middle of the domain lies. The terrain's frame is the transverse Mercator projection of
+    WGS 84 around it, scale 1 there, y to the north; files with a place on Earth are laid by it."""
+
+    lat_deg: Annotated[float, Field(ge=-89, le=89, allow_inf_nan=False)]
+    lon_deg: Annotated[float, Field(ge=-180, le=180, allow_inf_nan=False)]
+
+
 class TerrainSettings(Wire):
     """Settings of a terrain. ``reach_m`` None is infinity: the papers' pure, global diffusion (DESIGN 5.1).
 
@@ -230,6 +331,7 @@ class TerrainSettings(Wire):
     rule: Rule = "landscape"
     sun_azimuth_deg: Annotated[float, Field(ge=0, le=360)] = 115.0
     sun_elevation_deg: Annotated[float, Field(ge=0, le=90)] = 24.0
+    place: Place | None = None
 
 
 class TerrainFields(Wire):
@@ -245,19 +347,22 @@ class TerrainFields(Wire):
     rule: Rule | None = None
     sun_azimuth_deg: Annotated[float, Field(ge=0, le=360)] | None = None
     sun_elevation_deg: Annotated[float, Field(ge=0, le=90)] | None = None
+    place: Place | None = None
 
 
-NULLABLE_TERRAIN_FIELDS: Final = frozenset({"reach_m", "sea_level_m"})
+NULLABLE_TERRAIN_FIELDS: Final = frozenset({"reach_m", "sea_level_m", "place"})
 
 
 class Document(Wire):
-    """A whole terrain at one clock. ``deleted`` keeps removed strokes so that a delete can be undone."""
+    """A whole terrain at one clock. ``deleted`` and ``deleted_layers`` keep what was removed, for undo."""
 
     id: Id
     clock: Clock = 0
     settings: TerrainSettings = TerrainSettings()
     strokes: tuple[Stroke, ...] = ()
     deleted: tuple[Stroke, ...] = ()
+    layers: tuple[Layer, ...] = ()
+    deleted_layers: tuple[Layer, ...] = ()
 
 
 # --- operations (DESIGN 4) --------------------------------------------------------------------------------------
@@ -315,8 +420,42 @@ class SetTerrain(Wire):
     fields: TerrainFields
 
 
+class AddLayer(Wire):
+    """Only the server makes this op, when it holds the content: a client that sends it is refused."""
+
+    type: Literal["layer.add"] = "layer.add"
+    layer: Layer
+
+
+class SetLayer(Wire):
+    type: Literal["layer.set"] = "layer.set"
+    layer: Id
+    fields: LayerFields
+
+
+class DeleteLayer(Wire):
+    type: Literal["layer.delete"] = "layer.delete"
+    layer: Id
+
+
+class RestoreLayer(Wire):
+    type: Literal["layer.restore"] = "layer.restore"
+    layer: Id
+
+
 SimpleOp = Annotated[
-    BeginStroke | AppendPoints | FinishStroke | SetStroke | MoveAnchor | DeleteStroke | RestoreStroke | SetTerrain,
+    BeginStroke
+    | AppendPoints
+    | FinishStroke
+    | SetStroke
+    | MoveAnchor
+    | DeleteStroke
+    | RestoreStroke
+    | SetTerrain
+    | AddLayer
+    | SetLayer
+    | DeleteLayer
+    | RestoreLayer,
     Field(discriminator="type"),
 ]
 
@@ -337,6 +476,10 @@ Op = Annotated[
     | DeleteStroke
     | RestoreStroke
     | SetTerrain
+    | AddLayer
+    | SetLayer
+    | DeleteLayer
+    | RestoreLayer
     | Group,
     Field(discriminator="type"),
 ]
@@ -369,6 +512,11 @@ RejectCode = Literal[
     "out_of_domain",
     "bad_index",
     "bad_field",
+    "unknown_layer",
+    "duplicate_layer",
+    "deleted_layer",
+    "too_many_layers",
+    "server_only",
     "view_only",
     "rate_limited",
     "too_large",
@@ -577,8 +725,89 @@ class Pong(Wire):
     t: float
 
 
+class ImportQuestion(Wire):
+    """Something that a file does not say, or seems to say wrongly.
+
+    ``id``: "nodata" | "place" | "size" | "range" | "imagery" | "accuracy" | ...; ``options``: values that may be
+    answered (empty: any number); ``default``: what is taken when nobody answers otherwise.
+    """
+
+    id: Annotated[str, StringConstraints(max_length=24)]
+    text: Line
+    options: tuple[Line, ...] = ()
+    default: Line = ""
+
+
+class ImportReport(Wire):
+    """What an elevation file is and what would happen (``esker import --check``). ``verdict``: good, ask or refused.
+
+    ``spacing_m``, ``rotation_deg``, ``width_m``, ``height_m``: on the ground. ``at``: WGS 84 of its middle, (lat, lon).
+    ``preview``: 32 rows (south first) of 32 heights, 0..255 between low and high, -1 where there is none.
+    """
+
+    verdict: Literal["good", "ask", "refused"]
+    file: Name
+    format: Name = ""
+    rows: int = 0
+    cols: int = 0
+    dtype: Name = ""
+    crs: Name = ""
+    spacing_m: tuple[float, float] | None = None
+    rotation_deg: float = 0.0
+    width_m: float | None = None
+    height_m: float | None = None
+    at: tuple[float, float] | None = None
+    low_m: float | None = None
+    high_m: float | None = None
+    valid: float | None = None
+    nodata: float | None = None
+    accuracy_m: float | None = None
+    notes: tuple[Line, ...] = ()
+    questions: tuple[ImportQuestion, ...] = ()
+    refusal: Line = ""
+    preview: tuple[tuple[int, ...], ...] = ()
+
+
+ImportStage = Literal["upload", "reading", "question", "mipmaps", "errors", "saving", "done", "refused", "cancelled"]
+
+
+class ImportStatus(Wire):
+    """Where an import stands. ``share``: 0..1 of all the work; ``layer``: its id once it is done."""
+
+    id: Id
+    stage: ImportStage
+    share: Unit = 0.0
+    text: Line = ""
+    report: ImportReport | None = None
+    layer: Id | None = None
+
+
+class ImportAnswers(Wire):
+    """How an import goes on: answers by question id, and where to lay a grid that has no place of its own."""
+
+    answers: dict[Annotated[str, StringConstraints(max_length=24)], Line] = {}
+    anchor: tuple[Metres, Metres] | None = None
+    rotation_deg: Turn | None = None
+    spacing_m: tuple[Step, Step] | None = None
+    scale: Stretch | None = None
+    lift_m: Metres | None = None
+    accuracy_m: Length | None = None
+    name: Name | None = None
+    source: Line | None = None
+    licence: Line | None = None
+
+
+class Importing(Wire):
+    """Somebody brings in an elevation file: for everybody to see. Sent at each stage, at most 5 times a second."""
+
+    type: Literal["importing"] = "importing"
+    author: Name
+    file: Name
+    status: ImportStatus
+
+
 ServerMessage = Annotated[
-    Welcome | Ack | Reject | OpsBroadcast | Members | PresenceBroadcast | Progress | ErrorMessage | Pong,
+    Welcome | Ack | Reject | OpsBroadcast | Members | PresenceBroadcast | Progress | ErrorMessage | Pong | Importing,
     Field(discriminator="type"),
 ]
 
@@ -631,6 +860,10 @@ class Channel(IntEnum):
     GRASS = 4
     FOREST = 5
     WETNESS = 6
+    BASE = 7
+    """The elevation layers' ground, in the quanta of heights: what is drawn is HEIGHT + BASE."""
+    SURVEY = 8
+    """Level whose spacing is that of the finest elevation data here; detail begins below it."""
 
 
 FRAME_HEADER: Final = np.dtype(

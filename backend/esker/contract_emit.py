@@ -98,6 +98,8 @@ def _ts_type(schema: dict[str, Any]) -> str:
         case "array":
             inner = _ts_type(schema["items"])
             return f"({inner})[]" if " " in inner and not inner.startswith("[") else f"{inner}[]"
+        case "object":
+            return f"Record<string, {_ts_type(schema['additionalProperties'])}>"
         case other:
             raise ValueError(f"no TypeScript type for {other!r} in {schema}")
 
@@ -121,7 +123,7 @@ def _interfaces() -> Iterable[str]:
         yield "\n".join([*lines, "}"])
 
 
-_SENT = {"Hello", "View", "Presence", "Rename"}
+_SENT = {"Hello", "View", "Presence", "Rename", "ImportAnswers"}
 """Messages that the page only sends: their defaults may be left out. All other values carry every field."""
 
 

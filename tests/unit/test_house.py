@@ -23,6 +23,8 @@ LAYERS: tuple[frozenset[str], ...] = (
     frozenset({"contract_emit", "grid"}),
     frozenset({"document"}),
     frozenset({"templates"}),
+    frozenset({"patchwork"}),
+    frozenset({"importing"}),
     frozenset({"solve", "tiles", "store", "settings", "synthesis"}),
     frozenset({"session", "terrain"}),
     frozenset({"ground", "link"}),
@@ -37,9 +39,13 @@ RANK = {room: rank for rank, rooms in enumerate(LAYERS) for room in rooms}
 # Rooms of one rank that may not see each other, and rooms that a lower-ranked one may never see.
 FORBIDDEN = {("session", "solve"), ("tiles", "solve"), ("solve", "tiles"), ("store", "solve"), ("store", "tiles")}
 FORBIDDEN |= {(room, "synthesis") for room in ("session", "tiles", "store")}
-FORBIDDEN |= {("synthesis", room) for room in ("solve", "tiles", "store")}
+FORBIDDEN |= {("synthesis", room) for room in ("solve", "tiles", "store", "patchwork")}
+FORBIDDEN |= {(room, other) for room in ("session", "tiles", "solve") for other in ("patchwork", "importing")}
 ONLY = {
-    "pyopencl": {"solve", "synthesis"},
+    "pyopencl": {"solve", "synthesis", "patchwork"},
+    "numba": {"patchwork"},
+    "rasterio": {"importing"},
+    "pyproj": {"importing"},
     "fastapi": {"server"},
     "starlette": {"server"},
     "moderngl": {"render"},
