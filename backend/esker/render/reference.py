@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 from esker.contract import PATCH_CELLS, SUBPATCHES
 from esker.render import sources
 from esker.render.atlas import MAX_SLOTS, PLAIN_MARCH, Atlas
+from esker.render.camera import eye_projection, part
 from esker.render.device import depth_buffer, half_depth, open_context
-from esker.render.frame import Detail, Rect, Scene, sun_direction, view_values
+from esker.render.frame import Detail, Rect, Scene, base_height, sun_direction, view_values
 from esker.render.layout import StructLayout
 from esker.render.programs import Compute, Draw, Resources
-from esker.render.select import Cut, choose
+from esker.render.select import Cut, choose, frustum
 from esker.render.surface import Surface
 from esker.render.tables import noise_mipmaps
 
@@ -111,7 +112,7 @@ class Reference:
         sun = sun_direction(settings.sun_azimuth_deg, settings.sun_elevation_deg)
         atlas.compute(self._normals, self._sun, settings.size_m, float(high.max()), sun)
         resources, amplitude = self._resources(atlas, scene, channels)
-        records = _Records(self.context, cut, atlas)
+        words = _words(cut, atlas)
         out = np.empty((scene.camera.height, scene.camera.width, 3), dtype=np.uint8)
         parts = _parts(scene.camera.width, scene.camera.height)
         for done, rect in enumerate(parts):
@@ -120,12 +121,20 @@ class Reference:
             values = view_values(scene, rect, surface.range_m, amplitude)
             view = StructLayout(sources.background(self._detail), "View").pack(values)
             resources.buffers["view"] = self.context.buffer(view)
+            records = _Records(self.context, cut, words, self._seen(cut, scene, rect, surface))
             out[rect.top : rect.top + rect.height, rect.left : rect.left + rect.width] = self._part(
                 rect, scene, resources, records, bare=bare
             )
         if progress is not None:
             progress(1.0)
         return Picture(out, tau, len(cut.level))
+
+    def _seen(self, cut: Cut, scene: Scene, rect: Rect, surface: Surface) -> NDArray[np.bool_]:
+        """The patches that a part of the picture may show: a large one has many parts."""
+        camera, settings = scene.camera, scene.settings
+        planes = frustum(part(eye_projection(camera), camera, *rect))
+        foot = base_height(surface.range_m[0], settings.size_m)
+        return cut.within(camera, planes, foot, -np.inf if settings.sea_level_m is None else settings.sea_level_m)
 
     def _cut(self, surface: Surface, scene: Scene) -> tuple[Cut, float]:
         tau = scene.tau_px
@@ -265,15 +274,15 @@ class Reference:
 
 
 class _Records:
-    """The cut on the device; see patch.wgsl for what the words are."""
+    """Patches of the cut on the device; see patch.wgsl for what the words are. ``seen``: which ones."""
 
-    def __init__(self, context: moderngl.Context, cut: Cut, atlas: Atlas) -> None:
-        words = _words(cut, atlas)
-        sides = [(i, bit) for i, border in enumerate(cut.border.tolist()) for bit in (1, 2, 4, 8) if border & bit]
+    def __init__(self, context: moderngl.Context, cut: Cut, words: NDArray[np.uint32], seen: NDArray[np.bool_]) -> None:
+        borders = np.where(seen, cut.border, 0).tolist()
+        sides = [(i, bit) for i, border in enumerate(borders) for bit in (1, 2, 4, 8) if border & bit]
         walls = np.array([[*words[i], bit] for i, bit in sides], dtype=np.uint32).reshape(-1, 5)
-        wet = words[cut.wet]
-        self.count, self.wall_count, self.wet_count = len(words), len(walls), len(wet)
-        self.all, self.walls, self.wet = (_buffer(context, data) for data in (words, walls, wet))
+        ground, wet = words[seen], words[seen & cut.wet]
+        self.count, self.wall_count, self.wet_count = len(ground), len(walls), len(wet)
+        self.all, self.walls, self.wet = (_buffer(context, data) for data in (ground, walls, wet))
 
 
 def _buffer(context: moderngl.Context, data: NDArray[np.uint32]) -> moderngl.Buffer:

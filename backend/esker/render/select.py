@@ -49,7 +49,8 @@ class Figures(Protocol):
 class Cut:
     """Drawn patches. ``nodes``: (n, 2) column and row on ``level``; ``edges``: bits of the sides with a coarser
     neighbour, ``border``: of those on the domain's border; ``corners``: (n, 4) weights, south-west, south-east,
-    north-west, north-east, as unorm8; ``wet``: some of it lies below the sea."""
+    north-west, north-east, as unorm8; ``wet``: some of it lies below the sea. ``near``, ``far``: (n, 3) corners of the
+    boxes that patches stay in, metres."""
 
     level: Ints
     nodes: Ints
@@ -57,7 +58,17 @@ class Cut:
     border: Ints
     corners: NDArray[np.uint8]
     wet: NDArray[np.bool_]
+    near: Floats
+    far: Floats
     split: Split
+
+    def within(self, camera: Camera, planes: Floats, foot_m: float, surface_m: float) -> NDArray[np.bool_]:
+        """Which patches may be seen inside ``planes`` (``frustum``). On the domain's border the ground reaches down to
+        ``foot_m``, and where it is wet the sea up to ``surface_m``."""
+        near, far = self.near - np.array(camera.eye), self.far - np.array(camera.eye)
+        near[self.border != 0, 2] = np.minimum(near[self.border != 0, 2], foot_m - camera.eye[2])
+        far[self.wet, 2] = np.maximum(far[self.wet, 2], surface_m - camera.eye[2])
+        return _touching(planes, near, far)
 
     def tiles(self) -> list[tuple[int, int, int]]:
         """(level, x, y) of all tiles that the cut rests on: the root, and those that hold the children of split
@@ -67,6 +78,20 @@ class Cut:
             for px, py in nodes:
                 found.setdefault((level + 1, px // 2, py // 2))
         return sorted(found)
+
+
+def frustum(m: Floats) -> Floats:
+    """(6, 4) planes, relative to the eye, that clip space is bounded by; inside is where they are positive."""
+    return np.array([m[3] + m[0], m[3] - m[0], m[3] + m[1], m[3] - m[1], m[2], m[3] - m[2]])
+
+
+def _touching(planes: Floats, near: Floats, far: Floats) -> NDArray[np.bool_]:
+    """Which boxes, (n, 3) corners relative to the eye, are not wholly outside one of the planes."""
+    inside = np.ones(len(near), dtype=np.bool_)
+    for plane in planes:
+        furthest = np.where(plane[:3] > 0, far, near)
+        inside &= furthest @ plane[:3] + plane[3] >= 0
+    return inside
 
 
 def choose(ground: Figures, camera: Camera, tau_px: float, sea_m: float | None = None) -> Cut:
@@ -85,8 +110,7 @@ class _Walk:
         self.eye = np.array(camera.eye)
         self.ortho = camera.ortho_height_m > 0
         self.pixels = camera.height / (camera.ortho_height_m if self.ortho else 2 * camera.tangent)
-        m = eye_projection(camera)
-        self.planes = np.array([m[3] + m[0], m[3] - m[0], m[3] + m[1], m[3] - m[1], m[2], m[3] - m[2]])
+        self.planes = frustum(eye_projection(camera))
 
     def descend(self) -> Split:
         """Splits what commits too much error, from the root down."""
@@ -129,27 +153,26 @@ class _Walk:
             table[:, 3],
             table[:, 4],
             table[:, 5:9].astype(np.uint8),
-            self._wet(table),
+            *self._boxes(table),
             split,
         )
 
-    def _wet(self, table: Ints) -> NDArray[np.bool_]:
-        wet = np.zeros(len(table), dtype=np.bool_)
+    def _boxes(self, table: Ints) -> tuple[NDArray[np.bool_], Floats, Floats]:
+        """Which patches are wet, and the boxes of all."""
+        near, far = np.empty((len(table), 3)), np.empty((len(table), 3))
         for level in np.unique(table[:, 0]):
             here = table[:, 0] == level
-            wet[here] = self.ground.bounds(int(level), table[here, 1:3])[0] < self.sea
-        return wet
+            nodes, w = table[here, 1:3], self.ground.size_m / (SUBPATCHES << int(level))
+            low, high, _ = self.ground.bounds(int(level), nodes)
+            near[here], far[here] = np.column_stack((nodes * w, low)), np.column_stack(((nodes + 1) * w, high))
+        return near[:, 2] < self.sea, near, far
 
     def _visible(self, level: int, nodes: Ints) -> NDArray[np.bool_]:
         w = self.ground.size_m / (SUBPATCHES << level)
         low, high, _ = self.ground.bounds(level, nodes)
         near = np.column_stack((nodes * w - self.eye[:2], low - self.eye[2]))
         far = np.column_stack((near[:, :2] + w, np.maximum(high, self.sea) - self.eye[2]))
-        inside = np.ones(len(nodes), dtype=np.bool_)
-        for plane in self.planes:
-            furthest = np.where(plane[:3] > 0, far, near)
-            inside &= furthest @ plane[:3] + plane[3] >= 0
-        return inside
+        return _touching(self.planes, near, far)
 
     def _screen_error(self, level: int, nodes: Ints) -> Floats:
         """Error of stopping at these patches, in taus; at most 1 where they need not be split."""
