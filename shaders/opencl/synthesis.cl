@@ -10,7 +10,7 @@
 
 // What a launch is told: Launch in backend/esker/synthesis/kernels.py.
 typedef struct {
-    int level, rule, cyclic, own_guide;
+    int level, rule, cyclic, own_guide, surveyed;
     int row, col, rows, cols;                          // the child's window
     int parent_row, parent_col, parent_rows, parent_cols;
     uint seed;
@@ -18,7 +18,7 @@ typedef struct {
     float spacing, size, sea_level, amplitude;         // of the parent; of the domain; detail * alpha * s_0
     float snow_line, tree_line, plants, tie;
     float grain, strength;                             // of the noise of h, and of the other channels
-    int offset[6], side[6];                            // of the channels' grids, in the order of Biases
+    int offset[SYNTH_GRIDS], side[SYNTH_GRIDS];        // of the channels' grids, in the order of Biases
 } Launch;
 
 typedef struct {
@@ -30,7 +30,7 @@ typedef struct {
 } Ground;
 
 typedef struct {
-    float amplitude, roughness, snow, grass, forest, wetness;
+    float amplitude, roughness, snow, grass, forest, wetness, survey;
 } Biases;
 
 uint synth_mix(uint x) {

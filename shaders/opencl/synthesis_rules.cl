@@ -60,6 +60,7 @@ State synth_landscape(const Launch *l, Ground g, State before, Biases bias, int 
     float share = SYNTH_FLAT_SHARE + (1.0f - SYNTH_FLAT_SHARE) * STEP(AMPLITUDE_SLOPE, g.guide_slope);
     float amplitude = max(0.0f, l->amplitude * share + bias.amplitude);
     float size = amplitude * exp2(-(float)l->level * clamp(exponent, SYNTH_H_RANGE_FROM, SYNTH_H_RANGE_TO));
+    if (l->surveyed) size *= clamp((float)l->level - bias.survey, 0.0f, 1.0f);
     s.d = before.d + size * synth_full(words[0]);
     return s;
 }
@@ -105,6 +106,7 @@ __kernel void synthesise(__global const Launch *launch, __global const float *gr
     Biases bias = {
         synth_channel(&l, grids, 0, wi, wj), synth_channel(&l, grids, 1, wi, wj), synth_channel(&l, grids, 2, wi, wj),
         synth_channel(&l, grids, 3, wi, wj), synth_channel(&l, grids, 4, wi, wj), synth_channel(&l, grids, 5, wi, wj),
+        l.surveyed ? synth_channel(&l, grids, 6, wi, wj) : SYNTH_BASE_SURVEY,
     };
     State s;
     if (l.rule == 0) s = synth_landscape(&l, ground, before, bias, wi, wj);

@@ -119,8 +119,9 @@ fn channel_place(level: u32, index: vec2i) -> ChannelPlace {
   return ChannelPlace(low, low + 1u, vec2f(i - (low << shift)) / f32(1u << shift));
 }
 
+// Of a node: (amplitude, roughness), (snow, grass), (forest, wetness), and with data (survey, nothing).
 fn channel_value(row: u32, col: u32, which: u32) -> vec2f {
-  return channels[3u * (row * ((1u << site.channel_bits) + 1u) + col) + which];
+  return channels[(3u + site.surveyed) * (row * ((1u << site.channel_bits) + 1u) + col) + which];
 }
 
 fn along(a: f32, b: f32, part: vec2f) -> vec2f {
@@ -146,6 +147,7 @@ fn asked_of(level: u32, i: vec2i, j: vec2i) -> Asked {
   if (site.varied == 0u) {
     out.amplitude = vec4f(channels[0].x);
     out.roughness = vec4f(channels[0].y);
+    if (site.surveyed == 1u) { out.survey = vec4f(channels[3].x); }
     return out;
   }
   let x = channel_place(level, i);
@@ -161,6 +163,7 @@ fn asked_of(level: u32, i: vec2i, j: vec2i) -> Asked {
     out.forest = plants.low;
     out.wetness = plants.high;
   }
+  if (site.surveyed == 1u) { out.survey = channel_pair(x, y, 3u).low; }
   return out;
 }
 

@@ -25,7 +25,12 @@ fn rule(site: SynthSite, level: u32, ground: Ground, before: SynthState, asked: 
     out.h + SYNTH_ROUGHNESS_TO_H * (0.5 - asked.roughness) + SYNTH_SNOW_TO_H * out.snow,
     vec4f(SYNTH_H_RANGE_FROM), vec4f(SYNTH_H_RANGE_TO));
   let size = amplitude * exp2(-f32(level) * exponent);
-  out.d = before.d + size * noise_full(noise.a);
   out.finer = size * exp2(-exponent);
+  if (site.surveyed == 1u) {
+    out.d = before.d + size * audible(f32(level), asked.survey) * noise_full(noise.a);
+    out.finer *= hushed(f32(level), asked.survey, exponent);
+  } else {
+    out.d = before.d + size * noise_full(noise.a);
+  }
   return out;
 }

@@ -21,6 +21,10 @@ struct SynthSite {
   channel_bits: u32,      // the channels' grid has 2^channel_bits cells a side
   varied: u32,            // 1: the channels differ from place to place
   biased: u32,            // 1: paint asks for snow, plants or wetness somewhere
+  surveyed: u32,          // 1: elevation data hold detail back somewhere
+  pad0: u32,
+  pad1: u32,
+  pad2: u32,
   levels: array<SynthLevel, 18>,
 };
 
@@ -40,6 +44,7 @@ struct Asked {
   grass: vec4f,
   forest: vec4f,
   wetness: vec4f,
+  survey: vec4f,          // level whose spacing is that of the finest elevation data
 };
 
 struct SynthState {
@@ -52,6 +57,19 @@ struct SynthState {
   foam: vec4f,
   finer: vec4f,           // not stored: the most that the next level's noise would add here, metres
 };
+
+// Share of the detail of a level that may be heard: none down to the spacing of the data, then all of it.
+fn audible(level: f32, survey: vec4f) -> vec4f {
+  return clamp(level - survey, vec4f(0.0), vec4f(1.0));
+}
+
+// What data make of all that levels below this one may add, as a share: their noise falls by 2^-exponent a level, and
+// begins below the data.
+fn hushed(level: f32, survey: vec4f, exponent: vec4f) -> vec4f {
+  let silent = max(vec4f(0.0), survey - level);
+  let whole = floor(silent);
+  return exp2(-exponent * whole) * (1.0 - (silent - whole) * (1.0 - exp2(-exponent)));
+}
 
 // Words of the four streams.
 struct SynthNoise {

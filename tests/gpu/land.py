@@ -32,6 +32,12 @@ def hills(level: int, wavy: bool = False) -> NDArray[np.float32]:
     return heights
 
 
+def surveyed(seed: int) -> dict[str, NDArray[np.float32]]:
+    """Elevation data of many spacings, beside none."""
+    levels = np.random.default_rng(seed).uniform(-2, 5, (33, 33))
+    return {"survey": np.maximum(levels, -1).astype(np.float32)}
+
+
 def painted(seed: int) -> dict[str, NDArray[np.float32]]:
     """Channels as strokes leave them, on grids of several sizes, one of them finer than level 0."""
     rng = np.random.default_rng(seed)

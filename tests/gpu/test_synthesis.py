@@ -15,7 +15,19 @@ from esker.bench._slots import HELD, SLOT, Job, child_of
 from esker.synthesis.site import BORDER, Site, tile_window
 from esker.synthesis.state import State, unpack
 from esker.synthesis.subdivide import Samples, interpolated, root, subdivide
-from tests.gpu.land import SIZE, Land, Tile, around, disagreements, hills, lineage, painted, site_of, with_ancestors
+from tests.gpu.land import (
+    SIZE,
+    Land,
+    Tile,
+    around,
+    disagreements,
+    hills,
+    lineage,
+    painted,
+    site_of,
+    surveyed,
+    with_ancestors,
+)
 
 TOP = 12
 ULP = 2.0**-23
@@ -75,6 +87,8 @@ VARIANTS: dict[str, dict[str, Any]] = {
         "channels": {k: v for k, v in painted(7).items() if k in ("snow", "roughness")},
         "rule": "plain",
     },
+    "surveyed": {"channels": surveyed(9)},
+    "surveyed under strokes": {"channels": painted(9) | surveyed(9)},
     "cyclic": {"cyclic": True, "channels": painted(8)},
     "one level": {"solved": 0},
 }
@@ -107,7 +121,7 @@ def test_ground_that_nobody_holds_is_interpolated_by_the_rule() -> None:
 
 def test_slots_agree_to_the_bit_through_twelve_levels() -> None:
     """R27: edges, corners and borders, of siblings and of tiles whose parents, and all ancestors, differ."""
-    site = site_of(channels=painted(3))
+    site = site_of(channels=painted(3) | surveyed(3))
     corners = [tile for level in range(1, TOP + 1) for tile in around(level, 1 << (level - 1), 1 << (level - 1))]
     # Along the western border of the domain too, and amid one lineage: siblings and cousins.
     corners += [(level, 0, (1 << (level - 1)) + dy) for level in range(1, TOP + 1) for dy in (-1, 0)]

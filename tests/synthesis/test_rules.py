@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from esker import fractal, grid
+from esker import contract, fractal, grid
 from esker.fractal import PAINT_LESS
 from esker.synthesis.detailed import DetailedTerrain
 from esker.synthesis.interpolate import FOUR_POINT, Window, upsampled
@@ -115,6 +115,21 @@ def test_roughness_and_amplitude_are_obeyed() -> None:
     assert not flat.d.any()
     plain, more = (somewhere(plane(0.0, channels=everywhere(amplitude=a)), 3, 60).d for a in (0.0, all_there_is))
     assert rms(more) == pytest.approx((1 + fractal.FLAT_SHARE) / fractal.FLAT_SHARE * rms(plain), rel=0.01)
+
+
+def test_detail_begins_below_the_data() -> None:
+    """SPEC F19: no noise on levels down to the spacing of the data, all of it from one level below; the rest as it was."""
+    bare, data = (somewhere(plane(0.5, channels=c), 5, 60) for c in ({}, everywhere(survey=5.0)))
+    assert bare.d.any()
+    assert not data.d.any()
+    roots = [somewhere(plane(0.5, channels=c), 0, 30) for c in ({}, everywhere(survey=5.0))]
+    assert all(np.array_equal(a, b) for a, b in zip(roots[0][1:], roots[1][1:], strict=True))
+    assert data.h.std() > 0.05
+    first, half = (somewhere(plane(0.5, channels=everywhere(survey=at)), 6, 60).d for at in (5.0, 5.5))
+    assert rms(first) > 0
+    assert np.abs(half - first / 2).max() < 1e-2 * rms(first)
+    none = everywhere(survey=contract.BASE_SURVEY)
+    assert np.array_equal(somewhere(plane(0.5, channels=none)).d, somewhere(plane(0.5)).d)
 
 
 def test_strength_scales_detail() -> None:

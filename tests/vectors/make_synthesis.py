@@ -65,12 +65,20 @@ def strokes(seed: int) -> dict[str, list[list[float]]]:
     return {name: values.tolist() for name, values in out.items()}
 
 
+def survey(seed: int) -> dict[str, list[list[float]]]:
+    """Elevation data of cells of 64 m to one of 0.25 m, and none in a corner."""
+    levels = np.random.default_rng(seed).uniform(0.0, 8.0, (9, 9))
+    levels[:4, :4] = -1.0
+    return {"survey": (np.round(levels * 256).astype(int) / 256).tolist()}
+
+
 SITES = (
     fields("hill", sea_level_m=5.0, solved=1),
     fields("painted", seed=4294967295, detail=2.5, look="alpine", channels=strokes(5)),
     fields("smooth", rule="smooth", sea_level_m=-20.0, channels=strokes(6)),
     fields("plain", rule="plain", look="desert", channels=strokes(7)),
     fields("cyclic", cyclic=True, seed=77, channels=strokes(8)),
+    fields("surveyed", seed=9, channels=strokes(9) | survey(9)),
     fields("wide", size_m=65536.0, seed=123456789, look="paper"),
 )
 
@@ -160,11 +168,12 @@ def document() -> dict[str, Any]:
     ]
     sites = {data["name"]: site_of(data) for data in described}
     steps = []
-    for k, name in enumerate(("painted", "hill", "painted", "smooth", "plain", "cyclic", "wide", "painted")):
+    for k, name in enumerate(("painted", "hill", "painted", "smooth", "plain", "cyclic", "wide", "painted",
+                              "surveyed")):  # fmt: skip
         site = sites[name]
-        level = (2, 3, 6, 4, 5, 7, 12, 17)[k]
+        level = (2, 3, 6, 4, 5, 7, 12, 17, 6)[k]
         n = grid.cells(level)
-        tile = tile_window(level, (0, 3, 63, 5, 9, 127, 4095, 70000)[k], (1, 7, 20, 15, 0, 127, 17, 130000)[k])
+        tile = tile_window(level, (0, 3, 63, 5, 9, 127, 4095, 70000, 40)[k], (1, 7, 20, 15, 0, 127, 17, 130000, 41)[k])
         window = Window(level, max(tile.r0, -2), min(tile.r0 + 9, n + 3), tile.c1 - 8, tile.c1)
         steps.append(step(site, name, window, k))
     return {

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from esker import fractal, grid
 from esker.bench.report import ROOT
-from esker.contract import BASE_ROUGHNESS, MAX_SYNTHESIS_LEVEL, SUBPATCHES, TILE_CELLS, TILE_SAMPLES
+from esker.contract import BASE_ROUGHNESS, BASE_SURVEY, MAX_SYNTHESIS_LEVEL, SUBPATCHES, TILE_CELLS, TILE_SAMPLES
 from esker.synthesis import hash as noise
 from esker.synthesis.rules.targets import tie
 from esker.synthesis.site import BORDER, Biases, Site
@@ -58,7 +58,7 @@ def site_words(site: Site, bits: int, varied: bool, biased: bool) -> NDArray[np.
     head = [site.size_m, site.amplitude_m, sea or 0.0, 0.0 if sea is None else 1.0, *look]
     words = [
         np.array(head, np.float32).view(np.uint32),
-        np.array([site.solved, site.cyclic, bits, varied, biased], np.uint32),
+        np.array([site.solved, site.cyclic, bits, varied, biased, site.surveyed, 0, 0, 0], np.uint32),
     ]
     for level in range(MAX_SYNTHESIS_LEVEL + 1):
         starts = [site.seed + fractal.HASH_STEP * (fractal.HASH_STREAMS * level + stream) for stream in range(4)]
@@ -74,9 +74,10 @@ def site_words(site: Site, bits: int, varied: bool, biased: bool) -> NDArray[np.
 
 
 def channel_values(site: Site) -> tuple[NDArray[np.float32], int, bool, bool]:
-    """All channels on the finest of their grids, (n, n, 6); log2(n - 1); do they vary; is any bias asked for."""
+    """All channels on the finest of their grids, (n, n, 6), or 8 with a survey; log2(n - 1); do they vary; is any bias
+    asked for."""
     cells = max([1, *(len(values) - 1 for values in site.channels.values())])
-    out = np.zeros((cells + 1, cells + 1, 6), np.float32)
+    out = np.zeros((cells + 1, cells + 1, 8 if site.surveyed else 6), np.float32)
     out[..., 1] = BASE_ROUGHNESS
     for k, name in enumerate(Biases._fields):
         if name in site.channels:
@@ -84,7 +85,7 @@ def channel_values(site: Site) -> tuple[NDArray[np.float32], int, bool, bool]:
             while len(values) <= cells:
                 values = _refined(values)
             out[..., k] = values
-    biased = bool(out[..., 2:].any())
+    biased = bool(out[..., 2:6].any())
     return out, cells.bit_length() - 1, biased or bool((out != out[0, 0]).any()), biased
 
 

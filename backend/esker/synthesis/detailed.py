@@ -19,8 +19,10 @@ from esker.contract import (
     BASE_AMPLITUDE_M,
     BASE_BIAS,
     BASE_ROUGHNESS,
+    BASE_SURVEY,
     BIAS_QUANTA,
     ROUGHNESS_QUANTA,
+    SURVEY_QUANTA,
     TILE_CELLS,
     TerrainSettings,
 )
@@ -43,6 +45,7 @@ NAMES: Final = dict(
 QUANTA: Final = {
     "amplitude": (AMPLITUDE_QUANTA_PER_M, BASE_AMPLITUDE_M),
     "roughness": (ROUGHNESS_QUANTA, BASE_ROUGHNESS),
+    "survey": (SURVEY_QUANTA, BASE_SURVEY),
 } | dict.fromkeys(("snow", "grass", "forest", "wetness"), (BIAS_QUANTA, BASE_BIAS))
 
 

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from esker import contract_emit, grid
 from esker import fractal as f
-from esker.contract import BASE_ROUGHNESS
+from esker.contract import BASE_ROUGHNESS, BASE_SURVEY
 from esker.synthesis.interpolate import Window
 from esker.synthesis.rules import RULES
 from esker.synthesis.rules.targets import tie
-from esker.synthesis.site import Biases, Site
+from esker.synthesis.site import BASES, Biases, Site
 from esker.synthesis.state import WORDS, pack, unpack
 from esker.synthesis.subdivide import Samples, chain, root
 
@@ -26,12 +26,12 @@ SOURCES: Final = ("synthesis.cl", "synthesis_rules.cl")
 GROUP: Final = 64
 """Work-groups are always full: what compilers do with the rest of a row may round differently."""
 LAUNCH: Final = np.dtype(
-    [(name, "<i4") for name in ("level", "rule", "cyclic", "own_guide", "row", "col", "rows", "cols", "parent_row",
+    [(name, "<i4") for name in ("level", "rule", "cyclic", "own_guide", "surveyed", "row", "col", "rows", "cols", "parent_row",
                                 "parent_col", "parent_rows", "parent_cols")]
     + [("seed", "<u4"), ("sea", "<i4"), ("cells", "<i4"), ("shift", "<i4")]
     + [(name, "<f4") for name in ("spacing", "size", "sea_level", "amplitude", "snow_line", "tree_line", "plants",
                                   "tie", "grain", "strength")]
-    + [("offset", "<i4", 6), ("side", "<i4", 6)]
+    + [("offset", "<i4", len(Biases._fields)), ("side", "<i4", len(Biases._fields))]
 )  # fmt: skip
 """``Launch`` of synthesis.cl."""
 
@@ -100,7 +100,8 @@ def source() -> str:
     """The program's text: constants, then the rule."""
     folder = Path(__file__).resolve().parents[3] / "shaders" / "opencl"
     texts = [(folder / name).read_text(encoding="utf-8") for name in SOURCES]
-    defines = f"#define SYNTH_BASE_ROUGHNESS {BASE_ROUGHNESS!r}f\n#define SYNTH_GROUP {GROUP}"
+    bases = f"#define SYNTH_BASE_ROUGHNESS {BASE_ROUGHNESS!r}f\n#define SYNTH_BASE_SURVEY ({BASE_SURVEY!r}f)"
+    defines = f"{bases}\n#define SYNTH_GROUP {GROUP}\n#define SYNTH_GRIDS {len(Biases._fields)}"
     return "\n".join([contract_emit.shader("cl"), defines, *texts])
 
 
@@ -108,8 +109,7 @@ def _packed(site: Site) -> tuple[NDArray[np.float32], list[int], list[int]]:
     """All channels' grids in one array, where each starts, and samples along its side."""
     grids = []
     for name in Biases._fields:
-        base = BASE_ROUGHNESS if name == "roughness" else 0.0
-        grids.append(site.channels.get(name, np.full((2, 2), base, dtype=np.float32)))
+        grids.append(site.channels.get(name, np.full((2, 2), BASES.get(name, 0.0), dtype=np.float32)))
     offsets = np.cumsum([0, *(g.size for g in grids)])[:-1]
     flat = np.concatenate([np.asarray(g, dtype=np.float32).ravel() for g in grids])
     return flat, offsets.tolist(), [len(g) for g in grids]
@@ -120,7 +120,7 @@ def _launch(site: Site, parent: Window, child: Window, offsets: list[int], sides
     out = np.zeros(1, dtype=LAUNCH)
     values = {
         "level": level, "rule": list(RULES).index(site.rule), "cyclic": site.cyclic,
-        "own_guide": level <= site.solved, "row": child.r0, "col": child.c0,
+        "own_guide": level <= site.solved, "surveyed": site.surveyed, "row": child.r0, "col": child.c0,
         "rows": child.shape[0], "cols": child.shape[1], "parent_row": parent.r0, "parent_col": parent.c0,
         "parent_rows": parent.shape[0], "parent_cols": parent.shape[1],
         "seed": site.seed, "sea": site.sea_level_m is not None, "cells": grid.cells(level),

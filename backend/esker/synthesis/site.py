@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from esker import contract, grid
-from esker.contract import BASE_ROUGHNESS, TILE_CELLS
+from esker.contract import BASE_ROUGHNESS, BASE_SURVEY, TILE_CELLS
 from esker.fractal import ALPHA, LOOKS, LookRule
 from esker.synthesis.interpolate import Window
 from esker.synthesis.state import Array, State
@@ -35,7 +35,11 @@ class Ground(NamedTuple):
 
 
 class Biases(NamedTuple):
-    """What strokes ask for. ``amplitude``: metres; ``roughness``: 0..1; the rest -1..1, and 0 where none asks."""
+    """What strokes ask for, and what elevation data hold back.
+
+    ``amplitude``: metres; ``roughness``: 0..1; ``survey``: the level whose spacing is that of the finest data here,
+    BASE_SURVEY where there are none; the rest -1..1, and 0 where none asks.
+    """
 
     amplitude: Array
     roughness: Array
@@ -43,7 +47,11 @@ class Biases(NamedTuple):
     grass: Array
     forest: Array
     wetness: Array
+    survey: Array
 
+
+BASES: Final = {"roughness": BASE_ROUGHNESS, "survey": BASE_SURVEY}
+"""Channels that are not 0 where nothing is asked."""
 
 Rule = Callable[["Site", Ground, State, Window, Biases], State]
 """(site, ground, the parent's state at the child's samples, the child's window, biases) -> the child's state."""
@@ -99,6 +107,11 @@ class Site:
         return LOOKS[self.look]
 
     @property
+    def surveyed(self) -> bool:
+        """Whether elevation data hold detail back anywhere."""
+        return "survey" in self.channels
+
+    @property
     def amplitude_m(self) -> float:
         """Amplitude of the coarsest octave on steep ground, metres: detail * alpha * s_0."""
         return self.detail * ALPHA * grid.spacing(0, self.size_m)
@@ -118,11 +131,10 @@ class Site:
     def biases(self, window: Window) -> Biases:
         """Channels at the samples of a window."""
         rows, cols = (self.indices(a, window.level) for a in (window.rows, window.cols))
-        base = {"roughness": BASE_ROUGHNESS}
         return Biases(*(
             self._channel(self.channels[name], window.level, rows, cols)
             if name in self.channels
-            else np.full(window.shape, base.get(name, 0.0), dtype=self.dtype)
+            else np.full(window.shape, BASES.get(name, 0.0), dtype=self.dtype)
             for name in Biases._fields
         ))  # fmt: skip
 

@@ -98,6 +98,8 @@ export interface ChannelView {
   readonly grass: ChannelGrid;
   readonly forest: ChannelGrid;
   readonly wetness: ChannelGrid;
+  /** Level whose spacing is that of the finest elevation data, BASE_SURVEY where there are none. */
+  readonly survey: ChannelGrid;
 }
 
 /** A binary frame after decoding (net/decode.ts), applied atomically by tiles/store.ts. */
@@ -145,6 +147,25 @@ export interface GhostVisual {
   readonly colour: Rgba;
 }
 
+/** The outline of an elevation grid, as a line on the ground. */
+export interface FootprintVisual {
+  readonly id: string;
+  /** xyz triples, metres; the last point is the first again. */
+  readonly points: Float32Array;
+  readonly colour: Rgba;
+  /** Selected, or being laid. */
+  readonly strong: boolean;
+}
+
+/** A coarse picture of a grid that has no place yet: a lattice of points over the ground. Immutable. */
+export interface SheetVisual {
+  /** Points along one side. */
+  readonly side: number;
+  /** xyz triples [row, col], metres; z is NaN where the grid has no data. */
+  readonly points: Float32Array;
+  readonly colour: Rgba;
+}
+
 /** A ring on the ground: somebody's cursor, or mine. */
 export interface CursorVisual {
   readonly position: Vec3;
@@ -167,6 +188,9 @@ export interface Scene {
   readonly strokes: readonly StrokeVisual[];
   readonly ghost: GhostVisual | null;
   readonly cursors: readonly CursorVisual[];
+  /** Outlines of elevation grids; they show whether strokes do or not. */
+  readonly footprints?: readonly FootprintVisual[];
+  readonly sheet?: SheetVisual | null;
   /** Screen-error bound in pixels. */
   readonly tauPx: number;
   /** `automatic` where it is left out. */

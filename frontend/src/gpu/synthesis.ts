@@ -73,7 +73,7 @@ export class SynthesisPass {
   private channels: GPUBuffer | null = null;
   private channelSource: ChannelView | null = null;
   private channelStamp = -1;
-  private channelFacts: ChannelFacts = { bits: 0, varied: false, biased: false };
+  private channelFacts: ChannelFacts = { bits: 0, varied: false, biased: false, surveyed: false };
   private settings: SynthesisSettings | null = null;
   private atlas: SynthesisAtlas | null = null;
   private group: GPUBindGroup | null = null;

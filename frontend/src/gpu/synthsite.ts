@@ -32,7 +32,7 @@ export interface SynthesisSettings {
 }
 
 const LEVELS = MAX_SYNTHESIS_LEVEL + 1;
-const HEAD_WORDS = 12;
+const HEAD_WORDS = 16;
 const LEVEL_WORDS = 8;
 export const SITE_BYTES: number = 4 * (HEAD_WORDS + LEVELS * LEVEL_WORDS);
 
@@ -51,8 +51,8 @@ export function siteWords(s: SynthesisSettings, channels: ChannelFacts): Uint32A
   });
   floats.set([sizeM, site.amplitudeM, seaLevelM ?? 0, seaLevelM === null ? 0 : 1]);
   floats.set([site.snowLine, site.treeLine, site.plants], 4);
-  const { bits, varied, biased } = channels;
-  words.set([s.solved, s.cyclic === true ? 1 : 0, bits, varied ? 1 : 0, biased ? 1 : 0], 7);
+  const { bits, varied, biased, surveyed } = channels;
+  words.set([s.solved, s.cyclic === true ? 1 : 0, bits, varied ? 1 : 0, biased ? 1 : 0, surveyed ? 1 : 0], 7);
   for (let level = 0; level < LEVELS; level += 1) {
     const at = HEAD_WORDS + LEVEL_WORDS * level;
     for (let stream = 0; stream < 4; stream += 1) words[at + stream] = streamStart(s.seed, level, stream);

@@ -1,4 +1,4 @@
-/** What strokes ask of the synthesis at its samples: channels read at exact fractions, so both sides of a seam agree. */
+/** What strokes ask of the synthesis at its samples, and where data hold it back: channels read at exact fractions, so both sides of a seam agree. */
 
 import type { ChannelGrid, ChannelView } from "../core/types.ts";
 import { TILE_CELLS } from "../generated/contract.ts";
@@ -42,6 +42,7 @@ export class Biases {
   private readonly grass: Channel;
   private readonly forest: Channel;
   private readonly wetness: Channel;
+  private readonly survey: Channel;
 
   constructor(channels: Omit<ChannelView, "stamp">) {
     this.amplitude = new Channel(channels.amplitude);
@@ -50,6 +51,7 @@ export class Biases {
     this.grass = new Channel(channels.grass);
     this.forest = new Channel(channels.forest);
     this.wetness = new Channel(channels.wetness);
+    this.survey = new Channel(channels.survey);
   }
 
   /** Fills in the biases of the sample in row j and column i of a level; with `relief`, those that heights depend on. */
@@ -57,6 +59,7 @@ export class Biases {
     into.amplitude = this.amplitude.at(level, j, i);
     into.roughness = this.roughness.at(level, j, i);
     into.snowBias = this.snow.at(level, j, i);
+    into.survey = this.survey.at(level, j, i);
     if (relief) return;
     into.grassBias = this.grass.at(level, j, i);
     into.forestBias = this.forest.at(level, j, i);

@@ -11,10 +11,12 @@ import {
   BASE_AMPLITUDE_M,
   BASE_BIAS,
   BASE_ROUGHNESS,
+  BASE_SURVEY,
   BIAS_QUANTA,
   Channel,
   type PaintChannel,
   ROUGHNESS_QUANTA,
+  SURVEY_QUANTA,
   TILE_CELLS,
   TILE_SAMPLES,
 } from "../generated/contract.ts";
@@ -41,6 +43,7 @@ export class ChannelStore implements ChannelView {
   private readonly streams: ReadonlyMap<number, Stream> = new Map([
     [Channel.AMPLITUDE, stream(AMPLITUDE_QUANTA_PER_M, BASE_AMPLITUDE_M)],
     [Channel.ROUGHNESS, stream(ROUGHNESS_QUANTA, BASE_ROUGHNESS)],
+    [Channel.SURVEY, stream(SURVEY_QUANTA, BASE_SURVEY)],
     ...BIASES.map((channel) => [channel, stream(BIAS_QUANTA, BASE_BIAS)] as const),
   ]);
   /** The next frame of a new connection replaces everything. */
@@ -77,6 +80,10 @@ export class ChannelStore implements ChannelView {
 
   get wetness(): ChannelGrid {
     return this.grid(Channel.WETNESS);
+  }
+
+  get survey(): ChannelGrid {
+    return this.grid(Channel.SURVEY);
   }
 
   /** Noise amplitude in metres at a place; outside the domain that of the nearest border. */

@@ -52,7 +52,10 @@ export interface Samples {
   readonly grass: Float64Array;
   readonly forest: Float64Array;
   readonly foam: Float64Array;
-  /** The most that this level could add to or take from the detail, metres; the least exponent by which that falls. */
+  /**
+   * The most that this level could add to or take from the detail if no data held it back, metres; the least exponent by
+   * which that falls.
+   */
   readonly sigma: number;
   readonly exponent: number;
 }

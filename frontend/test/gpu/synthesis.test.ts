@@ -29,7 +29,15 @@ const flat = (value: number, side = 3): ChannelGrid => grid(side, () => value);
 
 function view(change: Partial<ChannelView> = {}): ChannelView {
   const none = flat(0);
-  const base = { amplitude: none, roughness: flat(0.5), snow: none, grass: none, forest: none, wetness: none };
+  const base = {
+    amplitude: none,
+    roughness: flat(0.5),
+    snow: none,
+    grass: none,
+    forest: none,
+    wetness: none,
+    survey: flat(-1),
+  };
   return { stamp: 1, ...base, ...change };
 }
 
@@ -37,7 +45,7 @@ describe("siteWords", () => {
   it("R18: lies where the shader's struct says", () => {
     const head = synthSite.replace(/\s*levels: array<SynthLevel, 18>,/, "");
     const layout = structLayout(head, "SynthSite");
-    const words = siteWords(SETTINGS, { bits: 6, varied: true, biased: false });
+    const words = siteWords(SETTINGS, { bits: 6, varied: true, biased: false, surveyed: true });
     const floats = new Float32Array(words.buffer);
     const at = (field: string): number => layout.offsets[field]! / 4;
     expect(floats[at("size")]).toBe(4096);
@@ -46,7 +54,7 @@ describe("siteWords", () => {
     expect(floats[at("has_sea")]).toBe(1);
     expect(floats[at("tree_line")]).toBeCloseTo(0.085);
     expect([words[at("solved")], words[at("cyclic")], words[at("channel_bits")]]).toEqual([4, 1, 6]);
-    expect([words[at("varied")], words[at("biased")]]).toEqual([1, 0]);
+    expect([words[at("varied")], words[at("biased")], words[at("surveyed")]]).toEqual([1, 0, 1]);
     const level = structLayout(synthSite, "SynthLevel");
     expect(words.byteLength).toBe(SITE_BYTES);
     expect(layout.size + 18 * level.size).toBe(SITE_BYTES);
@@ -57,8 +65,8 @@ describe("siteWords", () => {
 
   it("R26: keys are where the hashes of the vectors start", () => {
     for (const { seed, level, stream, i, j, hash } of vectors.hashes) {
-      const words = siteWords({ ...SETTINGS, seed }, { bits: 0, varied: false, biased: false });
-      const key = words[12 + 8 * level + stream]!;
+      const words = siteWords({ ...SETTINGS, seed }, { bits: 0, varied: false, biased: false, surveyed: false });
+      const key = words[16 + 8 * level + stream]!;
       expect(mixBits((mixBits((key + j) >>> 0) + i) >>> 0)).toBe(hash);
     }
   });
@@ -100,6 +108,15 @@ describe("channelWords", () => {
     expect(channelWords(view({ roughness: flat(0.75) }))).toMatchObject({ varied: false, biased: false });
     expect(channelWords(view({ roughness: grid(3, (r) => r) }))).toMatchObject({ varied: true, biased: false });
     expect(channelWords(view({ wetness: flat(1) }))).toMatchObject({ varied: true, biased: true });
+  });
+
+  it("R26: a survey comes as an eighth of eight values a node, and none where no data are", () => {
+    const words = channelWords(view({ survey: grid(3, (r, c) => 2 * r + c), roughness: grid(2, (r) => r) }));
+    expect([words.bits, words.varied, words.biased, words.surveyed]).toEqual([1, true, false, true]);
+    expect([...words.values.subarray(8 * 5, 8 * 6)]).toEqual([0, 0.5, 0, 0, 0, 0, 4, 0]);
+    expect(channelWords(view()).surveyed).toBe(false);
+    expect(channelWords(view()).values.length).toBe(6 * 9);
+    expect(channelWords(view({ survey: flat(3) }))).toMatchObject({ varied: false, surveyed: true });
   });
 
   it("refuses grids that are no power of two", () => {

@@ -105,6 +105,7 @@ function channelsOf(site: VectorSite): ChannelView {
     grass: grid("grass", 0),
     forest: grid("forest", 0),
     wetness: grid("wetness", 0),
+    survey: grid("survey", -1),
   };
 }
 

@@ -51,7 +51,7 @@ interface Vectors {
 const path = resolve(import.meta.dirname, "../../../tests/vectors/synthesis.json");
 export const vectors = JSON.parse(readFileSync(path, "utf8")) as Vectors;
 
-const BASES = { amplitude: 0, roughness: 0.5, snow: 0, grass: 0, forest: 0, wetness: 0 };
+const BASES = { amplitude: 0, roughness: 0.5, snow: 0, grass: 0, forest: 0, wetness: 0, survey: -1 };
 
 /** Channels of which some are given; the others are their base everywhere. */
 export function channelsOf(given: SiteVector["channels"] = {}): ChannelView {
@@ -68,6 +68,7 @@ export function channelsOf(given: SiteVector["channels"] = {}): ChannelView {
     grass: grid("grass"),
     forest: grid("forest"),
     wetness: grid("wetness"),
+    survey: grid("survey"),
   };
 }
 

@@ -19,6 +19,12 @@ def amplitude(site: Site, guide_slope: Array, channel: Array) -> Array:
     return np.maximum(0, site.amplitude_m * share + channel)
 
 
+def audible(level: int, survey: Array) -> Array:
+    """Share of the detail of a level that may be heard: none down to the spacing of the data, then all of it."""
+    share: Array = np.clip(level - survey, 0, 1)
+    return share
+
+
 def landscape(site: Site, ground: Ground, before: State, window: Window, biases: Biases) -> State:
     """Each channel is the parent's, drawn to its target, plus noise; d gets noise of amplitude A 2^(-level H)."""
     level, dtype = window.level, site.dtype
@@ -43,4 +49,6 @@ def landscape(site: Site, ground: Ground, before: State, window: Window, biases:
 
     exponent = h + f.ROUGHNESS_TO_H * (BASE_ROUGHNESS - biases.roughness) + f.SNOW_TO_H * snow
     size = amplitude(site, ground.guide_slope, biases.amplitude) * np.exp2(-level * np.clip(exponent, *f.H_RANGE))
+    if site.surveyed:
+        size = size * audible(level, biases.survey)
     return State(before.d + size * noise.full(words[0], dtype), h, snow, wet, grass, forest, foam)

@@ -47,6 +47,11 @@ export function amplitude(site: Site, guideSlope: number, channel: number): numb
   return Math.max(0, site.amplitudeM * (SYNTH_FLAT_SHARE + (1 - SYNTH_FLAT_SHARE) * steep) + channel);
 }
 
+/** Share of the detail of a level that may be heard: none down to the spacing of the data, then all of it. */
+export function audible(level: number, survey: number): number {
+  return clamp(level - survey, 0, 1);
+}
+
 /** Each channel is the parent's, drawn to its target, plus noise; d gets noise of amplitude A 2^(-level H). */
 export function landscape(site: Site, at: Sample, relief: boolean): void {
   const { tied, grain, strength } = octave(at.level);
@@ -63,7 +68,7 @@ export function landscape(site: Site, at: Sample, relief: boolean): void {
   at.exponent = clamp(exponent, SYNTH_H_RANGE_FROM, SYNTH_H_RANGE_TO);
   const size = amplitude(site, at.guideSlope, at.amplitude);
   at.sigma = size === 0 ? 0 : size * 2 ** (-at.level * at.exponent);
-  at.d += at.sigma * at.noiseD;
+  at.d += at.sigma * audible(at.level, at.survey) * at.noiseD;
 }
 
 /** Noise is strongest where the target is undecided, so that the border of a forest frays and its inside is whole. */

@@ -5,7 +5,7 @@
  */
 
 import type { TerrainSettings } from "../../generated/contract.ts";
-import { SYNTH_ALPHA, SYNTH_LOOKS, TILE_CELLS } from "../../generated/contract.ts";
+import { BASE_SURVEY, SYNTH_ALPHA, SYNTH_LOOKS, TILE_CELLS } from "../../generated/contract.ts";
 
 /** One terrain as its rule sees it. */
 export interface Site {
@@ -51,6 +51,8 @@ export interface Sample {
   grassBias: number;
   forestBias: number;
   wetBias: number;
+  /** The level whose spacing is that of the finest elevation data here: detail begins below it. */
+  survey: number;
   /** Uniform in -1..1, one for each of the six values below. */
   noiseD: number;
   noiseH: number;
@@ -67,7 +69,10 @@ export interface Sample {
   grass: number;
   forest: number;
   foam: number;
-  /** The most that this level could add to or take from the detail, metres, and how fast that falls: 2^-exponent a level. */
+  /**
+   * The most that this level could add to or take from the detail, metres, if no data held it back, and how fast that
+   * falls: 2^-exponent a level.
+   */
   sigma: number;
   exponent: number;
 }
@@ -86,6 +91,7 @@ export function newSample(): Sample {
     grassBias: 0,
     forestBias: 0,
     wetBias: 0,
+    survey: BASE_SURVEY,
     noiseD: 0,
     noiseH: 0,
     noiseSnow: 0,
