@@ -118,7 +118,7 @@ def test_roughness_and_amplitude_are_obeyed() -> None:
 
 
 def test_detail_begins_below_the_data() -> None:
-    """SPEC F19: no noise on levels down to the spacing of the data, all of it from one level below; the rest as it was."""
+    """SPEC F19: no noise on levels down to the spacing of the data, all of it from one level below."""
     bare, data = (somewhere(plane(0.5, channels=c), 5, 60) for c in ({}, everywhere(survey=5.0)))
     assert bare.d.any()
     assert not data.d.any()

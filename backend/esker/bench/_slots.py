@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from esker import fractal, grid
 from esker.bench.report import ROOT
-from esker.contract import BASE_ROUGHNESS, BASE_SURVEY, MAX_SYNTHESIS_LEVEL, SUBPATCHES, TILE_CELLS, TILE_SAMPLES
+from esker.contract import BASE_ROUGHNESS, MAX_SYNTHESIS_LEVEL, SUBPATCHES, TILE_CELLS, TILE_SAMPLES
 from esker.synthesis import hash as noise
 from esker.synthesis.rules.targets import tie
 from esker.synthesis.site import BORDER, Biases, Site

@@ -26,8 +26,8 @@ SOURCES: Final = ("synthesis.cl", "synthesis_rules.cl")
 GROUP: Final = 64
 """Work-groups are always full: what compilers do with the rest of a row may round differently."""
 LAUNCH: Final = np.dtype(
-    [(name, "<i4") for name in ("level", "rule", "cyclic", "own_guide", "surveyed", "row", "col", "rows", "cols", "parent_row",
-                                "parent_col", "parent_rows", "parent_cols")]
+    [(name, "<i4") for name in ("level", "rule", "cyclic", "own_guide", "surveyed", "row", "col", "rows", "cols",
+                                "parent_row", "parent_col", "parent_rows", "parent_cols")]
     + [("seed", "<u4"), ("sea", "<i4"), ("cells", "<i4"), ("shift", "<i4")]
     + [(name, "<f4") for name in ("spacing", "size", "sea_level", "amplitude", "snow_line", "tree_line", "plants",
                                   "tie", "grain", "strength")]
@@ -107,9 +107,9 @@ def source() -> str:
 
 def _packed(site: Site) -> tuple[NDArray[np.float32], list[int], list[int]]:
     """All channels' grids in one array, where each starts, and samples along its side."""
-    grids = []
-    for name in Biases._fields:
-        grids.append(site.channels.get(name, np.full((2, 2), BASES.get(name, 0.0), dtype=np.float32)))
+    grids = [
+        site.channels.get(name, np.full((2, 2), BASES.get(name, 0.0), dtype=np.float32)) for name in Biases._fields
+    ]
     offsets = np.cumsum([0, *(g.size for g in grids)])[:-1]
     flat = np.concatenate([np.asarray(g, dtype=np.float32).ravel() for g in grids])
     return flat, offsets.tolist(), [len(g) for g in grids]
