@@ -88,6 +88,8 @@ MIN_GRID_SIDE: Final = 4
 MAX_GRID_SPACING_M: Final = 100_000.0
 MIN_GRID_SPACING_M: Final = 0.001
 MAX_VERTICAL_SCALE: Final = 1_000.0
+LAYER_HEIGHT_MARGIN: Final = 64.0
+"""A layer's heights are within so many sides of the domain of zero: more quanta than 2^30 no tile holds."""
 
 # --- detail (DESIGN 10) -----------------------------------------------------------------------------------------
 

@@ -54,8 +54,13 @@ def test_every_op_type_and_document_refusal_has_a_vector() -> None:
         "stroke.delete",
         "stroke.restore",
         "terrain.set",
+        "layer.add",
+        "layer.set",
+        "layer.delete",
+        "layer.restore",
         "group",
     }
     codes = {case["refusal"] for case in cases if "refusal" in case}
     assert codes >= {"unknown_stroke", "duplicate_stroke", "deleted_stroke", "locked_stroke", "too_many_points"}
     assert codes >= {"out_of_domain", "bad_index", "bad_field"}
+    assert codes >= {"unknown_layer", "duplicate_layer", "deleted_layer", "too_many_layers"}

@@ -8,10 +8,10 @@ from typing import Any
 from pydantic import ValidationError
 
 from esker import contract as c
-from tests.vectors.op_cases import NEW, PAINTED, SNOW
+from tests.vectors.op_cases import NEW, PAINTED, SNOW, VALLEY
 from tests.vectors.scenes import Json, op
 
-HELLO: Json = {"type": "hello", "protocol": 3, "terrain": "t1", "secret": "s", "client": "c1"}
+HELLO: Json = {"type": "hello", "protocol": 4, "terrain": "t1", "secret": "s", "client": "c1"}
 VIEW: Json = {"type": "view", "eye": [0, 0, 100], "target": [1, 1, 0]}
 PRESENCE: Json = {"type": "presence", "cursor": [1, 2, 3.5], "tool": "mountain", "stroke": "c1-1"}
 
@@ -22,6 +22,10 @@ def ops(*raw: Json) -> Json:
 
 def _set(**fields: Any) -> Json:
     return op("stroke.set", stroke="a", fields=fields)
+
+
+def _lay(**fields: Any) -> Json:
+    return op("layer.set", layer="v", fields=fields)
 
 
 ACCEPT: list[tuple[str, Json]] = [
@@ -38,6 +42,9 @@ ACCEPT: list[tuple[str, Json]] = [
     ("presence, empty", {"type": "presence"}),
     ("paint", ops(op("stroke.begin", stroke=PAINTED), _set(paint=SNOW | {"radius_m": 0}))),
     ("strength and rule of the detail", ops(op("terrain.set", fields={"detail": 4, "rule": "smooth"}))),
+    ("layer ops", ops(op("layer.delete", layer="v"), op("layer.restore", layer="v"), _lay(anchor=[1, 2], outline=0))),
+    ("a layer, which the server refuses by name", ops(op("layer.add", layer=VALLEY))),
+    ("place on Earth", ops(op("terrain.set", fields={"place": {"lat_deg": -89, "lon_deg": 180}}))),
     ("credit", {"type": "credit", "bytes": 65536}),
     ("rename", {"type": "rename", "name": "Grace", "colour": "#123456"}),
     ("ping", {"type": "ping", "t": 12.5}),
@@ -95,6 +102,17 @@ REFUSE: list[tuple[str, Json | str]] = [
     ("the kind of a stroke cannot be set", ops(_set(kind="paint"))),
     ("the size of a terrain cannot be set", ops(op("terrain.set", fields={"size_m": 128}))),
     ("the author of a stroke cannot be set", ops(_set(author="eve"))),
+    ("layer content that is no digest", ops(op("layer.add", layer=VALLEY | {"content": "../../etc/passwd"}))),
+    ("layer without facts", ops(op("layer.add", layer={k: v for k, v in VALLEY.items() if k != "facts"}))),
+    ("layer spacing of zero", ops(_lay(spacing_m=[0, 1]))),
+    ("layer spacing of one number", ops(_lay(spacing_m=10))),
+    ("layer turned too far", ops(_lay(rotation_deg=361))),
+    ("layer accuracy below zero", ops(_lay(accuracy_m=-1))),
+    ("layer order of a fraction", ops(_lay(priority=0.5))),
+    ("layer outline of 2", ops(_lay(outline=2))),
+    ("layer with a source of 241 characters", ops(_lay(source="s" * 241))),
+    ("the content of a layer cannot be set", ops(_lay(content="0" * 64))),
+    ("place at the pole", ops(op("terrain.set", fields={"place": {"lat_deg": 90, "lon_deg": 0}}))),
     ("reach of zero", ops(op("terrain.set", fields={"reach_m": 0}))),
     ("unknown look", ops(op("terrain.set", fields={"look": "neon"}))),
     ("negative credit", {"type": "credit", "bytes": -1}),

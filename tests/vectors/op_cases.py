@@ -7,7 +7,7 @@ from typing import Any
 
 from esker import contract as c
 from esker.document.ops import Refusal, StrokeSet
-from tests.vectors.scenes import Json, document, dump, op, stroke
+from tests.vectors.scenes import Json, document, dump, layer, op, stroke
 
 RIDGE = stroke("a")
 MESA = stroke("m", kind="level", first=[1000, 1000, 120], last=[1500, 1000, 120], curve=[[0, 0], [0.5, 0.25], [1, 0]])
@@ -19,6 +19,11 @@ SNOW: Json = {"channel": "snow", "value": 1.0, "radius_m": 80.0}
 PAINTED = stroke(
     "p", kind="paint", first=[500, 500, 0], last=[900, 700, 0], curve=[[0, 0], [0.5, 0.1], [1, 0]], paint=SNOW
 )
+VALLEY = layer("v")
+CRATER = layer("k", name="crater 2004", priority=2, spacing_m=[2, 2], hidden=True)
+LOST = layer("d", name="lost")
+LAID = document(RIDGE, layers=(VALLEY, CRATER), deleted_layers=(LOST,))
+FULL = document(layers=tuple(layer(f"f{i}") for i in range(c.MAX_LAYERS)), deleted_layers=(LOST,))
 NEW = stroke("n", curve=[], finished=False, first=[0, 0, 0], last=[0, 0, 0])
 
 
@@ -95,6 +100,79 @@ def _applies() -> list[tuple[str, Json, Json]]:
         ("terrain detail and rule", BASE, op("terrain.set", fields={"detail": 2.5, "rule": "plain"})),
         ("exactly the most points", document(NEW), op("stroke.begin", stroke=LONG)),
     ]
+
+
+def _layer_applies() -> list[tuple[str, Json, Json]]:
+    add, set_ = "layer.add", "layer.set"
+    return [
+        ("lay a grid", document(), op(add, layer=VALLEY)),
+        ("lay a grid beside others", LAID, op(add, layer=layer("n", scale=0.3048, lift_m=-40, outline=0))),
+        ("name a layer", LAID, op(set_, layer="v", fields={"name": "Tal — 谷", "source": "USGS", "licence": "CC0"})),
+        (
+            "move and turn a layer",
+            LAID,
+            op(set_, layer="v", fields={"anchor": [-100, 0.125], "rotation_deg": -33.5, "spacing_m": [11, 13]}),
+        ),
+        (
+            "weigh a layer",
+            LAID,
+            op(set_, layer="k", fields={"priority": -7, "accuracy_m": 3, "hidden": False, "outline": 1}),
+        ),
+        ("scale and lift a layer", LAID, op(set_, layer="v", fields={"scale": -2, "lift_m": 1000})),
+        ("set nothing of a layer", LAID, op(set_, layer="v", fields={})),
+        ("delete a layer", LAID, op("layer.delete", layer="v")),
+        ("restore a layer", LAID, op("layer.restore", layer="d")),
+        (
+            "delete and restore a layer as one",
+            LAID,
+            op("group", ops=[op("layer.delete", layer="v"), op("layer.restore", layer="v")]),
+        ),
+        (
+            "strokes and layers in one group",
+            LAID,
+            op("group", ops=[_set("a", label="dam"), _lay("v", hidden=True), op("stroke.delete", stroke="a")]),
+        ),
+        ("deleting forgets the oldest tombstone", _graves(), op("layer.delete", layer="v")),
+        ("layer as high as may be", LAID, _lay("v", scale=1, lift_m=64 * 4096 - 840)),
+        ("place on Earth", BASE, op("terrain.set", fields={"place": {"lat_deg": 46.2, "lon_deg": -122.18}})),
+        ("no place on Earth", document(place={"lat_deg": 1, "lon_deg": 2}), op("terrain.set", fields={"place": None})),
+    ]
+
+
+def _layer_refuses() -> list[tuple[str, Json, Json, str]]:
+    add = "layer.add"
+    return [
+        ("lay a grid twice", LAID, op(add, layer=VALLEY), "duplicate_layer"),
+        ("lay a grid with the id of a deleted one", LAID, op(add, layer=LOST), "duplicate_layer"),
+        ("one layer too many", FULL, op(add, layer=VALLEY), "too_many_layers"),
+        ("restore one layer too many", FULL, op("layer.restore", layer="d"), "too_many_layers"),
+        ("lay a grid too high", document(), op(add, layer=VALLEY | {"scale": 1000}), "out_of_domain"),
+        ("lift a layer too high", LAID, _lay("v", lift_m=64 * 4096 - 839), "out_of_domain"),
+        ("sink a layer too low", LAID, _lay("v", lift_m=-64 * 4096 - 13), "out_of_domain"),
+        ("set on no layer", LAID, _lay("zz", name="x"), "unknown_layer"),
+        ("set on a deleted layer", LAID, _lay("d", name="x"), "deleted_layer"),
+        ("set a layer's name to null", LAID, _lay("v", name=None), "bad_field"),
+        ("a stroke is no layer", LAID, op("layer.delete", layer="a"), "unknown_layer"),
+        ("a layer is no stroke", LAID, op("stroke.delete", stroke="v"), "unknown_stroke"),
+        ("delete no layer", LAID, op("layer.delete", layer="zz"), "unknown_layer"),
+        ("delete a layer twice", LAID, op("layer.delete", layer="d"), "deleted_layer"),
+        ("restore a live layer", LAID, op("layer.restore", layer="v"), "duplicate_layer"),
+        ("restore no layer", LAID, op("layer.restore", layer="zz"), "unknown_layer"),
+        (
+            "a group with a bad layer does nothing",
+            LAID,
+            op("group", ops=[_set("a", label="1"), _lay("zz", name="2")]),
+            "unknown_layer",
+        ),
+    ]
+
+
+def _lay(layer_id: str, **fields: Any) -> Json:
+    return op("layer.set", layer=layer_id, fields=fields)
+
+
+def _graves() -> Json:
+    return document(layers=(VALLEY,), deleted_layers=tuple(layer(f"f{i}") for i in range(c.MAX_LAYERS)))
 
 
 def _refuses() -> list[tuple[str, Json, Json, str]]:
@@ -175,10 +253,10 @@ def _finish(stroke_id: str) -> Json:
 def op_vectors() -> list[Json]:
     """All cases; raises AssertionError when the implementation disagrees with the outcome named here."""
     out: list[Json] = []
-    for name, before, raw in _applies():
+    for name, before, raw in (*_applies(), *_layer_applies()):
         after, _ = _set_of(before).apply(c.OP.validate_json(json.dumps(raw)))
         out.append({"name": name, "document": before, "op": raw, "result": dump(after.to_document())})
-    for name, before, raw, code in _refuses():
+    for name, before, raw, code in (*_refuses(), *_layer_refuses()):
         assert _refusal(before, raw) == code, name
         out.append({"name": name, "document": before, "op": raw, "refusal": code})
     return out

@@ -25,9 +25,33 @@ def stroke(stroke_id: str, **over: Any) -> Json:
     return dump(c.Stroke.model_validate_json(_text(base | over)))
 
 
-def document(*strokes: Json, deleted: tuple[Json, ...] = (), clock: int = 7, **settings: Any) -> Json:
-    """A document of these strokes, as JSON."""
+def layer(layer_id: str, **over: Any) -> Json:
+    """A layer of 100 x 80 samples of 10 m, with overridden fields, as JSON."""
+    base: Json = {
+        "id": layer_id,
+        "content": "0123456789abcdef" * 4,
+        "facts": {"rows": 80, "cols": 100, "low_m": 12.5, "high_m": 840, "file": "valley.tif"},
+        "author": "ada",
+        "name": "valley.tif",
+        "anchor": [500, 600.5],
+        "rotation_deg": 27,
+        "spacing_m": [10, 12.5],
+        "accuracy_m": 0.5,
+    }
+    return dump(c.Layer.model_validate_json(_text(base | over)))
+
+
+def document(
+    *strokes: Json,
+    deleted: tuple[Json, ...] = (),
+    layers: tuple[Json, ...] = (),
+    deleted_layers: tuple[Json, ...] = (),
+    clock: int = 7,
+    **settings: Any,
+) -> Json:
+    """A document of these strokes and layers, as JSON."""
     raw = {"id": "t1", "clock": clock, "strokes": strokes, "deleted": deleted, "settings": settings}
+    raw |= {"layers": layers, "deleted_layers": deleted_layers}
     return dump(c.Document.model_validate_json(_text(raw)))
 
 

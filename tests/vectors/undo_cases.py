@@ -12,8 +12,8 @@ from typing import Any
 from esker import contract as c
 from esker.document.ops import StrokeSet
 from esker.document.undo import UndoStack
-from tests.vectors.op_cases import BASE, GONE, NEW, PAINTED, SNOW, _append, _finish, _set
-from tests.vectors.scenes import Json, document, dump, op
+from tests.vectors.op_cases import BASE, GONE, LAID, NEW, PAINTED, SNOW, _append, _finish, _lay, _set
+from tests.vectors.scenes import Json, document, dump, layer, op
 
 UNDO: Json = {"undo": None}
 REDO: Json = {"redo": None}
@@ -35,6 +35,41 @@ DRAW = [mine(op("stroke.begin", stroke=NEW), "d1"), mine(_append("n"), "d1"), mi
 DRAG = [mine(_anchor(x), "drag") for x in (3400, 3300, 3200)]
 DELETE = op("stroke.delete", stroke="a")
 RESTORE = op("stroke.restore", stroke="g")
+
+LAY = mine(op("layer.add", layer=layer("n")))
+SHIFT = [mine(_lay("v", anchor=[x, 0]), "shift") for x in (1, 2, 3)]
+
+LAYER_SCRIPTS: list[tuple[str, Json, list[Json]]] = [
+    ("a laid grid", LAID, [LAY, UNDO, REDO, UNDO]),
+    ("a laid grid that somebody moved is kept", LAID, [LAY, theirs(_lay("n", rotation_deg=3)), UNDO]),
+    ("a laid grid that somebody deleted", LAID, [LAY, theirs(op("layer.delete", layer="n")), UNDO]),
+    ("a laid grid and its first move", LAID, [LAY, mine(_lay("n", lift_m=4)), UNDO, UNDO, REDO, REDO]),
+    ("a layer's drag is one step", LAID, [*SHIFT, UNDO, REDO]),
+    ("others' other field of the layer is untouched", LAID, [*SHIFT, theirs(_lay("v", name="x")), UNDO, REDO]),
+    ("others' same field of the layer is kept", LAID, [*SHIFT, theirs(_lay("v", anchor=[9, 9])), UNDO, REDO]),
+    ("a drag of a layer that somebody deleted", LAID, [*SHIFT, theirs(op("layer.delete", layer="v")), UNDO]),
+    ("delete a layer and undo", LAID, [mine(op("layer.delete", layer="v")), UNDO, REDO, UNDO]),
+    (
+        "delete a layer, restored by another",
+        LAID,
+        [mine(op("layer.delete", layer="v")), theirs(op("layer.restore", layer="v")), UNDO],
+    ),
+    (
+        "restore a layer, change it, undo as one gesture",
+        LAID,
+        [mine(op("layer.restore", layer="d"), "r"), mine(_lay("d", hidden=True, outline=0.5), "r"), UNDO, REDO],
+    ),
+    (
+        "strokes and layers in one step",
+        LAID,
+        [mine(op("group", ops=[_lay("v", hidden=True), _set("a", label="x"), _lay("k", priority=9)])), UNDO, REDO],
+    ),
+    (
+        "place on Earth",
+        LAID,
+        [mine(op("terrain.set", fields={"place": {"lat_deg": 46.2, "lon_deg": -122.18}})), UNDO, REDO],
+    ),
+]
 
 SCRIPTS: list[tuple[str, Json, list[Json]]] = [
     ("nothing to undo", BASE, [UNDO, REDO]),
@@ -149,7 +184,7 @@ SCRIPTS: list[tuple[str, Json, list[Json]]] = [
 
 def undo_vectors() -> list[Json]:
     """Runs every script and writes down what comes out."""
-    return [_run(name, raw, script) for name, raw, script in SCRIPTS]
+    return [_run(name, raw, script) for name, raw, script in (*SCRIPTS, *LAYER_SCRIPTS)]
 
 
 def _run(name: str, raw: Json, script: list[Json]) -> Json:

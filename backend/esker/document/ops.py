@@ -10,9 +10,13 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from esker import contract as c
-from esker.contract import Op, RejectCode, Stroke, TerrainSettings
+from esker.contract import Layer, Op, Stroke, TerrainSettings
+from esker.document.layers import LayerEditor
+from esker.document.refusal import Limits, Refusal, changed, trim
 from esker.document.strokes import Points, bounds, misfit, world_points
 from esker.grid import Rect
+
+__all__ = ["CHANNEL_FIELDS", "GROUND_FIELDS", "Limits", "Refusal", "StrokeSet", "changed", "check_document"]
 
 GROUND_FIELDS: Final = frozenset(c.StrokeFields.model_fields) - {"label", "locked"}
 """Fields of a stroke that the ground depends on; changing another one leaves the ground alone."""
@@ -20,30 +24,25 @@ CHANNEL_FIELDS: Final = frozenset({"amplitude_m", "roughness", "paint"})
 """Those of them that no height depends on, only the other channels."""
 
 
-class Refusal(Exception):
-    """An op that cannot apply: ``code`` for machines, the message for a person. The document is unchanged."""
-
-    def __init__(self, code: RejectCode, message: str) -> None:
-        super().__init__(message)
-        self.code: RejectCode = code
-        self.message = message
-
-
 @dataclass(frozen=True)
 class StrokeSet:
-    """The document as the room holds it: strokes by id, tombstones by id, settings, clock. Treat as immutable."""
+    """The document as the room holds it: strokes, layers and tombstones by id, settings, clock. Treat as immutable."""
 
     id: str
     settings: TerrainSettings = field(default_factory=TerrainSettings)
     strokes: dict[str, Stroke] = field(default_factory=dict)
     deleted: dict[str, Stroke] = field(default_factory=dict)
     clock: int = 0
+    layers: dict[str, Layer] = field(default_factory=dict)
+    deleted_layers: dict[str, Layer] = field(default_factory=dict)
     shape: object = field(default_factory=object, compare=False, repr=False)
     """Of what the heights follow from. A successor has the same object exactly when nothing of that changed."""
     says: object = field(default_factory=object, compare=False, repr=False)
     """The same of what the other channels follow from: amplitude, roughness, paint, and where strokes lie."""
     painted: object = field(default_factory=object, compare=False, repr=False)
     """The same of what paint alone says."""
+    ground: object = field(default_factory=object, compare=False, repr=False)
+    """The same of what the base under the strokes follows from: the visible layers, but for what is told of them."""
     _rects: dict[str, tuple[Stroke, Rect | None]] = field(default_factory=dict, compare=False, repr=False)
     """Bounds of strokes as last seen, with the stroke they were computed for: a cache that successors share."""
 
@@ -56,6 +55,8 @@ class StrokeSet:
             {s.id: s for s in document.strokes},
             {s.id: s for s in document.deleted},
             document.clock,
+            {layer.id: layer for layer in document.layers},
+            {layer.id: layer for layer in document.deleted_layers},
         )
 
     def to_document(self) -> c.Document:
@@ -66,6 +67,8 @@ class StrokeSet:
             settings=self.settings,
             strokes=tuple(self.strokes.values()),
             deleted=tuple(self.deleted.values()),
+            layers=tuple(self.layers.values()),
+            deleted_layers=tuple(self.deleted_layers.values()),
         )
 
     def apply(self, op: Op, limits: Limits | None = None) -> tuple[StrokeSet, Rect | None]:
@@ -78,15 +81,27 @@ class StrokeSet:
         shape = self.shape if editor.dirty is None else object()
         says = object() if editor.said or editor.dirty is not None else self.says
         painted = object() if editor.painted else self.painted
+        ground = object() if editor.layers.grounded else self.ground
         after = StrokeSet(
-            self.id, editor.settings, editor.strokes, editor.deleted, self.clock + 1, shape, says, painted, self._rects
+            self.id,
+            editor.settings,
+            editor.strokes,
+            editor.deleted,
+            self.clock + 1,
+            editor.layers.layers,
+            editor.layers.deleted,
+            shape,
+            says,
+            painted,
+            ground,
+            self._rects,
         )
         return after, editor.dirty
 
 
 def check_document(document: c.Document, limits: Limits | None = None) -> None:
     """Refuses a document from outside that no sequence of ops could have made: ids used twice, limits, far points,
-    strokes that lack what their kind needs.
+    strokes that lack what their kind needs, layers that are too high.
 
     Raises Refusal.
     """
@@ -99,14 +114,13 @@ def check_document(document: c.Document, limits: Limits | None = None) -> None:
     editor = _Editor(StrokeSet(document.id, document.settings), limits)
     for stroke in everything:
         editor.check(stroke)
-
-
-@dataclass(frozen=True)
-class Limits:
-    """The document limits of DESIGN 4; settings may lower them."""
-
-    strokes: int = c.MAX_STROKES
-    points: int = c.MAX_POINTS_PER_STROKE
+    layers = (*document.layers, *document.deleted_layers)
+    if len({layer.id for layer in layers}) != len(layers):
+        raise Refusal("duplicate_layer", "Two elevation layers have the same id.")
+    if len(document.layers) > limits.layers or len(document.deleted_layers) > c.MAX_LAYERS:
+        raise Refusal("too_many_layers", f"A terrain holds at most {limits.layers} elevation layers.")
+    for layer in layers:
+        editor.layers.check(layer)
 
 
 class _Editor:
@@ -115,6 +129,7 @@ class _Editor:
     def __init__(self, base: StrokeSet, limits: Limits) -> None:
         self.strokes, self.deleted, self.settings = base.strokes, base.deleted, base.settings
         self.limits = limits
+        self.layers = LayerEditor(base.layers, base.deleted_layers, base.settings.size_m, limits)
         self._rects = base._rects
         self.dirty: Rect | None = None
         self.said = False
@@ -149,6 +164,8 @@ class _Editor:
                 self._restore(op.stroke)
             case c.SetTerrain():
                 self._set_terrain(op)
+            case c.AddLayer() | c.SetLayer() | c.DeleteLayer() | c.RestoreLayer():
+                self.layers.run(op)
 
     def _own(self) -> None:
         if not self._copied:
@@ -250,8 +267,7 @@ class _Editor:
         self._rects.pop(stroke_id, None)
         del self.strokes[stroke_id]
         self.deleted[stroke_id] = old
-        while len(self.deleted) > c.MAX_STROKES:  # never a setting: a replay must forget what was forgotten then
-            del self.deleted[next(iter(self.deleted))]
+        trim(self.deleted, c.MAX_STROKES)
 
     def _restore(self, stroke_id: str) -> None:
         if stroke_id in self.strokes:
@@ -272,12 +288,3 @@ class _Editor:
             size = self.settings.size_m
             self.dirty = Rect(0, 0, size, size).union(self.dirty)
             self.painted = True
-
-
-def changed(fields: c.StrokeFields | c.TerrainFields, nullable: frozenset[str]) -> dict[str, object]:
-    """The fields that a partial update really sets. Raises Refusal when a field that has no null is null."""
-    update = {name: getattr(fields, name) for name in fields.model_fields_set}
-    for name, value in update.items():
-        if value is None and name not in nullable:
-            raise Refusal("bad_field", f"'{name}' needs a value.")
-    return update

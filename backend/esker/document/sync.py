@@ -138,10 +138,14 @@ class SyncDoc:
                 continue
             if ordered.clock != confirmed.clock + 1:
                 raise Diverged(f"op {ordered.clock} came after op {confirmed.clock}")
+            before = confirmed
             try:
                 confirmed, _ = confirmed.apply(ordered.op)
             except Refusal as refusal:
                 raise Diverged(f"op {ordered.clock} does not apply: {refusal.message}") from refusal
+            if ordered.author == self.client and not ordered.id.startswith(f"{self.client}:"):
+                # What the server did in my name, as the end of an import, is mine to undo.
+                self.stack.record(before, ordered.op, confirmed)
         self._confirmed = confirmed
         self._drop([ordered.id for ordered in ops])
         self._rebuild()

@@ -13,6 +13,8 @@ def op_json(op: Op) -> str:
         return f'{{"type":"group","ops":[{",".join(op_json(part) for part in op.ops)}]}}'
     if isinstance(op, c.SetStroke):
         return op.model_dump_json(include={"type": True, "stroke": True, "fields": op.fields.model_fields_set})
+    if isinstance(op, c.SetLayer):
+        return op.model_dump_json(include={"type": True, "layer": True, "fields": op.fields.model_fields_set})
     if isinstance(op, c.SetTerrain):
         return op.model_dump_json(include={"type": True, "fields": op.fields.model_fields_set})
     return op.model_dump_json()

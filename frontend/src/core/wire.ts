@@ -9,12 +9,17 @@
 import {
   ABSOLUTE_BOUND_M,
   MAX_DETAIL,
+  MAX_GRID_SAMPLES,
+  MAX_GRID_SPACING_M,
   MAX_NAME_LENGTH,
   MAX_OPS_PER_GROUP,
   MAX_OPS_PER_MESSAGE,
   MAX_POINTS_PER_APPEND,
   MAX_POINTS_PER_STROKE,
   MAX_SLOPE_DEG,
+  MAX_VERTICAL_SCALE,
+  MIN_GRID_SIDE,
+  MIN_GRID_SPACING_M,
 } from "../generated/contract.ts";
 
 /** Null when the value is well formed, else what is wrong with it. */
@@ -155,6 +160,41 @@ const strokeShape: Shape = {
   finished: may(bool),
 };
 
+const side = integer(MIN_GRID_SIDE, MAX_GRID_SAMPLES);
+const unit = number(0, 1);
+const line = text(0, 240);
+const step = number(MIN_GRID_SPACING_M, MAX_GRID_SPACING_M);
+const facts = record({
+  rows: need(side),
+  cols: need(side),
+  low_m: need(metres),
+  high_m: need(metres),
+  valid: may(unit),
+  geo: may(bool),
+  crs: may(name),
+  format: may(name),
+  file: may(name),
+});
+
+const layerShape: Shape = {
+  id: need(id),
+  content: need(matches(/^[0-9a-f]{64}$/)),
+  facts: need(facts),
+  author: may(name),
+  name: may(name),
+  anchor: need(tuple(metres, metres)),
+  rotation_deg: may(number(-360, 360)),
+  spacing_m: need(tuple(step, step)),
+  scale: may(number(-MAX_VERTICAL_SCALE, MAX_VERTICAL_SCALE)),
+  lift_m: may(metres),
+  accuracy_m: need(metreLength),
+  priority: may(integer(-1e6, 1e6)),
+  hidden: may(bool),
+  outline: may(unit),
+  source: may(line),
+  licence: may(line),
+};
+
 /** Null is well formed for every field of a partial update; `apply` says where it has a meaning. */
 function partial(shape: Shape, names: readonly string[]): Check {
   return record(Object.fromEntries(names.map((n) => [n, may(nullable(shape[n]!.check))])));
@@ -163,6 +203,10 @@ function partial(shape: Shape, names: readonly string[]): Check {
 const strokeFields = partial(
   strokeShape,
   Object.keys(strokeShape).filter((n) => !["id", "author", "kind", "finished"].includes(n)),
+);
+const layerFields = partial(
+  layerShape,
+  Object.keys(layerShape).filter((n) => !["id", "content", "facts", "author"].includes(n)),
 );
 const terrainFields = record({
   title: may(nullable(name)),
@@ -175,6 +219,7 @@ const terrainFields = record({
   rule: may(nullable(oneOf("landscape", "smooth", "plain"))),
   sun_azimuth_deg: may(nullable(number(0, 360))),
   sun_elevation_deg: may(nullable(number(0, 90))),
+  place: may(nullable(record({ lat_deg: need(number(-89, 89)), lon_deg: need(number(-180, 180)) }))),
 });
 
 const simpleOps: Readonly<Record<string, Shape>> = {
@@ -190,6 +235,10 @@ const simpleOps: Readonly<Record<string, Shape>> = {
   "stroke.anchor": { stroke: need(id), which: need(oneOf("first", "last")), to: need(vec3) },
   "stroke.delete": { stroke: need(id) },
   "stroke.restore": { stroke: need(id) },
+  "layer.add": { layer: need(record(layerShape)) },
+  "layer.set": { layer: need(id), fields: need(layerFields) },
+  "layer.delete": { layer: need(id) },
+  "layer.restore": { layer: need(id) },
   "terrain.set": { fields: need(terrainFields) },
 };
 

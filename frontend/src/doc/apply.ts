@@ -18,7 +18,8 @@ import {
   type Stroke,
   type TerrainSettings,
 } from "../generated/contract.ts";
-import { type Doc, fullFlank, fullStroke, Refusal } from "./document.ts";
+import { changed, type Doc, fullFlank, fullStroke, Refusal } from "./document.ts";
+import { LayerEditor } from "./layers.ts";
 import { worldPoints } from "./strokes.ts";
 
 export { type Doc, Refusal } from "./document.ts";
@@ -33,6 +34,8 @@ export function apply(doc: Doc, op: Op): Doc {
     settings: editor.settings,
     strokes: editor.strokes,
     deleted: editor.deleted,
+    layers: editor.layers.layers,
+    deletedLayers: editor.layers.deleted,
   };
 }
 
@@ -41,12 +44,14 @@ class Editor {
   settings: TerrainSettings;
   strokes: ReadonlyMap<string, Stroke>;
   deleted: ReadonlyMap<string, Stroke>;
+  readonly layers: LayerEditor;
   #own: { strokes: Map<string, Stroke>; deleted: Map<string, Stroke> } | null = null;
 
   constructor(base: Doc) {
     this.settings = base.settings;
     this.strokes = base.strokes;
     this.deleted = base.deleted;
+    this.layers = new LayerEditor(base);
   }
 
   run(op: SimpleOp): void {
@@ -75,6 +80,8 @@ class Editor {
       case "terrain.set":
         this.#setTerrain(op);
         break;
+      default:
+        this.layers.run(op);
     }
   }
 
@@ -171,15 +178,4 @@ class Editor {
   #setTerrain(op: SetTerrain): void {
     this.settings = { ...this.settings, ...(changed(op.fields, NULLABLE_TERRAIN_FIELDS) as Partial<TerrainSettings>) };
   }
-}
-
-/** The fields that a partial update really sets. Throws Refusal when a field that has no null is null. */
-function changed(fields: object, nullable: readonly string[]): Record<string, unknown> {
-  const update: Record<string, unknown> = {};
-  for (const [name, value] of Object.entries(fields)) {
-    if (value === undefined) continue;
-    if (value === null && !nullable.includes(name)) throw new Refusal("bad_field", `'${name}' needs a value.`);
-    update[name] = value;
-  }
-  return update;
 }

@@ -1,11 +1,12 @@
 /** What an op changed, field by field: the memory of undo (`undo.ts`). Pure. */
 
-import type { Op, Stroke, TerrainSettings } from "../generated/contract.ts";
+import type { Layer, Op, SetTerrain, SimpleOp, Stroke, TerrainSettings } from "../generated/contract.ts";
 import type { Doc } from "./document.ts";
 
 export type State = "absent" | "live" | "deleted";
 export type Change = readonly [before: unknown, after: unknown];
-export type StrokeField = keyof typeof STROKE_WORDS;
+export type Kind = "stroke" | "layer";
+export type Item = Stroke | Layer;
 
 /** The undoable fields of a stroke in the order in which they are restored, with the word a person reads. */
 export const STROKE_WORDS = {
@@ -23,6 +24,26 @@ export const STROKE_WORDS = {
   label: "label",
 } as const;
 
+export const LAYER_WORDS = {
+  name: "name",
+  anchor: "place",
+  rotation_deg: "rotation",
+  spacing_m: "spacing",
+  scale: "vertical scale",
+  lift_m: "lift",
+  accuracy_m: "accuracy",
+  priority: "order",
+  hidden: "visibility",
+  outline: "outline",
+  source: "source",
+  licence: "licence",
+} as const;
+
+export const WORDS: { readonly [kind in Kind]: { readonly [field: string]: string } } = {
+  stroke: STROKE_WORDS,
+  layer: LAYER_WORDS,
+};
+
 export const TERRAIN_WORDS = {
   title: "title",
   reach_m: "reach",
@@ -34,18 +55,20 @@ export const TERRAIN_WORDS = {
   rule: "rule",
   sun_azimuth_deg: "direction of the sun",
   sun_elevation_deg: "height of the sun",
+  place: "place on Earth",
 } as const;
 
-/** What one step of mine did to a stroke. `content` is the stroke as I left it when it came to life or died. */
-export interface StrokeChange {
+/** What one step of mine did to a stroke or layer. `content` is the item as I left it when it came to life or died. */
+export interface ItemChange {
   readonly before: State;
   readonly after: State;
-  readonly fields: ReadonlyMap<StrokeField, Change>;
-  readonly content: Stroke | null;
+  readonly fields: ReadonlyMap<string, Change>;
+  readonly content: Item | null;
 }
 
 export interface Changes {
-  readonly strokes: ReadonlyMap<string, StrokeChange>;
+  readonly strokes: ReadonlyMap<string, ItemChange>;
+  readonly layers: ReadonlyMap<string, ItemChange>;
   readonly terrain: ReadonlyMap<string, Change>;
 }
 
@@ -59,53 +82,67 @@ export function same(a: unknown, b: unknown): boolean {
   return keys.length === Object.keys(b).length && keys.every((k) => same(x[k], y[k]));
 }
 
-/** Whether the stroke is there, and the stroke (or its tombstone). */
-export function stateOf(doc: Doc, id: string): [State, Stroke | null] {
-  const live = doc.strokes.get(id);
+/** A field of a stroke or a layer by its name. */
+export function fieldOf(item: Item, name: string): unknown {
+  return (item as unknown as Record<string, unknown>)[name];
+}
+
+/** Whether the stroke or layer is there, and it (or its tombstone). */
+export function stateOf(kind: Kind, doc: Doc, id: string): [State, Item | null] {
+  const live = (kind === "stroke" ? doc.strokes : doc.layers).get(id);
   if (live !== undefined) return ["live", live];
-  const gone = doc.deleted.get(id);
+  const gone = (kind === "stroke" ? doc.deleted : doc.deletedLayers).get(id);
   return gone !== undefined ? ["deleted", gone] : ["absent", null];
+}
+
+/** The stroke or layer that an op of one is about. */
+export function subjectOf(op: Exclude<SimpleOp, SetTerrain>): [kind: Kind, id: string] {
+  if (op.type === "stroke.begin") return ["stroke", op.stroke.id];
+  if (op.type === "layer.add") return ["layer", op.layer.id];
+  return "layer" in op ? ["layer", op.layer] : ["stroke", op.stroke];
 }
 
 /** What `op` changed between the two documents, field by field. */
 export function changes(op: Op, before: Doc, after: Doc): Changes {
-  const strokes = new Map<string, StrokeChange>();
+  const items = { stroke: new Map<string, ItemChange>(), layer: new Map<string, ItemChange>() };
   const terrain = new Map<string, Change>();
   for (const part of op.type === "group" ? op.ops : [op]) {
     if (part.type === "terrain.set") {
       for (const name of Object.keys(TERRAIN_WORDS) as (keyof TerrainSettings & keyof typeof TERRAIN_WORDS)[]) {
         const [old, now] = [before.settings[name], after.settings[name]];
-        if (part.fields[name] !== undefined && old !== now) terrain.set(name, [old, now]);
+        if (part.fields[name] !== undefined && !same(old, now)) terrain.set(name, [old, now]);
       }
       continue;
     }
-    const id = part.type === "stroke.begin" ? part.stroke.id : part.stroke;
-    strokes.set(id, strokeChange(id, before, after));
+    const [kind, id] = subjectOf(part);
+    items[kind].set(id, itemChange(kind, id, before, after));
   }
-  return { strokes, terrain };
+  return { strokes: items.stroke, layers: items.layer, terrain };
 }
 
-function strokeChange(id: string, before: Doc, after: Doc): StrokeChange {
-  const [oldState, old] = stateOf(before, id);
-  const [newState, now] = stateOf(after, id);
-  const fields = new Map<StrokeField, Change>();
+function itemChange(kind: Kind, id: string, before: Doc, after: Doc): ItemChange {
+  const [oldState, old] = stateOf(kind, before, id);
+  const [newState, now] = stateOf(kind, after, id);
+  const fields = new Map<string, Change>();
   if (old !== null && now !== null)
-    for (const name of Object.keys(STROKE_WORDS) as StrokeField[])
-      if (!same(old[name], now[name])) fields.set(name, [old[name], now[name]]);
+    for (const name of Object.keys(WORDS[kind])) {
+      const pair = [fieldOf(old, name), fieldOf(now, name)] as const;
+      if (!same(pair[0], pair[1])) fields.set(name, pair);
+    }
   return { before: oldState, after: newState, fields, content: oldState !== newState ? now : null };
 }
 
-function mergeFields<K>(earlier: ReadonlyMap<K, Change>, later: ReadonlyMap<K, Change>): Map<K, Change> {
+function mergeFields(earlier: ReadonlyMap<string, Change>, later: ReadonlyMap<string, Change>): Map<string, Change> {
   const out = new Map(earlier);
   for (const [name, [old, now]] of later) out.set(name, [out.has(name) ? out.get(name)![0] : old, now]);
   return out;
 }
 
-function mergeStroke(earlier: StrokeChange, later: StrokeChange): StrokeChange {
+function mergeItem(earlier: ItemChange, later: ItemChange): ItemChange {
   let content = later.content;
   if (content === null && earlier.content !== null) {
     const update = [...later.fields].map(([name, [, now]]) => [name, now] as const);
-    content = { ...earlier.content, ...(Object.fromEntries(update) as Partial<Stroke>) };
+    content = { ...earlier.content, ...(Object.fromEntries(update) as Partial<Item>) } as Item;
   }
   return {
     before: earlier.before,
@@ -115,18 +152,29 @@ function mergeStroke(earlier: StrokeChange, later: StrokeChange): StrokeChange {
   };
 }
 
+function mergeItems(
+  earlier: ReadonlyMap<string, ItemChange>,
+  later: ReadonlyMap<string, ItemChange>,
+): Map<string, ItemChange> {
+  const out = new Map(earlier);
+  for (const [id, change] of later) {
+    const old = out.get(id);
+    out.set(id, old === undefined ? change : mergeItem(old, change));
+  }
+  return out;
+}
+
 /** These changes followed by later ones. */
 export function merge(earlier: Changes, later: Changes): Changes {
-  const strokes = new Map(earlier.strokes);
-  for (const [id, change] of later.strokes) {
-    const old = strokes.get(id);
-    strokes.set(id, old === undefined ? change : mergeStroke(old, change));
-  }
-  return { strokes, terrain: mergeFields(earlier.terrain, later.terrain) };
+  return {
+    strokes: mergeItems(earlier.strokes, later.strokes),
+    layers: mergeItems(earlier.layers, later.layers),
+    terrain: mergeFields(earlier.terrain, later.terrain),
+  };
 }
 
 /** True when there is nothing that undo could put back. */
 export function isEmpty(done: Changes): boolean {
   if (done.terrain.size > 0) return false;
-  return [...done.strokes.values()].every((s) => s.fields.size === 0 && s.before === s.after);
+  return [...done.strokes.values(), ...done.layers.values()].every((s) => s.fields.size === 0 && s.before === s.after);
 }

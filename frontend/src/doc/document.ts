@@ -6,6 +6,7 @@ import {
   DEFAULT_SLOPE_DEG,
   type Document,
   type Flank,
+  type Layer,
   type RejectCode,
   type Stroke,
   type TerrainSettings,
@@ -18,6 +19,9 @@ export interface Doc {
   readonly strokes: ReadonlyMap<string, Stroke>;
   /** Tombstones: removed strokes, so that a delete can be undone. */
   readonly deleted: ReadonlyMap<string, Stroke>;
+  /** Elevation grids that are laid on the terrain. */
+  readonly layers: ReadonlyMap<string, Layer>;
+  readonly deletedLayers: ReadonlyMap<string, Layer>;
 }
 
 /** An op that cannot apply: `code` for machines, the message for a person. The document is unchanged. */
@@ -39,6 +43,8 @@ export function fromDocument(document: Document): Doc {
     settings: document.settings,
     strokes: new Map(document.strokes.map((s) => [s.id, s])),
     deleted: new Map(document.deleted.map((s) => [s.id, s])),
+    layers: new Map(document.layers.map((l) => [l.id, l])),
+    deletedLayers: new Map(document.deleted_layers.map((l) => [l.id, l])),
   };
 }
 
@@ -50,6 +56,8 @@ export function toDocument(doc: Doc): Document {
     settings: doc.settings,
     strokes: [...doc.strokes.values()],
     deleted: [...doc.deleted.values()],
+    layers: [...doc.layers.values()],
+    deleted_layers: [...doc.deletedLayers.values()],
   };
 }
 
@@ -80,4 +88,15 @@ export function fullStroke(stroke: Partial<Stroke> & Pick<Stroke, "id" | "kind" 
     left: fullFlank(stroke.left ?? null),
     right: fullFlank(stroke.right ?? null),
   };
+}
+
+/** The fields that a partial update really sets. Throws Refusal when a field that has no null is null. */
+export function changed(fields: object, nullable: readonly string[]): Record<string, unknown> {
+  const update: Record<string, unknown> = {};
+  for (const [name, value] of Object.entries(fields)) {
+    if (value === undefined) continue;
+    if (value === null && !nullable.includes(name)) throw new Refusal("bad_field", `'${name}' needs a value.`);
+    update[name] = value;
+  }
+  return update;
 }

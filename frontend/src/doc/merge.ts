@@ -17,6 +17,8 @@ export function mergeOps(a: Op, b: Op): Op | null {
   }
   if (a.type === "stroke.anchor" && b.type === "stroke.anchor" && a.stroke === b.stroke && a.which === b.which)
     return b;
+  if (a.type === "layer.set" && b.type === "layer.set" && a.layer === b.layer)
+    return { ...b, fields: { ...a.fields, ...b.fields } };
   if (a.type === "terrain.set" && b.type === "terrain.set") return { ...b, fields: { ...a.fields, ...b.fields } };
   return null;
 }

@@ -1,6 +1,7 @@
-/** Taking one stroke's change back in the present document: the inner half of `undo.ts`. */
+/** Taking one change of a stroke or a layer back in the present document: the inner half of `undo.ts`. */
 
 import {
+  type LayerFields,
   MAX_OPS_PER_GROUP,
   MAX_POINTS_PER_APPEND,
   type Op,
@@ -8,81 +9,134 @@ import {
   type Stroke,
   type StrokeFields,
 } from "../generated/contract.ts";
-import { STROKE_WORDS, type State, type StrokeChange, type StrokeField, same, stateOf } from "./changes.ts";
+import { fieldOf, type Item, type ItemChange, type Kind, type State, same, stateOf, WORDS } from "./changes.ts";
 import type { Doc } from "./document.ts";
-
-const DELETED = "Somebody else has deleted this stroke since; your change of it was not undone.";
-const DELETED_ALREADY = "This stroke is deleted already.";
-const RESTORED_ALREADY = "This stroke is back already.";
-const NOT_RESTORABLE = "This stroke can no longer be restored.";
-const CHANGED = "Somebody else has changed this stroke since; it was kept.";
-const LOCKED = "Somebody else has locked this stroke since; it was kept.";
 
 /** A longer curve is restored by appends, since one message of 64 KiB does not hold it. */
 const LARGE_CURVE_POINTS = 1024;
 
-const FIELDS = (): StrokeField[] => Object.keys(STROKE_WORDS) as StrokeField[];
-
-/** Appends to `ops` what takes the change back, and to `skipped` what was left alone. */
-export class Reverter {
-  readonly #id: string;
-  readonly #change: StrokeChange;
-  readonly #ops: SimpleOp[];
-  readonly #skipped: string[];
+/** What strokes and layers have in common: appends to `ops` what takes the change back, and to `skipped` what was left. */
+abstract class Reverter {
+  readonly #kind: Kind;
+  protected readonly id: string;
+  protected readonly change: ItemChange;
+  protected readonly ops: SimpleOp[];
+  protected readonly skipped: string[];
+  protected readonly item: Item | null;
   readonly #state: State;
-  readonly #stroke: Stroke | null;
 
-  constructor(id: string, change: StrokeChange, present: Doc, ops: SimpleOp[], skipped: string[]) {
-    this.#id = id;
-    this.#change = change;
-    this.#ops = ops;
-    this.#skipped = skipped;
-    [this.#state, this.#stroke] = stateOf(present, id);
+  constructor(kind: Kind, id: string, change: ItemChange, present: Doc, ops: SimpleOp[], skipped: string[]) {
+    this.#kind = kind;
+    this.id = id;
+    this.change = change;
+    this.ops = ops;
+    this.skipped = skipped;
+    [this.#state, this.item] = stateOf(kind, present, id);
   }
 
+  /** `changed`: put the fields back first, as they were in the tombstone. */
+  protected abstract remove(changed: boolean): void;
+  protected abstract restore(): void;
+  /** Puts the fields back that are still as I left them. */
+  protected abstract putBack(): void;
+
   run(): void {
-    const { before, after } = this.#change;
+    const { before, after } = this.change;
     if (before !== "live" && after === "live") this.#takeAway();
     else if (before === "live" && after === "deleted") this.#bringBack();
     else if (before === "live" && after === "live") {
-      if (this.#stroke === null || this.#state !== "live") this.#skipped.push(DELETED);
-      else this.#fields(this.#stroke);
+      if (this.item === null || this.#state !== "live")
+        this.skipped.push(`Somebody else has deleted this ${this.#kind} since; your change of it was not undone.`);
+      else this.putBack();
     }
-    // Anything else was drawn and cancelled within one step: nothing is left of it.
+    // Anything else was made and taken away within one step: nothing is left of it.
   }
 
   #takeAway(): void {
-    const stroke = this.#stroke;
-    if (stroke === null || this.#state !== "live") {
-      this.#skipped.push(DELETED_ALREADY);
+    const { item, change } = this;
+    if (item === null || this.#state !== "live") {
+      this.skipped.push(`This ${this.#kind} is deleted already.`);
       return;
     }
-    const content = this.#change.content;
-    if (content === null || FIELDS().some((name) => !same(stroke[name], content[name]))) {
-      this.#skipped.push(CHANGED);
+    const content = change.content;
+    const names = Object.keys(WORDS[this.#kind]);
+    if (content === null || names.some((name) => !same(fieldOf(item, name), fieldOf(content, name)))) {
+      this.skipped.push(`Somebody else has changed this ${this.#kind} since; it was kept.`);
       return;
     }
-    let locked = stroke.locked;
-    if (this.#change.before === "deleted" && this.#change.fields.size > 0) locked = this.#fields(stroke);
-    if (locked) this.#set({ locked: false });
-    this.#ops.push({ type: "stroke.delete", stroke: this.#id });
+    this.remove(change.before === "deleted" && change.fields.size > 0);
   }
 
   #bringBack(): void {
-    if (this.#stroke === null) this.#skipped.push(NOT_RESTORABLE);
-    else if (this.#state === "live") this.#skipped.push(RESTORED_ALREADY);
+    if (this.item === null) this.skipped.push(`This ${this.#kind} can no longer be restored.`);
+    else if (this.#state === "live") this.skipped.push(`This ${this.#kind} is back already.`);
     else {
-      this.#ops.push({ type: "stroke.restore", stroke: this.#id });
-      this.#fields(this.#stroke);
+      this.restore();
+      this.putBack();
     }
   }
 
-  /** Puts the fields back that are still as I left them; returns whether the stroke is locked afterwards. */
-  #fields(stroke: Stroke): boolean {
-    const update = this.#restorable(stroke);
+  /** The fields that are still as I left them, with the values they had before. */
+  protected restorable(item: Item): Record<string, unknown> {
+    const update: Record<string, unknown> = {};
+    for (const [name, word] of Object.entries(WORDS[this.#kind])) {
+      const change = this.change.fields.get(name);
+      if (change === undefined) continue;
+      if (same(fieldOf(item, name), change[1])) update[name] = change[0];
+      else this.skipped.push(`Somebody else has changed the ${word} of this ${this.#kind} since; that was kept.`);
+    }
+    return update;
+  }
+}
+
+/** Takes one layer's change back. */
+export class LayerReverter extends Reverter {
+  constructor(id: string, change: ItemChange, present: Doc, ops: SimpleOp[], skipped: string[]) {
+    super("layer", id, change, present, ops, skipped);
+  }
+
+  protected remove(changed: boolean): void {
+    if (changed) this.putBack();
+    this.ops.push({ type: "layer.delete", layer: this.id });
+  }
+
+  protected restore(): void {
+    this.ops.push({ type: "layer.restore", layer: this.id });
+  }
+
+  protected putBack(): void {
+    const fields: LayerFields = this.restorable(this.item!);
+    if (Object.keys(fields).length > 0) this.ops.push({ type: "layer.set", layer: this.id, fields });
+  }
+}
+
+/** Takes one stroke's change back, minding its lock and curves that no message holds. */
+export class StrokeReverter extends Reverter {
+  constructor(id: string, change: ItemChange, present: Doc, ops: SimpleOp[], skipped: string[]) {
+    super("stroke", id, change, present, ops, skipped);
+  }
+
+  protected remove(changed: boolean): void {
+    const locked = changed ? this.#fields() : (this.item as Stroke).locked;
+    if (locked) this.#set({ locked: false });
+    this.ops.push({ type: "stroke.delete", stroke: this.id });
+  }
+
+  protected restore(): void {
+    this.ops.push({ type: "stroke.restore", stroke: this.id });
+  }
+
+  protected putBack(): void {
+    this.#fields();
+  }
+
+  /** Returns whether the stroke is locked afterwards. */
+  #fields(): boolean {
+    const stroke = this.item as Stroke;
+    const update: StrokeFields = this.restorable(stroke);
     if (stroke.locked && Object.keys(update).length > 0) {
       if (update.locked === undefined) {
-        this.#skipped.push(LOCKED);
+        this.skipped.push("Somebody else has locked this stroke since; it was kept.");
         return true;
       }
       this.#set({ locked: update.locked });
@@ -101,26 +155,14 @@ export class Reverter {
     return relock ?? false;
   }
 
-  #restorable(stroke: Stroke): StrokeFields {
-    const update: Record<string, unknown> = {};
-    for (const name of FIELDS()) {
-      const change = this.#change.fields.get(name);
-      if (change === undefined) continue;
-      if (same(stroke[name], change[1])) update[name] = change[0];
-      else
-        this.#skipped.push(`Somebody else has changed the ${STROKE_WORDS[name]} of this stroke since; that was kept.`);
-    }
-    return update;
-  }
-
   #set(fields: StrokeFields): void {
-    this.#ops.push({ type: "stroke.set", stroke: this.#id, fields });
+    this.ops.push({ type: "stroke.set", stroke: this.id, fields });
   }
 
   #append(curve: Stroke["curve"], last: Stroke["last"]): void {
     for (let start = 0; start < curve.length; start += MAX_POINTS_PER_APPEND) {
       const points = curve.slice(start, start + MAX_POINTS_PER_APPEND);
-      this.#ops.push({ type: "stroke.append", stroke: this.#id, start, points, last });
+      this.ops.push({ type: "stroke.append", stroke: this.id, start, points, last });
     }
   }
 }

@@ -22,6 +22,7 @@ import {
   type Welcome,
 } from "../generated/contract.ts";
 import { apply, type Doc, Refusal } from "./apply.ts";
+import { subjectOf } from "./changes.ts";
 import { fromDocument } from "./document.ts";
 import { mergeOps } from "./merge.ts";
 import { type UndoPlan, UndoStack } from "./undo.ts";
@@ -51,6 +52,7 @@ interface Entry {
 
 interface Confirmed {
   readonly id: string;
+  readonly author: string;
   readonly op: Op;
 }
 
@@ -175,7 +177,7 @@ export class SyncDoc {
       this.#diverged();
       return;
     }
-    for (const { clock, id, op } of message.ops ?? []) this.#order(clock, { id, op });
+    for (const { clock, id, author, op } of message.ops ?? []) this.#order(clock, { id, author, op });
     this.#drain();
     this.#rebuild();
   }
@@ -193,7 +195,7 @@ export class SyncDoc {
         known ||= entry !== undefined;
         this.#drop(id);
         this.#undo.settle(id);
-      } else if (entry !== undefined) this.#order(clock, { id, op: entry.op });
+      } else if (entry !== undefined) this.#order(clock, { id, author: this.#client, op: entry.op });
       else if (!this.#ready.has(clock)) {
         this.#diverged();
         return;
@@ -205,7 +207,7 @@ export class SyncDoc {
 
   /** The server has ordered these ops of others (or of mine, seen by another connection of this page). */
   ordered(message: OpsBroadcast): void {
-    for (const { clock, id, op } of message.ops) this.#order(clock, { id, op });
+    for (const { clock, id, author, op } of message.ops) this.#order(clock, { id, author, op });
     this.#advance();
   }
 
@@ -293,14 +295,18 @@ export class SyncDoc {
       const next = this.#ready.get(this.#confirmed.clock + 1);
       if (next === undefined) break;
       this.#ready.delete(this.#confirmed.clock + 1);
-      if (next.id.startsWith(`${this.#client}:`)) this.#undo.settle(next.id);
+      const own = next.id.startsWith(`${this.#client}:`);
+      if (own) this.#undo.settle(next.id);
       if (this.#entries[0]?.id === next.id) this.#entries.shift();
       else {
         overtaken = true;
         this.#drop(next.id);
       }
+      const before = this.#confirmed;
       try {
-        this.#confirmed = apply(this.#confirmed, next.op);
+        this.#confirmed = apply(before, next.op);
+        // What the server did in my name, as the end of an import, is mine to undo.
+        if (!own && next.author === this.#client) this.#undo.record(before, next.op, this.#confirmed);
       } catch (error) {
         if (!(error instanceof Refusal)) throw error;
         this.#diverged();
@@ -360,5 +366,9 @@ function sizeOf(op: Op): number {
 
 function strokesOf(op: Op): string[] {
   const parts = op.type === "group" ? op.ops : [op];
-  return parts.flatMap((p) => (p.type === "terrain.set" ? [] : p.type === "stroke.begin" ? [p.stroke.id] : [p.stroke]));
+  return parts.flatMap((p) => {
+    if (p.type === "terrain.set") return [];
+    const [kind, id] = subjectOf(p);
+    return kind === "stroke" ? [id] : [];
+  });
 }

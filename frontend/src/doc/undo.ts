@@ -8,8 +8,8 @@
 
 import type { Op, SetTerrain, SimpleOp, TerrainSettings } from "../generated/contract.ts";
 import { apply, type Doc, Refusal } from "./apply.ts";
-import { type Changes, changes, isEmpty, merge, TERRAIN_WORDS } from "./changes.ts";
-import { grouped, Reverter } from "./revert.ts";
+import { type Changes, changes, isEmpty, merge, same, TERRAIN_WORDS } from "./changes.ts";
+import { grouped, LayerReverter, StrokeReverter } from "./revert.ts";
 
 const DEFAULT_DEPTH = 500;
 
@@ -29,12 +29,13 @@ export function inverse(op: Op, before: Doc): readonly Op[] {
 export function plan(done: Changes, present: Doc): UndoPlan {
   const ops: SimpleOp[] = [];
   const skipped: string[] = [];
-  for (const [id, change] of [...done.strokes].reverse()) new Reverter(id, change, present, ops, skipped).run();
+  for (const [id, change] of [...done.strokes].reverse()) new StrokeReverter(id, change, present, ops, skipped).run();
+  for (const [id, change] of [...done.layers].reverse()) new LayerReverter(id, change, present, ops, skipped).run();
   const fields: Record<string, unknown> = {};
   for (const [name, word] of Object.entries(TERRAIN_WORDS)) {
     const change = done.terrain.get(name);
     if (change === undefined) continue;
-    if (present.settings[name as keyof TerrainSettings] === change[1]) fields[name] = change[0];
+    if (same(present.settings[name as keyof TerrainSettings], change[1])) fields[name] = change[0];
     else skipped.push(`Somebody else has changed the ${word} of the terrain since; that was kept.`);
   }
   if (Object.keys(fields).length > 0) ops.push({ type: "terrain.set", fields: fields as SetTerrain["fields"] });

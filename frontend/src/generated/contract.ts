@@ -86,6 +86,8 @@ export const MIN_GRID_SPACING_M = 0.001 as const;
 
 export const MAX_VERTICAL_SCALE = 1000.0 as const;
 
+export const LAYER_HEIGHT_MARGIN = 64.0 as const;
+
 export const DEFAULT_DETAIL = 1.0 as const;
 
 export const MAX_DETAIL = 4.0 as const;

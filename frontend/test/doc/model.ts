@@ -31,9 +31,12 @@ export const EMPTY: Document = {
     rule: "landscape",
     sun_azimuth_deg: 115,
     sun_elevation_deg: 24,
+    place: null,
   },
   strokes: [],
   deleted: [],
+  layers: [],
+  deleted_layers: [],
 };
 
 export function ridge(id: string, over: Partial<Stroke> = {}): Stroke {
@@ -94,7 +97,7 @@ export class ServerModel {
     const resume = clock !== null && this.doc.clock - clock <= this.keep;
     return {
       type: "welcome",
-      protocol: 3,
+      protocol: 4,
       server: "model",
       client: "c",
       role: "edit",

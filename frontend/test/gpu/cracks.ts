@@ -144,6 +144,7 @@ function sceneOf(view: TileView, state: CameraState, look: Scene["settings"]["lo
       rule: "landscape",
       sun_azimuth_deg: 115,
       sun_elevation_deg: 24,
+      place: null,
     },
     strokes: [],
     ghost: null,

@@ -32,6 +32,7 @@ export const SETTINGS: TerrainSettings = {
   rule: "landscape",
   sun_azimuth_deg: 115,
   sun_elevation_deg: 24,
+  place: null,
 };
 
 const worlds = new Map<string, TileView>();

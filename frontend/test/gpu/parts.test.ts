@@ -144,6 +144,7 @@ function scene(): Scene {
       rule: "landscape",
       sun_azimuth_deg: 100,
       sun_elevation_deg: 30,
+      place: null,
     },
     strokes: [stroke],
     ghost: null,

@@ -52,7 +52,7 @@ beforeEach(() => {
   ];
   doc.welcome({
     type: "welcome",
-    protocol: 3,
+    protocol: 4,
     server: "",
     client: "me",
     role: "edit",
@@ -76,6 +76,7 @@ beforeEach(() => {
     canEdit: () => editable,
     tool,
     selection,
+    laying: signal(null),
     fingerDraws,
     defaults: toolDefaults(SIZE),
     newId: () => `copy${ids++}`,

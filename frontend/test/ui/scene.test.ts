@@ -22,7 +22,15 @@ function stroke(id: string, change: Partial<Stroke> = {}): Stroke {
 }
 
 function doc(...strokes: Stroke[]): Doc {
-  return fromDocument({ id: "t", clock: 1, settings: { size_m: 1000 } as Doc["settings"], strokes, deleted: [] });
+  return fromDocument({
+    id: "t",
+    clock: 1,
+    settings: { size_m: 1000 } as Doc["settings"],
+    strokes,
+    deleted: [],
+    layers: [],
+    deleted_layers: [],
+  });
 }
 
 const member = (client: string, colour: string): Member => ({ client, colour, name: client, role: "edit" });

@@ -74,12 +74,13 @@ const SETTINGS = {
   rule: "landscape",
   sun_azimuth_deg: 115,
   sun_elevation_deg: 24,
+  place: null,
 } as const;
 
 function welcome(role: Role = "owner", change: Partial<Welcome> = {}): Welcome {
   return {
     type: "welcome",
-    protocol: 3,
+    protocol: 4,
     server: "0.1.0",
     client: "c",
     role,
@@ -87,7 +88,15 @@ function welcome(role: Role = "owner", change: Partial<Welcome> = {}): Welcome {
     levels: 4,
     finest: 4,
     clock: 3,
-    document: { id: "t", clock: 3, settings: { ...SETTINGS }, strokes: [], deleted: [] },
+    document: {
+      id: "t",
+      clock: 3,
+      settings: { ...SETTINGS },
+      strokes: [],
+      deleted: [],
+      layers: [],
+      deleted_layers: [],
+    },
     ops: null,
     members: [],
     device: "numpy",
