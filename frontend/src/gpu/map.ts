@@ -6,6 +6,7 @@ import { overlayGrid } from "./channeltexture.ts";
 import { contourInterval } from "./looks.ts";
 import { DetailPicture, InfluencePicture, PaintedPicture } from "./mapdetail.ts";
 import { type MapStyle, shadeTile } from "./mapshade.ts";
+import { drawFootprints, MapSheet } from "./mapsheet.ts";
 
 /** Shading stops for this frame after so many milliseconds; what is left follows in the next frames. */
 const BUDGET_MS = 14;
@@ -38,6 +39,7 @@ export class MapRenderer implements SceneRenderer {
   private readonly detail = new DetailPicture();
   private readonly felt = new InfluencePicture();
   private readonly painted = new PaintedPicture();
+  private readonly sheet = new MapSheet();
   private readonly slot = new Float32Array(SLOT_TEXELS * SLOT_TEXELS);
   private frame = 0;
 
@@ -63,6 +65,9 @@ export class MapRenderer implements SceneRenderer {
       this.drawOver(picture, scene, frame);
     }
     drawGrid(this.context, frame, scene.tiles.sizeM);
+    const to = (x: number, y: number): [number, number] => toSheet(frame, x, y);
+    if (scene.sheet) this.sheet.draw(this.context, scene.sheet, to);
+    drawFootprints(this.context, scene.footprints ?? [], to, globalThis.devicePixelRatio || 1);
     if (scene.showStrokes) drawStrokes(this.context, frame, scene);
     drawCursors(this.context, frame, scene);
     this.forget();

@@ -17,6 +17,7 @@ import type { PassContext } from "./pipeline.ts";
 import { type Quality, QualityControl } from "./quality.ts";
 import { RibbonPass } from "./ribbons.ts";
 import { samePicture } from "./scenediff.ts";
+import { SheetPass } from "./sheet.ts";
 import { SkyTables } from "./sky.ts";
 import { TakeLightPass } from "./takelight.ts";
 import { Target } from "./target.ts";
@@ -46,6 +47,7 @@ interface Passes {
   readonly patches: PatchPasses;
   readonly ribbons: RibbonPass;
   readonly ghost: GhostPass;
+  readonly sheet: SheetPass;
   readonly labels: LabelPass;
 }
 
@@ -112,7 +114,7 @@ export class GpuRenderer implements SceneRenderer {
       samples,
       detail: gpu.software ? "plain" : "rich",
     };
-    const [target, fill, sun, taking, background, patches, ribbons, ghost, labels] = await Promise.all([
+    const [target, fill, sun, taking, background, patches, ribbons, ghost, sheet, labels] = await Promise.all([
       Target.create(device, format, samples),
       TileFill.create(device),
       SunPass.create(device, gpu.software),
@@ -121,6 +123,7 @@ export class GpuRenderer implements SceneRenderer {
       PatchPasses.create(context),
       RibbonPass.create(context),
       GhostPass.create(context),
+      SheetPass.create(context),
       LabelPass.create(context),
     ]);
     const compute = { fill, sun, taking };
@@ -133,6 +136,7 @@ export class GpuRenderer implements SceneRenderer {
       patches,
       ribbons,
       ghost,
+      sheet,
       labels,
     });
   }
@@ -239,9 +243,11 @@ export class GpuRenderer implements SceneRenderer {
     this.passes.frame.update(scene, { width, height, low: cut.minHeight, high: cut.maxHeight });
     this.passes.patches.update(cut);
     this.lookDue = !this.passes.patches.useLook(scene.settings.look);
-    this.passes.ribbons.update(scene.showStrokes ? scene.strokes : [], scene.ghost, quality.scale * pixelRatio());
+    const unit = quality.scale * pixelRatio();
+    this.passes.ribbons.update(scene.showStrokes ? scene.strokes : [], scene.ghost, unit, scene.footprints);
+    this.passes.sheet.update(scene.sheet ?? null);
     this.passes.ghost.update(scene.ghost);
-    this.passes.labels.update(scene, cut.maxHeight - cut.minHeight, quality.scale * pixelRatio(), quality.scale);
+    this.passes.labels.update(scene, cut.maxHeight - cut.minHeight, unit, quality.scale);
     this.encode(encoder, scene, context.getCurrentTexture(), width, height);
     device.queue.submit([encoder.finish()]);
     this.passes.fill.submitted();
@@ -308,6 +314,7 @@ export class GpuRenderer implements SceneRenderer {
       rule: settings.rule,
       look: settings.look,
       seaLevelM: settings.sea_level_m,
+      place: settings.place,
       solved: tiles.solved,
     });
     if (synthesis.setChannels(channels) || changed) {
@@ -348,7 +355,7 @@ export class GpuRenderer implements SceneRenderer {
   }
 
   private encode(encoder: GPUCommandEncoder, scene: Scene, canvas: GPUTexture, width: number, height: number): void {
-    const { target, frame, background, patches, ribbons, ghost, labels } = this.passes;
+    const { target, frame, background, patches, ribbons, ghost, sheet, labels } = this.passes;
     const pass = encoder.beginRenderPass(target.begin(canvas, width, height));
     pass.setBindGroup(0, frame.bindGroup);
     patches.drawGround(pass);
@@ -356,6 +363,7 @@ export class GpuRenderer implements SceneRenderer {
     const sea = scene.settings.sea_level_m !== null;
     background.draw(pass, sea);
     if (sea) patches.drawSea(pass);
+    sheet.draw(pass);
     ghost.draw(pass);
     labels.draw(pass);
     ribbons.draw(pass);

@@ -1,6 +1,6 @@
 /** Strokes, and the shadow of the stroke under way, as ribbons of constant width (shaders/wgsl/ribbon.wgsl). */
 
-import type { GhostVisual, Rgba, StrokeVisual } from "../core/types.ts";
+import type { FootprintVisual, GhostVisual, Rgba, StrokeVisual } from "../core/types.ts";
 import { createPass, GrowingBuffer, type PassContext } from "./pipeline.ts";
 import { SOURCES } from "./shaders.ts";
 
@@ -83,6 +83,16 @@ export function strokeStyle(stroke: StrokeVisual, scale: number): RibbonStyle {
   };
 }
 
+/** Outlines of grids: thin, under all strokes. */
+export function footprintStyle({ colour, strong }: FootprintVisual, scale: number): RibbonStyle {
+  return {
+    colour,
+    halfWidthPx: (strong ? 1.5 : 0.9) * scale,
+    haloPx: (strong ? 4 : 0) * scale,
+    hiddenOpacity: strong ? 0.5 : 0.22,
+  };
+}
+
 /** Four points in a row, each its own view of the one buffer: the one before, both ends, the one after. */
 const BUFFERS: readonly GPUVertexBufferLayout[] = [0, 1, 2, 3].map((place) => {
   const attribute = (shaderLocation: number, offset: number): GPUVertexAttribute => ({
@@ -128,8 +138,14 @@ export class RibbonPass {
   }
 
   /** Uploads the lines of a frame; `scale`: drawn pixels per device-independent pixel. */
-  update(strokes: readonly StrokeVisual[], ghost: GhostVisual | null, scale: number): void {
+  update(
+    strokes: readonly StrokeVisual[],
+    ghost: GhostVisual | null,
+    scale: number,
+    footprints: readonly FootprintVisual[] = [],
+  ): void {
     this.builder.clear();
+    for (const footprint of footprints) this.builder.add(footprint.points, footprintStyle(footprint, scale));
     if (ghost !== null) {
       this.builder.add(ghost.shadow, {
         colour: [0.04, 0.05, 0.08, 0.55],

@@ -1,6 +1,6 @@
 /** Whether two scenes show the same picture. The app builds scenes anew each frame, so values count, not identity. */
 
-import type { CameraState, CursorVisual, GhostVisual, Scene, StrokeVisual } from "../core/types.ts";
+import type { CameraState, CursorVisual, FootprintVisual, GhostVisual, Scene, StrokeVisual } from "../core/types.ts";
 
 function sameNumbers(a: ArrayLike<number>, b: ArrayLike<number>): boolean {
   if (a === b) return true;
@@ -34,6 +34,10 @@ function sameStroke(a: StrokeVisual, b: StrokeVisual): boolean {
 
 function sameCursor(a: CursorVisual, b: CursorVisual): boolean {
   return a.radiusPx === b.radiusPx && sameNumbers(a.position, b.position) && sameNumbers(a.colour, b.colour);
+}
+
+function sameFootprint(a: FootprintVisual, b: FootprintVisual): boolean {
+  return a.strong === b.strong && sameNumbers(a.colour, b.colour) && sameNumbers(a.points, b.points);
 }
 
 function sameGhost(a: GhostVisual | null, b: GhostVisual | null): boolean {
@@ -72,6 +76,8 @@ export function samePicture(a: Scene, stampA: number, b: Scene, stampB: number):
     sameCamera(a.camera, b.camera) &&
     sameSettings(a.settings, b.settings) &&
     sameGhost(a.ghost, b.ghost) &&
+    (a.sheet ?? null) === (b.sheet ?? null) &&
+    sameList(a.footprints ?? [], b.footprints ?? [], sameFootprint) &&
     sameList(a.cursors, b.cursors, sameCursor) &&
     sameList(a.strokes, b.strokes, sameStroke)
   );

@@ -26,6 +26,7 @@ import ribbon from "@shaders/wgsl/ribbon.wgsl?raw";
 import ruleLandscape from "@shaders/wgsl/rule_landscape.wgsl?raw";
 import rulePlain from "@shaders/wgsl/rule_plain.wgsl?raw";
 import ruleSmooth from "@shaders/wgsl/rule_smooth.wgsl?raw";
+import sheet from "@shaders/wgsl/sheet.wgsl?raw";
 import sky from "@shaders/wgsl/sky.wgsl?raw";
 import synthHash from "@shaders/wgsl/synth_hash.wgsl?raw";
 import synthInterpolate from "@shaders/wgsl/synth_interpolate.wgsl?raw";
@@ -75,6 +76,7 @@ export function sceneSource(part: "wall" | "background", detail: Detail): string
 export const SOURCES = {
   ribbon: join(contract, view, ribbon),
   ghost: join(contract, view, overlayLines, ghost),
+  sheet: join(contract, view, overlayLines, sheet),
   label: join(contract, view, label),
   normals: join(contract, tile, computeNormals),
   sun: join(contract, tile, computeSun),

@@ -9,7 +9,9 @@ import { brushActions } from "./brushactions.ts";
 import type { PenToolId, ToolDefaults } from "./defaults.ts";
 import { moveOps, raiseOps } from "./handledrag.ts";
 import { handlesOf } from "./handles.ts";
+import { layActions } from "./layactions.ts";
 import { drapedOf, shapeOf } from "./picking.ts";
+import type { Laying } from "./placement.ts";
 import { createOps, metres } from "./strokeops.ts";
 
 export type ToolId = "select" | PenToolId;
@@ -31,6 +33,9 @@ export type ActionId =
   | "brush-stronger"
   | "brush-channel"
   | "brush-opposite"
+  | "place-grid"
+  | "turn-grid-left"
+  | "turn-grid-right"
   | "next-stroke"
   | "previous-stroke"
   | "cancel"
@@ -65,6 +70,8 @@ export interface ActionContext {
   readonly canEdit: () => boolean;
   readonly tool: Signal<ToolId>;
   readonly selection: Signal<string | null>;
+  /** The elevation grid that is being laid. */
+  readonly laying: Signal<Laying | null>;
   readonly fingerDraws: Signal<boolean>;
   readonly defaults: ToolDefaults;
   readonly newId: () => string;
@@ -130,9 +137,12 @@ export function createActions(c: ActionContext): Map<string, Action> {
   put("next-stroke", "Select the next stroke", ["n"], () => edits.step(1), edits.any);
   put("previous-stroke", "Select the previous stroke", ["Shift+n"], () => edits.step(-1), edits.any);
   put("cancel", "Cancel, or select nothing", ["Escape"], () => {
-    if (!c.cancel()) c.selection.value = null;
+    if (c.cancel()) return;
+    if (c.laying.value !== null) c.laying.value.cancel();
+    else c.selection.value = null;
   });
-  nudgeActions(c, edits, put);
+  const nudgeGrid = layActions(c, (right, away) => edits.direction(right, away), put);
+  nudgeActions(c, edits, put, nudgeGrid);
   cameraActions(c, edits, put);
   put("finger-draws", "One finger draws, or orbits", ["Shift+f"], () => {
     c.fingerDraws.value = !c.fingerDraws.value;
@@ -143,7 +153,12 @@ export function createActions(c: ActionContext): Map<string, Action> {
 
 export type Put = (id: ActionId, title: string, keys: string[], run: () => void, enabled?: () => boolean) => void;
 
-function nudgeActions(c: ActionContext, edits: StrokeActions, put: Put): void {
+function nudgeActions(
+  c: ActionContext,
+  edits: StrokeActions,
+  put: Put,
+  nudgeGrid: (right: number, away: number) => boolean,
+): void {
   const arrows = [
     ["up", 0, 1],
     ["down", 0, -1],
@@ -152,8 +167,9 @@ function nudgeActions(c: ActionContext, edits: StrokeActions, put: Put): void {
   ] as const;
   for (const [name, right, away] of arrows) {
     const key = `Arrow${name[0]!.toUpperCase()}${name.slice(1)}`;
-    const title = `Move the stroke (or the view) ${{ up: "away", down: "nearer", left: "left", right: "right" }[name]}`;
+    const title = `Move the stroke (or the grid, or the view) ${{ up: "away", down: "nearer", left: "left", right: "right" }[name]}`;
     put(`nudge-${name}`, title, [key], () => {
+      if (nudgeGrid(right, away)) return;
       if (edits.stroke() !== null && c.canEdit()) edits.nudge(right, away);
       else
         c.camera.pan(
@@ -228,7 +244,7 @@ export class StrokeActions {
     const stroke = this.stroke();
     if (stroke === null) return;
     const step = this.#c.ground().sizeM / 40;
-    const [dx, dy] = this.#direction(step, -step);
+    const [dx, dy] = this.direction(step, -step);
     const moved = (p: Stroke["first"]): Stroke["first"] => metres([p[0] + dx, p[1] + dy, p[2]]);
     const id = this.#c.newId();
     const copy: Stroke = {
@@ -268,7 +284,7 @@ export class StrokeActions {
     const s = this.stroke();
     if (s === null) return;
     const step = this.#c.ground().sizeM / 256;
-    const [dx, dy] = this.#direction(right * step, away * step);
+    const [dx, dy] = this.direction(right * step, away * step);
     this.#submit(moveOps(s, dx, dy, this.#c.ground()), this.#repeated("nudge"));
   }
 
@@ -293,7 +309,8 @@ export class StrokeActions {
     this.#c.camera.frame([...crest, ...handlesOf(s, this.#c.ground(), null).map((h) => h.position)]);
   }
 
-  #direction(right: number, away: number): [number, number] {
+  /** Metres on the map of a step to the right and away, as seen on the screen. */
+  direction(right: number, away: number): [number, number] {
     const { eye, target, up } = this.#c.camera.state.value;
     let [fx, fy] = [target[0] - eye[0], target[1] - eye[1]];
     if (Math.hypot(fx, fy) < 1e-6) [fx, fy] = [up[0], up[1]];

@@ -5,23 +5,23 @@
  * camera. A second finger, or Esc, ends it. Events come in CSS pixels and become device pixels here, at the DOM's edge.
  */
 
-import { computed, type ReadonlySignal, type Signal, signal } from "@preact/signals-core";
+import { type ReadonlySignal, type Signal, signal } from "@preact/signals-core";
 import type { Camera } from "../core/camera.ts";
 import type { GhostVisual, Ground, Vec3 } from "../core/types.ts";
 import type { SyncDoc } from "../doc/sync.ts";
-import type { Stroke } from "../generated/contract.ts";
 import { type Action, createActions, type ToolId } from "./actions.ts";
 import type { ToolDefaults } from "./defaults.ts";
-import { type HandleVisual, handlesOf } from "./handles.ts";
-import { HandleTool } from "./handletool.ts";
+import { Grips, type GripVisual } from "./grips.ts";
 import { Keyboard } from "./keyboard.ts";
 import { type Finger, Navigation, type NavigationMode } from "./navigation.ts";
 import type { Picked, PickOrder } from "./picking.ts";
+import type { Laying } from "./placement.ts";
 import { Pointing, takePointer } from "./pointing.ts";
 import { type FinishedStroke, type InkVisual, StrokeTool } from "./stroketool.ts";
 
 export type { ActionId, ToolId } from "./actions.ts";
-export type { HandleVisual } from "./handles.ts";
+export type { GripVisual } from "./grips.ts";
+export type { Laying } from "./placement.ts";
 
 export type InputMode = "idle" | "draw" | "handle" | NavigationMode;
 
@@ -87,13 +87,14 @@ export class InputController {
   readonly selection: Signal<string | null> = signal<string | null>(null);
   /** Whether one finger draws; becomes false when a pen is seen. */
   readonly fingerDraws: Signal<boolean> = signal(true);
+  /** The elevation grid that is being laid: it has the pointer to itself. */
+  readonly laying: Signal<Laying | null> = signal<Laying | null>(null);
   readonly actions: Map<string, Action>;
   readonly #o: InputOptions;
   readonly #hovered = signal<string | null>(null);
   readonly #mode = signal<InputMode>("idle");
-  readonly #handles: ReadonlySignal<readonly HandleVisual[]>;
   readonly #strokes: StrokeTool;
-  readonly #drags: HandleTool;
+  readonly #grips: Grips;
   readonly #navigation: Navigation;
   readonly #pointing: Pointing;
   readonly #keyboard: Keyboard;
@@ -110,12 +111,13 @@ export class InputController {
     this.#navigation = new Navigation(options.camera, options.ground);
     this.#pointing = new Pointing(options.canvas, options.camera, options.doc);
     this.#strokes = new StrokeTool({ author: () => "", ...options, now });
-    this.#drags = new HandleTool({ ...options, now });
-    this.#handles = computed(() => this.#visibleHandles());
+    const { tool, selection, laying } = this;
+    this.#grips = new Grips({ ...options, tool, selection, laying, now });
     this.actions = createActions({
       ...options,
-      tool: this.tool,
-      selection: this.selection,
+      tool,
+      selection,
+      laying,
       fingerDraws: this.fingerDraws,
       newId: () => this.#strokes.newId(),
       cancel: () => this.#cancel(),
@@ -129,9 +131,9 @@ export class InputController {
     return this.#hovered;
   }
 
-  /** Handles of the selected stroke, in the select tool; of selected paint with the brush too. */
-  get handles(): ReadonlySignal<readonly HandleVisual[]> {
-    return this.#handles;
+  /** Handles of the grid that is being laid, else of the selected stroke in the select tool; of paint with the brush too. */
+  get handles(): ReadonlySignal<readonly GripVisual[]> {
+    return this.#grips.handles;
   }
 
   get ghost(): ReadonlySignal<GhostVisual | null> {
@@ -231,6 +233,7 @@ export class InputController {
     if (e.button === 1 || (e.button === 2 && e.shiftKey) || (e.button === 0 && this.#keyboard.spaceHeld))
       return navigate("pan");
     if (e.button !== 0 && !erases) return navigate(this.#turning());
+    if (this.laying.value !== null) return this.#lay(e, x, y);
     if (this.tool.value === "select") return this.#select(e, x, y);
     if (e.pointerType === "touch" && !this.fingerDraws.value) return this.#press(null);
     if (!this.#o.canEdit()) {
@@ -238,7 +241,7 @@ export class InputController {
       this.#toldViewOnly = true;
       return this.#press(null, notice);
     }
-    const handle = this.#pointing.handle(this.#handles.value, e);
+    const handle = this.#pointing.handle(this.handles.value, e);
     if (handle !== null && !erases) return this.#beginDrag(handle, x, y);
     const opposite = this.tool.value === "paint" && (erases || e.altKey);
     if (this.#strokes.start(this.tool.value, this.#pointing.sample(e), e.pointerType === "pen", opposite))
@@ -257,13 +260,19 @@ export class InputController {
   }
 
   #select(e: PointerEvent, x: number, y: number): Activity {
-    const handle = this.#pointing.handle(this.#handles.value, e);
+    const handle = this.#pointing.handle(this.handles.value, e);
     if (handle !== null) return this.#beginDrag(handle, x, y);
     return this.#press(this.#pick(e));
   }
 
-  #beginDrag(handle: Pick<HandleVisual, "kind" | "position">, x: number, y: number): Activity {
-    this.#drags.start(this.#selectedStroke()!, handle, x, y);
+  /** A grid is being laid: its handles, then its ground, then the view. */
+  #lay(e: PointerEvent, x: number, y: number): Activity {
+    const held = this.#pointing.handle(this.handles.value, e) ?? this.#grips.ground(this.#navigation.hit(x, y));
+    return held !== null && this.#o.canEdit() ? this.#beginDrag(held, x, y) : this.#press(null);
+  }
+
+  #beginDrag(handle: Pick<GripVisual, "kind" | "position">, x: number, y: number): Activity {
+    this.#grips.start(handle, x, y);
     return { kind: "drag" };
   }
 
@@ -315,7 +324,7 @@ export class InputController {
       this.#cursor(x, y);
     } else if (activity.kind === "navigate") this.#navigation.drag(x, y);
     else if (activity.kind === "drag") {
-      this.#drags.move(x, y, !e.altKey);
+      this.#grips.move(x, y, !e.altKey);
       this.#cursor(x, y);
     }
   }
@@ -336,8 +345,8 @@ export class InputController {
       const made = this.#strokes.finish();
       if (made !== null) this.#drawn(made);
     } else if (activity.kind === "drag") {
-      this.#drags.move(...this.#pointing.pixel(e), !e.altKey);
-      this.#drags.finish();
+      this.#grips.move(...this.#pointing.pixel(e), !e.altKey);
+      this.#grips.finish();
     }
     this.#endMain();
   }
@@ -362,13 +371,15 @@ export class InputController {
       }
     }
     if (activity.kind === "draw") this.#strokes.cancel();
-    if (activity.kind === "drag") this.#drags.cancel();
+    if (activity.kind === "drag") this.#grips.cancel();
     if (e.button !== 0 || activity.kind === "drag" || activity.kind === "navigate") return;
+    if (this.laying.value !== null) return;
     this.selection.value = picked?.stroke.id ?? null;
   }
 
   /** What lies under the pointer, of what the tool shows. */
   #pick(e: PointerEvent): Picked | null {
+    if (this.laying.value !== null) return null;
     return this.#pointing.stroke(e, this.#o.freeze(), PICKS[this.tool.value]);
   }
 
@@ -384,7 +395,7 @@ export class InputController {
   #leave(): void {
     if (this.#main !== null) return;
     this.#hovered.value = null;
-    this.#drags.hover(null);
+    this.#grips.hover(null);
     this.#o.onCursor(null);
   }
 
@@ -394,8 +405,8 @@ export class InputController {
       this.#penSeen = true;
       this.fingerDraws.value = false;
     }
-    const handle = this.#pointing.handle(this.#handles.value, e);
-    this.#drags.hover(handle?.kind ?? null);
+    const handle = this.#pointing.handle(this.handles.value, e);
+    this.#grips.hover(handle?.kind ?? null);
     const picks = this.tool.value === "select" || this.tool.value === "paint";
     const over = handle === null && picks ? this.#pick(e) : null;
     this.#hovered.value = over?.stroke.id ?? null;
@@ -418,7 +429,7 @@ export class InputController {
     if (main === null) return false;
     this.#endMain();
     if (main.activity.kind === "draw") this.#strokes.cancel();
-    else if (main.activity.kind === "drag") this.#drags.cancel();
+    else if (main.activity.kind === "drag") this.#grips.cancel();
     return main.activity.kind === "draw" || main.activity.kind === "drag";
   }
 
@@ -437,19 +448,9 @@ export class InputController {
   }
 
   #showCursor(over: boolean): void {
-    const idle = this.tool.value === "select" ? (over ? "pointer" : "default") : over ? "pointer" : "crosshair";
+    const still = this.tool.value === "select" || this.laying.value !== null;
+    const idle = still ? (over ? "pointer" : "default") : over ? "pointer" : "crosshair";
     const mode = this.#mode.value;
     this.#o.canvas.style.cursor = mode === "idle" || mode === "draw" ? idle : "grabbing";
-  }
-
-  #selectedStroke(): Stroke | null {
-    return this.#o.doc.doc.value?.strokes.get(this.selection.value ?? "") ?? null;
-  }
-
-  #visibleHandles(): readonly HandleVisual[] {
-    const stroke = this.#selectedStroke();
-    const inHand = this.tool.value === "select" || (this.tool.value === "paint" && stroke?.kind === "paint");
-    if (stroke === null || stroke.locked || !inHand || !this.#o.canEdit()) return [];
-    return handlesOf(stroke, this.#o.ground(), this.#drags.active.value);
   }
 }

@@ -3,7 +3,7 @@
 import type { Camera } from "../core/camera.ts";
 import type { Ground } from "../core/types.ts";
 import type { SyncDoc } from "../doc/sync.ts";
-import type { HandleVisual } from "./handles.ts";
+import type { GripVisual } from "./grips.ts";
 import { type Picked, type PickOrder, pickHandle, pickStroke } from "./picking.ts";
 import type { Sample } from "./sketch.ts";
 
@@ -62,7 +62,7 @@ export class Pointing {
     return pickStroke(doc, this.#camera, ground, x, y, STROKE_PX[reachOf(e)] * this.ratio, order);
   }
 
-  handle(handles: readonly HandleVisual[], e: PointerEvent): HandleVisual | null {
+  handle(handles: readonly GripVisual[], e: PointerEvent): GripVisual | null {
     const [x, y] = this.pixel(e);
     return pickHandle(handles, this.#camera, x, y, HANDLE_PX[reachOf(e)] * this.ratio);
   }

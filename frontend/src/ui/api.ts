@@ -1,7 +1,7 @@
 /** The server's JSON interface (docs/protocol.md). Secrets travel in the Authorization header only. */
 
 import type { TemplateInfo } from "../core/types.ts";
-import type { Role } from "../generated/contract.ts";
+import type { ImportAnswers, ImportStatus, Role } from "../generated/contract.ts";
 
 /** A refusal or failure with a sentence for a person. */
 export class ApiError extends Error {
@@ -59,19 +59,19 @@ async function request(method: Method, path: string, secret?: string, body?: unk
   } catch {
     throw new ApiError("unreachable", "The server does not answer. Check the connection and try again.");
   }
-  if (!response.ok) throw await refusal(response);
+  if (!response.ok) throw readRefusal(response.status, await response.text());
   return response;
 }
 
-async function refusal(response: Response): Promise<ApiError> {
+/** What the server said when it refused. */
+export function readRefusal(status: number, text: string): ApiError {
   try {
-    const body: unknown = await response.json();
-    const { code, message } = body as { code?: unknown; message?: unknown };
-    if (typeof message === "string") return new ApiError(String(code ?? response.status), message);
+    const { code, message } = JSON.parse(text) as { code?: unknown; message?: unknown };
+    if (typeof message === "string") return new ApiError(String(code ?? status), message);
   } catch {
     // Not JSON: a proxy answered. The status says enough.
   }
-  return new ApiError(String(response.status), `The server refused (${response.status}). Try again in a moment.`);
+  return new ApiError(String(status), `The server refused (${status}). Try again in a moment.`);
 }
 
 async function json<T>(method: Method, path: string, secret?: string, body?: unknown): Promise<T> {
@@ -111,6 +111,16 @@ export const api = {
 
   showPreview: (id: string, secret: string, shown: boolean): Promise<Preview> =>
     json("POST", `/api/terrains/${id}/preview`, secret, { shown, renew: !shown }),
+
+  importStatus: (id: string, secret: string, job: string): Promise<ImportStatus> =>
+    json("GET", `/api/terrains/${id}/imports/${job}`, secret),
+
+  answerImport: (id: string, secret: string, job: string, answers: ImportAnswers): Promise<ImportStatus> =>
+    json("POST", `/api/terrains/${id}/imports/${job}/answers`, secret, answers),
+
+  cancelImport: async (id: string, secret: string, job: string): Promise<void> => {
+    await request("DELETE", `/api/terrains/${id}/imports/${job}`, secret);
+  },
 
   code: (id: string, secret: string, role: Role): Promise<JoinCode> =>
     json("POST", `/api/terrains/${id}/codes`, secret, { role }),

@@ -1,7 +1,7 @@
 import { css, html, nothing, svg, type TemplateResult } from "lit";
 import { getStroke } from "perfect-freehand";
 import type { Ground, Vec3 } from "../core/types.ts";
-import type { HandleVisual } from "../input/controller.ts";
+import type { GripVisual } from "../input/controller.ts";
 import { SUBSTANCES } from "./paints.ts";
 import { memberName } from "./people.ts";
 import { cursorOf } from "./scene.ts";
@@ -53,7 +53,9 @@ export class EskOverlay extends SignalElement {
         stroke-width: 1.5;
       }
       .handle.crest .dot,
-      .handle.move .dot {
+      .handle.move .dot,
+      .handle.grid-lift .dot,
+      .handle.grid-move .dot {
         fill: #ffd9c7;
       }
       .handle.active .dot {
@@ -141,7 +143,7 @@ export class EskOverlay extends SignalElement {
     return svg`<path class="ink" fill=${this.stage.session.people.value.myColour} d=${`M${path} Z`}></path>` as unknown as TemplateResult;
   }
 
-  #handle(handle: HandleVisual): TemplateResult | typeof nothing {
+  #handle(handle: GripVisual): TemplateResult | typeof nothing {
     const at = this.#at(handle.position);
     if (!at) return nothing;
     const radius = handle.active ? 8 : 6.5;
@@ -179,9 +181,12 @@ export function brushRim([x, y]: Vec3, radiusM: number, ground: Ground): Vec3[] 
 }
 
 /** What each handle does, drawn on it: up and down, in and out, all ways. */
-const GLYPHS: Readonly<Partial<Record<HandleVisual["kind"], unknown>>> = {
+const GLYPHS: Readonly<Partial<Record<GripVisual["kind"], unknown>>> = {
   crest: svg`<path class="glyph" d="M0-3.5v7M-2-1.800 0-3.800 2-1.800M-2 1.800 0 3.800 2 1.800"></path>`,
   move: svg`<path class="glyph" d="M-3.500 0h7M0-3.500v7"></path>`,
+  "grid-lift": svg`<path class="glyph" d="M0-3.5v7M-2-1.800 0-3.800 2-1.800M-2 1.800 0 3.800 2 1.800"></path>`,
+  "grid-move": svg`<path class="glyph" d="M-3.500 0h7M0-3.500v7"></path>`,
+  "grid-turn": svg`<path class="glyph" d="M3.200-1.200A3.400 3.400 0 1 0 3.300 1M3.600-3.600v2.600h-2.600"></path>`,
   radius: svg`<path class="glyph" d="M-3 0h6M-1.500-2-3.500 0l2 2M1.500-2l2 2-2 2"></path>`,
   left: svg`<path class="glyph" d="M-3 0h6M-1.500-2-3.500 0l2 2M1.500-2l2 2-2 2"></path>`,
   right: svg`<path class="glyph" d="M-3 0h6M-1.500-2-3.500 0l2 2M1.500-2l2 2-2 2"></path>`,

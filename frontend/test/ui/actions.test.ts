@@ -33,6 +33,7 @@ function everyAction() {
     canEdit: () => true,
     tool: signal<ToolId>("select"),
     selection: signal<string | null>(null),
+    laying: signal(null),
     fingerDraws: signal(true),
     newId: () => "id",
     onMessage: () => {},

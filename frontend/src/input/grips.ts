@@ -1,0 +1,92 @@
+/** Whatever can be taken hold of: the handles of the selected stroke, or of the grid that is being laid. */
+
+import { computed, type ReadonlySignal, type Signal } from "@preact/signals-core";
+import type { Ground } from "../core/types.ts";
+import type { Stroke } from "../generated/contract.ts";
+import type { ToolId } from "./actions.ts";
+import { GridTool } from "./gridtool.ts";
+import { type HandleKind, type HandleVisual, handlesOf } from "./handles.ts";
+import { HandleTool, type HandleToolOptions } from "./handletool.ts";
+import { type GridHandle, type GridHandleKind, gridAt, gridHandles, type Laying } from "./placement.ts";
+
+export type GripVisual = HandleVisual | GridHandle;
+type Held = Pick<HandleVisual, "kind" | "position"> | Pick<GridHandle, "kind" | "position">;
+
+export interface GripOptions extends HandleToolOptions {
+  readonly ground: () => Ground;
+  readonly canEdit: () => boolean;
+  readonly tool: Signal<ToolId>;
+  readonly selection: Signal<string | null>;
+  readonly laying: Signal<Laying | null>;
+}
+
+const isGrid = (kind: GripVisual["kind"]): kind is GridHandleKind => kind.startsWith("grid-");
+
+export class Grips {
+  readonly handles: ReadonlySignal<readonly GripVisual[]>;
+  readonly #o: GripOptions;
+  readonly #strokes: HandleTool;
+  readonly #grids: GridTool;
+
+  constructor(options: GripOptions) {
+    this.#o = options;
+    this.#strokes = new HandleTool(options);
+    this.#grids = new GridTool({ ...options, sizeM: options.ground().sizeM });
+    this.handles = computed(() => this.#visible());
+  }
+
+  /** The grid that has the pointer to itself while it is laid. */
+  get laying(): Laying | null {
+    return this.#o.laying.value;
+  }
+
+  hover(kind: GripVisual["kind"] | null): void {
+    this.#grids.hover(kind !== null && isGrid(kind) ? kind : null);
+    this.#strokes.hover(kind !== null && !isGrid(kind) ? (kind as HandleKind) : null);
+  }
+
+  /** Takes a handle at a device pixel. */
+  start(held: Held, x: number, y: number): void {
+    const { kind, position } = held;
+    if (isGrid(kind)) this.#grids.start(this.laying!, { kind, position }, x, y);
+    else this.#strokes.start(this.#stroke()!, { kind, position }, x, y);
+  }
+
+  /** What the ground of the grid itself is held by, where a ray meets it: it moves the grid. Null beside the grid. */
+  ground(hit: readonly [number, number, number] | null): Held | null {
+    return this.laying !== null && hit !== null && gridAt(this.laying, hit)
+      ? { kind: "grid-move", position: hit }
+      : null;
+  }
+
+  move(x: number, y: number, regular: boolean): void {
+    this.#grids.move(x, y, regular);
+    this.#strokes.move(x, y, regular);
+  }
+
+  finish(): void {
+    this.#grids.finish();
+    this.#strokes.finish();
+  }
+
+  cancel(): void {
+    if (this.#grids.dragging) this.#grids.cancel();
+    else this.#strokes.cancel();
+  }
+
+  #stroke(): Stroke | null {
+    return this.#o.doc.doc.value?.strokes.get(this.#o.selection.value ?? "") ?? null;
+  }
+
+  #visible(): readonly GripVisual[] {
+    if (!this.#o.canEdit()) return [];
+    const laying = this.laying;
+    if (laying !== null) return gridHandles(laying, this.#o.ground(), this.#grids.active.value);
+    const stroke = this.#stroke();
+    const tool = this.#o.tool.value;
+    const inHand = tool === "select" || (tool === "paint" && stroke?.kind === "paint");
+    return stroke === null || stroke.locked || !inHand
+      ? []
+      : handlesOf(stroke, this.#o.ground(), this.#strokes.active.value);
+  }
+}

@@ -1,0 +1,86 @@
+/** Outlines of elevation grids on the ground, and the coarse picture of one that is being laid. */
+
+import { cornersOf, type GridPlace, type GridShape, latticePoint } from "../core/lattice.ts";
+import type { FootprintVisual, Ground, SheetVisual } from "../core/types.ts";
+import type { Doc } from "../doc/document.ts";
+import type { Layer } from "../generated/contract.ts";
+import { drape } from "../input/picking.ts";
+import type { Laying } from "../input/placement.ts";
+import { solvedHeight } from "../input/strokeops.ts";
+import { layerColour } from "./layers.ts";
+import { hexColour, lighten, withAlpha } from "./styles/colours.ts";
+
+/** Points of an outline lie at most this share of the domain apart. */
+const STEP = 1 / 192;
+/** Of grids that are being laid. */
+const LAYING_COLOUR = hexColour("#ff8a5c");
+const SHEET_COLOUR = hexColour("#ffb48f");
+/** Greatest value of `ImportReport.preview`. */
+const PREVIEW_MOST = 255;
+
+/** Outlines, for as long as neither layer nor ground changes: renderers know lines by their array. */
+const drawn = new WeakMap<Layer, { readonly ground: Ground; readonly points: Float32Array }>();
+
+/** The closed outline of a grid on the solved ground (xyz triples). */
+export function outlineOf(shape: GridShape, place: GridPlace, ground: Ground): Float32Array {
+  const corners = cornersOf(shape, place);
+  const line = [...corners, corners[0]!].flatMap(([x, y]) => [x, y, 0]);
+  return new Float32Array(drape(line, ground.sizeM * STEP, (x, y) => solvedHeight(ground, x, y)));
+}
+
+function layerOutline(layer: Layer, ground: Ground): Float32Array {
+  const known = drawn.get(layer);
+  if (known?.ground === ground) return known.points;
+  const points = outlineOf(layer.facts, layer, ground);
+  drawn.set(layer, { ground, points });
+  return points;
+}
+
+/**
+ * Outlines of all layers that are shown, the selected one strong, and of the grid that is being laid. An outline that nobody
+ * wants to see (strength 0) shows while it is selected or pointed at.
+ */
+export function footprintVisuals(
+  doc: Doc | null,
+  marks: { readonly selected: string | null; readonly hovered: string | null; readonly laying: Laying | null },
+  ground: Ground,
+): FootprintVisual[] {
+  const out: FootprintVisual[] = [];
+  for (const layer of doc?.layers.values() ?? []) {
+    const strong = layer.id === marks.selected;
+    const hovered = layer.id === marks.hovered;
+    if (!strong && !hovered && (layer.hidden || layer.outline === 0)) continue;
+    const colour = hexColour(layerColour(layer.id));
+    out.push({
+      id: layer.id,
+      points: layerOutline(layer, ground),
+      colour: withAlpha(strong || hovered ? lighten(colour, 0.25) : colour, strong || hovered ? 0.95 : layer.outline),
+      strong,
+    });
+  }
+  const { laying } = marks;
+  if (laying !== null && !doc?.layers.has(laying.id))
+    out.push({
+      id: laying.id,
+      points: outlineOf(laying, laying.place.value, ground),
+      colour: LAYING_COLOUR,
+      strong: true,
+    });
+  return out;
+}
+
+/** A coarse picture where it would lie; `preview`: rows of heights 0..255 between low and high, -1 where there is none. */
+export function sheetOf(laying: Laying, place: GridPlace, preview: readonly (readonly number[])[]): SheetVisual | null {
+  const side = preview.length;
+  if (side < 2) return null;
+  const points = new Float32Array(3 * side * side);
+  for (const [row, values] of preview.entries())
+    for (const [col, value] of values.entries()) {
+      const u = (col / (side - 1)) * (laying.cols - 1);
+      const v = (row / (side - 1)) * (laying.rows - 1);
+      const [x, y] = latticePoint(place, u, v);
+      const height = laying.low_m + (value / PREVIEW_MOST) * (laying.high_m - laying.low_m);
+      points.set([x, y, value < 0 ? Number.NaN : place.scale * height + place.lift_m], 3 * (row * side + col));
+    }
+  return { side, points, colour: SHEET_COLOUR };
+}
