@@ -74,6 +74,7 @@ class Ground:
 class Made:
     key: TileKey
     heights: NDArray[np.float32]
+    base: NDArray[np.float32] | None = None
     content: bytes = b""
 
 

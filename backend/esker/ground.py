@@ -16,7 +16,9 @@ from esker.contract import Channel, Vec3
 from esker.document.sync import SyncDoc
 from esker.grid import TileKey
 from esker.tiles.channels import values
+from esker.tiles.codec import SAMPLE_LIMIT, Wide, child_window, predict
 from esker.tiles.decoder import FrameDecoder
+from esker.tiles.frame import GROUND
 
 Heights = NDArray[np.float32]
 
@@ -24,8 +26,9 @@ Heights = NDArray[np.float32]
 class StreamedGround:
     """What the server has sent and not taken back. All public methods may be called from any thread.
 
-    Heights and amplitude in metres, roughness 0..1, paint of the other channels -1..1; float32, [row, col], row 0
-    south. They are those of the newest frames, a preview while somebody draws; ``wait`` returns when they are final.
+    Heights, their base and amplitude in metres, roughness 0..1, survey in levels, paint of the other channels -1..1;
+    float32, [row, col], row 0 south. Heights are those of the ground as it is drawn: offsets by strokes plus the base.
+    All are those of the newest frames, a preview while somebody draws; ``wait`` returns when they are final.
     """
 
     def __init__(
@@ -63,12 +66,15 @@ class StreamedGround:
                     raise TimeoutError("the ground has not come to rest")
 
     def tiles(self, channel: Channel = Channel.HEIGHT) -> frozenset[TileKey]:
-        """The tiles that are here."""
+        """The tiles that are here. Those of ``Channel.BASE``: none while there is no elevation layer."""
         with self._changed:
             return frozenset(self._decoder.channels[channel])
 
     def tile(self, level: int, x: int, y: int, channel: Channel = Channel.HEIGHT) -> Heights:
-        """One tile, (65, 65). Raises KeyError when it is not here."""
+        """One tile, (65, 65); of ``Channel.BASE`` the ground of the elevation layers alone.
+
+        Raises KeyError when it is not here.
+        """
         with self._changed:
             return self._tile(TileKey(level, x, y), channel)
 
@@ -106,10 +112,23 @@ class StreamedGround:
         held = self._decoder.channels[channel].get(key)
         if held is None:
             raise KeyError(f"tile {tuple(key)} is not here")
-        if channel != Channel.HEIGHT:
+        if channel not in GROUND:
             return values(held.samples, channel)
+        samples = held.samples
+        if channel == Channel.HEIGHT and self._decoder.channels[Channel.BASE]:
+            samples = samples + self._base(key)
         q = np.float64(grid.quantum(key.level, self._sync.confirmed.settings.size_m))
-        return np.asarray(held.samples * q, dtype=np.float32)
+        return np.asarray(samples * q, dtype=np.float32)
+
+    def _base(self, key: TileKey) -> Wide:
+        """Base of a tile, quanta; while it has not come, as the tiles above predict it."""
+        held = self._decoder.channels[Channel.BASE].get(key)
+        if held is not None:
+            return held.samples
+        if key.level == 0:
+            return np.zeros((c.TILE_SAMPLES, c.TILE_SAMPLES), dtype=np.int32)
+        above = np.clip(self._base(key.parent()), -SAMPLE_LIMIT, SAMPLE_LIMIT).astype(np.int32)
+        return child_window(predict(above), key.x, key.y)
 
     def _whole(self, level: int, channel: Channel) -> Heights:
         n = grid.samples(level)

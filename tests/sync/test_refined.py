@@ -48,6 +48,7 @@ class Tile:
     key: TileKey
     heights: NDArray[np.float32]
     content: bytes
+    base: NDArray[np.float32] | None = None
 
 
 class RoofRefiner:

@@ -208,6 +208,7 @@ def test_the_finest_preview_has_time_to_be_sent() -> None:
 class Tile:
     key: TileKey
     heights: Any = None
+    base: Any = None
     content: bytes = b""
 
 

@@ -13,7 +13,7 @@ from tests.vectors import make_tiles
 
 from esker.contract import CHANNEL_LEVELS_BELOW, MAX_LEVEL, MAX_REFINED_LEVEL, Channel, FrameKind, Predictor
 from esker.tiles.decoder import FrameDecoder
-from esker.tiles.frame import FrameError, FrameHead, read_frame, write_frame
+from esker.tiles.frame import GROUND, FrameError, FrameHead, read_frame, write_frame
 
 VECTORS: dict[str, Any] = json.loads(make_tiles.PATH.read_text())
 SESSION = [base64.b64decode(step["frame"]) for step in VECTORS["sessions"][0]["steps"]]
@@ -64,7 +64,8 @@ def test_the_vectors_have_every_channel_and_the_finest_default_level_but_one() -
 
 
 def test_levels_of_a_channel_end_below_those_of_the_heights() -> None:
-    for channel, finest in ((Channel.HEIGHT, MAX_REFINED_LEVEL), (Channel.ROUGHNESS, MAX_LEVEL - CHANNEL_LEVELS_BELOW)):
+    refined, below = MAX_REFINED_LEVEL, MAX_LEVEL - CHANNEL_LEVELS_BELOW
+    for channel, finest in ((Channel.HEIGHT, refined), (Channel.BASE, refined), (Channel.SURVEY, below)):
         read_frame(write_frame(FrameHead(FrameKind.LEVEL, finest, 1, True, channel), [], []))
         with pytest.raises(FrameError, match="above"):
             read_frame(write_frame(FrameHead(FrameKind.LEVEL, finest + 1, 1, True, channel), [], []))
@@ -76,7 +77,7 @@ def test_channels_are_kept_apart() -> None:
     for step in VECTORS["sessions"][4]["steps"]:
         decoder.decode(base64.b64decode(step["frame"]))
     sizes = {channel: len(held) for channel, held in decoder.channels.items()}
-    assert sizes == {channel: 85 if channel == Channel.HEIGHT else 5 for channel in Channel}
+    assert sizes == {channel: 85 if channel in GROUND else 5 for channel in Channel}
     decoder.decode(write_frame(FrameHead(FrameKind.LEVEL, 0, 9, True, Channel.AMPLITUDE), [(0, 0)], []))
     assert {c: len(h) for c, h in decoder.channels.items()} == sizes | {Channel.AMPLITUDE: 0}
 

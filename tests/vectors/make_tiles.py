@@ -22,7 +22,7 @@ from esker.tiles.bounds import block_reduce, parent_distance
 from esker.tiles.codec import SAMPLE_LIMIT, pack, predict
 from esker.tiles.decoder import DecodedFrame, FrameDecoder
 from esker.tiles.delivery import ClientTiles, TileServer
-from esker.tiles.frame import FrameHead, TileRecord, ratio, write_frame, write_tile
+from esker.tiles.frame import GROUND, FrameHead, TileRecord, ratio, write_frame, write_tile
 
 PATH = Path(__file__).with_name("tiles.json")
 SIZE_M = 1000.0
@@ -139,8 +139,10 @@ def channels() -> list[bytes]:
     server = TileServer(SIZE_M, LEVELS)
     client = ClientTiles(server)
     frames: list[bytes] = []
-    units = {Channel.HEIGHT: 40.0, Channel.AMPLITUDE: 30.0, Channel.ROUGHNESS: 0.4}
+    units = {Channel.BASE: 700.0, Channel.HEIGHT: 40.0, Channel.AMPLITUDE: 30.0, Channel.ROUGHNESS: 0.4}
     units |= {Channel.SNOW: 1.0, Channel.GRASS: -1.0, Channel.FOREST: 0.3, Channel.WETNESS: -0.2}
+    units |= {Channel.SURVEY: 3.0}
+    bases = {Channel.ROUGHNESS: 0.5, Channel.SURVEY: -1.0}
 
     def drain() -> None:
         while (plan := client.plan()) is not None:
@@ -149,11 +151,11 @@ def channels() -> list[bytes]:
 
     for clock in range(3):
         for channel, unit in units.items():
-            for level in range(LEVELS + 1 if channel == Channel.HEIGHT else LEVELS - 1):
+            for level in range(LEVELS + 1 if channel in GROUND else LEVELS - 1):
                 n = grid.samples(level)
                 y, x = np.mgrid[0:n, 0:n] * (SIZE_M / (n - 1))
                 patch = np.exp(-(((x - 300) / 80) ** 2) - ((y - 420) / 150) ** 2) * unit * clock
-                base = 0.5 if channel == Channel.ROUGHNESS else 0.0
+                base = bases.get(channel, 0.0)
                 server.put_level(clock, level, (base + patch).astype(np.float32), clock == 2, channel)
         drain()
     return frames
@@ -162,6 +164,7 @@ def channels() -> list[bytes]:
 class Made:
     """A refined tile of an analytic ground: a crest with a kink, at any level the same function of the place."""
 
+    base = None
     content = b""
 
     def __init__(self, key: TileKey, lift: float, size_m: float = SIZE_M) -> None:

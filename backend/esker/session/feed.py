@@ -135,6 +135,9 @@ class TileFeed:
             if self._newest.get(place) is result.heights:
                 return
             self._newest[place] = result.heights
+        if result.channel == c.Channel.BASE:
+            with self._lock:  # tiles that wait were made over another base
+                self._made.clear()
         try:
             while len(self._puts) > PUTS_AHEAD - 1:
                 self._puts.pop(0).result()
@@ -179,6 +182,8 @@ class TileFeed:
         except Exception:
             log.exception("level %d of %s at clock %d could not become tiles", result.level, channel.name, clock)
             return
+        if channel == c.Channel.BASE:
+            self._publish(False)
         if channel != c.Channel.HEIGHT:
             self._call(self._wake_all)
             return

@@ -60,6 +60,7 @@ class RefinedTile:
     key: TileKey
     heights: NDArray[np.float32]
     content: bytes
+    base: NDArray[np.float32] | None = None
 
 
 class FieldCache:

@@ -6,7 +6,7 @@ From these, per tile and nested over all descendants, flat arrays over all level
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import TypeVar
@@ -21,6 +21,8 @@ from esker.tiles.codec import Ints
 Floats = NDArray[np.float32]
 Counts = NDArray[np.uint32]
 T = TypeVar("T", bound=np.generic)
+Window = Callable[[slice, slice], Ints]
+"""Samples of some rows and columns of a level."""
 
 
 def block_reduce(ufunc: np.ufunc, a: NDArray[T], cells: int) -> NDArray[T]:
@@ -81,20 +83,24 @@ class SubPatches:
         self.high = np.zeros((n, n), dtype=np.int32)
         self.error = np.zeros((n, n), dtype=np.uint32)
 
-    def update(self, samples: Ints, parent: Ints | None, dirty: NDArray[np.bool_]) -> None:
-        """Recomputes the smallest rectangle of tiles that holds every True of ``dirty`` (2^l, 2^l)."""
+    def update(self, samples: Window, parent: Window | None, dirty: NDArray[np.bool_]) -> None:
+        """Recomputes the smallest rectangle of tiles that holds every True of ``dirty`` (2^l, 2^l).
+
+        ``samples`` and ``parent`` give a window of the level and of the one above.
+        """
         rows, cols = np.flatnonzero(dirty.any(axis=1)), np.flatnonzero(dirty.any(axis=0))
         if not rows.size:
             return
         r0, r1, c0, c1 = (int(v) for v in (rows[0], rows[-1] + 1, cols[0], cols[-1] + 1))
         cells = PATCH_CELLS * SUBPATCHES
-        window = samples[r0 * cells : r1 * cells + 1, c0 * cells : c1 * cells + 1]
+        window = samples(slice(r0 * cells, r1 * cells + 1), slice(c0 * cells, c1 * cells + 1))
         sub = np.s_[r0 * SUBPATCHES : r1 * SUBPATCHES, c0 * SUBPATCHES : c1 * SUBPATCHES]
         self.low[sub] = block_reduce(np.minimum, window, PATCH_CELLS)
         self.high[sub] = block_reduce(np.maximum, window, PATCH_CELLS)
         if parent is not None:
             half = cells // 2
-            self.error[sub] = sub_error(window, parent[r0 * half : r1 * half + 1, c0 * half : c1 * half + 1])
+            above = parent(slice(r0 * half, r1 * half + 1), slice(c0 * half, c1 * half + 1))
+            self.error[sub] = sub_error(window, above)
 
 
 def _quarter(ufunc: np.ufunc, a: Floats, by: int) -> Floats:

@@ -1,4 +1,4 @@
-"""Noise amplitude, roughness and what is painted, as levels of integers (DESIGN 5.4, 6).
+"""Noise amplitude, roughness, what is painted and how fine the data are, as levels of integers (DESIGN 5.4, 6).
 
 A channel has the same quantum on every level, and its base value (what it is where no stroke says otherwise) is
 subtracted, so untouched ground is all zeros. Its levels end ``CHANNEL_LEVELS_BELOW`` below those of the heights.
@@ -17,10 +17,12 @@ from esker.contract import (
     BASE_AMPLITUDE_M,
     BASE_BIAS,
     BASE_ROUGHNESS,
+    BASE_SURVEY,
     BIAS_QUANTA,
     CHANNEL_LEVELS_BELOW,
     QUANTA_PER_CELL,
     ROUGHNESS_QUANTA,
+    SURVEY_QUANTA,
     TILE_CELLS,
     Channel,
 )
@@ -34,11 +36,13 @@ BIASES: Final = (Channel.SNOW, Channel.GRASS, Channel.FOREST, Channel.WETNESS)
 QUANTA: Final = {
     Channel.AMPLITUDE: AMPLITUDE_QUANTA_PER_M,
     Channel.ROUGHNESS: ROUGHNESS_QUANTA,
+    Channel.SURVEY: SURVEY_QUANTA,
     **dict.fromkeys(BIASES, BIAS_QUANTA),
 }
 BASE: Final = {
     Channel.AMPLITUDE: BASE_AMPLITUDE_M,
     Channel.ROUGHNESS: BASE_ROUGHNESS,
+    Channel.SURVEY: BASE_SURVEY,
     **dict.fromkeys(BIASES, BASE_BIAS),
 }
 
@@ -49,9 +53,9 @@ def channel_levels(levels: int) -> int:
 
 
 def values(samples: Ints, channel: Channel) -> NDArray[np.float32]:
-    """Samples of a channel as metres (amplitude), 0..1 (roughness) or -1..1 (a bias), float32, same shape.
+    """Samples of a channel as metres (amplitude), 0..1 (roughness), -1..1 (a bias) or a level (survey).
 
-    Raises KeyError for heights.
+    float32, same shape. Raises KeyError for heights and their base.
     """
     return (samples / np.float64(QUANTA[channel]) + BASE[channel]).astype(np.float32)
 
@@ -75,12 +79,5 @@ class ChannelPyramid(Pyramid):
         if 0 <= level <= self.top and self.level(level) is None:
             if heights.shape == (grid.samples(level),) * 2 and not away.any():
                 return 0
-            self._begin(clock, level)
+            self.begin(clock, level)
         return super().put(clock, level, away, settled, show)
-
-    def _begin(self, clock: int, finest: int) -> None:
-        """The levels below the first that says anything."""
-        for level in range(finest):
-            if self.level(level) is None:
-                n = grid.samples(level)
-                super().put(clock, level, np.zeros((n, n), dtype=np.float32), settled=True)

@@ -18,31 +18,36 @@ from numpy.typing import NDArray
 from esker.contract import DEFAULT_LEVEL, Channel, View
 from esker.grid import TileKey
 from esker.tiles.channels import ChannelPyramid, channel_levels
+from esker.tiles.frame import GROUND
 from esker.tiles.ledger import Ledger
 from esker.tiles.plans import EncodedTiles, FramePlan
 from esker.tiles.pyramid import Mask, Pyramid
 from esker.tiles.quadtree import ALWAYS, default_selection, restrict, select
-from esker.tiles.refined import RefinedTiles
+from esker.tiles.refined import RefinedTiles, Under
 from esker.tiles.refined_ledger import RefinedLedger
 from esker.tiles.sparse import Selection, restrict_below, select_refined
+from esker.tiles.surface import BasePyramid, Surface
 
 WISHES: Final = 64
 """Most tiles that the refiner is asked for at once."""
 TAU_STEP: Final = 1.3
 """Where a view wants more refined tiles than a client may hold, its tau grows by this factor until they fit."""
 
-CHANNELS: Final[tuple[Channel, ...]] = tuple(channel for channel in Channel if channel != Channel.HEIGHT)
+CHANNELS: Final[tuple[Channel, ...]] = tuple(channel for channel in Channel if channel not in GROUND)
 
 
 class RefinedTile(Protocol):
-    """A tile as the refiner makes it (``solve/refine.py``): heights (65, 65) float32, metres;
-    content: digest of all that it depends on."""
+    """A tile as the refiner makes it (``solve/refine.py``): heights (65, 65) float32, metres, offsets from the base;
+    base: the same of the elevation layers, None where there are none; content: digest of all that it depends on."""
 
     @property
     def key(self) -> TileKey: ...
 
     @property
     def heights(self) -> NDArray[np.float32]: ...
+
+    @property
+    def base(self) -> NDArray[np.float32] | None: ...
 
     @property
     def content(self) -> bytes: ...
@@ -58,9 +63,16 @@ class TileServer:
         below ``levels`` or above MAX_REFINED_LEVEL.
         """
         self.pyramid = Pyramid(size_m, levels)
+        self.base = BasePyramid(size_m, levels)
+        self.surface = Surface(self.pyramid, self.base)
         self.channels = {channel: ChannelPyramid(channel, levels) for channel in CHANNELS}
         self.refined = RefinedTiles(size_m, levels, levels if finest is None else finest, room_tiles)
+        self.refined_base = RefinedTiles(size_m, levels, self.refined.finest, room_tiles)
         self.cache = EncodedTiles()
+        self._based = -1
+        """The heights' stamp when the base last came: levels put before then belong to another base."""
+        self._base_whole = True
+        """All levels of the base have come since it last changed."""
 
     @property
     def levels(self) -> int:
@@ -70,7 +82,8 @@ class TileServer:
     @property
     def stamp(self) -> int:
         """Rises with every change of anything that a client could be sent."""
-        return self.pyramid.stamp + sum(c.stamp for c in self.channels.values()) + self.refined.stamp
+        refined = self.refined.stamp + self.refined_base.stamp
+        return self.surface.stamp + sum(c.stamp for c in self.channels.values()) + refined
 
     def put_level(
         self,
@@ -83,10 +96,13 @@ class TileServer:
     ) -> int:
         """Takes a level of a solve: (N_l, N_l) float32, row 0 south. Returns the number of changed tiles.
 
-        Heights and amplitude in metres, roughness 0..1, biases -1..1. A tile changes when a sample moved by at least
-        one quantum; a settled level is exact. Raises ValueError for a wrong level, shape, NaN or infinity, and changes
-        nothing then.
+        Heights (offsets from the base), base and amplitude in metres, roughness 0..1, biases -1..1, survey in levels.
+        A tile changes when a sample moved by at least one quantum; a settled level is exact, and so is the base. The
+        base comes before the heights that were solved over it. Raises ValueError for a wrong level, shape, NaN or
+        infinity, and changes nothing then.
         """
+        if channel == Channel.BASE:
+            return self._put_base(clock, level, heights)
         if channel != Channel.HEIGHT:
             return self.channels[channel].put(clock, level, heights, settled, show)
         before = self.pyramid.stamp
@@ -97,25 +113,65 @@ class TileServer:
                 self.refined.begin(clock)
         return changed
 
+    def _put_base(self, clock: int, level: int, heights: NDArray[np.float32]) -> int:
+        before = self.base.stamp
+        changed = self.base.put_base(clock, level, heights)
+        if self.base.stamp != before:
+            self._based, self._base_whole = self.pyramid.stamp, level == self.base.top
+            self.refined.suspend()
+            self.refined_base.suspend()
+            if self._base_whole and level == self.levels:
+                self.refined_base.begin(clock)
+        return changed
+
     def put_tile(self, clock: int, tile: RefinedTile) -> bool:
         """Takes a refined tile of the settled solve at ``clock``; False when it has been overtaken.
 
         Raises ValueError for a level that is not refined here, a wrong shape, NaN or infinity.
         """
-        return self.refined.put(clock, tile.key, tile.heights, tile.content, self.pyramid)
+        if not self.refined.takes(clock, tile.key, tile.heights, self.pyramid):
+            return False
+        self.surface.changes()
+        base = above = None
+        if self.base.held or (tile.base is not None and tile.base.any()):
+            if not self._put_base_tile(tile):
+                return False
+            found = self.refined_base.verified(tile.key)
+            base = None if found is None else found.state.samples
+            above = self.refined_base.parent(tile.key, self.base)
+        under = Under(self.surface.stamp, base, above)
+        return self.refined.put(clock, tile.key, tile.heights, tile.content, self.pyramid, under)
+
+    def _put_base_tile(self, tile: RefinedTile) -> bool:
+        """The base of a refined tile: a stream of its own, which outlives the solve."""
+        if not self.base.held:  # layers so small that no level that is solved as a whole sees them
+            self.base.begin(self.refined.clock, self.levels + 1)
+            self.refined_base.begin(self.refined.clock)
+        heights = np.zeros_like(tile.heights) if tile.base is None else tile.base
+        return self.refined_base.put(self.refined_base.clock, tile.key, heights, tile.content, self.base)
 
     def limit(self, top: int) -> None:
         """From now on levels above ``top`` are not solved: clients are made to forget them."""
         if top != self.pyramid.top:
             self.refined.suspend()
+            self.refined_base.suspend()
             self.pyramid.limit(top)
+            self._base_whole = not self.base.held or self.base.level(top) is not None
+            self.base.limit(top)
             for channel in self.channels.values():
                 channel.limit(channel_levels(top))
 
     def settled(self) -> bool:
-        """True when every level that is solved is final for one and the same clock."""
+        """True when every level that is solved is final for one and the same clock, over the base as it is."""
         levels = [self.pyramid.level(level) for level in range(self.pyramid.top + 1)]
-        return all(level is not None and level.settled for level in levels) and len({v.clock for v in levels if v}) == 1
+        final = all(level is not None and level.settled and level.stamp > self._based for level in levels)
+        return final and self._base_whole and len({v.clock for v in levels if v}) == 1
+
+    def verified(self, key: TileKey) -> bool:
+        """Whether a refined tile and its base belong to the settled ground as it is."""
+        if self.refined.verified(key) is None:
+            return False
+        return not self.base.held or self.refined_base.verified(key) is not None
 
     def wishes(self, clients: Sequence[ClientTiles]) -> tuple[tuple[TileKey, ...], int]:
         """The tiles to refine next for all clients together, coarse before fine, then by screen error.
@@ -133,6 +189,7 @@ class TileServer:
         if len(self.refined) + len(order) > self.refined.room_tiles:
             wanted = {key for client in clients for key in client.wanted_refined()}
             room = self.refined.make_room(wanted, {key for client in clients for key in client.held_refined()})
+            self.refined_base.keep(self.refined)
             fresh = (key for key in order if self.refined.get(key) is None)
             beyond = set(itertools.islice(fresh, room, None))
             order = [key for key in order if key not in beyond]
@@ -150,11 +207,13 @@ class ClientTiles:
         self._server = tiles
         self._rest_level = min(rest_level, tiles.levels)
         self._heights = Ledger(tiles.pyramid, tiles.cache, ALWAYS, self._rest_level)
+        self._base = Ledger(tiles.base, tiles.cache, ALWAYS, self._rest_level, Channel.BASE)
         self._channels = {
             channel: Ledger(pyramid, tiles.cache, pyramid.levels, pyramid.levels, channel)
             for channel, pyramid in tiles.channels.items()
         }
         self._refined = RefinedLedger(tiles.refined, self._heights, tiles.cache)
+        self._refined_base = RefinedLedger(tiles.refined_base, self._base, tiles.cache, Channel.BASE)
         self._view: View | None = None
         self._wanted = default_selection(tiles.levels)
         self._errors: list[NDArray[np.float32]] | None = None
@@ -171,6 +230,8 @@ class ClientTiles:
 
     def held(self, channel: Channel = Channel.HEIGHT) -> dict[TileKey, int]:
         """Versions that the client holds once it has applied every committed frame."""
+        if channel == Channel.BASE:
+            return self._base.held() | self._refined_base.held()
         if channel != Channel.HEIGHT:
             return self._channels[channel].held()
         return self._heights.held() | self._refined.held()
@@ -191,39 +252,72 @@ class ClientTiles:
 
     def missing(self) -> list[tuple[TileKey, float]]:
         """Wanted tiles that the settled ground has not been refined to yet, with their projected errors in pixels."""
-        return self._refined.missing(self._selection)
+        return [(k, e) for k, e in self._selection.tiles.items() if not self._server.verified(k)]
 
     def plan(self) -> FramePlan | None:
         """The most useful next frame, or None when there is nothing to send now. Cheap; changes nothing held.
 
         Levels coarse to fine: a LEVEL frame where a newer put waits; then FILL frames for tiles that came into view,
         coarse to fine and by projected error; then the other channels; then refined tiles; then, when the ground is
-        settled, everything up to ``rest_level``.
+        settled, everything up to ``rest_level``. The base of a tile always goes before the tile.
         """
         stamp = self._server.stamp
         if self._idle_stamp == stamp and not self._view_changed:
             return None
         self.refresh()
-        plan = self._plan_heights() or self._plan_channels()
+        plan = self._plan_ground() or self._plan_channels()
         if plan is None and self._server.refined.active:
-            plan = self._refined.plan(self._selection)
+            plan = self._plan_refined()
         if plan is None and self._server.settled():
             plan = self._plan_rest()
         if plan is None:
             self._idle_stamp = stamp
         return plan
 
-    def _plan_heights(self) -> FramePlan | None:
-        plan = self._heights.plan_limit()
+    def _plan_ground(self) -> FramePlan | None:
+        plan = self._base.plan_limit() or self._heights.plan_limit()
         if plan is not None:
             return plan
         for level, wanted in enumerate(self._wanted):
-            plan = self._heights.plan_level(level, wanted)
+            plan = self._base.plan_level(level, wanted) or self._heights.plan_level(level, wanted)
             if plan is not None:
                 return plan
         for level, wanted in enumerate(self._wanted):
-            errors = None if self._errors is None else self._errors[level]
-            plan = self._heights.plan_fill(level, wanted, errors)
+            plan = self._plan_fill(level, wanted, None if self._errors is None else self._errors[level])
+            if plan is not None:
+                return plan
+        return None
+
+    def _plan_fill(
+        self, level: int, wanted: Mask | np.bool_, errors: NDArray[np.float32] | None = None
+    ) -> FramePlan | None:
+        """Tiles on a base that is held; then base, and what lies on it next; then whatever has to wait for its base."""
+        if not self._server.base.held:
+            return self._heights.plan_fill(level, wanted, errors)
+        based = self._base.versions[level] > 0
+        return (
+            self._heights.plan_fill(level, wanted & based, errors)
+            or self._base.plan_fill(level, wanted, errors)
+            or self._heights.plan_fill(level, wanted, errors)
+        )
+
+    def _plan_refined(self) -> FramePlan | None:
+        """The same above the levels that are solved as a whole."""
+        selection = self._selection
+        plan, finest = self._refined.plan_levels(selection)
+        if not self._server.refined_base.active:
+            return plan or self._fill_refined(finest, None)
+        under, finest_base = self._refined_base.plan_levels(selection)
+        return under or plan or self._fill_refined(finest, finest_base)
+
+    def _fill_refined(self, finest: int, finest_base: int | None) -> FramePlan | None:
+        """``finest``, ``finest_base``: the levels up to which tiles, and their base, may be filled in."""
+        selection = self._selection
+        based = None if finest_base is None else self._refined_base.keys()
+        for level in range(self._server.levels + 1, finest + 1):
+            plan = self._refined.plan_fill(level, selection, based)
+            if plan is None and finest_base is not None and level <= finest_base:
+                plan = self._refined_base.plan_fill(level, selection)
             if plan is not None:
                 return plan
         return None
@@ -241,7 +335,7 @@ class ClientTiles:
 
     def _plan_rest(self) -> FramePlan | None:
         for level in range(self._rest_level + 1):
-            plan = self._heights.plan_fill(level, np.True_)
+            plan = self._plan_fill(level, np.True_)
             if plan is not None:
                 return plan
         return None
@@ -249,17 +343,20 @@ class ClientTiles:
     def commit(self, plan: FramePlan) -> None:
         """The frame was handed to the socket: from now on the client counts as holding it."""
         self._idle_stamp = -1
-        if plan.channel != Channel.HEIGHT:
+        if plan.channel not in GROUND:
             self._channels[plan.channel].commit(plan)
             return
+        whole, refined = self._heights, self._refined
+        if plan.channel == Channel.BASE:
+            whole, refined = self._base, self._refined_base
         if plan.level <= self._server.levels:
-            self._heights.commit(plan)
-        self._refined.commit(plan)
+            whole.commit(plan)
+        refined.commit(plan)
 
     def refresh(self) -> None:
         """Selects again when the view moved or the ground changed since the last selection."""
         server = self._server
-        now = (server.pyramid.generation, server.refined.generation)
+        now = (server.surface.generation, server.refined.generation)
         if self._view is None or not (self._view_changed or self._selected != now):
             return
         self._select(self._view)
@@ -269,12 +366,12 @@ class ClientTiles:
 
     def _select(self, view: View) -> None:
         server = self._server
-        self._wanted, self._errors = select(server.pyramid.bounds(), view)
+        self._wanted, self._errors = select(server.surface.bounds(), view)
         if server.refined.finest == server.levels or server.pyramid.level(server.levels) is None:
             self._selection = Selection.nothing(server.levels, server.refined.finest)
             return
         while True:
-            found = select_refined(server.pyramid, server.refined, self._wanted[-1], view)
+            found = select_refined(server.surface, server.refined, self._wanted[-1], view)
             if found.count <= server.refined.client_tiles:
                 break
             view = view.model_copy(update={"tau_px": view.tau_px * TAU_STEP})

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
@@ -43,14 +44,18 @@ class FrameHead:
     channel: Channel = Channel.HEIGHT
 
 
+GROUND: Final = frozenset({Channel.HEIGHT, Channel.BASE})
+"""The channels in quanta of heights, with all levels: what is drawn is their sum."""
+
+
 def ratio(channel: Channel) -> int:
     """Quanta of a level in one of the next coarser level: heights halve their step, the other channels keep it."""
-    return 2 if channel == Channel.HEIGHT else 1
+    return 2 if channel in GROUND else 1
 
 
 def finest_level(channel: Channel) -> int:
     """The finest level that a frame of this channel may have."""
-    return MAX_REFINED_LEVEL if channel == Channel.HEIGHT else MAX_LEVEL - CHANNEL_LEVELS_BELOW
+    return MAX_REFINED_LEVEL if channel in GROUND else MAX_LEVEL - CHANNEL_LEVELS_BELOW
 
 
 @dataclass(frozen=True)

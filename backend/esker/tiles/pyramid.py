@@ -50,6 +50,10 @@ class Level:
     clock: int
     settled: bool
 
+    def window(self, rows: slice, cols: slice) -> Ints:
+        """Some of the samples, as a view."""
+        return self.samples[rows, cols]
+
 
 def quantise(
     heights: NDArray[np.float32],
@@ -188,6 +192,13 @@ class Pyramid:
                 count += self._store(clock, coarse, np.ascontiguousarray(steady[::step, ::step]), settled)
         return count + self._store(clock, level, steady, settled)
 
+    def begin(self, clock: int, count: int) -> None:
+        """Of the coarsest ``count`` levels those that were never put become zero."""
+        for level in range(min(count, self.top + 1)):
+            if self._levels[level] is None:
+                n = grid.samples(level)
+                self._store(clock, level, np.zeros((n, n), dtype=np.float32), True)
+
     def _store(self, clock: int, level: int, heights: NDArray[np.float32], settled: bool) -> int:
         """Quantises what is to be shown of a level; versions rise where a sample changed. Returns how many tiles."""
         old = self._levels[level]
@@ -280,7 +291,7 @@ class Pyramid:
             if level is None:
                 continue
             parent = self._levels[i - 1] if i else None
-            self._subs[i].update(level.samples, None if parent is None else parent.samples, self._dirty[i])
+            self._subs[i].update(level.window, None if parent is None else parent.window, self._dirty[i])
             self._dirty[i][:] = False
         self._bounds = nest(self._subs, [level is not None for level in self._levels], self.size_m)
         self._bounds_stamp = self.stamp

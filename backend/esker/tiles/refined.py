@@ -23,6 +23,7 @@ from esker.tiles.codec import SAMPLE_LIMIT, Ints
 from esker.tiles.ledger import state_of
 from esker.tiles.plans import TileState
 from esker.tiles.pyramid import Pyramid
+from esker.tiles.surface import total
 
 ROOM_TILES: Final = 2048
 """Refined tiles that a room keeps: 35 MB of samples."""
@@ -30,10 +31,11 @@ ROOM_TILES: Final = 2048
 
 @dataclass(frozen=True, eq=False)
 class Refined:
-    """A refined tile. ``low``, ``high``, ``error``: (4, 4) float32 per sub-patch, metres; error: against its parent.
+    """A refined tile. ``low``, ``high``, ``error``: (4, 4) float32 per sub-patch of the ground as it is drawn, metres;
+    error: against its parent.
 
-    ``epoch``: the last one in which it was verified. ``ground``: the pyramid's stamp at that time. ``content``: the
-    refiner's digest of all that it depends on.
+    ``epoch``: the last one in which it was verified. ``ground``: stamp of the levels below at that time.
+    ``content``: the refiner's digest of all that it depends on.
     """
 
     key: TileKey
@@ -64,6 +66,18 @@ class Known:
 def code(x: NDArray[np.int64], y: NDArray[np.int64], level: int) -> NDArray[np.int64]:
     """Tiles of a level as integers that sort by rows."""
     return (y << level) | x
+
+
+@dataclass(frozen=True, eq=False)
+class Under:
+    """What a refined tile lies on. ``ground``: the stamp of the ground below, for ``Refined.ground``.
+
+    ``base``, ``above``: (65, 65) quanta that are added to the tile and to its parent, for the bounds; None for none.
+    """
+
+    ground: int
+    base: Ints | None = None
+    above: Ints | None = None
 
 
 class RefinedTiles:
@@ -124,31 +138,45 @@ class RefinedTiles:
         self.epoch += 1
         self._changed()
 
-    def put(self, clock: int, key: TileKey, heights: NDArray[np.float32], content: bytes, pyramid: Pyramid) -> bool:
-        """Takes a tile of the settled solve at ``clock``; False when that is over, or the parent is not known.
-
-        Raises ValueError for a key that is not refined here, a wrong shape, NaN or infinity.
-        """
+    def takes(self, clock: int, key: TileKey, heights: NDArray[np.float32], pyramid: Pyramid) -> bool:
+        """Whether ``put`` would take this tile. Raises as it does."""
         side = 1 << max(0, key.level)
         if not (self.levels < key.level <= self.finest and 0 <= key.x < side and 0 <= key.y < side):
             raise ValueError(f"tile {tuple(key)} is not refined here")
         if heights.shape != (TILE_SAMPLES, TILE_SAMPLES) or not np.isfinite(heights).all():
             raise ValueError(f"tile {tuple(key)} is not 65x65 finite heights")
-        above = self._parent(key, pyramid)
-        if not self.active or clock != self.clock or above is None:
+        return self.active and clock == self.clock and self.parent(key, pyramid) is not None
+
+    def put(
+        self,
+        clock: int,
+        key: TileKey,
+        heights: NDArray[np.float32],
+        content: bytes,
+        pyramid: Pyramid,
+        under: Under | None = None,
+    ) -> bool:
+        """Takes a tile of the settled solve at ``clock``; False when that is over, or the parent is not known.
+
+        Raises ValueError for a key that is not refined here, a wrong shape, NaN or infinity.
+        """
+        if not self.takes(clock, key, heights, pyramid):
             return False
+        above = self.parent(key, pyramid)
+        assert above is not None
         samples = _quantise(heights, key.level, self.size_m)
         old = self._tiles.get(key)
         if old is not None and np.array_equal(old.state.samples, samples):
             state = old.state
         else:
             state = TileState(self.stamp + 1, samples)
-        self._tiles[key] = self._measured(key, state, above, content, pyramid.stamp)
+        under = under or Under(pyramid.stamp)
+        self._tiles[key] = self._measured(key, state, above, content, under)
         self._tiles.move_to_end(key)
         self._changed(key.level)
         return True
 
-    def _parent(self, key: TileKey, pyramid: Pyramid) -> Ints | None:
+    def parent(self, key: TileKey, pyramid: Pyramid) -> Ints | None:
         """The parent's samples as they are now."""
         if key.level - 1 > self.levels:
             found = self.verified(key.parent())
@@ -156,14 +184,17 @@ class RefinedTiles:
         level = pyramid.level(self.levels)
         return None if level is None else state_of(level, key.parent()).samples
 
-    def _measured(self, key: TileKey, state: TileState, above: Ints, content: bytes, ground: int) -> Refined:
+    def _measured(self, key: TileKey, state: TileState, above: Ints, content: bytes, under: Under) -> Refined:
         q = np.float32(grid.quantum(key.level, self.size_m))
         r, c = 32 * (key.y & 1), 32 * (key.x & 1)
-        low = block_reduce(np.minimum, state.samples, PATCH_CELLS) * q
-        high = block_reduce(np.maximum, state.samples, PATCH_CELLS) * q
-        error = sub_error(state.samples, above[r : r + 33, c : c + 33]) * q
+        samples, parent = state.samples, above[r : r + 33, c : c + 33]
+        if under.base is not None and under.above is not None:
+            samples, parent = total(samples, under.base), total(parent, under.above[r : r + 33, c : c + 33])
+        low = block_reduce(np.minimum, samples, PATCH_CELLS) * q
+        high = block_reduce(np.maximum, samples, PATCH_CELLS) * q
+        error = sub_error(samples, parent) * q
         bounds = (a.astype(np.float32) for a in (low, high, error))
-        return Refined(key, state, content, self.epoch, ground, *bounds)
+        return Refined(key, state, content, self.epoch, under.ground, *bounds)
 
     def known(self, level: int) -> Known:
         """All tiles of a level, as arrays."""
@@ -196,6 +227,12 @@ class RefinedTiles:
                 self._known.pop(key.level, None)
                 over -= 1
         return max(0, self.room_tiles - len(self._tiles))
+
+    def keep(self, others: RefinedTiles) -> None:
+        """Forgets the tiles that ``others`` has not."""
+        for key in [key for key in self._tiles if key not in others._tiles]:
+            del self._tiles[key]
+            self._known.pop(key.level, None)
 
     def _changed(self, level: int | None = None) -> None:
         self.stamp += 1

@@ -8,7 +8,7 @@ neighbours that differ on the edge that they share: a tile whose neighbour is st
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Set
 from dataclasses import dataclass
 from typing import Final
 
@@ -40,10 +40,12 @@ class _Blocked(Exception):
 
 
 class RefinedLedger:
-    """Mutable; used from the room's tile thread. ``below``: the ledger of the heights up to the finest whole level."""
+    """Mutable; used from the room's tile thread. ``below``: the ledger of the channel up to the finest whole level."""
 
-    def __init__(self, refined: RefinedTiles, below: Ledger, cache: EncodedTiles) -> None:
-        self._refined, self._below, self._cache = refined, below, cache
+    def __init__(
+        self, refined: RefinedTiles, below: Ledger, cache: EncodedTiles, channel: Channel = Channel.HEIGHT
+    ) -> None:
+        self._refined, self._below, self._cache, self._channel = refined, below, cache, channel
         self._held: dict[int, dict[TileKey, _Held]] = {
             level: {} for level in range(refined.levels + 1, refined.finest + 1)
         }
@@ -59,28 +61,35 @@ class RefinedLedger:
         """What the client holds."""
         return {key for tiles in self._held.values() for key in tiles}
 
-    def missing(self, selection: Selection) -> list[tuple[TileKey, float]]:
-        """Wanted tiles that the settled ground has not been refined to yet, with their projected errors."""
-        return [(k, e) for k, e in selection.tiles.items() if self._refined.verified(k) is None]
-
     # --- planning -----------------------------------------------------------------------------------------------
 
-    def plan(self, selection: Selection) -> FramePlan | None:
-        """The next frame on settled ground, when the levels below have nothing to send: LEVEL frames, then FILL."""
-        open_levels = []
+    def plan_levels(self, selection: Selection) -> tuple[FramePlan | None, int]:
+        """A LEVEL frame that is due on settled ground, when the levels below have nothing to send; and the finest level
+        up to which none is, nor waits: so far tiles may be filled in."""
+        finest = self._refined.levels
         for level in self._held:
             try:
                 plan = self._plan_level(level, selection)
             except _Blocked:
                 break
             if plan is not None:
-                return plan
-            open_levels.append(level)
-        for level in open_levels:
-            plan = self._plan_fill(level, selection)
-            if plan is not None:
-                return plan
-        return None
+                return plan, finest
+            finest = level
+        return None, finest
+
+    def plan_fill(self, level: int, selection: Selection, among: Set[TileKey] | None = None) -> FramePlan | None:
+        """A FILL frame of wanted tiles of a level, only of ``among`` if that is given, by their projected errors."""
+        held = self._held[level]
+        ready = [
+            key
+            for key in selection.tiles
+            if key.level == level
+            and key not in held
+            and (among is None or key in among)
+            and self._refined.verified(key) is not None
+            and self._parent(key) is not None
+        ]
+        return self._fill(level, ready, selection) if ready else None
 
     def _plan_level(self, level: int, selection: Selection) -> FramePlan | None:
         """Raises _Blocked when a tile that is to be replaced, or fits one that is, has not been made yet."""
@@ -126,18 +135,7 @@ class RefinedLedger:
             if not np.array_equal(_edge(now.state.samples, dx, dy), _edge(theirs.state.samples, -dx, -dy)):
                 yield other
 
-    def _plan_fill(self, level: int, selection: Selection) -> FramePlan | None:
-        held = self._held[level]
-        ready = [
-            key
-            for key in selection.tiles
-            if key.level == level
-            and key not in held
-            and self._refined.verified(key) is not None
-            and self._parent(key) is not None
-        ]
-        if not ready:
-            return None
+    def _fill(self, level: int, ready: list[TileKey], selection: Selection) -> FramePlan | None:
         over = len(ready) + sum(map(len, self._held.values())) - self._refined.client_tiles
         if over > 0:
             plan = self._plan_trim(over + SPARE_ROOM, selection)
@@ -187,13 +185,13 @@ class RefinedLedger:
             tiles.append(TilePlan(key, now.state, parent, before, base))
         clock = self._refined.clock
         return FramePlan(
-            kind, Channel.HEIGHT, level, clock, True, tuple(tiles), tuple(drops), self, self._cache, smooth=True
+            kind, self._channel, level, clock, True, tuple(tiles), tuple(drops), self, self._cache, smooth=True
         )
 
     # --- what was sent ------------------------------------------------------------------------------------------
 
     def commit(self, plan: FramePlan) -> None:
-        """A frame of heights was handed to the socket, of these levels or of one below (then committed there)."""
+        """A frame of the channel was handed to the socket, of these levels or of one below (then committed there)."""
         for key in plan.drops:
             self._forget(key)
         if plan.level > self._refined.levels:

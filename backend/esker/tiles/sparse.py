@@ -11,7 +11,7 @@ from __future__ import annotations
 import itertools
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final
+from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from esker import grid
 from esker.contract import SUBPATCHES, View
 from esker.grid import TileKey
-from esker.tiles.bounds import Floats
-from esker.tiles.pyramid import Mask, Pyramid
+from esker.tiles.bounds import Floats, SubPatches
+from esker.tiles.pyramid import Counts, Mask
 from esker.tiles.quadtree import MARGIN, SHADING_CELL_PX, SHADING_ERROR, screen_error
 from esker.tiles.refined import Known, RefinedTiles, code
 
@@ -88,7 +88,18 @@ class _Parents:
     error: Floats
 
 
-def select_refined(pyramid: Pyramid, refined: RefinedTiles, wanted: Mask, view: View) -> Selection:
+class Relief(Protocol):
+    """The levels that are solved as a whole, as selection reads them: ``pyramid.Pyramid`` or ``surface.Surface``."""
+
+    @property
+    def size_m(self) -> float: ...
+    @property
+    def levels(self) -> int: ...
+    def changes(self) -> Counts: ...
+    def sub_patches(self, level: int) -> SubPatches: ...
+
+
+def select_refined(pyramid: Relief, refined: RefinedTiles, wanted: Mask, view: View) -> Selection:
     """Wanted tiles of all levels above the pyramid's; ``wanted``: its selection of the finest level of its own.
 
     Closed under parents; the eight neighbours of a wanted tile's parent are wanted as far as they lie above the
@@ -152,7 +163,7 @@ def _around_parents(codes: Index, level: int) -> Index:
     return np.unique(code(nx[fits], ny[fits], level - 1))
 
 
-def _finest(pyramid: Pyramid, wanted: Mask) -> _Parents:
+def _finest(pyramid: Relief, wanted: Mask) -> _Parents:
     """The wanted tiles of the pyramid's finest level."""
     y, x = np.nonzero(wanted)
     q = np.float32(grid.quantum(pyramid.levels, pyramid.size_m))

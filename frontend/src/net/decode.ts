@@ -6,18 +6,16 @@
 import { inflateSync } from "fflate";
 import { subDistance, subRange } from "../core/bounds.ts";
 import { predictInts } from "../core/predict.ts";
+import { finestLevel, quantaRatio } from "../core/streams.ts";
 import { isUnderAny, keyLevel, parentKey, tileKey } from "../core/tilekey.ts";
 import type { DecodedFrame, DecodedTile } from "../core/types.ts";
 import {
-  CHANNEL_LEVELS_BELOW,
   Channel,
   Filter,
   FRAME_HEADER,
   FRAME_MAGIC,
   FRAME_SETTLED,
   FrameKind,
-  MAX_LEVEL,
-  MAX_REFINED_LEVEL,
   PROTOCOL_VERSION,
   Predictor,
   SUBPATCHES,
@@ -142,7 +140,7 @@ function parentSamples(held: Tiles, key: number): Int32Array | null {
 
 function decodeTile(held: Tiles, head: Head, tile: TileHead, payload: Uint8Array): DecodedTile {
   const key = tileKey(head.level, tile.x, tile.y);
-  const ratio = head.channel === Channel.HEIGHT ? 2 : 1;
+  const ratio = quantaRatio(head.channel);
   const samples = new Int32Array(AREA);
   const parent = parentSamples(held, key);
   if (tile.predictor === Predictor.PARENT) predictFromParent(held, key, tile, ratio);
@@ -199,7 +197,7 @@ function readHead(view: DataView): Head {
   const channel = view.getUint8(f.channel.offset);
   if (channel >= CHANNELS) throw new FrameError(`unknown channel ${channel}`);
   const level = view.getUint8(f.level.offset);
-  const finest = channel === Channel.HEIGHT ? MAX_REFINED_LEVEL : MAX_LEVEL - CHANNEL_LEVELS_BELOW;
+  const finest = finestLevel(channel);
   if (level > finest) throw new FrameError(`level ${level} is above ${finest}`);
   return {
     kind,
