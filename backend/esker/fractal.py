@@ -3,13 +3,14 @@
 ``contract_emit.py`` writes them, with ``SYNTH_`` before their names, beside those of ``contract.py``; change a number
 here, run ``make generate``, commit both. Nothing here does I/O.
 
-Units: slopes are metres per metre; elevations are shares of the domain's side above the sea (or above 0 m where there
-is none); concavity is the second difference of the ground over its spacing, positive in a valley. A pair is the
+Units: slopes are metres per metre; elevations are shares of ``relief_m`` above the sea (or above 0 m where there is
+none); concavity is the second difference of the ground over its spacing, positive in a valley. A pair is the
 interval over which a smoothstep rises.
 """
 
 from __future__ import annotations
 
+import math
 from typing import Final, NamedTuple
 
 # --- noise: a hash of the global sample index (docs/synthesis.md, "Noise") ------------------------------------------
@@ -86,6 +87,10 @@ FOAM: Final = 0.5
 FINEST_CELL_M: Final = 0.01
 """Detail ends where cells are this small: at most ``contract.MAX_SYNTHESIS_LEVEL`` levels."""
 
+SNOW_LINE_M: Final = 5200.0
+"""Height of the snow line at the equator; it falls by the square of the cosine of the latitude."""
+LEAST_SNOW_LINE_M: Final = 300.0
+
 
 class LookRule(NamedTuple):
     """What a look makes of height. ``snow_line``, ``tree_line``: elevations; ``plants``: 0 none, 1 as they grow."""
@@ -101,3 +106,14 @@ LOOKS: Final[dict[str, LookRule]] = {
     "desert": LookRule(9.0, 0.1, 0.05),
     "paper": LookRule(9.0, 0.085, 1.0),
 }
+
+
+def relief_m(size_m: float, lat_deg: float | None) -> float:
+    """What elevations are shares of, metres: the domain's side, so that a sketch of any size has its own climate.
+
+    Where the terrain has a place on Earth, that of which the natural look's snow line is the real one's height there.
+    """
+    if lat_deg is None:
+        return size_m
+    line = SNOW_LINE_M * math.cos(math.radians(lat_deg)) ** 2
+    return max(LEAST_SNOW_LINE_M, line) / LOOKS["natural"].snow_line

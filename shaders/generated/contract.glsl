@@ -74,3 +74,5 @@ const float SYNTH_WET_SLOPE_FROM = 0.3;
 const float SYNTH_WET_SLOPE_TO = 0.8;
 const float SYNTH_FOAM = 0.5;
 const float SYNTH_FINEST_CELL_M = 0.01;
+const float SYNTH_SNOW_LINE_M = 5200.0;
+const float SYNTH_LEAST_SNOW_LINE_M = 300.0;

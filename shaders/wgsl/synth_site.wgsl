@@ -13,7 +13,7 @@ struct SynthSite {
   amplitude: f32,         // of the coarsest octave on steep ground, metres
   sea: f32,               // elevations count from here, metres
   has_sea: f32,           // 1 or 0
-  snow_line: f32,         // of the look, elevations as shares of the side
+  snow_line: f32,         // of the look, elevations as shares of `relief`
   tree_line: f32,
   plants: f32,
   solved: u32,            // finest level whose guide is what was sent
@@ -22,9 +22,9 @@ struct SynthSite {
   varied: u32,            // 1: the channels differ from place to place
   biased: u32,            // 1: paint asks for snow, plants or wetness somewhere
   surveyed: u32,          // 1: elevation data hold detail back somewhere
+  relief: f32,            // elevations are shares of it, metres
   pad0: u32,
   pad1: u32,
-  pad2: u32,
   levels: array<SynthLevel, 18>,
 };
 

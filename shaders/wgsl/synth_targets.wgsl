@@ -15,7 +15,7 @@ fn rise(low: f32, high: f32, x: vec4f) -> vec4f {
 }
 
 fn targets(site: SynthSite, ground: Ground) -> Targets {
-  let e = (ground.height - site.sea) / site.size;
+  let e = (ground.height - site.sea) / site.relief;
   let t2 = ground.slope_x * ground.slope_x + ground.slope_y * ground.slope_y;
   let t = sqrt(t2);
   let north = -ground.slope_y * inverseSqrt(1.0 + t2);

@@ -132,6 +132,22 @@ def test_detail_begins_below_the_data() -> None:
     assert np.array_equal(somewhere(plane(0.5, channels=none)).d, somewhere(plane(0.5)).d)
 
 
+def test_a_place_on_earth_has_its_own_snow_line() -> None:
+    """SPEC F20: whatever the size of the domain; without a place elevations are shares of it."""
+    for size, lat, below, above in (
+        (SIZE, 46.8, 2000.0, 3000.0),
+        (65536.0, 46.8, 2000.0, 3000.0),
+        (SIZE, 70.0, 250.0, 1200.0),
+    ):
+        flat = np.zeros((65, 65), dtype=np.float32)
+        snow = [
+            somewhere(Site(size, 1, (flat + np.float32(h),), lat_deg=lat), 3, 60).snow.mean() for h in (below, above)
+        ]
+        assert snow[0] < 0.02
+        assert snow[1] > 0.9
+    assert Site(SIZE, 1, (flat,)).relief_m == SIZE
+
+
 def test_strength_scales_detail() -> None:
     base, double, none = (somewhere(plane(0.0, detail=strength), 3, 50).d for strength in (1.0, 2.0, 0.0))
     assert rms(double) == pytest.approx(2 * rms(base), rel=0.02)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from esker import Stroke, Terrain, grid
+from esker import Stroke, Terrain, contract, grid
 from esker.contract import DEFAULT_LEVEL, Channel, PaintChannel
 from esker.document import archive
 from esker.solve import command
@@ -43,6 +43,12 @@ def test_guides_are_what_clients_decode(size: float, level: int) -> None:
     q = grid.quantum(level, size)
     assert np.array_equal(on_the_wire(z, level, size), (samples.astype(np.float64) * q).astype(np.float32))
     assert np.abs(on_the_wire(z, level, size) - z).max() <= 0.51 * q
+    under = (0.7 * np.roll(z, 5, axis=0)).astype(np.float32)
+    both = (samples + quantise(under, level, size)).astype(np.float64) * q
+    assert np.array_equal(on_the_wire(z, level, size, under), both.astype(np.float32))
+    if level == 0:
+        terrain = contract.TerrainSettings(size_m=size)
+        assert np.array_equal(site_of(terrain, z, {}, base=(under,)).guides[0], both.astype(np.float32))
 
 
 def test_channels_are_what_clients_decode(terrain: Terrain) -> None:

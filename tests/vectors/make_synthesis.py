@@ -49,7 +49,7 @@ def fields(name: str, **changes: Any) -> dict[str, Any]:
     """A site as JSON has it."""
     out: dict[str, Any] = {
         "name": name, "size_m": SIZE_M, "seed": 1, "detail": 1.0, "rule": "landscape", "look": "natural",
-        "sea_level_m": None, "cyclic": False, "solved": 0, "channels": {},
+        "sea_level_m": None, "cyclic": False, "place": None, "solved": 0, "channels": {},
     }  # fmt: skip
     return out | changes
 
@@ -78,7 +78,7 @@ SITES = (
     fields("smooth", rule="smooth", sea_level_m=-20.0, channels=strokes(6)),
     fields("plain", rule="plain", look="desert", channels=strokes(7)),
     fields("cyclic", cyclic=True, seed=77, channels=strokes(8)),
-    fields("surveyed", seed=9, channels=strokes(9) | survey(9)),
+    fields("surveyed", seed=9, place={"lat_deg": 46.85, "lon_deg": -121.76}, channels=strokes(9) | survey(9)),
     fields("wide", size_m=65536.0, seed=123456789, look="paper"),
 )
 
@@ -95,7 +95,7 @@ def site_of(data: dict[str, Any]) -> Site:
     channels = {name: np.asarray(values, dtype=np.float32) for name, values in data["channels"].items()}
     return Site(
         size, data["seed"], guides, channels, data["detail"], data["rule"], data["look"], data["sea_level_m"],
-        data["cyclic"],
+        data["cyclic"], None if data["place"] is None else data["place"]["lat_deg"],
     )  # fmt: skip
 
 

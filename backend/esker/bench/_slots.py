@@ -58,7 +58,8 @@ def site_words(site: Site, bits: int, varied: bool, biased: bool) -> NDArray[np.
     head = [site.size_m, site.amplitude_m, sea or 0.0, 0.0 if sea is None else 1.0, *look]
     words = [
         np.array(head, np.float32).view(np.uint32),
-        np.array([site.solved, site.cyclic, bits, varied, biased, site.surveyed, 0, 0, 0], np.uint32),
+        np.array([site.solved, site.cyclic, bits, varied, biased, site.surveyed], np.uint32),
+        np.array([site.relief_m, 0, 0], np.float32).view(np.uint32),
     ]
     for level in range(MAX_SYNTHESIS_LEVEL + 1):
         starts = [site.seed + fractal.HASH_STEP * (fractal.HASH_STREAMS * level + stream) for stream in range(4)]

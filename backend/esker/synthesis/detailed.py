@@ -6,7 +6,7 @@ refined where the caller can refine it, and interpolated beyond (docs/synthesis.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, Protocol
 
@@ -75,26 +75,50 @@ class Detail:
     attributes: Mapping[str, Grid]
 
 
-def on_the_wire(heights: NDArray[np.float32], level: int, size_m: float) -> Grid:
-    """Heights as every client has them: rounded to quanta of the level, halves to even, then metres again."""
+def on_the_wire(heights: Grid, level: int, size_m: float, base: Grid | None = None) -> Grid:
+    """Heights as every client has them: rounded to quanta of the level, halves to even, then metres again.
+
+    ``base``: of elevation layers, the same shape; it travels by itself, rounded by itself, and is added.
+    """
     q = grid.quantum(level, size_m)
-    steps = np.rint(np.clip(heights * np.float32(1.0 / q), -WIRE_LIMIT, WIRE_LIMIT))
-    metres: Grid = (steps.astype(np.float64) * q).astype(np.float32)
+    steps = _steps(heights, q) if base is None else _steps(heights, q) + _steps(base, q)
+    metres: Grid = (steps * q).astype(np.float32)
     return metres
 
 
-def site_of(settings: TerrainSettings, heights: NDArray[np.float32], channels: Mapping[str, Grid]) -> Site:
+def _steps(heights: Grid, q: float) -> NDArray[np.float64]:
+    steps: NDArray[np.float64] = np.rint(np.clip(heights * np.float32(1.0 / q), -WIRE_LIMIT, WIRE_LIMIT)).astype(
+        np.float64
+    )
+    return steps
+
+
+def site_of(
+    settings: TerrainSettings,
+    heights: NDArray[np.float32],
+    channels: Mapping[str, Grid],
+    base: Sequence[Grid] = (),
+) -> Site:
     """The site of a settled solve. ``heights``: (N, N) float32 of level G, metres; ``channels``: by the names of
-    ``Biases``, (n, n) as the solver gives them. Raises ValueError for shapes that do not fit."""
+    ``Biases``, (n, n) as the solver gives them. ``base``: levels 0..G of the elevation layers' ground, on which
+    ``heights`` are then offsets. Raises ValueError for shapes that do not fit."""
     top = ((len(heights) - 1) // TILE_CELLS).bit_length() - 1
+    if len(base) not in {0, top + 1}:
+        raise ValueError(f"the base has {len(base)} levels, not {top + 1}")
     guides = tuple(
-        on_the_wire(np.ascontiguousarray(heights[:: 1 << (top - k), :: 1 << (top - k)]), k, settings.size_m)
+        on_the_wire(
+            np.ascontiguousarray(heights[:: 1 << (top - k), :: 1 << (top - k)]),
+            k,
+            settings.size_m,
+            base[k] if base else None,
+        )
         for k in range(top + 1)
     )
     return Site(
         settings.size_m, settings.seed, guides,
         {name: _rounded(values, *QUANTA[name]) for name, values in channels.items() if name in Biases._fields},
         settings.detail, settings.rule, settings.look, settings.sea_level_m,
+        lat_deg=None if settings.place is None else settings.place.lat_deg,
     )  # fmt: skip
 
 
@@ -108,12 +132,20 @@ class DetailedTerrain:
     """Makes windows of one settled terrain.
 
     ``refine`` gives the base of levels above the site's solved ones, up to ``finest``; without it, and in cyclic
-    domains, it is interpolated.
+    domains, it is interpolated. ``ground``: the elevation layers' ground of those levels, on which ``refine`` gives
+    offsets.
     """
 
-    def __init__(self, site: Site, maker: Maker | None = None, refine: Refine | None = None, finest: int = 0) -> None:
+    def __init__(
+        self,
+        site: Site,
+        maker: Maker | None = None,
+        refine: Refine | None = None,
+        finest: int = 0,
+        ground: Refine | None = None,
+    ) -> None:
         self.site, self._maker = site, maker or NumpyMaker()
-        self._refine = refine
+        self._refine, self._ground = refine, ground
         self.finest = max(site.solved, 0 if refine is None or site.cyclic else finest)
         """The finest level of which the base is not interpolated."""
 
@@ -166,6 +198,7 @@ class DetailedTerrain:
         # beyond an edge the border is made of as many samples on the near side of it
         r0, c0 = (max(0, min(k, n - 1 - BORDER)) for k in (window.r0, window.c0))
         r1, c1 = (min(n, max(k, BORDER + 1)) for k in (window.r1, window.c1))
-        held = self._refine(window.level, slice(r0, r1), slice(c0, c1))
-        held = on_the_wire(held, window.level, self.site.size_m)
+        rows, cols = slice(r0, r1), slice(c0, c1)
+        under = None if self._ground is None else self._ground(window.level, rows, cols)
+        held = on_the_wire(self._refine(window.level, rows, cols), window.level, self.site.size_m, under)
         return extended(held, window, origin=(r0, c0)).astype(np.float32)

@@ -11,7 +11,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from esker import contract, grid
 from esker.contract import BASE_ROUGHNESS, BASE_SURVEY, TILE_CELLS
-from esker.fractal import ALPHA, LOOKS, LookRule
+from esker.fractal import ALPHA, LOOKS, LookRule, relief_m
 from esker.synthesis.interpolate import Window
 from esker.synthesis.state import Array, State
 
@@ -66,7 +66,8 @@ class Site:
     ``guides``: heights of levels 0..G as sent on the wire, metres, (N_l, N_l) float32; ``channels``: grids (n, n) over
     the whole domain, corners on corners, n - 1 a power of two, by the names of ``Biases``; one that is missing is its
     base everywhere. ``detail``: strength, 0..4. ``sea_level_m``: None where there is no sea. ``cyclic``: the domain's
-    east edge is its west edge, north its south. ``dtype``: of the arithmetic. Raises ValueError for what does not fit.
+    east edge is its west edge, north its south. ``lat_deg``: where on Earth it lies, if anywhere. ``dtype``: of the
+    arithmetic. Raises ValueError for what does not fit.
     """
 
     size_m: float
@@ -78,6 +79,7 @@ class Site:
     look: str = "natural"
     sea_level_m: float | None = None
     cyclic: bool = False
+    lat_deg: float | None = None
     dtype: DTypeLike = np.float64
 
     def __post_init__(self) -> None:
@@ -105,6 +107,11 @@ class Site:
     def look_rule(self) -> LookRule:
         """Snow line, tree line and plants of the look."""
         return LOOKS[self.look]
+
+    @property
+    def relief_m(self) -> float:
+        """What elevations are shares of, metres."""
+        return relief_m(self.size_m, self.lat_deg)
 
     @property
     def surveyed(self) -> bool:

@@ -284,6 +284,10 @@ export const SYNTH_FOAM = 0.5;
 
 export const SYNTH_FINEST_CELL_M = 0.01;
 
+export const SYNTH_SNOW_LINE_M = 5200.0;
+
+export const SYNTH_LEAST_SNOW_LINE_M = 300.0;
+
 export const SYNTH_LOOKS = {
   natural: {
   snowLine: 0.15,

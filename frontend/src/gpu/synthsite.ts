@@ -1,6 +1,6 @@
 /** The settings of the synthesis as its shaders read them: `SynthSite` in shaders/wgsl/synth_site.wgsl. */
 
-import type { Look, Rule } from "../generated/contract.ts";
+import type { Look, Place, Rule } from "../generated/contract.ts";
 import {
   MAX_SYNTHESIS_LEVEL,
   SYNTH_CHANNEL_NOISE,
@@ -25,6 +25,8 @@ export interface SynthesisSettings {
   readonly rule: SynthesisRule;
   readonly look: Look;
   readonly seaLevelM: number | null;
+  /** Where on Earth the terrain lies, if anywhere. */
+  readonly place?: Place | null;
   /** Finest level that is solved everywhere: to it the guide is what was sent, above it the guide is interpolated. */
   readonly solved: number;
   /** The domain's east edge is its west edge, north its south. */
@@ -48,11 +50,13 @@ export function siteWords(s: SynthesisSettings, channels: ChannelFacts): Uint32A
     look: s.look,
     detail: s.detail,
     rule: s.rule,
+    place: s.place ?? null,
   });
   floats.set([sizeM, site.amplitudeM, seaLevelM ?? 0, seaLevelM === null ? 0 : 1]);
   floats.set([site.snowLine, site.treeLine, site.plants], 4);
   const { bits, varied, biased, surveyed } = channels;
   words.set([s.solved, s.cyclic === true ? 1 : 0, bits, varied ? 1 : 0, biased ? 1 : 0, surveyed ? 1 : 0], 7);
+  floats[13] = site.reliefM;
   for (let level = 0; level < LEVELS; level += 1) {
     const at = HEAD_WORDS + LEVEL_WORDS * level;
     for (let stream = 0; stream < 4; stream += 1) words[at + stream] = streamStart(s.seed, level, stream);
@@ -73,6 +77,7 @@ export function sameSettings(a: SynthesisSettings, b: SynthesisSettings): boolea
     a.rule === b.rule &&
     a.look === b.look &&
     a.seaLevelM === b.seaLevelM &&
+    a.place?.lat_deg === b.place?.lat_deg &&
     a.solved === b.solved &&
     (a.cyclic === true) === (b.cyclic === true)
   );

@@ -1,7 +1,7 @@
 /** The page's synthesis passes on this browser's device, held against tests/vectors/synthesis.json (SPEC R26). */
 
 import type { ChannelGrid, ChannelView } from "../../src/core/types.ts";
-import type { Look } from "../../src/generated/contract.ts";
+import type { Place as Home, Look } from "../../src/generated/contract.ts";
 import { type BoundsJob, BoundsPass, TILE_BOUNDS } from "../../src/gpu/bounds.ts";
 import {
   GROUND_BYTES,
@@ -21,6 +21,7 @@ interface VectorSite {
   readonly rule: SynthesisRule;
   readonly look: Look;
   readonly sea_level_m: number | null;
+  readonly place: Home | null;
   readonly cyclic: boolean;
   readonly solved: number;
   readonly channels: Readonly<Record<string, readonly (readonly number[])[]>>;
@@ -156,6 +157,7 @@ export async function synthesisVectors(vectors: Vectors, featureLevel = "core"):
       rule: site.rule,
       look: site.look,
       seaLevelM: site.sea_level_m,
+      place: site.place,
       solved: site.solved,
       cyclic: site.cyclic,
     });

@@ -3,7 +3,7 @@
 import { readFileSync } from "node:fs";
 import { resolve } from "node:path";
 import type { ChannelGrid, ChannelView } from "../../src/core/types.ts";
-import type { Look, Rule } from "../../src/generated/contract.ts";
+import type { Look, Place, Rule } from "../../src/generated/contract.ts";
 import { QUANTA_PER_CELL, TILE_CELLS } from "../../src/generated/contract.ts";
 import { Biases } from "../../src/tiles/biases.ts";
 import { fillArea } from "../../src/tiles/guide.ts";
@@ -18,6 +18,7 @@ export interface SiteVector {
   readonly rule: Rule;
   readonly look: Look;
   readonly sea_level_m: number | null;
+  readonly place: Place | null;
   readonly cyclic: boolean;
   readonly solved: number;
   readonly channels: Readonly<Partial<Record<keyof Omit<ChannelView, "stamp">, readonly (readonly number[])[]>>>;

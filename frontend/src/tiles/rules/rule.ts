@@ -4,12 +4,21 @@
  * picked point, and objects made for each would cost more than the rule.
  */
 
-import type { TerrainSettings } from "../../generated/contract.ts";
-import { BASE_SURVEY, SYNTH_ALPHA, SYNTH_LOOKS, TILE_CELLS } from "../../generated/contract.ts";
+import type { Place, TerrainSettings } from "../../generated/contract.ts";
+import {
+  BASE_SURVEY,
+  SYNTH_ALPHA,
+  SYNTH_LEAST_SNOW_LINE_M,
+  SYNTH_LOOKS,
+  SYNTH_SNOW_LINE_M,
+  TILE_CELLS,
+} from "../../generated/contract.ts";
 
 /** One terrain as its rule sees it. */
 export interface Site {
   readonly sizeM: number;
+  /** What elevations are shares of, metres. */
+  readonly reliefM: number;
   readonly seed: number;
   /** Amplitude of the coarsest octave on steep ground, metres. */
   readonly amplitudeM: number;
@@ -19,13 +28,25 @@ export interface Site {
   readonly plants: number;
 }
 
-export type RuleSettings = Pick<TerrainSettings, "size_m" | "seed" | "sea_level_m" | "look" | "detail" | "rule">;
+export type RuleSettings = Pick<TerrainSettings, "size_m" | "seed" | "sea_level_m" | "look" | "detail" | "rule"> &
+  Partial<Pick<TerrainSettings, "place">>;
+
+/**
+ * What elevations are shares of, metres: the domain's side, so that a sketch of any size has its own climate; where the
+ * terrain has a place on Earth, that of which the natural look's snow line is the real one's height there.
+ */
+export function reliefM(sizeM: number, place: Place | null | undefined): number {
+  if (place == null) return sizeM;
+  const line = SYNTH_SNOW_LINE_M * Math.cos((place.lat_deg * Math.PI) / 180) ** 2;
+  return Math.max(SYNTH_LEAST_SNOW_LINE_M, line) / SYNTH_LOOKS.natural.snowLine;
+}
 
 /** The site that settings describe. */
 export function siteOf(settings: RuleSettings): Site {
   const look = SYNTH_LOOKS[settings.look];
   return {
     sizeM: settings.size_m,
+    reliefM: reliefM(settings.size_m, settings.place),
     seed: settings.seed,
     amplitudeM: (settings.detail * SYNTH_ALPHA * settings.size_m) / TILE_CELLS,
     seaLevelM: settings.sea_level_m,
