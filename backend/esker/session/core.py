@@ -88,6 +88,8 @@ class RoomCore:
         self.head = self.document = loaded.document
         self.geometry_clock = loaded.document.clock
         """Clock of the last op that changed the ground."""
+        self.base_clock = loaded.document.clock
+        """Clock of the last op that changed the elevation layers' part of it."""
         self.members = Members()
         self._find, self._limits, self._max_members = find, limits or Limits(), max_members
         self._counters = dict(loaded.counters)
@@ -187,18 +189,36 @@ class RoomCore:
             return False
         if counter <= self._counters.get(client, -1) and self._known(member, client, counter):
             return False
-        before = self.head
+        if _adds_layer(envelope.op):
+            self.refuse(member, envelope.id, "server_only", "A layer is added by importing a file, not by this op.")
+            return False
         try:
-            after, _ = before.apply(envelope.op, self._limits)
+            self._order(envelope.op, client, counter, client)
         except Refusal as refusal:
             self.refuse(member, envelope.id, refusal.code, refusal.message)
             return False
+        return True
+
+    def perform(self, op: c.Op, agent: str, author: str) -> int:
+        """Orders an op of the server's own, the first and only one of ``agent``; returns its clock. Raises Refusal.
+
+        ``author``: the client in whose name it is done, who may undo it (``document/sync.py``).
+        """
+        if self._counters.get(agent, -1) >= 0:
+            raise Refusal("duplicate_layer", "This was done already.")
+        self._order(op, agent, 0, author)
+        return self.head.clock
+
+    def _order(self, op: c.Op, client: str, counter: int, author: str) -> None:
+        before = self.head
+        after, _ = before.apply(op, self._limits)
         self.head = after
+        if after.ground is not before.ground:
+            self.base_clock = self.geometry_clock = after.clock
         if after.says is not before.says:
             self.geometry_clock = after.clock
         self._counters[client] = max(counter, self._counters.get(client, -1))
-        self._waiting.append(Row(after.clock, client, counter, client, op_json(envelope.op)))
-        return True
+        self._waiting.append(Row(after.clock, client, counter, author, op_json(op)))
 
     def _known(self, member: Member, client: str, counter: int) -> bool:
         """True for an op that is ordered already: acknowledged now, or with its tick if that is still under way."""
@@ -256,9 +276,13 @@ class RoomCore:
         lost = [*self._in_flight, *self._waiting]
         self._in_flight, self._waiting = [], []
         self.head = self.document
-        self.geometry_clock = self.head.clock
+        self.geometry_clock = self.base_clock = self.head.clock
         for row in lost:
             author = self.members.by_client.get(row.client)
             if author is not None:
                 sentence = "The server could not save this change (is its disk full?). It was taken back."
                 self.refuse(author, f"{row.client}:{row.counter}", "unavailable", sentence)
+
+
+def _adds_layer(op: c.Op) -> bool:
+    return any(isinstance(part, c.AddLayer) for part in (op.ops if isinstance(op, c.Group) else (op,)))

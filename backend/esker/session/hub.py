@@ -7,6 +7,7 @@ import logging
 import secrets
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from typing import Final
 
 from esker import contract as c
@@ -14,7 +15,7 @@ from esker.document.ops import Limits
 from esker.session.core import Denied, RoomCore, RoomInfo
 from esker.session.limits import RateByKey
 from esker.session.outbox import Outbox
-from esker.session.ports import Tiles
+from esker.session.ports import Elevation, Tiles
 from esker.session.room import Guest, Room
 from esker.session.tilethread import TileThread
 from esker.session.worker import Worker
@@ -44,8 +45,10 @@ class Hub:
         max_members: int = c.MAX_MEMBERS,
         idle_seconds: float = IDLE_SECONDS,
         now: Callable[[], float] = time.monotonic,
+        elevation: Elevation | None = None,
     ) -> None:
-        """``levels``: the finest level solved as a whole; ``finest``: the finest refined (default: none is)."""
+        """``levels``: the finest level solved as a whole; ``finest``: the finest refined (default: none is);
+        ``elevation``: makes the base of elevation layers (default: none is laid)."""
         self.journal, self.access = journal, access
         self._worker, self._tiles = worker, tiles
         self._levels, self._finest = levels, levels if finest is None else max(levels, finest)
@@ -53,6 +56,8 @@ class Hub:
         self._idle_seconds, self._now = idle_seconds, now
         self._rooms: dict[str, asyncio.Task[Room | None]] = {}
         self._tile_thread = TileThread()
+        self._elevation = elevation
+        self._laying = ThreadPoolExecutor(1, thread_name_prefix="elevation")
         self._wrong = RateByKey(WRONG_SECRETS_PER_MINUTE / 60, WRONG_SECRETS_PER_MINUTE)
         self._closing = False
 
@@ -132,6 +137,8 @@ class Hub:
             executor=self._tile_thread,
             info=RoomInfo(self._levels, self._finest, self._worker.device_name),
             on_empty=lambda: self._empty(terrain),
+            elevation=self._elevation,
+            laying=self._laying,
         )
 
     def open_room(self, terrain: str) -> Room | None:
@@ -196,3 +203,4 @@ class Hub:
             room.shut()
         self._rooms.clear()
         self._tile_thread.shutdown(wait=False, cancel_futures=True)
+        self._laying.shutdown(wait=False, cancel_futures=True)

@@ -100,6 +100,31 @@ class Refinement(Protocol):
         ...
 
 
+class Base(Protocol):
+    """The ground of the elevation layers (``patchwork/base.py``): immutable, so the same object is the same ground."""
+
+    @property
+    def digest(self) -> bytes: ...
+
+
+class Elevation(Protocol):
+    """Makes the base of a terrain's layers (``esker.elevation``). May block for seconds: not for the event loop."""
+
+    def base(
+        self,
+        layers: tuple[c.Layer, ...],
+        size_m: float,
+        before: Base | None,
+        tell: Callable[[str], None] = ...,
+    ) -> Base | None:
+        """The base of these layers, hidden ones left out; None when nothing is visible.
+
+        ``before``: an earlier base of the same terrain, whose parts that no changed layer reaches are used again.
+        ``tell`` is called with a sentence for each layer that had to be left out.
+        """
+        ...
+
+
 class Solver(Protocol):
     """The solver as the worker uses it (``solve/solver.py``)."""
 
@@ -113,10 +138,15 @@ class Solver(Protocol):
         levels: int | None = None,
         *,
         basis: bool = False,
+        base: Any = None,
     ) -> Iterator[LevelResult | None]: ...
 
+    def base_levels(self, base: Any, levels: int) -> Iterator[LevelResult | None]:
+        """The base up to a level, coarse to fine, then the survey channel: to be shown before what is solved on it."""
+        ...
+
     def channels(
-        self, strokes: Sequence[c.Stroke], settings: c.TerrainSettings, levels: int | None = None
+        self, strokes: Sequence[c.Stroke], settings: c.TerrainSettings, levels: int | None = None, base: Any = None
     ) -> Iterator[LevelResult | None]: ...
 
     def refiner(self, basis: Any) -> Refiner: ...

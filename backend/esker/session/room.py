@@ -9,17 +9,19 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable
-from concurrent.futures import Future
+from concurrent.futures import Executor, Future
 from typing import Final
 
 from esker import contract as c
 from esker.contract import Role
+from esker.document.ops import Refusal
 from esker.session import protocol
 from esker.session.core import Batch, RoomCore, RoomInfo
 from esker.session.feed import Stream, TileFeed
-from esker.session.members import Member
+from esker.session.laying import Layers
+from esker.session.members import QUIET_BACKLOG_BYTES, Member
 from esker.session.outbox import Outbox
-from esker.session.ports import Journal, Tiles
+from esker.session.ports import Base, Elevation, Journal, Tiles
 from esker.session.tilethread import TileThread
 from esker.session.worker import Job, Worker
 
@@ -29,6 +31,7 @@ TICK: Final = c.TICK_MS / 1000
 PRESENCE_TICK: Final = 1 / c.PRESENCE_HZ
 PROGRESS_TICK: Final = 0.1
 CLOCK_TICK: Final = 0.25
+LAST_STAGES: Final = frozenset({"done", "refused", "cancelled"})
 
 
 class Guest:
@@ -51,7 +54,10 @@ class Room:
         executor: TileThread,
         info: RoomInfo,
         on_empty: Callable[[], None],
+        elevation: Elevation | None = None,
+        laying: Executor | None = None,
     ) -> None:
+        """``elevation`` makes the base of the layers, in a thread of ``laying``; without them nothing is laid."""
         self.core, self.info = core, info
         self.id = core.document.id
         self._journal, self._worker, self._on_empty = journal, worker, on_empty
@@ -69,6 +75,10 @@ class Room:
             limit=self._feed.limit,
             confirm=self._feed.confirm,
         )
+        self._layers = Layers(elevation, laying, self._loop, self._laid, self._tell)
+        self._shape: tuple[object, Base | None, object] = (None, None, None)
+        """Shape of the strokes, base, and what stands for both in a job."""
+        self._says: object = None
         self._tick_timer: asyncio.TimerHandle | None = None
         self._tick_at = float("-inf")
         self._presence_timer: asyncio.TimerHandle | None = None
@@ -135,6 +145,31 @@ class Room:
         if self.core.members.pending:
             self.core.members.tick()
 
+    # --- imports ------------------------------------------------------------------------------------------------
+
+    async def perform(self, op: c.Op, agent: str, author: str) -> int:
+        """Does an op of the server's own in the name of client ``author``; returns its clock once it is in the journal.
+
+        ``agent``: the id under which it is done, once. Raises Refusal (also when it could not be saved).
+        """
+        clock = self.core.perform(op, agent, author)
+        self._ordered()
+        await self.flush()
+        if not len(self.core.members):
+            self._on_empty()
+        if self._journal.find(self.id, agent, 0) != clock:
+            raise Refusal(
+                "unavailable", "The server could not save this change (is its disk full?). It was taken back."
+            )
+        return clock
+
+    def importing(self, message: c.Importing) -> None:
+        """Tells everybody how far somebody's import is."""
+        text = message.model_dump_json()
+        for member in self.core.members:
+            if member.outbox.backlog < QUIET_BACKLOG_BYTES or message.status.stage in LAST_STAGES:
+                member.outbox.push(text)
+
     # --- ticks --------------------------------------------------------------------------------------------------
 
     def _ordered(self) -> None:
@@ -178,7 +213,7 @@ class Room:
         self._solve_due = False
         if self.core.geometry_clock > self._requested_clock:
             self._request_solve()
-        elif self._progress.settled:
+        elif self._progress.settled and self._layers.current(self.core.head):
             # Nothing but the clock changed, and the members see that from the ops: no hurry.
             progress = self._progress.model_copy(update={"clock": self.core.head.clock})
             self._note_progress(progress, CLOCK_TICK)
@@ -186,8 +221,24 @@ class Room:
     def _request_solve(self) -> None:
         head = self.core.head
         self._requested_clock = head.clock
-        job = Job(head.clock, tuple(head.strokes.values()), head.settings, head.shape, head.painted)
+        fresh = self._layers.want(head)
+        if self._layers.empty:
+            return  # the first look at a terrain with real ground shows it, and no plane before
+        base = self._layers.base
+        if self._shape[0] is not head.shape or self._shape[1] is not base:
+            self._shape = head.shape, base, object()
+        elif not fresh and self._says is head.says:
+            return  # what is solved, or being solved, is all that can be until the new base is there
+        self._says = head.says
+        # On a base of before, this is not yet the ground of any clock since.
+        clock = head.clock if fresh else self.core.base_clock - 1
+        job = Job(clock, tuple(head.strokes.values()), head.settings, self._shape[2], head.painted, base)
         self._worker.request(self._solve_client, job)
+
+    def _laid(self) -> None:
+        """Another base is there."""
+        if not self.closed:
+            self._request_solve()
 
     def _level_taken(self, clock: int, level: int, settled: bool) -> None:
         """A level became tiles. An op that does not touch the ground leaves an older solve as good as new."""
@@ -245,6 +296,7 @@ class Room:
     def shut(self) -> None:
         """Stops the timers and the solver's work for this room. Call ``flush`` first."""
         self.closed = True
+        self._layers.close()
         self._worker.remove(self._solve_client)
         for timer in (self._tick_timer, self._presence_timer, self._progress_timer):
             if timer is not None:

@@ -17,7 +17,7 @@ from typing import Final
 
 from esker import contract as c
 from esker.grid import TileKey, solve_bytes
-from esker.session.ports import LevelResult, Refinement, Refiner
+from esker.session.ports import Base, LevelResult, Refinement, Refiner
 from esker.session.recovery import Backoff
 from esker.tiles.delivery import RefinedTile
 
@@ -46,6 +46,8 @@ class Job:
     settings: c.TerrainSettings
     shape: object = field(default_factory=object, compare=False)
     painted: object = field(default=None, compare=False)
+    base: Base | None = field(default=None, compare=False)
+    """The ground under the strokes. Jobs with another base have another ``shape``."""
 
 
 @dataclass(eq=False)
@@ -81,17 +83,21 @@ class Client:
     """Shape and finest level of the heights that are settled here, and refined."""
     ground_clock: int = -1
     """Of the job whose heights they are, or will be."""
+    laid: tuple[Base | None, int] = (None, -1)
+    """The base whose levels were delivered last, and the finest of them. A terrain begins with no base on any level."""
     light: bool = False
     """What runs are the channels of a job whose heights are settled."""
     aside_clock: int = -1
     """Of the newest job whose channels were solved while the running one went on; -1 for none."""
+    aside_job: Job | None = None
+    """That job."""
     painted: object = None
     """Of the job whose channels came last, or will come."""
     previewing: bool = False
     finest_at: float = -math.inf
     _reached: int = -1
-    _previewed: int = -1
-    """Clock of the last complete preview."""
+    _previewed: Job | None = None
+    """That had the last complete preview."""
     _came: dict[int, float] = field(default_factory=dict)
     _lead: dict[int, float] = field(default_factory=dict)
     """Per level: how long before the finest its preview came, last time."""
@@ -128,6 +134,11 @@ class Client:
         self.refined.clear()
         self.looking = self.previewing = self.light = False
 
+    def stands_on(self, base: Base | None) -> bool:
+        """Whether this base was delivered last, up to the level that is solved; no base need not be."""
+        shown, top = self.laid
+        return shown is base and (top >= self.top or (base is None and top == -1))
+
     @property
     def lighter(self) -> bool:
         """Whether its newest job has the heights that are settled already."""
@@ -138,7 +149,7 @@ class Client:
         """Whether the channels of its newest job are to be had while the running one goes on: because they were painted
         on, which must not wait for a pass to end, or because the heights, which are the same, are settling."""
         newest, running = self.newest, self.running
-        if newest is None or running is None or self.steps is None or self.light or newest.clock == self.aside_clock:
+        if newest is None or running is None or self.steps is None or self.light or newest is self.aside_job:
             return False
         settling = newest.shape is running.shape and not self.previewing
         return settling or newest.painted is not self.painted
@@ -159,7 +170,7 @@ class Client:
         if self.aside:
             return COARSE
         if self.newest is not None and self.starts(now):
-            return SETTLE if self.newest.clock == self._previewed else COARSE
+            return SETTLE if self.newest is self._previewed else COARSE
         if self.steps is not None:
             return SETTLE if not self.previewing else FINER if self._reached >= 0 else COARSE
         return REFINE if self.refiner is not None and self.looking else None
@@ -167,7 +178,7 @@ class Client:
     def begin(self) -> Job:
         """Takes up the newest job."""
         assert self.newest is not None
-        self.painted, self.aside_clock = self.newest.painted, -1
+        self.painted, self.aside_clock, self.aside_job = self.newest.painted, -1, None
         if self.lighter:
             _close(self.steps)
             self.running, self.newest, self.light = self.newest, None, True
@@ -200,7 +211,7 @@ class Client:
             telling = level == 0 or self._lead.get(level, math.inf) > HOLD
             return telling and now - self.finest_at >= FRAMES
         self._lead = {coarse: now - came for coarse, came in self._came.items()}
-        self.previewing, self.finest_at, self._previewed = False, now, self.clock
+        self.previewing, self.finest_at, self._previewed = False, now, self.running
         return True
 
 

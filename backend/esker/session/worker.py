@@ -13,11 +13,12 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Final
 
 from esker import contract as c
-from esker.session.ports import LevelResult, Refinement, Solver, SolverFactory
+from esker.session.laying import blank_levels
+from esker.session.ports import Base, LevelResult, Refinement, Solver, SolverFactory
 from esker.session.recovery import LAST_RESORT, Devices, Diagnose, Fault, unknown
 from esker.session.schedule import Client, Deliver, Job, Schedule
 
@@ -25,6 +26,8 @@ log = logging.getLogger("esker.worker")
 
 __all__ = ["Client", "Job", "Worker"]
 
+GROUND: Final = frozenset({c.Channel.BASE, c.Channel.SURVEY})
+"""Channels of the elevation layers: no solve changes them."""
 IDLE_CHECK: Final = 1.0
 """Seconds between looks at what may be tried again, when nothing else wakes the thread."""
 AGAIN_AFTER: Final = 3.0
@@ -175,14 +178,45 @@ class Worker:
         if self._standing and client.told != self._standing:
             client.told = self._standing
             client.tell(self._standing)
-        refines = client.refinement is not None
         try:
-            if client.light:
-                client.steps = iter(self._solver.channels(job.strokes, job.settings, client.top))
-            else:
-                client.steps = iter(self._solver.steps(job.strokes, job.settings, client.top, basis=refines))
+            client.steps = self._channels(job, client.top) if client.light else self._steps(client, job)
         except Exception as error:
             self._failed(client, job, error)
+
+    def _channels(self, job: Job, top: int) -> Iterator[LevelResult | None]:
+        assert self._solver is not None
+        based = {} if job.base is None else {"base": job.base}
+        return iter(self._solver.channels(job.strokes, job.settings, top, **based))
+
+    def _steps(self, client: Client, job: Job) -> Iterator[LevelResult | None]:
+        """First the base, where another one was shown, then what is solved on it."""
+        assert self._solver is not None
+        based = {} if job.base is None else {"base": job.base}
+        refines = client.refinement is not None
+        solve = iter(self._solver.steps(job.strokes, job.settings, client.top, basis=refines, **based))
+        if client.stands_on(job.base):
+            return solve
+        levels = blank_levels(client.top) if job.base is None else self._solver.base_levels(job.base, client.top)
+        return self._laid(client, job.base, levels, solve)
+
+    def _laid(
+        self,
+        client: Client,
+        base: Base | None,
+        levels: Iterator[LevelResult | None],
+        solve: Iterator[LevelResult | None],
+    ) -> Iterator[LevelResult | None]:
+        top = client.top
+        client.laid = (None, -2)  # until all is delivered it is neither the old base nor the new one
+        try:
+            yield from levels
+            client.laid = (base, top)
+            yield from solve
+        finally:
+            for work in (levels, solve):
+                close = getattr(work, "close", None)
+                if close is not None:
+                    close()
 
     def _solve(self, client: Client) -> None:
         job, steps = client.running, client.steps
@@ -203,7 +237,7 @@ class Worker:
             self._failed(client, job, error)
             return
         if result is not None:
-            show = client.took(result, self._now())
+            show = result.channel in GROUND or client.took(result, self._now())
             self._deliver(client, job, result, show)
 
     def _aside(self, client: Client) -> None:
@@ -212,9 +246,9 @@ class Worker:
         assert job is not None
         assert client.running is not None
         assert self._solver is not None
-        client.aside_clock, client.painted = job.clock, job.painted
+        client.aside_clock, client.aside_job, client.painted = job.clock, job, job.painted
         try:
-            for result in self._solver.channels(job.strokes, job.settings, client.top):
+            for result in self._channels(job, client.top):
                 if result is not None:
                     self._deliver(client, job, result, show=True)
         except Exception as error:
@@ -230,7 +264,7 @@ class Worker:
             client.refiner, client.looking = self._solver.refiner(result.basis), True
         if client not in self._schedule.clients:
             return
-        if result.channel != c.Channel.HEIGHT and job.clock < client.aside_clock:
+        if result.channel != c.Channel.HEIGHT and result.channel not in GROUND and job.clock < client.aside_clock:
             return  # newer ones have come already
         try:
             client.deliver(job.clock, result, show)
@@ -296,6 +330,7 @@ class Worker:
     def _coarser(self, client: Client) -> None:
         """The room goes on one level coarser, until there may be memory again."""
         client.top -= 1
+        client.laid = (client.laid[0], min(client.laid[1], client.top))
         client.backoff.failed(self._now())
         client.tell(
             f"{self.device_name} has too little memory for level {client.top + 1}: "
