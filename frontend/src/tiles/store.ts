@@ -1,29 +1,41 @@
 /**
  * The tiles that the page holds, as they are drawn now (DESIGN 6, 8). The only owner of that state.
  *
- * Levels arrive coarse to fine, and while somebody draws the fine ones lag. A tile whose ancestor moved is shown as its
- * last exact samples plus the parent's movement since then, predicted by the codec's own rule, until its level is
- * confirmed: full detail that morphs with the coarse levels. Movements are taken from the parent's heights at the time
- * when the child was exact, never accumulated, so nothing drifts and equal edges stay equal to the bit.
+ * What is drawn is the strokes' offsets plus the base, the ground of the elevation layers; each is a stream of its own
+ * (`chain.ts`). Where there is a base, a tile shows once its own base is here, so that neighbours have equal edges.
+ * While no tile of a level has one yet, all of that level stand on what the levels above predict: so too do they.
  */
 
 import { type ReadonlySignal, signal } from "@preact/signals-core";
 import { subDistance, subRange } from "../core/bounds.ts";
 import { predictMetres } from "../core/predict.ts";
-import { isUnderAny, keyLevel, parentKey, tileKey } from "../core/tilekey.ts";
-import type { DecodedFrame, DecodedTile, Ground, Tile, TileView } from "../core/types.ts";
-import { FrameKind, QUANTA_PER_CELL, SUBPATCHES, TILE_CELLS, TILE_SAMPLES } from "../generated/contract.ts";
+import { keyLevel, keyX, keyY, parentKey, tileKey } from "../core/tilekey.ts";
+import type { DecodedFrame, Ground, Tile, TileView } from "../core/types.ts";
+import { Channel, QUANTA_PER_CELL, SUBPATCHES, TILE_CELLS, TILE_SAMPLES } from "../generated/contract.ts";
+import { FLAT, type Link, type SentBounds, TileChain } from "./chain.ts";
 import { TileGround } from "./ground.ts";
 
 const AREA = TILE_SAMPLES * TILE_SAMPLES;
 const SUBS = SUBPATCHES * SUBPATCHES;
+const ROOT = tileKey(0, 0, 0);
 
-/** A tile, its exact heights, and its parent's heights at the time when the tile was exact. */
-interface Entry {
+/** A tile that is drawn, and what it was made of. */
+interface Shown extends Footing {
   readonly tile: Tile;
-  readonly exactHeights: Float32Array;
-  readonly parentThen: Float32Array | null;
+  readonly offset: Link;
 }
+
+/** What a tile stands on. */
+interface Footing {
+  /** Metres; null where there is no base. */
+  readonly base: Float32Array | null;
+  /** The tile's own base; null where there is none, or where `base` was predicted from the parent's, `from`. */
+  readonly own: Link | null;
+  readonly from: Float32Array | null;
+}
+
+type Bounds = Pick<Tile, "subMin" | "subMax" | "subError">;
+const NO_BASE: Footing = { base: null, own: null, from: null };
 
 export class TileStore implements TileView {
   readonly sizeM: number;
@@ -34,12 +46,10 @@ export class TileStore implements TileView {
   /** The ground as it is now; `freeze` gives one that stays. */
   readonly ground: Ground;
   private readonly rev = signal(0);
-  private entries = new Map<number, Entry>();
+  private readonly offsets: TileChain;
+  private readonly base: TileChain;
+  private shown = new Map<number, Shown>();
   private snapshot: { readonly stamp: number; readonly ground: TileGround } | null = null;
-  /** Per level that is held: whether what was last said of all its tiles is final. */
-  private readonly finals = new Map<number, boolean>();
-  private readonly delta = new Float32Array(AREA);
-  private readonly moved = new Float32Array(AREA);
   private readonly distance = new Float64Array(SUBS);
 
   /** `levels`: the finest level that can exist; `solved`: the finest that exists everywhere. */
@@ -47,6 +57,8 @@ export class TileStore implements TileView {
     this.sizeM = sizeM;
     this.levels = levels;
     this.solved = solved;
+    this.offsets = new TileChain(sizeM, levels);
+    this.base = new TileChain(sizeM, levels);
     this.revision = this.rev;
     this.ground = {
       sizeM,
@@ -61,28 +73,27 @@ export class TileStore implements TileView {
 
   /** True unless some level that is solved everywhere was last seen as a preview: its samples may be a little off. */
   get settled(): boolean {
-    for (const [level, final] of this.finals) if (level <= this.solved && !final) return false;
-    return true;
+    return this.offsets.settledTo(this.solved) && this.base.settledTo(this.solved);
   }
 
   tile(level: number, x: number, y: number): Tile | undefined {
-    return this.entries.get(tileKey(level, x, y))?.tile;
+    return this.shown.get(tileKey(level, x, y))?.tile;
   }
 
   *tiles(): Iterable<Tile> {
-    for (const entry of this.entries.values()) yield entry.tile;
+    for (const shown of this.shown.values()) yield shown.tile;
   }
 
-  /** Number of tiles held. */
+  /** Number of tiles held of the offsets, or of the base if that is more. */
   get size(): number {
-    return this.entries.size;
+    return Math.max(this.offsets.size, this.base.size);
   }
 
   /** The ground at this moment, which no later frame changes. Cheap: tiles are immutable and shared. */
   freeze(): TileGround {
     if (this.snapshot?.stamp !== this.stamp) {
       const tiles = new Map<number, Tile>();
-      for (const [key, entry] of this.entries) tiles.set(key, entry.tile);
+      for (const [key, shown] of this.shown) tiles.set(key, shown.tile);
       this.snapshot = { stamp: this.stamp, ground: new TileGround(this.sizeM, tiles) };
     }
     return this.snapshot.ground;
@@ -90,150 +101,106 @@ export class TileStore implements TileView {
 
   /** Forgets all tiles, as the server does when a connection begins. */
   clear(): void {
-    this.entries = new Map();
-    this.finals.clear();
+    this.offsets.clear();
+    this.base.clear();
+    this.shown = new Map();
     this.rev.value++;
   }
 
-  /** Shows a frame: all of it at once, with everything that moves along. One step of `revision`. */
+  /** Shows a frame of the offsets or the base: all of it at once, with everything that moves along. One step of `revision`. */
   apply(frame: DecodedFrame): void {
     const stamp = this.stamp + 1;
-    const next = new Map(this.entries);
-    this.drop(next, frame);
-    // Who holds nothing of a level is told nothing of it: the first tiles that fill it speak for themselves.
-    if (!holds(next, frame.level)) this.finals.set(frame.level, frame.settled || frame.tiles.length === 0);
-    const changed = new Set<number>();
-    for (const t of frame.tiles) {
-      const key = tileKey(frame.level, t.x, t.y);
-      next.set(key, this.exactEntry(next, key, t, stamp));
-      changed.add(key);
-    }
-    if (frame.kind === FrameKind.LEVEL) {
-      if (frame.tiles.length > 0 || holds(next, frame.level)) this.finals.set(frame.level, frame.settled);
-      this.confirm(next, frame.level, changed, stamp);
-    }
-    this.moveBelow(next, frame.level, changed, stamp);
-    this.entries = next;
+    const based = this.based;
+    const touched = (frame.channel === Channel.BASE ? this.base : this.offsets).apply(frame);
+    const all = based || this.based;
+    this.shown = all
+      ? this.composed(this.offsets.keys(), new Map(), stamp)
+      : this.composed(touched, new Map(this.shown), stamp);
     this.rev.value = stamp;
   }
 
-  private drop(next: Map<number, Entry>, frame: DecodedFrame): void {
-    if (frame.drops.length === 0) return;
-    const gone = new Set(frame.drops.map((d) => tileKey(frame.level, d.x, d.y)));
-    for (const key of next.keys()) if (isUnderAny(key, gone, frame.level)) next.delete(key);
+  /** Whether there is a base: its root is always held with anything of it. */
+  private get based(): boolean {
+    return this.base.get(ROOT) !== undefined;
   }
 
-  private exactEntry(next: ReadonlyMap<number, Entry>, key: number, t: DecodedTile, stamp: number): Entry {
-    const level = keyLevel(key);
+  /** Shows these tiles, coarse to fine, beside those that `next` has. */
+  private composed(keys: Iterable<number>, next: Map<number, Shown>, stamp: number): Map<number, Shown> {
+    for (const key of [...keys].sort((a, b) => a - b)) {
+      const link = this.offsets.get(key);
+      const parent = keyLevel(key) > 0 ? next.get(parentKey(key)) : undefined;
+      const footing = link && this.footing(key, parent);
+      if (footing) next.set(key, this.show(key, link, footing, parent?.tile, stamp));
+      else next.delete(key);
+    }
+    return next;
+  }
+
+  /** What a tile stands on; null where it has to wait for that. */
+  private footing(key: number, parent: Shown | undefined): Footing | null {
+    if (!this.based) return NO_BASE;
+    const own = this.base.get(key);
+    if (own && (parent || keyLevel(key) === 0)) return { base: own.heights, own, from: null };
+    if (!parent?.base || this.base.countOf(keyLevel(key)) > 0) return null;
+    const old = this.shown.get(key);
+    if (old && old.from === parent.base) return old;
+    return { base: predicted(key, parent.base), own: null, from: parent.base };
+  }
+
+  /** The tile as it is drawn; the same object where nothing that one sees has changed. */
+  private show(key: number, offset: Link, footing: Footing, parent: Tile | undefined, stamp: number): Shown {
+    const { base, own, from } = footing;
+    const { version } = offset;
+    const exact = offset.exact && from === null && own?.exact !== false;
+    const old = this.shown.get(key);
+    if (old && alike(old.offset, offset) && alike(old.own, own) && old.base === base) {
+      const kept = old.tile.exact === exact && old.tile.version === version;
+      return { tile: kept ? old.tile : { ...old.tile, exact, version, stamp }, offset, base, own, from };
+    }
+    const heights = sum(offset.heights, base);
+    const place = { level: keyLevel(key), x: keyX(key), y: keyY(key) };
+    const bounds =
+      offset.sent && !base ? this.sentBounds(offset.sent, place.level) : this.measured(heights, parent, place);
+    return { tile: { ...place, version, exact, stamp, heights, ...bounds }, offset, base, own, from };
+  }
+
+  private sentBounds(sent: SentBounds, level: number): Bounds {
     const quantum = this.sizeM / (TILE_CELLS << level) / QUANTA_PER_CELL;
-    const heights = new Float32Array(AREA);
-    for (let i = 0; i < AREA; i++) heights[i] = t.samples[i]! * quantum;
     const scaled = (a: ArrayLike<number>) => Float32Array.from(a, (v) => v * quantum);
-    const tile: Tile = {
-      level,
-      x: t.x,
-      y: t.y,
-      version: t.version,
-      exact: true,
-      stamp,
-      heights,
-      subMin: scaled(t.subMin),
-      subMax: scaled(t.subMax),
-      subError: scaled(t.subError),
-    };
-    return { tile, exactHeights: heights, parentThen: parentHeights(next, key) };
+    return { subMin: scaled(sent.subMin), subMax: scaled(sent.subMax), subError: scaled(sent.subError) };
   }
 
-  /** After a LEVEL frame every held tile of the level shows its own samples again. */
-  private confirm(next: Map<number, Entry>, level: number, changed: Set<number>, stamp: number): void {
-    for (const [key, entry] of next) {
-      if (keyLevel(key) !== level || changed.has(key)) continue;
-      const parent = parentHeights(next, key);
-      if (entry.tile.exact && entry.parentThen === parent) continue;
-      if (entry.tile.heights === entry.exactHeights) {
-        const tile = entry.tile.exact ? entry.tile : { ...entry.tile, exact: true, stamp };
-        next.set(key, { ...entry, tile, parentThen: parent });
-        continue;
-      }
-      next.set(key, { ...entry, tile: this.show(entry, entry.exactHeights, parent, true, stamp), parentThen: parent });
-      changed.add(key);
-    }
-  }
-
-  /** Moves the tiles below those that changed, level by level, so that each follows its parent's new display. */
-  private moveBelow(next: Map<number, Entry>, level: number, changed: Set<number>, stamp: number): void {
-    if (changed.size === 0) return;
-    const byLevel: number[][] = Array.from({ length: this.levels + 1 }, () => []);
-    for (const key of next.keys()) if (keyLevel(key) > level) byLevel[keyLevel(key)]?.push(key);
-    for (let below = level + 1; below <= this.levels; below++) {
-      for (const key of byLevel[below]!) {
-        if (!changed.has(parentKey(key))) continue;
-        const entry = next.get(key)!;
-        const tile = this.follow(entry, parentHeights(next, key), stamp);
-        if (tile === entry.tile) continue;
-        next.set(key, { ...entry, tile });
-        changed.add(key);
-      }
-    }
-  }
-
-  /** The tile moved along with its parent; the same object when its part of the parent did not move. */
-  private follow(entry: Entry, parent: Float32Array | null, stamp: number): Tile {
-    const { tile, exactHeights, parentThen } = entry;
-    if (!parent || !parentThen) return tile;
-    if (!this.parentMoved(parent, parentThen, tile.x, tile.y)) {
-      return tile.exact ? tile : this.show(entry, exactHeights, parent, true, stamp);
-    }
-    predictMetres(this.delta, tile.x, tile.y, this.moved);
-    let same = true;
-    let still = true;
-    for (let i = 0; i < AREA; i++) {
-      const height = Math.fround(exactHeights[i]! + this.moved[i]!);
-      if (height !== tile.heights[i]) same = false;
-      if (height !== exactHeights[i]) still = false;
-      this.moved[i] = height;
-    }
-    if (same) return tile;
-    return this.show(entry, still ? exactHeights : this.moved.slice(), parent, still, stamp);
-  }
-
-  /** Writes the parent's movement, where the child's prediction reads it, to `delta`; false when it is zero there. */
-  private parentMoved(now: Float32Array, then: Float32Array, x: number, y: number): boolean {
-    if (now === then) return false;
-    const [firstCol, lastCol] = x & 1 ? [TILE_CELLS / 2 - 1, TILE_CELLS] : [0, TILE_CELLS / 2 + 1];
-    const [firstRow, lastRow] = y & 1 ? [TILE_CELLS / 2 - 1, TILE_CELLS] : [0, TILE_CELLS / 2 + 1];
-    let any = false;
-    for (let r = firstRow; r <= lastRow; r++) {
-      for (let i = r * TILE_SAMPLES + firstCol, end = r * TILE_SAMPLES + lastCol; i <= end; i++) {
-        const d = now[i]! - then[i]!;
-        this.delta[i] = d;
-        if (d !== 0) any = true;
-      }
-    }
-    return any;
-  }
-
-  /** A new Tile with these heights and the bounds that belong to them. */
-  private show(entry: Entry, heights: Float32Array, parent: Float32Array | null, exact: boolean, stamp: number): Tile {
-    const { tile } = entry;
+  private measured(heights: Float32Array, parent: Tile | undefined, { x, y }: Pick<Tile, "x" | "y">): Bounds {
     const subMin = new Float32Array(SUBS);
     const subMax = new Float32Array(SUBS);
     const subError = new Float32Array(SUBS);
     subRange(heights, subMin, subMax);
     if (parent) {
-      subDistance(heights, parent, 1, tile.x, tile.y, this.distance);
+      subDistance(heights, parent.heights, 1, x, y, this.distance);
       for (let i = 0; i < SUBS; i++) subError[i] = this.distance[i]! / 2;
     }
-    return { ...tile, exact, stamp, heights, subMin, subMax, subError };
+    return { subMin, subMax, subError };
   }
 }
 
-function parentHeights(entries: ReadonlyMap<number, Entry>, key: number): Float32Array | null {
-  if (keyLevel(key) === 0) return null;
-  return entries.get(parentKey(key))?.tile.heights ?? null;
+/** Whether two states of a tile show the same, as the same part of its parent. What is sent anew may differ in the latter. */
+function alike(old: Link | null, now: Link | null): boolean {
+  if (old === now) return true;
+  if (!old || !now) return false;
+  return old.heights === now.heights && (now.sent === null || now.sent === old.sent);
 }
 
-function holds(entries: ReadonlyMap<number, Entry>, level: number): boolean {
-  for (const key of entries.keys()) if (keyLevel(key) === level) return true;
-  return false;
+/** The base of a tile, metres, as its parent's predicts it. */
+function predicted(key: number, parent: Float32Array): Float32Array {
+  if (parent === FLAT) return FLAT;
+  const out = new Float32Array(AREA);
+  predictMetres(parent, keyX(key), keyY(key), out);
+  return out;
+}
+
+/** Shared where one part is zero everywhere. */
+function sum(offset: Float32Array, base: Float32Array | null): Float32Array {
+  if (!base || base === FLAT) return offset;
+  if (offset === FLAT) return base;
+  return offset.map((v, i) => v + base[i]!);
 }

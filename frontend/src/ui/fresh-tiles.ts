@@ -8,7 +8,7 @@
 
 import { batch } from "@preact/signals-core";
 import type { DecodedFrame } from "../core/types.ts";
-import { FrameKind } from "../generated/contract.ts";
+import { Channel, FrameKind } from "../generated/contract.ts";
 
 /** Levels 0 to 2 cover the whole terrain for every view. */
 const COARSE = 2;
@@ -38,7 +38,9 @@ export class FreshTiles {
     this.#frames.push(frame);
     this.#timer ??= setTimeout(() => this.#show(), PATIENCE_MS);
     const coarse = Math.min(COARSE, this.#tiles.solved);
-    if (frame.kind === FrameKind.LEVEL && frame.level >= coarse) this.#show();
+    // The base of a level comes before what lies on it.
+    const height = frame.channel === Channel.HEIGHT;
+    if (height && frame.kind === FrameKind.LEVEL && frame.level >= coarse) this.#show();
   }
 
   stop(): void {

@@ -2,6 +2,7 @@
 
 import { computed, effect, type ReadonlySignal, signal } from "@preact/signals-core";
 import { Camera } from "../core/camera.ts";
+import { isGround } from "../core/streams.ts";
 import type {
   ChannelGrid,
   CursorVisual,
@@ -15,7 +16,7 @@ import type {
 import type { Doc } from "../doc/document.ts";
 import { strokeInfluence } from "../doc/influence.ts";
 import type { MemberPresence } from "../generated/contract.ts";
-import { Channel, MAX_REFINED_TILES } from "../generated/contract.ts";
+import { MAX_REFINED_TILES } from "../generated/contract.ts";
 import { InputController } from "../input/controller.ts";
 import { type ToolDefaults, toolDefaults } from "../input/defaults.ts";
 import { ChannelStore } from "../tiles/channels.ts";
@@ -151,7 +152,7 @@ export class Stage {
    * is held, and only a new connection helps.
    */
   apply(frame: DecodedFrame): boolean {
-    if (frame.channel !== Channel.HEIGHT) this.channels.apply(frame);
+    if (!isGround(frame.channel)) this.channels.apply(frame);
     else if (this.#fresh) this.#fresh.apply(frame);
     else this.tiles.apply(frame);
     return this.tiles.size <= (4 ** (this.levels + 1) - 1) / 3 + 2 * MAX_REFINED_TILES;
