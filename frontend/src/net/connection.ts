@@ -67,6 +67,7 @@ const SERVER_TYPES: ReadonlySet<string> = new Set<ServerMessage["type"]>([
   "progress",
   "error",
   "pong",
+  "importing",
 ]);
 
 /** After these codes the same page would only be refused again (contract, WS_CLOSE). */

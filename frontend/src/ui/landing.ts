@@ -1,13 +1,17 @@
 import { html, LitElement, nothing, svg, type TemplateResult } from "lit";
 import type { TemplateInfo } from "../core/types.ts";
+import { MAX_GRID_BYTES } from "../generated/contract.ts";
 import { ApiError, api, type OpenedTerrain } from "./api.ts";
+import "./drop-zone.ts";
 import { icon } from "./icons.ts";
+import { keepImport } from "./kept-imports.ts";
 import { readJoinInput, terrainPath } from "./links.ts";
 import { type Layer, penRidge, ridgeLayers, seedOf } from "./ridges.ts";
 import { deviceStore, forgetTerrain, type RecentTerrain, recentTerrains } from "./storage.ts";
 import { landingStyles } from "./styles/landing.ts";
 import { shared } from "./styles/shared.ts";
 import { chooseTheme, themeChoice } from "./theme.ts";
+import { upload } from "./upload.ts";
 import { ago } from "./words.ts";
 
 /** `/`: what Esker is, a new terrain, joining, what this device opened lately, the starting terrains. */
@@ -19,6 +23,7 @@ export class EskLanding extends LitElement {
     busy: { state: true },
     problem: { state: true },
     templateProblem: { state: true },
+    sent: { state: true },
   };
 
   declare templates: readonly TemplateInfo[] | null;
@@ -26,8 +31,11 @@ export class EskLanding extends LitElement {
   declare busy: string;
   declare problem: string;
   declare templateProblem: string;
+  /** Share of a dropped file that has been sent. */
+  declare sent: number;
 
   readonly #store = deviceStore();
+  #abort: AbortController | null = null;
 
   constructor() {
     super();
@@ -36,19 +44,19 @@ export class EskLanding extends LitElement {
     this.busy = "";
     this.problem = "";
     this.templateProblem = "";
+    this.sent = 0;
   }
 
   override connectedCallback(): void {
     super.connectedCallback();
     document.title = "Esker";
     window.addEventListener("pageshow", this.#shown);
-    this.addEventListener("dragover", (event) => event.preventDefault());
-    this.addEventListener("drop", (event) => this.#dropped(event));
     void this.#loadTemplates();
   }
 
   override disconnectedCallback(): void {
     super.disconnectedCallback();
+    this.#abort?.abort();
     window.removeEventListener("pageshow", this.#shown);
   }
 
@@ -58,10 +66,30 @@ export class EskLanding extends LitElement {
     this.recents = recentTerrains(this.#store);
   };
 
-  #dropped(event: DragEvent): void {
-    event.preventDefault();
-    const file = event.dataTransfer?.files[0];
-    if (file) void this.#open("file", () => api.open(file));
+  /** A terrain to open again, or a file with heights: then a new terrain of its size. */
+  #take(file: File): void {
+    if (/\.esker$/i.test(file.name)) void this.#open("file", () => api.open(file));
+    else void this.#open("grid", () => this.#fromGrid(file));
+  }
+
+  async #fromGrid(file: File): Promise<OpenedTerrain> {
+    if (file.size > MAX_GRID_BYTES)
+      throw new ApiError(
+        "too_large",
+        `“${file.name}” is larger than ${MAX_GRID_BYTES >> 20} MB. Cut it, or make it coarser.`,
+      );
+    this.#abort = new AbortController();
+    this.sent = 0;
+    const made = await upload<OpenedTerrain & { import: string }>({
+      path: `/api/terrains/from-grid?name=${encodeURIComponent(file.name)}`,
+      file,
+      onShare: (share) => {
+        this.sent = share;
+      },
+      signal: this.#abort.signal,
+    });
+    keepImport(made.id, { id: made.import, file: file.name });
+    return made;
   }
 
   async #loadTemplates(): Promise<void> {
@@ -104,7 +132,7 @@ export class EskLanding extends LitElement {
     const field = event.target as HTMLInputElement;
     const file = field.files?.[0];
     field.value = "";
-    if (file) void this.#open("file", () => api.open(file));
+    if (file) this.#take(file);
   }
 
   #forget(id: string): void {
@@ -118,6 +146,11 @@ export class EskLanding extends LitElement {
       <main>
         ${this.recents.length > 0 ? this.#recentSection() : nothing} ${this.#templateSection()}
       </main>
+      <esk-drop-zone
+        lead="Drop it: a new terrain"
+        detail="A file with heights becomes a terrain of its size and place. An .esker file opens as it was."
+        @files=${(e: CustomEvent<File[]>) => e.detail[0] && this.#take(e.detail[0])}
+      ></esk-drop-zone>
       <footer>
         <span>A terrain is its strokes: nothing is ever baked.</span>
         <span>Everything stays on this server. No account, no tracking.</span>
@@ -161,12 +194,18 @@ export class EskLanding extends LitElement {
           </div>
           <p id="problem" class="problem" role="alert">${this.problem}</p>
           <label class="file">
-            ${icon("upload")} ${this.busy === "file" ? "Opening the file…" : "Open an .esker file"}
-            <input class="visually-hidden" type="file" accept=".esker,application/zip" @change=${this.#openFile} />
+            ${icon("upload")} <span>${this.#fileWords()}</span>
+            <input class="visually-hidden" type="file" ?disabled=${this.busy !== ""} @change=${this.#openFile} />
           </label>
         </div>
       </header>
     `;
+  }
+
+  #fileWords(): string {
+    if (this.busy === "file") return "Opening the file…";
+    if (this.busy !== "grid") return "Open a file: real ground (GeoTIFF, HGT, ASC, PNG…) or .esker";
+    return this.sent < 1 ? `Uploading, ${Math.round(100 * this.sent)} %` : "Looking at the file…";
   }
 
   #recentSection(): TemplateResult {

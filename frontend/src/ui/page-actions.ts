@@ -8,6 +8,10 @@ export interface PageCommands {
   panel(): void;
   help(): void;
   share(): void;
+  /** Opens the layers of real ground, or closes them. */
+  layers(): void;
+  /** Asks for an elevation file. */
+  addGround(): void;
 }
 
 /** Adds the page's actions to a map of actions. */
@@ -27,6 +31,8 @@ export function pageActions(
     stage.overlay.value = OVERLAYS[(at + 1) % OVERLAYS.length]!.value;
   });
   put("inspector", "Open or close the inspector", ["i"], commands.panel);
+  put("add-ground", "Add real ground (an elevation file)", ["r"], commands.addGround);
+  put("layers", "Layers of real ground", ["Shift+r"], commands.layers);
   put("share", "Share", ["Shift+s"], commands.share);
   put("help", "Keys and help", ["?"], commands.help);
 }

@@ -40,6 +40,8 @@ import { Throttle } from "./throttle.ts";
 import { ToastList } from "./toasts.ts";
 
 const VIEWS_PER_SECOND = 10;
+/** The note of `backend/esker/session/laying.py` for work that ends by itself: the status line shows it, not a notice. */
+export const LAYING = "The elevation data are being laid on the terrain.";
 
 /** What the server told of itself. */
 export interface ServerInfo {
@@ -60,6 +62,8 @@ export class TerrainSession {
   readonly members = signal<readonly Member[]>([]);
   readonly presences = signal<ReadonlyMap<string, MemberPresence>>(new Map());
   readonly progress = signal<Progress | null>(null);
+  /** The server makes the ground of the elevation layers, and it takes long. */
+  readonly laying = signal(false);
   /** What the server last said about its solver, until somebody has read it. */
   readonly notice = signal<string | null>(null);
   readonly server = signal<ServerInfo | null>(null);
@@ -256,7 +260,12 @@ export class TerrainSession {
         break;
       case "progress":
         this.progress.value = message;
-        if (message.note) this.#setNotice(message.note);
+        if (message.note === LAYING) this.laying.value = true;
+        else if (message.note) this.#setNotice(message.note);
+        else if (message.settled) this.laying.value = false;
+        break;
+      case "importing":
+        this.stage.value?.groundwork.receive(message);
         break;
       case "error":
         this.#error(message);

@@ -25,6 +25,9 @@ import { TileStore } from "../tiles/store.ts";
 import { FrameLoop } from "./frame-loop.ts";
 import { FreshTiles } from "./fresh-tiles.ts";
 import { Graphics } from "./graphics.ts";
+import { gridTransport } from "./grid-transport.ts";
+import { Groundwork } from "./groundwork.ts";
+import { keepImports, keptImports } from "./kept-imports.ts";
 import { keepViews, keptViews } from "./kept-views.ts";
 import { QualityChoice, TAU_PX } from "./quality-choice.ts";
 import { cursorVisuals, strokeVisuals } from "./scene.ts";
@@ -52,6 +55,7 @@ export class Stage {
   /** The ground as it is drawn: solved heights with synthesised detail. */
   readonly shown: ShownTerrain;
   readonly input: InputController;
+  readonly groundwork: Groundwork;
   readonly defaults: ToolDefaults;
   readonly loop: FrameLoop;
   readonly overlay = signal<Scene["overlay"]>("none");
@@ -109,6 +113,22 @@ export class Stage {
         this.cursor.value = point;
       },
       onMessage: (text) => session.toasts.show(text),
+      author: () => session.me.value.name,
+    });
+    this.groundwork = new Groundwork({
+      sizeM,
+      doc: session.doc,
+      camera: this.camera,
+      laying: this.input.laying,
+      canEdit: () => session.canEdit.value,
+      ground: () => {
+        this.tiles.revision.value;
+        return this.shown.freeze();
+      },
+      transport: gridTransport(session),
+      kept: keptImports(session.id),
+      keep: (kept) => keepImports(session.id, kept),
+      say: (text, tone) => session.toasts.show(text, tone),
       author: () => session.me.value.name,
     });
     this.#strokes = computed(() => this.#visuals());
@@ -197,6 +217,7 @@ export class Stage {
     this.#fresh?.stop();
     this.loop.stop();
     for (const stop of this.#stops) stop();
+    this.groundwork.dispose();
     this.input.dispose();
     this.graphics.dispose();
   }
@@ -242,6 +263,8 @@ export class Stage {
         this.#strokes.value;
         this.#cursors.value;
         input.ghost.value;
+        this.groundwork.footprints.value;
+        this.groundwork.sheet.value;
         this.overlay.value;
         this.quality.mode.value;
         this.showStrokes.value;
@@ -281,6 +304,8 @@ export class Stage {
       strokes: this.#strokes.value,
       ghost: this.input.ghost.value,
       cursors: this.#cursors.value,
+      footprints: this.groundwork.footprints.value,
+      sheet: this.groundwork.sheet.value,
       tauPx: TAU_PX[quality],
       quality,
       time: this.#calm.matches ? 0 : timeS,

@@ -70,6 +70,9 @@ export class EskStatusLine extends SignalElement {
       .settled .dot.done {
         background: var(--esk-ok);
       }
+      .laying {
+        color: var(--esk-accent-text);
+      }
       .refining {
         margin-left: 4px;
       }
@@ -110,6 +113,7 @@ export class EskStatusLine extends SignalElement {
     const point = cursor.value;
     return html`
       <span class="height" title="Height of the ground under the cursor">${point ? height(point[2]) : "–"}</span>
+      ${session.laying.value ? html`<span class="laying" role="status">Laying the real ground…</span>` : nothing}
       ${this.#scale()} ${this.#levels(session.progress.value, levels)}
       <span class="renderer" title=${graphics.reason.value ?? ""}>${graphics.info.value?.description ?? nothing}</span>
     `;

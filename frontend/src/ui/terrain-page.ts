@@ -1,11 +1,15 @@
 import { effect, signal } from "@preact/signals-core";
 import { html, nothing, type TemplateResult } from "lit";
 import { ApiError, api } from "./api.ts";
+import "./drop-zone.ts";
+import { VIEW_ONLY } from "./groundwork.ts";
 import "./help-dialog.ts";
 import "./icon-library.ts";
 import { icon } from "./icons.ts";
+import "./layers-panel.ts";
 import "./legend.ts";
 import "./overlay.ts";
+import { importingWords } from "./others.ts";
 import { pageActions } from "./page-actions.ts";
 import { memberName } from "./people.ts";
 import "./profile-dialog.ts";
@@ -26,8 +30,14 @@ import "./top-bar.ts";
 import type { PageCommand } from "./top-bar.ts";
 import "./view-bar.ts";
 
-type PanelTab = "stroke" | "terrain";
+type PanelTab = "stroke" | "ground" | "terrain";
 type DialogId = "share" | "profile" | "help" | "about";
+
+const TABS = [
+  { value: "stroke", label: "Stroke" },
+  { value: "ground", label: "Ground", title: "Real ground: layers of elevation" },
+  { value: "terrain", label: "Terrain" },
+];
 
 const WIDE = "(min-width: 1000px)";
 
@@ -57,6 +67,8 @@ export class EskTerrain extends SignalElement {
           panel: () => this.#togglePanel(),
           help: () => this.#show("help"),
           share: () => this.#show("share"),
+          layers: () => this.#toggleLayers(),
+          addGround: () => this.#browse(),
         });
       }),
       effect(() => {
@@ -92,6 +104,25 @@ export class EskTerrain extends SignalElement {
     this.#panel.value = this.#panel.peek() === null ? "stroke" : null;
   }
 
+  #toggleLayers(): void {
+    this.#openedBySelection = false;
+    this.#panel.value = this.#panel.peek() === "ground" ? null : "ground";
+  }
+
+  /** Asks for files with the system's own dialog: the way in for touch and keyboard. */
+  #browse(): void {
+    const stage = this.#session.peek()?.stage.peek();
+    if (stage && !stage.session.canEdit.peek()) stage.session.toasts.show(VIEW_ONLY, "warn");
+    else this.renderRoot.querySelector<HTMLInputElement>("#grids")?.click();
+  }
+
+  #bring(stage: Stage, files: Iterable<File>): void {
+    stage.groundwork.add(files);
+    if (!stage.session.canEdit.peek()) return;
+    this.#openedBySelection = false;
+    this.#panel.value = "ground";
+  }
+
   #show(dialog: DialogId): void {
     this.#dialog.value = dialog;
   }
@@ -100,6 +131,8 @@ export class EskTerrain extends SignalElement {
     const command = event.detail;
     if (command === "panel") this.#togglePanel();
     else if (command === "download") void this.#download();
+    else if (command === "add-ground") this.#browse();
+    else if (command === "layers") this.#toggleLayers();
     else this.#show(command);
   }
 
@@ -165,7 +198,8 @@ export class EskTerrain extends SignalElement {
         <esk-view-bar class="panel" .stage=${stage}></esk-view-bar>
       </div>
       ${this.#hint(stage)} ${this.#following(stage)} ${this.#closedBar(stage)} ${this.#graphics(stage)} ${this.#notice(stage)}
-      ${this.#panel.value === null ? nothing : this.#side(stage, this.#panel.value)}
+      ${this.#importing(stage)}
+      ${this.#panel.value === null ? nothing : this.#side(stage, this.#panel.value)} ${this.#ways(stage)}
       <esk-share .stage=${stage} .open=${this.#dialog.value === "share"} @close=${this.#closeDialog}></esk-share>
       <esk-profile .stage=${stage} .open=${this.#dialog.value === "profile"} @close=${this.#closeDialog}></esk-profile>
       <esk-help .stage=${stage} .open=${this.#dialog.value === "help"} @close=${this.#closeDialog}></esk-help>
@@ -186,7 +220,7 @@ export class EskTerrain extends SignalElement {
         <header>
           <esk-segmented
             label="Inspector"
-            .segments=${[{ value: "stroke", label: "Stroke" }, { value: "terrain", label: "Terrain" }]}
+            .segments=${TABS}
             .value=${tab}
             @pick=${(e: CustomEvent<PanelTab>) => {
               this.#openedBySelection = false;
@@ -196,20 +230,62 @@ export class EskTerrain extends SignalElement {
           <button class="icon-btn small" aria-label="Close the inspector" @click=${() => this.#togglePanel()}>${icon("xmark")}</button>
         </header>
         <div class="scroll">
-          ${
-            tab === "stroke"
-              ? html`<esk-stroke-panel .stage=${stage}></esk-stroke-panel>`
-              : html`<esk-terrain-panel .stage=${stage}></esk-terrain-panel>`
-          }
+          ${this.#tab(stage, tab)}
         </div>
       </aside>
     `;
   }
 
+  #tab(stage: Stage, tab: PanelTab): TemplateResult {
+    if (tab === "stroke") return html`<esk-stroke-panel .stage=${stage}></esk-stroke-panel>`;
+    if (tab === "terrain") return html`<esk-terrain-panel .stage=${stage}></esk-terrain-panel>`;
+    return html`<esk-layers-panel .stage=${stage} @browse=${() => this.#browse()}></esk-layers-panel>`;
+  }
+
+  /** How elevation files come in: dropped anywhere, or chosen. */
+  #ways(stage: Stage): TemplateResult {
+    const edit = stage.session.canEdit.value;
+    return html`
+      <esk-drop-zone
+        lead=${edit ? "Drop it: real ground" : "You can look here, not change"}
+        detail=${edit ? "GeoTIFF, HGT, Esri ASCII, IMG, DTED, 16-bit PNG, RAW, NPY. Everybody here sees it appear." : VIEW_ONLY}
+        @files=${(e: CustomEvent<File[]>) => this.#bring(stage, e.detail)}
+      ></esk-drop-zone>
+      <input
+        id="grids"
+        class="visually-hidden"
+        type="file"
+        multiple
+        tabindex="-1"
+        aria-hidden="true"
+        @change=${(e: Event) => {
+          const field = e.target as HTMLInputElement;
+          this.#bring(stage, [...(field.files ?? [])]);
+          field.value = "";
+        }}
+      />
+    `;
+  }
+
+  /** What others bring in, while the panel that lists it is shut. */
+  #importing(stage: Stage): TemplateResult | typeof nothing {
+    const others = stage.groundwork.others.list.value;
+    if (others.length === 0 || this.#panel.value === "ground") return nothing;
+    return html`<div class="importing panel" role="status">
+      ${icon("upload")}<span>${importingWords(others.at(-1)!)}</span>
+    </div>`;
+  }
+
   /** The first-run hint: goes with the first stroke and does not come back on this device's later empty terrains. */
   #hint(stage: Stage): TemplateResult | typeof nothing {
     const { session, input } = stage;
-    const empty = (session.doc.doc.value?.strokes.size ?? 0) === 0;
+    const doc = session.doc.doc.value;
+    if (input.laying.value !== null)
+      return html`<div class="hint panel">
+        ${icon("select")}<span>Drag the grid where it belongs. Enter places it, Esc ${doc?.layers.has(input.laying.value.id) ? "puts it back" : "gives it up"}.</span>
+      </div>`;
+    const busy = this.#panel.value === "ground" || stage.groundwork.imports.jobs.value.length > 0;
+    const empty = (doc?.strokes.size ?? 0) === 0 && (doc?.layers.size ?? 0) === 0 && !busy;
     if (!empty || !session.canEdit.value || input.drawing.value !== null) return nothing;
     const drawn = flag(session.store, "drawn");
     const ready = input.tool.value !== "select";

@@ -3,9 +3,13 @@
  * curious in the console. docs/user-guide.md lists it.
  */
 
+import type { GridPlace } from "../core/lattice.ts";
 import type { CameraState, FrameStats } from "../core/types.ts";
-import type { PaintChannel, Stroke } from "../generated/contract.ts";
+import type { Layer, PaintChannel, Stroke } from "../generated/contract.ts";
 import type { Attributes } from "../tiles/detail.ts";
+import { orderedLayers } from "./layers.ts";
+import { placeOf } from "./laying.ts";
+import { importingWords } from "./others.ts";
 import type { TerrainSession } from "./session.ts";
 
 export interface PageView {
@@ -37,6 +41,16 @@ export interface PageView {
   /** My operations that are not yet in the server's journal. */
   pending(): number;
   strokes(): Stroke[];
+  /** Elevation layers, the most believed first. */
+  layers(): Layer[];
+  /** Elevation files that I bring in. */
+  imports(): { file: string; phase: string; share: number; problem: string }[];
+  /** What other people bring in, as it is told. */
+  importing(): string[];
+  /** Where handles are in the window, CSS pixels. */
+  handles(): { kind: string; x: number; y: number }[];
+  /** The elevation grid that is being laid by hand. */
+  laying(): (GridPlace & { id: string }) | null;
   title(): string;
   role(): string | null;
   members(): string[];
@@ -91,6 +105,21 @@ export function installTestHook(session: TerrainSession): () => void {
     },
     pending: () => session.doc.pending.peek(),
     strokes: () => [...(doc()?.strokes.values() ?? [])],
+    layers: () => orderedLayers(doc()?.layers.values() ?? []),
+    imports: () =>
+      (stage()?.groundwork.imports.jobs.peek() ?? []).map(({ file, phase, share, problem }) => ({
+        file,
+        phase,
+        share,
+        problem,
+      })),
+    importing: () => (stage()?.groundwork.others.list.peek() ?? []).map(importingWords),
+    handles: () =>
+      (stage()?.input.handles.peek() ?? []).map(({ kind, position }) => ({ kind, ...stage()!.toWindow(position) })),
+    laying: () => {
+      const laying = stage()?.input.laying.peek();
+      return laying ? { id: laying.id, ...placeOf(laying.place.peek()) } : null;
+    },
     title: () => doc()?.settings.title ?? "",
     role: () => session.role.peek(),
     members: () => session.members.peek().map((m) => m.name),

@@ -12,7 +12,7 @@ import { shared } from "./styles/shared.ts";
 import { chooseTheme, type ThemeChoice, themeChoice } from "./theme.ts";
 
 /** What the top bar asks of the page. */
-export type PageCommand = "share" | "profile" | "help" | "panel" | "download" | "about";
+export type PageCommand = "share" | "profile" | "help" | "panel" | "download" | "about" | "add-ground" | "layers";
 
 const THEMES: readonly { readonly value: ThemeChoice; readonly label: string }[] = [
   { value: "system", label: "Colours like the system" },
@@ -213,6 +213,8 @@ export class EskTopBar extends SignalElement {
     return html`
       <wa-dropdown placement="bottom-end" @wa-select=${this.#menu}>
         <button slot="trigger" class="icon-btn small" aria-label="More" title="More">${icon("ellipsis")}</button>
+        <wa-dropdown-item value="add-ground" ?disabled=${!this.stage.session.canEdit.value}>Add real ground…</wa-dropdown-item>
+        <wa-dropdown-item value="layers">Layers of real ground</wa-dropdown-item>
         <wa-dropdown-item value="download">Download a copy (.esker)</wa-dropdown-item>
         <wa-dropdown-item value="help">Keys and help</wa-dropdown-item>
         <wa-dropdown-item value="about">About this terrain</wa-dropdown-item>

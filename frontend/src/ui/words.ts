@@ -48,3 +48,10 @@ export function initials(name: string): string {
   const last = parts.length > 1 ? ([...parts[parts.length - 1]!][0] ?? "") : "";
   return (first + last).toUpperCase();
 }
+
+/** A size of a file: "840 kB", "3.3 MB". */
+export function bytes(n: number): string {
+  if (n < 1000) return `${n} bytes`;
+  if (n < 1e6) return `${Math.round(n / 1000)} kB`;
+  return `${(n / 1e6).toFixed(n < 1e7 ? 1 : 0)} MB`;
+}

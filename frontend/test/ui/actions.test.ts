@@ -19,7 +19,7 @@ const MARKS = /(<!-- keys:.*?-->\n\| what \| keys \|\n\|---\|---\|\n)([\s\S]*?)(
 const flat: Ground = { sizeM: 4096, heightAt: () => 0, raycast: () => null };
 
 function everyAction() {
-  const commands = { panel: vi.fn(), help: vi.fn(), share: vi.fn() };
+  const commands = { panel: vi.fn(), help: vi.fn(), share: vi.fn(), layers: vi.fn(), addGround: vi.fn() };
   const stage = {
     showStrokes: signal(true),
     overlay: signal<Scene["overlay"]>("none"),

@@ -21,7 +21,7 @@ beforeEach(() => {
     const answer = answers[`${init.method} ${path}`];
     if (!answer) throw new TypeError("network");
     const status = answer.status ?? 200;
-    return { ok: status < 400, status, json: async () => answer.body };
+    return { ok: status < 400, status, json: async () => answer.body, text: async () => JSON.stringify(answer.body) };
   });
 });
 afterEach(() => {

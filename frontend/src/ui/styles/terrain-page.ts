@@ -102,6 +102,23 @@ export const terrainPageStyles = css`
   .closed .icon {
     color: var(--esk-bad);
   }
+  .importing {
+    position: absolute;
+    left: 50%;
+    top: 74px;
+    transform: translateX(-50%);
+    display: flex;
+    align-items: center;
+    gap: 10px;
+    max-width: calc(100% - 2 * var(--edge));
+    padding: 8px 16px 8px 12px;
+    font-size: 0.8125rem;
+    font-variant-numeric: tabular-nums;
+    pointer-events: none;
+  }
+  .importing .icon {
+    color: var(--esk-accent-text);
+  }
   .notice .icon {
     color: var(--esk-accent-text);
   }
