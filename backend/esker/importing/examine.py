@@ -1,0 +1,318 @@
+"""What a file is and what would happen: the report of an import, and the decisions that a conversion follows."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from esker import contract as c
+from esker.importing import colours, laying, questions
+from esker.importing.gdal_source import GdalSource
+from esker.importing.georef import crs_label, on_earth, parse_crs
+from esker.importing.laying import Laid
+from esker.importing.opening import Opened, open_source, set_encoding
+from esker.importing.refusal import ImportRefused
+from esker.importing.scan import Scan, scan
+from esker.importing.source import Source
+
+Progress = Callable[[float], None]
+
+
+@dataclass(eq=False)
+class Terrain:
+    """What an import needs to know of the terrain: its place (None: it has none) and its size in metres."""
+
+    place: c.Place | None
+    size_m: float
+
+
+@dataclass(eq=False)
+class Exam:
+    """Everything decided about a file. Metres = ``gain`` * raw + ``bias``; ``laid`` None: only its shape is known."""
+
+    source: Source
+    scan: Scan
+    masked: tuple[float, ...]
+    gain: float
+    bias: float
+    laid: Laid | None
+    geo: bool
+    crs: str
+    far_m: float | None
+    report: c.ImportReport
+
+    @property
+    def step_m(self) -> float | None:
+        """The smallest difference of heights that the file can say."""
+        return None if self.source.step is None else abs(self.gain) * self.source.step
+
+
+def examine(
+    path: Path, name: str, workdir: Path, answers: Mapping[str, str], terrain: Terrain | None, progress: Progress
+) -> Exam:
+    """Reads a whole file once or twice and says what it is.
+
+    ``answers``: by question id; what is not answered takes the default and stands in ``report.questions``.
+    ``terrain``: where it would be laid; None: in a frame of its own. Raises ImportRefused with a sentence.
+    """
+    opened = open_source(path, name, workdir, answers)
+    source = opened.source
+    asked = _container_questions(opened, answers)
+    found = _first_scan(source, answers, asked, lambda share: progress(0.5 * share))
+    masked = _masked(source, found, answers, asked)
+    if masked:
+        found = scan(source, masked, lambda share: progress(0.5 + 0.5 * share))
+    if found.valid == 0:
+        raise ImportRefused("It holds no data: every sample is nodata.")
+    gain, bias = _heights(source, found, answers, asked)
+    laid, geo, crs, far_m = _place(source, answers, asked, terrain)
+    exam = Exam(source, found, masked, gain, bias, laid, geo, crs, far_m, c.ImportReport(verdict="good", file=""))
+    exam.report = _report(exam, name, asked)
+    return exam
+
+
+def _ask(asked: list[c.ImportQuestion], answers: Mapping[str, str], question: c.ImportQuestion) -> str:
+    """The answer to a question; when there is none it stands among those asked, and its default is taken."""
+    answer = answers.get(question.id)
+    if answer is None:
+        asked.append(question)
+        return question.default
+    return answer.strip()
+
+
+def _container_questions(opened: Opened, answers: Mapping[str, str]) -> list[c.ImportQuestion]:
+    asked: list[c.ImportQuestion] = []
+    source = opened.source
+    if opened.types:
+        text = "It has no header. Of which type are its samples?"
+        _ask(asked, answers, c.ImportQuestion(id="type", text=text, options=opened.types, default=opened.types[0]))
+    if opened.shapes:
+        text = "It has no header. How many columns and rows has it?"
+        _ask(asked, answers, c.ImportQuestion(id="shape", text=text, options=opened.shapes, default=opened.shapes[0]))
+    if source.bands > 1:
+        _ask(asked, answers, questions.band_question(source.bands))
+    if source.eight_bit and not source.colour and _ask(asked, answers, questions.IMAGERY) == questions.STOP:
+        raise ImportRefused("It was said to be a picture, not elevation.")
+    if not source.row_order_known:
+        text = "It does not say whether its first row is the northern or the southern one."
+        orders = questions.ROW_ORDERS
+        answer = _ask(asked, answers, c.ImportQuestion(id="rows", text=text, options=orders, default=orders[0]))
+        if answer not in orders:
+            raise ImportRefused(f"{answer[:40]!r} is no order of rows; there are: {', '.join(orders)}.")
+    return asked
+
+
+def _first_scan(source: Source, answers: Mapping[str, str], asked: list[c.ImportQuestion], progress: Progress) -> Scan:
+    """A scan with what the file itself declares; of colours, in the code that makes sense."""
+    if not source.colour or (isinstance(source, GdalSource) and source.encoding is not None):
+        return scan(source, (), progress)
+    assert isinstance(source, GdalSource)
+    found: dict[colours.Encoding, Scan] = {}
+    for encoding in colours.ENCODINGS:
+        set_encoding(source, encoding)
+        found[encoding] = scan(source, (), progress)
+    likely = [e for e in found if found[e].valid and colours.plausible(found[e].low, found[e].high)]
+    if not likely:
+        raise ImportRefused("It is a picture in colours, and neither Terrarium nor Mapbox heights are coded in them.")
+    likely.sort(key=lambda e: found[e].steps / max(found[e].high - found[e].low, 1e-9))
+    text = "It has three colours. In which code do they hold heights?"
+    options: tuple[str, ...] = colours.ENCODINGS
+    answer = _ask(asked, answers, c.ImportQuestion(id="encoding", text=text, options=options, default=likely[0]))
+    for encoding in colours.ENCODINGS:
+        if answer == encoding:
+            set_encoding(source, encoding)
+            return found[encoding]
+    raise ImportRefused(f"{answer[:40]!r} is no code of heights in colours; there are: {', '.join(colours.ENCODINGS)}.")
+
+
+def _masked(
+    source: Source, found: Scan, answers: Mapping[str, str], asked: list[c.ImportQuestion]
+) -> tuple[float, ...]:
+    suspects = questions.suspects(found, source)
+    if "nodata" in answers:
+        return questions.parse_nodata(answers["nodata"])
+    if not suspects:
+        return ()
+    return questions.parse_nodata(_ask(asked, answers, questions.nodata_question(suspects, found)))
+
+
+def _heights(
+    source: Source, found: Scan, answers: Mapping[str, str], asked: list[c.ImportQuestion]
+) -> tuple[float, float]:
+    """Gain and bias that make metres of raw samples. Raises ImportRefused when these are no heights."""
+    gain, bias = source.gain, source.bias
+    if not source.measured or "range" in answers:
+        low, high = questions.parse_range(_ask(asked, answers, questions.range_question(found, source)))
+        gain = (high - low) / (found.high - found.low) if found.high > found.low else 0.0
+        bias = low - gain * found.low
+    lowest, highest = sorted((gain * found.low + bias, gain * found.high + bias))
+    if not (lowest >= -c.ABSOLUTE_BOUND_M and highest <= c.ABSOLUTE_BOUND_M):
+        raise ImportRefused(f"Its heights run from {lowest:.6g} to {highest:.6g} m: these are no elevations in metres.")
+    if lowest < questions.EARTH_M[0] or highest > questions.EARTH_M[1]:
+        source.notes.append(f"Its heights run from {lowest:.6g} to {highest:.6g} m: nothing on Earth does.")
+    return gain, bias
+
+
+# --- place ------------------------------------------------------------------------------------------------------
+
+
+def _place(
+    source: Source, answers: Mapping[str, str], asked: list[c.ImportQuestion], terrain: Terrain | None
+) -> tuple[Laid | None, bool, str, float | None]:
+    """Where it lies; whether by its place on Earth; its system; how far off when that is outside the terrain."""
+    rows, cols = source.rows, source.cols
+    size_m = terrain.size_m if terrain is not None else c.DEFAULT_SIZE_M
+    if source.georef is None:
+        return _unplaced(source, answers, asked, terrain), False, "", None
+    georef = source.georef
+    answer = answers.get("place")
+    if georef.crs is None or not on_earth(georef.crs):
+        degrees = georef.looks_like_degrees(rows, cols) and georef.crs is None
+        reason = (
+            "It does not name its coordinate system." if georef.crs is None
+            else f"Its coordinate system ({crs_label(georef.crs)[:40]}) is not of the Earth."
+        )  # fmt: skip
+        answer = _ask(asked, answers, questions.system_question(degrees, reason))
+        if answer != questions.MIDDLE:
+            georef = georef.with_crs(parse_crs(answer))
+        elif degrees:
+            georef = georef.with_crs(parse_crs("EPSG:4326"))
+        else:
+            return _by_hand(source, size_m), False, "" if georef.crs is None else crs_label(georef.crs), None
+    source.georef = georef
+    assert georef.crs is not None
+    label = crs_label(georef.crs)
+    at = laying.middle(georef, rows, cols)
+    if at is None:
+        raise ImportRefused(f"Its place ({label}) cannot be found on Earth, or lies at a pole.")
+    own = c.Place(lat_deg=round(at[0], 6), lon_deg=round(at[1], 6))
+    place = own if terrain is None or terrain.place is None or answer == questions.MIDDLE else terrain.place
+    far_m = None if place is own else _far(source, at, place, size_m)
+    if far_m is not None:
+        answer = _ask(asked, answers, questions.far_question(far_m)) if answer is None else answer
+        if answer == questions.STOP:
+            raise ImportRefused(f"It lies {far_m / 1000:,.0f} km from this terrain.")
+        place = own
+    laid = laying.lay(laying.on_frame(georef, place, size_m), rows, cols)
+    _note_mercator(source, label, laid)
+    return replace(laid, at=at), answer != questions.MIDDLE, label, far_m
+
+
+def _far(source: Source, at: tuple[float, float], place: c.Place, size_m: float) -> float | None:
+    """Distance in metres from the middle of the terrain when the grid does not touch it, else None."""
+    assert source.georef is not None
+    arc = _great_circle_m(at, (place.lat_deg, place.lon_deg))
+    if arc > 10 * c.MAX_SIZE_M + size_m:  # so far that the frame is not asked; a grid is not that large
+        return arc
+    try:
+        laid = laying.lay(laying.on_frame(source.georef, place, size_m), source.rows, source.cols)
+    except ImportRefused:
+        return arc
+    low, high = laying.ground_box(laid, source.rows, source.cols)
+    outside = bool(np.any(high < 0.0) or np.any(low > size_m))
+    return arc if outside else None
+
+
+def _great_circle_m(a: tuple[float, float], b: tuple[float, float]) -> float:
+    (lat_a, lon_a), (lat_b, lon_b) = (tuple(map(math.radians, point)) for point in (a, b))
+    haversine = (
+        math.sin(0.5 * (lat_b - lat_a)) ** 2 + math.cos(lat_a) * math.cos(lat_b) * math.sin(0.5 * (lon_b - lon_a)) ** 2
+    )
+    return 2.0 * 6_371_008.8 * math.asin(min(1.0, math.sqrt(haversine)))
+
+
+def _by_hand(source: Source, size_m: float) -> Laid:
+    """A grid with coordinates in metres of nowhere: its own shape and turn, in the middle of the terrain."""
+    assert source.georef is not None
+    crs = source.georef.crs
+    unit = float(crs.axis_info[0].unit_conversion_factor) if crs is not None and crs.axis_info else 1.0
+    laid = laying.lay(laying.locally(source.georef, unit), source.rows, source.cols)
+    return _centred(laid, source, size_m)
+
+
+def _centred(laid: Laid, source: Source, size_m: float) -> Laid:
+    low, high = laying.ground_box(laid, source.rows, source.cols)
+    shift = 0.5 * size_m - 0.5 * (low + high)
+    x, y = (round(float(a), 4) for a in np.array(laid.anchor) + shift)
+    return replace(laid, anchor=(x, y))
+
+
+def _unplaced(
+    source: Source, answers: Mapping[str, str], asked: list[c.ImportQuestion], terrain: Terrain | None
+) -> Laid | None:
+    """A grid without any place: as wide as somebody says; None while nobody does and no terrain is known."""
+    width = questions.parse_size(_ask(asked, answers, questions.SIZE))
+    size_m = terrain.size_m if terrain is not None else c.DEFAULT_SIZE_M
+    if width is None and terrain is None:
+        return None
+    step = round(width / (source.cols - 1) if width is not None else size_m / (max(source.rows, source.cols) - 1), 9)
+    if not c.MIN_GRID_SPACING_M <= step <= c.MAX_GRID_SPACING_M:
+        raise ImportRefused(f"Its samples would lie {step:.6g} m apart: that is no grid for a terrain.")
+    return _centred(Laid((0.0, 0.0), 0.0, (step, step), True, False), source, size_m)
+
+
+def _note_mercator(source: Source, label: str, laid: Laid) -> None:
+    if label != "EPSG:3857" or source.georef is None or source.georef.affine is None:
+        return
+    a, _, _, d, _, _ = source.georef.affine
+    note = (
+        f"Web Mercator: its steps of {math.hypot(a, d):.4g} m are {laid.spacing_m[0]:.4g} m on the ground, and so laid."
+    )
+    source.notes.append(note)
+
+
+# --- report -----------------------------------------------------------------------------------------------------
+
+
+def _report(exam: Exam, name: str, asked: list[c.ImportQuestion]) -> c.ImportReport:
+    source, found, laid = exam.source, exam.scan, exam.laid
+    if found.infinite:
+        source.notes.append(f"{found.infinite:,} infinite samples are left out.")
+    if found.low == found.high:
+        source.notes.append("All its samples have the same height: it is flat.")
+    elif found.share < 0.5:
+        source.notes.append(f"Only {found.share:.1%} of its samples hold data.")
+    low, high = sorted((exam.gain * found.low + exam.bias, exam.gain * found.high + exam.bias))
+    spacing = laid.spacing_m if laid is not None else None
+    return c.ImportReport(
+        verdict="ask" if asked else "good",
+        file=name[: c.MAX_NAME_LENGTH],
+        format=source.format,
+        rows=source.rows,
+        cols=source.cols,
+        dtype=source.dtype,
+        crs=exam.crs,
+        spacing_m=spacing,
+        rotation_deg=laid.rotation_deg if laid is not None else 0.0,
+        width_m=(source.cols - 1) * spacing[0] if spacing else None,
+        height_m=(source.rows - 1) * spacing[1] if spacing else None,
+        at=laid.at if laid is not None and exam.geo else None,
+        low_m=low,
+        high_m=high,
+        valid=found.share,
+        nodata=source.nodata if source.nodata is not None and math.isfinite(source.nodata) else None,
+        accuracy_m=questions.accuracy_m(spacing, exam.step_m) if spacing else None,
+        notes=tuple(note[:240] for note in source.notes),
+        questions=tuple(asked),
+        preview=_preview(exam),
+    )
+
+
+def _preview(exam: Exam) -> tuple[tuple[int, ...], ...]:
+    """32 x 32 heights 0..255 between the lowest and highest sample, -1 for none, as stored: south first."""
+    picture = exam.scan.picture()
+    laid = exam.laid
+    if laid is None or laid.flip_rows:
+        picture = picture[::-1]
+    if laid is not None and laid.flip_cols:
+        picture = picture[:, ::-1]
+    span = exam.scan.high - exam.scan.low
+    shade = (picture - exam.scan.low) / span if span > 0 else np.where(np.isnan(picture), np.nan, 0.0)
+    if exam.gain < 0:
+        shade = 1.0 - shade
+    whole = np.where(np.isnan(shade), -1, np.round(255 * np.clip(shade, 0, 1))).astype(int)
+    return tuple(tuple(row) for row in whole.tolist())

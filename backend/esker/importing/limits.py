@@ -1,0 +1,72 @@
+"""Bounds on the process that reads files: memory, time, disk, and what GDAL and PROJ may touch."""
+
+from __future__ import annotations
+
+import os
+import resource
+from collections.abc import Mapping
+from typing import Final
+
+MEMORY_BYTES: Final = 1 << 30
+"""Memory of its own (RLIMIT_DATA) that reading may take; files that it maps do not count."""
+ADDRESS_BYTES: Final = {"inspect": 3 << 29, "convert": 6 << 30}
+"""Address space (RLIMIT_AS): a conversion maps the grid, its mipmap and its errors, 2 GiB for the largest."""
+CPU_SECONDS: Final = {"inspect": 120, "convert": 900}
+WALL_SECONDS: Final = {"inspect": 180.0, "convert": 1200.0}
+FILE_BYTES: Final = 3 << 30
+OPEN_FILES: Final = 128
+NICENESS: Final = 5
+
+KEPT: Final = (
+    "PATH",
+    "LD_LIBRARY_PATH",
+    "PYTHONPATH",
+    "HOME",
+    "TMPDIR",
+    "NUMBA_CACHE_DIR",
+    "SYSTEMROOT",
+    "VIRTUAL_ENV",
+)
+"""What the process gets of the server's environment; nothing that could hold a secret."""
+HARDENED: Final[Mapping[str, str]] = {
+    "LANG": "C.UTF-8",
+    "PYTHONUTF8": "1",
+    "OPENBLAS_NUM_THREADS": "1",
+    "OMP_NUM_THREADS": "1",
+    "GDAL_NUM_THREADS": "1",
+    "GDAL_CACHEMAX": "64",
+    "GDAL_DRIVER_PATH": "disable",
+    "GDAL_DISABLE_READDIR_ON_OPEN": "EMPTY_DIR",
+    "GDAL_GEOREF_SOURCES": "INTERNAL",
+    "GDAL_PAM_ENABLED": "NO",
+    "GDAL_VRT_ENABLE_PYTHON": "NO",
+    "GDAL_HTTP_MAX_RETRY": "0",
+    "GDAL_HTTP_TIMEOUT": "1",
+    "GDAL_HTTP_PROXY": "127.0.0.1:9",
+    "CPL_VSIL_CURL_ALLOWED_EXTENSIONS": ".none",
+    "CPL_VSIL_CURL_USE_HEAD": "NO",
+    "CPL_TMPDIR": "/nonexistent",
+    "PROJ_NETWORK": "OFF",
+}
+
+
+def environment() -> dict[str, str]:
+    """The whole environment of the process that reads."""
+    return {name: os.environ[name] for name in KEPT if name in os.environ} | dict(HARDENED)
+
+
+def apply(task: str) -> None:
+    """Bounds this process from now on. ``task``: "inspect" or "convert"."""
+    os.nice(NICENESS)
+    for kind, value in (
+        (resource.RLIMIT_DATA, MEMORY_BYTES),
+        (resource.RLIMIT_AS, ADDRESS_BYTES[task]),
+        (resource.RLIMIT_CPU, CPU_SECONDS[task]),
+        (resource.RLIMIT_FSIZE, FILE_BYTES),
+        (resource.RLIMIT_NOFILE, OPEN_FILES),
+        (resource.RLIMIT_CORE, 0),
+    ):
+        _, hard = resource.getrlimit(kind)
+        if hard != resource.RLIM_INFINITY:
+            value = min(value, hard)
+        resource.setrlimit(kind, (value, value))

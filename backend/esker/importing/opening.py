@@ -1,0 +1,129 @@
+"""Which format a file is of, told by its first bytes, and opening it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from typing import Final
+
+import pyproj
+
+from esker.importing import arrays, ascii_grid, colours, zipped
+from esker.importing.gdal_source import GdalSource, open_raster
+from esker.importing.georef import parse_crs
+from esker.importing.refusal import ImportRefused
+from esker.importing.source import Source
+
+TIFF: Final = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
+PNG: Final = b"\x89PNG\r\n\x1a\n"
+HFA: Final = b"EHFA_HEADER_TAG"
+KNOWN_BUT_NOT_TAKEN: Final = (
+    (b"\xff\xd8\xff", "It is a JPEG picture: elevations do not survive that."),
+    (b"GIF8", "It is a GIF picture, no elevation grid."),
+    (b"%PDF", "It is a PDF document, no elevation grid."),
+    (b"CDF", "NetCDF is not taken; save it as GeoTIFF (gdal_translate)."),
+    (b"\x89HDF", "HDF5 / NetCDF is not taken; save it as GeoTIFF (gdal_translate)."),
+    (b"<VRTDataset", "A VRT file only points at others; save it as GeoTIFF (gdal_translate)."),
+    (b"\x1f\x8b", "It is compressed with gzip: unpack it first."),
+)
+FORMATS: Final = (
+    "GeoTIFF or COG, HGT (also zipped), Esri ASCII, ERDAS IMAGINE, DTED, 16-bit PNG, RAW / R16, NPY / NPZ, "
+    "Terrarium or Mapbox RGB PNG"
+)
+
+
+@dataclass(eq=False)
+class Opened:
+    """A source, and what its container leaves open: types and shapes that a headless file could have."""
+
+    source: Source
+    name: str
+    types: tuple[str, ...] = ()
+    shapes: tuple[str, ...] = ()
+
+
+def open_source(path: Path, name: str, workdir: Path, answers: Mapping[str, str]) -> Opened:
+    """Opens an elevation file. ``name``: as its owner called it; ``workdir``: where archives are unpacked.
+
+    ``answers``: by question id: "type", "shape", "rows", "band", "encoding" change how it is read.
+    Raises ImportRefused.
+    """
+    size = path.stat().st_size
+    if size == 0:
+        raise ImportRefused("It is empty.")
+    with path.open("rb") as file:
+        head = file.read(4096)
+    prj = None
+    if head.startswith(b"PK"):
+        with zipped.open_zip(path) as archive:
+            if not zipped.is_npz(archive):
+                path, name, prj = zipped.unpack(archive, workdir)
+                with path.open("rb") as file:
+                    head = file.read(4096)
+        if head.startswith(b"PK") and prj is None and path.parent == workdir:
+            raise ImportRefused("A zip file inside a zip file is not opened.")
+    opened = _open(path, name, head, workdir, answers)
+    if prj is not None and opened.source.georef is not None and opened.source.georef.crs is None:
+        opened.source.georef = opened.source.georef.with_crs(_prj(prj))
+    return opened
+
+
+def _prj(text: str) -> pyproj.CRS | None:
+    try:
+        return parse_crs(text)
+    except ImportRefused:
+        return None
+
+
+def _open(path: Path, name: str, head: bytes, workdir: Path, answers: Mapping[str, str]) -> Opened:
+    suffix = PurePosixPath(name).suffix.lower()
+    rows = answers.get("rows")
+    if head.startswith(TIFF):
+        return Opened(_raster(path, "GTiff", answers), name)
+    if head.startswith(PNG):
+        return Opened(_raster(path, "PNG", answers), name)
+    if head.startswith(HFA):
+        return Opened(_raster(path, "HFA", answers), name)
+    if head.startswith((b"UHL1", b"HDR1", b"VOL1")):
+        return Opened(_raster(path, "DTED", answers), name)
+    if head.startswith(b"\x93NUMPY"):
+        return Opened(arrays.open_npy(path, rows), name)
+    if head.startswith(b"PK"):
+        return Opened(arrays.open_npz(path, workdir, rows), name)
+    for magic, sentence in KNOWN_BUT_NOT_TAKEN:
+        if head.lstrip().startswith(magic):
+            raise ImportRefused(sentence)
+    if suffix == ".hgt":
+        return Opened(arrays.open_hgt(path, name), name)
+    if suffix in arrays.RAW_DEFAULT:
+        source, types, shapes = arrays.open_raw(path, suffix, answers.get("type"), answers.get("shape"))
+        return Opened(source, name, tuple(types), tuple(shapes))
+    if _ascii(head):
+        return Opened(ascii_grid.open_ascii(path), name)
+    raise ImportRefused(f"It is in no format that can be read. There are: {FORMATS}.")
+
+
+def _ascii(head: bytes) -> bool:
+    text = head.removeprefix(ascii_grid.BOM).lstrip()[:16].lower()
+    return text.startswith(tuple(key.encode() for key in ascii_grid.KEYS))
+
+
+def _raster(path: Path, driver: str, answers: Mapping[str, str]) -> GdalSource:
+    band = answers.get("band", "1")
+    if not band.isdecimal() or len(band) > 4:
+        raise ImportRefused(f"{band[:20]!r} is no number of a band.")
+    source = open_raster(path, driver, int(band))
+    encoding = answers.get("encoding")
+    if encoding in colours.ENCODINGS:
+        set_encoding(source, encoding)
+    return source
+
+
+def set_encoding(source: GdalSource, encoding: colours.Encoding) -> None:
+    """Reads the colours of a source as heights in metres from now on. Raises ImportRefused when it has none."""
+    if not source.colour:
+        raise ImportRefused("It has no colours that could hold heights.")
+    source.encoding, source.measured = encoding, True
+    source.gain, source.bias, source.step = 1.0, 0.0, colours.STEP_M[encoding]
+    source.eight_bit = False
