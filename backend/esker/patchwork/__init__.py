@@ -1,0 +1,1 @@
+"""Elevation grids of any spacing and orientation as a living patchwork (DESIGN 11; paper 2, "Patchwork Terrains")."""

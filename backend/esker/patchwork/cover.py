@@ -1,0 +1,274 @@
+"""When do kernels cover a kernel? Tops and floors of patches, by cutting polygons (paper 2, Patch Invariant; compiled).
+
+The top of a patch P is the smallest z at which the kernels of greater patches with min z <= z together cover P's
+kernel; Algorithm 1 of the paper leaves out that they must be greater and is garbled at its end (DESIGN 11). P is the
+*floor* of a place if no more accurate patches cover its kernel: below its error nothing better is to be had there.
+
+Kernels meet exactly where nothing bends the lattice. Where a control net does, a kernel is tested smaller by its slack
+and covering ones are taken greater by theirs: what that passes over is far narrower than the margins of the patches.
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from esker.patchwork import patches
+from esker.patchwork.jit import bands, kernel, spread
+from esker.patchwork.patches import Floats
+from esker.patchwork.polygons import MOST, area_of, contains, overlap, shrunk, subtracted
+from esker.patchwork.sheets import Sheet
+
+Ints = NDArray[np.int64]
+
+COVERED: Final = 1e-7
+"""Share of a kernel's area that may be left over and count as covered: rounding, not ground."""
+SLIVER: Final = 1e-9
+"""Share of a kernel's area below which a left over piece is rounding."""
+
+
+class Index(NamedTuple):
+    """The patches of several sheets by place, for compiled loops. ``origin`` is taken off all world coordinates."""
+
+    kernel: Floats
+    min_z: Floats
+    area: Ints
+    slack: Floats
+    to_lattice: Floats
+    sway: Floats
+    tables: NDArray[np.int32]
+    start: Ints
+    tall: Ints
+    wide: Ints
+    rank: Ints
+    lowest: Ints
+    scales: Ints
+
+
+def index(sheets: list[Sheet], first: list[int], min_z: Floats, kernel: Floats) -> Index:
+    """Index of sheets whose patches have the places ``first[k]``.. in the arrays of the model."""
+    most = max(len(sheet.tables) for sheet in sheets)
+    start = np.full((len(sheets), most), -1, np.int64)
+    tall, wide, rank = np.zeros_like(start), np.zeros_like(start), np.full_like(start, np.iinfo(np.int64).min)
+    flat: list[NDArray[np.int32]] = []
+    filled = 0
+    for k, sheet in enumerate(sheets):
+        rows, cols = sheet.placed.raster.heights.shape
+        for scale, table in enumerate(sheet.tables):
+            tall[k, scale], wide[k, scale] = patches.table_shape(rows, cols, scale)
+            if (table >= 0).any():
+                start[k, scale] = filled
+                flat.append(np.where(table >= 0, table + first[k], -1).ravel().astype(np.int32))
+                filled += table.size
+                rank[k, scale] = sheet.area[sheet.scale_range(scale)[0]]
+    lowest = [next(s for s in range(most) if s == patches.SMALL_SCALES or start[k, s] >= 0) for k in range(len(sheets))]
+    return Index(
+        kernel,
+        min_z,
+        np.concatenate([sheet.area for sheet in sheets]),
+        np.concatenate([sheet.slack for sheet in sheets]),
+        np.stack([sheet.to_lattice for sheet in sheets]),
+        np.array([sheet.sway for sheet in sheets]),
+        np.concatenate(flat),
+        start,
+        tall,
+        wide,
+        rank,
+        np.array(lowest, np.int64),
+        np.array([len(sheet.tables) for sheet in sheets], np.int64),
+    )
+
+
+@kernel
+def greater(ix: Index, q: int, p: int) -> bool:
+    """The total order: area, then accuracy, then priority, layer and place (the order of the model's arrays)."""
+    if ix.area[q] != ix.area[p]:
+        return bool(ix.area[q] > ix.area[p])
+    if ix.min_z[q] != ix.min_z[p]:
+        return bool(ix.min_z[q] < ix.min_z[p])
+    return q > p
+
+
+@kernel
+def _box(ix: Index, layer: int, quad: Floats) -> tuple[float, float, float, float]:
+    """Bounds of a quad in area coordinates of a layer: low and high column, low and high row."""
+    m, sway = ix.to_lattice[layer], ix.sway[layer]
+    x0, x1, y0, y1 = np.inf, -np.inf, np.inf, -np.inf
+    for c in range(4):
+        x = m[0, 0] * quad[c, 0] + m[0, 1] * quad[c, 1] + m[0, 2] + 0.5
+        y = m[1, 0] * quad[c, 0] + m[1, 1] * quad[c, 1] + m[1, 2] + 0.5
+        x0, x1, y0, y1 = min(x0, x), max(x1, x), min(y0, y), max(y1, y)
+    return x0 - sway, x1 + sway, y0 - sway, y1 + sway
+
+
+@kernel
+def _local(ix: Index, q: int, x: float, y: float, out: Floats) -> None:
+    """The kernel of q relative to (x, y)."""
+    for c in range(4):
+        out[c, 0] = ix.kernel[q, c, 0] - x
+        out[c, 1] = ix.kernel[q, c, 1] - y
+
+
+@kernel
+def _top(ix: Index, p: int) -> float:
+    """Smallest z at which greater patches cover the kernel of p; infinity if they never do."""
+    x, y = ix.kernel[p, 0, 0], ix.kernel[p, 0, 1]
+    own, quad, other = np.empty((4, 2)), np.empty((4, 2)), np.empty((4, 2))
+    _local(ix, p, x, y, own)
+    shrunk(own, ix.slack[p], quad)
+    side = np.sqrt(area_of(own, 4))
+    best = np.inf
+    chosen = np.empty(64, np.int64)
+    count = 0
+    for layer in range(len(ix.lowest)):
+        x0, x1, y0, y1 = _box(ix, layer, ix.kernel[p])
+        for scale in range(ix.lowest[layer], ix.scales[layer]):
+            if ix.start[layer, scale] < 0 or ix.rank[layer, scale] < ix.area[p]:
+                continue
+            cells = float(7 << scale)
+            tall, wide = ix.tall[layer, scale], ix.wide[layer, scale]
+            for j in range(max(0, int(np.floor(y0 / cells))), min(tall - 1, int(np.floor(y1 / cells))) + 1):
+                for i in range(max(0, int(np.floor(x0 / cells))), min(wide - 1, int(np.floor(x1 / cells))) + 1):
+                    q = ix.tables[ix.start[layer, scale] + j * wide + i]
+                    if q < 0 or ix.min_z[q] >= best or not greater(ix, q, p):
+                        continue
+                    _local(ix, q, x, y, other)
+                    if contains(other, quad, ix.slack[q] + 1e-7 * side):
+                        best = ix.min_z[q]
+                    elif overlap(quad, other, ix.slack[q]):
+                        if count == len(chosen):
+                            more = np.empty(2 * count, np.int64)
+                            more[:count] = chosen
+                            chosen = more
+                        chosen[count] = q
+                        count += 1
+    kept = chosen[:count]
+    kept = kept[ix.min_z[kept] < best]
+    if len(kept) < 2:
+        return best
+    pieces = np.empty((1, MOST, 2))
+    pieces[0, :4] = quad
+    corners = np.full(1, 4, np.int64)
+    pieces_count = 1
+    whole = side * side
+    for k in np.argsort(ix.min_z[kept], kind="mergesort"):
+        q = kept[k]
+        _local(ix, q, x, y, other)
+        pieces, corners, pieces_count, left = subtracted(
+            pieces, corners, pieces_count, other, ix.slack[q], SLIVER * whole
+        )
+        if left <= COVERED * whole:
+            return float(ix.min_z[q])
+    return best
+
+
+@kernel
+def _tops(ix: Index, which: Ints, start: int, stop: int, out: Floats) -> None:
+    for k in range(start, stop):
+        out[k] = _top(ix, which[k])
+
+
+@kernel
+def _is_floor(ix: Index, p: int) -> bool:
+    """Whether more accurate patches leave some of the kernel of p to it. Walks each layer from its top down."""
+    x, y = ix.kernel[p, 0, 0], ix.kernel[p, 0, 1]
+    own, quad, other = np.empty((4, 2)), np.empty((4, 2)), np.empty((4, 2))
+    _local(ix, p, x, y, own)
+    shrunk(own, ix.slack[p], quad)
+    whole = area_of(own, 4)
+    pieces = np.empty((1, MOST, 2))
+    pieces[0, :4] = quad
+    corners = np.full(1, 4, np.int64)
+    count = 1
+    for layer in range(len(ix.lowest)):
+        x0, x1, y0, y1 = _box(ix, layer, ix.kernel[p])
+        # One patch is at the top and each has four children, so this many can wait at most.
+        stack = np.empty((4 * ix.scales[layer] + 4, 3), np.int64)
+        stack[0] = (ix.scales[layer] - 1, 0, 0)
+        waiting = 1
+        while waiting:
+            waiting -= 1
+            scale, j, i = stack[waiting]
+            cells = float(7 << scale)
+            if i * cells > x1 or (i + 1) * cells < x0 or j * cells > y1 or (j + 1) * cells < y0:
+                continue
+            if ix.start[layer, scale] >= 0:
+                q = ix.tables[ix.start[layer, scale] + j * ix.wide[layer, scale] + i]
+                if q >= 0 and (ix.min_z[q] < ix.min_z[p] or (ix.min_z[q] == ix.min_z[p] and greater(ix, q, p))):
+                    _local(ix, q, x, y, other)
+                    if overlap(quad, other, ix.slack[q]):
+                        pieces, corners, count, left = subtracted(
+                            pieces, corners, count, other, ix.slack[q], SLIVER * whole
+                        )
+                        if left <= COVERED * whole:
+                            return False
+                    continue
+            if scale > ix.lowest[layer]:
+                for dj in range(2):
+                    for di in range(2):
+                        if 2 * j + dj < ix.tall[layer, scale - 1] and 2 * i + di < ix.wide[layer, scale - 1]:
+                            stack[waiting] = (scale - 1, 2 * j + dj, 2 * i + di)
+                            waiting += 1
+    return True
+
+
+@kernel
+def _floors(ix: Index, which: Ints, start: int, stop: int, out: NDArray[np.bool_]) -> None:
+    for k in range(start, stop):
+        out[k] = _is_floor(ix, which[k])
+
+
+def tops(ix: Index, which: Ints) -> Floats:
+    """Tops of the patches ``which``."""
+    out = np.empty(len(which))
+    spread(lambda a, b: _tops(ix, which, a, b, out), bands(len(which)))
+    return out
+
+
+def floors(ix: Index, which: Ints) -> NDArray[np.bool_]:
+    """Which of the patches ``which`` are the floor of some place."""
+    out = np.empty(len(which), bool)
+    spread(lambda a, b: _floors(ix, which, a, b, out), bands(len(which)))
+    return out
+
+
+def nested(of: Sheet, min_z: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+    """Tops and floors of the patches of one sheet as if it were alone: kernels nest, so no polygon need be cut.
+
+    The top is the smallest error of the patches around (paper 2, section 4.1: kernels of the mipmap levels tile); a
+    patch is a floor if within some descendant's kernel no descendant is more accurate.
+    """
+    rows, cols = of.placed.raster.heights.shape
+    errors = [np.full(patches.table_shape(rows, cols, scale), np.inf) for scale in range(len(of.tables))]
+    for scale, table in enumerate(of.tables):
+        there = table >= 0
+        if there.any():
+            errors[scale][there] = min_z[table[there]]
+    top = np.empty(of.count)
+    floor = np.empty(of.count, bool)
+    above = np.full(errors[-1].shape, np.inf)
+    for scale in range(len(errors) - 1, -1, -1):
+        a, b = of.scale_range(scale)
+        if b > a:
+            top[a:b] = above[of.tables[scale] >= 0]
+        if scale:
+            shape = errors[scale - 1].shape
+            above = np.minimum(above, errors[scale]).repeat(2, 0).repeat(2, 1)[: shape[0], : shape[1]]
+    below: Floats | None = None
+    for scale, error in enumerate(errors):
+        worst = np.full(error.shape, np.inf) if below is None else _worst_of_four(below)
+        a, b = of.scale_range(scale)
+        if b > a:
+            floor[a:b] = ~(worst < error)[of.tables[scale] >= 0]
+        below = np.minimum(error, worst)
+    return top, floor & (top > min_z)
+
+
+def _worst_of_four(children: Floats) -> Floats:
+    """The greatest of the (up to four) children of each parent."""
+    rows, cols = children.shape
+    padded = np.full((-(-rows // 2) * 2, -(-cols // 2) * 2), -np.inf)
+    padded[:rows, :cols] = children
+    return np.asarray(padded.reshape(padded.shape[0] // 2, 2, -1, 2).max(axis=(1, 3)), np.float64)

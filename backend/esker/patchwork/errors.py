@@ -1,0 +1,219 @@
+"""Own errors of the patches of one grid, compiled (paper 2, section 3.1: delta, and 4.1).
+
+The error of a patch is the greatest distance between a valid sample of the grid in the patch's domain, at its true
+place, and the patch, whose samples are interpolated bilinearly. ``errors_reference`` is the plain twin.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from esker.contract import PATCH_KERNEL_CELLS
+from esker.patchwork import patches
+from esker.patchwork.jit import bands, kernel, spread
+from esker.patchwork.patches import Floats, PatchErrors
+from esker.patchwork.samples import cut
+
+Heights = NDArray[np.float32]
+NO_WARP = np.zeros((0, 0, 2))
+
+
+@kernel
+def _any_nodata(heights: Heights, start: int, stop: int, out: NDArray[np.bool_]) -> None:
+    for row in range(start, stop):
+        line = heights[row]
+        total = np.float32(0.0)
+        for col in range(line.size):
+            total += line[col] * np.float32(0.0)
+        if np.isnan(total):
+            out[row] = True
+
+
+@kernel
+def _whole_kernels(heights: Heights, size: int, start: int, stop: int, out: NDArray[np.bool_]) -> None:
+    rows, cols = heights.shape
+    for j in range(start, stop):
+        for row in range(size * j, min(size * (j + 1), rows)):
+            for col in range(cols):
+                if np.isnan(heights[row, col]):
+                    out[j, col // size] = False
+
+
+def whole_kernels(heights: Heights) -> NDArray[np.bool_] | None:
+    """Which of the smallest kernels of a grid hold no nodata; None if the grid holds none at all."""
+    holed = np.zeros(heights.shape[0], bool)
+    spread(lambda a, b: _any_nodata(heights, a, b, holed), bands(heights.shape[0], 64))
+    if not holed.any():
+        return None
+    out = np.ones(patches.table_shape(*heights.shape, 0), bool)
+    spread(lambda a, b: _whole_kernels(heights, patches.SMALLEST_KERNEL, a, b, out), bands(out.shape[0]))
+    return out
+
+
+@kernel
+def _level_errors(heights: Heights, mip: Heights, level: int, start: int, stop: int, out: Heights) -> None:
+    """Errors of the patches of rows start..stop of a level >= 1, for grids without nodata and warp, in float32.
+
+    A row of samples lies between two rows of the mipmap level: these are mixed first, then stretched to the samples'
+    spacing, and the greatest distance is kept for each column of the band. Patches take theirs from that.
+    """
+    rows, cols = heights.shape
+    mip_rows, mip_cols = mip.shape
+    step, half = 1 << level, 1 << (level - 1)
+    size = PATCH_KERNEL_CELLS * step
+    margin = 3 * half
+    mixed = np.empty(mip_cols + 2, np.float32)
+    worst = np.empty(cols, np.float32)
+    share = np.empty(step, np.float32)
+    for phase in range(step):
+        share[phase] = (phase + 0.5) / step
+    for j in range(start, stop):
+        worst[:] = 0.0
+        for row in range(max(0, size * j - margin), min(rows, size * (j + 1) + margin)):
+            cell = (row + half) // step - 1
+            part = share[(row + half) % step]
+            low, high = mip[max(cell, 0)], mip[min(cell + 1, mip_rows - 1)]
+            for k in range(mip_cols):
+                mixed[k + 1] = low[k] + (high[k] - low[k]) * part
+            mixed[0] = mixed[1]
+            mixed[mip_cols + 1] = mixed[mip_cols]
+            _row_errors(heights[row], mixed, share, half, worst)
+        for i in range(out.shape[1]):
+            greatest = np.float32(0.0)
+            for col in range(max(0, size * i - margin), min(cols, size * (i + 1) + margin)):
+                greatest = max(greatest, worst[col])
+            out[j, i] = greatest
+
+
+@kernel
+def _row_errors(line: Heights, mixed: Heights, share: Heights, half: int, worst: Heights) -> None:
+    """Raise ``worst`` to the distance of each sample of a row from the stretched row of the mipmap level."""
+    cols, step = line.size, share.size
+    for k in range(mixed.size - 1):
+        value = mixed[k]
+        rise = mixed[k + 1] - value
+        first = (k - 1) * step + half
+        for col in range(max(first, 0), min(first + step, cols)):
+            distance = abs(line[col] - (value + rise * share[col - first]))
+            if distance > worst[col]:
+                worst[col] = distance
+
+
+@kernel
+def _displaced(warp: Floats, rows: int, cols: int, u: float, v: float) -> tuple[float, float]:
+    """Lattice place (u, v) with the control net's displacement; the net is empty for none."""
+    if warp.shape[0] == 0:
+        return u, v
+    a = u * (warp.shape[1] - 1) / (cols - 1)
+    b = v * (warp.shape[0] - 1) / (rows - 1)
+    i = min(max(int(np.floor(a)), 0), warp.shape[1] - 2)
+    j = min(max(int(np.floor(b)), 0), warp.shape[0] - 2)
+    f, g = a - i, b - j
+    x0 = warp[j, i, 0] + (warp[j, i + 1, 0] - warp[j, i, 0]) * f
+    x1 = warp[j + 1, i, 0] + (warp[j + 1, i + 1, 0] - warp[j + 1, i, 0]) * f
+    y0 = warp[j, i, 1] + (warp[j, i + 1, 1] - warp[j, i, 1]) * f
+    y1 = warp[j + 1, i, 1] + (warp[j + 1, i + 1, 1] - warp[j + 1, i, 1]) * f
+    return u + x0 + (x1 - x0) * g, v + y0 + (y1 - y0) * g
+
+
+@kernel
+def interpolated(block: Heights, u: float, v: float) -> float:
+    """A patch at sample coordinates (u, v), bilinear; beyond its samples its border goes on."""
+    last = block.shape[0] - 1
+    u = min(max(u, 0.0), float(last))
+    v = min(max(v, 0.0), float(last))
+    i = min(int(u), last - 1)
+    j = min(int(v), last - 1)
+    f, g = u - i, v - j
+    low = block[j, i] + (np.float64(block[j, i + 1]) - block[j, i]) * f
+    high = block[j + 1, i] + (np.float64(block[j + 1, i + 1]) - block[j + 1, i]) * f
+    return float(low + (high - low) * g)
+
+
+@kernel
+def _patch_errors(
+    heights: Heights,
+    mip: Heights,
+    warp: Floats,
+    level: int,
+    size: int,
+    j: NDArray[np.int64],
+    i: NDArray[np.int64],
+    to_patch: Floats,
+    start: int,
+    stop: int,
+    out: Heights,
+) -> None:
+    """Errors of the patches start..stop of a scale, whatever the grid: float64, sample by sample."""
+    rows, cols = heights.shape
+    step = 1 << level
+    cells = size * step
+    margin = 1.5 * step
+    block = np.empty((size + 4, size + 4), np.float32)
+    for p in range(start, stop):
+        cut(mip, j[p] * size - 2, i[p] * size - 2, block)
+        m = to_patch[p]
+        worst = 0.0
+        for row in range(
+            max(0, int(np.ceil(cells * j[p] - margin - 0.5))), min(rows, int(cells * (j[p] + 1) + margin + 0.5))
+        ):
+            for col in range(
+                max(0, int(np.ceil(cells * i[p] - margin - 0.5))), min(cols, int(cells * (i[p] + 1) + margin + 0.5))
+            ):
+                height = heights[row, col]
+                if np.isnan(height):
+                    continue
+                x, y = _displaced(warp, rows, cols, float(col), float(row))
+                u = m[0, 0] * x + m[0, 1] * y + m[0, 2]
+                v = m[1, 0] * x + m[1, 1] * y + m[1, 2]
+                distance = abs(height - interpolated(block, u, v))
+                if distance > worst:
+                    worst = distance
+        out[p] = worst
+
+
+def measure(
+    mips: tuple[Heights, ...],
+    warp: Floats | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> PatchErrors:
+    """Errors of every patch of the grid ``mips[0]`` (its levels: ``mipmaps.mipmaps``). ``progress``: share done."""
+    heights = mips[0]
+    rows, cols = heights.shape
+    whole = whole_kernels(heights)
+    plain = whole is None and warp is None
+    tables: list[Heights] = []
+    exist = patches.existing(rows, cols, len(mips), warp, whole)
+    for scale, there in enumerate(exist):
+        level = patches.level_of(scale)
+        table = np.full(there.shape, np.nan, np.float32)
+        if plain and level:
+            step = patches.PATCH_KERNEL_CELLS << level
+            least = max(1, 256 // step)
+            spread(
+                lambda a, b, at=level, to=table: _level_errors(heights, mips[at], at, a, b, to),
+                bands(len(table), least),
+            )
+        elif warp is None and not level:
+            table[there] = 0.0
+        else:
+            table[there] = _each(mips, warp, scale, there)
+        tables.append(table)
+        if progress:
+            progress((scale + 1) / len(exist))
+    return PatchErrors(tuple(tables))
+
+
+def _each(mips: tuple[Heights, ...], warp: Floats | None, scale: int, there: NDArray[np.bool_]) -> Heights:
+    """Errors of the existing patches of a scale, measured sample by sample."""
+    j, i = np.nonzero(there)
+    rows, cols = mips[0].shape
+    level, size = patches.level_of(scale), patches.kernel_samples(scale)
+    to_patch = patches.lay(rows, cols, warp, scale, j, i).to_patch
+    net = NO_WARP if warp is None else warp
+    out = np.empty(len(j), np.float32)
+    spread(lambda a, b: _patch_errors(mips[0], mips[level], net, level, size, j, i, to_patch, a, b, out), bands(len(j)))
+    return out

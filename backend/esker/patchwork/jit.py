@@ -1,0 +1,55 @@
+"""Compiled loops: one way to compile them and one to spread them over the processors.
+
+Loops are compiled at their first call and kept on disk, so that nothing is compiled at import nor twice on a machine.
+None is compiled with numba's own ``parallel``: its thread pools must not be entered by two threads at once, and a
+server does just that. Loops release the interpreter lock instead, and :func:`spread` runs bands of them in threads.
+Bands write to places of their own, so that the result has the same bits for any number of threads.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, TypeVar, cast
+
+import numba
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def kernel(function: F) -> F:
+    """The compiled form of a loop: exact IEEE arithmetic, no interpreter lock, kept on disk where a disk allows it."""
+    options: dict[str, Any] = {"nogil": True, "boundscheck": False, "error_model": "numpy"}
+    try:
+        return cast(F, numba.njit(cache=True, **options)(function))
+    except RuntimeError:  # no place on this machine to keep compiled code in
+        return cast(F, numba.njit(**options)(function))
+
+
+def processors() -> int:
+    """Threads that :func:`spread` uses: the processors that this process may run on, 16 at most."""
+    try:
+        return min(16, len(os.sched_getaffinity(0)))
+    except AttributeError:  # not Linux
+        return min(16, os.cpu_count() or 1)
+
+
+def bands(count: int, least: int = 1, per_thread: int = 4) -> list[tuple[int, int]]:
+    """Ranges that cover 0..count, of at least ``least``, some for each thread so that uneven ones even out."""
+    if count <= 0:
+        return []
+    step = max(least, -(-count // (processors() * per_thread)))
+    return [(start, min(start + step, count)) for start in range(0, count, step)]
+
+
+def spread(work: Callable[[int, int], None], ranges: Iterable[tuple[int, int]]) -> None:
+    """Call ``work(start, stop)`` for every range, in threads. Raises what the first failing call raised."""
+    ranges = list(ranges)
+    if len(ranges) < 2 or processors() < 2:
+        for start, stop in ranges:
+            work(start, stop)
+        return
+    with ThreadPoolExecutor(processors(), thread_name_prefix="patchwork") as pool:
+        for done in [pool.submit(work, start, stop) for start, stop in ranges]:
+            done.result()

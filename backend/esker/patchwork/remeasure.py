@@ -1,0 +1,109 @@
+"""Measuring the patches of one layer against the samples of another (DESIGN 11: data that became stale; compiled)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from esker.patchwork import patches
+from esker.patchwork.errors import NO_WARP, Heights, _displaced, interpolated
+from esker.patchwork.jit import bands, kernel, spread
+from esker.patchwork.patches import Floats
+from esker.patchwork.samples import cut
+from esker.patchwork.sheets import Sheet, composed, reached
+
+NONE = -1.0
+"""The distance of a patch that no sample lies in."""
+
+
+@kernel
+def _narrowed(rise: float, start: float, extent: float, slip: float, low: float, high: float) -> tuple[float, float]:
+    """The part of low..high where -slip <= start + rise t <= extent + slip."""
+    if rise == 0.0:
+        if start < -slip or start > extent + slip:
+            return 1.0, 0.0
+        return low, high
+    a, b = (-slip - start) / rise, (extent + slip - start) / rise
+    return max(low, min(a, b)), min(high, max(a, b))
+
+
+@kernel
+def _distances(
+    mip: Heights,
+    first: NDArray[np.int64],
+    side: int,
+    to_patch: Floats,
+    extent: Floats,
+    gain: Floats,
+    heights: Heights,
+    warp: Floats,
+    sway: float,
+    start: int,
+    stop: int,
+    out: Floats,
+) -> None:
+    """Greatest distance of the samples of ``heights`` in the domain of each of the patches start..stop.
+
+    ``first`` (n, 2): row and column of a patch in ``mip``; ``to_patch`` (n, 2, 3): lattice of ``heights`` to patch;
+    ``gain``: scale and lift of the patches, scale and lift of the samples.
+    """
+    rows, cols = heights.shape
+    block = np.empty((side, side), np.float32)
+    for p in range(start, stop):
+        cut(mip, first[p, 0], first[p, 1], block)
+        m, eu, ev = to_patch[p], extent[p, 0], extent[p, 1]
+        su = (abs(m[0, 0]) + abs(m[0, 1])) * sway
+        sv = (abs(m[1, 0]) + abs(m[1, 1])) * sway
+        determinant = m[0, 0] * m[1, 1] - m[0, 1] * m[1, 0]
+        # Rows of the lattice that the domain's corners span.
+        low, high = np.inf, -np.inf
+        for corner in range(4):
+            du = (eu if corner & 1 else 0.0) - m[0, 2]
+            dv = (ev if corner & 2 else 0.0) - m[1, 2]
+            v = (m[0, 0] * dv - m[1, 0] * du) / determinant
+            low, high = min(low, v), max(high, v)
+        worst = -1.0
+        for row in range(max(0, int(np.ceil(low - sway))), min(rows - 1, int(np.floor(high + sway))) + 1):
+            a, b = _narrowed(m[0, 0], m[0, 1] * row + m[0, 2], eu, su, 0.0, cols - 1.0)
+            a, b = _narrowed(m[1, 0], m[1, 1] * row + m[1, 2], ev, sv, a, b)
+            if a > b:
+                continue
+            for col in range(max(0, int(np.floor(a))), min(cols - 1, int(np.ceil(b))) + 1):
+                height = heights[row, col]
+                if np.isnan(height):
+                    continue
+                x, y = _displaced(warp, rows, cols, float(col), float(row))
+                u = m[0, 0] * x + m[0, 1] * y + m[0, 2]
+                v = m[1, 0] * x + m[1, 1] * y + m[1, 2]
+                if u < 0.0 or v < 0.0 or u > eu or v > ev:
+                    continue
+                patch = gain[0] * interpolated(block, u, v) + gain[1]
+                worst = max(worst, abs(gain[2] * height + gain[3] - patch))
+        out[p] = worst
+
+
+def distances(of: Sheet, to: Sheet) -> tuple[NDArray[np.int64], Floats]:
+    """Indices of the patches of ``of`` that samples of ``to`` lie in, and the greatest distance there, metres."""
+    index = np.flatnonzero(reached(of, to))
+    out = np.full(len(index), NONE)
+    lattice_to_patch = composed(of.to_patch[index], to.to_world)
+    ours, theirs = of.placed, to.placed
+    gain = np.array([ours.layer.scale, ours.layer.lift_m, theirs.layer.scale, theirs.layer.lift_m], np.float64)
+    warp = NO_WARP if theirs.raster.warp is None else theirs.raster.warp
+    scales = of.scale[index]
+    for scale in np.unique(scales).tolist():
+        a, b = np.searchsorted(scales, scale), np.searchsorted(scales, scale, "right")
+        size = patches.kernel_samples(scale)
+        chosen = index[a:b]
+        first = np.stack([of.j[chosen], of.i[chosen]], 1).astype(np.int64) * size - patches.RING
+        mip = ours.raster.mips[patches.level_of(scale)]
+        side = patches.side_of(scale)
+        part, matrix, extent = out[a:b], lattice_to_patch[a:b], of.extent[chosen]
+        spread(
+            lambda x, y, m=mip, f=first, s=side, t=matrix, e=extent, o=part: _distances(
+                m, f, s, t, e, gain, theirs.raster.heights, warp, to.sway, x, y, o
+            ),
+            bands(len(chosen)),
+        )
+    there = out >= 0
+    return index[there], out[there]

@@ -1,0 +1,183 @@
+"""A sheet: all patches of one layer, laid in the world, as arrays. What follows from the layer alone."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from esker import contract
+from esker.patchwork import patches
+from esker.patchwork.patches import Floats
+from esker.patchwork.rasters import Raster
+
+Ints = NDArray[np.int64]
+
+AREA_QUANTA: Final = 1_000_000
+"""Areas are ordered by log2 in steps of a millionth: float noise must not order patches of equal size."""
+
+
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """An elevation layer of the document with the raster that its ``content`` names."""
+
+    layer: contract.Layer
+    raster: Raster
+
+
+def affine(layer: contract.Layer) -> Floats:
+    """(2, 3): (warped) lattice (u, v, 1) to world (x, y), metres. Quarter turns are exact."""
+    quarter, rest = divmod(layer.rotation_deg, 90.0)
+    turn = math.radians(rest)
+    cos, sin = (1.0, 0.0) if rest == 0 else (math.cos(turn), math.sin(turn))
+    for _ in range(int(quarter) % 4):
+        cos, sin = -sin, cos
+    sx, sy = layer.spacing_m
+    return np.array([[cos * sx, -sin * sy, layer.anchor[0]], [sin * sx, cos * sy, layer.anchor[1]]])
+
+
+def inverse(matrix: Floats) -> Floats:
+    """The inverse (..., 2, 3) of affine maps (..., 2, 3)."""
+    a, b, c, d = matrix[..., 0, 0], matrix[..., 0, 1], matrix[..., 1, 0], matrix[..., 1, 1]
+    determinant = a * d - b * c
+    out = np.empty_like(matrix)
+    out[..., 0, 0], out[..., 0, 1] = d / determinant, -b / determinant
+    out[..., 1, 0], out[..., 1, 1] = -c / determinant, a / determinant
+    out[..., 0, 2] = -(out[..., 0, 0] * matrix[..., 0, 2] + out[..., 0, 1] * matrix[..., 1, 2])
+    out[..., 1, 2] = -(out[..., 1, 0] * matrix[..., 0, 2] + out[..., 1, 1] * matrix[..., 1, 2])
+    return out
+
+
+def composed(outer: Floats, inner: Floats) -> Floats:
+    """The affine map ``outer`` after ``inner``, both (..., 2, 3)."""
+    out = np.empty(np.broadcast_shapes(outer.shape, inner.shape))
+    for row in range(2):
+        for col in range(3):
+            out[..., row, col] = outer[..., row, 0] * inner[..., 0, col] + outer[..., row, 1] * inner[..., 1, col]
+        out[..., row, 2] += outer[..., row, 2]
+    return out
+
+
+def mapped(matrix: Floats, points: Floats) -> Floats:
+    """Points (..., 2) under one affine map (2, 3). Equal points give equal bits."""
+    x, y = points[..., 0], points[..., 1]
+    first = matrix[0, 0] * x + matrix[0, 1] * y + matrix[0, 2]
+    return np.stack([first, matrix[1, 0] * x + matrix[1, 1] * y + matrix[1, 2]], -1)
+
+
+@dataclass(frozen=True, eq=False)
+class Sheet:
+    """The n patches of one layer, ordered by (scale, j, i). Fields as in ``lod_space.Model``; and
+
+    ``own``: accuracy + own error, metres. ``area``: log2 of the nominal kernel's area in steps of AREA_QUANTA.
+    ``tables[scale]``: index of patch (j, i) in the sheet, -1 where there is none. ``to_world``, ``to_lattice``: the
+    layer's affine and its inverse. ``sway``: greatest displacement of the control net, lattice units.
+    """
+
+    placed: Placed
+    scale: NDArray[np.int8]
+    j: NDArray[np.int32]
+    i: NDArray[np.int32]
+    to_patch: Floats
+    kernel: Floats
+    extent: Floats
+    half: Floats
+    slack: Floats
+    own: Floats
+    area: Ints
+    tables: tuple[NDArray[np.int32], ...]
+    to_world: Floats
+    to_lattice: Floats
+    sway: float
+
+    @property
+    def count(self) -> int:
+        return len(self.own)
+
+    def scale_range(self, scale: int) -> tuple[int, int]:
+        """First patch of a scale and the one after its last."""
+        return int(np.searchsorted(self.scale, scale)), int(np.searchsorted(self.scale, scale, "right"))
+
+
+def sheet(placed: Placed) -> Sheet:
+    """Lay the patches of a layer in the world."""
+    layer, raster = placed.layer, placed.raster
+    rows, cols = raster.heights.shape
+    to_world = affine(layer)
+    to_lattice = inverse(to_world)
+    parts: list[tuple[NDArray[np.float64], ...]] = []
+    scales, js, iss, areas, tables = [], [], [], [], []
+    first = 0
+    for scale, table in enumerate(raster.errors.tables):
+        there = ~np.isnan(table)
+        j, i = np.nonzero(there)
+        index = np.full(table.shape, -1, np.int32)
+        index[there] = np.arange(first, first + len(j))
+        tables.append(index)
+        first += len(j)
+        if not len(j):
+            continue
+        laid = patches.lay(rows, cols, raster.warp, scale, j, i)
+        to_patch = composed(laid.to_patch, to_lattice)
+        from_patch = inverse(to_patch)
+        unit = np.hypot(from_patch[:, 0, :2], from_patch[:, 1, :2])
+        kernel = mapped(to_world, laid.kernel)
+        own = layer.accuracy_m + abs(layer.scale) * table[there].astype(np.float64)
+        slack = laid.bend * max(layer.spacing_m)
+        parts.append((to_patch, kernel, laid.extent, laid.extent / 2 * unit, slack, own))
+        scales.append(np.full(len(j), scale, np.int8))
+        js.append(j.astype(np.int32))
+        iss.append(i.astype(np.int32))
+        log2 = math.log2(layer.spacing_m[0] * layer.spacing_m[1]) + 2 * (scale + math.log2(patches.SMALLEST_KERNEL))
+        areas.append(np.full(len(j), round(log2 * AREA_QUANTA), np.int64))
+    to_patch, kernel, extent, half, slack, own = (np.concatenate(column) for column in zip(*parts, strict=True))
+    return Sheet(
+        placed,
+        np.concatenate(scales),
+        np.concatenate(js),
+        np.concatenate(iss),
+        to_patch,
+        _counter_clockwise(kernel),
+        extent,
+        half,
+        slack,
+        own,
+        np.concatenate(areas),
+        tuple(tables),
+        to_world,
+        to_lattice,
+        0.0 if raster.warp is None else float(np.abs(raster.warp).max()) * 1.5 + 0.5,
+    )
+
+
+def _counter_clockwise(kernel: Floats) -> Floats:
+    """Quads (n, 4, 2), turned round where a mirroring control net made them run clockwise."""
+    a, b = kernel[:, 2] - kernel[:, 0], kernel[:, 3] - kernel[:, 1]
+    clockwise = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0] < 0
+    if clockwise.any():
+        kernel[clockwise] = kernel[clockwise, ::-1]
+    return kernel
+
+
+def domains(of: Sheet) -> Floats:
+    """Corners (n, 4, 2) of the domains of a sheet's patches, world."""
+    back = inverse(of.to_patch)
+    zero = np.zeros(of.count)
+    u = np.stack([zero, of.extent[:, 0], of.extent[:, 0], zero], 1)
+    v = np.stack([zero, zero, of.extent[:, 1], of.extent[:, 1]], 1)
+    x = back[:, 0, 0, None] * u + back[:, 0, 1, None] * v + back[:, 0, 2, None]
+    y = back[:, 1, 0, None] * u + back[:, 1, 1, None] * v + back[:, 1, 2, None]
+    return np.stack([x, y], -1)
+
+
+def reached(of: Sheet, by: Sheet) -> NDArray[np.bool_]:
+    """Which patches of ``of`` have a domain that may touch the grid of ``by`` (never misses one)."""
+    corners = mapped(by.to_lattice, domains(of))
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    rows, cols = by.placed.raster.heights.shape
+    edge = 0.5 + by.sway
+    end = np.array([cols - 1 + edge, rows - 1 + edge])
+    return np.asarray(((low <= end) & (high >= -edge)).all(axis=1), np.bool_)
