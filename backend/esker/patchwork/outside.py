@@ -1,0 +1,142 @@
+"""Ground beyond the data: the data's border continued as a membrane, free at the domain's border.
+
+Where the cover m of the patches (see ``blend``) is below 1 the ground is F = m f + (1 - m) O: f the blend, O a membrane
+that F's neighbours span, O = mean of the four. So F is f on the data, meets it smoothly over the patches' margins, and
+beyond it has no height that the data's border has not: no cliff, wherever nodata or the layer's edge lies.
+
+It is found coarse to fine. Level ``ANCHOR`` is solved as a whole (``membrane``: restricted to ever coarser grids,
+solved there, and carried back, with sweeps on each: a cascadic multigrid, Bornemann and Deuflhard 1996). Each finer
+level carries the coarser one down with the interpolating 4-point scheme (Dyn, Levin and Gregory 1987), which keeps the
+samples that both have, and sweeps a few times with the data that only it resolves. Twice finer than the data nothing
+is left to resolve, and no sweep is made: all levels show one function from there on.
+
+Every step is the same exact arithmetic for every sample, so that windows have the bits of whole levels.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from esker.patchwork.jit import bands, kernel, spread
+
+Grid = NDArray[np.float32]
+
+ANCHOR: Final = 3
+"""Level (513 x 513 samples) at which the membrane is solved as a whole."""
+SWEEPS: Final = 4
+"""Sweeps on each level above ``ANCHOR`` that still resolves something of the data."""
+_SWEEPS_BELOW: Final = (16, 64)
+"""Sweeps of the cascade on ``ANCHOR``, and at most on a coarser grid: four times as many on each, as they cost that."""
+
+
+@kernel
+def _sweep(before: Grid, heights: Grid, cover: Grid, first: int, last: int, after: Grid) -> None:
+    rows, cols = before.shape
+    one, quarter = np.float32(1), np.float32(0.25)
+    for row in range(first, last):
+        south, north = before[max(row - 1, 0)], before[min(row + 1, rows - 1)]
+        here, known, m, out = before[row], heights[row], cover[row], after[row]
+        for col in range(1, cols - 1):
+            mean = ((here[col - 1] + here[col + 1]) + (south[col] + north[col])) * quarter
+            out[col] = m[col] * known[col] + (one - m[col]) * mean
+        for col in (0, cols - 1):
+            west, east = here[max(col - 1, 0)], here[min(col + 1, cols - 1)]
+            mean = ((west + east) + (south[col] + north[col])) * quarter
+            out[col] = m[col] * known[col] + (one - m[col]) * mean
+
+
+def relax(ground: Grid, heights: Grid, cover: Grid, sweeps: int) -> Grid:
+    """``ground`` after sweeps of F <- m f + (1 - m) mean of four; indices beyond the arrays are clamped."""
+    other = np.empty_like(ground)
+    for _ in range(sweeps):
+        source, target = ground, other
+
+        def some(start: int, stop: int, source: Grid = source, target: Grid = target) -> None:
+            _sweep(source, heights, cover, start, stop, target)
+
+        spread(some, bands(len(ground), 128))
+        ground, other = target, source
+    return ground
+
+
+@kernel
+def _carry(coarse: Grid, row0: int, col0: int, side: int, r0: int, c0: int, out: Grid) -> None:
+    """4-point scheme in both directions. ``coarse[0, 0]`` is sample [row0, col0] of a level of ``side`` samples."""
+    near, far = np.float32(9.0 / 16.0), np.float32(-1.0 / 16.0)
+    rows, cols = out.shape
+    line = np.empty(coarse.shape[1], np.float32)
+    for row in range(rows):
+        y = (r0 + row) // 2
+        if (r0 + row) % 2 == 0:
+            line[:] = coarse[y - row0]
+        else:
+            a, b = coarse[max(y - 1, 0) - row0], coarse[y - row0]
+            c, d = coarse[min(y + 1, side - 1) - row0], coarse[min(y + 2, side - 1) - row0]
+            for k in range(line.size):
+                line[k] = near * (b[k] + c[k]) + far * (a[k] + d[k])
+        for col in range(cols):
+            x = (c0 + col) // 2
+            if (c0 + col) % 2 == 0:
+                out[row, col] = line[x - col0]
+            else:
+                inner = line[x - col0] + line[min(x + 1, side - 1) - col0]
+                outer = line[max(x - 1, 0) - col0] + line[min(x + 2, side - 1) - col0]
+                out[row, col] = near * inner + far * outer
+
+
+def carry(coarse: Grid, row0: int, col0: int, side: int, rows: slice, cols: slice) -> Grid:
+    """Samples ``[rows, cols]`` of the next finer level of a level with ``side`` samples, from a window of it.
+
+    ``coarse[0, 0]`` is sample [row0, col0]; the window must hold what ``needed`` says.
+    """
+    out = np.empty((rows.stop - rows.start, cols.stop - cols.start), dtype=np.float32)
+    _carry(np.ascontiguousarray(coarse), row0, col0, side, rows.start, cols.start, out)
+    return out
+
+
+def needed(span: slice, side: int) -> slice:
+    """Coarse samples from which ``carry`` makes the fine samples ``span``; ``side`` samples a side on the coarse."""
+    return slice(max(0, span.start // 2 - 1), min(side, (span.stop - 1) // 2 + 3))
+
+
+def membrane(heights: Grid, cover: Grid) -> Grid:
+    """F on a whole level (2^k + 1 samples a side) from blend and cover there. Without any cover it is 0."""
+    if len(heights) <= 3:
+        total = cover.sum()
+        mean = np.float32((heights * cover).sum() / total) if total > 0 else np.float32(0)
+        start = np.full_like(heights, mean)
+        return relax(start, heights, cover, _SWEEPS_BELOW[1])
+    coarse = membrane(*_restricted(heights, cover))
+    side = len(heights)
+    whole = slice(0, side)
+    fine = carry(coarse, 0, 0, len(coarse), whole, whole)
+    ground = cover * heights + (np.float32(1) - cover) * fine
+    least, most = _SWEEPS_BELOW
+    shrink = (64 << ANCHOR) // (side - 1)
+    return relax(ground, heights, cover, min(most, least * max(1, shrink * shrink)))
+
+
+def _restricted(heights: Grid, cover: Grid) -> tuple[Grid, Grid]:
+    """Every other sample: the mean around it weighted by cover, known as well as the best known around it."""
+    weight, total = _halved(cover), _halved(cover * heights)
+    known = np.maximum.reduce([_shifted(cover, i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)])
+    mean = np.where(weight > 0, total / np.where(weight > 0, weight, 1), 0)
+    return mean.astype(np.float32), np.where(weight > 0, known, 0).astype(np.float32)
+
+
+def _halved(values: Grid) -> NDArray[np.float64]:
+    weights = {-1: 0.25, 0: 0.5, 1: 0.25}
+    out = np.zeros(((len(values) + 1) // 2, (len(values) + 1) // 2))
+    for i, a in weights.items():
+        for j, b in weights.items():
+            out += a * b * _shifted(values, i, j)
+    return out
+
+
+def _shifted(values: Grid, i: int, j: int) -> Grid:
+    """Samples ``values[2 row + i, 2 col + j]``; 0 beyond the array."""
+    padded = np.pad(values, 1)
+    return padded[1 + i :: 2, 1 + j :: 2][: (len(values) + 1) // 2, : (len(values) + 1) // 2]
