@@ -1,4 +1,4 @@
-"""``esker serve | solve | render | bench | --version``; ``python -m esker`` is the same."""
+"""``esker serve | import | solve | render | bench | --version``; ``python -m esker`` is the same."""
 
 from __future__ import annotations
 
@@ -16,7 +16,9 @@ from esker.version import VERSION
 def main(argv: list[str] | None = None) -> int:
     """Runs a command; returns the exit status."""
     arguments = sys.argv[1:] if argv is None else argv
-    # What follows `solve`, `render` and `bench NAME` belongs to those commands, options and --help included.
+    # What follows `import`, `solve`, `render` and `bench NAME` belongs to those commands, options and --help included.
+    if arguments[:1] == ["import"]:
+        return _run("esker.importing.command", arguments[1:])
     if arguments[:1] == ["solve"]:
         return _run("esker.solve.command", arguments[1:])
     if arguments[:1] == ["render"]:
@@ -50,6 +52,7 @@ def _parser() -> argparse.ArgumentParser:
     serve.add_argument("--device", help="part of the name of the OpenCL device, or numpy")
     serve.add_argument("--threads", type=int, help="threads of a CPU device (default: cores - 1)")
     serve.add_argument("--log-level", choices=("debug", "info", "warning", "error"))
+    commands.add_parser("import", help="bring in elevation files (see esker import --help)", add_help=False)
     commands.add_parser("solve", help="solve a terrain file into heights (see esker solve --help)", add_help=False)
     commands.add_parser("render", help="draw a terrain: pictures, turntables (see esker render --help)", add_help=False)
     commands.add_parser("bench", help="measure: esker bench NAME --json (without NAME: the list)", add_help=False)

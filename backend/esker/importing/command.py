@@ -1,0 +1,202 @@
+"""``esker import``: what elevation files are, and bringing them into a terrain (docs/importing.md)."""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import http.client
+import sys
+from pathlib import Path
+from typing import Final
+
+from esker import contract as c
+from esker.importing import run
+from esker.importing.upload import Uploads
+from esker.link import Refused
+
+GOOD: Final = 0
+FAILED: Final = 1
+QUESTION: Final = 2
+REFUSED: Final = 3
+SEVERITY: Final = (GOOD, QUESTION, REFUSED, FAILED)
+VERDICTS: Final = {"good": GOOD, "ask": QUESTION, "refused": REFUSED}
+
+
+def main(argv: list[str]) -> int:
+    """Runs the command. Exit status: 0 good, 2 a question is open, 3 refused, 1 something else went wrong."""
+    parsed = _parser().parse_args(argv)
+    try:
+        answers = _answers(parsed.answer)
+    except ValueError as error:
+        return _fail(str(error))
+    statuses = [_check(path, answers, parsed.json) for path in parsed.files] if parsed.check else _into(parsed, answers)
+    return max(statuses, key=SEVERITY.index)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="esker import",
+        description="Say what elevation files are, or bring them into a terrain. Exit status: 0 good, 2 a question is "
+        "open, 3 refused, 1 something else went wrong.",
+    )
+    parser.add_argument("files", nargs="+", type=Path, metavar="FILE")
+    what = parser.add_mutually_exclusive_group(required=True)
+    what.add_argument("--check", action="store_true", help="only say what the files are and what would happen")
+    what.add_argument(
+        "--into", metavar="LINK", help="a link to a terrain with the right to edit, as esker serve prints it"
+    )
+    parser.add_argument(
+        "--answer", action="append", default=[], metavar="ID=VALUE", help="answer a question (may be given many times)"
+    )
+    parser.add_argument(
+        "--defaults", action="store_true", help="with --into: take the default answer where none is given"
+    )
+    parser.add_argument("--json", action="store_true", help="with --check: one report a line, as JSON")
+    parser.add_argument(
+        "--ca-file", type=Path, metavar="PEM", help="the authority of a classroom server (esker-ca.pem)"
+    )
+    return parser
+
+
+def _answers(given: list[str]) -> dict[str, str]:
+    """Raises ValueError for what has no "="."""
+    answers = {}
+    for text in given:
+        key, equals, value = text.partition("=")
+        if not equals or not key or len(key) > 24 or len(value) > 240:
+            raise ValueError(f"--answer {text[:40]!r}: write ID=VALUE, for instance nodata=-9999")
+        answers[key.strip()] = value.strip()
+    return answers
+
+
+def _fail(message: str) -> int:
+    sys.stderr.write(f"esker import: {message}\n")
+    return FAILED
+
+
+# --- checking ---------------------------------------------------------------------------------------------------
+
+
+def _check(path: Path, answers: dict[str, str], as_json: bool) -> int:
+    if not path.is_file():
+        return _fail(f"there is no file {path}")
+    report = asyncio.run(run.inspect(path, path.name, answers=c.ImportAnswers(answers=answers)))
+    sys.stdout.write(report.model_dump_json() + "\n" if as_json else describe(report))
+    return VERDICTS[report.verdict]
+
+
+def describe(report: c.ImportReport) -> str:
+    """A report for a person, some lines of text."""
+    if report.verdict == "refused":
+        return f"{report.file}: refused\n  {report.refusal}\n"
+    words = {
+        "good": "good",
+        "ask": "a question" if len(report.questions) == 1 else f"{len(report.questions)} questions",
+    }
+    lines = [f"{report.file}: {words[report.verdict]}"]
+    facts = [report.format, f"{report.cols} x {report.rows} samples", report.dtype, report.crs]
+    lines.append("  " + ", ".join(fact for fact in facts if fact))
+    if report.spacing_m is not None and report.width_m is not None and report.height_m is not None:
+        across, up = report.spacing_m
+        turned = f", turned by {report.rotation_deg:.2f}°" if abs(report.rotation_deg) >= 0.005 else ""
+        lines.append(
+            f"  {across:.4g} x {up:.4g} m apart, {_length(report.width_m)} x {_length(report.height_m)}{turned}"
+        )
+    if report.at is not None:
+        lat, lon = report.at
+        north, east = "N" if lat >= 0 else "S", "E" if lon >= 0 else "W"
+        lines.append(f"  middle at {abs(lat):.4f}° {north}, {abs(lon):.4f}° {east}")
+    if report.low_m is not None and report.high_m is not None and report.valid is not None:
+        accuracy = "" if report.accuracy_m is None else f", accuracy taken for {report.accuracy_m:.3g} m"
+        lines.append(f"  {report.low_m:.6g} to {report.high_m:.6g} m, {report.valid:.1%} of it data{accuracy}")
+    lines += [f"  note: {note}" for note in report.notes]
+    for question in report.questions:
+        lines.append(f"  ? {question.id}: {question.text}")
+        choices = [f"{option} (default)" if option == question.default else option for option in question.options]
+        lines.append(f"      --answer {question.id}=…   {' | '.join(choices) or f'default {question.default}'}")
+    return "\n".join(lines) + "\n"
+
+
+def _length(metres: float) -> str:
+    return f"{metres / 1000:.4g} km" if metres >= 1000 else f"{metres:.4g} m"
+
+
+# --- bringing in ------------------------------------------------------------------------------------------------
+
+
+def _into(parsed: argparse.Namespace, answers: dict[str, str]) -> list[int]:
+    try:
+        with Uploads(parsed.into, parsed.ca_file) as uploads:
+            return [_bring(uploads, path, answers, parsed.defaults) for path in parsed.files]
+    except Refused as error:
+        return [_fail(str(error))]
+    except (OSError, ValueError, http.client.HTTPException) as error:
+        return [_fail(f"{parsed.into.partition('#')[0]}: {error}")]
+
+
+def _bring(uploads: Uploads, path: Path, answers: dict[str, str], defaults: bool) -> int:
+    """One file, to the end. Raises what ``Uploads`` does."""
+    if not path.is_file():
+        return _fail(f"there is no file {path}")
+    if path.stat().st_size > c.MAX_GRID_BYTES:
+        sys.stdout.write(f"{path.name}: refused\n  It has more than {c.MAX_GRID_BYTES >> 20} MiB.\n")
+        return REFUSED
+    line = Line(path.name)
+    try:
+        status = uploads.send(path, lambda share: line.show("upload", share))
+    except Refused as error:
+        line.end()
+        sys.stdout.write(f"{path.name}: refused\n  {error}\n")
+        return REFUSED
+    try:
+        while (status := uploads.follow(status, lambda s: line.show(s.stage, s.share))).stage == "question":
+            chosen = _choose(status, answers, defaults)
+            if chosen is None:
+                line.end()
+                uploads.cancel(status)
+                sys.stdout.write(describe(status.report) if status.report is not None else f"{path.name}: a question\n")
+                return QUESTION
+            status = uploads.answer(status, c.ImportAnswers(answers=chosen))
+    except KeyboardInterrupt:
+        line.end()
+        uploads.cancel(status)
+        return _fail(f"{path.name}: cancelled")
+    line.end()
+    if status.stage == "done":
+        sys.stdout.write(f"{path.name}: laid as layer {status.layer}\n")
+        return GOOD
+    sys.stdout.write(f"{path.name}: {status.stage}\n  {status.text}\n")
+    return REFUSED
+
+
+def _choose(status: c.ImportStatus, answers: dict[str, str], defaults: bool) -> dict[str, str] | None:
+    """Answers to all that is asked, None when one is missing."""
+    questions = status.report.questions if status.report is not None else ()
+    chosen = {q.id: answers[q.id] for q in questions if q.id in answers}
+    if defaults:
+        chosen = {q.id: q.default for q in questions} | chosen
+    return chosen if len(chosen) == len(questions) else None
+
+
+class Line:
+    """One line of progress on a terminal; elsewhere a line a stage."""
+
+    def __init__(self, name: str) -> None:
+        self._name, self._stage, self._shown = name, "", ""
+        self._live = sys.stderr.isatty()
+
+    def show(self, stage: str, share: float) -> None:
+        """Shows how far it is."""
+        text = f"{self._name}: {stage} {share:4.0%}"
+        if self._live and text != self._shown:
+            sys.stderr.write(f"\r\x1b[K{text}")
+        elif not self._live and stage != self._stage:
+            sys.stderr.write(f"{self._name}: {stage}\n")
+        self._stage, self._shown = stage, text
+        sys.stderr.flush()
+
+    def end(self) -> None:
+        """Takes the line away."""
+        if self._live and self._shown:
+            sys.stderr.write("\r\x1b[K")
+            sys.stderr.flush()
