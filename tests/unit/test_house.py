@@ -19,16 +19,17 @@ PACKAGE = ROOT / "backend" / "esker"
 
 # A room may import the rooms to its left and itself (DESIGN 2).
 LAYERS: tuple[frozenset[str], ...] = (
-    frozenset({"contract", "fractal", "version"}),
+    frozenset({"contract", "fractal", "link", "version"}),
     frozenset({"contract_emit", "grid"}),
     frozenset({"document"}),
-    frozenset({"templates"}),
     frozenset({"patchwork"}),
     frozenset({"importing"}),
+    frozenset({"templates"}),
     frozenset({"solve", "tiles", "store", "settings", "synthesis"}),
+    frozenset({"terrain_layers"}),
     frozenset({"session", "terrain"}),
-    frozenset({"ground", "link"}),
-    frozenset({"client", "tls", "headers", "upload", "render"}),
+    frozenset({"ground"}),
+    frozenset({"client", "elevation", "imports", "tls", "headers", "upload", "render"}),
     frozenset({"server"}),
     frozenset({"run"}),
     frozenset({"bench"}),

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
+import numpy as np
 import pytest
 
 from esker import contract, templates
 from esker.document.ops import StrokeSet
 from esker.document.strokes import world_points
-from esker.templates import draw
+from esker.templates import draw, survey
+from esker.terrain_layers import Patchwork
 
 
 def test_drawing_again_changes_nothing() -> None:
@@ -17,10 +21,10 @@ def test_drawing_again_changes_nothing() -> None:
         )
 
 
-def test_there_are_five_with_words() -> None:
+def test_there_are_seven_with_words() -> None:
     catalogue = templates.catalogue()
-    assert len(catalogue) == 5
-    assert len({t.id for t in catalogue}) == 5
+    assert len(catalogue) == 7
+    assert len({t.id for t in catalogue}) == 7
     assert all(t.title and t.description for t in catalogue)
     with pytest.raises(KeyError):
         templates.load("atlantis")
@@ -40,3 +44,41 @@ def test_every_stroke_applies_as_an_op(template: templates.Template) -> None:
         assert points[:, :2].min() > -0.25 * size
         assert points[:, :2].max() < 1.25 * size
     assert len(document.strokes) == len(template.document.strokes)
+
+
+@pytest.mark.parametrize("name", templates.REAL)
+def test_real_ground_comes_with_its_grids(name: str) -> None:
+    """SPEC H6: the kept grids are those that the document names, they say whose they are, and cover the domain."""
+    template = templates.load(name)
+    document, grids = template.document, template.rasters()
+    assert {layer.content for layer in document.layers} == grids.keys()
+    assert document.settings.place is not None
+    for layer in document.layers:
+        raster = grids[layer.content]
+        assert raster.digest == layer.content
+        assert layer.facts == raster.facts(geo=True, file=layer.facts.file, format=layer.facts.format)
+        assert layer.source
+        assert layer.licence.startswith("Public domain")
+    base = Patchwork(document.settings.size_m, document.layers, grids).base
+    assert base is not None
+    assert base.survey(0).min() > contract.BASE_SURVEY
+    assert np.isfinite(base.level(1)).all()
+
+
+def test_kept_grids_come_back(tmp_path: Path) -> None:
+    """Within half a step, holes and nets as they were; too fine a step for the range is refused."""
+    rng = np.random.default_rng(3)
+    heights = (1500 + 400 * np.cumsum(rng.normal(size=(37, 52)), axis=1)).astype(np.float32)
+    heights[rng.random(heights.shape) < 0.2] = np.nan
+    heights[:, 0] = np.nan
+    net = rng.normal(size=(3, 4, 2))
+    for warp in (None, net):
+        survey.write(tmp_path / "grid.npz", survey.Grid(heights, warp), 0.25)
+        kept = survey.read(tmp_path / "grid.npz")
+        assert kept.heights.dtype == np.float32
+        assert np.array_equal(np.isnan(kept.heights), np.isnan(heights))
+        assert np.nanmax(np.abs(kept.heights - heights)) <= 0.126
+        assert (kept.warp is None) == (warp is None)
+        assert warp is None or (kept.warp is not None and np.array_equal(kept.warp, warp))
+    with pytest.raises(ValueError, match="too fine"):
+        survey.write(tmp_path / "grid.npz", survey.Grid(heights, None), 0.001)

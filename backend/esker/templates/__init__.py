@@ -1,4 +1,4 @@
-"""The five starting terrains: stroke documents in the repository, drawn by ``draw.py`` (issue: "drawn with care").
+"""The starting terrains: five stroke documents, drawn by ``draw.py``, and two of real ground, cut out by ``real.py``.
 
 They are real input for benchmarks and tests too. ``catalogue()`` lists them, ``load(id)`` gives one.
 """
@@ -6,30 +6,59 @@ They are real input for benchmarks and tests too. ``catalogue()`` lists them, ``
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
 from esker.contract import Document
+from esker.patchwork import rasters
+from esker.patchwork.rasters import Raster
+from esker.templates import survey
 
 FOLDER = Path(__file__).parent
 ORDER = ("figure-six", "alpine-ridge", "canyon", "volcanic-island", "archipelago")
+"""Those that are drawn."""
+REAL = ("rainier", "helens")
+"""Those of real ground."""
 
 
 @dataclass(frozen=True)
 class Template:
-    """A starting terrain: what the landing page shows, and the document that a new terrain starts from."""
+    """A starting terrain: what the landing page shows, and the document that a new terrain starts from.
+
+    ``grids``: names of the kept grids of its elevation layers, by ``Layer.content``.
+    """
 
     id: str
     title: str
     description: str
     document: Document
+    grids: Mapping[str, str] = field(default_factory=dict)
+
+    def rasters(self) -> dict[str, Raster]:
+        """The grids of its elevation layers, by ``Layer.content``: made at the first call, which takes a second.
+
+        Raises ValueError for a kept grid that is not the one that the document names.
+        """
+        return dict(_rasters(self.id))
+
+
+@cache
+def _rasters(template_id: str) -> dict[str, Raster]:
+    made = {}
+    for content, name in load(template_id).grids.items():
+        kept = survey.read(survey.FOLDER / f"{name}.npz")
+        made[content] = rasters.build(kept.heights, kept.warp)
+        if made[content].digest != content:
+            raise ValueError(f"{name}.npz is not the grid that {template_id}.json names: run esker.templates.real")
+    return made
 
 
 @cache
 def catalogue() -> tuple[Template, ...]:
     """All starting terrains, in the order of the landing page."""
-    return tuple(_read(FOLDER / f"{name}.json") for name in ORDER)
+    return tuple(_read(FOLDER / f"{name}.json") for name in (*ORDER, *REAL))
 
 
 def load(template_id: str) -> Template:
@@ -43,4 +72,4 @@ def load(template_id: str) -> Template:
 def _read(path: Path) -> Template:
     data = json.loads(path.read_text(encoding="utf-8"))
     document = Document.model_validate_json(json.dumps(data["document"]))
-    return Template(data["id"], data["title"], data["description"], document)
+    return Template(data["id"], data["title"], data["description"], document, data.get("grids", {}))
