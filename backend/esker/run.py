@@ -19,6 +19,9 @@ from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIO
 
 from esker import contract as c
 from esker.document.ops import Limits
+from esker.elevation import Elevation
+from esker.importing import run as importing
+from esker.imports import Imports
 from esker.render.previews import Previews
 from esker.server import Pictures, create_app
 from esker.session.hub import Hub
@@ -31,6 +34,7 @@ from esker.solve.faults import DeviceError, OutOfDeviceMemoryError
 from esker.solve.multigrid import DivergedError
 from esker.solve.solver import Solver as OpenClSolver
 from esker.store.access import Access
+from esker.store.grids import GridStore
 from esker.store.journal import Journal
 from esker.store.previews import PreviewTokens
 from esker.tiles.delivery import ClientTiles, TileServer
@@ -124,6 +128,8 @@ class Assembly:
         settings = self.settings
         self._context = server_context(settings.data, self.address) if settings.lan else None
         self._journal = Journal(settings.data)
+        self._grids = GridStore(settings.data)
+        self._grids.sweep(self._journal.grids())
         self._worker = Worker(
             make_solver, settings.device, candidates=lambda: candidates(settings.threads), diagnose=diagnose
         )
@@ -138,6 +144,7 @@ class Assembly:
             finest=settings.refine,
             limits=Limits(settings.max_strokes, settings.max_points),
             max_members=settings.max_members,
+            elevation=Elevation(self._grids),
         )
         self._backups = _Backups(self._journal)
 
@@ -152,7 +159,8 @@ class Assembly:
             PreviewTokens(self._journal),
             self.settings.public_url.rstrip("/") if self.settings.public_url else None,
         )
-        app = create_app(self.hub, self.settings.page, self.settings.data, pictures)
+        imports = Imports(self.hub, self._grids, importing, quota_bytes=self.settings.grid_quota_mb << 20)
+        app = create_app(self.hub, self.settings.page, self.settings.data, pictures, self._grids, imports)
 
         async def started() -> None:
             if announce:

@@ -38,6 +38,8 @@ class Settings:
     max_members: int = c.MAX_MEMBERS
     max_strokes: int = c.MAX_STROKES
     max_points: int = c.MAX_POINTS_PER_STROKE
+    grid_quota_mb: int = 4096
+    """MiB that the elevation grids of one terrain may take on disk."""
     log_level: str = "info"
 
     def __post_init__(self) -> None:
@@ -48,6 +50,7 @@ class Settings:
             "max_members": (1, c.MAX_MEMBERS),
             "max_strokes": (1, c.MAX_STROKES),
             "max_points": (2, c.MAX_POINTS_PER_STROKE),
+            "grid_quota_mb": (1, 2**24),
         }
         for name, (low, high) in bounds.items():
             if not low <= getattr(self, name) <= high:

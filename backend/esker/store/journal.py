@@ -5,7 +5,8 @@ the next one (group commit), each item under its own savepoint, so one refused i
 acknowledged after the commit that holds it, so ``kill -9`` loses nothing that was acknowledged.
 
 Tables: ``terrains`` (id, created), ``ops`` (terrain, clock, client, counter, author, op), ``snapshots`` (terrain,
-clock, document); ``store/access.py`` adds its own.
+clock, document), ``grids`` (terrain, digest: every grid that a layer of the terrain ever was, written in the same
+commit as the op or the birth that names it); ``store/access.py`` adds its own.
 """
 
 from __future__ import annotations
@@ -31,7 +32,8 @@ SNAPSHOT_EVERY: Final = 500
 """Ops between snapshots: opening a terrain replays at most this many."""
 GROUP_LIMIT: Final = 256
 """Most queued items that one commit takes."""
-_SCHEMA_VERSION: Final = 1
+_SCHEMA_VERSION: Final = 2
+"""1 knew no elevation layers; it becomes 2 by itself."""
 _SCHEMA: Final = """
 CREATE TABLE IF NOT EXISTS terrains (id TEXT PRIMARY KEY, created REAL NOT NULL) WITHOUT ROWID;
 CREATE TABLE IF NOT EXISTS ops (
@@ -40,6 +42,8 @@ CREATE TABLE IF NOT EXISTS ops (
 CREATE UNIQUE INDEX IF NOT EXISTS ops_by_id ON ops (terrain, client, counter);
 CREATE TABLE IF NOT EXISTS snapshots (
   terrain TEXT NOT NULL, clock INTEGER NOT NULL, document TEXT NOT NULL, PRIMARY KEY (terrain, clock)) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS grids (
+  terrain TEXT NOT NULL, digest TEXT NOT NULL, PRIMARY KEY (terrain, digest)) WITHOUT ROWID;
 CREATE TABLE IF NOT EXISTS links (
   id TEXT PRIMARY KEY, terrain TEXT NOT NULL, role TEXT NOT NULL, name TEXT NOT NULL, hash BLOB NOT NULL,
   created REAL NOT NULL, revoked REAL) WITHOUT ROWID;
@@ -118,6 +122,7 @@ class Journal:
 
         def write(db: sqlite3.Connection) -> None:
             db.executemany("INSERT INTO ops VALUES (?,?,?,?,?,?)", ((terrain, *row) for row in rows))
+            _name_grids(db, terrain, (digest for row in rows for digest in _contents(row.op)))
             if snapshot is not None:
                 _put_snapshot(db, snapshot)
 
@@ -128,6 +133,7 @@ class Journal:
 
         def write(db: sqlite3.Connection) -> None:
             db.execute("INSERT INTO terrains VALUES (?,?)", (document.id, self._now()))
+            _name_grids(db, document.id, (layer.content for layer in (*document.layers, *document.deleted_layers)))
             _put_snapshot(db, document)
 
         return self.submit(write)
@@ -223,6 +229,11 @@ class Journal:
         counters = db.execute("SELECT client, max(counter) FROM ops WHERE terrain=? GROUP BY client", (terrain,))
         return Loaded(replay(document, rows), rows, dict(counters))
 
+    def grids(self, terrain: str | None = None) -> set[str]:
+        """Digests of the grids that were ever layers of a terrain (default: of any), deleted ones too."""
+        where, values = ("", ()) if terrain is None else (" WHERE terrain=?", (terrain,))
+        return {str(row[0]) for row in self.reader().execute(f"SELECT DISTINCT digest FROM grids{where}", values)}
+
     # --- care ---------------------------------------------------------------------------------------------------
 
     def backup(self) -> Path:
@@ -275,7 +286,7 @@ def check(path: Path, directory: Path) -> None:
 
 def replay(document: StrokeSet, rows: Iterable[Row]) -> StrokeSet:
     """The document after ``rows``. Raises DamagedTerrain on a gap in the clocks or an op that does not apply."""
-    unlimited = Limits(strokes=2**31, points=2**31)
+    unlimited = Limits(strokes=2**31, points=2**31, layers=2**31)
     for row in rows:
         if row.clock != document.clock + 1:
             raise DamagedTerrain(f"op {row.clock} follows op {document.clock} in the journal of {document.id}")
@@ -284,6 +295,19 @@ def replay(document: StrokeSet, rows: Iterable[Row]) -> StrokeSet:
         except (Refusal, ValueError) as error:
             raise DamagedTerrain(f"op {row.clock} of {document.id} does not apply: {error}") from error
     return document
+
+
+def _contents(op: str) -> list[str]:
+    """Digests of the grids that an op, as JSON text, names first."""
+    if '"layer.add"' not in op:
+        return []
+    parsed = c.OP.validate_json(op)
+    parts = parsed.ops if isinstance(parsed, c.Group) else (parsed,)
+    return [part.layer.content for part in parts if isinstance(part, c.AddLayer)]
+
+
+def _name_grids(db: sqlite3.Connection, terrain: str, digests: Iterable[str]) -> None:
+    db.executemany("INSERT OR IGNORE INTO grids VALUES (?,?)", ((terrain, digest) for digest in digests))
 
 
 def _put_snapshot(db: sqlite3.Connection, document: c.Document) -> None:

@@ -1,0 +1,96 @@
+"""Routes of elevation files: upload, status, answers, cancel; and the stored grids."""
+
+from __future__ import annotations
+
+import asyncio
+import tempfile
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from fastapi import FastAPI, Query, Request, Response
+from fastapi.responses import FileResponse
+from pydantic import StringConstraints
+from starlette.background import BackgroundTask
+
+from esker import contract as c
+from esker.imports import Cannot, Imports
+from esker.patchwork.rasters import RasterError
+from esker.server.answers import AnyLink, EditorLink, Problem, address, answer, limited
+from esker.session.hub import Hub
+from esker.store.grids import GridStore
+
+FileName = Annotated[str, Query(max_length=400)]
+ClientId = Annotated[str, Query(max_length=40, pattern=r"^[A-Za-z0-9_-]*$")]
+Digest = Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{64}$")]
+
+
+def add_imports(app: FastAPI, hub: Hub, grids: GridStore, imports: Imports) -> None:
+    """Adds them."""
+
+    @app.exception_handler(Cannot)
+    async def cannot(_: Request, error: Cannot) -> Response:
+        return answer(error.status, error.code, error.message)
+
+    @app.post("/api/terrains/from-grid", status_code=201)
+    async def from_grid(request: Request, name: FileName = "", client: ClientId = "") -> dict[str, Any]:
+        limited(request, app.state.new_terrains, "new terrains came")
+        person = f"{address(request)} {client}"
+        born, secret, status = await imports.upload_new(name, person, request.stream(), _length(request), client)
+        return {
+            "id": born.id,
+            "title": born.settings.title,
+            "secret": secret,
+            "role": "owner",
+            "import": status.model_dump(mode="json"),
+        }
+
+    @app.post("/api/terrains/{terrain}/imports", status_code=202)
+    async def upload(
+        request: Request, terrain: str, link: EditorLink, name: FileName = "", client: ClientId = ""
+    ) -> c.ImportStatus:
+        limited(request, app.state.imports, "files came")
+        person = f"{link.id} {client or address(request)}"
+        return await imports.upload(
+            name, person, request.stream(), _length(request), terrain=terrain, link=link, client=client
+        )
+
+    @app.get("/api/terrains/{terrain}/imports/{job}")
+    async def status(terrain: str, job: str, link: AnyLink) -> c.ImportStatus:  # noqa: ARG001
+        return imports.status(terrain, job)
+
+    @app.post("/api/terrains/{terrain}/imports/{job}/answers")
+    async def answers(terrain: str, job: str, link: EditorLink, body: c.ImportAnswers) -> c.ImportStatus:
+        return imports.answer(terrain, job, link, body)
+
+    @app.delete("/api/terrains/{terrain}/imports/{job}", status_code=204)
+    async def cancel(terrain: str, job: str, link: EditorLink) -> None:
+        await imports.cancel(terrain, job, link)
+
+    @app.get("/api/terrains/{terrain}/grids/{digest}")
+    async def grid(terrain: str, digest: Digest, link: AnyLink) -> Response:  # noqa: ARG001
+        if digest not in await asyncio.to_thread(hub.journal.grids, terrain):
+            raise Problem(404, "no_grid", "No layer of this terrain has this grid.")
+        try:
+            path = await asyncio.to_thread(_packed, grids, digest)
+        except RasterError as error:
+            raise Problem(410, "no_grid", str(error)) from error
+        except OSError as error:
+            raise Problem(507, "storage", "The server has no room to pack this grid.") from error
+        return FileResponse(
+            path, media_type="application/zip", filename=f"{digest[:16]}.npz", background=BackgroundTask(path.unlink)
+        )
+
+
+def _length(request: Request) -> int | None:
+    text = request.headers.get("content-length", "")
+    return int(text) if text.isdigit() else None
+
+
+def _packed(grids: GridStore, digest: str) -> Path:
+    """A temporary .npz file with the heights, float32 metres, row 0 south, and the control net if there is one."""
+    raster = grids.read(digest)
+    arrays = {"heights": raster.heights} | ({} if raster.warp is None else {"warp": raster.warp})
+    with tempfile.NamedTemporaryFile(prefix="esker-grid-", suffix=".npz", delete=False) as file:
+        np.savez(file, **arrays)  # type: ignore[arg-type]
+        return Path(file.name)
