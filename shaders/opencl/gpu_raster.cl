@@ -69,48 +69,65 @@ inline sums_t gather(const tables_t *t, int bx, int by, int gx, int gy, int n, l
         } else {
             reached = straight(&near, t, p, at, x, y);
         }
+        LOWER(near, t, 0);
         if (reached && channels) channel_section(&sum, &near, in, p, t);
         if (reached && !channels) cross_section(&sum, &near, in, p, t);
     }
     return sum;
 }
 
+// Over a base: see raster.cl.
+#ifdef OVER_BASE
+#define OVER_ARGUMENTS , global const float *base
+#define OVER_SHARE , global float *share
+#define SET_OVER(t, o, there) (t).over = (there) ? base[o] : 0.0f
+#else
+#define OVER_ARGUMENTS
+#define OVER_SHARE
+#define SET_OVER(t, o, there)
+#endif
+
 // Work-groups (most bins of a row, rows of bins) of BIN x BIN; of row by0 + j the bins windows[2 j] .. windows[2 j + 1] - 1
 // are done. Arguments as in raster.cl.
 kernel __attribute__((reqd_work_group_size(BIN, BIN, 1)))
 void rasterise(TABLE_ARGUMENTS, int by0, global const int *windows, int n, int pitch, int stride,
                global float *gradient_d, global float *gradient_f, global float *height_d, global float *height_f,
-               float screening, int pinned) {
+               float screening, int pinned OVER_ARGUMENTS OVER_SHARE) {
     local int least_bits;
     local uint marks[BIN_ITEMS / 32];
     int j = get_group_id(1), bx = windows[2 * j] + get_group_id(0), by = by0 + j;
     if (bx >= windows[2 * j + 1]) return;
     tables_t t = TABLES;
     int gx = bx * BIN + get_local_id(0), gy = by * BIN + get_local_id(1);
+    size_t o = (size_t)(gy - row0 * BIN) * pitch + gx - column0 * BIN;
+    SET_OVER(t, o, gx < n && gy < n);
     sums_t sum = gather(&t, bx, by, gx, gy, n, &least_bits, marks, 0);
     if (gx >= n || gy >= n) return;
     constraint_t c = conclude(&sum, gx, gy, n, screening, pinned);
-    size_t o = (size_t)(gy - row0 * BIN) * pitch + gx - column0 * BIN;
     height_d[o] = c.height_d;
     height_f[o] = c.height_f;
     gradient_d[o] = c.gradient_d;
     gradient_f[o] = c.gradient_fx;
     gradient_f[o + stride] = c.gradient_fy;
+#ifdef OVER_BASE
+    share[o] = c.share;
+#endif
 }
 
 // The same for one of the other channels, as in raster.cl.
 kernel __attribute__((reqd_work_group_size(BIN, BIN, 1)))
 void rasterise_channel(TABLE_ARGUMENTS, int by0, global const int *windows, int n, int pitch, int stride,
-                       global float *d, global float *f, float screening, int covered) {
+                       global float *d, global float *f, float screening, int covered OVER_ARGUMENTS) {
     local int least_bits;
     local uint marks[BIN_ITEMS / 32];
     int j = get_group_id(1), bx = windows[2 * j] + get_group_id(0), by = by0 + j;
     if (bx >= windows[2 * j + 1]) return;
     tables_t t = TABLES;
     int gx = bx * BIN + get_local_id(0), gy = by * BIN + get_local_id(1);
+    size_t o = (size_t)(gy - row0 * BIN) * pitch + gx - column0 * BIN;
+    SET_OVER(t, o, gx < n && gy < n);
     sums_t sum = gather(&t, bx, by, gx, gy, n, &least_bits, marks, 1);
     if (gx >= n || gy >= n) return;
-    size_t o = (size_t)(gy - row0 * BIN) * pitch + gx - column0 * BIN;
     float stiffness, pull, cover;
     conclude_channel(&stiffness, &pull, &cover, &sum, screening);
     d[o] = stiffness;

@@ -88,6 +88,7 @@ inline void outline_in_bin(sums_t *sums, const tables_t *t, global const float *
     for (int y = 0; y < rows; y++) {
         int16 in = 0;
         nearest_t near = nearest_of_row(best[y], t->outlines, p[P_HEIGHT], x, y0 + y);
+        LOWER(near, t, y);
         if (at[I_SPANS] >= 0) {
             global const int *span = t->span_index + at[I_SPANS] + ((int)y0 + y - t->row0 * BIN);
             in = inside_row(t->spans, span[0], span[1], x);
@@ -115,23 +116,37 @@ inline void gather(sums_t *sums, const tables_t *t, int bx, int by, int rows, in
         }
         for (int y = 0; y < rows; y++) {
             nearest_t near;
-            if (straight(&near, t, p, at, x, y0 + y)) section(sums + y, &near, 0, p, t, channels);
+            if (!straight(&near, t, p, at, x, y0 + y)) continue;
+            LOWER(near, t, y);
+            section(sums + y, &near, 0, p, t, channels);
         }
     }
 }
+
+// Over a base the kernels have more arguments: the base at the samples, laid out like the outputs, and `share`.
+#ifdef OVER_BASE
+#define OVER_ARGUMENTS , global const float *base
+#define OVER_SHARE , global float *share
+#define SET_OVER(t, o, width) (t).over = base + (o), (t).pitch = (width)
+#else
+#define OVER_ARGUMENTS
+#define OVER_SHARE
+#define SET_OVER(t, o, width)
+#endif
 
 // Global size (most bins of a row, rows of bins); of row by0 + j the bins windows[2 j] .. windows[2 j + 1] - 1 are done.
 // Outputs start at the tables' first bin. height_d, height_f, gradient_d: one channel; gradient_f: two.
 kernel void rasterise(TABLE_ARGUMENTS, int by0, global const int *windows, int n, int pitch, int stride,
                       global float *gradient_d, global float *gradient_f, global float *height_d,
-                      global float *height_f, float screening, int pinned) {
+                      global float *height_f, float screening, int pinned OVER_ARGUMENTS OVER_SHARE) {
     int j = get_global_id(1), bx = windows[2 * j] + get_global_id(0), by = by0 + j, rows = min(BIN, n - by * BIN);
     if (bx >= windows[2 * j + 1]) return;
     tables_t t = TABLES;
     sums_t sums[BIN];
+    size_t o = (size_t)(by - row0) * BIN * pitch + PAD + (bx - column0) * BIN;
+    SET_OVER(t, o, pitch);
     gather(sums, &t, bx, by, rows, 0);
     int16 columns = bx * BIN + (int16)LANE_NUMBERS;
-    size_t o = (size_t)(by - row0) * BIN * pitch + PAD + (bx - column0) * BIN;
     for (int y = 0; y < rows; y++, o += pitch) {
         constraint_t c = conclude(sums + y, columns, by * BIN + y, n, screening, pinned);
         vstore16(c.height_d, 0, height_d + o);
@@ -139,19 +154,23 @@ kernel void rasterise(TABLE_ARGUMENTS, int by0, global const int *windows, int n
         vstore16(c.gradient_d, 0, gradient_d + o);
         vstore16(c.gradient_fx, 0, gradient_f + o);
         vstore16(c.gradient_fy, 0, gradient_f + stride + o);
+#ifdef OVER_BASE
+        vstore16(c.share, 0, share + o);
+#endif
     }
 }
 
 // The same for one of the other channels, as differences from its base; where `covered`, f has a second channel, which
 // is its cover.
 kernel void rasterise_channel(TABLE_ARGUMENTS, int by0, global const int *windows, int n, int pitch, int stride,
-                              global float *d, global float *f, float screening, int covered) {
+                              global float *d, global float *f, float screening, int covered OVER_ARGUMENTS) {
     int j = get_global_id(1), bx = windows[2 * j] + get_global_id(0), by = by0 + j, rows = min(BIN, n - by * BIN);
     if (bx >= windows[2 * j + 1]) return;
     tables_t t = TABLES;
     sums_t sums[BIN];
-    gather(sums, &t, bx, by, rows, 1);
     size_t o = (size_t)(by - row0) * BIN * pitch + PAD + (bx - column0) * BIN;
+    SET_OVER(t, o, pitch);
+    gather(sums, &t, bx, by, rows, 1);
     for (int y = 0; y < rows; y++, o += pitch) {
         float16 stiffness, pull, cover;
         conclude_channel(&stiffness, &pull, &cover, sums + y, screening);

@@ -4,6 +4,9 @@
 // Written once for two kinds of kernel. Row-wise ones (CPUs) compile it as it stands: REAL is a float16, 16 samples of
 // a row. Those with one work-item a sample (GPUs) define SECTION_SCALAR before it: REAL is a float. A MASK is the
 // result of a comparison: 0 / -1 in a vector, 0 / 1 in a scalar, so use the macros to make, join and test masks.
+//
+// With OVER_BASE defined, crest heights are those above a base that differs from sample to sample (docs/solver.md, "Over a
+// base"). It is a program of its own: where there is no base, nothing of this is compiled.
 #ifdef SECTION_SCALAR
 #define REAL float
 #define MASK int
@@ -56,7 +59,25 @@ typedef struct {
     int row0, column0;   // first bin of the tables
     float s, octave;     // metres a cell; metres between the controls of the first octave
     float decay, cliff;  // 1 / exit length; 1 / reach, or 0 for endless
+#ifdef OVER_BASE
+#ifdef SECTION_SCALAR
+    float over;  // the base at this work-item's sample
+#else
+    global const float *over;  // the base at the bin's first sample, rows `pitch` apart
+    int pitch;
+#endif
+#endif
 } tables_t;
+
+#ifdef OVER_BASE
+#ifdef SECTION_SCALAR
+#define LOWER(near, t, y) (near).height -= (t)->over
+#else
+#define LOWER(near, t, y) (near).height -= vload16(0, (t)->over + (size_t)(y) * (t)->pitch)
+#endif
+#else
+#define LOWER(near, t, y)
+#endif
 
 typedef struct {
     REAL distance, height, rate, rx, ry, along_x, along_y, left;
@@ -64,6 +85,9 @@ typedef struct {
 
 typedef struct {
     REAL w, wt, wtt, wa, fade, held, g, gx, gy, toe, hard;
+#ifdef OVER_BASE
+    REAL share;
+#endif
 } sums_t;
 
 INLINE REAL smooth(REAL t) {
@@ -250,6 +274,9 @@ INLINE band_t band_of(const nearest_t *near, MASK inside, global const float *p,
         b.k = p[P_RK] + share * (p[P_LK] - p[P_RK]);
         b.f = p[P_RF] + share * (p[P_LF] - p[P_RF]);
     }
+#ifdef OVER_BASE
+    b.present *= select((REAL)(p[P_FILL]), (REAL)(p[P_CUT]), near->height < 0.0f);
+#endif
     b.full = (1.0f + b.k + b.f) * b.top * b.run;
     b.end = select(zero, fmin(b.extent, b.full), b.has);
     return b;
@@ -307,6 +334,9 @@ INLINE void cross_section(sums_t *sum, const nearest_t *near, MASK inside, globa
     MASK reached = b.within && (b.hard || (b.has && rt < toe_end));
     if (!ANY(reached)) return;
     REAL z, fall, lift, free = 0.0f, skirted = 0.0f;
+#ifdef OVER_BASE
+    REAL left_off = 0.0f;
+#endif
     flank_profile(&b, fmin(b.ds, b.end), &z, &fall, &lift);
     MASK beyond = r > 1.0f;
     REAL held = 1.0f;
@@ -318,6 +348,9 @@ INLINE void cross_section(sums_t *sum, const nearest_t *near, MASK inside, globa
         REAL exit = fmin(fall, EXIT_SHARE * t->decay * z) / (past * past);
         REAL down = 2.0f * foot_height * rest / fmax(width, TINY);
         fall += leaving * (exit + need * (down - exit) - fall);
+#ifdef OVER_BASE
+        left_off = select(leaving, zero, beyond);
+#endif
         z += select(zero, need * (foot_height * rest * rest - z), beyond);
         lift = select(lift, need * foot_lift * rest * rest, beyond);
         REAL ends = b.ds / fmax(b.end + width, THINNEST_M);
@@ -333,6 +366,9 @@ INLINE void cross_section(sums_t *sum, const nearest_t *near, MASK inside, globa
     REAL w = near_weight * (fade * select(inner * inner + TINY, one, b.hard) + select(zero, skirted, reached));
     REAL g = near_weight * toe * outer * outer, a = SPRING_CELLS * t->s * wide;
     REAL unit = down / fmax(near->distance, 0.5f);
+#ifdef OVER_BASE
+    sum->share += g * lift * (1.0f - left_off);
+#endif
     lift = select(lift * (1.0f / t->s), zero, inside);
     sum->w += w;
     sum->wt += w * sign * z;
@@ -370,6 +406,9 @@ INLINE void channel_section(sums_t *sum, const nearest_t *near, MASK inside, glo
 // What all strokes together say of samples: D and f of both equations, stiffness -1 where fixed.
 typedef struct {
     REAL height_d, height_f, gradient_d, gradient_fx, gradient_fy;
+#ifdef OVER_BASE
+    REAL share;  // how far the gradient is that of the ground itself, not of what lies above the base
+#endif
 } constraint_t;
 
 // D and f of a channel, and f of its cover, which is 1 where the channel is known: there screening pulls to what is asked.
@@ -400,5 +439,8 @@ INLINE constraint_t conclude(const sums_t *sum, MASK x, int y, int n, float scre
     out.gradient_d = toe;
     out.gradient_fx = toe * sum->gx / g;
     out.gradient_fy = toe * sum->gy / g;
+#ifdef OVER_BASE
+    out.share = sum->toe * sum->share / g;
+#endif
     return out;
 }

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from esker import grid
 from esker.contract import Stroke, TerrainSettings
 from esker.solve import multigrid, reference, reference_raster
+from esker.solve.base import Base
 from esker.solve.constraints import pack
 
 Field = NDArray[np.float64]
@@ -20,19 +21,22 @@ GRADIENT_CYCLES = 60
 GRADIENT_TOLERANCE = 1e-11
 
 
-def assemble(strokes: Sequence[Stroke], settings: TerrainSettings, level: int) -> System:
+def assemble(strokes: Sequence[Stroke], settings: TerrainSettings, level: int, base: Base | None = None) -> System:
     """(A, b) of the height step: A csr float64 (N^2, N^2), symmetric positive definite; b (N^2,).
 
-    Unknowns are the heights in row-major sample order, row 0 south. Rows are those of the energy (DESIGN 5.1), halved:
-    edges along a border weigh 1/2, border samples 1/2, corners 1/4. Fixed samples (crests, a pinned border) are
-    identity rows and are eliminated from the other rows. Raises ValueError for a level outside 0..6.
+    Unknowns are the heights, over ``base`` those above it, in row-major sample order, row 0 south. Rows are those of
+    the energy (DESIGN 5.1), halved: edges along a border weigh 1/2, border samples 1/2, corners 1/4. Fixed samples
+    (crests, a pinned border) are identity rows and are eliminated from the other rows. Raises ValueError for a level
+    outside 0..6.
     """
-    tables = pack(strokes, settings, level)
-    c = reference_raster.rasterise(tables)
+    tables = pack(strokes, settings, level, base=base)
+    under = None if base is None else base.level(level).astype(np.float64)
+    c = reference_raster.rasterise(tables, under)
+    static = c.height_f if under is None else reference.over_base(c.height_f, c.height_d, c.share, under)
     gradient = reference.NumpySystem(c.gradient_d[None], c.gradient_f, tables.screening, level)
     _diffuse(gradient)
     f = reference.divergence(
-        c.height_f[None], c.height_d[None], gradient.fields["u", level], grid.spacing(level, settings.size_m)
+        static[None], c.height_d[None], gradient.fields["u", level], grid.spacing(level, settings.size_m)
     )[0]
     return system(c.height_d, f, tables.screening)
 

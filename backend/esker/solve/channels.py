@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,9 +28,11 @@ from esker.contract import (
     TerrainSettings,
 )
 from esker.solve import gpu_levels, levels, multigrid, raster, reference_raster
+from esker.solve.base import Base
 from esker.solve.constraints import Packer
 from esker.solve.device import Device
 from esker.solve.faults import finished
+from esker.solve.fields import Shape
 from esker.solve.injection import frozen, injections
 from esker.solve.reference import NumpySystem
 from esker.solve.sayings import BASES, STROKES_SPEAK, Layer, Speakers, reach_of, speakers
@@ -63,8 +65,8 @@ class LayerWorkspace(Protocol):
     @property
     def system(self) -> multigrid.System: ...
 
-    def load(self, strokes: Sequence[Stroke], settings: TerrainSettings) -> bool:
-        """Rasterise and coarsen what changed since the last stroke set; whether anything did."""
+    def load(self, strokes: Sequence[Stroke], settings: TerrainSettings, base: Base | None) -> bool:
+        """Rasterise and coarsen what changed since the last stroke set and base; whether anything did."""
 
     def read(self) -> Values:
         """The layer as a difference from the base, float32 (1, n, n), or (2, n, n) with its cover."""
@@ -88,10 +90,10 @@ class _NumpyLayer:
         self.level, self.packer, self._covers = level, Packer(level, layer), _covers(layer)
         self.system: NumpySystem
 
-    def load(self, strokes: Sequence[Stroke], settings: TerrainSettings) -> bool:
-        tables, window = self.packer.pack(strokes, settings)
+    def load(self, strokes: Sequence[Stroke], settings: TerrainSettings, base: Base | None) -> bool:
+        tables, window = self.packer.pack(strokes, settings, base)
         if window is not None:
-            d, *f = reference_raster.rasterise_channel(tables)
+            d, *f = reference_raster.rasterise_channel(tables, None if base is None else base.level(self.level))
             self.system = NumpySystem(d[None], np.stack(f[: 1 + self._covers]), tables.screening, self.level)
         return window is not None
 
@@ -106,17 +108,31 @@ class _ClLayer:
         self, system: levels.ClSystem | gpu_levels.GpuSystem, launch: raster.Launcher, level: int, layer: Layer
     ) -> None:
         self.level, self.packer, self.system, self._launch = level, Packer(level, layer), system, launch
+        self._base: tuple[bytes, Any] = b"", None
 
-    def load(self, strokes: Sequence[Stroke], settings: TerrainSettings) -> bool:
-        tables, window = self.packer.pack(strokes, settings)
+    def load(self, strokes: Sequence[Stroke], settings: TerrainSettings, base: Base | None) -> bool:
+        tables, window = self.packer.pack(strokes, settings, base)
         if window is None:
             return False
         shape, fields = self.system.shapes[self.level], self.system.fields
         d, f = fields["d", self.level], fields["f", self.level]
         covered = self.system.channels > 1
-        raster.rasterise_channel(self._launch, tables, window, d, f, shape.pitch, shape.stride, covered)
+        under = None if base is None else self._under(base, shape)
+        raster.rasterise_channel(self._launch, tables, window, d, f, shape.pitch, shape.stride, covered, under)
         self.system.coarsen(tables.screening, window.sample_rows)
         return True
+
+    def _under(self, base: Base, shape: Shape) -> Any:
+        """The base at the samples, on the device."""
+        if self._base[0] != base.digest:
+            pad = self.system.pad
+            host = np.zeros(shape.stride + pad, dtype=np.float32)
+            rows = host[pad : pad + shape.n * shape.pitch]
+            np.copyto(
+                np.lib.stride_tricks.as_strided(rows, (shape.n, shape.n), (4 * shape.pitch, 4)), base.level(self.level)
+            )
+            self._base = base.digest, self._launch.constant(host)
+        return self._base[1]
 
     def read(self) -> Values:
         return self.system.get("u", self.level)
@@ -146,22 +162,28 @@ class ChannelSolver:
         self._made: dict[Channel, tuple[Values | None, Values | None, Levels]] = {}
         """Per channel the layers that it was made from last, and its levels."""
 
-    def solve(self, strokes: Sequence[Stroke], settings: TerrainSettings) -> Iterator[tuple[Channel, Values]]:
+    def solve(
+        self, strokes: Sequence[Stroke], settings: TerrainSettings, base: Base | None = None
+    ) -> Iterator[tuple[Channel, Values]]:
         """Each channel, (n, n) float32 of ``level`` in its unit (metres, 0..1, -1..1), row 0 south, read-only.
 
         A pure function of the strokes and the settings. Raises DeviceErrors.
         """
-        for channel, pyramid in self.pyramids(speakers(strokes, settings), settings):
+        for channel, pyramid in self.pyramids(speakers(strokes, settings), settings, base=base):
             yield channel, pyramid[-1]
 
     def pyramids(
-        self, spoken: Mapping[Layer, Speakers], settings: TerrainSettings, channels: Iterable[Channel] = BASES
+        self,
+        spoken: Mapping[Layer, Speakers],
+        settings: TerrainSettings,
+        channels: Iterable[Channel] = BASES,
+        base: Base | None = None,
     ) -> Iterator[tuple[Channel, Levels]]:
         """The same for some channels, with levels 0..``level`` of each; what did not change since the last time are
         the same arrays. ``spoken``: ``sayings.speakers`` of the strokes."""
         for channel in channels:
             layers = (Layer(channel, painted) for painted in (False, True))
-            ground, paint = (self._diffused(layer, spoken.get(layer), settings) for layer in layers)
+            ground, paint = (self._diffused(layer, spoken.get(layer), settings, base) for layer in layers)
             made = self._made.get(channel)
             if made is None or made[0] is not ground or made[1] is not paint:
                 made = ground, paint, self._composed(channel, ground, paint)
@@ -176,13 +198,18 @@ class ChannelSolver:
         finest = (0 if paint is None else paint[0]) + over + np.float32(BASES[channel])
         return tuple(injections(frozen(np.asarray(finest, dtype=np.float32))))
 
-    def _diffused(self, layer: Layer, said: Speakers | None, settings: TerrainSettings) -> Values | None:
+    def _diffused(
+        self, layer: Layer, said: Speakers | None, settings: TerrainSettings, base: Base | None
+    ) -> Values | None:
         """A layer as ``LayerWorkspace.read`` gives it, the same array as last time if nothing changed; None at zero."""
         kept = self._layers.pop(layer, None)  # kept again only if nothing fails: half a raster is not to be trusted
         if said is None:
             return None
         workspace = new_layer(self._device, self.level, layer) if kept is None else kept[0]
-        changed = workspace.load(said.strokes, settings.model_copy(update={"reach_m": reach_of(layer, settings)}))
+        under = None if layer.painted else base  # a brush lies on the ground, however high that is
+        changed = workspace.load(
+            said.strokes, settings.model_copy(update={"reach_m": reach_of(layer, settings)}), under
+        )
         if changed:
             diffuse(workspace.system, TOLERANCES[layer.channel])
         if kept is None or changed or kept[1] != said.bounds:

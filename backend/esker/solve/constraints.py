@@ -13,7 +13,8 @@ import numpy as np
 from esker import grid
 from esker.contract import DEFAULT_REACH_FRACTION, MAX_REFINED_LEVEL, Stroke, TerrainSettings
 from esker.solve import dirty
-from esker.solve.packing import Packed, Shape, join, pack_one, reach_m, shape_for
+from esker.solve.base import Base, Ground
+from esker.solve.packing import Packed, Shape, join, pack_one, reach_m, shape_for, window_of
 from esker.solve.sayings import Layer
 from esker.solve.tables import BIN, BinBox, Floats, Tables, Window, bins, defines, everything, union, whole
 
@@ -32,9 +33,15 @@ __all__ = [
 ]
 
 
-def pack(strokes: Sequence[Stroke], settings: TerrainSettings, level: int, layer: Layer | None = None) -> Tables:
+def pack(
+    strokes: Sequence[Stroke],
+    settings: TerrainSettings,
+    level: int,
+    layer: Layer | None = None,
+    base: Base | None = None,
+) -> Tables:
     """The tables of a stroke set at one level. The order of ``strokes`` does not matter."""
-    return Packer(level, layer).pack(strokes, settings)[0]
+    return Packer(level, layer).pack(strokes, settings, base)[0]
 
 
 class Packer:
@@ -43,39 +50,58 @@ class Packer:
     def __init__(self, level: int, layer: Layer | None = None) -> None:
         self.level, self.layer = level, layer
         self._settings: tuple[float, float | None, str] | None = None
+        self._base: Base | None = None
         self._packed: dict[str, tuple[Stroke, Packed | None]] = {}
 
-    def likeness(self, strokes: Sequence[Stroke], settings: TerrainSettings) -> int:
+    def likeness(self, strokes: Sequence[Stroke], settings: TerrainSettings, base: Base | None = None) -> int:
         """How many strokes of this set were in the last one; -1 when nothing of it can be kept."""
-        if self._settings != _settings_key(settings):
+        if self._settings != _settings_key(settings) or not _same(self._base, base):
             return -1
         return sum(1 for s in strokes if s.id in self._packed and self._packed[s.id][0] is s)
 
-    def pack(self, strokes: Sequence[Stroke], settings: TerrainSettings) -> tuple[Tables, Window | None]:
+    def pack(
+        self, strokes: Sequence[Stroke], settings: TerrainSettings, base: Base | None = None
+    ) -> tuple[Tables, Window | None]:
         """The tables, and the bins whose constraints may differ from the last set's (None: no bin does)."""
         s, box = grid.spacing(self.level, settings.size_m), whole(self.level)
-        fresh = self._settings != _settings_key(settings)
+        fresh = self._settings != _settings_key(settings) or (self._base is None) != (base is None)
+        same = not fresh and _same(self._base, base)
         old = {} if fresh else self._packed
         new: dict[str, tuple[Stroke, Packed | None]] = {}
         for stroke in sorted(strokes, key=lambda k: k.id):
             known = old.get(stroke.id)
-            if known is not None and (known[0] is stroke or known[0] == stroke):
+            if same and known is not None and (known[0] is stroke or known[0] == stroke):
                 new[stroke.id] = (stroke, known[1])
                 continue
-            shape = shape_for(self.layer, stroke, settings)
+            shape = shape_for(self.layer, stroke, settings, base)
             new[stroke.id] = (stroke, None if shape is None else pack_one(shape, s, box))
         window = everything(box) if fresh else _changed(old, new, box)
-        self._settings, self._packed = _settings_key(settings), new
+        if not fresh and not same:
+            assert base is not None
+            window = union([w for w in (window, _moved(base.changed(self._base), s, box)) if w is not None])
+        self._settings, self._packed, self._base = _settings_key(settings), new, base
         tables = _tables(self.level, settings, [p for _, p in new.values() if p is not None], box)
         return tables, window
 
     def forget(self) -> None:
         """Make the next set a fresh one."""
-        self._settings, self._packed = None, {}
+        self._settings, self._packed, self._base = None, {}, None
 
 
 def _settings_key(settings: TerrainSettings) -> tuple[float, float | None, str]:
     return settings.size_m, settings.reach_m, settings.border
+
+
+def _same(one: Base | None, other: Base | None) -> bool:
+    return one is other or (one is not None and other is not None and one.digest == other.digest)
+
+
+def _moved(rect: grid.Rect | None, s: float, box: BinBox) -> Window | None:
+    """The bins of which the base changed at some sample."""
+    if rect is None:
+        return None
+    low, high = (np.array([[v / s] for v in corner]) for corner in ((rect.x0, rect.y0), (rect.x1, rect.y1)))
+    return window_of(low, high, box)
 
 
 def _changed(
@@ -109,9 +135,15 @@ class WindowPacker:
     window gets is, to the bit, what it gets in any other window and in the whole level.
     """
 
-    def __init__(self, strokes: Sequence[Stroke], settings: TerrainSettings, layer: Layer | None = None) -> None:
+    def __init__(
+        self,
+        strokes: Sequence[Stroke],
+        settings: TerrainSettings,
+        layer: Layer | None = None,
+        base: Base | None = None,
+    ) -> None:
         self._settings = settings
-        pairs = [(s, shape_for(layer, s, settings)) for s in sorted(strokes, key=lambda k: k.id)]
+        pairs = [(s, shape_for(layer, s, settings, base)) for s in sorted(strokes, key=lambda k: k.id)]
         self._strokes = [s for s, shape in pairs if shape is not None]
         self._shapes: list[Shape] = [shape for _, shape in pairs if shape is not None]
         plan = [shape.crest.points[:, :2] for shape in self._shapes]
@@ -125,6 +157,11 @@ class WindowPacker:
         s = grid.spacing(level, self._settings.size_m)
         packed = [pack_one(self._shapes[k], s, box) for k in self._near(level, box)]
         return _tables(level, self._settings, [p for p in packed if p is not None], box)
+
+    @property
+    def grounds(self) -> dict[str, Ground]:
+        """What each stroke is to the base, by its id."""
+        return {stroke.id: shape.ground for stroke, shape in zip(self._strokes, self._shapes, strict=True)}
 
     def reaching(self, level: int, box: BinBox) -> list[Stroke]:
         """The strokes, by id, that may reach the bins of ``box``, at this or any finer level. Raises like ``pack``."""

@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from esker.contract import DEFAULT_REFINED_LEVEL, MAX_REFINED_LEVEL, Channel, Stroke, TerrainSettings
+from esker.solve.base import Base
+from esker.solve.channels import channel_level
 from esker.solve.device import Device
 from esker.solve.faults import finished
 from esker.solve.solver import Basis, LevelResult, Solver
@@ -24,7 +26,7 @@ from esker.synthesis.subdivide import Samples
 
 @dataclass(frozen=True)
 class Settled:
-    """A settled solve with its channels, (n, n) float32 each, by name."""
+    """A settled solve with its channels, (n, n) float32 each, by name; over a base "survey" too."""
 
     basis: Basis
     channels: Mapping[str, NDArray[np.float32]]
@@ -36,11 +38,14 @@ def settle(
     settings: TerrainSettings,
     level: int,
     step: Callable[[LevelResult | None], None] | None = None,
+    *,
+    base: Base | None = None,
 ) -> Settled:
-    """Solve levels 0..``level`` to rest; ``step`` is told each step. Raises ValueError, DeviceErrors as solves do."""
+    """Solve levels 0..``level`` to rest, over a base; ``step`` is told each step. Raises ValueError, DeviceErrors as
+    solves do."""
     basis: Basis | None = None
     channels: dict[str, NDArray[np.float32]] = {}
-    for result in solver.steps(strokes, settings, level, basis=True):
+    for result in solver.steps(strokes, settings, level, basis=True, base=base):
         if step is not None:
             step(result)
         if result is None:
@@ -50,6 +55,8 @@ def settle(
         basis = result.basis or basis
     if basis is None:
         raise RuntimeError("The solve ended before the ground was settled.")
+    if base is not None:
+        channels[Channel.SURVEY.name.lower()] = base.survey(channel_level(level))
     return Settled(basis, channels)
 
 
@@ -60,9 +67,17 @@ def detailed(solver: Solver, settled: Settled, refined_level: int = DEFAULT_REFI
     """
     if not 0 <= refined_level <= MAX_REFINED_LEVEL:
         raise ValueError(f"tiles are refined to level 0..{MAX_REFINED_LEVEL}, not {refined_level}")
-    site = site_of(settled.basis.settings, settled.basis.heights, settled.channels)
+    basis, base = settled.basis, settled.basis.base
+    refiner = solver.refiner(basis)
+    levels = [] if base is None else [base.level(k, solver.device) for k in range(basis.level + 1)]
+    site = site_of(basis.settings, basis.heights, settled.channels, levels)
     maker = None if solver.device is None else _OnDevice(solver.device)
-    return DetailedTerrain(site, maker, solver.refiner(settled.basis).window, refined_level)
+
+    def ground(level: int, rows: slice, cols: slice) -> NDArray[np.float32]:
+        assert base is not None
+        return base.window(level, rows, cols, solver.device)
+
+    return DetailedTerrain(site, maker, refiner.window, refined_level, None if base is None else ground)
 
 
 class _OnDevice:

@@ -24,6 +24,9 @@ log = logging.getLogger(__name__)
 NUMPY = "numpy"
 NUMPY_NAME = "NumPy float64 (no OpenCL device)"
 SOURCES = ("rows.cl", "section.cl", "raster.cl", "setup.cl", "visit.cl", "refine.cl")
+OVER_SOURCES = ("rows.cl", "section.cl", "raster.cl", "over_base.cl")
+OVER_BASE = "#define OVER_BASE\n"
+_OVER = " over a base"
 Kernels = Literal["rows", "tiles"]
 _KERNELS = "ESKER_KERNELS"
 _ROWS_TOO = ", rows too"
@@ -35,6 +38,8 @@ _POCL_CACHE = "POCL_KERNEL_CACHE"
 _POCL_FOLDER = "POCL_CACHE_DIR"
 _opened: dict[str, Device] = {}
 """Devices of this process by name: a program is compiled once."""
+_programs: dict[str, tuple[Any, Any]] = {}
+"""(context, program) of grounds with a base, by device and kind of kernels."""
 
 
 @dataclass(frozen=True)
@@ -191,6 +196,32 @@ def _files() -> dict[str, str]:
     return {path.name: path.read_text(encoding="utf-8") for path in sorted(shader_folder().glob("*.cl"))}
 
 
+def named(kernel: str, over_base: bool) -> str:
+    """The name of a kernel of the rasteriser, as it is compiled for grounds with a base or without."""
+    return kernel + _OVER if over_base else kernel
+
+
+def kernel_of(cl: Any, device: Device, name: str) -> Any:
+    """A kernel by its name (``named``). The program for grounds with a base is compiled when the first one comes."""
+    if not name.endswith(_OVER):
+        return cl.Kernel(device.program, name)
+    key = device.name + (_ROWS_TOO if device.plan is None else "") + _OVER
+    if key not in _programs or _programs[key][0] is not device.context:
+        source = _over_source(device.plan)
+        _programs[key] = (
+            device.context,
+            _build(device.name, device.context.devices[0], device.context, device.plan, source),
+        )
+    return cl.Kernel(_programs[key][1], name.removesuffix(_OVER))
+
+
+def _over_source(plan: gpu_program.Plan | None) -> str:
+    """The rasteriser as it is over a base, and what the ground owes to it."""
+    if plan is not None:
+        return _INLINE + OVER_BASE + _defines(gpu_program.defines(plan)) + gpu_program.over_source(_files())
+    return _INLINE + OVER_BASE + _defines({}) + "\n".join(_files()[name] for name in OVER_SOURCES)
+
+
 def _source(plan: gpu_program.Plan | None) -> str:
     if plan is not None:
         return _INLINE + _defines(gpu_program.defines(plan)) + gpu_program.source(plan, _files())
@@ -220,7 +251,7 @@ def _open(name: str, device: Any) -> Device:
 
     context = cl.Context([device])
     plan = gpu_program.plan_of(device) if kernels_for(device) == "tiles" else None
-    program = _build(name, device, context, plan)
+    program = _build(name, device, context, plan, _source(plan))
     units = int(device.max_compute_units)
     return Device(
         name, context, cl.CommandQueue(context), program, units if units == 1 else 2 * units, plan,
@@ -237,7 +268,7 @@ def row_kernels(device: Device) -> Device:
         return device
     key = device.name + _ROWS_TOO
     if key not in _opened:
-        program = _build(device.name, device.context.devices[0], device.context, None)
+        program = _build(device.name, device.context.devices[0], device.context, None, _source(None))
         _opened[key] = replace(device, program=program, plan=None)
     return _opened[key]
 
@@ -245,13 +276,14 @@ def row_kernels(device: Device) -> Device:
 def _forget(name: str) -> None:
     _opened.pop(name, None)
     _opened.pop(name + _ROWS_TOO, None)
+    for key in [k for k in _programs if k in {name + _OVER, name + _ROWS_TOO + _OVER}]:
+        del _programs[key]
 
 
-def _build(name: str, device: Any, context: Any, plan: gpu_program.Plan | None) -> Any:
+def _build(name: str, device: Any, context: Any, plan: gpu_program.Plan | None, source: str) -> Any:
     """The program; raises BuildError."""
     import pyopencl as cl
 
-    source = _source(plan)
     try:
         try:
             program = _compile(context, source, plan)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from esker.contract import Stroke, TerrainSettings
 from esker.solve import multigrid, raster
+from esker.solve.base import Base
 from esker.solve.constraints import Packer
-from esker.solve.fields import Shape
+from esker.solve.fields import Shape, rectangle
 from esker.solve.queue import Queue
 from esker.solve.tables import RASTER_BINS, Tables, Window
 
@@ -32,37 +33,72 @@ class DeviceSystem(multigrid.System, Protocol):
         """See ``fields.Fields``."""
 
 
+class OverBase:
+    """What a workspace over a base holds on the device: the base at the finest level, the share of the guidance that is
+    the ground's own, and the right-hand side of the heights without what is owed to the base."""
+
+    def __init__(self, queue: Queue, shape: Shape, pad: int, enqueue: Callable[..., None]) -> None:
+        self.base, self.share, self.raw = (queue.zeros(shape.stride + pad) for _ in range(3))
+        self._queue, self._shape, self._pad, self._enqueue = queue, shape, pad, enqueue
+        self._digest = b""
+
+    def put(self, base: Base) -> None:
+        """Copy the base's samples to the device, unless they are there."""
+        if base.digest != self._digest:
+            samples = base.level(self._shape.level, self._queue.device)
+            window = rectangle(self._shape, 0, self._pad)
+            self._queue.cl.enqueue_copy(self._queue.queue, self.base, np.ascontiguousarray(samples), **window)
+            self._digest = base.digest
+
+    def add(self, d: Any, f: Any, rows: tuple[int, int]) -> None:
+        """f = ``raw`` and what is owed to the base, rows first .. last - 1."""
+        self._enqueue(self._queue, self._shape, (self.base, self.share, d, self.raw, f), rows)
+
+
 S = TypeVar("S", bound=DeviceSystem)
 
 
 class DeviceWorkspace(Generic[S]):
     """``solver.Workspace`` but for ``guide``, which is the kernels' own."""
 
-    def __init__(self, queue: Queue, gradient: S, height: S, bins: raster.Launcher) -> None:
+    def __init__(self, queue: Queue, gradient: S, height: S, bins: raster.Launcher, over: OverBase | None) -> None:
         self.top = height.top
         self.gradient, self.height = gradient, height
         self.packer = Packer(self.top)
         self.size_m = 1.0
-        self._queue, self._bins = queue, bins
+        self._queue, self._bins, self._over = queue, bins, over
 
-    def load(self, strokes: Sequence[Stroke], settings: TerrainSettings) -> None:
+    @property
+    def based(self) -> bool:
+        """Whether it solves over a base."""
+        return self._over is not None
+
+    def load(self, strokes: Sequence[Stroke], settings: TerrainSettings, base: Base | None = None) -> None:
         """``loading`` without a pause."""
-        for _ in self.loading(strokes, settings):
+        for _ in self.loading(strokes, settings, base):
             pass
 
-    def loading(self, strokes: Sequence[Stroke], settings: TerrainSettings) -> Iterator[None]:
+    def loading(self, strokes: Sequence[Stroke], settings: TerrainSettings, base: Base | None = None) -> Iterator[None]:
         """Rasterise what changed since the last set, and coarsen; may be left between bands of bins."""
-        tables, window = self.packer.pack(strokes, settings)
+        if (base is None) == self.based:
+            raise ValueError("a workspace solves with a base or without one, as it was made")
+        tables, window = self.packer.pack(strokes, settings, base)
         self.size_m = tables.size_m
         if window is None:
             return
+        if base is not None and self._over is not None:
+            self._over.put(base)
         for count, band in enumerate(window.bands(RASTER_BINS)):
             if count:
                 self._queue.queue.finish()
                 yield
             self.rasterise(tables, band)
-        self.gradient.coarsen(tables.screening, window.sample_rows)
-        self.height.coarsen(tables.screening, window.sample_rows)
+        rows = window.sample_rows
+        self.gradient.coarsen(tables.screening, rows)
+        if self._over is not None:
+            rows = max(0, rows[0] - 1), min(tables.samples, rows[1] + 1)
+            self._over.add(self.height.fields["d", self.top], self.height.fields["s", self.top], rows)
+        self.height.coarsen(tables.screening, rows)
 
     def warm(self, heights: NDArray[np.float32]) -> None:
         """Start the height step from these heights of the finest level instead of from coarser levels."""
@@ -72,8 +108,11 @@ class DeviceWorkspace(Generic[S]):
     def rasterise(self, tables: Tables, window: Window) -> None:
         """Constraints of the finest level inside a window of bins."""
         shape, h, g = self.height.shapes[self.top], self.height.fields, self.gradient.fields
-        fields = (h["d", self.top], h["s", self.top], g["d", self.top], g["f", self.top])
-        raster.rasterise(self._bins, tables, window, raster.Target(*fields, shape.pitch, shape.stride))
+        over = self._over
+        static = h["s", self.top] if over is None else over.raw
+        fields = (h["d", self.top], static, g["d", self.top], g["f", self.top])
+        pair = None if over is None else raster.Over(over.base, over.share)
+        raster.rasterise(self._bins, tables, window, raster.Target(*fields, shape.pitch, shape.stride, pair))
 
     def read(self, level: int) -> NDArray[np.float32]:
         """Heights of a level, metres."""

@@ -68,11 +68,15 @@ class Fields:
             queue.cl.enqueue_copy(queue.queue, self.fields[name, level], host, **self._window(shape, c))
 
     def _window(self, shape: Shape, channel: int) -> dict[str, Any]:
-        """A channel's samples, without padding, for a rectangular copy."""
-        return {
-            "host_pitches": (4 * shape.n,),
-            "host_origin": (0, 0),
-            "region": (4 * shape.n, shape.n),
-            "buffer_pitches": (4 * shape.pitch,),
-            "buffer_origin": (4 * (self.pad + channel * shape.stride), 0),
-        }
+        return rectangle(shape, channel, self.pad)
+
+
+def rectangle(shape: Shape, channel: int, pad: int) -> dict[str, Any]:
+    """A channel's samples, without padding, for a rectangular copy."""
+    return {
+        "host_pitches": (4 * shape.n,),
+        "host_origin": (0, 0),
+        "region": (4 * shape.n, shape.n),
+        "buffer_pitches": (4 * shape.pitch,),
+        "buffer_origin": (4 * (pad + channel * shape.stride), 0),
+    }

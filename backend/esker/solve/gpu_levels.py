@@ -6,6 +6,7 @@ lie behind each other. Level 0's buffers also hold the levels below it, which th
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -13,8 +14,8 @@ from numpy.typing import NDArray
 
 from esker import grid
 from esker.contract import TILE_CELLS
-from esker.solve.device import Device
-from esker.solve.device_workspace import DeviceWorkspace
+from esker.solve.device import Device, named
+from esker.solve.device_workspace import DeviceWorkspace, OverBase
 from esker.solve.fields import Fields, Shape
 from esker.solve.gpu_program import CHAIN, CHAIN_ITEMS, CHANGE_ITEMS, Plan
 from esker.solve.queue import Queue
@@ -200,13 +201,23 @@ class Bins:
         self.launch.run_once(name, size, (BIN, BIN), *args)
 
 
+def _over_base(launch: GpuLauncher, shape: Shape, fields: Sequence[Any], rows: tuple[int, int]) -> None:
+    """Enqueue ``reference.over_base`` (``device_workspace.OverBase``)."""
+    i, (first, last) = np.int32, rows
+    launch.run_once(
+        named("over_base", True), _blocks(shape.n, last - first), BLOCK, *fields, i(shape.n), i(shape.pitch), i(first),
+        i(last),
+    )  # fmt: skip
+
+
 class GpuWorkspace(DeviceWorkspace[GpuSystem]):
     """``solver.Workspace`` on a GPU."""
 
-    def __init__(self, device: Device, top: int) -> None:
+    def __init__(self, device: Device, top: int, based: bool = False) -> None:
         self.launch = GpuLauncher(device)
         gradient, height = GpuSystem(self.launch, top, 2, "f"), GpuSystem(self.launch, top, 1, "s")
-        super().__init__(self.launch, gradient, height, Bins(self.launch))
+        over = OverBase(self.launch, shape_of(top), 0, _over_base) if based else None
+        super().__init__(self.launch, gradient, height, Bins(self.launch), over)
 
     def guide(self, level: int) -> None:
         """f of the height step at ``level`` from u of the gradient step."""

@@ -114,7 +114,13 @@ def defines(of: Plan) -> dict[str, float | int]:
 SCALAR = "#define SECTION_SCALAR"
 """Cross-sections of one sample, not of sixteen."""
 SOURCES = ("gpu_level.cl", "gpu_setup.cl", "gpu_bottom.cl", "section.cl", "gpu_raster.cl")
+OVER_SOURCES = ("gpu_level.cl", "section.cl", "gpu_raster.cl", "gpu_over_base.cl")
 VISIT = "gpu_visit.cl"
+
+
+def over_source(files: dict[str, str]) -> str:
+    """The rasteriser over a base (``device.kernel_of``)."""
+    return "\n".join([SCALAR, *(files[name] for name in OVER_SOURCES)])
 
 
 def source(of: Plan, files: dict[str, str]) -> str:

@@ -6,6 +6,7 @@ behind each other. Level 0's buffers also hold the levels below it, which the bo
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -14,8 +15,8 @@ from numpy.typing import NDArray
 from esker import grid
 from esker.contract import TILE_CELLS
 from esker.solve import wave
-from esker.solve.device import Device
-from esker.solve.device_workspace import DeviceWorkspace
+from esker.solve.device import Device, named
+from esker.solve.device_workspace import DeviceWorkspace, OverBase
 from esker.solve.fields import Fields, Shape
 from esker.solve.queue import Queue
 from esker.solve.reference import BOTTOM_LEVELS
@@ -180,13 +181,30 @@ class ClSystem(Fields):
         super().put(name, level, value)
 
 
+def over_base(
+    launch: Launcher, fields: Sequence[Any], samples: tuple[int, int], pitch: int, rows: tuple[int, int]
+) -> None:
+    """Enqueue ``reference.over_base`` for ``rows`` (half open) of (rows, columns) samples; fields: base, share, d,
+    static part without it, static part."""
+    i, (first, last) = np.int32, rows
+    strips, each = launch.strips(last - first)
+    launch.run(
+        named("over_base", True), (strips,), *fields, i(samples[0]), i(samples[1]), i(pitch), i(first), i(last), i(each)
+    )
+
+
+def _over_level(launch: Launcher, shape: Shape, fields: Sequence[Any], rows: tuple[int, int]) -> None:
+    over_base(launch, fields, (shape.n, shape.n), shape.pitch, rows)
+
+
 class ClWorkspace(DeviceWorkspace[ClSystem]):
     """``solver.Workspace`` on an OpenCL device."""
 
-    def __init__(self, device: Device, top: int) -> None:
+    def __init__(self, device: Device, top: int, based: bool = False) -> None:
         self.launch = Launcher(device, top)
         gradient, height = ClSystem(self.launch, top, 2, "f"), ClSystem(self.launch, top, 1, "s")
-        super().__init__(self.launch, gradient, height, self.launch)
+        over = OverBase(self.launch, shape_of(top), PAD, _over_level) if based else None
+        super().__init__(self.launch, gradient, height, self.launch, over)
 
     def guide(self, level: int) -> None:
         """f of the height step at ``level`` from u of the gradient step."""

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from esker.contract import Flank, Stroke, TerrainSettings
+from esker.solve.base import SHEET, Base, Ground, ground_under
 from esker.solve.crest import Crest, crest_of, line_of
 from esker.solve.outline import cut, segments_of, spans_of
 from esker.solve.sayings import Layer, says
@@ -54,6 +55,7 @@ class Shape:
 
     cliff: 1 / reach of the terrain, 0 for endless; silhouette: of a profile, None of an outline. For another channel
     than the heights, value: what the stroke asks of it, as a difference from its base; brush_m: radius of paint.
+    ground: what is known of the base under it.
     """
 
     crest: Crest
@@ -63,6 +65,7 @@ class Shape:
     silhouette: Silhouette | None
     value: float = 0.0
     brush_m: float | None = None
+    ground: Ground = SHEET
 
     def brush(self, s: float) -> float:
         """Radius of paint in cells, 0 for a crest."""
@@ -118,7 +121,7 @@ class Packed:
         return self.pieces[ends[o] : ends[o + 1]]
 
 
-def shape_for(layer: Layer | None, stroke: Stroke, settings: TerrainSettings) -> Shape | None:
+def shape_for(layer: Layer | None, stroke: Stroke, settings: TerrainSettings, base: Base | None = None) -> Shape | None:
     """A stroke ready to be packed into the tables of a layer (None: the heights); None when it says nothing of it."""
     value = 0.0 if layer is None else says(stroke, layer, settings)
     if value is None:
@@ -127,25 +130,28 @@ def shape_for(layer: Layer | None, stroke: Stroke, settings: TerrainSettings) ->
         line = line_of(stroke)
         return None if line is None else Shape(line, None, None, 0.0, None, value, stroke.paint.radius_m)
     crest = crest_of(stroke)
-    return None if crest is None else replace(shape_of(crest, settings), value=value)
+    if crest is None:
+        return None
+    ground = ground_under(base, crest.points, stroke.plateau_radius_m, crest.closed, settings.size_m)
+    return replace(shape_of(crest, settings, ground), value=value)
 
 
-def shape_of(crest: Crest, settings: TerrainSettings) -> Shape:
+def shape_of(crest: Crest, settings: TerrainSettings, ground: Ground = SHEET) -> Shape:
     """A crest ready to be packed for any level."""
     stroke = crest.stroke
     left, right = _side(stroke.left), _side(stroke.right)
     cliff = 0.0 if settings.reach_m is None else 1 / settings.reach_m
-    shape = Shape(crest, left, right, cliff, None)
+    shape = Shape(crest, left, right, cliff, None, ground=ground)
     if stroke.kind != "profile":
         return shape
-    top = np.abs(crest.points[:, 2]).max()
+    top = ground.tops(crest.points[:, 2]).max()
     wide, skirt = (float(w[0]) for w in shape.widths(np.array([top])))
-    return Shape(crest, left, right, cliff, silhouette(crest, settings.size_m, TOE * wide + skirt))
+    return replace(shape, silhouette=silhouette(crest, settings.size_m, TOE * wide + skirt, ground.datum))
 
 
 def reach_m(shape: Shape, s: float) -> float:
     """Outermost distance of a stroke with any effect at spacing ``s``, metres."""
-    return float(shape.reach(np.abs(shape.crest.points[:, 2]), s).max()) * s
+    return float(shape.reach(shape.ground.tops(shape.crest.points[:, 2]), s).max()) * s
 
 
 def pack_one(shape: Shape, s: float, box: BinBox) -> Packed | None:
@@ -159,7 +165,7 @@ def _pack_profile(shape: Shape, s: float, box: BinBox, low: Ints, high: Ints) ->
     line = shape.silhouette
     assert line is not None
     edges, tops = line.blocks
-    reach = shape.reach(tops, s)
+    reach = shape.reach(tops + shape.ground.half, s)
     ends = (line.start + edges[:, None] * line.unit) / s
     a, b = ends[:-1].T, ends[1:].T
     window = window_of(np.minimum(a, b) - reach, np.maximum(a, b) + reach, box)
@@ -202,7 +208,7 @@ def _pack_profile(shape: Shape, s: float, box: BinBox, low: Ints, high: Ints) ->
 def _pack_outline(shape: Shape, s: float, box: BinBox, low: Ints, high: Ints) -> Packed | None:
     points, closed = shape.crest.points[:, :2] / s, shape.crest.closed
     height = float(shape.crest.points[0, 2])
-    reach = float(shape.reach(np.array([abs(height)]), s)[0])
+    reach = float(shape.reach(shape.ground.tops([height]), s)[0])
     if (points.min(axis=0) - reach > high).any() or (points.max(axis=0) + reach < low).any():
         return None
     segments = segments_of(cut(np.vstack([points, points[:1]]) if closed else points), closed)
@@ -242,6 +248,8 @@ def _params(shape: Shape, s: float, reach: float) -> Floats:
         "reach": reach,
         "same": float(shape.left == shape.right),
         "run": 1.0,
+        "fill": shape.ground.fill,
+        "cut": shape.ground.cut,
     }
     values |= {"value": shape.value, "brush": shape.brush(s)}
     for letter, side in (("l", shape.left), ("r", shape.right)):

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from esker.solve.device import Device
+from esker.solve.device import Device, kernel_of
 from esker.solve.reference import chebyshev_weights
 
 MOST_BOUND = 512
@@ -27,7 +27,7 @@ class Queue:
 
         self.cl, self.device, self.queue = cl, device, device.queue
         # of functions, not of methods: a cycle through the queue would keep its buffers until somebody collects it
-        self.bound = lru_cache(MOST_BOUND)(partial(_bound, cl, device.program))
+        self.bound = lru_cache(MOST_BOUND)(partial(_bound, cl, device))
         self.weights = self.constant(chebyshev_weights().astype(np.float32))
         self.table = self.constant(table)
 
@@ -45,13 +45,13 @@ class Queue:
 
     def once(self, name: str, args: tuple[Any, ...]) -> Any:
         """A kernel with all arguments set, for those that will not come again."""
-        kernel = self.cl.Kernel(self.device.program, name)
+        kernel = kernel_of(self.cl, self.device, name)
         kernel.set_args(*args)
         return kernel
 
 
-def _bound(cl: Any, program: Any, name: str, *args: Any) -> Any:
-    kernel = cl.Kernel(program, name)
+def _bound(cl: Any, device: Device, name: str, *args: Any) -> Any:
+    kernel = kernel_of(cl, device, name)
     for k, value in enumerate(args):
         kernel.set_arg(k, value)
     return kernel

@@ -8,6 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from esker.solve.device import named
 from esker.solve.tables import Tables, Window
 
 
@@ -16,6 +17,15 @@ class Launcher(Protocol):
 
     def constant(self, array: NDArray[Any]) -> Any: ...
     def run(self, name: str, size: tuple[int, ...], *args: Any) -> None: ...
+
+
+@dataclass(frozen=True)
+class Over:
+    """Float32 buffers laid out like the constraints. base: the base there; share: to be written, see
+    ``reference_raster.Constraints``."""
+
+    base: Any
+    share: Any
 
 
 @dataclass(frozen=True)
@@ -33,32 +43,45 @@ class Target:
     gradient_f: Any
     pitch: int
     stride: int
+    over: Over | None = None
 
 
 def rasterise(launch: Launcher, tables: Tables, window: Window, target: Target) -> None:
     """Enqueue the constraints of the bins of ``window``, which lie within the tables' box."""
     if window.width == 0:
         return
+    over = () if target.over is None else (target.over.base, target.over.share)
+    name = named("rasterise", over_base=target.over is not None)
     launch.run(
-        "rasterise", (window.width, len(window.spans)), *_arguments(launch, tables, window),
+        name, (window.width, len(window.spans)), *_arguments(launch, tables, window),
         np.int32(target.pitch), np.int32(target.stride), target.gradient_d, target.gradient_f, target.height_d,
-        target.height_f, np.float32(tables.screening), np.int32(tables.pinned),
+        target.height_f, np.float32(tables.screening), np.int32(tables.pinned), *over,
     )  # fmt: skip
 
 
 def rasterise_channel(
-    launch: Launcher, tables: Tables, window: Window, d: Any, f: Any, pitch: int, stride: int, covered: bool
+    launch: Launcher,
+    tables: Tables,
+    window: Window,
+    d: Any,
+    f: Any,
+    pitch: int,
+    stride: int,
+    covered: bool,
+    base: Any = None,
 ) -> None:
     """Enqueue what the strokes say of the tables' channel, as a difference from its base (DESIGN 5.4).
 
     d: stiffness; f: what it pulls to, and if ``covered``, in a second channel, that of a value of 1 (see
-    ``reference_raster.rasterise_channel``). Layout: see ``Target``.
+    ``reference_raster.rasterise_channel``). base: a buffer with the base there. Layout: see ``Target``.
     """
     if window.width == 0:
         return
+    name = named("rasterise_channel", over_base=base is not None)
     launch.run(
-        "rasterise_channel", (window.width, len(window.spans)), *_arguments(launch, tables, window),
+        name, (window.width, len(window.spans)), *_arguments(launch, tables, window),
         np.int32(pitch), np.int32(stride), d, f, np.float32(tables.screening), np.int32(covered),
+        *(() if base is None else (base,)),
     )  # fmt: skip
 
 

@@ -22,6 +22,7 @@ from esker.contract import (
 )
 from esker.grid import samples
 from esker.solve import reference_raster
+from esker.solve.base import Base
 from esker.solve.constraints import Packer
 from esker.solve.tables import PINNED, PINNED_STIFFNESS
 
@@ -94,6 +95,20 @@ def divergence(static: Field, d: Field, g: Field, spacing_m: float) -> Field:
         part[..., 0] = -(c[..., 0] + c[..., 1])
         part[..., -1] = c[..., -1] + c[..., -2]
         out += np.moveaxis(part, -1, axis) * spacing_m
+    return np.asarray(np.where(d < 0, static, static + out))
+
+
+def over_base(static: Field, d: Field, share: Field, base: Field) -> Field:
+    """Static right-hand side of the height step over a base (docs/solver.md, "Over a base"), all (n, n).
+
+    ``share`` of the guidance prescribes the ground itself: so that much of the base's own difference along each edge,
+    with the mean share of its two ends, is taken off what lies above the base. Borders are mirrored.
+    """
+    s, b = (np.pad(a, 1, mode="reflect") for a in (share, base))
+    out = np.zeros_like(static)
+    for rows, columns in ((slice(0, -2), slice(1, -1)), (slice(2, None), slice(1, -1)),
+                          (slice(1, -1), slice(0, -2)), (slice(1, -1), slice(2, None))):  # fmt: skip
+        out += 0.5 * (share + s[rows, columns]) * (b[rows, columns] - base)
     return np.asarray(np.where(d < 0, static, static + out))
 
 
@@ -197,26 +212,28 @@ class NumpySystem:
 class NumpyWorkspace:
     """``solver.Workspace`` in float64 NumPy: serves when there is no OpenCL device."""
 
-    def __init__(self, top: int) -> None:
-        self.top = top
+    def __init__(self, top: int, based: bool = False) -> None:
+        self.top, self.based = top, based
         self.size_m = 1.0
         self.packer = Packer(top)
         self.gradient: NumpySystem
         self.height: NumpySystem
 
-    def load(self, strokes: Sequence[Stroke], settings: TerrainSettings) -> None:
+    def load(self, strokes: Sequence[Stroke], settings: TerrainSettings, base: Base | None = None) -> None:
         """Rasterise and coarsen."""
-        tables, window = self.packer.pack(strokes, settings)
+        tables, window = self.packer.pack(strokes, settings, base)
         if window is None:
             return
-        c = reference_raster.rasterise(tables)
+        under = None if base is None else base.level(self.top).astype(np.float64)
+        c = reference_raster.rasterise(tables, under)
+        height_f = c.height_f if under is None else over_base(c.height_f, c.height_d, c.share, under)
         self.size_m = tables.size_m
         self.gradient = NumpySystem(c.gradient_d[None], c.gradient_f, tables.screening, self.top)
-        self.height = NumpySystem(c.height_d[None], c.height_f[None], tables.screening, self.top)
+        self.height = NumpySystem(c.height_d[None], height_f[None], tables.screening, self.top)
 
-    def loading(self, strokes: Sequence[Stroke], settings: TerrainSettings) -> Iterator[None]:
+    def loading(self, strokes: Sequence[Stroke], settings: TerrainSettings, base: Base | None = None) -> Iterator[None]:
         """The same, in one piece."""
-        self.load(strokes, settings)
+        self.load(strokes, settings, base)
         yield
 
     def warm(self, heights: NDArray[np.float32]) -> None:

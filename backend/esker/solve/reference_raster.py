@@ -28,7 +28,7 @@ Places = tuple[NDArray[np.int64], NDArray[np.int64]]
 
 HARD = -1.0
 """Stiffness that marks a sample as fixed, on a crest; on a pinned border it is ``tables.PINNED``."""
-_SUMS = ("w", "wt", "wtt", "wa", "fade", "held", "g", "gx", "gy", "toe", "hard")
+_SUMS = ("w", "wt", "wtt", "wa", "fade", "held", "g", "gx", "gy", "toe", "hard", "follows")
 
 
 @dataclass(frozen=True)
@@ -37,19 +37,21 @@ class Constraints:
 
     Every array float64, (rows, columns) or (2, rows, columns), row 0 south. height_d: spring stiffness, HARD where
     fixed. height_f: stiffness times target (plus what the screening must give back), or the fixed height. gradient_d:
-    stiffness for both gradient components. gradient_f: stiffness times target (d/dx, d/dy), metres per metre.
+    stiffness for both gradient components. gradient_f: stiffness times target (d/dx, d/dy), metres per metre. share:
+    how far the gradient is that of the ground, base included (``reference.over_base``).
     """
 
     height_d: Floats
     height_f: Floats
     gradient_d: Floats
     gradient_f: Floats
+    share: Floats
 
 
-def rasterise(tables: Tables) -> Constraints:
-    """The constraints of the samples of the tables' box, shape ``tables.shape``."""
+def rasterise(tables: Tables, base: NDArray[np.floating] | None = None) -> Constraints:
+    """The constraints of the samples of the tables' box, shape ``tables.shape``; ``base``: the base there, metres."""
     total = _sums(tables)
-    for k, at, near, inside in _strokes(tables):
+    for k, at, near, inside in _strokes(tables, base):
         _add(total, at, cross_section(near, inside, tables.strokes[k], tables))
     rows, columns = tables.shape
     total = {name: a[:rows, :columns] for name, a in total.items()}
@@ -67,10 +69,11 @@ def rasterise(tables: Tables) -> Constraints:
         y, x = (o + np.arange(count) for o, count in zip(tables.origin, tables.shape, strict=True))
         edge = ((y == 0) | (y == tables.samples - 1))[:, None] | (x == 0) | (x == tables.samples - 1)
         height_d, height_f = np.where(edge, PINNED, height_d), np.where(edge, 0.0, height_f)
-    return Constraints(height_d, height_f, *_two(total))
+    share = total["toe"] * total["follows"] / np.maximum(total["g"], TINY)
+    return Constraints(height_d, height_f, *_two(total), share)
 
 
-def rasterise_channel(tables: Tables) -> tuple[Floats, Floats, Floats]:
+def rasterise_channel(tables: Tables, base: NDArray[np.floating] | None = None) -> tuple[Floats, Floats, Floats]:
     """What the strokes say of the tables' channel, as a difference from its base (DESIGN 5.4).
 
     d: stiffness; f: stiffness times value; its cover, that of a value of 1; all of shape ``tables.shape``. As far as a
@@ -78,7 +81,7 @@ def rasterise_channel(tables: Tables) -> tuple[Floats, Floats, Floats]:
     does not depend on their order: paint and paint by how near its line is in its radius.
     """
     total = _sums(tables)
-    for k, at, near, inside in _strokes(tables):
+    for k, at, near, inside in _strokes(tables, base):
         params = tables.strokes[k]
         if params[STROKE_AT["brush"]] > 0:
             known = weight = brush_section(near, params)
@@ -105,12 +108,16 @@ def _two(total: dict[str, Floats]) -> tuple[Floats, Floats]:
     return d, np.stack([d * total["gx"] / g, d * total["gy"] / g])
 
 
-def _strokes(tables: Tables) -> Iterator[tuple[int, Places, Nearest, NDArray[np.bool_]]]:
-    """Per stroke the samples of its bins (places in the box), their nearest crest points and which are inside."""
+def _strokes(
+    tables: Tables, base: NDArray[np.floating] | None = None
+) -> Iterator[tuple[int, Places, Nearest, NDArray[np.bool_]]]:
+    """Per stroke the samples of its bins (places in the box), their nearest crest points, as high as they are above the
+    base there, and which are inside."""
     by0, by1, bx0, _ = tables.box
     stroke, first, last = tables.row_items.T
     row = np.repeat(np.arange(by0, by1), np.diff(tables.row_start))
     offset = np.arange(BIN)
+    over = None if base is None else _bordered(base, (by1 - by0) * BIN, (tables.box[3] - bx0) * BIN)
     for k in range(len(tables.index)):
         mine = np.flatnonzero(stroke == k)
         if len(mine) == 0:
@@ -126,7 +133,15 @@ def _strokes(tables: Tables) -> Iterator[tuple[int, Places, Nearest, NDArray[np.
             near = _nearest(tables, k, x.astype(float), y.astype(float))
             if tables.index[k, INDEX_AT["spans"]] >= 0:
                 inside = _inside(tables, int(tables.index[k, INDEX_AT["spans"]]), x, y)
-        yield k, (y - by0 * BIN, x - bx0 * BIN), near, inside
+        at = y - by0 * BIN, x - bx0 * BIN
+        if over is not None:
+            near.height = near.height - over[at]
+        yield k, at, near, inside
+
+
+def _bordered(base: NDArray[np.floating], rows: int, columns: int) -> Floats:
+    """A base that fills whole bins."""
+    return np.pad(base.astype(np.float64), ((0, rows - base.shape[0]), (0, columns - base.shape[1])), mode="edge")
 
 
 def _add(total: dict[str, Floats], at: Places, band: Band) -> None:
@@ -134,7 +149,7 @@ def _add(total: dict[str, Floats], at: Places, band: Band) -> None:
     w, g = np.where(band.reached, band.weight, 0.0), np.where(band.reached, band.toe_weight, 0.0)
     for name, value in (("w", w), ("wt", w * band.target), ("wtt", w * band.target**2), ("wa", w * band.stiffness)):
         total[name][at] += value
-    for name, value in (("g", g), ("gx", g * band.gx), ("gy", g * band.gy)):
+    for name, value in (("g", g), ("gx", g * band.gx), ("gy", g * band.gy), ("follows", g * band.follows)):
         total[name][at] += value
     for name, value in (("fade", band.fade), ("held", band.held), ("toe", band.toe_fade), ("hard", band.hard)):
         total[name][at] = np.maximum(total[name][at], np.where(band.reached, value, 0.0))

@@ -138,6 +138,7 @@ def flanks_of(near: Nearest, inside: Mask, params: Floats, s: float) -> Flanks:
     left = near.left * p["lh"]
     present = left + (1 - near.left) * p["rh"]
     has = present > 0
+    present = present * np.where(near.height < 0, p["cut"], p["fill"])
     share = left / np.maximum(present, TINY)
     slope = np.where(has, p["rs"] + share * (p["ls"] - p["rs"]), 1.0)
     extent = p["re"] + share * (p["le"] - p["re"])
@@ -192,7 +193,10 @@ def skirt(b: Flanks, reach_m: float | None) -> Skirt:
 
 @dataclass
 class Band:
-    """A stroke's wishes at samples: targets with their weights and how far they count (``reference_raster``)."""
+    """A stroke's wishes at samples: targets with their weights and how far they count (``reference_raster``).
+
+    follows: how far the gradient is that of the ground, base included.
+    """
 
     reached: Mask
     hard: Mask
@@ -205,6 +209,7 @@ class Band:
     toe_fade: Floats
     gx: Floats
     gy: Floats
+    follows: Floats
 
 
 def nearness(b: Flanks, tables: Tables) -> Floats:
@@ -235,6 +240,7 @@ def cross_section(near: Nearest, inside: Mask, params: Floats, tables: Tables) -
     z = np.where(beyond, z + apron.need * (apron.height * rest**2 - z), z)
     lift = np.where(beyond, apron.need * apron.lift * rest**2, lift)
     lift = np.where(b.has, lift, 1.0)
+    follows = lift * np.where(beyond, 1.0, 1 - leaving)
     held = 1 - smoothstep((b.ds / np.maximum(b.end + apron.width, THINNEST_M) - HELD_FRACTION) / (1 - HELD_FRACTION))
     sign = np.where(near.height < 0, -1.0, 1.0)
     sloping = b.has & (near.distance > params[STROKE_AT["plateau"]]) & ~inside
@@ -257,6 +263,7 @@ def cross_section(near: Nearest, inside: Mask, params: Floats, tables: Tables) -
         toe_fade=toe_fade,
         gx=unit * near.rx + rise * near.along_x,
         gy=unit * near.ry + rise * near.along_y,
+        follows=follows,
     )
 
 

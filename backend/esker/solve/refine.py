@@ -20,6 +20,8 @@ from numpy.typing import NDArray
 from esker import grid
 from esker.contract import MAX_REFINED_LEVEL, TILE_CELLS, TILE_SAMPLES, Stroke, TerrainSettings
 from esker.grid import TileKey
+from esker.solve.base import Base
+from esker.solve.base_blocks import BaseWindows, BlockCache
 from esker.solve.device import Device, row_kernels
 from esker.solve.refine_engine import CHANNELS, ClEngine, Engine, Fields, NumpyEngine, Span, Step, step
 from esker.solve.refine_strokes import DIGEST_BYTES, Strokes
@@ -47,14 +49,16 @@ class Basis(Protocol):
     def heights(self) -> NDArray[np.float32]: ...
     @property
     def gradient(self) -> NDArray[np.float32]: ...
+    @property
+    def base(self) -> Base | None: ...
 
 
 @dataclass(frozen=True)
 class RefinedTile:
     """A tile above the global levels.
 
-    heights: (65, 65) float32 metres, read-only; edges are bit-equal to the neighbours'. content: digest of all that it
-    depends on: equal content, same bits.
+    heights: (65, 65) float32 metres above the base, read-only; edges are bit-equal to the neighbours'. content: digest
+    of all that it depends on: equal content, same bits. base: the base there, None where the terrain has none.
     """
 
     key: TileKey
@@ -102,12 +106,13 @@ class FieldCache:
 class Refiner:
     """Refines one settled solve. Use it from the solver's thread."""
 
-    def __init__(self, basis: Basis, engine: Engine, cache: FieldCache) -> None:
+    def __init__(self, basis: Basis, engine: Engine, cache: FieldCache, blocks: BlockCache | None = None) -> None:
         self.basis, self.cache, self._engine = basis, cache, engine
+        self._base = None if basis.base is None else BaseWindows(basis.base, BlockCache() if blocks is None else blocks)
         self._ground = np.concatenate([basis.gradient, basis.heights[None]])
         self._digests: dict[TileKey, bytes] = {}
         self._content: dict[TileKey, bytes] = {}
-        self._strokes = Strokes(basis.strokes, basis.settings)
+        self._strokes = Strokes(basis.strokes, basis.settings, self._base)
 
     def content(self, key: TileKey) -> bytes:
         """Digest of all that a tile depends on: the key, the settings, the strokes that reach its windows at any level
@@ -131,7 +136,15 @@ class Refiner:
             if field is None:
                 left = {k for k in wanted[at:] if k.level == key.level and self.content(k) not in self.cache}
                 field = (yield from self._computed(key.level, _group(key, left)))[key]
-            yield RefinedTile(key, field[2], self.content(key))
+            yield RefinedTile(key, field[2], self.content(key), self._under(key))
+
+    def _under(self, key: TileKey) -> NDArray[np.float32] | None:
+        """The base at a tile's samples."""
+        if self._base is None:
+            return None
+        samples = self._base.window(key.level, _span(key))
+        samples.flags.writeable = False
+        return samples
 
     def clear(self) -> None:
         """Drop all that is kept, for all refiners of the solver: fields and rasterised constraints."""
@@ -146,7 +159,8 @@ class Refiner:
     def window(
         self, level: int, rows: slice, cols: slice, progress: Callable[[float], None] | None = None
     ) -> NDArray[np.float32]:
-        """Heights of a rectangle of samples of any level up to MAX_REFINED_LEVEL: (rows, columns) float32, metres.
+        """Heights above the base of a rectangle of samples of any level up to MAX_REFINED_LEVEL: (rows, cols)
+        float32, metres.
 
         ``progress`` is told the share that is done. Raises ValueError for slices with steps or outside of the level.
         """
@@ -230,10 +244,14 @@ class Refiner:
             raise ValueError(f"{key} is not a tile of levels {low + 1}..{MAX_REFINED_LEVEL}")
         span, level = _span(key), key.level
         at = step(level, span)
-        while level > low + 1:
+        out = blake2b(repr((low, tuple(key))).encode(), digest_size=DIGEST_BYTES)
+        while True:
+            if self._base is not None:
+                out.update(self._base.digest(level, at.window))
+            if level == low + 1:
+                break
             level -= 1
             at = step(level, _tile_span(_cover(at.parent, level)))
-        out = blake2b(repr((low, tuple(key))).encode(), digest_size=DIGEST_BYTES)
         out.update(self._strokes.digest(at.level, at.box))
         for ground in _keys(low, _cover(at.parent, low)):
             out.update(self._ground_digest(ground))
@@ -333,11 +351,11 @@ class Refinery:
 
     def __init__(self, device: Device | None, cache_bytes: int = CACHE_BYTES) -> None:
         self.cache = FieldCache(cache_bytes)
-        self._device = device
+        self._device, self._blocks = device, BlockCache(device)
         self._engine: Engine | None = None
 
     def refiner(self, basis: Basis) -> Refiner:
         """A refiner of a settled solve of the same solver. Raises DeviceError."""
         if self._engine is None:
             self._engine = NumpyEngine() if self._device is None else ClEngine(row_kernels(self._device))
-        return Refiner(basis, self._engine, self.cache)
+        return Refiner(basis, self._engine, self.cache, self._blocks)

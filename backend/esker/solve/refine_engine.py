@@ -17,10 +17,11 @@ from numpy.typing import NDArray
 from esker import grid
 from esker.contract import CHEBYSHEV_HIGH, TerrainSettings
 from esker.solve import raster, reference, reference_raster
+from esker.solve.base_blocks import BaseWindows
 from esker.solve.constraints import BIN, BinBox, Tables
 from esker.solve.device import Device
 from esker.solve.faults import guarded
-from esker.solve.levels import PAD, Launcher
+from esker.solve.levels import PAD, Launcher, over_base
 from esker.solve.refine_sheets import Sheets, exchange, missing
 
 GRADIENT_SWEEPS: Final = 16
@@ -34,6 +35,7 @@ CHANNELS: Final = 3
 """d/dx, d/dy, height."""
 _STRIPS_ROWS = 64
 
+Values = NDArray[np.float32]
 Fields = NDArray[np.float32]
 """(CHANNELS, rows, columns): d/dx, d/dy (metres per metre), height (metres)."""
 
@@ -121,6 +123,7 @@ class StrokeWindows(Protocol):
     """The strokes, as far as a step needs them."""
 
     settings: TerrainSettings
+    base: BaseWindows | None
 
     def tables(self, level: int, box: BinBox) -> Tables:
         """The rasteriser's tables of a box of bins."""
@@ -128,12 +131,14 @@ class StrokeWindows(Protocol):
     def shared_tables(self, level: int, box: BinBox) -> Tables:
         """The same for kernels: lists may name strokes that do not reach the box."""
 
-    def digest(self, level: int, box: BinBox) -> bytes:
-        """Digest of all that decides the constraints of a box of bins."""
+    def sheet_digest(self, level: int, box: BinBox) -> bytes:
+        """Digest of all that decides the constraints of a box of bins at this level."""
 
 
 _MEMORY: Final = {"u": 3, "v": 3, "gd": 1, "gf": 2, "hd": 1, "hf": 1, "q": 2, "rhs": 1}
 """Fields of a window and their channels."""
+_OVER: Final = {"base": 1, "share": 1, "raw": 1}
+"""Those that it has over a base."""
 
 
 class Engine(Protocol):
@@ -154,12 +159,14 @@ class NumpyEngine:
 
     def run(self, at: Step, strokes: StrokeWindows, parent: Fields) -> Fields:
         tables = strokes.tables(at.level, at.box)
-        c = reference_raster.rasterise(tables)
+        under = None if strokes.base is None else strokes.base.window(at.level, at.window).astype(np.float64)
+        c = reference_raster.rasterise(tables, under)
+        f = c.height_f if under is None else reference.over_base(c.height_f, c.height_d, c.share, under)
         u = prolongation(with_ghosts(parent.astype(np.float64), at), at.window)
         gradient = sweeps(u[:2], c.gradient_f, c.gradient_d[None], tables.screening, GRADIENT_SWEEPS)
         fixed = c.height_d[None] < 0
-        rhs = reference.divergence(c.height_f[None], c.height_d[None], gradient, tables.spacing_m)
-        start = np.where(fixed, c.height_f[None], u[2:])
+        rhs = reference.divergence(f[None], c.height_d[None], gradient, tables.spacing_m)
+        start = np.where(fixed, f[None], u[2:])
         height = sweeps(start, rhs, c.height_d[None], tables.screening, HEIGHT_SWEEPS)
         w, core = at.window, at.core
         rows, columns = slice(core.r0 - w.r0, core.r1 - w.r0), slice(core.c0 - w.c0, core.c1 - w.c0)
@@ -203,12 +210,14 @@ class ClEngine:
         """Drop the rasterised constraints."""
         self.sheets.clear()
 
-    def _room(self, stride: int) -> None:
-        """Memory for windows of ``stride`` floats a channel."""
+    def _room(self, stride: int, based: bool) -> None:
+        """Memory for windows of ``stride`` floats a channel, over a base if ``based``."""
         if stride > self.stride:
             self.stride = stride
-            for name, channels in _MEMORY.items():
-                self.fields[name] = self.launch.zeros(channels * stride + 2 * PAD)
+            self.fields.clear()
+        for name, channels in (_MEMORY | _OVER if based else _MEMORY).items():
+            if name not in self.fields:
+                self.fields[name] = self.launch.zeros(channels * self.stride + 2 * PAD)
 
     def run(self, at: Step, strokes: StrokeWindows, parent: Fields) -> Fields:
         with guarded(self.device):
@@ -221,7 +230,7 @@ class ClEngine:
         screening = 0.0 if reach is None else (spacing / reach) ** 2
         rows, columns = at.window.shape
         pitch = PAD + (at.box[3] - at.box[2]) * BIN + PAD
-        self._room(rows * pitch)
+        self._room(rows * pitch, strokes.base is not None)
         a, stride, run = self.fields, self.stride, self.launch.run
         self._constrain(at, strokes, pitch)
         shape = (i(rows), i(columns), i(pitch), i(stride))
@@ -246,15 +255,21 @@ class ClEngine:
 
     def _constrain(self, at: Step, strokes: StrokeWindows, pitch: int) -> None:
         """The constraints of the window: bins that are known from the sheets, the others from the rasteriser."""
-        a, cl, queue = self.fields, self.launch.cl, self.launch.queue
-        parts = self.sheets.parts(at.level, at.box, strokes.digest)
+        a, cl, queue, base = self.fields, self.launch.cl, self.launch.queue, strokes.base
+        kept = [("hd", 1), ("hf" if base is None else "raw", 1), ("gd", 1), ("gf", 2)]
+        kept += [] if base is None else [("share", 1)]
+        parts = self.sheets.parts(at.level, at.box, strokes.sheet_digest, sum(channels for _, channels in kept))
         fresh = missing(parts, at.box)
+        (rows, columns), both = at.window.shape, cl.map_flags.READ | cl.map_flags.WRITE
+        over = None
+        if base is not None:
+            self._put_base(base.window(at.level, at.window), pitch)
+            over = raster.Over(a["base"], a["share"])
         if fresh.width:
-            target = raster.Target(a["hd"], a["hf"], a["gd"], a["gf"], pitch=pitch, stride=self.stride)
+            target = raster.Target(a["hd"], a[kept[1][0]], a["gd"], a["gf"], pitch, self.stride, over)
             raster.rasterise(self.launch, strokes.shared_tables(at.level, at.box), fresh, target)
         views, maps = [], []
-        (rows, columns), both = at.window.shape, cl.map_flags.READ | cl.map_flags.WRITE
-        for name, channels in (("hd", 1), ("hf", 1), ("gd", 1), ("gf", 2)):
+        for name, channels in kept:
             host, _ = cl.enqueue_map_buffer(queue, a[name], both, 0, (a[name].size // 4,), np.float32)
             maps.append(host)
             for c in range(channels):
@@ -264,6 +279,17 @@ class ClEngine:
         for host in maps:
             host.base.release(queue)
         self.sheets.trim()
+        if base is not None:
+            fields = [a[name] for name in ("base", "share", "hd", "raw", "hf")]
+            over_base(self.launch, fields, (rows, columns), pitch, (0, rows))
+
+    def _put_base(self, samples: Values, pitch: int) -> None:
+        """Copies the base's samples to the window's."""
+        rows, columns = samples.shape
+        self.launch.cl.enqueue_copy(
+            self.launch.queue, self.fields["base"], samples, host_pitches=(4 * columns,), host_origin=(0, 0),
+            region=(4 * columns, rows), buffer_pitches=(4 * pitch,), buffer_origin=(4 * PAD, 0),
+        )  # fmt: skip
 
     def _sweep(
         self, channels: int, first: int, f: str, d: str, q: int, shape: tuple[Any, ...], screening: float, count: int,

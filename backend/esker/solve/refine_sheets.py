@@ -22,7 +22,8 @@ SHEET_BINS: Final = 8
 SHEET: Final = SHEET_BINS * BIN
 """Samples along a side of what is kept or dropped together."""
 FIELDS: Final = 5
-"""Stiffness and right-hand side of the heights, stiffness and both right-hand sides of the gradient."""
+"""Stiffness and right-hand side of the heights, stiffness and both right-hand sides of the gradient; over a base one
+more, the share of the gradient that is the ground's own."""
 SHEET_BYTES: Final = 4 * FIELDS * SHEET**2
 SHEETS_BYTES: Final = 64 << 20
 
@@ -34,7 +35,7 @@ Digest = Callable[[int, BinBox], bytes]
 class Sheet:
     """Constraints of SHEET_BINS x SHEET_BINS bins, and which of them are known."""
 
-    data: NDArray[np.float32] = field(default_factory=lambda: np.zeros((FIELDS, SHEET, SHEET), dtype=np.float32))
+    data: NDArray[np.float32]
     known: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((SHEET_BINS, SHEET_BINS), dtype=bool))
 
 
@@ -69,9 +70,9 @@ class Sheets:
     def __len__(self) -> int:
         return len(self._held)
 
-    def parts(self, level: int, box: BinBox, digest: Digest) -> list[Part]:
+    def parts(self, level: int, box: BinBox, digest: Digest, fields: int = FIELDS) -> list[Part]:
         """The sheets that hold the bins of ``box``, new ones where there were none."""
-        return list(self._parts(level, box, digest))
+        return list(self._parts(level, box, digest, fields))
 
     def trim(self) -> None:
         """Drop what is too much; not while parts of a window are in use."""
@@ -82,7 +83,7 @@ class Sheets:
         """Drop everything."""
         self._held.clear()
 
-    def _parts(self, level: int, box: BinBox, digest: Digest) -> Iterator[Part]:
+    def _parts(self, level: int, box: BinBox, digest: Digest, fields: int) -> Iterator[Part]:
         by0, by1, bx0, bx1 = box
         count = bins(grid.samples(level))
         for sy in range(by0 // SHEET_BINS, (by1 - 1) // SHEET_BINS + 1):
@@ -90,7 +91,9 @@ class Sheets:
                 y, x = sy * SHEET_BINS, sx * SHEET_BINS
                 whole = y, min(y + SHEET_BINS, count), x, min(x + SHEET_BINS, count)
                 key = level, sy, sx, digest(level, whole)
-                sheet = self._held.setdefault(key, Sheet()) if key not in self._held else self._held[key]
+                if key not in self._held:
+                    self._held[key] = Sheet(np.zeros((fields, SHEET, SHEET), dtype=np.float32))
+                sheet = self._held[key]
                 self._held.move_to_end(key)
                 first = max(by0 - y, 0), max(bx0 - x, 0)
                 last = min(by1 - y, SHEET_BINS), min(bx1 - x, SHEET_BINS)
@@ -112,7 +115,7 @@ def missing(parts: list[Part], box: BinBox) -> Window:
 def exchange(parts: list[Part], fresh: Window, box: BinBox, fields: list[NDArray[np.float32]]) -> None:
     """Completes a window whose bins of ``fresh`` have just been rasterised from its sheets, and these from the window.
 
-    fields: FIELDS views (rows, columns) of the window's samples.
+    fields: views (rows, columns) of the window's samples, as many as a sheet has.
     """
     spans = fresh.spans - box[2]
     for part in parts:

@@ -11,6 +11,7 @@ import numpy as np
 
 from esker import grid
 from esker.contract import Stroke, TerrainSettings
+from esker.solve.base_blocks import BaseWindows
 from esker.solve.constraints import BIN, BinBox, Tables, WindowPacker, bins
 from esker.solve.tables import INDEX_FIELDS
 
@@ -30,9 +31,10 @@ class Strokes:
     level: so the digest of its strokes is that of the chain's.
     """
 
-    def __init__(self, strokes: Sequence[Stroke], settings: TerrainSettings) -> None:
-        self.settings = settings
-        self._packer = WindowPacker(strokes, settings)
+    def __init__(self, strokes: Sequence[Stroke], settings: TerrainSettings, base: BaseWindows | None = None) -> None:
+        self.settings, self.base = settings, base
+        self._packer = WindowPacker(strokes, settings, base=None if base is None else base.base)
+        self._grounds = {} if base is None else self._packer.grounds
         self._own: dict[str, bytes] = {}
         self._windows: dict[tuple[int, BinBox], bytes] = {}
         self._packed: list[Tables] = []
@@ -55,7 +57,7 @@ class Strokes:
         return rows_of(held[0], box)
 
     def digest(self, level: int, box: BinBox) -> bytes:
-        """Digest of all that decides the constraints of a box of bins, at this or any finer level."""
+        """Digest of all that decides the constraints of a box of bins, at this or any finer level, but for the base."""
         known = self._windows.get((level, box))
         if known is None:
             out = blake2b(self._start, digest_size=DIGEST_BYTES)
@@ -64,10 +66,21 @@ class Strokes:
             known = self._windows[level, box] = out.digest()
         return known
 
+    def sheet_digest(self, level: int, box: BinBox) -> bytes:
+        """Digest of all that decides the constraints of a box of bins at this level."""
+        if self.base is None:
+            return self.digest(level, box)
+        n, (by0, by1, bx0, bx1) = grid.samples(level), box
+        bounds = by0 * BIN, min(by1 * BIN, n), bx0 * BIN, min(bx1 * BIN, n)
+        return self.digest(level, box) + self.base.digest(level, bounds)
+
     def _digest(self, stroke: Stroke) -> bytes:
         known = self._own.get(stroke.id)
         if known is None:
             text = stroke.model_dump_json(exclude=_WITHOUT_EFFECT).encode()
+            if stroke.id in self._grounds:
+                ground = self._grounds[stroke.id]
+                text += repr((ground.fill, ground.cut)).encode()
             known = self._own[stroke.id] = blake2b(text, digest_size=DIGEST_BYTES).digest()
         return known
 

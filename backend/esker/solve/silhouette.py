@@ -33,7 +33,7 @@ class Silhouette:
 
     start, unit: where it begins and its direction in plan; length in plan; t (n,): distances of the knots from the
     start, rising; z (n,): their heights; octaves: per octave o the controls at multiples of 2^o first ones, the first
-    one at -1; a crest is constant beyond its ends.
+    one at -1; a crest is constant beyond its ends. datum: from where ``blocks`` measures heights.
     """
 
     start: Floats
@@ -43,6 +43,7 @@ class Silhouette:
     z: Floats
     octaves: tuple[Floats, ...]
     octave_m: float
+    datum: float = 0.0
 
     @cached_property
     def pieces(self) -> tuple[Floats, ...]:
@@ -61,16 +62,16 @@ class Silhouette:
 
     @cached_property
     def blocks(self) -> tuple[Floats, Floats]:
-        """Borders (m + 1,) of parts of the crest, metres, and the most (m,) that each can seem high."""
+        """Borders (m + 1,) of parts of the crest, metres, and the most (m,) that each can seem apart from the datum."""
         count = min(max(math.ceil(self.length / (4 * self.octave_m)), 1), BLOCKS)
         edges = np.arange(count + 1, dtype=np.float64) * (self.length / count)
-        high = np.abs(np.interp(edges, self.t, self.z))
+        high = np.abs(np.interp(edges, self.t, self.z) - self.datum)
         tops: Floats = np.maximum(high[:-1], high[1:])
         place = np.minimum(edges.searchsorted(self.t, side="right") - 1, count - 1)
-        np.maximum.at(tops, place, np.abs(self.z))
+        np.maximum.at(tops, place, np.abs(self.z - self.datum))
         if self.octaves:
             controls, starts = self._behind_each_other
-            c = np.abs(controls)
+            c = np.abs(controls - self.datum)
             seen = np.maximum(np.maximum(c[:-3], c[1:-2]), np.maximum(c[2:-1], c[3:]))
             steps = self.octave_m * 2.0 ** np.arange(len(starts))[:, None]
             at = starts[:, None] + np.minimum((edges / steps).astype(int), np.diff(starts, append=len(c))[:, None] - 4)
@@ -79,7 +80,7 @@ class Silhouette:
         return edges, tops
 
 
-def silhouette(crest: Crest, size_m: float, farthest_m: float) -> Silhouette:
+def silhouette(crest: Crest, size_m: float, farthest_m: float, datum: float = 0.0) -> Silhouette:
     """The silhouette of a profile; octaves only as far as samples ``farthest_m`` from the plateau can see them."""
     points, base = crest.points, size_m * FIRST_OCTAVE
     start = points[0, :2]
@@ -93,7 +94,7 @@ def silhouette(crest: Crest, size_m: float, farthest_m: float) -> Silhouette:
     count = 0
     while base * 2**count <= length * OCTAVE_SHARE and FAN * base * (2**count - 1) < farthest_m:
         count += 1
-    return Silhouette(start, unit, length, t, z, tuple(_octaves(t, z, base, count)), base)
+    return Silhouette(start, unit, length, t, z, tuple(_octaves(t, z, base, count)), base, datum)
 
 
 def _octaves(t: Floats, z: Floats, base: float, count: int) -> list[Floats]:

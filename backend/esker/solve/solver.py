@@ -14,7 +14,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from esker import grid
 from esker.contract import MAX_LEVEL, Channel, Stroke, TerrainSettings
 from esker.solve import multigrid, proof
+from esker.solve.base import Base
 from esker.solve.channels import ChannelSolver, channel_level
 from esker.solve.constraints import Packer
 from esker.solve.device import NUMPY, NUMPY_NAME, Device, open_device
@@ -51,8 +52,8 @@ PACED_ABOVE = 4
 class Basis:
     """What refinement above the global levels starts from (DESIGN 5.6): a settled solve.
 
-    heights: (N, N) float32 of level ``level``, metres; gradient: (2, N, N) float32, d/dx and d/dy, metres per metre.
-    Both read-only.
+    heights: (N, N) float32 of level ``level``, metres above the ``base`` (None: a plane at 0); gradient: (2, N, N)
+    float32, d/dx and d/dy, metres per metre: in bands that of the ground, elsewhere of the heights. Both read-only.
     """
 
     strokes: tuple[Stroke, ...]
@@ -60,15 +61,17 @@ class Basis:
     level: int
     heights: NDArray[np.float32]
     gradient: NDArray[np.float32]
+    base: Base | None = None
 
 
 @dataclass(frozen=True)
 class LevelResult:
-    """One finished level. heights: (N_l, N_l) float32, metres, row 0 south, read-only. ``settled`` False: a preview
-    that later results correct; True: final for this stroke set, and the injection of the next finer level.
+    """One finished level. heights: (N_l, N_l) float32, metres above the base, row 0 south, read-only. ``settled``
+    False: a preview that later results correct; True: final for this stroke set, and the injection of the next finer
+    level.
 
-    ``channel`` other than HEIGHT: ``heights`` holds that channel instead, in its unit (metres, 0..1, -1..1); the same
-    array as last time if nothing of it changed.
+    ``channel`` other than HEIGHT: ``heights`` holds that channel instead, in its unit (metres, 0..1, -1..1, levels);
+    the same array as last time if nothing of it changed.
     ``basis``: with the last result of a settled solve, if it was asked for.
     """
 
@@ -100,15 +103,27 @@ class Workspace(Protocol):
     packer: Packer
 
     @property
+    def based(self) -> bool: ...
+    @property
     def gradient(self) -> multigrid.System: ...
     @property
     def height(self) -> multigrid.System: ...
-    def load(self, strokes: Sequence[Stroke], settings: TerrainSettings) -> None: ...
-    def loading(self, strokes: Sequence[Stroke], settings: TerrainSettings) -> Iterator[None]: ...
+    def load(self, strokes: Sequence[Stroke], settings: TerrainSettings, base: Base | None = None) -> None: ...
+    def loading(
+        self, strokes: Sequence[Stroke], settings: TerrainSettings, base: Base | None = None
+    ) -> Iterator[None]: ...
     def guide(self, level: int) -> None: ...
     def warm(self, heights: NDArray[np.float32]) -> None: ...
     def read(self, level: int) -> NDArray[np.float32]: ...
     def read_gradient(self) -> NDArray[np.float32]: ...
+
+
+class _Job(NamedTuple):
+    """What is to be solved."""
+
+    strokes: Sequence[Stroke]
+    settings: TerrainSettings
+    base: Base | None
 
 
 class Solver:
@@ -147,25 +162,49 @@ class Solver:
         return self._refinery.refiner(basis)
 
     def steps(
-        self, strokes: Sequence[Stroke], settings: TerrainSettings, levels: int | None = None, *, basis: bool = False
+        self,
+        strokes: Sequence[Stroke],
+        settings: TerrainSettings,
+        levels: int | None = None,
+        *,
+        basis: bool = False,
+        base: Base | None = None,
     ) -> Iterator[LevelResult | None]:
         """Previews of levels 0..G, each when it is finished, then 0..G settled.
 
         None comes wherever the work can be left for a while, or for good: between the cycles of the finest level, so
         that many rooms can share a device. Close the generator to stop; G is ``levels`` or the solver's ``max_level``.
-        With ``basis`` the last result carries what refinement starts from. Raises ValueError for a level outside
-        0..MAX_LEVEL.
+        With ``basis`` the last result carries what refinement starts from. ``base``: the ground without strokes, above
+        which heights are then given. Raises ValueError for a level outside 0..MAX_LEVEL.
         """
-        return self._run(strokes, settings, self._level(levels), None, basis)
+        return self._run(_Job(strokes, settings, base), self._level(levels), None, basis)
+
+    def base_levels(self, base: Base, levels: int | None = None) -> Iterator[LevelResult]:
+        """The base itself, channel BASE on levels 0..G, then how fine its data are, SURVEY on the levels of channels.
+
+        Raises ValueError like ``steps``, DeviceErrors.
+        """
+        top = self._level(levels)
+        with guarded(self._device):
+            for level in range(top + 1):
+                yield LevelResult(level, base.level(level, self._device), settled=True, channel=Channel.BASE)
+            for level in range(channel_level(top) + 1):
+                yield LevelResult(level, base.survey(level), settled=True, channel=Channel.SURVEY)
 
     def channels(
-        self, strokes: Sequence[Stroke], settings: TerrainSettings, levels: int | None = None
+        self,
+        strokes: Sequence[Stroke],
+        settings: TerrainSettings,
+        levels: int | None = None,
+        *,
+        base: Base | None = None,
     ) -> Iterator[LevelResult | None]:
         """What ``steps`` gives out beside the heights, alone: for strokes of which only that has changed.
 
         None comes wherever the work can be left. Raises ValueError like ``steps``.
         """
-        return self._retried(lambda top: self._alone(strokes, settings, top), self._level(levels))
+        job = _Job(strokes, settings, base)
+        return self._retried(lambda top: self._alone(job, top), self._level(levels))
 
     def solve(
         self,
@@ -175,15 +214,18 @@ class Solver:
         on_level: Callable[[LevelResult], None] | None = None,
         should_stop: Callable[[], bool] | None = None,
         guess: Pyramid | None = None,
+        *,
+        base: Base | None = None,
     ) -> Pyramid:
-        """The settled pyramid (DESIGN 5.7), or what there was when ``should_stop`` said so after some level.
+        """The settled pyramid (DESIGN 5.7), heights above the base, or what there was when ``should_stop`` said so
+        after some level.
 
         ``guess``: heights of a similar stroke set at the same levels; saves the previews and a cycle or two.
         """
         top = self._level(levels)
         warm = guess.levels[top] if guess is not None and len(guess) == top + 1 else None
         latest: dict[int, LevelResult] = {}
-        run = self._run(strokes, settings, top, warm, basis=False)
+        run = self._run(_Job(strokes, settings, base), top, warm, basis=False)
         for result in run:
             if result is not None and result.channel == Channel.HEIGHT:
                 latest[result.level] = result
@@ -211,15 +253,8 @@ class Solver:
             raise ValueError(f"level must be 0..{MAX_LEVEL}, not {top}")
         return top
 
-    def _run(
-        self,
-        strokes: Sequence[Stroke],
-        settings: TerrainSettings,
-        top: int,
-        warm: NDArray[np.float32] | None,
-        basis: bool,
-    ) -> Generator[LevelResult | None]:
-        yield from self._retried(lambda level: self._attempt(strokes, settings, level, warm, basis), top)
+    def _run(self, job: _Job, top: int, warm: NDArray[np.float32] | None, basis: bool) -> Generator[LevelResult | None]:
+        yield from self._retried(lambda level: self._attempt(job, level, warm, basis), top)
 
     def _retried(
         self, attempt: Callable[[int], Iterator[LevelResult | None]], top: int
@@ -236,37 +271,32 @@ class Solver:
         yield from attempt(top)
 
     def _attempt(
-        self,
-        strokes: Sequence[Stroke],
-        settings: TerrainSettings,
-        top: int,
-        warm: NDArray[np.float32] | None,
-        basis: bool,
+        self, job: _Job, top: int, warm: NDArray[np.float32] | None, basis: bool
     ) -> Generator[LevelResult | None]:
         """One solve. A workspace whose device failed, or that diverged, is dropped, all others are kept."""
         with guarded(self._device):
-            spoken = speakers(strokes, settings)
+            settings, spoken = job.settings, speakers(job.strokes, job.settings)
             late = [layer.channel for layer in spoken if not layer.painted]
             early = [channel for channel in BASES if channel not in late]
-            workspace = self._take(strokes, settings, top)
+            workspace = self._take(job, top)
             keep, loaded = True, False
             try:
-                yield from workspace.loading(strokes, settings)
+                yield from workspace.loading(*job)
                 loaded = True
                 if warm is None:
                     previews = self._paced(_previews(workspace, preview_gradient_cycles(settings)), top)
                     yield next(previews)
                     # so what is painted keeps up with a pen that never rests; channels of which the strokes speak that
                     # the pen draws would hold it up, and come when it does rest
-                    yield from self._channels(spoken, settings, top, early)
+                    yield from self._channels(spoken, job, top, early)
                     yield from previews
                 else:
                     _gradients(workspace)
                     workspace.warm(warm)
-                    yield from self._channels(spoken, settings, top, early)
+                    yield from self._channels(spoken, job, top, early)
                 yield from _to_rest(workspace, settings)
-                yield from self._channels(spoken, settings, top, late)
-                yield from _settled(workspace, strokes, settings, basis)
+                yield from self._channels(spoken, job, top, late)
+                yield from _settled(workspace, job, basis)
             except GeneratorExit:
                 if not loaded:
                     workspace.packer.forget()
@@ -287,33 +317,34 @@ class Solver:
                 self._device.queue.finish()
             yield result
 
-    def _alone(self, strokes: Sequence[Stroke], settings: TerrainSettings, top: int) -> Iterator[LevelResult | None]:
+    def _alone(self, job: _Job, top: int) -> Iterator[LevelResult | None]:
         with guarded(self._device):
-            yield from self._channels(speakers(strokes, settings), settings, top, BASES)
+            yield from self._channels(speakers(job.strokes, job.settings), job, top, BASES)
 
     def _channels(
-        self, spoken: Mapping[Layer, Speakers], settings: TerrainSettings, top: int, channels: Iterable[Channel]
+        self, spoken: Mapping[Layer, Speakers], job: _Job, top: int, channels: Iterable[Channel]
     ) -> Iterator[LevelResult | None]:
         """Channels other than the heights, final, levels coarse to fine."""
         level = channel_level(top)
         solver = self._channel_solvers.setdefault(level, ChannelSolver(self._device, level))
-        for channel, levels in solver.pyramids(spoken, settings, channels):
+        for channel, levels in solver.pyramids(spoken, job.settings, channels, job.base):
             for coarser, samples in enumerate(levels):
                 yield LevelResult(coarser, samples, settled=True, channel=channel)
             yield None
 
-    def _take(self, strokes: Sequence[Stroke], settings: TerrainSettings, top: int) -> Workspace:
+    def _take(self, job: _Job, top: int) -> Workspace:
         """An idle workspace that has most of these strokes rasterised already; or a new one; or the longest idle."""
-        idle = [w for w in self._spare if w.top == top]
-        best = max(idle, key=lambda w: w.packer.likeness(strokes, settings), default=None)
-        if best is not None and 2 * best.packer.likeness(strokes, settings) < len(strokes):
+        based = job.base is not None
+        idle = [w for w in self._spare if w.top == top and w.based == based]
+        best = max(idle, key=lambda w: w.packer.likeness(*job), default=None)
+        if best is not None and 2 * best.packer.likeness(*job) < len(job.strokes):
             best = idle[0] if self._kept() + grid.solve_bytes(top) > self._spare_bytes else None
         if best is not None:
             self._spare.remove(best)
             return best
         while self._spare and self._kept() + grid.solve_bytes(top) > self._spare_bytes:
             self._spare.pop(0)
-        return new_workspace(self._device, top)
+        return new_workspace(self._device, top, based)
 
     def _kept(self) -> int:
         return sum(grid.solve_bytes(w.top) for w in self._spare)
@@ -374,7 +405,7 @@ def _to_rest(w: Workspace, settings: TerrainSettings) -> Iterator[None]:
     yield from multigrid.converge(w.height, HEIGHT_SHARE * quantum)
 
 
-def _settled(w: Workspace, strokes: Sequence[Stroke], settings: TerrainSettings, basis: bool) -> Iterator[LevelResult]:
+def _settled(w: Workspace, job: _Job, basis: bool) -> Iterator[LevelResult]:
     """All levels of a system at rest: the finest, and its injections.
 
     Raises DivergedError for heights that are not finite: a kernel's largest update passes over what is not a number.
@@ -385,5 +416,6 @@ def _settled(w: Workspace, strokes: Sequence[Stroke], settings: TerrainSettings,
     *coarser, finest = enumerate(injections(heights))
     for level, samples in coarser:
         yield LevelResult(level, samples, settled=True)
-    found = Basis(tuple(strokes), settings, w.top, heights, frozen(w.read_gradient())) if basis else None
+    strokes, settings, base = job
+    found = Basis(tuple(strokes), settings, w.top, heights, frozen(w.read_gradient()), base) if basis else None
     yield LevelResult(finest[0], finest[1], settled=True, basis=found)

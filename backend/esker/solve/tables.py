@@ -91,7 +91,7 @@ SEGMENT_FIELDS = ("ax", "ay", "dx", "dy", "il2", "t0x", "t0y", "t1x", "t1y", "ca
 KNOT_FIELDS = ("t", "z", "slope")
 STROKE_FIELDS = (
     *("plateau", "reach", "lh", "ls", "le", "lk", "lf", "rh", "rs", "re", "rk", "rf", "same", "run"),
-    *("height", "ax", "ay", "tx", "ty", "length", "value", "brush"),
+    *("height", "ax", "ay", "tx", "ty", "length", "value", "brush", "fill", "cut"),
 )
 STROKE_STRIDE = len(STROKE_FIELDS)
 INDEX_FIELDS = ("first", "count", "spans", "octave", "octaves")
@@ -115,6 +115,7 @@ class Tables:
       taken by a round shoulder and a round foot; same: 1 if both sides are alike, then run: 1 / slope; height: of an
       outline; a, t, length: start, unit direction and length of a profile in plan. In tables of a channel other than
       heights, value: what the stroke asks of it, as a difference from its base; brush: radius of paint in cells, or 0.
+      fill, cut: how far bands raise ground below the crest and lower ground above it, 0..1; read over a base only.
     index: (k, INDEX_STRIDE) by INDEX_FIELDS: first segment or knot, number of them, start in span_index or -1, start in
       ``octaves``, number of octaves or -1 for an outline.
     row_start, row_items: by row of bins of ``box`` (CSR), per stroke (stroke, first bin, end of bins). span_index,

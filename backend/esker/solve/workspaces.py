@@ -23,18 +23,20 @@ if TYPE_CHECKING:
 
 SHARE = 0.9
 """Of a device's memory that workspaces may take: tables, the driver and the display need some too."""
+OVER_FIELDS = 3
+"""Fields of the finest level that a base takes (``device_workspace.OverBase``)."""
 _held: Counter[str] = Counter()
 _lock = threading.Lock()
 
 
-def new_workspace(device: Device | None, top: int) -> Workspace:
-    """Memory and kernels for one solve of levels 0..top; None is NumPy.
+def new_workspace(device: Device | None, top: int, based: bool = False) -> Workspace:
+    """Memory and kernels for one solve of levels 0..top, over a base if ``based``; None is NumPy.
 
     Raises OutOfDeviceMemoryError, before or while allocating, and other DeviceErrors.
     """
     if device is None:
-        return NumpyWorkspace(top)
-    needed, largest = planned_bytes(device, top)
+        return NumpyWorkspace(top, based)
+    needed, largest = planned_bytes(device, top, based)
     name = device.name
     with _lock:
         left = int(SHARE * device.memory) - _held[name]
@@ -51,7 +53,7 @@ def new_workspace(device: Device | None, top: int) -> Workspace:
             )
         _held[name] += needed
     try:
-        made = finished(device, lambda: _make(device, top))
+        made = finished(device, lambda: _make(device, top, based))
     except BaseException:
         _release(name, needed)
         raise
@@ -65,7 +67,7 @@ def held_bytes(device: Device) -> int:
         return _held[device.name]
 
 
-def planned_bytes(device: Device, top: int) -> tuple[int, int]:
+def planned_bytes(device: Device, top: int, based: bool = False) -> tuple[int, int]:
     """(all, largest) bytes of the buffers of a workspace."""
     rows = device.plan is None
     floats = []
@@ -73,13 +75,17 @@ def planned_bytes(device: Device, top: int) -> tuple[int, int]:
         for name, level in fields_of(top, static):
             stride = (levels if rows else gpu_levels).shape_of(level).stride
             floats.append(stride * (1 if name == "d" else channels) + (levels.PAD if rows else 0))
+    if based:
+        stride = (levels if rows else gpu_levels).shape_of(top).stride + (levels.PAD if rows else 0)
+        floats += [stride] * OVER_FIELDS
     if rows:
         floats.append(2 * device.strips * levels.scratch_floats(top))
     return 4 * sum(floats), 4 * max(floats)
 
 
-def _make(device: Device, top: int) -> Workspace:
-    return levels.ClWorkspace(device, top) if device.plan is None else gpu_levels.GpuWorkspace(device, top)
+def _make(device: Device, top: int, based: bool) -> Workspace:
+    kind = levels.ClWorkspace if device.plan is None else gpu_levels.GpuWorkspace
+    return kind(device, top, based)
 
 
 def _release(name: str, size: int) -> None:
