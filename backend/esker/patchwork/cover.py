@@ -112,15 +112,21 @@ def _local(ix: Index, q: int, x: float, y: float, out: Floats) -> None:
 
 
 @kernel
-def _top(ix: Index, p: int) -> float:
-    """Smallest z at which greater patches cover the kernel of p; infinity if they never do."""
+def _grown(numbers: Ints) -> Ints:
+    """A list with room for twice as many."""
+    more = np.empty(2 * len(numbers), np.int64)
+    for k in range(len(numbers)):
+        more[k] = numbers[k]
+    return more
+
+
+@kernel
+def _rivals(ix: Index, p: int, quad: Floats, found: Ints) -> tuple[Ints, int, float]:
+    """Greater patches whose kernels reach that of p, how many, and the least error of those that hold all of it."""
     x, y = ix.kernel[p, 0, 0], ix.kernel[p, 0, 1]
-    own, quad, other = np.empty((4, 2)), np.empty((4, 2)), np.empty((4, 2))
-    _local(ix, p, x, y, own)
-    shrunk(own, ix.slack[p], quad)
-    side = np.sqrt(area_of(own, 4))
+    other = np.empty((4, 2))
+    tolerance = 1e-7 * np.sqrt(area_of(quad, 4))
     best = np.inf
-    chosen = np.empty(64, np.int64)
     count = 0
     for layer in range(len(ix.lowest)):
         x0, x1, y0, y1 = _box(ix, layer, ix.kernel[p])
@@ -128,96 +134,145 @@ def _top(ix: Index, p: int) -> float:
             if ix.start[layer, scale] < 0 or ix.rank[layer, scale] < ix.area[p]:
                 continue
             cells = float(7 << scale)
-            tall, wide = ix.tall[layer, scale], ix.wide[layer, scale]
-            for j in range(max(0, int(np.floor(y0 / cells))), min(tall - 1, int(np.floor(y1 / cells))) + 1):
-                for i in range(max(0, int(np.floor(x0 / cells))), min(wide - 1, int(np.floor(x1 / cells))) + 1):
+            wide = ix.wide[layer, scale]
+            for j in range(max(0, int(y0 // cells)), min(ix.tall[layer, scale] - 1, int(y1 // cells)) + 1):
+                for i in range(max(0, int(x0 // cells)), min(wide - 1, int(x1 // cells)) + 1):
                     q = ix.tables[ix.start[layer, scale] + j * wide + i]
                     if q < 0 or ix.min_z[q] >= best or not greater(ix, q, p):
                         continue
                     _local(ix, q, x, y, other)
-                    if contains(other, quad, ix.slack[q] + 1e-7 * side):
+                    if contains(other, quad, ix.slack[q] + tolerance):
                         best = ix.min_z[q]
                     elif overlap(quad, other, ix.slack[q]):
-                        if count == len(chosen):
-                            more = np.empty(2 * count, np.int64)
-                            more[:count] = chosen
-                            chosen = more
-                        chosen[count] = q
+                        if count == len(found):
+                            found = _grown(found)
+                        found[count] = q
                         count += 1
-    kept = chosen[:count]
-    kept = kept[ix.min_z[kept] < best]
-    if len(kept) < 2:
-        return best
-    pieces = np.empty((1, MOST, 2))
-    pieces[0, :4] = quad
-    corners = np.full(1, 4, np.int64)
-    pieces_count = 1
-    whole = side * side
-    for k in np.argsort(ix.min_z[kept], kind="mergesort"):
-        q = kept[k]
-        _local(ix, q, x, y, other)
-        pieces, corners, pieces_count, left = subtracted(
-            pieces, corners, pieces_count, other, ix.slack[q], SLIVER * whole
-        )
-        if left <= COVERED * whole:
-            return float(ix.min_z[q])
-    return best
+    return found, count, best
+
+
+@kernel
+def _sorted_below(ix: Index, numbers: Ints, count: int, limit: float) -> int:
+    """Keep the patches with an error below ``limit``, by error then number. Returns how many."""
+    kept = 0
+    for k in range(count):
+        q = numbers[k]
+        z = ix.min_z[q]
+        if z >= limit:
+            continue
+        at = kept
+        while at > 0 and (ix.min_z[numbers[at - 1]] > z or (ix.min_z[numbers[at - 1]] == z and numbers[at - 1] > q)):
+            numbers[at] = numbers[at - 1]
+            at -= 1
+        numbers[at] = q
+        kept += 1
+    return kept
 
 
 @kernel
 def _tops(ix: Index, which: Ints, start: int, stop: int, out: Floats) -> None:
-    for k in range(start, stop):
-        out[k] = _top(ix, which[k])
+    """Smallest z at which greater patches cover the kernels of patches; infinity if they never do."""
+    own, quad, other = np.empty((4, 2)), np.empty((4, 2)), np.empty((4, 2))
+    found = np.empty(64, np.int64)
+    for w in range(start, stop):
+        p = which[w]
+        x, y = ix.kernel[p, 0, 0], ix.kernel[p, 0, 1]
+        _local(ix, p, x, y, own)
+        shrunk(own, ix.slack[p], quad)
+        found, count, best = _rivals(ix, p, quad, found)
+        count = _sorted_below(ix, found, count, best)
+        out[w] = best
+        if count < 2:
+            continue
+        whole = area_of(own, 4)
+        pieces, corners = _room(0)
+        _start(quad, pieces, corners)
+        parts = 1
+        for k in range(count):
+            q = found[k]
+            _local(ix, q, x, y, other)
+            left, sizes = _room(parts)
+            parts, area = subtracted(pieces, corners, parts, other, ix.slack[q], SLIVER * whole, left, sizes)
+            pieces, corners = left, sizes
+            if area <= COVERED * whole:
+                out[w] = ix.min_z[q]
+                break
 
 
 @kernel
-def _is_floor(ix: Index, p: int) -> bool:
-    """Whether more accurate patches leave some of the kernel of p to it. Walks each layer from its top down."""
-    x, y = ix.kernel[p, 0, 0], ix.kernel[p, 0, 1]
-    own, quad, other = np.empty((4, 2)), np.empty((4, 2)), np.empty((4, 2))
-    _local(ix, p, x, y, own)
-    shrunk(own, ix.slack[p], quad)
-    whole = area_of(own, 4)
-    pieces = np.empty((1, MOST, 2))
-    pieces[0, :4] = quad
-    corners = np.full(1, 4, np.int64)
-    count = 1
-    for layer in range(len(ix.lowest)):
-        x0, x1, y0, y1 = _box(ix, layer, ix.kernel[p])
-        # One patch is at the top and each has four children, so this many can wait at most.
-        stack = np.empty((4 * ix.scales[layer] + 4, 3), np.int64)
-        stack[0] = (ix.scales[layer] - 1, 0, 0)
-        waiting = 1
-        while waiting:
-            waiting -= 1
-            scale, j, i = stack[waiting]
-            cells = float(7 << scale)
-            if i * cells > x1 or (i + 1) * cells < x0 or j * cells > y1 or (j + 1) * cells < y0:
-                continue
-            if ix.start[layer, scale] >= 0:
-                q = ix.tables[ix.start[layer, scale] + j * ix.wide[layer, scale] + i]
-                if q >= 0 and (ix.min_z[q] < ix.min_z[p] or (ix.min_z[q] == ix.min_z[p] and greater(ix, q, p))):
-                    _local(ix, q, x, y, other)
-                    if overlap(quad, other, ix.slack[q]):
-                        pieces, corners, count, left = subtracted(
-                            pieces, corners, count, other, ix.slack[q], SLIVER * whole
-                        )
-                        if left <= COVERED * whole:
-                            return False
-                    continue
-            if scale > ix.lowest[layer]:
-                for dj in range(2):
-                    for di in range(2):
-                        if 2 * j + dj < ix.tall[layer, scale - 1] and 2 * i + di < ix.wide[layer, scale - 1]:
-                            stack[waiting] = (scale - 1, 2 * j + dj, 2 * i + di)
-                            waiting += 1
-    return True
+def _room(parts: int) -> tuple[Floats, Ints]:
+    """Room for what is left of some polygons."""
+    return np.empty((8 * parts + 1, MOST, 2)), np.empty(8 * parts + 1, np.int64)
+
+
+@kernel
+def _start(quad: Floats, pieces: Floats, corners: Ints) -> None:
+    """Begin a list of polygons with a quad."""
+    for c in range(4):
+        pieces[0, c, 0], pieces[0, c, 1] = quad[c, 0], quad[c, 1]
+    corners[0] = 4
+
+
+@kernel
+def _better(ix: Index, p: int, layer: int, found: Ints, count: int) -> tuple[Ints, int]:
+    """Add the greatest patches of a layer that are more accurate than p and near it, from the layer's top down."""
+    x0, x1, y0, y1 = _box(ix, layer, ix.kernel[p])
+    # One patch is at the top and each has four children, so this many can wait at most.
+    stack = np.empty((4 * ix.scales[layer] + 4, 3), np.int64)
+    stack[0, 0], stack[0, 1], stack[0, 2] = ix.scales[layer] - 1, 0, 0
+    waiting = 1
+    while waiting:
+        waiting -= 1
+        scale, j, i = stack[waiting, 0], stack[waiting, 1], stack[waiting, 2]
+        cells = float(7 << scale)
+        if i * cells > x1 or (i + 1) * cells < x0 or j * cells > y1 or (j + 1) * cells < y0:
+            continue
+        q = -1
+        if ix.start[layer, scale] >= 0:
+            q = ix.tables[ix.start[layer, scale] + j * ix.wide[layer, scale] + i]
+        if q >= 0 and (ix.min_z[q] < ix.min_z[p] or (ix.min_z[q] == ix.min_z[p] and greater(ix, q, p))):
+            if count == len(found):
+                found = _grown(found)
+            found[count] = q
+            count += 1
+        elif scale > ix.lowest[layer]:
+            for child in range(4):
+                down, right = 2 * j + child // 2, 2 * i + child % 2
+                if down < ix.tall[layer, scale - 1] and right < ix.wide[layer, scale - 1]:
+                    stack[waiting, 0], stack[waiting, 1], stack[waiting, 2] = scale - 1, down, right
+                    waiting += 1
+    return found, count
 
 
 @kernel
 def _floors(ix: Index, which: Ints, start: int, stop: int, out: NDArray[np.bool_]) -> None:
-    for k in range(start, stop):
-        out[k] = _is_floor(ix, which[k])
+    """Whether more accurate patches leave some of the kernels of patches to them."""
+    own, quad, other = np.empty((4, 2)), np.empty((4, 2)), np.empty((4, 2))
+    found = np.empty(64, np.int64)
+    for w in range(start, stop):
+        p = which[w]
+        x, y = ix.kernel[p, 0, 0], ix.kernel[p, 0, 1]
+        _local(ix, p, x, y, own)
+        shrunk(own, ix.slack[p], quad)
+        whole = area_of(own, 4)
+        count = 0
+        for layer in range(len(ix.lowest)):
+            found, count = _better(ix, p, layer, found, count)
+        pieces, corners = _room(0)
+        _start(quad, pieces, corners)
+        parts = 1
+        out[w] = True
+        for k in range(count):
+            q = found[k]
+            _local(ix, q, x, y, other)
+            if not overlap(quad, other, ix.slack[q]):
+                continue
+            left, sizes = _room(parts)
+            parts, area = subtracted(pieces, corners, parts, other, ix.slack[q], SLIVER * whole, left, sizes)
+            pieces, corners = left, sizes
+            if area <= COVERED * whole:
+                out[w] = False
+                break
 
 
 def tops(ix: Index, which: Ints) -> Floats:

@@ -65,7 +65,8 @@ def halve(fine: Heights, coarse: Heights | None = None) -> Heights:
     """The next coarser level of ``fine`` (rows, cols), into ``coarse`` if given: (ceil(rows/2), ceil(cols/2))."""
     if coarse is None:
         coarse = np.empty(((fine.shape[0] + 1) // 2, (fine.shape[1] + 1) // 2), np.float32)
-    target, source = coarse, fine
+    target, source = coarse, fine.view()
+    source.flags.writeable = False  # one kind of array for the compiled loop
     spread(lambda start, stop: _halve(source, start, stop, target), bands(coarse.shape[0], 64))
     return coarse
 

@@ -1,8 +1,4 @@
-"""Convex polygons cut by quads, compiled: what is left of a kernel when others are taken away from it.
-
-Polygons are arrays (MOST, 2) with a count of corners, counter-clockwise. All lengths are those of the caller, who puts
-the origin near the polygons so that products of coordinates keep their digits.
-"""
+"""Small convex polygons, clipped (compiled): where a patch's domain meets the triangle of a view."""
 
 from __future__ import annotations
 
@@ -14,136 +10,48 @@ from numpy.typing import NDArray
 from esker.patchwork.jit import kernel
 
 Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
-MOST: Final = 24
-"""Corners that a polygon may have; one that would have more is cut in two."""
-
-
-@kernel
-def area_of(points: Floats, count: int) -> float:
-    """Area of a convex polygon."""
-    total = 0.0
-    for k in range(1, count - 1):
-        ax, ay = points[k, 0] - points[0, 0], points[k, 1] - points[0, 1]
-        bx, by = points[k + 1, 0] - points[0, 0], points[k + 1, 1] - points[0, 1]
-        total += ax * by - ay * bx
-    return abs(total) * 0.5
+MOST: Final = 12
+"""Corners of a quadrangle clipped by a triangle, with room to spare."""
 
 
 @kernel
-def clipped(
-    points: Floats, count: int, x: float, y: float, nx: float, ny: float, offset: float, inside: bool, out: Floats
-) -> int:
-    """The part of a polygon on one side of the line through (x, y) with normal (nx, ny), moved ``offset`` back."""
-    kept = 0
-    sign = 1.0 if inside else -1.0
+def clipped(xs: Floats, ys: Floats, count: int, ax: float, ay: float, bx: float, by: float, out: Floats) -> int:
+    """Keep what lies left of a -> b of a convex polygon, in place; ``out`` (2, MOST) is scratch. Returns the corners left."""
+    made = 0
     for k in range(count):
-        m = k + 1 if k + 1 < count else 0
-        a = sign * ((points[k, 0] - x) * nx + (points[k, 1] - y) * ny + offset)
-        b = sign * ((points[m, 0] - x) * nx + (points[m, 1] - y) * ny + offset)
-        if a >= 0:
-            out[kept, 0], out[kept, 1] = points[k, 0], points[k, 1]
-            kept += 1
-        if (a > 0 and b < 0) or (a < 0 and b > 0):
-            t = a / (a - b)
-            out[kept, 0] = points[k, 0] + t * (points[m, 0] - points[k, 0])
-            out[kept, 1] = points[k, 1] + t * (points[m, 1] - points[k, 1])
-            kept += 1
-    return kept
+        n = k + 1 if k + 1 < count else 0
+        p = (bx - ax) * (ys[k] - ay) - (by - ay) * (xs[k] - ax)
+        q = (bx - ax) * (ys[n] - ay) - (by - ay) * (xs[n] - ax)
+        if p >= 0:
+            out[0, made], out[1, made] = xs[k], ys[k]
+            made += 1
+        if (p > 0 and q < 0) or (p < 0 and q > 0):
+            t = p / (p - q)
+            out[0, made], out[1, made] = xs[k] + t * (xs[n] - xs[k]), ys[k] + t * (ys[n] - ys[k])
+            made += 1
+    for k in range(made):
+        xs[k], ys[k] = out[0, k], out[1, k]
+    return made
 
 
 @kernel
-def contains(quad: Floats, points: Floats, tolerance: float) -> bool:
-    """Whether a quad, grown by ``tolerance``, holds all four corners of another."""
-    for k in range(4):
-        m = (k + 1) % 4
-        dx, dy = quad[m, 0] - quad[k, 0], quad[m, 1] - quad[k, 1]
-        length = np.hypot(dx, dy)
-        for c in range(4):
-            if dx * (points[c, 1] - quad[k, 1]) - dy * (points[c, 0] - quad[k, 0]) < -tolerance * length:
-                return False
-    return True
+def depths(corners: Floats, triangle: Floats, forward: Floats, work: Floats) -> tuple[float, float]:
+    """Least and greatest (p - triangle[0]) . forward over a convex quadrangle (4, 2) cut by a triangle (3, 2).
 
-
-@kernel
-def overlap(first: Floats, second: Floats, slack: float) -> bool:
-    """Whether two quads share more than an edge, the second one grown by ``slack`` (separating axes of both)."""
-    for turn in range(2):
-        a, b = (first, second) if turn == 0 else (second, first)
-        for k in range(4):
-            m = (k + 1) % 4
-            dx, dy = a[m, 0] - a[k, 0], a[m, 1] - a[k, 1]
-            most = -np.inf
-            for c in range(4):
-                most = max(most, dx * (b[c, 1] - a[k, 1]) - dy * (b[c, 0] - a[k, 0]))
-            if most + slack * np.hypot(dx, dy) <= 0:
-                return False
-    return True
-
-
-@kernel
-def shrunk(quad: Floats, slack: float, out: Floats) -> None:
-    """A quad drawn towards its middle, so that each edge moves by ``slack`` at least."""
-    mx, my = quad[:, 0].mean(), quad[:, 1].mean()
-    nearest = np.inf
-    for k in range(4):
-        m = (k + 1) % 4
-        dx, dy = quad[m, 0] - quad[k, 0], quad[m, 1] - quad[k, 1]
-        nearest = min(nearest, (dx * (my - quad[k, 1]) - dy * (mx - quad[k, 0])) / np.hypot(dx, dy))
-    keep = max(0.0, 1.0 - slack / nearest)
-    for k in range(4):
-        out[k, 0] = mx + (quad[k, 0] - mx) * keep
-        out[k, 1] = my + (quad[k, 1] - my) * keep
-
-
-@kernel
-def subtracted(
-    pieces: Floats, corners: Ints, count: int, quad: Floats, slack: float, least: float
-) -> tuple[Floats, Ints, int, float]:
-    """``count`` polygons minus a quad grown by ``slack``: polygons, their corner counts, how many, their whole area.
-
-    Slivers of an area up to ``least`` are dropped.
+    Both counter-clockwise. (inf, -inf) where they do not meet. ``work``: (4, MOST) scratch.
     """
-    out = np.empty((4 * count + 4, MOST, 2))
-    sizes = np.empty(4 * count + 4, np.int64)
-    rest, cut = np.empty((MOST + 8, 2)), np.empty((MOST + 8, 2))
-    found, total = 0, 0.0
-    for p in range(count):
-        n = corners[p]
-        rest[:n] = pieces[p, :n]
-        for k in range(4):
-            m = (k + 1) % 4
-            nx, ny = quad[k, 1] - quad[m, 1], quad[m, 0] - quad[k, 0]
-            offset = slack * np.hypot(nx, ny)
-            kept = clipped(rest, n, quad[k, 0], quad[k, 1], nx, ny, offset, False, cut)
-            if kept > 2:
-                size = area_of(cut, kept)
-                if size > least:
-                    total += size
-                    if found + 2 > len(sizes):
-                        more, numbers = np.empty((2 * found + 2, MOST, 2)), np.empty(2 * found + 2, np.int64)
-                        more[:found], numbers[:found] = out[:found], sizes[:found]
-                        out, sizes = more, numbers
-                    found = _put(cut, kept, out, sizes, found)
-            n = clipped(rest, n, quad[k, 0], quad[k, 1], nx, ny, offset, True, cut)
-            rest[:n] = cut[:n]
-            if n < 3:
-                break
-    return out, sizes, found, total
-
-
-@kernel
-def _put(cut: Floats, count: int, out: Floats, sizes: Ints, found: int) -> int:
-    """Add a polygon to a list, in two halves if it has too many corners to be cut again."""
-    if count <= MOST - 4:
-        out[found, :count] = cut[:count]
-        sizes[found] = count
-        return found + 1
-    half = count // 2
-    out[found, : half + 1] = cut[: half + 1]
-    sizes[found] = half + 1
-    out[found + 1, 0] = cut[0]
-    out[found + 1, 1 : count - half + 1] = cut[half:count]
-    sizes[found + 1] = count - half + 1
-    return found + 2
+    xs, ys, scratch = work[0], work[1], work[2:]
+    for k in range(4):
+        xs[k], ys[k] = corners[k, 0], corners[k, 1]
+    count = 4
+    for k in range(3):
+        n = (k + 1) % 3
+        count = clipped(xs, ys, count, triangle[k, 0], triangle[k, 1], triangle[n, 0], triangle[n, 1], scratch)
+        if count == 0:
+            return np.inf, -np.inf
+    low, high = np.inf, -np.inf
+    for k in range(count):
+        depth = (xs[k] - triangle[0, 0]) * forward[0] + (ys[k] - triangle[0, 1]) * forward[1]
+        low, high = min(low, depth), max(high, depth)
+    return low, high

@@ -35,7 +35,9 @@ def fill(out: NDArray[np.float32], holes: int) -> None:
     side = out.shape[0]
     known = np.empty_like(out)
     while 0 < holes < side * side:
-        known[:] = out
+        for r in range(side):
+            for c in range(side):
+                known[r, c] = out[r, c]
         for r in range(side):
             for c in range(side):
                 if not np.isnan(known[r, c]):
