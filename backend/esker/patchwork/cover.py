@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from esker.patchwork import patches
 from esker.patchwork.jit import bands, kernel, spread
 from esker.patchwork.patches import Floats
-from esker.patchwork.polygons import MOST, area_of, contains, overlap, shrunk, subtracted
+from esker.patchwork.quads import MOST, area_of, contains, overlap, shrunk, subtracted
 from esker.patchwork.sheets import Sheet
 
 Ints = NDArray[np.int64]
