@@ -75,6 +75,8 @@ export class Camera {
   #zoomLeft = 0;
   #zoomAnchor: Vec3 | undefined;
   #clearance: number;
+  /** Height of the land that home looks at. */
+  #groundM = 0;
   #width = 1;
   #height = 1;
 
@@ -254,6 +256,18 @@ export class Camera {
     this.#flyTo(this.#homePose(this.#pose.mode), durationMs);
   }
 
+  /** Says how high the land lies, metres. A camera that is still at home goes along. */
+  stand(groundM: number): void {
+    if (groundM === this.#groundM) return;
+    const home = this.#homePose(this.#pose.mode);
+    const { pivot, distanceM, heading, pitch } = this.#pose;
+    const near = 1e-6 * this.#sizeM;
+    const turned = Math.abs(wrapAngle(heading - home.heading)) + Math.abs(pitch - home.pitch);
+    const there = distance(pivot, home.pivot) + Math.abs(distanceM - home.distanceM) < near && turned < 1e-6;
+    this.#groundM = groundM;
+    if (there && !this.moving) this.#set(this.#homePose(this.#pose.mode));
+  }
+
   /**
    * One step of time: animates and keeps the eye above the ground (walk height in fly mode).
    * Returns true while anything moves, so that the caller draws another frame.
@@ -340,7 +354,7 @@ export class Camera {
   }
 
   #homePose(mode: CameraMode): Pose {
-    const pose = homePose(mode, this.#sizeM, this.#width / this.#height);
+    const pose = homePose(mode, this.#sizeM, this.#width / this.#height, this.#groundM);
     return { ...pose, distanceM: Math.min(pose.distanceM, this.#farthest) };
   }
 

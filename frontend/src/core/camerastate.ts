@@ -64,18 +64,19 @@ const HOME_MARGIN = 0.06;
 
 /**
  * The view of the whole terrain. The eye stands higher than its look is steep, so the pivot lies above the middle of the
- * land: that puts the land in the lower two thirds, as large as fits, under a sky.
+ * land: that puts the land in the lower two thirds, as large as fits, under a sky. `groundM`: height of that land.
  */
-export function homePose(mode: Pose["mode"], sizeM: number, aspect: number): Pose {
+export function homePose(mode: Pose["mode"], sizeM: number, aspect: number, groundM = 0): Pose {
   const half = sizeM / 2;
-  const corners: Vec3[] = [0, sizeM].flatMap((x) => [0, sizeM].map((y): Vec3 => [x, y, 0]));
+  const corners: Vec3[] = [0, sizeM].flatMap((x) => [0, sizeM].map((y): Vec3 => [x, y, groundM]));
   const fitted = (pose: Pose): Pose => ({ ...pose, distanceM: fitDistance(pose, corners, aspect, HOME_MARGIN, half) });
-  const base = { mode, pivot: [half, half, 0] as Vec3, distanceM: 1, fovDeg: FOV_DEG };
+  const base = { mode, pivot: [half, half, groundM] as Vec3, distanceM: 1, fovDeg: FOV_DEG };
   if (mode === "map") return fitted({ ...base, heading: 0, pitch: -90 * DEG });
   const lift = Math.cos(HOME_PITCH) * Math.tan(HOME_ELEVATION) + Math.sin(HOME_PITCH);
   let pose = fitted({ ...base, heading: HOME_HEADING, pitch: HOME_PITCH });
   // The height of the pivot follows from the distance, and that from the height: a few rounds agree to the metre.
-  for (let round = 0; round < 8; round++) pose = fitted({ ...pose, pivot: [half, half, lift * pose.distanceM] });
+  for (let round = 0; round < 8; round++)
+    pose = fitted({ ...pose, pivot: [half, half, groundM + lift * pose.distanceM] });
   return pose;
 }
 

@@ -26,9 +26,6 @@ export interface GridShape {
   readonly cols: number;
 }
 
-/** Share of the terrain that a grid without a size of its own takes at first. */
-const FIRST_SHARE = 0.6;
-
 /** World position of a lattice point. */
 export function latticePoint(place: GridPlace, u: number, v: number): Point {
   const [x, y] = [u * place.spacing_m[0], v * place.spacing_m[1]];
@@ -107,8 +104,17 @@ export function fitted(shape: GridShape, place: GridPlace, sizeM: number, share 
   return pinned(scaled, u, v, [sizeM / 2, sizeM / 2]);
 }
 
-/** Where a grid lies before anybody has laid it: its own spacing if it has one that fits, in the middle of the terrain. */
-export function firstPlace(shape: GridShape, sizeM: number, spacing: Point | null, rotationDeg = 0): GridPlace {
+/**
+ * Where a grid lies before anybody has laid it: in the middle of the terrain, with its own spacing if it has one that fits,
+ * else on a share of the terrain.
+ */
+export function firstPlace(
+  shape: GridShape,
+  sizeM: number,
+  spacing: Point | null,
+  rotationDeg = 0,
+  share = 1,
+): GridPlace {
   const place: GridPlace = {
     anchor: [0, 0],
     rotation_deg: wrapDegrees(rotationDeg),
@@ -117,7 +123,7 @@ export function firstPlace(shape: GridShape, sizeM: number, spacing: Point | nul
     lift_m: 0,
   };
   const [wide, tall] = extentOf(shape, place);
-  if (spacing === null || Math.max(wide, tall) > 4 * sizeM) return fitted(shape, place, sizeM, FIRST_SHARE);
+  if (spacing === null || Math.max(wide, tall) > 4 * sizeM) return fitted(shape, place, sizeM, share);
   return pinned(place, (shape.cols - 1) / 2, (shape.rows - 1) / 2, [sizeM / 2, sizeM / 2]);
 }
 

@@ -81,7 +81,8 @@ export class Grips {
   #visible(): readonly GripVisual[] {
     if (!this.#o.canEdit()) return [];
     const laying = this.laying;
-    if (laying !== null) return gridHandles(laying, this.#o.ground(), this.#grids.active.value);
+    const map = this.#o.camera.state.value.mode === "map";
+    if (laying !== null) return gridHandles(laying, this.#o.ground(), this.#grids.active.value, map);
     const stroke = this.#stroke();
     const tool = this.#o.tool.value;
     const inHand = tool === "select" || (tool === "paint" && stroke?.kind === "paint");

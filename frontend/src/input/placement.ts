@@ -64,8 +64,8 @@ export function topOf(laying: Pick<Laying, "low_m" | "high_m">, place: GridPlace
   return Math.max(place.scale * laying.low_m, place.scale * laying.high_m) + place.lift_m;
 }
 
-/** All handles. The corner labels are as the grid lies at rotation 0. */
-export function gridHandles(laying: Laying, ground: Ground, active: GridHandleKind | null): GridHandle[] {
+/** All handles. The corner labels are as the grid lies at rotation 0. `map`: seen from above nothing can be lifted. */
+export function gridHandles(laying: Laying, ground: Ground, active: GridHandleKind | null, map = false): GridHandle[] {
   const place = laying.place.value;
   const [wide, tall] = extentOf(laying, place);
   const diagonal = Math.hypot(wide, tall);
@@ -81,6 +81,7 @@ export function gridHandles(laying: Laying, ground: Ground, active: GridHandleKi
   put("grid-turn", onGround(turnAt), `Turned ${place.rotation_deg.toFixed(1)}°`);
   const centre = onGround(centreOf(laying, place));
   put("grid-move", centre, "Move");
+  if (map) return out;
   const rise = clamp(topOf(laying, place) - centre[2], LIFT_LEAST * diagonal, LIFT_MOST * diagonal);
   const lift = `${place.lift_m < 0 ? "−" : "+"}${Math.round(Math.abs(place.lift_m))} m`;
   put("grid-lift", [centre[0], centre[1], centre[2] + rise], `Lift ${lift}`);

@@ -5,12 +5,16 @@ import { api } from "./api.ts";
 import type { ImportTransport } from "./imports.ts";
 import { upload } from "./upload.ts";
 
-/** `terrain` is read at each call: its secret may change while the page is open. */
-export function gridTransport(terrain: { readonly id: string; readonly secret: string }): ImportTransport {
+/** `terrain` is read at each call: its secret may change while the page is open. The layer is added in `client`'s name. */
+export function gridTransport(terrain: {
+  readonly id: string;
+  readonly secret: string;
+  readonly client: string;
+}): ImportTransport {
   return {
     upload: (file, onShare, signal) =>
       upload<ImportStatus>({
-        path: `/api/terrains/${terrain.id}/imports?name=${encodeURIComponent(file.name)}`,
+        path: `/api/terrains/${terrain.id}/imports?name=${encodeURIComponent(file.name)}&client=${terrain.client}`,
         secret: terrain.secret,
         file,
         onShare,

@@ -5,21 +5,18 @@
 
 import { computed, effect, type ReadonlySignal, type Signal, signal } from "@preact/signals-core";
 import type { Camera } from "../core/camera.ts";
-import { cornersOf, rounded } from "../core/lattice.ts";
+import { cornersOf, type Point, rounded } from "../core/lattice.ts";
 import type { FootprintVisual, Ground, SheetVisual, Vec3 } from "../core/types.ts";
 import type { SyncDoc } from "../doc/sync.ts";
-import type { ImportAnswers, Importing, ImportQuestion, ImportReport, Layer } from "../generated/contract.ts";
+import type { ImportAnswers, Importing, ImportReport, Layer } from "../generated/contract.ts";
 import type { Laying } from "../input/placement.ts";
 import { footprintVisuals } from "./footprints.ts";
+import { heightRange, laidByHand } from "./import-questions.ts";
 import { type ImportJob, Imports, type ImportTransport, isOver } from "./imports.ts";
 import type { KeptImport } from "./kept-imports.ts";
 import { layerName } from "./layers.ts";
 import { LayerLaying, PendingLaying, startingPlace } from "./laying.ts";
 import { OtherImports } from "./others.ts";
-
-/** The answer that means: I lay it on the terrain myself. */
-export const BY_HAND = "by hand";
-const PLACE = "place";
 
 export interface GroundworkOptions {
   readonly sizeM: number;
@@ -38,6 +35,9 @@ export interface GroundworkOptions {
   /** My name, as it travels with my imports. */
   readonly author: () => string;
 }
+
+/** A grid without a size begins as large as the terrain; one that comes on top of others as large as this share of it. */
+const LATER_SHARE = 0.4;
 
 export const VIEW_ONLY = "This link lets you look, not change. Ask for an edit link to bring in real ground.";
 
@@ -182,12 +182,17 @@ export class Groundwork {
 
   #pending(job: ImportJob, report: ImportReport): PendingLaying {
     const { sizeM } = this.#o;
-    const ground = this.#o.doc.doc.peek()?.layers.size ? this.#o.ground().heightAt(sizeM / 2, sizeM / 2) : 0;
+    const first = !this.#o.doc.doc.peek()?.layers.size;
+    const ground = first ? 0 : this.#o.ground().heightAt(sizeM / 2, sizeM / 2);
+    const range = computed(
+      (): Point => heightRange(this.answersTo(job).range) ?? [report.low_m ?? 0, report.high_m ?? 0],
+    );
     const current = (): ImportJob => this.imports.jobs.peek().find((j) => j.key === job.key) ?? job;
     return new PendingLaying(
       layingId(job),
       report,
-      startingPlace(report, sizeM, ground),
+      range,
+      startingPlace(report, sizeM, first ? 1 : LATER_SHARE, ground),
       () => void this.answer(current()),
       () => {
         this.imports.cancel(job.key);
@@ -215,12 +220,6 @@ function underWay(jobs: readonly ImportJob[]): KeptImport[] {
 
 const layingId = (job: ImportJob): string => `import-${job.key}`;
 
-/** Whether the question asks for a place that can be given by hand. */
-export function isPlaceQuestion({ id, options }: ImportQuestion): boolean {
-  return id === PLACE && (options.length === 0 || options.includes(BY_HAND));
-}
-
 function isByHand(job: ImportJob, answers: Readonly<Record<string, string>>): boolean {
-  const question = job.status?.report?.questions.find(isPlaceQuestion);
-  return question !== undefined && (question.options.length === 0 || answers[PLACE] === BY_HAND);
+  return (job.status?.report?.questions ?? []).some((q) => laidByHand(q, answers[q.id] ?? ""));
 }

@@ -1,8 +1,8 @@
 import { html, nothing, type TemplateResult } from "lit";
 import { live } from "lit/directives/live.js";
 import type { ImportQuestion, ImportReport } from "../generated/contract.ts";
-import { BY_HAND, isPlaceQuestion } from "./groundwork.ts";
 import { icon } from "./icons.ts";
+import { heightRange, optionWords, SIZE_QUESTION } from "./import-questions.ts";
 import { type ImportJob, isOver } from "./imports.ts";
 import { reportFacts } from "./layers.ts";
 import { PendingLaying } from "./laying.ts";
@@ -79,18 +79,18 @@ export class EskImportCard extends SignalElement {
         }
         ${job.problem ? html`<p class="problem">${job.problem}</p>` : nothing}
         ${job.phase === "refused" ? html`<p class="quiet">${whatToDo(report)}</p>` : nothing}
-        ${report && job.phase !== "upload" ? this.#report(report) : nothing}
+        ${report && job.phase !== "upload" ? this.#report(report, job.phase === "question" && this.stage.input.laying.value === null) : nothing}
         ${job.phase === "question" && report ? this.#questions(report) : nothing}
       </article>
     `;
   }
 
-  #report(report: ImportReport): TemplateResult {
+  #report(report: ImportReport, open: boolean): TemplateResult {
     const facts = reportFacts(report);
     return html`
       ${
         facts.length > 0
-          ? html`<details ?open=${this.job.phase === "question"}>
+          ? html`<details ?open=${open}>
               <summary>What it is</summary>
               <dl>${facts.map(([what, how]) => html`<dt>${what}</dt><dd>${how}</dd>`)}</dl>
             </details>`
@@ -105,7 +105,8 @@ export class EskImportCard extends SignalElement {
     const answers = groundwork.answersTo(this.job);
     const laying = input.laying.value;
     const byHand = laying instanceof PendingLaying;
-    const asked = report.questions.filter((q) => !(isPlaceQuestion(q) && q.options.length <= 1));
+    // The size is that of the grid on the ground.
+    const asked = report.questions.filter((q) => !(byHand && q.id === SIZE_QUESTION));
     return html`
       <form @submit=${this.#submit}>
         ${asked.map((q) => this.#question(q, answers[q.id] ?? ""))}
@@ -130,6 +131,41 @@ export class EskImportCard extends SignalElement {
     `;
   }
 
+  #range(text: string, [low, high]: readonly [number, number], set: (value: string) => void): TemplateResult {
+    const field = (label: string, value: number, put: (v: number) => string): TemplateResult => html`<esk-number
+      label=${label}
+      unit="m"
+      digits="2"
+      .value=${value}
+      @number=${(e: CustomEvent<number>) => set(put(e.detail))}
+    ></esk-number>`;
+    return html`<fieldset>
+      <legend>${text}</legend>
+      <div class="two">
+        ${field("Lowest", low, (v) => `${v}..${Math.max(v, high)}`)}
+        ${field("Highest", high, (v) => `${Math.min(v, low)}..${v}`)}
+      </div>
+    </fieldset>`;
+  }
+
+  /** Systems that the question does not list. */
+  #otherSystem(question: ImportQuestion, answer: string, set: (value: string) => void): TemplateResult {
+    const own = question.options.includes(answer) ? "" : answer;
+    return html`<label class="choice other">
+      <span>Or</span>
+      <input
+        class="field"
+        placeholder="EPSG:32610"
+        autocomplete="off"
+        spellcheck="false"
+        aria-label="Another coordinate system, as an EPSG code"
+        .value=${live(own)}
+        @change=${(e: Event) => set((e.target as HTMLInputElement).value.trim() || question.default)}
+        @keydown=${(e: Event) => e.stopPropagation()}
+      />
+    </label>`;
+  }
+
   #submit(event: SubmitEvent): void {
     event.preventDefault();
     void this.stage.groundwork.answer(this.job);
@@ -138,34 +174,30 @@ export class EskImportCard extends SignalElement {
   #question(question: ImportQuestion, answer: string): TemplateResult {
     const set = (value: string): void => this.stage.groundwork.setAnswer(this.job, question.id, value);
     const name = `${this.job.key}-${question.id}`;
+    if (heightRange(answer) !== null && heightRange(question.default) !== null)
+      return this.#range(question.text, heightRange(answer)!, set);
     if (question.options.length > 0)
       return html`<fieldset>
         <legend>${question.text}</legend>
         ${question.options.map(
           (option) => html`<label class="choice">
             <input type="radio" name=${name} .checked=${live(option === answer)} @change=${() => set(option)} />
-            <span>${optionWords(option)}</span>
+            <span>${optionWords(question.id, option)}</span>
           </label>`,
         )}
+        ${question.id === "place" ? this.#otherSystem(question, answer, set) : nothing}
       </fieldset>`;
     return html`<label class="typed">
       <span>${question.text}</span>
       <input
         class="field"
         autocomplete="off"
-        inputmode="decimal"
         .value=${live(answer)}
         @input=${(e: Event) => set((e.target as HTMLInputElement).value.trim())}
         @keydown=${(e: Event) => e.stopPropagation()}
       />
     </label>`;
   }
-}
-
-/** An option as a person reads it. */
-function optionWords(option: string): string {
-  if (option === BY_HAND) return "I lay it on the terrain by hand";
-  return option.length > 0 ? option[0]!.toUpperCase() + option.slice(1) : "Nothing";
 }
 
 function whatToDo(report: ImportReport | null): string {

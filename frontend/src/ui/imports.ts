@@ -33,12 +33,16 @@ export interface ImportJob {
 const POLL_MS = 250;
 /** After so many polls in a row without an answer the import is given up. */
 const MOST_SILENCE = 40;
+/** The server may still be clearing away my file before this one: then it is asked again, so often. */
+const BUSY_MS = 1500;
+const MOST_BUSY = 8;
 
 interface Running {
   readonly file: File | null;
   readonly abort: AbortController;
   timer: ReturnType<typeof setTimeout> | undefined;
   silent: number;
+  busy: number;
 }
 
 export const isOver = (phase: ImportPhase): boolean =>
@@ -120,7 +124,7 @@ export class Imports {
 
   #begin(file: File | null, name: string, bytes: number, phase: ImportPhase): number {
     const key = this.#next++;
-    this.#running.set(key, { file, abort: new AbortController(), timer: undefined, silent: 0 });
+    this.#running.set(key, { file, abort: new AbortController(), timer: undefined, silent: 0, busy: 0 });
     const job: ImportJob = { key, file: name, bytes, phase, share: 0, status: null, problem: "" };
     this.#jobs.value = [...this.#jobs.value, job];
     return key;
@@ -170,7 +174,11 @@ export class Imports {
         this.#take(key, status);
       } else await this.#transport.cancel(status.id);
     } catch (error) {
-      if (this.#running.has(key)) this.#end(key, "failed", sentence(error));
+      if (!this.#running.has(key)) return;
+      if (error instanceof ApiError && error.code === "busy" && running.busy++ < MOST_BUSY) {
+        this.#patch(key, { phase: "waiting", share: 0 });
+        running.timer = setTimeout(() => this.#startNext(), BUSY_MS);
+      } else this.#end(key, "failed", sentence(error));
     }
   }
 

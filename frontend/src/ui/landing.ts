@@ -1,6 +1,6 @@
 import { html, LitElement, nothing, svg, type TemplateResult } from "lit";
 import type { TemplateInfo } from "../core/types.ts";
-import { MAX_GRID_BYTES } from "../generated/contract.ts";
+import { type ImportStatus, MAX_GRID_BYTES } from "../generated/contract.ts";
 import { ApiError, api, type OpenedTerrain } from "./api.ts";
 import "./drop-zone.ts";
 import { icon } from "./icons.ts";
@@ -80,7 +80,7 @@ export class EskLanding extends LitElement {
       );
     this.#abort = new AbortController();
     this.sent = 0;
-    const made = await upload<OpenedTerrain & { import: string }>({
+    const made = await upload<OpenedTerrain & { import: ImportStatus }>({
       path: `/api/terrains/from-grid?name=${encodeURIComponent(file.name)}`,
       file,
       onShare: (share) => {
@@ -88,7 +88,7 @@ export class EskLanding extends LitElement {
       },
       signal: this.#abort.signal,
     });
-    keepImport(made.id, { id: made.import, file: file.name });
+    keepImport(made.id, { id: made.import.id, file: file.name });
     return made;
   }
 

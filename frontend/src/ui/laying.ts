@@ -7,6 +7,7 @@ import type { SyncDoc } from "../doc/sync.ts";
 import type { ImportReport, Layer, Op } from "../generated/contract.ts";
 import type { Laying } from "../input/placement.ts";
 import { sheetOf } from "./footprints.ts";
+import { SIZE_QUESTION } from "./import-questions.ts";
 
 const IDENTITY: GridPlace = { anchor: [0, 0], rotation_deg: 0, spacing_m: [1, 1], scale: 1, lift_m: 0 };
 
@@ -15,24 +16,38 @@ export class PendingLaying implements Laying {
   readonly id: string;
   readonly rows: number;
   readonly cols: number;
-  readonly low_m: number;
-  readonly high_m: number;
   readonly place: Signal<GridPlace>;
   /** The coarse picture of it where it lies. */
   readonly sheet: ReadonlySignal<SheetVisual | null>;
+  readonly #range: ReadonlySignal<Point>;
   readonly #finish: () => void;
   readonly #cancel: () => void;
 
-  constructor(id: string, report: ImportReport, start: GridPlace, finish: () => void, cancel: () => void) {
+  /** `range`: lowest and highest sample in metres, as answered so far. */
+  constructor(
+    id: string,
+    report: ImportReport,
+    range: ReadonlySignal<Point>,
+    start: GridPlace,
+    finish: () => void,
+    cancel: () => void,
+  ) {
     this.id = id;
     this.rows = report.rows;
     this.cols = report.cols;
-    this.low_m = report.low_m ?? 0;
-    this.high_m = report.high_m ?? 0;
+    this.#range = range;
     this.place = signal(start);
     this.sheet = computed(() => sheetOf(this, this.place.value, report.preview));
     this.#finish = finish;
     this.#cancel = cancel;
+  }
+
+  get low_m(): number {
+    return this.#range.value[0];
+  }
+
+  get high_m(): number {
+    return this.#range.value[1];
   }
 
   lay(place: GridPlace): null {
@@ -50,12 +65,12 @@ export class PendingLaying implements Laying {
 }
 
 /**
- * Where a grid without a place begins: in the middle, of its own size if it has one that fits, lifted so that its lowest
- * sample lies on the ground when it would stand apart from it.
+ * Where a grid without a place begins: in the middle, of its own size if it has one that fits, else of a share of the
+ * terrain; lifted so that its lowest sample lies on the ground when it would stand apart from it.
  */
-export function startingPlace(report: ImportReport, sizeM: number, groundM: number): GridPlace {
-  const spacing: Point | null = report.spacing_m;
-  const place = firstPlace(report, sizeM, spacing, report.rotation_deg);
+export function startingPlace(report: ImportReport, sizeM: number, share: number, groundM: number): GridPlace {
+  const sized = !report.questions.some((q) => q.id === SIZE_QUESTION);
+  const place = firstPlace(report, sizeM, sized ? report.spacing_m : null, report.rotation_deg, share);
   const [low, high] = [report.low_m ?? 0, report.high_m ?? 0];
   const relief = Math.max(high - low, 1);
   const apart = low > groundM + relief || high < groundM - relief;

@@ -104,7 +104,11 @@ export class Stage {
       canvas: viewport,
       camera: this.camera,
       doc: session.doc,
-      ground: () => this.shown.ground,
+      ground: () => {
+        // Handles lie on the ground and follow it.
+        this.tiles.revision.value;
+        return this.shown.ground;
+      },
       freeze: () => this.shown.freeze(),
       clientId: session.client,
       canEdit: () => session.canEdit.value,
@@ -271,7 +275,21 @@ export class Stage {
         this.loop.invalidate();
       }),
     );
+    this.#stops.push(
+      effect(() => {
+        this.tiles.revision.value;
+        if (session.doc.doc.value?.layers.size) this.camera.stand(this.#landHeight());
+      }),
+    );
     this.#watchSize();
+  }
+
+  /** About how high the land lies on average, metres: in steps, so that a view at home does not tremble while it arrives. */
+  #landHeight(): number {
+    const heights = this.tiles.tile(0, 0, 0)?.heights;
+    if (heights === undefined) return 0;
+    const step = this.sizeM / 128;
+    return step * Math.round(heights.reduce((sum, h) => sum + h, 0) / heights.length / step);
   }
 
   #watchSize(): void {

@@ -117,14 +117,31 @@ export const importCardStyles = css`
   .choice input {
     accent-color: var(--esk-accent);
   }
+  .choice.other .field {
+    flex: 1;
+    height: 32px;
+    font-size: 0.8125rem;
+  }
+  .two {
+    display: grid;
+    grid-template-columns: 1fr 1fr;
+    gap: 8px 10px;
+  }
   .typed {
     display: grid;
     gap: 4px;
     font-weight: 550;
   }
+  /* Always at hand, however long the questions are. */
   .row {
+    position: sticky;
+    bottom: -18px;
     display: flex;
     gap: 8px;
+    margin: 0 -10px -12px -12px;
+    padding: 8px 10px 12px 12px;
+    border-radius: 0 0 12px 12px;
+    background: var(--esk-field);
   }
   .row .btn {
     flex: 1;

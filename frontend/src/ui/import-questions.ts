@@ -1,0 +1,40 @@
+/** The questions of an import as the page understands them (`backend/esker/importing/questions.py`). Pure. */
+
+import type { ImportQuestion } from "../generated/contract.ts";
+
+/** Asked of a grid that says nothing of where it lies or how large it is. */
+export const SIZE_QUESTION = "size";
+const PLACE_QUESTION = "place";
+/** The answer that means: in the middle of the terrain, from where I move it myself. */
+const MIDDLE = "middle";
+
+/** Whether this answer leaves it to me where the grid lies. */
+export function laidByHand({ id }: ImportQuestion, answer: string): boolean {
+  return id === SIZE_QUESTION || (id === PLACE_QUESTION && answer === MIDDLE);
+}
+
+/** Lowest and highest height from an answer such as "0..4380"; null for any other text. */
+export function heightRange(answer: string | undefined): readonly [number, number] | null {
+  const match = /^\s*(-?[\d.]+(?:e[+-]?\d+)?)\s*\.\.\s*(-?[\d.]+(?:e[+-]?\d+)?)\s*$/i.exec(answer ?? "");
+  if (match === null) return null;
+  const [low, high] = [Number(match[1]), Number(match[2])];
+  return Number.isFinite(low) && Number.isFinite(high) && low <= high ? [low, high] : null;
+}
+
+const WORDS: Readonly<Record<string, Readonly<Record<string, string>>>> = {
+  place: {
+    middle: "I lay it on the terrain by hand",
+    stop: "Do not bring it in",
+    "EPSG:4326": "Degrees of latitude and longitude (EPSG:4326)",
+  },
+  imagery: { elevation: "Take it as elevation", stop: "Do not bring it in" },
+  nodata: { none: "No, they are heights" },
+};
+
+/** An option as a person reads it. */
+export function optionWords(question: string, option: string): string {
+  const words = WORDS[question]?.[option];
+  if (words !== undefined) return words;
+  if (question === "nodata") return `Yes, leave out ${option}`;
+  return option.length > 0 ? option[0]!.toUpperCase() + option.slice(1) : "Nothing";
+}
