@@ -91,7 +91,7 @@ def _sides(base: Base, points: Floats, plateau_m: float, closed: bool, size_m: f
     long = np.hypot(step[:, 0], step[:, 1])[:, None]
     side = np.column_stack([-step[:, 1], step[:, 0]]) / np.maximum(long, 1e-12) * plateau_m
     edges = [line[:, :2]] if plateau_m == 0 else [line[:, :2] + side, line[:, :2] - side]
-    above = np.concatenate([line[:, 2] - _under(base.level(SIDES_LEVEL), edge / s) for edge in edges])
+    above = np.concatenate([line[:, 2] - under(base, size_m, edge) for edge in edges])
     slight = SLIGHT_M * s
     filled, cut = (float(np.maximum(v, 0.0).mean()) + slight for v in (above, -above))
     both = filled + cut
@@ -112,12 +112,13 @@ def _walked(points: Floats, step: float) -> Floats:
     return np.column_stack([np.interp(at, along, points[:, k]) for k in range(3)])
 
 
-def _under(level: NDArray[np.float32], at: Floats) -> Floats:
-    """A level at places (m, 2) in cells (x, y), bilinear; beyond the domain its border's."""
+def under(base: Base, size_m: float, places: Floats) -> Floats:
+    """A base at places (m, 2) in metres by its samples of SIDES_LEVEL, bilinear; beyond the domain its border's."""
+    level = base.level(SIDES_LEVEL)
     last = len(level) - 1
-    x, y = np.clip(at[:, 0], 0, last), np.clip(at[:, 1], 0, last)
+    x, y = np.clip(places.T / grid.spacing(SIDES_LEVEL, size_m), 0, last)
     i, j = np.minimum(x.astype(int), last - 1), np.minimum(y.astype(int), last - 1)
     u, v = x - i, y - j
-    a, b = level[j, i] + u * (level[j, i + 1] - level[j, i]), level[j + 1, i]
-    b = b + u * (level[j + 1, i + 1] - b)
-    return np.asarray(a + v * (b - a), dtype=np.float64)
+    south = level[j, i] + u * (level[j, i + 1] - level[j, i])
+    north = level[j + 1, i] + u * (level[j + 1, i + 1] - level[j + 1, i])
+    return np.asarray(south + v * (north - south), dtype=np.float64)

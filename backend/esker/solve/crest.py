@@ -6,6 +6,7 @@ becomes single-valued, a closed plateau outline gets its closing segment, a poin
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +16,13 @@ from esker.contract import Stroke
 from esker.document.strokes import world_points
 
 Points = NDArray[np.float64]
+Under = Callable[[Points], Points]
+
+
+def on_the_sheet(places: Points) -> Points:
+    """The blank sheet: 0 at all places (n, 2)."""
+    return np.zeros(len(places))
+
 
 CLOSED_FRACTION = 0.15
 """A level stroke whose ends are nearer than this share of its length encloses a plateau."""
@@ -34,13 +42,16 @@ class Crest:
     closed: bool
 
 
-def crest_of(stroke: Stroke) -> Crest | None:
-    """The crest line of a stroke, or None for one that constrains no height (hidden, without points, or paint)."""
+def crest_of(stroke: Stroke, under: Under = on_the_sheet) -> Crest | None:
+    """The crest line of a stroke, or None for one that constrains no height (hidden, without points, or paint).
+
+    ``under``: the base at places (n, 2), metres.
+    """
     if stroke.hidden or not stroke.curve or stroke.kind == "paint":
         return None
     points = world_points(stroke)
     if stroke.kind == "profile":
-        return Crest(stroke, _single_valued(points, stroke), closed=False)
+        return Crest(stroke, _single_valued(points, stroke, under), closed=False)
     points = _without_repeats(points)
     closed = is_closed(points)
     if closed and np.array_equal(points[0, :2], points[-1, :2]):
@@ -74,16 +85,16 @@ def _without_repeats(points: Points) -> Points:
     return points[keep]
 
 
-def _single_valued(points: Points, stroke: Stroke) -> Points:
+def _single_valued(points: Points, stroke: Stroke, under: Under) -> Points:
     """The part of a profile that the ground can have: over each place the height farthest from the base.
 
     A pen that goes back over its own line would make an overhang. Knots are the profile's own; where several
-    branches cover a knot the one with the greatest absolute height stays. Direction: from first towards last.
+    branches cover a knot the one farthest above or below the base stays. Direction: from first towards last.
     """
     first, last = np.array(stroke.first[:2]), np.array(stroke.last[:2])
     axis = last - first
     if not axis.any():
-        return points[[int(np.argmax(np.abs(points[:, 2])))]]
+        return points[[int(np.argmax(np.abs(points[:, 2] - under(points[:, :2]))))]]
     u = np.array([p for p, _ in stroke.curve])
     steps = np.diff(u)
     if (steps > 0).all():
@@ -91,14 +102,14 @@ def _single_valued(points: Points, stroke: Stroke) -> Points:
     if (steps < 0).all():
         return _without_repeats(points)
     knots = np.unique(u)
-    heights = _envelope(u, points[:, 2], knots)
-    if u[-1] < u[0]:
-        knots, heights = knots[::-1], heights[::-1]
-    return _without_repeats(np.column_stack([first + knots[:, None] * axis, heights]))
+    places = first + knots[:, None] * axis
+    heights = _envelope(u, points[:, 2], knots, under(places))
+    line = np.column_stack([places, heights])
+    return _without_repeats(line[::-1] if u[-1] < u[0] else line)
 
 
-def _envelope(u: NDArray[np.float64], z: NDArray[np.float64], knots: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Per knot the height of greatest magnitude among all segments (u_i, z_i)-(u_i+1, z_i+1) that cover it."""
+def _envelope(u: Points, z: Points, knots: Points, base: Points) -> Points:
+    """Per knot the height farthest from the base there among all segments (u_i, z_i)-(u_i+1, z_i+1) that cover it."""
     if len(u) == 1:
         return z.copy()
     low, high = np.minimum(u[:-1], u[1:]), np.maximum(u[:-1], u[1:])
@@ -106,11 +117,11 @@ def _envelope(u: NDArray[np.float64], z: NDArray[np.float64], knots: NDArray[np.
     out = np.zeros(len(knots))
     block = max(1, _ENVELOPE_BLOCK // len(low))
     for k in range(0, len(knots), block):
-        at = knots[k : k + block, None]
+        at, there = knots[k : k + block, None], base[k : k + block, None]
         value = z[:-1] + np.clip((at - u[:-1]) / run, 0, 1) * (z[1:] - z[:-1])
-        upright = np.where(np.abs(z[1:]) > np.abs(z[:-1]), z[1:], z[:-1])
+        upright = np.where(np.abs(z[1:] - there) > np.abs(z[:-1] - there), z[1:], z[:-1])
         value = np.where(u[1:] == u[:-1], upright, value)
-        value = np.where((at >= low) & (at <= high), value, 0.0)
-        best = np.argmax(np.abs(value), axis=1)
+        value = np.where((at >= low) & (at <= high), value, there)
+        best = np.argmax(np.abs(value - there), axis=1)
         out[k : k + block] = value[np.arange(len(best)), best]
     return out

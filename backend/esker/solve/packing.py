@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from esker.contract import Flank, Stroke, TerrainSettings
-from esker.solve.base import SHEET, Base, Ground, ground_under
+from esker.solve.base import SHEET, Base, Ground, ground_under, under
 from esker.solve.crest import Crest, crest_of, line_of
 from esker.solve.outline import cut, segments_of, spans_of
 from esker.solve.sayings import Layer, says
@@ -129,7 +130,7 @@ def shape_for(layer: Layer | None, stroke: Stroke, settings: TerrainSettings, ba
     if layer is not None and stroke.paint is not None:
         line = line_of(stroke)
         return None if line is None else Shape(line, None, None, 0.0, None, value, stroke.paint.radius_m)
-    crest = crest_of(stroke)
+    crest = crest_of(stroke) if base is None else crest_of(stroke, partial(under, base, settings.size_m))
     if crest is None:
         return None
     ground = ground_under(base, crest.points, stroke.plateau_radius_m, crest.closed, settings.size_m)
