@@ -1,4 +1,4 @@
-"""Cross-sections over a base (SPEC S98, S99, S100): what artists prescribe holds for the ground that they see."""
+"""Cross-sections over a base (SPEC S98, S99): what artists prescribe holds for the ground that they see."""
 
 from __future__ import annotations
 
