@@ -66,21 +66,25 @@ def _level_errors(heights: Heights, mip: Heights, level: int, start: int, stop: 
     size = PATCH_KERNEL_CELLS * step
     margin = 3 * half
     mixed = np.empty(mip_cols + 2, np.float32)
+    stretched = np.empty((mip_cols + 1) * step, np.float32)
     worst = np.empty(cols, np.float32)
     share = np.empty(step, np.float32)
     for phase in range(step):
         share[phase] = (phase + 0.5) / step
     for j in range(start, stop):
-        worst[:] = 0.0
+        for col in range(cols):
+            worst[col] = 0.0
         for row in range(max(0, size * j - margin), min(rows, size * (j + 1) + margin)):
             cell = (row + half) // step - 1
-            part = share[(row + half) % step]
-            low, high = mip[max(cell, 0)], mip[min(cell + 1, mip_rows - 1)]
-            for k in range(mip_cols):
-                mixed[k + 1] = low[k] + (high[k] - low[k]) * part
-            mixed[0] = mixed[1]
-            mixed[mip_cols + 1] = mixed[mip_cols]
-            _row_errors(heights[row], mixed, share, half, worst)
+            _mix(mip[max(cell, 0)], mip[min(cell + 1, mip_rows - 1)], share[(row + half) % step], mixed)
+            if step == 2:
+                _stretch_twice(mixed, stretched)
+            elif step == 4:
+                _stretch_four_times(mixed, stretched)
+            else:
+                _stretch(mixed, share, stretched)
+            # Samples begin half a cell after the first, which lies beyond the border.
+            _raise(heights[row], stretched[half : half + cols], worst)
         for i in range(out.shape[1]):
             greatest = np.float32(0.0)
             for col in range(max(0, size * i - margin), min(cols, size * (i + 1) + margin)):
@@ -89,17 +93,58 @@ def _level_errors(heights: Heights, mip: Heights, level: int, start: int, stop: 
 
 
 @kernel
-def _row_errors(line: Heights, mixed: Heights, share: Heights, half: int, worst: Heights) -> None:
-    """Raise ``worst`` to the distance of each sample of a row from the stretched row of the mipmap level."""
-    cols, step = line.size, share.size
+def _mix(low: Heights, high: Heights, part: np.float32, mixed: Heights) -> None:
+    """The row between two rows of a level, with one sample more at each end."""
+    inner = mixed[1:-1]
+    for k in range(low.size):
+        inner[k] = low[k] + (high[k] - low[k]) * part
+    mixed[0] = mixed[1]
+    mixed[low.size + 1] = mixed[low.size]
+
+
+@kernel
+def _stretch(mixed: Heights, share: Heights, out: Heights) -> None:
+    """Interpolate ``share.size`` samples between each two of ``mixed``."""
+    step = share.size
     for k in range(mixed.size - 1):
         value = mixed[k]
         rise = mixed[k + 1] - value
-        first = (k - 1) * step + half
-        for col in range(max(first, 0), min(first + step, cols)):
-            distance = abs(line[col] - (value + rise * share[col - first]))
-            if distance > worst[col]:
-                worst[col] = distance
+        part = out[k * step : (k + 1) * step]
+        for t in range(step):
+            part[t] = value + rise * share[t]
+
+
+@kernel
+def _stretch_twice(mixed: Heights, out: Heights) -> None:
+    """:func:`_stretch` by 2, as one loop that runs on many samples at once."""
+    after = mixed[1:]
+    for k in range(after.size):
+        value = mixed[k]
+        rise = after[k] - value
+        out[2 * k] = value + rise * np.float32(0.25)
+        out[2 * k + 1] = value + rise * np.float32(0.75)
+
+
+@kernel
+def _stretch_four_times(mixed: Heights, out: Heights) -> None:
+    """:func:`_stretch` by 4, as one loop that runs on many samples at once."""
+    after = mixed[1:]
+    for k in range(after.size):
+        value = mixed[k]
+        rise = after[k] - value
+        out[4 * k] = value + rise * np.float32(0.125)
+        out[4 * k + 1] = value + rise * np.float32(0.375)
+        out[4 * k + 2] = value + rise * np.float32(0.625)
+        out[4 * k + 3] = value + rise * np.float32(0.875)
+
+
+@kernel
+def _raise(line: Heights, stretched: Heights, worst: Heights) -> None:
+    """Raise ``worst`` to the distance of each sample of a row from the stretched one."""
+    for col in range(worst.size):
+        distance = abs(line[col] - stretched[col])
+        known = worst[col]
+        worst[col] = distance if distance > known else known
 
 
 @kernel
