@@ -19,19 +19,20 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from esker import contract, grid
-from esker.contract import Border, Document, Flank, TerrainSettings, Vec3
+from esker.contract import Border, Document, Layer, TerrainSettings
 from esker.document import archive
-from esker.document.strokes import level_curve, misfit, profile_curve
+from esker.document.maker import Stroke
+from esker.document.strokes import misfit
+from esker.patchwork.base import Base
+from esker.patchwork.rasters import Raster
 from esker.solve.assembly import System, assemble
 from esker.solve.detail import Settled, detailed, settle
 from esker.solve.solver import Solver
 from esker.synthesis.detailed import Detail, DetailedTerrain
 from esker.synthesis.subdivide import finest_level
+from esker.terrain_layers import Patchwork, Sample, imported, laid, unpacked
 
-FlankLike = tuple[float | None, float] | Flank | None
-DEFAULT_FLANK: Flank = Flank()
-LOOP_FRACTION = 0.25
-"""A level stroke whose ends are nearer than this share of its length takes its farthest point as second anchor."""
+__all__ = ["HeightWindow", "Sample", "Stroke", "Terrain", "default_solver"]
 
 Strokes = tuple[contract.Stroke, ...]
 
@@ -44,100 +45,6 @@ def default_solver() -> Solver:
     if _solver is None:
         _solver = Solver()
     return _solver
-
-
-class Stroke:
-    """Makes strokes from world points; what is made is a ``contract.Stroke``.
-
-    left, right: (slope in degrees or None, extent in metres) for a straight flank, which has that slope from the crest
-    to its end; a ``Flank`` for any other; or None for no flank on that side of the direction of travel. Other keywords:
-    ``plateau_radius_m``, ``amplitude_m``, ``roughness``, ``id``, ``label``.
-    Raises ValueError for points that are not finite (n, 3), or fields out of range.
-    """
-
-    @staticmethod
-    def profile(
-        points: ArrayLike, left: FlankLike = DEFAULT_FLANK, right: FlankLike = DEFAULT_FLANK, **fields: Any
-    ) -> contract.Stroke:
-        """A mountain or a crevice: points (n, 3), seen in the vertical plane through the first and the last."""
-        p = _points(points)
-        first, last = _vec(p[0]), _vec(p[-1])
-        return _stroke("profile", first, last, profile_curve(p, first, last), left, right, fields)
-
-    @staticmethod
-    def level(
-        points: ArrayLike, left: FlankLike = DEFAULT_FLANK, right: FlankLike = DEFAULT_FLANK, **fields: Any
-    ) -> contract.Stroke:
-        """A plateau outline or a level ridge: points (n, 3), all at the height of the first."""
-        p = _points(points)
-        p[:, 2] = p[0, 2]
-        first, last = _ends(p)
-        return _stroke("level", first, last, level_curve(p, first, last), left, right, fields)
-
-    @staticmethod
-    def paint(
-        points: ArrayLike,
-        channel: contract.PaintChannel,
-        value: float = 1.0,
-        radius_m: float = contract.DEFAULT_SIZE_M / 50,
-        **fields: Any,
-    ) -> contract.Stroke:
-        """A line of paint on the ground: points (n, 2), or (n, 3) whose heights do not matter.
-
-        Within ``radius_m`` of it one channel of the detail is raised or lowered: "snow", "grass", "forest", "wetness",
-        "roughness" or "amplitude", by ``value`` from -1 (none of it) to 1 (all of it). No height is constrained.
-        """
-        p = np.asarray(points, dtype=np.float64)
-        p = _points(np.column_stack([p, np.zeros(len(p))]) if p.ndim == 2 and p.shape[1] == 2 else p)
-        p[:, 2] = 0.0
-        first, last = _ends(p)
-        paint = contract.Paint(channel=channel, value=float(value), radius_m=float(radius_m))
-        return _stroke("paint", first, last, level_curve(p, first, last), None, None, {**fields, "paint": paint})
-
-
-def _ends(p: NDArray[np.float64]) -> tuple[Vec3, Vec3]:
-    """Anchors of a level frame: the ends of the line, or of a loop its first point and the farthest from it."""
-    steps = np.diff(p[:, :2], axis=0)
-    length = float(np.hypot(steps[:, 0], steps[:, 1]).sum())
-    gap = np.hypot(*(p[:, :2] - p[0, :2]).T)
-    far = int(np.argmax(gap)) if gap[-1] < LOOP_FRACTION * length else -1
-    return _vec(p[0]), _vec(p[far])
-
-
-def _points(points: ArrayLike) -> NDArray[np.float64]:
-    p = np.array(points, dtype=np.float64)
-    if p.ndim != 2 or p.shape[1] != 3 or len(p) == 0 or not np.isfinite(p).all():
-        raise ValueError(f"points must be finite and of shape (n, 3), n > 0; got {p.shape}")
-    return p
-
-
-def _vec(p: NDArray[np.float64]) -> Vec3:
-    return float(p[0]), float(p[1]), float(p[2])
-
-
-def _flank(side: FlankLike) -> Flank | None:
-    if side is None or isinstance(side, Flank):
-        return side
-    slope, extent = side
-    return Flank(slope_deg=None if slope is None else float(slope), extent_m=float(extent), shape="straight")
-
-
-def _stroke(
-    kind: contract.StrokeKind,
-    first: Vec3,
-    last: Vec3,
-    curve: tuple[contract.CurvePoint, ...],
-    left: FlankLike,
-    right: FlankLike,
-    fields: dict[str, Any],
-) -> contract.Stroke:
-    values = {"id": secrets.token_hex(6), "finished": True, **fields}
-    for name in ("plateau_radius_m", "amplitude_m", "roughness"):
-        if name in values:
-            values[name] = float(values[name])
-    return contract.Stroke(
-        kind=kind, first=first, last=last, curve=curve, left=_flank(left), right=_flank(right), **values
-    )
 
 
 def _same(a: Strokes, b: Strokes) -> bool:
@@ -158,7 +65,7 @@ class HeightWindow:
 
 
 class Terrain:
-    """A terrain without a server. Heights are a pure function of ``strokes`` and ``settings``.
+    """A terrain without a server. Heights are a pure function of ``strokes``, ``layers`` and ``settings``.
 
     size_m: side of the domain, metres; border: "free" or "pinned" to the base; reach_m: how far strokes are felt
     (DESIGN 5.1), default size / 32, None or infinity for pure diffusion. Raises ValueError out of range.
@@ -180,7 +87,8 @@ class Terrain:
         self.settings = TerrainSettings(size_m=size, border=border, reach_m=reach)
         self._strokes: dict[str, contract.Stroke] = {}
         self._solver = solver
-        self._heights: dict[int, tuple[TerrainSettings, Strokes, NDArray[np.float32]]] = {}
+        self._patchwork = Patchwork(size)
+        self._heights: dict[int, tuple[TerrainSettings, Strokes, Base | None, NDArray[np.float32]]] = {}
         self._settled: Settled | None = None
         self._detailed: tuple[Settled, int, DetailedTerrain] | None = None
         self._detail: tuple[DetailedTerrain, int, Detail] | None = None
@@ -207,6 +115,90 @@ class Terrain:
         """Take a stroke away. Raises KeyError when there is none of this id."""
         del self._strokes[stroke_id]
 
+    @property
+    def layers(self) -> tuple[Layer, ...]:
+        """The elevation layers, oldest first."""
+        return self._patchwork.layers
+
+    @property
+    def grids(self) -> Mapping[str, Raster]:
+        """The grids of the layers, by ``Layer.content``."""
+        return self._patchwork.grids
+
+    def add_grid(
+        self,
+        grid: ArrayLike | str | Path,
+        anchor: tuple[float, float] | None = None,
+        rotation: float | None = None,
+        spacing: float | tuple[float, float] | None = None,
+        accuracy: float | None = None,
+        priority: int | None = None,
+        name: str = "",
+        *,
+        scale: float = 1.0,
+        lift: float = 0.0,
+        source: str = "",
+        licence: str = "",
+        answers: Mapping[str, str] | None = None,
+    ) -> str:
+        """Lay an elevation grid on the terrain; returns the layer's id. Nothing is resampled, nothing is rebuilt.
+
+        ``grid``: an array (rows, cols) of heights, NaN where there are none, row 0 south; or the path of a file
+        (docs/importing.md), whose own place counts where it has one. ``anchor``: world position of sample [0, 0],
+        without which a grid lies in the middle; ``rotation``: degrees counter-clockwise; ``spacing``: metres, or
+        (sX, sY); ``accuracy``: the largest error of the grid anywhere, metres, by default from its spacing;
+        ``priority``: of layers that say different things the greater is believed, by default the one added last;
+        height = ``scale`` * sample + ``lift``. ``answers``: to what a file leaves open. Raises ValueError for a grid
+        that cannot be laid, or a file that is refused or leaves something open; OSError.
+        """
+        more: dict[str, Any] = {"name": name, "scale": scale, "lift_m": lift, "source": source, "licence": licence}
+        rank = self._patchwork.next_priority() if priority is None else int(priority)
+        if isinstance(grid, (str, Path)):
+            layer, raster, place = imported(
+                Path(grid), self.settings, anchor=anchor, rotation=rotation, spacing=spacing, accuracy=accuracy,
+                priority=rank, answers=answers or {}, more=more,
+            )  # fmt: skip
+            if self.settings.place is None and place is not None:
+                self.settings = self.settings.model_copy(update={"place": place})
+        else:
+            layer, raster = laid(
+                grid, self.settings.size_m, anchor=anchor, rotation=rotation, spacing=spacing, accuracy=accuracy,
+                priority=rank, more=more,
+            )  # fmt: skip
+        self._patchwork.put(layer, raster)
+        return layer.id
+
+    def set_grid(self, layer_id: str, **fields: Any) -> Layer:
+        """Move, turn, re-weight, hide or rename a layer: fields of ``contract.LayerFields``.
+
+        Raises KeyError, ValueError.
+        """
+        return self._patchwork.change(layer_id, fields)
+
+    def remove_grid(self, layer_id: str) -> None:
+        """Take a layer away. Raises KeyError when there is none of this id."""
+        self._patchwork.remove(layer_id)
+
+    def sample(
+        self, points: ArrayLike, tolerance: float = 0.0, derivatives: bool = False
+    ) -> NDArray[np.float64] | Sample:
+        """The ground of the elevation layers, without strokes, at places (n, 2), world metres; 0 without layers.
+
+        ``tolerance``: the error that may be made, metres; 0 gives the data. Returns heights (n,), or with
+        ``derivatives`` a ``Sample``: heights, gradient and curvature of the same, twice differentiable surface. Raises
+        ValueError for points that are not finite (n, 2).
+        """
+        places = np.asarray(points, dtype=np.float64)
+        if places.ndim != 2 or places.shape[1] != 2 or not np.isfinite(places).all():
+            raise ValueError(f"points must be finite and of shape (n, 2); got {places.shape}")
+        base, n = self._patchwork.base, len(places)
+        if base is None:
+            return Sample(np.zeros(n), np.zeros((n, 2)), np.zeros((n, 3))) if derivatives else np.zeros(n)
+        found = base.sample(places, tolerance=float(tolerance), smooth=True, derivatives=derivatives)
+        if found.gradient is None or found.hessian is None:
+            return found.heights
+        return Sample(found.heights, found.gradient, found.hessian)
+
     def heights(
         self,
         level: int = contract.DEFAULT_LEVEL,
@@ -218,19 +210,24 @@ class Terrain:
     ) -> NDArray[np.float32]:
         """Settled heights of a level: float32 (N, N), metres, row 0 south, read-only.
 
-        Without ``detail``, the solve with ``level`` as its finest. With it, what the page shows: heights as they come
-        from a server that solves levels 0..``global_level`` as a whole and refines to ``refined_level``, and the detail
-        synthesised on them (docs/synthesis.md); ``progress`` is told the share of that which is done. Raises ValueError
+        Strokes on the ground of the elevation layers. Without ``detail``, the solve with ``level`` as its finest. With
+        it, what the page shows: heights as they come from a server that solves levels 0..``global_level`` as a whole
+        and refines to ``refined_level``, and the detail synthesised on them (docs/synthesis.md); ``progress`` is told
+        the share of that which is done. Raises ValueError
         for a level outside 0..MAX_LEVEL; ``window`` goes further.
         """
         if detail:
             return self._whole(level, global_level, refined_level, progress).heights
-        strokes, held = self.strokes, self._heights.get(level)
-        if held is None or held[0] != self.settings or not _same(held[1], strokes):
+        strokes, base, held = self.strokes, self._patchwork.base, self._heights.get(level)
+        if held is None or held[0] != self.settings or held[2] is not base or not _same(held[1], strokes):
             solver = self._solver or default_solver()
-            held = (self.settings, strokes, solver.solve(strokes, self.settings, level)[level])
+            ground = solver.solve(strokes, self.settings, level, base=base)[level]
+            if base is not None:
+                ground = ground + base.level(level, solver.device)
+                ground.flags.writeable = False
+            held = (self.settings, strokes, base, ground)
             self._heights[level] = held
-        return held[2]
+        return held[3]
 
     def attributes(
         self,
@@ -283,8 +280,11 @@ class Terrain:
             made = self._with_detail(global_level, refined_level).window(level, rows, cols, progress)
             return HeightWindow(made.heights, c0 * s, r0 * s, s, made.attributes)
         solver = self._solver or default_solver()
-        refiner = solver.refiner(self._settle(solver, min(level, global_level)).basis)
-        return HeightWindow(refiner.window(level, rows, cols, progress), c0 * s, r0 * s, s)
+        settled, base = self._settle(solver, min(level, global_level)), self._patchwork.base
+        ground = solver.refiner(settled.basis).window(level, rows, cols, progress)
+        if base is not None:
+            ground = ground + base.window(level, rows, cols, solver.device)
+        return HeightWindow(ground, c0 * s, r0 * s, s)
 
     def _whole(
         self, level: int, global_level: int, refined_level: int, progress: Callable[[float], None] | None
@@ -311,40 +311,51 @@ class Terrain:
 
     def _settle(self, solver: Solver, level: int) -> Settled:
         """What refinement and detail start from; that of the last time if nothing has changed."""
-        strokes, held = self.strokes, self._settled
+        strokes, base, held = self.strokes, self._patchwork.base, self._settled
         basis = None if held is None else held.basis
         if (
             held is None
             or basis is None
             or basis.level != level
             or basis.settings != self.settings
+            or basis.base is not base
             or not _same(basis.strokes, strokes)
         ):
-            held = self._settled = settle(solver, strokes, self.settings, level)
+            held = self._settled = settle(solver, strokes, self.settings, level, base=base)
         return held
 
     def assemble(self, level: int) -> System:
-        """(A, b): the float64 sparse system of the height step at ``level``, see ``esker.solve.assembly``."""
-        return assemble(self.strokes, self.settings, level)
+        """(A, b): the float64 sparse system of the height step at ``level``, see ``esker.solve.assembly``.
+
+        Its unknowns are heights above the ground of the elevation layers.
+        """
+        return assemble(self.strokes, self.settings, level, base=self._patchwork.base)
 
     @property
     def document(self) -> Document:
         """The terrain as a document."""
-        return Document(id=self.id, settings=self.settings, strokes=self.strokes)
+        return Document(id=self.id, settings=self.settings, strokes=self.strokes, layers=self.layers)
 
     @classmethod
-    def from_document(cls, document: Document) -> Terrain:
-        """The terrain that a document describes."""
-        out = cls()
+    def from_document(
+        cls, document: Document, grids: Mapping[str, Raster] | None = None, solver: Solver | None = None
+    ) -> Terrain:
+        """The terrain that a document describes.
+
+        ``grids``: those of its elevation layers, by ``Layer.content``. Raises ValueError when one is missing.
+        """
+        out = cls(solver=solver)
         out.id, out.settings = document.id, document.settings
+        out._patchwork = Patchwork(document.settings.size_m, document.layers, grids)
         out._strokes = {s.id: s for s in document.strokes}
         return out
 
     def save(self, path: str | Path) -> None:
-        """Write an ``.esker`` file."""
-        Path(path).write_bytes(archive.dumps(self.document))
+        """Write an ``.esker`` file, with the grids of the layers. Raises ArchiveError for grids too large for one."""
+        Path(path).write_bytes(archive.dumps(self.document, self.grids))
 
     @classmethod
     def load(cls, path: str | Path) -> Terrain:
         """Read an ``.esker`` file. Raises ArchiveError, OSError."""
-        return cls.from_document(archive.loads(Path(path).read_bytes()))
+        data = Path(path).read_bytes()
+        return cls.from_document(archive.loads(data), unpacked(data))

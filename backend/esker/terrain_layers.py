@@ -24,6 +24,7 @@ from pydantic import ValidationError
 
 from esker import contract
 from esker.contract import ImportAnswers, Layer, LayerFields, Place
+from esker.document import archive
 from esker.patchwork import lod_space, rasters
 from esker.patchwork.base import Base
 from esker.patchwork.lod_space import Model, Placed
@@ -71,7 +72,7 @@ class Patchwork:
     def __init__(
         self, size_m: float, layers: tuple[Layer, ...] = (), grids: Mapping[str, Raster] | None = None
     ) -> None:
-        """``grids``: rasters by content. Raises KeyError when that of a layer is not among them."""
+        """``grids``: rasters by content. Raises ValueError when that of a layer is not among them."""
         self.size_m = size_m
         self._layers: dict[str, Layer] = {}
         self._rasters: dict[str, Raster] = {}
@@ -80,7 +81,7 @@ class Patchwork:
         self._key: tuple[object, ...] = ()
         for layer in layers:
             if grids is None or layer.content not in grids:
-                raise KeyError(f"the grid of layer '{layer.name or layer.id}' ({layer.content[:12]}) is not at hand")
+                raise ValueError(f"The grid of layer '{layer.name or layer.id}' ({layer.content[:12]}) is not at hand.")
             self.put(layer, grids[layer.content])
 
     @property
@@ -137,6 +138,16 @@ class Patchwork:
 def _matters(layer: Layer) -> Layer:
     """A layer without what its ground does not follow from."""
     return layer.model_copy(update={"name": "", "author": "", "outline": 0.0, "source": "", "licence": ""})
+
+
+def unpacked(data: bytes) -> dict[str, Raster]:
+    """The grids in the bytes of an ``.esker`` file, by content. Raises ArchiveError."""
+    grids = {}
+    for content, grid in archive.load_grids(data).items():
+        grids[content] = rasters.build(grid.heights, grid.warp)
+        if grids[content].digest != content:
+            raise archive.ArchiveError("An elevation grid in this file is not the one that its terrain names.")
+    return grids
 
 
 def laid(

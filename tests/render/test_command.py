@@ -12,7 +12,7 @@ from PIL import Image
 from esker import templates
 from esker.contract import Document
 from esker.render import command
-from esker.render.studio import open_document
+from esker.render.studio import open_terrain
 from esker.terrain import Stroke, Terrain
 from tests.sync.harness import LiveServer
 
@@ -106,9 +106,9 @@ def test_no_opengl_is_said_before_anything_is_solved(
 
 
 def test_a_terrain_is_found_by_template_and_link(tmp_path: Path) -> None:
-    assert open_document("canyon") == templates.load("canyon").document
+    assert open_terrain("canyon").document == templates.load("canyon").document
     with LiveServer(tmp_path) as server:
         terrain, secret = server.create()
-        found = open_document(f"{server.base}/t/{terrain}#{secret}")
+        found = open_terrain(f"{server.base}/t/{terrain}#{secret}").document
         assert isinstance(found, Document)
         assert found.id == terrain

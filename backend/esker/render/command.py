@@ -14,7 +14,7 @@ from PIL import Image
 from esker.contract import DEFAULT_LEVEL, DEFAULT_REFINED_LEVEL, MAX_LEVEL, MAX_REFINED_LEVEL, Document, TerrainSettings
 from esker.render import turntable
 from esker.render.frame import LOOKS, OVERLAYS, Scene
-from esker.render.studio import open_document, prepare
+from esker.render.studio import open_terrain, prepare
 from esker.render.views import HELP, camera_of, parse, turned
 
 STILLS: Final = {".png": {}, ".jpg": {"quality": 92}, ".jpeg": {"quality": 92}, ".webp": {"quality": 90, "method": 6}}
@@ -106,14 +106,15 @@ def _draw(options: argparse.Namespace, say: Says) -> None:
     from esker.render.reference import Reference
     from esker.solve.solver import Solver
 
-    document = _changed(open_document(options.terrain), options)
+    opened = open_terrain(options.terrain)
+    document = _changed(opened.document, options)
     reference = Reference("plain" if options.plain else "rich")  # before the solve: it fails where there is no OpenGL
     solver = Solver(options.device, max_level=options.level)
     say.say(f"solving on {solver.device_name}")
-    stage = prepare(document, solver, level=options.level, refined=options.refine)
+    stage = prepare(document, solver, grids=opened.grids, level=options.level, refined=options.refine)
 
     def picture(view: str, progress: Callable[[float], None]) -> Image.Image:
-        camera = camera_of(view, stage.surface, document.settings, *options.size)
+        camera = camera_of(view, stage.surface, document.settings, *options.size, land_m=stage.land_m)
         scene = Scene(document.settings, camera, options.tau, overlay=options.overlay)
         made = reference.draw(stage.surface, scene, stage.channels, progress)
         if made.tau_px > options.tau * 1.001:

@@ -25,6 +25,8 @@ VIEWS: Final = {
     "canyon": "orbit:150,27,3100,target:2048,1950,60",
     "volcanic-island": "orbit:165,13,2900,target:2048,2048,150",
     "archipelago": "orbit:160,17,3100,target:2048,1950,20",
+    "rainier": "orbit:318,9,46000,target:52000,14000,2000",
+    "helens": "orbit:20,22,2600,target:1450,1200,2000",
 }
 
 
@@ -32,7 +34,8 @@ def main(names: list[str]) -> int:
     """Draws the named pictures, or all."""
     reference, solver = Reference("rich"), Solver(max_level=DEFAULT_LEVEL)
     for name in names or list(VIEWS):
-        stage = prepare(templates.load(name).document, solver)
+        template = templates.load(name)
+        stage = prepare(template.document, solver, grids=template.rasters())
         settings = stage.document.settings
         camera = camera_of(VIEWS[name], stage.surface, settings, *(OVERSAMPLED * n for n in SIZE))
         made = reference.draw(stage.surface, Scene(settings, camera), stage.channels)

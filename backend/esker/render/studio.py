@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from esker import templates
 from esker.contract import DEFAULT_LEVEL, DEFAULT_REFINED_LEVEL, Document
 from esker.document import archive
+from esker.patchwork.rasters import Raster
 from esker.render.reference import PLAIN_CHANNELS, Channels
 from esker.render.surface import Surface
 from esker.solve.detail import detailed, settle
 from esker.solve.solver import LevelResult, Solver
 from esker.synthesis.subdivide import finest_level
+from esker.terrain_layers import Patchwork, unpacked
 
 GONE: Final = "There is no file, starting terrain or link {!r}. The starting terrains are {}."
 
@@ -29,9 +32,24 @@ class Stage:
     surface: Surface
     channels: Channels
 
+    @property
+    def land_m(self) -> float:
+        """Height that a view from home looks at: about the mean of the land where it is real, as in the page's stage.ts."""
+        if not self.document.layers:
+            return 0.0
+        step = self.document.settings.size_m / 128
+        return step * math.floor(self.surface.mean_m / step + 0.5)
 
-def open_document(name: str) -> Document:
-    """The document of a file (.esker or .json), a starting terrain, or a link to a terrain on a server.
+
+class Opened(NamedTuple):
+    """A document and the grids of its elevation layers, by ``Layer.content``."""
+
+    document: Document
+    grids: Mapping[str, Raster]
+
+
+def open_terrain(name: str) -> Opened:
+    """The terrain of a file (.esker or .json), a starting terrain, or a link to a terrain on a server.
 
     Raises ValueError with a sentence, OSError, and what ``esker.connect`` raises for links.
     """
@@ -39,13 +57,16 @@ def open_document(name: str) -> Document:
         from esker.client import connect
 
         with connect(name, "Picture") as live:
-            return live.document
+            return Opened(live.document, {})
     path = Path(name)
     if path.is_file():
         data = path.read_bytes()
-        return archive.loads(data) if data[:2] == b"PK" else archive.document_from_json(data)
+        if data[:2] != b"PK":
+            return Opened(archive.document_from_json(data), {})
+        return Opened(archive.loads(data), unpacked(data))
     try:
-        return templates.load(name).document
+        template = templates.load(name)
+        return Opened(template.document, template.rasters())
     except KeyError:
         known = ", ".join(t.id for t in templates.catalogue())
         raise ValueError(GONE.format(name, known)) from None
@@ -55,14 +76,17 @@ def prepare(
     document: Document,
     solver: Solver,
     *,
+    grids: Mapping[str, Raster] | None = None,
     level: int = DEFAULT_LEVEL,
     refined: int = DEFAULT_REFINED_LEVEL,
     step: Callable[[LevelResult | None], None] | None = None,
 ) -> Stage:
     """Settles the ground: levels 0..``level`` as a whole, finer ones where they are drawn, refined up to ``refined``,
-    synthesised beyond. ``step`` is told the steps of the solve. Raises what solves raise."""
+    synthesised beyond. ``grids``: those of the elevation layers. ``step`` is told the steps of the solve. Raises
+    ValueError where a grid is missing, and what solves raise."""
     settings = document.settings
-    terrain = detailed(solver, settle(solver, document.strokes, settings, level, step), refined)
+    base = Patchwork(settings.size_m, document.layers, grids).base
+    terrain = detailed(solver, settle(solver, document.strokes, settings, level, step, base=base), refined)
     asked = terrain.site.channels
     channels = Channels(
         np.asarray(asked.get("amplitude", PLAIN_CHANNELS.amplitude)),
