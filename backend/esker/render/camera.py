@@ -130,17 +130,22 @@ def orbit(
     return look_at(eye, pivot, size_m, width, height, clearance_m=clearance_m)
 
 
-def home(size_m: float, width: int, height: int, heading_deg: float = HOME_HEADING_DEG) -> Camera:
-    """The page's view of the whole terrain: all of it under a sky that takes the upper third of the picture."""
+def home(
+    size_m: float, width: int, height: int, heading_deg: float = HOME_HEADING_DEG, ground_m: float = 0.0
+) -> Camera:
+    """The page's view of the whole terrain: all of it under a sky that takes the upper third of the picture.
+
+    ``ground_m``: height of the land that it looks at.
+    """
     h, p = math.radians(heading_deg), math.radians(HOME_PITCH_DEG)
     forward = np.array([math.cos(p) * math.sin(h), math.cos(p) * math.cos(h), math.sin(p)])
     right = np.array([math.cos(h), -math.sin(h), 0.0])
     up = np.cross(right, forward)
-    corners = [np.array([x, y, 0.0]) for x in (0, size_m) for y in (0, size_m)]
+    corners = [np.array([x, y, ground_m]) for x in (0, size_m) for y in (0, size_m)]
     tan = math.tan(math.radians(FOV_DEG) / 2) * (1 - _HOME_MARGIN)
     lift = math.cos(p) * math.tan(math.radians(HOME_ELEVATION_DEG)) + math.sin(p)
     half, distance = size_m / 2, size_m / 2
-    pivot = np.array([half, half, 0.0])
+    pivot = np.array([half, half, ground_m])
     for _ in range(9):
         fitted = half
         for corner in corners:
@@ -148,7 +153,7 @@ def home(size_m: float, width: int, height: int, heading_deg: float = HOME_HEADI
             spread = max(abs(q @ up), abs(q @ right) / (width / height)) / tan
             fitted = max(fitted, spread - q @ forward)
         distance = float(fitted)
-        pivot = np.array([half, half, lift * distance])
+        pivot = np.array([half, half, ground_m + lift * distance])
     eye = _vec(pivot - forward * distance)
     return look_at(eye, _vec(pivot), size_m, width, height, clearance_m=size_m / 4)
 

@@ -22,13 +22,15 @@ class BadView(ValueError):
     """A camera that cannot be understood; the message is a sentence."""
 
 
-def camera_of(text: str, surface: Surface, settings: TerrainSettings, width: int, height: int) -> Camera:
+def camera_of(
+    text: str, surface: Surface, settings: TerrainSettings, width: int, height: int, *, land_m: float = 0.0
+) -> Camera:
     """The camera that is meant (see HELP). Raises BadView."""
     parts = parse(text)
     size = settings.size_m
     if "home" in parts:
         heading = parts["home"][0] if parts["home"] else HOME_HEADING_DEG
-        return home(size, width, height, heading)
+        return home(size, width, height, heading, land_m)
     if "eye" in parts:
         if "target" not in parts:
             raise BadView("An eye needs a target: eye:X,Y,Z,target:X,Y,Z.")
