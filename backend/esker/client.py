@@ -25,25 +25,28 @@ import secrets
 import ssl
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, Self
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from websockets.asyncio.client import ClientConnection
 from websockets.asyncio.client import connect as open_socket
 from websockets.exceptions import ConnectionClosed, InvalidHandshake, InvalidMessage
 
 from esker import contract as c
-from esker.contract import Document, Op, Stroke, TerrainSettings
+from esker.client_layers import Grids, bring_in, steps
+from esker.contract import Document, Layer, Op, Stroke, TerrainSettings
 from esker.document.ops import Refusal
 from esker.document.sync import Diverged, SyncDoc
 from esker.document.undo import UndoPlan
 from esker.document.wire import op_json
 from esker.ground import StreamedGround
+from esker.importing.upload import Uploads
 from esker.link import Link, Refused
+from esker.patchwork.rasters import Raster
 from esker.session.limits import TokenBucket
 from esker.terrain import Terrain
 from esker.tiles.frame import FrameError
@@ -85,6 +88,8 @@ class LiveTerrain:
         """
         self._link, self._name, self._solver = Link(link), name, solver
         self._tls = ssl.create_default_context(cafile=ca_file) if self._link.secure else None
+        self._address, self._ca_file = link, None if ca_file is None else Path(ca_file)
+        self._grids = Grids(link, self._tls)
         self._client = f"py-{secrets.token_hex(8)}"
         self._sync = SyncDoc(self._client)
         self._changed = threading.Condition()
@@ -139,6 +144,17 @@ class LiveTerrain:
             return tuple(self._sync.document.strokes.values())
 
     @property
+    def layers(self) -> tuple[Layer, ...]:
+        """The elevation layers as seen from here, oldest first."""
+        with self._changed:
+            return tuple(self._sync.document.layers.values())
+
+    @property
+    def grids(self) -> dict[str, Raster]:
+        """The grids of the layers by ``Layer.content``, fetched once each. Raises Refused, OSError."""
+        return self._grids.of(self.layers)
+
+    @property
     def settings(self) -> TerrainSettings:
         """The terrain's settings."""
         with self._changed:
@@ -179,12 +195,7 @@ class LiveTerrain:
         with self._changed:
             document = self._sync.confirmed.to_document()
         if self._local is None or self._local[0] != document:
-            terrain = Terrain.from_document(document)
-            if self._solver is not None:
-                terrain = Terrain(document.settings.size_m, solver=self._solver)
-                terrain.settings = document.settings
-                for stroke in document.strokes:
-                    terrain.add(stroke)
+            terrain = Terrain.from_document(document, self._grids.of(document.layers), solver=self._solver)
             self._local = (document, terrain)
         return self._local[1]
 
@@ -229,6 +240,51 @@ class LiveTerrain:
     def set_terrain(self, **fields: Any) -> None:
         """Changes settings: ``title``, ``sea_level_m``, ``look`` … Raises Refused, pydantic.ValidationError."""
         self._submit(c.SetTerrain(fields=c.TerrainFields.model_validate(fields)))
+
+    def add_grid(
+        self,
+        grid: ArrayLike | str | Path,
+        anchor: tuple[float, float] | None = None,
+        rotation: float | None = None,
+        spacing: float | tuple[float, float] | None = None,
+        accuracy: float | None = None,
+        name: str | None = None,
+        *,
+        scale: float | None = None,
+        lift: float | None = None,
+        source: str | None = None,
+        licence: str | None = None,
+        answers: Mapping[str, str] | None = None,
+        told: Callable[[c.ImportStatus], None] = lambda _: None,
+    ) -> str:
+        """Lays an elevation grid on the terrain, for everybody; returns the layer's id. One undo step of ours.
+
+        As ``Terrain.add_grid``, done by the server: ``told`` hears how far it is. Raises Refused, ValueError for what
+        is no grid, OSError, TimeoutError.
+        """
+        fields = {
+            "anchor": None if anchor is None else (float(anchor[0]), float(anchor[1])),
+            "rotation_deg": None if rotation is None else float(rotation),
+            "spacing_m": None if spacing is None else steps(spacing),
+            "accuracy_m": None if accuracy is None else float(accuracy),
+            "name": name,
+            "scale": None if scale is None else float(scale),
+            "lift_m": None if lift is None else float(lift),
+            "source": source,
+            "licence": licence,
+        }
+        with Uploads(self._address, self._ca_file) as uploads:
+            layer = bring_in(uploads, grid, fields, answers or {}, told, self._client)
+        self._await(lambda: layer in self._sync.confirmed.layers, CONNECT_SECONDS, "the new layer did not come")
+        return layer
+
+    def remove_grid(self, layer_id: str) -> None:
+        """Takes a layer away. Raises Refused."""
+        self._submit(c.DeleteLayer(layer=layer_id))
+
+    def set_grid(self, layer_id: str, **fields: Any) -> None:
+        """Moves, turns, weighs, hides or renames a layer: fields of ``contract.LayerFields``. Raises Refused."""
+        self._submit(c.SetLayer(layer=layer_id, fields=c.LayerFields.model_validate(fields)))
 
     def apply(self, op: Op) -> None:
         """Any op of the contract. Raises Refused when it does not apply here."""

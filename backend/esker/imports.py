@@ -93,6 +93,8 @@ class Job:
     """In whose name the layer is added."""
     work: Path
     terrain: str = ""
+    hold: bool = False
+    """Whether it waits for answers even where it asks nothing."""
     stage: ImportStage = "upload"
     share: float = 0.0
     text: str = ""
@@ -150,11 +152,12 @@ class Imports:
         terrain: str,
         link: Link,
         client: str,
+        hold: bool = False,
     ) -> ImportStatus:
-        """Takes a file for a terrain; the import goes on by itself. Raises Cannot."""
+        """Takes a file for a terrain; the import goes on by itself (``hold``: once it is answered). Raises Cannot."""
         await self._check_terrain(terrain)
         job = self._begin(name, person, link.id, client)
-        job.terrain = terrain
+        job.terrain, job.hold = terrain, hold
         await self._receive(job, body, length)
         job.task = asyncio.create_task(self._run(job))
         return job.status()
@@ -299,7 +302,7 @@ class Imports:
         report = await self._inspect(job, settings.place, settings.size_m)
         if report.verdict == "refused":
             raise ImportRefused(report.refusal)
-        if report.verdict == "ask":
+        if report.verdict == "ask" or job.hold:
             await self._ask(job)
         layer = await self._convert(job, settings)
         self._at(job, "saving", CONVERTED)

@@ -74,7 +74,7 @@ def test_a_file_from_before_paint_opens_unchanged() -> None:
         (zipped(esker_json=HEADER), "has no document.json"),
         (zipped(esker_json=b"{", document_json=BODY), "damaged"),
         (zipped(esker_json=b"[]", document_json=BODY), "not an .esker file"),
-        (zipped(esker_json=b'{"format": "esker-terrain", "version": 3}', document_json=BODY), "newer"),
+        (zipped(esker_json=b'{"format": "esker-terrain", "version": 4}', document_json=BODY), "newer"),
         (zipped(esker_json=HEADER, document_json=b'{"id": "t", "strokes": 3}'), "strokes"),
         (zipped(esker_json=HEADER, document_json=b'{"id": "t", "clock": NaN}'), "not valid"),
         (zipped(esker_json=HEADER, document_json=b" " * 40_000_000), "unpacks to more"),

@@ -29,7 +29,7 @@ LAYERS: tuple[frozenset[str], ...] = (
     frozenset({"terrain_layers"}),
     frozenset({"session", "terrain"}),
     frozenset({"ground"}),
-    frozenset({"client", "elevation", "imports", "tls", "headers", "upload", "render"}),
+    frozenset({"client", "client_layers", "elevation", "imports", "tls", "headers", "upload", "render"}),
     frozenset({"server"}),
     frozenset({"run"}),
     frozenset({"bench"}),

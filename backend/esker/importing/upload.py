@@ -45,12 +45,15 @@ class Uploads:
     ) -> None:
         self._http.close()
 
-    def send(self, path: Path, on_progress: Callable[[float], None]) -> c.ImportStatus:
-        """Uploads a file; ``on_progress``: share of its bytes. Raises Refused, OSError, http.client.HTTPException."""
+    def send(self, path: Path, on_progress: Callable[[float], None], query: str = "") -> c.ImportStatus:
+        """Uploads a file; ``on_progress``: share of its bytes; ``query``: more of the address (docs/protocol.md).
+
+        Raises Refused, OSError, http.client.HTTPException.
+        """
         size = path.stat().st_size
         with path.open("rb") as file:
             body = _Told(file, lambda done: on_progress(done / size if size else 1.0))
-            return self._call("POST", f"?name={quote(path.name, safe='')}", body, size)
+            return self._call("POST", f"?name={quote(path.name, safe='')}{query}", body, size)
 
     def follow(self, status: c.ImportStatus, told: Told) -> c.ImportStatus:
         """Asks until the import is over or asks something itself; every status is ``told``. Raises as ``send``."""

@@ -59,7 +59,7 @@ def create_app(hub: Hub, page: Path, data: Path, pictures: Pictures, grids: Grid
     app.state.imports = RateByKey(*IMPORTS)
     add_errors(app)
     add_imports(app, hub, grids, imports)
-    add_terrains(app, hub)
+    add_terrains(app, hub, grids)
     add_links(app, hub)
     add_socket(app, hub)
     add_previews(app, hub, pictures)

@@ -47,12 +47,12 @@ def add_imports(app: FastAPI, hub: Hub, grids: GridStore, imports: Imports) -> N
 
     @app.post("/api/terrains/{terrain}/imports", status_code=202)
     async def upload(
-        request: Request, terrain: str, link: EditorLink, name: FileName = "", client: ClientId = ""
+        request: Request, terrain: str, link: EditorLink, name: FileName = "", client: ClientId = "", hold: bool = False
     ) -> c.ImportStatus:
         limited(request, app.state.imports, "files came")
         person = f"{link.id} {client or address(request)}"
         return await imports.upload(
-            name, person, request.stream(), _length(request), terrain=terrain, link=link, client=client
+            name, person, request.stream(), _length(request), terrain=terrain, link=link, client=client, hold=hold
         )
 
     @app.get("/api/terrains/{terrain}/imports/{job}")

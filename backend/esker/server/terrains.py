@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 import asyncio
+import os
+import tempfile
+from pathlib import Path
 from typing import Annotated, Any, Final
 
 from fastapi import FastAPI, Request, Response
+from fastapi.responses import FileResponse
 from pydantic import Field
+from starlette.background import BackgroundTask
 
 from esker import contract as c
 from esker import templates
 from esker.document import archive
+from esker.patchwork.rasters import RasterError
 from esker.server.answers import AnyLink, Problem, limited
 from esker.session.hub import Hub
+from esker.store.grids import GridStore
 from esker.upload import read_archive
 
-MAX_IMPORT_BYTES: Final = 16 * 1024 * 1024
+MAX_IMPORT_BYTES: Final = c.MAX_GRID_BYTES
+"""Of an uploaded .esker file; its grids are in it."""
 
 
 class NewTerrain(c.Wire):
@@ -26,7 +34,7 @@ class NewTerrain(c.Wire):
     size_m: Annotated[float, Field(ge=c.MIN_SIZE_M, le=c.MAX_SIZE_M)] | None = None
 
 
-def add_terrains(app: FastAPI, hub: Hub) -> None:
+def add_terrains(app: FastAPI, hub: Hub, grids: GridStore) -> None:
     """Adds them."""
 
     @app.get("/api/templates")
@@ -36,16 +44,24 @@ def add_terrains(app: FastAPI, hub: Hub) -> None:
     @app.post("/api/terrains", status_code=201)
     async def create(request: Request, body: NewTerrain) -> dict[str, str]:
         limited(request, app.state.new_terrains, "new terrains came")
-        return await _create(hub, _new_document(body))
+        document = _new_document(body)
+        if body.template is not None and document.layers:
+            await asyncio.to_thread(_put_all, grids, templates.load(body.template))
+        return await _create(hub, document)
 
     @app.post("/api/terrains/import", status_code=201)
     async def upload(request: Request) -> dict[str, str]:
         limited(request, app.state.new_terrains, "new terrains came")
-        content = await _body(request, MAX_IMPORT_BYTES)
+        work = grids.work()
         try:
-            document = await read_archive(content, app.state.uploads)
+            await _receive(request, work / "upload.esker", MAX_IMPORT_BYTES)
+            document = await read_archive(work / "upload.esker", work, app.state.uploads)
+            for digest in {layer.content for layer in (*document.layers, *document.deleted_layers)}:
+                await asyncio.to_thread(grids.keep, work / digest, digest)
         except archive.ArchiveError as error:
             raise Problem(400, "bad_archive", str(error)) from error
+        finally:
+            grids.drop(work)
         return await _create(hub, document)
 
     @app.get("/api/terrains/{terrain}")
@@ -57,14 +73,19 @@ def add_terrains(app: FastAPI, hub: Hub) -> None:
             "role": link.role,
             "clock": document.clock,
             "strokes": len(document.strokes),
+            "layers": len(document.layers),
         }
 
     @app.get("/api/terrains/{terrain}/archive")
     async def download(terrain: str, link: AnyLink) -> Response:  # noqa: ARG001
         document = await hub.document(terrain)
-        content = await asyncio.to_thread(archive.dumps, document)
-        name = f'attachment; filename="{terrain}.esker"'
-        return Response(content, media_type="application/zip", headers={"Content-Disposition": name})
+        try:
+            path = await asyncio.to_thread(_packed, grids, document)
+        except (archive.ArchiveError, RasterError) as error:
+            raise Problem(409, "no_grid", str(error)) from error
+        return FileResponse(
+            path, media_type="application/zip", filename=f"{terrain}.esker", background=BackgroundTask(path.unlink)
+        )
 
 
 def _new_document(body: NewTerrain) -> c.Document:
@@ -91,12 +112,32 @@ async def _create(hub: Hub, document: c.Document) -> dict[str, str]:
     return {"id": born.id, "title": born.settings.title, "secret": secret, "role": link.role}
 
 
-async def _body(request: Request, limit: int) -> bytes:
-    parts: list[bytes] = []
+def _put_all(grids: GridStore, template: templates.Template) -> None:
+    for raster in template.rasters().values():
+        grids.put(raster)
+
+
+def _packed(grids: GridStore, document: c.Document) -> Path:
+    """A temporary .esker file. Raises ArchiveError, RasterError: a grid that is missing or damaged."""
+    live = {layer.content: grids.read(layer.content) for layer in document.layers}
+    gone = {layer.content for layer in document.deleted_layers if layer.content not in live}
+    found = live | {digest: grids.read(digest) for digest in gone if grids.has(digest)}
+    handle, name = tempfile.mkstemp(prefix="esker-archive-", suffix=".esker")
+    with os.fdopen(handle, "wb") as file:
+        try:
+            archive.write(file, document, found)
+        except BaseException:
+            Path(name).unlink()
+            raise
+    return Path(name)
+
+
+async def _receive(request: Request, path: Path, limit: int) -> None:
+    """The body of a request, to the disk."""
     size = 0
-    async for part in request.stream():
-        size += len(part)
-        if size > limit:
-            raise Problem(413, "too_large", f"The file may have {limit // 2**20} MiB at most.")
-        parts.append(part)
-    return b"".join(parts)
+    with path.open("wb") as file:
+        async for part in request.stream():
+            size += len(part)
+            if size > limit:
+                raise Problem(413, "too_large", f"The file may have {limit // 2**20} MiB at most.")
+            file.write(part)

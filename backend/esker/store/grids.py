@@ -75,6 +75,17 @@ class GridStore:
                 raster_dir.rename(target)
         _sync(self.folder)
 
+    def put(self, raster: Raster) -> None:
+        """Stores a raster that is in memory. Raises OSError."""
+        if self.has(raster.digest):
+            return
+        work = self.work()
+        try:
+            rasters.write(work / "raster", raster)
+            self.keep(work / "raster", raster.digest)
+        finally:
+            self.drop(work)
+
     def read(self, digest: str) -> Raster:
         """The raster, mapped from disk; who reads it while another holds it gets the same. Raises RasterError."""
         with self._lock:

@@ -1,0 +1,125 @@
+"""Elevation layers of a live terrain from Python: what ``LiveTerrain.add_grid`` and its like do over HTTP."""
+
+from __future__ import annotations
+
+import http.client
+import io
+import ssl
+import tempfile
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any, Final
+from urllib.parse import urlsplit
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from esker import contract as c
+from esker.importing.upload import Uploads
+from esker.link import Link, Refused
+from esker.patchwork import rasters
+from esker.patchwork.rasters import Raster
+
+HTTP_SECONDS: Final = 120.0
+ARRAY_ANSWERS: Final[Mapping[str, str]] = {"rows": "south first", "nodata": "none"}
+"""What holds of arrays: row 0 is in the south, and what is no data is NaN."""
+
+
+class Grids:
+    """The stored grids of one terrain on a server, fetched once each."""
+
+    def __init__(self, link: str, tls: ssl.SSLContext | None) -> None:
+        self._link, self._netloc, self._tls = Link(link), urlsplit(link).netloc, tls
+        self._rasters: dict[str, Raster] = {}
+
+    def of(self, layers: Iterable[c.Layer]) -> dict[str, Raster]:
+        """The grids of these layers by ``Layer.content``. Raises Refused, OSError."""
+        wanted = {layer.content for layer in layers}
+        for digest in wanted - self._rasters.keys():
+            self._rasters[digest] = self._fetch(digest)
+        return {digest: self._rasters[digest] for digest in wanted}
+
+    def _fetch(self, digest: str) -> Raster:
+        connection: http.client.HTTPConnection
+        if self._tls is not None:
+            connection = http.client.HTTPSConnection(self._netloc, timeout=HTTP_SECONDS, context=self._tls)
+        else:
+            connection = http.client.HTTPConnection(self._netloc, timeout=HTTP_SECONDS)
+        try:
+            path = f"/api/terrains/{self._link.terrain}/grids/{digest}"
+            connection.request("GET", path, headers={"Authorization": f"Bearer {self._link.secret}"})
+            response = connection.getresponse()
+            data = response.read()
+        finally:
+            connection.close()
+        if response.status != 200:
+            raise Refused("no_grid", f"The server did not give an elevation grid ({response.status}).")
+        with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
+            raster = rasters.build(arrays["heights"], arrays.get("warp"))
+        if raster.digest != digest:
+            raise Refused("no_grid", "The server gave another elevation grid than was asked for.")
+        return raster
+
+
+def bring_in(
+    uploads: Uploads,
+    grid: ArrayLike | str | Path,
+    fields: Mapping[str, Any],
+    answers: Mapping[str, str],
+    told: Callable[[c.ImportStatus], None],
+    client: str,
+) -> str:
+    """Uploads a file or an array and follows its import to the end; returns the id of the layer.
+
+    ``client``: in whose name. ``fields``: of ``contract.ImportAnswers``, where they are not None. Raises Refused (with
+    the server's sentence, or with what it asks and nobody answered), ValueError for what is no grid, OSError,
+    http.client.HTTPException.
+    """
+    given = {name: value for name, value in fields.items() if value is not None}
+    if isinstance(grid, str | Path):
+        return _follow(uploads, Path(grid), given, answers, told, client)
+    array = np.asarray(grid)
+    if array.ndim != 2 or array.dtype.kind not in "fiu":
+        raise ValueError(f"a grid is a two-dimensional array of numbers, not {array.dtype} of shape {array.shape}")
+    if "spacing_m" not in given:
+        raise ValueError("an array does not say how far its samples are apart: give spacing=metres or (sX, sY)")
+    with tempfile.TemporaryDirectory(prefix="esker-grid-") as folder:
+        path = Path(folder) / "array.npy"
+        np.save(path, array, allow_pickle=False)
+        return _follow(uploads, path, given, {**ARRAY_ANSWERS, **answers}, told, client, always=True)
+
+
+def _follow(
+    uploads: Uploads,
+    path: Path,
+    given: Mapping[str, Any],
+    answers: Mapping[str, str],
+    told: Callable[[c.ImportStatus], None],
+    client: str,
+    always: bool = False,
+) -> str:
+    """``always``: what the answers leave open is taken as the server proposes."""
+    query = f"&client={client}" + ("&hold=true" if given or answers else "")
+    status = uploads.follow(uploads.send(path, lambda _: None, query), told)
+    if status.stage == "question":
+        asked = status.report.questions if status.report is not None else ()
+        by_hand = {"size", "place"} if "spacing_m" in given else {"place"} if "anchor" in given else set()
+        found = {q.id: answers.get(q.id, q.default) for q in asked if always or q.id in answers or q.id in by_hand}
+        open_ones = [question for question in asked if question.id not in found]
+        if open_ones:
+            uploads.cancel(status)
+            hints = " ".join(f"{q.text} (answers={{{q.id!r}: {q.default!r}}}, for instance)" for q in open_ones)
+            raise Refused("question", f"{path.name} leaves something open. {hints}")
+        status = uploads.follow(uploads.answer(status, c.ImportAnswers(answers=found, **given)), told)
+    if status.layer is None:
+        raise Refused(status.stage, status.text or "The server did not take this file.")
+    return status.layer
+
+
+def steps(spacing: float | tuple[float, float]) -> tuple[float, float]:
+    """(sX, sY) of one number or two. Raises ValueError."""
+    found = np.asarray(spacing, dtype=np.float64)
+    if found.shape not in {(), (2,)}:
+        raise ValueError("spacing is one number or two: (sX, sY)")
+    x, y = np.broadcast_to(found, 2).tolist()
+    return x, y
