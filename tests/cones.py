@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from esker import grid
-from esker.contract import View
+from esker.contract import Channel, View
 from esker.grid import TileKey
 from esker.tiles.codec import Wide, child_window, predict
 from esker.tiles.decoder import FrameDecoder, HeldTile
@@ -54,10 +54,18 @@ class Ground:
         found = self.heights(at[None, :], at[:, None])
         return found if settled else found * np.float32(1 - 0.02 * (LEVELS + 1 - level))
 
-    def tile(self, key: TileKey) -> Made:
+    def tile(self, key: TileKey, base: Ground | None = None) -> Made:
         step = grid.spacing(key.level, SIZE_M)
         x, y = ((np.arange(65) + 64 * place) * step for place in (key.x, key.y))
-        return Made(key, self.heights(x[None, :], y[:, None]))
+        under = None if base is None else base.heights(x[None, :], y[:, None])
+        return Made(key, self.heights(x[None, :], y[:, None]), under)
+
+    def samples(self, key: TileKey) -> Wide:
+        """Quanta of a tile."""
+        quanta: Wide = np.rint(self.tile(key).heights * np.float32(1 / grid.quantum(key.level, SIZE_M))).astype(
+            np.int32
+        )
+        return quanta
 
     def edit(self, rng: random.Random) -> None:
         """Another cone, sometimes one less; or all a little higher, by less than a quantum of the coarse levels."""
@@ -100,6 +108,32 @@ def shown(held: dict[TileKey, HeldTile], key: TileKey, memo: dict[TileKey, Wide]
     return memo[key]
 
 
+def drawn(decoder: FrameDecoder) -> dict[TileKey, Wide]:
+    """What the page draws (``frontend/src/tiles/store.ts``), in whole quanta: offsets plus base.
+
+    A tile waits for its own base, but while no tile of its level has one, all stand on what the level above predicts.
+    """
+    heights, base = decoder.channels[Channel.HEIGHT], decoder.channels[Channel.BASE]
+    offsets: dict[TileKey, Wide] = {}
+    if not base:
+        return {key: shown(heights, key, offsets) for key in heights}
+    own: dict[TileKey, Wide] = {}
+    ground: dict[TileKey, Wide] = {}
+    out: dict[TileKey, Wide] = {}
+    levels = {key.level for key in base}
+    for key in sorted(heights):
+        if key.level and key.parent() not in out:
+            continue
+        if key in base:
+            ground[key] = shown(base, key, own)
+        elif key.level and key.level not in levels:
+            ground[key] = child_window(predict(ground[key.parent()].astype(np.int32)), key.x, key.y)
+        else:
+            continue
+        out[key] = shown(heights, key, offsets) + ground[key]
+    return out
+
+
 class Client:
     """A client's half on the server, and the decoder that the page would run."""
 
@@ -127,34 +161,41 @@ class Client:
         held = self.decoder.held
         for channel, sent in self.decoder.channels.items():
             assert self.tiles.held(channel) == {k: t.version for k, t in sent.items()}
-        assert all(k.level == 0 or k.parent() in held for k in held)
-        assert sum(k.level > LEVELS for k in held) <= self.server.refined.client_tiles
-        for tiles in self.tiles._refined._held.values():
-            for key, known in tiles.items():
-                then = held[key].parent_then
-                assert then is not None
-                assert np.array_equal(known.base.samples, then), "both sides predict from the same parent"
-        memo: dict[TileKey, Wide] = {}
-        for key, tile in held.items():
-            for dx, dy in ((1, 0), (0, 1), (1, 1), (1, -1)):
-                other = key._replace(x=key.x + dx, y=key.y + dy)
-                if other in held:
-                    assert np.array_equal(edge(tile.samples, dx, dy), edge(held[other].samples, -dx, -dy)), (key, other)
-                    mine, theirs = shown(held, key, memo), shown(held, other, memo)
-                    assert np.array_equal(edge(mine, dx, dy), edge(theirs, -dx, -dy)), (key, other)
+        both = ((held, self.tiles._refined), (self.decoder.channels[Channel.BASE], self.tiles._refined_base))
+        for sent, ledger in both:
+            assert all(k.level == 0 or k.parent() in sent for k in sent)
+            assert sum(k.level > self.server.levels for k in sent) <= self.server.refined.client_tiles
+            for tiles in ledger._held.values():
+                for key, known in tiles.items():
+                    then = sent[key].parent_then
+                    assert then is not None
+                    assert np.array_equal(known.base.samples, then), "both sides predict from the same parent"
+            memo: dict[TileKey, Wide] = {}
+            seamless({key: tile.samples for key, tile in sent.items()})
+            seamless({key: shown(sent, key, memo) for key in sent})
+        if self.decoder.channels[Channel.BASE]:
+            seamless(drawn(self.decoder))
 
-    def check_newest(self, ground: Ground) -> None:
+    def check_newest(self, ground: Ground, channel: Channel = Channel.HEIGHT) -> None:
         """All that is wanted is held, as the ground is, and nothing moves along any more."""
-        held = self.decoder.held
+        held = self.decoder.channels[channel]
         wanted = self.tiles.wanted_refined()
         assert wanted <= held.keys()
         memo: dict[TileKey, Wide] = {}
         for key, tile in held.items():
             assert shown(held, key, memo) is not None
             assert np.array_equal(memo[key], tile.samples), "a tile still rides along"
-            if key.level <= LEVELS or key in wanted:
-                want = np.rint(ground.tile(key).heights * np.float32(1 / grid.quantum(key.level, SIZE_M)))
-                assert np.array_equal(tile.samples, want.astype(np.int32)), key
+            if key.level <= self.server.levels or key in wanted:
+                assert np.array_equal(tile.samples, ground.samples(key)), key
+
+
+def seamless(tiles: dict[TileKey, Wide]) -> None:
+    """Neighbours of one level agree on their edges and corners to the bit."""
+    for key, mine in tiles.items():
+        for dx, dy in ((1, 0), (0, 1), (1, 1), (1, -1)):
+            theirs = tiles.get(key._replace(x=key.x + dx, y=key.y + dy))
+            if theirs is not None:
+                assert np.array_equal(edge(mine, dx, dy), edge(theirs, -dx, -dy)), (key, dx, dy)
 
 
 def near(x: float, y: float, z: float = 6.0, turn: float = 0.0, **fields: object) -> View:
@@ -170,12 +211,21 @@ def a_view(rng: random.Random, ground: Ground) -> View:
     return near(x, y, rng.choice([3.0, 15.0, 80.0]), rng.uniform(0, 6.28))
 
 
+def lay(server: TileServer, base: Ground | None, clock: int) -> int:
+    """Puts the base of every level; None: the layers are gone. Returns how many tiles changed."""
+    made = Ground() if base is None else base
+    levels = range(server.levels + 1)
+    return sum(server.put_level(clock, level, made.level(level), True, Channel.BASE) for level in levels)
+
+
 def solve(server: TileServer, ground: Ground, clock: int, settled: bool, levels: Iterable[int] | None = None) -> None:
     for level in range(LEVELS + 1) if levels is None else levels:
         server.put_level(clock, level, ground.level(level, settled), settled)
 
 
-def settle(server: TileServer, ground: Ground, clock: int, clients: Iterable[Client]) -> int:
+def settle(
+    server: TileServer, ground: Ground, clock: int, clients: Iterable[Client], base: Ground | None = None
+) -> int:
     """Refines whatever is wanted, sends whatever is owed, until neither is left; returns how many tiles were made."""
     made = 0
     clients = list(clients)
@@ -183,7 +233,7 @@ def settle(server: TileServer, ground: Ground, clock: int, clients: Iterable[Cli
         wishes, count = server.wishes([client.tiles for client in clients])
         assert len(wishes) <= min(count, WISHES)
         for key in wishes:
-            assert server.put_tile(clock, ground.tile(key))
+            assert server.put_tile(clock, ground.tile(key, base))
             made += 1
         for client in clients:
             client.drain()

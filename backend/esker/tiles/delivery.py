@@ -167,12 +167,6 @@ class TileServer:
         final = all(level is not None and level.settled and level.stamp > self._based for level in levels)
         return final and self._base_whole and len({v.clock for v in levels if v}) == 1
 
-    def verified(self, key: TileKey) -> bool:
-        """Whether a refined tile and its base belong to the settled ground as it is."""
-        if self.refined.verified(key) is None:
-            return False
-        return not self.base.held or self.refined_base.verified(key) is not None
-
     def wishes(self, clients: Sequence[ClientTiles]) -> tuple[tuple[TileKey, ...], int]:
         """The tiles to refine next for all clients together, coarse before fine, then by screen error.
 
@@ -252,7 +246,7 @@ class ClientTiles:
 
     def missing(self) -> list[tuple[TileKey, float]]:
         """Wanted tiles that the settled ground has not been refined to yet, with their projected errors in pixels."""
-        return [(k, e) for k, e in self._selection.tiles.items() if not self._server.verified(k)]
+        return [(k, e) for k, e in self._selection.tiles.items() if self._server.refined.verified(k) is None]
 
     def plan(self) -> FramePlan | None:
         """The most useful next frame, or None when there is nothing to send now. Cheap; changes nothing held.
