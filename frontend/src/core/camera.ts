@@ -9,10 +9,12 @@
 import { type ReadonlySignal, signal } from "@preact/signals-core";
 import {
   cameraState,
+  FLAT,
   fitDistance,
   HOME_HEADING,
   HOME_PITCH,
   homePose,
+  type Land,
   type Pose,
   poseBasis,
   poseEye,
@@ -75,8 +77,8 @@ export class Camera {
   #zoomLeft = 0;
   #zoomAnchor: Vec3 | undefined;
   #clearance: number;
-  /** Height of the land that home looks at. */
-  #groundM = 0;
+  /** The land that home looks at. */
+  #land: Land = FLAT;
   #width = 1;
   #height = 1;
 
@@ -256,15 +258,15 @@ export class Camera {
     this.#flyTo(this.#homePose(this.#pose.mode), durationMs);
   }
 
-  /** Says how high the land lies, metres. A camera that is still at home goes along. */
-  stand(groundM: number): void {
-    if (groundM === this.#groundM) return;
+  /** Says how high the land lies. A camera that is still at home goes along. */
+  stand(land: Land): void {
+    if (land.groundM === this.#land.groundM && land.lowM === this.#land.lowM) return;
     const home = this.#homePose(this.#pose.mode);
     const { pivot, distanceM, heading, pitch } = this.#pose;
     const near = 1e-6 * this.#sizeM;
     const turned = Math.abs(wrapAngle(heading - home.heading)) + Math.abs(pitch - home.pitch);
     const there = distance(pivot, home.pivot) + Math.abs(distanceM - home.distanceM) < near && turned < 1e-6;
-    this.#groundM = groundM;
+    this.#land = land;
     if (there && !this.moving) this.#set(this.#homePose(this.#pose.mode));
   }
 
@@ -354,7 +356,7 @@ export class Camera {
   }
 
   #homePose(mode: CameraMode): Pose {
-    const pose = homePose(mode, this.#sizeM, this.#width / this.#height, this.#groundM);
+    const pose = homePose(mode, this.#sizeM, this.#width / this.#height, this.#land);
     return { ...pose, distanceM: Math.min(pose.distanceM, this.#farthest) };
   }
 

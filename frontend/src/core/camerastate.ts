@@ -62,13 +62,27 @@ export const HOME_PITCH = -16 * DEG;
 const HOME_ELEVATION = 19 * DEG;
 const HOME_MARGIN = 0.06;
 
+/** How high the land lies on the whole, and what of it must be seen at its corners, metres. */
+export interface Land {
+  readonly groundM: number;
+  readonly lowM: number;
+}
+
+export const FLAT: Land = { groundM: 0, lowM: 0 };
+
 /**
  * The view of the whole terrain. The eye stands higher than its look is steep, so the pivot lies above the middle of the
- * land: that puts the land in the lower two thirds, as large as fits, under a sky. `groundM`: height of that land.
+ * land: that puts the land in the lower two thirds, as large as fits, under a sky. `land`: how high that is.
  */
-export function homePose(mode: Pose["mode"], sizeM: number, aspect: number, groundM = 0): Pose {
+export function homePose(mode: Pose["mode"], sizeM: number, aspect: number, land: Land = FLAT): Pose {
+  const { groundM, lowM } = land;
   const half = sizeM / 2;
-  const corners: Vec3[] = [0, sizeM].flatMap((x) => [0, sizeM].map((y): Vec3 => [x, y, groundM]));
+  const corners: Vec3[] = [0, sizeM].flatMap((x) =>
+    [0, sizeM].flatMap((y): Vec3[] => [
+      [x, y, groundM],
+      [x, y, lowM],
+    ]),
+  );
   const fitted = (pose: Pose): Pose => ({ ...pose, distanceM: fitDistance(pose, corners, aspect, HOME_MARGIN, half) });
   const base = { mode, pivot: [half, half, groundM] as Vec3, distanceM: 1, fovDeg: FOV_DEG };
   if (mode === "map") return fitted({ ...base, heading: 0, pitch: -90 * DEG });

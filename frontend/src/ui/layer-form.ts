@@ -143,7 +143,7 @@ export class EskLayerForm extends SignalElement {
         @value=${(e: CustomEvent<number>) => this.#set({ outline: share(e.detail) }, false)}
         @settle=${(e: CustomEvent<number>) => this.#set({ outline: share(e.detail) })}
       ></esk-range>
-      ${this.#text("Source", "source", disabled, "Who measured it, when")}
+      ${this.#text("Name", "name", disabled, layer.facts.file || "Elevation grid")} ${this.#text("Source", "source", disabled, "Who measured it, when")}
       ${this.#text("Licence", "licence", disabled, "How it may be used")}
       <details>
         <summary>What it is</summary>
@@ -153,12 +153,12 @@ export class EskLayerForm extends SignalElement {
     `;
   }
 
-  #text(label: string, field: "source" | "licence", disabled: boolean, placeholder: string): TemplateResult {
+  #text(label: string, field: "name" | "source" | "licence", disabled: boolean, placeholder: string): TemplateResult {
     return html`<label class="text">
       ${label}
       <input
         class="field"
-        maxlength="240"
+        maxlength=${field === "name" ? 80 : 240}
         placeholder=${placeholder}
         .value=${this.layer[field]}
         ?disabled=${disabled}

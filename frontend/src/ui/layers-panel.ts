@@ -9,7 +9,6 @@ import { layerColour, layerName, orderedLayers, reorderOps } from "./layers.ts";
 import { importingWords } from "./others.ts";
 import { SignalElement } from "./signal-element.ts";
 import type { Stage } from "./stage.ts";
-import { blurOnEnter } from "./stroke-panel.ts";
 import { layersPanelStyles } from "./styles/layers-panel.ts";
 import { panelStyles } from "./styles/panel.ts";
 import { shared } from "./styles/shared.ts";
@@ -120,26 +119,7 @@ export class EskLayersPanel extends SignalElement {
           )}
           ${this.#icon("trash", `Delete ${name}`, edit, () => session.submit({ type: "layer.delete", layer: layer.id }))}
         </div>
-        ${
-          open
-            ? html`<input
-                  class="field name"
-                  aria-label="Name of the layer"
-                  maxlength="80"
-                  placeholder=${layer.facts.file || "Name"}
-                  .value=${layer.name}
-                  ?disabled=${!edit}
-                  @change=${(e: Event) =>
-                    session.submit({
-                      type: "layer.set",
-                      layer: layer.id,
-                      fields: { name: (e.target as HTMLInputElement).value.trim() },
-                    })}
-                  @keydown=${blurOnEnter}
-                />
-                <esk-layer-form .stage=${this.stage} .layer=${layer}></esk-layer-form>`
-            : nothing
-        }
+        ${open ? html`<esk-layer-form .stage=${this.stage} .layer=${layer}></esk-layer-form>` : nothing}
       </li>
     `;
   }

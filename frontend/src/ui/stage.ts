@@ -2,6 +2,7 @@
 
 import { computed, effect, type ReadonlySignal, signal } from "@preact/signals-core";
 import { Camera } from "../core/camera.ts";
+import { FLAT, type Land } from "../core/camerastate.ts";
 import { isGround } from "../core/streams.ts";
 import type {
   ChannelGrid,
@@ -278,18 +279,20 @@ export class Stage {
     this.#stops.push(
       effect(() => {
         this.tiles.revision.value;
-        if (session.doc.doc.value?.layers.size) this.camera.stand(this.#landHeight());
+        if (session.doc.doc.value?.layers.size) this.camera.stand(this.#land());
       }),
     );
     this.#watchSize();
   }
 
-  /** About how high the land lies on average, metres: in steps, so that a view at home does not tremble while it arrives. */
-  #landHeight(): number {
+  /** About how high the land lies: in steps, so that a view at home does not tremble while it arrives. */
+  #land(): Land {
     const heights = this.tiles.tile(0, 0, 0)?.heights;
-    if (heights === undefined) return 0;
+    if (heights === undefined) return FLAT;
     const step = this.sizeM / 128;
-    return step * Math.round(heights.reduce((sum, h) => sum + h, 0) / heights.length / step);
+    const stepped = (h: number): number => step * Math.round(h / step);
+    const mean = heights.reduce((sum, h) => sum + h, 0) / heights.length;
+    return { groundM: stepped(mean), lowM: stepped(heights.reduce((low, h) => Math.min(low, h))) };
   }
 
   #watchSize(): void {

@@ -44,11 +44,6 @@ export const layersPanelStyles = css`
     border-radius: 3px;
     border: 1px solid rgb(0 0 0 / 25%);
   }
-  .layer .name {
-    width: 100%;
-    margin: 2px 0 8px;
-    height: 32px;
-  }
   .grip {
     flex: none;
     display: grid;
