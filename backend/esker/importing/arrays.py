@@ -88,8 +88,9 @@ def raw_shapes(path: Path, dtype: np.dtype[Any]) -> list[tuple[int, int]]:
         for rows, cols in {(small, count // small), (count // small, small)}
         if max(rows, cols) <= MAX_ASPECT * min(rows, cols) and min(rows, cols) > 1
     ]
-    head = np.memmap(path, dtype=dtype, mode="r", shape=(min(count, 1 << 20),)).astype(np.float64)
-    head[~np.isfinite(head)] = 0.0
+    with np.errstate(all="ignore"):  # bytes of another type make any kind of number
+        head = np.memmap(path, dtype=dtype, mode="r", shape=(min(count, 1 << 20),)).astype(np.float64)
+        head[~np.isfinite(head) | (np.abs(head) > 1e30)] = 0.0
 
     def unlike(shape: tuple[int, int]) -> tuple[float, int]:
         cols = shape[1]

@@ -22,6 +22,7 @@ from rasterio.windows import Window
 
 from esker.importing import colours
 from esker.importing.georef import Georef, check_affine, from_corner, vertical_unit_m
+from esker.importing.limits import ALONE
 from esker.importing.refusal import ImportRefused
 from esker.importing.source import MAX_BLOCK_BYTES, PIECE_SAMPLES, Piece, Source, check_shape, integer_step
 
@@ -48,20 +49,27 @@ class GdalSource(Source):
         for window in self._windows():
             try:
                 yield self._read(window)
-            except (RasterioError, CPLE_BaseError, MemoryError, ValueError) as error:
+            except (RasterioError, CPLE_BaseError, ValueError) as error:
                 raise ImportRefused(
                     f"The file's data are broken at row {int(window.row_off)}: its header is good but its samples "
                     "cannot be read."
                 ) from error
 
     def _windows(self) -> Iterator[Any]:
-        """Windows that cut no block of the file twice."""
-        height, width = self.dataset.block_shapes[self.band - 1]
+        """Windows in an order that decodes no block twice: whole blocks, or bands of one that is large."""
+        height, width = (min(*pair) for pair in zip(self._block(), (self.rows, self.cols), strict=True))
         across = min(self.cols, max(width, PIECE_SAMPLES // height // width * width))
         down = max(height, PIECE_SAMPLES // across // height * height)
+        band = min(down, max(1, PIECE_SAMPLES // across))
         for row in range(0, self.rows, down):
             for col in range(0, self.cols, across):
-                yield Window(col, row, min(across, self.cols - col), min(down, self.rows - row))
+                for part in range(row, min(row + down, self.rows), band):
+                    stop = min(part + band, row + down, self.rows)
+                    yield Window(col, part, min(across, self.cols - col), stop - part)
+
+    def _block(self) -> tuple[int, int]:
+        height, width = self.dataset.block_shapes[self.band - 1]
+        return int(height), int(width)
 
     def _read(self, window: Any) -> Piece:
         row, col = int(window.row_off), int(window.col_off)
@@ -69,7 +77,8 @@ class GdalSource(Source):
             bands = self.dataset.read((1, 2, 3), window=window)
             values = colours.decode(bands, self.encoding)
         else:
-            values = self.dataset.read(self.band, window=window).astype(np.float64)
+            with np.errstate(invalid="ignore"):  # signalling NaN
+                values = self.dataset.read(self.band, window=window).astype(np.float64)
         valid = (
             self.dataset.read_masks(self.band, window=window) != 0 if self.masked else np.ones(values.shape, np.bool_)
         )
@@ -78,9 +87,10 @@ class GdalSource(Source):
 
 def open_raster(path: Path, driver: str, band: int = 1) -> GdalSource:
     """Opens one file with one driver; nothing beside it is looked at. Raises ImportRefused."""
-    warnings.simplefilter("ignore", NotGeoreferencedWarning)
     try:
-        dataset = rasterio.open(path, driver=driver)
+        with warnings.catch_warnings(), rasterio.Env(**ALONE):
+            warnings.simplefilter("ignore", NotGeoreferencedWarning)
+            dataset = rasterio.open(path, driver=driver)
     except (RasterioError, CPLE_BaseError) as error:
         raise ImportRefused(
             f"It starts like {FORMATS[driver]} but cannot be opened: it is broken or cut off."

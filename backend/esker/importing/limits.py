@@ -28,23 +28,26 @@ KEPT: Final = (
     "VIRTUAL_ENV",
 )
 """What the process gets of the server's environment; nothing that could hold a secret."""
+ALONE: Final[Mapping[str, str]] = {
+    "GDAL_DISABLE_READDIR_ON_OPEN": "EMPTY_DIR",
+    "GDAL_GEOREF_SOURCES": "INTERNAL",
+    "GDAL_PAM_ENABLED": "NO",
+    "GDAL_VRT_ENABLE_PYTHON": "NO",
+    "CPL_VSIL_CURL_ALLOWED_EXTENSIONS": ".none",
+}
+"""GDAL's settings that make it look at one file and nothing beside it."""
 HARDENED: Final[Mapping[str, str]] = {
+    **ALONE,
     "LANG": "C.UTF-8",
     "PYTHONUTF8": "1",
     "OPENBLAS_NUM_THREADS": "1",
     "OMP_NUM_THREADS": "1",
     "GDAL_NUM_THREADS": "1",
-    "GDAL_CACHEMAX": "64",
+    "GDAL_CACHEMAX": "272",
     "GDAL_DRIVER_PATH": "disable",
-    "GDAL_DISABLE_READDIR_ON_OPEN": "EMPTY_DIR",
-    "GDAL_GEOREF_SOURCES": "INTERNAL",
-    "GDAL_PAM_ENABLED": "NO",
-    "GDAL_VRT_ENABLE_PYTHON": "NO",
     "GDAL_HTTP_MAX_RETRY": "0",
     "GDAL_HTTP_TIMEOUT": "1",
     "GDAL_HTTP_PROXY": "127.0.0.1:9",
-    "CPL_VSIL_CURL_ALLOWED_EXTENSIONS": ".none",
-    "CPL_VSIL_CURL_USE_HEAD": "NO",
     "CPL_TMPDIR": "/nonexistent",
     "PROJ_NETWORK": "OFF",
 }

@@ -61,8 +61,8 @@ def open_source(path: Path, name: str, workdir: Path, answers: Mapping[str, str]
                 path, name, prj = zipped.unpack(archive, workdir)
                 with path.open("rb") as file:
                     head = file.read(4096)
-        if head.startswith(b"PK") and prj is None and path.parent == workdir:
-            raise ImportRefused("A zip file inside a zip file is not opened.")
+                if head.startswith(b"PK"):
+                    raise ImportRefused("A zip file inside a zip file is not opened.")
     opened = _open(path, name, head, workdir, answers)
     if prj is not None and opened.source.georef is not None and opened.source.georef.crs is None:
         opened.source.georef = opened.source.georef.with_crs(_prj(prj))

@@ -20,6 +20,8 @@ EARTH_M: Final = (-12_000.0, 9_500.0)
 """Nothing solid on Earth is lower or higher."""
 GAP_SHARE: Final = 0.5
 """A value that stands apart from all others by more than this share of their range may be none of them."""
+LOW_GAP_SHARE: Final = 0.1
+"""The same for zero and for negative codes: ground comes down to its lowest values little by little."""
 MIN_ZERO_SHARE: Final = 1e-3
 DECIMETRE: Final = 0.1
 EIGHT_BIT_STEP_M: Final = 4.0
@@ -40,9 +42,12 @@ def number(value: float) -> str:
 
 def suspects(scan: Scan, source: Source) -> tuple[float, ...]:
     """Raw values that stand far apart from all others and are codes for nodata, zero or beyond the Earth."""
-    below = _apart([v for v, _ in scan.lows], scan.high, 1.0, scan, source)
-    rest = [v for v, _ in scan.lows if v not in below]
-    above = _apart([v for v, _ in scan.highs], rest[0] if rest else scan.low, -1.0, scan, source)
+    lows, highs = [v for v, _ in scan.lows], [v for v, _ in scan.highs]
+    below: tuple[float, ...] = ()
+    above: tuple[float, ...] = ()
+    for _ in range(2):  # a code at one end hides, by the range that it makes, one at the other
+        below = _apart(lows, highs[len(above)] if highs else 0.0, 1.0, scan, source)
+        above = _apart(highs, lows[len(below)] if lows else 0.0, -1.0, scan, source)
     return (*below, *above)
 
 
@@ -53,7 +58,8 @@ def _apart(values: list[float], far: float, sign: float, scan: Scan, source: Sou
         gap, span = sign * (rest - ours[-1]), sign * (far - rest)
         if span < 0.0:  # the other end is suspicious too and is told apart by itself
             continue
-        if all(_suspicious(value, scan, source) for value in ours) and gap > max(GAP_SHARE * span, 1.0):
+        share = LOW_GAP_SHARE if max(ours) <= 0.0 else GAP_SHARE
+        if all(_suspicious(value, scan, source) for value in ours) and gap > max(share * span, 1.0):
             return tuple(ours)
     return ()
 
