@@ -49,8 +49,14 @@ class PlainSolver:
                 n = grid.samples(level)
                 yield Level(level, np.full((n, n), height, dtype=np.float32), settled)
 
-    def channels(self, *_: Any) -> Iterator[Any]:
+    def channels(self, *_: Any, **__: Any) -> Iterator[Any]:
         return iter(())
+
+    def base_levels(self, base: Any, levels: int) -> Iterator[Level]:
+        for level in range(levels + 1):
+            yield Level(level, base.level(level), True, c.Channel.BASE)
+        for level in range(max(0, levels - c.CHANNEL_LEVELS_BELOW) + 1):
+            yield Level(level, base.survey(level), True, c.Channel.SURVEY)
 
     def refiner(self, basis: object) -> Any:
         raise AssertionError(f"nobody was given {basis}")

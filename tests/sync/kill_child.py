@@ -27,7 +27,7 @@ class _NoSolver:
     def steps(self, *_: Any, **__: Any) -> Any:
         return iter(())
 
-    def channels(self, *_: Any) -> Any:
+    def channels(self, *_: Any, **__: Any) -> Any:
         return iter(())
 
     def refiner(self, _: Any) -> Any:
