@@ -6,6 +6,7 @@ place, and the patch, whose samples are interpolated bilinearly. ``errors_refere
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 
 import numpy as np
@@ -44,11 +45,12 @@ def _whole_kernels(heights: Heights, size: int, start: int, stop: int, out: NDAr
 
 def whole_kernels(heights: Heights) -> NDArray[np.bool_] | None:
     """Which of the smallest kernels of a grid hold no nodata; None if the grid holds none at all."""
-    holed = np.zeros(heights.shape[0], bool)
-    spread(lambda a, b: _any_nodata(heights, a, b, holed), bands(heights.shape[0], 64))
+    rows, cols = heights.shape
+    holed = np.zeros(rows, np.bool_)
+    spread(lambda a, b: _any_nodata(heights, a, b, holed), bands(rows, 64))
     if not holed.any():
         return None
-    out = np.ones(patches.table_shape(*heights.shape, 0), bool)
+    out = np.ones(patches.table_shape(rows, cols, 0), np.bool_)
     spread(lambda a, b: _whole_kernels(heights, patches.SMALLEST_KERNEL, a, b, out), bands(out.shape[0]))
     return out
 
@@ -148,7 +150,7 @@ def _raise(line: Heights, stretched: Heights, worst: Heights) -> None:
 
 
 @kernel
-def _displaced(warp: Floats, rows: int, cols: int, u: float, v: float) -> tuple[float, float]:
+def displaced(warp: Floats, rows: int, cols: int, u: float, v: float) -> tuple[float, float]:
     """Lattice place (u, v) with the control net's displacement; the net is empty for none."""
     if warp.shape[0] == 0:
         return u, v
@@ -188,6 +190,7 @@ def _patch_errors(
     j: NDArray[np.int64],
     i: NDArray[np.int64],
     to_patch: Floats,
+    extent: Floats,
     start: int,
     stop: int,
     out: Heights,
@@ -195,25 +198,24 @@ def _patch_errors(
     """Errors of the patches start..stop of a scale, whatever the grid: float64, sample by sample."""
     rows, cols = heights.shape
     step = 1 << level
-    cells = size * step
-    margin = 1.5 * step
+    # Half a sample and the margin around the kernel; one cell of the level more for what a bent lattice brings in.
+    reach = 2 * step + (step if warp.shape[0] else 0)
     block = np.empty((size + 4, size + 4), np.float32)
     for p in range(start, stop):
         cut(mip, j[p] * size - 2, i[p] * size - 2, block)
-        m = to_patch[p]
+        m, end = to_patch[p], extent[p]
+        top, left = j[p] * size * step, i[p] * size * step
         worst = 0.0
-        for row in range(
-            max(0, int(np.ceil(cells * j[p] - margin - 0.5))), min(rows, int(cells * (j[p] + 1) + margin + 0.5))
-        ):
-            for col in range(
-                max(0, int(np.ceil(cells * i[p] - margin - 0.5))), min(cols, int(cells * (i[p] + 1) + margin + 0.5))
-            ):
+        for row in range(max(0, top - reach), min(rows, top + size * step + reach)):
+            for col in range(max(0, left - reach), min(cols, left + size * step + reach)):
                 height = heights[row, col]
                 if np.isnan(height):
                     continue
-                x, y = _displaced(warp, rows, cols, float(col), float(row))
+                x, y = displaced(warp, rows, cols, float(col), float(row))
                 u = m[0, 0] * x + m[0, 1] * y + m[0, 2]
                 v = m[1, 0] * x + m[1, 1] * y + m[1, 2]
+                if u < 0.0 or v < 0.0 or u > end[0] or v > end[1]:
+                    continue
                 distance = abs(height - interpolated(block, u, v))
                 if distance > worst:
                     worst = distance
@@ -236,12 +238,8 @@ def measure(
         level = patches.level_of(scale)
         table = np.full(there.shape, np.nan, np.float32)
         if plain and level:
-            step = patches.PATCH_KERNEL_CELLS << level
-            least = max(1, 256 // step)
-            spread(
-                lambda a, b, at=level, to=table: _level_errors(heights, mips[at], at, a, b, to),
-                bands(len(table), least),
-            )
+            work = functools.partial(_level_errors_into, table, heights, mips[level], level)
+            spread(work, bands(len(table), max(1, 256 // (PATCH_KERNEL_CELLS << level))))
         elif warp is None and not level:
             table[there] = 0.0
         else:
@@ -252,13 +250,21 @@ def measure(
     return PatchErrors(tuple(tables))
 
 
+def _level_errors_into(table: Heights, heights: Heights, mip: Heights, level: int, start: int, stop: int) -> None:
+    _level_errors(heights, mip, level, start, stop, table)
+
+
 def _each(mips: tuple[Heights, ...], warp: Floats | None, scale: int, there: NDArray[np.bool_]) -> Heights:
     """Errors of the existing patches of a scale, measured sample by sample."""
     j, i = np.nonzero(there)
     rows, cols = mips[0].shape
     level, size = patches.level_of(scale), patches.kernel_samples(scale)
-    to_patch = patches.lay(rows, cols, warp, scale, j, i).to_patch
+    laid = patches.lay(rows, cols, warp, scale, j, i)
     net = NO_WARP if warp is None else warp
     out = np.empty(len(j), np.float32)
-    spread(lambda a, b: _patch_errors(mips[0], mips[level], net, level, size, j, i, to_patch, a, b, out), bands(len(j)))
+    matrix, extent = laid.to_patch, laid.extent
+    spread(
+        lambda a, b: _patch_errors(mips[0], mips[level], net, level, size, j, i, matrix, extent, a, b, out),
+        bands(len(j)),
+    )
     return out

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 from numpy.typing import NDArray
 
 from esker.patchwork import patches
-from esker.patchwork.errors import NO_WARP, Heights, _displaced, interpolated
+from esker.patchwork.errors import NO_WARP, Heights, displaced, interpolated
 from esker.patchwork.jit import bands, kernel, spread
 from esker.patchwork.patches import Floats
 from esker.patchwork.samples import cut
@@ -38,9 +40,9 @@ def _distances(
     heights: Heights,
     warp: Floats,
     sway: float,
+    out: Floats,
     start: int,
     stop: int,
-    out: Floats,
 ) -> None:
     """Greatest distance of the samples of ``heights`` in the domain of each of the patches start..stop.
 
@@ -72,7 +74,7 @@ def _distances(
                 height = heights[row, col]
                 if np.isnan(height):
                     continue
-                x, y = _displaced(warp, rows, cols, float(col), float(row))
+                x, y = displaced(warp, rows, cols, float(col), float(row))
                 u = m[0, 0] * x + m[0, 1] * y + m[0, 2]
                 v = m[1, 0] * x + m[1, 1] * y + m[1, 2]
                 if u < 0.0 or v < 0.0 or u > eu or v > ev:
@@ -98,12 +100,19 @@ def distances(of: Sheet, to: Sheet) -> tuple[NDArray[np.int64], Floats]:
         first = np.stack([of.j[chosen], of.i[chosen]], 1).astype(np.int64) * size - patches.RING
         mip = ours.raster.mips[patches.level_of(scale)]
         side = patches.side_of(scale)
-        part, matrix, extent = out[a:b], lattice_to_patch[a:b], of.extent[chosen]
-        spread(
-            lambda x, y, m=mip, f=first, s=side, t=matrix, e=extent, o=part: _distances(
-                m, f, s, t, e, gain, theirs.raster.heights, warp, to.sway, x, y, o
-            ),
-            bands(len(chosen)),
+        work = functools.partial(
+            _distances,
+            mip,
+            first,
+            side,
+            lattice_to_patch[a:b],
+            of.extent[chosen],
+            gain,
+            theirs.raster.heights,
+            warp,
+            to.sway,
+            out[a:b],
         )
+        spread(work, bands(len(chosen)))
     there = out >= 0
     return index[there], out[there]
