@@ -164,22 +164,22 @@ def channels() -> list[bytes]:
 class Made:
     """A refined tile of an analytic ground: a crest with a kink, at any level the same function of the place."""
 
-    base = None
+    base: NDArray[np.float32] | None = None
     content = b""
 
-    def __init__(self, key: TileKey, lift: float, size_m: float = SIZE_M) -> None:
+    def __init__(self, key: TileKey, lift: float, wrinkles: float = 0.4, size_m: float = SIZE_M) -> None:
         self.key = key
         step = size_m / (64 << key.level)
         y, x = (np.arange(65) + 64 * np.array([[key.y], [key.x]])) * step
-        self.heights = crest(x[None, :], y[:, None], lift)
+        self.heights = crest(x[None, :], y[:, None], lift, wrinkles)
 
 
-def crest(x: NDArray[np.float64], y: NDArray[np.float64], lift: float) -> NDArray[np.float32]:
+def crest(x: NDArray[np.float64], y: NDArray[np.float64], lift: float, wrinkles: float = 0.4) -> NDArray[np.float32]:
     """A roof along x = 437.3 m with wrinkles, lifted towards the north-west."""
     h = (
         90
         - 0.9 * np.abs(x - 437.3 - 0.1 * y)
-        + 0.4 * np.abs(np.sin(y / 7.1))
+        + wrinkles * np.abs(np.sin(y / 7.1))
         + lift * np.exp(-(x**2 + (y - 900) ** 2) / 3e5)
     )
     return np.asarray(h, dtype=np.float32)
@@ -217,6 +217,65 @@ def refined() -> list[bytes]:
     client.set_view(View(eye=(486.0, 480.0, 60.0), target=(486.3, -483.0, 80.0), width=120, height=240, tau_px=6.0))
     solve(3, 9)
     settle(3, 9)
+    return frames
+
+
+def plateau(x: NDArray[np.float64], y: NDArray[np.float64], lift: float) -> NDArray[np.float32]:
+    """Rolling land at 300 m, with a hill that moves north."""
+    rolling = 300 + 0.2 * x + 12 * np.sin(x / 290) * np.cos(y / 310)
+    return np.asarray(rolling + 40 * np.exp(-((x - 480) ** 2 + (y - 400 - 9 * lift) ** 2) / 4e4), dtype=np.float32)
+
+
+def based() -> list[bytes]:
+    """A base comes late, under tiles that are held, moves while somebody draws, and goes; some tiles are refined."""
+    rng = np.random.default_rng(7)
+    server = TileServer(SIZE_M, 3, 4)
+    client = ClientTiles(server, rest_level=2)
+    frames: list[bytes] = []
+
+    def send(most: int = 1000) -> None:
+        for _ in range(most):
+            plan = client.plan()
+            if plan is None:
+                return
+            frames.append(plan.encode())
+            client.commit(plan)
+
+    def put(clock: int, channel: Channel, lift: float, settled: bool = True) -> None:
+        for level in range(4):
+            n = grid.samples(level)
+            y, x = np.mgrid[0:n, 0:n] * (SIZE_M / (n - 1))
+            ground = plateau(x, y, lift) if channel == Channel.BASE else crest(x, y, lift, 0.0)
+            server.put_level(clock, level, ground * np.float32(lift >= 0), settled, channel)
+            send(int(rng.integers(0, 3)))
+
+    def settle(clock: int, lift: float, hill: float | None) -> None:
+        while wishes := server.wishes([client])[0]:
+            for key in wishes:
+                tile = Made(key, lift, 0.0)
+                if hill is not None:
+                    step = SIZE_M / (64 << key.level)
+                    y, x = (np.arange(65) + 64 * np.array([[key.y], [key.x]])) * step
+                    tile.base = plateau(x[None, :], y[:, None], hill)
+                assert server.put_tile(clock, tile)
+            send()
+
+    client.set_view(View(eye=(430.0, 430.0, 480.0), target=(500.0, 520.0, 380.0), width=160, height=120, tau_px=4.0))
+    put(1, Channel.HEIGHT, 0)
+    settle(1, 0, None)
+    send()
+    put(2, Channel.BASE, 0)
+    put(2, Channel.HEIGHT, 3)
+    settle(2, 3, 0)
+    put(3, Channel.HEIGHT, 9, settled=False)
+    put(4, Channel.BASE, 2)
+    put(4, Channel.HEIGHT, 9)
+    settle(4, 9, 2)
+    send()
+    put(5, Channel.BASE, -1)
+    put(5, Channel.HEIGHT, 9)
+    settle(5, 9, None)
+    send()
     return frames
 
 
@@ -329,7 +388,7 @@ def told(decoder: FrameDecoder, frame: bytes) -> dict[str, Any]:
 def build() -> dict[str, Any]:
     """The whole file."""
     sessions = []
-    for made in (session, interrupted, confirmed, extreme, channels, refined):
+    for made in (session, interrupted, confirmed, extreme, channels, refined, based):
         name, frames = made.__name__, made()
         decoder = FrameDecoder()
         steps = [{"frame": base64.b64encode(f).decode(), "decoded": told(decoder, f)} for f in frames]

@@ -1,7 +1,7 @@
 /** Frames and grounds for the store's tests. */
 
 import type { DecodedFrame, DecodedTile, Tile, TileView } from "../../src/core/types.ts";
-import { FrameKind } from "../../src/generated/contract.ts";
+import { Channel, FrameKind } from "../../src/generated/contract.ts";
 import { FrameDecoder } from "../../src/net/decode.ts";
 import { bytesOf, vectors } from "../net-decode/vectors.ts";
 
@@ -52,8 +52,15 @@ export function frame(
   level: number,
   tiles: readonly DecodedTile[],
   drops: readonly { x: number; y: number }[] = [],
+  channel = Channel.HEIGHT as number,
 ): DecodedFrame {
-  return { kind: FrameKind[kind], level, channel: 0, clock: 1, settled: false, drops, tiles, bytes: 0 };
+  return { kind: FrameKind[kind], level, channel, clock: 1, settled: false, drops, tiles, bytes: 0 };
+}
+
+/** All tiles of a level of a ground given by a function. */
+export function all(level: number, version: number, height: (x: number, y: number) => number): DecodedTile[] {
+  const n = 2 ** level;
+  return Array.from({ length: n * n }, (_, i) => tileOf(level, i % n, Math.floor(i / n), version, height));
 }
 
 /** Every pair of neighbours on one level whose shared edge differs, as text. */

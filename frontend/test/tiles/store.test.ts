@@ -6,14 +6,10 @@ import { predictMetres } from "../../src/core/predict.ts";
 import type { Tile } from "../../src/core/types.ts";
 import { FrameKind } from "../../src/generated/contract.ts";
 import { TileStore } from "../../src/tiles/store.ts";
-import { frame, LEVELS, SIZE_M, seams, sessionFrames, tileOf } from "./frames.ts";
+import { all, frame, LEVELS, SIZE_M, seams, sessionFrames, tileOf } from "./frames.ts";
 
 const flat = () => 0;
 const bump = (x: number, y: number) => 40 * Math.exp(-((x - 300) ** 2 + (y - 200) ** 2) / 20_000);
-const all = (level: number, version: number, height: (x: number, y: number) => number) => {
-  const n = 2 ** level;
-  return Array.from({ length: n * n }, (_, i) => tileOf(level, i % n, Math.floor(i / n), version, height));
-};
 
 /** Levels 0 to 2 of one ground. */
 function filled(height: (x: number, y: number) => number): TileStore {
@@ -147,6 +143,13 @@ describe("moving along with the parents (T17)", () => {
       expect(Math.max(...t.subError)).toBeCloseTo(worst, 5);
     }
   });
+});
+
+test("a flat tile that is sent again over another parent has that one's error", () => {
+  const store = filled(flat);
+  const again = { ...tileOf(1, 1, 1, 2, flat), subError: new Uint32Array(16).fill(512) };
+  store.apply(frame("LEVEL", 1, [again]));
+  expect(store.tile(1, 1, 1)!.subError[3]).toBeCloseTo((512 * SIZE_M) / 128 / 256, 5);
 });
 
 describe("frames are shown whole (T16)", () => {
