@@ -1,7 +1,7 @@
 """Imports without end in processes that are killed: a process that forks one for each line it reads.
 
-``python import_child.py``: for each line ``DATA SEED`` on stdin it forks a server's room, journal and imports over DATA.
-The fork writes ``ready``, then the id of each layer that it was told is done. A fork shares what took long to load.
+``python import_child.py``: for each line ``DATA SEED`` on stdin it forks a server's room, journal and imports over
+DATA. It writes ``ready``, then the id of each layer that it was told is done. Forks share what took long to load.
 """
 
 from __future__ import annotations
@@ -46,6 +46,7 @@ class Reader:
         name: str | None = None,
     ) -> c.Layer:
         assert on_progress is not None
+        assert place is None
         rng = np.random.default_rng(list(path.read_bytes()))
         heights = rng.uniform(0, 100, (40, 50)).astype(np.float32)
         raster = rasters.build(heights)

@@ -30,6 +30,9 @@ class _NoSolver:
     def channels(self, *_: Any, **__: Any) -> Any:
         return iter(())
 
+    def base_levels(self, *_: Any) -> Any:
+        return iter(())
+
     def refiner(self, _: Any) -> Any:
         raise AssertionError("nothing is ever solved")
 

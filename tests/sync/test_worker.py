@@ -43,9 +43,14 @@ class Turnstile:
         finally:
             self.closed.append(len(strokes))
 
-    def channels(self, *_: Any) -> Iterator[Level]:
+    def channels(self, *_: Any, **__: Any) -> Iterator[Level]:
         self.permits.acquire()
         yield Level(0, FLAT, True, c.Channel.SNOW)
+
+    def base_levels(self, base: Any, levels: int) -> Iterator[Level]:
+        for level in range(levels + 1):
+            self.permits.acquire()
+            yield Level(level, base.level(level), True, c.Channel.BASE)
 
     def refiner(self, basis: object) -> Any:
         raise AssertionError(f"nobody was given {basis}")

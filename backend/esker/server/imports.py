@@ -9,8 +9,9 @@ from typing import Annotated, Any
 
 import numpy as np
 from fastapi import FastAPI, Query, Request, Response
+from fastapi.exceptions import RequestValidationError
 from fastapi.responses import FileResponse
-from pydantic import StringConstraints
+from pydantic import StringConstraints, ValidationError
 from starlette.background import BackgroundTask
 
 from esker import contract as c
@@ -60,7 +61,14 @@ def add_imports(app: FastAPI, hub: Hub, grids: GridStore, imports: Imports) -> N
         return imports.status(terrain, job)
 
     @app.post("/api/terrains/{terrain}/imports/{job}/answers")
-    async def answers(terrain: str, job: str, link: EditorLink, body: c.ImportAnswers) -> c.ImportStatus:
+    async def answers(request: Request, terrain: str, job: str, link: EditorLink) -> c.ImportStatus:
+        # From JSON itself: pydantic's strict mode takes no list for a pair once it is a Python object.
+        try:
+            body = c.ImportAnswers.model_validate_json(await _short(request))
+        except ValidationError as error:
+            raise RequestValidationError(
+                [{**found, "loc": ("body", *found["loc"])} for found in error.errors(include_url=False)]
+            ) from error
         return imports.answer(terrain, job, link, body)
 
     @app.delete("/api/terrains/{terrain}/imports/{job}", status_code=204)
@@ -80,6 +88,15 @@ def add_imports(app: FastAPI, hub: Hub, grids: GridStore, imports: Imports) -> N
         return FileResponse(
             path, media_type="application/zip", filename=f"{digest[:16]}.npz", background=BackgroundTask(path.unlink)
         )
+
+
+async def _short(request: Request) -> bytes:
+    data = b""
+    async for part in request.stream():
+        data += part
+        if len(data) > c.MAX_MESSAGE_BYTES:
+            raise Problem(413, "too_large", "These answers are too long.")
+    return data
 
 
 def _length(request: Request) -> int | None:

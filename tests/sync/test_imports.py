@@ -1,0 +1,351 @@
+"""Elevation files over HTTP: who may bring them in, questions, cancel, bounds, and what everybody sees (SPEC P80)."""
+
+from __future__ import annotations
+
+import asyncio
+import io
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import esker
+from esker import contract as c
+from esker.client import LiveTerrain, Refused
+from esker.contract import ImportStage
+from esker.importing.refusal import ImportRefused
+from esker.patchwork import rasters
+from tests.sync.harness import LiveServer
+
+QUESTION = c.ImportQuestion(id="size", text="How wide is it?", default="fit")
+GRID = np.add.outer(np.arange(40.0), np.arange(50.0))
+
+
+def _words(path: Path) -> str:
+    return path.read_bytes().decode("utf-8", "replace")
+
+
+class Reader:
+    """Reads files whose text says what to do: words of "ask", "refuse", "slow", "crash"."""
+
+    def __init__(self) -> None:
+        self.gate = threading.Event()
+        self.stopped = 0
+        self.at_once = 0
+        self.most = 0
+
+    async def inspect(self, path: Path, name: str, **_: Any) -> c.ImportReport:
+        words = _words(path)
+        if "refuse" in words:
+            return c.ImportReport(verdict="refused", file=name, refusal="It is a picture of a cat.")
+        questions = (QUESTION,) if "ask" in words else ()
+        return c.ImportReport(verdict="ask" if questions else "good", file=name, questions=questions)
+
+    async def convert(
+        self,
+        path: Path,
+        answers: c.ImportAnswers,
+        place: c.Place | None,
+        size_m: float,
+        out_dir: Path,
+        on_progress: Callable[[ImportStage, float], None] | None = None,
+        *,
+        name: str | None = None,
+    ) -> c.Layer:
+        assert place is None
+        assert on_progress is not None
+        words = _words(path)
+        self.at_once += 1
+        self.most = max(self.most, self.at_once)
+        try:
+            if "crash" in words:
+                raise RuntimeError("the reader fell over")
+            if answers.answers.get("size") == "no":
+                raise ImportRefused("That is no size.")
+            while "slow" in words and not self.gate.is_set():
+                on_progress("errors", 0.5)
+                await asyncio.sleep(0.01)
+            raster = rasters.build(GRID + len(words))
+            rasters.write(out_dir, raster)
+        except asyncio.CancelledError:
+            self.stopped += 1
+            raise
+        finally:
+            self.at_once -= 1
+        return c.Layer(
+            id="new", content=raster.digest, facts=raster.facts(file=name), name=answers.name or "grid",
+            anchor=answers.anchor or (10.0, 20.0), spacing_m=answers.spacing_m or (size_m / 50, size_m / 50),
+            accuracy_m=1.0,
+        )  # fmt: skip
+
+    def suggest_place(self, report: c.ImportReport) -> c.Place | None:
+        assert report.verdict != "refused"
+        return None
+
+    def suggest_size(self, report: c.ImportReport) -> float:
+        assert report.verdict != "refused"
+        return 1234.0
+
+
+@pytest.fixture
+def reader(monkeypatch: pytest.MonkeyPatch) -> Reader:
+    """In the place of the process that reads files, which has tests of its own (tests/importing)."""
+    made = Reader()
+    monkeypatch.setattr("esker.run.importing", made)
+    return made
+
+
+@pytest.fixture
+def live(tmp_path: Path, reader: Reader) -> Iterator[LiveServer]:
+    with LiveServer(tmp_path, grid_quota_mb=1) as server:
+        yield server
+        reader.gate.set()
+
+
+def _send(server: LiveServer, terrain: str, secret: str, words: str, query: str = "name=a.tif") -> tuple[int, Any]:
+    return server.http("POST", f"/api/terrains/{terrain}/imports?{query}", words.encode(), secret)
+
+
+def _wait(server: LiveServer, terrain: str, secret: str, job: str, *stages: str) -> dict[str, Any]:
+    deadline = time.monotonic() + 10
+    while time.monotonic() < deadline:
+        _, status = server.http("GET", f"/api/terrains/{terrain}/imports/{job}", secret=secret)
+        if status["stage"] in stages:
+            return dict(status)
+        time.sleep(0.01)
+    raise TimeoutError(stages)
+
+
+def _layers(server: LiveServer, terrain: str) -> tuple[c.Layer, ...]:
+    return asyncio.run(server.assembly.hub.document(terrain)).layers
+
+
+def _works(server: LiveServer) -> list[str]:
+    return [p.name for p in (server.assembly.settings.data / "grids").iterdir() if p.name.startswith(".work")]
+
+
+def test_a_file_becomes_a_layer_that_everybody_sees(live: LiveServer) -> None:
+    """SPEC P80, P86."""
+    terrain, secret = live.create()
+    ada, bob = live.join(terrain, secret, "ada", name="Ada"), live.join(terrain, secret, "bob")
+    status, job = _send(live, terrain, secret, "x", "name=../up/valley%0A.tif&client=ada")
+    assert status == 202
+    done = _wait(live, terrain, secret, job["id"], "done")
+    layer = _layers(live, terrain)[0]
+    assert (done["layer"], done["share"]) == (layer.id, 1.0)
+    assert (layer.author, layer.priority, layer.facts.file) == ("Ada", 0, "valley.tif")
+    for peer in (ada, bob):
+        stages: list[str] = []
+        while not stages or stages[-1] != "done":
+            message = peer.wait("importing")
+            assert (message["author"], message["file"]) == ("Ada", "valley.tif")
+            assert message["status"]["report"] is None
+            stages.append(message["status"]["stage"])
+        assert stages[0] == "upload"
+        ordered = [m for m in peer.seen if m["type"] == "ordered"] or [peer.wait("ordered")]
+        assert ordered[0]["ops"][0]["author"] == "ada"
+        peer.close()
+    assert _works(live) == []
+
+
+def test_no_client_adds_a_layer_by_itself(live: LiveServer) -> None:
+    """SPEC P81."""
+    terrain, secret = live.create()
+    peer = live.join(terrain, secret)
+    layer = c.Layer(
+        id="x", content="0" * 64, facts=c.GridFacts(rows=9, cols=9, low_m=0, high_m=1), anchor=(0, 0), spacing_m=(1, 1),
+        accuracy_m=1,
+    ).model_dump(mode="json")  # fmt: skip
+    add = {"type": "layer.add", "layer": layer}
+    peer.ops(("c1:1", add), ("c1:2", {"type": "group", "ops": [add]}))
+    assert [peer.wait("reject")["code"] for _ in range(2)] == ["server_only", "server_only"]
+    peer.close()
+
+
+@pytest.mark.parametrize(("role", "code"), [("view", 403), ("edit", 202)])
+def test_who_may_bring_files_in(live: LiveServer, role: str, code: int) -> None:
+    """SPEC P82."""
+    terrain, owner = live.create()
+    _, link = live.http("POST", f"/api/terrains/{terrain}/links", {"role": role}, owner)
+    status, answer = _send(live, terrain, link["secret"], "ask")
+    assert status == code
+    if role == "view":
+        assert answer["code"] == "view_only"
+        _, job = _send(live, terrain, owner, "ask")
+        status, _ = live.http("DELETE", f"/api/terrains/{terrain}/imports/{job['id']}", secret=link["secret"])
+        assert status == 403
+    assert _send(live, terrain, "wrong", "x")[0] == 403
+    other, secret = live.create()
+    assert live.http("GET", f"/api/terrains/{other}/imports/{answer.get('id')}", secret=secret)[0] == 404
+
+
+def test_questions_and_answers(live: LiveServer) -> None:
+    """SPEC P83."""
+    terrain, owner = live.create()
+    _, job = _send(live, terrain, owner, "ask")
+    path = f"/api/terrains/{terrain}/imports/{job['id']}"
+    asked = _wait(live, terrain, owner, job["id"], "question")
+    assert asked["report"]["questions"][0]["id"] == "size"
+    _, link = live.http("POST", f"/api/terrains/{terrain}/links", {"role": "edit"}, owner)
+    assert live.http("POST", f"{path}/answers", {}, link["secret"])[0] == 403, "another's import"
+    assert live.http("POST", f"{path}/answers", {"answers": {"colour": "red"}}, owner)[0] == 400
+    assert live.http("POST", f"{path}/answers", {"spacing_m": [0, 1]}, owner)[0] == 400
+    answers = {"answers": {"size": "500"}, "anchor": [1, 2], "spacing_m": [3, 4], "name": "Tal"}
+    assert live.http("POST", f"{path}/answers", answers, owner)[0] == 200
+    _wait(live, terrain, owner, job["id"], "done")
+    layer = _layers(live, terrain)[0]
+    assert (layer.anchor, layer.spacing_m, layer.name) == ((1.0, 2.0), (3.0, 4.0), "Tal")
+    assert live.http("POST", f"{path}/answers", answers, owner)[1]["code"] == "not_asked"
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [("refuse", "cat"), ("crash", "failed"), ("ask", "no size")],
+)
+def test_what_is_refused_leaves_nothing(live: LiveServer, words: str, says: str) -> None:
+    """SPEC P84."""
+    terrain, secret = live.create()
+    _, job = _send(live, terrain, secret, words)
+    if words == "ask":
+        _wait(live, terrain, secret, job["id"], "question")
+        body = {"answers": {"size": "no"}}
+        live.http("POST", f"/api/terrains/{terrain}/imports/{job['id']}/answers", body, secret)
+    assert says in _wait(live, terrain, secret, job["id"], "refused")["text"]
+    assert _layers(live, terrain) == ()
+    assert list((live.assembly.settings.data / "grids").iterdir()) == []
+
+
+@pytest.mark.parametrize("words", ["slow", "ask"])
+def test_cancel_leaves_nothing(live: LiveServer, reader: Reader, words: str) -> None:
+    """SPEC P84."""
+    terrain, secret = live.create()
+    _, job = _send(live, terrain, secret, words)
+    _wait(live, terrain, secret, job["id"], "errors" if words == "slow" else "question")
+    path = f"/api/terrains/{terrain}/imports/{job['id']}"
+    assert live.http("DELETE", path, secret=secret)[0] == 204
+    assert _wait(live, terrain, secret, job["id"], "cancelled")["layer"] is None
+    assert live.http("DELETE", path, secret=secret)[0] == 204, "again is harmless"
+    assert reader.stopped == (words == "slow")
+    assert (_layers(live, terrain), _works(live)) == ((), [])
+    assert _send(live, terrain, secret, "x")[0] == 202, "there is room for the next one"
+
+
+def test_one_at_a_time_of_a_person_and_two_of_the_server(live: LiveServer, reader: Reader) -> None:
+    """SPEC P85."""
+    terrain, secret = live.create()
+    jobs = []
+    for name in ("ada", "bob", "eve"):
+        status, job = _send(live, terrain, secret, f"slow {name}", f"name=a.tif&client={name}")
+        assert status == 202
+        jobs.append(job["id"])
+    assert _send(live, terrain, secret, "x", "name=b.tif&client=ada")[1]["code"] == "busy"
+    _wait(live, terrain, secret, jobs[1], "errors")
+    reader.gate.set()
+    for job in jobs:
+        _wait(live, terrain, secret, job, "done")
+    assert reader.most == 2
+    assert [layer.priority for layer in _layers(live, terrain)] == [0, 1, 2], "what comes later is believed"
+
+
+def test_bounds_of_size(live: LiveServer, monkeypatch: pytest.MonkeyPatch) -> None:
+    """SPEC P87."""
+    terrain, secret = live.create()
+    assert _send(live, terrain, secret, "")[1]["code"] == "empty"
+    monkeypatch.setattr(c, "MAX_GRID_BYTES", 1000)
+    assert _send(live, terrain, secret, "x" * 1001)[1]["code"] == "too_large"
+    assert _works(live) == []
+    monkeypatch.undo()
+    monkeypatch.setattr("esker.store.grids.GridStore.size", lambda *_: 1 << 20)
+    assert _send(live, terrain, secret, "x")[1]["code"] == "quota"
+
+
+def test_a_question_that_nobody_answers(live: LiveServer, monkeypatch: pytest.MonkeyPatch) -> None:
+    """SPEC P88."""
+    monkeypatch.setattr(live.assembly.imports, "_question_seconds", 0.05)
+    terrain, secret = live.create()
+    _, job = _send(live, terrain, secret, "ask")
+    assert "Nobody answered" in _wait(live, terrain, secret, job["id"], "refused")["text"]
+    assert _works(live) == []
+
+
+def test_a_terrain_made_from_a_file(live: LiveServer) -> None:
+    """SPEC P89."""
+    status, made = live.http("POST", "/api/terrains/from-grid?name=tal.tif", b"ask")
+    assert (status, made["title"], made["role"]) == (201, "tal", "owner")
+    path = f"/api/terrains/{made['id']}/imports/{made['import']['id']}"
+    _wait(live, made["id"], made["secret"], made["import"]["id"], "question")
+    assert live.http("POST", f"{path}/answers", {}, made["secret"])[0] == 200
+    _wait(live, made["id"], made["secret"], made["import"]["id"], "done")
+    document = asyncio.run(live.assembly.hub.document(made["id"]))
+    assert (document.settings.size_m, len(document.layers)) == (1234.0, 1)
+    status, error = live.http("POST", "/api/terrains/from-grid?name=cat.png", b"refuse")
+    assert (status, error["code"], error["message"]) == (400, "refused", "It is a picture of a cat.")
+
+
+def test_a_grid_comes_back_and_travels_in_a_terrain_file(live: LiveServer) -> None:
+    """SPEC P90, D33."""
+    terrain, secret = live.create()
+    _, job = _send(live, terrain, secret, "x")
+    _wait(live, terrain, secret, job["id"], "done")
+    layer = _layers(live, terrain)[0]
+    status, data = live.http("GET", f"/api/terrains/{terrain}/grids/{layer.content}", secret=secret)
+    assert status == 200
+    np.testing.assert_array_equal(np.load(io.BytesIO(data))["heights"], GRID + 1)
+    other, key = live.create()
+    assert live.http("GET", f"/api/terrains/{other}/grids/{layer.content}", secret=key)[0] == 404, "not its own"
+    assert live.http("GET", f"/api/terrains/{terrain}/grids/{'x' * 64}", secret=secret)[0] == 400
+    status, file = live.http("GET", f"/api/terrains/{terrain}/archive", secret=secret)
+    status, made = live.http("POST", "/api/terrains/import", file)
+    assert status == 201, made
+    assert [found.content for found in _layers(live, made["id"])] == [layer.content]
+    status, file = live.http("GET", f"/api/terrains/{made['id']}/archive", secret=made["secret"])
+    assert status == 200
+
+
+def test_undo_of_an_import_is_its_authors(live: LiveServer) -> None:
+    """SPEC D31: what the server did in my name is mine to take back, and nobody else's."""
+    link = "{}/t/{}#{}".format(live.base, *live.create())
+    with esker.connect(link, "Ada") as ada, esker.connect(link, "Bob") as bob:
+        layer = ada.add_grid(
+            GRID, anchor=(100, 200), rotation=30, spacing=(8, 9), accuracy=0.5, answers={"size": "fit"}
+        )
+        _until(bob, lambda: bob.layers)
+        assert (bob.layers[0].id, bob.layers[0].anchor, bob.layers[0].spacing_m) == (layer, (100.0, 200.0), (8.0, 9.0))
+        assert not bob.undo().ops, "Bob has done nothing"
+        assert ada.undo().ops
+        ada.wait()
+        _until(bob, lambda: not bob.layers)
+        assert ada.redo().ops
+        ada.wait()
+        _until(bob, lambda: bob.layers)
+        bob.set_grid(layer, lift_m=3.0)
+        bob.wait()
+        _until(ada, lambda: ada.layers[0].lift_m == 3.0)
+        assert "changed this layer" in ada.undo().skipped[0]
+        bob.remove_grid(layer)
+        bob.wait()
+        _until(ada, lambda: not ada.layers)
+        with pytest.raises(Refused, match="cat"):
+            bob.add_grid(_file(live, "refuse"))
+        with pytest.raises(Refused, match="How wide"):
+            bob.add_grid(_file(live, "ask"))
+        with pytest.raises(ValueError, match="spacing"):
+            bob.add_grid(GRID)
+
+
+def _file(server: LiveServer, words: str) -> Path:
+    path = server.assembly.settings.data / f"{words}.tif"
+    path.write_text(words)
+    return path
+
+
+def _until(terrain: LiveTerrain, ready: Callable[[], object]) -> None:
+    deadline = time.monotonic() + 10
+    while not ready():
+        assert time.monotonic() < deadline
+        terrain.wait_clock(0)
+        time.sleep(0.005)
