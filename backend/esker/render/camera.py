@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,13 @@ HOME_ELEVATION_DEG: Final = 19.0
 _HOME_MARGIN: Final = 0.06
 _STEEPEST: Final = 0.999
 """Sine of the steepest sight whose upper side is still up; beyond, north is."""
+
+
+class Land(NamedTuple):
+    """How high the land lies on the whole, and what of it must be seen at its corners, metres."""
+
+    ground_m: float
+    low_m: float
 
 
 @dataclass(frozen=True)
@@ -131,17 +138,18 @@ def orbit(
 
 
 def home(
-    size_m: float, width: int, height: int, heading_deg: float = HOME_HEADING_DEG, ground_m: float = 0.0
+    size_m: float, width: int, height: int, heading_deg: float = HOME_HEADING_DEG, land: Land | None = None
 ) -> Camera:
     """The page's view of the whole terrain: all of it under a sky that takes the upper third of the picture.
 
-    ``ground_m``: height of the land that it looks at.
+    ``land``: how high it lies, where that is not about 0.
     """
+    ground_m, low_m = land or Land(0.0, 0.0)
     h, p = math.radians(heading_deg), math.radians(HOME_PITCH_DEG)
     forward = np.array([math.cos(p) * math.sin(h), math.cos(p) * math.cos(h), math.sin(p)])
     right = np.array([math.cos(h), -math.sin(h), 0.0])
     up = np.cross(right, forward)
-    corners = [np.array([x, y, ground_m]) for x in (0, size_m) for y in (0, size_m)]
+    corners = [np.array([x, y, z]) for x in (0, size_m) for y in (0, size_m) for z in (ground_m, low_m)]
     tan = math.tan(math.radians(FOV_DEG) / 2) * (1 - _HOME_MARGIN)
     lift = math.cos(p) * math.tan(math.radians(HOME_ELEVATION_DEG)) + math.sin(p)
     half, distance = size_m / 2, size_m / 2

@@ -114,7 +114,7 @@ def _draw(options: argparse.Namespace, say: Says) -> None:
     stage = prepare(document, solver, grids=opened.grids, level=options.level, refined=options.refine)
 
     def picture(view: str, progress: Callable[[float], None]) -> Image.Image:
-        camera = camera_of(view, stage.surface, document.settings, *options.size, land_m=stage.land_m)
+        camera = camera_of(view, stage.surface, document.settings, *options.size, land=stage.land)
         scene = Scene(document.settings, camera, options.tau, overlay=options.overlay)
         made = reference.draw(stage.surface, scene, stage.channels, progress)
         if made.tau_px > options.tau * 1.001:

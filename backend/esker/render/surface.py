@@ -71,8 +71,8 @@ class Surface:
         self.solved = len(levels) - 1
         self.range_m = float(min(z.min() for z in levels)), float(max(z.max() for z in levels))
         """Lowest and highest solved ground, without detail."""
-        self.mean_m = float(levels[0].mean(dtype=np.float64))
-        """Mean of the coarsest level."""
+        self.coarse_m = float(levels[0].mean(dtype=np.float64)), float(levels[0].min())
+        """Mean and lowest height of the coarsest level."""
         self.levels = self.solved if terrain is None else max(top, self.solved)
         self._terrain = terrain
         self._whole: list[Samples] = []

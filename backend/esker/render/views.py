@@ -6,7 +6,7 @@ import re
 from typing import Final
 
 from esker.contract import TerrainSettings
-from esker.render.camera import HOME_HEADING_DEG, Camera, Vec3, home, look_at, orbit
+from esker.render.camera import HOME_HEADING_DEG, Camera, Land, Vec3, home, look_at, orbit
 from esker.render.surface import Surface
 
 WALK_M: Final = 1.7
@@ -23,14 +23,14 @@ class BadView(ValueError):
 
 
 def camera_of(
-    text: str, surface: Surface, settings: TerrainSettings, width: int, height: int, *, land_m: float = 0.0
+    text: str, surface: Surface, settings: TerrainSettings, width: int, height: int, *, land: Land | None = None
 ) -> Camera:
     """The camera that is meant (see HELP). Raises BadView."""
     parts = parse(text)
     size = settings.size_m
     if "home" in parts:
         heading = parts["home"][0] if parts["home"] else HOME_HEADING_DEG
-        return home(size, width, height, heading, land_m)
+        return home(size, width, height, heading, land)
     if "eye" in parts:
         if "target" not in parts:
             raise BadView("An eye needs a target: eye:X,Y,Z,target:X,Y,Z.")
