@@ -137,7 +137,7 @@ def extents(
 
 def identities(model: Model, index: NDArray[np.int32]) -> NDArray[np.uint64]:
     """A number for every patch of ``index`` that says what it is: same grid, place and samples, same number."""
-    layers = np.array([_layer_number(p.layer) for p in model.placed] or [0], dtype=np.uint64)
+    layers = np.array([layer_number(p.layer) for p in model.placed] or [0], dtype=np.uint64)
     words = (model.level[index].astype(np.uint64) << np.uint64(56)) ^ (
         model.side[index].astype(np.uint64) << np.uint64(48)
     )
@@ -146,7 +146,7 @@ def identities(model: Model, index: NDArray[np.int32]) -> NDArray[np.uint64]:
     return _mixed(words ^ layers[model.owner[index]])
 
 
-def _layer_number(layer: Layer) -> int:
+def layer_number(layer: Layer) -> int:
     """Of all that the heights of a layer's patches follow from."""
     text = repr((layer.content, layer.anchor, layer.rotation_deg, layer.spacing_m, layer.scale, layer.lift_m))
     return int.from_bytes(hashlib.blake2b(text.encode(), digest_size=8).digest(), "little")

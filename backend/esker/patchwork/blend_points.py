@@ -135,3 +135,19 @@ def _evaluate(
             for c in range(6):
                 heights[n, c] = height[c]
                 cover[n, c] = presence[c]
+
+
+@kernel
+def joined(
+    heights: NDArray[np.float64], cover: NDArray[np.float64], beyond: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Jets (n, 6) of m f + (1 - m) O from those of the blend f, its cover m and the continuation O."""
+    out = np.empty_like(heights)
+    for n in range(len(heights)):
+        f = (heights[n, 0], heights[n, 1], heights[n, 2], heights[n, 3], heights[n, 4], heights[n, 5])
+        m = (cover[n, 0], cover[n, 1], cover[n, 2], cover[n, 3], cover[n, 4], cover[n, 5])
+        o = (beyond[n, 0], beyond[n, 1], beyond[n, 2], beyond[n, 3], beyond[n, 4], beyond[n, 5])
+        jet = total(product(m, f), product(rest(m), o))
+        for c in range(6):
+            out[n, c] = jet[c]
+    return out

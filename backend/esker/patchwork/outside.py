@@ -7,8 +7,8 @@ beyond it has no height that the data's border has not: no cliff, wherever nodat
 It is found coarse to fine. Level ``ANCHOR`` is solved as a whole (``membrane``: restricted to ever coarser grids,
 solved there, and carried back, with sweeps on each: a cascadic multigrid, Bornemann and Deuflhard 1996). Each finer
 level carries the coarser one down with the interpolating 4-point scheme (Dyn, Levin and Gregory 1987), which keeps the
-samples that both have, and sweeps a few times with the data that only it resolves. Twice finer than the data nothing
-is left to resolve, and no sweep is made: all levels show one function from there on.
+samples that both have, and sweeps a few times with the data that only it resolves. Finer than the data nothing is left
+to resolve, and the sweeps change next to nothing: all levels show one function from there on.
 
 Every step is the same exact arithmetic for every sample, so that windows have the bits of whole levels.
 """
@@ -20,6 +20,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from esker.patchwork.jets import spline_jet
 from esker.patchwork.jit import bands, kernel, spread
 
 Grid = NDArray[np.float32]
@@ -27,7 +28,7 @@ Grid = NDArray[np.float32]
 ANCHOR: Final = 3
 """Level (513 x 513 samples) at which the membrane is solved as a whole."""
 SWEEPS: Final = 4
-"""Sweeps on each level above ``ANCHOR`` that still resolves something of the data."""
+"""Sweeps on each level above ``ANCHOR``."""
 _SWEEPS_BELOW: Final = (16, 64)
 """Sweeps of the cascade on ``ANCHOR``, and at most on a coarser grid: four times as many on each, as they cost that."""
 
@@ -140,3 +141,31 @@ def _shifted(values: Grid, i: int, j: int) -> Grid:
     """Samples ``values[2 row + i, 2 col + j]``; 0 beyond the array."""
     padded = np.pad(values, 1)
     return padded[1 + i :: 2, 1 + j :: 2][: (len(values) + 1) // 2, : (len(values) + 1) // 2]
+
+
+def smooth_jets(window: Grid, at: NDArray[np.float64], spacing: float) -> NDArray[np.float64]:
+    """The continuation as a C2 function: value and derivatives (n, 6), at (n, 2) col, row of a window.
+
+    A cubic B-spline whose coefficients are c = z - (second differences of z) / 6 along each axis: a quasi-interpolant,
+    local and exact for cubic polynomials, so that places in different windows see one function. The window must hold
+    three samples around each place.
+    """
+    values = window.astype(np.float64)
+    for axis in (0, 1):
+        curve = np.zeros_like(values)
+        middle = [slice(None), slice(None)]
+        middle[axis] = slice(1, -1)
+        curve[tuple(middle)] = np.diff(values, 2, axis=axis)
+        values -= curve / 6
+    out = np.empty((len(at), 6))
+    _spline_jets(values.astype(np.float32), np.ascontiguousarray(at) - 1.0, 1.0 / spacing, out)
+    return out
+
+
+@kernel
+def _spline_jets(c: Grid, at: NDArray[np.float64], per: float, out: NDArray[np.float64]) -> None:
+    end = min(c.shape) - 4
+    for k in range(at.shape[0]):
+        jet = spline_jet(c, at[k, 0], at[k, 1], end)
+        out[k, 0], out[k, 1], out[k, 2] = jet[0], jet[1] * per, jet[2] * per
+        out[k, 3], out[k, 4], out[k, 5] = jet[3] * per * per, jet[4] * per * per, jet[5] * per * per

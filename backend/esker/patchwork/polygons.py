@@ -17,7 +17,7 @@ MOST: Final = 12
 
 @kernel
 def clipped(xs: Floats, ys: Floats, count: int, ax: float, ay: float, bx: float, by: float, out: Floats) -> int:
-    """Keep what lies left of a -> b of a convex polygon, in place; ``out`` (2, MOST) is scratch. Returns the corners left."""
+    """Keep what lies left of a -> b of a convex polygon, in place; how many corners stay. ``out``: scratch."""
     made = 0
     for k in range(count):
         n = k + 1 if k + 1 < count else 0
