@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pytest
 import scipy.sparse.linalg as spla
+from numpy.typing import NDArray
 
 from esker import grid
 from esker.bench import _exact
@@ -351,3 +353,30 @@ def test_windows_of_bins_agree() -> None:
     assert np.array_equal(part.share, whole.share[rows, columns])
     assert part.share.any()
     assert packer.grounds[FIVE[0].id].half > 100
+
+
+def test_a_base_is_asked_on_one_device(solver: Solver) -> None:
+    """SPEC S93: kinds of devices differ in their last bits, so all that a solver asks of a base is made on its own."""
+    asked: list[Any] = []
+
+    class Watched(Analytic):
+        def level(self, level: int, device: Any = None) -> NDArray[np.float32]:
+            asked.append(device)
+            return super().level(level, device)
+
+        def window(self, level: int, rows: slice, cols: slice, device: Any = None) -> NDArray[np.float32]:
+            asked.append(device)
+            return super().window(level, rows, cols, device)
+
+    # the base's own use of ``window`` in ``level`` is not the solver's
+    base = Watched("watched", HILLS.formula, HILLS.low, HILLS.high, kept={k: HILLS.level(k) for k in range(5)})
+    folded = [s.model_copy(update={"curve": s.curve[:20] + s.curve[10:]}) for s in FIVE]
+    for one in (solver, Solver("numpy")):
+        asked.clear()
+        settled = settle(one, folded, SETTINGS, 1, base=base)
+        list(one.base_levels(base, 1))
+        next(t for t in one.refiner(settled.basis).tiles([TileKey(2, 1, 1)]) if t is not None)
+        detailed(one, settled, 2).window(2, slice(3, 9), slice(3, 9))
+        assert len(asked) > 8
+        own = None if one.device is None else one.device.context
+        assert {None if device is None else device.context for device in asked} == {own}

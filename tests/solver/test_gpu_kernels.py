@@ -19,7 +19,8 @@ from esker.solve.device import Device
 from esker.solve.gpu_levels import GpuLauncher, GpuSystem, GpuWorkspace
 from esker.solve.gpu_program import Plan, plan
 from esker.solve.levels import ClWorkspace
-from esker.solve.solver import Solver, _previews, _to_rest
+from esker.solve.passes import previews, to_rest
+from esker.solve.solver import Solver
 from tests.solver.scenes import ENDLESS, PINNED, SCENES, SETTINGS, SIZE
 from tests.solver.twins import Field, close, edited, fill, noise, tile_device
 
@@ -142,7 +143,7 @@ def test_the_same_constraints_settle_within_a_quantum(device: Device, tiles: Dev
         b.coarsen(rows.gradient.eps[level])
     heights = []
     for w in (rows, tile):
-        for step in (_previews(w), _to_rest(w, SETTINGS)):
+        for step in (previews(w), to_rest(w, SETTINGS)):
             for _ in step:
                 pass
         heights.append(w.read(level))
@@ -169,7 +170,7 @@ def test_launches_are_those_of_the_model(tiles: Device, top: int) -> None:
     w = GpuWorkspace(tiles, top)
     w.load(SCENES["five"], SETTINGS)
     before = w.launch.launches
-    for _ in _previews(w):
+    for _ in previews(w):
         pass
     assert w.launch.launches - before == gpu_model.two_step(top)["launches"]
     assert gpu_model.two_step(6)["launches"] < 300

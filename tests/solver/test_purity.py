@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
 
 from esker import grid
 from esker.contract import Channel, Stroke
+from esker.solve.device_workspace import DeviceWorkspace
 from esker.solve.solver import LevelResult, Solver
+from esker.solve.tables import Tables, Window
 from tests.solver.scenes import PINNED, SCENES, SETTINGS, SIZE, flank, mixed, ridge
 
 TOP = 3
@@ -71,6 +74,35 @@ def test_steps_of_a_solve(solver: Solver) -> None:
             r.heights[0, 0] = 1
     for coarse, fine in pairwise(settled):
         assert np.array_equal(coarse.heights, fine.heights[::2, ::2])
+
+
+def test_the_coarsest_preview_waits_for_no_fine_raster(solver: Solver, monkeypatch: pytest.MonkeyPatch) -> None:
+    """SPEC S16: it comes from strokes rasterised on level 2 alone; each level's preview comes once, with the same bits
+    whatever was solved before."""
+    rasterised: list[int] = []
+    whole = DeviceWorkspace.rasterise
+
+    def counted(self: DeviceWorkspace[Any], tables: Tables, window: Window) -> None:
+        rasterised.append(tables.level)
+        whole(self, tables, window)
+
+    monkeypatch.setattr(DeviceWorkspace, "rasterise", counted)
+    strokes = SCENES["fifty"]
+    first = []
+    for one in (Solver(), solver):
+        for before in [] if one is not solver else [strokes[3:], strokes[:9]]:
+            one.solve(before, SETTINGS, 4, should_stop=lambda: True)
+        rasterised.clear()
+        steps = one.steps(strokes, SETTINGS, 4)
+        first.append(next(steps))
+        assert rasterised == [2]
+        previews = [first[-1], *(r for r in steps if r is not None and r.channel == Channel.HEIGHT and not r.settled)]
+        assert [r.level for r in previews if r is not None] == [0, 1, 2, 3, 4]
+        assert 4 in rasterised
+    a, b = (r.heights for r in first if r is not None)
+    assert np.array_equal(a, b)
+    settled = solver.solve(strokes, SETTINGS, 4)[0]
+    assert np.sqrt(np.mean((a - settled) ** 2)) < 0.05 * np.ptp(settled)
 
 
 @pytest.mark.parametrize("scene", list(SCENES))

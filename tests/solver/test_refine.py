@@ -54,7 +54,7 @@ class Counting:
     """An engine that counts its steps."""
 
     def __init__(self, engine: Engine) -> None:
-        self.engine, self.steps = engine, 0
+        self.engine, self.device, self.steps = engine, engine.device, 0
 
     def run(self, at: Step, strokes: StrokeWindows, parent: Fields) -> Fields:
         self.steps += 1

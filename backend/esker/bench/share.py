@@ -50,9 +50,10 @@ class _Timed:
         levels: int | None = None,
         *,
         basis: bool = False,
+        base: Any = None,
     ) -> Iterator[LevelResult | None]:
         """As of the solver."""
-        steps = self._solver.steps(strokes, settings, levels, basis=basis)
+        steps = self._solver.steps(strokes, settings, levels, basis=basis, base=base)
         took = self.slices.setdefault(self._solver.max_level if levels is None else levels, [])
         try:
             while True:
@@ -65,8 +66,12 @@ class _Timed:
         finally:
             steps.close()  # type: ignore[attr-defined]
 
-    def channels(self, *job: Any) -> Iterator[Any]:
-        return self._solver.channels(*job)
+    def channels(self, *job: Any, **over: Any) -> Iterator[Any]:
+        return self._solver.channels(*job, **over)
+
+    def base_levels(self, base: Any, levels: int | None = None) -> Iterator[Any]:
+        """As of the solver."""
+        return self._solver.base_levels(base, levels)
 
     def refiner(self, basis: Any) -> Refiner:
         """As of the solver."""

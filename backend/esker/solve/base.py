@@ -50,6 +50,51 @@ class Base(Protocol):
 
 
 @dataclass(frozen=True)
+class Bound:
+    """A base that is always computed on one device (None: on the CPU): kinds of devices differ in their last bits, and
+    all that a solve reads of a base must agree."""
+
+    base: Base
+    device: Any
+
+    @property
+    def digest(self) -> bytes:
+        """As of the base."""
+        return self.base.digest
+
+    @property
+    def low(self) -> float:
+        """As of the base."""
+        return self.base.low
+
+    @property
+    def high(self) -> float:
+        """As of the base."""
+        return self.base.high
+
+    def level(self, level: int, device: Any = None) -> NDArray[np.float32]:  # noqa: ARG002
+        """As of the base, on the bound device."""
+        return self.base.level(level, self.device)
+
+    def window(self, level: int, rows: slice, cols: slice, device: Any = None) -> NDArray[np.float32]:  # noqa: ARG002
+        """As of the base, on the bound device."""
+        return self.base.window(level, rows, cols, self.device)
+
+    def survey(self, level: int) -> NDArray[np.float32]:
+        """As of the base."""
+        return self.base.survey(level)
+
+    def changed(self, other: Any) -> grid.Rect | None:
+        """As of the base."""
+        return self.base.changed(other.base if isinstance(other, Bound) else other)
+
+
+def bound(base: Base | None, device: Any) -> Bound | None:
+    """A base bound to a device; None for none."""
+    return None if base is None else Bound(base, device)
+
+
+@dataclass(frozen=True)
 class Ground:
     """What packing a stroke needs to know of the base under it.
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from hashlib import blake2b
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,10 +27,9 @@ Bounds = tuple[int, int, int, int]
 
 
 class BlockCache:
-    """Squares of all bases and levels, least recently used dropped first. ``device``: what bases compute on."""
+    """Squares of all bases and levels, least recently used dropped first."""
 
-    def __init__(self, device: Any = None, bytes_: int = BLOCKS_BYTES) -> None:
-        self.device = device
+    def __init__(self, bytes_: int = BLOCKS_BYTES) -> None:
         self.most = max(1, bytes_ // (4 * BLOCK * BLOCK))
         self._held: OrderedDict[tuple[bytes, int, int, int], tuple[NDArray[np.float32], bytes]] = OrderedDict()
 
@@ -44,7 +43,7 @@ class BlockCache:
         if found is None:
             n = grid.samples(level)
             rows, columns = (slice(k * BLOCK, min((k + 1) * BLOCK, n)) for k in (row, column))
-            samples = base.window(level, rows, columns, self.device)
+            samples = base.window(level, rows, columns)
             found = samples, blake2b(np.ascontiguousarray(samples).tobytes(), digest_size=DIGEST_BYTES).digest()
             self._held[key] = found
             while len(self._held) > self.most:

@@ -62,7 +62,7 @@ class Packer:
     def pack(
         self, strokes: Sequence[Stroke], settings: TerrainSettings, base: Base | None = None
     ) -> tuple[Tables, Window | None]:
-        """The tables, and the bins whose constraints may differ from the last set's (None: no bin does)."""
+        """The bins whose constraints may differ from the last set's (None: no bin does), and what reaches them."""
         s, box = grid.spacing(self.level, settings.size_m), whole(self.level)
         fresh = self._settings != _settings_key(settings) or (self._base is None) != (base is None)
         same = not fresh and _same(self._base, base)
@@ -80,7 +80,7 @@ class Packer:
             assert base is not None
             window = union([w for w in (window, _moved(base.changed(self._base), s, box)) if w is not None])
         self._settings, self._packed, self._base = _settings_key(settings), new, base
-        tables = _tables(self.level, settings, [p for _, p in new.values() if p is not None], box)
+        tables = _tables(self.level, settings, [p for _, p in new.values() if p is not None and _meet(p, window)], box)
         return tables, window
 
     def forget(self) -> None:
@@ -94,6 +94,14 @@ def _settings_key(settings: TerrainSettings) -> tuple[float, float | None, str]:
 
 def _same(one: Base | None, other: Base | None) -> bool:
     return one is other or (one is not None and other is not None and one.digest == other.digest)
+
+
+def _meet(packed: Packed, window: Window | None) -> bool:
+    """Whether a stroke can reach the rectangle around a window."""
+    if window is None:
+        return False
+    (r0, r1, c0, c1), (s0, s1, d0, d1) = packed.window.bounds, window.bounds
+    return r0 < s1 and s0 < r1 and c0 < d1 and d0 < c1
 
 
 def _moved(rect: grid.Rect | None, s: float, box: BinBox) -> Window | None:

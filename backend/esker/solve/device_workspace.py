@@ -45,7 +45,7 @@ class OverBase:
     def put(self, base: Base) -> None:
         """Copy the base's samples to the device, unless they are there."""
         if base.digest != self._digest:
-            samples = base.level(self._shape.level, self._queue.device)
+            samples = base.level(self._shape.level)
             window = rectangle(self._shape, 0, self._pad)
             self._queue.cl.enqueue_copy(self._queue.queue, self.base, np.ascontiguousarray(samples), **window)
             self._digest = base.digest
@@ -65,6 +65,7 @@ class DeviceWorkspace(Generic[S]):
         self.top = height.top
         self.gradient, self.height = gradient, height
         self.packer = Packer(self.top)
+        self.scout: Any = None
         self.size_m = 1.0
         self._queue, self._bins, self._over = queue, bins, over
 

@@ -28,6 +28,7 @@ class Queue:
         self.cl, self.device, self.queue = cl, device, device.queue
         # of functions, not of methods: a cycle through the queue would keep its buffers until somebody collects it
         self.bound = lru_cache(MOST_BOUND)(partial(_bound, cl, device))
+        self._passing: dict[str, Any] = {}
         self.weights = self.constant(chebyshev_weights().astype(np.float32))
         self.table = self.constant(table)
 
@@ -44,8 +45,13 @@ class Queue:
         return self.cl.Buffer(self.device.context, flags, hostbuf=host)
 
     def once(self, name: str, args: tuple[Any, ...]) -> Any:
-        """A kernel with all arguments set, for those that will not come again."""
-        kernel = kernel_of(self.cl, self.device, name)
+        """A kernel with all arguments set, for those that will not come again: enqueue it before the next of its name.
+
+        Making one takes pyopencl more than a millisecond where it has many arguments, so each name has one.
+        """
+        kernel = self._passing.get(name)
+        if kernel is None:
+            kernel = self._passing[name] = kernel_of(self.cl, self.device, name)
         kernel.set_args(*args)
         return kernel
 

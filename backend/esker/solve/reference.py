@@ -7,6 +7,7 @@ is the energy's (half control volume) doubled. Stiffness ``d`` excludes screenin
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -214,6 +215,7 @@ class NumpyWorkspace:
 
     def __init__(self, top: int, based: bool = False) -> None:
         self.top, self.based = top, based
+        self.scout: Any = None
         self.size_m = 1.0
         self.packer = Packer(top)
         self.gradient: NumpySystem

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from esker import grid
 from esker.contract import MAX_REFINED_LEVEL, TILE_CELLS, TILE_SAMPLES, Stroke, TerrainSettings
 from esker.grid import TileKey
-from esker.solve.base import Base
+from esker.solve.base import Base, bound
 from esker.solve.base_blocks import BaseWindows, BlockCache
 from esker.solve.device import Device, row_kernels
 from esker.solve.refine_engine import CHANNELS, ClEngine, Engine, Fields, NumpyEngine, Span, Step, step
@@ -108,7 +108,8 @@ class Refiner:
 
     def __init__(self, basis: Basis, engine: Engine, cache: FieldCache, blocks: BlockCache | None = None) -> None:
         self.basis, self.cache, self._engine = basis, cache, engine
-        self._base = None if basis.base is None else BaseWindows(basis.base, BlockCache() if blocks is None else blocks)
+        under = bound(basis.base, engine.device)
+        self._base = None if under is None else BaseWindows(under, BlockCache() if blocks is None else blocks)
         self._ground = np.concatenate([basis.gradient, basis.heights[None]])
         self._digests: dict[TileKey, bytes] = {}
         self._content: dict[TileKey, bytes] = {}
@@ -351,7 +352,7 @@ class Refinery:
 
     def __init__(self, device: Device | None, cache_bytes: int = CACHE_BYTES) -> None:
         self.cache = FieldCache(cache_bytes)
-        self._device, self._blocks = device, BlockCache(device)
+        self._device, self._blocks = device, BlockCache()
         self._engine: Engine | None = None
 
     def refiner(self, basis: Basis) -> Refiner:

@@ -142,7 +142,10 @@ _OVER: Final = {"base": 1, "share": 1, "raw": 1}
 
 
 class Engine(Protocol):
-    """Computes one step."""
+    """Computes one step. ``device``: on what; None is NumPy."""
+
+    @property
+    def device(self) -> Device | None: ...
 
     def run(self, at: Step, strokes: StrokeWindows, parent: Fields) -> Fields:
         """``at.core``'s fields from the parent's on ``at.parent``."""
@@ -153,6 +156,8 @@ class Engine(Protocol):
 
 class NumpyEngine:
     """The twin in float64, and what serves without OpenCL."""
+
+    device = None
 
     def clear(self) -> None:
         """Nothing is kept."""

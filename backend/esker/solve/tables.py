@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -225,6 +226,14 @@ class Window:
 
     first: int
     spans: Ints
+
+    @cached_property
+    def bounds(self) -> tuple[int, int, int, int]:
+        """Rows and columns of bins (first, end, first, end) around all that are in it."""
+        left, right = self.spans.T
+        used = right > left
+        columns = (int(left[used].min()), int(right[used].max())) if used.any() else (0, 0)
+        return self.first, self.first + len(self.spans), *columns
 
     @property
     def sample_rows(self) -> tuple[int, int]:

@@ -19,7 +19,7 @@ from esker.solve.fields import fields_of
 from esker.solve.reference import NumpyWorkspace
 
 if TYPE_CHECKING:
-    from esker.solve.solver import Workspace
+    from esker.solve.passes import Workspace
 
 SHARE = 0.9
 """Of a device's memory that workspaces may take: tables, the driver and the display need some too."""

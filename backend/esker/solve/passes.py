@@ -1,0 +1,177 @@
+"""The passes of one solve over a workspace: previews coarse to fine, cycles to rest, settled levels (DESIGN 5.3)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from esker import grid
+from esker.contract import Channel, Stroke, TerrainSettings
+from esker.solve import multigrid
+from esker.solve.base import Base, Bound
+from esker.solve.constraints import Packer
+from esker.solve.injection import frozen, injections
+
+PREVIEW_GRADIENT_CYCLES = 1
+PREVIEW_HEIGHT_CYCLES = 3
+WIDE_REACHES = (1 / 16, 1 / 4)
+"""A reach above each of these shares of the domain takes one gradient cycle more: what full multigrid leaves of the
+gradient is smooth, and the farther it is felt the more height it adds up to."""
+HEIGHT_SHARE = 0.25
+"""Error, in quanta of the finest level, at which the heights are at rest: half of what DESIGN 5.3 asks for."""
+GRADIENT_SHARE = 1 / 16
+"""Share of a quantum that the gradient's own error may cost the heights."""
+
+
+@dataclass(frozen=True)
+class Basis:
+    """What refinement above the global levels starts from (DESIGN 5.6): a settled solve.
+
+    heights: (N, N) float32 of level ``level``, metres above the ``base`` (None: a plane at 0); gradient: (2, N, N)
+    float32, d/dx and d/dy, metres per metre: in bands that of the ground, elsewhere of the heights. Both read-only.
+    """
+
+    strokes: tuple[Stroke, ...]
+    settings: TerrainSettings
+    level: int
+    heights: NDArray[np.float32]
+    gradient: NDArray[np.float32]
+    base: Base | None = None
+
+
+@dataclass(frozen=True)
+class LevelResult:
+    """One finished level. heights: (N_l, N_l) float32, metres above the base, row 0 south, read-only. ``settled``
+    False: a preview that later results correct; True: final for this stroke set, and the injection of the next finer
+    level.
+
+    ``channel`` other than HEIGHT: ``heights`` holds that channel instead, in its unit (metres, 0..1, -1..1, levels);
+    the same array as last time if nothing of it changed.
+    ``basis``: with the last result of a settled solve, if it was asked for.
+    """
+
+    level: int
+    heights: NDArray[np.float32]
+    settled: bool
+    channel: Channel = Channel.HEIGHT
+    basis: Basis | None = None
+
+
+class Workspace(Protocol):
+    """Memory and kernels for one solve at a time of one finest level; ``device_workspace`` says what each does."""
+
+    top: int
+    packer: Packer
+    scout: Workspace | None
+
+    @property
+    def based(self) -> bool: ...
+    @property
+    def gradient(self) -> multigrid.System: ...
+    @property
+    def height(self) -> multigrid.System: ...
+    def load(self, strokes: Sequence[Stroke], settings: TerrainSettings, base: Base | None = None) -> None: ...
+    def loading(
+        self, strokes: Sequence[Stroke], settings: TerrainSettings, base: Base | None = None
+    ) -> Iterator[None]: ...
+    def guide(self, level: int) -> None: ...
+    def warm(self, heights: NDArray[np.float32]) -> None: ...
+    def read(self, level: int) -> NDArray[np.float32]: ...
+    def read_gradient(self) -> NDArray[np.float32]: ...
+
+
+class Job(NamedTuple):
+    """What is to be solved. ``base``: see ``Basis``, on the device that solves."""
+
+    strokes: Sequence[Stroke]
+    settings: TerrainSettings
+    base: Bound | None
+
+
+def preview_gradient_cycles(settings: TerrainSettings) -> int:
+    """Gradient cycles of the finest preview that keep it within 10^-3 of the relief (docs/solver.md)."""
+    reach = settings.size_m if settings.reach_m is None else settings.reach_m
+    return PREVIEW_GRADIENT_CYCLES + sum(reach > share * settings.size_m for share in WIDE_REACHES)
+
+
+def scouted(w: Workspace, job: Job) -> LevelResult:
+    """The coarsest preview, of constraints that were rasterised coarsely."""
+    w.load(*job)
+    _coarse(w, 0)
+    return LevelResult(0, frozen(w.read(0)), settled=False)
+
+
+def _coarse(w: Workspace, level: int) -> None:
+    """Both steps on a level below the finest, once the next coarser one is done."""
+    multigrid.start(w.gradient, level)
+    multigrid.finish(w.gradient, level)
+    w.guide(level)
+    multigrid.start(w.height, level)
+    multigrid.finish(w.height, level)
+
+
+def previews(
+    w: Workspace, gradient_cycles: int = PREVIEW_GRADIENT_CYCLES, *, coarsest: bool = True
+) -> Iterator[LevelResult | None]:
+    """Full multigrid, both steps level by level, so that a coarse level is out before the next one is touched.
+
+    Not ``coarsest``: without level 0, which is out already.
+    """
+    for level in range(w.top):
+        _coarse(w, level)
+        if level > 0 or coarsest:
+            yield LevelResult(level, frozen(w.read(level)), settled=False)
+    yield from _cycles(w.gradient, gradient_cycles)
+    w.guide(w.top)
+    yield from _cycles(w.height, PREVIEW_HEIGHT_CYCLES)
+    yield LevelResult(w.top, frozen(w.read(w.top)), settled=False)
+
+
+def _cycles(system: multigrid.System, count: int) -> Iterator[None]:
+    """Start the finest level from the next coarser and cycle."""
+    multigrid.start(system, system.top)
+    for _ in range(count if system.top > 0 else 0):
+        multigrid.cycle(system)
+        yield
+
+
+def gradients(w: Workspace) -> None:
+    """The gradient step alone, up to the finest level."""
+    for level in range(w.top):
+        multigrid.start(w.gradient, level)
+        multigrid.finish(w.gradient, level)
+    for _ in _cycles(w.gradient, PREVIEW_GRADIENT_CYCLES):
+        pass
+
+
+def to_rest(w: Workspace, settings: TerrainSettings) -> Iterator[None]:
+    """Cycle both steps until their error is too small to see."""
+    if w.top == 0:
+        return
+    quantum = grid.quantum(w.top, settings.size_m)
+    span = min(settings.reach_m or settings.size_m / 4, settings.size_m / 4)
+    yield from multigrid.converge(w.gradient, GRADIENT_SHARE * quantum / span)
+    w.guide(w.top)
+    multigrid.refresh(w.height)
+    yield from multigrid.converge(w.height, HEIGHT_SHARE * quantum)
+
+
+def settled(w: Workspace, job: Job, basis: bool) -> Iterator[LevelResult]:
+    """All levels of a system at rest: the finest, and its injections.
+
+    Raises DivergedError for heights that are not finite: a kernel's largest update passes over what is not a number.
+    """
+    heights = frozen(w.read(w.top))
+    if not np.isfinite(heights).all():
+        raise multigrid.DivergedError
+    *coarser, finest = enumerate(injections(heights))
+    for level, samples in coarser:
+        yield LevelResult(level, samples, settled=True)
+    strokes, settings, base = job
+    own = None if base is None else base.base
+    found = Basis(tuple(strokes), settings, w.top, heights, frozen(w.read_gradient()), own) if basis else None
+    yield LevelResult(finest[0], finest[1], settled=True, basis=found)
