@@ -36,18 +36,23 @@ function layerOutline(layer: Layer, ground: Ground): Float32Array {
   return points;
 }
 
+export interface FootprintMarks {
+  readonly selected: string | null;
+  readonly hovered: string | null;
+  readonly laying: Laying | null;
+  /** A drawing tool is in hand: the selected outline does not stand out. */
+  readonly calm: boolean;
+}
+
 /**
  * Outlines of all layers that are shown, the selected one strong, and of the grid that is being laid. An outline that nobody
  * wants to see (strength 0) shows while it is selected or pointed at.
  */
-export function footprintVisuals(
-  doc: Doc | null,
-  marks: { readonly selected: string | null; readonly hovered: string | null; readonly laying: Laying | null },
-  ground: Ground,
-): FootprintVisual[] {
+export function footprintVisuals(doc: Doc | null, marks: FootprintMarks, ground: Ground): FootprintVisual[] {
   const out: FootprintVisual[] = [];
   for (const layer of doc?.layers.values() ?? []) {
-    const strong = layer.id === marks.selected;
+    const { laying } = marks;
+    const strong = layer.id === marks.selected && (!marks.calm || layer.id === laying?.id);
     const hovered = layer.id === marks.hovered;
     if (!strong && !hovered && (layer.hidden || layer.outline === 0)) continue;
     const colour = hexColour(layerColour(layer.id));

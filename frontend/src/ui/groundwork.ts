@@ -27,6 +27,8 @@ export interface GroundworkOptions {
   /** The ground as drawn, held fast; a new one whenever it changes. Reading it in a computation subscribes to changes. */
   readonly ground: () => Ground;
   readonly transport: ImportTransport;
+  /** Somebody draws: outlines step back. */
+  readonly calm: () => boolean;
   /** Imports that were under way when the page was loaded. */
   readonly kept: readonly KeptImport[];
   /** Remembers those that are, for a page that is loaded anew. */
@@ -63,7 +65,7 @@ export class Groundwork {
       const doc = options.doc.doc.value;
       const laying = options.laying.value;
       if (!doc?.layers.size && laying === null) return NONE;
-      const marks = { selected: this.selected.value, hovered: this.hovered.value, laying };
+      const marks = { selected: this.selected.value, hovered: this.hovered.value, laying, calm: options.calm() };
       return footprintVisuals(doc, marks, options.ground());
     });
     this.sheet = computed(() => {
@@ -163,7 +165,6 @@ export class Groundwork {
   #arrived(job: ImportJob): void {
     const id = job.status?.layer ?? null;
     if (id === null) return;
-    this.selected.value = id;
     const notes = job.status?.report?.notes ?? [];
     this.#o.say(`${job.file} is part of the ground now.`);
     if (notes.length === 0) this.imports.dismiss(job.key);

@@ -131,6 +131,7 @@ export class Stage {
         return this.shown.freeze();
       },
       transport: gridTransport(session),
+      calm: () => this.input.tool.value !== "select",
       kept: keptImports(session.id),
       keep: (kept) => keepImports(session.id, kept),
       say: (text, tone) => session.toasts.show(text, tone),

@@ -5,7 +5,7 @@
 
 import type { GridPlace } from "../core/lattice.ts";
 import type { CameraState, FrameStats } from "../core/types.ts";
-import type { Layer, PaintChannel, Stroke } from "../generated/contract.ts";
+import { type Layer, type PaintChannel, type Stroke, TILE_SAMPLES } from "../generated/contract.ts";
 import type { Attributes } from "../tiles/detail.ts";
 import { orderedLayers } from "./layers.ts";
 import { placeOf } from "./laying.ts";
@@ -62,6 +62,8 @@ export interface PageView {
   camera(): Pick<CameraState, "mode" | "eye" | "target" | "fovDeg" | "orthoHeight" | "width" | "height"> | null;
   /** CSS pixels of the window for a point of the world. */
   project(x: number, y: number, z: number): { x: number; y: number; visible: boolean } | null;
+  /** Greatest step between neighbouring held tiles of a level along the edges that they share, metres: 0 means no crack. */
+  seams(): number;
   /** Tiles held, how many of them are exact, and how many there are of each level. */
   tiles(): { held: number; exact: number; levels: number[] };
   stats(): FrameStats | null;
@@ -135,6 +137,7 @@ export function installTestHook(session: TerrainSession): () => void {
       return { mode, eye, target, fovDeg, orthoHeight, width, height };
     },
     project: (x, y, z) => stage()?.toWindow([x, y, z]) ?? null,
+    seams: () => greatestStep(session),
     tiles: () => ({ held: stage()?.tiles.size ?? 0, exact: count(session), levels: byLevel(session) }),
     stats: () => stage()?.stats.peek() ?? null,
     get frames() {
@@ -145,6 +148,20 @@ export function installTestHook(session: TerrainSession): () => void {
   return () => {
     if (window.esker === view) delete window.esker;
   };
+}
+
+function greatestStep(session: TerrainSession): number {
+  const tiles = session.stage.peek()?.tiles;
+  let most = 0;
+  for (const { level, x, y, heights } of tiles?.tiles() ?? []) {
+    const [east, north] = [tiles?.tile(level, x + 1, y)?.heights, tiles?.tile(level, x, y + 1)?.heights];
+    for (let k = 0; k < TILE_SAMPLES; k++) {
+      const [right, top] = [k * TILE_SAMPLES + TILE_SAMPLES - 1, TILE_SAMPLES * (TILE_SAMPLES - 1) + k];
+      if (east) most = Math.max(most, Math.abs(heights[right]! - east[k * TILE_SAMPLES]!));
+      if (north) most = Math.max(most, Math.abs(heights[top]! - north[k]!));
+    }
+  }
+  return most;
 }
 
 function count(session: TerrainSession): number {

@@ -65,6 +65,7 @@ function open(layers: Layer[] = []): void {
       },
       cancel: async (id) => void cancelled.push(id),
     },
+    calm: () => false,
     kept: [],
     keep: (list) => {
       kept = list;
@@ -108,7 +109,7 @@ describe("real ground on the page", () => {
     expect(kept).toEqual([{ id: "j", file: "dome.npy" }]);
     now = { ...now, stage: "done", layer: "l1" };
     await vi.advanceTimersByTimeAsync(250);
-    expect(work.selected.value).toBe("l1");
+    expect(said.at(-1)).toBe("dome.npy is part of the ground now.");
     expect(kept).toEqual([]);
   });
 

@@ -94,7 +94,7 @@ describe("words of grids", () => {
 
 describe("footprints", () => {
   const doc = (...layers: Layer[]) => fromDocument({ ...EMPTY, layers });
-  const marks = { selected: null, hovered: null, laying: null };
+  const marks = { selected: null, hovered: null, laying: null, calm: false };
 
   it("lie on the ground as closed lines, as strong as their layer says", () => {
     const [f] = footprintVisuals(doc(layer("a")), marks, flat);
