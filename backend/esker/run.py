@@ -112,6 +112,8 @@ class Assembly:
         self._worker: Worker | None = None
         self._journal: Journal | None = None
         self._backups: _Backups | None = None
+        self.imports: Imports | None = None
+        """Once there is a server."""
         try:
             self._open(make_solver or self._solver)
         except BaseException:
@@ -159,8 +161,8 @@ class Assembly:
             PreviewTokens(self._journal),
             self.settings.public_url.rstrip("/") if self.settings.public_url else None,
         )
-        imports = Imports(self.hub, self._grids, importing, quota_bytes=self.settings.grid_quota_mb << 20)
-        app = create_app(self.hub, self.settings.page, self.settings.data, pictures, self._grids, imports)
+        self.imports = Imports(self.hub, self._grids, importing, quota_bytes=self.settings.grid_quota_mb << 20)
+        app = create_app(self.hub, self.settings.page, self.settings.data, pictures, self._grids, self.imports)
 
         async def started() -> None:
             if announce:

@@ -11,6 +11,7 @@ import heapq
 import itertools
 import random
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 
 from esker import contract as c
@@ -44,7 +45,11 @@ class World:
         self._order = itertools.count()
 
     def after(self, delay: float, run: Callable[[], None]) -> None:
-        heapq.heappush(self._events, _Event(self.now + delay, next(self._order), run))
+        self.at(self.now + delay, run)
+
+    def at(self, moment: float, run: Callable[[], None]) -> None:
+        """Exactly then: what is added and taken away again may come out of order by a rounding."""
+        heapq.heappush(self._events, _Event(moment, next(self._order), run))
 
     def run(self, until: float = float("inf")) -> None:
         while self._events and self._events[0].at <= until:
@@ -94,6 +99,13 @@ class Server:
         self.core.committed(batch)
         self.ordered()
 
+    def lay(self, author: str, n: int, make: Callable[[str, float], c.Layer]) -> None:
+        """The end of an import of ``author``'s."""
+        layer = make(f"{author}-layer-{n}", 10.0 * n)
+        with suppress(Refusal):  # a server that died may find that it has done this already
+            self.core.perform(c.AddLayer(layer=layer), f"import-{author}-{n}", author)
+            self.ordered()
+
     def die(self) -> None:
         """SIGKILL and restart: uncommitted ops are gone, every connection is cut."""
         self.generation += 1
@@ -122,7 +134,7 @@ class Link:
     def up(self, text: str) -> None:
         at = max(self.world.now + self._delay(), self._last_up)
         self._last_up = at
-        self.world.after(at - self.world.now, lambda: self._arrive(text))
+        self.world.at(at, lambda: self._arrive(text))
 
     def _arrive(self, text: str) -> None:
         if not self.alive:
@@ -145,7 +157,7 @@ class Link:
         while (text := self.outbox.pop()) is not None:
             at = max(self.world.now + self._delay(), self._last_down)
             self._last_down = at
-            self.world.after(at - self.world.now, lambda text=text: self._deliver(text))  # type: ignore[misc]
+            self.world.at(at, lambda text=text: self._deliver(text))  # type: ignore[misc]
         if self.outbox.closing is not None:
             self.cut()
 

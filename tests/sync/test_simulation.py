@@ -38,9 +38,15 @@ def _line(stroke_id: str, x: float) -> c.Stroke:
     return c.Stroke(id=stroke_id, kind="paint", paint=_paint(1.0), **anchors)
 
 
+def _layer(layer_id: str, x: float) -> c.Layer:
+    facts = c.GridFacts(rows=9, cols=9, low_m=0.0, high_m=10.0)
+    fields: Any = {"content": "0" * 64, "facts": facts, "anchor": (x, 0.0), "spacing_m": (1.0, 1.0), "accuracy_m": 1.0}
+    return c.Layer(id=layer_id, **fields)
+
+
 def _birth() -> StrokeSet:
     shared = {f"s{i}": _stroke(f"s{i}", 100.0 * i) for i in range(3)} | {"p0": _line("p0", 300.0)}
-    return StrokeSet("t", strokes=shared)
+    return StrokeSet("t", strokes=shared, layers={"v0": _layer("v0", 0.0)})
 
 
 def _fields(**fields: object) -> c.StrokeFields:
@@ -77,6 +83,21 @@ def _random_op(rng: random.Random, client: Client, n: int) -> tuple[c.Op, str | 
     return c.SetStroke(stroke=target, fields=_fields(locked=rng.random() < 0.2, label=f"{n}")), None
 
 
+def _layer_op(rng: random.Random, client: Client, n: int) -> tuple[c.Op, str | None]:
+    known = [*client.doc.document.layers, *client.doc.document.deleted_layers]
+    target, x = rng.choice(known), float(rng.randrange(4000))
+    kind = rng.randrange(5)
+    if kind == 0:
+        return c.DeleteLayer(layer=target), None
+    if kind == 1:
+        return c.RestoreLayer(layer=target), None
+    if kind == 2:
+        return c.Group(ops=(c.SetLayer(layer=target, fields=c.LayerFields(hidden=bool(n % 2))),)), None
+    if kind == 3:
+        return c.SetLayer(layer=target, fields=c.LayerFields(name=f"{n}", priority=n)), None
+    return c.SetLayer(layer=target, fields=c.LayerFields(anchor=(x, 0.0))), f"g{n // 5}"
+
+
 def _act(rng: random.Random, client: Client, n: int) -> None:
     if client.doc.clock is None:
         return
@@ -87,6 +108,8 @@ def _act(rng: random.Random, client: Client, n: int) -> None:
         client.redo()
     elif roll < 0.22 and client.link is not None:
         client.link.cut()
+    elif roll < 0.40:
+        client.do(*_layer_op(rng, client, n))
     else:
         client.do(*_random_op(rng, client, n))
 
@@ -111,6 +134,8 @@ def _converges(seed: int) -> None:
         for n in range(25):
             delay = world.random.uniform(0, 5)
             world.after(delay, lambda client=client, n=n: _act(world.random, client, n))  # type: ignore[misc]
+        for n in range(2):  # an import comes to its end
+            world.after(world.random.uniform(0, 5), lambda client=client, n=n: server.lay(client.name, n, _layer))  # type: ignore[misc]
         if seed % 3 == 0 and i == 0:
             world.after(world.random.uniform(1, 5), server.die)
     _settle(world, clients)
@@ -154,6 +179,31 @@ def test_undo_never_touches_what_others_did(block: int) -> None:
 
 def _value(client: int, n: int) -> object:
     return f"v{n}" if client == 0 else (n + 1) / 100.0
+
+
+def test_what_the_server_did_in_my_name_is_mine_to_undo() -> None:
+    """SPEC D31: also where the op came while I was away."""
+    world = World(9)
+    server = Server(world, _birth())
+    mine, other = (Client(world, server, name) for name in ("c0", "c1"))
+    world.run()
+    assert mine.link is not None
+    mine.link.cut()
+    server.lay("c0", 0, _layer)
+    _settle(world, [mine, other])
+    laid = "c0-layer-0"
+    assert laid in other.doc.document.layers
+    other.undo()
+    _settle(world, [mine, other])
+    assert laid in server.core.document.layers
+    mine.undo()
+    _settle(world, [mine, other])
+    assert laid not in server.core.document.layers
+    assert laid in other.doc.document.deleted_layers
+    mine.redo()
+    _settle(world, [mine, other])
+    assert server.core.document.layers == other.doc.document.layers
+    assert laid in other.doc.document.layers
 
 
 def test_redo_brings_back_what_undo_took() -> None:
