@@ -12,6 +12,7 @@ from esker import contract as c
 from esker.importing import laying
 from esker.importing.georef import Georef, check_affine
 from esker.importing.laying import Laid, net_at
+from esker.importing.placing import Terrain
 from esker.importing.refusal import ImportRefused
 from tests.importing.conftest import look, take, world
 from tests.importing.make_files import COLS, EAST_M, NORTH_M, ROWS, UTM, ground
@@ -144,8 +145,6 @@ def test_the_terrain_without_a_place(files: Path, tmp_path: Path) -> None:
 
 def test_from_elsewhere(files: Path, tmp_path: Path) -> None:
     """SPEC G24: asked in an examination, refused in a conversion unless somebody said so."""
-    from esker.importing.examine import Terrain
-
     place = c.Place(lat_deg=46.2, lon_deg=-122.2)
     question = look(files / "little.tif", terrain=Terrain(place, 8192.0)).report.questions[0]
     assert question.id == "place"
@@ -155,6 +154,18 @@ def test_from_elsewhere(files: Path, tmp_path: Path) -> None:
     answers = c.ImportAnswers(answers={"place": "middle"})
     layer, raster = take(files / "little.tif", tmp_path / "b", answers, place=place)
     assert world(layer, raster).reshape(-1, 2).mean(axis=0) == pytest.approx((4096.0, 4096.0), abs=1.0)
+    assert not layer.facts.geo
+
+
+def test_a_named_system_is_never_moved_silently(files: Path, tmp_path: Path) -> None:
+    """SPEC G24: degrees that lie elsewhere are laid by hand by default; a system that is answered and lies elsewhere is
+    refused with what to do."""
+    place = c.Place(lat_deg=46.2, lon_deg=-122.2)
+    question = look(files / "no_crs.tif", terrain=Terrain(place, 8192.0)).report.questions[0]
+    assert (question.id, question.default) == ("place", "middle")
+    with pytest.raises(ImportRefused, match="place=middle"):
+        take(files / "no_crs.tif", tmp_path / "a", c.ImportAnswers(answers={"place": "EPSG:4326"}), place=place)
+    layer, _ = take(files / "no_crs.tif", tmp_path / "b", c.ImportAnswers(answers={"place": "middle"}), place=place)
     assert not layer.facts.geo
 
 

@@ -49,14 +49,15 @@ def _end_with_parent() -> None:
 
 
 def _work(task: wire.Task, out: Out) -> wire.Inspected | wire.Converted:
+    from esker.importing.answers import given
     from esker.importing.convert import convert
-    from esker.importing.examine import Terrain, examine
+    from esker.importing.examine import examine
+    from esker.importing.placing import Terrain
 
     path, workdir = Path(task.path), Path(task.workdir)
     terrain = None if task.size_m is None else Terrain(task.place, task.size_m)
     if task.task == "inspect":
-        answers = task.answers.answers
-        exam = examine(path, task.name, workdir, answers, terrain, lambda share: out.step("reading", share))
+        exam = examine(path, task.name, workdir, given(task.answers), terrain, lambda share: out.step("reading", share))
         return wire.Inspected(report=exam.report)
     terrain = terrain or Terrain(task.place, c.DEFAULT_SIZE_M)
     layer = convert(path, task.name, task.answers, terrain, Path(task.out_dir), workdir, out.step)

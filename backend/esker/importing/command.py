@@ -9,8 +9,11 @@ import sys
 from pathlib import Path
 from typing import Final
 
+from pydantic import ValidationError
+
 from esker import contract as c
 from esker.importing import run
+from esker.importing.answers import given
 from esker.importing.upload import Uploads
 from esker.link import Refused
 
@@ -19,6 +22,8 @@ FAILED: Final = 1
 QUESTION: Final = 2
 REFUSED: Final = 3
 SEVERITY: Final = (GOOD, QUESTION, REFUSED, FAILED)
+ABOUT_THE_FILE: Final = frozenset({"empty", "too_large"})
+"""Codes of a server that takes no such file; others are about the link, the terrain or the server."""
 VERDICTS: Final = {"good": GOOD, "ask": QUESTION, "refused": REFUSED}
 
 
@@ -26,7 +31,7 @@ def main(argv: list[str]) -> int:
     """Runs the command. Exit status: 0 good, 2 a question is open, 3 refused, 1 something else went wrong."""
     parsed = _parser().parse_args(argv)
     try:
-        answers = _answers(parsed.answer)
+        answers = _answers(parsed)
     except ValueError as error:
         return _fail(str(error))
     statuses = [_check(path, answers, parsed.json) for path in parsed.files] if parsed.check else _into(parsed, answers)
@@ -51,6 +56,16 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--defaults", action="store_true", help="with --into: take the default answer where none is given"
     )
+    hand = parser.add_argument_group("by hand", "where a grid lies and what it is, instead of what its file says")
+    hand.add_argument("--anchor", nargs=2, type=float, metavar=("X", "Y"), help="its first sample, metres in the world")
+    hand.add_argument("--rotation", type=float, metavar="DEGREES", help="counter-clockwise")
+    hand.add_argument("--spacing", nargs=2, type=float, metavar=("SX", "SY"), help="metres from sample to sample")
+    hand.add_argument("--scale", type=float, help="factor of its heights")
+    hand.add_argument("--lift", type=float, metavar="METRES", help="added to its heights")
+    hand.add_argument("--accuracy", type=float, metavar="METRES", help="its largest error")
+    hand.add_argument("--name", help="of the layer")
+    hand.add_argument("--source", help="who made it")
+    hand.add_argument("--licence", help="under which licence")
     parser.add_argument("--json", action="store_true", help="with --check: one report a line, as JSON")
     parser.add_argument(
         "--ca-file", type=Path, metavar="PEM", help="the authority of a classroom server (esker-ca.pem)"
@@ -58,15 +73,30 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _answers(given: list[str]) -> dict[str, str]:
-    """Raises ValueError for what has no "="."""
+def _answers(parsed: argparse.Namespace) -> c.ImportAnswers:
+    """Raises ValueError with a sentence."""
     answers = {}
-    for text in given:
+    for text in parsed.answer:
         key, equals, value = text.partition("=")
         if not equals or not key or len(key) > 24 or len(value) > 240:
             raise ValueError(f"--answer {text[:40]!r}: write ID=VALUE, for instance nodata=-9999")
         answers[key.strip()] = value.strip()
-    return answers
+    try:
+        return c.ImportAnswers(
+            answers=answers,
+            anchor=parsed.anchor and tuple(parsed.anchor),
+            rotation_deg=parsed.rotation,
+            spacing_m=parsed.spacing and tuple(parsed.spacing),
+            scale=parsed.scale,
+            lift_m=parsed.lift,
+            accuracy_m=parsed.accuracy,
+            name=parsed.name,
+            source=parsed.source,
+            licence=parsed.licence,
+        )
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_input=False)[0]
+        raise ValueError(f"{first['loc'][0]}: {first['msg']}") from None
 
 
 def _fail(message: str) -> int:
@@ -77,10 +107,10 @@ def _fail(message: str) -> int:
 # --- checking ---------------------------------------------------------------------------------------------------
 
 
-def _check(path: Path, answers: dict[str, str], as_json: bool) -> int:
+def _check(path: Path, answers: c.ImportAnswers, as_json: bool) -> int:
     if not path.is_file():
         return _fail(f"there is no file {path}")
-    report = asyncio.run(run.inspect(path, path.name, answers=c.ImportAnswers(answers=answers)))
+    report = asyncio.run(run.inspect(path, path.name, answers=answers))
     sys.stdout.write(report.model_dump_json() + "\n" if as_json else describe(report))
     return VERDICTS[report.verdict]
 
@@ -124,7 +154,7 @@ def _length(metres: float) -> str:
 # --- bringing in ------------------------------------------------------------------------------------------------
 
 
-def _into(parsed: argparse.Namespace, answers: dict[str, str]) -> list[int]:
+def _into(parsed: argparse.Namespace, answers: c.ImportAnswers) -> list[int]:
     try:
         with Uploads(parsed.into, parsed.ca_file) as uploads:
             return [_bring(uploads, path, answers, parsed.defaults) for path in parsed.files]
@@ -134,7 +164,7 @@ def _into(parsed: argparse.Namespace, answers: dict[str, str]) -> list[int]:
         return [_fail(f"{parsed.into.partition('#')[0]}: {error}")]
 
 
-def _bring(uploads: Uploads, path: Path, answers: dict[str, str], defaults: bool) -> int:
+def _bring(uploads: Uploads, path: Path, answers: c.ImportAnswers, defaults: bool) -> int:
     """One file, to the end. Raises what ``Uploads`` does."""
     if not path.is_file():
         return _fail(f"there is no file {path}")
@@ -143,9 +173,11 @@ def _bring(uploads: Uploads, path: Path, answers: dict[str, str], defaults: bool
         return REFUSED
     line = Line(path.name)
     try:
-        status = uploads.send(path, lambda share: line.show("upload", share))
+        status = uploads.send(path, lambda share: line.show("upload", share), "&hold=true")
     except Refused as error:
         line.end()
+        if error.code not in ABOUT_THE_FILE:
+            raise
         sys.stdout.write(f"{path.name}: refused\n  {error}\n")
         return REFUSED
     try:
@@ -156,7 +188,9 @@ def _bring(uploads: Uploads, path: Path, answers: dict[str, str], defaults: bool
                 uploads.cancel(status)
                 sys.stdout.write(describe(status.report) if status.report is not None else f"{path.name}: a question\n")
                 return QUESTION
-            status = uploads.answer(status, c.ImportAnswers(answers=chosen))
+            for unasked in sorted(answers.answers.keys() - chosen.keys()):
+                sys.stderr.write(f"{path.name}: it does not ask for {unasked!r}\n")
+            status = uploads.answer(status, answers.model_copy(update={"answers": chosen}))
     except KeyboardInterrupt:
         line.end()
         uploads.cancel(status)
@@ -169,10 +203,11 @@ def _bring(uploads: Uploads, path: Path, answers: dict[str, str], defaults: bool
     return REFUSED
 
 
-def _choose(status: c.ImportStatus, answers: dict[str, str], defaults: bool) -> dict[str, str] | None:
+def _choose(status: c.ImportStatus, answers: c.ImportAnswers, defaults: bool) -> dict[str, str] | None:
     """Answers to all that is asked, None when one is missing."""
     questions = status.report.questions if status.report is not None else ()
-    chosen = {q.id: answers[q.id] for q in questions if q.id in answers}
+    known = given(answers)
+    chosen = {q.id: known[q.id] for q in questions if q.id in known}
     if defaults:
         chosen = {q.id: q.default for q in questions} | chosen
     return chosen if len(chosen) == len(questions) else None

@@ -13,8 +13,10 @@ from numpy.lib import format as npy
 
 from esker import contract as c
 from esker.importing import questions
-from esker.importing.examine import Exam, Terrain, examine
+from esker.importing.answers import MIDDLE, given
+from esker.importing.examine import Exam, examine
 from esker.importing.laying import Laid
+from esker.importing.placing import Terrain
 from esker.importing.refusal import ImportRefused
 from esker.importing.scan import usable
 from esker.patchwork import rasters
@@ -31,11 +33,11 @@ def convert(
 
     ``progress``: stage and share of the whole conversion. Raises ImportRefused; ``out_dir`` is then of no use.
     """
-    exam = examine(path, name, workdir, answers.answers, terrain, lambda share: progress("reading", 0.25 * share))
-    if exam.far_m is not None and "place" not in answers.answers and answers.anchor is None:
+    exam = examine(path, name, workdir, given(answers), terrain, lambda share: progress("reading", 0.25 * share))
+    if exam.placed.far_m is not None and "place" not in answers.answers and answers.anchor is None:
         raise ImportRefused(
-            f"It lies {exam.far_m / 1000:,.0f} km from this terrain. Answer place={questions.MIDDLE} to lay it in its "
-            "middle."
+            f"It lies {exam.placed.far_m / 1000:,.0f} km from this terrain. Answer place={MIDDLE} "
+            "to lay it in the middle."
         )
     laid = _laid(exam, answers)
     out_dir.mkdir(parents=True, exist_ok=True)
@@ -60,7 +62,7 @@ def convert(
 
 def _laid(exam: Exam, answers: c.ImportAnswers) -> Laid:
     """The place by the file, or by the hand of whoever answered."""
-    laid = exam.laid
+    laid = exam.placed.laid
     assert laid is not None  # a terrain was given, so that even a grid without a place is fitted to it
     if answers.rotation_deg is not None:
         laid = replace(laid, rotation_deg=answers.rotation_deg)
@@ -108,7 +110,9 @@ def _put(file: BinaryIO, start: int, cols: int, row: int, col: int, values: np.n
 def _layer(exam: Exam, laid: Laid, answers: c.ImportAnswers, raster: rasters.Raster) -> c.Layer:
     name = exam.report.file
     accuracy = questions.accuracy_m(laid.spacing_m, exam.step_m)
-    facts = raster.facts(geo=exam.geo and answers.anchor is None, crs=exam.crs, format=exam.source.format, file=name)
+    placed = exam.placed
+    geo = placed.geo and answers.anchor is None
+    facts = raster.facts(geo=geo, crs=placed.crs, format=exam.source.format, file=name)
     scale = answers.scale if answers.scale is not None else 1.0
     return c.Layer(
         id=UNNAMED,

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from esker import contract as c
-from esker.importing import colours, laying, questions
+from esker.importing import colours, placing, questions
+from esker.importing.answers import STOP
 from esker.importing.gdal_source import GdalSource
-from esker.importing.georef import crs_label, on_earth, parse_crs
-from esker.importing.laying import Laid
 from esker.importing.opening import Opened, open_source, set_encoding
+from esker.importing.placing import Placed, Terrain
 from esker.importing.refusal import ImportRefused
 from esker.importing.scan import Scan, scan
 from esker.importing.source import Source
@@ -23,26 +23,15 @@ Progress = Callable[[float], None]
 
 
 @dataclass(eq=False)
-class Terrain:
-    """What an import needs to know of the terrain: its place (None: it has none) and its size in metres."""
-
-    place: c.Place | None
-    size_m: float
-
-
-@dataclass(eq=False)
 class Exam:
-    """Everything decided about a file. Metres = ``gain`` * raw + ``bias``; ``laid`` None: only its shape is known."""
+    """Everything decided about a file. Metres = ``gain`` * raw + ``bias``."""
 
     source: Source
     scan: Scan
     masked: tuple[float, ...]
     gain: float
     bias: float
-    laid: Laid | None
-    geo: bool
-    crs: str
-    far_m: float | None
+    placed: Placed
     report: c.ImportReport
 
     @property
@@ -69,8 +58,8 @@ def examine(
     if found.valid == 0:
         raise ImportRefused("It holds no data: every sample is nodata.")
     gain, bias = _heights(source, found, answers, asked)
-    laid, geo, crs, far_m = _place(source, answers, asked, terrain)
-    exam = Exam(source, found, masked, gain, bias, laid, geo, crs, far_m, c.ImportReport(verdict="good", file=""))
+    placed = placing.place(source, answers, lambda question: _ask(asked, answers, question), terrain)
+    exam = Exam(source, found, masked, gain, bias, placed, c.ImportReport(verdict="good", file=""))
     exam.report = _report(exam, name, asked)
     return exam
 
@@ -95,7 +84,7 @@ def _container_questions(opened: Opened, answers: Mapping[str, str]) -> list[c.I
         _ask(asked, answers, c.ImportQuestion(id="shape", text=text, options=opened.shapes, default=opened.shapes[0]))
     if source.bands > 1:
         _ask(asked, answers, questions.band_question(source.bands))
-    if source.eight_bit and not source.colour and _ask(asked, answers, questions.IMAGERY) == questions.STOP:
+    if source.eight_bit and not source.colour and _ask(asked, answers, questions.IMAGERY) == STOP:
         raise ImportRefused("It was said to be a picture, not elevation.")
     if not source.row_order_known:
         text = "It does not say whether its first row is the northern or the southern one."
@@ -157,119 +146,11 @@ def _heights(
     return gain, bias
 
 
-# --- place ------------------------------------------------------------------------------------------------------
-
-
-def _place(
-    source: Source, answers: Mapping[str, str], asked: list[c.ImportQuestion], terrain: Terrain | None
-) -> tuple[Laid | None, bool, str, float | None]:
-    """Where it lies; whether by its place on Earth; its system; how far off when that is outside the terrain."""
-    rows, cols = source.rows, source.cols
-    size_m = terrain.size_m if terrain is not None else c.DEFAULT_SIZE_M
-    if source.georef is None:
-        return _unplaced(source, answers, asked, terrain), False, "", None
-    georef = source.georef
-    answer = answers.get("place")
-    if georef.crs is None or not on_earth(georef.crs):
-        degrees = georef.looks_like_degrees(rows, cols) and georef.crs is None
-        reason = (
-            "It does not name its coordinate system." if georef.crs is None
-            else f"Its coordinate system ({crs_label(georef.crs)[:40]}) is not of the Earth."
-        )  # fmt: skip
-        answer = _ask(asked, answers, questions.system_question(degrees, reason))
-        if answer != questions.MIDDLE:
-            georef = georef.with_crs(parse_crs(answer))
-        elif degrees:
-            georef = georef.with_crs(parse_crs("EPSG:4326"))
-        else:
-            return _by_hand(source, size_m), False, "" if georef.crs is None else crs_label(georef.crs), None
-    source.georef = georef
-    assert georef.crs is not None
-    label = crs_label(georef.crs)
-    at = laying.middle(georef, rows, cols)
-    if at is None:
-        raise ImportRefused(f"Its place ({label}) cannot be found on Earth, or lies at a pole.")
-    own = c.Place(lat_deg=round(at[0], 6), lon_deg=round(at[1], 6))
-    place = own if terrain is None or terrain.place is None or answer == questions.MIDDLE else terrain.place
-    far_m = None if place is own else _far(source, at, place, size_m)
-    if far_m is not None:
-        answer = _ask(asked, answers, questions.far_question(far_m)) if answer is None else answer
-        if answer == questions.STOP:
-            raise ImportRefused(f"It lies {far_m / 1000:,.0f} km from this terrain.")
-        place = own
-    laid = laying.lay(laying.on_frame(georef, place, size_m), rows, cols)
-    _note_mercator(source, label, laid)
-    return replace(laid, at=at), answer != questions.MIDDLE, label, far_m
-
-
-def _far(source: Source, at: tuple[float, float], place: c.Place, size_m: float) -> float | None:
-    """Distance in metres from the middle of the terrain when the grid does not touch it, else None."""
-    assert source.georef is not None
-    arc = _great_circle_m(at, (place.lat_deg, place.lon_deg))
-    if arc > 10 * c.MAX_SIZE_M + size_m:  # so far that the frame is not asked; a grid is not that large
-        return arc
-    try:
-        laid = laying.lay(laying.on_frame(source.georef, place, size_m), source.rows, source.cols)
-    except ImportRefused:
-        return arc
-    low, high = laying.ground_box(laid, source.rows, source.cols)
-    outside = bool(np.any(high < 0.0) or np.any(low > size_m))
-    return arc if outside else None
-
-
-def _great_circle_m(a: tuple[float, float], b: tuple[float, float]) -> float:
-    (lat_a, lon_a), (lat_b, lon_b) = (tuple(map(math.radians, point)) for point in (a, b))
-    haversine = (
-        math.sin(0.5 * (lat_b - lat_a)) ** 2 + math.cos(lat_a) * math.cos(lat_b) * math.sin(0.5 * (lon_b - lon_a)) ** 2
-    )
-    return 2.0 * 6_371_008.8 * math.asin(min(1.0, math.sqrt(haversine)))
-
-
-def _by_hand(source: Source, size_m: float) -> Laid:
-    """A grid with coordinates in metres of nowhere: its own shape and turn, in the middle of the terrain."""
-    assert source.georef is not None
-    crs = source.georef.crs
-    unit = float(crs.axis_info[0].unit_conversion_factor) if crs is not None and crs.axis_info else 1.0
-    laid = laying.lay(laying.locally(source.georef, unit), source.rows, source.cols)
-    return _centred(laid, source, size_m)
-
-
-def _centred(laid: Laid, source: Source, size_m: float) -> Laid:
-    low, high = laying.ground_box(laid, source.rows, source.cols)
-    shift = 0.5 * size_m - 0.5 * (low + high)
-    x, y = (round(float(a), 4) for a in np.array(laid.anchor) + shift)
-    return replace(laid, anchor=(x, y))
-
-
-def _unplaced(
-    source: Source, answers: Mapping[str, str], asked: list[c.ImportQuestion], terrain: Terrain | None
-) -> Laid | None:
-    """A grid without any place: as wide as somebody says; None while nobody does and no terrain is known."""
-    width = questions.parse_size(_ask(asked, answers, questions.SIZE))
-    size_m = terrain.size_m if terrain is not None else c.DEFAULT_SIZE_M
-    if width is None and terrain is None:
-        return None
-    step = round(width / (source.cols - 1) if width is not None else size_m / (max(source.rows, source.cols) - 1), 9)
-    if not c.MIN_GRID_SPACING_M <= step <= c.MAX_GRID_SPACING_M:
-        raise ImportRefused(f"Its samples would lie {step:.6g} m apart: that is no grid for a terrain.")
-    return _centred(Laid((0.0, 0.0), 0.0, (step, step), True, False), source, size_m)
-
-
-def _note_mercator(source: Source, label: str, laid: Laid) -> None:
-    if label != "EPSG:3857" or source.georef is None or source.georef.affine is None:
-        return
-    a, _, _, d, _, _ = source.georef.affine
-    note = (
-        f"Web Mercator: its steps of {math.hypot(a, d):.4g} m are {laid.spacing_m[0]:.4g} m on the ground, and so laid."
-    )
-    source.notes.append(note)
-
-
 # --- report -----------------------------------------------------------------------------------------------------
 
 
 def _report(exam: Exam, name: str, asked: list[c.ImportQuestion]) -> c.ImportReport:
-    source, found, laid = exam.source, exam.scan, exam.laid
+    source, found, laid = exam.source, exam.scan, exam.placed.laid
     if found.infinite:
         source.notes.append(f"{found.infinite:,} infinite samples are left out.")
     if found.low == found.high:
@@ -285,12 +166,12 @@ def _report(exam: Exam, name: str, asked: list[c.ImportQuestion]) -> c.ImportRep
         rows=source.rows,
         cols=source.cols,
         dtype=source.dtype,
-        crs=exam.crs,
+        crs=exam.placed.crs,
         spacing_m=spacing,
         rotation_deg=laid.rotation_deg if laid is not None else 0.0,
         width_m=(source.cols - 1) * spacing[0] if spacing else None,
         height_m=(source.rows - 1) * spacing[1] if spacing else None,
-        at=laid.at if laid is not None and exam.geo else None,
+        at=laid.at if laid is not None and exam.placed.geo else None,
         low_m=low,
         high_m=high,
         valid=found.share,
@@ -305,7 +186,7 @@ def _report(exam: Exam, name: str, asked: list[c.ImportQuestion]) -> c.ImportRep
 def _preview(exam: Exam) -> tuple[tuple[int, ...], ...]:
     """32 x 32 heights 0..255 between the lowest and highest sample, -1 for none, as stored: south first."""
     picture = exam.scan.picture()
-    laid = exam.laid
+    laid = exam.placed.laid
     if laid is None or laid.flip_rows:
         picture = picture[::-1]
     if laid is not None and laid.flip_cols:

@@ -7,6 +7,7 @@ import re
 from typing import Final
 
 from esker import contract as c
+from esker.importing.answers import FIT, MIDDLE, NONE, STOP
 from esker.importing.refusal import ImportRefused
 from esker.importing.scan import Scan
 from esker.importing.source import Source
@@ -25,10 +26,6 @@ LOW_GAP_SHARE: Final = 0.1
 MIN_ZERO_SHARE: Final = 1e-3
 DECIMETRE: Final = 0.1
 EIGHT_BIT_STEP_M: Final = 4.0
-FIT: Final = "fit"
-MIDDLE: Final = "middle"
-STOP: Final = "stop"
-NONE: Final = "none"
 ROW_ORDERS: Final = ("north first", "south first")
 
 
@@ -180,13 +177,17 @@ def parse_size(text: str) -> float | None:
     return width
 
 
-def system_question(degrees: bool, reason: str) -> c.ImportQuestion:
-    """Asks in which coordinate system a file lies. ``reason``: why that is not known."""
+def system_question(degrees: bool, reason: str, elsewhere: bool) -> c.ImportQuestion:
+    """Asks in which coordinate system a file lies.
+
+    ``reason``: why that is not known; ``elsewhere``: as degrees it would lie outside the terrain, so that laying it by
+    hand is the default.
+    """
     if degrees:
         text = f"{reason} Its numbers look like degrees (EPSG:4326). In which system does it lie? An EPSG code, or "
-        return c.ImportQuestion(
-            id="place", text=text + "middle: laid by hand.", options=("EPSG:4326", MIDDLE), default="EPSG:4326"
-        )
+        options = ("EPSG:4326", MIDDLE)
+        default = MIDDLE if elsewhere else options[0]
+        return c.ImportQuestion(id="place", text=text + "middle: laid by hand.", options=options, default=default)
     text = (
         f"{reason} Lay it in the middle of the terrain, to be moved by hand (its numbers taken for metres)? Or give an "
     )
