@@ -11,16 +11,18 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 
 from esker import contract as c
+from esker.document.layers import TOLD_FIELDS
 from esker.document.ops import CHANNEL_FIELDS, GROUND_FIELDS, Limits, Refusal, StrokeSet
 from esker.document.strokes import bounds
-from esker.document.undo import STROKE_WORDS, UndoStack, inverse
+from esker.document.undo import LAYER_WORDS, STROKE_WORDS, UndoStack, inverse
 from esker.document.wire import op_json
 from esker.grid import Rect
 
 PEOPLE = ("ada", "bob", "eve")
 HEIGHT_FIELDS = GROUND_FIELDS - CHANNEL_FIELDS
 IDS = tuple(f"s{i}" for i in range(4))
-LIMITS = Limits(strokes=4, points=6)
+LIMITS = Limits(strokes=4, points=6, layers=2)
+LAYER_IDS = tuple(f"v{i}" for i in range(3))
 
 metres = st.floats(-50_000, 50_000, allow_nan=False).map(lambda x: round(x, 3))
 near = st.floats(0, 4096).map(lambda x: round(x, 3))
@@ -94,7 +96,39 @@ terrain_fields = st.fixed_dictionaries(
         "rule": st.sampled_from(get_args(c.Rule)),
     },
 )
+layer_id = st.sampled_from(LAYER_IDS)
+layers = st.builds(
+    c.Layer,
+    id=layer_id,
+    content=st.sampled_from(("0" * 64, "f" * 64)),
+    facts=st.just(c.GridFacts(rows=9, cols=9, low_m=-10.0, high_m=900.0)),
+    anchor=st.tuples(metres, metres),
+    spacing_m=st.just((1.0, 2.0)),
+    accuracy_m=st.floats(0, 5),
+    hidden=st.booleans(),
+)
+layer_fields = st.fixed_dictionaries(
+    {},
+    optional={
+        "name": st.sampled_from(("x", "山")),
+        "anchor": st.tuples(metres, metres),
+        "rotation_deg": st.floats(-360, 360),
+        "scale": st.sampled_from((0.0, 1.0, -2.0, 1000.0)),
+        "lift_m": metres,
+        "priority": st.integers(-3, 3),
+        "hidden": st.booleans(),
+        "outline": st.floats(0, 1),
+    },
+)
+layer_ops = st.one_of(
+    st.builds(c.AddLayer, layer=layers),
+    st.builds(c.SetLayer, layer=layer_id, fields=layer_fields.map(c.LayerFields.model_validate)),
+    st.builds(c.DeleteLayer, layer=layer_id),
+    st.builds(c.RestoreLayer, layer=layer_id),
+)
 simple = st.one_of(
+    layer_ops,
+    layer_ops,
     st.builds(c.BeginStroke, stroke=strokes),
     st.builds(c.AppendPoints, stroke=stroke_id, start=st.integers(0, 7), points=curve, last=vec),
     st.builds(c.FinishStroke, stroke=stroke_id),
@@ -147,6 +181,10 @@ def _state(document: StrokeSet) -> dict[str, object]:
         for stroke in some.values():
             found[f"{stroke.id}.state"] = place
             found |= {f"{stroke.id}.{name}": getattr(stroke, name) for name in STROKE_WORDS}
+    for place, laid in (("live", document.layers), ("deleted", document.deleted_layers)):
+        for layer in laid.values():
+            found[f"{layer.id}.state"] = place
+            found |= {f"{layer.id}.{name}": getattr(layer, name) for name in LAYER_WORDS}
     return found
 
 
@@ -167,7 +205,7 @@ def test_ops_survive_the_wire(op: c.Op) -> None:
     again = c.OP.validate_json(text)
     assert again == op
     assert op_json(again) == text
-    if isinstance(op, c.SetStroke | c.SetTerrain):
+    if isinstance(op, c.SetStroke | c.SetTerrain | c.SetLayer):
         assert again.fields.model_fields_set == op.fields.model_fields_set
 
 
@@ -184,6 +222,7 @@ def test_an_inverse_takes_back_exactly_its_op(before: list[c.Op], op: c.Op) -> N
     for one in inverse(op, document):
         back, _ = back.apply(one)
     assert back.strokes.keys() == document.strokes.keys()
+    assert back.layers.keys() == document.layers.keys()
     expected = _state(document)
     for key, value in _state(back).items():
         if key in expected and not _in_tombstone(key, document):
@@ -192,8 +231,19 @@ def test_an_inverse_takes_back_exactly_its_op(before: list[c.Op], op: c.Op) -> N
 
 def _in_tombstone(key: str, document: StrokeSet) -> bool:
     """What a deleted stroke holds inside is nobody's concern, only that it is deleted."""
-    stroke, _, name = key.partition(".")
-    return name != "state" and stroke in document.deleted
+    item, _, name = key.partition(".")
+    return name != "state" and (item in document.deleted or item in document.deleted_layers)
+
+
+def _laid(document: StrokeSet) -> list[dict[str, object]]:
+    """All that the base follows from (SPEC D30), by id."""
+    some = [layer.model_dump(exclude=set(TOLD_FIELDS)) for layer in document.layers.values() if not layer.hidden]
+    return sorted(some, key=lambda layer: str(layer["id"]))
+
+
+def _returned(op: c.Op) -> bool:
+    """A group may change the ground and change it back: a new object for the same ground is no mistake."""
+    return isinstance(op, c.Group)
 
 
 def _try(document: StrokeSet, op: c.Op) -> StrokeSet | None:
@@ -239,6 +289,7 @@ class Session(RuleBasedStateMachine):
         after, dirty = applied
         assert after.clock == before.clock + 1
         self._check_dirty(before, after, dirty)
+        assert (before.ground is after.ground) == (_laid(before) == _laid(after)) or _returned(op)
         self.stacks[who].record(before, op, after, gesture)
         self._note(who, before, after)
         self.document = after
@@ -282,7 +333,7 @@ class Session(RuleBasedStateMachine):
             if old[key] != new[key] and not key.endswith(".state"):
                 claimed = self.claims.get((key, repr(old[key])), set())
                 assert who in claimed, f"{who} took back {key} = {old[key]}, which {claimed or 'nobody'} wrote"
-        if len(after.strokes) > LIMITS.strokes:
+        if len(after.strokes) > LIMITS.strokes or len(after.layers) > LIMITS.layers:
             return
         self._note(who, before, after)
         self.document = after
@@ -293,6 +344,8 @@ class Session(RuleBasedStateMachine):
             return
         assert not self.document.strokes.keys() & self.document.deleted.keys()
         assert len(self.document.strokes) <= LIMITS.strokes
+        assert not self.document.layers.keys() & self.document.deleted_layers.keys()
+        assert len(self.document.layers) <= LIMITS.layers
         assert all(len(s.curve) <= LIMITS.points for s in self.document.strokes.values())
         text = self.document.to_document().model_dump_json()
         assert StrokeSet.from_document(c.Document.model_validate_json(text)) == self.document

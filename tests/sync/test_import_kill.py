@@ -1,4 +1,4 @@
-"""SIGKILL at any moment of an import leaves the terrain without the layer or with all of it (SPEC J11, J12)."""
+"""SIGKILL at any moment of an import leaves the terrain without the layer or with all of it (SPEC J13)."""
 
 from __future__ import annotations
 

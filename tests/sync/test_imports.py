@@ -1,4 +1,4 @@
-"""Elevation files over HTTP: who may bring them in, questions, cancel, bounds, and what everybody sees (SPEC P80)."""
+"""Elevation files over HTTP: who may, questions, cancel, bounds, what everybody sees (SPEC P100 to P110)."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ def _works(server: LiveServer) -> list[str]:
 
 
 def test_a_file_becomes_a_layer_that_everybody_sees(live: LiveServer) -> None:
-    """SPEC P80, P86."""
+    """SPEC P100, P106."""
     terrain, secret = live.create()
     ada, bob = live.join(terrain, secret, "ada", name="Ada"), live.join(terrain, secret, "bob")
     status, job = _send(live, terrain, secret, "x", "name=../up/valley%0A.tif&client=ada")
@@ -153,7 +153,7 @@ def test_a_file_becomes_a_layer_that_everybody_sees(live: LiveServer) -> None:
 
 
 def test_no_client_adds_a_layer_by_itself(live: LiveServer) -> None:
-    """SPEC P81."""
+    """SPEC P101."""
     terrain, secret = live.create()
     peer = live.join(terrain, secret)
     layer = c.Layer(
@@ -168,7 +168,7 @@ def test_no_client_adds_a_layer_by_itself(live: LiveServer) -> None:
 
 @pytest.mark.parametrize(("role", "code"), [("view", 403), ("edit", 202)])
 def test_who_may_bring_files_in(live: LiveServer, role: str, code: int) -> None:
-    """SPEC P82."""
+    """SPEC P102."""
     terrain, owner = live.create()
     _, link = live.http("POST", f"/api/terrains/{terrain}/links", {"role": role}, owner)
     status, answer = _send(live, terrain, link["secret"], "ask")
@@ -184,7 +184,7 @@ def test_who_may_bring_files_in(live: LiveServer, role: str, code: int) -> None:
 
 
 def test_questions_and_answers(live: LiveServer) -> None:
-    """SPEC P83."""
+    """SPEC P103."""
     terrain, owner = live.create()
     _, job = _send(live, terrain, owner, "ask")
     path = f"/api/terrains/{terrain}/imports/{job['id']}"
@@ -207,7 +207,7 @@ def test_questions_and_answers(live: LiveServer) -> None:
     [("refuse", "cat"), ("crash", "failed"), ("ask", "no size")],
 )
 def test_what_is_refused_leaves_nothing(live: LiveServer, words: str, says: str) -> None:
-    """SPEC P84."""
+    """SPEC P104."""
     terrain, secret = live.create()
     _, job = _send(live, terrain, secret, words)
     if words == "ask":
@@ -221,7 +221,7 @@ def test_what_is_refused_leaves_nothing(live: LiveServer, words: str, says: str)
 
 @pytest.mark.parametrize("words", ["slow", "ask"])
 def test_cancel_leaves_nothing(live: LiveServer, reader: Reader, words: str) -> None:
-    """SPEC P84."""
+    """SPEC P104."""
     terrain, secret = live.create()
     _, job = _send(live, terrain, secret, words)
     _wait(live, terrain, secret, job["id"], "errors" if words == "slow" else "question")
@@ -235,7 +235,7 @@ def test_cancel_leaves_nothing(live: LiveServer, reader: Reader, words: str) -> 
 
 
 def test_one_at_a_time_of_a_person_and_two_of_the_server(live: LiveServer, reader: Reader) -> None:
-    """SPEC P85."""
+    """SPEC P105."""
     terrain, secret = live.create()
     jobs = []
     for name in ("ada", "bob", "eve"):
@@ -252,7 +252,7 @@ def test_one_at_a_time_of_a_person_and_two_of_the_server(live: LiveServer, reade
 
 
 def test_bounds_of_size(live: LiveServer, monkeypatch: pytest.MonkeyPatch) -> None:
-    """SPEC P87."""
+    """SPEC P107."""
     terrain, secret = live.create()
     assert _send(live, terrain, secret, "")[1]["code"] == "empty"
     monkeypatch.setattr(c, "MAX_GRID_BYTES", 1000)
@@ -264,7 +264,7 @@ def test_bounds_of_size(live: LiveServer, monkeypatch: pytest.MonkeyPatch) -> No
 
 
 def test_a_question_that_nobody_answers(live: LiveServer, monkeypatch: pytest.MonkeyPatch) -> None:
-    """SPEC P88."""
+    """SPEC P108."""
     monkeypatch.setattr(live.assembly.imports, "_question_seconds", 0.05)
     terrain, secret = live.create()
     _, job = _send(live, terrain, secret, "ask")
@@ -273,7 +273,7 @@ def test_a_question_that_nobody_answers(live: LiveServer, monkeypatch: pytest.Mo
 
 
 def test_a_terrain_made_from_a_file(live: LiveServer) -> None:
-    """SPEC P89."""
+    """SPEC P109."""
     status, made = live.http("POST", "/api/terrains/from-grid?name=tal.tif", b"ask")
     assert (status, made["title"], made["role"]) == (201, "tal", "owner")
     path = f"/api/terrains/{made['id']}/imports/{made['import']['id']}"
@@ -287,7 +287,7 @@ def test_a_terrain_made_from_a_file(live: LiveServer) -> None:
 
 
 def test_a_grid_comes_back_and_travels_in_a_terrain_file(live: LiveServer) -> None:
-    """SPEC P90, D33."""
+    """SPEC P110, D33."""
     terrain, secret = live.create()
     _, job = _send(live, terrain, secret, "x")
     _wait(live, terrain, secret, job["id"], "done")

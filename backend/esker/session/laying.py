@@ -50,6 +50,8 @@ class Layers:
         self._wanted: StrokeSet | None = None
         self._making: object = None
         self._slow: asyncio.TimerHandle | None = None
+        self._told = False
+        """Whether it was told that this takes long, since nothing was wanted last."""
         self._closed = False
 
     def current(self, document: StrokeSet) -> bool:
@@ -85,8 +87,7 @@ class Layers:
         if document is None or self._making is not None or self._closed:
             return
         self._wanted, self._making = None, document.ground
-        if self._slow is None:
-            self._slow = self._loop.call_later(SLOW_SECONDS, self._tell, LAYING)
+        self._slow = self._loop.call_later(SLOW_SECONDS, self._takes_long)
         layers, size_m = tuple(document.layers.values()), document.settings.size_m
         assert self._executor is not None
         try:
@@ -107,6 +108,7 @@ class Layers:
 
     def _made(self, ground: object, future: Future[Base | None]) -> None:
         self._making = None
+        self._quiet()
         if self._closed:
             return
         error = future.exception()
@@ -117,10 +119,14 @@ class Layers:
             self._tell(FAILED)
         self._ground = ground
         if self._wanted is None or self._wanted.ground is ground:
-            self._wanted = None
-            self._quiet()
+            self._wanted, self._told = None, False
         self._laid()
         self._next()
+
+    def _takes_long(self) -> None:
+        if not self._told:
+            self._told = True
+            self._tell(LAYING)
 
     def _quiet(self) -> None:
         if self._slow is not None:
