@@ -34,7 +34,7 @@ from esker.solve.faults import DeviceError, OutOfDeviceMemoryError
 from esker.solve.multigrid import DivergedError
 from esker.solve.solver import Solver as OpenClSolver
 from esker.store.access import Access
-from esker.store.grids import GridStore
+from esker.store.grids import FOLDER, GridStore
 from esker.store.journal import Journal
 from esker.store.previews import PreviewTokens
 from esker.tiles.delivery import ClientTiles, TileServer
@@ -157,7 +157,9 @@ class Assembly:
         """The HTTP server, to be run with ``run``."""
         assert self._journal is not None, "an assembly is open until it is closed"
         pictures = Pictures(
-            Previews(self.settings.data / "previews", self.settings.device),
+            Previews(
+                self.settings.data / "previews", self.settings.device, grids=self.settings.data / FOLDER
+            ),
             PreviewTokens(self._journal),
             self.settings.public_url.rstrip("/") if self.settings.public_url else None,
         )

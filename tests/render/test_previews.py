@@ -13,14 +13,17 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from PIL import Image
 
 from esker import contract as c
+from esker.patchwork import rasters
 from esker.render import previews as module
 from esker.render.card import tags, with_tags
 from esker.render.painting import picture
 from esker.render.previews import Busy, CannotDraw, Previews
+from esker.terrain import Terrain
 from tests.sync.harness import LiveServer
 
 
@@ -158,7 +161,7 @@ def die(_text: str, _device: str | None) -> bytes:
 
 
 def small(text: str, device: str | None) -> bytes:
-    return picture(c.Document.model_validate_json(text), device, (96, 64), 1, 80)
+    return picture(c.Document.model_validate_json(text), None, device, (96, 64), 1, 80)
 
 
 def test_a_process_that_dies_is_followed_by_another(tmp_path: Path) -> None:
@@ -183,6 +186,20 @@ def test_the_picture_has_the_size_that_cards_want(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(module, "LEVEL", 1)
     with Image.open(io.BytesIO(module.paint(document().model_dump_json(), "numpy"))) as made:
         assert (made.size, made.format) == ((module.WIDTH, module.HEIGHT), "JPEG")
+
+
+def test_elevation_layers_are_in_the_picture(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """V8: their grids come from the folder of the server; a layer whose grid is missing is left out."""
+    monkeypatch.setattr(module, "LEVEL", 1)
+    terrain = Terrain(1024.0)
+    y, x = np.mgrid[0:60, 0:60]
+    terrain.add_grid(300 * np.exp(-(((x - 30) / 9) ** 2) - ((y - 30) / 9) ** 2), spacing=18.0, accuracy=1.0)
+    (layer,) = terrain.layers
+    rasters.write(tmp_path / "grids" / layer.content, terrain.grids[layer.content])
+    text = terrain.document.model_dump_json()
+    shown, bare = (module.paint(text, "numpy", tmp_path / name) for name in ("grids", "none"))
+    difference = np.asarray(Image.open(io.BytesIO(shown)), dtype=int) - np.asarray(Image.open(io.BytesIO(bare)))
+    assert np.mean(np.abs(difference).max(axis=-1) > 30) > 0.1
 
 
 # --- over HTTP

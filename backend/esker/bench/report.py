@@ -1,4 +1,4 @@
-"""Figures of README, docs/solver.md and docs/refinement.md from the committed results.
+"""Figures of README, docs/solver.md, docs/refinement.md and docs/patchwork.md from the committed results.
 
 ``python -m esker.bench.report [--check]``.
 """
@@ -10,13 +10,14 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from esker.bench import _refine, _solver
+from esker.bench import _patchwork, _refine, _solver
 
 ROOT = Path(__file__).resolve().parents[3]
 RESULTS = ROOT / "bench" / "results"
 README = ROOT / "README.md"
 SOLVER = ROOT / "docs" / "solver.md"
 REFINEMENT = ROOT / "docs" / "refinement.md"
+PATCHWORK = ROOT / "docs" / "patchwork.md"
 BEGIN, END = "<!-- figures: written by `python -m esker.bench.report` -->", "<!-- end of figures -->"
 
 
@@ -75,6 +76,7 @@ def rows() -> list[tuple[str, str, str]]:
             f"{room['deliveries_per_s']:,} deliveries/s, {room['server_cores']:.2f} of a core, "
             f"{room['server_rss_mb']:.0f} MB",
         ),
+        *_patchwork.rows(result("patchwork")),
     ]
 
 
@@ -102,6 +104,7 @@ def documents() -> dict[Path, str]:
     out = {README: readme(README.read_text(encoding="utf-8"))}
     out[SOLVER] = _solver.document(SOLVER.read_text(encoding="utf-8"), result("solve"))
     out[REFINEMENT] = _refine.document(REFINEMENT.read_text(encoding="utf-8"), result("refine"))
+    out[PATCHWORK] = _patchwork.document(PATCHWORK.read_text(encoding="utf-8"), result("patchwork"))
     return out
 
 

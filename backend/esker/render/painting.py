@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import io
+from contextlib import suppress
 from functools import cache
+from pathlib import Path
 from typing import Final
 
 from PIL import Image
 
 from esker.contract import Document
+from esker.patchwork import rasters
+from esker.patchwork.rasters import Raster, RasterError
 from esker.render.camera import Camera, orbit
 from esker.render.frame import Scene
 from esker.render.reference import Reference
@@ -33,6 +37,17 @@ def _solver(device: str | None, level: int) -> Solver:
     return Solver(device, max_level=level, threads=1)
 
 
+def _held(document: Document, grids: Path | None) -> dict[str, Raster]:
+    """The rasters of a document that are in a folder, by content."""
+    out: dict[str, Raster] = {}
+    if grids is None:
+        return out
+    for layer in document.layers:
+        with suppress(RasterError):
+            out[layer.content] = rasters.read(grids / layer.content)
+    return out
+
+
 def camera_for(stage: Stage, width: int, height: int) -> Camera:
     """A view that fills the picture: half to the side of the sun, so that slopes have light and shade, and near."""
     settings = stage.document.settings
@@ -45,10 +60,15 @@ def camera_for(stage: Stage, width: int, height: int) -> Camera:
     return orbit(azimuth, ELEVATION_DEG, distance, pivot, size, width, height, clearance_m=size / 20)
 
 
-def picture(document: Document, device: str | None, size: tuple[int, int], level: int, quality: int) -> bytes:
+def picture(
+    document: Document, grids: Path | None, device: str | None, size: tuple[int, int], level: int, quality: int
+) -> bytes:
     """The terrain in its own look and light, as JPEG. Raises device.NoGraphics, and what solves raise."""
     reference = _reference()
-    stage = prepare(document, _solver(device, level), level=level, refined=level)
+    held = _held(document, grids)
+    layers = tuple(layer for layer in document.layers if layer.content in held)
+    document = document.model_copy(update={"layers": layers})
+    stage = prepare(document, _solver(device, level), grids=held, level=level, refined=level)
     scene = Scene(document.settings, camera_for(stage, *size))
     made = reference.draw(stage.surface, scene, stage.channels)
     out = io.BytesIO()

@@ -15,6 +15,7 @@ import time
 from collections.abc import Callable
 from concurrent.futures import Executor, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -56,14 +57,15 @@ class Previews:
         folder: Path,
         device: str | None = None,
         *,
+        grids: Path | None = None,
         painter: Painter | None = None,
         executor: Callable[[], Executor] | None = None,
         now: Callable[[], float] = time.monotonic,
     ) -> None:
-        """``folder``: where pictures are kept, made when needed. ``painter``, ``executor``, ``now``: others, for
-        tests."""
+        """``folder``: where pictures are kept, made when needed. ``grids``: where the rasters of elevation layers lie,
+        by digest. ``painter``, ``executor``, ``now``: others, for tests."""
         self._folder, self._device, self._now = folder, device, now
-        self._painter = painter or paint
+        self._painter = painter or partial(paint, grids=grids)
         self._new_executor = executor or _process
         self._executor: Executor | None = None
         self._turn = asyncio.Lock()
@@ -198,12 +200,15 @@ def _process() -> Executor:
     return ProcessPoolExecutor(1, mp_context=context, initializer=os.nice, initargs=(NICENESS,))
 
 
-def paint(document: str, device: str | None) -> bytes:
-    """The preview of a document as JPEG: the page's view of the whole terrain. Raises CannotDraw."""
+def paint(document: str, device: str | None, grids: Path | None = None) -> bytes:
+    """The preview of a document as JPEG: the page's view of the whole terrain. Raises CannotDraw.
+
+    Layers whose grid is not in the folder ``grids``, or damaged, are left out, as rooms leave them out.
+    """
     from esker.render.device import NoGraphics
     from esker.render.painting import picture
 
     try:
-        return picture(Document.model_validate_json(document), device, (WIDTH, HEIGHT), LEVEL, QUALITY)
+        return picture(Document.model_validate_json(document), grids, device, (WIDTH, HEIGHT), LEVEL, QUALITY)
     except NoGraphics as error:
         raise CannotDraw(str(error)) from None

@@ -14,6 +14,7 @@ from esker import templates
 from esker.contract import DEFAULT_LEVEL, DEFAULT_REFINED_LEVEL, Document
 from esker.document import archive
 from esker.patchwork.rasters import Raster
+from esker.render.camera import Land
 from esker.render.reference import PLAIN_CHANNELS, Channels
 from esker.render.surface import Surface
 from esker.solve.detail import detailed, settle
@@ -33,12 +34,13 @@ class Stage:
     channels: Channels
 
     @property
-    def land_m(self) -> float:
-        """Height that a view from home looks at: about the mean of the land where it is real, as in the page's stage.ts."""
+    def land(self) -> Land | None:
+        """What a view from home looks at where the land is real (the page's stage.ts)."""
         if not self.document.layers:
-            return 0.0
+            return None
         step = self.document.settings.size_m / 128
-        return step * math.floor(self.surface.mean_m / step + 0.5)
+        mean, low = self.surface.coarse_m
+        return Land(step * math.floor(mean / step + 0.5), step * math.floor(low / step + 0.5))
 
 
 class Opened(NamedTuple):
@@ -57,7 +59,7 @@ def open_terrain(name: str) -> Opened:
         from esker.client import connect
 
         with connect(name, "Picture") as live:
-            return Opened(live.document, {})
+            return Opened(live.document, live.grids)
     path = Path(name)
     if path.is_file():
         data = path.read_bytes()

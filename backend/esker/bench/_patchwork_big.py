@@ -1,0 +1,63 @@
+"""Builds one large raster out of core: ``python -m esker.bench._patchwork_big HEIGHTS.npy FOLDER``.
+
+A process of its own, so that its memory is its own. Two figures of it: ``anonymous``, what the process itself
+allocated, and ``resident``, which counts the pages of mapped files too, that the system takes back when it needs
+them.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import threading
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from esker.bench import patchwork
+from esker.patchwork import rasters
+
+EVERY_S: Final = 0.02
+
+
+class Watch(threading.Thread):
+    """Greatest memory of this process while it runs, MiB."""
+
+    def __init__(self) -> None:
+        super().__init__(daemon=True)
+        self.most = {"RssAnon": 0.0, "VmRSS": 0.0}
+        self._over = threading.Event()
+
+    def run(self) -> None:
+        """Looks every ``EVERY_S``."""
+        while not self._over.wait(EVERY_S):
+            for line in Path("/proc/self/status").read_text().splitlines():
+                name, _, value = line.partition(":")
+                if name in self.most:
+                    self.most[name] = max(self.most[name], int(value.split()[0]) / 1024)
+
+    def stop(self) -> dict[str, float]:
+        """Ends it."""
+        self._over.set()
+        self.join()
+        return {"anonymous_mib": self.most["RssAnon"], "resident_mib": self.most["VmRSS"]}
+
+
+def main(heights: Path, folder: Path) -> dict[str, Any]:
+    """Stages, bytes and memory."""
+    patchwork.built(lambda stages: rasters.build(np.zeros((200, 200)), progress=stages))  # compiled loops, ready
+    mapped = np.load(heights, mmap_mode="r")
+    watch = Watch()
+    watch.start()
+    figures, raster, model, index = patchwork.built(
+        lambda stages: rasters.build_out_of_core(mapped, folder, progress=stages)
+    )
+    memory = watch.stop()
+    return figures | {
+        "patches": model.count, "bytes_over": patchwork.bytes_over(raster, model, index), "memory": memory,
+    }  # fmt: skip
+
+
+if __name__ == "__main__":
+    sys.stdout.write(json.dumps(main(Path(sys.argv[1]), Path(sys.argv[2]))) + "\n")

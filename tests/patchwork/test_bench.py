@@ -1,0 +1,67 @@
+"""The benchmark of the patchwork measures what it says (DESIGN 15): all of it, on a small grid."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from esker.bench import _patchwork, _patchwork_big, _patchwork_data, _patchwork_gdal, patchwork
+from esker.patchwork import lod_space, rasters
+from esker.patchwork.query import Index
+
+SIDE = 257
+
+
+def test_finer_grids_keep_the_coarser_one_and_its_roughness(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Samples stay, flat ground stays flat, bands leave no seam, roughness halves with the spacing."""
+    coarse, about = _patchwork_data.first(None)
+    assert coarse.shape == (1025, 1025)
+    assert "Puget Sound" in about
+    coarse = np.ascontiguousarray(coarse[100:200, 300:400])
+    coarse[:40, :40] = 7.0
+    whole, parts = (np.empty((199, 199), np.float32) for _ in range(2))
+    _patchwork_data.finer(coarse, 11, whole)
+    monkeypatch.setattr(_patchwork_data, "BAND", 17)
+    _patchwork_data.finer(coarse, 11, parts)
+    assert np.array_equal(whole, parts)
+    assert np.abs(whole[::2, ::2] - coarse).max() < 0.051
+    assert (whole[:76, :76] == 7.0).all()
+    rough = [float(np.abs(np.diff(z[50:], 2, axis=0)).mean()) for z in (coarse, whole[50:])]
+    assert 0.3 * rough[0] < rough[1] < rough[0]
+
+
+def test_everything_is_measured_and_told(tmp_path: Path) -> None:
+    """Every figure of the result is there and goes into the tables of docs/patchwork.md and README."""
+    heights = np.ascontiguousarray(_patchwork_data.first(None)[0][:SIDE, :SIDE])
+    np.save(tmp_path / "heights.npy", heights)
+    big = _patchwork_big.main(tmp_path / "heights.npy", tmp_path / "raster")
+    assert big["three_stages_s"] > 0
+    assert 0.3 < big["bytes_over"]["share"] < 5
+    raster = rasters.read(tmp_path / "raster")
+    index = Index(lod_space.build([patchwork.whole(raster)]))
+    asked = patchwork.queries(index, quick=True)
+    assert asked["uniform"]["0"]["patches"] > asked["uniform"]["50"]["patches"] > 0
+    assert asked["flight"]["1000 m/s"]["patches"] > 0
+    assert asked["rotation"]["90 deg/s"]["bytes_a_frame"] >= 0
+    result: dict[str, Any] = {
+        "machine": {"cores": 2, "cpu": "a processor", "load_before": 0.0},
+        "data": "a part",
+        "build": {"4097": big},
+        "queries": asked,
+        "blend": patchwork.blending(index, quick=True),
+        "add": patchwork.adding(raster, quick=True),
+        "gdal": _patchwork_gdal.measure(tmp_path, heights, patchwork.SPAN_M, None, quick=True),
+        "paper": patchwork.PAPER,
+    }
+    result["gdal"]["overviews"]["4097"] = result["gdal"]["overviews"].pop(str(SIDE))
+    text = _patchwork.document(f"a {_patchwork.BEGIN} old {_patchwork.END} b", result)
+    assert "old" not in text
+    assert text.count("| bicubic |") == 1
+    assert "196.2" not in text
+    assert "11.7 s" in text
+    assert len(_patchwork.rows(result)) == 3
+    with pytest.raises(ValueError, match="no place"):
+        _patchwork.document("nothing", result)
