@@ -8,9 +8,13 @@ import importlib.util
 import logging
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from esker import contract as c
 from esker.version import VERSION
+
+if TYPE_CHECKING:
+    from esker.patchwork.base import Base
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -20,7 +24,7 @@ def main(argv: list[str] | None = None) -> int:
     if arguments[:1] == ["import"]:
         return _run("esker.importing.command", arguments[1:])
     if arguments[:1] == ["solve"]:
-        return _run("esker.solve.command", arguments[1:])
+        return _run("esker.solve.command", arguments[1:], _base_of)
     if arguments[:1] == ["render"]:
         return _run("esker.render.command", arguments[1:])
     if arguments[:1] == ["bench"] and len(arguments) > 1 and not arguments[1].startswith("-"):
@@ -93,10 +97,20 @@ def _bench(name: str, argv: list[str]) -> int:
     return _run(f"esker.bench.{name}", argv)
 
 
-def _run(module: str, argv: list[str]) -> int:
+def _base_of(document: c.Document, data: bytes) -> Base | None:
+    """The ground of the elevation layers of a terrain file. Raises ValueError."""
+    from esker.terrain_layers import Patchwork, unpacked
+
+    if not document.layers:
+        return None
+    grids = unpacked(data) if data[:2] == b"PK" else {}
+    return Patchwork(document.settings.size_m, document.layers, grids).base
+
+
+def _run(module: str, argv: list[str], *more: object) -> int:
     if importlib.util.find_spec(module) is None:
         return _fail(f"This installation lacks {module}.")
-    result: int = importlib.import_module(module).main(argv)
+    result: int = importlib.import_module(module).main(argv, *more)
     return result
 
 

@@ -8,7 +8,7 @@ import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any, NamedTuple, TextIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from esker import grid
 from esker.contract import DEFAULT_LEVEL, MAX_LEVEL, MAX_REFINED_LEVEL, MAX_SYNTHESIS_LEVEL, Channel, Document
 from esker.document import archive
+from esker.solve.base import Base
 from esker.solve.detail import detailed, settle
 from esker.solve.solver import LevelResult, Solver
 
@@ -26,7 +27,16 @@ PLAIN_SECONDS = 2.0
 BAR = 24
 
 
-def main(argv: list[str]) -> int:
+BaseOf = Callable[[Document, bytes], Base | None]
+"""From a document and the bytes of its file to the ground of its elevation layers; raises ValueError."""
+
+
+def _without_layers(document: Document, _: bytes) -> None:
+    if document.layers:
+        raise ValueError("This terrain has elevation layers, which need the whole of Esker: run `esker solve`.")
+
+
+def main(argv: list[str], base_of: BaseOf = _without_layers) -> int:
     """Run the command; 0, or 1 with one sentence on standard error. Bad arguments exit with 2, like argparse."""
     parser = _parser()
     options = parser.parse_args(argv)
@@ -40,17 +50,17 @@ def main(argv: list[str]) -> int:
         _writable("Heights", options.output, ".npy")
         if options.attributes is not None:
             _writable("Attributes", options.attributes, ".npz")
-        document = _read(options.terrain)
+        terrain = _read(options.terrain, base_of)
         solver = Solver(
             options.device, max_level=min(options.level, MAX_LEVEL if options.window is None else DEFAULT_LEVEL)
         )
         attributes: Mapping[str, Any] = {}
         if with_detail:
-            heights, attributes = _with_detail(solver, document, options.level, options.window, quiet=options.quiet)
+            heights, attributes = _with_detail(solver, terrain, options.level, options.window, quiet=options.quiet)
         elif options.window is None:
-            heights = _solve(solver, document, options.level, quiet=options.quiet)
+            heights = _solve(solver, terrain, options.level, quiet=options.quiet)
         else:
-            heights = _window(solver, document, options.level, options.window, quiet=options.quiet)
+            heights = _window(solver, terrain, options.level, options.window, quiet=options.quiet)
         with options.output.open("wb") as file:
             np.save(file, heights)
         if options.attributes is not None:
@@ -93,12 +103,18 @@ def _writable(what: str, path: Path, suffix: str) -> None:
         raise ValueError(f"There is no folder {path.absolute().parent}.")
 
 
-def _read(path: Path) -> Document:
-    """A document from an archive or from JSON. Raises OSError, ValueError."""
+class _Terrain(NamedTuple):
+    """What is to be solved, on what ground."""
+
+    document: Document
+    base: Base | None
+
+
+def _read(path: Path, base_of: BaseOf) -> _Terrain:
+    """A terrain from an archive or from JSON. Raises OSError, ValueError."""
     data = path.read_bytes()
-    if data[:2] == b"PK":
-        return archive.loads(data)
-    return archive.document_from_json(data)
+    document = archive.loads(data) if data[:2] == b"PK" else archive.document_from_json(data)
+    return _Terrain(document, base_of(document, data))
 
 
 class Progress:
@@ -170,20 +186,23 @@ def _name(level: int) -> str:
     return f"level {level} ({n} x {n})"
 
 
-def _solve(solver: Solver, document: Document, level: int, *, quiet: bool) -> NDArray[np.float32]:
+def _solve(solver: Solver, terrain: _Terrain, level: int, *, quiet: bool) -> NDArray[np.float32]:
     """The settled heights of ``level``, with progress on standard error unless ``quiet``."""
+    document, base = terrain
     progress = None if quiet else Progress(sys.stderr, level)
     if progress:
         print(f"{len(document.strokes)} strokes on {solver.device_name}", file=sys.stderr)
         progress.show()
     heights: NDArray[np.float32] | None = None
-    for result in solver.steps(document.strokes, document.settings, level):
+    for result in solver.steps(document.strokes, document.settings, level, base=base):
         if progress:
             progress.step(result)
         if result is not None and result.settled and result.level == level and result.channel == Channel.HEIGHT:
             heights = result.heights
     if heights is None:
         raise RuntimeError("The solve ended before the ground was settled.")
+    if base is not None:
+        heights = heights + base.level(level, solver.device)
     if progress:
         elapsed = progress.clock() - progress.start
         n = len(heights)
@@ -192,15 +211,17 @@ def _solve(solver: Solver, document: Document, level: int, *, quiet: bool) -> ND
 
 
 def _window(
-    solver: Solver, document: Document, level: int, corners: Sequence[float], *, quiet: bool
+    solver: Solver, terrain: _Terrain, level: int, corners: Sequence[float], *, quiet: bool
 ) -> NDArray[np.float32]:
     """The heights of a rectangle of ``level``; raises ValueError for one without samples."""
+    document, under = terrain
     size = document.settings.size_m
     r0, r1, c0, c1 = grid.Rect(*corners).sample_window(level, size)
     if r0 >= r1 or c0 >= c1:
         raise ValueError(f"No sample of level {level} lies in that window; the terrain is {size:g} m wide.")
     basis = None
-    for result in solver.steps(document.strokes, document.settings, min(level, DEFAULT_LEVEL), basis=True):
+    steps = solver.steps(document.strokes, document.settings, min(level, DEFAULT_LEVEL), basis=True, base=under)
+    for result in steps:
         basis = result.basis if result is not None and result.basis is not None else basis
     if basis is None:
         raise RuntimeError("The solve ended before the ground was settled.")
@@ -210,7 +231,10 @@ def _window(
         if live:
             print(f"\r\x1b[Krefining to {_name(level)}: {100 * share:3.0f} %", end="", file=sys.stderr, flush=True)
 
-    heights = solver.refiner(basis).window(level, slice(r0, r1), slice(c0, c1), show)
+    rows, columns = slice(r0, r1), slice(c0, c1)
+    heights = solver.refiner(basis).window(level, rows, columns, show)
+    if under is not None:
+        heights = heights + under.window(level, rows, columns, solver.device)
     if not quiet:
         s = grid.spacing(level, size)
         where = f"sample [0, 0] at x {c0 * s:g} m, y {r0 * s:g} m, {s:g} m apart"
@@ -220,15 +244,17 @@ def _window(
 
 
 def _with_detail(
-    solver: Solver, document: Document, level: int, corners: Sequence[float] | None, *, quiet: bool
+    solver: Solver, terrain: _Terrain, level: int, corners: Sequence[float] | None, *, quiet: bool
 ) -> tuple[NDArray[np.float32], Mapping[str, NDArray[np.float32]]]:
     """Heights and attributes as the page shows them, of a whole level or of a rectangle of it; raises ValueError."""
+    document, base = terrain
     size, n = document.settings.size_m, grid.samples(level)
     r0, r1, c0, c1 = (0, n, 0, n) if corners is None else grid.Rect(*corners).sample_window(level, size)
     if r0 >= r1 or c0 >= c1:
         raise ValueError(f"No sample of level {level} lies in that window; the terrain is {size:g} m wide.")
     progress = None if quiet else Progress(sys.stderr, DEFAULT_LEVEL)
-    settled = settle(solver, document.strokes, document.settings, DEFAULT_LEVEL, progress.step if progress else None)
+    told = progress.step if progress else None
+    settled = settle(solver, document.strokes, document.settings, DEFAULT_LEVEL, told, base=base)
     if progress:
         progress.close(f"{_name(DEFAULT_LEVEL)} settled in {progress.clock() - progress.start:.2f} s")
     live = not quiet and sys.stderr.isatty()
