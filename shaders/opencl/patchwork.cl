@@ -10,6 +10,7 @@ typedef struct {
     float volume;                       /* one over the product of the half sides in metres */
     float du_col, dv_col, du_row, dv_row;
     int side;
+    int rank;                           /* equal for patches that stand equal; those of a bin come in its order */
 } Patch;
 
 static inline float fade(float outside) {
@@ -20,6 +21,15 @@ static inline float fade(float outside) {
 /* 1 in the kernel, 0 from a margin beyond it on. */
 static inline float presence(const Patch *p, float u, float v) {
     return fade(fmax(p->ku0 - u, u - p->ku1) * MARGIN) * fade(fmax(p->kv0 - v, v - p->kv1) * MARGIN);
+}
+
+/* Samples of a work-item, half open and one to spare, where |at + step * (first + k) - middle| * per < 1. */
+static inline int2 reached(float at, float step, float middle, float per, int first) {
+    const float reach = 1.0f / per;
+    if (fabs(step) * BIN < 1e-6f)
+        return fabs(at - middle) <= reach * 1.001f ? (int2)(0, SPAN) : (int2)(0, 0);
+    const float a = (middle - reach - at) / step - first, b = (middle + reach - at) / step - first;
+    return (int2)((int)clamp(fmin(a, b), 0.0f, (float)SPAN), (int)clamp(fmax(a, b) + 2.0f, 0.0f, (float)SPAN));
 }
 
 #ifdef SMOOTH
@@ -64,24 +74,34 @@ __kernel void blend_bins(__global const int *restrict start, __global const int 
                          __global const float *restrict coefficients, const int cols,
                          __global float *restrict heights, __global float *restrict cover) {
     const int bin = get_global_id(2), row = get_global_id(1), first = get_global_id(0) * SPAN;
-    float above[SPAN], below[SPAN], bare[SPAN];
+    float above[SPAN], below[SPAN], bare[SPAN], veil[SPAN];
     for (int k = 0; k < SPAN; k++) {
         above[k] = 0.0f;
         below[k] = 0.0f;
         bare[k] = 1.0f;
+        veil[k] = 1.0f;
     }
     const int last = start[bin + 1];
+    int rank = start[bin] < last ? patches[patch[start[bin]]].rank : 0;
     for (int entry = start[bin]; entry < last; entry++) {
         const Patch p = patches[patch[entry]];
         __global const float *c = coefficients + (size_t)patch[entry] * (STRIDE * STRIDE);
+        if (p.rank != rank) {
+            rank = p.rank;
+            for (int k = 0; k < SPAN; k++)
+                veil[k] = bare[k];
+        }
         const float u_row = origin[entry].x + p.du_row * row, v_row = origin[entry].y + p.dv_row * row;
-        for (int k = 0; k < SPAN; k++) {
+        const int2 along = reached(u_row, p.du_col, p.mid_u, p.per_u, first);
+        const int2 across = reached(v_row, p.dv_col, p.mid_v, p.per_v, first);
+        const int begin = max(along.x, across.x), end = min(along.y, across.y);
+        float z[SPAN];
+        for (int k = begin; k < end; k++)
+            z[k] = height(c, u_row + p.du_col * (first + k), v_row + p.dv_col * (first + k), p.side - 2);
+        for (int k = begin; k < end; k++) {
             const float u = u_row + p.du_col * (first + k), v = v_row + p.dv_col * (first + k);
-            const float tu = fabs(u - p.mid_u) * p.per_u, tv = fabs(v - p.mid_v) * p.per_v;
-            if (tu >= 1.0f || tv >= 1.0f)
-                continue;
-            const float weight = taper(tu) * taper(tv) * p.volume;
-            above[k] += weight * height(c, u, v, p.side - 2);
+            const float weight = taper(fabs(u - p.mid_u) * p.per_u) * taper(fabs(v - p.mid_v) * p.per_v) * p.volume;
+            above[k] += weight * z[k];
             below[k] += weight;
             bare[k] *= 1.0f - presence(&p, u, v);
         }

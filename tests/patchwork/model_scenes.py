@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from esker import contract
-from esker.patchwork import rasters, sheets
-from esker.patchwork.errors_reference import bilinear
+from esker.patchwork import blend_reference, rasters, sheets
 from esker.patchwork.lod_space import Model, Placed
 from esker.patchwork.patches import warped
 
@@ -126,19 +125,6 @@ def chosen(model: Model, tolerance: float) -> NDArray[np.intp]:
     return np.flatnonzero((model.low <= tolerance) & (tolerance < model.max_z))
 
 
-def blended(model: Model, index: NDArray[np.intp], points: Floats) -> tuple[Floats, Floats]:
-    """Blend (paper 2, equation 1; bilinear) of patches at points, NaN where none lies, and their greatest error."""
-    total, weight, worst = np.zeros(len(points)), np.zeros(len(points)), np.zeros(len(points))
-    for p in index.tolist():
-        m, extent = model.to_patch[p], model.extent[p]
-        at = points @ m[:, :2].T + m[:, 2]
-        t = 1 - np.abs(at - extent / 2) / (extent / 2)
-        there = (t > 0).all(axis=1)
-        if there.any():
-            w = t[there].prod(axis=1) / model.half[p].prod()
-            heights = bilinear(model.samples(p).astype(float), at[there, 0], at[there, 1])
-            total[there] += w * heights
-            weight[there] += w
-            worst[there] = np.maximum(worst[there], model.min_z[p])
-    with np.errstate(invalid="ignore"):
-        return total / weight, worst
+def blended(model: Model, index: NDArray[np.intp], points: Floats, tolerance: float) -> Floats:
+    """The bilinear blend of a cut at points, NaN where no patch lies."""
+    return blend_reference.evaluate(model, index.astype(np.int32), points, False, tolerance)[0]

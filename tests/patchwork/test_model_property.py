@@ -66,7 +66,7 @@ def check_cover(model: Model, rng: np.random.Generator) -> None:
         cut = chosen(model, tolerance)
         hit = inside(model.kernel[cut], points, model.slack[cut] + slack.max() + 1e-3).any(axis=0)
         assert (hit | ~could).all(), tolerance
-        height, _ = blended(model, cut, points)
+        height = blended(model, cut, points, tolerance)
         assert not np.isnan(height[could]).any()
 
 
@@ -94,7 +94,7 @@ def _within(model: Model, p: int, rng: np.random.Generator) -> Floats:
 
 
 def check_error(model: Model, rng: np.random.Generator) -> None:
-    """SPEC PW14: against the most trusted samples at a place the blend errs by e, or by the best there is."""
+    """SPEC PW14: against the most trusted samples at a place the blend errs by e, or by the best patch there."""
     for one in model.placed:
         more = {k for k, other in enumerate(model.placed) if trust(other.layer) > trust(one.layer)}
         at = places(one.layer, one.raster.warp).reshape(-1, 2)
@@ -102,11 +102,15 @@ def check_error(model: Model, rng: np.random.Generator) -> None:
         some = rng.permutation(np.flatnonzero(~np.isnan(heights)))[:150]
         for tolerance in (0.0, 2.0, 30.0):
             cut = chosen(model, tolerance)
-            height, worst = blended(model, cut, at[some])
-            believed = np.isnan(blended(model, cut[np.isin(model.owner[cut], list(more))], at[some])[0])
+            height = blended(model, cut, at[some], tolerance)
+            believed = np.isnan(blended(model, cut[np.isin(model.owner[cut], list(more))], at[some], tolerance))
+            within = inside(model.kernel[cut], at[some])
+            best = np.where(within, np.maximum(model.min_z[cut], tolerance)[:, None], np.inf).min(
+                axis=0, initial=np.inf
+            )
             err = np.abs(height - heights[some]) + one.layer.accuracy_m
-            good = believed & ~np.isnan(height)
-            assert (err[good] <= np.maximum(worst, tolerance)[good] + 1e-3).all()
+            good = believed & ~np.isnan(height) & np.isfinite(best)
+            assert (err[good] <= best[good] + 1e-3).all()
             assert (model.min_z[cut][~model.floor[cut]] <= tolerance).all()
 
 
@@ -152,8 +156,28 @@ def test_stale_ground_is_measured_against_the_newer() -> None:
     model = build([old, new])
     middle = np.array([[595.0, 595.0]])
     for tolerance in (1.0, 10.0, 60.0):
-        height, _ = blended(model, chosen(model, tolerance), middle)
+        height = blended(model, chosen(model, tolerance), middle, tolerance)
         assert abs(height[0] - (land(595.0, 595.0) + 80.0)) <= tolerance  # type: ignore[arg-type]
     stale = build([old, Placed(new.layer.model_copy(update={"priority": -1}), new.raster)])
-    height, _ = blended(stale, chosen(stale, 10.0), middle)
+    height = blended(stale, chosen(stale, 10.0), middle, 10.0)
     assert abs(height[0] - land(595.0, 595.0)) <= 10.0  # type: ignore[arg-type]
+
+
+def test_stale_ground_does_not_show_through() -> None:
+    """SPEC PW18: inside a newer, finer survey the old ground that still serves around it has no weight."""
+    old = surveyed(layer("old", 120, 120, accuracy_m=3.0))
+    new = surveyed(
+        layer(
+            "new", 110, 120, anchor=(403.0, 507.0), rotation_deg=12.0, spacing_m=(2.0, 2.0), accuracy_m=0.5, priority=1
+        ),
+        height=lambda x, y: land(x, y) + 80.0,
+    )
+    model = build([old, new])
+    inner = places(new.layer)[6:-6, 6:-6].reshape(-1, 2)
+    true = new.raster.heights[6:-6, 6:-6].ravel()
+    for tolerance in (0.0, 1.0, 10.0):
+        cut = chosen(model, tolerance)
+        assert (model.owner[cut] == 0).any()
+        within = inside(model.kernel[cut[model.owner[cut] == 1]], inner).any(axis=0)
+        wrong = np.abs(blended(model, cut, inner, tolerance) - true)[within]
+        assert wrong.max() <= tolerance + 1e-3

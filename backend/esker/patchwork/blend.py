@@ -8,6 +8,11 @@ grown by its margin, a rectangle of any half sides.
 Cover = 1 - prod (1 - q_i), where q_i is 1 in the kernel of patch i and falls to 0 (quintic, C2) over its margin: 1 on
 the data, 0 where no patch says anything, and smooth. ``outside`` joins the ground beyond the data by it.
 
+Patches *stand* at the greater of their error and the tolerance of the cut. Where one stands higher than others its
+weight is multiplied by prod (1 - q_i) of those that stand lower: a patch that serves below its error, because nothing
+better covers all of its kernel, gives way where something better is. The paper has no such patches; without the rule
+they would show through wherever weights are small, at the edges of all kernels.
+
 A lattice is cut into bins of ``BIN`` x ``BIN`` samples, counted from sample [0, 0] of the domain. A bin is computed
 whole from the patches whose domain meets it, in the order of their identities: its bits depend on these patches only,
 not on what else is asked for with it, nor on threads. Twins: ``blend_reference`` (float64), ``blend_device`` (OpenCL).
@@ -64,7 +69,7 @@ class Pack:
     ``coefficients``: float32 (n, 34, 34), of B-splines if ``smooth``, else samples in the first 32 x 32 places;
     ``to_patch``: float64 (n, 2, 3), world to samples of the patch; ``domain``, ``kernel``: float64 (n, 4) as u0, u1,
     v0, v1 in samples; ``volume``: float64 (n,), one over the product of the domain's half sides in metres;
-    ``side``: int32 (n,), samples along a side.
+    ``side``: int32 (n,), samples along a side; ``rank``: int32 (n,), ascending, equal for patches that stand equal.
     """
 
     smooth: bool
@@ -74,6 +79,7 @@ class Pack:
     kernel: NDArray[np.float64]
     volume: NDArray[np.float64]
     side: NDArray[np.int32]
+    rank: NDArray[np.int32]
 
     def __len__(self) -> int:
         return len(self.side)
@@ -92,15 +98,21 @@ class Bins(NamedTuple):
     step: NDArray[np.float32]
 
 
-def pack(model: Model, index: NDArray[np.int32], smooth: bool) -> Pack:
-    """The patches ``index`` of a model, with their coefficients."""
-    index = index[np.argsort(identities(model, index), kind="stable")]
+def pack(model: Model, index: NDArray[np.int32], smooth: bool, tolerance: float = np.inf) -> Pack:
+    """The patches ``index`` of a model, chosen at ``tolerance`` metres, with their coefficients.
+
+    Without a tolerance all stand equal, whatever their errors.
+    """
+    standing = np.maximum(model.min_z[index], tolerance)
+    order = np.lexsort((identities(model, index), standing))
+    index, standing = index[order], standing[order]
+    rank = np.concatenate([[0], np.cumsum(standing[1:] != standing[:-1])])[: len(index)].astype(np.int32)
     to_patch, side = model.to_patch[index], model.side[index].astype(np.int32)
     inner, domain = extents(model.kernel[index], to_patch, side)
     half = np.stack([domain[:, 1] - domain[:, 0], domain[:, 3] - domain[:, 2]], axis=1) / 2
     turn = np.abs(to_patch[:, 0, 0] * to_patch[:, 1, 1] - to_patch[:, 0, 1] * to_patch[:, 1, 0])
     coefficients = _coefficients(model, index, smooth)
-    return Pack(smooth, coefficients, to_patch, domain, inner, turn / (half[:, 0] * half[:, 1]), side)
+    return Pack(smooth, coefficients, to_patch, domain, inner, turn / (half[:, 0] * half[:, 1]), side, rank)
 
 
 def _coefficients(model: Model, index: NDArray[np.int32], smooth: bool) -> NDArray[np.float32]:
@@ -196,7 +208,7 @@ def evaluate(
 
         def some(start: int, stop: int) -> None:
             work(found.start, found.patch, found.origin, found.step, packed.coefficients, constants, packed.side,
-                 cols, start, stop, heights, cover)  # fmt: skip
+                 packed.rank, cols, start, stop, heights, cover)  # fmt: skip
 
         spread(some, bands(rows * cols, 4))
     top, left = lattice.row0 - r0 * BIN, lattice.col0 - c0 * BIN

@@ -22,7 +22,7 @@ from esker.patchwork.splines import STRIDE
 if TYPE_CHECKING:
     from esker.patchwork.blend import Bins, Pack
 
-PATCH: Final = np.dtype([("constants", "<f4", 9), ("step", "<f4", 4), ("side", "<i4")])
+PATCH: Final = np.dtype([("constants", "<f4", 9), ("step", "<f4", 4), ("side", "<i4"), ("rank", "<i4")])
 """``Patch`` of patchwork.cl."""
 _GPU_GROUP: Final = (32, 8, 1)
 _programs: weakref.WeakKeyDictionary[Any, dict[bool, Program]] = weakref.WeakKeyDictionary()
@@ -66,6 +66,7 @@ class Program:
         patches["constants"][: len(packed)] = constants
         patches["step"][: len(packed)] = found.step
         patches["side"][: len(packed)] = packed.side
+        patches["rank"][: len(packed)] = packed.rank
 
         def copied(array: NDArray[Any]) -> Any:
             whole = np.ascontiguousarray(array) if array.size else np.zeros(16, dtype=np.uint8)

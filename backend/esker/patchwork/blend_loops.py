@@ -138,6 +138,7 @@ def smooth_bins(
     coefficients: NDArray[np.float32],
     constants: NDArray[np.float32],
     side: NDArray[np.int32],
+    rank: NDArray[np.int32],
     cols: int,
     first: int,
     last: int,
@@ -145,49 +146,72 @@ def smooth_bins(
     cover: NDArray[np.float32],
 ) -> None:
     """Bicubic patches: bins ``first`` to ``last`` of a lattice with ``cols`` bins a row."""
-    zero, one, half, sixth = np.float32(0), np.float32(1), np.float32(0.5), np.float32(1.0 / 6.0)
-    three, two_thirds = np.float32(3), np.float32(2.0 / 3.0)
-    margin = np.float32(1.0 / PATCH_MARGIN_CELLS)
-    above = np.empty((BIN, BIN), np.float32)
-    below = np.empty((BIN, BIN), np.float32)
-    bare = np.empty((BIN, BIN), np.float32)
+    one, three = np.float32(1), np.float32(3)
+    zero, margin = np.float32(0), np.float32(1.0 / PATCH_MARGIN_CELLS)
+    above, below, bare = (
+        np.empty((BIN, BIN), np.float32),
+        np.empty((BIN, BIN), np.float32),
+        np.empty((BIN, BIN), np.float32),
+    )
+    z = np.empty(BIN, np.float32)
     for at in range(first, last):
         above[:], below[:], bare[:] = 0, 0, 1
         for entry in range(start[at], start[at + 1]):
             k = patch[entry]
             c = coefficients[k].ravel()
             mid_u, mid_v, per_u, per_v, ku0, ku1, kv0, kv1, volume = constants[k]
-            end, du, dv = np.int32(side[k] - 2), step[k, 0], step[k, 1]
+            du, dv = step[k, 0], step[k, 1]
             for row in range(BIN):
                 u_row = origin[entry, 0] + step[k, 2] * np.float32(row)
                 v_row = origin[entry, 1] + step[k, 3] * np.float32(row)
                 begin, done = _columns(u_row, v_row, du, dv, constants[k])
+                _smooth_row(c, u_row, v_row, du, dv, np.int32(side[k] - 2), begin, done, z)
+                over, under, free = above[row], below[row], bare[row]
                 for col in range(begin, done):
                     u, v = u_row + du * np.float32(col), v_row + dv * np.float32(col)
                     tu, tv = abs(u - mid_u) * per_u, abs(v - mid_v) * per_v
                     su, sv = max(one - tu, zero), max(one - tv, zero)
                     weight = su * su * su * (three * tu + one) * volume
                     weight *= sv * sv * sv * (three * tv + one)
-                    i, j = min(max(np.int32(u), np.int32(0)), end), min(max(np.int32(v), np.int32(0)), end)
-                    f, g = u - np.float32(i), v - np.float32(j)
-                    fi, gi = one - f, one - g
-                    a0, a3 = fi * fi * fi * sixth, f * f * f * sixth
-                    a1 = two_thirds - f * f * (one - half * f)
-                    a2 = one - a0 - a1 - a3
-                    b0, b3 = gi * gi * gi * sixth, g * g * g * sixth
-                    b1 = two_thirds - g * g * (one - half * g)
-                    b2 = one - b0 - b1 - b3
-                    p = j * np.int32(STRIDE) + i
-                    q, r, t = p + np.int32(STRIDE), p + np.int32(2 * STRIDE), p + np.int32(3 * STRIDE)
-                    z = b0 * (a0 * c[p] + a1 * c[p + 1] + a2 * c[p + 2] + a3 * c[p + 3])
-                    z += b1 * (a0 * c[q] + a1 * c[q + 1] + a2 * c[q + 2] + a3 * c[q + 3])
-                    z += b2 * (a0 * c[r] + a1 * c[r + 1] + a2 * c[r + 2] + a3 * c[r + 3])
-                    z += b3 * (a0 * c[t] + a1 * c[t + 1] + a2 * c[t + 2] + a3 * c[t + 3])
-                    above[row, col] += weight * z
-                    below[row, col] += weight
-                    near = fade(max(ku0 - u, u - ku1) * margin) * fade(max(kv0 - v, v - kv1) * margin)
-                    bare[row, col] *= one - near
+                    over[col] += weight * z[col]
+                    under[col] += weight
+                    free[col] *= one - fade(max(ku0 - u, u - ku1) * margin) * fade(max(kv0 - v, v - kv1) * margin)
         _finish(at, cols, above, below, bare, heights, cover)
+
+
+@kernel
+def _smooth_row(
+    c: NDArray[np.float32],
+    u_row: np.float32,
+    v_row: np.float32,
+    du: np.float32,
+    dv: np.float32,
+    end: np.int32,
+    begin: int,
+    done: int,
+    z: NDArray[np.float32],
+) -> None:
+    """Heights of a bicubic patch with coefficients ``c`` at the columns of a bin's row."""
+    zero, one, half, sixth = np.int32(0), np.float32(1), np.float32(0.5), np.float32(1.0 / 6.0)
+    two_thirds = np.float32(2.0 / 3.0)
+    for col in range(begin, done):
+        u, v = u_row + du * np.float32(col), v_row + dv * np.float32(col)
+        i, j = min(max(np.int32(u), zero), end), min(max(np.int32(v), zero), end)
+        f, g = u - np.float32(i), v - np.float32(j)
+        fi, gi = one - f, one - g
+        a0, a3 = fi * fi * fi * sixth, f * f * f * sixth
+        a1 = two_thirds - f * f * (one - half * f)
+        a2 = one - a0 - a1 - a3
+        b0, b3 = gi * gi * gi * sixth, g * g * g * sixth
+        b1 = two_thirds - g * g * (one - half * g)
+        b2 = one - b0 - b1 - b3
+        p = j * np.int32(STRIDE) + i
+        q, r, t = p + np.int32(STRIDE), p + np.int32(2 * STRIDE), p + np.int32(3 * STRIDE)
+        low = b0 * (a0 * c[p] + a1 * c[p + 1] + a2 * c[p + 2] + a3 * c[p + 3])
+        low += b1 * (a0 * c[q] + a1 * c[q + 1] + a2 * c[q + 2] + a3 * c[q + 3])
+        high = b2 * (a0 * c[r] + a1 * c[r + 1] + a2 * c[r + 2] + a3 * c[r + 3])
+        high += b3 * (a0 * c[t] + a1 * c[t + 1] + a2 * c[t + 2] + a3 * c[t + 3])
+        z[col] = low + high
 
 
 @kernel
@@ -199,6 +223,7 @@ def linear_bins(
     coefficients: NDArray[np.float32],
     constants: NDArray[np.float32],
     side: NDArray[np.int32],
+    rank: NDArray[np.int32],
     cols: int,
     first: int,
     last: int,
@@ -210,10 +235,13 @@ def linear_bins(
     above = np.empty((BIN, BIN), np.float32)
     below = np.empty((BIN, BIN), np.float32)
     bare = np.empty((BIN, BIN), np.float32)
+    veil = np.empty((BIN, BIN), np.float32)
     for at in range(first, last):
-        above[:], below[:], bare[:] = 0, 0, 1
+        above[:], below[:], bare[:], veil[:] = 0, 0, 1, 1
         for entry in range(start[at], start[at + 1]):
             k = patch[entry]
+            if entry > start[at] and rank[k] != rank[patch[entry - 1]]:
+                veil[:] = bare
             c = coefficients[k].ravel()
             mid_u, mid_v, per_u, per_v, ku0, ku1, kv0, kv1, volume = constants[k]
             end, du, dv = np.int32(side[k] - 2), step[k, 0], step[k, 1]
@@ -224,7 +252,7 @@ def linear_bins(
                 for col in range(begin, done):
                     u, v = u_row + du * np.float32(col), v_row + dv * np.float32(col)
                     weight = max(one - abs(u - mid_u) * per_u, zero) * volume
-                    weight *= max(one - abs(v - mid_v) * per_v, zero)
+                    weight *= max(one - abs(v - mid_v) * per_v, zero) * veil[row, col]
                     i, j = min(max(np.int32(u), np.int32(0)), end), min(max(np.int32(v), np.int32(0)), end)
                     f, g = u - np.float32(i), v - np.float32(j)
                     p = j * np.int32(STRIDE) + i

@@ -58,7 +58,7 @@ def evaluate(packed: Pack, points: NDArray[np.float64]) -> Places:
 
     def some(first: int, last: int) -> None:
         _evaluate(points, corner, order, which, start, patch, packed.smooth, packed.coefficients, to_patch,
-                  packed.domain, packed.kernel, packed.volume, packed.side, first, last, *out)  # fmt: skip
+                  packed.domain, packed.kernel, packed.volume, packed.side, packed.rank, first, last, *out)  # fmt: skip
 
     spread(some, bands(len(points), 256))
     return out
@@ -99,6 +99,7 @@ def _evaluate(
     kernels: NDArray[np.float64],
     volume: NDArray[np.float64],
     side: NDArray[np.int32],
+    rank: NDArray[np.int32],
     first: int,
     last: int,
     heights: NDArray[np.float64],
@@ -110,8 +111,11 @@ def _evaluate(
         x, y = points[n, 0] - corner[0], points[n, 1] - corner[1]
         above, below = zero, zero
         bare = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        veil, at_rank = bare, np.int32(-1)
         for entry in range(start[which[n]], start[which[n] + 1]):
             k = patch[entry]
+            if rank[k] != at_rank:
+                veil, at_rank = bare, rank[k]
             to, d, inner = to_patch[k], domain[k], kernels[k]
             u = to[0, 0] * x + to[0, 1] * y + to[0, 2]
             v = to[1, 0] * x + to[1, 1] * y + to[1, 2]
@@ -120,7 +124,7 @@ def _evaluate(
             along = taper_line(u - (d[0] + d[1]) / 2, 2 / (d[1] - d[0]), smooth)
             across = taper_line(v - (d[2] + d[3]) / 2, 2 / (d[3] - d[2]), smooth)
             along = (along[0] * volume[k], along[1] * volume[k], along[2] * volume[k])
-            weight = turned(tensor(along, across), to)
+            weight = product(turned(tensor(along, across), to), veil)
             jet = spline_jet(coefficients[k], u, v, side[k] - 2) if smooth else linear_jet(
                 coefficients[k], u, v, side[k] - 2)  # fmt: skip
             above = total(above, product(weight, turned(jet, to)))

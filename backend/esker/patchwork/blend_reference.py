@@ -58,12 +58,15 @@ def fade(outside: Floats) -> Floats:
 
 
 def evaluate(
-    model: Model, index: NDArray[np.int32], points: Floats, smooth: bool
+    model: Model, index: NDArray[np.int32], points: Floats, smooth: bool, tolerance: float = np.inf
 ) -> tuple[Floats, Floats, NDArray[np.int64]]:
     """Heights, cover and number of patches at world points (n, 2); heights NaN where no patch reaches."""
     above, below, bare = np.zeros(len(points)), np.zeros(len(points)), np.ones(len(points))
     count = np.zeros(len(points), dtype=np.int64)
-    for k in index:
+    veil, at = bare.copy(), -np.inf
+    for k in index[np.argsort(np.maximum(model.min_z[index], tolerance), kind="stable")]:
+        if max(model.min_z[k], tolerance) > at:  # it stands higher: lower ones go before
+            veil, at = bare.copy(), max(model.min_z[k], tolerance)
         to_patch, side = model.to_patch[k : k + 1], model.side[k : k + 1].astype(np.int32)
         inner, domain = (e[0] for e in extents(model.kernel[k : k + 1], to_patch, side))
         u, v = to_patch[0, :, :2] @ points.T + to_patch[0, :, 2:]
@@ -73,7 +76,7 @@ def evaluate(
         world = np.linalg.inv(to_patch[0, :, :2])
         area = half[0] * half[1] * abs(np.linalg.det(world))
         weight = taper((u - domain[:2].mean()) / half[0], smooth) * taper((v - domain[2:].mean()) / half[1], smooth)
-        weight = weight / area
+        weight = weight / area * veil[near]
         above[near] += weight * patch_heights(model.samples(int(k)).astype(np.float64), u, v, smooth)
         below[near] += weight
         miss_u, miss_v = np.maximum(inner[0] - u, u - inner[1]), np.maximum(inner[2] - v, v - inner[3])

@@ -26,8 +26,10 @@ def differing(model: Model, other: Model, tolerance: float | None) -> tuple[NDAr
         a, b = _part(model, k), _part(other, at)
         if tolerance is None:
             same = (model.low[a] == other.low[b]) & (model.max_z[a] == other.max_z[b])
+            same &= model.min_z[a] == other.min_z[b]
         else:
             same = _chosen(model, a, tolerance) == _chosen(other, b, tolerance)
+            same &= np.maximum(model.min_z[a], tolerance) == np.maximum(other.min_z[b], tolerance)
         marks[0][a] &= ~same
         marks[1][b] &= ~same
     found = []
