@@ -157,9 +157,7 @@ class Assembly:
         """The HTTP server, to be run with ``run``."""
         assert self._journal is not None, "an assembly is open until it is closed"
         pictures = Pictures(
-            Previews(
-                self.settings.data / "previews", self.settings.device, grids=self.settings.data / FOLDER
-            ),
+            Previews(self.settings.data / "previews", self.settings.device, grids=self.settings.data / FOLDER),
             PreviewTokens(self._journal),
             self.settings.public_url.rstrip("/") if self.settings.public_url else None,
         )

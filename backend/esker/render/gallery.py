@@ -25,8 +25,8 @@ VIEWS: Final = {
     "canyon": "orbit:150,27,3100,target:2048,1950,60",
     "volcanic-island": "orbit:165,13,2900,target:2048,2048,150",
     "archipelago": "orbit:160,17,3100,target:2048,1950,20",
-    "rainier": "orbit:318,9,46000,target:52000,14000,2000",
-    "helens": "orbit:20,22,2600,target:1450,1200,2000",
+    "rainier": "orbit:335,8,19000,target:56000,11500,2300",
+    "helens": "orbit:352,20,2050,target:1480,1050,2130",
 }
 
 

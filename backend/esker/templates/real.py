@@ -16,7 +16,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from esker.contract import Document, GridFacts, Layer, Place, Stroke, TerrainSettings
+from esker.contract import Document, GridFacts, Layer, Place, TerrainSettings
 from esker.importing import laying
 from esker.importing.georef import Georef
 from esker.importing.opening import open_source
@@ -121,11 +121,6 @@ HELENS: Final = (
 )  # fmt: skip
 
 
-def rainier_strokes() -> tuple[Stroke, ...]:
-    """None yet: the ground is the picture."""
-    return ()
-
-
 @dataclass(frozen=True)
 class Real:
     """One starting terrain."""
@@ -135,18 +130,17 @@ class Real:
     description: str
     settings: TerrainSettings
     cuts: tuple[Cut, ...]
-    strokes: tuple[Stroke, ...] = ()
 
 
 def terrains() -> tuple[Real, ...]:
-    """Both, without their ground."""
+    """Both. No strokes: the ground is the picture, and what people draw is theirs."""
     sound = TerrainSettings(
         title="Rainier and the Sound", size_m=65536.0, place=Place(lat_deg=47.0560, lon_deg=-122.0720),
-        reach_m=600.0, sea_level_m=0.6, sun_azimuth_deg=118.0, sun_elevation_deg=24.0,
+        reach_m=600.0, sea_level_m=0.6, sun_azimuth_deg=75.0, sun_elevation_deg=18.0,
     )  # fmt: skip
     helens = TerrainSettings(
         title="Mount St Helens", size_m=2944.0, place=Place(lat_deg=46.2017, lon_deg=-122.18734),
-        reach_m=60.0, sun_azimuth_deg=110.0, sun_elevation_deg=30.0,
+        reach_m=60.0, sun_azimuth_deg=112.0, sun_elevation_deg=28.0,
     )  # fmt: skip
     return (
         Real("rainier", "Rainier and the Sound",
@@ -167,7 +161,7 @@ def build(folder: Path, out: Path = FOLDER) -> None:
             survey.write(out / "data" / f"{spec.name}.npz", grid, spec.quantum_m)
             kept = survey.read(out / "data" / f"{spec.name}.npz")
             layers.append(layer_of(real.id, priority, spec, kept, laid))
-        document = Document(id=real.id, settings=real.settings, strokes=real.strokes, layers=tuple(layers))
+        document = Document(id=real.id, settings=real.settings, layers=tuple(layers))
         grids = {layer.content: spec.name for layer, spec in zip(layers, real.cuts, strict=True)}
         data: dict[str, Any] = {"id": real.id, "title": real.title, "description": real.description, "grids": grids}
         text = json.dumps(data | {"document": document.model_dump(mode="json")}, separators=(",", ":"))
