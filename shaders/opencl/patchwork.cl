@@ -100,7 +100,8 @@ __kernel void blend_bins(__global const int *restrict start, __global const int 
             z[k] = height(c, u_row + p.du_col * (first + k), v_row + p.dv_col * (first + k), p.side - 2);
         for (int k = begin; k < end; k++) {
             const float u = u_row + p.du_col * (first + k), v = v_row + p.dv_col * (first + k);
-            const float weight = taper(fabs(u - p.mid_u) * p.per_u) * taper(fabs(v - p.mid_v) * p.per_v) * p.volume;
+            float weight = taper(fabs(u - p.mid_u) * p.per_u) * taper(fabs(v - p.mid_v) * p.per_v);
+            weight *= p.volume * veil[k];
             above[k] += weight * z[k];
             below[k] += weight;
             bare[k] *= 1.0f - presence(&p, u, v);

@@ -72,8 +72,8 @@ def inside(view: View, count: int, rng: np.random.Generator) -> Floats:
 def check_cut(model: Model, chosen: Chosen, points: Floats, allowed: Floats) -> None:
     """Every place that the model covers is covered; no patch that is blended there is less accurate than allowed."""
     everything = np.arange(model.count, dtype=np.int32)
-    coverable = kernels_over(model, everything, points).any(axis=1)
-    assert kernels_over(model, chosen, points).any(axis=1)[coverable].all()
+    coverable = np.asarray(kernels_over(model, everything, points).any(axis=1))
+    assert np.asarray(kernels_over(model, chosen, points).any(axis=1))[coverable].all()
     used = domains_over(model, chosen, points)
     assert (np.where(used, model.low[chosen], 0).max(axis=1, initial=0) <= allowed + 1e-9).all()
 

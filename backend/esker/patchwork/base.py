@@ -41,11 +41,10 @@ _OVERSHOOT: Final = 0.75
 
 
 class Blended(NamedTuple):
-    """Blended heights and cover of a whole level, and whether a device made them (its last bits may differ)."""
+    """Blended heights and cover of a whole level."""
 
     heights: Grid
     cover: Grid
-    on_device: bool
 
 
 class Sample(NamedTuple):
@@ -62,7 +61,8 @@ class Base:
 
     ``digest``: of everything that it follows from. ``low``, ``high``: bounds of its heights, metres. ``spacing_m``:
     finest sample spacing of a layer. ``before``: another one, of which parts that no changed layer reaches are used.
-    Ask for all levels and windows of one base with the same ``device``: kinds of devices differ in their last bits.
+    Kinds of devices differ in their last bits: each level stays with the device that it was first asked for with, and
+    so does that of a base made from one before.
     """
 
     def __init__(self, model: Model, size_m: float, before: Base | None = None) -> None:
@@ -76,10 +76,12 @@ class Base:
         self._blended: dict[int, Blended] = {}
         self._surveys: dict[int, Grid] = {}
         self._blocks: OrderedDict[tuple[int, int, int], Grid] = OrderedDict()
+        self._devices: dict[int, ClDevice | None] = {}
         self._before: tuple[Model, dict[int, Blended]] | None = None
         if before is not None and before.size_m == size_m:
             with before._lock:
                 self._before = before.model, dict(before._blended)
+                self._devices = dict(before._devices)
 
     def tolerance(self, level: int) -> float:
         """Error in metres that level ``level`` may have where its samples are farther apart than the data's."""
@@ -145,7 +147,7 @@ class Base:
             return Sample(np.zeros(0), *((np.zeros((0, 2)), np.zeros((0, 3))) if derivatives else ()))
         low, high = points.min(axis=0), points.max(axis=0)
         chosen = self.index.uniform(tolerance, (low[0], low[1], high[0], high[1]))
-        jets = blend_points.evaluate(blend.pack(self.model, chosen, smooth), points)
+        jets = blend_points.evaluate(blend.pack(self.model, chosen, smooth, tolerance), points)
         bare = np.flatnonzero(jets.cover[:, 0] < 1)
         heights = jets.heights
         if len(bare):
@@ -166,9 +168,10 @@ class Base:
         rect = reuse.reached(self.model, other.model)
         step = grid.spacing(outside.ANCHOR, self.size_m)
         for level in range(outside.ANCHOR + 1):
-            differ = np.argwhere(self.level(level) != other.level(level)) * grid.spacing(level, self.size_m)
+            device = self._devices.get(level, other._devices.get(level))
+            differ = np.argwhere(self.level(level, device) != other.level(level, device))
             if len(differ):
-                (y0, x0), (y1, x1) = differ.min(axis=0), differ.max(axis=0)
+                (y0, x0), (y1, x1) = (end * grid.spacing(level, self.size_m) for end in (differ.min(0), differ.max(0)))
                 rect = grid.Rect(float(x0), float(y0), float(x1), float(y1)).union(rect)
         # The anchor's cells around a sample that differs carry the difference to finer levels: two, and their sweeps.
         grown = rect.grown((2 + outside.SWEEPS) * step) if rect is not None else None
@@ -258,7 +261,7 @@ class Base:
             if found is None:
                 whole = slice(0, grid.samples(level))
                 found = self._fresh(level, whole, whole, device)
-            self._blended[level] = Blended(*found, device is not None)
+            self._blended[level] = Blended(*found)
             for array in found:
                 array.setflags(write=False)
         return self._blended[level].heights, self._blended[level].cover
@@ -268,7 +271,7 @@ class Base:
             return None
         model, kept = self._before
         old = kept.pop(level, None)
-        if old is None or old.on_device != (device is not None):
+        if old is None:
             return None
         n = grid.samples(level)
         lattice = blend.Lattice(grid.spacing(level, self.size_m), 0, n, 0, n)
@@ -285,9 +288,11 @@ class Base:
         shape = rows.stop - rows.start, cols.stop - cols.start
         heights, cover = np.empty(shape, dtype=np.float32), np.empty(shape, dtype=np.float32)
         spacing, tolerance = grid.spacing(level, self.size_m), self.tolerance(level)
+        device = self._devices.setdefault(level, device)
         for r, c in itertools.product(_chunks(rows), _chunks(cols)):
             lattice = blend.Lattice(spacing, r.start, r.stop, c.start, c.stop)
-            packed = blend.pack(self.model, self.index.resolved(spacing, tolerance, lattice.rect()), smooth=True)
+            chosen = self.index.resolved(spacing, tolerance, lattice.rect())
+            packed = blend.pack(self.model, chosen, True, tolerance)
             up, across = (
                 slice(r.start - rows.start, r.stop - rows.start),
                 slice(c.start - cols.start, c.stop - cols.start),

@@ -148,16 +148,17 @@ def smooth_bins(
     """Bicubic patches: bins ``first`` to ``last`` of a lattice with ``cols`` bins a row."""
     one, three = np.float32(1), np.float32(3)
     zero, margin = np.float32(0), np.float32(1.0 / PATCH_MARGIN_CELLS)
-    above, below, bare = (
-        np.empty((BIN, BIN), np.float32),
-        np.empty((BIN, BIN), np.float32),
-        np.empty((BIN, BIN), np.float32),
-    )
+    above = np.empty((BIN, BIN), np.float32)
+    below = np.empty((BIN, BIN), np.float32)
+    bare = np.empty((BIN, BIN), np.float32)
+    veil = np.empty((BIN, BIN), np.float32)
     z = np.empty(BIN, np.float32)
     for at in range(first, last):
-        above[:], below[:], bare[:] = 0, 0, 1
+        above[:], below[:], bare[:], veil[:] = 0, 0, 1, 1
         for entry in range(start[at], start[at + 1]):
             k = patch[entry]
+            if entry > start[at] and rank[k] != rank[patch[entry - 1]]:
+                veil[:] = bare
             c = coefficients[k].ravel()
             mid_u, mid_v, per_u, per_v, ku0, ku1, kv0, kv1, volume = constants[k]
             du, dv = step[k, 0], step[k, 1]
@@ -166,13 +167,13 @@ def smooth_bins(
                 v_row = origin[entry, 1] + step[k, 3] * np.float32(row)
                 begin, done = _columns(u_row, v_row, du, dv, constants[k])
                 _smooth_row(c, u_row, v_row, du, dv, np.int32(side[k] - 2), begin, done, z)
-                over, under, free = above[row], below[row], bare[row]
+                over, under, free, lets = above[row], below[row], bare[row], veil[row]
                 for col in range(begin, done):
                     u, v = u_row + du * np.float32(col), v_row + dv * np.float32(col)
                     tu, tv = abs(u - mid_u) * per_u, abs(v - mid_v) * per_v
                     su, sv = max(one - tu, zero), max(one - tv, zero)
                     weight = su * su * su * (three * tu + one) * volume
-                    weight *= sv * sv * sv * (three * tv + one)
+                    weight *= sv * sv * sv * (three * tv + one) * lets[col]
                     over[col] += weight * z[col]
                     under[col] += weight
                     free[col] *= one - fade(max(ku0 - u, u - ku1) * margin) * fade(max(kv0 - v, v - kv1) * margin)

@@ -30,26 +30,33 @@ def _pivots(n: int) -> NDArray[np.float64]:
 
 
 @kernel
+def _solve(values: NDArray[np.float64], side: int, pivot: NDArray[np.float64]) -> None:
+    """Samples to coefficients along the first axis, in place: elimination and substitution, all columns at once."""
+    for row in range(1, side - 1):
+        here, below, p = values[row], values[row - 1], pivot[row]
+        for col in range(side):
+            here[col] = (6.0 * here[col] - below[col]) * p
+    for row in range(side - 2, 0, -1):
+        here, above, p = values[row], values[row + 1], pivot[row]
+        for col in range(side):
+            here[col] -= p * above[col]
+
+
+@kernel
 def prefilter(samples: NDArray[np.float64], side: int, out: NDArray[np.float32]) -> None:
     """Turn ``samples[:side, :side]`` (spoilt by this) into coefficients ``out[:side + 2, :side + 2]``."""
     pivot = _pivots(side)
-    for row in range(1, side - 1):
-        for col in range(side):
-            samples[row, col] = (6.0 * samples[row, col] - samples[row - 1, col]) * pivot[row]
-    for row in range(side - 2, 0, -1):
-        for col in range(side):
-            samples[row, col] -= pivot[row] * samples[row + 1, col]
-    for row in range(side):
-        for col in range(1, side - 1):
-            samples[row, col] = (6.0 * samples[row, col] - samples[row, col - 1]) * pivot[col]
-        for col in range(side - 2, 0, -1):
-            samples[row, col] -= pivot[col] * samples[row, col + 1]
+    _solve(samples, side, pivot)
+    turned = np.empty((side, side))
     for row in range(side):
         for col in range(side):
-            out[row + 1, col + 1] = samples[row, col]
-    for row in range(1, side + 1):
-        out[row, 0] = 2.0 * out[row, 1] - out[row, 2]
-        out[row, side + 1] = 2.0 * out[row, side] - out[row, side - 1]
+            turned[col, row] = samples[row, col]
+    _solve(turned, side, pivot)
+    for row in range(side):
+        for col in range(side):
+            out[row + 1, col + 1] = turned[col, row]
+        out[row + 1, 0] = 2.0 * turned[0, row] - turned[1, row]
+        out[row + 1, side + 1] = 2.0 * turned[side - 1, row] - turned[side - 2, row]
     for col in range(side + 2):
         out[0, col] = 2.0 * out[1, col] - out[2, col]
         out[side + 1, col] = 2.0 * out[side, col] - out[side - 1, col]
