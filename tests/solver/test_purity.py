@@ -101,6 +101,11 @@ def test_the_coarsest_preview_waits_for_no_fine_raster(solver: Solver, monkeypat
         assert 4 in rasterised
     a, b = (r.heights for r in first if r is not None)
     assert np.array_equal(a, b)
+    kept = solver._spare[-1].packer
+    stopped = solver.steps(strokes[1:], SETTINGS, 4)
+    next(stopped)
+    stopped.close()  # type: ignore[attr-defined]
+    assert kept.likeness(strokes, SETTINGS) == len(strokes), "the fine raster is as it was: nothing of it began"
     settled = solver.solve(strokes, SETTINGS, 4)[0]
     assert np.sqrt(np.mean((a - settled) ** 2)) < 0.05 * np.ptp(settled)
 

@@ -217,13 +217,14 @@ class Solver:
             late = [layer.channel for layer in spoken if not layer.painted]
             early = [channel for channel in BASES if channel not in late]
             workspace = self._take(job, top)
-            keep, loaded = True, False
+            keep, half = True, False
             try:
                 scout = workspace.scout if warm is None else None
                 if scout is not None:
                     yield passes.scouted(scout, job)
+                half = True
                 yield from workspace.loading(*job)
-                loaded = True
+                half = False
                 if warm is None:
                     cycles = passes.preview_gradient_cycles(settings)
                     previews = self._paced(passes.previews(workspace, cycles, coarsest=scout is None), top)
@@ -240,7 +241,7 @@ class Solver:
                 yield from self._channels(spoken, job, top, late)
                 yield from passes.settled(workspace, job, basis)
             except GeneratorExit:
-                if not loaded:
+                if half:
                     workspace.packer.forget()
                 raise
             except BaseException as error:
