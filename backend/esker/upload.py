@@ -17,7 +17,6 @@ import numpy as np
 from esker.contract import Document
 from esker.document import archive
 from esker.document.ops import Refusal, check_document
-from esker.patchwork import rasters
 
 MEMORY_BYTES: Final = 1 << 30
 """Of its own; mapped files do not count."""
@@ -88,6 +87,8 @@ def main(path: Path, folder: Path) -> int:
 
 def _build(folder: Path, digest: str) -> None:
     """The raster of one grid, from its unpacked arrays. Raises ArchiveError."""
+    from esker.patchwork import rasters  # compiled loops take a second to load, and most files have no layers
+
     heights, warp = folder / f"{digest}.npy", folder / f"{digest}.warp.npy"
     try:
         net = np.load(warp, allow_pickle=False) if warp.exists() else None

@@ -235,6 +235,12 @@ def _in_tombstone(key: str, document: StrokeSet) -> bool:
     return name != "state" and (item in document.deleted or item in document.deleted_layers)
 
 
+def _born_layer(layer_id: str, **fields: Any) -> c.Layer:
+    facts = c.GridFacts(rows=9, cols=9, low_m=-10.0, high_m=900.0)
+    given: dict[str, Any] = {"content": "0" * 64, "facts": facts, "anchor": (0.0, 0.0), "spacing_m": (1.0, 2.0)}
+    return c.Layer(id=layer_id, **(given | {"accuracy_m": 1.0} | fields))
+
+
 def _laid(document: StrokeSet) -> list[dict[str, object]]:
     """All that the base follows from (SPEC D30), by id."""
     some = [layer.model_dump(exclude=set(TOLD_FIELDS)) for layer in document.layers.values() if not layer.hidden]
@@ -266,7 +272,13 @@ class Session(RuleBasedStateMachine):
     @initialize()
     def start(self) -> None:
         born = (c.Stroke(id=i, kind="profile", first=(0, 0, 0), last=(9, 9, 9), curve=((0, 0),)) for i in IDS[:3])
-        self.document = StrokeSet("t", strokes={stroke.id: stroke for stroke in born})
+        laid = {i: _born_layer(i, hidden=i == "v1") for i in LAYER_IDS}
+        self.document = StrokeSet(
+            "t",
+            strokes={stroke.id: stroke for stroke in born},
+            layers={i: laid[i] for i in LAYER_IDS[:2]},
+            deleted_layers={LAYER_IDS[2]: laid[LAYER_IDS[2]]},
+        )
         self.stacks = {name: UndoStack() for name in PEOPLE}
         self.claims: dict[tuple[str, str], set[str]] = {}
         """Who ever gave a field this value, by their own hand or by taking something back."""
@@ -319,6 +331,10 @@ class Session(RuleBasedStateMachine):
         """Few fields, few values: people get in each other's way."""
         value: object = str(n) if name == "label" else (float(n), 0.0, 0.0)
         self.act(who, c.SetStroke(stroke=stroke, fields=c.StrokeFields.model_validate({name: value})), None)
+
+    @rule(who=st.sampled_from(PEOPLE), op=layer_ops)
+    def lay(self, who: str, op: c.Op) -> None:
+        self.act(who, op, None)
 
     @rule(who=st.sampled_from(PEOPLE), redo=st.booleans())
     def travel(self, who: str, redo: bool) -> None:
