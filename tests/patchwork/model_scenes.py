@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from esker import contract
-from esker.patchwork import blend_reference, rasters, sheets
+from esker.patchwork import blend, blend_points, rasters, sheets
 from esker.patchwork.lod_space import Model, Placed
 from esker.patchwork.patches import warped
 
@@ -127,4 +127,5 @@ def chosen(model: Model, tolerance: float) -> NDArray[np.intp]:
 
 def blended(model: Model, index: NDArray[np.intp], points: Floats, tolerance: float) -> Floats:
     """The bilinear blend of a cut at points, NaN where no patch lies."""
-    return blend_reference.evaluate(model, index.astype(np.int32), points, False, tolerance)[0]
+    found = blend_points.evaluate(blend.pack(model, index.astype(np.int32), False, tolerance), points)
+    return np.where(found.cover[:, 0] > 0, found.heights[:, 0], np.nan)

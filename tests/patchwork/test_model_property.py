@@ -58,7 +58,7 @@ def check_cover(model: Model, rng: np.random.Generator) -> None:
     To the slack of bent kernels; and always well inside the domain of a patch of the cut.
     """
     low, high = model.kernel.min(axis=(0, 1)), model.kernel.max(axis=(0, 1))
-    points = rng.uniform(low, high, (400, 2))
+    points = rng.uniform(low, high, (200, 2))
     within = inside(model.kernel, points)
     could = within.any(axis=0)
     slack = np.where(within, model.slack[:, None], 0.0)
@@ -99,7 +99,7 @@ def check_error(model: Model, rng: np.random.Generator) -> None:
         more = {k for k, other in enumerate(model.placed) if trust(other.layer) > trust(one.layer)}
         at = places(one.layer, one.raster.warp).reshape(-1, 2)
         heights = one.layer.scale * one.raster.heights.ravel().astype(float) + one.layer.lift_m
-        some = rng.permutation(np.flatnonzero(~np.isnan(heights)))[:150]
+        some = rng.permutation(np.flatnonzero(~np.isnan(heights)))[:100]
         for tolerance in (0.0, 2.0, 30.0):
             cut = chosen(model, tolerance)
             height = blended(model, cut, at[some], tolerance)

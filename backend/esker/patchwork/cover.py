@@ -278,14 +278,14 @@ def _floors(ix: Index, which: Ints, start: int, stop: int, out: NDArray[np.bool_
 def tops(ix: Index, which: Ints) -> Floats:
     """Tops of the patches ``which``."""
     out = np.empty(len(which))
-    spread(lambda a, b: _tops(ix, which, a, b, out), bands(len(which)))
+    spread(lambda a, b: _tops(ix, which, a, b, out), bands(len(which), 64))
     return out
 
 
 def floors(ix: Index, which: Ints) -> NDArray[np.bool_]:
     """Which of the patches ``which`` are the floor of some place."""
     out = np.empty(len(which), bool)
-    spread(lambda a, b: _floors(ix, which, a, b, out), bands(len(which)))
+    spread(lambda a, b: _floors(ix, which, a, b, out), bands(len(which), 64))
     return out
 
 

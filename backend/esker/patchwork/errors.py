@@ -265,6 +265,6 @@ def _each(mips: tuple[Heights, ...], warp: Floats | None, scale: int, there: NDA
     matrix, extent = laid.to_patch, laid.extent
     spread(
         lambda a, b: _patch_errors(mips[0], mips[level], net, level, size, j, i, matrix, extent, a, b, out),
-        bands(len(j)),
+        bands(len(j), 16),
     )
     return out

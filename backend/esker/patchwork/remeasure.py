@@ -113,6 +113,6 @@ def distances(of: Sheet, to: Sheet) -> tuple[NDArray[np.int64], Floats]:
             to.sway,
             out[a:b],
         )
-        spread(work, bands(len(chosen)))
+        spread(work, bands(len(chosen), 16))
     there = out >= 0
     return index[there], out[there]
