@@ -15,10 +15,13 @@ import pytest
 
 import esker
 from esker import contract as c
+from esker import grid
 from esker.client import LiveTerrain, Refused
 from esker.contract import ImportStage
 from esker.importing.refusal import ImportRefused
-from esker.patchwork import rasters
+from esker.patchwork import lod_space, rasters
+from esker.patchwork.base import Base
+from esker.patchwork.lod_space import Placed
 from tests.sync.harness import LiveServer
 
 QUESTION = c.ImportQuestion(id="size", text="How wide is it?", default="fit")
@@ -349,3 +352,29 @@ def _until(terrain: LiveTerrain, ready: Callable[[], object]) -> None:
         assert time.monotonic() < deadline
         terrain.wait_clock(0)
         time.sleep(0.005)
+
+
+def test_a_real_file_is_real_ground_for_everybody(tmp_path: Path) -> None:
+    """SPEC P100: through the process that reads files, the store, the base and the tiles to another program."""
+    rows, cols = np.mgrid[0:60, 0:70]
+    heights = (400 + 90 * np.sin(rows / 9) * np.cos(cols / 7)).astype(np.float32)
+    with LiveServer(tmp_path, level=2) as server:
+        link = "{}/t/{}#{}".format(server.base, *server.create())
+        with esker.connect(link, "Ada") as ada, esker.connect(link, "Bob", ground=True) as bob:
+            layer = ada.add_grid(heights, anchor=(500, 700), rotation=27, spacing=(40, 45), accuracy=0.1, name="waves")
+            _until(bob, lambda: bob.layers)
+            assert (bob.layers[0].id, bob.layers[0].name, bob.layers[0].rotation_deg) == (layer, "waves", 27.0)
+            assert (bob.layers[0].source, bob.layers[0].author) == ("", "Ada")
+            made = rasters.build(heights)
+            assert bob.layers[0].content == made.digest
+            np.testing.assert_array_equal(bob.grids[made.digest].heights, heights)
+            bob.ground.wait(30)
+            base = Base(lod_space.build([Placed(bob.layers[0], made)]), bob.settings.size_m)
+            for level in (0, 1, 2):
+                quantum = grid.quantum(level, bob.settings.size_m)
+                np.testing.assert_allclose(bob.ground.heights(level), base.level(level), rtol=0, atol=quantum)
+            ada.undo()
+            ada.wait()
+            _until(bob, lambda: not bob.layers)
+            bob.ground.wait(30)
+            assert not bob.ground.heights(2).any()
