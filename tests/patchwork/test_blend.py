@@ -57,8 +57,8 @@ def test_the_loops_agree_with_the_twin(smooth: bool) -> None:
     points = lattice_points(lattice)
     for tolerance in TOLERANCES:
         index = INDEX.uniform(tolerance)
-        heights, cover = blend.evaluate(blend.pack(MODEL, index, smooth), lattice)
-        expected, presence, _ = blend_reference.evaluate(MODEL, index, points, smooth)
+        heights, cover = blend.evaluate(blend.pack(MODEL, index, smooth, tolerance), lattice)
+        expected, presence, _ = blend_reference.evaluate(MODEL, index, points, smooth, tolerance)
         assert np.abs(cover.ravel() - presence).max() < 2e-5
         there = presence > 1e-3
         assert np.abs(heights.ravel()[there] - expected[there]).max() < 5e-3
@@ -69,7 +69,7 @@ def test_the_kernel_agrees_with_the_loops(device: Device, smooth: bool) -> None:
     """SPEC PW41."""
     lattice = Lattice(37.0, 0, 97, 0, 65)
     for tolerance in TOLERANCES:
-        packed = blend.pack(MODEL, INDEX.uniform(tolerance), smooth)
+        packed = blend.pack(MODEL, INDEX.uniform(tolerance), smooth, tolerance)
         heights, cover = blend.evaluate(packed, lattice)
         on_device, presence = blend.evaluate(packed, lattice, device)
         assert np.abs(cover - presence).max() < 1e-5
@@ -82,8 +82,8 @@ def test_places_agree_with_the_twin(smooth: bool) -> None:
     points = scattered(4000)
     for tolerance in TOLERANCES:
         index = INDEX.uniform(tolerance)
-        found = blend_points.evaluate(blend.pack(MODEL, index, smooth), points)
-        expected, presence, _ = blend_reference.evaluate(MODEL, index, points, smooth)
+        found = blend_points.evaluate(blend.pack(MODEL, index, smooth, tolerance), points)
+        expected, presence, _ = blend_reference.evaluate(MODEL, index, points, smooth, tolerance)
         assert np.abs(found.cover[:, 0] - presence).max() < 1e-12
         there = presence > 1e-9
         assert np.abs(found.heights[there, 0] - expected[there]).max() < 2e-4
@@ -93,14 +93,14 @@ def test_places_agree_with_the_twin(smooth: bool) -> None:
 def test_a_bin_has_the_same_bits_whatever_is_asked_for_with_it(device: Device, smooth: bool) -> None:
     """SPEC PW42."""
     whole = Lattice(20.0, 0, 160, 0, 160)
-    all_of_them = blend.pack(MODEL, INDEX.uniform(6.0), smooth)
+    all_of_them = blend.pack(MODEL, INDEX.uniform(6.0), smooth, 6.0)
     rng = np.random.default_rng(8)
     for wanted in (None, device):
         heights, cover = blend.evaluate(all_of_them, whole, wanted)
         for _ in range(8):
             r, c = rng.integers(0, 150, 2)
             part = Lattice(20.0, int(r), int(r) + int(rng.integers(1, 10)), int(c), int(c) + int(rng.integers(1, 10)))
-            few = blend.pack(MODEL, INDEX.uniform(6.0, part.rect()), smooth)
+            few = blend.pack(MODEL, INDEX.uniform(6.0, part.rect()), smooth, 6.0)
             assert len(few) < len(all_of_them)
             h, m = blend.evaluate(few, part, wanted)
             rows, cols = slice(part.row0, part.row1), slice(part.col0, part.col1)
@@ -171,7 +171,7 @@ def test_samples_of_a_perfect_layer_are_reproduced(smooth: bool) -> None:
 def sharpest(model: lod_space.Model, smooth: bool, lines: int = 60) -> tuple[Floats, Floats]:
     """Greatest change (6,) of value and derivatives within half a metre, and in the worst hundredth of each such."""
     rng = np.random.default_rng(5)
-    packed = blend.pack(model, Index(model).uniform(0.0), smooth)
+    packed = blend.pack(model, Index(model).uniform(0.0), smooth, 0.0)
     start, way = rng.uniform(600, 2400, (lines, 2)), rng.normal(size=(lines, 2))
     way /= np.linalg.norm(way, axis=1)[:, None]
 
@@ -210,7 +210,7 @@ def test_facets_of_bilinear_patches_are_seen() -> None:
 def test_derivatives_are_those_of_the_heights() -> None:
     """SPEC PW46."""
     points, h = scattered(1500, 9), 1e-2
-    packed = blend.pack(MODEL, INDEX.uniform(6.0), smooth=True)
+    packed = blend.pack(MODEL, INDEX.uniform(6.0), True, 6.0)
 
     def at(dx: float, dy: float) -> blend_points.Places:
         return blend_points.evaluate(packed, shifted(points, dx * h, dy * h))

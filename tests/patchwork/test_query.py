@@ -7,6 +7,7 @@ import pytest
 
 from esker.patchwork import blend_reference, lod_space
 from esker.patchwork.lod_space import Model
+from esker.patchwork.quadtree_index import CAPACITY, QuadtreeIndex
 from esker.patchwork.query import Bounded, Chosen, Index, Sampled, Surface, View, difference, slope
 from tests.patchwork.blend_scenes import Floats, rough, sampled, shifted, three_layers
 
@@ -225,8 +226,26 @@ def test_an_index_follows_its_model() -> None:
     assert index.updated(model) is index
 
 
+@pytest.mark.parametrize("model", [ALONE, MODEL], ids=["one layer", "three layers"])
+def test_the_paper_s_quadtree_gives_the_same_answers(model: Model) -> None:
+    """SPEC PW35."""
+    tree, index, rng = QuadtreeIndex(model), Index(model), np.random.default_rng(6)
+    for e in (0.0, 0.5, 2.0, 7.5, 30.0, 300.0):
+        assert np.array_equal(np.sort(tree.uniform(e)), np.sort(index.uniform(e)))
+        for _ in range(6):
+            x, y, w, h = *rng.uniform(-400, 3500, 2), *rng.uniform(1, 900, 2)
+            rect = (x, y, x + w, y + h)
+            assert np.array_equal(np.sort(tree.uniform(e, rect)), np.sort(index.uniform(e, rect)))
+    assert 1 <= tree.copies < 2
+    assert (np.diff(tree.nodes.start) <= CAPACITY).all()
+    for n in range(len(tree.nodes.child)):
+        tops = model.max_z[tree.nodes.patch[tree.nodes.start[n] : tree.nodes.start[n + 1]]]
+        assert (tops[1:] <= tops[:-1]).all()
+
+
 def test_no_layers_no_patches() -> None:
     index = Index(lod_space.build([]))
     assert len(index.uniform(0.0)) == len(index.uniform(0.0, (0, 0, 1, 1))) == 0
+    assert len(QuadtreeIndex(index.model).uniform(0.0)) == 0
     assert len(index.view(View((0.0, 0.0), 0.0, 0.5, 100.0, 0.1))) == 0
     assert len(index.region(Bounded((0, 0, 1, 1), lambda boxes: np.zeros(len(boxes))))) == 0
