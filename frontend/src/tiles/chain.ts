@@ -30,6 +30,8 @@ export interface Link {
   readonly parentThen: Float32Array | null;
   /** The bounds that came with it, quanta; null once it has moved. */
   readonly sent: SentBounds | null;
+  /** Another one whenever the tile was sent or moved, be it there and back: its parent moved too then. */
+  readonly mark: object;
 }
 
 export class TileChain {
@@ -40,8 +42,12 @@ export class TileChain {
   private readonly counts: number[];
   /** Per level that is held: whether what was last said of all its tiles is final. */
   private readonly finals = new Map<number, boolean>();
+  /** Tiles that show something else, of which the children may not have followed yet. */
+  private readonly changed = new Set<number>();
+  /** Tiles that changed or went since `follow`. */
+  private touched = new Set<number>();
   private readonly delta = new Float32Array(AREA);
-  private readonly moved = new Float32Array(AREA);
+  private readonly movement = new Float32Array(AREA);
 
   /** `levels`: the finest level that can exist. */
   constructor(sizeM: number, levels: number) {
@@ -79,30 +85,41 @@ export class TileChain {
     this.links = new Map();
     this.finals.clear();
     this.counts.fill(0);
+    this.changed.clear();
+    this.touched.clear();
   }
 
-  /** Takes a frame, all of it at once, with everything that moves along. Returns the tiles that changed or went. */
-  apply(frame: DecodedFrame): Set<number> {
+  /**
+   * Takes a frame, all of it at once. What moves along is moved by `follow`: frames of finer levels may come first, and
+   * where they do there is nothing to move.
+   */
+  apply(frame: DecodedFrame): void {
+    const sent = new Set(frame.tiles.map((t) => tileKey(frame.level, t.x, t.y)));
+    this.moveTo(frame.level, sent);
     const next = new Map(this.links);
-    const touched = drop(next, frame);
+    for (const key of drop(next, frame)) this.touched.add(key);
     // Who holds nothing of a level is told nothing of it: the first tiles that fill it speak for themselves.
     if (!holds(next, frame.level)) this.finals.set(frame.level, frame.settled || frame.tiles.length === 0);
-    const changed = new Set<number>();
     for (const t of frame.tiles) {
       const key = tileKey(frame.level, t.x, t.y);
       next.set(key, this.exactLink(next, key, t));
-      changed.add(key);
+      this.changed.add(key);
+      this.touched.add(key);
     }
-    for (const key of changed) touched.add(key);
     if (frame.kind === FrameKind.LEVEL) {
       if (frame.tiles.length > 0 || holds(next, frame.level)) this.finals.set(frame.level, frame.settled);
-      confirm(next, frame.level, changed, touched);
+      this.confirm(next, frame.level, sent);
     }
-    this.moveBelow(next, frame.level, changed);
-    for (const key of changed) touched.add(key);
     this.links = next;
     this.counts.fill(0);
     for (const key of next.keys()) this.counts[keyLevel(key)]! += 1;
+  }
+
+  /** Moves along what the frames since the last call moved. Returns the tiles that changed or went since then. */
+  follow(): Set<number> {
+    this.moveTo(this.levels);
+    const touched = this.touched;
+    this.touched = new Set();
     return touched;
   }
 
@@ -113,44 +130,67 @@ export class TileChain {
     if (!flat) for (let i = 0; i < AREA; i++) heights[i] = t.samples[i]! * quantum;
     const parentThen = parentHeights(next, key);
     const sent = { subMin: t.subMin, subMax: t.subMax, subError: t.subError };
-    return { version: t.version, exact: true, heights, exactHeights: heights, parentThen, sent };
+    return { version: t.version, exact: true, heights, exactHeights: heights, parentThen, sent, mark: {} };
   }
 
-  /** Moves the tiles below those that changed, level by level, so that each follows its parent's new display. */
-  private moveBelow(next: Map<number, Link>, level: number, changed: Set<number>): void {
-    if (changed.size === 0) return;
-    const byLevel: number[][] = Array.from({ length: this.levels + 1 }, () => []);
-    for (const key of next.keys()) if (keyLevel(key) > level) byLevel[keyLevel(key)]?.push(key);
-    for (let below = level + 1; below <= this.levels; below++) {
-      for (const key of byLevel[below]!) {
-        if (!changed.has(parentKey(key))) continue;
-        const link = next.get(key)!;
-        const shown = this.follow(key, link, parentHeights(next, key));
-        if (shown === link) continue;
-        next.set(key, shown);
-        changed.add(key);
+  /** After a LEVEL frame every held tile of the level shows its own samples again. */
+  private confirm(next: Map<number, Link>, level: number, sent: ReadonlySet<number>): void {
+    for (const [key, link] of next) {
+      if (keyLevel(key) !== level || sent.has(key)) continue;
+      const parent = parentHeights(next, key);
+      if (link.exact && link.parentThen === parent) continue;
+      this.touched.add(key);
+      if (link.heights === link.exactHeights) {
+        next.set(key, { ...link, exact: true, parentThen: parent });
+        continue;
       }
+      next.set(key, { ...link, exact: true, heights: link.exactHeights, parentThen: parent, sent: null, mark: {} });
+      this.changed.add(key);
+    }
+  }
+
+  /**
+   * Moves the tiles up to a level whose parents changed, level by level, so that each follows what its parent shows.
+   * Those in `but`, of the finest level, are about to be replaced.
+   */
+  private moveTo(finest: number, but: ReadonlySet<number> | null = null): void {
+    if (this.changed.size === 0) return;
+    const byLevel: number[][] = Array.from({ length: this.levels + 1 }, () => []);
+    for (const key of this.links.keys()) byLevel[keyLevel(key)]?.push(key);
+    for (let level = 1; level <= finest; level++) {
+      for (const key of byLevel[level]!) {
+        if (!this.changed.has(parentKey(key)) || but?.has(key)) continue;
+        const link = this.links.get(key)!;
+        const shown = this.moved(key, link, parentHeights(this.links, key));
+        if (shown === link) continue;
+        this.links.set(key, shown);
+        this.changed.add(key);
+        this.touched.add(key);
+      }
+    }
+    for (const key of this.changed) {
+      if (keyLevel(key) < finest || finest === this.levels) this.changed.delete(key);
     }
   }
 
   /** The tile moved along with its parent; the same object when its part of the parent did not move. */
-  private follow(key: number, link: Link, parent: Float32Array | null): Link {
+  private moved(key: number, link: Link, parent: Float32Array | null): Link {
     const { heights, exactHeights, parentThen } = link;
     if (!parent || !parentThen) return link;
     if (!this.parentMoved(parent, parentThen, keyX(key), keyY(key))) {
-      return link.exact ? link : { ...link, exact: true, heights: exactHeights, sent: null };
+      return link.exact ? link : { ...link, exact: true, heights: exactHeights, sent: null, mark: {} };
     }
-    predictMetres(this.delta, keyX(key), keyY(key), this.moved);
+    predictMetres(this.delta, keyX(key), keyY(key), this.movement);
     let same = true;
     let still = true;
     for (let i = 0; i < AREA; i++) {
-      const height = Math.fround(exactHeights[i]! + this.moved[i]!);
+      const height = Math.fround(exactHeights[i]! + this.movement[i]!);
       if (height !== heights[i]) same = false;
       if (height !== exactHeights[i]) still = false;
-      this.moved[i] = height;
+      this.movement[i] = height;
     }
     if (same) return link;
-    return { ...link, exact: still, heights: still ? exactHeights : this.moved.slice(), sent: null };
+    return { ...link, exact: still, heights: still ? exactHeights : this.movement.slice(), sent: null, mark: {} };
   }
 
   /** Writes the parent's movement, where the child's prediction reads it, to `delta`; false when it is zero there. */
@@ -181,20 +221,6 @@ function drop(next: Map<number, Link>, frame: DecodedFrame): Set<number> {
     dropped.add(key);
   }
   return dropped;
-}
-
-/** After a LEVEL frame every held tile of the level shows its own samples again. */
-function confirm(next: Map<number, Link>, level: number, changed: Set<number>, touched: Set<number>): void {
-  for (const [key, link] of next) {
-    if (keyLevel(key) !== level || changed.has(key)) continue;
-    const parent = parentHeights(next, key);
-    if (link.exact && link.parentThen === parent) continue;
-    const moved = link.heights !== link.exactHeights;
-    const sent = moved ? null : link.sent;
-    next.set(key, { ...link, exact: true, heights: link.exactHeights, parentThen: parent, sent });
-    touched.add(key);
-    if (moved) changed.add(key);
-  }
 }
 
 function parentHeights(links: ReadonlyMap<number, Link>, key: number): Float32Array | null {

@@ -48,7 +48,10 @@ export class TileStore implements TileView {
   private readonly rev = signal(0);
   private readonly offsets: TileChain;
   private readonly base: TileChain;
-  private shown = new Map<number, Shown>();
+  /** What is drawn, as somebody last looked at it: where several frames come at once, the tiles are made once. */
+  private drawn = new Map<number, Shown>();
+  /** What frames have changed since then. */
+  private stale: "nothing" | "offsets" | "all" = "nothing";
   private snapshot: { readonly stamp: number; readonly ground: TileGround } | null = null;
   private readonly distance = new Float64Array(SUBS);
 
@@ -103,20 +106,30 @@ export class TileStore implements TileView {
   clear(): void {
     this.offsets.clear();
     this.base.clear();
-    this.shown = new Map();
+    this.drawn = new Map();
+    this.stale = "nothing";
     this.rev.value++;
   }
 
   /** Shows a frame of the offsets or the base: all of it at once, with everything that moves along. One step of `revision`. */
   apply(frame: DecodedFrame): void {
-    const stamp = this.stamp + 1;
     const based = this.based;
-    const touched = (frame.channel === Channel.BASE ? this.base : this.offsets).apply(frame);
-    const all = based || this.based;
-    this.shown = all
-      ? this.composed(this.offsets.keys(), new Map(), stamp)
-      : this.composed(touched, new Map(this.shown), stamp);
-    this.rev.value = stamp;
+    (frame.channel === Channel.BASE ? this.base : this.offsets).apply(frame);
+    this.stale = based || this.based || this.stale === "all" ? "all" : "offsets";
+    this.rev.value++;
+  }
+
+  /** What is drawn now. */
+  private get shown(): ReadonlyMap<number, Shown> {
+    if (this.stale === "nothing") return this.drawn;
+    const all = this.stale === "all";
+    this.stale = "nothing";
+    const touched = this.offsets.follow();
+    this.base.follow();
+    this.drawn = all
+      ? this.composed(this.offsets.keys(), new Map(), this.stamp)
+      : this.composed(touched, new Map(this.drawn), this.stamp);
+    return this.drawn;
   }
 
   /** Whether there is a base: its root is always held with anything of it. */
@@ -142,7 +155,7 @@ export class TileStore implements TileView {
     const own = this.base.get(key);
     if (own && (parent || keyLevel(key) === 0)) return { base: own.heights, own, from: null };
     if (!parent?.base || this.base.countOf(keyLevel(key)) > 0) return null;
-    const old = this.shown.get(key);
+    const old = this.drawn.get(key);
     if (old && old.from === parent.base) return old;
     return { base: predicted(key, parent.base), own: null, from: parent.base };
   }
@@ -152,8 +165,8 @@ export class TileStore implements TileView {
     const { base, own, from } = footing;
     const { version } = offset;
     const exact = offset.exact && from === null && own?.exact !== false;
-    const old = this.shown.get(key);
-    if (old && alike(old.offset, offset) && alike(old.own, own) && old.base === base) {
+    const old = this.drawn.get(key);
+    if (old && old.offset.mark === offset.mark && old.own?.mark === own?.mark && old.base === base) {
       const kept = old.tile.exact === exact && old.tile.version === version;
       return { tile: kept ? old.tile : { ...old.tile, exact, version, stamp }, offset, base, own, from };
     }
@@ -181,13 +194,6 @@ export class TileStore implements TileView {
     }
     return { subMin, subMax, subError };
   }
-}
-
-/** Whether two states of a tile show the same, as the same part of its parent. What is sent anew may differ in the latter. */
-function alike(old: Link | null, now: Link | null): boolean {
-  if (old === now) return true;
-  if (!old || !now) return false;
-  return old.heights === now.heights && (now.sent === null || now.sent === old.sent);
 }
 
 /** The base of a tile, metres, as its parent's predicts it. */

@@ -56,6 +56,36 @@ describe("a session from the server", () => {
     expect(late).toBeGreaterThan(0);
   });
 
+  test("shows the same whether anybody looked in between or not", () => {
+    const [watched, left] = [new TileStore(SIZE_M, 4, 3), new TileStore(SIZE_M, 4, 3)];
+    const steps = sessionFrames("based");
+    steps.forEach((f, i) => {
+      for (const store of [watched, left]) store.apply(f);
+      const tiles = new Map([...watched.tiles()].map((t) => [keyOf(t), t]));
+      if (i % 3 < 2 && i < steps.length - 1) return;
+      expect([...left.tiles()].length).toBe(tiles.size);
+      for (const t of left.tiles()) {
+        const other = tiles.get(keyOf(t))!;
+        expect([t.exact, t.version]).toEqual([other.exact, other.version]);
+        expect(t.heights.every((v, k) => v === other.heights[k])).toBe(true);
+        expect(t.subError).toEqual(other.subError);
+      }
+    });
+    const store = filled(bump, rough);
+    const before = store.tile(2, 1, 1)!.subError.slice();
+    store.apply(
+      base(
+        "LEVEL",
+        1,
+        all(1, 2, (x, y) => rough(x, y) + 9),
+      ),
+    );
+    store.apply(base("LEVEL", 2, []));
+    const after = store.tile(2, 1, 1)!;
+    expect(after.exact).toBe(true);
+    expect(after.subError[5]! - before[5]!).toBeGreaterThan(5);
+  });
+
   test("ends with the sum of what was sent last, to the bit", () => {
     const frames = sessionFrames("based");
     const until = frames.findLastIndex((f) => f.channel === Channel.BASE && f.clock === 4) + 2;
