@@ -74,6 +74,20 @@ export function footprintVisuals(doc: Doc | null, marks: FootprintMarks, ground:
   return out;
 }
 
+/** Upright lines from the ground to the corners of the coarse picture: they tell how high it stands. */
+export function stemsOf(laying: Laying, sheet: SheetVisual | null, ground: Ground): FootprintVisual[] {
+  if (sheet === null) return [];
+  const { side, points } = sheet;
+  const out: FootprintVisual[] = [];
+  for (const corner of [0, side - 1, side * side - 1, side * (side - 1)]) {
+    const [x, y, z] = points.subarray(3 * corner, 3 * corner + 3) as unknown as [number, number, number];
+    if (Number.isNaN(z)) continue;
+    const line = new Float32Array([x, y, ground.heightAt(x, y), x, y, z]);
+    out.push({ id: `${laying.id}/${corner}`, points: line, colour: withAlpha(LAYING_COLOUR, 0.6), strong: false });
+  }
+  return out;
+}
+
 /** A coarse picture where it would lie; `preview`: rows of heights 0..255 between low and high, -1 where there is none. */
 export function sheetOf(laying: Laying, place: GridPlace, preview: readonly (readonly number[])[]): SheetVisual | null {
   const side = preview.length;

@@ -10,7 +10,7 @@ import type { FootprintVisual, Ground, SheetVisual, Vec3 } from "../core/types.t
 import type { SyncDoc } from "../doc/sync.ts";
 import type { ImportAnswers, Importing, ImportReport, Layer } from "../generated/contract.ts";
 import type { Laying } from "../input/placement.ts";
-import { footprintVisuals } from "./footprints.ts";
+import { footprintVisuals, stemsOf } from "./footprints.ts";
 import { heightRange, laidByHand } from "./import-questions.ts";
 import { type ImportJob, Imports, type ImportTransport, isOver } from "./imports.ts";
 import type { KeptImport } from "./kept-imports.ts";
@@ -66,7 +66,9 @@ export class Groundwork {
       const laying = options.laying.value;
       if (!doc?.layers.size && laying === null) return NONE;
       const marks = { selected: this.selected.value, hovered: this.hovered.value, laying, calm: options.calm() };
-      return footprintVisuals(doc, marks, options.ground());
+      const ground = options.ground();
+      const stems = laying instanceof PendingLaying ? stemsOf(laying, laying.sheet.value, ground) : [];
+      return [...footprintVisuals(doc, marks, ground), ...stems];
     });
     this.sheet = computed(() => {
       const laying = options.laying.value;

@@ -202,7 +202,7 @@ export class EskImportCard extends SignalElement {
 
 function whatToDo(report: ImportReport | null): string {
   if (report === null || report.format === "")
-    return "Elevation comes as GeoTIFF, HGT, Esri ASCII, IMG, DTED, 16-bit PNG, RAW, NPY or NPZ.";
+    return "Nothing was added. Save it in one of these formats and drop it again.";
   return "Nothing was added. Mend the file and drop it again, or drop another one.";
 }
 

@@ -3,6 +3,7 @@ import { repeat } from "lit/directives/repeat.js";
 import { type Layer, MAX_LAYERS } from "../generated/contract.ts";
 import { icon } from "./icons.ts";
 import "./import-card.ts";
+import { isOver } from "./imports.ts";
 import { keyText } from "./keys.ts";
 import "./layer-form.ts";
 import { layerColour, layerName, orderedLayers, reorderOps } from "./layers.ts";
@@ -41,7 +42,8 @@ export class EskLayersPanel extends SignalElement {
     return html`
       ${this.#adding(layers.length)}
       ${repeat(
-        jobs,
+        // What is under way comes before what is over.
+        [...jobs].sort((a, b) => Number(isOver(a.phase)) - Number(isOver(b.phase))),
         (j) => j.key,
         (j) => html`<esk-import-card .stage=${this.stage} .job=${j}></esk-import-card>`,
       )}

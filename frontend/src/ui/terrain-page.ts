@@ -7,6 +7,7 @@ import "./help-dialog.ts";
 import "./icon-library.ts";
 import { icon } from "./icons.ts";
 import "./layers-panel.ts";
+import "./laying-bar.ts";
 import "./legend.ts";
 import "./overlay.ts";
 import { importingWords } from "./others.ts";
@@ -40,6 +41,7 @@ const TABS = [
 ];
 
 const WIDE = "(min-width: 1000px)";
+const NARROW = "(max-width: 720px)";
 
 /** `/t/{id}`: the picture over the whole window, and calm chrome that floats on it. */
 export class EskTerrain extends SignalElement {
@@ -77,6 +79,11 @@ export class EskTerrain extends SignalElement {
       }),
       effect(() => {
         if ((session.doc.doc.value?.strokes.size ?? 0) > 0) setFlag(session.store, "drawn");
+      }),
+      effect(() => {
+        // The sheet would hide the ground on which the grid is laid.
+        const laid = session.stage.value?.input.laying.value ?? null;
+        if (laid !== null && window.matchMedia(NARROW).matches) this.#panel.value = null;
       }),
       installTestHook(session),
     ];
@@ -199,6 +206,12 @@ export class EskTerrain extends SignalElement {
       </div>
       ${this.#hint(stage)} ${this.#following(stage)} ${this.#closedBar(stage)} ${this.#graphics(stage)} ${this.#notice(stage)}
       ${this.#importing(stage)}
+      <esk-laying-bar
+        .stage=${stage}
+        @numbers=${() => {
+          this.#panel.value = "ground";
+        }}
+      ></esk-laying-bar>
       ${this.#panel.value === null ? nothing : this.#side(stage, this.#panel.value)} ${this.#ways(stage)}
       <esk-share .stage=${stage} .open=${this.#dialog.value === "share"} @close=${this.#closeDialog}></esk-share>
       <esk-profile .stage=${stage} .open=${this.#dialog.value === "profile"} @close=${this.#closeDialog}></esk-profile>
@@ -280,13 +293,9 @@ export class EskTerrain extends SignalElement {
   #hint(stage: Stage): TemplateResult | typeof nothing {
     const { session, input } = stage;
     const doc = session.doc.doc.value;
-    if (input.laying.value !== null)
-      return html`<div class="hint panel">
-        ${icon("select")}<span>Drag the grid where it belongs. Enter places it, Esc ${doc?.layers.has(input.laying.value.id) ? "puts it back" : "gives it up"}.</span>
-      </div>`;
     const busy = this.#panel.value === "ground" || stage.groundwork.imports.jobs.value.length > 0;
     const empty = (doc?.strokes.size ?? 0) === 0 && (doc?.layers.size ?? 0) === 0 && !busy;
-    if (!empty || !session.canEdit.value || input.drawing.value !== null) return nothing;
+    if (!empty || !session.canEdit.value || input.drawing.value !== null || input.laying.value !== null) return nothing;
     const drawn = flag(session.store, "drawn");
     const ready = input.tool.value !== "select";
     const flat = stage.camera.state.value.mode === "map";

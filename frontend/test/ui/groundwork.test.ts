@@ -98,7 +98,7 @@ describe("real ground on the page", () => {
     const held = laying.value!;
     expect(held).toMatchObject({ rows: 96, cols: 96, low_m: 2000, high_m: 2200 });
     expect(work.sheet.value).not.toBeNull();
-    expect(work.footprints.value.map((f) => f.strong)).toEqual([true]);
+    expect(work.footprints.value.filter((f) => f.strong).map((f) => f.id)).toEqual(["import-1"]);
     held.lay({ anchor: [100, 200], rotation_deg: 27, spacing_m: [2, 2], scale: 1, lift_m: 5 }, "g");
     held.finish();
     await vi.advanceTimersByTimeAsync(0);

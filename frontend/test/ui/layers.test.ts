@@ -10,7 +10,7 @@ import { apply } from "../../src/doc/apply.ts";
 import { fromDocument } from "../../src/doc/document.ts";
 import type { ImportReport, Layer } from "../../src/generated/contract.ts";
 import { sheetShades, sheetVertices } from "../../src/gpu/sheet.ts";
-import { footprintVisuals, sheetOf } from "../../src/ui/footprints.ts";
+import { footprintVisuals, sheetOf, stemsOf } from "../../src/ui/footprints.ts";
 import { heightRange, laidByHand, optionWords } from "../../src/ui/import-questions.ts";
 import { layerFacts, orderedLayers, percent, placeWords, reorderOps, reportFacts } from "../../src/ui/layers.ts";
 import { PendingLaying, startingPlace } from "../../src/ui/laying.ts";
@@ -147,6 +147,17 @@ describe("a file without a place", () => {
     expect(points[8]).toBeCloseTo((128 / 255) * 400, 3);
     expect(points[11]).toBeNaN();
     expect(sheetOf(laying, laying.place.value, [])).toBeNull();
+  });
+
+  it("stands on stems at the corners that hold data", () => {
+    const laying = pending();
+    const stems = stemsOf(laying, laying.sheet.value, flat);
+    expect(stems.length).toBe(3);
+    const [x, y, z, x1, y1, z1] = stems[0]!.points;
+    expect([x, y]).toEqual([x1, y1]);
+    expect(z).toBe(50);
+    expect(z1).toBe(2000 + laying.place.value.lift_m);
+    expect(stemsOf(laying, null, flat)).toEqual([]);
   });
 
   it("shows no cell that lacks a corner, and light from the north-west", () => {

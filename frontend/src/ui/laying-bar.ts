@@ -1,0 +1,103 @@
+import { css, html, nothing, type TemplateResult } from "lit";
+import { icon } from "./icons.ts";
+import { LayerLaying } from "./laying.ts";
+import { SignalElement } from "./signal-element.ts";
+import type { Stage } from "./stage.ts";
+import { shared } from "./styles/shared.ts";
+
+/** While a grid is in hand: what to do with it, and the buttons for those without a keyboard. Fires `numbers`. */
+export class EskLayingBar extends SignalElement {
+  static override properties = { stage: { attribute: false } };
+  static override styles = [
+    shared,
+    css`
+      :host {
+        position: absolute;
+        left: 50%;
+        bottom: 64px;
+        transform: translateX(-50%);
+        width: max-content;
+        max-width: calc(100% - 2 * var(--edge));
+      }
+      .panel {
+        display: flex;
+        flex-wrap: wrap;
+        align-items: center;
+        justify-content: center;
+        gap: 8px 10px;
+        padding: 7px 7px 7px 14px;
+        font-weight: 500;
+      }
+      .what {
+        display: flex;
+        align-items: center;
+        gap: 10px;
+      }
+      .what .icon {
+        color: var(--esk-accent-text);
+      }
+      .keys {
+        color: var(--esk-quiet);
+        font-weight: 400;
+      }
+      .row {
+        display: flex;
+        gap: 6px;
+      }
+      @media (max-width: 720px) {
+        :host {
+          bottom: calc(118px + env(safe-area-inset-bottom));
+          width: auto;
+          left: var(--edge);
+          right: var(--edge);
+          transform: none;
+        }
+        .panel {
+          padding: 10px;
+          font-size: 0.8125rem;
+        }
+        .row {
+          width: 100%;
+        }
+        .row .btn {
+          flex: 1;
+        }
+        .keys {
+          display: none;
+        }
+      }
+      @media (pointer: coarse) {
+        .btn {
+          min-height: 44px;
+        }
+        .keys {
+          display: none;
+        }
+      }
+    `,
+  ];
+
+  declare stage: Stage;
+
+  protected override render(): TemplateResult | typeof nothing {
+    const laying = this.stage.input.laying.value;
+    if (laying === null) return nothing;
+    const layer = laying instanceof LayerLaying;
+    return html`<div class="panel" role="group" aria-label="The grid in hand">
+      <span class="what" role="status">
+        ${icon("select")}
+        <span>
+          Drag the grid where it belongs.
+          <span class="keys">Enter ${layer ? "leaves it, Esc puts it back" : "places it, Esc gives it up"}.</span>
+        </span>
+      </span>
+      <span class="row">
+        <button class="btn outline" @click=${() => this.dispatchEvent(new CustomEvent("numbers"))}>Numbers</button>
+        <button class="btn outline" @click=${() => laying.cancel()}>${layer ? "Put it back" : "Cancel"}</button>
+        <button class="btn primary" @click=${() => laying.finish()}>${layer ? "Leave it here" : "Place it"}</button>
+      </span>
+    </div>`;
+  }
+}
+
+customElements.define("esk-laying-bar", EskLayingBar);
