@@ -1,7 +1,7 @@
 """The index of paper 2, section 4.2: a quadtree whose nodes list the 64 boxes with the highest tops.
 
 A node holds those live patches whose domain's box meets it, that no node above it holds, with the greatest ``max_z``;
-the rest go down to each child that they meet. So a query reads a node's list from its top down to its tolerance, and goes
+the rest go down to each child that they meet. A query reads a node's list from its top down to its tolerance, and goes
 down only from nodes whose whole list lies above it. Kept beside the nested pyramids (``pyramid_index``) to be measured
 against them: it needs no nesting, but patches stand in several nodes, and large ones are met again in each.
 """
