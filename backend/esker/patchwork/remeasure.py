@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from esker.patchwork import patches
-from esker.patchwork.errors import NO_WARP, Heights, displaced, interpolated
+from esker.patchwork.errors import NO_WARP, Heights, displaced
 from esker.patchwork.jit import bands, kernel, spread
 from esker.patchwork.patches import Floats
 from esker.patchwork.samples import cut
@@ -40,48 +40,70 @@ def _distances(
     heights: Heights,
     warp: Floats,
     sway: float,
+    parts: int,
     out: Floats,
     start: int,
     stop: int,
 ) -> None:
-    """Greatest distance of the samples of ``heights`` in the domain of each of the patches start..stop.
+    """Greatest distance of the samples of ``heights`` in the domains of patches, each in ``parts`` bands of rows.
 
     ``first`` (n, 2): row and column of a patch in ``mip``; ``to_patch`` (n, 2, 3): lattice of ``heights`` to patch;
-    ``gain``: scale and lift of the patches, scale and lift of the samples.
+    ``gain``: scale and lift of the patches, scale and lift of the samples. ``out[p * parts + band]``.
     """
     rows, cols = heights.shape
     block = np.empty((side, side), np.float32)
-    for p in range(start, stop):
-        cut(mip, first[p, 0], first[p, 1], block)
+    metres = np.empty((side, side))
+    for work in range(start, stop):
+        p = work // parts
         m, eu, ev = to_patch[p], extent[p, 0], extent[p, 1]
         su = (abs(m[0, 0]) + abs(m[0, 1])) * sway
         sv = (abs(m[1, 0]) + abs(m[1, 1])) * sway
-        determinant = m[0, 0] * m[1, 1] - m[0, 1] * m[1, 0]
-        # Rows of the lattice that the domain's corners span.
-        low, high = np.inf, -np.inf
-        for corner in range(4):
-            du = (eu if corner & 1 else 0.0) - m[0, 2]
-            dv = (ev if corner & 2 else 0.0) - m[1, 2]
-            v = (m[0, 0] * dv - m[1, 0] * du) / determinant
-            low, high = min(low, v), max(high, v)
+        low, high = _rows_of(m, eu, ev)
+        top, end = max(0, int(np.ceil(low - sway))), min(rows, int(np.floor(high + sway)) + 1)
+        out[work] = -1.0
+        if top >= end:
+            continue
+        cut(mip, first[p, 0], first[p, 1], block)
+        for r in range(side):
+            for c in range(side):
+                metres[r, c] = gain[0] * block[r, c] + gain[1]
         worst = -1.0
-        for row in range(max(0, int(np.ceil(low - sway))), min(rows - 1, int(np.floor(high + sway))) + 1):
+        band = work % parts
+        for row in range(top + (end - top) * band // parts, top + (end - top) * (band + 1) // parts):
             a, b = _narrowed(m[0, 0], m[0, 1] * row + m[0, 2], eu, su, 0.0, cols - 1.0)
             a, b = _narrowed(m[1, 0], m[1, 1] * row + m[1, 2], ev, sv, a, b)
             if a > b:
                 continue
+            line = heights[row]
             for col in range(max(0, int(np.floor(a))), min(cols - 1, int(np.ceil(b))) + 1):
-                height = heights[row, col]
-                if np.isnan(height):
-                    continue
-                x, y = displaced(warp, rows, cols, float(col), float(row))
+                x, y = float(col), float(row)
+                if warp.shape[0]:
+                    x, y = displaced(warp, rows, cols, x, y)
                 u = m[0, 0] * x + m[0, 1] * y + m[0, 2]
                 v = m[1, 0] * x + m[1, 1] * y + m[1, 2]
                 if u < 0.0 or v < 0.0 or u > eu or v > ev:
                     continue
-                patch = gain[0] * interpolated(block, u, v) + gain[1]
-                worst = max(worst, abs(gain[2] * height + gain[3] - patch))
-        out[p] = worst
+                i, j = min(int(u), side - 2), min(int(v), side - 2)
+                f, g = u - i, v - j
+                near = metres[j, i] + (metres[j, i + 1] - metres[j, i]) * f
+                far = metres[j + 1, i] + (metres[j + 1, i + 1] - metres[j + 1, i]) * f
+                distance = abs(gain[2] * line[col] + gain[3] - (near + (far - near) * g))
+                if distance > worst:  # never for nodata, which is NaN
+                    worst = distance
+        out[work] = worst
+
+
+@kernel
+def _rows_of(m: Floats, eu: float, ev: float) -> tuple[float, float]:
+    """Rows of the lattice that the corners of a domain span."""
+    determinant = m[0, 0] * m[1, 1] - m[0, 1] * m[1, 0]
+    low, high = np.inf, -np.inf
+    for corner in range(4):
+        du = (eu if corner & 1 else 0.0) - m[0, 2]
+        dv = (ev if corner & 2 else 0.0) - m[1, 2]
+        v = (m[0, 0] * dv - m[1, 0] * du) / determinant
+        low, high = min(low, v), max(high, v)
+    return low, high
 
 
 def distances(of: Sheet, to: Sheet) -> tuple[NDArray[np.int64], Floats]:
@@ -100,6 +122,10 @@ def distances(of: Sheet, to: Sheet) -> tuple[NDArray[np.int64], Floats]:
         first = np.stack([of.j[chosen], of.i[chosen]], 1).astype(np.int64) * size - patches.RING
         mip = ours.raster.mips[patches.level_of(scale)]
         side = patches.side_of(scale)
+        # A few great patches are shared out by rows, so that no thread waits for another.
+        cells = patches.SMALLEST_KERNEL << scale
+        parts = -(-cells // 448)
+        bests = np.empty(len(chosen) * parts)
         work = functools.partial(
             _distances,
             mip,
@@ -111,8 +137,10 @@ def distances(of: Sheet, to: Sheet) -> tuple[NDArray[np.int64], Floats]:
             theirs.raster.heights,
             warp,
             to.sway,
-            out[a:b],
+            parts,
+            bests,
         )
-        spread(work, bands(len(chosen), 16))
+        spread(work, bands(len(bests), 1 if cells > 500 else 16))
+        out[a:b] = bests.reshape(-1, parts).max(axis=1)
     there = out >= 0
     return index[there], out[there]
