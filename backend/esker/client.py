@@ -25,28 +25,26 @@ import secrets
 import ssl
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from websockets.asyncio.client import ClientConnection
 from websockets.asyncio.client import connect as open_socket
 from websockets.exceptions import ConnectionClosed, InvalidHandshake, InvalidMessage
 
 from esker import contract as c
-from esker.client_layers import Grids, bring_in, steps
-from esker.contract import Document, Layer, Op, Stroke, TerrainSettings
+from esker.client_layers import Grids, LiveLayers
+from esker.contract import Document, Op, Stroke, TerrainSettings
 from esker.document.ops import Refusal
 from esker.document.sync import Diverged, SyncDoc
 from esker.document.undo import UndoPlan
 from esker.document.wire import op_json
 from esker.ground import StreamedGround
-from esker.importing.upload import Uploads
 from esker.link import Link, Refused
-from esker.patchwork.rasters import Raster
 from esker.session.limits import TokenBucket
 from esker.terrain import Terrain
 from esker.tiles.frame import FrameError
@@ -68,7 +66,7 @@ LOST: Final = (OSError, ConnectionClosed, InvalidHandshake, InvalidMessage, Time
 """After these the client connects again."""
 
 
-class LiveTerrain:
+class LiveTerrain(LiveLayers):
     """A terrain that others may be changing too. All methods may be called from any thread."""
 
     def __init__(
@@ -142,17 +140,6 @@ class LiveTerrain:
         """The strokes as seen from here: confirmed, with our unconfirmed changes on top."""
         with self._changed:
             return tuple(self._sync.document.strokes.values())
-
-    @property
-    def layers(self) -> tuple[Layer, ...]:
-        """The elevation layers as seen from here, oldest first."""
-        with self._changed:
-            return tuple(self._sync.document.layers.values())
-
-    @property
-    def grids(self) -> dict[str, Raster]:
-        """The grids of the layers by ``Layer.content``, fetched once each. Raises Refused, OSError."""
-        return self._grids.of(self.layers)
 
     @property
     def settings(self) -> TerrainSettings:
@@ -240,51 +227,6 @@ class LiveTerrain:
     def set_terrain(self, **fields: Any) -> None:
         """Changes settings: ``title``, ``sea_level_m``, ``look`` … Raises Refused, pydantic.ValidationError."""
         self._submit(c.SetTerrain(fields=c.TerrainFields.model_validate(fields)))
-
-    def add_grid(
-        self,
-        grid: ArrayLike | str | Path,
-        anchor: tuple[float, float] | None = None,
-        rotation: float | None = None,
-        spacing: float | tuple[float, float] | None = None,
-        accuracy: float | None = None,
-        name: str | None = None,
-        *,
-        scale: float | None = None,
-        lift: float | None = None,
-        source: str | None = None,
-        licence: str | None = None,
-        answers: Mapping[str, str] | None = None,
-        told: Callable[[c.ImportStatus], None] = lambda _: None,
-    ) -> str:
-        """Lays an elevation grid on the terrain, for everybody; returns the layer's id. One undo step of ours.
-
-        As ``Terrain.add_grid``, done by the server: ``told`` hears how far it is. Raises Refused, ValueError for what
-        is no grid, OSError, TimeoutError.
-        """
-        fields = {
-            "anchor": None if anchor is None else (float(anchor[0]), float(anchor[1])),
-            "rotation_deg": None if rotation is None else float(rotation),
-            "spacing_m": None if spacing is None else steps(spacing),
-            "accuracy_m": None if accuracy is None else float(accuracy),
-            "name": name,
-            "scale": None if scale is None else float(scale),
-            "lift_m": None if lift is None else float(lift),
-            "source": source,
-            "licence": licence,
-        }
-        with Uploads(self._address, self._ca_file) as uploads:
-            layer = bring_in(uploads, grid, fields, answers or {}, told, self._client)
-        self._await(lambda: layer in self._sync.confirmed.layers, CONNECT_SECONDS, "the new layer did not come")
-        return layer
-
-    def remove_grid(self, layer_id: str) -> None:
-        """Takes a layer away. Raises Refused."""
-        self._submit(c.DeleteLayer(layer=layer_id))
-
-    def set_grid(self, layer_id: str, **fields: Any) -> None:
-        """Moves, turns, weighs, hides or renames a layer: fields of ``contract.LayerFields``. Raises Refused."""
-        self._submit(c.SetLayer(layer=layer_id, fields=c.LayerFields.model_validate(fields)))
 
     def apply(self, op: Op) -> None:
         """Any op of the contract. Raises Refused when it does not apply here."""

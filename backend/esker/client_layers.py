@@ -1,4 +1,4 @@
-"""Elevation layers of a live terrain from Python: what ``LiveTerrain.add_grid`` and its like do over HTTP."""
+"""Elevation layers of a live terrain from Python: the half of ``LiveTerrain`` that goes over HTTP."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import http.client
 import io
 import ssl
 import tempfile
+import threading
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any, Final
@@ -15,12 +17,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from esker import contract as c
+from esker.document.sync import SyncDoc
 from esker.importing.upload import Uploads
 from esker.link import Link, Refused
 from esker.patchwork import rasters
 from esker.patchwork.rasters import Raster
 
 HTTP_SECONDS: Final = 120.0
+ARRIVES_SECONDS: Final = 15.0
+"""Time for the op of a finished import to come over the socket."""
 ARRAY_ANSWERS: Final[Mapping[str, str]] = {"rows": "south first", "nodata": "none"}
 """What holds of arrays: row 0 is in the south, and what is no data is NaN."""
 
@@ -59,6 +64,86 @@ class Grids:
         if raster.digest != digest:
             raise Refused("no_grid", "The server gave another elevation grid than was asked for.")
         return raster
+
+
+class LiveLayers(ABC):
+    """The methods of ``LiveTerrain`` for elevation layers."""
+
+    _address: str
+    _ca_file: Path | None
+    _client: str
+    _grids: Grids
+    _sync: SyncDoc
+    _changed: threading.Condition
+
+    @abstractmethod
+    def _submit(self, op: c.Op, gesture: str | None = None) -> None: ...
+
+    @abstractmethod
+    def _await(self, ready: Callable[[], bool], timeout: float, what: str) -> None: ...
+
+    @property
+    def layers(self) -> tuple[c.Layer, ...]:
+        """The elevation layers as seen from here, oldest first."""
+        with self._changed:
+            return tuple(self._sync.document.layers.values())
+
+    @property
+    def grids(self) -> dict[str, Raster]:
+        """The grids of the layers by ``Layer.content``, fetched once each. Raises Refused, OSError."""
+        return self._grids.of(self.layers)
+
+    def add_grid(
+        self,
+        grid: ArrayLike | str | Path,
+        anchor: tuple[float, float] | None = None,
+        rotation: float | None = None,
+        spacing: float | tuple[float, float] | None = None,
+        accuracy: float | None = None,
+        priority: int | None = None,
+        name: str | None = None,
+        *,
+        scale: float | None = None,
+        lift: float | None = None,
+        source: str | None = None,
+        licence: str | None = None,
+        answers: Mapping[str, str] | None = None,
+        told: Callable[[c.ImportStatus], None] = lambda _: None,
+    ) -> str:
+        """Lays an elevation grid on the terrain, for everybody; returns the layer's id. An undo step of ours.
+
+        As ``Terrain.add_grid``, done by the server: ``told`` hears how far it is. Raises Refused, ValueError for what
+        is no grid, OSError, TimeoutError.
+        """
+        fields = {
+            "anchor": None if anchor is None else (float(anchor[0]), float(anchor[1])),
+            "rotation_deg": None if rotation is None else float(rotation),
+            "spacing_m": None if spacing is None else steps(spacing),
+            "accuracy_m": None if accuracy is None else float(accuracy),
+            "name": name,
+            "scale": None if scale is None else float(scale),
+            "lift_m": None if lift is None else float(lift),
+            "source": source,
+            "licence": licence,
+        }
+        with Uploads(self._address, self._ca_file) as uploads:
+            layer = bring_in(uploads, grid, fields, answers or {}, told, self._client)
+        self._await(lambda: layer in self._sync.confirmed.layers, ARRIVES_SECONDS, "the new layer did not come")
+        if priority is not None:
+            self.set_grid(layer, priority=int(priority))
+        return layer
+
+    def remove_grid(self, layer_id: str) -> None:
+        """Takes a layer away. Raises Refused."""
+        self._submit(c.DeleteLayer(layer=layer_id))
+
+    def restore_grid(self, layer_id: str) -> None:
+        """Brings a deleted layer back. Raises Refused."""
+        self._submit(c.RestoreLayer(layer=layer_id))
+
+    def set_grid(self, layer_id: str, **fields: Any) -> None:
+        """Moves, turns, weighs, hides or renames a layer: fields of ``contract.LayerFields``. Raises Refused."""
+        self._submit(c.SetLayer(layer=layer_id, fields=c.LayerFields.model_validate(fields)))
 
 
 def bring_in(

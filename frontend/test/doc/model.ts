@@ -3,7 +3,7 @@
 import { apply, type Doc, Refusal } from "../../src/doc/apply.ts";
 import { fromDocument, toDocument } from "../../src/doc/document.ts";
 import { SyncDoc } from "../../src/doc/sync.ts";
-import type { Document, OpEnvelope, OrderedOp, ServerMessage, Stroke, Welcome } from "../../src/generated/contract.ts";
+import type { Document, Op, OpEnvelope, OrderedOp, ServerMessage, Stroke, Welcome } from "../../src/generated/contract.ts";
 
 /** Mulberry32: a small seeded generator of numbers in [0, 1). */
 export function random(seed: number): () => number {
@@ -91,6 +91,14 @@ export class ServerModel {
           link === from ? { type: "ack", ids: [id], clocks: [this.doc.clock] } : { type: "ordered", ops: [ordered] },
         );
     }
+  }
+
+  /** An op of the server's own, in the name of a client. */
+  perform(op: Op, id: string, author: string): void {
+    this.doc = apply(this.doc, op);
+    const ordered: OrderedOp = { clock: this.doc.clock, id, author, op };
+    this.journal.push(ordered);
+    for (const link of this.links) link.deliver({ type: "ordered", ops: [ordered] });
   }
 
   welcome(clock: number | null): Welcome {

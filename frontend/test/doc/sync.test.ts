@@ -2,6 +2,7 @@
 import { describe, expect, it } from "vitest";
 import { apply } from "../../src/doc/apply.ts";
 import { toDocument } from "../../src/doc/document.ts";
+import { fullLayer } from "../../src/doc/layers.ts";
 import { mergeOps } from "../../src/doc/merge.ts";
 import type { Op, Stroke } from "../../src/generated/contract.ts";
 import { Link, random, ridge, ServerModel } from "./model.ts";
@@ -155,6 +156,41 @@ describe("one client", () => {
     expect(a.sync.canRedo.value).toBe(true);
     expect(a.sync.redo().done).toBe(true);
     expect(a.sync.doc.value!.strokes.get("s")!.roughness).toBe(1);
+  });
+
+  it("takes what the server did in my name into my undo, also when I was away (SPEC D31)", () => {
+    const world = new World();
+    const a = world.client("a");
+    const b = world.client("b");
+    const grid = (id: string): Op => ({
+      type: "layer.add",
+      layer: fullLayer({
+        id,
+        content: "0".repeat(64),
+        facts: { rows: 9, cols: 9, low_m: 0, high_m: 9, valid: 1, geo: false, crs: "", format: "", file: "" },
+        anchor: [0, 0],
+        spacing_m: [1, 1],
+        accuracy_m: 1,
+      }),
+    });
+    a.cut();
+    world.server.perform(grid("v"), "import-1:0", "a");
+    world.run(50);
+    expect(a.sync.canUndo.value).toBe(false);
+    a.connect();
+    world.run(50);
+    expect([a.sync.canUndo.value, b.sync.canUndo.value]).toEqual([true, false]);
+    expect(a.sync.submit({ type: "layer.set", layer: "v", fields: { lift_m: 5 } })).toBeNull();
+    world.run(50);
+    expect(b.sync.doc.value!.layers.get("v")!.lift_m).toBe(5);
+    a.sync.undo();
+    expect(a.sync.undo()).toEqual({ done: true, skipped: [] });
+    world.run(50);
+    expect([...b.sync.doc.value!.layers.keys(), ...b.sync.doc.value!.deletedLayers.keys()]).toEqual(["v"]);
+    expect(b.sync.doc.value!.layers.size).toBe(0);
+    a.sync.redo();
+    world.run(50);
+    expect(b.sync.doc.value!.layers.has("v")).toBe(true);
   });
 
   it("one gesture is one undo step", () => {
