@@ -3,7 +3,15 @@
 import { apply, type Doc, Refusal } from "../../src/doc/apply.ts";
 import { fromDocument, toDocument } from "../../src/doc/document.ts";
 import { SyncDoc } from "../../src/doc/sync.ts";
-import type { Document, Op, OpEnvelope, OrderedOp, ServerMessage, Stroke, Welcome } from "../../src/generated/contract.ts";
+import type {
+  Document,
+  Op,
+  OpEnvelope,
+  OrderedOp,
+  ServerMessage,
+  Stroke,
+  Welcome,
+} from "../../src/generated/contract.ts";
 
 /** Mulberry32: a small seeded generator of numbers in [0, 1). */
 export function random(seed: number): () => number {
