@@ -42,6 +42,7 @@ def convert(
     laid = _laid(exam, answers)
     out_dir.mkdir(parents=True, exist_ok=True)
     _write_heights(exam, laid, out_dir / rasters.HEIGHTS, lambda share: progress("reading", 0.25 + 0.15 * share))
+    exam.source.close()
     heights = np.load(out_dir / rasters.HEIGHTS, mmap_mode="r")
     spans: dict[str, tuple[c.ImportStage, float, float]] = {
         "mipmaps": ("mipmaps", 0.4, 0.1),

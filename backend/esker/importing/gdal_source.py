@@ -55,6 +55,10 @@ class GdalSource(Source):
                     "cannot be read."
                 ) from error
 
+    def close(self) -> None:
+        """Gives back GDAL's cache of blocks."""
+        self.dataset.close()
+
     def _windows(self) -> Iterator[Any]:
         """Windows in an order that decodes no block twice: whole blocks, or bands of one that is large."""
         height, width = (min(*pair) for pair in zip(self._block(), (self.rows, self.cols), strict=True))

@@ -40,6 +40,8 @@ HARDENED: Final[Mapping[str, str]] = {
     **ALONE,
     "LANG": "C.UTF-8",
     "PYTHONUTF8": "1",
+    "MALLOC_MMAP_THRESHOLD_": "131072",  # else freed blocks of files stay with the process
+    "MALLOC_ARENA_MAX": "4",
     "OPENBLAS_NUM_THREADS": "1",
     "OMP_NUM_THREADS": "1",
     "GDAL_NUM_THREADS": "1",

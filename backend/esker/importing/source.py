@@ -14,8 +14,8 @@ from esker import contract as c
 from esker.importing.georef import Georef
 from esker.importing.refusal import ImportRefused
 
-PIECE_SAMPLES: Final = 1 << 21
-"""Samples that are looked at in one go: 16 MiB of float64."""
+PIECE_SAMPLES: Final = 1 << 20
+"""Samples that are looked at in one go: 8 MiB of float64."""
 MAX_BLOCK_BYTES: Final = 256 << 20
 """Largest block (tile, strip) of a file that is decoded: it must lie in memory whole."""
 
@@ -61,6 +61,9 @@ class Source(ABC):
     @abstractmethod
     def pieces(self) -> Iterator[Piece]:
         """All samples once, in pieces of about ``PIECE_SAMPLES``. Raises ImportRefused when the data are broken."""
+
+    def close(self) -> None:  # noqa: B027: most have nothing to give back
+        """Gives back what reading holds; no more pieces after it."""
 
 
 def check_shape(rows: int, cols: int) -> None:
