@@ -80,9 +80,11 @@ class _WebSocketProtocol(WebSocketsSansIOProtocol):
 class _Server(uvicorn.Server):
     """Says goodbye to the members of all rooms before the sockets are closed."""
 
-    def __init__(self, config: uvicorn.Config, hub: Hub, started: Callable[[], Awaitable[None]]) -> None:
+    def __init__(
+        self, config: uvicorn.Config, hub: Hub, imports: Imports, started: Callable[[], Awaitable[None]]
+    ) -> None:
         super().__init__(config)
-        self._hub, self._announce = hub, started
+        self._hub, self._imports, self._announce = hub, imports, started
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         await super().startup(sockets)
@@ -90,6 +92,7 @@ class _Server(uvicorn.Server):
             await self._announce()
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        await self._imports.close()
         await self._hub.close()
         await asyncio.sleep(GOODBYE_SECONDS)
         await super().shutdown(sockets)
@@ -168,7 +171,7 @@ class Assembly:
             if announce:
                 await _announce(self.hub, self.base, self.settings)
 
-        return _Server(_config(app, self.settings, self._context), self.hub, started)
+        return _Server(_config(app, self.settings, self._context), self.hub, self.imports, started)
 
     def run(self, server: _Server) -> None:
         """Serves until the server is told to stop."""

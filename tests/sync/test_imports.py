@@ -378,3 +378,17 @@ def test_a_real_file_is_real_ground_for_everybody(tmp_path: Path) -> None:
             _until(bob, lambda: not bob.layers)
             bob.ground.wait(30)
             assert not bob.ground.heights(2).any()
+
+
+def test_a_server_that_stops_leaves_no_half_import(tmp_path: Path, reader: Reader) -> None:
+    """SPEC P104: whoever waits is told, and the reader is stopped."""
+    with LiveServer(tmp_path) as server:
+        terrain, secret = server.create()
+        peer = server.join(terrain, secret)
+        _, job = _send(server, terrain, secret, "slow")
+        _wait(server, terrain, secret, job["id"], "errors")
+    stages = [m["status"]["stage"] for m in peer.seen if m["type"] == "importing"]
+    while not stages or stages[-1] != "cancelled":
+        stages.append(peer.wait("importing")["status"]["stage"])
+    assert reader.stopped == 1
+    assert list((tmp_path / "grids").iterdir()) == []
