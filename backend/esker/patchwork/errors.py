@@ -150,34 +150,66 @@ def _raise(line: Heights, stretched: Heights, worst: Heights) -> None:
 
 
 @kernel
-def displaced(warp: Floats, rows: int, cols: int, u: float, v: float) -> tuple[float, float]:
-    """Lattice place (u, v) with the control net's displacement; the net is empty for none."""
+def segment(
+    warp: Floats, rows: int, cols: int, m: Floats, row: int, col: int
+) -> tuple[int, float, float, float, float]:
+    """Where the samples of a row lie in a patch, from a column up to where the control net has its next one.
+
+    ``m``: (warped) lattice to patch. Returns that column, and u = a + b col, v = c + d col. The net is empty for none.
+    """
     if warp.shape[0] == 0:
-        return u, v
-    a = u * (warp.shape[1] - 1) / (cols - 1)
-    b = v * (warp.shape[0] - 1) / (rows - 1)
-    i = min(max(int(np.floor(a)), 0), warp.shape[1] - 2)
-    j = min(max(int(np.floor(b)), 0), warp.shape[0] - 2)
-    f, g = a - i, b - j
-    x0 = warp[j, i, 0] + (warp[j, i + 1, 0] - warp[j, i, 0]) * f
-    x1 = warp[j + 1, i, 0] + (warp[j + 1, i + 1, 0] - warp[j + 1, i, 0]) * f
-    y0 = warp[j, i, 1] + (warp[j, i + 1, 1] - warp[j, i, 1]) * f
-    y1 = warp[j + 1, i, 1] + (warp[j + 1, i + 1, 1] - warp[j + 1, i, 1]) * f
-    return u + x0 + (x1 - x0) * g, v + y0 + (y1 - y0) * g
+        return cols, m[0, 1] * row + m[0, 2], m[0, 0], m[1, 1] * row + m[1, 2], m[1, 0]
+    wide = (warp.shape[1] - 1) / (cols - 1)
+    b = row * ((warp.shape[0] - 1) / (rows - 1))
+    i = min(int(col * wide), warp.shape[1] - 2)
+    j = min(int(b), warp.shape[0] - 2)
+    g = b - j
+    x0 = warp[j, i, 0] + (warp[j + 1, i, 0] - warp[j, i, 0]) * g
+    x1 = warp[j, i + 1, 0] + (warp[j + 1, i + 1, 0] - warp[j, i + 1, 0]) * g
+    y0 = warp[j, i, 1] + (warp[j + 1, i, 1] - warp[j, i, 1]) * g
+    y1 = warp[j, i + 1, 1] + (warp[j + 1, i + 1, 1] - warp[j, i + 1, 1]) * g
+    # Displacement = x0 + (x1 - x0) (col wide - i): a line in col.
+    xs, ys = (x1 - x0) * wide, (y1 - y0) * wide
+    x, y = x0 - (x1 - x0) * i, row + y0 - (y1 - y0) * i
+    end = cols if i == warp.shape[1] - 2 else min(cols, max(col + 1, int(np.ceil((i + 1) / wide))))
+    return (
+        end,
+        m[0, 0] * x + m[0, 1] * y + m[0, 2],
+        m[0, 0] * (1.0 + xs) + m[0, 1] * ys,
+        m[1, 0] * x + m[1, 1] * y + m[1, 2],
+        m[1, 0] * (1.0 + xs) + m[1, 1] * ys,
+    )
 
 
 @kernel
-def interpolated(block: Heights, u: float, v: float) -> float:
-    """A patch at sample coordinates (u, v), bilinear; beyond its samples its border goes on."""
-    last = block.shape[0] - 1
-    u = min(max(u, 0.0), float(last))
-    v = min(max(v, 0.0), float(last))
-    i = min(int(u), last - 1)
-    j = min(int(v), last - 1)
-    f, g = u - i, v - j
-    low = block[j, i] + (np.float64(block[j, i + 1]) - block[j, i]) * f
-    high = block[j + 1, i] + (np.float64(block[j + 1, i + 1]) - block[j + 1, i]) * f
-    return float(low + (high - low) * g)
+def farthest(
+    line: Heights,
+    gain: float,
+    lift: float,
+    block: Floats,
+    ends: tuple[float, float],
+    at: tuple[float, float, float, float],
+    first: int,
+    last: int,
+) -> float:
+    """Greatest distance of samples first..last of a row from a patch, -1 if none of them lies in its domain.
+
+    ``block``: the patch's samples; sample c of the row is gain * line[c] + lift at (at[0] + at[1] c, at[2] + at[3] c).
+    """
+    worst = -1.0
+    end = block.shape[0] - 2
+    for col in range(first, last):
+        u, v = at[0] + at[1] * col, at[2] + at[3] * col
+        if u < 0.0 or v < 0.0 or u > ends[0] or v > ends[1]:
+            continue
+        i, j = min(int(u), end), min(int(v), end)
+        f, g = u - i, v - j
+        near = block[j, i] + (block[j, i + 1] - block[j, i]) * f
+        far = block[j + 1, i] + (block[j + 1, i + 1] - block[j + 1, i]) * f
+        distance = abs(gain * line[col] + lift - (near + (far - near) * g))
+        if distance > worst:  # never for nodata, which is NaN
+            worst = distance
+    return worst
 
 
 @kernel
@@ -201,24 +233,23 @@ def _patch_errors(
     # Half a sample and the margin around the kernel; one cell of the level more for what a bent lattice brings in.
     reach = 2 * step + (step if warp.shape[0] else 0)
     block = np.empty((size + 4, size + 4), np.float32)
+    exact = np.empty((size + 4, size + 4))
     for p in range(start, stop):
         cut(mip, j[p] * size - 2, i[p] * size - 2, block)
-        m, end = to_patch[p], extent[p]
+        for r in range(size + 4):
+            for c in range(size + 4):
+                exact[r, c] = block[r, c]
         top, left = j[p] * size * step, i[p] * size * step
+        right = min(cols, left + size * step + reach)
+        ends = (extent[p, 0], extent[p, 1])
         worst = 0.0
         for row in range(max(0, top - reach), min(rows, top + size * step + reach)):
-            for col in range(max(0, left - reach), min(cols, left + size * step + reach)):
-                height = heights[row, col]
-                if np.isnan(height):
-                    continue
-                x, y = displaced(warp, rows, cols, float(col), float(row))
-                u = m[0, 0] * x + m[0, 1] * y + m[0, 2]
-                v = m[1, 0] * x + m[1, 1] * y + m[1, 2]
-                if u < 0.0 or v < 0.0 or u > end[0] or v > end[1]:
-                    continue
-                distance = abs(height - interpolated(block, u, v))
-                if distance > worst:
-                    worst = distance
+            col = max(0, left - reach)
+            while col < right:
+                end, a, b, c0, d = segment(warp, rows, cols, to_patch[p], row, col)
+                last = min(end, right)
+                worst = max(worst, farthest(heights[row], 1.0, 0.0, exact, ends, (a, b, c0, d), col, last))
+                col = last
         out[p] = worst
 
 

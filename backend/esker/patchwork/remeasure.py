@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from esker.patchwork import patches
-from esker.patchwork.errors import NO_WARP, Heights, displaced
+from esker.patchwork.errors import NO_WARP, Heights, farthest, segment
 from esker.patchwork.jit import bands, kernel, spread
 from esker.patchwork.patches import Floats
 from esker.patchwork.samples import cut
@@ -74,22 +74,13 @@ def _distances(
             a, b = _narrowed(m[1, 0], m[1, 1] * row + m[1, 2], ev, sv, a, b)
             if a > b:
                 continue
-            line = heights[row]
-            for col in range(max(0, int(np.floor(a))), min(cols - 1, int(np.ceil(b))) + 1):
-                x, y = float(col), float(row)
-                if warp.shape[0]:
-                    x, y = displaced(warp, rows, cols, x, y)
-                u = m[0, 0] * x + m[0, 1] * y + m[0, 2]
-                v = m[1, 0] * x + m[1, 1] * y + m[1, 2]
-                if u < 0.0 or v < 0.0 or u > eu or v > ev:
-                    continue
-                i, j = min(int(u), side - 2), min(int(v), side - 2)
-                f, g = u - i, v - j
-                near = metres[j, i] + (metres[j, i + 1] - metres[j, i]) * f
-                far = metres[j + 1, i] + (metres[j + 1, i + 1] - metres[j + 1, i]) * f
-                distance = abs(gain[2] * line[col] + gain[3] - (near + (far - near) * g))
-                if distance > worst:  # never for nodata, which is NaN
-                    worst = distance
+            col, right = max(0, int(np.floor(a))), min(cols, int(np.ceil(b)) + 1)
+            while col < right:
+                end_col, x, dx, y, dy = segment(warp, rows, cols, m, row, col)
+                last = min(end_col, right)
+                found = farthest(heights[row], gain[2], gain[3], metres, (eu, ev), (x, dx, y, dy), col, last)
+                worst = max(worst, found)
+                col = last
         out[work] = worst
 
 
