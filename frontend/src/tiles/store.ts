@@ -87,9 +87,14 @@ export class TileStore implements TileView {
     for (const shown of this.shown.values()) yield shown.tile;
   }
 
-  /** Number of tiles held of the offsets, or of the base if that is more. */
+  /** Number of tiles held, those included that wait for their base. */
   get size(): number {
-    return Math.max(this.offsets.size, this.base.size);
+    return this.offsets.size;
+  }
+
+  /** Number of tiles of the base held. */
+  get baseSize(): number {
+    return this.base.size;
   }
 
   /** The ground at this moment, which no later frame changes. Cheap: tiles are immutable and shared. */

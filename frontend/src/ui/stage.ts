@@ -181,7 +181,8 @@ export class Stage {
     if (!isGround(frame.channel)) this.channels.apply(frame);
     else if (this.#fresh) this.#fresh.apply(frame);
     else this.tiles.apply(frame);
-    return this.tiles.size <= (4 ** (this.levels + 1) - 1) / 3 + 2 * MAX_REFINED_TILES;
+    const most = Math.max(this.tiles.size, this.tiles.baseSize);
+    return most <= (4 ** (this.levels + 1) - 1) / 3 + 2 * MAX_REFINED_TILES;
   }
 
   /** The server starts anew after a reconnect and sends every tile again: the old ground stays until the new is here. */
