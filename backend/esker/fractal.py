@@ -90,6 +90,8 @@ FINEST_CELL_M: Final = 0.01
 SNOW_LINE_M: Final = 5200.0
 """Height of the snow line at the equator; it falls by the square of the cosine of the latitude."""
 LEAST_SNOW_LINE_M: Final = 300.0
+SHORE_M: Final = 4096.0
+"""What shares of the shore's elevation are of on real ground: waves are as high everywhere."""
 
 
 class LookRule(NamedTuple):
@@ -117,3 +119,8 @@ def relief_m(size_m: float, lat_deg: float | None) -> float:
         return size_m
     line = SNOW_LINE_M * math.cos(math.radians(lat_deg)) ** 2
     return max(LEAST_SNOW_LINE_M, line) / LOOKS["natural"].snow_line
+
+
+def shore_m(size_m: float, lat_deg: float | None) -> float:
+    """What the elevation of wet shores is a share of, metres."""
+    return size_m if lat_deg is None else SHORE_M

@@ -8,7 +8,7 @@ float synth_step(float from, float to, float x) {
 
 // What the ground asks of the channels; d is unused.
 State synth_targets(const Launch *l, Ground g) {
-    float e = (g.height - (l->sea ? l->sea_level : 0.0f)) / l->relief;
+    float above_sea = g.height - (l->sea ? l->sea_level : 0.0f), e = above_sea / l->relief;
     float t2 = g.slope_x * g.slope_x + g.slope_y * g.slope_y;
     float t = sqrt(t2), v = g.concavity, north = -g.slope_y / sqrt(1.0f + t2);
     State s;
@@ -25,7 +25,7 @@ State synth_targets(const Launch *l, Ground g) {
     s.forest = l->plants * (SYNTH_FOREST + SYNTH_FOREST_VALLEY * v) * (1.0f - STEP(FOREST_SLOPE, t)) *
                (1.0f - synth_step(SYNTH_FOREST_THINS * tree, tree, e)) * bare;
     s.wet = SYNTH_WET_VALLEY * STEP(WET_CONCAVITY, v) * (1.0f - STEP(WET_SLOPE, t));
-    if (l->sea) s.wet = max(s.wet, 1.0f - STEP(WET_SHORE, e));
+    if (l->sea) s.wet = max(s.wet, 1.0f - STEP(WET_SHORE, above_sea / l->shore));
     s.foam = SYNTH_FOAM;
     return s;
 }

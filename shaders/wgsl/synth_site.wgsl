@@ -23,8 +23,8 @@ struct SynthSite {
   biased: u32,            // 1: paint asks for snow, plants or wetness somewhere
   surveyed: u32,          // 1: elevation data hold detail back somewhere
   relief: f32,            // elevations are shares of it, metres
+  shore: f32,             // those of wet shores of this
   pad0: u32,
-  pad1: u32,
   levels: array<SynthLevel, 18>,
 };
 

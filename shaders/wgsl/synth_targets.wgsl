@@ -15,7 +15,8 @@ fn rise(low: f32, high: f32, x: vec4f) -> vec4f {
 }
 
 fn targets(site: SynthSite, ground: Ground) -> Targets {
-  let e = (ground.height - site.sea) / site.relief;
+  let above_sea = ground.height - site.sea;
+  let e = above_sea / site.relief;
   let t2 = ground.slope_x * ground.slope_x + ground.slope_y * ground.slope_y;
   let t = sqrt(t2);
   let north = -ground.slope_y * inverseSqrt(1.0 + t2);
@@ -37,7 +38,7 @@ fn targets(site: SynthSite, ground: Ground) -> Targets {
     * (1.0 - rise(SYNTH_FOREST_SLOPE_FROM, SYNTH_FOREST_SLOPE_TO, t)) * (1.0 - rise(SYNTH_FOREST_THINS * tree, tree, e));
   let valley = SYNTH_WET_VALLEY * rise(SYNTH_WET_CONCAVITY_FROM, SYNTH_WET_CONCAVITY_TO, v)
     * (1.0 - rise(SYNTH_WET_SLOPE_FROM, SYNTH_WET_SLOPE_TO, t));
-  out.wet = max(valley, site.has_sea * (1.0 - rise(SYNTH_WET_SHORE_FROM, SYNTH_WET_SHORE_TO, e)));
+  out.wet = max(valley, site.has_sea * (1.0 - rise(SYNTH_WET_SHORE_FROM, SYNTH_WET_SHORE_TO, above_sea / site.shore)));
   out.foam = vec4f(SYNTH_FOAM);
   return out;
 }

@@ -59,7 +59,7 @@ def site_words(site: Site, bits: int, varied: bool, biased: bool) -> NDArray[np.
     words = [
         np.array(head, np.float32).view(np.uint32),
         np.array([site.solved, site.cyclic, bits, varied, biased, site.surveyed], np.uint32),
-        np.array([site.relief_m, 0, 0], np.float32).view(np.uint32),
+        np.array([site.relief_m, site.shore_m, 0], np.float32).view(np.uint32),
     ]
     for level in range(MAX_SYNTHESIS_LEVEL + 1):
         starts = [site.seed + fractal.HASH_STEP * (fractal.HASH_STREAMS * level + stream) for stream in range(4)]

@@ -11,7 +11,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from esker import contract, grid
 from esker.contract import BASE_ROUGHNESS, BASE_SURVEY, TILE_CELLS
-from esker.fractal import ALPHA, LOOKS, LookRule, relief_m
+from esker.fractal import ALPHA, LOOKS, LookRule, relief_m, shore_m
 from esker.synthesis.interpolate import Window
 from esker.synthesis.state import Array, State
 
@@ -112,6 +112,11 @@ class Site:
     def relief_m(self) -> float:
         """What elevations are shares of, metres."""
         return relief_m(self.size_m, self.lat_deg)
+
+    @property
+    def shore_m(self) -> float:
+        """What the elevation of wet shores is a share of, metres."""
+        return shore_m(self.size_m, self.lat_deg)
 
     @property
     def surveyed(self) -> bool:

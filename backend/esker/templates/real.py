@@ -136,7 +136,7 @@ def terrains() -> tuple[Real, ...]:
     """Both. No strokes: the ground is the picture, and what people draw is theirs."""
     sound = TerrainSettings(
         title="Rainier and the Sound", size_m=65536.0, place=Place(lat_deg=47.0560, lon_deg=-122.0720),
-        reach_m=600.0, sea_level_m=0.6, sun_azimuth_deg=75.0, sun_elevation_deg=18.0,
+        reach_m=600.0, sea_level_m=3.0, sun_azimuth_deg=75.0, sun_elevation_deg=18.0,
     )  # fmt: skip
     helens = TerrainSettings(
         title="Mount St Helens", size_m=2944.0, place=Place(lat_deg=46.2017, lon_deg=-122.18734),
@@ -144,10 +144,10 @@ def terrains() -> tuple[Real, ...]:
     )  # fmt: skip
     return (
         Real("rainier", "Rainier and the Sound",
-             "Real ground: Puget Sound at 160 m and Mount Rainier at 90 m, turned against each other, blended live.",
+             "Real ground: Puget Sound and Mount Rainier, two surveys of their own grain and angle, blended live.",
              sound, RAINIER),
         Real("helens", "Mount St Helens",
-             "A crater in three surveys: 2000 at 10 m, and two of October 2004 at 2 m. Hide one and watch the dome.",
+             "A crater in three surveys: 2000 and twice in October 2004. Hide a layer and watch the new dome go.",
              helens, HELENS),
     )  # fmt: skip
 

@@ -288,6 +288,8 @@ export const SYNTH_SNOW_LINE_M = 5200.0;
 
 export const SYNTH_LEAST_SNOW_LINE_M = 300.0;
 
+export const SYNTH_SHORE_M = 4096.0;
+
 export const SYNTH_LOOKS = {
   natural: {
   snowLine: 0.15,

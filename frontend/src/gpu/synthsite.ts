@@ -56,7 +56,7 @@ export function siteWords(s: SynthesisSettings, channels: ChannelFacts): Uint32A
   floats.set([site.snowLine, site.treeLine, site.plants], 4);
   const { bits, varied, biased, surveyed } = channels;
   words.set([s.solved, s.cyclic === true ? 1 : 0, bits, varied ? 1 : 0, biased ? 1 : 0, surveyed ? 1 : 0], 7);
-  floats[13] = site.reliefM;
+  floats.set([site.reliefM, site.shoreM], 13);
   for (let level = 0; level < LEVELS; level += 1) {
     const at = HEAD_WORDS + LEVEL_WORDS * level;
     for (let stream = 0; stream < 4; stream += 1) words[at + stream] = streamStart(s.seed, level, stream);

@@ -33,7 +33,8 @@ def targets(site: Site, ground: Ground) -> Targets:
     """Paper 1, section 4: smoother in valleys and low down, rougher where steep; plants and snow by height, slope."""
     look = site.look_rule
     sea = site.sea_level_m
-    e = (ground.height - (0.0 if sea is None else sea)) / site.relief_m
+    above_sea = ground.height - (0.0 if sea is None else sea)
+    e = above_sea / site.relief_m
     t2 = ground.slope_x * ground.slope_x + ground.slope_y * ground.slope_y
     t, v = np.sqrt(t2), ground.concavity
     north = -ground.slope_y / np.sqrt(1 + t2)
@@ -63,7 +64,7 @@ def targets(site: Site, ground: Ground) -> Targets:
     )
     wet = f.WET_VALLEY * smoothstep(f.WET_CONCAVITY, v) * (1 - smoothstep(f.WET_SLOPE, t))
     if sea is not None:
-        wet = np.maximum(wet, 1 - smoothstep(f.WET_SHORE, e))
+        wet = np.maximum(wet, 1 - smoothstep(f.WET_SHORE, above_sea / site.shore_m))
     return Targets(h, snow, wet, grass, forest, np.full_like(e, f.FOAM))
 
 

@@ -10,6 +10,7 @@ import {
   SYNTH_ALPHA,
   SYNTH_LEAST_SNOW_LINE_M,
   SYNTH_LOOKS,
+  SYNTH_SHORE_M,
   SYNTH_SNOW_LINE_M,
   TILE_CELLS,
 } from "../../generated/contract.ts";
@@ -19,6 +20,8 @@ export interface Site {
   readonly sizeM: number;
   /** What elevations are shares of, metres. */
   readonly reliefM: number;
+  /** What the elevation of wet shores is a share of, metres. */
+  readonly shoreM: number;
   readonly seed: number;
   /** Amplitude of the coarsest octave on steep ground, metres. */
   readonly amplitudeM: number;
@@ -47,6 +50,7 @@ export function siteOf(settings: RuleSettings): Site {
   return {
     sizeM: settings.size_m,
     reliefM: reliefM(settings.size_m, settings.place),
+    shoreM: settings.place == null ? settings.size_m : SYNTH_SHORE_M,
     seed: settings.seed,
     amplitudeM: (settings.detail * SYNTH_ALPHA * settings.size_m) / TILE_CELLS,
     seaLevelM: settings.sea_level_m,

@@ -59,7 +59,8 @@ const found: Targets = { h: 0, snow: 0, wet: 0, grass: 0, forest: 0, foam: SYNTH
 
 /** The targets of a sample; with `relief` only h* and snow* are made. The same object every time: read it at once. */
 export function targets(site: Site, at: Sample, relief: boolean): Readonly<Targets> {
-  const e = (at.height - (site.seaLevelM ?? 0)) / site.reliefM;
+  const aboveSea = at.height - (site.seaLevelM ?? 0);
+  const e = aboveSea / site.reliefM;
   const t2 = at.slopeX * at.slopeX + at.slopeY * at.slopeY;
   const t = Math.sqrt(t2);
   const v = at.concavity;
@@ -75,11 +76,11 @@ export function targets(site: Site, at: Sample, relief: boolean): Readonly<Targe
   found.snow =
     smoothstep(SYNTH_SNOW_EDGE_FROM, SYNTH_SNOW_EDGE_TO, e - line) *
     (1 - smoothstep(SYNTH_SNOW_SLOPE_FROM, SYNTH_SNOW_SLOPE_TO, t));
-  if (!relief) plantsAndWater(site, e, t, v);
+  if (!relief) plantsAndWater(site, e, aboveSea / site.shoreM, t, v);
   return found;
 }
 
-function plantsAndWater(site: Site, e: number, t: number, v: number): void {
+function plantsAndWater(site: Site, e: number, shoreE: number, t: number, v: number): void {
   const tree = site.treeLine;
   const bare = 1 - found.snow;
   found.grass =
@@ -97,7 +98,7 @@ function plantsAndWater(site: Site, e: number, t: number, v: number): void {
     SYNTH_WET_VALLEY *
     smoothstep(SYNTH_WET_CONCAVITY_FROM, SYNTH_WET_CONCAVITY_TO, v) *
     (1 - smoothstep(SYNTH_WET_SLOPE_FROM, SYNTH_WET_SLOPE_TO, t));
-  const shore = site.seaLevelM === null ? 0 : 1 - smoothstep(SYNTH_WET_SHORE_FROM, SYNTH_WET_SHORE_TO, e);
+  const shore = site.seaLevelM === null ? 0 : 1 - smoothstep(SYNTH_WET_SHORE_FROM, SYNTH_WET_SHORE_TO, shoreE);
   found.wet = Math.max(valley, shore);
 }
 
