@@ -14,7 +14,7 @@ from esker import grid
 from esker.bench import _exact
 from esker.contract import Channel, Stroke, TerrainSettings
 from esker.grid import TileKey
-from esker.solve import reference, reference_raster
+from esker.solve import constraints, reference, reference_raster
 from esker.solve.assembly import assemble
 from esker.solve.channels import ChannelSolver, channel_level
 from esker.solve.constraints import Packer, WindowPacker, pack
@@ -22,9 +22,11 @@ from esker.solve.detail import detailed, settle
 from esker.solve.device import Device, open_device
 from esker.solve.gpu_levels import GpuWorkspace
 from esker.solve.levels import ClWorkspace
+from esker.solve.packing import Packed, Shape, pack_one
 from esker.solve.refine import FieldCache, Refiner
 from esker.solve.refine_engine import NumpyEngine
 from esker.solve.solver import Basis, Solver
+from esker.solve.tables import BinBox
 from esker.synthesis.interpolate import Window
 from esker.terrain import Stroke as Make
 from tests.solver.bases import Analytic, hills, mirrored, mound, plane, rough
@@ -228,7 +230,7 @@ def test_a_changed_base_rasterises_where_it_changed(device: Device) -> None:
     packer = Packer(3)
     packer.pack(FIVE, SETTINGS, HILLS)
     assert packer.pack(FIVE, SETTINGS, HILLS)[1] is None
-    within = Analytic(other.name, other.formula, HILLS.low, HILLS.high, where=other.where)
+    within = Analytic(other.name, other.formula, HILLS.low, HILLS.high)
     window = packer.pack(FIVE, SETTINGS, within)[1]
     assert window is not None
     assert 0 < (window.spans[:, 1] - window.spans[:, 0]).sum() <= 7 * 7
@@ -380,3 +382,42 @@ def test_a_base_is_asked_on_one_device(solver: Solver) -> None:
         assert len(asked) > 8
         own = None if one.device is None else one.device.context
         assert {None if device is None else device.context for device in asked} == {own}
+
+
+def test_dragging_a_layer_packs_what_it_touches(monkeypatch: pytest.MonkeyPatch) -> None:
+    """SPEC S93: strokes away from where the base changed are as they were, and a solver keeps its workspace."""
+    packed: list[str] = []
+
+    def counted(shape: Shape, s: float, box: BinBox) -> Packed | None:
+        packed.append(shape.crest.stroke.id)
+        return pack_one(shape, s, box)
+
+    monkeypatch.setattr(constraints, "pack_one", counted)
+    strokes = [
+        Make.profile([(x, 500 + x / 3, 500), (x + 300, 900 + x / 3, 500)], left=flank(), right=flank(), id=f"s{x}")
+        for x in (400, 1600, 2800)
+    ]
+    packer = Packer(3)
+    packer.pack(strokes, SETTINGS, HILLS)
+    for name, at, expected in (("far", (500, 3500), set()), ("near", (1750, 1250), {"s1600"})):
+        packed.clear()
+        there = mound(*at, 150, 20.0, HILLS)
+        within = Analytic(name, there.formula, HILLS.low, HILLS.high)
+        packer.pack(strokes, SETTINGS, within)
+        assert set(packed) == expected
+        packer.pack(strokes, SETTINGS, HILLS)
+    packed.clear()
+    peak = mound(500, 3500, 60, 200.0, HILLS)
+    high = Analytic("higher", peak.formula, HILLS.low, peak.high)
+    packer.pack(strokes, SETTINGS, high)
+    assert set(packed) == {"s400", "s1600", "s2800"}, "they may reach farther"
+
+
+def test_one_workspace_follows_a_layer(solver: Solver) -> None:
+    """SPEC S93: each place of a dragged layer is a new base; the next one begins with the raster of the last."""
+    one = Solver()
+    for k in range(3):
+        base = mound(1000 + 100 * k, 2800, 300, 10.0, HILLS)
+        found = one.solve(FIVE, SETTINGS, 2, base=base)[2]
+        assert len(one._spare) == 1
+        assert np.array_equal(found, solver.solve(FIVE[::-1], SETTINGS, 2, base=base)[2])

@@ -7,6 +7,7 @@ is higher the stroke cuts.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any, Final, Protocol
 
@@ -19,6 +20,8 @@ Floats = NDArray[np.float64]
 
 SIDES_LEVEL: Final = 4
 """Level of the base by which it is told whether a stroke fills or cuts: one for all, so that all levels agree."""
+BOUNDS_M: Final = 64.0
+"""Bounds of a base are taken at multiples of this: strokes are packed anew when they change."""
 SLIGHT_M: Final = 1 / 16
 """Heights above the base below this many cells of SIDES_LEVEL say nothing of filling or cutting."""
 SIDES_FROM: Final = 0.05
@@ -116,11 +119,17 @@ SHEET: Final = Ground()
 """The blank sheet: a plane at 0."""
 
 
+def bounds_of(base: Base) -> tuple[float, float]:
+    """Bounds of a base, metres, that hardly ever change while a layer is dragged."""
+    return math.floor(base.low / BOUNDS_M) * BOUNDS_M, math.ceil(base.high / BOUNDS_M) * BOUNDS_M
+
+
 def ground_under(base: Base | None, points: Floats, plateau_m: float, closed: bool, size_m: float) -> Ground:
     """What a stroke with this crest, (n, 3) metres, is to a base; ``SHEET`` without one."""
     if base is None:
         return SHEET
-    datum, half = 0.5 * (base.high + base.low), 0.5 * (base.high - base.low)
+    low, high = bounds_of(base)
+    datum, half = 0.5 * (high + low), 0.5 * (high - low)
     fill, cut = _sides(base, points, plateau_m, closed, size_m)
     return Ground(datum, half, fill, cut)
 

@@ -6,14 +6,15 @@ Strokes are ordered by id, so no result depends on the order of edits.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from esker import grid
 from esker.contract import DEFAULT_REACH_FRACTION, MAX_REFINED_LEVEL, Stroke, TerrainSettings
+from esker.document.strokes import world_points
 from esker.solve import dirty
-from esker.solve.base import Base, Ground
+from esker.solve.base import SIDES_LEVEL, Base, Ground, bounds_of
 from esker.solve.packing import Packed, Shape, join, pack_one, reach_m, shape_for, window_of
 from esker.solve.sayings import Layer
 from esker.solve.tables import BIN, BinBox, Floats, Tables, Window, bins, defines, everything, union, whole
@@ -53,9 +54,9 @@ class Packer:
         self._base: Base | None = None
         self._packed: dict[str, tuple[Stroke, Packed | None]] = {}
 
-    def likeness(self, strokes: Sequence[Stroke], settings: TerrainSettings, base: Base | None = None) -> int:
+    def likeness(self, strokes: Sequence[Stroke], settings: TerrainSettings) -> int:
         """How many strokes of this set were in the last one; -1 when nothing of it can be kept."""
-        if self._settings != _settings_key(settings) or not _same(self._base, base):
+        if self._settings != _settings_key(settings):
             return -1
         return sum(1 for s in strokes if s.id in self._packed and self._packed[s.id][0] is s)
 
@@ -65,20 +66,20 @@ class Packer:
         """The bins whose constraints may differ from the last set's (None: no bin does), and what reaches them."""
         s, box = grid.spacing(self.level, settings.size_m), whole(self.level)
         fresh = self._settings != _settings_key(settings) or (self._base is None) != (base is None)
-        same = not fresh and _same(self._base, base)
+        moved = None if fresh else _moved(self._base, base)
+        stale = _all if fresh else _stale(self._base, base, moved, 2 * grid.spacing(SIDES_LEVEL, settings.size_m))
         old = {} if fresh else self._packed
         new: dict[str, tuple[Stroke, Packed | None]] = {}
         for stroke in sorted(strokes, key=lambda k: k.id):
             known = old.get(stroke.id)
-            if same and known is not None and (known[0] is stroke or known[0] == stroke):
+            if known is not None and (known[0] is stroke or known[0] == stroke) and not stale(stroke):
                 new[stroke.id] = (stroke, known[1])
                 continue
             shape = shape_for(self.layer, stroke, settings, base)
             new[stroke.id] = (stroke, None if shape is None else pack_one(shape, s, box))
         window = everything(box) if fresh else _changed(old, new, box)
-        if not fresh and not same:
-            assert base is not None
-            window = union([w for w in (window, _moved(base.changed(self._base), s, box)) if w is not None])
+        if moved is not None:
+            window = union([w for w in (window, _bins_of(moved, s, box)) if w is not None])
         self._settings, self._packed, self._base = _settings_key(settings), new, base
         tables = _tables(self.level, settings, [p for _, p in new.values() if p is not None and _meet(p, window)], box)
         return tables, window
@@ -104,10 +105,40 @@ def _meet(packed: Packed, window: Window | None) -> bool:
     return r0 < s1 and s0 < r1 and c0 < d1 and d0 < c1
 
 
-def _moved(rect: grid.Rect | None, s: float, box: BinBox) -> Window | None:
-    """The bins of which the base changed at some sample."""
-    if rect is None:
-        return None
+def _moved(old: Base | None, new: Base | None) -> grid.Rect | None:
+    """Where two bases differ; None: nowhere, or there is none."""
+    return None if old is None or new is None or _same(old, new) else new.changed(old)
+
+
+def _stale(old: Base | None, new: Base | None, moved: grid.Rect | None, margin: float) -> Callable[[Stroke], bool]:
+    """Whether what was packed of a stroke over one base may be wrong over another that differs in a rectangle."""
+    if old is None or new is None or moved is None:
+        return _none
+    if bounds_of(old) != bounds_of(new):
+        return _all
+
+    def near(stroke: Stroke) -> bool:
+        plan = world_points(stroke)[:, :2]
+        if len(plan) == 0:
+            return False
+        (x0, y0), (x1, y1) = plan.min(axis=0), plan.max(axis=0)
+        return grid.Rect(x0, y0, x1, y1).grown(stroke.plateau_radius_m + margin).intersects(moved)
+
+    return near
+
+
+def _all(_: Stroke) -> bool:
+    """Nothing that was packed serves."""
+    return True
+
+
+def _none(_: Stroke) -> bool:
+    """All that was packed serves."""
+    return False
+
+
+def _bins_of(rect: grid.Rect, s: float, box: BinBox) -> Window | None:
+    """The bins of a rectangle."""
     low, high = (np.array([[v / s] for v in corner]) for corner in ((rect.x0, rect.y0), (rect.x1, rect.y1)))
     return window_of(low, high, box)
 

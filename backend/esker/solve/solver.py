@@ -281,8 +281,9 @@ class Solver:
         """An idle workspace that has most of these strokes rasterised already; or a new one; or the longest idle."""
         based = job.base is not None
         idle = [w for w in self._spare if w.top == top and w.based == based]
-        best = max(idle, key=lambda w: w.packer.likeness(*job), default=None)
-        if best is not None and 2 * best.packer.likeness(*job) < len(job.strokes):
+        strokes, settings = job.strokes, job.settings
+        best = max(idle, key=lambda w: w.packer.likeness(strokes, settings), default=None)
+        if best is not None and 2 * best.packer.likeness(strokes, settings) < len(strokes):
             best = idle[0] if self._kept() + grid.solve_bytes(top) > self._spare_bytes else None
         if best is not None:
             self._spare.remove(best)
