@@ -62,8 +62,9 @@ class Source(ABC):
     def pieces(self) -> Iterator[Piece]:
         """All samples once, in pieces of about ``PIECE_SAMPLES``. Raises ImportRefused when the data are broken."""
 
-    def close(self) -> None:  # noqa: B027: most have nothing to give back
-        """Gives back what reading holds; no more pieces after it."""
+    def close(self) -> None:
+        """Gives back what reading holds (most hold nothing); no more pieces after it."""
+        return
 
 
 def check_shape(rows: int, cols: int) -> None:
