@@ -152,6 +152,7 @@ class Index:
     def _columns(self) -> None:
         low, top = self.model.low, self.model.max_z
         self._low, self._low_top = low[self._by_low], top[self._by_low]
+        self._least_top = np.minimum.accumulate(self._low_top)
         self._top, self._top_low = -top[self._by_top], low[self._by_top]
 
     def _places(self) -> None:
@@ -192,6 +193,8 @@ class Index:
             return out[: pyramid_index.uniform(self.tree, self.boxes, e, *rect, out)].copy()
         accurate = int(np.searchsorted(self._low, e, side="right"))
         needed = int(np.searchsorted(self._top, -e, side="left"))
+        if accurate == 0 or self._least_top[accurate - 1] > e:  # all that are accurate enough are needed, too
+            return self._by_low[:accurate].copy()
         if accurate <= needed:
             return _above(self._by_low[:accurate], self._low_top, e)
         return _below(self._by_top[:needed], self._top_low, e)
