@@ -30,6 +30,8 @@ DROP = """([name, text]) => {
 }"""
 TOLERANCE = quantum(DEFAULT_LEVEL, DEFAULT_SIZE_M)
 SURVEY_M = 10.0
+"""Spacing of the first survey."""
+CRATER = (1990.0, 1900.0)
 
 
 def drop(visitor: Visitor, name: str) -> None:
@@ -136,11 +138,13 @@ def test_real_ground_is_dropped_sketched_on_and_refined_by_a_turned_grid(
     drop(ada, "dome.npy")
     wait(ada, "() => window.esker.laying() !== null")
     assert layers(ben) == [valley]
-    drag(ada, handle(ada, "grid-move"), on_screen(ada, 2200, 2000))
-    drag(ada, handle(ada, "grid-2"), handle(ada, "grid-move"))
+    (x0, y0), (x1, y1) = handle(ada, "grid-0"), handle(ada, "grid-2")
+    drag(ada, (x1, y1), (x0 + 0.3 * (x1 - x0), y0 + 0.3 * (y1 - y0)))
+    drag(ada, handle(ada, "grid-move"), on_screen(ada, *CRATER))
     drag(ada, handle(ada, "grid-turn"), on_screen(ada, *knob(ada, 27.0)))
     laid = ada.js("() => window.esker.laying()")
     assert 10 < laid["rotation_deg"] < 45
+    assert laid["spacing_m"][0] < SURVEY_M
     ada.page.wait_for_timeout(600)
     ada.shot("elevation-4-laid-by-hand")
     ada.page.keyboard.press("Enter")

@@ -7,7 +7,7 @@ import { shared } from "./styles/shared.ts";
 
 /** While a grid is in hand: what to do with it, and the buttons for those without a keyboard. Fires `numbers`. */
 export class EskLayingBar extends SignalElement {
-  static override properties = { stage: { attribute: false } };
+  static override properties = { stage: { attribute: false }, beside: { type: Boolean, reflect: true } };
   static override styles = [
     shared,
     css`
@@ -44,6 +44,19 @@ export class EskLayingBar extends SignalElement {
         display: flex;
         gap: 6px;
       }
+      /* The panel at the right has the buttons too. */
+      @media (min-width: 721px) {
+        :host([beside]) {
+          left: calc((100% - 324px) / 2);
+          max-width: calc(100% - 324px - 160px);
+        }
+        :host([beside]) .row {
+          display: none;
+        }
+        :host([beside]) .panel {
+          padding: 11px 18px 11px 14px;
+        }
+      }
       @media (max-width: 720px) {
         :host {
           bottom: calc(118px + env(safe-area-inset-bottom));
@@ -78,6 +91,8 @@ export class EskLayingBar extends SignalElement {
   ];
 
   declare stage: Stage;
+  /** The panel with the grid's numbers is open. */
+  declare beside: boolean;
 
   protected override render(): TemplateResult | typeof nothing {
     const laying = this.stage.input.laying.value;

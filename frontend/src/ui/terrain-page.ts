@@ -208,6 +208,7 @@ export class EskTerrain extends SignalElement {
       ${this.#importing(stage)}
       <esk-laying-bar
         .stage=${stage}
+        ?beside=${this.#panel.value === "ground"}
         @numbers=${() => {
           this.#panel.value = "ground";
         }}
