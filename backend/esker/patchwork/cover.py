@@ -296,23 +296,26 @@ def nested(of: Sheet, min_z: Floats) -> tuple[Floats, NDArray[np.bool_]]:
     patch is a floor if within some descendant's kernel no descendant is more accurate.
     """
     rows, cols = of.placed.raster.heights.shape
-    errors = [np.full(patches.table_shape(rows, cols, scale), np.inf) for scale in range(len(of.tables))]
-    for scale, table in enumerate(of.tables):
-        there = table >= 0
+    small = of.count > 0 and of.scale[0] < patches.SMALL_SCALES
+    scales = range(0 if small else patches.SMALL_SCALES, len(of.tables))
+    errors = {scale: np.full(patches.table_shape(rows, cols, scale), np.inf) for scale in scales}
+    for scale in scales:
+        there = of.tables[scale] >= 0
         if there.any():
-            errors[scale][there] = min_z[table[there]]
+            errors[scale][there] = min_z[of.tables[scale][there]]
     top = np.empty(of.count)
     floor = np.empty(of.count, bool)
-    above = np.full(errors[-1].shape, np.inf)
-    for scale in range(len(errors) - 1, -1, -1):
+    above = np.full(errors[scales[-1]].shape, np.inf)
+    for scale in reversed(scales):
         a, b = of.scale_range(scale)
         if b > a:
             top[a:b] = above[of.tables[scale] >= 0]
-        if scale:
+        if scale > scales[0]:
             shape = errors[scale - 1].shape
             above = np.minimum(above, errors[scale]).repeat(2, 0).repeat(2, 1)[: shape[0], : shape[1]]
     below: Floats | None = None
-    for scale, error in enumerate(errors):
+    for scale in scales:
+        error = errors[scale]
         worst = np.full(error.shape, np.inf) if below is None else _worst_of_four(below)
         a, b = of.scale_range(scale)
         if b > a:
@@ -326,4 +329,5 @@ def _worst_of_four(children: Floats) -> Floats:
     rows, cols = children.shape
     padded = np.full((-(-rows // 2) * 2, -(-cols // 2) * 2), -np.inf)
     padded[:rows, :cols] = children
-    return np.asarray(padded.reshape(padded.shape[0] // 2, 2, -1, 2).max(axis=(1, 3)), np.float64)
+    pairs = np.maximum(padded[::2], padded[1::2])
+    return np.maximum(pairs[:, ::2], pairs[:, 1::2])
