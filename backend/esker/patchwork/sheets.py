@@ -118,8 +118,8 @@ def sheet(placed: Placed) -> Sheet:
         index[there] = np.arange(first, first + len(j))
         tables.append(index)
         first += len(j)
-        if not len(j):
-            continue
+        if not len(j) and (parts or scale < len(raster.errors.tables) - 1):
+            continue  # the last one stands for a grid without any patch, so full of holes is it
         laid = patches.lay(rows, cols, raster.warp, scale, j, i)
         to_patch = composed(laid.to_patch, to_lattice)
         from_patch = inverse(to_patch)
