@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import json
+import mmap
 import os
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -179,17 +180,24 @@ def _finish(
 ) -> Raster:
     say = progress or (lambda _stage, _share: None)
     low, high, valid = _bounds(heights)
+    _let_go(heights)
     shapes = mipmaps.shapes(*heights.shape)
 
     def made(level: int, shape: tuple[int, int]) -> Heights:
         say("mipmaps", (level - 1) / max(1, len(shapes) - 1))
+        _let_go(heights)
         if directory is None:
             return np.empty(shape, np.float32)
         return np.lib.format.open_memmap(directory / _mip_name(level), "w+", np.float32, shape)
 
     mips = tuple(_read_only(mip) for mip in mipmaps.mipmaps(heights, made))
     say("mipmaps", 1.0)
-    measured = errors.measure(mips, warp, lambda share: say("errors", share))
+
+    def measuring(share: float) -> None:
+        say("errors", share)
+        _let_go(heights)
+
+    measured = errors.measure(mips, warp, measuring)
     return Raster(heights, mips, warp, measured, digest(heights, warp), low, high, valid)
 
 
@@ -241,6 +249,16 @@ def _own_heights(heights: Heights, path: Path) -> None:
             block[bad] = np.nan
             target[rows] = block
     target.flush()  # type: ignore[attr-defined]
+    _let_go(heights)
+
+
+def _let_go(array: Heights) -> None:
+    """Take the pages of a mapped file out of this process's memory: they stay in the system's cache, or on disk."""
+    holder: Any = array
+    while holder is not None and not isinstance(holder, mmap.mmap):
+        holder = getattr(holder, "_mmap", None) or getattr(holder, "base", None)
+    if holder is not None and hasattr(mmap, "MADV_DONTNEED"):
+        holder.madvise(mmap.MADV_DONTNEED)
 
 
 def _net(warp: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
