@@ -39,6 +39,10 @@ UPLOADED: Final = 0.2
 EXAMINED: Final = 0.3
 CONVERTED: Final = 0.97
 """Shares of the work that are done after each part."""
+ROUNDS: Final = 12
+"""How often an import asks at most: answers may be wrong, or raise other questions."""
+STOP: Final = "stop"
+"""The answer that ends an import (``importing.questions``)."""
 OVER: Final = frozenset({"done", "refused", "cancelled"})
 
 
@@ -172,7 +176,7 @@ class Imports:
         job = self._begin(name, person, "", client)
         await self._receive(job, body, length)
         try:
-            report = await self._inspect(job, None, None)
+            report = job.report = await self._inspect(job, None, None)
             if report.verdict == "refused":
                 raise Cannot(400, "refused", report.refusal)
             place, size_m = self._importer.suggest_place(report), self._importer.suggest_size(report)
@@ -206,7 +210,7 @@ class Imports:
                 raise Cannot(400, "malformed", f"The import did not ask for “{key}”.")
             if len(value) > 240:
                 raise Cannot(400, "malformed", f"The answer to “{key}” is too long.")
-        job.answers = answers
+        job.answers = answers.model_copy(update={"answers": {**job.answers.answers, **answers.answers}})
         self._at(job, "reading", EXAMINED)
         job.answered.set()
         return job.status()
@@ -299,27 +303,50 @@ class Imports:
 
     async def _import(self, job: Job) -> None:
         settings = (await self._hub.document(job.terrain)).settings
-        report = await self._inspect(job, settings.place, settings.size_m)
+        report = job.report = await self._inspect(job, settings.place, settings.size_m)
         if report.verdict == "refused":
             raise ImportRefused(report.refusal)
         if report.verdict == "ask" or job.hold:
-            await self._ask(job)
+            await self._settle_questions(job, settings)
         layer = await self._convert(job, settings)
         self._at(job, "saving", CONVERTED)
         # From here on it is not left half done: what is stored without an op is swept at the next start.
         await asyncio.shield(asyncio.ensure_future(self._lay(job, layer)))
 
-    async def _inspect(self, job: Job, place: c.Place | None, size_m: float | None) -> c.ImportReport:
+    async def _settle_questions(self, job: Job, settings: c.TerrainSettings) -> None:
+        """Asks until the answers make a grid of the file. A wrong answer is told and asked for again."""
+        asked: set[str] = set()
+        text = ""
+        for _ in range(ROUNDS):
+            asked |= {question.id for question in (job.report.questions if job.report is not None else ())}
+            await self._ask(job, text)
+            if not job.answers.answers:
+                return
+            found = await self._inspect(job, settings.place, settings.size_m, job.answers)
+            if found.verdict == "refused":
+                if STOP in job.answers.answers.values():
+                    break
+                text = found.refusal
+                continue
+            job.report, text = found, ""
+            if asked.issuperset(question.id for question in found.questions):
+                return
+        raise ImportRefused(text or found.refusal)
+
+    async def _inspect(
+        self, job: Job, place: c.Place | None, size_m: float | None, answers: c.ImportAnswers | None = None
+    ) -> c.ImportReport:
         if self._slots.locked():
             self._at(job, "reading", UPLOADED, "Waiting for its turn.")
         async with self._slots:
             self._at(job, "reading", UPLOADED)
-            job.report = await self._importer.inspect(job.path, job.file, place=place, size_m=size_m)
+            report = await self._importer.inspect(job.path, job.file, answers=answers, place=place, size_m=size_m)
         job.share = EXAMINED
-        return job.report
+        return report
 
-    async def _ask(self, job: Job) -> None:
-        self._at(job, "question", EXAMINED)
+    async def _ask(self, job: Job, text: str) -> None:
+        job.answered.clear()
+        self._at(job, "question", EXAMINED, text)
         try:
             await asyncio.wait_for(job.answered.wait(), self._question_seconds)
         except TimeoutError:
@@ -339,11 +366,6 @@ class Imports:
                 progress,
                 name=job.file,
             )
-            if layer.facts.geo and settings.place is None and job.answers.answers:
-                # Where it lies may follow from the answers.
-                job.report = await self._importer.inspect(
-                    job.path, job.file, answers=job.answers, size_m=settings.size_m
-                )
         size = sum(file.stat().st_size for file in (job.work / "raster").iterdir())
         if not self._grids.has(layer.content):
             self._check_quota(job.terrain, size)

@@ -41,11 +41,19 @@ class Reader:
         self.at_once = 0
         self.most = 0
 
-    async def inspect(self, path: Path, name: str, **_: Any) -> c.ImportReport:
+    async def inspect(
+        self, path: Path, name: str, *, answers: c.ImportAnswers | None = None, **_: Any
+    ) -> c.ImportReport:
         words = _words(path)
+        given = {} if answers is None else answers.answers
+        if given.get("size") == "no":
+            return c.ImportReport(verdict="refused", file=name, refusal="That is no size.")
+        if given.get("size") == "twice":
+            questions = () if "shape" in given else (QUESTION.model_copy(update={"id": "shape"}),)
+            return c.ImportReport(verdict="ask" if questions else "good", file=name, questions=questions)
         if "refuse" in words:
             return c.ImportReport(verdict="refused", file=name, refusal="It is a picture of a cat.")
-        questions = (QUESTION,) if "ask" in words else ()
+        questions = (QUESTION,) if "ask" in words and not given else ()
         return c.ImportReport(verdict="ask" if questions else "good", file=name, questions=questions)
 
     async def convert(
@@ -67,8 +75,8 @@ class Reader:
         try:
             if "crash" in words:
                 raise RuntimeError("the reader fell over")
-            if answers.answers.get("size") == "no":
-                raise ImportRefused("That is no size.")
+            if answers.answers.get("size") == "late":
+                raise ImportRefused("That is no size after all.")
             while "slow" in words and not self.gate.is_set():
                 on_progress("errors", 0.5)
                 await asyncio.sleep(0.01)
@@ -205,6 +213,31 @@ def test_questions_and_answers(live: LiveServer) -> None:
     assert live.http("POST", f"{path}/answers", answers, owner)[1]["code"] == "not_asked"
 
 
+def test_wrong_answers_are_asked_for_again(live: LiveServer) -> None:
+    """SPEC P103."""
+    terrain, secret = live.create()
+    _, job = _send(live, terrain, secret, "ask")
+    path = f"/api/terrains/{terrain}/imports/{job['id']}/answers"
+    _wait(live, terrain, secret, job["id"], "question")
+
+    def answer(asks: str, **answers: str) -> dict[str, Any]:
+        assert live.http("POST", path, {"answers": answers}, secret)[0] == 200
+        status = _wait(live, terrain, secret, job["id"], "question", "done", "refused")
+        assert [q["id"] for q in status["report"]["questions"]] == ([asks] if asks else [])
+        return status
+
+    assert answer("size", size="no")["text"] == "That is no size."
+    assert answer("shape", size="twice")["text"] == "", "an answer may raise another question"
+    assert answer("", shape="3 x 4")["stage"] == "done"
+    _, job = _send(live, terrain, secret, "ask")
+    path = f"/api/terrains/{terrain}/imports/{job['id']}/answers"
+    _wait(live, terrain, secret, job["id"], "question")
+    live.http("POST", path, {"answers": {"size": "stop"}}, secret)
+    assert _wait(live, terrain, secret, job["id"], "done", "refused")["stage"] == "done", (
+        "the reader knows what to stop"
+    )
+
+
 @pytest.mark.parametrize(
     ("words", "says"),
     [("refuse", "cat"), ("crash", "failed"), ("ask", "no size")],
@@ -215,7 +248,7 @@ def test_what_is_refused_leaves_nothing(live: LiveServer, words: str, says: str)
     _, job = _send(live, terrain, secret, words)
     if words == "ask":
         _wait(live, terrain, secret, job["id"], "question")
-        body = {"answers": {"size": "no"}}
+        body = {"answers": {"size": "late"}}
         live.http("POST", f"/api/terrains/{terrain}/imports/{job['id']}/answers", body, secret)
     assert says in _wait(live, terrain, secret, job["id"], "refused")["text"]
     assert _layers(live, terrain) == ()
