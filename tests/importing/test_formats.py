@@ -11,6 +11,7 @@ import pyproj
 import pytest
 
 from esker import contract as c
+from esker.importing import ascii_grid, gdal_source, source
 from esker.importing.refusal import ImportRefused
 from tests.importing import make_files
 from tests.importing.conftest import PLACE, SIZE_M, look, take, world
@@ -217,6 +218,17 @@ def test_other_formats(head: bytes, reason: str, tmp_path: Path) -> None:
         look(path)
 
 
+def test_parts_in_other_files(tmp_path: Path) -> None:
+    """SPEC G8: an IMAGINE file that keeps its samples in another file is refused, with that file there or not."""
+    path = tmp_path / "parts.img"
+    make_files.write(path, ground(), "HFA", USE_SPILL="YES")
+    assert path.with_suffix(".ige").exists()
+    for _ in range(2):
+        with pytest.raises(ImportRefused):
+            look(path)
+        path.with_suffix(".ige").unlink(missing_ok=True)
+
+
 def test_nothing_beside_a_file_is_read(files: Path, tmp_path: Path) -> None:
     """SPEC G8: neither world files nor .aux.xml, which an upload would not have either."""
     path = tmp_path / "heights16.png"
@@ -252,3 +264,17 @@ def test_npz_with_broken_members(tmp_path: Path) -> None:
     cut.write_bytes(buffer.getvalue()[:-300])
     with pytest.raises(ImportRefused, match="broken"):
         look(cut)
+
+
+@pytest.mark.parametrize("name", ["little.tif", "tiled.tif", "mirrored.tif", "imagine.img", "degrees.asc", "axes.npz"])
+@pytest.mark.parametrize("samples", [1, 300])
+def test_piece_by_piece(name: str, samples: int, files: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """SPEC G3: blocks, bands of blocks and strips put together are the whole, flipped or not, and scanned alike."""
+    whole, whole_raster = take(files / name, tmp_path / "whole")
+    report = look(files / name).report
+    for module in (source, gdal_source, ascii_grid):
+        monkeypatch.setattr(module, "PIECE_SAMPLES", samples)
+    layer, raster = take(files / name, tmp_path / "pieces")
+    assert layer == whole
+    assert raster.digest == whole_raster.digest
+    assert look(files / name).report == report

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rasterio.transform import Affine
 
 from esker import contract as c
 from esker.importing import questions
@@ -141,6 +142,19 @@ def test_bands(tmp_path: Path) -> None:
     for bad in ("0", "3", "x"):
         with pytest.raises(ImportRefused):
             look(path, {"band": bad})
+
+
+def test_feet_along_the_ground(tmp_path: Path) -> None:
+    """SPEC G13: coordinates in feet, heights in nobody says what."""
+    path = tmp_path / "a.tif"
+    write(path, ground(), crs="EPSG:2263", transform=Affine(30.0, 0.0, 980_000.0, 0.0, -30.0, 200_000.0))
+    report = look(path).report
+    assert [(q.id, q.default) for q in report.questions] == [("unit", "feet")]
+    assert report.low_m == pytest.approx(155 * 1200 / 3937)
+    assert report.spacing_m == pytest.approx((30 * 0.3048, 30 * 0.3048), rel=1e-3)
+    assert look(path, {"unit": "metres"}).report.low_m == 155.0
+    with pytest.raises(ImportRefused):
+        look(path, {"unit": "ells"})
 
 
 def test_accuracy() -> None:

@@ -10,6 +10,8 @@ FIT: Final = "fit"
 MIDDLE: Final = "middle"
 STOP: Final = "stop"
 NONE: Final = "none"
+FEET: Final = "feet"
+METRES: Final = "metres"
 
 
 def given(answers: c.ImportAnswers) -> dict[str, str]:

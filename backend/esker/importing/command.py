@@ -22,6 +22,7 @@ FAILED: Final = 1
 QUESTION: Final = 2
 REFUSED: Final = 3
 SEVERITY: Final = (GOOD, QUESTION, REFUSED, FAILED)
+TOO_LARGE: Final = f"It has more than {c.MAX_GRID_BYTES >> 20} MiB: cut out the part that you need, or compress it."
 ABOUT_THE_FILE: Final = frozenset({"empty", "too_large"})
 """Codes of a server that takes no such file; others are about the link, the terrain or the server."""
 VERDICTS: Final = {"good": GOOD, "ask": QUESTION, "refused": REFUSED}
@@ -110,7 +111,10 @@ def _fail(message: str) -> int:
 def _check(path: Path, answers: c.ImportAnswers, as_json: bool) -> int:
     if not path.is_file():
         return _fail(f"there is no file {path}")
-    report = asyncio.run(run.inspect(path, path.name, answers=answers))
+    if path.stat().st_size > c.MAX_GRID_BYTES:
+        report = c.ImportReport(verdict="refused", file=path.name[: c.MAX_NAME_LENGTH], refusal=TOO_LARGE)
+    else:
+        report = asyncio.run(run.inspect(path, path.name, answers=answers))
     sys.stdout.write(report.model_dump_json() + "\n" if as_json else describe(report))
     return VERDICTS[report.verdict]
 
@@ -169,7 +173,7 @@ def _bring(uploads: Uploads, path: Path, answers: c.ImportAnswers, defaults: boo
     if not path.is_file():
         return _fail(f"there is no file {path}")
     if path.stat().st_size > c.MAX_GRID_BYTES:
-        sys.stdout.write(f"{path.name}: refused\n  It has more than {c.MAX_GRID_BYTES >> 20} MiB.\n")
+        sys.stdout.write(f"{path.name}: refused\n  {TOO_LARGE}\n")
         return REFUSED
     line = Line(path.name)
     try:

@@ -11,8 +11,9 @@ import numpy as np
 
 from esker import contract as c
 from esker.importing import colours, placing, questions
-from esker.importing.answers import STOP
+from esker.importing.answers import FEET, STOP
 from esker.importing.gdal_source import GdalSource
+from esker.importing.georef import horizontal_unit_m
 from esker.importing.opening import Opened, open_source, set_encoding
 from esker.importing.placing import Placed, Terrain
 from esker.importing.refusal import ImportRefused
@@ -59,6 +60,8 @@ def examine(
         raise ImportRefused("It holds no data: every sample is nodata.")
     gain, bias = _heights(source, found, answers, asked)
     placed = placing.place(source, answers, lambda question: _ask(asked, answers, question), terrain)
+    unit_m = _unit_m(source, answers, asked)
+    gain, bias = unit_m * gain, unit_m * bias
     exam = Exam(source, found, masked, gain, bias, placed, c.ImportReport(verdict="good", file=""))
     exam.report = _report(exam, name, asked)
     return exam
@@ -144,6 +147,19 @@ def _heights(
     if lowest < questions.EARTH_M[0] or highest > questions.EARTH_M[1]:
         source.notes.append(f"Its heights run from {lowest:.6g} to {highest:.6g} m: nothing on Earth does.")
     return gain, bias
+
+
+def _unit_m(source: Source, answers: Mapping[str, str], asked: list[c.ImportQuestion]) -> float:
+    """Metres per unit of height where coordinates are in feet and nothing says what heights are in; else 1."""
+    crs = source.georef.crs if source.georef is not None else None
+    foot = horizontal_unit_m(crs) if crs is not None else None
+    said = not source.measured or "range" in answers or source.unit_m is not None or source.colour
+    if foot is None or said or not 0.3 < foot < 0.31:
+        return 1.0
+    answer = _ask(asked, answers, questions.UNIT)
+    if answer not in questions.UNIT.options:
+        raise ImportRefused(f"{answer[:40]!r} is no unit; there are: {', '.join(questions.UNIT.options)}.")
+    return foot if answer == FEET else 1.0
 
 
 # --- report -----------------------------------------------------------------------------------------------------

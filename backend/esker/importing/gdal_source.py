@@ -130,6 +130,8 @@ def open_raster(path: Path, driver: str, band: int = 1) -> GdalSource:
         source.notes.append("Its samples are numbers of a colour table.")
     _place(source)
     _vertical(source)
+    if len(dataset.subdatasets) > 1:
+        source.notes.append(f"It holds {len(dataset.subdatasets)} grids; the first is taken.")
     if driver == "GTiff" and dataset.tags(ns="IMAGE_STRUCTURE").get("LAYOUT") == "COG":
         source.format = "GeoTIFF (COG)"
     return source
@@ -188,6 +190,7 @@ def _vertical(source: GdalSource) -> None:
         metres = vertical_unit_m(crs)
     if not known:
         source.notes.append(f"Its unit {unit[:20]!r} is not known; its samples are taken for metres.")
+    source.unit_m = metres
     source.gain, source.bias = scale * (metres or 1.0), offset * (metres or 1.0)
     if (scale, offset) != (1.0, 0.0):
         source.notes.append(f"Scale {scale:g} and offset {offset:g} of the file are applied.")

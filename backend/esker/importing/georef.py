@@ -95,6 +95,13 @@ def crs_label(crs: pyproj.CRS) -> str:
     return label[:80]
 
 
+def horizontal_unit_m(crs: pyproj.CRS) -> float | None:
+    """Metres per unit of a projected system's coordinates, None for others."""
+    if not crs.is_projected or not crs.axis_info:
+        return None
+    return float(crs.axis_info[0].unit_conversion_factor)
+
+
 def vertical_unit_m(crs: pyproj.CRS) -> float | None:
     """Metres per unit of the system's height axis, None when it has none."""
     for part in crs.sub_crs_list:

@@ -7,7 +7,7 @@ import re
 from typing import Final
 
 from esker import contract as c
-from esker.importing.answers import FIT, MIDDLE, NONE, STOP
+from esker.importing.answers import FEET, FIT, METRES, MIDDLE, NONE, STOP
 from esker.importing.refusal import ImportRefused
 from esker.importing.scan import Scan
 from esker.importing.source import Source
@@ -136,6 +136,13 @@ def parse_range(text: str) -> tuple[float, float]:
         raise ImportRefused(f"{text[:40]!r} is no range of heights: the first number must be the lower one.")
     return low, high
 
+
+UNIT: Final = c.ImportQuestion(
+    id="unit",
+    text="Its coordinates are in feet, and it does not say in what its heights are.",
+    options=(FEET, METRES),
+    default=FEET,
+)
 
 IMAGERY: Final = c.ImportQuestion(
     id="imagery",

@@ -55,6 +55,8 @@ class Source(ABC):
     colour: bool = False
     """Three 8-bit bands: heights may be coded in the colours."""
     bands: int = 1
+    unit_m: float | None = None
+    """Metres per unit of height that the file itself names, None when it names none."""
     row_order_known: bool = True
     """False: nothing says whether the first row is the northern one."""
 
