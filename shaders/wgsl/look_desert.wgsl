@@ -21,6 +21,6 @@ fn ground_material(s: Site) -> Material {
   m = mix_in(m, Material(vec3f(0.118, 0.112, 0.052), fine_slope(s, 0.4), 0.0, 0.1), max(brush, 0.7 * covered(c.grass, (s.fine2.r - 0.5) * 0.5, 0.2)));
   m = mix_in(m, canopy(s, vec3f(0.030, 0.040, 0.016), vec3f(0.070, 0.075, 0.028)), covered(c.forest, (s.fine1.g - 0.5) * 0.4, 0.15));
   m = mix_in(m, snowfield(s), covered(c.snow, (s.fine2.r - 0.5) * 0.4, 0.2));
-  m = soaked(m, c.wet * 0.8 * (1.0 - view.has_sea * step(s.height, 0.003)));
+  m = soaked(m, c.wet * 0.8 * (1.0 - view.has_sea * step(s.shore, 0.003)));
   return shore(m, s, vec3f(0.52, 0.40, 0.26));
 }

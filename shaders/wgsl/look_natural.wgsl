@@ -15,7 +15,7 @@ fn ground_material(s: Site) -> Material {
   // Rubble gathers below the faces, where the slope eases and hollows.
   m = mix_in(m, stony, steeper(s, 0.70, 0.15) * (0.65 + 0.35 * smoothstep(-0.1, 0.2, s.curvature)));
   m = mix_in(m, rock(s, vec3f(0.292, 0.284, 0.270), vec3f(0.060, 0.060, 0.063), 0.58), steeper(s, 0.90, 0.17));
-  m = soaked(m, c.wet * 0.7 * (1.0 - view.has_sea * step(s.height, 0.003)));
+  m = soaked(m, c.wet * 0.7 * (1.0 - view.has_sea * step(s.shore, 0.003)));
   m = shore(m, s, vec3f(0.42, 0.355, 0.245));
   return mix_in(m, snowfield(s), covered(c.snow, (s.fine2.r - 0.5) * 0.4 + (s.fine1.g - 0.5) * 0.3, 0.20));
 }

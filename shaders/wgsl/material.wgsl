@@ -21,7 +21,8 @@ struct Site {
   p: vec3f,
   n: vec3f,          // normal of the surface
   steep: f32,        // tangent of the slope
-  height: f32,       // above the sea or zero, as a fraction of the domain
+  height: f32,       // above the sea or zero, as a fraction of the relief: the domain, or the climate of a real place
+  shore: f32,        // the same for the sea's shores
   curvature: f32,
   footprint: f32,    // metres that a pixel covers
   macro1: vec4f,     // features of a third and of a fifteenth of the domain
@@ -38,7 +39,9 @@ fn survey(p: vec3f, gradient: vec2f, curvature: f32, f: Footprint, cover: Attrib
   s.p = p;
   s.n = n;
   s.steep = length(gradient);
-  s.height = (p.z - select(0.0, view.sea, view.has_sea > 0.5)) / view.size;
+  let above = p.z - select(0.0, view.sea, view.has_sea > 0.5);
+  s.height = above / view.relief;
+  s.shore = above / view.shore;
   s.curvature = curvature;
   s.footprint = sqrt(max(max(dot(f.dx, f.dx), dot(f.dy, f.dy)), 1.0e-8));
   s.macro1 = ground_noise(p, f, view.size * 1.37, vec2f(0.917, -0.399));
@@ -128,10 +131,10 @@ fn soaked(m: Material, wet: f32) -> Material {
 fn shore(m: Material, s: Site, colour: vec3f) -> Material {
   if (view.has_sea < 0.5) { return m; }
   let wander = (s.macro2.r - 0.5) * 0.006 + (s.fine1.r - 0.5) * 0.003;
-  let low = 1.0 - smoothstep(0.0012, 0.0034, s.height + wander * 0.7);
+  let low = 1.0 - smoothstep(0.0012, 0.0034, s.shore + wander * 0.7);
   let gentle = 1.0 - smoothstep(0.42, 0.75, s.steep + (s.fine1.g - 0.5) * 0.3);
   let sand = Material(colour * (0.86 + 0.28 * s.fine2.r), fine_slope(s, 0.08), 0.0, 0.0);
   // Below the water and a hand above it.
-  let wet = 1.0 - smoothstep(-0.0002, 0.0010, s.height + wander * 0.3);
+  let wet = 1.0 - smoothstep(-0.0002, 0.0010, s.shore + wander * 0.3);
   return soaked(mix_in(m, sand, low * gentle), wet);
 }

@@ -24,6 +24,8 @@ struct View {
   contour_strength: f32,
   finest_cell: f32,      // metres between samples of level MAX_SYNTHESIS_LEVEL
   amplitude: f32,        // metres of noise amplitude that the value 1 of `channels` stands for
+  relief: f32,           // metres of elevation that count as 1, for stone and plants
+  shore: f32,            // and for the sea's shores
   look: u32,
   overlay: u32,
   cursor_count: u32,

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from esker.contract import MAX_SYNTHESIS_LEVEL, TILE_CELLS, TerrainSettings
+from esker.fractal import relief_m, shore_m
 from esker.render.camera import Camera, Vec3, axes, eye_projection, part, reversed_depth
 
 Overlay = Literal["none", "contours", "slope", "patches", "detail"]
@@ -85,6 +86,7 @@ def view_values(scene: Scene, rect: Rect, range_m: tuple[float, float], amplitud
     value 1 of the channel texture stands for."""
     low, high = range_m
     settings, camera = scene.settings, scene.camera
+    lat = None if settings.place is None else settings.place.lat_deg
     look, relief = LOOKS[settings.look], high - low
     sun = sun_direction(settings.sun_azimuth_deg, settings.sun_elevation_deg)
     exposure = 1.0 if settings.look == "paper" else adaptation(settings.sun_elevation_deg)
@@ -105,6 +107,8 @@ def view_values(scene: Scene, rect: Rect, range_m: tuple[float, float], amplitud
         "contour_strength": look.contours if relief > 0 else 0.0,
         "look": look.number,
         "amplitude": amplitude,
+        "relief": relief_m(settings.size_m, lat),
+        "shore": shore_m(settings.size_m, lat),
         "overlay": OVERLAYS[scene.overlay],
     }
 

@@ -3,6 +3,7 @@
 import { eyeProjection, reversedDepth, viewAxes } from "../core/eyeprojection.ts";
 import type { Scene, Vec3 } from "../core/types.ts";
 import { MAX_SYNTHESIS_LEVEL, TILE_CELLS } from "../generated/contract.ts";
+import { reliefM, shoreM } from "../tiles/rules/rule.ts";
 import type { Atlas } from "./atlas.ts";
 import { ChannelTexture, overlayGrid } from "./channeltexture.ts";
 import { StructWriter, structLayout } from "./layout.ts";
@@ -151,6 +152,8 @@ export class FrameBindings {
     w.set("contour_strength", relief > 0 ? look.contours : 0);
     w.set("look", look.index);
     w.set("amplitude", this.channels.fullScale);
+    w.set("relief", reliefM(scene.tiles.sizeM, settings.place));
+    w.set("shore", shoreM(scene.tiles.sizeM, settings.place));
     w.set("overlay", OVERLAYS[scene.overlay]);
     this.writeCursors(scene);
     this.device.queue.writeBuffer(this.uniform, 0, w.buffer);

@@ -44,13 +44,18 @@ export function reliefM(sizeM: number, place: Place | null | undefined): number 
   return Math.max(SYNTH_LEAST_SNOW_LINE_M, line) / SYNTH_LOOKS.natural.snowLine;
 }
 
+/** What the elevation of wet shores is a share of, metres. */
+export function shoreM(sizeM: number, place: Place | null | undefined): number {
+  return place == null ? sizeM : SYNTH_SHORE_M;
+}
+
 /** The site that settings describe. */
 export function siteOf(settings: RuleSettings): Site {
   const look = SYNTH_LOOKS[settings.look];
   return {
     sizeM: settings.size_m,
     reliefM: reliefM(settings.size_m, settings.place),
-    shoreM: settings.place == null ? settings.size_m : SYNTH_SHORE_M,
+    shoreM: shoreM(settings.size_m, settings.place),
     seed: settings.seed,
     amplitudeM: (settings.detail * SYNTH_ALPHA * settings.size_m) / TILE_CELLS,
     seaLevelM: settings.sea_level_m,
