@@ -11,8 +11,10 @@ import pytest
 from esker import grid
 from esker.contract import Channel, Stroke
 from esker.solve.device_workspace import DeviceWorkspace
+from esker.solve.sayings import BASES
 from esker.solve.solver import LevelResult, Solver
 from esker.solve.tables import Tables, Window
+from esker.terrain import Stroke as Make
 from tests.solver.scenes import PINNED, SCENES, SETTINGS, SIZE, flank, mixed, ridge
 
 TOP = 3
@@ -87,7 +89,7 @@ def test_the_coarsest_preview_waits_for_no_fine_raster(solver: Solver, monkeypat
         whole(self, tables, window)
 
     monkeypatch.setattr(DeviceWorkspace, "rasterise", counted)
-    strokes = SCENES["fifty"]
+    strokes = [*SCENES["fifty"], Make.paint([(900, 900), (2000, 2000)], "snow", 1.0, radius_m=80, id="snow")]
     first = []
     for one in (Solver(), solver):
         for before in [] if one is not solver else [strokes[3:], strokes[:9]]:
@@ -95,6 +97,8 @@ def test_the_coarsest_preview_waits_for_no_fine_raster(solver: Solver, monkeypat
         rasterised.clear()
         steps = one.steps(strokes, SETTINGS, 4)
         first.append(next(steps))
+        paint = [next(steps) for _ in range(3 * len(BASES))]
+        assert Channel.SNOW in {r.channel for r in paint if r is not None}
         assert rasterised == [2]
         previews = [first[-1], *(r for r in steps if r is not None and r.channel == Channel.HEIGHT and not r.settled)]
         assert [r.level for r in previews if r is not None] == [0, 1, 2, 3, 4]

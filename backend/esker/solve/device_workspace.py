@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any, Generic, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,9 @@ from esker.solve.constraints import Packer
 from esker.solve.fields import Shape, rectangle
 from esker.solve.queue import Queue
 from esker.solve.tables import RASTER_BINS, Tables, Window
+
+if TYPE_CHECKING:
+    from esker.solve.passes import Workspace
 
 
 class DeviceSystem(multigrid.System, Protocol):
@@ -65,7 +68,7 @@ class DeviceWorkspace(Generic[S]):
         self.top = height.top
         self.gradient, self.height = gradient, height
         self.packer = Packer(self.top)
-        self.scout: Any = None
+        self.scout: Workspace | None = None
         self.size_m = 1.0
         self._queue, self._bins, self._over = queue, bins, over
 

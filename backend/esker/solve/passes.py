@@ -62,7 +62,10 @@ class LevelResult:
 
 
 class Workspace(Protocol):
-    """Memory and kernels for one solve at a time of one finest level; ``device_workspace`` says what each does."""
+    """Memory and kernels for one solve at a time of one finest level; ``device_workspace`` says what each does.
+
+    scout: a small one that makes the coarsest preview of the same strokes, None below ``solver.SCOUT_FROM``.
+    """
 
     top: int
     packer: Packer
@@ -99,10 +102,12 @@ def preview_gradient_cycles(settings: TerrainSettings) -> int:
 
 
 def scouted(w: Workspace, job: Job) -> LevelResult:
-    """The coarsest preview, of constraints that were rasterised coarsely."""
-    w.load(*job)
-    _coarse(w, 0)
-    return LevelResult(0, frozen(w.read(0)), settled=False)
+    """The coarsest preview, made by a workspace's scout of constraints that were rasterised coarsely."""
+    scout = w.scout
+    assert scout is not None
+    scout.load(*job)
+    _coarse(scout, 0)
+    return LevelResult(0, frozen(scout.read(0)), settled=False)
 
 
 def _coarse(w: Workspace, level: int) -> None:

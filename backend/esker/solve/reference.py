@@ -7,7 +7,7 @@ is the energy's (half control volume) doubled. Stiffness ``d`` excludes screenin
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,9 @@ from esker.solve import reference_raster
 from esker.solve.base import Base
 from esker.solve.constraints import Packer
 from esker.solve.tables import PINNED, PINNED_STIFFNESS
+
+if TYPE_CHECKING:
+    from esker.solve.passes import Workspace
 
 Field = NDArray[np.float64]
 
@@ -215,7 +218,7 @@ class NumpyWorkspace:
 
     def __init__(self, top: int, based: bool = False) -> None:
         self.top, self.based = top, based
-        self.scout: Any = None
+        self.scout: Workspace | None = None
         self.size_m = 1.0
         self.packer = Packer(top)
         self.gradient: NumpySystem

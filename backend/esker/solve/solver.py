@@ -211,7 +211,11 @@ class Solver:
     def _attempt(
         self, job: Job, top: int, warm: NDArray[np.float32] | None, basis: bool
     ) -> Generator[LevelResult | None]:
-        """One solve. A workspace whose device failed, or that diverged, is dropped, all others are kept."""
+        """One solve. A workspace whose device failed, or that diverged, is dropped, all others are kept.
+
+        Painted channels come right after the coarsest preview, so that they keep up with a pen that never rests; those
+        of which the strokes speak that the pen draws would hold it up, and come when it does rest.
+        """
         with guarded(self._device):
             settings, spoken = job.settings, speakers(job.strokes, job.settings)
             late = [layer.channel for layer in spoken if not layer.painted]
@@ -219,19 +223,19 @@ class Solver:
             workspace = self._take(job, top)
             keep, half = True, False
             try:
-                scout = workspace.scout if warm is None else None
-                if scout is not None:
-                    yield passes.scouted(scout, job)
+                scouting = warm is None and workspace.scout is not None
+                if scouting:
+                    yield passes.scouted(workspace, job)
+                    yield from self._channels(spoken, job, top, early)
                 half = True
                 yield from workspace.loading(*job)
                 half = False
                 if warm is None:
                     cycles = passes.preview_gradient_cycles(settings)
-                    previews = self._paced(passes.previews(workspace, cycles, coarsest=scout is None), top)
-                    yield next(previews)
-                    # so what is painted keeps up with a pen that never rests; channels of which the strokes speak that
-                    # the pen draws would hold it up, and come when it does rest
-                    yield from self._channels(spoken, job, top, early)
+                    previews = self._paced(passes.previews(workspace, cycles, coarsest=not scouting), top)
+                    if not scouting:
+                        yield next(previews)
+                        yield from self._channels(spoken, job, top, early)
                     yield from previews
                 else:
                     passes.gradients(workspace)
@@ -296,7 +300,7 @@ class Solver:
         return made
 
     def _kept(self) -> int:
-        return sum(grid.solve_bytes(w.top) for w in self._spare)
+        return sum(grid.solve_bytes(w.top) + (0 if w.scout is None else grid.solve_bytes(SCOUT)) for w in self._spare)
 
     def _give(self, workspace: Workspace) -> None:
         self._spare.append(workspace)
