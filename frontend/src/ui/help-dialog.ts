@@ -13,6 +13,7 @@ const POINTERS: readonly { readonly what: string; readonly how: string }[] = [
   { what: "Pan", how: "Middle button, Shift + right button, Space + left button, or two fingers" },
   { what: "Zoom", how: "Wheel, or two fingers" },
   { what: "Fly there", how: "Double click" },
+  { what: "Bring in real ground", how: "Drop elevation files anywhere on the page" },
 ];
 
 /** The help sheet: every action with its keys. */

@@ -119,6 +119,40 @@ describe("projection (SPEC I1)", () => {
   });
 });
 
+describe("home over land that lies high (SPEC U32)", () => {
+  const land = { groundM: 2150, lowM: 1780 };
+
+  it("looks at the land where it lies, down to its foot", () => {
+    const c = new Camera(4096);
+    c.resize(1200, 800);
+    c.stand(land);
+    c.home(0);
+    for (const x of [0, 4096])
+      for (const y of [0, 4096])
+        for (const z of [land.groundM, land.lowM]) expect(c.project([x, y, z]).visible).toBe(true);
+    expect(c.state.value.eye[2]).toBeGreaterThan(land.groundM);
+  });
+
+  it("goes along while nobody has moved the view, and only then", () => {
+    const c = new Camera(4096);
+    c.resize(1200, 800);
+    c.home(0);
+    const before = c.state.value.eye;
+    c.stand(land);
+    expect(c.state.value.eye[2] - before[2]).toBeGreaterThan(1500);
+    c.orbit(40, 0);
+    const moved = c.state.value.eye;
+    c.stand({ groundM: 0, lowM: 0 });
+    expect(c.state.value.eye).toEqual(moved);
+  });
+
+  it("is what it was on flat land", () => {
+    const [a, b] = [new Camera(4096), new Camera(4096)];
+    b.stand({ groundM: 0, lowM: 0 });
+    expect(b.state.value.eye).toEqual(a.state.value.eye);
+  });
+});
+
 describe("moves", () => {
   it("zoom keeps the anchor under the pointer (SPEC I2)", () => {
     for (const mode of ["orbit", "fly", "map"] as const) {

@@ -41,6 +41,44 @@ async function landing(): Promise<EskLanding> {
 const one = <T extends Element>(element: EskLanding, selector: string) =>
   element.shadowRoot!.querySelector<T>(selector)!;
 
+/** Stands for the request that tells how much has left; `fetch` does not. */
+class FakeRequest extends EventTarget {
+  static last: FakeRequest;
+  readonly upload = new EventTarget();
+  status = 0;
+  responseText = "";
+  path = "";
+  aborted = false;
+  readonly headers: Record<string, string> = {};
+  constructor() {
+    super();
+    FakeRequest.last = this;
+  }
+  open(_method: string, path: string): void {
+    this.path = path;
+  }
+  setRequestHeader(name: string, value: string): void {
+    this.headers[name] = value;
+  }
+  send(): void {}
+  abort(): void {
+    this.aborted = true;
+  }
+  answer(status: number, body: unknown): void {
+    this.status = status;
+    this.responseText = JSON.stringify(body);
+    this.dispatchEvent(new Event("load"));
+  }
+  leave(loaded: number, total: number): void {
+    this.upload.dispatchEvent(Object.assign(new Event("progress"), { lengthComputable: true, loaded, total }));
+  }
+}
+
+function fall(file: File): void {
+  const event = Object.assign(new Event("drop", { cancelable: true }), { dataTransfer: { files: [file] } });
+  window.dispatchEvent(event);
+}
+
 async function join(element: EskLanding, text: string): Promise<void> {
   one<HTMLInputElement>(element, "#join").value = text;
   one(element, "form").dispatchEvent(new Event("submit", { cancelable: true }));
@@ -108,5 +146,38 @@ describe("the landing page", () => {
     element.busy = "new";
     window.dispatchEvent(new Event("pageshow"));
     expect(element.busy).toBe("");
+  });
+});
+
+describe("a file that falls on the landing page (SPEC U31)", () => {
+  it("makes a terrain of its ground, with the real share of its bytes, and goes on there", async () => {
+    vi.stubGlobal("XMLHttpRequest", FakeRequest);
+    const element = await landing();
+    fall(new File(["x"], "St Helens.tif"));
+    await vi.waitFor(() => expect(FakeRequest.last?.path).toBe("/api/terrains/from-grid?name=St%20Helens.tif"));
+    FakeRequest.last.leave(45, 100);
+    await element.updateComplete;
+    expect(one(element, ".file").textContent).toContain("Uploading, 45 %");
+    FakeRequest.last.answer(201, { id: "t1", secret: "s", role: "owner", import: { id: "job" } });
+    await vi.waitFor(() => expect(assign).toHaveBeenCalledWith("/t/t1#s"));
+    expect(window.sessionStorage.getItem("esker.imports.t1")).toBe('[{"id":"job","file":"St Helens.tif"}]');
+    window.sessionStorage.clear();
+  });
+
+  it("says why it cannot", async () => {
+    vi.stubGlobal("XMLHttpRequest", FakeRequest);
+    const element = await landing();
+    fall(new File(["x"], "a.txt"));
+    await vi.waitFor(() => expect(FakeRequest.last.path).toContain("a.txt"));
+    FakeRequest.last.answer(400, { code: "refused", message: "It is in no format that can be read." });
+    await vi.waitFor(() => expect(element.problem).toBe("It is in no format that can be read."));
+    expect(element.busy).toBe("");
+  });
+
+  it("opens when it is an archive", async () => {
+    answers["POST /api/terrains/import"] = { status: 201, body: { id: "old", secret: "k", role: "owner" } };
+    await landing();
+    fall(new File(["x"], "land.ESKER"));
+    await vi.waitFor(() => expect(assign).toHaveBeenCalledWith("/t/old#k"));
   });
 });

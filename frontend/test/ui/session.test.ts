@@ -43,6 +43,8 @@ class FakeStage {
   };
   readonly cursor = signal([1, 2, 3]);
   readonly input = { tool: signal("mountain"), drawing: signal(null) };
+  static told: unknown[] = [];
+  readonly groundwork = { receive: (message: unknown) => FakeStage.told.push(message) };
   async start(): Promise<void> {}
   restart(): void {
     FakeStage.restarts++;
@@ -58,7 +60,7 @@ class FakeStage {
 vi.mock("../../src/net/connection.ts", () => ({ Connection: FakeConnection }));
 vi.mock("../../src/ui/stage.ts", () => ({ Stage: FakeStage }));
 
-const { TerrainSession } = await import("../../src/ui/session.ts");
+const { LAYING, TerrainSession } = await import("../../src/ui/session.ts");
 const { recentTerrains } = await import("../../src/ui/storage.ts");
 const { fullStroke } = await import("../../src/doc/document.ts");
 
@@ -310,5 +312,27 @@ describe("a session", () => {
     FakeStage.agrees = false;
     server().options.onFrame(frame);
     expect(server().reconnects).toBe(1);
+  });
+});
+
+describe("real ground (SPEC U18, U30)", () => {
+  it("being laid by the server is told in the status line, not as a notice", () => {
+    say(welcome());
+    const progress = { type: "progress", clock: 3, level: 4, of: 4, settled: true, refining: 0 } as const;
+    say({ ...progress, settled: false, note: LAYING });
+    expect(session.laying.value).toBe(true);
+    expect(session.notice.value).toBeNull();
+    say({ ...progress, settled: false, note: "" });
+    expect(session.laying.value).toBe(true);
+    say({ ...progress, note: "" });
+    expect(session.laying.value).toBe(false);
+  });
+
+  it("that others bring in reaches the page", () => {
+    say(welcome());
+    FakeStage.told = [];
+    const status = { id: "i", stage: "reading", share: 0.45, text: "", report: null, layer: null } as const;
+    say({ type: "importing", author: "Ana", file: "rainier.tif", status });
+    expect(FakeStage.told).toEqual([{ type: "importing", author: "Ana", file: "rainier.tif", status }]);
   });
 });
