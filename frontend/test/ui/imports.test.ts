@@ -79,7 +79,8 @@ afterEach(() => {
 
 describe("files on their way", () => {
   it("go one after the other, with the real share of their bytes", async () => {
-    imports.add([file("a.tif"), file("b.tif")]);
+    imports.add([file("a.tif")]);
+    imports.add([file("b.tif")]);
     expect(phases()).toEqual(["upload", "waiting"]);
     server.uploads[0]!.onShare(0.45);
     expect(imports.jobs.value[0]!.share).toBe(0.45);
