@@ -140,6 +140,17 @@ def test_a_grid_smaller_than_a_cell_is_no_spike() -> None:
         assert np.abs(base.level(level) - 900).max() < 0.1, level
 
 
+def test_a_grid_between_all_samples_of_the_anchor_is_no_spike() -> None:
+    """SPEC PW52: 4 m of data at 900 m in a domain of 65 km, which no sample of the first ten levels meets."""
+    layer = placed(np.full((9, 9), 900.0), anchor=(30_050.0, 30_060.0), spacing_m=(0.5, 0.5))
+    base = Base(lod_space.build([layer]), 65_536.0)
+    for level in (0, 3, 5):
+        assert np.abs(base.level(level) - 900).max() < 0.1, level
+    for level in (10, 14):
+        at = round(30_052 / grid.spacing(level, 65_536.0))
+        assert np.abs(base.window(level, slice(at - 40, at + 40), slice(at - 40, at + 40)) - 900).max() < 0.1, level
+
+
 def test_places_see_what_levels_show() -> None:
     """SPEC PW53: `sample` at the samples of a level finer than the data."""
     base = Base(lod_space.build([FINE]), SIZE)

@@ -188,10 +188,27 @@ class Base:
         if (cover == 1).all():
             return heights.copy()
         if level == outside.ANCHOR:
-            return outside.membrane(heights, cover)
+            return outside.membrane(*self._with_specks(heights, cover))
         anchor = self.level(outside.ANCHOR, device)
         step = 1 << (outside.ANCHOR - level)
         return cover * heights + (np.float32(1) - cover) * anchor[::step, ::step]
+
+    def _with_specks(self, heights: Grid, cover: Grid) -> tuple[Grid, Grid]:
+        """The anchor's blend with layers that are too small for its samples: their mean at the nearest one.
+
+        Else such a layer would be unknown to the membrane, and stand on it as a spike on the levels that resolve it.
+        """
+        heights, cover = heights.copy(), cover.copy()
+        spacing, last = grid.spacing(outside.ANCHOR, self.size_m), grid.samples(outside.ANCHOR) - 1
+        for placed, first, sheet in zip(self.model.placed, self.model.first, self.model.sheets, strict=True):
+            corners = self.model.kernel[first : first + sheet.count].reshape(-1, 2)
+            if len(corners) == 0 or np.ptp(corners, axis=0).max() > 2 * spacing:
+                continue
+            col, row = np.round((corners.min(axis=0) + corners.max(axis=0)) / (2 * spacing)).astype(int)
+            if 0 <= row <= last and 0 <= col <= last and cover[row, col] < 1:
+                mean = float(np.nanmean(placed.raster.mips[-1], dtype=np.float64))
+                heights[row, col], cover[row, col] = placed.layer.scale * mean + placed.layer.lift_m, 1
+        return heights, cover
 
     def _window(self, level: int, rows: slice, cols: slice, device: ClDevice | None) -> Grid:
         """``window`` inside the domain: from what is kept, else made and kept."""

@@ -29,6 +29,8 @@ ANCHOR: Final = 3
 """Level (513 x 513 samples) at which the membrane is solved as a whole."""
 SWEEPS: Final = 4
 """Sweeps on each level above ``ANCHOR``."""
+_SMALL: Final = 600
+"""Rows of a grid that one thread sweeps alone."""
 _SWEEPS_BELOW: Final = (16, 64)
 """Sweeps of the cascade on ``ANCHOR``, and at most on a coarser grid: four times as many on each, as they cost that."""
 
@@ -58,7 +60,8 @@ def relax(ground: Grid, heights: Grid, cover: Grid, sweeps: int) -> Grid:
         def some(start: int, stop: int, source: Grid = source, target: Grid = target) -> None:
             _sweep(source, heights, cover, start, stop, target)
 
-        spread(some, bands(len(ground), 128))
+        # Threads take longer to start than a small grid does to sweep.
+        spread(some, bands(len(ground), 128) if len(ground) > _SMALL else [(0, len(ground))])
         ground, other = target, source
     return ground
 
@@ -122,25 +125,26 @@ def membrane(heights: Grid, cover: Grid) -> Grid:
 
 def _restricted(heights: Grid, cover: Grid) -> tuple[Grid, Grid]:
     """Every other sample: the mean around it weighted by cover, known as well as the best known around it."""
-    weight, total = _halved(cover), _halved(cover * heights)
-    known = np.maximum.reduce([_shifted(cover, i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)])
-    mean = np.where(weight > 0, total / np.where(weight > 0, weight, 1), 0)
-    return mean.astype(np.float32), np.where(weight > 0, known, 0).astype(np.float32)
+    side = (len(heights) + 1) // 2
+    mean, known = np.empty((side, side), dtype=np.float32), np.empty((side, side), dtype=np.float32)
+    _restrict(heights, cover, mean, known)
+    return mean, known
 
 
-def _halved(values: Grid) -> NDArray[np.float64]:
-    weights = {-1: 0.25, 0: 0.5, 1: 0.25}
-    out = np.zeros(((len(values) + 1) // 2, (len(values) + 1) // 2))
-    for i, a in weights.items():
-        for j, b in weights.items():
-            out += a * b * _shifted(values, i, j)
-    return out
-
-
-def _shifted(values: Grid, i: int, j: int) -> Grid:
-    """Samples ``values[2 row + i, 2 col + j]``; 0 beyond the array."""
-    padded = np.pad(values, 1)
-    return padded[1 + i :: 2, 1 + j :: 2][: (len(values) + 1) // 2, : (len(values) + 1) // 2]
+@kernel
+def _restrict(heights: Grid, cover: Grid, mean: Grid, known: Grid) -> None:
+    last = heights.shape[0] - 1
+    for row in range(mean.shape[0]):
+        for col in range(mean.shape[1]):
+            total, weight, best = 0.0, 0.0, np.float32(0)
+            for i in range(max(2 * row - 1, 0), min(2 * row + 1, last) + 1):
+                for j in range(max(2 * col - 1, 0), min(2 * col + 1, last) + 1):
+                    w = (2 - abs(i - 2 * row)) * (2 - abs(j - 2 * col)) * cover[i, j]
+                    total += w * heights[i, j]
+                    weight += w
+                    best = max(best, cover[i, j])
+            mean[row, col] = total / weight if weight > 0 else 0.0
+            known[row, col] = best
 
 
 def smooth_jets(window: Grid, at: NDArray[np.float64], spacing: float) -> NDArray[np.float64]:
