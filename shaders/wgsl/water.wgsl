@@ -44,7 +44,7 @@ fn sea_depth(p: vec2f) -> f32 {
 
 // What ground looks like from afar, by height above the sea and slope.
 fn far_albedo(height: f32, steep: f32) -> vec3f {
-  let e = height / view.size;
+  let e = height / view.relief;
   let rocky = smoothstep(0.55, 0.95, steep);
   switch (view.look) {
     case LOOK_ALPINE: { return mix(vec3f(0.72, 0.75, 0.80), vec3f(0.14, 0.135, 0.135), smoothstep(0.75, 1.2, steep)); }
@@ -125,7 +125,7 @@ fn water_surface(p: vec3f, dir: vec3f, w: Water) -> vec3f {
   let sun = sun_light() * max(view.sun.z, 0.0) / 3.14159265;
 
   // Down to the bed and back up: both ways are steeper in water.
-  let scale = clamp(4096.0 / view.size, 0.25, 4.0);
+  let scale = clamp(4096.0 / view.shore, 0.25, 4.0);
   let down = sqrt(1.0 - (1.0 - facing * facing) / (WATER_INDEX * WATER_INDEX));
   let sun_down = sqrt(1.0 - (1.0 - view.sun.z * view.sun.z) / (WATER_INDEX * WATER_INDEX));
   let depth = max(w.depth, 0.0) * scale;
@@ -144,7 +144,7 @@ fn water_surface(p: vec3f, dir: vec3f, w: Water) -> vec3f {
   var colour = (bed * seen + body) * (1.0 - fresnel) + (shown + sun_light() * glitter) * fresnel;
 
   // Foam: lace where waves run out on the shore, more of it where the channel says so.
-  let band = w.depth / (0.0013 * view.size);
+  let band = w.depth / (0.0013 * view.shore);
   let wash = 0.5 + 0.5 * sin(band * 10.0 - view.time * 1.1 + w.noise.z * 9.0);
   let reach = 1.0 - smoothstep(0.0, 0.7 + 0.9 * w.foam, band);
   let lace = smoothstep(0.46, 0.74, w.noise.w * 0.80 + wash * 0.22 + (1.0 - min(band, 1.0)) * 0.20 + (w.foam - 0.5) * 0.25);
@@ -199,7 +199,7 @@ fn water_fragment(v: WaterVertex) -> @location(0) vec4f {
   let dir = ray_to(world);
   let water = water_surface(world, dir, Water(depth, length(bed) * inner, shore_foam(v.record, v.at), noises));
   let shown = display(water * v.through + v.glow, v.position.xy);
-  let edge = smoothstep(0.0, 0.00012 * view.size, v.depth);
+  let edge = smoothstep(0.0, 0.00012 * view.shore, v.depth);
   return vec4f(with_cursors(shown.rgb, world), edge);
 }
 

@@ -16,13 +16,14 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from esker.contract import Document, GridFacts, Layer, Place, TerrainSettings
+from esker.contract import Document, GridFacts, Layer, Place, Stroke, TerrainSettings
 from esker.importing import laying
 from esker.importing.georef import Georef
 from esker.importing.opening import open_source
 from esker.importing.source import Source
 from esker.patchwork import rasters
 from esker.templates import FOLDER, survey
+from esker.templates.pen import Pen
 
 MARGIN_SAMPLES: Final = 40
 """Samples beyond the domain that are kept, so that the ground goes on across its border."""
@@ -121,6 +122,14 @@ HELENS: Final = (
 )  # fmt: skip
 
 
+def sound_strokes() -> tuple[Stroke, ...]:
+    """The bed of Commencement Bay: the data know its surface alone."""
+    pen = Pen("rainier", 1)
+    bay = [(5056, 57000, -12), (4500, 58400, -70), (2900, 60000, -120), (2500, 61400, -130), (6300, 64600, -140)]
+    pen.chain(bay, (5, 1600), (5, 1600), wobble=0.0, label="Commencement Bay")
+    return tuple(pen.strokes)
+
+
 @dataclass(frozen=True)
 class Real:
     """One starting terrain."""
@@ -130,10 +139,11 @@ class Real:
     description: str
     settings: TerrainSettings
     cuts: tuple[Cut, ...]
+    strokes: tuple[Stroke, ...] = ()
 
 
 def terrains() -> tuple[Real, ...]:
-    """Both. No strokes: the ground is the picture, and what people draw is theirs."""
+    """Both, without their ground."""
     sound = TerrainSettings(
         title="Rainier and the Sound", size_m=65536.0, place=Place(lat_deg=47.0560, lon_deg=-122.0720),
         reach_m=600.0, sea_level_m=3.0, sun_azimuth_deg=75.0, sun_elevation_deg=18.0,
@@ -145,7 +155,7 @@ def terrains() -> tuple[Real, ...]:
     return (
         Real("rainier", "Rainier and the Sound",
              "Real ground: Puget Sound and Mount Rainier, two surveys of their own grain and angle, blended live.",
-             sound, RAINIER),
+             sound, RAINIER, sound_strokes()),
         Real("helens", "Mount St Helens",
              "A crater in three surveys: 2000 and twice in October 2004. Hide a layer and watch the new dome go.",
              helens, HELENS),
@@ -161,7 +171,7 @@ def build(folder: Path, out: Path = FOLDER) -> None:
             survey.write(out / "data" / f"{spec.name}.npz", grid, spec.quantum_m)
             kept = survey.read(out / "data" / f"{spec.name}.npz")
             layers.append(layer_of(real.id, priority, spec, kept, laid))
-        document = Document(id=real.id, settings=real.settings, layers=tuple(layers))
+        document = Document(id=real.id, settings=real.settings, strokes=real.strokes, layers=tuple(layers))
         grids = {layer.content: spec.name for layer, spec in zip(layers, real.cuts, strict=True)}
         data: dict[str, Any] = {"id": real.id, "title": real.title, "description": real.description, "grids": grids}
         text = json.dumps(data | {"document": document.model_dump(mode="json")}, separators=(",", ":"))
