@@ -6,7 +6,7 @@ import random
 
 import numpy as np
 import pytest
-from tests.cones import FINEST, LEVELS, SIZE_M, Bump, Client, Ground, a_view, drawn, lay, settle, solve
+from tests.cones import FINEST, LEVELS, SIZE_M, Bump, Client, Ground, a_view, drawn, lay, near, settle, solve
 
 from esker.contract import Channel
 from esker.tiles.delivery import TileServer
@@ -93,6 +93,43 @@ def test_random_sessions_come_to_rest_on_offsets_plus_base(seed: int) -> None:
             if key.level <= LEVELS or key in wanted:
                 assert np.array_equal(samples, ground.samples(key) + under.samples(key)), key
         assert sum(key.level <= LEVELS for key in found) == sum(4**level for level in range(LEVELS + 1))
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_whole_levels_of_both_streams_interrupt_each_other(seed: int) -> None:
+    """Levels that come by FILL, to a client that looks around and is slow: tiles wait for their base, none cracks."""
+    rng = random.Random(50 + seed)
+    server, ground = TileServer(SIZE_M, 3), Ground([Bump(200.0, 300.0, 60.0, 40.0)])
+    base: Layers | None = None
+    client, waited = Client(server), 0
+    for level in range(4):
+        server.put_level(0, level, ground.level(level), True)
+    while len(client.decoder.held) < 85:
+        assert client.step()
+    for clock in range(1, 6):
+        if clock == 1 or rng.random() < 0.7:
+            base = change(rng, base)
+            lay(server, base, clock)
+        if rng.random() < 0.7:
+            ground.edit(rng)
+        for level in range(4 if rng.random() < 0.8 else rng.randrange(4)):
+            server.put_level(clock, level, ground.level(level), clock % 2 == 0)
+            for _ in range(rng.choice([0, 0, 1, 4])):
+                client.step()
+                waited += len(client.decoder.held) - len(drawn(client.decoder))
+        if rng.random() < 0.6:
+            client.tiles.set_view(near(rng.uniform(0, SIZE_M), rng.uniform(0, SIZE_M), 60.0, rng.uniform(0, 6)))
+    lay(server, base, 99)
+    for level in range(4):
+        server.put_level(99, level, ground.level(level), True)
+    while client.step():
+        waited += len(client.decoder.held) - len(drawn(client.decoder))
+    client.check_newest(ground)
+    under = base or Ground()
+    found = drawn(client.decoder)
+    assert len(found) == 85
+    assert all(np.array_equal(found[key], ground.samples(key) + under.samples(key)) for key in found)
+    assert waited > 0
 
 
 @pytest.mark.parametrize("seed", range(4))
