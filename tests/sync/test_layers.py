@@ -365,8 +365,9 @@ def test_the_store_keeps_what_the_journal_names(tmp_path: Path) -> None:
 
     journal.append("t", [Row(1, "import-x", 0, "c", op_json(c.Group(ops=(lay, c.DeleteLayer(layer="b")))))]).result()
     assert journal.grids("t") == journal.grids() == {born, made[1].digest}
-    work = store.work()
+    work, packed = store.work(), store.temporary(".npz")
     store.sweep(journal.grids())
+    assert not packed.exists()
     assert [store.has(raster.digest) for raster in made] == [True, True, False, False]
     assert not work.exists()
     with pytest.raises(MissingGrid):

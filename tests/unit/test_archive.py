@@ -15,6 +15,7 @@ import pytest
 from esker import contract as c
 from esker.document import archive
 from esker.document.archive import ArchiveError
+from esker.document.ops import Refusal, check_document
 from esker.patchwork import rasters
 from esker.patchwork.rasters import Raster
 from esker.store.grids import GridStore
@@ -154,3 +155,29 @@ def test_the_process_that_reads_makes_rasters(document: c.Document, grids: dict[
     path.write_bytes(_again(path.read_bytes(), **{name: _npy(HEIGHTS + 9)}))
     with pytest.raises(ArchiveError, match="not the one"):
         asyncio.run(read_archive(path, store.work(), asyncio.Semaphore(1)))
+
+
+@pytest.mark.parametrize(
+    ("layers", "deleted", "code"),
+    [
+        (("a", "a"), (), "duplicate_layer"),
+        (("a",), ("a",), "duplicate_layer"),
+        (tuple(f"v{k}" for k in range(c.MAX_LAYERS + 1)), (), "too_many_layers"),
+        ((), tuple(f"v{k}" for k in range(c.MAX_LAYERS + 1)), "too_many_layers"),
+        (("high",), (), "out_of_domain"),
+    ],
+)
+def test_documents_that_no_ops_could_have_made(
+    layers: tuple[str, ...], deleted: tuple[str, ...], code: str, grids: dict[str, Raster]
+) -> None:
+    """SPEC D32."""
+    raster = next(iter(grids.values()))
+
+    def made(names: tuple[str, ...]) -> tuple[c.Layer, ...]:
+        return tuple(_layer(raster, name, scale=1000.0 if name == "high" else 1.0, lift_m=300_000.0) for name in names)
+
+    settings = c.TerrainSettings(size_m=5000.0)
+    check_document(c.Document(id="t", settings=settings, layers=made(("fine",))))
+    with pytest.raises(Refusal) as caught:
+        check_document(c.Document(id="t", settings=settings, layers=made(layers), deleted_layers=made(deleted)))
+    assert caught.value.code == code

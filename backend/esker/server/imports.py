@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import tempfile
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -108,6 +107,11 @@ def _packed(grids: GridStore, digest: str) -> Path:
     """A temporary .npz file with the heights, float32 metres, row 0 south, and the control net if there is one."""
     raster = grids.read(digest)
     arrays = {"heights": raster.heights} | ({} if raster.warp is None else {"warp": raster.warp})
-    with tempfile.NamedTemporaryFile(prefix="esker-grid-", suffix=".npz", delete=False) as file:
-        np.savez(file, **arrays)  # type: ignore[arg-type]
-        return Path(file.name)
+    path = grids.temporary(".npz")
+    with path.open("wb") as file:
+        try:
+            np.savez(file, **arrays)  # type: ignore[arg-type]
+        except BaseException:
+            path.unlink()
+            raise
+    return path

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import os
-import tempfile
 from pathlib import Path
 from typing import Annotated, Any, Final
 
@@ -122,14 +120,14 @@ def _packed(grids: GridStore, document: c.Document) -> Path:
     live = {layer.content: grids.read(layer.content) for layer in document.layers}
     gone = {layer.content for layer in document.deleted_layers if layer.content not in live}
     found = live | {digest: grids.read(digest) for digest in gone if grids.has(digest)}
-    handle, name = tempfile.mkstemp(prefix="esker-archive-", suffix=".esker")
-    with os.fdopen(handle, "wb") as file:
+    path = grids.temporary(".esker")
+    with path.open("wb") as file:
         try:
             archive.write(file, document, found)
         except BaseException:
-            Path(name).unlink()
+            path.unlink()
             raise
-    return Path(name)
+    return path
 
 
 async def _receive(request: Request, path: Path, limit: int) -> None:

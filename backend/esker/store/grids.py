@@ -12,6 +12,7 @@ import os
 import re
 import secrets
 import shutil
+import tempfile
 import threading
 import weakref
 from collections.abc import Collection, Iterable
@@ -47,6 +48,12 @@ class GridStore:
         path = self.folder / f"{_WORK}{secrets.token_hex(8)}"
         path.mkdir()
         return path
+
+    def temporary(self, suffix: str) -> Path:
+        """A new, empty file that may become large, for the caller to remove; one that is left over is swept."""
+        handle, name = tempfile.mkstemp(prefix=_WORK, suffix=suffix, dir=self.folder)
+        os.close(handle)
+        return Path(name)
 
     def drop(self, work: Path) -> None:
         """Removes a work folder with all that is in it. Harmless when it is gone."""
@@ -109,7 +116,10 @@ class GridStore:
         for path in self.folder.iterdir():
             if path.name.startswith(_WORK) or (_DIGEST.fullmatch(path.name) and path.name not in named):
                 log.info("removing %s, which nothing refers to", path.name)
-                shutil.rmtree(path, ignore_errors=True)
+                if path.is_dir():
+                    shutil.rmtree(path, ignore_errors=True)
+                else:
+                    path.unlink(missing_ok=True)
 
 
 def _sync(path: Path) -> None:
