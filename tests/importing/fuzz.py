@@ -18,8 +18,8 @@ from esker.importing import limits
 from esker.importing.examine import examine
 from esker.importing.refusal import ImportRefused
 
-TRUNCATIONS: Final = 5
-FLIPS: Final = 12
+TRUNCATIONS: Final = 4
+FLIPS: Final = 8
 HEADER_BYTES: Final = 600
 LEFT_OUT: Final = frozenset(
     {"mapbox.png", "terrarium.png", "cog.tif", "bigtiff.tif", "mirrored.tif", "upside_down.tif"}

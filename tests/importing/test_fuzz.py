@@ -10,12 +10,12 @@ from tests.importing.conftest import HERE
 
 
 def test_damaged_files(files: Path) -> None:
-    """Some four hundred variants, cut off and changed, in one process with the bounds of a reader; then in time."""
+    """Some three hundred variants, cut off and changed, in one process with the bounds of a reader; then in time."""
     done = subprocess.run(
         [sys.executable, "-m", "tests.importing.fuzz", str(files), "20260"],
         cwd=HERE.parents[1], capture_output=True, text=True, timeout=120,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-1000:]
     lines = done.stdout.splitlines()
-    assert len(lines) > 300
-    assert sum("refused" in line for line in lines) > 100
+    assert len(lines) > 250
+    assert sum("refused" in line for line in lines) > 80
