@@ -20,6 +20,7 @@ from esker import contract as c
 from esker.contract import ImportStage, ImportStatus
 from esker.document.ops import Refusal
 from esker.importing.refusal import ImportCancelled, ImportRefused
+from esker.patchwork.trust import default_priority
 from esker.session.core import Denied
 from esker.session.hub import Hub
 from esker.store.access import Link
@@ -383,8 +384,7 @@ class Imports:
             update={
                 "id": f"g-{secrets.token_hex(6)}",
                 "author": self._author(job),
-                # What comes later is the newer survey, until somebody says otherwise.
-                "priority": min(10**6, max((other.priority for other in others), default=-1) + 1),
+                "priority": default_priority(layer, others),
             }
         )
         op: c.Op = c.AddLayer(layer=named)

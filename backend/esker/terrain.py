@@ -25,6 +25,7 @@ from esker.document.maker import Stroke
 from esker.document.strokes import misfit
 from esker.patchwork.base import Base
 from esker.patchwork.rasters import Raster
+from esker.patchwork.trust import default_priority
 from esker.solve.assembly import System, assemble
 from esker.solve.detail import Settled, detailed, settle
 from esker.solve.solver import Solver
@@ -147,12 +148,13 @@ class Terrain:
         (docs/importing.md), whose own place counts where it has one. ``anchor``: world position of sample [0, 0],
         without which a grid lies in the middle; ``rotation``: degrees counter-clockwise; ``spacing``: metres, or
         (sX, sY); ``accuracy``: the largest error of the grid anywhere, metres, by default from its spacing;
-        ``priority``: of layers that say different things the greater is believed, by default the one added last;
+        ``priority``: of layers that say different things the greater is believed, by default the one added last,
+        unless it is coarser and less accurate than what it lies on;
         height = ``scale`` * sample + ``lift``. ``answers``: to what a file leaves open. Raises ValueError for a grid
         that cannot be laid, or a file that is refused or leaves something open; OSError.
         """
         more: dict[str, Any] = {"name": name, "scale": scale, "lift_m": lift, "source": source, "licence": licence}
-        rank = self._patchwork.next_priority() if priority is None else int(priority)
+        rank = 0 if priority is None else int(priority)
         if isinstance(grid, (str, Path)):
             layer, raster, place = imported(
                 Path(grid), self.settings, anchor=anchor, rotation=rotation, spacing=spacing, accuracy=accuracy,
@@ -165,6 +167,8 @@ class Terrain:
                 grid, self.settings.size_m, anchor=anchor, rotation=rotation, spacing=spacing, accuracy=accuracy,
                 priority=rank, more=more,
             )  # fmt: skip
+        if priority is None:
+            layer = layer.model_copy(update={"priority": default_priority(layer, self.layers)})
         self._patchwork.put(layer, raster)
         return layer.id
 

@@ -118,10 +118,6 @@ class Patchwork:
         if all(other.content != layer.content for other in self._layers.values()):
             del self._rasters[layer.content]
 
-    def next_priority(self) -> int:
-        """That of a layer newer than all that are there."""
-        return max((layer.priority + 1 for layer in self.layers), default=0)
-
     @property
     def base(self) -> Base | None:
         """The ground of the visible layers; None where none is visible. That of the last time if nothing changed."""

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from esker.patchwork import lod_space_reference as reference
-from esker.patchwork.lod_space import Model, Placed, build, trust
+from esker.patchwork.lod_space import Model, Placed, build
+from esker.patchwork.trust import default_priority, trust
 from tests.patchwork.model_scenes import (
     Floats,
     blended,
@@ -181,3 +182,19 @@ def test_stale_ground_does_not_show_through() -> None:
         within = inside(model.kernel[cut[model.owner[cut] == 1]], inner).any(axis=0)
         wrong = np.abs(blended(model, cut, inner, tolerance) - true)[within]
         assert wrong.max() <= tolerance + 1e-3
+
+
+def test_a_coarse_grid_added_later_goes_below_the_better_ones() -> None:
+    """SPEC PW19."""
+    fine = layer("fine", 50, 50, anchor=(100.0, 100.0), rotation_deg=30.0, accuracy_m=1.0, priority=2)
+    far = layer("far", 50, 50, anchor=(9000.0, 0.0), accuracy_m=0.5, priority=7)
+    coarse = layer("coarse", 60, 60, spacing_m=(40.0, 40.0), accuracy_m=10.0)
+    assert default_priority(coarse, [fine, far]) == 2
+    believed = sorted([fine, coarse.model_copy(update={"priority": 2})], key=trust)
+    assert [one.id for one in believed] == ["coarse", "fine"]
+    assert default_priority(coarse, [far]) == 8
+    assert default_priority(fine.model_copy(update={"id": "again"}), [fine, coarse]) == 3, (
+        "what comes later is believed"
+    )
+    assert default_priority(coarse.model_copy(update={"accuracy_m": 0.5}), [fine]) == 3, "coarser, but more accurate"
+    assert default_priority(fine, [fine]) == 0

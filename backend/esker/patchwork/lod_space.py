@@ -17,21 +17,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from esker import contract
 from esker.patchwork import cover, patches, remeasure
 from esker.patchwork.patches import Floats
 from esker.patchwork.samples import cut
 from esker.patchwork.sheets import Ints, Placed, Sheet, reached, sheet
+from esker.patchwork.trust import trust
 
 __all__ = ["Model", "Placed", "build"]
 
 GROUND = ("content", "anchor", "rotation_deg", "spacing_m", "scale", "lift_m", "accuracy_m", "priority", "hidden")
 """Fields of a layer that its patches follow from."""
-
-
-def trust(layer: contract.Layer) -> tuple[int, float, float, str]:
-    """Sort key of layers: the greater is believed where two of them say different things."""
-    return layer.priority, -layer.accuracy_m, -layer.spacing_m[0] * layer.spacing_m[1], layer.id
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from esker.patchwork.errors_reference import bilinear
-from esker.patchwork.lod_space import Model, trust
+from esker.patchwork.lod_space import Model
 from esker.patchwork.patches import warped
 from esker.patchwork.sheets import affine, mapped
+from esker.patchwork.trust import trust
 
 Point = tuple[float, float]
 Polygon = list[Point]
