@@ -101,13 +101,6 @@ def test_mars() -> None:
 
 
 HOSTILE = ["huge_sparse_200k.tif", "huge_header.asc", "mars_srs.tif"]
-    "huge_sparse_200k.tif",
-    "huge_header.asc",
-    "bigtiff_100000x1.tif",
-    "empty.tif",
-    "invalid.tif",
-    "mars_srs.tif",
-]
 
 
 def test_memory_of_the_process_that_reads() -> None:
