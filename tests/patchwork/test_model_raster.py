@@ -142,6 +142,7 @@ def test_the_name_is_that_of_the_content() -> None:
     other = strange.copy()
     other.view(np.uint32)[0, 0] = 0xFFC01234
     assert rasters.build(strange).digest == rasters.build(other).digest
+    assert rasters.digest(strange, None) == rasters.digest(other, None) == rasters.build(strange).digest
 
 
 @pytest.mark.parametrize(
