@@ -119,7 +119,7 @@ def _coefficients(model: Model, index: NDArray[np.int32], smooth: bool) -> NDArr
     """``Pack.coefficients`` of patches, mipmap by mipmap."""
     stored = np.zeros((len(index), STRIDE, STRIDE), dtype=np.float32)
     groups = model.owner[index].astype(np.int64) * 64 + model.level[index]
-    order = np.argsort(groups, kind="stable")
+    order = np.lexsort((index, groups))  # neighbours follow each other: samples are read once
     for part in np.split(order, np.flatnonzero(np.diff(groups[order])) + 1) if len(order) else []:
         first = index[part[0]]
         placed = model.placed[model.owner[first]]

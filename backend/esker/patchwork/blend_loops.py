@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from esker.contract import PATCH_MARGIN_CELLS
+from esker.contract import PATCH_MARGIN_CELLS, PATCH_SAMPLES
 from esker.patchwork.jit import kernel
 from esker.patchwork.samples import cut
 from esker.patchwork.splines import STRIDE, prefilter
@@ -87,16 +87,33 @@ def fill_patches(
     stop: int,
 ) -> None:
     """Coefficients ``stored[places[k]]`` of the patches start..stop of one mipmap level."""
+    heights = np.empty((PATCH_SAMPLES, PATCH_SAMPLES))
     for k in range(start, stop):
         side = int(sides[k])
-        samples = np.empty((side, side), np.float32)
-        cut(mip, rows[k], cols[k], samples)
+        if not _plain_patch(mip, rows[k], cols[k], side, scale, lift, heights):
+            samples = np.empty((side, side), np.float32)
+            cut(mip, rows[k], cols[k], samples)
+            heights[:side, :side] = samples.astype(np.float64) * scale + lift
         if smooth:
-            prefilter(samples.astype(np.float64) * scale + lift, side, stored[places[k]])
+            prefilter(heights, side, stored[places[k]])
         else:
-            for row in range(side):
-                for col in range(side):
-                    stored[places[k], row, col] = samples[row, col] * scale + lift
+            stored[places[k], :side, :side] = heights[:side, :side]
+
+
+@kernel
+def _plain_patch(
+    mip: NDArray[np.float32], row: int, col: int, side: int, scale: float, lift: float, heights: NDArray[np.float64]
+) -> bool:
+    """The samples of a patch that lies inside its level and holds no nodata; False for any other."""
+    if row < 0 or col < 0 or row + side > mip.shape[0] or col + side > mip.shape[1]:
+        return False
+    total = np.float32(0)
+    for r in range(side):
+        source, out = mip[row + r], heights[r]
+        for c in range(side):
+            total += np.float32(0) * source[col + c]
+            out[c] = source[col + c] * scale + lift
+    return not np.isnan(total)
 
 
 @kernel
