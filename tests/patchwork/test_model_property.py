@@ -198,3 +198,15 @@ def test_a_coarse_grid_added_later_goes_below_the_better_ones() -> None:
     )
     assert default_priority(coarse.model_copy(update={"accuracy_m": 0.5}), [fine]) == 3, "coarser, but more accurate"
     assert default_priority(fine, [fine]) == 0
+
+
+def test_level_ground_is_one_patch() -> None:
+    """SPEC PW7, PW8: where all patches are equally accurate the greatest one serves, at every tolerance, 0 too."""
+    flat = surveyed(layer("flat", 120, 90, accuracy_m=2.0), height=lambda x, y: 0 * (x + y) + 7.0)
+    model = build([flat])
+    for tolerance in TOLERANCES:
+        cut = chosen(model, tolerance)
+        assert model.level[cut].tolist() == [len(flat.raster.mips) - 1]
+    other = surveyed(layer("small", 40, 40, anchor=(20.0, 30.0), accuracy_m=2.0), height=lambda x, y: 0 * (x + y) + 7.0)
+    both = build([flat, other])
+    assert [len(chosen(both, tolerance)) for tolerance in TOLERANCES] == [1] * len(TOLERANCES)
