@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from esker.patchwork import errors_reference as reference
-from esker.patchwork import mipmaps, patches, rasters
+from esker.patchwork import mipmaps, patches, rasters, sheets
 from esker.patchwork.rasters import Raster, RasterError
+from esker.patchwork.samples import cut
 from tests.patchwork.model_scenes import Floats, bend, land, layer
 
 RNG = np.random.default_rng(7)
@@ -191,3 +192,24 @@ def test_progress_tells_its_stages() -> None:
     rasters.build(grid(120, 120), progress=lambda stage, share: seen.append((stage, share)))
     assert [stage for stage, share in seen if share == 1.0] == ["mipmaps", "errors"]
     assert all(0 <= share <= 1 for _, share in seen)
+
+
+def test_samples_beside_nodata_are_the_mean_of_valid_ones() -> None:
+    """SPEC PW4: ring by ring outwards; beyond the grid its border goes on."""
+    heights = grid(60, 64).astype(np.float32)
+    heights[20:, 41:] = np.nan
+    for row, col in ((-2, -2), (12, 15), (18, 36), (40, 38)):
+        block = np.empty((18, 18), np.float32)
+        cut(heights, row, col, block)
+        np.testing.assert_allclose(block, reference.patch_samples(heights.astype(float), row, col, 18), atol=1e-3)
+
+
+@pytest.mark.parametrize("turn", [0.0, 90.0, 180.0, 270.0, -90.0, 30.0, -117.0, 360.0])
+def test_layers_turn_counter_clockwise(turn: float) -> None:
+    """SPEC PW5: sample [row, col] lies at anchor + R(turn) (col sx, row sy); quarter turns are exact."""
+    of = layer("x", 9, 9, anchor=(100.0, 50.0), rotation_deg=turn, spacing_m=(3.0, 5.0))
+    c, s = np.cos(np.radians(turn)), np.sin(np.radians(turn))
+    at = sheets.mapped(sheets.affine(of), np.array([[2.0, 0.0], [0.0, 2.0]]))
+    np.testing.assert_allclose(at, [[100 + 6 * c, 50 + 6 * s], [100 - 10 * s, 50 + 10 * c]], atol=1e-9)
+    if turn % 90 == 0:
+        assert np.array_equal(at, np.round(at))
