@@ -1,4 +1,4 @@
-"""Writes the files that other languages take from ``contract.py`` and ``fractal.py``.
+"""Writes the files that other languages take from ``contract`` and ``fractal.py``.
 
 ``python -m esker.contract_emit [--check]``.
 

@@ -1,4 +1,4 @@
-"""Binary frames (DESIGN 6): layout of contract.py's FRAME_HEADER, TILE_DROP, TILE_HEADER, written and read.
+"""Binary frames (DESIGN 6): layout of the contract's FRAME_HEADER, TILE_DROP, TILE_HEADER, written and read.
 
 A frame is the header, then the drops, then for each tile its header and payload; nothing follows.
 """

@@ -1,5 +1,5 @@
 /**
- * The rules of the contract for what this page sends, checked before it is sent (twin of the models of contract.py).
+ * The rules of the contract for what this page sends, checked before it is sent (twin of the models of the contract).
  *
  * The server closes a connection for good when a message is malformed, so a slip in the page (a NaN from a degenerate
  * drag, a label too long) must be found here and refused like any other op. `tests/vectors/messages.json` holds the

@@ -691,6 +691,59 @@ export interface OrderedOp {
   op: BeginStroke | AppendPoints | FinishStroke | SetStroke | MoveAnchor | DeleteStroke | RestoreStroke | SetTerrain | AddLayer | SetLayer | DeleteLayer | RestoreLayer | Group;
 }
 
+export interface ImportQuestion {
+  id: string;
+  text: string;
+  options: string[];
+  default: string;
+}
+
+export interface ImportReport {
+  verdict: "good" | "ask" | "refused";
+  file: string;
+  format: string;
+  rows: number;
+  cols: number;
+  dtype: string;
+  crs: string;
+  spacing_m: [number, number] | null;
+  rotation_deg: number;
+  width_m: number | null;
+  height_m: number | null;
+  at: [number, number] | null;
+  low_m: number | null;
+  high_m: number | null;
+  valid: number | null;
+  nodata: number | null;
+  accuracy_m: number | null;
+  notes: string[];
+  questions: ImportQuestion[];
+  refusal: string;
+  preview: number[][];
+}
+
+export interface ImportStatus {
+  id: string;
+  stage: "upload" | "reading" | "question" | "mipmaps" | "errors" | "saving" | "done" | "refused" | "cancelled";
+  share: number;
+  text: string;
+  report: ImportReport | null;
+  layer: string | null;
+}
+
+export interface ImportAnswers {
+  answers?: Record<string, string>;
+  anchor?: [number, number] | null;
+  rotation_deg?: number | null;
+  spacing_m?: [number, number] | null;
+  scale?: number | null;
+  lift_m?: number | null;
+  accuracy_m?: number | null;
+  name?: string | null;
+  source?: string | null;
+  licence?: string | null;
+}
+
 export interface Hello {
   type: "hello";
   protocol: number;
@@ -822,59 +875,6 @@ export interface ErrorMessage {
 export interface Pong {
   type: "pong";
   t: number;
-}
-
-export interface ImportQuestion {
-  id: string;
-  text: string;
-  options: string[];
-  default: string;
-}
-
-export interface ImportReport {
-  verdict: "good" | "ask" | "refused";
-  file: string;
-  format: string;
-  rows: number;
-  cols: number;
-  dtype: string;
-  crs: string;
-  spacing_m: [number, number] | null;
-  rotation_deg: number;
-  width_m: number | null;
-  height_m: number | null;
-  at: [number, number] | null;
-  low_m: number | null;
-  high_m: number | null;
-  valid: number | null;
-  nodata: number | null;
-  accuracy_m: number | null;
-  notes: string[];
-  questions: ImportQuestion[];
-  refusal: string;
-  preview: number[][];
-}
-
-export interface ImportStatus {
-  id: string;
-  stage: "upload" | "reading" | "question" | "mipmaps" | "errors" | "saving" | "done" | "refused" | "cancelled";
-  share: number;
-  text: string;
-  report: ImportReport | null;
-  layer: string | null;
-}
-
-export interface ImportAnswers {
-  answers?: Record<string, string>;
-  anchor?: [number, number] | null;
-  rotation_deg?: number | null;
-  spacing_m?: [number, number] | null;
-  scale?: number | null;
-  lift_m?: number | null;
-  accuracy_m?: number | null;
-  name?: string | null;
-  source?: string | null;
-  licence?: string | null;
 }
 
 export interface Importing {

@@ -1,0 +1,122 @@
+"""Constants: protocol, grid, solver, channels, elevation grids, detail, limits (DESIGN 2 to 6, 10, 11)."""
+
+from __future__ import annotations
+
+from typing import Final
+
+# --- protocol ---------------------------------------------------------------------------------------------------
+
+PROTOCOL_VERSION: Final = 4
+SUBPROTOCOL: Final = "esker.4"
+
+# --- grid (DESIGN 3) --------------------------------------------------------------------------------------------
+
+TILE_CELLS: Final = 64
+TILE_SAMPLES: Final = 65
+PATCH_CELLS: Final = 16
+SUBPATCHES: Final = 4
+"""Sub-patches along one side of a tile: each 16x16-cell patch is selected and drawn by itself (DESIGN 9)."""
+MAX_LEVEL: Final = 6
+"""The finest level that may be solved globally (4097 samples a side)."""
+DEFAULT_LEVEL: Final = 4
+MAX_REFINED_LEVEL: Final = 10
+"""The finest level that may be refined tile by tile above the global ones (65,537 samples a side; DESIGN 5.6)."""
+DEFAULT_REFINED_LEVEL: Final = 8
+MAX_SYNTHESIS_LEVEL: Final = 17
+"""The finest level that detail may be synthesised at: cells of 0.8 cm on the largest domain (DESIGN 10)."""
+MAX_REFINED_TILES: Final = 512
+"""Tiles above the global levels that one client is made to hold at most; the server drops what is least in view."""
+QUANTA_PER_CELL: Final = 256
+"""Quantisation step of level l: q_l = s_l / 256, so that the slope error is the same at every level (DESIGN 6)."""
+DEFAULT_SIZE_M: Final = 4096.0
+MIN_SIZE_M: Final = 64.0
+MAX_SIZE_M: Final = 65536.0
+DEFAULT_REACH_FRACTION: Final = 1.0 / 32.0
+
+# --- solver (DESIGN 5.2, 5.3) -----------------------------------------------------------------------------------
+
+CREST_STIFFNESS: Final = 4.0
+SATURATION: Final = 0.12
+SPRING_CELLS: Final = 30.0
+"""Flank spring a_i = (30 s_l / extent)^2."""
+SPRING_FULL_FRACTION: Final = 0.85
+CHEBYSHEV_SWEEPS: Final = 4
+CHEBYSHEV_LOW: Final = 0.5
+CHEBYSHEV_HIGH: Final = 2.0
+
+# --- channels (DESIGN 5.4, 6) -----------------------------------------------------------------------------------
+
+CHANNEL_LEVELS_BELOW: Final = 2
+"""Channels are smooth: they are solved and sent up to this many levels below the heights."""
+AMPLITUDE_QUANTA_PER_M: Final = 64
+ROUGHNESS_QUANTA: Final = 1024
+"""Quantisation steps of roughness 1. Channels have the same step on every level."""
+BIAS_QUANTA: Final = 1024
+"""Quantisation steps of a bias of 1: of snow, grass, forest and wetness."""
+BASE_AMPLITUDE_M: Final = 0.0
+BASE_ROUGHNESS: Final = 0.5
+BASE_BIAS: Final = 0.0
+"""What the channels are where no stroke says otherwise."""
+
+SURVEY_QUANTA: Final = 256
+"""Quantisation steps of one level of the survey channel."""
+BASE_SURVEY: Final = -1.0
+"""The survey channel where no elevation grid lies: below level 0, so that no detail is held back there."""
+
+# --- elevation grids (DESIGN 11) --------------------------------------------------------------------------------
+
+PATCH_SAMPLES: Final = 32
+PATCH_KERNEL_CELLS: Final = 28
+PATCH_MARGIN_CELLS: Final = 1.5
+"""A patch has 32 x 32 samples (31 cells); its kernel is the 28 cells in the middle."""
+MAX_LAYERS: Final = 64
+MAX_GRID_SAMPLES: Final = 200_000_000
+"""Samples that a file may declare."""
+MAX_GRID_BYTES: Final = 256 * 1024 * 1024
+"""Bytes of an uploaded elevation file."""
+MIN_GRID_SIDE: Final = 4
+MAX_GRID_SPACING_M: Final = 100_000.0
+MIN_GRID_SPACING_M: Final = 0.001
+MAX_VERTICAL_SCALE: Final = 1_000.0
+LAYER_HEIGHT_MARGIN: Final = 64.0
+"""A layer's heights are within so many sides of the domain of zero: more quanta than 2^30 no tile holds."""
+
+# --- detail (DESIGN 10) -----------------------------------------------------------------------------------------
+
+DEFAULT_DETAIL: Final = 1.0
+MAX_DETAIL: Final = 4.0
+"""Strength of the natural detail: 0 takes it away, 1 is the rule's own."""
+
+# --- stroke defaults (DESIGN 5.2, 12) ---------------------------------------------------------------------------
+
+DEFAULT_SLOPE_DEG: Final = 35.0
+DEFAULT_EXTENT_FRACTION: Final = 1.0 / 2.0
+"""Default flank extent as a fraction of the domain. So generous that a high flank is never cut off in a cliff: the band
+ends where it meets the base anyway."""
+MAX_SLOPE_DEG: Final = 85.0
+
+# --- limits (DESIGN 4); settings may lower them, never raise them --------------------------------------------------
+
+MAX_STROKES: Final = 5_000
+MAX_POINTS_PER_STROKE: Final = 4_096
+MAX_POINTS_PER_APPEND: Final = 256
+MAX_MESSAGE_BYTES: Final = 64 * 1024
+MAX_OPS_PER_SECOND: Final = 120
+OPS_BURST: Final = 240
+MAX_PRESENCE_PER_SECOND: Final = 30
+MAX_VIEWS_PER_SECOND: Final = 60
+MAX_MEMBERS: Final = 200
+MAX_NAME_LENGTH: Final = 80
+MAX_OPS_PER_MESSAGE: Final = 256
+MAX_OPS_PER_GROUP: Final = 64
+DOMAIN_MARGIN: Final = 10.0
+"""Points farther than ten times the domain size from its origin are refused."""
+PRESENCE_HZ: Final = 20
+TICK_MS: Final = 33
+BYTE_WINDOW: Final = 1 * 1024 * 1024
+"""Tile bytes that may be in flight to one client before it returns credits (DESIGN 8)."""
+MAX_BACKLOG_BYTES: Final = 3 * 1024 * 1024
+"""Control bytes queued for a client that does not read; above it the client is closed and resumes."""
+STALL_SECONDS: Final = 8.0
+"""A client whose socket accepted nothing for this long while bytes were waiting is evicted."""
+DEFAULT_TAU_PX: Final = 1.5
