@@ -78,8 +78,13 @@ SITES = (
     fields("smooth", rule="smooth", sea_level_m=-20.0, channels=strokes(6)),
     fields("plain", rule="plain", look="desert", channels=strokes(7)),
     fields("cyclic", cyclic=True, seed=77, channels=strokes(8)),
-    fields("surveyed", seed=9, sea_level_m=8.0, place={"lat_deg": 46.85, "lon_deg": -121.76},
-           channels=strokes(9) | survey(9)),
+    fields(
+        "surveyed",
+        seed=9,
+        sea_level_m=8.0,
+        place={"lat_deg": 46.85, "lon_deg": -121.76},
+        channels=strokes(9) | survey(9),
+    ),
     fields("wide", size_m=65536.0, seed=123456789, look="paper"),
 )
 
