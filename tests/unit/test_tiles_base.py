@@ -11,6 +11,7 @@ from tests.cones import FINEST, LEVELS, SIZE_M, Bump, Client, Ground, Made, draw
 from esker import grid
 from esker.contract import Channel, FrameKind, View
 from esker.grid import TileKey
+from esker.tiles.channels import values
 from esker.tiles.codec import SAMPLE_LIMIT
 from esker.tiles.delivery import ClientTiles, TileServer
 from esker.tiles.surface import total
@@ -292,3 +293,13 @@ def test_a_limit_holds_for_the_base_too() -> None:
 def test_sums_saturate_like_their_parts() -> None:
     top = np.array([[SAMPLE_LIMIT, -SAMPLE_LIMIT, 5]], dtype=np.int32)
     assert total(top, top).tolist() == [[SAMPLE_LIMIT, -SAMPLE_LIMIT, 10]]
+
+
+def test_a_survey_finer_than_all_tiles_ends_with_them() -> None:
+    """SPEC T51: where data are finer than the finest tile of the base, detail goes on below that tile."""
+    server = TileServer(SIZE_M, LEVELS, FINEST)
+    fine = np.full((65, 65), FINEST + 3.5, dtype=np.float32)
+    server.put_level(1, 0, fine, settled=True, channel=Channel.SURVEY)
+    held = server.channels[Channel.SURVEY].level(0)
+    assert held is not None
+    assert (values(held.samples, Channel.SURVEY) == FINEST).all()

@@ -8,14 +8,42 @@ Bands write to places of their own, so that the result has the same bits for any
 
 from __future__ import annotations
 
+import hashlib
 import os
+import shutil
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
 
 F = TypeVar("F", bound=Callable[..., Any])
+
+
+def _keep_by_content() -> None:
+    """Keeps compiled code in a folder that is named by what it was compiled from, and removes that of other texts.
+
+    numba asks only whether the file of a function has changed, not those of the functions that it calls. Where the
+    folder cannot be written, numba finds another place by its own rules.
+    """
+    room = Path(__file__).parent
+    texts = hashlib.sha256(b"".join(path.read_bytes() for path in sorted(room.glob("*.py")))).hexdigest()[:16]
+    kept = room / "__pycache__" / f"compiled-{texts}"
+    try:
+        kept.mkdir(parents=True, exist_ok=True)
+        if not os.access(kept, os.W_OK):
+            return
+    except OSError:
+        return
+    for other in kept.parent.glob("compiled-*"):
+        if other != kept:
+            shutil.rmtree(other, ignore_errors=True)
+    if "NUMBA_CACHE_DIR" not in os.environ:
+        numba.config.CACHE_DIR = str(kept)  # type: ignore[attr-defined]
+
+
+_keep_by_content()
 
 
 def kernel(function: F) -> F:

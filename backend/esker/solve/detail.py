@@ -70,7 +70,7 @@ def detailed(solver: Solver, settled: Settled, refined_level: int = DEFAULT_REFI
     basis, base = settled.basis, settled.basis.base
     refiner = solver.refiner(basis)
     levels = [] if base is None else [base.level(k, solver.device) for k in range(basis.level + 1)]
-    site = site_of(basis.settings, basis.heights, settled.channels, levels)
+    site = site_of(basis.settings, basis.heights, _shown(settled.channels, max(refined_level, basis.level)), levels)
     maker = None if solver.device is None else _OnDevice(solver.device)
 
     def ground(level: int, rows: slice, cols: slice) -> NDArray[np.float32]:
@@ -78,6 +78,14 @@ def detailed(solver: Solver, settled: Settled, refined_level: int = DEFAULT_REFI
         return base.window(level, rows, cols, solver.device)
 
     return DetailedTerrain(site, maker, refiner.window, refined_level, None if base is None else ground)
+
+
+def _shown(channels: Mapping[str, NDArray[np.float32]], finest: int) -> Mapping[str, NDArray[np.float32]]:
+    """The channels where no tile is finer than ``finest``: detail goes on below it, as on a server's tiles."""
+    name = Channel.SURVEY.name.lower()
+    if name not in channels:
+        return channels
+    return {**channels, name: np.minimum(channels[name], np.float32(finest))}
 
 
 class _OnDevice:

@@ -103,6 +103,9 @@ class TileServer:
         """
         if channel == Channel.BASE:
             return self._put_base(clock, level, heights)
+        if channel == Channel.SURVEY:
+            # Data finer than any tile of the base are not shown: detail goes on where the tiles end.
+            heights = np.minimum(heights, np.float32(self.refined.finest))
         if channel != Channel.HEIGHT:
             return self.channels[channel].put(clock, level, heights, settled, show)
         before = self.pyramid.stamp
