@@ -25,6 +25,8 @@ SHOTS: dict[str, list[str]] = {
         *("alpine-ridge", "--sun", "205,24", "--refine", "9"),
         *("--camera", "eye:1502,1500,target:1540,1560"),
     ],
+    "real-crater": ["helens", "--camera", "orbit:20,22,2600,target:1450,1200,2000"],
+    "real-rainier": ["rainier", "--camera", "orbit:318,9,46000,target:52000,14000,2000"],
 }
 
 
