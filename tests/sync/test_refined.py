@@ -96,8 +96,11 @@ class RoofSolver:
         return RoofRefiner(basis.height, self.made)
 
 
-def follow(peer: Peer, decoder: FrameDecoder, clock: int, timeout: float = 20) -> None:
-    """Decodes and gives credit until the ground is settled at ``clock`` and nothing is left to refine."""
+def follow(peer: Peer, decoder: FrameDecoder, clock: int, timeout: float = 20, refined: int = 0) -> None:
+    """Decodes and gives credit until the ground is settled at ``clock`` and nothing is left to refine.
+
+    ``refined``: tiles above level 1 that must have come: where the server knows them all it has nothing to tell first.
+    """
     deadline = time.monotonic() + timeout
     quiet = False
     while not quiet:
@@ -106,6 +109,7 @@ def follow(peer: Peer, decoder: FrameDecoder, clock: int, timeout: float = 20) -
         except TimeoutError:
             last: dict[str, Any] = next((m for m in reversed(peer.seen) if m["type"] == "progress"), {})
             quiet = last.get("settled", False) and last["clock"] >= clock and last["refining"] == 0
+            quiet = quiet and sum(key.level > 1 for key in decoder.held) >= refined
             assert quiet or time.monotonic() < deadline, last
             continue
         if isinstance(message, bytes):
@@ -152,7 +156,7 @@ def test_refined_tiles_come_where_one_looks_and_follow_edits(tmp_path: Path) -> 
         second, other = server.join(terrain, secret, "c2"), FrameDecoder()
         second.say("view", **NEAR.model_dump(mode="json", exclude={"type"}))
         made = len(solver.made)
-        follow(second, other, 2)
+        follow(second, other, 2, refined=sum(check(decoder, 26.0)[2:6]))
         assert check(other, 26.0)[2:6] == check(decoder, 26.0)[2:6]
         assert len(solver.made) == made, "what one has is there for the other"
         peer.close()
