@@ -16,12 +16,13 @@ NODE_OK := node -e 'const [a,b]=process.versions.node.split(".").map(Number);pro
 DRAWN := tests/e2e tests/golden tests/gpu tests/render
 SOURCES := $(shell find frontend/src shaders frontend/public -type f 2>/dev/null)
 
-.PHONY: run test test-drawn test-rest test-page pictures check format generate lock setup browser clean
+.PHONY: run test test-drawn test-rest test-page pictures check check-python check-page format generate lock setup browser clean
 
 run: setup frontend/dist/index.html ## set up, build, start the server, print the link of a new terrain
 	@exec $(BIN)/python -m esker serve $(ARGS)
 
-test: check browser frontend/dist/index.html ## set up, then run every check and every test
+test: $(STAMPS)/dev ## set up, then run every check and every test
+	@$(MAKE) --no-print-directory -j2 check browser frontend/dist/index.html
 	@if [ -n "$(ARGS)" ]; then exec $(BIN)/python -m pytest $(ARGS); else exec $(MAKE) --no-print-directory -j2 test-drawn test-rest test-page; fi
 
 # What draws in a browser leaves half a core idle, and so do the others: side by side they take two thirds of the time.
@@ -34,11 +35,15 @@ test-rest:
 test-page:
 	$(NPM) test
 
-check: $(STAMPS)/dev $(STAMPS)/node ## linters, formatters, type checkers, generated files
+check: check-python check-page ## linters, formatters, type checkers, generated files
+
+check-python: $(STAMPS)/dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/python -m esker.contract_emit --check
+
+check-page: $(STAMPS)/node
 	$(NPM) run check
 
 format: $(STAMPS)/dev $(STAMPS)/node
