@@ -22,7 +22,7 @@ from esker.session.recovery import Backoff
 from esker.tiles.delivery import RefinedTile
 
 FINEST_WITHIN: Final = 0.150
-HOLD: Final = 0.050
+HOLD: Final = 0.070
 """A coarse preview that the finest follows within this time is not shown, and its pass is not stopped."""
 FRAMES: Final = 0.060
 """The finest preview has this time to become frames before a coarse one is shown again: what is coarser and newer would
