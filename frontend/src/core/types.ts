@@ -209,6 +209,8 @@ export interface FrameStats {
   readonly selectMs: number;
   readonly cpuMs: number;
   readonly uploads: number;
+  /** Screen-error bound that the device's memory has room for where that is coarser than the one asked for, else null. */
+  readonly coarsenedPx?: number | null;
   /** True when another frame is needed even if nothing changes (uploads pending, something moving). */
   readonly busy: boolean;
 }

@@ -7,6 +7,7 @@ import { expectation } from "../tiles/synthetic.ts";
 import { Atlas, type Changes, MAX_SLOTS, type Resident, SOFTWARE_SLOTS } from "./atlas.ts";
 import { BackgroundPass } from "./background.ts";
 import type { Gpu } from "./device.ts";
+import { Fit } from "./fit.ts";
 import { FrameBindings, sunDirection } from "./frame.ts";
 import { GhostPass } from "./ghostplane.ts";
 import { LabelPass } from "./labels.ts";
@@ -57,6 +58,10 @@ interface World {
   readonly atlas: Atlas;
   readonly light: LightQueue;
   readonly selection: Selection;
+  /** What the atlas has no slots for is left out by a coarser bound. */
+  readonly fit: Fit;
+  /** Tiles that the last cut rested on and lacked. */
+  needed: number;
 }
 
 export class GpuRenderer implements SceneRenderer {
@@ -205,7 +210,7 @@ export class GpuRenderer implements SceneRenderer {
     this.passes.sun.attach(atlas);
     this.passes.taking.attach(atlas);
     const light = new LightQueue(this.passes.sun, atlas, this.gpu.software ? this.passes.taking : null);
-    this.world = { tiles: scene.tiles, atlas, selection, light };
+    this.world = { tiles: scene.tiles, atlas, selection, light, fit: new Fit(), needed: 0 };
     return this.world;
   }
 
@@ -258,24 +263,30 @@ export class GpuRenderer implements SceneRenderer {
       patches: cut.count,
       triangles: this.passes.patches.triangles,
       selectMs,
+      coarsenedPx: world.fit.factor > 1 ? scene.tauPx * world.fit.factor : null,
       cpuMs: performance.now() - how.began,
       uploads,
     });
   }
 
   /** Selects, lets requested tiles in and selects again, so that coarse levels arrive together in the first frame. */
-  private choose(scene: Scene, world: World, quality: Quality): { cut: Cut; entered: Resident[] } {
+  private choose(scene: Scene, world: World, quality: Quality, moved: boolean): { cut: Cut; entered: Resident[] } {
     const entered: Resident[] = [];
     const limit = NEW_TILES[this.gpu.software ? "software" : "hardware"];
-    const tau = scene.tauPx * quality.tauFactor;
+    const { atlas, fit } = world;
+    fit.begin(moved, world.needed, atlas.capacity);
     const sea = scene.settings.sea_level_m ?? Number.NEGATIVE_INFINITY;
     for (;;) {
-      const cut = world.selection.select(scene.tiles, scene.camera, tau, world.atlas, quality.scale, sea);
-      const more = world.atlas.admit(cut.requests, limit - entered.length);
+      const tau = scene.tauPx * quality.tauFactor * fit.factor;
+      const cut = world.selection.select(scene.tiles, scene.camera, tau, atlas, quality.scale, sea);
+      world.needed = cut.tiles;
+      if (fit.exceeded(cut.tiles, atlas.capacity)) continue;
+      const more = atlas.admit(cut.requests, limit - entered.length);
       entered.push(...more);
       if (more.length > 0) continue;
       // What is only needed soon waits for a frame with room to spare; the CPU never has any.
-      if (!this.gpu.software) entered.push(...world.atlas.admit(cut.early, limit - entered.length));
+      const room = Math.min(limit - entered.length, atlas.capacity - cut.tiles);
+      if (!this.gpu.software && room > 0) entered.push(...atlas.admit(cut.early, room));
       return { cut, entered };
     }
   }
@@ -336,10 +347,11 @@ export class GpuRenderer implements SceneRenderer {
     for (const { level, x, y } of changes.remade) world.selection.tree.remade(level, x, y);
     for (const { level, x, y } of changes.moved) world.selection.tree.remade(level, x, y);
     const selecting = performance.now();
-    const { cut, entered } = this.choose(scene, world, quality);
+    const { cut, entered } = this.choose(scene, world, quality, moved);
     const selectMs = performance.now() - selecting;
     this.high = cut.top;
-    this.tilesDue = cut.requests.length > 0 && !world.atlas.full;
+    // Slots that a finer cut of this frame held are free in the next.
+    this.tilesDue = cut.requests.length > 0 && (!world.atlas.full || cut.tiles <= world.atlas.capacity);
     this.compute(encoder, scene, world, { changes, entered, moved });
     return { cut, uploads: changes.remade.length + changes.moved.length + entered.length, selectMs };
   }

@@ -42,13 +42,18 @@ export interface Cut {
   readonly maxHeight: number;
   /** Nothing of the ground is higher, detail included. */
   readonly top: number;
+  /** Tiles that must be in the atlas together for a picture as fine as was asked for, as far as is known. */
+  readonly tiles: number;
 }
 
 /** What the selection asks of the atlas. */
 export interface Slots {
   /** Slot of a usable tile. */
   slot(level: number, x: number, y: number): number;
-  /** Called once per usable tile that the cut rests on (drawn tiles, their parents and all ancestors). */
+  /**
+   * Called once per usable tile that the cut rests on (drawn tiles, their parents and all ancestors), and per one that waits
+   * for a tile that was asked for.
+   */
   touch(level: number, x: number, y: number): void;
 }
 
@@ -61,6 +66,7 @@ export class Selection {
   private readonly splitList: number[][];
   // Per page.
   private touched: Uint8Array;
+  private touchedCount = 0;
   private slotOf: Int32Array;
   /** Tiles that the cut lacks, and those that it will soon need. */
   private readonly wishes: Wishes;
@@ -82,7 +88,7 @@ export class Selection {
   /** `levels`: the finest level that can exist. */
   constructor(readonly levels: number) {
     this.tree = new PatchTree(levels);
-    this.wishes = new Wishes(this.tree);
+    this.wishes = new Wishes(this.tree, (page) => this.touch(page));
     this.early = new Wishes(this.tree);
     const { capacity } = this.tree;
     this.split = new Uint8Array(capacity * 16);
@@ -112,7 +118,7 @@ export class Selection {
     this.begin(view, camera, tauPx, slots, pixelScale);
     const { usable, held, max, low, high } = this.tree;
     if (usable[0] === 1) {
-      slots.touch(0, 0, 0);
+      this.touch(0);
       for (let node = 0; node < 16; node += 1) this.descend(0, node);
       this.enforce();
       this.touchSplit();
@@ -125,7 +131,8 @@ export class Selection {
     for (let node = 0; node < 16; node += 1) top = Math.max(top, max[node]!);
     const { count, records } = this;
     const [requests, early] = [this.wishes.sorted(), this.early.sorted()];
-    return { count, records, requests, early, minHeight: low, maxHeight: high, top };
+    const tiles = this.touchedCount + requests.length;
+    return { count, records, requests, early, minHeight: low, maxHeight: high, top, tiles };
   }
 
   private begin(view: TileView, camera: CameraState, tauPx: number, slots: Slots, pixelScale: number): void {
@@ -154,6 +161,7 @@ export class Selection {
       this.slotOf = new Int32Array(capacity);
     }
     this.touched.fill(0);
+    this.touchedCount = 0;
     this.slotOf.fill(-1);
   }
 
@@ -272,15 +280,16 @@ export class Selection {
   }
 
   private touchSplit(): void {
-    const { tree, touched } = this;
-    for (let level = 0; level < this.levels; level += 1) {
-      for (const node of this.splitList[level]!) {
-        const page = tree.childPage(node);
-        if (touched[page] === 1) continue;
-        touched[page] = 1;
-        this.slots!.touch(level + 1, tree.tileX[page]!, tree.tileY[page]!);
-      }
-    }
+    for (let level = 0; level < this.levels; level += 1)
+      for (const node of this.splitList[level]!) this.touch(this.tree.childPage(node));
+  }
+
+  private touch(page: number): void {
+    if (this.touched[page] === 1) return;
+    this.touched[page] = 1;
+    this.touchedCount += 1;
+    const { tileLevel, tileX, tileY } = this.tree;
+    this.slots!.touch(tileLevel[page]!, tileX[page]!, tileY[page]!);
   }
 
   /** Whether the eye is above the ground that is drawn: else nearer ground need not hide what is behind it. */

@@ -18,7 +18,11 @@ export class Wishes {
   private list: Wish[] = [];
   private readonly known = new Set<number>();
 
-  constructor(private readonly tree: PatchTree) {}
+  /** `keep` is told the pages of tiles that are there already and that a wished one cannot be drawn without. */
+  constructor(
+    private readonly tree: PatchTree,
+    private readonly keep: (page: number) => void = () => {},
+  ) {}
 
   clear(): void {
     // What was given out stays as it was.
@@ -51,6 +55,7 @@ export class Wishes {
     const missing = page < 0 || tree.usable[page] === 0;
     if (missing && (tree.canMake(level) || (page >= 0 && tree.held[page] === 1)))
       this.list.push({ level, x, y, priority });
+    if (!missing) this.keep(page);
     if (level === 0) return;
     const dx = (x & 1) * 2 - 1;
     const dy = (y & 1) * 2 - 1;

@@ -66,6 +66,8 @@ export class Stage {
   readonly quality: QualityChoice;
   readonly following = signal<string | null>(null);
   readonly stats = signal<FrameStats | null>(null);
+  /** Screen-error bound of the picture, pixels, where this device has no room for the chosen one. */
+  readonly coarsenedPx = computed(() => this.stats.value?.coarsenedPx ?? null);
   readonly #viewport: HTMLElement;
   readonly #strokes: ReadonlySignal<readonly StrokeVisual[]>;
   readonly #cursors: ReadonlySignal<readonly CursorVisual[]>;

@@ -66,9 +66,15 @@ export class EskViewBar extends SignalElement {
   }
 
   #qualities(chosen: QualityMode): TemplateResult {
+    const coarsened = this.stage.coarsenedPx.value;
     return html`
       <wa-divider></wa-divider>
       <small class="heading">Quality</small>
+      ${
+        coarsened === null
+          ? null
+          : html`<small class="heading" role="status">This view is held to ${coarsened.toFixed(1)} px: no room for finer ground</small>`
+      }
       ${QUALITIES.map(
         (q) => html`
           <wa-dropdown-item type="checkbox" value=${q.value} title=${q.title} .checked=${live(chosen === q.value)}>${q.label}</wa-dropdown-item>
