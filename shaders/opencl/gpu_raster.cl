@@ -79,7 +79,7 @@ inline sums_t gather(const tables_t *t, int bx, int by, int gx, int gy, int n, l
 // Over a base: see raster.cl.
 #ifdef OVER_BASE
 #define OVER_ARGUMENTS , global const float *base
-#define OVER_SHARE , global float *share
+#define OVER_SHARE , global float *share, global float *target
 #define SET_OVER(t, o, there) (t).over = (there) ? base[o] : 0.0f
 #else
 #define OVER_ARGUMENTS
@@ -111,6 +111,7 @@ void rasterise(TABLE_ARGUMENTS, int by0, global const int *windows, int n, int p
     gradient_f[o + stride] = c.gradient_fy;
 #ifdef OVER_BASE
     share[o] = c.share;
+    target[o] = c.target;
 #endif
 }
 

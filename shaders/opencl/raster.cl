@@ -123,10 +123,10 @@ inline void gather(sums_t *sums, const tables_t *t, int bx, int by, int rows, in
     }
 }
 
-// Over a base the kernels have more arguments: the base at the samples, laid out like the outputs, and `share`.
+// Over a base the kernels have more arguments: the base at the samples, laid out like the outputs, `share` and `target`.
 #ifdef OVER_BASE
 #define OVER_ARGUMENTS , global const float *base
-#define OVER_SHARE , global float *share
+#define OVER_SHARE , global float *share, global float *target
 #define SET_OVER(t, o, width) (t).over = base + (o), (t).pitch = (width)
 #else
 #define OVER_ARGUMENTS
@@ -156,6 +156,7 @@ kernel void rasterise(TABLE_ARGUMENTS, int by0, global const int *windows, int n
         vstore16(c.gradient_fy, 0, gradient_f + stride + o);
 #ifdef OVER_BASE
         vstore16(c.share, 0, share + o);
+        vstore16(c.target, 0, target + o);
 #endif
     }
 }

@@ -407,7 +407,8 @@ INLINE void channel_section(sums_t *sum, const nearest_t *near, MASK inside, glo
 typedef struct {
     REAL height_d, height_f, gradient_d, gradient_fx, gradient_fy;
 #ifdef OVER_BASE
-    REAL share;  // how far the gradient is that of the ground itself, not of what lies above the base
+    REAL share;   // how far the gradient is that of the ground itself, not of what lies above the base
+    REAL target;  // what strokes want above the base, 0 where they want nothing
 #endif
 } constraint_t;
 
@@ -441,6 +442,7 @@ INLINE constraint_t conclude(const sums_t *sum, MASK x, int y, int n, float scre
     out.gradient_fy = toe * sum->gy / g;
 #ifdef OVER_BASE
     out.share = sum->toe * sum->share / g;
+    out.target = target;
 #endif
     return out;
 }

@@ -74,6 +74,7 @@ def test_what_is_owed_to_the_base(kernels: Device, level: int) -> None:
     over = w._over
     assert over is not None
     fields = {"d": stiffness(n)[0], "raw": noise((n, n), 2), "base": noise((n, n), 3), "share": noise((n, n), 4)}
+    fields["target"] = noise((n, n), 5)
     for name, value in fields.items():
         w.height.put("d", level, value[None])
         if name != "d":
@@ -83,12 +84,13 @@ def test_what_is_owed_to_the_base(kernels: Device, level: int) -> None:
             queue.cl.enqueue_copy(queue.queue, getattr(over, name), host)
     w.height.put("d", level, fields["d"][None])
     w.height.put("s", level, np.zeros((1, n, n)))
-    over.add(w.height.fields["d", level], w.height.fields["s", level], (5, n - 7))
-    expected = reference.over_base(fields["raw"], fields["d"], fields["share"], fields["base"])
+    slack = 0.2
+    over.add(w.height.fields["d", level], w.height.fields["s", level], slack, (5, n - 7))
+    expected = reference.over_base(fields["raw"], fields["d"], fields["share"], fields["target"], fields["base"], slack)
     some = np.zeros((n, n))
     some[5 : n - 7] = expected[5 : n - 7]
     close(w.height.get("s", level)[0], some)
-    over.add(w.height.fields["d", level], w.height.fields["s", level], (0, n))
+    over.add(w.height.fields["d", level], w.height.fields["s", level], slack, (0, n))
     close(w.height.get("s", level)[0], expected)
 
 
@@ -100,7 +102,7 @@ def test_constraints_are_the_twin_s(kernels: Device, base: Analytic) -> None:
     w.load(strokes, PINNED, base)
     under = base.level(level).astype(np.float64)
     c = reference_raster.rasterise(pack(strokes, PINNED, level, base=base), under)
-    static = reference.over_base(c.height_f, c.height_d, c.share, under)
+    static = reference.over_base(c.height_f, c.height_d, c.share, c.target, under, grid.spacing(level, SIZE))
     got = [w.height.get("d", level)[0], w.height.get("s", level)[0], w.gradient.get("d", level)[0]]
     got += list(w.gradient.get("f", level))
     for a, b in zip(got, [c.height_d, static, c.gradient_d, *c.gradient_f], strict=True):
@@ -121,7 +123,7 @@ def test_manufactured_ground(device: Device) -> None:
     d = np.zeros((n, n))
     d[n // 3, n // 2] = -1
     f = np.where(d < 0, ground - under, -reference.laplacian(ground[None])[0])
-    f = reference.over_base(f, d, np.ones((n, n)), under)
+    f = reference.over_base(f, d, np.ones((n, n)), np.zeros((n, n)), under, 0.0)
     w.height.put("d", level, d[None])
     w.height.put("s", level, f[None])
     w.height.coarsen(0.0)

@@ -137,6 +137,36 @@ def test_a_terrace_along_a_contour_does_both() -> None:
     assert (found.fill, found.cut) == (1, 1)
 
 
+def cliff(high: float = 300.0) -> Analytic:
+    """Low in the west, high in the east, with nothing between; it runs askew to the samples."""
+    return Analytic(f"cliff {high}", lambda x, y: 100 + high * (x - 2048 > 0.3 * (y - 2048)), 99, 101 + high)
+
+
+@pytest.mark.parametrize(
+    ("first", "last", "height"),
+    [
+        pytest.param((1000, 2048), (3000, 2048), 550.0, id="a ridge across it"),
+        pytest.param((1000, 2048), (3000, 2048), 250.0, id="a road, a dam below and a gorge above"),
+        pytest.param((1000, 2048), (3000, 2048), 140.0, id="a gorge"),
+        pytest.param((1900, 1000), (1900, 3000), 350.0, id="a ridge along it"),
+    ],
+)
+def test_strokes_leave_no_spikes_at_a_cliff(
+    solver: Solver, first: tuple[int, int], last: tuple[int, int], height: float
+) -> None:
+    """SPEC S100: the ground is that of the section or the base, on both sides of the cliff."""
+    base, slope = cliff(), math.tan(math.radians(35))
+    side = flank(35, 800, "straight")
+    stroke = Make.profile([(*first, height), (*last, height)], left=side, right=side, id="s")
+    h, under = ground(solver, [stroke], base, 3), base.level(3).astype(np.float64)
+    y, x = np.mgrid[:513, :513] * 8.0
+    beyond = np.hypot(np.clip(x, first[0], last[0]) - x, np.clip(y, first[1], last[1]) - y)
+    section = np.where(
+        height > under, np.maximum(under, height - slope * beyond), np.minimum(under, height + slope * beyond)
+    )
+    assert np.abs(h - section).max() < 20
+
+
 def test_levels_agree_over_a_base(solver: Solver) -> None:
     """SPEC S13 over hills: a finer level does not weigh strokes anew."""
     strokes = lifted(mixed(12, 9), 300)

@@ -32,7 +32,9 @@ def assemble(strokes: Sequence[Stroke], settings: TerrainSettings, level: int, b
     tables = pack(strokes, settings, level, base=base)
     under = None if base is None else base.level(level).astype(np.float64)
     c = reference_raster.rasterise(tables, under)
-    static = c.height_f if under is None else reference.over_base(c.height_f, c.height_d, c.share, under)
+    static = c.height_f
+    if under is not None:
+        static = reference.over_base(static, c.height_d, c.share, c.target, under, tables.spacing_m)
     gradient = reference.NumpySystem(c.gradient_d[None], c.gradient_f, tables.screening, level)
     _diffuse(gradient)
     f = reference.divergence(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Final, Generic, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,10 @@ from esker.solve.tables import RASTER_BINS, Tables, Window
 
 if TYPE_CHECKING:
     from esker.solve.passes import Workspace
+
+
+OVER_FIELDS: Final = 4
+"""Fields of the finest level that a base takes."""
 
 
 class DeviceSystem(multigrid.System, Protocol):
@@ -38,10 +42,11 @@ class DeviceSystem(multigrid.System, Protocol):
 
 class OverBase:
     """What a workspace over a base holds on the device: the base at the finest level, the share of the guidance that is
-    the ground's own, and the right-hand side of the heights without what is owed to the base."""
+    the ground's own, what strokes want above the base, and the right-hand side of the heights without what is owed to
+    the base."""
 
     def __init__(self, queue: Queue, shape: Shape, pad: int, enqueue: Callable[..., None]) -> None:
-        self.base, self.share, self.raw = (queue.zeros(shape.stride + pad) for _ in range(3))
+        self.base, self.share, self.target, self.raw = (queue.zeros(shape.stride + pad) for _ in range(OVER_FIELDS))
         self._queue, self._shape, self._pad, self._enqueue = queue, shape, pad, enqueue
         self._digest = b""
 
@@ -53,9 +58,9 @@ class OverBase:
             self._queue.cl.enqueue_copy(self._queue.queue, self.base, np.ascontiguousarray(samples), **window)
             self._digest = base.digest
 
-    def add(self, d: Any, f: Any, rows: tuple[int, int]) -> None:
-        """f = ``raw`` and what is owed to the base, rows first .. last - 1."""
-        self._enqueue(self._queue, self._shape, (self.base, self.share, d, self.raw, f), rows)
+    def add(self, d: Any, f: Any, slack: float, rows: tuple[int, int]) -> None:
+        """f = ``raw`` and what is owed to the base, rows first .. last - 1; see ``reference.over_base``."""
+        self._enqueue(self._queue, self._shape, (self.base, self.share, self.target, d, self.raw, f), slack, rows)
 
 
 S = TypeVar("S", bound=DeviceSystem)
@@ -101,7 +106,8 @@ class DeviceWorkspace(Generic[S]):
         self.gradient.coarsen(tables.screening, rows)
         if self._over is not None:
             rows = max(0, rows[0] - 1), min(tables.samples, rows[1] + 1)
-            self._over.add(self.height.fields["d", self.top], self.height.fields["s", self.top], rows)
+            d, f = (self.height.fields[name, self.top] for name in ("d", "s"))
+            self._over.add(d, f, tables.spacing_m, rows)
         self.height.coarsen(tables.screening, rows)
 
     def warm(self, heights: NDArray[np.float32]) -> None:
@@ -115,7 +121,7 @@ class DeviceWorkspace(Generic[S]):
         over = self._over
         static = h["s", self.top] if over is None else over.raw
         fields = (h["d", self.top], static, g["d", self.top], g["f", self.top])
-        pair = None if over is None else raster.Over(over.base, over.share)
+        pair = None if over is None else raster.Over(over.base, over.share, over.target)
         raster.rasterise(self._bins, tables, window, raster.Target(*fields, shape.pitch, shape.stride, pair))
 
     def read(self, level: int) -> NDArray[np.float32]:

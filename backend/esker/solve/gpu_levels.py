@@ -201,12 +201,12 @@ class Bins:
         self.launch.run_once(name, size, (BIN, BIN), *args)
 
 
-def _over_base(launch: GpuLauncher, shape: Shape, fields: Sequence[Any], rows: tuple[int, int]) -> None:
+def _over_base(launch: GpuLauncher, shape: Shape, fields: Sequence[Any], slack: float, rows: tuple[int, int]) -> None:
     """Enqueue ``reference.over_base`` (``device_workspace.OverBase``)."""
     i, (first, last) = np.int32, rows
     launch.run_once(
-        named("over_base", True), _blocks(shape.n, last - first), BLOCK, *fields, i(shape.n), i(shape.pitch), i(first),
-        i(last),
+        named("over_base", True), _blocks(shape.n, last - first), BLOCK, *fields, np.float32(slack), i(shape.n),
+        i(shape.pitch), i(first), i(last),
     )  # fmt: skip
 
 

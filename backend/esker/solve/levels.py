@@ -182,19 +182,20 @@ class ClSystem(Fields):
 
 
 def over_base(
-    launch: Launcher, fields: Sequence[Any], samples: tuple[int, int], pitch: int, rows: tuple[int, int]
+    launch: Launcher, fields: Sequence[Any], slack: float, samples: tuple[int, int], pitch: int, rows: tuple[int, int]
 ) -> None:
-    """Enqueue ``reference.over_base`` for ``rows`` (half open) of (rows, columns) samples; fields: base, share, d,
-    static part without it, static part."""
+    """Enqueue ``reference.over_base`` for ``rows`` (half open) of (rows, columns) samples; fields: base, share, target,
+    d, static part without it, static part."""
     i, (first, last) = np.int32, rows
     strips, each = launch.strips(last - first)
     launch.run(
-        named("over_base", True), (strips,), *fields, i(samples[0]), i(samples[1]), i(pitch), i(first), i(last), i(each)
-    )
+        named("over_base", True), (strips,), *fields, np.float32(slack), i(samples[0]), i(samples[1]), i(pitch),
+        i(first), i(last), i(each),
+    )  # fmt: skip
 
 
-def _over_level(launch: Launcher, shape: Shape, fields: Sequence[Any], rows: tuple[int, int]) -> None:
-    over_base(launch, fields, (shape.n, shape.n), shape.pitch, rows)
+def _over_level(launch: Launcher, shape: Shape, fields: Sequence[Any], slack: float, rows: tuple[int, int]) -> None:
+    over_base(launch, fields, slack, (shape.n, shape.n), shape.pitch, rows)
 
 
 class ClWorkspace(DeviceWorkspace[ClSystem]):

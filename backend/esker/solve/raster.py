@@ -21,11 +21,12 @@ class Launcher(Protocol):
 
 @dataclass(frozen=True)
 class Over:
-    """Float32 buffers laid out like the constraints. base: the base there; share: to be written, see
+    """Float32 buffers laid out like the constraints. base: the base there; share, target: to be written, see
     ``reference_raster.Constraints``."""
 
     base: Any
     share: Any
+    target: Any
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,7 @@ def rasterise(launch: Launcher, tables: Tables, window: Window, target: Target) 
     """Enqueue the constraints of the bins of ``window``, which lie within the tables' box."""
     if window.width == 0:
         return
-    over = () if target.over is None else (target.over.base, target.over.share)
+    over = () if target.over is None else (target.over.base, target.over.share, target.over.target)
     name = named("rasterise", over_base=target.over is not None)
     launch.run(
         name, (window.width, len(window.spans)), *_arguments(launch, tables, window),

@@ -102,17 +102,24 @@ def divergence(static: Field, d: Field, g: Field, spacing_m: float) -> Field:
     return np.asarray(np.where(d < 0, static, static + out))
 
 
-def over_base(static: Field, d: Field, share: Field, base: Field) -> Field:
+def over_base(static: Field, d: Field, share: Field, target: Field, base: Field, slack: float) -> Field:
     """Static right-hand side of the height step over a base (docs/solver.md, "Over a base"), all (n, n).
 
     ``share`` of the guidance prescribes the ground itself: so that much of the base's own difference along each edge,
-    with the mean share of its two ends, is taken off what lies above the base. Borders are mirrored.
+    with the mean share of its two ends, is taken off what lies above the base. Where a cliff of the base leaves a band
+    that is too much or too little: then, to within ``slack`` metres, what the two ends' ``target`` differ by, with a
+    share between those of the ends; between a fill and a cut it may be less than either. Borders are mirrored.
     """
-    s, b = (np.pad(a, 1, mode="reflect") for a in (share, base))
+    s, b, t = (np.pad(a, 1, mode="reflect") for a in (share, base, target))
     out = np.zeros_like(static)
     for rows, columns in ((slice(0, -2), slice(1, -1)), (slice(2, None), slice(1, -1)),
                           (slice(1, -1), slice(0, -2)), (slice(1, -1), slice(2, None))):  # fmt: skip
-        out += 0.5 * (share + s[rows, columns]) * (b[rows, columns] - base)
+        step, fall = b[rows, columns] - base, target - t[rows, columns]
+        low, high = np.sort([share * step, s[rows, columns] * step], axis=0)
+        through = target * t[rows, columns] < 0
+        low, high = np.where(through, np.minimum(low, 0), low), np.where(through, np.maximum(high, 0), high)
+        mean = 0.5 * (share + s[rows, columns]) * step
+        out += np.clip(np.clip(mean, fall - slack, fall + slack), low, high)
     return np.asarray(np.where(d < 0, static, static + out))
 
 
@@ -231,7 +238,11 @@ class NumpyWorkspace:
             return
         under = None if base is None else base.level(self.top).astype(np.float64)
         c = reference_raster.rasterise(tables, under)
-        height_f = c.height_f if under is None else over_base(c.height_f, c.height_d, c.share, under)
+        height_f = (
+            c.height_f
+            if under is None
+            else over_base(c.height_f, c.height_d, c.share, c.target, under, tables.spacing_m)
+        )
         self.size_m = tables.size_m
         self.gradient = NumpySystem(c.gradient_d[None], c.gradient_f, tables.screening, self.top)
         self.height = NumpySystem(c.height_d[None], height_f[None], tables.screening, self.top)

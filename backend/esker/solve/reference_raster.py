@@ -38,7 +38,8 @@ class Constraints:
     Every array float64, (rows, columns) or (2, rows, columns), row 0 south. height_d: spring stiffness, HARD where
     fixed. height_f: stiffness times target (plus what the screening must give back), or the fixed height. gradient_d:
     stiffness for both gradient components. gradient_f: stiffness times target (d/dx, d/dy), metres per metre. share:
-    how far the gradient is that of the ground, base included (``reference.over_base``).
+    how far the gradient is that of the ground, base included; target: heights above the base that are wanted, 0 where
+    none are (``reference.over_base``).
     """
 
     height_d: Floats
@@ -46,6 +47,7 @@ class Constraints:
     gradient_d: Floats
     gradient_f: Floats
     share: Floats
+    target: Floats
 
 
 def rasterise(tables: Tables, base: NDArray[np.floating] | None = None) -> Constraints:
@@ -70,7 +72,7 @@ def rasterise(tables: Tables, base: NDArray[np.floating] | None = None) -> Const
         edge = ((y == 0) | (y == tables.samples - 1))[:, None] | (x == 0) | (x == tables.samples - 1)
         height_d, height_f = np.where(edge, PINNED, height_d), np.where(edge, 0.0, height_f)
     share = total["toe"] * total["follows"] / np.maximum(total["g"], TINY)
-    return Constraints(height_d, height_f, *_two(total), share)
+    return Constraints(height_d, height_f, *_two(total), share, target)
 
 
 def rasterise_channel(tables: Tables, base: NDArray[np.floating] | None = None) -> tuple[Floats, Floats, Floats]:

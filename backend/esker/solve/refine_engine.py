@@ -137,7 +137,7 @@ class StrokeWindows(Protocol):
 
 _MEMORY: Final = {"u": 3, "v": 3, "gd": 1, "gf": 2, "hd": 1, "hf": 1, "q": 2, "rhs": 1}
 """Fields of a window and their channels."""
-_OVER: Final = {"base": 1, "share": 1, "raw": 1}
+_OVER: Final = {"base": 1, "share": 1, "target": 1, "raw": 1}
 """Those that it has over a base."""
 
 
@@ -166,7 +166,9 @@ class NumpyEngine:
         tables = strokes.tables(at.level, at.box)
         under = None if strokes.base is None else strokes.base.window(at.level, at.window).astype(np.float64)
         c = reference_raster.rasterise(tables, under)
-        f = c.height_f if under is None else reference.over_base(c.height_f, c.height_d, c.share, under)
+        f = c.height_f
+        if under is not None:
+            f = reference.over_base(f, c.height_d, c.share, c.target, under, tables.spacing_m)
         u = prolongation(with_ghosts(parent.astype(np.float64), at), at.window)
         gradient = sweeps(u[:2], c.gradient_f, c.gradient_d[None], tables.screening, GRADIENT_SWEEPS)
         fixed = c.height_d[None] < 0
@@ -237,7 +239,7 @@ class ClEngine:
         pitch = PAD + (at.box[3] - at.box[2]) * BIN + PAD
         self._room(rows * pitch, strokes.base is not None)
         a, stride, run = self.fields, self.stride, self.launch.run
-        self._constrain(at, strokes, pitch)
+        self._constrain(at, strokes, pitch, spacing)
         shape = (i(rows), i(columns), i(pitch), i(stride))
         each = _STRIPS_ROWS
         strips = -(-rows // each)
@@ -258,18 +260,18 @@ class ClEngine:
         self._sweep(1, 2, "rhs", "hd", 1, shape, screening, HEIGHT_SWEEPS, target_span)
         return self._read(target_span, pitch)
 
-    def _constrain(self, at: Step, strokes: StrokeWindows, pitch: int) -> None:
+    def _constrain(self, at: Step, strokes: StrokeWindows, pitch: int, spacing: float) -> None:
         """The constraints of the window: bins that are known from the sheets, the others from the rasteriser."""
         a, cl, queue, base = self.fields, self.launch.cl, self.launch.queue, strokes.base
         kept = [("hd", 1), ("hf" if base is None else "raw", 1), ("gd", 1), ("gf", 2)]
-        kept += [] if base is None else [("share", 1)]
+        kept += [] if base is None else [("share", 1), ("target", 1)]
         parts = self.sheets.parts(at.level, at.box, strokes.sheet_digest, sum(channels for _, channels in kept))
         fresh = missing(parts, at.box)
         (rows, columns), both = at.window.shape, cl.map_flags.READ | cl.map_flags.WRITE
         over = None
         if base is not None:
             self._put_base(base.window(at.level, at.window), pitch)
-            over = raster.Over(a["base"], a["share"])
+            over = raster.Over(a["base"], a["share"], a["target"])
         if fresh.width:
             target = raster.Target(a["hd"], a[kept[1][0]], a["gd"], a["gf"], pitch, self.stride, over)
             raster.rasterise(self.launch, strokes.shared_tables(at.level, at.box), fresh, target)
@@ -285,8 +287,8 @@ class ClEngine:
             host.base.release(queue)
         self.sheets.trim()
         if base is not None:
-            fields = [a[name] for name in ("base", "share", "hd", "raw", "hf")]
-            over_base(self.launch, fields, (rows, columns), pitch, (0, rows))
+            fields = [a[name] for name in ("base", "share", "target", "hd", "raw", "hf")]
+            over_base(self.launch, fields, spacing, (rows, columns), pitch, (0, rows))
 
     def _put_base(self, samples: Values, pitch: int) -> None:
         """Copies the base's samples to the window's."""

@@ -22,8 +22,8 @@ SHEET_BINS: Final = 8
 SHEET: Final = SHEET_BINS * BIN
 """Samples along a side of what is kept or dropped together."""
 FIELDS: Final = 5
-"""Stiffness and right-hand side of the heights, stiffness and both right-hand sides of the gradient; over a base one
-more, the share of the gradient that is the ground's own."""
+"""Stiffness and right-hand side of the heights, stiffness and both right-hand sides of the gradient; over a base two
+more, the share of the gradient that is the ground's own and what is wanted above the base."""
 SHEET_BYTES: Final = 4 * FIELDS * SHEET**2
 SHEETS_BYTES: Final = 64 << 20
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 from esker import grid
 from esker.solve import gpu_levels, levels
 from esker.solve.device import Device
+from esker.solve.device_workspace import OVER_FIELDS
 from esker.solve.faults import OutOfDeviceMemoryError, finished
 from esker.solve.fields import fields_of
 from esker.solve.reference import NumpyWorkspace
@@ -23,8 +24,6 @@ if TYPE_CHECKING:
 
 SHARE = 0.9
 """Of a device's memory that workspaces may take: tables, the driver and the display need some too."""
-OVER_FIELDS = 3
-"""Fields of the finest level that a base takes (``device_workspace.OverBase``)."""
 _held: Counter[str] = Counter()
 _lock = threading.Lock()
 
