@@ -78,8 +78,9 @@ MIN_GRID_SIDE: Final = 4
 MAX_GRID_SPACING_M: Final = 100_000.0
 MIN_GRID_SPACING_M: Final = 0.001
 MAX_VERTICAL_SCALE: Final = 1_000.0
-LAYER_HEIGHT_MARGIN: Final = 64.0
-"""A layer's heights are within so many sides of the domain of zero: more quanta than 2^30 no tile holds."""
+LAYER_HEIGHT_MARGIN: Final = 5.0
+"""A layer's heights are within so many sides of the domain of zero. Tiles of level 10 hold 16 sides (2^28 quanta);
+strokes reach ``DOMAIN_MARGIN`` = 10, so their offsets from any layer fit, with a side to spare for what overshoots."""
 
 # --- detail (DESIGN 10) -----------------------------------------------------------------------------------------
 
@@ -105,7 +106,15 @@ MAX_OPS_PER_SECOND: Final = 120
 OPS_BURST: Final = 240
 MAX_PRESENCE_PER_SECOND: Final = 30
 MAX_VIEWS_PER_SECOND: Final = 60
+MAX_SEEKS_PER_SECOND: Final = 15
 MAX_MEMBERS: Final = 200
+MAX_PAST_ROOMS: Final = 8
+"""People of one server who look at the past at the same time: each has a solve and tiles of their own."""
+PAST_IDLE_SECONDS: Final = 600.0
+"""Who looks at the past and neither moves the view nor goes to another clock for so long makes room for others."""
+MAX_HISTORY_OPS: Final = 100_000
+"""Ops that the list of the history reaches back; earlier clocks can be looked at and copied all the same."""
+MAX_HISTORY_PAGE: Final = 200
 MAX_NAME_LENGTH: Final = 80
 MAX_OPS_PER_MESSAGE: Final = 256
 MAX_OPS_PER_GROUP: Final = 64

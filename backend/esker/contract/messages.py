@@ -16,7 +16,11 @@ from esker.contract.values import Clock, Colour, Id, Name, OpId, Role, Secret, V
 
 
 class Hello(Wire):
-    """First message on a socket. ``clock`` asks to resume: the server answers with the missing ops if it can."""
+    """First message on a socket. ``clock`` asks to resume: the server answers with the missing ops if it can.
+
+    ``at``: to look at the terrain as it was at this clock (or now, if that is earlier), in a room of one's own where
+    nothing can be changed; ``seek`` goes to another clock.
+    """
 
     type: Literal["hello"] = "hello"
     protocol: int
@@ -26,6 +30,7 @@ class Hello(Wire):
     name: Name = ""
     colour: Colour | None = None
     clock: Clock | None = None
+    at: Clock | None = None
 
 
 class Ops(Wire):
@@ -69,12 +74,23 @@ class Rename(Wire):
     colour: Colour | None = None
 
 
+class Seek(Wire):
+    """Only after a ``hello`` with ``at``: show the terrain as it was at another clock.
+
+    Answered by ``ordered`` with the ops in between, where they are few and ``clock`` is later, else by a ``welcome``
+    with the document; of seeks that come before an answer the last one counts.
+    """
+
+    type: Literal["seek"] = "seek"
+    clock: Clock
+
+
 class Ping(Wire):
     type: Literal["ping"] = "ping"
     t: float
 
 
-ClientMessage = Annotated[Hello | Ops | View | Presence | Credit | Rename | Ping, Field(discriminator="type")]
+ClientMessage = Annotated[Hello | Ops | View | Presence | Credit | Rename | Seek | Ping, Field(discriminator="type")]
 
 
 # --- messages: server to client ---------------------------------------------------------------------------------

@@ -13,6 +13,7 @@ from fastapi import FastAPI
 from esker.headers import Headers
 from esker.imports import Imports
 from esker.server.answers import add_errors
+from esker.server.history import add_history
 from esker.server.imports import add_imports
 from esker.server.links import add_links
 from esker.server.page import add_page
@@ -60,6 +61,7 @@ def create_app(hub: Hub, page: Path, data: Path, pictures: Pictures, grids: Grid
     add_errors(app)
     add_imports(app, hub, grids, imports)
     add_terrains(app, hub, grids)
+    add_history(app, hub, grids)
     add_links(app, hub)
     add_socket(app, hub)
     add_previews(app, hub, pictures)

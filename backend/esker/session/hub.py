@@ -8,13 +8,14 @@ import secrets
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from typing import Final
+from typing import Any, Final
 
 from esker import contract as c
-from esker.document.ops import Limits
+from esker.document.ops import Limits, StrokeSet
 from esker.session.core import Denied, RoomCore, RoomInfo
 from esker.session.limits import RateByKey
 from esker.session.outbox import Outbox
+from esker.session.past import PastCore, PastRoom, Pasts
 from esker.session.ports import Elevation, Tiles
 from esker.session.room import Guest, Room
 from esker.session.tilethread import TileThread
@@ -60,6 +61,7 @@ class Hub:
         self._laying = ThreadPoolExecutor(1, thread_name_prefix="elevation")
         self._wrong = RateByKey(WRONG_SECRETS_PER_MINUTE / 60, WRONG_SECRETS_PER_MINUTE)
         self._closing = False
+        self._pasts = Pasts(journal, self._past_room)
 
     @property
     def device(self) -> str:
@@ -86,6 +88,8 @@ class Hub:
         if self._closing:
             raise Denied("shutting_down", "The server is stopping. Your page will come back by itself.")
         link = self.authorise(hello.terrain, hello.secret, address)
+        if hello.at is not None:
+            return await self._pasts.enter(hello, link.id, outbox)
         room = await self.room(hello.terrain)
         while room.closed:  # it was idle and closed in this very moment
             room = await self.room(hello.terrain)
@@ -129,17 +133,22 @@ class Hub:
             self._limits,
             self._max_members,
         )
-        return Room(
-            core,
-            journal=self.journal,
-            worker=self._worker,
-            tiles=self._tiles,
-            executor=self._tile_thread,
-            info=RoomInfo(self._levels, self._finest, self._worker.device_name),
-            on_empty=lambda: self._empty(terrain),
-            elevation=self._elevation,
-            laying=self._laying,
-        )
+        return Room(core, journal=self.journal, on_empty=lambda: self._empty(terrain), **self._needs())
+
+    def _past_room(self, core: PastCore, on_empty: Callable[[], None]) -> PastRoom:
+        idle = c.PAST_IDLE_SECONDS
+        return PastRoom(core, journal=self.journal, on_empty=on_empty, idle_seconds=idle, **self._needs())
+
+    def _needs(self) -> dict[str, Any]:
+        """What every room is made with."""
+        return {
+            "worker": self._worker,
+            "tiles": self._tiles,
+            "executor": self._tile_thread,
+            "info": RoomInfo(self._levels, self._finest, self._worker.device_name),
+            "elevation": self._elevation,
+            "laying": self._laying,
+        }
 
     def open_room(self, terrain: str) -> Room | None:
         """The room if it is open already."""
@@ -166,30 +175,37 @@ class Hub:
         link, secret = await asyncio.wrap_future(self.access.add(born.id, "owner", "Owner"))
         return born, link, secret
 
-    async def document(self, terrain: str) -> c.Document:
-        """The committed document. Raises Denied (no_terrain, server_error)."""
+    async def document(self, terrain: str, at: int | None = None) -> c.Document:
+        """The committed document, or that of an earlier clock. Raises Denied (no_terrain, server_error)."""
+        return (await self.strokes(terrain, at)).to_document()
+
+    async def strokes(self, terrain: str, at: int | None = None) -> StrokeSet:
+        """The same as the room holds it."""
         room = self.open_room(terrain)
-        if room is not None:
-            return room.core.document.to_document()
+        if room is not None and (at is None or at >= room.core.document.clock):
+            return room.core.document
         try:
-            loaded = await asyncio.to_thread(self.journal.load, terrain)
+            loaded = await asyncio.to_thread(self.journal.load, terrain, at)
         except DamagedTerrain as error:
             raise Denied("server_error", "The journal of this terrain is damaged; nothing was changed.") from error
         if loaded is None:
             raise Denied("no_terrain", "There is no such terrain on this server.")
-        return loaded.document.to_document()
+        return loaded.document
 
     def revoke_members(self, terrain: str, link: str) -> None:
         """Closes everybody who came in by a link that no longer works."""
-        room = self.open_room(terrain)
-        if room is not None:
-            room.core.revoke(link)
+        self._revoke(terrain, link, "revoked", "The link that you opened was revoked by the owner.")
 
     def renew_members(self, terrain: str, link: str) -> None:
         """Lets everybody who came in by a link show its new secret: they are closed and may come back."""
+        sentence = "The link was renewed. Your page comes back if it has the new one."
+        self._revoke(terrain, link, "shutting_down", sentence)
+
+    def _revoke(self, terrain: str, link: str, code: c.CloseCode, sentence: str) -> None:
         room = self.open_room(terrain)
         if room is not None:
-            room.core.revoke(link, "shutting_down", "The link was renewed. Your page comes back if it has the new one.")
+            room.core.revoke(link, code, sentence)
+        self._pasts.revoke(terrain, link, code, sentence)
 
     async def close(self) -> None:
         """Tells everybody, commits what was ordered, stops the rooms. The journal stays open."""
@@ -199,6 +215,7 @@ class Hub:
             await room.flush()
             for member in room.core.members:
                 member.outbox.close("shutting_down", "The server is stopping. Your page will come back by itself.")
+        self._pasts.close("shutting_down", "The server is stopping. Your page will come back by itself.")
         for room in rooms:
             room.shut()
         self._rooms.clear()

@@ -27,7 +27,7 @@ class Outbox:
         self.closing: tuple[CloseCode, str] | None = None
 
     def push(self, text: str, *, counted: bool = True) -> None:
-        """Queues a control text. ``counted`` False is for the one welcome, whose size is the document's."""
+        """Queues a control text. ``counted`` False is for a welcome, whose size is the document's."""
         if self.closing is not None:
             return
         size = len(text) if counted else 0
@@ -57,6 +57,11 @@ class Outbox:
         text, size = self._texts.popleft()
         self.backlog -= size
         return text
+
+    @property
+    def waits(self) -> bool:
+        """True while there is text that was not taken yet."""
+        return bool(self._texts)
 
     def notify(self) -> None:
         """Something outside the queue changed: tiles, a view, credit."""

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from esker import contract as c
 from esker.grid import TileKey
 from esker.store.journal import Loaded, Row
+from esker.store.moments import Person
 from esker.tiles.delivery import RefinedTile
 
 
@@ -159,8 +160,16 @@ SolverFactory = Callable[[str | None], Solver]
 class Journal(Protocol):
     """The part of ``store.journal.Journal`` that a room uses."""
 
-    def append(self, terrain: str, rows: Sequence[Row], snapshot: c.Document | None = None) -> Future[None]: ...
+    def append(
+        self,
+        terrain: str,
+        rows: Sequence[Row],
+        snapshot: c.Document | None = None,
+        people: Sequence[Person] = (),
+    ) -> Future[None]: ...
 
     def find(self, terrain: str, client: str, counter: int) -> int | None: ...
 
     def load(self, terrain: str, upto: int | None = None) -> Loaded | None: ...
+
+    def rows(self, terrain: str, after: int, upto: int | None = None) -> list[Row]: ...

@@ -49,9 +49,9 @@ class Refused:
 
 @dataclass(frozen=True)
 class Message:
-    """A well-formed view, presence, credit or rename."""
+    """A well-formed view, presence, credit, rename or seek."""
 
-    body: c.View | c.Presence | c.Credit | c.Rename
+    body: c.View | c.Presence | c.Credit | c.Rename | c.Seek
 
 
 @dataclass(frozen=True)
@@ -80,9 +80,11 @@ class Connection:
         self._opened = opened
         self._subprotocol = subprotocol
         self._greeted = False
+        self._past = False
         self._closed = False
         self._ops = TokenBucket(c.MAX_OPS_PER_SECOND, c.OPS_BURST)
         self._presences = TokenBucket(c.MAX_PRESENCE_PER_SECOND, c.MAX_PRESENCE_PER_SECOND)
+        self._seeks = TokenBucket(c.MAX_SEEKS_PER_SECOND, c.MAX_SEEKS_PER_SECOND)
         self._views = TokenBucket(c.MAX_VIEWS_PER_SECOND, c.MAX_VIEWS_PER_SECOND)
         self._messages = TokenBucket(MAX_MESSAGES_PER_SECOND, MESSAGES_BURST)
         self._notices = TokenBucket(1.0, 1.0)
@@ -137,6 +139,11 @@ class Connection:
             case c.View():
                 if not self._views.take(now):
                     return self._notice(f"More than {c.MAX_VIEWS_PER_SECOND} views a second.", now)
+            case c.Seek():
+                if not self._past:
+                    return self._close("malformed", "Only who looks at the past goes to another clock.")
+                if not self._seeks.take(now):
+                    return self._notice(f"More than {c.MAX_SEEKS_PER_SECOND} clocks a second.", now)
             case c.Ping():
                 return [Reply(c.Pong(t=message.t))]
         return [Message(message)]
@@ -149,7 +156,7 @@ class Connection:
                 "bad_protocol",
                 f"This server speaks protocol {c.PROTOCOL_VERSION}, not {hello.protocol}. Reload the page.",
             )
-        self._greeted = True
+        self._greeted, self._past = True, hello.at is not None
         return [Hi(hello)]
 
     def _rated(self, ops: tuple[c.OpEnvelope, ...], events: list[Event], now: float) -> list[Event]:

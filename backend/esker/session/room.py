@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from concurrent.futures import Executor, Future
 from typing import Final
 
@@ -24,6 +24,7 @@ from esker.session.outbox import Outbox
 from esker.session.ports import Base, Elevation, Journal, Tiles
 from esker.session.tilethread import TileThread
 from esker.session.worker import Job, Worker
+from esker.store.moments import Person
 
 log = logging.getLogger("esker.room")
 
@@ -87,6 +88,8 @@ class Room:
         self._progress = c.Progress(clock=core.head.clock, level=0, of=info.levels, settled=False)
         self._progress_timer: asyncio.TimerHandle | None = None
         self._note = ""
+        self._called: dict[str, Person] = {}
+        """Authors of ops as the journal knows them."""
         self._refining = 0
         self._flushed = asyncio.Event()
         self._flushed.set()
@@ -129,6 +132,8 @@ class Room:
             case protocol.Message(c.Rename() as rename):
                 self.core.members.rename(guest.member, rename.name, rename.colour)
                 self._presence_soon()
+                if guest.member.client in self._called:
+                    self._journal.append(self.id, (), None, self._new_names((guest.member.client,)))
             case protocol.Reply(message):
                 guest.member.outbox.message(message)
 
@@ -191,8 +196,17 @@ class Room:
             return
         self._tick_at = self._loop.time()
         self._flushed.clear()
-        future = self._journal.append(self.id, batch.rows, batch.snapshot)
+        people = self._new_names(row.author for row in batch.rows)
+        future = self._journal.append(self.id, batch.rows, batch.snapshot, people)
         future.add_done_callback(lambda f: self._loop.call_soon_threadsafe(self._committed, batch, f))
+
+    def _new_names(self, clients: Iterable[str]) -> list[Person]:
+        """What authors of ops are called, where the journal does not have it from this room yet."""
+        here = (self.core.members.by_client.get(client) for client in dict.fromkeys(clients))
+        people = [Person(m.client, m.name, m.colour) for m in here if m is not None]
+        new = [person for person in people if self._called.get(person.client) != person]
+        self._called |= {person.client: person for person in new}
+        return new
 
     def _committed(self, batch: Batch, future: Future[None]) -> None:
         error = future.exception()

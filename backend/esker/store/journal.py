@@ -6,7 +6,8 @@ acknowledged after the commit that holds it, so ``kill -9`` loses nothing that w
 
 Tables: ``terrains`` (id, created), ``ops`` (terrain, clock, client, counter, author, op), ``snapshots`` (terrain,
 clock, document), ``grids`` (terrain, digest: every grid that a layer of the terrain ever was, written in the same
-commit as the op or the birth that names it); ``store/access.py`` adds its own.
+commit as the op or the birth that names it); ``store/access.py`` and ``store/moments.py`` add their own. Ops are never
+removed: any clock can be opened again.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from typing import Any, Final, NamedTuple, TypeVar
 
 from esker import contract as c
 from esker.document.ops import Limits, Refusal, StrokeSet
+from esker.store import moments
 from esker.store.backup import last_backup, write_backup
 
 T = TypeVar("T")
@@ -30,6 +32,8 @@ T = TypeVar("T")
 DATABASE_NAME: Final = "esker.db"
 SNAPSHOT_EVERY: Final = 500
 """Ops between snapshots: opening a terrain replays at most this many."""
+MILESTONES: Final = 8
+"""Snapshots that stay, spread over the history: an earlier clock is opened without replaying all before it."""
 GROUP_LIMIT: Final = 256
 """Most queued items that one commit takes."""
 _SCHEMA_VERSION: Final = 2
@@ -93,11 +97,11 @@ class Journal:
     def __init__(self, directory: Path, now: Callable[[], float] = time.time) -> None:
         """Opens or creates ``directory/esker.db``. Raises CorruptDatabase, OSError."""
         self.directory, self.path = directory, directory / DATABASE_NAME
-        self._now = now
+        self._now, self._moments = now, moments.Moments()
         directory.mkdir(parents=True, exist_ok=True)
         check(self.path, directory)
         self._writer_db = connect(self.path)
-        self._writer_db.executescript(_SCHEMA)
+        self._writer_db.executescript(_SCHEMA + moments.SCHEMA)
         self._writer_db.execute(f"PRAGMA user_version={_SCHEMA_VERSION}")
         self._readers = threading.local()
         self._open_readers: list[sqlite3.Connection] = []
@@ -117,11 +121,23 @@ class Journal:
         self._queue.put((write, future))
         return future
 
-    def append(self, terrain: str, rows: Sequence[Row], snapshot: c.Document | None = None) -> Future[None]:
-        """Appends ops (and a snapshot after them). Fails with sqlite3.IntegrityError on a clock or id used before."""
+    def append(
+        self,
+        terrain: str,
+        rows: Sequence[Row],
+        snapshot: c.Document | None = None,
+        people: Sequence[moments.Person] = (),
+    ) -> Future[None]:
+        """Appends ops (a snapshot after them, and what their authors are called, where that is new).
+
+        Fails with sqlite3.IntegrityError on a clock or id used before.
+        """
 
         def write(db: sqlite3.Connection) -> None:
             db.executemany("INSERT INTO ops VALUES (?,?,?,?,?,?)", ((terrain, *row) for row in rows))
+            if rows:
+                self._moments.note(db, terrain, rows[0].clock, self._now())
+            moments.keep(db, terrain, people)
             _name_grids(db, terrain, (digest for row in rows for digest in _contents(row.op)))
             if snapshot is not None:
                 _put_snapshot(db, snapshot)
@@ -206,6 +222,11 @@ class Journal:
         )
         found = row.fetchone()
         return None if found is None else int(found[0])
+
+    def newest(self, terrain: str) -> int:
+        """Clock of the terrain's last op; 0 where there is none."""
+        row = self.reader().execute("SELECT max(clock) FROM ops WHERE terrain=?", (terrain,)).fetchone()
+        return int(row[0] or 0)
 
     def rows(self, terrain: str, after: int, upto: int | None = None) -> list[Row]:
         """The ops with after < clock <= upto, in order."""
@@ -314,9 +335,14 @@ def _put_snapshot(db: sqlite3.Connection, document: c.Document) -> None:
     db.execute(
         "INSERT OR REPLACE INTO snapshots VALUES (?,?,?)", (document.id, document.clock, document.model_dump_json())
     )
-    # The first snapshot (the terrain's birth) stays for ever; of the later ones the two newest do.
+    # The first snapshot (the terrain's birth) stays for ever, the two newest do, and between them one in each stretch
+    # of the history: no clock is much farther than a stretch from a snapshot before it. Stretches double as it grows.
+    stretch = SNAPSHOT_EVERY
+    while stretch * MILESTONES < document.clock:
+        stretch *= 2
     db.execute(
         "DELETE FROM snapshots WHERE terrain=?1 AND clock > (SELECT min(clock) FROM snapshots WHERE terrain=?1)"
-        " AND clock NOT IN (SELECT clock FROM snapshots WHERE terrain=?1 ORDER BY clock DESC LIMIT 2)",
-        (document.id,),
+        " AND clock NOT IN (SELECT clock FROM snapshots WHERE terrain=?1 ORDER BY clock DESC LIMIT 2)"
+        " AND clock NOT IN (SELECT min(clock) FROM snapshots WHERE terrain=?1 AND clock >= ?2 GROUP BY clock / ?2)",
+        (document.id, stretch),
     )

@@ -86,7 +86,7 @@ export const MIN_GRID_SPACING_M = 0.001 as const;
 
 export const MAX_VERTICAL_SCALE = 1000.0 as const;
 
-export const LAYER_HEIGHT_MARGIN = 64.0 as const;
+export const LAYER_HEIGHT_MARGIN = 5.0 as const;
 
 export const DEFAULT_DETAIL = 1.0 as const;
 
@@ -114,7 +114,17 @@ export const MAX_PRESENCE_PER_SECOND = 30 as const;
 
 export const MAX_VIEWS_PER_SECOND = 60 as const;
 
+export const MAX_SEEKS_PER_SECOND = 15 as const;
+
 export const MAX_MEMBERS = 200 as const;
+
+export const MAX_PAST_ROOMS = 8 as const;
+
+export const PAST_IDLE_SECONDS = 600.0 as const;
+
+export const MAX_HISTORY_OPS = 100000 as const;
+
+export const MAX_HISTORY_PAGE = 200 as const;
 
 export const MAX_NAME_LENGTH = 80 as const;
 
@@ -379,6 +389,7 @@ export type ClientMessage =
   | Presence
   | Credit
   | Rename
+  | Seek
   | Ping;
 
 export type ServerMessage =
@@ -753,6 +764,7 @@ export interface Hello {
   name?: string;
   colour?: string | null;
   clock?: number | null;
+  at?: number | null;
 }
 
 export interface Ops {
@@ -788,6 +800,11 @@ export interface Rename {
   type: "rename";
   name: string;
   colour?: string | null;
+}
+
+export interface Seek {
+  type: "seek";
+  clock: number;
 }
 
 export interface Ping {
