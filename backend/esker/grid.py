@@ -14,6 +14,12 @@ from esker.contract import QUANTA_PER_CELL, TILE_CELLS
 
 SOLVE_FIELDS = 19
 """Float32 a sample that a solve holds: 12 fields of the finest level, and a third of the 21 of those below it."""
+BASE_FIELDS = 4
+"""Those of the finest level that a base adds (``solve.device_workspace.OverBase``)."""
+SCOUT = 2
+"""Level on which strokes are rasterised for the coarsest preview alone: a sixteenth of level 4's work or less ..."""
+SCOUT_FROM = 4
+"""... of terrains from this level up: below, it would save nothing (docs/solver.md)."""
 SOLVE_PADDING = 96
 """Columns more that padded rows and scratch come to: in between, as kernels for GPUs need less than those for CPUs."""
 
@@ -38,13 +44,15 @@ def quantum(level: int, size_m: float) -> float:
     return spacing(level, size_m) / QUANTA_PER_CELL
 
 
-def solve_bytes(level: int) -> int:
-    """Memory that a solve up to ``level`` holds, to share it out by: 83 MiB at level 4, four times as much a level.
+def solve_bytes(level: int, based: bool = False) -> int:
+    """Memory of the device that a solve up to ``level`` holds, its scout included, to share it out by: 90 MiB at level
+    4, 109 over a base, four times as much a level.
 
     From level 3 up within a tenth of what ``solve.workspaces.planned_bytes`` says exactly, for a known device.
     """
-    n = samples(level)
-    return 4 * SOLVE_FIELDS * n * (n + SOLVE_PADDING)
+    n, fields = samples(level), SOLVE_FIELDS + (BASE_FIELDS if based else 0)
+    scout = solve_bytes(SCOUT, based) if level >= SCOUT_FROM else 0
+    return 4 * fields * n * (n + SOLVE_PADDING) + scout
 
 
 class TileKey(NamedTuple):

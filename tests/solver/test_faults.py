@@ -35,6 +35,7 @@ from esker.solve.faults import (
 from esker.solve.gpu_levels import GpuWorkspace
 from esker.solve.levels import ClWorkspace
 from esker.solve.solver import Solver
+from tests.solver.bases import Analytic, hills
 from tests.solver.scenes import SCENES, SETTINGS
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -251,11 +252,32 @@ def test_the_plan_is_what_is_allocated(used: Solver, monkeypatch: pytest.MonkeyP
 
 @pytest.mark.parametrize("level", range(3, MAX_LEVEL + 1))
 @pytest.mark.parametrize("strips", [1, 8])
-def test_what_solves_are_shared_out_by_is_about_the_plan(used: Solver, strips: int, level: int) -> None:
-    """SPEC S26."""
+@pytest.mark.parametrize("based", [False, True])
+def test_what_solves_are_shared_out_by_is_about_the_plan(used: Solver, strips: int, level: int, based: bool) -> None:
+    """SPEC S26: a base and a scout included."""
     assert used._device is not None
-    planned, _ = workspaces.planned_bytes(replace(used._device, strips=strips), level)
-    assert grid.solve_bytes(level) == pytest.approx(planned, rel=0.1)
+    device = replace(used._device, strips=strips)
+    planned = workspaces.planned_bytes(device, level, based)[0]
+    planned += workspaces.planned_bytes(device, grid.SCOUT, based)[0] if level >= grid.SCOUT_FROM else 0
+    assert grid.solve_bytes(level, based) == pytest.approx(planned, rel=0.1)
+
+
+@pytest.mark.parametrize("base", [None, hills()], ids=["a sheet", "hills"])
+def test_what_solves_are_shared_out_by_is_what_they_allocate(
+    monkeypatch: pytest.MonkeyPatch, base: Analytic | None
+) -> None:
+    """SPEC S26: the buffers of a solve of level 4 that is the first of its solver."""
+    fresh, sizes = Solver(max_level=4), []
+
+    def counted(context: Any, flags: int, size: int = 0, hostbuf: Any = None) -> Any:
+        sizes.append(size)
+        return cl._cl.Buffer(context, flags, size, hostbuf)
+
+    monkeypatch.setattr(cl, "Buffer", counted)
+    steps = fresh.steps(STROKES, SETTINGS, base=base)
+    assert next(steps) is not None
+    assert sum(sizes) == pytest.approx(grid.solve_bytes(4, base is not None), rel=0.1)
+    steps.close()
 
 
 def test_build_failure(monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:

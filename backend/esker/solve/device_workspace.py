@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from typing import TYPE_CHECKING, Any, Final, Generic, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from esker import grid
 from esker.contract import Stroke, TerrainSettings
 from esker.solve import multigrid, raster
 from esker.solve.base import Base
@@ -18,10 +19,6 @@ from esker.solve.tables import RASTER_BINS, Tables, Window
 
 if TYPE_CHECKING:
     from esker.solve.passes import Workspace
-
-
-OVER_FIELDS: Final = 4
-"""Fields of the finest level that a base takes."""
 
 
 class DeviceSystem(multigrid.System, Protocol):
@@ -46,7 +43,8 @@ class OverBase:
     the base."""
 
     def __init__(self, queue: Queue, shape: Shape, pad: int, enqueue: Callable[..., None]) -> None:
-        self.base, self.share, self.target, self.raw = (queue.zeros(shape.stride + pad) for _ in range(OVER_FIELDS))
+        fields = (queue.zeros(shape.stride + pad) for _ in range(grid.BASE_FIELDS))
+        self.base, self.share, self.target, self.raw = fields
         self._queue, self._shape, self._pad, self._enqueue = queue, shape, pad, enqueue
         self._digest = b""
 

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 from esker import grid
 from esker.solve import gpu_levels, levels
 from esker.solve.device import Device
-from esker.solve.device_workspace import OVER_FIELDS
 from esker.solve.faults import OutOfDeviceMemoryError, finished
 from esker.solve.fields import fields_of
 from esker.solve.reference import NumpyWorkspace
@@ -76,7 +75,7 @@ def planned_bytes(device: Device, top: int, based: bool = False) -> tuple[int, i
             floats.append(stride * (1 if name == "d" else channels) + (levels.PAD if rows else 0))
     if based:
         stride = (levels if rows else gpu_levels).shape_of(top).stride + (levels.PAD if rows else 0)
-        floats += [stride] * OVER_FIELDS
+        floats += [stride] * grid.BASE_FIELDS
     if rows:
         floats.append(2 * device.strips * levels.scratch_floats(top))
     return 4 * sum(floats), 4 * max(floats)
