@@ -11,8 +11,11 @@ import pytest
 from rasterio.transform import Affine
 
 from esker import contract as c
+from esker import grid
 from esker.importing import questions
+from esker.importing.placing import Terrain
 from esker.importing.refusal import ImportRefused
+from esker.tiles.codec import SAMPLE_LIMIT
 from tests.importing.conftest import look, take
 from tests.importing.make_files import geographic, ground, write
 
@@ -174,3 +177,43 @@ def test_report_is_complete(files: Path) -> None:
     north, south = ground()[:2, :2].mean(), ground()[-2:, :2].mean()
     assert (picture[0, 0] > picture[31, 0]) == (south > north)
     assert (np.array(look(files / "little.tif").report.preview) >= 0).all()
+
+
+def _high(path: Path, low: float, high: float) -> Path:
+    return _geo(path, np.linspace(low, high, 60 * 48, dtype=np.float32).reshape(60, 48))
+
+
+@pytest.mark.parametrize(("low", "high", "shift"), [(2410.0, 2500.0, -2400.0), (-3990.0, -3900.0, 4000.0)])
+def test_too_high_for_a_small_terrain(low: float, high: float, shift: float, tmp_path: Path) -> None:
+    """SPEC G14: asked with the size that would hold it, and shifted when somebody says so."""
+    small = Terrain(None, 64.0)
+    path = _high(tmp_path / "a.tif", low, high)
+    question = look(path, terrain=small).report.questions[-1]
+    assert (question.id, question.options, question.default) == ("height", ("shift", "stop"), "shift")
+    assert f"at least {max(abs(low), abs(high)) / c.LAYER_HEIGHT_MARGIN:,.0f} m" in question.text
+    answers = c.ImportAnswers(answers={"height": "shift", "place": "middle"})
+    layer, _ = take(path, tmp_path / "raster", answers, None, 64.0)
+    assert layer.lift_m == shift
+    assert (layer.facts.low_m, layer.facts.high_m) == (low, high)
+    assert not [q for q in look(path, terrain=Terrain(None, 4096.0)).report.questions if q.id == "height"]
+    with pytest.raises(ImportRefused, match="farther from zero"):
+        look(path, {"height": "stop"}, small)
+
+
+def test_higher_than_a_small_terrain_is_wide(tmp_path: Path) -> None:
+    """SPEC G14: no shift helps; what is laid by hand is held to the same."""
+    path = _high(tmp_path / "a.tif", 0.0, 400.0)
+    with pytest.raises(ImportRefused, match="at least 100 m wide"):
+        look(path, terrain=Terrain(None, 64.0))
+    by_hand = c.ImportAnswers(answers={"place": "middle"}, scale=0.5)
+    assert take(path, tmp_path / "halved", by_hand, None, 64.0)[0].scale == 0.5
+    with pytest.raises(ImportRefused, match="reach 700 m from zero"):
+        take(path, tmp_path / "lifted", by_hand.model_copy(update={"lift_m": 500.0}), None, 64.0)
+
+
+def test_nothing_that_is_taken_saturates() -> None:
+    """SPEC G14: layers and strokes at their bounds, and offsets between them, fit into quanta of the finest tiles."""
+    side = 64.0
+    held = SAMPLE_LIMIT * grid.quantum(c.MAX_REFINED_LEVEL, side)
+    assert (c.LAYER_HEIGHT_MARGIN + c.DOMAIN_MARGIN) * side < held
+    assert questions.held_m(side) == c.LAYER_HEIGHT_MARGIN * side

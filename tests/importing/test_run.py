@@ -186,6 +186,13 @@ def test_size_of_a_terrain_made_from_a_file(width: float, height: float, turn: f
     assert run.suggest_size(report) == size
 
 
+def test_a_terrain_made_from_a_file_grows_for_its_heights() -> None:
+    """SPEC G14: up to twice; where that is not enough, it is asked about."""
+    report = c.ImportReport(verdict="good", file="a", width_m=400.0, height_m=400.0, low_m=0.0, high_m=2500.0)
+    assert run.suggest_size(report) == 500.0
+    assert run.suggest_size(report.model_copy(update={"high_m": 5000.0})) == 400.0
+
+
 def test_place_of_a_terrain_made_from_a_file() -> None:
     report = c.ImportReport(verdict="good", file="a", at=(46.2, -122.2))
     assert run.suggest_place(report) == c.Place(lat_deg=46.2, lon_deg=-122.2)

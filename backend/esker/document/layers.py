@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
 from esker import contract as c
@@ -14,6 +15,11 @@ from esker.document.refusal import Limits, Refusal, changed, trim
 TOLD_FIELDS: Final = frozenset({"name", "outline", "source", "licence"})
 """Fields of a layer that are for people only; the ground follows from all the others."""
 LayerOp = c.AddLayer | c.SetLayer | c.DeleteLayer | c.RestoreLayer
+
+
+def size_for(farthest_m: float) -> float:
+    """Side in whole metres of the smallest domain that holds ground so far from zero."""
+    return float(math.ceil(farthest_m / c.LAYER_HEIGHT_MARGIN))
 
 
 class LayerEditor:
@@ -41,9 +47,15 @@ class LayerEditor:
     def check(self, layer: Layer) -> None:
         """Raises Refusal for a layer whose heights the quanta of the finest tiles could not hold."""
         facts = layer.facts
+        farthest = max(abs(layer.scale * z + layer.lift_m) for z in (facts.low_m, facts.high_m))
         bound = c.LAYER_HEIGHT_MARGIN * self._size_m
-        if any(abs(layer.scale * z + layer.lift_m) > bound for z in (facts.low_m, facts.high_m)):
-            raise Refusal("out_of_domain", f"Heights of this layer would be more than {bound:.0f} metres from zero.")
+        if farthest > bound:
+            raise Refusal(
+                "out_of_domain",
+                f"Heights of this layer would reach {farthest:.0f} metres from zero; a terrain "
+                f"{self._size_m:.0f} metres wide holds {bound:.0f}. Lower it, or make a terrain of at least "
+                f"{size_for(farthest):.0f} metres.",
+            )
 
     def _own(self) -> None:
         if not self._copied:

@@ -12,6 +12,8 @@ STOP: Final = "stop"
 NONE: Final = "none"
 FEET: Final = "feet"
 METRES: Final = "metres"
+SHIFT: Final = "shift"
+KEEP: Final = "keep"
 
 
 def given(answers: c.ImportAnswers) -> dict[str, str]:
@@ -21,4 +23,6 @@ def given(answers: c.ImportAnswers) -> dict[str, str]:
         found.setdefault("size", FIT)
     if answers.anchor is not None:
         found.setdefault("place", MIDDLE)
+    if answers.lift_m is not None or answers.scale is not None:
+        found["height"] = KEEP
     return found

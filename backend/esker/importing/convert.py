@@ -39,6 +39,7 @@ def convert(
             f"It lies {exam.placed.far_m / 1000:,.0f} km from this terrain. Answer place={MIDDLE} "
             "to lay it in the middle."
         )
+    _check_heights(exam, answers, terrain)
     laid = _laid(exam, answers)
     out_dir.mkdir(parents=True, exist_ok=True)
     _write_heights(exam, laid, out_dir / rasters.HEIGHTS, lambda share: progress("reading", 0.25 + 0.15 * share))
@@ -74,6 +75,19 @@ def _laid(exam: Exam, answers: c.ImportAnswers) -> Laid:
     if max(map(abs, laid.anchor)) > c.ABSOLUTE_BOUND_M:
         raise ImportRefused("It reaches too far out of the terrain. Cut out the part that you need first.")
     return laid
+
+
+def _check_heights(exam: Exam, answers: c.ImportAnswers, terrain: Terrain) -> None:
+    """Raises ImportRefused for a scale and a lift by hand that the terrain could not hold, before anything is made."""
+    scale = 1.0 if answers.scale is None else answers.scale
+    lift = exam.lift_m if answers.lift_m is None else answers.lift_m
+    farthest = max(abs(scale * z + lift) for z in exam.span_m)
+    held = questions.held_m(terrain.size_m)
+    if farthest > held:
+        raise ImportRefused(
+            f"Laid so, its heights would reach {farthest:,.0f} m from zero; a terrain {terrain.size_m:,.0f} m wide "
+            f"holds {held:,.0f} m. Lower it, or make a terrain at least {questions.size_for_m(farthest):,.0f} m wide."
+        )
 
 
 def _write_heights(exam: Exam, laid: Laid, path: Path, progress: Callable[[float], None]) -> None:
@@ -124,7 +138,7 @@ def _layer(exam: Exam, laid: Laid, answers: c.ImportAnswers, raster: rasters.Ras
         rotation_deg=laid.rotation_deg,
         spacing_m=laid.spacing_m,
         scale=scale,
-        lift_m=answers.lift_m if answers.lift_m is not None else 0.0,
+        lift_m=answers.lift_m if answers.lift_m is not None else exam.lift_m,
         accuracy_m=answers.accuracy_m if answers.accuracy_m is not None else accuracy * max(1.0, abs(scale)),
         source=answers.source or "",
         licence=answers.licence or "",

@@ -11,7 +11,7 @@ import numpy as np
 
 from esker import contract as c
 from esker.importing import colours, placing, questions
-from esker.importing.answers import FEET, STOP
+from esker.importing.answers import FEET, KEEP, SHIFT, STOP
 from esker.importing.gdal_source import GdalSource
 from esker.importing.georef import horizontal_unit_m
 from esker.importing.opening import Opened, open_source, set_encoding
@@ -34,6 +34,14 @@ class Exam:
     bias: float
     placed: Placed
     report: c.ImportReport
+    lift_m: float = 0.0
+    """What is added to all heights, so that the terrain can hold them."""
+
+    @property
+    def span_m(self) -> tuple[float, float]:
+        """Lowest and highest valid sample, metres."""
+        low, high = sorted((self.gain * self.scan.low + self.bias, self.gain * self.scan.high + self.bias))
+        return low, high
 
     @property
     def step_m(self) -> float | None:
@@ -63,6 +71,7 @@ def examine(
     unit_m = _unit_m(source, answers, asked)
     gain, bias = unit_m * gain, unit_m * bias
     exam = Exam(source, found, masked, gain, bias, placed, c.ImportReport(verdict="good", file=""))
+    exam.lift_m = _lift_m(exam, answers, asked, terrain)
     exam.report = _report(exam, name, asked)
     return exam
 
@@ -162,6 +171,18 @@ def _unit_m(source: Source, answers: Mapping[str, str], asked: list[c.ImportQues
     return foot if answer == FEET else 1.0
 
 
+def _lift_m(exam: Exam, answers: Mapping[str, str], asked: list[c.ImportQuestion], terrain: Terrain | None) -> float:
+    """Metres by which heights are shifted that are too far from zero for the terrain. Raises ImportRefused."""
+    low, high = exam.span_m
+    if terrain is None or answers.get("height") == KEEP or max(abs(low), abs(high)) <= questions.held_m(terrain.size_m):
+        return 0.0
+    question, shift = questions.height_question(low, high, terrain.size_m)
+    if _ask(asked, answers, question) != SHIFT:
+        raise ImportRefused(f"Its heights reach farther from zero than this terrain of {terrain.size_m:,.0f} m holds.")
+    exam.source.notes.append(f"All its heights are shifted by {shift:+,.0f} m, so that the terrain can hold them.")
+    return shift
+
+
 # --- report -----------------------------------------------------------------------------------------------------
 
 
@@ -173,7 +194,7 @@ def _report(exam: Exam, name: str, asked: list[c.ImportQuestion]) -> c.ImportRep
         source.notes.append("All its samples have the same height: it is flat.")
     elif found.share < 0.5:
         source.notes.append(f"Only {found.share:.1%} of its samples hold data.")
-    low, high = sorted((exam.gain * found.low + exam.bias, exam.gain * found.high + exam.bias))
+    low, high = exam.span_m
     spacing = laid.spacing_m if laid is not None else None
     return c.ImportReport(
         verdict="ask" if asked else "good",

@@ -12,7 +12,8 @@ MEMORY_BYTES: Final = 1 << 30
 ADDRESS_BYTES: Final = {"inspect": 3 << 29, "convert": 6 << 30}
 """Address space (RLIMIT_AS): a conversion maps the grid, its mipmap and its errors, 2 GiB for the largest."""
 CPU_SECONDS: Final = {"inspect": 120, "convert": 900}
-WALL_SECONDS: Final = {"inspect": 180.0, "convert": 1200.0}
+WALL_SECONDS: Final = {"inspect": 600.0, "convert": 2400.0}
+"""Against readers that hang: processor time is what bounds the others, and on a busy machine they have little of it."""
 FILE_BYTES: Final = 3 << 30
 OPEN_FILES: Final = 128
 NICENESS: Final = 5

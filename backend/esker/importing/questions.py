@@ -7,7 +7,7 @@ import re
 from typing import Final
 
 from esker import contract as c
-from esker.importing.answers import FEET, FIT, METRES, MIDDLE, NONE, STOP
+from esker.importing.answers import FEET, FIT, METRES, MIDDLE, NONE, SHIFT, STOP
 from esker.importing.refusal import ImportRefused
 from esker.importing.scan import Scan
 from esker.importing.source import Source
@@ -160,6 +160,43 @@ def band_question(bands: int) -> c.ImportQuestion:
         options=tuple(str(band) for band in range(1, bands + 1)),
         default="1",
     )
+
+
+LIFT_STEP_M: Final = 100.0
+
+
+def held_m(size_m: float) -> float:
+    """How far from zero the layers of a domain may reach, metres."""
+    return c.LAYER_HEIGHT_MARGIN * size_m
+
+
+def size_for_m(farthest: float) -> int:
+    """Side of the smallest domain, whole metres, that holds ground so many metres from zero."""
+    return math.ceil(farthest / c.LAYER_HEIGHT_MARGIN)
+
+
+def height_question(low: float, high: float, size_m: float) -> tuple[c.ImportQuestion, float]:
+    """Asks whether to shift heights low..high, metres, that lie too far from zero for a domain; and by how much.
+
+    Raises ImportRefused when no shift by whole hundreds of metres helps: the grid is higher than the domain holds.
+    """
+    held, farthest = held_m(size_m), max(abs(low), abs(high))
+    shift = -LIFT_STEP_M * math.floor(low / LIFT_STEP_M)
+    if max(abs(low + shift), abs(high + shift)) > held:
+        least = size_for_m(high - low + LIFT_STEP_M)
+        raise ImportRefused(
+            f"From its lowest to its highest sample it is {high - low:,.0f} m; a terrain {size_m:,.0f} m wide holds "
+            f"{held:,.0f} m. Make a terrain at least {least:,.0f} m wide for it."
+        )
+    way = "Lower" if shift < 0 else "Raise"
+    question = c.ImportQuestion(
+        id="height",
+        text=f"Its heights reach {farthest:,.0f} m from zero; a terrain {size_m:,.0f} m wide holds {held:,.0f} m. "
+        f"{way} it by {abs(shift):,.0f} m? As it is, it needs a terrain at least {size_for_m(farthest):,.0f} m wide.",
+        options=(SHIFT, STOP),
+        default=SHIFT,
+    )
+    return question, shift
 
 
 # --- place ------------------------------------------------------------------------------------------------------

@@ -29,6 +29,7 @@ __all__ = ["ImportCancelled", "ImportRefused", "convert", "inspect", "suggest_pl
 Progress = Callable[[c.ImportStage, float], None]
 MAX_LINE_BYTES: Final = 256 * 1024
 KEPT_ERRORS: Final = 4096
+HEIGHT_GROWTH: Final = 2.0
 STOPPED: Final = "Reading it took too much memory or time, or its data are broken in a way that stops the reader."
 
 
@@ -111,12 +112,16 @@ def suggest_place(report: c.ImportReport) -> c.Place | None:
 
 def suggest_size(report: c.ImportReport) -> float:
     """Size in metres of a terrain made from a file: it holds the whole grid where the largest terrain can, rounded up
-    to three digits; the default where the file does not say how large it is."""
+    to three digits; the default where the file does not say how large it is. A little larger where that lets it hold
+    the heights as they are; where it would have to be more than ``HEIGHT_GROWTH`` times, they are asked about."""
     if report.width_m is None or report.height_m is None:
         return c.DEFAULT_SIZE_M
     angle = math.radians(report.rotation_deg)
     across, up = abs(math.cos(angle)), abs(math.sin(angle))
     side = max(report.width_m * across + report.height_m * up, report.width_m * up + report.height_m * across)
+    farthest = max(abs(report.low_m or 0.0), abs(report.high_m or 0.0)) / c.LAYER_HEIGHT_MARGIN
+    if side < farthest <= HEIGHT_GROWTH * side:
+        side = farthest
     side = min(max(side, c.MIN_SIZE_M), c.MAX_SIZE_M)
     unit = 10.0 ** (math.floor(math.log10(side)) - 2)
     return float(min(math.ceil(round(side / unit, 6)) * unit, c.MAX_SIZE_M))

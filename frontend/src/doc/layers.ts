@@ -88,8 +88,13 @@ export class LayerEditor {
   #put(layer: Layer): void {
     const bound = LAYER_HEIGHT_MARGIN * this.#sizeM;
     const { low_m, high_m } = layer.facts;
-    if ([low_m, high_m].some((z) => Math.abs(layer.scale * z + layer.lift_m) > bound)) {
-      const sentence = `Heights of this layer would be more than ${bound.toFixed(0)} metres from zero.`;
+    const farthest = Math.max(...[low_m, high_m].map((z) => Math.abs(layer.scale * z + layer.lift_m)));
+    if (farthest > bound) {
+      const needed = Math.ceil(farthest / LAYER_HEIGHT_MARGIN);
+      const sentence =
+        `Heights of this layer would reach ${farthest.toFixed(0)} metres from zero; a terrain ` +
+        `${this.#sizeM.toFixed(0)} metres wide holds ${bound.toFixed(0)}. Lower it, or make a terrain of at least ` +
+        `${needed.toFixed(0)} metres.`;
       throw new Refusal("out_of_domain", sentence);
     }
     this.#writable().layers.set(layer.id, layer);

@@ -4,7 +4,7 @@ import { computed, type ReadonlySignal, type Signal, signal } from "@preact/sign
 import { firstPlace, type GridPlace, type Point } from "../core/lattice.ts";
 import type { SheetVisual } from "../core/types.ts";
 import type { SyncDoc } from "../doc/sync.ts";
-import type { ImportReport, Layer, Op } from "../generated/contract.ts";
+import { type ImportReport, LAYER_HEIGHT_MARGIN, type Layer, type Op } from "../generated/contract.ts";
 import type { Laying } from "../input/placement.ts";
 import { sheetOf } from "./footprints.ts";
 import { SIZE_QUESTION } from "./import-questions.ts";
@@ -74,8 +74,9 @@ export function startingPlace(report: ImportReport, sizeM: number, share: number
   const [low, high] = [report.low_m ?? 0, report.high_m ?? 0];
   const relief = Math.max(high - low, 1);
   const apart = low > groundM + relief || high < groundM - relief;
-  // A terrain that holds nothing yet takes heights as they are.
-  return apart && groundM !== 0 ? { ...place, lift_m: Math.round(groundM - low) } : place;
+  const held = Math.max(Math.abs(low), Math.abs(high)) <= LAYER_HEIGHT_MARGIN * sizeM;
+  // A terrain that holds nothing yet takes heights as they are, if it can.
+  return apart && (groundM !== 0 || !held) ? { ...place, lift_m: Math.round(groundM - low) } : place;
 }
 
 /** A layer that is moved: live for everybody, one step of undo a gesture. */

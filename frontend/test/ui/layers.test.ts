@@ -135,6 +135,8 @@ describe("a file without a place", () => {
     expect(laying.place.value.spacing_m[0]).toBeCloseTo((0.4 * 4096) / 95);
     expect(laying.place.value.lift_m).toBe(-1300);
     expect(startingPlace(REPORT, 4096, 1, 0).lift_m).toBe(0);
+    // Heights of 2,000 m: more than five sides of 64 m.
+    expect(startingPlace(REPORT, 64, 1, 0).lift_m).toBe(-2000);
     expect(pending({ spacing_m: [2, 2], questions: [] }).place.value.spacing_m).toEqual([2, 2]);
   });
 
