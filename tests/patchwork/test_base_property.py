@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from esker import grid
-from esker.patchwork import lod_space
+from esker.patchwork import lod_space, rim
 from esker.patchwork.base import Base
 from esker.patchwork.lod_space import Placed
 from esker.patchwork.query import Index, View
@@ -61,10 +61,14 @@ def test_any_layers_make_ground(seed: int) -> None:
     assert set(Index(model).view(View((0.5 * size, 0.5 * size), 1.0, 0.5, size, 0.01))) <= set(range(model.count))
 
 
-def test_a_grid_without_room_for_a_patch_is_no_ground() -> None:
-    """Samples so sparse that no block of 7 x 7 is whole: nothing to blend, and no fault."""
+def test_a_grid_without_a_patch_is_no_ground(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Samples far apart are ground, each by itself (SPEC PW4); were none let in: nothing to blend, and no fault."""
     heights = np.full((40, 40), np.nan)
     heights[::5, ::5] = 100.0
+    model = lod_space.build([placed(heights)])
+    assert model.count == 64
+    assert Base(model, 1000.0).level(2).max() == pytest.approx(100.0)
+    monkeypatch.setattr(rim, "MOST", 0)
     model = lod_space.build([placed(heights)])
     assert model.count == 0
     assert not Base(model, 1000.0).level(2).any()

@@ -50,7 +50,11 @@ def test_own_errors_are_as_defined(rows: int, cols: int, bent: bool, hole: bool)
     for scale, table in enumerate(raster.errors.tables):
         for j, i in np.argwhere(~np.isnan(table)).tolist():
             assert table[j, i] == pytest.approx(reference.patch_error(twin, raster.warp, scale, j, i), abs=2e-4)
-    assert raster.errors.count == sum(int((~np.isnan(t)).sum()) for t in raster.errors.tables) > 0
+    for box, measured in zip(raster.errors.rim, raster.errors.rim_errors, strict=True):
+        assert measured == pytest.approx(reference.rim_error(twin[0], raster.warp, box), abs=2e-4)
+    assert len(raster.errors.rim) > 5 if hole else len(raster.errors.rim) == 0
+    tables = sum(int((~np.isnan(t)).sum()) for t in raster.errors.tables)
+    assert raster.errors.count == tables + len(raster.errors.rim) > 0
 
 
 def kernels(raster: Raster, scale: int) -> list[tuple[slice, slice]]:

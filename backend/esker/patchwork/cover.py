@@ -30,7 +30,11 @@ SLIVER: Final = 1e-9
 
 
 class Index(NamedTuple):
-    """The patches of several sheets by place, for compiled loops. ``origin`` is taken off all world coordinates."""
+    """The patches of several sheets by place, for compiled loops.
+
+    Rim patches of block b of layer k: ``rim[rim_at[k] + b]`` up to the next; ``rim_at`` is -1 where a layer has none.
+    ``rank``, ``rim_rank``: the greatest area of the patches of a scale and of a rim.
+    """
 
     kernel: Floats
     min_z: Floats
@@ -39,6 +43,9 @@ class Index(NamedTuple):
     to_lattice: Floats
     sway: Floats
     tables: NDArray[np.int32]
+    rim: Ints
+    rim_at: Ints
+    rim_rank: Ints
     start: Ints
     tall: Ints
     wide: Ints
@@ -53,9 +60,14 @@ def index(sheets: list[Sheet], first: list[int], min_z: Floats, kernel: Floats) 
     start = np.full((len(sheets), most), -1, np.int64)
     tall, wide, rank = np.zeros_like(start), np.zeros_like(start), np.full_like(start, np.iinfo(np.int64).min)
     flat: list[NDArray[np.int32]] = []
-    filled = 0
+    filled, rims, rim_filled = 0, [np.zeros(0, np.int64)], 0
+    rim_at, rim_rank = np.full(len(sheets), -1, np.int64), np.full(len(sheets), np.iinfo(np.int64).min)
     for k, sheet in enumerate(sheets):
         rows, cols = sheet.placed.raster.heights.shape
+        if len(sheet.rim_start):
+            rim_at[k], rim_rank[k] = rim_filled, sheet.area[: sheet.rim_start[-1]].max()
+            rims.append(sheet.rim_start + first[k])
+            rim_filled += len(sheet.rim_start)
         for scale, table in enumerate(sheet.tables):
             tall[k, scale], wide[k, scale] = patches.table_shape(rows, cols, scale)
             if (table >= 0).any():
@@ -63,7 +75,10 @@ def index(sheets: list[Sheet], first: list[int], min_z: Floats, kernel: Floats) 
                 flat.append(np.where(table >= 0, table + first[k], -1).ravel().astype(np.int32))
                 filled += table.size
                 rank[k, scale] = sheet.area[sheet.scale_range(scale)[0]]
-    lowest = [next(s for s in range(most) if s == patches.SMALL_SCALES or start[k, s] >= 0) for k in range(len(sheets))]
+    lowest = [
+        0 if rim_at[k] >= 0 else next(s for s in range(most) if s == patches.SMALL_SCALES or start[k, s] >= 0)
+        for k in range(len(sheets))
+    ]
     return Index(
         kernel,
         min_z,
@@ -71,7 +86,10 @@ def index(sheets: list[Sheet], first: list[int], min_z: Floats, kernel: Floats) 
         np.concatenate([sheet.slack for sheet in sheets]),
         np.stack([sheet.to_lattice for sheet in sheets]),
         np.array([sheet.sway for sheet in sheets]),
-        np.concatenate(flat),
+        np.concatenate(flat) if flat else np.zeros(0, np.int32),
+        np.concatenate(rims),
+        rim_at,
+        rim_rank,
         start,
         tall,
         wide,
@@ -121,6 +139,34 @@ def _grown(numbers: Ints) -> Ints:
 
 
 @kernel
+def _meet(
+    ix: Index,
+    q: int,
+    x: float,
+    y: float,
+    quad: Floats,
+    tolerance: float,
+    other: Floats,
+    found: Ints,
+    count: int,
+    best: float,
+) -> tuple[Ints, int, float]:
+    """What a greater patch q is to a kernel at (x, y): all of it, then its error is ``best``; a part, then it is found.
+
+    ``other``: room for its corners.
+    """
+    _local(ix, q, x, y, other)
+    if contains(other, quad, ix.slack[q] + tolerance):
+        return found, count, ix.min_z[q]
+    if overlap(quad, other, ix.slack[q]):
+        if count == len(found):
+            found = _grown(found)
+        found[count] = q
+        count += 1
+    return found, count, best
+
+
+@kernel
 def _rivals(ix: Index, p: int, quad: Floats, found: Ints) -> tuple[Ints, int, float]:
     """Greater patches whose kernels reach that of p, how many, and the least error of those that hold all of it."""
     x, y = ix.kernel[p, 0, 0], ix.kernel[p, 0, 1]
@@ -138,16 +184,17 @@ def _rivals(ix: Index, p: int, quad: Floats, found: Ints) -> tuple[Ints, int, fl
             for j in range(max(0, int(y0 // cells)), min(ix.tall[layer, scale] - 1, int(y1 // cells)) + 1):
                 for i in range(max(0, int(x0 // cells)), min(wide - 1, int(x1 // cells)) + 1):
                     q = ix.tables[ix.start[layer, scale] + j * wide + i]
-                    if q < 0 or ix.min_z[q] >= best or not greater(ix, q, p):
-                        continue
-                    _local(ix, q, x, y, other)
-                    if contains(other, quad, ix.slack[q] + tolerance):
-                        best = ix.min_z[q]
-                    elif overlap(quad, other, ix.slack[q]):
-                        if count == len(found):
-                            found = _grown(found)
-                        found[count] = q
-                        count += 1
+                    if q >= 0 and ix.min_z[q] < best and greater(ix, q, p):
+                        found, count, best = _meet(ix, q, x, y, quad, tolerance, other, found, count, best)
+        if ix.rim_at[layer] < 0 or ix.rim_rank[layer] < ix.area[p]:
+            continue
+        wide = ix.wide[layer, 0]
+        for j in range(max(0, int(y0 // 7.0)), min(ix.tall[layer, 0] - 1, int(y1 // 7.0)) + 1):
+            for i in range(max(0, int(x0 // 7.0)), min(wide - 1, int(x1 // 7.0)) + 1):
+                block = ix.rim_at[layer] + j * wide + i
+                for q in range(ix.rim[block], ix.rim[block + 1]):
+                    if ix.min_z[q] < best and greater(ix, q, p):
+                        found, count, best = _meet(ix, q, x, y, quad, tolerance, other, found, count, best)
     return found, count, best
 
 
@@ -241,6 +288,14 @@ def _better(ix: Index, p: int, layer: int, found: Ints, count: int) -> tuple[Int
                 if down < ix.tall[layer, scale - 1] and right < ix.wide[layer, scale - 1]:
                     stack[waiting, 0], stack[waiting, 1], stack[waiting, 2] = scale - 1, down, right
                     waiting += 1
+        elif ix.rim_at[layer] >= 0:
+            block = ix.rim_at[layer] + j * ix.wide[layer, 0] + i
+            for q in range(ix.rim[block], ix.rim[block + 1]):
+                if ix.min_z[q] < ix.min_z[p] or (ix.min_z[q] == ix.min_z[p] and greater(ix, q, p)):
+                    if count == len(found):
+                        found = _grown(found)
+                    found[count] = q
+                    count += 1
     return found, count
 
 
@@ -293,7 +348,8 @@ def nested(of: Sheet, min_z: Floats) -> tuple[Floats, NDArray[np.bool_]]:
     """Tops and floors of the patches of one sheet as if it were alone: kernels nest, so no polygon need be cut.
 
     The top is the smallest error of the patches around (paper 2, section 4.1: kernels of the mipmap levels tile); a
-    patch is a floor if within some descendant's kernel no descendant is more accurate.
+    patch is a floor if within some descendant's kernel no descendant is more accurate. Over and under a patch of the
+    rim there is no other.
     """
     rows, cols = of.placed.raster.heights.shape
     small = of.count > 0 and of.scale[0] < patches.SMALL_SCALES
@@ -303,8 +359,8 @@ def nested(of: Sheet, min_z: Floats) -> tuple[Floats, NDArray[np.bool_]]:
         there = of.tables[scale] >= 0
         if there.any():
             errors[scale][there] = min_z[of.tables[scale][there]]
-    top = np.empty(of.count)
-    floor = np.empty(of.count, bool)
+    top = np.full(of.count, np.inf)
+    floor = np.ones(of.count, bool)
     above = np.full(errors[scales[-1]].shape, np.inf)
     for scale in reversed(scales):
         a, b = of.scale_range(scale)

@@ -6,19 +6,23 @@ place, and the patch, whose samples are interpolated bilinearly. ``errors_refere
 
 from __future__ import annotations
 
-import functools
+import itertools
 from collections.abc import Callable
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from esker.contract import PATCH_KERNEL_CELLS
-from esker.patchwork import patches
+from esker.patchwork import paging, patches, rim
 from esker.patchwork.jit import bands, kernel, spread
 from esker.patchwork.patches import Floats, PatchErrors
 from esker.patchwork.samples import cut
 
 Heights = NDArray[np.float32]
+Ints = NDArray[np.int64]
+PART_ROWS: Final = 256
+"""Rows of samples that a patch is measured at in one go, at most."""
 NO_WARP = np.zeros((0, 0, 2))
 
 
@@ -47,22 +51,26 @@ def whole_kernels(heights: Heights) -> NDArray[np.bool_] | None:
     """Which of the smallest kernels of a grid hold no nodata; None if the grid holds none at all."""
     rows, cols = heights.shape
     holed = np.zeros(rows, np.bool_)
-    spread(lambda a, b: _any_nodata(heights, a, b, holed), bands(rows, 64))
+    paging.sweep(lambda a, b: _any_nodata(heights, a, b, holed), heights, 64)
     if not holed.any():
         return None
     out = np.ones(patches.table_shape(rows, cols, 0), np.bool_)
-    spread(lambda a, b: _whole_kernels(heights, patches.SMALLEST_KERNEL, a, b, out), bands(out.shape[0]))
+    size = patches.SMALLEST_KERNEL
+    paging.sweep(lambda a, b: _whole_kernels(heights, size, a, b, out), heights, 1, size)
     return out
 
 
 @kernel
-def _level_errors(heights: Heights, mip: Heights, level: int, start: int, stop: int, out: Heights) -> None:
-    """Errors of the patches of rows start..stop of a level >= 1, for grids without nodata and warp, in float32.
+def _level_errors(heights: Heights, mip: Heights, level: int, parts: Ints, start: int, stop: int, out: Heights) -> None:
+    """Errors of the patches of a level >= 1, for grids without nodata and warp, in float32.
+
+    ``parts`` (n, 3): a row of patches, and rows of samples, first and end, that it is measured at; those of the patches
+    of part k go to ``out[k]``.
 
     A row of samples lies between two rows of the mipmap level: these are mixed first, then stretched to the samples'
     spacing, and the greatest distance is kept for each column of the band. Patches take theirs from that.
     """
-    rows, cols = heights.shape
+    cols = heights.shape[1]
     mip_rows, mip_cols = mip.shape
     step, half = 1 << level, 1 << (level - 1)
     size = PATCH_KERNEL_CELLS * step
@@ -73,10 +81,10 @@ def _level_errors(heights: Heights, mip: Heights, level: int, start: int, stop: 
     share = np.empty(step, np.float32)
     for phase in range(step):
         share[phase] = (phase + 0.5) / step
-    for j in range(start, stop):
+    for k in range(start, stop):
         for col in range(cols):
             worst[col] = 0.0
-        for row in range(max(0, size * j - margin), min(rows, size * (j + 1) + margin)):
+        for row in range(parts[k, 1], parts[k, 2]):
             cell = (row + half) // step - 1
             _mix(mip[max(cell, 0)], mip[min(cell + 1, mip_rows - 1)], share[(row + half) % step], mixed)
             if step == 2:
@@ -91,7 +99,7 @@ def _level_errors(heights: Heights, mip: Heights, level: int, start: int, stop: 
             greatest = np.float32(0.0)
             for col in range(max(0, size * i - margin), min(cols, size * (i + 1) + margin)):
                 greatest = max(greatest, worst[col])
-            out[j, i] = greatest
+            out[k, i] = greatest
 
 
 @kernel
@@ -217,40 +225,46 @@ def _patch_errors(
     heights: Heights,
     mip: Heights,
     warp: Floats,
-    level: int,
-    size: int,
-    j: NDArray[np.int64],
-    i: NDArray[np.int64],
+    step: int,
+    kernels: Ints,
     to_patch: Floats,
     extent: Floats,
+    parts: Ints,
     start: int,
     stop: int,
     out: Heights,
 ) -> None:
-    """Errors of the patches start..stop of a scale, whatever the grid: float64, sample by sample."""
+    """Errors of patches of a level, whatever the grid: float64, sample by sample.
+
+    ``kernels`` (n, 4): row, column, rows, columns in samples of ``mip``; ``parts`` (m, 3) as :func:`_level_errors`, of
+    patches instead of rows of patches; ``out[k]`` is for part k.
+    """
     rows, cols = heights.shape
-    step = 1 << level
     # Half a sample and the margin around the kernel; one cell of the level more for what a bent lattice brings in.
     reach = 2 * step + (step if warp.shape[0] else 0)
-    block = np.empty((size + 4, size + 4), np.float32)
-    exact = np.empty((size + 4, size + 4))
-    for p in range(start, stop):
-        cut(mip, j[p] * size - 2, i[p] * size - 2, block)
-        for r in range(size + 4):
-            for c in range(size + 4):
+    block = np.empty((0, 0), np.float32)
+    exact = np.empty((0, 0))
+    for k in range(start, stop):
+        p = parts[k, 0]
+        side = max(kernels[p, 2], kernels[p, 3]) + 4
+        if side != len(block):
+            block, exact = np.empty((side, side), np.float32), np.empty((side, side))
+        cut(mip, kernels[p, 0] - 2, kernels[p, 1] - 2, block)
+        for r in range(side):
+            for c in range(side):
                 exact[r, c] = block[r, c]
-        top, left = j[p] * size * step, i[p] * size * step
-        right = min(cols, left + size * step + reach)
+        left = kernels[p, 1] * step
+        right = min(cols, left + kernels[p, 3] * step + reach)
         ends = (extent[p, 0], extent[p, 1])
         worst = 0.0
-        for row in range(max(0, top - reach), min(rows, top + size * step + reach)):
+        for row in range(parts[k, 1], parts[k, 2]):
             col = max(0, left - reach)
             while col < right:
                 end, a, b, c0, d = segment(warp, rows, cols, to_patch[p], row, col)
                 last = min(end, right)
                 worst = max(worst, farthest(heights[row], 1.0, 0.0, exact, ends, (a, b, c0, d), col, last))
                 col = last
-        out[p] = worst
+        out[k] = worst
 
 
 def measure(
@@ -269,8 +283,7 @@ def measure(
         level = patches.level_of(scale)
         table = np.full(there.shape, np.nan, np.float32)
         if plain and level:
-            work = functools.partial(_level_errors_into, table, heights, mips[level], level)
-            spread(work, bands(len(table), max(1, 256 // (PATCH_KERNEL_CELLS << level))))
+            table[:] = _by_rows(heights, mips[level], level, *there.shape)
         elif warp is None and not level:
             table[there] = 0.0
         else:
@@ -278,11 +291,19 @@ def measure(
         tables.append(table)
         if progress:
             progress((scale + 1) / len(exist))
-    return PatchErrors(tuple(tables))
+    found = rim.find(heights, whole)
+    return PatchErrors(tuple(tables), found, rim_errors(heights, warp, found))
 
 
-def _level_errors_into(table: Heights, heights: Heights, mip: Heights, level: int, start: int, stop: int) -> None:
-    _level_errors(heights, mip, level, start, stop, table)
+def _by_rows(heights: Heights, mip: Heights, level: int, tall: int, wide: int) -> Heights:
+    """Errors (tall, wide) of all patches of a level of a grid without nodata and warp."""
+    rows = len(heights)
+    margin = 3 << level - 1
+    low = np.arange(tall) * (PATCH_KERNEL_CELLS << level)
+    parts, of = _parts(np.maximum(low - margin, 0), np.minimum(low + (PATCH_KERNEL_CELLS << level) + margin, rows))
+    out = np.empty((len(parts), wide), np.float32)
+    _spread(lambda a, b: _level_errors(heights, mip, level, parts, a, b, out), heights, mip, level, parts)
+    return np.maximum.reduceat(out, of, axis=0)
 
 
 def _each(mips: tuple[Heights, ...], warp: Floats | None, scale: int, there: NDArray[np.bool_]) -> Heights:
@@ -290,12 +311,67 @@ def _each(mips: tuple[Heights, ...], warp: Floats | None, scale: int, there: NDA
     j, i = np.nonzero(there)
     rows, cols = mips[0].shape
     level, size = patches.level_of(scale), patches.kernel_samples(scale)
-    laid = patches.lay(rows, cols, warp, scale, j, i)
+    kernels = np.stack([j * size, i * size, np.full_like(j, size), np.full_like(i, size)], 1)
+    return _exactly(mips[0], mips[level], warp, level, kernels, patches.lay(rows, cols, warp, scale, j, i))
+
+
+def rim_errors(heights: Heights, warp: Floats | None, found: rim.Boxes) -> Heights:
+    """Errors of the patches of the rim: none unless the lattice is bent."""
+    if warp is None:
+        return np.zeros(len(found), np.float32)
+    rows, cols = heights.shape
+    laid = patches.lay_rim(rows, cols, warp, found)
+    return _exactly(heights, heights, warp, 0, found.astype(np.int64), laid)
+
+
+def _exactly(
+    heights: Heights, mip: Heights, warp: Floats | None, level: int, kernels: Ints, laid: patches.Lattice
+) -> Heights:
+    """Errors of patches with ``kernels`` (n, 4) of a level, sample by sample."""
+    if not len(kernels):
+        return np.empty(0, np.float32)
+    step = 1 << level
+    reach = 2 * step + (step if warp is not None else 0)
+    low, high = kernels[:, 0] * step, (kernels[:, 0] + kernels[:, 2]) * step
+    parts, of = _parts(np.maximum(low - reach, 0), np.minimum(high + reach, len(heights)))
     net = NO_WARP if warp is None else warp
-    out = np.empty(len(j), np.float32)
     matrix, extent = laid.to_patch, laid.extent
-    spread(
-        lambda a, b: _patch_errors(mips[0], mips[level], net, level, size, j, i, matrix, extent, a, b, out),
-        bands(len(j), 16),
-    )
-    return out
+    out = np.empty(len(parts), np.float32)
+
+    def work(start: int, stop: int) -> None:
+        _patch_errors(heights, mip, net, step, kernels, matrix, extent, parts, start, stop, out)
+
+    _spread(work, heights, mip, level, parts)
+    return np.maximum.reduceat(out, of)
+
+
+def _parts(low: Ints, high: Ints) -> tuple[Ints, Ints]:
+    """Rows low..high (n,) of patches in parts of ``PART_ROWS`` at most, (m, 3), and the first part of each patch.
+
+    Great patches are shared out so, and pages of mapped heights are let go in between.
+    """
+    each = -(-(high - low) // PART_ROWS)
+    of = np.concatenate([[0], np.cumsum(each)]).astype(np.int64)
+    patch = np.repeat(np.arange(len(low)), each)
+    part = np.arange(of[-1]) - of[patch]
+    start = low[patch] + (high - low)[patch] * part // each[patch]
+    stop = low[patch] + (high - low)[patch] * (part + 1) // each[patch]
+    return np.stack([patch, start, stop], 1).astype(np.int64), of[:-1]
+
+
+def _spread(work: Callable[[int, int], None], heights: Heights, mip: Heights, level: int, parts: Ints) -> None:
+    """Call ``work`` for ranges of parts that cover them; where heights are mapped, let go of their rows behind it."""
+
+    def one(start: int, stop: int) -> None:
+        work(start, stop)
+        first, end = int(parts[start:stop, 1].min()), int(parts[start:stop, 2].max())
+        paging.let_go(heights, first, end)
+        paging.let_go(mip, first >> level, (end >> level) + 1)
+
+    if paging.mapped(heights):
+        cuts = np.flatnonzero(np.diff(parts[:, 1] // paging.strip_rows(heights))) + 1
+        edges = [0, *cuts.tolist(), len(parts)]
+        spread(one, itertools.pairwise(edges))
+    else:
+        tallest = int((parts[:, 2] - parts[:, 1]).max())
+        spread(work, bands(len(parts), max(1, PART_ROWS // tallest)))

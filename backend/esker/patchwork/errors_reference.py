@@ -59,13 +59,27 @@ def bilinear(samples: Floats, u: Floats, v: Floats) -> Floats:
 
 def patch_error(mips: tuple[Floats, ...], warp: Floats | None, scale: int, j: int, i: int) -> float:
     """max |sample - patch| over the valid samples of the grid whose true places lie in the domain of a patch."""
-    rows, cols = mips[0].shape
     level, size = patches.level_of(scale), patches.kernel_samples(scale)
     samples = patch_samples(mips[level], j * size - patches.RING, i * size - patches.RING, patches.side_of(scale))
+    rows, cols = mips[0].shape
+    laid = patches.lay(rows, cols, warp, scale, np.array([j]), np.array([i]))
+    return _farthest(mips[0], warp, samples, laid)
+
+
+def rim_error(heights: Floats, warp: Floats | None, box: NDArray[np.int32]) -> float:
+    """As :func:`patch_error`, of the patch of a kernel of the rim (row, column, rows, columns)."""
+    side = int(box[2:].max()) + 2 * patches.RING
+    samples = patch_samples(heights, int(box[0]) - patches.RING, int(box[1]) - patches.RING, side)
+    rows, cols = heights.shape
+    return _farthest(heights, warp, samples, patches.lay_rim(rows, cols, warp, box[None]))
+
+
+def _farthest(heights: Floats, warp: Floats | None, samples: Floats, laid: patches.Lattice) -> float:
+    """max |sample - patch| over the valid samples in the domain of one patch."""
+    rows, cols = heights.shape
     v, u = (index.ravel() for index in np.indices((rows, cols)))
     place = patches.warped(warp, rows, cols, np.stack([u, v], 1).astype(np.float64))
-    laid = patches.lay(rows, cols, warp, scale, np.array([j]), np.array([i]))
     at = place @ laid.to_patch[0, :, :2].T + laid.to_patch[0, :, 2]
-    inside = (at >= 0).all(axis=1) & (at <= laid.extent[0]).all(axis=1) & ~np.isnan(mips[0].ravel())
+    inside = (at >= 0).all(axis=1) & (at <= laid.extent[0]).all(axis=1) & ~np.isnan(heights.ravel())
     at = at[inside]
-    return float(np.abs(mips[0].ravel()[inside] - bilinear(samples, at[:, 0], at[:, 1])).max())
+    return float(np.abs(heights.ravel()[inside] - bilinear(samples, at[:, 0], at[:, 1])).max())

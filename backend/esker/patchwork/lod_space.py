@@ -132,7 +132,7 @@ def _assembled(
     first = np.concatenate([[0], np.cumsum([s.count for s in sheets])]).tolist()
     owner = np.repeat(np.arange(len(sheets), dtype=np.int32), [s.count for s in sheets])
     scale = np.concatenate([s.scale for s in sheets])
-    size = patches.SMALLEST_KERNEL << np.minimum(scale, patches.SMALL_SCALES).astype(np.int32)
+    row, col, side = (np.concatenate(column) for column in zip(*(s.windows() for s in sheets), strict=True))
     kernel = np.concatenate([s.kernel for s in sheets])
     min_z, meets = _measured_against_newer(placed, sheets, first, measured)
     max_z, floor = _boxes(sheets, first, min_z, kernel, meets)
@@ -140,9 +140,9 @@ def _assembled(
         placed,
         owner,
         np.maximum(scale - patches.SMALL_SCALES, 0).astype(np.int8),
-        np.concatenate([s.j for s in sheets]) * size - patches.RING,
-        np.concatenate([s.i for s in sheets]) * size - patches.RING,
-        (size + 2 * patches.RING).astype(np.int8),
+        row,
+        col,
+        side.astype(np.int8),
         np.concatenate([s.to_patch for s in sheets]),
         np.concatenate([s.extent for s in sheets]),
         kernel,

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from esker.contract import PATCH_KERNEL_CELLS
-from esker.patchwork.jit import bands, kernel, spread
+from esker.patchwork.jit import kernel
+from esker.patchwork.paging import let_go, sweep
 
 Heights = NDArray[np.float32]
 
@@ -67,7 +68,12 @@ def halve(fine: Heights, coarse: Heights | None = None) -> Heights:
         coarse = np.empty(((fine.shape[0] + 1) // 2, (fine.shape[1] + 1) // 2), np.float32)
     target, source = coarse, fine.view()
     source.flags.writeable = False  # one kind of array for the compiled loop
-    spread(lambda start, stop: _halve(source, start, stop, target), bands(coarse.shape[0], 64))
+
+    def some(start: int, stop: int) -> None:
+        _halve(source, start, stop, target)
+        let_go(target, start, stop)
+
+    sweep(some, fine, 64, 2)
     return coarse
 
 

@@ -4,7 +4,8 @@ Patches come at *scales*. At scale t kernels are 7 2^t lattice cells a side and 
 so that four kernels of a scale are one of the next. Scales 2 and up are the mipmap levels 0 and up, with patches of
 32 x 32 samples. Scales 0 and 1 are patches of 11 x 11 and 18 x 18 samples of the grid itself, made only where nodata or
 a bend of the lattice forbids the greater ones. No kernel holds nodata. (Coarser levels need no small patches: their
-kernels would be those of full patches of the level below.)
+kernels would be those of full patches of the level below.) Where not even a kernel of 7 x 7 has none, what is valid is
+the *rim*: rectangles of 1 to 42 samples of the grid itself (``rim``), which lie below scale 0, at scale ``RIM``.
 
 Places are in area coordinates (sample k covers k..k+1, its middle is the lattice coordinate k) unless it says lattice.
 """
@@ -12,6 +13,7 @@ Places are in area coordinates (sample k covers k..k+1, its middle is the lattic
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +25,8 @@ Mask = NDArray[np.bool_]
 
 SMALL_SCALES = 2
 """Scales below that of the full patches: kernels of a half and a quarter of theirs."""
+RIM = -1
+"""Scale of the patches of the rim."""
 SMALLEST_KERNEL = PATCH_KERNEL_CELLS >> SMALL_SCALES
 RING = (PATCH_SAMPLES - PATCH_KERNEL_CELLS) // 2
 """Samples that a patch has around those of its kernel."""
@@ -57,9 +61,12 @@ class PatchErrors:
 
     NaN where there is no such patch. The tables of the small scales have shape (0, 0) when there are none at all.
     The error is max |sample - patch| over the valid samples of the grid in the patch's domain, at their true places.
+    ``rim``: int32 (n, 4), kernels of the rim (see ``rim.find``); ``rim_errors``: float32 (n,).
     """
 
     tables: tuple[NDArray[np.float32], ...]
+    rim: NDArray[np.int32]
+    rim_errors: NDArray[np.float32]
 
     @property
     def levels(self) -> int:
@@ -69,7 +76,7 @@ class PatchErrors:
     @property
     def count(self) -> int:
         """Patches in all."""
-        return sum(int(np.count_nonzero(~np.isnan(table))) for table in self.tables)
+        return len(self.rim) + sum(int(np.count_nonzero(~np.isnan(table))) for table in self.tables)
 
 
 def warped(warp: Floats | None, rows: int, cols: int, points: Floats) -> Floats:
@@ -111,15 +118,26 @@ def lay(rows: int, cols: int, warp: Floats | None, scale: int, j: NDArray[np.int
     cells, step = SMALLEST_KERNEL << scale, 1 << level_of(scale)
     low = np.stack([i * cells, j * cells], 1).astype(np.float64)
     high = np.minimum(low + cells, np.array([cols, rows], np.float64))
+    return _laid(rows, cols, warp, step, low, high)
+
+
+def lay_rim(rows: int, cols: int, warp: Floats | None, rim: NDArray[np.int32]) -> Lattice:
+    """Lay the patches of the rim (n, 4) on the lattice of a (rows, cols) grid."""
+    low = rim[:, [1, 0]].astype(np.float64)
+    return _laid(rows, cols, warp, 1, low, low + rim[:, [3, 2]])
+
+
+def _laid(rows: int, cols: int, warp: Floats | None, step: int, low: Floats, high: Floats) -> Lattice:
+    """Patches with kernels low..high (n, 2), x and y in area coordinates, of a level with samples ``step`` apart."""
     margin = PATCH_MARGIN_CELLS * step
     extent = (high - low + 2 * margin) / step
     kernel = warped(warp, rows, cols, _corners(low, high) - 0.5)
     origin = low - margin - 0.5
-    to_patch = np.zeros((len(j), 2, 3))
+    to_patch = np.zeros((len(low), 2, 3))
     if warp is None:
         to_patch[:, 0, 0] = to_patch[:, 1, 1] = 1.0 / step
         to_patch[:, :, 2] = -origin / step
-        return Lattice(kernel, to_patch, extent, np.zeros(len(j)))
+        return Lattice(kernel, to_patch, extent, np.zeros(len(low)))
     width = high - low + 2 * margin
     domain = warped(warp, rows, cols, _corners(origin, origin + width))
     along = (domain[:, 1] + domain[:, 2] - domain[:, 0] - domain[:, 3]) / (2 * width[:, :1]) * step
@@ -160,14 +178,22 @@ def _four_of(parents: Mask, shape: tuple[int, int]) -> Mask:
     return parents.repeat(2, 0).repeat(2, 1)[: shape[0], : shape[1]]
 
 
+STRAIGHT_AT_ONCE: Final = 1 << 14
+"""Kernels whose bend is found at a time: a grid of 14,000 x 14,000 has a million of the smallest."""
+
+
 def _straight(rows: int, cols: int, warp: Floats | None, scale: int) -> Mask:
     """Kernels of a scale whose edges the lattice's bend leaves straight enough."""
     shape = table_shape(rows, cols, scale)
     if warp is None:
         return np.ones(shape, bool)
-    j, i = (index.ravel() for index in np.indices(shape))
-    bend = lay(rows, cols, warp, scale, j, i).bend
-    return np.asarray(bend <= MAX_BEND * (1 << level_of(scale)), np.bool_).reshape(shape)
+    straight = np.empty(shape, np.bool_)
+    band = max(1, STRAIGHT_AT_ONCE // shape[1])
+    for top in range(0, shape[0], band):
+        j, i = np.indices((min(band, shape[0] - top), shape[1])).reshape(2, -1)
+        bend = lay(rows, cols, warp, scale, top + j, i).bend
+        straight[top : top + band] = (bend <= MAX_BEND * (1 << level_of(scale))).reshape(-1, shape[1])
+    return straight
 
 
 def existing(rows: int, cols: int, levels: int, warp: Floats | None, whole: Mask | None) -> tuple[Mask, ...]:

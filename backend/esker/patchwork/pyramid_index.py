@@ -26,11 +26,12 @@ Ints = NDArray[np.int64]
 
 
 class Tree(NamedTuple):
-    """Nodes of all layers' pyramids, coarsest scale last in each layer.
+    """Nodes of all layers' pyramids, coarsest scale last in each layer; patches of rims are below the lowest ones.
 
     ``patch`` int32 (nodes,): index into the model, -1 without; ``least``, ``most`` float64 (nodes,); ``box`` float64
     (nodes, 4) x0, y0, x1, y1. ``scale`` int64 (scales of all layers, 3): first node, rows, cols; the scales of layer k
-    are ``first[k]`` to ``first[k + 1]``.
+    are ``first[k]`` to ``first[k + 1]``. Rim patches of node n of layer k's lowest scale, counted from its first, are
+    ``rim[rim_at[k] + n]`` up to the next; ``rim_at`` is -1 where a layer has none.
     """
 
     patch: NDArray[np.int32]
@@ -39,6 +40,8 @@ class Tree(NamedTuple):
     box: Floats
     scale: Ints
     first: Ints
+    rim: Ints
+    rim_at: Ints
 
 
 class Boxes(NamedTuple):
@@ -73,7 +76,11 @@ def boxes(model: Model, known: Boxes | None = None, same: tuple[Ints, Ints] | No
 def tree(model: Model, found: Boxes) -> Tree:
     """The pyramids of all layers of a model."""
     patch, scales, first, nodes = [], [], [0], 0
+    rims, rim_at, filled = [np.zeros(0, np.int64)], [], 0
     for start, sheet in zip(model.first, model.sheets, strict=True):
+        rim_at.append(filled if len(sheet.rim_start) else -1)
+        rims.append(sheet.rim_start + start)
+        filled += len(sheet.rim_start)
         for table in sheet.tables:
             patch.append(np.where(table < 0, -1, table + start).astype(np.int32).ravel())
             scales.append((nodes, *table.shape))
@@ -86,10 +93,32 @@ def tree(model: Model, found: Boxes) -> Tree:
         np.tile([np.inf, np.inf, -np.inf, -np.inf], (nodes, 1)),
         np.array(scales, dtype=np.int64).reshape(-1, 3),
         np.array(first, dtype=np.int64),
+        np.concatenate(rims),
+        np.array(rim_at, dtype=np.int64),
     )
     for layer in range(len(model.sheets)):
         _summarise(layer, out, found)
     return out
+
+
+@kernel
+def rim_of(t: Tree, layer: int, node: int) -> tuple[int, int]:
+    """Patches first..end of the rim below a node of a layer's lowest scale."""
+    if t.rim_at[layer] < 0:
+        return 0, 0
+    at = t.rim_at[layer] + node - t.scale[t.first[layer], 0]
+    return t.rim[at], t.rim[at + 1]
+
+
+@kernel
+def _raise(t: Tree, found: Boxes, n: int, k: int) -> None:
+    """Widen a node's bounds by a patch that is alive."""
+    if found.low[k] >= found.max_z[k]:
+        return
+    box = t.box
+    t.least[n], t.most[n] = min(t.least[n], found.low[k]), max(t.most[n], found.max_z[k])
+    box[n, 0], box[n, 1] = min(box[n, 0], found.box[k, 0]), min(box[n, 1], found.box[k, 1])
+    box[n, 2], box[n, 3] = max(box[n, 2], found.box[k, 2]), max(box[n, 3], found.box[k, 3])
 
 
 @kernel
@@ -104,11 +133,12 @@ def _summarise(layer: int, t: Tree, found: Boxes) -> None:
             for i in range(cols):
                 n = node + j * cols + i
                 k = t.patch[n]
-                if k >= 0 and found.low[k] < found.max_z[k]:
-                    low[n], most[n] = found.low[k], found.max_z[k]
-                    for c in range(4):
-                        box[n, c] = found.box[k, c]
+                if k >= 0:
+                    _raise(t, found, n, k)
                 if not below:
+                    begin, end = rim_of(t, layer, n)
+                    for q in range(begin, end):
+                        _raise(t, found, n, q)
                     continue
                 for y in range(2 * j, min(2 * j + 2, down)):
                     for x in range(2 * i, min(2 * i + 2, across)):
@@ -134,6 +164,15 @@ def apart(corners: Floats, x0: float, y0: float, x1: float, y1: float) -> bool:
 
 
 @kernel
+def _serves(found: Boxes, k: int, e: float, x0: float, y0: float, x1: float, y1: float) -> bool:
+    """Whether a patch is chosen at tolerance e and its domain meets a rectangle."""
+    if found.low[k] > e or e >= found.max_z[k]:
+        return False
+    b = found.box[k]
+    return not (b[0] > x1 or b[2] < x0 or b[1] > y1 or b[3] < y0 or apart(found.corners[k], x0, y0, x1, y1))
+
+
+@kernel
 def uniform(t: Tree, found: Boxes, e: float, x0: float, y0: float, x1: float, y1: float, out: NDArray[np.int32]) -> int:
     """Patches chosen at tolerance e whose domain meets a rectangle, into ``out``; returns how many, -1 for too many."""
     stack = np.empty((256, 3), np.int64)
@@ -154,15 +193,20 @@ def uniform(t: Tree, found: Boxes, e: float, x0: float, y0: float, x1: float, y1
                 if t.box[n, 0] > x1 or t.box[n, 2] < x0 or t.box[n, 1] > y1 or t.box[n, 3] < y0:
                     continue
                 k = t.patch[n]
-                if k >= 0 and found.low[k] <= e and e < found.max_z[k]:
-                    b = found.box[k]
-                    outside = b[0] > x1 or b[2] < x0 or b[1] > y1 or b[3] < y0
-                    if not outside and not apart(found.corners[k], x0, y0, x1, y1):
-                        if count == out.size:
-                            return -1
-                        out[count] = k
-                        count += 1
-                if s > t.first[layer]:
+                if k >= 0 and _serves(found, k, e, x0, y0, x1, y1):
+                    if count == out.size:
+                        return -1
+                    out[count] = k
+                    count += 1
+                if s == t.first[layer]:
+                    begin, end = rim_of(t, layer, n)
+                    for q in range(begin, end):
+                        if _serves(found, q, e, x0, y0, x1, y1):
+                            if count == out.size:
+                                return -1
+                            out[count] = q
+                            count += 1
+                else:
                     _, down, across = t.scale[s - 1]
                     for y in range(2 * j, min(2 * j + 2, down)):
                         for x in range(2 * i, min(2 * i + 2, across)):
@@ -189,6 +233,12 @@ def refined(
     for at in range(chosen.size):
         layer = owner[chosen[at]]
         first = t.first[layer]
+        if place[chosen[at], 0] < 0:  # of the rim: there is nothing finer
+            if count == out.size:
+                return -1
+            out[count] = chosen[at]
+            count += 1
+            continue
         stack[0, 0], stack[0, 1], stack[0, 2] = place[chosen[at], 0], place[chosen[at], 1], place[chosen[at], 2]
         held = 1
         while held:
@@ -245,26 +295,51 @@ def view(
                     continue
                 k = t.patch[n]
                 if k >= 0:
-                    low, high = depths(found.corners[k], triangle, forward, work)
-                    e = max(floor, slope * low)
-                    if low <= high and found.low[k] <= e:
-                        if (
-                            layers == 1
-                            or found.max_z[k] > e
-                            or not _covered(t, found, k, triangle, forward, slope, floor, near, work)
-                        ):
+                    safe, needed = _seen(t, found, k, triangle, forward, slope, floor, near, work)
+                    if needed:
+                        if count == out.size:
+                            return -1
+                        out[count] = k
+                        count += 1
+                    if safe:
+                        continue
+                if s == t.first[layer]:
+                    begin, end = rim_of(t, layer, n)
+                    for q in range(begin, end):
+                        if _seen(t, found, q, triangle, forward, slope, floor, near, work)[1]:
                             if count == out.size:
                                 return -1
-                            out[count] = k
+                            out[count] = q
                             count += 1
-                        continue
-                if s > t.first[layer]:
+                else:
                     _, down, across = t.scale[s - 1]
                     for y in range(2 * j, min(2 * j + 2, down)):
                         for x in range(2 * i, min(2 * i + 2, across)):
                             stack[held, 0], stack[held, 1], stack[held, 2] = s - 1, y, x
                             held += 1
     return count
+
+
+@kernel
+def _seen(
+    t: Tree,
+    found: Boxes,
+    k: int,
+    triangle: Floats,
+    forward: Floats,
+    slope: float,
+    floor: float,
+    near: NDArray[np.int32],
+    work: Floats,
+) -> tuple[bool, bool]:
+    """Whether a patch is in view and accurate enough all over its part of it, and whether it is needed, then."""
+    low, high = depths(found.corners[k], triangle, forward, work)
+    e = max(floor, slope * low)
+    if low > high or found.low[k] > e:
+        return False, False
+    if t.first.size == 2 or found.max_z[k] > e:
+        return True, True
+    return True, not _covered(t, found, k, triangle, forward, slope, floor, near, work)
 
 
 @kernel

@@ -203,9 +203,10 @@ class Index:
         """What shows the ground to samples ``spacing_m`` metres apart, in a rectangle: the patches chosen at tolerance
         e, those whose own samples are farther apart than that replaced by finer ones of their layer, down to the data.
 
-        So a layer's data is shown as it is where samples are as close as it, whatever other layers there are.
+        So a layer's data is shown as it is where samples are as close as it, whatever other layers there are. Patches
+        of rims that none of the samples [row, col] * spacing lies in are left out: coarse levels need few of them.
         """
-        chosen = self.uniform(e, rect)
+        chosen = self._met(self.uniform(e, rect), spacing_m)
         if len(chosen) == 0:
             return chosen
         finest = np.floor(np.log2(np.maximum(spacing_m / self._steps, 1.0)) + 1e-9).astype(np.int64)
@@ -217,6 +218,18 @@ class Index:
             if count >= 0:
                 return out[:count].copy()
             room *= 4
+
+    def _met(self, chosen: Chosen, spacing_m: float) -> Chosen:
+        """Patches less those of rims that lie between the samples of a lattice, by a cell at least."""
+        rim = self._place[chosen, 0] == patches.RIM
+        if not rim.any():
+            return chosen
+        some = chosen[rim]
+        box, more = self.boxes.box[some], self._steps[self.model.owner[some], None]
+        first, last = np.ceil((box[:, :2] - more) / spacing_m), np.floor((box[:, 2:] + more) / spacing_m)
+        keep = np.ones(len(chosen), dtype=bool)
+        keep[rim] = (first <= last).all(axis=1)
+        return chosen[keep]
 
     def view(self, view: View) -> Chosen:
         """The safe cut of a view: every place in its triangle is covered, by patches that are accurate enough wherever
@@ -258,6 +271,7 @@ class Index:
             rest = np.ones(len(nodes), dtype=bool)
             rest[safe] = False
             if s == bottom:
+                found.append(self._safe_rim(layer, nodes[rest], surface))
                 break
             j, i = np.divmod(nodes[rest], cols)
             _, down, across = t.scale[s - 1]
@@ -266,6 +280,18 @@ class Index:
             inside = (y < down) & (x < across)
             nodes = y[inside] * across + x[inside]
         return found
+
+    def _safe_rim(self, layer: int, nodes: NDArray[np.int64], surface: Surface) -> Chosen:
+        """The patches of the rim below nodes of the lowest scale that are accurate enough."""
+        at = int(self.tree.rim_at[layer])
+        if at < 0:
+            return np.zeros(0, dtype=np.int32)
+        start, stop = self.tree.rim[at + nodes], self.tree.rim[at + nodes + 1]
+        count = stop - start
+        patch = np.repeat(start - np.cumsum(count) + count, count) + np.arange(count.sum())
+        lowest = surface.lowest(self.boxes.box[patch])
+        safe: Chosen = patch[(self.model.low[patch] <= lowest) & np.isfinite(lowest)].astype(np.int32)
+        return safe
 
     def _needed(self, chosen: Chosen, surface: Surface) -> Chosen:
         """Without those that other layers' greater patches, accurate enough themselves, cover."""

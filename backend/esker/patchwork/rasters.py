@@ -10,7 +10,6 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import json
-import mmap
 import os
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -21,16 +20,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from esker import contract
-from esker.patchwork import errors, mipmaps, patches
+from esker.patchwork import errors, mipmaps, patches, rim
+from esker.patchwork.paging import let_go
 from esker.patchwork.patches import PatchErrors
 
 Heights = NDArray[np.float32]
 Progress = Callable[[str, float], None]
 
-FORMAT: Final = 1
+FORMAT: Final = 2
 HEAD: Final = "raster.json"
 HEIGHTS: Final = "heights.npy"
 WARP: Final = "warp.npy"
+RIM: Final = "rim.npy"
+RIM_ERRORS: Final = "rim_errors.npy"
 BLOCK_ROWS: Final = 256
 
 
@@ -83,7 +85,7 @@ def build_out_of_core(
     warp: NDArray[np.float64] | None = None,
     progress: Progress | None = None,
 ) -> Raster:
-    """Make a raster in ``directory``, mapped: memory beyond the mapped files stays at some megabytes.
+    """Make a raster in ``directory``, mapped: memory stays at some megabytes, pages of mapped files counted.
 
     ``heights``: float32, usually a memmap. If it maps ``directory``/heights.npy already, it is taken as it is (and
     infinities in it become NaN there), else it is copied block by block. Raises RasterError as :func:`build`.
@@ -109,7 +111,7 @@ def read(raster_dir: Path) -> Raster:
     """Open a raster: its arrays are mapped, read-only. Raises RasterError if anything in it is not as it must be."""
     try:
         head = json.loads((raster_dir / HEAD).read_text(encoding="utf-8"))
-        if head["format"] != FORMAT:
+        if head["format"] not in (1, FORMAT):
             raise RasterError(f"{raster_dir.name}: format {head['format']} of rasters is not known here")
         rows, cols = (int(side) for side in head["shape"])
         shapes = mipmaps.shapes(rows, cols)
@@ -123,11 +125,18 @@ def read(raster_dir: Path) -> Raster:
             whole = patches.table_shape(rows, cols, scale)
             if table.dtype != np.float32 or table.shape not in (whole, (0, 0)):
                 raise RasterError(f"{raster_dir.name}: its patch errors do not fit it")
+        net = _net(warp)
+        if head["format"] == FORMAT:
+            found, measured = np.load(raster_dir / RIM, allow_pickle=False), np.load(raster_dir / RIM_ERRORS)
+            _check_rim(raster_dir, found, measured, mips[0].shape)
+        else:  # written before there was a rim
+            found = rim.find(mips[0], errors.whole_kernels(mips[0]) if head["valid"] < 1 else None)
+            measured = errors.rim_errors(mips[0], net, found)
         return Raster(
             mips[0],
             mips,
-            _net(warp),
-            PatchErrors(tuple(_read_only(table) for table in tables)),
+            net,
+            PatchErrors(tuple(_read_only(table) for table in tables), _read_only(found), _read_only(measured)),
             str(head["digest"]),
             float(head["low"]),
             float(head["high"]),
@@ -137,6 +146,17 @@ def read(raster_dir: Path) -> Raster:
         raise RasterError(f"{raster_dir.name}: not a whole raster ({error})") from error
     except ValueError as error:
         raise error if isinstance(error, RasterError) else RasterError(f"{raster_dir.name}: {error}") from error
+
+
+def _check_rim(raster_dir: Path, found: NDArray[Any], measured: NDArray[Any], shape: tuple[int, ...]) -> None:
+    """Raise RasterError unless kernels (n, 4) of a rim lie in a grid of a shape and each has an error."""
+    kinds = found.dtype == np.int32 and measured.dtype == np.float32
+    if not kinds or found.shape != (len(measured), 4) or measured.ndim != 1:
+        raise RasterError(f"{raster_dir.name}: the rim of its patches does not fit it")
+    if (found < (0, 0, 1, 1)).any() or (found[:, :2] + found[:, 2:] > shape).any():
+        raise RasterError(f"{raster_dir.name}: the rim of its patches does not lie in it")
+    if (found[:, :2] // patches.SMALLEST_KERNEL != (found[:, :2] + found[:, 2:] - 1) // patches.SMALLEST_KERNEL).any():
+        raise RasterError(f"{raster_dir.name}: the rim of its patches does not lie in its tiling")
 
 
 def verify(raster: Raster) -> bool:
@@ -180,24 +200,17 @@ def _finish(
 ) -> Raster:
     say = progress or (lambda _stage, _share: None)
     low, high, valid = _bounds(heights)
-    _let_go(heights)
     shapes = mipmaps.shapes(*heights.shape)
 
     def made(level: int, shape: tuple[int, int]) -> Heights:
         say("mipmaps", (level - 1) / max(1, len(shapes) - 1))
-        _let_go(heights)
         if directory is None:
             return np.empty(shape, np.float32)
         return np.lib.format.open_memmap(directory / _mip_name(level), "w+", np.float32, shape)
 
     mips = tuple(_read_only(mip) for mip in mipmaps.mipmaps(heights, made))
     say("mipmaps", 1.0)
-
-    def measuring(share: float) -> None:
-        say("errors", share)
-        _let_go(heights)
-
-    measured = errors.measure(mips, warp, measuring)
+    measured = errors.measure(mips, warp, lambda share: say("errors", share))
     return Raster(heights, mips, warp, measured, digest(heights, warp), low, high, valid)
 
 
@@ -215,8 +228,10 @@ def _bounds(heights: Heights) -> tuple[float, float, float]:
 
 
 def _blocks(heights: Heights) -> Iterator[Heights]:
+    """Blocks of rows; one is let go of when the next is asked for."""
     for row in range(0, heights.shape[0], BLOCK_ROWS):
         yield np.asarray(heights[row : row + BLOCK_ROWS])
+        let_go(heights, row, row + BLOCK_ROWS)
 
 
 def _clean(heights: NDArray[Any]) -> Heights:
@@ -248,17 +263,9 @@ def _own_heights(heights: Heights, path: Path) -> None:
         if not same or bad.any():
             block[bad] = np.nan
             target[rows] = block
+            let_go(target, row, row + BLOCK_ROWS)
+        let_go(heights, row, row + BLOCK_ROWS)
     target.flush()  # type: ignore[attr-defined]
-    _let_go(heights)
-
-
-def _let_go(array: Heights) -> None:
-    """Take the pages of a mapped file out of this process's memory: they stay in the system's cache, or on disk."""
-    holder: Any = array
-    while holder is not None and not isinstance(holder, mmap.mmap):
-        holder = getattr(holder, "_mmap", None) or getattr(holder, "base", None)
-    if holder is not None and hasattr(mmap, "MADV_DONTNEED"):
-        holder.madvise(mmap.MADV_DONTNEED)
 
 
 def _net(warp: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
@@ -302,6 +309,8 @@ def _write_rest(directory: Path, raster: Raster) -> None:
         np.save(directory / WARP, raster.warp)
     for scale, table in enumerate(raster.errors.tables):
         np.save(directory / _error_name(scale), table)
+    np.save(directory / RIM, raster.errors.rim)
+    np.save(directory / RIM_ERRORS, raster.errors.rim_errors)
     head = {
         "format": FORMAT,
         "shape": list(raster.heights.shape),

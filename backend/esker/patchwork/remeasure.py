@@ -105,25 +105,24 @@ def distances(of: Sheet, to: Sheet) -> tuple[NDArray[np.int64], Floats]:
     ours, theirs = of.placed, to.placed
     gain = np.array([ours.layer.scale, ours.layer.lift_m, theirs.layer.scale, theirs.layer.lift_m], np.float64)
     warp = NO_WARP if theirs.raster.warp is None else theirs.raster.warp
-    scales = of.scale[index]
-    for scale in np.unique(scales).tolist():
-        a, b = np.searchsorted(scales, scale), np.searchsorted(scales, scale, "right")
-        size = patches.kernel_samples(scale)
-        chosen = index[a:b]
-        first = np.stack([of.j[chosen], of.i[chosen]], 1).astype(np.int64) * size - patches.RING
+    row, col, sides = (column[index] for column in of.windows())
+    kinds = of.scale[index].astype(np.int64) * 64 + sides
+    for kind in np.unique(kinds).tolist():
+        scale, side = divmod(kind, 64)
+        at = np.flatnonzero(kinds == kind)
+        first = np.stack([row[at], col[at]], 1).astype(np.int64)
         mip = ours.raster.mips[patches.level_of(scale)]
-        side = patches.side_of(scale)
         # A few great patches are shared out by rows, so that no thread waits for another.
-        cells = patches.SMALLEST_KERNEL << scale
+        cells = patches.SMALLEST_KERNEL << max(scale, 0)
         parts = -(-cells // 448)
-        bests = np.empty(len(chosen) * parts)
+        bests = np.empty(len(at) * parts)
         work = functools.partial(
             _distances,
             mip,
             first,
             side,
-            lattice_to_patch[a:b],
-            of.extent[chosen],
+            lattice_to_patch[at],
+            of.extent[index[at]],
             gain,
             theirs.raster.heights,
             warp,
@@ -132,6 +131,6 @@ def distances(of: Sheet, to: Sheet) -> tuple[NDArray[np.int64], Floats]:
             bests,
         )
         spread(work, bands(len(bests), 1 if cells > 500 else 16))
-        out[a:b] = bests.reshape(-1, parts).max(axis=1)
+        out[at] = bests.reshape(-1, parts).max(axis=1)
     there = out >= 0
     return index[there], out[there]

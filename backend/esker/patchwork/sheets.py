@@ -13,6 +13,7 @@ from esker import contract
 from esker.patchwork import patches
 from esker.patchwork.patches import Floats
 from esker.patchwork.rasters import Raster
+from esker.patchwork.rim import blocks
 
 Ints = NDArray[np.int64]
 
@@ -73,7 +74,9 @@ class Sheet:
     """The n patches of one layer, ordered by (scale, j, i). Fields as in ``lod_space.Model``; and
 
     ``own``: accuracy + own error, metres. ``area``: log2 of the nominal kernel's area in steps of AREA_QUANTA.
-    ``tables[scale]``: index of patch (j, i) in the sheet, -1 where there is none. ``to_world``, ``to_lattice``: the
+    ``tables[scale]``: index of patch (j, i) in the sheet, -1 where there is none. Patches of the rim come first, by
+    their block (j, i) of the tiling's scale 0, ``rim_start[j * blocks a row + i]`` ..; it is empty if there are none.
+    ``j`` and ``i`` of theirs are the row and column of their kernel's first sample. ``to_world``, ``to_lattice``: the
     layer's affine and its inverse. ``sway``: greatest displacement of the control net, lattice units.
     """
 
@@ -89,6 +92,7 @@ class Sheet:
     own: Floats
     area: Ints
     tables: tuple[NDArray[np.int32], ...]
+    rim_start: Ints
     to_world: Floats
     to_lattice: Floats
     sway: float
@@ -101,6 +105,16 @@ class Sheet:
         """First patch of a scale and the one after its last."""
         return int(np.searchsorted(self.scale, scale)), int(np.searchsorted(self.scale, scale, "right"))
 
+    def windows(self) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
+        """First row and column of the patches in their levels, and how many samples a side they have."""
+        size = patches.SMALLEST_KERNEL << np.clip(self.scale, 0, patches.SMALL_SCALES).astype(np.int32)
+        row, col = self.j * size - patches.RING, self.i * size - patches.RING
+        rim = self.placed.raster.errors.rim
+        if len(rim):
+            part = slice(0, len(rim))
+            row[part], col[part], size[part] = rim[:, 0] - patches.RING, rim[:, 1] - patches.RING, rim[:, 2:].max(1)
+        return row, col, (size + 2 * patches.RING).astype(np.int32)
+
 
 def sheet(placed: Placed) -> Sheet:
     """Lay the patches of a layer in the world."""
@@ -110,29 +124,45 @@ def sheet(placed: Placed) -> Sheet:
     to_lattice = inverse(to_world)
     parts: list[tuple[NDArray[np.float64], ...]] = []
     scales, js, iss, areas, tables = [], [], [], [], []
-    first = 0
-    for scale, table in enumerate(raster.errors.tables):
-        there = ~np.isnan(table)
-        j, i = np.nonzero(there)
-        index = np.full(table.shape, -1, np.int32)
-        index[there] = np.arange(first, first + len(j))
-        tables.append(index)
-        first += len(j)
-        if not len(j) and (parts or scale < len(raster.errors.tables) - 1):
-            continue  # the last one stands for a grid without any patch, so full of holes is it
-        laid = patches.lay(rows, cols, raster.warp, scale, j, i)
+    rim, cell = raster.errors.rim, math.log2(layer.spacing_m[0] * layer.spacing_m[1])
+
+    def add(laid: patches.Lattice, errors: NDArray[np.float32], scale: int, at: Ints, samples: Floats) -> None:
         to_patch = composed(laid.to_patch, to_lattice)
         from_patch = inverse(to_patch)
         unit = np.hypot(from_patch[:, 0, :2], from_patch[:, 1, :2])
         kernel = mapped(to_world, laid.kernel)
-        own = layer.accuracy_m + abs(layer.scale) * table[there].astype(np.float64)
+        own = layer.accuracy_m + abs(layer.scale) * errors.astype(np.float64)
         slack = laid.bend * max(layer.spacing_m)
         parts.append((to_patch, kernel, laid.extent, laid.extent / 2 * unit, slack, own))
-        scales.append(np.full(len(j), scale, np.int8))
-        js.append(j.astype(np.int32))
-        iss.append(i.astype(np.int32))
-        log2 = math.log2(layer.spacing_m[0] * layer.spacing_m[1]) + 2 * (scale + math.log2(patches.SMALLEST_KERNEL))
-        areas.append(np.full(len(j), round(log2 * AREA_QUANTA), np.int64))
+        scales.append(np.full(len(at), scale, np.int8))
+        js.append(at[:, 0].astype(np.int32))
+        iss.append(at[:, 1].astype(np.int32))
+        areas.append(np.rint((cell + np.log2(samples)) * AREA_QUANTA).astype(np.int64))
+
+    if len(rim):
+        laid = patches.lay_rim(rows, cols, raster.warp, rim)
+        add(
+            laid,
+            raster.errors.rim_errors,
+            patches.RIM,
+            rim[:, :2].astype(np.int64),
+            rim[:, 2:].prod(axis=1).astype(np.float64),
+        )
+    first = len(rim)
+    for scale, table in enumerate(raster.errors.tables):
+        there = ~np.isnan(table)
+        j, i = np.nonzero(there)
+        # Where there is a rim the small tables are the way to it.
+        index = np.full(patches.table_shape(rows, cols, scale) if len(rim) else table.shape, -1, np.int32)
+        if len(j):
+            index[there] = np.arange(first, first + len(j))
+        tables.append(index)
+        first += len(j)
+        if not len(j) and (parts or scale < len(raster.errors.tables) - 1):
+            continue  # the last one stands for a grid without any patch, all of whose rim was left out
+        laid = patches.lay(rows, cols, raster.warp, scale, j, i)
+        samples = np.full(len(j), 4.0**scale * patches.SMALLEST_KERNEL**2)
+        add(laid, table[there], scale, np.stack([j, i], 1), samples)
     to_patch, kernel, extent, half, slack, own = (np.concatenate(column) for column in zip(*parts, strict=True))
     return Sheet(
         placed,
@@ -147,6 +177,7 @@ def sheet(placed: Placed) -> Sheet:
         own,
         np.concatenate(areas),
         tuple(tables),
+        blocks(rim, patches.table_shape(rows, cols, 0)) if len(rim) else np.zeros(0, np.int64),
         to_world,
         to_lattice,
         0.0 if raster.warp is None else float(np.abs(raster.warp).max()) * 1.5 + 0.5,
