@@ -101,11 +101,21 @@ def _build(result: dict[str, Any]) -> str:
     if "memory" in largest:
         memory = largest["memory"]
         text += (
-            f"\n\nThe largest out of core: the process itself allocated {memory['anonymous_mib']:,.0f} MiB at most; "
-            f"with the pages of mapped files that the system happened to keep, {memory['resident_mib']:,.0f} MiB. "
-            f"With digest, bounds and files {_seconds(largest['with_digest_and_files_s'])} in all."
+            f"\n\nThe largest out of core: the process itself allocated {memory['anonymous_mib']:,.0f} MiB at most, "
+            f"and {_peak(memory):,.0f} MiB were resident with the pages of mapped files{_limit(memory)}. With digest, "
+            f"bounds and files {_seconds(largest['with_digest_and_files_s'])} in all."
         )
     return text
+
+
+def _peak(memory: dict[str, float]) -> float:
+    """The kernel's record, or, in older results, the greatest that was seen."""
+    return max(memory["resident_mib"], memory.get("peak_resident_mib", 0.0))
+
+
+def _limit(memory: dict[str, float]) -> str:
+    limit = memory.get("data_limit_mib")
+    return f"; it was not allowed to allocate more than {limit:,.0f} MiB" if limit else ""
 
 
 def _queries(result: dict[str, Any]) -> str:

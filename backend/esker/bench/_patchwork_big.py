@@ -1,13 +1,16 @@
 """Builds one large raster out of core: ``python -m esker.bench._patchwork_big HEIGHTS.npy FOLDER``.
 
-A process of its own, so that its memory is its own. Two figures of it: ``anonymous``, what the process itself
-allocated, and ``resident``, which counts the pages of mapped files too, that the system takes back when it needs
-them.
+A process of its own, so that its memory is its own, with a limit on what it may allocate (RLIMIT_DATA): beyond
+``LIMIT_MIB`` it fails. Three figures of it: ``anonymous``, what the process itself allocated, ``resident``, which
+counts the pages of mapped files too, both looked at every ``EVERY_S``, and ``peak_resident``, the kernel's own record
+of the latter, which misses no moment. What the system keeps of files in its cache is no process's and is not counted.
 """
 
 from __future__ import annotations
 
+import contextlib
 import json
+import resource
 import sys
 import threading
 from pathlib import Path
@@ -19,6 +22,7 @@ from esker.bench import patchwork
 from esker.patchwork import rasters
 
 EVERY_S: Final = 0.02
+LIMIT_MIB: Final = 1024
 
 
 class Watch(threading.Thread):
@@ -26,22 +30,34 @@ class Watch(threading.Thread):
 
     def __init__(self) -> None:
         super().__init__(daemon=True)
-        self.most = {"RssAnon": 0.0, "VmRSS": 0.0}
+        self.most = {"RssAnon": 0.0, "VmRSS": 0.0, "VmHWM": 0.0}
+        with contextlib.suppress(OSError):
+            Path("/proc/self/clear_refs").write_text("5")  # the record begins anew
         self._over = threading.Event()
 
     def run(self) -> None:
         """Looks every ``EVERY_S``."""
         while not self._over.wait(EVERY_S):
-            for line in Path("/proc/self/status").read_text().splitlines():
-                name, _, value = line.partition(":")
-                if name in self.most:
-                    self.most[name] = max(self.most[name], int(value.split()[0]) / 1024)
+            self._look()
 
-    def stop(self) -> dict[str, float]:
+    def _look(self) -> None:
+        for line in Path("/proc/self/status").read_text().splitlines():
+            name, _, value = line.partition(":")
+            if name in self.most:
+                self.most[name] = max(self.most[name], int(value.split()[0]) / 1024)
+
+    def stop(self) -> dict[str, float | None]:
         """Ends it."""
         self._over.set()
         self.join()
-        return {"anonymous_mib": self.most["RssAnon"], "resident_mib": self.most["VmRSS"]}
+        self._look()
+        limit = resource.getrlimit(resource.RLIMIT_DATA)[0]
+        return {
+            "anonymous_mib": self.most["RssAnon"],
+            "resident_mib": self.most["VmRSS"],
+            "peak_resident_mib": self.most["VmHWM"],
+            "data_limit_mib": None if limit == resource.RLIM_INFINITY else limit / 2**20,
+        }
 
 
 def main(heights: Path, folder: Path) -> dict[str, Any]:
@@ -60,4 +76,5 @@ def main(heights: Path, folder: Path) -> dict[str, Any]:
 
 
 if __name__ == "__main__":
+    resource.setrlimit(resource.RLIMIT_DATA, (LIMIT_MIB << 20, LIMIT_MIB << 20))
     sys.stdout.write(json.dumps(main(Path(sys.argv[1]), Path(sys.argv[2]))) + "\n")
