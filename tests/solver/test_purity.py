@@ -108,10 +108,32 @@ def test_the_coarsest_preview_waits_for_no_fine_raster(solver: Solver, monkeypat
     kept = solver._spare[-1].packer
     stopped = solver.steps(strokes[1:], SETTINGS, 4)
     next(stopped)
-    stopped.close()  # type: ignore[attr-defined]
+    stopped.close()
     assert kept.likeness(strokes, SETTINGS) == len(strokes), "the fine raster is as it was: nothing of it began"
     settled = solver.solve(strokes, SETTINGS, 4)[0]
     assert np.sqrt(np.mean((a - settled) ** 2)) < 0.05 * np.ptp(settled)
+
+
+def test_a_glimpse_of_newer_strokes_changes_nothing_of_a_solve(solver: Solver) -> None:
+    """SPEC S17: it is what their own solve begins with, to the bit, and that may then begin without it."""
+    older, newer = SCENES["fifty"][3:], SCENES["fifty"]
+    plain = [r.heights for r in solver.steps(older, SETTINGS, 4) if r is not None and r.level == 4]
+    own = next(solver.steps(newer, SETTINGS, 4))
+    steps, glimpses, levels = solver.steps(older, SETTINGS, 4), [], []
+    assert steps.glimpse(newer, SETTINGS) is None, "it has not begun"
+    for r in steps:
+        glimpses.append(steps.glimpse(newer, SETTINGS))
+        if r is not None and r.channel == Channel.HEIGHT and r.level == 4:
+            levels.append(r.heights)
+    assert steps.glimpse(newer, SETTINGS) is None, "it has ended"
+    assert own is not None
+    assert len(glimpses) > 8
+    for glimpse in glimpses:
+        assert glimpse is not None
+        assert np.array_equal(glimpse.heights, own.heights)
+    assert [np.array_equal(a, b) for a, b in zip(plain, levels, strict=True)] == [True, True]
+    rest = [r for r in solver.steps(newer, SETTINGS, 4, coarsest=False) if r is not None and not r.settled]
+    assert [r.level for r in rest if r.channel == Channel.HEIGHT] == [1, 2, 3, 4]
 
 
 @pytest.mark.parametrize("scene", list(SCENES))
@@ -132,7 +154,7 @@ def test_close_and_go_on(solver: Solver) -> None:
         run = solver.steps(SCENES["cross"], SETTINGS, 2)
         for _ in range(stop):
             next(run)
-        run.close()  # type: ignore[attr-defined]
+        run.close()
         assert np.array_equal(solver.solve(SCENES["five"], SETTINGS, 2)[2], whole)
 
 

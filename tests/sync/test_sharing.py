@@ -170,12 +170,12 @@ def test_a_preview_that_is_about_to_end_is_shown_whole_and_not_stopped() -> None
         client.begin()
         client.steps = iter(())
         row = []
-        for level, takes in ((0, 0.005), (1, 0.1), (2, 0.02)):
+        for level, takes in ((0, 0.005), (1, 0.4), (2, 0.02)):
             now += takes
             row.append(client.took(Level(level, np.zeros((1, 1), dtype=np.float32), False), now))
             if clock == 2 and level < 2:
                 client.request(Job(9, (), SETTINGS), now)
-                assert client.starts(now) == (level == 0), "0.12 s before the end, but not 0.02 s before it"
+                assert client.starts(now) == (level == 0), "0.42 s before the end, but not 0.02 s before it"
                 client.newest = None
         shown.append(row)
     # Nothing is known of the first pass; in the second, level 1 comes 20 ms before the finest and is not worth a look.
@@ -183,22 +183,59 @@ def test_a_preview_that_is_about_to_end_is_shown_whole_and_not_stopped() -> None
 
 
 def test_the_finest_preview_has_time_to_be_sent() -> None:
-    """A newer coarse preview would bar it: who draws without a pause would never see the finest level (SPEC P71)."""
-    client = Client(1, ignore, ignore)
+    """A newer preview of a level between would bar it; the coarsest alone is shown at any time (SPEC P71)."""
+    client = Client(2, ignore, ignore)
     flat = np.zeros((1, 1), dtype=np.float32)
 
-    def passing(clock: int, coarse_at: float) -> bool:
-        client.request(Job(clock, (), SETTINGS), coarse_at)
+    def passing(clock: int, at: float) -> list[bool]:
+        client.request(Job(clock, (), SETTINGS), at)
         client.begin()
         client.steps = iter(())
-        return client.took(Level(0, flat, False), coarse_at)
+        return [client.took(Level(level, flat, False), at + 0.001 * level) for level in (0, 1)]
 
-    assert passing(1, 10.0), "the first is shown at once"
-    assert client.took(Level(1, flat, False), 10.1)
-    assert not passing(2, 10.12)
-    assert not passing(3, 10.15)
-    assert passing(4, 10.17)
-    assert client.took(Level(1, flat, False), 10.27)
+    assert passing(1, 10.0) == [True, True], "the first is shown at once"
+    assert client.took(Level(2, flat, False), 10.1)
+    assert passing(2, 10.12) == [True, False]
+    assert passing(3, 10.15) == [True, False]
+    assert passing(4, 10.17) == [True, True]
+    assert client.took(Level(2, flat, False), 10.27)
+
+
+class Seer(Iterator[Any]):
+    """A solve of levels 0..2 that can tell what newer strokes look like."""
+
+    def __init__(self) -> None:
+        self._levels = _levels(2)
+
+    def __next__(self) -> Any:
+        return next(self._levels)
+
+    def glimpse(self, *_: Any) -> Any:
+        return Level(0, np.zeros((1, 1), dtype=np.float32), False)
+
+
+def test_a_newer_job_shows_its_coarsest_level_while_a_pass_goes_on() -> None:
+    """SPEC P92: once for each job, and not before the pass has shown its own; then its pass begins without it."""
+    client = Client(2, ignore, ignore)
+    client.request(Job(1, (), SETTINGS), 0.0)
+    client.begin()
+    client.steps, client.finest_at, client._lead = Seer(), 0.0, {0: 0.1, 1: 0.05}
+    newer = Job(2, (), SETTINGS)
+    client.request(newer, 0.01)
+    assert not client.glimpse_due, "the first level of the pass comes as soon"
+    client.took(next(client.steps), 0.01)
+    assert client.glimpse_due
+    assert client.stage(0.01) == module.COARSE
+    client.glimpsed, client.ahead = newer, True
+    assert not client.glimpse_due
+    assert client.stage(0.01) == module.FINER, "the pass goes on"
+    for _ in (1, 2):
+        client.took(next(client.steps), 0.02)
+    assert client.begin() is newer
+    assert client.is_ahead(newer)
+    client.steps = Seer()
+    client.request(Job(3, (), SETTINGS), 0.03)
+    assert client.glimpse_due, "its coarsest level is out"
 
 
 # --- refinement -----------------------------------------------------------------------------------------------------
@@ -384,7 +421,7 @@ def test_a_solve_left_while_it_rasterises_leaves_no_trace(monkeypatch: pytest.Mo
     solver.solve(strokes[:30], SETTINGS)
     steps = solver.steps(strokes, SETTINGS)
     assert next(steps) is None, "between two bands of bins"
-    steps.close()  # type: ignore[attr-defined]
+    steps.close()
     got = solver.solve(strokes, SETTINGS)
     for level in range(3):
         np.testing.assert_array_equal(got[level], want[level])

@@ -44,7 +44,7 @@ FORBIDDEN |= {("synthesis", room) for room in ("solve", "tiles", "store", "patch
 FORBIDDEN |= {(room, other) for room in ("session", "tiles", "solve") for other in ("patchwork", "importing")}
 ONLY = {
     "pyopencl": {"solve", "synthesis", "patchwork"},
-    "numba": {"patchwork"},
+    "numba": {"patchwork", "tiles"},
     "rasterio": {"importing"},
     "pyproj": {"importing"},
     "fastapi": {"server"},

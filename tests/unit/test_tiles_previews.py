@@ -1,4 +1,4 @@
-"""Previews that agree over the levels, and that cost what is new (SPEC T3, T34, T35)."""
+"""Previews that agree over the levels, and that cost what is new (SPEC T3, T34, T35, T53)."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from esker import grid
 from esker.contract import View
-from esker.tiles.codec import SAMPLE_LIMIT, follow
+from esker.tiles.codec import SAMPLE_LIMIT, follow, predict
 from esker.tiles.delivery import ClientTiles, TileServer
 from esker.tiles.frame import read_frame
-from esker.tiles.pyramid import COARSE_DEAD_ZONE, DEAD_ZONE, Level, Pyramid, follow_parents
+from esker.tiles.pyramid import COARSE_DEAD_ZONE, DEAD_ZONE, Level, Pyramid, follow_parents, moved_along
 
 SIZE_M = 1024.0
 LEVELS = 3
@@ -71,6 +71,51 @@ def test_a_coarse_preview_that_was_shown_stays_as_it_was_shown(settled: Pyramid)
     settled.put(2, LEVELS, ground(LEVELS, 130.0), False)
     for index in range(LEVELS):
         np.testing.assert_array_equal(level(settled, index).samples, shown[index])
+
+
+def test_a_finest_preview_keeps_what_a_newer_coarsest_one_has_moved(settled: Pyramid) -> None:
+    """SPEC T53."""
+    for clock, height in ((2, 120.0), (3, 150.0), (4, 160.0)):  # 3 and 4 are drawn while 2 is solved
+        settled.put(clock, 0, ground(0, height), False)
+    coarse = level(settled, 0)
+    settled.put(2, LEVELS, ground(LEVELS, 120.0), False)
+    assert level(settled, 0) is coarse, "what is newer is not taken back"
+    finest = level(settled, LEVELS)
+    assert finest.clock == 2
+    assert finest.stamp > coarse.stamp, "it may be sent"
+    quantum = grid.quantum(LEVELS, SIZE_M)
+    off = np.abs(finest.samples * quantum - ground(LEVELS, 160.0)).max()
+    assert off < 0.02 * 40, "40 m, as smooth as level 0 can say them"
+    for index in range(1, LEVELS):
+        step = 1 << (LEVELS - index)
+        injected = finest.samples[::step, ::step] * quantum
+        assert (
+            np.abs(level(settled, index).samples * grid.quantum(index, SIZE_M) - injected).max() < 2.6 * quantum * step
+        )
+    settled.put(4, LEVELS, ground(LEVELS, 160.0), False)
+    assert level(settled, 0) is not coarse or level(settled, 0).clock == 4
+    assert np.abs(level(settled, LEVELS).samples * quantum - ground(LEVELS, 160.0)).max() <= (DEAD_ZONE + 0.1) * quantum
+
+
+def test_a_finest_preview_without_a_coarsest_one_of_its_own_is_shown_as_it_is(settled: Pyramid) -> None:
+    settled.put(3, 0, ground(0, 150.0), False)
+    settled.put(2, LEVELS, ground(LEVELS, 120.0), False)
+    quantum = grid.quantum(LEVELS, SIZE_M)
+    assert np.abs(level(settled, LEVELS).samples * quantum - ground(LEVELS, 120.0)).max() <= (DEAD_ZONE + 0.1) * quantum
+    assert level(settled, 0).clock == 2
+
+
+@pytest.mark.parametrize("at", [(30, 30), (0, 0), (64, 10), (5, 64)])
+def test_what_level_0_moves_is_interpolated_as_tiles_are(at: tuple[int, int]) -> None:
+    then = np.zeros((65, 65), dtype=np.int32)
+    now = then.copy()
+    now[at] = 4096
+    heights = np.zeros((129, 129), dtype=np.float32)
+    assert moved_along(heights, then, then, 0.5) is heights
+    found = moved_along(heights, then, now, 0.5)
+    np.testing.assert_array_equal(found[::2, ::2], now * np.float32(0.5))
+    inner = np.s_[4:-4, 4:-4]  # beside the domain's border tiles are predicted one-sidedly
+    np.testing.assert_allclose(found[inner], predict(now)[inner] * 0.25, atol=0.5)
 
 
 def test_agreeing_previews_cost_a_fraction_of_the_bytes() -> None:

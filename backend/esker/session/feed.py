@@ -1,8 +1,11 @@
 """The way of solved levels and refined tiles to the clients of one room (DESIGN 5.6; 8, "Flow control").
 
 All work on tiles (taking a level, planning, encoding) happens in one thread of its own, so the event loop never waits
-for it and no lock is needed. A client is planned for only while its byte window is open and its last frame has been
-handed to the socket: versions in between are skipped by construction, and nothing stale is ever queued.
+for it and no lock is needed. A client is planned for only while its byte window is open and its last frames have been
+handed to the socket: versions in between are skipped by construction, and no more than ``BATCH_BYTES`` are ever queued.
+
+A coarsest preview of newer strokes may come at any time. What is coarser and newer bars finer levels, so it waits until
+the frames of a finest preview that has just come were made.
 
 What the clients want refined goes the other way: the tile thread publishes it, the solver's thread reads it, and the
 tiles that come back are taken together, so that a hundred of them cost a few selections and not a hundred.
@@ -13,10 +16,11 @@ from __future__ import annotations
 import asyncio
 import logging
 import threading
+from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import CancelledError, Future
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 from esker import contract as c
@@ -25,11 +29,14 @@ from esker.session.outbox import Outbox
 from esker.session.ports import ClientTiles, LevelResult, Tiles
 from esker.session.tilethread import TileThread
 from esker.tiles.delivery import RefinedTile
+from esker.tiles.pyramid import warm
 
 log = logging.getLogger("esker.feed")
 
 PUTS_AHEAD: Final = 1
 """Levels that may wait to become tiles while the solver goes on."""
+BATCH_BYTES: Final = 48 << 10
+"""Frames of one client are made in one go up to this size: each way to the loop and back costs a millisecond."""
 BATCH_SECONDS: Final = 0.03
 """Refined tiles that come within this time are taken together."""
 BATCH_TILES: Final = 16
@@ -42,19 +49,19 @@ WISHES_SECONDS: Final = 0.05
 
 @dataclass(eq=False)
 class Stream:
-    """The tiles of one client: its window, and at most one encoded frame that waits for the socket."""
+    """The tiles of one client: its window, and the encoded frames that wait for the socket."""
 
     outbox: Outbox
     view: c.View | None = None
     in_flight: int = 0
     hungry: bool = True
     busy: bool = False
-    frame: bytes | None = None
+    frames: deque[bytes] = field(default_factory=deque)
 
     @property
     def ready(self) -> bool:
         """True when a frame may be made for it now."""
-        free = self.frame is None and not self.busy and self.in_flight < c.BYTE_WINDOW
+        free = not self.frames and not self.busy and self.in_flight < c.BYTE_WINDOW
         return self.hungry and free and self.outbox.closing is None
 
 
@@ -89,10 +96,15 @@ class TileFeed:
         self._wishes: tuple[TileKey, ...] = ()
         self._made: dict[TileKey, tuple[int, RefinedTile]] = {}
         """Refined tiles that wait to be taken. This and ``_wishes`` need the lock."""
+        self._coarse: tuple[int, LevelResult] | None = None
+        """The newest coarsest preview that waits to be taken. It needs the lock too."""
+        self._owing = False
+        """Of the tile thread: a finest preview was taken, and nobody was told yet."""
         self._taking = False
         self._rest_until = 0.0
         """When the next batch may be taken, by the loop's clock."""
         self._wishes_timer: asyncio.TimerHandle | None = None
+        self._submit(warm)
 
     def add(self, outbox: Outbox) -> Stream:
         """A new client."""
@@ -118,8 +130,10 @@ class TileFeed:
 
     def sent(self, stream: Stream) -> bytes | None:
         """Takes the frame that waits, to hand it to the socket; the next one may be made."""
-        frame, stream.frame = stream.frame, None
-        if frame is not None:
+        if not stream.frames:
+            return None
+        frame = stream.frames.popleft()
+        if not stream.frames:
             self._loop.call_soon(self._feed, stream)
         return frame
 
@@ -139,11 +153,21 @@ class TileFeed:
             with self._lock:  # tiles that wait were made over another base
                 self._made.clear()
         try:
+            if result.level == 0 and result.channel == c.Channel.HEIGHT and show and not result.settled:
+                self._put_coarse(clock, result)
+                return
             while len(self._puts) > PUTS_AHEAD - 1:
                 self._puts.pop(0).result()
             self._puts.append(self._executor.first(self._put, clock, result, show))
         except (CancelledError, RuntimeError):
             log.debug("the tile thread has stopped")
+
+    def _put_coarse(self, clock: int, result: LevelResult) -> None:
+        """Takes a coarsest preview in place of one that still waits. Never waits."""
+        with self._lock:
+            waiting, self._coarse = self._coarse, (clock, result)
+        if waiting is None:
+            self._executor.first(self._take_coarse)
 
     def confirm(self, clock: int, level: int) -> None:
         """Heights up to ``level`` are final for ``clock`` too: only other channels followed from what has changed."""
@@ -175,6 +199,22 @@ class TileFeed:
 
     # --- in the tile thread ---------------------------------------------------------------------------------------
 
+    def _take_coarse(self) -> None:
+        """Puts the coarsest preview, unless frames of a finest one are owed: then it comes again behind these."""
+        if self._owing:
+            self._call(self._submit, self._take_coarse_now)
+            return
+        self._take_coarse_now()
+
+    def _take_coarse_now(self) -> None:
+        with self._lock:
+            waiting, self._coarse = self._coarse, None
+        if waiting is not None:
+            self._put(*waiting, True)
+
+    def _told(self) -> None:
+        self._owing = False
+
     def _put(self, clock: int, result: LevelResult, show: bool) -> None:
         channel = result.channel
         try:
@@ -189,8 +229,12 @@ class TileFeed:
             return
         settled = self._server.settled()
         self._publish(settled)
-        if show:
-            self._call(self._level_taken, clock, result.level, settled)
+        if not show:
+            return
+        self._owing = result.level > 0 and not result.settled
+        self._call(self._level_taken, clock, result.level, settled)
+        if self._owing:
+            self._call(self._submit, self._told)
 
     def _confirm(self, clock: int, level: int) -> None:
         self._call(self._level_taken, clock, level, self._server.settled())
@@ -241,22 +285,24 @@ class TileFeed:
             self._publish(False)
 
     def _make(self, stream: Stream, view: c.View | None) -> None:
-        frame: bytes | None = None
+        """Makes frames of the latest state, and hands each over when it is made."""
+        made = 0
         try:
             tiles = self._clients.get(stream)
             if tiles is None:
                 tiles = self._clients[stream] = self._tiles.client(self._server)
             if view is not None:
                 tiles.set_view(view)
-            plan = tiles.plan()
-            if plan is not None:
+            while made < BATCH_BYTES and (plan := tiles.plan()) is not None:
                 frame = plan.encode()
                 tiles.commit(plan)
+                made += len(frame)
+                self._call(self._frame_made, stream, frame)
         except Exception:
             log.exception("a tile frame could not be made")
             self._call(stream.outbox.close, "server_error", "The server failed to prepare the ground for you.")
             return
-        self._call(self._frame_made, stream, frame)
+        self._call(self._all_made, stream, made > 0)
 
     def _call(self, callback: Callable[..., object], *args: object) -> None:
         if not self._loop.is_closed():
@@ -298,12 +344,12 @@ class TileFeed:
             return False
         return True
 
-    def _frame_made(self, stream: Stream, frame: bytes | None) -> None:
-        stream.busy = False
-        if frame is None:
-            self._feed(stream)  # only if something changed while it was planned
-            return
-        stream.frame = frame
-        stream.hungry = True
+    def _frame_made(self, stream: Stream, frame: bytes) -> None:
+        stream.frames.append(frame)
         stream.in_flight += len(frame)
         stream.outbox.notify()
+
+    def _all_made(self, stream: Stream, some: bool) -> None:
+        stream.busy = False
+        stream.hungry |= some
+        self._feed(stream)  # if something changed while they were made, or if there is more

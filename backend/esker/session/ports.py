@@ -140,6 +140,7 @@ class Solver(Protocol):
         *,
         basis: bool = False,
         base: Any = None,
+        coarsest: bool = True,
     ) -> Iterator[LevelResult | None]: ...
 
     def base_levels(self, base: Any, levels: int) -> Iterator[LevelResult | None]:

@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Any, Final, Protocol, runtime_checkable
 
 from esker import contract as c
 from esker.grid import TileKey, solve_bytes
@@ -23,10 +23,12 @@ from esker.tiles.delivery import RefinedTile
 
 FINEST_WITHIN: Final = 0.150
 HOLD: Final = 0.070
-"""A coarse preview that the finest follows within this time is not shown, and its pass is not stopped."""
+"""A preview between the coarsest and the finest that the finest follows within this time is not shown."""
+FINISH: Final = 0.300
+"""A pass that should end within this time is not stopped: coarsest previews of newer jobs are made in between."""
 FRAMES: Final = 0.060
-"""The finest preview has this time to become frames before a coarse one is shown again: what is coarser and newer would
-bar it, and who draws without a pause would never see more than coarse levels."""
+"""The finest preview has this time to become frames before a level below it is shown again: what is coarser and newer
+would bar it. The coarsest level alone is shown at any time: tiles follow it (``feed.py``, ``tiles/pyramid.py``)."""
 PATIENCE: Final = 0.150
 BUDGET: Final = min(3 << 30, os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // 8)
 """Bytes for solves in progress, of all rooms together."""
@@ -48,6 +50,15 @@ class Job:
     painted: object = field(default=None, compare=False)
     base: Base | None = field(default=None, compare=False)
     """The ground under the strokes. Jobs with another base have another ``shape``."""
+
+
+@runtime_checkable
+class Glimpsing(Protocol):
+    """A solve that can tell, while it goes on, what newer strokes look like on the coarsest level."""
+
+    def glimpse(self, strokes: Sequence[c.Stroke], settings: c.TerrainSettings, base: Any = None) -> LevelResult | None:
+        """The coarsest preview of other strokes, None when this solve cannot make one now."""
+        ...
 
 
 @dataclass(eq=False)
@@ -93,6 +104,10 @@ class Client:
     """That job."""
     painted: object = None
     """Of the job whose channels came last, or will come."""
+    glimpsed: Job | None = None
+    """The newest job of which the coarsest preview was to be made ahead of its pass, ..."""
+    ahead: bool = False
+    """... and whether it was."""
     previewing: bool = False
     finest_at: float = -math.inf
     _reached: int = -1
@@ -109,6 +124,12 @@ class Client:
     def clock(self) -> int:
         """Of the job that it solves, or solved last."""
         return -1 if self.running is None else self.running.clock
+
+    @property
+    def bytes(self) -> int:
+        """Memory that its solve holds, or would hold."""
+        job = self.running if self.newest is None or self.steps is not None else self.newest
+        return solve_bytes(self.top, job is not None and job.base is not None)
 
     @property
     def at_rest(self) -> bool:
@@ -154,6 +175,14 @@ class Client:
         settling = newest.shape is running.shape and not self.previewing
         return settling or newest.painted is not self.painted
 
+    @property
+    def glimpse_due(self) -> bool:
+        """Whether the coarsest preview of its newest job is to be had while the pass of an older one goes on."""
+        newest, running = self.newest, self.running
+        if newest is None or running is None or newest is self.glimpsed or not isinstance(self.steps, Glimpsing):
+            return False
+        return self.previewing and self._reached >= 0 and newest.base is running.base
+
     def starts(self, now: float) -> bool:
         """Whether its newest job is to be begun: at once, but for a preview pass that should end first."""
         if self.newest is None:
@@ -163,7 +192,7 @@ class Client:
         if self.steps is None or not self.previewing:
             return True
         starving = now - self.finest_at > FINEST_WITHIN
-        return not starving and self._lead.get(self._reached, math.inf) > HOLD
+        return not starving and self._lead.get(self._reached, math.inf) > FINISH
 
     def stage(self, now: float) -> int | None:
         """Its class; None when it has nothing to do."""
@@ -171,6 +200,8 @@ class Client:
             return COARSE
         if self.newest is not None and self.starts(now):
             return SETTLE if self.newest is self._previewed else COARSE
+        if self.glimpse_due:
+            return COARSE
         if self.steps is not None:
             return SETTLE if not self.previewing else FINER if self._reached >= 0 else COARSE
         return REFINE if self.refiner is not None and self.looking else None
@@ -189,7 +220,13 @@ class Client:
         self.running, self.newest = self.newest, None
         self.previewing, self._reached, self.again_at = True, -1, math.inf
         self._came.clear()
+        if self.is_ahead(self.running):
+            self._reached, self._came[0] = 0, self.ran_at
         return self.running
+
+    def is_ahead(self, job: Job) -> bool:
+        """Whether the coarsest preview of a job was made ahead of its pass."""
+        return self.ahead and job is self.glimpsed
 
     def ended(self) -> None:
         """Its solve came to its end."""
@@ -200,16 +237,15 @@ class Client:
     def took(self, result: LevelResult, now: float) -> bool:
         """Notes a result; returns whether to show it.
 
-        Of a preview that ends soon only the coarsest level is shown at once: what coarse levels say in between would be
-        corrected before anybody saw it (docs/decisions/0014-consistent-previews.md).
+        The coarsest level is always shown at once. Of a preview that ends soon it is the only one: what levels say in
+        between would be corrected before anybody saw it (docs/decisions/0014-consistent-previews.md).
         """
         if not self.previewing or result.settled:
             return True
         level = self._reached = result.level
         if level < self.top:
             self._came[level] = now
-            telling = level == 0 or self._lead.get(level, math.inf) > HOLD
-            return telling and now - self.finest_at >= FRAMES
+            return level == 0 or (self._lead.get(level, math.inf) > HOLD and now - self.finest_at >= FRAMES)
         self._lead = {coarse: now - came for coarse, came in self._came.items()}
         self.previewing, self.finest_at, self._previewed = False, now, self.running
         return True
@@ -285,8 +321,7 @@ class Schedule:
 
     def _room(self, client: Client, gone: list[Client]) -> bool:
         held = [x for x in self._solving(client) if x not in gone]
-        used = sum(solve_bytes(x.top) for x in held)
-        return not held or used + solve_bytes(client.top) <= self._budget
+        return not held or sum(x.bytes for x in [*held, client]) <= self._budget
 
 
 def _close(work: object) -> None:

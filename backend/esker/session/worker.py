@@ -14,13 +14,13 @@ import logging
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from typing import Final
+from typing import Any, Final
 
 from esker import contract as c
 from esker.session.laying import blank_levels
 from esker.session.ports import Base, LevelResult, Refinement, Solver, SolverFactory
 from esker.session.recovery import LAST_RESORT, Devices, Diagnose, Fault, unknown
-from esker.session.schedule import Client, Deliver, Job, Schedule
+from esker.session.schedule import Client, Deliver, Glimpsing, Job, Schedule
 
 log = logging.getLogger("esker.worker")
 
@@ -166,6 +166,8 @@ class Worker:
             self._open(client, job)
         if client.aside:
             self._aside(client)
+        elif client.glimpse_due:
+            self._glimpse(client)
         elif client.steps is not None:
             self._solve(client)
         elif client.refiner is not None:
@@ -191,9 +193,11 @@ class Worker:
     def _steps(self, client: Client, job: Job) -> Iterator[LevelResult | None]:
         """First the base, where another one was shown, then what is solved on it."""
         assert self._solver is not None
-        based = {} if job.base is None else {"base": job.base}
+        more: dict[str, Any] = {} if job.base is None else {"base": job.base}
+        if client.is_ahead(job):
+            more["coarsest"] = False
         refines = client.refinement is not None
-        solve = iter(self._solver.steps(job.strokes, job.settings, client.top, basis=refines, **based))
+        solve = iter(self._solver.steps(job.strokes, job.settings, client.top, basis=refines, **more))
         if client.stands_on(job.base):
             return solve
         levels = blank_levels(client.top) if job.base is None else self._solver.base_levels(job.base, client.top)
@@ -253,6 +257,22 @@ class Worker:
                     self._deliver(client, job, result, show=True)
         except Exception as error:
             self._failed(client, client.running, error)
+
+    def _glimpse(self, client: Client) -> None:
+        """The coarsest preview of the newest job, while the pass of an older one goes on."""
+        job, steps = client.newest, client.steps
+        assert job is not None
+        assert client.running is not None
+        assert isinstance(steps, Glimpsing)
+        client.glimpsed, client.ahead = job, False
+        try:
+            result = steps.glimpse(job.strokes, job.settings, job.base)
+        except Exception as error:
+            self._failed(client, client.running, error)
+            return
+        if result is not None:
+            client.ahead = True
+            self._deliver(client, job, result, show=True)
 
     def _confirm(self, client: Client, job: Job) -> None:
         client.light = False

@@ -35,6 +35,7 @@ from esker.solve.passes import (
 )
 from esker.solve.refine import Refiner, Refinery
 from esker.solve.sayings import BASES, Layer, Speakers, speakers
+from esker.solve.solving import Seat, Solving
 from esker.solve.workspaces import new_workspace
 
 __all__ = ["PREVIEW_GRADIENT_CYCLES", "PREVIEW_HEIGHT_CYCLES", "Basis", "LevelResult", "Pyramid", "Solver", "Workspace"]
@@ -42,10 +43,6 @@ __all__ = ["PREVIEW_GRADIENT_CYCLES", "PREVIEW_HEIGHT_CYCLES", "Basis", "LevelRe
 SPARE_BYTES = 5 << 30
 """Memory that idle workspaces may keep, with the raster of the strokes that they last solved, but no more than a
 fifth of the machine's: a room whose workspace was given to another one has all its strokes rasterised again."""
-SCOUT = 2
-"""Level at which strokes are rasterised for the coarsest preview alone: a sixteenth of level 4's work or less ..."""
-SCOUT_FROM = 4
-"""... of terrains from this level up: below, it would save nothing (docs/solver.md)."""
 PACED_ABOVE = 4
 """Up to this level a whole preview takes less time than one cycle of a big terrain."""
 
@@ -107,15 +104,18 @@ class Solver:
         *,
         basis: bool = False,
         base: Base | None = None,
-    ) -> Iterator[LevelResult | None]:
+        coarsest: bool = True,
+    ) -> Solving:
         """Previews of levels 0..G, each when it is finished, then 0..G settled.
 
         None comes wherever the work can be left for a while, or for good: between the cycles of the finest level, so
         that many rooms can share a device. Close the generator to stop; G is ``levels`` or the solver's ``max_level``.
         With ``basis`` the last result carries what refinement starts from. ``base``: the ground without strokes, above
-        which heights are then given. Raises ValueError for a level outside 0..MAX_LEVEL.
+        which heights are then given. Not ``coarsest``: without level 0, a glimpse of these strokes is out already.
+        Raises ValueError for a level outside 0..MAX_LEVEL.
         """
-        return self._run(Job(strokes, settings, bound(base, self._device)), self._level(levels), None, basis)
+        job, seat = Job(strokes, settings, bound(base, self._device)), Seat()
+        return Solving(self._run(job, self._level(levels), None, basis, seat, coarsest), seat, self._device)
 
     def base_levels(self, base: Base, levels: int | None = None) -> Iterator[LevelResult]:
         """The base itself, channel BASE on levels 0..G, then how fine its data are, SURVEY on the levels of channels.
@@ -191,8 +191,16 @@ class Solver:
             raise ValueError(f"level must be 0..{MAX_LEVEL}, not {top}")
         return top
 
-    def _run(self, job: Job, top: int, warm: NDArray[np.float32] | None, basis: bool) -> Generator[LevelResult | None]:
-        yield from self._retried(lambda level: self._attempt(job, level, warm, basis), top)
+    def _run(
+        self,
+        job: Job,
+        top: int,
+        warm: NDArray[np.float32] | None,
+        basis: bool,
+        seat: Seat | None = None,
+        coarsest: bool = True,
+    ) -> Generator[LevelResult | None]:
+        yield from self._retried(lambda level: self._attempt(job, level, warm, basis, seat or Seat(), coarsest), top)
 
     def _retried(
         self, attempt: Callable[[int], Iterator[LevelResult | None]], top: int
@@ -209,7 +217,7 @@ class Solver:
         yield from attempt(top)
 
     def _attempt(
-        self, job: Job, top: int, warm: NDArray[np.float32] | None, basis: bool
+        self, job: Job, top: int, warm: NDArray[np.float32] | None, basis: bool, seat: Seat, coarsest: bool
     ) -> Generator[LevelResult | None]:
         """One solve. A workspace whose device failed, or that diverged, is dropped, all others are kept.
 
@@ -220,12 +228,13 @@ class Solver:
             settings, spoken = job.settings, speakers(job.strokes, job.settings)
             late = [layer.channel for layer in spoken if not layer.painted]
             early = [channel for channel in BASES if channel not in late]
-            workspace = self._take(job, top)
+            workspace = seat.workspace = self._take(job, top)
             keep, half = True, False
             try:
                 scouting = warm is None and workspace.scout is not None
                 if scouting:
-                    yield passes.scouted(workspace, job)
+                    if coarsest:
+                        yield passes.scouted(workspace, job)
                     yield from self._channels(spoken, job, top, early)
                 half = True
                 yield from workspace.loading(*job)
@@ -255,6 +264,7 @@ class Solver:
                 keep = not (is_fault(error) or isinstance(error, multigrid.DivergedError))
                 raise
             finally:
+                seat.workspace = None
                 if keep:
                     self._give(workspace)
                 del workspace  # the traceback of an error would keep it
@@ -288,19 +298,19 @@ class Solver:
         strokes, settings = job.strokes, job.settings
         best = max(idle, key=lambda w: w.packer.likeness(strokes, settings), default=None)
         if best is not None and 2 * best.packer.likeness(strokes, settings) < len(strokes):
-            best = idle[0] if self._kept() + grid.solve_bytes(top) > self._spare_bytes else None
+            best = idle[0] if self._kept() + grid.solve_bytes(top, based) > self._spare_bytes else None
         if best is not None:
             self._spare.remove(best)
             return best
-        while self._spare and self._kept() + grid.solve_bytes(top) > self._spare_bytes:
+        while self._spare and self._kept() + grid.solve_bytes(top, based) > self._spare_bytes:
             self._spare.pop(0)
         made = new_workspace(self._device, top, based)
-        if top >= SCOUT_FROM:
-            made.scout = new_workspace(self._device, SCOUT, based)
+        if top >= grid.SCOUT_FROM:
+            made.scout = new_workspace(self._device, grid.SCOUT, based)
         return made
 
     def _kept(self) -> int:
-        return sum(grid.solve_bytes(w.top) + (0 if w.scout is None else grid.solve_bytes(SCOUT)) for w in self._spare)
+        return sum(grid.solve_bytes(w.top, w.based) for w in self._spare)
 
     def _give(self, workspace: Workspace) -> None:
         self._spare.append(workspace)

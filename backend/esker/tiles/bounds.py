@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from esker import grid
 from esker.contract import PATCH_CELLS, SUBPATCHES
+from esker.tiles import loops
 from esker.tiles.codec import Ints
 
 Floats = NDArray[np.float32]
@@ -95,12 +96,11 @@ class SubPatches:
         cells = PATCH_CELLS * SUBPATCHES
         window = samples(slice(r0 * cells, r1 * cells + 1), slice(c0 * cells, c1 * cells + 1))
         sub = np.s_[r0 * SUBPATCHES : r1 * SUBPATCHES, c0 * SUBPATCHES : c1 * SUBPATCHES]
-        self.low[sub] = block_reduce(np.minimum, window, PATCH_CELLS)
-        self.high[sub] = block_reduce(np.maximum, window, PATCH_CELLS)
+        loops.bounded(window, PATCH_CELLS, self.low[sub], self.high[sub])
         if parent is not None:
             half = cells // 2
             above = parent(slice(r0 * half, r1 * half + 1), slice(c0 * half, c1 * half + 1))
-            self.error[sub] = sub_error(window, above)
+            loops.erred(window, above, PATCH_CELLS, self.error[sub])
 
 
 def _quarter(ufunc: np.ufunc, a: Floats, by: int) -> Floats:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import ClassVar, Final
 
 import numpy as np
@@ -15,8 +16,9 @@ from numpy.typing import NDArray
 
 from esker import grid
 from esker.contract import TILE_CELLS
-from esker.tiles.bounds import Bounds, SubPatches, block_reduce, dilate, nest
-from esker.tiles.codec import SAMPLE_LIMIT, Ints, predict
+from esker.tiles import loops
+from esker.tiles.bounds import Bounds, SubPatches, dilate, nest
+from esker.tiles.codec import SAMPLE_LIMIT, Ints
 from esker.tiles.steady import Steadier
 
 BLOCK_CELLS: Final = 4
@@ -30,6 +32,8 @@ DEAD_ZONE: Final = 2.0
 """Quanta that a sample of the finest level may be off in a preview (DESIGN 6). Settled levels are exact."""
 COARSE_DEAD_ZONE: Final = 0.5
 """The same for the levels above: they are what finer ones are predicted from, and an error there counts twice below."""
+GLIMPSES: Final = 8
+"""Coarsest previews that may have been shown since the job began whose finest preview comes."""
 FOLLOW_TILES: Final = 256
 """Most parents of which a level follows the movement; above, as after a change of all the ground, it starts afresh."""
 
@@ -95,16 +99,42 @@ def follow_parents(samples: Ints, then: Level | None, now: Level | None, ratio: 
     if not 0 < len(moved) <= FOLLOW_TILES:
         return samples
     out = samples.copy()
-    for y, x in moved:
-        place = np.s_[TILE_CELLS * y : TILE_CELLS * (y + 1) + 1, TILE_CELLS * x : TILE_CELLS * (x + 1) + 1]
-        if np.array_equal(now.samples[place], then.samples[place]):
-            continue
-        change = predict(now.samples[place], ratio) - predict(then.samples[place], ratio)
-        under = np.s_[
-            2 * TILE_CELLS * y : 2 * TILE_CELLS * (y + 1) + 1, 2 * TILE_CELLS * x : 2 * TILE_CELLS * (x + 1) + 1
-        ]
-        change += samples[under]
-        out[under] = np.clip(change, -SAMPLE_LIMIT, SAMPLE_LIMIT)
+    loops.followed(samples, then.samples, now.samples, moved, TILE_CELLS, 9 - ratio, SAMPLE_LIMIT, out)
+    return out
+
+
+def moved_along(heights: NDArray[np.float32], then: Ints, now: Ints, quantum: float) -> NDArray[np.float32]:
+    """Heights of level l, (N_l, N_l), metres, moved by what level 0 has moved, interpolated as the prediction of
+    tiles interpolates, each level from the one above; the same array if nowhere.
+
+    ``then``, ``now``: level 0, (65, 65) in quanta of ``quantum`` metres.
+    """
+    change = now - then
+    rows, cols = np.flatnonzero(change.any(axis=1)), np.flatnonzero(change.any(axis=0))
+    if not rows.size:
+        return heights
+    # what a sample moves ends less than three cells from it; the prediction needs four samples a side
+    window = tuple(slice(max(0, int(v[0]) - 4), min(TILE_CELLS, int(v[-1]) + 4) + 1) for v in (rows, cols))
+    move = change[window].astype(np.float32) * np.float32(quantum)
+    step = 1
+    while TILE_CELLS * step + 1 < heights.shape[0]:
+        for _ in range(2):
+            move = _between(move).T
+        step *= 2
+    out = heights.copy()
+    out[tuple(slice(w.start * step, (w.stop - 1) * step + 1) for w in window)] += move
+    return out
+
+
+def _between(a: NDArray[np.float32]) -> NDArray[np.float32]:
+    """(m, n) -> (m, 2n - 1): the four-point rule (-1, 9, 9, -1)/16 along rows, linear beside the ends."""
+    out = np.empty((a.shape[0], 2 * a.shape[1] - 1), dtype=np.float32)
+    out[:, ::2] = a
+    odd = out[:, 1::2]
+    np.add(a[:, :-1], a[:, 1:], out=odd)
+    odd *= np.float32(0.5)
+    odd[:, 1:-1] *= np.float32(1.125)
+    odd[:, 1:-1] -= (a[:, :-3] + a[:, 3:]) * np.float32(1 / 16)
     return out
 
 
@@ -137,6 +167,8 @@ class Pyramid:
         """Per level: the level above as it was when this one was last put."""
         self._previewed = -1
         """Clock of the newest preview of the finest level."""
+        self._glimpses: deque[tuple[int, Ints]] = deque(maxlen=GLIMPSES)
+        """The coarsest level as it was shown for the last previews, with their clocks, oldest first."""
         self._touched = [np.zeros((16 << level, 16 << level), dtype=np.uint32) for level in range(levels)]
         """Per block: the stamp of its last change. The finest level moves nothing below it and keeps none."""
         self._lineage: list[Counts] = []
@@ -182,15 +214,37 @@ class Pyramid:
             return 0
         steady = steadier.preview(clock, heights)
         if level < self.top:
-            return self._store(clock, level, steady, settled)
+            count = self._store(clock, level, steady, settled)
+            if level == 0:
+                self._glimpsed(clock)
+            return count
         self._previewed = clock
         count = 0
+        steady, newer = self._ahead(clock, steady)
         for coarse in range(level):
             old = self._levels[coarse]
-            if old is None or old.clock != clock:
+            if (old is None or old.clock != clock) and not (newer and coarse == 0):
                 step = 1 << (level - coarse)
                 count += self._store(clock, coarse, np.ascontiguousarray(steady[::step, ::step]), settled)
         return count + self._store(clock, level, steady, settled)
+
+    def _glimpsed(self, clock: int) -> None:
+        """Remembers how the coarsest level is shown for this clock."""
+        now = self._levels[0]
+        assert now is not None
+        if self._glimpses and self._glimpses[-1][0] == clock:
+            self._glimpses.pop()
+        self._glimpses.append((clock, now.samples))
+
+    def _ahead(self, clock: int, heights: NDArray[np.float32]) -> tuple[NDArray[np.float32], bool]:
+        """A finest preview moved by what the coarsest level has moved since it showed the same clock, and whether it
+        shows a newer one: strokes go on while the finest preview of what they were is made."""
+        then = next((samples for shown, samples in self._glimpses if shown == clock), None)
+        if then is None or self._glimpses[-1][0] == clock:
+            return heights, False
+        while self._glimpses[0][0] != clock:
+            self._glimpses.popleft()
+        return moved_along(heights, then, self._glimpses[-1][1], grid.quantum(0, self.size_m)), True
 
     def begin(self, clock: int, count: int) -> None:
         """Of the coarsest ``count`` levels those that were never put become zero."""
@@ -207,10 +261,15 @@ class Pyramid:
         if old is not None and not settled:
             kept = follow_parents(old.samples, self._parents[level], parent, self.ratio)
         self._parents[level] = parent
-        samples = quantise(heights, level, self.size_m, kept, DEAD_ZONE if level == self.top else COARSE_DEAD_ZONE)
+        dead_zone = DEAD_ZONE if level == self.top else COARSE_DEAD_ZONE
+        if kept is None:
+            samples = quantise(heights, level, self.size_m)
+        else:
+            samples = np.empty(heights.shape, dtype=np.int32)
+            scale = np.float32(1.0 / grid.quantum(level, self.size_m))
+            loops.quantised(heights, kept, scale, np.float32(dead_zone), np.float32(SAMPLE_LIMIT), samples)
         stamp = self.stamp + 1
-        moved = np.ones(samples.shape, dtype=np.bool_) if old is None else samples != old.samples
-        changed = self._touch(level, moved, stamp)
+        changed = self._touch(level, None if old is None else old.samples, samples, stamp)
         count = int(np.count_nonzero(changed))
         if old is not None and not count:
             self._levels[level] = replace(old, stamp=stamp, clock=clock, settled=settled)
@@ -227,13 +286,17 @@ class Pyramid:
             self.generation += 1
         return count
 
-    def _touch(self, level: int, moved: Mask, stamp: int) -> Mask:
-        """Remembers which blocks hold a moved sample; returns which tiles do."""
+    def _touch(self, level: int, old: Ints | None, new: Ints, stamp: int) -> Mask:
+        """Remembers which blocks hold a sample that moved; returns which tiles do."""
+        side = 1 << level
+        cells = TILE_CELLS if level == self.levels else BLOCK_CELLS
+        per = TILE_CELLS // cells
+        blocks = np.full((side * per, side * per), old is None, dtype=np.bool_)
+        if old is not None:
+            loops.changed(new, old, cells, blocks)
         if level == self.levels:
-            return block_reduce(np.logical_or, moved, TILE_CELLS)
-        blocks = block_reduce(np.logical_or, moved, BLOCK_CELLS)
+            return blocks
         self._touched[level][blocks] = stamp
-        side, per = 1 << level, TILE_CELLS // BLOCK_CELLS
         return np.asarray(blocks.reshape(side, per, side, per).any(axis=(1, 3)), dtype=np.bool_)
 
     def lineage(self) -> list[Counts]:
@@ -296,3 +359,14 @@ class Pyramid:
         self._bounds = nest(self._subs, [level is not None for level in self._levels], self.size_m)
         self._bounds_stamp = self.stamp
         return self._bounds
+
+
+@lru_cache(maxsize=1)
+def warm() -> None:
+    """Goes once through all compiled loops, so that they are compiled before anybody draws. Seconds, once a machine."""
+    pyramid = Pyramid(TILE_CELLS, 1)
+    for clock, settled in enumerate((False, True, False, False)):
+        for level in (0, 1):
+            n = grid.samples(level)
+            pyramid.put(clock, level, np.full((n, n), clock, dtype=np.float32), settled)
+        pyramid.bounds()

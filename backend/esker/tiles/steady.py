@@ -16,6 +16,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from esker.tiles import loops
+
 Heights = NDArray[np.float32]
 
 
@@ -43,12 +45,18 @@ class Steadier:
         self.note(clock, heights)
         if self._reference is None:
             return heights
-        before, correction = self._reference
-        moved = heights - before
-        np.abs(moved, out=moved)
-        left = np.abs(correction)
-        left -= moved
-        np.maximum(left, 0, out=left)
-        np.copysign(left, correction, out=left)
-        left += heights
-        return left
+        out = np.empty_like(heights)
+        loops.steadied(heights, *self._reference, out)
+        return out
+
+
+def steadied(heights: Heights, before: Heights, correction: Heights) -> Heights:
+    """What to show for a preview: the rule above for ``p1``, ``p0`` and ``b``. Twin of ``loops.steadied``."""
+    moved = heights - before
+    np.abs(moved, out=moved)
+    left = np.abs(correction)
+    left -= moved
+    np.maximum(left, 0, out=left)
+    np.copysign(left, correction, out=left)
+    left += heights
+    return left

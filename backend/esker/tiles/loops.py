@@ -1,0 +1,143 @@
+"""Compiled loops for what is done with every sample of a level that is put (DESIGN 6, 7).
+
+They let go of the interpreter's lock, so the solver's thread and the event loop go on beside them. Each does, to the
+bit, what its NumPy twin does: ``steady.steadied``, ``pyramid.quantise``, ``pyramid.follow_parents``,
+``bounds.SubPatches``. They are compiled at their first call and kept on disk where a disk allows it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeVar, cast
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+F = TypeVar("F", bound=Callable[..., Any])
+Ints = NDArray[np.int32]
+Floats = NDArray[np.float32]
+
+
+def _compiled(function: F) -> F:
+    """Exact IEEE arithmetic, no lock."""
+    options: dict[str, Any] = {"nogil": True, "boundscheck": False, "error_model": "numpy"}
+    try:
+        return cast(F, numba.njit(cache=True, **options)(function))
+    except RuntimeError:  # no place on this machine to keep compiled code in
+        return cast(F, numba.njit(**options)(function))
+
+
+@_compiled
+def steadied(heights: Floats, before: Floats, correction: Floats, out: Floats) -> None:
+    """``steady.steadied`` of whole levels, (n, n) float32 each."""
+    rows, cols = heights.shape
+    for r in range(rows):
+        for k in range(cols):
+            h = heights[r, k]
+            c = correction[r, k]
+            left = max(abs(c) - abs(h - before[r, k]), np.float32(0))
+            out[r, k] = np.copysign(left, c) + h
+
+
+@_compiled
+def quantised(heights: Floats, kept: Ints, scale: np.float32, dead: np.float32, limit: np.float32, out: Ints) -> None:
+    """``pyramid.quantise`` of ``heights`` with ``kept``, (n, n).
+
+    scale: quanta a metre; dead: dead zone, quanta; limit: largest |sample|.
+    """
+    rows, cols = heights.shape
+    for r in range(rows):
+        for k in range(cols):
+            step = min(max(heights[r, k] * scale, -limit), limit)
+            near = kept[r, k]
+            moved = abs(step - np.float32(near)) >= dead
+            out[r, k] = np.int32(np.rint(step)) if moved else near
+
+
+@_compiled
+def changed(new: Ints, old: Ints, cells: int, out: NDArray[np.bool_]) -> None:
+    """Which closed blocks of ``cells`` + 1 samples a side hold a sample that differs; out: (m, m) of False."""
+    side = out.shape[0]
+    for r in range(new.shape[0]):
+        first, last = max((r - 1) // cells, 0), min(r // cells, side - 1)
+        for b in range(side):
+            differs = False
+            for k in range(b * cells, (b + 1) * cells + 1):
+                differs |= new[r, k] != old[r, k]
+            if differs:
+                out[first, b] = True
+                out[last, b] = True
+
+
+@_compiled
+def _upsampled(a: NDArray[np.int64], out: NDArray[np.int64]) -> None:
+    """Along the rows of (m, n) into (m, 2n - 1), scaled by 16: see ``codec``."""
+    rows, n = a.shape
+    for r in range(rows):
+        for k in range(n):
+            out[r, 2 * k] = 16 * a[r, k]
+        out[r, 1] = 5 * a[r, 0] + 15 * a[r, 1] - 5 * a[r, 2] + a[r, 3]
+        out[r, 2 * n - 3] = 5 * a[r, n - 1] + 15 * a[r, n - 2] - 5 * a[r, n - 3] + a[r, n - 4]
+        for k in range(1, n - 2):
+            out[r, 2 * k + 1] = 9 * (a[r, k] + a[r, k + 1]) - a[r, k - 1] - a[r, k + 2]
+
+
+@_compiled
+def _predicted(tile: Ints, shift: int) -> NDArray[np.int64]:
+    """``codec.predict`` of one tile, transposed."""
+    n = tile.shape[0]
+    across = np.empty((n, 2 * n - 1), dtype=np.int64)
+    both = np.empty((2 * n - 1, 2 * n - 1), dtype=np.int64)
+    _upsampled(tile.astype(np.int64), across)
+    _upsampled(np.ascontiguousarray(across.T), both)
+    half = np.int64(1) << (shift - 1)
+    for r in range(2 * n - 1):
+        for k in range(2 * n - 1):
+            both[r, k] = (both[r, k] + half) >> shift
+    return both
+
+
+@_compiled
+def followed(
+    samples: Ints, then: Ints, now: Ints, tiles: NDArray[np.int64], cells: int, shift: int, limit: int, out: Ints
+) -> None:
+    """``pyramid.follow_parents``: moves ``out``, a copy of ``samples``, along with the tiles (y, x) of its parent."""
+    for t in range(tiles.shape[0]):
+        y, x = tiles[t, 0] * cells, tiles[t, 1] * cells
+        a, b = then[y : y + cells + 1, x : x + cells + 1], now[y : y + cells + 1, x : x + cells + 1]
+        if np.array_equal(a, b):
+            continue
+        before, after = _predicted(a, shift), _predicted(b, shift)
+        for r in range(2 * cells + 1):
+            for k in range(2 * cells + 1):
+                moved = samples[2 * y + r, 2 * x + k] + after[k, r] - before[k, r]
+                out[2 * y + r, 2 * x + k] = min(max(moved, -limit), limit)
+
+
+@_compiled
+def bounded(samples: Ints, cells: int, low: Ints, high: Ints) -> None:
+    """Lowest and highest sample of closed blocks of ``cells`` + 1 samples a side; low, high: (m, n)."""
+    for i in range(low.shape[0]):
+        for j in range(low.shape[1]):
+            least, most = samples[i * cells, j * cells], samples[i * cells, j * cells]
+            for r in range(i * cells, (i + 1) * cells + 1):
+                for k in range(j * cells, (j + 1) * cells + 1):
+                    least, most = min(least, samples[r, k]), max(most, samples[r, k])
+            low[i, j], high[i, j] = least, most
+
+
+@_compiled
+def erred(samples: Ints, parent: Ints, cells: int, out: NDArray[np.uint32]) -> None:
+    """``bounds.sub_error``: largest distance to the parent's surface per block of ``cells`` (even); (m, n)."""
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            worst = 0
+            for r in range(i * cells, (i + 1) * cells + 1):
+                up, down = r >> 1, (r + 1) >> 1
+                for k in range(j * cells, (j + 1) * cells + 1):
+                    left, right = k >> 1, (k + 1) >> 1
+                    # the mean of a cell's four corners; on an edge two of them are the same, at a sample all four
+                    corners = parent[up, left] + parent[down, right] + parent[up, right] + parent[down, left]
+                    worst = max(worst, abs(2 * samples[r, k] - corners))
+            out[i, j] = (worst + 1) >> 1
