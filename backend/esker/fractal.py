@@ -3,9 +3,8 @@
 ``contract_emit.py`` writes them, with ``SYNTH_`` before their names, beside those of ``contract.py``; change a number
 here, run ``make generate``, commit both. Nothing here does I/O.
 
-Units: slopes are metres per metre; elevations are shares of ``relief_m`` above the sea (or above 0 m where there is
-none); concavity is the second difference of the ground over its spacing, positive in a valley. A pair is the
-interval over which a smoothstep rises.
+Units: slopes are metres per metre; elevations are shares of ``relief_m`` above ``zero_m``; concavity is the second
+difference of the ground over its spacing, positive in a valley. A pair is the interval over which a smoothstep rises.
 """
 
 from __future__ import annotations
@@ -90,6 +89,8 @@ FINEST_CELL_M: Final = 0.01
 SNOW_LINE_M: Final = 5200.0
 """Height of the snow line at the equator; it falls by the square of the cosine of the latitude."""
 LEAST_SNOW_LINE_M: Final = 300.0
+SNOW_SHARE: Final = 0.7
+"""Of the relief of laid ground without a place on Earth: the natural look's snow lies above it."""
 SHORE_M: Final = 4096.0
 """What shares of the shore's elevation are of on real ground: waves are as high everywhere."""
 
@@ -110,13 +111,23 @@ LOOKS: Final[dict[str, LookRule]] = {
 }
 
 
-def relief_m(size_m: float, lat_deg: float | None) -> float:
+def zero_m(lat_deg: float | None, sea_level_m: float | None, ground_m: tuple[float, float] | None) -> float:
+    """Where elevations count from, metres: the sea; without one the lowest sample of elevation layers on a terrain
+    without a place on Earth, else 0. ``ground_m``: lowest and highest sample of the layers, None without any."""
+    if sea_level_m is not None:
+        return sea_level_m
+    return 0.0 if lat_deg is not None or ground_m is None else ground_m[0]
+
+
+def relief_m(size_m: float, lat_deg: float | None, above_m: float = 0.0) -> float:
     """What elevations are shares of, metres: the domain's side, so that a sketch of any size has its own climate.
 
     Where the terrain has a place on Earth, that of which the natural look's snow line is the real one's height there.
+    Without a place, ground of elevation layers that reaches ``above_m`` over ``zero_m`` has the snow line at
+    ``SNOW_SHARE`` of that at least.
     """
     if lat_deg is None:
-        return size_m
+        return max(size_m, SNOW_SHARE * above_m / LOOKS["natural"].snow_line)
     line = SNOW_LINE_M * math.cos(math.radians(lat_deg)) ** 2
     return max(LEAST_SNOW_LINE_M, line) / LOOKS["natural"].snow_line
 

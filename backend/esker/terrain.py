@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from esker import contract, grid
 from esker.contract import Border, Document, Layer, TerrainSettings
 from esker.document import archive
+from esker.document.layers import span_m
 from esker.document.maker import Stroke
 from esker.document.strokes import misfit
 from esker.patchwork.base import Base
@@ -310,7 +311,9 @@ class Terrain:
         solver = self._solver or default_solver()
         settled, held = self._settle(solver, global_level), self._detailed
         if held is None or held[0] is not settled or held[1] != refined_level:
-            held = self._detailed = (settled, refined_level, detailed(solver, settled, refined_level))
+            held = self._detailed = (
+                settled, refined_level, detailed(solver, settled, refined_level, span_m(self.layers))
+            )  # fmt: skip
         return held[2]
 
     def _settle(self, solver: Solver, level: int) -> Settled:

@@ -76,4 +76,5 @@ const float SYNTH_FOAM = 0.5;
 const float SYNTH_FINEST_CELL_M = 0.01;
 const float SYNTH_SNOW_LINE_M = 5200.0;
 const float SYNTH_LEAST_SNOW_LINE_M = 300.0;
+const float SYNTH_SNOW_SHARE = 0.7;
 const float SYNTH_SHORE_M = 4096.0;

@@ -76,4 +76,5 @@ const SYNTH_FOAM: f32 = 0.5;
 const SYNTH_FINEST_CELL_M: f32 = 0.01;
 const SYNTH_SNOW_LINE_M: f32 = 5200.0;
 const SYNTH_LEAST_SNOW_LINE_M: f32 = 300.0;
+const SYNTH_SNOW_SHARE: f32 = 0.7;
 const SYNTH_SHORE_M: f32 = 4096.0;

@@ -15,7 +15,7 @@ typedef struct {
     int parent_row, parent_col, parent_rows, parent_cols;
     uint seed;
     int sea, cells, shift;                             // is there a sea; 2^shift cells of the level along one side
-    float spacing, relief, shore, sea_level, amplitude; // of the parent; elevations of share 1; detail * alpha * s_0
+    float spacing, relief, shore, zero, amplitude; // of the parent; elevations of share 1, and where they count from; detail * alpha * s_0
     float snow_line, tree_line, plants, tie;
     float grain, strength;                             // of the noise of h, and of the other channels
     int offset[SYNTH_GRIDS], side[SYNTH_GRIDS];        // of the channels' grids, in the order of Biases

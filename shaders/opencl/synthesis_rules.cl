@@ -8,7 +8,7 @@ float synth_step(float from, float to, float x) {
 
 // What the ground asks of the channels; d is unused.
 State synth_targets(const Launch *l, Ground g) {
-    float above_sea = g.height - (l->sea ? l->sea_level : 0.0f), e = above_sea / l->relief;
+    float above_sea = g.height - l->zero, e = above_sea / l->relief;
     float t2 = g.slope_x * g.slope_x + g.slope_y * g.slope_y;
     float t = sqrt(t2), v = g.concavity, north = -g.slope_y / sqrt(1.0f + t2);
     State s;

@@ -39,7 +39,7 @@ fn survey(p: vec3f, gradient: vec2f, curvature: f32, f: Footprint, cover: Attrib
   s.p = p;
   s.n = n;
   s.steep = length(gradient);
-  let above = p.z - select(0.0, view.sea, view.has_sea > 0.5);
+  let above = p.z - view.sea;
   s.height = above / view.relief;
   s.shore = above / view.shore;
   s.curvature = curvature;

@@ -13,7 +13,7 @@ struct View {
   time: f32,
   size: f32,             // side of the domain, metres
   base: f32,             // height of the plane on which the block stands, metres
-  sea: f32,              // sea level, metres
+  sea: f32,              // sea level, metres; without a sea, where elevations count from
   has_sea: f32,          // 1 or 0
   exposure: f32,
   haze: f32,             // extinction per metre at the ground

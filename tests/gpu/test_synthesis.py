@@ -91,6 +91,7 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "surveyed under strokes": {"channels": painted(9) | surveyed(9)},
     "cyclic": {"cyclic": True, "channels": painted(8)},
     "one level": {"solved": 0},
+    "laid without a place": {"sea_level_m": None, "ground_m": (120.0, 1500.0)},
 }
 
 

@@ -148,6 +148,29 @@ def test_a_place_on_earth_has_its_own_snow_line() -> None:
     assert Site(SIZE, 1, (flat,)).relief_m == SIZE
 
 
+@pytest.mark.parametrize("ground", [(1900.0, 2100.0), (-4800.0, -4500.0), (100.0, 2600.0)])
+def test_laid_ground_without_a_place_has_the_climate_of_its_own_relief(ground: tuple[float, float]) -> None:
+    """SPEC F21: its lowland is green; snow, if it reaches so high, lies above seven tenths of its relief."""
+    low, high = ground
+    flat = np.zeros((65, 65), dtype=np.float32)
+    line = max(0.7 * (high - low), 0.15 * SIZE)
+
+    def at(height: float) -> State:
+        return somewhere(Site(SIZE, 1, (flat + np.float32(height),), ground_m=ground), 3, 60)
+
+    lowland = at(low + 0.1 * line)
+    assert lowland.snow.mean() < 0.02
+    assert lowland.forest.mean() + lowland.grass.mean() > 0.5
+    assert at(low + 0.8 * line).snow.mean() < 0.05
+    assert at(low + 1.4 * line).snow.mean() > 0.9
+    # A sea or a place on Earth says more than the layers do.
+    assert Site(SIZE, 1, (flat,), sea_level_m=7.0, ground_m=ground).zero_m == 7.0
+    assert Site(SIZE, 1, (flat,), lat_deg=46.0, ground_m=ground).zero_m == 0.0
+    assert (
+        Site(SIZE, 1, (flat,), lat_deg=46.0, ground_m=ground).relief_m == Site(SIZE, 1, (flat,), lat_deg=46.0).relief_m
+    )
+
+
 def test_strength_scales_detail() -> None:
     base, double, none = (somewhere(plane(0.0, detail=strength), 3, 50).d for strength in (1.0, 2.0, 0.0))
     assert rms(double) == pytest.approx(2 * rms(base), rel=0.02)

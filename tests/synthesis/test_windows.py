@@ -99,7 +99,10 @@ def test_kernels_are_the_twin(kernels: Kernels, rule: str, place: tuple[int, int
     """SPEC F7: the guide to the bit, d within 10^-3 of the cell, other channels within two units of their 16 bits."""
     level, r, c = place
     window = Window(level, r, r + 50, c, c + 45)
-    for site in (hill(channels=channels(), rule=rule, sea_level_m=3.0), hill(rule=rule, look="alpine", detail=4.0)):
+    for site in (
+        hill(channels=channels(), rule=rule, sea_level_m=3.0),
+        hill(rule=rule, look="alpine", detail=4.0, ground_m=(40.0, 1500.0)),
+    ):
         twin, found = detail(site, window), kernels.detail(site, window)
         assert found.guide.dtype == np.float32
         assert np.array_equal(found.guide, twin.guide)

@@ -49,7 +49,7 @@ def fields(name: str, **changes: Any) -> dict[str, Any]:
     """A site as JSON has it."""
     out: dict[str, Any] = {
         "name": name, "size_m": SIZE_M, "seed": 1, "detail": 1.0, "rule": "landscape", "look": "natural",
-        "sea_level_m": None, "cyclic": False, "place": None, "solved": 0, "channels": {},
+        "sea_level_m": None, "cyclic": False, "place": None, "ground": None, "solved": 0, "channels": {},
     }  # fmt: skip
     return out | changes
 
@@ -85,6 +85,7 @@ SITES = (
         place={"lat_deg": 46.85, "lon_deg": -121.76},
         channels=strokes(9) | survey(9),
     ),
+    fields("laid", seed=11, rule="plain", ground=[200.0, 1400.0]),
     fields("wide", size_m=65536.0, seed=123456789, look="paper"),
 )
 
@@ -102,6 +103,7 @@ def site_of(data: dict[str, Any]) -> Site:
     return Site(
         size, data["seed"], guides, channels, data["detail"], data["rule"], data["look"], data["sea_level_m"],
         data["cyclic"], None if data["place"] is None else data["place"]["lat_deg"],
+        None if data["ground"] is None else tuple(data["ground"]),
     )  # fmt: skip
 
 

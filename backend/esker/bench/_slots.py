@@ -55,7 +55,7 @@ def source(*names: str) -> str:
 def site_words(site: Site, bits: int, varied: bool, biased: bool) -> NDArray[np.uint32]:
     """``SynthSite`` of synth_site.wgsl: gpu/synthsite.ts in Python."""
     look, sea = site.look_rule, site.sea_level_m
-    head = [site.size_m, site.amplitude_m, sea or 0.0, 0.0 if sea is None else 1.0, *look]
+    head = [site.size_m, site.amplitude_m, site.zero_m, 0.0 if sea is None else 1.0, *look]
     words = [
         np.array(head, np.float32).view(np.uint32),
         np.array([site.solved, site.cyclic, bits, varied, biased, site.surveyed], np.uint32),

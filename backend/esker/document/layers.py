@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import Final
 
 from esker import contract as c
@@ -15,6 +16,17 @@ from esker.document.refusal import Limits, Refusal, changed, trim
 TOLD_FIELDS: Final = frozenset({"name", "outline", "source", "licence"})
 """Fields of a layer that are for people only; the ground follows from all the others."""
 LayerOp = c.AddLayer | c.SetLayer | c.DeleteLayer | c.RestoreLayer
+
+
+def span_m(layers: Iterable[Layer]) -> tuple[float, float] | None:
+    """Lowest and highest sample of the layers that are shown, metres, as they are laid; None without any."""
+    ends = [
+        layer.scale * z + layer.lift_m
+        for layer in layers
+        if not layer.hidden
+        for z in (layer.facts.low_m, layer.facts.high_m)
+    ]
+    return (min(ends), max(ends)) if ends else None
 
 
 def size_for(farthest_m: float) -> float:

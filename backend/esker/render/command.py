@@ -12,6 +12,7 @@ from typing import Any, Final, TextIO
 from PIL import Image
 
 from esker.contract import DEFAULT_LEVEL, DEFAULT_REFINED_LEVEL, MAX_LEVEL, MAX_REFINED_LEVEL, Document, TerrainSettings
+from esker.document.layers import span_m
 from esker.render import turntable
 from esker.render.frame import LOOKS, OVERLAYS, Scene
 from esker.render.studio import open_terrain, prepare
@@ -115,7 +116,7 @@ def _draw(options: argparse.Namespace, say: Says) -> None:
 
     def picture(view: str, progress: Callable[[float], None]) -> Image.Image:
         camera = camera_of(view, stage.surface, document.settings, *options.size, land=stage.land)
-        scene = Scene(document.settings, camera, options.tau, overlay=options.overlay)
+        scene = Scene(document.settings, camera, options.tau, overlay=options.overlay, ground_m=span_m(document.layers))
         made = reference.draw(stage.surface, scene, stage.channels, progress)
         if made.tau_px > options.tau * 1.001:
             say.line(f"the picture needs too many tiles: screen error {made.tau_px:.2f} instead of {options.tau:g} px")

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from esker.contract import MAX_SYNTHESIS_LEVEL, TILE_CELLS, TerrainSettings
-from esker.fractal import relief_m, shore_m
+from esker.fractal import relief_m, shore_m, zero_m
 from esker.render.camera import Camera, Vec3, axes, eye_projection, part, reversed_depth
 
 Overlay = Literal["none", "contours", "slope", "patches", "detail"]
@@ -37,13 +37,15 @@ LOOKS: Final[dict[str, LookFigures]] = {
 
 @dataclass(frozen=True)
 class Scene:
-    """All that one picture shows. ``tau_px``: screen-error bound; ``time``: seconds, for waves."""
+    """All that one picture shows. ``tau_px``: screen-error bound; ``time``: seconds, for waves; ``ground_m``:
+    lowest and highest sample of the elevation layers, None without any."""
 
     settings: TerrainSettings
     camera: Camera
     tau_px: float = 1.0
     time: float = 12.0
     overlay: Overlay = "none"
+    ground_m: tuple[float, float] | None = None
 
 
 class Rect(NamedTuple):
@@ -89,6 +91,7 @@ def view_values(scene: Scene, rect: Rect, range_m: tuple[float, float], amplitud
     lat = None if settings.place is None else settings.place.lat_deg
     look, relief = LOOKS[settings.look], high - low
     sun = sun_direction(settings.sun_azimuth_deg, settings.sun_elevation_deg)
+    zero = zero_m(lat, settings.sea_level_m, scene.ground_m)
     exposure = 1.0 if settings.look == "paper" else adaptation(settings.sun_elevation_deg)
     return {
         **_camera_values(camera, rect, settings.size_m),
@@ -96,7 +99,7 @@ def view_values(scene: Scene, rect: Rect, range_m: tuple[float, float], amplitud
         "time": scene.time % 3600,
         "size": settings.size_m,
         "base": base_height(low, settings.size_m),
-        "sea": settings.sea_level_m or 0.0,
+        "sea": zero,
         "has_sea": 0.0 if settings.sea_level_m is None else 1.0,
         "exposure": look.exposure * exposure,
         "haze": look.haze / settings.size_m,
@@ -107,7 +110,7 @@ def view_values(scene: Scene, rect: Rect, range_m: tuple[float, float], amplitud
         "contour_strength": look.contours if relief > 0 else 0.0,
         "look": look.number,
         "amplitude": amplitude,
-        "relief": relief_m(settings.size_m, lat),
+        "relief": relief_m(settings.size_m, lat, 0.0 if scene.ground_m is None else scene.ground_m[1] - zero),
         "shore": shore_m(settings.size_m, lat),
         "overlay": OVERLAYS[scene.overlay],
     }

@@ -10,6 +10,7 @@ from PIL import Image
 
 from esker import templates
 from esker.contract import DEFAULT_LEVEL
+from esker.document.layers import span_m
 from esker.render.frame import Scene
 from esker.render.reference import Reference
 from esker.render.studio import prepare
@@ -38,7 +39,9 @@ def main(names: list[str]) -> int:
         stage = prepare(template.document, solver, grids=template.rasters())
         settings = stage.document.settings
         camera = camera_of(VIEWS[name], stage.surface, settings, *(OVERSAMPLED * n for n in SIZE))
-        made = reference.draw(stage.surface, Scene(settings, camera), stage.channels)
+        made = reference.draw(
+            stage.surface, Scene(settings, camera, ground_m=span_m(stage.document.layers)), stage.channels
+        )
         path = OUT / f"{name}.webp"
         Image.fromarray(made.pixels).resize(SIZE, Image.Resampling.LANCZOS).save(path, quality=84, method=6)
         sys.stdout.write(f"{name}: {path.stat().st_size // 1024} KiB\n")

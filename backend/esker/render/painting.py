@@ -11,6 +11,7 @@ from typing import Final
 from PIL import Image
 
 from esker.contract import Document
+from esker.document.layers import span_m
 from esker.patchwork import rasters
 from esker.patchwork.rasters import Raster, RasterError
 from esker.render.camera import Camera, orbit
@@ -69,7 +70,7 @@ def picture(
     layers = tuple(layer for layer in document.layers if layer.content in held)
     document = document.model_copy(update={"layers": layers})
     stage = prepare(document, _solver(device, level), grids=held, level=level, refined=level)
-    scene = Scene(document.settings, camera_for(stage, *size))
+    scene = Scene(document.settings, camera_for(stage, *size), ground_m=span_m(document.layers))
     made = reference.draw(stage.surface, scene, stage.channels)
     out = io.BytesIO()
     Image.fromarray(made.pixels).save(out, "JPEG", quality=quality, optimize=True)

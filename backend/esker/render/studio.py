@@ -13,6 +13,7 @@ import numpy as np
 from esker import templates
 from esker.contract import DEFAULT_LEVEL, DEFAULT_REFINED_LEVEL, Document
 from esker.document import archive
+from esker.document.layers import span_m
 from esker.patchwork.rasters import Raster
 from esker.render.camera import Land
 from esker.render.reference import PLAIN_CHANNELS, Channels
@@ -88,7 +89,8 @@ def prepare(
     ValueError where a grid is missing, and what solves raise."""
     settings = document.settings
     base = Patchwork(settings.size_m, document.layers, grids).base
-    terrain = detailed(solver, settle(solver, document.strokes, settings, level, step, base=base), refined)
+    settled = settle(solver, document.strokes, settings, level, step, base=base)
+    terrain = detailed(solver, settled, refined, span_m(document.layers))
     asked = terrain.site.channels
     channels = Channels(
         np.asarray(asked.get("amplitude", PLAIN_CHANNELS.amplitude)),

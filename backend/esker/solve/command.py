@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from esker import grid
 from esker.contract import DEFAULT_LEVEL, MAX_LEVEL, MAX_REFINED_LEVEL, MAX_SYNTHESIS_LEVEL, Channel, Document
 from esker.document import archive
+from esker.document.layers import span_m
 from esker.solve.base import Base
 from esker.solve.detail import detailed, settle
 from esker.solve.solver import LevelResult, Solver
@@ -263,7 +264,8 @@ def _with_detail(
         if live:
             print(f"\r\x1b[Kdetail of {_name(level)}: {100 * share:3.0f} %", end="", file=sys.stderr, flush=True)
 
-    made = detailed(solver, settled).window(level, slice(r0, r1), slice(c0, c1), show)
+    maker = detailed(solver, settled, ground_m=span_m(document.layers))
+    made = maker.window(level, slice(r0, r1), slice(c0, c1), show)
     if not quiet:
         s = grid.spacing(level, size)
         clear = "\r\x1b[K" if live else ""

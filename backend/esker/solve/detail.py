@@ -60,9 +60,15 @@ def settle(
     return Settled(basis, channels)
 
 
-def detailed(solver: Solver, settled: Settled, refined_level: int = DEFAULT_REFINED_LEVEL) -> DetailedTerrain:
+def detailed(
+    solver: Solver,
+    settled: Settled,
+    refined_level: int = DEFAULT_REFINED_LEVEL,
+    ground_m: tuple[float, float] | None = None,
+) -> DetailedTerrain:
     """What makes windows with detail of a settled solve, on the solver's device.
 
+    ``ground_m``: lowest and highest sample of the elevation layers (``document.layers.span_m``), None without any.
     Raises ValueError for a level that is not refined, DeviceErrors for a device that fails.
     """
     if not 0 <= refined_level <= MAX_REFINED_LEVEL:
@@ -70,7 +76,8 @@ def detailed(solver: Solver, settled: Settled, refined_level: int = DEFAULT_REFI
     basis, base = settled.basis, settled.basis.base
     refiner = solver.refiner(basis)
     levels = [] if base is None else [base.level(k, solver.device) for k in range(basis.level + 1)]
-    site = site_of(basis.settings, basis.heights, _shown(settled.channels, max(refined_level, basis.level)), levels)
+    shown = _shown(settled.channels, max(refined_level, basis.level))
+    site = site_of(basis.settings, basis.heights, shown, levels, ground_m)
     maker = None if solver.device is None else _OnDevice(solver.device)
 
     def ground(level: int, rows: slice, cols: slice) -> NDArray[np.float32]:

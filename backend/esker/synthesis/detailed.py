@@ -98,10 +98,12 @@ def site_of(
     heights: NDArray[np.float32],
     channels: Mapping[str, Grid],
     base: Sequence[Grid] = (),
+    ground_m: tuple[float, float] | None = None,
 ) -> Site:
     """The site of a settled solve. ``heights``: (N, N) float32 of level G, metres; ``channels``: by the names of
     ``Biases``, (n, n) as the solver gives them. ``base``: levels 0..G of the elevation layers' ground, on which
-    ``heights`` are then offsets. Raises ValueError for shapes that do not fit."""
+    ``heights`` are then offsets; ``ground_m``: lowest and highest sample of those layers. Raises ValueError for shapes
+    that do not fit."""
     top = ((len(heights) - 1) // TILE_CELLS).bit_length() - 1
     if len(base) not in {0, top + 1}:
         raise ValueError(f"the base has {len(base)} levels, not {top + 1}")
@@ -118,7 +120,7 @@ def site_of(
         settings.size_m, settings.seed, guides,
         {name: _rounded(values, *QUANTA[name]) for name, values in channels.items() if name in Biases._fields},
         settings.detail, settings.rule, settings.look, settings.sea_level_m,
-        lat_deg=None if settings.place is None else settings.place.lat_deg,
+        lat_deg=None if settings.place is None else settings.place.lat_deg, ground_m=ground_m,
     )  # fmt: skip
 
 

@@ -29,7 +29,7 @@ LAUNCH: Final = np.dtype(
     [(name, "<i4") for name in ("level", "rule", "cyclic", "own_guide", "surveyed", "row", "col", "rows", "cols",
                                 "parent_row", "parent_col", "parent_rows", "parent_cols")]
     + [("seed", "<u4"), ("sea", "<i4"), ("cells", "<i4"), ("shift", "<i4")]
-    + [(name, "<f4") for name in ("spacing", "relief", "shore", "sea_level", "amplitude", "snow_line", "tree_line",
+    + [(name, "<f4") for name in ("spacing", "relief", "shore", "zero", "amplitude", "snow_line", "tree_line",
                                   "plants", "tie", "grain", "strength")]
     + [("offset", "<i4", len(Biases._fields)), ("side", "<i4", len(Biases._fields))]
 )  # fmt: skip
@@ -126,7 +126,7 @@ def _launch(site: Site, parent: Window, child: Window, offsets: list[int], sides
         "seed": site.seed, "sea": site.sea_level_m is not None, "cells": grid.cells(level),
         "shift": grid.cells(level).bit_length() - 1,
         "spacing": site.spacing(parent.level), "relief": site.relief_m, "shore": site.shore_m,
-        "sea_level": site.sea_level_m or 0.0,
+        "zero": site.zero_m,
         "amplitude": site.amplitude_m, "snow_line": look.snow_line, "tree_line": look.tree_line,
         "plants": look.plants, "tie": tie(level),
         "grain": f.SMOOTHNESS_NOISE * 2.0 ** (-f.SMOOTHNESS_NOISE_DECAY * level),

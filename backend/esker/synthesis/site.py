@@ -11,7 +11,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from esker import contract, grid
 from esker.contract import BASE_ROUGHNESS, BASE_SURVEY, TILE_CELLS
-from esker.fractal import ALPHA, LOOKS, LookRule, relief_m, shore_m
+from esker.fractal import ALPHA, LOOKS, LookRule, relief_m, shore_m, zero_m
 from esker.synthesis.interpolate import Window
 from esker.synthesis.state import Array, State
 
@@ -66,8 +66,9 @@ class Site:
     ``guides``: heights of levels 0..G as sent on the wire, metres, (N_l, N_l) float32; ``channels``: grids (n, n) over
     the whole domain, corners on corners, n - 1 a power of two, by the names of ``Biases``; one that is missing is its
     base everywhere. ``detail``: strength, 0..4. ``sea_level_m``: None where there is no sea. ``cyclic``: the domain's
-    east edge is its west edge, north its south. ``lat_deg``: where on Earth it lies, if anywhere. ``dtype``: of the
-    arithmetic. Raises ValueError for what does not fit.
+    east edge is its west edge, north its south. ``lat_deg``: where on Earth it lies, if anywhere. ``ground_m``: lowest
+    and highest sample of its elevation layers, None without any. ``dtype``: of the arithmetic. Raises ValueError for
+    what does not fit.
     """
 
     size_m: float
@@ -80,6 +81,7 @@ class Site:
     sea_level_m: float | None = None
     cyclic: bool = False
     lat_deg: float | None = None
+    ground_m: tuple[float, float] | None = None
     dtype: DTypeLike = np.float64
 
     def __post_init__(self) -> None:
@@ -111,7 +113,12 @@ class Site:
     @property
     def relief_m(self) -> float:
         """What elevations are shares of, metres."""
-        return relief_m(self.size_m, self.lat_deg)
+        return relief_m(self.size_m, self.lat_deg, 0.0 if self.ground_m is None else self.ground_m[1] - self.zero_m)
+
+    @property
+    def zero_m(self) -> float:
+        """Where elevations count from, metres."""
+        return zero_m(self.lat_deg, self.sea_level_m, self.ground_m)
 
     @property
     def shore_m(self) -> float:

@@ -185,6 +185,8 @@ export interface Scene {
   readonly tiles: TileView;
   readonly channels: ChannelView;
   readonly settings: TerrainSettings;
+  /** Lowest and highest sample of the elevation layers that are shown, metres: climate of ground without a place. */
+  readonly ground?: readonly [number, number] | null;
   readonly strokes: readonly StrokeVisual[];
   readonly ghost: GhostVisual | null;
   readonly cursors: readonly CursorVisual[];

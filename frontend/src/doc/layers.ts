@@ -37,6 +37,14 @@ export function fullLayer(
   };
 }
 
+/** Lowest and highest sample of the layers that are shown, metres, as they are laid; null without any. */
+export function spanOf(layers: Iterable<Layer>): [number, number] | null {
+  const ends = [...layers].flatMap(({ hidden, scale, lift_m, facts }) =>
+    hidden ? [] : [scale * facts.low_m + lift_m, scale * facts.high_m + lift_m],
+  );
+  return ends.length === 0 ? null : [Math.min(...ends), Math.max(...ends)];
+}
+
 /** The layers of one application in progress. Copies the maps on first write only. */
 export class LayerEditor {
   layers: Layers;

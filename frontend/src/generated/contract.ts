@@ -298,6 +298,8 @@ export const SYNTH_SNOW_LINE_M = 5200.0;
 
 export const SYNTH_LEAST_SNOW_LINE_M = 300.0;
 
+export const SYNTH_SNOW_SHARE = 0.7;
+
 export const SYNTH_SHORE_M = 4096.0;
 
 export const SYNTH_LOOKS = {

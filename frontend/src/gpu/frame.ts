@@ -3,7 +3,7 @@
 import { eyeProjection, reversedDepth, viewAxes } from "../core/eyeprojection.ts";
 import type { Scene, Vec3 } from "../core/types.ts";
 import { MAX_SYNTHESIS_LEVEL, TILE_CELLS } from "../generated/contract.ts";
-import { reliefM, shoreM } from "../tiles/rules/rule.ts";
+import { reliefM, shoreM, zeroM } from "../tiles/rules/rule.ts";
 import type { Atlas } from "./atlas.ts";
 import { ChannelTexture, overlayGrid } from "./channeltexture.ts";
 import { StructWriter, structLayout } from "./layout.ts";
@@ -141,7 +141,8 @@ export class FrameBindings {
     w.set("time", scene.time % 3600);
     w.set("size", size);
     w.set("base", baseHeight(facts.low, size));
-    w.set("sea", settings.sea_level_m ?? 0);
+    const climate = { ...settings, ground: scene.ground ?? null };
+    w.set("sea", zeroM(climate));
     w.set("has_sea", settings.sea_level_m === null ? 0 : 1);
     w.set("exposure", look.exposure * (settings.look === "paper" ? 1 : adaptation(settings.sun_elevation_deg)));
     w.set("haze", look.haze / size);
@@ -152,8 +153,8 @@ export class FrameBindings {
     w.set("contour_strength", relief > 0 ? look.contours : 0);
     w.set("look", look.index);
     w.set("amplitude", this.channels.fullScale);
-    w.set("relief", reliefM(scene.tiles.sizeM, settings.place));
-    w.set("shore", shoreM(scene.tiles.sizeM, settings.place));
+    w.set("relief", reliefM({ ...climate, size_m: size }));
+    w.set("shore", shoreM(size, settings.place));
     w.set("overlay", OVERLAYS[scene.overlay]);
     this.writeCursors(scene);
     this.device.queue.writeBuffer(this.uniform, 0, w.buffer);

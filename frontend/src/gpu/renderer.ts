@@ -326,6 +326,7 @@ export class GpuRenderer implements SceneRenderer {
       look: settings.look,
       seaLevelM: settings.sea_level_m,
       place: settings.place,
+      ground: scene.ground ?? null,
       solved: tiles.solved,
     });
     if (synthesis.setChannels(channels) || changed) {

@@ -10,7 +10,7 @@ import {
   TILE_CELLS,
 } from "../generated/contract.ts";
 import { streamStart } from "../tiles/noise.ts";
-import { siteOf } from "../tiles/rules/rule.ts";
+import { type GroundSpan, siteOf } from "../tiles/rules/rule.ts";
 import { tie } from "../tiles/rules/targets.ts";
 import type { ChannelFacts } from "./synthchannels.ts";
 
@@ -27,6 +27,8 @@ export interface SynthesisSettings {
   readonly seaLevelM: number | null;
   /** Where on Earth the terrain lies, if anywhere. */
   readonly place?: Place | null;
+  /** Lowest and highest sample of its elevation layers, metres. */
+  readonly ground?: GroundSpan | null;
   /** Finest level that is solved everywhere: to it the guide is what was sent, above it the guide is interpolated. */
   readonly solved: number;
   /** The domain's east edge is its west edge, north its south. */
@@ -51,8 +53,9 @@ export function siteWords(s: SynthesisSettings, channels: ChannelFacts): Uint32A
     detail: s.detail,
     rule: s.rule,
     place: s.place ?? null,
+    ground: s.ground ?? null,
   });
-  floats.set([sizeM, site.amplitudeM, seaLevelM ?? 0, seaLevelM === null ? 0 : 1]);
+  floats.set([sizeM, site.amplitudeM, site.zeroM, seaLevelM === null ? 0 : 1]);
   floats.set([site.snowLine, site.treeLine, site.plants], 4);
   const { bits, varied, biased, surveyed } = channels;
   words.set([s.solved, s.cyclic === true ? 1 : 0, bits, varied ? 1 : 0, biased ? 1 : 0, surveyed ? 1 : 0], 7);
@@ -78,6 +81,8 @@ export function sameSettings(a: SynthesisSettings, b: SynthesisSettings): boolea
     a.look === b.look &&
     a.seaLevelM === b.seaLevelM &&
     a.place?.lat_deg === b.place?.lat_deg &&
+    a.ground?.[0] === b.ground?.[0] &&
+    a.ground?.[1] === b.ground?.[1] &&
     a.solved === b.solved &&
     (a.cyclic === true) === (b.cyclic === true)
   );

@@ -7,7 +7,7 @@ import type { Ground } from "../core/types.ts";
 import type { ChannelStore } from "./channels.ts";
 import { type Attributes, DetailField } from "./detail.ts";
 import { heightsOfTiles } from "./guide.ts";
-import type { RuleSettings } from "./rules/rule.ts";
+import { type RuleSettings, reliefM, zeroM } from "./rules/rule.ts";
 import { ShownGround } from "./shown.ts";
 import type { TileStore } from "./store.ts";
 
@@ -74,6 +74,8 @@ export class ShownTerrain {
       s.look,
       s.detail,
       s.rule,
+      zeroM(s),
+      reliefM(s),
       this.channels.stamp,
       this.guideStamp(),
     ].join();

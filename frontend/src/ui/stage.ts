@@ -16,6 +16,7 @@ import type {
 } from "../core/types.ts";
 import type { Doc } from "../doc/document.ts";
 import { strokeInfluence } from "../doc/influence.ts";
+import { spanOf } from "../doc/layers.ts";
 import type { MemberPresence } from "../generated/contract.ts";
 import { MAX_REFINED_TILES } from "../generated/contract.ts";
 import { InputController } from "../input/controller.ts";
@@ -89,7 +90,10 @@ export class Stage {
     this.camera = new Camera(sizeM);
     this.tiles = new TileStore(sizeM, finest, levels);
     this.channels = new ChannelStore(sizeM);
-    this.shown = new ShownTerrain(this.tiles, this.channels, () => session.doc.doc.peek()?.settings ?? null);
+    this.shown = new ShownTerrain(this.tiles, this.channels, () => {
+      const doc = session.doc.doc.peek();
+      return doc && { ...doc.settings, ground: spanOf(doc.layers.values()) };
+    });
     this.#floor = {
       ...this.shown.ground,
       heightAt: (x, y) => this.shown.floorUnder(x, y, this.camera.state.peek().eye[2]),
@@ -326,6 +330,7 @@ export class Stage {
       tiles: this.tiles,
       channels: this.channels,
       settings: doc.settings,
+      ground: spanOf(doc.layers.values()),
       strokes: this.#strokes.value,
       ghost: this.input.ghost.value,
       cursors: this.#cursors.value,

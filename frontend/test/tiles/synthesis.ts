@@ -19,6 +19,7 @@ export interface SiteVector {
   readonly look: Look;
   readonly sea_level_m: number | null;
   readonly place: Place | null;
+  readonly ground: readonly [number, number] | null;
   readonly cyclic: boolean;
   readonly solved: number;
   readonly channels: Readonly<Partial<Record<keyof Omit<ChannelView, "stamp">, readonly (readonly number[])[]>>>;

@@ -33,7 +33,7 @@ def targets(site: Site, ground: Ground) -> Targets:
     """Paper 1, section 4: smoother in valleys and low down, rougher where steep; plants and snow by height, slope."""
     look = site.look_rule
     sea = site.sea_level_m
-    above_sea = ground.height - (0.0 if sea is None else sea)
+    above_sea = ground.height - site.zero_m
     e = above_sea / site.relief_m
     t2 = ground.slope_x * ground.slope_x + ground.slope_y * ground.slope_y
     t, v = np.sqrt(t2), ground.concavity

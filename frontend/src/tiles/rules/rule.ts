@@ -12,6 +12,7 @@ import {
   SYNTH_LOOKS,
   SYNTH_SHORE_M,
   SYNTH_SNOW_LINE_M,
+  SYNTH_SNOW_SHARE,
   TILE_CELLS,
 } from "../../generated/contract.ts";
 
@@ -26,20 +27,39 @@ export interface Site {
   /** Amplitude of the coarsest octave on steep ground, metres. */
   readonly amplitudeM: number;
   readonly seaLevelM: number | null;
+  /** Where elevations count from, metres. */
+  readonly zeroM: number;
   readonly snowLine: number;
   readonly treeLine: number;
   readonly plants: number;
 }
 
 export type RuleSettings = Pick<TerrainSettings, "size_m" | "seed" | "sea_level_m" | "look" | "detail" | "rule"> &
-  Partial<Pick<TerrainSettings, "place">>;
+  Partial<Pick<TerrainSettings, "place">> & { readonly ground?: GroundSpan | null };
+
+/** Lowest and highest sample of the elevation layers that are shown, metres. */
+export type GroundSpan = readonly [number, number];
+
+/**
+ * Where elevations count from, metres: the sea; without one the lowest sample of elevation layers on a terrain without a
+ * place on Earth, else 0.
+ */
+export function zeroM(settings: Pick<RuleSettings, "sea_level_m" | "place" | "ground">): number {
+  const { sea_level_m, place, ground } = settings;
+  return sea_level_m ?? (place == null ? (ground?.[0] ?? 0) : 0);
+}
 
 /**
  * What elevations are shares of, metres: the domain's side, so that a sketch of any size has its own climate; where the
- * terrain has a place on Earth, that of which the natural look's snow line is the real one's height there.
+ * terrain has a place on Earth, that of which the natural look's snow line is the real one's height there. Without a place,
+ * ground of elevation layers has the snow line at a share of its relief at least.
  */
-export function reliefM(sizeM: number, place: Place | null | undefined): number {
-  if (place == null) return sizeM;
+export function reliefM(settings: Pick<RuleSettings, "size_m" | "sea_level_m" | "place" | "ground">): number {
+  const { size_m, place, ground } = settings;
+  if (place == null) {
+    const above = ground == null ? 0 : ground[1] - zeroM(settings);
+    return Math.max(size_m, (SYNTH_SNOW_SHARE * above) / SYNTH_LOOKS.natural.snowLine);
+  }
   const line = SYNTH_SNOW_LINE_M * Math.cos((place.lat_deg * Math.PI) / 180) ** 2;
   return Math.max(SYNTH_LEAST_SNOW_LINE_M, line) / SYNTH_LOOKS.natural.snowLine;
 }
@@ -54,11 +74,12 @@ export function siteOf(settings: RuleSettings): Site {
   const look = SYNTH_LOOKS[settings.look];
   return {
     sizeM: settings.size_m,
-    reliefM: reliefM(settings.size_m, settings.place),
+    reliefM: reliefM(settings),
     shoreM: shoreM(settings.size_m, settings.place),
     seed: settings.seed,
     amplitudeM: (settings.detail * SYNTH_ALPHA * settings.size_m) / TILE_CELLS,
     seaLevelM: settings.sea_level_m,
+    zeroM: zeroM(settings),
     snowLine: look.snowLine,
     treeLine: look.treeLine,
     plants: look.plants,

@@ -59,7 +59,7 @@ const found: Targets = { h: 0, snow: 0, wet: 0, grass: 0, forest: 0, foam: SYNTH
 
 /** The targets of a sample; with `relief` only h* and snow* are made. The same object every time: read it at once. */
 export function targets(site: Site, at: Sample, relief: boolean): Readonly<Targets> {
-  const aboveSea = at.height - (site.seaLevelM ?? 0);
+  const aboveSea = at.height - site.zeroM;
   const e = aboveSea / site.reliefM;
   const t2 = at.slopeX * at.slopeX + at.slopeY * at.slopeY;
   const t = Math.sqrt(t2);
