@@ -48,6 +48,8 @@ ACCEPT: list[tuple[str, Json]] = [
     ("credit", {"type": "credit", "bytes": 65536}),
     ("rename", {"type": "rename", "name": "Grace", "colour": "#123456"}),
     ("ping", {"type": "ping", "t": 12.5}),
+    ("hello to look at the past", HELLO | {"at": 0}),
+    ("seek", {"type": "seek", "clock": 12}),
 ]
 
 REFUSE: list[tuple[str, Json | str]] = [
@@ -57,6 +59,9 @@ REFUSE: list[tuple[str, Json | str]] = [
     ("an array", "[]"),
     ("no type", {}),
     ("unknown type", {"type": "teleport"}),
+    ("the past of a clock before the first", HELLO | {"at": -1}),
+    ("seek to no clock", {"type": "seek"}),
+    ("seek to a part of a clock", {"type": "seek", "clock": 1.5}),
     ("null type", {"type": None}),
     ("a field that does not exist", HELLO | {"admin": True}),
     ("hello without secret", {k: v for k, v in HELLO.items() if k != "secret"}),

@@ -260,6 +260,7 @@ export const checkClientMessage: Check = union({
     name: may(name),
     colour: may(nullable(colour)),
     clock: may(nullable(clock)),
+    at: may(nullable(clock)),
   },
   ops: { ops: need(list(envelope, 1, MAX_OPS_PER_MESSAGE)) },
   view: {
@@ -279,5 +280,6 @@ export const checkClientMessage: Check = union({
   },
   credit: { bytes: need(integer(0, 2 ** 31)) },
   rename: { name: need(name), colour: may(nullable(colour)) },
+  seek: { clock: need(clock) },
   ping: { t: need(number(-Number.MAX_VALUE, Number.MAX_VALUE)) },
 });

@@ -75,6 +75,10 @@ export class SyncDoc {
   /** Strokes whose beginning was refused: refusals of what I did to them next are no news. */
   readonly #stillborn = new Set<string>();
   #confirmed: Doc | null = null;
+  /** Confirmed and unconfirmed together. */
+  #present: Doc | null = null;
+  /** What is shown instead. */
+  #past: Doc | null = null;
   #entries: Entry[] = [];
   /** Ops whose clock is known, waiting for an earlier one. */
   #ready = new Map<number, Confirmed>();
@@ -95,7 +99,7 @@ export class SyncDoc {
     this.#tokensAt = now();
   }
 
-  /** What to show: confirmed and unconfirmed together. Null before the first welcome. */
+  /** What to show: confirmed and unconfirmed together, or an earlier state. Null before the first welcome. */
   get doc(): ReadonlySignal<Doc | null> {
     return this.#doc;
   }
@@ -118,15 +122,22 @@ export class SyncDoc {
     return this.#confirmed?.clock ?? null;
   }
 
+  /** Shows an earlier state, which cannot be changed; null: the present again, which has gone on meanwhile. */
+  lookAt(past: Doc | null): void {
+    this.#past = past;
+    this.#show();
+  }
+
   /**
    * Applies an op of mine at once and queues it. Ops with the same `gesture` are one undo step.
    * Returns the refusal when it does not apply; then nothing has changed.
    */
   submit(op: Op, gesture?: string): Refusal | null {
-    const before = this.#doc.value;
+    const before = this.#present;
     if (before === null) return new Refusal("unavailable", "The terrain is still loading.");
+    if (this.#past !== null) return new Refusal("view_only", "This is the past: go back to now to change the terrain.");
     const refusal = this.#enqueue(op, gesture ?? null, (id) => {
-      this.#undo.record(before, op, this.#doc.value!, gesture ?? null, id);
+      this.#undo.record(before, op, this.#present!, gesture ?? null, id);
     });
     this.#publishCounts();
     return refusal;
@@ -250,11 +261,12 @@ export class SyncDoc {
     if (wrong !== null) return new Refusal("malformed", `This cannot be done: ${wrong}.`);
     if (sizeOf(op) > MESSAGE_BYTES) return new Refusal("too_large", "This change is too large for one message.");
     try {
-      this.#doc.value = apply(this.#doc.value!, op);
+      this.#present = apply(this.#present!, op);
     } catch (error) {
       if (error instanceof Refusal) return error;
       throw error;
     }
+    this.#show();
     const last = this.#entries.at(-1);
     const merged =
       last !== undefined && !last.fixed && gesture !== null && last.gesture === gesture ? mergeOps(last.op, op) : null;
@@ -270,8 +282,8 @@ export class SyncDoc {
   }
 
   #timeTravel(move: (doc: Doc) => UndoPlan): UndoResult {
-    const doc = this.#doc.value;
-    if (doc === null) return { done: false, skipped: [] };
+    const doc = this.#present;
+    if (doc === null || this.#past !== null) return { done: false, skipped: [] };
     const { ops, skipped } = move(doc);
     const refused = ops.map((op) => this.#enqueue(op, null, () => {})).filter((r) => r !== null);
     this.#publishCounts();
@@ -346,8 +358,13 @@ export class SyncDoc {
         if (!(error instanceof Refusal)) throw error;
       }
     }
-    if (doc !== null) this.#doc.value = doc;
+    if (doc !== null) this.#present = doc;
+    this.#show();
     this.#publishCounts();
+  }
+
+  #show(): void {
+    this.#doc.value = this.#past ?? this.#present;
   }
 
   #publishCounts(): void {

@@ -2,6 +2,7 @@
 
 import type { TemplateInfo } from "../core/types.ts";
 import type { ImportAnswers, ImportStatus, Role } from "../generated/contract.ts";
+import type { HistoryPage } from "./history.ts";
 
 /** A refusal or failure with a sentence for a person. */
 export class ApiError extends Error {
@@ -121,6 +122,14 @@ export const api = {
   cancelImport: async (id: string, secret: string, job: string): Promise<void> => {
     await request("DELETE", `/api/terrains/${id}/imports/${job}`, secret);
   },
+
+  /** What people did, newest first; `before`: only what had ended before this clock. */
+  history: (id: string, secret: string, before: number | null): Promise<HistoryPage> =>
+    json("GET", `/api/terrains/${id}/history${before === null ? "" : `?before=${before}`}`, secret),
+
+  /** A new terrain as this one was at a clock. */
+  fork: (id: string, secret: string, at: number): Promise<OpenedTerrain> =>
+    json("POST", `/api/terrains/${id}/fork`, secret, { at }),
 
   code: (id: string, secret: string, role: Role): Promise<JoinCode> =>
     json("POST", `/api/terrains/${id}/codes`, secret, { role }),

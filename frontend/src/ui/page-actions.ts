@@ -10,6 +10,10 @@ export interface PageCommands {
   share(): void;
   /** Opens the layers of real ground, or closes them. */
   layers(): void;
+  /** Opens the history, or closes it. */
+  history(): void;
+  /** Goes back to now; false when that is what is shown. */
+  toNow(): boolean;
   /** Asks for an elevation file. */
   addGround(): void;
 }
@@ -33,6 +37,12 @@ export function pageActions(
   put("inspector", "Open or close the inspector", ["i"], commands.panel);
   put("add-ground", "Add real ground (an elevation file)", ["r"], commands.addGround);
   put("layers", "Layers of real ground", ["Shift+r"], commands.layers);
+  put("history", "History of this terrain", ["Shift+h"], commands.history);
+  const cancel = actions.get("cancel");
+  if (cancel)
+    put("cancel", cancel.title, [...cancel.keys], () => {
+      if (!commands.toNow()) cancel.run();
+    });
   put("share", "Share", ["Shift+s"], commands.share);
   put("help", "Keys and help", ["?"], commands.help);
 }

@@ -22,8 +22,12 @@ import type {
 } from "../generated/contract.ts";
 import { MAX_PRESENCE_PER_SECOND, PRESENCE_HZ, PROTOCOL_VERSION, TICK_MS } from "../generated/contract.ts";
 import { Connection } from "../net/connection.ts";
+import { api } from "./api.ts";
+import { History } from "./history.ts";
+import { Lapse } from "./lapse.ts";
 import { terrainPath } from "./links.ts";
 import { friendlyName } from "./names.ts";
+import { Past } from "./past.ts";
 import type { People } from "./scene.ts";
 import { Stage } from "./stage.ts";
 import { type Status, status } from "./status.ts";
@@ -58,6 +62,11 @@ export class TerrainSession {
   readonly toasts = new ToastList();
   readonly doc: SyncDoc;
   readonly connection: Connection;
+  readonly past: Past;
+  readonly lapse = new Lapse(this);
+  readonly history: History;
+  /** Clock of the present, also while the past is shown. */
+  readonly newest = signal(0);
   readonly role = signal<Role | null>(null);
   readonly members = signal<readonly Member[]>([]);
   readonly presences = signal<ReadonlyMap<string, MemberPresence>>(new Map());
@@ -69,6 +78,9 @@ export class TerrainSession {
   readonly server = signal<ServerInfo | null>(null);
   readonly me = signal<Identity>({ name: "", colour: "#888888" });
   readonly stage = signal<Stage | null>(null);
+  /** What the link allows. */
+  readonly mayEdit = computed(() => this.role.value === "owner" || this.role.value === "edit");
+  /** What can be done now: nobody changes the past. */
   readonly canEdit: ReadonlySignal<boolean>;
   readonly status: ReadonlySignal<Status>;
   readonly people: ReadonlySignal<People>;
@@ -89,13 +101,16 @@ export class TerrainSession {
     this.doc = new SyncDoc(this.client);
     this.doc.onRefused((refusal) => this.toasts.show(refusal.message, "warn"));
     this.doc.onDiverged(() => this.connection.reconnect());
+    const url = `${window.location.protocol === "https:" ? "wss" : "ws"}://${window.location.host}/ws`;
+    this.past = this.#makePast(url);
+    this.history = new History((before) => api.history(this.id, this.secret, before));
     this.connection = new Connection({
-      url: `${window.location.protocol === "https:" ? "wss" : "ws"}://${window.location.host}/ws`,
+      url,
       hello: () => this.#hello(),
       onMessage: (message) => this.#receive(message),
       onFrame: (frame) => this.#frame(frame),
     });
-    this.canEdit = computed(() => this.role.value === "owner" || this.role.value === "edit");
+    this.canEdit = computed(() => this.mayEdit.value && !this.past.active.value);
     this.status = computed(() =>
       status({
         connection: this.connection.state.value,
@@ -106,7 +121,7 @@ export class TerrainSession {
     );
     this.people = computed(() => ({
       members: this.members.value,
-      presences: this.presences.value,
+      presences: this.past.active.value ? new Map() : this.presences.value,
       me: this.client,
       myColour: this.members.value.find((m) => m.client === this.client)?.colour ?? this.me.value.colour,
     }));
@@ -117,6 +132,10 @@ export class TerrainSession {
 
   /** Applies an op at once and sends it; a refusal becomes a toast. True when it was applied. */
   submit(op: Op, gesture?: string): boolean {
+    if (this.past.active.peek()) {
+      this.toasts.show("This is how the terrain was. Go back to now to change it.", "warn");
+      return false;
+    }
     if (!this.canEdit.value) {
       this.toasts.show("This link lets you look, not draw. Ask for an edit link to change the terrain.", "warn");
       return false;
@@ -175,6 +194,9 @@ export class TerrainSession {
     this.#views.stop();
     this.#presence.stop();
     this.toasts.dispose();
+    this.lapse.pause();
+    this.past.dispose();
+    this.history.stop();
     this.connection.close();
     this.stage.value?.dispose();
     this.stage.value = null;
@@ -184,6 +206,25 @@ export class TerrainSession {
   readonly #warn = (event: Event): void => {
     if (this.doc.pending.peek() > 0) event.preventDefault();
   };
+
+  #makePast(url: string): Past {
+    return new Past({
+      connect: (handlers) => new Connection({ url, ...handlers }),
+      hello: () => this.#hello(),
+      show: (doc) => this.doc.lookAt(doc),
+      restart: () => {
+        this.stage.peek()?.restart();
+        this.viewChanged();
+      },
+      frame: (frame) => this.stage.peek()?.apply(frame),
+      progress: (progress) => {
+        this.progress.value = progress;
+      },
+      ended: (why) => this.toasts.show(why, "warn"),
+      // The server counts the tiles of now as held: only a new connection sends them all again.
+      back: () => this.connection.reconnect("Back to now."),
+    });
+  }
 
   #hello(): Hello {
     return {
@@ -216,13 +257,13 @@ export class TerrainSession {
       effect(() => {
         const doc = this.doc.doc.value;
         const role = this.role.value;
-        if (!doc || !role) return;
+        if (!doc || !role || this.past.active.value) return;
         document.title = `${doc.settings.title || "Untitled terrain"} · Esker`;
       }),
       effect(() => {
         const title = this.doc.doc.value?.settings.title;
         const role = this.role.value;
-        if (title === undefined || !role) return;
+        if (title === undefined || !role || this.past.active.value) return;
         rememberTerrain(this.store, { id: this.id, secret: this.secret, title, role, opened: Date.now() });
       }),
     );
@@ -259,7 +300,7 @@ export class TerrainSession {
         this.#setPresences(message.members);
         break;
       case "progress":
-        this.progress.value = message;
+        if (!this.past.active.peek()) this.progress.value = message;
         if (message.note === LAYING) this.laying.value = true;
         else if (message.note) this.#setNotice(message.note);
         else if (message.settled) this.laying.value = false;
@@ -273,6 +314,7 @@ export class TerrainSession {
       case "pong":
         break;
     }
+    this.newest.value = this.doc.clock ?? this.newest.peek();
   }
 
   /** The notice has been read: the same sentence does not come again on this page. */
@@ -299,7 +341,7 @@ export class TerrainSession {
     this.#setMembers(message.members);
     const doc = this.doc.doc.value;
     if (doc && this.stage.value === null) this.#openStage(doc, message);
-    else this.stage.value?.restart();
+    else if (!this.past.active.peek()) this.stage.value?.restart();
     this.viewChanged();
     this.#flush();
   }
@@ -312,6 +354,7 @@ export class TerrainSession {
   }
 
   #frame(frame: DecodedFrame): void {
+    if (this.past.active.peek()) return;
     if (this.stage.value?.apply(frame) === false) this.connection.reconnect();
   }
 
@@ -326,13 +369,13 @@ export class TerrainSession {
     const next = new Map(this.presences.value);
     for (const presence of changed) next.set(presence.client, presence);
     this.presences.value = next;
-    this.stage.value?.followed(changed);
+    if (!this.past.active.peek()) this.stage.value?.followed(changed);
   }
 
   #sendView(): void {
     const camera = this.stage.value?.camera.state.value;
-    if (!camera || this.connection.state.value !== "online") return;
-    this.connection.send({
+    if (!camera) return;
+    (this.past.active.peek() ? this.past : this.connection).send({
       type: "view",
       eye: [...camera.eye],
       target: [...camera.target],
@@ -344,7 +387,7 @@ export class TerrainSession {
 
   #sendPresence(): void {
     const stage = this.stage.value;
-    if (!stage || this.connection.state.value !== "online") return;
+    if (!stage || this.connection.state.value !== "online" || this.past.active.peek()) return;
     const { eye, target } = stage.camera.state.value;
     const cursor = stage.cursor.value;
     this.connection.send({

@@ -4,12 +4,14 @@ import { ApiError, api } from "./api.ts";
 import "./drop-zone.ts";
 import { VIEW_ONLY } from "./groundwork.ts";
 import "./help-dialog.ts";
+import "./history-panel.ts";
 import "./icon-library.ts";
 import { icon } from "./icons.ts";
 import "./layers-panel.ts";
 import "./laying-bar.ts";
 import "./legend.ts";
 import "./overlay.ts";
+import "./past-bar.ts";
 import { importingWords } from "./others.ts";
 import { pageActions } from "./page-actions.ts";
 import { memberName } from "./people.ts";
@@ -31,13 +33,14 @@ import "./top-bar.ts";
 import type { PageCommand } from "./top-bar.ts";
 import "./view-bar.ts";
 
-type PanelTab = "stroke" | "ground" | "terrain";
+type PanelTab = "stroke" | "ground" | "terrain" | "history";
 type DialogId = "share" | "profile" | "help" | "about";
 
 const TABS = [
   { value: "stroke", label: "Stroke" },
   { value: "ground", label: "Ground", title: "Real ground: layers of elevation" },
   { value: "terrain", label: "Terrain" },
+  { value: "history", label: "History", title: "What everybody did, and the terrain as it was" },
 ];
 
 const WIDE = "(min-width: 1000px)";
@@ -69,7 +72,9 @@ export class EskTerrain extends SignalElement {
           panel: () => this.#togglePanel(),
           help: () => this.#show("help"),
           share: () => this.#show("share"),
-          layers: () => this.#toggleLayers(),
+          layers: () => this.#toggle("ground"),
+          history: () => this.#toggle("history"),
+          toNow: () => stage.session.lapse.leave(),
           addGround: () => this.#browse(),
         });
       }),
@@ -111,9 +116,9 @@ export class EskTerrain extends SignalElement {
     this.#panel.value = this.#panel.peek() === null ? "stroke" : null;
   }
 
-  #toggleLayers(): void {
+  #toggle(tab: PanelTab): void {
     this.#openedBySelection = false;
-    this.#panel.value = this.#panel.peek() === "ground" ? null : "ground";
+    this.#panel.value = this.#panel.peek() === tab ? null : tab;
   }
 
   /** Asks for files with the system's own dialog: the way in for touch and keyboard. */
@@ -139,7 +144,8 @@ export class EskTerrain extends SignalElement {
     if (command === "panel") this.#togglePanel();
     else if (command === "download") void this.#download();
     else if (command === "add-ground") this.#browse();
-    else if (command === "layers") this.#toggleLayers();
+    else if (command === "layers") this.#toggle("ground");
+    else if (command === "history") this.#toggle("history");
     else this.#show(command);
   }
 
@@ -213,6 +219,7 @@ export class EskTerrain extends SignalElement {
           this.#panel.value = "ground";
         }}
       ></esk-laying-bar>
+      <esk-past-bar .stage=${stage} ?beside=${this.#panel.value !== null}></esk-past-bar>
       ${this.#panel.value === null ? nothing : this.#side(stage, this.#panel.value)} ${this.#ways(stage)}
       <esk-share .stage=${stage} .open=${this.#dialog.value === "share"} @close=${this.#closeDialog}></esk-share>
       <esk-profile .stage=${stage} .open=${this.#dialog.value === "profile"} @close=${this.#closeDialog}></esk-profile>
@@ -252,6 +259,7 @@ export class EskTerrain extends SignalElement {
 
   #tab(stage: Stage, tab: PanelTab): TemplateResult {
     if (tab === "stroke") return html`<esk-stroke-panel .stage=${stage}></esk-stroke-panel>`;
+    if (tab === "history") return html`<esk-history-panel .stage=${stage}></esk-history-panel>`;
     if (tab === "terrain") return html`<esk-terrain-panel .stage=${stage}></esk-terrain-panel>`;
     return html`<esk-layers-panel .stage=${stage} @browse=${() => this.#browse()}></esk-layers-panel>`;
   }

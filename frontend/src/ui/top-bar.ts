@@ -12,7 +12,16 @@ import { shared } from "./styles/shared.ts";
 import { chooseTheme, type ThemeChoice, themeChoice } from "./theme.ts";
 
 /** What the top bar asks of the page. */
-export type PageCommand = "share" | "profile" | "help" | "panel" | "download" | "about" | "add-ground" | "layers";
+export type PageCommand =
+  | "share"
+  | "profile"
+  | "help"
+  | "panel"
+  | "download"
+  | "about"
+  | "add-ground"
+  | "layers"
+  | "history";
 
 const THEMES: readonly { readonly value: ThemeChoice; readonly label: string }[] = [
   { value: "system", label: "Colours like the system" },
@@ -215,6 +224,7 @@ export class EskTopBar extends SignalElement {
         <button slot="trigger" class="icon-btn small" aria-label="More" title="More">${icon("ellipsis")}</button>
         <wa-dropdown-item value="add-ground" ?disabled=${!this.stage.session.canEdit.value}>Add real ground…</wa-dropdown-item>
         <wa-dropdown-item value="layers">Layers of real ground</wa-dropdown-item>
+        <wa-dropdown-item value="history">History</wa-dropdown-item>
         <wa-dropdown-item value="download">Download a copy (.esker)</wa-dropdown-item>
         <wa-dropdown-item value="help">Keys and help</wa-dropdown-item>
         <wa-dropdown-item value="about">About this terrain</wa-dropdown-item>

@@ -19,7 +19,15 @@ const MARKS = /(<!-- keys:.*?-->\n\| what \| keys \|\n\|---\|---\|\n)([\s\S]*?)(
 const flat: Ground = { sizeM: 4096, heightAt: () => 0, raycast: () => null };
 
 function everyAction() {
-  const commands = { panel: vi.fn(), help: vi.fn(), share: vi.fn(), layers: vi.fn(), addGround: vi.fn() };
+  const commands = {
+    panel: vi.fn(),
+    help: vi.fn(),
+    share: vi.fn(),
+    layers: vi.fn(),
+    addGround: vi.fn(),
+    history: vi.fn(),
+    toNow: vi.fn(() => false),
+  };
   const stage = {
     showStrokes: signal(true),
     overlay: signal<Scene["overlay"]>("none"),

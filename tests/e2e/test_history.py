@@ -1,0 +1,92 @@
+"""The history with two people: the list, the terrain as it was, a time lapse, a copy (SPEC HI15 to HI19)."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from esker import contract as c
+from esker.grid import quantum, spacing
+from esker.terrain import Terrain
+from tests.e2e.conftest import Server, Visitor, Visitors
+from tests.e2e.hands import COARSE, arch, draw, ellipse, heights, levels, wait, wait_settled
+
+SIZE = 4096.0
+HISTORY = "() => window.esker.history()"
+
+
+def as_it_was(visitor: Visitor, server: Server, terrain: str, secret: str, clock: int) -> None:
+    """The page shows the ground of that clock: that of an offline solve, within a quantisation step."""
+    wait(visitor, "c => window.esker.past() === c && window.esker.settled()", clock, timeout=90)
+    text = server.request("GET", f"/api/terrains/{terrain}/document?at={clock}", secret=secret)
+    document = c.Document.model_validate_json(text)
+    assert {s["id"] for s in visitor.js("() => window.esker.strokes()")} == {s.id for s in document.strokes}
+    truth, s = Terrain.from_document(document).heights(level=4), spacing(4, SIZE)
+    places = COARSE[::7]
+    for (x, y), height, level in zip(places, heights(visitor, places), levels(visitor, places), strict=True):
+        assert abs(height - truth[round(y / s), round(x / s)]) <= quantum(level, SIZE) + 1e-4
+
+
+def entry(visitor: Visitor, text: str) -> Any:
+    return visitor.page.locator("esk-history-panel .item").filter(has_text=text).first
+
+
+def test_two_people_look_back(visitors: Visitors, server: Server, tmp_path: Path) -> None:
+    terrain, secret = server.create(title="Looking back")
+    link = json.loads(server.request("POST", f"/api/terrains/{terrain}/links", {"role": "edit", "name": "Ben"}, secret))
+    ada, ben = visitors(1000, 620), visitors(560, 420)
+    ada.open(f"/t/{terrain}#{secret}")
+    ben.open(f"/t/{terrain}#{link['secret']}")
+    ada.page.keyboard.press("Shift+H")
+    assert "Nothing has happened here yet" in ada.page.locator("esk-history-panel .empty").inner_text()
+
+    first = draw(ada, "b", arch((300, 400), (520, 380), 120))
+    drawn = ada.js("() => window.esker.clock()")
+    draw(ben, "p", ellipse((330, 250), 50, 22))
+    wait(ada, "() => window.esker.history().length === 2")
+    says = ada.js(HISTORY)
+    assert [line.endswith(what) for line, what in zip(says, ("drew a plateau", "drew a mountain"), strict=True)]
+    wait_settled(ada, ben)
+    now, clock = heights(ben, COARSE), ben.js("() => window.esker.clock()")
+    ada.shot("history-list")
+
+    entry(ada, "drew a mountain").click()
+    as_it_was(ada, server, terrain, secret, drawn)
+    ada.shot("history-as-it-was")
+    assert heights(ben, COARSE) == now
+    ada.page.keyboard.press("b")
+    ada.page.mouse.move(420, 470)
+    ada.page.mouse.down()
+    ada.page.mouse.move(520, 430, steps=4)
+    ada.page.mouse.up()
+    assert len(ada.js("() => window.esker.strokes()")) == 1
+    assert ben.js("() => window.esker.clock()") == clock
+
+    draw(ben, "b", arch((200, 260), (280, 250), 40))
+    wait(ada, "() => window.esker.history().length === 3")
+    assert ada.js("() => window.esker.past()") == drawn
+    ada.page.get_by_role("button", name="Back to now").first.click()
+    wait(ada, "() => window.esker.past() === null && window.esker.strokes().length === 3")
+    wait_settled(ada, ben)
+    for person in (ada, ben):
+        wait(person, "ps => ps.every(([x, y]) => window.esker.levelAt(x, y) === 4)", [list(p) for p in COARSE])
+    assert heights(ada, COARSE) == heights(ben, COARSE)
+
+    ada.page.get_by_role("button", name="Watch it come to be").click()
+    wait(ada, "() => window.esker.past() !== null && window.esker.strokes().length === 1")
+    ada.shot("history-lapse")
+    wait(ada, "() => window.esker.past() === window.esker.clock()")
+    ada.page.keyboard.press("Escape")
+    wait(ada, "() => window.esker.past() === null")
+
+    entry(ada, "drew a mountain").scroll_into_view_if_needed()
+    ada.page.locator("esk-history-panel .item").last.click()
+    wait(ada, "c => window.esker.past() === c", drawn)
+    ada.page.get_by_role("button", name="Make a copy").click()
+    wait(ada, "t => !location.pathname.endsWith(t) && window.esker?.ready()", terrain, timeout=90)
+    assert [s["id"] for s in ada.js("() => window.esker.strokes()")] == [first]
+    assert ada.js("() => window.esker.title()") == "Copy of Looking back"
+    assert len(ben.js("() => window.esker.strokes()")) == 3
+    for person in (ada, ben):
+        assert person.errors == []
