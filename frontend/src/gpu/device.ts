@@ -12,6 +12,8 @@ export interface Gpu {
   readonly description: string;
   /** True for an adapter that draws on the CPU. */
   readonly software: boolean;
+  /** False for devices that only have WebGPU's compatibility mode: shaders cannot read depth there. */
+  readonly core: boolean;
 }
 
 /** An adapter's words for itself, shortened for the status line. */
@@ -22,7 +24,7 @@ function describe(info: GPUAdapterInfo | undefined): string {
 
 const SOFTWARE = /swiftshader|llvmpipe|lavapipe|software|basic render/i;
 
-async function requestAdapter(): Promise<GPUAdapter> {
+async function requestAdapter(): Promise<{ adapter: GPUAdapter; core: boolean }> {
   if (!globalThis.isSecureContext) {
     throw new NoWebGpu("The 3D view needs a secure page: open this terrain over https or on localhost.");
   }
@@ -32,10 +34,10 @@ async function requestAdapter(): Promise<GPUAdapter> {
   for (const featureLevel of ["core", "compatibility"]) {
     try {
       const adapter = await gpu.requestAdapter({ featureLevel, powerPreference: "high-performance" });
-      if (adapter !== null) return adapter;
+      if (adapter !== null) return { adapter, core: featureLevel === "core" };
     } catch {
       const adapter = await gpu.requestAdapter();
-      if (adapter !== null) return adapter;
+      if (adapter !== null) return { adapter, core: true };
     }
   }
   throw new NoWebGpu("WebGPU found no graphics device it can use; the map view is shown instead.");
@@ -43,7 +45,7 @@ async function requestAdapter(): Promise<GPUAdapter> {
 
 /** Device and canvas context. Throws `NoWebGpu`. */
 export async function openGpu(canvas: HTMLCanvasElement): Promise<Gpu> {
-  const adapter = await requestAdapter();
+  const { adapter, core } = await requestAdapter();
   let device: GPUDevice;
   try {
     device = await adapter.requestDevice({ label: "esker" });
@@ -62,5 +64,5 @@ export async function openGpu(canvas: HTMLCanvasElement): Promise<Gpu> {
   const info = adapter.info as GPUAdapterInfo | undefined;
   const description = describe(info);
   const software = info?.isFallbackAdapter === true || SOFTWARE.test(`${description} ${info?.description ?? ""}`);
-  return { device, context, format, description, software };
+  return { device, context, format, description, software, core };
 }

@@ -77,6 +77,7 @@ export class FrameBindings {
         texture(9, "float", "2d"),
         texture(10, "float", "2d-array"),
         texture(11, "float", "2d-array"),
+        texture(12, "float", "2d"),
       ],
     });
     this.channels = new ChannelTexture(device);
@@ -119,6 +120,11 @@ export class FrameBindings {
         { binding: 11, resource: array(atlas.attributes1) },
       ],
     });
+  }
+
+  /** The view uniform, for passes that bind nothing else of a frame. */
+  get view(): GPUBuffer {
+    return this.uniform;
   }
 
   /** The bind group; `attach` must have been called. */

@@ -3,6 +3,7 @@
 import { type Look, PATCH_CELLS } from "../generated/contract.ts";
 import { EDGE_EAST, EDGE_NORTH, EDGE_SOUTH, EDGE_WEST, isWet, RECORD_WORDS, recordBorder } from "../tiles/records.ts";
 import type { Cut } from "../tiles/selection.ts";
+import type { Round } from "./hidden.ts";
 import { createPass, describePass, GrowingBuffer, type PassContext } from "./pipeline.ts";
 import { sceneSource, terrainSource } from "./shaders.ts";
 
@@ -29,7 +30,8 @@ export function patchIndices(): Uint16Array<ArrayBuffer> {
   return out;
 }
 
-const INDEX_COUNT = PATCH_CELLS * PATCH_CELLS * 6;
+/** Indices of one patch. */
+export const INDEX_COUNT = PATCH_CELLS * PATCH_CELLS * 6;
 const WALL_VERTICES = PATCH_CELLS * 6;
 const WALL_WORDS = RECORD_WORDS + 1;
 
@@ -146,6 +148,15 @@ export class PatchPasses {
 
   drawGround(pass: GPURenderPassEncoder): void {
     if (this.terrain !== null) this.drawPatches(pass, this.terrain, this.recordBuffer, this.count);
+  }
+
+  /** Of the ground what one round of the search for hidden patches leaves. */
+  drawRound(pass: GPURenderPassEncoder, round: Round): void {
+    if (this.terrain === null || this.count === 0) return;
+    pass.setPipeline(this.terrain);
+    pass.setVertexBuffer(0, round.records, round.recordOffset);
+    pass.setIndexBuffer(this.indices, "uint16");
+    pass.drawIndexedIndirect(round.draws, round.drawOffset);
   }
 
   drawSea(pass: GPURenderPassEncoder): void {

@@ -10,10 +10,12 @@ import type { Gpu } from "./device.ts";
 import { Fit } from "./fit.ts";
 import { FrameBindings, sunDirection } from "./frame.ts";
 import { GhostPass } from "./ghostplane.ts";
+import { HiddenPatches } from "./hidden.ts";
 import { LabelPass } from "./labels.ts";
 import { LightQueue } from "./lightqueue.ts";
 import { createNoiseTexture } from "./noise.ts";
-import { PatchPasses } from "./patches.ts";
+import { INDEX_COUNT, PatchPasses } from "./patches.ts";
+import { Picture } from "./picture.ts";
 import type { PassContext } from "./pipeline.ts";
 import { type Quality, QualityControl } from "./quality.ts";
 import { RibbonPass } from "./ribbons.ts";
@@ -50,6 +52,7 @@ interface Passes {
   readonly ghost: GhostPass;
   readonly sheet: SheetPass;
   readonly labels: LabelPass;
+  readonly hidden: HiddenPatches | null;
 }
 
 /** The tiles of one store on the device. */
@@ -68,6 +71,8 @@ export class GpuRenderer implements SceneRenderer {
   readonly kind = "webgpu";
   readonly description: string;
   readonly lost: Promise<string>;
+  /** Draws what a frame has prepared; says whether hidden patches are looked for. */
+  readonly picture: Picture;
   private readonly quality: QualityControl;
   private world: World | null = null;
   private last: Scene | null = null;
@@ -104,6 +109,7 @@ export class GpuRenderer implements SceneRenderer {
   ) {
     this.description = gpu.description;
     this.quality = new QualityControl(gpu.software);
+    this.picture = new Picture(passes, passes.hidden);
     this.lost = gpu.device.lost.then((info) => (this.destroyed ? "closed" : info.message || info.reason));
   }
 
@@ -119,8 +125,8 @@ export class GpuRenderer implements SceneRenderer {
       samples,
       detail: gpu.software ? "plain" : "rich",
     };
-    const [target, fill, sun, taking, background, patches, ribbons, ghost, sheet, labels] = await Promise.all([
-      Target.create(device, format, samples),
+    const [target, fill, sun, taking, background, patches, ribbons, ghost, sheet, labels, hidden] = await Promise.all([
+      Target.create(device, format, samples, gpu.core),
       TileFill.create(device),
       SunPass.create(device, gpu.software),
       TakeLightPass.create(device),
@@ -130,6 +136,8 @@ export class GpuRenderer implements SceneRenderer {
       GhostPass.create(context),
       SheetPass.create(context),
       LabelPass.create(context),
+      // Devices of the compatibility mode cannot read depth in a shader.
+      gpu.core ? HiddenPatches.create(device, frame.view, samples, INDEX_COUNT) : null,
     ]);
     const compute = { fill, sun, taking };
     return new GpuRenderer(canvas, gpu, {
@@ -143,6 +151,7 @@ export class GpuRenderer implements SceneRenderer {
       ghost,
       sheet,
       labels,
+      hidden,
     });
   }
 
@@ -188,7 +197,7 @@ export class GpuRenderer implements SceneRenderer {
     if (this.destroyed) return;
     this.destroyed = true;
     this.world?.atlas.destroy();
-    for (const part of Object.values(this.passes)) if ("destroy" in part) part.destroy();
+    for (const part of Object.values(this.passes)) if (part !== null && "destroy" in part) part.destroy();
     this.gpu.device.destroy();
   }
 
@@ -253,9 +262,11 @@ export class GpuRenderer implements SceneRenderer {
     this.passes.sheet.update(scene.sheet ?? null);
     this.passes.ghost.update(scene.ghost);
     this.passes.labels.update(scene, cut.maxHeight - cut.minHeight, unit, quality.scale);
-    this.encode(encoder, scene, context.getCurrentTexture(), width, height);
+    const nodes = world.selection.tree.capacity * 16;
+    this.picture.encode(encoder, scene, cut, nodes, { canvas: context.getCurrentTexture(), width, height });
     device.queue.submit([encoder.finish()]);
     this.passes.fill.submitted();
+    this.picture.submitted();
     this.measure(true);
     this.lightDrawn = this.lightMarched;
     this.drawnAt = Number.POSITIVE_INFINITY;
@@ -365,23 +376,6 @@ export class GpuRenderer implements SceneRenderer {
     this.gpu.device.queue.submit([encoder.finish()]);
     this.passes.fill.submitted();
     this.measure(false);
-  }
-
-  private encode(encoder: GPUCommandEncoder, scene: Scene, canvas: GPUTexture, width: number, height: number): void {
-    const { target, frame, background, patches, ribbons, ghost, sheet, labels } = this.passes;
-    const pass = encoder.beginRenderPass(target.begin(canvas, width, height));
-    pass.setBindGroup(0, frame.bindGroup);
-    patches.drawGround(pass);
-    patches.drawWalls(pass);
-    const sea = scene.settings.sea_level_m !== null;
-    background.draw(pass, sea);
-    if (sea) patches.drawSea(pass);
-    sheet.draw(pass);
-    ghost.draw(pass);
-    labels.draw(pass);
-    ribbons.draw(pass);
-    pass.end();
-    target.finish(encoder, canvas);
   }
 
   /** Follows a submission to its end; `frame`: its time says how fast frames are. */

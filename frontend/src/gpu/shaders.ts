@@ -12,6 +12,10 @@ import computeSynthesis from "@shaders/wgsl/compute_synthesis.wgsl?raw";
 import detailPlain from "@shaders/wgsl/detail_plain.wgsl?raw";
 import detailRich from "@shaders/wgsl/detail_rich.wgsl?raw";
 import ghost from "@shaders/wgsl/ghost.wgsl?raw";
+import hidden from "@shaders/wgsl/hidden.wgsl?raw";
+import hiddenBase from "@shaders/wgsl/hidden_base.wgsl?raw";
+import hiddenDepth from "@shaders/wgsl/hidden_depth.wgsl?raw";
+import hiddenSamples from "@shaders/wgsl/hidden_depth_samples.wgsl?raw";
 import label from "@shaders/wgsl/label.wgsl?raw";
 import overlayLines from "@shaders/wgsl/lines.wgsl?raw";
 import lookAlpine from "@shaders/wgsl/look_alpine.wgsl?raw";
@@ -83,6 +87,9 @@ export const SOURCES = {
   light: join(contract, tile, computeLight),
   sky: join(atmosphere, computeSky),
   bounds: join(contract, tile, computeBounds),
+  hidden: join(contract, view, tile, patch, hidden),
+  hiddenDepth: join(contract, view, tile, patch, hidden, hiddenBase, hiddenDepth),
+  hiddenSamples: join(contract, view, tile, patch, hidden, hiddenBase, hiddenSamples),
 } as const;
 
 const RULES: Readonly<Record<SynthesisRule, string>> = {

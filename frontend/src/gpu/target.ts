@@ -17,12 +17,19 @@ export class Target {
     private readonly device: GPUDevice,
     private readonly format: GPUTextureFormat,
     readonly samples: number,
+    private readonly readDepth: boolean,
     private readonly blitPipeline: GPURenderPipeline,
   ) {
     this.sampler = device.createSampler({ magFilter: "linear", minFilter: "linear" });
   }
 
-  static async create(device: GPUDevice, format: GPUTextureFormat, samples: number): Promise<Target> {
+  /** `readDepth`: shaders read the depth between two passes. */
+  static async create(
+    device: GPUDevice,
+    format: GPUTextureFormat,
+    samples: number,
+    readDepth = false,
+  ): Promise<Target> {
     const module = device.createShaderModule({ label: "blit", code: blit });
     const pipeline = await device.createRenderPipelineAsync({
       label: "blit",
@@ -30,33 +37,45 @@ export class Target {
       vertex: { module },
       fragment: { module, targets: [{ format }] },
     });
-    return new Target(device, format, samples, pipeline);
+    return new Target(device, format, samples, readDepth, pipeline);
   }
 
   /**
    * Attachments for a frame of `width` x `height` pixels shown on `canvas`. When the sizes differ, `finish` stretches the
-   * picture.
+   * picture. `part`: a frame is drawn in one pass, or in two with a look at the depth between them.
    */
-  begin(canvas: GPUTexture, width: number, height: number): GPURenderPassDescriptor {
+  begin(
+    canvas: GPUTexture,
+    width: number,
+    height: number,
+    part: "whole" | "first" | "second" = "whole",
+  ): GPURenderPassDescriptor {
     this.resize(canvas, width, height);
     const resolved = (this.scaled ?? canvas).createView();
+    const loadOp = part === "second" ? "load" : "clear";
+    const goesOn = part === "first";
     const colour: GPURenderPassColorAttachment = {
       view: this.multisampled === null ? resolved : this.multisampled.createView(),
       clearValue: [0, 0, 0, 1],
-      loadOp: "clear",
-      storeOp: this.multisampled === null ? "store" : "discard",
+      loadOp,
+      storeOp: this.multisampled === null || goesOn ? "store" : "discard",
     };
-    if (this.multisampled !== null) colour.resolveTarget = resolved;
+    if (this.multisampled !== null && !goesOn) colour.resolveTarget = resolved;
     return {
       label: "scene",
       colorAttachments: [colour],
       depthStencilAttachment: {
         view: this.depth!.createView(),
         depthClearValue: 0,
-        depthLoadOp: "clear",
-        depthStoreOp: "discard",
+        depthLoadOp: loadOp,
+        depthStoreOp: goesOn ? "store" : "discard",
       },
     };
+  }
+
+  /** Depth of the picture, between its two passes. */
+  get depthView(): GPUTextureView {
+    return this.depth!.createView();
   }
 
   finish(encoder: GPUCommandEncoder, canvas: GPUTexture): void {
@@ -84,7 +103,7 @@ export class Target {
     const usage = GPUTextureUsage.RENDER_ATTACHMENT;
     const make = (label: string, format: GPUTextureFormat, sampleCount: number, more = 0): GPUTexture =>
       this.device.createTexture({ label, format, sampleCount, size: [width, height], usage: usage | more });
-    this.depth = make("depth", DEPTH_FORMAT, this.samples);
+    this.depth = make("depth", DEPTH_FORMAT, this.samples, this.readDepth ? GPUTextureUsage.TEXTURE_BINDING : 0);
     this.multisampled = this.samples > 1 ? make("colour", this.format, this.samples) : null;
     this.scaled = null;
     if (width !== canvas.width || height !== canvas.height) {

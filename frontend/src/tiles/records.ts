@@ -11,6 +11,8 @@ export const EDGE_NORTH = 8;
  * own slot | parent slot << 16; four corner morph weights as unorm8 (south-west, south-east, north-west, north-east).
  */
 export const RECORD_WORDS = 4;
+/** Words that say what is known of a patch beside what is drawn (Cut.facts, shaders/wgsl/hidden.wgsl). */
+export const FACT_WORDS = 3;
 const INDEX_MASK = 0xffffff;
 const WET = 1 << 31;
 

@@ -14,7 +14,7 @@ import type { CameraState, TileView } from "../core/types.ts";
 import { PATCH_CELLS, QUANTA_PER_CELL, SUBPATCHES } from "../generated/contract.ts";
 import { frontToBack, Horizon, highestAround } from "./occlusion.ts";
 import { PatchTree } from "./patchtree.ts";
-import { EDGE_EAST, EDGE_NORTH, EDGE_SOUTH, EDGE_WEST, RECORD_WORDS, writeRecord } from "./records.ts";
+import { EDGE_EAST, EDGE_NORTH, EDGE_SOUTH, EDGE_WEST, FACT_WORDS, RECORD_WORDS, writeRecord } from "./records.ts";
 import { type TileRequest, Wishes } from "./wishes.ts";
 
 export type { TileRequest } from "./wishes.ts";
@@ -33,6 +33,8 @@ export interface Cut {
   readonly count: number;
   /** `RECORD_WORDS` words a patch. */
   readonly records: Uint32Array;
+  /** `FACT_WORDS` words a patch: lowest and highest ground that it can have, metres, as float32; its node of the tree. */
+  readonly facts: Uint32Array;
   /** Tiles that a finer picture needs and that are not usable yet, coarse first, then by screen error. */
   readonly requests: readonly TileRequest[];
   /** Tiles that will be needed when the eye comes a little nearer, in the same order. */
@@ -76,6 +78,8 @@ export class Selection {
   private readonly horizon = new Horizon();
   private readonly planes = new Float64Array(24);
   private records = new Uint32Array(RECORD_WORDS * 1024);
+  private facts = new Uint32Array(FACT_WORDS * 1024);
+  private bounds = new Float32Array(this.facts.buffer);
   private count = 0;
   private eye: readonly number[] = [0, 0, 0];
   private pixels = 1;
@@ -129,10 +133,10 @@ export class Selection {
     }
     let top = Number.NEGATIVE_INFINITY;
     for (let node = 0; node < 16; node += 1) top = Math.max(top, max[node]!);
-    const { count, records } = this;
+    const { count, records, facts } = this;
     const [requests, early] = [this.wishes.sorted(), this.early.sorted()];
     const tiles = this.touchedCount + requests.length;
-    return { count, records, requests, early, minHeight: low, maxHeight: high, top, tiles };
+    return { count, records, facts, requests, early, minHeight: low, maxHeight: high, top, tiles };
   }
 
   private begin(view: TileView, camera: CameraState, tauPx: number, slots: Slots, pixelScale: number): void {
@@ -345,6 +349,10 @@ export class Selection {
       const grown = new Uint32Array(this.records.length * 2);
       grown.set(this.records);
       this.records = grown;
+      const facts = new Uint32Array(this.facts.length * 2);
+      facts.set(this.facts);
+      this.facts = facts;
+      this.bounds = new Float32Array(facts.buffer);
     }
     const { tree } = this;
     const px = this.column(node);
@@ -383,6 +391,10 @@ export class Selection {
       wet: tree.min[node]! < this.seaM,
       corners,
     });
+    const fact = this.count * FACT_WORDS;
+    this.bounds[fact] = tree.min[node]!;
+    this.bounds[fact + 1] = tree.max[node]!;
+    this.facts[fact + 2] = node;
     this.count += 1;
   }
 

@@ -11,7 +11,9 @@ import { Selection } from "../../src/tiles/selection.ts";
 import { drawReference } from "./dense.ts";
 import { drawnPatch, samplesOf, shownHeight } from "./drawn.ts";
 import { flightCamera, fly, type Moment, Tally } from "./flight.ts";
+import { hiddenTwin } from "./hiddentwin.ts";
 import { LAMBERT } from "./lambert.ts";
+import * as ridges from "./ridges.ts";
 import { craggyField, FieldView, filteredField, lookAt, PLAIN_CHANNELS, SparseView } from "./world.ts";
 
 export interface Camera {
@@ -267,5 +269,19 @@ async function flicker(frames: number): Promise<{ differing: number; largest: nu
 }
 
 Object.assign(globalThis, {
-  bench: { load, grow, open, settle, frames, picture, reference, screenError, hills, flight, flicker },
+  bench: {
+    load,
+    grow,
+    open,
+    settle,
+    frames,
+    picture,
+    reference,
+    screenError,
+    hills,
+    flight,
+    flicker,
+    ridges,
+    hiddenTwin,
+  },
 });
