@@ -48,6 +48,21 @@ describe("patch mesh", () => {
     }
     expect(area).toBe(256);
   });
+
+  it("R66: lists new vertices together: SwiftShader shades four indices at a time when the first is not among 64", () => {
+    const indices = patchIndices();
+    let runs = 0;
+    for (let batch = 0; batch < indices.length; batch += 3 * 128) {
+      const part = indices.subarray(batch, batch + 3 * 128);
+      const cache = new Int32Array(64).fill(-1);
+      part.forEach((vertex, i) => {
+        if (cache[vertex % 64] === vertex) return;
+        runs += 1;
+        for (let k = Math.min(i + 3, part.length - 1); k >= i; k -= 1) cache[part[k]! % 64] = part[k]!;
+      });
+    }
+    expect(runs).toBeLessThanOrEqual(112);
+  });
 });
 
 describe("quality", () => {
