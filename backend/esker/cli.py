@@ -1,4 +1,4 @@
-"""``esker serve | import | solve | render | bench | --version``; ``python -m esker`` is the same."""
+"""``esker serve | import | history | fork | solve | render | bench | --version``; ``python -m esker`` is the same."""
 
 from __future__ import annotations
 
@@ -20,9 +20,11 @@ if TYPE_CHECKING:
 def main(argv: list[str] | None = None) -> int:
     """Runs a command; returns the exit status."""
     arguments = sys.argv[1:] if argv is None else argv
-    # What follows `import`, `solve`, `render` and `bench NAME` belongs to those commands, options and --help included.
+    # What follows such a name belongs to that command, options and --help included.
     if arguments[:1] == ["import"]:
         return _run("esker.importing.command", arguments[1:])
+    if arguments[:1] in (["history"], ["fork"]):
+        return _run("esker.history_command", arguments)
     if arguments[:1] == ["solve"]:
         return _run("esker.solve.command", arguments[1:], _base_of)
     if arguments[:1] == ["render"]:
@@ -57,6 +59,8 @@ def _parser() -> argparse.ArgumentParser:
     serve.add_argument("--threads", type=int, help="threads of a CPU device (default: cores - 1)")
     serve.add_argument("--log-level", choices=("debug", "info", "warning", "error"))
     commands.add_parser("import", help="bring in elevation files (see esker import --help)", add_help=False)
+    commands.add_parser("history", help="what people did on a terrain (see esker history --help)", add_help=False)
+    commands.add_parser("fork", help="a new terrain as one was at a clock (see esker fork --help)", add_help=False)
     commands.add_parser("solve", help="solve a terrain file into heights (see esker solve --help)", add_help=False)
     commands.add_parser("render", help="draw a terrain: pictures, turntables (see esker render --help)", add_help=False)
     commands.add_parser("bench", help="measure: esker bench NAME --json (without NAME: the list)", add_help=False)

@@ -37,6 +37,7 @@ from websockets.asyncio.client import connect as open_socket
 from websockets.exceptions import ConnectionClosed, InvalidHandshake, InvalidMessage
 
 from esker import contract as c
+from esker.client_history import LiveHistory
 from esker.client_layers import Grids, LiveLayers
 from esker.contract import Document, Op, Stroke, TerrainSettings
 from esker.document.ops import Refusal
@@ -66,7 +67,7 @@ LOST: Final = (OSError, ConnectionClosed, InvalidHandshake, InvalidMessage, Time
 """After these the client connects again."""
 
 
-class LiveTerrain(LiveLayers):
+class LiveTerrain(LiveLayers, LiveHistory):
     """A terrain that others may be changing too. All methods may be called from any thread."""
 
     def __init__(

@@ -12,7 +12,9 @@ from typing import Any
 
 import pytest
 
+import esker
 from esker import contract as c
+from esker.cli import main
 from esker.document.ops import StrokeSet
 from esker.document.wire import op_json
 from esker.grid import TileKey, quantum
@@ -289,3 +291,29 @@ def test_who_may_only_look_sees_the_past_and_copies_nothing(tmp_path: Path) -> N
         assert server.join(terrain, look, "past", at=1).welcome["clock"] == 1
         status, answer = server.http("POST", f"/api/terrains/{terrain}/fork", {"at": 1}, look)
         assert (status, answer["code"]) == (403, "view_only")
+
+
+def test_python_and_a_shell_read_and_copy_the_history(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """HI7, HI14."""
+    with LiveServer(tmp_path) as server:
+        terrain, secret, _ = drawn(server, 2)
+        link = f"{server.base}/t/{terrain}#{secret}"
+        with esker.connect(link, "Py") as live:
+            live.set("s1", label="Peak")
+            live.wait()
+            assert [str(e) for e in live.history()] == [
+                "Py named the mountain “Peak”",
+                "Ana drew the mountain “Peak”",
+                "Ana drew a mountain",
+            ]
+            assert [e.last for e in live.history(before=3)] == [2, 1]
+            assert [s.id for s in live.at(1).strokes] == ["s0"]
+            with esker.connect(live.fork(1, "Mine")) as copy:
+                assert ([s.id for s in copy.strokes], copy.settings.title) == (["s0"], "Mine")
+        assert main(["history", link, "--most", "1"]) == 0
+        assert capsys.readouterr().out.rstrip().endswith("Py named the mountain “Peak”")
+        assert main(["fork", link, "--at", "2"]) == 0
+        with esker.connect(capsys.readouterr().out.strip()) as copy:
+            assert len(copy.strokes) == 2
+        assert main(["fork", link[:-3]]) == 1
+        assert "does not open this terrain" in capsys.readouterr().err

@@ -29,10 +29,12 @@ LAYERS: tuple[frozenset[str], ...] = (
     frozenset({"terrain_layers"}),
     frozenset({"session", "terrain"}),
     frozenset({"ground"}),
-    frozenset({"client", "client_layers", "elevation", "imports", "tls", "headers", "upload", "render"}),
+    frozenset(
+        {"client", "client_history", "client_layers", "elevation", "imports", "tls", "headers", "upload", "render"}
+    ),
     frozenset({"server"}),
     frozenset({"run"}),
-    frozenset({"bench"}),
+    frozenset({"bench", "history_command"}),
     frozenset({"cli"}),
     frozenset({"__main__"}),
 )

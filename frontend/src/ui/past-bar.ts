@@ -30,6 +30,7 @@ export class EskPastBar extends SignalElement {
           </div>
           <button
             class="btn outline"
+            aria-label="Make a copy from here"
             ?disabled=${!session.mayEdit.value || lapse.copying.value}
             title=${session.mayEdit.value ? "A new terrain of your own that begins here" : "This link lets you look, not copy."}
             @click=${() => void lapse.copy()}
