@@ -24,12 +24,13 @@ from esker.patchwork import blend, blend_points, outside, reuse, survey
 from esker.patchwork.blend_device import ClDevice
 from esker.patchwork.blend_loops import BIN
 from esker.patchwork.lod_space import Model
+from esker.patchwork.melt import Melt
 from esker.patchwork.query import Index
 
 Grid = NDArray[np.float32]
 Floats = NDArray[np.float64]
 
-_FORMAT: Final = b"esker base 1"
+_FORMAT: Final = b"esker base 2"
 _CHUNK: Final = 1024
 """Samples along one side of what is evaluated at once: bounds the memory of coefficients."""
 _KEPT_LEVELS: Final = 5
@@ -77,15 +78,25 @@ class Base:
         self._surveys: dict[int, Grid] = {}
         self._blocks: OrderedDict[tuple[int, int, int], Grid] = OrderedDict()
         self._devices: dict[int, ClDevice | None] = {}
-        self._before: tuple[Model, dict[int, Blended]] | None = None
+        self._melt: Melt | None = None
+        self._before: tuple[Model, Melt, dict[int, Blended]] | None = None
         if before is not None and before.size_m == size_m:
             with before._lock:
-                self._before = before.model, dict(before._blended)
+                if before._melt is not None:
+                    self._before = before.model, before._melt, dict(before._blended)
                 self._devices = dict(before._devices)
 
     def tolerance(self, level: int) -> float:
         """Error in metres that level ``level`` may have where its samples are farther apart than the data's."""
         return grid.spacing(level, self.size_m) / 4
+
+    @property
+    def melt(self) -> Melt:
+        """How the ground of older layers is bent to meet newer ones."""
+        with self._lock:
+            if self._melt is None:
+                self._melt = Melt(self.model, self.size_m, None if self._before is None else self._before[1])
+            return self._melt
 
     def level(self, level: int, device: ClDevice | None = None) -> Grid:
         """The whole level: read-only float32 (64 * 2^level + 1 a side), metres, never NaN."""
@@ -147,7 +158,9 @@ class Base:
             return Sample(np.zeros(0), *((np.zeros((0, 2)), np.zeros((0, 3))) if derivatives else ()))
         low, high = points.min(axis=0), points.max(axis=0)
         chosen = self.index.uniform(tolerance, (low[0], low[1], high[0], high[1]))
-        jets = blend_points.evaluate(blend.pack(self.model, chosen, smooth, tolerance), points)
+        packed = blend.pack(self.model, chosen, smooth, tolerance)
+        jets = blend_points.evaluate(packed, points)
+        self.melt.lay_jets(packed, points, jets.heights)
         bare = np.flatnonzero(jets.cover[:, 0] < 1)
         heights = jets.heights
         if len(bare):
@@ -166,6 +179,8 @@ class Base:
         if other.digest == self.digest:
             return None
         rect = reuse.reached(self.model, other.model)
+        for corrected in self.melt.changed(other.melt):
+            rect = grid.Rect(*corrected).union(rect)
         step = grid.spacing(outside.ANCHOR, self.size_m)
         for level in range(outside.ANCHOR + 1):
             device = self._devices.get(level, other._devices.get(level))
@@ -286,13 +301,14 @@ class Base:
     def _taken_over(self, level: int, device: ClDevice | None) -> tuple[Grid, Grid] | None:
         if self._before is None:
             return None
-        model, kept = self._before
+        model, melt, kept = self._before
         old = kept.pop(level, None)
         if old is None:
             return None
         n = grid.samples(level)
         lattice = blend.Lattice(grid.spacing(level, self.size_m), 0, n, 0, n)
-        hit = np.argwhere(reuse.changed_bins(self.model, model, self.tolerance(level), lattice))
+        differ = reuse.changed_bins(self.model, model, self.tolerance(level), lattice)
+        hit = np.argwhere(differ | reuse.met_bins(self.melt.changed(melt), lattice))
         if len(hit) == 0:
             return old.heights, old.cover
         (r0, c0), (r1, c1) = hit.min(axis=0) * BIN, np.minimum((hit.max(axis=0) + 1) * BIN, n)
@@ -315,6 +331,7 @@ class Base:
                 slice(c.start - cols.start, c.stop - cols.start),
             )
             heights[up, across], cover[up, across] = blend.evaluate(packed, lattice, device)
+            self.melt.lay(packed, lattice, heights[up, across])
         return heights, cover
 
     def _beyond(self, points: Floats, device: ClDevice | None) -> Floats:

@@ -69,7 +69,8 @@ class Pack:
     ``coefficients``: float32 (n, 34, 34), of B-splines if ``smooth``, else samples in the first 32 x 32 places;
     ``to_patch``: float64 (n, 2, 3), world to samples of the patch; ``domain``, ``kernel``: float64 (n, 4) as u0, u1,
     v0, v1 in samples; ``volume``: float64 (n,), one over the product of the domain's half sides in metres;
-    ``side``: int32 (n,), samples along a side; ``rank``: int32 (n,), ascending, equal for patches that stand equal.
+    ``side``: int32 (n,), samples along a side; ``rank``: int32 (n,), ascending, equal for patches that stand equal;
+    ``owner``: int32 (n,), the layer's index in ``model.placed``.
     """
 
     smooth: bool
@@ -80,6 +81,7 @@ class Pack:
     volume: NDArray[np.float64]
     side: NDArray[np.int32]
     rank: NDArray[np.int32]
+    owner: NDArray[np.int32]
 
     def __len__(self) -> int:
         return len(self.side)
@@ -112,7 +114,8 @@ def pack(model: Model, index: NDArray[np.int32], smooth: bool, tolerance: float 
     half = np.stack([domain[:, 1] - domain[:, 0], domain[:, 3] - domain[:, 2]], axis=1) / 2
     turn = np.abs(to_patch[:, 0, 0] * to_patch[:, 1, 1] - to_patch[:, 0, 1] * to_patch[:, 1, 0])
     coefficients = _coefficients(model, index, smooth)
-    return Pack(smooth, coefficients, to_patch, domain, inner, turn / (half[:, 0] * half[:, 1]), side, rank)
+    volume = turn / (half[:, 0] * half[:, 1])
+    return Pack(smooth, coefficients, to_patch, domain, inner, volume, side, rank, model.owner[index])
 
 
 def _coefficients(model: Model, index: NDArray[np.int32], smooth: bool) -> NDArray[np.float32]:

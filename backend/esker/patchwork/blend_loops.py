@@ -137,10 +137,10 @@ def _span(at: np.float32, step: np.float32, middle: np.float32, per: np.float32)
 
 
 @kernel
-def _columns(
+def columns(
     u: np.float32, v: np.float32, du: np.float32, dv: np.float32, constants: NDArray[np.float32]
 ) -> tuple[int, int]:
-    """Columns of a bin's row that a patch reaches."""
+    """Columns of a bin's row that a patch reaches, half open."""
     a, b = _span(u, du, constants[0], constants[2])
     c, d = _span(v, dv, constants[1], constants[3])
     return max(a, c), min(b, d)
@@ -182,7 +182,7 @@ def smooth_bins(
             for row in range(BIN):
                 u_row = origin[entry, 0] + step[k, 2] * np.float32(row)
                 v_row = origin[entry, 1] + step[k, 3] * np.float32(row)
-                begin, done = _columns(u_row, v_row, du, dv, constants[k])
+                begin, done = columns(u_row, v_row, du, dv, constants[k])
                 _smooth_row(c, u_row, v_row, du, dv, np.int32(side[k] - 2), begin, done, z)
                 over, under, free, lets = above[row], below[row], bare[row], veil[row]
                 for col in range(begin, done):
@@ -266,7 +266,7 @@ def linear_bins(
             for row in range(BIN):
                 u_row = origin[entry, 0] + step[k, 2] * np.float32(row)
                 v_row = origin[entry, 1] + step[k, 3] * np.float32(row)
-                begin, done = _columns(u_row, v_row, du, dv, constants[k])
+                begin, done = columns(u_row, v_row, du, dv, constants[k])
                 for col in range(begin, done):
                     u, v = u_row + du * np.float32(col), v_row + dv * np.float32(col)
                     weight = max(one - abs(u - mid_u) * per_u, zero) * volume

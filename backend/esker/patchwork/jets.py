@@ -70,9 +70,28 @@ def total(f: Jet, g: Jet) -> Jet:
 
 
 @kernel
+def scaled(f: Jet, by: float) -> Jet:
+    """Of f times a number."""
+    return by * f[0], by * f[1], by * f[2], by * f[3], by * f[4], by * f[5]
+
+
+@kernel
 def rest(f: Jet) -> Jet:
     """Of 1 - f."""
     return 1 - f[0], -f[1], -f[2], -f[3], -f[4], -f[5]
+
+
+@kernel
+def composed(f: Jet, g: Line) -> Jet:
+    """Of g(f), where ``g`` is the value and the derivatives of g at f."""
+    return (
+        g[0],
+        g[1] * f[1],
+        g[1] * f[2],
+        g[1] * f[3] + g[2] * f[1] * f[1],
+        g[1] * f[4] + g[2] * f[1] * f[2],
+        g[1] * f[5] + g[2] * f[2] * f[2],
+    )
 
 
 @kernel
@@ -80,7 +99,7 @@ def spline_jet(c: NDArray[np.float32], u: float, v: float, end: int) -> Jet:
     """Of a cubic spline with B-spline coefficients ``c``, ``c[1, 1]`` at u = v = 0; cells 0..``end`` a side."""
     i, j = min(max(int(u), 0), end), min(max(int(v), 0), end)
     f, g = u - i, v - j
-    a, b = _weights(f), _weights(g)
+    a, b = weights(f), weights(g)
     value, across, twice = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for m in range(4):
         row = c[j + m]
@@ -95,7 +114,7 @@ def spline_jet(c: NDArray[np.float32], u: float, v: float, end: int) -> Jet:
 
 
 @kernel
-def _weights(f: float) -> tuple[Line, Line, Line, Line]:
+def weights(f: float) -> tuple[Line, Line, Line, Line]:
     """The four cubic B-splines over a cell with their derivatives."""
     g = 1 - f
     return (

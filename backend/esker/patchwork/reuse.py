@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -53,6 +56,22 @@ def changed_bins(model: Model, other: Model, tolerance: float, lattice: Lattice)
         bin_patches(to_patch, domain, pitch, reach, r0, r1, c0, c1, found, *empty)
         hit |= found[1:] > 0
     return hit.reshape(r1 - r0, c1 - c0)
+
+
+def met_bins(rects: Iterable[tuple[float, float, float, float]], lattice: Lattice) -> NDArray[np.bool_]:
+    """Bins of a lattice, (rows, cols), that rectangles x0, y0, x1, y1 meet."""
+    r0, r1, c0, c1 = lattice.bins
+    hit, pitch = np.zeros((r1 - r0, c1 - c0), dtype=bool), BIN * lattice.spacing
+    for x0, y0, x1, y1 in rects:
+        (left, right), (low, high) = (
+            (
+                max(0, math.floor(max(a, -pitch) / pitch) - first),
+                max(0, math.floor(min(b, end * pitch) / pitch) + 1 - first),
+            )
+            for a, b, first, end in ((x0, x1, c0, c1), (y0, y1, r0, r1))
+        )
+        hit[low:high, left:right] = True
+    return hit
 
 
 def reached(model: Model, other: Model) -> grid.Rect | None:
