@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import shutil
 import sqlite3
 import time
 from contextlib import suppress
@@ -10,6 +11,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import esker
@@ -18,6 +20,7 @@ from esker.cli import main
 from esker.document.ops import StrokeSet
 from esker.document.wire import op_json
 from esker.grid import TileKey, quantum
+from esker.patchwork import rasters
 from esker.session import past
 from esker.store.chronicles import Chronicles
 from esker.store.journal import SNAPSHOT_EVERY, Journal, Row
@@ -133,14 +136,14 @@ def test_no_clock_is_far_from_a_snapshot(tmp_path: Path) -> None:
 # --- looking ----------------------------------------------------------------------------------------------------
 
 
-def ground_is(peer: Peer, height: float) -> None:
+def ground_is(peer: Peer, height: float, channel: c.Channel = c.Channel.HEIGHT) -> None:
     """Waits until the tiles say this height: with ``PlainSolver`` the sum of the strokes' first anchors."""
     want, deadline = round(height / quantum(0, c.DEFAULT_SIZE_M)), time.monotonic() + 10
     while True:
         decoder = FrameDecoder()
         for frame in peer.frames:
             decoder.decode(frame)
-        root = decoder.held.get(TileKey(0, 0, 0))
+        root = decoder.channels[channel].get(TileKey(0, 0, 0))
         if root is not None and (root.samples == want).all():
             return
         assert time.monotonic() < deadline, root
@@ -205,7 +208,6 @@ def test_only_who_looks_at_the_past_may_seek(tmp_path: Path) -> None:
 
 def test_rooms_of_the_past_are_few_and_not_for_ever(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """HI13."""
-    monkeypatch.setattr(c, "PAST_IDLE_SECONDS", 0.5)
     with LiveServer(tmp_path) as server:
         terrain, secret, _ = drawn(server, 1)
         pasts = server.assembly.hub._pasts
@@ -213,19 +215,26 @@ def test_rooms_of_the_past_are_few_and_not_for_ever(tmp_path: Path, monkeypatch:
         first = server.join(terrain, secret, "p0", at=0)
         again = server.join(terrain, secret, "p0", at=1)
         assert first.closed()[0] == c.WS_CLOSE["bad_hello"]
-        server.join(terrain, secret, "p1", at=1)
+        other = server.join(terrain, secret, "p1", at=1)
         third = Peer(server.socket())
         third.say("hello", protocol=4, terrain=terrain, secret=secret, client="p2", at=1)
         code, error = third.closed()
-        assert code == c.WS_CLOSE["room_full"]
-        assert error is not None
-        assert error["message"] == past.CROWDED
-        code, error = again.closed()
+        assert (code, error and error["message"]) == (c.WS_CLOSE["room_full"], past.CROWDED)
+        for peer in (again, other):
+            peer.close()
+        empty(pasts)
+        monkeypatch.setattr(c, "PAST_IDLE_SECONDS", 0.3)
+        code, error = server.join(terrain, secret, "p3", at=1).closed()
         assert (code, error and error["message"]) == (c.WS_CLOSE["room_full"], past.IDLE)
-        deadline = time.monotonic() + 5
-        while len(pasts) and time.monotonic() < deadline:
-            time.sleep(0.02)
-        assert len(pasts) == 0
+        empty(pasts)
+
+
+def empty(pasts: past.Pasts) -> None:
+    """Waits until nobody looks at the past."""
+    deadline = time.monotonic() + 10
+    while len(pasts):
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
 
 
 def test_a_revoked_link_ends_looking_back_too(tmp_path: Path) -> None:
@@ -317,3 +326,33 @@ def test_python_and_a_shell_read_and_copy_the_history(tmp_path: Path, capsys: py
             assert len(copy.strokes) == 2
         assert main(["fork", link[:-3]]) == 1
         assert "does not open this terrain" in capsys.readouterr().err
+
+
+def test_elevation_layers_are_in_the_past_and_in_copies(tmp_path: Path) -> None:
+    """HI11, HI14: also those that were deleted since; a grid that is gone is said to be."""
+    with LiveServer(tmp_path) as server:
+        raster = rasters.build(np.full((40, 50), 128, dtype=np.float32))
+        server.assembly._grids.put(raster)
+        facts = c.GridFacts(rows=40, cols=50, low_m=128, high_m=128)
+        layer = c.Layer(
+            id="v", content=raster.digest, facts=facts, anchor=(0, 0), spacing_m=(90, 110), accuracy_m=1, name="Table"
+        )
+        terrain, secret = server.create(layers=(layer,))
+        ana = server.join(terrain, secret, "ana", name="Ana")
+        ana.ops(("ana:0", {"type": "layer.delete", "layer": "v"}))
+        ana.wait("ack")
+        _, page = server.http("GET", f"/api/terrains/{terrain}/history", secret=secret)
+        assert says(page) == ["Ana deleted layer Table"]
+        peer = server.join(terrain, secret, "past", at=0)
+        peer.settled(0)
+        ground_is(peer, 128, c.Channel.BASE)
+        peer.say("seek", clock=1)
+        peer.settled(1)
+        ground_is(peer, 0, c.Channel.BASE)
+        status, made = server.http("POST", f"/api/terrains/{terrain}/fork", {"at": 0}, secret)
+        assert status == 201
+        assert server.assembly.hub.journal.grids(made["id"]) == {raster.digest}
+        assert server.join(made["id"], made["secret"], "c").welcome["document"]["layers"][0]["name"] == "Table"
+        shutil.rmtree(server.assembly._grids.path(raster.digest))
+        assert server.http("POST", f"/api/terrains/{terrain}/fork", {"at": 0}, secret)[1]["code"] == "no_grid"
+        assert server.http("POST", f"/api/terrains/{terrain}/fork", {"at": 1}, secret)[0] == 201
