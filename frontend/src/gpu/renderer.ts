@@ -363,7 +363,8 @@ export class GpuRenderer implements SceneRenderer {
     const selectMs = performance.now() - selecting;
     this.high = cut.top;
     // Slots that a finer cut of this frame held are free in the next.
-    this.tilesDue = cut.requests.length > 0 && (!world.atlas.full || cut.tiles <= world.atlas.capacity);
+    const lacking = cut.requests.length > 0 && (!world.atlas.full || cut.tiles <= world.atlas.capacity);
+    this.tilesDue = lacking || world.fit.eased;
     this.compute(encoder, scene, world, { changes, entered, moved });
     return { cut, uploads: changes.remade.length + changes.moved.length + entered.length, selectMs };
   }
