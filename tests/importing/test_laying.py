@@ -43,6 +43,41 @@ def test_degree_tiles_within_a_twentieth(lat: float) -> None:
     assert (laid.flip_rows, laid.flip_cols) == (True, False)
 
 
+def test_the_edge_of_a_bent_grid_is_where_its_samples_are(tmp_path: Path) -> None:
+    """SPEC G26: the outline that pages draw, within an eighth of a step of the outermost samples."""
+    path, cols, rows = tmp_path / "a.npz", 321, 161
+    lon, lat = np.linspace(-122.0, -121.0, cols), np.linspace(46.6, 47.0, rows)
+    np.savez(path, z=np.hypot(*np.meshgrid(lon, lat)) * 10, longitude=lon, latitude=lat)
+    layer, raster = take(path, tmp_path / "raster", place=c.Place(lat_deg=46.8, lon_deg=-121.5), size_m=65_536.0)
+    at = world(layer, raster)
+    bend = np.array(layer.facts.edge)
+    assert bend.shape == (c.EDGE_POINTS, 2)
+    assert np.abs(bend).max() > 0.5
+    # The same edge as pages take it: corners by the layer's affine, and the points between them moved.
+    u = np.concatenate(
+        [np.linspace(0, cols - 1, 9)[:8], np.full(8, cols - 1), np.linspace(cols - 1, 0, 9)[:8], np.zeros(8)]
+    )
+    v = np.concatenate(
+        [np.zeros(8), np.linspace(0, rows - 1, 9)[:8], np.full(8, rows - 1), np.linspace(rows - 1, 0, 9)[:8]]
+    )
+    moved = (np.stack([u, v], -1) + bend) * layer.spacing_m
+    turn = np.radians(layer.rotation_deg)
+    there = np.array(layer.anchor) + moved @ np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
+    true = at[v.astype(int), u.astype(int)]
+    assert np.hypot(*(there - true).T).max() < min(layer.spacing_m) / 100
+    straight = np.array(layer.anchor) + (np.stack([u, v], -1) * layer.spacing_m) @ np.array(
+        [[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]]
+    )
+    assert np.hypot(*(straight - true).T).max() > 0.5 * min(layer.spacing_m)
+    assert take(path, tmp_path / "b", c.ImportAnswers(), c.Place(lat_deg=46.8, lon_deg=-121.5))[0].facts.edge
+
+
+def test_straight_grids_have_no_edge_of_their_own(files: Path, tmp_path: Path) -> None:
+    """SPEC G26."""
+    middle = c.ImportAnswers(answers={"place": "middle"})
+    assert take(files / "rotated.tif", tmp_path / "raster", middle)[0].facts.edge == ()
+
+
 @pytest.mark.parametrize("degrees", [0.0, 27.0, -63.5, 90.0, 135.0, 180.0, -45.0])
 @pytest.mark.parametrize("mirror", [1.0, -1.0])
 def test_any_turn(degrees: float, mirror: float) -> None:

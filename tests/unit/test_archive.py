@@ -174,7 +174,7 @@ def test_documents_that_no_ops_could_have_made(
     raster = next(iter(grids.values()))
 
     def made(names: tuple[str, ...]) -> tuple[c.Layer, ...]:
-        return tuple(_layer(raster, name, scale=1000.0 if name == "high" else 1.0, lift_m=300_000.0) for name in names)
+        return tuple(_layer(raster, name, scale=1000.0 if name == "high" else 1.0, lift_m=20_000.0) for name in names)
 
     settings = c.TerrainSettings(size_m=5000.0)
     check_document(c.Document(id="t", settings=settings, layers=made(("fine",))))

@@ -75,6 +75,8 @@ MAX_GRID_SAMPLES: Final = 200_000_000
 MAX_GRID_BYTES: Final = 256 * 1024 * 1024
 """Bytes of an uploaded elevation file."""
 MIN_GRID_SIDE: Final = 4
+EDGE_POINTS: Final = 32
+"""Points that tell how the edge of a grid bends, eight a side."""
 MAX_GRID_SPACING_M: Final = 100_000.0
 MIN_GRID_SPACING_M: Final = 0.001
 MAX_VERTICAL_SCALE: Final = 1_000.0

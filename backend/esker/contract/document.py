@@ -12,6 +12,7 @@ from esker.contract.constants import (
     DEFAULT_REACH_FRACTION,
     DEFAULT_SIZE_M,
     DEFAULT_SLOPE_DEG,
+    EDGE_POINTS,
     MAX_DETAIL,
     MAX_GRID_SAMPLES,
     MAX_GRID_SPACING_M,
@@ -122,6 +123,8 @@ class GridFacts(Wire):
 
     ``rows`` x ``cols`` samples; ``low_m``, ``high_m``: of its valid samples, before scale and lift; ``valid``: share of
     samples that are valid; ``geo``: it came with a place on Earth; ``crs``: that of the file, as a person writes it.
+    ``edge``: how the edge bends: displacements in lattice units (columns, rows) of ``EDGE_POINTS`` points of the
+    straight one, evenly apart on each side, counter-clockwise from sample [0, 0]; empty where it does not.
     """
 
     rows: Annotated[int, Field(ge=MIN_GRID_SIDE, le=MAX_GRID_SAMPLES)]
@@ -133,6 +136,7 @@ class GridFacts(Wire):
     crs: Name = ""
     format: Name = ""
     file: Name = ""
+    edge: Annotated[tuple[CurvePoint, ...], Field(max_length=EDGE_POINTS)] = ()
 
 
 Step = Annotated[float, Field(ge=MIN_GRID_SPACING_M, le=MAX_GRID_SPACING_M, allow_inf_nan=False)]

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from esker import contract
 from esker.patchwork import errors, mipmaps, patches, rim
+from esker.patchwork.outline import bent_edge
 from esker.patchwork.paging import let_go
 from esker.patchwork.patches import PatchErrors
 
@@ -65,6 +66,7 @@ class Raster:
             low_m=self.low,
             high_m=self.high,
             valid=self.valid,
+            edge=bent_edge(*self.heights.shape, self.warp),
             **more,
         )
 

@@ -8,6 +8,7 @@
 
 import {
   ABSOLUTE_BOUND_M,
+  EDGE_POINTS,
   MAX_DETAIL,
   MAX_GRID_SAMPLES,
   MAX_GRID_SPACING_M,
@@ -174,6 +175,7 @@ const facts = record({
   crs: may(name),
   format: may(name),
   file: may(name),
+  edge: may(list(point, 0, EDGE_POINTS)),
 });
 
 const layerShape: Shape = {

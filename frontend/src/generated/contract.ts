@@ -80,6 +80,8 @@ export const MAX_GRID_BYTES = 268435456 as const;
 
 export const MIN_GRID_SIDE = 4 as const;
 
+export const EDGE_POINTS = 32 as const;
+
 export const MAX_GRID_SPACING_M = 100000.0 as const;
 
 export const MIN_GRID_SPACING_M = 0.001 as const;
@@ -540,6 +542,7 @@ export interface GridFacts {
   crs: string;
   format: string;
   file: string;
+  edge: [number, number][];
 }
 
 export interface Layer {

@@ -1,9 +1,16 @@
 /** Outlines of elevation grids on the ground, and the coarse picture of one that is being laid. */
 
-import { cornersOf, type GridPlace, type GridShape, latticePoint } from "../core/lattice.ts";
+import {
+  cornersOf,
+  type GridPlace,
+  type GridShape,
+  latticeCorners,
+  latticePoint,
+  type Point,
+} from "../core/lattice.ts";
 import type { FootprintVisual, Ground, SheetVisual } from "../core/types.ts";
 import type { Doc } from "../doc/document.ts";
-import type { Layer } from "../generated/contract.ts";
+import { EDGE_POINTS, type GridFacts, type Layer } from "../generated/contract.ts";
 import { drape } from "../input/picking.ts";
 import type { Laying } from "../input/placement.ts";
 import { solvedHeight } from "../input/strokeops.ts";
@@ -21,17 +28,29 @@ const PREVIEW_MOST = 255;
 /** Outlines, for as long as neither layer nor ground changes: renderers know lines by their array. */
 const drawn = new WeakMap<Layer, { readonly ground: Ground; readonly points: Float32Array }>();
 
-/** The closed outline of a grid on the solved ground (xyz triples). */
-export function outlineOf(shape: GridShape, place: GridPlace, ground: Ground): Float32Array {
-  const corners = cornersOf(shape, place);
-  const line = [...corners, corners[0]!].flatMap(([x, y]) => [x, y, 0]);
+/** Places on the edge of a grid, counter-clockwise: its corners, and points between them where the grid bends with the Earth. */
+function edgeOf(shape: GridShape, place: GridPlace, bend: GridFacts["edge"] | undefined): Point[] {
+  if (bend?.length !== EDGE_POINTS) return cornersOf(shape, place);
+  const corners = latticeCorners(shape);
+  const side = EDGE_POINTS / 4;
+  return bend.map(([du, dv], i) => {
+    const [a, b] = [corners[Math.floor(i / side)]!, corners[(Math.floor(i / side) + 1) % 4]!];
+    const t = (i % side) / side;
+    return latticePoint(place, a[0] + (b[0] - a[0]) * t + du, a[1] + (b[1] - a[1]) * t + dv);
+  });
+}
+
+/** The closed outline of a grid on the solved ground (xyz triples); `bend`: how its edge leaves the straight lines. */
+export function outlineOf(shape: GridShape, place: GridPlace, ground: Ground, bend?: GridFacts["edge"]): Float32Array {
+  const edge = edgeOf(shape, place, bend);
+  const line = [...edge, edge[0]!].flatMap(([x, y]) => [x, y, 0]);
   return new Float32Array(drape(line, ground.sizeM * STEP, (x, y) => solvedHeight(ground, x, y)));
 }
 
 function layerOutline(layer: Layer, ground: Ground): Float32Array {
   const known = drawn.get(layer);
   if (known?.ground === ground) return known.points;
-  const points = outlineOf(layer.facts, layer, ground);
+  const points = outlineOf(layer.facts, layer, ground, layer.facts.edge);
   drawn.set(layer, { ground, points });
   return points;
 }

@@ -167,7 +167,7 @@ describe("one client", () => {
       layer: fullLayer({
         id,
         content: "0".repeat(64),
-        facts: { rows: 9, cols: 9, low_m: 0, high_m: 9, valid: 1, geo: false, crs: "", format: "", file: "" },
+        facts: { rows: 9, cols: 9, low_m: 0, high_m: 9, valid: 1, geo: false, crs: "", format: "", file: "", edge: [] },
         anchor: [0, 0],
         spacing_m: [1, 1],
         accuracy_m: 1,

@@ -16,6 +16,7 @@ export function layer(id: string, over: Partial<Layer> = {}): Layer {
       crs: "",
       format: "",
       file: `${id}.tif`,
+      edge: [],
     },
     author: "",
     name: "",

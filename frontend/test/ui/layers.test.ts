@@ -10,7 +10,7 @@ import { apply } from "../../src/doc/apply.ts";
 import { fromDocument } from "../../src/doc/document.ts";
 import type { ImportReport, Layer } from "../../src/generated/contract.ts";
 import { sheetShades, sheetVertices } from "../../src/gpu/sheet.ts";
-import { footprintVisuals, sheetOf, stemsOf } from "../../src/ui/footprints.ts";
+import { footprintVisuals, outlineOf, sheetOf, stemsOf } from "../../src/ui/footprints.ts";
 import { heightRange, laidByHand, optionWords } from "../../src/ui/import-questions.ts";
 import { layerFacts, orderedLayers, percent, placeWords, reorderOps, reportFacts } from "../../src/ui/layers.ts";
 import { PendingLaying, startingPlace } from "../../src/ui/laying.ts";
@@ -160,6 +160,26 @@ describe("a file without a place", () => {
     expect(z).toBe(50);
     expect(z1).toBe(2000 + laying.place.value.lift_m);
     expect(stemsOf(laying, null, flat)).toEqual([]);
+  });
+
+  it("is outlined where its edge truly lies, wherever it is moved", () => {
+    // The middle of the south side bends by 4 rows to the south, that of the east side by 2 columns to the west.
+    const edge = Array.from({ length: 32 }, (_, i): [number, number] =>
+      i === 4 ? [0, -4] : i === 12 ? [-2, 0] : [0, 0],
+    );
+    const bent = layer("a", { rotation_deg: 90, facts: { ...layer("a").facts, edge } });
+    const points = outlineOf(bent.facts, bent, flat, edge);
+    const lies = (x: number, y: number): number => {
+      let least = Number.POSITIVE_INFINITY;
+      for (let i = 0; i < points.length; i += 3)
+        least = Math.min(least, Math.hypot(points[i]! - x, points[i + 1]! - y));
+      return least;
+    };
+    expect(lies(100 + 40, 200 + 1000)).toBeLessThan(1e-6);
+    expect(lies(100 - 500, 200 + 2000 - 20)).toBeLessThan(1e-6);
+    expect(lies(100, 200)).toBeLessThan(1e-6);
+    expect([...points.slice(0, 3)]).toEqual([...points.slice(-3)]);
+    expect(outlineOf(bent.facts, bent, flat, []).length).toBeLessThanOrEqual(points.length);
   });
 
   it("shows no cell that lacks a corner, and light from the north-west", () => {
