@@ -3,13 +3,14 @@ fn ground_material(s: Site) -> Material {
   let c = s.cover;
   // Bare ground: stones high up, earth and short grass lower down.
   let stony = scree(s, vec3f(0.250, 0.232, 0.205));
-  let earth = Material(mix(vec3f(0.150, 0.128, 0.088), vec3f(0.120, 0.088, 0.056), s.fine1.r) * (0.8 + 0.4 * s.fine2.r), fine_slope(s, 0.20), 0.0, 0.0);
+  let earth = heaped(Material(mix(vec3f(0.150, 0.128, 0.088), vec3f(0.120, 0.088, 0.056), s.fine1.r) * (0.8 + 0.4 * s.fine2.r), fine_slope(s, 0.20), 0.0, 0.0), s, 0.7);
   var m = mix_in(earth, stony, smoothstep(0.06, 0.13, s.height + (s.macro2.r - 0.5) * 0.05));
   // Meadows: lush in hollows and low down, dry and pale on rises and higher up.
   let dry = smoothstep(0.25, 0.85, 0.45 + (s.macro1.r - 0.5) * 1.5 + (s.macro2.r - 0.5) * 0.8 + s.height * 3.0 - s.curvature * 0.5 - c.wet * 0.4);
   let tone = 0.84 + 0.30 * (s.fine1.r - 0.5) + 0.40 * (s.fine2.r - 0.5) + 0.25 * (s.fine3.r - 0.5) + 0.25 * (s.macro2.g - 0.5);
   let meadow = Material(mix(vec3f(0.066, 0.104, 0.026), vec3f(0.190, 0.168, 0.070), dry) * tone, fine_slope(s, 0.13), 0.0, 0.12);
-  m = mix_in(m, meadow, covered(c.grass, (s.fine1.r - 0.5) * 0.5 + (s.fine2.r - 0.5) * 0.3, 0.22));
+  let green = covered(c.grass, (s.fine1.r - 0.5) * 0.5 + (s.fine2.r - 0.5) * 0.3, 0.22);
+  m = mix_in(m, tufted(meadow, s, vec3f(0.250, 0.232, 0.205)), green);
   let wood = covered(c.forest, (s.fine1.g - 0.5) * 0.35 + (s.fine2.r - 0.5) * 0.25, 0.16);
   m = mix_in(m, canopy(s, vec3f(0.018, 0.036, 0.015), vec3f(0.044, 0.062, 0.020)), wood * 0.96);
   // Rubble gathers below the faces, where the slope eases and hollows.

@@ -25,6 +25,8 @@ struct Site {
   shore: f32,        // the same for the sea's shores
   curvature: f32,
   footprint: f32,    // metres that a pixel covers
+  f: Footprint,
+  bent: vec3f,       // the place where the finer layers are read
   macro1: vec4f,     // features of a third and of a fifteenth of the domain
   macro2: vec4f,
   fine1: vec4f,      // features of some 50 m, 8 m and 1 m
@@ -44,12 +46,14 @@ fn survey(p: vec3f, gradient: vec2f, curvature: f32, f: Footprint, cover: Attrib
   s.shore = above / view.shore;
   s.curvature = curvature;
   s.footprint = sqrt(max(max(dot(f.dx, f.dx), dot(f.dy, f.dy)), 1.0e-8));
+  s.f = f;
   s.macro1 = ground_noise(p, f, view.size * 1.37, vec2f(0.917, -0.399));
   s.macro2 = ground_noise(p, f, view.size * 0.27, vec2f(0.602, 0.799));
-  // The finer layers are pushed about by the broadest one: what repeats is not seen to repeat.
-  let bent = p + vec3f((s.macro1.rg - 0.5) * 150.0, 0.0);
-  s.fine1 = rock_noise(bent, n, f, 211.0);
-  let fine = fine_noise(bent, n, f, s.fine1);
+  // The finer layers are pushed about: what repeats is not seen to repeat. By waves, not by noise: where a texture of 8
+  // bits is filtered in 8 bits, its steps would be cuts through the ground.
+  s.bent = p + vec3f(sin(p.yx * vec2f(0.0071, 0.0059) + sin(p.xy * vec2f(0.0043, 0.0037)) * 1.7) * 45.0, 0.0);
+  s.fine1 = rock_noise(s.bent, n, f, 211.0);
+  let fine = fine_noise(s.bent, n, f, s.fine1);
   s.fine2 = fine.medium;
   s.fine3 = fine.small;
   s.cover = cover;
@@ -98,13 +102,13 @@ fn rock(s: Site, light: vec3f, dark: vec3f, relief: f32) -> Material {
   let hue = mix(vec3f(0.93, 0.99, 1.07), vec3f(1.06, 1.0, 0.92), smoothstep(0.3, 0.7, s.macro2.r + (s.fine2.r - 0.5) * 0.4));
   let seep = smoothstep(0.05, 0.4, s.curvature + (s.fine1.r - 0.5) * 0.3);
   let ledge = s.n.xy * (beds.z * 0.16 + beds.w * 0.11) * min(s.steep, 1.2);
-  return Material(mix(dark, light, tone) * hue * (1.0 - 0.22 * seep), fine_slope(s, relief) + ledge, 0.0, 0.0);
+  return broken(Material(mix(dark, light, tone) * hue * (1.0 - 0.22 * seep), fine_slope(s, relief) + ledge, 0.0, 0.0), s, 1.0);
 }
 
 // Stones below the faces.
 fn scree(s: Site, colour: vec3f) -> Material {
-  let stones = 0.72 + 0.34 * s.fine2.g + 0.22 * s.fine3.r;
-  return Material(colour * stones, fine_slope(s, 0.26), 0.0, 0.0);
+  let grain = 0.72 + 0.34 * s.fine2.g + 0.22 * s.fine3.r;
+  return heaped(Material(colour * grain, fine_slope(s, 0.26), 0.0, 0.0), s, 1.0);
 }
 
 // Crowns: a relief of their own, dark between.

@@ -57,6 +57,7 @@ const OVERLAY_PAINTED: u32 = 6u;
 @group(0) @binding(9) var channels: texture_2d<f32>;  // over the domain, 0..1: amplitude, roughness, reach of a stroke
 @group(0) @binding(10) var attributes0: texture_2d_array<f32>;  // synthesised: snow, wet, foam, smoothness / 2
 @group(0) @binding(11) var attributes1: texture_2d_array<f32>;  // grass, forest, grain, size of the next level's detail
+@group(0) @binding(12) var stones: texture_2d<f32>;  // stones_rich.wgsl
 
 // Clip position of a point given relative to the eye.
 fn clip_of(relative: vec3f) -> vec4f {

@@ -15,6 +15,7 @@ from esker.render.camera import Camera, home, look_at
 from esker.render.frame import LOOKS, Scene
 from esker.render.reference import Reference
 from esker.render.surface import Surface
+from esker.render.tables import stone_mipmaps
 from esker.synthesis.detailed import DetailedTerrain
 from esker.synthesis.site import Site
 from tests.render.ground import rough_levels
@@ -134,3 +135,11 @@ def test_figures_of_the_looks_are_the_pages() -> None:
     assert {name: tuple(map(float, numbers)) for name, *numbers in rows} == {
         k: tuple(map(float, v)) for k, v in LOOKS.items()
     }
+
+
+def test_stones_are_those_of_the_page() -> None:
+    """R64: texels that frontend/test/gpu/parts.test.ts expects too, and mipmaps that fade to level ground."""
+    levels = stone_mipmaps()
+    at = [levels[0][row, col].tolist() for row, col in ((0, 0), (17, 300), (255, 511), (400, 33))]
+    assert at == [[84, 138, 123, 103], [25, 158, 125, 115], [255, 120, 114, 138], [83, 254, 166, 119]]
+    assert np.abs(levels[-1][0, 0, 2:].astype(int) - 127).max() <= 2

@@ -20,7 +20,7 @@ from esker.render.layout import StructLayout
 from esker.render.programs import Compute, Draw, Resources
 from esker.render.select import Cut, choose, frustum
 from esker.render.surface import Surface
-from esker.render.tables import noise_mipmaps
+from esker.render.tables import noise_mipmaps, stone_mipmaps
 
 Pixels = NDArray[np.uint8]
 
@@ -73,7 +73,7 @@ class Reference:
         self._sky = [Compute(self.context, sources.sky(), entry) for entry in ("bake_sky", "bake_ambient")]
         self._draws: dict[tuple[str, str], Draw] = {}
         self._fixed = self._samplers()
-        self._noise = self._noise_texture()
+        self._noise, self._stones = (self._tiling(levels()) for levels in (noise_mipmaps, stone_mipmaps))
 
     @property
     def device(self) -> str:
@@ -159,8 +159,7 @@ class Reference:
             "smooth_repeat": self.context.sampler(filter=mips, anisotropy=ANISOTROPY if sharp else 1.0),
         }
 
-    def _noise_texture(self) -> moderngl.Texture:
-        levels = noise_mipmaps()
+    def _tiling(self, levels: tuple[NDArray[np.uint8], ...]) -> moderngl.Texture:
         texture = self.context.texture((len(levels[0]),) * 2, 4, levels[0].tobytes())
         texture.build_mipmaps(0, len(levels) - 1)
         for level, data in enumerate(levels):
@@ -176,6 +175,7 @@ class Reference:
             **atlas.textures,
             "sky_lut": radiance,
             "noise": self._noise,
+            "stones": self._stones,
             "channels": grid,
         }
         return Resources(textures, self._fixed, {"skylight": ambient}), amplitude

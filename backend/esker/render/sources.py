@@ -15,7 +15,8 @@ _COMMON: Final = ("view", "tile", "sky", "noise", "tonemap")
 
 def terrain(look: str, detail: str) -> Module:
     """The ground in one look, for one of the two amounts of detail."""
-    return _module(*_COMMON, f"detail_{detail}", "patch", "material", f"look_{look}", "lines", "overlay", "terrain")
+    ground = "material", f"stones_{detail}", f"look_{look}"
+    return _module(*_COMMON, f"detail_{detail}", "patch", *ground, "lines", "overlay", "terrain")
 
 
 def wall(detail: str) -> Module:

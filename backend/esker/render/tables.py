@@ -1,4 +1,4 @@
-"""Tables that all materials read: the tiling noise (twin of frontend/src/gpu/noise.ts)."""
+"""Tables that all materials read: tiling noise and stones (twins of frontend/src/gpu/noise.ts and stones.ts)."""
 
 from __future__ import annotations
 
@@ -13,6 +13,11 @@ NOISE_SIZE: Final = 256
 GRADIENT_RANGE: Final = 8
 OCTAVES: Final = 6
 DEVIATION: Final = 0.19
+STONES_SIZE: Final = 512
+STONES_PERIOD: Final = 24
+STONES_EDGE: Final = 0.55
+STONES_SEED: Final = 71
+STONES_LEAN: Final = 0.16
 
 Floats = NDArray[np.float64]
 
@@ -64,6 +69,10 @@ def noise_mipmaps() -> tuple[NDArray[np.uint8], ...]:
     east = (np.roll(smooth, -1, axis=1) - np.roll(smooth, 1, axis=1)) * slope
     north = (np.roll(smooth, -1, axis=0) - np.roll(smooth, 1, axis=0)) * slope
     texels = np.stack((smooth, ridged, 0.5 + east, 0.5 + north), axis=-1).astype(np.float32)
+    return _mipmaps(texels)
+
+
+def _mipmaps(texels: NDArray[np.float32]) -> tuple[NDArray[np.uint8], ...]:
     levels = []
     while True:
         levels.append(np.floor(np.clip(texels, 0, 1).astype(np.float64) * 255 + 0.5).astype(np.uint8))
@@ -71,3 +80,43 @@ def noise_mipmaps() -> tuple[NDArray[np.uint8], ...]:
             return tuple(levels)
         n = len(texels) // 2
         texels = texels.astype(np.float64).reshape(n, 2, n, 2, 4).mean(axis=(1, 3)).astype(np.float32)
+
+
+def _cells() -> tuple[Floats, Floats, Floats, Floats]:
+    """How far in from its stone's edge each texel is, 0..1, its stone's own number and lean (Worley 1996)."""
+    i = np.arange(STONES_PERIOD, dtype=np.uint32)
+    east, north, numbers = (
+        (_hash(i[None, :], i[:, None], STONES_SEED + k) / 2**32).astype(np.float32).astype(np.float64) for k in range(3)
+    )
+    at = np.arange(STONES_SIZE) * (STONES_PERIOD / STONES_SIZE)
+    whole = np.floor(at).astype(np.int64)
+    near = np.full((STONES_SIZE, STONES_SIZE), 9.0)
+    second = near.copy()
+    own, lean_east, lean_north = (np.zeros_like(near) for _ in range(3))
+    for dj in range(-2, 3):
+        for di in range(-2, 3):
+            cell = np.ix_((whole + dj) % STONES_PERIOD, (whole + di) % STONES_PERIOD)
+            ex = (whole + di)[None, :] + east[cell] - at[None, :]
+            ey = (whole + dj)[:, None] + north[cell] - at[:, None]
+            d = np.sqrt(ex * ex + ey * ey)
+            second = np.where(d < near, near, np.minimum(second, d))
+            own = np.where(d < near, numbers[cell], own)
+            lean_east = np.where(d < near, (east[cell] - 0.5) * STONES_LEAN, lean_east)
+            lean_north = np.where(d < near, (north[cell] - 0.5) * STONES_LEAN, lean_north)
+            near = np.minimum(near, d)
+    inside = np.minimum(1, (second - near) / STONES_EDGE).astype(np.float32)
+    return inside.astype(np.float64), own, lean_east, lean_north
+
+
+@cache
+def stone_mipmaps() -> tuple[NDArray[np.uint8], ...]:
+    """Levels of the mipmap, finest first, (side, side, 4): r how far in from its stone's edge, g the stone's own
+    number, ba gradient of its leaning, rounded relief per stone."""
+    inside, own, lean_east, lean_north = _cells()
+    relief = np.sqrt(inside * (2 - inside)).astype(np.float32).astype(np.float64)
+    slope = STONES_SIZE / STONES_PERIOD / (8 * GRADIENT_RANGE)
+    east = (np.roll(relief, -1, axis=1) - np.roll(relief, 1, axis=1)) * slope
+    north = (np.roll(relief, -1, axis=0) - np.roll(relief, 1, axis=0)) * slope
+    return _mipmaps(
+        np.stack((inside, own, 0.5 + east + lean_east, 0.5 + north + lean_north), axis=-1).astype(np.float32)
+    )

@@ -1,4 +1,4 @@
-/** What all passes of a frame bind: the view uniform, the atlas, the sky tables, the noise (shaders/wgsl/view.wgsl). */
+/** What all passes of a frame bind: the view uniform, the atlas, the sky tables, noise and stones (shaders/wgsl/view.wgsl). */
 
 import { eyeProjection, reversedDepth, viewAxes } from "../core/eyeprojection.ts";
 import type { Scene, Vec3 } from "../core/types.ts";
@@ -54,6 +54,7 @@ export class FrameBindings {
     private readonly device: GPUDevice,
     private readonly sky: SkyTables,
     private readonly noise: GPUTexture,
+    private readonly stones: GPUTexture,
     software: boolean,
   ) {
     const visibility = GPUShaderStage.VERTEX | GPUShaderStage.FRAGMENT;
@@ -118,6 +119,7 @@ export class FrameBindings {
         { binding: 9, resource: this.channels.texture.createView() },
         { binding: 10, resource: array(atlas.attributes0) },
         { binding: 11, resource: array(atlas.attributes1) },
+        { binding: 12, resource: this.stones.createView() },
       ],
     });
   }

@@ -6,7 +6,8 @@
 export const NOISE_SIZE = 256;
 const GRADIENT_RANGE = 8;
 
-function hash(x: number, y: number, seed: number): number {
+/** 32 bits for a lattice point. */
+export function hash(x: number, y: number, seed: number): number {
   let h = (Math.imul(x, 0x27d4eb2d) ^ Math.imul(y, 0x165667b1) ^ Math.imul(seed, 0x9e3779b1)) >>> 0;
   h = Math.imul(h ^ (h >>> 15), 0x85ebca6b) >>> 0;
   h = Math.imul(h ^ (h >>> 13), 0xc2b2ae35) >>> 0;
@@ -86,7 +87,8 @@ export function noiseMipmaps(): Uint8Array[] {
   return mipmaps(texels, NOISE_SIZE);
 }
 
-function mipmaps(finest: Float32Array, size: number): Uint8Array[] {
+/** RGBA8 levels of a texture of `size` texels a side, 0..1, finest first, each the mean of the one before. */
+export function mipmaps(finest: Float32Array, size: number): Uint8Array[] {
   const levels: Uint8Array[] = [];
   let current = finest;
   for (let side = size; side >= 1; side /= 2) {
@@ -109,16 +111,21 @@ function mipmaps(finest: Float32Array, size: number): Uint8Array[] {
 
 /** The texture on the device. */
 export function createNoiseTexture(device: GPUDevice): GPUTexture {
-  const levels = noiseMipmaps();
+  return upload(device, "noise", noiseMipmaps());
+}
+
+/** An rgba8 texture of all its levels, finest first. */
+export function upload(device: GPUDevice, label: string, levels: readonly Uint8Array[]): GPUTexture {
+  const size = 1 << (levels.length - 1);
   const texture = device.createTexture({
-    label: "noise",
+    label,
     format: "rgba8unorm",
-    size: [NOISE_SIZE, NOISE_SIZE],
+    size: [size, size],
     mipLevelCount: levels.length,
     usage: GPUTextureUsage.TEXTURE_BINDING | GPUTextureUsage.COPY_DST,
   });
   levels.forEach((data, mipLevel) => {
-    const side = NOISE_SIZE >> mipLevel;
+    const side = size >> mipLevel;
     device.queue.writeTexture({ texture, mipLevel }, data as Uint8Array<ArrayBuffer>, { bytesPerRow: side * 4 }, [
       side,
       side,

@@ -22,6 +22,7 @@ import { RibbonPass } from "./ribbons.ts";
 import { samePicture } from "./scenediff.ts";
 import { SheetPass } from "./sheet.ts";
 import { SkyTables } from "./sky.ts";
+import { createStonesTexture } from "./stones.ts";
 import { TakeLightPass } from "./takelight.ts";
 import { Target } from "./target.ts";
 import { SunPass } from "./tilecompute.ts";
@@ -71,6 +72,8 @@ export class GpuRenderer implements SceneRenderer {
   readonly kind = "webgpu";
   readonly description: string;
   readonly lost: Promise<string>;
+  /** Ground finer than what is held is made where somebody looks. Measurements against a grid end with the grid. */
+  endless = true;
   /** Draws what a frame has prepared; says whether hidden patches are looked for. */
   readonly picture: Picture;
   private readonly quality: QualityControl;
@@ -117,7 +120,13 @@ export class GpuRenderer implements SceneRenderer {
     const { device, format } = gpu;
     const samples = gpu.software ? 1 : 4;
     const sky = await SkyTables.create(device);
-    const frame = new FrameBindings(device, sky, createNoiseTexture(device), gpu.software);
+    const frame = new FrameBindings(
+      device,
+      sky,
+      createNoiseTexture(device),
+      createStonesTexture(device, gpu.software),
+      gpu.software,
+    );
     const context: PassContext = {
       device,
       frameLayout: frame.layout,
@@ -210,7 +219,7 @@ export class GpuRenderer implements SceneRenderer {
     if (this.world?.tiles === scene.tiles) return this.world;
     this.world?.atlas.destroy();
     const { levels, solved, sizeM } = scene.tiles;
-    const selection = new Selection(Math.max(levels, finestLevel(sizeM)));
+    const selection = new Selection(this.endless ? Math.max(levels, finestLevel(sizeM)) : levels);
     const enter = (level: number, x: number, y: number, usable: boolean): void =>
       selection.tree.setUsable(level, x, y, usable, this.fades && level > solved);
     const atlas = new Atlas(this.gpu.device, enter, this.gpu.software ? SOFTWARE_SLOTS : MAX_SLOTS);

@@ -32,6 +32,8 @@ import rulePlain from "@shaders/wgsl/rule_plain.wgsl?raw";
 import ruleSmooth from "@shaders/wgsl/rule_smooth.wgsl?raw";
 import sheet from "@shaders/wgsl/sheet.wgsl?raw";
 import sky from "@shaders/wgsl/sky.wgsl?raw";
+import stonesPlain from "@shaders/wgsl/stones_plain.wgsl?raw";
+import stonesRich from "@shaders/wgsl/stones_rich.wgsl?raw";
 import synthHash from "@shaders/wgsl/synth_hash.wgsl?raw";
 import synthInterpolate from "@shaders/wgsl/synth_interpolate.wgsl?raw";
 import synthSite from "@shaders/wgsl/synth_site.wgsl?raw";
@@ -64,10 +66,11 @@ const LOOKS: Readonly<Record<Look, string>> = {
 };
 
 const DETAILS: Readonly<Record<Detail, string>> = { rich: detailRich, plain: detailPlain };
+const STONES: Readonly<Record<Detail, string>> = { rich: stonesRich, plain: stonesPlain };
 
 /** The ground in one look. */
 export function terrainSource(look: Look, detail: Detail): string {
-  return join(common, DETAILS[detail], patch, material, LOOKS[look], overlayLines, overlay, terrain);
+  return join(common, DETAILS[detail], patch, material, STONES[detail], LOOKS[look], overlayLines, overlay, terrain);
 }
 
 /** Walls, sea and background. */

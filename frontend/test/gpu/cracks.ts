@@ -11,6 +11,7 @@ import { createNoiseTexture } from "../../src/gpu/noise.ts";
 import { PatchPasses } from "../../src/gpu/patches.ts";
 import type { PassContext } from "../../src/gpu/pipeline.ts";
 import { SkyTables } from "../../src/gpu/sky.ts";
+import { createStonesTexture } from "../../src/gpu/stones.ts";
 import { TakeLightPass } from "../../src/gpu/takelight.ts";
 import { DEPTH_FORMAT } from "../../src/gpu/target.ts";
 import { SunPass } from "../../src/gpu/tilecompute.ts";
@@ -71,7 +72,7 @@ async function makeRig(): Promise<Rig> {
     throw new Error(event.error.message);
   });
   const sky = await SkyTables.create(device);
-  const frame = new FrameBindings(device, sky, createNoiseTexture(device), true);
+  const frame = new FrameBindings(device, sky, createNoiseTexture(device), createStonesTexture(device, true), true);
   const context: PassContext = { device, frameLayout: frame.layout, format: FORMAT, samples: 1, detail: "plain" };
   const usage = GPUTextureUsage.RENDER_ATTACHMENT | GPUTextureUsage.COPY_SRC;
   return {

@@ -13,7 +13,16 @@ import { PITCH, patchIndices } from "../../src/gpu/patches.ts";
 import { QualityControl } from "../../src/gpu/quality.ts";
 import { RibbonBuilder } from "../../src/gpu/ribbons.ts";
 import { samePicture } from "../../src/gpu/scenediff.ts";
+import { STONES_SIZE, stoneTexels } from "../../src/gpu/stones.ts";
 import { FieldView, lookAt, PLAIN_CHANNELS } from "./world.ts";
+
+/** rgba of stones at (0, 0), (17, 300), (255, 511), (400, 33); tests/render/test_picture.py has them too. */
+const STONE_TEXELS = [
+  [84, 138, 123, 103],
+  [25, 158, 125, 115],
+  [255, 120, 114, 138],
+  [83, 254, 166, 119],
+];
 
 describe("layout", () => {
   it("R18: follows the alignment rules of WGSL", () => {
@@ -251,6 +260,24 @@ describe("figures", { timeout: 60_000 }, () => {
     expect(mean / NOISE_SIZE ** 2).toBeCloseTo(127.5, -1);
     expect(seam).toBeLessThan(2.5 * inner);
     expect(Math.abs(levels.at(-1)![0]! - 128)).toBeLessThan(6);
+  });
+
+  it("R64: the stones tile, lean no way on the whole, and are those of the reference", () => {
+    const texels = stoneTexels();
+    expect(texels).toHaveLength(4 * STONES_SIZE ** 2);
+    const at = (row: number, col: number): number[] =>
+      Array.from(texels.subarray(4 * (row * STONES_SIZE + col), 4 * (row * STONES_SIZE + col) + 4), (v) =>
+        Math.round(255 * v),
+      );
+    expect([at(0, 0), at(17, 300), at(255, 511), at(400, 33)]).toEqual(STONE_TEXELS);
+    let [seam, inner, lean] = [0, 0, 0];
+    for (let r = 0; r < STONES_SIZE; r += 1) {
+      seam += Math.abs(at(r, 0)[0]! - at(r, STONES_SIZE - 1)[0]!);
+      inner += Math.abs(at(r, 100)[0]! - at(r, 101)[0]!);
+      for (let c = 0; c < STONES_SIZE; c += 1) lean += texels[4 * (r * STONES_SIZE + c) + 2]! - 0.5;
+    }
+    expect(seam).toBeLessThan(2 * inner);
+    expect(Math.abs(lean / STONES_SIZE ** 2)).toBeLessThan(0.005);
   });
 });
 

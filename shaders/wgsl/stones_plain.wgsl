@@ -1,0 +1,6 @@
+// The functions of stones_rich.wgsl for adapters that draw on the CPU: the ground as it is from afar.
+fn broken(m: Material, s: Site, amount: f32) -> Material { return m; }
+
+fn heaped(m: Material, s: Site, amount: f32) -> Material { return m; }
+
+fn tufted(m: Material, s: Site, stone: vec3f) -> Material { return m; }
