@@ -22,20 +22,19 @@ export class EskPastBar extends SignalElement {
     if (clock === null) return nothing;
     return html`
       <section class="panel bar" aria-label="The terrain as it was">
-        <div class="row">
+        <div class="row head">
           ${icon("clock")}
           <div class="says" role="status">
             <strong>As it was</strong>
-            <span>${this.#what(clock)}</span>
+            <span title=${this.#words(clock)}>${this.#what(clock)}</span>
           </div>
           <button
             class="btn outline"
-            aria-label="Make a copy from here"
             ?disabled=${!session.mayEdit.value || lapse.copying.value}
             title=${session.mayEdit.value ? "A new terrain of your own that begins here" : "This link lets you look, not copy."}
             @click=${() => void lapse.copy()}
           >
-            ${icon("copy")} <span class="long">Make a copy from here</span><span class="short">Copy</span>
+            ${icon("copy")} Make a copy
           </button>
           <button class="btn primary" @click=${() => lapse.leave()}>Back to now</button>
         </div>

@@ -86,9 +86,9 @@ export class EskTerrain extends SignalElement {
         if ((session.doc.doc.value?.strokes.size ?? 0) > 0) setFlag(session.store, "drawn");
       }),
       effect(() => {
-        // The sheet would hide the ground on which the grid is laid.
+        // The sheet would hide the ground on which the grid is laid, or the past.
         const laid = session.stage.value?.input.laying.value ?? null;
-        if (laid !== null && window.matchMedia(NARROW).matches) this.#panel.value = null;
+        if ((laid !== null || session.past.active.value) && window.matchMedia(NARROW).matches) this.#panel.value = null;
       }),
       installTestHook(session),
     ];

@@ -33,8 +33,12 @@ export const pastBarStyles = css`
     flex: none;
     color: var(--esk-accent-text);
   }
+  .head {
+    flex-wrap: wrap;
+  }
+  /* Where there is no room for all in one row, the buttons share a second one. */
   .says {
-    flex: 1;
+    flex: 100 1 170px;
     min-width: 0;
     display: grid;
     line-height: 1.25;
@@ -52,6 +56,9 @@ export const pastBarStyles = css`
   .btn {
     flex: none;
   }
+  .head .btn {
+    flex: 1 0 auto;
+  }
   input[type="range"] {
     flex: 1;
     min-width: 0;
@@ -61,9 +68,6 @@ export const pastBarStyles = css`
     min-width: 48px;
     font-variant-numeric: tabular-nums;
   }
-  .short {
-    display: none;
-  }
   @media (max-width: 720px) {
     :host,
     :host([beside]) {
@@ -72,20 +76,6 @@ export const pastBarStyles = css`
       top: 60px;
       width: auto;
       transform: none;
-    }
-    .long {
-      display: none;
-    }
-    .short {
-      display: inline;
-    }
-  }
-  @media (max-width: 1180px) {
-    :host([beside]) .long {
-      display: none;
-    }
-    :host([beside]) .short {
-      display: inline;
     }
   }
 `;
