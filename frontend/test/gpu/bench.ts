@@ -104,6 +104,8 @@ async function open(shading: "lambert" | "full"): Promise<{ description: string 
     device.createShaderModule = (d) => make({ ...d, code: LAMBERT.replace(d.label ?? "", d.code) });
   }
   shown = { renderer: await GpuRenderer.create(canvas, gpu), canvas, device, tally };
+  // Peers and reference end with the map: so does what is compared with them.
+  shown.renderer.endless = shading === "full";
   return { description: shown.renderer.description };
 }
 
