@@ -29,7 +29,9 @@ def modules() -> dict[str, list[Path]]:
         for detail in ("detailRich", "detailPlain"):
             for look in ("lookNatural", "lookAlpine", "lookDesert", "lookPaper"):
                 for rule in ("ruleLandscape", "ruleSmooth", "rulePlain"):
-                    variant = {"DETAILS[detail]": detail, "LOOKS[look]": look, "RULES[rule]": rule}
+                    stones = detail.replace("detail", "stones")
+                    variant = {"DETAILS[detail]": detail, "STONES[detail]": stones}
+                    variant |= {"LOOKS[look]": look, "RULES[rule]": rule}
                     chosen = joined(parts, **variant)
                     names = [name for place, name in variant.items() if place in parts]
                     found["-".join([chosen[-1].stem, *names])] = chosen
