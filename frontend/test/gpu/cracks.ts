@@ -64,7 +64,7 @@ interface Rig {
   readonly readback: GPUBuffer;
 }
 
-async function makeRig(): Promise<Rig> {
+export async function makeRig(): Promise<Rig> {
   const adapter = await navigator.gpu.requestAdapter();
   if (adapter === null) throw new Error("no adapter");
   const device = await adapter.requestDevice();
@@ -96,7 +96,7 @@ async function makeRig(): Promise<Rig> {
   };
 }
 
-type Kind = "above" | "below" | "map" | "grazing";
+export type Kind = "above" | "below" | "map" | "grazing";
 
 function camera(kind: Kind, next: () => number, view: FieldView): CameraState {
   const x = 1000 + next() * 2096;
@@ -128,7 +128,7 @@ function heightOf(view: FieldView, x: number, y: number): number {
   return root.heights[Math.round((y / SIZE) * 64) * 65 + Math.round((x / SIZE) * 64)]!;
 }
 
-function sceneOf(view: TileView, state: CameraState, look: Scene["settings"]["look"]): Scene {
+export function sceneOf(view: TileView, state: CameraState, look: Scene["settings"]["look"]): Scene {
   return {
     camera: state,
     tiles: view,
@@ -164,7 +164,7 @@ interface World {
 }
 
 /** An empty atlas and selection for a store; `fades`: refined tiles enter by and by. */
-function makeWorld(rig: Rig, view: TileView, fades = false): World {
+export function makeWorld(rig: Rig, view: TileView, fades = false): World {
   const selection = new Selection(finestLevel(view.sizeM));
   const atlas = new Atlas(rig.device, (l, x, y, usable) =>
     selection.tree.setUsable(l, x, y, usable, fades && l > view.solved),
@@ -232,7 +232,7 @@ interface Drawn {
   readonly deepest: number;
 }
 
-async function picture(rig: Rig, world: World, scene: Scene, tau: number, how: Pace = {}): Promise<Drawn> {
+export async function picture(rig: Rig, world: World, scene: Scene, tau: number, how: Pace = {}): Promise<Drawn> {
   const cut = await settle(rig, world, scene, tau, how);
   const encoder = rig.device.createCommandEncoder();
   rig.frame.update(scene, { width: WIDTH, height: HEIGHT, low: cut.minHeight, high: cut.maxHeight });
@@ -283,7 +283,7 @@ function count(words: Uint16Array, kind: Kind): { cracks: number; covered: numbe
 }
 
 /** What all pictures of a test show together. */
-class Tally {
+export class Tally {
   private total = { cracks: 0, nans: 0, covered: 0, patches: 0, mixed: 0, deepest: 0 };
   private readonly failures: string[] = [];
 
@@ -445,7 +445,7 @@ export async function walkCrackTest(seed: number, views: number): Promise<CrackR
 }
 
 /** Takes the edge bits and corner weights away from every cut. */
-function spoilRecords(selection: Selection): void {
+export function spoilRecords(selection: Selection): void {
   const select = selection.select.bind(selection);
   selection.select = (...args) => {
     const cut = select(...args);

@@ -17,6 +17,7 @@ import { openGpu } from "../../src/gpu/device.ts";
 import { createMapRenderer, createRenderer } from "../../src/gpu/index.ts";
 import { GpuRenderer } from "../../src/gpu/renderer.ts";
 import { crackTest, deepCrackTest, walkCrackTest } from "./cracks.ts";
+import { layeredCrackTest } from "./layered.ts";
 import { synthesisVectors } from "./synthesis.ts";
 import { alpineField, FieldView, lookAt, mapCamera, PLAIN_CHANNELS } from "./world.ts";
 
@@ -269,5 +270,16 @@ async function morph(shot: Shot, rounds: number): Promise<{ uploads: number; cpu
 }
 
 Object.assign(globalThis, {
-  esker: { morph, load, shoot, picture, circle, crackTest, deepCrackTest, walkCrackTest, synthesisVectors },
+  esker: {
+    morph,
+    load,
+    shoot,
+    picture,
+    circle,
+    crackTest,
+    deepCrackTest,
+    layeredCrackTest,
+    walkCrackTest,
+    synthesisVectors,
+  },
 });
