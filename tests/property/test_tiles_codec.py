@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from esker.tiles import entropy
 from esker.tiles.bounds import sub_error
 from esker.tiles.codec import SAMPLE_LIMIT, CodecError, child_window, pack, predict, reconstruct, unpack
 
@@ -87,19 +88,34 @@ def test_neighbours_predict_equal_edges(seed: int, amplitude: int) -> None:
 def test_round_trip_is_exact(seed: int, parent_size: int, child_size: int, quadrant: int) -> None:
     parent, child = rough(seed, parent_size), rough(seed + 1, child_size)
     prediction = child_window(predict(parent), quadrant & 1, quadrant >> 1)
-    planes, payload = pack(child - prediction)
-    assert np.array_equal(reconstruct(prediction, unpack(planes, payload)), child)
-    planes, payload = pack(child)
-    assert np.array_equal(reconstruct(None, unpack(planes, payload)), child)
+    for base in (prediction, None):
+        residual = child - (0 if base is None else prediction)
+        for lattice in (False, True):
+            coded = pack(residual, lattice)
+            assert coded is not None or lattice
+            assert coded is None or np.array_equal(reconstruct(base, unpack(*coded, lattice)), child)
 
 
-@pytest.mark.parametrize(("largest", "planes"), [(0, 0), (127, 1), (128, 2), (32_767, 2), (32_768, 3), (1 << 23, 4)])
-def test_planes_are_as_few_as_the_largest_residual_needs(largest: int, planes: int) -> None:
-    residual = np.zeros((65, 65), dtype=np.int32)
-    residual[7, 9] = largest
-    count, payload = pack(residual)
-    assert count == planes
-    assert np.array_equal(unpack(count, payload), residual)
+@given(st.integers(0, 2**32), st.sampled_from([1, 3, 200, 2**17 - 1]), st.integers(0, 14), st.booleans())
+@settings(max_examples=20, deadline=None)
+def test_residuals_are_coded_without_the_power_of_two_that_they_share(
+    seed: int, amplitude: int, shift: int, lattice: bool
+) -> None:
+    residual = rough(seed, amplitude) << shift
+    residual[7, 9] = 1 << shift
+    coded, whole = pack(residual, lattice), pack(residual >> shift, lattice)
+    assert coded is not None
+    assert whole is not None
+    assert coded == (shift, whole[1])
+    assert np.array_equal(unpack(*coded, lattice), residual)
+
+
+def test_a_lattice_that_expects_too_much_is_not_coded() -> None:
+    """Neighbours near 2^31 of both signs: what is left may have more than 32 bits."""
+    wild = np.where(np.indices((65, 65)).sum(axis=0) % 2, 2**32 - 1, 1 - 2**32)
+    assert entropy.encode(wild) is not None
+    assert entropy.encode(wild, True) is None
+    assert entropy.encode(wild + 2**32) is None
 
 
 def test_smooth_ground_is_small_and_a_plane_is_nearly_free() -> None:
@@ -107,14 +123,47 @@ def test_smooth_ground_is_small_and_a_plane_is_nearly_free() -> None:
     parent = (40 * x + 25 * y).astype(np.int32)
     prediction = child_window(predict(parent), 0, 0)
     child = (40 * x + 25 * y).astype(np.int32)  # the same slope in quanta of the child
-    assert len(pack(child - prediction)[1]) < 40
+    assert pack(child - prediction) == (0, b"")
+    lone = np.zeros((65, 65), dtype=np.int32)
+    lone[30, 40] = 8
+    coded = pack(lone)
+    assert coded is not None
+    assert len(coded[1]) < 40
 
 
-@given(st.integers(1, 4), st.binary(max_size=300))
+def test_noise_takes_what_it_must_and_little_more() -> None:
+    """This noise has an entropy of 1.5 bits; what is rare costs more, and is learnt for each size of neighbours."""
+    rng = np.random.default_rng(3)
+    noise = rng.choice([-1, 0, 0, 1], size=(65, 65))
+    coded = pack(noise)
+    assert coded is not None
+    assert 1.5 * 65 * 65 / 8 < len(coded[1]) < 1.06 * 1.5 * 65 * 65 / 8
+    both = noise.copy()
+    both[32:] = rng.integers(-500, 500, (33, 65))
+    apart = [pack(part) for part in (np.where(np.indices((65, 65))[0] < 32, both, 0), both)]
+    assert apart[0] is not None
+    assert apart[1] is not None
+    assert len(apart[1][1]) < len(apart[0][1]) + 1.1 * 10 * 33 * 65 / 8
+
+
+@given(st.binary(min_size=1, max_size=300), st.integers(0, 15), st.booleans())
 @settings(max_examples=150, deadline=None)
-def test_garbage_payloads_are_refused(planes: int, payload: bytes) -> None:
-    with pytest.raises(CodecError):
-        unpack(planes, payload)
+def test_garbage_payloads_are_numbers_of_32_bits_or_refused(payload: bytes, shift: int, lattice: bool) -> None:
+    try:
+        residual = unpack(shift, payload, lattice)
+    except CodecError:
+        return
+    assert residual.shape == (65, 65)
+    assert np.abs(residual).max() < entropy.LIMIT
+
+
+@given(st.integers(0, 2**32), st.sampled_from([1, 30, 9000, 2**31]), st.booleans())
+@settings(max_examples=20, deadline=None)
+def test_bytes_that_follow_a_payload_are_refused(seed: int, amplitude: int, lattice: bool) -> None:
+    coded = pack(np.random.default_rng(seed).integers(-amplitude, amplitude, (65, 65)), lattice)
+    if coded is not None:
+        with pytest.raises(CodecError, match="left over"):
+            unpack(coded[0], coded[1] + bytes(8), lattice)
 
 
 def test_prediction_beyond_the_limit_is_refused() -> None:

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.vectors import make_tiles
 
-from esker.contract import CHANNEL_LEVELS_BELOW, MAX_LEVEL, MAX_REFINED_LEVEL, Channel, FrameKind, Predictor
+from esker.contract import CHANNEL_LEVELS_BELOW, MAX_LEVEL, MAX_REFINED_LEVEL, Channel, Filter, FrameKind, Predictor
 from esker.tiles.decoder import FrameDecoder
 from esker.tiles.frame import GROUND, FrameError, FrameHead, read_frame, write_frame
 
@@ -34,7 +34,7 @@ def test_committed_frames_decode_to_what_they_say(session: dict[str, Any]) -> No
 
 
 def test_regenerating_the_vectors_changes_no_sample() -> None:
-    """Deflate streams may differ between zlib builds, so frames are compared by what they decode to."""
+    """Frames are compared by what they decode to: predictors are chosen by floating-point numbers."""
     new = make_tiles.build()
     for mine, theirs in zip(new["sessions"], VECTORS["sessions"], strict=True):
         assert [s["decoded"] for s in mine["steps"]] == [s["decoded"] for s in theirs["steps"]]
@@ -49,6 +49,17 @@ def test_the_vectors_use_every_predictor_where_it_matters() -> None:
     assert set().union(*kinds["interrupted"]) == set(Predictor)
     assert kinds["confirmed"][-2:] == [{Predictor.PREVIOUS}, {Predictor.PREVIOUS}]
     assert kinds["confirmed"][3] == set()  # the LEVEL frame that confirms and carries nothing
+
+
+def test_the_vectors_use_every_filter_and_coarse_steps() -> None:
+    tiles = [
+        tile
+        for session in VECTORS["sessions"]
+        for step in session["steps"]
+        for tile in read_frame(base64.b64decode(step["frame"]))[2]
+    ]
+    assert {tile.filter for tile in tiles} == set(Filter)
+    assert {0, 1} < {tile.shift for tile in tiles}
 
 
 def test_the_vectors_have_every_channel_and_the_finest_default_level_but_one() -> None:

@@ -35,8 +35,9 @@ def test_samples_are_steadied_and_rounded_as_in_numpy(scale: float) -> None:
     quantum = np.float32(1 / grid.quantum(LEVEL, SIZE_M))
     kept = quantise(want + rng.normal(scale=2 / quantum, size=want.shape).astype(np.float32), LEVEL, SIZE_M)
     found = np.empty_like(kept)
-    loops.quantised(want, kept, quantum, np.float32(1.0), np.float32(SAMPLE_LIMIT), found)
-    np.testing.assert_array_equal(found, quantise(want, LEVEL, SIZE_M, kept, 1.0))
+    for step in (1, 8):
+        loops.quantised(want, kept, quantum, step, np.float32(SAMPLE_LIMIT), found)
+        np.testing.assert_array_equal(found, quantise(want, LEVEL, SIZE_M, kept, step))
 
 
 @pytest.mark.parametrize("cells", [4, 64])

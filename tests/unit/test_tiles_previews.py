@@ -14,11 +14,16 @@ from esker.contract import View
 from esker.tiles.codec import SAMPLE_LIMIT, follow, predict
 from esker.tiles.delivery import ClientTiles, TileServer
 from esker.tiles.frame import read_frame
-from esker.tiles.pyramid import COARSE_DEAD_ZONE, DEAD_ZONE, Level, Pyramid, follow_parents, moved_along
+from esker.tiles.pyramid import PREVIEW_STEP, Level, Pyramid, follow_parents, moved_along
 
 SIZE_M = 1024.0
 LEVELS = 3
 Heights = NDArray[np.float32]
+
+
+def step(index: int) -> int:
+    """Quanta in which a preview changes a level."""
+    return max(1, PREVIEW_STEP >> (LEVELS - index))
 
 
 def ground(level: int, height: float, wrong: float = 0.0) -> Heights:
@@ -61,7 +66,7 @@ def test_a_preview_that_is_not_shown_changes_nothing_until_the_finest_brings_its
     for index in range(LEVELS + 1):
         quantum = grid.quantum(index, SIZE_M)
         off = np.abs(level(settled, index).samples * quantum - ground(index, 130.0)).max() / quantum
-        assert off <= (DEAD_ZONE if index == LEVELS else COARSE_DEAD_ZONE) + 0.05, "injected, not as solved there"
+        assert off <= step(index) + 0.05, "injected, not as solved there"
         assert level(settled, index).clock == 2
 
 
@@ -87,21 +92,24 @@ def test_a_finest_preview_keeps_what_a_newer_coarsest_one_has_moved(settled: Pyr
     off = np.abs(finest.samples * quantum - ground(LEVELS, 160.0)).max()
     assert off < 0.02 * 40, "40 m, as smooth as level 0 can say them"
     for index in range(1, LEVELS):
-        step = 1 << (LEVELS - index)
-        injected = finest.samples[::step, ::step] * quantum
-        assert (
-            np.abs(level(settled, index).samples * grid.quantum(index, SIZE_M) - injected).max() < 2.6 * quantum * step
-        )
+        apart = 1 << (LEVELS - index)
+        injected = finest.samples[::apart, ::apart] * quantum
+        off = np.abs(level(settled, index).samples * grid.quantum(index, SIZE_M) - injected).max()
+        assert off < (2 * PREVIEW_STEP + 0.6) * quantum
     settled.put(4, LEVELS, ground(LEVELS, 160.0), False)
     assert level(settled, 0) is not coarse or level(settled, 0).clock == 4
-    assert np.abs(level(settled, LEVELS).samples * quantum - ground(LEVELS, 160.0)).max() <= (DEAD_ZONE + 0.1) * quantum
+    assert (
+        np.abs(level(settled, LEVELS).samples * quantum - ground(LEVELS, 160.0)).max() <= (PREVIEW_STEP + 0.1) * quantum
+    )
 
 
 def test_a_finest_preview_without_a_coarsest_one_of_its_own_is_shown_as_it_is(settled: Pyramid) -> None:
     settled.put(3, 0, ground(0, 150.0), False)
     settled.put(2, LEVELS, ground(LEVELS, 120.0), False)
     quantum = grid.quantum(LEVELS, SIZE_M)
-    assert np.abs(level(settled, LEVELS).samples * quantum - ground(LEVELS, 120.0)).max() <= (DEAD_ZONE + 0.1) * quantum
+    assert (
+        np.abs(level(settled, LEVELS).samples * quantum - ground(LEVELS, 120.0)).max() <= (PREVIEW_STEP + 0.1) * quantum
+    )
     assert level(settled, 0).clock == 2
 
 
@@ -182,8 +190,7 @@ def test_errors_of_previews_are_bounded_however_long_one_draws(settled: Pyramid)
     for index in range(1, LEVELS + 1):
         quantum = grid.quantum(index, SIZE_M)
         want = ground(index, 100.0 + 3.1 * 19) / quantum
-        bound = DEAD_ZONE if index == LEVELS else COARSE_DEAD_ZONE
-        assert np.abs(level(settled, index).samples - want).max() <= bound + 0.05
+        assert np.abs(level(settled, index).samples - want).max() <= step(index) + 0.05
     solve(settled, 20, 120.0, show=False, settle=True)
     for index in range(LEVELS + 1):
         want = np.rint(ground(index, 120.0) / np.float32(grid.quantum(index, SIZE_M)))

@@ -7,10 +7,11 @@ import pytest
 from numpy.typing import NDArray
 
 from esker import grid
-from esker.contract import Channel
+from esker.contract import Channel, Predictor
 from esker.grid import TileKey
 from esker.tiles.codec import SAMPLE_LIMIT
 from esker.tiles.delivery import TileServer
+from esker.tiles.frame import TileRecord
 from esker.tiles.plans import EncodedTiles
 from esker.tiles.pyramid import Pyramid, quantise
 
@@ -66,24 +67,24 @@ def test_wrong_levels_and_shapes_are_refused() -> None:
         pyramid.put(1, 0, heights(1), False)
 
 
-def test_a_preview_keeps_samples_that_moved_less_than_two_quanta_and_settling_does_not() -> None:
+def test_a_preview_moves_samples_in_steps_and_settling_to_where_they_belong() -> None:
     q = np.float32(grid.quantum(0, SIZE_M))
     pyramid = Pyramid(SIZE_M, 0)
     base = np.full((65, 65), 10 * q, dtype=np.float32)
     pyramid.put(1, 0, base, False)
     moved = base.copy()
-    moved[3, 3] += np.float32(1.9) * q
+    moved[3, 3] += np.float32(7.9) * q
     assert pyramid.put(2, 0, moved, False) == 0
-    moved[4, 4] += np.float32(2.1) * q
+    moved[4, 4] += np.float32(8.1) * q
+    moved[5, 5] -= np.float32(21) * q
     assert pyramid.put(3, 0, moved, False) == 1
     level = pyramid.level(0)
     assert level is not None
-    assert level.samples[3, 3] == 10
-    assert level.samples[4, 4] == 12
+    assert [int(level.samples[i, i]) for i in (3, 4, 5)] == [10, 18, 10 - 24]
     assert pyramid.put(4, 0, moved, True) == 1
     level = pyramid.level(0)
     assert level is not None
-    assert level.samples[3, 3] == 12
+    assert [int(level.samples[i, i]) for i in (3, 4, 5)] == [18, 18, -11]
     assert np.array_equal(level.samples, quantise(moved, 0, SIZE_M))
 
 
@@ -191,7 +192,7 @@ def test_levels_that_were_never_put_are_not_valid() -> None:
 def test_the_cache_of_coded_tiles_is_bounded_and_forgets_the_oldest() -> None:
     cache = EncodedTiles(limit=1000)
     for i in range(30):
-        cache.put((Channel.HEIGHT, ROOT, i, 0, 0, 0), bytes(100))
+        cache.put((Channel.HEIGHT, ROOT, i, 0, 0, 0), TileRecord(0, 0, Predictor.ZERO, 0, i, 0, bytes(100)))
         assert cache.get((Channel.HEIGHT, ROOT, 0, 0, 0, 0)) is not None  # used again and again, so it stays
     assert cache.bytes <= 1000
     assert cache.get((Channel.HEIGHT, ROOT, 1, 0, 0, 0)) is None

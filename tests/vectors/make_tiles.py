@@ -16,13 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from esker import grid
-from esker.contract import FRAME_HEADER, TILE_HEADER, Channel, FrameKind, Predictor, View
+from esker.contract import FRAME_HEADER, Channel, Filter, FrameKind, Predictor, View
 from esker.grid import TileKey
 from esker.tiles.bounds import block_reduce, parent_distance
 from esker.tiles.codec import SAMPLE_LIMIT, pack, predict
 from esker.tiles.decoder import DecodedFrame, FrameDecoder
 from esker.tiles.delivery import ClientTiles, TileServer
-from esker.tiles.frame import GROUND, FrameHead, TileRecord, ratio, write_frame, write_tile
+from esker.tiles.filters import pack_smallest
+from esker.tiles.frame import GROUND, FrameHead, TileRecord, ratio, write_frame
 
 PATH = Path(__file__).with_name("tiles.json")
 SIZE_M = 1000.0
@@ -126,11 +127,11 @@ def extreme() -> list[bytes]:
     frames = []
     for level, samples, base in ((0, parent, None), (1, child, parent)):
         residual = samples if base is None else samples - predict(base)[64:, 64:]
-        planes, payload = pack(residual)
+        made, shift, payload = pack_smallest(residual, tuple(Filter))
         kind = Predictor.ZERO if base is None else Predictor.PARENT
         at = 0 if base is None else 1
-        record = TileRecord(at, at, kind, planes, level + 1, 0 if base is None else 1, payload)
-        frames.append(write_frame(FrameHead(FrameKind.FILL, level, 7, False), [], [write_tile(record)]))
+        record = TileRecord(at, at, kind, shift, level + 1, 0 if base is None else 1, payload, made)
+        frames.append(write_frame(FrameHead(FrameKind.FILL, level, 7, False), [], [record]))
     return frames
 
 
@@ -281,10 +282,9 @@ def based() -> list[bytes]:
 
 def malformed() -> list[dict[str, str]]:
     """Frames that every decoder must refuse, each applied to the state that ``session``'s first two frames leave."""
-    first, second = session()[:2]
-    head, tile = FRAME_HEADER.itemsize, FRAME_HEADER.itemsize + TILE_HEADER.itemsize
+    first = session()[0]
+    head = FRAME_HEADER.itemsize
     offset = {name: FRAME_HEADER.fields[name][1] for name in FRAME_HEADER.names or ()}  # type: ignore[index]
-    inner = {name: head + TILE_HEADER.fields[name][1] for name in TILE_HEADER.names or ()}  # type: ignore[index]
 
     def patched(data: bytes, at: int, value: bytes) -> bytes:
         return data[:at] + value + data[at + len(value) :]
@@ -293,11 +293,19 @@ def malformed() -> list[dict[str, str]]:
         level: int, records: list[TileRecord], drops: list[tuple[int, int]], channel: Channel = Channel.HEIGHT
     ) -> bytes:
         head = FrameHead(FrameKind.LEVEL, level, 1, False, channel)
-        return write_frame(head, drops, [write_tile(r) for r in records])
+        return write_frame(head, drops, records)
 
-    planes, payload = pack(np.zeros((65, 65), dtype=np.int32))
-    flat = TileRecord(0, 0, Predictor.ZERO, planes, 9, 0, payload)
-    wide = pack(np.full((65, 65), 1 << 29, dtype=np.int32))
+    wave = np.rint(40 * np.sin(np.arange(65 * 65) / 9)).astype(np.int32).reshape(65, 65)
+    coded, wide = pack(wave), pack(np.full((65, 65), (1 << 29) + 1, dtype=np.int32))
+    assert coded
+    assert wide
+
+    def one(predictor: Predictor, base: int = 0, payload: bytes = coded[1], x: int = 0, shift: int = 0) -> TileRecord:
+        return TileRecord(x, 0, predictor, shift, 9, base, payload)
+
+    flat = one(Predictor.ZERO, payload=b"")
+    last = retold(0, [flat], [])
+    coding = len(last) - 4
     cases = {
         "empty": b"",
         "header cut": first[: head - 1],
@@ -306,43 +314,34 @@ def malformed() -> list[dict[str, str]]:
         "unknown kind": patched(first, offset["kind"], b"\x09"),
         "level too fine": patched(first, offset["level"], b"\x0b"),
         "channel level too fine": retold(5, [], [], Channel.AMPLITUDE),
-        "channel predicted from the heights": retold(
-            1, [TileRecord(0, 0, Predictor.PARENT, 0, 9, 1, b"")], [], Channel.ROUGHNESS
-        ),
+        "channel predicted from the heights": retold(1, [one(Predictor.PARENT, 1, b"")], [], Channel.ROUGHNESS),
         "unknown channel": patched(first, offset["channel"], b"\x09"),
         "more tiles than bytes": patched(first, offset["tiles"], b"\xff\xff"),
         "more drops than bytes": patched(first, offset["drops"], b"\xff\xff"),
-        "tile header cut": first[: tile - 3],
+        "tile numbers cut": last[:-2],
         "payload cut": first[:-5],
         "bytes after the end": first + b"\0",
-        "tile outside": patched(first, inner["x"], b"\x01\x00"),
+        "tile outside": retold(0, [one(Predictor.ZERO, x=1)], []),
         "drop outside": retold(1, [], [(2, 0)]),
-        "unknown predictor": patched(first, inner["predictor"], b"\x07"),
-        "unknown filter": patched(first, inner["filter"], b"\x03"),
-        "no planes": patched(first, inner["planes"], b"\x00"),
-        "five planes": patched(first, inner["planes"], b"\x05"),
-        "fewer planes than sent": patched(first, inner["planes"], b"\x01"),
-        "payload length beyond any tile": patched(first, inner["bytes"], b"\xff\xff\xff\x7f"),
-        "deflate garbage": retold(0, [TileRecord(0, 0, Predictor.ZERO, 1, 9, 0, b"\xff" * 40)], []),
-        "deflate cut": retold(0, [TileRecord(0, 0, Predictor.ZERO, 1, 9, 0, payload[:-2])], []),
-        "deflate bomb": retold(0, [TileRecord(0, 0, Predictor.ZERO, 1, 9, 0, _bomb())], []),
-        "parent not held": retold(3, [TileRecord(0, 0, Predictor.PARENT, planes, 9, 1, payload)], []),
-        "wrong parent version": patched(second, inner["base_version"], b"\x63\x00\x00\x00"),
-        "previous version not held": retold(1, [TileRecord(0, 0, Predictor.PREVIOUS, planes, 9, 77, payload)], []),
-        "previous of a tile not held": retold(2, [TileRecord(0, 0, Predictor.PREVIOUS, planes, 9, 1, payload)], []),
-        "root predicted from a parent": patched(first, inner["predictor"], bytes([Predictor.PARENT])),
+        "shift too large": patched(last, coding, b"\x80\x02\x12\x00\x00"),
+        "number too long": patched(last, coding, b"\x80" * 6),
+        "version below zero": patched(last, coding + 1, b"\x01"),
+        "version beyond 32 bits": patched(last, coding + 1, b"\xff\xff\xff\xff\x7f\x00\x00"),
+        "payload length beyond any tile": patched(last, coding + 3, b"\x81\x80\x10"),
+        "payload longer than the frame": patched(last, coding + 3, b"\x01"),
+        "bytes left over": retold(0, [one(Predictor.ZERO, payload=coded[1] + bytes(8))], []),
+        "numbers beyond 32 bits": retold(0, [one(Predictor.ZERO, payload=b"\x00" * 3000)], []),
+        "shifted beyond 32 bits": retold(0, [one(Predictor.ZERO, payload=wide[1], shift=15)], []),
+        "parent not held": retold(3, [one(Predictor.PARENT, 1)], []),
+        "wrong parent version": retold(1, [one(Predictor.PARENT, 99)], []),
+        "previous version not held": retold(1, [one(Predictor.PREVIOUS, 77)], []),
+        "previous of a tile not held": retold(2, [one(Predictor.PREVIOUS, 1)], []),
+        "root predicted from a parent": retold(0, [one(Predictor.PARENT, 1)], []),
         "tile twice": retold(0, [flat, flat], []),
         "tile sent and dropped": retold(0, [flat], [(0, 0)]),
-        "sample out of range": retold(0, [TileRecord(0, 0, Predictor.ZERO, wide[0], 9, 0, wide[1])], []),
+        "sample out of range": retold(0, [one(Predictor.ZERO, payload=wide[1])], []),
     }
     return [{"name": name, "frame": base64.b64encode(data).decode()} for name, data in cases.items()]
-
-
-def _bomb() -> bytes:
-    import zlib
-
-    deflate = zlib.compressobj(9, zlib.DEFLATED, -15)
-    return deflate.compress(bytes(4_000_000)) + deflate.flush()
 
 
 def told(decoder: FrameDecoder, frame: bytes) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from esker import contract as c
 from tests.vectors.op_cases import NEW, PAINTED, SNOW, VALLEY
 from tests.vectors.scenes import Json, op
 
-HELLO: Json = {"type": "hello", "protocol": 4, "terrain": "t1", "secret": "s", "client": "c1"}
+HELLO: Json = {"type": "hello", "protocol": 5, "terrain": "t1", "secret": "s", "client": "c1"}
 VIEW: Json = {"type": "view", "eye": [0, 0, 100], "target": [1, 1, 0]}
 PRESENCE: Json = {"type": "presence", "cursor": [1, 2, 3.5], "tool": "mountain", "stroke": "c1-1"}
 

@@ -6,8 +6,8 @@ from typing import Final
 
 # --- protocol ---------------------------------------------------------------------------------------------------
 
-PROTOCOL_VERSION: Final = 4
-SUBPROTOCOL: Final = "esker.4"
+PROTOCOL_VERSION: Final = 5
+SUBPROTOCOL: Final = "esker.5"
 
 # --- grid (DESIGN 3) --------------------------------------------------------------------------------------------
 

@@ -64,6 +64,7 @@ class ChannelPyramid(Pyramid):
     """The newest levels of one channel; samples are ``(value - base) * quanta``, rounded half to even."""
 
     ratio: ClassVar[int] = 1
+    preview_step: ClassVar[int] = 2
 
     def __init__(self, channel: Channel, levels: int) -> None:
         super().__init__(UNIT_SIZE_M, channel_levels(levels))

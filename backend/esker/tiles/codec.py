@@ -1,4 +1,4 @@
-"""Tile payloads: integer prediction from the parent, zig-zag residuals, byte planes, raw deflate (DESIGN 6).
+"""Tile payloads: integer prediction from the parent, residuals coded by ``entropy`` (DESIGN 6).
 
 Everything is exact integer arithmetic, mirrored by ``frontend/src/core/predict.ts`` and ``net/decode.ts``; both read
 ``tests/vectors/tiles.json``. Arrays are ``[row, col]``, row 0 south; a tile is 65x65 int32 in quanta of its level.
@@ -6,28 +6,21 @@ Everything is exact integer arithmetic, mirrored by ``frontend/src/core/predict.
 
 from __future__ import annotations
 
-import zlib
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from esker.contract import TILE_CELLS, TILE_SAMPLES
+from esker.contract import TILE_CELLS, TILE_MAX_SHIFT, TILE_SAMPLES
+from esker.tiles import entropy
 
 Ints = NDArray[np.int32]
 Wide = NDArray[np.signedinteger]
 
 SAMPLE_LIMIT: Final = 1 << 28
 """Samples are within +-2^28 quanta, so that a residual always fits 32 bits (see ``predict``)."""
-TILE_AREA: Final = TILE_SAMPLES * TILE_SAMPLES
-MAX_PAYLOAD: Final = 4 * TILE_AREA + 1024
-"""Above this a payload is malformed: deflate never grows 16,900 bytes by more than a few stored-block headers."""
-
 _NARROW_LIMIT: Final = (1 << 31) // (26 * 26) - 1
 """Largest |parent sample| for which the two-dimensional sums below fit in int32 (weights add up to at most 26)."""
-_DEFLATE_LEVEL: Final = 6
-"""With matches of distance one only (Z_RLE): 3 % smaller than the strategy for filtered data on solved terrains, as
-longer matches of noise cost more than they save, and three times as fast."""
 
 
 class CodecError(ValueError):
@@ -96,56 +89,28 @@ def cost(residual: Wide) -> float:
     return float(np.log2(np.abs(residual).astype(np.float32) + 1).sum())
 
 
-def zigzag(residual: Wide) -> NDArray[np.uint32]:
-    """0, -1, 1, -2, 2 ... -> 0, 1, 2, 3, 4 ...; residuals must fit in int32."""
-    r = residual.astype(np.int32)
-    return ((r << 1) ^ (r >> 31)).view(np.uint32)
+def pack(residual: Wide, lattice: bool = False) -> tuple[int, bytes] | None:
+    """One tile's residual, (65, 65) with 32 bits, as ``(shift, payload)``; None where ``lattice`` makes it too large.
 
-
-def unzigzag(codes: NDArray[np.uint32]) -> Ints:
-    """Inverse of ``zigzag``."""
-    return ((codes >> 1) ^ (0 - (codes & 1))).view(np.int32)
-
-
-def pack(residual: Wide) -> tuple[int, bytes]:
-    """One tile's residual, shape (65, 65), as ``(planes, payload)``.
-
-    The zig-zag codes are split into ``planes`` (1..4) byte planes, lowest first, each 4,225 bytes in row-major order,
-    and deflated raw (RFC 1951, no zlib header). A residual of zeros has no planes and no payload.
+    What is coded is the residual divided by 2^shift, the greatest power of two that all samples are multiples of. A
+    residual of zeros has no payload. ``lattice``: see ``entropy.encode``.
     """
-    if not residual.any():
+    bits = int(np.bitwise_or.reduce(residual, axis=None))
+    if not bits:
         return 0, b""
-    codes = np.ascontiguousarray(zigzag(residual)).reshape(-1)
-    planes = max(1, (int(codes.max()).bit_length() + 7) // 8)
-    raw = codes.astype("<u4", copy=False).view(np.uint8).reshape(TILE_AREA, 4)[:, :planes].T.tobytes()
-    deflate = zlib.compressobj(_DEFLATE_LEVEL, zlib.DEFLATED, -15, 8, zlib.Z_RLE)
-    return planes, deflate.compress(raw) + deflate.flush()
+    shift = min((bits & -bits).bit_length() - 1, TILE_MAX_SHIFT)
+    payload = entropy.encode(residual >> shift, lattice)
+    return None if payload is None else (shift, payload)
 
 
-def unpack(planes: int, payload: bytes | memoryview) -> Ints:
-    """Inverse of ``pack``: the residual, (65, 65) int32. Never inflates more than ``planes`` planes plus one byte.
-
-    Raises CodecError for a wrong number of planes, an oversize payload, a broken stream or a wrong length.
-    """
-    if not 0 <= planes <= 4:
-        raise CodecError(f"a tile has 0 to 4 byte planes, not {planes}")
-    if planes == 0:
-        if len(payload):
-            raise CodecError("a tile without planes has no payload")
-        return np.zeros((TILE_SAMPLES, TILE_SAMPLES), dtype=np.int32)
-    if len(payload) > MAX_PAYLOAD:
-        raise CodecError(f"a tile payload has at most {MAX_PAYLOAD} bytes, not {len(payload)}")
-    want = planes * TILE_AREA
-    inflate = zlib.decompressobj(-15)
-    try:
-        raw = inflate.decompress(payload, want + 1)
-    except zlib.error as e:
-        raise CodecError(f"a tile payload does not inflate: {e}") from e
-    if len(raw) != want or not inflate.eof:
-        raise CodecError(f"a tile payload inflates to {len(raw)} bytes, not {want}")
-    codes = np.zeros((TILE_AREA, 4), dtype=np.uint8)
-    codes[:, :planes] = np.frombuffer(raw, dtype=np.uint8).reshape(planes, TILE_AREA).T
-    return unzigzag(codes.reshape(-1).view("<u4").astype(np.uint32, copy=False)).reshape(TILE_SAMPLES, TILE_SAMPLES)
+def unpack(shift: int, payload: bytes | memoryview, lattice: bool = False) -> Wide:
+    """Inverse of ``pack``: the residual, (65, 65) int64. Raises CodecError for what no encoder writes."""
+    if len(payload) == 0:
+        return np.zeros((TILE_SAMPLES, TILE_SAMPLES), dtype=np.int64)
+    coded = entropy.decode(payload, lattice)
+    if coded is None or max(int(coded.max()), -int(coded.min())) >= entropy.LIMIT >> shift:
+        raise CodecError("a tile payload has bytes left over or numbers that are too large")
+    return coded << shift
 
 
 def reconstruct(prediction: Wide | None, residual: Wide) -> Ints:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from esker.contract import Channel, FrameKind, Predictor
+from esker.contract import Channel, Filter, FrameKind, Predictor
 from esker.grid import TileKey
 from esker.tiles.codec import CodecError, Ints, Wide, child_window, follow, predict, reconstruct, unpack
 from esker.tiles.filters import undo
@@ -90,7 +90,7 @@ def _parent(held: Held, key: TileKey) -> Ints | None:
 
 
 def _samples(held: Held, head: FrameHead, key: TileKey, record: TileRecord) -> Ints:
-    residual = undo(record.filter, unpack(record.planes, record.payload))
+    residual = undo(record.filter, unpack(record.shift, record.payload, record.filter == Filter.LATTICE))
     if record.predictor == Predictor.ZERO:
         samples = reconstruct(None, residual)
     elif record.predictor in (Predictor.PREVIOUS, Predictor.HELD):

@@ -1,6 +1,6 @@
-"""Binary frames (DESIGN 6): layout of the contract's FRAME_HEADER, TILE_DROP, TILE_HEADER, written and read.
+"""Binary frames (DESIGN 6): layout of the contract's FRAME_HEADER and TILE_DROP and of its tiles, written and read.
 
-A frame is the header, then the drops, then for each tile its header and payload; nothing follows.
+A frame is the header, then the drops, then for each tile a few short numbers and its payload; nothing follows.
 """
 
 from __future__ import annotations
@@ -20,13 +20,15 @@ from esker.contract import (
     MAX_REFINED_LEVEL,
     PROTOCOL_VERSION,
     TILE_DROP,
-    TILE_HEADER,
+    TILE_FILTER_BITS,
+    TILE_MAX_SHIFT,
+    TILE_PREDICTOR_BITS,
     Channel,
     Filter,
     FrameKind,
     Predictor,
 )
-from esker.tiles.codec import MAX_PAYLOAD
+from esker.tiles.entropy import MAX_BYTES
 
 
 class FrameError(ValueError):
@@ -60,43 +62,100 @@ def finest_level(channel: Channel) -> int:
 
 @dataclass(frozen=True)
 class TileRecord:
-    """One coded tile, with the header's fields by name.
-
-    ``base_version``: of the parent for ``Predictor.PARENT``, of the same tile as held for ``PREVIOUS``, 0 for ``ZERO``.
-    """
+    """One coded tile. ``base_version``: of the parent for ``Predictor.PARENT``, of the same tile as held for
+    ``PREVIOUS`` and ``HELD``, 0 for ``ZERO``; versions have 32 bits. ``shift``: see ``codec.pack``."""
 
     x: int
     y: int
     predictor: Predictor
-    planes: int
+    shift: int
     version: int
     base_version: int
     payload: bytes | memoryview
     filter: Filter = Filter.NONE
 
 
-def write_tile(tile: TileRecord) -> bytes:
-    """Tile header and payload."""
-    head = np.zeros((), dtype=TILE_HEADER)
-    head["x"], head["y"], head["predictor"], head["planes"] = tile.x, tile.y, tile.predictor, tile.planes
-    head["version"], head["base_version"], head["bytes"] = tile.version, tile.base_version, len(tile.payload)
-    head["filter"] = tile.filter
-    return head.tobytes() + bytes(tile.payload)
-
-
-def write_frame(head: FrameHead, drops: Sequence[tuple[int, int]], tiles: Sequence[bytes]) -> bytes:
-    """A whole frame. ``drops``: (x, y); ``tiles``: results of ``write_tile``."""
+def write_frame(head: FrameHead, drops: Sequence[tuple[int, int]], tiles: Sequence[TileRecord]) -> bytes:
+    """A whole frame. ``drops``: (x, y)."""
     start = np.zeros((), dtype=FRAME_HEADER)
     start["magic"], start["protocol"], start["kind"] = FRAME_MAGIC, PROTOCOL_VERSION, head.kind
     start["level"], start["channel"], start["clock"] = head.level, head.channel, head.clock & 0xFFFFFFFF
     start["flags"] = FRAME_SETTLED if head.settled else 0
     start["tiles"], start["drops"] = len(tiles), len(drops)
-    gone = np.array(list(drops), dtype=TILE_DROP)
-    return b"".join([start.tobytes(), gone.tobytes(), *tiles])
+    out = bytearray(start.tobytes() + np.array(list(drops), dtype=TILE_DROP).tobytes())
+    version = base = 0
+    for tile in tiles:
+        coding = tile.predictor | tile.filter << TILE_PREDICTOR_BITS
+        coding |= tile.shift << (TILE_PREDICTOR_BITS + TILE_FILTER_BITS)
+        for number in (tile.x, tile.y, coding, _folded(tile.version - version), _folded(tile.base_version - base)):
+            _write_number(out, number)
+        _write_number(out, len(tile.payload))
+        out += tile.payload
+        version, base = tile.version, tile.base_version
+    return bytes(out)
+
+
+def _folded(number: int) -> int:
+    """0, -1, 1, -2, 2 ... -> 0, 1, 2, 3, 4 ..."""
+    return 2 * number if number >= 0 else -2 * number - 1
+
+
+def _write_number(out: bytearray, number: int) -> None:
+    """LEB128: seven bits a byte, the lowest first, the highest bit set where more follow."""
+    while number > 127:
+        out.append(number & 127 | 128)
+        number >>= 7
+    out.append(number)
+
+
+class _Reader:
+    """What is left of a frame. ``version``, ``base``: those of the tile before."""
+
+    def __init__(self, view: memoryview) -> None:
+        self.view, self.at, self.version, self.base = view, 0, 0, 0
+
+    def number(self) -> int:
+        """The next number; raises FrameError beyond 35 bits or the end."""
+        value = 0
+        for shift in range(0, 35, 7):
+            if self.at >= len(self.view):
+                break
+            byte = self.view[self.at]
+            self.at += 1
+            value |= (byte & 127) << shift
+            if byte < 128:
+                return value
+        raise FrameError("the frame ends inside a tile's numbers, or one of them is too long")
+
+    def version_after(self, last: int) -> int:
+        """A version, written as the difference to one before it."""
+        folded = self.number()
+        version = last + (-(folded + 1) // 2 if folded & 1 else folded // 2)
+        if not 0 <= version <= 0xFFFFFFFF:
+            raise FrameError(f"version {version} has more than 32 bits")
+        return version
+
+    def tile(self) -> TileRecord:
+        """The next tile; its payload is a view."""
+        x, y, coding = self.number(), self.number(), self.number()
+        predictor = coding & (1 << TILE_PREDICTOR_BITS) - 1
+        kind = coding >> TILE_PREDICTOR_BITS & (1 << TILE_FILTER_BITS) - 1
+        shift = coding >> (TILE_PREDICTOR_BITS + TILE_FILTER_BITS)
+        if shift > TILE_MAX_SHIFT:
+            raise FrameError(f"residuals are shifted by {TILE_MAX_SHIFT} bits at most, not {shift}")
+        self.version, self.base = self.version_after(self.version), self.version_after(self.base)
+        size = self.number()
+        if size > MAX_BYTES:
+            raise FrameError(f"a tile payload of {size} bytes is too large")
+        if len(self.view) < self.at + size:
+            raise FrameError("the frame ends inside a tile payload")
+        payload = self.view[self.at : self.at + size]
+        self.at += size
+        return TileRecord(x, y, Predictor(predictor), shift, self.version, self.base, payload, Filter(kind))
 
 
 def read_frame(data: bytes | memoryview) -> tuple[FrameHead, list[tuple[int, int]], list[TileRecord]]:
-    """Takes a frame apart without inflating it; payloads are views. Raises FrameError with what is wrong."""
+    """Takes a frame apart without decoding its tiles; payloads are views. Raises FrameError with what is wrong."""
     view = memoryview(data)
     if len(view) < FRAME_HEADER.itemsize:
         raise FrameError("the frame ends inside its header")
@@ -109,21 +168,10 @@ def read_frame(data: bytes | memoryview) -> tuple[FrameHead, list[tuple[int, int
         raise FrameError("the frame ends inside its list of dropped tiles")
     drops = [(int(d["x"]), int(d["y"])) for d in np.frombuffer(view, dtype=TILE_DROP, count=count, offset=at)]
     at += count * TILE_DROP.itemsize
-    tiles: list[TileRecord] = []
-    for _ in range(int(start["tiles"])):
-        if len(view) < at + TILE_HEADER.itemsize:
-            raise FrameError("the frame ends inside a tile header")
-        h = np.frombuffer(view, dtype=TILE_HEADER, count=1, offset=at)[0]
-        at += TILE_HEADER.itemsize
-        size = int(h["bytes"])
-        if size > MAX_PAYLOAD:
-            raise FrameError(f"a tile payload of {size} bytes is too large")
-        if len(view) < at + size:
-            raise FrameError("the frame ends inside a tile payload")
-        tiles.append(_record(h, view[at : at + size]))
-        at += size
-    if at != len(view):
-        raise FrameError(f"{len(view) - at} bytes follow the last tile")
+    reader = _Reader(view[at:])
+    tiles = [reader.tile() for _ in range(int(start["tiles"]))]
+    if reader.at != len(reader.view):
+        raise FrameError(f"{len(reader.view) - reader.at} bytes follow the last tile")
     places = [(t.x, t.y) for t in tiles]
     if any(x >= side or y >= side for x, y in places + drops):
         raise FrameError(f"a tile lies outside level {head.level}")
@@ -146,20 +194,3 @@ def _head(start: np.void) -> FrameHead:
         raise FrameError(f"level {start['level']} is above {finest_level(channel)}")
     settled = bool(start["flags"] & FRAME_SETTLED)
     return FrameHead(FrameKind(int(start["kind"])), int(start["level"]), int(start["clock"]), settled, channel)
-
-
-def _record(h: np.void, payload: memoryview) -> TileRecord:
-    if h["predictor"] not in tuple(Predictor):
-        raise FrameError(f"unknown predictor {h['predictor']}")
-    if h["filter"] not in tuple(Filter):
-        raise FrameError(f"unknown filter {h['filter']}")
-    return TileRecord(
-        x=int(h["x"]),
-        y=int(h["y"]),
-        predictor=Predictor(int(h["predictor"])),
-        planes=int(h["planes"]),
-        version=int(h["version"]),
-        base_version=int(h["base_version"]),
-        payload=payload,
-        filter=Filter(int(h["filter"])),
-    )

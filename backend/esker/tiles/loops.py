@@ -41,18 +41,20 @@ def steadied(heights: Floats, before: Floats, correction: Floats, out: Floats) -
 
 
 @_compiled
-def quantised(heights: Floats, kept: Ints, scale: np.float32, dead: np.float32, limit: np.float32, out: Ints) -> None:
+def quantised(heights: Floats, kept: Ints, scale: np.float32, quanta: int, limit: np.float32, out: Ints) -> None:
     """``pyramid.quantise`` of ``heights`` with ``kept``, (n, n).
 
-    scale: quanta a metre; dead: dead zone, quanta; limit: largest |sample|.
+    scale: quanta a metre; quanta: its ``step``; limit: largest |sample|.
     """
     rows, cols = heights.shape
+    whole, most = np.float32(quanta), np.int64(limit)
     for r in range(rows):
         for k in range(cols):
-            step = min(max(heights[r, k] * scale, -limit), limit)
-            near = kept[r, k]
-            moved = abs(step - np.float32(near)) >= dead
-            out[r, k] = np.int32(np.rint(step)) if moved else near
+            away = min(max(heights[r, k] * scale, -limit), limit) - np.float32(kept[r, k])
+            value = np.int64(kept[r, k])
+            if abs(away) >= whole:
+                value = min(max(value + np.int64(np.rint(away / whole)) * quanta, -most), most)
+            out[r, k] = value
 
 
 @_compiled

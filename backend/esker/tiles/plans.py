@@ -15,11 +15,13 @@ import numpy as np
 
 from esker.contract import Channel, Filter, FrameKind, Predictor
 from esker.grid import TileKey
-from esker.tiles.codec import Ints, Wide, child_window, cost, pack, predict
+from esker.tiles.codec import Ints, Wide, child_window, cost, predict
 from esker.tiles.filters import pack_smallest
-from esker.tiles.frame import FrameHead, TileRecord, ratio, write_frame, write_tile
+from esker.tiles.frame import FrameHead, TileRecord, ratio, write_frame
 
 CACHE_BYTES: Final = 32 * 1024 * 1024
+
+DIFFERENCES: Final = (Filter.ROW, Filter.PLANE)
 
 CacheKey = tuple[Channel, TileKey, int, int, int, int]
 """Channel, tile, its version, its parent's; and the versions of both that it may be predicted from instead, 0 for
@@ -32,10 +34,10 @@ class EncodedTiles:
     def __init__(self, limit: int = CACHE_BYTES) -> None:
         self._limit = limit
         self._lock = threading.Lock()
-        self._items: OrderedDict[CacheKey, bytes] = OrderedDict()
+        self._items: OrderedDict[CacheKey, TileRecord] = OrderedDict()
         self._bytes = 0
 
-    def get(self, key: CacheKey) -> bytes | None:
+    def get(self, key: CacheKey) -> TileRecord | None:
         """The coded tile, or None."""
         with self._lock:
             found = self._items.get(key)
@@ -43,19 +45,19 @@ class EncodedTiles:
                 self._items.move_to_end(key)
             return found
 
-    def put(self, key: CacheKey, value: bytes) -> None:
+    def put(self, key: CacheKey, value: TileRecord) -> None:
         """Keeps a coded tile and forgets the least recently used ones above the limit."""
         with self._lock:
             if key in self._items:
                 return
             self._items[key] = value
-            self._bytes += len(value)
+            self._bytes += len(value.payload)
             while self._bytes > self._limit and len(self._items) > 1:
-                self._bytes -= len(self._items.popitem(last=False)[1])
+                self._bytes -= len(self._items.popitem(last=False)[1].payload)
 
     @property
     def bytes(self) -> int:
-        """Bytes held."""
+        """Bytes of the payloads held."""
         return self._bytes
 
 
@@ -125,31 +127,39 @@ class FramePlan:
             name = tile.cache_key(self.channel)
             data = self.cache.get(name)
             if data is None:
-                data = _write(tile, predicted, self.smooth)
+                data = _coded(tile, predicted, self.smooth)
                 self.cache.put(name, data)
             coded.append(data)
         head = FrameHead(self.kind, self.level, self.clock, self.settled, self.channel)
         return write_frame(head, [(d.x, d.y) for d in self.drops], coded)
 
 
-def _write(tile: TilePlan, predicted: Callable[[TileKey, TileState], Wide], smooth: bool) -> bytes:
-    """Codes a tile with the cheapest of its predictors, and of the filters."""
+def _coded(tile: TilePlan, predicted: Callable[[TileKey, TileState], Wide], smooth: bool) -> TileRecord:
+    """A tile with the cheapest of its predictors, and the smallest of the filters that are worth a try."""
+    kind, base_version, residual = min(_options(tile, predicted), key=lambda option: cost(option[2]))
+    if kind == Predictor.ZERO:
+        filters: tuple[Filter, ...] = DIFFERENCES
+    else:
+        filters = (Filter.LATTICE, *DIFFERENCES) if smooth else (Filter.LATTICE,)
+    made, shift, payload = pack_smallest(residual, filters)
+    return TileRecord(tile.key.x, tile.key.y, kind, shift, tile.now.version, base_version, payload, made)
+
+
+def _options(tile: TilePlan, predicted: Callable[[TileKey, TileState], Wide]) -> list[tuple[Predictor, int, Wide]]:
+    """What a tile may be predicted from, the version of that, and the residual."""
     key, now, parent, before, then = tile.key, tile.now, tile.parent, tile.before, tile.parent_before
-    kind, base_version = Predictor.ZERO, 0
-    residual: Wide = now.samples.astype(np.int64)
+    found: list[tuple[Predictor, int, Wide]] = []
     moved: Wide | None = None
-    if parent is not None:
+    if parent is None:
+        found.append((Predictor.ZERO, 0, now.samples.astype(np.int64)))
+    else:
         own = predicted(key, parent).astype(np.int64)
-        kind, base_version, residual = Predictor.PARENT, parent.version, now.samples - own
+        found.append((Predictor.PARENT, parent.version, now.samples - own))
         if then is not None:
             moved = own - predicted(key, then)
     if before is not None:
         change: Wide = now.samples - before.samples.astype(np.int64)
-        options = [(Predictor.PREVIOUS if parent is None else Predictor.HELD, change)]
+        found.append((Predictor.PREVIOUS if parent is None else Predictor.HELD, before.version, change))
         if moved is not None:
-            options.insert(0, (Predictor.PREVIOUS, change - moved))
-        for option, candidate in options:
-            if np.abs(candidate).max() < 1 << 31 and cost(candidate) < cost(residual):
-                kind, base_version, residual = option, before.version, candidate
-    made, planes, payload = pack_smallest(residual) if smooth else (Filter.NONE, *pack(residual))
-    return write_tile(TileRecord(key.x, key.y, kind, planes, now.version, base_version, payload, made))
+            found.append((Predictor.PREVIOUS, before.version, change - moved))
+    return [option for option in found if np.abs(option[2]).max() < 1 << 31]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from esker import grid
 from esker.contract import TILE_CELLS
-from esker.tiles import loops
+from esker.tiles import entropy, loops
 from esker.tiles.bounds import Bounds, SubPatches, dilate, nest
 from esker.tiles.codec import SAMPLE_LIMIT, Ints
 from esker.tiles.steady import Steadier
@@ -28,10 +28,9 @@ prediction's stencil of three samples a level, ends less than one block away."""
 Counts = NDArray[np.uint32]
 Mask = NDArray[np.bool_]
 
-DEAD_ZONE: Final = 2.0
-"""Quanta that a sample of the finest level may be off in a preview (DESIGN 6). Settled levels are exact."""
-COARSE_DEAD_ZONE: Final = 0.5
-"""The same for the levels above: they are what finer ones are predicted from, and an error there counts twice below."""
+PREVIEW_STEP: Final = 8
+"""Quanta in which a preview changes samples of the finest level; half as many on each level above, so that all levels
+are equally exact in metres, and an error of a parent is none to its children. Settled levels are exact."""
 GLIMPSES: Final = 8
 """Coarsest previews that may have been shown since the job began whose finest preview comes."""
 FOLLOW_TILES: Final = 256
@@ -64,13 +63,13 @@ def quantise(
     level: int,
     size_m: float,
     kept: Ints | None = None,
-    dead_zone: float = COARSE_DEAD_ZONE,
+    step: int = 1,
 ) -> Ints:
     """Metres to quanta of the level, halves to even, saturating at +-2^28 quanta.
 
-    With ``kept`` (same shape) a sample that is less than ``dead_zone`` quanta from its kept value keeps it. The
-    decision is made per sample of the level, so the shared edges of neighbouring tiles stay equal. Heights must be
-    finite.
+    With ``kept`` (same shape) a sample differs from its kept value by a multiple of ``step``, the nearest one, and by
+    none while it is less than a step off: in fewer, rounder numbers a change takes fewer bytes. The decision is made
+    per sample of the level, so the shared edges of neighbouring tiles stay equal. Heights must be finite.
     """
     with np.errstate(over="ignore"):
         steps = heights * np.float32(1.0 / grid.quantum(level, size_m))
@@ -80,10 +79,10 @@ def quantise(
     # In float32 throughout: mixed with int32, numpy would compute in float64, four times as long.
     away = kept.astype(np.float32)
     np.subtract(steps, away, out=away)
-    moved = np.abs(away, out=away) >= dead_zone
+    moved = np.abs(away) >= step
     out = kept.copy()
-    out[moved] = np.rint(steps[moved])
-    return out
+    out[moved] += np.rint(away[moved] / np.float32(step)).astype(np.int32) * np.int32(step)
+    return np.clip(out, -SAMPLE_LIMIT, SAMPLE_LIMIT, out=out)
 
 
 def follow_parents(samples: Ints, then: Level | None, now: Level | None, ratio: int = 2) -> Ints:
@@ -149,6 +148,8 @@ class Pyramid:
     ratio: ClassVar[int] = 2
     """Quanta of a level in one of the next coarser level (see ``codec.predict``)."""
 
+    preview_step: ClassVar[int] = PREVIEW_STEP
+
     def __init__(self, size_m: float, levels: int) -> None:
         self.size_m = size_m
         self.levels = levels
@@ -189,7 +190,7 @@ class Pyramid:
         """Replaces a level; returns the number of tiles of which a sample changed.
 
         ``heights``: (N_l, N_l) float32 metres, not to be changed afterwards. Unsettled heights are steadied (see
-        ``steady``), then kept as predicted wherever that is within the dead zone; settled ones are rounded exactly.
+        ``steady``), then shown as they were but for coarse steps (``quantise``); settled ones are rounded exactly.
         With ``show`` False a coarse preview is only noted: its level is injected from the finest preview, which is
         expected soon (docs/decisions/0014-consistent-previews.md). Between a complete preview and the settled levels
         of the same clock a solver may repeat coarse levels as a sign of life: these are ignored, as they would only
@@ -261,13 +262,13 @@ class Pyramid:
         if old is not None and not settled:
             kept = follow_parents(old.samples, self._parents[level], parent, self.ratio)
         self._parents[level] = parent
-        dead_zone = DEAD_ZONE if level == self.top else COARSE_DEAD_ZONE
+        step = max(1, self.preview_step >> (self.top - level))
         if kept is None:
             samples = quantise(heights, level, self.size_m)
         else:
             samples = np.empty(heights.shape, dtype=np.int32)
             scale = np.float32(1.0 / grid.quantum(level, self.size_m))
-            loops.quantised(heights, kept, scale, np.float32(dead_zone), np.float32(SAMPLE_LIMIT), samples)
+            loops.quantised(heights, kept, scale, step, np.float32(SAMPLE_LIMIT), samples)
         stamp = self.stamp + 1
         changed = self._touch(level, None if old is None else old.samples, samples, stamp)
         count = int(np.count_nonzero(changed))
@@ -370,3 +371,7 @@ def warm() -> None:
             n = grid.samples(level)
             pyramid.put(clock, level, np.full((n, n), clock, dtype=np.float32), settled)
         pyramid.bounds()
+    for lattice in (False, True):
+        coded = entropy.encode(np.eye(TILE_CELLS + 1, dtype=np.int64), lattice)
+        assert coded is not None
+        entropy.decode(coded, lattice)

@@ -3,7 +3,6 @@
  * `tests/vectors/tiles.json`. A frame is decoded wholly before anything held changes.
  */
 
-import { inflateSync } from "fflate";
 import { subDistance, subRange } from "../core/bounds.ts";
 import { predictInts } from "../core/predict.ts";
 import { finestLevel, quantaRatio } from "../core/streams.ts";
@@ -20,9 +19,12 @@ import {
   Predictor,
   SUBPATCHES,
   TILE_DROP,
-  TILE_HEADER,
+  TILE_FILTER_BITS,
+  TILE_MAX_SHIFT,
+  TILE_PREDICTOR_BITS,
   TILE_SAMPLES,
 } from "../generated/contract.ts";
+import { decodeResiduals, LIMIT, MAX_BYTES } from "./entropy.ts";
 
 /** A frame that is truncated, malformed or does not fit what is held. */
 export class FrameError extends Error {
@@ -31,8 +33,6 @@ export class FrameError extends Error {
 
 const AREA = TILE_SAMPLES * TILE_SAMPLES;
 const SUBS = SUBPATCHES * SUBPATCHES;
-/** Above this a payload is malformed: deflate never grows four planes by more than a few block headers. */
-const MAX_PAYLOAD = 4 * AREA + 1024;
 const SAMPLE_LIMIT = 2 ** 28;
 const CHANNELS = Object.keys(Channel).length;
 
@@ -50,8 +50,8 @@ interface TileHead {
   readonly x: number;
   readonly y: number;
   readonly predictor: number;
-  readonly planes: number;
   readonly filter: number;
+  readonly shift: number;
   readonly version: number;
   readonly baseVersion: number;
   readonly bytes: number;
@@ -103,19 +103,17 @@ export class FrameDecoder {
     const held = this.channels[head.channel]!;
     const tiles: DecodedTile[] = [];
     const seen = new Set<number>();
-    let at = FRAME_HEADER.size + head.drops * TILE_DROP.size;
+    const reader = new TileReader(view, FRAME_HEADER.size + head.drops * TILE_DROP.size);
     for (let i = 0; i < head.tiles; i++) {
-      const tile = readTileHead(view, at, head.level);
-      at += TILE_HEADER.size;
-      if (at + tile.bytes > buffer.byteLength) throw new FrameError("the frame ends inside a tile payload");
+      const tile = reader.tile(head.level);
       const key = tileKey(head.level, tile.x, tile.y);
       if (seen.has(key)) throw new FrameError("a tile occurs twice");
       if (dropped.has(key)) throw new FrameError("a tile is both sent and dropped");
       seen.add(key);
-      tiles.push(decodeTile(held, head, tile, new Uint8Array(buffer, at, tile.bytes)));
-      at += tile.bytes;
+      tiles.push(decodeTile(held, head, tile, reader.payload(tile.bytes)));
     }
-    if (at !== buffer.byteLength) throw new FrameError(`${buffer.byteLength - at} bytes follow the last tile`);
+    const left = buffer.byteLength - reader.at;
+    if (left > 0) throw new FrameError(`${left} bytes follow the last tile`);
     commit(held, head, dropped, tiles);
     const { kind, level, channel, clock, settled } = head;
     return { kind, level, channel, clock, settled, drops, tiles, bytes: buffer.byteLength };
@@ -146,9 +144,7 @@ function decodeTile(held: Tiles, head: Head, tile: TileHead, payload: Uint8Array
   if (tile.predictor === Predictor.PARENT) predictFromParent(held, key, tile, ratio);
   else if (tile.predictor !== Predictor.ZERO) predictFromHeld(held, key, tile, parent, ratio);
   else base.fill(0);
-  if (tile.planes === 0 && payload.length > 0) throw new FrameError("a tile without planes has no payload");
-  const raw = tile.planes === 0 ? new Uint8Array(0) : inflatePlanes(payload, tile.planes);
-  readResidual(raw, tile.planes);
+  readResidual(payload, tile);
   undoFilter(tile.filter);
   addResidual(samples);
   const subMin = new Int32Array(SUBS);
@@ -223,58 +219,89 @@ function readDrops(view: DataView, head: Head): { x: number; y: number }[] {
   return drops;
 }
 
-function readTileHead(view: DataView, at: number, level: number): TileHead {
-  const f = TILE_HEADER;
-  if (at + f.size > view.byteLength) throw new FrameError("the frame ends inside a tile header");
-  const tile: TileHead = {
-    x: view.getUint16(at + f.x.offset, true),
-    y: view.getUint16(at + f.y.offset, true),
-    predictor: view.getUint8(at + f.predictor.offset),
-    planes: view.getUint8(at + f.planes.offset),
-    filter: view.getUint8(at + f.filter.offset),
-    version: view.getUint32(at + f.version.offset, true),
-    baseVersion: view.getUint32(at + f.base_version.offset, true),
-    bytes: view.getUint32(at + f.bytes.offset, true),
-  };
-  checkPlace(level, tile.x, tile.y);
-  if (tile.predictor > Predictor.HELD) throw new FrameError(`unknown predictor ${tile.predictor}`);
-  if (tile.filter > Filter.PLANE) throw new FrameError(`unknown filter ${tile.filter}`);
-  if (tile.planes > 4) throw new FrameError(`a tile has 0 to 4 byte planes, not ${tile.planes}`);
-  if (tile.bytes > MAX_PAYLOAD) throw new FrameError(`a tile payload of ${tile.bytes} bytes is too large`);
-  return tile;
+/** Reads tiles, whose versions are differences to those of the tile before. */
+class TileReader {
+  private version = 0;
+  private base = 0;
+
+  constructor(
+    private readonly view: DataView,
+    public at: number,
+  ) {}
+
+  /** The numbers of the next tile. */
+  tile(level: number): TileHead {
+    const x = this.number();
+    const y = this.number();
+    checkPlace(level, x, y);
+    const coding = this.number();
+    const filterBits = 2 ** TILE_PREDICTOR_BITS;
+    const shiftBits = filterBits * 2 ** TILE_FILTER_BITS;
+    const shift = Math.floor(coding / shiftBits);
+    if (shift > TILE_MAX_SHIFT)
+      throw new FrameError(`residuals are shifted by ${TILE_MAX_SHIFT} bits at most, not ${shift}`);
+    this.version = this.versionAfter(this.version);
+    this.base = this.versionAfter(this.base);
+    const bytes = this.number();
+    if (bytes > MAX_BYTES) throw new FrameError(`a tile payload of ${bytes} bytes is too large`);
+    return {
+      x,
+      y,
+      predictor: coding % filterBits,
+      filter: Math.floor(coding / filterBits) % 2 ** TILE_FILTER_BITS,
+      shift,
+      version: this.version,
+      baseVersion: this.base,
+      bytes,
+    };
+  }
+
+  /** The bytes that follow the numbers, as a view. */
+  payload(bytes: number): Uint8Array {
+    const { buffer, byteOffset, byteLength } = this.view;
+    if (this.at + bytes > byteLength) throw new FrameError("the frame ends inside a tile payload");
+    const out = new Uint8Array(buffer, byteOffset + this.at, bytes);
+    this.at += bytes;
+    return out;
+  }
+
+  /** LEB128: seven bits a byte, the lowest first; 35 bits at most. */
+  private number(): number {
+    let value = 0;
+    for (let scale = 1; scale < 2 ** 35 && this.at < this.view.byteLength; scale *= 128) {
+      const byte = this.view.getUint8(this.at++);
+      value += (byte & 127) * scale;
+      if (byte < 128) return value;
+    }
+    throw new FrameError("the frame ends inside a tile's numbers, or one of them is too long");
+  }
+
+  private versionAfter(last: number): number {
+    const folded = this.number();
+    const version = last + (folded % 2 > 0 ? -(folded + 1) / 2 : folded / 2);
+    if (version < 0 || version > 0xffffffff) throw new FrameError(`version ${version} has more than 32 bits`);
+    return version;
+  }
 }
 
 function checkPlace(level: number, x: number, y: number): void {
   if (x >= 1 << level || y >= 1 << level) throw new FrameError(`a tile lies outside level ${level}`);
 }
 
-/** Inflates raw deflate into at most one byte more than the planes need. */
-function inflatePlanes(payload: Uint8Array, planes: number): Uint8Array {
-  const want = planes * AREA;
-  let raw: Uint8Array;
-  try {
-    raw = inflateSync(payload, { out: new Uint8Array(want + 1) });
-  } catch (e) {
-    throw new FrameError(`a tile payload does not inflate: ${e instanceof Error ? e.message : String(e)}`);
-  }
-  if (raw.length !== want) throw new FrameError(`a tile payload inflates to ${raw.length} bytes, not ${want}`);
-  return raw;
-}
-
-/** The zig-zag codes, lowest byte plane first, as numbers in `residual`. */
-function readResidual(raw: Uint8Array, planes: number): void {
-  for (let i = 0; i < AREA; i++) {
-    let code = planes > 0 ? raw[i]! : 0;
-    if (planes > 1) code |= raw[AREA + i]! << 8;
-    if (planes > 2) code |= raw[2 * AREA + i]! << 16;
-    if (planes > 3) code |= raw[3 * AREA + i]! << 24;
-    residual[i] = (code >>> 1) ^ -(code & 1);
-  }
+/** The residuals as coded, in `residual`. */
+function readResidual(payload: Uint8Array, tile: TileHead): void {
+  residual.fill(0);
+  if (payload.length === 0) return;
+  const limit = LIMIT / 2 ** tile.shift;
+  const fits = decodeResiduals(payload, tile.filter === Filter.LATTICE, residual);
+  if (!fits || residual.some((v) => Math.abs(v) >= limit))
+    throw new FrameError("a tile payload has bytes left over or numbers that are too large");
+  if (tile.shift > 0) for (let i = 0; i < AREA; i++) residual[i]! *= 2 ** tile.shift;
 }
 
 /** Adds up the differences in `residual`. Sums of 4,225 numbers of 32 bits are exact in float64. */
 function undoFilter(filter: number): void {
-  if (filter === Filter.NONE) return;
+  if (filter === Filter.NONE || filter === Filter.LATTICE) return;
   const across = filter === Filter.ROW ? 1 : TILE_SAMPLES;
   for (let row = 1; row < TILE_SAMPLES; row++)
     for (let i = row * TILE_SAMPLES; i < row * TILE_SAMPLES + across; i++) residual[i]! += residual[i - TILE_SAMPLES]!;

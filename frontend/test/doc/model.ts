@@ -113,7 +113,7 @@ export class ServerModel {
     const resume = clock !== null && this.doc.clock - clock <= this.keep;
     return {
       type: "welcome",
-      protocol: 4,
+      protocol: 5,
       server: "model",
       client: "c",
       role: "edit",

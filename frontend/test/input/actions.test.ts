@@ -52,7 +52,7 @@ beforeEach(() => {
   ];
   doc.welcome({
     type: "welcome",
-    protocol: 4,
+    protocol: 5,
     server: "",
     client: "me",
     role: "edit",

@@ -33,7 +33,7 @@ export function open(mode: "orbit" | "map" = "orbit", over: Partial<InputOptions
   doc = new SyncDoc("me", () => time);
   doc.welcome({
     type: "welcome",
-    protocol: 4,
+    protocol: 5,
     server: "",
     client: "me",
     role: "edit",

@@ -72,7 +72,7 @@ describe("robustness (T6)", () => {
         expect(() => decoder.decode(good.slice(0, length))).toThrow(FrameError);
         expect(decoder.decode(good).tiles.length).toBe(16);
       }),
-      { numRuns: 60 },
+      { numRuns: 30 },
     );
   });
 
@@ -88,7 +88,7 @@ describe("robustness (T6)", () => {
           expect(e).toBeInstanceOf(FrameError);
         }
       }),
-      { numRuns: 200 },
+      { numRuns: 80 },
     );
   });
 

@@ -81,7 +81,7 @@ function connect(random = () => 0.5): Connection {
   frames = [];
   const connection = new Connection({
     url: "ws://localhost/ws",
-    hello: () => ({ type: "hello", protocol: 4, terrain: "t", secret: "s", client: "c", clock: null }),
+    hello: () => ({ type: "hello", protocol: 5, terrain: "t", secret: "s", client: "c", clock: null }),
     onMessage: (m) => messages.push(m),
     onFrame: (f) => frames.push({ bytes: f.bytes, sent: FakeSocket.last.sent.length }),
     random,
@@ -113,7 +113,7 @@ afterEach(() => {
 describe("opening", () => {
   it("says hello first and is online with the welcome (SPEC I30)", () => {
     const c = connect();
-    expect(FakeSocket.last.protocol).toBe("esker.4");
+    expect(FakeSocket.last.protocol).toBe("esker.5");
     expect(FakeSocket.last.binaryType).toBe("arraybuffer");
     expect(c.send({ type: "credit", bytes: 1 })).toBe(false);
     FakeSocket.last.open();

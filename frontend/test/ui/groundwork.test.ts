@@ -47,7 +47,7 @@ function open(layers: Layer[] = []): void {
     device: "",
   };
   const document = { ...EMPTY, layers };
-  doc.welcome({ type: "welcome", protocol: 4, levels: 4, finest: 4, clock: 0, document, ...rest });
+  doc.welcome({ type: "welcome", protocol: 5, levels: 4, finest: 4, clock: 0, document, ...rest });
   work = new Groundwork({
     sizeM: 4096,
     doc,

@@ -27,7 +27,7 @@ function document(clock: number, text: string): Document {
 
 function welcome(doc: Document): Welcome {
   return {
-    ...{ type: "welcome", protocol: 4, server: "", client: "me", role: "view", colour: "#000000", device: "" },
+    ...{ type: "welcome", protocol: 5, server: "", client: "me", role: "view", colour: "#000000", device: "" },
     ...{ levels: 4, finest: 8, clock: doc.clock, document: doc, ops: null, members: [] },
   };
 }
@@ -112,7 +112,7 @@ function looking() {
         },
       };
     },
-    hello: () => ({ type: "hello", protocol: 4, terrain: "t", secret: "s", client: "me", clock: 41 }),
+    hello: () => ({ type: "hello", protocol: 5, terrain: "t", secret: "s", client: "me", clock: 41 }),
     show: (doc) => shown.push(doc?.clock ?? null),
     restart: () => calls.restart++,
     frame: () => true,

@@ -82,7 +82,7 @@ const SETTINGS = {
 function welcome(role: Role = "owner", change: Partial<Welcome> = {}): Welcome {
   return {
     type: "welcome",
-    protocol: 4,
+    protocol: 5,
     server: "0.1.0",
     client: "c",
     role,
