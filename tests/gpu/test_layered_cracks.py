@@ -1,6 +1,6 @@
 """No crack on real ground with a stroke across it, at rest and while a turned grid arrives (SPEC G27, R8; issue 5).
 
-The frames are a server's: Mount St Helens with a dam, then a finer grid turned by 27 degrees over the crater. The page's
+The frames are a server's: Mount St Helens with a dam, then a finer grid turned by 27 degrees over the crater. A page's
 own decoder, store, selection and shaders draw them. What is counted: pixels of the clear colour, as in test_cracks.
 """
 
