@@ -103,7 +103,7 @@ void rasterise(TABLE_ARGUMENTS, int by0, global const int *windows, int n, int p
     SET_OVER(t, o, gx < n && gy < n);
     sums_t sum = gather(&t, bx, by, gx, gy, n, &least_bits, marks, 0);
     if (gx >= n || gy >= n) return;
-    constraint_t c = conclude(&sum, gx, gy, n, screening, pinned);
+    constraint_t c = conclude(&sum, gx, gy, n, screening, pinned, t.s, t.octave);
     height_d[o] = c.height_d;
     height_f[o] = c.height_f;
     gradient_d[o] = c.gradient_d;

@@ -148,7 +148,7 @@ kernel void rasterise(TABLE_ARGUMENTS, int by0, global const int *windows, int n
     gather(sums, &t, bx, by, rows, 0);
     int16 columns = bx * BIN + (int16)LANE_NUMBERS;
     for (int y = 0; y < rows; y++, o += pitch) {
-        constraint_t c = conclude(sums + y, columns, by * BIN + y, n, screening, pinned);
+        constraint_t c = conclude(sums + y, columns, by * BIN + y, n, screening, pinned, t.s, t.octave);
         vstore16(c.height_d, 0, height_d + o);
         vstore16(c.height_f, 0, height_f + o);
         vstore16(c.gradient_d, 0, gradient_d + o);

@@ -419,8 +419,8 @@ INLINE void conclude_channel(REAL *d, REAL *f, REAL *cover, const sums_t *sum, f
     *f = *cover * sum->gx / fmax(sum->g, TINY);
 }
 
-// x: columns of the samples, y their row, n samples a side; a pinned border is fixed at the base.
-INLINE constraint_t conclude(const sums_t *sum, MASK x, int y, int n, float screening, int pinned) {
+// x: columns of the samples, y their row, n samples a side; a pinned border is fixed at the base. s, octave: see tables_t.
+INLINE constraint_t conclude(const sums_t *sum, MASK x, int y, int n, float screening, int pinned, float s, float octave) {
     constraint_t out;
     REAL zero = 0.0f, fixed = -1.0f;
     REAL w = fmax(sum->w, TINY), target = sum->wt / w;
@@ -436,7 +436,9 @@ INLINE constraint_t conclude(const sums_t *sum, MASK x, int y, int n, float scre
         out.height_d = select(out.height_d, PINNED, edge);
         out.height_f = select(out.height_f, zero, edge);
     }
-    REAL toe = CREST_STIFFNESS * sum->toe, g = fmax(sum->g, TINY);
+    // a stiffness fades on the ground, not on the grid: in cells of level 4, else bands seem wider on every finer level
+    float finer = fmax(octave / s, 1.0f), excess = finer * finer - 1.0f;
+    REAL toe = CREST_STIFFNESS * sum->toe / (1.0f + excess * (1.0f - sum->toe * sum->toe)), g = fmax(sum->g, TINY);
     out.gradient_d = toe;
     out.gradient_fx = toe * sum->gx / g;
     out.gradient_fy = toe * sum->gy / g;

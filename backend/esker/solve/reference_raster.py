@@ -72,7 +72,7 @@ def rasterise(tables: Tables, base: NDArray[np.floating] | None = None) -> Const
         edge = ((y == 0) | (y == tables.samples - 1))[:, None] | (x == 0) | (x == tables.samples - 1)
         height_d, height_f = np.where(edge, PINNED, height_d), np.where(edge, 0.0, height_f)
     share = total["toe"] * total["follows"] / np.maximum(total["g"], TINY)
-    return Constraints(height_d, height_f, *_two(total), share, target)
+    return Constraints(height_d, height_f, *_two(total, tables), share, target)
 
 
 def rasterise_channel(tables: Tables, base: NDArray[np.floating] | None = None) -> tuple[Floats, Floats, Floats]:
@@ -104,9 +104,12 @@ def _sums(tables: Tables) -> dict[str, Floats]:
     return {name: np.zeros(((by1 - by0) * BIN, (bx1 - bx0) * BIN)) for name in _SUMS}
 
 
-def _two(total: dict[str, Floats]) -> tuple[Floats, Floats]:
-    """D and f of the gradient."""
-    d, g = CREST_STIFFNESS * total["toe"], np.maximum(total["g"], TINY)
+def _two(total: dict[str, Floats], tables: Tables) -> tuple[Floats, Floats]:
+    """D and f of the gradient. A stiffness fades on the ground, not on the grid: in cells of level 4 (of a coarser
+    level its own), else bands would seem wider on every finer level, and the free ground between them would move."""
+    excess = max(tables.octave_m / tables.spacing_m, 1.0) ** 2 - 1
+    toe, g = total["toe"], np.maximum(total["g"], TINY)
+    d = CREST_STIFFNESS * toe / (1 + excess * (1 - toe**2))
     return d, np.stack([d * total["gx"] / g, d * total["gy"] / g])
 
 

@@ -34,6 +34,8 @@ TILE_BYTES: Final = 4 * CHANNELS * TILE_SAMPLES**2
 
 Box = tuple[int, int, int, int]
 """Tiles x0 .. x1 - 1, y0 .. y1 - 1 as (x0, y0, x1, y1)."""
+Plan = dict[int, set[TileKey]]
+"""Per level the tiles that are still to be made."""
 
 
 class Basis(Protocol):
@@ -132,12 +134,21 @@ class Refiner:
         for key in keys:
             self.content(key)
         wanted = list(dict.fromkeys(keys))
-        for at, key in enumerate(wanted):
+        left = self._plan(wanted)
+        for key in wanted:
             field = self.cache.get(self.content(key))
             if field is None:
-                left = {k for k in wanted[at:] if k.level == key.level and self.content(k) not in self.cache}
-                field = (yield from self._computed(key.level, _group(key, left)))[key]
+                field = (yield from self._made([key], left))[key]
             yield RefinedTile(key, field[2], self.content(key), self._under(key))
+
+    def _plan(self, keys: Iterable[TileKey]) -> Plan:
+        """Those tiles that are not kept, by level: when some are made, as parents of finer ones too, so are others that
+        lie beside them."""
+        left: Plan = {level: set() for level in range(self.basis.level + 1, MAX_REFINED_LEVEL + 1)}
+        for key in keys:
+            if self.content(key) not in self.cache:
+                left[key.level].add(key)
+        return left
 
     def _under(self, key: TileKey) -> NDArray[np.float32] | None:
         """The base at a tile's samples."""
@@ -184,7 +195,7 @@ class Refiner:
 
     def _all(self, keys: list[TileKey]) -> dict[TileKey, Fields]:
         """The fields of tiles, without leaving the work."""
-        work = self._made(keys)
+        work = self._made(keys, self._plan(keys))
         while True:
             try:
                 next(work)
@@ -192,8 +203,9 @@ class Refiner:
                 found: dict[TileKey, Fields] = end.value
                 return found
 
-    def _made(self, keys: Iterable[TileKey]) -> Generator[None, None, dict[TileKey, Fields]]:
-        """Fields of tiles of one level, from the cache or made now; yields where the work can be left."""
+    def _made(self, keys: Iterable[TileKey], plan: Plan) -> Generator[None, None, dict[TileKey, Fields]]:
+        """Fields of tiles of one level, from the cache or made now, with others of the plan beside them; yields where
+        the work can be left."""
         out: dict[TileKey, Fields] = {}
         missing: list[TileKey] = []
         for key in keys:
@@ -205,17 +217,17 @@ class Refiner:
         left = dict.fromkeys(missing)
         while left:
             first = next(iter(left))
-            made = yield from self._computed(first.level, _group(first, left.keys()))
+            made = yield from self._computed(first.level, _group(first, left.keys() | plan[first.level]), plan)
             for key in made.keys() & left.keys():
                 out[key] = made[key]
                 del left[key]
         return out
 
-    def _computed(self, level: int, box: Box) -> Generator[None, None, dict[TileKey, Fields]]:
+    def _computed(self, level: int, box: Box, plan: Plan) -> Generator[None, None, dict[TileKey, Fields]]:
         """The tiles of a box, computed in one step after what they need of the parent level."""
         x0, y0, x1, y1 = box
         at = step(level, Span(y0 * TILE_CELLS, y1 * TILE_CELLS + 1, x0 * TILE_CELLS, x1 * TILE_CELLS + 1))
-        parent = yield from self._parent(at)
+        parent = yield from self._parent(at, plan)
         fields = self._engine.run(at, self._strokes, parent)
         out = {}
         for key in _keys(level, box):
@@ -224,16 +236,17 @@ class Refiner:
             tile.flags.writeable = False
             out[key] = tile
             self.cache.put(self.content(key), tile)
+            plan[level].discard(key)
         yield
         return out
 
-    def _parent(self, at: Step) -> Generator[None, None, Fields]:
+    def _parent(self, at: Step, plan: Plan) -> Generator[None, None, Fields]:
         """What a step reads of the next coarser level."""
         p = at.parent
         if at.level - 1 == self.basis.level:
             return self._ground[:, p.r0 : p.r1, p.c0 : p.c1]
         out = np.empty((CHANNELS, *p.shape), dtype=np.float32)
-        tiles = yield from self._made(_keys(at.level - 1, _cover(p, at.level - 1)))
+        tiles = yield from self._made(_keys(at.level - 1, _cover(p, at.level - 1)), plan)
         for key, field in tiles.items():
             _paste(out, p, key, field)
         return out
@@ -269,13 +282,14 @@ class Refiner:
 
 def _group(key: TileKey, left: Set[TileKey]) -> Box:
     """The box of at most GROUP tiles a side around ``key`` that holds most of the tiles that are left to make."""
-    best: list[TileKey] = []
+    near = [(x, y) for _, x, y in left if abs(x - key.x) < GROUP and abs(y - key.y) < GROUP]
+    best: list[tuple[int, int]] = []
     for y0 in range(key.y - GROUP + 1, key.y + 1):
         for x0 in range(key.x - GROUP + 1, key.x + 1):
-            held = [k for k in _keys(key.level, (x0, y0, x0 + GROUP, y0 + GROUP)) if k in left]
+            held = [at for at in near if x0 <= at[0] < x0 + GROUP and y0 <= at[1] < y0 + GROUP]
             best = max(best, held, key=len)
-    x, y = [k.x for k in best], [k.y for k in best]
-    return min(x), min(y), max(x) + 1, max(y) + 1
+    xs, ys = zip(*best, strict=True)
+    return min(xs), min(ys), max(xs) + 1, max(ys) + 1
 
 
 def _span(key: TileKey) -> Span:

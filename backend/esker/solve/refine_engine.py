@@ -24,7 +24,7 @@ from esker.solve.faults import guarded
 from esker.solve.levels import PAD, Launcher, over_base
 from esker.solve.refine_sheets import Sheets, exchange, missing
 
-GRADIENT_SWEEPS: Final = 16
+GRADIENT_SWEEPS: Final = 8
 HEIGHT_SWEEPS: Final = 64
 """Both even. docs/decisions/0012-refinement.md says why so many."""
 LOWEST: Final = 16.0

@@ -117,14 +117,14 @@ def exchange(parts: list[Part], fresh: Window, box: BinBox, fields: list[NDArray
 
     fields: views (rows, columns) of the window's samples, as many as a sheet has.
     """
-    spans = fresh.spans - box[2]
+    spans = [(int(low), int(high)) for low, high in fresh.spans - box[2]]  # arrays of two are slower than their work
     for part in parts:
         rows, columns = part.there
         row = rows.start
         while row < rows.stop:
-            low, high = (int(v) for v in np.clip(spans[row], columns.start, columns.stop))
+            low, high = (min(max(v, columns.start), columns.stop) for v in spans[row])
             end = row + 1
-            while end < rows.stop and (spans[end] == spans[row]).all():
+            while end < rows.stop and spans[end] == spans[row]:
                 end += 1
             for a, b in (
                 (columns.start, low if high > low else columns.stop),

@@ -15,7 +15,7 @@ from esker.solve.base_blocks import BaseWindows
 from esker.solve.constraints import BIN, BinBox, Tables, WindowPacker, bins
 from esker.solve.tables import INDEX_FIELDS
 
-PACK_AROUND: Final = 24
+PACK_AROUND: Final = 48
 """Bins around a window that are packed with it."""
 PACKED: Final = 12
 """Tables kept by a refiner."""
