@@ -1,4 +1,4 @@
-"""The codec is exact, symmetric and seamless (SPEC T1, T2, T5)."""
+"""The codec is exact, symmetric and seamless (SPEC T1, T2, T5, T55)."""
 
 from __future__ import annotations
 
