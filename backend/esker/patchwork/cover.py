@@ -10,23 +10,19 @@ and covering ones are taken greater by theirs: what that passes over is far narr
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from esker.patchwork import patches
+from esker.patchwork.covering import least_cover, local
 from esker.patchwork.jit import bands, kernel, spread
 from esker.patchwork.patches import Floats
-from esker.patchwork.quads import MOST, area_of, contains, overlap, shrunk, subtracted
+from esker.patchwork.quads import area_of, contains, overlap, shrunk
 from esker.patchwork.sheets import Sheet
 
 Ints = NDArray[np.int64]
-
-COVERED: Final = 1e-7
-"""Share of a kernel's area that may be left over and count as covered: rounding, not ground."""
-SLIVER: Final = 1e-9
-"""Share of a kernel's area below which a left over piece is rounding."""
 
 
 class Index(NamedTuple):
@@ -122,14 +118,6 @@ def _box(ix: Index, layer: int, quad: Floats) -> tuple[float, float, float, floa
 
 
 @kernel
-def _local(ix: Index, q: int, x: float, y: float, out: Floats) -> None:
-    """The kernel of q relative to (x, y)."""
-    for c in range(4):
-        out[c, 0] = ix.kernel[q, c, 0] - x
-        out[c, 1] = ix.kernel[q, c, 1] - y
-
-
-@kernel
 def _grown(numbers: Ints) -> Ints:
     """A list with room for twice as many."""
     more = np.empty(2 * len(numbers), np.int64)
@@ -155,7 +143,7 @@ def _meet(
 
     ``other``: room for its corners.
     """
-    _local(ix, q, x, y, other)
+    local(ix.kernel, q, x, y, other)
     if contains(other, quad, ix.slack[q] + tolerance):
         return found, count, ix.min_z[q]
     if overlap(quad, other, ix.slack[q]):
@@ -219,45 +207,18 @@ def _sorted_below(ix: Index, numbers: Ints, count: int, limit: float) -> int:
 @kernel
 def _tops(ix: Index, which: Ints, start: int, stop: int, out: Floats) -> None:
     """Smallest z at which greater patches cover the kernels of patches; infinity if they never do."""
-    own, quad, other = np.empty((4, 2)), np.empty((4, 2)), np.empty((4, 2))
+    own, quad = np.empty((4, 2)), np.empty((4, 2))
     found = np.empty(64, np.int64)
     for w in range(start, stop):
         p = which[w]
         x, y = ix.kernel[p, 0, 0], ix.kernel[p, 0, 1]
-        _local(ix, p, x, y, own)
+        local(ix.kernel, p, x, y, own)
         shrunk(own, ix.slack[p], quad)
         found, count, best = _rivals(ix, p, quad, found)
         count = _sorted_below(ix, found, count, best)
         out[w] = best
-        if count < 2:
-            continue
-        whole = area_of(own, 4)
-        pieces, corners = _room(0)
-        _start(quad, pieces, corners)
-        parts = 1
-        for k in range(count):
-            q = found[k]
-            _local(ix, q, x, y, other)
-            left, sizes = _room(parts)
-            parts, area = subtracted(pieces, corners, parts, other, ix.slack[q], SLIVER * whole, left, sizes)
-            pieces, corners = left, sizes
-            if area <= COVERED * whole:
-                out[w] = ix.min_z[q]
-                break
-
-
-@kernel
-def _room(parts: int) -> tuple[Floats, Ints]:
-    """Room for what is left of some polygons."""
-    return np.empty((8 * parts + 1, MOST, 2)), np.empty(8 * parts + 1, np.int64)
-
-
-@kernel
-def _start(quad: Floats, pieces: Floats, corners: Ints) -> None:
-    """Begin a list of polygons with a quad."""
-    for c in range(4):
-        pieces[0, c, 0], pieces[0, c, 1] = quad[c, 0], quad[c, 1]
-    corners[0] = 4
+        if count > 1:
+            out[w] = least_cover(ix.kernel, ix.slack, ix.min_z, quad, area_of(own, 4), x, y, found, count, best, False)
 
 
 @kernel
@@ -307,27 +268,20 @@ def _floors(ix: Index, which: Ints, start: int, stop: int, out: NDArray[np.bool_
     for w in range(start, stop):
         p = which[w]
         x, y = ix.kernel[p, 0, 0], ix.kernel[p, 0, 1]
-        _local(ix, p, x, y, own)
+        local(ix.kernel, p, x, y, own)
         shrunk(own, ix.slack[p], quad)
         whole = area_of(own, 4)
         count = 0
         for layer in range(len(ix.lowest)):
             found, count = _better(ix, p, layer, found, count)
-        pieces, corners = _room(0)
-        _start(quad, pieces, corners)
-        parts = 1
-        out[w] = True
+        met = 0
         for k in range(count):
-            q = found[k]
-            _local(ix, q, x, y, other)
-            if not overlap(quad, other, ix.slack[q]):
-                continue
-            left, sizes = _room(parts)
-            parts, area = subtracted(pieces, corners, parts, other, ix.slack[q], SLIVER * whole, left, sizes)
-            pieces, corners = left, sizes
-            if area <= COVERED * whole:
-                out[w] = False
-                break
+            local(ix.kernel, found[k], x, y, other)
+            if overlap(quad, other, ix.slack[found[k]]):
+                found[met] = found[k]
+                met += 1
+        left = least_cover(ix.kernel, ix.slack, ix.min_z, quad, whole, x, y, found, met, np.inf, True)
+        out[w] = left == np.inf
 
 
 def tops(ix: Index, which: Ints) -> Floats:

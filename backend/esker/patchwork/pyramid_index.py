@@ -102,23 +102,14 @@ def tree(model: Model, found: Boxes) -> Tree:
 
 
 @kernel
-def rim_of(t: Tree, layer: int, node: int) -> tuple[int, int]:
-    """Patches first..end of the rim below a node of a layer's lowest scale."""
-    if t.rim_at[layer] < 0:
-        return 0, 0
-    at = t.rim_at[layer] + node - t.scale[t.first[layer], 0]
-    return t.rim[at], t.rim[at + 1]
-
-
-@kernel
-def _raise(t: Tree, found: Boxes, n: int, k: int) -> None:
-    """Widen a node's bounds by a patch that is alive."""
-    if found.low[k] >= found.max_z[k]:
-        return
+def _raise(t: Tree, found: Boxes, n: int, first: int, end: int) -> None:
+    """Widen a node's bounds by those of the patches first..end that are alive."""
     box = t.box
-    t.least[n], t.most[n] = min(t.least[n], found.low[k]), max(t.most[n], found.max_z[k])
-    box[n, 0], box[n, 1] = min(box[n, 0], found.box[k, 0]), min(box[n, 1], found.box[k, 1])
-    box[n, 2], box[n, 3] = max(box[n, 2], found.box[k, 2]), max(box[n, 3], found.box[k, 3])
+    for k in range(first, end):
+        if found.low[k] < found.max_z[k]:
+            t.least[n], t.most[n] = min(t.least[n], found.low[k]), max(t.most[n], found.max_z[k])
+            box[n, 0], box[n, 1] = min(box[n, 0], found.box[k, 0]), min(box[n, 1], found.box[k, 1])
+            box[n, 2], box[n, 3] = max(box[n, 2], found.box[k, 2]), max(box[n, 3], found.box[k, 3])
 
 
 @kernel
@@ -133,12 +124,14 @@ def _summarise(layer: int, t: Tree, found: Boxes) -> None:
             for i in range(cols):
                 n = node + j * cols + i
                 k = t.patch[n]
-                if k >= 0:
-                    _raise(t, found, n, k)
+                if k >= 0 and found.low[k] < found.max_z[k]:
+                    low[n], most[n] = found.low[k], found.max_z[k]
+                    for c in range(4):
+                        box[n, c] = found.box[k, c]
                 if not below:
-                    begin, end = rim_of(t, layer, n)
-                    for q in range(begin, end):
-                        _raise(t, found, n, q)
+                    if t.rim_at[layer] >= 0:
+                        at = t.rim_at[layer] + n - node
+                        _raise(t, found, n, t.rim[at], t.rim[at + 1])
                     continue
                 for y in range(2 * j, min(2 * j + 2, down)):
                     for x in range(2 * i, min(2 * i + 2, across)):
@@ -164,12 +157,29 @@ def apart(corners: Floats, x0: float, y0: float, x1: float, y1: float) -> bool:
 
 
 @kernel
-def _serves(found: Boxes, k: int, e: float, x0: float, y0: float, x1: float, y1: float) -> bool:
-    """Whether a patch is chosen at tolerance e and its domain meets a rectangle."""
-    if found.low[k] > e or e >= found.max_z[k]:
-        return False
-    b = found.box[k]
-    return not (b[0] > x1 or b[2] < x0 or b[1] > y1 or b[3] < y0 or apart(found.corners[k], x0, y0, x1, y1))
+def _uniform_rim(
+    found: Boxes,
+    first: int,
+    end: int,
+    e: float,
+    x0: float,
+    y0: float,
+    x1: float,
+    y1: float,
+    out: NDArray[np.int32],
+    count: int,
+) -> int:
+    """Those of the patches first..end that :func:`uniform` looks for, behind ``count`` in ``out``; -1 for too many."""
+    for k in range(first, end):
+        b = found.box[k]
+        outside = b[0] > x1 or b[2] < x0 or b[1] > y1 or b[3] < y0
+        if outside or found.low[k] > e or e >= found.max_z[k] or apart(found.corners[k], x0, y0, x1, y1):
+            continue
+        if count == out.size:
+            return -1
+        out[count] = k
+        count += 1
+    return count
 
 
 @kernel
@@ -193,20 +203,20 @@ def uniform(t: Tree, found: Boxes, e: float, x0: float, y0: float, x1: float, y1
                 if t.box[n, 0] > x1 or t.box[n, 2] < x0 or t.box[n, 1] > y1 or t.box[n, 3] < y0:
                     continue
                 k = t.patch[n]
-                if k >= 0 and _serves(found, k, e, x0, y0, x1, y1):
-                    if count == out.size:
+                if k >= 0 and found.low[k] <= e and e < found.max_z[k]:
+                    b = found.box[k]
+                    outside = b[0] > x1 or b[2] < x0 or b[1] > y1 or b[3] < y0
+                    if not outside and not apart(found.corners[k], x0, y0, x1, y1):
+                        if count == out.size:
+                            return -1
+                        out[count] = k
+                        count += 1
+                if s == t.first[layer] and t.rim_at[layer] >= 0:
+                    at = t.rim_at[layer] + n - node
+                    count = _uniform_rim(found, t.rim[at], t.rim[at + 1], e, x0, y0, x1, y1, out, count)
+                    if count < 0:
                         return -1
-                    out[count] = k
-                    count += 1
-                if s == t.first[layer]:
-                    begin, end = rim_of(t, layer, n)
-                    for q in range(begin, end):
-                        if _serves(found, q, e, x0, y0, x1, y1):
-                            if count == out.size:
-                                return -1
-                            out[count] = q
-                            count += 1
-                else:
+                if s > t.first[layer]:
                     _, down, across = t.scale[s - 1]
                     for y in range(2 * j, min(2 * j + 2, down)):
                         for x in range(2 * i, min(2 * i + 2, across)):
@@ -295,23 +305,26 @@ def view(
                     continue
                 k = t.patch[n]
                 if k >= 0:
-                    safe, needed = _seen(t, found, k, triangle, forward, slope, floor, near, work)
-                    if needed:
-                        if count == out.size:
-                            return -1
-                        out[count] = k
-                        count += 1
-                    if safe:
-                        continue
-                if s == t.first[layer]:
-                    begin, end = rim_of(t, layer, n)
-                    for q in range(begin, end):
-                        if _seen(t, found, q, triangle, forward, slope, floor, near, work)[1]:
+                    low, high = depths(found.corners[k], triangle, forward, work)
+                    e = max(floor, slope * low)
+                    if low <= high and found.low[k] <= e:
+                        if (
+                            layers == 1
+                            or found.max_z[k] > e
+                            or not _covered(t, found, k, triangle, forward, slope, floor, near, work)
+                        ):
                             if count == out.size:
                                 return -1
-                            out[count] = q
+                            out[count] = k
                             count += 1
-                else:
+                        continue
+                if s == t.first[layer] and t.rim_at[layer] >= 0:
+                    at = t.rim_at[layer] + n - node
+                    part = (t.rim[at], t.rim[at + 1])
+                    count = _view_rim(t, found, part, triangle, forward, slope, floor, near, work, out, count)
+                    if count < 0:
+                        return -1
+                if s > t.first[layer]:
                     _, down, across = t.scale[s - 1]
                     for y in range(2 * j, min(2 * j + 2, down)):
                         for x in range(2 * i, min(2 * i + 2, across)):
@@ -321,25 +334,32 @@ def view(
 
 
 @kernel
-def _seen(
+def _view_rim(
     t: Tree,
     found: Boxes,
-    k: int,
+    part: tuple[int, int],
     triangle: Floats,
     forward: Floats,
     slope: float,
     floor: float,
     near: NDArray[np.int32],
     work: Floats,
-) -> tuple[bool, bool]:
-    """Whether a patch is in view and accurate enough all over its part of it, and whether it is needed, then."""
-    low, high = depths(found.corners[k], triangle, forward, work)
-    e = max(floor, slope * low)
-    if low > high or found.low[k] > e:
-        return False, False
-    if t.first.size == 2 or found.max_z[k] > e:
-        return True, True
-    return True, not _covered(t, found, k, triangle, forward, slope, floor, near, work)
+    out: NDArray[np.int32],
+    count: int,
+) -> int:
+    """Those of a part of the patches that :func:`view` takes, behind ``count`` in ``out``; -1 for too many."""
+    for k in range(part[0], part[1]):
+        low, high = depths(found.corners[k], triangle, forward, work)
+        e = max(floor, slope * low)
+        if low > high or found.low[k] > e:
+            continue
+        if found.max_z[k] <= e and _covered(t, found, k, triangle, forward, slope, floor, near, work):
+            continue
+        if count == out.size:
+            return -1
+        out[count] = k
+        count += 1
+    return count
 
 
 @kernel
