@@ -116,7 +116,7 @@ export class TerrainSession {
         connection: this.connection.state.value,
         reason: this.connection.reason.value,
         pending: this.doc.pending.value,
-        canEdit: this.canEdit.value,
+        canEdit: this.mayEdit.value,
       }),
     );
     this.people = computed(() => ({
