@@ -56,7 +56,7 @@ def _parser() -> argparse.ArgumentParser:
     serve.add_argument("--refine", type=int, metavar="LEVEL", help="finest level made where somebody looks, "
                        f"0 to {c.MAX_REFINED_LEVEL} (default {c.DEFAULT_REFINED_LEVEL})")  # fmt: skip
     serve.add_argument("--device", help="part of the name of the OpenCL device, or numpy")
-    serve.add_argument("--threads", type=int, help="threads of a CPU device (default: cores - 1)")
+    serve.add_argument("--threads", type=int, help="threads of a CPU device (default: all cores)")
     serve.add_argument("--log-level", choices=("debug", "info", "warning", "error"))
     commands.add_parser("import", help="bring in elevation files (see esker import --help)", add_help=False)
     commands.add_parser("history", help="what people did on a terrain (see esker history --help)", add_help=False)

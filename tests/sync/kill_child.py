@@ -44,7 +44,7 @@ class _NoTiles:
     def client(self, *_: Any) -> Any:
         return self
 
-    def plan(self) -> None:
+    def plan(self, *_: Any) -> None:
         return None
 
 

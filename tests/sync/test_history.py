@@ -217,7 +217,7 @@ def test_rooms_of_the_past_are_few_and_not_for_ever(tmp_path: Path, monkeypatch:
         assert first.closed()[0] == c.WS_CLOSE["bad_hello"]
         other = server.join(terrain, secret, "p1", at=1)
         third = Peer(server.socket())
-        third.say("hello", protocol=4, terrain=terrain, secret=secret, client="p2", at=1)
+        third.say("hello", protocol=c.PROTOCOL_VERSION, terrain=terrain, secret=secret, client="p2", at=1)
         code, error = third.closed()
         assert (code, error and error["message"]) == (c.WS_CLOSE["room_full"], past.CROWDED)
         for peer in (again, other):

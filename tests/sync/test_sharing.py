@@ -238,6 +238,20 @@ def test_a_newer_job_shows_its_coarsest_level_while_a_pass_goes_on() -> None:
     assert client.glimpse_due, "its coarsest level is out"
 
 
+def test_nobody_waits_for_a_lull() -> None:
+    """SPEC P94."""
+    desk = Desk()
+    first, second = desk.client(), desk.client()
+    assert not desk.schedule.urges(first)
+    desk.ask(first)
+    assert desk.schedule.urges(first), "a newer job of its own"
+    desk.slice()
+    assert not desk.schedule.urges(first), "its own solve can wait"
+    assert desk.schedule.urges(second), "for others it is work"
+    desk.ask(second)
+    assert desk.schedule.urges(first)
+
+
 # --- refinement -----------------------------------------------------------------------------------------------------
 
 

@@ -98,18 +98,14 @@ def test_a_finest_preview_keeps_what_a_newer_coarsest_one_has_moved(settled: Pyr
         assert off < (2 * PREVIEW_STEP + 0.6) * quantum
     settled.put(4, LEVELS, ground(LEVELS, 160.0), False)
     assert level(settled, 0) is not coarse or level(settled, 0).clock == 4
-    assert (
-        np.abs(level(settled, LEVELS).samples * quantum - ground(LEVELS, 160.0)).max() <= (PREVIEW_STEP + 0.1) * quantum
-    )
+    assert np.abs(level(settled, LEVELS).samples * quantum - ground(LEVELS, 160.0)).max() <= (PREVIEW_STEP + 0.1) * quantum
 
 
 def test_a_finest_preview_without_a_coarsest_one_of_its_own_is_shown_as_it_is(settled: Pyramid) -> None:
     settled.put(3, 0, ground(0, 150.0), False)
     settled.put(2, LEVELS, ground(LEVELS, 120.0), False)
     quantum = grid.quantum(LEVELS, SIZE_M)
-    assert (
-        np.abs(level(settled, LEVELS).samples * quantum - ground(LEVELS, 120.0)).max() <= (PREVIEW_STEP + 0.1) * quantum
-    )
+    assert np.abs(level(settled, LEVELS).samples * quantum - ground(LEVELS, 120.0)).max() <= (PREVIEW_STEP + 0.1) * quantum
     assert level(settled, 0).clock == 2
 
 
@@ -124,6 +120,27 @@ def test_what_level_0_moves_is_interpolated_as_tiles_are(at: tuple[int, int]) ->
     np.testing.assert_array_equal(found[::2, ::2], now * np.float32(0.5))
     inner = np.s_[4:-4, 4:-4]  # beside the domain's border tiles are predicted one-sidedly
     np.testing.assert_allclose(found[inner], predict(now)[inner] * 0.25, atol=0.5)
+
+
+def test_levels_that_move_go_before_a_new_selection(monkeypatch: pytest.MonkeyPatch) -> None:
+    """SPEC T54."""
+    server = TileServer(SIZE_M, LEVELS)
+    client = ClientTiles(server, rest_level=-1)
+    client.set_view(View(eye=(400, -300, 500), target=(400, 300, 0), tau_px=0.5))
+    solve(server.pyramid, 1, 100.0, show=True, settle=True)
+    _drain(client)
+    solve(server.pyramid, 2, 150.0, show=False)
+    selected = []
+    monkeypatch.setattr(ClientTiles, "_select", lambda _, view: selected.append(view))
+    for level in range(LEVELS + 1):
+        plan = client.plan(hurry=True)
+        assert plan is not None
+        assert plan.level == level
+        client.commit(plan)
+    assert client.plan(hurry=True) is None
+    assert not selected
+    client.plan()
+    assert len(selected) == 1, "in a hurry it was not forgotten"
 
 
 def test_agreeing_previews_cost_a_fraction_of_the_bytes() -> None:

@@ -14,6 +14,8 @@ import json
 import math
 import sys
 import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -23,7 +25,7 @@ from websockets.asyncio.client import connect as open_socket
 
 from esker import contract as c
 from esker import grid, templates
-from esker.bench import _serving
+from esker.bench import _phases, _serving
 from esker.document.strokes import profile_curve
 from esker.solve.solver import Solver
 from esker.tiles.decoder import FrameDecoder
@@ -124,10 +126,7 @@ def measure_bytes(solver: Solver, document: c.Document, segments: int) -> dict[s
     client.set_view(NEAR)
     _drain(client)
     sent = []
-    curve: tuple[c.CurvePoint, ...] = ()
-    for n in range(segments):
-        curve += segment(n).points
-        grown = document.model_copy(update={"strokes": (*document.strokes, PEN.model_copy(update={"curve": curve}))})
+    for n, grown in enumerate(_drawn(document, segments)):
         _put(server, solver, grown, 2 + n, settle=False)
         sent.append(_drain(client))
     _put(server, solver, grown, 2 + segments)
@@ -153,6 +152,25 @@ def _selection(server: TileServer) -> dict[str, Any]:
     return out
 
 
+def measure_phases(solver: Solver, document: c.Document, segments: int) -> dict[str, Any]:
+    """Where the time of one segment goes."""
+    server = TileServer(SIZE, LEVEL)
+    _put(server, solver, document, 1)
+    client = ClientTiles(server, rest_level=-1)
+    client.set_view(NEAR)
+    _drain(client)
+    return _phases.measure(solver, list(_drawn(document, segments)), server, client)
+
+
+def _drawn(document: c.Document, segments: int) -> Iterator[c.Document]:
+    """The document with one segment of the pen more each time."""
+    curve: tuple[c.CurvePoint, ...] = ()
+    for n in range(segments):
+        curve += segment(n).points
+        pen = PEN.model_copy(update={"curve": curve})
+        yield document.model_copy(update={"strokes": (*document.strokes, pen), "clock": 2 + n})
+
+
 # --- latencies, over a real socket ----------------------------------------------------------------------------------
 
 
@@ -173,19 +191,32 @@ class _Pen:
     changed: asyncio.Event = field(default_factory=asyncio.Event)
 
     async def listen(self) -> None:
-        """Applies frames as the page does, and gives credit."""
-        async for message in self.ws:
-            now = time.perf_counter()
-            if isinstance(message, bytes):
-                head, _, tiles = read_frame(message)
-                self.decoder.decode(message)
-                self.bytes += len(message)
-                await self.ws.send(f'{{"type":"credit","bytes":{len(message)}}}')
-                if head.kind == c.FrameKind.LEVEL:
-                    self.frames.append((now, head.level, head.clock, head.settled, len(tiles)))
-            else:
-                self._control(json.loads(message), now)
-            self.changed.set()
+        """Applies frames as the page does, in another thread, and gives credit."""
+        arrived: asyncio.Queue[Any] = asyncio.Queue()
+        with ThreadPoolExecutor(1) as worker:
+            applier = asyncio.create_task(self._apply(arrived, worker))
+            try:
+                async for message in self.ws:
+                    self._take(message, arrived, time.perf_counter())
+            finally:
+                applier.cancel()
+
+    def _take(self, message: Any, arrived: asyncio.Queue[Any], now: float) -> None:
+        if isinstance(message, bytes):
+            head, _, tiles = read_frame(message)
+            arrived.put_nowait(message)
+            self.bytes += len(message)
+            if head.kind == c.FrameKind.LEVEL:
+                self.frames.append((now, head.level, head.clock, head.settled, len(tiles)))
+        else:
+            self._control(json.loads(message), now)
+        self.changed.set()
+
+    async def _apply(self, arrived: asyncio.Queue[Any], worker: ThreadPoolExecutor) -> None:
+        while True:
+            message = await arrived.get()
+            await asyncio.get_running_loop().run_in_executor(worker, self.decoder.decode, message)
+            await self.ws.send(f'{{"type":"credit","bytes":{len(message)}}}')
 
     def _control(self, message: dict[str, Any], now: float) -> None:
         kind = message["type"]
@@ -311,6 +342,7 @@ def main(argv: list[str]) -> int:
         document = fifty() if name == "fifty" else templates.load(name).document
         scene: dict[str, Any] = {"strokes": len(document.strokes)}
         scene |= measure_bytes(solver, document, 12)
+        scene["phases_ms"] = measure_phases(solver, document, 24)
         scene["socket"] = measure_socket(document, arguments.appends)
         result["scenes"][name] = scene
     if arguments.json:

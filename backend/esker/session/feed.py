@@ -156,6 +156,9 @@ class TileFeed:
             if result.level == 0 and result.channel == c.Channel.HEIGHT and show and not result.settled:
                 self._put_coarse(clock, result)
                 return
+            if not show:  # noted in no time, and the finest level, which waits, comes behind it
+                self._executor.first(self._put, clock, result, show)
+                return
             while len(self._puts) > PUTS_AHEAD - 1:
                 self._puts.pop(0).result()
             self._puts.append(self._executor.first(self._put, clock, result, show))
@@ -293,7 +296,8 @@ class TileFeed:
                 tiles = self._clients[stream] = self._tiles.client(self._server)
             if view is not None:
                 tiles.set_view(view)
-            while made < BATCH_BYTES and (plan := tiles.plan()) is not None:
+            # Who has begun to make a level's frames makes them all; then a coarsest preview that waits goes first.
+            while made < BATCH_BYTES and (plan := tiles.plan(made > 0 and self._coarse is not None)) is not None:
                 frame = plan.encode()
                 tiles.commit(plan)
                 made += len(frame)

@@ -274,6 +274,10 @@ class Schedule:
             best = self._favoured = min(late, key=lambda x: x.turn)
         return best
 
+    def urges(self, client: Client) -> bool:
+        """Whether there is anything to do but to go on with the client's solve."""
+        return any(x.newest is not None or (x is not client and x.steps is not None) for x in self.clients)
+
     def ended(self, client: Client) -> None:
         """Its slice is over: from now on it waits. After a slice out of turn the others have at least as long."""
         now = self._now()

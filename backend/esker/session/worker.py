@@ -28,6 +28,9 @@ __all__ = ["Client", "Job", "Worker"]
 
 GROUND: Final = frozenset({c.Channel.BASE, c.Channel.SURVEY})
 """Channels of the elevation layers: no solve changes them."""
+LULLS: Final = {False: 0.002, True: 0.020}
+"""Seconds that a coarsest preview, and (True) a finest one, has to become frames before all cores compute what comes
+next, unless something else waits."""
 IDLE_CHECK: Final = 1.0
 """Seconds between looks at what may be tried again, when nothing else wakes the thread."""
 AGAIN_AFTER: Final = 3.0
@@ -243,6 +246,13 @@ class Worker:
         if result is not None:
             show = result.channel in GROUND or client.took(result, self._now())
             self._deliver(client, job, result, show)
+            if result.channel == c.Channel.HEIGHT and not result.settled and result.level in (0, client.top):
+                self._lull(client, LULLS[result.level == client.top])
+
+    def _lull(self, client: Client, seconds: float) -> None:
+        """Leaves the processor to those who bring people what was just delivered."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._stopping or self._schedule.urges(client), seconds)
 
     def _aside(self, client: Client) -> None:
         """The channels of the newest job, while the running one goes on."""

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, Literal, cast
 
 from esker.contract import CHEBYSHEV_SWEEPS, SATURATION
-from esker.solve import gpu_program, pocl_cpu, reference, tables, wave
+from esker.solve import gpu_program, pocl_cpu, priority, reference, tables, wave
 from esker.solve.faults import BuildError, NoDeviceError, build_error, finished
 
 log = logging.getLogger(__name__)
@@ -63,8 +63,9 @@ class Device:
 
 
 def default_threads() -> int:
-    """Cores - 1, at least 1: the event loop keeps a core (DESIGN 8)."""
-    return max(1, (os.cpu_count() or 1) - 1)
+    """All cores where the threads yield to the event loop's (``priority``), else it keeps one for itself (DESIGN 8)."""
+    cores = os.cpu_count() or 1
+    return cores if priority.can_yield() else max(1, cores - 1)
 
 
 def open_device(
@@ -128,7 +129,9 @@ def _found(threads: int | None) -> list[tuple[str, Any]]:
         os.environ.update({_POCL_FOLDER: folder} if folder else {_POCL_CACHE: "0"})
     names: dict[str, int] = {}
     out = []
-    for name, d in _devices():
+    with priority.yielding():  # PoCL starts its threads when its devices are first listed
+        devices = _devices()
+    for name, d in devices:
         names[name] = names.get(name, 0) + 1
         out.append((name if names[name] == 1 else f"{name} #{names[name]}", d))
     return out

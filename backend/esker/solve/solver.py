@@ -65,7 +65,7 @@ class Solver:
     """Solves stroke sets on one device. Use it from one thread; solves may be interleaved level by level.
 
     ``device``: part of the name of an OpenCL platform or device, or "numpy"; None takes the best there is.
-    ``threads`` limits PoCL and counts for the first solver of a process (default: cores - 1). Raises NoDeviceError
+    ``threads`` limits PoCL and counts for the first solver of a process (default: all cores). Raises NoDeviceError
     when a device that was asked for by name is missing, ValueError for a level that is not solved globally.
     """
 

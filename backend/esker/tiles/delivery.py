@@ -251,8 +251,10 @@ class ClientTiles:
         """Wanted tiles that the settled ground has not been refined to yet, with their projected errors in pixels."""
         return [(k, e) for k, e in self._selection.tiles.items() if self._server.refined.verified(k) is None]
 
-    def plan(self) -> FramePlan | None:
+    def plan(self, hurry: bool = False) -> FramePlan | None:
         """The most useful next frame, or None when there is nothing to send now. Cheap; changes nothing held.
+
+        ``hurry``: only levels that move, over the selection of before; all else can wait.
 
         Levels coarse to fine: a LEVEL frame where a newer put waits; then FILL frames for tiles that came into view,
         coarse to fine and by projected error; then the other channels; then refined tiles; then, when the ground is
@@ -261,9 +263,14 @@ class ClientTiles:
         stamp = self._server.stamp
         if self._idle_stamp == stamp and not self._view_changed:
             return None
-        self.refresh()
-        plan = self._plan_ground() or self._plan_channels()
-        if plan is None and self._server.refined.active:
+        # Levels that move go first, over the selection of before: selecting anew takes longer than sending them.
+        plan = None if self._view_changed else self._plan_levels()
+        if plan is None and not hurry:
+            self.refresh()
+            plan = self._plan_levels() or self._plan_fills() or self._plan_channels()
+        if plan is not None or hurry:
+            return plan
+        if self._server.refined.active:
             plan = self._plan_refined()
         if plan is None and self._server.settled():
             plan = self._plan_rest()
@@ -271,7 +278,7 @@ class ClientTiles:
             self._idle_stamp = stamp
         return plan
 
-    def _plan_ground(self) -> FramePlan | None:
+    def _plan_levels(self) -> FramePlan | None:
         plan = self._base.plan_limit() or self._heights.plan_limit()
         if plan is not None:
             return plan
@@ -279,6 +286,9 @@ class ClientTiles:
             plan = self._base.plan_level(level, wanted) or self._heights.plan_level(level, wanted)
             if plan is not None:
                 return plan
+        return None
+
+    def _plan_fills(self) -> FramePlan | None:
         for level, wanted in enumerate(self._wanted):
             plan = self._plan_fill(level, wanted, None if self._errors is None else self._errors[level])
             if plan is not None:
