@@ -41,7 +41,7 @@ TAUS: Final = (0.5, 0.7, 1.5, 3.0, 6.0, 12.0)
 THREE: Final = ("three-webgl", "three-webgl-displacement", "three-webgpu")
 SCREEN_SPACE_ERRORS: Final = (1.0, 2.0, 4.0)
 GROWTH: Final = (4, 6, 8, 10)
-RIDGES: Final = (5, 6, 9)
+RIDGES: Final = (5, 6, 8, 9)
 """Seeds of the low views in which hidden patches are looked for."""
 OFF: Final = 8
 

@@ -58,6 +58,7 @@ export async function open(options: {
   tau = options.tauPx ?? 1.5;
   const view = new FieldView(SIZE, options.levels ?? 4, filteredField(7, RUGGED_M));
   shown = { renderer: await GpuRenderer.create(canvas, gpu), canvas, device, view };
+  shown.renderer.endless = false;
 }
 
 function heightAt(view: FieldView, x: number, y: number): number {
@@ -65,23 +66,12 @@ function heightAt(view: FieldView, x: number, y: number): number {
   return samplesOf(view)(view.levels, Math.round((x / SIZE) * n), Math.round((y / SIZE) * n));
 }
 
-/** The lowest of some random places. */
-function gully(next: () => number): readonly [number, number] {
-  let lowest: readonly [number, number, number] = [0, 0, Number.POSITIVE_INFINITY];
-  for (let k = 0; k < 8; k += 1) {
-    const [x, y] = [SIZE * (0.15 + 0.7 * next()), SIZE * (0.15 + 0.7 * next())];
-    const z = heightAt(shown.view, x, y);
-    if (z < lowest[2]) lowest = [x, y, z];
-  }
-  return [lowest[0], lowest[1]];
-}
-
 /** A place near the ground, looking over it; every fifth from the air, or the map. */
 function pose(next: () => number, index: number): CameraState {
   const { canvas, view } = shown;
   const [width, height] = [canvas.width, canvas.height];
   const angle = next() * 2 * Math.PI;
-  const [x, y] = index % 5 < 3 ? gully(next) : [SIZE * (0.15 + 0.7 * next()), SIZE * (0.15 + 0.7 * next())];
+  const [x, y] = [SIZE * (0.15 + 0.7 * next()), SIZE * (0.15 + 0.7 * next())];
   const up = index % 5 === 3 ? 200 + 300 * next() : 10 + 25 * next();
   if (index % 5 === 4) return mapCamera([x, y, 0], 900 + 2000 * next(), width, height);
   const eye: Vec3 = [x, y, heightAt(view, x, y) + up];
