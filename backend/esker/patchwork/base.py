@@ -332,6 +332,9 @@ class Base:
             )
             heights[up, across], cover[up, across] = blend.evaluate(packed, lattice, device)
             self.melt.lay(packed, lattice, heights[up, across])
+        if self.melt.zones:  # high ground that is raised as far as low ground beside it might leave the bounds
+            low, high = np.float32(self.low), np.float32(self.high)
+            np.clip(heights, np.nextafter(low, high), np.nextafter(high, low), out=heights)
         return heights, cover
 
     def _beyond(self, points: Floats, device: ClDevice | None) -> Floats:

@@ -1,21 +1,22 @@
 """Surveys melt into older ground: where two layers disagree along the border of the one that is believed, the ground
 of the other is bent to meet it.
 
-The blend alone lets a newer layer end within 1.5 of its cells, whatever lies beside it. Here the *rim* of each layer,
-the border of what its kernels cover, is sampled a cell apart. At each rim point the difference D of the layer to the
+The blend alone lets a newer layer end within 1.5 of its cells, whatever lies beside it. Here the border of each layer,
+the edge of what its kernels cover, is sampled a cell apart. At each border point the difference D of the layer to the
 ground of all layers that are trusted less is known. Ground of these layers gets the correction
 
     u = D(x) (1 - d^2 / R^2)^3,    1 / R^2 = 1 / (RUN |D(x)|)^2 + 1 / cap^2,
 
-with d the distance to the rim and D(x) the rim's differences, averaged over the more of it the farther x is: detail
-along the rim fades near it, as in a membrane. A difference has reached R, five times its size; the cap is an eighth of
-the domain. What differs by less than a quarter of the newer layer's cell agrees: there u is 0, and no bit changes.
+with d the distance to the border and D(x) the border's differences, averaged over the more of it the farther x is:
+detail along the border fades near it, as in a membrane. So a difference is gone at RUN = 5 times its size, or nearer:
+the cap is an eighth of the domain. What differs by less than a quarter of the newer layer's cell agrees: there u is 0,
+and no bit changes.
 
-D(x) and d come from one ladder of kernel sums (``melt_loops``): nodes h apart, 1.4 h, 2 h, ... from the rim's own
-spacing on. The density of the rim's kernel sum says how far the rim is, since the kernel is nearly Gaussian, and the
-quotient of sums is the mean difference (a normalised convolution, Knutsson and Westin 1993). Each place takes the
-finest level that the rim is near enough to. The result is a smooth function (C2) of the place alone, the same for
-every level, window and tolerance.
+D(x) and d come from one ladder of kernel sums (``melt_loops``): nodes h apart, 1.4 h, 2 h, ... from the border's own
+spacing on. The density of the border's kernel sum says how far the border is, since the kernel is nearly Gaussian,
+and the quotient of sums is the mean difference (a normalised convolution, Knutsson and Westin 1993). Each place takes
+the finest level that the border is near enough to. The result is a smooth function (C2) of the place alone, the same
+for every level, window and tolerance.
 
 Layers are melted in the order of trust: the differences of each are those to the ground below it as it was melted
 before. A patch of layer j gets v_j, the sum of u over the layers that are trusted more, and what is added to the blend
@@ -34,11 +35,11 @@ from numpy.typing import NDArray
 
 from esker.patchwork import blend, blend_points, melt_loops, patches
 from esker.patchwork.blend_loops import BIN
+from esker.patchwork.borders import border_of
 from esker.patchwork.jets import product, total
 from esker.patchwork.jit import bands, kernel, spread
 from esker.patchwork.lod_space import Model
 from esker.patchwork.melt_loops import AGREED, BLOCK, FAR, RUN, RUNG, Tables
-from esker.patchwork.rims import rim_of
 from esker.patchwork.trust import trust
 
 Floats = NDArray[np.float64]
@@ -66,8 +67,8 @@ class Zone(NamedTuple):
 
 
 class Differences(NamedTuple):
-    """Rim points (n, 2) of a layer that lie on other ground, their ``weight`` (n,) in metres of rim, ``difference``
-    (n,) metres by which the layer is higher there, and ``pitch`` metres from one point to the next at most."""
+    """Border points (n, 2) of a layer that lie on other ground, their ``weight`` (n,) in metres of border, and
+    ``difference`` (n,) metres by which the layer is higher there; ``pitch`` metres from point to point at most."""
 
     points: Floats
     weight: Floats
@@ -122,7 +123,7 @@ class Melt:
         return found
 
     def _asked(self, place: int, size_m: float) -> Rect | None:
-        """What of a layer can have a rim that matters; None if nothing lies below it."""
+        """What of a layer can have a border that matters; None if nothing lies below it."""
         k = self._order[place]
         reach = 3 * max(max(p.layer.spacing_m) for p in self._model.placed)
         box = _grown(self._boxes[k], reach)
@@ -140,7 +141,7 @@ class Melt:
         return hashlib.blake2b(b"\0".join(parts), digest_size=16).digest()
 
     def _zone(self, place: int) -> Zone | None:
-        """The differences along a layer's rim as nodes; None where it agrees with all ground below."""
+        """The differences along a layer's border as nodes; None where it agrees with all ground below."""
         layer = self._model.placed[self._order[place]].layer
         points, weight, difference, first = self.differences(place)
         cell = math.sqrt(layer.spacing_m[0] * layer.spacing_m[1])
@@ -169,13 +170,13 @@ class Melt:
     def differences(self, place: int) -> Differences:
         """Of the layer at ``place`` in the order of trust to the ground below it."""
         k = self._order[place]
-        rim = rim_of(self._model.sheets[k])
-        there = ((rim.points > -self._cap) & (rim.points < (_CAP + 1) * self._cap)).all(axis=1)
-        points, weight = rim.points[there], rim.weight[there]
+        border = border_of(self._model.sheets[k])
+        there = ((border.points > -self._cap) & (border.points < (_CAP + 1) * self._cap)).all(axis=1)
+        points, weight = border.points[there], border.weight[there]
         ground, known = self._ground(place, points)
         met = known > 0
         difference = self._alone(k, points[met])[0] - ground[met]
-        return Differences(points[met], (weight * known)[met], difference, rim.pitch)
+        return Differences(points[met], (weight * known)[met], difference, border.pitch)
 
     def _ground(self, place: int, points: Floats) -> tuple[Floats, Floats]:
         """Heights and cover at points of the layers below ``place``, each laid over those that are trusted less."""
@@ -195,10 +196,10 @@ class Melt:
     def _alone(self, k: int, points: Floats) -> tuple[Floats, Floats]:
         """Heights and cover at points of a layer alone, from its own samples."""
         sheet = self._model.sheets[k]
-        own = slice(sheet.scale_range(0)[0], sheet.scale_range(patches.SMALL_SCALES)[1])
+        own = slice(0, sheet.scale_range(patches.SMALL_SCALES)[1])
         grown = 3 * max(sheet.placed.layer.spacing_m)
         near = _near(sheet.kernel[own], grown, points)
-        index = (near + (self._model.first[k] + own.start)).astype(np.int32)
+        index = (near + self._model.first[k]).astype(np.int32)
         found = blend_points.evaluate(blend.pack(self._model, index, True), points)
         return found.heights[:, 0].copy(), found.cover[:, 0].copy()
 
@@ -296,7 +297,7 @@ def _spread_out(
 
 
 def _first_reach(hot: Floats, pitch: list[float]) -> tuple[float, tuple[int, int, int, int]]:
-    """Side of the cells of a reach, and the first column and row, columns and rows of those that kernels of the rim's
+    """Side of the cells of a reach, and the first column and row, columns and rows of those that kernels of the
     differing points ``hot`` meet at all."""
     wide = max(8 * pitch[0], pitch[-1] / 8)
     x0, y0, x1, y1 = _grown(_box(hot), 4 * pitch[-1])

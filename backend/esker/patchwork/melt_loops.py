@@ -1,8 +1,9 @@
-"""The melt's compiled loops (see ``melt``): tables of the differences along rims, and the correction that they give.
+"""The melt's compiled loops (see ``melt``): tables of the differences along borders, and the correction that they give.
 
-A table is a ladder of levels of nodes, each RUNG times as far apart as those of the level below. Rim points are spread
-on the nodes of a level with cubic B-splines and read with them again: a kernel of variance 2/3 pitch^2 whatever the
-places, since B-splines reproduce quadratics. Only blocks of nodes near the rim are held. Twin: ``melt_reference``.
+A table is a ladder of levels of nodes, each RUNG times as far apart as those of the level below. Border points are
+spread on the nodes of a level with cubic B-splines and read with them again: a kernel of variance 2/3 pitch^2 whatever
+the places, since B-splines reproduce quadratics. Only blocks of nodes near the border are held.
+Twin: ``melt_reference``.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ SPREAD: Final = 4 / 3
 SOFT: Final = 0.1
 """Squares of the pitch over which squared distances are rounded off towards 0."""
 NEAR: Final = 1.2
-"""Squared distance from the rim in pitches up to which a level is believed wholly."""
+"""Squared distance from the border in pitches up to which a level is believed wholly."""
 FAR: Final = 4.8
 """And from which on it is not believed at all."""
 LEAST: Final = PEAK * math.exp(-FAR / SPREAD)
@@ -45,14 +46,14 @@ AGREED: Final = 0.25
 
 
 class Tables(NamedTuple):
-    """Differences along the rims of z layers, as nodes; flat, so that compiled loops take them whole.
+    """Differences along the borders of z layers, as nodes; flat, so that compiled loops take them whole.
 
     Per layer: ``above`` its place in the order of trust; ``cell`` and ``cap`` metres; its reach: ``wide`` metres the
     side of a cell, ``reach`` int64 (z, 5) first column and row, columns, rows, and where its part of ``held`` begins,
     row by row: whether anything may be corrected in the cell; ``ladder`` int64 (z + 1,) where its levels begin. Per
     level: ``pitch`` metres; ``corner`` int64 (levels, 4) first block column and row, columns, rows; ``chart`` int64
     where its part of ``blocks`` begins: the block at each place, row by row, -1 for none. ``nodes`` float32 (blocks,
-    19, 19, 2): density of the rim, and of the rim times difference.
+    19, 19, 2): density of the border, and of the border times difference.
     """
 
     above: NDArray[np.int32]
@@ -146,7 +147,7 @@ def _step(t: float) -> Line:
 
 @kernel
 def mean_and_square(t: Tables, z: int, x: float, y: float) -> tuple[float, float]:
-    """The rim's mean difference as seen from a place, metres, and the squared distance to the rim; inf far from it."""
+    """The border's mean difference as seen from a place, metres, and the squared distance to it, inf far from it."""
     left, difference, square = 1.0, 0.0, 0.0
     for level in range(t.ladder[z], t.ladder[z + 1]):
         k, row, col, f, g = _block(t, level, x, y)
@@ -184,7 +185,7 @@ def _in_reach(t: Tables, z: int, x: float, y: float) -> bool:
 
 @kernel
 def reach_cells(t: Tables, far: float, held: NDArray[np.bool_]) -> None:
-    """Which cells of layer 0's reach are no farther from its rim than ``far`` metres, told from their middles."""
+    """Which cells of layer 0's reach are no farther from its border than ``far`` metres, told from their middles."""
     wide, cols = t.wide[0], t.reach[0, 2]
     limit = (far + 1.5 * wide) ** 2
     for k in range(len(held)):
@@ -244,7 +245,7 @@ def lift_jet(t: Tables, z: int, x: float, y: float) -> Jet:
 
 @kernel
 def _faded(d: Jet, square: Jet, least: float, per_cap: float) -> Jet:
-    """The difference ``d`` at squared distance ``square`` from the rim, faded out over its reach."""
+    """The difference ``d`` at squared distance ``square`` from the border, faded out over its reach."""
     size, sign = abs(d[0]), 1.0 if d[0] > 0 else -1.0
     run = 1 / (RUN * RUN * size * size)
     share = composed(d, (run + per_cap, -2 * sign * run / size, 6 * run / (size * size)))

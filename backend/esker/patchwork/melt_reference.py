@@ -29,7 +29,7 @@ def _sums(points: Floats, weight: Floats, pitch: float, at: Floats) -> Floats:
 def lifts(
     points: Floats, weight: Floats, difference: Floats, pitch: tuple[float, ...], cell: float, cap: float, at: Floats
 ) -> Floats:
-    """Correction u (k,) at places (k, 2) of a rim: points (n, 2), their weights in metres and differences (n,)."""
+    """Correction u (k,) at places (k, 2) of a border: points (n, 2), their weights in metres and differences (n,)."""
     left, mean, square = np.ones(len(at)), np.zeros(len(at)), np.zeros(len(at))
     for h in pitch:
         density = _sums(points, weight, h, at)
