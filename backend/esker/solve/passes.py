@@ -64,7 +64,7 @@ class LevelResult:
 class Workspace(Protocol):
     """Memory and kernels for one solve at a time of one finest level; ``device_workspace`` says what each does.
 
-    scout: a small one that makes the coarsest preview of the same strokes, None below ``solver.SCOUT_FROM``.
+    scout: a small one that makes the coarsest preview of the same strokes, None below ``grid.SCOUT_FROM``.
     """
 
     top: int
