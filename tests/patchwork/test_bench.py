@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from esker.bench import _patchwork, _patchwork_big, _patchwork_data, _patchwork_gdal, patchwork
+from esker.bench import _patchwork, _patchwork_big, _patchwork_cover, _patchwork_data, _patchwork_gdal, patchwork
 from esker.patchwork import lod_space, rasters
 from esker.patchwork.query import Index
 
@@ -40,6 +40,7 @@ def test_everything_is_measured_and_told(tmp_path: Path) -> None:
     big = _patchwork_big.main(tmp_path / "heights.npy", tmp_path / "raster")
     assert big["three_stages_s"] > 0
     assert 0.3 < big["bytes_over"]["share"] < 5
+    assert big["memory"]["peak_resident_mib"] >= big["memory"]["resident_mib"] > big["memory"]["anonymous_mib"] > 0
     raster = rasters.read(tmp_path / "raster")
     index = Index(lod_space.build([patchwork.whole(raster)]))
     asked = patchwork.queries(index, quick=True)
@@ -65,3 +66,25 @@ def test_everything_is_measured_and_told(tmp_path: Path) -> None:
     assert len(_patchwork.rows(result)) == 3
     with pytest.raises(ValueError, match="no place"):
         _patchwork.document("nothing", result)
+
+
+def test_what_of_a_file_is_ground_is_counted(tmp_path: Path) -> None:
+    """A hole of one sample in 20 x 30: blocks of 7 x 7 hold all but 48 of the rest, rims those, too."""
+    heights = np.arange(600.0).reshape(20, 30)
+    heights[8, 9] = np.nan
+    (tmp_path / "files").mkdir()
+    np.save(tmp_path / "files" / "holed.npy", heights)
+    np.save(tmp_path / "files" / "plain.npy", np.nan_to_num(heights))
+    (tmp_path / "files" / "empty.tif").touch()
+    result = _patchwork_cover.main([tmp_path / "files"])
+    assert list(result["files"]) == ["holed.npy", "plain.npy"]
+    one = result["files"]["holed.npy"]
+    assert one["in_blocks"] == pytest.approx(551 / 599)
+    assert one["in_all"] == 1
+    assert one["rim_patches"] == 4
+    text = _patchwork_cover.document(f"a {_patchwork_cover.BEGIN} stale {_patchwork_cover.END} b", result)
+    assert "stale" not in text
+    assert "| holed.npy | 20 × 30 | 99.8 % | 92.0 % | 100.0 % |" in text
+    assert "1 further files" in text
+    with pytest.raises(ValueError, match="no place"):
+        _patchwork_cover.document("nothing", result)

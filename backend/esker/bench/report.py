@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from esker.bench import _patchwork, _refine, _solver
+from esker.bench import _patchwork, _patchwork_cover, _refine, _solver
 
 ROOT = Path(__file__).resolve().parents[3]
 RESULTS = ROOT / "bench" / "results"
@@ -104,7 +104,8 @@ def documents() -> dict[Path, str]:
     out = {README: readme(README.read_text(encoding="utf-8"))}
     out[SOLVER] = _solver.document(SOLVER.read_text(encoding="utf-8"), result("solve"))
     out[REFINEMENT] = _refine.document(REFINEMENT.read_text(encoding="utf-8"), result("refine"))
-    out[PATCHWORK] = _patchwork.document(PATCHWORK.read_text(encoding="utf-8"), result("patchwork"))
+    page = _patchwork.document(PATCHWORK.read_text(encoding="utf-8"), result("patchwork"))
+    out[PATCHWORK] = _patchwork_cover.document(page, result("patchwork_cover"))
     return out
 
 
