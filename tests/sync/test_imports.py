@@ -33,7 +33,7 @@ def _words(path: Path) -> str:
 
 
 class Reader:
-    """Reads files whose text says what to do: words of "ask", "refuse", "slow", "crash"."""
+    """Reads files whose text says what to do: words of "ask", "refuse", "long", "slow", "crash"."""
 
     def __init__(self) -> None:
         self.gate = threading.Event()
@@ -42,9 +42,19 @@ class Reader:
         self.most = 0
 
     async def inspect(
-        self, path: Path, name: str, *, answers: c.ImportAnswers | None = None, **_: Any
+        self,
+        path: Path,
+        name: str,
+        *,
+        answers: c.ImportAnswers | None = None,
+        on_progress: Callable[[ImportStage, float], None] | None = None,
+        **_: Any,
     ) -> c.ImportReport:
         words = _words(path)
+        while "long" in words and not self.gate.is_set():
+            assert on_progress is not None
+            on_progress("reading", 0.5)
+            await asyncio.sleep(0.01)
         given = {} if answers is None else answers.answers
         if given.get("size") == "no":
             return c.ImportReport(verdict="refused", file=name, refusal="That is no size.")
@@ -122,13 +132,13 @@ def _send(server: LiveServer, terrain: str, secret: str, words: str, query: str 
 
 
 def _wait(server: LiveServer, terrain: str, secret: str, job: str, *stages: str) -> dict[str, Any]:
-    deadline = time.monotonic() + 10
+    deadline = time.monotonic() + 60
     while time.monotonic() < deadline:
         _, status = server.http("GET", f"/api/terrains/{terrain}/imports/{job}", secret=secret)
         if status["stage"] in stages:
             return dict(status)
         time.sleep(0.01)
-    raise TimeoutError(stages)
+    raise TimeoutError(f"{stages}: {status}")
 
 
 def _layers(server: LiveServer, terrain: str) -> tuple[c.Layer, ...]:
@@ -253,6 +263,21 @@ def test_what_is_refused_leaves_nothing(live: LiveServer, words: str, says: str)
     assert says in _wait(live, terrain, secret, job["id"], "refused")["text"]
     assert _layers(live, terrain) == ()
     assert list((live.assembly.settings.data / "grids").iterdir()) == []
+
+
+def test_progress_moves_while_a_file_is_examined(live: LiveServer, reader: Reader) -> None:
+    """SPEC P106: examining the largest files takes a while too."""
+    terrain, secret = live.create()
+    _, job = _send(live, terrain, secret, "long")
+    deadline = time.monotonic() + 60
+    shares = [job["share"]]
+    while shares[-1] < 0.25 and time.monotonic() < deadline:
+        shares.append(live.http("GET", f"/api/terrains/{terrain}/imports/{job['id']}", secret=secret)[1]["share"])
+        time.sleep(0.01)
+    assert shares[-1] == pytest.approx(0.25)
+    assert shares == sorted(shares)
+    reader.gate.set()
+    assert _wait(live, terrain, secret, job["id"], "done")["share"] == 1.0
 
 
 @pytest.mark.parametrize("words", ["slow", "ask"])
@@ -380,7 +405,7 @@ def _file(server: LiveServer, words: str) -> Path:
 
 
 def _until(terrain: LiveTerrain, ready: Callable[[], object]) -> None:
-    deadline = time.monotonic() + 10
+    deadline = time.monotonic() + 60
     while not ready():
         assert time.monotonic() < deadline
         terrain.wait_clock(0)

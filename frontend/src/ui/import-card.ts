@@ -2,7 +2,7 @@ import { html, nothing, type TemplateResult } from "lit";
 import { live } from "lit/directives/live.js";
 import type { ImportQuestion, ImportReport } from "../generated/contract.ts";
 import { icon } from "./icons.ts";
-import { heightRange, optionWords, SIZE_QUESTION } from "./import-questions.ts";
+import { handAnswers, heightRange, listsFormats, namesSystem, optionWords } from "./import-questions.ts";
 import { type ImportJob, isOver } from "./imports.ts";
 import { reportFacts } from "./layers.ts";
 import { PendingLaying } from "./laying.ts";
@@ -78,7 +78,7 @@ export class EskImportCard extends SignalElement {
             : nothing
         }
         ${job.problem ? html`<p class="problem">${job.problem}</p>` : nothing}
-        ${job.phase === "refused" ? html`<p class="quiet">${whatToDo(report)}</p>` : nothing}
+        ${job.phase === "refused" ? html`<p class="quiet">${whatToDo(job.problem)}</p>` : nothing}
         ${report && job.phase !== "upload" ? this.#report(report, job.phase === "question" && this.stage.input.laying.value === null) : nothing}
         ${job.phase === "question" && report ? this.#questions(report) : nothing}
       </article>
@@ -105,8 +105,7 @@ export class EskImportCard extends SignalElement {
     const answers = groundwork.answersTo(this.job);
     const laying = input.laying.value;
     const byHand = laying instanceof PendingLaying;
-    // The size is that of the grid on the ground.
-    const asked = report.questions.filter((q) => !(byHand && q.id === SIZE_QUESTION));
+    const asked = report.questions.filter((q) => !(byHand && handAnswers(q)));
     return html`
       <form @submit=${this.#submit}>
         ${asked.map((q) => this.#question(q, answers[q.id] ?? ""))}
@@ -185,7 +184,7 @@ export class EskImportCard extends SignalElement {
             <span>${optionWords(question.id, option)}</span>
           </label>`,
         )}
-        ${question.id === "place" ? this.#otherSystem(question, answer, set) : nothing}
+        ${namesSystem(question) ? this.#otherSystem(question, answer, set) : nothing}
       </fieldset>`;
     return html`<label class="typed">
       <span>${question.text}</span>
@@ -200,9 +199,8 @@ export class EskImportCard extends SignalElement {
   }
 }
 
-function whatToDo(report: ImportReport | null): string {
-  if (report === null || report.format === "")
-    return "Nothing was added. Save it in one of these formats and drop it again.";
+function whatToDo(problem: string | null): string {
+  if (listsFormats(problem ?? "")) return "Nothing was added. Save it in one of these formats and drop it again.";
   return "Nothing was added. Mend the file and drop it again, or drop another one.";
 }
 

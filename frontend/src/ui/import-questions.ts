@@ -4,13 +4,32 @@ import type { ImportQuestion } from "../generated/contract.ts";
 
 /** Asked of a grid that says nothing of where it lies or how large it is. */
 export const SIZE_QUESTION = "size";
+/** Asked of a grid whose heights the terrain cannot hold. */
+const HEIGHT_QUESTION = "height";
 const PLACE_QUESTION = "place";
 /** The answer that means: in the middle of the terrain, from where I move it myself. */
 const MIDDLE = "middle";
+/** The answer that gives the file up. */
+const STOP = "stop";
 
 /** Whether this answer leaves it to me where the grid lies. */
 export function laidByHand({ id }: ImportQuestion, answer: string): boolean {
   return id === SIZE_QUESTION || (id === PLACE_QUESTION && answer === MIDDLE);
+}
+
+/** Whether laying a grid by hand answers a question: where it lies, how large it is, and how high. */
+export function handAnswers({ id }: ImportQuestion): boolean {
+  return id === SIZE_QUESTION || id === HEIGHT_QUESTION;
+}
+
+/** Whether a coordinate system may be named: not where the file has one and lies elsewhere, which is laid by hand or not at all. */
+export function namesSystem({ id, options }: ImportQuestion): boolean {
+  return id === PLACE_QUESTION && !options.includes(STOP);
+}
+
+/** Whether a refusal says which formats there are (`backend/esker/importing/opening.py`). */
+export function listsFormats(refusal: string): boolean {
+  return refusal.includes("There are: ");
 }
 
 /** Lowest and highest height from an answer such as "0..4380"; null for any other text. */
@@ -29,6 +48,7 @@ const WORDS: Readonly<Record<string, Readonly<Record<string, string>>>> = {
   },
   imagery: { elevation: "Take it as elevation", stop: "Do not bring it in" },
   nodata: { none: "No, they are heights" },
+  height: { shift: "Yes, shift all its heights", stop: "Do not bring it in" },
 };
 
 /** An option as a person reads it. */

@@ -11,7 +11,14 @@ import { fromDocument } from "../../src/doc/document.ts";
 import type { ImportReport, Layer } from "../../src/generated/contract.ts";
 import { sheetShades, sheetVertices } from "../../src/gpu/sheet.ts";
 import { footprintVisuals, outlineOf, sheetOf, stemsOf } from "../../src/ui/footprints.ts";
-import { heightRange, laidByHand, optionWords } from "../../src/ui/import-questions.ts";
+import {
+  handAnswers,
+  heightRange,
+  laidByHand,
+  listsFormats,
+  namesSystem,
+  optionWords,
+} from "../../src/ui/import-questions.ts";
 import { layerFacts, orderedLayers, percent, placeWords, reorderOps, reportFacts } from "../../src/ui/layers.ts";
 import { PendingLaying, startingPlace } from "../../src/ui/laying.ts";
 import { EMPTY } from "../doc/model.ts";
@@ -88,6 +95,14 @@ describe("words of grids", () => {
     expect(heightRange("-12.5 .. 1e3")).toEqual([-12.5, 1000]);
     for (const text of ["5..1", "fit", "", "1..x", undefined]) expect(heightRange(text)).toBeNull();
     expect(optionWords("nodata", "-9999")).toBe("Yes, leave out -9999");
+    expect(optionWords("height", "shift")).toBe("Yes, shift all its heights");
+    const place = (...options: string[]) => ({ id: "place", text: "", options, default: "middle" });
+    expect(namesSystem(place("EPSG:4326", "middle"))).toBe(true);
+    expect(namesSystem(place("middle", "stop"))).toBe(false);
+    expect(handAnswers({ ...place("shift", "stop"), id: "height" })).toBe(true);
+    expect(handAnswers(place("middle"))).toBe(false);
+    expect(listsFormats("It is in no format that can be read. There are: GeoTIFF or COG")).toBe(true);
+    expect(listsFormats("It is empty.")).toBe(false);
     expect(optionWords("rows", "north first")).toBe("North first");
   });
 });

@@ -1,9 +1,4 @@
-"""Bringing elevation files into terrains: upload, examination, questions, conversion, and the op that lays the layer.
-
-One import is one work folder of the ``GridStore`` and one task. Everything about the file happens in a child process
-(``esker.importing``); here is who may import, how much at once, and in which order things become durable: the raster is
-stored under its digest, synced, and only then is the op ordered that names it (decision 0019).
-"""
+"""All imports of one server: who may, how many at once, and the steps from an upload to a layer."""
 
 from __future__ import annotations
 
@@ -11,15 +6,15 @@ import asyncio
 import logging
 import secrets
 import time
-from collections.abc import AsyncIterator, Callable, Coroutine
-from dataclasses import dataclass, field
-from pathlib import Path, PurePosixPath
-from typing import Any, Final, Protocol
+from collections.abc import AsyncIterator, Callable
+from pathlib import PurePosixPath
+from typing import Final
 
 from esker import contract as c
 from esker.contract import ImportStage, ImportStatus
 from esker.document.ops import Refusal
 from esker.importing.refusal import ImportCancelled, ImportRefused
+from esker.imports.job import OVER, Cannot, Importer, Job, clean_name
 from esker.patchwork.trust import default_priority
 from esker.session.core import Denied
 from esker.session.hub import Hub
@@ -44,85 +39,6 @@ ROUNDS: Final = 12
 """How often an import asks at most: answers may be wrong, or raise other questions."""
 STOP: Final = "stop"
 """The answer that ends an import (``importing.questions``)."""
-OVER: Final = frozenset({"done", "refused", "cancelled"})
-
-
-class Cannot(Exception):
-    """An import that cannot begin, or an answer that comes too late: HTTP status, code, and a sentence."""
-
-    def __init__(self, status: int, code: str, message: str) -> None:
-        super().__init__(message)
-        self.status, self.code, self.message = status, code, message
-
-
-class Importer(Protocol):
-    """What examines and converts files: the module ``esker.importing.run``, whose functions are told of there."""
-
-    def inspect(
-        self,
-        path: Path,
-        name: str,
-        *,
-        answers: c.ImportAnswers | None = None,
-        place: c.Place | None = None,
-        size_m: float | None = None,
-    ) -> Coroutine[Any, Any, c.ImportReport]: ...
-
-    def convert(
-        self,
-        path: Path,
-        answers: c.ImportAnswers,
-        place: c.Place | None,
-        size_m: float,
-        out_dir: Path,
-        on_progress: Callable[[ImportStage, float], None] | None = None,
-        *,
-        name: str | None = None,
-    ) -> Coroutine[Any, Any, c.Layer]: ...
-
-    def suggest_place(self, report: c.ImportReport) -> c.Place | None: ...
-
-    def suggest_size(self, report: c.ImportReport) -> float: ...
-
-
-@dataclass(eq=False)
-class Job:
-    """One import from its first byte to its end."""
-
-    id: str
-    file: str
-    person: str
-    """Of whom one import at a time is taken."""
-    link: str
-    client: str
-    """In whose name the layer is added."""
-    work: Path
-    terrain: str = ""
-    hold: bool = False
-    """Whether it waits for answers even where it asks nothing."""
-    stage: ImportStage = "upload"
-    share: float = 0.0
-    text: str = ""
-    report: c.ImportReport | None = None
-    layer: str | None = None
-    answers: c.ImportAnswers = field(default_factory=c.ImportAnswers)
-    answered: asyncio.Event = field(default_factory=asyncio.Event)
-    task: asyncio.Task[None] | None = None
-    told: tuple[str, float] = ("", 0.0)
-    """Stage and time of the last broadcast."""
-    ended: float = 0.0
-
-    @property
-    def path(self) -> Path:
-        """The file as it came."""
-        return self.work / "upload"
-
-    def status(self) -> ImportStatus:
-        """Where it stands."""
-        share = min(1.0, max(0.0, self.share))
-        return ImportStatus(
-            id=self.id, stage=self.stage, share=share, text=self.text[:240], report=self.report, layer=self.layer
-        )
 
 
 class Imports:
@@ -337,11 +253,16 @@ class Imports:
     async def _inspect(
         self, job: Job, place: c.Place | None, size_m: float | None, answers: c.ImportAnswers | None = None
     ) -> c.ImportReport:
+        def progress(stage: ImportStage, share: float) -> None:
+            self._at(job, stage, max(job.share, UPLOADED + (EXAMINED - UPLOADED) * share))
+
         if self._slots.locked():
             self._at(job, "reading", UPLOADED, "Waiting for its turn.")
         async with self._slots:
-            self._at(job, "reading", UPLOADED)
-            report = await self._importer.inspect(job.path, job.file, answers=answers, place=place, size_m=size_m)
+            self._at(job, "reading", max(job.share, UPLOADED))
+            report = await self._importer.inspect(
+                job.path, job.file, answers=answers, place=place, size_m=size_m, on_progress=progress
+            )
         job.share = EXAMINED
         return report
 
@@ -439,9 +360,3 @@ class Imports:
         if job.link != link.id and link.role != "owner":
             raise Cannot(403, "not_allowed", "Only who brings the file in, or an owner of the terrain, may do this.")
         return job
-
-
-def clean_name(name: str) -> str:
-    """A file's own name, without folders and control characters, at most 80 characters."""
-    last = name.replace("\\", "/").rsplit("/", 1)[-1]
-    return "".join(ch for ch in last if ch.isprintable()).strip()[: c.MAX_NAME_LENGTH] or "grid"
