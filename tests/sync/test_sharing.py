@@ -226,7 +226,7 @@ def test_a_newer_job_shows_its_coarsest_level_while_a_pass_goes_on() -> None:
     client.took(next(client.steps), 0.01)
     assert client.glimpse_due
     assert client.stage(0.01) == module.COARSE
-    client.glimpsed, client.ahead = newer, True
+    client.glimpsed, client.ahead, client.stepped = newer, True, False
     assert not client.glimpse_due
     assert client.stage(0.01) == module.FINER, "the pass goes on"
     for _ in (1, 2):
@@ -235,6 +235,8 @@ def test_a_newer_job_shows_its_coarsest_level_while_a_pass_goes_on() -> None:
     assert client.is_ahead(newer)
     client.steps = Seer()
     client.request(Job(3, (), SETTINGS), 0.03)
+    assert not client.glimpse_due, "the pass has not gone on since the last"
+    client.stepped = True
     assert client.glimpse_due, "its coarsest level is out"
 
 

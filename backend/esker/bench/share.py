@@ -12,7 +12,7 @@ import argparse
 import json
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -23,6 +23,7 @@ from esker.bench import _serving, stream
 from esker.session.ports import LevelResult, Refiner
 from esker.session.worker import Client, Job, Worker
 from esker.solve.solver import Solver
+from esker.solve.solving import Solving
 from esker.version import VERSION
 
 PERIOD: Final = 1.0
@@ -44,27 +45,11 @@ class _Timed:
         return self._solver.device_name
 
     def steps(
-        self,
-        strokes: Sequence[c.Stroke],
-        settings: c.TerrainSettings,
-        levels: int | None = None,
-        *,
-        basis: bool = False,
-        base: Any = None,
-    ) -> Iterator[LevelResult | None]:
+        self, strokes: Sequence[c.Stroke], settings: c.TerrainSettings, levels: int | None = None, **more: Any
+    ) -> _Slices:
         """As of the solver."""
-        steps = self._solver.steps(strokes, settings, levels, basis=basis, base=base)
-        took = self.slices.setdefault(self._solver.max_level if levels is None else levels, [])
-        try:
-            while True:
-                start = time.perf_counter()
-                result = next(steps, _END)
-                took.append(time.perf_counter() - start)
-                if result is _END:
-                    return
-                yield result  # type: ignore[misc]
-        finally:
-            steps.close()  # type: ignore[attr-defined]
+        level = self._solver.max_level if levels is None else levels
+        return _Slices(self._solver.steps(strokes, settings, levels, **more), self.slices.setdefault(level, []))
 
     def channels(self, *job: Any, **over: Any) -> Iterator[Any]:
         return self._solver.channels(*job, **over)
@@ -78,7 +63,27 @@ class _Timed:
         return self._solver.refiner(basis)
 
 
-_END: Final = object()
+class _Slices(Iterator[Any]):
+    """A solve whose steps and glimpses are timed."""
+
+    def __init__(self, steps: Solving, took: list[float]) -> None:
+        self._steps, self._took = steps, took
+
+    def __next__(self) -> Any:
+        return self._timed(lambda: next(self._steps))
+
+    def glimpse(self, strokes: Sequence[c.Stroke], settings: c.TerrainSettings, base: Any = None) -> Any:
+        return self._timed(lambda: self._steps.glimpse(strokes, settings, base))
+
+    def close(self) -> None:
+        self._steps.close()
+
+    def _timed(self, work: Callable[[], Any]) -> Any:
+        start = time.perf_counter()
+        try:
+            return work()
+        finally:
+            self._took.append(time.perf_counter() - start)
 
 
 @dataclass

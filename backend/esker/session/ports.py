@@ -140,8 +140,9 @@ class Solver(Protocol):
         *,
         basis: bool = False,
         base: Any = None,
-        coarsest: bool = True,
-    ) -> Iterator[LevelResult | None]: ...
+    ) -> Iterator[LevelResult | None]:
+        """Whose solves are ``schedule.Glimpsing`` also take ``coarsest=False``: level 0 is out already."""
+        ...
 
     def base_levels(self, base: Any, levels: int) -> Iterator[LevelResult | None]:
         """The base up to a level, coarse to fine, then the survey channel: to be shown before what is solved on it."""

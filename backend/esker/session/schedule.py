@@ -108,6 +108,8 @@ class Client:
     """The newest job of which the coarsest preview was to be made ahead of its pass, ..."""
     ahead: bool = False
     """... and whether it was."""
+    stepped: bool = True
+    """Its pass has gone on since then: who glimpses all the time keeps others, and itself, from finer levels."""
     previewing: bool = False
     finest_at: float = -math.inf
     _reached: int = -1
@@ -181,7 +183,7 @@ class Client:
         newest, running = self.newest, self.running
         if newest is None or running is None or newest is self.glimpsed or not isinstance(self.steps, Glimpsing):
             return False
-        return self.previewing and self._reached >= 0 and newest.base is running.base
+        return self.stepped and self.previewing and self._reached >= 0 and newest.base is running.base
 
     def starts(self, now: float) -> bool:
         """Whether its newest job is to be begun: at once, but for a preview pass that should end first."""

@@ -226,7 +226,7 @@ class Worker:
                     close()
 
     def _solve(self, client: Client) -> None:
-        job, steps = client.running, client.steps
+        job, steps, client.stepped = client.running, client.steps, True
         assert job is not None
         assert steps is not None
         try:
@@ -274,7 +274,7 @@ class Worker:
         assert job is not None
         assert client.running is not None
         assert isinstance(steps, Glimpsing)
-        client.glimpsed, client.ahead = job, False
+        client.glimpsed, client.ahead, client.stepped = job, False, False
         try:
             result = steps.glimpse(job.strokes, job.settings, job.base)
         except Exception as error:
