@@ -15,7 +15,7 @@ from tests.vectors import make
 from esker import contract as c
 from esker.session import protocol
 
-HELLO = json.dumps({"type": "hello", "protocol": 4, "terrain": "t", "secret": "s", "client": "c1"})
+HELLO = json.dumps({"type": "hello", "protocol": c.PROTOCOL_VERSION, "terrain": "t", "secret": "s", "client": "c1"})
 VECTORS = Path(make.__file__).parent / "messages.json"
 ACCEPTED = [x["text"] for x in json.loads(VECTORS.read_text(encoding="utf-8"))["cases"] if x["accept"]]
 

@@ -233,10 +233,10 @@ def sleeping_member(port: int, terrain: str, secret: str) -> socket.socket:
     tcp.connect(("127.0.0.1", port))
     tcp.sendall(
         b"GET /ws HTTP/1.1\r\nHost: x\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
-        b"Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Protocol: esker.4\r\n\r\n"
+        b"Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Protocol: %b\r\n\r\n" % c.SUBPROTOCOL.encode()
     )
     assert b"101" in tcp.recv(64)
-    hello = {"type": "hello", "protocol": 4, "terrain": terrain, "secret": secret, "client": "sleeper"}
+    hello = {"type": "hello", "protocol": c.PROTOCOL_VERSION, "terrain": terrain, "secret": secret, "client": "sleeper"}
     payload = json.dumps(hello).encode()
     header = bytes([0x81, 0x80 | 126]) + len(payload).to_bytes(2, "big")
     tcp.sendall(header + bytes(4) + payload)  # masked with zeros

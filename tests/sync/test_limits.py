@@ -15,7 +15,7 @@ from esker.session.limits import RateByKey, TokenBucket
 from esker.settings import BadSetting, Settings, from_environment
 from tests.sync.harness import LiveServer, Peer, set_op, stroke
 
-HELLO = json.dumps({"type": "hello", "protocol": 4, "terrain": "t", "secret": "s", "client": "c"})
+HELLO = json.dumps({"type": "hello", "protocol": c.PROTOCOL_VERSION, "terrain": "t", "secret": "s", "client": "c"})
 
 
 def _connection() -> protocol.Connection:
