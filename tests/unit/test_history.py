@@ -114,8 +114,8 @@ def test_what_the_undo_of_the_clients_does_is_told_as_such() -> None:
     """HI4: the same steps that ``SyncDoc`` makes, in a page and in Python."""
     t = Told_(strokes=(stroke("b"),))
     sync = SyncDoc("ana")
-    welcome = {"protocol": c.PROTOCOL_VERSION, "server": "", "client": "ana", "role": "edit", "colour": "#000000", "device": ""}
-    numbers = {"levels": 0, "finest": 0, "clock": 0}
+    welcome = {"server": "", "client": "ana", "role": "edit", "colour": "#000000", "device": ""}
+    numbers = {"protocol": c.PROTOCOL_VERSION, "levels": 0, "finest": 0, "clock": 0}
     sync.welcome(c.Welcome.model_validate({**welcome, **numbers, "members": (), "document": t.birth}))
 
     def does(*ops: c.Op, gesture: str | None = None) -> None:
