@@ -129,7 +129,8 @@ def least_cover(
         if limit <= found or (whether and limit < best):
             continue
         if met <= FEW or depth == DEEPEST:
-            z = _cut(kernels, slack, min_z, part, area, x, y, lists[depth], met, limit)
+            # What may be left is a share of the whole quad: a sliver lies in one quarter, seldom in two.
+            z = _cut(kernels, slack, min_z, part, whole, x, y, lists[depth], met, limit)
             if z == best:
                 return best
             found = max(found, z)
