@@ -1,4 +1,4 @@
-"""Figures of README, docs/solver.md, docs/refinement.md and docs/patchwork.md from the committed results.
+"""Figures of README and of docs/ (solver, refinement, patchwork, importing) from the committed results.
 
 ``python -m esker.bench.report [--check]``.
 """
@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from esker.bench import _patchwork, _patchwork_cover, _refine, _solver
+from esker.bench import _importing, _patchwork, _patchwork_cover, _refine, _solver
 
 ROOT = Path(__file__).resolve().parents[3]
 RESULTS = ROOT / "bench" / "results"
@@ -18,6 +18,7 @@ README = ROOT / "README.md"
 SOLVER = ROOT / "docs" / "solver.md"
 REFINEMENT = ROOT / "docs" / "refinement.md"
 PATCHWORK = ROOT / "docs" / "patchwork.md"
+IMPORTING = ROOT / "docs" / "importing.md"
 BEGIN, END = "<!-- figures: written by `python -m esker.bench.report` -->", "<!-- end of figures -->"
 
 
@@ -106,6 +107,7 @@ def documents() -> dict[Path, str]:
     out[REFINEMENT] = _refine.document(REFINEMENT.read_text(encoding="utf-8"), result("refine"))
     page = _patchwork.document(PATCHWORK.read_text(encoding="utf-8"), result("patchwork"))
     out[PATCHWORK] = _patchwork_cover.document(page, result("patchwork_cover"))
+    out[IMPORTING] = _importing.document(IMPORTING.read_text(encoding="utf-8"), result("importing"))
     return out
 
 
