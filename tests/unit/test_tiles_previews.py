@@ -98,14 +98,18 @@ def test_a_finest_preview_keeps_what_a_newer_coarsest_one_has_moved(settled: Pyr
         assert off < (2 * PREVIEW_STEP + 0.6) * quantum
     settled.put(4, LEVELS, ground(LEVELS, 160.0), False)
     assert level(settled, 0) is not coarse or level(settled, 0).clock == 4
-    assert np.abs(level(settled, LEVELS).samples * quantum - ground(LEVELS, 160.0)).max() <= (PREVIEW_STEP + 0.1) * quantum
+    assert (
+        np.abs(level(settled, LEVELS).samples * quantum - ground(LEVELS, 160.0)).max() <= (PREVIEW_STEP + 0.1) * quantum
+    )
 
 
 def test_a_finest_preview_without_a_coarsest_one_of_its_own_is_shown_as_it_is(settled: Pyramid) -> None:
     settled.put(3, 0, ground(0, 150.0), False)
     settled.put(2, LEVELS, ground(LEVELS, 120.0), False)
     quantum = grid.quantum(LEVELS, SIZE_M)
-    assert np.abs(level(settled, LEVELS).samples * quantum - ground(LEVELS, 120.0)).max() <= (PREVIEW_STEP + 0.1) * quantum
+    assert (
+        np.abs(level(settled, LEVELS).samples * quantum - ground(LEVELS, 120.0)).max() <= (PREVIEW_STEP + 0.1) * quantum
+    )
     assert level(settled, 0).clock == 2
 
 
