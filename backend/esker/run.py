@@ -38,6 +38,7 @@ from esker.store.grids import FOLDER, GridStore
 from esker.store.journal import Journal
 from esker.store.previews import PreviewTokens
 from esker.tiles.delivery import ClientTiles, TileServer
+from esker.tiles.pyramid import warm
 from esker.tls import CA_FILE, lan_address, server_context
 
 log = logging.getLogger("esker")
@@ -138,7 +139,10 @@ class Assembly:
         self._worker = Worker(
             make_solver, settings.device, candidates=lambda: candidates(settings.threads), diagnose=diagnose
         )
+        compiling = threading.Thread(target=warm, name="compiling", daemon=True)
+        compiling.start()  # beside the device's own kernels
         self._worker.start()
+        compiling.join()
         log.info("solver: %s, levels 0 to %d", self._worker.device_name, settings.level)
         self.hub = Hub(
             self._journal,

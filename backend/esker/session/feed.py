@@ -29,7 +29,6 @@ from esker.session.outbox import Outbox
 from esker.session.ports import ClientTiles, LevelResult, Tiles
 from esker.session.tilethread import TileThread
 from esker.tiles.delivery import RefinedTile
-from esker.tiles.pyramid import warm
 
 log = logging.getLogger("esker.feed")
 
@@ -104,7 +103,6 @@ class TileFeed:
         self._rest_until = 0.0
         """When the next batch may be taken, by the loop's clock."""
         self._wishes_timer: asyncio.TimerHandle | None = None
-        self._submit(warm)
 
     def add(self, outbox: Outbox) -> Stream:
         """A new client."""
@@ -287,8 +285,8 @@ class TileFeed:
         if self._clients.pop(stream, None) is not None:
             self._publish(False)
 
-    def _make(self, stream: Stream, view: c.View | None) -> None:
-        """Makes frames of the latest state, and hands each over when it is made."""
+    def _make(self, stream: Stream, view: c.View | None, most: int) -> None:
+        """Makes frames of the latest state, up to ``most`` bytes and the rest of a frame; hands each over when made."""
         made = 0
         try:
             tiles = self._clients.get(stream)
@@ -297,7 +295,7 @@ class TileFeed:
             if view is not None:
                 tiles.set_view(view)
             # Who has begun to make a level's frames makes them all; then a coarsest preview that waits goes first.
-            while made < BATCH_BYTES and (plan := tiles.plan(made > 0 and self._coarse is not None)) is not None:
+            while made < most and (plan := tiles.plan(made > 0 and self._coarse is not None)) is not None:
                 frame = plan.encode()
                 tiles.commit(plan)
                 made += len(frame)
@@ -333,7 +331,8 @@ class TileFeed:
         stream.busy, stream.hungry = True, False
         if view is not None and self._refines and self._wishes_timer is None:
             self._wishes_timer = self._loop.call_later(WISHES_SECONDS, self._wishes_due)
-        if not self._submit(self._make, stream, view):
+        most = min(BATCH_BYTES, c.BYTE_WINDOW - stream.in_flight)
+        if not self._submit(self._make, stream, view, most):
             self._streams.discard(stream)
 
     def _wishes_due(self) -> None:
