@@ -48,9 +48,9 @@ def _sides(sheet: Sheet, rows: int, cols: int) -> tuple[Ints, Ints]:
         part, wide = slice(*sheet.scale_range(scale)), 1 << scale
         for dj in range(wide):
             for di in range(wide):
-                j, i = sheet.j[part] * wide + dj, sheet.i[part] * wide + di
-                there = (j < inner.shape[0]) & (i < inner.shape[1])
-                inner[j[there], i[there]] = 1
+                row_of, col_of = sheet.j[part] * wide + dj, sheet.i[part] * wide + di
+                there = (row_of < inner.shape[0]) & (col_of < inner.shape[1])
+                inner[row_of[there], col_of[there]] = 1
     j, i = np.nonzero(held[1:-1, 1:] != held[1:-1, :-1])
     upright = [_run(j * size, np.minimum(i * size, cols), np.minimum(size, rows - j * size), cols + 1, cols + 1)]
     j, i = np.nonzero(held[1:, 1:-1] != held[:-1, 1:-1])
