@@ -139,7 +139,7 @@ def test_a_terrace_along_a_contour_does_both() -> None:
 
 def cliff(high: float = 300.0) -> Analytic:
     """Low in the west, high in the east, with nothing between; it runs askew to the samples."""
-    return Analytic(f"cliff {high}", lambda x, y: 100 + high * (x - 2048 > 0.3 * (y - 2048)), 99, 101 + high)
+    return Analytic(f"cliff {high}", lambda x, y: 100 + np.where(x - 2048 > 0.3 * y - 614.4, high, 0.0), 99, 101 + high)
 
 
 @pytest.mark.parametrize(

@@ -66,7 +66,7 @@ class Raster:
             low_m=self.low,
             high_m=self.high,
             valid=self.valid,
-            edge=bent_edge(*self.heights.shape, self.warp),
+            edge=bent_edge(self.heights.shape[0], self.heights.shape[1], self.warp),
             **more,
         )
 
