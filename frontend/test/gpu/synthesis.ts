@@ -22,6 +22,7 @@ interface VectorSite {
   readonly look: Look;
   readonly sea_level_m: number | null;
   readonly place: Home | null;
+  readonly ground: readonly [number, number] | null;
   readonly cyclic: boolean;
   readonly solved: number;
   readonly channels: Readonly<Record<string, readonly (readonly number[])[]>>;
@@ -158,6 +159,7 @@ export async function synthesisVectors(vectors: Vectors, featureLevel = "core"):
       look: site.look,
       seaLevelM: site.sea_level_m,
       place: site.place,
+      ground: site.ground,
       solved: site.solved,
       cyclic: site.cyclic,
     });
