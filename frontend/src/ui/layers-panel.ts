@@ -71,7 +71,7 @@ export class EskLayersPanel extends SignalElement {
     return html`<div class="empty">
       ${icon("landscape")}
       <p>No real ground yet. Drop a file with heights anywhere on this page: GeoTIFF, HGT, Esri ASCII, IMG, DTED, 16-bit PNG, RAW or NPY.</p>
-      <p>Sketch on it as on any land. A finer grid, or one turned by any angle, joins what lies there.</p>
+      <p>Sketch on it as on any land. A finer grid, or one turned by any angle, melts into what lies there.</p>
     </div>`;
   }
 
