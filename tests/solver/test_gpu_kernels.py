@@ -5,7 +5,6 @@ Where there is no GPU they run on PoCL's CPU device, which has work-groups and l
 
 from __future__ import annotations
 
-from collections.abc import Generator
 from dataclasses import replace
 
 import numpy as np
@@ -21,6 +20,7 @@ from esker.solve.gpu_program import Plan, plan
 from esker.solve.levels import ClWorkspace
 from esker.solve.passes import previews, to_rest
 from esker.solve.solver import Solver
+from esker.solve.solving import Solving
 from tests.solver.scenes import ENDLESS, PINNED, SCENES, SETTINGS, SIZE
 from tests.solver.twins import Field, close, edited, fill, noise, tile_device
 
@@ -157,7 +157,7 @@ def test_history_changes_not_one_bit(tile_solver: Solver) -> None:
     tile_solver.solve(strokes, SETTINGS, 2)
     tile_solver.solve(strokes[::-1], ENDLESS, 2, should_stop=lambda: True)
     run = tile_solver.steps(strokes[:9], SETTINGS, 2)
-    assert isinstance(run, Generator)
+    assert isinstance(run, Solving)
     next(run)
     again = tile_solver.solve(edited(strokes)[::-1], SETTINGS, 2)[2]
     run.close()
