@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
 import socket
+
+import psutil
 
 # WebGPU in headless Chromium on the software adapter needs all of these (DESIGN 16).
 FLAGS = [
@@ -34,3 +37,16 @@ def free_port() -> int:
     with socket.socket() as s:
         s.bind(("127.0.0.1", 0))
         return int(s.getsockname()[1])
+
+
+def draw_politely() -> None:
+    """Let the servers that a test started come before the browsers' graphics processes.
+
+    On a software adapter those take all the processor time that there is, for frames that nobody counts; where Chromium
+    runs as root they even have a higher priority than others.
+    """
+    for process in psutil.Process().children(recursive=True):
+        with contextlib.suppress(psutil.Error, OSError):
+            if "--type=gpu-process" in process.cmdline():
+                for thread in process.threads():
+                    os.setpriority(os.PRIO_PROCESS, thread.id, 10)

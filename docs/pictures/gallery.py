@@ -22,8 +22,8 @@ SHOTS: dict[str, list[str]] = {
     "look-paper": ["figure-six", "--look", "paper", "--camera", "eye:3500,-2900,2700,target:2080,1850,20"],
     "water": ["volcanic-island", "--sun", "110,12", "--camera", "eye:3500,300,90,target:2200,1900,150"],
     "close-up": [
-        *("alpine-ridge", "--sun", "205,24", "--refine", "9"),
-        *("--camera", "eye:1502,1500,target:1540,1560"),
+        *("alpine-ridge", "--sun", "118,25", "--refine", "9"),
+        *("--camera", "eye:1400,1640,target:1620,2500,400"),
     ],
     "real-crater": ["helens", "--camera", "orbit:20,22,2600,target:1450,1200,2000"],
     "real-rainier": ["rainier", "--camera", "orbit:318,9,46000,target:52000,14000,2000"],

@@ -19,7 +19,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Error, Page, sync_playwright
 
-from tests.browser import FLAGS, chromium_path, free_port
+from tests.browser import FLAGS, chromium_path, draw_politely, free_port
 
 ROOT = Path(__file__).resolve().parents[2]
 ARTIFACTS = ROOT / "tests" / "artifacts" / "e2e"
@@ -94,6 +94,7 @@ def browser() -> Iterator[Browser]:
     """Headless Chromium with WebGPU on the software adapter; its event loop ends with this folder."""
     with sync_playwright() as playwright:
         made = playwright.chromium.launch(executable_path=chromium_path(), args=FLAGS + AWAKE)
+        draw_politely()
         yield made
         made.close()
 

@@ -1,4 +1,4 @@
-"""Figures of README and of docs/ (solver, refinement, patchwork, importing) from the committed results.
+"""Figures of README and of docs/ (solver, refinement, patchwork, importing, renderer) from the committed results.
 
 ``python -m esker.bench.report [--check]``.
 """
@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from esker.bench import _importing, _patchwork, _patchwork_cover, _refine, _solver
+from esker.bench import _importing, _patchwork, _patchwork_cover, _refine, _render, _solver
 
 ROOT = Path(__file__).resolve().parents[3]
 RESULTS = ROOT / "bench" / "results"
@@ -19,6 +19,7 @@ SOLVER = ROOT / "docs" / "solver.md"
 REFINEMENT = ROOT / "docs" / "refinement.md"
 PATCHWORK = ROOT / "docs" / "patchwork.md"
 IMPORTING = ROOT / "docs" / "importing.md"
+RENDERER = ROOT / "docs" / "renderer.md"
 BEGIN, END = "<!-- figures: written by `python -m esker.bench.report` -->", "<!-- end of figures -->"
 
 
@@ -77,6 +78,7 @@ def rows() -> list[tuple[str, str, str]]:
             f"{room['deliveries_per_s']:,} deliveries/s, {room['server_cores']:.2f} of a core, "
             f"{room['server_rss_mb']:.0f} MB",
         ),
+        *_render.rows(result("render"), result("cracks")),
         *_patchwork.rows(result("patchwork")),
     ]
 
@@ -108,6 +110,8 @@ def documents() -> dict[Path, str]:
     page = _patchwork.document(PATCHWORK.read_text(encoding="utf-8"), result("patchwork"))
     out[PATCHWORK] = _patchwork_cover.document(page, result("patchwork_cover"))
     out[IMPORTING] = _importing.document(IMPORTING.read_text(encoding="utf-8"), result("importing"))
+    drawn = (result(name) for name in ("render", "cracks", "flight"))
+    out[RENDERER] = _render.document(RENDERER.read_text(encoding="utf-8"), *drawn)
     return out
 
 
