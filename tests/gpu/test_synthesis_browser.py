@@ -19,8 +19,9 @@ def check(found: list[dict[str, Any]], vectors: dict[str, Any]) -> None:
         rounding = 5 * 2.0**-23 * max(abs(height) for height in place["range"])
         assert place["ground"] <= max(vectors["metres"] * place["cellM"], rounding), place
         assert place["detail"] <= max(vectors["metres"] * place["cellM"], rounding), place
-        # Rounding of heights over the cell is what slopes are wrong by; channels follow slopes loosely on fine levels.
-        assert place["halves"] <= vectors["unorm"] + 0.3 * 65535 * rounding / place["cellM"], place
+        # Rounding of heights over the cell is what slopes are wrong by; channels follow slopes loosely on fine levels, and
+        # heights too where the climate of laid ground has little room between its valleys and its snow.
+        assert place["halves"] <= vectors["unorm"] + 0.5 * 65535 * rounding / place["cellM"], place
         assert place["bounds"] == place["range"], place
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, Final
 
 BEGIN: Final = "<!-- renderer: written by `python -m esker.bench.report` -->"
@@ -57,7 +58,7 @@ def _ms(figures: dict[str, Any]) -> str:
     )
 
 
-def _table(head: tuple[str, ...], lines: list[tuple[str, ...]]) -> str:
+def _table(head: tuple[str, ...], lines: Sequence[tuple[str, ...]]) -> str:
     rule = "|".join("---" for _ in head)
     return "\n".join([f"| {' | '.join(head)} |", f"|{rule}|", *(f"| {' | '.join(line)} |" for line in lines)])
 
