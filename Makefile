@@ -24,7 +24,7 @@ run: setup frontend/dist/index.html ## set up, build, start the server, print th
 
 test: $(STAMPS)/dev ## set up, then run every check and every test
 	@$(MAKE) --no-print-directory -j2 check browser frontend/dist/index.html
-	@if [ -n "$(ARGS)" ]; then exec $(BIN)/python -m pytest $(ARGS); else exec $(MAKE) --no-print-directory -j3 test-people test-drawn test-rest test-page; fi
+	@if [ -n "$(ARGS)" ]; then exec $(BIN)/python -m pytest $(ARGS); else exec $(MAKE) --no-print-directory -j2 test-people test-rest test-drawn test-page; fi
 
 # Who waits for a page to rest leaves a core idle, and so do the others: side by side they take two thirds of the time.
 test-people:
