@@ -90,6 +90,22 @@ DEFAULT_DETAIL: Final = 1.0
 MAX_DETAIL: Final = 4.0
 """Strength of the natural detail: 0 takes it away, 1 is the rule's own."""
 
+# --- lakes (docs/renderer.md, "Lakes") ---------------------------------------------------------------------------
+
+LAKE_LEVEL: Final = 2
+"""Basins are those of the solved ground of this level."""
+LAKE_LEAST_SAMPLES: Final = 4
+"""Smaller basins stay dry."""
+LAKE_FREEBOARD_CELLS: Final = 0.06
+LAKE_FREEBOARD_SHARE: Final = 0.25
+"""A lake stays below its outlet by so much of a cell, at most this share of its depth: finer ground is not as even."""
+LAKE_SHORE_SAMPLES: Final = 3
+"""Ground so many samples around a lake is told of it: finer ground may be lower there."""
+NO_LAKE: Final = -1.0e9
+"""Level where there is no lake, metres."""
+DEFAULT_LAKES_FRACTION: Final = 1.0 / 1024.0
+"""Least depth of a basin that fills, in sides of the domain, where a person says no other."""
+
 # --- stroke defaults (DESIGN 5.2, 12) ---------------------------------------------------------------------------
 
 DEFAULT_SLOPE_DEG: Final = 35.0

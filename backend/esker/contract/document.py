@@ -202,6 +202,7 @@ class Place(Wire):
 class TerrainSettings(Wire):
     """Settings of a terrain. ``reach_m`` None is infinity: the papers' pure, global diffusion (DESIGN 5.1).
 
+    ``lakes_m``: basins of the ground that are deeper than this hold a lake, None: none does (docs/renderer.md).
     ``detail`` and ``rule`` are of the synthesis (DESIGN 10): no solved height depends on them.
     """
 
@@ -210,6 +211,7 @@ class TerrainSettings(Wire):
     reach_m: Annotated[float, Field(gt=0, le=ABSOLUTE_BOUND_M)] | None = DEFAULT_SIZE_M * DEFAULT_REACH_FRACTION
     border: Border = "free"
     sea_level_m: Metres | None = None
+    lakes_m: Length | None = None
     seed: Annotated[int, Field(ge=0, lt=2**32)] = 1
     look: Look = "natural"
     detail: Annotated[float, Field(ge=0, le=MAX_DETAIL, allow_inf_nan=False)] = DEFAULT_DETAIL
@@ -226,6 +228,7 @@ class TerrainFields(Wire):
     reach_m: Annotated[float, Field(gt=0, le=ABSOLUTE_BOUND_M)] | None = None
     border: Border | None = None
     sea_level_m: Metres | None = None
+    lakes_m: Length | None = None
     seed: Annotated[int, Field(ge=0, lt=2**32)] | None = None
     look: Look | None = None
     detail: Annotated[float, Field(ge=0, le=MAX_DETAIL, allow_inf_nan=False)] | None = None
@@ -235,7 +238,7 @@ class TerrainFields(Wire):
     place: Place | None = None
 
 
-NULLABLE_TERRAIN_FIELDS: Final = frozenset({"reach_m", "sea_level_m", "place"})
+NULLABLE_TERRAIN_FIELDS: Final = frozenset({"reach_m", "sea_level_m", "lakes_m", "place"})
 
 
 class Document(Wire):

@@ -48,6 +48,7 @@ TERRAIN_WORDS: Final[dict[str, str]] = {
     "reach_m": "reach",
     "border": "border",
     "sea_level_m": "sea level",
+    "lakes_m": "lakes",
     "seed": "seed",
     "look": "look",
     "detail": "detail",

@@ -215,6 +215,7 @@ const terrainFields = record({
   reach_m: may(nullable((v) => (v === 0 ? "must be above 0" : reach(v)))),
   border: may(nullable(oneOf("free", "pinned"))),
   sea_level_m: may(nullable(metres)),
+  lakes_m: may(nullable(metreLength)),
   seed: may(nullable(integer(0, 2 ** 32 - 1))),
   look: may(nullable(oneOf("natural", "alpine", "desert", "paper"))),
   detail: may(nullable(number(0, MAX_DETAIL))),

@@ -49,6 +49,7 @@ export const TERRAIN_WORDS = {
   reach_m: "reach",
   border: "border",
   sea_level_m: "sea level",
+  lakes_m: "lakes",
   seed: "seed",
   look: "look",
   detail: "detail",

@@ -94,6 +94,20 @@ export const DEFAULT_DETAIL = 1.0 as const;
 
 export const MAX_DETAIL = 4.0 as const;
 
+export const LAKE_LEVEL = 2 as const;
+
+export const LAKE_LEAST_SAMPLES = 4 as const;
+
+export const LAKE_FREEBOARD_CELLS = 0.06 as const;
+
+export const LAKE_FREEBOARD_SHARE = 0.25 as const;
+
+export const LAKE_SHORE_SAMPLES = 3 as const;
+
+export const NO_LAKE = -1000000000.0 as const;
+
+export const DEFAULT_LAKES_FRACTION = 0.0009765625 as const;
+
 export const DEFAULT_SLOPE_DEG = 35.0 as const;
 
 export const DEFAULT_EXTENT_FRACTION = 0.5 as const;
@@ -152,7 +166,7 @@ export const ABSOLUTE_BOUND_M = 655360.0 as const;
 
 export const NULLABLE_STROKE_FIELDS = ["left", "paint", "right"] as const;
 
-export const NULLABLE_TERRAIN_FIELDS = ["place", "reach_m", "sea_level_m"] as const;
+export const NULLABLE_TERRAIN_FIELDS = ["lakes_m", "place", "reach_m", "sea_level_m"] as const;
 
 export const WS_CLOSE = {
   bad_protocol: 4000,
@@ -601,6 +615,7 @@ export interface TerrainSettings {
   reach_m: number | null;
   border: "free" | "pinned";
   sea_level_m: number | null;
+  lakes_m: number | null;
   seed: number;
   look: "natural" | "alpine" | "desert" | "paper";
   detail: number;
@@ -615,6 +630,7 @@ export interface TerrainFields {
   reach_m?: number | null;
   border?: "free" | "pinned" | null;
   sea_level_m?: number | null;
+  lakes_m?: number | null;
   seed?: number | null;
   look?: "natural" | "alpine" | "desert" | "paper" | null;
   detail?: number | null;

@@ -33,6 +33,7 @@ export const EMPTY: Document = {
     reach_m: 128,
     border: "free",
     sea_level_m: null,
+    lakes_m: null,
     seed: 1,
     look: "natural",
     detail: 1,

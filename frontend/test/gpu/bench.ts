@@ -124,6 +124,7 @@ function scene(step: number): Scene {
       reach_m: 128,
       border: "free",
       sea_level_m: null,
+      lakes_m: null,
       seed: 1,
       look: "natural",
       ...detail,

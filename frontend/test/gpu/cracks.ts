@@ -139,6 +139,7 @@ export function sceneOf(view: TileView, state: CameraState, look: Scene["setting
       reach_m: null,
       border: "free",
       sea_level_m: null,
+      lakes_m: null,
       seed: 1,
       look,
       detail: 1,

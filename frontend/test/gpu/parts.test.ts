@@ -162,6 +162,7 @@ function scene(): Scene {
       reach_m: null,
       border: "free",
       sea_level_m: null,
+      lakes_m: null,
       seed: 1,
       look: "natural",
       detail: 1,

@@ -90,6 +90,7 @@ function scene(camera: CameraState): Scene {
       reach_m: 128,
       border: "free",
       sea_level_m: null,
+      lakes_m: null,
       seed: 1,
       look: "natural",
       rule: "plain",
