@@ -8,7 +8,7 @@ import pytest
 from esker import grid
 from esker.tiles import loops
 from esker.tiles.bounds import SubPatches, block_reduce, sub_error
-from esker.tiles.codec import SAMPLE_LIMIT
+from esker.tiles.codec import SAMPLE_LIMIT, predict, upsampled
 from esker.tiles.pyramid import quantise
 from esker.tiles.steady import Steadier, steadied
 
@@ -68,3 +68,13 @@ def test_bounds_of_sub_patches_are_those_of_numpy(scale: int) -> None:
     np.testing.assert_array_equal(sub.error[at], sub_error(samples, parent)[at])
     assert not sub.low[:4].any()
     assert not sub.error[:, :4].any()
+
+
+@pytest.mark.parametrize("ratio", [1, 2])
+@pytest.mark.parametrize("scale", [1, 3000, SAMPLE_LIMIT])
+def test_children_are_predicted_as_in_numpy(scale: int, ratio: int) -> None:
+    parent = np.random.default_rng(scale).integers(-scale, scale, (65, 65), endpoint=True).astype(np.int32)
+    want = upsampled(parent, ratio)
+    np.testing.assert_array_equal(predict(parent, ratio), want)
+    parent.flags.writeable = False
+    np.testing.assert_array_equal(predict(parent.T, ratio), want.T)

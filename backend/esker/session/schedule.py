@@ -75,6 +75,9 @@ class Client:
     running: Job | None = None
     steps: Iterator[LevelResult | None] | None = None
     refiner: Refiner | None = None
+    remains: object = None
+    """What its last solve left to refinement, kept until its next one has shown something: giving so much memory back
+    takes a millisecond or more."""
     tiles: Iterator[RefinedTile | None] | None = None
     refined: set[TileKey] = field(default_factory=set)
     looking: bool = False
@@ -153,7 +156,7 @@ class Client:
         """Ends what runs for it. In the solver's thread."""
         for work in (self.steps, self.tiles):
             _close(work)
-        self.steps = self.tiles = self.refiner = self.ground = None
+        self.steps = self.tiles = self.refiner = self.remains = self.ground = None
         self.refined.clear()
         self.looking = self.previewing = self.light = False
 
@@ -217,7 +220,9 @@ class Client:
             self.running, self.newest, self.light = self.newest, None, True
             self.again_at = math.inf
             return self.running
+        refiner = self.refiner
         self.drop()
+        self.remains = refiner
         self.ground_clock = self.newest.clock
         self.running, self.newest = self.newest, None
         self.previewing, self._reached, self.again_at = True, -1, math.inf

@@ -248,6 +248,7 @@ class Worker:
             self._deliver(client, job, result, show)
             if result.channel == c.Channel.HEIGHT and not result.settled and result.level in (0, client.top):
                 self._lull(client, LULLS[result.level == client.top])
+            client.remains = None
 
     def _lull(self, client: Client, seconds: float) -> None:
         """Leaves the processor to those who bring people what was just delivered."""

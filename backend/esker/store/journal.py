@@ -137,8 +137,10 @@ class Journal:
             db.executemany("INSERT INTO ops VALUES (?,?,?,?,?,?)", ((terrain, *row) for row in rows))
             if rows:
                 self._moments.note(db, terrain, rows[0].clock, self._now())
-            moments.keep(db, terrain, people)
-            _name_grids(db, terrain, (digest for row in rows for digest in _contents(row.op)))
+            if people:
+                moments.keep(db, terrain, people)
+            if digests := [digest for row in rows for digest in _contents(row.op)]:
+                _name_grids(db, terrain, digests)
             if snapshot is not None:
                 _put_snapshot(db, snapshot)
 
@@ -178,19 +180,24 @@ class Journal:
         # From here on an item cannot be cancelled any more; one that was (its HTTP client hung up) is not written.
         batch = [(write, future) for write, future in batch if future.set_running_or_notify_cancel()]
         outcomes: list[tuple[Future[Any], Any, Exception | None]] = []
+        # Every statement gives the interpreter's lock away and waits to have it back: an item alone has no savepoint.
+        alone = len(batch) == 1
         try:
             db.execute("BEGIN IMMEDIATE")
             for write, future in batch:
-                db.execute("SAVEPOINT item")
+                if not alone:
+                    db.execute("SAVEPOINT item")
                 try:
                     outcomes.append((future, write(db), None))
                 except Exception as error:
                     if not db.in_transaction:  # SQLite gave the whole transaction up: a full disk, an I/O error
                         raise
-                    db.execute("ROLLBACK TO item")
+                    db.execute("ROLLBACK" if alone else "ROLLBACK TO item")
                     outcomes.append((future, None, error))
-                db.execute("RELEASE item")
-            db.execute("COMMIT")
+                if not alone:
+                    db.execute("RELEASE item")
+            if not alone or outcomes[0][2] is None:
+                db.execute("COMMIT")
         except sqlite3.Error as error:  # nothing of this batch is durable
             if db.in_transaction:
                 db.execute("ROLLBACK")

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from esker.contract import TILE_CELLS, TILE_MAX_SHIFT, TILE_SAMPLES
-from esker.tiles import entropy
+from esker.tiles import entropy, loops
 
 Ints = NDArray[np.int32]
 Wide = NDArray[np.signedinteger]
@@ -27,43 +27,41 @@ class CodecError(ValueError):
     """A payload that no encoder could have written."""
 
 
-def _upsample(a: Wide) -> Wide:
-    """Along the last axis, n -> 2n-1 samples, scaled by 16: interpolating 4-point rule, one-sided at both ends."""
-    out = np.empty((*a.shape[:-1], 2 * a.shape[-1] - 1), dtype=a.dtype)
-    np.multiply(a, 16, out=out[..., 0::2])
-    odd = out[..., 1::2]
-    inner = odd[..., 1:-1]
-    np.add(a[..., 1:-2], a[..., 2:-1], out=inner)
-    inner *= 9
-    inner -= a[..., :-3]
-    inner -= a[..., 3:]
-    odd[..., 0] = 5 * a[..., 0] + 15 * a[..., 1] - 5 * a[..., 2] + a[..., 3]
-    odd[..., -1] = 5 * a[..., -1] + 15 * a[..., -2] - 5 * a[..., -3] + a[..., -4]
-    return out
-
-
-def predict(parents: Ints, ratio: int = 2) -> Wide:
-    """All four children of each parent at once, as one 129x129 grid.
+def predict(parent: Ints, ratio: int = 2) -> Wide:
+    """All four children of a parent at once, as one 129x129 grid.
 
     Args:
-        parents: (..., 65, 65) int32, |sample| <= 2^28, in quanta of the parent's level.
+        parent: (65, 65) int32, |sample| <= 2^28, in quanta of the parent's level.
         ratio: quanta of the child's level in one of the parent's: 2 for heights, 1 for the other channels.
     Returns:
-        (..., 129, 129) int32 or int64 in quanta of the child's level: the tensor product of (-1, 9, 9, -1)/16, at the
+        (129, 129) int32 or int64 in quanta of the child's level: the tensor product of (-1, 9, 9, -1)/16, at the
         parent tile's border of (5, 15, -5, 1)/16, times ``ratio``, rounded once, halves upward: with the sum S of
         weights that add up to 256, ``floor((S + 64) / 128)`` or ``floor((S + 128) / 256)``. Even samples are exactly
         ``ratio`` times the parent's. |result| is below 2^30.5. Child (cx, cy) is
-        ``[64*cy : 64*cy+65, 64*cx : 64*cx+65]``.
+        ``[64*cy : 64*cy+65, 64*cx : 64*cx+65]``. Twin of this compiled form: ``upsampled``.
     """
-    shift = 9 - ratio
-    small = parents.size == 0 or max(int(parents.max()), -int(parents.min())) <= _NARROW_LIMIT
-    wide: Wide = parents if small else parents.astype(np.int64)
-    cols = _upsample(wide)
-    # The rows are upsampled through a transposed view: same kernel, same rounding, symmetric in x and y.
-    both = _upsample(np.ascontiguousarray(np.swapaxes(cols, -1, -2)))
-    both += 1 << (shift - 1)
-    both >>= shift
-    return np.swapaxes(both, -1, -2)
+    small = max(int(parent.max()), -int(parent.min())) <= _NARROW_LIMIT
+    wide: Wide = parent.astype(np.int32 if small else np.int64, order="C")
+    out: Wide = np.empty((2 * parent.shape[0] - 1, 2 * parent.shape[1] - 1), dtype=wide.dtype)
+    loops.predicted(wide, 9 - ratio, out)
+    return out
+
+
+def upsampled(parent: Ints, ratio: int = 2) -> Wide:
+    """``predict`` in plain NumPy, (n, n) -> (2n - 1, 2n - 1) int64."""
+    both = _upsample(_upsample(parent.astype(np.int64)).T).T
+    return np.asarray((both + (1 << (8 - ratio))) >> (9 - ratio))
+
+
+def _upsample(a: Wide) -> Wide:
+    """Along the last axis, n -> 2n-1 samples, scaled by 16: interpolating 4-point rule, one-sided at both ends."""
+    out = np.empty((*a.shape[:-1], 2 * a.shape[-1] - 1), dtype=a.dtype)
+    out[..., 0::2] = 16 * a
+    odd = out[..., 1::2]
+    odd[..., 1:-1] = 9 * (a[..., 1:-2] + a[..., 2:-1]) - a[..., :-3] - a[..., 3:]
+    odd[..., 0] = 5 * a[..., 0] + 15 * a[..., 1] - 5 * a[..., 2] + a[..., 3]
+    odd[..., -1] = 5 * a[..., -1] + 15 * a[..., -2] - 5 * a[..., -3] + a[..., -4]
+    return out
 
 
 def child_window(prediction: Wide, x: int, y: int) -> Wide:

@@ -2,7 +2,8 @@
 
 They let go of the interpreter's lock, so the solver's thread and the event loop go on beside them. Each does, to the
 bit, what its NumPy twin does: ``steady.steadied``, ``pyramid.quantise``, ``pyramid.follow_parents``,
-``bounds.SubPatches``. They are compiled at their first call and kept on disk where a disk allows it.
+``bounds.SubPatches``, ``codec.upsampled``. They are compiled at their first call and kept on disk where a disk allows
+it.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 
 F = TypeVar("F", bound=Callable[..., Any])
 Ints = NDArray[np.int32]
+Wide = NDArray[np.signedinteger]
 Floats = NDArray[np.float32]
 
 
@@ -59,45 +61,52 @@ def quantised(heights: Floats, kept: Ints, scale: np.float32, quanta: int, limit
 
 @_compiled
 def changed(new: Ints, old: Ints, cells: int, out: NDArray[np.bool_]) -> None:
-    """Which closed blocks of ``cells`` + 1 samples a side hold a sample that differs; out: (m, m) of False."""
+    """Which closed blocks of ``cells`` + 1 samples a side hold a sample that differs; out: (m, m) of False.
+
+    Most rows of a put are as they were: each is looked at as a whole first.
+    """
     side = out.shape[0]
     for r in range(new.shape[0]):
+        whole = np.int32(0)
+        for k in range(new.shape[1]):
+            whole |= new[r, k] ^ old[r, k]
+        if whole == 0:
+            continue
         first, last = max((r - 1) // cells, 0), min(r // cells, side - 1)
         for b in range(side):
-            differs = False
+            differs = np.int32(0)
             for k in range(b * cells, (b + 1) * cells + 1):
-                differs |= new[r, k] != old[r, k]
-            if differs:
+                differs |= new[r, k] ^ old[r, k]
+            if differs != 0:
                 out[first, b] = True
                 out[last, b] = True
 
 
 @_compiled
-def _upsampled(a: NDArray[np.int64], out: NDArray[np.int64]) -> None:
-    """Along the rows of (m, n) into (m, 2n - 1), scaled by 16: see ``codec``."""
-    rows, n = a.shape
-    for r in range(rows):
-        for k in range(n):
-            out[r, 2 * k] = 16 * a[r, k]
-        out[r, 1] = 5 * a[r, 0] + 15 * a[r, 1] - 5 * a[r, 2] + a[r, 3]
-        out[r, 2 * n - 3] = 5 * a[r, n - 1] + 15 * a[r, n - 2] - 5 * a[r, n - 3] + a[r, n - 4]
-        for k in range(1, n - 2):
-            out[r, 2 * k + 1] = 9 * (a[r, k] + a[r, k + 1]) - a[r, k - 1] - a[r, k + 2]
-
-
-@_compiled
-def _predicted(tile: Ints, shift: int) -> NDArray[np.int64]:
-    """``codec.predict`` of one tile, transposed."""
+def predicted(tile: Wide, shift: int, out: Wide) -> None:
+    """``codec.predict`` of one tile, (n, n) into (2n - 1, 2n - 1) of the same dtype, wide enough for the sums."""
     n = tile.shape[0]
-    across = np.empty((n, 2 * n - 1), dtype=np.int64)
-    both = np.empty((2 * n - 1, 2 * n - 1), dtype=np.int64)
-    _upsampled(tile.astype(np.int64), across)
-    _upsampled(np.ascontiguousarray(across.T), both)
-    half = np.int64(1) << (shift - 1)
-    for r in range(2 * n - 1):
-        for k in range(2 * n - 1):
-            both[r, k] = (both[r, k] + half) >> shift
-    return both
+    wide = 2 * n - 1
+    half = 1 << (shift - 1)
+    across = np.empty((n, wide), dtype=tile.dtype)
+    for r in range(n):
+        for k in range(n):
+            across[r, 2 * k] = 16 * tile[r, k]
+        across[r, 1] = 5 * tile[r, 0] + 15 * tile[r, 1] - 5 * tile[r, 2] + tile[r, 3]
+        across[r, wide - 2] = 5 * tile[r, n - 1] + 15 * tile[r, n - 2] - 5 * tile[r, n - 3] + tile[r, n - 4]
+        for k in range(1, n - 2):
+            across[r, 2 * k + 1] = 9 * (tile[r, k] + tile[r, k + 1]) - tile[r, k - 1] - tile[r, k + 2]
+    for r in range(n):
+        for k in range(wide):
+            out[2 * r, k] = (16 * across[r, k] + half) >> shift
+    for k in range(wide):
+        first = 5 * across[0, k] + 15 * across[1, k] - 5 * across[2, k] + across[3, k]
+        last = 5 * across[n - 1, k] + 15 * across[n - 2, k] - 5 * across[n - 3, k] + across[n - 4, k]
+        out[1, k], out[wide - 2, k] = (first + half) >> shift, (last + half) >> shift
+    for r in range(1, n - 2):
+        for k in range(wide):
+            inner = 9 * (across[r, k] + across[r + 1, k]) - across[r - 1, k] - across[r + 2, k]
+            out[2 * r + 1, k] = (inner + half) >> shift
 
 
 @_compiled
@@ -105,15 +114,18 @@ def followed(
     samples: Ints, then: Ints, now: Ints, tiles: NDArray[np.int64], cells: int, shift: int, limit: int, out: Ints
 ) -> None:
     """``pyramid.follow_parents``: moves ``out``, a copy of ``samples``, along with the tiles (y, x) of its parent."""
+    before = np.empty((2 * cells + 1, 2 * cells + 1), dtype=np.int64)
+    after = np.empty_like(before)
     for t in range(tiles.shape[0]):
         y, x = tiles[t, 0] * cells, tiles[t, 1] * cells
         a, b = then[y : y + cells + 1, x : x + cells + 1], now[y : y + cells + 1, x : x + cells + 1]
         if np.array_equal(a, b):
             continue
-        before, after = _predicted(a, shift), _predicted(b, shift)
+        predicted(a.astype(np.int64), shift, before)
+        predicted(b.astype(np.int64), shift, after)
         for r in range(2 * cells + 1):
             for k in range(2 * cells + 1):
-                moved = samples[2 * y + r, 2 * x + k] + after[k, r] - before[k, r]
+                moved = samples[2 * y + r, 2 * x + k] + after[r, k] - before[r, k]
                 out[2 * y + r, 2 * x + k] = min(max(moved, -limit), limit)
 
 

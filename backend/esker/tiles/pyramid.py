@@ -18,7 +18,7 @@ from esker import grid
 from esker.contract import TILE_CELLS
 from esker.tiles import entropy, loops
 from esker.tiles.bounds import Bounds, SubPatches, dilate, nest
-from esker.tiles.codec import SAMPLE_LIMIT, Ints
+from esker.tiles.codec import SAMPLE_LIMIT, Ints, predict
 from esker.tiles.steady import Steadier
 
 BLOCK_CELLS: Final = 4
@@ -371,6 +371,8 @@ def warm() -> None:
             n = grid.samples(level)
             pyramid.put(clock, level, np.full((n, n), clock, dtype=np.float32), settled)
         pyramid.bounds()
+    for amplitude in (1, SAMPLE_LIMIT):
+        predict(np.full((TILE_CELLS + 1, TILE_CELLS + 1), amplitude, dtype=np.int32))
     for lattice in (False, True):
         coded = entropy.encode(np.eye(TILE_CELLS + 1, dtype=np.int64), lattice)
         assert coded is not None
