@@ -16,11 +16,12 @@ from esker.contract import MAX_REFINED_LEVEL, Stroke, TerrainSettings
 from esker.grid import TileKey
 from esker.solve.device import Device
 from esker.solve.refine import FieldCache, RefinedTile, Refiner
+from esker.solve.refine_cl import ClEngine
 from esker.solve.refine_engine import (
-    ClEngine,
     Engine,
     Fields,
     NumpyEngine,
+    Pending,
     Span,
     Step,
     StrokeWindows,
@@ -54,11 +55,11 @@ class Counting:
     """An engine that counts its steps."""
 
     def __init__(self, engine: Engine) -> None:
-        self.engine, self.device, self.steps = engine, engine.device, 0
+        self.engine, self.device, self.ahead, self.steps = engine, engine.device, engine.ahead, 0
 
-    def run(self, at: Step, strokes: StrokeWindows, parent: Fields) -> Fields:
+    def begin(self, at: Step, strokes: StrokeWindows, parent: Fields) -> Pending:
         self.steps += 1
-        return self.engine.run(at, strokes, parent)
+        return self.engine.begin(at, strokes, parent)
 
     def clear(self) -> None:
         self.engine.clear()
@@ -84,7 +85,8 @@ def computed(engine: Engine, basis: Basis, core: Span) -> Fields:
     at = step(basis.level + 1, core)
     p = at.parent
     ground = np.concatenate([basis.gradient, basis.heights[None]])
-    return engine.run(at, Strokes(basis.strokes, basis.settings), ground[:, p.r0 : p.r1, p.c0 : p.c1])
+    pending = engine.begin(at, Strokes(basis.strokes, basis.settings), ground[:, p.r0 : p.r1, p.c0 : p.c1])
+    return pending.fields()
 
 
 def random_spans(rng: random.Random, n: int) -> Iterator[tuple[Span, Span, Span]]:

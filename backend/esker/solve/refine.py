@@ -8,7 +8,7 @@ solve: which tiles were asked for, in which order, in which groups and from what
 from __future__ import annotations
 
 import itertools
-from collections import OrderedDict
+from collections import OrderedDict, deque
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence, Set
 from dataclasses import dataclass
 from hashlib import blake2b
@@ -23,7 +23,8 @@ from esker.grid import TileKey
 from esker.solve.base import Base, bound
 from esker.solve.base_blocks import BaseWindows, BlockCache
 from esker.solve.device import Device, row_kernels
-from esker.solve.refine_engine import CHANNELS, ClEngine, Engine, Fields, NumpyEngine, Span, Step, step
+from esker.solve.refine_cl import ClEngine
+from esker.solve.refine_engine import CHANNELS, Engine, Fields, NumpyEngine, Pending, Span, Step, step
 from esker.solve.refine_strokes import DIGEST_BYTES, Strokes
 
 GROUP: Final = 4
@@ -105,6 +106,20 @@ class FieldCache:
         self._held.clear()
 
 
+@dataclass(frozen=True, eq=False)
+class _Begun:
+    """A step under way for the tiles of a box."""
+
+    level: int
+    box: Box
+    pending: Pending
+
+    def holds(self, key: TileKey) -> bool:
+        """Whether it makes a tile."""
+        x0, y0, x1, y1 = self.box
+        return key.level == self.level and x0 <= key.x < x1 and y0 <= key.y < y1
+
+
 class Refiner:
     """Refines one settled solve. Use it from the solver's thread."""
 
@@ -116,6 +131,10 @@ class Refiner:
         self._digests: dict[TileKey, bytes] = {}
         self._content: dict[TileKey, bytes] = {}
         self._strokes = Strokes(basis.strokes, basis.settings, self._base)
+        self._under_way: deque[_Begun] = deque()
+        """Oldest first; they outlive the iterator that began them."""
+        self._waiting: dict[int, dict[TileKey, Fields | None]] = {}
+        """What the iterators need of them, by the identity of the dictionary."""
 
     def content(self, key: TileKey) -> bytes:
         """Digest of all that a tile depends on: the key, the settings, the strokes that reach its windows at any level
@@ -135,20 +154,28 @@ class Refiner:
             self.content(key)
         wanted = list(dict.fromkeys(keys))
         left = self._plan(wanted)
-        for key in wanted:
-            field = self.cache.get(self.content(key))
-            if field is None:
-                field = (yield from self._made([key], left))[key]
+        for n, key in enumerate(wanted):
+            yield from self._look_ahead(wanted[n:], left)
+            field = (yield from self._made([key], left))[key]
             yield RefinedTile(key, field[2], self.content(key), self._under(key))
 
     def _plan(self, keys: Iterable[TileKey]) -> Plan:
-        """Those tiles that are not kept, by level: when some are made, as parents of finer ones too, so are others that
-        lie beside them."""
+        """Those tiles that are not kept, nor under way, by level: when some are made, as parents of finer ones too, so
+        are others that lie beside them."""
         left: Plan = {level: set() for level in range(self.basis.level + 1, MAX_REFINED_LEVEL + 1)}
         for key in keys:
-            if self.content(key) not in self.cache:
+            if self.content(key) not in self.cache and not self._is_under_way(key):
                 left[key.level].add(key)
         return left
+
+    def _look_ahead(self, coming: Sequence[TileKey], plan: Plan) -> Generator[None, None, None]:
+        """Begins as many steps for the tiles that come next as may be under way: the device works on while the caller
+        takes those that are made."""
+        while len(self._under_way) < self._engine.ahead:
+            first = next((key for key in coming if key in plan[key.level]), None)
+            if first is None:
+                return
+            yield from self._begun(first, set(), plan)
 
     def _under(self, key: TileKey) -> NDArray[np.float32] | None:
         """The base at a tile's samples."""
@@ -160,11 +187,14 @@ class Refiner:
 
     def clear(self) -> None:
         """Drop all that is kept, for all refiners of the solver: fields and rasterised constraints."""
+        self._under_way.clear()
         self.cache.clear()
         self._engine.clear()
 
     def forget(self, keys: Iterable[TileKey]) -> None:
-        """Drop tiles from the cache."""
+        """Drop tiles from the cache. Raises DeviceError like ``tiles``: those under way are finished first."""
+        while self._under_way:
+            self._finish()
         for key in keys:
             self.cache.drop(self.content(key))
 
@@ -206,39 +236,49 @@ class Refiner:
     def _made(self, keys: Iterable[TileKey], plan: Plan) -> Generator[None, None, dict[TileKey, Fields]]:
         """Fields of tiles of one level, from the cache or made now, with others of the plan beside them; yields where
         the work can be left."""
-        out: dict[TileKey, Fields] = {}
-        missing: list[TileKey] = []
-        for key in keys:
-            held = self.cache.get(self.content(key))
-            if held is None:
-                missing.append(key)
-            else:
-                out[key] = held
-        left = dict.fromkeys(missing)
-        while left:
-            first = next(iter(left))
-            made = yield from self._computed(first.level, _group(first, left.keys() | plan[first.level]), plan)
-            for key in made.keys() & left.keys():
-                out[key] = made[key]
-                del left[key]
-        return out
+        out: dict[TileKey, Fields | None] = {key: self.cache.get(self.content(key)) for key in keys}
+        self._waiting[id(out)] = out
+        try:
+            while missing := [key for key, field in out.items() if field is None]:
+                left = [key for key in missing if not self._is_under_way(key)]
+                if left:
+                    yield from self._begun(left[0], set(left), plan)
+                else:
+                    self._finish()
+        finally:
+            del self._waiting[id(out)]
+        return {key: field for key, field in out.items() if field is not None}
 
-    def _computed(self, level: int, box: Box, plan: Plan) -> Generator[None, None, dict[TileKey, Fields]]:
-        """The tiles of a box, computed in one step after what they need of the parent level."""
+    def _begun(self, first: TileKey, others: Set[TileKey], plan: Plan) -> Generator[None, None, None]:
+        """Begins the step of ``first`` and of those of the others and of the plan that go with it, after making what it
+        needs of the parent level."""
+        level = first.level
+        box = _group(first, {first} | others | plan[level])
         x0, y0, x1, y1 = box
         at = step(level, Span(y0 * TILE_CELLS, y1 * TILE_CELLS + 1, x0 * TILE_CELLS, x1 * TILE_CELLS + 1))
         parent = yield from self._parent(at, plan)
-        fields = self._engine.run(at, self._strokes, parent)
-        out = {}
-        for key in _keys(level, box):
+        while len(self._under_way) >= self._engine.ahead:
+            self._finish()
+        self._under_way.append(_Begun(level, box, self._engine.begin(at, self._strokes, parent)))
+        plan[level].difference_update(_keys(level, box))
+        yield
+
+    def _is_under_way(self, key: TileKey) -> bool:
+        return any(begun.holds(key) for begun in self._under_way)
+
+    def _finish(self) -> None:
+        """Waits for the oldest step under way and keeps its tiles."""
+        begun = self._under_way.popleft()
+        fields = begun.pending.fields()
+        x0, y0 = begun.box[:2]
+        for key in _keys(begun.level, begun.box):
             r, c = (key.y - y0) * TILE_CELLS, (key.x - x0) * TILE_CELLS
             tile = fields[:, r : r + TILE_SAMPLES, c : c + TILE_SAMPLES].copy()
             tile.flags.writeable = False
-            out[key] = tile
             self.cache.put(self.content(key), tile)
-            plan[level].discard(key)
-        yield
-        return out
+            for waiting in self._waiting.values():
+                if key in waiting:
+                    waiting[key] = tile
 
     def _parent(self, at: Step, plan: Plan) -> Generator[None, None, Fields]:
         """What a step reads of the next coarser level."""

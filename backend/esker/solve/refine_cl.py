@@ -1,0 +1,220 @@
+"""Steps of refinement on an OpenCL device, row by row (shaders/opencl/refine.cl); twin ``refine_engine.NumpyEngine``.
+
+Two steps may be under way: while the sweeps of one run, which take one core of a CPU, the host prepares the next one, and
+the rasteriser works for it.
+"""
+
+from __future__ import annotations
+
+import weakref
+from collections import deque
+from dataclasses import replace
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from esker import grid
+from esker.solve import raster
+from esker.solve.constraints import BIN
+from esker.solve.device import Device
+from esker.solve.faults import guarded
+from esker.solve.levels import PAD, Launcher, over_base
+from esker.solve.refine_engine import (
+    CHANNELS,
+    GRADIENT_SWEEPS,
+    HEIGHT_SWEEPS,
+    Fields,
+    Pending,
+    Span,
+    Step,
+    StrokeWindows,
+    Values,
+    sweep_weights,
+    with_ghosts,
+)
+from esker.solve.refine_sheets import Sheets, exchange, missing
+
+AHEAD: Final = 2
+"""Steps under way at once: each has memory of its own."""
+_STRIPS_ROWS: Final = 64
+
+_MEMORY: Final = {"u": 3, "v": 3, "gd": 1, "gf": 2, "hd": 1, "hf": 1, "q": 2, "rhs": 1}
+"""Fields of a window and their channels."""
+_OVER: Final = {"base": 1, "share": 1, "target": 1, "raw": 1}
+"""Those that it has over a base."""
+
+
+class ClEngine:
+    """Steps on a device, with the constraints that windows share."""
+
+    ahead = AHEAD
+
+    def __init__(self, device: Device) -> None:
+        self.device = device
+        self.sheets = Sheets()
+        self._rooms = deque(_Room(device) for _ in range(AHEAD))
+
+    def clear(self) -> None:
+        """Drop the rasterised constraints."""
+        self.sheets.clear()
+
+    def begin(self, at: Step, strokes: StrokeWindows, parent: Fields) -> Pending:
+        """See ``Engine``. The step that was begun ``ahead`` steps before is waited for, if anybody still wants it."""
+        room = self._rooms[0]
+        self._rooms.rotate(-1)
+        room.make_free()
+        with guarded(self.device):
+            return room.begin(at, strokes, parent, self.sheets)
+
+
+class _Flight:
+    """A step that a room's queue works on."""
+
+    def __init__(self, room: _Room, span: Span, pitch: int) -> None:
+        self._room, self._span, self._pitch = room, span, pitch
+        self._made: Fields | None = None
+
+    def fields(self) -> Fields:
+        """See ``Pending``."""
+        if self._made is None:
+            with guarded(self._room.device):
+                self._made = self._room.read(self._span, self._pitch)
+        return self._made
+
+
+class _Room:
+    """A queue and memory for one step at a time, as large as the largest window so far."""
+
+    def __init__(self, device: Device) -> None:
+        with guarded(device):
+            import pyopencl as cl
+
+            queue = cl.CommandQueue(device.context, device.context.devices[0])
+            self.device = device
+            self.launch = Launcher(replace(device, queue=queue), 0)
+            self.weights = {k: self.launch.constant(sweep_weights(k).astype(np.float32)) for k in _counts()}
+        self.stride = 0
+        self.fields: dict[str, Any] = {}
+        self._flight: weakref.ref[_Flight] | None = None
+
+    def make_free(self) -> None:
+        """Has the step that is still here read, if anybody wants it."""
+        flight = None if self._flight is None else self._flight()
+        if flight is not None:
+            flight.fields()
+        self._flight = None
+
+    def _reserve(self, stride: int, based: bool) -> None:
+        """Memory for windows of ``stride`` floats a channel, over a base if ``based``."""
+        if stride > self.stride:
+            self.stride = stride
+            self.fields.clear()
+        for name, channels in (_MEMORY | _OVER if based else _MEMORY).items():
+            if name not in self.fields:
+                self.fields[name] = self.launch.zeros(channels * self.stride + 2 * PAD)
+
+    def begin(self, at: Step, strokes: StrokeWindows, parent: Fields, sheets: Sheets) -> Pending:
+        """Has the queue make ``at.core``'s fields; the room is free."""
+        i, f = np.int32, np.float32
+        spacing = grid.spacing(at.level, strokes.settings.size_m)
+        reach = strokes.settings.reach_m
+        screening = 0.0 if reach is None else (spacing / reach) ** 2
+        rows, columns = at.window.shape
+        pitch = PAD + (at.box[3] - at.box[2]) * BIN + PAD
+        self._reserve(rows * pitch, strokes.base is not None)
+        a, stride, run = self.fields, self.stride, self.launch.run
+        self._constrain(at, strokes, pitch, spacing, sheets)
+        shape = (i(rows), i(columns), i(pitch), i(stride))
+        each = _STRIPS_ROWS
+        strips = -(-rows // each)
+        host = _padded(with_ghosts(parent, at), rows, columns)
+        run(
+            "refine_start", (strips, CHANNELS), self.launch.constant(host), i(host.shape[2]),
+            i(host.shape[1] * host.shape[2]), a["gd"], a["hd"], a["hf"], a["u"], a["q"], *shape, f(screening),
+            i(each),
+        )  # fmt: skip
+        core = at.core
+        target_span = Span(
+            core.r0 - at.window.r0, core.r1 - at.window.r0, core.c0 - at.window.c0, core.c1 - at.window.c0
+        )
+        wide = target_span.grown(HEIGHT_SWEEPS + 1, 1 << 30)
+        wide = Span(wide.r0, min(rows, wide.r1), wide.c0, min(columns, wide.c1))
+        self._sweep(2, 0, "gf", "gd", 0, shape, screening, GRADIENT_SWEEPS, wide)
+        run("refine_guide", (strips,), a["u"], a["hd"], a["hf"], a["rhs"], *shape, f(spacing), i(each))
+        self._sweep(1, 2, "rhs", "hd", 1, shape, screening, HEIGHT_SWEEPS, target_span)
+        self.launch.queue.flush()
+        flight = _Flight(self, target_span, pitch)
+        self._flight = weakref.ref(flight)
+        return flight
+
+    def _constrain(self, at: Step, strokes: StrokeWindows, pitch: int, spacing: float, sheets: Sheets) -> None:
+        """The constraints of the window: bins that are known from the sheets, the others from the rasteriser."""
+        a, cl, queue, base = self.fields, self.launch.cl, self.launch.queue, strokes.base
+        kept = [("hd", 1), ("hf" if base is None else "raw", 1), ("gd", 1), ("gf", 2)]
+        kept += [] if base is None else [("share", 1), ("target", 1)]
+        parts = sheets.parts(at.level, at.box, strokes.sheet_digest, sum(channels for _, channels in kept))
+        fresh = missing(parts, at.box)
+        (rows, columns), both = at.window.shape, cl.map_flags.READ | cl.map_flags.WRITE
+        over = None
+        if base is not None:
+            self._put_base(base.window(at.level, at.window), pitch)
+            over = raster.Over(a["base"], a["share"], a["target"])
+        if fresh.width:
+            target = raster.Target(a["hd"], a[kept[1][0]], a["gd"], a["gf"], pitch, self.stride, over)
+            raster.rasterise(self.launch, strokes.shared_tables(at.level, at.box), fresh, target)
+        views, maps = [], []
+        for name, channels in kept:
+            host, _ = cl.enqueue_map_buffer(queue, a[name], both, 0, (a[name].size // 4,), np.float32)
+            maps.append(host)
+            for c in range(channels):
+                first = c * self.stride + PAD
+                views.append(host[first : first + rows * pitch].reshape(rows, pitch)[:, :columns])
+        exchange(parts, fresh, at.box, views)
+        for host in maps:
+            host.base.release(queue)
+        sheets.trim()
+        if base is not None:
+            fields = [a[name] for name in ("base", "share", "target", "hd", "raw", "hf")]
+            over_base(self.launch, fields, spacing, (rows, columns), pitch, (0, rows))
+
+    def _put_base(self, samples: Values, pitch: int) -> None:
+        """Copies the base's samples to the window's."""
+        rows, columns = samples.shape
+        self.launch.cl.enqueue_copy(
+            self.launch.queue, self.fields["base"], samples, host_pitches=(4 * columns,), host_origin=(0, 0),
+            region=(4 * columns, rows), buffer_pitches=(4 * pitch,), buffer_origin=(4 * PAD, 0),
+        )  # fmt: skip
+
+    def _sweep(
+        self, channels: int, first: int, f: str, d: str, q: int, shape: tuple[Any, ...], screening: float, count: int,
+        span: Span,
+    ) -> None:  # fmt: skip
+        i, a = np.int32, self.fields
+        self.launch.run(
+            "refine_sweeps", (channels,), a["u"], a["v"], a[f], a[d], a["q"], i(first), i(q), *shape,
+            np.float32(screening), self.weights[count], i(count), *map(i, span),
+        )  # fmt: skip
+
+    def read(self, span: Span, pitch: int) -> Fields:
+        """The fields of samples of the window, when all that was begun is done."""
+        rows, columns = span.shape
+        out = np.empty((CHANNELS, rows, columns), dtype=np.float32)
+        for c in range(CHANNELS):
+            self.launch.cl.enqueue_copy(
+                self.launch.queue, out[c], self.fields["u"], host_pitches=(4 * columns,), host_origin=(0, 0),
+                region=(4 * columns, rows), buffer_pitches=(4 * pitch,),
+                buffer_origin=(4 * (c * self.stride + span.r0 * pitch + PAD + span.c0), 0),
+            )  # fmt: skip
+        return out
+
+
+def _counts() -> set[int]:
+    return {GRADIENT_SWEEPS, HEIGHT_SWEEPS}
+
+
+def _padded(parent: NDArray[np.float32], rows: int, columns: int) -> NDArray[np.float32]:
+    """Rows and columns enough for the kernel's vectors."""
+    out = np.zeros((CHANNELS, rows // 2 + 4, -(-columns // BIN) * (BIN // 2) + 2 * PAD), dtype=np.float32)
+    out[:, : parent.shape[1], : parent.shape[2]] = parent[:, : out.shape[1], : out.shape[2]]
+    return out
