@@ -17,12 +17,15 @@ struct Attributes {
   grain: f32,        // the noise of the place's own level
 };
 
+// Waves of a lake run up so many times less than those of the sea.
+const LAKE_SHORES: f32 = 3.0;
+
 struct Site {
   p: vec3f,
   n: vec3f,          // normal of the surface
   steep: f32,        // tangent of the slope
   height: f32,       // above the sea or zero, as a fraction of the relief: the domain, or the climate of a real place
-  shore: f32,        // the same for the sea's shores
+  shore: f32,        // above the nearest water, the same for shores: those of lakes are narrower
   curvature: f32,
   footprint: f32,    // metres that a pixel covers
   f: Footprint,
@@ -35,7 +38,7 @@ struct Site {
   cover: Attributes,
 };
 
-fn survey(p: vec3f, gradient: vec2f, curvature: f32, f: Footprint, cover: Attributes) -> Site {
+fn survey(p: vec3f, gradient: vec2f, curvature: f32, f: Footprint, cover: Attributes, above_lake: f32) -> Site {
   let n = normalize(vec3f(-gradient, 1.0));
   var s: Site;
   s.p = p;
@@ -43,7 +46,7 @@ fn survey(p: vec3f, gradient: vec2f, curvature: f32, f: Footprint, cover: Attrib
   s.steep = length(gradient);
   let above = p.z - view.sea;
   s.height = above / view.relief;
-  s.shore = above / view.shore;
+  s.shore = min(select(FAR_ABOVE, above, view.has_sea > 0.5), LAKE_SHORES * above_lake) / view.shore;
   s.curvature = curvature;
   s.footprint = sqrt(max(max(dot(f.dx, f.dx), dot(f.dy, f.dy)), 1.0e-8));
   s.f = f;
@@ -133,7 +136,7 @@ fn soaked(m: Material, wet: f32) -> Material {
 }
 
 fn shore(m: Material, s: Site, colour: vec3f) -> Material {
-  if (view.has_sea < 0.5) { return m; }
+  if (max(view.has_sea, view.has_lakes) < 0.5) { return m; }
   let wander = (s.macro2.r - 0.5) * 0.006 + (s.fine1.r - 0.5) * 0.003;
   let low = 1.0 - smoothstep(0.0012, 0.0034, s.shore + wander * 0.7);
   let gentle = 1.0 - smoothstep(0.42, 0.75, s.steep + (s.fine1.g - 0.5) * 0.3);

@@ -8,6 +8,7 @@ struct TerrainVertex {
   @location(4) through: vec3f,
   @location(5) glow: vec3f,
   @location(6) detail: vec3f,
+  @location(7) above_lake: f32,
 };
 
 @vertex
@@ -23,6 +24,7 @@ fn terrain_vertex(@builtin(vertex_index) index: u32, patch_in: PatchIn) -> Terra
   out.through = air.through;
   out.glow = air.glow;
   out.detail = detail_at(v.world.xy);
+  out.above_lake = above_lake(v.world);
   return out;
 }
 
@@ -76,7 +78,7 @@ fn terrain_fragment(v: TerrainVertex) -> @location(0) vec4f {
   let world = v.relative + view.eye.xyz;
   let rate = abs(f.dx.z) + abs(f.dy.z);
   let surface = patch_surface(v.record, v.at, v.morph);
-  let site = survey(world, surface.gradient, surface.curvature, f, cover_of(surface));
+  let site = survey(world, surface.gradient, surface.curvature, f, cover_of(surface), v.above_lake);
   var m = ground_material(site);
   if (view.overlay == OVERLAY_SLOPE) {
     m.albedo = mix(m.albedo, slope_tint(site.steep), 0.8);

@@ -15,6 +15,7 @@ struct View {
   base: f32,             // height of the plane on which the block stands, metres
   sea: f32,              // sea level, metres; without a sea, where elevations count from
   has_sea: f32,          // 1 or 0
+  has_lakes: f32,        // 1 or 0
   exposure: f32,
   haze: f32,             // extinction per metre at the ground
   low: f32,              // lowest and highest ground, metres
@@ -58,6 +59,7 @@ const OVERLAY_PAINTED: u32 = 6u;
 @group(0) @binding(10) var attributes0: texture_2d_array<f32>;  // synthesised: snow, wet, foam, smoothness / 2
 @group(0) @binding(11) var attributes1: texture_2d_array<f32>;  // grass, forest, grain, size of the next level's detail
 @group(0) @binding(12) var stones: texture_2d<f32>;  // stones_rich.wgsl
+@group(0) @binding(13) var lake_map: texture_2d<f32>;  // over the domain, metres: ground and level of a sample (lakes.wgsl)
 
 // Clip position of a point given relative to the eye.
 fn clip_of(relative: vec3f) -> vec4f {

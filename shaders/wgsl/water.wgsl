@@ -1,7 +1,7 @@
-// The sea: absorption by depth, the bed through it, waves, Fresnel reflection of sky and land, the sun's glitter, foam at
-// the shore. Inside the domain it is drawn on the patches themselves, so that its shore is exactly the ground's contour;
-// outside it is part of the background. Both are opaque and use the same function, so that they meet without a step; only
-// the last hand's breadth of water blends with the ground.
+// The sea and lakes: absorption by depth, the bed through it where the bent sight meets it, waves, Fresnel reflection of sky
+// and land, the sun's glitter, foam at the shore. Inside the domain water is drawn on the patches themselves, one level sheet
+// each, so that its shore is exactly the ground's contour; outside the sea is part of the background. Both are opaque and
+// use the same function, so that they meet without a step; only the last hand's breadth of water blends with the ground.
 
 // Absorption per metre of clear water, and what it scatters back.
 const WATER_ABSORB: vec3f = vec3f(0.210, 0.058, 0.046);
@@ -67,15 +67,21 @@ fn far_ground(p: vec3f) -> vec3f {
   return far_albedo(p.z - view.sea, length(g)) * lit;
 }
 
-// What a mirror ray from the water sees: land, found by a march over level 0, else the sky. `steps` 0: the sky alone.
-fn mirrored(p: vec3f, dir: vec3f, steps: i32) -> vec3f {
+// Ground that water mirrors: lakes are too small for level 0.
+fn mirror_ground(p: vec2f, inland: bool) -> f32 {
+  if (inland) { return lake_ground(p); }
+  return root_ground(p);
+}
+
+// What a mirror ray from the water sees: land, found by a march over coarse ground, else the sky. `steps` 0: the sky alone.
+fn mirrored(p: vec3f, dir: vec3f, steps: i32, inland: bool) -> vec3f {
   let sky = sky_colour(dir);
   // The part of the ray over the domain and below its highest ground.
   let inverse = 1.0 / select(dir.xy, vec2f(1.0e-5), abs(dir.xy) < vec2f(1.0e-5));
   let a = -p.xy * inverse;
   let b = (vec2f(view.size) - p.xy) * inverse;
   let enter = max(max(min(a.x, b.x), min(a.y, b.y)), 0.0);
-  let leave = min(min(max(a.x, b.x), max(a.y, b.y)), (view.high - view.sea) / max(dir.z, 0.01));
+  let leave = min(min(max(a.x, b.x), max(a.y, b.y)), (view.high - p.z) / max(dir.z, 0.01));
   var cover = 0.0;
   var at = p;
   var before = 0.0;
@@ -84,7 +90,7 @@ fn mirrored(p: vec3f, dir: vec3f, steps: i32) -> vec3f {
     let part = f32(i + 1) / f32(steps);
     let t = enter + (leave - enter) * part * part;
     let q = p + dir * t;
-    let above = root_ground(q.xy) - q.z;
+    let above = mirror_ground(q.xy, inland) - q.z;
     if (above > 0.0) {
       // Between the last place above ground and this one.
       let back = (t - before) * above / (above + 0.25 * (t - before) + 1.0e-3);
@@ -96,7 +102,7 @@ fn mirrored(p: vec3f, dir: vec3f, steps: i32) -> vec3f {
   }
   if (cover <= 0.0) { return sky; }
   let air = exp(-view.haze * distance(at, p));
-  return mix(sky, mix(haze_glow(dir), far_ground(vec3f(at.xy, max(at.z, view.sea))), air), cover);
+  return mix(sky, mix(haze_glow(dir), far_ground(vec3f(at.xy, max(at.z, p.z))), air), cover);
 }
 
 fn bed_albedo(steep: f32, grain: f32) -> vec3f {
@@ -108,17 +114,30 @@ fn bed_albedo(steep: f32, grain: f32) -> vec3f {
 }
 
 struct Water {
-  depth: f32,    // metres below the surface here
+  depth: f32,    // metres below the surface, of the bed that is seen
+  shallow: f32,  // of the bed right below
   steep: f32,    // of the bed
   foam: f32,     // what the ground's channel says, 0..1
-  noise: vec4f,  // two layers of ground noise
+  noise: vec4f,  // two layers of ground noise, on the bed
+  waves: f32,    // their height in that of the sea's
+  inland: bool,  // a lake
 };
 
-// Colour of the water, not yet through the air.
-fn water_surface(p: vec3f, dir: vec3f, w: Water) -> vec3f {
+// The surface's normal, waves and all.
+fn water_normal(p: vec3f, dir: vec3f, waves: f32) -> vec3f {
   let away = distance(p, view.eye.xyz) * (1.0 - view.eye.w) + view.eye.w;
-  let slope = wave_slope(p.xy, away, abs(dir.z));
-  let n = normalize(vec3f(-slope, 1.0));
+  return normalize(vec3f(-wave_slope(p.xy, away, abs(dir.z)) * waves, 1.0));
+}
+
+// Sight below the surface (Snell).
+fn bent(dir: vec3f, n: vec3f) -> vec3f {
+  let k = 1.0 / WATER_INDEX;
+  let facing = clamp(dot(n, -dir), 0.0, 1.0);
+  return k * dir + (k * facing - sqrt(1.0 - k * k * (1.0 - facing * facing))) * n;
+}
+
+// Colour of the water, not yet through the air.
+fn water_surface(p: vec3f, dir: vec3f, n: vec3f, w: Water) -> vec3f {
   let facing = clamp(dot(n, -dir), 0.0, 1.0);
   let fresnel = 0.02 + 0.98 * pow(1.0 - facing, 5.0);
   let up = ambient_light(vec3f(0.0, 0.0, 1.0));
@@ -137,14 +156,14 @@ fn water_surface(p: vec3f, dir: vec3f, w: Water) -> vec3f {
   let body = WATER_SCATTER * (sun + up) * (vec3f(1.0) - seen * reached);
   var mirror = reflect(dir, n);
   mirror.z = abs(mirror.z) + 0.002;
-  let shown = mirrored(p, normalize(mirror), select(0, MIRROR_STEPS, fresnel > 0.03 && view.eye.w < 0.5));
+  let shown = mirrored(p, normalize(mirror), select(0, MIRROR_STEPS, fresnel > 0.03 && view.eye.w < 0.5), w.inland);
   let half_way = normalize(view.sun.xyz - dir);
   let glint = max(dot(n, half_way), 0.0);
   let glitter = pow(glint, 420.0) * 7.0 + pow(glint, 70.0) * 0.18;
   var colour = (bed * seen + body) * (1.0 - fresnel) + (shown + sun_light() * glitter) * fresnel;
 
   // Foam: lace where waves run out on the shore, more of it where the channel says so.
-  let band = w.depth / (0.0013 * view.shore);
+  let band = w.shallow / (0.0013 * view.shore * w.waves);
   let wash = 0.5 + 0.5 * sin(band * 10.0 - view.time * 1.1 + w.noise.z * 9.0);
   let reach = 1.0 - smoothstep(0.0, 0.7 + 0.9 * w.foam, band);
   let lace = smoothstep(0.46, 0.74, w.noise.w * 0.80 + wash * 0.22 + (1.0 - min(band, 1.0)) * 0.20 + (w.foam - 0.5) * 0.25);
@@ -153,7 +172,8 @@ fn water_surface(p: vec3f, dir: vec3f, w: Water) -> vec3f {
 
 // The open sea: no waves break there.
 fn open_water(p: vec3f, dir: vec3f) -> vec3f {
-  return water_surface(p, dir, Water(sea_depth(p.xy), 0.0, 0.0, vec4f(0.5, 0.5, 0.5, 0.0)));
+  let depth = sea_depth(p.xy);
+  return water_surface(p, dir, water_normal(p, dir, 1.0), Water(depth, depth, 0.0, 0.0, vec4f(0.5, 0.5, 0.5, 0.0), 1.0, false));
 }
 
 struct WaterVertex {
@@ -164,15 +184,18 @@ struct WaterVertex {
   @location(3) glow: vec3f,
   @location(4) at: vec2f,
   @location(5) @interpolate(flat) record: vec4u,
+  @location(6) @interpolate(flat) sheet: vec4f,
 };
 
+// `sheet`: level of the water now, metres; level that its lake is known by, NO_LAKE for the sea; height of its waves in that
+// of the sea's.
 @vertex
-fn water_vertex(@builtin(vertex_index) index: u32, patch_in: PatchIn) -> WaterVertex {
+fn water_vertex(@builtin(vertex_index) index: u32, patch_in: PatchIn, @location(1) sheet: vec4f) -> WaterVertex {
   let v = patch_vertex(patch_in.record, vec2i(i32(index % PITCH), i32(index / PITCH)));
-  let world = vec3f(v.world.xy, view.sea);
+  let world = vec3f(v.world.xy, sheet.x);
   let air = air_to(world);
-  let relative = vec3f(v.relative.xy, (view.sea - view.eye.z) - view.eye_low.z);
-  return WaterVertex(clip_of(relative), relative, view.sea - v.world.z, air.through, air.glow, v.at, patch_in.record);
+  let relative = vec3f(v.relative.xy, (sheet.x - view.eye.z) - view.eye_low.z);
+  return WaterVertex(clip_of(relative), relative, sheet.x - v.world.z, air.through, air.glow, v.at, patch_in.record, sheet);
 }
 
 // Foam of the ground's channel at a place of a patch.
@@ -186,20 +209,32 @@ fn water_fragment(v: WaterVertex) -> @location(0) vec4f {
   let f = Footprint(dpdx(v.relative), dpdy(v.relative));
   let world = v.relative + view.eye.xyz;
   if (v.depth < 0.0) { discard; }
-  let a = ground_noise(world, f, 61.0, vec2f(0.9, 0.436));
-  let b = ground_noise(world + vec3f(view.time * 0.8, 0.0, 0.0), f, 17.0, vec2f(0.6, -0.8));
+  let inland = v.sheet.y > NO_LAKE;
+  var within = view.size;
+  if (inland) {
+    within = inside_lake(world.xy, v.sheet.y);
+    if (within <= 0.0) { discard; }
+  }
+  let dir = ray_to(world);
+  let n = water_normal(world, dir, v.sheet.z);
+  // The bed that is seen lies further on, where the bent sight meets its slope.
   let own = patch_slot(v.record);
   let bed = textureSampleLevel(slopes, smooth_clamp, slot_uv(own, v.at), slot_layer(own), 0.0).xy;
+  let below = bent(dir, n);
+  let along = below.xy / max(-below.z, 0.2);
+  let seen = v.depth / clamp(1.0 + dot(bed, along), 0.5, 3.0);
+  let place = world + vec3f(along, -1.0) * seen;
+  let a = ground_noise(place, f, 61.0, vec2f(0.9, 0.436));
+  let b = ground_noise(place + vec3f(view.time * 0.8, 0.0, 0.0), f, 17.0, vec2f(0.6, -0.8));
   // Towards the domain's border the water becomes the open sea's.
-  let inland = min(min(world.x, world.y), min(view.size - world.x, view.size - world.y));
-  let inner = smoothstep(0.0, 0.04 * view.size, inland);
-  let depth = mix(sea_depth(world.xy), v.depth, inner);
-  let lace = mix(a.g, b.g, 0.5) * inner;
-  let noises = mix(vec4f(0.5, 0.5, 0.5, 0.0), vec4f(a.r, b.g, a.r, lace), inner);
-  let dir = ray_to(world);
-  let water = water_surface(world, dir, Water(depth, length(bed) * inner, shore_foam(v.record, v.at), noises));
+  let border = min(min(world.x, world.y), min(view.size - world.x, view.size - world.y));
+  let inner = select(smoothstep(0.0, 0.04 * view.size, border), 1.0, inland);
+  let open = sea_depth(world.xy);
+  let noises = mix(vec4f(0.5, 0.5, 0.5, 0.0), vec4f(a.r, b.g, a.r, mix(a.g, b.g, 0.5)), inner);
+  let w = Water(mix(open, seen, inner), mix(open, v.depth, inner), length(bed) * inner, shore_foam(v.record, v.at), noises, v.sheet.z, inland);
+  let water = water_surface(world, dir, n, w);
   let shown = display(water * v.through + v.glow, v.position.xy);
-  let edge = smoothstep(0.0, 0.00012 * view.shore, v.depth);
+  let edge = smoothstep(0.0, 0.00012 * view.shore, min(v.depth, within));
   return vec4f(with_cursors(shown.rgb, world), edge);
 }
 

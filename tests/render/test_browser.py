@@ -34,6 +34,7 @@ SCENES: dict[str, dict[str, Any]] = {
     "natural": {"look": "natural"},
     "sea": {"look": "natural", "sea_level_m": 20.0},
     "paper": {"look": "paper"},
+    "lakes": {"look": "natural", "lakes_m": 2.0},
 }
 
 

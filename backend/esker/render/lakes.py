@@ -9,6 +9,7 @@ south-east to north-west. On such ground the flood is exact: water leaves a basi
 from __future__ import annotations
 
 import heapq
+import math
 from collections import deque
 from collections.abc import Iterator
 from typing import Final, NamedTuple
@@ -28,6 +29,8 @@ from esker.contract import (
 )
 
 Heights = NDArray[np.float32]
+FULL_FETCH_M: Final = 3000.0
+"""Wind that has come over so much water raises the waves of the sea."""
 _MESH: Final = ((0, 1), (0, -1), (1, 0), (-1, 0), (1, -1), (-1, 1))
 
 
@@ -143,6 +146,12 @@ def levels_on(lakes: Lakes, level: int, column: int, row: int) -> list[float]:
     high_x, high_y = -(-(column + 1) * span // cell), -(-(row + 1) * span // cell)
     part = lakes.levels[low_y : high_y + 1, low_x : high_x + 1]
     return sorted(set(part[part > NO_LAKE].tolist()))
+
+
+def waves_of(lakes: Lakes, size_m: float) -> dict[float, float]:
+    """Height of the waves on each lake in those of the sea, by their fetch: about the root of it."""
+    cell = size_m / (TILE_CELLS << LAKE_LEVEL)
+    return {lake: math.sqrt(min(1.0, math.sqrt(n) * cell / FULL_FETCH_M)) for lake, n in lakes.samples.items()}
 
 
 def _around(r: int, c: int, rows: int, cols: int) -> Iterator[tuple[int, int]]:

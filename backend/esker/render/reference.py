@@ -10,12 +10,13 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from esker.contract import PATCH_CELLS, SUBPATCHES
+from esker.contract import NO_LAKE, PATCH_CELLS, SUBPATCHES, TerrainSettings
 from esker.render import sources
 from esker.render.atlas import MAX_SLOTS, PLAIN_MARCH, Atlas
 from esker.render.camera import eye_projection, part
 from esker.render.device import depth_buffer, half_depth, open_context
 from esker.render.frame import Detail, Rect, Scene, base_height, sun_direction, view_values
+from esker.render.lakes import Lakes, Surfaces, levels_on, sheet, waves_of
 from esker.render.layout import StructLayout
 from esker.render.programs import Compute, Draw, Resources
 from esker.render.select import Cut, choose, frustum
@@ -105,23 +106,26 @@ class Reference:
         *,
         bare: bool,
     ) -> Picture:
-        cut, tau = self._cut(surface, scene)
+        lakes = surface.lakes(scene.settings)
+        water = Surfaces(lakes, scene.settings.sea_level_m)
+        cut, tau = self._cut(surface, scene, water)
         _, high, _ = surface.bounds(0, np.array([(x, y) for x in range(SUBPATCHES) for y in range(SUBPATCHES)]))
         atlas = Atlas(self.context, cut.tiles(), surface)
         settings = scene.settings
         sun = sun_direction(settings.sun_azimuth_deg, settings.sun_elevation_deg)
         atlas.compute(self._normals, self._sun, settings.size_m, float(high.max()), sun)
-        resources, amplitude = self._resources(atlas, scene, channels)
+        resources, amplitude = self._resources(atlas, scene, channels, lakes)
         words = _words(cut, atlas)
         out = np.empty((scene.camera.height, scene.camera.width, 3), dtype=np.uint8)
         parts = _parts(scene.camera.width, scene.camera.height)
         for done, rect in enumerate(parts):
             if progress is not None:
                 progress(done / len(parts))
-            values = view_values(scene, rect, surface.range_m, amplitude)
+            values = view_values(scene, rect, surface.range_m, amplitude, lakes=lakes is not None)
             view = StructLayout(sources.background(self._detail), "View").pack(values)
             resources.buffers["view"] = self.context.buffer(view)
-            records = _Records(self.context, cut, words, self._seen(cut, scene, rect, surface))
+            seen = self._seen(cut, scene, rect, surface)
+            records = _Records(self.context, cut, words, seen, _sheets(cut, words, seen, scene.settings, lakes))
             out[rect.top : rect.top + rect.height, rect.left : rect.left + rect.width] = self._part(
                 rect, scene, resources, records, bare=bare
             )
@@ -134,12 +138,12 @@ class Reference:
         camera, settings = scene.camera, scene.settings
         planes = frustum(part(eye_projection(camera), camera, *rect))
         foot = base_height(surface.range_m[0], settings.size_m)
-        return cut.within(camera, planes, foot, -np.inf if settings.sea_level_m is None else settings.sea_level_m)
+        return cut.within(camera, planes, foot)
 
-    def _cut(self, surface: Surface, scene: Scene) -> tuple[Cut, float]:
+    def _cut(self, surface: Surface, scene: Scene, water: Surfaces) -> tuple[Cut, float]:
         tau = scene.tau_px
         while True:
-            cut = choose(surface, scene.camera, tau, scene.settings.sea_level_m)
+            cut = choose(surface, scene.camera, tau, water)
             if len(cut.tiles()) <= MAX_SLOTS:
                 return cut, tau
             tau *= COARSER
@@ -166,7 +170,9 @@ class Reference:
             texture.write(data.tobytes(), level=level, alignment=1)
         return texture
 
-    def _resources(self, atlas: Atlas, scene: Scene, channels: Channels) -> tuple[Resources, float]:
+    def _resources(
+        self, atlas: Atlas, scene: Scene, channels: Channels, lakes: Lakes | None
+    ) -> tuple[Resources, float]:
         """All that passes bind but the view, and the amplitude that the channel texture's 1 stands for."""
         radiance, ambient = self._bake(scene)
         texels, amplitude = channel_texels(channels)
@@ -177,8 +183,13 @@ class Reference:
             "noise": self._noise,
             "stones": self._stones,
             "channels": grid,
+            "lake_map": self._lake_map(lakes),
         }
         return Resources(textures, self._fixed, {"skylight": ambient}), amplitude
+
+    def _lake_map(self, lakes: Lakes | None) -> moderngl.Texture:
+        texels = np.zeros((2, 2, 2), dtype=np.float32) if lakes is None else sheet(lakes)
+        return self.context.texture(texels.shape[:2], 2, texels.tobytes(), dtype="f4")
 
     def _bake(self, scene: Scene) -> tuple[moderngl.Texture, moderngl.Buffer]:
         module = sources.sky()
@@ -243,46 +254,59 @@ class Reference:
         *,
         bare: bool,
     ) -> None:
-        """The page's order: ground, walls, open sea, sky, sea over the ground (frontend/src/gpu/renderer.ts)."""
+        """The page's order: ground, walls, open sea, sky, water over the ground (frontend/src/gpu/renderer.ts)."""
         look = scene.settings.look
         sea = scene.settings.sea_level_m is not None
         frame = (float(rect.left), float(rect.top + rect.height))
 
         def run(
-            name: str, records: moderngl.Buffer | None, count: int, *, test: str = ">", writes: bool = True
+            name: str,
+            records: moderngl.Buffer | None,
+            count: int,
+            *,
+            layout: str = "4u4",
+            test: str = ">",
+            writes: bool = True,
         ) -> None:
             if count == 0:
                 return
             self.context.depth_func = test
             target.depth_mask = writes
-            self._pass(name, look).run(resources, frame, records=records, layout="4u4 1u4 /i", count=count)
+            self._pass(name, look).run(resources, frame, records=records, layout=layout, count=count)
 
         run("terrain", records.all, records.count)
         if bare:
             return
-        run("wall", records.walls, records.wall_count)
+        run("wall", records.walls, records.wall_count, layout="4u4 1u4 /i")
         if sea:
             run("open_sea", None, 24)
         run("background", None, 3, test=">=", writes=False)
-        if sea:
-            self.context.enable(moderngl.BLEND)
-            over = (moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA)
-            self.context.blend_func = (*over, moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA)  # type: ignore[assignment]
-            run("water", records.wet, records.wet_count, writes=False)
-            self.context.disable(moderngl.BLEND)
+        self.context.enable(moderngl.BLEND)
+        over = (moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA)
+        self.context.blend_func = (*over, moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA)  # type: ignore[assignment]
+        run("water", records.sheets, records.sheet_count, layout="4u4 4f4", writes=False)
+        self.context.disable(moderngl.BLEND)
         target.depth_mask = True
 
 
 class _Records:
-    """Patches of the cut on the device; see patch.wgsl for what the words are. ``seen``: which ones."""
+    """Patches of the cut on the device; see patch.wgsl for what the words are. ``seen``: which ones; ``sheets``: of
+    water, (n, 8)."""
 
-    def __init__(self, context: moderngl.Context, cut: Cut, words: NDArray[np.uint32], seen: NDArray[np.bool_]) -> None:
+    def __init__(
+        self,
+        context: moderngl.Context,
+        cut: Cut,
+        words: NDArray[np.uint32],
+        seen: NDArray[np.bool_],
+        sheets: NDArray[np.uint32],
+    ) -> None:
         borders = np.where(seen, cut.border, 0).tolist()
         sides = [(i, bit) for i, border in enumerate(borders) for bit in (1, 2, 4, 8) if border & bit]
         walls = np.array([[*words[i], bit] for i, bit in sides], dtype=np.uint32).reshape(-1, 5)
-        ground, wet = words[seen], words[seen & cut.wet]
-        self.count, self.wall_count, self.wet_count = len(ground), len(walls), len(wet)
-        self.all, self.walls, self.wet = (_buffer(context, data) for data in (ground, walls, wet))
+        ground = words[seen]
+        self.count, self.wall_count, self.sheet_count = len(ground), len(walls), len(sheets)
+        self.all, self.walls, self.sheets = (_buffer(context, data) for data in (ground, walls, sheets))
 
 
 def _buffer(context: moderngl.Context, data: NDArray[np.uint32]) -> moderngl.Buffer:
@@ -302,6 +326,31 @@ def _words(cut: Cut, atlas: Atlas) -> NDArray[np.uint32]:
     out[:, 1] = corner[:, 1] | cut.level << 24 | cut.wet.astype(np.int64) << 31
     out[:, 2] = np.array(own) | np.array(parent) << 16
     out[:, 3] = np.ascontiguousarray(cut.corners).view("<u4")[:, 0]
+    return out
+
+
+def _sheets(
+    cut: Cut, words: NDArray[np.uint32], seen: NDArray[np.bool_], settings: TerrainSettings, lakes: Lakes | None
+) -> NDArray[np.uint32]:
+    """Sheets of water on patches, (n, 8): record, level, level that the lake is known by, waves. The sea comes first
+    (frontend/src/gpu/patches.ts)."""
+    waves = {} if lakes is None else waves_of(lakes, settings.size_m)
+    rows: list[tuple[int, float, float, float]] = []
+    sea = settings.sea_level_m
+    for i in np.flatnonzero(seen & cut.wet).tolist():
+        low = cut.near[i, 2]
+        if sea is not None and low < sea:
+            rows.append((i, sea, NO_LAKE, 1.0))
+        if lakes is not None:
+            px, py = cut.nodes[i].tolist()
+            found = levels_on(lakes, int(cut.level[i]), px, py)
+            rows += [(i, level, level, waves[level]) for level in found if low < level]
+    rows.sort(key=lambda row: row[2] > NO_LAKE)
+    out = np.zeros((len(rows), 8), dtype=np.uint32)
+    if rows:
+        at = np.array([row[0] for row in rows])
+        out[:, :4] = words[at]
+        out[:, 4:7] = np.array([row[1:] for row in rows], dtype=np.float32).view(np.uint32)
     return out
 
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from esker.contract import PATCH_CELLS, QUANTA_PER_CELL, SUBPATCHES
 from esker.render.camera import Camera, eye_projection
+from esker.render.lakes import Surfaces
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -49,8 +50,8 @@ class Figures(Protocol):
 class Cut:
     """Drawn patches. ``nodes``: (n, 2) column and row on ``level``; ``edges``: bits of the sides with a coarser
     neighbour, ``border``: of those on the domain's border; ``corners``: (n, 4) weights, south-west, south-east,
-    north-west, north-east, as unorm8; ``wet``: some of it lies below the sea. ``near``, ``far``: (n, 3) corners of the
-    boxes that patches stay in, metres."""
+    north-west, north-east, as unorm8; ``wet``: some of it lies below water. ``near``, ``far``: (n, 3) corners of the
+    boxes that patches stay in, ``water``: how high water may stand there, metres."""
 
     level: Ints
     nodes: Ints
@@ -60,14 +61,15 @@ class Cut:
     wet: NDArray[np.bool_]
     near: Floats
     far: Floats
+    water: Floats
     split: Split
 
-    def within(self, camera: Camera, planes: Floats, foot_m: float, surface_m: float) -> NDArray[np.bool_]:
+    def within(self, camera: Camera, planes: Floats, foot_m: float) -> NDArray[np.bool_]:
         """Which patches may be seen inside ``planes`` (``frustum``). On the domain's border the ground reaches down to
-        ``foot_m``, and where it is wet the sea up to ``surface_m``."""
+        ``foot_m``."""
         near, far = self.near - np.array(camera.eye), self.far - np.array(camera.eye)
         near[self.border != 0, 2] = np.minimum(near[self.border != 0, 2], foot_m - camera.eye[2])
-        far[self.wet, 2] = np.maximum(far[self.wet, 2], surface_m - camera.eye[2])
+        far[self.wet, 2] = np.maximum(far[self.wet, 2], self.water[self.wet] - camera.eye[2])
         return _touching(planes, near, far)
 
     def tiles(self) -> list[tuple[int, int, int]]:
@@ -94,9 +96,9 @@ def _touching(planes: Floats, near: Floats, far: Floats) -> NDArray[np.bool_]:
     return inside
 
 
-def choose(ground: Figures, camera: Camera, tau_px: float, sea_m: float | None = None) -> Cut:
-    """The cut for a camera. ``sea_m``: patches below it are drawn as far as its surface is in view."""
-    walk = _Walk(ground, camera, tau_px, -np.inf if sea_m is None else sea_m)
+def choose(ground: Figures, camera: Camera, tau_px: float, water: Surfaces | None = None) -> Cut:
+    """The cut for a camera. ``water``: patches below it are drawn as far as its surface is in view."""
+    walk = _Walk(ground, camera, tau_px, water or Surfaces(None, None))
     split = walk.descend()
     enforce(split)
     return walk.emit(split)
@@ -105,8 +107,8 @@ def choose(ground: Figures, camera: Camera, tau_px: float, sea_m: float | None =
 class _Walk:
     """One selection."""
 
-    def __init__(self, ground: Figures, camera: Camera, tau_px: float, sea_m: float) -> None:
-        self.ground, self.tau, self.sea = ground, tau_px, sea_m
+    def __init__(self, ground: Figures, camera: Camera, tau_px: float, water: Surfaces) -> None:
+        self.ground, self.tau, self.water = ground, tau_px, water
         self.eye = np.array(camera.eye)
         self.ortho = camera.ortho_height_m > 0
         self.pixels = camera.height / (camera.ortho_height_m if self.ortho else 2 * camera.tangent)
@@ -157,21 +159,22 @@ class _Walk:
             split,
         )
 
-    def _boxes(self, table: Ints) -> tuple[NDArray[np.bool_], Floats, Floats]:
-        """Which patches are wet, and the boxes of all."""
-        near, far = np.empty((len(table), 3)), np.empty((len(table), 3))
+    def _boxes(self, table: Ints) -> tuple[NDArray[np.bool_], Floats, Floats, Floats]:
+        """Which patches are wet, the boxes of all, and how high water may stand on them."""
+        near, far, water = np.empty((len(table), 3)), np.empty((len(table), 3)), np.empty(len(table))
         for level in np.unique(table[:, 0]):
             here = table[:, 0] == level
             nodes, w = table[here, 1:3], self.ground.size_m / (SUBPATCHES << int(level))
             low, high, _ = self.ground.bounds(int(level), nodes)
             near[here], far[here] = np.column_stack((nodes * w, low)), np.column_stack(((nodes + 1) * w, high))
-        return near[:, 2] < self.sea, near, far
+            water[here] = self.water.highest(int(level), nodes)
+        return near[:, 2] < water, near, far, water
 
     def _visible(self, level: int, nodes: Ints) -> NDArray[np.bool_]:
         w = self.ground.size_m / (SUBPATCHES << level)
         low, high, _ = self.ground.bounds(level, nodes)
         near = np.column_stack((nodes * w - self.eye[:2], low - self.eye[2]))
-        far = np.column_stack((near[:, :2] + w, np.maximum(high, self.sea) - self.eye[2]))
+        far = np.column_stack((near[:, :2] + w, np.maximum(high, self.water.highest(level, nodes)) - self.eye[2]))
         return _touching(self.planes, near, far)
 
     def _screen_error(self, level: int, nodes: Ints) -> Floats:

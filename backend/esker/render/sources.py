@@ -16,7 +16,7 @@ _COMMON: Final = ("view", "tile", "sky", "noise", "tonemap")
 def terrain(look: str, detail: str) -> Module:
     """The ground in one look, for one of the two amounts of detail."""
     ground = "material", f"stones_{detail}", f"look_{look}"
-    return _module(*_COMMON, f"detail_{detail}", "patch", *ground, "lines", "overlay", "terrain")
+    return _module(*_COMMON, f"detail_{detail}", "patch", "lakes", *ground, "lines", "overlay", "terrain")
 
 
 def wall(detail: str) -> Module:
@@ -26,7 +26,7 @@ def wall(detail: str) -> Module:
 
 def background(detail: str) -> Module:
     """Sea, sky and what lies around."""
-    return _module(*_COMMON, f"detail_{detail}", "patch", "lines", "overlay", "water", "background")
+    return _module(*_COMMON, f"detail_{detail}", "patch", "lines", "overlay", "lakes", "water", "background")
 
 
 def normals() -> Module:

@@ -12,8 +12,9 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from esker.contract import PATCH_CELLS, SUBPATCHES, TILE_CELLS, TILE_SAMPLES
+from esker.contract import LAKE_LEVEL, PATCH_CELLS, SUBPATCHES, TILE_CELLS, TILE_SAMPLES, TerrainSettings
 from esker.fractal import H_RANGE
+from esker.render.lakes import Lakes, find_lakes
 from esker.render.select import Floats, Ints
 from esker.synthesis.detailed import DetailedTerrain
 from esker.synthesis.hash import full, hashed
@@ -75,6 +76,7 @@ class Surface:
         """Mean and lowest height of the coarsest level."""
         self.levels = self.solved if terrain is None else max(top, self.solved)
         self._terrain = terrain
+        self._solved = [np.asarray(z, dtype=np.float32) for z in levels[: LAKE_LEVEL + 1]]
         self._whole: list[Samples] = []
         self._heights: list[NDArray[np.float32]] = []
         for level, heights in enumerate(levels):
@@ -121,6 +123,23 @@ class Surface:
         words = hashed(site.seed, level, 0, site.indices(window.rows, level), site.indices(window.cols, level))
         heights = (made.base + made.samples.state.d).astype(np.float32)
         return SlotData(heights, made.samples.state, full(words, np.float64))
+
+    def lakes(self, settings: TerrainSettings) -> Lakes | None:
+        """The lakes in basins of the solved ground; None without any, or where the terrain has none."""
+        if settings.lakes_m is None:
+            return None
+        level = min(LAKE_LEVEL, self.solved)
+        cells = TILE_CELLS << level
+        ground = self._solved[level]
+        if level < LAKE_LEVEL:
+            at = np.arange((TILE_CELLS << LAKE_LEVEL) + 1) / (1 << LAKE_LEVEL - level)
+            i = np.minimum(at.astype(np.int64), cells - 1)
+            f = (at - i).astype(np.float32)
+            rows = ground[i] * (1 - f[:, None]) + ground[i + 1] * f[:, None]
+            ground = rows[:, i] * (1 - f) + rows[:, i + 1] * f
+        cell = self.size_m / (TILE_CELLS << LAKE_LEVEL)
+        found = find_lakes(ground, cell, settings.lakes_m, settings.sea_level_m)
+        return found if found.any else None
 
     def height_at(self, x_m: float, y_m: float, level: int | None = None) -> float:
         """Height of the ground at a place, bilinear in the samples of a level (default: the finest solved one)."""

@@ -3,9 +3,11 @@
 import { eyeProjection, reversedDepth, viewAxes } from "../core/eyeprojection.ts";
 import type { Scene, Vec3 } from "../core/types.ts";
 import { MAX_SYNTHESIS_LEVEL, TILE_CELLS } from "../generated/contract.ts";
+import type { Lakes } from "../tiles/lakes.ts";
 import { reliefM, shoreM, zeroM } from "../tiles/rules/rule.ts";
 import type { Atlas } from "./atlas.ts";
 import { ChannelTexture, overlayGrid } from "./channeltexture.ts";
+import { LakeTexture } from "./laketexture.ts";
 import { StructWriter, structLayout } from "./layout.ts";
 import { adaptation, contourInterval, LOOKS } from "./looks.ts";
 import { VIEW_SOURCE } from "./shaders.ts";
@@ -31,6 +33,8 @@ export interface FrameFacts {
   readonly height: number;
   readonly low: number;
   readonly high: number;
+  /** None: no lake is drawn. */
+  readonly lakes?: Lakes | null;
 }
 
 /** Unit vector towards the sun; azimuth clockwise from north (the y axis), degrees. */
@@ -47,6 +51,7 @@ export class FrameBindings {
   private readonly clamp: GPUSampler;
   private readonly repeat: GPUSampler;
   private readonly channels: ChannelTexture;
+  private readonly lakes: LakeTexture;
   private atlas: Atlas | null = null;
   private group: GPUBindGroup | null = null;
 
@@ -79,9 +84,11 @@ export class FrameBindings {
         texture(10, "float", "2d-array"),
         texture(11, "float", "2d-array"),
         texture(12, "float", "2d"),
+        texture(13, "unfilterable-float", "2d"),
       ],
     });
     this.channels = new ChannelTexture(device);
+    this.lakes = new LakeTexture(device);
     this.uniform = device.createBuffer({
       label: "view",
       size: this.writer.layout.size,
@@ -120,6 +127,7 @@ export class FrameBindings {
         { binding: 10, resource: array(atlas.attributes0) },
         { binding: 11, resource: array(atlas.attributes1) },
         { binding: 12, resource: this.stones.createView() },
+        { binding: 13, resource: this.lakes.texture.createView() },
       ],
     });
   }
@@ -137,7 +145,10 @@ export class FrameBindings {
 
   /** Writes the uniform for this frame. */
   update(scene: Scene, facts: FrameFacts): void {
-    if (this.channels.update(scene.channels, overlayGrid(scene)) && this.atlas !== null) this.attach(this.atlas);
+    const { lakes = null } = facts;
+    const channels = this.channels.update(scene.channels, overlayGrid(scene));
+    const grown = this.lakes.update(lakes);
+    if ((channels || grown) && this.atlas !== null) this.attach(this.atlas);
     this.writeCamera(scene, facts);
     const w = this.writer;
     const { settings } = scene;
@@ -152,6 +163,7 @@ export class FrameBindings {
     const climate = { ...settings, ground: scene.ground ?? null };
     w.set("sea", zeroM(climate));
     w.set("has_sea", settings.sea_level_m === null ? 0 : 1);
+    w.set("has_lakes", lakes === null ? 0 : 1);
     w.set("exposure", look.exposure * (settings.look === "paper" ? 1 : adaptation(settings.sun_elevation_deg)));
     w.set("haze", look.haze / size);
     w.set("low", facts.low);
@@ -171,6 +183,7 @@ export class FrameBindings {
   destroy(): void {
     this.uniform.destroy();
     this.channels.destroy();
+    this.lakes.destroy();
   }
 
   private writeCamera(scene: Scene, facts: FrameFacts): void {

@@ -1,7 +1,21 @@
 /** The passes that draw patches: ground, sea and walls share the patch records of the cut. */
 
-import { type Look, PATCH_CELLS } from "../generated/contract.ts";
-import { EDGE_EAST, EDGE_NORTH, EDGE_SOUTH, EDGE_WEST, isWet, RECORD_WORDS, recordBorder } from "../tiles/records.ts";
+import { LAKE_LEVEL, type Look, NO_LAKE, PATCH_CELLS, TILE_CELLS } from "../generated/contract.ts";
+import { type Lakes, levelsOn } from "../tiles/lakes.ts";
+import type { ShownLakes } from "../tiles/lakewatch.ts";
+import {
+  EDGE_EAST,
+  EDGE_NORTH,
+  EDGE_SOUTH,
+  EDGE_WEST,
+  FACT_WORDS,
+  isWet,
+  RECORD_WORDS,
+  recordBorder,
+  recordColumn,
+  recordLevel,
+  recordRow,
+} from "../tiles/records.ts";
 import type { Cut } from "../tiles/selection.ts";
 import type { Round } from "./hidden.ts";
 import { createPass, describePass, GrowingBuffer, type PassContext } from "./pipeline.ts";
@@ -63,13 +77,41 @@ const WALL_LAYOUT: GPUVertexBufferLayout = {
   ],
 };
 
-/** The cut on the device, drawn by the ground, sea and wall pipelines. */
+/** A sheet of water on a patch: its record, then level now, level that the lake is known by (NO_LAKE: the sea), waves. */
+const SHEET_WORDS = RECORD_WORDS + 4;
+const SHEET_LAYOUT: GPUVertexBufferLayout = {
+  arrayStride: SHEET_WORDS * 4,
+  stepMode: "instance",
+  attributes: [
+    { shaderLocation: 0, offset: 0, format: "uint32x4" },
+    { shaderLocation: 1, offset: RECORD_WORDS * 4, format: "float32x4" },
+  ],
+};
+
+/** Wind that has come over so much water raises the waves of the sea, metres. */
+const FULL_FETCH_M = 3000;
+
+/** What water lies on the ground. */
+export interface Waters extends ShownLakes {
+  readonly sizeM: number;
+  readonly seaM: number | null;
+}
+
+const DRY: Waters = { sizeM: 1, seaM: null, lakes: null, heights: new Map() };
+
+/** Height of the waves on lakes in those of the sea, by their fetch: about the root of it. */
+export function wavesOf({ samples }: Lakes, sizeM: number): Map<number, number> {
+  const cell = sizeM / (TILE_CELLS << LAKE_LEVEL);
+  return new Map([...samples].map(([lake, n]) => [lake, Math.sqrt(Math.min(1, (Math.sqrt(n) * cell) / FULL_FETCH_M))]));
+}
+
+/** The cut on the device, drawn by the ground, water and wall pipelines. */
 export class PatchPasses {
   private readonly records: GrowingBuffer;
   private readonly walls: GrowingBuffer;
   private readonly wet: GrowingBuffer;
-  private wetRecords = new Uint32Array(0);
-  private wetCount = 0;
+  private sheets = new Uint32Array(SHEET_WORDS * 64);
+  private sheetCount = 0;
   private wetBuffer: GPUBuffer | null = null;
   private readonly indices: GPUBuffer;
   private wallRecords = new Uint32Array(WALL_WORDS * 256);
@@ -83,13 +125,13 @@ export class PatchPasses {
 
   private constructor(
     private readonly context: PassContext,
-    private readonly sea: GPURenderPipeline,
+    private readonly water: GPURenderPipeline,
     private readonly wall: GPURenderPipeline,
   ) {
     const { device } = context;
     this.records = new GrowingBuffer(device, "patch records");
     this.walls = new GrowingBuffer(device, "wall records");
-    this.wet = new GrowingBuffer(device, "sea records");
+    this.wet = new GrowingBuffer(device, "sheets of water");
     const indices = patchIndices();
     this.indices = device.createBuffer({
       label: "patch indices",
@@ -100,13 +142,13 @@ export class PatchPasses {
   }
 
   static async create(context: PassContext): Promise<PatchPasses> {
-    const [sea, wall] = await Promise.all([
+    const [water, wall] = await Promise.all([
       createPass(context, {
-        label: "sea",
+        label: "water",
         code: sceneSource("background", context.detail),
         vertex: "water_vertex",
         fragment: "water_fragment",
-        buffers: [RECORD_LAYOUT],
+        buffers: [SHEET_LAYOUT],
         vertexConstants: { PITCH },
         blend: true,
         depthWrite: false,
@@ -119,7 +161,7 @@ export class PatchPasses {
         buffers: [WALL_LAYOUT],
       }),
     ]);
-    return new PatchPasses(context, sea, wall);
+    return new PatchPasses(context, water, wall);
   }
 
   /**
@@ -155,12 +197,12 @@ export class PatchPasses {
     return false;
   }
 
-  /** Uploads the cut. */
-  update(cut: Cut): void {
+  /** Uploads the cut and the water on it. */
+  update(cut: Cut, water: Waters = DRY): void {
     this.count = cut.count;
     this.recordBuffer = this.records.write(cut.records, cut.count * RECORD_WORDS);
-    this.collectWet(cut);
-    this.wetBuffer = this.wet.write(this.wetRecords, this.wetCount * RECORD_WORDS);
+    this.collectSheets(cut, water);
+    this.wetBuffer = this.wet.write(this.sheets, this.sheetCount * SHEET_WORDS);
     this.collectWalls(cut);
     this.wallBuffer = this.walls.write(this.wallRecords, this.wallCount * WALL_WORDS);
   }
@@ -178,8 +220,8 @@ export class PatchPasses {
     pass.drawIndexedIndirect(round.draws, round.drawOffset);
   }
 
-  drawSea(pass: GPURenderPassEncoder): void {
-    this.drawPatches(pass, this.sea, this.wetBuffer, this.wetCount);
+  drawWater(pass: GPURenderPassEncoder): void {
+    this.drawPatches(pass, this.water, this.wetBuffer, this.sheetCount);
   }
 
   drawWalls(pass: GPURenderPassEncoder): void {
@@ -213,16 +255,42 @@ export class PatchPasses {
     pass.drawIndexed(INDEX_COUNT, count);
   }
 
-  private collectWet(cut: Cut): void {
-    if (this.wetRecords.length < cut.records.length) this.wetRecords = new Uint32Array(cut.records.length);
-    this.wetCount = 0;
-    for (let i = 0; i < cut.count; i += 1) {
-      const from = i * RECORD_WORDS;
-      if (!isWet(cut.records, i)) continue;
-      const to = this.wetCount * RECORD_WORDS;
-      for (let k = 0; k < RECORD_WORDS; k += 1) this.wetRecords[to + k] = cut.records[from + k]!;
-      this.wetCount += 1;
+  /** The sea first: a lake may stand over ground that is below it. */
+  private collectSheets(cut: Cut, { sizeM, seaM, lakes, heights }: Waters): void {
+    this.sheetCount = 0;
+    const lowest = new Float32Array(cut.facts.buffer);
+    if (seaM !== null) {
+      for (let i = 0; i < cut.count; i += 1) {
+        if (isWet(cut.records, i) && lowest[i * FACT_WORDS]! < seaM) this.addSheet(cut, i, seaM, NO_LAKE, 1);
+      }
     }
+    if (lakes === null) return;
+    const waves = wavesOf(lakes, sizeM);
+    for (let i = 0; i < cut.count; i += 1) {
+      if (!isWet(cut.records, i)) continue;
+      const level = recordLevel(cut.records, i);
+      const px = recordColumn(cut.records, i) / PATCH_CELLS;
+      const py = recordRow(cut.records, i) / PATCH_CELLS;
+      for (const lake of levelsOn(lakes, level, px, py)) {
+        const at = heights.get(lake);
+        if (at !== undefined && lowest[i * FACT_WORDS]! < at) this.addSheet(cut, i, at, lake, waves.get(lake) ?? 0);
+      }
+    }
+  }
+
+  private addSheet(cut: Cut, patch: number, at: number, lake: number, waves: number): void {
+    const to = this.sheetCount * SHEET_WORDS;
+    if (to + SHEET_WORDS > this.sheets.length) {
+      const grown = new Uint32Array(this.sheets.length * 2);
+      grown.set(this.sheets);
+      this.sheets = grown;
+    }
+    for (let k = 0; k < RECORD_WORDS; k += 1) this.sheets[to + k] = cut.records[patch * RECORD_WORDS + k]!;
+    const floats = new Float32Array(this.sheets.buffer);
+    floats[to + RECORD_WORDS] = at;
+    floats[to + RECORD_WORDS + 1] = lake;
+    floats[to + RECORD_WORDS + 2] = waves;
+    this.sheetCount += 1;
   }
 
   private collectWalls(cut: Cut): void {

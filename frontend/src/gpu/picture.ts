@@ -120,7 +120,7 @@ export class Picture {
     patches.drawWalls(pass);
     const sea = scene.settings.sea_level_m !== null;
     background.draw(pass, sea);
-    if (sea) patches.drawSea(pass);
+    patches.drawWater(pass);
     sheet.draw(pass);
     ghost.draw(pass);
     labels.draw(pass);

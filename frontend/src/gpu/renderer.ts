@@ -2,6 +2,7 @@
 
 import type { FrameStats, Scene, SceneRenderer, Vec3 } from "../core/types.ts";
 import { finestLevel } from "../tiles/detail.ts";
+import { LakeWatch } from "../tiles/lakewatch.ts";
 import { type Cut, Selection } from "../tiles/selection.ts";
 import { expectation } from "../tiles/synthetic.ts";
 import { Atlas, type Changes, MAX_SLOTS, type Resident, SOFTWARE_SLOTS } from "./atlas.ts";
@@ -87,6 +88,7 @@ export class GpuRenderer implements SceneRenderer {
   /** Share of an entrance that passes with this frame. */
   private entrance = 1;
   private lastQuality: Quality | null = null;
+  private readonly lakes = new LakeWatch();
   /** Highest ground of the last cut, metres. */
   private high = 0;
   /** Held tiles were asked for that are not in the atlas yet. */
@@ -175,30 +177,33 @@ export class GpuRenderer implements SceneRenderer {
     const told = this.passes.fill.tell(world.selection.tree);
     const moved = this.changed(scene);
     this.quality.mode = scene.quality ?? "automatic";
-    if (moved) this.ready = false;
+    // Time stands at zero for people who asked for less motion; the CPU draws too few frames for any.
+    const smooth = !this.gpu.software && scene.time !== 0;
+    const filled = this.lakes.update(scene.tiles, scene.settings, began, smooth);
+    if (moved || filled) this.ready = false;
     const quality = this.quality.next(began, moved || (software && !this.ready));
     if (software && !moved && !this.ready && began - this.drawnAt < Math.max(REDRAW_MS, REDRAW_FRAMES * this.frameMs)) {
       // On the CPU a picture costs more than the upload and light of many tiles: get them ready, then draw.
       this.prepareOnly(scene, world);
-      this.ready = !this.tilesDue && !world.light.pending && !this.passes.fill.pending;
+      this.ready = !this.tilesDue && !world.light.pending && !this.passes.fill.pending && !this.lakes.busy;
       return this.report({ busy: true });
     }
-    // Time stands at zero for people who asked for less motion: then the sea is still.
     const fading = this.advanceFades(scene, world, began);
-    const waves = scene.settings.sea_level_m !== null && !software && scene.time !== 0;
+    const waves = (scene.settings.sea_level_m !== null || this.lakes.lakes !== null) && smooth;
     const due =
       fading ||
+      filled ||
       told ||
       this.tilesDue ||
       this.lookDue ||
       this.lightDrawn !== this.lightMarched ||
       !sameQuality(quality, this.lastQuality);
     if (!moved && !waves && !due && !world.light.pending)
-      return this.report({ busy: this.quality.pending || this.passes.fill.pending, uploads: 0 });
+      return this.report({ busy: this.quality.pending || this.passes.fill.pending || this.lakes.busy, uploads: 0 });
     this.remember(scene, quality);
     this.draw(scene, world, quality, { began, moved });
     const coming = this.tilesDue || this.lookDue || world.light.pending || this.passes.fill.pending;
-    const busy = waves || fading || this.quality.pending || coming;
+    const busy = waves || fading || this.quality.pending || coming || this.lakes.busy;
     return this.report({ busy });
   }
 
@@ -263,8 +268,9 @@ export class GpuRenderer implements SceneRenderer {
 
     const encoder = device.createCommandEncoder({ label: "frame" });
     const { cut, uploads, selectMs } = this.prepare(encoder, scene, world, quality, how.moved);
-    this.passes.frame.update(scene, { width, height, low: cut.minHeight, high: cut.maxHeight });
-    this.passes.patches.update(cut);
+    const { lakes, heights } = this.lakes;
+    this.passes.frame.update(scene, { width, height, low: cut.minHeight, high: cut.maxHeight, lakes });
+    this.passes.patches.update(cut, { sizeM: scene.tiles.sizeM, seaM: scene.settings.sea_level_m, lakes, heights });
     this.lookDue = !this.passes.patches.useLook(scene.settings.look);
     const unit = quality.scale * pixelRatio();
     this.passes.ribbons.update(scene.showStrokes ? scene.strokes : [], scene.ghost, unit, scene.footprints);
@@ -295,10 +301,9 @@ export class GpuRenderer implements SceneRenderer {
     const limit = NEW_TILES[this.gpu.software ? "software" : "hardware"];
     const { atlas, fit } = world;
     fit.begin(moved, world.needed, atlas.capacity);
-    const sea = scene.settings.sea_level_m ?? Number.NEGATIVE_INFINITY;
     for (;;) {
       const tau = scene.tauPx * quality.tauFactor * fit.factor;
-      const cut = world.selection.select(scene.tiles, scene.camera, tau, atlas, quality.scale, sea);
+      const cut = world.selection.select(scene.tiles, scene.camera, tau, atlas, quality.scale, this.lakes.surfaces);
       world.needed = cut.tiles;
       if (fit.exceeded(cut.tiles, atlas.capacity)) continue;
       const more = atlas.admit(cut.requests, limit - entered.length);

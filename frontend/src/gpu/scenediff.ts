@@ -55,6 +55,7 @@ function sameSettings(a: Scene["settings"], b: Scene["settings"]): boolean {
     a === b ||
     (a.look === b.look &&
       a.sea_level_m === b.sea_level_m &&
+      a.lakes_m === b.lakes_m &&
       a.seed === b.seed &&
       a.detail === b.detail &&
       a.rule === b.rule &&

@@ -17,6 +17,7 @@ import hiddenBase from "@shaders/wgsl/hidden_base.wgsl?raw";
 import hiddenDepth from "@shaders/wgsl/hidden_depth.wgsl?raw";
 import hiddenSamples from "@shaders/wgsl/hidden_depth_samples.wgsl?raw";
 import label from "@shaders/wgsl/label.wgsl?raw";
+import lakes from "@shaders/wgsl/lakes.wgsl?raw";
 import overlayLines from "@shaders/wgsl/lines.wgsl?raw";
 import lookAlpine from "@shaders/wgsl/look_alpine.wgsl?raw";
 import lookDesert from "@shaders/wgsl/look_desert.wgsl?raw";
@@ -70,14 +71,25 @@ const STONES: Readonly<Record<Detail, string>> = { rich: stonesRich, plain: ston
 
 /** The ground in one look. */
 export function terrainSource(look: Look, detail: Detail): string {
-  return join(common, DETAILS[detail], patch, material, STONES[detail], LOOKS[look], overlayLines, overlay, terrain);
+  return join(
+    common,
+    DETAILS[detail],
+    patch,
+    lakes,
+    material,
+    STONES[detail],
+    LOOKS[look],
+    overlayLines,
+    overlay,
+    terrain,
+  );
 }
 
 /** Walls, sea and background. */
 export function sceneSource(part: "wall" | "background", detail: Detail): string {
   return part === "wall"
     ? join(common, DETAILS[detail], patch, wall)
-    : join(common, DETAILS[detail], patch, overlayLines, overlay, water, background);
+    : join(common, DETAILS[detail], patch, overlayLines, overlay, lakes, water, background);
 }
 
 export const SOURCES = {

@@ -48,6 +48,13 @@ export interface Cut {
   readonly tiles: number;
 }
 
+/** How high water may stand on a patch, metres; -Infinity where there is none (tiles/lakes.ts, Surfaces). */
+export interface Water {
+  highest(level: number, px: number, py: number): number;
+}
+
+const DRY: Water = { highest: () => Number.NEGATIVE_INFINITY };
+
 /** What the selection asks of the atlas. */
 export interface Slots {
   /** Slot of a usable tile. */
@@ -86,7 +93,7 @@ export class Selection {
   private ortho = false;
   private tau = 1;
   private sizeM = 1;
-  private seaM = Number.NEGATIVE_INFINITY;
+  private water = DRY;
   private slots: Slots | null = null;
 
   /** `levels`: the finest level that can exist. */
@@ -105,18 +112,11 @@ export class Selection {
   /**
    * Chooses the cut among the usable tiles.
    *
-   * `pixelScale` scales the camera's height to the pixels that are really drawn (adaptive resolution). `seaM`: patches
+   * `pixelScale` scales the camera's height to the pixels that are really drawn (adaptive resolution). `water`: patches
    * below it are drawn as far as its surface is in view.
    */
-  select(
-    view: TileView,
-    camera: CameraState,
-    tauPx: number,
-    slots: Slots,
-    pixelScale = 1,
-    seaM: number = Number.NEGATIVE_INFINITY,
-  ): Cut {
-    this.seaM = seaM;
+  select(view: TileView, camera: CameraState, tauPx: number, slots: Slots, pixelScale = 1, water: Water = DRY): Cut {
+    this.water = water;
     this.tree.sync(view);
     this.tree.updateSplittable();
     this.begin(view, camera, tauPx, slots, pixelScale);
@@ -245,7 +245,7 @@ export class Selection {
     const y0 = this.row(node) * w - this.eye[1]!;
     const p = this.planes;
     const low = this.tree.min[node]! - this.eye[2]!;
-    const high = Math.max(this.tree.max[node]!, this.seaM) - this.eye[2]!;
+    const high = this.highest(level, node) - this.eye[2]!;
     for (let i = 0; i < 24; i += 4) {
       const a = p[i]!;
       const b = p[i + 1]!;
@@ -254,6 +254,11 @@ export class Selection {
       if (far + p[i + 3]! < 0) return false;
     }
     return true;
+  }
+
+  /** Of the ground of a patch and the water on it. */
+  private highest(level: number, node: number): number {
+    return Math.max(this.tree.max[node]!, this.water.highest(level, this.column(node), this.row(node)));
   }
 
   private markSplit(level: number, node: number, ratio: number): void {
@@ -327,7 +332,7 @@ export class Selection {
     const w = this.sizeM / (SUBPATCHES << level);
     const east = this.column(node) * w - this.eye[0]!;
     const north = this.row(node) * w - this.eye[1]!;
-    if (this.horizon.hides(east, north, w, Math.max(tree.max[node]!, this.seaM) - this.eye[2]!)) return;
+    if (this.horizon.hides(east, north, w, this.highest(level, node) - this.eye[2]!)) return;
     if (this.split[node] === 0) {
       this.write(level, node, morph);
       this.horizon.add(east, north, w, tree.min[node]! - this.eye[2]!);
@@ -388,7 +393,7 @@ export class Selection {
       parent,
       edges,
       border,
-      wet: tree.min[node]! < this.seaM,
+      wet: tree.min[node]! < this.water.highest(level, px, py),
       corners,
     });
     const fact = this.count * FACT_WORDS;

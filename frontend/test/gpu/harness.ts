@@ -86,6 +86,8 @@ interface Shot {
   tau?: number;
   /** Near plane, metres. */
   near?: number;
+  /** Seconds; 0: nothing moves. */
+  time?: number;
   width?: number;
   height?: number;
 }
@@ -160,7 +162,7 @@ function scene(shot: Shot, width: number, height: number): Scene {
     ghost: demo.ghost,
     cursors: demo.cursors,
     tauPx: shot.tau ?? 1.5,
-    time: 12,
+    time: shot.time ?? 12,
     overlay: shot.overlay ?? "none",
     showStrokes: true,
   };

@@ -2,6 +2,7 @@
 
 import { beforeAll, describe, expect, it } from "vitest";
 import type { CameraState, Vec3 } from "../../src/core/types.ts";
+import { Surfaces } from "../../src/tiles/lakes.ts";
 import { frontToBack, Horizon } from "../../src/tiles/occlusion.ts";
 import { RECORD_WORDS } from "../../src/tiles/records.ts";
 import { type Cut, Selection } from "../../src/tiles/selection.ts";
@@ -143,9 +144,9 @@ describe("hidden patches", { timeout: 60_000 }, () => {
       const sea = round % 4 === 0 ? 0 : Number.NEGATIVE_INFINITY;
       const tau = place === "outside" ? 6 : 2;
       const selection = ready(view);
-      const kept = new Set(drawn(view, selection.select(view, state, tau, slots, 1, sea)).keys());
+      const kept = new Set(drawn(view, selection.select(view, state, tau, slots, 1, new Surfaces(null, sea))).keys());
       selection.occlusion = false;
-      const all = drawn(view, selection.select(view, state, tau, slots, 1, sea));
+      const all = drawn(view, selection.select(view, state, tau, slots, 1, new Surfaces(null, sea)));
       for (const name of kept) expect(all.has(name)).toBe(true);
       const names = [...all.keys()];
       const front = rasterise([...all.values()], state, { width: 256, height: 192, base: -500 });

@@ -2,6 +2,7 @@
 
 import { beforeAll, describe, expect, it } from "vitest";
 import type { CameraState, Vec3 } from "../../src/core/types.ts";
+import { Surfaces } from "../../src/tiles/lakes.ts";
 import {
   EDGE_EAST,
   EDGE_NORTH,
@@ -239,7 +240,7 @@ describe("selection", { timeout: 60_000 }, () => {
     const deep = new FieldView(4096, 1, () => -800);
     const camera = lookAt([2048, -400, 300], [2048, 1200, 250], 800, 600);
     const without = ready(deep).select(deep, camera, 1, new Everything()).count;
-    const withSea = ready(deep).select(deep, camera, 1, new Everything(), 1, 0).count;
+    const withSea = ready(deep).select(deep, camera, 1, new Everything(), 1, new Surfaces(null, 0)).count;
     expect(withSea).toBeGreaterThan(without);
   });
 
