@@ -15,6 +15,7 @@ import numpy as np
 
 from esker.contract import Channel, Filter, FrameKind, Predictor
 from esker.grid import TileKey
+from esker.tiles import coding
 from esker.tiles.codec import Ints, Wide, child_window, cost, predict
 from esker.tiles.filters import pack_smallest
 from esker.tiles.frame import FrameHead, TileRecord, ratio, write_frame
@@ -122,20 +123,37 @@ class FramePlan:
                 predictions[place] = predict(state.samples, scale)
             return child_window(predictions[place], key.x, key.y)
 
-        coded = []
-        for tile in self.tiles:
+        def coded(tile: TilePlan) -> TileRecord:
             name = tile.cache_key(self.channel)
             data = self.cache.get(name)
             if data is None:
                 data = _coded(tile, predicted, self.smooth)
                 self.cache.put(name, data)
-            coded.append(data)
+            return data
+
         head = FrameHead(self.kind, self.level, self.clock, self.settled, self.channel)
-        return write_frame(head, [(d.x, d.y) for d in self.drops], coded)
+        return write_frame(head, [(d.x, d.y) for d in self.drops], coding.in_two(coded, self.tiles))
 
 
 def _coded(tile: TilePlan, predicted: Callable[[TileKey, TileState], Wide], smooth: bool) -> TileRecord:
     """A tile with the cheapest of its predictors, and the smallest of the filters that are worth a try."""
+    if tile.parent is not None and not smooth:
+        own = predicted(tile.key, tile.parent)
+        before, then = tile.before, tile.parent_before
+        held = None if before is None else before.samples
+        found = coding.code(tile.now.samples, own, held, None if then is None else predicted(tile.key, then))
+        if found is not None:
+            base = tile.parent.version if before is None or found.predictor == Predictor.PARENT else before.version
+            return TileRecord(
+                tile.key.x,
+                tile.key.y,
+                found.predictor,
+                found.shift,
+                tile.now.version,
+                base,
+                found.payload,
+                found.filter,
+            )
     kind, base_version, residual = min(_options(tile, predicted), key=lambda option: cost(option[2]))
     if kind == Predictor.ZERO:
         filters: tuple[Filter, ...] = DIFFERENCES

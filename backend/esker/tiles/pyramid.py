@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from esker import grid
 from esker.contract import TILE_CELLS
-from esker.tiles import entropy, loops
+from esker.tiles import coding, entropy, loops
 from esker.tiles.bounds import Bounds, SubPatches, dilate, nest
 from esker.tiles.codec import SAMPLE_LIMIT, Ints, predict
 from esker.tiles.steady import Steadier
@@ -373,6 +373,7 @@ def warm() -> None:
         pyramid.bounds()
     for amplitude in (1, SAMPLE_LIMIT):
         predict(np.full((TILE_CELLS + 1, TILE_CELLS + 1), amplitude, dtype=np.int32))
+    coding.warm()
     for lattice in (False, True):
         coded = entropy.encode(np.eye(TILE_CELLS + 1, dtype=np.int64), lattice)
         assert coded is not None

@@ -1,0 +1,143 @@
+"""A tile of a level that is solved as a whole, from its samples to its payload in one compiled piece (DESIGN 6).
+
+It lets go of the interpreter's lock from beginning to end, so that tiles of a frame are coded in two threads. What it
+makes is, to the bit, what ``plans._options``, ``codec.cost`` and ``filters.pack_smallest`` make one after the other.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Final, NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from esker.contract import TILE_MAX_SHIFT, TILE_SAMPLES, Filter, Predictor
+from esker.tiles import entropy
+from esker.tiles.codec import Ints, Wide
+from esker.tiles.entropy import Bytes, Longs
+from esker.tiles.loops import _compiled
+
+PREDICTORS: Final = (Predictor.PARENT, Predictor.HELD, Predictor.PREVIOUS)
+LOGS: Final = np.log2(np.arange(1, 1025, dtype=np.float32))
+MOST: Final = 1 << 31
+"""A residual that is larger is not coded."""
+IN_TWO: Final = 4
+"""Tiles from which on a second thread is worth being woken."""
+_local = threading.local()
+_second = ThreadPoolExecutor(1, thread_name_prefix="coding")
+A = TypeVar("A")
+B = TypeVar("B")
+
+
+class Coded(NamedTuple):
+    """The cheapest predictor, the smaller of the filters NONE and LATTICE, and what they make of the tile."""
+
+    predictor: Predictor
+    filter: Filter
+    shift: int
+    payload: bytes
+
+
+@_compiled
+def _cost(residual: Longs, logs: NDArray[np.float32]) -> float:
+    """``codec.cost``; infinite where a number is too large to be coded."""
+    total = 0.0
+    for r in range(residual.shape[0]):
+        for k in range(residual.shape[1]):
+            size = abs(residual[r, k])
+            if size >= MOST:
+                return np.inf
+            total += logs[size] if size < logs.size else np.log2(np.float32(size + 1))
+    return total
+
+
+@_compiled
+def _coded(
+    now: Longs,
+    own: Longs,
+    before: Longs,
+    then: Longs,
+    known: int,
+    logs: NDArray[np.float32],
+    weights: Longs,
+    rates: Longs,
+    plain: Bytes,
+    lattice: Bytes,
+) -> tuple[int, int, int, int]:
+    """Which predictor, its shift, and the bytes written of ``plain`` and ``lattice``; predictor -1: none will do.
+
+    ``own``, ``then``: the parent's prediction, now and as it was for ``before``; ``known``: how many of ``before`` and
+    ``then`` there are.
+    """
+    best, least, chosen = now - own, np.inf, -1
+    for option in range(1 + known):
+        if option == 0:
+            residual = now - own
+        elif option == 1:
+            residual = now - before
+        else:
+            residual = now - before - (own - then)
+        cost = _cost(residual, logs)
+        if cost < least:
+            best, least, chosen = residual, cost, option
+    bits = np.int64(0)
+    for value in best.flat:
+        bits |= value
+    if chosen < 0 or bits == 0:
+        return chosen, 0, 0, 0
+    shift = 0
+    while shift < TILE_MAX_SHIFT and not (bits >> shift) & 1:
+        shift += 1
+    best = best >> shift
+    return (
+        chosen,
+        shift,
+        entropy._encode(best, False, weights, rates, plain),
+        entropy._encode(best, True, weights, rates, lattice),
+    )
+
+
+def code(now: Ints, own: Wide, before: Ints | None, then: Wide | None) -> Coded | None:
+    """A tile, (65, 65) in quanta, that has a parent; None where no predictor leaves numbers that can be coded.
+
+    ``own``: the parent's prediction of it; ``before``: the tile as the client holds it; ``then``: the prediction as it
+    was for that one, None where it is not known.
+    """
+    samples = now.astype(np.int64)
+    had = samples if before is None else before.astype(np.int64)
+    moved = samples if before is None or then is None else then.astype(np.int64)
+    known = 0 if before is None else 1 if then is None else 2
+    plain, lattice = _room()
+    option, shift, size, small = _coded(
+        samples, own.astype(np.int64), had, moved, known, LOGS, entropy.WEIGHTS, entropy.RATES, plain, lattice
+    )
+    if option < 0:
+        return None
+    if 0 <= small < size:
+        return Coded(PREDICTORS[option], Filter.LATTICE, shift, lattice[:small].tobytes())
+    return Coded(PREDICTORS[option], Filter.NONE, shift, plain[:size].tobytes())
+
+
+def in_two(work: Callable[[A], B], items: Sequence[A]) -> list[B]:
+    """``work`` of each, in order; one half of many in a second thread."""
+    half = len(items) // 2 if len(items) >= IN_TWO else len(items)
+    second = [_second.submit(lambda part: [work(item) for item in part], items[half:])] if half < len(items) else []
+    first = [work(item) for item in items[:half]]
+    return first + [made for future in second for made in future.result()]
+
+
+def _room() -> NDArray[np.uint8]:
+    """This thread's own space for two payloads: fresh pages every time cost more than some tiles."""
+    room: NDArray[np.uint8] | None = getattr(_local, "room", None)
+    if room is None:
+        room = _local.room = np.empty((2, entropy.MAX_BYTES), dtype=np.uint8)
+    return room
+
+
+def warm() -> None:
+    """Compiles it."""
+    tile = np.eye(TILE_SAMPLES, dtype=np.int32)
+    code(tile, np.zeros_like(tile), tile, tile)
