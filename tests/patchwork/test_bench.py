@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from esker.bench import _patchwork, _patchwork_big, _patchwork_cover, _patchwork_data, _patchwork_gdal, patchwork
+from esker.bench import (
+    _patchwork,
+    _patchwork_big,
+    _patchwork_cover,
+    _patchwork_data,
+    _patchwork_gdal,
+    importing,
+    patchwork,
+)
 from esker.patchwork import lod_space, rasters
 from esker.patchwork.query import Index
 
@@ -88,3 +97,35 @@ def test_what_of_a_file_is_ground_is_counted(tmp_path: Path) -> None:
     assert "1 further files" in text
     with pytest.raises(ValueError, match="no place"):
         _patchwork_cover.document("nothing", result)
+
+
+def test_the_benchmark_of_imports_goes_on_where_it_was_stopped(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Stopped at its third file, or out of time, it prints what it has and what is left out; a whole run keeps
+    nothing of its own."""
+    asked: list[tuple[int, str]] = []
+    stop_at = [3]
+
+    def measured(side: int, layout: str, folder: Path, _puget: Path | None) -> dict[str, int]:
+        asked.append((side, layout))
+        (folder / "work").mkdir()
+        if len(asked) == stop_at[0]:
+            raise KeyboardInterrupt
+        return {"samples": side}
+
+    monkeypatch.setattr(importing, "measure", measured)
+    line = ["--work", str(tmp_path)]
+    assert importing.main([*line, "--minutes", "0"]) == 1
+    assert json.loads(capsys.readouterr().out)["files"] == {}
+    assert importing.main(line) == 1
+    first = json.loads(capsys.readouterr().out)
+    assert first["files"] == {"1025": {"tiled": {"samples": 1025}, "striped": {"samples": 1025}}}
+    assert first["left_out"] == ["4097 tiled", "4097 striped", "14000 tiled", "14000 striped"]
+    assert [path.name for path in tmp_path.iterdir()] == [importing.KEPT]
+    assert importing.main(line) == 0
+    second = json.loads(capsys.readouterr().out)
+    assert [len(files) for files in second["files"].values()] == [2, 2, 2]
+    assert second["left_out"] == []
+    assert asked.count((1025, "tiled")) == 1
+    assert not list(tmp_path.iterdir())

@@ -27,7 +27,7 @@ def table(result: dict[str, Any]) -> str:
             f"Measured on {machine['cores']} cores ({machine['cpu']}), load {machine['load_before']} before it began. "
             "Seconds by the clock, of processor time in brackets; memory of the process's own, and with pages of "
             "mapped files; disk beside the upload; the longest wait for a sign of progress; the longest until a "
-            "cancelled conversion is gone.",
+            "cancelled conversion is gone." + _left_out(result),
             "",
             "| float32, deflate | file | examined | converted | samples a second | memory | disk | silence "
             "| cancelled |",
@@ -35,6 +35,12 @@ def table(result: dict[str, Any]) -> str:
             *lines,
         ]
     )
+
+
+def _left_out(result: dict[str, Any]) -> str:
+    """What a run that was stopped did not come to."""
+    left = result.get("left_out", [])
+    return f" Not measured: {', '.join(left)}." if left else ""
 
 
 def _line(side: int, layout: str, found: dict[str, Any]) -> str:

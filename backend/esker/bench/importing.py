@@ -5,7 +5,12 @@ square that may be declared), compressed with deflate and predictor 3, in tiles 
 to inspect and to convert by the clock and of processor time, bytes and samples a second, greatest memory of the process
 (``anonymous``: its own; ``resident``: with pages of mapped files, which the system takes back), greatest disk in the
 work folder beside the file, how many steps of progress came and the longest silence between two, and how long a
-cancelled conversion takes to be gone in each stage. Heights: ``_patchwork_data``. ``--quick``: no 14,000.
+cancelled conversion takes to be gone in each stage (of striped files only while it reads: the rest is the same work).
+Heights: ``_patchwork_data``. ``--quick``: no 14,000.
+
+What was measured is kept in ``--work`` after each file. When it is stopped (Ctrl-C, a signal to end), or once
+``--minutes`` are over before the next file, it prints what it has, names what is ``left_out`` and ends with status 1;
+the same command then goes on where it was. A whole run leaves files of heights there, for the next, and nothing else.
 """
 
 from __future__ import annotations
@@ -15,6 +20,7 @@ import asyncio
 import json
 import resource
 import shutil
+import signal
 import sys
 import tempfile
 import threading
@@ -53,6 +59,10 @@ STEPS_A_METRE: Final = 8
 would be 3 % more than may be uploaded."""
 BAND: Final = 512
 """Rows that are written at a time."""
+MINUTES: Final = 8.0
+KEPT: Final = "measured.json"
+Result = dict[str, dict[str, Any]]
+"""By samples a side, then layout."""
 
 
 def say(text: str) -> None:
@@ -229,7 +239,8 @@ def measure(side: int, layout: str, folder: Path, puget: Path | None) -> dict[st
     ) | steps.end()  # fmt: skip
     conversion["raster_bytes"] = sum(file.stat().st_size for file in out.iterdir())
     shutil.rmtree(out)
-    stops = {stage: asyncio.run(cancelled(path, out, stage)) for stage in STAGES if side > SIDES[0]}
+    stages = () if side == SIDES[0] else STAGES if layout == "tiled" else STAGES[:1]
+    stops = {stage: asyncio.run(cancelled(path, out, stage)) for stage in stages}
     shutil.rmtree(work)
     say(f"{side} {layout}: {inspection['s']:.1f} s + {conversion['s']:.1f} s, {conversion['anonymous_mib']:.0f} MiB")
     return {
@@ -238,27 +249,76 @@ def measure(side: int, layout: str, folder: Path, puget: Path | None) -> dict[st
     }  # fmt: skip
 
 
+def kept(folder: Path, what: dict[str, Any]) -> Result:
+    """What a run that was stopped has measured of ``what`` (version, machine, data); nothing of anything else."""
+    try:
+        found = json.loads((folder / KEPT).read_text())
+    except (OSError, ValueError):
+        return {}
+    return found["files"] if found.get("what") == what else {}
+
+
+def keep(folder: Path, what: dict[str, Any], files: Result) -> None:
+    """For ``kept``, whole or not at all."""
+    partial = folder / f"{KEPT}.part"
+    partial.write_text(json.dumps({"what": what, "files": files}))
+    partial.replace(folder / KEPT)
+
+
+def run_all(sides: tuple[int, ...], folder: Path, puget: Path | None, minutes: float) -> tuple[Result, list[str]]:
+    """What is measured, and what is left out: for want of time, or because somebody stopped it."""
+    what = {"version": VERSION, "cpu": _serving.machine()["cpu"], "data": data.first(puget)[1]}
+    found, until = kept(folder, what), time.monotonic() + 60 * minutes
+    wanted = [(side, layout) for side in sides for layout in LAYOUTS]
+    stopped = False
+    for side, layout in wanted:
+        if stopped or layout in found.get(str(side), {}):
+            continue
+        if time.monotonic() > until:
+            break
+        try:
+            measured = measure(side, layout, folder, puget)
+        except KeyboardInterrupt:
+            say("stopped")
+            stopped = True
+            continue
+        finally:
+            shutil.rmtree(folder / "work", ignore_errors=True)
+        found.setdefault(str(side), {})[layout] = measured
+        keep(folder, what, found)
+    left = [f"{side} {layout}" for side, layout in wanted if layout not in found.get(str(side), {})]
+    if not left:
+        (folder / KEPT).unlink(missing_ok=True)
+    return {str(side): found[str(side)] for side in sides if str(side) in found}, left
+
+
+def _interrupt(_signal: int, _frame: object) -> None:
+    """A signal to end is Ctrl-C."""
+    raise KeyboardInterrupt
+
+
 def main(argv: list[str]) -> int:
-    """``esker bench importing [--json] [--quick] [--puget FILE] [--work FOLDER]``."""
+    """``esker bench importing [--json] [--quick] [--minutes N] [--puget FILE] [--work FOLDER]``."""
     parser = argparse.ArgumentParser(prog="esker bench importing", description=(__doc__ or "").split("\n", 1)[0])
     parser.add_argument("--json", action="store_true", help="print the result as JSON, indented")
     parser.add_argument("--quick", action="store_true", help="no 14,000: does it work?")
     parser.add_argument("--side", type=int, choices=SIDES, help="only this one")
+    parser.add_argument("--minutes", type=float, default=MINUTES, help="no file is begun after so many")
     parser.add_argument("--puget", type=Path, help="ps_height_1k.png of the Large Geometric Models Archive")
     parser.add_argument("--work", type=Path, help="where 4 GB of grids and files are made and kept")
     options = parser.parse_args(argv)
+    before = signal.signal(signal.SIGTERM, _interrupt)
     machine = _serving.machine()
     folder = options.work or Path(tempfile.mkdtemp(prefix="esker-importing-"))
     folder.mkdir(parents=True, exist_ok=True)
+    sides = (options.side,) if options.side else SIDES[: 2 if options.quick else 3]
     try:
-        files = {
-            str(side): {layout: measure(side, layout, folder, options.puget) for layout in LAYOUTS}
-            for side in ((options.side,) if options.side else SIDES[: 2 if options.quick else 3])
-        }
+        files, left = run_all(sides, folder, options.puget, options.minutes)
     finally:
+        signal.signal(signal.SIGTERM, before)
         if options.work is None:
             shutil.rmtree(folder, ignore_errors=True)
     result = {"bench": "importing", "version": VERSION, "machine": machine, "data": data.first(options.puget)[1],
-              "quick": options.quick, "files": files}  # fmt: skip
+              "quick": options.quick, "files": files, "left_out": left}  # fmt: skip
     sys.stdout.write(json.dumps(result, indent=1 if options.json else None) + "\n")
-    return 0
+    return 1 if left else 0
