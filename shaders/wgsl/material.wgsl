@@ -18,7 +18,7 @@ struct Attributes {
 };
 
 // Waves of a lake run up so many times less than those of the sea.
-const LAKE_SHORES: f32 = 3.0;
+const LAKE_SHORES: f32 = 4.0;
 
 struct Site {
   p: vec3f,
@@ -26,6 +26,7 @@ struct Site {
   steep: f32,        // tangent of the slope
   height: f32,       // above the sea or zero, as a fraction of the relief: the domain, or the climate of a real place
   shore: f32,        // above the nearest water, the same for shores: those of lakes are narrower
+  inland: f32,       // 1 where that water is a lake
   curvature: f32,
   footprint: f32,    // metres that a pixel covers
   f: Footprint,
@@ -46,7 +47,9 @@ fn survey(p: vec3f, gradient: vec2f, curvature: f32, f: Footprint, cover: Attrib
   s.steep = length(gradient);
   let above = p.z - view.sea;
   s.height = above / view.relief;
-  s.shore = min(select(FAR_ABOVE, above, view.has_sea > 0.5), LAKE_SHORES * above_lake) / view.shore;
+  let coast = select(FAR_ABOVE, above, view.has_sea > 0.5);
+  s.shore = min(coast, LAKE_SHORES * above_lake) / view.shore;
+  s.inland = select(0.0, 1.0, LAKE_SHORES * above_lake < coast);
   s.curvature = curvature;
   s.footprint = sqrt(max(max(dot(f.dx, f.dx), dot(f.dy, f.dy)), 1.0e-8));
   s.f = f;
@@ -140,7 +143,9 @@ fn shore(m: Material, s: Site, colour: vec3f) -> Material {
   let wander = (s.macro2.r - 0.5) * 0.006 + (s.fine1.r - 0.5) * 0.003;
   let low = 1.0 - smoothstep(0.0012, 0.0034, s.shore + wander * 0.7);
   let gentle = 1.0 - smoothstep(0.42, 0.75, s.steep + (s.fine1.g - 0.5) * 0.3);
-  let sand = Material(colour * (0.86 + 0.28 * s.fine2.r), fine_slope(s, 0.08), 0.0, 0.0);
+  // Beaches of sand by the sea, of pebbles and mud by a lake.
+  let beach = mix(colour, colour * vec3f(0.58, 0.60, 0.64), s.inland) * (0.86 + 0.28 * s.fine2.r);
+  let sand = Material(beach, fine_slope(s, 0.08 + 0.10 * s.inland), 0.0, 0.0);
   // Below the water and a hand above it.
   let wet = 1.0 - smoothstep(-0.0002, 0.0010, s.shore + wander * 0.3);
   return soaked(mix_in(m, sand, low * gentle), wet);

@@ -167,7 +167,9 @@ fn water_surface(p: vec3f, dir: vec3f, n: vec3f, w: Water) -> vec3f {
   let wash = 0.5 + 0.5 * sin(band * 10.0 - view.time * 1.1 + w.noise.z * 9.0);
   let reach = 1.0 - smoothstep(0.0, 0.7 + 0.9 * w.foam, band);
   let lace = smoothstep(0.46, 0.74, w.noise.w * 0.80 + wash * 0.22 + (1.0 - min(band, 1.0)) * 0.20 + (w.foam - 0.5) * 0.25);
-  return mix(colour, vec3f(0.80) * (sun + up), clamp(reach * lace, 0.0, 1.0) * 0.85);
+  // Where the wind has little room, no lace but a rim of ripples.
+  let white = clamp(reach * lace, 0.0, 1.0) * select(0.85, 0.5 * w.waves, w.inland);
+  return mix(colour, vec3f(0.80) * (sun + up), white);
 }
 
 // The open sea: no waves break there.

@@ -1,6 +1,9 @@
 /** The map: a printed relief sheet on a 2D canvas, for browsers without WebGPU (DESIGN 9). Same scenes, same tiles. */
 
 import type { CameraState, FrameStats, Rgba, Scene, SceneRenderer, Tile, TileView } from "../core/types.ts";
+import { SUBPATCHES } from "../generated/contract.ts";
+import { levelsOn } from "../tiles/lakes.ts";
+import { LakeWatch } from "../tiles/lakewatch.ts";
 import { assembleBordered, SLOT_TEXELS } from "./apron.ts";
 import { overlayGrid } from "./channeltexture.ts";
 import { contourInterval } from "./looks.ts";
@@ -40,6 +43,7 @@ export class MapRenderer implements SceneRenderer {
   private readonly felt = new InfluencePicture();
   private readonly painted = new PaintedPicture();
   private readonly sheet = new MapSheet();
+  private readonly lakes = new LakeWatch();
   private readonly slot = new Float32Array(SLOT_TEXELS * SLOT_TEXELS);
   private frame = 0;
 
@@ -53,6 +57,7 @@ export class MapRenderer implements SceneRenderer {
     const began = performance.now();
     this.frame += 1;
     const { camera } = scene;
+    this.lakes.update(scene.tiles, scene.settings, began, false);
     if (this.canvas.width !== camera.width) this.canvas.width = camera.width;
     if (this.canvas.height !== camera.height) this.canvas.height = camera.height;
     const frame = frameOf(camera);
@@ -71,7 +76,14 @@ export class MapRenderer implements SceneRenderer {
     if (scene.showStrokes) drawStrokes(this.context, frame, scene);
     drawCursors(this.context, frame, scene);
     this.forget();
-    return { patches: drawn, triangles: 0, selectMs: 0, cpuMs: performance.now() - began, uploads, busy };
+    return {
+      patches: drawn,
+      triangles: 0,
+      selectMs: 0,
+      cpuMs: performance.now() - began,
+      uploads,
+      busy: busy || this.lakes.busy,
+    };
   }
 
   destroy(): void {
@@ -85,6 +97,7 @@ export class MapRenderer implements SceneRenderer {
       look: settings.look,
       sizeM: tiles.sizeM,
       seaM: settings.sea_level_m,
+      lakes: this.lakes.lakes,
       contourM: contourInterval(relief(tiles)),
       contours: scene.overlay === "contours" || root !== undefined,
       slope: scene.overlay === "slope",
@@ -123,7 +136,7 @@ export class MapRenderer implements SceneRenderer {
     const context = canvas.getContext("2d", { alpha: false })!;
     const image = context.createImageData(side, side);
     assembleBordered(tile.heights, (dx, dy) => neighbour(view, tile, dx, dy)?.heights, this.slot);
-    shadeTile(this.slot, tile.level, side, style, image.data);
+    shadeTile(this.slot, tile, side, style, image.data);
     context.putImageData(image, 0, 0);
     const picture = { canvas, key, used: this.frame };
     this.pictures.set(nameOf(tile), picture);
@@ -201,7 +214,10 @@ function pictureKey(view: TileView, tile: Tile, side: number, style: MapStyle): 
   for (let dy = -1; dy <= 1; dy += 1) {
     for (let dx = -1; dx <= 1; dx += 1) stamps += `${neighbour(view, tile, dx, dy)?.stamp ?? ""},`;
   }
-  return `${side} ${style.look} ${style.seaM} ${style.contourM} ${style.contours} ${style.slope} ${stamps}`;
+  const { level, x, y } = tile;
+  const lakes =
+    style.lakes === null ? "" : levelsOn(style.lakes, level, x * SUBPATCHES, y * SUBPATCHES, SUBPATCHES).join(" ");
+  return `${side} ${style.look} ${lakes} ${style.seaM} ${style.contourM} ${style.contours} ${style.slope} ${stamps}`;
 }
 
 function relief(view: TileView): number {

@@ -5,8 +5,10 @@
  * Source of the manner: E. Imhof, "Cartographic Relief Presentation" (1982), chapters 9 and 13.
  */
 
+import type { Tile } from "../core/types.ts";
 import type { Look } from "../generated/contract.ts";
-import { TILE_CELLS } from "../generated/contract.ts";
+import { NO_LAKE, TILE_CELLS } from "../generated/contract.ts";
+import { type Lakes, lakeOver } from "../tiles/lakes.ts";
 import { BORDER, SLOT_TEXELS } from "./apron.ts";
 
 type Rgb = readonly [number, number, number];
@@ -16,6 +18,8 @@ export interface MapStyle {
   readonly look: Look;
   readonly sizeM: number;
   readonly seaM: number | null;
+  /** Where lakes stand, and how high; null without a lake. */
+  readonly lakes: Lakes | null;
   readonly contourM: number;
   readonly contours: boolean;
   readonly slope: boolean;
@@ -135,16 +139,17 @@ function gradients(slot: Float32Array, cell: number): { gx: Float32Array; gy: Fl
 }
 
 /**
- * Draws a tile: `slot` is its 69 x 69 samples (row 0 south), `level` its level, `out` RGBA of `side` x `side` pixels, row 0
+ * Draws a tile: `slot` is its 69 x 69 samples (row 0 south), `tile` says which, `out` RGBA of `side` x `side` pixels, row 0
  * north.
  */
 export function shadeTile(
   slot: Float32Array,
-  level: number,
+  tile: Pick<Tile, "level" | "x" | "y">,
   side: number,
   style: MapStyle,
   out: Uint8ClampedArray,
 ): void {
+  const { level } = tile;
   const cell = style.sizeM / (TILE_CELLS << level);
   const { gx, gy } = gradients(slot, cell);
   const perPixel = TILE_CELLS / side;
@@ -159,7 +164,8 @@ export function shadeTile(
       const fx = x - i;
       const at = (j + BORDER) * SLOT_TEXELS + i + BORDER;
       const z = bilinear(slot, at, fx, fy);
-      shadePoint(z, bilinear(gx, at, fx, fy), bilinear(gy, at, fx, fy), cell * perPixel, style, colour);
+      const water = waterOver(style, (tile.x * TILE_CELLS + x) * cell, (tile.y * TILE_CELLS + y) * cell, z);
+      shadePoint(z, water, [bilinear(gx, at, fx, fy), bilinear(gy, at, fx, fy)], cell * perPixel, style, colour);
       const to = 4 * (row * side + col);
       out[to] = colour[0]!;
       out[to + 1] = colour[1]!;
@@ -175,12 +181,26 @@ function bilinear(field: Float32Array, at: number, fx: number, fy: number): numb
   return south + (north - south) * fy;
 }
 
-function shadePoint(z: number, gx: number, gy: number, pixelM: number, style: MapStyle, out: Float32Array): void {
+/** Level of the water that covers ground of height z; null where it is dry. */
+function waterOver({ lakes, seaM, sizeM }: MapStyle, x: number, y: number, z: number): number | null {
+  const lake = lakes === null ? NO_LAKE : lakeOver(lakes, x / sizeM, y / sizeM);
+  const level = Math.max(lake, seaM ?? NO_LAKE);
+  return level > NO_LAKE && z < level ? level : null;
+}
+
+function shadePoint(
+  z: number,
+  water: number | null,
+  [gx, gy]: readonly [number, number],
+  pixelM: number,
+  style: MapStyle,
+  out: Float32Array,
+): void {
   const look = RAMPS[style.look];
   const steep = Math.hypot(gx, gy);
   const ground = style.seaM ?? 0;
-  if (style.seaM !== null && z < style.seaM) {
-    shadeSea((style.seaM - z) / style.sizeM, steep * pixelM, style.sizeM, out);
+  if (water !== null) {
+    shadeSea((water - z) / style.sizeM, steep * pixelM, style.sizeM, out);
     return;
   }
   if (style.slope) ramp(SLOPE_STOPS, (Math.atan(steep) * 180) / Math.PI, out);
@@ -203,7 +223,7 @@ function shadePoint(z: number, gx: number, gy: number, pixelM: number, style: Ma
   }
 }
 
-/** Sea by depth (a fraction of the domain), with a shore line and faint steps of depth. */
+/** Water by depth (a fraction of the domain), with a shore line and faint steps of depth. */
 function shadeSea(depth: number, ratePerPixelM: number, sizeM: number, out: Float32Array): void {
   const t = Math.min(1, Math.sqrt(depth / 0.05));
   const step = Math.min(1, Math.floor(depth / 0.004) * 0.12);

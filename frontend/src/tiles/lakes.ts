@@ -205,6 +205,27 @@ function spread(
   }
 }
 
+/**
+ * Level of the lake that covers a place if the ground there lies below it, else NO_LAKE; `u` from west to east and `v` from
+ * south to north, 0..1. A lake ends where the ground outside its basin falls below it (lakes.wgsl, inside_lake).
+ */
+export function lakeOver({ side, heights, levels }: Lakes, u: number, v: number): number {
+  const [x, y] = [u * (side - 1), v * (side - 1)];
+  const i = Math.min(side - 2, Math.max(0, Math.floor(x)));
+  const j = Math.min(side - 2, Math.max(0, Math.floor(y)));
+  const at = j * side + i;
+  const lake = Math.max(levels[at]!, levels[at + 1]!, levels[at + side]!, levels[at + side + 1]!);
+  if (lake === NO_LAKE) return NO_LAKE;
+  const inside = (k: number): number => {
+    const z = heights[k]!;
+    return levels[k] === lake && z < lake ? lake - z : z - lake;
+  };
+  const [s, t] = [x - i, y - j];
+  const south = inside(at) * (1 - s) + inside(at + 1) * s;
+  const north = inside(at + side) * (1 - s) + inside(at + side + 1) * s;
+  return south * (1 - t) + north * t > 0 ? lake : NO_LAKE;
+}
+
 /** How high water may stand on the patches of any level. */
 export class Surfaces {
   /** Per level, highest lake of each patch; on finer levels that of the patch they lie in. */
@@ -261,12 +282,12 @@ function quartered(of: Float32Array): Float32Array {
   return out;
 }
 
-/** Levels of the lakes, rising, that may be seen on a patch. */
-export function levelsOn({ side, levels }: Lakes, level: number, px: number, py: number): number[] {
+/** Levels of the lakes, rising, that may be seen on a patch, or on a square of `across` x `across` of them. */
+export function levelsOn({ side, levels }: Lakes, level: number, px: number, py: number, across = 1): number[] {
   const cell = 1 << Math.max(level - LAKE_LEVEL, 0);
   const span = PATCH_CELLS << Math.max(LAKE_LEVEL - level, 0);
   const found = new Set<number>();
-  const [x1, y1] = [Math.ceil(((px + 1) * span) / cell), Math.ceil(((py + 1) * span) / cell)];
+  const [x1, y1] = [Math.ceil(((px + across) * span) / cell), Math.ceil(((py + across) * span) / cell)];
   for (let y = Math.floor((py * span) / cell); y <= y1; y += 1) {
     for (let x = Math.floor((px * span) / cell); x <= x1; x += 1) {
       const at = levels[y * side + x]!;

@@ -34,7 +34,7 @@ export class LakeWatch implements ShownLakes {
   private rule: Rule = { lakes_m: null, sea_level_m: null };
   private ground: Float32Array | null = null;
   private stamp = -1;
-  private found = Number.NEGATIVE_INFINITY;
+  private asked = Number.NEGATIVE_INFINITY;
   private easedAt = 0;
   private waiting = false;
   private fresh = false;
@@ -61,8 +61,9 @@ export class LakeWatch implements ShownLakes {
     if (lakes_m === null) {
       if (this.lakes !== null || ruled) this.forget();
       this.stamp = view.stamp;
-    } else if (this.stale && !this.waiting && (ruled || now - this.found >= REST_MS)) {
+    } else if (this.stale && !this.waiting && (ruled || now - this.asked >= REST_MS)) {
       this.waiting = true;
+      this.asked = now;
       this.later(() => this.find(smooth));
     }
     if (this.surfaces.seaM !== (sea_level_m ?? Number.NEGATIVE_INFINITY)) this.level();
@@ -96,7 +97,6 @@ export class LakeWatch implements ShownLakes {
 
   private find(smooth: boolean): void {
     this.waiting = false;
-    this.found = performance.now();
     const { view, rule } = this;
     if (view === null || rule.lakes_m === null) return;
     const ruled = this.stamp === -1;
@@ -140,6 +140,7 @@ export class LakeWatch implements ShownLakes {
       if (next !== NO_LAKE && before !== NO_LAKE && heights[i]! < next) heirs.set(before, next);
     }
     const beds = new Map<number, number>();
+    const samples = new Map(found.samples);
     for (let i = 0; i < levels.length; i += 1) {
       const before = old.levels[i]!;
       if (levels[i] !== NO_LAKE || before === NO_LAKE || !now.has(before)) continue;
@@ -155,8 +156,9 @@ export class LakeWatch implements ShownLakes {
       if (this.targets.has(level)) continue;
       this.heights.set(level, now.get(level)!);
       this.targets.set(level, bed);
+      samples.set(level, old.samples.get(level) ?? 0);
     }
-    return { ...found, levels };
+    return { ...found, levels, samples };
   }
 
   /** Brings levels nearer to where they belong; true when one moved. */

@@ -2,7 +2,7 @@ import "@awesome.me/webawesome/dist/components/switch/switch.js";
 import { html, nothing, type TemplateResult } from "lit";
 import { live } from "lit/directives/live.js";
 import type { Border, Look, Rule, TerrainFields, TerrainSettings } from "../generated/contract.ts";
-import { DEFAULT_REACH_FRACTION, MAX_DETAIL } from "../generated/contract.ts";
+import { DEFAULT_LAKES_FRACTION, DEFAULT_REACH_FRACTION, MAX_DETAIL } from "../generated/contract.ts";
 import "./range-field.ts";
 import "./segmented.ts";
 import { SignalElement } from "./signal-element.ts";
@@ -56,7 +56,7 @@ export function detailWords(detail: number): string {
 
 const tenth = (v: number): number => Math.round(10 * v) / 10;
 
-/** Settings of the whole terrain: look, detail, sun, sea, and how far strokes reach. */
+/** Settings of the whole terrain: look, detail, sun, sea and lakes, and how far strokes reach. */
 export class EskTerrainPanel extends SignalElement {
   static override properties = { stage: { attribute: false } };
   static override styles = [shared, panelStyles];
@@ -85,7 +85,7 @@ export class EskTerrainPanel extends SignalElement {
           @pick=${(e: CustomEvent<Look>) => this.#set({ look: e.detail })}
         ></esk-segmented>
       </div>
-      ${this.#detail(settings, disabled)} ${this.#sun(settings, disabled)} ${this.#sea(settings, disabled)} ${this.#reach(settings, disabled)}
+      ${this.#detail(settings, disabled)} ${this.#sun(settings, disabled)} ${this.#sea(settings, disabled)} ${this.#lakes(settings, disabled)} ${this.#reach(settings, disabled)}
       <div class="group">
         <h3>Border</h3>
         <esk-segmented
@@ -177,6 +177,37 @@ export class EskTerrainPanel extends SignalElement {
                 @value=${(e: CustomEvent<number>) => this.#set({ sea_level_m: e.detail }, false)}
                 @settle=${(e: CustomEvent<number>) => this.#set({ sea_level_m: e.detail })}
               ></esk-range>`
+        }
+      </div>
+    `;
+  }
+
+  #lakes({ lakes_m: least, size_m: size }: TerrainSettings, disabled: boolean): TemplateResult {
+    const standard = size * DEFAULT_LAKES_FRACTION;
+    return html`
+      <div class="group">
+        <wa-switch
+          size="s"
+          .checked=${live(least !== null)}
+          ?disabled=${disabled}
+          @change=${(e: Event) => this.#set({ lakes_m: (e.target as HTMLInputElement).checked ? standard : null })}
+          >Lakes</wa-switch
+        >
+        ${
+          least === null
+            ? html`<p class="lead">Basins stay dry.</p>`
+            : html`<esk-range
+                  label="From a depth of"
+                  unit="m"
+                  log
+                  min=${standard / 8}
+                  max=${standard * 32}
+                  .value=${least}
+                  ?disabled=${disabled}
+                  @value=${(e: CustomEvent<number>) => this.#set({ lakes_m: e.detail }, false)}
+                  @settle=${(e: CustomEvent<number>) => this.#set({ lakes_m: e.detail })}
+                ></esk-range>
+                <p class="lead">Basins fill to their brim. Draw a dam across a valley, or a crater.</p>`
         }
       </div>
     `;

@@ -3,6 +3,7 @@
 import view from "@shaders/wgsl/view.wgsl?raw";
 import { describe, expect, it, vi } from "vitest";
 import type { Scene, StrokeVisual } from "../../src/core/types.ts";
+import { NO_LAKE } from "../../src/generated/contract.ts";
 import { NoWebGpu, openGpu } from "../../src/gpu/device.ts";
 import { baseHeight, sunDirection } from "../../src/gpu/frame.ts";
 import { StructWriter, structLayout } from "../../src/gpu/layout.ts";
@@ -290,15 +291,32 @@ describe("the map", () => {
   });
 
   it("R16: draws sea below the level, land above, and no line over flat ground at a round height", () => {
-    const style = { look: "natural", sizeM: 4096, seaM: 0, contourM: 20, contours: true, slope: false } as const;
+    const style = {
+      look: "natural",
+      sizeM: 4096,
+      seaM: 0,
+      lakes: null,
+      contourM: 20,
+      contours: true,
+      slope: false,
+    } as const;
     const slot = new Float32Array(69 * 69).fill(0);
     const out = new Uint8ClampedArray(64 * 64 * 4);
-    shadeTile(slot, 0, 64, { ...style, seaM: null }, out);
+    const root = { level: 0, x: 0, y: 0 };
+    shadeTile(slot, root, 64, { ...style, seaM: null }, out);
     const plain = [...out.subarray(0, 4)];
     expect(plain[1]).toBeGreaterThan(180);
     slot.fill(-40);
-    shadeTile(slot, 0, 64, style, out);
+    shadeTile(slot, root, 64, style, out);
     expect(out[2]).toBeGreaterThan(out[0]! + 20);
+    // A lake in the south-west alone, 10 m above the ground there.
+    const heights = new Float32Array(9).fill(-40);
+    const levels = Float32Array.from([-30, -30, NO_LAKE, -30, -30, NO_LAKE, NO_LAKE, NO_LAKE, NO_LAKE]);
+    shadeTile(slot, root, 64, { ...style, seaM: null, lakes: { side: 3, heights, levels, samples: new Map() } }, out);
+    const blue = (row: number, col: number): number => out[4 * (64 * row + col) + 2]! - out[4 * (64 * row + col)]!;
+    expect(blue(60, 4)).toBeGreaterThan(20);
+    expect(blue(4, 4)).toBeLessThan(0);
+    expect(blue(60, 60)).toBeLessThan(0);
   });
 });
 
