@@ -11,6 +11,7 @@ from tests.cones import FINEST, LEVELS, SIZE_M, Bump, Client, Ground, Made, near
 from esker import grid
 from esker.contract import MAX_REFINED_LEVEL, MAX_REFINED_TILES, FrameKind, Predictor
 from esker.grid import TileKey
+from esker.tiles import sparse
 from esker.tiles.delivery import ClientTiles, TileServer
 from esker.tiles.frame import read_frame
 
@@ -99,7 +100,7 @@ def test_the_selection_is_closed_under_parents_and_restricted(seed: int, levels:
             assert below[level - 1][y >> 1, x >> 1]
 
 
-def test_wishes_go_coarse_to_fine_then_by_screen_error_and_never_beyond_one_unknown_level() -> None:
+def test_wishes_go_coarse_to_fine_then_by_screen_error_and_after_their_parents() -> None:
     server, ground = TileServer(SIZE_M, LEVELS, FINEST), Ground([TIP, Bump(220.0, 330.0, 9.0, 4.0)])
     client = ClientTiles(server)
     client.set_view(LOOK)
@@ -116,6 +117,29 @@ def test_wishes_go_coarse_to_fine_then_by_screen_error_and_never_beyond_one_unkn
             server.put_tile(1, ground.tile(key))
         seen += [k.level for k in wishes]
     assert set(seen) == set(range(LEVELS + 1, FINEST + 1))
+
+
+@pytest.mark.parametrize("eye_m", [6.0, 40.0])
+def test_several_unknown_levels_are_wished_at_once_near_a_crest(eye_m: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """SPEC Q7: fewer rounds than levels, the same tiles wanted in the end, and few made for nothing."""
+
+    def made(likely: float) -> tuple[int, int, set[TileKey]]:
+        monkeypatch.setattr(sparse, "LIKELY", likely)
+        server, ground = TileServer(SIZE_M, LEVELS, FINEST), Ground([TIP, Bump(220.0, 330.0, 9.0, 4.0)])
+        client = ClientTiles(server)
+        client.set_view(near(200.0, 275.0, eye_m, tau_px=0.7))
+        solve(server, ground, 1, True)
+        rounds = 0
+        while wishes := server.wishes([client])[0]:
+            rounds += 1
+            assert all(server.put_tile(1, ground.tile(key)) for key in wishes)
+        return rounds, len(server.refined), client.wanted_refined()
+
+    guessed, one_by_one = made(sparse.LIKELY), made(np.inf)
+    assert one_by_one[0] >= FINEST - LEVELS
+    assert guessed[0] < one_by_one[0]
+    assert guessed[1] < 1.25 * one_by_one[1]
+    assert guessed[2] == one_by_one[2]
 
 
 def test_clients_wishes_are_merged() -> None:

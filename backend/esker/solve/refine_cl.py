@@ -1,7 +1,6 @@
 """Steps of refinement on an OpenCL device, row by row (shaders/opencl/refine.cl); twin ``refine_engine.NumpyEngine``.
 
-Two steps may be under way: while the sweeps of one run, which take one core of a CPU, the host prepares the next one, and
-the rasteriser works for it.
+Two steps may be under way: while the sweeps of one run, which take one core of a CPU, the host prepares the next one.
 """
 
 from __future__ import annotations

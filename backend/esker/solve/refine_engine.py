@@ -72,6 +72,7 @@ class Step:
         return Span(by0 * BIN, min(by1 * BIN, n), bx0 * BIN, min(bx1 * BIN, n))
 
 
+@lru_cache(maxsize=4096)
 def step(level: int, core: Span) -> Step:
     """The step that computes the samples ``core`` of ``level``."""
     n = grid.samples(level)

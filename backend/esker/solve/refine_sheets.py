@@ -66,6 +66,8 @@ class Sheets:
     def __init__(self, bytes_: int = SHEETS_BYTES) -> None:
         self.most = max(1, bytes_ // SHEET_BYTES)
         self._held: OrderedDict[tuple[int, int, int, bytes], Sheet] = OrderedDict()
+        self._spare: list[NDArray[np.float32]] = []
+        """Memory of sheets that were dropped: fresh memory costs more than filling it."""
 
     def __len__(self) -> int:
         return len(self._held)
@@ -77,11 +79,20 @@ class Sheets:
     def trim(self) -> None:
         """Drop what is too much; not while parts of a window are in use."""
         while len(self._held) > self.most:
-            self._held.popitem(last=False)
+            self._spare.append(self._held.popitem(last=False)[1].data)
 
     def clear(self) -> None:
         """Drop everything."""
         self._held.clear()
+        self._spare.clear()
+
+    def _memory(self, fields: int) -> NDArray[np.float32]:
+        """Samples of a new sheet, of any value."""
+        while self._spare:
+            found = self._spare.pop()
+            if len(found) == fields:
+                return found
+        return np.empty((fields, SHEET, SHEET), dtype=np.float32)
 
     def _parts(self, level: int, box: BinBox, digest: Digest, fields: int) -> Iterator[Part]:
         by0, by1, bx0, bx1 = box
@@ -92,7 +103,7 @@ class Sheets:
                 whole = y, min(y + SHEET_BINS, count), x, min(x + SHEET_BINS, count)
                 key = level, sy, sx, digest(level, whole)
                 if key not in self._held:
-                    self._held[key] = Sheet(np.zeros((fields, SHEET, SHEET), dtype=np.float32))
+                    self._held[key] = Sheet(self._memory(fields))
                 sheet = self._held[key]
                 self._held.move_to_end(key)
                 first = max(by0 - y, 0), max(bx0 - x, 0)

@@ -28,7 +28,7 @@ from esker.tiles.refined_ledger import RefinedLedger
 from esker.tiles.sparse import Selection, restrict_below, select_refined
 from esker.tiles.surface import BasePyramid, Surface
 
-WISHES: Final = 64
+WISHES: Final = 128
 """Most tiles that the refiner is asked for at once."""
 TAU_STEP: Final = 1.3
 """Where a view wants more refined tiles than a client may hold, its tau grows by this factor until they fit."""

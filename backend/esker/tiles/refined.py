@@ -16,9 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from esker import grid
-from esker.contract import MAX_REFINED_LEVEL, MAX_REFINED_TILES, PATCH_CELLS, TILE_SAMPLES
+from esker.contract import MAX_REFINED_LEVEL, MAX_REFINED_TILES, PATCH_CELLS, SUBPATCHES, TILE_SAMPLES
 from esker.grid import TileKey
-from esker.tiles.bounds import Floats, block_reduce, sub_error
+from esker.tiles import loops
+from esker.tiles.bounds import Floats
 from esker.tiles.codec import SAMPLE_LIMIT, Ints
 from esker.tiles.ledger import state_of
 from esker.tiles.plans import TileState
@@ -190,10 +191,11 @@ class RefinedTiles:
         samples, parent = state.samples, above[r : r + 33, c : c + 33]
         if under.base is not None and under.above is not None:
             samples, parent = total(samples, under.base), total(parent, under.above[r : r + 33, c : c + 33])
-        low = block_reduce(np.minimum, samples, PATCH_CELLS) * q
-        high = block_reduce(np.maximum, samples, PATCH_CELLS) * q
-        error = sub_error(samples, parent) * q
-        bounds = (a.astype(np.float32) for a in (low, high, error))
+        low, high = np.empty((2, SUBPATCHES, SUBPATCHES), dtype=np.int32)
+        error = np.empty((SUBPATCHES, SUBPATCHES), dtype=np.uint32)
+        loops.bounded(samples, PATCH_CELLS, low, high)
+        loops.erred(samples, parent, PATCH_CELLS, error)
+        bounds = (a * q for a in (low.astype(np.float32), high.astype(np.float32), error.astype(np.float32)))
         return Refined(key, state, content, self.epoch, under.ground, *bounds)
 
     def known(self, level: int) -> Known:

@@ -28,6 +28,9 @@ Index = NDArray[np.int64]
 
 EXPECTED: Final = np.float32(0.5)
 """The error of a tile as a part of its parent's, where it is not known."""
+LIKELY: Final = 8.0
+"""A tile that is not known is taken for as bad as that where it is this many times too bad: so several levels are made
+in one go near crests, in fewer and fuller steps."""
 HALF: Final = SUBPATCHES // 2
 
 
@@ -120,7 +123,7 @@ def select_refined(pyramid: Relief, refined: RefinedTiles, wanted: Mask, view: V
         order = np.argsort(place)
         codes.append(place[order])
         errors.append(error[chosen][order])
-        parents = below.parents(chosen)
+        parents = below.parents(chosen, chosen & (error > LIKELY * tau))
         if not len(parents.x):
             break
     for _ in range(refined.finest - refined.levels - len(codes)):
@@ -192,8 +195,8 @@ class _Children:
     """The ground there has not changed since the tile was made."""
     made: Known
 
-    def parents(self, chosen: NDArray[np.bool_]) -> _Parents:
-        """The chosen ones that are known: from them selection goes on downward."""
+    def parents(self, chosen: NDArray[np.bool_], likely: NDArray[np.bool_]) -> _Parents:
+        """The chosen ones that are known, and the likely ones that are not: from them selection goes on downward."""
         mask = chosen & self.known
         at, changed = self.at[mask], ~self.same[mask]
         low, high, error = self.made.low[at], self.made.high[at], self.made.error[at]
@@ -202,7 +205,16 @@ class _Children:
             low[changed] = np.minimum(low[changed], boxes.low[mask][changed, None, None])
             high[changed] = np.maximum(high[changed], boxes.high[mask][changed, None, None])
             error[changed] = np.maximum(error[changed], boxes.error[mask][changed, None, None])
-        return _Parents(self.x[mask], self.y[mask], low, high, error)
+        guessed = likely & ~self.known
+        if not guessed.any():
+            return _Parents(self.x[mask], self.y[mask], low, high, error)
+        shape = (int(guessed.sum()), SUBPATCHES, SUBPATCHES)
+        bounds = (
+            np.concatenate([known, np.broadcast_to(guess[guessed][:, None, None], shape)])
+            for known, guess in ((low, self.boxes.low), (high, self.boxes.high), (error, self.boxes.error))
+        )
+        x, y = (np.concatenate([place[mask], place[guessed]]) for place in (self.x, self.y))
+        return _Parents(x, y, *bounds)
 
 
 def _children(parents: _Parents, level: int, refined: RefinedTiles, changed: NDArray[np.uint32]) -> _Children:
