@@ -212,12 +212,13 @@ fn water_fragment(v: WaterVertex) -> @location(0) vec4f {
   let world = v.relative + view.eye.xyz;
   if (v.depth < 0.0) { discard; }
   let inland = v.sheet.y > NO_LAKE;
+  let dir = ray_to(world);
   var within = view.size;
   if (inland) {
     within = inside_lake(world.xy, v.sheet.y);
-    if (within <= 0.0) { discard; }
+    // An eye that has gone below a lake sees its bed.
+    if (within <= 0.0 || dir.z > 0.0) { discard; }
   }
-  let dir = ray_to(world);
   let n = water_normal(world, dir, v.sheet.z);
   // The bed that is seen lies further on, where the bent sight meets its slope.
   let own = patch_slot(v.record);

@@ -135,9 +135,14 @@ def volcanic_island() -> dict[str, object]:
         [(420, 1020, 0), (620, 820, 140), (900, 700, 100), (1080, 560, 0)], 30, spurs=1, spacing=260, label="Islet"
     )
     settings = TerrainSettings(
-        title="Volcanic island", sea_level_m=42.0, sun_azimuth_deg=104.0, sun_elevation_deg=19.0, reach_m=240.0
+        title="Volcanic island",
+        sea_level_m=42.0,
+        lakes_m=4.0,
+        sun_azimuth_deg=104.0,
+        sun_elevation_deg=19.0,
+        reach_m=240.0,
     )
-    words = "A breached crater, ridges running to the coast, and a side cone by the bay."
+    words = "A breached crater that holds a lake, ridges running to the coast, and a side cone by the bay."
     return template(pen, "Volcanic island", words, settings)
 
 

@@ -1,4 +1,4 @@
-// Lakes are those of the Python twin, to the bit (spec R60 to R63); what the picture asks of them.
+// Lakes are those of the Python twin, to the bit (spec R67, R68); what the picture asks of them.
 
 import { readFileSync } from "node:fs";
 import { describe, expect, it } from "vitest";

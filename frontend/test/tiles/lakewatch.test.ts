@@ -1,4 +1,4 @@
-// Lakes while the ground changes under them (spec R66).
+// Lakes while the ground changes under them (spec R69).
 
 import { describe, expect, it } from "vitest";
 import type { Tile, TileView } from "../../src/core/types.ts";
