@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -197,3 +198,12 @@ def test_place_of_a_terrain_made_from_a_file() -> None:
     report = c.ImportReport(verdict="good", file="a", at=(46.2, -122.2))
     assert run.suggest_place(report) == c.Place(lat_deg=46.2, lon_deg=-122.2)
     assert run.suggest_place(c.ImportReport(verdict="good", file="a")) is None
+
+
+def test_a_full_disk_is_told(files: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """SPEC G31: a reader that ends where the disk is full was not stopped by its file; nothing is left."""
+    monkeypatch.setattr(shutil, "disk_usage", lambda _path: shutil._ntuple_diskusage(1 << 30, 1 << 30, 0))  # type: ignore[attr-defined]
+    monkeypatch.setattr(sys, "executable", "/bin/false")
+    with pytest.raises(run.ImportRefused, match="no room"):
+        asyncio.run(run.convert(files / "little.tif", c.ImportAnswers(), PLACE, SIZE_M, tmp_path / "raster"))
+    assert os.listdir(tmp_path) == []

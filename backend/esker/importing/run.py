@@ -30,6 +30,9 @@ Progress = Callable[[c.ImportStage, float], None]
 MAX_LINE_BYTES: Final = 256 * 1024
 KEPT_ERRORS: Final = 4096
 HEIGHT_GROWTH: Final = 2.0
+ROOM_BYTES: Final = 16 << 20
+"""A reader that ends with less than this left on the disk ended for want of it: mapped files return no error."""
+FULL: Final = "The server's disk has no room for it."
 STOPPED: Final = "Reading it took too much memory or time, or its data are broken in a way that stops the reader."
 
 
@@ -187,7 +190,8 @@ async def _talk(
     finally:
         errors.cancel()
         await asyncio.gather(errors, return_exceptions=True)
-    raise ImportRefused(STOPPED)
+    full = await asyncio.to_thread(lambda: shutil.disk_usage(task.workdir).free < ROOM_BYTES)
+    raise ImportRefused(FULL if full else STOPPED)
 
 
 async def _tail(stream: asyncio.StreamReader) -> str:
