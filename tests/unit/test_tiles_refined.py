@@ -9,7 +9,7 @@ import pytest
 from tests.cones import FINEST, LEVELS, SIZE_M, Bump, Client, Ground, Made, near, settle, solve
 
 from esker import grid
-from esker.contract import MAX_REFINED_LEVEL, MAX_REFINED_TILES, FrameKind, Predictor
+from esker.contract import MAX_REFINED_LEVEL, MAX_REFINED_TILES, FrameKind, Predictor, View
 from esker.grid import TileKey
 from esker.tiles import sparse
 from esker.tiles.delivery import ClientTiles, TileServer
@@ -33,6 +33,26 @@ def at_rest(view: object = LOOK, finest: int = FINEST, **limits: int) -> tuple[T
 
 def levels_of(client: Client) -> list[int]:
     return [sum(k.level == level for k in client.decoder.held) for level in range(FINEST + 1)]
+
+
+def test_what_a_view_shows_comes_before_what_a_step_nearer_shows() -> None:
+    """SPEC T12."""
+    rng, levels = random.Random(3), 4
+    server = TileServer(SIZE_M, levels)
+    bumps = [Bump(rng.uniform(0, SIZE_M), rng.uniform(0, SIZE_M), 30.0, rng.uniform(0.5, 3.0)) for _ in range(60)]
+    for level in range(levels + 1):
+        server.put_level(1, level, Ground(bumps).level(level), True)
+    client = ClientTiles(server, rest_level=-1)
+    client.set_view(View(eye=(256, -150, 120), target=(256, 256, 0), width=800, height=600, tau_px=1.0))
+    came: list[TileKey] = []
+    while (plan := client.plan()) is not None:
+        came += plan.keys
+        client.commit(plan)
+    shown = {TileKey(level, int(x), int(y)) for level, m in enumerate(client.shown()) for y, x in np.argwhere(m)}
+    wanted = {TileKey(level, int(x), int(y)) for level, m in enumerate(client.wanted()) for y, x in np.argwhere(m)}
+    assert set(came) == wanted
+    assert 21 < len(shown) < len(wanted)
+    assert set(came[: len(shown)]) == shown
 
 
 # --- what is wanted ---------------------------------------------------------------------------------------------------

@@ -47,7 +47,7 @@ def rows() -> list[tuple[str, str, str]]:
     """What, figure, and what it is compared with in the same run."""
     solve, stream, fanout = result("solve"), result("stream"), result("fanout")
     canvas, flow = stream["scenes"]["fifty"], stream["scenes"]["fifty"]["socket"]
-    room = fanout["esker"]
+    room, first = fanout["esker"], canvas["first_view_home"]
     return [
         *_solver.rows(solve),
         (
@@ -62,9 +62,9 @@ def rows() -> list[tuple[str, str, str]]:
             "",
         ),
         (
-            "first full view, 1025², 50 strokes",
-            kilobytes(canvas["first_view_home"]["bytes"]),
-            f"raw uint16: {kilobytes(canvas['first_view_home']['raw_uint16_bytes'])}",
+            "first view, 1025², 50 strokes: what it shows / and what a step nearer shows",
+            f"{kilobytes(first['shown']['bytes'])} / {kilobytes(first['bytes'])}",
+            f"raw uint16: {kilobytes(first['raw_uint16_bytes'])}",
         ),
         (
             "one appended segment",

@@ -27,6 +27,7 @@ from esker import contract as c
 from esker import grid, templates
 from esker.bench import _phases, _serving
 from esker.document.strokes import profile_curve
+from esker.grid import TileKey
 from esker.solve.solver import Solver
 from esker.tiles.decoder import FrameDecoder
 from esker.tiles.delivery import ClientTiles, TileServer
@@ -88,15 +89,23 @@ def percentiles(seconds: list[float]) -> dict[str, float]:
 # --- bytes and selection, in this process ---------------------------------------------------------------------------
 
 
-def _drain(client: ClientTiles) -> dict[str, int]:
-    """Sends all that a client is owed; counts tiles, drops and bytes."""
+def _drain(client: ClientTiles, *, shown: bool = False) -> dict[str, int]:
+    """Sends all that a client is owed, or (``shown``) until it has what its view shows as it is; counts tiles, drops
+    and bytes."""
     total = {"tiles": 0, "drops": 0, "bytes": 0}
-    while (plan := client.plan()) is not None:
+    while not (shown and _complete(client)) and (plan := client.plan()) is not None:
         total["bytes"] += len(plan.encode())
         total["tiles"] += len(plan.keys)
         total["drops"] += len(plan.drops)
         client.commit(plan)
     return total
+
+
+def _complete(client: ClientTiles) -> bool:
+    """Whether a client has all tiles that its view shows."""
+    held = client.held()
+    masks = enumerate(client.shown())
+    return all(TileKey(level, int(x), int(y)) in held for level, mask in masks for y, x in np.argwhere(mask))
 
 
 def _put(server: TileServer, solver: Solver, document: c.Document, clock: int, *, settle: bool = True) -> None:
@@ -118,7 +127,8 @@ def measure_bytes(solver: Solver, document: c.Document, segments: int) -> dict[s
     for name, view in (("first_view_home", HOME), ("first_view_near", NEAR)):
         client = ClientTiles(server, rest_level=-1)
         client.set_view(view)
-        out[name] = _drain(client)
+        shown = _drain(client, shown=True)
+        out[name] = {key: count + shown[key] for key, count in _drain(client).items()} | {"shown": shown}
         out[name]["raw_uint16_bytes"] = out[name]["tiles"] * RAW_TILE
     out["whole_pyramid"] = _drain(ClientTiles(server))
     out["whole_pyramid"]["raw_uint16_bytes"] = out["whole_pyramid"]["tiles"] * RAW_TILE

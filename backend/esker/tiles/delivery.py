@@ -22,7 +22,7 @@ from esker.tiles.frame import GROUND
 from esker.tiles.ledger import Ledger
 from esker.tiles.plans import EncodedTiles, FramePlan
 from esker.tiles.pyramid import Mask, Pyramid
-from esker.tiles.quadtree import ALWAYS, default_selection, restrict, select
+from esker.tiles.quadtree import ALWAYS, default_selection, restrict, select_shown
 from esker.tiles.refined import RefinedTiles, Under
 from esker.tiles.refined_ledger import RefinedLedger
 from esker.tiles.sparse import Selection, restrict_below, select_refined
@@ -212,7 +212,7 @@ class ClientTiles:
         self._refined = RefinedLedger(tiles.refined, self._heights, tiles.cache)
         self._refined_base = RefinedLedger(tiles.refined_base, self._base, tiles.cache, Channel.BASE)
         self._view: View | None = None
-        self._wanted = default_selection(tiles.levels)
+        self._wanted = self._shown = default_selection(tiles.levels)
         self._errors: list[NDArray[np.float32]] | None = None
         self._selection = Selection.nothing(tiles.levels, tiles.refined.finest)
         self._selected = (-1, -1)
@@ -238,6 +238,11 @@ class ClientTiles:
         self.refresh()
         return self._wanted
 
+    def shown(self) -> list[Mask]:
+        """Those of them that the view shows as it is; the others are for an eye a step nearer."""
+        self.refresh()
+        return self._shown
+
     def wanted_refined(self) -> set[TileKey]:
         """The present selection above these levels."""
         self.refresh()
@@ -256,9 +261,10 @@ class ClientTiles:
 
         ``hurry``: only levels that move, over the selection of before; all else can wait.
 
-        Levels coarse to fine: a LEVEL frame where a newer put waits; then FILL frames for tiles that came into view,
-        coarse to fine and by projected error; then the other channels; then refined tiles; then, when the ground is
-        settled, everything up to ``rest_level``. The base of a tile always goes before the tile.
+        Levels coarse to fine: a LEVEL frame where a newer put waits; then FILL frames for tiles that the view shows,
+        coarse to fine and by projected error; then the other channels; then tiles that a step nearer will show; then
+        refined tiles; then, when the ground is settled, everything up to ``rest_level``. The base of a tile always
+        goes before the tile.
         """
         stamp = self._server.stamp
         if self._idle_stamp == stamp and not self._view_changed:
@@ -267,7 +273,8 @@ class ClientTiles:
         plan = None if self._view_changed else self._plan_levels()
         if plan is None and not hurry:
             self.refresh()
-            plan = self._plan_levels() or self._plan_fills() or self._plan_channels()
+            plan = self._plan_levels() or self._plan_fills(self._shown)
+            plan = plan or self._plan_channels() or self._plan_fills(self._wanted)
         if plan is not None or hurry:
             return plan
         if self._server.refined.active:
@@ -288,8 +295,8 @@ class ClientTiles:
                 return plan
         return None
 
-    def _plan_fills(self) -> FramePlan | None:
-        for level, wanted in enumerate(self._wanted):
+    def _plan_fills(self, masks: list[Mask]) -> FramePlan | None:
+        for level, wanted in enumerate(masks):
             plan = self._plan_fill(level, wanted, None if self._errors is None else self._errors[level])
             if plan is not None:
                 return plan
@@ -373,7 +380,7 @@ class ClientTiles:
 
     def _select(self, view: View) -> None:
         server = self._server
-        self._wanted, self._errors = select(server.surface.bounds(), view)
+        self._wanted, self._shown, self._errors = select_shown(server.surface.bounds(), view)
         if server.refined.finest == server.levels or server.pyramid.level(server.levels) is None:
             self._selection = Selection.nothing(server.levels, server.refined.finest)
             return

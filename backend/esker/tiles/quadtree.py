@@ -11,7 +11,7 @@ one level.
 from __future__ import annotations
 
 import math
-from typing import Final, Protocol
+from typing import Final, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ from esker.tiles.bounds import Bounds, Floats, dilate
 
 Mask = NDArray[np.bool_]
 Vector = NDArray[np.float64]
+T = TypeVar("T", bound=np.generic)
 
 ALWAYS: Final = 2
 """Levels 0..2 are always wanted, whatever the view: they are small, and shading and picking lean on them."""
@@ -120,14 +121,26 @@ def restrict(masks: list[Mask]) -> list[Mask]:
 
 def select(bounds: Bounds, view: View) -> tuple[list[Mask], list[Floats]]:
     """Wanted tiles and their projected errors (pixels), one (2^l, 2^l) array per level, rows from the south."""
-    inside, error, cell = screen_error(bounds, view)
-    tau = MARGIN * view.tau_px
+    found = screen_error(bounds, view)
+    return _chosen(bounds, *found, MARGIN * view.tau_px), _by_level(bounds, found[1])
+
+
+def select_shown(bounds: Bounds, view: View) -> tuple[list[Mask], list[Mask], list[Floats]]:
+    """``select``, and between the two those of the wanted tiles that the view shows as it is: without MARGIN."""
+    found = screen_error(bounds, view)
+    wanted, shown = (_chosen(bounds, *found, margin * view.tau_px) for margin in (MARGIN, 1.0))
+    return wanted, shown, _by_level(bounds, found[1])
+
+
+def _chosen(bounds: Bounds, inside: Mask, error: Floats, cell: Floats, tau: float) -> list[Mask]:
+    """Restricted masks of the tiles that are worth sending at ``tau`` pixels; the others: see ``screen_error``."""
     bends = (bounds.error > SHADING_ERROR * 2 * bounds.spacing) & (cell > SHADING_CELL_PX * tau)
     wanted = inside & (cell > tau) & ((error > tau) | bends)
     wanted[: (4 ** (ALWAYS + 1) - 1) // 3] = True
-    masks, errors = [], []
-    for level, start in enumerate(bounds.starts):
-        n = 1 << level
-        masks.append(wanted[start : start + n * n].reshape(n, n))
-        errors.append(error[start : start + n * n].reshape(n, n))
-    return restrict(masks), errors
+    return restrict(_by_level(bounds, wanted))
+
+
+def _by_level(bounds: Bounds, flat: NDArray[T]) -> list[NDArray[T]]:
+    """An array over all tiles as one (2^l, 2^l) array per level."""
+    sides = (1 << level for level in range(len(bounds.starts)))
+    return [flat[start : start + n * n].reshape(n, n) for start, n in zip(bounds.starts, sides, strict=True)]
