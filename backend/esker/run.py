@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import logging
 import signal
 import socket
@@ -16,6 +17,7 @@ from typing import Any, Final
 import segno
 import uvicorn
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
+from websockets.protocol import State
 
 from esker import contract as c
 from esker.document.ops import Limits
@@ -48,12 +50,19 @@ GOODBYE_SECONDS: Final = 0.3
 """Time for the farewells to leave before the sockets are closed."""
 HARD_MESSAGE_LIMIT: Final = 4 * c.MAX_MESSAGE_BYTES
 """Above ``MAX_MESSAGE_BYTES`` a client gets a sentence (4007); above this the websocket library hangs up (1009)."""
+READ_AHEAD: Final = 8
+"""Messages of one client that may wait to be understood before no more are read."""
 SEND_BUFFER: Final = 256 * 1024
 """The kernel would queue megabytes for a client that does not read, and show it old tiles when it does."""
 
 
 SWITCH_SECONDS: Final = 0.0005
 """An append passes four threads on its way to the screen; at each Python would let the other go on for 5 ms first."""
+
+
+GARBAGE_OBJECTS: Final = 10_000
+"""Objects made before the collector looks at them. It never looks at what is there at the start, modules and compiled
+code, which made all threads wait for 100 ms now and then."""
 
 
 class CannotServe(Exception):
@@ -71,11 +80,29 @@ class _Tiles:
 
 
 class _WebSocketProtocol(WebSocketsSansIOProtocol):
-    """Lets the application drop a connection whose peer does not read."""
+    """Lets the application drop a connection whose peer does not read, and write a frame made once for many."""
 
     async def run_asgi(self) -> None:
         self.scope["esker.abort"] = self.transport.abort  # type: ignore[typeddict-unknown-key]
+        self.scope["esker.write"] = self.write_frame  # type: ignore[typeddict-unknown-key]
         await super().run_asgi()
+
+    async def write_frame(self, frame: bytes) -> None:
+        """Writes a whole frame when there is room. Raises ConnectionResetError when the peer is gone."""
+        await self.writable.wait()
+        if self.disconnected or self.close_sent or self.conn.state is not State.OPEN:
+            raise ConnectionResetError("the peer is gone")
+        self.transport.write(frame)
+
+    def send_receive_event_to_app(self) -> None:
+        """Stops reading when ``READ_AHEAD`` messages wait; at every single one, as it is inherited, takes two calls of
+        the system for each."""
+        paused, self.read_paused = self.read_paused, True
+        super().send_receive_event_to_app()
+        self.read_paused = paused
+        if not paused and self.queue.qsize() >= READ_AHEAD:
+            self.read_paused = True
+            self.transport.pause_reading()
 
 
 class _Server(uvicorn.Server):
@@ -180,6 +207,9 @@ class Assembly:
     def run(self, server: _Server) -> None:
         """Serves until the server is told to stop."""
         sys.setswitchinterval(SWITCH_SECONDS)
+        gc.collect()
+        gc.freeze()
+        gc.set_threshold(GARBAGE_OBJECTS)
         if self._backups is not None:
             self._backups.start()
         if threading.current_thread() is threading.main_thread():

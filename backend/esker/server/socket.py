@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import suppress
-from typing import Any
+from functools import lru_cache
+from typing import Any, Final
 from urllib.parse import urlsplit
 
 from fastapi import FastAPI, WebSocket
 from starlette.websockets import WebSocketDisconnect
+from websockets.frames import Frame, Opcode
 
 from esker import contract as c
 from esker.server.answers import address
@@ -19,15 +21,32 @@ from esker.session.socket import Session
 log = logging.getLogger("esker.server")
 
 
+SHARED_TEXTS: Final = 16
+SHARED_CHARACTERS: Final = 1 << 18
+"""Frames of so many of the last texts are kept, up to this length: what everybody in a room is told is framed once."""
+
+
+def _frame(text: str) -> bytes:
+    """A text as a frame of the websocket, as a server sends it: whole and without a mask (RFC 6455, 5.2)."""
+    return Frame(Opcode.TEXT, text.encode()).serialize(mask=False)
+
+
+_framed = lru_cache(SHARED_TEXTS)(_frame)
+
+
 class _Transport:
     """``session.socket.Transport`` over Starlette's websocket."""
 
     def __init__(self, socket: WebSocket) -> None:
         self._socket = socket
+        self._write: Callable[[bytes], Awaitable[None]] | None = socket.scope.get("esker.write")
         self._abort: Callable[[], None] | None = socket.scope.get("esker.abort")
 
     async def send_text(self, text: str) -> None:
-        await self._send({"type": "websocket.send", "text": text})
+        if self._write is None:
+            await self._send({"type": "websocket.send", "text": text})
+            return
+        await self._write(_framed(text) if len(text) <= SHARED_CHARACTERS else _frame(text))
 
     async def send_bytes(self, data: bytes) -> None:
         await self._send({"type": "websocket.send", "bytes": data})
