@@ -17,13 +17,22 @@ fn lake_sample(i: vec2i) -> vec2f {
   return textureLoad(lake_map, i, 0).xy;
 }
 
+// Lower ground that is not the lake's: beyond its brim.
+fn beyond(s: vec2f, lake: f32) -> bool {
+  return s.y < lake && s.x < lake;
+}
+
 // Metres above the lake beside a place, FAR_ABOVE where none is near.
 fn above_lake(p: vec3f) -> f32 {
   if (view.has_lakes < 0.5) { return FAR_ABOVE; }
   let i = lake_cell(lake_lattice(p.xy));
-  let south = max(lake_sample(i).y, lake_sample(i + vec2i(1, 0)).y);
-  let north = max(lake_sample(i + vec2i(0, 1)).y, lake_sample(i + vec2i(1, 1)).y);
-  return min(p.z - max(south, north), FAR_ABOVE);
+  let a = lake_sample(i);
+  let b = lake_sample(i + vec2i(1, 0));
+  let c = lake_sample(i + vec2i(0, 1));
+  let d = lake_sample(i + vec2i(1, 1));
+  let lake = max(max(a.y, b.y), max(c.y, d.y));
+  if (beyond(a, lake) || beyond(b, lake) || beyond(c, lake) || beyond(d, lake)) { return FAR_ABOVE; }
+  return min(p.z - lake, FAR_ABOVE);
 }
 
 // Ground at a place, metres.
@@ -36,18 +45,28 @@ fn lake_ground(p: vec2f) -> f32 {
   return mix(south, north, f.y);
 }
 
-// Of one sample: how far it lies inside a lake or above it, metres; below zero on lower ground that is not the lake's.
-fn lake_side(i: vec2i, lake: f32) -> f32 {
-  let s = lake_sample(i);
-  return select(s.x - lake, lake - s.x, s.y == lake && s.x < lake);
+fn covers(s: vec2f, lake: f32) -> bool {
+  return s.y == lake && s.x < lake;
 }
 
-// The same between the samples: a lake ends where the ground outside its basin falls below it.
+// Of one sample: how far it lies inside a lake or above it, metres; below zero on lower ground that is not the lake's.
+fn lake_side(s: vec2f, lake: f32) -> f32 {
+  return select(s.x - lake, lake - s.x, covers(s, lake));
+}
+
+// The same between the samples: a lake ends where the ground outside its basin falls below it. Where it covers none of the
+// four samples around, all four must be its shore: beyond the brim finer ground may dip below it.
 fn inside_lake(p: vec2f, lake: f32) -> f32 {
   let at = lake_lattice(p);
   let i = lake_cell(at);
   let f = at - vec2f(i);
-  let south = mix(lake_side(i, lake), lake_side(i + vec2i(1, 0), lake), f.x);
-  let north = mix(lake_side(i + vec2i(0, 1), lake), lake_side(i + vec2i(1, 1), lake), f.x);
+  let a = lake_sample(i);
+  let b = lake_sample(i + vec2i(1, 0));
+  let c = lake_sample(i + vec2i(0, 1));
+  let d = lake_sample(i + vec2i(1, 1));
+  let shore = a.y == lake && b.y == lake && c.y == lake && d.y == lake;
+  if (!shore && !(covers(a, lake) || covers(b, lake) || covers(c, lake) || covers(d, lake))) { return -1.0; }
+  let south = mix(lake_side(a, lake), lake_side(b, lake), f.x);
+  let north = mix(lake_side(c, lake), lake_side(d, lake), f.x);
   return mix(south, north, f.y);
 }

@@ -220,6 +220,10 @@ export function lakeOver({ side, heights, levels }: Lakes, u: number, v: number)
     const z = heights[k]!;
     return levels[k] === lake && z < lake ? lake - z : z - lake;
   };
+  const under = (k: number): boolean => levels[k] === lake && heights[k]! < lake;
+  const shore = (k: number): boolean => levels[k] === lake;
+  const around = [at, at + 1, at + side, at + side + 1];
+  if (!around.every(shore) && !around.some(under)) return NO_LAKE;
   const [s, t] = [x - i, y - j];
   const south = inside(at) * (1 - s) + inside(at + 1) * s;
   const north = inside(at + side) * (1 - s) + inside(at + side + 1) * s;

@@ -49,6 +49,13 @@ function world(name: string, levels: number): TileView {
       flat: () => 0,
       smooth: (x: number, y: number) => smooth(x, y, 0),
       rough: (x: number, y: number) => rough(x, y, 0),
+      /** A cone with a crater of 90 m that has a low brim in the south. */
+      crater: (x: number, y: number) => {
+        const [east, north] = [x - 2048, y - 2048];
+        const d = Math.hypot(east, north);
+        const brim = 500 + 0.05 * north;
+        return 0.12 * rough(x, y, 0) + (d > 420 ? Math.max(brim - 0.45 * (d - 420), 0) : brim - 0.34 * (420 - d));
+      },
       island: (x: number, y: number) => {
         const d = Math.hypot(x - 2048, y - 2048) / 2048;
         return rough(x, y, 0) * Math.max(0, 1 - d * d) - 60 * d * d + 12;
