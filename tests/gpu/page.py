@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import atexit
+import contextlib
+import functools
 import os
 import signal
 import subprocess
@@ -16,8 +19,9 @@ from tests.browser import FLAGS, chromium_path, free_port
 FRONTEND = Path(__file__).resolve().parents[2] / "frontend"
 
 
-@contextmanager
-def _vite() -> Iterator[str]:
+@functools.cache
+def _vite() -> str:
+    """Address of the server of the sources. It is started once for all modules and ends with this process."""
     port = free_port()
     vite = FRONTEND / "node_modules" / "vite" / "bin" / "vite.js"
     # No file watching: an edit during the run must not reload the page.
@@ -31,19 +35,21 @@ def _vite() -> Iterator[str]:
         text=True,
         start_new_session=True,
     )
+    atexit.register(_end, process)
     assert process.stdout is not None
-    try:
-        seen = ""
-        for line in process.stdout:
-            seen += line
-            if "Local" in line:
-                break
-        else:
-            raise RuntimeError(f"vite did not start:\n{seen}")
-        yield f"http://127.0.0.1:{port}"
-    finally:
+    seen = ""
+    for line in process.stdout:
+        seen += line
+        if "Local" in line:
+            return f"http://127.0.0.1:{port}"
+    raise RuntimeError(f"vite did not start:\n{seen}")
+
+
+def _end(process: subprocess.Popen[str]) -> None:
+    with contextlib.suppress(ProcessLookupError):  # it has ended by itself
         os.killpg(process.pid, signal.SIGTERM)
-        process.wait(20)
+    process.wait(20)
+    if process.stdout is not None:
         process.stdout.close()
 
 
@@ -51,13 +57,13 @@ def _vite() -> Iterator[str]:
 def open_harness(name: str = "renderer") -> Iterator[Page]:
     """A page of frontend/dev, ready. Console errors fail the caller at the end."""
     problems: list[str] = []
-    with _vite() as url, sync_playwright() as playwright:
+    with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium_path(), args=FLAGS)
         try:
             page = browser.new_page(viewport={"width": 800, "height": 600})
             page.on("pageerror", lambda error: problems.append(str(error)))
             page.on("console", lambda m: problems.append(m.text) if m.type == "error" else None)
-            page.goto(f"{url}/dev/{name}.html")
+            page.goto(f"{_vite()}/dev/{name}.html")
             page.wait_for_function("globalThis.esker !== undefined || globalThis.bench !== undefined", timeout=60_000)
             yield page
         finally:

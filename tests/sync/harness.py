@@ -24,6 +24,9 @@ from esker import grid
 from esker.run import Assembly
 from esker.settings import Settings
 
+PATIENCE = 30.0
+"""Seconds to wait for what must come, on a machine that has other things to do."""
+
 
 @dataclass(frozen=True)
 class Level:
@@ -156,7 +159,7 @@ class Peer:
     def ops(self, *ops: tuple[str, dict[str, Any]]) -> None:
         self.say("ops", ops=[{"id": op_id, "op": op} for op_id, op in ops])
 
-    def next(self, timeout: float = 10) -> dict[str, Any]:
+    def next(self, timeout: float = PATIENCE) -> dict[str, Any]:
         """The next control message; frames are kept aside."""
         deadline = time.monotonic() + timeout
         while True:
@@ -168,7 +171,7 @@ class Peer:
             self.seen.append(found)
             return found
 
-    def wait(self, *kinds: str, timeout: float = 10) -> dict[str, Any]:
+    def wait(self, *kinds: str, timeout: float = PATIENCE) -> dict[str, Any]:
         """The next control message of one of these kinds."""
         deadline = time.monotonic() + timeout
         while time.monotonic() < deadline:
@@ -177,7 +180,7 @@ class Peer:
                 return found
         raise TimeoutError(kinds)
 
-    def settled(self, clock: int, timeout: float = 10) -> None:
+    def settled(self, clock: int, timeout: float = PATIENCE) -> None:
         """Waits until the server says that the ground is final for ``clock``."""
         deadline = time.monotonic() + timeout
         while True:
@@ -185,7 +188,7 @@ class Peer:
             if found["settled"] and found["clock"] >= clock:
                 return
 
-    def closed(self, timeout: float = 10) -> tuple[int, dict[str, Any] | None]:
+    def closed(self, timeout: float = PATIENCE) -> tuple[int, dict[str, Any] | None]:
         """Reads until the server closes: the close code, and the last error message."""
         from websockets.exceptions import ConnectionClosed
 
