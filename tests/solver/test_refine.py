@@ -325,3 +325,22 @@ def test_the_sweeps_damp_what_they_promise() -> None:
             growth = max(growth, float(np.abs(product).max()))
         assert np.abs(product).max() < 0.02
         assert growth < 200
+
+
+def test_steps_under_way_of_two_refiners_do_not_mix(engine: ClEngine, basis: Basis, solver: Solver) -> None:
+    """SPEC S51, S53: rooms share an engine; what one has begun the other may push out, or nobody ever fetch."""
+    other = settled(solver, SCENES["cross"], SETTINGS, LOW)
+    keys = patch(LOW + 2, 0, 0, 8)
+    expected = [bits(made(Refiner(start, engine, FieldCache()), keys)) for start in (basis, other)]
+    refiners = [Refiner(start, engine, FieldCache()) for start in (basis, other)]
+    runs = [refiner.tiles(keys) for refiner in refiners]
+    found: list[dict[TileKey, RefinedTile]] = [{}, {}]
+    lost = Refiner(basis, engine, FieldCache()).tiles(keys[::-1])
+    for n in range(400):
+        if n == 3:
+            next(lost)
+            del lost
+        item = next(runs[n % 2], None)
+        if item is not None:
+            found[n % 2][item.key] = item
+    assert [bits(tiles) for tiles in found] == expected

@@ -99,10 +99,10 @@ class _Room:
 
     def make_free(self) -> None:
         """Has the step that is still here read, if anybody wants it."""
-        flight = None if self._flight is None else self._flight()
+        here, self._flight = self._flight, None
+        flight = None if here is None else here()
         if flight is not None:
             flight.fields()
-        self._flight = None
 
     def _reserve(self, stride: int, based: bool) -> None:
         """Memory for windows of ``stride`` floats a channel, over a base if ``based``."""
