@@ -56,7 +56,7 @@ SEND_BUFFER: Final = 256 * 1024
 """The kernel would queue megabytes for a client that does not read, and show it old tiles when it does."""
 
 
-SWITCH_SECONDS: Final = 0.0005
+SWITCH_SECONDS: Final = 0.0002
 """An append passes four threads on its way to the screen; at each Python would let the other go on for 5 ms first."""
 
 

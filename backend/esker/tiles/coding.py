@@ -17,13 +17,9 @@ from numpy.typing import NDArray
 from esker.contract import TILE_MAX_SHIFT, TILE_SAMPLES, Filter, Predictor
 from esker.tiles import entropy
 from esker.tiles.codec import Ints, Wide
-from esker.tiles.entropy import Bytes, Longs
-from esker.tiles.loops import _compiled
 
 PREDICTORS: Final = (Predictor.PARENT, Predictor.HELD, Predictor.PREVIOUS)
 LOGS: Final = np.log2(np.arange(1, 1025, dtype=np.float32))
-MOST: Final = 1 << 31
-"""A residual that is larger is not coded."""
 IN_TWO: Final = 4
 """Tiles from which on a second thread is worth being woken."""
 _local = threading.local()
@@ -41,65 +37,6 @@ class Coded(NamedTuple):
     payload: bytes
 
 
-@_compiled
-def _cost(residual: Longs, logs: NDArray[np.float32]) -> float:
-    """``codec.cost``; infinite where a number is too large to be coded."""
-    total = 0.0
-    for r in range(residual.shape[0]):
-        for k in range(residual.shape[1]):
-            size = abs(residual[r, k])
-            if size >= MOST:
-                return np.inf
-            total += logs[size] if size < logs.size else np.log2(np.float32(size + 1))
-    return total
-
-
-@_compiled
-def _coded(
-    now: Longs,
-    own: Longs,
-    before: Longs,
-    then: Longs,
-    known: int,
-    logs: NDArray[np.float32],
-    weights: Longs,
-    rates: Longs,
-    plain: Bytes,
-    lattice: Bytes,
-) -> tuple[int, int, int, int]:
-    """Which predictor, its shift, and the bytes written of ``plain`` and ``lattice``; predictor -1: none will do.
-
-    ``own``, ``then``: the parent's prediction, now and as it was for ``before``; ``known``: how many of ``before`` and
-    ``then`` there are.
-    """
-    best, least, chosen = now - own, np.inf, -1
-    for option in range(1 + known):
-        if option == 0:
-            residual = now - own
-        elif option == 1:
-            residual = now - before
-        else:
-            residual = now - before - (own - then)
-        cost = _cost(residual, logs)
-        if cost < least:
-            best, least, chosen = residual, cost, option
-    bits = np.int64(0)
-    for value in best.flat:
-        bits |= value
-    if chosen < 0 or bits == 0:
-        return chosen, 0, 0, 0
-    shift = 0
-    while shift < TILE_MAX_SHIFT and not (bits >> shift) & 1:
-        shift += 1
-    best = best >> shift
-    return (
-        chosen,
-        shift,
-        entropy._encode(best, False, weights, rates, plain),
-        entropy._encode(best, True, weights, rates, lattice),
-    )
-
-
 def code(now: Ints, own: Wide, before: Ints | None, then: Wide | None) -> Coded | None:
     """A tile, (65, 65) in quanta, that has a parent; None where no predictor leaves numbers that can be coded.
 
@@ -111,8 +48,9 @@ def code(now: Ints, own: Wide, before: Ints | None, then: Wide | None) -> Coded 
     moved = samples if before is None or then is None else then.astype(np.int64)
     known = 0 if before is None else 1 if then is None else 2
     plain, lattice = _room()
-    option, shift, size, small = _coded(
-        samples, own.astype(np.int64), had, moved, known, LOGS, entropy.WEIGHTS, entropy.RATES, plain, lattice
+    tables = LOGS, entropy.WEIGHTS, entropy.RATES
+    option, shift, size, small = entropy.encode_cheapest(
+        samples, own.astype(np.int64), had, moved, known, TILE_MAX_SHIFT, *tables, plain, lattice
     )
     if option < 0:
         return None

@@ -231,6 +231,69 @@ def _decode(data: Bytes, lattice: bool, weights: Longs, rates: Longs, known: Lon
     return int(state[2])
 
 
+@_compiled
+def _cost(residual: Longs, logs: NDArray[np.float32]) -> float:
+    """``codec.cost``; infinite where a number is too large to be coded."""
+    total = 0.0
+    for r in range(residual.shape[0]):
+        for k in range(residual.shape[1]):
+            size = abs(residual[r, k])
+            if size >= LIMIT >> 1:
+                return np.inf
+            total += logs[size] if size < logs.size else np.log2(np.float32(size + 1))
+    return total
+
+
+@_compiled
+def encode_cheapest(
+    now: Longs,
+    own: Longs,
+    before: Longs,
+    then: Longs,
+    known: int,
+    most_shift: int,
+    logs: NDArray[np.float32],
+    weights: Longs,
+    rates: Longs,
+    plain: Bytes,
+    lattice: Bytes,
+) -> tuple[int, int, int, int]:
+    """Which predictor, its shift, and the bytes written of ``plain`` and ``lattice``; predictor -1: none will do.
+
+    It is here, and not where it is called (``coding.code``), since what is kept of compiled code is made anew when the
+    text of its own file changes, not that of others.
+
+    ``own``, ``then``: the parent's prediction, now and as it was for ``before``; ``known``: how many of ``before`` and
+    ``then`` there are.
+    """
+    best, least, chosen = now - own, np.inf, -1
+    for option in range(1 + known):
+        if option == 0:
+            residual = now - own
+        elif option == 1:
+            residual = now - before
+        else:
+            residual = now - before - (own - then)
+        cost = _cost(residual, logs)
+        if cost < least:
+            best, least, chosen = residual, cost, option
+    bits = np.int64(0)
+    for value in best.flat:
+        bits |= value
+    if chosen < 0 or bits == 0:
+        return chosen, 0, 0, 0
+    shift = 0
+    while shift < most_shift and not (bits >> shift) & 1:
+        shift += 1
+    best = best >> shift
+    return (
+        chosen,
+        shift,
+        _encode(best, False, weights, rates, plain),
+        _encode(best, True, weights, rates, lattice),
+    )
+
+
 def encode(residual: NDArray[np.signedinteger], lattice: bool = False) -> bytes | None:
     """Codes (65, 65) integers below 2^32; None where a number does not fit.
 
