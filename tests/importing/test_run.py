@@ -202,7 +202,7 @@ def test_place_of_a_terrain_made_from_a_file() -> None:
 
 def test_a_full_disk_is_told(files: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """SPEC G31: a reader that ends where the disk is full was not stopped by its file; nothing is left."""
-    monkeypatch.setattr(shutil, "disk_usage", lambda _path: shutil._ntuple_diskusage(1 << 30, 1 << 30, 0))  # type: ignore[attr-defined]
+    monkeypatch.setattr(shutil, "disk_usage", lambda _path: shutil._ntuple_diskusage(1 << 30, 1 << 30, 0))
     monkeypatch.setattr(sys, "executable", "/bin/false")
     with pytest.raises(run.ImportRefused, match="no room"):
         asyncio.run(run.convert(files / "little.tif", c.ImportAnswers(), PLACE, SIZE_M, tmp_path / "raster"))

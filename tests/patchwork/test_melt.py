@@ -105,6 +105,38 @@ def test_there_is_a_slope_and_no_step() -> None:
     assert correction.max() < 29
 
 
+def tilted(x: Floats, y: Floats) -> Floats:
+    """1 in 2.2."""
+    return np.asarray(300 + 0.4 * x + 0.2 * y)
+
+
+@pytest.mark.parametrize("raised", [0.0, 20.0], ids=["the same", "higher"])
+def test_no_crease_where_the_border_slopes(raised: float) -> None:
+    """SPEC PW62: a survey goes on along its slope beyond its edge and around nodata in it. On a tilted plane nothing of
+    its border is seen; where it melts, the slope changes by no more than that of the melt in a cell."""
+
+    def holed(x: Floats, y: Floats) -> Floats:
+        return np.where(np.hypot(x - 560, y - 520) < 60, np.nan, tilted(x, y) + raised)
+
+    model = lod_space.build([wide(tilted), newer(holed)])
+    for level in (3, LEVEL):
+        x, y = np.meshgrid(*[np.arange(grid.samples(level)) * grid.spacing(level, SIZE)] * 2)
+        bent = Base(model, SIZE).level(level) - tilted(x, y)
+        turns = max(np.abs(np.diff(bent, 2, axis=axis)).max() for axis in (0, 1)) / grid.spacing(level, SIZE)
+        assert turns < (0.02 if raised == 0 else 0.6)
+
+
+def test_places_beside_a_newer_survey_show_the_older_as_levels_do() -> None:
+    """SPEC PW53: all patches of the older one are stale there, the coarse ones hardly more than the fine ones."""
+    base = Unmelted(lod_space.build([wide(), newer(lambda x, y: hills(x, y) + 300)]), SIZE)
+    ring = inside(120) & ~inside(12)
+    row, col = (at[::97] for at in np.nonzero(ring))
+    at: Floats = np.stack([col, row], axis=1).astype(np.float64) * np.float64(SPACING)
+    found = base.sample(at)
+    assert np.abs(found.heights - hills(at[:, 0], at[:, 1])).max() < 0.5
+    assert np.abs(found.heights - base.level(LEVEL)[row, col]).max() < 0.05
+
+
 def test_the_reach_is_bounded() -> None:
     """SPEC PW63: five times the difference, and never more than an eighth of the domain (corners are rounder)."""
     melted, plain = Base(MODEL, SIZE).level(LEVEL), Unmelted(MODEL, SIZE).level(LEVEL)

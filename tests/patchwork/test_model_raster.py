@@ -198,14 +198,40 @@ def test_progress_tells_its_stages() -> None:
     assert all(0 <= share <= 1 for _, share in seen)
 
 
-def test_samples_beside_nodata_are_the_mean_of_valid_ones() -> None:
-    """SPEC PW4: ring by ring outwards; beyond the grid its border goes on."""
-    heights = grid(60, 64).astype(np.float32)
+def cut_of(heights: Floats, row: int, col: int, side: int) -> Floats:
+    block = np.empty((side, side), np.float32)
+    cut(heights.astype(np.float32), row, col, block)
+    return block.astype(float)
+
+
+def test_samples_beyond_the_grid_and_in_nodata_are_those_of_the_twin() -> None:
+    """SPEC PW4: at every border and corner, with far more patch than grid, beside nodata, in thin strips."""
+    heights = grid(60, 64)
     heights[20:, 41:] = np.nan
-    for row, col in ((-2, -2), (12, 15), (18, 36), (40, 38)):
-        block = np.empty((18, 18), np.float32)
-        cut(heights, row, col, block)
-        np.testing.assert_allclose(block, reference.patch_samples(heights.astype(float), row, col, 18), atol=1e-3)
+    heights[RNG.random(heights.shape) < 0.03] = np.nan
+    places = [(-2, -2), (12, 15), (18, 36), (40, 38), (50, -2), (56, 20), (-2, 55)]
+    for of, where in ((heights, places), (heights[:2, :9], [(-2, -2)]), (grid(5, 3), [(-2, -2), (2, 1)])):
+        for row, col in where:
+            want = reference.patch_samples(of, row, col, 18)
+            np.testing.assert_allclose(cut_of(of, row, col, 18), want, atol=1e-3)
+
+
+def test_planes_go_on_and_peaks_do_not() -> None:
+    """SPEC PW4: a plane beyond the border and around nodata is the plane; no sample that is needed leaves the heights
+    by more than their range, however rough they are."""
+    row, col = np.indices((40, 50)).astype(float)
+    plane = 300 + 7 * col - 4 * row
+    holed = plane.copy()
+    holed[12:20, 14:26] = np.nan
+    holed[5, 5] = holed[0, 30] = np.nan
+    for of, r, c in ((plane, -2, -2), (plane, 26, 38), (holed, 3, 3), (holed, 18, 12), (holed, -2, 24)):
+        v, u = np.mgrid[r : r + 18, c : c + 18]
+        near = (slice(0, 16), slice(0, 16)) if np.isnan(of).any() else (slice(None), slice(None))
+        np.testing.assert_allclose(cut_of(of, r, c, 18)[near], (300 + 7 * u - 4 * v)[near], atol=1e-2)
+    noise = np.random.default_rng(1).uniform(-1, 1, (40, 50))
+    for r, c in ((-2, -2), (-2, 36), (26, -2)):
+        inner = cut_of(noise, r, c, 18)[:16] if r < 0 else cut_of(noise, r, c, 18)[2:]
+        assert np.abs(inner).max() < 3
 
 
 @pytest.mark.parametrize("turn", [0.0, 90.0, 180.0, 270.0, -90.0, 30.0, -117.0, 360.0])

@@ -81,18 +81,25 @@ def test_a_riddled_grid_leaves_its_smallest_rectangles_out(monkeypatch: pytest.M
     assert held(heights, some).max() == 1
 
 
-def test_a_raster_written_before_there_was_a_rim_is_read(tmp_path: Path) -> None:
-    """SPEC PW5: what is missing is found from its heights; what does not fit them is refused."""
+def test_a_raster_of_an_older_format_is_read(tmp_path: Path) -> None:
+    """SPEC PW5: rims and errors are found from its heights; what does not fit them is refused."""
     rows, cols = 60, 66
     warp = bend(layer("x", rows, cols), 3.0, np.random.default_rng(5))
     raster = rasters.build(riddled(4, rows, cols, 0.05), warp)
     rasters.write(tmp_path, raster)
     head = json.loads((tmp_path / rasters.HEAD).read_text())
-    (tmp_path / rasters.HEAD).write_text(json.dumps({**head, "format": 1}))
-    (tmp_path / rasters.RIM).rename(tmp_path / "kept.npy")
-    old = rasters.read(tmp_path)
-    assert np.array_equal(old.errors.rim, raster.errors.rim)
-    assert np.array_equal(old.errors.rim_errors, raster.errors.rim_errors)
+    stale = raster.errors.tables[2] + np.float32(1)
+    np.save(tmp_path / "errors2.npy", stale)
+    assert np.array_equal(rasters.read(tmp_path).errors.tables[2], stale, equal_nan=True)
+    for older in (2, 1):
+        (tmp_path / rasters.HEAD).write_text(json.dumps({**head, "format": older}))
+        if older == 1:
+            (tmp_path / rasters.RIM).rename(tmp_path / "kept.npy")
+        old = rasters.read(tmp_path)
+        assert np.array_equal(old.errors.rim, raster.errors.rim)
+        assert np.array_equal(old.errors.rim_errors, raster.errors.rim_errors)
+        for mine, theirs in zip(raster.errors.tables, old.errors.tables, strict=True):
+            assert np.array_equal(mine, theirs, equal_nan=True)
     assert raster.errors.rim_errors.max() > 0
     (tmp_path / rasters.HEAD).write_text(json.dumps(head))
     for strange in (raster.errors.rim + np.int32(5), raster.errors.rim[1:], raster.errors.rim * np.int32(2)):

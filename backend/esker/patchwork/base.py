@@ -30,7 +30,7 @@ from esker.patchwork.query import Index
 Grid = NDArray[np.float32]
 Floats = NDArray[np.float64]
 
-_FORMAT: Final = b"esker base 2"
+_FORMAT: Final = b"esker base 3"
 _CHUNK: Final = 1024
 """Samples along one side of what is evaluated at once: bounds the memory of coefficients."""
 _KEPT_LEVELS: Final = 5
@@ -143,7 +143,8 @@ class Base:
         derivatives: bool = False,
         device: ClDevice | None = None,
     ) -> Sample:
-        """The ground at world places (n, 2) with an error up to ``tolerance`` metres (the data's own at 0).
+        """The ground at world places (n, 2) with an error up to ``tolerance`` metres (the data's own at 0), by the
+        patches that a level of four times that spacing shows.
 
         ``smooth``: bicubic patches, twice continuously differentiable; else bilinear ones, continuous. Beyond the data
         the same continuation as on levels, made smooth, clamped to the domain. Raises ValueError for points that are
@@ -157,7 +158,9 @@ class Base:
         if len(points) == 0:
             return Sample(np.zeros(0), *((np.zeros((0, 2)), np.zeros((0, 3))) if derivatives else ()))
         low, high = points.min(axis=0), points.max(axis=0)
-        chosen = self.index.uniform(tolerance, (low[0], low[1], high[0], high[1]))
+        # As on a level: beside newer ground all patches of the older are stale, and the finest are shown.
+        spacing = max(4 * tolerance, self.spacing_m / 64)
+        chosen = self.index.resolved(spacing, tolerance, (low[0], low[1], high[0], high[1]))
         packed = blend.pack(self.model, chosen, smooth, tolerance)
         jets = blend_points.evaluate(packed, points)
         self.melt.lay_jets(packed, points, jets.heights)
@@ -332,9 +335,9 @@ class Base:
             )
             heights[up, across], cover[up, across] = blend.evaluate(packed, lattice, device)
             self.melt.lay(packed, lattice, heights[up, across])
-        if self.melt.zones:  # high ground that is raised as far as low ground beside it might leave the bounds
-            low, high = np.float32(self.low), np.float32(self.high)
-            np.clip(heights, np.nextafter(low, high), np.nextafter(high, low), out=heights)
+        # Ground that goes on beyond a grid, or is raised as far as lower ground beside it, might leave the bounds.
+        low, high = np.float32(self.low), np.float32(self.high)
+        np.clip(heights, np.nextafter(low, high), np.nextafter(high, low), out=heights)
         return heights, cover
 
     def _beyond(self, points: Floats, device: ClDevice | None) -> Floats:

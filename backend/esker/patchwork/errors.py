@@ -17,7 +17,7 @@ from esker.contract import PATCH_KERNEL_CELLS
 from esker.patchwork import paging, patches, rim
 from esker.patchwork.jit import bands, kernel, spread
 from esker.patchwork.patches import Floats, PatchErrors
-from esker.patchwork.samples import cut
+from esker.patchwork.samples import beyond, cut, row_beyond
 
 Heights = NDArray[np.float32]
 Ints = NDArray[np.int64]
@@ -78,6 +78,9 @@ def _level_errors(heights: Heights, mip: Heights, level: int, parts: Ints, start
     mixed = np.empty(mip_cols + 2, np.float32)
     stretched = np.empty((mip_cols + 1) * step, np.float32)
     worst = np.empty(cols, np.float32)
+    south, north = np.empty(mip_cols + 2, np.float32), np.empty(mip_cols + 2, np.float32)
+    row_beyond(mip, True, -1, south)
+    row_beyond(mip, False, -1, north)
     share = np.empty(step, np.float32)
     for phase in range(step):
         share[phase] = (phase + 0.5) / step
@@ -86,7 +89,15 @@ def _level_errors(heights: Heights, mip: Heights, level: int, parts: Ints, start
             worst[col] = 0.0
         for row in range(parts[k, 1], parts[k, 2]):
             cell = (row + half) // step - 1
-            _mix(mip[max(cell, 0)], mip[min(cell + 1, mip_rows - 1)], share[(row + half) % step], mixed)
+            part = share[(row + half) % step]
+            low = mip[cell] if cell >= 0 else south[1:-1]
+            high = mip[cell + 1] if cell + 1 < mip_rows else north[1:-1]
+            _mix(low, high, part, mixed[1:-1])
+            for first in (True, False):
+                end = 0 if first else mip_cols + 1
+                near = beyond(low, first) if cell >= 0 else south[end]
+                far = beyond(high, first) if cell + 1 < mip_rows else north[end]
+                mixed[end] = near + (far - near) * part
             if step == 2:
                 _stretch_twice(mixed, stretched)
             elif step == 4:
@@ -104,12 +115,9 @@ def _level_errors(heights: Heights, mip: Heights, level: int, parts: Ints, start
 
 @kernel
 def _mix(low: Heights, high: Heights, part: np.float32, mixed: Heights) -> None:
-    """The row between two rows of a level, with one sample more at each end."""
-    inner = mixed[1:-1]
+    """The row between two rows of a level."""
     for k in range(low.size):
-        inner[k] = low[k] + (high[k] - low[k]) * part
-    mixed[0] = mixed[1]
-    mixed[low.size + 1] = mixed[low.size]
+        mixed[k] = low[k] + (high[k] - low[k]) * part
 
 
 @kernel

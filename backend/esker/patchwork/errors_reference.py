@@ -10,6 +10,8 @@ from esker.patchwork import patches
 
 Floats = NDArray[np.float64]
 
+AROUND = [(y, x) for y in (-1, 0, 1) for x in (-1, 0, 1) if (y, x) != (0, 0)]
+
 
 def halved(fine: Floats) -> Floats:
     """The next coarser level: the mean of the valid samples of each 2 x 2 block, NaN where there is none."""
@@ -32,18 +34,40 @@ def mipmaps(heights: Floats) -> tuple[Floats, ...]:
     return tuple(levels)
 
 
-def patch_samples(mip: Floats, row: int, col: int, side: int) -> Floats:
-    """Samples (side, side) from [row, col] on: the level's border goes on, nodata is the mean of valid neighbours."""
-    rows = np.clip(np.arange(row, row + side), 0, mip.shape[0] - 1)
-    cols = np.clip(np.arange(col, col + side), 0, mip.shape[1] - 1)
-    out = np.array(mip[np.ix_(rows, cols)], np.float64)
-    while np.isnan(out).any():
-        known = np.pad(out, 1, constant_values=np.nan)
-        for r, c in np.argwhere(np.isnan(out)):
-            near = known[r : r + 3, c : c + 3]
-            if not np.isnan(near).all():
-                out[r, c] = near[~np.isnan(near)].mean()
+def following(a: float, b: float, c: float) -> float:
+    """What comes after c, b, a: the lesser of the two slopes goes on, none where they have opposite signs."""
+    if np.isnan([a, b, c]).any():
+        return float("nan")
+    steps = np.array([a - b, b - c])
+    return float(a + (steps[np.argmin(np.abs(steps))] if steps[0] * steps[1] > 0 else 0.0))
+
+
+def _gone_on(line: Floats, before: int, after: int) -> Floats:
+    """A line with samples more at both ends, on the straight lines that begin there."""
+    out = np.pad(line, (before, after), mode="edge")
+    if len(line) >= 3:
+        south, north = (following(*end[:3]) - end[0] for end in (line, line[::-1]))
+        out[:before] += np.nan_to_num(south) * np.arange(before, 0, -1)
+        out[len(out) - after :] += np.nan_to_num(north) * np.arange(1, after + 1)
     return out
+
+
+def patch_samples(mip: Floats, row: int, col: int, side: int) -> Floats:
+    """Samples (side, side) from [row, col] on: the level's slope goes on beyond its border, rows first; then nodata."""
+    row, col, side = row - 3, col - 3, side + 6  # what lies around the patch has a say in its holes
+    around = [max(0, -row), max(0, row + side - mip.shape[0]), max(0, -col), max(0, col + side - mip.shape[1])]
+    wide = np.array([_gone_on(line, *around[2:]) for line in np.asarray(mip, np.float64)])
+    wide = np.array([_gone_on(line, *around[:2]) for line in wide.T]).T
+    out = wide[max(0, row) :, max(0, col) :][:side, :side].copy()
+    while np.isnan(out[3:-3, 3:-3]).any():
+        known = np.pad(out, 3, constant_values=np.nan)
+        for r, c in np.argwhere(np.isnan(out)):
+            near = [[known[r + 3 + k * y, c + 3 + k * x] for k in (1, 2, 3)] for y, x in AROUND]
+            sloping = [value for value in (following(*line) for line in near) if not np.isnan(value)]
+            flat = [line[0] for line in near if not np.isnan(line[0])]
+            if flat:
+                out[r, c] = np.mean(sloping or flat)
+    return out[3:-3, 3:-3]
 
 
 def bilinear(samples: Floats, u: Floats, v: Floats) -> Floats:

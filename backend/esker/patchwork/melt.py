@@ -64,6 +64,7 @@ class Zone(NamedTuple):
     corner: tuple[tuple[int, int, int, int], ...]
     blocks: tuple[NDArray[np.int32], ...]
     nodes: tuple[NDArray[np.float32], ...]
+    dense: tuple[NDArray[np.bool_], ...]
 
 
 class Differences(NamedTuple):
@@ -283,8 +284,8 @@ def _add_products(share: Floats, lifted: Floats, places: NDArray[np.int64], out:
 
 def _spread_out(
     points: Floats, weight: Floats, difference: Floats, pitch: float
-) -> tuple[tuple[int, int, int, int], NDArray[np.int32], NDArray[np.float32]]:
-    """One level of nodes: corner, chart of blocks and blocks, see ``melt_loops.Tables``."""
+) -> tuple[tuple[int, int, int, int], NDArray[np.int32], NDArray[np.float32], NDArray[np.bool_]]:
+    """One level of nodes: corner, chart of blocks, blocks and their dense cells, see ``melt_loops.Tables``."""
     base = np.floor(points / pitch).astype(np.int64) - 1
     low, high = (base.min(axis=0) - 3) // BLOCK, (base.max(axis=0) + 3) // BLOCK + 1
     wide, tall = (high - low).tolist()
@@ -293,7 +294,10 @@ def _spread_out(
     count = melt_loops.mark(points, pitch, np.array(corner), chart)
     nodes = np.zeros((count, BLOCK + 3, BLOCK + 3, 2))
     melt_loops.scatter(points, weight, difference, pitch, np.array(corner), chart, nodes)
-    return corner, chart, nodes.astype(np.float32)
+    kept = nodes.astype(np.float32)
+    dense = np.empty((count, BLOCK, BLOCK), dtype=np.bool_)
+    melt_loops.dense_cells(kept, dense)
+    return corner, chart, kept, dense
 
 
 def _first_reach(hot: Floats, pitch: list[float]) -> tuple[float, tuple[int, int, int, int]]:
@@ -308,12 +312,13 @@ def _first_reach(hot: Floats, pitch: list[float]) -> tuple[float, tuple[int, int
 def _flat(zones: dict[int, Zone]) -> Tables:
     """The zones of all places, laid one behind the other in an order of their own, so that sums have one order, too."""
     ordered = sorted(zones.items(), key=lambda item: item[1].digest)
-    all_blocks, all_nodes, charts, done, at = [], [], [], 0, 0
+    all_blocks, all_nodes, all_dense, charts, done, at = [], [], [], [], 0, 0
     for _, zone in ordered:
-        for blocks, nodes in zip(zone.blocks, zone.nodes, strict=True):
+        for blocks, nodes, dense in zip(zone.blocks, zone.nodes, zone.dense, strict=True):
             charts.append(at)
             all_blocks.append(np.where(blocks < 0, -1, blocks + done).astype(np.int32))
             all_nodes.append(nodes)
+            all_dense.append(dense)
             at, done = at + len(blocks), done + len(nodes)
     begins = np.cumsum([0, *(len(zone.held) for _, zone in ordered)]).tolist()
     return Tables(
@@ -331,6 +336,7 @@ def _flat(zones: dict[int, Zone]) -> Tables:
         np.array(charts, dtype=np.int64),
         np.concatenate([np.zeros(0, np.int32), *all_blocks]),
         np.concatenate([np.zeros((0, BLOCK + 3, BLOCK + 3, 2), np.float32), *all_nodes]),
+        np.concatenate([np.zeros((0, BLOCK, BLOCK), np.bool_), *all_dense]),
     )
 
 

@@ -53,7 +53,8 @@ class Tables(NamedTuple):
     row by row: whether anything may be corrected in the cell; ``ladder`` int64 (z + 1,) where its levels begin. Per
     level: ``pitch`` metres; ``corner`` int64 (levels, 4) first block column and row, columns, rows; ``chart`` int64
     where its part of ``blocks`` begins: the block at each place, row by row, -1 for none. ``nodes`` float32 (blocks,
-    19, 19, 2): density of the border, and of the border times difference.
+    19, 19, 2): density of the border, and of the border times difference; ``dense`` (blocks, 16, 16) whether the level
+    may be believed in a cell at all.
     """
 
     above: NDArray[np.int32]
@@ -68,6 +69,20 @@ class Tables(NamedTuple):
     chart: NDArray[np.int64]
     blocks: NDArray[np.int32]
     nodes: NDArray[np.float32]
+    dense: NDArray[np.bool_]
+
+
+@kernel
+def dense_cells(nodes: NDArray[np.float32], dense: NDArray[np.bool_]) -> None:
+    """Cells in which the density may be more than LEAST: a spline leaves the range of its nodes nowhere."""
+    for k in range(len(nodes)):
+        for row in range(BLOCK):
+            for col in range(BLOCK):
+                most = np.float32(0)
+                for m in range(4):
+                    for n in range(4):
+                        most = max(most, nodes[k, row + m, col + n, 0])
+                dense[k, row, col] = most > LEAST * (1 - 1e-6)
 
 
 @kernel
@@ -151,7 +166,7 @@ def mean_and_square(t: Tables, z: int, x: float, y: float) -> tuple[float, float
     left, difference, square = 1.0, 0.0, 0.0
     for level in range(t.ladder[z], t.ladder[z + 1]):
         k, row, col, f, g = _block(t, level, x, y)
-        if k < 0:
+        if k < 0 or not t.dense[k, row, col]:
             continue
         a, b = _values(f), _values(g)
         density, moment = 0.0, 0.0
@@ -215,7 +230,7 @@ def lift_jet(t: Tables, z: int, x: float, y: float) -> Jet:
     left, difference, square = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0), zero, zero
     for level in range(t.ladder[z], t.ladder[z + 1]):
         k, row, col, f, g = _block(t, level, x, y)
-        if k < 0:
+        if k < 0 or not t.dense[k, row, col]:
             continue
         density, moment = _node_jets(t, k, row, col, f, g, 1 / t.pitch[level])
         if density[0] <= LEAST:

@@ -57,10 +57,10 @@ class Boxes(NamedTuple):
 
 def boxes(model: Model, known: Boxes | None = None, same: tuple[Ints, Ints] | None = None) -> Boxes:
     """Boxes of a model; ``known`` those of another, whose patches ``same[1]`` are patches ``same[0]`` of this one."""
-    corners = np.empty((model.count, 4, 2))
+    corners, box = np.empty((model.count, 4, 2)), np.empty((model.count, 4))
     fresh = np.ones(model.count, dtype=bool)
     if known is not None and same is not None:
-        corners[same[0]] = known.corners[same[1]]
+        corners[same[0]], box[same[0]] = known.corners[same[1]], known.box[same[1]]
         fresh[same[0]] = False
     index = np.flatnonzero(fresh)
     to, extent = model.to_patch[index], model.extent[index]
@@ -68,8 +68,8 @@ def boxes(model: Model, known: Boxes | None = None, same: tuple[Ints, Ints] | No
     at = at - to[:, None, :, 2]
     det = to[:, 0, 0] * to[:, 1, 1] - to[:, 0, 1] * to[:, 1, 0]
     inverse = np.stack([to[:, 1, 1], -to[:, 0, 1], -to[:, 1, 0], to[:, 0, 0]], 1).reshape(-1, 2, 2) / det[:, None, None]
-    corners[index] = np.einsum("nij,nkj->nki", inverse, at)
-    box = np.concatenate([corners.min(axis=1), corners.max(axis=1)], axis=1)
+    made = np.einsum("nij,nkj->nki", inverse, at)
+    corners[index], box[index] = made, np.concatenate([made.min(axis=1), made.max(axis=1)], axis=1)
     return Boxes(model.low, model.max_z, corners, box, model.kernel)
 
 

@@ -191,8 +191,8 @@ class Index:
         if rect is not None:
             out = np.empty(self.model.count, dtype=np.int32)
             return out[: pyramid_index.uniform(self.tree, self.boxes, e, *rect, out)].copy()
-        accurate = int(np.searchsorted(self._low, e, side="right"))
-        needed = int(np.searchsorted(self._top, -e, side="left"))
+        accurate = int(self._low.searchsorted(e, "right"))
+        needed = int(self._top.searchsorted(-e))
         if accurate == 0 or self._least_top[accurate - 1] > e:  # all that are accurate enough are needed, too
             return self._by_low[:accurate].copy()
         if accurate <= needed:

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from esker import contract
-from esker.patchwork import errors, mipmaps, patches, rim
+from esker.patchwork import errors, mipmaps, patches
 from esker.patchwork.outline import bent_edge
 from esker.patchwork.paging import let_go
 from esker.patchwork.patches import PatchErrors
@@ -28,7 +28,8 @@ from esker.patchwork.patches import PatchErrors
 Heights = NDArray[np.float32]
 Progress = Callable[[str, float], None]
 
-FORMAT: Final = 2
+FORMAT: Final = 3
+"""2: patches beyond the grid were flat, their errors others; 1: there was no rim, either."""
 HEAD: Final = "raster.json"
 HEIGHTS: Final = "heights.npy"
 WARP: Final = "warp.npy"
@@ -113,32 +114,22 @@ def read(raster_dir: Path) -> Raster:
     """Open a raster: its arrays are mapped, read-only. Raises RasterError if anything in it is not as it must be."""
     try:
         head = json.loads((raster_dir / HEAD).read_text(encoding="utf-8"))
-        if head["format"] not in (1, FORMAT):
+        if head["format"] not in (1, 2, FORMAT):
             raise RasterError(f"{raster_dir.name}: format {head['format']} of rasters is not known here")
         rows, cols = (int(side) for side in head["shape"])
         shapes = mipmaps.shapes(rows, cols)
         mips = tuple(_open(raster_dir / _mip_name(level), shape) for level, shape in enumerate(shapes))
         warp = np.load(raster_dir / WARP, allow_pickle=False) if head["warped"] else None
-        tables = tuple(
-            np.load(raster_dir / _error_name(scale), allow_pickle=False)
-            for scale in range(len(mips) + patches.SMALL_SCALES)
-        )
-        for scale, table in enumerate(tables):
-            whole = patches.table_shape(rows, cols, scale)
-            if table.dtype != np.float32 or table.shape not in (whole, (0, 0)):
-                raise RasterError(f"{raster_dir.name}: its patch errors do not fit it")
         net = _net(warp)
         if head["format"] == FORMAT:
-            found, measured = np.load(raster_dir / RIM, allow_pickle=False), np.load(raster_dir / RIM_ERRORS)
-            _check_rim(raster_dir, found, measured, mips[0].shape)
-        else:  # written before there was a rim
-            found = rim.find(mips[0], errors.whole_kernels(mips[0]) if head["valid"] < 1 else None)
-            measured = errors.rim_errors(mips[0], net, found)
+            measured = _read_errors(raster_dir, len(mips), (rows, cols))
+        else:
+            measured = errors.measure(mips, net)
         return Raster(
             mips[0],
             mips,
             net,
-            PatchErrors(tuple(_read_only(table) for table in tables), _read_only(found), _read_only(measured)),
+            measured,
             str(head["digest"]),
             float(head["low"]),
             float(head["high"]),
@@ -148,6 +139,20 @@ def read(raster_dir: Path) -> Raster:
         raise RasterError(f"{raster_dir.name}: not a whole raster ({error})") from error
     except ValueError as error:
         raise error if isinstance(error, RasterError) else RasterError(f"{raster_dir.name}: {error}") from error
+
+
+def _read_errors(raster_dir: Path, levels: int, shape: tuple[int, int]) -> PatchErrors:
+    """The errors that lie beside a grid of a shape."""
+    tables = [
+        np.load(raster_dir / _error_name(scale), allow_pickle=False) for scale in range(levels + patches.SMALL_SCALES)
+    ]
+    for scale, table in enumerate(tables):
+        whole = patches.table_shape(*shape, scale)
+        if table.dtype != np.float32 or table.shape not in (whole, (0, 0)):
+            raise RasterError(f"{raster_dir.name}: its patch errors do not fit it")
+    found, measured = np.load(raster_dir / RIM, allow_pickle=False), np.load(raster_dir / RIM_ERRORS)
+    _check_rim(raster_dir, found, measured, shape)
+    return PatchErrors(tuple(_read_only(table) for table in tables), _read_only(found), _read_only(measured))
 
 
 def _check_rim(raster_dir: Path, found: NDArray[Any], measured: NDArray[Any], shape: tuple[int, ...]) -> None:

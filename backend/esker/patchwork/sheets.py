@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from esker import contract
 from esker.patchwork import patches
+from esker.patchwork.jit import kernel
 from esker.patchwork.patches import Floats
 from esker.patchwork.rasters import Raster
 from esker.patchwork.rim import blocks
@@ -193,22 +194,28 @@ def _counter_clockwise(kernel: Floats) -> Floats:
     return kernel
 
 
-def domains(of: Sheet) -> Floats:
-    """Corners (n, 4, 2) of the domains of a sheet's patches, world."""
-    back = inverse(of.to_patch)
-    zero = np.zeros(of.count)
-    u = np.stack([zero, of.extent[:, 0], of.extent[:, 0], zero], 1)
-    v = np.stack([zero, zero, of.extent[:, 1], of.extent[:, 1]], 1)
-    x = back[:, 0, 0, None] * u + back[:, 0, 1, None] * v + back[:, 0, 2, None]
-    y = back[:, 1, 0, None] * u + back[:, 1, 1, None] * v + back[:, 1, 2, None]
-    return np.stack([x, y], -1)
-
-
 def reached(of: Sheet, by: Sheet) -> NDArray[np.bool_]:
     """Which patches of ``of`` have a domain that may touch the grid of ``by`` (never misses one)."""
-    corners = mapped(by.to_lattice, domains(of))
-    low, high = corners.min(axis=1), corners.max(axis=1)
     rows, cols = by.placed.raster.heights.shape
     edge = 0.5 + by.sway
-    end = np.array([cols - 1 + edge, rows - 1 + edge])
-    return np.asarray(((low <= end) & (high >= -edge)).all(axis=1), np.bool_)
+    out = np.empty(of.count, np.bool_)
+    _reached(of.to_patch, of.extent, by.to_lattice, edge, cols - 1 + edge, rows - 1 + edge, out)
+    return out
+
+
+@kernel
+def _reached(
+    to_patch: Floats, extent: Floats, m: Floats, edge: float, end_u: float, end_v: float, out: NDArray[np.bool_]
+) -> None:
+    for k in range(len(to_patch)):
+        t = to_patch[k]
+        determinant = t[0, 0] * t[1, 1] - t[0, 1] * t[1, 0]
+        u0, u1, v0, v1 = np.inf, -np.inf, np.inf, -np.inf
+        for corner in range(4):
+            du = (extent[k, 0] if corner & 1 else 0.0) - t[0, 2]
+            dv = (extent[k, 1] if corner & 2 else 0.0) - t[1, 2]
+            x = (t[1, 1] * du - t[0, 1] * dv) / determinant
+            y = (t[0, 0] * dv - t[1, 0] * du) / determinant
+            u, v = m[0, 0] * x + m[0, 1] * y + m[0, 2], m[1, 0] * x + m[1, 1] * y + m[1, 2]
+            u0, u1, v0, v1 = min(u0, u), max(u1, u), min(v0, v), max(v1, v)
+        out[k] = u0 <= end_u and u1 >= -edge and v0 <= end_v and v1 >= -edge
