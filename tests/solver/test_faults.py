@@ -9,6 +9,7 @@ import gc
 import os
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -34,7 +35,7 @@ from esker.solve.faults import (
 )
 from esker.solve.gpu_levels import GpuWorkspace
 from esker.solve.levels import ClWorkspace
-from esker.solve.solver import Solver
+from esker.solve.solver import SPARE_SECONDS, Solver
 from tests.solver.bases import Analytic, hills
 from tests.solver.scenes import SCENES, SETTINGS
 
@@ -171,6 +172,21 @@ def test_idle_workspaces_make_room(used: Solver, monkeypatch: pytest.MonkeyPatch
         assert np.array_equal(heights(used, 1), expected)
     assert failing.calls > 10
     assert [w.top for w in used._spare] == [1]
+
+
+def test_workspaces_that_nobody_uses_are_given_back(used: Solver) -> None:
+    """SPEC S30: those idle for long go, with their memory; the next solve gives the same bits."""
+    expected = heights(used, 1)
+    before = held(used)
+    assert used.tidy() == 0
+    assert held(used) == before > 0
+    later = time.monotonic() + SPARE_SECONDS + 1
+    used._idle_since[used._spare[0]] = later
+    assert used.tidy(later) == 1
+    assert 0 < held(used) < before
+    assert used.tidy(2 * later) == 1
+    assert held(used) == 0
+    assert np.array_equal(heights(used, 1), expected)
 
 
 def test_out_of_memory_in_the_middle_of_a_solve(used: Solver, monkeypatch: pytest.MonkeyPatch) -> None:

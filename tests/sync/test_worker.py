@@ -28,6 +28,11 @@ class Turnstile:
         self.permits = threading.Semaphore(0)
         self.closed: list[int] = []
         self.speaks = False
+        self.tidied = threading.Event()
+
+    def tidy(self) -> int:
+        self.tidied.set()
+        return 0
 
     def steps(
         self, strokes: Sequence[c.Stroke], settings: c.TerrainSettings, levels: int | None = None, **_: Any
@@ -274,6 +279,16 @@ def test_rooms_take_turns() -> None:
         for count in range(3, 19):
             made = [sum(entry[0] == name for entry in got[:count]) for name in rooms]
             assert max(made) - min(made) <= 2, got
+
+    _bench(run)
+
+
+def test_a_solver_tidies_up_while_there_is_nothing_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    """SPEC S30."""
+    monkeypatch.setattr("esker.session.worker.IDLE_CHECK", 0.01)
+
+    def run(bench: Bench) -> None:
+        assert bench.solver.tidied.wait(5)
 
     _bench(run)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -153,6 +153,15 @@ class Solver(Protocol):
     ) -> Iterator[LevelResult | None]: ...
 
     def refiner(self, basis: Any) -> Refiner: ...
+
+
+@runtime_checkable
+class Tidying(Protocol):
+    """A solver that keeps memory for rooms that may come back."""
+
+    def tidy(self) -> int:
+        """Gives back what nobody has used for long; how many pieces that were. Called while there is nothing to do."""
+        ...
 
 
 SolverFactory = Callable[[str | None], Solver]

@@ -18,7 +18,7 @@ from typing import Any, Final
 
 from esker import contract as c
 from esker.session.laying import blank_levels
-from esker.session.ports import Base, LevelResult, Refinement, Solver, SolverFactory
+from esker.session.ports import Base, LevelResult, Refinement, Solver, SolverFactory, Tidying
 from esker.session.recovery import LAST_RESORT, Devices, Diagnose, Fault, unknown
 from esker.session.schedule import Client, Deliver, Glimpsing, Job, Schedule
 
@@ -156,6 +156,8 @@ class Worker:
             for gone in leaving:  # a solve must end in the thread that began it
                 gone.drop()
             self._retry()
+            if client is None and isinstance(self._solver, Tidying):
+                self._solver.tidy()
             if client is not None and client not in leaving:
                 self._step(client)
         for left in self._schedule.clients:

@@ -12,6 +12,8 @@ every solve starts from zero, strokes are ordered by id, and no cache changes a 
 from __future__ import annotations
 
 import os
+import time
+import weakref
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -36,13 +38,15 @@ from esker.solve.passes import (
 from esker.solve.refine import Refiner, Refinery
 from esker.solve.sayings import BASES, Layer, Speakers, speakers
 from esker.solve.solving import Seat, Solving
-from esker.solve.workspaces import new_workspace
+from esker.solve.workspaces import give_back, new_workspace
 
 __all__ = ["PREVIEW_GRADIENT_CYCLES", "PREVIEW_HEIGHT_CYCLES", "Basis", "LevelResult", "Pyramid", "Solver", "Workspace"]
 
 SPARE_BYTES = 5 << 30
 """Memory that idle workspaces may keep, with the raster of the strokes that they last solved, but no more than a
 fifth of the machine's: a room whose workspace was given to another one has all its strokes rasterised again."""
+SPARE_SECONDS = 300.0
+"""How long a workspace is kept that nobody uses: who has been away for longer waits once for the raster."""
 PACED_ABOVE = 4
 """Up to this level a whole preview takes less time than one cycle of a big terrain."""
 
@@ -74,6 +78,7 @@ class Solver:
             raise ValueError(f"max_level must be 0..{MAX_LEVEL}, not {max_level}")
         self.max_level = max_level
         self._spare: list[Workspace] = []
+        self._idle_since: weakref.WeakKeyDictionary[Workspace, float] = weakref.WeakKeyDictionary()
         self._refinery: Refinery | None = None
         self._channel_solvers: dict[int, ChannelSolver] = {}
         self._spare_bytes = min(SPARE_BYTES, os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // 5)
@@ -174,6 +179,19 @@ class Solver:
                 break
         done = [latest[level] for level in range(top + 1) if level in latest]
         return Pyramid(tuple(r.heights for r in done), len(done) == top + 1 and all(r.settled for r in done))
+
+    def tidy(self, now: float | None = None) -> int:
+        """Gives back the memory of workspaces that have been idle for SPARE_SECONDS; returns how many there were.
+
+        ``now``: of ``time.monotonic``.
+        """
+        late = (time.monotonic() if now is None else now) - SPARE_SECONDS
+        count = len(self._spare)
+        self._spare = [w for w in self._spare if self._idle_since[w] > late]
+        count -= len(self._spare)
+        if count:
+            give_back()
+        return count
 
     def _check(self, device: Device) -> None:
         """Compile the kernels now, not under somebody's first stroke, and trust none whose ground is not the twin's.
@@ -314,5 +332,6 @@ class Solver:
 
     def _give(self, workspace: Workspace) -> None:
         self._spare.append(workspace)
+        self._idle_since[workspace] = time.monotonic()
         while len(self._spare) > 1 and self._kept() > self._spare_bytes:
             self._spare.pop(0)

@@ -6,9 +6,11 @@ overcommit and fail late, in the middle of a solve: a plan that cannot fit is re
 
 from __future__ import annotations
 
+import ctypes
 import threading
 import weakref
 from collections import Counter
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from esker import grid
@@ -63,6 +65,12 @@ def held_bytes(device: Device) -> int:
     """Bytes of the workspaces of this process on a device, by plan."""
     with _lock:
         return _held[device.name]
+
+
+def give_back() -> None:
+    """Returns freed memory to the system: of big blocks that threads took, too, the GNU C library keeps what it can."""
+    with suppress(OSError, AttributeError, TypeError):  # another C library
+        ctypes.CDLL(None).malloc_trim(0)
 
 
 def planned_bytes(device: Device, top: int, based: bool = False) -> tuple[int, int]:
