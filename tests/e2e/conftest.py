@@ -26,6 +26,32 @@ ARTIFACTS = ROOT / "tests" / "artifacts" / "e2e"
 # Two pages side by side: neither may be slowed down as if it were in the background.
 AWAKE = ["--disable-backgrounding-occluded-windows", "--disable-renderer-backgrounding"]
 
+SCALE = 0.5
+"""Drawn pixels per CSS pixel, along a side: hands, layout and errors are those of the whole window, but the software
+adapter draws a quarter of its pixels. Where the picture itself is looked at, tests ask for 1."""
+
+HERTZ = 10
+"""Pictures a second that a window shows at most, as a slow screen would: else pages of the software adapter draw all
+that the processors can, for frames that nobody looks at, while the server that they wait for gets what is left."""
+SLOW_SCREEN = """
+  const draws = new Map(), real = requestAnimationFrame.bind(window), period = 1000 / HERTZ;
+  let last = -period, count = 0, asked = false;
+  const show = (now) => {
+    asked = false;
+    last = now;
+    const due = [...draws.values()];
+    draws.clear();
+    for (const draw of due) try { draw(now); } catch (error) { reportError(error); }
+  };
+  window.requestAnimationFrame = (draw) => {
+    draws.set(++count, draw);
+    if (!asked) setTimeout(() => real(show), Math.max(0, last + period - performance.now()));
+    asked = true;
+    return count;
+  };
+  window.cancelAnimationFrame = (id) => void draws.delete(id);
+""".replace("HERTZ", str(HERTZ))
+
 
 @dataclass
 class Server:
@@ -78,15 +104,20 @@ class Server:
         return made["id"], made["secret"]
 
 
-@pytest.fixture
-def server(tmp_path: Path) -> Iterator[Server]:
-    """A fresh server on an empty data folder."""
+def serving(folder: Path) -> Iterator[Server]:
+    """A fresh server on an empty data folder inside ``folder``, ended at the end: the body of a fixture."""
     if not (ROOT / "frontend" / "dist" / "index.html").exists():
         pytest.fail("The page is not built: run `make test`, which builds it first.")
-    made = Server(tmp_path / "data")
+    made = Server(folder / "data")
     made.start()
     yield made
     made.kill(signal.SIGTERM)
+
+
+@pytest.fixture(scope="package")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    """One server for all: every test makes terrains of its own. Who harms it starts one of their own (``serving``)."""
+    yield from serving(tmp_path_factory.mktemp("server"))
 
 
 @pytest.fixture(scope="package")
@@ -162,8 +193,18 @@ class Visitors:
         self.browser, self.server = browser, server
         self.made: list[Visitor] = []
 
-    def __call__(self, width: int = 720, height: int = 540, **options: Any) -> Visitor:
-        context = self.browser.new_context(viewport={"width": width, "height": height}, **options)
+    def __call__(
+        self, width: int = 720, height: int = 540, device_scale_factor: float = SCALE, **options: Any
+    ) -> Visitor:
+        """A window of so many CSS pixels, of ``device_scale_factor`` pixels each along a side.
+
+        Below 1 its screen is slow too.
+        """
+        context = self.browser.new_context(
+            viewport={"width": width, "height": height}, device_scale_factor=device_scale_factor, **options
+        )
+        if device_scale_factor < 1:
+            context.add_init_script(SLOW_SCREEN)
         visitor = Visitor(context, context.new_page(), self.server.url)
         visitor.watch()
         self.made.append(visitor)

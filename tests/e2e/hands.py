@@ -79,6 +79,16 @@ def wait_settled(*visitors: Visitor) -> None:
             wait(visitor, "c => window.esker.clock() >= c && window.esker.settled()", max(clocks), timeout=90)
 
 
+def wait_whole(*visitors: Visitor, level: int = 4, points: Sequence[Pixel] = COARSE) -> None:
+    """Until every page holds a level at all of the points: at rest everybody gets everything (docs/decisions/0005).
+
+    What is compared to the bit is read off the same level then, however few pixels a page draws.
+    """
+    for visitor in visitors:
+        held = "([ps, l]) => ps.every(([x, y]) => window.esker.levelAt(x, y) >= l) && window.esker.settled()"
+        wait(visitor, held, [[list(p) for p in points], level], timeout=90)
+
+
 def heights(visitor: Visitor, points: Sequence[Pixel]) -> list[float]:
     """Ground heights as the page shows them, metres."""
     found = visitor.js("ps => ps.map(([x, y]) => window.esker.heightAt(x, y))", [list(p) for p in points])

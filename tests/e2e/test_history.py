@@ -10,7 +10,7 @@ from esker import contract as c
 from esker.grid import quantum, spacing
 from esker.terrain import Terrain
 from tests.e2e.conftest import Server, Visitor, Visitors
-from tests.e2e.hands import COARSE, arch, draw, ellipse, heights, levels, wait, wait_settled
+from tests.e2e.hands import COARSE, arch, draw, ellipse, heights, levels, wait, wait_settled, wait_whole
 
 SIZE = 4096.0
 HISTORY = "() => window.esker.history()"
@@ -48,6 +48,7 @@ def test_two_people_look_back(visitors: Visitors, server: Server, tmp_path: Path
     says = ada.js(HISTORY)
     assert [line.endswith(what) for line, what in zip(says, ("drew a plateau", "drew a mountain"), strict=True)]
     wait_settled(ada, ben)
+    wait_whole(ben)
     now, clock = heights(ben, COARSE), ben.js("() => window.esker.clock()")
     ada.shot("history-list")
 

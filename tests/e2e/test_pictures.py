@@ -38,7 +38,7 @@ def rest(visitor: Visitor) -> None:
 def test_hero(visitors: Visitors, server: Server) -> None:
     """The landscape of the paper's figure 6 as a visitor sees it."""
     terrain, secret = server.create(template="figure-six", title="Figure six")
-    guest = visitors(1280, 800)
+    guest = visitors(1280, 800, device_scale_factor=1)
     guest.open(f"/t/{terrain}#{secret}")
     wait_settled(guest)
     rest(guest)
@@ -51,7 +51,7 @@ def test_hero(visitors: Visitors, server: Server) -> None:
 def test_morph(visitors: Visitors, server: Server) -> None:
     """A mountain rises under the pen, frame by frame."""
     terrain, secret = server.create(title="Morph")
-    guest = visitors(720, 450)
+    guest = visitors(720, 450, device_scale_factor=1)
     guest.open(f"/t/{terrain}#{secret}")
     wait_settled(guest)
     rest(guest)

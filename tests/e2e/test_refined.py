@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from esker.grid import quantum, samples, spacing
 from esker.solve.refine import Refiner
 from esker.terrain import Terrain, default_solver
-from tests.e2e.conftest import Server, Visitor, Visitors
-from tests.e2e.hands import arch, draw, heights, levels, on_screen, wait, wait_settled
+from tests.e2e.conftest import SCALE, Server, Visitor, Visitors
+from tests.e2e.hands import arch, draw, heights, levels, on_screen, wait, wait_settled, wait_whole
 
 SIZE = 4096.0
 SOLVED = 4
@@ -24,7 +24,7 @@ def two_people(visitors: Visitors, server: Server, **options: Any) -> tuple[Visi
     """Ada owns the terrain, Ben has an edit link; both see it."""
     terrain, secret = server.create(title="Near the ground")
     link = json.loads(server.request("POST", f"/api/terrains/{terrain}/links", {"role": "edit", "name": "Ben"}, secret))
-    ada, ben = visitors(**options), visitors(480, 360)
+    ada, ben = visitors(**options), visitors(480, 360, device_scale_factor=options.get("device_scale_factor", SCALE))
     ada.open(f"/t/{terrain}#{secret}")
     ben.open(f"/t/{terrain}#{link['secret']}")
     return ada, ben, terrain, secret
@@ -103,7 +103,7 @@ def check(visitor: Visitor, places: list[Point], truth: Truth) -> dict[int, int]
 
 def test_a_crest_sharpens_as_one_comes_near(visitors: Visitors, server: Server, tmp_path: Path) -> None:
     """E8: finer levels come where somebody stands, are right, and are right again after the ground has changed."""
-    ada, ben, terrain, secret = two_people(visitors, server, width=480, height=360)
+    ada, ben, terrain, secret = two_people(visitors, server, width=480, height=360, device_scale_factor=1)
     mountain = draw(ada, "b", arch(on_screen(ada, 900, 2200), on_screen(ada, 2300, 2500), 110))
     wait_settled(ada, ben)
     x, y, z = crest_of({s["id"]: s for s in ada.js("() => window.esker.strokes()")}[mountain])
@@ -144,6 +144,7 @@ def test_reach_and_border_move_everybodys_ground(visitors: Visitors, server: Ser
     wait_settled(ada, ben)
     # On the border below the ridge, and well beyond the ridge's flanks.
     edge, beyond = (2112.0, 0.0), (2112.0, 2304.0)
+    wait_whole(ben, points=[edge, beyond])
     free = heights(ben, [edge, beyond])
     assert free[0] > 5
     ada.page.keyboard.press("v")
@@ -164,6 +165,7 @@ def test_reach_and_border_move_everybodys_ground(visitors: Visitors, server: Ser
         if ada.page.get_by_role("radio", name="Free").get_attribute("aria-checked") == "true":
             break
     wait_settled(ada, ben)
+    wait_whole(ben, points=[edge, beyond])
     again = heights(ben, [edge, beyond])
     assert np.abs(np.subtract(again, free)).max() <= 2 * quantum(SOLVED, SIZE)
     assert not ada.errors

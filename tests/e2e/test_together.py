@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import io
 import json
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+import pytest
 from PIL import Image
 
 from esker.grid import quantum, spacing
 from esker.terrain import Terrain
-from tests.e2e.conftest import Server, Visitor, Visitors
+from tests.e2e.conftest import Server, Visitor, Visitors, serving
 from tests.e2e.hands import (
     COARSE,
     arch,
@@ -24,9 +26,16 @@ from tests.e2e.hands import (
     press_and_move,
     wait,
     wait_settled,
+    wait_whole,
 )
 
 SIZE = 4096.0
+
+
+@pytest.fixture
+def server(tmp_path: Path) -> Iterator[Server]:
+    """A server that may be killed."""
+    yield from serving(tmp_path)
 
 
 def two_people(visitors: Visitors, server: Server) -> tuple[Visitor, Visitor, str, str]:
@@ -41,8 +50,7 @@ def two_people(visitors: Visitors, server: Server) -> tuple[Visitor, Visitor, st
 
 def same_ground(ada: Visitor, ben: Visitor, server: Server, terrain: str, secret: str, folder: Path) -> None:
     """Both pages show the same heights exactly, and those of the offline solve within one quantisation step."""
-    for person in (ada, ben):  # at rest everybody gets everything (docs/decisions/0005)
-        wait(person, "ps => ps.every(([x, y]) => window.esker.levelAt(x, y) === 4)", [list(p) for p in COARSE])
+    wait_whole(ada, ben)
     here, there = heights(ada, COARSE), heights(ben, COARSE)
     assert here == there
     archive = folder / "now.esker"

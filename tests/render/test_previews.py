@@ -190,7 +190,8 @@ def test_the_picture_has_the_size_that_cards_want(monkeypatch: pytest.MonkeyPatc
 
 def test_elevation_layers_are_in_the_picture(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """V8: their grids come from the folder of the server; a layer whose grid is missing is left out."""
-    monkeypatch.setattr(module, "LEVEL", 1)
+    for name, small in {"LEVEL": 1, "WIDTH": 240, "HEIGHT": 126}.items():
+        monkeypatch.setattr(module, name, small)
     terrain = Terrain(1024.0)
     y, x = np.mgrid[0:60, 0:60]
     terrain.add_grid(300 * np.exp(-(((x - 30) / 9) ** 2) - ((y - 30) / 9) ** 2), spacing=18.0, accuracy=1.0)
