@@ -49,9 +49,11 @@ export interface LakeRule {
 /** The lakes of `heights`, metres. What reaches the border runs off. */
 export function findLakes(heights: Float32Array, side: number, { cellM, leastM, seaM }: LakeRule): Lakes {
   const sea = seaM === null ? Number.NEGATIVE_INFINITY : Math.fround(seaM);
-  const ground = heights.map((z) => Math.max(z, sea));
+  const ground = heights.slice();
+  if (seaM !== null) for (let i = 0; i < ground.length; i += 1) ground[i] = Math.max(ground[i]!, sea);
   const filled = flooded(ground, side);
-  const left = Uint8Array.from(filled, (level, i) => (level > ground[i]! ? 1 : 0));
+  const left = new Uint8Array(heights.length);
+  for (let i = 0; i < left.length; i += 1) left[i] = filled[i]! > ground[i]! ? 1 : 0;
   let levels = new Float32Array(heights.length).fill(NO_LAKE);
   const samples = new Map<number, number>();
   for (let start = 0; start < left.length; start += 1) {
@@ -75,66 +77,58 @@ export function findLakes(heights: Float32Array, side: number, { cellM, leastM, 
   return { side, heights, levels, samples };
 }
 
+/** Steps to the samples that drawn edges join to one, in a grid of rows of `side`. */
+function meshSteps(side: number): readonly number[] {
+  return [1, -1, side, -side, side - 1, 1 - side];
+}
+
 /** How high water stands on ground whose border is open: at least the ground, metres. */
 export function flooded(ground: Float32Array, side: number): Float32Array {
   const out = new Float32Array(ground.length).fill(Number.POSITIVE_INFINITY);
   const heap = new Heap(ground.length);
   const last = side - 1;
-  for (let i = 0; i < ground.length; i += 1) {
-    const [r, c] = [Math.floor(i / side), i % side];
-    if (r > 0 && r < last && c > 0 && c < last) continue;
-    out[i] = ground[i]!;
-    heap.push(ground[i]!, i);
-  }
   // Samples of a basin come in any order: they are all as high as its outlet.
   const pit = new Int32Array(ground.length);
   let [first, end] = [0, 0];
-  const around = new Int32Array(6);
+  const reach = (i: number, level: number): void => {
+    if (out[i] !== Number.POSITIVE_INFINITY) return;
+    const z = ground[i]!;
+    if (z <= level) {
+      out[i] = level;
+      pit[end++] = i;
+    } else {
+      out[i] = z;
+      heap.push(z, i);
+    }
+  };
+  for (let k = 0; k < side; k += 1) {
+    for (const i of [k, last * side + k, k * side, k * side + last]) reach(i, Number.NEGATIVE_INFINITY);
+  }
+  const [a, b, c, d, e, f] = meshSteps(side) as [number, number, number, number, number, number];
+  const area = ground.length;
   while (first < end || heap.size > 0) {
+    if (first === end) first = end = 0;
     const at = first < end ? pit[first++]! : heap.pop();
     const level = out[at]!;
-    const count = neighbours(at, side, around);
-    for (let k = 0; k < count; k += 1) {
-      const i = around[k]!;
-      if (out[i] !== Number.POSITIVE_INFINITY) continue;
-      const z = ground[i]!;
-      if (z <= level) {
-        out[i] = level;
-        pit[end++] = i;
-      } else {
-        out[i] = z;
-        heap.push(z, i);
-      }
-    }
-    if (first === end) first = end = 0;
+    // Beyond the border steps lead nowhere or to the other side of the border, whose samples are all done.
+    if (at + a < area) reach(at + a, level);
+    if (at + b >= 0) reach(at + b, level);
+    if (at + c < area) reach(at + c, level);
+    if (at + d >= 0) reach(at + d, level);
+    if (at + e < area) reach(at + e, level);
+    if (at + f >= 0) reach(at + f, level);
   }
   return out;
 }
 
-/** Samples that drawn edges join to a sample; returns how many. */
-function neighbours(at: number, side: number, out: Int32Array): number {
-  const r = Math.floor(at / side);
-  const c = at - r * side;
-  const last = side - 1;
-  let n = 0;
-  if (c < last) out[n++] = at + 1;
-  if (c > 0) out[n++] = at - 1;
-  if (r < last) out[n++] = at + side;
-  if (r > 0) out[n++] = at - side;
-  if (r < last && c > 0) out[n++] = at + side - 1;
-  if (r > 0 && c < last) out[n++] = at - side + 1;
-  return n;
-}
-
-/** The samples connected with `start`, taken out of `left`. */
+/** The samples connected with `start`, taken out of `left`. None lies on the border. */
 function takeBasin(left: Uint8Array, side: number, start: number): number[] {
   left[start] = 0;
   const basin = [start];
-  const around = new Int32Array(6);
+  const steps = meshSteps(side);
   for (let k = 0; k < basin.length; k += 1) {
-    const count = neighbours(basin[k]!, side, around);
-    for (let j = 0; j < count; j += 1) {
-      const i = around[j]!;
+    for (const step of steps) {
+      const i = basin[k]! + step;
       if (left[i] === 0) continue;
       left[i] = 0;
       basin.push(i);
@@ -190,6 +184,13 @@ function spread(
   x: number,
   y: number,
 ): void {
+  if (up === 0) {
+    for (let r = 0; r < TILE_SAMPLES; r += 1) {
+      const row = from.subarray(r * TILE_SAMPLES, (r + 1) * TILE_SAMPLES);
+      out.set(row, (y * TILE_CELLS + r) * LAKE_SIDE + x * TILE_CELLS);
+    }
+    return;
+  }
   const scale = 1 / (1 << up);
   for (let r = 0; r < TILE_SAMPLES; r += 1) {
     const v = (low + r) * scale;
