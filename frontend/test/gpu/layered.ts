@@ -7,11 +7,10 @@ import type { Point } from "../../src/core/lattice.ts";
 import type { CameraState, TileView, Vec3 } from "../../src/core/types.ts";
 import { FrameDecoder } from "../../src/net/decode.ts";
 import { TileStore } from "../../src/tiles/store.ts";
-import { type CrackReport, type Kind, makeRig, makeWorld, picture, sceneOf, spoilRecords, Tally } from "./cracks.ts";
+import { makeWorld, picture, sceneOf, sharedRig, spoilRecords } from "./crackrig.ts";
+import { type CrackReport, HEIGHT, KINDS, type Kind, Tally, WIDTH } from "./cracktally.ts";
 import { lookAt, mapCamera, random } from "./world.ts";
 
-const WIDTH = 256;
-const HEIGHT = 192;
 /** Views lie within this share of the domain of the places asked for. */
 const AROUND = 0.06;
 
@@ -50,9 +49,8 @@ function camera(kind: Kind, next: () => number, view: TileView, [x, y]: Point): 
 
 /** Draws `views` views at every moment. `spoil` clears the edge bits, to see the test fail. */
 export async function layeredCrackTest(seed: number, views: number, sent: Sent, spoil = false): Promise<CrackReport> {
-  const rig = await makeRig();
+  const rig = await sharedRig();
   const next = random(seed);
-  const kinds: Kind[] = ["above", "grazing", "below", "map"];
   const looks = ["natural", "alpine", "desert", "paper"] as const;
   const tally = new Tally();
   const decoder = new FrameDecoder();
@@ -63,21 +61,15 @@ export async function layeredCrackTest(seed: number, views: number, sent: Sent, 
     for (const frame of frames)
       store.apply(decoder.decode(Uint8Array.from(atob(frame), (c) => c.charCodeAt(0)).buffer));
     for (let k = 0; k < views; k += 1) {
-      const kind = kinds[k % 4]!;
+      const kind = KINDS[k % 4]!;
       const place = sent.places[k % sent.places.length]!;
       const near = place.map((v) => v + (2 * next() - 1) * AROUND * sent.size_m) as unknown as Point;
       const tau = 0.6 + 4 * next() ** 2;
       const scene = sceneOf(store, camera(kind, next, store, near), looks[Math.floor(k / 4) % 4]!);
-      const drawn = await picture(rig, world, scene, tau);
-      tally.add(
-        drawn,
-        kind,
-        `seed ${seed} moment ${moment} view ${k} ${kind} tau ${tau.toFixed(2)}`,
-        kind === "grazing",
-      );
+      const drawn = await picture(rig, world, scene, tau, { full: Math.floor(k / 4) % 2 === moment % 2 });
+      tally.add(drawn, kind, `seed ${seed} moment ${moment} view ${k} ${kind} tau ${tau.toFixed(2)}`);
     }
   }
   world.atlas.destroy();
-  rig.device.destroy();
   return tally.report(views * sent.moments.length);
 }
