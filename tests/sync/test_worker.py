@@ -1,4 +1,4 @@
-"""The solver's thread: newest job wins, nobody starves (SPEC P57 to P59; DESIGN 8)."""
+"""The solver's thread: newest job wins, nobody starves (SPEC P57 to P59, P120; DESIGN 8)."""
 
 from __future__ import annotations
 
@@ -291,6 +291,24 @@ def test_a_solver_tidies_up_while_there_is_nothing_to_do(monkeypatch: pytest.Mon
         assert bench.solver.tidied.wait(5)
 
     _bench(run)
+
+
+def test_what_a_solve_left_is_given_back_behind_the_first_level_of_the_next() -> None:
+    def test(bench: Bench) -> None:
+        room = bench.room("one")
+        bench.worker.request(room, _job(1))
+        bench.let(6)
+        bench.idle()
+        room.refiner = left = object()
+        bench.worker.request(room, _job(2))
+        bench.idle()
+        assert (room.refiner, room.remains) == (None, left)
+        bench.let(2)
+        bench.idle()
+        assert room.remains is None
+        assert bench.got[-2:] == [("one", 2, 0, False), ("one", 2, 1, False)]
+
+    _bench(test)
 
 
 def test_a_closed_room_gets_nothing_more() -> None:
