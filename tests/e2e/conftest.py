@@ -194,16 +194,18 @@ class Visitors:
         self.made: list[Visitor] = []
 
     def __call__(
-        self, width: int = 720, height: int = 540, device_scale_factor: float = SCALE, **options: Any
+        self,
+        width: int = 720,
+        height: int = 540,
+        device_scale_factor: float = SCALE,
+        slow_screen: bool = True,
+        **options: Any,
     ) -> Visitor:
-        """A window of so many CSS pixels, of ``device_scale_factor`` pixels each along a side.
-
-        Below 1 its screen is slow too.
-        """
+        """A window of so many CSS pixels, of ``device_scale_factor`` pixels each along a side."""
         context = self.browser.new_context(
             viewport={"width": width, "height": height}, device_scale_factor=device_scale_factor, **options
         )
-        if device_scale_factor < 1:
+        if slow_screen:
             context.add_init_script(SLOW_SCREEN)
         visitor = Visitor(context, context.new_page(), self.server.url)
         visitor.watch()

@@ -24,21 +24,21 @@ def picture(visitor: Visitor) -> Image.Image:
 
 
 def rest(visitor: Visitor) -> None:
-    """Until the picture has been the same for two seconds: tiles are uploaded, light is baked, quality is full."""
-    last, same = picture(visitor), 0
-    for _ in range(60):
-        visitor.page.wait_for_timeout(500)
-        now = picture(visitor)
-        same = same + 1 if max(ImageStat.Stat(ImageChops.difference(last, now)).mean) < 0.05 else 0
-        if same == 4:
+    """Until nothing was drawn for two seconds: tiles are uploaded, light is baked, quality is full."""
+    drawn, same = -1, 0
+    for _ in range(600):
+        visitor.page.wait_for_timeout(200)
+        now = visitor.js("() => window.esker.frames")
+        drawn, same = now, same + 1 if now == drawn else 0
+        if same == 10:
             return
-        last = now
+    raise TimeoutError("the picture does not come to rest")
 
 
 def test_hero(visitors: Visitors, server: Server) -> None:
     """The landscape of the paper's figure 6 as a visitor sees it."""
     terrain, secret = server.create(template="figure-six", title="Figure six")
-    guest = visitors(1280, 800, device_scale_factor=1)
+    guest = visitors(1280, 800, device_scale_factor=1, slow_screen=False)
     guest.open(f"/t/{terrain}#{secret}")
     wait_settled(guest)
     rest(guest)
@@ -51,7 +51,7 @@ def test_hero(visitors: Visitors, server: Server) -> None:
 def test_morph(visitors: Visitors, server: Server) -> None:
     """A mountain rises under the pen, frame by frame."""
     terrain, secret = server.create(title="Morph")
-    guest = visitors(720, 450, device_scale_factor=1)
+    guest = visitors(720, 450, device_scale_factor=1, slow_screen=False)
     guest.open(f"/t/{terrain}#{secret}")
     wait_settled(guest)
     rest(guest)
