@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import io
 import os
 import shutil
 import signal
@@ -15,7 +16,7 @@ import psutil
 import pytest
 
 from esker import contract as c
-from esker.importing import limits, run, wire
+from esker.importing import limits, run, upload, wire
 from esker.patchwork import rasters
 from tests.importing import make_files
 from tests.importing.conftest import PLACE, SIZE_M
@@ -207,3 +208,15 @@ def test_a_full_disk_is_told(files: Path, tmp_path: Path, monkeypatch: pytest.Mo
     with pytest.raises(run.ImportRefused, match="no room"):
         asyncio.run(run.convert(files / "little.tif", c.ImportAnswers(), PLACE, SIZE_M, tmp_path / "raster"))
     assert os.listdir(tmp_path) == []
+
+
+def test_a_file_that_changes_while_it_is_sent() -> None:
+    """SPEC G30: one that grows is sent as long as it was, one that shrinks is an error at once, not a wait."""
+    seen: list[int] = []
+    grown = upload._Told(io.BytesIO(b"12345678"), 5, seen.append)
+    assert (grown.read(4), grown.read(4), grown.read(4)) == (b"1234", b"5", b"")
+    assert seen[:2] == [4, 5]
+    shrunk = upload._Told(io.BytesIO(b"123"), 5, seen.append)
+    assert shrunk.read(4) == b"123"
+    with pytest.raises(OSError, match="shorter"):
+        shrunk.read(4)

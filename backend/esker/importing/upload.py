@@ -52,7 +52,7 @@ class Uploads:
         """
         size = path.stat().st_size
         with path.open("rb") as file:
-            body = _Told(file, lambda done: on_progress(done / size if size else 1.0))
+            body = _Told(file, size, lambda done: on_progress(done / size if size else 1.0))
             return self._call("POST", f"?name={quote(path.name, safe='')}{query}", body, size)
 
     def follow(self, status: c.ImportStatus, told: Told) -> c.ImportStatus:
@@ -98,13 +98,17 @@ class Uploads:
 
 
 class _Told:
-    """A file that tells how much of it was read."""
+    """The first ``size`` bytes of a file, that tells how much of it was read. Raises OSError if it has become shorter:
+    the server would wait for the rest."""
 
-    def __init__(self, file: BinaryIO, told: Callable[[int], None]) -> None:
-        self._file, self._told, self._done = file, told, 0
+    def __init__(self, file: BinaryIO, size: int, told: Callable[[int], None]) -> None:
+        self._file, self._size, self._told, self._done = file, size, told, 0
 
     def read(self, count: int = -1) -> bytes:
-        part = self._file.read(count)
+        left = self._size - self._done
+        part = self._file.read(left if count < 0 else min(count, left))
+        if not part and left:
+            raise OSError("the file became shorter while it was sent")
         self._done += len(part)
         self._told(self._done)
         return part
