@@ -23,7 +23,7 @@ from esker.version import VERSION
 
 FIRST_SEED: Final = 1000
 # What a page leaves behind does not pile up.
-SEEDS_A_PAGE: Final = 8
+SEEDS_A_PAGE: Final = 5
 
 
 class Kind(NamedTuple):
@@ -35,9 +35,9 @@ class Kind(NamedTuple):
 
 
 KINDS: Final = {
-    "trees": Kind("crackTest", 80, 10),
+    "trees": Kind("crackTest", 120, 10),
     "metres_from_the_ground": Kind("deepCrackTest", 20, 20),
-    "a_metre_from_the_ground": Kind("walkCrackTest", 40, 20),
+    "a_metre_from_the_ground": Kind("walkCrackTest", 60, 20),
 }
 MOST_BLIND: Final = 0.1
 SUMS: Final = ("views", "full", "cracks", "nans", "covered", "patches", "mixed", "blind")
