@@ -168,3 +168,14 @@ def test_a_chronicle_may_be_continued_or_begin_anywhere() -> None:
     assert whole.names == {"ana": "Ana"}
     late = Chronicle(None, 2)
     assert [(e.action, e.first, e.last) for e in t.entries(late)] == [("reshape", 3, 4), ("name", 6, 6)]
+
+
+def test_a_switch_thrown_back_reads_as_what_became_of_the_thing() -> None:
+    told = [
+        Told(k + 1, "ann", f'{{"type":"layer.set","layer":"l","fields":{{"hidden":{hidden}}}}}', None)
+        for k, hidden in enumerate(["true", "false", "true", "false"])
+    ]
+    chronicle = Chronicle(None)
+    chronicle.add(told)
+    words = [sentence(entry, {}, {}) for entry in chronicle.entries]
+    assert words == ["hid a layer", "showed a layer", "hid a layer again", "showed a layer again"]

@@ -27,7 +27,8 @@ _VERBS: Final[dict[Action, tuple[str, str]]] = {
     "order": ("reordered", "reordering"),
     "several": ("changed", "changing"),
 }
-_NEW: Final = frozenset({"draw", "layer"})
+_OPPOSITE: Final[dict[Action, Action]] = {"hide": "show", "show": "hide", "lock": "unlock", "unlock": "lock"}
+"""The journal cannot tell a switch thrown back by hand from an undo: both are told as what became of the thing."""
 MANY_WORDS: Final = 3
 """More settings than this are not listed."""
 
@@ -39,6 +40,9 @@ def sentence(entry: Entry, strokes: Mapping[str, c.Stroke], layers: Mapping[str,
     """
     past, gerund = _VERBS[entry.action]
     what = _settings(entry) if entry.action == "settings" else _things(entry, strokes, layers)
+    if entry.turn and entry.action in _OPPOSITE:
+        now = _OPPOSITE[entry.action] if entry.turn == "undo" else entry.action
+        return f"{_VERBS[now][0]} {what} again"
     if entry.turn:
         return f"{'undid' if entry.turn == 'undo' else 'redid'} {gerund} {what}"
     return f"{past} {what}"
