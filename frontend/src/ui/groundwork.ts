@@ -11,7 +11,7 @@ import type { SyncDoc } from "../doc/sync.ts";
 import type { ImportAnswers, Importing, ImportReport, Layer } from "../generated/contract.ts";
 import type { Laying } from "../input/placement.ts";
 import { footprintVisuals, stemsOf } from "./footprints.ts";
-import { heightRange, laidByHand } from "./import-questions.ts";
+import { heightRange, laidByHand, leftToAsk } from "./import-questions.ts";
 import { type ImportJob, Imports, type ImportTransport, isOver } from "./imports.ts";
 import type { KeptImport } from "./kept-imports.ts";
 import { layerName } from "./layers.ts";
@@ -53,7 +53,10 @@ export class Groundwork {
   readonly hovered = signal<string | null>(null);
   readonly footprints: ReadonlySignal<readonly FootprintVisual[]>;
   readonly sheet: ReadonlySignal<SheetVisual | null>;
+  /** Rises when a grid was to be placed whose questions nobody has seen: the page shows them. */
+  readonly asking = signal(0);
   readonly #o: GroundworkOptions;
+  readonly #read = new Set<number>();
   readonly #answers = signal<ReadonlyMap<number, Readonly<Record<string, string>>>>(new Map());
   readonly #seen = new Set<string>();
   readonly #stops: (() => void)[];
@@ -113,6 +116,22 @@ export class Groundwork {
   setAnswer(job: ImportJob, question: string, answer: string): void {
     const given = { ...this.#answers.peek().get(job.key), [question]: answer };
     this.#answers.value = new Map(this.#answers.peek()).set(job.key, given);
+  }
+
+  /** A card has shown its questions. */
+  questionsSeen(job: ImportJob): void {
+    this.#read.add(job.key);
+  }
+
+  /** Places what was laid by hand; where there are questions that were out of sight, those come first. */
+  #place(job: ImportJob): void {
+    const left = leftToAsk(job.status?.report?.questions ?? [], this.answersTo(job));
+    if (left.length === 0 || this.#read.has(job.key)) {
+      void this.answer(job);
+      return;
+    }
+    this.asking.value += 1;
+    this.#o.say(left.length === 1 ? "One question about the file first." : "A few questions about the file first.");
   }
 
   /** Sends the answers, with the place where the grid is laid by hand. */
@@ -196,7 +215,7 @@ export class Groundwork {
       report,
       range,
       startingPlace(report, sizeM, first ? 1 : LATER_SHARE, ground),
-      () => void this.answer(current()),
+      () => this.#place(current()),
       () => {
         this.imports.cancel(job.key);
         this.#o.say(`${job.file} was not laid. Drop it again to begin anew.`);

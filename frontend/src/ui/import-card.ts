@@ -85,6 +85,15 @@ export class EskImportCard extends SignalElement {
     `;
   }
 
+  /** Questions count as seen once a frame has shown them: a narrow screen closes the panel when a grid comes to hand. */
+  protected override updated(): void {
+    const { job, stage } = this;
+    if (job.phase !== "question") return;
+    requestAnimationFrame(() => {
+      if (this.isConnected && this.job.key === job.key) stage.groundwork.questionsSeen(job);
+    });
+  }
+
   #report(report: ImportReport, open: boolean): TemplateResult {
     const facts = reportFacts(report);
     return html`

@@ -22,6 +22,14 @@ export function handAnswers({ id }: ImportQuestion): boolean {
   return id === SIZE_QUESTION || id === HEIGHT_QUESTION;
 }
 
+/** What a person is still to be asked while laying a grid by hand. */
+export function leftToAsk(
+  questions: readonly ImportQuestion[],
+  answers: Readonly<Record<string, string>>,
+): readonly ImportQuestion[] {
+  return questions.filter((q) => !handAnswers(q) && !laidByHand(q, answers[q.id] ?? q.default));
+}
+
 /** Whether a coordinate system may be named: not where the file has one and lies elsewhere, which is laid by hand or not at all. */
 export function namesSystem({ id, options }: ImportQuestion): boolean {
   return id === PLACE_QUESTION && !options.includes(STOP);

@@ -90,6 +90,9 @@ export class EskTerrain extends SignalElement {
         const laid = session.stage.value?.input.laying.value ?? null;
         if ((laid !== null || session.past.active.value) && window.matchMedia(NARROW).matches) this.#panel.value = null;
       }),
+      effect(() => {
+        if ((session.stage.value?.groundwork.asking.value ?? 0) > 0) this.#panel.value = "ground";
+      }),
       installTestHook(session),
     ];
   }

@@ -113,6 +113,23 @@ describe("real ground on the page", () => {
     expect(kept).toEqual([]);
   });
 
+  it("asks before it places a grid whose questions were out of sight", async () => {
+    const nodata = { id: "nodata", text: "Is 0 nodata?", options: ["0", "none"], default: "0" };
+    now = { ...question(), report: { ...REPORT, questions: [...REPORT.questions, nodata] } };
+    open();
+    await drop();
+    laying.value!.finish();
+    await vi.advanceTimersByTimeAsync(0);
+    expect(answers).toEqual([]);
+    expect(laying.value).not.toBeNull();
+    expect(work.asking.value).toBe(1);
+    expect(said.at(-1)).toBe("One question about the file first.");
+    work.questionsSeen(work.imports.jobs.value[0]!);
+    laying.value!.finish();
+    await vi.advanceTimersByTimeAsync(0);
+    expect(answers).toMatchObject([{ answers: { size: "fit", nodata: "0" } }]);
+  });
+
   it("gives the file up on Esc", async () => {
     open();
     await drop();
