@@ -6,13 +6,20 @@ import json
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from esker.contract import DEFAULT_LEVEL, DEFAULT_SIZE_M
-from esker.grid import quantum
 from esker.terrain import Terrain
 from tests.e2e.conftest import Server, Visitor, Visitors
-from tests.e2e.hands import COARSE, arch, draw, heights, on_screen, polyline, press_and_move, wait, wait_settled
+from tests.e2e.hands import (
+    COARSE,
+    arch,
+    draw,
+    heights,
+    on_screen,
+    polyline,
+    press_and_move,
+    wait,
+    wait_settled,
+    wait_whole,
+)
 
 CHANNEL = "([name, x, y]) => window.esker.channelAt(name, x, y)"
 
@@ -42,6 +49,7 @@ def test_paint_reaches_everybody_live_and_touches_no_height(visitors: Visitors, 
     ada, ben, terrain, secret = two_people(visitors, server)
     draw(ada, "b", arch(on_screen(ada, 900, 2300), on_screen(ada, 3100, 2500), 110))
     wait_settled(ada, ben)
+    wait_whole(ben)
     ground = heights(ben, COARSE)
     assert max(ground) > 60
 
@@ -72,8 +80,8 @@ def test_paint_reaches_everybody_live_and_touches_no_height(visitors: Visitors, 
         assert channel(person, "snow", *snow) > 0.3
         assert abs(channel(person, "snow", 3900, 3900)) < 0.05
         assert channel(person, "forest", *forest) < -0.3
-    # Tiles out of sight come at rest, so a place may be read off a finer level than before: a quantum apart.
-    assert np.abs(np.subtract(heights(ben, COARSE), ground)).max() <= quantum(DEFAULT_LEVEL, DEFAULT_SIZE_M)
+    wait_whole(ben)
+    assert heights(ben, COARSE) == ground
     assert ada.js("([x, y]) => window.esker.attributesAt(x, y).snow", list(snow)) > 0.5
     ben.shot("paint-2-painted-ben")
 
