@@ -115,6 +115,18 @@ def test_flipped_bytes_raise_or_change_nothing(at: int, value: int) -> None:
     assert out == DOCUMENT
 
 
+def test_a_member_that_begins_before_the_file(tmp_path: Path) -> None:
+    """Byte 100,000 turned to 1 by the test above: the directory of parts says so."""
+    data = bytearray(archive.dumps(DOCUMENT))
+    data[data.rindex(b"PK\x05\x06") + 18] ^= 1  # where the directory begins
+    with pytest.raises(ArchiveError, match="damaged"):
+        archive.loads(bytes(data))
+    file = tmp_path / "a.esker"
+    file.write_bytes(data)
+    with file.open("rb") as opened, pytest.raises(ArchiveError, match="damaged"):
+        archive.unpack(opened, tmp_path)
+
+
 def test_terrain_of_the_design(tmp_path: Path) -> None:
     """The example of DESIGN 5.7."""
     t = Terrain(size_m=4096)

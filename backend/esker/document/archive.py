@@ -8,6 +8,7 @@ is unpacked.
 
 from __future__ import annotations
 
+import errno
 import io
 import json
 import shutil
@@ -158,7 +159,13 @@ def _opened(file: BinaryIO) -> Iterator[zipfile.ZipFile]:
             if len(archive.infolist()) > MAX_MEMBERS:
                 raise ArchiveError("The file has too many parts to be a terrain.")
             yield archive
-    except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, EOFError) as error:
+    except ArchiveError:
+        raise
+    except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, EOFError, ValueError) as error:
+        raise ArchiveError("This is not an .esker file, or it is damaged.") from error
+    except OSError as error:
+        if error.errno != errno.EINVAL:  # what a file says to a member that begins before it
+            raise
         raise ArchiveError("This is not an .esker file, or it is damaged.") from error
 
 
