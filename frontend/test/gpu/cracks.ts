@@ -75,8 +75,10 @@ class HoledView implements TileView {
 }
 
 function camera(kind: Kind, next: () => number, view: TileView): CameraState {
-  const x = 1000 + next() * 2096;
-  const y = 1000 + next() * 2096;
+  // So far from the border of the domain that no sight passes over it.
+  const inland = kind === "above" ? 1300 : 1000;
+  const x = inland + next() * (SIZE - 2 * inland);
+  const y = inland + next() * (SIZE - 2 * inland);
   const ground = heightOf(view, x, y);
   const angle = next() * 2 * Math.PI;
   const along: Vec3 = [Math.cos(angle), Math.sin(angle), 0];
