@@ -79,7 +79,7 @@ function camera(kind: Kind, next: () => number, view: TileView): CameraState {
   const inland = kind === "above" ? 1300 : 1000;
   const x = inland + next() * (SIZE - 2 * inland);
   const y = inland + next() * (SIZE - 2 * inland);
-  const ground = heightOf(view, x, y);
+  const ground = kind === "below" ? heightOf(view, x, y) : ceilingOf(view, x, y);
   const angle = next() * 2 * Math.PI;
   const along: Vec3 = [Math.cos(angle), Math.sin(angle), 0];
   if (kind === "map") return mapCamera([x, y, 0], 300 + next() * 1100, WIDTH, HEIGHT);
@@ -104,6 +104,20 @@ function camera(kind: Kind, next: () => number, view: TileView): CameraState {
 function heightOf(view: TileView, x: number, y: number): number {
   const root = view.tile(0, 0, 0)!;
   return root.heights[Math.round((y / SIZE) * 64) * 65 + Math.round((x / SIZE) * 64)]!;
+}
+
+/** No level that is held has higher ground at a place: an eye inside of the ground sees its sky from below. */
+function ceilingOf(view: TileView, x: number, y: number): number {
+  let highest = Number.NEGATIVE_INFINITY;
+  for (let level = 0; level <= view.levels; level += 1) {
+    const cell = SIZE / (64 << level);
+    const [col, row] = [Math.floor(x / cell), Math.floor(y / cell)];
+    const tile = view.tile(level, col >> 6, row >> 6);
+    if (tile === undefined) break;
+    const at = (row & 63) * 65 + (col & 63);
+    for (const k of [at, at + 1, at + 65, at + 66]) highest = Math.max(highest, tile.heights[k]!);
+  }
+  return highest;
 }
 
 /** Draws `views` random views of random trees. */
