@@ -21,6 +21,7 @@ SHOTS: dict[str, list[str]] = {
     "look-desert": ["canyon", "--sun", "236,20", "--camera", "eye:1500,1400,420,target:2400,2500,60"],
     "look-paper": ["figure-six", "--look", "paper", "--camera", "eye:3500,-2900,2700,target:2080,1850,20"],
     "water": ["volcanic-island", "--sun", "110,12", "--camera", "eye:3500,300,90,target:2200,1900,150"],
+    "lake": ["volcanic-island", "--sun", "128,22", "--camera", "eye:2330,1660,900,target:2050,2130,500"],
     "close-up": [
         *("alpine-ridge", "--sun", "118,25", "--refine", "9"),
         *("--camera", "eye:1400,1640,target:1620,2500,400"),
