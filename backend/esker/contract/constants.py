@@ -101,6 +101,8 @@ LAKE_FREEBOARD_SHARE: Final = 0.25
 """A lake stays below its outlet by so much of a cell, at most this share of its depth: finer ground is not as even."""
 LAKE_SHORE_SAMPLES: Final = 3
 """Ground so many samples around a lake is told of it: finer ground may be lower there."""
+LAKE_FULL_FETCH_M: Final = 3000.0
+"""Wind that has come over so much water raises the waves of the sea."""
 NO_LAKE: Final = -1.0e9
 """Level where there is no lake, metres."""
 DEFAULT_LAKES_FRACTION: Final = 1.0 / 1024.0

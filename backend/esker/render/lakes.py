@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from esker.contract import (
     LAKE_FREEBOARD_CELLS,
     LAKE_FREEBOARD_SHARE,
+    LAKE_FULL_FETCH_M,
     LAKE_LEAST_SAMPLES,
     LAKE_LEVEL,
     LAKE_SHORE_SAMPLES,
@@ -29,8 +30,6 @@ from esker.contract import (
 )
 
 Heights = NDArray[np.float32]
-FULL_FETCH_M: Final = 3000.0
-"""Wind that has come over so much water raises the waves of the sea."""
 _MESH: Final = ((0, 1), (0, -1), (1, 0), (-1, 0), (1, -1), (-1, 1))
 
 
@@ -151,7 +150,7 @@ def levels_on(lakes: Lakes, level: int, column: int, row: int) -> list[float]:
 def waves_of(lakes: Lakes, size_m: float) -> dict[float, float]:
     """Height of the waves on each lake in those of the sea, by their fetch: about the root of it."""
     cell = size_m / (TILE_CELLS << LAKE_LEVEL)
-    return {lake: math.sqrt(min(1.0, math.sqrt(n) * cell / FULL_FETCH_M)) for lake, n in lakes.samples.items()}
+    return {lake: math.sqrt(min(1.0, math.sqrt(n) * cell / LAKE_FULL_FETCH_M)) for lake, n in lakes.samples.items()}
 
 
 def _around(r: int, c: int, rows: int, cols: int) -> Iterator[tuple[int, int]]:

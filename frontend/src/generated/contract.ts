@@ -104,6 +104,8 @@ export const LAKE_FREEBOARD_SHARE = 0.25 as const;
 
 export const LAKE_SHORE_SAMPLES = 3 as const;
 
+export const LAKE_FULL_FETCH_M = 3000.0 as const;
+
 export const NO_LAKE = -1000000000.0 as const;
 
 export const DEFAULT_LAKES_FRACTION = 0.0009765625 as const;

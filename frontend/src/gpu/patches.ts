@@ -1,6 +1,6 @@
 /** The passes that draw patches: ground, sea and walls share the patch records of the cut. */
 
-import { LAKE_LEVEL, type Look, NO_LAKE, PATCH_CELLS, TILE_CELLS } from "../generated/contract.ts";
+import { LAKE_FULL_FETCH_M, LAKE_LEVEL, type Look, NO_LAKE, PATCH_CELLS, TILE_CELLS } from "../generated/contract.ts";
 import { type Lakes, levelsOn } from "../tiles/lakes.ts";
 import type { ShownLakes } from "../tiles/lakewatch.ts";
 import {
@@ -88,9 +88,6 @@ const SHEET_LAYOUT: GPUVertexBufferLayout = {
   ],
 };
 
-/** Wind that has come over so much water raises the waves of the sea, metres. */
-const FULL_FETCH_M = 3000;
-
 /** What water lies on the ground. */
 export interface Waters extends ShownLakes {
   readonly sizeM: number;
@@ -102,7 +99,9 @@ const DRY: Waters = { sizeM: 1, seaM: null, lakes: null, heights: new Map() };
 /** Height of the waves on lakes in those of the sea, by their fetch: about the root of it. */
 export function wavesOf({ samples }: Lakes, sizeM: number): Map<number, number> {
   const cell = sizeM / (TILE_CELLS << LAKE_LEVEL);
-  return new Map([...samples].map(([lake, n]) => [lake, Math.sqrt(Math.min(1, (Math.sqrt(n) * cell) / FULL_FETCH_M))]));
+  return new Map(
+    [...samples].map(([lake, n]) => [lake, Math.sqrt(Math.min(1, (Math.sqrt(n) * cell) / LAKE_FULL_FETCH_M))]),
+  );
 }
 
 /** The cut on the device, drawn by the ground, water and wall pipelines. */
