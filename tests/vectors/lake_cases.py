@@ -7,11 +7,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from esker.contract import NO_LAKE
-from esker.render.lakes import find_lakes
+from esker.contract import LAKE_LEVEL, NO_LAKE, TILE_CELLS
+from esker.render.lakes import find_lakes, waves_of
 
 SIDE = 25
 SCALE = 16
+# The ground as it is asked, and so wide that the largest lakes have the waves of the sea.
+WAVES_CELLS_M = (16.0, 512.0)
 Floats = NDArray[np.float64]
 
 
@@ -47,7 +49,7 @@ def _grounds() -> dict[str, tuple[Floats, dict[str, Any]]]:
 
 
 def lake_vectors() -> list[dict[str, Any]]:
-    """One case a ground: what is asked, and levels and samples that follow."""
+    """One case a ground: what is asked, levels and samples that follow, and the waves on terrains of two sizes."""
     out = []
     for name, (ground, rule) in _grounds().items():
         steps = np.rint(ground * SCALE).astype(np.int64)
@@ -55,5 +57,8 @@ def lake_vectors() -> list[dict[str, Any]]:
         lakes = find_lakes((steps / SCALE).astype(np.float32), asked["cell_m"], asked["least_m"], asked["sea_m"])
         levels = [None if z == NO_LAKE else z for z in lakes.levels.ravel().tolist()]
         samples = sorted(lakes.samples.items())
-        out.append({"name": name, **asked, "ground": steps.ravel().tolist(), "levels": levels, "samples": samples})
+        sizes = [cell * (TILE_CELLS << LAKE_LEVEL) for cell in WAVES_CELLS_M]
+        waves = [{"size_m": size, "heights": sorted(waves_of(lakes, size).items())} for size in sizes]
+        found = {"levels": levels, "samples": samples, "waves": waves}
+        out.append({"name": name, **asked, "ground": steps.ravel().tolist(), **found})
     return out

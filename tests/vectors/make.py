@@ -32,7 +32,7 @@ def build() -> dict[str, str]:
     return {
         "ops.json": text("document + op -> result document, or a refusal code", op_vectors()),
         "undo.json": text("scripts of mine / theirs / undo / redo with the ops and sentences expected", undo_vectors()),
-        "lakes.json": text("ground in sixteenths of a metre, row 0 south -> levels of lakes, metres", lake_vectors()),
+        "lakes.json": text("ground in sixteenths of a metre, row 0 south -> levels of lakes, waves", lake_vectors()),
         "messages.json": text("texts a client may send: accepted, or refused (accept false)", message_vectors()),
     }
 

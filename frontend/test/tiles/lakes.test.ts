@@ -3,6 +3,7 @@
 import { readFileSync } from "node:fs";
 import { describe, expect, it } from "vitest";
 import { NO_LAKE } from "../../src/generated/contract.ts";
+import { wavesOf } from "../../src/gpu/patches.ts";
 import { findLakes, flooded, LAKE_SIDE, lakeGround, levelsOn, Surfaces } from "../../src/tiles/lakes.ts";
 
 interface Case {
@@ -13,6 +14,7 @@ interface Case {
   ground: number[];
   levels: (number | null)[];
   samples: [number, number][];
+  waves: { size_m: number; heights: [number, number][] }[];
 }
 
 const { cases } = JSON.parse(readFileSync(new URL("../../../tests/vectors/lakes.json", import.meta.url), "utf8")) as {
@@ -26,6 +28,14 @@ describe("lakes", () => {
     const lakes = findLakes(ground, side, { cellM: c.cell_m, leastM: c.least_m, seaM: c.sea_m });
     expect([...lakes.levels].map((z) => (z === NO_LAKE ? null : z))).toEqual(c.levels);
     expect([...lakes.samples].sort((a, b) => a[0] - b[0])).toEqual(c.samples);
+    for (const { size_m, heights } of c.waves)
+      expect([...wavesOf(lakes, size_m)].sort((a, b) => a[0] - b[0])).toEqual(heights);
+  });
+
+  it("the waves of the vectors reach those of the sea on wide lakes, and only there", () => {
+    const all = cases.flatMap((c) => c.waves.flatMap((w) => w.heights.map(([, height]) => height)));
+    expect(Math.max(...all)).toBe(1);
+    expect(Math.min(...all)).toBeLessThan(0.4);
   });
 
   it("stand nowhere above the lowest way out", () => {
