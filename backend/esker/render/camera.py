@@ -18,6 +18,10 @@ HOME_HEADING_DEG: Final = 25.0
 HOME_PITCH_DEG: Final = -16.0
 HOME_ELEVATION_DEG: Final = 19.0
 _HOME_MARGIN: Final = 0.06
+_TALL_PITCH_DEG: Final = -2.0
+_TALL_ELEVATION_DEG: Final = 6.0
+_TALL_MARGIN: Final = -0.46
+"""What a picture adds to these that is twice as tall as wide: the page's TALL."""
 _STEEPEST: Final = 0.999
 """Sine of the steepest sight whose upper side is still up; beyond, north is."""
 
@@ -142,23 +146,27 @@ def home(
 ) -> Camera:
     """The page's view of the whole terrain: all of it under a sky that takes the upper third of the picture.
 
+    On a picture taller than wide it comes nearer and cuts off the corners at the left and the right.
+
     ``land``: how high it lies, where that is not about 0.
     """
     ground_m, low_m = land or Land(0.0, 0.0)
-    h, p = math.radians(heading_deg), math.radians(HOME_PITCH_DEG)
+    tall = min(max(2 * (1 - width / height), 0.0), 1.0)
+    h, p = math.radians(heading_deg), math.radians(HOME_PITCH_DEG + tall * _TALL_PITCH_DEG)
     forward = np.array([math.cos(p) * math.sin(h), math.cos(p) * math.cos(h), math.sin(p)])
     right = np.array([math.cos(h), -math.sin(h), 0.0])
     up = np.cross(right, forward)
     corners = [np.array([x, y, z]) for x in (0, size_m) for y in (0, size_m) for z in (ground_m, low_m)]
-    tan = math.tan(math.radians(FOV_DEG) / 2) * (1 - _HOME_MARGIN)
-    lift = math.cos(p) * math.tan(math.radians(HOME_ELEVATION_DEG)) + math.sin(p)
+    tan = math.tan(math.radians(FOV_DEG) / 2)
+    wide, high = tan * width / height * (1 - _HOME_MARGIN - tall * _TALL_MARGIN), tan * (1 - _HOME_MARGIN)
+    lift = math.cos(p) * math.tan(math.radians(HOME_ELEVATION_DEG + tall * _TALL_ELEVATION_DEG)) + math.sin(p)
     half, distance = size_m / 2, size_m / 2
     pivot = np.array([half, half, ground_m])
     for _ in range(9):
         fitted = half
         for corner in corners:
             q = corner - pivot
-            spread = max(abs(q @ up), abs(q @ right) / (width / height)) / tan
+            spread = max(abs(q @ up) / high, abs(q @ right) / wide)
             fitted = max(fitted, spread - q @ forward)
         distance = float(fitted)
         pivot = np.array([half, half, ground_m + lift * distance])

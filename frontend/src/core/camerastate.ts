@@ -1,7 +1,7 @@
 /** From a pose to the matrices that renderers read. Pure. */
 
 import { mat4d } from "wgpu-matrix";
-import { addScaled, DEG, dot, sub } from "./math.ts";
+import { addScaled, clamp, DEG, dot, sub } from "./math.ts";
 import type { CameraState, Vec3 } from "./types.ts";
 
 /** Vertical field of view, degrees; the map covers at its pivot what the perspective view does. */
@@ -39,15 +39,24 @@ export function poseEye(pose: Pose): Vec3 {
 
 /**
  * The smallest distance from the pivot at which all points lie inside the view, kept clear of
- * its border by `margin` (fraction of the half view). The direction of the pose stays.
+ * its border by `margin` (fraction of the half view), at the left and the right by `across` (negative where they may
+ * lie beyond it). The direction of the pose stays.
  */
-export function fitDistance(pose: Pose, points: readonly Vec3[], aspect: number, margin: number, from: number): number {
+export function fitDistance(
+  pose: Pose,
+  points: readonly Vec3[],
+  aspect: number,
+  margin: number,
+  from: number,
+  across = margin,
+): number {
   const { forward, right, up } = poseBasis(pose);
-  const tan = Math.tan((pose.fovDeg * DEG) / 2) * (1 - margin);
+  const tan = Math.tan((pose.fovDeg * DEG) / 2);
+  const [wide, high] = [tan * aspect * (1 - across), tan * (1 - margin)];
   let distanceM = from;
   for (const p of points) {
     const q = sub(p, pose.pivot);
-    const spread = Math.max(Math.abs(dot(q, up)), Math.abs(dot(q, right)) / aspect) / tan;
+    const spread = Math.max(Math.abs(dot(q, up)) / high, Math.abs(dot(q, right)) / wide);
     // In perspective the depth of the point counts: spread <= distance + depth offset.
     distanceM = Math.max(distanceM, pose.mode === "map" ? spread : spread - dot(q, forward));
   }
@@ -61,6 +70,11 @@ export const HOME_PITCH = -16 * DEG;
 /** How high home stands over the land: an angle at its middle. */
 const HOME_ELEVATION = 19 * DEG;
 const HOME_MARGIN = 0.06;
+/**
+ * What a picture adds to these that is twice as tall as wide: there all of the land would be a small tile. The eye stands
+ * higher and so near that the corners at the left and the right are cut off.
+ */
+const TALL = { pitch: -2 * DEG, elevation: 6 * DEG, margin: -0.46 } as const;
 
 /** How high the land lies on the whole, and what of it must be seen at its corners, metres. */
 export interface Land {
@@ -72,22 +86,29 @@ export const FLAT: Land = { groundM: 0, lowM: 0 };
 
 /**
  * The view of the whole terrain. The eye stands higher than its look is steep, so the pivot lies above the middle of the
- * land: that puts the land in the lower two thirds, as large as fits, under a sky. `land`: how high that is.
+ * land: that puts the land in the lower two thirds, as large as fits, under a sky; a tall picture comes nearer (`TALL`).
+ * `land`: how high that is.
  */
 export function homePose(mode: Pose["mode"], sizeM: number, aspect: number, land: Land = FLAT): Pose {
   const { groundM, lowM } = land;
   const half = sizeM / 2;
+  const tall = mode === "map" ? 0 : clamp(2 * (1 - aspect), 0, 1);
+  const pitch = HOME_PITCH + tall * TALL.pitch;
+  const across = HOME_MARGIN + tall * TALL.margin;
   const corners: Vec3[] = [0, sizeM].flatMap((x) =>
     [0, sizeM].flatMap((y): Vec3[] => [
       [x, y, groundM],
       [x, y, lowM],
     ]),
   );
-  const fitted = (pose: Pose): Pose => ({ ...pose, distanceM: fitDistance(pose, corners, aspect, HOME_MARGIN, half) });
+  const fitted = (pose: Pose): Pose => ({
+    ...pose,
+    distanceM: fitDistance(pose, corners, aspect, HOME_MARGIN, half, across),
+  });
   const base = { mode, pivot: [half, half, groundM] as Vec3, distanceM: 1, fovDeg: FOV_DEG };
   if (mode === "map") return fitted({ ...base, heading: 0, pitch: -90 * DEG });
-  const lift = Math.cos(HOME_PITCH) * Math.tan(HOME_ELEVATION) + Math.sin(HOME_PITCH);
-  let pose = fitted({ ...base, heading: HOME_HEADING, pitch: HOME_PITCH });
+  const lift = Math.cos(pitch) * Math.tan(HOME_ELEVATION + tall * TALL.elevation) + Math.sin(pitch);
+  let pose = fitted({ ...base, heading: HOME_HEADING, pitch });
   // The height of the pivot follows from the distance, and that from the height: a few rounds agree to the metre.
   for (let round = 0; round < 8; round++)
     pose = fitted({ ...pose, pivot: [half, half, groundM + lift * pose.distanceM] });

@@ -7,6 +7,8 @@ import { addScaled, distance, distanceXY, dot, normalize, sub } from "../../src/
 import type { Ground, Vec3 } from "../../src/core/types.ts";
 
 const SIZE = 4096;
+/** Eye and pivot of home on 390 × 844 pixels; the same numbers stand in tests/render/test_camera.py. */
+const HOME_TALL = [-2235, -7137, 4725.8, 2048, 2048, 1432.9];
 const flat = (z = 0): Ground => ({ sizeM: SIZE, heightAt: () => z, raycast: () => null });
 const hill: Ground = {
   sizeM: SIZE,
@@ -73,23 +75,34 @@ describe("projection (SPEC I1)", () => {
     expect(c.project(target).visible).toBe(true);
   });
 
-  it("the whole domain is visible from home, on a wide and on a tall canvas", () => {
-    for (const [w, h] of [
-      [1600, 900],
-      [360, 740],
+  it("the whole domain is visible from home on a wide canvas; a tall one cuts off two corners and is filled", () => {
+    for (const [w, h, hidden] of [
+      [1600, 900, 0],
+      [800, 800, 0],
+      [390, 844, 2],
     ] as const) {
       const c = new Camera(SIZE);
       c.resize(w, h);
       c.home(0);
-      for (const x of [0, SIZE]) for (const y of [0, SIZE]) expect(c.project([x, y, 0]).visible).toBe(true);
+      const corners = [0, SIZE].flatMap((x) => [0, SIZE].map((y) => c.project([x, y, 0])));
+      expect(corners.filter((p) => !p.visible).length).toBe(hidden);
+      for (const p of corners) expect(Math.abs(p.x / w - 0.5)).toBeLessThan(0.5 + 0.21);
     }
+  });
+
+  it("on a tall canvas home is that of the reference (tests/render/test_camera.py)", () => {
+    const c = new Camera(SIZE);
+    c.resize(390, 844);
+    c.home(0);
+    const { eye, target } = c.state.value;
+    expect([...eye, ...target].map((v) => Math.round(v * 10) / 10)).toEqual(HOME_TALL);
   });
 
   it("home shows the sky above a horizon in the upper third and the land large below it", () => {
     for (const [w, h, least] of [
       [1440, 900, 0.66],
       [720, 540, 0.72],
-      [360, 740, 0.84],
+      [360, 740, 1.25],
     ] as const) {
       const c = new Camera(SIZE);
       c.resize(w, h);
