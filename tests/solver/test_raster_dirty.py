@@ -8,9 +8,11 @@ from numpy.typing import NDArray
 
 from esker.contract import Stroke, StrokeFields
 from esker.document.strokes import world_points
-from esker.solve.constraints import Packer, bins
+from esker.solve import packing
+from esker.solve.constraints import BIN, Packer, bins, everything, whole
 from esker.solve.device import Device
 from esker.solve.levels import ClWorkspace
+from esker.solve.packing import window_of
 from esker.terrain import Stroke as Make
 from tests.solver.scenes import SCENES, SETTINGS, flank
 
@@ -116,6 +118,37 @@ def test_one_more_point_costs_little(device: Device) -> None:
     w.load([], SETTINGS)
     whole = count(w, [flat])
     assert 0 < count(w, [bump]) < whole / 3
+
+
+@pytest.mark.parametrize("name", ["cross", "fifty", "loops", "bare"])
+def test_what_a_crest_reaches_lies_in_its_window(device: Device, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """SPEC S41: windows leave out bins, at the corners too, of which no bit depends on the crest."""
+    strokes = list(SCENES[name])
+    w, wide = ClWorkspace(device, LEVEL), ClWorkspace(device, LEVEL)
+    count(w, strokes[1:])
+    done = count(w, strokes)
+    monkeypatch.setattr(packing, "window_of", lambda *at: everything(at[-1]))
+    count(wide, strokes[1:])
+    assert done < count(wide, strokes)
+    for a, b in zip(fields(w), fields(wide), strict=True):
+        assert np.array_equal(a, b)
+
+
+def test_windows_are_round() -> None:
+    """A point's window leaves out the corners of the square around what it reaches, and no bin that it touches."""
+    at, reach = np.array([[520.0], [520.0]]), 200.0
+    window = window_of(at, at, reach, whole(5))
+    assert window is not None
+    rows, columns = np.meshgrid(np.arange(64) * BIN, np.arange(64) * BIN, indexing="ij")
+    near = [np.maximum(np.maximum(v - 520, 520 - (v + BIN - 1)), 0) for v in (rows, columns)]
+    touched = np.hypot(*near) <= reach
+    spans = {window.first + j: (int(a), int(b)) for j, (a, b) in enumerate(window.spans)}
+    for row in range(64):
+        inside = np.flatnonzero(touched[row])
+        low, high = spans.get(row, (0, 0))
+        assert (high > low) == bool(len(inside))
+        if len(inside):
+            assert (low, high) == (inside[0], inside[-1] + 1)
 
 
 def test_fields_that_no_table_holds_change_nothing() -> None:

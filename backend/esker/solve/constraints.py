@@ -138,9 +138,9 @@ def _none(_: Stroke) -> bool:
 
 
 def _bins_of(rect: grid.Rect, s: float, box: BinBox) -> Window | None:
-    """The bins of a rectangle."""
+    """The bins of a rectangle, and of the samples right beside it."""
     low, high = (np.array([[v / s] for v in corner]) for corner in ((rect.x0, rect.y0), (rect.x1, rect.y1)))
-    return window_of(low, high, box)
+    return window_of(low, high, 1.0, box)
 
 
 def _changed(

@@ -56,7 +56,7 @@ def _changed_outline(old: Floats, new: Floats, reach: float, box: BinBox) -> Win
     if parts.shape[1] == 0:
         return None
     ends = parts[:2], parts[:2] + parts[2:4]
-    return window_of(np.minimum(*ends) - reach, np.maximum(*ends) + reach, box)
+    return window_of(np.minimum(*ends), np.maximum(*ends), reach, box)
 
 
 def _changed_interval(old: Packed, new: Packed) -> tuple[float, float] | None:
@@ -113,4 +113,4 @@ def _strip(old: Packed, new: Packed, low: float, high: float, box: BinBox) -> Wi
     reach = max(old.params[at["reach"]], new.params[at["reach"]])
     edges = np.linspace(low, high, _PARTS + 1)[:, None] * unit + start
     a, b = edges[:-1].T, edges[1:].T
-    return window_of(np.minimum(a, b) - reach, np.maximum(a, b) + reach, box)
+    return window_of(np.minimum(a, b), np.maximum(a, b), reach, box)

@@ -39,6 +39,9 @@ from esker.solve.tables import (
     Window,
 )
 
+SLACK = 0.05
+"""Cells by which windows are wider than what is felt: the kernels compute distances in float32."""
+
 
 @dataclass(frozen=True)
 class Side:
@@ -169,7 +172,7 @@ def _pack_profile(shape: Shape, s: float, box: BinBox, low: Ints, high: Ints) ->
     reach = shape.reach(tops + shape.ground.half, s)
     ends = (line.start + edges[:, None] * line.unit) / s
     a, b = ends[:-1].T, ends[1:].T
-    window = window_of(np.minimum(a, b) - reach, np.maximum(a, b) + reach, box)
+    window = window_of(np.minimum(a, b), np.maximum(a, b), reach, box)
     if window is None:
         return None
     ux, uy = line.unit.tolist()
@@ -219,11 +222,13 @@ def _pack_outline(shape: Shape, s: float, box: BinBox, low: Ints, high: Ints) ->
     if not near.any() and (spans is None or len(spans) == 0):
         return None
     segments = segments[:, near] if near.any() else segments[:, :1]
-    from_, to = np.minimum(*ends)[:, near] - reach, np.maximum(*ends)[:, near] + reach
+    from_, to = np.minimum(*ends)[:, near], np.maximum(*ends)[:, near]
+    felt = np.full(from_.shape[1], reach)
     if closed:
         from_ = np.column_stack([from_, points.min(axis=0)])
         to = np.column_stack([to, points.max(axis=0)])
-    window = window_of(from_, to, box)
+        felt = np.append(felt, 0.0)
+    window = window_of(from_, to, felt, box)
     if window is None:
         return None
     params = _params(shape, s, reach)
@@ -266,15 +271,19 @@ def _params(shape: Shape, s: float, reach: float) -> Floats:
     return out
 
 
-def window_of(low: Floats, high: Floats, box: BinBox) -> Window | None:
-    """The bins of a box that rectangles (2, m) low .. high in cells touch, row by row; None of none."""
+def window_of(low: Floats, high: Floats, reach: Floats | float, box: BinBox) -> Window | None:
+    """The bins of a box of which a sample may be within ``reach`` (one, or one each) of rectangles (2, m) low .. high,
+    all in cells, row by row; None of none. Corners are round, as what a crest reaches is."""
     by0, by1, bx0, bx1 = box
-    low, high = np.floor(low / BIN), np.ceil(high / BIN)
-    first, last = (min(max(int(v), by0), by1) for v in (low[1].min(), high[1].max() + 1))
-    row = np.arange(first, last)
-    meets = (low[1][:, None] <= row) & (row <= high[1][:, None])
-    left = np.where(meets, low[0][:, None], bx1).min(axis=0, initial=bx1)
-    right = np.where(meets, high[0][:, None] + 1, bx0).max(axis=0, initial=bx0)
+    reach = reach + SLACK
+    ends = (low[1] - reach).min() / BIN, (high[1] + reach).max() / BIN + 1
+    first, last = (min(max(math.floor(v), by0), by1) for v in ends)
+    south = np.arange(first, last)[:, None] * float(BIN)
+    away = np.maximum(np.maximum(low[1] - (south + BIN - 1), south - high[1]), 0.0)
+    square = reach * reach - away * away
+    meets, half = square >= 0, np.sqrt(np.maximum(square, 0.0))
+    left = np.where(meets, np.ceil((low[0] - half - (BIN - 1)) / BIN), bx1).min(axis=1, initial=bx1)
+    right = np.where(meets, np.floor((high[0] + half) / BIN) + 1, bx0).max(axis=1, initial=bx0)
     spans = np.array([left, np.maximum(left, right)]).T
     spans = np.minimum(np.maximum(spans, bx0), bx1).astype(np.int32)
     return Window(first, spans) if (spans[:, 1] > spans[:, 0]).any() else None
