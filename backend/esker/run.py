@@ -22,6 +22,7 @@ from websockets.protocol import State
 from esker import contract as c
 from esker.document.ops import Limits
 from esker.elevation import Elevation
+from esker.http_protocol import HttpProtocol
 from esker.importing import run as importing
 from esker.imports import Imports
 from esker.render.previews import Previews
@@ -38,6 +39,7 @@ from esker.solve.solver import Solver as OpenClSolver
 from esker.store.access import Access
 from esker.store.grids import FOLDER, GridStore
 from esker.store.journal import Journal
+from esker.store.lock import DataLock, InUse
 from esker.store.previews import PreviewTokens
 from esker.tiles.delivery import ClientTiles, TileServer
 from esker.tiles.pyramid import warm
@@ -142,6 +144,7 @@ class Assembly:
         self._context: ssl.SSLContext | None = None
         self._worker: Worker | None = None
         self._journal: Journal | None = None
+        self._lock: DataLock | None = None
         self._backups: _Backups | None = None
         self.imports: Imports | None = None
         """Once there is a server."""
@@ -159,6 +162,10 @@ class Assembly:
 
     def _open(self, make_solver: SolverFactory) -> None:
         settings = self.settings
+        try:
+            self._lock = DataLock(settings.data)
+        except InUse as error:
+            raise CannotServe(str(error)) from None
         self._context = server_context(settings.data, self.address) if settings.lan else None
         self._journal = Journal(settings.data)
         self._grids = GridStore(settings.data)
@@ -226,6 +233,8 @@ class Assembly:
             self._worker.stop()
         if self._journal is not None:
             self._journal.close()
+        if self._lock is not None:
+            self._lock.release()
         self._listener.close()
 
 
@@ -271,7 +280,7 @@ def _config(app: Any, settings: Settings, context: ssl.SSLContext | None) -> uvi
         ws_per_message_deflate=False,
         ws_ping_interval=20,
         ws_ping_timeout=20,
-        http="httptools",
+        http=HttpProtocol,
         log_config=None,
         access_log=False,
         server_header=False,

@@ -246,7 +246,7 @@ def test_codes_end_after_fifteen_minutes(tmp_path: Path) -> None:
     now = [1000.0]
     journal = Journal(tmp_path)
     access = Access(journal, lambda: now[0])
-    code = access.make_code("t", "edit")
+    code = access.make_code("t", "edit", "l")
     now[0] += CODE_SECONDS - 1
     assert access.open_code(code) == ("t", "edit")
     now[0] += 2

@@ -60,7 +60,7 @@ def add_errors(app: FastAPI) -> None:
 
     @app.exception_handler(HTTPException)
     async def http(_: Request, error: HTTPException) -> JSONResponse:
-        code = {404: "not_found", 405: "not_allowed"}.get(error.status_code, "error")
+        code = {404: "not_found", 405: "not_allowed", 413: "too_large"}.get(error.status_code, "error")
         sentence = {404: "There is nothing at this address.", 405: "This address does not do that."}
         return answer(error.status_code, code, sentence.get(error.status_code, str(error.detail)))
 

@@ -13,6 +13,7 @@ from fastapi import FastAPI
 from esker.headers import Headers
 from esker.imports import Imports
 from esker.server.answers import add_errors
+from esker.server.bodies import Bodies
 from esker.server.history import add_history
 from esker.server.imports import add_imports
 from esker.server.links import add_links
@@ -52,6 +53,7 @@ def create_app(hub: Hub, page: Path, data: Path, pictures: Pictures, grids: Grid
         openapi_url="/api/openapi.json",
         lifespan=lifespan,
     )
+    app.add_middleware(Bodies)
     app.add_middleware(Headers)
     app.state.hub = hub
     app.state.new_terrains = RateByKey(*NEW_TERRAINS)

@@ -61,6 +61,7 @@ def add_links(app: FastAPI, hub: Hub) -> None:
         secret = await asyncio.wrap_future(access.rotate(terrain, link_id))
         if secret is None:
             raise Problem(404, "no_link", "There is no such link, or it was revoked.")
+        access.drop_codes(link_id)
         if link_id != link.id:
             hub.revoke_members(terrain, link_id)
         else:  # whoever asked has the new secret in a moment and comes back; nobody else with the old one does
@@ -73,13 +74,14 @@ def add_links(app: FastAPI, hub: Hub) -> None:
             raise Problem(409, "own_link", "You cannot revoke the link that you came in by; rotate it instead.")
         if not await asyncio.wrap_future(access.revoke(terrain, link_id)):
             raise Problem(404, "no_link", "There is no such link, or it was revoked already.")
+        access.drop_codes(link_id)
         hub.revoke_members(terrain, link_id)
 
     @app.post("/api/terrains/{terrain}/codes", status_code=201)
     async def new_code(terrain: str, link: AnyLink, body: NewCode) -> dict[str, Any]:
         if link.role == "view" or (link.role == "edit" and body.role == "owner"):
             raise Problem(403, "not_allowed", "Your link does not allow you to invite people in this role.")
-        return {"code": access.make_code(terrain, body.role), "expires_s": CODE_SECONDS}
+        return {"code": access.make_code(terrain, body.role, link.id), "expires_s": CODE_SECONDS}
 
     @app.post("/api/join")
     async def join(request: Request, body: JoinCode) -> dict[str, str]:

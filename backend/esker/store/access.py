@@ -24,6 +24,8 @@ CODE_ALPHABET: Final = "ABCDEFGHJKMNPQRSTUVWXYZ23456789"
 """No 0/O, 1/I/L: codes are read from a wall and typed by hand."""
 MAX_LINKS: Final = 2_000
 """Live links per terrain. Links made by join codes count too."""
+MAX_CODES: Final = 16
+"""Live join codes that one link may have made; with one more its oldest ends."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +44,7 @@ class Link:
 class _Code:
     terrain: str
     role: Role
+    link: str
     expires: float
 
 
@@ -121,13 +124,19 @@ class Access:
 
         return self._journal.submit(write)
 
-    def make_code(self, terrain: str, role: Role) -> str:
-        """A join code that opens the terrain in this role for fifteen minutes, as often as it is typed."""
+    def make_code(self, terrain: str, role: Role, link: str) -> str:
+        """A join code that opens the terrain in this role for fifteen minutes, as often as it is typed.
+
+        ``link``: the id of the link by which it is made; when that ends, so do its codes.
+        """
         self._forget_old()
+        own = [digest for digest, code in self._codes.items() if code.link == link]
+        for digest in own[: max(0, len(own) + 1 - MAX_CODES)]:
+            del self._codes[digest]
         while True:
             code = "".join(secrets.choice(CODE_ALPHABET) for _ in range(CODE_LENGTH))
             if hashed(code) not in self._codes:
-                self._codes[hashed(code)] = _Code(terrain, role, self._now() + CODE_SECONDS)
+                self._codes[hashed(code)] = _Code(terrain, role, link, self._now() + CODE_SECONDS)
                 return code
 
     def open_code(self, code: str) -> tuple[str, Role] | None:
@@ -136,9 +145,9 @@ class Access:
         found = self._codes.get(hashed(code.strip().upper().replace(" ", "").replace("-", "")))
         return None if found is None else (found.terrain, found.role)
 
-    def drop_codes(self, terrain: str) -> None:
-        """Ends every join code of a terrain."""
-        self._codes = {k: v for k, v in self._codes.items() if v.terrain != terrain}
+    def drop_codes(self, link: str) -> None:
+        """Ends every join code that was made by this link."""
+        self._codes = {k: v for k, v in self._codes.items() if v.link != link}
 
     def _forget_old(self) -> None:
         now = self._now()
