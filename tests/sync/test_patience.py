@@ -1,4 +1,4 @@
-"""Who takes a server's memory, descriptors or places and gives nothing back (SPEC P121 to P124)."""
+"""Who takes a server's memory, descriptors or places and gives nothing back (SPEC P121 to P125)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from esker import http_protocol
 from esker.run import CannotServe
 from esker.store.access import MAX_CODES, Access
 from esker.store.journal import Journal
-from tests.sync.harness import LiveServer, raw_socket
+from tests.sync.harness import LiveServer, raw_socket, sleeping_member
 
 
 @pytest.fixture
@@ -141,3 +141,22 @@ def test_the_codes_of_a_link_are_few_and_end_with_it(tmp_path: Path, server: Liv
     made = server.http("POST", f"/api/terrains/{terrain}/codes", {}, link["secret"])[1]["code"]
     assert server.raw("DELETE", f"/api/terrains/{terrain}/links/{link['id']}", secret=owner)[0] == 204
     assert server.http("POST", "/api/join", {"code": made})[1]["code"] == "bad_code"
+
+
+def test_who_reads_a_long_document_slowly_gets_it_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(c, "STALL_SECONDS", 1.0)
+    strokes = tuple(
+        c.Stroke(id=f"s{i}", kind="profile", first=(0, 0, 0), last=(9, 9, 9), curve=((0.1234567, 7.654321),) * 4096)
+        for i in range(30)
+    )
+    with LiveServer(tmp_path) as server:
+        terrain, secret = server.create(strokes=strokes)
+        with sleeping_member(server.port, terrain, secret) as tcp:
+            tcp.settimeout(10)
+            began, got = time.monotonic(), 0
+            while got < 2_300_000:  # of 2.5 MB, 0.9 a second
+                part = tcp.recv(65536)
+                assert part, f"dropped after {got} bytes"
+                got += len(part)
+                time.sleep(max(0.0, began + got / 900_000 - time.monotonic()))
+        assert time.monotonic() - began > 2 * c.STALL_SECONDS

@@ -66,10 +66,15 @@ def test_a_frame_made_once_arrives_as_a_text_and_not_after_the_end() -> None:
         assert isinstance(wire.take()[0], Response)
         for size in (0, 125, 126, 65_535, 65_536, route.SHARED_CHARACTERS + 1):
             text = "é" * size
-            await route._Transport(Mock(scope=wire.scope)).send_text(text)
-            (frame,) = wire.take()
-            assert isinstance(frame, Frame)
-            assert bytes(frame.data).decode() == text
+            went_on = Mock()
+            await route._Transport(Mock(scope=wire.scope)).send_text(text, went_on)
+            frames = wire.take()
+            assert all(isinstance(frame, Frame) for frame in frames)
+            assert b"".join(bytes(frame.data) for frame in frames).decode() == text
+            long = size > route.SHARED_CHARACTERS
+            assert len(frames) == (-(-2 * size // route.FRAGMENT_BYTES) if long else 1)
+            assert went_on.call_count == (len(frames) if long else 0)
+            assert [frame.fin for frame in frames] == [False] * (len(frames) - 1) + [True]
         wire.client.send_close()
         wire.give()
         with pytest.raises(ConnectionResetError):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from contextlib import suppress
 from functools import lru_cache
 from typing import Any, Final
@@ -24,11 +24,21 @@ log = logging.getLogger("esker.server")
 SHARED_TEXTS: Final = 16
 SHARED_CHARACTERS: Final = 1 << 18
 """Frames of so many of the last texts are kept, up to this length: what everybody in a room is told is framed once."""
+FRAGMENT_BYTES: Final = 1 << 16
+"""Longer texts go in frames of this size (RFC 6455, 5.4): it shows that a peer reads them, however slowly."""
 
 
 def _frame(text: str) -> bytes:
     """A text as a frame of the websocket, as a server sends it: whole and without a mask (RFC 6455, 5.2)."""
     return Frame(Opcode.TEXT, text.encode()).serialize(mask=False)
+
+
+def _fragments(text: str) -> Iterator[bytes]:
+    """The same in several frames."""
+    data = text.encode()
+    for start in range(0, len(data), FRAGMENT_BYTES):
+        opcode, end = Opcode.CONT if start else Opcode.TEXT, start + FRAGMENT_BYTES
+        yield Frame(opcode, data[start:end], fin=end >= len(data)).serialize(mask=False)
 
 
 _framed = lru_cache(SHARED_TEXTS)(_frame)
@@ -42,11 +52,15 @@ class _Transport:
         self._write: Callable[[bytes], Awaitable[None]] | None = socket.scope.get("esker.write")
         self._abort: Callable[[], None] | None = socket.scope.get("esker.abort")
 
-    async def send_text(self, text: str) -> None:
+    async def send_text(self, text: str, went_on: Callable[[], None]) -> None:
         if self._write is None:
             await self._send({"type": "websocket.send", "text": text})
-            return
-        await self._write(_framed(text) if len(text) <= SHARED_CHARACTERS else _frame(text))
+        elif len(text) <= SHARED_CHARACTERS:
+            await self._write(_framed(text))
+        else:
+            for fragment in _fragments(text):
+                await self._write(fragment)
+                went_on()
 
     async def send_bytes(self, data: bytes) -> None:
         await self._send({"type": "websocket.send", "bytes": data})
@@ -89,7 +103,7 @@ def add_socket(app: FastAPI, hub: Hub) -> None:
             log.info("closed a connection from %s: bad_origin", address(socket))
             text = c.ErrorMessage(code="bad_origin", message=sentence, fatal=True).model_dump_json()
             with suppress(ConnectionResetError):
-                await transport.send_text(text)
+                await transport.send_text(text, lambda: None)
                 await transport.close(c.WS_CLOSE["bad_origin"], sentence)
             return
         await Session(hub, transport, address(socket), subprotocol).run(_messages(socket))

@@ -25,10 +25,11 @@ GOODBYE_SECONDS: Final = 1.0
 class Transport(Protocol):
     """One websocket. ``send_*`` return when the socket has room again; ``abort`` drops it without a farewell.
 
-    All but ``abort`` raise ConnectionError when the peer is gone.
+    All but ``abort`` raise ConnectionError when the peer is gone. ``went_on`` is called whenever a part of a long text
+    has left.
     """
 
-    async def send_text(self, text: str) -> None: ...
+    async def send_text(self, text: str, went_on: Callable[[], None]) -> None: ...
 
     async def send_bytes(self, data: bytes) -> None: ...
 
@@ -116,22 +117,26 @@ class Session:
             await self._wake.wait()
             self._wake.clear()
             while (text := self.outbox.pop()) is not None:
-                self._sending_since = self._now()
-                await self._transport.send_text(text)
+                self._went_on()
+                await self._transport.send_text(text, self._went_on)
             if self.outbox.closing is not None:
                 await self._farewell(*self.outbox.closing)
                 return
             if self._room is not None and self._guest is not None:
                 frame = self._room.frame(self._guest)
                 if frame is not None:
-                    self._sending_since = self._now()
+                    self._went_on()
                     await self._transport.send_bytes(frame)
                     self._wake.set()
             self._sending_since = None
 
+    def _went_on(self) -> None:
+        self._sending_since = self._now()
+
     async def _farewell(self, code: c.CloseCode, reason: str) -> None:
         log.info("closed a connection from %s: %s (%s)", self._address, code, reason)
-        await self._transport.send_text(c.ErrorMessage(code=code, message=reason, fatal=True).model_dump_json())
+        text = c.ErrorMessage(code=code, message=reason, fatal=True).model_dump_json()
+        await self._transport.send_text(text, self._went_on)
         await self._transport.close(c.WS_CLOSE[code], reason[:120])
 
     async def _watch(self) -> None:
