@@ -64,7 +64,7 @@ inline void sweep_row(row_t out, crow_t south, crow_t here, crow_t north, crow_t
     }
 }
 
-// `sweeps` (even) Chebyshev-Jacobi sweeps of u, right on rows [y0, y1) and columns [x0, x1) of the window: sweep k does as
+// `sweeps` (even) weighted Jacobi sweeps of u, right on rows [y0, y1) and columns [x0, x1) of the window: sweep k does as
 // many samples more on each side as sweeps follow it. v: a second array like u. As a wave: when sweep 0 does row t,
 // sweep k does row t - k, and overwrites what sweep k - 2 left there. u, v: channel `channel` onwards; f from its
 // beginning. d and q are shared. Global size (channels).

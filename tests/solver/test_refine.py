@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import random
 import tracemalloc
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 import pytest
@@ -18,6 +18,8 @@ from esker.solve.device import Device
 from esker.solve.refine import FieldCache, RefinedTile, Refiner
 from esker.solve.refine_cl import ClEngine
 from esker.solve.refine_engine import (
+    GRADIENT_LOW,
+    HEIGHT_SWEEPS,
     Engine,
     Fields,
     NumpyEngine,
@@ -25,8 +27,9 @@ from esker.solve.refine_engine import (
     Span,
     Step,
     StrokeWindows,
+    gradient_weights,
+    height_weights,
     step,
-    sweep_weights,
 )
 from esker.solve.refine_strokes import Strokes
 from esker.solve.solver import Basis, Solver
@@ -233,6 +236,35 @@ def test_a_closed_run_harms_nothing_and_what_it_made_is_kept(engine: ClEngine, b
     assert list(made(refiner, [keys[0], keys[0]])) == [keys[0]]
 
 
+def test_who_is_in_a_hurry_waits_for_no_device(engine: ClEngine, basis: Basis) -> None:
+    """SPEC S53: None comes while the device works, however often, and changes no bit."""
+    keys = patch(LOW + 3, 2, 2, 5)
+    calm = list(Refiner(basis, engine, FieldCache()).tiles(keys))
+    engine.clear()
+    hasty: list[RefinedTile | None] = []
+    calls = 0
+
+    def urgent() -> bool:
+        nonlocal calls
+        calls += 1
+        return calls % 3 > 0
+
+    hasty = list(Refiner(basis, engine, FieldCache()).tiles(keys, urgent))
+    assert hasty.count(None) - calm.count(None) == sum(k % 3 > 0 for k in range(1, calls + 1)) > 0
+    assert [t and (t.key, t.heights.tobytes()) for t in hasty if t] == [
+        t and (t.key, t.heights.tobytes()) for t in calm if t
+    ]
+
+
+def test_bands_of_bins_do_not_change_bits(engine: ClEngine, basis: Basis, monkeypatch: pytest.MonkeyPatch) -> None:
+    """SPEC S51: what is rasterised at a stretch is only a matter of time."""
+    keys = patch(LOW + 3, 2, 2, 3)
+    expected = bits(made(Refiner(basis, engine, FieldCache()), keys))
+    monkeypatch.setattr("esker.solve.refine_cl.BAND_BINS", 20)
+    engine.clear()
+    assert bits(made(Refiner(basis, engine, FieldCache()), keys)) == expected
+
+
 def test_no_step_is_longer_than_a_group(engine: ClEngine, basis: Basis) -> None:
     """SPEC S53: None after every step, so that solves take precedence."""
     counting = Counting(engine)
@@ -314,17 +346,26 @@ def test_windows_for_exports(engine: ClEngine, basis: Basis) -> None:
             wrong()
 
 
-def test_the_sweeps_damp_what_they_promise() -> None:
-    """The polynomial of the sweeps is small on its interval in float32, in the order in which it is applied."""
-    for count in (16, 64):
-        product = np.ones(400, dtype=np.float32)
-        growth = 0.0
-        at = np.linspace(16 / count**2, 2.0, 400).astype(np.float32)
-        for w in sweep_weights(count).astype(np.float32):
+@pytest.mark.parametrize(
+    ("weights", "low", "most"), [(gradient_weights, GRADIENT_LOW, 6e-3), (height_weights, 0.25, 1.5e-2)]
+)
+def test_the_sweeps_damp_what_they_promise(weights: Callable[[], NDArray[np.float64]], low: float, most: float) -> None:
+    """Their polynomial is small in float32, in the order in which they are done, from the start and from the end."""
+    at = np.linspace(0, 2, 8001).astype(np.float32)
+    for order in (weights(), weights()[::-1]):
+        product, growth = np.ones_like(at), 0.0
+        for w in order.astype(np.float32):
             product = product * (1 - w * at)
             growth = max(growth, float(np.abs(product).max()))
-        assert np.abs(product).max() < 0.02
-        assert growth < 200
+        assert np.abs(product[at >= low]).max() < most
+        assert growth < 400
+
+
+def test_the_sweeps_of_the_height_are_the_best_in_the_mean() -> None:
+    """SPEC S55: no polynomial of degree n with p(0) = 1 has a smaller integral of its square over [0, 2]."""
+    nodes, shares = np.polynomial.legendre.leggauss(HEIGHT_SWEEPS + 1)
+    product = np.prod(1 - height_weights()[:, None] * (1 + nodes), axis=0)
+    assert (shares * product**2).sum() == pytest.approx(2 / (HEIGHT_SWEEPS + 1) ** 2, rel=1e-9)
 
 
 def test_steps_under_way_of_two_refiners_do_not_mix(engine: ClEngine, basis: Basis, solver: Solver) -> None:

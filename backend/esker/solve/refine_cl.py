@@ -1,12 +1,15 @@
 """Steps of refinement on an OpenCL device, row by row (shaders/opencl/refine.cl); twin ``refine_engine.NumpyEngine``.
 
 Two steps may be under way: while the sweeps of one run, which take one core of a CPU, the host prepares the next one.
+What waits in a queue is kept short, as who draws waits for it: bins are rasterised some at a time, and the sweeps are
+enqueued when all of them are done.
 """
 
 from __future__ import annotations
 
 import weakref
 from collections import deque
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any, Final
 
@@ -29,13 +32,17 @@ from esker.solve.refine_engine import (
     Step,
     StrokeWindows,
     Values,
-    sweep_weights,
+    gradient_weights,
+    height_weights,
     with_ghosts,
 )
-from esker.solve.refine_sheets import Sheets, exchange, missing
+from esker.solve.refine_sheets import Part, Sheets, exchange, missing
+from esker.solve.tables import Tables, Window
 
 AHEAD: Final = 2
 """Steps under way at once: each has memory of its own."""
+BAND_BINS: Final = 128
+"""Bins rasterised at a stretch: 4 ms on two cores where sixty strokes meet."""
 _STRIPS_ROWS: Final = 64
 
 _MEMORY: Final = {"u": 3, "v": 3, "gd": 1, "gf": 2, "hd": 1, "hf": 1, "q": 2, "rhs": 1}
@@ -63,6 +70,8 @@ class ClEngine:
         room = self._rooms[0]
         self._rooms.rotate(-1)
         room.make_free()
+        for other in self._rooms:
+            other.share()
         with guarded(self.device):
             return room.begin(at, strokes, parent, self.sheets)
 
@@ -70,16 +79,46 @@ class ClEngine:
 class _Flight:
     """A step that a room's queue works on."""
 
-    def __init__(self, room: _Room, span: Span, pitch: int) -> None:
+    def __init__(self, room: _Room, constraining: Iterator[Any], relax: Callable[[], Any], span: Span, pitch: int):
+        """``constraining`` enqueues the constraints bit by bit, and gives out the events to wait for in between;
+        ``relax`` enqueues the rest and returns the last event."""
         self._room, self._span, self._pitch = room, span, pitch
+        self._constraining, self._relax = constraining, relax
+        self._event: Any = None
         self._made: Fields | None = None
+        self.prepared = False
+        self._go_on()
+
+    def poll(self) -> bool:
+        """See ``Pending``."""
+        with guarded(self._room.device):
+            while self._event is not None and self._room.complete(self._event):
+                self._go_on()
+        return self._event is None
+
+    def prepare(self) -> None:
+        """See ``Pending``."""
+        self._wait(lambda: self.prepared)
 
     def fields(self) -> Fields:
         """See ``Pending``."""
         if self._made is None:
+            self._wait(lambda: self._event is None)
             with guarded(self._room.device):
                 self._made = self._room.read(self._span, self._pitch)
         return self._made
+
+    def _wait(self, until: Callable[[], bool]) -> None:
+        with guarded(self._room.device):
+            while not until():
+                self._event.wait()
+                self._go_on()
+
+    def _go_on(self) -> None:
+        """Enqueues what follows the event that has come."""
+        self._event = next(self._constraining, None)
+        if self._event is None and not self.prepared:
+            self.prepared, self._event = True, self._relax()
 
 
 class _Room:
@@ -92,7 +131,8 @@ class _Room:
             queue = cl.CommandQueue(device.context, device.context.devices[0])
             self.device = device
             self.launch = Launcher(replace(device, queue=queue), 0)
-            self.weights = {k: self.launch.constant(sweep_weights(k).astype(np.float32)) for k in _counts()}
+            weights = {GRADIENT_SWEEPS: gradient_weights(), HEIGHT_SWEEPS: height_weights()}
+            self.weights = {k: self.launch.constant(w.astype(np.float32)) for k, w in weights.items()}
         self.stride = 0
         self.fields: dict[str, Any] = {}
         self._flight: weakref.ref[_Flight] | None = None
@@ -103,6 +143,25 @@ class _Room:
         flight = None if here is None else here()
         if flight is not None:
             flight.fields()
+
+    def share(self) -> None:
+        """Has the constraints of the step that is here, if anybody wants it, in the sheets."""
+        flight = None if self._flight is None else self._flight()
+        if flight is not None:
+            flight.prepare()
+
+    def complete(self, event: Any) -> bool:
+        """Whether what was enqueued up to an event is done. Raises DeviceError where it failed."""
+        status = event.command_execution_status
+        if status < 0:
+            event.wait()
+        return bool(status == self.launch.cl.command_execution_status.COMPLETE)
+
+    def _mark(self) -> Any:
+        """The event of all that was enqueued so far."""
+        event = self.launch.cl.enqueue_marker(self.launch.queue)
+        self.launch.queue.flush()
+        return event
 
     def _reserve(self, stride: int, based: bool) -> None:
         """Memory for windows of ``stride`` floats a channel, over a base if ``based``."""
@@ -115,53 +174,74 @@ class _Room:
 
     def begin(self, at: Step, strokes: StrokeWindows, parent: Fields, sheets: Sheets) -> Pending:
         """Has the queue make ``at.core``'s fields; the room is free."""
-        i, f = np.int32, np.float32
+        rows, core, window = at.window.shape[0], at.core, at.window
+        pitch = PAD + (at.box[3] - at.box[2]) * BIN + PAD
+        self._reserve(rows * pitch, strokes.base is not None)
+        span = Span(core.r0 - window.r0, core.r1 - window.r0, core.c0 - window.c0, core.c1 - window.c0)
         spacing = grid.spacing(at.level, strokes.settings.size_m)
         reach = strokes.settings.reach_m
         screening = 0.0 if reach is None else (spacing / reach) ** 2
-        rows, columns = at.window.shape
-        pitch = PAD + (at.box[3] - at.box[2]) * BIN + PAD
-        self._reserve(rows * pitch, strokes.base is not None)
-        a, stride, run = self.fields, self.stride, self.launch.run
-        self._constrain(at, strokes, pitch, spacing, sheets)
+
+        def relax() -> Any:
+            return self._relaxed(at, with_ghosts(parent, at), span, pitch, spacing, screening)
+
+        flight = _Flight(self, self._constrain(at, strokes, pitch, spacing, sheets), relax, span, pitch)
+        self._flight = weakref.ref(flight)
+        return flight
+
+    def _relaxed(self, at: Step, parent: Fields, span: Span, pitch: int, spacing: float, screening: float) -> Any:
+        """Enqueues prolongation and sweeps; their event."""
+        i, f, (rows, columns) = np.int32, np.float32, at.window.shape
+        a, stride, run, each = self.fields, self.stride, self.launch.run, _STRIPS_ROWS
         shape = (i(rows), i(columns), i(pitch), i(stride))
-        each = _STRIPS_ROWS
         strips = -(-rows // each)
-        host = _padded(with_ghosts(parent, at), rows, columns)
+        host = _padded(parent, rows, columns)
         run(
             "refine_start", (strips, CHANNELS), self.launch.constant(host), i(host.shape[2]),
             i(host.shape[1] * host.shape[2]), a["gd"], a["hd"], a["hf"], a["u"], a["q"], *shape, f(screening),
             i(each),
         )  # fmt: skip
-        core = at.core
-        target_span = Span(
-            core.r0 - at.window.r0, core.r1 - at.window.r0, core.c0 - at.window.c0, core.c1 - at.window.c0
-        )
-        wide = target_span.grown(HEIGHT_SWEEPS + 1, 1 << 30)
+        wide = span.grown(HEIGHT_SWEEPS + 1, 1 << 30)
         wide = Span(wide.r0, min(rows, wide.r1), wide.c0, min(columns, wide.c1))
         self._sweep(2, 0, "gf", "gd", 0, shape, screening, GRADIENT_SWEEPS, wide)
         run("refine_guide", (strips,), a["u"], a["hd"], a["hf"], a["rhs"], *shape, f(spacing), i(each))
-        self._sweep(1, 2, "rhs", "hd", 1, shape, screening, HEIGHT_SWEEPS, target_span)
-        self.launch.queue.flush()
-        flight = _Flight(self, target_span, pitch)
-        self._flight = weakref.ref(flight)
-        return flight
+        self._sweep(1, 2, "rhs", "hd", 1, shape, screening, HEIGHT_SWEEPS, span)
+        return self._mark()
 
-    def _constrain(self, at: Step, strokes: StrokeWindows, pitch: int, spacing: float, sheets: Sheets) -> None:
+    def _constrain(self, at: Step, strokes: StrokeWindows, pitch: int, spacing: float, sheets: Sheets) -> Iterator[Any]:
         """The constraints of the window: bins that are known from the sheets, the others from the rasteriser."""
-        a, cl, queue, base = self.fields, self.launch.cl, self.launch.queue, strokes.base
+        a, base = self.fields, strokes.base
         kept = [("hd", 1), ("hf" if base is None else "raw", 1), ("gd", 1), ("gf", 2)]
         kept += [] if base is None else [("share", 1), ("target", 1)]
         parts = sheets.parts(at.level, at.box, strokes.sheet_digest, sum(channels for _, channels in kept))
         fresh = missing(parts, at.box)
-        (rows, columns), both = at.window.shape, cl.map_flags.READ | cl.map_flags.WRITE
         over = None
         if base is not None:
             self._put_base(base.window(at.level, at.window), pitch)
             over = raster.Over(a["base"], a["share"], a["target"])
         if fresh.width:
             target = raster.Target(a["hd"], a[kept[1][0]], a["gd"], a["gf"], pitch, self.stride, over)
-            raster.rasterise(self.launch, strokes.shared_tables(at.level, at.box), fresh, target)
+            yield from self._rasterised(strokes.shared_tables(at.level, at.box), fresh, target)
+        self._exchanged(kept, parts, fresh, at, pitch)
+        sheets.trim()
+        if base is not None:
+            fields = [a[name] for name in ("base", "share", "target", "hd", "raw", "hf")]
+            rows, columns = at.window.shape
+            over_base(self.launch, fields, spacing, (rows, columns), pitch, (0, rows))
+
+    def _rasterised(self, tables: Tables, fresh: Window, target: raster.Target) -> Iterator[Any]:
+        """Two bands of bins are in the queue at once, until all are done."""
+        loaded, events = raster.load(self.launch, tables), deque[Any]()
+        for band in fresh.bands(BAND_BINS):
+            raster.rasterise(self.launch, tables, band, target, loaded)
+            events.append(self._mark())
+            if len(events) > 1:
+                yield events.popleft()
+        yield from events
+
+    def _exchanged(self, kept: list[tuple[str, int]], parts: list[Part], fresh: Window, at: Step, pitch: int) -> None:
+        cl, queue, a = self.launch.cl, self.launch.queue, self.fields
+        (rows, columns), both = at.window.shape, cl.map_flags.READ | cl.map_flags.WRITE
         views, maps = [], []
         for name, channels in kept:
             host, _ = cl.enqueue_map_buffer(queue, a[name], both, 0, (a[name].size // 4,), np.float32)
@@ -172,10 +252,6 @@ class _Room:
         exchange(parts, fresh, at.box, views)
         for host in maps:
             host.base.release(queue)
-        sheets.trim()
-        if base is not None:
-            fields = [a[name] for name in ("base", "share", "target", "hd", "raw", "hf")]
-            over_base(self.launch, fields, spacing, (rows, columns), pitch, (0, rows))
 
     def _put_base(self, samples: Values, pitch: int) -> None:
         """Copies the base's samples to the window's."""
@@ -206,10 +282,6 @@ class _Room:
                 buffer_origin=(4 * (c * self.stride + span.r0 * pitch + PAD + span.c0), 0),
             )  # fmt: skip
         return out
-
-
-def _counts() -> set[int]:
-    return {GRADIENT_SWEEPS, HEIGHT_SWEEPS}
 
 
 def _padded(parent: NDArray[np.float32], rows: int, columns: int) -> NDArray[np.float32]:

@@ -1,6 +1,6 @@
 """One step of refinement of one window: from the parent's fields to those of the next level (DESIGN 5.6).
 
-Cubic prolongation, then Chebyshev-Jacobi sweeps of both steps of the solver with the constraints of the finer level:
+Cubic prolongation, then weighted Jacobi sweeps of both steps of the solver with the constraints of the finer level:
 first the two gradient components, then the heights with them as guidance. Each sample is a function of the samples
 within HALO of it, and is computed by the same operations in every window: windows agree bit for bit on what they share.
 """
@@ -12,6 +12,7 @@ from functools import lru_cache
 from typing import Any, Final, NamedTuple, Protocol
 
 import numpy as np
+from numpy.polynomial.legendre import legroots
 from numpy.typing import NDArray
 
 from esker import grid
@@ -22,10 +23,11 @@ from esker.solve.constraints import BIN, BinBox, Tables
 from esker.solve.device import Device
 
 GRADIENT_SWEEPS: Final = 8
-HEIGHT_SWEEPS: Final = 64
-"""Both even. docs/decisions/0012-refinement.md says why so many."""
-LOWEST: Final = 16.0
-"""The sweeps damp errors from this / sweeps^2 of the spectrum's scale upward."""
+HEIGHT_SWEEPS: Final = 70
+"""Both even, and as many as whole bins have room for: tiles begin on bins, so that a halo of 79 takes no more of them
+than one of 65. docs/decisions/0012-refinement.md."""
+GRADIENT_LOW: Final = 0.25
+"""The sweeps of the gradient damp errors from here upward."""
 HALO: Final = GRADIENT_SWEEPS + 1 + HEIGHT_SWEEPS
 """Samples around a window that take part: one more for the divergence."""
 CHANNELS: Final = 3
@@ -87,19 +89,39 @@ def step(level: int, core: Span) -> Step:
     return Step(level, core, box, clipped)
 
 
-@lru_cache(maxsize=8)
-def sweep_weights(sweeps: int) -> NDArray[np.float64]:
-    """Relaxations of Chebyshev-Jacobi sweeps on [LOWEST / sweeps^2, CHEBYSHEV_HIGH].
+@lru_cache(maxsize=1)
+def gradient_weights() -> NDArray[np.float64]:
+    """Relaxations of the sweeps of the gradient: Chebyshev's on [GRADIENT_LOW, 2] of the scaled spectrum."""
+    mid, half = (CHEBYSHEV_HIGH + GRADIENT_LOW) / 2, (CHEBYSHEV_HIGH - GRADIENT_LOW) / 2
+    k = np.arange(GRADIENT_SWEEPS)
+    return 1 / _leja(mid + half * np.cos(np.pi * (2 * k + 1) / (2 * GRADIENT_SWEEPS)))
 
-    ``sweeps`` is a power of two. In the order of Lebedev and Finogenov (1971), each root followed by that which makes
-    up for it, so that rounding errors do not grow: in their natural order float32 would lose all digits.
+
+@lru_cache(maxsize=1)
+def height_weights() -> NDArray[np.float64]:
+    """Relaxations of the sweeps of the height, whose polynomial is the smallest in the mean on the scaled spectrum.
+
+    Of all polynomials p of their degree n with p(0) = 1 the one with the least integral of p^2 over [0, 2], which is
+    2 / (n + 1)^2: a kernel polynomial (Stiefel 1958), whose roots are those of (P_n - P_n+1)(1 - t), Legendre's P, but
+    for the one at 0. What is nearly as smooth as the window is wide shrinks more than with Chebyshev's polynomial of an
+    interval, which must leave that out, and so do kinks.
     """
-    low = min(0.5, LOWEST / sweeps**2)
-    mid, half = (CHEBYSHEV_HIGH + low) / 2, (CHEBYSHEV_HIGH - low) / 2
-    order = [0]
-    while len(order) < sweeps:
-        order = [k for j in order for k in (j, 2 * len(order) - 1 - j)]
-    return np.asarray(1 / (mid + half * np.cos(np.pi * (2 * np.array(order) + 1) / (2 * sweeps))))
+    series = np.zeros(HEIGHT_SWEEPS + 2)
+    series[-2:] = 1, -1
+    return 1 / _leja(1 - np.sort(legroots(series).real)[:-1])
+
+
+def _leja(roots: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Roots in Leja's order (Calvetti and Reichel 1996), the largest first, so that rounding errors do not grow: in
+    their natural order float32 would lose all digits."""
+    left = np.sort(roots)
+    order: list[float] = []
+    while len(left):
+        farness = np.log(np.abs(left[:, None] - order)).sum(axis=1) if order else left
+        k = int(np.argmax(farness))
+        order.append(float(left[k]))
+        left = np.delete(left, k)
+    return np.asarray(order)
 
 
 def with_ghosts(parent: NDArray[Any], at: Step) -> NDArray[Any]:
@@ -133,7 +155,16 @@ class StrokeWindows(Protocol):
 
 
 class Pending(Protocol):
-    """A step under way."""
+    """A step under way. ``prepared``: what it shares with others that begin is known."""
+
+    @property
+    def prepared(self) -> bool: ...
+
+    def poll(self) -> bool:
+        """Whether ``fields`` will not wait; has the device go on with what it can. Raises DeviceError."""
+
+    def prepare(self) -> None:
+        """Waits until it is ``prepared``. Raises DeviceError."""
 
     def fields(self) -> Fields:
         """The fields of the step's core; waits for them. Raises DeviceError."""
@@ -160,6 +191,14 @@ class Done:
     """A step that is finished."""
 
     made: Fields
+    prepared = True
+
+    def poll(self) -> bool:
+        """See ``Pending``."""
+        return True
+
+    def prepare(self) -> None:
+        """See ``Pending``."""
 
     def fields(self) -> Fields:
         """See ``Pending``."""
@@ -184,11 +223,11 @@ class NumpyEngine:
         if under is not None:
             f = reference.over_base(f, c.height_d, c.share, c.target, under, tables.spacing_m)
         u = prolongation(with_ghosts(parent.astype(np.float64), at), at.window)
-        gradient = sweeps(u[:2], c.gradient_f, c.gradient_d[None], tables.screening, GRADIENT_SWEEPS)
+        gradient = sweeps(u[:2], c.gradient_f, c.gradient_d[None], tables.screening, gradient_weights())
         fixed = c.height_d[None] < 0
         rhs = reference.divergence(f[None], c.height_d[None], gradient, tables.spacing_m)
         start = np.where(fixed, f[None], u[2:])
-        height = sweeps(start, rhs, c.height_d[None], tables.screening, HEIGHT_SWEEPS)
+        height = sweeps(start, rhs, c.height_d[None], tables.screening, height_weights())
         w, core = at.window, at.core
         rows, columns = slice(core.r0 - w.r0, core.r1 - w.r0), slice(core.c0 - w.c0, core.c1 - w.c0)
         return Done(np.concatenate([gradient, height])[:, rows, columns].astype(np.float32))
@@ -207,10 +246,14 @@ def prolongation(parent: NDArray[np.float64], window: Span) -> NDArray[np.float6
 
 
 def sweeps(
-    u: NDArray[np.float64], rhs: NDArray[np.float64], d: NDArray[np.float64], screening: float, count: int
+    u: NDArray[np.float64],
+    rhs: NDArray[np.float64],
+    d: NDArray[np.float64],
+    screening: float,
+    weights: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """``count`` sweeps; the window's ends are mirrored like the level's borders."""
+    """A sweep for each weight; the window's ends are mirrored like the level's borders."""
     q = np.where(d < 0, 0.0, 1 / (4 + screening + np.maximum(d, 0)))
-    for w in sweep_weights(count):
+    for w in weights:
         u = u + w * q * reference.residual(u, rhs, d, screening)
     return u
