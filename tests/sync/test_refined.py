@@ -55,7 +55,7 @@ class RoofRefiner:
     def __init__(self, height: float, log: list[TileKey]) -> None:
         self.height, self.log = height, log
 
-    def tiles(self, keys: Sequence[TileKey]) -> Iterator[Tile | None]:
+    def tiles(self, keys: Sequence[TileKey], _: object) -> Iterator[Tile | None]:
         for key in keys:
             yield None
             time.sleep(0.01)

@@ -67,7 +67,7 @@ class Refining:
         assert basis is not None
         return self
 
-    def tiles(self, keys: Sequence[TileKey]) -> Iterator[Tile | None]:
+    def tiles(self, keys: Sequence[TileKey], _: Any) -> Iterator[Tile | None]:
         try:
             for key in keys:
                 yield None
@@ -144,13 +144,38 @@ def test_a_new_job_ends_refinement_at_once_and_it_starts_again_from_the_new_grou
     assert solver.closed == 1
 
 
+def test_an_op_does_not_wait_for_the_device_that_refines(refining: Any) -> None:
+    """SPEC P57."""
+    solver, worker, viewer, client = refining
+    asked: list[bool] = []
+
+    def busy(keys: Sequence[TileKey], urgent: Any) -> Iterator[Tile | None]:
+        while len(viewer.got) == 0:
+            asked.append(urgent())
+            if asked[-1]:
+                yield None
+            time.sleep(0.001)
+        yield from map(Tile, keys)
+
+    solver.tiles = busy
+    viewer.keys = (A,)
+    worker.request(client, Job(1, (), SETTINGS))
+    wait(lambda: len(asked) > 5)
+    assert not any(asked)
+    del solver.tiles
+    worker.request(client, Job(2, (), SETTINGS))
+    wait(lambda: viewer.got == [(2, A)])
+    assert asked[-1]
+    assert solver.closed == 0
+
+
 def test_when_refining_fails_the_ground_stays_and_people_are_told(refining: Any) -> None:
     solver, worker, viewer, client = refining
     told: list[str] = []
     client.tell = told.append
     viewer.keys = (A, B)
 
-    def broken(keys: Sequence[TileKey]) -> Iterator[Tile | None]:
+    def broken(keys: Sequence[TileKey], _: Any) -> Iterator[Tile | None]:
         yield Tile(keys[0])
         raise MemoryError
 

@@ -86,7 +86,9 @@ class LevelResult(Protocol):
 class Refiner(Protocol):
     """Refines one settled solve, in the worker's thread (``solve/refine.py``)."""
 
-    def tiles(self, keys: Sequence[TileKey]) -> Iterator[RefinedTile | None]: ...
+    def tiles(
+        self, keys: Sequence[TileKey], urgent: Callable[[], bool] | None = None
+    ) -> Iterator[RefinedTile | None]: ...
 
 
 class Refinement(Protocol):

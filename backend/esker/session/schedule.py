@@ -281,6 +281,11 @@ class Schedule:
             best = self._favoured = min(late, key=lambda x: x.turn)
         return best
 
+    @property
+    def called(self) -> bool:
+        """Whether any client has a job that was not begun."""
+        return any(client.newest is not None for client in tuple(self.clients))
+
     def urges(self, client: Client) -> bool:
         """Whether there is anything to do but to go on with the client's solve."""
         return any(x.newest is not None or (x is not client and x.steps is not None) for x in self.clients)

@@ -343,8 +343,12 @@ class Worker:
         keys = [key for key in refinement.wanted() if key not in client.refined]
         client.looking = bool(keys)
         if keys:
-            client.tiles = iter(client.refiner.tiles(keys))
+            client.tiles = iter(client.refiner.tiles(keys, self._urgent))
         return bool(keys)
+
+    def _urgent(self) -> bool:
+        """Whether refinement is to be left for something else. Asked a thousand times a second, so without the lock."""
+        return self._stopping or bool(self._leaving) or self._schedule.called
 
     # --- faults -------------------------------------------------------------------------------------------------
 

@@ -47,14 +47,20 @@ class Target:
     over: Over | None = None
 
 
-def rasterise(launch: Launcher, tables: Tables, window: Window, target: Target) -> None:
-    """Enqueue the constraints of the bins of ``window``, which lie within the tables' box."""
+def rasterise(
+    launch: Launcher, tables: Tables, window: Window, target: Target, loaded: tuple[Any, ...] | None = None
+) -> None:
+    """Enqueue the constraints of the bins of ``window``, which lie within the tables' box.
+
+    ``loaded``: of ``load``, where several windows of the same tables follow each other.
+    """
     if window.width == 0:
         return
+    arguments = load(launch, tables) if loaded is None else loaded
     over = () if target.over is None else (target.over.base, target.over.share, target.over.target)
     name = named("rasterise", over_base=target.over is not None)
     launch.run(
-        name, (window.width, len(window.spans)), *_arguments(launch, tables, window),
+        name, (window.width, len(window.spans)), *arguments, *_window(launch, tables, window),
         np.int32(target.pitch), np.int32(target.stride), target.gradient_d, target.gradient_f, target.height_d,
         target.height_f, np.float32(tables.screening), np.int32(tables.pinned), *over,
     )  # fmt: skip
@@ -80,14 +86,14 @@ def rasterise_channel(
         return
     name = named("rasterise_channel", over_base=base is not None)
     launch.run(
-        name, (window.width, len(window.spans)), *_arguments(launch, tables, window),
+        name, (window.width, len(window.spans)), *load(launch, tables), *_window(launch, tables, window),
         np.int32(pitch), np.int32(stride), d, f, np.float32(tables.screening), np.int32(covered),
         *(() if base is None else (base,)),
     )  # fmt: skip
 
 
-def _arguments(launch: Launcher, tables: Tables, window: Window) -> tuple[Any, ...]:
-    """TABLE_ARGUMENTS of section.cl, then the window and the samples of the level."""
+def load(launch: Launcher, tables: Tables) -> tuple[Any, ...]:
+    """TABLE_ARGUMENTS of section.cl: the tables on the device."""
 
     def put(array: NDArray[Any]) -> Any:
         return launch.constant(array.astype(np.float32 if array.dtype.kind == "f" else np.int32))
@@ -98,6 +104,10 @@ def _arguments(launch: Launcher, tables: Tables, window: Window) -> tuple[Any, .
         put(tables.segments), i(tables.segments.shape[1]), put(tables.knots), i(tables.knots.shape[1]),
         put(tables.pieces), put(tables.octaves), put(tables.strokes), put(tables.index), put(tables.row_start),
         put(tables.row_items), put(tables.span_index), put(tables.spans), i(tables.box[0]), i(tables.box[2]),
-        f(tables.spacing_m), f(tables.octave_m), f(tables.exit_length_m), f(cliff), i(window.first),
-        put(window.spans), i(tables.samples),
+        f(tables.spacing_m), f(tables.octave_m), f(tables.exit_length_m), f(cliff),
     )  # fmt: skip
+
+
+def _window(launch: Launcher, tables: Tables, window: Window) -> tuple[Any, ...]:
+    """The bins to be done, and the samples of the level."""
+    return np.int32(window.first), launch.constant(window.spans.astype(np.int32)), np.int32(tables.samples)

@@ -8,6 +8,7 @@ solve: which tiles were asked for, in which order, in which groups and from what
 from __future__ import annotations
 
 import itertools
+import time
 from collections import OrderedDict, deque
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence, Set
 from dataclasses import dataclass
@@ -27,6 +28,8 @@ from esker.solve.refine_cl import ClEngine
 from esker.solve.refine_engine import CHANNELS, Engine, Fields, NumpyEngine, Pending, Span, Step, step
 from esker.solve.refine_strokes import DIGEST_BYTES, Strokes
 
+LOOK_SECONDS: Final = 0.0005
+"""Between two looks at the device, and at who is in a hurry."""
 GROUP: Final = 4
 """Tiles along a side of what one step computes at most: more, and a step takes too long to be left; fewer, and the
 halo costs more than the tiles."""
@@ -133,6 +136,7 @@ class Refiner:
         self._strokes = Strokes(basis.strokes, basis.settings, self._base)
         self._under_way: deque[_Begun] = deque()
         """Oldest first; they outlive the iterator that began them."""
+        self._urgent: Callable[[], bool] | None = None
         self._waiting: dict[int, dict[TileKey, Fields | None]] = {}
         """What the iterators need of them, by the identity of the dictionary."""
 
@@ -145,9 +149,10 @@ class Refiner:
             known = self._content[key] = self._digest(key)
         return known
 
-    def tiles(self, keys: Sequence[TileKey]) -> Iterator[RefinedTile | None]:
+    def tiles(self, keys: Sequence[TileKey], urgent: Callable[[], bool] | None = None) -> Iterator[RefinedTile | None]:
         """Every tile of ``keys`` once, in that order; None wherever the work can be left.
 
+        ``urgent``: whether somebody else needs this thread. It is asked while the device works; None comes then.
         Close the iterator to stop; what was finished stays in the cache. Raises ValueError like ``content``.
         """
         for key in keys:
@@ -155,6 +160,7 @@ class Refiner:
         wanted = list(dict.fromkeys(keys))
         left = self._plan(wanted)
         for n, key in enumerate(wanted):
+            self._urgent = urgent  # other iterators may have run in between
             yield from self._look_ahead(wanted[n:], left)
             field = (yield from self._made([key], left))[key]
             yield RefinedTile(key, field[2], self.content(key), self._under(key))
@@ -225,6 +231,7 @@ class Refiner:
 
     def _all(self, keys: list[TileKey]) -> dict[TileKey, Fields]:
         """The fields of tiles, without leaving the work."""
+        self._urgent = None
         work = self._made(keys, self._plan(keys))
         while True:
             try:
@@ -244,7 +251,7 @@ class Refiner:
                 if left:
                     yield from self._begun(left[0], set(left), plan)
                 else:
-                    self._finish()
+                    yield from self._oldest()
         finally:
             del self._waiting[id(out)]
         return {key: field for key, field in out.items() if field is not None}
@@ -258,10 +265,27 @@ class Refiner:
         at = step(level, Span(y0 * TILE_CELLS, y1 * TILE_CELLS + 1, x0 * TILE_CELLS, x1 * TILE_CELLS + 1))
         parent = yield from self._parent(at, plan)
         while len(self._under_way) >= self._engine.ahead:
-            self._finish()
+            yield from self._oldest()
+        for begun in tuple(self._under_way):
+            yield from self._until(lambda pending=begun.pending: pending.poll() or pending.prepared)
         self._under_way.append(_Begun(level, box, self._engine.begin(at, self._strokes, parent)))
         plan[level].difference_update(_keys(level, box))
         yield
+
+    def _oldest(self) -> Generator[None, None, None]:
+        """Finishes the oldest step under way."""
+        oldest = self._under_way[0]
+        yield from self._until(oldest.pending.poll)
+        if self._under_way and self._under_way[0] is oldest:
+            self._finish()
+
+    def _until(self, ready: Callable[[], bool]) -> Generator[None, None, None]:
+        """Waits for the device for those who may be interrupted; the others wait where they need it, without a look
+        at the clock."""
+        while self._urgent is not None and not ready():
+            if self._urgent():
+                yield
+            time.sleep(LOOK_SECONDS)
 
     def _is_under_way(self, key: TileKey) -> bool:
         return any(begun.holds(key) for begun in self._under_way)
