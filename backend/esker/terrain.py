@@ -110,6 +110,9 @@ class Terrain:
             raise ValueError(wrong)
         if stroke.id not in self._strokes and len(self._strokes) >= contract.MAX_STROKES:
             raise ValueError(f"a terrain holds at most {contract.MAX_STROKES} strokes")
+        others = sum(len(other.curve) for key, other in self._strokes.items() if key != stroke.id)
+        if others + len(stroke.curve) > contract.MAX_POINTS_PER_TERRAIN:
+            raise ValueError(f"the strokes of a terrain hold at most {contract.MAX_POINTS_PER_TERRAIN} points together")
         self._strokes[stroke.id] = stroke
         return stroke.id
 

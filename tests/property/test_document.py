@@ -12,7 +12,7 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, ru
 
 from esker import contract as c
 from esker.document.layers import TOLD_FIELDS
-from esker.document.ops import CHANNEL_FIELDS, GROUND_FIELDS, Limits, Refusal, StrokeSet
+from esker.document.ops import CHANNEL_FIELDS, GROUND_FIELDS, Limits, Refusal, StrokeSet, check_document
 from esker.document.strokes import bounds
 from esker.document.undo import LAYER_WORDS, STROKE_WORDS, UndoStack, inverse
 from esker.document.wire import op_json
@@ -198,6 +198,38 @@ def test_a_label_leaves_the_ground_alone() -> None:
         assert dirty is None
     _, dirty = document.apply(c.SetStroke(stroke="s", fields=c.StrokeFields(plateau_radius_m=5.0)))
     assert dirty == Rect(-5, -5, 5, 5)
+
+
+def _long(stroke_id: str, points: int) -> c.Stroke:
+    return c.Stroke(id=stroke_id, kind="profile", first=(0, 0, 0), last=(9, 0, 0), curve=((0.5, 1.0),) * points)
+
+
+def test_the_points_of_a_terrain_are_bounded() -> None:
+    """SPEC D7: however they come, and what was deleted makes room."""
+    limits = Limits(all_points=10)
+    document = StrokeSet.from_document(c.Document(id="t", strokes=(_long("a", 6), _long("b", 3))))
+    longer = c.SetStroke(stroke="b", fields=c.StrokeFields(curve=((0, 0),) * 5))
+    further = c.AppendPoints(stroke="b", start=2, points=((2, 0),) * 3, last=(9, 0, 0))
+    for op in (c.BeginStroke(stroke=_long("c", 2)), longer, further):
+        with pytest.raises(Refusal, match="at most 10 points"):
+            document.apply(op, limits)
+    full, _ = document.apply(c.AppendPoints(stroke="b", start=2, points=((2, 0),) * 2, last=(9, 0, 0)), limits)
+    without, _ = full.apply(c.DeleteStroke(stroke="a"), limits)
+    other, _ = without.apply(c.BeginStroke(stroke=_long("c", 6)), limits)
+    with pytest.raises(Refusal, match="at most 10 points"):
+        other.apply(c.RestoreStroke(stroke="a"), limits)
+    full.apply(c.MoveAnchor(stroke="a", which="last", to=(5, 5, 5)), Limits(all_points=1))  # what is there may change
+    with pytest.raises(Refusal, match="at most 9 points"):
+        check_document(full.to_document(), Limits(all_points=9))
+    check_document(full.to_document(), limits)
+
+
+def test_tombstones_hold_no_more_points_than_a_terrain() -> None:
+    """SPEC D9: the same as in doc/tombstones.test.ts."""
+    document = StrokeSet("t", strokes={f"s{i}": _long(f"s{i}", c.MAX_POINTS_PER_STROKE) for i in range(124)})
+    for i in range(124):
+        document, _ = document.apply(c.DeleteStroke(stroke=f"s{i}"))
+    assert list(document.deleted) == [f"s{i}" for i in range(2, 124)]
 
 
 @given(op=ops)

@@ -120,6 +120,8 @@ MAX_SLOPE_DEG: Final = 85.0
 
 MAX_STROKES: Final = 5_000
 MAX_POINTS_PER_STROKE: Final = 4_096
+MAX_POINTS_PER_TERRAIN: Final = 500_000
+"""Of its strokes together, and again of its tombstones: everybody who comes in is sent them all."""
 MAX_POINTS_PER_APPEND: Final = 256
 MAX_MESSAGE_BYTES: Final = 64 * 1024
 MAX_OPS_PER_SECOND: Final = 120

@@ -6,13 +6,14 @@ page; ``tests/vectors/ops.json`` holds the cases that both languages read.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Final
 
 from esker import contract as c
 from esker.contract import Layer, Op, Stroke, TerrainSettings
 from esker.document.layers import LayerEditor
-from esker.document.refusal import Limits, Refusal, changed, trim
+from esker.document.refusal import Limits, Refusal, changed, trim, trim_points
 from esker.document.strokes import Points, bounds, misfit, world_points
 from esker.grid import Rect
 
@@ -45,6 +46,8 @@ class StrokeSet:
     """The same of what the base under the strokes follows from: the visible layers, but for what is told of them."""
     _rects: dict[str, tuple[Stroke, Rect | None]] = field(default_factory=dict, compare=False, repr=False)
     """Bounds of strokes as last seen, with the stroke they were computed for: a cache that successors share."""
+    _points: int = field(default=-1, compare=False, repr=False)
+    """Points of all live strokes; below zero: not counted yet."""
 
     @classmethod
     def from_document(cls, document: c.Document) -> StrokeSet:
@@ -95,6 +98,7 @@ class StrokeSet:
             painted,
             ground,
             self._rects,
+            editor.points,
         )
         return after, editor.dirty
 
@@ -111,6 +115,9 @@ def check_document(document: c.Document, limits: Limits | None = None) -> None:
         raise Refusal("duplicate_stroke", "Two strokes have the same id.")
     if len(document.strokes) > limits.strokes or len(document.deleted) > c.MAX_STROKES:
         raise Refusal("too_many_strokes", f"A terrain holds at most {limits.strokes} strokes.")
+    for strokes, most in ((document.strokes, limits.all_points), (document.deleted, c.MAX_POINTS_PER_TERRAIN)):
+        if _points_of(strokes) > most:
+            raise _too_many_points(most)
     editor = _Editor(StrokeSet(document.id, document.settings), limits)
     for stroke in everything:
         editor.check(stroke)
@@ -123,6 +130,14 @@ def check_document(document: c.Document, limits: Limits | None = None) -> None:
         editor.layers.check(layer)
 
 
+def _points_of(strokes: Iterable[Stroke]) -> int:
+    return sum(len(stroke.curve) for stroke in strokes)
+
+
+def _too_many_points(most: int) -> Refusal:
+    return Refusal("too_many_points", f"The strokes of a terrain hold at most {most} points together.")
+
+
 class _Editor:
     """One application in progress. Copies the dictionaries on first write only."""
 
@@ -131,6 +146,7 @@ class _Editor:
         self.limits = limits
         self.layers = LayerEditor(base.layers, base.deleted_layers, base.settings.size_m, limits)
         self._rects = base._rects
+        self.points = base._points if base._points >= 0 else _points_of(base.strokes.values())
         self.dirty: Rect | None = None
         self.said = False
         """Whether a channel other than the heights may have changed."""
@@ -198,6 +214,10 @@ class _Editor:
         points = self.check(stroke)
         self._own()
         old = self.strokes.get(stroke.id)
+        more = len(stroke.curve) - (0 if old is None else len(old.curve))
+        if more > 0 and self.points + more > self.limits.all_points:
+            raise _too_many_points(self.limits.all_points)
+        self.points += more
         before = None if old is None else self._bounds(old)
         rect = bounds(stroke, points)
         self._rects[stroke.id] = (stroke, rect)
@@ -267,7 +287,9 @@ class _Editor:
         self._rects.pop(stroke_id, None)
         del self.strokes[stroke_id]
         self.deleted[stroke_id] = old
+        self.points -= len(old.curve)
         trim(self.deleted, c.MAX_STROKES)
+        trim_points(self.deleted, c.MAX_POINTS_PER_TERRAIN)
 
     def _restore(self, stroke_id: str) -> None:
         if stroke_id in self.strokes:

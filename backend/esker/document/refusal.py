@@ -28,6 +28,7 @@ class Limits:
     strokes: int = c.MAX_STROKES
     points: int = c.MAX_POINTS_PER_STROKE
     layers: int = c.MAX_LAYERS
+    all_points: int = c.MAX_POINTS_PER_TERRAIN
 
 
 def changed(
@@ -46,3 +47,10 @@ def trim(tombstones: dict[str, c.Stroke] | dict[str, c.Layer], most: int) -> Non
     items: Mapping[str, object] = tombstones
     while len(tombstones) > most:
         del tombstones[next(iter(items))]
+
+
+def trim_points(tombstones: dict[str, c.Stroke], most: int) -> None:
+    """The same above ``most`` points of all of them together."""
+    held = sum(len(stroke.curve) for stroke in tombstones.values())
+    while held > most:
+        held -= len(tombstones.pop(next(iter(tombstones))).curve)

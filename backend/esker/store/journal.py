@@ -314,7 +314,7 @@ def check(path: Path, directory: Path) -> None:
 
 def replay(document: StrokeSet, rows: Iterable[Row]) -> StrokeSet:
     """The document after ``rows``. Raises DamagedTerrain on a gap in the clocks or an op that does not apply."""
-    unlimited = Limits(strokes=2**31, points=2**31, layers=2**31)
+    unlimited = Limits(strokes=2**31, points=2**31, layers=2**31, all_points=2**31)
     for row in rows:
         if row.clock != document.clock + 1:
             raise DamagedTerrain(f"op {row.clock} follows op {document.clock} in the journal of {document.id}")

@@ -8,6 +8,7 @@ import {
   type AppendPoints,
   DOMAIN_MARGIN,
   MAX_POINTS_PER_STROKE,
+  MAX_POINTS_PER_TERRAIN,
   MAX_STROKES,
   NULLABLE_STROKE_FIELDS,
   NULLABLE_TERRAIN_FIELDS,
@@ -160,9 +161,12 @@ class Editor {
     const { strokes, deleted } = this.#writable();
     strokes.delete(id);
     deleted.set(id, old);
-    for (const oldest of deleted.keys()) {
-      if (deleted.size <= MAX_STROKES) break;
+    let points = 0;
+    for (const stroke of deleted.values()) points += stroke.curve.length;
+    for (const [oldest, stroke] of deleted) {
+      if (deleted.size <= MAX_STROKES && points <= MAX_POINTS_PER_TERRAIN) break;
       deleted.delete(oldest);
+      points -= stroke.curve.length;
     }
   }
 

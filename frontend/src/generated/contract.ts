@@ -120,6 +120,8 @@ export const MAX_STROKES = 5000 as const;
 
 export const MAX_POINTS_PER_STROKE = 4096 as const;
 
+export const MAX_POINTS_PER_TERRAIN = 500000 as const;
+
 export const MAX_POINTS_PER_APPEND = 256 as const;
 
 export const MAX_MESSAGE_BYTES = 65536 as const;
