@@ -12,6 +12,7 @@ import time
 from collections import OrderedDict, deque
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence, Set
 from dataclasses import dataclass
+from functools import partial
 from hashlib import blake2b
 from typing import Final, Protocol
 
@@ -267,7 +268,7 @@ class Refiner:
         while len(self._under_way) >= self._engine.ahead:
             yield from self._oldest()
         for begun in tuple(self._under_way):
-            yield from self._until(lambda pending=begun.pending: pending.poll() or pending.prepared)
+            yield from self._until(partial(_shared, begun.pending))
         self._under_way.append(_Begun(level, box, self._engine.begin(at, self._strokes, parent)))
         plan[level].difference_update(_keys(level, box))
         yield
@@ -342,6 +343,11 @@ class Refiner:
             part = np.ascontiguousarray(self._ground[:, s.r0 : s.r1, s.c0 : s.c1])
             known = self._digests[key] = blake2b(part.tobytes(), digest_size=DIGEST_BYTES).digest()
         return known
+
+
+def _shared(pending: Pending) -> bool:
+    """Whether others may begin beside a step."""
+    return pending.poll() or pending.prepared
 
 
 def _group(key: TileKey, left: Set[TileKey]) -> Box:
