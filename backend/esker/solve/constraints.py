@@ -6,7 +6,7 @@ Strokes are ordered by id, so no result depends on the order of edits.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
 
 import numpy as np
 
@@ -193,8 +193,21 @@ class WindowPacker:
     def pack(self, level: int, box: BinBox) -> Tables:
         """The tables of the bins of ``box``. Raises ValueError for a level outside 0..MAX_REFINED_LEVEL or a box that
         is empty or sticks out of the level."""
+        work = self.packing(level, box)
+        while True:
+            try:
+                next(work)
+            except StopIteration as end:
+                found: Tables = end.value
+                return found
+
+    def packing(self, level: int, box: BinBox) -> Generator[None, None, Tables]:
+        """``pack``, which may be left between strokes."""
         s = grid.spacing(level, self._settings.size_m)
-        packed = [pack_one(self._shapes[k], s, box) for k in self._near(level, box)]
+        packed = []
+        for k in self._near(level, box):
+            packed.append(pack_one(self._shapes[k], s, box))
+            yield
         return _tables(level, self._settings, [p for p in packed if p is not None], box)
 
     @property

@@ -12,7 +12,6 @@ import time
 from collections import OrderedDict, deque
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence, Set
 from dataclasses import dataclass
-from functools import partial
 from hashlib import blake2b
 from typing import Final, Protocol
 
@@ -158,6 +157,8 @@ class Refiner:
         """
         for key in keys:
             self.content(key)
+            if urgent is not None and urgent():
+                yield None
         wanted = list(dict.fromkeys(keys))
         left = self._plan(wanted)
         for n, key in enumerate(wanted):
@@ -268,7 +269,7 @@ class Refiner:
         while len(self._under_way) >= self._engine.ahead:
             yield from self._oldest()
         for begun in tuple(self._under_way):
-            yield from self._until(partial(_shared, begun.pending))
+            yield from self._until(begun.pending, lambda pending: pending.prepared)
         self._under_way.append(_Begun(level, box, self._engine.begin(at, self._strokes, parent)))
         plan[level].difference_update(_keys(level, box))
         yield
@@ -276,17 +277,18 @@ class Refiner:
     def _oldest(self) -> Generator[None, None, None]:
         """Finishes the oldest step under way."""
         oldest = self._under_way[0]
-        yield from self._until(oldest.pending.poll)
+        yield from self._until(oldest.pending, lambda pending: pending.ready)
         if self._under_way and self._under_way[0] is oldest:
             self._finish()
 
-    def _until(self, ready: Callable[[], bool]) -> Generator[None, None, None]:
-        """Waits for the device for those who may be interrupted; the others wait where they need it, without a look
-        at the clock."""
-        while self._urgent is not None and not ready():
+    def _until(self, pending: Pending, enough: Callable[[Pending], bool]) -> Generator[None, None, None]:
+        """Waits for a step for those who may be interrupted; the others wait where they need it, without a look at the
+        clock."""
+        while self._urgent is not None and not enough(pending):
             if self._urgent():
                 yield
-            time.sleep(LOOK_SECONDS)
+            if not pending.poll():
+                time.sleep(LOOK_SECONDS)
 
     def _is_under_way(self, key: TileKey) -> bool:
         return any(begun.holds(key) for begun in self._under_way)
@@ -343,11 +345,6 @@ class Refiner:
             part = np.ascontiguousarray(self._ground[:, s.r0 : s.r1, s.c0 : s.c1])
             known = self._digests[key] = blake2b(part.tobytes(), digest_size=DIGEST_BYTES).digest()
         return known
-
-
-def _shared(pending: Pending) -> bool:
-    """Whether others may begin beside a step."""
-    return pending.poll() or pending.prepared
 
 
 def _group(key: TileKey, left: Set[TileKey]) -> Box:

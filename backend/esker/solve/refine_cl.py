@@ -80,21 +80,22 @@ class _Flight:
     """A step that a room's queue works on."""
 
     def __init__(self, room: _Room, constraining: Iterator[Any], relax: Callable[[], Any], span: Span, pitch: int):
-        """``constraining`` enqueues the constraints bit by bit, and gives out the events to wait for in between;
-        ``relax`` enqueues the rest and returns the last event."""
+        """``constraining`` enqueues the constraints bit by bit, and gives out the events to wait for in between, or
+        None; ``relax`` enqueues the rest and returns the last event."""
         self._room, self._span, self._pitch = room, span, pitch
         self._constraining, self._relax = constraining, relax
         self._event: Any = None
         self._made: Fields | None = None
-        self.prepared = False
+        self.prepared = self.ready = False
         self._go_on()
 
     def poll(self) -> bool:
         """See ``Pending``."""
         with guarded(self._room.device):
-            while self._event is not None and self._room.complete(self._event):
-                self._go_on()
-        return self._event is None
+            if self.ready or (self._event is not None and not self._room.complete(self._event)):
+                return False
+            self._go_on()
+        return True
 
     def prepare(self) -> None:
         """See ``Pending``."""
@@ -103,7 +104,7 @@ class _Flight:
     def fields(self) -> Fields:
         """See ``Pending``."""
         if self._made is None:
-            self._wait(lambda: self._event is None)
+            self._wait(lambda: self.ready)
             with guarded(self._room.device):
                 self._made = self._room.read(self._span, self._pitch)
         return self._made
@@ -111,13 +112,18 @@ class _Flight:
     def _wait(self, until: Callable[[], bool]) -> None:
         with guarded(self._room.device):
             while not until():
-                self._event.wait()
+                if self._event is not None:
+                    self._event.wait()
                 self._go_on()
 
     def _go_on(self) -> None:
         """Enqueues what follows the event that has come."""
-        self._event = next(self._constraining, None)
-        if self._event is None and not self.prepared:
+        if self.prepared:
+            self.ready = True
+            return
+        try:
+            self._event = next(self._constraining)
+        except StopIteration:
             self.prepared, self._event = True, self._relax()
 
 
@@ -221,7 +227,8 @@ class _Room:
             over = raster.Over(a["base"], a["share"], a["target"])
         if fresh.width:
             target = raster.Target(a["hd"], a[kept[1][0]], a["gd"], a["gf"], pitch, self.stride, over)
-            yield from self._rasterised(strokes.shared_tables(at.level, at.box), fresh, target)
+            tables = yield from strokes.shared_tables(at.level, at.box)
+            yield from self._rasterised(tables, fresh, target)
         self._exchanged(kept, parts, fresh, at, pitch)
         sheets.trim()
         if base is not None:

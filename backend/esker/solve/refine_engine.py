@@ -7,6 +7,7 @@ within HALO of it, and is computed by the same operations in every window: windo
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Final, NamedTuple, Protocol
@@ -147,21 +148,25 @@ class StrokeWindows(Protocol):
     def tables(self, level: int, box: BinBox) -> Tables:
         """The rasteriser's tables of a box of bins."""
 
-    def shared_tables(self, level: int, box: BinBox) -> Tables:
-        """The same for kernels: lists may name strokes that do not reach the box."""
+    def shared_tables(self, level: int, box: BinBox) -> Generator[None, None, Tables]:
+        """The same for kernels, made bit by bit: lists may name strokes that do not reach the box."""
 
     def sheet_digest(self, level: int, box: BinBox) -> bytes:
         """Digest of all that decides the constraints of a box of bins at this level."""
 
 
 class Pending(Protocol):
-    """A step under way. ``prepared``: what it shares with others that begin is known."""
+    """A step under way. ``prepared``: what it shares with others that begin is known; ``ready``: ``fields`` will not
+    wait."""
 
     @property
     def prepared(self) -> bool: ...
 
+    @property
+    def ready(self) -> bool: ...
+
     def poll(self) -> bool:
-        """Whether ``fields`` will not wait; has the device go on with what it can. Raises DeviceError."""
+        """Does a little of what the host has to do for it; False: for now nothing. Raises DeviceError."""
 
     def prepare(self) -> None:
         """Waits until it is ``prepared``. Raises DeviceError."""
@@ -191,11 +196,11 @@ class Done:
     """A step that is finished."""
 
     made: Fields
-    prepared = True
+    prepared = ready = True
 
     def poll(self) -> bool:
         """See ``Pending``."""
-        return True
+        return False
 
     def prepare(self) -> None:
         """See ``Pending``."""

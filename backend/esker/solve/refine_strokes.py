@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import replace
 from hashlib import blake2b
 from typing import Final
@@ -44,15 +44,16 @@ class Strokes:
         """The rasteriser's tables of a box of bins."""
         return self._packer.pack(level, box)
 
-    def shared_tables(self, level: int, box: BinBox) -> Tables:
+    def shared_tables(self, level: int, box: BinBox) -> Generator[None, None, Tables]:
         """Tables that serve for a box of bins, cut from those of a larger one around it: most of the time of packing
-        goes to strokes, not to bins, and the next windows are near. Their lists may name strokes beside the box."""
+        goes to strokes, not to bins, and the next windows are near. Their lists may name strokes beside the box. To be
+        left between strokes."""
         held = [t for t in self._packed if t.level == level and _holds(t.box, box)]
         if not held:
             count, more = bins(grid.samples(level)), PACK_AROUND
             by0, by1, bx0, bx1 = box
             around = max(0, by0 - more), min(count, by1 + more), max(0, bx0 - more), min(count, bx1 + more)
-            held = [self._packer.pack(level, around)]
+            held = [(yield from self._packer.packing(level, around))]
             self._packed = [*held, *self._packed[: PACKED - 1]]
         return rows_of(held[0], box)
 
