@@ -176,8 +176,9 @@ def test_the_secret_of_another_terrain_opens_nothing(server: LiveServer) -> None
     _, other = server.create()
     status, error = server.http("GET", f"/api/terrains/{terrain}", secret=other)
     assert (status, error["code"]) == (403, "bad_secret")
-    status, error = server.http("GET", "/api/terrains/nowhere", secret=other)
-    assert (status, error["code"]) == (404, "no_terrain")
+    for name in ("nowhere", "%C3%A9", "%00", "%FF"):
+        status, error = server.http("GET", f"/api/terrains/{name}", secret=other)
+        assert (status, error["code"]) == (404, "no_terrain")
 
 
 def test_revoking_closes_whoever_came_by_the_link(server: LiveServer) -> None:

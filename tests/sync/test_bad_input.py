@@ -92,6 +92,21 @@ def test_the_close_is_logged_in_one_line(scene: Scene, caplog: pytest.LogCapture
     assert not any(scene.secret in line for line in lines)
 
 
+@pytest.mark.parametrize("name", ["\n2026 I esker: all is well\x1b[2J", "山" * 300, "é" * 9_000])
+def test_a_field_named_to_spoil_the_log(scene: Scene, name: str, caplog: pytest.LogCaptureFixture) -> None:
+    """SPEC P126."""
+    with caplog.at_level(logging.INFO, "esker"):
+        scene.peer.say("ping", **{"t": 1.0, name: 1})
+        sentence = scene.closes("malformed")
+    assert len(sentence) < 900
+    assert sentence.isascii()
+    assert sentence.isprintable()
+    lines = [r.getMessage() for r in caplog.records if r.name.startswith("esker") and "malformed" in r.getMessage()]
+    assert len(lines) == 1
+    assert lines[0].isprintable()
+    assert not [r for r in caplog.records if r.levelno >= logging.ERROR]
+
+
 def test_unknown_op(scene: Scene) -> None:
     scene.refuses({"type": "stroke.explode", "stroke": "s1"}, "malformed")
 

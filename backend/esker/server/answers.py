@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import time
 from typing import Annotated, Final
+from urllib.parse import quote
 
 from fastapi import Depends, FastAPI, Request, WebSocket
 from fastapi.exceptions import RequestValidationError
@@ -66,7 +67,7 @@ def add_errors(app: FastAPI) -> None:
 
     @app.exception_handler(Exception)
     async def failed(request: Request, error: Exception) -> JSONResponse:
-        log.error("%s %s failed: %s: %s", request.method, request.url.path, type(error).__name__, error)
+        log.error("%s %s failed: %s: %s", request.method, quote(request.url.path), type(error).__name__, error)
         return answer(500, "server_error", "The server failed to do this. It is in its log.")
 
 

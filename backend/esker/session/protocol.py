@@ -22,6 +22,8 @@ MAX_MESSAGES_PER_SECOND: Final = 600
 MESSAGES_BURST: Final = 1_200
 MAX_REFUSED_OPS: Final = 4 * c.OPS_BURST
 """So many ops refused for their rate, one after another, close the connection."""
+MAX_NAME: Final = 120
+"""Characters of the name of a field in a sentence."""
 
 
 @dataclass(frozen=True)
@@ -226,5 +228,6 @@ def _reject_code(error: ValidationError) -> RejectCode:
 
 def _sentence(error: ValidationError) -> str:
     first = error.errors()[0]
-    where = ".".join(str(part) for part in first["loc"])
+    # A field that does not exist is named by the client, and what is said here goes into the log.
+    where = ascii(".".join(str(part) for part in first["loc"])[:MAX_NAME])[1:-1]
     return f"{where}: {first['msg']}." if where else f"{first['msg']}."

@@ -20,6 +20,8 @@ log = logging.getLogger("esker.socket")
 WATCH_SECONDS: Final = 0.5
 GOODBYE_SECONDS: Final = 1.0
 """How long a closing connection may take to accept the reason."""
+REASON_BYTES: Final = 123
+"""Of the reason in a close frame (RFC 6455, 5.5)."""
 
 
 class Transport(Protocol):
@@ -137,7 +139,7 @@ class Session:
         log.info("closed a connection from %s: %s (%s)", self._address, code, reason)
         text = c.ErrorMessage(code=code, message=reason, fatal=True).model_dump_json()
         await self._transport.send_text(text, self._went_on)
-        await self._transport.close(c.WS_CLOSE[code], reason[:120])
+        await self._transport.close(c.WS_CLOSE[code], reason.encode()[:REASON_BYTES].decode(errors="ignore"))
 
     async def _watch(self) -> None:
         """Ends connections that never say hello, and clients that do not read."""

@@ -73,7 +73,7 @@ class Access:
         for row in rows:
             same = hmac.compare_digest(bytes(row[6]), digest)
             link = Link(*row[:6])
-            if same and hmac.compare_digest(link.terrain, terrain):
+            if same and link.terrain == terrain:  # an id is no secret, and may be any text here
                 return link
         return None
 
