@@ -15,7 +15,7 @@ struct TerrainVertex {
 fn terrain_vertex(@builtin(vertex_index) index: u32, patch_in: PatchIn) -> TerrainVertex {
   let v = patch_vertex(patch_in.record, vec2i(i32(index % PITCH), i32(index / PITCH)));
   var out: TerrainVertex;
-  out.position = clip_of(v.relative);
+  out.position = guarded(clip_of(v.relative));
   out.relative = v.relative;
   out.at = v.at;
   out.morph = v.morph;

@@ -10,6 +10,7 @@ struct View {
   forward: vec4f,        // w: metres per pixel at distance 1 (orthographic: metres per pixel)
   sun: vec4f,            // unit vector to the sun; w = sine of its elevation
   viewport: vec2f,       // pixels that are drawn
+  guard: vec2f,          // what part of the viewport in which patches are drawn they are (gpu/guard.ts)
   time: f32,
   size: f32,             // side of the domain, metres
   base: f32,             // height of the plane on which the block stands, metres
@@ -64,6 +65,11 @@ const OVERLAY_PAINTED: u32 = 6u;
 // Clip position of a point given relative to the eye.
 fn clip_of(relative: vec3f) -> vec4f {
   return view.eye_proj * vec4f(relative, 1.0);
+}
+
+// Clip position for the viewport in which patches are drawn, of one for that of the picture.
+fn guarded(clip: vec4f) -> vec4f {
+  return vec4f(clip.xy * view.guard, clip.zw);
 }
 
 fn to_clip(p: vec3f) -> vec4f {

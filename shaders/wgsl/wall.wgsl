@@ -30,7 +30,7 @@ fn wall_vertex(@builtin(vertex_index) index: u32, @location(0) record: vec4u, @l
     relative.z = (world.z - view.eye.z) - view.eye_low.z;
   }
   let air = air_to(world);
-  return WallVertex(clip_of(relative), world, v.world.z, normal, air.through, air.glow);
+  return WallVertex(guarded(clip_of(relative)), world, v.world.z, normal, air.through, air.glow);
 }
 
 @fragment

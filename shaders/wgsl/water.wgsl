@@ -197,7 +197,7 @@ fn water_vertex(@builtin(vertex_index) index: u32, patch_in: PatchIn, @location(
   let world = vec3f(v.world.xy, sheet.x);
   let air = air_to(world);
   let relative = vec3f(v.relative.xy, (sheet.x - view.eye.z) - view.eye_low.z);
-  return WaterVertex(clip_of(relative), relative, sheet.x - v.world.z, air.through, air.glow, v.at, patch_in.record, sheet);
+  return WaterVertex(guarded(clip_of(relative)), relative, sheet.x - v.world.z, air.through, air.glow, v.at, patch_in.record, sheet);
 }
 
 // Foam of the ground's channel at a place of a patch.

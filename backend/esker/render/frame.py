@@ -143,6 +143,7 @@ def _camera_values(camera: Camera, rect: Rect, size_m: float) -> dict[str, Array
         "up": [*up, tan * rect.height / camera.height],
         "forward": [*forward, per_pixel],
         "viewport": [camera.width, camera.height],
+        "guard": [1.0, 1.0],
     }
 
 

@@ -7,6 +7,8 @@
  */
 
 import { type ReadonlySignal, signal } from "@preact/signals-core";
+import { type Flight, poseOn } from "./cameraflight.ts";
+import { lifted, MAX_PITCH, MIN_PITCH, standingRoom } from "./camerafloor.ts";
 import {
   cameraState,
   FLAT,
@@ -19,7 +21,8 @@ import {
   poseBasis,
   poseEye,
 } from "./camerastate.ts";
-import { add, addScaled, clamp, DEG, distance, dot, mix, mix3, normalize, sub, wrapAngle } from "./math.ts";
+import { type Canvas, metresPerPixel, metresPerPixelAt, type Projection, projected, rayThrough } from "./cameraview.ts";
+import { add, addScaled, clamp, DEG, distance, dot, mix3, normalize, sub, wrapAngle } from "./math.ts";
 import type { CameraState, Ground, Ray, Vec3 } from "./types.ts";
 
 export type CameraMode = CameraState["mode"];
@@ -31,15 +34,7 @@ export interface SavedView {
   readonly target: Vec3;
 }
 
-export interface Projection {
-  /** Device pixels from the top left corner. */
-  readonly x: number;
-  readonly y: number;
-  /** Metres along the view direction; negative behind the eye. */
-  readonly depth: number;
-  /** In front of the eye and inside the canvas. (Nothing is said about ground in between.) */
-  readonly visible: boolean;
-}
+export type { Projection } from "./cameraview.ts";
 
 export interface FrameRect {
   readonly x0: number;
@@ -48,20 +43,12 @@ export interface FrameRect {
   readonly y1: number;
 }
 
-interface Flight {
-  readonly from: Pose;
-  readonly to: Pose;
-  readonly durationS: number;
-  elapsedS: number;
-}
-
-const MAX_PITCH = 30 * DEG;
-const MIN_PITCH = -89 * DEG;
 const FLY_PITCH = 85 * DEG;
 const MAP_PITCH = -90 * DEG;
-/** How near one may come to what is looked at, and how high the eye stands over the ground; nearer on small models. */
+/** How near one may come to what is looked at; nearer on small models. */
 const NEAREST_M = 2;
-const EYE_HEIGHT_M = 1.7;
+/** Heights that count as the same, metres. */
+const LEVEL_M = 1e-4;
 /** Slowest flight, metres a second. */
 const SLOWEST_M = 20;
 /** Time in which a smooth zoom covers 63 % of its way. */
@@ -79,8 +66,7 @@ export class Camera {
   #clearance: number;
   /** The land that home looks at. */
   #land: Land = FLAT;
-  #width = 1;
-  #height = 1;
+  #canvas: Canvas = { width: 1, height: 1 };
 
   /** Starts in orbit mode at the home view of a terrain of `sizeM` metres. */
   constructor(sizeM: number) {
@@ -107,8 +93,7 @@ export class Camera {
 
   /** Canvas size in device pixels. */
   resize(width: number, height: number): void {
-    this.#width = Math.max(1, Math.round(width));
-    this.#height = Math.max(1, Math.round(height));
+    this.#canvas = { width: Math.max(1, Math.round(width)), height: Math.max(1, Math.round(height)) };
     this.#publish();
   }
 
@@ -118,7 +103,7 @@ export class Camera {
       this.look(-dxPx, -dyPx);
       return;
     }
-    const k = Math.PI / this.#height;
+    const k = Math.PI / this.#canvas.height;
     const { heading, pitch, mode } = this.#pose;
     if (mode === "map") this.#set({ heading: wrapAngle(heading + dxPx * k) });
     else this.#set({ heading: wrapAngle(heading + dxPx * k), pitch: clamp(pitch - dyPx * k, MIN_PITCH, MAX_PITCH) });
@@ -132,7 +117,7 @@ export class Camera {
   /** Drags the ground with the pointer; the pivot follows the height of the ground. */
   pan(dxPx: number, dyPx: number, ground: Ground): void {
     const { forward, right, up } = poseBasis(this.#pose);
-    const perPixel = this.#metresPerPixel();
+    const perPixel = metresPerPixel(this.#pose, this.#canvas);
     const pivot = this.#pose.pivot;
     if (this.#pose.mode === "fly") {
       this.#set({ pivot: addScaled(addScaled(pivot, right, -dxPx * perPixel), up, dyPx * perPixel) });
@@ -206,7 +191,7 @@ export class Camera {
 
   /** Turns the view about the eye. */
   look(dxPx: number, dyPx: number): void {
-    const k = (this.#pose.fovDeg * DEG) / this.#height;
+    const k = (this.#pose.fovDeg * DEG) / this.#canvas.height;
     this.#keepEye(
       wrapAngle(this.#pose.heading + dxPx * k),
       clamp(this.#pose.pitch - dyPx * k, -FLY_PITCH, FLY_PITCH),
@@ -237,7 +222,7 @@ export class Camera {
     );
     const pitch = this.#pose.mode === "map" ? this.#pose.pitch : clamp(this.#pose.pitch, -75 * DEG, -15 * DEG);
     const pose: Pose = { ...this.#pose, pivot: mix3(low, high, 0.5), pitch };
-    const distanceM = fitDistance(pose, points, this.#width / this.#height, 0.2, this.#sizeM / 40);
+    const distanceM = fitDistance(pose, points, this.#aspect, 0.2, this.#sizeM / 40);
     this.#flyTo({ ...pose, distanceM: clamp(distanceM, this.#nearest, this.#farthest) }, durationMs);
   }
 
@@ -284,46 +269,17 @@ export class Camera {
 
   /** The ray through a device pixel. */
   ray(xPx: number, yPx: number): Ray {
-    const { forward, right, up } = poseBasis(this.#pose);
-    const nx = (2 * xPx) / this.#width - 1;
-    const ny = 1 - (2 * yPx) / this.#height;
-    const t = Math.tan((this.#pose.fovDeg * DEG) / 2);
-    const aspect = this.#width / this.#height;
-    const eye = poseEye(this.#pose);
-    if (this.#pose.mode === "map") {
-      const half = this.#pose.distanceM * t;
-      const onPlane = addScaled(addScaled(eye, right, nx * half * aspect), up, ny * half);
-      // Start above everything: the eye of a close map view may be lower than a summit beside it.
-      return {
-        origin: [onPlane[0], onPlane[1], onPlane[2] + 2 * this.#sizeM],
-        dir: forward,
-        spread: [this.#metresPerPixel(), 0],
-      };
-    }
-    const dir = normalize(addScaled(addScaled(forward, right, nx * t * aspect), up, ny * t));
-    return { origin: eye, dir, spread: [0, (2 * t) / this.#height] };
+    return rayThrough(this.#pose, this.#canvas, xPx, yPx, 2 * this.#sizeM);
   }
 
   /** Where a world point is on the canvas. */
   project(p: Vec3): Projection {
-    const { forward, right, up } = poseBasis(this.#pose);
-    const q = sub(p, poseEye(this.#pose));
-    const depth = dot(q, forward);
-    const map = this.#pose.mode === "map";
-    const half = Math.tan((this.#pose.fovDeg * DEG) / 2) * (map ? this.#pose.distanceM : depth);
-    const nx = dot(q, right) / (half * (this.#width / this.#height));
-    const ny = dot(q, up) / half;
-    const x = ((nx + 1) / 2) * this.#width;
-    const y = ((1 - ny) / 2) * this.#height;
-    const inFront = map || depth > 0;
-    return { x, y, depth, visible: inFront && Math.abs(nx) <= 1 && Math.abs(ny) <= 1 };
+    return projected(this.#pose, this.#canvas, p);
   }
 
   /** Metres that one device pixel covers at a world point. */
   metresPerPixelAt(p: Vec3): number {
-    if (this.#pose.mode === "map") return this.#metresPerPixel();
-    const depth = Math.max(0.1, dot(sub(p, poseEye(this.#pose)), poseBasis(this.#pose).forward));
-    return (2 * depth * Math.tan((this.#pose.fovDeg * DEG) / 2)) / this.#height;
+    return metresPerPixelAt(this.#pose, this.#canvas, p);
   }
 
   /** Remembers the present view under a name. */
@@ -347,6 +303,10 @@ export class Camera {
     return true;
   }
 
+  get #aspect(): number {
+    return this.#canvas.width / this.#canvas.height;
+  }
+
   get #nearest(): number {
     return Math.min(NEAREST_M, this.#sizeM / 500);
   }
@@ -356,12 +316,8 @@ export class Camera {
   }
 
   #homePose(mode: CameraMode): Pose {
-    const pose = homePose(mode, this.#sizeM, this.#width / this.#height, this.#land);
+    const pose = homePose(mode, this.#sizeM, this.#aspect, this.#land);
     return { ...pose, distanceM: Math.min(pose.distanceM, this.#farthest) };
-  }
-
-  #metresPerPixel(): number {
-    return (2 * this.#pose.distanceM * Math.tan((this.#pose.fovDeg * DEG) / 2)) / this.#height;
   }
 
   #leash(p: Vec3): Vec3 {
@@ -393,23 +349,10 @@ export class Camera {
   }
 
   #stepFlight(dtS: number): void {
-    const flight = this.#flight;
-    if (flight === null) return;
-    flight.elapsedS += dtS;
-    const t = clamp(flight.elapsedS / flight.durationS, 0, 1);
-    const e = t * t * (3 - 2 * t);
-    const { from, to } = flight;
-    this.#pose = {
-      ...to,
-      pivot: mix3(from.pivot, to.pivot, e),
-      distanceM: from.distanceM * (to.distanceM / from.distanceM) ** e,
-      heading: wrapAngle(from.heading + wrapAngle(to.heading - from.heading) * e),
-      pitch: mix(from.pitch, to.pitch, e),
-    };
-    if (t >= 1) {
-      this.#pose = to;
-      this.#flight = null;
-    }
+    if (this.#flight === null) return;
+    const flight = { ...this.#flight, elapsedS: this.#flight.elapsedS + dtS };
+    this.#pose = poseOn(flight);
+    this.#flight = this.#pose === flight.to ? null : flight;
     this.#publish();
   }
 
@@ -422,32 +365,16 @@ export class Camera {
 
   #keepAbove(ground: Ground): void {
     const eye = poseEye(this.#pose);
-    const floor = ground.heightAt(eye[0], eye[1]);
-    const walk = Math.min(EYE_HEIGHT_M, this.#sizeM / 100);
-    const clearance = Math.max(walk, eye[2] - floor);
-    const low = this.#pose.mode !== "map" && eye[2] < floor + walk;
-    if (!low && Math.abs(clearance - this.#clearance) < 1e-3 * this.#clearance) return;
-    this.#clearance = clearance;
-    if (low) this.#raiseEye([eye[0], eye[1], floor + walk]);
+    const { floor, lowest } = standingRoom(ground, eye, this.#sizeM);
+    this.#clearance = Math.max(lowest, eye[2]) - floor;
+    // An eye that was lifted is off by rounding: that is no reason for another frame.
+    if (this.#pose.mode === "map" || eye[2] >= lowest - LEVEL_M) return;
+    this.#pose = lifted(this.#pose, [eye[0], eye[1], lowest], this.#nearest);
     this.#publish();
   }
 
-  /** Lifts the eye. Orbit keeps looking at its pivot; fly keeps its direction. */
-  #raiseEye(eye: Vec3): void {
-    const { pivot, mode, distanceM } = this.#pose;
-    if (mode === "fly") {
-      this.#pose = { ...this.#pose, pivot: addScaled(eye, poseBasis(this.#pose).forward, distanceM) };
-      return;
-    }
-    const d = sub(pivot, eye);
-    const flat = Math.hypot(d[0], d[1]);
-    const pitch = clamp(Math.atan2(d[2], flat), MIN_PITCH, MAX_PITCH);
-    const lifted: Pose = { ...this.#pose, pitch, distanceM: Math.max(this.#nearest, distance(eye, pivot)) };
-    this.#pose = { ...lifted, pivot: addScaled(eye, poseBasis(lifted).forward, lifted.distanceM) };
-  }
-
   #snapshot(): CameraState {
-    return cameraState(this.#pose, this.#width, this.#height, this.#sizeM, this.#clearance);
+    return cameraState(this.#pose, this.#canvas.width, this.#canvas.height, this.#sizeM);
   }
 
   #publish(): void {

@@ -1,6 +1,5 @@
-/** From a pose to the matrices that renderers read. Pure. */
+/** From a pose to the matrix that renderers read. Pure. */
 
-import { mat4d } from "wgpu-matrix";
 import { addScaled, clamp, DEG, dot, sub } from "./math.ts";
 import type { CameraState, Vec3 } from "./types.ts";
 
@@ -118,17 +117,15 @@ export function homePose(mode: Pose["mode"], sizeM: number, aspect: number, land
 /**
  * The published state of a pose.
  *
- * `clearanceM` is the height of the eye above the ground: it bounds the near plane, so that depth keeps its precision
- * from a walk to a view from space. Matrices are built in float64 and rounded once.
+ * The near plane is as near as eyes come to the ground (camerafloor.ts), from a walk to a view from space: reversed depth
+ * does not lose precision by it, and what is beside a cliff is not cut off. Matrices are built in float64 and rounded once.
  */
-export function cameraState(pose: Pose, width: number, height: number, sizeM: number, clearanceM: number): CameraState {
+export function cameraState(pose: Pose, width: number, height: number, sizeM: number): CameraState {
   const basis = poseBasis(pose);
   const eye = poseEye(pose);
   const map = pose.mode === "map";
   const reach = Math.hypot(eye[0] - sizeM / 2, eye[1] - sizeM / 2, eye[2]) + 2 * sizeM;
-  const near = map
-    ? pose.distanceM - 2 * sizeM
-    : Math.max(Math.min(0.1, sizeM / 4096), Math.min(pose.distanceM * 0.02, clearanceM * 0.25));
+  const near = map ? pose.distanceM - 2 * sizeM : Math.min(0.1, sizeM / 4096);
   const far = map ? pose.distanceM + 2 * sizeM : 2 * reach;
   const tan = Math.tan((pose.fovDeg * DEG) / 2);
   const orthoHeight = map ? 2 * pose.distanceM * tan : 0;
@@ -147,7 +144,6 @@ export function cameraState(pose: Pose, width: number, height: number, sizeM: nu
     width,
     height,
     viewProj: new Float32Array(viewProj),
-    invViewProj: new Float32Array(mat4d.invert(viewProj)),
   };
 }
 

@@ -26,7 +26,6 @@ export interface CameraState {
   readonly height: number;
   /** Column-major 4x4, WebGPU clip space (z 0..1). */
   readonly viewProj: Float32Array;
-  readonly invViewProj: Float32Array;
 }
 
 export interface Ray {

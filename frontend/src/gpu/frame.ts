@@ -53,6 +53,8 @@ export class FrameBindings {
   private readonly channels: ChannelTexture;
   private readonly lakes: LakeTexture;
   private atlas: Atlas | null = null;
+  /** Pixels that the last update was for. */
+  private drawn = { width: 1, height: 1 };
   private group: GPUBindGroup | null = null;
 
   constructor(
@@ -61,6 +63,7 @@ export class FrameBindings {
     private readonly noise: GPUTexture,
     private readonly stones: GPUTexture,
     software: boolean,
+    private readonly guardPx = 0,
   ) {
     const visibility = GPUShaderStage.VERTEX | GPUShaderStage.FRAGMENT;
     const texture = (
@@ -143,6 +146,16 @@ export class FrameBindings {
     return this.group;
   }
 
+  /** From here on a pass draws patches: their vertices are for a viewport with a border (gpu/guard.ts). */
+  widen(pass: GPURenderPassEncoder): void {
+    if (this.guardPx > 0) this.setViewport(pass, this.guardPx);
+  }
+
+  /** From here on a pass draws all else. */
+  narrow(pass: GPURenderPassEncoder): void {
+    if (this.guardPx > 0) this.setViewport(pass, 0);
+  }
+
   /** Writes the uniform for this frame. */
   update(scene: Scene, facts: FrameFacts): void {
     const { lakes = null } = facts;
@@ -186,6 +199,11 @@ export class FrameBindings {
     this.lakes.destroy();
   }
 
+  private setViewport(pass: GPURenderPassEncoder, border: number): void {
+    const { width, height } = this.drawn;
+    pass.setViewport(-border, -border, width + 2 * border, height + 2 * border, 0, 1);
+  }
+
   private writeCamera(scene: Scene, facts: FrameFacts): void {
     const w = this.writer;
     const { camera } = scene;
@@ -204,6 +222,9 @@ export class FrameBindings {
     w.set("up", [...up, tan]);
     w.set("forward", [...forward, ortho ? camera.orthoHeight / facts.height : (2 * tan) / facts.height]);
     w.set("viewport", [facts.width, facts.height]);
+    const border = 2 * this.guardPx;
+    w.set("guard", [facts.width / (facts.width + border), facts.height / (facts.height + border)]);
+    this.drawn = { width: facts.width, height: facts.height };
   }
 
   private writeCursors(scene: Scene): void {

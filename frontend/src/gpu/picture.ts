@@ -78,17 +78,20 @@ export class Picture {
       const first = this.hidden.first(encoder);
       const near = encoder.beginRenderPass(target.begin(canvas, width, height, "first"));
       near.setBindGroup(0, frame.bindGroup);
+      frame.widen(near);
       patches.drawRound(near, first);
       near.end();
       const second = this.hidden.second(encoder, target.depthView);
       this.told = this.hidden.measure(encoder);
       const pass = encoder.beginRenderPass(target.begin(canvas, width, height, "second"));
       pass.setBindGroup(0, frame.bindGroup);
+      frame.widen(pass);
       patches.drawRound(pass, second);
       this.rest(pass, scene);
     } else {
       const pass = encoder.beginRenderPass(target.begin(canvas, width, height));
       pass.setBindGroup(0, frame.bindGroup);
+      frame.widen(pass);
       patches.drawGround(pass);
       this.rest(pass, scene);
     }
@@ -114,13 +117,16 @@ export class Picture {
     return scene.camera.orthoHeight === 0 && this.choice.use(cut.count);
   }
 
-  /** All that comes after the ground. */
+  /** All that comes after the ground, whose viewport is set. */
   private rest(pass: GPURenderPassEncoder, scene: Scene): void {
-    const { background, patches, ribbons, ghost, sheet, labels } = this.passes;
+    const { frame, background, patches, ribbons, ghost, sheet, labels } = this.passes;
     patches.drawWalls(pass);
     const sea = scene.settings.sea_level_m !== null;
+    frame.narrow(pass);
     background.draw(pass, sea);
+    frame.widen(pass);
     patches.drawWater(pass);
+    frame.narrow(pass);
     sheet.draw(pass);
     ghost.draw(pass);
     labels.draw(pass);

@@ -11,6 +11,7 @@ import type { Gpu } from "./device.ts";
 import { Fit } from "./fit.ts";
 import { FrameBindings, sunDirection } from "./frame.ts";
 import { GhostPass } from "./ghostplane.ts";
+import { guardOf } from "./guard.ts";
 import { HiddenPatches } from "./hidden.ts";
 import { LabelPass } from "./labels.ts";
 import { LightQueue } from "./lightqueue.ts";
@@ -128,6 +129,7 @@ export class GpuRenderer implements SceneRenderer {
       createNoiseTexture(device),
       createStonesTexture(device, gpu.software),
       gpu.software,
+      await guardOf(device, gpu.software),
     );
     const context: PassContext = {
       device,

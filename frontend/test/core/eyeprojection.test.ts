@@ -24,7 +24,7 @@ const relative = (s: CameraState, p: Vec3): Vec3 => [p[0] - s.eye[0], p[1] - s.e
 describe("eyeProjection", () => {
   it.each(["orbit", "map"] as const)("R24: is the camera's own projection, seen from the eye (%s)", (mode) => {
     const near: Pose = { ...pose, mode, pivot: [900, 700, 40], distanceM: 400 };
-    const state = cameraState(near, 800, 600, 4096, 50);
+    const state = cameraState(near, 800, 600, 4096);
     const p: Vec3 = [930, 690, 20];
     const whole = apply(state.viewProj, p);
     const seen = apply(eyeProjection(state), relative(state, p));
@@ -32,7 +32,7 @@ describe("eyeProjection", () => {
   });
 
   it("R24: a step of a millimetre at the far corner of the largest terrain moves the picture by what it should", () => {
-    const state = cameraState(pose, 1280, 720, SIZE, 2);
+    const state = cameraState(pose, 1280, 720, SIZE);
     const m = Float32Array.from(eyeProjection(state));
     const pixel = (p: Vec3): number => {
       const [x, , , w] = apply(m, relative(state, p).map(Math.fround) as unknown as Vec3) as [
@@ -63,7 +63,7 @@ describe("eyeProjection", () => {
   });
 
   it("R24: reversed depth is 1 at the near plane and 0 at the far one", () => {
-    const state = cameraState(pose, 800, 600, SIZE, 2);
+    const state = cameraState(pose, 800, 600, SIZE);
     const m = reversedDepth(eyeProjection(state));
     const forward = relative({ ...state, eye: state.eye }, state.target).map((v) => v / 3);
     const depth = (d: number): number => {

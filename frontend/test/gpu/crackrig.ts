@@ -7,6 +7,7 @@
 import type { CameraState, Scene, TileView } from "../../src/core/types.ts";
 import { Atlas, type Changes, SOFTWARE_SLOTS } from "../../src/gpu/atlas.ts";
 import { FrameBindings, sunDirection } from "../../src/gpu/frame.ts";
+import { guardOf } from "../../src/gpu/guard.ts";
 import { LightQueue } from "../../src/gpu/lightqueue.ts";
 import { createNoiseTexture } from "../../src/gpu/noise.ts";
 import { INDEX_COUNT, PatchPasses, PITCH, patchIndices } from "../../src/gpu/patches.ts";
@@ -107,7 +108,15 @@ async function makeRig(): Promise<Rig> {
     throw new Error(event.error.message);
   });
   const sky = await SkyTables.create(device);
-  const frame = new FrameBindings(device, sky, createNoiseTexture(device), createStonesTexture(device, true), true);
+  const guard = await guardOf(device, true);
+  const frame = new FrameBindings(
+    device,
+    sky,
+    createNoiseTexture(device),
+    createStonesTexture(device, true),
+    true,
+    guard,
+  );
   const context: PassContext = {
     device,
     frameLayout: frame.layout,
@@ -281,6 +290,7 @@ async function bare(rig: Rig, encoder: GPUCommandEncoder, cut: Cut): Promise<{ g
   const records = rig.records.write(cut.records, cut.count * RECORD_WORDS);
   const pixels = await rig.one.draw(encoder, rig.depth, (pass) => {
     pass.setBindGroup(0, rig.frame.bindGroup);
+    rig.frame.widen(pass);
     pass.setPipeline(rig.bare);
     pass.setVertexBuffer(0, records);
     pass.setIndexBuffer(rig.indices, "uint16");
@@ -302,6 +312,7 @@ export async function picture(rig: Rig, world: World, scene: Scene, tau: number,
     while (!rig.patches.useLook(scene.settings.look)) await new Promise((done) => setTimeout(done, 10));
     const pixels = await rig.full.draw(encoder, rig.depth, (pass) => {
       pass.setBindGroup(0, rig.frame.bindGroup);
+      rig.frame.widen(pass);
       rig.patches.drawGround(pass);
     });
     shown = scan(new Uint16Array(pixels));

@@ -218,13 +218,31 @@ export async function deepCrackTest(seed: number, views: number, how: How = {}):
   return tally.report(views);
 }
 
-/** A camera that somebody on foot has, at least `least` metres up: ground that is on its way must not reach the eye. */
-function footCamera(kind: Kind, next: () => number, [x, y, z]: Vec3, least: number): CameraState {
+/** Room that the page's camera keeps to all sides (core/camerafloor.ts), metres. */
+const ROOM = 0.45;
+/** Where ground is asked for that may rise beside an eye. */
+const AROUND = [
+  [0, 0],
+  ...Array.from({ length: 8 }, (_, k) => [Math.cos((k * Math.PI) / 4), Math.sin((k * Math.PI) / 4)]),
+];
+
+/**
+ * A camera that somebody on foot has, at least `least` metres up: ground that is on its way must not reach the eye.
+ * `highest`: of the ground drawn around a place; on a slope the eye stands above what rises beside it, as the page's does.
+ */
+function footCamera(
+  kind: Kind,
+  next: () => number,
+  [x, y, z]: Vec3,
+  least: number,
+  highest: (x: number, y: number) => number,
+): CameraState {
   if (kind === "map") return mapCamera([x, y, 0], 0.4 + 3 * next(), WIDTH, HEIGHT);
   const up = least + 2 * next();
   const angle = 2 * Math.PI * next();
-  const eye: Vec3 = [x + 0.3 * up * Math.cos(angle), y + 0.3 * up * Math.sin(angle), z + up];
-  return lookAt(eye, [x, y, z], WIDTH, HEIGHT, 40, 0.05, 4e5);
+  const [ex, ey] = [x + 0.3 * up * Math.cos(angle), y + 0.3 * up * Math.sin(angle)];
+  const beside = Math.max(...AROUND.map(([east, north]) => highest(ex + ROOM * east!, ey + ROOM * north!)));
+  return lookAt([ex, ey, Math.max(z + up, beside + ROOM)], [x, y, z], WIDTH, HEIGHT, 40, 0.05, 4e5);
 }
 
 /**
@@ -261,7 +279,8 @@ export async function walkCrackTest(seed: number, views: number, how: How = {}):
         if (part === 3) view.lose(() => next() < 0.3);
       }
       const tau = 0.6 + 2 * next();
-      const state = footCamera(kind, next, [x, y, ground()], part === 0 ? 1 : 9);
+      const highest = (px: number, py: number): number => groundAt(world.selection.tree, LARGE, px, py).high;
+      const state = footCamera(kind, next, [x, y, ground()], part === 0 ? 1 : 9, highest);
       const drawn = await picture(rig, world, sceneOf(view, state, look), tau, {
         full: isFull(seed, done, how),
         rounds: part === 0 ? 3 : 1,

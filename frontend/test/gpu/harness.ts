@@ -17,6 +17,7 @@ import { openGpu } from "../../src/gpu/device.ts";
 import { createMapRenderer, createRenderer } from "../../src/gpu/index.ts";
 import { GpuRenderer } from "../../src/gpu/renderer.ts";
 import { crackTest, deepCrackTest, walkCrackTest } from "./cracks.ts";
+import { guardTest } from "./guard.ts";
 import { layeredCrackTest } from "./layered.ts";
 import { synthesisVectors } from "./synthesis.ts";
 import { alpineField, FieldView, lookAt, mapCamera, PLAIN_CHANNELS } from "./world.ts";
@@ -288,6 +289,7 @@ Object.assign(globalThis, {
     circle,
     crackTest,
     deepCrackTest,
+    guardTest,
     layeredCrackTest,
     walkCrackTest,
     synthesisVectors,

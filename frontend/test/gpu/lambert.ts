@@ -24,7 +24,7 @@ struct PlainVertex {
 @vertex
 fn terrain_vertex(@builtin(vertex_index) index: u32, patch_in: PatchIn) -> PlainVertex {
   let v = patch_vertex(patch_in.record, vec2i(i32(index % PITCH), i32(index / PITCH)));
-  return PlainVertex(clip_of(v.relative), v.at, v.morph, patch_in.record);
+  return PlainVertex(guarded(clip_of(v.relative)), v.at, v.morph, patch_in.record);
 }
 
 @fragment

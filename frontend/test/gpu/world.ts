@@ -262,7 +262,6 @@ export function lookAt(
     width,
     height,
     viewProj: Float32Array.from(viewProj),
-    invViewProj: Float32Array.from(mat4.inverse(viewProj)),
   };
 }
 
@@ -284,7 +283,6 @@ export function mapCamera(centre: Vec3, orthoHeight: number, width: number, heig
     width,
     height,
     viewProj: Float32Array.from(viewProj),
-    invViewProj: Float32Array.from(mat4.inverse(viewProj)),
   };
 }
 
