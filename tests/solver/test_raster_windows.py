@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from esker import grid
 from esker.contract import MAX_REFINED_LEVEL, Channel, Stroke, TerrainSettings
 from esker.fractal import PAINT_LESS, PAINT_MORE
-from esker.solve import raster, reference_raster
-from esker.solve.constraints import BIN, BinBox, Tables, WindowPacker, bins, everything, pack
+from esker.solve import constraints, raster, reference_raster
+from esker.solve.constraints import BIN, BinBox, Shapes, Tables, WindowPacker, bins, everything, pack
 from esker.solve.device import Device
 from esker.solve.levels import PAD, ClWorkspace, Launcher
+from esker.solve.packing import Shape
 from esker.solve.sayings import Layer, natural_amplitude_m
 from esker.terrain import Stroke as Make
 from tests.solver.scenes import PINNED, SCENES, SETTINGS, SIZE, flank, loop, ridge
@@ -192,3 +193,30 @@ def test_windows_are_checked(box: BinBox) -> None:
         WindowPacker(SCENE, SETTINGS).pack(0, box)
     with pytest.raises(ValueError, match=r"0\.\.10"):
         WindowPacker(SCENE, SETTINGS).pack(11, (0, 1, 0, 1))
+
+
+def test_a_stroke_is_made_ready_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """SPEC S40: the same object under the same settings is known, the least recently used is forgotten."""
+    made: list[str] = []
+
+    def shape_for(layer: object, stroke: Stroke, settings: TerrainSettings, base: object) -> Shape | None:
+        assert layer is base is None
+        made.append(stroke.id)
+        return real(None, stroke, settings, None)
+
+    real = constraints.shape_for
+    monkeypatch.setattr(constraints, "shape_for", shape_for)
+    shapes, strokes = Shapes(most=5), [s.model_copy(update={"id": str(k)}) for k, s in enumerate(SCENES["five"])]
+    first = [shapes.of(s, SETTINGS, None) for s in strokes]
+    assert made == list("01234")
+    assert [shapes.of(s, SETTINGS, None) for s in strokes] == first
+    assert len(made) == 5
+    other = SETTINGS.model_copy(update={"reach_m": 77.0})
+    shape = shapes.of(strokes[4], other, None)
+    assert shape is not None
+    assert shape.cliff == 1 / 77
+    shapes.of(strokes[1], SETTINGS, None)
+    shapes.of(strokes[0], SETTINGS, None)
+    assert made == list("0123440")
+    tables = [WindowPacker(strokes, SETTINGS, shapes=known).pack(3, (2, 20, 3, 21)) for known in (None, shapes, shapes)]
+    assert len({t.knots.tobytes() + t.pieces.tobytes() + t.row_items.tobytes() for t in tables}) == 1

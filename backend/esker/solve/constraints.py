@@ -6,7 +6,9 @@ Strokes are ordered by id, so no result depends on the order of edits.
 from __future__ import annotations
 
 import math
+from collections import OrderedDict
 from collections.abc import Callable, Generator, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -23,6 +25,7 @@ __all__ = [
     "BIN",
     "BinBox",
     "Packer",
+    "Shapes",
     "Tables",
     "Window",
     "WindowPacker",
@@ -32,6 +35,9 @@ __all__ = [
     "pack",
     "whole",
 ]
+
+SHAPES = 4096
+"""Strokes that are kept ready, some kilobytes each."""
 
 
 def pack(
@@ -166,6 +172,25 @@ def _tables(level: int, settings: TerrainSettings, packed: list[Packed], box: Bi
     )
 
 
+class Shapes:
+    """Strokes ready to be packed for the heights, least recently used dropped first: when one of a hundred has changed,
+    the others need not be made ready again."""
+
+    def __init__(self, most: int = SHAPES) -> None:
+        self.most = most
+        self._held: OrderedDict[tuple[object, ...], tuple[Stroke, Shape | None]] = OrderedDict()
+
+    def of(self, stroke: Stroke, settings: TerrainSettings, base: Base | None) -> Shape | None:
+        """``shape_for`` of a stroke, which is known again by being the same object."""
+        key = id(stroke), *_settings_key(settings), None if base is None else base.digest
+        if key not in self._held:
+            self._held[key] = stroke, shape_for(None, stroke, settings, base)
+            while len(self._held) > self.most:
+                self._held.popitem(last=False)
+        self._held.move_to_end(key)
+        return self._held[key][1]
+
+
 class WindowPacker:
     """Packs windows of one stroke set, for the heights or one layer, at any level, also above the global ones
     (DESIGN 5.6).
@@ -180,9 +205,12 @@ class WindowPacker:
         settings: TerrainSettings,
         layer: Layer | None = None,
         base: Base | None = None,
+        shapes: Shapes | None = None,
     ) -> None:
+        """``shapes``: what was made ready before, for the heights."""
         self._settings = settings
-        pairs = [(s, shape_for(layer, s, settings, base)) for s in sorted(strokes, key=lambda k: k.id)]
+        ready = partial(shape_for, layer) if shapes is None or layer is not None else shapes.of
+        pairs = [(s, ready(s, settings, base)) for s in sorted(strokes, key=lambda k: k.id)]
         self._strokes = [s for s, shape in pairs if shape is not None]
         self._shapes: list[Shape] = [shape for _, shape in pairs if shape is not None]
         plan = [shape.crest.points[:, :2] for shape in self._shapes]

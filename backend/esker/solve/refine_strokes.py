@@ -12,7 +12,7 @@ import numpy as np
 from esker import grid
 from esker.contract import Stroke, TerrainSettings
 from esker.solve.base_blocks import BaseWindows
-from esker.solve.constraints import BIN, BinBox, Tables, WindowPacker, bins
+from esker.solve.constraints import BIN, BinBox, Shapes, Tables, WindowPacker, bins
 from esker.solve.tables import INDEX_FIELDS
 
 PACK_AROUND: Final = 48
@@ -31,9 +31,15 @@ class Strokes:
     level: so the digest of its strokes is that of the chain's.
     """
 
-    def __init__(self, strokes: Sequence[Stroke], settings: TerrainSettings, base: BaseWindows | None = None) -> None:
+    def __init__(
+        self,
+        strokes: Sequence[Stroke],
+        settings: TerrainSettings,
+        base: BaseWindows | None = None,
+        shapes: Shapes | None = None,
+    ) -> None:
         self.settings, self.base = settings, base
-        self._packer = WindowPacker(strokes, settings, base=None if base is None else base.base)
+        self._packer = WindowPacker(strokes, settings, base=None if base is None else base.base, shapes=shapes)
         self._grounds = {} if base is None else self._packer.grounds
         self._own: dict[str, bytes] = {}
         self._windows: dict[tuple[int, BinBox], bytes] = {}
