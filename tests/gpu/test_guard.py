@@ -1,8 +1,9 @@
 """The border round the picture in which triangles are not cut (SPEC R70), on the software adapter that needs it.
 
 Two pairs of triangles that the crack test found (crackTest(1010, 110) view 109, crackTest(3012, 74) view 73), clip
-positions as the vertex shader gave them. Each pair covers one pixel at the picture's border together. SwiftShader leaves
-it out: of the second triangle's whole, snapped to 1/16 pixel, the area is 0 or below, of what the border leaves of it above.
+positions as the vertex shader gave them. Each pair covers one pixel at the picture's border together. SwiftShader
+leaves it out: of the second triangle's whole, snapped to 1/16 pixel, the area is 0 or below, of what the border leaves
+of it above.
 """
 
 from __future__ import annotations
