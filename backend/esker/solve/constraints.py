@@ -56,6 +56,8 @@ class Packer:
 
     def __init__(self, level: int, layer: Layer | None = None) -> None:
         self.level, self.layer = level, layer
+        self.shapes: Shapes | None = None
+        """What other packers made ready, for the heights."""
         self._settings: tuple[float, float | None, str] | None = None
         self._base: Base | None = None
         self._packed: dict[str, tuple[Stroke, Packed | None]] = {}
@@ -81,7 +83,7 @@ class Packer:
             if known is not None and (known[0] is stroke or known[0] == stroke) and not stale(stroke):
                 new[stroke.id] = (stroke, known[1])
                 continue
-            shape = shape_for(self.layer, stroke, settings, base)
+            shape = _ready(self.shapes, self.layer)(stroke, settings, base)
             new[stroke.id] = (stroke, None if shape is None else pack_one(shape, s, box))
         window = everything(box) if fresh else _changed(old, new, box)
         if moved is not None:
@@ -191,6 +193,13 @@ class Shapes:
         return self._held[key][1]
 
 
+def _ready(
+    shapes: Shapes | None, layer: Layer | None
+) -> Callable[[Stroke, TerrainSettings, Base | None], Shape | None]:
+    """What makes a stroke ready to be packed."""
+    return partial(shape_for, layer) if shapes is None or layer is not None else shapes.of
+
+
 class WindowPacker:
     """Packs windows of one stroke set, for the heights or one layer, at any level, also above the global ones
     (DESIGN 5.6).
@@ -209,7 +218,7 @@ class WindowPacker:
     ) -> None:
         """``shapes``: what was made ready before, for the heights."""
         self._settings = settings
-        ready = partial(shape_for, layer) if shapes is None or layer is not None else shapes.of
+        ready = _ready(shapes, layer)
         pairs = [(s, ready(s, settings, base)) for s in sorted(strokes, key=lambda k: k.id)]
         self._strokes = [s for s, shape in pairs if shape is not None]
         self._shapes: list[Shape] = [shape for _, shape in pairs if shape is not None]

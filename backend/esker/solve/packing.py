@@ -341,10 +341,13 @@ def _rows(packed: list[Packed], box: BinBox) -> tuple[Ints, Ints]:
     count = box[1] - box[0]
     if not packed:
         return np.zeros(count + 1, dtype=np.int32), np.zeros((0, ITEM_STRIDE), dtype=np.int32)
-    spans = np.vstack([p.window.spans for p in packed])
-    rows = np.concatenate([p.window.first - box[0] + np.arange(len(p.window.spans)) for p in packed])
-    stroke = np.repeat(np.arange(len(packed)), [len(p.window.spans) for p in packed])
-    used = spans[:, 1] > spans[:, 0]
-    order = np.argsort(rows[used], kind="stable")
-    items = np.column_stack([stroke, spans])[used][order].astype(np.int32)
+    spans = np.concatenate([p.window.spans for p in packed])
+    lengths = np.array([len(p.window.spans) for p in packed])
+    starts = np.array([p.window.first for p in packed]) - box[0] - (np.cumsum(lengths) - lengths)
+    rows = np.arange(len(spans)) + np.repeat(starts, lengths)
+    used = np.flatnonzero(spans[:, 1] > spans[:, 0])
+    used = used[np.argsort(rows[used], kind="stable")]
+    items = np.empty((len(used), ITEM_STRIDE), dtype=np.int32)
+    items[:, 0] = np.repeat(np.arange(len(packed)), lengths)[used]
+    items[:, 1:] = spans[used]
     return np.concatenate([[0], np.cumsum(np.bincount(rows[used], minlength=count))]).astype(np.int32), items

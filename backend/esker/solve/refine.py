@@ -141,7 +141,6 @@ class Refiner:
         self._ground = np.concatenate([basis.gradient, basis.heights[None]])
         self._digests: dict[TileKey, bytes] = {}
         self._content: dict[TileKey, bytes] = {}
-        self._chains: dict[tuple[int, Box], bytes] = {}
         self._strokes = Strokes(basis.strokes, basis.settings, self._base, shapes)
         self._under_way: deque[_Begun] = deque()
         """Oldest first; they outlive the iterator that began them."""
@@ -332,27 +331,20 @@ class Refiner:
         side = 1 << key.level if 0 <= key.level <= MAX_REFINED_LEVEL else 0
         if key.level <= low or not (0 <= key.x < side and 0 <= key.y < side):
             raise ValueError(f"{key} is not a tile of levels {low + 1}..{MAX_REFINED_LEVEL}")
+        span, level = _span(key), key.level
+        at = step(level, span)
         out = blake2b(repr((low, tuple(key))).encode(), digest_size=DIGEST_BYTES)
-        out.update(self._chain(key.level, (key.x, key.y, key.x + 1, key.y + 1)))
-        return out.digest()
-
-    def _chain(self, level: int, box: Box) -> bytes:
-        """Digest of all that the fields of a box of tiles depend on but its place. Kept by box: chains of tiles that
-        lie near each other soon go on as one."""
-        known = self._chains.get((level, box))
-        if known is None:
-            at, low, out = step(level, _tile_span(box)), self.basis.level, blake2b(digest_size=DIGEST_BYTES)
-            under = _cover(at.parent, level - 1)
+        while True:
             if self._base is not None:
                 out.update(self._base.digest(level, at.window))
-            if level > low + 1:
-                out.update(self._chain(level - 1, under))
-            else:
-                out.update(self._strokes.digest(level, at.box))
-                for ground in _keys(low, under):
-                    out.update(self._ground_digest(ground))
-            known = self._chains[level, box] = out.digest()
-        return known
+            if level == low + 1:
+                break
+            level -= 1
+            at = step(level, _tile_span(_cover(at.parent, level)))
+        out.update(self._strokes.digest(at.level, at.box))
+        for ground in _keys(low, _cover(at.parent, low)):
+            out.update(self._ground_digest(ground))
+        return out.digest()
 
     def _ground_digest(self, key: TileKey) -> bytes:
         known = self._digests.get(key)
@@ -447,9 +439,9 @@ class Refinery:
     Refinement has row-wise kernels only; a GPU runs them too, correctly and slowly.
     """
 
-    def __init__(self, device: Device | None, cache_bytes: int = CACHE_BYTES) -> None:
+    def __init__(self, device: Device | None, cache_bytes: int = CACHE_BYTES, shapes: Shapes | None = None) -> None:
         self.cache = FieldCache(cache_bytes)
-        self._device, self._blocks, self._shapes = device, BlockCache(), Shapes()
+        self._device, self._blocks, self._shapes = device, BlockCache(), shapes
         self._engine: Engine | None = None
 
     def refiner(self, basis: Basis) -> Refiner:

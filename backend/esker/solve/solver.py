@@ -25,6 +25,7 @@ from esker.contract import MAX_LEVEL, Channel, Stroke, TerrainSettings
 from esker.solve import multigrid, passes, proof
 from esker.solve.base import Base, bound
 from esker.solve.channels import ChannelSolver, channel_level
+from esker.solve.constraints import Shapes
 from esker.solve.device import NUMPY, NUMPY_NAME, Device, open_device
 from esker.solve.faults import OutOfDeviceMemoryError, guarded, is_fault
 from esker.solve.passes import (
@@ -80,6 +81,7 @@ class Solver:
         self._spare: list[Workspace] = []
         self._idle_since: weakref.WeakKeyDictionary[Workspace, float] = weakref.WeakKeyDictionary()
         self._refinery: Refinery | None = None
+        self._shapes = Shapes()
         self._channel_solvers: dict[int, ChannelSolver] = {}
         self._spare_bytes = min(SPARE_BYTES, os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // 5)
         self._device: Device | None = None
@@ -98,7 +100,7 @@ class Solver:
     def refiner(self, basis: Basis) -> Refiner:
         """What refines a settled solve of this solver above its level (DESIGN 5.6). Refiners share a cache."""
         if self._refinery is None:
-            self._refinery = Refinery(self._device)
+            self._refinery = Refinery(self._device, shapes=self._shapes)
         return self._refinery.refiner(basis)
 
     def steps(
@@ -323,8 +325,10 @@ class Solver:
         while self._spare and self._kept() + grid.solve_bytes(top, based) > self._spare_bytes:
             self._spare.pop(0)
         made = new_workspace(self._device, top, based)
+        made.packer.shapes = self._shapes
         if top >= grid.SCOUT_FROM:
             made.scout = new_workspace(self._device, grid.SCOUT, based)
+            made.scout.packer.shapes = self._shapes
         return made
 
     def _kept(self) -> int:
