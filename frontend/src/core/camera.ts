@@ -91,9 +91,11 @@ export class Camera {
     return this.#flight !== null || this.#zoomLeft !== 0;
   }
 
-  /** Canvas size in device pixels. */
+  /** Canvas size in device pixels. A camera that is still at home goes along: home depends on the shape of the picture. */
   resize(width: number, height: number): void {
+    const there = this.#atHome();
     this.#canvas = { width: Math.max(1, Math.round(width)), height: Math.max(1, Math.round(height)) };
+    if (there) this.#pose = this.#homePose(this.#pose.mode);
     this.#publish();
   }
 
@@ -246,13 +248,9 @@ export class Camera {
   /** Says how high the land lies. A camera that is still at home goes along. */
   stand(land: Land): void {
     if (land.groundM === this.#land.groundM && land.lowM === this.#land.lowM) return;
-    const home = this.#homePose(this.#pose.mode);
-    const { pivot, distanceM, heading, pitch } = this.#pose;
-    const near = 1e-6 * this.#sizeM;
-    const turned = Math.abs(wrapAngle(heading - home.heading)) + Math.abs(pitch - home.pitch);
-    const there = distance(pivot, home.pivot) + Math.abs(distanceM - home.distanceM) < near && turned < 1e-6;
+    const there = this.#atHome();
     this.#land = land;
-    if (there && !this.moving) this.#set(this.#homePose(this.#pose.mode));
+    if (there) this.#set(this.#homePose(this.#pose.mode));
   }
 
   /**
@@ -313,6 +311,16 @@ export class Camera {
 
   get #farthest(): number {
     return this.#sizeM * 8;
+  }
+
+  /** Whether nobody has moved the view since it was home, and nothing moves it now. */
+  #atHome(): boolean {
+    const home = this.#homePose(this.#pose.mode);
+    const { pivot, distanceM, heading, pitch } = this.#pose;
+    const near = 1e-6 * this.#sizeM;
+    const turned = Math.abs(wrapAngle(heading - home.heading)) + Math.abs(pitch - home.pitch);
+    const there = distance(pivot, home.pivot) + Math.abs(distanceM - home.distanceM) < near && turned < 1e-6;
+    return there && !this.moving;
   }
 
   #homePose(mode: CameraMode): Pose {

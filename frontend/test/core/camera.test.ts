@@ -164,6 +164,20 @@ describe("home over land that lies high (SPEC U32)", () => {
     expect(c.state.value.eye).toEqual(moved);
   });
 
+  it("goes along when the picture changes its shape, and only then (U33)", () => {
+    const [turned, upright] = [new Camera(4096), new Camera(4096)];
+    upright.resize(390, 844);
+    upright.home(0);
+    turned.resize(844, 390);
+    turned.home(0);
+    turned.resize(390, 844);
+    expect(turned.state.value.eye).toEqual(upright.state.value.eye);
+    turned.orbit(40, 0);
+    const moved = turned.state.value.eye;
+    turned.resize(844, 390);
+    expect(turned.state.value.eye).toEqual(moved);
+  });
+
   it("is what it was on flat land", () => {
     const [a, b] = [new Camera(4096), new Camera(4096)];
     b.stand({ groundM: 0, lowM: 0 });
