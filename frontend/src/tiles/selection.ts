@@ -9,21 +9,16 @@
  * shared edge, so patches meet exactly.
  */
 
-import { eyeProjection } from "../core/eyeprojection.ts";
 import type { CameraState, TileView } from "../core/types.ts";
-import { PATCH_CELLS, QUANTA_PER_CELL, SUBPATCHES } from "../generated/contract.ts";
+import { PATCH_CELLS, SUBPATCHES } from "../generated/contract.ts";
 import { frontToBack, Horizon, highestAround } from "./occlusion.ts";
 import { PatchTree } from "./patchtree.ts";
 import { EDGE_EAST, EDGE_NORTH, EDGE_SOUTH, EDGE_WEST, FACT_WORDS, RECORD_WORDS, writeRecord } from "./records.ts";
+import { DRY, Sight, type Water } from "./sight.ts";
 import { type TileRequest, Wishes } from "./wishes.ts";
 
 export type { TileRequest } from "./wishes.ts";
 
-/** A cell is never split further once it covers fewer pixels than this many taus. */
-const SMALLEST_CELL = 1;
-/** Where a cell is wide on the screen, what its children would add to the shading counts too: error per child cell. */
-const SHADING_ERROR = 1.5 / QUANTA_PER_CELL;
-const SHADING_CELL_PX = 5;
 /** From this error on, in taus, tiles are asked for that a nearer eye will need: they are there before they are drawn. */
 const EARLY = 0.7;
 
@@ -47,13 +42,6 @@ export interface Cut {
   /** Tiles that must be in the atlas together for a picture as fine as was asked for, as far as is known. */
   readonly tiles: number;
 }
-
-/** How high water may stand on a patch, metres; -Infinity where there is none (tiles/lakes.ts, Surfaces). */
-export interface Water {
-  highest(level: number, px: number, py: number): number;
-}
-
-const DRY: Water = { highest: () => Number.NEGATIVE_INFINITY };
 
 /** What the selection asks of the atlas. */
 export interface Slots {
@@ -83,22 +71,17 @@ export class Selection {
   /** Leaves out patches that nearer ground hides. Measurements and tests turn it off. */
   occlusion = true;
   private readonly horizon = new Horizon();
-  private readonly planes = new Float64Array(24);
   private records = new Uint32Array(RECORD_WORDS * 1024);
   private facts = new Uint32Array(FACT_WORDS * 1024);
   private bounds = new Float32Array(this.facts.buffer);
   private count = 0;
-  private eye: readonly number[] = [0, 0, 0];
-  private pixels = 1;
-  private ortho = false;
-  private tau = 1;
-  private sizeM = 1;
-  private water = DRY;
+  private readonly sight: Sight;
   private slots: Slots | null = null;
 
   /** `levels`: the finest level that can exist. */
   constructor(readonly levels: number) {
     this.tree = new PatchTree(levels);
+    this.sight = new Sight(this.tree);
     this.wishes = new Wishes(this.tree, (page) => this.touch(page));
     this.early = new Wishes(this.tree);
     const { capacity } = this.tree;
@@ -116,10 +99,10 @@ export class Selection {
    * below it are drawn as far as its surface is in view.
    */
   select(view: TileView, camera: CameraState, tauPx: number, slots: Slots, pixelScale = 1, water: Water = DRY): Cut {
-    this.water = water;
     this.tree.sync(view);
     this.tree.updateSplittable();
-    this.begin(view, camera, tauPx, slots, pixelScale);
+    this.sight.begin(view.sizeM, camera, tauPx, pixelScale, water);
+    this.begin(slots);
     const { usable, held, max, low, high } = this.tree;
     if (usable[0] === 1) {
       this.touch(0);
@@ -127,7 +110,8 @@ export class Selection {
       this.enforce();
       this.touchSplit();
       this.horizon.begin(camera, this.occlusion && this.above(view));
-      for (const node of frontToBack(SUBPATCHES, this.sizeM, this.eye[0]!, this.eye[1]!)) this.emit(0, node, 0);
+      for (const node of frontToBack(SUBPATCHES, this.sight.sizeM, this.sight.eye[0]!, this.sight.eye[1]!))
+        this.emit(0, node, 0);
     } else if (held[0] === 1) {
       this.wishes.ask(0, 0, 0, 1);
     }
@@ -139,20 +123,11 @@ export class Selection {
     return { count, records, facts, requests, early, minHeight: low, maxHeight: high, top, tiles };
   }
 
-  private begin(view: TileView, camera: CameraState, tauPx: number, slots: Slots, pixelScale: number): void {
+  private begin(slots: Slots): void {
     this.count = 0;
     this.wishes.clear();
     this.early.clear();
     this.slots = slots;
-    this.tau = tauPx;
-    this.sizeM = view.sizeM;
-    this.eye = camera.eye;
-    this.ortho = camera.orthoHeight > 0;
-    const heightPx = camera.height * pixelScale;
-    this.pixels = this.ortho
-      ? heightPx / camera.orthoHeight
-      : heightPx / (2 * Math.tan((camera.fovDeg * Math.PI) / 360));
-    frustumPlanes(eyeProjection(camera), this.planes);
     for (const list of this.splitList) {
       for (const node of list) this.split[node] = 0;
       list.length = 0;
@@ -171,8 +146,8 @@ export class Selection {
 
   private descend(level: number, node: number): void {
     const { tree } = this;
-    if (level >= this.levels || tree.error[node] === 0 || !this.visible(level, node)) return;
-    const ratio = this.screenError(level, node);
+    if (level >= this.levels || tree.error[node] === 0 || !this.sight.visible(level, node)) return;
+    const ratio = this.sight.screenError(level, node);
     if (ratio <= EARLY) return;
     if (ratio <= 1) {
       if (tree.splittable[node] === 0) this.early.askBelow(level, node, ratio);
@@ -199,66 +174,13 @@ export class Selection {
     if (page < 0 || tree.usable[page] === 0 || level + 1 >= this.levels) return;
     const first = tree.firstChild(node, page);
     for (const child of [first, first + 1, first + 4, first + 5]) {
-      if (tree.error[child] === 0 || !this.visible(level + 1, child)) continue;
-      const ratio = this.screenError(level + 1, child);
+      if (tree.error[child] === 0 || !this.sight.visible(level + 1, child)) continue;
+      const ratio = this.sight.screenError(level + 1, child);
       if (ratio <= 1) continue;
       const below = tree.childPage(child);
       if (below < 0 || tree.usable[below] === 0) this.early.askBelow(level + 1, child, ratio);
       else this.lookAhead(level + 1, child);
     }
-  }
-
-  /** Error of stopping at this patch, in taus; at most 1 when it need not be split. */
-  private screenError(level: number, node: number): number {
-    const cell = this.sizeM / ((SUBPATCHES << level) * PATCH_CELLS);
-    const scale = this.pixels / (this.ortho ? 1 : this.distance(level, node));
-    const cellPx = cell * scale;
-    if (cellPx <= SMALLEST_CELL * this.tau) return 0;
-    const error = this.tree.error[node]!;
-    const geometric = (error * scale) / this.tau;
-    const rough = error > SHADING_ERROR * cell ? cellPx / (SHADING_CELL_PX * this.tau) : 0;
-    return Math.max(geometric, rough);
-  }
-
-  /** Column and row of a node on its level. */
-  private column(node: number): number {
-    return this.tree.tileX[node >> 4]! * SUBPATCHES + (node & 3);
-  }
-
-  private row(node: number): number {
-    return this.tree.tileY[node >> 4]! * SUBPATCHES + ((node >> 2) & 3);
-  }
-
-  private distance(level: number, node: number): number {
-    const w = this.sizeM / (SUBPATCHES << level);
-    const px = this.column(node);
-    const py = this.row(node);
-    const dx = outside(this.eye[0]!, px * w, (px + 1) * w);
-    const dy = outside(this.eye[1]!, py * w, (py + 1) * w);
-    const dz = outside(this.eye[2]!, this.tree.min[node]!, this.tree.max[node]!);
-    return Math.max(1e-3, Math.sqrt(dx * dx + dy * dy + dz * dz));
-  }
-
-  private visible(level: number, node: number): boolean {
-    const w = this.sizeM / (SUBPATCHES << level);
-    const x0 = this.column(node) * w - this.eye[0]!;
-    const y0 = this.row(node) * w - this.eye[1]!;
-    const p = this.planes;
-    const low = this.tree.min[node]! - this.eye[2]!;
-    const high = this.highest(level, node) - this.eye[2]!;
-    for (let i = 0; i < 24; i += 4) {
-      const a = p[i]!;
-      const b = p[i + 1]!;
-      const c = p[i + 2]!;
-      const far = a * (a > 0 ? x0 + w : x0) + b * (b > 0 ? y0 + w : y0) + c * (c > 0 ? high : low);
-      if (far + p[i + 3]! < 0) return false;
-    }
-    return true;
-  }
-
-  /** Of the ground of a patch and the water on it. */
-  private highest(level: number, node: number): number {
-    return Math.max(this.tree.max[node]!, this.water.highest(level, this.column(node), this.row(node)));
   }
 
   private markSplit(level: number, node: number, ratio: number): void {
@@ -303,8 +225,9 @@ export class Selection {
 
   /** Whether the eye is above the ground that is drawn: else nearer ground need not hide what is behind it. */
   private above(view: TileView): boolean {
-    const { tree, sizeM } = this;
-    const [x, y, z] = this.eye as [number, number, number];
+    const { tree } = this;
+    const { sizeM } = this.sight;
+    const [x, y, z] = this.sight.eye as [number, number, number];
     if (x < 0 || y < 0 || x >= sizeM || y >= sizeM) {
       for (let node = 0; node < 16; node += 1) if (tree.max[node]! >= z) return false;
       return true;
@@ -328,14 +251,14 @@ export class Selection {
 
   private emit(level: number, node: number, morph: number): void {
     const { tree } = this;
-    if (!this.visible(level, node)) return;
-    const w = this.sizeM / (SUBPATCHES << level);
-    const east = this.column(node) * w - this.eye[0]!;
-    const north = this.row(node) * w - this.eye[1]!;
-    if (this.horizon.hides(east, north, w, this.highest(level, node) - this.eye[2]!)) return;
+    if (!this.sight.visible(level, node)) return;
+    const w = this.sight.sizeM / (SUBPATCHES << level);
+    const east = this.sight.column(node) * w - this.sight.eye[0]!;
+    const north = this.sight.row(node) * w - this.sight.eye[1]!;
+    if (this.horizon.hides(east, north, w, this.sight.highest(level, node) - this.sight.eye[2]!)) return;
     if (this.split[node] === 0) {
       this.write(level, node, morph);
-      this.horizon.add(east, north, w, tree.min[node]! - this.eye[2]!);
+      this.horizon.add(east, north, w, tree.min[node]! - this.sight.eye[2]!);
       return;
     }
     const page = tree.childPage(node);
@@ -360,8 +283,8 @@ export class Selection {
       this.bounds = new Float32Array(facts.buffer);
     }
     const { tree } = this;
-    const px = this.column(node);
-    const py = this.row(node);
+    const px = this.sight.column(node);
+    const py = this.sight.row(node);
     const last = (SUBPATCHES << level) - 1;
     let edges = 0;
     if (px > 0 && !this.exists(level, tree.neighbour(node, -1, 0))) edges |= EDGE_WEST;
@@ -393,7 +316,7 @@ export class Selection {
       parent,
       edges,
       border,
-      wet: tree.min[node]! < this.water.highest(level, px, py),
+      wet: tree.min[node]! < this.sight.waterOn(level, px, py),
       corners,
     });
     const fact = this.count * FACT_WORDS;
@@ -442,24 +365,4 @@ export class Selection {
 /** 1 when the parent's error is at the bound (about to be merged), 0 from twice the bound on. */
 function morphOf(parentRatio: number): number {
   return Math.min(1, Math.max(0, 2 - parentRatio));
-}
-
-function outside(v: number, low: number, high: number): number {
-  return v < low ? low - v : v > high ? v - high : 0;
-}
-
-/** Six planes (a, b, c, d), positive inside, of a column-major matrix with z from 0 to 1. */
-export function frustumPlanes(m: ArrayLike<number>, out: Float64Array): void {
-  for (let c = 0; c < 4; c += 1) {
-    const x = m[4 * c]!;
-    const y = m[4 * c + 1]!;
-    const z = m[4 * c + 2]!;
-    const w = m[4 * c + 3]!;
-    out[c] = w + x;
-    out[4 + c] = w - x;
-    out[8 + c] = w + y;
-    out[12 + c] = w - y;
-    out[16 + c] = z;
-    out[20 + c] = w - z;
-  }
 }
