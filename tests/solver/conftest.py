@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from esker.solve.device import Device, open_device, row_kernels
 from esker.solve.solver import Solver
+from tests.solver.failing import STROKES
+from tests.solver.scenes import SETTINGS
 
 
 @pytest.fixture(scope="session")
@@ -20,3 +24,16 @@ def device() -> Device:
 @pytest.fixture(scope="session")
 def solver() -> Solver:
     return Solver()
+
+
+@pytest.fixture(params=["rows", "tiles"])
+def used(request: pytest.FixtureRequest) -> Solver:
+    """A solver that has solved, with an idle workspace of level 2, on a device of a name of its own."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("ESKER_KERNELS", request.param)
+        made = Solver()
+    if made._device is None:
+        pytest.skip("no OpenCL device")
+    made._device = replace(made._device, name=f"{request.param} under test")
+    made.solve(STROKES, SETTINGS, 2)
+    return made

@@ -1,0 +1,156 @@
+"""Memory of a device that ends, and what solves need of it (SPEC S26, S30)."""
+
+from __future__ import annotations
+
+import gc
+import time
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pyopencl as cl
+import pytest
+
+from esker import grid
+from esker.contract import MAX_LEVEL
+from esker.solve import workspaces
+from esker.solve.faults import OutOfDeviceMemoryError
+from esker.solve.solver import SPARE_SECONDS, Solver
+from tests.solver.bases import Analytic, hills
+from tests.solver.failing import INVALID_VALUE, NO_MEMORY, STROKES, Failing, heights, held
+from tests.solver.scenes import SETTINGS
+
+
+def test_idle_workspaces_make_room(used: Solver, monkeypatch: pytest.MonkeyPatch) -> None:
+    """SPEC S26: out of memory once, with idle workspaces around: they are dropped and the solve succeeds."""
+    expected = heights(used, 1)
+    assert len(used._spare) == 2
+    used._spare = [w for w in used._spare if w.top == 2]
+    with monkeypatch.context() as patch:
+        failing = Failing(cl.Buffer, NO_MEMORY, after=9, times=1)
+        patch.setattr(cl, "Buffer", failing)
+        assert np.array_equal(heights(used, 1), expected)
+    assert failing.calls > 10
+    assert [w.top for w in used._spare] == [1]
+
+
+def test_workspaces_that_nobody_uses_are_given_back(used: Solver) -> None:
+    """SPEC S30: those idle for long go, with their memory; the next solve gives the same bits."""
+    expected = heights(used, 1)
+    before = held(used)
+    assert used.tidy() == 0
+    assert held(used) == before > 0
+    later = time.monotonic() + SPARE_SECONDS + 1
+    used._idle_since[used._spare[0]] = later
+    assert used.tidy(later) == 1
+    assert 0 < held(used) < before
+    assert used.tidy(2 * later) == 1
+    assert held(used) == 0
+    assert np.array_equal(heights(used, 1), expected)
+
+
+def test_out_of_memory_in_the_middle_of_a_solve(used: Solver, monkeypatch: pytest.MonkeyPatch) -> None:
+    """SPEC S26: many drivers allocate when a kernel first touches a buffer. Tried again while there is what to drop."""
+    expected = heights(used)
+    run = used.steps(STROKES, SETTINGS, 1)
+    next(run)  # keeps a workspace of its own, so that there is an idle one beside that of the solve that fails
+    with monkeypatch.context() as patch:
+        failing = Failing(cl.enqueue_nd_range_kernel, NO_MEMORY, after=10, times=1)
+        patch.setattr(cl, "enqueue_nd_range_kernel", failing)
+        for _ in run:
+            pass
+        assert failing.calls > 30
+    assert [w.top for w in used._spare] == [1]
+    with monkeypatch.context() as patch:
+        used._spare.clear()
+        patch.setattr(cl, "enqueue_nd_range_kernel", Failing(cl.enqueue_nd_range_kernel, NO_MEMORY, after=30))
+        with pytest.raises(OutOfDeviceMemoryError):
+            heights(used)
+    assert np.array_equal(heights(used), expected)
+
+
+def test_out_of_memory_without_anything_to_drop(used: Solver, monkeypatch: pytest.MonkeyPatch) -> None:
+    used._spare.clear()
+    with monkeypatch.context() as patch:
+        failing = Failing(cl.Buffer, NO_MEMORY, after=9)
+        patch.setattr(cl, "Buffer", failing)
+        with pytest.raises(OutOfDeviceMemoryError, match="too little memory"):
+            heights(used)
+    assert held(used) == 0
+    assert heights(used).max() > 0
+
+
+@pytest.mark.parametrize("limit", ["memory", "largest"])
+def test_a_plan_that_cannot_fit_allocates_nothing(used: Solver, monkeypatch: pytest.MonkeyPatch, limit: str) -> None:
+    """SPEC S26."""
+    assert used._device is not None
+    limits = {"memory": used._device.memory, "largest": used._device.largest} | {limit: 40 << 20}
+    small = replace(used._device, name="small one", memory=limits["memory"], largest=limits["largest"])
+    monkeypatch.setattr(used, "_device", small)
+    used._spare.clear()
+    assert heights(used, 1).max() > 0
+    with monkeypatch.context() as patch:
+        patch.setattr(cl, "Buffer", Failing(cl.Buffer, INVALID_VALUE))
+        with pytest.raises(OutOfDeviceMemoryError, match=r"4097².*small one.* MiB"):
+            workspaces.new_workspace(small, 6)
+    assert held(used) == workspaces.planned_bytes(small, 1)[0]
+
+
+def test_what_is_held_counts(used: Solver, monkeypatch: pytest.MonkeyPatch) -> None:
+    """SPEC S26: two workspaces do not fit where one does; when the first is gone the second does."""
+    assert used._device is not None
+    needed = workspaces.planned_bytes(used._device, 2)[0]
+    tight = replace(used._device, name="tight one", memory=int(1.8 * needed / workspaces.SHARE))
+    first = workspaces.new_workspace(tight, 2)
+    with pytest.raises(OutOfDeviceMemoryError, match="left"):
+        workspaces.new_workspace(tight, 2)
+    del first
+    gc.collect()
+    workspaces.new_workspace(tight, 2)
+
+
+@pytest.mark.parametrize("top", [0, 1, 3])
+def test_the_plan_is_what_is_allocated(used: Solver, monkeypatch: pytest.MonkeyPatch, top: int) -> None:
+    """SPEC S26: within the tables and weights, a few kilobytes."""
+    assert used._device is not None
+    sizes = []
+
+    def counted(context: Any, flags: int, size: int = 0, hostbuf: Any = None) -> Any:
+        sizes.append(size)
+        return cl._cl.Buffer(context, flags, size, hostbuf)
+
+    monkeypatch.setattr(cl, "Buffer", counted)
+    workspaces.new_workspace(used._device, top)
+    planned, largest = workspaces.planned_bytes(used._device, top)
+    assert 0 <= sum(sizes) - planned < 100_000
+    assert largest == max(sizes)
+
+
+@pytest.mark.parametrize("level", range(3, MAX_LEVEL + 1))
+@pytest.mark.parametrize("strips", [1, 8])
+@pytest.mark.parametrize("based", [False, True])
+def test_what_solves_are_shared_out_by_is_about_the_plan(used: Solver, strips: int, level: int, based: bool) -> None:
+    """SPEC S26: a base and a scout included."""
+    assert used._device is not None
+    device = replace(used._device, strips=strips)
+    planned = workspaces.planned_bytes(device, level, based)[0]
+    planned += workspaces.planned_bytes(device, grid.SCOUT, based)[0] if level >= grid.SCOUT_FROM else 0
+    assert grid.solve_bytes(level, based) == pytest.approx(planned, rel=0.1)
+
+
+@pytest.mark.parametrize("base", [None, hills()], ids=["a sheet", "hills"])
+def test_what_solves_are_shared_out_by_is_what_they_allocate(
+    monkeypatch: pytest.MonkeyPatch, base: Analytic | None
+) -> None:
+    """SPEC S26: the buffers of a solve of level 4 that is the first of its solver."""
+    fresh, sizes = Solver(max_level=4), []
+
+    def counted(context: Any, flags: int, size: int = 0, hostbuf: Any = None) -> Any:
+        sizes.append(size)
+        return cl._cl.Buffer(context, flags, size, hostbuf)
+
+    monkeypatch.setattr(cl, "Buffer", counted)
+    steps = fresh.steps(STROKES, SETTINGS, base=base)
+    assert next(steps) is not None
+    assert sum(sizes) == pytest.approx(grid.solve_bytes(4, base is not None), rel=0.1)
+    steps.close()
