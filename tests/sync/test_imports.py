@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import io
-import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -17,99 +16,11 @@ import esker
 from esker import contract as c
 from esker import grid
 from esker.client import LiveTerrain, Refused
-from esker.contract import ImportStage
-from esker.importing.refusal import ImportRefused
 from esker.patchwork import lod_space, rasters
 from esker.patchwork.base import Base
 from esker.patchwork.lod_space import Placed
 from tests.sync.harness import LiveServer
-
-QUESTION = c.ImportQuestion(id="size", text="How wide is it?", default="fit")
-GRID = np.add.outer(np.arange(40.0), np.arange(50.0))
-
-
-def _words(path: Path) -> str:
-    return path.read_bytes().decode("utf-8", "replace")
-
-
-class Reader:
-    """Reads files whose text says what to do: words of "ask", "refuse", "long", "slow", "crash"."""
-
-    def __init__(self) -> None:
-        self.gate = threading.Event()
-        self.stopped = 0
-        self.at_once = 0
-        self.most = 0
-
-    async def inspect(
-        self,
-        path: Path,
-        name: str,
-        *,
-        answers: c.ImportAnswers | None = None,
-        on_progress: Callable[[ImportStage, float], None] | None = None,
-        **_: Any,
-    ) -> c.ImportReport:
-        words = _words(path)
-        while "long" in words and not self.gate.is_set():
-            assert on_progress is not None
-            on_progress("reading", 0.5)
-            await asyncio.sleep(0.01)
-        given = {} if answers is None else answers.answers
-        if given.get("size") == "no":
-            return c.ImportReport(verdict="refused", file=name, refusal="That is no size.")
-        if given.get("size") == "twice":
-            questions = () if "shape" in given else (QUESTION.model_copy(update={"id": "shape"}),)
-            return c.ImportReport(verdict="ask" if questions else "good", file=name, questions=questions)
-        if "refuse" in words:
-            return c.ImportReport(verdict="refused", file=name, refusal="It is a picture of a cat.")
-        questions = (QUESTION,) if "ask" in words and not given else ()
-        return c.ImportReport(verdict="ask" if questions else "good", file=name, questions=questions)
-
-    async def convert(
-        self,
-        path: Path,
-        answers: c.ImportAnswers,
-        place: c.Place | None,
-        size_m: float,
-        out_dir: Path,
-        on_progress: Callable[[ImportStage, float], None] | None = None,
-        *,
-        name: str | None = None,
-    ) -> c.Layer:
-        assert place is None
-        assert on_progress is not None
-        words = _words(path)
-        self.at_once += 1
-        self.most = max(self.most, self.at_once)
-        try:
-            if "crash" in words:
-                raise RuntimeError("the reader fell over")
-            if answers.answers.get("size") == "late":
-                raise ImportRefused("That is no size after all.")
-            while "slow" in words and not self.gate.is_set():
-                on_progress("errors", 0.5)
-                await asyncio.sleep(0.01)
-            raster = rasters.build(GRID + len(words))
-            rasters.write(out_dir, raster)
-        except asyncio.CancelledError:
-            self.stopped += 1
-            raise
-        finally:
-            self.at_once -= 1
-        return c.Layer(
-            id="new", content=raster.digest, facts=raster.facts(file=name), name=answers.name or "grid",
-            anchor=answers.anchor or (10.0, 20.0), spacing_m=answers.spacing_m or (size_m / 50, size_m / 50),
-            accuracy_m=1.0,
-        )  # fmt: skip
-
-    def suggest_place(self, report: c.ImportReport) -> c.Place | None:
-        assert report.verdict != "refused"
-        return None
-
-    def suggest_size(self, report: c.ImportReport) -> float:
-        assert report.verdict != "refused"
-        return 1234.0
+from tests.sync.scripted_reader import GRID, Reader, layers, send, wait, works
 
 
 @pytest.fixture
@@ -127,36 +38,14 @@ def live(tmp_path: Path, reader: Reader) -> Iterator[LiveServer]:
         reader.gate.set()
 
 
-def _send(server: LiveServer, terrain: str, secret: str, words: str, query: str = "name=a.tif") -> tuple[int, Any]:
-    return server.http("POST", f"/api/terrains/{terrain}/imports?{query}", words.encode(), secret)
-
-
-def _wait(server: LiveServer, terrain: str, secret: str, job: str, *stages: str) -> dict[str, Any]:
-    deadline = time.monotonic() + 60
-    while time.monotonic() < deadline:
-        _, status = server.http("GET", f"/api/terrains/{terrain}/imports/{job}", secret=secret)
-        if status["stage"] in stages:
-            return dict(status)
-        time.sleep(0.01)
-    raise TimeoutError(f"{stages}: {status}")
-
-
-def _layers(server: LiveServer, terrain: str) -> tuple[c.Layer, ...]:
-    return asyncio.run(server.assembly.hub.document(terrain)).layers
-
-
-def _works(server: LiveServer) -> list[str]:
-    return [p.name for p in (server.assembly.settings.data / "grids").iterdir() if p.name.startswith(".work")]
-
-
 def test_a_file_becomes_a_layer_that_everybody_sees(live: LiveServer) -> None:
     """SPEC P100, P106."""
     terrain, secret = live.create()
     ada, bob = live.join(terrain, secret, "ada", name="Ada"), live.join(terrain, secret, "bob")
-    status, job = _send(live, terrain, secret, "x", "name=../up/valley%0A.tif&client=ada")
+    status, job = send(live, terrain, secret, "x", "name=../up/valley%0A.tif&client=ada")
     assert status == 202
-    done = _wait(live, terrain, secret, job["id"], "done")
-    layer = _layers(live, terrain)[0]
+    done = wait(live, terrain, secret, job["id"], "done")
+    layer = layers(live, terrain)[0]
     assert (done["layer"], done["share"]) == (layer.id, 1.0)
     assert (layer.author, layer.priority, layer.facts.file) == ("Ada", 0, "valley.tif")
     for peer in (ada, bob):
@@ -170,7 +59,7 @@ def test_a_file_becomes_a_layer_that_everybody_sees(live: LiveServer) -> None:
         ordered = [m for m in peer.seen if m["type"] == "ordered"] or [peer.wait("ordered")]
         assert ordered[0]["ops"][0]["author"] == "ada"
         peer.close()
-    assert _works(live) == []
+    assert works(live) == []
 
 
 def test_no_client_adds_a_layer_by_itself(live: LiveServer) -> None:
@@ -192,14 +81,14 @@ def test_who_may_bring_files_in(live: LiveServer, role: str, code: int) -> None:
     """SPEC P102."""
     terrain, owner = live.create()
     _, link = live.http("POST", f"/api/terrains/{terrain}/links", {"role": role}, owner)
-    status, answer = _send(live, terrain, link["secret"], "ask")
+    status, answer = send(live, terrain, link["secret"], "ask")
     assert status == code
     if role == "view":
         assert answer["code"] == "view_only"
-        _, job = _send(live, terrain, owner, "ask")
+        _, job = send(live, terrain, owner, "ask")
         status, _ = live.http("DELETE", f"/api/terrains/{terrain}/imports/{job['id']}", secret=link["secret"])
         assert status == 403
-    assert _send(live, terrain, "wrong", "x")[0] == 403
+    assert send(live, terrain, "wrong", "x")[0] == 403
     other, secret = live.create()
     assert live.http("GET", f"/api/terrains/{other}/imports/{answer.get('id')}", secret=secret)[0] == 404
 
@@ -207,9 +96,9 @@ def test_who_may_bring_files_in(live: LiveServer, role: str, code: int) -> None:
 def test_questions_and_answers(live: LiveServer) -> None:
     """SPEC P103."""
     terrain, owner = live.create()
-    _, job = _send(live, terrain, owner, "ask")
+    _, job = send(live, terrain, owner, "ask")
     path = f"/api/terrains/{terrain}/imports/{job['id']}"
-    asked = _wait(live, terrain, owner, job["id"], "question")
+    asked = wait(live, terrain, owner, job["id"], "question")
     assert asked["report"]["questions"][0]["id"] == "size"
     _, link = live.http("POST", f"/api/terrains/{terrain}/links", {"role": "edit"}, owner)
     assert live.http("POST", f"{path}/answers", {}, link["secret"])[0] == 403, "another's import"
@@ -217,8 +106,8 @@ def test_questions_and_answers(live: LiveServer) -> None:
     assert live.http("POST", f"{path}/answers", {"spacing_m": [0, 1]}, owner)[0] == 400
     answers = {"answers": {"size": "500"}, "anchor": [1, 2], "spacing_m": [3, 4], "name": "Tal"}
     assert live.http("POST", f"{path}/answers", answers, owner)[0] == 200
-    _wait(live, terrain, owner, job["id"], "done")
-    layer = _layers(live, terrain)[0]
+    wait(live, terrain, owner, job["id"], "done")
+    layer = layers(live, terrain)[0]
     assert (layer.anchor, layer.spacing_m, layer.name) == ((1.0, 2.0), (3.0, 4.0), "Tal")
     assert live.http("POST", f"{path}/answers", answers, owner)[1]["code"] == "not_asked"
 
@@ -226,26 +115,24 @@ def test_questions_and_answers(live: LiveServer) -> None:
 def test_wrong_answers_are_asked_for_again(live: LiveServer) -> None:
     """SPEC P103."""
     terrain, secret = live.create()
-    _, job = _send(live, terrain, secret, "ask")
+    _, job = send(live, terrain, secret, "ask")
     path = f"/api/terrains/{terrain}/imports/{job['id']}/answers"
-    _wait(live, terrain, secret, job["id"], "question")
+    wait(live, terrain, secret, job["id"], "question")
 
     def answer(asks: str, **answers: str) -> dict[str, Any]:
         assert live.http("POST", path, {"answers": answers}, secret)[0] == 200
-        status = _wait(live, terrain, secret, job["id"], "question", "done", "refused")
+        status = wait(live, terrain, secret, job["id"], "question", "done", "refused")
         assert [q["id"] for q in status["report"]["questions"]] == ([asks] if asks else [])
         return status
 
     assert answer("size", size="no")["text"] == "That is no size."
     assert answer("shape", size="twice")["text"] == "", "an answer may raise another question"
     assert answer("", shape="3 x 4")["stage"] == "done"
-    _, job = _send(live, terrain, secret, "ask")
+    _, job = send(live, terrain, secret, "ask")
     path = f"/api/terrains/{terrain}/imports/{job['id']}/answers"
-    _wait(live, terrain, secret, job["id"], "question")
+    wait(live, terrain, secret, job["id"], "question")
     live.http("POST", path, {"answers": {"size": "stop"}}, secret)
-    assert _wait(live, terrain, secret, job["id"], "done", "refused")["stage"] == "done", (
-        "the reader knows what to stop"
-    )
+    assert wait(live, terrain, secret, job["id"], "done", "refused")["stage"] == "done", "the reader knows what to stop"
 
 
 @pytest.mark.parametrize(
@@ -255,20 +142,20 @@ def test_wrong_answers_are_asked_for_again(live: LiveServer) -> None:
 def test_what_is_refused_leaves_nothing(live: LiveServer, words: str, says: str) -> None:
     """SPEC P104."""
     terrain, secret = live.create()
-    _, job = _send(live, terrain, secret, words)
+    _, job = send(live, terrain, secret, words)
     if words == "ask":
-        _wait(live, terrain, secret, job["id"], "question")
+        wait(live, terrain, secret, job["id"], "question")
         body = {"answers": {"size": "late"}}
         live.http("POST", f"/api/terrains/{terrain}/imports/{job['id']}/answers", body, secret)
-    assert says in _wait(live, terrain, secret, job["id"], "refused")["text"]
-    assert _layers(live, terrain) == ()
+    assert says in wait(live, terrain, secret, job["id"], "refused")["text"]
+    assert layers(live, terrain) == ()
     assert list((live.assembly.settings.data / "grids").iterdir()) == []
 
 
 def test_progress_moves_while_a_file_is_examined(live: LiveServer, reader: Reader) -> None:
     """SPEC P106: examining the largest files takes a while too."""
     terrain, secret = live.create()
-    _, job = _send(live, terrain, secret, "long")
+    _, job = send(live, terrain, secret, "long")
     deadline = time.monotonic() + 60
     shares = [job["share"]]
     while shares[-1] < 0.25 and time.monotonic() < deadline:
@@ -277,22 +164,22 @@ def test_progress_moves_while_a_file_is_examined(live: LiveServer, reader: Reade
     assert shares[-1] == pytest.approx(0.25)
     assert shares == sorted(shares)
     reader.gate.set()
-    assert _wait(live, terrain, secret, job["id"], "done")["share"] == 1.0
+    assert wait(live, terrain, secret, job["id"], "done")["share"] == 1.0
 
 
 @pytest.mark.parametrize("words", ["slow", "ask"])
 def test_cancel_leaves_nothing(live: LiveServer, reader: Reader, words: str) -> None:
     """SPEC P104."""
     terrain, secret = live.create()
-    _, job = _send(live, terrain, secret, words)
-    _wait(live, terrain, secret, job["id"], "errors" if words == "slow" else "question")
+    _, job = send(live, terrain, secret, words)
+    wait(live, terrain, secret, job["id"], "errors" if words == "slow" else "question")
     path = f"/api/terrains/{terrain}/imports/{job['id']}"
     assert live.http("DELETE", path, secret=secret)[0] == 204
-    assert _wait(live, terrain, secret, job["id"], "cancelled")["layer"] is None
+    assert wait(live, terrain, secret, job["id"], "cancelled")["layer"] is None
     assert live.http("DELETE", path, secret=secret)[0] == 204, "again is harmless"
     assert reader.stopped == (words == "slow")
-    assert (_layers(live, terrain), _works(live)) == ((), [])
-    assert _send(live, terrain, secret, "x")[0] == 202, "there is room for the next one"
+    assert (layers(live, terrain), works(live)) == ((), [])
+    assert send(live, terrain, secret, "x")[0] == 202, "there is room for the next one"
 
 
 def test_one_at_a_time_of_a_person_and_two_of_the_server(live: LiveServer, reader: Reader) -> None:
@@ -300,37 +187,37 @@ def test_one_at_a_time_of_a_person_and_two_of_the_server(live: LiveServer, reade
     terrain, secret = live.create()
     jobs = []
     for name in ("ada", "bob", "eve"):
-        status, job = _send(live, terrain, secret, f"slow {name}", f"name=a.tif&client={name}")
+        status, job = send(live, terrain, secret, f"slow {name}", f"name=a.tif&client={name}")
         assert status == 202
         jobs.append(job["id"])
-    assert _send(live, terrain, secret, "x", "name=b.tif&client=ada")[1]["code"] == "busy"
-    _wait(live, terrain, secret, jobs[1], "errors")
+    assert send(live, terrain, secret, "x", "name=b.tif&client=ada")[1]["code"] == "busy"
+    wait(live, terrain, secret, jobs[1], "errors")
     reader.gate.set()
     for job in jobs:
-        _wait(live, terrain, secret, job, "done")
+        wait(live, terrain, secret, job, "done")
     assert reader.most == 2
-    assert [layer.priority for layer in _layers(live, terrain)] == [0, 1, 2], "what comes later is believed"
+    assert [layer.priority for layer in layers(live, terrain)] == [0, 1, 2], "what comes later is believed"
 
 
 def test_bounds_of_size(live: LiveServer, monkeypatch: pytest.MonkeyPatch) -> None:
     """SPEC P107."""
     terrain, secret = live.create()
-    assert _send(live, terrain, secret, "")[1]["code"] == "empty"
+    assert send(live, terrain, secret, "")[1]["code"] == "empty"
     monkeypatch.setattr(c, "MAX_GRID_BYTES", 1000)
-    assert _send(live, terrain, secret, "x" * 1001)[1]["code"] == "too_large"
-    assert _works(live) == []
+    assert send(live, terrain, secret, "x" * 1001)[1]["code"] == "too_large"
+    assert works(live) == []
     monkeypatch.undo()
     monkeypatch.setattr("esker.store.grids.GridStore.size", lambda *_: 1 << 20)
-    assert _send(live, terrain, secret, "x")[1]["code"] == "quota"
+    assert send(live, terrain, secret, "x")[1]["code"] == "quota"
 
 
 def test_a_question_that_nobody_answers(live: LiveServer, monkeypatch: pytest.MonkeyPatch) -> None:
     """SPEC P108."""
     monkeypatch.setattr(live.assembly.imports, "_question_seconds", 0.05)
     terrain, secret = live.create()
-    _, job = _send(live, terrain, secret, "ask")
-    assert "Nobody answered" in _wait(live, terrain, secret, job["id"], "refused")["text"]
-    assert _works(live) == []
+    _, job = send(live, terrain, secret, "ask")
+    assert "Nobody answered" in wait(live, terrain, secret, job["id"], "refused")["text"]
+    assert works(live) == []
 
 
 def test_a_terrain_made_from_a_file(live: LiveServer) -> None:
@@ -338,9 +225,9 @@ def test_a_terrain_made_from_a_file(live: LiveServer) -> None:
     status, made = live.http("POST", "/api/terrains/from-grid?name=tal.tif", b"ask")
     assert (status, made["title"], made["role"]) == (201, "tal", "owner")
     path = f"/api/terrains/{made['id']}/imports/{made['import']['id']}"
-    _wait(live, made["id"], made["secret"], made["import"]["id"], "question")
+    wait(live, made["id"], made["secret"], made["import"]["id"], "question")
     assert live.http("POST", f"{path}/answers", {}, made["secret"])[0] == 200
-    _wait(live, made["id"], made["secret"], made["import"]["id"], "done")
+    wait(live, made["id"], made["secret"], made["import"]["id"], "done")
     document = asyncio.run(live.assembly.hub.document(made["id"]))
     assert (document.settings.size_m, len(document.layers)) == (1234.0, 1)
     status, error = live.http("POST", "/api/terrains/from-grid?name=cat.png", b"refuse")
@@ -350,9 +237,9 @@ def test_a_terrain_made_from_a_file(live: LiveServer) -> None:
 def test_a_grid_comes_back_and_travels_in_a_terrain_file(live: LiveServer) -> None:
     """SPEC P110, D33."""
     terrain, secret = live.create()
-    _, job = _send(live, terrain, secret, "x")
-    _wait(live, terrain, secret, job["id"], "done")
-    layer = _layers(live, terrain)[0]
+    _, job = send(live, terrain, secret, "x")
+    wait(live, terrain, secret, job["id"], "done")
+    layer = layers(live, terrain)[0]
     status, data = live.http("GET", f"/api/terrains/{terrain}/grids/{layer.content}", secret=secret)
     assert status == 200
     np.testing.assert_array_equal(np.load(io.BytesIO(data))["heights"], GRID + 1)
@@ -362,7 +249,7 @@ def test_a_grid_comes_back_and_travels_in_a_terrain_file(live: LiveServer) -> No
     status, file = live.http("GET", f"/api/terrains/{terrain}/archive", secret=secret)
     status, made = live.http("POST", "/api/terrains/import", file)
     assert status == 201, made
-    assert [found.content for found in _layers(live, made["id"])] == [layer.content]
+    assert [found.content for found in layers(live, made["id"])] == [layer.content]
     status, file = live.http("GET", f"/api/terrains/{made['id']}/archive", secret=made["secret"])
     assert status == 200
 
@@ -443,8 +330,8 @@ def test_a_server_that_stops_leaves_no_half_import(tmp_path: Path, reader: Reade
     with LiveServer(tmp_path) as server:
         terrain, secret = server.create()
         peer = server.join(terrain, secret)
-        _, job = _send(server, terrain, secret, "slow")
-        _wait(server, terrain, secret, job["id"], "errors")
+        _, job = send(server, terrain, secret, "slow")
+        wait(server, terrain, secret, job["id"], "errors")
     stages = [m["status"]["stage"] for m in peer.seen if m["type"] == "importing"]
     while not stages or stages[-1] != "cancelled":
         stages.append(peer.wait("importing")["status"]["stage"])
