@@ -76,13 +76,13 @@ def files(folder: Path) -> Iterator[str]:
 
 
 @contextmanager
-def chromium() -> Iterator[Browser]:
-    """The browser at $CHROMIUM or on the path. Raises RuntimeError when there is none."""
+def chromium(*flags: str) -> Iterator[Browser]:
+    """The browser at $CHROMIUM or on the path, with more ``flags``. Raises RuntimeError when there is none."""
     path = os.environ.get("CHROMIUM") or shutil.which("chromium") or shutil.which("chromium-browser")
     if path is None:
         raise RuntimeError("Chromium is missing: run `make browser`.")
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, args=FLAGS)
+        browser = playwright.chromium.launch(executable_path=path, args=[*FLAGS, *flags])
         try:
             yield browser
         finally:

@@ -4,14 +4,20 @@ The views of CI's tests, thousands of them, of three kinds: random trees with mi
 side and straight down; the same metres from the ground of the largest terrain; a metre from it, on levels without end.
 Some have a look, light and the NaN scan, most show the ground in one colour (docs/renderer.md, "The crack test"). With
 ``--keep FILE``, which becomes the result, a run that was stopped goes on unless something that draws has changed.
+``--workers N`` draws in N browsers side by side, each seed in one of them: the result is the same, but for its times.
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import hashlib
 import json
+import math
 import sys
+import threading
+from collections import deque
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -88,26 +94,68 @@ def views_of(result: dict[str, Any]) -> int:
     return sum(int(result[kind]["views"]) for kind in KINDS)
 
 
-def browser_seconds() -> float:
-    """Processor time of the browser that this process started, seconds."""
-    return sum(_browser.cpu_ms(process) for process in psutil.Process().children(recursive=True)) / 1000
+class Run:
+    """A result that several browsers add to: seeds are handed out in order, and counted in order as they come back."""
+
+    def __init__(self, result: dict[str, Any], views: int, keep: Path | None) -> None:
+        """``views``: in all. ``keep``: the file that is written after every seed."""
+        self.result, self.keep = result, keep
+        seeds = math.ceil((views - views_of(result)) / sum(kind.views for kind in KINDS.values()))
+        self.open = deque(range(result["next_seed"], result["next_seed"] + max(0, seeds)))
+        self.drawn: dict[int, tuple[dict[str, dict[str, Any]], float]] = {}
+        self.lock = threading.Lock()
+
+    def take(self) -> int | None:
+        """The next seed to draw; None when there is none."""
+        with self.lock:
+            return self.open.popleft() if self.open else None
+
+    def give(self, seed: int, reports: dict[str, dict[str, Any]], cpu_s: float) -> None:
+        """A seed's reports by kind. Later seeds wait for earlier ones: a stopped run goes on from ``next_seed``."""
+        with self.lock:
+            self.drawn[seed] = (reports, cpu_s)
+            while (ready := self.drawn.pop(self.result["next_seed"], None)) is not None:
+                for kind, report in ready[0].items():
+                    add(self.result, kind, self.result["next_seed"], report)
+                self.result["next_seed"] += 1
+                self.result["cpu_s"] = round(self.result["cpu_s"] + ready[1], 2)
+            if self.keep:
+                part = self.keep.with_suffix(".part")
+                part.write_text(json.dumps(self.result, indent=1) + "\n", encoding="utf-8")
+                part.replace(self.keep)
+            found = sum(self.result[kind]["cracks"] for kind in KINDS)
+            sys.stderr.write(f"\r{views_of(self.result)} views, {found} crack pixels")
 
 
-def draw(page: Page, result: dict[str, Any], views: int, keep: Path | None) -> None:
-    """Up to ``SEEDS_A_PAGE`` seeds on one page, counted into the result, as long as there are fewer than ``views``."""
-    for _ in range(SEEDS_A_PAGE):
-        if views_of(result) >= views:
-            return
-        seed, began = result["next_seed"], browser_seconds()
-        for name, kind in KINDS.items():
-            call = f"([seed, views, full]) => esker.{kind.function}(seed, views, {{ full }})"
-            add(result, name, seed, page.evaluate(call, [seed, kind.views, kind.full]))
-        result["next_seed"] = seed + 1
-        result["cpu_s"] = round(result["cpu_s"] + browser_seconds() - began, 2)
-        if keep:
-            keep.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
-        found = sum(result[kind]["cracks"] for kind in KINDS)
-        sys.stderr.write(f"\r{views_of(result)} views, {found} crack pixels")
+def browser_seconds(marker: str) -> float:
+    """Processor time of the browser whose command line holds ``marker``, with what it started, seconds."""
+    for child in psutil.Process().children(recursive=True):
+        with contextlib.suppress(psutil.NoSuchProcess):
+            if any(marker in word for word in child.cmdline()):
+                family = [child, *child.children(recursive=True)]
+                return sum(_browser.cpu_ms(process) for process in family) / 1000
+    return 0.0
+
+
+def work(run: Run, base: str, marker: str) -> None:
+    """Draws seeds in a browser of its own until there are none left, ``SEEDS_A_PAGE`` on a page."""
+    ready = "globalThis.esker !== undefined"
+    with _browser.chromium(f"--{marker}") as browser:
+        seed = run.take()
+        while seed is not None:
+            with _browser.page(browser, f"{base}/dev/renderer.html", ready) as page:
+                for _ in range(SEEDS_A_PAGE):
+                    began = browser_seconds(marker)
+                    run.give(seed, draw(page, seed), browser_seconds(marker) - began)
+                    seed = run.take()
+                    if seed is None:
+                        break
+
+
+def draw(page: Page, seed: int) -> dict[str, dict[str, Any]]:
+    """The views of a seed, by kind."""
+    call = "([name, seed, views, full]) => esker[name](seed, views, { full })"
+    return {name: page.evaluate(call, [kind.function, seed, kind.views, kind.full]) for name, kind in KINDS.items()}
 
 
 def failed(result: dict[str, Any]) -> bool:
@@ -117,22 +165,22 @@ def failed(result: dict[str, Any]) -> bool:
 
 
 def main(argv: list[str]) -> int:
-    """``esker bench cracks [--json] [--views N] [--keep FILE]``: 1 when it ``failed``."""
+    """``esker bench cracks [--json] [--views N] [--keep FILE] [--workers N]``: 1 when it ``failed``."""
     parser = argparse.ArgumentParser(prog="esker bench cracks", description=__doc__)
     parser.add_argument("--views", type=int, default=10_000, help="views in all (default 10,000)")
     parser.add_argument("--keep", type=Path, help="result file, written after every seed and gone on from")
+    parser.add_argument("--workers", type=int, default=1, help="browsers side by side, a core each (default 1)")
     parser.add_argument("--json", action="store_true", help="print the result as JSON")
     args = parser.parse_args(argv)
-    result = load(args.keep)
-    ready = "globalThis.esker !== undefined"
-    with _browser.pages() as base, _browser.chromium() as browser:
-        while views_of(result) < args.views:
-            with _browser.page(browser, f"{base}/dev/renderer.html", ready) as page:
-                draw(page, result, args.views, args.keep)
+    run = Run(load(args.keep), args.views, args.keep)
+    with _browser.pages() as base, ThreadPoolExecutor(max(1, args.workers)) as pool:
+        done = [pool.submit(work, run, base, f"crack-worker-{k}") for k in range(max(1, args.workers))]
+    for worker in done:
+        worker.result()
     sys.stderr.write("\n")
     if args.json:
-        sys.stdout.write(json.dumps(result, indent=1) + "\n")
+        sys.stdout.write(json.dumps(run.result, indent=1) + "\n")
     else:
         for kind in KINDS:
-            sys.stdout.write(f"{kind}: {result[kind]}\n")
-    return int(failed(result))
+            sys.stdout.write(f"{kind}: {run.result[kind]}\n")
+    return int(failed(run.result))
