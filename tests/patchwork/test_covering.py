@@ -26,11 +26,14 @@ def tiles(side: int, turn: float, rng: np.random.Generator) -> Floats:
     return np.asarray(kernels[rng.permutation(len(kernels))])
 
 
-def both(kernels: Floats, z: Floats, quad: Floats, whether: bool = False) -> tuple[float, float]:
+def both(
+    kernels: Floats, z: Floats, quad: Floats, whether: bool = False, slack: Floats | None = None
+) -> tuple[float, float]:
     """By quartering and by cutting, with a world far from its origin."""
+    slack = np.zeros(len(z)) if slack is None else slack
     corner = np.array([5e5, 5e6])
     order = np.argsort(z, kind="stable")
-    args = (kernels + corner, np.zeros(len(z)), z, quad, 1.0, *corner, order, len(order), np.inf)
+    args = (kernels + corner, slack, z, quad, 1.0, *corner, order, len(order), np.inf)
     return covering.least_cover(*args, whether), covering._cut(*args)  # type: ignore[call-arg]
 
 
@@ -58,3 +61,16 @@ def test_one_missing_tile_is_found() -> None:
         assert both(less, np.delete(z, gone), UNIT) == (np.inf, np.inf)
     over = np.concatenate([kernels, [2 * UNIT - 0.5]])
     assert both(over, np.append(z, 40.5), UNIT)[0] == 40.5
+
+
+def test_slack_reaches_into_quarters_beside() -> None:
+    """Every second kernel is too small by what those around it, across the edges of quarters too, may be grown by."""
+    gap, z = 0.004, np.arange(100.0)
+    at = np.stack(np.meshgrid(np.arange(-1, 9), np.arange(-1, 9), indexing="ij"), -1).reshape(-1, 2)
+    small = at.sum(axis=1) % 2 == 1
+    size = np.where(small, 1 / 8 - 2 * gap, 1 / 8)[:, None, None]
+    kernels = (at / 8 + np.where(small, gap, 0.0)[:, None])[:, None] + size * UNIT
+    for grown, covered in ((1.01 * gap, True), (0.9 * gap, False)):
+        quartered, cut = both(kernels, z, UNIT, slack=np.where(small, 0.0, grown))
+        assert quartered == cut
+        assert (cut < np.inf) == covered
