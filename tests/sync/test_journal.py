@@ -1,4 +1,4 @@
-"""The journal alone: commits, replay, damage, backups (SPEC J1 to J9)."""
+"""The journal alone: commits, replay, damage, backups (SPEC J1 to J9, J16)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from esker import contract as c
 from esker.document.ops import StrokeSet
 from esker.document.wire import op_json
 from esker.store import backup
-from esker.store.journal import CorruptDatabase, DamagedTerrain, Journal, Row
+from esker.store.journal import DATABASE_NAME, LOG_BYTES, CorruptDatabase, DamagedTerrain, Journal, Row
 
 BIRTH = c.Document(id="t")
 
@@ -52,6 +52,30 @@ def test_what_was_appended_is_there_after_a_restart(journal: Journal, tmp_path: 
     assert again.find("t", "d", 4) is None
     assert again.load("nothing") is None
     again.close()
+
+
+def test_the_log_has_its_length_from_the_start_and_is_read_as_far_as_it_is_written(
+    journal: Journal, tmp_path: Path
+) -> None:
+    """SPEC J16: also by who finds it after a crash, in the midst of a first and of a later round."""
+    log, copies = tmp_path / f"{DATABASE_NAME}-wal", 0
+    assert log.stat().st_size == LOG_BYTES
+    for clock in range(1, 3000, 10):
+        journal.append("t", _rows(clock, 10)).result()
+        if clock in (1, 1501, 2991):
+            copies += 1
+            crashed = tmp_path / f"crashed{copies}"
+            crashed.mkdir()
+            for name in (DATABASE_NAME, log.name):
+                shutil.copy(tmp_path / name, crashed / name)
+            found = Journal(crashed)
+            assert [row.clock for row in found.rows("t", 0)] == list(range(1, clock + 10))
+            assert (crashed / log.name).stat().st_size == LOG_BYTES
+            found.append("t", _rows(clock + 10, 1)).result()
+            found.close()
+    assert log.stat().st_size == LOG_BYTES, "it was begun anew, and never grew"
+    assert tmp_path.joinpath(DATABASE_NAME).stat().st_size > 100_000, "its first round went to the database"
+    journal.close()
 
 
 def test_a_clock_or_an_id_is_used_once(journal: Journal) -> None:

@@ -12,13 +12,14 @@ removed: any clock can be opened again.
 
 from __future__ import annotations
 
+import os
 import queue
 import sqlite3
 import threading
 import time
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Future
-from contextlib import closing
+from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any, Final, NamedTuple, TypeVar
 
@@ -36,6 +37,8 @@ MILESTONES: Final = 8
 """Snapshots that stay, spread over the history: an earlier clock is opened without replaying all before it."""
 GROUP_LIMIT: Final = 256
 """Most queued items that one commit takes."""
+LOG_BYTES: Final = 5 << 20
+"""How long the write-ahead log is from the start: more than the 1,000 pages after which it is begun anew."""
 _SCHEMA_VERSION: Final = 2
 """1 knew no elevation layers; it becomes 2 by itself."""
 _SCHEMA: Final = """
@@ -103,6 +106,7 @@ class Journal:
         self._writer_db = connect(self.path)
         self._writer_db.executescript(_SCHEMA + moments.SCHEMA)
         self._writer_db.execute(f"PRAGMA user_version={_SCHEMA_VERSION}")
+        _lengthen(directory / f"{DATABASE_NAME}-wal")
         self._readers = threading.local()
         self._open_readers: list[sqlite3.Connection] = []
         self._queue: queue.SimpleQueue[tuple[Callable[[sqlite3.Connection], Any], Future[Any]] | None]
@@ -287,6 +291,18 @@ def connect(path: Path) -> sqlite3.Connection:
     db.execute("PRAGMA synchronous=FULL")
     db.execute("PRAGMA foreign_keys=ON")
     return db
+
+
+def _lengthen(log: Path) -> None:
+    """Gives a write-ahead log its length at once, by zeros that no reader takes for its frames.
+
+    To sync a file that has grown a file system waits for its own journal, and so for what others have just written: on
+    a busy disk hundreds of milliseconds, now and then, for a commit that takes one where the log is written over.
+    """
+    with suppress(OSError), log.open("ab") as file:  # without room it only takes longer
+        file.write(bytes(max(0, LOG_BYTES - file.tell())))
+        file.flush()
+        os.fsync(file.fileno())
 
 
 def check(path: Path, directory: Path) -> None:
