@@ -79,7 +79,11 @@ const PICKS: Readonly<Record<ToolId, PickOrder>> = {
 };
 const VIEW_ONLY = "This link lets you look, not draw. Ask for an edit link to change the terrain.";
 const LOCKED = "This stroke is locked. Unlock it to change it.";
-const FLUSH = "This plateau lies level with the ground. Drag its handle up to raise it.";
+const FLUSH: Readonly<Record<Exclude<ToolId, "select" | "paint">, string>> = {
+  mountain: "This line lies on the ground. Draw it up into the air, or drag its middle handle up.",
+  crevice: "This line lies on the ground. Draw it as a hollow, or drag its middle handle down.",
+  plateau: "This plateau lies level with the ground. Drag its handle up to raise it.",
+};
 const OFF_GROUND = "Begin the line on the ground.";
 
 export class InputController {
@@ -351,13 +355,14 @@ export class InputController {
     this.#endMain();
   }
 
-  /** A new stroke is selected. A plateau that nobody can see yet is put in hand, with a word on what to do. */
+  /** A new stroke is selected. One that changes nothing to be seen is put in hand, with a word on what to do. */
   #drawn(made: FinishedStroke): void {
     // With the brush one goes on painting: keys and inspector stay with the brush.
-    this.selection.value = this.tool.value === "paint" ? null : made.id;
-    if (!made.flush) return;
+    const tool = this.tool.value;
+    this.selection.value = tool === "paint" ? null : made.id;
+    if (!made.flush || tool === "paint" || tool === "select") return;
     this.tool.value = "select";
-    this.#o.onMessage(FLUSH);
+    this.#o.onMessage(FLUSH[tool]);
   }
 
   /** A click without movement selects the stroke under it, or nothing; with the brush, beside all paint, it is a dab. */

@@ -50,7 +50,7 @@ const COLOURS: Readonly<Record<PenToolId, Rgba>> = {
 /** A stroke that has just been drawn. */
 export interface FinishedStroke {
   readonly id: string;
-  /** A plateau that lies level with the ground all along, so that nothing is seen of it. */
+  /** A stroke that lies on the ground all along, so that nothing is seen of it. */
   readonly flush: boolean;
 }
 
@@ -141,7 +141,7 @@ export class StrokeTool {
       this.cancel(); // nothing of the line could be projected
       return null;
     }
-    const flush = session.tool === "plateau" && liesOnGround(points, session.ground);
+    const flush = session.tool !== "paint" && liesOnGround(points, session.ground, flatness(session.tool, points));
     if (session.begun) {
       this.#submitShape(session, true);
       if (this.#session !== null) this.#submit(session, { type: "stroke.finish", stroke: session.id });
@@ -296,10 +296,20 @@ function sketchFor(tool: PenToolId, start: SketchStart): Sketch & { readonly sam
 /** Closer to the ground than this all along, metres, a plateau changes nothing that one sees. */
 const FLUSH_M = 2;
 
-/** Whether every point (xyz triples) lies within two metres of the ground. */
-function liesOnGround(points: Float64Array, ground: Ground): boolean {
+/** As a share of its length: a line across the ground trembles by so much, where a silhouette was meant. */
+const FLAT_PROFILE = 0.01;
+
+/** How far from the ground a line (xyz triples) still lies on it, metres. */
+function flatness(tool: PenToolId, points: Float64Array): number {
+  if (tool === "plateau") return FLUSH_M;
+  const n = points.length;
+  return Math.max(FLUSH_M, FLAT_PROFILE * Math.hypot(points[n - 3]! - points[0]!, points[n - 2]! - points[1]!));
+}
+
+/** Whether every point (xyz triples) lies within `most` metres of the ground. */
+function liesOnGround(points: Float64Array, ground: Ground, most: number): boolean {
   for (let i = 0; i + 2 < points.length; i += 3)
-    if (Math.abs(points[i + 2]! - ground.heightAt(points[i]!, points[i + 1]!)) > FLUSH_M) return false;
+    if (Math.abs(points[i + 2]! - ground.heightAt(points[i]!, points[i + 1]!)) > most) return false;
   return true;
 }
 

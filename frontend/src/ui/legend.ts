@@ -11,7 +11,10 @@ export function amplitudeEnds(greatestM: number): [string, string] {
   return ["0", greatestM > 0 ? metres(greatestM) : "none yet"];
 }
 
-/** What the colours of an overlay mean. Nothing while the overlay needs no words. */
+/** Overlays without a scale: the key that goes through them all should say which it has come to. */
+const NAMED = { contours: "Contour lines", patches: "Levels of detail, a colour each" } as const;
+
+/** What the colours of an overlay mean. */
 export class EskLegend extends SignalElement {
   static override properties = { stage: { attribute: false } };
   static override styles = [
@@ -75,9 +78,9 @@ export class EskLegend extends SignalElement {
 
   protected override render(): TemplateResult | typeof nothing {
     const overlay = this.stage.overlay.value;
-    const plain = overlay === "none" || overlay === "contours" || overlay === "patches";
-    this.toggleAttribute("hidden", plain);
-    if (plain) return nothing;
+    this.toggleAttribute("hidden", overlay === "none");
+    if (overlay === "none") return nothing;
+    if (overlay === "contours" || overlay === "patches") return html`<div class="name">${NAMED[overlay]}</div>`;
     if (overlay === "slope") return scale("Steepness", "slope", ["0°", "30°", "60°"]);
     if (overlay === "influence") return this.#influence();
     this.stage.channels.revision.value;

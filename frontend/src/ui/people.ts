@@ -57,6 +57,16 @@ export class EskPeople extends SignalElement {
         color: var(--esk-quiet);
         font-size: 0.8125rem;
       }
+      @media (pointer: coarse) {
+        .avatar {
+          position: relative;
+        }
+        .avatar::after {
+          content: "";
+          position: absolute;
+          inset: -7px -2px;
+        }
+      }
       @media (max-width: 720px) {
         .other:nth-of-type(n + 3) {
           display: none;

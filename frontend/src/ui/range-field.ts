@@ -69,6 +69,18 @@ export class EskRange extends LitElement {
       .unit {
         min-width: 12px;
       }
+      @media (pointer: coarse) {
+        wa-slider {
+          --thumb-width: 24px;
+          --thumb-height: 24px;
+        }
+        wa-slider::part(slider) {
+          padding-block: 8px;
+        }
+        input {
+          height: 32px;
+        }
+      }
     `,
   ];
 

@@ -62,6 +62,12 @@ export class EskSegmented extends LitElement {
           padding: 0 7px;
         }
       }
+      @media (pointer: coarse) {
+        button {
+          min-width: 40px;
+          min-height: 40px;
+        }
+      }
       button:disabled {
         cursor: default;
         opacity: 0.5;

@@ -215,7 +215,7 @@ export class EskShare extends SignalElement {
   #picture(preview: Preview): TemplateResult {
     return html`
       <wa-switch
-        size="small"
+        size="s"
         ?checked=${preview.shown}
         ?disabled=${this.busy}
         @change=${(e: Event) => this.#try(() => this.#showPreview((e.target as HTMLInputElement).checked))}

@@ -103,6 +103,12 @@ export class EskStatusLine extends SignalElement {
           display: none;
         }
       }
+      /* Room for the buttons of the view, which fingers need large. */
+      @media (max-width: 430px) {
+        .scale {
+          display: none;
+        }
+      }
     `,
   ];
 

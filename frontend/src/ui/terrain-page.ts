@@ -80,7 +80,7 @@ export class EskTerrain extends SignalElement {
       }),
       effect(() => {
         const input = session.stage.value?.input;
-        this.#followSelection(input?.selection.value ?? null, input?.tool.peek() === "select");
+        this.#followSelection(input?.selection.value ?? null, input?.tool.value === "select");
       }),
       effect(() => {
         if ((session.doc.doc.value?.strokes.size ?? 0) > 0) setFlag(session.store, "drawn");
@@ -89,6 +89,9 @@ export class EskTerrain extends SignalElement {
         // The sheet would hide the ground on which the grid is laid, or the past.
         const laid = session.stage.value?.input.laying.value ?? null;
         if ((laid !== null || session.past.active.value) && window.matchMedia(NARROW).matches) this.#panel.value = null;
+      }),
+      effect(() => {
+        this.toggleAttribute("sheet", this.#panel.value !== null);
       }),
       effect(() => {
         if ((session.stage.value?.groundwork.asking.value ?? 0) > 0) this.#panel.value = "ground";
@@ -103,7 +106,7 @@ export class EskTerrain extends SignalElement {
     this.#session.value?.dispose();
   }
 
-  /** On a wide window the inspector comes with a selection and goes with it; a stroke just drawn does not call it. */
+  /** On a wide window the inspector comes with a selection in the select tool and goes with it; drawing does not call it. */
   #followSelection(selection: string | null, picked: boolean): void {
     if (selection !== null && picked && this.#panel.peek() === null && window.matchMedia(WIDE).matches) {
       this.#panel.value = "stroke";

@@ -5,12 +5,16 @@ import type { Border, Look, Rule, TerrainFields, TerrainSettings } from "../gene
 import { DEFAULT_LAKES_FRACTION, DEFAULT_REACH_FRACTION, MAX_DETAIL } from "../generated/contract.ts";
 import "./range-field.ts";
 import "./segmented.ts";
+import { seaSpan, seaStart } from "./sea.ts";
 import { SignalElement } from "./signal-element.ts";
 import type { Stage } from "./stage.ts";
 import { panelStyles } from "./styles/panel.ts";
 import { shared } from "./styles/shared.ts";
 import "./sun-pad.ts";
 import { type SunPosition, sunWords } from "./sun.ts";
+
+/** Before the first tile. */
+const NO_HEIGHTS = new Float32Array(0);
 
 const LOOKS = [
   { value: "natural", label: "Natural" },
@@ -63,6 +67,8 @@ export class EskTerrainPanel extends SignalElement {
 
   declare stage: Stage;
   #gesture: string | null = null;
+  /** Where the sea stood that was turned off here. */
+  #seaM: number | null = null;
 
   #set(fields: TerrainFields, settled = true): void {
     this.#gesture ??= this.stage.session.newGesture();
@@ -153,14 +159,19 @@ export class EskTerrainPanel extends SignalElement {
 
   #sea(settings: TerrainSettings, disabled: boolean): TemplateResult {
     const level = settings.sea_level_m;
-    const span = settings.size_m / 8;
+    const heights = this.stage.tiles.tile(0, 0, 0)?.heights ?? NO_HEIGHTS;
+    const [lowest, highest] = seaSpan(heights, settings.size_m);
+    const turn = (on: boolean): void => {
+      if (!on) this.#seaM = level;
+      this.#set({ sea_level_m: on ? (this.#seaM ?? seaStart(heights, settings.size_m)) : null });
+    };
     return html`
       <div class="group">
         <wa-switch
           size="s"
           .checked=${live(level !== null)}
           ?disabled=${disabled}
-          @change=${(e: Event) => this.#set({ sea_level_m: (e.target as HTMLInputElement).checked ? 0 : null })}
+          @change=${(e: Event) => turn((e.target as HTMLInputElement).checked)}
           >Sea</wa-switch
         >
         ${
@@ -169,8 +180,8 @@ export class EskTerrainPanel extends SignalElement {
             : html`<esk-range
                 label="Sea level"
                 unit="m"
-                min=${-span}
-                max=${span}
+                min=${lowest}
+                max=${highest}
                 step=${settings.size_m / 4096}
                 .value=${level}
                 ?disabled=${disabled}

@@ -66,8 +66,9 @@ export class EskTools extends SignalElement {
         }
       }
       @media (max-width: 430px) {
+        /* Eight of them beside each other. */
         .icon-btn {
-          width: 38px;
+          width: min(44px, calc((100vw - 58px) / 8));
         }
         :host {
           gap: 2px;

@@ -155,6 +155,19 @@ export class EskTopBar extends SignalElement {
           padding: 0 2px;
         }
       }
+      @media (pointer: coarse) {
+        .panel {
+          height: 48px;
+        }
+        .home,
+        .share {
+          min-width: 40px;
+          height: 40px;
+        }
+        .title {
+          height: 40px;
+        }
+      }
     `,
   ];
 

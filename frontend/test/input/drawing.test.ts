@@ -109,6 +109,32 @@ describe("drawing", () => {
     expect(s.left?.slope_deg).toBe(50);
   });
 
+  it.each([
+    ["mountain", "up into the air"],
+    ["crevice", "as a hollow"],
+  ] as const)(
+    "a straight %s along the ground comes to hand with a word; one with a shape does not (SPEC I53)",
+    (tool, word) => {
+      input.tool.value = tool;
+      const side = tool === "mountain" ? 1 : -1;
+      stroke([
+        [1400, 1000, 0],
+        [2048, 1000, side * 120],
+        [2600, 1000, 0],
+      ]);
+      expect([messages, input.tool.value]).toEqual([[], tool]);
+      stroke([
+        [1400, 2000, 0],
+        [2000, 2000, side * 6],
+        [2600, 2000, 0],
+      ]);
+      expect(messages).toEqual([expect.stringContaining(word)]);
+      expect(input.tool.value).toBe("select");
+      expect(input.selection.value).toBe(strokes()[1]!.id);
+      expect(input.handles.value.map((h) => h.kind)).toContain("crest");
+    },
+  );
+
   it("a plateau level with the ground comes to hand with a word on what to do; its handle raises it (SPEC I53)", () => {
     input.tool.value = "plateau";
     stroke([

@@ -213,7 +213,9 @@ describe("the legend of a painted channel", () => {
     expect(text).toContain("Paint here−25 %");
     expect(text).toContain("Snow here62 %");
     expect(element.hasAttribute("hidden")).toBe(false);
-    const plain = await put<EskLegend>("esk-legend", { stage: stage(snow, [1, 2, 3], "paint", "patches") });
+    const levels = await put<EskLegend>("esk-legend", { stage: stage(snow, [1, 2, 3], "paint", "patches") });
+    expect(levels.shadowRoot!.textContent).toContain("Levels of detail");
+    const plain = await put<EskLegend>("esk-legend", { stage: stage(snow, [1, 2, 3], "paint", "none") });
     expect(plain.hasAttribute("hidden")).toBe(true);
   });
 });

@@ -111,4 +111,9 @@ export const panelStyles = css`
   wa-switch {
     font-size: 0.8125rem;
   }
+  @media (pointer: coarse) {
+    wa-switch::part(base) {
+      min-height: 40px;
+    }
+  }
 `;

@@ -136,6 +136,17 @@ export const shared = css`
   .field::placeholder {
     color: var(--esk-quiet);
   }
+  /* A finger covers 40 pixels. */
+  @media (pointer: coarse) {
+    .btn,
+    .field {
+      min-height: 40px;
+    }
+    .icon-btn.small {
+      width: 40px;
+      height: 40px;
+    }
+  }
   @media (prefers-reduced-motion: reduce) {
     *,
     *::before,

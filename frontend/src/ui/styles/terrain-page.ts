@@ -123,6 +123,7 @@ export const terrainPageStyles = css`
     color: var(--esk-accent-text);
   }
   .notes {
+    min-width: 0;
     display: grid;
     justify-items: start;
     gap: var(--esk-gap);
@@ -189,12 +190,29 @@ export const terrainPageStyles = css`
   @media (max-width: 720px) {
     :host {
       --edge: 8px;
+      --sheet: 0px;
+    }
+    /* The sheet stands below the picture, not on it: what one changes must be seen. One height for all its tabs. */
+    :host([sheet]) {
+      --sheet: min(46%, 400px);
+    }
+    :host([sheet]) .viewport {
+      bottom: calc(var(--sheet) - var(--esk-radius));
+    }
+    :host([sheet]) .foot {
+      display: none;
+    }
+    :host([sheet]) esk-tools {
+      bottom: calc(var(--sheet) + var(--edge));
     }
     esk-tools {
       left: 50%;
       top: auto;
       bottom: calc(var(--edge) + env(safe-area-inset-bottom));
       transform: translateX(-50%);
+    }
+    esk-view-bar {
+      flex: none;
     }
     .foot {
       gap: 6px;
@@ -206,7 +224,8 @@ export const terrainPageStyles = css`
       right: 0;
       bottom: 0;
       width: auto;
-      max-height: min(56%, 520px);
+      height: var(--sheet);
+      max-height: none;
       z-index: 2;
       border-radius: var(--esk-radius) var(--esk-radius) 0 0;
       background: var(--esk-panel-solid);
@@ -219,7 +238,7 @@ export const terrainPageStyles = css`
     }
     .hint,
     esk-toasts {
-      bottom: calc(118px + env(safe-area-inset-bottom));
+      bottom: calc(118px + var(--sheet) + env(safe-area-inset-bottom));
       width: max-content;
     }
     .hint {
@@ -227,7 +246,7 @@ export const terrainPageStyles = css`
       padding: 9px 14px 9px 12px;
     }
     esk-toasts {
-      bottom: calc(170px + env(safe-area-inset-bottom));
+      bottom: calc(170px + var(--sheet) + env(safe-area-inset-bottom));
     }
   }
 `;
