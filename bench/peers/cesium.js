@@ -77,20 +77,18 @@ function widget(C, ground) {
   return made;
 }
 
-/** Vertical error on the screen, pixels: the shown ground against the heights, over the samples of a sparse grid. */
-function screenError(C, scene, { heights, side, sizeM, camera, height }) {
+/** Vertical error on the screen, pixels: the shown ground against the heights, at the grid's samples `places`. */
+function screenError(C, scene, { heights, side, sizeM, camera, height, places }) {
   const errors = [];
   const perRadian = height / 2 / Math.tan((camera.fovDeg * Math.PI) / 360);
   const cell = sizeM / (side - 1);
-  for (let j = 3; j < side; j += 17) {
-    for (let i = 5; i < side; i += 17) {
-      const place = C.Cartographic.fromDegrees((i * cell) / METRES_PER_DEGREE, (j * cell) / METRES_PER_DEGREE);
-      const shown = scene.globe.getHeight(place);
-      if (shown === undefined) continue;
-      const truth = heights[j * side + i];
-      const away = Math.hypot(i * cell - camera.eye[0], j * cell - camera.eye[1], truth - camera.eye[2]);
-      errors.push((Math.abs(shown - truth) * perRadian) / away);
-    }
+  for (const k of places) {
+    const [x, y] = [(k % side) * cell, Math.floor(k / side) * cell];
+    const shown = scene.globe.getHeight(C.Cartographic.fromDegrees(x / METRES_PER_DEGREE, y / METRES_PER_DEGREE));
+    if (shown === undefined) continue;
+    const truth = heights[k];
+    const away = Math.hypot(x - camera.eye[0], y - camera.eye[1], truth - camera.eye[2]);
+    errors.push((Math.abs(shown - truth) * perRadian) / away);
   }
   errors.sort((a, b) => a - b);
   const quantile = (q) => errors[Math.floor(q * (errors.length - 1))];

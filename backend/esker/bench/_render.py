@@ -77,7 +77,7 @@ def _camera(name: str, figures: dict[str, Any]) -> str:
         error = row["screen_error_px"]
         lines.append(
             (
-                f"ours, {tau.replace('tau', 'τ =')}",
+                f"ours, lit, {tau.replace('tau', 'τ =')}",
                 f"{row['still_gpu_process_ms']:.0f}",
                 f"{row['triangles']:,}",
                 f"{error['p95']:.2f}",
@@ -87,10 +87,15 @@ def _camera(name: str, figures: dict[str, Any]) -> str:
     for tau, row in figures["ours"]["full"].items():
         label = f"ours with all of its light and materials, {tau.replace('tau', 'τ =')}"
         lines.append((label, f"{row['still_gpu_process_ms']:.0f}", f"{row['triangles']:,}", "", ""))
+    for peer, row in figures.get("beside_cesium", {}).items():
+        for shading in ("flat", "lambert"):
+            label = f"ours, {'one colour' if shading == 'flat' else 'lit'}, for {_peer_name(peer)}, τ = {row['tau']:g}"
+            cost, error = f"{row[shading]['still_gpu_process_ms']:.0f}", f"{row['screen_error_px']['p95']:.2f}"
+            lines.append((label, cost, f"{row[shading]['triangles']:,}", error, ""))
     for peer, row in figures.get("peers", {}).items():
         if isinstance(row, dict):
             error = row.get("screen_error_px", {})
-            shown = NAMES.get(peer, peer.replace("cesium sse", "CesiumJS, error bound"))
+            shown = _peer_name(peer)
             cost = f"{row['still_gpu_process_ms']:.0f}" if "still_gpu_process_ms" in row else "could not draw it here"
             triangles = f"{row['triangles']:,}" if "triangles" in row else ""
             lines.append((shown, cost, triangles, f"{error['p95']:.2f}" if "p95" in error else "", ""))
@@ -99,10 +104,15 @@ def _camera(name: str, figures: dict[str, Any]) -> str:
     return f"View `{name}`:\n\n{table}\n\nOurs beside the others: {said or 'none of them drew'}."
 
 
+def _peer_name(peer: str) -> str:
+    return NAMES.get(peer, peer.replace("cesium sse", "CesiumJS, error bound"))
+
+
 def _share(key: str, value: Any) -> str:
-    name = NAMES.get(key.removeprefix("share_of_"), key.removeprefix("share_of_").replace("cesium sse", "CesiumJS at"))
+    name = _peer_name(key.removeprefix("share_of_"))
     if isinstance(value, dict):
-        return f"{value['share']:.2f} of {name} at equal error ({value['at'].replace('tau', 'τ =')})"
+        lit = f"({value['lambert']:.2f} when ours is lit)"
+        return f"{value['flat']:.2f} of {name}, at equal error and in one colour as it draws {lit}"
     return f"{value:.2f} of {name} with less than 0.1 % of pixels off"
 
 

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any, Final
+
 import numpy as np
 from numpy.typing import NDArray
 
-SIDE = 1025
-SIZE_M = 4096.0
-OCTAVES = 9
-HIGH_M = 880.0
+SIDE: Final = 1025
+SIZE_M: Final = 4096.0
+OCTAVES: Final = 9
+HIGH_M: Final = 880.0
 
 
 def _hash(x: NDArray[np.uint32], y: NDArray[np.uint32]) -> NDArray[np.float64]:
@@ -38,3 +41,25 @@ def heights(side: int = SIDE) -> NDArray[np.float32]:
         weight = np.minimum(1, t * 1.6)
         gain, frequency = gain / 2, frequency * 2
     return (out * HIGH_M).astype(np.float32)
+
+
+def places(camera: Mapping[str, Any], width: int, height: int, grid: NDArray[np.float32], step: int = 11) -> list[int]:
+    """Samples of a grid over ``SIZE_M``, flat indices, at which all renderers' screen errors are measured: every
+    ``step``-th of both ways that lies in the picture, whether or not nearer ground hides it there.
+
+    ``camera``: ``eye`` and ``target`` (metres), ``fovDeg`` (vertical), ``near``.
+    """
+    side = grid.shape[0]
+    eye, target = (np.asarray(camera[name], dtype=np.float64) for name in ("eye", "target"))
+    forward = (target - eye) / np.linalg.norm(target - eye)
+    right = np.cross(forward, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    j, i = np.meshgrid(np.arange(3, side, step), np.arange(5, side, step), indexing="ij")
+    cell = SIZE_M / (side - 1)
+    away = np.stack([i * cell, j * cell, grid[j, i]], axis=-1) - eye
+    depth = away @ forward
+    tangent = np.tan(np.radians(camera["fovDeg"]) / 2) * np.maximum(depth, 0)
+    inside = (depth > camera["near"]) & (np.abs(away @ np.cross(right, forward)) < tangent)
+    inside &= np.abs(away @ right) < tangent * width / height
+    flat: list[int] = (j * side + i)[inside].tolist()
+    return flat

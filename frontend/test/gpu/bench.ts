@@ -1,7 +1,7 @@
 /**
  * The page behind frontend/dev/bench.html: our renderer as `esker bench render` measures it. `lambert` draws the ground
- * with the plain shading of the peers and of the dense reference, so that geometry is compared with geometry; `full` is the
- * picture that people see.
+ * with the plain shading of three.js and of the dense reference, `flat` in one colour as CesiumJS does, so that geometry is
+ * compared with geometry; `full` is the picture that people see.
  */
 
 import type { FrameStats, QualityMode, Scene, TerrainSettings, TileView, Vec3 } from "../../src/core/types.ts";
@@ -12,7 +12,7 @@ import { drawReference } from "./dense.ts";
 import { drawnPatch, samplesOf, shownHeight } from "./drawn.ts";
 import { flightCamera, fly, type Moment, Tally } from "./flight.ts";
 import { hiddenTwin } from "./hiddentwin.ts";
-import { LAMBERT } from "./lambert.ts";
+import { LAMBERT, type Plain } from "./lambert.ts";
 import * as ridges from "./ridges.ts";
 import { craggyField, FieldView, filteredField, lookAt, PLAIN_CHANNELS, SparseView } from "./world.ts";
 
@@ -83,7 +83,7 @@ function grow(levels: number): void {
   view = sparse;
 }
 
-async function open(shading: "lambert" | "full"): Promise<{ description: string }> {
+async function open(shading: Plain | "full"): Promise<{ description: string }> {
   for (const old of document.querySelectorAll("canvas")) old.remove();
   const canvas = document.createElement("canvas");
   Object.assign(canvas, { width: ground.width, height: ground.height });
@@ -99,9 +99,9 @@ async function open(shading: "lambert" | "full"): Promise<{ description: string 
   device.addEventListener("uncapturederror", (event) => {
     throw new Error(event.error.message);
   });
-  if (shading === "lambert") {
+  if (shading !== "full") {
     const make = device.createShaderModule.bind(device);
-    device.createShaderModule = (d) => make({ ...d, code: LAMBERT.replace(d.label ?? "", d.code) });
+    device.createShaderModule = (d) => make({ ...d, code: LAMBERT.replace(d.label ?? "", d.code, shading) });
   }
   shown = { renderer: await GpuRenderer.create(canvas, gpu), canvas, device, tally };
   // Peers and reference end with the map: so does what is compared with them.
@@ -200,10 +200,14 @@ async function reference(): Promise<string> {
   return drawReference({ ...ground, heights, camera: scene(0).camera });
 }
 
-/** Vertical error on the screen at samples of the grid that lie in a drawn patch, pixels. */
-function screenError(tauPx: number): { places: number; p50: number; p95: number; max: number } {
+/**
+ * Vertical error on the screen, pixels, at samples of the grid (flat indices, inside of the picture); those behind nearer
+ * ground count too.
+ */
+function screenError(tauPx: number, places: readonly number[]): Record<"places" | "p50" | "p95" | "max", number> {
   const { camera, side, sizeM, height } = ground;
   const selection = new Selection(view.levels);
+  selection.occlusion = false;
   for (const tile of view.tiles()) selection.tree.setUsable(tile.level, tile.x, tile.y, true);
   tau = tauPx;
   const cut = selection.select(view, scene(0).camera, tauPx, { slot: () => 0, touch: () => {} });
@@ -211,18 +215,24 @@ function screenError(tauPx: number): { places: number; p50: number; p95: number;
   const perRadian = height / 2 / Math.tan((camera.fovDeg * Math.PI) / 360);
   const cell = sizeM / (side - 1);
   const errors: number[] = [];
+  let left = places.map((k) => [k % side, Math.floor(k / side)] as const);
   for (let p = 0; p < cut.count; p += 1) {
     const patch = drawnPatch(cut, p, sizeM, sample);
-    const steps = Math.round(patch.cell / cell) * 16;
-    const [i0, j0] = [Math.round((patch.column * patch.cell) / cell), Math.round((patch.row * patch.cell) / cell)];
-    for (let j = j0; j < j0 + steps; j += 3) {
-      for (let i = i0; i < i0 + steps; i += 3) {
-        const truth = heights[j * side + i]!;
-        const off = Math.abs(shownHeight(patch, i * cell, j * cell) - truth);
-        const away = Math.hypot(i * cell - camera.eye[0], j * cell - camera.eye[1], truth - camera.eye[2]);
-        errors.push((off * perRadian) / away);
+    const steps = Math.round(patch.cell / cell);
+    const on = (v: number, first: number): boolean => v >= first * steps && v <= (first + 16) * steps;
+    const rest: (typeof left)[number][] = [];
+    for (const place of left) {
+      const [i, j] = place;
+      if (!(on(i, patch.column) && on(j, patch.row))) {
+        rest.push(place);
+        continue;
       }
+      const truth = heights[j * side + i]!;
+      const off = Math.abs(shownHeight(patch, i * cell, j * cell) - truth);
+      const away = Math.hypot(i * cell - camera.eye[0], j * cell - camera.eye[1], truth - camera.eye[2]);
+      errors.push((off * perRadian) / away);
     }
+    left = rest;
   }
   errors.sort((a, b) => a - b);
   const quantile = (q: number): number => errors[Math.floor(q * (errors.length - 1))]!;

@@ -1,4 +1,7 @@
-/** The plain shading that renderers are compared with: two-sided nothing, one sun, one ambient term, no air. */
+/**
+ * The plain shadings in which renderers are compared: `lambert`, as three.js draws, has one sun, one ambient term, no air;
+ * `flat`, as CesiumJS draws without imagery, is one colour.
+ */
 
 /** Colour of the ground (linear), light of the sun and of the sky, colour behind (linear). */
 const SHADING = /* wgsl */ `
@@ -40,6 +43,19 @@ fn terrain_fragment(v: PlainVertex) -> @location(0) vec4f {
 }
 `;
 
+const FLAT_GROUND = /* wgsl */ `
+@vertex
+fn terrain_vertex(@builtin(vertex_index) index: u32, patch_in: PatchIn) -> @builtin(position) vec4f {
+  return guarded(clip_of(patch_vertex(patch_in.record, vec2i(i32(index % PITCH), i32(index / PITCH))).relative));
+}
+
+@fragment
+fn terrain_fragment() -> @location(0) vec4f { return vec4f(0.55, 0.5, 0.42, 1.0); }
+`;
+
+/** Of linear (0.6, 0.75, 0.9), display-encoded: peers clear to a colour, so it is none that each pixel computes. */
+export const BEHIND_COLOUR = [0.6, 0.75, 0.9].map((v) => 1.055 * v ** (1 / 2.4) - 0.055);
+
 const BEHIND = /* wgsl */ `
 @vertex
 fn background_vertex(@builtin(vertex_index) index: u32) -> @builtin(position) vec4f {
@@ -47,7 +63,7 @@ fn background_vertex(@builtin(vertex_index) index: u32) -> @builtin(position) ve
 }
 
 @fragment
-fn background_fragment() -> @location(0) vec4f { return vec4f(encoded(vec3f(0.6, 0.75, 0.9)), 1.0); }
+fn background_fragment() -> @location(0) vec4f { return vec4f(${BEHIND_COLOUR.join(", ")}, 1.0); }
 `;
 
 /** Cuts a module off before its first entry point's own struct and puts plain entry points there. */
@@ -57,11 +73,15 @@ function cut(code: string, before: string, plain: string): string {
   return code.slice(0, at) + SHADING + plain;
 }
 
+export type Plain = "lambert" | "flat";
+
 export const LAMBERT = {
   shading: SHADING,
   /** The module of that label as it is drawn here. */
-  replace(label: string, code: string): string {
-    if (label.startsWith("terrain ")) return cut(code, "struct TerrainVertex", GROUND);
+  replace(label: string, code: string, plain: Plain = "lambert"): string {
+    if (label.startsWith("terrain ")) {
+      return cut(code, "struct TerrainVertex", plain === "lambert" ? GROUND : FLAT_GROUND);
+    }
     if (label === "background") return cut(code, "struct BackgroundVertex", BEHIND);
     return code;
   },
