@@ -8,13 +8,18 @@ import importlib.util
 import logging
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from esker import contract as c
 from esker.version import VERSION
 
 if TYPE_CHECKING:
     from esker.patchwork.base import Base
+
+NOT_MEASURED: Final = frozenset(
+    {"gallery", "gpu_model", "plots", "report", "synthesis_plots", "synthesis_statistics"}
+)  # fmt: skip
+"""Modules beside the benchmarks that write scenes, sections and pictures: ``python -m esker.bench.NAME``."""
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -63,7 +68,9 @@ def _parser() -> argparse.ArgumentParser:
     commands.add_parser("fork", help="a new terrain as one was at a clock (see esker fork --help)", add_help=False)
     commands.add_parser("solve", help="solve a terrain file into heights (see esker solve --help)", add_help=False)
     commands.add_parser("render", help="draw a terrain: pictures, turntables (see esker render --help)", add_help=False)
-    commands.add_parser("bench", help="measure: esker bench NAME --json (without NAME: the list)", add_help=False)
+    commands.add_parser("bench", help="measure: esker bench NAME --json (without NAME: the list)",
+                        usage="esker bench [NAME [OPTIONS]]", description="Without NAME: lists the benchmarks. "
+                        "esker bench NAME --help says what one measures.")  # fmt: skip
     return parser
 
 
@@ -92,7 +99,7 @@ def _serve(parsed: argparse.Namespace) -> int:
 
 def _benches() -> list[str]:
     folder = Path(__file__).parent / "bench"
-    return sorted(path.stem for path in folder.glob("*.py") if not path.stem.startswith("_"))
+    return sorted({path.stem for path in folder.glob("*.py") if not path.stem.startswith("_")} - NOT_MEASURED)
 
 
 def _bench(name: str, argv: list[str]) -> int:

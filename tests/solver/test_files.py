@@ -22,6 +22,7 @@ from esker.document.archive import ArchiveError
 from esker.document.strokes import world_points
 from esker.solve import command
 from esker.solve.crest import crest_of
+from esker.solve.heightmap import quantised
 from esker.solve.solver import LevelResult
 from tests.solver.scenes import SCENES, mixed
 
@@ -209,6 +210,33 @@ def test_solve_command(tmp_path: Path, kind: str, capsys: pytest.CaptureFixture[
     assert "settled" in capsys.readouterr().err
 
 
+@pytest.mark.filterwarnings("ignore::rasterio.errors.NotGeoreferencedWarning")
+@pytest.mark.parametrize("kind", ["png", "r16"])
+def test_heightmaps_of_sixteen_bits(tmp_path: Path, kind: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """SPEC S21: other programs read the heights that the terrain has, to half a step, north first."""
+    import rasterio
+
+    terrain = Terrain.from_document(Document(id="t", strokes=tuple(SCENES["one"])))
+    source, out = tmp_path / "t.esker", tmp_path / f"h.{kind}"
+    terrain.save(source)
+    assert command.main([str(source), "--level", "1", "-q", "-o", str(out)]) == 0
+    found = re.search(r"^129 x 129 samples, north first: 0 is (\S+) m, 65535 is (\S+) m$", capsys.readouterr().out)
+    assert found
+    low, high = map(float, found.groups())
+    if kind == "png":
+        with rasterio.open(out) as file:
+            assert (file.driver, file.dtypes) == ("PNG", ("uint16",))
+            steps = file.read(1)
+    else:
+        steps = np.frombuffer(out.read_bytes(), "<u2").reshape(129, 129)
+    heights = terrain.heights(1)
+    assert (low, high) == pytest.approx((heights.min(), heights.max()))
+    assert (steps.min(), steps.max()) == (0, 65535)
+    step = (high - low) / 65535
+    np.testing.assert_allclose(low + steps[::-1] * step, heights, rtol=0, atol=0.51 * step)
+    assert not quantised(np.full((3, 2), 7, dtype=np.float32)).any(), "a plain has no range"
+
+
 class Terminal(io.StringIO):
     def isatty(self) -> bool:
         return True
@@ -263,9 +291,9 @@ def test_solve_command_errors(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     bad = tmp_path / "bad.json"
     bad.write_text("{")
     for argv, says in (
-        ([str(tmp_path / "none.esker"), "-o", out], "No such file"),
+        ([str(tmp_path / "none.esker"), "-o", out], "no file"),
         ([str(bad), "-o", out], "not valid"),
-        ([str(good), "-o", str(tmp_path / "h.png")], "npy"),
+        ([str(good), "-o", str(tmp_path / "h.tif")], "r16"),
         ([str(good), "-o", str(tmp_path / "no" / "h.npy")], "no folder"),
         ([str(good), "-o", out, "--device", "abacus"], "abacus"),
     ):

@@ -65,6 +65,13 @@ def test_the_command_writes_a_window(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert "sample [0, 0] at x 1000 m" in capsys.readouterr().err
     assert command.main([*arguments[:5], "--window", "1e6", "0", "2e6", "5"]) == 1
     assert "No sample" in capsys.readouterr().err
+    for size, more in (("4096", ["--level", "10"]), ("800", ["--level", "12", "--detail"])):
+        assert command.main([*arguments[:3], *more, "--window", "0", "0", size, size]) == 1
+        assert "in parts" in capsys.readouterr().err
+    for text in ("nan", "inf", "far"):
+        with pytest.raises(SystemExit):
+            command.main([*arguments[:5], "--window", text, "0", "1", "1"])
+        assert "--window" in capsys.readouterr().err
     with pytest.raises(SystemExit):
         command.main(arguments[:5])
     assert "--window" in capsys.readouterr().err

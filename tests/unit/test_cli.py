@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import importlib.util
+import inspect
 import re
 import signal
 import socket
@@ -16,6 +18,7 @@ from pathlib import Path
 import pytest
 
 from esker import cli
+from esker.cli import NOT_MEASURED
 from esker.tls import authority, names, server_context
 from esker.version import VERSION
 
@@ -62,7 +65,18 @@ def test_without_a_command_it_helps(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_bench_lists_and_names_what_there_is(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["bench"]) == 0
-    assert "fanout" in capsys.readouterr().out.split()
+    listed = capsys.readouterr().out.split()
+    assert "fanout" in listed
+    for name in listed:
+        main = importlib.import_module(f"esker.bench.{name}").main
+        assert list(inspect.signature(main).parameters), f"{name} takes no arguments, so it does not measure"
+    assert not NOT_MEASURED.intersection(listed)
+    for name in NOT_MEASURED:
+        assert importlib.util.find_spec(f"esker.bench.{name}") is not None, name
+    with pytest.raises(SystemExit) as end:
+        cli.main(["bench", "--help"])
+    assert end.value.code == 0
+    assert "NAME" in capsys.readouterr().out
     assert cli.main(["bench", "nonsense"]) == 1
     assert "fanout" in capsys.readouterr().err
 

@@ -144,7 +144,7 @@ def document_from_json(text: bytes) -> Document:
         return Document.model_validate_json(text)
     except ValidationError as error:
         first = error.errors(include_url=False, include_input=False)[0]
-        where = ".".join(str(part) for part in first["loc"])
+        where = ".".join(str(part) for part in first["loc"]) or "it"
         raise ArchiveError(f"The terrain in this file is not valid: {where}: {first['msg']}.") from error
 
 

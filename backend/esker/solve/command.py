@@ -17,6 +17,7 @@ from esker import grid
 from esker.contract import DEFAULT_LEVEL, MAX_LEVEL, MAX_REFINED_LEVEL, MAX_SYNTHESIS_LEVEL, Channel, Document
 from esker.document import archive
 from esker.document.layers import span_m
+from esker.solve import heightmap
 from esker.solve.base import Base
 from esker.solve.detail import detailed, settle
 from esker.solve.solver import LevelResult, Solver
@@ -26,6 +27,8 @@ EXPECTED_CYCLES = 10
 PLAIN_SECONDS = 2.0
 """Where nobody watches, a line as often as this while a long level is under way."""
 BAR = 24
+MOST_SAMPLES = 1 << 29
+"""Of a window: 2 GiB of heights; a tenth of it with detail, whose attributes are ten more of them."""
 
 
 BaseOf = Callable[[Document, bytes], Base | None]
@@ -48,9 +51,9 @@ def main(argv: list[str], base_of: BaseOf = _without_layers) -> int:
     if options.level > MAX_LEVEL and options.window is None:
         parser.error(f"levels above {MAX_LEVEL} are made where they are looked at: say --window X0 Y0 X1 Y1")
     try:
-        _writable("Heights", options.output, ".npy")
+        _writable("Heights", options.output, heightmap.SUFFIXES)
         if options.attributes is not None:
-            _writable("Attributes", options.attributes, ".npz")
+            _writable("Attributes", options.attributes, (".npz",))
         terrain = _read(options.terrain, base_of)
         solver = Solver(
             options.device, max_level=min(options.level, MAX_LEVEL if options.window is None else DEFAULT_LEVEL)
@@ -62,8 +65,8 @@ def main(argv: list[str], base_of: BaseOf = _without_layers) -> int:
             heights = _solve(solver, terrain, options.level, quiet=options.quiet)
         else:
             heights = _window(solver, terrain, options.level, options.window, quiet=options.quiet)
-        with options.output.open("wb") as file:
-            np.save(file, heights)
+        if said := heightmap.write(options.output, heights):
+            print(said)
         if options.attributes is not None:
             np.savez_compressed(options.attributes, **attributes)
     except (OSError, ValueError, RuntimeError, MemoryError) as error:
@@ -76,16 +79,22 @@ def main(argv: list[str], base_of: BaseOf = _without_layers) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    p = argparse.ArgumentParser(prog="esker solve", description="Settled heights of a terrain, as a NumPy file.")
+    p = argparse.ArgumentParser(prog="esker solve", description="Settled heights of a terrain, as a file.")
     p.add_argument("terrain", type=Path, help="an .esker file, or a document as .json")
-    p.add_argument("-o", "--output", type=Path, required=True, help="heights.npy: float32, metres, row 0 south")
+    p.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        required=True,
+        help="heights.npy: float32, metres, row 0 south; .png or .r16: a heightmap of 16 bits, row 0 north",
+    )
     samples = (
         f"finest level, 0..{MAX_LEVEL}, with --window to {MAX_REFINED_LEVEL}, with --detail as well to cells of a "
         "centimetre; 64 * 2^N + 1 samples a side"
     )
     p.add_argument("--level", type=int, choices=range(MAX_SYNTHESIS_LEVEL + 1), default=DEFAULT_LEVEL, metavar="N",
                    help=f"{samples} (default {DEFAULT_LEVEL})")  # fmt: skip
-    p.add_argument("--window", type=float, nargs=4, metavar=("X0", "Y0", "X1", "Y1"),
+    p.add_argument("--window", type=_metres, nargs=4, metavar=("X0", "Y0", "X1", "Y1"),
                    help="only the samples in this rectangle of world metres, refined from level "
                    f"{DEFAULT_LEVEL} where N is above it")  # fmt: skip
     p.add_argument("--detail", action="store_true", help="heights as the page shows them, with synthesised detail")
@@ -96,10 +105,17 @@ def _parser() -> argparse.ArgumentParser:
     return p
 
 
-def _writable(what: str, path: Path, suffix: str) -> None:
+def _metres(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f"'{text}' is no place")
+    return value
+
+
+def _writable(what: str, path: Path, suffixes: Sequence[str]) -> None:
     """Refuse a file of another kind, or in a folder that is not there, before anything is computed."""
-    if path.suffix != suffix:
-        raise ValueError(f"{what} are written as {suffix}, not as '{path.suffix or path.name}'.")
+    if path.suffix not in suffixes:
+        raise ValueError(f"{what} are written as {', '.join(suffixes)}, not as '{path.suffix or path.name}'.")
     if not path.absolute().parent.is_dir():
         raise ValueError(f"There is no folder {path.absolute().parent}.")
 
@@ -113,6 +129,8 @@ class _Terrain(NamedTuple):
 
 def _read(path: Path, base_of: BaseOf) -> _Terrain:
     """A terrain from an archive or from JSON. Raises OSError, ValueError."""
+    if not path.is_file():
+        raise ValueError(f"There is no file {path}.")
     data = path.read_bytes()
     document = archive.loads(data) if data[:2] == b"PK" else archive.document_from_json(data)
     return _Terrain(document, base_of(document, data))
@@ -211,15 +229,26 @@ def _solve(solver: Solver, terrain: _Terrain, level: int, *, quiet: bool) -> NDA
     return heights
 
 
+def _samples(level: int, size: float, corners: Sequence[float], most: int) -> tuple[int, int, int, int]:
+    """Rows r0 to r1 and columns c0 to c1 of a window; raises ValueError for one without samples or with too many."""
+    r0, r1, c0, c1 = grid.Rect(*corners).sample_window(level, size)
+    if r0 >= r1 or c0 >= c1:
+        raise ValueError(f"No sample of level {level} lies in that window; the terrain is {size:g} m wide.")
+    if (r1 - r0) * (c1 - c0) > most:
+        raise ValueError(
+            f"That window has {r1 - r0:,} x {c1 - c0:,} samples of level {level}; at most {most:,} are made at once. "
+            "Take it in parts: they agree to the bit where they meet."
+        )
+    return r0, r1, c0, c1
+
+
 def _window(
     solver: Solver, terrain: _Terrain, level: int, corners: Sequence[float], *, quiet: bool
 ) -> NDArray[np.float32]:
     """The heights of a rectangle of ``level``; raises ValueError for one without samples."""
     document, under = terrain
     size = document.settings.size_m
-    r0, r1, c0, c1 = grid.Rect(*corners).sample_window(level, size)
-    if r0 >= r1 or c0 >= c1:
-        raise ValueError(f"No sample of level {level} lies in that window; the terrain is {size:g} m wide.")
+    r0, r1, c0, c1 = _samples(level, size, corners, MOST_SAMPLES)
     basis = None
     steps = solver.steps(document.strokes, document.settings, min(level, DEFAULT_LEVEL), basis=True, base=under)
     for result in steps:
@@ -250,9 +279,7 @@ def _with_detail(
     """Heights and attributes as the page shows them, of a whole level or of a rectangle of it; raises ValueError."""
     document, base = terrain
     size, n = document.settings.size_m, grid.samples(level)
-    r0, r1, c0, c1 = (0, n, 0, n) if corners is None else grid.Rect(*corners).sample_window(level, size)
-    if r0 >= r1 or c0 >= c1:
-        raise ValueError(f"No sample of level {level} lies in that window; the terrain is {size:g} m wide.")
+    r0, r1, c0, c1 = (0, n, 0, n) if corners is None else _samples(level, size, corners, MOST_SAMPLES // 10)
     progress = None if quiet else Progress(sys.stderr, DEFAULT_LEVEL)
     told = progress.step if progress else None
     settled = settle(solver, document.strokes, document.settings, DEFAULT_LEVEL, told, base=base)
