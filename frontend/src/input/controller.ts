@@ -1,7 +1,7 @@
 /**
  * Pointers and keys on the terrain: which tool gets them, and what they change (DESIGN 12).
  *
- * One pointer is the main one and does one thing at a time (`Activity`): draw, drag a handle, move a stroke, or move the
+ * One pointer is the main one and does one thing at a time (`presses.ts`): draw, drag a handle, move a stroke, or move the
  * camera. A second finger, or Esc, ends it. Events come in CSS pixels and become device pixels here, at the DOM's edge.
  */
 
@@ -14,9 +14,9 @@ import type { ToolDefaults } from "./defaults.ts";
 import { Grips, type GripVisual } from "./grips.ts";
 import { Keyboard } from "./keyboard.ts";
 import { type Finger, Navigation, type NavigationMode } from "./navigation.ts";
-import type { Picked, PickOrder } from "./picking.ts";
 import type { Laying } from "./placement.ts";
 import { Pointing, takePointer } from "./pointing.ts";
+import { type Activity, Presses } from "./presses.ts";
 import { type FinishedStroke, type InkVisual, StrokeTool } from "./stroketool.ts";
 
 export type { ActionId, ToolId } from "./actions.ts";
@@ -46,17 +46,6 @@ export interface InputOptions {
   readonly now?: () => number;
 }
 
-type Activity =
-  | {
-      readonly kind: "press";
-      readonly picked: Picked | null;
-      readonly navigate: NavigationMode;
-      readonly notice: string | null;
-    }
-  | { readonly kind: "draw" }
-  | { readonly kind: "drag" }
-  | { readonly kind: "navigate"; readonly mode: NavigationMode };
-
 interface Main {
   readonly pointerId: number;
   readonly startX: number;
@@ -67,24 +56,11 @@ interface Main {
 
 /** CSS pixels a pointer may tremble within a click. */
 const CLICK_PX = 4;
-/** Number of the button that the other end of a pen presses. */
-const ERASER = 5;
-/** What a click takes: paint lies over the land like a veil, so it comes last, and the drawing tools do not see it. */
-const PICKS: Readonly<Record<ToolId, PickOrder>> = {
-  select: ["land", "paint"],
-  mountain: ["land"],
-  crevice: ["land"],
-  plateau: ["land"],
-  paint: ["paint"],
-};
-const VIEW_ONLY = "This link lets you look, not draw. Ask for an edit link to change the terrain.";
-const LOCKED = "This stroke is locked. Unlock it to change it.";
 const FLUSH: Readonly<Record<Exclude<ToolId, "select" | "paint">, string>> = {
   mountain: "This line lies on the ground. Draw it up into the air, or drag its middle handle up.",
   crevice: "This line lies on the ground. Draw it as a hollow, or drag its middle handle down.",
   plateau: "This plateau lies level with the ground. Drag its handle up to raise it.",
 };
-const OFF_GROUND = "Begin the line on the ground.";
 
 export class InputController {
   readonly tool: Signal<ToolId> = signal<ToolId>("mountain");
@@ -102,12 +78,12 @@ export class InputController {
   readonly #navigation: Navigation;
   readonly #pointing: Pointing;
   readonly #keyboard: Keyboard;
+  readonly #presses: Presses;
   readonly #touches = new Map<number, Finger>();
   readonly #abort = new AbortController();
   #main: Main | null = null;
   #penDown = false;
   #penSeen = false;
-  #toldViewOnly = false;
 
   constructor(options: InputOptions) {
     this.#o = options;
@@ -128,6 +104,18 @@ export class InputController {
       now,
     });
     this.#keyboard = new Keyboard(options.camera, this.#navigation, this.actions);
+    this.#presses = new Presses({
+      ...options,
+      tool,
+      selection,
+      laying,
+      fingerDraws: this.fingerDraws,
+      navigation: this.#navigation,
+      pointing: this.#pointing,
+      strokes: this.#strokes,
+      grips: this.#grips,
+      spaceHeld: () => this.#keyboard.spaceHeld,
+    });
     this.#listen();
   }
 
@@ -206,7 +194,7 @@ export class InputController {
       startX: x,
       startY: y,
       moved: false,
-      activity: this.#activityFor(e, x, y),
+      activity: this.#presses.begin(e, x, y),
     };
     this.#publishMode();
   }
@@ -228,58 +216,6 @@ export class InputController {
     this.#publishMode();
   }
 
-  #activityFor(e: PointerEvent, x: number, y: number): Activity {
-    const navigate = (mode: NavigationMode): Activity => {
-      this.#navigation.begin(mode, x, y);
-      return { kind: "navigate", mode };
-    };
-    const erases = e.button === ERASER && this.tool.value === "paint";
-    if (e.button === 1 || (e.button === 2 && e.shiftKey) || (e.button === 0 && this.#keyboard.spaceHeld))
-      return navigate("pan");
-    if (e.button !== 0 && !erases) return navigate(this.#turning());
-    if (this.laying.value !== null) return this.#lay(e, x, y);
-    if (this.tool.value === "select") return this.#select(e, x, y);
-    if (e.pointerType === "touch" && !this.fingerDraws.value) return this.#press(null);
-    if (!this.#o.canEdit()) {
-      const notice = this.#toldViewOnly ? null : VIEW_ONLY;
-      this.#toldViewOnly = true;
-      return this.#press(null, notice);
-    }
-    const handle = this.#pointing.handle(this.handles.value, e);
-    if (handle !== null && !erases) return this.#beginDrag(handle, x, y);
-    const opposite = this.tool.value === "paint" && (erases || e.altKey);
-    if (this.#strokes.start(this.tool.value, this.#pointing.sample(e), e.pointerType === "pen", opposite))
-      return { kind: "draw" };
-    return this.#press(null, OFF_GROUND);
-  }
-
-  /** Nothing yet: a click, or with movement a drag of the picked stroke or of the view, which `notice` then explains. */
-  #press(picked: Picked | null, notice: string | null = null): Activity {
-    const map = this.#o.camera.state.value.mode === "map";
-    return { kind: "press", picked, navigate: map ? "pan" : this.#turning(), notice };
-  }
-
-  #turning(): NavigationMode {
-    return this.#o.camera.state.value.mode === "fly" ? "look" : "orbit";
-  }
-
-  #select(e: PointerEvent, x: number, y: number): Activity {
-    const handle = this.#pointing.handle(this.handles.value, e);
-    if (handle !== null) return this.#beginDrag(handle, x, y);
-    return this.#press(this.#pick(e));
-  }
-
-  /** A grid is being laid: its handles, then its ground, then the view. */
-  #lay(e: PointerEvent, x: number, y: number): Activity {
-    const held = this.#pointing.handle(this.handles.value, e) ?? this.#grips.ground(this.#navigation.hit(x, y));
-    return held !== null && this.#o.canEdit() ? this.#beginDrag(held, x, y) : this.#press(null);
-  }
-
-  #beginDrag(handle: Pick<GripVisual, "kind" | "position">, x: number, y: number): Activity {
-    this.#grips.start(handle, x, y);
-    return { kind: "drag" };
-  }
-
   #move(e: PointerEvent): void {
     const [x, y] = this.#pointing.pixel(e);
     const finger = this.#touches.get(e.pointerId);
@@ -298,27 +234,10 @@ export class InputController {
     if (!main.moved) {
       if (Math.hypot(x - main.startX, y - main.startY) <= CLICK_PX * this.#pointing.ratio) return;
       main.moved = true;
-      this.#firstMove(main);
+      main.activity = this.#presses.moved(main.activity, main.startX, main.startY);
+      this.#publishMode();
     }
     this.#continue(main, e, x, y);
-  }
-
-  /** The pointer has left the place where it went down: a press becomes a drag of the stroke or of the view. */
-  #firstMove(main: Main): void {
-    if (main.activity.kind !== "press") return;
-    const { picked, navigate, notice } = main.activity;
-    if (notice !== null) this.#o.onMessage(notice);
-    if (picked !== null && picked.stroke.id === this.selection.value) {
-      if (picked.stroke.locked) this.#o.onMessage(LOCKED);
-      else if (this.#o.canEdit()) {
-        main.activity = this.#beginDrag({ kind: "move", position: picked.point }, main.startX, main.startY);
-        this.#publishMode();
-        return;
-      }
-    }
-    this.#navigation.begin(navigate, main.startX, main.startY);
-    main.activity = { kind: "navigate", mode: navigate };
-    this.#publishMode();
   }
 
   #continue(main: Main, e: PointerEvent, x: number, y: number): void {
@@ -367,7 +286,7 @@ export class InputController {
 
   /** A click without movement selects the stroke under it, or nothing; with the brush, beside all paint, it is a dab. */
   #click(activity: Activity, e: PointerEvent): void {
-    const picked = this.#pick(e);
+    const picked = this.#presses.pick(e);
     if (activity.kind === "draw" && picked === null) {
       const made = this.#strokes.touch();
       if (made !== null) {
@@ -380,12 +299,6 @@ export class InputController {
     if (e.button !== 0 || activity.kind === "drag" || activity.kind === "navigate") return;
     if (this.laying.value !== null) return;
     this.selection.value = picked?.stroke.id ?? null;
-  }
-
-  /** What lies under the pointer, of what the tool shows. */
-  #pick(e: PointerEvent): Picked | null {
-    if (this.laying.value !== null) return null;
-    return this.#pointing.stroke(e, this.#o.freeze(), PICKS[this.tool.value]);
   }
 
   /** The system took the pointer away: what was being drawn is given up. */
@@ -413,7 +326,7 @@ export class InputController {
     const handle = this.#pointing.handle(this.handles.value, e);
     this.#grips.hover(handle?.kind ?? null);
     const picks = this.tool.value === "select" || this.tool.value === "paint";
-    const over = handle === null && picks ? this.#pick(e) : null;
+    const over = handle === null && picks ? this.#presses.pick(e) : null;
     this.#hovered.value = over?.stroke.id ?? null;
     this.#showCursor(handle !== null || over !== null);
   }

@@ -1,0 +1,136 @@
+/** What a pointer that goes down begins, by tool, button and what lies under it; and what becomes of it when it moves. */
+
+import type { ReadonlySignal } from "@preact/signals-core";
+import type { Camera } from "../core/camera.ts";
+import type { Ground } from "../core/types.ts";
+import type { ToolId } from "./actions.ts";
+import type { Grips, GripVisual } from "./grips.ts";
+import type { Navigation, NavigationMode } from "./navigation.ts";
+import type { Picked, PickOrder } from "./picking.ts";
+import type { Laying } from "./placement.ts";
+import type { Pointing } from "./pointing.ts";
+import type { StrokeTool } from "./stroketool.ts";
+
+export type Activity =
+  | {
+      readonly kind: "press";
+      readonly picked: Picked | null;
+      readonly navigate: NavigationMode;
+      readonly notice: string | null;
+    }
+  | { readonly kind: "draw" }
+  | { readonly kind: "drag" }
+  | { readonly kind: "navigate"; readonly mode: NavigationMode };
+
+/** What presses act on. */
+export interface PressContext {
+  readonly camera: Camera;
+  /** The ground as it is drawn now, held fast. */
+  readonly freeze: () => Ground;
+  readonly canEdit: () => boolean;
+  readonly onMessage: (text: string) => void;
+  readonly tool: ReadonlySignal<ToolId>;
+  readonly selection: ReadonlySignal<string | null>;
+  readonly laying: ReadonlySignal<Laying | null>;
+  readonly fingerDraws: ReadonlySignal<boolean>;
+  readonly navigation: Navigation;
+  readonly pointing: Pointing;
+  readonly strokes: StrokeTool;
+  readonly grips: Grips;
+  readonly spaceHeld: () => boolean;
+}
+
+/** Number of the button that the other end of a pen presses. */
+const ERASER = 5;
+/** What a click takes: paint lies over the land like a veil, so it comes last, and the drawing tools do not see it. */
+const PICKS: Readonly<Record<ToolId, PickOrder>> = {
+  select: ["land", "paint"],
+  mountain: ["land"],
+  crevice: ["land"],
+  plateau: ["land"],
+  paint: ["paint"],
+};
+const VIEW_ONLY = "This link lets you look, not draw. Ask for an edit link to change the terrain.";
+const LOCKED = "This stroke is locked. Unlock it to change it.";
+const OFF_GROUND = "Begin the line on the ground.";
+
+export class Presses {
+  readonly #c: PressContext;
+  #toldViewOnly = false;
+
+  constructor(context: PressContext) {
+    this.#c = context;
+  }
+
+  /** The main pointer went down at a device pixel. */
+  begin(e: PointerEvent, x: number, y: number): Activity {
+    const { tool, laying, strokes, grips, pointing } = this.#c;
+    const erases = e.button === ERASER && tool.value === "paint";
+    if (e.button === 1 || (e.button === 2 && e.shiftKey) || (e.button === 0 && this.#c.spaceHeld()))
+      return this.#navigate("pan", x, y);
+    if (e.button !== 0 && !erases) return this.#navigate(this.#turning(), x, y);
+    if (laying.value !== null) return this.#lay(e, x, y);
+    if (tool.value === "select") return this.#select(e, x, y);
+    if (e.pointerType === "touch" && !this.#c.fingerDraws.value) return this.#press(null);
+    if (!this.#c.canEdit()) {
+      const notice = this.#toldViewOnly ? null : VIEW_ONLY;
+      this.#toldViewOnly = true;
+      return this.#press(null, notice);
+    }
+    const handle = pointing.handle(grips.handles.value, e);
+    if (handle !== null && !erases) return this.#drag(handle, x, y);
+    const opposite = tool.value === "paint" && (erases || e.altKey);
+    if (strokes.start(tool.value, pointing.sample(e), e.pointerType === "pen", opposite)) return { kind: "draw" };
+    return this.#press(null, OFF_GROUND);
+  }
+
+  /** The pointer has left the place (x, y) where it went down: a press becomes a drag of the stroke or of the view. */
+  moved(activity: Activity, x: number, y: number): Activity {
+    if (activity.kind !== "press") return activity;
+    const { picked, navigate, notice } = activity;
+    if (notice !== null) this.#c.onMessage(notice);
+    if (picked !== null && picked.stroke.id === this.#c.selection.value) {
+      if (picked.stroke.locked) this.#c.onMessage(LOCKED);
+      else if (this.#c.canEdit()) return this.#drag({ kind: "move", position: picked.point }, x, y);
+    }
+    return this.#navigate(navigate, x, y);
+  }
+
+  /** What lies under the pointer, of what the tool shows. */
+  pick(e: PointerEvent): Picked | null {
+    if (this.#c.laying.value !== null) return null;
+    return this.#c.pointing.stroke(e, this.#c.freeze(), PICKS[this.#c.tool.value]);
+  }
+
+  #navigate(mode: NavigationMode, x: number, y: number): Activity {
+    this.#c.navigation.begin(mode, x, y);
+    return { kind: "navigate", mode };
+  }
+
+  /** Nothing yet: a click, or with movement a drag of the picked stroke or of the view, which `notice` then explains. */
+  #press(picked: Picked | null, notice: string | null = null): Activity {
+    const map = this.#c.camera.state.value.mode === "map";
+    return { kind: "press", picked, navigate: map ? "pan" : this.#turning(), notice };
+  }
+
+  #turning(): NavigationMode {
+    return this.#c.camera.state.value.mode === "fly" ? "look" : "orbit";
+  }
+
+  #select(e: PointerEvent, x: number, y: number): Activity {
+    const handle = this.#c.pointing.handle(this.#c.grips.handles.value, e);
+    return handle !== null ? this.#drag(handle, x, y) : this.#press(this.pick(e));
+  }
+
+  /** A grid is being laid: its handles, then its ground, then the view. */
+  #lay(e: PointerEvent, x: number, y: number): Activity {
+    const { grips, pointing, navigation } = this.#c;
+    const held = pointing.handle(grips.handles.value, e) ?? grips.ground(navigation.hit(x, y));
+    return held !== null && this.#c.canEdit() ? this.#drag(held, x, y) : this.#press(null);
+  }
+
+  #drag(handle: Pick<GripVisual, "kind" | "position">, x: number, y: number): Activity {
+    this.#c.grips.start(handle, x, y);
+    return { kind: "drag" };
+  }
+}
