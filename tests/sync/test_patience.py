@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import socket
 import time
@@ -117,6 +118,22 @@ def test_an_answer_that_nobody_reads_is_taken_back(tmp_path: Path) -> None:
         tcp.sendall(b"GET /large.bin HTTP/1.1\r\nHost: x\r\n\r\n")
         time.sleep(1.0)
         assert len(_ends(tcp)) < 8 << 20, "what was on its way, not the file"
+
+
+def test_a_disk_without_room_is_told(server: LiveServer, monkeypatch: pytest.MonkeyPatch) -> None:
+    """SPEC P36: of a terrain file; elevation files say so themselves (tests/importing/test_run.py)."""
+    before = sorted((server.assembly.settings.data / "grids").iterdir())
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("esker.server.terrains.read_archive", full)
+    status, error = server.http("POST", "/api/terrains/import", b"x")
+    assert (status, error["code"]) == (507, "storage")
+    assert "disk" in error["message"]
+    assert sorted((server.assembly.settings.data / "grids").iterdir()) == before
+    monkeypatch.setattr("esker.server.terrains.read_archive", lambda *_: open("/nowhere/at/all"))  # noqa: SIM115
+    assert server.http("POST", "/api/terrains/import", b"x")[0] == 500
 
 
 def test_one_server_at_a_time_has_a_data_folder(tmp_path: Path) -> None:

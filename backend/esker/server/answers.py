@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import logging
 import time
 from typing import Annotated, Final
@@ -27,6 +28,7 @@ STATUS: Final = {
     "server_error": 500,
     "shutting_down": 503,
 }
+NO_ROOM: Final = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG})
 
 
 class Problem(Exception):
@@ -64,6 +66,13 @@ def add_errors(app: FastAPI) -> None:
         code = {404: "not_found", 405: "not_allowed", 413: "too_large"}.get(error.status_code, "error")
         sentence = {404: "There is nothing at this address.", 405: "This address does not do that."}
         return answer(error.status_code, code, sentence.get(error.status_code, str(error.detail)))
+
+    @app.exception_handler(OSError)
+    async def disk(request: Request, error: OSError) -> JSONResponse:
+        if error.errno not in NO_ROOM:
+            return await failed(request, error)
+        log.error("%s %s: no room: %s", request.method, quote(request.url.path), error)
+        return answer(507, "storage", "The server has no room for this (is its disk full?).")
 
     @app.exception_handler(Exception)
     async def failed(request: Request, error: Exception) -> JSONResponse:
