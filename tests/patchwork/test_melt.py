@@ -257,3 +257,38 @@ def test_no_layers_and_no_overlap_melt_nothing() -> None:
     far = newer(anchor=(5000.0, 5000.0))
     for model in (lod_space.build([]), lod_space.build([wide()]), lod_space.build([wide(), far])):
         assert not Melt(model, SIZE).zones
+
+
+def test_differences_are_those_to_the_ground_below_as_it_was_melted() -> None:
+    """SPEC PW64: of three layers the second counts where it lies, and the first, raised to meet it, beside it."""
+    model = lod_space.build([wide(), newer(), third()])
+    points, _, difference, _ = Melt(model, SIZE).differences(2)
+    x, y = points[:, 0], points[:, 1]
+    turn = np.radians(27.0)
+    u, v = np.cos(turn) * (x - 380) + np.sin(turn) * (y - 250), -np.sin(turn) * (x - 380) + np.cos(turn) * (y - 250)
+    beyond = np.maximum(np.maximum(-u, u - (COLS - 1) * 4.0), np.maximum(-v, v - (ROWS - 1) * 4.0))
+    there, beside, far = beyond < -8, (beyond > 8) & (beyond < 16), beyond > melt_loops.RUN * 28
+    assert min(there.sum(), beside.sum(), far.sum()) > 5
+    assert np.abs(difference + 35 + 8 * np.sin(x / 150))[there].max() < 1
+    assert np.abs(difference + 35 + 8 * np.sin(x / 150))[beside].max() < 6
+    assert np.abs(difference + 15)[far].max() < 1
+
+
+def test_where_the_older_ground_ends_the_border_counts_in_part() -> None:
+    """SPEC PW63: no more than the older layer covers there, and nothing beyond."""
+    model = lod_space.build([wide(), newer(anchor=(1000.0, 300.0))])
+    found, border = Melt(model, SIZE).differences(1), border_of(model.sheets[1])
+    whole = {(x, y): w for (x, y), w in zip(border.points.tolist(), border.weight.tolist(), strict=True)}
+    share = found.weight / np.array([whole[x, y] for x, y in found.points.tolist()])
+    assert len(found.points) < len(border.points)
+    assert share.max() == pytest.approx(1)
+    assert ((share > 0.05) & (share < 0.95)).any()
+
+
+def test_what_is_taken_over_is_of_the_same_domain() -> None:
+    """SPEC PW65: the reach of a correction is a share of the domain, too."""
+    model = lod_space.build([wide(), newer(lambda x, y: hills(x, y) + 200)])
+    at = np.random.default_rng(2).uniform(200, 900, (200, 2))
+    before, fresh = Melt(model, SIZE), Melt(model, SIZE / 2)
+    assert np.array_equal(Melt(model, SIZE / 2, before).lifts(1, at), fresh.lifts(1, at))
+    assert not np.array_equal(before.lifts(1, at), fresh.lifts(1, at))
