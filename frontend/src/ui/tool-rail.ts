@@ -51,6 +51,16 @@ export class EskTools extends SignalElement {
       .icon-btn {
         font-size: 18px;
       }
+      /* A phone on its side: two columns stand between the bars at the top and the bottom, one does not. */
+      @media (max-height: 500px) and (min-width: 721px) {
+        :host {
+          display: grid;
+          grid-template-columns: auto auto;
+        }
+        hr {
+          display: none;
+        }
+      }
       @media (max-width: 720px) {
         :host {
           flex-direction: row;
