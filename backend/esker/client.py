@@ -190,7 +190,12 @@ class LiveTerrain(LiveLayers, LiveHistory):
     # --- changing -----------------------------------------------------------------------------------------------
 
     def add(self, stroke: Stroke) -> str:
-        """Adds a stroke, or replaces the one of the same id; returns the id. One undo step. Raises Refused."""
+        """Adds a stroke, or replaces the one of the same id; returns the id. One undo step.
+
+        Raises Refused, TypeError for what is no stroke, RuntimeError after ``close``.
+        """
+        if not isinstance(stroke, c.Stroke):
+            raise TypeError(f"add takes a stroke, as Stroke.profile(...) makes one, not {type(stroke).__name__}")
         gesture = f"add-{secrets.token_hex(4)}"
         with self._changed:
             exists = stroke.id in self._sync.document.strokes
@@ -282,6 +287,7 @@ class LiveTerrain(LiveLayers, LiveHistory):
             raise Refused("too_large", "This change is too large for one message.")
         with self._changed:
             self._raise_failure()
+            self._raise_closed()
             try:
                 self._sync.submit(op, gesture)
             except Refusal as refusal:
@@ -291,6 +297,7 @@ class LiveTerrain(LiveLayers, LiveHistory):
     def _travel(self, move: Callable[[], UndoPlan]) -> UndoPlan:
         with self._changed:
             self._raise_failure()
+            self._raise_closed()
             plan = move()
         self._poke()
         return plan
@@ -298,6 +305,10 @@ class LiveTerrain(LiveLayers, LiveHistory):
     def _raise_failure(self) -> None:
         if self._failure is not None:
             raise self._failure
+
+    def _raise_closed(self) -> None:
+        if self._closing:
+            raise RuntimeError("this connection was closed: connect again to change the terrain")
 
     def _await(self, ready: Callable[[], bool], timeout: float, what: str) -> None:
         with self._changed:

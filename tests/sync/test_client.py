@@ -118,6 +118,28 @@ def test_wrong_links(server: LiveServer) -> None:
         connect("http://127.0.0.1:9/t/a#b", timeout=0.3)
 
 
+def test_what_is_no_stroke_and_what_comes_after_the_end(server: LiveServer) -> None:
+    """SPEC P40: told at once, where it was written."""
+    terrain, secret = server.create()
+    live = connect(f"{server.base}/t/{terrain}#{secret}")
+    for wrong in (None, "ridge", {"kind": "profile"}, [(0, 0, 0), (1, 1, 1)]):
+        with pytest.raises(TypeError, match=r"Stroke\.profile"):
+            live.add(wrong)  # type: ignore[arg-type]
+    for flank in ("steep", (35,), 35):
+        with pytest.raises(ValueError, match="slope in degrees"):
+            esker.Stroke.profile([(0, 0, 0), (9, 9, 9)], left=flank)  # type: ignore[arg-type]
+    kept = live.add(esker.Stroke.profile([(0, 0, 0), (9, 9, 9)]))
+    live.wait()
+    live.close()
+    for change in (
+        lambda: live.add(esker.Stroke.profile([(0, 0, 0), (9, 9, 9)])),
+        lambda: live.remove(kept),
+        live.undo,
+    ):
+        with pytest.raises(RuntimeError, match="closed"):
+            change()
+
+
 def test_it_comes_back_after_a_restart_with_what_it_did_meanwhile(tmp_path: Path) -> None:
     with LiveServer(tmp_path) as server:
         terrain, secret = server.create()

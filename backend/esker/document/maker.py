@@ -90,7 +90,10 @@ def _vec(p: NDArray[np.float64]) -> Vec3:
 def _flank(side: FlankLike) -> Flank | None:
     if side is None or isinstance(side, Flank):
         return side
-    slope, extent = side
+    try:
+        slope, extent = side
+    except (TypeError, ValueError):
+        raise ValueError(f"a flank is (slope in degrees or None, extent in metres), not {side!r}") from None
     return Flank(slope_deg=None if slope is None else float(slope), extent_m=float(extent), shape="straight")
 
 
