@@ -1,0 +1,74 @@
+"""A phone, upright and on its side: nothing covers the land or another bar, fingers hit what they mean (SPEC U33)."""
+
+from __future__ import annotations
+
+from tests.e2e.conftest import Server, Visitor, Visitors
+from tests.e2e.hands import wait
+
+Box = dict[str, float]
+
+SMALL = """() => {
+  const small = [], walk = (root) => {
+    for (const e of root.querySelectorAll("*")) {
+      if (e.shadowRoot) walk(e.shadowRoot);
+      const box = e.getBoundingClientRect();
+      if (e.matches("button:not(.avatar), a") && box.height > 0 && (box.height < 40 || box.width < 40))
+        small.push([e.getAttribute("aria-label") ?? e.textContent.trim(), box.width, box.height]);
+    }
+  };
+  walk(document);
+  return small;
+}"""
+
+
+def box(visitor: Visitor, selector: str) -> Box:
+    """Where an element is, CSS pixels."""
+    found = visitor.page.locator(selector).first.bounding_box()
+    assert found is not None, selector
+    x, y = found["x"], found["y"]
+    return {"x": x, "y": y, "right": x + found["width"], "bottom": y + found["height"]}
+
+
+def apart(a: Box, b: Box) -> bool:
+    """Whether two boxes have no pixel in common."""
+    return a["right"] <= b["x"] or b["right"] <= a["x"] or a["bottom"] <= b["y"] or b["bottom"] <= a["y"]
+
+
+def bars_apart(visitor: Visitor, *names: str) -> None:
+    """All of these lie inside the window and beside each other."""
+    window = visitor.page.viewport_size
+    assert window is not None
+    boxes = {name: box(visitor, name) for name in names}
+    for name, at in boxes.items():
+        assert min(at["x"], at["y"], window["width"] - at["right"], window["height"] - at["bottom"]) >= 0, (name, at)
+        assert all(apart(at, other) for key, other in boxes.items() if key != name), (name, boxes)
+
+
+def test_a_phone_shows_the_land_beside_its_panel_and_follows_a_turn(visitors: Visitors, server: Server) -> None:
+    terrain, secret = server.create(title="Phone")
+    phone = visitors(390, 844, has_touch=True, is_mobile=True, reduced_motion="reduce")
+    phone.open(f"/t/{terrain}#{secret}")
+    bars_apart(phone, "esk-top-bar .left", "esk-top-bar .right", "esk-tools", "esk-status-line", "esk-view-bar")
+    assert phone.js(SMALL) == []
+    upright = phone.js("() => window.esker.camera().eye")
+
+    phone.page.get_by_role("button", name="Inspector").tap()
+    wait(phone, "() => window.esker.camera().height < 844 * window.devicePixelRatio * 0.7")
+    side, picture = box(phone, "aside.side"), box(phone, ".viewport canvas")
+    assert side["y"] > picture["bottom"] - 20, "the sheet lies below the picture, not on it"
+    bars_apart(phone, "esk-top-bar .right", "esk-tools", "aside.side")
+    for tab in ("Ground", "Terrain", "History"):
+        phone.page.get_by_role("radio", name=tab).tap()
+        assert box(phone, "aside.side") == side, "tabs do not make the sheet jump"
+    middle = phone.js("() => window.esker.project(2048, 2048, 0)")
+    assert middle["visible"]
+    assert middle["y"] < side["y"]
+    phone.shot("phone-sheet")
+    phone.page.get_by_role("button", name="Close the inspector").tap()
+    wait(phone, "e => JSON.stringify(window.esker.camera().eye) === JSON.stringify(e)", upright)
+
+    phone.page.set_viewport_size({"width": 844, "height": 390})
+    wait(phone, "e => JSON.stringify(window.esker.camera().eye) !== JSON.stringify(e)", upright)
+    bars_apart(phone, "esk-top-bar .left", "esk-top-bar .right", "esk-tools", "esk-status-line", "esk-view-bar")
+    phone.shot("phone-side")
+    assert phone.errors == []
