@@ -182,3 +182,26 @@ def test_sub_error_is_the_distance_to_the_parents_bilinear_surface(seed: int, am
     distance = np.abs(samples - drawn)
     want = [[np.ceil(distance[r : r + 17, c : c + 17].max()) for c in range(0, 64, 16)] for r in range(0, 64, 16)]
     assert np.array_equal(sub_error(samples, parent), np.array(want))
+
+
+CERTAIN = bytes.fromhex("2108586533084bc973db6cd071e9967bbd1f1bca0a7de8690963ef378eb1")
+LARGEST = bytes.fromhex("00000000800000000000000000000000ffffff02")
+TOO_LARGE = bytes.fromhex(
+    "0000000080000000000000033ffffffd555000115577ffffffc36bee5b2f53af9fc36bec011fbf5ef86d7e980282c800002b721fc9fff64ba6e7"
+    "2777ee57c5bfdfdb03675c8d0b97fffffb"
+)
+
+
+def test_the_ends_of_what_is_coded() -> None:
+    """SPEC T55, the page's test has the same bytes: decisions that always fall the same way, both ways; the largest
+    numbers; numbers that are too large; bytes that the decoder does not read."""
+    certain, largest = np.full((65, 65), -3), np.zeros((65, 65), dtype=np.int64)
+    largest[0, :2] = 2**32 - 1, 1 - 2**32
+    for payload, residual in ((CERTAIN, certain), (LARGEST, largest)):
+        assert entropy.encode(residual) == payload
+        found = entropy.decode(payload)
+        assert found is not None
+        assert np.array_equal(found, residual)
+    assert entropy.decode(TOO_LARGE, True) is None
+    assert entropy.decode(CERTAIN + bytes(3)) is not None
+    assert entropy.decode(CERTAIN + bytes(4)) is None

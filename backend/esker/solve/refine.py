@@ -29,7 +29,7 @@ from esker.solve.refine_cl import ClEngine
 from esker.solve.refine_engine import CHANNELS, Engine, Fields, NumpyEngine, Pending, Span, Step, step
 from esker.solve.refine_strokes import DIGEST_BYTES, Strokes
 
-LOOK_SECONDS: Final = 0.0005
+LOOK_SECONDS: Final = 0.0002
 """Between two looks at the device, and at who is in a hurry."""
 GROUP: Final = 4
 """Tiles along a side of what one step computes at most: more, and a step takes too long to be left; fewer, and the
