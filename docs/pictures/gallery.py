@@ -1,4 +1,4 @@
-"""Draws the README's pictures of the looks, of water and of the ground a metre away, with ``esker render``.
+"""Draws the README's pictures of the looks, of water and of the ground at one's feet, with ``esker render``.
 
 ``python docs/pictures/gallery.py [name ...]`` writes docs/pictures/<name>.webp; ``make pictures`` draws all of them. No
 browser and no GPU are needed; a picture takes about half a minute on two cores.
@@ -23,8 +23,8 @@ SHOTS: dict[str, list[str]] = {
     "water": ["volcanic-island", "--sun", "110,12", "--camera", "eye:3500,300,90,target:2200,1900,150"],
     "lake": ["volcanic-island", "--sun", "128,22", "--camera", "eye:2330,1660,900,target:2050,2130,500"],
     "close-up": [
-        *("alpine-ridge", "--sun", "118,25", "--refine", "9"),
-        *("--camera", "eye:1400,1640,target:1620,2500,400"),
+        *("alpine-ridge", "--sun", "222,12", "--refine", "10"),
+        *("--camera", "eye:1560,1420,target:1985,2600,372"),
     ],
     "real-crater": ["helens", "--camera", "orbit:20,22,2600,target:1450,1200,2000"],
     "real-rainier": ["rainier", "--camera", "orbit:318,9,46000,target:52000,14000,2000"],
