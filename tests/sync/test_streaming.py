@@ -77,8 +77,10 @@ def test_without_credit_the_window_closes(tmp_path: Path) -> None:
 
         reader = threading.Thread(target=read)
         reader.start()
-        for i in range(25):
-            greedy.ops((f"g:{i}", stroke(f"s{i}")))
+        count = 0
+        while count < 25 or (sum(map(len, modest.frames)) < 2.5 * window and count < 200):
+            greedy.ops((f"g:{count}", stroke(f"s{count}")))
+            count += 1  # on a busy machine more of them share a solve
             time.sleep(0.08)
         time.sleep(0.5)
         modest.say("ping", t=0)
@@ -91,7 +93,7 @@ def test_without_credit_the_window_closes(tmp_path: Path) -> None:
         assert sum(map(len, modest.frames)) > 1.5 * window, "the scene must be big enough to matter"
         assert window <= sent <= window + biggest
         ops = [o["id"] for m in greedy.seen if m["type"] == "ordered" for o in m["ops"]]
-        assert ops == [f"g:{i}" for i in range(25)]
+        assert ops == [f"g:{i}" for i in range(count)]
         # Credit opens the window, and what comes is the newest ground.
         before = len(greedy.frames)
         greedy.say("credit", bytes=sent)
