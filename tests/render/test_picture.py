@@ -16,6 +16,7 @@ from esker.render.frame import LOOKS, Scene
 from esker.render.reference import Reference
 from esker.render.surface import Surface
 from esker.render.tables import stone_mipmaps
+from esker.render.views import WALK_M, camera_of
 from esker.synthesis.detailed import DetailedTerrain
 from esker.synthesis.site import Site
 from tests.render.ground import rough_levels
@@ -117,6 +118,19 @@ def test_detail_goes_on_near_the_ground(drawer: Reference) -> None:
     assert max(level for level, _, _ in surface._made) >= 12
     assert not (picture.pixels == MAGENTA).all(axis=2).any()
     assert picture.tau_px == 1.5
+
+
+def test_an_eye_without_a_height_stands_on_the_ground_that_is_drawn() -> None:
+    """V5: on finer levels too, which lie metres above the solved ones at crests: the picture was one from below."""
+    levels = rough_levels(2, SIZE)
+    surface = Surface.of(DetailedTerrain(Site(SIZE, 7, tuple(levels))), 13)
+    places = [(900.0 + 190 * k, 3100.0 - 130 * k) for k in range(8)]
+    rises = []
+    for x, y in places:
+        camera = camera_of(f"eye:{x},{y},target:2000,2000", surface, SETTINGS, 120, 80)
+        assert camera.eye[2] == pytest.approx(surface.height_at(x, y, 13) + WALK_M)
+        rises.append(surface.height_at(x, y, 13) - surface.height_at(x, y))
+    assert max(rises) > WALK_M  # who stood on the solved ground was under it somewhere
 
 
 def test_a_tile_is_the_synthesised_window() -> None:

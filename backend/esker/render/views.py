@@ -35,7 +35,7 @@ def camera_of(
         if "target" not in parts:
             raise BadView("An eye needs a target: eye:X,Y,Z,target:X,Y,Z.")
         eye, target = _place(parts["eye"], surface, WALK_M), _place(parts["target"], surface, 0.0)
-        over = max(WALK_M, eye[2] - surface.height_at(eye[0], eye[1]))
+        over = max(WALK_M, eye[2] - _ground(surface, eye[0], eye[1]))
         try:
             return look_at(eye, target, size, width, height, clearance_m=over)
         except ValueError as error:
@@ -45,7 +45,7 @@ def camera_of(
         raise BadView("An orbit has an elevation from -89 to 90 degrees and a distance above 0 m.")
     pivot = _place(parts.get("target", [size / 2, size / 2]), surface, 0.0)
     camera = orbit(azimuth, elevation, distance, pivot, size, width, height)
-    over = max(WALK_M, camera.eye[2] - surface.height_at(camera.eye[0], camera.eye[1]))
+    over = max(WALK_M, camera.eye[2] - _ground(surface, camera.eye[0], camera.eye[1]))
     return orbit(azimuth, elevation, distance, pivot, size, width, height, clearance_m=over)
 
 
@@ -87,4 +87,9 @@ def parse(text: str) -> dict[str, list[float]]:
 def _place(numbers: list[float], surface: Surface, above: float) -> Vec3:
     if len(numbers) == 3:
         return numbers[0], numbers[1], numbers[2]
-    return numbers[0], numbers[1], surface.height_at(numbers[0], numbers[1]) + above
+    return numbers[0], numbers[1], _ground(surface, numbers[0], numbers[1]) + above
+
+
+def _ground(surface: Surface, x_m: float, y_m: float) -> float:
+    """Height of the finest ground, as it is drawn beside an eye: what levels above the solved ones add may bury one."""
+    return surface.height_at(x_m, y_m, surface.levels)
