@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from esker import grid
 from esker.contract import MAX_REFINED_LEVEL, Channel, Stroke, TerrainSettings
 from esker.fractal import PAINT_LESS, PAINT_MORE
-from esker.solve import constraints, raster, reference_raster
+from esker.solve import constraints, packing, raster, reference_raster
 from esker.solve.constraints import BIN, BinBox, Shapes, Tables, WindowPacker, bins, everything, pack
 from esker.solve.device import Device
 from esker.solve.levels import PAD, ClWorkspace, Launcher
@@ -204,7 +204,7 @@ def test_a_stroke_is_made_ready_once(monkeypatch: pytest.MonkeyPatch) -> None:
         made.append(stroke.id)
         return real(None, stroke, settings, None)
 
-    real = constraints.shape_for
+    real = packing.shape_for
     monkeypatch.setattr(constraints, "shape_for", shape_for)
     shapes, strokes = Shapes(most=5), [s.model_copy(update={"id": str(k)}) for k, s in enumerate(SCENES["five"])]
     first = [shapes.of(s, SETTINGS, None) for s in strokes]

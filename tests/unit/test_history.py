@@ -170,6 +170,19 @@ def test_a_chronicle_may_be_continued_or_begin_anywhere() -> None:
     assert [(e.action, e.first, e.last) for e in t.entries(late)] == [("reshape", 3, 4), ("name", 6, 6)]
 
 
+def test_who_undoes_half_of_an_entry_undid_that_half() -> None:
+    """HI4: two settings changed within a minute are one entry; undone one by one, the last alone is named first."""
+    t = Told_()
+    t.does("ana", c.SetTerrain(fields=c.TerrainFields(sea_level_m=10.0)), at=0)
+    t.does("ana", c.SetTerrain(fields=c.TerrainFields(lakes_m=5.0)), at=5)
+    t.does("ana", c.SetTerrain(fields=c.TerrainFields(lakes_m=None)), at=9)
+    both, undone = t.entries()
+    assert both.fields == {"sea_level_m", "lakes_m"}
+    assert undone.turn == "undo" and undone.fields == {"lakes_m"}
+    t.does("ana", c.SetTerrain(fields=c.TerrainFields(lakes_m=5.0)), at=12)
+    assert t.entries()[-1].turn == "redo" and t.entries()[-1].fields == {"lakes_m"}
+
+
 def test_a_switch_thrown_back_reads_as_what_became_of_the_thing() -> None:
     told = [
         Told(k + 1, "ann", f'{{"type":"layer.set","layer":"l","fields":{{"hidden":{hidden}}}}}', None)

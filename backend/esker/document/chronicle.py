@@ -215,7 +215,7 @@ class Chronicle:
                 top.steps = top.steps[:at]
                 if not top.steps:
                     person.done.pop()
-                return self._turned(person, told, top, "undo")
+                return self._turned(person, told, top, "undo", person.undone[-1][1])
         if person.undone:
             entry, steps = person.undone[-1]
             if _after(steps, step):
@@ -223,12 +223,22 @@ class Chronicle:
                 if not person.done or person.done[-1] is not entry:
                     person.done.append(entry)
                 entry.steps = [*entry.steps, *steps]
-                return self._turned(person, told, entry, "redo")
+                return self._turned(person, told, entry, "redo", steps)
         return None
 
-    def _turned(self, person: _Person, told: Told, of: Entry, turn: Turn) -> Entry:
+    def _turned(self, person: _Person, told: Told, of: Entry, turn: Turn, steps: list[Step]) -> Entry:
+        """``steps``: what of the entry is undone or done again. Only their fields are named."""
+        fields = of.fields & {name for step in steps for _, _, name in step} or of.fields
         entry = replace(
-            of, first=told.clock, last=told.clock, at=told.at, author=told.author, turn=turn, of=of, steps=[]
+            of,
+            first=told.clock,
+            last=told.clock,
+            at=told.at,
+            author=told.author,
+            fields=fields,
+            turn=turn,
+            of=of,
+            steps=[],
         )
         self.entries.append(entry)
         person.last = entry
@@ -300,14 +310,20 @@ def _continues(entry: Entry, action: Action, subjects: tuple[str, ...], told: To
 
 
 def _before(steps: list[Step], new: Step) -> int | None:
-    """The step before which all fields of ``new`` had the values that it gives them; None when there is none."""
+    """The step before which all fields of ``new`` had the values that it gives them; None when there is none.
+
+    Steps that changed just those fields come first: others of the entry were not taken back.
+    """
+    found: int | None = None
     for i in range(len(steps)):
         olds: dict[Key, object] = {}
         for step in reversed(steps[i:]):
             olds |= {key: old for key, (old, _) in step.items()}
         if all(key in olds and olds[key] is not _UNKNOWN and olds[key] == value for key, (_, value) in new.items()):
-            return i
-    return None
+            if olds.keys() == new.keys():
+                return i
+            found = i if found is None else found
+    return found
 
 
 def _after(steps: list[Step], new: Step) -> bool:

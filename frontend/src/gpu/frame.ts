@@ -2,7 +2,7 @@
 
 import { eyeProjection, reversedDepth, viewAxes } from "../core/eyeprojection.ts";
 import type { Scene, Vec3 } from "../core/types.ts";
-import { MAX_SYNTHESIS_LEVEL, TILE_CELLS } from "../generated/contract.ts";
+import { type Look, MAX_SYNTHESIS_LEVEL, TILE_CELLS } from "../generated/contract.ts";
 import type { Lakes } from "../tiles/lakes.ts";
 import { reliefM, shoreM, zeroM } from "../tiles/rules/rule.ts";
 import type { Atlas } from "./atlas.ts";
@@ -35,6 +35,8 @@ export interface FrameFacts {
   readonly high: number;
   /** None: no lake is drawn. */
   readonly lakes?: Lakes | null;
+  /** In which the ground is drawn, while the one that the terrain has is still being made; none: the terrain's. */
+  readonly look?: Look;
 }
 
 /** Unit vector towards the sun; azimuth clockwise from north (the y axis), degrees. */
@@ -166,7 +168,8 @@ export class FrameBindings {
     const w = this.writer;
     const { settings } = scene;
     const size = scene.tiles.sizeM;
-    const look = LOOKS[settings.look];
+    const name = facts.look ?? settings.look;
+    const look = LOOKS[name];
     const sun = sunDirection(settings.sun_azimuth_deg, settings.sun_elevation_deg);
     const relief = facts.high - facts.low;
     w.set("sun", [...sun, sun[2]]);
@@ -177,7 +180,7 @@ export class FrameBindings {
     w.set("sea", zeroM(climate));
     w.set("has_sea", settings.sea_level_m === null ? 0 : 1);
     w.set("has_lakes", lakes === null ? 0 : 1);
-    w.set("exposure", look.exposure * (settings.look === "paper" ? 1 : adaptation(settings.sun_elevation_deg)));
+    w.set("exposure", look.exposure * (name === "paper" ? 1 : adaptation(settings.sun_elevation_deg)));
     w.set("haze", look.haze / size);
     w.set("low", facts.low);
     w.set("high", facts.high);

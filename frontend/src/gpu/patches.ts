@@ -18,8 +18,8 @@ import {
 } from "../tiles/records.ts";
 import type { Cut } from "../tiles/selection.ts";
 import type { Round } from "./hidden.ts";
-import { createPass, describePass, GrowingBuffer, type PassContext } from "./pipeline.ts";
-import { sceneSource, terrainSource } from "./shaders.ts";
+import { createPass, describePass, GrowingBuffer, type PassContext, type PassOptions } from "./pipeline.ts";
+import { type Detail, sceneSource, terrainSource } from "./shaders.ts";
 
 /** Row stride of the vertex numbering; not the vertex count, so that small vertex caches do not thrash (DESIGN 9). */
 export const PITCH = 20;
@@ -104,6 +104,18 @@ export function wavesOf({ samples }: Lakes, sizeM: number): Map<number, number> 
   );
 }
 
+/** The pipeline that draws the ground in a look. */
+function groundOf(look: Look, detail: Detail): PassOptions {
+  return {
+    label: `terrain ${look}`,
+    code: terrainSource(look, detail),
+    vertex: "terrain_vertex",
+    fragment: "terrain_fragment",
+    buffers: [RECORD_LAYOUT],
+    vertexConstants: { PITCH },
+  };
+}
+
 /** The cut on the device, drawn by the ground, water and wall pipelines. */
 export class PatchPasses {
   private readonly records: GrowingBuffer;
@@ -119,6 +131,7 @@ export class PatchPasses {
   private readonly looks = new Map<Look, GPURenderPipeline>();
   private readonly coming = new Set<Look>();
   private terrain: GPURenderPipeline | null = null;
+  private look: Look | null = null;
   private recordBuffer: GPUBuffer | null = null;
   private wallBuffer: GPUBuffer | null = null;
 
@@ -165,35 +178,28 @@ export class PatchPasses {
 
   /**
    * Makes the ground's pipeline of a look the current one. The first is made at once; a later one in the background, while
-   * the last look goes on. Returns false until the look is there.
+   * the last look goes on. Returns the look that is drawn.
    */
-  useLook(look: Look): boolean {
+  useLook(look: Look): Look {
     const ready = this.looks.get(look);
     if (ready !== undefined) {
       this.terrain = ready;
-      return true;
-    }
-    if (this.coming.has(look)) return false;
-    const options = {
-      label: `terrain ${look}`,
-      code: terrainSource(look, this.context.detail),
-      vertex: "terrain_vertex",
-      fragment: "terrain_fragment",
-      buffers: [RECORD_LAYOUT],
-      vertexConstants: { PITCH },
-    };
-    if (this.terrain === null) {
-      this.terrain = this.context.device.createRenderPipeline(describePass(this.context, options));
+      this.look = look;
+    } else if (this.look === null) {
+      this.terrain = this.context.device.createRenderPipeline(
+        describePass(this.context, groundOf(look, this.context.detail)),
+      );
       this.looks.set(look, this.terrain);
-      return true;
+      this.look = look;
+    } else if (!this.coming.has(look)) {
+      this.coming.add(look);
+      createPass(this.context, groundOf(look, this.context.detail)).then(
+        (pipeline) => this.looks.set(look, pipeline),
+        // A lost device: the renderer's `lost` tells.
+        () => this.coming.delete(look),
+      );
     }
-    this.coming.add(look);
-    createPass(this.context, options).then(
-      (pipeline) => this.looks.set(look, pipeline),
-      // A lost device: the renderer's `lost` tells.
-      () => this.coming.delete(look),
-    );
-    return false;
+    return this.look;
   }
 
   /** Uploads the cut and the water on it. */

@@ -271,9 +271,11 @@ export class GpuRenderer implements SceneRenderer {
     const encoder = device.createCommandEncoder({ label: "frame" });
     const { cut, uploads, selectMs } = this.prepare(encoder, scene, world, quality, how.moved);
     const { lakes, heights } = this.lakes;
-    this.passes.frame.update(scene, { width, height, low: cut.minHeight, high: cut.maxHeight, lakes });
+    // Sky, haze and exposure change with the ground: they would show another place while its shader is made.
+    const look = this.passes.patches.useLook(scene.settings.look);
+    this.lookDue = look !== scene.settings.look;
+    this.passes.frame.update(scene, { width, height, low: cut.minHeight, high: cut.maxHeight, lakes, look });
     this.passes.patches.update(cut, { sizeM: scene.tiles.sizeM, seaM: scene.settings.sea_level_m, lakes, heights });
-    this.lookDue = !this.passes.patches.useLook(scene.settings.look);
     const unit = quality.scale * pixelRatio();
     this.passes.ribbons.update(scene.showStrokes ? scene.strokes : [], scene.ghost, unit, scene.footprints);
     this.passes.sheet.update(scene.sheet ?? null);

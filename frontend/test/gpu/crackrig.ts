@@ -309,7 +309,8 @@ export async function picture(rig: Rig, world: World, scene: Scene, tau: number,
   if (full) {
     lightUp(rig, world, encoder, scene.tiles.sizeM, cut.top);
     rig.patches.update(cut);
-    while (!rig.patches.useLook(scene.settings.look)) await new Promise((done) => setTimeout(done, 10));
+    while (rig.patches.useLook(scene.settings.look) !== scene.settings.look)
+      await new Promise((done) => setTimeout(done, 10));
     const pixels = await rig.full.draw(encoder, rig.depth, (pass) => {
       pass.setBindGroup(0, rig.frame.bindGroup);
       rig.frame.widen(pass);
