@@ -178,9 +178,12 @@ def test_who_undoes_half_of_an_entry_undid_that_half() -> None:
     t.does("ana", c.SetTerrain(fields=c.TerrainFields(lakes_m=None)), at=9)
     both, undone = t.entries()
     assert both.fields == {"sea_level_m", "lakes_m"}
-    assert undone.turn == "undo" and undone.fields == {"lakes_m"}
+    assert undone.turn == "undo"
+    assert undone.fields == {"lakes_m"}
     t.does("ana", c.SetTerrain(fields=c.TerrainFields(lakes_m=5.0)), at=12)
-    assert t.entries()[-1].turn == "redo" and t.entries()[-1].fields == {"lakes_m"}
+    again = t.entries()[-1]
+    assert again.turn == "redo"
+    assert again.fields == {"lakes_m"}
 
 
 def test_a_switch_thrown_back_reads_as_what_became_of_the_thing() -> None:
