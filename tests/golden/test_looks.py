@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from PIL import Image
 from playwright.sync_api import Page
 
@@ -54,6 +55,22 @@ SHOTS: dict[str, dict[str, Any]] = {
 def page() -> Iterator[Page]:
     with open_harness() as opened:
         yield opened
+
+
+def _pixels(data_url: str) -> NDArray[np.int64]:
+    data = base64.b64decode(data_url.split(",")[1])
+    return np.asarray(Image.open(io.BytesIO(data)).convert("RGB")).astype(np.int64)
+
+
+def test_sky_and_ground_take_a_look_together(page: Page) -> None:
+    """R14: the sky waits for the ground, whose shader takes seconds to make (it is not made yet: this comes first)."""
+    shot = {**SHOTS["natural"], "width": 160, "height": 100}
+    sky = np.s_[:20]
+    before = _pixels(page.evaluate("shot => esker.picture(shot)", shot))[sky]
+    first = _pixels(page.evaluate("shot => esker.firstIn(shot, 'desert')", shot))[sky]
+    after = _pixels(page.evaluate("shot => esker.picture(shot)", {**shot, "settings": {"look": "desert"}}))[sky]
+    assert np.abs(first - before).max() <= 1
+    assert np.abs(after - before).mean() > 2
 
 
 @pytest.mark.parametrize("name", list(SHOTS))

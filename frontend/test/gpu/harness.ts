@@ -241,6 +241,16 @@ async function picture(shot: Shot): Promise<string> {
   return canvas.toDataURL("image/png");
 }
 
+/** The first picture after a shot got another look, PNG data URL; what the look needs is not made yet. */
+async function firstIn(shot: Shot, look: TerrainSettings["look"]): Promise<string> {
+  await shoot(shot);
+  const used = await rendererFor(shot);
+  const canvas = document.querySelector<HTMLCanvasElement>(`#${canvasOf(shot)}`)!;
+  const changed = { ...shot, settings: { ...shot.settings, look } };
+  used.render(scene(changed, shot.width ?? 1280, shot.height ?? 720));
+  return canvas.toDataURL("image/png");
+}
+
 /** Draws `frames` frames of a circling camera, waiting for the device after each; milliseconds per frame. */
 async function circle(shot: Shot, frames: number): Promise<{ ms: number; patches: number }> {
   const used = await rendererFor(shot);
@@ -286,6 +296,7 @@ Object.assign(globalThis, {
     load,
     shoot,
     picture,
+    firstIn,
     circle,
     crackTest,
     deepCrackTest,
