@@ -243,11 +243,12 @@ async function picture(shot: Shot): Promise<string> {
 
 /** The first picture after a shot got another look, PNG data URL; what the look needs is not made yet. */
 async function firstIn(shot: Shot, look: TerrainSettings["look"]): Promise<string> {
-  await shoot(shot);
   const used = await rendererFor(shot);
   const canvas = document.querySelector<HTMLCanvasElement>(`#${canvasOf(shot)}`)!;
-  const changed = { ...shot, settings: { ...shot.settings, look } };
-  used.render(scene(changed, shot.width ?? 1280, shot.height ?? 720));
+  const changed = scene({ ...shot, settings: { ...shot.settings, look } }, shot.width ?? 1280, shot.height ?? 720);
+  // A frame that was skipped reports the figures of the last one.
+  const { cpuMs } = await shoot(shot);
+  while (used.render(changed).cpuMs === cpuMs) await new Promise((done) => setTimeout(done, 8));
   return canvas.toDataURL("image/png");
 }
 
