@@ -43,7 +43,7 @@ DROP = """([name, text]) => {
 TOLERANCE = quantum(DEFAULT_LEVEL, DEFAULT_SIZE_M)
 SURVEY_M = 10.0
 """Spacing of the first survey."""
-IMPORTED_S = 120
+IMPORTED_S = 240
 """A file is read by another process; in a clean checkout the first one also compiles the loops that lay it."""
 CRATER = (1990.0, 1900.0)
 
