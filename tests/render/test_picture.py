@@ -49,7 +49,7 @@ def inward(surface: Surface, seed: int, count: int) -> list[Camera]:
         away = rng.uniform(0.2, 1.0) * up
         turn = rng.uniform(0, 2 * np.pi)
         target = (x + away * np.cos(turn), y + away * np.sin(turn), eye[2] - 1.2 * up)
-        found.append(look_at(eye, target, SIZE, 160, 120, clearance_m=up))
+        found.append(look_at(eye, target, SIZE, 160, 120))
     return found
 
 
@@ -113,7 +113,7 @@ def test_detail_goes_on_near_the_ground(drawer: Reference) -> None:
     terrain = DetailedTerrain(Site(SIZE, 7, tuple(levels)))
     surface = Surface.of(terrain, 13)
     z = surface.height_at(2000, 2000, 13)
-    camera = look_at((2000, 2000, z + 1.0), (2000.4, 2000.3, z), SIZE, 120, 80, clearance_m=1.0)
+    camera = look_at((2000, 2000, z + 1.0), (2000.4, 2000.3, z), SIZE, 120, 80)
     picture = drawer.draw(surface, Scene(SETTINGS, camera, 1.5), bare=True)
     assert max(level for level, _, _ in surface._made) >= 12
     assert not (picture.pixels == MAGENTA).all(axis=2).any()

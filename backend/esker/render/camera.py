@@ -14,6 +14,8 @@ Floats = NDArray[np.float64]
 
 FOV_DEG: Final = 45.0
 """Vertical field of view."""
+NEAR_M: Final = 0.1
+"""The near plane, metres; nearer on small models. Reversed depth loses no precision by it."""
 HOME_HEADING_DEG: Final = 25.0
 HOME_PITCH_DEG: Final = -16.0
 HOME_ELEVATION_DEG: Final = 19.0
@@ -105,18 +107,17 @@ def part(m: Floats, camera: Camera, left: int, top: int, width: int, height: int
     return out
 
 
-def look_at(
-    eye: Vec3, target: Vec3, size_m: float, width: int, height: int, *, clearance_m: float = math.inf
-) -> Camera:
-    """A perspective camera. ``clearance_m``: height of the eye over the ground, which bounds the near plane.
+def look_at(eye: Vec3, target: Vec3, size_m: float, width: int, height: int) -> Camera:
+    """A perspective camera; metres, and pixels for ``width`` and ``height``.
 
+    The near plane is the page's: as near as eyes come to the ground (``views.standing_room``), however far they look.
     Raises ValueError where eye and target are the same place.
     """
     away = math.dist(eye, target)
     if away < 1e-6:
         raise ValueError("The eye and what it looks at are the same place.")
     reach = math.hypot(eye[0] - size_m / 2, eye[1] - size_m / 2, eye[2]) + 2 * size_m
-    near = max(min(0.1, size_m / 4096), min(away * 0.02, clearance_m * 0.25))
+    near = min(NEAR_M, size_m / 4096)
     steep = abs(target[2] - eye[2]) / away
     return Camera(
         eye, target, width, height, near, 2 * reach, (0.0, 1.0, 0.0) if steep > _STEEPEST else (0.0, 0.0, 1.0)
@@ -124,21 +125,13 @@ def look_at(
 
 
 def orbit(
-    azimuth_deg: float,
-    elevation_deg: float,
-    distance_m: float,
-    pivot: Vec3,
-    size_m: float,
-    width: int,
-    height: int,
-    *,
-    clearance_m: float = math.inf,
+    azimuth_deg: float, elevation_deg: float, distance_m: float, pivot: Vec3, size_m: float, width: int, height: int
 ) -> Camera:
     """A camera that looks at ``pivot``. ``azimuth_deg``: where it stands, clockwise from north (180: in the south)."""
     a, e = math.radians(azimuth_deg), math.radians(elevation_deg)
     flat = distance_m * math.cos(e)
     eye = (pivot[0] + flat * math.sin(a), pivot[1] + flat * math.cos(a), pivot[2] + distance_m * math.sin(e))
-    return look_at(eye, pivot, size_m, width, height, clearance_m=clearance_m)
+    return look_at(eye, pivot, size_m, width, height)
 
 
 def home(
@@ -171,7 +164,7 @@ def home(
         distance = float(fitted)
         pivot = np.array([half, half, ground_m + lift * distance])
     eye = _vec(pivot - forward * distance)
-    return look_at(eye, _vec(pivot), size_m, width, height, clearance_m=size_m / 4)
+    return look_at(eye, _vec(pivot), size_m, width, height)
 
 
 def _unit(v: NDArray[np.floating]) -> Floats:

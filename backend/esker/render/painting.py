@@ -58,7 +58,7 @@ def camera_for(stage: Stage, width: int, height: int) -> Camera:
         low = max(low, min(settings.sea_level_m, high))
     pivot = (size / 2, size / 2, low + SIGHT_HEIGHT * (high - low))
     azimuth, distance = settings.sun_azimuth_deg + BESIDE_SUN_DEG, DISTANCE * size
-    return orbit(azimuth, ELEVATION_DEG, distance, pivot, size, width, height, clearance_m=size / 20)
+    return orbit(azimuth, ELEVATION_DEG, distance, pivot, size, width, height)
 
 
 def picture(

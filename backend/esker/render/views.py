@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import re
+from collections.abc import Callable
 from typing import Final
 
 from esker.contract import TerrainSettings
@@ -10,10 +12,13 @@ from esker.render.camera import HOME_HEADING_DEG, Camera, Land, Vec3, home, look
 from esker.render.surface import Surface
 
 WALK_M: Final = 1.7
-"""Height of the eye where only a place on the ground is given."""
+"""Height of the eye where only a place on the ground is given, metres; lower on small models."""
+ROOM_M: Final = 0.45
+"""Room that such an eye has to all sides: the page's (frontend/src/core/camerafloor.ts)."""
 HELP: Final = (
     "home, home:HEADING, orbit:AZIMUTH,ELEVATION,DISTANCE (degrees, metres; where the eye stands, seen from the "
-    "middle or from target:X,Y,Z), or eye:X,Y,Z,target:X,Y,Z; without a Z the eye stands on the ground"
+    "middle or from target:X,Y,Z, lifted out of the ground), or eye:X,Y,Z,target:X,Y,Z; without a Z the eye stands on "
+    "the ground"
 )
 _PART: Final = re.compile(r"(home|orbit|eye|target)(?::([^:a-z]*))?")
 
@@ -34,19 +39,31 @@ def camera_of(
     if "eye" in parts:
         if "target" not in parts:
             raise BadView("An eye needs a target: eye:X,Y,Z,target:X,Y,Z.")
-        eye, target = _place(parts["eye"], surface, WALK_M), _place(parts["target"], surface, 0.0)
-        over = max(WALK_M, eye[2] - _ground(surface, eye[0], eye[1]))
+        eye, target = _place(parts["eye"], surface, standing_room), _place(parts["target"], surface, _ground)
         try:
-            return look_at(eye, target, size, width, height, clearance_m=over)
+            return look_at(eye, target, size, width, height)
         except ValueError as error:
             raise BadView(str(error)) from None
     azimuth, elevation, distance = parts["orbit"]
     if not -89.0 <= elevation <= 90.0 or not 0 < distance <= 1e6:
         raise BadView("An orbit has an elevation from -89 to 90 degrees and a distance above 0 m.")
-    pivot = _place(parts.get("target", [size / 2, size / 2]), surface, 0.0)
+    pivot = _place(parts.get("target", [size / 2, size / 2]), surface, _ground)
     camera = orbit(azimuth, elevation, distance, pivot, size, width, height)
-    over = max(WALK_M, camera.eye[2] - _ground(surface, camera.eye[0], camera.eye[1]))
-    return orbit(azimuth, elevation, distance, pivot, size, width, height, clearance_m=over)
+    x, y, z = camera.eye
+    lowest = standing_room(surface, x, y)
+    return camera if z >= lowest else look_at((x, y, lowest), pivot, size, width, height)
+
+
+def standing_room(surface: Surface, x_m: float, y_m: float) -> float:
+    """The least height at which an eye has room, metres: over the finest ground below it, and over what rises close
+    beside it, where the near plane would else reach into a slope or a wall. Twin of camerafloor.ts."""
+    size = surface.size_m
+    room = min(ROOM_M, size / 400)
+    lowest = _ground(surface, x_m, y_m) + min(WALK_M, size / 100)
+    for k in range(8):
+        east, north = math.cos(k * math.pi / 4), math.sin(k * math.pi / 4)
+        lowest = max(lowest, _ground(surface, x_m + room * east, y_m + room * north) + room)
+    return lowest
 
 
 def turned(text: str, degrees: float) -> str:
@@ -84,10 +101,9 @@ def parse(text: str) -> dict[str, list[float]]:
     return found
 
 
-def _place(numbers: list[float], surface: Surface, above: float) -> Vec3:
-    if len(numbers) == 3:
-        return numbers[0], numbers[1], numbers[2]
-    return numbers[0], numbers[1], _ground(surface, numbers[0], numbers[1]) + above
+def _place(numbers: list[float], surface: Surface, without_z: Callable[[Surface, float, float], float]) -> Vec3:
+    x, y, *z = numbers
+    return x, y, z[0] if z else without_z(surface, x, y)
 
 
 def _ground(surface: Surface, x_m: float, y_m: float) -> float:
