@@ -123,7 +123,7 @@ def _interfaces() -> Iterable[str]:
         yield "\n".join([*lines, "}"])
 
 
-_SENT = {"Hello", "View", "Presence", "Rename", "ImportAnswers"}
+_SENT = {"Hello", "View", "Presence", "Rename", "ImportAnswers", "ExportWish"}
 """Messages that the page only sends: their defaults may be left out. All other values carry every field."""
 
 
@@ -140,6 +140,7 @@ def _unions() -> Iterable[str]:
         "Rule",
         "Role",
         "Which",
+        "ExportFormat",
         "RejectCode",
         "CloseCode",
     ):

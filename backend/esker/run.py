@@ -22,6 +22,8 @@ from websockets.protocol import State
 from esker import contract as c
 from esker.document.ops import Limits
 from esker.elevation import Elevation
+from esker.exports import run as exporting
+from esker.exports.service import Exports, Plant
 from esker.http_protocol import HttpProtocol
 from esker.importing import run as importing
 from esker.imports import Imports
@@ -148,6 +150,7 @@ class Assembly:
         self._backups: _Backups | None = None
         self.imports: Imports | None = None
         """Once there is a server."""
+        self.exports: Exports | None = None
         try:
             self._open(make_solver or self._solver)
         except BaseException:
@@ -203,7 +206,10 @@ class Assembly:
             self.settings.public_url.rstrip("/") if self.settings.public_url else None,
         )
         self.imports = Imports(self.hub, self._grids, importing, quota_bytes=self.settings.grid_quota_mb << 20)
-        app = create_app(self.hub, self.settings.page, self.settings.data, pictures, self._grids, self.imports)
+        settings = self.settings
+        plant = Plant(settings.device, settings.threads, settings.level, settings.refine)
+        self.exports = Exports(self.hub, settings.data / "exports", self._grids.folder, exporting.make, plant)
+        app = create_app(self.hub, settings.page, settings.data, pictures, self._grids, self.imports, self.exports)
 
         async def started() -> None:
             if announce:

@@ -27,14 +27,14 @@ LAYERS: tuple[frozenset[str], ...] = (
     frozenset({"templates"}),
     frozenset({"solve", "tiles", "store", "settings", "synthesis"}),
     frozenset({"terrain_layers"}),
-    frozenset({"session", "terrain"}),
+    frozenset({"session", "terrain", "exports"}),
     frozenset({"ground"}),
     frozenset(
         {"client", "client_history", "client_layers", "elevation", "imports", "tls", "headers", "upload", "render"}
     ),
     frozenset({"server"}),
     frozenset({"run"}),
-    frozenset({"bench", "history_command"}),
+    frozenset({"bench", "history_command", "export_command"}),
     frozenset({"cli"}),
     frozenset({"__main__"}),
 )
@@ -47,7 +47,7 @@ FORBIDDEN |= {(room, other) for room in ("session", "tiles", "solve") for other 
 ONLY = {
     "pyopencl": {"solve", "synthesis", "patchwork"},
     "numba": {"patchwork", "tiles"},
-    "rasterio": {"importing"},
+    "rasterio": {"importing", "exports"},
     "pyproj": {"importing"},
     "fastapi": {"server"},
     "starlette": {"server"},

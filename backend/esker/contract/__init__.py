@@ -13,5 +13,6 @@ from esker.contract.values import *  # noqa: F403
 from esker.contract.document import *  # noqa: F403
 from esker.contract.operations import *  # noqa: F403
 from esker.contract.imports import *  # noqa: F403
+from esker.contract.exports import *  # noqa: F403
 from esker.contract.messages import *  # noqa: F403
 from esker.contract.frames import *  # noqa: F403

@@ -10,10 +10,12 @@ from typing import Final
 
 from fastapi import FastAPI
 
+from esker.exports.service import Exports
 from esker.headers import Headers
 from esker.imports import Imports
 from esker.server.answers import add_errors
 from esker.server.bodies import Bodies
+from esker.server.exports import add_exports
 from esker.server.history import add_history
 from esker.server.imports import add_imports
 from esker.server.links import add_links
@@ -35,13 +37,16 @@ IMPORTS: Final = (1 / 6, 20)
 """Elevation files by address."""
 
 
-def create_app(hub: Hub, page: Path, data: Path, pictures: Pictures, grids: GridStore, imports: Imports) -> FastAPI:
+def create_app(
+    hub: Hub, page: Path, data: Path, pictures: Pictures, grids: GridStore, imports: Imports, exports: Exports
+) -> FastAPI:
     """The application over an open hub. ``page``: the built front-end; ``data``: where the LAN certificate lies."""
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:  # noqa: ARG001
         yield
         await imports.close()
+        await exports.close()
         await pictures.previews.close()
         await hub.close()
 
@@ -63,6 +68,7 @@ def create_app(hub: Hub, page: Path, data: Path, pictures: Pictures, grids: Grid
     add_errors(app)
     add_imports(app, hub, grids, imports)
     add_terrains(app, hub, grids)
+    add_exports(app, exports)
     add_history(app, hub, grids)
     add_links(app, hub)
     add_socket(app, hub)

@@ -188,6 +188,20 @@ export const WS_CLOSE = {
   shutting_down: 4501,
 } as const;
 
+export const EXPORT_LEVELS = {
+  257: 2,
+  505: 3,
+  513: 3,
+  1009: 4,
+  1025: 4,
+  2017: 5,
+  2049: 5,
+  4033: 6,
+  4097: 6,
+} as const;
+
+export const EXPORT_MESH_SAMPLES = 1025 as const;
+
 export const FRAME_MAGIC = 19283 as const;
 
 export const FRAME_SETTLED = 1 as const;
@@ -478,6 +492,14 @@ export type Role =
 export type Which =
   | "first"
   | "last";
+
+export type ExportFormat =
+  | "png16"
+  | "r16"
+  | "geotiff"
+  | "npy"
+  | "glb"
+  | "masks";
 
 export type RejectCode =
   | "malformed"
@@ -789,6 +811,30 @@ export interface ImportAnswers {
   name?: string | null;
   source?: string | null;
   licence?: string | null;
+}
+
+export interface ExportWish {
+  format: "png16" | "r16" | "geotiff" | "npy" | "glb" | "masks";
+  samples?: number;
+  detail?: boolean;
+  at?: number | null;
+}
+
+export interface ExportEstimate {
+  bytes: number;
+  seconds: number;
+}
+
+export interface ExportStatus {
+  id: string;
+  stage: "waiting" | "solving" | "detail" | "writing" | "done" | "failed" | "cancelled";
+  share: number;
+  text: string;
+  file: string;
+  bytes: number;
+  low_m: number;
+  high_m: number;
+  spacing_m: number;
 }
 
 export interface Hello {

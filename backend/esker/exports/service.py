@@ -1,0 +1,241 @@
+"""All exports of one server: who may, how many at once, how long what was made is kept."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import re
+import secrets
+import shutil
+import time
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, NamedTuple
+
+from esker import contract as c
+from esker.contract import ExportStage, ExportStatus, ExportWish
+from esker.exports import formats, wire
+from esker.exports.run import FAILED, ExportFailed, Progress
+from esker.session.core import Denied
+from esker.session.hub import Hub
+from esker.store.access import Link
+
+log = logging.getLogger("esker.exports")
+
+OPEN: Final = 12
+"""Exports that wait or are made at a time, of the whole server; one is made, the others wait for their turn."""
+OPEN_IN_ROOM: Final = 4
+KEPT_SECONDS: Final = 10 * 60.0
+"""How long a file, or why there is none, can be asked for."""
+KEPT_BYTES: Final = 1 << 30
+"""Of all files together; the oldest go."""
+SPARE_BYTES: Final = 64 << 20
+"""Of the disk, left free beside an export."""
+STEM: Final = 48
+OVER: Final = frozenset({"done", "failed", "cancelled"})
+WAITING: Final = "Waiting for its turn."
+
+Maker = Callable[[wire.Task, Progress], Awaitable[wire.Made]]
+
+
+class Cannot(Exception):
+    """An export that cannot begin, or is not there: HTTP status, code, and a sentence."""
+
+    def __init__(self, status: int, code: str, message: str) -> None:
+        super().__init__(message)
+        self.status, self.code, self.message = status, code, message
+
+
+class Plant(NamedTuple):
+    """How this server solves: device and threads for ``Solver``, its global and its finest refined level."""
+
+    device: str | None = None
+    threads: int | None = None
+    level: int = c.DEFAULT_LEVEL
+    refine: int = c.DEFAULT_REFINED_LEVEL
+
+
+class Finished(NamedTuple):
+    """A file to be sent."""
+
+    path: Path
+    name: str
+    media: str
+
+
+@dataclass(eq=False)
+class Job:
+    """One export from its beginning until it is forgotten."""
+
+    id: str
+    terrain: str
+    link: str
+    person: str
+    """Of whom one export at a time is taken."""
+    wish: ExportWish
+    folder: Path
+    status: ExportStatus
+    task: asyncio.Task[None] | None = None
+    ended: float = 0.0
+
+    @property
+    def over(self) -> bool:
+        """Whether nothing will change any more."""
+        return self.status.stage in OVER
+
+    def at(self, stage: ExportStage, **fields: object) -> None:
+        """Where it stands now; the end is the end."""
+        if not self.over:
+            self.status = self.status.model_copy(update={"stage": stage, **fields})
+
+
+class Exports:
+    """All exports of one server. Lives in the event loop."""
+
+    def __init__(
+        self,
+        hub: Hub,
+        folder: Path,
+        grids: Path,
+        maker: Maker,
+        plant: Plant = Plant(),  # noqa: B008  (immutable)
+        *,
+        now: Callable[[], float] = time.monotonic,
+        kept_seconds: float = KEPT_SECONDS,
+        kept_bytes: int = KEPT_BYTES,
+    ) -> None:
+        """``folder``: for what is made; what an earlier server left there is removed. ``grids``: where the rasters of
+        layers lie, by digest. ``maker``: ``run.make``, or another for tests. Raises OSError."""
+        self._hub, self._folder, self._grids, self._maker, self._plant = hub, folder, grids, maker, plant
+        self._now, self._kept_seconds, self._kept_bytes = now, kept_seconds, kept_bytes
+        self._jobs: dict[str, Job] = {}
+        self._turn = asyncio.Semaphore(1)
+        self._closing = False
+        shutil.rmtree(folder, ignore_errors=True)
+
+    # --- for routes ---------------------------------------------------------------------------------------------
+
+    async def begin(self, terrain: str, link: Link, person: str, wish: ExportWish) -> ExportStatus:
+        """Begins an export, or has it wait for its turn; it goes on by itself. Raises Cannot, Denied, OSError."""
+        if sentence := formats.refusal(wish):
+            raise Cannot(400, "malformed", sentence)
+        self._check(terrain, person)
+        document = await self._hub.document(terrain, wish.at)
+        self._check(terrain, person)  # others may have come meanwhile
+        job_id = secrets.token_urlsafe(9)
+        folder = self._folder / job_id
+        folder.mkdir(parents=True)
+        try:
+            room = formats.free_bytes(self._folder) - SPARE_BYTES - 2 * formats.estimate(wish).bytes
+            if room < 0:
+                raise Cannot(507, "storage", "The server has no room for this file (is its disk full?).")
+        except BaseException:
+            shutil.rmtree(folder, ignore_errors=True)
+            raise
+        status = ExportStatus(id=job_id, stage="waiting", text=WAITING if self._turn.locked() else "")
+        job = self._jobs[job_id] = Job(job_id, terrain, link.id, person, wish, folder, status)
+        job.task = asyncio.create_task(self._run(job, self._task(job, document)))
+        return job.status
+
+    def status(self, terrain: str, job_id: str, link: Link) -> ExportStatus:
+        """Where an export stands. Raises Cannot."""
+        return self._own(terrain, job_id, link).status
+
+    async def cancel(self, terrain: str, job_id: str, link: Link) -> None:
+        """Stops an export, or removes its file. Harmless when it is over. Raises Cannot."""
+        job = self._own(terrain, job_id, link)
+        if job.task is not None and not job.task.done():
+            job.task.cancel()
+            await asyncio.gather(job.task, return_exceptions=True)
+        self._forget(job)
+
+    def file(self, terrain: str, job_id: str, link: Link) -> Finished:
+        """What an export made. Raises Cannot: there is none (yet)."""
+        job = self._own(terrain, job_id, link)
+        if job.status.stage != "done":
+            raise Cannot(409, "not_done", "This export is not done.")
+        return Finished(job.folder / job.status.file, job.status.file, formats.FORMATS[job.wish.format].media)
+
+    async def close(self) -> None:
+        """Stops all exports and removes what was made."""
+        self._closing = True
+        tasks = [job.task for job in self._jobs.values() if job.task is not None]
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+        for job in list(self._jobs.values()):
+            self._forget(job)
+        shutil.rmtree(self._folder, ignore_errors=True)
+
+    # --- the work -----------------------------------------------------------------------------------------------
+
+    def _check(self, terrain: str, person: str) -> None:
+        self._forget_old()
+        if self._closing:
+            raise Cannot(503, "shutting_down", "The server is stopping.")
+        going = [job for job in self._jobs.values() if not job.over]
+        if any(job.person == person for job in going):
+            raise Cannot(409, "busy", "Another export of yours is still being made. Wait for it, or cancel it.")
+        if len(going) >= OPEN or sum(job.terrain == terrain for job in going) >= OPEN_IN_ROOM:
+            raise Cannot(503, "busy", "Many exports are being made just now. Try again in a few minutes.")
+
+    def _task(self, job: Job, document: c.Document) -> wire.Task:
+        plant = self._plant
+        stem = re.sub(r"[\W_]+", "-", document.settings.title)[:STEM].strip("-").lower() or "terrain"
+        return wire.Task(
+            document=document.model_copy(update={"deleted": (), "deleted_layers": ()}),
+            wish=job.wish,
+            grids=str(self._grids.resolve()),
+            folder=str(job.folder.resolve()),
+            name=f"{stem}-{job.wish.samples}",
+            device=plant.device,
+            threads=plant.threads,
+            global_level=plant.level,
+            refined_level=plant.refine,
+        )
+
+    async def _run(self, job: Job, task: wire.Task) -> None:
+        started = self._now()
+        try:
+            async with self._turn:
+                job.at("solving", text="")
+                made = await self._maker(task, lambda stage, share: job.at(stage, share=share))
+            told = made.model_dump(exclude={"type"})
+            job.at("done", share=1.0, **told)
+            log.info("export %s of %s in %.1f s", made.file, job.terrain, self._now() - started)
+        except asyncio.CancelledError:
+            job.at("cancelled", text="The export was cancelled.")
+        except (ExportFailed, Denied) as error:
+            job.at("failed", text=str(error)[:240])
+        except Exception:
+            log.exception("the export of %s failed", job.terrain)
+            job.at("failed", text=FAILED)
+        job.ended = self._now()
+        if job.status.stage != "done":
+            shutil.rmtree(job.folder, ignore_errors=True)
+        self._forget_old()
+        if not self._closing:
+            asyncio.get_running_loop().call_later(self._kept_seconds + 1.0, self._forget_old)
+
+    def _forget_old(self) -> None:
+        """Removes what was kept long enough, and the oldest files beyond ``kept_bytes``, never the newest."""
+        late = self._now() - self._kept_seconds
+        over = sorted((job for job in self._jobs.values() if job.over), key=lambda job: job.ended)
+        kept = sum(job.status.bytes for job in over)
+        for job in over:
+            if job.ended < late or (kept > self._kept_bytes and job is not over[-1]):
+                kept -= job.status.bytes
+                self._forget(job)
+
+    def _forget(self, job: Job) -> None:
+        self._jobs.pop(job.id, None)
+        shutil.rmtree(job.folder, ignore_errors=True)
+
+    def _own(self, terrain: str, job_id: str, link: Link) -> Job:
+        job = self._jobs.get(job_id)
+        if job is None or job.terrain != terrain:
+            raise Cannot(404, "no_export", "This export is not on the server any more. Export again.")
+        if job.link != link.id and link.role != "owner":
+            raise Cannot(403, "not_allowed", "Only who began an export, or an owner of the terrain, may do this.")
+        return job
