@@ -43,7 +43,7 @@ export interface Preview {
 
 type Method = "GET" | "POST" | "DELETE";
 
-async function request(method: Method, path: string, secret?: string, body?: unknown): Promise<Response> {
+export async function request(method: Method, path: string, secret?: string, body?: unknown): Promise<Response> {
   const headers: Record<string, string> = {};
   if (secret) headers.Authorization = `Bearer ${secret}`;
   const init: RequestInit = { method, headers };
@@ -75,7 +75,7 @@ export function readRefusal(status: number, text: string): ApiError {
   return new ApiError(String(status), `The server refused (${status}). Try again in a moment.`);
 }
 
-async function json<T>(method: Method, path: string, secret?: string, body?: unknown): Promise<T> {
+export async function json<T>(method: Method, path: string, secret?: string, body?: unknown): Promise<T> {
   return (await (await request(method, path, secret, body)).json()) as T;
 }
 

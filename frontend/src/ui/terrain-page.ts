@@ -2,6 +2,7 @@ import { effect, signal } from "@preact/signals-core";
 import { html, nothing, type TemplateResult } from "lit";
 import { ApiError, api } from "./api.ts";
 import "./drop-zone.ts";
+import "./export-dialog.ts";
 import { VIEW_ONLY } from "./groundwork.ts";
 import "./help-dialog.ts";
 import "./history-panel.ts";
@@ -34,7 +35,7 @@ import type { PageCommand } from "./top-bar.ts";
 import "./view-bar.ts";
 
 type PanelTab = "stroke" | "ground" | "terrain" | "history";
-type DialogId = "share" | "profile" | "help" | "about";
+type DialogId = "share" | "profile" | "help" | "about" | "export";
 
 const TABS = [
   { value: "stroke", label: "Stroke" },
@@ -72,6 +73,7 @@ export class EskTerrain extends SignalElement {
           panel: () => this.#togglePanel(),
           help: () => this.#show("help"),
           share: () => this.#show("share"),
+          export: () => this.#show("export"),
           layers: () => this.#toggle("ground"),
           history: () => this.#toggle("history"),
           toNow: () => stage.session.lapse.leave(),
@@ -229,6 +231,7 @@ export class EskTerrain extends SignalElement {
       ${this.#panel.value === null ? nothing : this.#side(stage, this.#panel.value)} ${this.#ways(stage)}
       <esk-share .stage=${stage} .open=${this.#dialog.value === "share"} @close=${this.#closeDialog}></esk-share>
       <esk-profile .stage=${stage} .open=${this.#dialog.value === "profile"} @close=${this.#closeDialog}></esk-profile>
+      <esk-export .stage=${stage} .open=${this.#dialog.value === "export"} @close=${this.#closeDialog}></esk-export>
       <esk-help .stage=${stage} .open=${this.#dialog.value === "help"} @close=${this.#closeDialog}></esk-help>
       ${this.#about(stage)}
     `;

@@ -18,6 +18,7 @@ export type PageCommand =
   | "help"
   | "panel"
   | "download"
+  | "export"
   | "about"
   | "add-ground"
   | "layers"
@@ -238,6 +239,7 @@ export class EskTopBar extends SignalElement {
         <wa-dropdown-item value="add-ground" ?disabled=${!this.stage.session.canEdit.value}>Add real ground…</wa-dropdown-item>
         <wa-dropdown-item value="layers">Layers of real ground</wa-dropdown-item>
         <wa-dropdown-item value="history">History</wa-dropdown-item>
+        <wa-dropdown-item value="export">Export for other programs…</wa-dropdown-item>
         <wa-dropdown-item value="download">Download a copy (.esker)</wa-dropdown-item>
         <wa-dropdown-item value="help">Keys and help</wa-dropdown-item>
         <wa-dropdown-item value="about">About this terrain</wa-dropdown-item>
