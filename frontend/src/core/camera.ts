@@ -270,6 +270,12 @@ export class Camera {
     return rayThrough(this.#pose, this.#canvas, xPx, yPx, 2 * this.#sizeM);
   }
 
+  /** The rays of the picture as it is now, for whoever must not notice that the view moves on. */
+  held(): (xPx: number, yPx: number) => Ray {
+    const [pose, canvas] = [this.#pose, this.#canvas];
+    return (xPx, yPx) => rayThrough(pose, canvas, xPx, yPx, 2 * this.#sizeM);
+  }
+
   /** Where a world point is on the canvas. */
   project(p: Vec3): Projection {
     return projected(this.#pose, this.#canvas, p);

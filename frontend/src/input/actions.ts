@@ -9,6 +9,7 @@ import { brushActions } from "./brushactions.ts";
 import type { PenToolId, ToolDefaults } from "./defaults.ts";
 import { moveOps, raiseOps } from "./handledrag.ts";
 import { handlesOf } from "./handles.ts";
+import type { KeyPen } from "./keypen.ts";
 import { layActions } from "./layactions.ts";
 import { drapedOf, shapeOf } from "./picking.ts";
 import type { Laying } from "./placement.ts";
@@ -33,7 +34,7 @@ export type ActionId =
   | "brush-stronger"
   | "brush-channel"
   | "brush-opposite"
-  | "place-grid"
+  | "set-point"
   | "turn-grid-left"
   | "turn-grid-right"
   | "next-stroke"
@@ -78,6 +79,8 @@ export interface ActionContext {
   readonly onMessage: (text: string) => void;
   /** Gives up what is being drawn or dragged; true when there was something. */
   readonly cancel: () => boolean;
+  /** The pen that the arrow keys move. */
+  readonly keyPen: Pick<KeyPen, "show" | "usable">;
   readonly now: () => number;
 }
 
@@ -167,7 +170,7 @@ function nudgeActions(
   ] as const;
   for (const [name, right, away] of arrows) {
     const key = `Arrow${name[0]!.toUpperCase()}${name.slice(1)}`;
-    const title = `Move the stroke (or the grid, or the view) ${{ up: "away", down: "nearer", left: "left", right: "right" }[name]}`;
+    const title = `Move the pen (or the stroke, the grid, the view) ${{ up: "away", down: "nearer", left: "left", right: "right" }[name]}`;
     put(`nudge-${name}`, title, [key], () => {
       if (nudgeGrid(right, away)) return;
       if (edits.stroke() !== null && c.canEdit()) edits.nudge(right, away);

@@ -13,6 +13,7 @@ import { type Action, createActions, type ToolId } from "./actions.ts";
 import type { ToolDefaults } from "./defaults.ts";
 import { Grips, type GripVisual } from "./grips.ts";
 import { Keyboard } from "./keyboard.ts";
+import { KeyPen } from "./keypen.ts";
 import { type Finger, Navigation, type NavigationMode } from "./navigation.ts";
 import type { Laying } from "./placement.ts";
 import { Pointing, takePointer } from "./pointing.ts";
@@ -21,6 +22,7 @@ import { type FinishedStroke, type InkVisual, StrokeTool } from "./stroketool.ts
 
 export type { ActionId, ToolId } from "./actions.ts";
 export type { GripVisual } from "./grips.ts";
+export type { KeyPenVisual } from "./keypen.ts";
 export type { Laying } from "./placement.ts";
 
 export type InputMode = "idle" | "draw" | "handle" | NavigationMode;
@@ -70,6 +72,8 @@ export class InputController {
   /** The elevation grid that is being laid: it has the pointer to itself. */
   readonly laying: Signal<Laying | null> = signal<Laying | null>(null);
   readonly actions: Map<string, Action>;
+  /** The pen that the arrow keys move. */
+  readonly keyPen: KeyPen;
   readonly #o: InputOptions;
   readonly #hovered = signal<string | null>(null);
   readonly #mode = signal<InputMode>("idle");
@@ -93,6 +97,14 @@ export class InputController {
     this.#strokes = new StrokeTool({ author: () => "", ...options, now });
     const { tool, selection, laying } = this;
     this.#grips = new Grips({ ...options, tool, selection, laying, now });
+    this.keyPen = new KeyPen({
+      ...options,
+      tool,
+      laying,
+      strokes: this.#strokes,
+      hit: (x, y) => this.#navigation.hit(x, y),
+      onDrawn: (made) => this.#drawn(made),
+    });
     this.actions = createActions({
       ...options,
       tool,
@@ -101,9 +113,10 @@ export class InputController {
       fingerDraws: this.fingerDraws,
       newId: () => this.#strokes.newId(),
       cancel: () => this.#cancel(),
+      keyPen: this.keyPen,
       now,
     });
-    this.#keyboard = new Keyboard(options.camera, this.#navigation, this.actions);
+    this.#keyboard = new Keyboard(options.camera, this.#navigation, this.actions, this.keyPen);
     this.#presses = new Presses({
       ...options,
       tool,
@@ -151,6 +164,7 @@ export class InputController {
   dispose(): void {
     this.#cancel();
     this.#abort.abort();
+    this.keyPen.dispose();
     this.#keyboard.dispose();
     this.#navigation.dispose();
   }
@@ -188,6 +202,7 @@ export class InputController {
       }
     }
     if (this.#main !== null) return;
+    this.keyPen.leave();
     takePointer(this.#o.canvas, e.pointerId);
     this.#main = {
       pointerId: e.pointerId,
@@ -337,6 +352,7 @@ export class InputController {
 
   #wheel(e: WheelEvent): void {
     e.preventDefault();
+    this.keyPen.leave();
     const [x, y] = this.#pointing.pixel(e);
     this.#navigation.wheel(e.deltaY, e.deltaMode, e.ctrlKey, x, y);
   }
@@ -344,7 +360,7 @@ export class InputController {
   /** Gives up what is under way: a stroke being drawn is deleted, a drag is taken back. True when there was one. */
   #cancel(): boolean {
     const main = this.#main;
-    if (main === null) return false;
+    if (main === null) return this.keyPen.cancel();
     this.#endMain();
     if (main.activity.kind === "draw") this.#strokes.cancel();
     else if (main.activity.kind === "drag") this.#grips.cancel();

@@ -2,6 +2,7 @@
 
 import type { Camera } from "../core/camera.ts";
 import type { Action } from "./actions.ts";
+import type { KeyPen } from "./keypen.ts";
 import type { Navigation } from "./navigation.ts";
 
 /** Elements that use keys themselves. */
@@ -61,16 +62,18 @@ export function actionFor(actions: ReadonlyMap<string, Action>, keys: string): A
   return null;
 }
 
-/** Listens to the keys of the window: flight, the Space that pans, and the actions. */
+/** Listens to the keys of the window: the pen that they move, flight, the Space that pans, and the actions. */
 export class Keyboard {
   readonly #camera: Camera;
   readonly #navigation: Navigation;
   readonly #actions: ReadonlyMap<string, Action>;
+  readonly #pen: Pick<KeyPen, "key">;
   readonly #abort = new AbortController();
   #spaceHeld = false;
 
-  constructor(camera: Camera, navigation: Navigation, actions: ReadonlyMap<string, Action>) {
+  constructor(camera: Camera, navigation: Navigation, actions: ReadonlyMap<string, Action>, pen: Pick<KeyPen, "key">) {
     this.#camera = camera;
+    this.#pen = pen;
     this.#navigation = navigation;
     this.#actions = actions;
     const { signal } = this.#abort;
@@ -89,6 +92,10 @@ export class Keyboard {
 
   #down(e: KeyboardEvent): void {
     if (!meantForCanvas(e)) return;
+    if (this.#pen.key(e)) {
+      e.preventDefault();
+      return;
+    }
     if (e.key === " ") {
       this.#spaceHeld = true;
       e.preventDefault();

@@ -26,7 +26,13 @@ export function layActions(
     const place = laying.place.peek();
     say(c, laying.lay(rounded(turned(laying, place, place.rotation_deg + by)), gestures.name(laying.id, "turn")));
   };
-  put("place-grid", "Place the grid that is being laid", ["Enter"], () => c.laying.value?.finish(), usable);
+  put(
+    "set-point",
+    "Draw with the arrow keys: shows the pen, sets points (or places a grid)",
+    ["Enter"],
+    () => (c.laying.value === null ? c.keyPen.show() : c.laying.value.finish()),
+    () => usable() || (c.laying.value === null && c.keyPen.usable()),
+  );
   put("turn-grid-left", "Turn the grid left", ["<"], () => turn(TURN_DEG), usable);
   put("turn-grid-right", "Turn the grid right", [">"], () => turn(-TURN_DEG), usable);
   return (right, away) => {

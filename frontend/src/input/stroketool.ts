@@ -60,7 +60,7 @@ interface Session {
   /** The brush does the opposite of what it is set to. */
   readonly opposite: boolean;
   readonly ground: Ground;
-  readonly sketch: Sketch & { readonly samples: readonly Sample[] };
+  sketch: Sketch & { readonly samples: readonly Sample[] };
   readonly id: string;
   readonly gesture: string;
   readonly pen: boolean;
@@ -125,6 +125,19 @@ export class StrokeTool {
     const session = this.#session;
     if (session === null || samples.length === 0) return;
     for (const sample of samples) session.sketch.add(sample);
+    this.#show(session, predicted);
+  }
+
+  /** Replaces all samples but the first: the line of a pen that takes points back. */
+  redraw(samples: readonly Sample[]): void {
+    const session = this.#session;
+    if (session === null || samples.length === 0) return;
+    session.sketch = sketchFor(session.tool, session.start);
+    for (const sample of samples) session.sketch.add(sample);
+    this.#show(session, []);
+  }
+
+  #show(session: Session, predicted: readonly Sample[]): void {
     if (!session.begun) this.#begin(session);
     if (this.#session === null) return;
     this.#ink.value = { points: session.sketch.samples, predicted };

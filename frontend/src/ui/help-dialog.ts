@@ -9,6 +9,10 @@ import { shared } from "./styles/shared.ts";
 const POINTERS: readonly { readonly what: string; readonly how: string }[] = [
   { what: "Draw, or use the chosen tool", how: "Left button, pen or one finger" },
   { what: "Paint the opposite", how: "Alt with the brush, or the other end of a pen" },
+  {
+    what: "Draw with the keys",
+    how: "Enter shows the pen and sets points, arrows move it (Shift: finely), Enter again ends",
+  },
   { what: "Orbit", how: "Right button; left button on empty ground with Select" },
   { what: "Pan", how: "Middle button, Shift + right button, Space + left button, or two fingers" },
   { what: "Zoom", how: "Wheel, or two fingers" },

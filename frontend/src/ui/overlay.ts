@@ -62,6 +62,21 @@ export class EskOverlay extends SignalElement {
         fill: #f46a45;
         stroke: #fff;
       }
+      .pen {
+        fill: none;
+        stroke-linecap: round;
+        stroke-width: 2;
+        stroke: #fff;
+      }
+      .pen.under {
+        stroke-width: 5;
+        stroke: rgb(12 18 24 / 60%);
+      }
+      .point {
+        fill: #fff;
+        stroke: #1b2631;
+        stroke-width: 1.5;
+      }
       .glyph {
         fill: none;
         stroke: #1b2631;
@@ -108,7 +123,9 @@ export class EskOverlay extends SignalElement {
   protected override render(): TemplateResult {
     this.stage.camera.state.value;
     return html`
-      <svg aria-hidden="true">${this.#brush()} ${this.#ink()} ${this.stage.input.handles.value.map((h) => this.#handle(h))}</svg>
+      <svg aria-hidden="true">
+        ${this.#brush()} ${this.#ink()} ${this.stage.input.handles.value.map((h) => this.#handle(h))} ${this.#keyPen()}
+      </svg>
       ${this.#cursors()}
     `;
   }
@@ -141,6 +158,22 @@ export class EskOverlay extends SignalElement {
     if (outline.length < 3) return nothing;
     const path = outline.map(([x, y]) => `${x!.toFixed(1)} ${y!.toFixed(1)}`).join(" L");
     return svg`<path class="ink" fill=${this.stage.session.people.value.myColour} d=${`M${path} Z`}></path>` as unknown as TemplateResult;
+  }
+
+  /** The pen that the arrow keys move: a crosshair, and the points that are set. */
+  #keyPen(): TemplateResult | typeof nothing {
+    const pen = this.stage.input.keyPen.visual.value;
+    if (pen === null) return nothing;
+    const [x, y] = pen.at.map((v) => v / this.#ratio);
+    const cross = "M0-16V-5M0 5V16M-16 0H-5M5 0H16";
+    return svg`
+      ${pen.points.map(([px, py]) => svg`<circle class="point" r="4.5" cx=${px / this.#ratio} cy=${py / this.#ratio}></circle>`)}
+      <g class="keypen" transform="translate(${x!.toFixed(1)} ${y!.toFixed(1)})">
+        <path class="pen under" d=${cross}></path>
+        <path class="pen" d=${cross}></path>
+        <circle r="2" fill=${this.stage.session.people.value.myColour}></circle>
+      </g>
+    ` as unknown as TemplateResult;
   }
 
   #handle(handle: GripVisual): TemplateResult | typeof nothing {

@@ -8,14 +8,16 @@ export interface PageCommands {
   panel(): void;
   help(): void;
   share(): void;
-  /** Opens the dialog that takes the terrain to other programs. */
-  export(): void;
   /** Opens the layers of real ground, or closes them. */
   layers(): void;
   /** Opens the history, or closes it. */
   history(): void;
+  /** Gives the keys back to the land. */
+  toLand(): void;
   /** Goes back to now; false when that is what is shown. */
   toNow(): boolean;
+  /** Puts the keys in the next part of the page, or in the one before. */
+  region(back: boolean): void;
   /** Asks for an elevation file. */
   addGround(): void;
 }
@@ -43,9 +45,11 @@ export function pageActions(
   const cancel = actions.get("cancel");
   if (cancel)
     put("cancel", cancel.title, [...cancel.keys], () => {
+      commands.toLand();
       if (!commands.toNow()) cancel.run();
     });
   put("share", "Share", ["Shift+s"], commands.share);
-  put("export", "Export for other programs", ["Shift+e"], commands.export);
+  put("next-region", "Keys go to the next part of the page", ["F6"], () => commands.region(false));
+  put("previous-region", "Keys go to the part before", ["Shift+F6"], () => commands.region(true));
   put("help", "Keys and help", ["?"], commands.help);
 }

@@ -32,6 +32,7 @@ import { Groundwork } from "./groundwork.ts";
 import { keepImports, keptImports } from "./kept-imports.ts";
 import { keepViews, keptViews } from "./kept-views.ts";
 import { QualityChoice, TAU_PX } from "./quality-choice.ts";
+import { deepFocus } from "./regions.ts";
 import { cursorVisuals, strokeVisuals } from "./scene.ts";
 import type { TerrainSession } from "./session.ts";
 
@@ -248,7 +249,10 @@ export class Stage {
       this.following.value = null;
     };
     // Drawing prevents the default of the pointer, so a field that had the keys would keep them.
-    const takeKeys = (): void => blurField();
+    const takeKeys = (): void => {
+      const active = deepFocus();
+      if (active instanceof HTMLElement && active !== document.body) active.blur();
+    };
     this.#viewport.addEventListener("pointerdown", takeKeys);
     this.#stops.push(() => this.#viewport.removeEventListener("pointerdown", takeKeys));
     for (const type of ["pointerdown", "wheel"] as const) {
@@ -351,11 +355,4 @@ export class Stage {
 function hasPaint(doc: Doc | null): boolean {
   for (const stroke of doc?.strokes.values() ?? []) if (stroke.paint !== null) return true;
   return false;
-}
-
-/** Takes the focus from whatever field has it, through shadow roots. */
-function blurField(): void {
-  let active = document.activeElement;
-  while (active?.shadowRoot?.activeElement) active = active.shadowRoot.activeElement;
-  if (active instanceof HTMLElement && active !== document.body) active.blur();
 }

@@ -2,7 +2,6 @@ import { effect, signal } from "@preact/signals-core";
 import { html, nothing, type TemplateResult } from "lit";
 import { ApiError, api } from "./api.ts";
 import "./drop-zone.ts";
-import "./export-dialog.ts";
 import { VIEW_ONLY } from "./groundwork.ts";
 import "./help-dialog.ts";
 import "./history-panel.ts";
@@ -17,6 +16,7 @@ import { importingWords } from "./others.ts";
 import { pageActions } from "./page-actions.ts";
 import { memberName } from "./people.ts";
 import "./profile-dialog.ts";
+import { deepFocus, nextRegion } from "./regions.ts";
 import { TerrainSession } from "./session.ts";
 import "./share-dialog.ts";
 import { SignalElement } from "./signal-element.ts";
@@ -35,7 +35,7 @@ import type { PageCommand } from "./top-bar.ts";
 import "./view-bar.ts";
 
 type PanelTab = "stroke" | "ground" | "terrain" | "history";
-type DialogId = "share" | "profile" | "help" | "about" | "export";
+type DialogId = "share" | "profile" | "help" | "about";
 
 const TABS = [
   { value: "stroke", label: "Stroke" },
@@ -73,11 +73,15 @@ export class EskTerrain extends SignalElement {
           panel: () => this.#togglePanel(),
           help: () => this.#show("help"),
           share: () => this.#show("share"),
-          export: () => this.#show("export"),
           layers: () => this.#toggle("ground"),
           history: () => this.#toggle("history"),
+          toLand: () => {
+            // Hands on a mouse have not moved the focus: nothing jumps for them.
+            if (deepFocus()?.matches(":focus-visible")) this.#focusLand();
+          },
           toNow: () => stage.session.lapse.leave(),
           addGround: () => this.#browse(),
+          region: (back) => this.renderRoot instanceof ShadowRoot && nextRegion(this.renderRoot, back),
         });
       }),
       effect(() => {
@@ -179,7 +183,12 @@ export class EskTerrain extends SignalElement {
     const session = this.#session.value;
     const stage = session?.stage.value ?? null;
     return html`
-      <div class="viewport" tabindex="0" role="application" aria-label="Terrain. Press ? for the keys."></div>
+      <div
+        class="viewport"
+        tabindex="0"
+        role="application"
+        aria-label="Terrain. Enter draws with the arrow keys, question mark lists all keys."
+      ></div>
       ${stage ? this.#chrome(stage) : this.#veil(session)}
       ${session ? html`<esk-toasts .toasts=${session.toasts}></esk-toasts>` : nothing}
     `;
@@ -218,7 +227,7 @@ export class EskTerrain extends SignalElement {
         </div>
         <esk-view-bar class="panel" .stage=${stage}></esk-view-bar>
       </div>
-      ${this.#hint(stage)} ${this.#following(stage)} ${this.#closedBar(stage)} ${this.#graphics(stage)} ${this.#notice(stage)}
+      ${this.#hint(stage)} ${this.#keyPen(stage)} ${this.#following(stage)} ${this.#closedBar(stage)} ${this.#graphics(stage)} ${this.#notice(stage)}
       ${this.#importing(stage)}
       <esk-laying-bar
         .stage=${stage}
@@ -231,7 +240,6 @@ export class EskTerrain extends SignalElement {
       ${this.#panel.value === null ? nothing : this.#side(stage, this.#panel.value)} ${this.#ways(stage)}
       <esk-share .stage=${stage} .open=${this.#dialog.value === "share"} @close=${this.#closeDialog}></esk-share>
       <esk-profile .stage=${stage} .open=${this.#dialog.value === "profile"} @close=${this.#closeDialog}></esk-profile>
-      <esk-export .stage=${stage} .open=${this.#dialog.value === "export"} @close=${this.#closeDialog}></esk-export>
       <esk-help .stage=${stage} .open=${this.#dialog.value === "help"} @close=${this.#closeDialog}></esk-help>
       ${this.#about(stage)}
     `;
@@ -241,8 +249,12 @@ export class EskTerrain extends SignalElement {
     if (this.#dialog.peek() === null) return;
     this.#dialog.value = null;
     // Keys belong to the terrain again.
-    this.renderRoot.querySelector<HTMLElement>(".viewport")?.focus({ preventScroll: true });
+    this.#focusLand();
   };
+
+  #focusLand(): void {
+    this.renderRoot.querySelector<HTMLElement>(".viewport")?.focus({ preventScroll: true });
+  }
 
   #side(stage: Stage, tab: PanelTab): TemplateResult {
     return html`
@@ -313,7 +325,9 @@ export class EskTerrain extends SignalElement {
     const doc = session.doc.doc.value;
     const busy = this.#panel.value === "ground" || stage.groundwork.imports.jobs.value.length > 0;
     const empty = (doc?.strokes.size ?? 0) === 0 && (doc?.layers.size ?? 0) === 0 && !busy;
-    if (!empty || !session.canEdit.value || input.drawing.value !== null || input.laying.value !== null) return nothing;
+    const pen = input.keyPen.visual.value !== null;
+    if (!empty || pen || !session.canEdit.value || input.drawing.value !== null || input.laying.value !== null)
+      return nothing;
     const drawn = flag(session.store, "drawn");
     const ready = input.tool.value !== "select";
     const flat = stage.camera.state.value.mode === "map";
@@ -322,6 +336,14 @@ export class EskTerrain extends SignalElement {
       : "Draw a line across the land — the ground rises to meet it.";
     return html`<div class="hint panel">
       ${icon("sketch")}<span>${ready ? (drawn ? "An empty land. Draw a line." : first) : "An empty land. Pick a tool and draw a line."}</span>
+    </div>`;
+  }
+
+  /** What the pen of the arrow keys awaits: read aloud, and shown while the pen is. */
+  #keyPen(stage: Stage): TemplateResult {
+    const { visual, words } = stage.input.keyPen;
+    return html`<div class=${visual.value === null ? "visually-hidden" : "hint panel"} role="status" aria-live="polite">
+      ${visual.value === null ? nothing : icon("sketch")}<span>${words.value}</span>
     </div>`;
   }
 

@@ -82,6 +82,7 @@ beforeEach(() => {
     newId: () => `copy${ids++}`,
     onMessage: () => {},
     cancel: () => false,
+    keyPen: { show: () => {}, usable: () => false },
     now: () => time,
   });
 });
@@ -270,7 +271,7 @@ describe("keys", () => {
 
   it("W flies in fly mode, and is free elsewhere (SPEC I64)", () => {
     const navigation = new Navigation(c, () => FLAT);
-    const keyboard = new Keyboard(c, navigation, actions);
+    const keyboard = new Keyboard(c, navigation, actions, { key: () => false });
     const frames: FrameRequestCallback[] = [];
     const original = globalThis.requestAnimationFrame;
     globalThis.requestAnimationFrame = (run) => frames.push(run);

@@ -174,10 +174,11 @@ describe("a grid in hand", () => {
     expect(last().rotation_deg).toBe(1);
     input.actions.get("turn-grid-right")!.run();
     expect(last().rotation_deg).toBe(0);
-    input.actions.get("place-grid")!.run();
+    input.actions.get("set-point")!.run();
     expect(ends).toEqual(["finish"]);
     input.laying.value = null;
-    expect(input.actions.get("place-grid")!.enabled()).toBe(false);
+    input.tool.value = "select";
+    expect(input.actions.get("set-point")!.enabled()).toBe(false);
   });
 
   it("does not select what lies under it", () => {

@@ -23,9 +23,10 @@ function everyAction() {
     panel: vi.fn(),
     help: vi.fn(),
     share: vi.fn(),
-    export: vi.fn(),
     layers: vi.fn(),
     addGround: vi.fn(),
+    region: vi.fn(),
+    toLand: vi.fn(),
     history: vi.fn(),
     toNow: vi.fn(() => false),
   };
@@ -47,6 +48,7 @@ function everyAction() {
     newId: () => "id",
     onMessage: () => {},
     cancel: () => false,
+    keyPen: { show: () => {}, usable: () => false },
     now: () => 0,
   });
   pageActions(actions, stage, commands);
@@ -72,9 +74,8 @@ describe("actions", () => {
     actions.get("help")!.run();
     actions.get("inspector")!.run();
     actions.get("share")!.run();
-    actions.get("export")!.run();
-    const asked = [commands.help, commands.panel, commands.share, commands.export];
-    expect(asked.map((f) => f.mock.calls.length)).toEqual([1, 1, 1, 1]);
+    const asked = [commands.help, commands.panel, commands.share];
+    expect(asked.map((f) => f.mock.calls.length)).toEqual([1, 1, 1]);
     actions.get("toggle-strokes")!.run();
     expect(stage.showStrokes.value).toBe(false);
     const overlays = Array.from({ length: OVERLAYS.length }, () => {
