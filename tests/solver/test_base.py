@@ -23,7 +23,8 @@ from esker.solve.device import Device, open_device
 from esker.solve.gpu_levels import GpuWorkspace
 from esker.solve.levels import ClWorkspace
 from esker.solve.packing import Packed, Shape, pack_one
-from esker.solve.refine import FieldCache, Refiner
+from esker.solve.refine import Refiner
+from esker.solve.refine_cache import FieldCache
 from esker.solve.refine_engine import NumpyEngine
 from esker.solve.solver import Basis, Solver
 from esker.solve.tables import BinBox

@@ -15,7 +15,8 @@ from esker import grid
 from esker.contract import MAX_REFINED_LEVEL, Stroke, TerrainSettings
 from esker.grid import TileKey
 from esker.solve.device import Device
-from esker.solve.refine import FieldCache, RefinedTile, Refiner
+from esker.solve.refine import RefinedTile, Refiner
+from esker.solve.refine_cache import FieldCache
 from esker.solve.refine_cl import ClEngine
 from esker.solve.refine_engine import (
     GRADIENT_LOW,

@@ -83,6 +83,33 @@ def _cut(
 
 
 @kernel
+def _meeting(
+    kernels: Floats,
+    slack: Floats,
+    min_z: Floats,
+    quad: Floats,
+    area: float,
+    x: float,
+    y: float,
+    numbers: Ints,
+    limit: float,
+    out: Ints,
+) -> tuple[int, float]:
+    """How many of the kernels ``numbers`` meet a quad of this area, into ``out``, up to the first that holds it whole;
+    and the smaller of ``limit`` and that one's error."""
+    other, met = np.empty((4, 2)), 0
+    for k in range(numbers.size):
+        q = numbers[k]
+        local(kernels, q, x, y, other)
+        if contains(other, quad, slack[q] + 1e-7 * np.sqrt(area)):
+            return met, min(limit, min_z[q])
+        if overlap(quad, other, slack[q]):
+            out[met] = q
+            met += 1
+    return met, limit
+
+
+@kernel
 def least_cover(
     kernels: Floats,
     slack: Floats,
@@ -111,21 +138,13 @@ def least_cover(
     quads, depths = np.empty((4 * DEEPEST + 4, 4, 2)), np.ones(4 * DEEPEST + 4, np.int64)
     limits = np.full(4 * DEEPEST + 4, best)
     _quarters(quad, quads[:4])
-    waiting, other, part, found = 4, np.empty((4, 2)), np.empty((4, 2)), -np.inf
+    waiting, part, found = 4, np.empty((4, 2)), -np.inf
     while waiting:
         waiting -= 1
         depth, limit = depths[waiting], limits[waiting]
         part[:] = quads[waiting]
-        area, met = whole * 0.25**depth, 0
-        for k in range(held[depth - 1]):
-            q = lists[depth - 1, k]
-            local(kernels, q, x, y, other)
-            if contains(other, part, slack[q] + 1e-7 * np.sqrt(area)):
-                limit = min(limit, min_z[q])
-                break
-            if overlap(part, other, slack[q]):
-                lists[depth, met] = q
-                met += 1
+        asked = lists[depth - 1, : held[depth - 1]]
+        met, limit = _meeting(kernels, slack, min_z, part, whole * 0.25**depth, x, y, asked, limit, lists[depth])
         if limit <= found or (whether and limit < best):
             continue
         if met <= FEW or depth == DEEPEST:

@@ -183,6 +183,17 @@ def _uniform_rim(
 
 
 @kernel
+def _push_below(t: Tree, s: int, j: int, i: int, stack: Ints, held: int) -> int:
+    """Puts the up to four nodes below node (j, i) of scale s on a stack of (scale, j, i); returns how many it holds."""
+    _, down, across = t.scale[s - 1]
+    for y in range(2 * j, min(2 * j + 2, down)):
+        for x in range(2 * i, min(2 * i + 2, across)):
+            stack[held, 0], stack[held, 1], stack[held, 2] = s - 1, y, x
+            held += 1
+    return held
+
+
+@kernel
 def uniform(t: Tree, found: Boxes, e: float, x0: float, y0: float, x1: float, y1: float, out: NDArray[np.int32]) -> int:
     """Patches chosen at tolerance e whose domain meets a rectangle, into ``out``; returns how many, -1 for too many."""
     stack = np.empty((256, 3), np.int64)
@@ -217,11 +228,7 @@ def uniform(t: Tree, found: Boxes, e: float, x0: float, y0: float, x1: float, y1
                     if count < 0:
                         return -1
                 if s > t.first[layer]:
-                    _, down, across = t.scale[s - 1]
-                    for y in range(2 * j, min(2 * j + 2, down)):
-                        for x in range(2 * i, min(2 * i + 2, across)):
-                            stack[held, 0], stack[held, 1], stack[held, 2] = s - 1, y, x
-                            held += 1
+                    held = _push_below(t, s, j, i, stack, held)
     return count
 
 
@@ -325,11 +332,7 @@ def view(
                     if count < 0:
                         return -1
                 if s > t.first[layer]:
-                    _, down, across = t.scale[s - 1]
-                    for y in range(2 * j, min(2 * j + 2, down)):
-                        for x in range(2 * i, min(2 * i + 2, across)):
-                            stack[held, 0], stack[held, 1], stack[held, 2] = s - 1, y, x
-                            held += 1
+                    held = _push_below(t, s, j, i, stack, held)
     return count
 
 

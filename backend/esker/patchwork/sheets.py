@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -119,37 +119,14 @@ class Sheet:
 
 def sheet(placed: Placed) -> Sheet:
     """Lay the patches of a layer in the world."""
-    layer, raster = placed.layer, placed.raster
+    raster = placed.raster
     rows, cols = raster.heights.shape
-    to_world = affine(layer)
-    to_lattice = inverse(to_world)
-    parts: list[tuple[NDArray[np.float64], ...]] = []
-    scales, js, iss, areas, tables = [], [], [], [], []
-    rim, cell = raster.errors.rim, math.log2(layer.spacing_m[0] * layer.spacing_m[1])
-
-    def add(laid: patches.Lattice, errors: NDArray[np.float32], scale: int, at: Ints, samples: Floats) -> None:
-        to_patch = composed(laid.to_patch, to_lattice)
-        from_patch = inverse(to_patch)
-        unit = np.hypot(from_patch[:, 0, :2], from_patch[:, 1, :2])
-        kernel = mapped(to_world, laid.kernel)
-        own = layer.accuracy_m + abs(layer.scale) * errors.astype(np.float64)
-        slack = laid.bend * max(layer.spacing_m)
-        parts.append((to_patch, kernel, laid.extent, laid.extent / 2 * unit, slack, own))
-        scales.append(np.full(len(at), scale, np.int8))
-        js.append(at[:, 0].astype(np.int32))
-        iss.append(at[:, 1].astype(np.int32))
-        areas.append(np.rint((cell + np.log2(samples)) * AREA_QUANTA).astype(np.int64))
-
+    rim, rows_of = raster.errors.rim, _Rows(placed)
     if len(rim):
         laid = patches.lay_rim(rows, cols, raster.warp, rim)
-        add(
-            laid,
-            raster.errors.rim_errors,
-            patches.RIM,
-            rim[:, :2].astype(np.int64),
-            rim[:, 2:].prod(axis=1).astype(np.float64),
-        )
-    first = len(rim)
+        size = rim[:, 2:].prod(axis=1).astype(np.float64)
+        rows_of.add(laid, raster.errors.rim_errors, patches.RIM, rim[:, :2].astype(np.int64), size)
+    tables, first = [], len(rim)
     for scale, table in enumerate(raster.errors.tables):
         there = ~np.isnan(table)
         j, i = np.nonzero(there)
@@ -159,30 +136,55 @@ def sheet(placed: Placed) -> Sheet:
             index[there] = np.arange(first, first + len(j))
         tables.append(index)
         first += len(j)
-        if not len(j) and (parts or scale < len(raster.errors.tables) - 1):
+        if not len(j) and (rows_of.parts or scale < len(raster.errors.tables) - 1):
             continue  # the last one stands for a grid without any patch, all of whose rim was left out
         laid = patches.lay(rows, cols, raster.warp, scale, j, i)
-        samples = np.full(len(j), 4.0**scale * patches.SMALLEST_KERNEL**2)
-        add(laid, table[there], scale, np.stack([j, i], 1), samples)
-    to_patch, kernel, extent, half, slack, own = (np.concatenate(column) for column in zip(*parts, strict=True))
-    return Sheet(
-        placed,
-        np.concatenate(scales),
-        np.concatenate(js),
-        np.concatenate(iss),
-        to_patch,
-        _counter_clockwise(kernel),
-        extent,
-        half,
-        slack,
-        own,
-        np.concatenate(areas),
-        tuple(tables),
-        blocks(rim, patches.table_shape(rows, cols, 0)) if len(rim) else np.zeros(0, np.int64),
-        to_world,
-        to_lattice,
-        0.0 if raster.warp is None else float(np.abs(raster.warp).max()) * 1.5 + 0.5,
-    )
+        size = np.full(len(j), 4.0**scale * patches.SMALLEST_KERNEL**2)
+        rows_of.add(laid, table[there], scale, np.stack([j, i], 1), size)
+    starts = blocks(rim, patches.table_shape(rows, cols, 0)) if len(rim) else np.zeros(0, np.int64)
+    return rows_of.sheet(tuple(tables), starts)
+
+
+class _Rows:
+    """The patches of a sheet as they come, scale by scale."""
+
+    def __init__(self, placed: Placed) -> None:
+        self._placed = placed
+        self._to_world = affine(placed.layer)
+        self._to_lattice = inverse(self._to_world)
+        self._cell = math.log2(placed.layer.spacing_m[0] * placed.layer.spacing_m[1])
+        self.parts: list[tuple[NDArray[Any], ...]] = []
+        """Columns in the order of Sheet's fields, scale to area."""
+
+    def add(self, laid: patches.Lattice, errors: NDArray[np.float32], scale: int, at: Ints, samples: Floats) -> None:
+        """n patches of one scale. ``errors`` (n,) in the raster's unit; ``at`` (n, 2) their j and i; ``samples`` (n,)
+        how many their nominal kernels have."""
+        layer = self._placed.layer
+        to_patch = composed(laid.to_patch, self._to_lattice)
+        from_patch = inverse(to_patch)
+        unit = np.hypot(from_patch[:, 0, :2], from_patch[:, 1, :2])
+        self.parts.append(
+            (
+                np.full(len(at), scale, np.int8),
+                at[:, 0].astype(np.int32),
+                at[:, 1].astype(np.int32),
+                to_patch,
+                mapped(self._to_world, laid.kernel),
+                laid.extent,
+                laid.extent / 2 * unit,
+                laid.bend * max(layer.spacing_m),
+                layer.accuracy_m + abs(layer.scale) * errors.astype(np.float64),
+                np.rint((self._cell + np.log2(samples)) * AREA_QUANTA).astype(np.int64),
+            )
+        )
+
+    def sheet(self, tables: tuple[NDArray[np.int32], ...], rim_start: Ints) -> Sheet:
+        """All of them. ``tables``, ``rim_start``: as in Sheet."""
+        scale, j, i, to_patch, kernel, *more = (np.concatenate(column) for column in zip(*self.parts, strict=True))
+        warp = self._placed.raster.warp
+        sway = 0.0 if warp is None else float(np.abs(warp).max()) * 1.5 + 0.5
+        columns = (scale, j, i, to_patch, _counter_clockwise(kernel), *more)
+        return Sheet(self._placed, *columns, tables, rim_start, self._to_world, self._to_lattice, sway)
 
 
 def _counter_clockwise(kernel: Floats) -> Floats:

@@ -27,11 +27,34 @@ Digest = Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{64}$")]
 
 def add_imports(app: FastAPI, hub: Hub, grids: GridStore, imports: Imports) -> None:
     """Adds them."""
+    _add_uploads(app, imports)
+    _add_grids(app, hub, grids)
 
     @app.exception_handler(Cannot)
     async def cannot(_: Request, error: Cannot) -> Response:
         return answer(error.status, error.code, error.message)
 
+    @app.get("/api/terrains/{terrain}/imports/{job}")
+    async def status(terrain: str, job: str, link: AnyLink) -> c.ImportStatus:  # noqa: ARG001
+        return imports.status(terrain, job)
+
+    @app.post("/api/terrains/{terrain}/imports/{job}/answers")
+    async def answers(request: Request, terrain: str, job: str, link: EditorLink) -> c.ImportStatus:
+        # From JSON itself: pydantic's strict mode takes no list for a pair once it is a Python object.
+        try:
+            body = c.ImportAnswers.model_validate_json(await _short(request))
+        except ValidationError as error:
+            raise RequestValidationError(
+                [{**found, "loc": ("body", *found["loc"])} for found in error.errors(include_url=False)]
+            ) from error
+        return imports.answer(terrain, job, link, body)
+
+    @app.delete("/api/terrains/{terrain}/imports/{job}", status_code=204)
+    async def cancel(terrain: str, job: str, link: EditorLink) -> None:
+        await imports.cancel(terrain, job, link)
+
+
+def _add_uploads(app: FastAPI, imports: Imports) -> None:
     @app.post("/api/terrains/from-grid", status_code=201)
     async def from_grid(request: Request, name: FileName = "", client: ClientId = "") -> dict[str, Any]:
         limited(request, app.state.new_terrains, "new terrains came")
@@ -55,25 +78,8 @@ def add_imports(app: FastAPI, hub: Hub, grids: GridStore, imports: Imports) -> N
             name, person, request.stream(), _length(request), terrain=terrain, link=link, client=client, hold=hold
         )
 
-    @app.get("/api/terrains/{terrain}/imports/{job}")
-    async def status(terrain: str, job: str, link: AnyLink) -> c.ImportStatus:  # noqa: ARG001
-        return imports.status(terrain, job)
 
-    @app.post("/api/terrains/{terrain}/imports/{job}/answers")
-    async def answers(request: Request, terrain: str, job: str, link: EditorLink) -> c.ImportStatus:
-        # From JSON itself: pydantic's strict mode takes no list for a pair once it is a Python object.
-        try:
-            body = c.ImportAnswers.model_validate_json(await _short(request))
-        except ValidationError as error:
-            raise RequestValidationError(
-                [{**found, "loc": ("body", *found["loc"])} for found in error.errors(include_url=False)]
-            ) from error
-        return imports.answer(terrain, job, link, body)
-
-    @app.delete("/api/terrains/{terrain}/imports/{job}", status_code=204)
-    async def cancel(terrain: str, job: str, link: EditorLink) -> None:
-        await imports.cancel(terrain, job, link)
-
+def _add_grids(app: FastAPI, hub: Hub, grids: GridStore) -> None:
     @app.get("/api/terrains/{terrain}/grids/{digest}")
     async def grid(terrain: str, digest: Digest, link: AnyLink) -> Response:  # noqa: ARG001
         if digest not in await asyncio.to_thread(hub.journal.grids, terrain):

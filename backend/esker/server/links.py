@@ -39,12 +39,7 @@ class JoinCode(c.Wire):
 def add_links(app: FastAPI, hub: Hub) -> None:
     """Adds them."""
     access = hub.access
-
-    async def add(terrain: str, role: Role, name: str) -> tuple[Link, str]:
-        try:
-            return await asyncio.wrap_future(access.add(terrain, role, name))
-        except TooManyLinks:
-            raise Problem(409, "too_many_links", "This terrain has too many links. Revoke some.") from None
+    _add_codes(app, hub)
 
     @app.get("/api/terrains/{terrain}/links")
     async def list_links(terrain: str, link: OwnerLink) -> list[dict[str, Any]]:  # noqa: ARG001
@@ -53,7 +48,7 @@ def add_links(app: FastAPI, hub: Hub) -> None:
 
     @app.post("/api/terrains/{terrain}/links", status_code=201)
     async def new_link(terrain: str, link: OwnerLink, body: NewLink) -> dict[str, str]:  # noqa: ARG001
-        made, secret = await add(terrain, body.role, body.name)
+        made, secret = await _new(hub, terrain, body.role, body.name)
         return {"id": made.id, "role": made.role, "name": made.name, "secret": secret}
 
     @app.post("/api/terrains/{terrain}/links/{link_id}/rotate")
@@ -77,6 +72,18 @@ def add_links(app: FastAPI, hub: Hub) -> None:
         access.drop_codes(link_id)
         hub.revoke_members(terrain, link_id)
 
+
+async def _new(hub: Hub, terrain: str, role: Role, name: str) -> tuple[Link, str]:
+    """A new link and its secret. Raises Problem."""
+    try:
+        return await asyncio.wrap_future(hub.access.add(terrain, role, name))
+    except TooManyLinks:
+        raise Problem(409, "too_many_links", "This terrain has too many links. Revoke some.") from None
+
+
+def _add_codes(app: FastAPI, hub: Hub) -> None:
+    access = hub.access
+
     @app.post("/api/terrains/{terrain}/codes", status_code=201)
     async def new_code(terrain: str, link: AnyLink, body: NewCode) -> dict[str, Any]:
         if link.role == "view" or (link.role == "edit" and body.role == "owner"):
@@ -90,5 +97,5 @@ def add_links(app: FastAPI, hub: Hub) -> None:
         if found is None:
             raise Problem(404, "bad_code", "This code is wrong or too old. Ask for a new one.")
         terrain, role = found
-        _, secret = await add(terrain, role, "Joined by code")
+        _, secret = await _new(hub, terrain, role, "Joined by code")
         return {"id": terrain, "secret": secret, "role": role}

@@ -7,9 +7,8 @@ solve: which tiles were asked for, in which order, in which groups and from what
 
 from __future__ import annotations
 
-import itertools
 import time
-from collections import OrderedDict, deque
+from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence, Set
 from dataclasses import dataclass
 from hashlib import blake2b
@@ -18,27 +17,31 @@ from typing import Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from esker import grid
 from esker.contract import MAX_REFINED_LEVEL, TILE_CELLS, TILE_SAMPLES, Stroke, TerrainSettings
 from esker.grid import TileKey
 from esker.solve.base import Base, bound
 from esker.solve.base_blocks import BaseWindows, BlockCache
 from esker.solve.constraints import Shapes
 from esker.solve.device import Device, row_kernels
+from esker.solve.refine_boxes import (
+    Box,
+    bounds_of,
+    evenly_cut,
+    group_around,
+    in_z_order,
+    keys_of,
+    paste,
+    samples_of,
+    span_of,
+    tiles_over,
+)
+from esker.solve.refine_cache import CACHE_BYTES, FieldCache
 from esker.solve.refine_cl import ClEngine
 from esker.solve.refine_engine import CHANNELS, Engine, Fields, NumpyEngine, Pending, Span, Step, step
 from esker.solve.refine_strokes import DIGEST_BYTES, Strokes
 
 LOOK_SECONDS: Final = 0.0002
 """Between two looks at the device, and at who is in a hurry."""
-GROUP: Final = 4
-"""Tiles along a side of what one step computes at most: more, and a step takes too long to be left; fewer, and the
-halo costs more than the tiles."""
-CACHE_BYTES: Final = 64 << 20
-TILE_BYTES: Final = 4 * CHANNELS * TILE_SAMPLES**2
-
-Box = tuple[int, int, int, int]
-"""Tiles x0 .. x1 - 1, y0 .. y1 - 1 as (x0, y0, x1, y1)."""
 Plan = dict[int, set[TileKey]]
 """Per level the tiles that are still to be made."""
 
@@ -72,42 +75,6 @@ class RefinedTile:
     heights: NDArray[np.float32]
     content: bytes
     base: NDArray[np.float32] | None = None
-
-
-class FieldCache:
-    """Fields of refined tiles by content, least recently used dropped first; shared by the refiners of a solver."""
-
-    def __init__(self, bytes_: int = CACHE_BYTES) -> None:
-        self.most = max(1, bytes_ // TILE_BYTES)
-        self._held: OrderedDict[bytes, Fields] = OrderedDict()
-
-    def __len__(self) -> int:
-        return len(self._held)
-
-    def __contains__(self, content: bytes) -> bool:
-        return content in self._held
-
-    def get(self, content: bytes) -> Fields | None:
-        """The fields (3, 65, 65) of this content, if they are held."""
-        found = self._held.get(content)
-        if found is not None:
-            self._held.move_to_end(content)
-        return found
-
-    def put(self, content: bytes, fields: Fields) -> None:
-        """Hold fields."""
-        self._held[content] = fields
-        self._held.move_to_end(content)
-        while len(self._held) > self.most:
-            self._held.popitem(last=False)
-
-    def drop(self, content: bytes) -> None:
-        """Forget one tile."""
-        self._held.pop(content, None)
-
-    def clear(self) -> None:
-        """Drop everything."""
-        self._held.clear()
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,7 +164,7 @@ class Refiner:
         """The base at a tile's samples."""
         if self._base is None:
             return None
-        samples = self._base.window(key.level, _span(key))
+        samples = self._base.window(key.level, span_of(key))
         samples.flags.writeable = False
         return samples
 
@@ -224,17 +191,17 @@ class Refiner:
         """
         if not 0 <= level <= MAX_REFINED_LEVEL:
             raise ValueError(f"level must be 0..{MAX_REFINED_LEVEL}, not {level}")
-        span = Span(*_bounds(rows, level), *_bounds(cols, level))
+        span = Span(*bounds_of(rows, level), *bounds_of(cols, level))
         if level <= self.basis.level:
             jump = 1 << (self.basis.level - level)
             whole = self.basis.heights[::jump, ::jump]
             return np.ascontiguousarray(whole[span.r0 : span.r1, span.c0 : span.c1])
         out = np.empty(span.shape, dtype=np.float32)
-        groups = _in_z_order(_boxes(_cover(span, level)))
+        groups = in_z_order(evenly_cut(tiles_over(span, level)))
         for done, box in enumerate(groups):
-            keys = _keys(level, box)
+            keys = keys_of(level, box)
             for key, field in self._all(keys).items():
-                _paste(out[None], span, key, field[2:])
+                paste(out[None], span, key, field[2:])
             if progress is not None:
                 progress((done + 1) / len(groups))
         return out
@@ -270,7 +237,7 @@ class Refiner:
         """Begins the step of ``first`` and of those of the others and of the plan that go with it, after making what it
         needs of the parent level."""
         level = first.level
-        box = _group(first, {first} | others | plan[level])
+        box = group_around(first, {first} | others | plan[level])
         x0, y0, x1, y1 = box
         at = step(level, Span(y0 * TILE_CELLS, y1 * TILE_CELLS + 1, x0 * TILE_CELLS, x1 * TILE_CELLS + 1))
         parent = yield from self._parent(at, plan)
@@ -279,7 +246,7 @@ class Refiner:
         for begun in tuple(self._under_way):
             yield from self._until(begun.pending, lambda pending: pending.prepared)
         self._under_way.append(_Begun(level, box, self._engine.begin(at, self._strokes, parent)))
-        plan[level].difference_update(_keys(level, box))
+        plan[level].difference_update(keys_of(level, box))
         yield
 
     def _oldest(self) -> Generator[None, None, None]:
@@ -306,7 +273,7 @@ class Refiner:
         begun = self._under_way.popleft()
         fields = begun.pending.fields()
         x0, y0 = begun.box[:2]
-        for key in _keys(begun.level, begun.box):
+        for key in keys_of(begun.level, begun.box):
             r, c = (key.y - y0) * TILE_CELLS, (key.x - x0) * TILE_CELLS
             tile = fields[:, r : r + TILE_SAMPLES, c : c + TILE_SAMPLES].copy()
             tile.flags.writeable = False
@@ -321,9 +288,9 @@ class Refiner:
         if at.level - 1 == self.basis.level:
             return self._ground[:, p.r0 : p.r1, p.c0 : p.c1]
         out = np.empty((CHANNELS, *p.shape), dtype=np.float32)
-        tiles = yield from self._made(_keys(at.level - 1, _cover(p, at.level - 1)), plan)
+        tiles = yield from self._made(keys_of(at.level - 1, tiles_over(p, at.level - 1)), plan)
         for key, field in tiles.items():
-            _paste(out, p, key, field)
+            paste(out, p, key, field)
         return out
 
     def _digest(self, key: TileKey) -> bytes:
@@ -331,7 +298,7 @@ class Refiner:
         side = 1 << key.level if 0 <= key.level <= MAX_REFINED_LEVEL else 0
         if key.level <= low or not (0 <= key.x < side and 0 <= key.y < side):
             raise ValueError(f"{key} is not a tile of levels {low + 1}..{MAX_REFINED_LEVEL}")
-        span, level = _span(key), key.level
+        span, level = span_of(key), key.level
         at = step(level, span)
         out = blake2b(repr((low, tuple(key))).encode(), digest_size=DIGEST_BYTES)
         while True:
@@ -340,97 +307,19 @@ class Refiner:
             if level == low + 1:
                 break
             level -= 1
-            at = step(level, _tile_span(_cover(at.parent, level)))
+            at = step(level, samples_of(tiles_over(at.parent, level)))
         out.update(self._strokes.digest(at.level, at.box))
-        for ground in _keys(low, _cover(at.parent, low)):
+        for ground in keys_of(low, tiles_over(at.parent, low)):
             out.update(self._ground_digest(ground))
         return out.digest()
 
     def _ground_digest(self, key: TileKey) -> bytes:
         known = self._digests.get(key)
         if known is None:
-            s = _span(key)
+            s = span_of(key)
             part = np.ascontiguousarray(self._ground[:, s.r0 : s.r1, s.c0 : s.c1])
             known = self._digests[key] = blake2b(part.tobytes(), digest_size=DIGEST_BYTES).digest()
         return known
-
-
-def _group(key: TileKey, left: Set[TileKey]) -> Box:
-    """The box of at most GROUP tiles a side around ``key`` that holds most of the tiles that are left to make."""
-    near = [(x, y) for _, x, y in left if abs(x - key.x) < GROUP and abs(y - key.y) < GROUP]
-    best: list[tuple[int, int]] = []
-    for y0 in range(key.y - GROUP + 1, key.y + 1):
-        for x0 in range(key.x - GROUP + 1, key.x + 1):
-            held = [at for at in near if x0 <= at[0] < x0 + GROUP and y0 <= at[1] < y0 + GROUP]
-            best = max(best, held, key=len)
-    xs, ys = zip(*best, strict=True)
-    return min(xs), min(ys), max(xs) + 1, max(ys) + 1
-
-
-def _span(key: TileKey) -> Span:
-    return _tile_span((key.x, key.y, key.x + 1, key.y + 1))
-
-
-def _tile_span(box: Box) -> Span:
-    """The samples of a box of tiles, both edges included."""
-    x0, y0, x1, y1 = box
-    return Span(y0 * TILE_CELLS, y1 * TILE_CELLS + 1, x0 * TILE_CELLS, x1 * TILE_CELLS + 1)
-
-
-def _cover(span: Span, level: int) -> Box:
-    """The fewest tiles that hold a span."""
-    last = (1 << level) - 1
-    r, c = max(span.r1 - 2, span.r0), max(span.c1 - 2, span.c0)
-    return (
-        min(span.c0 // TILE_CELLS, last),
-        min(span.r0 // TILE_CELLS, last),
-        min(c // TILE_CELLS, last) + 1,
-        min(r // TILE_CELLS, last) + 1,
-    )
-
-
-def _keys(level: int, box: Box) -> list[TileKey]:
-    x0, y0, x1, y1 = box
-    return [TileKey(level, x, y) for y in range(y0, y1) for x in range(x0, x1)]
-
-
-def _boxes(box: Box) -> list[Box]:
-    """A box cut evenly into boxes of at most GROUP tiles a side."""
-    x0, y0, x1, y1 = box
-    across, along = _cuts(x0, x1), _cuts(y0, y1)
-    return [(a, b, c, d) for b, d in along for a, c in across]
-
-
-def _cuts(low: int, high: int) -> list[tuple[int, int]]:
-    parts = -(-(high - low) // GROUP)
-    edges = [low + (high - low) * k // parts for k in range(parts + 1)]
-    return list(itertools.pairwise(edges))
-
-
-def _in_z_order(boxes: list[Box]) -> list[Box]:
-    """So that boxes follow each other that share parents."""
-
-    def spread(v: int) -> int:
-        return sum(((v >> k) & 1) << (2 * k) for k in range(MAX_REFINED_LEVEL + 1))
-
-    return sorted(boxes, key=lambda b: spread(b[0]) | spread(b[1]) << 1)
-
-
-def _paste(out: Fields, span: Span, key: TileKey, tile: Fields) -> None:
-    """Copies what a tile shares with a span."""
-    at = _span(key)
-    r0, r1, c0, c1 = max(span.r0, at.r0), min(span.r1, at.r1), max(span.c0, at.c0), min(span.c1, at.c1)
-    out[:, r0 - span.r0 : r1 - span.r0, c0 - span.c0 : c1 - span.c0] = tile[
-        :, r0 - at.r0 : r1 - at.r0, c0 - at.c0 : c1 - at.c0
-    ]
-
-
-def _bounds(part: slice, level: int) -> tuple[int, int]:
-    n = grid.samples(level)
-    low, high, jump = part.indices(n)
-    if jump != 1 or low >= high or (part.stop is not None and part.stop > n) or (part.start or 0) < 0:
-        raise ValueError(f"not a range of the {n} samples of level {level}: {part}")
-    return low, high
 
 
 class Refinery:
