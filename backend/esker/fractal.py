@@ -1,6 +1,6 @@
 """The constants of detail synthesis (docs/synthesis.md): one source for every language.
 
-``contract_emit.py`` writes them, with ``SYNTH_`` before their names, beside those of ``contract.py``; change a number
+``contract_emit.py`` writes them, with ``SYNTH_`` before their names, beside those of ``contract``; change a number
 here, run ``make generate``, commit both. Nothing here does I/O.
 
 Units: slopes are metres per metre; elevations are shares of ``relief_m`` above ``zero_m``; concavity is the second

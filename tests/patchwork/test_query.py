@@ -1,4 +1,4 @@
-"""Queries of LOD space (SPEC PW30 to PW36)."""
+"""Queries of LOD space (SPEC PW30 to PW35)."""
 
 from __future__ import annotations
 

@@ -277,6 +277,12 @@ def test_undo_of_an_import_is_its_authors(live: LiveServer) -> None:
         bob.remove_grid(layer)
         bob.wait()
         _until(ada, lambda: not ada.layers)
+        ada.restore_grid(layer)
+        ada.wait()
+        _until(bob, lambda: [found.lift_m for found in bob.layers] == [3.0])
+        bob.remove_grid(layer)
+        bob.wait()
+        _until(ada, lambda: not ada.layers)
         with pytest.raises(Refused, match="cat"):
             bob.add_grid(_file(live, "refuse"))
         with pytest.raises(Refused, match="How wide"):

@@ -17,7 +17,6 @@ from esker.synthesis.subdivide import detail, levels
 from tests.synthesis.sites import SIZE, channels, everywhere, heights, hill, plane, rms
 
 LEVEL = 8
-BITS = 0.5 / 65535
 
 
 def somewhere(site: Site, level: int = LEVEL, side: int = 150) -> State:

@@ -12,9 +12,9 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from esker import fractal, grid
+from esker import fractal
 from esker.bench.report import ROOT
-from esker.contract import BASE_ROUGHNESS, MAX_SYNTHESIS_LEVEL, SUBPATCHES, TILE_CELLS, TILE_SAMPLES
+from esker.contract import BASE_ROUGHNESS, MAX_SYNTHESIS_LEVEL, SUBPATCHES, TILE_SAMPLES
 from esker.synthesis import hash as noise
 from esker.synthesis.rules.targets import tie
 from esker.synthesis.site import BORDER, Biases, Site
@@ -271,9 +271,3 @@ def _by_level(jobs: Sequence[Job]) -> Iterator[tuple[int, list[Job]]]:
 def child_of(job: Job, slot: int, east: int, north: int, held: int = 0) -> Job:
     """The job of a child of a tile."""
     return Job(slot, job.level + 1, 2 * job.x + east, 2 * job.y + north, job.slot, held)
-
-
-def tiles_of(level: int) -> list[tuple[int, int]]:
-    """(x, y) of all tiles of a level."""
-    side = grid.cells(level) // TILE_CELLS
-    return [(x, y) for y in range(side) for x in range(side)]

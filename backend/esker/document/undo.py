@@ -87,11 +87,6 @@ class UndoStack:
         """True when there is a step to take back."""
         return bool(self._done)
 
-    @property
-    def can_redo(self) -> bool:
-        """True when the last thing done was an undo."""
-        return bool(self._undone)
-
     def record(
         self, before: StrokeSet, op: Op, after: StrokeSet, gesture: str | None = None, op_id: str | None = None
     ) -> None:

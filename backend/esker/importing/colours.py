@@ -19,7 +19,7 @@ HIGHEST_M: Final = 9_000.0
 def decode(bands: NDArray[Any], encoding: Encoding) -> NDArray[np.float64]:
     """Heights in metres (rows, cols) from uint8 red, green, blue (3, rows, cols).
 
-    Terrarium: 256 R + G + B/256 - 32768 (Tilezen Joerd, formats.md). Mapbox Terrain-RGB: -10000 + 0.1 (65536 R + 256 G
+    Terrarium: 256 R + G + B/256 - 32768 (Tilezen Joerd, "Terrarium"). Mapbox Terrain-RGB: -10000 + 0.1 (65536 R + 256 G
     + B) (Mapbox documentation, "Terrain-RGB").
     """
     red, green, blue = bands.astype(np.float64)

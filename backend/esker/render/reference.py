@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 import moderngl
@@ -370,9 +370,3 @@ def _parts(width: int, height: int) -> list[Rect]:
     """Rectangles that cover a picture, their corners on even pixels: derivatives are taken over squares of two."""
     rows, cols = (range(0, n, LARGEST_PART) for n in (height, width))
     return [Rect(x, y, min(LARGEST_PART, width - x), min(LARGEST_PART, height - y)) for y in rows for x in cols]
-
-
-def with_sun(scene: Scene, azimuth_deg: float, elevation_deg: float) -> Scene:
-    """The scene under another sun."""
-    change = {"sun_azimuth_deg": azimuth_deg % 360, "sun_elevation_deg": elevation_deg}
-    return replace(scene, settings=scene.settings.model_copy(update=change))

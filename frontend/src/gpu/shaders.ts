@@ -54,7 +54,6 @@ const join = (...parts: string[]): string => parts.join("\n");
 const common = join(contract, view, tile, sky, noise, tonemap);
 
 export const VIEW_SOURCE = view;
-export const SUN_LIST_SOURCE = computeSun;
 
 /** How much detail a device can afford: `plain` on adapters that draw on the CPU. */
 export type Detail = "rich" | "plain";

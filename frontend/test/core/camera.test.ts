@@ -1,4 +1,4 @@
-// The camera's projections, modes and animations (SPEC I1-I9).
+// The camera's projections, modes and animations (SPEC I1-I5).
 
 import { describe, expect, it } from "vitest";
 import { Camera } from "../../src/core/camera.ts";

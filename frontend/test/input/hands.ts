@@ -1,4 +1,4 @@
-/** Synthetic pointers over a canvas with a real controller, camera and document, for the input tests (SPEC I40-I52). */
+/** Synthetic pointers over a canvas with a real controller, camera and document, for the input tests (SPEC I40-I54). */
 
 import { afterEach, beforeEach, expect, vi } from "vitest";
 import type { Camera } from "../../src/core/camera.ts";

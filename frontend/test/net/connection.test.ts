@@ -1,5 +1,5 @@
 // @vitest-environment happy-dom
-// The life of a connection against a socket that the test plays (SPEC I30-I35).
+// The life of a connection against a socket that the test plays (SPEC I30-I34).
 import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
 import type { DecodedFrame } from "../../src/core/types.ts";
 import type { ServerMessage } from "../../src/generated/contract.ts";

@@ -13,7 +13,6 @@ export const landingStyles = css`
     --near: #2f4a55;
     --disc: #fff4e2;
     --ink: #1a2a33;
-    --scrim: rgb(251 244 236 / 0%);
   }
   :host-context(.wa-dark) {
     --sky-top: #0e1720;

@@ -101,9 +101,6 @@ export const shared = css`
   .btn.outline {
     border-color: var(--esk-line-strong);
   }
-  .btn.danger {
-    color: var(--esk-bad);
-  }
   .icon-btn {
     width: 40px;
     height: 40px;
