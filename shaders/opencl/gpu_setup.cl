@@ -1,5 +1,5 @@
 // From rasterised constraints to the hierarchy of levels, and what else does one sample at a time on a GPU (DESIGN 5.3).
-// Twins: reference.coarsen, reference.divergence, reference.restriction.
+// Twins: reference.coarsen, reference.divergence, reference.restriction, reference.held.
 
 // R f at coarse sample (Y, X), mirrored.
 inline float restriction_at(cfield_t f, int Y, int X, int n, int pitch) {
@@ -94,6 +94,13 @@ kernel void divergence(cfield_t f, cfield_t d, cfield_t g, field_t rhs, int n, i
                   : y == n - 1 ? h[at] + h[at - pitch]
                                : -0.5f * (h[at + pitch] - h[at - pitch]);
     rhs[at] = d[at] < 0.0f ? f[at] : fma(spacing, across + along, f[at]);
+}
+
+// u = f where fixed. Global size (columns, rows), rounded up.
+kernel void hold_fixed(cfield_t f, cfield_t d, field_t u, int n, int pitch) {
+    int x = get_global_id(0), y = get_global_id(1);
+    size_t at = (size_t)y * pitch + x;
+    if (x < n && y < n && d[at] < 0.0f) u[at] = f[at];
 }
 
 // out[group] = largest |a - b| of the samples of a group, all channels. Work-groups of CHANGE_ITEMS, which each stride

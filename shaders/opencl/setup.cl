@@ -1,4 +1,5 @@
-// From rasterised constraints to the hierarchy of levels (DESIGN 5.3). Twins: reference.coarsen, reference.divergence.
+// From rasterised constraints to the hierarchy of levels (DESIGN 5.3). Twins: reference.coarsen, reference.divergence,
+// reference.held.
 
 // Springs of one coarse row: d' = S / (1 + SATURATION S), f' = R f / (1 + SATURATION S), S = R d. Fixed samples count
 // as springs of CREST_STIFFNESS; a pinned border stays as good as fixed. `tmp` holds four fine rows. d is written by channel
@@ -57,6 +58,16 @@ kernel void coarsen_bottom(row_t d, row_t f, constant int *tab, int levels, int 
                 coarsen_row(d + a[0], f + (size_t)c * stride + a[0], d + b[0], f + (size_t)c * stride + b[0], J, a[1],
                             a[2], b[2], scratch, c == 0);
     }
+}
+
+// u = f where fixed. Global size (strips).
+kernel void hold_fixed(crow_t f, crow_t d, row_t u, int n, int pitch, int rows) {
+    int s = get_global_id(0);
+    for (int y = s * rows; y < min(n, (s + 1) * rows); y++)
+        for (int x = 0; x < n; x += VW) {
+            row_t o = row(u, y, pitch) + x;
+            store16(select(load16(o), load16(crow(f, y, pitch) + x), load16(crow(d, y, pitch) + x) < 0.0f), o);
+        }
 }
 
 inline float16 half_difference(float16 before, float16 after) { return -0.5f * (after - before); }

@@ -122,6 +122,13 @@ def test_divergence(kernels: Device, level: int) -> None:
     close(w.height.get("f", level), reference.divergence(f, d, g, grid.spacing(level, 1000.0)))
 
 
+def test_fixed_samples_are_held(kernels: Device) -> None:
+    s = new_system(kernels, 2, 1)
+    host = fill(s)
+    s.hold()
+    assert np.array_equal(s.get("u", 2), reference.held(host["u"], host["f"], host["d"]).astype(np.float32))
+
+
 @pytest.mark.parametrize("scene", ["one", "cross", "loops", "fifty"])
 @pytest.mark.parametrize("settings", [SETTINGS, PINNED], ids=["free", "pinned"])
 def test_rasterise(kernels: Device, scene: str, settings: TerrainSettings) -> None:

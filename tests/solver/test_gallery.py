@@ -92,6 +92,15 @@ def test_previews_of_wide_reaches(device: Device, solver: Solver, name: str, rea
     assert np.abs(preview - settled).max() <= 1e-3 * np.ptp(settled)
 
 
+@pytest.mark.parametrize("name", ["loops", "five-hundred", "crossing", "border", "archipelago"])
+def test_previews_of_edits(solver: Solver, name: str) -> None:
+    """SPEC S18: a stroke more, made from the ground without it: those of the gallery that take the most cycles."""
+    document = gallery.load(name)
+    solver.solve(document.strokes[:-1], document.settings, 4)
+    preview, settled, _ = _accuracy.product(solver, document, 4)
+    assert np.abs(preview - settled).max() <= 1e-3 * np.ptp(settled)
+
+
 @pytest.mark.parametrize("name", ["five", "crossing", "twins", "canyon"])
 def test_ties(device: Device, name: str) -> None:
     """SPEC S4: where float32 and float64 see the same constraints they give the same ground."""

@@ -117,8 +117,11 @@ def test_the_coarsest_preview_waits_for_no_fine_raster(solver: Solver, monkeypat
 def test_a_glimpse_of_newer_strokes_changes_nothing_of_a_solve(solver: Solver) -> None:
     """SPEC S17: it is what their own solve begins with, to the bit, and that may then begin without it."""
     older, newer = SCENES["fifty"][3:], SCENES["fifty"]
-    plain = [r.heights for r in solver.steps(older, SETTINGS, 4) if r is not None and r.level == 4]
-    own = next(solver.steps(newer, SETTINGS, 4))
+    first = Solver()
+    for one in (first, solver):  # both know the same ground of before
+        one.solve(older[9:], SETTINGS, 4)
+    plain = [r.heights for r in first.steps(older, SETTINGS, 4) if r is not None and r.level == 4]
+    own = next(first.steps(newer, SETTINGS, 4))
     steps, glimpses, levels = solver.steps(older, SETTINGS, 4), [], []
     assert steps.glimpse(newer, SETTINGS) is None, "it has not begun"
     for r in steps:
@@ -133,7 +136,51 @@ def test_a_glimpse_of_newer_strokes_changes_nothing_of_a_solve(solver: Solver) -
         assert np.array_equal(glimpse.heights, own.heights)
     assert [np.array_equal(a, b) for a, b in zip(plain, levels, strict=True)] == [True, True]
     rest = [r for r in solver.steps(newer, SETTINGS, 4, coarsest=False) if r is not None and not r.settled]
-    assert [r.level for r in rest if r.channel == Channel.HEIGHT] == [1, 2, 3, 4]
+    assert sorted(r.level for r in rest if r.channel == Channel.HEIGHT) == [1, 2, 3, 4]
+
+
+def previewed(solver: Solver, strokes: list[Stroke]) -> tuple[list[int], np.ndarray, np.ndarray]:
+    """Levels of the previews in order, the finest one, and the settled ground."""
+    results = [r for r in solver.steps(strokes, SETTINGS, 4) if r is not None and r.channel == Channel.HEIGHT]
+    preview, settled = (r.heights for r in results if r.level == 4)
+    return [r.level for r in results if not r.settled], preview, settled
+
+
+def test_an_edit_is_shown_from_the_ground_before_it(solver: Solver) -> None:
+    """SPEC S18: the finest preview of a segment needs none of the others; segments may follow each other before any of
+    them settles, and what settles then has the bits of a solver that knew nothing."""
+    *others, pen = SCENES["fifty"]
+    solver.solve(others, SETTINGS, 4)
+    count = len(pen.curve)
+    assert count >= 8
+    for end in range(count - 6, count):
+        part = [*others, pen.model_copy(update={"curve": pen.curve[:end]})]
+        steps = solver.steps(part, SETTINGS, 4)
+        previews = (r for r in steps if r is not None and r.channel == Channel.HEIGHT)
+        assert [next(previews).level for _ in range(2)] == [0, 4]
+        steps.close()
+    levels, preview, settled = previewed(solver, SCENES["fifty"])
+    assert levels == [0, 4, 1, 2, 3]
+    assert np.abs(preview - settled).max() <= 1e-3 * np.ptp(settled)
+    levels, _, fresh = previewed(Solver(), SCENES["fifty"])
+    assert levels == [0, 1, 2, 3, 4]
+    assert np.array_equal(settled, fresh)
+
+
+def test_ground_that_is_not_what_it_was_is_not_begun_with() -> None:
+    """Other settings, many other strokes, or a solve that was left in the middle of the finest level."""
+    strokes, whole, solver = SCENES["fifty"], [0, 1, 2, 3, 4], Solver()
+    solver.solve(strokes, PINNED, 4)
+    assert previewed(solver, strokes)[0] == whole
+    assert previewed(solver, strokes[9:])[0] == [0, 4, 1, 2, 3], "fewer are what there were"
+    assert previewed(solver, strokes)[0] == whole, "nine more are not"
+    left = solver.steps(strokes, SETTINGS, 4)
+    for result in left:  # up to the step after the last coarse level, in which the finest is begun again
+        if result is not None and result.channel == Channel.HEIGHT and result.level == 3:
+            break
+    next(left)
+    left.close()
+    assert previewed(solver, strokes[1:])[0] == whole
 
 
 @pytest.mark.parametrize("scene", list(SCENES))

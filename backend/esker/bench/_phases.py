@@ -79,18 +79,14 @@ def _solve(clock: _Clock, workspace: Any, job: Job, name: str, level: int) -> An
     rows = window.sample_rows
     for system in (workspace.gradient, workspace.height):
         clock(f"{name}coarsen", lambda: system.coarsen(tables.screening, rows))  # noqa: B023
-    for coarse in range(max(level, 1)):
-        clock(f"{name}coarse levels", lambda: passes._coarse(workspace, coarse))  # noqa: B023
-    if level:
-        clock("gradient", lambda: _finest(workspace.gradient, passes.preview_gradient_cycles(job.settings)))
-        clock("guidance", lambda: workspace.guide(level))
-        clock("heights", lambda: _finest(workspace.height, passes.PREVIEW_HEIGHT_CYCLES))
+    if level:  # from the ground before (``passes.amended``)
+        clock("gradient", lambda: passes.amend_gradient(workspace, job.settings))
+        clock("guidance", lambda: passes.amend_guidance(workspace))
+        for _ in range(2):
+            clock("heights", lambda: multigrid.cycle(workspace.height))
+    else:
+        clock(f"{name}coarse levels", lambda: passes._coarse(workspace, 0))
     return clock(f"{name}read", lambda: workspace.read(level))
-
-
-def _finest(system: multigrid.System, cycles: int) -> None:
-    for _ in passes._cycles(system, cycles):
-        pass
 
 
 def _send(client: ClientTiles, clock: Callable[..., Any], name: str = "") -> None:

@@ -253,7 +253,7 @@ class Client:
         if level < self.top:
             self._came[level] = now
             return level == 0 or (self._lead.get(level, math.inf) > HOLD and now - self.finest_at >= FRAMES)
-        self._lead = {coarse: now - came for coarse, came in self._came.items()}
+        self._lead |= {coarse: now - came for coarse, came in self._came.items()}
         self.previewing, self.finest_at, self._previewed = False, now, self.running
         return True
 

@@ -72,6 +72,7 @@ class DeviceWorkspace(Generic[S]):
         self.gradient, self.height = gradient, height
         self.packer = Packer(self.top)
         self.scout: Workspace | None = None
+        self.standing: object = None
         self.size_m = 1.0
         self._queue, self._bins, self._over = queue, bins, over
 

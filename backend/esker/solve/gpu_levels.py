@@ -163,6 +163,14 @@ class GpuSystem(Fields):
             np.float32(self.eps[0]), self.launch.weights, np.int32(cycles),
         )  # fmt: skip
 
+    def hold(self) -> None:
+        """See ``multigrid.System``."""
+        shape = self.shapes[self.top]
+        f, d, u = (self.fields[name, self.top] for name in ("f", "d", "u"))
+        self.launch.run(
+            "hold_fixed", _blocks(shape.n, shape.n), BLOCK, f, d, u, np.int32(shape.n), np.int32(shape.pitch)
+        )
+
     def change(self, old: str, new: str) -> float:
         """See ``multigrid.System``."""
         self._restrict_now()

@@ -157,6 +157,13 @@ class ClSystem(Fields):
             np.float32(self.eps[0]), self.launch.scratch, i(self.launch.scratch_stride), self.launch.weights, i(cycles),
         )  # fmt: skip
 
+    def hold(self) -> None:
+        """See ``multigrid.System``."""
+        i, shape = np.int32, self.shapes[self.top]
+        strips, rows = self.launch.strips(shape.n)
+        f, d, u = (self.fields[name, self.top] for name in ("f", "d", "u"))
+        self.launch.again("hold_fixed", (strips,), f, d, u, i(shape.n), i(shape.pitch), i(rows))
+
     def change(self, old: str, new: str) -> float:
         """See ``multigrid.System``. Who asks once will ask again: until the next start from a coarser level the visits
         of the finest one find it on their way; only the first time needs a pass over both fields."""

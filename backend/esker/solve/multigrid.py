@@ -58,6 +58,9 @@ class System(Protocol):
     def swap(self, level: int) -> None:
         """Exchange u and v of a level."""
 
+    def hold(self) -> None:
+        """u of the finest level = f where it is fixed; of the first channel, and fixed samples are those of one."""
+
     def change(self, old: str, new: str) -> float:
         """Largest absolute difference of two fields of the finest level."""
 

@@ -21,6 +21,10 @@ PREVIEW_HEIGHT_CYCLES = 3
 WIDE_REACHES = (1 / 16, 1 / 4)
 """A reach above each of these shares of the domain takes one gradient cycle more: what full multigrid leaves of the
 gradient is smooth, and the farther it is felt the more height it adds up to."""
+AMEND_SHARE = 5e-4
+"""Estimated error, as a share of the relief, at which a preview made from the ground before an edit is shown."""
+AMEND_CYCLES = 5
+"""Cycles after which it is given up."""
 HEIGHT_SHARE = 0.25
 """Error, in quanta of the finest level, at which the heights are at rest: half of what DESIGN 5.3 asks for."""
 GRADIENT_SHARE = 1 / 16
@@ -64,12 +68,15 @@ class LevelResult:
 class Workspace(Protocol):
     """Memory and kernels for one solve at a time of one finest level; ``device_workspace`` says what each does.
 
-    scout: a small one that makes the coarsest preview of the same strokes, None below ``grid.SCOUT_FROM``.
+    scout: a small one that makes the coarsest preview of the same strokes, None below ``grid.SCOUT_FROM``;
+    standing: what the ground of the finest level, u of both steps, was solved with (``standing_on``), if it is that
+    of the strokes that are packed; None where it is not.
     """
 
     top: int
     packer: Packer
     scout: Workspace | None
+    standing: object
 
     @property
     def based(self) -> bool: ...
@@ -130,10 +137,50 @@ def previews(
         _coarse(w, level)
         if level > 0 or coarsest:
             yield LevelResult(level, frozen(w.read(level)), settled=False)
+    w.standing = None
     yield from _cycles(w.gradient, gradient_cycles)
     w.guide(w.top)
     yield from _cycles(w.height, PREVIEW_HEIGHT_CYCLES)
     yield LevelResult(w.top, frozen(w.read(w.top)), settled=False)
+
+
+def standing_on(job: Job) -> object:
+    """What must not have changed for ``amended``, strokes aside."""
+    return job.settings, None if job.base is None else job.base.base.digest
+
+
+def amended(w: Workspace, settings: TerrainSettings, relief_m: float) -> Iterator[LevelResult | None]:
+    """The finest preview of an edit from the ground before it, which ``w`` still holds: no level of full multigrid, and
+    as many cycles as it takes. No result where those are too many: full multigrid is better then.
+
+    Each cycle takes off the error of the ground of before, too, so edits may follow each other.
+    """
+    amend_gradient(w, settings)
+    amend_guidance(w)
+    multigrid.cycle(w.height)
+    for more in range(AMEND_CYCLES - 1):
+        if more == 1:  # a large edit: then what is left of the gradient's error counts, too
+            multigrid.cycle(w.gradient)
+            amend_guidance(w)
+        multigrid.cycle(w.height)
+        if w.height.change("v", "u") * multigrid.UPDATE_SHARE < AMEND_SHARE * relief_m:
+            yield LevelResult(w.top, frozen(w.read(w.top)), settled=False)
+            return
+        yield None
+
+
+def amend_gradient(w: Workspace, settings: TerrainSettings) -> None:
+    """The gradient step of ``amended``."""
+    multigrid.refresh(w.gradient)
+    for _ in range(preview_gradient_cycles(settings)):
+        multigrid.cycle(w.gradient)
+
+
+def amend_guidance(w: Workspace) -> None:
+    """The right-hand side of its height step, and the residual that cycles begin with."""
+    w.guide(w.top)
+    w.height.hold()
+    multigrid.refresh(w.height)
 
 
 def _cycles(system: multigrid.System, count: int) -> Iterator[None]:

@@ -102,6 +102,11 @@ def divergence(static: Field, d: Field, g: Field, spacing_m: float) -> Field:
     return np.asarray(np.where(d < 0, static, static + out))
 
 
+def held(u: Field, f: Field, d: Field) -> Field:
+    """u, but f where fixed."""
+    return np.asarray(np.where(d < 0, f, u))
+
+
 def over_base(static: Field, d: Field, share: Field, target: Field, base: Field, slack: float) -> Field:
     """Static right-hand side of the height step over a base (docs/solver.md, "Over a base"), all (n, n).
 
@@ -216,6 +221,10 @@ class NumpySystem:
     def swap(self, level: int) -> None:
         self.fields["u", level], self.fields["v", level] = self.fields["v", level], self.fields["u", level]
 
+    def hold(self) -> None:
+        u, f = self.fields["u", self.top], self.fields["f", self.top]
+        self.fields["u", self.top] = held(u, f, self.d[self.top])
+
     def change(self, old: str, new: str) -> float:
         return float(np.abs(self.fields[new, self.top] - self.fields[old, self.top]).max())
 
@@ -226,6 +235,7 @@ class NumpyWorkspace:
     def __init__(self, top: int, based: bool = False) -> None:
         self.top, self.based = top, based
         self.scout: Workspace | None = None
+        self.standing: object = None
         self.size_m = 1.0
         self.packer = Packer(top)
         self.gradient: NumpySystem
@@ -244,8 +254,12 @@ class NumpyWorkspace:
             else over_base(c.height_f, c.height_d, c.share, c.target, under, tables.spacing_m)
         )
         self.size_m = tables.size_m
+        before = [s.fields.get(("u", self.top)) for s in (self.gradient, self.height)] if self.standing else []
         self.gradient = NumpySystem(c.gradient_d[None], c.gradient_f, tables.screening, self.top)
         self.height = NumpySystem(c.height_d[None], height_f[None], tables.screening, self.top)
+        for system, u in zip((self.gradient, self.height), before, strict=False):
+            if u is not None:
+                system.fields["u", self.top] = u
 
     def loading(self, strokes: Sequence[Stroke], settings: TerrainSettings, base: Base | None = None) -> Iterator[None]:
         """The same, in one piece."""

@@ -48,6 +48,8 @@ SPARE_BYTES = 5 << 30
 fifth of the machine's: a room whose workspace was given to another one has all its strokes rasterised again."""
 SPARE_SECONDS = 300.0
 """How long a workspace is kept that nobody uses: who has been away for longer waits once for the raster."""
+EDITED = 4
+"""Strokes that may be new or changed for a preview to be made from the ground before."""
 PACED_ABOVE = 4
 """Up to this level a whole preview takes less time than one cycle of a big terrain."""
 
@@ -256,12 +258,12 @@ class Solver:
                     if coarsest:
                         yield passes.scouted(workspace, job)
                     yield from self._channels(spoken, job, top, early)
+                edited = scouting and _edited(workspace, job)
                 half = True
                 yield from workspace.loading(*job)
-                half = False
+                half, workspace.standing = False, None
                 if warm is None:
-                    cycles = passes.preview_gradient_cycles(settings)
-                    previews = self._paced(passes.previews(workspace, cycles, coarsest=not scouting), top)
+                    previews = self._previews(workspace, job, coarsest=not scouting, edited=edited)
                     if not scouting:
                         yield next(previews)
                         yield from self._channels(spoken, job, top, early)
@@ -270,6 +272,7 @@ class Solver:
                     passes.gradients(workspace)
                     workspace.warm(warm)
                     yield from self._channels(spoken, job, top, early)
+                workspace.standing = passes.standing_on(job)
                 yield from passes.to_rest(workspace, settings)
                 yield from self._channels(spoken, job, top, late)
                 yield from passes.settled(workspace, job, basis)
@@ -289,10 +292,30 @@ class Solver:
                     self._give(workspace)
                 del workspace  # the traceback of an error would keep it
 
-    def _paced(self, steps: Iterator[LevelResult | None], top: int) -> Iterator[LevelResult | None]:
-        """On big levels what is enqueued is done before somebody else has a turn: the queue is in order."""
+    def _previews(
+        self, workspace: Workspace, job: Job, *, coarsest: bool, edited: bool
+    ) -> Iterator[LevelResult | None]:
+        """Previews coarse to fine. Of ground of which little was ``edited`` the finest comes first, made from what it
+        was: then the others go with it, so that what settles depends on the strokes alone."""
+        settings, shown = job.settings, False
+        if edited:
+            assert workspace.scout is not None
+            relief = max(float(np.ptp(workspace.scout.read(0))), 1.0)
+            for result in passes.amended(workspace, settings, relief):
+                if result is not None:
+                    shown, workspace.standing = True, passes.standing_on(job)
+                yield result
+        cycles = passes.preview_gradient_cycles(settings)
+        paced = shown or workspace.top > PACED_ABOVE
+        for result in self._paced(passes.previews(workspace, cycles, coarsest=coarsest), paced):
+            again = shown and result is not None and result.level == workspace.top
+            yield None if again else result
+
+    def _paced(self, steps: Iterator[LevelResult | None], paced: bool) -> Iterator[LevelResult | None]:
+        """``paced``: what is enqueued is done before somebody else has a turn, as the queue is in order: on big levels,
+        and where nobody waits."""
         for result in steps:
-            if result is None and self._device is not None and top > PACED_ABOVE:
+            if result is None and self._device is not None and paced:
                 self._device.queue.finish()
             yield result
 
@@ -339,3 +362,11 @@ class Solver:
         self._idle_since[workspace] = time.monotonic()
         while len(self._spare) > 1 and self._kept() > self._spare_bytes:
             self._spare.pop(0)
+
+
+def _edited(workspace: Workspace, job: Job) -> bool:
+    """Whether the finest level still holds the ground of nearly the same strokes."""
+    if workspace.standing is None or workspace.standing != passes.standing_on(job):
+        return False
+    known = workspace.packer.likeness(job.strokes, job.settings)
+    return known >= 0 and len(job.strokes) - known <= EDITED

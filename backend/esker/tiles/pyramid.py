@@ -202,11 +202,14 @@ class Pyramid:
         n = grid.samples(level)
         if heights.shape != (n, n):
             raise ValueError(f"level {level} has {n}x{n} samples, not {heights.shape}")
-        if level > self.top or (not settled and level < self.top and self._previewed == clock):
+        if level > self.top:
             return 0
         if not np.isfinite(heights).all():
             raise ValueError(f"level {level} has heights that are not finite")
         steadier = self._steadiers[level]
+        if not settled and level < self.top and self._previewed == clock:
+            steadier.note(clock, heights)
+            return 0
         if settled:
             steadier.settled(clock, heights)
             return self._store(clock, level, heights, settled)
