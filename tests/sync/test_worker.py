@@ -12,7 +12,7 @@ import pytest
 
 from esker import contract as c
 from esker.session import schedule as module
-from esker.session.worker import Job, Worker
+from esker.session.worker import TIDY_EVERY, Job, Worker
 from tests.sync.harness import Level
 
 SETTINGS = c.TerrainSettings()
@@ -91,7 +91,7 @@ class Bench:
         for _ in range(count):
             self.solver.permits.release()
         with self._arrived:
-            assert self._arrived.wait_for(lambda: len(self.got) >= goal, 5), self.got
+            assert self._arrived.wait_for(lambda: len(self.got) >= goal, 60), self.got
         return self.got
 
     def idle(self) -> None:
@@ -288,7 +288,22 @@ def test_a_solver_tidies_up_while_there_is_nothing_to_do(monkeypatch: pytest.Mon
     monkeypatch.setattr("esker.session.worker.IDLE_CHECK", 0.01)
 
     def run(bench: Bench) -> None:
-        assert bench.solver.tidied.wait(5)
+        assert bench.solver.tidied.wait(60)
+
+    _bench(run)
+
+
+def test_a_solver_tidies_up_on_a_server_that_never_rests(monkeypatch: pytest.MonkeyPatch) -> None:
+    """SPEC S30: between two steps of a solve, every half minute."""
+    monkeypatch.setattr("esker.session.worker.IDLE_CHECK", 1000.0)
+
+    def run(bench: Bench) -> None:
+        bench.worker.request(bench.room("a"), _job(1))
+        bench.let(2)
+        assert not bench.solver.tidied.is_set()
+        bench.now += TIDY_EVERY
+        bench.let(2)
+        assert bench.solver.tidied.is_set()
 
     _bench(run)
 

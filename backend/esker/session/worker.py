@@ -33,6 +33,8 @@ LULLS: Final = {False: 0.002, True: 0.020}
 next, unless something else waits."""
 IDLE_CHECK: Final = 1.0
 """Seconds between looks at what may be tried again, when nothing else wakes the thread."""
+TIDY_EVERY: Final = 30.0
+"""Seconds between looks at what the solver keeps of rooms that have gone, on a server that is never idle."""
 AGAIN_AFTER: Final = 3.0
 """Seconds until a job that failed for reasons unknown is tried again without a change."""
 AGAIN: Final = "The ground could not be computed; it will be tried again soon."
@@ -64,6 +66,7 @@ class Worker:
         self._stopping = False
         self._solver: Solver | None = None
         self._broken: Exception | None = None
+        self._tidied = now()
         self._standing = ""
         """What is wrong with the device for as long as it lasts, told to every room once."""
         self._ready = threading.Event()
@@ -156,12 +159,18 @@ class Worker:
             for gone in leaving:  # a solve must end in the thread that began it
                 gone.drop()
             self._retry()
-            if client is None and isinstance(self._solver, Tidying):
-                self._solver.tidy()
+            self._tidy(idle=client is None)
             if client is not None and client not in leaving:
                 self._step(client)
         for left in self._schedule.clients:
             left.drop()
+
+    def _tidy(self, idle: bool) -> None:
+        """Memory that nobody uses goes back while nothing is to be done, and where that never comes too."""
+        now = self._now()
+        if isinstance(self._solver, Tidying) and (idle or now - self._tidied >= TIDY_EVERY):
+            self._tidied = now
+            self._solver.tidy()
 
     def _step(self, client: Client) -> None:
         """One slice of one room: what the solver does until it can be left."""
