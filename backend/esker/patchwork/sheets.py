@@ -153,8 +153,8 @@ class _Rows:
         self._to_world = affine(placed.layer)
         self._to_lattice = inverse(self._to_world)
         self._cell = math.log2(placed.layer.spacing_m[0] * placed.layer.spacing_m[1])
-        self.parts: list[tuple[NDArray[Any], ...]] = []
-        """Columns in the order of Sheet's fields, scale to area."""
+        self.parts: list[dict[str, NDArray[Any]]] = []
+        """Columns by the names of Sheet's fields."""
 
     def add(self, laid: patches.Lattice, errors: NDArray[np.float32], scale: int, at: Ints, samples: Floats) -> None:
         """n patches of one scale. ``errors`` (n,) in the raster's unit; ``at`` (n, 2) their j and i; ``samples`` (n,)
@@ -164,27 +164,34 @@ class _Rows:
         from_patch = inverse(to_patch)
         unit = np.hypot(from_patch[:, 0, :2], from_patch[:, 1, :2])
         self.parts.append(
-            (
-                np.full(len(at), scale, np.int8),
-                at[:, 0].astype(np.int32),
-                at[:, 1].astype(np.int32),
-                to_patch,
-                mapped(self._to_world, laid.kernel),
-                laid.extent,
-                laid.extent / 2 * unit,
-                laid.bend * max(layer.spacing_m),
-                layer.accuracy_m + abs(layer.scale) * errors.astype(np.float64),
-                np.rint((self._cell + np.log2(samples)) * AREA_QUANTA).astype(np.int64),
-            )
+            {
+                "scale": np.full(len(at), scale, np.int8),
+                "j": at[:, 0].astype(np.int32),
+                "i": at[:, 1].astype(np.int32),
+                "to_patch": to_patch,
+                "kernel": mapped(self._to_world, laid.kernel),
+                "extent": laid.extent,
+                "half": laid.extent / 2 * unit,
+                "slack": laid.bend * max(layer.spacing_m),
+                "own": layer.accuracy_m + abs(layer.scale) * errors.astype(np.float64),
+                "area": np.rint((self._cell + np.log2(samples)) * AREA_QUANTA).astype(np.int64),
+            }
         )
 
     def sheet(self, tables: tuple[NDArray[np.int32], ...], rim_start: Ints) -> Sheet:
         """All of them. ``tables``, ``rim_start``: as in Sheet."""
-        scale, j, i, to_patch, kernel, *more = (np.concatenate(column) for column in zip(*self.parts, strict=True))
+        columns = {name: np.concatenate([part[name] for part in self.parts]) for name in self.parts[0]}
+        columns["kernel"] = _counter_clockwise(columns["kernel"])
         warp = self._placed.raster.warp
-        sway = 0.0 if warp is None else float(np.abs(warp).max()) * 1.5 + 0.5
-        columns = (scale, j, i, to_patch, _counter_clockwise(kernel), *more)
-        return Sheet(self._placed, *columns, tables, rim_start, self._to_world, self._to_lattice, sway)
+        return Sheet(
+            self._placed,
+            **columns,
+            tables=tables,
+            rim_start=rim_start,
+            to_world=self._to_world,
+            to_lattice=self._to_lattice,
+            sway=0.0 if warp is None else float(np.abs(warp).max()) * 1.5 + 0.5,
+        )
 
 
 def _counter_clockwise(kernel: Floats) -> Floats:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import logging
 from collections.abc import Callable
+from ctypes.util import find_library
 from typing import Any, Final
 
 import moderngl
@@ -12,6 +13,7 @@ import moderngl
 log = logging.getLogger("esker.render")
 
 GL_VERSION: Final = 430
+EGL: Final = "libEGL.so.1"
 _LOWER_LEFT, _ZERO_TO_ONE = 0x8CA1, 0x935F
 _RENDERBUFFER, _DEPTH_32F = 0x8D41, 0x8CAC
 
@@ -23,7 +25,9 @@ class NoGraphics(RuntimeError):
 def open_context() -> moderngl.Context:
     """A context of OpenGL 4.3 or later by EGL, with depth from 0 to 1 where that can be had. Raises NoGraphics."""
     try:
-        context = moderngl.create_context(require=GL_VERSION, standalone=True, backend="egl")  # type: ignore[arg-type]
+        # Where libGL is not installed: EGL's own library finds all functions too.
+        how: dict[str, Any] = {"backend": "egl", "libgl": find_library("GL") or EGL}
+        context = moderngl.create_context(require=GL_VERSION, standalone=True, **how)
     except Exception as error:  # what comes depends on the driver and on the libraries that are missing
         reason = str(error).strip().splitlines()[-1] if str(error).strip() else type(error).__name__
         raise NoGraphics(
@@ -60,7 +64,7 @@ def depth_buffer(context: moderngl.Context, width: int, height: int, samples: in
 
 def _function(name: str, *takes: Any) -> Callable[..., None] | None:
     try:
-        egl = ctypes.CDLL("libEGL.so.1")
+        egl = ctypes.CDLL(EGL)
     except OSError:
         return None
     find = egl.eglGetProcAddress
