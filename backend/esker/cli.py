@@ -1,4 +1,4 @@
-"""``esker serve | import | history | fork | solve | render | bench | --version``; ``python -m esker`` is the same."""
+"""``esker serve | import | history | fork | solve | export | render | bench | --version``; also ``python -m esker``."""
 
 from __future__ import annotations
 
@@ -32,6 +32,8 @@ def main(argv: list[str] | None = None) -> int:
         return _run("esker.history_command", arguments)
     if arguments[:1] == ["solve"]:
         return _run("esker.solve.command", arguments[1:], _base_of)
+    if arguments[:1] == ["export"]:
+        return _run("esker.export_command", arguments[1:])
     if arguments[:1] == ["render"]:
         return _run("esker.render.command", arguments[1:])
     if arguments[:1] == ["bench"] and len(arguments) > 1 and not arguments[1].startswith("-"):
@@ -67,6 +69,7 @@ def _parser() -> argparse.ArgumentParser:
     commands.add_parser("history", help="what people did on a terrain (see esker history --help)", add_help=False)
     commands.add_parser("fork", help="a new terrain as one was at a clock (see esker fork --help)", add_help=False)
     commands.add_parser("solve", help="solve a terrain file into heights (see esker solve --help)", add_help=False)
+    commands.add_parser("export", help="a terrain for other programs (see esker export --help)", add_help=False)
     commands.add_parser("render", help="draw a terrain: pictures, turntables (see esker render --help)", add_help=False)
     commands.add_parser("bench", help="measure: esker bench NAME --json (without NAME: the list)",
                         usage="esker bench [NAME [OPTIONS]]", description="Without NAME: lists the benchmarks. "

@@ -294,6 +294,39 @@ class Terrain:
             ground = ground + base.window(level, rows, cols, solver.device)
         return HeightWindow(ground, c0 * s, r0 * s, s)
 
+    def export(
+        self,
+        path: str | Path,
+        *,
+        level: int | None = None,
+        samples: int | None = None,
+        detail: bool = True,
+        window: tuple[float, float, float, float] | None = None,
+        global_level: int = contract.DEFAULT_LEVEL,
+        refined_level: int = contract.DEFAULT_REFINED_LEVEL,
+        progress: Callable[[float], None] | None = None,
+    ) -> None:
+        """Write the terrain for other programs, as the suffix of ``path`` says (docs/exporting.md): ``.png``, ``.r16``
+        and ``.raw`` (heightmaps of 16 bits, the raw ones with a .json beside them), ``.tif`` (GeoTIFF), ``.npy``,
+        ``.glb`` (a mesh with colours), ``.zip`` (masks of 8 bits).
+
+        ``level``, or ``samples`` a side (one of EXPORT_LEVELS); ``window``: only the samples of ``level`` in this
+        rectangle (x0, y0, x1, y1) of world metres. ``detail`` and the levels: as in ``heights``; masks and colours
+        always come from the detail. ``progress`` is told the share that is done. Raises ValueError for what cannot be
+        written so, OSError.
+        """
+        from esker.exports import formats  # not with this module: it brings pyproj
+        from esker.exports.ground import Extent
+
+        def step(stage: contract.ExportStage, share: float) -> None:
+            if progress is not None:
+                progress(formats.share_of(stage, share))
+
+        where = Path(path)
+        extent = Extent.of(level, samples, window)
+        levels = {"global_level": global_level, "refined_level": refined_level}
+        formats.export(self, where, formats.format_of(where), extent, detail=detail, step=step, **levels)
+
     def _whole(
         self, level: int, global_level: int, refined_level: int, progress: Callable[[float], None] | None
     ) -> Detail:

@@ -128,7 +128,7 @@ def _made(task: wire.Task, device: str | None, grids: dict[str, Raster], out: Ou
     return ground
 
 
-def _work(task: wire.Task, out: Out) -> wire.Made:
+def work(task: wire.Task, out: Out) -> wire.Made:
     """Tries one device after the other, as rooms do; NumPy, the last, has none that could fail."""
     from esker.exports.formats import sent_name
     from esker.solve.device import candidates
@@ -160,7 +160,7 @@ def main() -> int:
     os.nice(NICENESS)
     out = Out()
     try:
-        out.line(_work(task, out))
+        out.line(work(task, out))
     except Failure as failure:
         out.line(wire.Failed(sentence=str(failure)))
     except MemoryError:

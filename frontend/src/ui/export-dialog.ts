@@ -7,6 +7,7 @@ import {
   bytesWords,
   type ExportedFile,
   Exporter,
+  type ExportPhase,
   engineWords,
   exportWords,
   ofUnreal,
@@ -58,6 +59,7 @@ export class EskExport extends SignalElement {
   declare stage: Stage;
   declare open: boolean;
   #exporter: Exporter | null = null;
+  #shown: ExportPhase = "choose";
 
   constructor() {
     super();
@@ -71,6 +73,21 @@ export class EskExport extends SignalElement {
 
   protected override willUpdate(changed: Map<PropertyKey, unknown>): void {
     if (changed.has("open") && this.open) this.#made().ask();
+  }
+
+  /** What was pressed is gone with its part of the dialog: the keys go to the next one. */
+  protected override updated(): void {
+    const phase = this.#exporter?.phase.peek() ?? "choose";
+    if (phase === this.#shown) return;
+    this.#shown = phase;
+    const next = {
+      choose: "input:checked",
+      done: ".btn.primary",
+      failed: ".btn.primary",
+      work: ".state",
+      load: ".state",
+    };
+    if (this.open) this.renderRoot.querySelector<HTMLElement>(next[phase])?.focus({ preventScroll: true });
   }
 
   #made(): Exporter {
@@ -183,7 +200,7 @@ export class EskExport extends SignalElement {
       </div>`;
     if (phase === "done") return this.#done(exporter);
     const words = exportWords(phase, status);
-    return html`<div class="state">
+    return html`<div class="state" tabindex="-1">
       <p class="says" role="status">${words}</p>
       <progress max="1" .value=${status?.share ?? 0} aria-label=${words}></progress>
       <p class="note">You can close this and go on: the file is saved when it is there. Drawing goes first.</p>

@@ -9,6 +9,9 @@ export const exportStyles = css`
     display: grid;
     gap: 16px;
   }
+  .state:focus {
+    outline: none;
+  }
   fieldset {
     display: grid;
     grid-template-columns: repeat(auto-fill, minmax(232px, 1fr));
