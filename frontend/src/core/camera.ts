@@ -67,6 +67,8 @@ export class Camera {
   /** The land that home looks at. */
   #land: Land = FLAT;
   #canvas: Canvas = { width: 1, height: 1 };
+  /** Views change at once instead of flying: for people who asked for less motion. */
+  calm = false;
 
   /** Starts in orbit mode at the home view of a terrain of `sizeM` metres. */
   constructor(sizeM: number) {
@@ -145,7 +147,7 @@ export class Camera {
    */
   zoom(factor: number, anchor?: Vec3, smooth = false): void {
     if (!(factor > 0) || !Number.isFinite(factor)) return;
-    if (smooth) {
+    if (smooth && !this.calm) {
       this.#flight = null;
       this.#zoomLeft += Math.log(factor);
       this.#zoomAnchor = anchor;
@@ -354,7 +356,7 @@ export class Camera {
 
   #flyTo(to: Pose, durationMs: number): void {
     this.#zoomLeft = 0;
-    if (durationMs <= 0) {
+    if (durationMs <= 0 || this.calm) {
       this.#set(to);
       return;
     }

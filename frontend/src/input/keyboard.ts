@@ -5,12 +5,13 @@ import type { Action } from "./actions.ts";
 import type { KeyPen } from "./keypen.ts";
 import type { Navigation } from "./navigation.ts";
 
-/** Elements that use keys themselves. */
-const EDITABLE = "input, textarea, select, [contenteditable=''], [contenteditable='true']";
+/** Elements in which one types. A switch is an input too, but takes few keys: see `CONTROLS`. */
+const TICKED = ":not([type='checkbox'], [type='radio'], [type='range'], [type='button'], [type='file'])";
+const EDITABLE = `input${TICKED}, textarea, select, [contenteditable=''], [contenteditable='true']`;
 const MODAL = "dialog, wa-dialog, wa-drawer, [role='dialog'], [role='menu'], [role='listbox']";
 /** Elements that Space, Enter and the arrows belong to. */
 const CONTROLS =
-  "button, a[href], summary, [role='button'], [role='slider'], [role='radio'], [role='tab'], wa-button, wa-slider, wa-switch, wa-checkbox, wa-radio, wa-tab, wa-select, wa-dropdown";
+  "button, input, a[href], summary, [role='button'], [role='slider'], [role='radio'], [role='tab'], wa-button, wa-slider, wa-switch, wa-checkbox, wa-radio, wa-tab, wa-select, wa-dropdown";
 const CONTROL_KEYS: ReadonlySet<string> = new Set([
   " ",
   "Enter",

@@ -8,6 +8,8 @@ export interface PageCommands {
   panel(): void;
   help(): void;
   share(): void;
+  /** Opens the dialog that takes the terrain to other programs. */
+  export(): void;
   /** Opens the layers of real ground, or closes them. */
   layers(): void;
   /** Opens the history, or closes it. */
@@ -49,6 +51,7 @@ export function pageActions(
       if (!commands.toNow()) cancel.run();
     });
   put("share", "Share", ["Shift+s"], commands.share);
+  put("export", "Export for other programs", ["Shift+e"], commands.export);
   put("next-region", "Keys go to the next part of the page", ["F6"], () => commands.region(false));
   put("previous-region", "Keys go to the part before", ["Shift+F6"], () => commands.region(true));
   put("help", "Keys and help", ["?"], commands.help);

@@ -89,6 +89,7 @@ export class Stage {
     this.finest = finest;
     this.#viewport = viewport;
     this.camera = new Camera(sizeM);
+    this.camera.calm = this.#calm.matches;
     this.tiles = new TileStore(sizeM, finest, levels);
     this.channels = new ChannelStore(sizeM);
     this.shown = new ShownTerrain(this.tiles, this.channels, () => {

@@ -16,6 +16,8 @@ import { panelStyles } from "./styles/panel.ts";
 import { shared } from "./styles/shared.ts";
 
 const LISTED = 200;
+const PAINT_BY_MOUSE = "Draw on the ground to paint. Alt, or the other end of a pen, does the opposite.";
+const PAINT_BY_HAND = "Draw on the ground to paint. Remove takes it away again, and so does the other end of a pen.";
 
 /** What a stroke is, in a word. */
 export function kindWord(stroke: Stroke): string {
@@ -40,6 +42,7 @@ export class EskStrokePanel extends SignalElement {
   declare stage: Stage;
   declare filter: string;
   #gesture: string | null = null;
+  readonly #coarse = window.matchMedia("(pointer: coarse)");
 
   constructor() {
     super();
@@ -101,7 +104,7 @@ export class EskStrokePanel extends SignalElement {
   #brush(): TemplateResult {
     const { defaults, sizeM } = this.stage;
     return html`
-      <p class="lead">Draw on the ground to paint. Alt, or the other end of a pen, does the opposite.</p>
+      <p class="lead">${this.#coarse.matches ? PAINT_BY_HAND : PAINT_BY_MOUSE}</p>
       <esk-paint-form
         .paint=${defaults.paint.value}
         .sizeM=${sizeM}

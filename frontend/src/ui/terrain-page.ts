@@ -1,7 +1,9 @@
 import { effect, signal } from "@preact/signals-core";
 import { html, nothing, type TemplateResult } from "lit";
+import { aboutDialog } from "./about-dialog.ts";
 import { ApiError, api } from "./api.ts";
 import "./drop-zone.ts";
+import "./export-dialog.ts";
 import { VIEW_ONLY } from "./groundwork.ts";
 import "./help-dialog.ts";
 import "./history-panel.ts";
@@ -12,6 +14,7 @@ import "./laying-bar.ts";
 import "./legend.ts";
 import "./overlay.ts";
 import "./past-bar.ts";
+import { makeRoom } from "./make-room.ts";
 import { importingWords } from "./others.ts";
 import { pageActions } from "./page-actions.ts";
 import { memberName } from "./people.ts";
@@ -35,7 +38,7 @@ import type { PageCommand } from "./top-bar.ts";
 import "./view-bar.ts";
 
 type PanelTab = "stroke" | "ground" | "terrain" | "history";
-type DialogId = "share" | "profile" | "help" | "about";
+type DialogId = "share" | "profile" | "help" | "about" | "export";
 
 const TABS = [
   { value: "stroke", label: "Stroke" },
@@ -73,6 +76,7 @@ export class EskTerrain extends SignalElement {
           panel: () => this.#togglePanel(),
           help: () => this.#show("help"),
           share: () => this.#show("share"),
+          export: () => this.#show("export"),
           layers: () => this.#toggle("ground"),
           history: () => this.#toggle("history"),
           toLand: () => {
@@ -86,7 +90,9 @@ export class EskTerrain extends SignalElement {
       }),
       effect(() => {
         const input = session.stage.value?.input;
-        this.#followSelection(input?.selection.value ?? null, input?.tool.value === "select");
+        const picked = input?.tool.value === "select";
+        this.#followSelection(input?.selection.value ?? null, picked);
+        if (input?.selection.value && picked) requestAnimationFrame(() => this.#makeRoom());
       }),
       effect(() => {
         if ((session.doc.doc.value?.strokes.size ?? 0) > 0) setFlag(session.store, "drawn");
@@ -121,6 +127,15 @@ export class EskTerrain extends SignalElement {
       this.#panel.value = null;
       this.#openedBySelection = false;
     }
+  }
+
+  /** Handles of a stroke that has just been selected come out from under the inspector. */
+  #makeRoom(): void {
+    const stage = this.#session.peek()?.stage.peek();
+    const side = this.renderRoot.querySelector("aside.side")?.getBoundingClientRect();
+    if (!stage || !side || !window.matchMedia(WIDE).matches || stage.input.inputMode.peek() !== "idle") return;
+    const ratio = stage.camera.state.peek().width / Math.max(1, this.clientWidth);
+    makeRoom(stage.camera, stage.input.handles.peek(), (p) => stage.toWindow(p), side, ratio);
   }
 
   #togglePanel(): void {
@@ -240,8 +255,9 @@ export class EskTerrain extends SignalElement {
       ${this.#panel.value === null ? nothing : this.#side(stage, this.#panel.value)} ${this.#ways(stage)}
       <esk-share .stage=${stage} .open=${this.#dialog.value === "share"} @close=${this.#closeDialog}></esk-share>
       <esk-profile .stage=${stage} .open=${this.#dialog.value === "profile"} @close=${this.#closeDialog}></esk-profile>
+      <esk-export .stage=${stage} .open=${this.#dialog.value === "export"} @close=${this.#closeDialog}></esk-export>
       <esk-help .stage=${stage} .open=${this.#dialog.value === "help"} @close=${this.#closeDialog}></esk-help>
-      ${this.#about(stage)}
+      ${aboutDialog(stage, this.#dialog.value === "about", this.#closeDialog)}
     `;
   }
 
@@ -387,29 +403,6 @@ export class EskTerrain extends SignalElement {
       ${icon("info")}<span>${notice.value}</span>
       <button class="icon-btn small" aria-label="Dismiss" @click=${() => stage.session.dismissNotice()}>${icon("xmark")}</button>
     </div>`;
-  }
-
-  #about(stage: Stage): TemplateResult {
-    const { session, sizeM } = stage;
-    const server = session.server.value;
-    const facts = [
-      ["Size", `${(sizeM / 1000).toFixed(sizeM < 10_000 ? 2 : 0)} km a side`],
-      ["Strokes", String(session.doc.doc.value?.strokes.size ?? 0)],
-      ["Operations so far", String(session.doc.doc.value?.clock ?? 0)],
-      ["Finest solved level", `${stage.levels} (${64 * 2 ** stage.levels + 1} samples a side)`],
-      ["Refined where one looks", stage.finest > stage.levels ? `to level ${stage.finest}` : "no"],
-      ["Drawn by", stage.graphics.info.value?.description ?? "–"],
-      ["Solved on", server?.device ?? "–"],
-      ["Server", server ? `Esker ${server.version}` : "–"],
-      [
-        "Round trip",
-        session.connection.rttMs.value === null ? "–" : `${Math.round(session.connection.rttMs.value)} ms`,
-      ],
-    ];
-    return html`<wa-dialog label="About this terrain" light-dismiss ?open=${this.#dialog.value === "about"} @wa-after-hide=${this.#closeDialog}>
-      <dl class="facts">${facts.map(([k, v]) => html`<dt>${k}</dt><dd>${v}</dd>`)}</dl>
-      ${stage.graphics.reason.value ? html`<p class="quiet">${stage.graphics.reason.value}</p>` : nothing}
-    </wa-dialog>`;
   }
 }
 

@@ -248,7 +248,7 @@ describe("keys", () => {
   });
 
   it("are not taken from fields, dialogs and focused controls (SPEC I63)", () => {
-    document.body.innerHTML = `<input id="i"><div role="dialog"><p id="d"></p></div><button id="b"></button><p id="p"></p>`;
+    document.body.innerHTML = `<input id="i"><input id="s" type="checkbox"><div role="dialog"><p id="d"></p></div><button id="b"></button><p id="p"></p>`;
     const meant = (id: string, k: string): boolean => {
       let result = false;
       const listener = (e: KeyboardEvent): void => {
@@ -263,6 +263,8 @@ describe("keys", () => {
     };
     expect(meant("i", "b")).toBe(false);
     expect(meant("d", "b")).toBe(false);
+    expect(meant("s", "b")).toBe(true);
+    expect(meant("s", " ")).toBe(false);
     expect(meant("b", " ")).toBe(false);
     expect(meant("b", "ArrowUp")).toBe(false);
     expect(meant("b", "b")).toBe(true);

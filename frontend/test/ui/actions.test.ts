@@ -23,6 +23,7 @@ function everyAction() {
     panel: vi.fn(),
     help: vi.fn(),
     share: vi.fn(),
+    export: vi.fn(),
     layers: vi.fn(),
     addGround: vi.fn(),
     region: vi.fn(),
@@ -74,8 +75,9 @@ describe("actions", () => {
     actions.get("help")!.run();
     actions.get("inspector")!.run();
     actions.get("share")!.run();
-    const asked = [commands.help, commands.panel, commands.share];
-    expect(asked.map((f) => f.mock.calls.length)).toEqual([1, 1, 1]);
+    actions.get("export")!.run();
+    const asked = [commands.help, commands.panel, commands.share, commands.export];
+    expect(asked.map((f) => f.mock.calls.length)).toEqual([1, 1, 1, 1]);
     actions.get("toggle-strokes")!.run();
     expect(stage.showStrokes.value).toBe(false);
     const overlays = Array.from({ length: OVERLAYS.length }, () => {

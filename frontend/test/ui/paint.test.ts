@@ -169,6 +169,7 @@ function stage(paint: Paint, cursor: Vec3 | null, tool = "paint", overlay: Scene
       tool: signal(tool),
       ink: signal(null),
       handles: signal([]),
+      keyPen: { visual: signal(null) },
     },
     session: {
       canEdit: signal(true),

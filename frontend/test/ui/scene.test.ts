@@ -5,6 +5,7 @@ import { type Doc, fromDocument, fullStroke } from "../../src/doc/document.ts";
 import type { Member, MemberPresence, Stroke } from "../../src/generated/contract.ts";
 import { cursorVisuals, insidePoints, type People, reliefOf, shapeOf, strokeVisuals } from "../../src/ui/scene.ts";
 import { hexColour, inkOn, strokeColour } from "../../src/ui/styles/colours.ts";
+import { contrast, parseColour } from "./contrast.ts";
 
 function stroke(id: string, change: Partial<Stroke> = {}): Stroke {
   return fullStroke({
@@ -150,7 +151,15 @@ describe("colours", () => {
   });
 
   it("carry the ink that reads on them", () => {
-    expect(inkOn("#ffffff")).toBe("#14191f");
+    expect(inkOn("#ffffff")).toBe("#000000");
     expect(inkOn("#7c4dd6")).toBe("#ffffff");
+  });
+
+  it("are read on any ground: 4.5 : 1 at least (WCAG 1.4.3)", () => {
+    for (let i = 0; i < 512; i++) {
+      const [r, g, b] = [(i >> 6) & 7, (i >> 3) & 7, i & 7].map((v) => Math.round((v * 255) / 7));
+      const hex = `#${[r, g, b].map((v) => v!.toString(16).padStart(2, "0")).join("")}`;
+      expect(contrast(parseColour(hex), parseColour(inkOn(hex))), hex).toBeGreaterThan(4.5);
+    }
   });
 });

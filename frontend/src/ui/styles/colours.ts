@@ -40,9 +40,11 @@ export function withAlpha(colour: Rgba, alpha: number): Rgba {
   return [colour[0], colour[1], colour[2], alpha];
 }
 
-/** White or near-black, whichever reads better on the colour (WCAG relative luminance). */
-export function inkOn(hex: string): "#ffffff" | "#14191f" {
+/** White or black, whichever reads better: at least 4.58 : 1 on every colour (WCAG 2.2 relative luminance). */
+export function inkOn(hex: string): "#ffffff" | "#000000" {
   const linear = (c: number): number => (c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4);
   const [r, g, b] = hexColour(hex);
-  return 0.2126 * linear(r) + 0.7152 * linear(g) + 0.0722 * linear(b) > 0.36 ? "#14191f" : "#ffffff";
+  const luminance = 0.2126 * linear(r) + 0.7152 * linear(g) + 0.0722 * linear(b);
+  // (L + 0.05) / 0.05 against 1.05 / (L + 0.05).
+  return luminance + 0.05 > Math.sqrt(0.05 * 1.05) ? "#000000" : "#ffffff";
 }

@@ -124,6 +124,7 @@ export const landingStyles = css`
   .join {
     display: flex;
     flex: 1 1 250px;
+    min-width: 0;
     max-width: 340px;
     padding: 4px;
     gap: 4px;

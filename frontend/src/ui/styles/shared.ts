@@ -99,7 +99,7 @@ export const shared = css`
     background: var(--esk-accent-hover);
   }
   .btn.outline {
-    border-color: var(--esk-line-strong);
+    border-color: var(--esk-edge);
   }
   .icon-btn {
     width: 40px;
@@ -124,7 +124,7 @@ export const shared = css`
     height: 36px;
     min-width: 0;
     padding: 0 0.75em;
-    border: 1px solid var(--esk-line-strong);
+    border: 1px solid var(--esk-edge);
     border-radius: 10px;
     background: var(--esk-field);
     color: var(--esk-text);

@@ -236,6 +236,27 @@ export const terrainPageStyles = css`
         transform: translateY(24px);
       }
     }
+    /* A small window on its side, or a page at 200 %: the sheet stands beside the picture. */
+    @media (max-height: 440px) and (min-width: 480px) {
+      :host([sheet]) {
+        --sheet: 0px;
+        --beside: min(46%, 300px);
+      }
+      :host([sheet]) .viewport {
+        right: calc(var(--beside) - var(--esk-radius));
+        bottom: 0;
+      }
+      :host([sheet]) esk-tools {
+        left: calc((100% - var(--beside)) / 2);
+      }
+      .side {
+        top: calc(var(--edge) + 52px);
+        left: auto;
+        width: var(--beside);
+        height: auto;
+        border-radius: var(--esk-radius) 0 0 0;
+      }
+    }
     .hint,
     esk-toasts {
       bottom: calc(118px + var(--sheet) + env(safe-area-inset-bottom));
