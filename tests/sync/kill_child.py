@@ -1,6 +1,8 @@
-"""A room with its journal in a process of its own, to be killed. Writes each acknowledged op's id to stdout.
+"""Rooms with their journals in processes that are killed: a process that forks one for each line it reads.
 
-``python kill_child.py DATA FIRST``: client c submits ops c:FIRST, c:FIRST+1 … as fast as the room takes them.
+``python -m tests.sync.kill_child``: for each line ``DATA FIRST`` on stdin a fork's client c submits ops c:FIRST,
+c:FIRST+1 … as fast as the room takes them, and writes the id of each that is acknowledged to stdout; ``gone`` follows
+when it has ended. Forks share what took long to load.
 """
 
 from __future__ import annotations
@@ -48,7 +50,7 @@ class _NoTiles:
         return None
 
 
-async def main(data: Path, first: int) -> None:
+async def life(data: Path, first: int) -> None:
     """Runs until it is killed."""
     journal = Journal(data)
     if not journal.exists("t"):
@@ -93,5 +95,17 @@ def _stroke(stroke_id: str) -> c.Stroke:
     return c.Stroke(id=stroke_id, kind="profile", first=(0, 0, 0), last=(1, 1, 1), curve=((0, 0),))
 
 
+def main() -> None:
+    """One fork for each line."""
+    for line in sys.stdin:
+        folder, first = line.rsplit(" ", 1)
+        child = os.fork()
+        if child == 0:
+            asyncio.run(life(Path(folder), int(first)))
+        os.write(2, f"{child}\n".encode())
+        os.waitpid(child, 0)
+        os.write(1, b"gone\n")
+
+
 if __name__ == "__main__":
-    asyncio.run(main(Path(sys.argv[1]), int(sys.argv[2])))
+    main()

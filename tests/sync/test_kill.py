@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import random
 import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -18,31 +20,46 @@ KILLS = 50
 PARTS = 5
 
 
-def _life(data: Path, first: int, seconds: float) -> dict[str, int]:
+@pytest.fixture(scope="module")
+def zygote() -> Iterator[subprocess.Popen[str]]:
+    """What the lives are forked from."""
+    command = [sys.executable, "-m", "tests.sync.kill_child"]
+    with subprocess.Popen(
+        command, cwd=ROOT, text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    ) as process:
+        yield process
+        assert process.stdin is not None
+        process.stdin.close()
+
+
+def _life(zygote: subprocess.Popen[str], data: Path, first: int, seconds: float) -> dict[str, int]:
     """Runs a room until it is killed ``seconds`` after its first acknowledgement; what it acknowledged."""
-    command = [sys.executable, str(ROOT / "tests" / "sync" / "kill_child.py"), str(data), str(first)]
-    with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as child:
-        assert child.stdout is not None
-        assert child.stderr is not None
-        head = child.stdout.readline()
-        if not head:
-            pytest.fail(child.stderr.read().decode())
-        time.sleep(seconds)
-        child.send_signal(signal.SIGKILL)
-        text = (head + child.stdout.read()).decode()
-        child.stderr.read()
+    assert zygote.stdin is not None
+    assert zygote.stdout is not None
+    assert zygote.stderr is not None
+    zygote.stdin.write(f"{data} {first}\n")
+    zygote.stdin.flush()
+    child = int(zygote.stderr.readline())
+    line = zygote.stdout.readline()
+    if line == "gone\n":
+        pytest.fail("A life ended by itself: run tests/sync/kill_child.py to see why.")
+    time.sleep(seconds)
+    os.kill(child, signal.SIGKILL)
+    lines = []
     # The last line may be cut in two by the kill: then nobody has read it as an acknowledgement.
-    lines = text.split("\n")[:-1]
-    return {op_id: int(clock) for op_id, clock in (line.split() for line in lines)}
+    while not line.endswith("gone\n"):
+        lines.append(line)
+        line = zygote.stdout.readline()
+    return {op_id: int(clock) for op_id, clock in map(str.split, lines)}
 
 
 @pytest.mark.parametrize("part", range(PARTS))
-def test_killed_under_load(part: int, tmp_path: Path) -> None:
+def test_killed_under_load(zygote: subprocess.Popen[str], part: int, tmp_path: Path) -> None:
     rng = random.Random(part)
     acked: dict[str, int] = {}
     for _ in range(KILLS // PARTS):
         first = max((int(op_id.split(":")[1]) for op_id in acked), default=-1)
-        new = _life(tmp_path, (first // 1000 + 1) * 1000 if acked else 0, rng.uniform(0, 0.12))
+        new = _life(zygote, tmp_path, (first // 1000 + 1) * 1000 if acked else 0, rng.uniform(0, 0.12))
         assert new
         assert not acked.keys() & new.keys()
         acked |= new
