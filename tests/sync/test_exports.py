@@ -228,6 +228,22 @@ def test_files_are_kept_for_a_while_and_within_bounds(live: LiveServer) -> None:
     assert live.http("GET", f"/api/terrains/{terrain}/exports/{jobs[2]}", secret=secret)[1]["code"] == "no_export"
 
 
+def test_the_estimate_follows_the_pace_of_this_server(live: LiveServer, maker: Maker) -> None:
+    """SPEC X30."""
+    service = live.assembly.exports
+    assert service is not None
+    terrain, secret = live.create(**titled("slow"))
+    path = f"/api/terrains/{terrain}/exports/estimate"
+    before = live.http("POST", path, WISH, secret)[1]["seconds"]
+    maker.gate.clear()
+    job = begin(live, terrain, secret)[1]["id"]
+    wait(live, terrain, secret, job, "detail")
+    service._now = lambda: time.monotonic() + 9.0 * before
+    maker.gate.set()
+    wait(live, terrain, secret, job, "done")
+    assert live.http("POST", path, WISH, secret)[1]["seconds"] > 3 * before
+
+
 def test_a_full_disk(live: LiveServer, monkeypatch: pytest.MonkeyPatch) -> None:
     """SPEC X23."""
     monkeypatch.setattr("esker.exports.formats.free_bytes", lambda _: 1 << 20)
@@ -306,6 +322,21 @@ def test_a_cancelled_process_is_gone(tmp_path: Path) -> None:
 
     asyncio.run(cancelled())
     assert not any("esker.exports" in process.cmdline() for process in psutil.Process().children())
+
+
+def test_a_process_that_the_system_kills(tmp_path: Path) -> None:
+    """SPEC X23: for want of memory; the server goes on."""
+
+    async def killed() -> None:
+        def kill(*_: object) -> None:
+            for process in psutil.Process().children():
+                if "esker.exports" in process.cmdline():
+                    process.kill()
+
+        await run.make(task_of(ridge(), tmp_path), kill)
+
+    with pytest.raises(ExportFailed, match="want of memory"):
+        asyncio.run(killed())
 
 
 def test_the_process_ends_with_the_server(tmp_path: Path) -> None:

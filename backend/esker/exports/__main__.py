@@ -5,6 +5,7 @@ It ends when its stdin ends, so that it never outlives the server, and stands be
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import logging
 import os
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 log = logging.getLogger("esker.exports")
 
 NICENESS: Final = 15
+OOM_SCORE: Final = "700"
 STEP_SECONDS: Final = 0.1
 EXPECTED_CYCLES: Final = 10
 """Steps of the solver that most scenes take to rest, for the share only."""
@@ -63,6 +65,13 @@ def _end_with_parent() -> None:
     while sys.stdin.buffer.read(4096):
         pass
     os._exit(9)
+
+
+def _step_back() -> None:
+    """Behind everything that rooms do; where memory runs out, this process goes and not the server."""
+    os.nice(NICENESS)
+    with contextlib.suppress(OSError):
+        Path("/proc/self/oom_score_adj").write_text(OOM_SCORE, encoding="ascii")
 
 
 def _grids(task: wire.Task) -> dict[str, Raster]:
@@ -157,7 +166,7 @@ def main() -> int:
     """Runs one task. The exit status is 0 whenever the last line says how it ended."""
     task = wire.Task.model_validate_json(sys.stdin.buffer.readline())
     threading.Thread(target=_end_with_parent, name="parent", daemon=True).start()
-    os.nice(NICENESS)
+    _step_back()
     out = Out()
     try:
         out.line(work(task, out))

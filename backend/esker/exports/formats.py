@@ -36,17 +36,17 @@ class Format(NamedTuple):
 
 
 FORMATS: Final[dict[ExportFormat, Format]] = {
-    "png16": Format((".png",), write_png, "image/png", 1.6),
-    "r16": Format((".r16", ".raw"), write_r16, "application/zip", 1.7, sent=".zip"),
+    "png16": Format((".png",), write_png, "image/png", 1.4),
+    "r16": Format((".r16", ".raw"), write_r16, "application/zip", 1.4, sent=".zip"),
     "geotiff": Format((".tif", ".tiff"), write_geotiff, "image/tiff", 2.6),
     "npy": Format((".npy",), write_npy, "application/octet-stream", 4.0),
     "glb": Format((".glb",), write_glb, "model/gltf-binary", 58.5, covers=True, most=contract.EXPORT_MESH_SAMPLES),
-    "masks": Format((".zip",), write_masks, "application/zip", 1.2, covers=True),
+    "masks": Format((".zip",), write_masks, "application/zip", 2.1, covers=True),
 }
 SUFFIXES: Final = {suffix: name for name, made in FORMATS.items() for suffix in made.suffixes}
 
-PLAIN_SECONDS, DETAIL_SECONDS, START_SECONDS = 1.2, 8.0, 2.5
-"""Of a million samples without and with detail, and of the process: two cores (bench: docs/exporting.md)."""
+PLAIN_SECONDS, DETAIL_SECONDS, START_SECONDS = 0.4, 1.0, 3.0
+"""Of processor time: of a million samples without and with detail, and of the process (docs/exporting.md)."""
 FALLEN: Final = {"solving": (0.0, 0.3), "detail": (0.3, 0.9), "writing": (0.9, 1.0)}
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import signal
 import sys
 from collections.abc import Callable
 from typing import Final
@@ -21,6 +22,7 @@ WALL_SECONDS: Final = 3600.0
 """Against a driver that hangs; without any device the largest export takes many minutes."""
 KEPT_ERRORS: Final = 4096
 FAILED: Final = "The server failed to make this export. It is in its log."
+KILLED: Final = "The system ended this export, most likely for want of memory. Take fewer samples."
 TOO_LONG: Final = "This export took too long. Take fewer samples."
 
 
@@ -73,7 +75,7 @@ async def _talk(process: asyncio.subprocess.Process, task: wire.Task, on_progres
     finally:
         errors.cancel()
         await asyncio.gather(errors, return_exceptions=True)
-    raise ExportFailed(FAILED)
+    raise ExportFailed(KILLED if process.returncode == -signal.SIGKILL else FAILED)
 
 
 async def _tail(stream: asyncio.StreamReader) -> str:

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from esker import contract as c
-from esker.contract import ExportStage, ExportStatus, ExportWish
+from esker.contract import ExportEstimate, ExportStage, ExportStatus, ExportWish
 from esker.exports import formats, wire
 from esker.exports.run import FAILED, ExportFailed, Progress
 from esker.session.core import Denied
@@ -35,6 +35,8 @@ SPARE_BYTES: Final = 64 << 20
 STEM: Final = 48
 OVER: Final = frozenset({"done", "failed", "cancelled"})
 WAITING: Final = "Waiting for its turn."
+PACE: Final = (0.3, 30.0)
+"""Bounds of how much slower than ``formats.estimate`` this server is taken to be."""
 
 Maker = Callable[[wire.Task, Progress], Awaitable[wire.Made]]
 
@@ -112,6 +114,7 @@ class Exports:
         self._jobs: dict[str, Job] = {}
         self._turn = asyncio.Semaphore(1)
         self._closing = False
+        self._pace = 1.0
         shutil.rmtree(folder, ignore_errors=True)
 
     # --- for routes ---------------------------------------------------------------------------------------------
@@ -137,6 +140,13 @@ class Exports:
         job = self._jobs[job_id] = Job(job_id, terrain, link.id, person, wish, folder, status)
         job.task = asyncio.create_task(self._run(job, self._task(job, document)))
         return job.status
+
+    def estimate(self, wish: ExportWish) -> ExportEstimate:
+        """About what an export costs, at the pace of the last ones here. Raises Cannot."""
+        if sentence := formats.refusal(wish):
+            raise Cannot(400, "malformed", sentence)
+        plain = formats.estimate(wish)
+        return plain.model_copy(update={"seconds": round(plain.seconds * self._pace, 1)})
 
     def status(self, terrain: str, job_id: str, link: Link) -> ExportStatus:
         """Where an export stands. Raises Cannot."""
@@ -196,14 +206,18 @@ class Exports:
         )
 
     async def _run(self, job: Job, task: wire.Task) -> None:
-        started = self._now()
         try:
             async with self._turn:
+                started = self._now()
                 job.at("solving", text="")
                 made = await self._maker(task, lambda stage, share: job.at(stage, share=share))
             told = made.model_dump(exclude={"type"})
             job.at("done", share=1.0, **told)
-            log.info("export %s of %s in %.1f s", made.file, job.terrain, self._now() - started)
+            took = self._now() - started
+            low, high = PACE
+            pace = min(max(took / formats.estimate(job.wish).seconds, low), high)
+            self._pace = 0.5 * (self._pace + pace)
+            log.info("export %s of %s in %.1f s", made.file, job.terrain, took)
         except asyncio.CancelledError:
             job.at("cancelled", text="The export was cancelled.")
         except (ExportFailed, Denied) as error:

@@ -8,9 +8,8 @@ from fastapi import FastAPI, Query, Request, Response
 from fastapi.responses import FileResponse
 
 from esker import contract as c
-from esker.exports import formats
 from esker.exports.service import Cannot, Exports
-from esker.server.answers import AnyLink, Problem, address, answer, limited
+from esker.server.answers import AnyLink, address, answer, limited
 from esker.session.limits import RateByKey
 
 EXPORTS: Final = (1 / 6, 20)
@@ -29,9 +28,7 @@ def add_exports(app: FastAPI, exports: Exports) -> None:
 
     @app.post(f"{path}/estimate")
     async def estimate(terrain: str, link: AnyLink, wish: c.ExportWish) -> c.ExportEstimate:  # noqa: ARG001
-        if sentence := formats.refusal(wish):
-            raise Problem(400, "malformed", sentence)
-        return formats.estimate(wish)
+        return exports.estimate(wish)
 
     @app.post(path, status_code=202)
     async def begin(

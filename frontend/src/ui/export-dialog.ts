@@ -184,7 +184,7 @@ export class EskExport extends SignalElement {
   #costs(exporter: Exporter): string {
     const found = exporter.estimate.value;
     if (found === null) return "";
-    return `About ${bytesWords(found.bytes)}, ready in ${waitWords(found.seconds)} on an idle server.`;
+    return `About ${bytesWords(found.bytes)}, ready in ${waitWords(found.seconds)}.`;
   }
 
   #state(exporter: Exporter): TemplateResult {
