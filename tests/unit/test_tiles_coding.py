@@ -35,7 +35,8 @@ def in_parts(now: Ints, own: Ints, before: Ints | None, then: Ints | None) -> tu
         if then is not None:
             options.append((Predictor.PREVIOUS, change - (own_wide - then)))
     kind, residual = min(options, key=lambda option: cost(option[1]))
-    return kind, pack_smallest(residual, (Filter.LATTICE,))
+    plain = pack_smallest(residual, ())
+    return kind, plain if len(plain[2]) <= coding.FEW else pack_smallest(residual, (Filter.LATTICE,))
 
 
 def example(rng: Rng, kind: int) -> tuple[Ints, Ints, Ints | None, Ints | None]:

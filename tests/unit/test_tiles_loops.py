@@ -40,6 +40,17 @@ def test_samples_are_steadied_and_rounded_as_in_numpy(scale: float) -> None:
         np.testing.assert_array_equal(found, quantise(want, LEVEL, SIZE_M, kept, step))
 
 
+def test_what_is_not_finite_is_found() -> None:
+    rng = np.random.default_rng(4)
+    ground = heights(rng, 1e30)
+    ground[7, 9] = np.finfo(np.float32).max
+    assert loops.finite(ground)
+    for value in (np.inf, -np.inf, np.nan, -np.nan):
+        broken = ground.copy()
+        broken[-1, -1] = value
+        assert not loops.finite(broken)
+
+
 @pytest.mark.parametrize("cells", [4, 64])
 def test_a_changed_sample_marks_every_block_that_it_lies_in(cells: int) -> None:
     rng = np.random.default_rng(cells)

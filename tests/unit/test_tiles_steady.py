@@ -101,6 +101,18 @@ def test_signs_of_life_while_settling_are_ignored(settled: Pyramid) -> None:
     assert settled.put(3, 0, preview(0, False), False) == 1
 
 
+def test_coarse_previews_that_come_behind_the_finest_are_known_when_the_ground_settles(settled: Pyramid) -> None:
+    """A solver that begins with the ground before brings the finest preview first."""
+    for level in (0, LEVELS, *range(1, LEVELS)):
+        settled.put(2, level, preview(level, True), False)
+    for level in range(LEVELS + 1):
+        settled.put(2, level, truth(level, True), True)
+    stamps = [now(settled, level).versions.copy() for level in range(LEVELS)]
+    for level in range(LEVELS):
+        settled.put(3, level, preview(level, True), False)
+        assert np.array_equal(now(settled, level).versions, stamps[level]), "shown as settled"
+
+
 def test_without_a_settled_solve_of_the_same_clock_previews_are_shown_as_they_are() -> None:
     steadier = Steadier()
     a, b = preview(0, False), truth(0, False)

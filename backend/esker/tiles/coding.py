@@ -1,7 +1,8 @@
 """A tile of a level that is solved as a whole, from its samples to its payload in one compiled piece (DESIGN 6).
 
 It lets go of the interpreter's lock from beginning to end, so that tiles of a frame are coded in two threads. What it
-makes is, to the bit, what ``plans._options``, ``codec.cost`` and ``filters.pack_smallest`` make one after the other.
+makes is, to the bit, what ``plans._options``, ``codec.cost`` and ``filters.pack_smallest`` make one after the other,
+but for tiles of ``FEW`` bytes, which are not tried as a lattice.
 """
 
 from __future__ import annotations
@@ -20,6 +21,8 @@ from esker.tiles.codec import Ints, Wide
 
 PREDICTORS: Final = (Predictor.PARENT, Predictor.HELD, Predictor.PREVIOUS)
 LOGS: Final = np.log2(np.arange(1, 1025, dtype=np.float32))
+FEW: Final = 96
+"""A tile of at most so many bytes is not tried as a lattice, too: most of a segment's, and half of their time."""
 IN_TWO: Final = 4
 """Tiles from which on a second thread is worth being woken."""
 _local = threading.local()
@@ -50,7 +53,7 @@ def code(now: Ints, own: Wide, before: Ints | None, then: Wide | None) -> Coded 
     plain, lattice = _room()
     tables = LOGS, entropy.WEIGHTS, entropy.RATES
     option, shift, size, small = entropy.encode_cheapest(
-        samples, own.astype(np.int64), had, moved, known, TILE_MAX_SHIFT, *tables, plain, lattice
+        samples, own.astype(np.int64), had, moved, known, TILE_MAX_SHIFT, *tables, plain, lattice, FEW
     )
     if option < 0:
         return None
@@ -65,6 +68,15 @@ def in_two(work: Callable[[A], B], items: Sequence[A]) -> list[B]:
     second = [_second.submit(lambda part: [work(item) for item in part], items[half:])] if half < len(items) else []
     first = [work(item) for item in items[:half]]
     return first + [made for future in second for made in future.result()]
+
+
+def both(work: Callable[[A], object], first: A, second: A) -> None:
+    """``work`` of the first, and meanwhile of the second in a second thread."""
+    other = _second.submit(work, second)
+    try:
+        work(first)
+    finally:
+        other.result()
 
 
 def _room() -> NDArray[np.uint8]:

@@ -257,8 +257,11 @@ def encode_cheapest(
     rates: Longs,
     plain: Bytes,
     lattice: Bytes,
+    few: int,
 ) -> tuple[int, int, int, int]:
     """Which predictor, its shift, and the bytes written of ``plain`` and ``lattice``; predictor -1: none will do.
+
+    Where ``plain`` takes no more than ``few`` bytes ``lattice`` is not tried, -1.
 
     It is here, and not where it is called (``coding.code``), since what is kept of compiled code is made anew when the
     text of its own file changes, not that of others.
@@ -286,12 +289,9 @@ def encode_cheapest(
     while shift < most_shift and not (bits >> shift) & 1:
         shift += 1
     best = best >> shift
-    return (
-        chosen,
-        shift,
-        _encode(best, False, weights, rates, plain),
-        _encode(best, True, weights, rates, lattice),
-    )
+    size = _encode(best, False, weights, rates, plain)
+    small = -1 if 0 <= size <= few else _encode(best, True, weights, rates, lattice)
+    return chosen, shift, size, small
 
 
 def encode(residual: NDArray[np.signedinteger], lattice: bool = False) -> bytes | None:

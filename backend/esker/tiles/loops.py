@@ -43,6 +43,17 @@ def steadied(heights: Floats, before: Floats, correction: Floats, out: Floats) -
 
 
 @_compiled
+def finite(heights: Floats) -> bool:
+    """Whether all of (n, m) float32 are: infinities and NaN have the largest exponent."""
+    bits = heights.view(np.int32)
+    most = np.int32(0)
+    for r in range(bits.shape[0]):
+        for k in range(bits.shape[1]):
+            most = max(most, bits[r, k] & np.int32(0x7FFFFFFF))
+    return bool(most < np.int32(0x7F800000))
+
+
+@_compiled
 def quantised(heights: Floats, kept: Ints, scale: np.float32, quanta: int, limit: np.float32, out: Ints) -> None:
     """``pyramid.quantise`` of ``heights`` with ``kept``, (n, n).
 
@@ -61,19 +72,19 @@ def quantised(heights: Floats, kept: Ints, scale: np.float32, quanta: int, limit
 
 @_compiled
 def changed(new: Ints, old: Ints, cells: int, out: NDArray[np.bool_]) -> None:
-    """Which closed blocks of ``cells`` + 1 samples a side hold a sample that differs; out: (m, m) of False.
+    """Which closed blocks of ``cells`` + 1 samples a side hold a sample that differs; out: (m, n) of False.
 
     Most rows of a put are as they were: each is looked at as a whole first.
     """
-    side = out.shape[0]
+    rows, cols = out.shape
     for r in range(new.shape[0]):
         whole = np.int32(0)
         for k in range(new.shape[1]):
             whole |= new[r, k] ^ old[r, k]
         if whole == 0:
             continue
-        first, last = max((r - 1) // cells, 0), min(r // cells, side - 1)
-        for b in range(side):
+        first, last = max((r - 1) // cells, 0), min(r // cells, rows - 1)
+        for b in range(cols):
             differs = np.int32(0)
             for k in range(b * cells, (b + 1) * cells + 1):
                 differs |= new[r, k] ^ old[r, k]

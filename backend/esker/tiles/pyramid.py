@@ -98,7 +98,11 @@ def follow_parents(samples: Ints, then: Level | None, now: Level | None, ratio: 
     if not 0 < len(moved) <= FOLLOW_TILES:
         return samples
     out = samples.copy()
-    loops.followed(samples, then.samples, now.samples, moved, TILE_CELLS, 9 - ratio, SAMPLE_LIMIT, out)
+
+    def follow(tiles: NDArray[np.int64]) -> None:
+        loops.followed(samples, then.samples, now.samples, tiles, TILE_CELLS, 9 - ratio, SAMPLE_LIMIT, out)
+
+    coding.both(follow, *np.array_split(moved, 2))
     return out
 
 
@@ -193,9 +197,9 @@ class Pyramid:
         ``steady``), then shown as they were but for coarse steps (``quantise``); settled ones are rounded exactly.
         With ``show`` False a coarse preview is only noted: its level is injected from the finest preview, which is
         expected soon (docs/decisions/0014-consistent-previews.md). Between a complete preview and the settled levels
-        of the same clock a solver may repeat coarse levels as a sign of life: these are ignored, as they would only
-        move the ground there and back. Raises ValueError for a wrong level or shape or heights that are not finite,
-        and changes nothing then.
+        of the same clock a solver may repeat coarse levels as a sign of life, or bring them only now: these are not
+        shown, as they would only move the ground there and back. Raises ValueError for a wrong level or shape or heights
+        that are not finite, and changes nothing then.
         """
         if not 0 <= level <= self.levels:
             raise ValueError(f"level {level} is not one of 0..{self.levels}")
@@ -204,11 +208,11 @@ class Pyramid:
             raise ValueError(f"level {level} has {n}x{n} samples, not {heights.shape}")
         if level > self.top:
             return 0
-        if not np.isfinite(heights).all():
+        if not loops.finite(heights):
             raise ValueError(f"level {level} has heights that are not finite")
         steadier = self._steadiers[level]
         if not settled and level < self.top and self._previewed == clock:
-            steadier.note(clock, heights)
+            steadier.late(clock, heights)
             return 0
         if settled:
             steadier.settled(clock, heights)

@@ -40,6 +40,11 @@ class Steadier:
         """A preview that is not shown: remembered as what the settled heights of its clock will be compared with."""
         self._preview = (clock, heights)
 
+    def late(self, clock: int, heights: Heights) -> None:
+        """A preview that comes behind a finer one of its clock and is not shown: noted, unless one was before."""
+        if self._preview is None or self._preview[0] != clock:
+            self.note(clock, heights)
+
     def preview(self, clock: int, heights: Heights) -> Heights:
         """What to show for a preview; ``heights`` itself when nothing is known."""
         self.note(clock, heights)
