@@ -2,6 +2,8 @@
 const NOISE_TEXELS: f32 = 256.0;
 // Steps of the march for what the water mirrors.
 const MIRROR_STEPS: i32 = 4;
+// What is left of the height on faces: the noise there is drawn out downhill, as water cuts rock.
+const DRAWN: f32 = 0.38;
 
 fn noise_sample(at: vec2f, dx: vec2f, dy: vec2f, scale: f32) -> vec4f {
   let k = 1.0 / scale;
@@ -12,11 +14,11 @@ fn noise_sample(at: vec2f, dx: vec2f, dy: vec2f, scale: f32) -> vec4f {
 // On the plane that the surface faces most; on faces drawn out downhill, as water cuts rock.
 fn rock_noise(p: vec3f, n: vec3f, f: Footprint, scale: f32) -> vec4f {
   let a = abs(n);
-  if (a.z > 0.62) { return ground_noise(p, f, scale, vec2f(0.829, 0.559)); }
+  if (a.z > 0.70) { return ground_noise(p, f, scale, vec2f(0.829, 0.559)); }
   let east = a.x > a.y;
   let s = noise_sample(
-    vec2f(select(p.x, p.y, east), p.z * 0.6), vec2f(select(f.dx.x, f.dx.y, east), f.dx.z * 0.6),
-    vec2f(select(f.dy.x, f.dy.y, east), f.dy.z * 0.6), scale);
+    vec2f(select(p.x, p.y, east), p.z * DRAWN), vec2f(select(f.dx.x, f.dx.y, east), f.dx.z * DRAWN),
+    vec2f(select(f.dy.x, f.dy.y, east), f.dy.z * DRAWN), scale);
   return select(vec4f(s.rg, s.b, 0.5), vec4f(s.rg, 0.5, s.b), east);
 }
 

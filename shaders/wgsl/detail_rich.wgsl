@@ -3,6 +3,8 @@
 
 // Steps of the march for what the water mirrors.
 const MIRROR_STEPS: i32 = 16;
+// What is left of the height on faces: the noise there is drawn out downhill, as water cuts rock.
+const DRAWN: f32 = 0.38;
 
 // `scale`: metres (or whatever `at` is in) that the texture covers once.
 fn noise_sample(at: vec2f, dx: vec2f, dy: vec2f, scale: f32) -> vec4f {
@@ -18,7 +20,7 @@ fn rock_noise(p: vec3f, n: vec3f, f: Footprint, scale: f32) -> vec4f {
   w /= w.x + w.y + w.z;
   let flat = ground_noise(p, f, scale, vec2f(0.829, 0.559));
   if (w.z > 0.97) { return flat; }
-  let drawn = vec2f(1.0, 0.6);
+  let drawn = vec2f(1.0, DRAWN);
   let east = noise_sample(p.yz * drawn, f.dx.yz * drawn, f.dy.yz * drawn, scale);
   let north = noise_sample(p.xz * drawn, f.dx.xz * drawn, f.dy.xz * drawn, scale);
   // A face's own gradient runs along it and down: only the part along it turns a normal that is told by dz/dx, dz/dy.

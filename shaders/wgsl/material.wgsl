@@ -85,30 +85,37 @@ fn fine_slope(s: Site, strength: f32) -> vec2f {
     + 0.36 * g.w * noise_slope(s.fine3);
 }
 
-// Beds of rock, tilted and warped: x 0..1 the bed's tone, y its ledge (-1 undercut .. 1 lit top), thick and thin ones.
+// Beds of rock, tilted and warped: a column of noise that is read along the height and drawn out sideways, so beds are thick
+// and thin, run out, and fade before they are finer than pixels. rg as the noise; a: of a bed's top (above 0.5) or foot.
 fn strata(s: Site) -> vec4f {
   let unit = view.size / 4096.0;
-  let z = (s.p.z + 0.09 * s.p.x - 0.05 * s.p.y) / unit + (s.macro2.r - 0.5) * 140.0 + (s.fine1.r - 0.5) * 11.0;
-  let thick = z / 34.0;
-  let thin = z / 7.3 + 0.7 * sin(thick * 2.1);
-  // Beds finer than a few pixels are not drawn.
-  let rise = s.footprint / unit;
-  let seen = vec2f(1.0 - smoothstep(6.0, 17.0, rise), 1.0 - smoothstep(1.4, 3.6, rise));
-  let wave = vec2f(sin(6.2831853 * thick), sin(6.2831853 * thin)) * seen;
-  let slant = vec2f(cos(6.2831853 * thick), cos(6.2831853 * thin)) * seen;
-  return vec4f(wave, slant);
+  let dip = vec3f(0.11, -0.06, 1.0);
+  let run = vec3f(0.034, 0.026, 0.0);
+  let warp = (s.macro2.r - 0.5) * 62.0 + (s.fine1.r - 0.5) * 7.0;
+  let at = vec2f(dot(s.p, run), dot(s.p, dip)) / unit + vec2f(0.0, warp);
+  return noise_sample(at, vec2f(dot(s.f.dx, run), dot(s.f.dx, dip)) / unit, vec2f(dot(s.f.dy, run), dot(s.f.dy, dip)) / unit, 330.0);
 }
 
-// Weathered rock: beds stand out as ledges, gullies and grain between.
+// Dark lines where the ridges of a noise run together.
+fn cracks(ridged: f32) -> f32 {
+  return smoothstep(0.66, 0.90, ridged);
+}
+
+// Weathered rock: beds that stand out as ledges, streaks and joints down the faces, broad stains.
 fn rock(s: Site, light: vec3f, dark: vec3f, relief: f32) -> Material {
   let beds = strata(s);
-  let grain = 0.40 * s.fine1.g + 0.30 * s.fine2.g + 0.18 * s.macro2.g + 0.12 * s.fine3.r;
-  let tone = clamp((grain - 0.5) * 1.9 + 0.40 + beds.x * 0.10 + beds.y * 0.07, 0.0, 1.0);
-  // Warm where it is fresh, grey where lichen has had time, dark where water runs.
-  let hue = mix(vec3f(0.93, 0.99, 1.07), vec3f(1.06, 1.0, 0.92), smoothstep(0.3, 0.7, s.macro2.r + (s.fine2.r - 0.5) * 0.4));
-  let seep = smoothstep(0.05, 0.4, s.curvature + (s.fine1.r - 0.5) * 0.3);
-  let ledge = s.n.xy * (beds.z * 0.16 + beds.w * 0.11) * min(s.steep, 1.2);
-  return broken(Material(mix(dark, light, tone) * hue * (1.0 - 0.22 * seep), fine_slope(s, relief) + ledge, 0.0, 0.0), s, 1.0);
+  let bed = smoothstep(0.38, 0.60, beds.r) - 0.5;
+  let grain = (s.fine1.r - 0.5) * 0.85 + (s.fine2.g - 0.5) * 0.30 + (s.fine3.r - 0.5) * 0.25;
+  let tone = clamp(0.44 + bed * 0.36 + grain + (s.macro2.g - 0.5) * 0.6, 0.0, 1.0);
+  // Stains: rust where iron weathers out of some beds, grey lichen elsewhere.
+  let rust = smoothstep(0.42, 0.74, s.macro2.r * 0.75 + beds.g * 0.25 + (s.fine1.g - 0.5) * 0.3);
+  let hue = mix(vec3f(0.93, 0.99, 1.08), vec3f(1.10, 0.99, 0.87), rust);
+  // Dark where water runs and where light does not reach: in hollows, joints, under ledges.
+  let seep = smoothstep(0.03, 0.35, s.curvature + (s.fine1.r - 0.5) * 0.25);
+  let joint = 0.50 * cracks(s.fine1.g) + 0.34 * cracks(s.fine2.g) + 0.40 * cracks(beds.g);
+  let shade = (1.0 - 0.30 * seep) * (1.0 - min(joint, 0.75));
+  let ledge = s.n.xy * ((beds.a - 0.5) * 2.6 * min(s.steep, 1.2));
+  return broken(Material(mix(dark, light, tone) * hue * shade, fine_slope(s, relief) + ledge, 0.0, 0.0), s, 1.0);
 }
 
 // Stones below the faces.
@@ -117,10 +124,16 @@ fn scree(s: Site, colour: vec3f) -> Material {
   return heaped(Material(colour * grain, fine_slope(s, 0.26), 0.0, 0.0), s, 1.0);
 }
 
+// How much of a forest's crowns is seen: who stands among the trees sees what grows below them.
+fn afar(s: Site) -> f32 {
+  return 0.25 + 0.75 * smoothstep(0.04, 0.35, s.footprint);
+}
+
 // Crowns: a relief of their own, dark between.
 fn canopy(s: Site, dark: vec3f, light: vec3f) -> Material {
-  let crown = clamp(0.9 * s.fine1.g + 0.7 * s.fine2.r + 0.3 * s.fine3.r - 0.45, 0.0, 1.0);
-  return Material(mix(dark, light, smoothstep(0.25, 0.85, s.macro2.g)) * (0.35 + 1.05 * crown), fine_slope(s, 0.62), 0.0, 0.25);
+  let crown = smoothstep(0.22, 0.78, 0.30 * s.fine1.g + 0.55 * s.fine2.r + 0.15 * s.fine3.r);
+  let stand = smoothstep(0.25, 0.75, s.macro2.g * 0.6 + s.fine1.r * 0.4);
+  return crowned(Material(mix(dark, light, stand) * (0.28 + 1.30 * crown), fine_slope(s, 0.62), 0.0, 0.20), s);
 }
 
 fn snowfield(s: Site) -> Material {

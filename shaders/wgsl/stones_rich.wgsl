@@ -79,20 +79,45 @@ fn heaped(m: Material, s: Site, amount: f32) -> Material {
   return Material(m.albedo * mix(vec3f(1.0), hue * tone, amount) * (1.0 - (under + rim) * amount), m.slope + slope * amount, m.gloss, m.soft);
 }
 
-// Grass in tufts and blades, a few stones among them.
+// Grass: clumps, tufts, and blades that lie this way and that; stones that peek out, ringed by what grows at their foot.
 fn tufted(m: Material, s: Site, stone: vec3f) -> Material {
-  let tuft = stones_at(s, 0.31, vec2f(0.669, 0.743), push_small(s));
-  let blade = stones_at(s, 0.047, vec2f(0.174, -0.985), push_small(s) * 0.1);
-  let shade = tuft.seen * (tuft.inside - 0.42) * 0.75 + blade.seen * ((blade.inside - 0.45) * 0.85 + (blade.own - 0.5) * 0.5);
-  let straw = smoothstep(0.45, 0.95, tuft.own * tuft.seen + (blade.own - 0.5) * 0.7 * blade.seen);
-  let colour = mix(m.albedo, m.albedo * vec3f(1.9, 1.5, 1.0), straw * 0.55) * (1.0 + shade);
-  let grass = Material(colour, m.slope + tuft.slope * (0.42 * tuft.seen) + blade.slope * (0.34 * blade.seen), m.gloss, m.soft);
-  let rocks = stones_at(s, 0.95, vec2f(0.259, 0.966), push_small(s));
-  let bare = rocks.seen * smoothstep(0.80, 0.83, rocks.own + (s.fine2.r - 0.5) * 0.34) * smoothstep(0.24, 0.36, rocks.inside);
-  let chips = stones_at(s, 0.11, vec2f(0.743, 0.669), push_small(s) * 0.2);
-  let grain = (0.72 + 0.5 * s.fine3.r) * (1.0 + chips.seen * (chips.own - 0.5) * 0.3 - gap(chips, 0.25) * 0.3);
-  let rock = Material(stone * grain, m.slope * 0.3 + rocks.slope * 0.62 + chips.slope * (0.12 * chips.seen), 0.0, 0.0);
-  // Its shadow, and what grows thicker at its foot.
-  let foot = rocks.seen * smoothstep(0.80, 0.83, rocks.own + (s.fine2.r - 0.5) * 0.34) * (1.0 - bare);
-  return mix_in(Material(grass.albedo * (1.0 - 0.45 * foot), grass.slope, grass.gloss, grass.soft), rock, bare);
+  let near = 1.0 - smoothstep(0.10, 0.36, s.footprint);
+  if (near <= 0.0) { return m; }
+  let here = s.bent.xy;
+  let one = blades(here, s, vec2f(0.669, 0.743));
+  let other = blades(here, s, vec2f(0.174, -0.985));
+  let lie = smoothstep(0.42, 0.58, s.fine3.r);
+  let blade = mix(one, other, lie) - vec4f(0.5);
+  let clump = s.fine3.r - 0.5;
+  // Straw among the green, thicker in some clumps than in others.
+  let straw = smoothstep(0.05, 0.30, blade.r * 0.9 + (s.fine3.g - 0.5) * 0.5 + (s.fine2.g - 0.5) * 0.6) * near;
+  let colour = mix(m.albedo, m.albedo * vec3f(2.1, 1.55, 1.15), straw * 0.5) * (1.0 + near * (blade.g * 1.5 + clump * 0.9));
+  let grass = Material(colour, m.slope + near * (noise_slope(s.fine3) * 0.16 + blade.ba * 1.6), m.gloss, m.soft);
+  let big = stones_at(s, 0.42, vec2f(0.259, 0.966), push_small(s));
+  let small = stones_at(s, 0.13, vec2f(0.743, 0.669), push_small(s) * 0.4);
+  let dry = (s.fine2.g - 0.5) * 0.36 + clump * 0.3;
+  let rough = (blade.r + clump) * 0.45;
+  let boulder = big.seen * smoothstep(0.945, 0.960, big.own + dry * 0.25);
+  let pebble = small.seen * smoothstep(0.915, 0.945, small.own + dry * 0.8);
+  let bare = max(boulder * smoothstep(0.16, 0.24, big.inside + rough), pebble * smoothstep(0.20, 0.30, small.inside + rough * 0.7));
+  let slope = mix(small.slope * 1.1, big.slope * 1.5, boulder);
+  let grain = 0.55 + 0.45 * fract(big.own * 37.0 + small.own * 11.0) + clump * 0.5 + blade.r * 0.3;
+  // Their shadow, and what grows thicker at their foot.
+  let foot = max(boulder * smoothstep(0.0, 0.16, big.inside), pebble * smoothstep(0.02, 0.20, small.inside)) * (1.0 - bare);
+  let grown = Material(grass.albedo * (1.0 - 0.55 * foot), grass.slope, grass.gloss, grass.soft);
+  return mix_in(grown, Material(stone * grain, m.slope * 0.3 + slope + blade.ba * 0.5, 0.0, 0.0), bare);
+}
+
+// Noise drawn out along one way, from a hand to a blade's width.
+fn blades(at: vec2f, s: Site, way: vec2f) -> vec4f {
+  let narrow = vec2f(0.21, 1.0);
+  return noise_sample(turned(at, way) * narrow, turned(s.f.dx.xy, way) * narrow, turned(s.f.dy.xy, way) * narrow, 0.27);
+}
+
+// Crowns of trees, each its own: round, lit on top, dark between. From below they would be stains on the ground.
+fn crowned(m: Material, s: Site) -> Material {
+  let tree = stones_at(s, 6.5, vec2f(0.788, 0.616), push_medium(s) * 0.8);
+  let seen = tree.seen * smoothstep(0.35, 0.90, s.footprint);
+  let shade = seen * ((tree.inside - 0.42) * 1.1 + (tree.own - 0.5) * 0.7);
+  return Material(m.albedo * (1.0 + shade), m.slope + tree.slope * (0.9 * seen), m.gloss, m.soft);
 }
