@@ -16,8 +16,6 @@ from typing import Any, Final
 
 import segno
 import uvicorn
-from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
-from websockets.protocol import State
 
 from esker import contract as c
 from esker.document.ops import Limits
@@ -46,6 +44,7 @@ from esker.store.previews import PreviewTokens
 from esker.tiles.delivery import ClientTiles, TileServer
 from esker.tiles.pyramid import warm
 from esker.tls import CA_FILE, lan_address, server_context
+from esker.websocket_protocol import WebSocketProtocol
 
 log = logging.getLogger("esker")
 
@@ -54,8 +53,6 @@ GOODBYE_SECONDS: Final = 0.3
 """Time for the farewells to leave before the sockets are closed."""
 HARD_MESSAGE_LIMIT: Final = 4 * c.MAX_MESSAGE_BYTES
 """Above ``MAX_MESSAGE_BYTES`` a client gets a sentence (4007); above this the websocket library hangs up (1009)."""
-READ_AHEAD: Final = 8
-"""Messages of one client that may wait to be understood before no more are read."""
 SEND_BUFFER: Final = 256 * 1024
 """The kernel would queue megabytes for a client that does not read, and show it old tiles when it does."""
 
@@ -81,32 +78,6 @@ class _Tiles:
 
     def client(self, server: Any) -> ClientTiles:
         return ClientTiles(server)
-
-
-class _WebSocketProtocol(WebSocketsSansIOProtocol):
-    """Lets the application drop a connection whose peer does not read, and write a frame made once for many."""
-
-    async def run_asgi(self) -> None:
-        self.scope["esker.abort"] = self.transport.abort  # type: ignore[typeddict-unknown-key]
-        self.scope["esker.write"] = self.write_frame  # type: ignore[typeddict-unknown-key]
-        await super().run_asgi()
-
-    async def write_frame(self, frame: bytes) -> None:
-        """Writes a whole frame when there is room. Raises ConnectionResetError when the peer is gone."""
-        await self.writable.wait()
-        if self.disconnected or self.close_sent or self.conn.state is not State.OPEN:
-            raise ConnectionResetError("the peer is gone")
-        self.transport.write(frame)
-
-    def send_receive_event_to_app(self) -> None:
-        """Stops reading when ``READ_AHEAD`` messages wait; at every single one, as it is inherited, takes two calls of
-        the system for each."""
-        paused, self.read_paused = self.read_paused, True
-        super().send_receive_event_to_app()
-        self.read_paused = paused
-        if not paused and self.queue.qsize() >= READ_AHEAD:
-            self.read_paused = True
-            self.transport.pause_reading()
 
 
 class _Server(uvicorn.Server):
@@ -280,7 +251,7 @@ def _listen(host: str, port: int) -> socket.socket:
 def _config(app: Any, settings: Settings, context: ssl.SSLContext | None) -> uvicorn.Config:
     config = uvicorn.Config(
         app,
-        ws=_WebSocketProtocol,
+        ws=WebSocketProtocol,
         ws_max_size=HARD_MESSAGE_LIMIT,
         # Tiles are deflated already, and control texts are small: a second deflate costs more than it saves.
         ws_per_message_deflate=False,

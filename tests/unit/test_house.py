@@ -19,7 +19,7 @@ PACKAGE = ROOT / "backend" / "esker"
 
 # A room may import the rooms to its left and itself (DESIGN 2).
 LAYERS: tuple[frozenset[str], ...] = (
-    frozenset({"contract", "fractal", "http_protocol", "link", "version"}),
+    frozenset({"contract", "fractal", "http_protocol", "link", "version", "websocket_protocol"}),
     frozenset({"contract_emit", "grid"}),
     frozenset({"document"}),
     frozenset({"patchwork"}),
@@ -52,7 +52,7 @@ ONLY = {
     "fastapi": {"server"},
     "starlette": {"server"},
     "moderngl": {"render"},
-    "uvicorn": {"run", "http_protocol"},
+    "uvicorn": {"run", "http_protocol", "websocket_protocol"},
     "sqlite3": {"store"},
 }
 

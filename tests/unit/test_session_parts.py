@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 
 from esker import contract as c
 from esker.session import core
@@ -53,6 +54,31 @@ def test_an_outbox_gives_back_in_order_and_counts() -> None:
     assert outbox.pop() == "a"
     assert json.loads(outbox.pop() or "") == {"type": "pong", "t": 1.0}
     assert (outbox.pop(), outbox.backlog) == (None, 0)
+
+
+def test_what_goes_at_once_is_not_queued_and_passes_nothing_that_waits() -> None:
+    gone: list[str] = []
+    free = True
+
+    def now(texts: Sequence[str]) -> bool:
+        gone.extend(texts if free else ())
+        return free
+
+    woken: list[None] = []
+    outbox = Outbox(lambda: woken.append(None), limit=10, now=now)
+    outbox.push("x" * 40, "y")
+    assert (gone, outbox.backlog, outbox.waits, woken) == (["x" * 40, "y"], 0, False, [])
+    free = False
+    outbox.push("a", "b")
+    free = True
+    outbox.push("c")
+    assert gone[2:] == []
+    assert [outbox.pop() for _ in range(4)] == ["a", "b", "c", None]
+    outbox.push("d")
+    assert gone[2:] == ["d"]
+    outbox.close("revoked", "over")
+    outbox.push("e")
+    assert gone[2:] == ["d"]
 
 
 def _member(members: Members, client: str, wanted: str | None = None) -> Member:

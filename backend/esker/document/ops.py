@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, NamedTuple
 
 from esker import contract as c
 from esker.contract import Layer, Op, Stroke, TerrainSettings
 from esker.document.layers import LayerEditor
 from esker.document.refusal import Limits, Refusal, changed, trim, trim_points
-from esker.document.strokes import Points, bounds, misfit, world_points
+from esker.document.strokes import CurveBox, bounds, curve_box, misfit, reach, world_points
 from esker.grid import Rect
 
 __all__ = ["CHANNEL_FIELDS", "GROUND_FIELDS", "Limits", "Refusal", "StrokeSet", "changed", "check_document"]
@@ -23,6 +23,14 @@ GROUND_FIELDS: Final = frozenset(c.StrokeFields.model_fields) - {"label", "locke
 """Fields of a stroke that the ground depends on; changing another one leaves the ground alone."""
 CHANNEL_FIELDS: Final = frozenset({"amplitude_m", "roughness", "paint"})
 """Those of them that no height depends on, only the other channels."""
+
+
+class _Bounds(NamedTuple):
+    """What was found of a stroke, and the very stroke of which it is true."""
+
+    stroke: Stroke
+    box: CurveBox | None
+    rect: Rect | None
 
 
 @dataclass(frozen=True)
@@ -44,8 +52,8 @@ class StrokeSet:
     """The same of what paint alone says."""
     ground: object = field(default_factory=object, compare=False, repr=False)
     """The same of what the base under the strokes follows from: the visible layers, but for what is told of them."""
-    _rects: dict[str, tuple[Stroke, Rect | None]] = field(default_factory=dict, compare=False, repr=False)
-    """Bounds of strokes as last seen, with the stroke they were computed for: a cache that successors share."""
+    _rects: dict[str, _Bounds] = field(default_factory=dict, compare=False, repr=False)
+    """Bounds of strokes as last seen: a cache that successors share."""
     _points: int = field(default=-1, compare=False, repr=False)
     """Points of all live strokes; below zero: not counted yet."""
 
@@ -205,13 +213,13 @@ class _Editor:
         """Replaces a stroke by one that is the same to the ground."""
         self._own()
         known = self._rects.get(stroke.id)
-        if known is not None and known[0] is self.strokes[stroke.id]:
-            self._rects[stroke.id] = (stroke, known[1])
+        if known is not None and known.stroke is self.strokes[stroke.id]:
+            self._rects[stroke.id] = known._replace(stroke=stroke)
         self.strokes[stroke.id] = stroke
 
-    def _put(self, stroke: Stroke, moved: bool = True) -> None:
-        """``moved`` False: no height follows from what changed."""
-        points = self.check(stroke)
+    def _put(self, stroke: Stroke, moved: bool = True, box: CurveBox | None = None) -> None:
+        """``moved`` False: no height follows from what changed; ``box``: of its curve, where that is known."""
+        box = self.check(stroke, box)
         self._own()
         old = self.strokes.get(stroke.id)
         more = len(stroke.curve) - (0 if old is None else len(old.curve))
@@ -219,17 +227,18 @@ class _Editor:
             raise _too_many_points(self.limits.all_points)
         self.points += more
         before = None if old is None else self._bounds(old)
-        rect = bounds(stroke, points)
-        self._rects[stroke.id] = (stroke, rect)
+        rect = bounds(stroke, box)
+        self._rects[stroke.id] = _Bounds(stroke, box, rect)
         for touched in (before, rect):
             self._touch(stroke, touched, moved)
         self.strokes[stroke.id] = stroke
 
     def _bounds(self, stroke: Stroke) -> Rect | None:
         known = self._rects.get(stroke.id)
-        if known is None or known[0] is not stroke:
-            known = self._rects[stroke.id] = (stroke, bounds(stroke))
-        return known[1]
+        if known is None or known.stroke is not stroke:
+            box = curve_box(stroke.curve)
+            known = self._rects[stroke.id] = _Bounds(stroke, box, bounds(stroke, box))
+        return known.rect
 
     def _touch(self, stroke: Stroke, rect: Rect | None, moved: bool = True) -> None:
         if rect is None:
@@ -240,21 +249,25 @@ class _Editor:
         elif moved:
             self.dirty = rect.union(self.dirty)
 
-    def check(self, stroke: Stroke) -> Points:
-        """Its world points. Raises Refusal for too many or too far points, and for fields that are not of its kind."""
+    def check(self, stroke: Stroke, box: CurveBox | None = None) -> CurveBox | None:
+        """The box of its curve, which may be known already.
+
+        Raises Refusal for too many or too far points, and for fields that are not of its kind.
+        """
         if len(stroke.curve) > self.limits.points:
             raise Refusal("too_many_points", f"A stroke holds at most {self.limits.points} points.")
         bound = c.DOMAIN_MARGIN * self.settings.size_m
         anchors = (*stroke.first, *stroke.last)
-        if any(abs(v) > bound for v in anchors):
+        if max(anchors) > bound or min(anchors) < -bound:
             raise Refusal("out_of_domain", "An anchor lies farther than ten times the terrain from its corner.")
         wrong = misfit(stroke)
         if wrong is not None:
             raise Refusal("bad_field", wrong)
-        points = world_points(stroke)
-        if stroke.curve and abs(points).max() > bound:
+        box = box or curve_box(stroke.curve)
+        # Points are made where the box says that one may lie too far.
+        if box is not None and reach(stroke, box) > bound and abs(world_points(stroke)).max() > bound:
             raise Refusal("out_of_domain", "A point lies farther than ten times the terrain from its corner.")
-        return points
+        return box
 
     def _begin(self, stroke: Stroke) -> None:
         if stroke.id in self.strokes or stroke.id in self.deleted:
@@ -267,7 +280,10 @@ class _Editor:
         old = self._editable(op.stroke)
         if op.start > len(old.curve):
             raise Refusal("bad_index", "The points do not continue the stroke that the server holds.")
-        self._put(old.model_copy(update={"curve": old.curve[: op.start] + op.points, "last": op.last}))
+        known = self._rects.get(op.stroke)
+        goes_on = op.start == len(old.curve) and known is not None and known.stroke is old
+        box = curve_box(op.points, known.box) if goes_on and known is not None else None
+        self._put(old.model_copy(update={"curve": old.curve[: op.start] + op.points, "last": op.last}), box=box)
 
     def _set(self, op: c.SetStroke) -> None:
         old = self._live(op.stroke)

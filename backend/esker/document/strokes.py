@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from itertools import chain
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,9 @@ from esker.contract import CurvePoint, Flank, Stroke, Vec3
 from esker.grid import Rect
 
 Points = NDArray[np.float64]
+
+ROUNDING = 1e-12
+"""Relative: more than what the few operations of a bound and of a point may differ by."""
 
 
 def world_points(stroke: Stroke) -> Points:
@@ -72,13 +76,52 @@ def influence_extent(stroke: Stroke) -> float:
     return stroke.plateau_radius_m + max((f.extent_m for f in sides if f is not None), default=0.0)
 
 
-def bounds(stroke: Stroke, points: Points | None = None) -> Rect | None:
+class CurveBox(NamedTuple):
+    """Least and greatest coordinates of the points of a curve, in the frame of its anchors."""
+
+    u0: float
+    u1: float
+    v0: float
+    v1: float
+
+
+def curve_box(curve: Iterable[CurvePoint], known: CurveBox | None = None) -> CurveBox | None:
+    """The box of these points and of those in ``known``; None when there are none.
+
+    Arithmetic of plain numbers: most curves that are looked at have few points, or few that are new.
+    """
+    points = chain(curve, () if known is None else (known[::2], known[1::2]))
+    u, v = next(columns := zip(*points, strict=True), ()), next(columns, ())
+    return CurveBox(min(u), max(u), min(v), max(v)) if u else None
+
+
+def reach(stroke: Stroke, box: CurveBox) -> float:
+    """No coordinate of a point of ``world_points`` is farther from zero, metres; ``box``: of its curve."""
+    (ax, ay, az), (bx, by, bz) = stroke.first, stroke.last
+    dx, dy = abs(bx - ax), abs(by - ay)
+    u, v = max(box.u1, -box.u0), max(box.v1, -box.v0)
+    if stroke.kind == "profile":
+        far = max(abs(ax) + u * dx, abs(ay) + u * dy, abs(az) + u * abs(bz - az) + v)
+    else:
+        far = max(abs(ax) + u * dx + v * dy, abs(ay) + u * dy + v * dx, abs(az))
+    return far * (1 + ROUNDING)
+
+
+def bounds(stroke: Stroke, box: CurveBox | None = None) -> Rect | None:
     """The rectangle outside which the stroke constrains nothing, of any channel; None for a stroke without effect.
 
-    ``points``: its ``world_points``, where the caller has them already.
+    ``box``: of its curve, where the caller has it already.
     """
     if stroke.hidden or not stroke.curve:
         return None
-    xy = (world_points(stroke) if points is None else points)[:, :2]
-    low, high = xy.min(axis=0), xy.max(axis=0)
-    return Rect(float(low[0]), float(low[1]), float(high[0]), float(high[1])).grown(influence_extent(stroke))
+    if stroke.kind == "profile":  # its points lie on the line through the anchors: the ends of u are the ends of all
+        ends = box or curve_box(stroke.curve)
+        assert ends is not None
+        (ax, ay, _), (bx, by, _) = stroke.first, stroke.last
+        xs, ys = ((a + ends.u0 * (b - a), a + ends.u1 * (b - a)) for a, b in ((ax, bx), (ay, by)))
+        rect = Rect(min(xs), min(ys), max(xs), max(ys))
+    else:
+        xy = world_points(stroke)[:, :2]
+        low, high = xy.min(axis=0), xy.max(axis=0)
+        rect = Rect(float(low[0]), float(low[1]), float(high[0]), float(high[1]))
+    return rect.grown(influence_extent(stroke))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator, Sequence
 from contextlib import suppress
 from functools import lru_cache
 from typing import Any, Final
@@ -17,6 +17,7 @@ from esker import contract as c
 from esker.server.answers import address
 from esker.session.hub import Hub
 from esker.session.socket import Session
+from esker.websocket_protocol import WebSocketProtocol
 
 log = logging.getLogger("esker.server")
 
@@ -24,13 +25,22 @@ log = logging.getLogger("esker.server")
 SHARED_TEXTS: Final = 16
 SHARED_CHARACTERS: Final = 1 << 18
 """Frames of so many of the last texts are kept, up to this length: what everybody in a room is told is framed once."""
+_WHOLE_TEXT: Final = 0x80 | Opcode.TEXT
 FRAGMENT_BYTES: Final = 1 << 16
 """Longer texts go in frames of this size (RFC 6455, 5.4): it shows that a peer reads them, however slowly."""
 
 
 def _frame(text: str) -> bytes:
     """A text as a frame of the websocket, as a server sends it: whole and without a mask (RFC 6455, 5.2)."""
-    return Frame(Opcode.TEXT, text.encode()).serialize(mask=False)
+    data = text.encode()
+    size = len(data)
+    if size < 126:
+        head = bytes((_WHOLE_TEXT, size))
+    elif size < 1 << 16:
+        head = bytes((_WHOLE_TEXT, 126)) + size.to_bytes(2)
+    else:
+        head = bytes((_WHOLE_TEXT, 127)) + size.to_bytes(8)
+    return head + data
 
 
 def _fragments(text: str) -> Iterator[bytes]:
@@ -49,17 +59,25 @@ class _Transport:
 
     def __init__(self, socket: WebSocket) -> None:
         self._socket = socket
-        self._write: Callable[[bytes], Awaitable[None]] | None = socket.scope.get("esker.write")
-        self._abort: Callable[[], None] | None = socket.scope.get("esker.abort")
+        self._wire: WebSocketProtocol | None = socket.scope.get("esker.socket")
+
+    def listen(self, listener: Callable[[str | bytes], None]) -> None:
+        if self._wire is not None:
+            self._wire.listen(listener)
+
+    def send_now(self, texts: Sequence[str]) -> bool:
+        if self._wire is None or any(len(text) > SHARED_CHARACTERS for text in texts):
+            return False
+        return self._wire.write_now(_framed(texts[0]) if len(texts) == 1 else b"".join(map(_framed, texts)))
 
     async def send_text(self, text: str, went_on: Callable[[], None]) -> None:
-        if self._write is None:
+        if self._wire is None:
             await self._send({"type": "websocket.send", "text": text})
         elif len(text) <= SHARED_CHARACTERS:
-            await self._write(_framed(text))
+            await self._wire.write(_framed(text))
         else:
             for fragment in _fragments(text):
-                await self._write(fragment)
+                await self._wire.write(fragment)
                 went_on()
 
     async def send_bytes(self, data: bytes) -> None:
@@ -75,8 +93,8 @@ class _Transport:
             raise ConnectionResetError("the peer is gone") from error
 
     def abort(self) -> None:
-        if self._abort is not None:
-            self._abort()
+        if self._wire is not None:
+            self._wire.abort()
 
 
 async def _messages(socket: WebSocket) -> AsyncIterator[str | bytes]:

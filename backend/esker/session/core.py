@@ -259,17 +259,15 @@ class RoomCore:
         for row, text in zip(batch.rows, texts, strict=True):
             self._recent.add(row.clock, text)
         shared = f'{{"type":"ordered","ops":[{",".join(texts)}]}}'
-        for member in self.members:
-            member.outbox.push(shared)
-        mine: dict[str, list[Row]] = {}
+        acks: dict[str, list[Row]] = {}
         for row in batch.rows:
-            mine.setdefault(row.client, []).append(row)
-        for client, rows in mine.items():
-            author = self.members.by_client.get(client)
-            if author is not None:
-                ids = ",".join(f'"{r.client}:{r.counter}"' for r in rows)
-                clocks = ",".join(str(r.clock) for r in rows)
-                author.outbox.push(f'{{"type":"ack","ids":[{ids}],"clocks":[{clocks}]}}')
+            acks.setdefault(row.client, []).append(row)
+        for member in self.members:
+            mine = acks.get(member.client)
+            if mine is None:
+                member.outbox.push(shared)
+            else:
+                member.outbox.push(shared, _ack(mine))
 
     def failed(self) -> None:
         """The journal did not take the batch: back to what is committed; every op since is refused."""
@@ -282,6 +280,11 @@ class RoomCore:
             if author is not None:
                 sentence = "The server could not save this change (is its disk full?). It was taken back."
                 self.refuse(author, f"{row.client}:{row.counter}", "unavailable", sentence)
+
+
+def _ack(rows: Sequence[Row]) -> str:
+    ids, clocks = ",".join(f'"{r.client}:{r.counter}"' for r in rows), ",".join(str(r.clock) for r in rows)
+    return f'{{"type":"ack","ids":[{ids}],"clocks":[{clocks}]}}'
 
 
 def _adds_layer(op: c.Op) -> bool:

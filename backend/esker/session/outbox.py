@@ -8,7 +8,7 @@ always shows the latest state.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Final
 
 from esker import contract as c
@@ -18,24 +18,36 @@ SLOW: Final = "Your connection did not keep up. It will resume by itself."
 
 
 class Outbox:
-    """Bounded queue of one client. ``wake`` is called when there is something new to do; it must not block."""
+    """Bounded queue of one client. ``wake`` is called when there is something new to do; it must not block.
 
-    def __init__(self, wake: Callable[[], None], limit: int = c.MAX_BACKLOG_BYTES) -> None:
-        self._wake, self._limit = wake, limit
+    ``now`` takes texts that none waits before, if they can go at once, and says whether they did: then they are not
+    queued.
+    """
+
+    def __init__(
+        self,
+        wake: Callable[[], None],
+        limit: int = c.MAX_BACKLOG_BYTES,
+        now: Callable[[Sequence[str]], bool] | None = None,
+    ) -> None:
+        self._wake, self._limit, self._now = wake, limit, now
         self._texts: deque[tuple[str, int]] = deque()
         self.backlog = 0
         self.closing: tuple[CloseCode, str] | None = None
 
-    def push(self, text: str, *, counted: bool = True) -> None:
-        """Queues a control text. ``counted`` False is for a welcome, whose size is the document's."""
+    def push(self, *texts: str, counted: bool = True) -> None:
+        """Queues control texts. ``counted`` False is for a welcome, whose size is the document's."""
         if self.closing is not None:
             return
-        size = len(text) if counted else 0
-        if self.backlog + size > self._limit:
-            self.close("slow_client", SLOW)
+        if self._now is not None and not self._texts and self._now(texts):
             return
-        self._texts.append((text, size))
-        self.backlog += size
+        for text in texts:
+            size = len(text) if counted else 0
+            if self.backlog + size > self._limit:
+                self.close("slow_client", SLOW)
+                return
+            self._texts.append((text, size))
+            self.backlog += size
         self._wake()
 
     def message(self, message: c.Wire) -> None:

@@ -175,6 +175,9 @@ class PastRoom(Room):
         """Told by the journal's clock, not by the one that only rises."""
         super()._note_progress(progress.model_copy(update={"clock": self.core.document.clock}), delay)
 
+    def _newest_progress(self) -> c.Progress:
+        return self._progress
+
     def _level_taken(self, clock: int, level: int, settled: bool) -> None:
         super()._level_taken(clock, level, settled and clock >= self.core.geometry_clock)
 

@@ -101,7 +101,7 @@ class Room:
     def join(self, hello: c.Hello, role: Role, link: str, outbox: Outbox) -> Guest:
         """Lets a client in. Raises Denied."""
         member = self.core.join(hello, role, link, outbox, self.info)
-        outbox.message(self._progress)
+        outbox.message(self._newest_progress())
         guest = Guest(member, self._feed.add(outbox))
         self._presence_soon()
         return guest
@@ -179,9 +179,13 @@ class Room:
 
     def _ordered(self) -> None:
         """Ops were ordered: they are committed with the next tick, and solved at once."""
-        if not self._solve_due:
-            self._solve_due = True
-            self._loop.call_soon(self._solve)
+        if self.core.geometry_clock > self._requested_clock:
+            if not self._solve_due:
+                self._solve_due = True
+                self._loop.call_soon(self._solve)
+        elif self._progress.settled:
+            # Nothing but the clock changes, and the members see that from the ops: no hurry.
+            self._progress_soon(CLOCK_TICK)
         self._tick_soon()
 
     def _tick_soon(self) -> None:
@@ -227,10 +231,6 @@ class Room:
         self._solve_due = False
         if self.core.geometry_clock > self._requested_clock:
             self._request_solve()
-        elif self._progress.settled and self._layers.current(self.core.head):
-            # Nothing but the clock changed, and the members see that from the ops: no hurry.
-            progress = self._progress.model_copy(update={"clock": self.core.head.clock})
-            self._note_progress(progress, CLOCK_TICK)
 
     def _request_solve(self) -> None:
         head = self.core.head
@@ -278,12 +278,22 @@ class Room:
 
     def _note_progress(self, progress: c.Progress, delay: float = PROGRESS_TICK) -> None:
         self._progress = progress
+        self._progress_soon(delay)
+
+    def _progress_soon(self, delay: float) -> None:
         if self._progress_timer is None and not self.closed:
             self._progress_timer = self._loop.call_later(delay, self._send_progress)
 
+    def _newest_progress(self) -> c.Progress:
+        """Ground that is settled is so for every clock since at which none of it changed."""
+        progress, head = self._progress, self.core.head
+        if progress.settled and self.core.geometry_clock <= progress.clock < head.clock and self._layers.current(head):
+            self._progress = progress.model_copy(update={"clock": head.clock})
+        return self._progress
+
     def _send_progress(self) -> None:
         self._progress_timer = None
-        text = self._progress.model_copy(update={"note": self._note}).model_dump_json()
+        text = self._newest_progress().model_copy(update={"note": self._note}).model_dump_json()
         self._note = ""
         for member in self.core.members:
             member.outbox.push(text)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Sequence
 from typing import Final, Protocol
 
 from esker import contract as c
@@ -25,11 +25,21 @@ REASON_BYTES: Final = 123
 
 
 class Transport(Protocol):
-    """One websocket. ``send_*`` return when the socket has room again; ``abort`` drops it without a farewell.
+    """One websocket. ``send_text`` and ``send_bytes`` return when the socket has room again; ``abort`` drops it without
+    a farewell.
 
-    All but ``abort`` raise ConnectionError when the peer is gone. ``went_on`` is called whenever a part of a long text
-    has left.
+    All but ``abort`` and ``listen`` raise ConnectionError when the peer is gone. ``went_on`` is called whenever a part
+    of a long text has left.
     """
+
+    def listen(self, listener: Callable[[str | bytes], None]) -> None:
+        """From now on a message that none waits before may be given to ``listener`` as it is read, and not come by the
+        iterator. It must not raise."""
+        ...
+
+    def send_now(self, texts: Sequence[str]) -> bool:
+        """Sends texts if there is room for them at once; False when there is not, or when one of them is long."""
+        ...
 
     async def send_text(self, text: str, went_on: Callable[[], None]) -> None: ...
 
@@ -54,7 +64,7 @@ class Session:
         self._hub, self._transport, self._address, self._now = hub, transport, address, now
         self._protocol = protocol.Connection(now(), subprotocol)
         self._wake = asyncio.Event()
-        self.outbox = Outbox(self._wake.set)
+        self.outbox = Outbox(self._wake.set, now=self._send_now)
         self._room: Room | None = None
         self._guest: Guest | None = None
         self._sending_since: float | None = None
@@ -74,6 +84,7 @@ class Session:
             results = await asyncio.gather(sender, reader, watch, return_exceptions=True)
             if self._room is not None and self._guest is not None:
                 self._room.leave(self._guest)
+                self._guest = None  # what is still read of its messages is nobody's
             if self.outbox.closing is not None:
                 self._transport.abort()
             for error in results:
@@ -87,26 +98,43 @@ class Session:
             await self._handle(event)
         try:
             async for message in messages:
-                if isinstance(message, str):
-                    events = self._protocol.text(message, self._now())
-                else:
-                    events = self._protocol.binary(message)
-                for event in events:
+                for event in self._events(message):
                     await self._handle(event)
         except ConnectionError:
             raise
         except Exception:
-            log.exception("a message from %s could not be handled", self._address)
-            self.outbox.close("server_error", "The server failed to handle a message. Your page will come back.")
+            self._failed()
+
+    def _read(self, message: str | bytes) -> None:
+        """A message of a member, as it is read: what is not a hello needs no task to wait in."""
+        try:
+            for event in self._events(message):
+                self._do(event)
+        except Exception:
+            self._failed()
+
+    def _events(self, message: str | bytes) -> list[protocol.Event]:
+        if isinstance(message, str):
+            return self._protocol.text(message, self._now())
+        return self._protocol.binary(message)
+
+    def _failed(self) -> None:
+        log.exception("a message from %s could not be handled", self._address)
+        self.outbox.close("server_error", "The server failed to handle a message. Your page will come back.")
 
     async def _handle(self, event: protocol.Event) -> None:
+        if not isinstance(event, protocol.Hi):
+            self._do(event)
+            return
+        try:
+            self._room, self._guest = await self._hub.enter(event.hello, self.outbox, self._address)
+            self._transport.listen(self._read)  # a second hello is refused, so none comes this way
+        except Denied as denied:
+            self.outbox.close(denied.code, denied.message)
+
+    def _do(self, event: protocol.Event) -> None:
         if isinstance(event, protocol.Close):
             self.outbox.close(event.code, event.message)
-        elif isinstance(event, protocol.Hi):
-            try:
-                self._room, self._guest = await self._hub.enter(event.hello, self.outbox, self._address)
-            except Denied as denied:
-                self.outbox.close(denied.code, denied.message)
         elif self._room is not None and self._guest is not None and self.outbox.closing is None:
             self._room.receive(self._guest, event)
         elif isinstance(event, protocol.Reply):
@@ -131,6 +159,13 @@ class Session:
                     await self._transport.send_bytes(frame)
                     self._wake.set()
             self._sending_since = None
+
+    def _send_now(self, texts: Sequence[str]) -> bool:
+        """Whether texts went without the sender's task: nothing is on its way, and the socket has room."""
+        try:
+            return self._sending_since is None and self._transport.send_now(texts)
+        except ConnectionError:  # the sender's task will see it too, and end
+            return False
 
     def _went_on(self) -> None:
         self._sending_since = self._now()
