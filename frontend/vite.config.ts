@@ -1,11 +1,15 @@
 import { resolve } from "node:path";
-import { defineConfig } from "vite";
+import { defineConfig } from "vitest/config";
+import { licences } from "./licences.ts";
 
 // The page is built once and served by the Python server from the same origin; shaders are imported with `?raw`.
 export default defineConfig({
   base: "/",
   resolve: { alias: { "@shaders": resolve(import.meta.dirname, "../shaders") } },
+  plugins: [licences(resolve(import.meta.dirname, "../NOTICE"))],
   server: { fs: { allow: [resolve(import.meta.dirname, "..")] } },
   build: { target: "es2023", outDir: "dist", assetsInlineLimit: 0, chunkSizeWarningLimit: 1500 },
   worker: { format: "es" },
+  // Limits end what hangs. A busy machine takes its time.
+  test: { testTimeout: 60_000, hookTimeout: 60_000 },
 });

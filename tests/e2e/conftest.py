@@ -11,26 +11,34 @@ import sys
 import time
 import urllib.error
 import urllib.request
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, BrowserContext, Error, Page, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, Error, Page, Playwright, sync_playwright
 
 from tests.browser import FLAGS, chromium_path, draw_politely, free_port
 
 ROOT = Path(__file__).resolve().parents[2]
 ARTIFACTS = ROOT / "tests" / "artifacts" / "e2e"
-# Two pages side by side: neither may be slowed down as if it were in the background.
-AWAKE = ["--disable-backgrounding-occluded-windows", "--disable-renderer-backgrounding"]
+# Two pages side by side: neither may be slowed down as if it were in the background. What is not drawn in 3D costs less
+# without the software graphics.
+AWAKE = ["--disable-backgrounding-occluded-windows", "--disable-renderer-backgrounding", "--disable-gpu-rasterization"]
+# Pages draw their 3D view as ever, but it is not put on the screen: doing that takes the software graphics as long as
+# drawing it, and it is done with each change of the page.
+UNSEEN = ["--disable-gpu-compositing"]
 
 SCALE = 0.5
 """Drawn pixels per CSS pixel, along a side: hands, layout and errors are those of the whole window, but the software
-adapter draws a quarter of its pixels. Where the picture itself is looked at, tests ask for 1."""
+adapter draws a quarter of its pixels. Where the picture itself is looked at, tests ask for 1. Windows of fewer pixels
+are not seen unless they ask for that: in their screenshots the 3D view is missing."""
 
-HERTZ = 10
+PATIENCE_MS = 90_000
+"""How long hands and eyes wait: limits end what hangs, a busy machine takes its time."""
+
+HERTZ = 4
 """Pictures a second that a window shows at most, as a slow screen would: else pages of the software adapter draw all
 that the processors can, for frames that nobody looks at, while the server that they wait for gets what is left."""
 SLOW_SCREEN = """
@@ -51,6 +59,21 @@ SLOW_SCREEN = """
   };
   window.cancelAnimationFrame = (id) => void draws.delete(id);
 """.replace("HERTZ", str(HERTZ))
+
+WATCH = """([argument, patienceMs]) => new Promise((resolve, reject) => {
+  const holds = %s, end = performance.now() + patienceMs;
+  const look = () => {
+    try {
+      if (holds(argument)) resolve(true);
+      else if (performance.now() > end) resolve(false);
+      else setTimeout(look, 50);
+    } catch (error) {
+      reject(error);
+    }
+  };
+  look();
+})"""
+"""Comes true when a condition does, false when it has not in so many milliseconds."""
 
 
 @dataclass
@@ -95,7 +118,7 @@ class Server:
             headers["Authorization"] = f"Bearer {secret}"
         data = None if body is None else json.dumps(body).encode()
         call = urllib.request.Request(self.url + path, data=data, headers=headers, method=method)
-        with urllib.request.urlopen(call, timeout=30) as answer:
+        with urllib.request.urlopen(call, timeout=120) as answer:
             return bytes(answer.read())
 
     def create(self, **body: Any) -> tuple[str, str]:
@@ -114,6 +137,13 @@ def serving(folder: Path) -> Iterator[Server]:
     made.kill(signal.SIGTERM)
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """The longest of these take minutes, on a busy machine several times as many."""
+    for item in items:
+        if item.path.is_relative_to(Path(__file__).parent):
+            item.add_marker(pytest.mark.timeout(1200))
+
+
 @pytest.fixture(scope="package")
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     """One server for all: every test makes terrains of its own. Who harms it starts one of their own (``serving``)."""
@@ -121,13 +151,30 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
 
 
 @pytest.fixture(scope="package")
-def browser() -> Iterator[Browser]:
-    """Headless Chromium with WebGPU on the software adapter; its event loop ends with this folder."""
-    with sync_playwright() as playwright:
-        made = playwright.chromium.launch(executable_path=chromium_path(), args=FLAGS + AWAKE)
-        draw_politely()
+def playwright() -> Iterator[Playwright]:
+    """What starts browsers; its event loop ends with this folder."""
+    with sync_playwright() as made:
         yield made
-        made.close()
+
+
+def browsing(playwright: Playwright, *flags: str) -> Iterator[Browser]:
+    """Headless Chromium with WebGPU on the software adapter, ended at the end: the body of a fixture."""
+    made = playwright.chromium.launch(executable_path=chromium_path(), args=[*FLAGS, *AWAKE, *flags])
+    draw_politely()
+    yield made
+    made.close()
+
+
+@pytest.fixture(scope="package")
+def browser(playwright: Playwright) -> Iterator[Browser]:
+    """Shows pages without their 3D view."""
+    yield from browsing(playwright, *UNSEEN)
+
+
+@pytest.fixture(scope="package")
+def seen_browser(playwright: Playwright) -> Iterator[Browser]:
+    """Shows all."""
+    yield from browsing(playwright)
 
 
 @dataclass
@@ -160,22 +207,25 @@ class Visitor:
         """Evaluate in the page."""
         return self.page.evaluate(expression, argument)
 
-    def wait(self, condition: str, argument: Any = None, timeout: float = 60) -> None:
+    def wait(self, condition: str, argument: Any = None, timeout: float = 90) -> None:
         """Wait until a condition in the page holds. (Playwright's own wait needs `eval`, which our CSP forbids.)"""
         deadline = time.monotonic() + timeout
-        while not self._holds(condition, argument):
+        while not self._holds(condition, argument, deadline - time.monotonic()):
             if time.monotonic() > deadline:
                 self.shot("timeout")
                 raise TimeoutError(f"not so after {timeout} s: {condition} {argument!r}")
-            self.page.wait_for_timeout(50)
 
-    def _holds(self, condition: str, argument: Any) -> bool:
-        """False too while the page is on its way to another address: there is nobody to ask then."""
+    def _holds(self, condition: str, argument: Any, seconds: float) -> bool:
+        """Whether the condition comes true within a time. The page asks itself: asked from here it keeps a core busy.
+
+        False too when the page goes to another address meanwhile: there is nobody to ask then.
+        """
         try:
-            return bool(self.page.evaluate(condition, argument))
+            return bool(self.page.evaluate(WATCH % condition, [argument, max(0.0, 1000 * seconds)]))
         except Error as error:
             if "Execution context was destroyed" not in error.message:
                 raise
+            self.page.wait_for_timeout(50)
             return False
 
     def shot(self, name: str) -> Path:
@@ -189,8 +239,10 @@ class Visitor:
 class Visitors:
     """Makes visitors; closes them all at the end."""
 
-    def __init__(self, browser: Browser, server: Server) -> None:
+    def __init__(self, browser: Browser, server: Server, seen: Callable[[], Browser] | None = None) -> None:
+        """``seen`` gives the browser of windows that are looked at; by default it is the same."""
         self.browser, self.server = browser, server
+        self.seen = seen or (lambda: browser)
         self.made: list[Visitor] = []
 
     def __call__(
@@ -199,12 +251,18 @@ class Visitors:
         height: int = 540,
         device_scale_factor: float = SCALE,
         slow_screen: bool = True,
+        seen: bool | None = None,
         **options: Any,
     ) -> Visitor:
-        """A window of so many CSS pixels, of ``device_scale_factor`` pixels each along a side."""
-        context = self.browser.new_context(
+        """A window of so many CSS pixels, of ``device_scale_factor`` pixels each along a side.
+
+        ``seen``: its 3D view is in screenshots (default: where it has all its pixels).
+        """
+        shown = device_scale_factor > SCALE if seen is None else seen
+        context = (self.seen() if shown else self.browser).new_context(
             viewport={"width": width, "height": height}, device_scale_factor=device_scale_factor, **options
         )
+        context.set_default_timeout(PATIENCE_MS)
         if slow_screen:
             context.add_init_script(SLOW_SCREEN)
         visitor = Visitor(context, context.new_page(), self.server.url)
@@ -214,9 +272,9 @@ class Visitors:
 
 
 @pytest.fixture
-def visitors(browser: Browser, server: Server) -> Iterator[Visitors]:
+def visitors(browser: Browser, server: Server, request: pytest.FixtureRequest) -> Iterator[Visitors]:
     """``visitors()`` gives a new person on the server."""
-    made = Visitors(browser, server)
+    made = Visitors(browser, server, lambda: request.getfixturevalue("seen_browser"))
     yield made
     for visitor in made.made:
         visitor.context.close()

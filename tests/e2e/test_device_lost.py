@@ -42,7 +42,7 @@ def contrast(visitor: Visitor) -> float:
 def open_page(visitors: Visitors, server: Server) -> Visitor:
     """A terrain with a mountain, drawn in 3D by a device that the test can take away."""
     terrain, secret = server.create(template="alpine-ridge", title="Lost")
-    guest = visitors(480, 360)
+    guest = visitors(480, 360, seen=True)
     guest.page.add_init_script(KEEP_DEVICES)
     guest.open(f"/t/{terrain}#{secret}")
     wait_settled(guest)

@@ -114,7 +114,7 @@ def test_a_viewer_watches_and_cannot_draw(visitors: Visitors, server: Server) ->
 def test_a_wrong_link_says_so(visitors: Visitors, server: Server, path: str) -> None:
     lost = visitors(480, 600)
     lost.page.goto(server.url + path)
-    lost.page.get_by_text("Go to the start page").first.wait_for(timeout=30_000)
+    lost.page.get_by_text("Go to the start page").first.wait_for()
     lost.shot(f"wrong-link-{path.count('#')}")
     assert lost.foreign == []
 
@@ -123,7 +123,7 @@ def test_the_landing_page_starts_a_terrain(visitors: Visitors, server: Server) -
     """From the front door to a starting terrain with the mouse, then back: it is under recent."""
     guest = visitors(1024, 700)
     guest.page.goto(server.url)
-    guest.page.get_by_text("Volcanic island").first.wait_for(timeout=30_000)
+    guest.page.get_by_text("Volcanic island").first.wait_for()
     guest.shot("landing")
     assert narrow(guest)
     guest.page.get_by_text("Volcanic island").first.click()
@@ -133,7 +133,7 @@ def test_the_landing_page_starts_a_terrain(visitors: Visitors, server: Server) -
     guest.shot("landing-to-island")
     assert "#" in guest.page.url, "the secret is in the fragment"
     guest.page.goto(server.url)
-    guest.page.get_by_text("Recent").first.wait_for(timeout=30_000)
+    guest.page.get_by_text("Recent").first.wait_for()
     guest.shot("landing-recent")
     assert guest.foreign == []
     assert guest.errors == []

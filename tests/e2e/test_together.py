@@ -42,7 +42,7 @@ def two_people(visitors: Visitors, server: Server) -> tuple[Visitor, Visitor, st
     """Ada owns the terrain, Ben has an edit link; both see it."""
     terrain, secret = server.create(title="Together")
     link = json.loads(server.request("POST", f"/api/terrains/{terrain}/links", {"role": "edit", "name": "Ben"}, secret))
-    ada, ben = visitors(), visitors()
+    ada, ben = visitors(seen=True), visitors(seen=True)
     ada.open(f"/t/{terrain}#{secret}")
     ben.open(f"/t/{terrain}#{link['secret']}")
     return ada, ben, terrain, secret
