@@ -21,7 +21,7 @@ PREVIEW_HEIGHT_CYCLES = 3
 WIDE_REACHES = (1 / 16, 1 / 4)
 """A reach above each of these shares of the domain takes one gradient cycle more: what full multigrid leaves of the
 gradient is smooth, and the farther it is felt the more height it adds up to."""
-AMEND_SHARE = 5e-4
+AMEND_SHARE = 1e-3
 """Estimated error, as a share of the relief, at which a preview made from the ground before an edit is shown."""
 AMEND_CYCLES = 5
 """Cycles after which it is given up."""

@@ -198,8 +198,8 @@ class Pyramid:
         With ``show`` False a coarse preview is only noted: its level is injected from the finest preview, which is
         expected soon (docs/decisions/0014-consistent-previews.md). Between a complete preview and the settled levels
         of the same clock a solver may repeat coarse levels as a sign of life, or bring them only now: these are not
-        shown, as they would only move the ground there and back. Raises ValueError for a wrong level or shape or heights
-        that are not finite, and changes nothing then.
+        shown, as they would only move the ground there and back. Raises ValueError for a wrong level or shape, or for
+        heights that are not finite, and changes nothing then.
         """
         if not 0 <= level <= self.levels:
             raise ValueError(f"level {level} is not one of 0..{self.levels}")
