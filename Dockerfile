@@ -3,6 +3,7 @@ FROM node:22-bookworm-slim AS page
 WORKDIR /esker/frontend
 COPY frontend/package.json frontend/package-lock.json frontend/.npmrc ./
 RUN npm install --no-save
+COPY NOTICE /esker/
 COPY shaders /esker/shaders
 COPY frontend ./
 # Not `npm run build`: that checks types, those of tests too, whose vectors are not here. `make check` does.

@@ -305,6 +305,9 @@ export const landingStyles = css`
     color: var(--esk-quiet);
     font-size: 0.8125rem;
   }
+  footer a {
+    color: inherit;
+  }
   @media (max-width: 640px) {
     .hero {
       min-height: 600px;
