@@ -21,9 +21,11 @@ from esker.contract import ExportWish
 from esker.exports import formats, mesh
 from esker.exports.ground import Extent
 from esker.exports.resample import resampled
+from esker.exports.water import under_water
 from esker.importing import placing
 from esker.importing.examine import examine
 from esker.importing.laying import frame
+from esker.lakes import Lakes, find_lakes
 
 SIZE = 512.0
 LEVEL = 2
@@ -191,12 +193,51 @@ def test_masks_are_the_attributes(terrain: Terrain, tmp_path: Path) -> None:
             with Image.open(io.BytesIO(archive.read(name))) as picture:
                 assert picture.mode == "L"
                 masks[name.removesuffix(".png")] = np.asarray(picture)[::-1]
-    assert set(masks) == {"snow", "wetness", "grass", "forest", "sea"}
+    assert set(masks) == {"snow", "wetness", "grass", "forest", "water"}
     for name in ("snow", "wetness", "grass", "forest"):
         assert np.abs(masks[name] / 255.0 - attributes[name]).max() <= 0.5001 / 255
     assert masks["grass"].max() > 0, "there is something to compare"
-    np.testing.assert_array_equal(masks["sea"] > 0, heights < 4.0)
-    assert 0 < (masks["sea"] > 0).mean() < 1
+    np.testing.assert_array_equal(masks["water"] > 0, heights < 4.0)
+    assert 0 < (masks["water"] > 0).mean() < 1
+
+
+def inside_lake(lakes: Lakes, x: float, y: float, lake: float) -> float:
+    """The twin: ``inside_lake`` of shaders/wgsl/lakes.wgsl at a place in samples of the lakes' lattice."""
+    n = len(lakes.levels)
+    i, j = min(int(y), n - 2), min(int(x), n - 2)
+    sides, covered, shore = [], False, True
+    for dy, dx in ((0, 0), (0, 1), (1, 0), (1, 1)):
+        level, ground = float(lakes.levels[i + dy, j + dx]), float(lakes.heights[i + dy, j + dx])
+        covers = level == lake and ground < lake
+        covered, shore = covered or covers, shore and level == lake
+        sides.append(lake - ground if covers else ground - lake)
+    if not (covered or shore):
+        return -1.0
+    fx, fy = x - j, y - i
+    south, north = sides[0] + (sides[1] - sides[0]) * fx, sides[2] + (sides[3] - sides[2]) * fx
+    return south + (north - south) * fy
+
+
+def test_water_stands_in_basins_and_in_the_sea() -> None:
+    """SPEC X5: two craters, one on the flank of the other, beside a sea."""
+    y, x = np.mgrid[0:1:65j, 0:1:65j]
+    far = np.hypot(x - 0.4, y - 0.5), np.hypot(x - 0.75, y - 0.6)
+    ground = np.maximum(60 - 150 * np.abs(far[0] - 0.2), 40 - 200 * np.abs(far[1] - 0.12)).astype(np.float32)
+    lakes = find_lakes(ground, 4.0, 2.0, sea_m=5.0)
+    assert len(lakes.samples) == 2
+    u = np.arange(190) * 64 / 189
+    rows, columns = np.minimum(u.astype(int), 63), np.minimum(u.astype(int), 63)
+    fine = (ground[rows][:, columns] + np.sin(np.arange(190)) * 1.5).astype(np.float32)
+    wet = under_water(fine, u, u, lakes, 5.0)
+    twin = fine < 5.0
+    for r in range(190):
+        for c in range(190):
+            i, j = rows[r], columns[c]
+            lake = float(lakes.levels[i : i + 2, j : j + 2].max())
+            twin[r, c] |= lake > contract.NO_LAKE and fine[r, c] < lake and inside_lake(lakes, u[c], u[r], lake) > 0
+    np.testing.assert_array_equal(wet, twin)
+    assert 0.05 < (wet & (fine >= 5.0)).mean() < 0.5
+    np.testing.assert_array_equal(under_water(fine, u, u, None, None), False)
 
 
 def keys(values: NDArray[np.float64], at: float) -> float:

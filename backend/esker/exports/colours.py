@@ -42,7 +42,7 @@ WET: Final = np.float32(0.4)
 
 def colours(ground: Ground) -> NDArray[np.uint8]:
     """(rows, columns, 3) sRGB, row 0 south: rock where it is steep, earth elsewhere, grass, forest and snow over it as
-    the masks say, darker where it is wet; the bed where it lies under the sea. No light: an engine brings its own."""
+    the masks say, darker where it is wet; the bed where it lies under water. No light: an engine brings its own."""
     palette, masks = PALETTES[ground.settings.look], ground.masks
     north, east = np.gradient(ground.heights, np.float32(ground.spacing_m))
     low, high = STEEP
@@ -52,7 +52,7 @@ def colours(ground: Ground) -> NDArray[np.uint8]:
         seen = _mixed(seen, colour, _share(masks[name]))
     seen = _mixed(seen, (0.0, 0.0, 0.0), WET * _share(masks["wetness"]))
     seen = _mixed(seen, palette.snow, _share(masks["snow"]))
-    seen = _mixed(seen, palette.bed, _share(masks["sea"]))
+    seen = _mixed(seen, palette.bed, _share(masks["water"]))
     coded: NDArray[np.uint8] = np.rint(_encoded(seen) * 255.0).astype(np.uint8)
     return coded
 

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from esker import contract, grid
 from esker.contract import TerrainSettings
 from esker.exports.resample import resampled
+from esker.exports.water import under_water
+from esker.lakes import find_lakes
 
 if TYPE_CHECKING:
     from esker.terrain import Terrain
@@ -29,7 +31,7 @@ WHOLE: Final = 255
 class Ground:
     """What is written. ``heights``: (rows, columns) float32, metres, row 0 south; sample [0, 0] lies at world
     (x_m, y_m), neighbours ``spacing_m`` apart. ``masks``: the same shape, uint8, 255 where there is all of it: COVERS
-    and ``sea``; empty where they were not asked for."""
+    and ``water``; empty where they were not asked for. ``lakes_m``: levels of the lakes, rising, metres."""
 
     heights: Heights
     x_m: float
@@ -37,6 +39,7 @@ class Ground:
     spacing_m: float
     settings: TerrainSettings
     masks: Mapping[str, Mask] = field(default_factory=dict)
+    lakes_m: tuple[float, ...] = ()
 
     @property
     def range_m(self) -> tuple[float, float]:
@@ -57,6 +60,7 @@ class Ground:
             "low_m": low,
             "high_m": high,
             "sea_level_m": self.settings.sea_level_m,
+            "lakes_m": list(self.lakes_m),
             "place": None if place is None else {"lat_deg": place.lat_deg, "lon_deg": place.lon_deg},
         }
 
@@ -114,7 +118,7 @@ def take(
             ground = replace(ground, heights=_plain(terrain, extent, None).heights)
     if extent.window is None and extent.samples != grid.samples(extent.level):
         ground = _fewer(ground, extent.samples)
-    return replace(ground, masks={**ground.masks, "sea": _sea(ground)}) if masks else ground
+    return _with_water(terrain, ground, levels.get("global_level", contract.DEFAULT_LEVEL)) if masks else ground
 
 
 def _plain(terrain: Terrain, extent: Extent, progress: Progress | None) -> Ground:
@@ -164,11 +168,26 @@ def _fewer(ground: Ground, samples: int) -> Ground:
     return replace(ground, heights=resampled(ground.heights, samples), spacing_m=spacing, masks=masks)
 
 
-def _sea(ground: Ground) -> Mask:
-    level = ground.settings.sea_level_m
-    if level is None:
-        return np.zeros(ground.heights.shape, dtype=np.uint8)
-    return np.where(ground.heights < level, np.uint8(WHOLE), np.uint8(0))
+def _with_water(terrain: Terrain, ground: Ground, global_level: int) -> Ground:
+    """With the mask of the sea and of the lakes, which stand in the solved ground of LAKE_LEVEL."""
+    settings = ground.settings
+    lakes = None
+    if settings.lakes_m is not None:
+        top = max(global_level, contract.LAKE_LEVEL)
+        step = 1 << (top - contract.LAKE_LEVEL)
+        cell = grid.spacing(contract.LAKE_LEVEL, settings.size_m)
+        solved = np.ascontiguousarray(terrain.heights(top)[::step, ::step])
+        lakes = find_lakes(solved, cell, settings.lakes_m, settings.sea_level_m)
+    per_m = (grid.samples(contract.LAKE_LEVEL) - 1) / settings.size_m
+    rows, columns = ground.heights.shape
+    u, v = (
+        (corner + np.arange(n, dtype=np.float64) * ground.spacing_m) * per_m
+        for corner, n in ((ground.x_m, columns), (ground.y_m, rows))
+    )
+    wet = under_water(ground.heights, u, v, lakes, settings.sea_level_m)
+    water = np.where(wet, np.uint8(WHOLE), np.uint8(0))
+    found = () if lakes is None else tuple(sorted(lakes.samples))
+    return replace(ground, masks={**ground.masks, "water": water}, lakes_m=found)
 
 
 def eight_bits(values: NDArray[np.float32]) -> Mask:

@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from esker.contract import NO_LAKE, PATCH_CELLS, SUBPATCHES, TerrainSettings
+from esker.lakes import Lakes, Surfaces, levels_on, sheet, waves_of
 from esker.render import sources
 from esker.render.atlas import MAX_SLOTS, PLAIN_MARCH, Atlas
 from esker.render.camera import eye_projection, part
 from esker.render.device import depth_buffer, half_depth, open_context
 from esker.render.frame import Detail, Rect, Scene, base_height, sun_direction, view_values
-from esker.render.lakes import Lakes, Surfaces, levels_on, sheet, waves_of
 from esker.render.layout import StructLayout
 from esker.render.programs import Compute, Draw, Resources
 from esker.render.select import Cut, choose, frustum

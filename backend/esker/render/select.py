@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from esker.contract import PATCH_CELLS, QUANTA_PER_CELL, SUBPATCHES
+from esker.lakes import Surfaces
 from esker.render.camera import Camera, eye_projection
-from esker.render.lakes import Surfaces
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

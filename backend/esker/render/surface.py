@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from esker.contract import LAKE_LEVEL, PATCH_CELLS, SUBPATCHES, TILE_CELLS, TILE_SAMPLES, TerrainSettings
 from esker.fractal import H_RANGE
-from esker.render.lakes import Lakes, find_lakes
+from esker.lakes import Lakes, find_lakes
 from esker.render.select import Floats, Ints
 from esker.synthesis.detailed import DetailedTerrain
 from esker.synthesis.hash import full, hashed

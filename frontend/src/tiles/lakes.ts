@@ -1,5 +1,5 @@
 /**
- * Lakes in the basins of the ground: how high water stands that cannot run off (twin of backend/esker/render/lakes.py).
+ * Lakes in the basins of the ground: how high water stands that cannot run off (twin of backend/esker/lakes.py).
  *
  * Basins are found by priority flood (Barnes, Lehman & Mulla, "Priority-flood: An optimal depression-filling and
  * watershed-labeling algorithm for digital elevation models", Computers & Geosciences 62, 2014) on the samples of one

@@ -46,7 +46,7 @@ const CARDS: readonly Card[] = [
     value: "masks",
     label: "Masks",
     suffix: ".zip",
-    says: "Snow, grass, forest, wetness and sea, as pictures for splat maps.",
+    says: "Snow, grass, forest, wetness and water, as pictures for splat maps.",
   },
   { value: "npy", label: "Array", suffix: ".npy", says: "Heights in metres, row 0 south. NumPy." },
 ];

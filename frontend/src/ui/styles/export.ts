@@ -145,6 +145,16 @@ export const exportStyles = css`
     font-variant-numeric: tabular-nums;
     user-select: text;
   }
+  /* On a phone the button stays in sight: only the chosen card says more. */
+  @media (max-width: 520px) {
+    .card {
+      align-content: center;
+      min-height: 44px;
+    }
+    .card:not(:has(:checked)) small {
+      display: none;
+    }
+  }
   .problem {
     color: var(--esk-bad);
     font-weight: 550;
