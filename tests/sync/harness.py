@@ -24,7 +24,7 @@ from esker import grid
 from esker.run import Assembly
 from esker.settings import Settings
 
-PATIENCE = 30.0
+PATIENCE = 90.0
 """Seconds to wait for what must come, on a machine that has other things to do."""
 
 
@@ -116,7 +116,7 @@ class LiveServer:
         request = urllib.request.Request(self.base + path, data=data, headers=headers, method=method)
         context = ssl._create_unverified_context() if self.base.startswith("https") else None
         try:
-            with urllib.request.urlopen(request, timeout=20, context=context) as answer:
+            with urllib.request.urlopen(request, timeout=90, context=context) as answer:
                 return answer.status, answer.read(), answer.headers.get("Content-Type", "")
         except urllib.error.HTTPError as error:
             return error.code, error.read(), error.headers.get("Content-Type", "")

@@ -319,7 +319,7 @@ def test_a_real_file_is_real_ground_for_everybody(tmp_path: Path) -> None:
             made = rasters.build(heights)
             assert bob.layers[0].content == made.digest
             np.testing.assert_array_equal(bob.grids[made.digest].heights, heights)
-            bob.ground.wait(30)
+            bob.ground.wait(120)
             base = Base(lod_space.build([Placed(bob.layers[0], made)]), bob.settings.size_m)
             for level in (0, 1, 2):
                 quantum = grid.quantum(level, bob.settings.size_m)
@@ -327,7 +327,7 @@ def test_a_real_file_is_real_ground_for_everybody(tmp_path: Path) -> None:
             ada.undo()
             ada.wait()
             _until(bob, lambda: not bob.layers)
-            bob.ground.wait(30)
+            bob.ground.wait(120)
             assert not bob.ground.heights(2).any()
 
 

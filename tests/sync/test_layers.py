@@ -100,7 +100,7 @@ class Site:
         self.laid += 1
 
     async def until(self, ready: Callable[[], bool]) -> None:
-        deadline = time.monotonic() + 5
+        deadline = time.monotonic() + 60
         while not ready():
             assert time.monotonic() < deadline
             await asyncio.sleep(0.001)

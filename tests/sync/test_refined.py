@@ -96,7 +96,7 @@ class RoofSolver:
         return RoofRefiner(basis.height, self.made)
 
 
-def follow(peer: Peer, decoder: FrameDecoder, clock: int, timeout: float = 20, refined: int = 0) -> None:
+def follow(peer: Peer, decoder: FrameDecoder, clock: int, timeout: float = 90, refined: int = 0) -> None:
     """Decodes and gives credit until the ground is settled at ``clock`` and nothing is left to refine.
 
     ``refined``: tiles above level 1 that must have come: where the server knows them all it has nothing to tell first.

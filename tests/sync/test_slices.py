@@ -106,7 +106,7 @@ def refining() -> Iterator[tuple[Refining, Worker, Viewer, Client]]:
 
 
 def wait(condition: Any) -> None:
-    deadline = time.monotonic() + 5
+    deadline = time.monotonic() + 60
     while not condition():
         assert time.monotonic() < deadline
         time.sleep(0.001)

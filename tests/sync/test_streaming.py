@@ -104,7 +104,7 @@ def test_without_credit_the_window_closes(tmp_path: Path) -> None:
         # Credit opens the window, and what comes is the newest ground.
         before = len(greedy.frames)
         greedy.say("credit", bytes=sent)
-        deadline = time.monotonic() + 5
+        deadline = time.monotonic() + 60
         while len(greedy.frames) == before:
             assert time.monotonic() < deadline
             greedy.say("ping", t=0)
@@ -209,7 +209,7 @@ def test_after_three_failures_numpy_takes_over(tmp_path: Path) -> None:
     for clock in range(1, 4):
         count = len(notes)
         worker.request(client, Job(clock, (), c.TerrainSettings()))
-        deadline = time.monotonic() + 5
+        deadline = time.monotonic() + 60
         while len(notes) == count:
             assert time.monotonic() < deadline
             time.sleep(0.001)

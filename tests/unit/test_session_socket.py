@@ -118,7 +118,7 @@ class Call:
 
     async def end(self) -> None:
         self.incoming.put_nowait(None)
-        await asyncio.wait_for(self.task, 5)
+        await asyncio.wait_for(self.task, 60)
 
 
 async def settle() -> None:
@@ -188,7 +188,7 @@ def test_who_is_heard_without_a_task_is_closed_like_everybody(said: str | bytes,
         error, closed = call.wire.sent[-2:]
         assert json.loads(error)["code"] == code
         assert str(closed).startswith(f"close {c.WS_CLOSE[code]}")
-        await asyncio.wait_for(call.task, 5)
+        await asyncio.wait_for(call.task, 60)
         assert call.wire.gone
 
     asyncio.run(run())
@@ -200,7 +200,7 @@ def test_a_peer_that_is_gone_when_something_should_go_at_once_ends_the_session()
         outbox = await call.greet()
         call.wire.gone = True
         outbox.push("late")  # must not raise: a room tells all its members in one go
-        await asyncio.wait_for(call.task, 5)
+        await asyncio.wait_for(call.task, 60)
         assert not call.hall.inside
 
     asyncio.run(run())

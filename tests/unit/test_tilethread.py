@@ -24,9 +24,9 @@ def test_what_is_first_runs_before_what_waits_and_each_in_its_order() -> None:
 
 def test_results_and_errors_arrive_and_a_stopped_thread_takes_nothing() -> None:
     thread = TileThread()
-    assert thread.submit(lambda x, y: x + y, 1, y=2).result(5) == 3
+    assert thread.submit(lambda x, y: x + y, 1, y=2).result(60) == 3
     with pytest.raises(ZeroDivisionError):
-        thread.first(lambda: 1 // 0).result(5)
+        thread.first(lambda: 1 // 0).result(60)
     thread.shutdown()
     with pytest.raises(RuntimeError):
         thread.submit(print)
@@ -40,10 +40,10 @@ def test_shutting_down_may_drop_what_waits() -> None:
         gate.wait()
 
     running = thread.submit(hold)
-    assert started.wait(5)
+    assert started.wait(60)
     waiting = thread.submit(print)
     thread.shutdown(wait=False, cancel_futures=True)
     gate.set()
-    running.result(5)
+    running.result(60)
     with pytest.raises(CancelledError):
-        waiting.result(5)
+        waiting.result(60)
