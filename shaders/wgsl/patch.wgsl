@@ -12,9 +12,12 @@ struct PatchVertex {
 };
 
 override PITCH: u32 = 17u;     // vertex numbering: row stride of the index buffer
+// Cells from an edge on which the weights of the corners count; further inside it is the patch's own alone.
+const EDGE_BAND: f32 = 2.0;
 
-fn patch_slot(record: vec4u) -> u32 { return record.z & 0xffffu; }
-fn patch_parent(record: vec4u) -> u32 { return record.z >> 16u; }
+fn patch_slot(record: vec4u) -> u32 { return record.z & 0xfffu; }
+fn patch_parent(record: vec4u) -> u32 { return (record.z >> 12u) & 0xfffu; }
+fn patch_own_morph(record: vec4u) -> f32 { return f32(record.z >> 24u) / 255.0; }
 fn patch_level(record: vec4u) -> u32 { return (record.y >> 24u) & 31u; }
 fn patch_edges(record: vec4u) -> u32 { return (record.x >> 24u) & 15u; }
 fn patch_corner(record: vec4u) -> vec2i { return vec2i(record.xy & vec2u(0xffffffu)); }
@@ -47,7 +50,8 @@ fn exact_mix(a: f32, b: f32, t: f32) -> f32 {
   return a * (1.0 - t) + b * t;
 }
 
-// Morph weight of vertex g (0..16) from the weights of the corners; on an edge only its two corners count.
+// Morph weight of vertex g (0..16): on an edge from the weights of its two corners, inside soon the patch's own. So a
+// coarser neighbour flattens a band along the edge, not the patch.
 fn patch_morph(record: vec4u, g: vec2i) -> f32 {
   let c = unpack4x8unorm(record.w);
   let t = vec2f(g) / f32(PATCH_CELLS);
@@ -55,7 +59,9 @@ fn patch_morph(record: vec4u, g: vec2i) -> f32 {
   if (g.x == PATCH_CELLS) { return exact_mix(c.y, c.w, t.y); }
   if (g.y == 0) { return exact_mix(c.x, c.y, t.x); }
   if (g.y == PATCH_CELLS) { return exact_mix(c.z, c.w, t.x); }
-  return mix(mix(c.x, c.y, t.x), mix(c.z, c.w, t.x), t.y);
+  let corners = mix(mix(c.x, c.y, t.x), mix(c.z, c.w, t.x), t.y);
+  let inside = min(g, PATCH_CELLS - g);
+  return mix(patch_own_morph(record), corners, max(0.0, 1.0 - f32(min(inside.x, inside.y)) / EDGE_BAND));
 }
 
 fn patch_vertex(record: vec4u, grid: vec2i) -> PatchVertex {
@@ -85,6 +91,23 @@ fn patch_vertex(record: vec4u, grid: vec2i) -> PatchVertex {
   return out;
 }
 
+// Where a patch's samples lie in the atlas's textures: found per vertex, so that pixels only scale and add.
+struct PatchTexels {
+  origins: vec4f,  // texture coordinates of the sample position 0: of the own tile, of the parent's for it
+  layers: vec2i,
+};
+
+fn patch_texels(record: vec4u) -> PatchTexels {
+  let own = patch_slot(record);
+  let parent = patch_parent(record);
+  let origins = vec4f(slot_uv(own, vec2f(0.0)), slot_uv(parent, parent_at(record, vec2f(0.0))));
+  return PatchTexels(origins, vec2i(slot_layer(own), slot_layer(parent)));
+}
+
+fn own_uv(texels: PatchTexels, at: vec2f) -> vec2f { return texels.origins.xy + at * SLOT_UV; }
+
+fn parent_uv(texels: PatchTexels, at: vec2f) -> vec2f { return texels.origins.zw + at * (0.5 * SLOT_UV); }
+
 // Surface gradient (dz/dx, dz/dy), sun and sky visibility and synthesised channels at a point of a patch, morphed like the
 // heights.
 struct Surface {
@@ -96,20 +119,20 @@ struct Surface {
   attributes1: vec4f,  // grass, forest, grain, size of the next level's detail
 };
 
-fn patch_surface(record: vec4u, at: vec2f, morph: f32) -> Surface {
-  let own = patch_slot(record);
-  let uv = slot_uv(own, at);
-  var s = textureSampleLevel(slopes, smooth_clamp, uv, slot_layer(own), 0.0);
-  var l = textureSampleLevel(light, smooth_clamp, uv, slot_layer(own), 0.0);
-  var a0 = textureSampleLevel(attributes0, smooth_clamp, uv, slot_layer(own), 0.0);
-  var a1 = textureSampleLevel(attributes1, smooth_clamp, uv, slot_layer(own), 0.0);
+fn patch_surface(texels: PatchTexels, at: vec2f, morph: f32) -> Surface {
+  let uv = own_uv(texels, at);
+  let own = texels.layers.x;
+  var s = textureSampleLevel(slopes, smooth_clamp, uv, own, 0.0);
+  var l = textureSampleLevel(light, smooth_clamp, uv, own, 0.0);
+  var a0 = textureSampleLevel(attributes0, smooth_clamp, uv, own, 0.0);
+  var a1 = textureSampleLevel(attributes1, smooth_clamp, uv, own, 0.0);
   if (morph > 0.0) {
-    let parent = patch_parent(record);
-    let up = slot_uv(parent, parent_at(record, at));
-    s = mix(s, textureSampleLevel(slopes, smooth_clamp, up, slot_layer(parent), 0.0), morph);
-    l = mix(l, textureSampleLevel(light, smooth_clamp, up, slot_layer(parent), 0.0), morph);
-    a0 = mix(a0, textureSampleLevel(attributes0, smooth_clamp, up, slot_layer(parent), 0.0), morph);
-    a1 = mix(a1, textureSampleLevel(attributes1, smooth_clamp, up, slot_layer(parent), 0.0), morph);
+    let up = parent_uv(texels, at);
+    let parent = texels.layers.y;
+    s = mix(s, textureSampleLevel(slopes, smooth_clamp, up, parent, 0.0), morph);
+    l = mix(l, textureSampleLevel(light, smooth_clamp, up, parent, 0.0), morph);
+    a0 = mix(a0, textureSampleLevel(attributes0, smooth_clamp, up, parent, 0.0), morph);
+    a1 = mix(a1, textureSampleLevel(attributes1, smooth_clamp, up, parent, 0.0), morph);
   }
   return Surface(s.xy, s.z, l.x, l.y, a0, a1);
 }

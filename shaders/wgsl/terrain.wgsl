@@ -4,7 +4,8 @@ struct TerrainVertex {
   @location(0) relative: vec3f,
   @location(1) at: vec2f,
   @location(2) morph: f32,
-  @location(3) @interpolate(flat) record: vec4u,
+  @location(3) @interpolate(flat) origins: vec4f,  // where its texels lie (PatchTexels)
+  @location(8) @interpolate(flat) layers: vec3i,   // and in which layers; its level
   @location(4) through: vec3f,
   @location(5) glow: vec3f,
   @location(6) detail: vec3f,
@@ -19,7 +20,9 @@ fn terrain_vertex(@builtin(vertex_index) index: u32, patch_in: PatchIn) -> Terra
   out.relative = v.relative;
   out.at = v.at;
   out.morph = v.morph;
-  out.record = patch_in.record;
+  let texels = patch_texels(patch_in.record);
+  out.origins = texels.origins;
+  out.layers = vec3i(texels.layers, i32(patch_level(patch_in.record)));
   let air = air_to(v.world);
   out.through = air.through;
   out.glow = air.glow;
@@ -77,7 +80,7 @@ fn terrain_fragment(v: TerrainVertex) -> @location(0) vec4f {
   let f = Footprint(dpdx(v.relative), dpdy(v.relative));
   let world = v.relative + view.eye.xyz;
   let rate = abs(f.dx.z) + abs(f.dy.z);
-  let surface = patch_surface(v.record, v.at, v.morph);
+  let surface = patch_surface(PatchTexels(v.origins, v.layers.xy), v.at, v.morph);
   let site = survey(world, surface.gradient, surface.curvature, f, cover_of(surface), v.above_lake);
   var m = ground_material(site);
   if (view.overlay == OVERLAY_SLOPE) {
@@ -93,7 +96,7 @@ fn terrain_fragment(v: TerrainVertex) -> @location(0) vec4f {
     m.albedo = mix(m.albedo, painted_tint(v.detail.z), 0.8);
     m.gloss = 0.0;
   } else if (view.overlay == OVERLAY_PATCHES) {
-    m.albedo = mix(m.albedo, level_tint(patch_level(v.record)) * 0.5, 0.7);
+    m.albedo = mix(m.albedo, level_tint(u32(v.layers.z)) * 0.5, 0.7);
   }
   let dir = ray_to(world);
   var colour = shade(m, surface.gradient, surface, dir);

@@ -2,6 +2,7 @@
 const SLOT_BORDER: i32 = 2;
 const SLOT_TEXELS: i32 = TILE_SAMPLES + 2 * SLOT_BORDER;
 const SLOTS_ACROSS: u32 = 16u;
+const SLOT_UV: f32 = 1.0 / f32(SLOT_TEXELS * i32(SLOTS_ACROSS));  // from a sample to the next, in texture coordinates
 
 fn slot_layer(slot: u32) -> i32 {
   return i32(slot / (SLOTS_ACROSS * SLOTS_ACROSS));

@@ -69,6 +69,18 @@ def test_neighbours_differ_by_one_level_and_agree(surface: Surface) -> None:
                 assert weights[level, x, y] == {0}
 
 
+def test_patches_have_a_weight_of_their_own(surface: Surface) -> None:
+    """R71: by the parent's error in bounds; all at it where the parent was split for its neighbours' sake alone."""
+    between = 0
+    for cut in cuts(surface):
+        for level, (px, py), morph in zip(cut.level.tolist(), cut.nodes.tolist(), cut.morph.tolist(), strict=True):
+            ratio = cut.split[level - 1][px >> 1, py >> 1] if level else 9.0
+            wanted = 255 if ratio <= 1 else 0 if ratio >= 1.25 else 255 * (1.25 - ratio) / 0.25
+            assert abs(morph - wanted) <= 0.5 + 1e-6
+            between += 0 < morph < 255
+    assert between > 5
+
+
 def test_tiles_of_a_cut_come_with_their_ancestors(surface: Surface) -> None:
     """R5."""
     for cut in cuts(surface):

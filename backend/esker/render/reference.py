@@ -314,7 +314,7 @@ def _buffer(context: moderngl.Context, data: NDArray[np.uint32]) -> moderngl.Buf
 
 
 def _words(cut: Cut, atlas: Atlas) -> NDArray[np.uint32]:
-    """Patch records: (n, 4). Column, edge bits; row, level; own and parent's slot; four corner weights."""
+    """Patch records: (n, 4). Column, edge bits; row, level; own and parent's slot, own weight; four corner weights."""
     own, parent = [], []
     for level, (px, py) in zip(cut.level.tolist(), cut.nodes.tolist(), strict=True):
         x, y = px // SUBPATCHES, py // SUBPATCHES
@@ -324,7 +324,7 @@ def _words(cut: Cut, atlas: Atlas) -> NDArray[np.uint32]:
     out = np.empty((len(cut.level), 4), dtype=np.uint32)
     out[:, 0] = corner[:, 0] | cut.edges << 24 | cut.border << 28
     out[:, 1] = corner[:, 1] | cut.level << 24 | cut.wet.astype(np.int64) << 31
-    out[:, 2] = np.array(own) | np.array(parent) << 16
+    out[:, 2] = np.array(own) | np.array(parent) << 12 | cut.morph.astype(np.int64) << 24
     out[:, 3] = np.ascontiguousarray(cut.corners).view("<u4")[:, 0]
     return out
 

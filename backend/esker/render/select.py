@@ -27,6 +27,7 @@ Split = list[dict[Node, float]]
 SMALLEST_CELL: Final = 1.0
 SHADING_ERROR: Final = 1.5 / QUANTA_PER_CELL
 SHADING_CELL_PX: Final = 5.0
+MORPH_WIDTH: Final = 0.25
 WEST, EAST, SOUTH, NORTH = 1, 2, 4, 8
 
 
@@ -49,14 +50,15 @@ class Figures(Protocol):
 @dataclass(frozen=True)
 class Cut:
     """Drawn patches. ``nodes``: (n, 2) column and row on ``level``; ``edges``: bits of the sides with a coarser
-    neighbour, ``border``: of those on the domain's border; ``corners``: (n, 4) weights, south-west, south-east,
-    north-west, north-east, as unorm8; ``wet``: some of it lies below water. ``near``, ``far``: (n, 3) corners of the
-    boxes that patches stay in, ``water``: how high water may stand there, metres."""
+    neighbour, ``border``: of those on the domain's border; ``morph``: (n,) own weight, ``corners``: (n, 4) weights,
+    south-west, south-east, north-west, north-east, all as unorm8; ``wet``: some of it lies below water. ``near``,
+    ``far``: (n, 3) corners of the boxes that patches stay in, ``water``: how high water may stand there, metres."""
 
     level: Ints
     nodes: Ints
     edges: Ints
     border: Ints
+    morph: NDArray[np.uint8]
     corners: NDArray[np.uint8]
     wet: NDArray[np.bool_]
     near: Floats
@@ -131,7 +133,7 @@ class _Walk:
 
     def emit(self, split: Split) -> Cut:
         """The visible leaves of the restricted tree."""
-        rows: list[tuple[int, int, int, int, int, int, int, int, int, int]] = []
+        rows: list[tuple[int, ...]] = []
         nodes = _roots()
         for level in range(len(split) + 1):
             nodes = nodes[self._visible(level, nodes)]
@@ -144,7 +146,8 @@ class _Walk:
                     continue
                 border = WEST * (px == 0) | EAST * (px == last) | SOUTH * (py == 0) | NORTH * (py == last)
                 corners = _corners(split, level, px, py) if level else (0, 0, 0, 0)
-                rows.append((level, px, py, _edges(split, level, px, py), border, *corners, 0))
+                own = _unorm8(_morph(split[level - 1][px >> 1, py >> 1])) if level else 0
+                rows.append((level, px, py, _edges(split, level, px, py), border, own, *corners))
             if not deeper:
                 break
             nodes = _children(np.array(deeper, dtype=np.int64))
@@ -154,7 +157,8 @@ class _Walk:
             table[:, 1:3],
             table[:, 3],
             table[:, 4],
-            table[:, 5:9].astype(np.uint8),
+            table[:, 5].astype(np.uint8),
+            table[:, 6:10].astype(np.uint8),
             *self._boxes(table),
             split,
         )
@@ -232,8 +236,12 @@ def _edges(split: Split, level: int, px: int, py: int) -> int:
 
 
 def _morph(parent_ratio: float) -> float:
-    """1 when the parent's error is at the bound (about to be merged), 0 from twice the bound on."""
-    return min(1.0, max(0.0, 2.0 - parent_ratio))
+    """1 when the parent's error is at the bound (about to be merged), 0 from ``MORPH_WIDTH`` beyond it on."""
+    return min(1.0, max(0.0, 1.0 - (parent_ratio - 1.0) / MORPH_WIDTH))
+
+
+def _unorm8(weight: float) -> int:
+    return int(weight * 255 + 0.5)
 
 
 def _corners(split: Split, level: int, px: int, py: int) -> tuple[int, int, int, int]:
@@ -243,7 +251,7 @@ def _corners(split: Split, level: int, px: int, py: int) -> tuple[int, int, int,
         for sx in (-1, 1):
             around = [(0, 0), (sx, 0), (0, sy), (sx, sy)]
             inside = [(px + x, py + y) for x, y in around if 0 <= px + x <= last and 0 <= py + y <= last]
-            out.append(int(_weight(split, level, inside) * 255 + 0.5))
+            out.append(_unorm8(_weight(split, level, inside)))
     return out[0], out[1], out[2], out[3]
 
 

@@ -8,12 +8,15 @@ export const EDGE_NORTH = 8;
 /**
  * Uint32 words of a patch record; the vertex shader reads the same (patch.wgsl): column of the south-west vertex in samples
  * of its level | edge bits << 24 | border bits << 28; row | level << 24 | (1 << 31 where some of it lies below the sea);
- * own slot | parent slot << 16; four corner morph weights as unorm8 (south-west, south-east, north-west, north-east).
+ * own slot | parent slot << 12 | own morph weight as unorm8 << 24; four morph weights of the corners as unorm8 (south-west,
+ * south-east, north-west, north-east).
  */
 export const RECORD_WORDS = 4;
 /** Words that say what is known of a patch beside what is drawn (Cut.facts, shaders/wgsl/hidden.wgsl). */
 export const FACT_WORDS = 3;
 const INDEX_MASK = 0xffffff;
+/** Slots of the atlas have fewer bits. */
+const SLOT_MASK = 0xfff;
 const WET = 1 << 31;
 
 /** What a record says. */
@@ -27,7 +30,9 @@ export interface PatchRecord {
   readonly edges: number;
   readonly border: number;
   readonly wet: boolean;
-  /** Morph weights as unorm8. */
+  /** Morph weight of what is not near an edge, as unorm8. */
+  readonly own: number;
+  /** Morph weights of the corners as unorm8. */
   readonly corners: number;
 }
 
@@ -35,7 +40,7 @@ export function writeRecord(records: Uint32Array, patch: number, of: PatchRecord
   const at = patch * RECORD_WORDS;
   records[at] = (of.column | (of.edges << 24) | (of.border << 28)) >>> 0;
   records[at + 1] = (of.row | (of.level << 24) | (of.wet ? WET : 0)) >>> 0;
-  records[at + 2] = (of.slot | (of.parent << 16)) >>> 0;
+  records[at + 2] = ((of.slot & SLOT_MASK) | ((of.parent & SLOT_MASK) << 12) | (of.own << 24)) >>> 0;
   records[at + 3] = of.corners >>> 0;
 }
 
@@ -49,6 +54,19 @@ export function recordRow(records: Uint32Array, patch: number): number {
 
 export function recordLevel(records: Uint32Array, patch: number): number {
   return (records[patch * RECORD_WORDS + 1]! >>> 24) & 31;
+}
+
+export function recordSlot(records: Uint32Array, patch: number): number {
+  return records[patch * RECORD_WORDS + 2]! & SLOT_MASK;
+}
+
+export function recordParent(records: Uint32Array, patch: number): number {
+  return (records[patch * RECORD_WORDS + 2]! >>> 12) & SLOT_MASK;
+}
+
+/** Morph weight of what is not near an edge, 0 to 1. */
+export function recordMorph(records: Uint32Array, patch: number): number {
+  return (records[patch * RECORD_WORDS + 2]! >>> 24) / 255;
 }
 
 export function recordEdges(records: Uint32Array, patch: number): number {

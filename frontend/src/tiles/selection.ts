@@ -6,7 +6,7 @@
  * neighbour there is coarser: odd vertices snap) and a morph weight for each of its four corners. A weight is a property
  * of the corner's point, the same for all patches that meet there: 1 where one of them is coarser (all draw the parent's
  * sample), 0 where one is finer, else by screen error. Bilinear weights between the corners then agree along every
- * shared edge, so patches meet exactly.
+ * shared edge, so patches meet exactly. Away from its edges a patch has its own weight (patch.wgsl).
  */
 
 import type { CameraState, TileView } from "../core/types.ts";
@@ -21,6 +21,11 @@ export type { TileRequest } from "./wishes.ts";
 
 /** From this error on, in taus, tiles are asked for that a nearer eye will need: they are there before they are drawn. */
 const EARLY = 0.7;
+/**
+ * A patch has its parent's shape when the parent's error is at the bound, and its own from so much above it on, in bounds:
+ * wider, and most of what is drawn is half flattened; narrower, and levels change within few frames of a moving camera.
+ */
+const MORPH_WIDTH = 0.25;
 
 /** The drawn cut. Arrays are reused by the next call of `select`. */
 export interface Cut {
@@ -316,6 +321,7 @@ export class Selection {
       parent,
       edges,
       border,
+      own: level > 0 ? Math.round(morph * 255) : 0,
       wet: tree.min[node]! < this.sight.waterOn(level, px, py),
       corners,
     });
@@ -362,7 +368,7 @@ export class Selection {
   }
 }
 
-/** 1 when the parent's error is at the bound (about to be merged), 0 from twice the bound on. */
+/** 1 when the parent's error is at the bound (about to be merged), 0 from `MORPH_WIDTH` beyond it on. */
 function morphOf(parentRatio: number): number {
-  return Math.min(1, Math.max(0, 2 - parentRatio));
+  return Math.min(1, Math.max(0, 1 - (parentRatio - 1) / MORPH_WIDTH));
 }

@@ -12,6 +12,7 @@ import {
   recordColumn,
   recordEdges,
   recordLevel,
+  recordMorph,
   recordRow,
 } from "../../src/tiles/records.ts";
 import type { Cut } from "../../src/tiles/selection.ts";
@@ -55,7 +56,7 @@ export function shownVertex(
   const level = recordLevel(cut.records, index);
   const column = recordColumn(cut.records, index) + x;
   const row = recordRow(cut.records, index) + y;
-  const m = morphAt(corners, x, y);
+  const m = morphAt(corners, recordMorph(cut.records, index), x, y);
   const own = m < 1 ? height(level, column, row) : 0;
   if (m === 0) return own;
   const [i, j] = [column >> 1, row >> 1];
@@ -91,12 +92,17 @@ export function drawnPatch(cut: Cut, index: number, sizeM: number, height: Sampl
   };
 }
 
-/** Weight of a vertex from the weights of the corners (south-west, south-east, north-west, north-east). */
-function morphAt(c: readonly number[], x: number, y: number): number {
+/** Cells from an edge on which corners count (patch.wgsl). */
+const EDGE_BAND = 2;
+
+/** Weight of a vertex from the weights of the corners (south-west, south-east, north-west, north-east) and the patch's own. */
+function morphAt(c: readonly number[], own: number, x: number, y: number): number {
   const [u, v] = [x / PATCH_CELLS, y / PATCH_CELLS];
   const south = c[0]! * (1 - u) + c[1]! * u;
   const north = c[2]! * (1 - u) + c[3]! * u;
-  return south * (1 - v) + north * v;
+  const inside = Math.min(x, PATCH_CELLS - x, y, PATCH_CELLS - y);
+  const share = Math.max(0, 1 - inside / EDGE_BAND);
+  return own * (1 - share) + (south * (1 - v) + north * v) * share;
 }
 
 /** Height of a drawn patch at a place of the domain that it covers, metres. Not for snapped edges. */

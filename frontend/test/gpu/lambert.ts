@@ -21,23 +21,23 @@ struct PlainVertex {
   @builtin(position) position: vec4f,
   @location(0) at: vec2f,
   @location(1) morph: f32,
-  @location(2) @interpolate(flat) record: vec4u,
+  @location(2) @interpolate(flat) origins: vec4f,
+  @location(3) @interpolate(flat) layers: vec2i,
 };
 
 @vertex
 fn terrain_vertex(@builtin(vertex_index) index: u32, patch_in: PatchIn) -> PlainVertex {
   let v = patch_vertex(patch_in.record, vec2i(i32(index % PITCH), i32(index / PITCH)));
-  return PlainVertex(guarded(clip_of(v.relative)), v.at, v.morph, patch_in.record);
+  let texels = patch_texels(patch_in.record);
+  return PlainVertex(guarded(clip_of(v.relative)), v.at, v.morph, texels.origins, texels.layers);
 }
 
 @fragment
 fn terrain_fragment(v: PlainVertex) -> @location(0) vec4f {
-  let own = patch_slot(v.record);
-  var s = textureSampleLevel(slopes, smooth_clamp, slot_uv(own, v.at), slot_layer(own), 0.0).xy;
+  let texels = PatchTexels(v.origins, v.layers);
+  var s = textureSampleLevel(slopes, smooth_clamp, own_uv(texels, v.at), v.layers.x, 0.0).xy;
   if (v.morph > 0.0) {
-    let parent = patch_parent(v.record);
-    let up = slot_uv(parent, parent_at(v.record, v.at));
-    s = mix(s, textureSampleLevel(slopes, smooth_clamp, up, slot_layer(parent), 0.0).xy, v.morph);
+    s = mix(s, textureSampleLevel(slopes, smooth_clamp, parent_uv(texels, v.at), v.layers.y, 0.0).xy, v.morph);
   }
   return lambert(s, view.sun.xyz);
 }

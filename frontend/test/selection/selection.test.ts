@@ -12,9 +12,13 @@ import {
   recordColumn,
   recordEdges,
   recordLevel,
+  recordMorph,
+  recordParent,
   recordRow,
+  recordSlot,
 } from "../../src/tiles/records.ts";
 import { type Cut, Selection, type TileRequest } from "../../src/tiles/selection.ts";
+import { samplesOf, shownVertex } from "../gpu/drawn.ts";
 import { FieldView, filteredField, lookAt, mapCamera, random } from "../gpu/world.ts";
 
 interface Leaf {
@@ -30,13 +34,13 @@ interface Leaf {
 
 function leaves(cut: Cut): Leaf[] {
   return Array.from({ length: cut.count }, (_, i) => {
-    const [, , c, d] = cut.records.subarray(4 * i, 4 * i + 4) as unknown as [number, number, number, number];
+    const d = cut.records[4 * i + 3]!;
     return {
       level: recordLevel(cut.records, i),
       px: recordColumn(cut.records, i) / 16,
       py: recordRow(cut.records, i) / 16,
-      slot: c & 0xffff,
-      parent: c >>> 16,
+      slot: recordSlot(cut.records, i),
+      parent: recordParent(cut.records, i),
       edges: recordEdges(cut.records, i),
       border: recordBorder(cut.records, i),
       corners: [0, 8, 16, 24].map((shift) => (d >>> shift) & 255),
@@ -189,6 +193,28 @@ describe("selection", { timeout: 60_000 }, () => {
         }
       }
     }
+  });
+
+  it("R71: inside of its edges a patch has its own shape, though a coarser one lies beside it", () => {
+    const cut = ready(view).select(view, above(), 0.6, new Everything());
+    const sample = samplesOf(view);
+    let beside = 0;
+    for (let i = 0; i < cut.count; i += 1) {
+      const [level, px, py] = [recordLevel(cut.records, i), recordColumn(cut.records, i), recordRow(cut.records, i)];
+      const edges = recordEdges(cut.records, i);
+      if (recordMorph(cut.records, i) !== 0 || !(edges & (EDGE_WEST | EDGE_EAST))) continue;
+      beside += 1;
+      const west = (edges & EDGE_WEST) !== 0;
+      const own = (x: number): number => sample(level, px + x, py + 7);
+      const shown = (x: number): number => shownVertex(cut, i, x, 7, sample);
+      // On the edge it is the parent's surface, the middle of two samples here.
+      const at = west ? 0 : 16;
+      const up = (row: number): number => sample(level - 1, (px + at) / 2, (py + row) / 2);
+      expect(shown(at)).toBeCloseTo(0.5 * (up(6) + up(8)), 6);
+      expect(shown(west ? 2 : 14)).toBe(own(west ? 2 : 14));
+      expect(shown(8)).toBe(own(8));
+    }
+    expect(beside).toBeGreaterThan(5);
   });
 
   it("R5: the parent of every drawn tile, and all its ancestors, are touched and named", () => {

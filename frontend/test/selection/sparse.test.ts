@@ -9,7 +9,7 @@ import { craggyField, lookAt, random, SparseView } from "../gpu/world.ts";
 
 const SIZE = 65536;
 const LEVELS = 10;
-const slots = { slot: (level: number, x: number, y: number) => (level * 7 + x * 3 + y) & 0xffff, touch() {} };
+const slots = { slot: (level: number, x: number, y: number) => (level * 7 + x * 3 + y) & 0xfff, touch() {} };
 
 interface Leaf {
   readonly level: number;

@@ -4,7 +4,7 @@ import { beforeAll, describe, expect, it } from "vitest";
 import type { CameraState, TerrainSettings } from "../../src/core/types.ts";
 import { Atlas, type Resident } from "../../src/gpu/atlas.ts";
 import { finestLevel } from "../../src/tiles/detail.ts";
-import { recordColumn, recordLevel, recordRow } from "../../src/tiles/records.ts";
+import { recordColumn, recordLevel, recordRow, recordSlot } from "../../src/tiles/records.ts";
 import { type Cut, Selection } from "../../src/tiles/selection.ts";
 import { expectation } from "../../src/tiles/synthetic.ts";
 import { alpineField, FieldView, lookAt, PLAIN_CHANNELS } from "../gpu/world.ts";
@@ -166,7 +166,7 @@ describe("synthetic levels", { timeout: 60_000 }, () => {
       for (let k = 0; k < cut.count; k += 1) {
         const level = recordLevel(cut.records, k);
         const [col, row] = [recordColumn(cut.records, k) >> 6, recordRow(cut.records, k) >> 6];
-        expect(bench.atlas.slot(level, col, row)).toBe(cut.records[4 * k + 2]! & 0xffff);
+        expect(bench.atlas.slot(level, col, row)).toBe(recordSlot(cut.records, k));
         const key = [level, recordColumn(cut.records, k), recordRow(cut.records, k)].join();
         now.set(key, level);
       }
