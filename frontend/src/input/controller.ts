@@ -5,7 +5,7 @@
  * camera. A second finger, or Esc, ends it. Events come in CSS pixels and become device pixels here, at the DOM's edge.
  */
 
-import { type ReadonlySignal, type Signal, signal } from "@preact/signals-core";
+import { computed, type ReadonlySignal, type Signal, signal } from "@preact/signals-core";
 import type { Camera } from "../core/camera.ts";
 import type { GhostVisual, Ground, Vec3 } from "../core/types.ts";
 import type { SyncDoc } from "../doc/sync.ts";
@@ -15,6 +15,7 @@ import { Grips, type GripVisual } from "./grips.ts";
 import { Keyboard } from "./keyboard.ts";
 import { KeyPen } from "./keypen.ts";
 import { type Finger, Navigation, type NavigationMode } from "./navigation.ts";
+import { OversketchTool } from "./oversketch.ts";
 import type { Laying } from "./placement.ts";
 import { Pointing, takePointer } from "./pointing.ts";
 import { type Activity, Presses } from "./presses.ts";
@@ -78,6 +79,8 @@ export class InputController {
   readonly #hovered = signal<string | null>(null);
   readonly #mode = signal<InputMode>("idle");
   readonly #strokes: StrokeTool;
+  readonly #oversketch: OversketchTool;
+  readonly #inks: ReadonlySignal<InkVisual | null>;
   readonly #grips: Grips;
   readonly #navigation: Navigation;
   readonly #pointing: Pointing;
@@ -95,6 +98,8 @@ export class InputController {
     this.#navigation = new Navigation(options.camera, options.ground);
     this.#pointing = new Pointing(options.canvas, options.camera, options.doc);
     this.#strokes = new StrokeTool({ author: () => "", ...options, now });
+    this.#oversketch = new OversketchTool({ ...options, now });
+    this.#inks = computed(() => this.#oversketch.ink.value ?? this.#strokes.ink.value);
     const { tool, selection, laying } = this;
     this.#grips = new Grips({ ...options, tool, selection, laying, now });
     this.keyPen = new KeyPen({
@@ -126,6 +131,7 @@ export class InputController {
       navigation: this.#navigation,
       pointing: this.#pointing,
       strokes: this.#strokes,
+      oversketch: this.#oversketch,
       grips: this.#grips,
       spaceHeld: () => this.#keyboard.spaceHeld,
     });
@@ -152,7 +158,7 @@ export class InputController {
 
   /** The line under the pen, in device pixels. */
   get ink(): ReadonlySignal<InkVisual | null> {
-    return this.#strokes.ink;
+    return this.#inks;
   }
 
   /** What the main pointer is doing. */
@@ -260,6 +266,9 @@ export class InputController {
     if (activity.kind === "draw") {
       this.#strokes.move(this.#pointing.samples(e), this.#pointing.predicted(e));
       this.#cursor(x, y);
+    } else if (activity.kind === "redraw") {
+      this.#oversketch.move(this.#pointing.samples(e), this.#pointing.predicted(e));
+      this.#cursor(x, y);
     } else if (activity.kind === "navigate") this.#navigation.drag(x, y);
     else if (activity.kind === "drag") {
       this.#grips.move(x, y, !e.altKey);
@@ -282,7 +291,8 @@ export class InputController {
     else if (activity.kind === "draw") {
       const made = this.#strokes.finish();
       if (made !== null) this.#drawn(made);
-    } else if (activity.kind === "drag") {
+    } else if (activity.kind === "redraw") this.#oversketch.finish();
+    else if (activity.kind === "drag") {
       this.#grips.move(...this.#pointing.pixel(e), !e.altKey);
       this.#grips.finish();
     }
@@ -310,6 +320,7 @@ export class InputController {
       }
     }
     if (activity.kind === "draw") this.#strokes.cancel();
+    if (activity.kind === "redraw") this.#oversketch.cancel();
     if (activity.kind === "drag") this.#grips.cancel();
     if (e.button !== 0 || activity.kind === "drag" || activity.kind === "navigate") return;
     if (this.laying.value !== null) return;
@@ -342,8 +353,9 @@ export class InputController {
     this.#grips.hover(handle?.kind ?? null);
     const picks = this.tool.value === "select" || this.tool.value === "paint";
     const over = handle === null && picks ? this.#presses.pick(e) : null;
-    this.#hovered.value = over?.stroke.id ?? null;
-    this.#showCursor(handle !== null || over !== null);
+    const redraws = handle === null && !picks && this.#presses.over(e);
+    this.#hovered.value = redraws ? this.selection.value : (over?.stroke.id ?? null);
+    this.#showCursor(handle !== null || over !== null, redraws);
   }
 
   #cursor(x: number, y: number): void {
@@ -362,9 +374,11 @@ export class InputController {
     const main = this.#main;
     if (main === null) return this.keyPen.cancel();
     this.#endMain();
-    if (main.activity.kind === "draw") this.#strokes.cancel();
-    else if (main.activity.kind === "drag") this.#grips.cancel();
-    return main.activity.kind === "draw" || main.activity.kind === "drag";
+    const { kind } = main.activity;
+    if (kind === "draw") this.#strokes.cancel();
+    else if (kind === "redraw") this.#oversketch.cancel();
+    else if (kind === "drag") this.#grips.cancel();
+    return kind === "draw" || kind === "redraw" || kind === "drag";
   }
 
   #endMain(): void {
@@ -377,13 +391,15 @@ export class InputController {
     const activity = this.#main?.activity;
     const navigation = this.#navigation.mode;
     if (navigation !== null) this.#mode.value = navigation;
-    else this.#mode.value = activity?.kind === "draw" ? "draw" : activity?.kind === "drag" ? "handle" : "idle";
+    else if (activity?.kind === "draw" || activity?.kind === "redraw") this.#mode.value = "draw";
+    else this.#mode.value = activity?.kind === "drag" ? "handle" : "idle";
     this.#showCursor(false);
   }
 
-  #showCursor(over: boolean): void {
+  /** `over`: something can be taken hold of; `redraws`: a line begun here changes the selected one. */
+  #showCursor(over: boolean, redraws = false): void {
     const still = this.tool.value === "select" || this.laying.value !== null;
-    const idle = still ? (over ? "pointer" : "default") : over ? "pointer" : "crosshair";
+    const idle = redraws ? "cell" : over ? "pointer" : still ? "default" : "crosshair";
     const mode = this.#mode.value;
     this.#o.canvas.style.cursor = mode === "idle" || mode === "draw" ? idle : "grabbing";
   }

@@ -62,6 +62,11 @@ export class Pointing {
     return pickStroke(doc, this.#camera, ground, x, y, STROKE_PX[reachOf(e)] * this.ratio, order);
   }
 
+  /** How near to a line counts as on it, CSS pixels. */
+  near(e: PointerEvent): number {
+    return STROKE_PX[reachOf(e)];
+  }
+
   handle(handles: readonly GripVisual[], e: PointerEvent): GripVisual | null {
     const [x, y] = this.pixel(e);
     return pickHandle(handles, this.#camera, x, y, HANDLE_PX[reachOf(e)] * this.ratio);

@@ -3,9 +3,11 @@
 import type { ReadonlySignal } from "@preact/signals-core";
 import type { Camera } from "../core/camera.ts";
 import type { Ground } from "../core/types.ts";
+import type { SyncDoc } from "../doc/sync.ts";
 import type { ToolId } from "./actions.ts";
 import type { Grips, GripVisual } from "./grips.ts";
 import type { Navigation, NavigationMode } from "./navigation.ts";
+import { type OversketchTool, redraws } from "./oversketch.ts";
 import type { Picked, PickOrder } from "./picking.ts";
 import type { Laying } from "./placement.ts";
 import type { Pointing } from "./pointing.ts";
@@ -19,6 +21,8 @@ export type Activity =
       readonly notice: string | null;
     }
   | { readonly kind: "draw" }
+  /** A line over the selected stroke, which takes the place of a part of it. */
+  | { readonly kind: "redraw" }
   | { readonly kind: "drag" }
   | { readonly kind: "navigate"; readonly mode: NavigationMode };
 
@@ -36,6 +40,8 @@ export interface PressContext {
   readonly navigation: Navigation;
   readonly pointing: Pointing;
   readonly strokes: StrokeTool;
+  readonly oversketch: OversketchTool;
+  readonly doc: SyncDoc;
   readonly grips: Grips;
   readonly spaceHeld: () => boolean;
 }
@@ -79,6 +85,7 @@ export class Presses {
     }
     const handle = pointing.handle(grips.handles.value, e);
     if (handle !== null && !erases) return this.#drag(handle, x, y);
+    if (!e.altKey && this.#redraw(e)) return { kind: "redraw" };
     const opposite = tool.value === "paint" && (erases || e.altKey);
     if (strokes.start(tool.value, pointing.sample(e), e.pointerType === "pen", opposite)) return { kind: "draw" };
     return this.#press(null, OFF_GROUND);
@@ -100,6 +107,22 @@ export class Presses {
   pick(e: PointerEvent): Picked | null {
     if (this.#c.laying.value !== null) return null;
     return this.#c.pointing.stroke(e, this.#c.freeze(), PICKS[this.#c.tool.value]);
+  }
+
+  /** Whether a line begun here would redraw a part of the selected one. */
+  over(e: PointerEvent): boolean {
+    const { doc, selection, tool, pointing, oversketch } = this.#c;
+    const stroke = doc.doc.value?.strokes.get(selection.value ?? "");
+    if (stroke === undefined || e.altKey || !redraws(tool.value, stroke)) return false;
+    return oversketch.would(stroke, pointing.sample(e), pointing.near(e), pointing.ratio);
+  }
+
+  /** Whether the pen came down on the line of the selected stroke, with the tool that draws such lines. */
+  #redraw(e: PointerEvent): boolean {
+    const { doc, selection, tool, pointing, oversketch } = this.#c;
+    const stroke = doc.doc.value?.strokes.get(selection.value ?? "");
+    if (stroke === undefined || !redraws(tool.value, stroke)) return false;
+    return oversketch.start(stroke, pointing.sample(e), pointing.near(e), pointing.ratio);
   }
 
   #navigate(mode: NavigationMode, x: number, y: number): Activity {

@@ -8,6 +8,7 @@ import { shared } from "./styles/shared.ts";
 /** What pointers do; the keys come from the actions themselves. */
 const POINTERS: readonly { readonly what: string; readonly how: string }[] = [
   { what: "Draw, or use the chosen tool", how: "Left button, pen or one finger" },
+  { what: "Redraw a part of the selected line", how: "Begin on it with the tool that drew it (Alt: a new line)" },
   { what: "Paint the opposite", how: "Alt with the brush, or the other end of a pen" },
   {
     what: "Draw with the keys",

@@ -8,6 +8,7 @@ import { VIEW_ONLY } from "./groundwork.ts";
 import "./help-dialog.ts";
 import "./history-panel.ts";
 import "./icon-library.ts";
+import { DRAWN, DRAWN_ON, hintWords } from "./hints.ts";
 import { icon } from "./icons.ts";
 import "./layers-panel.ts";
 import "./laying-bar.ts";
@@ -25,7 +26,7 @@ import "./share-dialog.ts";
 import { SignalElement } from "./signal-element.ts";
 import type { Stage } from "./stage.ts";
 import "./status-line.ts";
-import { flag, setFlag } from "./storage.ts";
+import { setFlag } from "./storage.ts";
 import "./stroke-panel.ts";
 import { shared } from "./styles/shared.ts";
 import { terrainPageStyles } from "./styles/terrain-page.ts";
@@ -95,7 +96,12 @@ export class EskTerrain extends SignalElement {
         if (input?.selection.value && picked) requestAnimationFrame(() => this.#makeRoom());
       }),
       effect(() => {
-        if ((session.doc.doc.value?.strokes.size ?? 0) > 0) setFlag(session.store, "drawn");
+        const strokes = session.doc.doc.value?.strokes.size ?? 0;
+        if (strokes > 0) setFlag(session.store, DRAWN);
+        // An ink that draws no new stroke changes one.
+        const input = session.stage.value?.input;
+        const redraws = input !== undefined && input.ink.value !== null && input.drawing.value === null;
+        if (strokes > 1 || redraws) setFlag(session.store, DRAWN_ON);
       }),
       effect(() => {
         // The sheet would hide the ground on which the grid is laid, or the past.
@@ -335,24 +341,9 @@ export class EskTerrain extends SignalElement {
     </div>`;
   }
 
-  /** The first-run hint: goes with the first stroke and does not come back on this device's later empty terrains. */
   #hint(stage: Stage): TemplateResult | typeof nothing {
-    const { session, input } = stage;
-    const doc = session.doc.doc.value;
-    const busy = this.#panel.value === "ground" || stage.groundwork.imports.jobs.value.length > 0;
-    const empty = (doc?.strokes.size ?? 0) === 0 && (doc?.layers.size ?? 0) === 0 && !busy;
-    const pen = input.keyPen.visual.value !== null;
-    if (!empty || pen || !session.canEdit.value || input.drawing.value !== null || input.laying.value !== null)
-      return nothing;
-    const drawn = flag(session.store, "drawn");
-    const ready = input.tool.value !== "select";
-    const flat = stage.camera.state.value.mode === "map";
-    const first = flat
-      ? "Draw a ridge on the map — the ground rises along it."
-      : "Draw a line across the land — the ground rises to meet it.";
-    return html`<div class="hint panel">
-      ${icon("sketch")}<span>${ready ? (drawn ? "An empty land. Draw a line." : first) : "An empty land. Pick a tool and draw a line."}</span>
-    </div>`;
+    const words = hintWords(stage, this.#panel.value === "ground" || stage.groundwork.imports.jobs.value.length > 0);
+    return words === null ? nothing : html`<div class="hint panel">${icon("sketch")}<span>${words}</span></div>`;
   }
 
   /** What the pen of the arrow keys awaits: read aloud, and shown while the pen is. */
