@@ -12,6 +12,7 @@ import type {
   Stroke,
   Welcome,
 } from "../../src/generated/contract.ts";
+import { SETTINGS } from "../settings.ts";
 
 /** Mulberry32: a small seeded generator of numbers in [0, 1). */
 export function random(seed: number): () => number {
@@ -27,21 +28,7 @@ export function random(seed: number): () => number {
 export const EMPTY: Document = {
   id: "t1",
   clock: 0,
-  settings: {
-    size_m: 4096,
-    title: "T",
-    reach_m: 128,
-    border: "free",
-    sea_level_m: null,
-    lakes_m: null,
-    seed: 1,
-    look: "natural",
-    detail: 1,
-    rule: "landscape",
-    sun_azimuth_deg: 115,
-    sun_elevation_deg: 24,
-    place: null,
-  },
+  settings: SETTINGS,
   strokes: [],
   deleted: [],
   layers: [],

@@ -16,27 +16,12 @@ import type {
 import { openGpu } from "../../src/gpu/device.ts";
 import { createMapRenderer, createRenderer } from "../../src/gpu/index.ts";
 import { GpuRenderer } from "../../src/gpu/renderer.ts";
+import { SETTINGS } from "../settings.ts";
 import { crackTest, deepCrackTest, walkCrackTest } from "./cracks.ts";
 import { guardTest } from "./guard.ts";
 import { layeredCrackTest } from "./layered.ts";
 import { synthesisVectors } from "./synthesis.ts";
 import { alpineField, FieldView, lookAt, mapCamera, PLAIN_CHANNELS } from "./world.ts";
-
-export const SETTINGS: TerrainSettings = {
-  size_m: 4096,
-  title: "Harness",
-  reach_m: 128,
-  border: "free",
-  sea_level_m: null,
-  lakes_m: null,
-  seed: 1,
-  look: "natural",
-  detail: 1,
-  rule: "landscape",
-  sun_azimuth_deg: 115,
-  sun_elevation_deg: 24,
-  place: null,
-};
 
 const worlds = new Map<string, TileView>();
 

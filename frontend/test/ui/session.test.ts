@@ -4,6 +4,7 @@ import { type Signal, signal } from "@preact/signals-core";
 import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
 import type { DecodedFrame } from "../../src/core/types.ts";
 import type { ClientMessage, Hello, Role, ServerMessage, Stroke, Welcome } from "../../src/generated/contract.ts";
+import { SETTINGS } from "../settings.ts";
 
 /** Stands for the websocket: the test plays the server. */
 class FakeConnection {
@@ -64,22 +65,6 @@ const { LAYING, TerrainSession } = await import("../../src/ui/session.ts");
 const { recentTerrains } = await import("../../src/ui/storage.ts");
 const { fullStroke } = await import("../../src/doc/document.ts");
 
-const SETTINGS = {
-  size_m: 4096,
-  title: "Ridge",
-  reach_m: 128,
-  border: "free",
-  sea_level_m: null,
-  lakes_m: null,
-  seed: 1,
-  look: "natural",
-  detail: 1,
-  rule: "landscape",
-  sun_azimuth_deg: 115,
-  sun_elevation_deg: 24,
-  place: null,
-} as const;
-
 function welcome(role: Role = "owner", change: Partial<Welcome> = {}): Welcome {
   return {
     type: "welcome",
@@ -94,7 +79,7 @@ function welcome(role: Role = "owner", change: Partial<Welcome> = {}): Welcome {
     document: {
       id: "t",
       clock: 3,
-      settings: { ...SETTINGS },
+      settings: { ...SETTINGS, title: "Ridge" },
       strokes: [],
       deleted: [],
       layers: [],
