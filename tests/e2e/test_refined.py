@@ -24,7 +24,8 @@ def two_people(visitors: Visitors, server: Server, **options: Any) -> tuple[Visi
     """Ada owns the terrain, Ben has an edit link; both see it."""
     terrain, secret = server.create(title="Near the ground")
     link = json.loads(server.request("POST", f"/api/terrains/{terrain}/links", {"role": "edit", "name": "Ben"}, secret))
-    ada, ben = visitors(**options), visitors(480, 360, device_scale_factor=options.get("device_scale_factor", SCALE))
+    ada = visitors(**options)
+    ben = visitors(480, 360, device_scale_factor=options.get("device_scale_factor", SCALE), seen=False)
     ada.open(f"/t/{terrain}#{secret}")
     ben.open(f"/t/{terrain}#{link['secret']}")
     return ada, ben, terrain, secret

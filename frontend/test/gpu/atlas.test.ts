@@ -44,7 +44,7 @@ const heldBy =
 const at = (slot: Float32Array, col: number, row: number): number =>
   slot[2 * ((row + BORDER) * SLOT_TEXELS + col + BORDER) + 1]!;
 
-describe("slots", { timeout: 60_000 }, () => {
+describe("slots", () => {
   const view = new FieldView(4096, 2, (x, y) => 0.1 * x - 0.03 * y + ((x * y) % 97));
 
   it("R10: the border is the neighbours' samples, guide and base alike", () => {
@@ -110,7 +110,7 @@ describe("slots", { timeout: 60_000 }, () => {
 
 const names = (residents: readonly Resident[]): string[] => residents.map((r) => `${r.level}/${r.x}/${r.y}`);
 
-describe("atlas", { timeout: 60_000 }, () => {
+describe("atlas", () => {
   it("R11: all resident tiles that changed are uploaded in one frame, and only those", () => {
     const view = new FieldView(4096, 3, filteredField(1, 50));
     const { device, uploads } = recorder();
@@ -208,7 +208,7 @@ describe("atlas", { timeout: 60_000 }, () => {
   });
 });
 
-describe("synthetic tiles", { timeout: 60_000 }, () => {
+describe("synthetic tiles", () => {
   const SIZE = 65536;
 
   function scene(): { view: SparseView; atlas: Atlas; uploads: Upload[] } {

@@ -18,7 +18,7 @@ const device = {
   queue: { writeBuffer() {} },
 } as unknown as GPUDevice;
 
-describe("a view that needs more tiles than there are slots", { timeout: 30_000 }, () => {
+describe("a view that needs more tiles than there are slots", () => {
   const view = new FieldView(4096, 4, filteredField(7, 300));
   const camera = lookAt([200, 200, 700], [1800, 1800, 100], 1024, 768, 50, 2, 20_000);
   const tau = 0.3;

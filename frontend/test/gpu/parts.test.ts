@@ -225,7 +225,7 @@ describe("ribbons", () => {
   });
 });
 
-describe("figures", { timeout: 60_000 }, () => {
+describe("figures", () => {
   it("the sun stands where the settings say: azimuth clockwise from north", () => {
     expect(sunDirection(90, 0.5)[0]).toBeGreaterThan(0.99);
     expect(sunDirection(0, 45)[1]).toBeCloseTo(Math.SQRT1_2);

@@ -50,7 +50,7 @@ function pose(frame: number, ground: (x: number, y: number) => number): CameraSt
   return lookAt(eye, target, 800, HEIGHT, 45);
 }
 
-describe("a flight", { timeout: 60_000 }, () => {
+describe("a flight", () => {
   it("R48: between frames nothing jumps by more than the error bound, while tiles come and go and levels change", () => {
     const field = craggyField(3, SIZE);
     const view = new SparseView(SIZE, LEVELS, SOLVED, field);

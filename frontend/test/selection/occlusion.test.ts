@@ -127,7 +127,7 @@ describe("the horizon", () => {
   });
 });
 
-describe("hidden patches", { timeout: 60_000 }, () => {
+describe("hidden patches", () => {
   let views: FieldView[];
   beforeAll(() => {
     views = [5, 8].map((seed) => new FieldView(SIZE, LEVELS, filteredField(seed, 700)));

@@ -94,7 +94,7 @@ function randomCamera(next: () => number): CameraState {
 const above = (tall = 4200): CameraState => mapCamera([2048, 2048, 0], tall, 800, 800);
 
 // Building the terrains takes seconds on a busy machine.
-describe("selection", { timeout: 60_000 }, () => {
+describe("selection", () => {
   const levels = 4;
   let view: FieldView;
   beforeAll(() => {

@@ -77,7 +77,7 @@ function checkMeetings(cut: readonly Leaf[]): number {
   return mixed;
 }
 
-describe("sparse levels", { timeout: 60_000 }, () => {
+describe("sparse levels", () => {
   it("R20: patches of level 10 are drawn where tiles are held, and weights agree wherever patches meet", () => {
     let deepest = 0;
     let mixed = 0;

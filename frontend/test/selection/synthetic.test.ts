@@ -103,7 +103,7 @@ const deepest = (cut: Cut): number => {
   return level;
 };
 
-describe("synthetic levels", { timeout: 60_000 }, () => {
+describe("synthetic levels", () => {
   let view: FieldView;
   beforeAll(() => {
     const field = alpineField(0);
