@@ -53,6 +53,8 @@ GOODBYE_SECONDS: Final = 0.3
 """Time for the farewells to leave before the sockets are closed."""
 HARD_MESSAGE_LIMIT: Final = 4 * c.MAX_MESSAGE_BYTES
 """Above ``MAX_MESSAGE_BYTES`` a client gets a sentence (4007); above this the websocket library hangs up (1009)."""
+PING_SECONDS, PONG_SECONDS = 20.0, 20.0
+"""A websocket is asked so often whether its peer is there, and dropped without an answer in so long."""
 SEND_BUFFER: Final = 256 * 1024
 """The kernel would queue megabytes for a client that does not read, and show it old tiles when it does."""
 
@@ -255,8 +257,8 @@ def _config(app: Any, settings: Settings, context: ssl.SSLContext | None) -> uvi
         ws_max_size=HARD_MESSAGE_LIMIT,
         # Tiles are deflated already, and control texts are small: a second deflate costs more than it saves.
         ws_per_message_deflate=False,
-        ws_ping_interval=20,
-        ws_ping_timeout=20,
+        ws_ping_interval=PING_SECONDS,
+        ws_ping_timeout=PONG_SECONDS,
         http=HttpProtocol,
         log_config=None,
         access_log=False,

@@ -21,6 +21,8 @@ except ImportError:  # a platform without a compiled one
 
 READ_AHEAD: Final = 8
 """Messages of one client that may wait to be understood before no more are read."""
+FAREWELL_SECONDS: Final = 1.0
+"""For the farewell to a peer that does not answer, should it read after all."""
 _WHOLE_TEXT: Final = 0x80 | Opcode.TEXT
 _MASKED: Final = 0x80
 _TWO_BYTES, _EIGHT_BYTES = 126, 127
@@ -62,6 +64,11 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
         """Writes a whole frame when there is room. Raises ConnectionResetError when the peer is gone."""
         while not self.write_now(frame):
             await self.writable.wait()
+
+    def keepalive_timeout(self) -> None:
+        """The peer did not answer a ping. What is on its way to it may wait for ever, so nothing waits for that."""
+        super().keepalive_timeout()
+        self.loop.call_later(FAREWELL_SECONDS, self.transport.abort)
 
     # --- in -----------------------------------------------------------------------------------------------------
 

@@ -244,13 +244,16 @@ def test_join_codes(server: LiveServer) -> None:
 
 
 def test_codes_end_after_fifteen_minutes(tmp_path: Path) -> None:
-    now = [1000.0]
+    """SPEC P35, P129: by a clock that nobody sets."""
+    ticks, date = [1000.0], [1e9]
     journal = Journal(tmp_path)
-    access = Access(journal, lambda: now[0])
+    access = Access(journal, lambda: date[0], lambda: ticks[0])
     code = access.make_code("t", "edit", "l")
-    now[0] += CODE_SECONDS - 1
+    ticks[0] += CODE_SECONDS - 1
+    date[0] += 3600
     assert access.open_code(code) == ("t", "edit")
-    now[0] += 2
+    date[0] -= 7200
+    ticks[0] += 2
     assert access.open_code(code) is None
     journal.close()
 

@@ -1,4 +1,4 @@
-"""The journal alone: commits, replay, damage, backups (SPEC J1 to J9, J16)."""
+"""The journal alone: commits, replay, damage, backups (SPEC J1 to J9, J16, J17)."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import sqlite3
 import threading
 import time
 from concurrent.futures import Future, wait
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -15,7 +16,8 @@ from esker import contract as c
 from esker.document.ops import StrokeSet
 from esker.document.wire import op_json
 from esker.store import backup
-from esker.store.journal import DATABASE_NAME, LOG_BYTES, CorruptDatabase, DamagedTerrain, Journal, Row
+from esker.store.backup import last_backup
+from esker.store.journal import DATABASE_NAME, LOG_BYTES, CorruptDatabase, DamagedTerrain, Journal, Row, Unwritable
 
 BIRTH = c.Document(id="t")
 
@@ -141,8 +143,9 @@ def test_a_full_disk_is_reported_and_survived(journal: Journal) -> None:
     journal._writer_db.execute(f"PRAGMA max_page_count={pages}")
     big = c.SetTerrain(fields=c.TerrainFields(title="x" * 80))
     rows = [Row(i, "c", i, "c", op_json(big)) for i in range(1, 5000)]
-    with pytest.raises(sqlite3.OperationalError, match="full"):
+    with pytest.raises(Unwritable, match="full") as failure:
         journal.append("t", rows).result()
+    assert failure.value.full
     journal._writer_db.execute("PRAGMA max_page_count=1000000")
     journal.append("t", _rows(1, 1)).result()
     assert [row.clock for row in journal.rows("t", 0)] == [1]
@@ -217,6 +220,24 @@ def test_without_a_copy_the_sentence_says_so(tmp_path: Path) -> None:
     (tmp_path / "esker.db").write_bytes(b"nonsense" * 1000)
     with pytest.raises(CorruptDatabase, match="no earlier copy"):
         Journal(tmp_path)
+
+
+def test_a_date_that_was_set_back_drops_no_newer_copy(journal: Journal, tmp_path: Path) -> None:
+    """SPEC J17."""
+    dates = [1e9 + 60 * i for i in range(6)] + [1e9 - 3600, 1e9 - 3599]
+    for clock, date in enumerate(dates, 1):
+        journal._now = lambda date=date: date  # type: ignore[misc]
+        journal.append("t", _rows(clock, 1)).result()
+        copy = journal.backup()
+        assert copy.exists()
+        assert copy == last_backup(tmp_path)
+    kept = sorted((tmp_path / "backup").iterdir())
+    clocks = []
+    for copy in kept:
+        with closing(sqlite3.connect(copy)) as db:
+            clocks.append(db.execute("SELECT max(clock) FROM ops").fetchone()[0])
+    assert clocks == [4, 5, 6, 7, 8]
+    journal.close()
 
 
 def test_backups_are_complete_while_the_journal_is_written(journal: Journal, tmp_path: Path) -> None:

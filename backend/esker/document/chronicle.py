@@ -306,7 +306,7 @@ def _continues(entry: Entry, action: Action, subjects: tuple[str, ...], told: To
     """Whether this is more of the same."""
     if entry.turn or entry.action != action or entry.subjects != subjects or action in ("draw", "paint", "layer"):
         return False
-    return entry.at is None or told.at is None or told.at - entry.at <= MERGE_SECONDS
+    return entry.at is None or told.at is None or abs(told.at - entry.at) <= MERGE_SECONDS
 
 
 def _before(steps: list[Step], new: Step) -> int | None:

@@ -17,6 +17,7 @@ from esker.session.core import Denied
 from esker.session.hub import Hub
 from esker.session.limits import RateByKey
 from esker.store.access import Link
+from esker.store.journal import Unwritable
 
 log = logging.getLogger("esker.server")
 
@@ -28,6 +29,9 @@ STATUS: Final = {
     "server_error": 500,
     "shutting_down": 503,
 }
+FULL: Final = "The server has no room for this (is its disk full?). Nothing was changed."
+UNWRITABLE: Final = "The server cannot save anything at the moment. Nothing was changed; try again later."
+AGAIN_SECONDS: Final = 30
 NO_ROOM: Final = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG})
 
 
@@ -39,9 +43,10 @@ class Problem(Exception):
         self.status, self.code, self.message = status, code, message
 
 
-def answer(status: int, code: str, message: str) -> JSONResponse:
-    """A refusal as JSON."""
-    return JSONResponse({"code": code, "message": message}, status_code=status)
+def answer(status: int, code: str, message: str, again: int | None = None) -> JSONResponse:
+    """A refusal as JSON. ``again``: seconds after which it may be asked again."""
+    headers = None if again is None else {"Retry-After": str(again)}
+    return JSONResponse({"code": code, "message": message}, status_code=status, headers=headers)
 
 
 def add_errors(app: FastAPI) -> None:
@@ -72,7 +77,14 @@ def add_errors(app: FastAPI) -> None:
         if error.errno not in NO_ROOM:
             return await failed(request, error)
         log.error("%s %s: no room: %s", request.method, quote(request.url.path), error)
-        return answer(507, "storage", "The server has no room for this (is its disk full?).")
+        return answer(507, "storage", FULL, AGAIN_SECONDS)
+
+    @app.exception_handler(Unwritable)
+    async def unwritable(request: Request, error: Unwritable) -> JSONResponse:
+        log.error("%s %s: the database cannot be written: %s", request.method, quote(request.url.path), error)
+        if error.full:
+            return answer(507, "storage", FULL, AGAIN_SECONDS)
+        return answer(503, "unavailable", UNWRITABLE, AGAIN_SECONDS)
 
     @app.exception_handler(Exception)
     async def failed(request: Request, error: Exception) -> JSONResponse:

@@ -169,10 +169,13 @@ class Hub:
     # --- terrains -----------------------------------------------------------------------------------------------
 
     async def create(self, document: c.Document) -> tuple[c.Document, Link, str]:
-        """A new terrain born as ``document`` under a fresh id, with its owner link and that link's secret."""
+        """A new terrain born as ``document`` under a fresh id, with its owner link and that link's secret.
+
+        Raises store.journal.Unwritable; then there is neither.
+        """
         born = document.model_copy(update={"id": secrets.token_urlsafe(9), "clock": 0})
-        await asyncio.wrap_future(self.journal.create(born))
-        link, secret = await asyncio.wrap_future(self.access.add(born.id, "owner", "Owner"))
+        link, secret, insert = self.access.make(born.id, "owner", "Owner")
+        await asyncio.wrap_future(self.journal.create(born, insert))
         return born, link, secret
 
     async def document(self, terrain: str, at: int | None = None) -> c.Document:

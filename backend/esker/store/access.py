@@ -60,8 +60,14 @@ def hashed(secret: str) -> bytes:
 class Access:
     """Links in the journal's database, join codes in memory (they live for fifteen minutes)."""
 
-    def __init__(self, journal: Journal, now: Callable[[], float] = time.time) -> None:
-        self._journal, self._now = journal, now
+    def __init__(
+        self,
+        journal: Journal,
+        now: Callable[[], float] = time.time,
+        ticks: Callable[[], float] = time.monotonic,
+    ) -> None:
+        """``now``: the date, which may be set; ``ticks``: seconds that only ever go on, by which codes end."""
+        self._journal, self._now, self._ticks = journal, now, ticks
         self._codes: dict[bytes, _Code] = {}
 
     def check(self, terrain: str, secret: str) -> Link | None:
@@ -85,19 +91,24 @@ class Access:
         return [Link(*row) for row in rows]
 
     def add(self, terrain: str, role: Role, name: str) -> Future[tuple[Link, str]]:
-        """A new link and its secret. Fails with TooManyLinks."""
-        secret = secrets.token_urlsafe(24)
-        link = Link(secrets.token_urlsafe(9), terrain, role, name, self._now(), None)
+        """A new link and its secret. Fails with TooManyLinks, Unwritable."""
+        link, secret, insert = self.make(terrain, role, name)
 
         def write(db: sqlite3.Connection) -> tuple[Link, str]:
             live = db.execute("SELECT count(*) FROM links WHERE terrain=? AND revoked IS NULL", (terrain,)).fetchone()
             if live[0] >= MAX_LINKS:
                 raise TooManyLinks
-            row = (link.id, terrain, role, name, hashed(secret), link.created)
-            db.execute("INSERT INTO links VALUES (?,?,?,?,?,?,NULL)", row)
+            insert(db)
             return link, secret
 
         return self._journal.submit(write)
+
+    def make(self, terrain: str, role: Role, name: str) -> tuple[Link, str, Callable[[sqlite3.Connection], object]]:
+        """A link that is not written yet, its secret, and what writes it; a terrain's first comes with its birth."""
+        secret = secrets.token_urlsafe(24)
+        link = Link(secrets.token_urlsafe(9), terrain, role, name, self._now(), None)
+        row = (link.id, terrain, role, name, hashed(secret), link.created)
+        return link, secret, lambda db: db.execute("INSERT INTO links VALUES (?,?,?,?,?,?,NULL)", row)
 
     def rotate(self, terrain: str, link_id: str) -> Future[str | None]:
         """A new secret for a live link; the old one stops working. None when there is no such link."""
@@ -136,7 +147,7 @@ class Access:
         while True:
             code = "".join(secrets.choice(CODE_ALPHABET) for _ in range(CODE_LENGTH))
             if hashed(code) not in self._codes:
-                self._codes[hashed(code)] = _Code(terrain, role, link, self._now() + CODE_SECONDS)
+                self._codes[hashed(code)] = _Code(terrain, role, link, self._ticks() + CODE_SECONDS)
                 return code
 
     def open_code(self, code: str) -> tuple[str, Role] | None:
@@ -150,5 +161,5 @@ class Access:
         self._codes = {k: v for k, v in self._codes.items() if v.link != link}
 
     def _forget_old(self) -> None:
-        now = self._now()
+        now = self._ticks()
         self._codes = {k: v for k, v in self._codes.items() if v.expires > now}

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import calendar
+import math
 import sqlite3
 import time
 from contextlib import closing
@@ -10,6 +12,7 @@ from typing import Final
 
 FOLDER: Final = "backup"
 KEPT: Final = 5
+STAMP: Final = "%Y%m%d-%H%M%S"
 
 
 def last_backup(directory: Path) -> Path | None:
@@ -19,10 +22,14 @@ def last_backup(directory: Path) -> Path | None:
 
 
 def write_backup(source: Path, directory: Path, now: float) -> Path:
-    """Writes ``backup/esker-<time>.db``, complete or not at all, and keeps the newest five. Raises sqlite3.Error."""
+    """Writes ``backup/esker-<time>.db``, complete or not at all, and keeps the newest five. Raises sqlite3.Error.
+
+    The time in the name is later than that of the copy before, also when the date was set back: the newest copy is the
+    last by name, and never the one that is dropped.
+    """
     folder = directory / FOLDER
     folder.mkdir(exist_ok=True)
-    stamp = time.strftime("%Y%m%d-%H%M%S", time.gmtime(now))
+    stamp = time.strftime(STAMP, time.gmtime(max(now, _time_of(last_backup(directory)) + 1)))
     target, part = folder / f"esker-{stamp}.db", folder / f"esker-{stamp}.part"
     part.unlink(missing_ok=True)
     with closing(sqlite3.connect(source)) as live, closing(sqlite3.connect(part)) as copy:
@@ -33,6 +40,14 @@ def write_backup(source: Path, directory: Path, now: float) -> Path:
     for old in _copies(directory)[:-KEPT]:
         old.unlink(missing_ok=True)
     return target
+
+
+def _time_of(copy: Path | None) -> float:
+    """Seconds since 1970 that the name of a copy says; minus infinity when it says none."""
+    try:
+        return calendar.timegm(time.strptime(copy.stem, f"esker-{STAMP}")) if copy is not None else -math.inf
+    except ValueError:
+        return -math.inf
 
 
 def _copies(directory: Path) -> list[Path]:

@@ -63,6 +63,15 @@ class CorruptDatabase(Exception):
     """The database file is damaged. It is left exactly as it is; the message names the last good copy."""
 
 
+class Unwritable(Exception):
+    """The database cannot be written to at present. Of what was asked nothing was done; it may be asked again later."""
+
+    def __init__(self, error: sqlite3.OperationalError) -> None:
+        super().__init__(str(error))
+        self.full = error.sqlite_errorcode == sqlite3.SQLITE_FULL
+        """Whether it is for want of room."""
+
+
 class DamagedTerrain(Exception):
     """The journal of one terrain does not replay (a gap, or an op that does not apply)."""
 
@@ -118,7 +127,10 @@ class Journal:
     # --- writing ------------------------------------------------------------------------------------------------
 
     def submit(self, write: Callable[[sqlite3.Connection], T]) -> Future[T]:
-        """Runs ``write`` in the next commit; the future resolves after the commit is on disk."""
+        """Runs ``write`` in the next commit; the future resolves after the commit is on disk.
+
+        It fails with Unwritable when that cannot be, and with whatever ``write`` raises.
+        """
         if self._closed:
             raise RuntimeError("the journal is closed")
         future: Future[T] = Future()
@@ -150,13 +162,18 @@ class Journal:
 
         return self.submit(write)
 
-    def create(self, document: c.Document) -> Future[None]:
-        """A new terrain, born as ``document``. Fails with sqlite3.IntegrityError when the id exists."""
+    def create(self, document: c.Document, also: Callable[[sqlite3.Connection], Any] | None = None) -> Future[None]:
+        """A new terrain, born as ``document``, with what ``also`` writes, or neither.
+
+        Fails with sqlite3.IntegrityError when the id exists.
+        """
 
         def write(db: sqlite3.Connection) -> None:
             db.execute("INSERT INTO terrains VALUES (?,?)", (document.id, self._now()))
             _name_grids(db, document.id, (layer.content for layer in (*document.layers, *document.deleted_layers)))
             _put_snapshot(db, document)
+            if also is not None:
+                also(db)
 
         return self.submit(write)
 
@@ -210,7 +227,7 @@ class Journal:
             if failure is None:
                 future.set_result(value)
             else:
-                future.set_exception(failure)
+                future.set_exception(Unwritable(failure) if isinstance(failure, sqlite3.OperationalError) else failure)
 
     # --- reading ------------------------------------------------------------------------------------------------
 
