@@ -48,7 +48,7 @@ class Scan:
         return self.valid / (self.rows * self.cols)
 
     def picture(self) -> NDArray[np.float64]:
-        """Means of 32 x 32 parts, raw, in the file's order of rows; NaN where there is none."""
+        """Means (32, 32) of parts of the grid, raw, in the file's order of rows; NaN where there is none."""
         with np.errstate(invalid="ignore"):
             mean = np.where(self.counts > 0, self.sums / np.maximum(self.counts, 1), np.nan)
         return mean[np.ix_(_filled(self.rows), _filled(self.cols))]
@@ -61,7 +61,7 @@ def _filled(count: int) -> NDArray[np.intp]:
 
 
 def usable(piece: Piece, masked: tuple[float, ...]) -> NDArray[np.bool_]:
-    """Samples that count: declared valid, finite, and none of the values taken for nodata."""
+    """Samples of a piece (rows, cols) that count: declared valid, finite, and none of the values taken for nodata."""
     good = piece.valid & np.isfinite(piece.values)
     for value in masked:
         good &= piece.values != value

@@ -65,7 +65,7 @@ class Camera:
 
 
 def axes(camera: Camera) -> tuple[Floats, Floats, Floats]:
-    """Forward, right and up: orthonormal."""
+    """Forward, right and up, (3,) float64 each: orthonormal, in the world's axes."""
     forward = _unit(np.subtract(camera.target, camera.eye))
     right = _unit(np.cross(forward, camera.up))
     return forward, right, np.cross(right, forward)
@@ -91,14 +91,14 @@ def eye_projection(camera: Camera) -> Floats:
 
 
 def reversed_depth(m: Floats) -> Floats:
-    """The same with depth from w at the near plane to 0 at the far one: floats hold it equally well everywhere."""
+    """The same (4, 4) with depth from w at the near plane to 0 at the far one: floats hold it equally well."""
     out = m.copy()
     out[2] = m[3] - m[2]
     return out
 
 
 def part(m: Floats, camera: Camera, left: int, top: int, width: int, height: int) -> Floats:
-    """Clip space of a rectangle of the picture's pixels: an off-centre projection."""
+    """Clip space (4, 4) of a rectangle of the picture's pixels, from its upper left: an off-centre projection."""
     out = m.copy()
     middle_x = 2 * (left + width / 2) / camera.width - 1
     middle_y = 1 - 2 * (top + height / 2) / camera.height

@@ -34,12 +34,12 @@ def hashed(seed: int, level: int, stream: int, rows: NDArray[np.int64], cols: ND
 
 
 def full(words: Words, dtype: DTypeLike) -> NDArray[np.floating]:
-    """Uniform in [-1, 1): 24 bits of each word, exact in float32."""
+    """Uniform in [-1, 1), shaped like the words: 24 bits of each, exact in float32."""
     return (words >> np.uint32(8)).astype(dtype) * 2.0**-23 - 1.0
 
 
 def low(words: Words, dtype: DTypeLike) -> NDArray[np.floating]:
-    """Uniform in (-1, 1) and symmetric: the low half of each word, exact in float32."""
+    """Uniform in (-1, 1) and symmetric, shaped like the words: the low half of each, exact in float32."""
     return (words & np.uint32(0xFFFF)).astype(dtype) * 2.0**-15 - (1.0 - 2.0**-16)
 
 

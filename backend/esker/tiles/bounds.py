@@ -40,7 +40,7 @@ def block_reduce(ufunc: np.ufunc, a: NDArray[T], cells: int) -> NDArray[T]:
 
 
 def dilate(a: NDArray[T]) -> NDArray[T]:
-    """The largest of each value and its eight neighbours; on booleans, also the neighbours of every True."""
+    """The largest of each value (rows, cols) and its eight neighbours; on booleans, those of every True too."""
     rows = a.copy()
     np.maximum(rows[1:], a[:-1], out=rows[1:])
     np.maximum(rows[:-1], a[1:], out=rows[:-1])
@@ -67,7 +67,8 @@ def parent_distance(samples: Ints, parent: Ints) -> Ints:
 
 
 def sub_error(samples: Ints, parent: Ints) -> Counts:
-    """Largest distance to the parent's surface per sub-patch, quanta of the child's level, rounded up."""
+    """Largest distance to the parent's surface per sub-patch, quanta of the child's level, rounded up: (n, n) for
+    samples (16n+1, 16n+1)."""
     worst = block_reduce(np.maximum, parent_distance(samples, parent), PATCH_CELLS)
     return np.asarray((worst + 1) >> 1, dtype=np.uint32)
 

@@ -79,7 +79,7 @@ class Boxes(Protocol):
 
 
 def screen_error(bounds: Boxes, view: View) -> tuple[Mask, Floats, Floats]:
-    """Per box: is it in the enlarged frustum; its error; its parent's cell size. Both in pixels.
+    """Per box, (n,) each: is it in the enlarged frustum; its error; its parent's cell size. Both in pixels.
 
     Lengths are projected at the nearest point of the tile's box, a bound from above. The frustum has no far plane;
     the near plane passes through the eye.

@@ -65,7 +65,7 @@ class Known:
 
 
 def code(x: NDArray[np.int64], y: NDArray[np.int64], level: int) -> NDArray[np.int64]:
-    """Tiles of a level as integers that sort by rows."""
+    """Tiles (n,) of a level as integers that sort by rows."""
     return (y << level) | x
 
 
