@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import io
+import re
 from collections.abc import Iterator
 from typing import Any
 
@@ -11,7 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from PIL import Image
-from playwright.sync_api import Page
+from playwright.sync_api import Page, Route
 
 from tests.gpu.page import open_harness
 
@@ -58,6 +59,43 @@ def test_the_seas_meet_without_a_step(page: Page) -> None:
     inside, outside = seen[:, 82:96].mean(axis=(0, 1)), seen[:, 64:78].mean(axis=(0, 1))
     assert np.abs(inside - outside).max() < 3
     assert np.abs(seen[:, 81].mean(axis=0) - seen[:, 78].mean(axis=0)).max() < 3
+
+
+def test_the_seas_meet_without_a_gap(page: Page) -> None:
+    """R63: no pixel of the bed or of the sky between them. That they overlap is not seen, so that more of it is the
+    same: where they only touch, 18 pixels of this view show what lies behind, by 140 of 255."""
+    shot = {
+        "world": "island",
+        "levels": 1,
+        "width": 480,
+        "height": 270,
+        "tau": 2,
+        "eye": [1900, -150, 60],
+        "target": [2300, 600, 0],
+        "settings": {"sea_level_m": 0},
+    }
+    shown = picture(page, shot)
+    page.route("**/water.wgsl*", overlapping)
+    try:
+        again(page)
+        off = np.abs(picture(page, shot) - shown).max(axis=2)
+    finally:
+        page.unroute_all()
+        again(page)
+    assert (off > 40).sum() == 0
+
+
+def again(page: Page) -> None:
+    page.reload()
+    page.wait_for_function("globalThis.esker !== undefined", timeout=60_000)
+
+
+def overlapping(route: Route) -> None:
+    """Answers with a shader whose open sea reaches ten times as far into the domain."""
+    answer = route.fetch()
+    lap = re.compile(r"let lap = [\d.]+;")
+    assert lap.search(answer.text())
+    route.fulfill(response=answer, body=lap.sub("let lap = 0.01;", answer.text()))
 
 
 def test_index_contours_are_labelled(page: Page) -> None:
