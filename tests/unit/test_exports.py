@@ -17,6 +17,7 @@ from PIL import Image
 
 from esker import Stroke, Terrain, contract
 from esker import cli as command_line
+from esker.bench.export import measure_files
 from esker.contract import ExportWish
 from esker.exports import formats, mesh
 from esker.exports.ground import Extent
@@ -26,6 +27,7 @@ from esker.importing import placing
 from esker.importing.examine import examine
 from esker.importing.laying import frame
 from esker.lakes import Lakes, find_lakes
+from esker.terrain import default_solver
 
 SIZE = 512.0
 LEVEL = 2
@@ -342,6 +344,19 @@ def test_every_wish_of_the_page_has_an_estimate() -> None:
     for samples, level in contract.EXPORT_LEVELS.items():
         assert 0.9 * (64 * 2**level + 1) < int(samples) <= 64 * 2**level + 1
         assert Extent.of(None, int(samples)).level == level
+
+
+def test_estimates_are_near_what_files_are() -> None:
+    """SPEC X30: on a real scene, within a factor of two; it is also what ``esker bench export`` measures."""
+    found = measure_files(default_solver(), [257])
+    assert set(found) == {
+        f"{kind}_257{detail}"
+        for kind, form in formats.FORMATS.items()
+        for detail in (["_detail"] if form.covers else ["", "_detail"])
+    }
+    for kind in formats.FORMATS:
+        told = formats.estimate(ExportWish(format=kind, samples=257)).bytes
+        assert 0.5 < found[f"{kind}_257_detail"]["bytes"] / told < 2.0
 
 
 def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -17,7 +17,6 @@ from esker import contract as c
 from esker.contract import ExportEstimate, ExportStage, ExportStatus, ExportWish
 from esker.exports import formats, wire
 from esker.exports.run import FAILED, ExportFailed, Progress
-from esker.session.core import Denied
 from esker.session.hub import Hub
 from esker.store.access import Link
 
@@ -120,7 +119,8 @@ class Exports:
     # --- for routes ---------------------------------------------------------------------------------------------
 
     async def begin(self, terrain: str, link: Link, person: str, wish: ExportWish) -> ExportStatus:
-        """Begins an export, or has it wait for its turn; it goes on by itself. Raises Cannot, Denied, OSError."""
+        """Begins an export, or has it wait for its turn; it goes on by itself. Raises Cannot, OSError, and Denied where
+        there is no such terrain."""
         if sentence := formats.refusal(wish):
             raise Cannot(400, "malformed", sentence)
         self._check(terrain, person)
@@ -220,7 +220,7 @@ class Exports:
             log.info("export %s of %s in %.1f s", made.file, job.terrain, took)
         except asyncio.CancelledError:
             job.at("cancelled", text="The export was cancelled.")
-        except (ExportFailed, Denied) as error:
+        except ExportFailed as error:
             job.at("failed", text=str(error)[:240])
         except Exception:
             log.exception("the export of %s failed", job.terrain)
