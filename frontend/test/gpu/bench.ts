@@ -5,11 +5,13 @@
  */
 
 import type { FrameStats, QualityMode, Scene, TerrainSettings, TileView, Vec3 } from "../../src/core/types.ts";
+import { PATCH_CELLS, SUBPATCHES } from "../../src/generated/contract.ts";
 import { openGpu } from "../../src/gpu/device.ts";
 import { GpuRenderer } from "../../src/gpu/renderer.ts";
-import { Selection } from "../../src/tiles/selection.ts";
+import { recordColumn, recordLevel, recordRow } from "../../src/tiles/records.ts";
+import { type Cut, Selection } from "../../src/tiles/selection.ts";
 import { drawReference } from "./dense.ts";
-import { drawnPatch, samplesOf, shownHeight } from "./drawn.ts";
+import { type DrawnPatch, drawnPatch, samplesOf, shownHeight } from "./drawn.ts";
 import { flightCamera, fly, type Moment, Tally } from "./flight.ts";
 import { hiddenTwin } from "./hiddentwin.ts";
 import { LAMBERT, type Plain } from "./lambert.ts";
@@ -215,28 +217,43 @@ function screenError(tauPx: number, places: readonly number[]): Record<"places" 
   const perRadian = height / 2 / Math.tan((camera.fovDeg * Math.PI) / 360);
   const cell = sizeM / (side - 1);
   const errors: number[] = [];
-  let left = places.map((k) => [k % side, Math.floor(k / side)] as const);
-  for (let p = 0; p < cut.count; p += 1) {
-    const patch = drawnPatch(cut, p, sizeM, sample);
-    const steps = Math.round(patch.cell / cell);
-    const on = (v: number, first: number): boolean => v >= first * steps && v <= (first + 16) * steps;
-    const rest: (typeof left)[number][] = [];
-    for (const place of left) {
-      const [i, j] = place;
-      if (!(on(i, patch.column) && on(j, patch.row))) {
-        rest.push(place);
-        continue;
-      }
-      const truth = heights[j * side + i]!;
-      const off = Math.abs(shownHeight(patch, i * cell, j * cell) - truth);
-      const away = Math.hypot(i * cell - camera.eye[0], j * cell - camera.eye[1], truth - camera.eye[2]);
-      errors.push((off * perRadian) / away);
-    }
-    left = rest;
+  const drawnAt = patchAt(cut, (p) => drawnPatch(cut, p, sizeM, sample));
+  for (const k of places) {
+    const [i, j] = [k % side, Math.floor(k / side)];
+    const patch = drawnAt((i * cell) / sizeM, (j * cell) / sizeM);
+    if (patch === undefined) continue;
+    const truth = heights[k]!;
+    const off = Math.abs(shownHeight(patch, i * cell, j * cell) - truth);
+    const away = Math.hypot(i * cell - camera.eye[0], j * cell - camera.eye[1], truth - camera.eye[2]);
+    errors.push((off * perRadian) / away);
   }
   errors.sort((a, b) => a - b);
   const quantile = (q: number): number => errors[Math.floor(q * (errors.length - 1))]!;
   return { places: errors.length, p50: quantile(0.5), p95: quantile(0.95), max: quantile(1) };
+}
+
+/** Finds the patch of a cut that lies at a place, given as parts of the domain; each is made once. */
+function patchAt(cut: Cut, make: (index: number) => DrawnPatch): (u: number, v: number) => DrawnPatch | undefined {
+  const key = (level: number, column: number, row: number): number => (level * 4096 + column) * 4096 + row;
+  const found = new Map<number, number>();
+  for (let p = 0; p < cut.count; p += 1) {
+    const { records } = cut;
+    const [column, row] = [recordColumn(records, p) / PATCH_CELLS, recordRow(records, p) / PATCH_CELLS];
+    found.set(key(recordLevel(records, p), column, row), p);
+  }
+  const made: DrawnPatch[] = [];
+  return (u, v) => {
+    for (let level = 0; level <= view.levels; level += 1) {
+      const across = SUBPATCHES << level;
+      const on = (part: number): number => Math.min(across - 1, Math.floor(part * across));
+      const p = found.get(key(level, on(u), on(v)));
+      if (p !== undefined) {
+        made[p] ??= make(p);
+        return made[p];
+      }
+    }
+    return undefined;
+  };
 }
 
 /** Hills of 4 km whose detail is made where one looks, in a window of 400 x 300. */
