@@ -37,7 +37,7 @@ fn plane_albedo() -> vec3f {
     case LOOK_ALPINE: { return vec3f(0.56, 0.59, 0.63); }
     case LOOK_DESERT: { return vec3f(0.47, 0.345, 0.215); }
     case LOOK_PAPER: { return vec3f(0.50, 0.455, 0.385); }
-    default: { return vec3f(0.250, 0.246, 0.172); }
+    default: { return vec3f(0.222, 0.230, 0.122); }
   }
 }
 
@@ -46,13 +46,13 @@ fn country(p: vec2f, footprint: f32) -> vec3f {
   let texel = log2(max(footprint, 1.0e-3) * 256.0 / view.size);
   let broad = textureSampleLevel(noise, smooth_repeat, turned(p, vec2f(0.917, -0.399)) / (view.size * 3.1), clamp(texel - 1.6, 0.0, 8.0));
   let fine = textureSampleLevel(noise, smooth_repeat, turned(p, vec2f(0.602, 0.799)) / (view.size * 0.37), clamp(texel + 1.43, 0.0, 8.0));
-  let open = plane_albedo() * (0.80 + 0.30 * broad.r + 0.36 * (fine.r - 0.5));
+  let open = plane_albedo() * (0.84 + 0.26 * broad.r + 0.20 * (fine.r - 0.5));
   let wood = smoothstep(0.50, 0.62, broad.g * 0.40 + fine.g * 0.48 + fine.r * 0.12);
   switch (view.look) {
     case LOOK_ALPINE: { return mix(open, vec3f(0.16, 0.18, 0.19), wood * 0.55); }
     case LOOK_DESERT: { return mix(open, open * vec3f(0.66, 0.58, 0.54), wood * 0.6); }
     case LOOK_PAPER: { return plane_albedo(); }
-    default: { return mix(open, vec3f(0.105, 0.120, 0.072), wood * 0.42); }
+    default: { return mix(open, vec3f(0.105, 0.130, 0.062), wood * 0.42); }
   }
 }
 
@@ -71,7 +71,7 @@ fn ground_plane(p: vec3f, dir: vec3f, footprint: f32) -> vec3f {
     // Morning mist lies in the lowlands while the sun is low; it starts a way off the block.
     let drift = textureSampleLevel(noise, smooth_repeat, turned(p.xy, vec2f(0.829, 0.559)) / (view.size * 7.9), clamp(log2(max(footprint, 1.0e-3) * 256.0 / (view.size * 7.9)), 0.0, 8.0));
     let early = 1.0 - smoothstep(0.10, 0.62, view.sun.z);
-    let mist = early * smoothstep(0.42, 0.80, drift.r + 0.30 * smoothstep(0.6 * view.size, 5.0 * view.size, away)) * smoothstep(0.4 * view.size, 2.2 * view.size, away);
+    let mist = early * smoothstep(0.42, 0.80, drift.r + 0.30 * smoothstep(0.6 * view.size, 5.0 * view.size, away)) * smoothstep(0.8 * view.size, 4.5 * view.size, away);
     let towards = max(dot(dir, view.sun.xyz), 0.0);
     colour = mix(colour, 0.70 * (sun + 1.5 * sky) + sun_light() * 0.06 * pow(towards, 6.0), mist * 0.75);
   }

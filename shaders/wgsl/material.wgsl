@@ -120,7 +120,7 @@ fn rock(s: Site, light: vec3f, dark: vec3f, relief: f32) -> Material {
 
 // Stones below the faces.
 fn scree(s: Site, colour: vec3f) -> Material {
-  let grain = 0.72 + 0.34 * s.fine2.g + 0.22 * s.fine3.r;
+  let grain = 0.42 + 0.34 * s.fine1.r + 0.46 * s.fine2.g + 0.30 * s.fine3.r;
   return heaped(Material(colour * grain, fine_slope(s, 0.26), 0.0, 0.0), s, 1.0);
 }
 

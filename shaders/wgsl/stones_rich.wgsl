@@ -101,11 +101,12 @@ fn tufted(m: Material, s: Site, stone: vec3f) -> Material {
   let pebble = small.seen * smoothstep(0.915, 0.945, small.own + dry * 0.8);
   let bare = max(boulder * smoothstep(0.16, 0.24, big.inside + rough), pebble * smoothstep(0.20, 0.30, small.inside + rough * 0.7));
   let slope = mix(small.slope * 1.1, big.slope * 1.5, boulder);
-  let grain = 0.55 + 0.45 * fract(big.own * 37.0 + small.own * 11.0) + clump * 0.5 + blade.r * 0.3;
+  let grain = 0.45 + 0.45 * fract(big.own * 37.0 + small.own * 11.0) + clump * 0.5 + blade.r * 0.3;
   // Their shadow, and what grows thicker at their foot.
   let foot = max(boulder * smoothstep(0.0, 0.16, big.inside), pebble * smoothstep(0.02, 0.20, small.inside)) * (1.0 - bare);
   let grown = Material(grass.albedo * (1.0 - 0.55 * foot), grass.slope, grass.gloss, grass.soft);
-  return mix_in(grown, Material(stone * grain, m.slope * 0.3 + slope + blade.ba * 0.5, 0.0, 0.0), bare);
+  let moss = mix(vec3f(1.0), vec3f(0.72, 0.84, 0.46), smoothstep(0.45, 0.70, s.fine3.g) * 0.8);
+  return mix_in(grown, Material(stone * moss * grain, m.slope * 0.3 + slope + blade.ba * 0.5, 0.0, 0.0), bare);
 }
 
 // Noise drawn out along one way, from a hand to a blade's width.
