@@ -92,6 +92,12 @@ def test_documents_name_what_is_there(path: str) -> None:
     assert past or list(unknown(content, names=True)) == []
 
 
+def test_every_decision_is_in_the_list() -> None:
+    listed = re.findall(r"^\d+\. \[[^]]+\]\((\d{4}-[\w-]+\.md)\)$", text("docs/decisions/README.md"), re.M)
+    there = [Path(path).name for path in files() if path.startswith("docs/decisions/0")]
+    assert listed == sorted(there)
+
+
 def test_the_check_of_documents_can_fail() -> None:
     bad = "[a](../gone.md) [b](user-guide.md#gone) [c](https://x.org) `solve/gone.py` `gone/` `Terrain.zz" + "yx()`"
     assert list(dead_links("docs/tiles.md", bad)) == ["../gone.md", "user-guide.md#gone"]
