@@ -22,6 +22,8 @@ MAX_MESSAGES_PER_SECOND: Final = 600
 MESSAGES_BURST: Final = 1_200
 MAX_REFUSED_OPS: Final = 4 * c.OPS_BURST
 """So many ops refused for their rate, one after another, close the connection."""
+FITS_CHARACTERS: Final = c.MAX_MESSAGE_BYTES // 4
+"""Of a text that is no longer the bytes need not be counted: a character has four at most."""
 MAX_NAME: Final = 120
 """Characters of the name of a field in a sentence."""
 
@@ -117,7 +119,7 @@ class Connection:
         """One text message."""
         if self._closed:
             return []
-        if len(text) > c.MAX_MESSAGE_BYTES or len(text.encode("utf-8", "replace")) > c.MAX_MESSAGE_BYTES:
+        if len(text) > FITS_CHARACTERS and len(text.encode("utf-8", "replace")) > c.MAX_MESSAGE_BYTES:
             return self._close("too_large", f"A message may have {c.MAX_MESSAGE_BYTES} bytes at most.")
         if not self._messages.take(now):
             return self._close("rate_limited", f"More than {MAX_MESSAGES_PER_SECOND} messages came in a second.")
@@ -128,13 +130,13 @@ class Connection:
         return self._understood(message, now)
 
     def _understood(self, message: Any, now: float) -> list[Event]:
+        if isinstance(message, c.Ops) and self._greeted:  # most of what is said
+            return self._rated(message.ops, [], now)
         if isinstance(message, c.Hello):
             return self._hello(message)
         if not self._greeted:
             return self._close("bad_hello", "The first message must be hello.")
         match message:
-            case c.Ops():
-                return self._rated(message.ops, [], now)
             case c.Presence():
                 if not self._presences.take(now):
                     return self._notice(f"More than {c.MAX_PRESENCE_PER_SECOND} cursor messages a second.", now)
