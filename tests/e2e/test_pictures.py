@@ -6,6 +6,7 @@ They are tests too: a picture without contrast, or an animation in which nothing
 from __future__ import annotations
 
 import io
+import json
 from itertools import pairwise
 from pathlib import Path
 
@@ -13,9 +14,13 @@ import numpy as np
 from PIL import Image, ImageChops, ImageStat
 
 from tests.e2e.conftest import ROOT, Server, Visitor, Visitors
-from tests.e2e.hands import COARSE, heights, polyline, wait_settled
+from tests.e2e.hands import COARSE, heights, polyline, press_and_move, wait_settled
 
 PICTURES = ROOT / "tests" / "artifacts" / "pictures"
+HERO_VIEW = {"eye": [260.0, 240.0, 640.0], "target": [2000.0, 2350.0, 330.0]}
+HERO_STROKE = [(470.0, 690.0), (560.0, 590.0), (600.0, 600.0), (690.0, 500.0), (740.0, 530.0), (850.0, 690.0)]
+"""Window pixels of a silhouette, foot to foot."""
+HERO_OTHER = (330, 215)
 
 
 def picture(visitor: Visitor) -> Image.Image:
@@ -35,15 +40,38 @@ def rest(visitor: Visitor) -> None:
     raise TimeoutError("the picture does not come to rest")
 
 
+def open_at(visitor: Visitor, terrain: str, secret: str, view: dict[str, list[float]]) -> None:
+    """Opens a terrain where ``view`` looks: the page finds it among its remembered ones, and the key takes it there."""
+    remembered: dict[str, object] = {"mode": "orbit", **view}
+    kept = json.dumps(json.dumps({"1": remembered}))
+    visitor.context.add_init_script(f"localStorage.setItem('esker.views.{terrain}', {kept})")
+    visitor.open(f"/t/{terrain}#{secret}")
+    wait_settled(visitor)
+    visitor.page.keyboard.press("Alt+1")
+    near = "([x, y]) => Math.hypot(window.esker.camera().eye[0] - x, window.esker.camera().eye[1] - y) < 1"
+    visitor.wait(near, view["eye"][:2])
+
+
 def test_hero(visitors: Visitors, server: Server) -> None:
-    """The landscape of the paper's figure 6 as a visitor sees it."""
-    terrain, secret = server.create(template="figure-six", title="Figure six")
-    guest = visitors(1280, 800, device_scale_factor=1, slow_screen=False)
-    guest.open(f"/t/{terrain}#{secret}")
-    wait_settled(guest)
+    """A ridge in the morning; a hand draws a summit before it, and somebody else points at what comes next."""
+    terrain, secret = server.create(template="alpine-ridge", title="Morning ridge")
+    guest, other = visitors(1440, 900, device_scale_factor=1, slow_screen=False), visitors(480, 360)
+    guest.context.add_init_script("localStorage.setItem('esker.name', 'Ada')")
+    other.context.add_init_script("localStorage.setItem('esker.name', 'Ben')")
+    open_at(guest, terrain, secret, HERO_VIEW)
+    open_at(other, terrain, secret, HERO_VIEW)
+    rest(guest)
+    land = picture(guest)
+    guest.page.keyboard.press("b")
+    press_and_move(guest.page, polyline(HERO_STROKE, 3))
+    other.page.mouse.move(*HERO_OTHER)
+    guest.wait("() => window.esker.settled()")
     rest(guest)
     hero = picture(guest)
+    guest.page.mouse.up()
     assert min(ImageStat.Stat(hero).stddev) > 25, "a landscape has light and shade"
+    grown = np.asarray(ImageChops.difference(hero, land)).max(axis=2) > 12
+    assert grown.mean() > 0.02, "the summit stands in the picture"
     PICTURES.mkdir(parents=True, exist_ok=True)
     hero.save(PICTURES / "hero.png", optimize=True)
 
