@@ -261,13 +261,14 @@ def keys(values: NDArray[np.float64], at: float) -> float:
     return sum(value(i) * kernel(at - i) for i in range(first - 1, first + 3))
 
 
-def test_a_few_samples_less() -> None:
-    """SPEC X6."""
+@pytest.mark.parametrize("wanted", [30, 40])
+def test_a_few_samples_less(wanted: int) -> None:
+    """SPEC X6; more too, where samples lie in the outermost cells."""
     rng = np.random.default_rng(7)
     grid = rng.normal(size=(33, 33)).astype(np.float32)
-    found = resampled(grid, 30)
-    rows = np.array([[keys(column, i * 32 / 29) for column in grid.T.astype(np.float64)] for i in range(30)])
-    twin = np.array([[keys(row, j * 32 / 29) for j in range(30)] for row in rows])
+    found, step = resampled(grid, wanted), 32 / (wanted - 1)
+    rows = np.array([[keys(column, i * step) for column in grid.T.astype(np.float64)] for i in range(wanted)])
+    twin = np.array([[keys(row, j * step) for j in range(wanted)] for row in rows])
     np.testing.assert_allclose(found, twin, atol=5e-6)
     corners = np.ix_([0, -1], [0, -1])
     np.testing.assert_array_equal(found[corners], grid[corners])
