@@ -12,7 +12,7 @@ export const DRAWN_ON = "drawn-on";
 export function hintWords(stage: Stage, busy: boolean): string | null {
   const { session, input, camera } = stage;
   const doc = session.doc.doc.value;
-  if (!doc || !session.canEdit.value || session.past.active.value) return null;
+  if (!doc || !session.canEdit.value || session.past.active.value || stage.following.value !== null) return null;
   if (input.inputMode.value === "draw" || input.laying.value !== null || input.keyPen.visual.value !== null)
     return null;
   if (doc.strokes.size === 1) {

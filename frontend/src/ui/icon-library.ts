@@ -3,4 +3,10 @@
 import { registerIconLibrary } from "@awesome.me/webawesome/dist/components/icon/library.js";
 import { iconUrl } from "./icons.ts";
 
-for (const library of ["default", "system"]) registerIconLibrary(library, { resolver: iconUrl, spriteSheet: true });
+for (const library of ["default", "system"])
+  registerIconLibrary(library, {
+    resolver: iconUrl,
+    spriteSheet: true,
+    // Without proportions of its own a drawing is 300 pixels wide: unseen, it took clicks and made dialogs scroll sideways.
+    mutator: (svg) => svg?.setAttribute("viewBox", "0 0 24 24"),
+  });

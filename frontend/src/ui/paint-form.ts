@@ -58,6 +58,11 @@ export class EskPaintForm extends LitElement {
         box-shadow: inset 0 0 0 1px var(--esk-accent);
         background: var(--esk-chosen);
       }
+      @media (pointer: coarse) {
+        .channel {
+          min-height: 40px;
+        }
+      }
       .channel:disabled {
         cursor: default;
         opacity: 0.55;

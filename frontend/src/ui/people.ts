@@ -1,4 +1,7 @@
+import "@awesome.me/webawesome/dist/components/dropdown/dropdown.js";
+import "@awesome.me/webawesome/dist/components/dropdown-item/dropdown-item.js";
 import { css, html, nothing, type TemplateResult } from "lit";
+import { live } from "lit/directives/live.js";
 import type { Member } from "../generated/contract.ts";
 import { icon } from "./icons.ts";
 import { friendlyName } from "./names.ts";
@@ -8,7 +11,10 @@ import { inkOn } from "./styles/colours.ts";
 import { shared } from "./styles/shared.ts";
 import { initials } from "./words.ts";
 
-const SHOWN = 5;
+/** People with a circle of their own beside mine; all others are in a list. */
+const SHOWN = { wide: 5, narrow: 2, phone: 1 } as const;
+const NARROW = "(max-width: 720px)";
+const PHONE = "(max-width: 430px)";
 
 /** The name to show for a member; one who gave none (a script, say) goes by a friendly name made from the client's id. */
 export function memberName(member: Pick<Member, "client" | "name">): string {
@@ -53,11 +59,28 @@ export class EskPeople extends SignalElement {
         height: 15px;
       }
       .more {
-        margin-left: 6px;
+        min-width: 34px;
+        height: 34px;
+        min-height: 0;
+        margin-left: 2px;
+        padding: 0 6px;
         color: var(--esk-quiet);
         font-size: 0.8125rem;
       }
+      wa-dropdown::part(menu) {
+        max-height: min(70vh, 480px);
+        overflow-y: auto;
+      }
+      .spot {
+        width: 14px;
+        height: 14px;
+        border-radius: 50%;
+      }
       @media (pointer: coarse) {
+        .more {
+          min-width: 40px;
+          height: 40px;
+        }
         .avatar {
           position: relative;
         }
@@ -67,20 +90,29 @@ export class EskPeople extends SignalElement {
           inset: -7px -2px;
         }
       }
-      @media (max-width: 720px) {
-        .other:nth-of-type(n + 3) {
-          display: none;
-        }
-      }
     `,
   ];
 
   declare stage: Stage;
+  readonly #narrow = window.matchMedia(NARROW);
+  readonly #phone = window.matchMedia(PHONE);
+  readonly #turned = (): void => this.requestUpdate();
+
+  override connectedCallback(): void {
+    super.connectedCallback();
+    for (const query of [this.#narrow, this.#phone]) query.addEventListener("change", this.#turned);
+  }
+
+  override disconnectedCallback(): void {
+    super.disconnectedCallback();
+    for (const query of [this.#narrow, this.#phone]) query.removeEventListener("change", this.#turned);
+  }
 
   protected override render(): TemplateResult {
     const { session, following } = this.stage;
     const others = session.members.value.filter((m) => m.client !== session.client);
     const me = session.people.value;
+    const shown = SHOWN[this.#phone.matches ? "phone" : this.#narrow.matches ? "narrow" : "wide"];
     return html`
       <button
         class="avatar"
@@ -91,9 +123,26 @@ export class EskPeople extends SignalElement {
       >
         ${initials(session.me.value.name) || icon("user")}
       </button>
-      ${others.slice(0, SHOWN).map((m) => this.#other(m, following.value === m.client))}
-      ${others.length > SHOWN ? html`<span class="more">+${others.length - SHOWN}</span>` : nothing}
+      ${others.slice(0, shown).map((m) => this.#other(m, following.value === m.client))}
+      ${others.length > shown ? this.#all(others, others.length - shown) : nothing}
     `;
+  }
+
+  /** Everybody by name: a class does not fit beside each other. */
+  #all(others: readonly Member[], hidden: number): TemplateResult {
+    const { following } = this.stage;
+    const named = others.map((m) => ({ ...m, shown: memberName(m) })).sort((a, b) => a.shown.localeCompare(b.shown));
+    const follow = (e: CustomEvent<{ item: { value: string } }>): void => this.stage.follow(e.detail.item.value);
+    return html`<wa-dropdown placement="bottom-end" @wa-select=${follow}>
+      <button slot="trigger" class="btn more" aria-label=${`Everybody here: ${others.length + 1} people`} title="Everybody here">
+        +${hidden}
+      </button>
+      ${named.map(
+        (m) => html`<wa-dropdown-item type="checkbox" value=${m.client} .checked=${live(following.value === m.client)}>
+          <span slot="icon" class="spot" style=${`background:${m.colour}`}></span>${m.shown}
+        </wa-dropdown-item>`,
+      )}
+    </wa-dropdown>`;
   }
 
   #other(member: Member, followed: boolean): TemplateResult {

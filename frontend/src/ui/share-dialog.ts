@@ -33,6 +33,7 @@ export class EskShare extends SignalElement {
     preview: { state: true },
     problem: { state: true },
     busy: { state: true },
+    large: { state: true },
   };
   static override styles = [shared, shareStyles];
 
@@ -45,6 +46,8 @@ export class EskShare extends SignalElement {
   declare preview: Preview | null;
   declare problem: string;
   declare busy: boolean;
+  /** The code fills the window, for a projector. */
+  declare large: boolean;
 
   constructor() {
     super();
@@ -56,6 +59,7 @@ export class EskShare extends SignalElement {
     this.preview = null;
     this.problem = "";
     this.busy = false;
+    this.large = false;
   }
 
   protected override willUpdate(changed: Map<PropertyKey, unknown>): void {
@@ -66,6 +70,7 @@ export class EskShare extends SignalElement {
     const { session } = this.stage;
     this.made = madeLinks(session.store, session.id);
     this.code = null;
+    this.large = false;
     this.problem = "";
     this.tab = session.role.value === "view" ? "view" : "edit";
     void this.#try(async () => {
@@ -142,6 +147,7 @@ export class EskShare extends SignalElement {
   }
 
   protected override render(): TemplateResult {
+    if (this.large && this.code) return this.#projected(this.code.code);
     const role = this.stage.session.role.value;
     const tabs: Tab[] = role === "owner" ? ["edit", "view", "owner"] : role === "edit" ? ["edit"] : ["view"];
     return html`
@@ -166,6 +172,32 @@ export class EskShare extends SignalElement {
         ${role === "owner" && this.links ? this.#list(this.links) : nothing}
       </wa-dialog>
     `;
+  }
+
+  /** Readable from the last row: the code, where to type it, and the link as a QR code where there is one. */
+  #projected(code: string): TemplateResult {
+    const { host, origin } = window.location;
+    const secret = this.#secret;
+    return html`
+      <wa-dialog class="large" label="Join this terrain" light-dismiss ?open=${this.open} @wa-after-hide=${this.#hidden}>
+        <div class="projected">
+          <div class="words">
+            <p>Open <strong>${host}</strong> and type</p>
+            <p class="letters">${code.slice(0, 3)} ${code.slice(3)}</p>
+          </div>
+          ${
+            secret === null
+              ? nothing
+              : html`<div class="qr"><wa-qr-code .value=${terrainLink(origin, this.stage.session.id, secret)} label="QR code of the link" size="320"></wa-qr-code></div>`
+          }
+        </div>
+        <button class="btn outline" @click=${() => this.#enlarge(false)}>Back</button>
+      </wa-dialog>
+    `;
+  }
+
+  #enlarge(large: boolean): void {
+    this.large = large;
   }
 
   #link(): TemplateResult {
@@ -202,7 +234,10 @@ export class EskShare extends SignalElement {
                   <strong>${code.code.slice(0, 3)} ${code.code.slice(3)}</strong>
                   <span class="quiet">Valid for ${Math.round(code.expires_s / 60)} minutes. Type it at ${window.location.host}.</span>
                 </span>
-                <wa-copy-button .value=${code.code} copy-label="Copy the code"></wa-copy-button>`
+                <span class="acts">
+                  <button class="btn outline" @click=${() => this.#enlarge(true)}>${icon("monitor")} Show it large</button>
+                  <wa-copy-button .value=${code.code} copy-label="Copy the code"></wa-copy-button>
+                </span>`
             : html`<span class="quiet">For a classroom: a short code to type instead of the link.</span>
                 <button class="btn outline" ?disabled=${this.busy} @click=${() => this.#try(() => this.#makeCode(tab))}>
                   ${icon("key")} Show a code

@@ -45,8 +45,12 @@ export const shareStyles = css`
   .problem:empty {
     display: none;
   }
+  wa-dialog::part(body) {
+    overflow-x: hidden;
+  }
   .code {
     display: flex;
+    flex-wrap: wrap;
     align-items: center;
     justify-content: space-between;
     gap: 12px;
@@ -55,8 +59,40 @@ export const shareStyles = css`
     border-top: 1px solid var(--esk-line);
     font-size: 0.8125rem;
   }
+  .code .acts {
+    display: flex;
+    align-items: center;
+    gap: 4px;
+  }
+  wa-dialog.large {
+    --width: min(96vw, 1500px);
+  }
+  .projected {
+    display: flex;
+    flex-wrap: wrap;
+    align-items: center;
+    justify-content: space-evenly;
+    gap: 4vmin;
+    min-height: 60vh;
+    text-align: center;
+  }
+  .projected .words {
+    font-size: clamp(1.25rem, 3.4vmin, 2.6rem);
+  }
+  .projected .letters {
+    font-size: clamp(3rem, 11vw, 11rem);
+    font-weight: 720;
+    letter-spacing: 0.06em;
+    line-height: 1.15;
+    white-space: nowrap;
+  }
+  .projected .qr {
+    width: auto;
+    margin: 0;
+  }
   .code strong {
     display: block;
+    white-space: nowrap;
     font-size: 1.6rem;
     font-weight: 680;
     letter-spacing: 0.08em;

@@ -102,6 +102,7 @@ export const shared = css`
     border-color: var(--esk-edge);
   }
   .icon-btn {
+    flex: none;
     width: 40px;
     height: 40px;
     min-height: 0;

@@ -70,11 +70,18 @@ export const terrainPageStyles = css`
   }
   .side header esk-segmented {
     flex: 1;
+    min-width: 0;
   }
   .scroll {
     overflow-y: auto;
     padding: 6px 16px 18px;
     scrollbar-width: thin;
+  }
+  /* Four tabs and a cross that fingers hit. */
+  @media (pointer: coarse) and (min-width: 721px) {
+    .side {
+      width: 352px;
+    }
   }
   .hint,
   .closed {
@@ -89,6 +96,9 @@ export const terrainPageStyles = css`
     padding: 11px 18px 11px 14px;
     font-weight: 500;
     pointer-events: none;
+  }
+  .hint {
+    width: max-content;
   }
   .hint .icon {
     color: var(--esk-accent-text);
