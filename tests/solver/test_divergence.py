@@ -36,6 +36,9 @@ class Told:
     def swap(self, level: int) -> None:
         """Nothing to exchange."""
 
+    def hold(self) -> None:
+        """Nothing is fixed."""
+
     def change(self, old: str, new: str) -> float:
         assert (old, new) == ("v", "u")
         self.cycles += 1

@@ -75,6 +75,9 @@ class Recorder:
     def swap(self, level: int) -> None:
         self.order.append(f"swap{level}")
 
+    def hold(self) -> None:
+        self._count(self.top, 2, 0)  # the stiffness is read; what is fixed is read and written, a field at most
+
     def change(self, old: str, new: str) -> float:
         raise NotImplementedError(f"nothing to compare in {old} and {new}: only the order of calls is recorded")
 
