@@ -3,6 +3,8 @@
 
 const METRES_PER_DEGREE = 111319.49;
 const SAMPLES = 65;
+/** Frames without anything to load after which nothing more will come. */
+const SETTLED = 30;
 
 function loadCesium() {
   globalThis.CESIUM_BASE_URL = "./node_modules/cesium/Build/Cesium/";
@@ -113,7 +115,7 @@ export async function openCesium(ground) {
   const began = performance.now();
   // Loaded for now is not loaded for good: what has come asks for more.
   let loaded = 0;
-  while (loaded < 80 && performance.now() - began < 240_000) {
+  while (loaded < SETTLED && performance.now() - began < 240_000) {
     scene.render();
     await new Promise((done) => setTimeout(done, 20));
     loaded = scene.globe.tilesLoaded ? loaded + 1 : 0;
@@ -133,7 +135,7 @@ export async function openCesium(ground) {
       version: C.VERSION,
       backend: "webgl2",
       screen_space_error: ground.sse,
-      settled: loaded >= 80,
+      settled: loaded >= SETTLED,
       tiles,
       triangles,
       screen_error_px: screenError(C, scene, ground),
