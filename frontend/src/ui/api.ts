@@ -134,5 +134,3 @@ export const api = {
   code: (id: string, secret: string, role: Role): Promise<JoinCode> =>
     json("POST", `/api/terrains/${id}/codes`, secret, { role }),
 };
-
-export type Api = typeof api;
