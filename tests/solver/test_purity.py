@@ -44,6 +44,13 @@ def test_any_order_of_edits(solver: Solver) -> None:
         assert np.array_equal(edited(np.random.default_rng(seed), strokes, solver, TOP), fresh)
 
 
+def test_numpy_after_an_edit() -> None:
+    """SPEC S15, S19: the workspace without OpenCL keeps what it knew outside of the bins that an edit reaches."""
+    strokes, solver = SCENES["fifty"], Solver("numpy")
+    solver.solve(strokes[1:], SETTINGS, 1)
+    assert np.array_equal(solver.solve(strokes, SETTINGS, 1)[1], Solver("numpy").solve(strokes, SETTINGS, 1)[1])
+
+
 def test_order_at_level_four(solver: Solver) -> None:
     strokes = mixed(50, 11)
     a, b = solver.solve(strokes, SETTINGS, 4)[4], Solver().solve(strokes[::-1], SETTINGS, 4)[4]

@@ -7,6 +7,7 @@ is the energy's (half control volume) doubled. Stiffness ``d`` excludes screenin
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import fields, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,7 +26,7 @@ from esker.grid import samples
 from esker.solve import reference_raster
 from esker.solve.base import Base
 from esker.solve.constraints import Packer
-from esker.solve.tables import PINNED, PINNED_STIFFNESS
+from esker.solve.tables import BIN, PINNED, PINNED_STIFFNESS, Window
 
 if TYPE_CHECKING:
     from esker.solve.passes import Workspace
@@ -229,6 +230,19 @@ class NumpySystem:
         return float(np.abs(self.fields[new, self.top] - self.fields[old, self.top]).max())
 
 
+def within(
+    window: Window, new: reference_raster.Constraints, old: reference_raster.Constraints | None
+) -> reference_raster.Constraints:
+    """The new constraints in the bins of ``window``, the old ones elsewhere: there the tables may lack strokes."""
+    if old is None:
+        return new
+    inside = np.zeros(new.height_d.shape, dtype=np.bool_)
+    for row, (west, east) in enumerate(window.spans, window.first):
+        inside[row * BIN : (row + 1) * BIN, west * BIN : east * BIN] = True
+    parts = {f.name: (getattr(new, f.name), getattr(old, f.name)) for f in fields(new)}
+    return replace(new, **{name: np.where(inside, a, b) for name, (a, b) in parts.items() if isinstance(a, np.ndarray)})
+
+
 class NumpyWorkspace:
     """``solver.Workspace`` in float64 NumPy: serves when there is no OpenCL device."""
 
@@ -236,6 +250,7 @@ class NumpyWorkspace:
         self.top, self.based = top, based
         self.scout: Workspace | None = None
         self.standing: object = None
+        self._constraints: reference_raster.Constraints | None = None
         self.size_m = 1.0
         self.packer = Packer(top)
         self.gradient: NumpySystem
@@ -247,7 +262,7 @@ class NumpyWorkspace:
         if window is None:
             return
         under = None if base is None else base.level(self.top).astype(np.float64)
-        c = reference_raster.rasterise(tables, under)
+        c = self._constraints = within(window, reference_raster.rasterise(tables, under), self._constraints)
         height_f = (
             c.height_f
             if under is None
