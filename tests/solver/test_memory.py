@@ -34,6 +34,20 @@ def test_idle_workspaces_make_room(used: Solver, monkeypatch: pytest.MonkeyPatch
     assert [w.top for w in used._spare] == [1]
 
 
+def test_a_room_where_everybody_draws_keeps_its_workspace() -> None:
+    """SPEC S30: other points of the same strokes are no other terrain."""
+    solver = Solver()
+    for step in range(4):
+        moved = [s.model_copy(update={"last": (s.last[0], s.last[1], s.last[2] + step)}) for s in STROKES]
+        again = solver.solve(moved, SETTINGS, 1)
+        assert len(solver._spare) == 1
+    fresh = Solver().solve(moved, SETTINGS, 1)
+    assert all(np.array_equal(a, b) for a, b in zip(again.levels, fresh.levels, strict=True))
+    others = [s.model_copy(update={"id": f"other-{s.id}"}) for s in STROKES]
+    solver.solve(others, SETTINGS, 1)
+    assert len(solver._spare) == 2, "another terrain does not take the raster of the first"
+
+
 def test_workspaces_that_nobody_uses_are_given_back(used: Solver) -> None:
     """SPEC S30: those idle for long go, with their memory; the next solve gives the same bits."""
     expected = heights(used, 1)

@@ -68,6 +68,10 @@ class Packer:
             return -1
         return sum(1 for s in strokes if s.id in self._packed and self._packed[s.id][0] is s)
 
+    def kinship(self, strokes: Sequence[Stroke]) -> int:
+        """How many strokes of this set the last one had too, be it with other points."""
+        return sum(1 for s in strokes if s.id in self._packed)
+
     def pack(
         self, strokes: Sequence[Stroke], settings: TerrainSettings, base: Base | None = None
     ) -> tuple[Tables, Window | None]:

@@ -341,7 +341,10 @@ class Solver:
         strokes, settings = job.strokes, job.settings
         best = max(idle, key=lambda w: w.packer.likeness(strokes, settings), default=None)
         if best is not None and 2 * best.packer.likeness(strokes, settings) < len(strokes):
-            best = idle[0] if self._kept() + grid.solve_bytes(top, based) > self._spare_bytes else None
+            # Where everybody in a room draws at once, most strokes differ from solve to solve: it is theirs still.
+            best = max(idle, key=lambda w: w.packer.kinship(strokes))
+            if 2 * best.packer.kinship(strokes) < len(strokes):
+                best = idle[0] if self._kept() + grid.solve_bytes(top, based) > self._spare_bytes else None
         if best is not None:
             self._spare.remove(best)
             return best
