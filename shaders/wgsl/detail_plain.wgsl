@@ -11,15 +11,21 @@ fn noise_sample(at: vec2f, dx: vec2f, dy: vec2f, scale: f32) -> vec4f {
   return textureSampleLevel(noise, smooth_repeat, at * k, max(0.5 * log2(max(texels, 1.0e-6)), 0.0));
 }
 
-// On the plane that the surface faces most; on faces drawn out downhill, as water cuts rock.
+// On the plane that the surface faces most; on faces drawn out downhill, as water cuts rock. One sample for all three: these
+// adapters compute both sides of a branch.
 fn rock_noise(p: vec3f, n: vec3f, f: Footprint, scale: f32) -> vec4f {
   let a = abs(n);
-  if (a.z > 0.70) { return ground_noise(p, f, scale, vec2f(0.829, 0.559)); }
+  let level = a.z > 0.70;
   let east = a.x > a.y;
-  let s = noise_sample(
-    vec2f(select(p.x, p.y, east), p.z * DRAWN), vec2f(select(f.dx.x, f.dx.y, east), f.dx.z * DRAWN),
-    vec2f(select(f.dy.x, f.dy.y, east), f.dy.z * DRAWN), scale);
-  return select(vec4f(s.rg, s.b, 0.5), vec4f(s.rg, 0.5, s.b), east);
+  let turn = vec2f(0.829, 0.559);
+  let at = select(vec2f(select(p.x, p.y, east), p.z * DRAWN), turned(p.xy, turn), level);
+  let dx = select(vec2f(select(f.dx.x, f.dx.y, east), f.dx.z * DRAWN), turned(f.dx.xy, turn), level);
+  let dy = select(vec2f(select(f.dy.x, f.dy.y, east), f.dy.z * DRAWN), turned(f.dy.xy, turn), level);
+  let s = noise_sample(at, dx, dy, scale);
+  let g = s.ba - 0.5;
+  let lying = vec2f(g.x * turn.x + g.y * turn.y, g.y * turn.x - g.x * turn.y) + 0.5;
+  let standing = select(vec2f(s.b, 0.5), vec2f(0.5, s.b), east);
+  return vec4f(s.rg, select(standing, lying, level));
 }
 
 struct FineNoise {
