@@ -140,8 +140,8 @@ export class StrokeTool {
   #show(session: Session, predicted: readonly Sample[]): void {
     if (!session.begun) this.#begin(session);
     if (this.#session === null) return;
-    this.#ink.value = { points: session.sketch.samples, predicted };
     this.#drawing.value = session.id;
+    this.#ink.value = { points: session.sketch.samples, predicted };
     this.#schedule(session);
   }
 

@@ -1,5 +1,6 @@
 // @vitest-environment happy-dom
 // What pointers draw, with synthetic events (SPEC I40-I43, I53).
+import { effect } from "@preact/signals-core";
 import { describe, expect, it, vi } from "vitest";
 import { distance } from "../../src/core/math.ts";
 import type { Vec3 } from "../../src/core/types.ts";
@@ -47,6 +48,15 @@ describe("drawing", () => {
     expect(input.selection.value).toBe(s.id);
     expect(input.drawing.value).toBeNull();
     expect(input.ghost.value).toBeNull();
+  });
+
+  it("never shows ink of a new stroke without its name: that is how a line over an old one is told apart", () => {
+    const seen: boolean[] = [];
+    const stop = effect(() => void seen.push(input.ink.value !== null && input.drawing.value === null));
+    stroke(PEAK);
+    stop();
+    expect(seen.length).toBeGreaterThan(3);
+    expect(seen).not.toContain(true);
   });
 
   it("is one step of undo", () => {
