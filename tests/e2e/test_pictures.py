@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageChops, ImageStat
 
-from tests.e2e.conftest import ROOT, Server, Visitor, Visitors
+from tests.e2e.conftest import PATIENCE_MS, ROOT, Server, Visitor, Visitors
 from tests.e2e.hands import COARSE, heights, polyline, press_and_move, wait_settled
 
 PICTURES = ROOT / "tests" / "artifacts" / "pictures"
@@ -25,7 +25,7 @@ HERO_OTHER = (330, 215)
 
 def picture(visitor: Visitor) -> Image.Image:
     """The window as it is now."""
-    return Image.open(io.BytesIO(visitor.page.screenshot())).convert("RGB")
+    return Image.open(io.BytesIO(visitor.page.screenshot(timeout=PATIENCE_MS))).convert("RGB")
 
 
 def rest(visitor: Visitor) -> None:
@@ -53,7 +53,7 @@ def open_at(visitor: Visitor, terrain: str, secret: str, view: dict[str, list[fl
 
 
 def test_hero(visitors: Visitors, server: Server) -> None:
-    """A ridge in the morning; a hand draws a summit before it, and somebody else points at what comes next."""
+    """A ridge in the morning, a summit just drawn before it, and somebody else who points at what comes next."""
     terrain, secret = server.create(template="alpine-ridge", title="Morning ridge")
     guest, other = visitors(1440, 900, device_scale_factor=1, slow_screen=False), visitors(480, 360)
     guest.context.add_init_script("localStorage.setItem('esker.name', 'Ada')")
@@ -64,11 +64,11 @@ def test_hero(visitors: Visitors, server: Server) -> None:
     land = picture(guest)
     guest.page.keyboard.press("b")
     press_and_move(guest.page, polyline(HERO_STROKE, 3))
+    guest.page.mouse.up()  # while a stroke is drawn the picture is coarser
     other.page.mouse.move(*HERO_OTHER)
-    guest.wait("() => window.esker.settled()")
+    wait_settled(guest)
     rest(guest)
     hero = picture(guest)
-    guest.page.mouse.up()
     assert min(ImageStat.Stat(hero).stddev) > 25, "a landscape has light and shade"
     grown = np.asarray(ImageChops.difference(hero, land)).max(axis=2) > 12
     assert grown.mean() > 0.02, "the summit stands in the picture"
