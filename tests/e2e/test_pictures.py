@@ -1,16 +1,19 @@
 """Makes the README's picture and animation; `make pictures` copies them to docs/pictures.
 
-They are tests too: a picture without contrast, or an animation in which nothing rises, fails.
+They are tests too: a picture without contrast, or an animation in which nothing rises, fails. The large picture takes a
+software adapter a minute or two and shows nothing that other tests do not ask for, so only `make pictures` draws it.
 """
 
 from __future__ import annotations
 
 import io
 import json
+import os
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+import pytest
 from PIL import Image, ImageChops, ImageStat
 
 from tests.e2e.conftest import PATIENCE_MS, ROOT, Server, Visitor, Visitors
@@ -52,6 +55,7 @@ def open_at(visitor: Visitor, terrain: str, secret: str, view: dict[str, list[fl
     visitor.wait(near, view["eye"][:2])
 
 
+@pytest.mark.skipif("ESKER_PICTURES" not in os.environ, reason="a picture for the README: make pictures")
 def test_hero(visitors: Visitors, server: Server) -> None:
     """A ridge in the morning, a summit just drawn before it, and somebody else who points at what comes next."""
     terrain, secret = server.create(template="alpine-ridge", title="Morning ridge")

@@ -373,7 +373,14 @@ def test_a_base_is_asked_on_one_device(solver: Solver) -> None:
             asked.append(device)
             return super().window(level, rows, cols, device)
 
-    # the base's own use of ``window`` in ``level`` is not the solver's
+        def changed(self, other: Any) -> grid.Rect | None:
+            """Asked where the solver's last scene stood on another base: it compares levels of its own accord."""
+            before = len(asked)
+            rect = super().changed(other)
+            del asked[before:]
+            return rect
+
+    # the base's own use of ``window`` in ``level`` and ``changed`` is not the solver's
     base = Watched("watched", HILLS.formula, HILLS.low, HILLS.high, kept={k: HILLS.level(k) for k in range(5)})
     folded = [s.model_copy(update={"curve": s.curve[:20] + s.curve[10:]}) for s in FIVE]
     for one in (solver, Solver("numpy")):
