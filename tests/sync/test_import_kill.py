@@ -10,6 +10,7 @@ import sys
 import time
 from pathlib import Path
 
+from esker.contract import MAX_LAYERS
 from esker.patchwork import rasters
 from esker.store.grids import GridStore
 from esker.store.journal import Journal
@@ -61,7 +62,8 @@ def _check(data: Path, said: list[str]) -> bool:
         loaded = journal.load("t")
         assert loaded is not None
         layers = loaded.document.layers | loaded.document.deleted_layers
-        assert len(layers) <= 65
+        assert len(loaded.document.deleted_layers) <= MAX_LAYERS
+        assert len(loaded.document.layers) <= KILLS, "each life deletes what it imported before it imports the next"
         rows = journal.rows("t", 0)
         missing = [layer for layer in said if not any(f'"{layer}"' in row.op for row in rows)]
         assert missing == [], "an import that was said to be done is lost"
