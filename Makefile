@@ -29,9 +29,9 @@ test: ## set up, then run every check and every test
 	@if [ -n "$(ARGS)" ]; then $(MAKE) --no-print-directory -j2 check; exec $(BIN)/python -m pytest $(ARGS); \
 	else exec $(MAKE) --no-print-directory -j$(PARTS) test-people check test-page test-solved test-rest test-drawn; fi
 
-# So many parts at a time, the longest first. Each leaves cores idle while it waits: with two at a time two cores were
-# busy for four fifths of the time. The checks and the page come early and compile no loops: meanwhile the people's
-# servers do, for the parts that follow (compiled loops are kept on disk).
+# So many parts at a time, the longest first. Who waits for a page to rest leaves a core idle; with three at a time two cores
+# are never idle, but pages draw frames for nobody while servers wait, and the whole takes a minute longer. The checks and
+# the page come early and compile no loops: meanwhile the people's servers do, for the parts that follow (they are kept).
 test-people:
 	$(BIN)/python -m pytest --durations=12 -o cache_dir=.pytest_cache/people $(PEOPLE)
 
