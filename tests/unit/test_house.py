@@ -19,7 +19,7 @@ PACKAGE = ROOT / "backend" / "esker"
 
 # A room may import the rooms to its left and itself (DESIGN 2).
 LAYERS: tuple[frozenset[str], ...] = (
-    frozenset({"contract", "fractal", "http_protocol", "link", "version", "websocket_protocol"}),
+    frozenset({"child_process", "contract", "fractal", "http_protocol", "link", "version", "websocket_protocol"}),
     frozenset({"contract_emit", "grid", "lakes"}),
     frozenset({"document"}),
     frozenset({"patchwork"}),

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from esker import contract as c
+from esker.child_process import end_with_parent
 from esker.exports import wire
 
 if TYPE_CHECKING:
@@ -58,13 +59,6 @@ class Out:
         """Writes one line at once."""
         sys.stdout.write(line.model_dump_json() + "\n")
         sys.stdout.flush()
-
-
-def _end_with_parent() -> None:
-    """Ends this process when whoever started it is gone."""
-    while sys.stdin.buffer.read(4096):
-        pass
-    os._exit(9)
 
 
 def _step_back() -> None:
@@ -165,7 +159,7 @@ def work(task: wire.Task, out: Out) -> wire.Made:
 def main() -> int:
     """Runs one task. The exit status is 0 whenever the last line says how it ended."""
     task = wire.Task.model_validate_json(sys.stdin.buffer.readline())
-    threading.Thread(target=_end_with_parent, name="parent", daemon=True).start()
+    threading.Thread(target=end_with_parent, name="parent", daemon=True).start()
     _step_back()
     out = Out()
     try:

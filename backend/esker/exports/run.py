@@ -13,6 +13,7 @@ from typing import Final
 from pydantic import ValidationError
 
 from esker import contract as c
+from esker.child_process import put_down, tail
 from esker.exports import wire
 
 log = logging.getLogger("esker.exports")
@@ -20,7 +21,6 @@ log = logging.getLogger("esker.exports")
 Progress = Callable[[c.ExportStage, float], None]
 WALL_SECONDS: Final = 3600.0
 """Against a driver that hangs; without any device the largest export takes many minutes."""
-KEPT_ERRORS: Final = 4096
 FAILED: Final = "The server failed to make this export. It is in its log."
 KILLED: Final = "The system ended this export, most likely for want of memory. Take fewer samples."
 TOO_LONG: Final = "This export took too long. Take fewer samples."
@@ -42,12 +42,7 @@ async def make(task: wire.Task, on_progress: Progress) -> wire.Made:
     except TimeoutError:
         raise ExportFailed(TOO_LONG) from None
     finally:
-        if process.returncode is None:
-            with contextlib.suppress(ProcessLookupError):
-                process.kill()
-        if process.stdin is not None:
-            process.stdin.close()
-        await process.wait()
+        await put_down(process)
 
 
 async def _talk(process: asyncio.subprocess.Process, task: wire.Task, on_progress: Progress) -> wire.Made:
@@ -55,7 +50,7 @@ async def _talk(process: asyncio.subprocess.Process, task: wire.Task, on_progres
     assert process.stdin is not None
     assert process.stdout is not None
     assert process.stderr is not None
-    errors = asyncio.create_task(_tail(process.stderr))
+    errors = asyncio.create_task(tail(process.stderr))
     try:
         with contextlib.suppress(ConnectionError):
             process.stdin.write(task.model_dump_json().encode() + b"\n")
@@ -76,11 +71,3 @@ async def _talk(process: asyncio.subprocess.Process, task: wire.Task, on_progres
         errors.cancel()
         await asyncio.gather(errors, return_exceptions=True)
     raise ExportFailed(KILLED if process.returncode == -signal.SIGKILL else FAILED)
-
-
-async def _tail(stream: asyncio.StreamReader) -> str:
-    """The end of what a process complained of; everything is read, so that it never waits for us."""
-    kept = b""
-    while chunk := await stream.read(65536):
-        kept = (kept + chunk)[-KEPT_ERRORS:]
-    return kept.decode("utf-8", "replace")

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Final
 
 from esker import contract as c
+from esker.child_process import end_with_parent
 from esker.importing import limits, wire
 
 STEP_SECONDS: Final = 0.1
@@ -41,13 +42,6 @@ class Out:
         sys.stdout.flush()
 
 
-def _end_with_parent() -> None:
-    """Ends this process when whoever started it is gone."""
-    while sys.stdin.buffer.read(4096):
-        pass
-    os._exit(9)
-
-
 def _work(task: wire.Task, out: Out) -> wire.Inspected | wire.Converted:
     from esker.importing.answers import given
     from esker.importing.convert import convert
@@ -69,7 +63,7 @@ def main() -> int:
     from esker.importing.refusal import ImportRefused
 
     task = wire.Task.model_validate_json(sys.stdin.buffer.readline())
-    threading.Thread(target=_end_with_parent, name="parent", daemon=True).start()
+    threading.Thread(target=end_with_parent, name="parent", daemon=True).start()
     limits.apply(task.task)
     out = Out()
     try:

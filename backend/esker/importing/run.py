@@ -19,6 +19,7 @@ from typing import Final
 from pydantic import ValidationError
 
 from esker import contract as c
+from esker.child_process import put_down, tail
 from esker.importing import limits, wire
 from esker.importing.refusal import ImportCancelled, ImportRefused
 
@@ -28,7 +29,6 @@ __all__ = ["ImportCancelled", "ImportRefused", "convert", "inspect", "suggest_pl
 
 Progress = Callable[[c.ImportStage, float], None]
 MAX_LINE_BYTES: Final = 256 * 1024
-KEPT_ERRORS: Final = 4096
 HEIGHT_GROWTH: Final = 2.0
 ROOM_BYTES: Final = 16 << 20
 """A reader that ends with less than this left on the disk ended for want of it: mapped files return no error."""
@@ -153,12 +153,7 @@ async def _run(
         for left in (waiting, stop):
             if left is not None and not left.done():
                 left.cancel()
-        if process.returncode is None:
-            with contextlib.suppress(ProcessLookupError):
-                process.kill()
-        if process.stdin is not None:
-            process.stdin.close()
-        await process.wait()
+        await put_down(process)
         await asyncio.gather(*(left for left in (waiting, stop) if left is not None), return_exceptions=True)
 
 
@@ -169,7 +164,7 @@ async def _talk(
     assert process.stdin is not None
     assert process.stdout is not None
     assert process.stderr is not None
-    errors = asyncio.create_task(_tail(process.stderr))
+    errors = asyncio.create_task(tail(process.stderr))
     try:
         with contextlib.suppress(ConnectionError):
             process.stdin.write(task.model_dump_json().encode() + b"\n")
@@ -192,11 +187,3 @@ async def _talk(
         await asyncio.gather(errors, return_exceptions=True)
     full = await asyncio.to_thread(lambda: shutil.disk_usage(task.workdir).free < ROOM_BYTES)
     raise ImportRefused(FULL if full else STOPPED)
-
-
-async def _tail(stream: asyncio.StreamReader) -> str:
-    """The end of what a process complained of; everything is read, so that it never waits for us."""
-    kept = b""
-    while chunk := await stream.read(65536):
-        kept = (kept + chunk)[-KEPT_ERRORS:]
-    return kept.decode("utf-8", "replace")
