@@ -2,7 +2,9 @@
 FROM node:22-bookworm-slim AS page
 WORKDIR /esker/frontend
 COPY frontend/package.json frontend/package-lock.json frontend/.npmrc ./
-RUN npm install --no-save
+# Exactly what is locked, or nothing. Without the linter, which nothing here runs: the lock file lacks its programs for
+# other systems, and npm ci takes that for a mistake.
+RUN npm pkg delete "devDependencies.@biomejs/biome" && npm ci
 COPY NOTICE /esker/
 COPY shaders /esker/shaders
 COPY frontend ./
@@ -23,8 +25,10 @@ RUN pip install --no-cache-dir --no-deps --no-build-isolation -e .
 COPY --from=page /esker/frontend/dist frontend/dist
 RUN useradd --create-home esker && mkdir /data && chown esker:esker /data
 USER esker
+# The root may be read-only: what is compiled for this processor is kept with the data.
+ENV XDG_CACHE_HOME=/data/.cache NUMBA_CACHE_DIR=/data/.cache/numba PYTHONDONTWRITEBYTECODE=1
 VOLUME /data
 EXPOSE 8000
-# Kernels are compiled at the first start.
-HEALTHCHECK --interval=15s --timeout=3s --start-period=60s CMD ["python", "-c", "import urllib.request as u; u.urlopen('http://127.0.0.1:8000/healthz', timeout=2)"]
+# Kernels are compiled at the first start, by children that may try more than one level.
+HEALTHCHECK --interval=15s --timeout=3s --start-period=180s CMD ["python", "-c", "import urllib.request as u; u.urlopen('http://127.0.0.1:8000/readyz', timeout=2)"]
 CMD ["python", "-m", "esker", "serve", "--host", "0.0.0.0", "--port", "8000", "--data", "/data"]

@@ -16,13 +16,16 @@ NODE_OK := node -e 'const [a,b]=process.versions.node.split(".").map(Number);pro
 PARTS ?= 2
 PEOPLE := tests/e2e
 DRAWN := tests/golden tests/gpu tests/render
+COMPUTED := tests/solver tests/golden tests/gpu tests/synthesis tests/patchwork tests/render tests/property
 SOLVED := tests/solver tests/sync tests/synthesis
+# Python shows a traceback when Ctrl-C comes while it starts itself; held back, the signal waits for our first line.
+HOLDING := $(shell env --block-signal=INT true 2>/dev/null && echo env --block-signal=INT)
 SOURCES := $(shell find frontend/src shaders frontend/public -type f 2>/dev/null)
 
-.PHONY: run test test-people test-drawn test-solved test-rest test-page pictures check check-python check-page format generate lock setup browser clean
+.PHONY: run test test-levels test-people test-drawn test-solved test-rest test-page pictures wheel audit check check-python check-page format generate lock setup browser clean
 
-run: setup frontend/dist/index.html ## set up, build, start the server, print the link of a new terrain
-	@exec $(BIN)/python -m esker serve $(ARGS)
+run: setup frontend/dist/index.html ## set up, build, start the server, print the link of a terrain
+	@exec $(HOLDING) $(BIN)/python -m esker serve $(ARGS)
 
 test: ## set up, then run every check and every test
 	@$(MAKE) --no-print-directory -j2 $(STAMPS)/dev browser frontend/dist/index.html
@@ -44,6 +47,14 @@ test-solved:
 test-rest:
 	$(BIN)/python -m pytest --durations=15 $(PEOPLE:%=--ignore=%) $(DRAWN:%=--ignore=%) $(SOLVED:%=--ignore=%)
 
+# What is computed, again as on narrower processors, one after the other. What depends on the processor shows here.
+LEVELS ?= haswell penryn
+test-levels: setup ## the tests of what is computed, compiled for narrower processors: before a release
+	@$(MAKE) --no-print-directory $(STAMPS)/dev browser frontend/dist/index.html
+	ESKER_EVERY_LEVEL=1 $(BIN)/python -m pytest -o cache_dir=.pytest_cache/levels tests/solver/test_every_level.py
+	for level in $(LEVELS); do echo "ESKER_CPU_LEVEL=$$level"; \
+	  ESKER_CPU_LEVEL=$$level $(BIN)/python -m pytest -o cache_dir=.pytest_cache/levels $(COMPUTED); done
+
 test-page:
 	$(NPM) test
 
@@ -53,7 +64,7 @@ check-python: $(STAMPS)/dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/python -m esker.contract_emit --check
+	$(BIN)/python -m esker.contract.emit --check
 
 check-page: $(STAMPS)/node
 	$(NPM) run check
@@ -64,12 +75,14 @@ format: $(STAMPS)/dev $(STAMPS)/node
 	$(NPM) run format
 
 generate: $(STAMPS)/python
-	$(BIN)/python -m esker.contract_emit
+	$(BIN)/python -m esker.contract.emit
+	$(BIN)/python docs/rooms.py
 
 lock: $(STAMPS)/dev ## renew the lock files
 	$(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header --no-emit-index-url pyproject.toml build.in -o requirements.lock
 	$(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header --no-emit-index-url --extra dev --extra bench pyproject.toml build.in -c requirements.lock -o requirements-dev.lock
 	cd frontend && rm -f package-lock.json && npm install --package-lock-only
+	.ci/audit --renew
 
 setup: $(STAMPS)/python $(STAMPS)/node
 
@@ -111,7 +124,15 @@ pictures: check browser frontend/dist/index.html ## draw the README's pictures a
 	mkdir -p docs/pictures && cp tests/artifacts/pictures/* docs/pictures/
 	$(BIN)/python docs/pictures/gallery.py
 
-browser: ## the browser and the software graphics drivers that the tests draw with
+wheel: $(STAMPS)/python frontend/dist/index.html ## one wheel with the page and the shaders, for any system, in the folder dist
+	$(BIN)/pip wheel --quiet --no-deps --no-build-isolation --wheel-dir dist .
+	@ls dist/esker-*.whl
+
+audit: $(STAMPS)/dev ## what the product is made of, since when, and whether holes are known
+	@.ci/audit
+
+# After the virtual environment: both may have to install packages, and two apt-get at a time stop each other.
+browser: | $(VENV)/bin/python ## the browser and the software graphics drivers that the tests draw with
 	@$(SHELL) .ci/browser-packages
 
 clean:

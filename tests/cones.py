@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from esker import grid
 from esker.contract import Channel, View
 from esker.grid import TileKey
-from esker.tiles.codec import Wide, child_window, predict
+from esker.tiles.codec.payload import Wide, child_window, predict
 from esker.tiles.decoder import FrameDecoder, HeldTile
 from esker.tiles.delivery import WISHES, ClientTiles, TileServer
 from esker.tiles.plans import FramePlan

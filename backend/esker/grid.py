@@ -15,11 +15,12 @@ from esker.contract import QUANTA_PER_CELL, TILE_CELLS
 SOLVE_FIELDS = 19
 """Float32 a sample that a solve holds: 12 fields of the finest level, and a third of the 21 of those below it."""
 BASE_FIELDS = 4
-"""Those of the finest level that a base adds (``solve.device_workspace.OverBase``)."""
+"""Fields of the finest level that a base adds (``solve.device_workspace.OverBase``)."""
 SCOUT = 2
-"""Level on which strokes are rasterised for the coarsest preview alone: a sixteenth of level 4's work or less ..."""
+"""Level on which strokes are rasterised for the coarsest preview alone. It takes a sixteenth of level 4's work or
+less."""
 SCOUT_FROM = 4
-"""... of terrains from this level up: below, it would save nothing (docs/solver.md)."""
+"""Terrains of this level and above have such a preview; for smaller ones it would save nothing (docs/solver.md)."""
 SOLVE_PADDING = 96
 """Columns more that padded rows and scratch come to: in between, as kernels for GPUs need less than those for CPUs."""
 

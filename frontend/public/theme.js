@@ -1,4 +1,4 @@
-// Sets the colour theme before the first paint; the page itself keeps it in step (src/ui/theme.ts).
+// Sets the colour theme before the first paint; the page itself keeps it in step (src/app/device/theme.ts).
 (() => {
   let choice = null;
   try {

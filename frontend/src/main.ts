@@ -1,21 +1,24 @@
 /** The page's start: theme, then the page that the address means. The landing page never loads the 3D view. */
 
 import "./ui/styles/theme.css";
-import { route } from "./ui/router.ts";
-import { startTheme } from "./ui/theme.ts";
+import { startTheme } from "./app/device/theme.ts";
+import { route } from "./app/server/router.ts";
 
 async function show(): Promise<void> {
   const target = route(new URL(window.location.href));
   const app = document.getElementById("app");
   if (!app) throw new Error("index.html has no #app");
   if (target.page === "terrain") {
-    const { openTerrain } = await import("./ui/terrain-page.ts");
+    const { openTerrain } = await import("./ui/pages/terrain-page.ts");
     app.replaceChildren(openTerrain(target.id, target.secret));
   } else if (target.page === "landing") {
-    await import("./ui/landing.ts");
+    await import("./ui/pages/landing.ts");
     app.replaceChildren(document.createElement("esk-landing"));
+  } else if (target.page === "server") {
+    const { serverPage } = await import("./ui/pages/server-page.ts");
+    app.replaceChildren(serverPage(target.key));
   } else {
-    const { missingPage } = await import("./ui/missing.ts");
+    const { missingPage } = await import("./ui/pages/missing.ts");
     app.replaceChildren(missingPage(target.path));
   }
 }

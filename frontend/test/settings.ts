@@ -3,6 +3,7 @@ import type { TerrainSettings } from "../src/generated/contract.ts";
 /** Settings of a terrain of 4096 m with everything as a new one has it, for all tests. */
 export const SETTINGS: TerrainSettings = {
   size_m: 4096,
+  edition: 1,
   title: "T",
   reach_m: 128,
   border: "free",

@@ -4,8 +4,15 @@
 #define OWNED ((SIDE(0) * SIDE(0) + BOTTOM_ITEMS - 1) / BOTTOM_ITEMS)
 #define COARSEST SIDE(BOTTOM_LEVELS)
 
-// Constraints of the levels below level 0, then the linear map of COARSEST_SWEEPS over-relaxations on the coarsest, a
-// column by a work-item: a GPU would take as long for one relaxation as for all the levels above. One work-group.
+// Area of the control volume of a sample of the coarsest level, in cells.
+inline float control_volume(int i) {
+    int y = i / COARSEST, x = i % COARSEST;
+    return (y == 0 || y == COARSEST - 1 ? 0.5f : 1.0f) * (x == 0 || x == COARSEST - 1 ? 0.5f : 1.0f);
+}
+
+// Constraints of the levels below level 0, then the linear map of COARSEST_SWEEPS over-relaxations from the constant that
+// balances the load (reference.relaxation_matrix) on the coarsest, a column by a work-item: a GPU would take as long for
+// one relaxation as for all the levels above. One work-group.
 kernel __attribute__((reqd_work_group_size(BOTTOM_ITEMS, 1, 1)))
 void coarsen_bottom(field_t d, field_t f, field_t matrix, constant int *tab, int channels, int stride, float screening) {
     int lid = get_local_id(0);
@@ -18,9 +25,13 @@ void coarsen_bottom(field_t d, field_t f, field_t matrix, constant int *tab, int
     }
     cfield_t dc = d + tab[4 * BOTTOM_LEVELS];
     int pitch = tab[4 * BOTTOM_LEVELS + 2];
+    float stiffness = 0.0f;
+    for (int i = 0; i < COARSEST * COARSEST; i++)
+        stiffness = fma(control_volume(i), dc[i / COARSEST * pitch + i % COARSEST] + screening, stiffness);
     for (int column = lid; column < COARSEST * COARSEST; column += BOTTOM_ITEMS) {
-        float u[COARSEST * COARSEST];
-        for (int i = 0; i < COARSEST * COARSEST; i++) u[i] = 0.0f;
+        float u[COARSEST * COARSEST], total = 0.0f, start = 0.0f;
+        if (stiffness > LEAST_HOLD) start = control_volume(column) / stiffness;
+        for (int i = 0; i < COARSEST * COARSEST; i++) u[i] = start;
         for (int s = 0; s < COARSEST_SWEEPS; s++)
             for (int i = 0; i < COARSEST * COARSEST; i++) {
                 int y = i / COARSEST, x = i % COARSEST;
@@ -29,7 +40,10 @@ void coarsen_bottom(field_t d, field_t f, field_t matrix, constant int *tab, int
                 float value = ((i == column ? 1.0f : 0.0f) + around) / (4.0f + dc[y * pitch + x] + screening);
                 u[i] = fma(COARSEST_RELAXATION, value - u[i], u[i]);
             }
-        for (int i = 0; i < COARSEST * COARSEST; i++) matrix[i * COARSEST * COARSEST + column] = u[i];
+        for (int i = 0; i < COARSEST * COARSEST; i++) total = fma(control_volume(i), u[i], total);
+        if (stiffness > LEAST_HOLD) total = 0.0f;
+        for (int i = 0; i < COARSEST * COARSEST; i++)
+            matrix[i * COARSEST * COARSEST + column] = u[i] - total / ((COARSEST - 1) * (COARSEST - 1));
     }
 }
 

@@ -3,9 +3,10 @@
 inline float edge_over_base(cfield_t base, cfield_t share, cfield_t target, size_t at, size_t to, float slack) {
     float step = base[to] - base[at], one = share[at] * step, two = share[to] * step, fall = target[at] - target[to];
     float low = fmin(one, two), high = fmax(one, two);
-    int through = target[at] * target[to] < 0.0f;
+    float lesser = fmin(fabs(target[at]), fabs(target[to])) * (1.0f / BALANCE_M);
+    float through = (target[at] < 0.0f) != (target[to] < 0.0f) ? fmin(lesser, 1.0f) : 0.0f;
     float taken = clamp(0.5f * (share[at] + share[to]) * step, fall - slack, fall + slack);
-    return clamp(taken, through ? fmin(low, 0.0f) : low, through ? fmax(high, 0.0f) : high);
+    return clamp(taken, low - through * fmax(low, 0.0f), high - through * fmin(high, 0.0f));
 }
 
 // Rows [from, to). Global size (columns, to - from), rounded up.

@@ -1,5 +1,5 @@
 // Strokes to the constraints of one level on a GPU (DESIGN 5.2, 5.5); after section.cl, scalar. Twin:
-// backend/esker/solve/reference_raster.py. A work-group of 16 x 16 does one bin: together its work-items find the least
+// backend/esker/solve/constraints/raster_reference.py. A work-group of 16 x 16 does one bin: together its work-items find the least
 // distance of a stroke to the bin's middle and mark the segments that can be nearest somewhere in the bin, a bit each, so
 // that every one then tries them in the order of the table, whichever work-item found them: ties fall as on a CPU.
 #define NOTHING 0x7fffffff  // the segment of a sample that has none near
@@ -47,20 +47,20 @@ inline int nearest_in_bin(int *best, segments_t s, int first, int count, float r
 // The sums of all strokes at this work-item's sample; (x0, y0): the bin's first.
 inline sums_t gather(const tables_t *t, int bx, int by, int gx, int gy, int n, local int *least_bits, local uint *marks,
                      int channels) {
-    sums_t sum = {0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f};
+    sums_t sum = {0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f};
     float x = gx, y = gy, cx = bx * BIN + 0.5f * (BIN - 1), cy = by * BIN + 0.5f * (BIN - 1);
     for (int i = t->row_start[by - t->row0]; i < t->row_start[by - t->row0 + 1]; i++) {
         global const int *item = t->row_items + ITEM_STRIDE * i;
         if (bx < item[1] || bx >= item[2]) continue;
         global const float *p = t->strokes + STROKE_STRIDE * item[0];
         global const int *at = t->index + INDEX_STRIDE * item[0];
-        nearest_t near = {1e15f, p[P_HEIGHT], 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f};
+        nearest_t near = {1e15f, p[P_HEIGHT], 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 1.0f, 1e30f, 0.0f};
         int in = 0, reached;
         if (at[I_OCTAVES] < 0) {
             int best;
             reached = nearest_in_bin(&best, t->outlines, at[I_FIRST], at[I_COUNT], p[P_REACH], x, y, cx, cy, least_bits,
                                      marks);
-            if (best != NOTHING) resolve(&near, 1, t->outlines, best, x, y);
+            if (best != NOTHING) resolve(&near, 1, t->outlines, best, x, y, t->edition);
             if (at[I_SPANS] >= 0 && gy < n) {
                 global const int *span = t->span_index + at[I_SPANS] + gy - t->row0 * BIN;
                 in = inside_row(t->spans, span[0], span[1], x);
@@ -103,7 +103,7 @@ void rasterise(TABLE_ARGUMENTS, int by0, global const int *windows, int n, int p
     SET_OVER(t, o, gx < n && gy < n);
     sums_t sum = gather(&t, bx, by, gx, gy, n, &least_bits, marks, 0);
     if (gx >= n || gy >= n) return;
-    constraint_t c = conclude(&sum, gx, gy, n, screening, pinned, t.s, t.octave);
+    constraint_t c = conclude(&sum, gx, gy, n, screening, pinned, &t);
     height_d[o] = c.height_d;
     height_f[o] = c.height_f;
     gradient_d[o] = c.gradient_d;

@@ -55,8 +55,20 @@ void restriction_chain(cfield_t fine, field_t out1, field_t out2, field_t out3, 
     }
 }
 
+// Whether a sample is at least so stiff.
+inline int at_least(float d, float least) { return d < 0.0f || d >= least; }
+
+// Whether a coarse sample is on a crest along one of the lines through it (reference.on_lines), from the stiffness there
+// and west, east, south and north of it.
+inline int on_line(float here, float w, float e, float s, float n) {
+    const float line = 0.5f * LINE_STIFFNESS, firm = FIRM_STIFFNESS;
+    int strong = at_least(here, line) && ((at_least(w, line) && at_least(e, line)) || (at_least(s, line) && at_least(n, line)));
+    int across = at_least(w, firm) + at_least(e, firm), along = at_least(s, firm) + at_least(n, firm);
+    return strong || (at_least(here, firm) && ((across == 2 && along == 0) || (along == 2 && across == 0)));
+}
+
 // Springs of one coarse sample: d' = S / (1 + SATURATION S), f' = R f / (1 + SATURATION S), S = R d. Fixed samples count
-// as springs of CREST_STIFFNESS; a pinned border stays as good as fixed.
+// as springs of CREST_STIFFNESS; a pinned border stays as good as fixed, a crest along a line nearly so.
 inline void coarsen_at(cfield_t d, cfield_t f, field_t d2, field_t f2, int Y, int X, int channels, level_t g) {
     float sd = 0.0f, sf[2] = {0.0f, 0.0f};
     for (int j = -1; j <= 1; j++)
@@ -67,11 +79,16 @@ inline void coarsen_at(cfield_t d, cfield_t f, field_t d2, field_t f2, int Y, in
             sd = fma(w, dv < 0.0f ? CREST_STIFFNESS : dv, sd);
             for (int c = 0; c < channels; c++) sf[c] = fma(share, f[at + (size_t)c * g.stride], sf[c]);
         }
-    size_t to = (size_t)Y * g.pitch2 + X;
-    float k = 1.0f / fma(SATURATION, sd, 1.0f), here = d[(size_t)(2 * Y) * g.pitch + 2 * X];
+    size_t to = (size_t)Y * g.pitch2 + X, middle = (size_t)(2 * Y) * g.pitch, at = middle + 2 * X;
+    float k = 1.0f / fma(SATURATION, sd, 1.0f), here = d[at];
     int pinned = here <= PINNED || here >= 0.5f * PINNED_STIFFNESS;
-    d2[to] = pinned ? PINNED_STIFFNESS : sd * k;
-    for (int c = 0; c < channels; c++) f2[to + (size_t)c * g.stride2] = pinned ? 0.0f : sf[c] * k;
+    int line = on_line(here, d[middle + mirrored(2 * X - 1, g.n)], d[middle + mirrored(2 * X + 1, g.n)],
+                       d[(size_t)mirrored(2 * Y - 1, g.n) * g.pitch + 2 * X],
+                       d[(size_t)mirrored(2 * Y + 1, g.n) * g.pitch + 2 * X]);
+    float stiff = here < 0.0f ? LINE_STIFFNESS : LINE_STIFFNESS / fmax(here, 1.0f);
+    d2[to] = pinned ? PINNED_STIFFNESS : line ? LINE_STIFFNESS : sd * k;
+    for (int c = 0; c < channels; c++)
+        f2[to + (size_t)c * g.stride2] = pinned ? 0.0f : line ? stiff * f[at + (size_t)c * g.stride] : sf[c] * k;
 }
 
 // Coarse rows [from, to). Global size (columns, to - from), rounded up.

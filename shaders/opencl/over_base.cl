@@ -6,23 +6,24 @@
 #pragma OPENCL FP_CONTRACT OFF
 
 // The share on an edge is the mean of those at its ends. A cliff of the base in one step may leave a band: then the edge takes
-// off what the band has there, to within `slack`, with a share between those at the ends; between a fill and a cut it may be
-// less than either.
+// off what the band has there, to within `slack`, with a share between those at the ends; between a fill and a cut, of
+// BALANCE_M each, it may be less than either.
 inline float16 edge_over_base(float16 s, float16 b, float16 t, crow_t share, crow_t base, crow_t target, float slack) {
     float16 other = vload16(0, share), step = vload16(0, base) - b, t2 = vload16(0, target), fall = t - t2;
     float16 one = s * step, two = other * step, low = fmin(one, two), high = fmax(one, two), zero = 0.0f;
-    int16 through = t * t2 < 0.0f;
+    float16 lesser = fmin(fmin(fabs(t), fabs(t2)) * (1.0f / BALANCE_M), 1.0f);
+    float16 through = select(zero, lesser, (t < 0.0f) ^ (t2 < 0.0f));
     float16 taken = clamp(0.5f * (s + other) * step, fall - slack, fall + slack);
-    return clamp(taken, select(low, fmin(low, zero), through), select(high, fmax(high, zero), through));
+    return clamp(taken, low - through * fmax(low, zero), high - through * fmin(high, zero));
 }
 
 inline float edge_at(crow_t share, crow_t base, crow_t target, int x, crow_t share2, crow_t base2, crow_t target2, int x2,
                      float slack) {
     float s = share[x], other = share2[x2], step = base2[x2] - base[x], t = target[x], t2 = target2[x2], fall = t - t2;
     float one = s * step, two = other * step, low = fmin(one, two), high = fmax(one, two);
-    int through = t * t2 < 0.0f;
+    float through = (t < 0.0f) != (t2 < 0.0f) ? fmin(fmin(fabs(t), fabs(t2)) * (1.0f / BALANCE_M), 1.0f) : 0.0f;
     float taken = clamp(0.5f * (s + other) * step, fall - slack, fall + slack);
-    return clamp(taken, through ? fmin(low, 0.0f) : low, through ? fmax(high, 0.0f) : high);
+    return clamp(taken, low - through * fmax(low, 0.0f), high - through * fmin(high, 0.0f));
 }
 
 // f = raw + sum over the neighbours of the edge's share times the difference of the base; at fixed samples raw.

@@ -1,5 +1,5 @@
 /* Blending of patches (paper 2 section 3.2, equation 1; section 4.1 for patches and weights): a gather. Twins:
-   esker.patchwork.blend_loops (same arithmetic) and blend_reference (float64).
+   esker.patchwork.blend.loops (same arithmetic) and blend_reference (float64).
 
    A work-item makes SPAN samples of a row of a bin (32 on CPUs, where the loop along the row is the vector; 1 on GPUs)
    and loops over all patches that meet the bin, however many they are. Defines: BIN, STRIDE, SPAN, MARGIN (1 / cells). */

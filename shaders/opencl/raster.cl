@@ -1,5 +1,5 @@
 // Strokes to the constraints of one level (DESIGN 5.2, 5.4, 5.5), row by row; after section.cl. Twin:
-// backend/esker/solve/reference_raster.py; tables: backend/esker/solve/tables.py. One work-item does one bin of 16 x 16
+// backend/esker/solve/constraints/raster_reference.py; tables: backend/esker/solve/constraints/tables.py. One work-item does one bin of 16 x 16
 // samples: per stroke the nearest crest point of every sample (of an outline among the few segments that can be nearest
 // somewhere in the bin), then the stroke's cross-section, whose weighted sums do not depend on the order of edits.
 #define CANDIDATES 48
@@ -30,11 +30,11 @@ inline int least_int16(int16 v) {
     return min(c.x, c.y);
 }
 
-inline nearest_t nearest_of_row(int16 best, segments_t s, float height, float16 x, float y) {
-    nearest_t out = {1e15f, height, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f};
+inline nearest_t nearest_of_row(int16 best, const tables_t *t, float height, float16 x, float y) {
+    nearest_t out = {1e15f, height, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 1.0f, 1e30f, 0.0f};
     for (int at = least_int16(best); at < NOTHING; at = least_int16(best)) {
         int16 mine = best == at;
-        resolve(&out, mine, s, at, x, y);
+        resolve(&out, mine, t->outlines, at, x, y, t->edition);
         best = select(best, (int16)(NOTHING), mine);
     }
     return out;
@@ -87,7 +87,7 @@ inline void outline_in_bin(sums_t *sums, const tables_t *t, global const float *
     if (!reached && at[I_SPANS] < 0) return;
     for (int y = 0; y < rows; y++) {
         int16 in = 0;
-        nearest_t near = nearest_of_row(best[y], t->outlines, p[P_HEIGHT], x, y0 + y);
+        nearest_t near = nearest_of_row(best[y], t, p[P_HEIGHT], x, y0 + y);
         LOWER(near, t, y);
         if (at[I_SPANS] >= 0) {
             global const int *span = t->span_index + at[I_SPANS] + ((int)y0 + y - t->row0 * BIN);
@@ -97,17 +97,20 @@ inline void outline_in_bin(sums_t *sums, const tables_t *t, global const float *
     }
 }
 
-// The sums of all strokes that reach a bin, `rows` rows of it.
-inline void gather(sums_t *sums, const tables_t *t, int bx, int by, int rows, int channels) {
-    float x0 = bx * BIN, y0 = by * BIN;
-    float16 x = x0 + (float16)LANE_NUMBERS;
+inline void clear(sums_t *sums, int rows) {
     for (int y = 0; y < rows; y++) {
-        sums_t none = {0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f};
+        sums_t none = {0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f};
         sums[y] = none;
     }
+}
+
+// Adds the strokes `first` .. `end` - 1 that reach a bin to its sums, `rows` rows of them.
+inline void gather(sums_t *sums, const tables_t *t, int bx, int by, int rows, int channels, int first, int end) {
+    float x0 = bx * BIN, y0 = by * BIN;
+    float16 x = x0 + (float16)LANE_NUMBERS;
     for (int i = t->row_start[by - t->row0]; i < t->row_start[by - t->row0 + 1]; i++) {
         global const int *item = t->row_items + ITEM_STRIDE * i;
-        if (bx < item[1] || bx >= item[2]) continue;
+        if (bx < item[1] || bx >= item[2] || item[0] < first || item[0] >= end) continue;
         global const float *p = t->strokes + STROKE_STRIDE * item[0];
         global const int *at = t->index + INDEX_STRIDE * item[0];
         if (at[I_OCTAVES] < 0) {
@@ -135,20 +138,30 @@ inline void gather(sums_t *sums, const tables_t *t, int bx, int by, int rows, in
 #endif
 
 // Global size (most bins of a row, rows of bins); of row by0 + j the bins windows[2 j] .. windows[2 j + 1] - 1 are done.
+// Where `later` is a stroke, sums of those before it are kept for bins that have a slot: k + 1, in slot k they are; -k - 1,
+// there they are to be. One loop does both parts, so that a compiler cannot round them otherwise.
 // Outputs start at the tables' first bin. height_d, height_f, gradient_d: one channel; gradient_f: two.
 kernel void rasterise(TABLE_ARGUMENTS, int by0, global const int *windows, int n, int pitch, int stride,
                       global float *gradient_d, global float *gradient_f, global float *height_d,
-                      global float *height_f, float screening, int pinned OVER_ARGUMENTS OVER_SHARE) {
+                      global float *height_f, float screening, int pinned, int later, global const int *slots,
+                      global sums_t *kept OVER_ARGUMENTS OVER_SHARE) {
     int j = get_global_id(1), bx = windows[2 * j] + get_global_id(0), by = by0 + j, rows = min(BIN, n - by * BIN);
     if (bx >= windows[2 * j + 1]) return;
     tables_t t = TABLES;
     sums_t sums[BIN];
     size_t o = (size_t)(by - row0) * BIN * pitch + PAD + (bx - column0) * BIN;
     SET_OVER(t, o, pitch);
-    gather(sums, &t, bx, by, rows, 0);
+    int slot = later < NOTHING ? slots[j * get_global_size(0) + get_global_id(0)] : 0;
+    global sums_t *own = kept + (size_t)(slot > 0 ? slot - 1 : slot < 0 ? -slot - 1 : 0) * BIN;
+    clear(sums, rows);
+    for (int y = 0; y < rows && slot > 0; y++) sums[y] = own[y];
+    for (int part = slot > 0; part <= (later < NOTHING); part++) {
+        gather(sums, &t, bx, by, rows, 0, part ? later : 0, part ? NOTHING : later);
+        for (int y = 0; y < rows && part == 0 && slot < 0; y++) own[y] = sums[y];
+    }
     int16 columns = bx * BIN + (int16)LANE_NUMBERS;
     for (int y = 0; y < rows; y++, o += pitch) {
-        constraint_t c = conclude(sums + y, columns, by * BIN + y, n, screening, pinned, t.s, t.octave);
+        constraint_t c = conclude(sums + y, columns, by * BIN + y, n, screening, pinned, &t);
         vstore16(c.height_d, 0, height_d + o);
         vstore16(c.height_f, 0, height_f + o);
         vstore16(c.gradient_d, 0, gradient_d + o);
@@ -171,7 +184,8 @@ kernel void rasterise_channel(TABLE_ARGUMENTS, int by0, global const int *window
     sums_t sums[BIN];
     size_t o = (size_t)(by - row0) * BIN * pitch + PAD + (bx - column0) * BIN;
     SET_OVER(t, o, pitch);
-    gather(sums, &t, bx, by, rows, 1);
+    clear(sums, rows);
+    gather(sums, &t, bx, by, rows, 1, 0, NOTHING);
     for (int y = 0; y < rows; y++, o += pitch) {
         float16 stiffness, pull, cover;
         conclude_channel(&stiffness, &pull, &cover, sums + y, screening);

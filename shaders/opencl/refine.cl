@@ -1,5 +1,5 @@
 // Refinement of a window above the global levels, row by row (DESIGN 5.6); after rows.cl. Twin:
-// backend/esker/solve/refine_engine.py (NumpyEngine).
+// backend/esker/solve/refine/engine.py (NumpyEngine).
 //
 // A window is `rows` x `columns` samples of a level, laid out like a level (rows.cl); it begins on a bin, so on an even
 // sample. Channels: d/dx, d/dy, height. Where the window ends on the border of the level, mirroring is the operator's own;

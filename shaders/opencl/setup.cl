@@ -1,13 +1,31 @@
 // From rasterised constraints to the hierarchy of levels (DESIGN 5.3). Twins: reference.coarsen, reference.divergence,
 // reference.held.
 
+// The samples of one fine row, at every second of which a coarse one lies, that are at least so stiff.
+FORCE_INLINE int16 even_from(crow_t r, float least) {
+    float16 u = load16(r), v = load16(r + VW), e = (float16)(u.even, v.even);
+    return e < 0.0f || e >= least;
+}
+
+// Coarse samples on a crest along one of the lines through them (reference.on_lines): `a`, `b`, `c` are rows 2J-1, 2J,
+// 2J+1 of the stiffness, of which b has ghosts.
+FORCE_INLINE int16 on_lines(crow_t a, crow_t b, crow_t c) {
+    int16 west = even_from(b - 1, 0.5f * LINE_STIFFNESS), east = even_from(b + 1, 0.5f * LINE_STIFFNESS);
+    int16 south = even_from(a, 0.5f * LINE_STIFFNESS), north = even_from(c, 0.5f * LINE_STIFFNESS);
+    int16 strong = even_from(b, 0.5f * LINE_STIFFNESS) & ((west & east) | (south & north));
+    west = even_from(b - 1, FIRM_STIFFNESS), east = even_from(b + 1, FIRM_STIFFNESS);
+    south = even_from(a, FIRM_STIFFNESS), north = even_from(c, FIRM_STIFFNESS);
+    int16 lone = (west & east & ~south & ~north) | (south & north & ~west & ~east);
+    return strong | (even_from(b, FIRM_STIFFNESS) & lone);
+}
+
 // Springs of one coarse row: d' = S / (1 + SATURATION S), f' = R f / (1 + SATURATION S), S = R d. Fixed samples count
-// as springs of CREST_STIFFNESS; a pinned border stays as good as fixed. `tmp` holds four fine rows. d is written by channel
-// 0 only.
+// as springs of CREST_STIFFNESS; a pinned border stays as good as fixed, a crest along a line nearly so. `tmp` holds four
+// fine rows. d is written by channel 0 only.
 inline void coarsen_row(crow_t d, crow_t f, row_t d2, row_t f2, int J, int n, int pitch, int pitch2, row_t tmp,
                         int write_d) {
     int ys[3] = {mirror(2 * J - 1, n), 2 * J, mirror(2 * J + 1, n)}, nc = n / 2 + 1;
-    row_t sd = tmp + PAD, sf = tmp + pitch + PAD, t = tmp + 2 * pitch + PAD, kd = tmp + 3 * pitch + PAD;
+    row_t sd = tmp + PAD, sf = tmp + pitch + PAD, middle = tmp + 2 * pitch + PAD;
     for (int x = 0; x < n; x += VW) {
         float16 ad = 0.0f, af = 0.0f;
         for (int i = 0; i < 3; i++) {
@@ -16,14 +34,16 @@ inline void coarsen_row(crow_t d, crow_t f, row_t d2, row_t f2, int J, int n, in
             float w = i == 1 ? 1.0f : 0.5f;
             ad += w * HARD_VALUE(dv, CREST_STIFFNESS);
             af += w * fixed * fv;
+            if (i == 1) store16(dv, middle + x);
         }
         store16(ad, sd + x);
         store16(af, sf + x);
     }
     ghosts(sd, n);
     ghosts(sf, n);
+    ghosts(middle, n);
     row_t od = row(d2, J, pitch2), of = row(f2, J, pitch2);
-    crow_t centre = crow(d, 2 * J, pitch);
+    crow_t south = crow(d, ys[0], pitch), north = crow(d, ys[2], pitch), value = crow(f, 2 * J, pitch);
     for (int x = 0; x < nc; x += VW) {
         float16 s[2];
         for (int i = 0; i < 2; i++) {
@@ -31,11 +51,14 @@ inline void coarsen_row(crow_t d, crow_t f, row_t d2, row_t f2, int J, int n, in
             float16 u = load16(r), v = load16(r + VW), l = load16(r - 1), m = load16(r + VW - 1);
             s[i] = (float16)(u.even + 0.5f * (u.odd + l.even), v.even + 0.5f * (v.odd + m.even));
         }
-        float16 k = 1.0f / (1.0f + SATURATION * s[0]), u = load16(centre + 2 * x), v = load16(centre + 2 * x + VW);
-        float16 here = (float16)(u.even, v.even);
+        float16 k = 1.0f / (1.0f + SATURATION * s[0]), u = load16(middle + 2 * x), v = load16(middle + 2 * x + VW);
+        float16 here = (float16)(u.even, v.even), a = load16(value + 2 * x), b = load16(value + 2 * x + VW);
+        float16 target = (float16)(a.even, b.even) * select(1.0f / fmax(here, 1.0f), (float16)(1.0f), here < 0.0f);
         int16 pinned = here <= PINNED || here >= 0.5f * PINNED_STIFFNESS;
-        if (write_d) store16(select(s[0] * k, (float16)(PINNED_STIFFNESS), pinned), od + x);
-        store16(select(s[1] * k, (float16)(0.0f), pinned), of + x);
+        int16 line = on_lines(south + 2 * x, middle + 2 * x, north + 2 * x);
+        float16 dk = select(s[0] * k, (float16)(LINE_STIFFNESS), line), fk = select(s[1] * k, LINE_STIFFNESS * target, line);
+        if (write_d) store16(select(dk, (float16)(PINNED_STIFFNESS), pinned), od + x);
+        store16(select(fk, (float16)(0.0f), pinned), of + x);
     }
 }
 

@@ -3,7 +3,7 @@
 // do row t - k, so all sweeps of a row happen while it is in cache; and the row that sweep k needs to the north is what
 // sweep k - 1 has just made, in a register. Strips repeat a few rows of their neighbours, blocks of columns a few
 // columns, and all agree to the bit: every sample is made by the same operations, none of which the compiler may fuse.
-// The sizes are those of backend/esker/solve/wave.py.
+// The sizes are those of backend/esker/solve/opencl/wave.py.
 #if CHEBYSHEV_SWEEPS != 4
 #error "a wave has four sweeps"
 #endif
@@ -141,7 +141,8 @@ FORCE_INLINE void wave16(step_t *s, int n, const source_t *in, int t, int enteri
         }
     }
     r = stage(&c, &s->k5, u, s->even + 3 * LANE, s->odd + 3 * LANE, s->s5, x, t - 5, n, 1, edge, end);
-    store16(select(r, (float16)(0.0f), load16(s->s5 + T_LANE + x) < 0.0f), s->residual + x);
+    // fixed: its inverse is 0 (where screening is strong, t is positive there, too)
+    store16(select(r, (float16)(0.0f), load16(s->s5 + x) == 0.0f), s->residual + x);
 }
 
 // One time step of m columns: row t enters, sweep k does row t - k, the residual is that of row t - 5. The last sweep
@@ -272,9 +273,24 @@ FORCE_INLINE void restrict_residual(row_t u, crow_t rhs, crow_t d, row_t coarse,
     }
 }
 
+// Area of the control volume of a sample of the coarsest level, in cells.
+FORCE_INLINE float control_volume(int y, int x, int n) {
+    return (y == 0 || y == n - 1 ? 0.5f : 1.0f) * (x == 0 || x == n - 1 ? 0.5f : 1.0f);
+}
+
+// Over-relaxations from the constant that balances b; where nothing holds the ground its mean is zero
+// (reference.relaxation_matrix).
 FORCE_INLINE void relax_coarsest(row_t u, crow_t b, crow_t d, level_t g) {
+    float stiffness = 0.0f, load = 0.0f, start = 0.0f, total = 0.0f, cells = (float)((g.n - 1) * (g.n - 1));
     for (int y = 0; y < g.n; y++)
-        for (int x = -PAD; x < g.pitch - PAD; x++) row(u, y, g.pitch)[x] = 0.0f;
+        for (int x = 0; x < g.n; x++) {
+            float share = control_volume(y, x, g.n);
+            stiffness += share * (crow(d, y, g.pitch)[x] + g.screening);
+            load += share * crow(b, y, g.pitch)[x];
+        }
+    if (stiffness > LEAST_HOLD) start = load / stiffness;
+    for (int y = 0; y < g.n; y++)
+        for (int x = -PAD; x < g.pitch - PAD; x++) row(u, y, g.pitch)[x] = start;
     for (int s = 0; s < COARSEST_SWEEPS; s++)
         for (int y = 0; y < g.n; y++)
             for (int x = 0; x < g.n; x++) {
@@ -284,6 +300,11 @@ FORCE_INLINE void relax_coarsest(row_t u, crow_t b, crow_t d, level_t g) {
                 float value = (crow(b, y, g.pitch)[x] + around) / (4.0f + crow(d, y, g.pitch)[x] + g.screening);
                 r[x] += COARSEST_RELAXATION * (value - r[x]);
             }
+    if (stiffness > LEAST_HOLD) return;
+    for (int y = 0; y < g.n; y++)
+        for (int x = 0; x < g.n; x++) total += control_volume(y, x, g.n) * row(u, y, g.pitch)[x];
+    for (int y = 0; y < g.n; y++)
+        for (int x = 0; x < g.n; x++) row(u, y, g.pitch)[x] -= total / cells;
 }
 
 // V-cycles from zero on level 0 and the levels behind it in the same buffers, one work-item per channel.

@@ -25,6 +25,9 @@ fn clouds(dir: vec3f, base: vec3f) -> vec3f {
 fn sky_with_sun(dir: vec3f) -> vec3f {
   var colour = clouds(dir, sky_colour(dir));
   if (view.look != LOOK_PAPER) {
+    // The low sun's warmth over the horizon, all round.
+    let early = 1.0 - smoothstep(0.10, 0.62, view.sun.z);
+    colour += sun_light() * vec3f(0.062, 0.034, 0.014) * (early * exp(-max(dir.z, 0.0) * 11.0));
     let c = dot(dir, view.sun.xyz);
     let disc = smoothstep(0.99996, 0.999985, c) * smoothstep(-0.02, 0.0, dir.z);
     colour += sun_light() * (disc * 40.0 + pow(max(c, 0.0), 900.0) * 0.5 + pow(max(c, 0.0), 60.0) * 0.03);
@@ -37,7 +40,7 @@ fn plane_albedo() -> vec3f {
     case LOOK_ALPINE: { return vec3f(0.56, 0.59, 0.63); }
     case LOOK_DESERT: { return vec3f(0.47, 0.345, 0.215); }
     case LOOK_PAPER: { return vec3f(0.50, 0.455, 0.385); }
-    default: { return vec3f(0.222, 0.230, 0.122); }
+    default: { return vec3f(0.186, 0.222, 0.140); }
   }
 }
 
@@ -52,7 +55,7 @@ fn country(p: vec2f, footprint: f32) -> vec3f {
     case LOOK_ALPINE: { return mix(open, vec3f(0.16, 0.18, 0.19), wood * 0.55); }
     case LOOK_DESERT: { return mix(open, open * vec3f(0.66, 0.58, 0.54), wood * 0.6); }
     case LOOK_PAPER: { return plane_albedo(); }
-    default: { return mix(open, vec3f(0.105, 0.130, 0.062), wood * 0.42); }
+    default: { return mix(open, vec3f(0.070, 0.102, 0.056), wood * 0.46); }
   }
 }
 
@@ -64,16 +67,16 @@ fn ground_plane(p: vec3f, dir: vec3f, footprint: f32) -> vec3f {
   let reach = tall * length(view.sun.xy) / max(view.sun.z, 0.12);
   let toward = p.xy + normalize(view.sun.xy + vec2f(1.0e-5)) * min(reach, view.size) * 0.5;
   let shadow = smoothstep(0.0, 0.5 * min(reach, view.size) + 1.0, outside_domain(toward));
-  let sun = sun_light() * max(view.sun.z, 0.0) / 3.14159265 * mix(0.35, 1.0, shadow);
+  let sun = sun_light() * max(view.sun.z, 0.0) / 3.14159265 * mix(0.45, 1.0, shadow);
   let sky = ambient_light(vec3f(0.0, 0.0, 1.0));
   var colour = country(p.xy, footprint) * (sun + sky) * max(shade, 0.0);
   if (view.look != LOOK_PAPER) {
     // Morning mist lies in the lowlands while the sun is low; it starts a way off the block.
     let drift = textureSampleLevel(noise, smooth_repeat, turned(p.xy, vec2f(0.829, 0.559)) / (view.size * 7.9), clamp(log2(max(footprint, 1.0e-3) * 256.0 / (view.size * 7.9)), 0.0, 8.0));
     let early = 1.0 - smoothstep(0.10, 0.62, view.sun.z);
-    let mist = early * smoothstep(0.42, 0.80, drift.r + 0.30 * smoothstep(0.6 * view.size, 5.0 * view.size, away)) * smoothstep(0.8 * view.size, 4.5 * view.size, away);
+    let mist = early * smoothstep(0.34, 0.80, drift.r + 0.30 * smoothstep(0.4 * view.size, 3.0 * view.size, away)) * smoothstep(0.12 * view.size, 2.4 * view.size, away);
     let towards = max(dot(dir, view.sun.xyz), 0.0);
-    colour = mix(colour, 0.70 * (sun + 1.5 * sky) + sun_light() * 0.06 * pow(towards, 6.0), mist * 0.75);
+    colour = mix(colour, (1.50 * sun + 2.4 * sky) + sun_light() * 0.06 * pow(towards, 6.0), mist * 0.84);
   }
   return colour;
 }

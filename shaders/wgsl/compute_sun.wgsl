@@ -20,7 +20,7 @@ struct SunList {
 const NO_SLOT: u32 = 0xffffffffu;
 const PLACES: u32 = 4096u;
 const INDEX_MASK: u32 = (1u << u32(MAX_SYNTHESIS_LEVEL)) - 1u;
-// Fewer on software adapters (gpu/tilecompute.ts).
+// Fewer on software adapters (gpu/atlas/tilecompute.ts).
 override SUN_STEPS: i32 = 60;
 override SUN_GROWTH: f32 = 0.1;
 override SKY_DIRECTIONS: i32 = 8;
@@ -28,7 +28,7 @@ override SKY_STEPS: i32 = 6;
 
 @group(0) @binding(0) var<storage, read> list: SunList;
 @group(0) @binding(1) var heights: texture_2d_array<f32>;
-@group(0) @binding(2) var<storage, read> pages: array<vec2u, PLACES>;  // by hash, see gpu/pagetable.ts
+@group(0) @binding(2) var<storage, read> pages: array<vec2u, PLACES>;  // by hash, see gpu/atlas/pagetable.ts
 @group(0) @binding(3) var light_out: texture_storage_2d_array<rgba8unorm, write>;
 
 fn page(level: u32, tile: vec2u) -> u32 {

@@ -1,4 +1,4 @@
-// Patches that the ground in front of them hides, in two rounds (gpu/hidden.ts): first those that showed in the last picture
+// Patches that the ground in front of them hides, in two rounds (gpu/passes/hidden.ts): first those that showed in the last picture
 // are drawn, then the depth that they leave is reduced to a pyramid, and of the others those are drawn whose box may stand
 // before it. Depth is reversed, 1 near and 0 far: a texel of the pyramid is the least, farthest depth under it.
 

@@ -1,4 +1,4 @@
-// Lakes in basins (frontend/src/tiles/lakes.ts): a sample of `lake_map` says where the ground lies and at what level the lake
+// Lakes in basins (frontend/src/tiles/lakes/lakes.ts): a sample of `lake_map` says where the ground lies and at what level the lake
 // stands that covers it, or whose shore it is.
 const NO_LAKE: f32 = -1.0e9;
 // Metres above a lake that mean: there is none.

@@ -7,11 +7,11 @@ fn ground_material(s: Site) -> Material {
   var m = mix_in(earth, stony, smoothstep(0.06, 0.13, s.height + (s.macro2.r - 0.5) * 0.05));
   // Meadows: lush in hollows and low down, dry and pale on rises and higher up.
   let dry = smoothstep(0.25, 0.85, 0.45 + (s.macro1.r - 0.5) * 1.5 + (s.macro2.r - 0.5) * 0.8 + s.height * 3.0 - s.curvature * 0.5 - c.wet * 0.4);
-  let tone = 0.84 + 0.30 * (s.fine1.r - 0.5) + 0.40 * (s.fine2.r - 0.5) + 0.25 * (s.fine3.r - 0.5) + 0.25 * (s.macro2.g - 0.5);
-  let meadow = Material(mix(vec3f(0.066, 0.104, 0.026), vec3f(0.190, 0.168, 0.070), dry) * tone, fine_slope(s, 0.13), 0.0, 0.12);
-  let green = covered(c.grass, (s.fine1.r - 0.5) * 0.5 + (s.fine2.r - 0.5) * 0.4 + (s.fine3.r - 0.5) * 0.35, 0.13);
+  let tone = 0.86 + 0.16 * (s.fine1.r - 0.5) + 0.40 * (s.fine2.r - 0.5) + 0.25 * (s.fine3.r - 0.5) + 0.25 * (s.macro2.g - 0.5);
+  let meadow = Material(mix(vec3f(0.078, 0.122, 0.030), vec3f(0.205, 0.192, 0.080), dry) * tone, fine_slope(s, 0.13), 0.0, 0.12);
+  let green = covered(c.grass, 0.16 + (s.macro2.r - 0.5) * 0.35 + (s.fine1.r - 0.5) * 0.16 + (s.fine2.r - 0.5) * 0.3 + (s.fine3.r - 0.5) * 0.35, 0.24);
   m = mix_in(m, tufted(meadow, s, vec3f(0.250, 0.232, 0.205)), green);
-  let wood = covered(c.forest, (s.fine1.g - 0.5) * 0.40 + (s.fine2.r - 0.5) * 0.45, 0.07);
+  let wood = covered(c.forest, (s.macro2.g - 0.5) * 0.55 + (s.fine1.g - 0.5) * 0.20 + (s.fine2.r - 0.5) * 0.35, 0.09);
   m = mix_in(m, canopy(s, vec3f(0.018, 0.036, 0.015), vec3f(0.044, 0.062, 0.020)), wood * afar(s));
   // Rubble gathers below the faces, where the slope eases and hollows.
   m = mix_in(m, stony, steeper(s, 0.70, 0.15) * (0.65 + 0.35 * smoothstep(-0.1, 0.2, s.curvature)));

@@ -1,4 +1,4 @@
-// The noise texture (gpu/noise.ts): r = gradient noise fbm, g = ridged fbm, both 0..1; ba = gradient of r. Tiles; its
+// The noise texture (gpu/synthesis/noise.ts): r = gradient noise fbm, g = ridged fbm, both 0..1; ba = gradient of r. Tiles; its
 // mipmaps fade detail out before it can shimmer.
 const NOISE_GRADIENT: f32 = 8.0;
 

@@ -31,7 +31,7 @@ fn slope_tint(steep: f32) -> vec3f {
   return mix(b, vec3f(0.36, 0.05, 0.22), smoothstep(40.0, 60.0, degrees));
 }
 
-// Roughness from smooth to rough by hue, noise amplitude by strength. The legend in ui/legend.ts has the same colours.
+// Roughness from smooth to rough by hue, noise amplitude by strength. The legend in ui/panels/legend.ts has the same colours.
 fn detail_tint(detail: vec2f) -> vec3f {
   let smooth_half = mix(vec3f(0.05, 0.24, 0.40), vec3f(0.46, 0.40, 0.16), clamp(detail.y * 2.0, 0.0, 1.0));
   let hue = mix(smooth_half, vec3f(0.52, 0.06, 0.10), clamp(detail.y * 2.0 - 1.0, 0.0, 1.0));

@@ -1,7 +1,7 @@
 // The vertices of a drawn patch: 17 x 17 samples of a tile, morphed towards the parent's surface (DESIGN 9).
 // Terrain, water and walls use the same function, so that they meet exactly.
 struct PatchIn {
-  @location(0) record: vec4u,  // see Cut.records in frontend/src/tiles/selection.ts
+  @location(0) record: vec4u,  // see Cut.records in frontend/src/tiles/patches/selection.ts
 };
 
 struct PatchVertex {

@@ -1,7 +1,7 @@
 // What the ground is made of a few steps away: broken rock, stones, tufts. stones_plain.wgsl has the same functions for
 // adapters that draw on the CPU.
 //
-// The stones texture (gpu/stones.ts), binding 12: r = how far in from its stone's edge, g = a number of the stone's own,
+// The stones texture (gpu/passes/stones.ts), binding 12: r = how far in from its stone's edge, g = a number of the stone's own,
 // ba = gradient of the stone's leaning, rounded relief. STONES_PERIOD stones side by side, then it repeats.
 const STONES_PERIOD: f32 = 24.0;
 

@@ -1,4 +1,4 @@
-// What the rule is told of a place: settings (gpu/synthsite.ts writes them), the ground, what strokes ask for.
+// What the rule is told of a place: settings (gpu/synthesis/site.ts writes them), the ground, what strokes ask for.
 // vec4f: the four children of a parent's cell, see synth_interpolate.wgsl.
 struct SynthLevel {
   keys: vec4u,            // of the four streams of noise

@@ -10,7 +10,7 @@ struct View {
   forward: vec4f,        // w: metres per pixel at distance 1 (orthographic: metres per pixel)
   sun: vec4f,            // unit vector to the sun; w = sine of its elevation
   viewport: vec2f,       // pixels that are drawn
-  guard: vec2f,          // what part of the viewport in which patches are drawn they are (gpu/guard.ts)
+  guard: vec2f,          // what part of the viewport in which patches are drawn they are (gpu/passes/guard.ts)
   time: f32,
   size: f32,             // side of the domain, metres
   base: f32,             // height of the plane on which the block stands, metres

@@ -93,7 +93,7 @@ class Server:
         command = [sys.executable, "-m", "esker", "serve", "--port", str(self.port), "--data", str(self.data)]
         with (self.data.parent / "server.log").open("ab") as log:
             self.process = subprocess.Popen(command, cwd=ROOT, stdout=log, stderr=log)
-        deadline = time.monotonic() + 90
+        deadline = time.monotonic() + 300  # the first start of a machine compiles, beside whatever else it does
         while time.monotonic() < deadline:
             if self.process.poll() is not None:
                 break

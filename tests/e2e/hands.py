@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import time
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -64,6 +65,13 @@ def draw(visitor: Visitor, key: str, path: Iterable[Pixel]) -> str:
     return str(made)
 
 
+AFTER_FRAMES = """() => new Promise((resolve) => {
+  const done = () => resolve(JSON.stringify(window.esker.camera()));
+  const pass = (left) => left > 0 ? requestAnimationFrame(() => pass(left - 1)) : done();
+  pass(4);
+})"""
+
+
 def wait(visitor: Visitor, condition: str, argument: Any = None, timeout: float = 60) -> None:
     """Wait until a condition in the page holds."""
     visitor.wait(condition, argument, timeout)
@@ -99,6 +107,19 @@ def levels(visitor: Visitor, points: Sequence[Pixel]) -> list[int]:
     """Finest level that the page holds at each point."""
     found = visitor.js("ps => ps.map(([x, y]) => window.esker.levelAt(x, y))", [list(p) for p in points])
     return [int(v) for v in found]
+
+
+def wait_still(visitor: Visitor, seconds: float = 60) -> None:
+    """Returns when the camera has stopped: what is where on the screen stays so.
+
+    A view that makes room for a panel sets out only when the page was laid out anew. A slow renderer comes to that
+    late, so several frames lie between two looks at the camera.
+    """
+    end, last = time.monotonic() + seconds, None
+    while (now := visitor.js(AFTER_FRAMES)) != last:
+        assert time.monotonic() < end, "the camera never rests"
+        last = now
+        time.sleep(0.3)
 
 
 def on_screen(visitor: Visitor, x: float, y: float, z: float | None = None) -> Pixel:

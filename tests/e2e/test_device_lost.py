@@ -17,7 +17,7 @@ from playwright.sync_api import Browser
 
 from tests.browser import FLAGS, chromium_path
 from tests.e2e.conftest import AWAKE, Server, Visitor, Visitors
-from tests.e2e.hands import COARSE, arch, draw, heights, on_screen, wait_settled
+from tests.e2e.hands import COARSE, arch, draw, heights, on_screen, wait_settled, wait_still
 
 # The page asks for its devices through this; the test takes the last one away.
 KEEP_DEVICES = """
@@ -72,7 +72,7 @@ def drawn_again(guest: Visitor, frames: int) -> None:
 def test_another_device_goes_on_and_the_map_stands_in_where_there_is_none(visitors: Visitors, server: Server) -> None:
     guest = open_page(visitors, server)
     guest.page.keyboard.press("ArrowLeft")
-    guest.page.wait_for_timeout(600)
+    wait_still(guest)
     frames, camera, strokes = (guest.js(f"() => window.esker.{what}") for what in ("frames", "camera()", "strokes()"))
     guest.js("() => window.devices.at(-1).destroy()")
     guest.page.get_by_text("The graphics device was lost; the 3D view is open again.").wait_for()

@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from esker.api.terrain import Terrain
 from esker.contract import DEFAULT_LEVEL, DEFAULT_SIZE_M
 from esker.grid import quantum, spacing
-from esker.terrain import Terrain
 from tests.e2e.conftest import Server, Visitor, Visitors
 from tests.e2e.hands import (
     COARSE,
@@ -28,6 +28,7 @@ from tests.e2e.hands import (
     press_and_move,
     wait,
     wait_settled,
+    wait_still,
     wait_whole,
 )
 
@@ -67,7 +68,7 @@ def drag(visitor: Visitor, start: tuple[float, float], end: tuple[float, float])
 
 def knob(visitor: Visitor, rotation_deg: float) -> tuple[float, float]:
     """Where on the map the turning knob of the grid in hand would be at another rotation (it lies unturned)."""
-    laid = visitor.js("() => window.esker.laying()")
+    laid = visitor.js("() => window.esker.placing()")
     half = 47.5 * np.array(laid["spacing_m"])
     reach = half[1] + 0.09 * 2 * float(np.hypot(*half))
     turn = math.radians(rotation_deg)
@@ -152,13 +153,15 @@ def test_real_ground_is_dropped_sketched_on_and_refined_by_a_turned_grid(
 
     # A finer survey without any place: laid by hand, moved, turned by its knob, made smaller by a corner.
     drop(ada, "dome.npy")
-    wait(ada, "() => window.esker.laying() !== null")
+    wait(ada, "() => window.esker.placing() !== null")
+    wait_still(ada)
+    ada.shot("elevation-3b-in-hand")
     assert layers(ben) == [valley]
     (x0, y0), (x1, y1) = handle(ada, "grid-0"), handle(ada, "grid-2")
     drag(ada, (x1, y1), (x0 + 0.2 * (x1 - x0), y0 + 0.2 * (y1 - y0)))
     drag(ada, handle(ada, "grid-move"), on_screen(ada, *CRATER))
     drag(ada, handle(ada, "grid-turn"), on_screen(ada, *knob(ada, 27.0)))
-    laid = ada.js("() => window.esker.laying()")
+    laid = ada.js("() => window.esker.placing()")
     assert 10 < laid["rotation_deg"] < 45
     assert laid["spacing_m"][0] < SURVEY_M
     ada.page.wait_for_timeout(600)

@@ -7,10 +7,22 @@ from pathlib import Path
 from typing import Any
 
 from esker import contract as c
+from esker.api.terrain import Terrain
 from esker.grid import quantum, spacing
-from esker.terrain import Terrain
 from tests.e2e.conftest import Server, Visitor, Visitors
-from tests.e2e.hands import COARSE, arch, draw, ellipse, heights, levels, wait, wait_settled, wait_whole
+from tests.e2e.hands import (
+    COARSE,
+    arch,
+    draw,
+    ellipse,
+    heights,
+    levels,
+    on_screen,
+    wait,
+    wait_settled,
+    wait_still,
+    wait_whole,
+)
 
 SIZE = 4096.0
 HISTORY = "() => window.esker.history()"
@@ -40,10 +52,11 @@ def test_two_people_look_back(visitors: Visitors, server: Server, tmp_path: Path
     ben.open(f"/t/{terrain}#{link['secret']}")
     ada.page.keyboard.press("Shift+H")
     assert "Nothing has happened here yet" in ada.page.locator("esk-history-panel .empty").inner_text()
+    wait_still(ada)  # the view makes room for the panel
 
-    first = draw(ada, "b", arch((200, 330), (380, 315), 100))
+    first = draw(ada, "b", arch(on_screen(ada, 900, 900), on_screen(ada, 2300, 1000), 90))
     drawn = ada.js("() => window.esker.clock()")
-    draw(ben, "p", ellipse((250, 190), 40, 18))
+    draw(ben, "p", ellipse(on_screen(ben, 3000, 2600), 36, 9))
     wait(ada, "() => window.esker.history().length === 2")
     says = ada.js(HISTORY)
     assert [line.endswith(what) for line, what in zip(says, ("drew a plateau", "drew a mountain"), strict=True)]
@@ -64,7 +77,7 @@ def test_two_people_look_back(visitors: Visitors, server: Server, tmp_path: Path
     assert len(ada.js("() => window.esker.strokes()")) == 1
     assert ben.js("() => window.esker.clock()") == clock
 
-    draw(ben, "b", arch((140, 200), (200, 195), 30))
+    draw(ben, "b", arch(on_screen(ben, 2600, 500), on_screen(ben, 3600, 600), 20))
     wait(ada, "() => window.esker.history().length === 3")
     assert ada.js("() => window.esker.past()") == drawn
     ada.page.get_by_role("button", name="Back to now").first.click()

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from esker.terrain import Terrain
+from esker.api.terrain import Terrain
 from tests.e2e.conftest import Server, Visitor, Visitors
 from tests.e2e.hands import (
     COARSE,
@@ -18,6 +18,7 @@ from tests.e2e.hands import (
     press_and_move,
     wait,
     wait_settled,
+    wait_still,
     wait_whole,
 )
 
@@ -110,12 +111,14 @@ def test_paint_is_a_stroke_that_can_be_taken_in_hand(visitors: Visitors, server:
     ada.open(f"/t/{terrain}#{secret}")
     ada.page.keyboard.press("k")
     ada.page.keyboard.press("i")
+    wait_still(ada)
     press_and_move(ada.page, polyline([on_screen(ada, 1000, 1500), on_screen(ada, 2300, 1500)], 12))
     ada.page.mouse.up()
     wait(ada, "() => window.esker.strokes().length === 1 && window.esker.pending() === 0")
     paint = ada.js("() => window.esker.strokes()[0].paint")
 
     # Keys change the brush, not what lies there; a click on the line takes it, then they change that.
+    wait_still(ada)
     ada.page.keyboard.press("]")
     assert ada.js("() => window.esker.strokes()[0].paint") == paint
     ada.page.mouse.click(*on_screen(ada, 1700, 1500))
@@ -134,6 +137,7 @@ def test_paint_is_a_stroke_that_can_be_taken_in_hand(visitors: Visitors, server:
 
     # A click beside all lines is a dab; its overlay shows on the ground.
     ada.page.keyboard.press("Escape")
+    wait_still(ada)
     ada.page.mouse.click(*on_screen(ada, 2600, 2600))
     wait(ada, "() => window.esker.strokes().length === 2 && window.esker.pending() === 0")
     wait_settled(ada)

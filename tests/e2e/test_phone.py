@@ -20,6 +20,8 @@ SMALL = """() => {
   return small;
 }"""
 
+CORNERS = "() => [[0,0],[4096,0],[4096,4096],[0,4096]].map(([x, y]) => window.esker.project(x, y, 0))"
+
 
 def box(visitor: Visitor, selector: str) -> Box:
     """Where an element is, CSS pixels."""
@@ -55,15 +57,18 @@ def test_a_phone_shows_the_land_beside_its_panel_and_follows_a_turn(visitors: Vi
     phone.page.get_by_role("button", name="Inspector").tap()
     wait(phone, "() => window.esker.camera().height < 844 * window.devicePixelRatio * 0.7")
     side, picture = box(phone, "aside.side"), box(phone, ".viewport canvas")
-    assert side["y"] > picture["bottom"] - 20, "the sheet lies below the picture, not on it"
+    assert side["y"] > picture["bottom"] - 20, "the drawer lies below the picture, not on it"
     bars_apart(phone, "esk-top-bar .right", "esk-tools", "aside.side")
     for tab in ("Ground", "Terrain", "History"):
         phone.page.get_by_role("radio", name=tab).tap()
-        assert box(phone, "aside.side") == side, "tabs do not make the sheet jump"
+        assert box(phone, "aside.side") == side, "tabs do not make the drawer jump"
     middle = phone.js("() => window.esker.project(2048, 2048, 0)")
     assert middle["visible"]
     assert middle["y"] < side["y"]
-    phone.shot("phone-sheet")
+    hint = box(phone, "esk-terrain .hint")
+    assert all(hint["bottom"] < corner["y"] for corner in phone.js(CORNERS)), "the hint lies on no land (SPEC U431)"
+    assert apart(hint, box(phone, "esk-top-bar .left"))
+    phone.shot("phone-drawer")
     phone.page.get_by_role("button", name="Close the inspector").tap()
     wait(phone, "e => JSON.stringify(window.esker.camera().eye) === JSON.stringify(e)", upright)
 
@@ -71,4 +76,33 @@ def test_a_phone_shows_the_land_beside_its_panel_and_follows_a_turn(visitors: Vi
     wait(phone, "e => JSON.stringify(window.esker.camera().eye) !== JSON.stringify(e)", upright)
     bars_apart(phone, "esk-top-bar .left", "esk-top-bar .right", "esk-tools", "esk-status-line", "esk-view-bar")
     phone.shot("phone-side")
+
+    # A page at 200 % is as small: nothing is cut beside the drawer, and no row has to be scrolled.
+    phone.page.set_viewport_size({"width": 640, "height": 400})
+    phone.page.get_by_role("button", name="Inspector").tap()
+    phone.page.locator("aside.side").wait_for()
+    tools = phone.page.locator("esk-tools")
+    assert tools.evaluate("e => e.scrollWidth <= e.clientWidth")
+    names = ("Stroke", "Ground", "Terrain", "History")
+    tops = {phone.page.get_by_role("radio", name=name).evaluate("e => e.offsetTop") for name in names}
+    assert len(tops) == 1, "four tabs stand side by side"
+    bars_apart(phone, "esk-top-bar .right", "esk-tools", "aside.side")
+    phone.shot("phone-drawer-beside")
+
+    # A window of 1100 x 700 at 200 % (SPEC U350): tabs and tools are whole, no sentence lies under the inspector.
+    phone.page.set_viewport_size({"width": 550, "height": 350})
+    wait(phone, "() => innerWidth === 550")
+    side = box(phone, "aside.side")
+    for name in names:
+        placed = phone.page.get_by_role("radio", name=name).bounding_box()
+        assert placed is not None
+        assert side["x"] <= placed["x"] < placed["x"] + placed["width"] <= side["right"], name
+    for button in phone.page.locator("esk-tools button").all():
+        button.scroll_into_view_if_needed()
+        at = button.bounding_box()
+        assert at is not None
+        assert at["x"] >= 0
+        assert at["x"] + at["width"] <= side["x"]
+    assert box(phone, "esk-terrain .hint")["right"] <= side["x"]
+    phone.shot("phone-drawer-at-200")
     assert phone.errors == []

@@ -17,13 +17,15 @@ import pytest
 from PIL import Image, ImageChops, ImageStat
 
 from tests.e2e.conftest import PATIENCE_MS, ROOT, Server, Visitor, Visitors
-from tests.e2e.hands import COARSE, heights, polyline, press_and_move, wait_settled
+from tests.e2e.hands import COARSE, heights, on_screen, polyline, press_and_move, wait_settled
 
 PICTURES = ROOT / "tests" / "artifacts" / "pictures"
 HERO_VIEW = {"eye": [260.0, 240.0, 640.0], "target": [2000.0, 2350.0, 330.0]}
 HERO_STROKE = [(470.0, 690.0), (560.0, 590.0), (600.0, 600.0), (690.0, 500.0), (740.0, 530.0), (850.0, 690.0)]
 """Window pixels of a silhouette, foot to foot."""
 HERO_OTHER = (330, 215)
+MORPH_STROKE = [(0, 0), (0.16, 50), (0.23, 44), (0.4, 118), (0.5, 88), (0.6, 106), (0.75, 46), (0.82, 54), (1, 0)]
+"""A silhouette from foot to foot: how far along, and window pixels above the line between the feet."""
 
 
 def picture(visitor: Visitor) -> Image.Image:
@@ -83,13 +85,14 @@ def test_hero(visitors: Visitors, server: Server) -> None:
 def test_morph(visitors: Visitors, server: Server) -> None:
     """A mountain rises under the pen, frame by frame."""
     terrain, secret = server.create(title="Morph")
-    guest = visitors(720, 450, device_scale_factor=1, slow_screen=False)
+    guest = visitors(800, 500, device_scale_factor=1, slow_screen=False)
     guest.open(f"/t/{terrain}#{secret}")
     wait_settled(guest)
     rest(guest)
     guest.page.keyboard.press("b")
-    legs = [(190, 262), (245, 205), (270, 212), (330, 128), (365, 160), (400, 138), (455, 205), (480, 196), (545, 258)]
-    path = polyline([(float(x), float(y)) for x, y in legs], 5)
+    (left, foot), (right, end) = on_screen(guest, 900, 2300), on_screen(guest, 3000, 2500)
+    legs = [(left + part * (right - left), foot + part * (end - foot) - rise) for part, rise in MORPH_STROKE]
+    path = polyline(legs, 5)
     frames = [picture(guest)]
     guest.page.mouse.move(*path[0])
     guest.page.mouse.down()

@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from esker.api.terrain import Terrain, default_solver
+from esker.events import Done
 from esker.grid import quantum, samples, spacing
-from esker.solve.refine import Refiner
-from esker.terrain import Terrain, default_solver
+from esker.solve.refine.refinement import Refiner
 from tests.e2e.conftest import SCALE, Server, Visitor, Visitors
-from tests.e2e.hands import arch, draw, heights, levels, on_screen, wait, wait_settled, wait_whole
+from tests.e2e.hands import arch, draw, heights, levels, on_screen, wait, wait_settled, wait_still, wait_whole
 
 SIZE = 4096.0
 SOLVED = 4
@@ -73,8 +74,7 @@ class Truth:
         loaded = Terrain.load(archive)
         solver = default_solver()
         *_, last = solver.steps(loaded.strokes, loaded.settings, SOLVED, basis=True)
-        assert last is not None
-        assert last.basis is not None
+        assert isinstance(last, Done)
         self.refiner: Refiner = solver.refiner(last.basis)
 
     def window(self, level: int, rows: slice, cols: slice) -> NDArray[np.float32]:
@@ -126,7 +126,8 @@ def test_a_crest_sharpens_as_one_comes_near(visitors: Visitors, server: Server, 
 
     # Ben steps back and draws across: what Ada stands on follows, and is put right.
     ben.page.keyboard.press("Home")
-    wait(ben, "h => window.esker.camera().eye[2] > h", z + 300)
+    wait(ben, "p => Math.hypot(...window.esker.camera().eye.map((v, k) => v - p[k])) > 800", [x, y, z])
+    wait_still(ben)
     draw(ben, "b", arch(on_screen(ben, x - 300, y - 200), on_screen(ben, x + 300, y + 100), 60))
     wait(ada, "n => window.esker.strokes().length === n", 2)
     wait_refined(ada, (x, y), 7)

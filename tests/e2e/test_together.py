@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from esker.api.terrain import Terrain
 from esker.grid import quantum, spacing
-from esker.terrain import Terrain
 from tests.e2e.conftest import Server, Visitor, Visitors, serving
 from tests.e2e.hands import (
     COARSE,
@@ -121,6 +121,11 @@ def test_two_people_sketch_one_terrain(visitors: Visitors, server: Server, tmp_p
     for x, y in path[len(path) // 2 :]:
         ada.page.mouse.move(x, y)
     wait(ada, "() => window.esker.connection() !== 'online'")
+    offline = ada.page.get_by_text("The server makes the ground: it stays as it is until the connection is back.")
+    offline.wait_for()  # SPEC U348: in words, in a window of 720 pixels
+    said = offline.bounding_box()
+    assert said is not None
+    assert 0 <= said["x"] < said["x"] + said["width"] <= 720
     ada.shot("6-server-gone-ada")
     ada.page.mouse.up()
     assert ada.js("() => window.esker.pending()") > 0, "the page does not claim to have saved what it could not send"

@@ -39,7 +39,7 @@ def slot_origin(slot: int) -> tuple[int, int, int]:
 
 
 class TinyAtlas:
-    """Height, gradient and light textures of one layer, as gpu/atlas.ts makes them."""
+    """Height, gradient and light textures of one layer, as gpu/atlas/atlas.ts makes them."""
 
     def __init__(self) -> None:
         self.device = open_device()
@@ -143,7 +143,7 @@ def sun_list(
 
 
 def page_table(slots: dict[tuple[int, int, int], int]) -> NDArray[np.uint32]:
-    """The atlas's page table (gpu/pagetable.ts): 4096 pairs of words, open addressing by hash."""
+    """The atlas's page table (gpu/atlas/pagetable.ts): 4096 pairs of words, open addressing by hash."""
     table = np.full((4096, 2), NO_SLOT, np.uint32)
     for (level, x, y), slot in slots.items():
         column = level << 17 | x

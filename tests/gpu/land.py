@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.room._slots import SLOT, Job, SlotMaker
 from esker import grid
-from esker.bench._slots import SLOT, Job, SlotMaker
 from esker.synthesis.site import BORDER, Site
 
 SIZE = 4096.0

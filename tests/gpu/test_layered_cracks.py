@@ -1,4 +1,4 @@
-"""No crack on real ground with a stroke across it, at rest and while a turned grid arrives (SPEC G27, R8; issue 5).
+"""No crack on real ground with a stroke across it, at rest and while a turned grid arrives (SPEC G27, R8).
 
 The frames are a server's: Mount St Helens with a dam, then a finer grid turned by 27 degrees over the crater. A page's
 own decoder, store, selection and shaders draw them. What is counted: pixels of the clear colour, as in test_cracks.
@@ -15,12 +15,12 @@ import pytest
 from playwright.sync_api import Page
 
 from esker import Stroke, templates
+from esker.api.layers import Patchwork
 from esker.contract import Channel, Document, Layer
-from esker.patchwork import rasters
-from esker.patchwork.rasters import Raster
+from esker.patchwork.raster import rasters
+from esker.patchwork.raster.rasters import Raster
 from esker.solve.detail import settle
 from esker.solve.solver import Solver
-from esker.terrain_layers import Patchwork
 from esker.tiles.delivery import ClientTiles, TileServer
 from tests.gpu.page import open_harness
 
@@ -58,7 +58,7 @@ class Sender:
         """The ground of these layers under the document's strokes, as far as it is news."""
         self.clock += 1
         settings = self.document.settings
-        base = Patchwork(settings.size_m, layers, grids).base
+        base = Patchwork(settings, layers, grids).base
         assert base is not None
         settled = settle(self.solver, self.document.strokes, settings, LEVEL, base=base)
         for level in range(LEVEL + 1):

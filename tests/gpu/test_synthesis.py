@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from esker import fractal
-from esker.bench._slots import HELD, SLOT, Job, child_of
+from bench.room._slots import HELD, SLOT, Job, child_of
+from esker.contract import fractal
 from esker.synthesis.site import BORDER, Site, tile_window
 from esker.synthesis.state import State, unpack
 from esker.synthesis.subdivide import Samples, interpolated, root, subdivide

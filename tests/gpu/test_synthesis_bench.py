@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from esker.bench import synthesis as bench
-from esker.bench._slots import SlotMaker
+from bench.picture import synthesis as bench
+from bench.room._slots import SlotMaker
 
 HIGH = bench.Eye(700.0, 700.0, 200.0, 0.7)
 

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from esker.fractal import SNOW_EDGE, SNOW_NORTH
+from esker.contract.fractal import SNOW_EDGE, SNOW_NORTH
 from tests.gpu.page import open_harness
 
 # How steeply a channel can follow a slope: snow on its edge, a smoothstep in heights that aspect shifts.

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from esker import contract as c
 from esker.importing.convert import convert
 from esker.importing.examine import Exam, examine
-from esker.importing.placing import Terrain
-from esker.patchwork import rasters
+from esker.importing.placement.placing import Terrain
+from esker.patchwork.raster import rasters
 from tests.importing import make_files
 
 HERE = Path(__file__).parent

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from esker.importing import ascii_grid
+from esker.importing.formats import ascii_grid
 from esker.importing.refusal import ImportRefused
 from tests.importing.conftest import KEPT, look, take
 

@@ -11,8 +11,11 @@ from pathlib import Path
 
 import pytest
 
-from esker import cli, connect
-from esker.importing import command, upload
+from esker import connect
+from esker.api import uploads
+from esker.api.http import refusal
+from esker.cli import import_files, main
+from tests.elsewhere.test_elsewhere import private_link
 from tests.importing.conftest import HERE, KEPT
 
 
@@ -24,13 +27,13 @@ def test_check_ends_with_its_verdict(
     names: list[str], status: int, files: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Of several files the worst verdict counts."""
-    assert cli.main(["import", "--check", *(str(files / name) for name in names)]) == status
+    assert main.main(["import", "--check", *(str(files / name) for name in names)]) == status
     out = capsys.readouterr().out
     assert all(f"{name}: " in out for name in names)
 
 
 def test_check_says_what_it_is(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    command.main(["--check", str(files / "rotated.tif"), str(files / "no_crs.tif"), str(KEPT / "gray8.png")])
+    import_files.main(["--check", str(files / "rotated.tif"), str(files / "no_crs.tif"), str(KEPT / "gray8.png")])
     out = capsys.readouterr().out
     assert "GeoTIFF, 48 x 60 samples, int16, EPSG:32605" in out
     assert "62.97 x 92.95 m apart, 2.96 km x 5.484 km, turned by -26.13°" in out
@@ -41,18 +44,18 @@ def test_check_says_what_it_is(files: Path, capsys: pytest.CaptureFixture[str]) 
 
 def test_answers_and_json(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = str(files / "no_crs.tif")
-    assert command.main(["--check", "--json", path, "--answer", "place=EPSG:4326"]) == 0
+    assert import_files.main(["--check", "--json", path, "--answer", "place=EPSG:4326"]) == 0
     assert json.loads(capsys.readouterr().out)["verdict"] == "good"
     by_hand = ["--spacing", "5", "5", "--anchor", "0", "0", "--answer", "range=0..100"]
-    assert command.main(["--check", str(files / "heights16.png"), *by_hand]) == 0
+    assert import_files.main(["--check", str(files / "heights16.png"), *by_hand]) == 0
 
 
 def test_what_goes_wrong(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert command.main(["--check", str(tmp_path / "none.tif")]) == 1
-    assert command.main(["--check", str(tmp_path), "--answer", "nonsense"]) == 1
-    assert command.main([str(KEPT / "hugo_site.asc"), "--into", "nonsense"]) == 1
-    assert command.main([str(KEPT / "hugo_site.asc"), "--into", "http://127.0.0.1:1/t/a#b"]) == 1
-    assert command.main(["--check", str(tmp_path), "--accuracy", "-3"]) == 1
+    assert import_files.main(["--check", str(tmp_path / "none.tif")]) == 1
+    assert import_files.main(["--check", str(tmp_path), "--answer", "nonsense"]) == 1
+    assert import_files.main([str(KEPT / "hugo_site.asc"), "--into", "nonsense"]) == 1
+    assert import_files.main([str(KEPT / "hugo_site.asc"), "--into", "http://127.0.0.1:1/t/a#b"]) == 1
+    assert import_files.main(["--check", str(tmp_path), "--accuracy", "-3"]) == 1
     errors = capsys.readouterr().err
     assert "there is no file" in errors
     assert "ID=VALUE" in errors
@@ -80,9 +83,8 @@ def link(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     with subprocess.Popen(serve, cwd=HERE.parents[1], stdout=subprocess.PIPE, text=True) as process:
         try:
             assert process.stdout is not None
-            found = next(filter(None, (re.search(r"https?://\S+/t/\S+#\S+", line) for line in process.stdout)), None)
-            assert found is not None
-            yield found.group()
+            assert any("esker link" in line for line in process.stdout), "it says where the link is, and no pipe has it"
+            yield private_link(data)
         finally:
             process.kill()
 
@@ -90,13 +92,13 @@ def link(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
 def test_into_a_terrain(link: str, files: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Good files are laid, questions end with 2 and leave nothing, answers are taken, broken files are refused."""
     into = ["--into", link]
-    assert command.main([str(files / "little.tif"), *into, "--accuracy", "3", "--licence", "none needed"]) == 0
+    assert import_files.main([str(files / "little.tif"), *into, "--accuracy", "3", "--licence", "none needed"]) == 0
     assert "laid as layer" in capsys.readouterr().out
-    assert command.main([str(files / "void_no_tag.tif"), *into]) == 2
+    assert import_files.main([str(files / "void_no_tag.tif"), *into]) == 2
     assert "--answer nodata=…" in capsys.readouterr().out
-    assert command.main([str(files / "void_no_tag.tif"), *into, "--defaults", "--answer", "other=1"]) == 0
+    assert import_files.main([str(files / "void_no_tag.tif"), *into, "--defaults", "--answer", "other=1"]) == 0
     assert "does not ask for 'other'" in capsys.readouterr().err
-    assert command.main([str(files / "corrupt.tif"), *into]) == 3
+    assert import_files.main([str(files / "corrupt.tif"), *into]) == 3
     with connect(link) as terrain:
         layers = terrain.document.layers
     assert [layer.name for layer in layers] == ["little", "void_no_tag"]
@@ -106,7 +108,7 @@ def test_into_a_terrain(link: str, files: Path, capsys: pytest.CaptureFixture[st
 
 def test_a_link_that_does_not_open(link: str, files: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """That is about the link, not about the file."""
-    assert command.main([str(files / "little.tif"), "--into", link + "x"]) == 1
+    assert import_files.main([str(files / "little.tif"), "--into", link + "x"]) == 1
     assert "link" in capsys.readouterr().err
 
 
@@ -117,12 +119,14 @@ def test_cancel(link: str, files: Path, monkeypatch: pytest.MonkeyPatch, capsys:
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr(upload.Uploads, "follow", interrupted)
-        assert command.main([str(files / "little.tif"), "--into", link]) == 1
+        patch.setattr(uploads.Uploads, "follow", interrupted)
+        assert import_files.main([str(files / "little.tif"), "--into", link]) == 1
     assert "cancelled" in capsys.readouterr().err
-    assert command.main([str(files / "corrupt.tif"), "--into", link]) == 3  # and not 1 for an import still open
+    assert import_files.main([str(files / "corrupt.tif"), "--into", link]) == 3  # and not 1 for an import still open
 
 
 def test_refusals_that_are_not_the_server_s() -> None:
     """A proxy's page becomes a sentence too."""
-    assert "502" in str(upload._refusal(502, b"<html>Bad gateway</html>"))
+    found = refusal(502, b"<html>Bad gateway</html>")
+    assert "502" in str(found)
+    assert found.status == 502

@@ -11,7 +11,8 @@ import pyproj
 import pytest
 
 from esker import contract as c
-from esker.importing import ascii_grid, gdal_source, source
+from esker.importing import source
+from esker.importing.formats import ascii_grid, gdal_source
 from esker.importing.refusal import ImportRefused
 from tests.importing import make_files
 from tests.importing.conftest import PLACE, SIZE_M, look, take, world

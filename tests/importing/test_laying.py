@@ -9,10 +9,10 @@ import pyproj
 import pytest
 
 from esker import contract as c
-from esker.importing import laying
-from esker.importing.georef import Georef, check_affine
-from esker.importing.laying import Laid, net_at
-from esker.importing.placing import Terrain
+from esker.importing.placement import fitting
+from esker.importing.placement.fitting import Laid, net_at
+from esker.importing.placement.georef import Georef, check_affine
+from esker.importing.placement.placing import Terrain
 from esker.importing.refusal import ImportRefused
 from tests.importing.conftest import look, take, world
 from tests.importing.make_files import COLS, EAST_M, NORTH_M, ROWS, UTM, ground
@@ -20,7 +20,7 @@ from tests.importing.make_files import COLS, EAST_M, NORTH_M, ROWS, UTM, ground
 SIZE_M = 40_000.0
 
 
-def _error(laid: Laid, locate: laying.Locate, rows: int, cols: int) -> float:
+def _error(laid: Laid, locate: fitting.Locate, rows: int, cols: int) -> float:
     """Largest distance in metres between where samples are laid, net and all, and where ``locate`` has them."""
     v, u = (a.reshape(-1).astype(float) for a in np.mgrid[0:rows, 0:cols])
     moved = np.stack([u, v], -1) + (net_at(laid.warp, u, v, rows, cols) if laid.warp is not None else 0.0)
@@ -36,8 +36,8 @@ def test_degree_tiles_within_a_twentieth(lat: float) -> None:
     """SPEC G20: whole degrees at 3", from the equator to the north, checked at every sample."""
     rows = cols = 301
     georef = Georef(pyproj.CRS.from_epsg(4326), (1 / 300, 0.0, -121.0, 0.0, -1 / 300, lat + 0.5))
-    locate = laying.on_frame(georef, c.Place(lat_deg=lat + 0.2, lon_deg=-120.2), SIZE_M)
-    laid = laying.lay(locate, rows, cols)
+    locate = fitting.on_frame(georef, c.Place(lat_deg=lat + 0.2, lon_deg=-120.2), SIZE_M)
+    laid = fitting.lay(locate, rows, cols)
     assert laid.warp is not None
     assert _error(laid, locate, rows, cols) <= min(laid.spacing_m) / 20
     assert (laid.flip_rows, laid.flip_cols) == (True, False)
@@ -85,8 +85,8 @@ def test_any_turn(degrees: float, mirror: float) -> None:
     turn = np.radians(degrees)
     a, d = 20 * np.cos(turn), 20 * np.sin(turn)
     b, e = -10 * mirror * np.sin(turn), 10 * mirror * np.cos(turn)
-    locate = laying.locally(Georef(None, (a, b, 500.0, d, e, -300.0)), 1.0)
-    laid = laying.lay(locate, 40, 30)
+    locate = fitting.locally(Georef(None, (a, b, 500.0, d, e, -300.0)), 1.0)
+    laid = fitting.lay(locate, 40, 30)
     assert laid.warp is None
     assert laid.spacing_m == pytest.approx((20.0, 10.0))
     assert _error(laid, locate, 40, 30) < 1e-3
@@ -96,8 +96,8 @@ def test_any_turn(degrees: float, mirror: float) -> None:
 
 def test_shear_goes_into_the_net() -> None:
     """SPEC G22: four control points hold it exactly."""
-    locate = laying.locally(Georef(None, (60.0, 15.0, 0.0, 5.0, -90.0, 0.0)), 1.0)
-    laid = laying.lay(locate, 60, 48)
+    locate = fitting.locally(Georef(None, (60.0, 15.0, 0.0, 5.0, -90.0, 0.0)), 1.0)
+    laid = fitting.lay(locate, 60, 48)
     assert laid.warp is not None
     assert laid.warp.shape == (2, 2, 2)
     assert _error(laid, locate, 60, 48) < 0.01
@@ -124,8 +124,8 @@ def test_axes_beyond_180_degrees() -> None:
     lon, lat = np.linspace(234.0, 235.0, 30), np.linspace(48.0, 49.0, 40)
     crs = pyproj.CRS.from_epsg(4326)
     place = c.Place(lat_deg=48.5, lon_deg=-125.5)
-    east = laying.lay(laying.on_frame(Georef(crs, None, lon, lat), place, SIZE_M), 40, 30)
-    west = laying.lay(laying.on_frame(Georef(crs, None, lon - 360, lat), place, SIZE_M), 40, 30)
+    east = fitting.lay(fitting.on_frame(Georef(crs, None, lon, lat), place, SIZE_M), 40, 30)
+    west = fitting.lay(fitting.on_frame(Georef(crs, None, lon - 360, lat), place, SIZE_M), 40, 30)
     assert (east.anchor, east.spacing_m) == (west.anchor, west.spacing_m)
 
 
@@ -136,8 +136,8 @@ def test_uneven_axes() -> None:
         np.arctan(np.sinh(np.linspace(np.arcsinh(np.tan(np.radians(48))), np.arcsinh(np.tan(np.radians(50))), 91)))
     )
     georef = Georef(pyproj.CRS.from_epsg(4326), None, lon, lat)
-    locate = laying.on_frame(georef, c.Place(lat_deg=49.0, lon_deg=-124.0), SIZE_M)
-    laid = laying.lay(locate, 91, 120)
+    locate = fitting.on_frame(georef, c.Place(lat_deg=49.0, lon_deg=-124.0), SIZE_M)
+    laid = fitting.lay(locate, 91, 120)
     assert _error(laid, locate, 91, 120) <= min(laid.spacing_m) / 20
 
 
@@ -150,9 +150,9 @@ def test_uneven_axes() -> None:
 )
 def test_too_much_of_the_earth(affine: tuple[float, float, float, float, float, float]) -> None:
     """SPEC G24."""
-    locate = laying.on_frame(Georef(pyproj.CRS.from_epsg(4326), affine), c.Place(lat_deg=40, lon_deg=0), SIZE_M)
+    locate = fitting.on_frame(Georef(pyproj.CRS.from_epsg(4326), affine), c.Place(lat_deg=40, lon_deg=0), SIZE_M)
     with pytest.raises(ImportRefused):
-        laying.lay(locate, 180, 360)
+        fitting.lay(locate, 180, 360)
 
 
 @pytest.mark.parametrize(
@@ -222,6 +222,6 @@ def test_by_hand(files: Path, tmp_path: Path) -> None:
 def test_net_rounding_is_the_same_everywhere() -> None:
     """SPEC G25: displacements are whole multiples of 2^-20."""
     georef = Georef(pyproj.CRS.from_epsg(4326), (1 / 300, 0.0, -121.0, 0.0, -1 / 300, 47.0))
-    laid = laying.lay(laying.on_frame(georef, c.Place(lat_deg=46.5, lon_deg=-120.5), SIZE_M), 100, 100)
+    laid = fitting.lay(fitting.on_frame(georef, c.Place(lat_deg=46.5, lon_deg=-120.5), SIZE_M), 100, 100)
     assert laid.warp is not None
     assert np.array_equal(laid.warp * 2**20, np.round(laid.warp * 2**20))

@@ -13,9 +13,9 @@ from rasterio.transform import Affine
 from esker import contract as c
 from esker import grid
 from esker.importing import questions
-from esker.importing.placing import Terrain
+from esker.importing.placement.placing import Terrain
 from esker.importing.refusal import ImportRefused
-from esker.tiles.codec import SAMPLE_LIMIT
+from esker.tiles.codec.payload import SAMPLE_LIMIT
 from tests.importing.conftest import look, take
 from tests.importing.make_files import geographic, ground, write
 

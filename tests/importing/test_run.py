@@ -16,8 +16,9 @@ import psutil
 import pytest
 
 from esker import contract as c
-from esker.importing import limits, run, upload, wire
-from esker.patchwork import rasters
+from esker.api import uploads
+from esker.importing import limits, run, wire
+from esker.patchwork.raster import rasters
 from tests.importing import make_files
 from tests.importing.conftest import PLACE, SIZE_M
 
@@ -114,7 +115,7 @@ def test_too_long(large: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("program", ["/bin/false", "/bin/cat", "/bin/yes"])
 def test_a_reader_that_dies_or_talks_nonsense(program: str, files: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """SPEC G30: a sentence in any case."""
-    monkeypatch.setattr(run.sys, "executable", program)  # type: ignore[attr-defined]
+    monkeypatch.setattr(sys, "executable", program)
     report = asyncio.run(run.inspect(files / "little.tif", "little.tif"))
     assert (report.verdict, report.refusal) == ("refused", run.STOPPED)
 
@@ -213,10 +214,10 @@ def test_a_full_disk_is_told(files: Path, tmp_path: Path, monkeypatch: pytest.Mo
 def test_a_file_that_changes_while_it_is_sent() -> None:
     """SPEC G30: one that grows is sent as long as it was, one that shrinks is an error at once, not a wait."""
     seen: list[int] = []
-    grown = upload._Told(io.BytesIO(b"12345678"), 5, seen.append)
+    grown = uploads._CountedBody(io.BytesIO(b"12345678"), 5, seen.append)
     assert (grown.read(4), grown.read(4), grown.read(4)) == (b"1234", b"5", b"")
     assert seen[:2] == [4, 5]
-    shrunk = upload._Told(io.BytesIO(b"123"), 5, seen.append)
+    shrunk = uploads._CountedBody(io.BytesIO(b"123"), 5, seen.append)
     assert shrunk.read(4) == b"123"
     with pytest.raises(OSError, match="shorter"):
         shrunk.read(4)

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from esker.contract import Layer
-from esker.patchwork import lod_space, rasters
-from esker.patchwork.lod_space import Model, Placed
+from esker.patchwork.lod import space
+from esker.patchwork.lod.space import Model, Placed
+from esker.patchwork.raster import rasters
 
 Floats = NDArray[np.float64]
 Ground = Callable[[Floats, Floats], Floats]
@@ -68,4 +69,4 @@ def three_layers(ground: Ground = rough) -> Model:
     heights = ground(x, y)
     heights[20:30, 40:55] = np.nan
     survey = placed(heights, "cccccccc", accuracy_m=0.0, priority=1, **place)
-    return lod_space.build([wide, fine, survey])
+    return space.build([wide, fine, survey])

@@ -10,9 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from esker import contract
-from esker.patchwork import blend, blend_points, rasters, sheets
-from esker.patchwork.lod_space import Model, Placed
-from esker.patchwork.patches import warped
+from esker.patchwork.blend import lattice
+from esker.patchwork.blend import points as blend_points
+from esker.patchwork.lod import layer_patches
+from esker.patchwork.lod.space import Model, Placed
+from esker.patchwork.raster import rasters
+from esker.patchwork.raster.patches import warped
 
 Floats = NDArray[np.float64]
 
@@ -33,7 +36,9 @@ def layer(name: str, rows: int, cols: int, **fields: Any) -> contract.Layer:
 def places(of: contract.Layer, warp: Floats | None = None) -> Floats:
     """World places (rows, cols, 2) of a layer's samples."""
     u, v = np.meshgrid(np.arange(of.facts.cols, dtype=float), np.arange(of.facts.rows, dtype=float))
-    return sheets.mapped(sheets.affine(of), warped(warp, of.facts.rows, of.facts.cols, np.stack([u, v], -1)))
+    return layer_patches.mapped(
+        layer_patches.affine(of), warped(warp, of.facts.rows, of.facts.cols, np.stack([u, v], -1))
+    )
 
 
 def surveyed(
@@ -127,5 +132,5 @@ def chosen(model: Model, tolerance: float) -> NDArray[np.intp]:
 
 def blended(model: Model, index: NDArray[np.intp], points: Floats, tolerance: float) -> Floats:
     """The bilinear blend of a cut at points, NaN where no patch lies."""
-    found = blend_points.evaluate(blend.pack(model, index.astype(np.int32), False, tolerance), points)
+    found = blend_points.evaluate(lattice.pack(model, index.astype(np.int32), False, tolerance), points)
     return np.where(found.cover[:, 0] > 0, found.heights[:, 0], np.nan)

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from esker import grid
 from esker.contract import BASE_SURVEY
-from esker.patchwork import lod_space
 from esker.patchwork.base import Base
-from esker.patchwork.lod_space import Model, Placed
+from esker.patchwork.lod import space
+from esker.patchwork.lod.space import Model, Placed
 from tests.patchwork.blend_scenes import Floats, placed, places, plane, rough, sampled, shifted, three_layers
 
 SIZE = 4096.0
@@ -27,7 +27,7 @@ def clamped(level: NDArray[np.float32], rows: slice, cols: slice) -> NDArray[np.
     return np.asarray(level[np.ix_(row, col)])
 
 
-@pytest.mark.parametrize("model", [MODEL, lod_space.build([FINE])], ids=["three layers", "island"])
+@pytest.mark.parametrize("model", [MODEL, space.build([FINE])], ids=["three layers", "island"])
 def test_windows_are_parts_of_levels(model: Model) -> None:
     """SPEC PW50: bit for bit, in any order, from a base that has made the level and from one that has not."""
     whole, fresh = Base(model, SIZE), Base(model, SIZE)
@@ -47,7 +47,7 @@ def test_windows_are_parts_of_levels(model: Model) -> None:
 
 def test_windows_of_fine_levels_do_not_depend_on_each_other() -> None:
     """SPEC PW50: overlapping windows share bits far below whole levels, with data, at its border and beyond."""
-    model = lod_space.build([FINE])
+    model = space.build([FINE])
     rng = np.random.default_rng(1)
     for level in (7, 10, 14):
         s = grid.spacing(level, SIZE)
@@ -89,7 +89,7 @@ def test_bad_questions_are_refused() -> None:
 
 def test_levels_keep_their_tolerance() -> None:
     """SPEC PW51: against the data: a quarter of a sample's spacing, and the data itself where samples are finer."""
-    model = lod_space.build([sampled(plane_with_hills, 420, 420, anchor=(-50.0, -50.0), spacing_m=(10.0, 10.0))])
+    model = space.build([sampled(plane_with_hills, 420, 420, anchor=(-50.0, -50.0), spacing_m=(10.0, 10.0))])
     base = Base(model, SIZE)
     assert base.spacing_m == 10.0
     assert [base.tolerance(level) for level in (0, 1, 2, 3)] == [16.0, 8.0, 4.0, 2.0]
@@ -113,7 +113,7 @@ def test_beyond_the_data_is_no_cliff() -> None:
     heights[np.hypot(row - 60, col - 55) > 45] = np.nan
     heights[50:70, 30:44] = np.nan
     layer = placed(heights, anchor=(1300.0, 1500.0), rotation_deg=33.0, spacing_m=(8.0, 8.0))
-    base = Base(lod_space.build([layer]), SIZE)
+    base = Base(space.build([layer]), SIZE)
     steepest = max(np.nanmax(np.abs(np.diff(heights, axis=axis))) for axis in (0, 1)) / 8.0
     for level in range(6):
         ground = base.level(level)
@@ -125,7 +125,7 @@ def test_beyond_the_data_is_no_cliff() -> None:
 
 def test_beyond_the_data_all_levels_show_one_ground() -> None:
     """SPEC PW52: and it is nearly as high as the data's border near it."""
-    base = Base(lod_space.build([FINE]), SIZE)
+    base = Base(space.build([FINE]), SIZE)
     last = base.level(6)
     for level in range(6):
         step = 1 << (6 - level)
@@ -135,7 +135,7 @@ def test_beyond_the_data_all_levels_show_one_ground() -> None:
 def test_a_grid_smaller_than_a_cell_is_no_spike() -> None:
     """SPEC PW52: 40 m of data at 900 m in a domain of 4 km, in no sample of the coarse levels."""
     layer = placed(np.full((20, 20), 900.0), anchor=(2010.0, 2013.0), spacing_m=(2.0, 2.0))
-    base = Base(lod_space.build([layer]), SIZE)
+    base = Base(space.build([layer]), SIZE)
     for level in range(6):
         assert np.abs(base.level(level) - 900).max() < 0.1, level
 
@@ -143,7 +143,7 @@ def test_a_grid_smaller_than_a_cell_is_no_spike() -> None:
 def test_a_grid_between_all_samples_of_the_anchor_is_no_spike() -> None:
     """SPEC PW52: 4 m of data at 900 m in a domain of 65 km, which no sample of the first ten levels meets."""
     layer = placed(np.full((9, 9), 900.0), anchor=(30_050.0, 30_060.0), spacing_m=(0.5, 0.5))
-    base = Base(lod_space.build([layer]), 65_536.0)
+    base = Base(space.build([layer]), 65_536.0)
     for level in (0, 3, 5):
         assert np.abs(base.level(level) - 900).max() < 0.1, level
     for level in (10, 14):
@@ -153,7 +153,7 @@ def test_a_grid_between_all_samples_of_the_anchor_is_no_spike() -> None:
 
 def test_places_see_what_levels_show() -> None:
     """SPEC PW53: `sample` at the samples of a level finer than the data."""
-    base = Base(lod_space.build([FINE]), SIZE)
+    base = Base(space.build([FINE]), SIZE)
     rows, cols = np.mgrid[1100:1900:7, 1300:2100:7]
     points = np.stack([cols.ravel(), rows.ravel()], axis=1) * (SIZE / 4096)
     found = base.sample(points)
@@ -166,7 +166,7 @@ def test_places_see_what_levels_show() -> None:
 
 def test_derivatives_hold_beyond_the_data_too() -> None:
     """SPEC PW53: across the border, by differences."""
-    base = Base(lod_space.build([FINE]), SIZE)
+    base = Base(space.build([FINE]), SIZE)
     points, h = np.random.default_rng(3).uniform(1300, 2100, (400, 2)), 0.01
     found = base.sample(points, derivatives=True)
     assert found.gradient is not None
@@ -249,7 +249,7 @@ def test_a_change_is_told_where_it_is() -> None:
 def test_a_small_change_in_much_data_stays_small() -> None:
     """SPEC PW56."""
     wide = sampled(rough, 120, 120, "aaaaaaaa", anchor=(-300.0, -300.0), spacing_m=(40.0, 40.0), accuracy_m=4.0)
-    before = Base(lod_space.build([wide]), SIZE)
+    before = Base(space.build([wide]), SIZE)
     after = Base(before.model.with_(FINE), SIZE, before)
     rect = after.changed(before)
     assert rect is not None
@@ -258,7 +258,7 @@ def test_a_small_change_in_much_data_stays_small() -> None:
 
 def test_bounds_hold() -> None:
     """SPEC PW57."""
-    for model in (MODEL, lod_space.build([FINE])):
+    for model in (MODEL, space.build([FINE])):
         base = Base(model, SIZE)
         for level in range(6):
             assert base.low <= base.level(level).min()
@@ -266,7 +266,7 @@ def test_bounds_hold() -> None:
 
 
 def test_no_layers_are_flat_ground() -> None:
-    base = Base(lod_space.build([]), SIZE)
+    base = Base(space.build([]), SIZE)
     assert not base.level(4).any()
     assert not base.window(9, slice(0, 70), slice(3, 9)).any()
     assert (base.survey(3) == BASE_SURVEY).all()
@@ -276,7 +276,7 @@ def test_no_layers_are_flat_ground() -> None:
 def test_the_digest_is_of_what_the_ground_follows_from() -> None:
     """SPEC PW58: order and names do not count, places do."""
     names = [p.layer.model_copy(update={"name": "x", "outline": 1.0}) for p in MODEL.placed]
-    same = lod_space.build([Placed(n, p.raster) for n, p in zip(names, MODEL.placed, strict=True)][::-1])
+    same = space.build([Placed(n, p.raster) for n, p in zip(names, MODEL.placed, strict=True)][::-1])
     assert Base(same, SIZE).digest == Base(MODEL, SIZE).digest
     seen = {Base(MODEL, SIZE).digest, Base(MODEL, 2 * SIZE).digest}
     model = MODEL

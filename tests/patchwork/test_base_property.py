@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from esker import grid
-from esker.patchwork import lod_space, rim
 from esker.patchwork.base import Base
-from esker.patchwork.lod_space import Placed
-from esker.patchwork.query import Index, View
+from esker.patchwork.lod import space
+from esker.patchwork.lod.space import Placed
+from esker.patchwork.query.queries import Index, View
+from esker.patchwork.raster import rim
 from tests.patchwork.blend_scenes import placed
 
 
@@ -43,7 +44,7 @@ def test_any_layers_make_ground(seed: int) -> None:
     rng = np.random.default_rng(seed)
     size = float(rng.choice([64.0, 1000.0, 4096.0, 65536.0]))
     chosen = layers(rng, size)
-    model = lod_space.build(chosen)
+    model = space.build(chosen)
     base, level = Base(model, size), int(rng.integers(0, 4))
     ground = base.level(level)
     assert np.isfinite(ground).all()
@@ -65,10 +66,10 @@ def test_a_grid_without_a_patch_is_no_ground(monkeypatch: pytest.MonkeyPatch) ->
     """Samples far apart are ground, each by itself (SPEC PW4); were none let in: nothing to blend, and no fault."""
     heights = np.full((40, 40), np.nan)
     heights[::5, ::5] = 100.0
-    model = lod_space.build([placed(heights)])
+    model = space.build([placed(heights)])
     assert model.count == 64
     assert Base(model, 1000.0).level(2).max() == pytest.approx(100.0)
     monkeypatch.setattr(rim, "MOST", 0)
-    model = lod_space.build([placed(heights)])
+    model = space.build([placed(heights)])
     assert model.count == 0
     assert not Base(model, 1000.0).level(2).any()

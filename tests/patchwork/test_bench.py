@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from esker.bench import (
+from bench.ground import (
     _patchwork,
     _patchwork_big,
     _patchwork_cover,
@@ -18,8 +18,9 @@ from esker.bench import (
     importing,
     patchwork,
 )
-from esker.patchwork import lod_space, rasters
-from esker.patchwork.query import Index
+from esker.patchwork.lod import space
+from esker.patchwork.query.queries import Index
+from esker.patchwork.raster import rasters
 
 SIDE = 257
 
@@ -51,7 +52,7 @@ def test_everything_is_measured_and_told(tmp_path: Path) -> None:
     assert 0.3 < big["bytes_over"]["share"] < 5
     assert big["memory"]["peak_resident_mib"] >= big["memory"]["resident_mib"] > big["memory"]["anonymous_mib"] > 0
     raster = rasters.read(tmp_path / "raster")
-    index = Index(lod_space.build([patchwork.whole(raster)]))
+    index = Index(space.build([patchwork.whole(raster)]))
     asked = patchwork.queries(index, quick=True)
     assert asked["uniform"]["0"]["patches"] > asked["uniform"]["50"]["patches"] > 0
     assert asked["flight"]["1000 m/s"]["patches"] > 0

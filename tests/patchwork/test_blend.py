@@ -7,10 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from esker.patchwork import blend, blend_points, blend_reference, lod_space, splines
-from esker.patchwork.blend import Lattice
-from esker.patchwork.query import Index
-from esker.solve.device import Device, open_device
+from esker.patchwork.blend import lattice as blend
+from esker.patchwork.blend import points as blend_points
+from esker.patchwork.blend import reference, splines
+from esker.patchwork.blend.lattice import Lattice
+from esker.patchwork.lod import space
+from esker.patchwork.query.queries import Index
+from esker.solve.opencl.device import Device, open_device
 from tests.patchwork.blend_scenes import Floats, placed, places, plane, rough, sampled, shifted, three_layers
 
 KINDS = pytest.mark.parametrize("smooth", [False, True], ids=["bilinear", "bicubic"])
@@ -43,10 +46,10 @@ def test_spline_coefficients_are_those_of_the_definition() -> None:
         samples = rng.normal(size=(side, side)) * 100
         out = np.zeros((splines.STRIDE, splines.STRIDE), dtype=np.float32)
         splines.prefilter(samples.copy(), side, out)
-        expected = blend_reference.coefficients(samples)
+        expected = reference.coefficients(samples)
         assert np.abs(out[: side + 2, : side + 2] - expected).max() < 1e-4
         corner = np.array([0.0, side - 1.0, 3.0])
-        found = blend_reference.patch_heights(samples, corner, corner[::-1], smooth=True)
+        found = reference.patch_heights(samples, corner, corner[::-1], smooth=True)
         assert found == pytest.approx([samples[3, 0], samples[side - 1, side - 1], samples[0, 3]], abs=1e-9)
 
 
@@ -58,7 +61,7 @@ def test_the_loops_agree_with_the_twin(smooth: bool) -> None:
     for tolerance in TOLERANCES:
         index = INDEX.uniform(tolerance)
         heights, cover = blend.evaluate(blend.pack(MODEL, index, smooth, tolerance), lattice)
-        expected, presence, _ = blend_reference.evaluate(MODEL, index, points, smooth, tolerance)
+        expected, presence, _ = reference.evaluate(MODEL, index, points, smooth, tolerance)
         assert np.abs(cover.ravel() - presence).max() < 2e-5
         there = presence > 1e-3
         assert np.abs(heights.ravel()[there] - expected[there]).max() < 5e-3
@@ -83,7 +86,7 @@ def test_places_agree_with_the_twin(smooth: bool) -> None:
     for tolerance in TOLERANCES:
         index = INDEX.uniform(tolerance)
         found = blend_points.evaluate(blend.pack(MODEL, index, smooth, tolerance), points)
-        expected, presence, _ = blend_reference.evaluate(MODEL, index, points, smooth, tolerance)
+        expected, presence, _ = reference.evaluate(MODEL, index, points, smooth, tolerance)
         assert np.abs(found.cover[:, 0] - presence).max() < 1e-12
         there = presence > 1e-9
         assert np.abs(found.heights[there, 0] - expected[there]).max() < 2e-4
@@ -114,10 +117,10 @@ def test_more_patches_than_the_paper_saw_may_overlap() -> None:
         sampled(plane, 40, 40, f"layer{k:03}", anchor=(200.0, 200.0), rotation_deg=7.0 * k, accuracy_m=1.0 + 0.1 * k)
         for k in range(10)
     ]
-    model = lod_space.build(layers)
+    model = space.build(layers)
     index = np.arange(model.count, dtype=np.int32)
     points = np.random.default_rng(1).uniform(200, 400, (500, 2))
-    expected, _, count = blend_reference.evaluate(model, index, points, smooth=True)
+    expected, _, count = reference.evaluate(model, index, points, smooth=True)
     assert count.max() > 12
     found = blend_points.evaluate(blend.pack(model, index, smooth=True), points)
     there = count > 0
@@ -136,7 +139,7 @@ def test_a_tilted_plane_is_reproduced(smooth: bool) -> None:
     holed[30:42, 50:71] = np.nan
     place: dict[str, Any] = {"anchor": (900.0, 1300.0), "rotation_deg": 31.0, "spacing_m": (14.0, 9.0)}
     layers.append(placed(holed, "cccccccc", lift_m=-125.0, **place))
-    model = lod_space.build(layers)
+    model = space.build(layers)
     chosen = Index(model).resolved(1.0, 0.0, (0.0, 0.0, 3000.0, 3000.0))
     points = np.random.default_rng(2).uniform(500, 2500, (6000, 2))
     found = blend_points.evaluate(blend.pack(model, chosen, smooth), points)
@@ -149,7 +152,7 @@ def test_samples_of_a_perfect_layer_are_reproduced(smooth: bool) -> None:
     """SPEC PW45: at its own sample places, at tolerance 0."""
     fields: dict[str, Any] = {"anchor": (100.0, 50.0), "rotation_deg": 19.0, "spacing_m": (10.0, 15.0)}
     layer = sampled(rough, 75, 100, **fields)
-    model = lod_space.build([layer])
+    model = space.build([layer])
     x, y = places(75, 100, **fields)
     points = np.stack([x.ravel(), y.ravel()], axis=1)
     found = blend_points.evaluate(blend.pack(model, Index(model).uniform(0.0), smooth), points)
@@ -157,7 +160,7 @@ def test_samples_of_a_perfect_layer_are_reproduced(smooth: bool) -> None:
     assert (found.cover[:, 0] == 1).all()
 
 
-def sharpest(model: lod_space.Model, smooth: bool, lines: int = 60) -> tuple[Floats, Floats]:
+def sharpest(model: space.Model, smooth: bool, lines: int = 60) -> tuple[Floats, Floats]:
     """Greatest change (6,) of value and derivatives within half a metre, and in the worst hundredth of each such."""
     rng = np.random.default_rng(5)
     packed = blend.pack(model, Index(model).uniform(0.0), smooth, 0.0)
@@ -191,7 +194,7 @@ def test_the_ground_is_as_continuous_as_the_paper_says(smooth: bool, order: int)
 
 def test_facets_of_bilinear_patches_are_seen() -> None:
     """The test above can fail: the slope of bilinear patches jumps at every sample."""
-    wide, narrow = sharpest(lod_space.build([MODEL.placed[0]]), smooth=False, lines=20)
+    wide, narrow = sharpest(space.build([MODEL.placed[0]]), smooth=False, lines=20)
     assert narrow[0] < 0.1 * wide[0]
     assert (narrow[1:3] > 0.9 * wide[1:3]).all()
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from esker.patchwork import covering
+from esker.patchwork.lod import covering
 
 Floats = NDArray[np.float64]
 UNIT = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])

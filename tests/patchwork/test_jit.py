@@ -8,6 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+from esker import compiled
 from esker.patchwork import jit
 
 INNER = "from esker.patchwork.jit import kernel\n\n\n@kernel\ndef inner(x: float) -> float:\n    return x + {}\n"
@@ -31,6 +32,9 @@ def test_a_change_in_another_file_is_compiled_anew(tmp_path: Path) -> None:
     (room / "__init__.py").touch()
     (room.parent / "__init__.py").touch()
     shutil.copy(jit.__file__, room / "jit.py")
+    shutil.copy(compiled.__file__, room.parent / "compiled.py")
+    process = Path(jit.__file__).parents[1] / "process"
+    shutil.copytree(process, room.parent / "process", ignore=shutil.ignore_patterns("__pycache__"))
     (room / "outer.py").write_text(OUTER)
     environment = {k: v for k, v in os.environ.items() if k != "NUMBA_CACHE_DIR"} | {"PYTHONPATH": str(tmp_path)}
     said = []

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from esker.patchwork import lod_space_reference as reference
-from esker.patchwork.lod_space import Model, Placed, build
-from esker.patchwork.trust import default_priority, trust
+from esker.patchwork.lod import reference
+from esker.patchwork.lod.precedence import default_priority, precedence
+from esker.patchwork.lod.space import Model, Placed, build
 from tests.patchwork.model_scenes import (
     Floats,
     blended,
@@ -97,7 +97,7 @@ def _within(model: Model, p: int, rng: np.random.Generator) -> Floats:
 def check_error(model: Model, rng: np.random.Generator) -> None:
     """SPEC PW14: against the most trusted samples at a place the blend errs by e, or by the best patch there."""
     for one in model.placed:
-        more = {k for k, other in enumerate(model.placed) if trust(other.layer) > trust(one.layer)}
+        more = {k for k, other in enumerate(model.placed) if precedence(other.layer) > precedence(one.layer)}
         at = places(one.layer, one.raster.warp).reshape(-1, 2)
         heights = one.layer.scale * one.raster.heights.ravel().astype(float) + one.layer.lift_m
         some = rng.permutation(np.flatnonzero(~np.isnan(heights)))[:100]
@@ -190,7 +190,7 @@ def test_a_coarse_grid_added_later_goes_below_the_better_ones() -> None:
     far = layer("far", 50, 50, anchor=(9000.0, 0.0), accuracy_m=0.5, priority=7)
     coarse = layer("coarse", 60, 60, spacing_m=(40.0, 40.0), accuracy_m=10.0)
     assert default_priority(coarse, [fine, far]) == 2
-    believed = sorted([fine, coarse.model_copy(update={"priority": 2})], key=trust)
+    believed = sorted([fine, coarse.model_copy(update={"priority": 2})], key=precedence)
     assert [one.id for one in believed] == ["coarse", "fine"]
     assert default_priority(coarse, [far]) == 8
     assert default_priority(fine.model_copy(update={"id": "again"}), [fine, coarse]) == 3, (

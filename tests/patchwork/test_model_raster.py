@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from esker.patchwork import errors_reference as reference
-from esker.patchwork import mipmaps, patches, rasters, sheets
-from esker.patchwork.rasters import Raster, RasterError
-from esker.patchwork.samples import cut
+from esker.patchwork.lod import layer_patches
+from esker.patchwork.raster import errors_reference as reference
+from esker.patchwork.raster import mipmaps, patches, rasters
+from esker.patchwork.raster.rasters import Raster, RasterError
+from esker.patchwork.raster.samples import cut
 from tests.patchwork.model_scenes import Floats, bend, land, layer
 
 RNG = np.random.default_rng(7)
@@ -239,7 +240,7 @@ def test_layers_turn_counter_clockwise(turn: float) -> None:
     """SPEC PW5: sample [row, col] lies at anchor + R(turn) (col sx, row sy); quarter turns are exact."""
     of = layer("x", 9, 9, anchor=(100.0, 50.0), rotation_deg=turn, spacing_m=(3.0, 5.0))
     c, s = np.cos(np.radians(turn)), np.sin(np.radians(turn))
-    at = sheets.mapped(sheets.affine(of), np.array([[2.0, 0.0], [0.0, 2.0]]))
+    at = layer_patches.mapped(layer_patches.affine(of), np.array([[2.0, 0.0], [0.0, 2.0]]))
     np.testing.assert_allclose(at, [[100 + 6 * c, 50 + 6 * s], [100 - 10 * s, 50 + 10 * c]], atol=1e-9)
     if turn % 90 == 0:
         assert np.array_equal(at, np.round(at))

@@ -5,15 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from esker.patchwork import blend_reference, lod_space
-from esker.patchwork.lod_space import Model
-from esker.patchwork.quadtree_index import CAPACITY, QuadtreeIndex
-from esker.patchwork.query import Bounded, Chosen, Index, Sampled, Surface, View, difference, slope
+from esker.patchwork.blend import reference
+from esker.patchwork.lod import space
+from esker.patchwork.lod.space import Model
+from esker.patchwork.query.quadtree_index import CAPACITY, QuadtreeIndex
+from esker.patchwork.query.queries import Bounded, Chosen, Index, Sampled, Surface, View, difference, slope
 from tests.patchwork.blend_scenes import Floats, rough, sampled, shifted, three_layers
 
 MODEL = three_layers()
 INDEX = Index(MODEL)
-ALONE = lod_space.build([sampled(rough, 300, 260, spacing_m=(12.0, 12.0), accuracy_m=0.5)])
+ALONE = space.build([sampled(rough, 300, 260, spacing_m=(12.0, 12.0), accuracy_m=0.5)])
 
 
 def kernels_over(model: Model, index: Chosen, points: Floats) -> np.ndarray:
@@ -117,8 +118,8 @@ def test_height_errors_in_a_view_stay_below_a_pixel() -> None:
     for _ in range(6):
         view = looking(rng, slope(1.0, 1080, np.radians(45)) * 20)._replace(eye=(1500.0, 1500.0), far=1400.0)
         points = inside(view, 300, rng)
-        near, cover, _ = blend_reference.evaluate(ALONE, index.view(view), points, smooth=False)
-        best, there, _ = blend_reference.evaluate(ALONE, exact, points, smooth=False)
+        near, cover, _ = reference.evaluate(ALONE, index.view(view), points, smooth=False)
+        best, there, _ = reference.evaluate(ALONE, exact, points, smooth=False)
         known = (cover == 1) & (there == 1)
         # A sample's error is bounded; between samples of the fine grid both interpolate them.
         assert (np.abs(near - best)[known] <= view.tolerance(points)[known] + 2 * 0.5).all()
@@ -209,7 +210,7 @@ def same(a: Index, b: Index) -> None:
 def test_an_index_follows_its_model() -> None:
     """SPEC PW34: after layers came, went and moved it equals one that is made anew."""
     layers = {p.layer.id: p for p in MODEL.placed}
-    index = Index(lod_space.build([layers["aaaaaaaa"]]))
+    index = Index(space.build([layers["aaaaaaaa"]]))
     model = index.model.with_(layers["cccccccc"])
     index = index.updated(model)
     same(index, Index(model))
@@ -217,7 +218,7 @@ def test_an_index_follows_its_model() -> None:
     index = index.updated(model)
     same(index, Index(model))
     moved = layers["bbbbbbbb"].layer.model_copy(update={"anchor": (1300.0, 200.0)})
-    model = model.with_(lod_space.Placed(moved, layers["bbbbbbbb"].raster))
+    model = model.with_(space.Placed(moved, layers["bbbbbbbb"].raster))
     index = index.updated(model)
     same(index, Index(model))
     model = model.without("cccccccc")
@@ -244,7 +245,7 @@ def test_the_paper_s_quadtree_gives_the_same_answers(model: Model) -> None:
 
 
 def test_no_layers_no_patches() -> None:
-    index = Index(lod_space.build([]))
+    index = Index(space.build([]))
     assert len(index.uniform(0.0)) == len(index.uniform(0.0, (0, 0, 1, 1))) == 0
     assert len(QuadtreeIndex(index.model).uniform(0.0)) == 0
     assert len(index.view(View((0.0, 0.0), 0.0, 0.5, 100.0, 0.1))) == 0

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from esker.patchwork import errors, lod_space, patches, rasters, rim
 from esker.patchwork.base import Base
-from esker.patchwork.query import Bounded, Index, View
+from esker.patchwork.lod import space
+from esker.patchwork.query.queries import Bounded, Index, View
+from esker.patchwork.raster import errors, patches, rasters, rim
 from tests.patchwork.model_scenes import Floats, bend, chosen, layer, random_scene, surveyed
 
 Counts = NDArray[np.int64]
@@ -54,7 +55,7 @@ def test_every_valid_sample_lies_in_one_kernel(share: float) -> None:
 def test_a_grid_without_nodata_has_no_rim() -> None:
     raster = rasters.build(np.ones((50, 60)))
     assert len(raster.errors.rim) == 0
-    model = lod_space.build([surveyed(layer("plain", 50, 60))])
+    model = space.build([surveyed(layer("plain", 50, 60))])
     assert np.unique(model.side).tolist() == [patches.side_of(patches.SMALL_SCALES)]
 
 
@@ -110,7 +111,7 @@ def test_a_raster_of_an_older_format_is_read(tmp_path: Path) -> None:
 
 def test_mapped_grids_have_the_bits_of_those_in_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """SPEC PW5: in strips of a few rows, with nodata, a bend, both and neither."""
-    monkeypatch.setattr("esker.patchwork.paging.STRIP_BYTES", 5000)
+    monkeypatch.setattr("esker.patchwork.raster.paging.STRIP_BYTES", 5000)
     for k, (holes, bent) in enumerate(((0.0, False), (0.03, False), (0.0, True), (0.03, True))):
         heights = riddled(k, 150, 140, holes) if holes else 100 * np.random.default_rng(k).random((150, 140))
         warp = bend(layer("x", 150, 140), 3.0, np.random.default_rng(k)) if bent else None
@@ -136,11 +137,9 @@ def test_whole_kernels_and_rim_are_found_alike_by_bands() -> None:
 def test_queries_find_the_rim() -> None:
     """SPEC PW30, PW32: in a rectangle, in a view and over a region, the patches that a list of all gives."""
     heights = riddled(6, 90, 100, 0.05)
-    model = lod_space.build(
-        [surveyed(layer("holed", 90, 100), change=lambda z: np.where(np.isnan(heights), np.nan, z))]
-    )
+    model = space.build([surveyed(layer("holed", 90, 100), change=lambda z: np.where(np.isnan(heights), np.nan, z))])
     index = Index(model)
-    small = np.flatnonzero(model.sheets[0].scale == patches.RIM)
+    small = np.flatnonzero(model.layers[0].scale == patches.RIM)
     assert len(small) > 100
     assert np.isin(small, index.uniform(1.0)).all()
     everywhere = (-1e6, -1e6, 1e6, 1e6)
@@ -157,9 +156,7 @@ def test_queries_find_the_rim() -> None:
 def test_coarse_levels_leave_out_what_lies_between_their_samples(monkeypatch: pytest.MonkeyPatch) -> None:
     """SPEC PW51: fewer patches, the same bits."""
     heights = riddled(7, 120, 120, 0.05)
-    model = lod_space.build(
-        [surveyed(layer("holed", 120, 120), change=lambda z: np.where(np.isnan(heights), np.nan, z))]
-    )
+    model = space.build([surveyed(layer("holed", 120, 120), change=lambda z: np.where(np.isnan(heights), np.nan, z))])
     index = Index(model)
     whole = (-1e6, -1e6, 1e6, 1e6)
     assert len(index.resolved(200.0, 50.0, whole)) < len(index.uniform(50.0, whole)) / 4
@@ -179,7 +176,7 @@ def test_samples_beside_nodata_are_ground() -> None:
             layer("holed", 60, 60, anchor=(200.0, 200.0)),
             change=lambda z, h=heights: np.where(np.isnan(h), np.nan, z),  # type: ignore[misc]
         )
-        base = Base(lod_space.build([placed]), 1000.0)
+        base = Base(space.build([placed]), 1000.0)
         row, col = np.nonzero(~np.isnan(heights))
         at = np.stack([200 + 10.0 * col, 200 + 10.0 * row], 1)
         for smooth in (True, False):

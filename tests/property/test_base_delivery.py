@@ -6,10 +6,10 @@ import random
 
 import numpy as np
 import pytest
-from tests.cones import FINEST, LEVELS, SIZE_M, Bump, Client, Ground, a_view, drawn, lay, near, settle, solve
 
 from esker.contract import Channel
 from esker.tiles.delivery import TileServer
+from tests.cones import FINEST, LEVELS, SIZE_M, Bump, Client, Ground, a_view, drawn, lay, near, settle, solve
 
 
 class Layers(Ground):

@@ -76,6 +76,7 @@ field_values: dict[str, st.SearchStrategy[Any]] = {
     "plateau_radius_m": st.floats(0, 500),
     "amplitude_m": st.floats(0, 50),
     "roughness": st.floats(0, 1),
+    "yields": st.floats(0, 1),
     "paint": paint,
     "locked": st.booleans(),
     "hidden": st.booleans(),
@@ -168,9 +169,9 @@ def test_nothing_but_shape_dirties_the_heights() -> None:
     ]
     for op, expected in cases:
         after, dirty = document.apply(op)
-        found = after.shape is not document.shape, after.says is not document.says
+        found = after.heights_rev != document.heights_rev, after.channels_rev != document.channels_rev
         brushed = isinstance(op, c.SetTerrain) or getattr(op, "stroke", "") == "p"
-        assert (after.painted is not document.painted) == (expected[1] and brushed), op
+        assert (after.paint_rev != document.paint_rev) == (expected[1] and brushed), op
         assert (found, dirty is not None) == (expected, expected[0]), op
         document = after
 
@@ -334,7 +335,7 @@ class Session(RuleBasedStateMachine):
         after, dirty = applied
         assert after.clock == before.clock + 1
         self._check_dirty(before, after, dirty)
-        assert (before.ground is after.ground) == (_laid(before) == _laid(after)) or _returned(op)
+        assert (before.layers_rev == after.layers_rev) == (_laid(before) == _laid(after)) or _returned(op)
         self.stacks[who].record(before, op, after, gesture)
         self._note(who, before, after)
         self.document = after
@@ -346,7 +347,7 @@ class Session(RuleBasedStateMachine):
             if old is not None and new is not None and all(getattr(old, n) == getattr(new, n) for n in GROUND_FIELDS):
                 continue
             if any(s is not None and not s.hidden and s.curve for s in (old, new)):
-                assert after.says is not before.says
+                assert after.channels_rev != before.channels_rev
             if (old or new).kind == "paint":  # type: ignore[union-attr]
                 continue
             if old is not None and new is not None and all(getattr(old, n) == getattr(new, n) for n in HEIGHT_FIELDS):

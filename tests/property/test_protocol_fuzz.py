@@ -10,10 +10,10 @@ from typing import Any
 import hypothesis.strategies as st
 import pytest
 from hypothesis import HealthCheck, given, settings
-from tests.vectors import make
 
 from esker import contract as c
-from esker.session import protocol
+from esker.session.room import protocol
+from tests.vectors import make
 
 HELLO = json.dumps({"type": "hello", "protocol": c.PROTOCOL_VERSION, "terrain": "t", "secret": "s", "client": "c1"})
 VECTORS = Path(make.__file__).parent / "messages.json"

@@ -6,11 +6,11 @@ import random
 
 import numpy as np
 import pytest
-from tests.cones import FINEST, LEVELS, SIZE_M, Client, Ground, a_view, settle, solve
 
 from esker.contract import Channel, FrameKind
 from esker.grid import TileKey
 from esker.tiles.delivery import TileServer
+from tests.cones import FINEST, LEVELS, SIZE_M, Client, Ground, a_view, settle, solve
 
 
 def put_channel(

@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from esker.tiles import entropy
 from esker.tiles.bounds import sub_error
-from esker.tiles.codec import SAMPLE_LIMIT, CodecError, child_window, pack, predict, reconstruct, unpack
+from esker.tiles.codec import entropy
+from esker.tiles.codec.payload import SAMPLE_LIMIT, CodecError, child_window, pack, predict, reconstruct, unpack
 
 Ints = NDArray[np.int32]
 AMPLITUDES = st.sampled_from([0, 1, 100, 30_000, 3_170_000, 3_180_000, 1 << 27, SAMPLE_LIMIT])

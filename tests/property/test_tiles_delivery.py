@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from esker import grid
 from esker.contract import FrameKind, Predictor, View
 from esker.grid import TileKey
+from esker.tiles.codec.frame import read_frame
 from esker.tiles.decoder import FrameDecoder
 from esker.tiles.delivery import ClientTiles, TileServer
-from esker.tiles.frame import read_frame
 from esker.tiles.plans import FramePlan
 
 SIZE_M = 512.0

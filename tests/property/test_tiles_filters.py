@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from esker.contract import Filter
-from esker.tiles.codec import CodecError, Ints, Wide, pack, unpack
-from esker.tiles.filters import apply, pack_smallest, undo
+from esker.tiles.codec.filters import apply, pack_smallest, undo
+from esker.tiles.codec.payload import CodecError, Ints, Wide, pack, unpack
 
 RESIDUALS = arrays(np.int32, (65, 65), elements=st.integers(-(2**31) + 1, 2**31 - 1))
 

@@ -1,4 +1,4 @@
-"""The cameras are those of the page (frontend/test/core/camera.test.ts; SPEC I1, I4, V5)."""
+"""The cameras are those of the page (frontend/test/core/projection.test.ts, camera.test.ts; SPEC I1, I4, V5)."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import pytest
 from esker import grid
 from esker.contract import TerrainSettings
 from esker.render.camera import Camera, Vec3, axes, home, look_at
+from esker.render.pictures.views import camera_of
 from esker.render.surface import Surface
-from esker.render.views import camera_of
 
 SIZE = 4096.0
 SETTINGS = TerrainSettings(size_m=SIZE)

@@ -10,10 +10,10 @@ import pytest
 from PIL import Image
 
 from esker import templates
+from esker.api.terrain import Stroke, Terrain
+from esker.cli import render
 from esker.contract import Document
-from esker.render import command
-from esker.render.studio import open_terrain
-from esker.terrain import Stroke, Terrain
+from esker.render.pictures.studio import open_terrain
 from tests.sync.harness import LiveServer
 
 SMALL = ["--size", "96x64", "--plain", "--level", "1", "--refine", "1", "--tau", "4", "--device", "numpy"]
@@ -30,7 +30,7 @@ def terrain(tmp_path: Path) -> Path:
 
 def test_a_picture_and_its_progress(terrain: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "ridge.png"
-    assert command.main([str(terrain), "-o", str(out), *SMALL, "--camera", "orbit:200,25,1500", "--sun", "90,30"]) == 0
+    assert render.main([str(terrain), "-o", str(out), *SMALL, "--camera", "orbit:200,25,1500", "--sun", "90,30"]) == 0
     with Image.open(out) as picture:
         assert picture.size == (96, 64)
         assert len(np.unique(np.asarray(picture).reshape(-1, 3), axis=0)) > 200
@@ -42,7 +42,7 @@ def test_a_picture_and_its_progress(terrain: Path, tmp_path: Path, capsys: pytes
 
 def test_a_turntable_has_its_pictures(terrain: Path, tmp_path: Path) -> None:
     out = tmp_path / "around.webp"
-    assert command.main([str(terrain), "-o", str(out), *SMALL, "--turntable", "3", "-q"]) == 0
+    assert render.main([str(terrain), "-o", str(out), *SMALL, "--turntable", "3", "-q"]) == 0
     with Image.open(out) as moving:
         assert getattr(moving, "n_frames", 1) == 3
         frames = []
@@ -51,7 +51,7 @@ def test_a_turntable_has_its_pictures(terrain: Path, tmp_path: Path) -> None:
             frames.append(np.asarray(moving.convert("RGB")).astype(int))
     assert np.abs(frames[0] - frames[1]).mean() > 1
     folder = tmp_path / "stills"
-    assert command.main([str(terrain), "-o", str(folder), *SMALL, "--turntable", "2", "-q"]) == 0
+    assert render.main([str(terrain), "-o", str(folder), *SMALL, "--turntable", "2", "-q"]) == 0
     assert [p.name for p in sorted(folder.iterdir())] == ["0000.png", "0001.png"]
 
 
@@ -75,7 +75,7 @@ def test_what_is_wrong_is_said(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     small = [a for k, a in enumerate(SMALL) if "--tau" not in (a, SMALL[k - 1]) or "--tau" not in arguments]
-    assert command.main([*arguments, *small, "-q"]) == 1
+    assert render.main([*arguments, *small, "-q"]) == 1
     said = capsys.readouterr().err
     assert said.startswith("esker render: ")
     assert WRONG[arguments] in said
@@ -86,7 +86,7 @@ def test_mp4_without_ffmpeg_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
-    assert command.main(["canyon", "-o", str(tmp_path / "x.mp4"), "--turntable", "4"]) == 1
+    assert render.main(["canyon", "-o", str(tmp_path / "x.mp4"), "--turntable", "4"]) == 1
     assert "MP4 needs the program ffmpeg" in capsys.readouterr().err
 
 
@@ -98,7 +98,7 @@ def test_no_opengl_is_said_before_anything_is_solved(
 
     monkeypatch.setattr(moderngl, "create_context", fail)
     monkeypatch.setattr("esker.solve.solver.Solver.__init__", fail)
-    assert command.main(["canyon", "-o", str(tmp_path / "x.png")]) == 1
+    assert render.main(["canyon", "-o", str(tmp_path / "x.png")]) == 1
     said = capsys.readouterr().err
     assert "Pictures need OpenGL 4.3 by EGL" in said
     assert "libEGL.so.1" in said

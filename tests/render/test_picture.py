@@ -13,10 +13,10 @@ from esker.contract import TerrainSettings
 from esker.render import programs, reference
 from esker.render.camera import Camera, home, look_at
 from esker.render.frame import LOOKS, Scene
+from esker.render.pictures.views import WALK_M, camera_of
 from esker.render.reference import Reference
 from esker.render.surface import Surface
 from esker.render.tables import stone_mipmaps
-from esker.render.views import WALK_M, camera_of
 from esker.synthesis.detailed import DetailedTerrain
 from esker.synthesis.site import Site
 from tests.render.ground import rough_levels

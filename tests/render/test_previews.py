@@ -8,23 +8,32 @@ import io
 import logging
 import os
 import re
+import signal
+import subprocess
+import sys
+import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import psutil
 import pytest
 from PIL import Image
 
 from esker import contract as c
-from esker.patchwork import rasters
-from esker.render import previews as module
-from esker.render.card import tags, with_tags
-from esker.render.painting import picture
-from esker.render.previews import Busy, CannotDraw, Previews
-from esker.terrain import Terrain
+from esker.api.terrain import Terrain
+from esker.fairness.shares import Who
+from esker.patchwork.raster import rasters
+from esker.render.pictures import previews as module
+from esker.render.pictures.card import tags, with_tags
+from esker.render.pictures.painting import picture
+from esker.render.pictures.previews import Busy, CannotDraw, Previews
 from tests.sync.harness import LiveServer
+
+ROOT = Path(__file__).resolve().parents[2]
 
 
 def document(terrain: str = "t1", clock: int = 1) -> c.Document:
@@ -125,6 +134,22 @@ def test_sixteen_wait_and_more_are_refused(desk: Desk) -> None:
     assert len(desk.painter.seen) == module.WAITING
 
 
+def test_one_address_does_not_take_all_places(desk: Desk) -> None:
+    """SPEC P452: whoever asked for the pictures of sixteen terrains kept all others from being drawn."""
+
+    async def go() -> None:
+        stranger, other = Who("192.0.2.7"), Who("192.0.2.8")
+        asked = [desk.previews.picture(document(f"t{k}"), stranger) for k in range(module.WAITING)]
+        asked.append(desk.previews.picture(document("mine"), other))
+        found = await asyncio.gather(*asked, return_exceptions=True)
+        assert sum(isinstance(f, Busy) for f in found) == module.WAITING - 6
+        assert not isinstance(found[-1], Exception)
+        await desk.previews.picture(document("again"), stranger)  # places are given back
+
+    desk.run(go)
+    assert ("mine", 1) in desk.painter.seen
+
+
 def test_what_was_asked_for_longest_ago_goes(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
     """V10."""
     monkeypatch.setattr(module, "KEPT", 2)
@@ -181,6 +206,44 @@ def test_a_process_that_dies_is_followed_by_another(tmp_path: Path) -> None:
         assert made.size == (96, 64)
 
 
+DRAWING = """
+import os, sys, time
+from esker.render.pictures.previews import DrawingProcess
+if __name__ == "__main__":
+    process = DrawingProcess()
+    print(process.submit(os.getpid).result(), flush=True)
+    if sys.argv[1] == "busy":
+        process.submit(time.sleep, 600)
+    time.sleep(600)
+"""
+
+
+@pytest.mark.parametrize("how", ["idle", "busy"])
+def test_the_drawing_process_ends_with_a_server_that_is_killed(how: str, tmp_path: Path) -> None:
+    """SPEC P411: it holds both ends of the pipe on which it waits for work, and would wait there for ever."""
+    script = tmp_path / "server.py"
+    script.write_text(DRAWING)
+    command = [sys.executable, str(script), how]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, cwd=ROOT) as server:
+        assert server.stdout is not None
+        child = psutil.Process(int(server.stdout.readline()))
+        family = psutil.Process(server.pid).children(recursive=True)
+        assert child in family
+        server.kill()
+    assert psutil.wait_procs(family, timeout=30)[1] == []
+
+
+def test_a_server_that_stops_does_not_wait_for_a_picture() -> None:
+    """SPEC P411: and Ctrl-C in the terminal, which reaches the child too, says nothing there."""
+    process = module.DrawingProcess()
+    child = psutil.Process(process.submit(os.getpid).result())
+    child.send_signal(signal.SIGINT)
+    picture = process.submit(time.sleep, 600)
+    process.shutdown(wait=True)
+    assert not child.is_running()
+    assert isinstance(picture.exception(), BrokenProcessPool)
+
+
 def test_the_picture_has_the_size_that_cards_want(monkeypatch: pytest.MonkeyPatch) -> None:
     """V8."""
     monkeypatch.setattr(module, "LEVEL", 1)
@@ -209,7 +272,7 @@ def test_elevation_layers_are_in_the_picture(monkeypatch: pytest.MonkeyPatch, tm
 @pytest.fixture
 def server(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[LiveServer]:
     made = functools.partial(Previews, painter=Painter(), executor=lambda: ThreadPoolExecutor(1))
-    monkeypatch.setattr("esker.run.Previews", made)
+    monkeypatch.setattr("esker.server.run.Previews", made)
     page = tmp_path / "page"
     page.mkdir()
     (page / "index.html").write_text("<!doctype html><html><head><title>Esker</title></head><body></body></html>")

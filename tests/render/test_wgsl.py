@@ -10,10 +10,10 @@ import pytest
 
 from esker.render import sources
 from esker.render.device import open_context
-from esker.render.glsl_stage import Bindings, functions, translate
 from esker.render.layout import StructLayout
-from esker.render.wgsl import parse
-from esker.render.wgsl_tree import WgslError
+from esker.wgsl.parse import parse
+from esker.wgsl.stage import Bindings, functions, translate
+from esker.wgsl.tree import WgslError
 
 
 @pytest.fixture(scope="module")

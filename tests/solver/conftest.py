@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from esker.solve.device import Device, open_device, row_kernels
+from esker.solve.opencl.device import Device, open_device, row_kernels
 from esker.solve.solver import Solver
 from tests.solver.failing import STROKES
 from tests.solver.scenes import SETTINGS

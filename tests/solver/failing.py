@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 import pyopencl as cl
 
-from esker.solve import workspaces
+from esker.solve.opencl import workspaces
 from esker.solve.solver import Solver
 from tests.solver.scenes import SCENES, SETTINGS
 

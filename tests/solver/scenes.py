@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
+from esker.api.terrain import Stroke as Make
 from esker.contract import Flank, FlankShape, Stroke, TerrainSettings
-from esker.terrain import Stroke as Make
 
 SIZE = 4096.0
 SETTINGS = TerrainSettings()

@@ -10,26 +10,28 @@ import pytest
 import scipy.sparse.linalg as spla
 from numpy.typing import NDArray
 
+from bench.solver import _exact
 from esker import grid
-from esker.bench import _exact
+from esker.api.terrain import Stroke as Make
 from esker.contract import Channel, Stroke, TerrainSettings
+from esker.events import Done, Level
 from esker.grid import TileKey
-from esker.solve import constraints, reference, reference_raster
+from esker.solve import reference
 from esker.solve.assembly import assemble
 from esker.solve.channels import ChannelSolver, channel_level
-from esker.solve.constraints import Packer, WindowPacker, pack
+from esker.solve.constraints import constraints, raster_reference
+from esker.solve.constraints.constraints import Packer, WindowPacker, pack
+from esker.solve.constraints.packing import Packed, Shape, pack_one
+from esker.solve.constraints.tables import BinBox
 from esker.solve.detail import detailed, settle
-from esker.solve.device import Device, open_device
-from esker.solve.gpu_levels import GpuWorkspace
-from esker.solve.levels import ClWorkspace
-from esker.solve.packing import Packed, Shape, pack_one
-from esker.solve.refine import Refiner
-from esker.solve.refine_cache import FieldCache
-from esker.solve.refine_engine import NumpyEngine
+from esker.solve.opencl.device import Device, open_device
+from esker.solve.opencl.gpu_levels import GpuWorkspace
+from esker.solve.opencl.levels import ClWorkspace
+from esker.solve.refine.cache import FieldCache
+from esker.solve.refine.engine import NumpyEngine
+from esker.solve.refine.refinement import Refiner
 from esker.solve.solver import Basis, Solver
-from esker.solve.tables import BinBox
 from esker.synthesis.interpolate import Window
-from esker.terrain import Stroke as Make
 from tests.solver.bases import Analytic, hills, mirrored, mound, plane, rough
 from tests.solver.scenes import PINNED, SCENES, SETTINGS, SIZE, flank, mixed
 from tests.solver.twins import close, noise, stiffness, tile_device
@@ -39,7 +41,7 @@ FLAT = Analytic("flat", lambda x, y: 0 * (x + y), 0.0, 0.0)
 
 
 def lifted(strokes: Sequence[Stroke], by: float) -> list[Stroke]:
-    """Strokes of the blank sheet, drawn on higher ground."""
+    """Strokes of flat ground, drawn on higher ground."""
 
     def up(p: tuple[float, float, float]) -> tuple[float, float, float]:
         return p[0], p[1], p[2] + by
@@ -62,8 +64,8 @@ def workspace(device: Device, level: int) -> ClWorkspace | GpuWorkspace:
 
 
 def basis_of(solver: Solver, strokes: Sequence[Stroke], level: int, base: Analytic) -> Basis:
-    found = [
-        r.basis for r in solver.steps(strokes, SETTINGS, level, basis=True, base=base) if r is not None and r.basis
+    found: list[Basis] = [
+        r.basis for r in solver.steps(strokes, SETTINGS, level, basis=True, base=base) if isinstance(r, Done)
     ]
     return found[-1]
 
@@ -102,7 +104,7 @@ def test_constraints_are_the_twin_s(kernels: Device, base: Analytic) -> None:
     w = workspace(kernels, level)
     w.load(strokes, PINNED, base)
     under = base.level(level).astype(np.float64)
-    c = reference_raster.rasterise(pack(strokes, PINNED, level, base=base), under)
+    c = raster_reference.rasterise(pack(strokes, PINNED, level, base=base), under)
     static = reference.over_base(c.height_f, c.height_d, c.share, c.target, under, grid.spacing(level, SIZE))
     got = [w.height.get("d", level)[0], w.height.get("s", level)[0], w.gradient.get("d", level)[0]]
     got += list(w.gradient.get("f", level))
@@ -265,7 +267,7 @@ def test_channels_know_how_high_a_crest_stands(solver: Solver) -> None:
     assert got[0.0, False][Channel.ROUGHNESS][row, 128] > 0.85
     assert got[350.0, False][Channel.ROUGHNESS][row, 128] < 0.8
     assert np.array_equal(got[0.0, False][Channel.SNOW], got[350.0, False][Channel.SNOW])
-    results = [r for r in solver.channels([rough_wall], SETTINGS, 4, base=plane(0, 0, 350.0)) if r is not None]
+    results = [r for r in solver.channels([rough_wall], SETTINGS, 4, base=plane(0, 0, 350.0)) if isinstance(r, Level)]
     last = [r for r in results if r.channel == Channel.ROUGHNESS][-1]
     assert np.array_equal(last.heights, got[350.0, False][Channel.ROUGHNESS])
 
@@ -350,10 +352,10 @@ def test_content_is_local(solver: Solver) -> None:
 def test_windows_of_bins_agree() -> None:
     """SPEC S40 over a base: the twin in a window has the bits of the whole level."""
     packer, level = WindowPacker(FIVE, SETTINGS, base=ROUGH), 3
-    whole = reference_raster.rasterise(pack(FIVE, SETTINGS, level, base=ROUGH), ROUGH.level(level))
+    whole = raster_reference.rasterise(pack(FIVE, SETTINGS, level, base=ROUGH), ROUGH.level(level))
     box = (10, 14, 12, 17)
     rows, columns = slice(160, 224), slice(192, 272)
-    part = reference_raster.rasterise(packer.pack(level, box), ROUGH.window(level, rows, columns))
+    part = raster_reference.rasterise(packer.pack(level, box), ROUGH.window(level, rows, columns))
     assert np.array_equal(part.height_f, whole.height_f[rows, columns])
     assert np.array_equal(part.share, whole.share[rows, columns])
     assert part.share.any()
@@ -429,5 +431,5 @@ def test_one_workspace_follows_a_layer(solver: Solver) -> None:
     for k in range(3):
         base = mound(1000 + 100 * k, 2800, 300, 10.0, HILLS)
         found = one.solve(FIVE, SETTINGS, 2, base=base)[2]
-        assert len(one._spare) == 1
+        assert len(one._spares.idle) == 1
         assert np.array_equal(found, solver.solve(FIVE[::-1], SETTINGS, 2, base=base)[2])

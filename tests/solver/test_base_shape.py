@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from esker import grid
+from esker.api.terrain import Stroke as Make
 from esker.contract import Stroke
+from esker.events import Level
 from esker.solve import base as rules
 from esker.solve.base import ground_under
-from esker.solve.crest import crest_of
+from esker.solve.constraints.crest import crest_of
 from esker.solve.solver import Solver
-from esker.terrain import Stroke as Make
 from tests.solver.bases import Analytic, Floats, hills, plane, rough
 from tests.solver.scenes import SETTINGS, SIZE, flank, loop, mixed, wall
 from tests.solver.test_base import lifted
@@ -182,6 +183,8 @@ def test_levels_agree_over_a_base(solver: Solver) -> None:
 def test_previews_over_a_base(solver: Solver, scene_base: Analytic) -> None:
     """SPEC S18 over a base: the finest preview is within 10^-3 of the relief of the ground at rest."""
     strokes = lifted(mixed(12, 9), 300)
-    finest = [r.heights for r in solver.steps(strokes, SETTINGS, 3, base=scene_base) if r is not None and r.level == 3]
+    finest = [
+        r.heights for r in solver.steps(strokes, SETTINGS, 3, base=scene_base) if isinstance(r, Level) and r.level == 3
+    ]
     preview, settled = finest
     assert np.abs(preview - settled).max() <= 1e-3 * np.ptp(settled)

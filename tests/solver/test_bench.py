@@ -12,13 +12,14 @@ import numpy as np
 import pytest
 import scipy.sparse.linalg as spla
 
+from bench.solver import _exact, _kernels, _peers
+from bench.solver import solve as bench
 from esker import grid
-from esker.bench import _exact, _kernels, _peers, gallery
-from esker.bench import solve as bench
 from esker.solve import multigrid, reference
 from esker.solve.assembly import system
-from esker.solve.device import Device
-from esker.solve.levels import ClWorkspace
+from esker.solve.opencl.device import Device
+from esker.solve.opencl.levels import ClWorkspace
+from esker.templates import gallery
 
 
 def problem(device: Device, level: int, name: str) -> tuple[ClWorkspace, _exact.Constraints, _exact.Exact]:
@@ -76,8 +77,10 @@ def test_byte_model() -> None:
     cycle = _kernels.Recorder(4, 1)
     multigrid.cycle(cycle)
     assert one.moved < cycle.moved < 2 * one.moved, "coarser levels add a third of a third"
-    with pytest.raises(NotImplementedError):
-        cycle.change("u", "v")
+    settled = _kernels.Recorder(4, 1)
+    assert list(multigrid.converge(settled, 1e-6)) == [], "a record is at rest after its first cycle"
+    assert settled.launches == cycle.launches + 1, "which a look at both fields follows"
+    assert settled.moved == cycle.moved + 8 * samples
 
 
 @pytest.fixture(scope="module")

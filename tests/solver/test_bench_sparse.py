@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from bench.solver import sparse
 from esker import templates
-from esker.bench import sparse
 from esker.solve.solver import Solver
 
 

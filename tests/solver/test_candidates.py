@@ -2,20 +2,13 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
-from pathlib import Path
-
 import pyopencl as cl
 import pytest
 
-from esker.solve.device import candidates, open_device, row_kernels
-from esker.solve.faults import NoDeviceError
+from esker.solve.opencl.device import candidates, open_device, row_kernels
+from esker.solve.opencl.faults import NoDeviceError
 from esker.solve.solver import Solver
 from tests.solver.failing import Failing
-
-ROOT = Path(__file__).resolve().parents[2]
 
 
 class Fake:
@@ -85,39 +78,3 @@ def test_row_kernels_beside_tiles(monkeypatch: pytest.MonkeyPatch) -> None:
     assert rows.queue is tiles.queue
     assert row_kernels(tiles) is rows
     assert row_kernels(rows) is rows
-
-
-def mirror(source: Path, target: Path) -> None:
-    """A folder like another one, of links to its files."""
-    target.mkdir(parents=True)
-    for entry in source.iterdir():
-        if entry.is_dir() and entry.name != "__pycache__":
-            mirror(entry, target / entry.name)
-        elif entry.is_file():
-            (target / entry.name).symlink_to(entry)
-
-
-def test_a_processor_without_avx512(tmp_path: Path) -> None:
-    """SPEC S2 on narrower vectors: PoCL compiles for haswell, with the built-ins that it has for such processors."""
-    site = Path(cl.__file__).parent.parent
-    for package in ("pyopencl", "pocl_binary_distribution"):
-        if not (site / package).exists():
-            pytest.skip("PoCL is not from its wheel")
-        mirror(site / package, tmp_path / package)
-    library = tmp_path / "pocl_binary_distribution" / ".libs" / "share" / "pocl"
-    narrow, wide = (library / f"kernel-x86_64-unknown-linux-gnu-{level}.bc" for level in ("avx2", "avx512"))
-    wide.unlink()
-    wide.symlink_to(narrow)
-    code = (
-        "import numpy as np; from esker.solve import pocl_cpu; pocl_cpu.cpu_level = lambda *_: 'haswell';"
-        "from esker.solve.solver import Solver; from tests.solver.scenes import *;"
-        "x, y = (Solver(name).solve(SCENES['five'], SETTINGS, 2)[2] for name in ('pocl', 'numpy'));"
-        "assert np.quantile(np.abs(x - y), 0.99) < 1 / 16, np.abs(x - y).max()"
-    )
-    env = os.environ | {
-        "PYTHONPATH": os.pathsep.join((str(tmp_path), str(ROOT))),
-        "POCL_CACHE_DIR": str(tmp_path / "cache"),
-        "ESKER_KERNELS": "rows",
-    }
-    (tmp_path / "cache").mkdir()
-    subprocess.run([sys.executable, "-c", code], check=True, cwd=ROOT, env=env, timeout=300)

@@ -19,13 +19,14 @@ from esker.contract import (
     Stroke,
     TerrainSettings,
 )
-from esker.solve import reference_raster
+from esker.events import Level
 from esker.solve.assembly import system
 from esker.solve.channels import ChannelSolver, channel_level
-from esker.solve.constraints import pack
-from esker.solve.device import open_device
-from esker.solve.sayings import Layer
-from esker.solve.solver import LevelResult, Solver
+from esker.solve.constraints import raster_reference
+from esker.solve.constraints.constraints import pack
+from esker.solve.constraints.sayings import Layer
+from esker.solve.opencl.device import open_device
+from esker.solve.solver import Solver
 
 SETTINGS = TerrainSettings()
 LEVEL = 2
@@ -90,7 +91,7 @@ def test_the_twin_and_a_direct_solve_agree(reach: float | None) -> None:
     roughness = (Channel.ROUGHNESS, BASE_ROUGHNESS, 1 / ROUGHNESS_QUANTA)
     for channel, base, quantum in (amplitude, roughness):
         tables = pack([ROUGH, SMOOTH], settings, LEVEL, Layer(channel, painted=False))
-        d, f, _ = reference_raster.rasterise_channel(tables)
+        d, f, _ = raster_reference.rasterise_channel(tables)
         a, b = system(d, f, tables.screening)
         exact = spla.spsolve(a.tocsc(), b).reshape(d.shape) + base
         assert np.abs(twin[channel] - exact).max() < quantum / 2
@@ -114,7 +115,7 @@ def test_a_failed_raster_is_not_remembered(monkeypatch: pytest.MonkeyPatch) -> N
     solver = ChannelSolver(open_device(), LEVEL)
     list(solver.solve([ROUGH], SETTINGS))
     with monkeypatch.context() as broken:
-        broken.setattr("esker.solve.raster.rasterise_channel", lambda *_: 1 / 0)
+        broken.setattr("esker.solve.opencl.raster.rasterise_channel", lambda *_: 1 / 0)
         with pytest.raises(ZeroDivisionError):
             list(solver.solve([ROUGH, SMOOTH], SETTINGS))
     got = dict(solver.solve([ROUGH, SMOOTH], SETTINGS))
@@ -123,7 +124,7 @@ def test_a_failed_raster_is_not_remembered(monkeypatch: pytest.MonkeyPatch) -> N
 
 def test_a_solve_gives_out_its_channels() -> None:
     """SPEC S63: coarse to fine, final, each the injection of the next finer, two levels below the heights."""
-    results = [r for r in Solver().steps([ROUGH], SETTINGS, 3) if r is not None]
+    results = [r for r in Solver().steps([ROUGH], SETTINGS, 3) if isinstance(r, Level)]
     for channel in set(Channel) - {Channel.HEIGHT, Channel.BASE, Channel.SURVEY}:
         mine = [r for r in results if r.channel == channel]
         assert [r.level for r in mine] == list(range(channel_level(3) + 1))
@@ -134,7 +135,7 @@ def test_a_solve_gives_out_its_channels() -> None:
     order = [(r.channel, r.level, r.settled) for r in results]
     preview, final = (order.index((Channel.HEIGHT, 3, settled)) for settled in (False, True))
     assert order.index((Channel.SNOW, 0, True)) < preview < order.index((Channel.AMPLITUDE, 0, True)) < final
-    finest: LevelResult = results[-1]
+    finest: Level = results[-1]
     assert finest.channel == Channel.HEIGHT
     assert finest.level == 3
     assert [channel_level(top) for top in (0, 1, 2, 4, 6)] == [0, 0, 0, 2, 4]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -10,10 +11,10 @@ import numpy as np
 import pytest
 
 from esker import grid
-from esker.contract import Channel
-from esker.solve import device, pocl_cpu
-from esker.solve.device import open_device
-from esker.solve.faults import NoDeviceError
+from esker.events import Preview, Settled
+from esker.solve.opencl import device
+from esker.solve.opencl.device import open_device
+from esker.solve.opencl.faults import NoDeviceError
 from esker.solve.solver import Solver
 from tests.solver.scenes import ENDLESS, PINNED, SCENES, SETTINGS, SIZE
 
@@ -32,7 +33,7 @@ def test_numpy_gives_the_same(solver: Solver, scene: str, settings: object) -> N
 def test_numpy_says_so() -> None:
     twin = Solver(device="NumPy")
     assert twin.device_name == "NumPy float64 (no OpenCL device)"
-    results = [r for r in twin.steps(SCENES["one"], SETTINGS, 1) if r is not None and r.channel == Channel.HEIGHT]
+    results = [r for r in twin.steps(SCENES["one"], SETTINGS, 1) if isinstance(r, Preview | Settled)]
     assert [r.level for r in results if r.settled] == [0, 1]
     assert results[-1].heights.dtype == np.float32
     assert twin.solve(SCENES["one"], SETTINGS, 1)[1].max() > 200
@@ -70,49 +71,15 @@ def test_a_missing_device_lists_what_there_is(device: device.Device) -> None:
 
 def test_import_touches_no_device() -> None:
     """SPEC H4: importing the solver loads no OpenCL."""
-    code = "import esker, esker.terrain, esker.solve.solver, sys; sys.exit('pyopencl' in sys.modules)"
+    code = "import esker, esker.api.terrain, esker.solve.solver, sys; sys.exit('pyopencl' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
-def test_cpu_level(tmp_path: Path) -> None:
-    """The names that PoCL's compiler is given for processors that it does not know."""
-    for flags, name in (
-        ("fpu avx2 fma bmi2 f16c avx512f avx512bw avx512cd avx512dq avx512vl", "skylake-avx512"),
-        ("fpu sse2 avx avx2 fma bmi2 f16c", "haswell"),
-        ("fpu sse2", "x86-64"),
-        ("fpu sse2 avx f16c", "sandybridge"),
-        ("fpu sse2 avx avx2 fma bmi2 f16c avx512f avx512cd", None),
-        ("fpu sse2 avx avx2", None),
-        ("swp half thumb", None),
-    ):
-        info = tmp_path / "cpuinfo"
-        info.write_text(f"processor : 0\nflags : {flags}\n\nprocessor : 1\nflags : other\n")
-        assert pocl_cpu.cpu_level(info) == name
-
-
-def test_what_pocl_compiles_is_kept_by_processor(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """SPEC S28: code for one processor is never found by another."""
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    folders = []
-    for level in ("skylake-avx512", "haswell"):
-        monkeypatch.setattr(pocl_cpu, "cpu_level", lambda level=level: level)
-        folders.append(pocl_cpu.cache_folder())
-    assert len(set(folders)) == 2
-    assert all(folder is not None and Path(folder).is_dir() for folder in folders)
-    (tmp_path / "file").write_text("")
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
-    assert pocl_cpu.cache_folder() is None
-
-
-@pytest.mark.parametrize("given", [{}, {"POCL_CACHE_DIR": "/mine"}, {"POCL_KERNEL_CACHE": "1"}])
-def test_pocl_is_set_up_unless_somebody_did(monkeypatch: pytest.MonkeyPatch, given: dict[str, str]) -> None:
-    environment = {"HOME": "/nowhere"} | given
-    monkeypatch.setattr("os.environ", environment)
+def test_pocl_gets_its_threads_unless_somebody_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("os.environ", {"HOME": "/nowhere"})
     monkeypatch.setattr(device, "_devices", list)
-    monkeypatch.setattr(pocl_cpu, "cache_folder", lambda: None)
     assert device.candidates(threads=3) == ["numpy"]
-    assert environment["POCL_MAX_PTHREAD_COUNT"] == "3"
-    assert environment.get("POCL_KERNEL_CACHE") == ("0" if not given else given.get("POCL_KERNEL_CACHE"))
+    assert os.environ["POCL_MAX_PTHREAD_COUNT"] == "3"
 
 
 def test_threads_change_nothing(solver: Solver) -> None:

@@ -7,14 +7,18 @@ import pytest
 
 from esker import grid
 from esker.contract import TerrainSettings
-from esker.solve import reference, reference_raster
-from esker.solve.constraints import pack
-from esker.solve.device import Device
+from esker.solve import reference
+from esker.solve.constraints import raster_reference
+from esker.solve.constraints.constraints import pack
+from esker.solve.constraints.tables import LINE_STIFFNESS
+from esker.solve.constraints.tables import PINNED as PINNED_SAMPLE
+from esker.solve.opencl.device import Device
 from esker.solve.reference import BOTTOM_LEVELS
 from tests.solver.scenes import PINNED, SCENES, SETTINGS
 from tests.solver.twins import (
     EPS,
     LEVELS,
+    Field,
     close,
     edited,
     fill,
@@ -83,6 +87,55 @@ def test_coarsen(kernels: Device, level: int, channels: int) -> None:
         close(s.get("f", k), f)
 
 
+def crests(n: int) -> Field:
+    """Crests along lines of samples, fixed and firm, alone and side by side, short and at borders; (1, n, n)."""
+    d = np.zeros((n, n))
+    d[n // 2, 8:-8] = d[8:-8, n // 4] = d[n // 8, 5:] = d[8:-8, n // 4 + 1] = -1
+    d[0, 4:-9] = d[3:-3, -1] = -1
+    d[5, 5:10] = 3.0
+    d[6, 40:60] = d[7, 40:60] = 3.0
+    d[30, 20:22] = -1
+    return d[None]
+
+
+@pytest.mark.parametrize("pinned", [False, True])
+@pytest.mark.parametrize("channels", [1, 2])
+def test_coarsen_crests_on_lines(kernels: Device, channels: int, pinned: bool) -> None:
+    """SPEC S181."""
+    level = 2
+    s, d = new_system(kernels, level, channels), crests(grid.samples(level))
+    if pinned:
+        d[:, [0, -1]] = d[:, :, [0, -1]] = PINNED_SAMPLE
+    f = noise((channels, *d.shape[1:]), 2) * (d < 0)
+    s.put("d", level, d)
+    s.put("f", level, f)
+    s.coarsen(EPS)
+    for k in range(level - 1, -1, -1):
+        d, f = reference.coarsen(d, f)
+        close(s.get("d", k), d)
+        close(s.get("f", k), f)
+        assert (d == LINE_STIFFNESS).sum() > 3 * (grid.samples(k) // 4), "crests are found"
+
+
+@pytest.mark.parametrize("spring", [0.0, 1e-12, 1e-3])
+def test_bottom_of_ground_that_hardly_anything_holds(kernels: Device, spring: float) -> None:
+    """SPEC S183: weak springs set the mean height at once; where they are next to nothing it is that of the base."""
+    s = new_system(kernels, 0, 1)
+    d, f = np.zeros((1, 65, 65)), np.zeros((1, 65, 65))
+    d[0, 20:24, 30:36] = spring
+    f[0, 20:24, 30:36] = 100 * spring
+    f[0, 10, 10:50], f[0, 12, 10:50] = 1.0, -1.0  # a slope
+    s.put("d", 0, d)
+    s.put("f", 0, f)
+    s.coarsen(0.0)
+    s.bottom(rhs="f", out="u", cycles=24)
+    twin = reference.NumpySystem(d, f, 0.0, 0)
+    twin.bottom(rhs="f", out="u", cycles=24)
+    close(s.get("u", 0), twin.fields["u", 0])
+    mean = float((reference.control_volumes(65) * s.get("u", 0)[0]).sum()) / 64**2
+    assert mean == pytest.approx(100.0 if spring == 1e-3 else 0.0, abs=4.0)
+
+
 @pytest.mark.parametrize("channels", [1, 2])
 @pytest.mark.parametrize("cycles", [1, 3])
 def test_bottom(kernels: Device, channels: int, cycles: int) -> None:
@@ -137,7 +190,7 @@ def test_rasterise(kernels: Device, scene: str, settings: TerrainSettings) -> No
     level = 3
     w = new_workspace(kernels, level)
     w.load(SCENES[scene], settings)
-    c = reference_raster.rasterise(pack(SCENES[scene], settings, level))
+    c = raster_reference.rasterise(pack(SCENES[scene], settings, level))
     pairs = (
         (w.height.get("d", level)[0], c.height_d, 2e-3),
         (w.height.get("s", level)[0], c.height_f, 2e-3),

@@ -6,10 +6,10 @@ import numpy as np
 import pyopencl as cl
 import pytest
 
-from esker.solve import device as devices
-from esker.solve import proof
-from esker.solve.device import Device, candidates, open_device
-from esker.solve.faults import (
+from esker.solve.opencl import device as devices
+from esker.solve.opencl import program_text, proof
+from esker.solve.opencl.device import Device, candidates, open_device
+from esker.solve.opencl.faults import (
     BuildError,
     DeviceError,
     DeviceLostError,
@@ -18,8 +18,8 @@ from esker.solve.faults import (
     classify,
     guarded,
 )
-from esker.solve.gpu_levels import GpuWorkspace
-from esker.solve.levels import ClWorkspace
+from esker.solve.opencl.gpu_levels import GpuWorkspace
+from esker.solve.opencl.levels import ClWorkspace
 from esker.solve.solver import Solver
 from tests.solver.failing import (
     BUILD_FAILURE,
@@ -94,7 +94,7 @@ def test_a_fault_in_the_middle_of_a_solve(
             heights(used) if after else used.solve(STROKES[1:], SETTINGS, 2)
     assert failing.calls == after + 1
     assert isinstance(caught.value.__cause__, cl.Error)
-    assert used._spare == []
+    assert used._spares.idle == []
     assert held(used) == 0, "even though the error, with its frames, is still here"
     assert np.array_equal(heights(used), expected)
     assert held(used) == before
@@ -114,11 +114,11 @@ def test_a_fault_while_reading(used: Solver, monkeypatch: pytest.MonkeyPatch) ->
 def test_build_failure(monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:
     """SPEC S23: kernels that do not compile are a BuildError; without a wish NumPy serves."""
     monkeypatch.setattr(devices, "_opened", {})
-    monkeypatch.setattr(devices, "_source", lambda _: "kernel void broken( { }")
+    monkeypatch.setattr(program_text, "source", lambda _: "kernel void broken( { }")
     name = candidates()[0]
     if name == "numpy":
         pytest.skip("no OpenCL device")
-    found = devices._found(None)[0]
+    found = devices.listed(None)[0]
     with pytest.raises(BuildError, match=r"could not compile the solver's kernels \(.*error: .*\)\.$"):
         devices._open(*found)
     with pytest.raises(NoDeviceError, match="does not work"):
@@ -129,9 +129,9 @@ def test_build_failure(monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptur
 
 
 def test_a_program_without_kernels(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(devices, "_source", lambda _: "kernel void other(global float *a) { a[0] = 1.0f; }")
+    monkeypatch.setattr(program_text, "source", lambda _: "kernel void other(global float *a) { a[0] = 1.0f; }")
     with pytest.raises(BuildError, match="without kernels"):
-        devices._open(*devices._found(None)[0])
+        devices._open(*devices.listed(None)[0])
 
 
 def test_no_platform(monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:

@@ -16,14 +16,14 @@ from hypothesis import strategies as st
 
 import esker
 from esker import Stroke, Terrain
+from esker.cli import solve
 from esker.contract import Document, Flank, TerrainSettings
 from esker.document import archive
 from esker.document.archive import ArchiveError
 from esker.document.strokes import world_points
-from esker.solve import command
-from esker.solve.crest import crest_of
-from esker.solve.heightmap import quantised
-from esker.solve.solver import LevelResult
+from esker.events import PAUSE, Preview, Settled, SolveEvent
+from esker.exporting.heightmap import quantised
+from esker.solve.constraints.crest import crest_of
 from tests.solver.scenes import SCENES, mixed
 
 DOCUMENT = Document(
@@ -75,7 +75,7 @@ def test_a_file_from_before_paint_opens_unchanged() -> None:
         (zipped(esker_json=HEADER), "has no document.json"),
         (zipped(esker_json=b"{", document_json=BODY), "damaged"),
         (zipped(esker_json=b"[]", document_json=BODY), "not an .esker file"),
-        (zipped(esker_json=b'{"format": "esker-terrain", "version": 4}', document_json=BODY), "newer"),
+        (zipped(esker_json=b'{"format": "esker-terrain", "version": 6}', document_json=BODY), "newer"),
         (zipped(esker_json=HEADER, document_json=b'{"id": "t", "strokes": 3}'), "strokes"),
         (zipped(esker_json=HEADER, document_json=b'{"id": "t", "clock": NaN}'), "not valid"),
         (zipped(esker_json=HEADER, document_json=b" " * 40_000_000), "unpacks to more"),
@@ -204,7 +204,7 @@ def test_solve_command(tmp_path: Path, kind: str, capsys: pytest.CaptureFixture[
     document = Document(id="t", strokes=tuple(SCENES["one"]))
     source, out = tmp_path / f"t.{kind}", tmp_path / "h.npy"
     source.write_bytes(archive.dumps(document) if kind == "esker" else document.model_dump_json().encode())
-    assert command.main([str(source), "--level", "1", "-o", str(out)]) == 0
+    assert solve.main([str(source), "--level", "1", "-o", str(out)]) == 0
     heights = np.load(out)
     assert np.array_equal(heights, Terrain.from_document(document).heights(1))
     assert "settled" in capsys.readouterr().err
@@ -219,7 +219,7 @@ def test_heightmaps_of_sixteen_bits(tmp_path: Path, kind: str, capsys: pytest.Ca
     terrain = Terrain.from_document(Document(id="t", strokes=tuple(SCENES["one"])))
     source, out = tmp_path / "t.esker", tmp_path / f"h.{kind}"
     terrain.save(source)
-    assert command.main([str(source), "--level", "1", "-q", "-o", str(out)]) == 0
+    assert solve.main([str(source), "--level", "1", "-q", "-o", str(out)]) == 0
     found = re.search(r"^129 x 129 samples, north first: 0 is (\S+) m, 65535 is (\S+) m$", capsys.readouterr().out)
     assert found
     low, high = map(float, found.groups())
@@ -242,11 +242,11 @@ class Terminal(io.StringIO):
         return True
 
 
-def walk(progress: command.Progress, cycles: int, now: list[float]) -> None:
+def walk(progress: solve.Progress, cycles: int, now: list[float]) -> None:
     """What a solve of level 2 reports, a tenth of a second a step."""
     ground = np.zeros((2, 2), dtype=np.float32)
-    steps = [*(LevelResult(level, ground, settled=False) for level in range(3)), *[None] * cycles]
-    for result in [*steps, LevelResult(2, ground, settled=True)]:
+    steps: list[SolveEvent] = [*(Preview(level, ground) for level in range(3)), *[PAUSE] * cycles]
+    for result in [*steps, Settled(2, ground)]:
         now[0] += 0.1
         progress.step(result)
 
@@ -255,7 +255,7 @@ def walk(progress: command.Progress, cycles: int, now: list[float]) -> None:
 def test_progress_on_a_terminal(cycles: int) -> None:
     """SPEC S21: one line that changes; the share rises and stays below 100 % until the end."""
     now, stream = [0.0], Terminal()
-    progress = command.Progress(stream, 2, lambda: now[0])
+    progress = solve.Progress(stream, 2, lambda: now[0])
     progress.show()
     walk(progress, cycles, now)
     assert 0.2 < progress.share() < 1
@@ -273,7 +273,7 @@ def test_progress_on_a_terminal(cycles: int) -> None:
 def test_progress_in_a_log() -> None:
     """Plain lines: one a level, and while nothing else is said one every two seconds."""
     now, stream = [0.0], io.StringIO()
-    progress = command.Progress(stream, 2, lambda: now[0])
+    progress = solve.Progress(stream, 2, lambda: now[0])
     walk(progress, 45, now)
     progress.close("done")
     text = stream.getvalue()
@@ -297,7 +297,7 @@ def test_solve_command_errors(tmp_path: Path, capsys: pytest.CaptureFixture[str]
         ([str(good), "-o", str(tmp_path / "no" / "h.npy")], "no folder"),
         ([str(good), "-o", out, "--device", "abacus"], "abacus"),
     ):
-        assert command.main(argv) == 1
+        assert solve.main(argv) == 1
         assert says in capsys.readouterr().err
     with pytest.raises(SystemExit):
-        command.main([str(good), "-o", out, "--level", "9"])
+        solve.main([str(good), "-o", out, "--level", "9"])

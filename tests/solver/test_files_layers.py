@@ -7,10 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from esker import cli
+from esker.api.terrain import Stroke, Terrain
+from esker.cli import main, solve
 from esker.document import archive
-from esker.solve import command
-from esker.terrain import Stroke, Terrain
 from tests.solver.scenes import SIZE, flank
 
 
@@ -30,7 +29,7 @@ def test_solve_command_stands_on_the_layers(terrain: Terrain, tmp_path: Path, ex
     file, out = tmp_path / "t.esker", tmp_path / "h.npy"
     terrain.save(file)
     level = 5 if extra[:1] == ["--window"] else 2
-    assert cli.main(["solve", str(file), "-q", "-o", str(out), "--level", str(level), *extra]) == 0
+    assert main.main(["solve", str(file), "-q", "-o", str(out), "--level", str(level), *extra]) == 0
     heights = np.load(out)
     if not extra:
         assert np.array_equal(heights, terrain.heights(2))
@@ -49,10 +48,10 @@ def test_grids_that_are_not_at_hand_are_said(
     """A document alone has no grids, and the solver alone does not know layers."""
     file, out = tmp_path / "t.json", tmp_path / "h.npy"
     file.write_text(terrain.document.model_dump_json())
-    assert cli.main(["solve", str(file), "-q", "-o", str(out)]) == 1
+    assert main.main(["solve", str(file), "-q", "-o", str(out)]) == 1
     assert "not at hand" in capsys.readouterr().err
     whole = tmp_path / "t.esker"
     whole.write_bytes(archive.dumps(terrain.document, terrain.grids))
-    assert command.main([str(whole), "-q", "-o", str(out)]) == 1
+    assert solve.main([str(whole), "-q", "-o", str(out)]) == 1
     assert "elevation layers" in capsys.readouterr().err
     assert not out.exists()

@@ -5,14 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from bench.solver import _accuracy, _exact
 from esker import grid
-from esker.bench import _accuracy, _exact, gallery
+from esker.cli import solve
 from esker.contract import Border
 from esker.document import archive
-from esker.solve import command
-from esker.solve.device import Device
-from esker.solve.levels import ClWorkspace
+from esker.solve.opencl.device import Device
+from esker.solve.opencl.levels import ClWorkspace
 from esker.solve.solver import Solver
+from esker.templates import gallery
 
 
 def test_drawing_again_changes_nothing() -> None:
@@ -22,7 +23,7 @@ def test_drawing_again_changes_nothing() -> None:
     assert {path.stem for path in gallery.FOLDER.iterdir()} == set(gallery.NAMES)
     for name, document in drawn.items():
         text = (gallery.FOLDER / f"{name}.json").read_text(encoding="utf-8")
-        assert gallery.to_json(document) == text, f"{name} is stale: run python -m esker.bench.gallery"
+        assert gallery.to_json(document) == text, f"{name} is stale: run python -m esker.templates.gallery"
         assert archive.document_from_json(text.encode()) == document
 
 
@@ -43,7 +44,7 @@ def test_what_the_gallery_holds() -> None:
 def test_solve_command_on_every_scene(name: str, tmp_path, capsys: pytest.CaptureFixture[str]) -> None:  # type: ignore[no-untyped-def]
     """SPEC S21."""
     out = tmp_path / "heights.npy"
-    assert command.main([str(gallery.FOLDER / f"{name}.json"), "--level", "2", "-o", str(out)]) == 0
+    assert solve.main([str(gallery.FOLDER / f"{name}.json"), "--level", "2", "-o", str(out)]) == 0
     heights = np.load(out)
     assert heights.shape == (257, 257)
     assert np.isfinite(heights).all()

@@ -10,14 +10,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bench.solver import gpu_model
 from esker import grid
-from esker.bench import gpu_model
 from esker.contract import TerrainSettings
 from esker.solve import reference
-from esker.solve.device import Device
-from esker.solve.gpu_levels import GpuLauncher, GpuSystem, GpuWorkspace
-from esker.solve.gpu_program import Plan, plan
-from esker.solve.levels import ClWorkspace
+from esker.solve.opencl.device import Device
+from esker.solve.opencl.gpu_levels import GpuLauncher, GpuSystem, GpuWorkspace
+from esker.solve.opencl.gpu_program import Plan, plan
+from esker.solve.opencl.levels import ClWorkspace
 from esker.solve.passes import previews, to_rest
 from esker.solve.solver import Solver
 from esker.solve.solving import Solving

@@ -10,10 +10,10 @@ import pytest
 
 from esker import grid
 from esker.contract import CHEBYSHEV_SWEEPS
-from esker.solve import device as devices
-from esker.solve import gpu_program
-from esker.solve.device import Device
-from esker.solve.gpu_levels import BLOCK, GpuLauncher, GpuSystem, bottom_table
+from esker.solve.opencl import device as devices
+from esker.solve.opencl import gpu_program, program_text
+from esker.solve.opencl.device import Device
+from esker.solve.opencl.gpu_levels import BLOCK, GpuLauncher, GpuSystem, bottom_table
 from esker.solve.reference import BOTTOM_LEVELS, chebyshev_weights
 from tests.solver.twins import EPS, noise, stiffness, tile_device
 
@@ -30,9 +30,9 @@ def tiles() -> Device:
 def plain_launcher(tiles: Device) -> GpuLauncher:
     """Launches the plain kernels on the same queue."""
     assert tiles.plan is not None
-    files = devices._files()
+    files = program_text.files()
     texts = [files[name] for name in ("gpu_level.cl", "gpu_setup.cl", "gpu_plain.cl")]
-    source = devices._defines(gpu_program.defines(tiles.plan)) + "\n".join(texts)
+    source = program_text.defines(gpu_program.defines(tiles.plan)) + "\n".join(texts)
     return GpuLauncher(replace(tiles, program=devices._compile(tiles.context, source, tiles.plan)))
 
 

@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from esker.solve import device as device_module
-from esker.solve import reference, reference_raster
-from esker.solve.constraints import Packer, bins, pack
-from esker.solve.device import Device
-from esker.solve.levels import PAD, ClSystem, Launcher
-from esker.solve.tables import STROKE_AT
+from esker.solve import reference
+from esker.solve.constraints import raster_reference
+from esker.solve.constraints.constraints import Packer, bins, pack
+from esker.solve.constraints.tables import STROKE_AT
+from esker.solve.opencl import program_text
+from esker.solve.opencl.device import Device
+from esker.solve.opencl.levels import PAD, ClSystem, Launcher
 from tests.solver.scenes import PINNED, SCENES, SETTINGS
 from tests.solver.twins import EPS, LEVELS, Field, fill, noise
 
@@ -46,11 +47,11 @@ def test_visit_does_not_depend_on_the_strips(device: Device, strips: int, channe
 def plain(device: Device) -> dict[str, Any]:
     """The kernels of plain.cl, which the product does not use."""
     cl = pytest.importorskip("pyopencl")
-    folder = device_module.shader_folder()
+    folder = program_text.shader_folder()
     source = "".join((folder / name).read_text() for name in ("rows.cl", "plain.cl"))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", cl.CompilerWarning)
-        program = cl.Program(device.context, device_module._defines({}) + source).build(["-cl-mad-enable"])
+        program = cl.Program(device.context, program_text.defines({}) + source).build(["-cl-mad-enable"])
     return {kernel.function_name.removeprefix("plain_"): kernel for kernel in program.all_kernels()}
 
 
@@ -131,12 +132,12 @@ def test_nearest_segment_is_that_of_a_full_search() -> None:
     """The candidates of a bin always hold the nearest segment of every sample."""
     tables = pack(SCENES["loops"], SETTINGS, 2)
     for k, (first, count, *_) in enumerate(tables.index):
-        seg = tables.segments[:, first : first + count]
+        seg = tables.segments[:, first : first + count].astype(np.float64)
         y, x = np.mgrid[: bins(257) * 16 : 1, : bins(257) * 16 : 1].astype(float)
-        near = reference_raster._nearest(tables, k, blocks(x), blocks(y))
+        near = raster_reference._nearest(tables, k, blocks(x), blocks(y))
         best = np.full(x.shape, 1e30)
         for j in range(count):
-            best = np.minimum(best, reference_raster._distance2(seg[:, j], x, y))
+            best = np.minimum(best, raster_reference._distance2(seg[:, j], x, y))
         best = np.sqrt(blocks(best))
         within = best <= tables.strokes[k, STROKE_AT["reach"]]
         assert np.allclose(near.distance[within], best[within])

@@ -6,16 +6,17 @@ import numpy as np
 import pytest
 
 from esker import grid
-from esker.bench import gallery
+from esker.events import Done
 from esker.solve.solver import Basis, Solver
+from esker.templates import gallery
 
 
 def settled(solver: Solver, level: int) -> Basis:
     """The scene of fifty strokes at rest, many of them across another's flank, wide and narrow ones."""
     document = gallery.load("fifty")
-    found = None
+    found: Basis | None = None
     for result in solver.steps(document.strokes, document.settings, level, basis=True):
-        found = found if result is None or result.basis is None else result.basis
+        found = result.basis if isinstance(result, Done) else found
     assert found is not None
     return found
 

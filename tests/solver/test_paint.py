@@ -14,13 +14,14 @@ from esker import Stroke as Make
 from esker import Terrain
 from esker import contract as c
 from esker.contract import AMPLITUDE_QUANTA_PER_M, BIAS_QUANTA, Channel, Stroke, TerrainSettings
-from esker.fractal import ALPHA, PAINT_LESS, PAINT_MORE
-from esker.solve import reference_raster
+from esker.contract.fractal import ALPHA, PAINT_LESS, PAINT_MORE
+from esker.events import Level
 from esker.solve.assembly import system
 from esker.solve.channels import ChannelSolver, at_base
-from esker.solve.constraints import Packer, WindowPacker, pack
-from esker.solve.device import Device, open_device
-from esker.solve.sayings import PAINTED, Layer, speakers
+from esker.solve.constraints import raster_reference
+from esker.solve.constraints.constraints import Packer, WindowPacker, pack
+from esker.solve.constraints.sayings import PAINTED, Layer, speakers
+from esker.solve.opencl.device import Device, open_device
 from esker.solve.solver import Solver
 from tests.solver.twins import tile_device
 
@@ -88,7 +89,7 @@ def test_the_twin_and_a_direct_solve_agree(reach: float | None) -> None:
     strokes = [paint("snow", 1.0), paint("snow", -0.6, 90, line=[(1800, 1000), (2100, 2100)]), MOUNTAIN]
     fast, twin = (solved(strokes, settings, device)[Channel.SNOW] for device in (None, "numpy"))
     tables = pack(strokes, settings.model_copy(update={"reach_m": 16.0}), LEVEL, Layer(Channel.SNOW, painted=True))
-    d, f, _ = reference_raster.rasterise_channel(tables)
+    d, f, _ = raster_reference.rasterise_channel(tables)
     a, b = system(d, f, tables.screening)
     exact = spla.spsolve(a.tocsc(), b).reshape(d.shape)
     assert np.abs(twin - exact).max() < 0.5 / BIAS_QUANTA
@@ -192,8 +193,8 @@ def test_channels_alone_are_those_of_a_solve() -> None:
     """SPEC S63."""
     strokes = [MOUNTAIN, paint("snow", 1.0), paint("amplitude", 0.3)]
     solver = Solver()
-    whole = [r for r in solver.steps(strokes, SETTINGS, 3) if r is not None and r.channel != Channel.HEIGHT]
-    alone = [r for r in Solver().channels(strokes, SETTINGS, 3) if r is not None]
+    whole = [r for r in solver.steps(strokes, SETTINGS, 3) if isinstance(r, Level) and r.channel != Channel.HEIGHT]
+    alone = [r for r in Solver().channels(strokes, SETTINGS, 3) if isinstance(r, Level)]
     one, other = ({(r.channel, r.level, r.settled): r.heights for r in some} for some in (whole, alone))
     assert len(whole) == len(one) == len(alone)
     assert one.keys() == other.keys()

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from esker.bench import _solver, plots, report
+from bench import report
+from bench.solver import _solver, plots
 
 RESULT = report.result("solve")
 
@@ -16,7 +17,7 @@ RESULT = report.result("solve")
 def test_tables_in_the_documents_are_fresh() -> None:
     """SPEC S86: figures in docs/solver.md and README.md are those of bench/results."""
     for path, text in report.documents().items():
-        assert path.read_text(encoding="utf-8") == text, f"{path.name}: run python -m esker.bench.report"
+        assert path.read_text(encoding="utf-8") == text, f"{path.name}: run python -m bench.report"
     assert report.main(["--check"]) == 0
 
 

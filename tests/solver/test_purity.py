@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 
 from esker import grid
+from esker.api.terrain import Stroke as Make
 from esker.contract import Channel, Stroke
-from esker.solve.device_workspace import DeviceWorkspace
-from esker.solve.sayings import BASES
-from esker.solve.solver import LevelResult, Solver
-from esker.solve.tables import Tables, Window
-from esker.terrain import Stroke as Make
+from esker.events import Level, Preview, Settled
+from esker.solve.constraints.sayings import BASES
+from esker.solve.constraints.tables import Tables, Window
+from esker.solve.opencl.device_workspace import DeviceWorkspace
+from esker.solve.solver import Solver
 from tests.solver.scenes import PINNED, SCENES, SETTINGS, SIZE, flank, mixed, ridge
 
 TOP = 3
@@ -70,7 +71,7 @@ def test_warm_start(solver: Solver, scene: str) -> None:
 
 def test_steps_of_a_solve(solver: Solver) -> None:
     """SPEC S16."""
-    results = [r for r in solver.steps(SCENES["five"], SETTINGS, TOP) if r is not None and r.channel == Channel.HEIGHT]
+    results = [r for r in solver.steps(SCENES["five"], SETTINGS, TOP) if isinstance(r, Preview | Settled)]
     previews = [r for r in results if not r.settled]
     settled = [r for r in results if r.settled]
     assert [r.level for r in previews] == list(range(TOP + 1))
@@ -100,55 +101,59 @@ def test_the_coarsest_preview_waits_for_no_fine_raster(solver: Solver, monkeypat
     first = []
     for one in (Solver(), solver):
         for before in [] if one is not solver else [strokes[3:], strokes[:9]]:
-            one.solve(before, SETTINGS, 4, should_stop=lambda: True)
+            shown: list[object] = []
+            one.solve(before, SETTINGS, 4, on_level=shown.append, should_stop=lambda: len(shown) > 0)  # noqa: B023
         rasterised.clear()
         steps = one.steps(strokes, SETTINGS, 4)
-        first.append(next(steps))
+        first.append(next(r for r in steps if isinstance(r, Level)))
         paint = [next(steps) for _ in range(3 * len(BASES))]
-        assert Channel.SNOW in {r.channel for r in paint if r is not None}
+        assert Channel.SNOW in {r.channel for r in paint if isinstance(r, Level)}
         assert rasterised == [2]
-        previews = [first[-1], *(r for r in steps if r is not None and r.channel == Channel.HEIGHT and not r.settled)]
-        assert [r.level for r in previews if r is not None] == [0, 1, 2, 3, 4]
+        previews = [
+            first[-1],
+            *(r for r in steps if isinstance(r, Preview | Settled) and not r.settled),
+        ]
+        assert [r.level for r in previews if isinstance(r, Level)] == [0, 1, 2, 3, 4]
         assert 4 in rasterised
-    a, b = (r.heights for r in first if r is not None)
+    a, b = (r.heights for r in first if isinstance(r, Level))
     assert np.array_equal(a, b)
-    kept = solver._spare[-1].packer
+    kept = solver._spares.idle[-1].packer
     stopped = solver.steps(strokes[1:], SETTINGS, 4)
-    next(stopped)
+    next(r for r in stopped if isinstance(r, Level))
     stopped.close()
     assert kept.likeness(strokes, SETTINGS) == len(strokes), "the fine raster is as it was: nothing of it began"
     settled = solver.solve(strokes, SETTINGS, 4)[0]
     assert np.sqrt(np.mean((a - settled) ** 2)) < 0.05 * np.ptp(settled)
 
 
-def test_a_glimpse_of_newer_strokes_changes_nothing_of_a_solve(solver: Solver) -> None:
+def test_an_early_preview_of_newer_strokes_changes_nothing_of_a_solve(solver: Solver) -> None:
     """SPEC S17: it is what their own solve begins with, to the bit, and that may then begin without it."""
     older, newer = SCENES["fifty"][3:], SCENES["fifty"]
     first = Solver()
     for one in (first, solver):  # both know the same ground of before
         one.solve(older[9:], SETTINGS, 4)
-    plain = [r.heights for r in first.steps(older, SETTINGS, 4) if r is not None and r.level == 4]
+    plain = [r.heights for r in first.steps(older, SETTINGS, 4) if isinstance(r, Level) and r.level == 4]
     own = next(first.steps(newer, SETTINGS, 4))
-    steps, glimpses, levels = solver.steps(older, SETTINGS, 4), [], []
-    assert steps.glimpse(newer, SETTINGS) is None, "it has not begun"
+    steps, early, levels = solver.steps(older, SETTINGS, 4), [], []
+    assert steps.early_preview(newer, SETTINGS) is None, "it has not begun"
     for r in steps:
-        glimpses.append(steps.glimpse(newer, SETTINGS))
-        if r is not None and r.channel == Channel.HEIGHT and r.level == 4:
+        early.append(steps.early_preview(newer, SETTINGS))
+        if isinstance(r, Preview | Settled) and r.level == 4:
             levels.append(r.heights)
-    assert steps.glimpse(newer, SETTINGS) is None, "it has ended"
-    assert own is not None
-    assert len(glimpses) > 8
-    for glimpse in glimpses:
-        assert glimpse is not None
-        assert np.array_equal(glimpse.heights, own.heights)
+    assert steps.early_preview(newer, SETTINGS) is None, "it has ended"
+    assert isinstance(own, Level)
+    assert len(early) > 8
+    for preview in early:
+        assert preview is not None
+        assert np.array_equal(preview.heights, own.heights)
     assert [np.array_equal(a, b) for a, b in zip(plain, levels, strict=True)] == [True, True]
-    rest = [r for r in solver.steps(newer, SETTINGS, 4, coarsest=False) if r is not None and not r.settled]
+    rest = [r for r in solver.steps(newer, SETTINGS, 4, coarsest=False) if isinstance(r, Level) and not r.settled]
     assert sorted(r.level for r in rest if r.channel == Channel.HEIGHT) == [1, 2, 3, 4]
 
 
 def previewed(solver: Solver, strokes: list[Stroke]) -> tuple[list[int], np.ndarray, np.ndarray]:
     """Levels of the previews in order, the finest one, and the settled ground."""
-    results = [r for r in solver.steps(strokes, SETTINGS, 4) if r is not None and r.channel == Channel.HEIGHT]
+    results = [r for r in solver.steps(strokes, SETTINGS, 4) if isinstance(r, Preview | Settled)]
     preview, settled = (r.heights for r in results if r.level == 4)
     return [r.level for r in results if not r.settled], preview, settled
 
@@ -163,7 +168,7 @@ def test_an_edit_is_shown_from_the_ground_before_it(solver: Solver) -> None:
     for end in range(count - 6, count):
         part = [*others, pen.model_copy(update={"curve": pen.curve[:end]})]
         steps = solver.steps(part, SETTINGS, 4)
-        previews = (r for r in steps if r is not None and r.channel == Channel.HEIGHT)
+        previews = (r for r in steps if isinstance(r, Preview | Settled))
         assert [next(previews).level for _ in range(2)] == [0, 4]
         steps.close()
     levels, preview, settled = previewed(solver, SCENES["fifty"])
@@ -183,7 +188,7 @@ def test_ground_that_is_not_what_it_was_is_not_begun_with() -> None:
     assert previewed(solver, strokes)[0] == whole, "nine more are not"
     left = solver.steps(strokes, SETTINGS, 4)
     for result in left:  # up to the step after the last coarse level, in which the finest is begun again
-        if result is not None and result.channel == Channel.HEIGHT and result.level == 3:
+        if isinstance(result, Level) and result.channel == Channel.HEIGHT and result.level == 3:
             break
     next(left)
     left.close()
@@ -193,7 +198,7 @@ def test_ground_that_is_not_what_it_was_is_not_begun_with() -> None:
 @pytest.mark.parametrize("scene", list(SCENES))
 def test_previews_are_close(solver: Solver, scene: str) -> None:
     """SPEC S18."""
-    results = [r for r in solver.steps(SCENES[scene], SETTINGS, TOP) if r is not None and r.level == TOP]
+    results = [r for r in solver.steps(SCENES[scene], SETTINGS, TOP) if isinstance(r, Level) and r.level == TOP]
     preview, settled = results
     relief = max(float(np.ptp(settled.heights)), 1.0)
     assert np.abs(preview.heights - settled.heights).max() <= 1e-3 * relief
@@ -219,7 +224,7 @@ def test_interleaved_solves(solver: Solver) -> None:
              ("loops", SETTINGS, 3), ("one", SETTINGS, 0))]  # fmt: skip
     alone = [Solver().solve(*job)[job[2]] for job in jobs]
     running = {k: solver.steps(*job) for k, job in enumerate(jobs)}
-    last: dict[int, LevelResult] = {}
+    last: dict[int, Level] = {}
     while running:
         for k in list(running):
             try:
@@ -227,14 +232,14 @@ def test_interleaved_solves(solver: Solver) -> None:
             except StopIteration:
                 del running[k]
                 continue
-            if result is not None:
+            if isinstance(result, Level):
                 last[k] = result  # heights of the finest level come last
     for k, heights in enumerate(alone):
         assert np.array_equal(last[k].heights, heights)
 
 
 def test_stop_between_levels(solver: Solver) -> None:
-    seen: list[LevelResult] = []
+    seen: list[Level] = []
     pyramid = solver.solve(SCENES["five"], SETTINGS, 3, on_level=seen.append, should_stop=lambda: len(seen) == 2)
     assert not pyramid.settled
     assert len(pyramid) == 2
@@ -257,8 +262,8 @@ def test_an_error_while_loading_is_not_remembered(solver: Solver, monkeypatch: p
         raise RuntimeError("lost the device")
 
     with monkeypatch.context() as patch:
-        patch.setattr("esker.solve.levels.ClSystem.coarsen", fail)
-        patch.setattr("esker.solve.gpu_levels.GpuSystem.coarsen", fail)
+        patch.setattr("esker.solve.opencl.levels.ClSystem.coarsen", fail)
+        patch.setattr("esker.solve.opencl.gpu_levels.GpuSystem.coarsen", fail)
         patch.setattr("esker.solve.reference.coarsen", fail)
         with pytest.raises(RuntimeError):
             solver.solve(SCENES["five"][1:], SETTINGS, 2)

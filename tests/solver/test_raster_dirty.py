@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from esker.api.terrain import Stroke as Make
 from esker.contract import Stroke, StrokeFields
 from esker.document.strokes import world_points
-from esker.solve import packing
-from esker.solve.constraints import BIN, Packer, bins, everything, whole
-from esker.solve.device import Device
-from esker.solve.levels import ClWorkspace
-from esker.solve.packing import window_of
-from esker.terrain import Stroke as Make
+from esker.solve.constraints import packing
+from esker.solve.constraints.constraints import BIN, Packer, bins, everything, whole
+from esker.solve.constraints.packing import window_of
+from esker.solve.opencl.device import Device
+from esker.solve.opencl.levels import ClWorkspace
 from tests.solver.scenes import SCENES, SETTINGS, flank
 
 LEVEL = 3

@@ -10,15 +10,16 @@ import pytest
 from numpy.typing import NDArray
 
 from esker import grid
+from esker.api.terrain import Stroke as Make
 from esker.contract import MAX_REFINED_LEVEL, Channel, Stroke, TerrainSettings
-from esker.fractal import PAINT_LESS, PAINT_MORE
-from esker.solve import constraints, packing, raster, reference_raster
-from esker.solve.constraints import BIN, BinBox, Shapes, Tables, WindowPacker, bins, everything, pack
-from esker.solve.device import Device
-from esker.solve.levels import PAD, ClWorkspace, Launcher
-from esker.solve.packing import Shape
-from esker.solve.sayings import Layer, natural_amplitude_m
-from esker.terrain import Stroke as Make
+from esker.contract.fractal import PAINT_LESS, PAINT_MORE
+from esker.solve.constraints import constraints, packing, raster_reference
+from esker.solve.constraints.constraints import BIN, BinBox, Shapes, Tables, WindowPacker, bins, everything, pack
+from esker.solve.constraints.packing import Shape
+from esker.solve.constraints.sayings import Layer, natural_amplitude_m
+from esker.solve.opencl import raster
+from esker.solve.opencl.device import Device
+from esker.solve.opencl.levels import PAD, ClWorkspace, Launcher
 from tests.solver.scenes import PINNED, SCENES, SETTINGS, SIZE, flank, loop, ridge
 
 SCENE = [
@@ -63,7 +64,7 @@ def on_device(device: Device, tables: Tables) -> Window:
 
 def on_host(tables: Tables) -> Window:
     """What the twin says of the tables' box."""
-    c = reference_raster.rasterise(tables)
+    c = raster_reference.rasterise(tables)
     return Window(tables.box, np.stack([c.height_d, c.height_f, c.gradient_d, *c.gradient_f]))
 
 
@@ -138,7 +139,7 @@ def test_channels_of_a_window(device: Device, level: int) -> None:
         host = np.empty(3 * rows * pitch + PAD, dtype=np.float32)
         launch.cl.enqueue_copy(launch.queue, host[: rows * pitch + PAD], d)
         launch.cl.enqueue_copy(launch.queue, host[rows * pitch :], f)
-        expected = reference_raster.rasterise_channel(tables)
+        expected = raster_reference.rasterise_channel(tables)
         for found, twin in zip(host[:-PAD].reshape(3, rows, pitch)[:, :, PAD : PAD + columns], expected, strict=True):
             assert np.quantile(np.abs(found - twin), 0.99) < 2e-3
             assert (np.abs(found - twin) > 0.5).mean() < 1e-2
@@ -147,8 +148,8 @@ def test_channels_of_a_window(device: Device, level: int) -> None:
         low, high = (
             (-0.5 * PAINT_LESS * natural, PAINT_MORE * natural) if packer is packers[1] else (0, 10 + 7 * len(SCENE))
         )
-        assert low - 1e-9 <= means.min(initial=0)
-        assert means.max(initial=0) <= high + 1e-9
+        assert low - 1e-5 <= means.min(initial=0)
+        assert means.max(initial=0) <= high + 1e-5
 
 
 def test_far_strokes_cost_nothing() -> None:

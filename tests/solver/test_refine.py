@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 
 from esker import grid
 from esker.contract import MAX_REFINED_LEVEL, Stroke, TerrainSettings
+from esker.events import Done
 from esker.grid import TileKey
-from esker.solve.device import Device
-from esker.solve.refine import RefinedTile, Refiner
-from esker.solve.refine_cache import FieldCache
-from esker.solve.refine_cl import ClEngine
-from esker.solve.refine_engine import (
+from esker.solve.constraints.tables import BinBox, Tables
+from esker.solve.opencl.device import Device
+from esker.solve.refine.cache import FieldCache
+from esker.solve.refine.cl_engine import ClEngine
+from esker.solve.refine.engine import (
     GRADIENT_LOW,
     HEIGHT_SWEEPS,
     Engine,
@@ -32,9 +33,9 @@ from esker.solve.refine_engine import (
     height_weights,
     step,
 )
-from esker.solve.refine_strokes import Strokes
+from esker.solve.refine.refinement import RefinedTile, Refiner
+from esker.solve.refine.stroke_set import Strokes
 from esker.solve.solver import Basis, Solver
-from esker.solve.tables import BinBox, Tables
 from tests.solver.scenes import PINNED, SCENES, SETTINGS, flank, ridge
 
 LOW = 1
@@ -42,7 +43,7 @@ LOW = 1
 
 def settled(solver: Solver, strokes: Sequence[Stroke], settings: TerrainSettings, level: int) -> Basis:
     """What refinement starts from."""
-    found = [r.basis for r in solver.steps(strokes, settings, level, basis=True) if r is not None and r.basis]
+    found: list[Basis] = [r.basis for r in solver.steps(strokes, settings, level, basis=True) if isinstance(r, Done)]
     return found[-1]
 
 
@@ -159,14 +160,14 @@ def test_order_cache_and_interleaving_do_not_change_bits(engine: ClEngine, basis
 
 
 def test_known_constraints_do_not_change_bits(device: Device, basis: Basis, monkeypatch: pytest.MonkeyPatch) -> None:
-    """SPEC S51: bins from the sheets are those of the rasteriser, whatever was kept, dropped or of other strokes."""
+    """SPEC S51: bins from the cache are those of the rasteriser, whatever was kept, dropped or of other strokes."""
     keys = [*patch(LOW + 3, 3, 3, 4), TileKey(LOW + 3, 15, 15)]
     fresh = ClEngine(device)
     expected = bits(made(Refiner(basis, fresh, FieldCache()), keys))
     small = ClEngine(device)
-    small.sheets.most = 1
+    small.bin_cache.most = 1
     assert bits(made(Refiner(basis, small, FieldCache()), keys[::-1])) == expected
-    assert len(small.sheets) == 1
+    assert len(small.bin_cache) == 1
     with monkeypatch.context() as patched:
         patched.setattr(Strokes, "shared_tables", None)
         assert bits(made(Refiner(basis, fresh, FieldCache()), keys)) == expected
@@ -179,7 +180,7 @@ def test_known_constraints_do_not_change_bits(device: Device, basis: Basis, monk
     last = Refiner(basis, fresh, FieldCache())
     assert bits(made(last, keys)) == expected
     last.clear()
-    assert len(fresh.sheets) == len(last.cache) == 0
+    assert len(fresh.bin_cache) == len(last.cache) == 0
 
 
 def test_tables_of_a_larger_box_serve(device: Device, solver: Solver, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -267,7 +268,7 @@ def test_bands_of_bins_do_not_change_bits(engine: ClEngine, basis: Basis, monkey
     """SPEC S51: what is rasterised at a stretch is only a matter of time."""
     keys = patch(LOW + 3, 2, 2, 3)
     expected = bits(made(Refiner(basis, engine, FieldCache()), keys))
-    monkeypatch.setattr("esker.solve.refine_cl.BAND_BINS", 20)
+    monkeypatch.setattr("esker.solve.refine.cl_engine.BAND_BINS", 20)
     engine.clear()
     assert bits(made(Refiner(basis, engine, FieldCache()), keys)) == expected
 

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bench.ground import refine as bench
 from esker import grid, templates
-from esker.bench import refine as bench
+from esker.api.terrain import Terrain
+from esker.cli import solve
 from esker.document import archive
-from esker.solve import command
 from esker.solve.solver import Solver
-from esker.terrain import Terrain
 from tests.solver.scenes import SCENES, SIZE
 
 
@@ -59,21 +59,21 @@ def test_the_command_writes_a_window(tmp_path: Path, capsys: pytest.CaptureFixtu
     document = templates.load("canyon").document
     file.write_bytes(archive.dumps(document))
     arguments = [str(file), "-o", str(out), "--level", "7", "--window", "1000", "1000", "1030", "1020"]
-    assert command.main(arguments) == 0
+    assert solve.main(arguments) == 0
     s = grid.spacing(7, document.settings.size_m)
     assert np.load(out).shape == (int(1020 / s) - int(999.9 / s), int(1030 / s) - int(999.9 / s))
     assert "sample [0, 0] at x 1000 m" in capsys.readouterr().err
-    assert command.main([*arguments[:5], "--window", "1e6", "0", "2e6", "5"]) == 1
+    assert solve.main([*arguments[:5], "--window", "1e6", "0", "2e6", "5"]) == 1
     assert "No sample" in capsys.readouterr().err
     for size, more in (("4096", ["--level", "10"]), ("800", ["--level", "12", "--detail"])):
-        assert command.main([*arguments[:3], *more, "--window", "0", "0", size, size]) == 1
+        assert solve.main([*arguments[:3], *more, "--window", "0", "0", size, size]) == 1
         assert "in parts" in capsys.readouterr().err
     for text in ("nan", "inf", "far"):
         with pytest.raises(SystemExit):
-            command.main([*arguments[:5], "--window", text, "0", "1", "1"])
+            solve.main([*arguments[:5], "--window", text, "0", "1", "1"])
         assert "--window" in capsys.readouterr().err
     with pytest.raises(SystemExit):
-        command.main(arguments[:5])
+        solve.main(arguments[:5])
     assert "--window" in capsys.readouterr().err
 
 

@@ -9,10 +9,10 @@ import pytest
 from scipy.ndimage import map_coordinates
 
 from esker import grid
+from esker.api.terrain import Stroke as Make
 from esker.contract import Stroke, TerrainSettings
-from esker.solve.crest import crest_of, is_closed
+from esker.solve.constraints.crest import crest_of, is_closed
 from esker.solve.solver import Solver
-from esker.terrain import Stroke as Make
 from tests.solver.scenes import SCENES, SETTINGS, SIZE, flank, loop, ridge, wall
 
 SMALL = TerrainSettings(size_m=1024.0, reach_m=32.0)
@@ -285,6 +285,16 @@ def test_folded_profile_takes_its_outline() -> None:
     points = crest_of(folded).points  # type: ignore[union-attr]
     assert (np.diff(points[:, 0]) > 0).all()
     assert np.allclose(points, [(0, 0, 0), (400, 0, 500), (600, 0, 1000 / 3), (1000, 0, 0)])
+
+
+def test_a_fold_by_the_smallest_number_there_is_stands_upright() -> None:
+    """SPEC S14: two knots whose distance has no quotient are a wall; the search found them on another processor."""
+    folded = Make.profile([(0, 0, 0), (1, 0, 300), (2, 0, 500), (3, 0, 0)], id="f")
+    curve = ((0.0, 0.1), (-5e-324, 0.4), (0.75, 0.2), (0.14, 0.3), (1.0, 0.0))
+    with np.errstate(all="raise", under="ignore"):
+        crest = crest_of(folded.model_copy(update={"curve": curve}))
+    assert crest is not None
+    assert np.isfinite(crest.points).all()
 
 
 @pytest.mark.parametrize("scene", list(SCENES))

@@ -7,14 +7,15 @@ import pytest
 import scipy.sparse.linalg as spla
 from numpy.typing import NDArray
 
+from bench.solver import _exact
 from esker import grid
-from esker.bench import _exact
 from esker.contract import TerrainSettings
-from esker.solve import multigrid, reference, reference_raster
+from esker.solve import multigrid, reference
 from esker.solve.assembly import assemble, system
-from esker.solve.constraints import pack
-from esker.solve.device import Device
-from esker.solve.levels import ClWorkspace
+from esker.solve.constraints import raster_reference
+from esker.solve.constraints.constraints import pack
+from esker.solve.opencl.device import Device
+from esker.solve.opencl.levels import ClWorkspace
 from esker.solve.solver import Solver
 from tests.solver.scenes import ENDLESS, PINNED, SCENES, SETTINGS, SIZE, flank, ridge
 
@@ -46,7 +47,7 @@ def test_assembled_system(scene: str) -> None:
     a, _ = assemble(SCENES[scene], PINNED, 1)
     assert abs(a - a.T).max() < 1e-12
     assert spla.eigsh(a, k=1, sigma=0, return_eigenvectors=False)[0] > 0
-    fixed = reference_raster.rasterise(pack(SCENES[scene], PINNED, 1)).height_d.ravel() < 0
+    fixed = raster_reference.rasterise(pack(SCENES[scene], PINNED, 1)).height_d.ravel() < 0
     rows = a[np.flatnonzero(fixed)]
     assert rows.nnz == fixed.sum()
     assert (rows.data == 1).all()
@@ -57,7 +58,7 @@ def test_assembled_system(scene: str) -> None:
 def test_convergence_factor_of_the_twin(scene: str, settings: TerrainSettings) -> None:
     """SPEC S3 on the float64 twin, whose cycle is the same; ``test_gallery`` measures the kernels."""
     level = 2
-    c = reference_raster.rasterise(pack(SCENES[scene], settings, level))
+    c = raster_reference.rasterise(pack(SCENES[scene], settings, level))
     screening = pack(SCENES[scene], settings, level).screening
     for d, f in ((c.height_d[None], c.height_f[None]), (c.gradient_d[None], c.gradient_f)):
         if not d.any():

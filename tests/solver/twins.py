@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from esker import grid
 from esker.contract import Stroke
-from esker.solve import device as devices
-from esker.solve import gpu_program
-from esker.solve.device import Device, open_device
-from esker.solve.gpu_levels import GpuLauncher, GpuSystem, GpuWorkspace
-from esker.solve.gpu_program import plan
-from esker.solve.levels import ClSystem, ClWorkspace, Launcher
+from esker.solve.opencl import device as devices
+from esker.solve.opencl import gpu_program
+from esker.solve.opencl.device import Device, open_device
+from esker.solve.opencl.gpu_levels import GpuLauncher, GpuSystem, GpuWorkspace
+from esker.solve.opencl.gpu_program import plan
+from esker.solve.opencl.levels import ClSystem, ClWorkspace, Launcher
 
 Field = NDArray[np.float64]
 LEVELS = (1, 2, 3)

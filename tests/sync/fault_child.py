@@ -11,8 +11,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from esker.solve.faults import DeviceLostError, OutOfDeviceMemoryError
-from tests.sync.harness import Level, LiveServer, PlainSolver
+from esker.events import Preview, Settled
+from esker.solve.opencl.faults import DeviceLostError, OutOfDeviceMemoryError
+from tests.sync.harness import LiveServer, PlainSolver
 
 
 class Breaking(PlainSolver):
@@ -21,7 +22,7 @@ class Breaking(PlainSolver):
     def __init__(self) -> None:
         self.count = 0
 
-    def steps(self, *job: Any, **_: Any) -> Iterator[Level]:
+    def steps(self, *job: Any, **_: Any) -> Iterator[Preview | Settled]:
         for level in super().steps(*job):
             self.count += 1
             kinds = (DeviceLostError, OutOfDeviceMemoryError, RuntimeError)

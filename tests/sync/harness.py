@@ -11,7 +11,7 @@ import time
 import urllib.error
 import urllib.request
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,20 +21,20 @@ from websockets.sync.client import ClientConnection, connect
 
 from esker import contract as c
 from esker import grid
-from esker.run import Assembly
-from esker.settings import Settings
+from esker.document.birth import new_document
+from esker.events import BaseLevel, Preview, Settled
+from esker.server.run import Assembly
+from esker.server.settings import Settings
 
+TOKENS: dict[tuple[str, str], str] = {}
+"""By which client ids come again, as programs keep them: also to a server that was started anew."""
 PATIENCE = 90.0
 """Seconds to wait for what must come, on a machine that has other things to do."""
 
 
-@dataclass(frozen=True)
-class Level:
-    level: int
-    heights: NDArray[np.float32]
-    settled: bool
-    channel: c.Channel = c.Channel.HEIGHT
-    basis: Any = None
+def height_level(level: int, heights: NDArray[np.float32], settled: bool) -> Preview | Settled:
+    """Heights of one level, as a solver yields them."""
+    return Settled(level, heights) if settled else Preview(level, heights)
 
 
 class PlainSolver:
@@ -44,22 +44,22 @@ class PlainSolver:
 
     def steps(
         self, strokes: Sequence[c.Stroke], settings: c.TerrainSettings, levels: int | None = None, **_: Any
-    ) -> Iterator[Level]:
+    ) -> Iterator[Preview | Settled]:
         assert settings.size_m > 0
         height = float(sum(s.first[2] for s in strokes))
         for settled in (False, True):
             for level in range((levels or 0) + 1):
                 n = grid.samples(level)
-                yield Level(level, np.full((n, n), height, dtype=np.float32), settled)
+                yield height_level(level, np.full((n, n), height, dtype=np.float32), settled)
 
     def channels(self, *_: Any, **__: Any) -> Iterator[Any]:
         return iter(())
 
-    def base_levels(self, base: Any, levels: int) -> Iterator[Level]:
+    def base_levels(self, base: Any, levels: int) -> Iterator[BaseLevel]:
         for level in range(levels + 1):
-            yield Level(level, base.level(level), True, c.Channel.BASE)
+            yield BaseLevel(level, base.level(level), c.Channel.BASE)
         for level in range(max(0, levels - c.CHANNEL_LEVELS_BELOW) + 1):
-            yield Level(level, base.survey(level), True, c.Channel.SURVEY)
+            yield BaseLevel(level, base.survey(level), c.Channel.SURVEY)
 
     def refiner(self, basis: object) -> Any:
         raise AssertionError(f"nobody was given {basis}")
@@ -123,7 +123,7 @@ class LiveServer:
 
     def create(self, **document: Any) -> tuple[str, str]:
         """A new terrain past the rate limit by address: id and owner secret."""
-        born, _, secret = asyncio.run(self.assembly.hub.create(c.Document(id="new", **document)))
+        born, _, secret = asyncio.run(self.assembly.hub.create(new_document().model_copy(update=document)))
         return born.id, secret
 
     # --- websocket ----------------------------------------------------------------------------------------------
@@ -139,8 +139,10 @@ class LiveServer:
     def join(self, terrain: str, secret: str, client: str = "c1", **hello: Any) -> Peer:
         """A member that has had its welcome."""
         peer = Peer(self.socket())
+        hello = {"token": TOKENS.get((terrain, client)), **hello}
         peer.say("hello", protocol=c.PROTOCOL_VERSION, terrain=terrain, secret=secret, client=client, **hello)
         peer.welcome = peer.wait("welcome")
+        TOKENS[terrain, client] = peer.welcome["token"]
         return peer
 
 
@@ -235,7 +237,8 @@ def sleeping_member(port: int, terrain: str, secret: str) -> socket.socket:
     tcp.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
     tcp.connect(("127.0.0.1", port))
     tcp.sendall(
-        b"GET /ws HTTP/1.1\r\nHost: x\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+        b"GET /ws HTTP/1.1\r\nHost: 127.0.0.1\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+        b"Sec-WebSocket-Version: 13\r\n"
         b"Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Protocol: %b\r\n\r\n" % c.SUBPROTOCOL.encode()
     )
     assert b"101" in tcp.recv(64)

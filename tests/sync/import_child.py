@@ -18,10 +18,11 @@ import numpy as np
 
 from esker import contract as c
 from esker.contract import ImportStage
-from esker.imports import Imports
-from esker.patchwork import rasters
-from esker.session.hub import Hub
-from esker.session.worker import Worker
+from esker.fairness.shares import Who
+from esker.jobs import Imports
+from esker.patchwork.raster import rasters
+from esker.session.ground.worker import Worker
+from esker.session.room.hub import Hub
 from esker.store.access import Access
 from esker.store.grids import GridStore
 from esker.store.journal import Journal
@@ -84,7 +85,7 @@ async def life(data: Path, seed: int) -> None:
     os.write(1, b"ready\n")
     for count in range(1000):
         status = await imports.upload(
-            "a.tif", "me", _body(f"{seed} {count}".encode()), None, terrain="t", link=link, client="c"
+            "a.tif", "me", _body(f"{seed} {count}".encode()), None, terrain="t", link=link, client="c", who=Who("")
         )
         while status.stage not in ("done", "refused"):
             await asyncio.sleep(0.001)

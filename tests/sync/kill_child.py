@@ -14,12 +14,13 @@ from pathlib import Path
 from typing import Any
 
 from esker import contract as c
-from esker.session import protocol
-from esker.session.core import RoomCore, RoomInfo
-from esker.session.outbox import Outbox
-from esker.session.room import Guest, Room
-from esker.session.tilethread import TileThread
-from esker.session.worker import Worker
+from esker.session.ground.tilethread import TileThread
+from esker.session.ground.worker import Worker
+from esker.session.room import protocol
+from esker.session.room.core import RoomCore, RoomInfo
+from esker.session.room.outbox import Outbox
+from esker.session.room.room import Guest, Room
+from esker.store.claims import Claims
 from esker.store.journal import Journal
 
 
@@ -59,7 +60,7 @@ async def life(data: Path, first: int) -> None:
     assert loaded is not None
     worker = Worker(lambda _: _NoSolver())
     worker.start()
-    core = RoomCore(loaded, lambda client, counter: journal.find("t", client, counter))
+    core = RoomCore(loaded, lambda client, counter: journal.find("t", client, counter), claims=CLAIMS)
     room = Room(
         core,
         journal=journal,
@@ -72,7 +73,7 @@ async def life(data: Path, first: int) -> None:
     wake = asyncio.Event()
     outbox = Outbox(wake.set)
     guest: Guest = room.join(
-        c.Hello(protocol=c.PROTOCOL_VERSION, terrain="t", secret="s", client="c"), "edit", "link", outbox
+        c.Hello(protocol=c.PROTOCOL_VERSION, terrain="t", secret="s", client="c", token=TOKEN), "edit", "link", outbox
     )
     counter = first
     while True:
@@ -85,10 +86,14 @@ async def life(data: Path, first: int) -> None:
         room.receive(guest, protocol.Accepted(tuple(ops)))
         await asyncio.sleep(0.002)
         while (text := outbox.pop()) is not None:
-            message = c.SERVER_MESSAGE.validate_json(text)
+            message = c.SERVER_MESSAGE.validate_json(str(text))
             if isinstance(message, c.Ack):
                 os.write(1, ("".join(f"{i} {k}\n" for i, k in zip(message.ids, message.clocks, strict=True))).encode())
             assert not isinstance(message, c.Reject), message
+
+
+CLAIMS = Claims(bytes(32))
+TOKEN = CLAIMS.token("t", "c", "link", 1)
 
 
 def _stroke(stroke_id: str) -> c.Stroke:

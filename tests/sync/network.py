@@ -18,10 +18,11 @@ from esker import contract as c
 from esker.document.ops import Refusal, StrokeSet
 from esker.document.sync import SyncDoc
 from esker.document.wire import op_json
-from esker.session import protocol
-from esker.session.core import Batch, RoomCore, RoomInfo
-from esker.session.members import Member
-from esker.session.outbox import Outbox
+from esker.session.room import protocol
+from esker.session.room.core import Batch, RoomCore, RoomInfo
+from esker.session.room.members import Member
+from esker.session.room.outbox import Outbox
+from esker.store.claims import Claims
 from esker.store.journal import Loaded, Row, replay
 
 INFO = RoomInfo(levels=2, finest=2, device="none")
@@ -66,6 +67,7 @@ class Server:
         self.rows: list[Row] = []
         self.generation = 0
         self.links: list[Link] = []
+        self.claims = Claims()
         self.core = self._open()
         self._ticking = False
 
@@ -74,7 +76,7 @@ class Server:
         for row in self.rows:
             counters[row.client] = max(row.counter, counters.get(row.client, -1))
         loaded = Loaded(replay(self.birth, self.rows), self.rows[-50:], counters)
-        return RoomCore(loaded, self._find)
+        return RoomCore(loaded, self._find, claims=self.claims)
 
     def _find(self, client: str, counter: int) -> int | None:
         return next((r.clock for r in self.rows if (r.client, r.counter) == (client, counter)), None)
@@ -148,6 +150,7 @@ class Link:
             self.member = core.join(event.hello, "edit", "link", self.outbox, INFO)
         elif isinstance(event, protocol.Accepted):
             assert self.member is not None
+            core.heard(self.member)
             core.submit(self.member, event.ops)
             self.server.ordered()
         else:
@@ -157,7 +160,7 @@ class Link:
         while (text := self.outbox.pop()) is not None:
             at = max(self.world.now + self._delay(), self._last_down)
             self._last_down = at
-            self.world.at(at, lambda text=text: self._deliver(text))  # type: ignore[misc]
+            self.world.at(at, lambda text=str(text): self._deliver(text))  # type: ignore[misc]
         if self.outbox.closing is not None:
             self.cut()
 
@@ -185,13 +188,21 @@ class Client:
         self.refusals: list[c.Reject] = []
         self.acked: set[str] = set()
         self.online = False
+        self.token: str | None = None
         self.connect()
 
     def connect(self) -> None:
         if self.link is not None:
             return
         self.link = Link(self, self.server)
-        hello = c.Hello(protocol=c.PROTOCOL_VERSION, terrain="t", secret="s", client=self.name, clock=self.doc.clock)
+        hello = c.Hello(
+            protocol=c.PROTOCOL_VERSION,
+            terrain="t",
+            secret="s",
+            client=self.name,
+            token=self.token,
+            clock=self.doc.clock,
+        )
         self.link.up(hello.model_dump_json())
 
     def lost(self) -> None:
@@ -205,7 +216,7 @@ class Client:
         match message:
             case c.Welcome():
                 self.doc.welcome(message)
-                self.online = True
+                self.token, self.online = message.token, True
             case c.OpsBroadcast():
                 self.doc.ordered(message)
             case c.Ack():

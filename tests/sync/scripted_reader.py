@@ -14,7 +14,7 @@ import numpy as np
 from esker import contract as c
 from esker.contract import ImportStage
 from esker.importing.refusal import ImportRefused
-from esker.patchwork import rasters
+from esker.patchwork.raster import rasters
 from tests.sync.harness import LiveServer
 
 QUESTION = c.ImportQuestion(id="size", text="How wide is it?", default="fit")

@@ -10,7 +10,7 @@ import pytest
 
 from esker import contract as c
 from esker.document import archive
-from esker.store.access import CODE_SECONDS, Access
+from esker.store.access import CODE_SECONDS, Access, JoinCode
 from esker.store.journal import Journal
 from tests.sync.harness import LiveServer, Peer, set_op, stroke
 
@@ -98,7 +98,7 @@ def test_an_archive_that_no_ops_could_have_made(server: LiveServer) -> None:
 def test_an_archive_that_eats_memory_or_time_is_stopped(server: LiveServer, monkeypatch: pytest.MonkeyPatch) -> None:
     terrain, secret = server.create()
     _, content, _ = server.raw("GET", f"/api/terrains/{terrain}/archive", secret=secret)
-    monkeypatch.setattr("esker.upload.WALL_FACTOR", 0.001)
+    monkeypatch.setattr("esker.server.upload.WALL_FACTOR", 0.001)
     status, error = server.http("POST", "/api/terrains/import", content)
     assert (status, error["code"]) == (400, "bad_archive")
     assert "too long" in error["message"]
@@ -107,7 +107,7 @@ def test_an_archive_that_eats_memory_or_time_is_stopped(server: LiveServer, monk
 
 
 def test_too_large_an_archive(server: LiveServer, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("esker.server.terrains.MAX_IMPORT_BYTES", 1 << 20)
+    monkeypatch.setattr("esker.server.routes.terrains.MAX_IMPORT_BYTES", 1 << 20)
     status, error = server.http("POST", "/api/terrains/import", bytes((1 << 20) + 1))
     assert (status, error["code"]) == (413, "too_large")
 
@@ -251,7 +251,7 @@ def test_codes_end_after_fifteen_minutes(tmp_path: Path) -> None:
     code = access.make_code("t", "edit", "l")
     ticks[0] += CODE_SECONDS - 1
     date[0] += 3600
-    assert access.open_code(code) == ("t", "edit")
+    assert access.open_code(code) == JoinCode("t", "edit", "l")
     date[0] -= 7200
     ticks[0] += 2
     assert access.open_code(code) is None
@@ -266,6 +266,33 @@ def test_links_are_bounded(server: LiveServer, monkeypatch: pytest.MonkeyPatch) 
     assert (status, error["code"]) == (409, "too_many_links")
     assert server.raw("DELETE", f"/api/terrains/{terrain}/links/{link}", secret=owner)[0] == 204
     _link(server, terrain, owner, "edit")
+
+
+def test_of_revoked_links_only_the_last_are_remembered(server: LiveServer, monkeypatch: pytest.MonkeyPatch) -> None:
+    """SPEC A452: making and revoking links for hours filled the database and the list that owners read."""
+    monkeypatch.setattr("esker.store.access.KEPT_REVOKED", 2)
+    terrain, owner = server.create()
+    secrets = []
+    for _ in range(5):
+        link, secret = _link(server, terrain, owner, "edit")
+        assert server.raw("DELETE", f"/api/terrains/{terrain}/links/{link}", secret=owner)[0] == 204
+        secrets.append(secret)
+    listed = server.http("GET", f"/api/terrains/{terrain}/links", secret=owner)[1]
+    assert len(listed) == 1 + 3, "the own one, and two that were there when the last was made"
+    assert _denied(server, terrain, secrets[0]) == "bad_secret"
+    assert _denied(server, terrain, secrets[-1]) == "revoked"
+
+
+def test_codes_and_links_have_a_rate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """SPEC A452: thousands of live codes made everybody's codes longer."""
+    monkeypatch.setattr("esker.server.app.NEW_CODES", (1e-6, 2))
+    monkeypatch.setattr("esker.server.app.NEW_LINKS", (1e-6, 2))
+    with LiveServer(tmp_path) as server:
+        terrain, owner = server.create()
+        for path in ("codes", "links"):
+            body = {"role": "edit"}
+            asked = [server.http("POST", f"/api/terrains/{terrain}/{path}", body, owner)[0] for _ in range(3)]
+            assert asked == [201, 201, 429], path
 
 
 def test_the_store_keeps_no_secret(tmp_path: Path) -> None:
@@ -336,4 +363,69 @@ def test_without_a_page_it_says_how_to_build_it(server: LiveServer) -> None:
 def test_healthz(server: LiveServer) -> None:
     status, health = server.http("GET", "/healthz")
     assert status == 200
-    assert health == {"ok": True, "version": "0.1.0", "device": "arithmetic"}
+    told = {"ok": True, "version": "0.1.0", "device": "arithmetic", "journal": "ok", "disk": "ok"}
+    assert health.items() >= told.items()
+    assert health.keys() == {*told, "waiting", "rooms"}
+
+
+def test_a_link_to_look_takes_neither_what_was_deleted_nor_who_drew(server: LiveServer) -> None:
+    """SPEC P297."""
+    terrain, owner = server.create()
+    _, view = _link(server, terrain, owner, "view")
+    _, edit = _link(server, terrain, owner, "edit")
+    peer = server.join(terrain, owner, "c1", name="Ada Lovelace")
+    drawn = [stroke("s1"), stroke("s2")]
+    for op in drawn:
+        op["stroke"]["author"] = "Ada Lovelace"
+    peer.ops(("c1:1", drawn[0]), ("c1:2", drawn[1]), ("c1:3", {"type": "stroke.delete", "stroke": "s1"}))
+    while peer.wait("ack")["clocks"][-1] < 3:
+        pass
+    peer.close()
+    for secret, deleted, author in ((view, 0, ""), (edit, 1, "Ada Lovelace"), (owner, 1, "Ada Lovelace")):
+        _, content, _ = server.raw("GET", f"/api/terrains/{terrain}/archive", secret=secret)
+        packed = archive.loads(content)
+        _, told = server.http("GET", f"/api/terrains/{terrain}/document", secret=secret)
+        assert (len(packed.deleted), len(told["deleted"])) == (deleted, deleted)
+        assert (packed.strokes[0].author, told["strokes"][0]["author"]) == (author, author)
+        _, earlier = server.http("GET", f"/api/terrains/{terrain}/document?at=2", secret=secret)
+        assert {each["author"] for each in earlier["strokes"]} == {author}
+
+
+def test_codes_are_longer_where_many_live(tmp_path: Path) -> None:
+    """SPEC P298: a guess finds one of 10^8 at most."""
+    journal = Journal(tmp_path)
+    access = Access(journal)
+    codes = [access.make_code("t", "edit", f"link{i}") for i in range(300)]
+    assert len(codes[0]) == 6
+    assert len(codes[-1]) == 8
+    for live, code in enumerate(codes, 1):
+        assert live * 10**8 <= 31 ** len(code)
+    assert access.open_code(codes[-1].lower()) == JoinCode("t", "edit", "link299")
+    journal.close()
+
+
+def test_all_guessers_together_are_slowed_down(tmp_path: Path) -> None:
+    """SPEC P298: however many addresses they have; what is right costs nothing."""
+    import json
+    import urllib.error
+    import urllib.request
+
+    def join(server: LiveServer, address: str, code: str) -> int:
+        request = urllib.request.Request(f"{server.base}/api/join", json.dumps({"code": code}).encode())
+        request.add_header("Content-Type", "application/json")
+        request.add_header("X-Forwarded-For", address)
+        try:
+            with urllib.request.urlopen(request) as answer:
+                return int(answer.status)
+        except urllib.error.HTTPError as error:
+            error.close()
+            return error.code
+
+    with LiveServer(tmp_path) as server:
+        terrain, owner = server.create()
+        code = server.http("POST", f"/api/terrains/{terrain}/codes", {}, owner)[1]["code"]
+        assert [join(server, "192.0.2.7", code) for _ in range(20)] == [200] * 20
+        tries = [join(server, f"198.51.{i // 250}.{i % 250}", "AAAAAA") for i in range(400)]
+        assert tries[0] == 404
+        assert 300 <= tries.count(404) < 330
+        assert tries[-1] == 429

@@ -12,7 +12,8 @@ from typing import Any
 
 import pytest
 
-from esker import run, websocket_protocol
+from esker.server import run, starting
+from esker.server.wire import websocket
 from tests.sync.harness import LiveServer, Peer, raw_socket, set_op, sleeping_member, stroke
 
 LAST_ANSWER_TO_OUT = 41.0
@@ -110,8 +111,8 @@ def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     """A server that asks soon, and whose sockets hold little."""
     monkeypatch.setattr(run, "PING_SECONDS", 0.4)
     monkeypatch.setattr(run, "PONG_SECONDS", 0.4)
-    monkeypatch.setattr(run, "SEND_BUFFER", 4096)
-    monkeypatch.setattr(websocket_protocol, "FAREWELL_SECONDS", 0.2)
+    monkeypatch.setattr(starting, "SEND_BUFFER", 4096)
+    monkeypatch.setattr(websocket, "FAREWELL_SECONDS", 0.2)
 
 
 def _members(peer: Peer) -> set[str]:
@@ -145,7 +146,7 @@ def test_a_peer_that_just_stops_is_out_in_a_bounded_time(tmp_path: Path, waiting
 
 
 def test_the_defaults_keep_what_is_promised() -> None:
-    assert run.PING_SECONDS + run.PONG_SECONDS + websocket_protocol.FAREWELL_SECONDS <= LAST_ANSWER_TO_OUT
+    assert run.PING_SECONDS + run.PONG_SECONDS + websocket.FAREWELL_SECONDS <= LAST_ANSWER_TO_OUT
 
 
 def test_half_a_goodbye_is_one(server: LiveServer) -> None:

@@ -17,10 +17,11 @@ import pytest
 
 from esker import Stroke, Terrain
 from esker import contract as c
-from esker.exports import run, wire
-from esker.exports import service as exports
-from esker.exports.__main__ import Failure, Out, work
-from esker.exports.run import ExportFailed, Progress
+from esker.api.export_child import Failure, Out, work
+from esker.exporting import run, wire
+from esker.exporting.run import ExportFailed, Progress
+from esker.fairness.shares import Places, Share
+from esker.jobs import exports
 from tests.sync.harness import LiveServer
 
 WISH = {"format": "npy", "samples": 257, "detail": False}
@@ -62,7 +63,7 @@ class Maker:
 @pytest.fixture
 def maker(monkeypatch: pytest.MonkeyPatch) -> Maker:
     made = Maker()
-    monkeypatch.setattr("esker.run.exporting", made)
+    monkeypatch.setattr("esker.server.run.exporting", made)
     return made
 
 
@@ -155,7 +156,8 @@ def test_wishes_that_cannot_be(live: LiveServer, wish: dict[str, Any]) -> None:
 
 def test_how_many_at_once(live: LiveServer, maker: Maker, monkeypatch: pytest.MonkeyPatch) -> None:
     """SPEC X21."""
-    monkeypatch.setattr(exports, "OPEN", 6)
+    assert live.assembly.exports is not None
+    monkeypatch.setattr(live.assembly.exports, "_places", Places(Share(6)))
     terrain, secret = live.create(**titled("slow"))
     jobs = [begin(live, terrain, secret, client)[1]["id"] for client in "abcd"]
     wait(live, terrain, secret, jobs[0], "detail")
@@ -246,7 +248,7 @@ def test_the_estimate_follows_the_pace_of_this_server(live: LiveServer, maker: M
 
 def test_a_full_disk(live: LiveServer, monkeypatch: pytest.MonkeyPatch) -> None:
     """SPEC X23."""
-    monkeypatch.setattr("esker.exports.formats.free_bytes", lambda _: 1 << 20)
+    monkeypatch.setattr("esker.exporting.formats.free_bytes", lambda _: 1 << 20)
     terrain, secret = live.create()
     assert begin(live, terrain, secret)[1]["code"] == "storage"
     assert folders(live) == []
@@ -274,7 +276,7 @@ def ridge() -> Terrain:
 
 
 def task_of(terrain: Terrain, folder: Path, **more: Any) -> wire.Task:
-    wish = c.ExportWish(format="npy", samples=257)
+    wish = c.ExportRequest(format="npy", samples=257)
     made: dict[str, Any] = {"wish": wish, "grids": str(folder / "grids"), "folder": str(folder), "name": "a"}
     return wire.Task(document=terrain.document, **(made | more))
 
@@ -310,18 +312,18 @@ def test_a_cancelled_process_is_gone(tmp_path: Path) -> None:
 
     async def cancelled() -> None:
         begun = asyncio.Event()
-        wish = c.ExportWish(format="npy", samples=4097)
+        wish = c.ExportRequest(format="npy", samples=4097)
         task = asyncio.create_task(run.make(task_of(ridge(), tmp_path, wish=wish), lambda *_: begun.set()))
         await begun.wait()
         mine = psutil.Process().children()
-        assert any("esker.exports" in process.cmdline() for process in mine)
-        assert all(process.nice() >= 15 for process in mine if "esker.exports" in process.cmdline())
+        assert any("esker.api.export_child" in process.cmdline() for process in mine)
+        assert all(process.nice() >= 15 for process in mine if "esker.api.export_child" in process.cmdline())
         task.cancel()
         with pytest.raises(asyncio.CancelledError):
             await task
 
     asyncio.run(cancelled())
-    assert not any("esker.exports" in process.cmdline() for process in psutil.Process().children())
+    assert not any("esker.api.export_child" in process.cmdline() for process in psutil.Process().children())
 
 
 def test_a_process_that_the_system_kills(tmp_path: Path) -> None:
@@ -330,7 +332,7 @@ def test_a_process_that_the_system_kills(tmp_path: Path) -> None:
     async def killed() -> None:
         def kill(*_: object) -> None:
             for process in psutil.Process().children():
-                if "esker.exports" in process.cmdline():
+                if "esker.api.export_child" in process.cmdline():
                     process.kill()
 
         await run.make(task_of(ridge(), tmp_path), kill)
@@ -341,10 +343,10 @@ def test_a_process_that_the_system_kills(tmp_path: Path) -> None:
 
 def test_the_process_ends_with_the_server(tmp_path: Path) -> None:
     """SPEC X23."""
-    wish = c.ExportWish(format="npy", samples=4097)
+    wish = c.ExportRequest(format="npy", samples=4097)
     text = task_of(ridge(), tmp_path, wish=wish).model_dump_json().encode() + b"\n"
     child = subprocess.Popen(
-        [sys.executable, "-m", "esker.exports"],
+        [sys.executable, "-m", "esker.api.export_child"],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,

@@ -15,13 +15,21 @@ import numpy as np
 import pytest
 
 from esker import contract as c
-from esker.run import diagnose
-from esker.session import recovery
-from esker.session.recovery import Backoff, Devices, Fault
-from esker.solve.faults import BuildError, DeviceError, DeviceLostError, NoDeviceError, OutOfDeviceMemoryError
+from esker.events import Preview, Settled
+from esker.server.run import diagnose
+from esker.session.ground import recovery
+from esker.session.ground.recovery import Backoff, Devices, Fault
+from esker.session.ground.repairs import AGAIN, GIVEN_UP
 from esker.solve.multigrid import DivergedError
+from esker.solve.opencl.faults import (
+    BuildError,
+    DeviceError,
+    DeviceLostError,
+    NoDeviceError,
+    OutOfDeviceMemoryError,
+)
 from esker.store.journal import Journal
-from tests.sync.harness import Level, LiveServer, Peer, PlainSolver, set_op, stroke
+from tests.sync.harness import LiveServer, Peer, PlainSolver, set_op, stroke
 
 ROOT = Path(__file__).resolve().parents[2]
 NUMPY = "NumPy float64 (no OpenCL device)"
@@ -35,12 +43,16 @@ class Sick(PlainSolver):
 
     def steps(
         self, strokes: Sequence[c.Stroke], settings: c.TerrainSettings, levels: int | None = None, **_: Any
-    ) -> Iterator[Level]:
+    ) -> Iterator[Preview | Settled]:
         for result in super().steps(strokes, settings, levels):
             error = self.fault(result.level)
             if error is not None:
                 raise error
             yield result
+
+    def prove(self) -> None:
+        if error := self.fault(1):
+            raise error
 
 
 class Clinic:
@@ -57,12 +69,14 @@ class Clinic:
         found = next((x for x in self.names if x not in self.unmakeable and device in (None, x)), None)
         if found is None:
             raise NoDeviceError(f"{device} does not work.")
-        self.made.append(found)
 
         def fault(level: int) -> Exception | None:
             return self.faults[found](level) if found in self.faults else None
 
-        return Sick(NUMPY if found == "numpy" else found, fault)
+        made = Sick(NUMPY if found == "numpy" else found, fault)
+        made.prove()
+        self.made.append(found)
+        return made
 
 
 Build = Callable[..., tuple[Clinic, Peer]]
@@ -76,10 +90,11 @@ def clinic(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Build]:
     def build(
         names: tuple[str, ...] = ("gpu", "cpu", "numpy"), retry: float = 60.0, unmakeable: tuple[str, ...] = ()
     ) -> tuple[Clinic, Peer]:
-        monkeypatch.setattr("esker.run.candidates", lambda _: list(names))
+        monkeypatch.setattr("esker.server.run.candidates", lambda _: list(names))
         monkeypatch.setattr(recovery, "RETRY_SECONDS", retry)
-        monkeypatch.setattr("esker.session.worker.IDLE_CHECK", 0.05)
-        monkeypatch.setattr("esker.session.worker.AGAIN_AFTER", 0.1)
+        monkeypatch.setattr("esker.session.ground.worker.IDLE_CHECK", 0.05)
+        monkeypatch.setattr("esker.session.ground.machine.AGAIN_AFTER", 0.1)
+        monkeypatch.setattr("esker.session.ground.repairs.PROVE_EVERY", 0.05)
         clinic = Clinic(tmp_path, names, unmakeable)
         clinic.server.__enter__()
         opened.append(clinic.server)
@@ -144,12 +159,70 @@ def test_numpy_takes_over_when_no_other_device_can_be_made(clinic: Build) -> Non
     peer.close()
 
 
-def test_errors_nobody_knows_are_tried_again_before_the_device_is_left(clinic: Build) -> None:
+class Poison(Sick):
+    """A device that works, on which a stroke of more than 500 m cannot be computed."""
+
+    error: Exception = OverflowError(34, "Numerical result out of range")
+
+    def steps(self, strokes: Sequence[c.Stroke], *given: Any, **more: Any) -> Iterator[Preview | Settled]:
+        if any(abs(s.first[2]) > 500 for s in strokes):
+            raise self.error
+        yield from super().steps(strokes, *given, **more)
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        OverflowError(34, "Numerical result out of range"),
+        ValueError("x"),
+        TypeError("x"),
+        RuntimeError("what is this?"),
+        DeviceError("CL_INVALID_KERNEL_ARGS"),
+    ],
+    ids=lambda error: type(error).__name__,
+)
+def test_a_job_that_cannot_be_computed_takes_the_device_from_nobody(
+    clinic: Build, error: Exception, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """SPEC P220, P221: it is tried three times, then it waits for a change. Other rooms go on where they were."""
+    monkeypatch.setattr("tests.sync.test_faults.Sick", Poison)
+    monkeypatch.setattr(Poison, "error", error)
+    ward, peer = clinic()
+    other = ward.server.join(*ward.server.create(), client="c2")
+    rest(peer, 0)
+    rest(other, 0)
+    peer.ops(("c1:1", stroke()), ("c1:2", set_op(first=[100, 100, 600.0])))
+    assert note(peer, "tried again") == AGAIN
+    assert note(peer, "waits") == GIVEN_UP
+    for n in range(1, 4):
+        other.ops((f"c2:{n}", stroke() if n == 1 else set_op(first=[100, 100, float(n)])))
+        rest(other, n)
+    assert ward.made == ["gpu"], "nobody was moved"
+    assert not any("runs on" in m["note"] for m in other.seen if m["type"] == "progress")
+    peer.ops(("c1:3", set_op(first=[100, 100, 5.0])))
+    rest(peer, 3)
+    peer.close()
+    other.close()
+
+
+def test_a_device_that_one_job_broke_is_opened_again(clinic: Build) -> None:
+    """SPEC P221: a context that is lost is not a device that is lost."""
+    ward, peer = clinic()
+    rest(peer, 0)
+    broken = [DeviceLostError("gpu was lost.")] * 2
+    ward.faults["gpu"] = lambda _: broken.pop() if broken else None
+    draw(peer, 1)
+    rest(peer, 5)
+    assert ward.made == ["gpu", "gpu"]
+    assert not any("runs on" in m["note"] for m in peer.seen if m["type"] == "progress")
+    peer.close()
+
+
+def test_errors_nobody_knows_are_proved_before_the_device_is_left(clinic: Build) -> None:
     ward, peer = clinic()
     rest(peer, 0)
     ward.faults["gpu"] = lambda _: RuntimeError("what is this?")
     peer.ops(("c1:1", stroke()))
-    note(peer, "tried again")
     note(peer, "what is this?", "cpu")
     rest(peer, 1)
     peer.close()
@@ -285,7 +358,9 @@ def test_what_an_exception_means() -> None:
     for kind in (DeviceLostError, BuildError, NoDeviceError, DeviceError):
         assert diagnose(kind("x")) == Fault.DEVICE
     assert diagnose(DivergedError()) == Fault.JOB
-    assert diagnose(ValueError("x")) == Fault.UNKNOWN
+    for flaw in (OverflowError, ZeroDivisionError, FloatingPointError, ValueError, TypeError, IndexError, KeyError):
+        assert diagnose(flaw("x")) == Fault.FLAW, "no device would do better"
+    assert diagnose(RuntimeError("x")) == Fault.UNKNOWN
 
 
 def test_trying_again_takes_longer_each_time_until_it_works() -> None:

@@ -9,8 +9,10 @@ import pytest
 
 from esker import Stroke, Terrain, connect, grid
 from esker import contract as c
+from esker.api.link import Refused
+from esker.document.birth import new_document
+from esker.events import Done, Settled
 from esker.grid import TileKey
-from esker.link import Refused
 from esker.solve.channels import ChannelSolver
 from esker.solve.solver import Solver
 from tests.sync.harness import LiveServer
@@ -102,14 +104,15 @@ def test_paint_on_a_live_terrain(tmp_path: Path, solver: Solver) -> None:
 
 def check(ground: object, keys: set[TileKey], solver: Solver, **fields: float) -> None:
     """Whole levels are the solver's to half a quantum, refined tiles its refiner's."""
-    from esker.ground import StreamedGround
+    from esker.api.live_ground import StreamedGround
 
     assert isinstance(ground, StreamedGround)
     strokes = (RIDGE.model_copy(update={"finished": True, **fields}),)
-    settings = c.TerrainSettings()
-    *_, last = (r for r in solver.steps(strokes, settings, 1, basis=True) if r is not None and r.basis is not None)
-    assert last.basis is not None
-    assert np.abs(ground.heights(1) - last.heights).max() <= 0.51 * grid.quantum(1, settings.size_m)
+    settings = new_document().settings
+    *_, finest, last = solver.steps(strokes, settings, 1, basis=True)
+    assert isinstance(finest, Settled)
+    assert isinstance(last, Done)
+    assert np.abs(ground.heights(1) - finest.heights).max() <= 0.51 * grid.quantum(1, settings.size_m)
     order = sorted(keys)
     parents = sorted({k.parent() for k in order})
     made = {t.key: t for t in solver.refiner(last.basis).tiles([*parents, *order]) if t is not None}

@@ -16,15 +16,17 @@ import pytest
 
 import esker
 from esker import contract as c
-from esker.cli import main
+from esker.cli.main import main
 from esker.document.ops import StrokeSet
 from esker.document.wire import op_json
+from esker.fairness.shares import Places, Share
 from esker.grid import TileKey, quantum
-from esker.patchwork import rasters
-from esker.session import past
-from esker.store.chronicles import Chronicles
-from esker.store.journal import SNAPSHOT_EVERY, Journal, Row
-from esker.store.moments import Person
+from esker.patchwork.raster import rasters
+from esker.session.room import past
+from esker.store.activity import ActivityLogs
+from esker.store.journal import Journal, Row
+from esker.store.timestamps import Person
+from esker.store.writing import SNAPSHOT_EVERY
 from esker.tiles.decoder import FrameDecoder
 from tests.sync.harness import LiveServer, Peer, set_op, stroke
 
@@ -91,18 +93,18 @@ def test_a_journal_of_before_has_a_history_without_names_and_times(tmp_path: Pat
     journal.create(c.Document(id="t")).result()
     journal.append("t", rows(1, 3)).result()
     for table in ("moments", "people"):
-        journal.submit(partial(_drop, table)).result()
+        journal.submit(partial(_empty, table)).result()
     journal.close()
     journal = Journal(tmp_path, now=lambda: 1000.0)
     journal.append("t", rows(4, 1, "d"), None, (Person("d", "Dan", "#000000"),)).result()
-    page = Chronicles(journal).page("t", None, 10)
+    page = ActivityLogs(journal).page("t", None, 10)
     assert [(e.author, e.at) for e in page.entries] == [("d", 1000.0), ("c", None), ("c", None), ("c", None)]
     assert page.people == {"d": Person("d", "Dan", "#000000")}
     journal.close()
 
 
-def _drop(table: str, db: sqlite3.Connection) -> None:
-    db.execute(f"DROP TABLE {table}")
+def _empty(table: str, db: sqlite3.Connection) -> None:
+    db.execute(f"DELETE FROM {table}")
 
 
 def test_the_list_reaches_back_a_bounded_number_of_ops(tmp_path: Path) -> None:
@@ -110,12 +112,12 @@ def test_the_list_reaches_back_a_bounded_number_of_ops(tmp_path: Path) -> None:
     journal = Journal(tmp_path)
     journal.create(c.Document(id="t")).result()
     journal.append("t", rows(1, 30)).result()
-    chronicles = Chronicles(journal, reach=10)
-    assert (chronicles.page("t", None, 50).first, len(chronicles.page("t", None, 50).entries)) == (20, 10)
+    activity_logs = ActivityLogs(journal, reach=10)
+    assert (activity_logs.page("t", None, 50).first, len(activity_logs.page("t", None, 50).entries)) == (20, 10)
     journal.append("t", rows(31, 10)).result()
-    assert chronicles.page("t", None, 50).first == 20
+    assert activity_logs.page("t", None, 50).first == 20
     journal.append("t", rows(41, 1)).result()
-    assert chronicles.page("t", None, 50).first == 31
+    assert activity_logs.page("t", None, 50).first == 31
     journal.close()
 
 
@@ -213,7 +215,7 @@ def test_rooms_of_the_past_are_few_and_not_for_ever(tmp_path: Path, monkeypatch:
     with LiveServer(tmp_path) as server:
         terrain, secret, _ = drawn(server, 1)
         pasts = server.assembly.hub._pasts
-        pasts._most = 2
+        pasts._places = Places(Share(2))
         first = server.join(terrain, secret, "p0", at=0)
         again = server.join(terrain, secret, "p0", at=1)
         assert first.closed()[0] == c.WS_CLOSE["bad_hello"]

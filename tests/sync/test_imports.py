@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import io
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +15,14 @@ import pytest
 import esker
 from esker import contract as c
 from esker import grid
-from esker.client import LiveTerrain, Refused
-from esker.patchwork import lod_space, rasters
+from esker.api.live import LiveTerrain, Refused
+from esker.errors import Cannot
+from esker.fairness.shares import Who
 from esker.patchwork.base import Base
-from esker.patchwork.lod_space import Placed
+from esker.patchwork.lod import space
+from esker.patchwork.lod.space import Placed
+from esker.patchwork.raster import rasters
+from esker.store.kept import count_kept
 from tests.sync.harness import LiveServer
 from tests.sync.scripted_reader import GRID, Reader, layers, send, wait, works
 
@@ -27,7 +31,7 @@ from tests.sync.scripted_reader import GRID, Reader, layers, send, wait, works
 def reader(monkeypatch: pytest.MonkeyPatch) -> Reader:
     """In the place of the process that reads files, which has tests of its own (tests/importing)."""
     made = Reader()
-    monkeypatch.setattr("esker.run.importing", made)
+    monkeypatch.setattr("esker.server.run.importing", made)
     return made
 
 
@@ -234,6 +238,40 @@ def test_a_terrain_made_from_a_file(live: LiveServer) -> None:
     assert (status, error["code"], error["message"]) == (400, "refused", "It is a picture of a cat.")
 
 
+def test_two_people_behind_one_address_start_at_once(live: LiveServer) -> None:
+    """SPEC P348: one file of each person; whose it is can cancel it, and then bring in another."""
+    start = "/api/terrains/from-grid?name=tal.tif&client="
+    made = {}
+    for person in ("ann", "bea"):
+        status, made[person] = live.http("POST", start + person, b"ask")
+        assert status == 201, made[person]
+    status, error = live.http("POST", start + "ann", b"x")
+    assert (status, error["code"]) == (409, "busy")
+    mine = made["ann"]
+    path = f"/api/terrains/{mine['id']}/imports/{mine['import']['id']}"
+    assert live.http("DELETE", path, secret=made["bea"]["secret"])[0] == 403
+    assert live.http("DELETE", path, secret=mine["secret"])[0] == 204
+    assert live.http("POST", start + "ann", b"ask")[0] == 201
+
+
+def test_a_file_that_nobody_waits_for_makes_no_terrain(live: LiveServer) -> None:
+    """SPEC P348."""
+    imports = live.assembly.imports
+    assert imports is not None
+    before = count_kept(live.assembly.hub.journal)
+
+    async def body() -> AsyncIterator[bytes]:
+        yield b"ask"
+
+    async def gone() -> bool:
+        return True
+
+    with pytest.raises(Cannot) as caught:
+        asyncio.run(imports.upload_new("t.tif", "9.9.9.9 x", body(), 3, "x", Who("9.9.9.9"), gone))
+    assert caught.value.code == "cancelled"
+    assert count_kept(live.assembly.hub.journal) == before
+
+
 def test_a_grid_comes_back_and_travels_in_a_terrain_file(live: LiveServer) -> None:
     """SPEC P110, D33."""
     terrain, secret = live.create()
@@ -320,7 +358,8 @@ def test_a_real_file_is_real_ground_for_everybody(tmp_path: Path) -> None:
             assert bob.layers[0].content == made.digest
             np.testing.assert_array_equal(bob.grids[made.digest].heights, heights)
             bob.ground.wait(120)
-            base = Base(lod_space.build([Placed(bob.layers[0], made)]), bob.settings.size_m)
+            model = space.build([Placed(bob.layers[0], made)])
+            base = Base(model, bob.settings.size_m, edition=bob.settings.edition)
             for level in (0, 1, 2):
                 quantum = grid.quantum(level, bob.settings.size_m)
                 np.testing.assert_allclose(bob.ground.heights(level), base.level(level), rtol=0, atol=quantum)

@@ -15,9 +15,12 @@ import pytest
 from esker import contract as c
 from esker.document.ops import StrokeSet
 from esker.document.wire import op_json
-from esker.store import backup
-from esker.store.backup import last_backup
-from esker.store.journal import DATABASE_NAME, LOG_BYTES, CorruptDatabase, DamagedTerrain, Journal, Row, Unwritable
+from esker.store.journal import DamagedTerrain, Journal, Row, Unwritable
+from esker.store.upkeep import backup
+from esker.store.upkeep.backup import last_backup
+from esker.store.upkeep.inspection import DATABASE_NAME, CorruptDatabase
+from esker.store.upkeep.restore import restore
+from esker.store.writing import LOG_BYTES
 
 BIRTH = c.Document(id="t")
 
@@ -207,8 +210,8 @@ def test_a_damaged_database_is_refused_and_left_alone(journal: Journal, tmp_path
     assert str(good) in str(caught.value)
     assert path.read_bytes() == bytes(content), "a damaged file must not be touched"
     # The way out that the sentence describes works.
-    path.unlink()
-    shutil.copy(good, path)
+    assert f"esker restore --data {tmp_path}" in str(caught.value)
+    restore(tmp_path)
     restored = Journal(tmp_path)
     loaded = restored.load("t")
     assert loaded is not None
@@ -231,7 +234,7 @@ def test_a_date_that_was_set_back_drops_no_newer_copy(journal: Journal, tmp_path
         copy = journal.backup()
         assert copy.exists()
         assert copy == last_backup(tmp_path)
-    kept = sorted((tmp_path / "backup").iterdir())
+    kept = sorted((tmp_path / "backup").glob("*.db"))
     clocks = []
     for copy in kept:
         with closing(sqlite3.connect(copy)) as db:

@@ -17,16 +17,17 @@ from numpy.typing import NDArray
 from esker import contract as c
 from esker import grid
 from esker.document.ops import StrokeSet
-from esker.elevation import Elevation
-from esker.patchwork import rasters
-from esker.session import laying
-from esker.session.laying import Layers
-from esker.session.schedule import Job
-from esker.session.worker import Worker
+from esker.events import Preview, Settled, SolveEvent
+from esker.patchwork.raster import rasters
+from esker.server.elevation import Elevation
+from esker.session.ground import base_builder
+from esker.session.ground.base_builder import Layers
+from esker.session.ground.jobs import Job
+from esker.session.ground.worker import Worker
 from esker.store.grids import GridStore, MissingGrid
 from esker.store.journal import Journal
-from tests.sync.harness import Level, LiveServer, PlainSolver, stroke
-from tests.sync.test_worker import FLAT, SETTINGS, Bench, Turnstile
+from tests.sync.harness import LiveServer, PlainSolver, stroke
+from tests.sync.test_worker_thread import FLAT, SETTINGS, Bench, Turnstile
 
 FACTS = c.GridFacts(rows=40, cols=50, low_m=0, high_m=100)
 
@@ -60,9 +61,15 @@ class Mason:
         self.fails = False
 
     def base(
-        self, layers: tuple[c.Layer, ...], size_m: float, before: object, tell: Callable[[str], None] = print
+        self,
+        layers: tuple[c.Layer, ...],
+        size_m: float,
+        before: object,
+        tell: Callable[[str], None] = print,
+        edition: int = 1,
     ) -> FlatBase | None:
         assert size_m > 0
+        assert edition >= 1
         assert self.gate.acquire(timeout=10)
         visible = tuple(x for x in layers if not x.hidden)
         self.made.append(sum(x.lift_m for x in visible))
@@ -81,6 +88,7 @@ class Site:
         self.mason = Mason()
         self.laid = 0
         self.told: list[str] = []
+        self.slow: list[bool] = []
         self.document = StrokeSet("t")
 
     def apply(self, op: c.Op) -> None:
@@ -89,7 +97,8 @@ class Site:
     async def run(self, test: Callable[[Site, Layers], Any]) -> None:
         with ThreadPoolExecutor(1) as executor:
             loop = asyncio.get_running_loop()
-            layers = Layers(self.mason, executor, loop, self._laid, self.told.append)
+            layers = Layers(self.mason, executor, loop, self._laid, self.told.append, self._slow_changed)
+            self.layers = layers
             try:
                 await test(self, layers)
             finally:
@@ -98,6 +107,9 @@ class Site:
 
     def _laid(self) -> None:
         self.laid += 1
+
+    def _slow_changed(self) -> None:
+        self.slow.append(self.layers.slow)
 
     async def until(self, ready: Callable[[], bool]) -> None:
         deadline = time.monotonic() + 60
@@ -178,7 +190,7 @@ def test_a_base_that_fails_keeps_the_one_before_and_is_told() -> None:
         site.mason.gate.release()
         await site.until(lambda: site.laid == 2)
         assert layers.base is first
-        assert site.told == [laying.FAILED]
+        assert site.told == [base_builder.FAILED]
         site.mason.fails = False
         site.apply(_lift(6.0, name="gone"))
         layers.want(site.document)
@@ -192,12 +204,12 @@ def test_a_base_that_fails_keeps_the_one_before_and_is_told() -> None:
 
 def test_what_takes_long_is_told_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """SPEC P114."""
-    monkeypatch.setattr(laying, "SLOW_SECONDS", 0.01)
+    monkeypatch.setattr(base_builder, "SLOW_SECONDS", 0.01)
 
     async def run(site: Site, layers: Layers) -> None:
         site.apply(c.AddLayer(layer=_layer()))
         layers.want(site.document)
-        await site.until(lambda: bool(site.told))
+        await site.until(lambda: bool(site.slow))
         site.apply(_lift(1.0))
         layers.want(site.document)
         site.mason.gate.release()
@@ -206,7 +218,8 @@ def test_what_takes_long_is_told_once(monkeypatch: pytest.MonkeyPatch) -> None:
         site.mason.gate.release()
         await site.until(lambda: site.laid == 2)
         await asyncio.sleep(0.05)
-        assert site.told == [laying.LAYING], "a drag of slow bases is one long time"
+        assert site.slow == [True, False], "a drag of slow bases is one long time"
+        assert site.told == [], "it is a state, not a sentence"
         site.apply(_lift(2.0))
         layers.want(site.document)
         site.mason.gate.release()
@@ -225,7 +238,7 @@ class Ledger(Turnstile):
         super().__init__()
         self.bases: list[object] = []
 
-    def steps(self, *arguments: Any, base: Any = None, **more: Any) -> Iterator[Level]:
+    def steps(self, *arguments: Any, base: Any = None, **more: Any) -> Iterator[SolveEvent]:
         self.bases.append(base)
         return super().steps(*arguments, **more)
 
@@ -250,9 +263,8 @@ def test_the_base_comes_before_what_is_solved_on_it_and_only_once() -> None:
         channels: list[tuple[c.Channel, int, float]] = []
         arrived = threading.Condition()
 
-        def deliver(clock: int, result: Any, show: bool) -> None:
+        def deliver(clock: int, result: Any) -> None:
             assert clock >= 1
-            assert show or result.channel == c.Channel.HEIGHT
             with arrived:
                 channels.append((result.channel, result.level, float(result.heights.max())))
                 arrived.notify()
@@ -264,19 +276,19 @@ def test_the_base_comes_before_what_is_solved_on_it_and_only_once() -> None:
                 assert arrived.wait_for(lambda: len(channels) >= goal, 5), channels
             return channels[goal - count :]
 
-        room = bench.worker.add(1, deliver, lambda _: None)
+        room = bench.worker.add(1, deliver, lambda _: None, note=deliver)
         base, other = FlatBase((_layer(lift_m=7.0),)), FlatBase((_layer(lift_m=9.0),))
         height, ground = c.Channel.HEIGHT, c.Channel.BASE
-        bench.worker.request(room, Job(1, (), SETTINGS, object(), None, base))
+        bench.worker.request(room, Job(1, (), SETTINGS, layers_rev=1, base=base))
         assert let(6) == [(ground, 0, 7.0), (ground, 1, 7.0), *[(height, level, 0.0) for level in (0, 1, 0, 1)]]
         bench.idle()
-        bench.worker.request(room, Job(2, (), SETTINGS, object(), None, base))
+        bench.worker.request(room, Job(2, (), SETTINGS, layers_rev=1, base=base))
         assert [channel for channel, _, _ in let(4)] == [height] * 4, "the base is there already"
         bench.idle()
-        bench.worker.request(room, Job(3, (), SETTINGS, object(), None, other))
+        bench.worker.request(room, Job(3, (), SETTINGS, layers_rev=2, base=other))
         assert let(6)[:2] == [(ground, 0, 9.0), (ground, 1, 9.0)]
         bench.idle()
-        bench.worker.request(room, Job(4, (), SETTINGS, object(), None, None))
+        bench.worker.request(room, Job(4, (), SETTINGS))
         solver.permits.release(4)
         with arrived:
             assert arrived.wait_for(lambda: len(channels) >= 16 + 7, 5)
@@ -296,7 +308,7 @@ class Ground(PlainSolver):
     def __init__(self) -> None:
         self.jobs: list[tuple[int, object]] = []
 
-    def steps(self, *arguments: Any, base: Any = None, **more: Any) -> Iterator[Level]:
+    def steps(self, *arguments: Any, base: Any = None, **more: Any) -> Iterator[Preview | Settled]:
         self.jobs.append((len(arguments[0]), base))
         return super().steps(*arguments, **more)
 
@@ -366,7 +378,7 @@ def test_the_store_keeps_what_the_journal_names(tmp_path: Path) -> None:
     journal.append("t", [Row(1, "import-x", 0, "c", op_json(c.Group(ops=(lay, c.DeleteLayer(layer="b")))))]).result()
     assert journal.grids("t") == journal.grids() == {born, made[1].digest}
     work, packed = store.work(), store.temporary(".npz")
-    store.sweep(journal.grids())
+    store.sweep(journal.grids(), now=0.0)
     assert not packed.exists()
     assert [store.has(raster.digest) for raster in made] == [True, True, False, False]
     assert not work.exists()

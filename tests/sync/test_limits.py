@@ -10,9 +10,10 @@ from typing import Any
 import pytest
 
 from esker import contract as c
-from esker.session import protocol
-from esker.session.limits import RateByKey, TokenBucket
-from esker.settings import BadSetting, Settings, from_environment
+from esker.fairness.shares import Rate, Rates, Who
+from esker.server.settings import BadSetting, Settings, from_environment
+from esker.session.room import protocol
+from esker.session.room.limits import TokenBucket
 from tests.sync.harness import LiveServer, Peer, set_op, stroke
 
 HELLO = json.dumps({"type": "hello", "protocol": c.PROTOCOL_VERSION, "terrain": "t", "secret": "s", "client": "c"})
@@ -118,12 +119,12 @@ def test_token_bucket() -> None:
 
 
 def test_rates_by_address_forget_the_oldest() -> None:
-    rates = RateByKey(rate=0.001, burst=1, most_keys=2)
-    assert rates.take("a", 0)
-    assert not rates.take("a", 0)
-    assert rates.take("b", 0)
-    assert rates.take("c", 0)
-    assert rates.take("a", 0), "a was forgotten"
+    rates, (a, b, c_) = Rates(Rate(0.001, 1), most_keys=2), (Who(name) for name in "abc")
+    assert rates.take(a, 0)
+    assert not rates.take(a, 0)
+    assert rates.take(b, 0)
+    assert rates.take(c_, 0)
+    assert rates.take(a, 0), "a was forgotten"
 
 
 def test_members_per_room(tmp_path: Path) -> None:

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from esker import contract as c
-from esker import http_protocol
-from esker.run import CannotServe
+from esker.server.starting import CannotServe
+from esker.server.wire import http
 from esker.store.access import MAX_CODES, Access
 from esker.store.journal import Journal
 from tests.sync.harness import LiveServer, raw_socket, sleeping_member
@@ -21,9 +21,9 @@ from tests.sync.harness import LiveServer, raw_socket, sleeping_member
 @pytest.fixture
 def hasty(monkeypatch: pytest.MonkeyPatch) -> None:
     """Patience of a quarter of a second."""
-    monkeypatch.setattr(http_protocol, "LOOK_SECONDS", 0.05)
-    monkeypatch.setattr(http_protocol, "HEADER_SECONDS", 0.25)
-    monkeypatch.setattr(http_protocol, "BODY_SECONDS", 0.25)
+    monkeypatch.setattr(http, "LOOK_SECONDS", 0.05)
+    monkeypatch.setattr(http, "HEADER_SECONDS", 0.25)
+    monkeypatch.setattr(http, "BODY_SECONDS", 0.25)
 
 
 def _ends(tcp: socket.socket, seconds: float = 60.0) -> bytes:
@@ -39,7 +39,7 @@ def _ends(tcp: socket.socket, seconds: float = 60.0) -> bytes:
 
 
 def _head(path: str, secret: str, *fields: str) -> bytes:
-    lines = (f"POST {path} HTTP/1.1", "Host: x", f"Authorization: Bearer {secret}", *fields, "", "")
+    lines = (f"POST {path} HTTP/1.1", "Host: 127.0.0.1", f"Authorization: Bearer {secret}", *fields, "", "")
     return "\r\n".join(lines).encode()
 
 
@@ -61,7 +61,7 @@ def test_the_body_of_a_request_is_bounded(server: LiveServer) -> None:
 def test_a_header_without_end_is_refused(server: LiveServer, endless: bytes) -> None:
     with raw_socket(server.port) as tcp:
         tcp.sendall(b"GET /healthz HTTP/1.1\r\n" if b":" in endless else b"GET /")
-        tcp.sendall(endless * (3 * http_protocol.MAX_HEADER_BYTES // len(endless)))
+        tcp.sendall(endless * (3 * http.MAX_HEADER_BYTES // len(endless)))
         said = _ends(tcp)
     assert said.startswith(b"HTTP/1.1 431 ") or said == b"", "the refusal, unless more was on its way"
     assert server.http("GET", "/healthz")[0] == 200
@@ -93,10 +93,10 @@ def test_an_upload_that_stops_gives_its_place_back(tmp_path: Path) -> None:
 
 
 def test_an_upload_that_goes_on_slowly_is_not_dropped(server: LiveServer, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(http_protocol, "LOOK_SECONDS", 0.02)
-    monkeypatch.setattr(http_protocol, "HEADER_SECONDS", 0.6)
-    monkeypatch.setattr(http_protocol, "BODY_SECONDS", 0.6)
-    monkeypatch.setattr(http_protocol, "BODY_BYTES", 10)
+    monkeypatch.setattr(http, "LOOK_SECONDS", 0.02)
+    monkeypatch.setattr(http, "HEADER_SECONDS", 0.6)
+    monkeypatch.setattr(http, "BODY_SECONDS", 0.6)
+    monkeypatch.setattr(http, "BODY_BYTES", 10)
     with raw_socket(server.port) as tcp:
         tcp.sendall(_head("/api/terrains/import", "-", "Content-Length: 1000"))
         for _ in range(10):
@@ -127,12 +127,12 @@ def test_a_disk_without_room_is_told(server: LiveServer, monkeypatch: pytest.Mon
     def full(*_: object) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr("esker.server.terrains.read_archive", full)
+    monkeypatch.setattr("esker.server.routes.terrains.read_archive", full)
     status, error = server.http("POST", "/api/terrains/import", b"x")
     assert (status, error["code"]) == (507, "storage")
     assert "disk" in error["message"]
     assert sorted((server.assembly.settings.data / "grids").iterdir()) == before
-    monkeypatch.setattr("esker.server.terrains.read_archive", lambda *_: open("/nowhere/at/all"))  # noqa: SIM115
+    monkeypatch.setattr("esker.server.routes.terrains.read_archive", lambda *_: open("/nowhere/at/all"))  # noqa: SIM115
     assert server.http("POST", "/api/terrains/import", b"x")[0] == 500
 
 

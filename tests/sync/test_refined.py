@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 
 from esker import contract as c
 from esker import grid
+from esker.events import ChannelLevel, Done, SolveEvent
 from esker.grid import TileKey
-from esker.settings import BadSetting, Settings, from_environment
+from esker.server.settings import BadSetting, Settings, from_environment
 from esker.tiles.decoder import FrameDecoder
-from tests.sync.harness import LiveServer, Peer, PlainSolver, set_op, stroke
+from tests.sync.harness import LiveServer, Peer, PlainSolver, height_level, set_op, stroke
 
 SIZE = c.DEFAULT_SIZE_M
 NEAR = c.View(eye=(1800.0, 1900.0, 12.0), target=(1803.0, 1960.0, 4.0), width=400, height=300, tau_px=4.0)
@@ -75,7 +76,7 @@ class RoofSolver:
 
     def steps(
         self, strokes: Sequence[c.Stroke], settings: c.TerrainSettings, levels: int | None = None, basis: bool = False
-    ) -> Iterator[Level]:
+    ) -> Iterator[SolveEvent]:
         assert settings.size_m == SIZE
         top = levels or 0
         height = float(sum(s.first[2] for s in strokes))
@@ -83,14 +84,14 @@ class RoofSolver:
             for level in range(top + 1):
                 n = grid.samples(level)
                 y, x = np.mgrid[0:n, 0:n] * (SIZE / (n - 1))
-                found = Basis(height) if basis and settled and level == top else None
-                yield Level(level, ground(x, y, height), settled, basis=found)
+                yield height_level(level, ground(x, y, height), settled)
         yield from self.channels(strokes)
+        yield Done(Basis(height) if basis else None)
 
-    def channels(self, strokes: Sequence[c.Stroke], *_: Any) -> Iterator[Level]:
+    def channels(self, strokes: Sequence[c.Stroke], *_: Any) -> Iterator[SolveEvent]:
         amplitude = float(sum(s.amplitude_m for s in strokes))
         for channel, value in ((c.Channel.AMPLITUDE, amplitude), (c.Channel.ROUGHNESS, 0.5)):
-            yield Level(0, np.full((65, 65), value, dtype=np.float32), True, channel)
+            yield ChannelLevel(0, np.full((65, 65), value, dtype=np.float32), channel)
 
     def refiner(self, basis: Basis) -> RoofRefiner:
         return RoofRefiner(basis.height, self.made)

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from esker import contract as c
-from esker.session.core import RECENT_OPS
-from esker.store.journal import SNAPSHOT_EVERY
+from esker.session.room.recent import RECENT_OPS
+from esker.store.writing import SNAPSHOT_EVERY
 from tests.sync.harness import LiveServer, Peer, set_op, stroke
 
 

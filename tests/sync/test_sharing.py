@@ -1,78 +1,95 @@
-"""Whose turn it is on the solver, and what is ended for whom (SPEC P57 to P59, P70, P71; DESIGN 8)."""
+"""Whose turn it is on the solver, and what is ended for whom (SPEC P57 to P59, P70, P71; DESIGN 8).
+
+Nothing runs here: grounds, tally and time are values.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 
 from esker import contract as c
+from esker.events import Done, Preview, Settled
 from esker.grid import solve_bytes
-from esker.session import schedule as module
-from esker.session.schedule import Client, Job, Schedule
-from tests.sync.harness import Level
+from esker.session.ground import effects as does
+from esker.session.ground import machine, schedule, states
+from esker.session.ground.effects import Effect, Event
+from esker.session.ground.jobs import Job
+from esker.session.ground.schedule import Tally
+from esker.session.ground.states import Early, Ground, Idle, Previewing, Settling
 
 SETTINGS = c.TerrainSettings()
-
-
-def ignore(*_: Any) -> None:
-    """A callback that does nothing."""
+FLAT = np.zeros((1, 1), dtype=np.float32)
 
 
 class Desk:
-    """A schedule driven by hand: every slice is one level of a solve with levels 0..2, or one cycle of settling."""
+    """Rooms by number, driven by hand: every slice is one level of a solve with levels 0..2."""
 
-    def __init__(self, budget: int = module.BUDGET) -> None:
+    def __init__(self, budget: int = schedule.BUDGET) -> None:
         self.now = 0.0
-        self.schedule = Schedule(lambda: self.now, budget)
-        self.log: list[tuple[Client, str]] = []
-        self.pace: dict[Client, float] = {}
+        self.tally: Tally[int] = Tally(budget)
+        self.grounds: dict[int, Ground] = {}
+        self.left: dict[int, list[Preview | Settled]] = {}
+        """What the solve of each room has yet to give."""
+        self.log: list[tuple[int, str]] = []
+        self.pace: dict[int, float] = {}
 
-    def client(self, levels: int = 2) -> Client:
-        client = Client(levels, ignore, ignore)
-        self.schedule.clients.append(client)
-        return client
+    def room(self, levels: int = 2) -> int:
+        room = len(self.grounds)
+        self.grounds[room], self.tally = Ground(levels), self.tally.opened(room)
+        return room
 
-    def ask(self, client: Client, clock: int = 1) -> None:
-        client.request(Job(clock, (), SETTINGS), self.now)
+    def happen(self, room: int, event: Event) -> tuple[Effect, ...]:
+        rested = states.is_at_rest(self.grounds[room])
+        self.grounds[room], effects = machine.next(self.grounds[room], event, self.now)
+        if rested and not states.is_at_rest(self.grounds[room]):
+            self.tally = self.tally.noted(room, ran_at=self.now)
+        return effects
 
-    def slice(self, seconds: float = 0.001) -> Client | None:
+    def ask(self, room: int, clock: int = 1) -> None:
+        self.happen(room, does.Requested(Job(clock, (), SETTINGS)))
+
+    def slice(self, seconds: float = 0.001) -> int | None:
         """One turn, as the worker takes it."""
-        client = self.schedule.pick()
-        if client is None:
+        room, self.tally = schedule.choose(self.grounds, self.now, self.tally)
+        if room is None:
             return None
-        if self.schedule.begin(client) is not None:
-            client.steps = _levels(client.top)
-        assert client.steps is not None
-        result = next(client.steps, None)
-        self.now += self.pace.get(client, seconds)
-        self.schedule.ended(client)
-        if result is None:
-            client.steps = None
-        else:
-            client.took(result, self.now)
-            self.log.append((client, f"{result.level}{'s' if result.settled else ''}"))
-        return client
+        begins, gone, self.tally = schedule.begin(room, self.grounds, self.now, self.tally)
+        for other in gone:
+            self.happen(other, does.Dropped())
+            self.happen(other, does.Again())
+        for effect in self.happen(room, does.Turn(begins)):
+            if isinstance(effect, does.OpenSolve):
+                self.left[room] = _levels(effect.top)
+                self.happen(room, does.Opened(False))
+        result = self.left[room].pop(0) if self.left[room] else None
+        self.now += self.pace.get(room, seconds)
+        self.tally = self.tally.ended(room, self.now)
+        self.happen(room, Done() if result is None else result)
+        if result is not None:
+            self.log.append((room, f"{result.level}{'s' if result.settled else ''}"))
+        return room
 
-    def until(self, client: Client, what: str, most: int = 200) -> int:
-        """Slices until a client has got something."""
+    def until(self, room: int, what: str, most: int = 200) -> int:
+        """Slices until a room has got something."""
         for count in range(1, most):
             self.slice()
-            if (client, what) in self.log:
+            if (room, what) in self.log:
                 return count
         raise AssertionError((what, self.log))
 
+    def solving(self) -> list[int]:
+        return [room for room, ground in self.grounds.items() if states.is_solving(ground)]
 
-def _levels(top: int) -> Iterator[Any]:
-    for settled in (False, True):
-        for level in range(top + 1):
-            yield Level(level, np.zeros((1, 1), dtype=np.float32), settled)
+
+def _levels(top: int) -> list[Preview | Settled]:
+    return [kind(level, FLAT) for kind in (Preview, Settled) for level in range(top + 1)]
 
 
 def test_a_coarse_preview_goes_before_finer_ones_and_before_settling() -> None:
     desk = Desk()
-    first, second, third = (desk.client() for _ in range(3))
+    first, second, third = (desk.room() for _ in range(3))
     desk.ask(first)
     desk.until(first, "0s")
     desk.ask(second)
@@ -85,7 +102,7 @@ def test_a_coarse_preview_goes_before_finer_ones_and_before_settling() -> None:
 
 def test_settling_gets_its_share_while_others_draw_without_end() -> None:
     desk = Desk()
-    drawing, settling = desk.client(), desk.client()
+    drawing, settling = desk.room(), desk.room()
     desk.ask(settling)
     desk.until(settling, "2")
     for clock in range(1, 400):
@@ -93,16 +110,16 @@ def test_settling_gets_its_share_while_others_draw_without_end() -> None:
         desk.slice(0.02)
         if (settling, "2s") in desk.log:
             break
-    assert desk.now < 4 * 3 * module.PATIENCE
+    assert desk.now < 4 * 3 * schedule.PATIENCE
 
 
 def test_a_coarse_preview_waits_for_one_slice_of_a_big_terrain_however_long_they_are() -> None:
     desk = Desk()
-    big = desk.client(6)
-    desk.pace[big] = 4 * module.PATIENCE
+    big = desk.room(6)
+    desk.pace[big] = 4 * schedule.PATIENCE
     desk.ask(big)
     desk.until(big, "6")
-    small = [desk.client() for _ in range(4)]
+    small = [desk.room() for _ in range(4)]
     for clock in range(1, 40):
         for client in small:
             desk.ask(client, clock)
@@ -115,27 +132,26 @@ def test_a_coarse_preview_waits_for_one_slice_of_a_big_terrain_however_long_they
 
 def test_a_coarse_preview_ends_the_settling_solve_that_began_last_and_that_settles_later() -> None:
     desk = Desk(budget=2 * solve_bytes(4))
-    early, late, new = (desk.client(4) for _ in range(3))
+    early, late, new = (desk.room(4) for _ in range(3))
     for client in (early, late):
         desk.ask(client)
         desk.until(client, "4")
     desk.ask(new)
     assert desk.until(new, "0") == 1
-    assert early.steps is not None
-    assert late.steps is None
-    assert late.newest is not None
+    assert desk.solving() == [early, new]
+    assert desk.grounds[late].jobs.wanted is not None
     for client in (early, new, late):
         desk.until(client, "4s")
 
 
 def test_previews_are_not_ended_for_a_coarse_one_and_never_more_solves_run_than_fit() -> None:
     desk = Desk(budget=3 * solve_bytes(4))
-    clients = [desk.client(4) for _ in range(12)]
+    clients = [desk.room(4) for _ in range(12)]
     for client in clients:
         desk.ask(client)
     most = 0
     while desk.slice() is not None:
-        most = max(most, sum(x.steps is not None for x in clients))
+        most = max(most, len(desk.solving()))
     assert most == 3
     for client in clients:
         assert [what for x, what in desk.log if x is client].count("4s") == 1
@@ -145,7 +161,7 @@ def test_previews_are_not_ended_for_a_coarse_one_and_never_more_solves_run_than_
 
 def test_a_solve_bigger_than_the_budget_still_runs_alone() -> None:
     desk = Desk(budget=solve_bytes(4))
-    big, small = desk.client(6), desk.client(4)
+    big, small = desk.room(6), desk.room(4)
     desk.ask(big)
     desk.until(big, "6")
     desk.ask(small)
@@ -153,95 +169,78 @@ def test_a_solve_bigger_than_the_budget_still_runs_alone() -> None:
     desk.until(big, "6s")
 
 
-def test_a_preview_that_is_about_to_end_is_shown_whole_and_not_stopped() -> None:
-    client = Client(2, ignore, ignore)
-    shown: list[list[bool]] = []
-    now = 0.0
-    for clock in (1, 2):
-        now += 0.1
-        client.request(Job(clock, (), SETTINGS), now)
-        client.begin()
-        client.steps = iter(())
-        row = []
-        for level, takes in ((0, 0.005), (1, 0.4), (2, 0.02)):
-            now += takes
-            row.append(client.took(Level(level, np.zeros((1, 1), dtype=np.float32), False), now))
-            if clock == 2 and level < 2:
-                client.request(Job(9, (), SETTINGS), now)
-                assert client.starts(now) == (level == 0), "0.42 s before the end, but not 0.02 s before it"
-                client.newest = None
-        shown.append(row)
+def _passing(ground: Ground, clock: int, at: float, takes: tuple[float, ...]) -> tuple[Ground, list[bool]]:
+    """A job is begun, and its previews come after so many seconds each. Returns also which of them are shown."""
+    now, shown = at, []
+    ground, _ = machine.next(ground, does.Requested(Job(clock, (), SETTINGS)), now)
+    ground, _ = machine.next(ground, does.Turn(begins=True), now)
+    for level, seconds in enumerate(takes):
+        now += seconds
+        ground, effects = machine.next(ground, Preview(level, FLAT), now)
+        shown += [
+            isinstance(effect, does.Deliver) for effect in effects if isinstance(effect, does.Deliver | does.Note)
+        ]
+    return ground, shown
+
+
+def test_a_preview_that_is_about_to_end_is_shown_whole_and_not_left() -> None:
+    ground, first = _passing(Ground(2), 1, 0.1, (0.005, 0.4, 0.02))
+    ended, second = _passing(ground, 2, 0.625, (0.005, 0.4, 0.02))
     # Nothing is known of the first pass; in the second, level 1 comes 20 ms before the finest and is not worth a look.
-    assert shown == [[True, True, True], [True, False, True]]
+    assert (first, second) == ([True, True, True], [True, False, True])
+    for level, leaves in ((1, True), (2, False)):
+        amid, _ = _passing(replace(ground, shown=replace(ground.shown, finest_at=0.6)), 2, 0.6, (0.005, 0.1)[:level])
+        amid, _ = machine.next(amid, does.Requested(Job(9, (), SETTINGS)), 0.71)
+        assert states.starts(amid, 0.71) == leaves, "0.42 s before the end, but not 0.02 s before it"
+    assert isinstance(ended.state, Settling)
 
 
 def test_the_finest_preview_has_time_to_be_sent() -> None:
     """A newer preview of a level between would bar it; the coarsest alone is shown at any time (SPEC P71)."""
-    client = Client(2, ignore, ignore)
-    flat = np.zeros((1, 1), dtype=np.float32)
-
-    def passing(clock: int, at: float) -> list[bool]:
-        client.request(Job(clock, (), SETTINGS), at)
-        client.begin()
-        client.steps = iter(())
-        return [client.took(Level(level, flat, False), at + 0.001 * level) for level in (0, 1)]
-
-    assert passing(1, 10.0) == [True, True], "the first is shown at once"
-    assert client.took(Level(2, flat, False), 10.1)
-    assert passing(2, 10.12) == [True, False]
-    assert passing(3, 10.15) == [True, False]
-    assert passing(4, 10.17) == [True, True]
-    assert client.took(Level(2, flat, False), 10.27)
-
-
-class Seer(Iterator[Any]):
-    """A solve of levels 0..2 that can tell what newer strokes look like."""
-
-    def __init__(self) -> None:
-        self._levels = _levels(2)
-
-    def __next__(self) -> Any:
-        return next(self._levels)
-
-    def glimpse(self, *_: Any) -> Any:
-        return Level(0, np.zeros((1, 1), dtype=np.float32), False)
+    ground, shown = _passing(Ground(2), 1, 10.0, (0.0, 0.001, 0.099))
+    assert shown == [True, True, True], "the first is shown at once"
+    for clock, at, expected in ((2, 10.12, False), (3, 10.15, False), (4, 10.17, True)):
+        assert _passing(ground, clock, at, (0.0, 0.001))[1] == [True, expected]
 
 
 def test_a_newer_job_shows_its_coarsest_level_while_a_pass_goes_on() -> None:
     """SPEC P92: once for each job, and not before the pass has shown its own; then its pass begins without it."""
-    client = Client(2, ignore, ignore)
-    client.request(Job(1, (), SETTINGS), 0.0)
-    client.begin()
-    client.steps, client.finest_at, client._lead = Seer(), 0.0, {0: 0.1, 1: 0.05}
+    ground, _ = machine.next(Ground(2), does.Requested(Job(1, (), SETTINGS)), 0.0)
+    ground = replace(ground, shown=replace(ground.shown, finest_at=0.0, lead={0: 0.1, 1: 0.05}))
+    ground, _ = machine.next(ground, does.Turn(begins=True), 0.0)
+    ground, _ = machine.next(ground, does.Opened(previews_early=True), 0.0)
     newer = Job(2, (), SETTINGS)
-    client.request(newer, 0.01)
-    assert not client.glimpse_due, "the first level of the pass comes as soon"
-    client.took(next(client.steps), 0.01)
-    assert client.glimpse_due
-    assert client.stage(0.01) == module.COARSE
-    client.glimpsed, client.ahead, client.stepped = newer, True, False
-    assert not client.glimpse_due
-    assert client.stage(0.01) == module.FINER, "the pass goes on"
-    for _ in (1, 2):
-        client.took(next(client.steps), 0.02)
-    assert client.begin() is newer
-    assert client.is_ahead(newer)
-    client.steps = Seer()
-    client.request(Job(3, (), SETTINGS), 0.03)
-    assert not client.glimpse_due, "the pass has not gone on since the last"
-    client.stepped = True
-    assert client.glimpse_due, "its coarsest level is out"
+    ground, _ = machine.next(ground, does.Requested(newer), 0.01)
+    assert not states.early_preview_is_due(ground), "the first level of the pass comes as soon"
+    ground, _ = machine.next(ground, Preview(0, FLAT), 0.01)
+    assert states.stage(ground, 0.01) == states.COARSE
+    ground, effects = machine.next(ground, does.Turn(begins=False), 0.01)
+    assert effects == (does.PreviewEarly(newer),)
+    ground, effects = machine.next(ground, does.EarlyMade(newer, Preview(0, FLAT)), 0.01)
+    assert [type(effect) for effect in effects] == [does.Deliver]
+    assert states.stage(ground, 0.01) == states.FINER, "the pass goes on"
+    for level in (1, 2):
+        ground, _ = machine.next(ground, Preview(level, FLAT), 0.02)
+    ground, effects = machine.next(ground, does.Turn(begins=True), 0.02)
+    assert effects[1] == does.OpenSolve(newer, 2, coarsest=False, base=False)
+    ground, _ = machine.next(ground, does.Requested(Job(3, (), SETTINGS)), 0.03)
+    ground = replace(ground, state=Previewing(newer, reached=0, previews_early=True))
+    assert not states.early_preview_is_due(ground), "the pass has not gone on since the last"
+    ground = replace(ground, early=Early(newer.number, made=True))
+    assert states.early_preview_is_due(ground), "its coarsest level is out"
 
 
-def test_nobody_waits_for_a_lull() -> None:
+def test_nobody_waits_while_something_else_is_to_be_done() -> None:
     """SPEC P94."""
     desk = Desk()
-    first, second = desk.client(), desk.client()
-    assert not desk.schedule.urges(first)
+    first, second = desk.room(), desk.room()
+    assert not schedule.has_something_else(first, desk.grounds)
     desk.ask(first)
-    assert desk.schedule.urges(first), "a newer job of its own"
+    assert schedule.has_something_else(first, desk.grounds), "a newer job of its own"
     desk.slice()
-    assert not desk.schedule.urges(first), "its own solve can wait"
-    assert desk.schedule.urges(second), "for others it is work"
+    assert not schedule.has_something_else(first, desk.grounds), "its own solve can wait"
+    assert schedule.has_something_else(second, desk.grounds), "for others it is work"
     desk.ask(second)
-    assert desk.schedule.urges(first)
+    assert schedule.has_something_else(first, desk.grounds)
+    assert desk.grounds[second].state == states.Waiting()
+    assert Ground(2).state == Idle()

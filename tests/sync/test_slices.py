@@ -10,15 +10,19 @@ from typing import Any
 import numpy as np
 import pytest
 
+from bench.room import stream
 from esker import contract as c
 from esker import grid
-from esker.bench import stream
+from esker.events import PAUSE, Done, Preview, Settled
 from esker.grid import TileKey
-from esker.session.schedule import Client, Job
-from esker.session.worker import Worker
+from esker.session.ground import states
+from esker.session.ground.client import Client
+from esker.session.ground.jobs import Job
+from esker.session.ground.worker import Worker
 from esker.solve.solver import Solver
 
 SETTINGS = c.TerrainSettings()
+NOTHING = np.zeros((1, 1), dtype=np.float32)
 
 
 def ignore(*_: Any) -> None:
@@ -36,15 +40,6 @@ class Tile:
     content: bytes = b""
 
 
-@dataclass(frozen=True)
-class Finest:
-    level: int
-    heights: Any
-    settled: bool
-    channel: c.Channel = c.Channel.HEIGHT
-    basis: object = None
-
-
 class Refining:
     """A solver whose solves take no time and whose tiles are counted."""
 
@@ -57,8 +52,9 @@ class Refining:
     def steps(self, strokes: Sequence[c.Stroke], settings: Any, levels: int, *, basis: bool) -> Iterator[Any]:
         assert basis
         assert settings == SETTINGS
-        yield Finest(levels, None, False)
-        yield Finest(levels, None, True, basis=len(strokes))
+        yield Preview(levels, NOTHING)
+        yield Settled(levels, NOTHING)
+        yield Done(len(strokes))
 
     def channels(self, *_: Any) -> Iterator[Any]:
         return iter(())
@@ -184,7 +180,7 @@ def test_when_refining_fails_the_ground_stays_and_people_are_told(refining: Any)
     wait(lambda: bool(told))
     assert "detail" in told[0]
     assert viewer.got == [(1, A)]
-    assert client.at_rest
+    assert states.is_at_rest(client.ground)
     del solver.tiles
     worker.request(client, Job(2, (), SETTINGS))
     wait(lambda: (2, B) in viewer.got)
@@ -205,14 +201,13 @@ class Watched:
         made: Any = self
         self.worker = Worker(lambda _: made)
         self.worker.start()
-        self.client = self.worker.add(levels, self.deliver, ignore)
+        self.client = self.worker.add(levels, self.deliver, ignore, note=self.deliver)
 
     def steps(self, strokes: Any, settings: Any, levels: int, **_: Any) -> Iterator[Any]:
         self.open.append(len(strokes))
         return self.solver.steps(strokes, settings, levels)
 
-    def deliver(self, clock: int, result: Any, show: bool) -> None:
-        assert show or not result.settled
+    def deliver(self, clock: int, result: Any) -> None:
         if result.channel == c.Channel.HEIGHT:
             self.done.append((clock, result.level, result.settled, time.monotonic()))
 
@@ -224,7 +219,7 @@ class Watched:
 
 
 def test_a_solve_left_while_it_rasterises_leaves_no_trace(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("esker.solve.device_workspace.RASTER_BINS", 40)
+    monkeypatch.setattr("esker.solve.opencl.device_workspace.RASTER_BINS", 40)
     strokes = stream.fifty().strokes
     solver = Solver(max_level=2)
     if solver.device_name.startswith("NumPy"):
@@ -232,7 +227,7 @@ def test_a_solve_left_while_it_rasterises_leaves_no_trace(monkeypatch: pytest.Mo
     want = solver.solve(strokes, SETTINGS)
     solver.solve(strokes[:30], SETTINGS)
     steps = solver.steps(strokes, SETTINGS)
-    assert next(steps) is None, "between two bands of bins"
+    assert next(steps) == PAUSE, "between two bands of bins"
     steps.close()
     got = solver.solve(strokes, SETTINGS)
     for level in range(3):

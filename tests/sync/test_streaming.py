@@ -13,9 +13,10 @@ import numpy as np
 import psutil
 
 from esker import contract as c
+from esker.events import Preview, Settled
 from esker.grid import TileKey
 from esker.tiles.decoder import FrameDecoder
-from tests.sync.harness import Level, LiveServer, PlainSolver, set_op, sleeping_member, stroke
+from tests.sync.harness import LiveServer, PlainSolver, height_level, set_op, sleeping_member, stroke
 
 
 def _clock(frame: bytes) -> int:
@@ -56,11 +57,11 @@ def test_without_credit_the_window_closes(tmp_path: Path) -> None:
     class Noise(PlainSolver):
         def steps(
             self, strokes: Sequence[c.Stroke], settings: c.TerrainSettings, levels: int | None = None, **_: Any
-        ) -> Iterator[Level]:
+        ) -> Iterator[Preview | Settled]:
             rng = np.random.default_rng(len(strokes))
             for level in super().steps(strokes, settings, levels):
                 heights = rng.uniform(0, 1000, level.heights.shape).astype(np.float32)
-                yield Level(level.level, heights, level.settled)
+                yield height_level(level.level, heights, level.settled)
 
     with LiveServer(tmp_path, Noise(), level=2) as server:
         terrain, secret = server.create()
@@ -156,7 +157,7 @@ class Failing(PlainSolver):
 
     def steps(
         self, strokes: Sequence[c.Stroke], settings: c.TerrainSettings, levels: int | None = None, **_: Any
-    ) -> Iterator[Level]:
+    ) -> Iterator[Preview | Settled]:
         for level in super().steps(strokes, settings, levels):
             self.calls += 1
             if self.broken:
@@ -184,7 +185,7 @@ def test_a_failing_solver_is_told_and_tried_again(tmp_path: Path) -> None:
 
 
 def test_after_three_failures_numpy_takes_over(tmp_path: Path) -> None:
-    from esker.session.worker import Job, Worker
+    from esker.session.ground.worker import Job, Worker
 
     made: list[str | None] = []
     notes: list[str] = []
@@ -201,7 +202,7 @@ def test_after_three_failures_numpy_takes_over(tmp_path: Path) -> None:
     worker = Worker(factory, "gpu")
     worker.start()
 
-    def deliver(_: int, level: Any, show: bool) -> None:
+    def deliver(_: int, level: Any) -> None:
         if level.settled:
             done.set()
 

@@ -1,350 +1,258 @@
-"""The solver's thread: newest job wins, nobody starves (SPEC P57 to P59, P120; DESIGN 8)."""
+"""The states of a room's ground: what each event leads to, and what is done then (SPEC P461; DESIGN 8).
+
+Nothing runs here: a ground, an event and a time go in, a ground and effects come out.
+"""
 
 from __future__ import annotations
 
-import threading
-import time
-from collections.abc import Callable, Iterator, Sequence
-from typing import Any
+import math
+from dataclasses import fields, replace
+from typing import Any, get_args
 
 import numpy as np
 import pytest
 
 from esker import contract as c
-from esker.session import schedule as module
-from esker.session.worker import TIDY_EVERY, Job, Worker
-from tests.sync.harness import Level
+from esker.events import BaseLevel, ChannelLevel, Done, Pause, Preview, Settled
+from esker.session.ground import effects as does
+from esker.session.ground import machine, schedule, states
+from esker.session.ground.effects import Effect, Event
+from esker.session.ground.jobs import Attempt, Job
+from esker.session.ground.states import (
+    Channels,
+    ChannelsOnly,
+    Early,
+    Failed,
+    Ground,
+    Idle,
+    Jobs,
+    Previewing,
+    Refining,
+    Settling,
+    Shown,
+    State,
+    Waiting,
+)
 
+NOW = 10.0
+TOP = 2
+FLAT = np.zeros((1, 1), dtype=np.float32)
 SETTINGS = c.TerrainSettings()
-FLAT = np.zeros((65, 65), dtype=np.float32)
-
-
-class Turnstile:
-    """A solver that makes one level each time the test lets it."""
-
-    device_name = "turnstile"
-
-    def __init__(self) -> None:
-        self.permits = threading.Semaphore(0)
-        self.closed: list[int] = []
-        self.speaks = False
-        self.tidied = threading.Event()
-
-    def tidy(self) -> int:
-        self.tidied.set()
-        return 0
-
-    def steps(
-        self, strokes: Sequence[c.Stroke], settings: c.TerrainSettings, levels: int | None = None, **_: Any
-    ) -> Iterator[Level]:
-        assert settings == SETTINGS
-        try:
-            for settled in (False, True):
-                for level in range((levels or 0) + 1):
-                    self.permits.acquire()
-                    yield Level(level, FLAT, settled)
-                    if self.speaks and level == 0 and not settled:
-                        yield from self.channels()
-        finally:
-            self.closed.append(len(strokes))
-
-    def channels(self, *_: Any, **__: Any) -> Iterator[Level]:
-        self.permits.acquire()
-        yield Level(0, FLAT, True, c.Channel.SNOW)
-
-    def base_levels(self, base: Any, levels: int) -> Iterator[Level]:
-        for level in range(levels + 1):
-            self.permits.acquire()
-            yield Level(level, base.level(level), True, c.Channel.BASE)
-
-    def refiner(self, basis: object) -> Any:
-        raise AssertionError(f"nobody was given {basis}")
-
-
-class Bench:
-    """A worker whose time is a number and whose deliveries are written down."""
-
-    def __init__(self) -> None:
-        self.now = 0.0
-        self.solver = Turnstile()
-        self.worker = Worker(lambda _: self.solver, now=lambda: self.now)
-        self.worker.start()
-        self.got: list[tuple[str, int, int, bool]] = []
-        self.confirmed: list[tuple[int, int]] = []
-        self._arrived = threading.Condition()
-
-    def room(self, name: str, levels: int = 2) -> Any:
-        def deliver(clock: int, result: Any, show: bool) -> None:
-            what = name if result.channel == c.Channel.HEIGHT else f"{name}.snow"
-            with self._arrived:
-                self.got.append((what, clock, result.level, result.settled))
-                self._arrived.notify()
-
-        def confirm(clock: int, level: int) -> None:
-            self.confirmed.append((clock, level))
-
-        return self.worker.add(levels, deliver, _unexpected, confirm=confirm)
-
-    def let(self, count: int) -> list[tuple[str, int, int, bool]]:
-        """Lets ``count`` levels be made; returns the deliveries so far."""
-        goal = len(self.got) + count
-        for _ in range(count):
-            self.solver.permits.release()
-        with self._arrived:
-            assert self._arrived.wait_for(lambda: len(self.got) >= goal, 60), self.got
-        return self.got
-
-    def idle(self) -> None:
-        """Waits until the worker stands at the turnstile or has nothing to do."""
-        time.sleep(0.02)
-
-    def stop(self) -> None:
-        self.solver.permits.release(100)
-        self.worker.stop()
-
-
-def _unexpected(note: str) -> None:
-    raise AssertionError(note)
-
-
-def _job(clock: int, shape: object = None, painted: object = None) -> Job:
-    """Jobs of one shape have the same heights."""
-    return Job(clock, (), SETTINGS, object() if shape is None else shape, painted)
-
-
-def _bench(test: Callable[[Bench], None]) -> None:
-    bench = Bench()
-    try:
-        test(bench)
-    finally:
-        bench.stop()
-
-
-def test_levels_come_coarse_to_fine_then_settled() -> None:
-    def run(bench: Bench) -> None:
-        room = bench.room("a")
-        bench.worker.request(room, _job(1))
-        got = bench.let(6)
-        assert got == [("a", 1, level, settled) for settled in (False, True) for level in (0, 1, 2)]
-
-    _bench(run)
-
-
-def test_a_newer_job_stops_the_old_one_at_the_next_level() -> None:
-    def run(bench: Bench) -> None:
-        room = bench.room("a")
-        bench.worker.request(room, _job(1))
-        bench.let(4)  # the preview pass is through: the finest level was delivered just now
-        bench.idle()
-        bench.worker.request(room, _job(2))
-        bench.worker.request(room, _job(3))
-        got = bench.let(2)
-        # The level that was being made is delivered; then the newest job starts, the one between is skipped.
-        assert got[4:] == [("a", 1, 1, True), ("a", 3, 0, False)]
-
-    _bench(run)
-
-
-def test_drawing_without_a_pause_does_not_starve_the_fine_levels() -> None:
-    def run(bench: Bench) -> None:
-        room = bench.room("a")
-        bench.worker.request(room, _job(1))
-        bench.let(3)
-        finest: list[float] = [bench.now]
-        for clock in range(2, 40):
-            bench.worker.request(room, _job(clock))
-            bench.idle()
-            bench.now += 0.033
-            [*_, (_, _, level, _)] = bench.let(1)
-            if level == 2:
-                finest.append(bench.now)
-        gaps = np.diff(finest)
-        assert len(gaps) >= 4
-        assert max(gaps) <= module.FINEST_WITHIN + 4 * 0.033
-        coarse = [entry for entry in bench.got if entry[2] == 0]
-        assert len(coarse) > len(finest), "coarse levels still come more often than fine ones"
-
-    _bench(run)
-
-
-def test_paint_leaves_settled_heights_alone() -> None:
-    """SPEC P81."""
-
-    def run(bench: Bench) -> None:
-        room = bench.room("a")
-        bench.worker.request(room, _job(1, "shape"))
-        bench.let(6)
-        bench.idle()
-        for clock in (2, 3):
-            bench.worker.request(room, _job(clock, "shape"))
-            assert bench.let(1)[-1] == ("a.snow", clock, 0, True)
-            bench.idle()
-            assert bench.confirmed[-1] == (clock, 2)
-        bench.worker.request(room, _job(4, "another"))
-        assert bench.let(1)[-1] == ("a", 4, 0, False)
-
-    _bench(run)
-
-
-def test_paint_does_not_stop_heights_that_settle() -> None:
-    """SPEC P81: it is solved in between, the newest alone, and confirmed when the heights are final."""
-
-    def run(bench: Bench) -> None:
-        room = bench.room("a")
-        bench.worker.request(room, _job(1, "shape"))
-        bench.let(1)
-        bench.idle()
-        bench.worker.request(room, _job(2, "shape"))
-        assert [entry[:3] for entry in bench.let(2)[1:]] == [("a", 1, 1), ("a", 1, 2)], "the preview goes on"
-        assert bench.let(1)[-1] == ("a.snow", 2, 0, True)
-        bench.let(1)
-        bench.idle()
-        bench.worker.request(room, _job(3, "shape"))
-        bench.worker.request(room, _job(4, "shape"))
-        assert bench.let(2)[-2:] == [("a", 1, 1, True), ("a.snow", 4, 0, True)]
-        assert bench.let(1)[-1] == ("a", 1, 2, True)
-        assert bench.confirmed == []
-        assert bench.let(1)[-1] == ("a.snow", 4, 0, True)
-        bench.idle()
-        assert bench.confirmed == [(4, 2)]
-
-    _bench(run)
-
-
-def test_paint_does_not_wait_for_a_pen_that_never_rests() -> None:
-    """SPEC P81: between two levels of somebody's stroke; and older channels of that one come no more."""
-
-    def run(bench: Bench) -> None:
-        room = bench.room("a")
-        bench.solver.speaks = True
-        bench.worker.request(room, _job(1))
-        assert bench.let(1) == [("a", 1, 0, False)]
-        bench.idle()
-        bench.worker.request(room, _job(2))
-        bench.worker.request(room, _job(3, painted="snow"))
-        assert bench.let(2)[1:] == [("a.snow", 1, 0, True), ("a.snow", 3, 0, True)]
-        room.finest_at = -1.0  # the pass is to end first
-        bench.idle()
-        assert bench.let(1)[-1] == ("a", 1, 1, False)
-        bench.worker.request(room, _job(4, painted="snow"))
-        assert bench.let(1)[-1] == ("a", 1, 2, False)
-        bench.idle()
-        assert bench.let(1)[-1] == ("a", 4, 0, False), "no more paint, no more of it"
-        assert bench.let(1)[-1] == ("a.snow", 4, 0, True)
-
-    _bench(run)
-
-
-def test_older_paint_does_not_come_after_newer() -> None:
-    """SPEC P81."""
-
-    def run(bench: Bench) -> None:
-        room = bench.room("a")
-        bench.solver.speaks = True
-        bench.worker.request(room, _job(1))
-        bench.idle()  # at level 0
-        bench.worker.request(room, _job(2, painted="snow"))
-        assert bench.let(2) == [("a", 1, 0, False), ("a.snow", 2, 0, True)]
-        bench.solver.permits.release()  # for the channels of the first job
-        assert bench.let(1)[2:] == [("a", 1, 1, False)]
-
-    _bench(run)
-
-
-def test_a_stroke_amid_paint_starts_the_heights_anew() -> None:
-    """SPEC P81: heights that were not finished are nobody's ground."""
-
-    def run(bench: Bench) -> None:
-        room = bench.room("a")
-        bench.worker.request(room, _job(1, "shape"))
-        bench.let(4)
-        bench.idle()
-        bench.worker.request(room, _job(2, "another"))
-        assert bench.let(2)[-1] == ("a", 2, 0, False)
-        bench.idle()
-        bench.worker.request(room, _job(3, "shape"))
-        got = bench.let(5)
-        assert ("a.snow", 3, 0, True) not in got
-
-    _bench(run)
-
-
-def test_rooms_take_turns() -> None:
-    def run(bench: Bench) -> None:
-        rooms = {name: bench.room(name) for name in "abc"}
-        for room in rooms.values():
-            bench.worker.request(room, _job(1))
-        got = bench.let(18)
-        # The first room may be a level ahead, as it asked first.
-        for count in range(3, 19):
-            made = [sum(entry[0] == name for entry in got[:count]) for name in rooms]
-            assert max(made) - min(made) <= 2, got
-
-    _bench(run)
-
-
-def test_a_solver_tidies_up_while_there_is_nothing_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
-    """SPEC S30."""
-    monkeypatch.setattr("esker.session.worker.IDLE_CHECK", 0.01)
-
-    def run(bench: Bench) -> None:
-        assert bench.solver.tidied.wait(60)
-
-    _bench(run)
-
-
-def test_a_solver_tidies_up_on_a_server_that_never_rests(monkeypatch: pytest.MonkeyPatch) -> None:
-    """SPEC S30: between two steps of a solve, every half minute."""
-    monkeypatch.setattr("esker.session.worker.IDLE_CHECK", 1000.0)
-
-    def run(bench: Bench) -> None:
-        bench.worker.request(bench.room("a"), _job(1))
-        bench.let(2)
-        assert not bench.solver.tidied.is_set()
-        bench.now += TIDY_EVERY
-        bench.let(2)
-        assert bench.solver.tidied.is_set()
-
-    _bench(run)
-
-
-def test_what_a_solve_left_is_given_back_behind_the_first_level_of_the_next() -> None:
-    def test(bench: Bench) -> None:
-        room = bench.room("one")
-        bench.worker.request(room, _job(1))
-        bench.let(6)
-        bench.idle()
-        room.refiner = left = object()
-        bench.worker.request(room, _job(2))
-        bench.idle()
-        assert (room.refiner, room.remains) == (None, left)
-        bench.let(2)
-        bench.idle()
-        assert room.remains is None
-        assert bench.got[-2:] == [("one", 2, 0, False), ("one", 2, 1, False)]
-
-    _bench(test)
-
-
-def test_a_closed_room_gets_nothing_more() -> None:
-    def run(bench: Bench) -> None:
-        room, other = bench.room("a"), bench.room("b")
-        bench.worker.request(room, _job(1))
-        bench.let(1)
-        bench.idle()
-        bench.worker.remove(room)
-        bench.solver.permits.release()
-        bench.idle()
-        bench.worker.request(other, _job(1))
-        bench.let(2)
-        assert [entry[0] for entry in bench.got] == ["a", "b", "b"]
-
-    _bench(run)
-
-
-def test_a_solver_that_cannot_be_made_is_an_error_at_the_start() -> None:
-    def broken(_: str | None) -> Any:
-        raise RuntimeError("no device")
-
-    with pytest.raises(RuntimeError, match="no device"):
-        Worker(broken).start()
+JOB = Job(1, (), SETTINGS, heights_rev=1, paint_rev=1, number=1)
+DRAWN = Job(2, (), SETTINGS, heights_rev=2, paint_rev=1, number=2)
+PAINTED = Job(3, (), SETTINGS, heights_rev=1, paint_rev=2, number=3)
+SNOW = ChannelLevel(0, FLAT, c.Channel.SNOW)
+GROUND = BaseLevel(0, FLAT, c.Channel.BASE)
+SOON = Shown(lead={0: 0.1, 1: 0.05}, finest_at=NOW - 0.1)
+SETTLED = Shown(heights=((1, 0), TOP), clock=1)
+OF_JOB = Channels(paint_rev=1)
+MAKING = Channels(beside=PAINTED, making=True, paint_rev=2)
+
+
+def ground(state: State, wanted: Job | None = None, tries: int = 0, **more: Any) -> Ground:
+    """A ground whose job JOB was begun, unless nothing ever was."""
+    begun = None if state in (Idle(), Waiting()) else Attempt(JOB, tries)
+    return Ground(TOP, state, Jobs(None if wanted is None else Attempt(wanted), begun), **{"channels": OF_JOB, **more})
+
+
+def opens(job: Job, *, coarsest: bool = True, keeps: bool = False) -> tuple[Effect, ...]:
+    return does.Leave(keeps), does.OpenSolve(job, TOP, coarsest=coarsest, base=False)
+
+
+def shows(level: Any, *, shown: bool = True, wait: float = 0.0, job: Job = JOB) -> tuple[Effect, ...]:
+    brings = does.Deliver(job, level) if shown else does.Note(job, level)
+    return (brings, *((does.Yield(wait),) if wait else ()), does.GiveBack())
+
+
+NONE: tuple[Effect, ...] = ()
+COARSE, MIDDLE, FINEST = (Preview(level, FLAT) for level in range(3))
+EXACT = Settled(0, FLAT)
+EARLY = Previewing(JOB, 0, {0: NOW}, previews_early=True)
+
+TABLE: list[tuple[Ground, Event, State, tuple[Effect, ...]]] = [
+    # a job comes
+    (ground(Idle()), does.Requested(JOB), Waiting(), NONE),
+    (ground(Idle(refines=True)), does.Requested(JOB), Waiting(refines=True), NONE),
+    (ground(Waiting(), JOB), does.Requested(DRAWN), Waiting(), NONE),
+    (ground(Previewing(JOB)), does.Requested(DRAWN), Previewing(JOB), NONE),
+    (ground(Settling(JOB)), does.Requested(DRAWN), Settling(JOB), NONE),
+    (ground(Refining()), does.Requested(DRAWN), Refining(), NONE),
+    (ground(ChannelsOnly(JOB)), does.Requested(DRAWN), ChannelsOnly(JOB), NONE),
+    (ground(Failed(11.0)), does.Requested(DRAWN), Waiting(), NONE),
+    # its solve is begun, and what was open is left
+    (ground(Waiting(), JOB), does.Turn(begins=True), Previewing(JOB), opens(JOB)),
+    (ground(Settling(JOB), DRAWN), does.Turn(begins=True), Previewing(DRAWN), opens(DRAWN)),
+    (ground(Refining(), DRAWN, shown=SETTLED), does.Turn(begins=True), Previewing(DRAWN), opens(DRAWN)),
+    (ground(ChannelsOnly(JOB), DRAWN), does.Turn(begins=True), Previewing(DRAWN), opens(DRAWN, keeps=True)),
+    (
+        ground(Settling(JOB), DRAWN, early=Early(DRAWN.number, made=True)),
+        does.Turn(begins=True),
+        Previewing(DRAWN, 0, {0: NOW}),
+        opens(DRAWN, coarsest=False),
+    ),
+    (ground(Previewing(JOB)), does.Opened(True), Previewing(JOB, previews_early=True), (does.Step(),)),
+    # previews
+    (ground(Previewing(JOB)), does.Turn(begins=False), Previewing(JOB), (does.Step(),)),
+    (ground(Previewing(JOB)), Pause(), Previewing(JOB), NONE),
+    (ground(Previewing(JOB)), GROUND, Previewing(JOB), shows(GROUND)),
+    (ground(Previewing(JOB)), does.BaseShown(), Previewing(JOB), NONE),
+    (ground(Previewing(JOB)), COARSE, Previewing(JOB, 0, {0: NOW}), shows(COARSE, wait=0.002)),
+    (ground(Previewing(JOB)), MIDDLE, Previewing(JOB, 1, {1: NOW}), shows(MIDDLE)),
+    (ground(Previewing(JOB), shown=SOON), MIDDLE, Previewing(JOB, 1, {1: NOW}), shows(MIDDLE, shown=False)),
+    (ground(Previewing(JOB)), FINEST, Settling(JOB), shows(FINEST, wait=0.020)),
+    (ground(Previewing(JOB)), SNOW, Previewing(JOB), shows(SNOW)),
+    (ground(Previewing(JOB)), EXACT, Previewing(JOB), shows(EXACT)),
+    # an early preview of a newer job
+    (ground(EARLY, DRAWN), does.Turn(begins=False), EARLY, (does.PreviewEarly(DRAWN),)),
+    (ground(EARLY, DRAWN), does.EarlyMade(DRAWN, COARSE), EARLY, (does.Deliver(DRAWN, COARSE),)),
+    (ground(EARLY, DRAWN), does.EarlyMade(DRAWN, None), EARLY, NONE),
+    (ground(EARLY, DRAWN, early=Early(DRAWN.number)), does.Turn(begins=False), EARLY, (does.Step(),)),
+    # settling
+    (ground(Settling(JOB)), does.Turn(begins=False), Settling(JOB), (does.Step(),)),
+    (ground(Settling(JOB)), COARSE, Settling(JOB), shows(COARSE, wait=0.002)),
+    (ground(Settling(JOB)), EXACT, Settling(JOB), shows(EXACT)),
+    (ground(Settling(JOB)), Done(), Idle(), (does.NoteSolved(),)),
+    (ground(Settling(JOB)), Done("basis"), Refining(), (does.OpenRefinement("basis"), does.NoteSolved())),
+    (ground(Settling(JOB), PAINTED), Done(), Waiting(), (does.NoteSolved(),)),
+    # channels beside a solve
+    (
+        ground(Settling(JOB), PAINTED),
+        does.Turn(begins=False),
+        Settling(JOB),
+        (does.OpenChannels(PAINTED, TOP, beside=True), does.StepBeside()),
+    ),
+    (ground(Settling(JOB), PAINTED, channels=MAKING), does.Turn(begins=False), Settling(JOB), (does.StepBeside(),)),
+    (
+        ground(Settling(JOB), PAINTED, channels=replace(MAKING, solved_since=False)),
+        does.Turn(begins=False),
+        Settling(JOB),
+        (does.Step(),),
+    ),
+    (ground(Settling(JOB), channels=MAKING), does.Beside(SNOW), Settling(JOB), (does.Deliver(PAINTED, SNOW),)),
+    (ground(Settling(JOB), channels=MAKING), does.Beside(Pause()), Settling(JOB), NONE),
+    (ground(Settling(JOB), channels=MAKING), does.Beside(Done()), Settling(JOB), NONE),
+    (ground(Settling(JOB), channels=MAKING), SNOW, Settling(JOB), (does.GiveBack(),)),  # a newer job's came already
+    (ground(Idle(), channels=MAKING), does.Turn(begins=False), Idle(), (does.StepBeside(),)),
+    # channels only
+    (
+        ground(Refining(), PAINTED, shown=SETTLED),
+        does.Turn(begins=True),
+        ChannelsOnly(PAINTED, refines=True, looking=True),
+        (does.OpenChannels(PAINTED, TOP), does.Step()),
+    ),
+    (
+        ground(Waiting(refines=True), PAINTED, shown=SETTLED, channels=MAKING),
+        does.Turn(begins=True),
+        ChannelsOnly(PAINTED, refines=True),
+        (does.AdoptChannels(), does.Step()),
+    ),
+    (ground(ChannelsOnly(JOB)), SNOW, ChannelsOnly(JOB), shows(SNOW)),
+    (ground(ChannelsOnly(JOB)), Done(), Idle(), (does.Confirm(JOB, TOP),)),
+    (ground(ChannelsOnly(JOB, refines=True)), Done(), Idle(refines=True), (does.Confirm(JOB, TOP),)),
+    (ground(ChannelsOnly(JOB, refines=True, looking=True)), Done(), Refining(), (does.Confirm(JOB, TOP),)),
+    (ground(ChannelsOnly(JOB, refines=True)), does.Nudged(), ChannelsOnly(JOB, refines=True, looking=True), NONE),
+    # refinement
+    (ground(Refining()), does.Turn(begins=False), Refining(), (does.Refine(),)),
+    (ground(Refining()), does.NothingRequested(), Idle(refines=True), NONE),
+    (ground(Refining(), DRAWN), does.NothingRequested(), Waiting(refines=True), NONE),
+    (ground(Idle(refines=True)), does.Nudged(), Refining(), NONE),
+    (ground(Waiting(refines=True), PAINTED), does.Nudged(), Refining(), NONE),
+    (ground(Idle()), does.Nudged(), Idle(), NONE),
+    # ended for another room's sake, or for another device's
+    (ground(Settling(JOB)), does.Dropped(), Idle(), NONE),
+    (ground(Settling(JOB), DRAWN), does.Dropped(), Waiting(), NONE),
+    (ground(Idle(refines=True)), does.Again(), Waiting(refines=True), NONE),
+    (ground(Idle()), does.Again(), Idle(), NONE),
+    # failures
+    (ground(Idle(refines=True)), does.Unsolved(), Failed(NOW + machine.AGAIN_AFTER), (does.Apologise(again=True),)),
+    (ground(Idle(refines=True), tries=2), does.Unsolved(), Failed(math.inf), (does.Apologise(again=False),)),
+    (ground(Waiting(refines=True), DRAWN), does.Unsolved(), Waiting(), (does.Apologise(again=True),)),
+    (ground(Idle(refines=True)), does.Unsolvable(), Failed(math.inf), NONE),
+    (ground(Waiting(refines=True), DRAWN), does.Unsolvable(), Waiting(), NONE),
+    (ground(Failed(11.0)), does.Again(), Waiting(), NONE),
+    (ground(Failed(11.0)), does.Turn(begins=False), Failed(11.0), NONE),
+    (ground(Idle(refines=True)), does.Coarser(), Waiting(refines=True), NONE),
+    (ground(Idle(refines=True)), does.Finer(3), Waiting(refines=True), NONE),
+]
+
+
+def named(row: tuple[Ground, Event, State, tuple[Effect, ...]]) -> str:
+    before, event, after, _ = row
+    return f"{type(before.state).__name__}-{type(event).__name__}-{type(after).__name__}"
+
+
+@pytest.mark.parametrize(("before", "event", "state", "effects"), TABLE, ids=map(named, TABLE))
+def test_an_event_leads_to_a_state_and_effects(
+    before: Ground, event: Event, state: State, effects: tuple[Effect, ...]
+) -> None:
+    """SPEC P461."""
+    after, found = machine.next(before, event, NOW)
+    assert after.state == state
+    assert found == effects
+
+
+def test_the_table_has_every_state_event_and_effect() -> None:
+    """SPEC P461: a new one that nobody wrote down is found."""
+    assert {type(before.state) for before, _, _, _ in TABLE} == set(get_args(State))
+    assert {type(event) for _, event, _, _ in TABLE} == set(get_args(Event))
+    assert {type(effect) for *_, effects in TABLE for effect in effects} == set(get_args(Effect))
+
+
+def test_states_are_small_values() -> None:
+    """SPEC P461: at most six fields each, none of which is ever assigned to."""
+    for kind in (*get_args(State), Ground, Jobs, Channels, Shown, Early, schedule.Used, schedule.Tally):
+        assert len(fields(kind)) <= 6, kind
+        assert kind.__dataclass_params__.frozen, kind
+
+
+PASS = Previewing(JOB, 1, {0: NOW, 1: NOW})
+OTHERS = replace(PAINTED, number=4)
+NEW, OLD = replace(SOON, lead={1: 1.0}), replace(SOON, finest_at=NOW - 1.0, lead={1: 1.0})
+BEGINS: list[tuple[str, Ground, bool]] = [
+    ("nothing is wanted", ground(Settling(JOB)), False),
+    ("nothing runs", ground(Waiting(), JOB), True),
+    ("it only settles", ground(Settling(JOB), DRAWN), True),
+    ("it refines", ground(Refining(), DRAWN), True),
+    ("the heights are the same", ground(Settling(JOB), PAINTED), False),
+    ("a pass of which nothing is known", ground(PASS, DRAWN, shown=Shown(finest_at=NOW)), True),
+    ("a pass that takes long", ground(PASS, DRAWN, shown=NEW), True),
+    ("a pass that ends soon", ground(PASS, DRAWN, shown=SOON), False),
+    ("a pass whose finest level has been out for long", ground(PASS, DRAWN, shown=OLD), False),
+    (
+        "other channels are made first",
+        ground(Idle(), OTHERS, shown=SETTLED, channels=MAKING),
+        False,
+    ),
+    ("its own channels are made", ground(Idle(), PAINTED, shown=SETTLED, channels=MAKING), True),
+    ("channels came long ago", ground(ChannelsOnly(JOB), PAINTED, channels=Channels(complete_at=NOW - 1)), False),
+    ("channels came just now", ground(ChannelsOnly(JOB), PAINTED, channels=Channels(complete_at=NOW)), True),
+]
+
+
+@pytest.mark.parametrize(("before", "begins"), [row[1:] for row in BEGINS], ids=[row[0] for row in BEGINS])
+def test_when_the_newest_job_is_begun(before: Ground, begins: bool) -> None:
+    """SPEC P57, P58: at once, but for a preview pass that should end first."""
+    assert states.starts(before, NOW) == begins
+
+
+def test_what_is_kept_beside_the_state() -> None:
+    """SPEC P461: what was shown, which channels came, how often a job has failed."""
+    after, _ = machine.next(ground(Settling(JOB)), Done(), NOW)
+    assert (after.shown.heights, after.channels.complete_at) == ((JOB.heights, TOP), NOW)
+    after, _ = machine.next(after, does.Dropped(settled=True), NOW)
+    assert after.shown.heights is not None
+    after, _ = machine.next(after, does.Dropped(), NOW)
+    assert after.shown.heights is None
+    after, _ = machine.next(ground(Previewing(JOB)), SNOW, NOW)
+    assert after.channels.came == {(int(c.Channel.SNOW), 0): JOB.number}
+    after, _ = machine.next(ground(Previewing(JOB, 1, {0: 9.0, 1: 9.5})), FINEST, NOW)
+    assert (after.shown.lead, after.shown.finest_at, after.shown.previewed) == ({0: 1.0, 1: 0.5}, NOW, JOB.number)
+    after, _ = machine.next(ground(Previewing(JOB)), GROUND, NOW)
+    assert after.shown.base == (0, -2), "half a base is nobody's"
+    after, _ = machine.next(after, does.BaseShown(), NOW)
+    assert after.shown.base == (JOB.layers_rev, TOP)
+    after, _ = machine.next(after, does.Coarser(), NOW)
+    assert (after.top, after.shown.base) == (TOP - 1, (JOB.layers_rev, TOP - 1))
+    after, _ = machine.next(ground(Idle(refines=True)), does.Unsolved(), NOW)
+    after, _ = machine.next(after, does.Again(), NOW)
+    assert after.jobs.wanted == Attempt(JOB, tries=1)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from esker.solve.device import open_device
+from esker.solve.opencl.device import open_device
 from esker.synthesis.kernels import Kernels
 
 

@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from esker import contract, fractal, grid
-from esker.fractal import PAINT_LESS
+from esker import contract, grid
+from esker.contract import fractal
+from esker.contract.fractal import PAINT_LESS
 from esker.synthesis.detailed import DetailedTerrain
 from esker.synthesis.interpolate import FOUR_POINT, Window, upsampled
 from esker.synthesis.site import Site

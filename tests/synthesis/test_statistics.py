@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from esker.bench import synthesis_statistics as bench
+from bench.picture import synthesis_statistics as bench
 
 
 @pytest.fixture(scope="module", params=[0.75, 1.1])

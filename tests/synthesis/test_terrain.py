@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from esker import Stroke, Terrain, contract, grid
+from esker.cli import solve
 from esker.contract import DEFAULT_LEVEL, Channel, PaintChannel
 from esker.document import archive
-from esker.solve import command
 from esker.solve.detail import settle
 from esker.solve.solver import Solver
 from esker.synthesis import detailed
@@ -61,7 +61,7 @@ def test_channels_are_what_clients_decode(terrain: Terrain) -> None:
         name = channel.name.lower()
         given = settled.channels[name]
         pyramid = ChannelPyramid(channel, 3)
-        pyramid.put(1, pyramid.levels, given, settled=True)
+        pyramid.settle(1, pyramid.levels, given)
         level = pyramid.level(pyramid.levels)
         assert level is not None
         assert np.array_equal(site.channels[name], values(level.samples, channel))
@@ -183,7 +183,7 @@ def test_the_command_writes_heights_and_attributes(
     file.write_bytes(archive.dumps(terrain.document))
     corners = [str(v) for v in WHERE]
     options = ["--level", "9", "--attributes", str(more), "--window", *corners]
-    assert command.main([str(file), "-o", str(out), *options]) == 0
+    assert solve.main([str(file), "-o", str(out), *options]) == 0
     said = capsys.readouterr().err
     assert "level 4 (1025 x 1025) settled" in said
     assert "heights with detail" in said
@@ -193,7 +193,7 @@ def test_the_command_writes_heights_and_attributes(
         shapes = {name: attributes[name].shape for name in attributes}
         assert shapes == dict.fromkeys(wanted.attributes, wanted.heights.shape)
         assert np.array_equal(attributes["snow"], wanted.attributes["snow"])
-    assert command.main([str(file), "-o", str(out), "--level", "2", "--detail", "-q"]) == 0
+    assert solve.main([str(file), "-o", str(out), "--level", "2", "--detail", "-q"]) == 0
     assert capsys.readouterr().err == ""
     assert np.array_equal(np.load(out), terrain.heights(2, detail=True))
 
@@ -211,11 +211,11 @@ def test_the_command_says_what_is_wrong(
 ) -> None:
     file, out = tmp_path / "t.esker", tmp_path / "h.npy"
     file.write_bytes(archive.dumps(terrain.document))
-    assert command.main([str(file), "-o", str(out), "-q", *arguments]) == 1
+    assert solve.main([str(file), "-o", str(out), "-q", *arguments]) == 1
     assert words in capsys.readouterr().err
     assert not out.exists()
     with pytest.raises(SystemExit):
-        command.main([str(file), "-o", str(out), "--level", "12", "--window", "0", "0", "9", "9"])
+        solve.main([str(file), "-o", str(out), "--level", "12", "--window", "0", "0", "9", "9"])
     assert "--detail" in capsys.readouterr().err
 
 

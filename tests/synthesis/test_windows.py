@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from esker import fractal, grid
+from esker import grid
+from esker.contract import fractal
 from esker.synthesis.detailed import Maker, NumpyMaker
 from esker.synthesis.interpolate import B_SPLINE, Window, upsampled
 from esker.synthesis.kernels import Kernels

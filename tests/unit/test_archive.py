@@ -16,10 +16,10 @@ from esker import contract as c
 from esker.document import archive
 from esker.document.archive import ArchiveError
 from esker.document.ops import Refusal, check_document
-from esker.patchwork import rasters
-from esker.patchwork.rasters import Raster
+from esker.patchwork.raster import rasters
+from esker.patchwork.raster.rasters import Raster
+from esker.server.upload import read_archive
 from esker.store.grids import GridStore
-from esker.upload import read_archive
 
 HEIGHTS = np.add.outer(np.arange(30.0), np.arange(40.0)).astype(np.float32)
 HEIGHTS[3:5, 7:9] = np.nan

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from esker.bench import base
+from bench.ground import base
 from esker.contract import TILE_SAMPLES
 
 

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from esker.bench import cracks
+from bench.picture import cracks
 
 SEED_VIEWS = sum(kind.views for kind in cracks.KINDS.values())
 

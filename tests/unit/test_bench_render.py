@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from esker.bench import _render_ground, render
+from bench.picture import _render_ground, render
 from esker.render.camera import Camera, eye_projection
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import inspect
-import re
+import os
 import signal
 import socket
 import subprocess
@@ -12,14 +12,14 @@ import sys
 import tomllib
 import urllib.request
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
 
-from esker import cli
-from esker.cli import NOT_MEASURED
-from esker.tls import authority, names, server_context
+from esker.cli import main as cli
+from esker.cli.main import NOT_MEASURED
+from esker.keeper.private import Private
 from esker.version import VERSION
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -32,15 +32,19 @@ def _esker(*arguments: str) -> subprocess.CompletedProcess[str]:
 
 @contextmanager
 def _serving(*arguments: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
-    """A server process and the link that it printed."""
+    """A server process and its owner's link, which stands in no log and in a private file."""
     command = [sys.executable, "-m", "esker", "serve", "--port", "0", "--device", "numpy", *arguments]
     with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         try:
             assert process.stdout is not None
             for line in process.stdout:
-                found = re.search(r"https?://\S+/t/\S+#\S+", line)
-                if found:
-                    yield process, found.group()
+                assert "#" not in line, "no secret where nobody sits"
+                if "esker link" in line:
+                    data = arguments[arguments.index("--data") + 1]
+                    content = Private(Path(data)).read()
+                    assert content is not None
+                    assert content.lesson is not None
+                    yield process, f"{content.base}/t/{content.lesson.terrain}#{content.lesson.owner}"
                     break
             else:
                 assert process.stderr is not None
@@ -68,11 +72,11 @@ def test_bench_lists_and_names_what_there_is(capsys: pytest.CaptureFixture[str])
     listed = capsys.readouterr().out.split()
     assert "fanout" in listed
     for name in listed:
-        main = importlib.import_module(f"esker.bench.{name}").main
+        main = importlib.import_module(cli.benchmarks()[name]).main
         assert list(inspect.signature(main).parameters), f"{name} takes no arguments, so it does not measure"
     assert not NOT_MEASURED.intersection(listed)
     for name in NOT_MEASURED:
-        assert importlib.util.find_spec(f"esker.bench.{name}") is not None, name
+        assert list((ROOT / "bench").rglob(f"{name}.py")), name
     with pytest.raises(SystemExit) as end:
         cli.main(["bench", "--help"])
     assert end.value.code == 0
@@ -127,41 +131,40 @@ def test_it_serves_and_stops_when_told(tmp_path: Path) -> None:
     assert list((tmp_path / "backup").glob("esker-*.db"))
 
 
-def test_the_lan_certificate(tmp_path: Path) -> None:
-    context = server_context(tmp_path, "192.168.1.20")
-    assert context.minimum_version.name == "TLSv1_2"
-    key = tmp_path / "tls" / "esker-ca.key"
-    assert key.stat().st_mode & 0o077 == 0, "nobody else reads the authority's key"
-    assert authority(tmp_path).cert_pem.bytes() == (tmp_path / "tls" / "esker-ca.pem").read_bytes()
-    found = names("192.168.1.20")
-    assert found[0] == "192.168.1.20"
-    assert {"localhost", "127.0.0.1"} <= set(found)
-    assert len(found) == len(set(found))
+def test_what_the_server_writes_is_its_users_alone(tmp_path: Path) -> None:
+    """SPEC P285: database, log of it, backups, previews, grids: whatever the umask was."""
+    before = os.umask(0)
+    try:
+        with _serving("--data", str(tmp_path / "data"), "--lan") as (process, _):
+            process.send_signal(signal.SIGTERM)
+            process.wait(20)
+    finally:
+        os.umask(before)
+    written = [tmp_path / "data", *(tmp_path / "data").rglob("*")]
+    assert {"esker.db", "esker-ca.key"} <= {path.name for path in written}
+    assert [path for path in written if path.stat().st_mode & 0o077] == []
 
 
-def test_lan_prints_a_qr_code_and_where_the_certificate_is(tmp_path: Path) -> None:
-    command = [
-        sys.executable,
-        "-m",
-        "esker",
-        "serve",
-        "--port",
-        "0",
-        "--device",
-        "numpy",
-        "--lan",
-        "--data",
-        str(tmp_path),
-    ]
-    with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
-        assert process.stdout is not None
-        lines: list[str] = []
-        for line in process.stdout:
-            lines.append(line)
-            if len(lines) > 20:
-                break
+def test_lan_prints_on_a_terminal_how_all_come_in(tmp_path: Path) -> None:
+    """A real terminal: what is shown on the projector comes last, is no owner's link, and names its scheme."""
+    import pty
+
+    command = [sys.executable, "-m", "esker", "serve", "--port", "0", "--device", "numpy", "--lan"]
+    ours, theirs = pty.openpty()
+    with subprocess.Popen(
+        [*command, "--data", str(tmp_path)], cwd=ROOT, stdout=theirs, stderr=subprocess.DEVNULL
+    ) as process:
+        os.close(theirs)
+        text = ""
+        with suppress(OSError):  # how a terminal says that its program has ended
+            while text.count("█") < 100:
+                text += os.read(ours, 65536).decode(errors="ignore")
         process.kill()
-    text = "".join(lines)
-    assert "https://" in text
+    os.close(ours)
+    content = Private(tmp_path).read()
+    assert content is not None
+    assert content.lesson is not None
     assert "/esker-ca.pem" in text
-    assert text.count("█") > 100
+    private, public = text.index(content.lesson.owner), text.index(content.lesson.edit)
+    assert text.index("PRIVATE") < private < public < text.index("█")
+    assert f"https://{content.base.removeprefix('https://')}/t/" in text

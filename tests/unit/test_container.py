@@ -5,14 +5,17 @@ from __future__ import annotations
 import json
 import re
 import shlex
+import shutil
+import subprocess
 import tomllib
 from fnmatch import fnmatch
 from pathlib import Path
 
 import pytest
-from tests.unit.test_docs import ROOT, files, text
 
-from esker import cli, settings
+from esker.cli import main
+from esker.server import settings
+from tests.unit.test_docs import ROOT, files, text
 
 DOCKERFILE = re.sub(r"\\\n", " ", text("Dockerfile"))
 
@@ -70,7 +73,7 @@ def test_all_that_the_page_imports_is_copied_before_it_is_built() -> None:
 def test_the_command_is_one_that_the_server_takes() -> None:
     program, flag, package, *arguments = json.loads(DOCKERFILE.split("\nCMD ")[1])
     assert (program, flag, package) == ("python", "-m", "esker")
-    parsed = cli._parser().parse_args(arguments)
+    parsed = main._parser().parse_args(arguments)
     assert (parsed.host, parsed.port, str(parsed.data)) == ("0.0.0.0", 8000, "/data")
     assert instructions("EXPOSE") == [["8000"]]
     assert instructions("VOLUME") == [["/data"]]
@@ -83,7 +86,7 @@ def test_the_health_check_asks_for_a_page_that_is_there() -> None:
     """The page itself answers in tests/sync/test_access.py."""
     url = re.search(r"http://127\.0\.0\.1:8000(/\w+)", DOCKERFILE)
     assert url is not None
-    assert f'@app.get("{url.group(1)}")' in text("backend/esker/server/page.py")
+    assert f'@app.get("{url.group(1)}")' in text("backend/esker/server/routes/health.py")
 
 
 def test_compose_and_caddy_name_the_same_server() -> None:
@@ -101,3 +104,78 @@ def test_versions_are_those_that_the_make_file_takes() -> None:
     assert int(images["node"]) >= 22
     least = tomllib.loads(text("pyproject.toml"))["project"]["requires-python"]
     assert f">={images['python']}" == least
+
+
+def service(name: str) -> str:
+    """The lines of one service of docker-compose.yml."""
+    found = re.search(rf"^  {name}:\n((?:    .*\n|\n)+)", text("docker-compose.yml"), re.M)
+    assert found is not None
+    return found.group(1)
+
+
+@pytest.mark.parametrize("name", ["esker", "caddy"])
+def test_containers_can_take_and_change_little(name: str) -> None:
+    """SPEC H167."""
+    lines = service(name)
+    for line in ("read_only: true", "cap_drop: [ALL]", 'security_opt: ["no-new-privileges:true"]', "pids_limit: "):
+        assert f"    {line}" in lines, line
+    assert re.search(r"^    mem_limit: \S", lines, re.M)
+    assert re.search(r"^      - /tmp:mode=1777,size=\d+[mg]$", lines, re.M)
+    assert "logging:" in lines
+    assert "privileged: true" not in lines
+    assert re.findall(r"cap_add: .*", lines) == ([] if name == "esker" else ["cap_add: [NET_BIND_SERVICE]"])
+    assert re.search(r"max-size: 10m, max-file: \"\d\"", service("esker")), "logs are turned over"
+
+
+def test_what_is_compiled_is_kept_where_a_read_only_container_can_write() -> None:
+    """SPEC H167: the caches of PoCL and of the loops."""
+    given = dict(part.split("=", 1) for line in instructions("ENV") for part in line)
+    (volume,) = instructions("VOLUME")[0]
+    for name in ("XDG_CACHE_HOME", "NUMBA_CACHE_DIR"):
+        assert given[name].startswith(f"{volume}/")
+
+
+def test_packages_of_the_page_are_those_of_the_lock_file() -> None:
+    """SPEC H167: `npm install` may change its mind, `npm ci` fails instead."""
+    assert [line[-2:] for line in instructions("RUN")].count(["npm", "ci"]) == 1
+    assert not [line for line in instructions("RUN") if line[:2] == ["npm", "install"]]
+
+
+def test_no_compiler_nor_linker_comes_from_the_system() -> None:
+    """What OpenCL kernels need for their build comes with the locked packages (DESIGN 17)."""
+    (system,) = [line for line in instructions("RUN") if "apt-get" in line]
+    assert not {"gcc", "clang", "binutils", "build-essential", "libc6-dev", "lld"}.intersection(system)
+
+
+def test_images_get_the_digests_that_a_registry_says(tmp_path: Path) -> None:
+    """SPEC H168. No digest is in the files: none could be asked for where they were written."""
+    digest = "sha256:" + "0123456789abcdef" * 4
+    (tmp_path / "bin").mkdir()
+    docker = tmp_path / "bin" / "docker"
+    for file in ("Dockerfile", "docker-compose.yml"):
+        shutil.copy(ROOT / file, tmp_path / file)
+
+    def pin(*options: str) -> subprocess.CompletedProcess[str]:
+        environment = {"ROOT": str(tmp_path), "PATH": f"{tmp_path / 'bin'}:/usr/bin:/bin"}
+        command = ["/bin/bash", str(ROOT / ".ci" / "pin-images"), *options]
+        return subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+
+    bare = {line: re.sub(r"@sha256:[0-9a-f]{64}", "", line) for file in ("Dockerfile", "docker-compose.yml")
+            for line in text(file).splitlines() if re.match(r"FROM |    image: ", line)}  # fmt: skip
+    docker.write_text("#!/bin/sh\necho 'no such host'\n")
+    docker.chmod(0o755)
+    assert pin().returncode == 1, "what is no digest is not written"
+    assert (tmp_path / "Dockerfile").read_text() == text("Dockerfile")
+    docker.write_text(f"#!/bin/sh\necho {digest}\n")
+    for _ in range(2):  # once more replaces what is there
+        assert pin().returncode == 0
+        now = (tmp_path / "Dockerfile").read_text() + (tmp_path / "docker-compose.yml").read_text()
+        assert now.count(f"@{digest}") == len(bare) == 3
+        assert re.sub(rf"@{digest}", "", now) == re.sub(
+            r"@sha256:[0-9a-f]{64}", "", text("Dockerfile") + text("docker-compose.yml")
+        )
+    assert pin("--check").returncode == 0
+    docker.unlink()
+    shutil.copy(ROOT / "Dockerfile", tmp_path / "Dockerfile")
+    checked = pin("--check")
+    assert (checked.returncode == 1) == ("@sha256:" not in text("Dockerfile"))

@@ -15,19 +15,20 @@ import rasterio
 from numpy.typing import NDArray
 from PIL import Image
 
+from bench.ground.export import measure_files
 from esker import Stroke, Terrain, contract
-from esker import cli as command_line
-from esker.bench.export import measure_files
-from esker.contract import ExportWish
-from esker.exports import formats, mesh
-from esker.exports.ground import Extent
-from esker.exports.resample import resampled
-from esker.exports.water import under_water
-from esker.importing import placing
+from esker.api.terrain import default_solver
+from esker.cli import main as command_line
+from esker.contract import ExportRequest
+from esker.exporting import formats, mesh
+from esker.exporting.ground import Extent
+from esker.exporting.resample import resampled
+from esker.exporting.water import under_water
+from esker.exporting.weights import weights
 from esker.importing.examine import examine
-from esker.importing.laying import frame
-from esker.lakes import Lakes, find_lakes
-from esker.terrain import default_solver
+from esker.importing.placement import placing
+from esker.importing.placement.fitting import frame
+from esker.synthesis.lakes import Lakes, find_lakes
 
 SIZE = 512.0
 LEVEL = 2
@@ -203,6 +204,47 @@ def test_masks_are_the_attributes(terrain: Terrain, tmp_path: Path) -> None:
     assert 0 < (masks["water"] > 0).mean() < 1
 
 
+def masks_of(path: Path) -> dict[str, NDArray[np.uint8]]:
+    """The masks of a .zip, row 0 south."""
+    with zipfile.ZipFile(path) as archive:
+        names = [name for name in archive.namelist() if name.endswith(".png")]
+        assert json.loads(archive.read("masks.json"))["masks"] == names
+        return {name[:-4]: np.asarray(Image.open(io.BytesIO(archive.read(name))))[::-1] for name in names}
+
+
+def test_masks_that_sum_to_one(terrain: Terrain, tmp_path: Path) -> None:
+    """SPEC X380: at every sample, each within a step of its part of what those above it leave."""
+    plain = masks_of(exported(terrain, tmp_path, "a.zip"))
+    summed = masks_of(exported(terrain, tmp_path, "b.zip", weights=True))
+    assert set(summed) == {*plain, "ground"}
+    assert max(mask.max() for mask in (summed["ground"], summed["grass"])) > 128, "there is something to share out"
+    np.testing.assert_array_equal(sum(mask.astype(int) for mask in summed.values()), 255)
+    assert np.sum([mask.astype(int) for mask in plain.values()], axis=0).max() > 255
+    left = np.ones(summed["ground"].shape)
+    for name in ("water", "snow", "forest", "grass", "wetness"):
+        assert np.abs(summed[name] / 255 - left * plain[name] / 255).max() < 1.001 / 255
+        left *= 1 - plain[name] / 255
+    assert np.abs(summed["ground"] / 255 - left).max() < 1.001 / 255
+
+
+def test_any_masks_can_be_made_to_sum_to_one() -> None:
+    """SPEC X380: all of everything at once, nothing at all, and every value between."""
+    rng = np.random.default_rng(3)
+    for _ in range(20):
+        few = rng.integers(0, 256, size=(5, 4, 64)) * rng.integers(0, 2, size=(5, 1, 64)) | 255 * rng.integers(0, 2, 64)
+        found = weights(dict(zip(("grass", "snow", "water", "wetness", "forest"), few.astype(np.uint8), strict=True)))
+        np.testing.assert_array_equal(sum(mask.astype(int) for mask in found.values()), 255)
+
+
+def test_only_masks_sum_to_one(terrain: Terrain, tmp_path: Path) -> None:
+    """SPEC X380, X8."""
+    with pytest.raises(ValueError, match="Only masks"):
+        exported(terrain, tmp_path, "a.tif", weights=True)
+    assert list(tmp_path.iterdir()) == []
+    assert "Only masks" in formats.refusal(ExportRequest(format="npy", weights=True))
+    assert not formats.refusal(ExportRequest(format="masks", weights=True))
+
+
 def inside_lake(lakes: Lakes, x: float, y: float, lake: float) -> float:
     """The twin: ``inside_lake`` of shaders/wgsl/lakes.wgsl at a place in samples of the lakes' lattice."""
     n = len(lakes.levels)
@@ -335,13 +377,13 @@ def test_every_wish_of_the_page_has_an_estimate() -> None:
     """SPEC X30."""
     for kind in formats.FORMATS:
         sizes = [int(n) for n in contract.EXPORT_LEVELS]
-        wishes = [ExportWish(format=kind, samples=n) for n in sizes]
+        wishes = [ExportRequest(format=kind, samples=n) for n in sizes]
         fine = [w for w in wishes if not formats.refusal(w)]
         assert [w.samples for w in wishes if w not in fine] == ([n for n in sizes if n > 1025] if kind == "glb" else [])
         costs = [formats.estimate(w) for w in fine]
         assert [c.bytes for c in costs] == sorted(c.bytes for c in costs)
         assert all(c.seconds > 0 for c in costs)
-    assert formats.refusal(ExportWish(format="npy", samples=1000))
+    assert formats.refusal(ExportRequest(format="npy", samples=1000))
     for samples, level in contract.EXPORT_LEVELS.items():
         assert 0.9 * (64 * 2**level + 1) < int(samples) <= 64 * 2**level + 1
         assert Extent.of(None, int(samples)).level == level
@@ -356,7 +398,7 @@ def test_estimates_are_near_what_files_are() -> None:
         for detail in (["_detail"] if form.covers else ["", "_detail"])
     }
     for kind in formats.FORMATS:
-        told = formats.estimate(ExportWish(format=kind, samples=257)).bytes
+        told = formats.estimate(ExportRequest(format=kind, samples=257)).bytes
         assert 0.5 < found[f"{kind}_257_detail"]["bytes"] / told < 2.0
 
 
@@ -371,6 +413,10 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     np.testing.assert_array_equal(np.load(out), made.heights(1))
     assert command_line.main(["export", str(tmp_path / "none.esker"), "-o", str(out)]) == 1
     assert "There is no file" in capsys.readouterr().err
-    with pytest.raises(SystemExit):
-        command_line.main(["export", str(tmp_path / "a.esker"), "-o", str(tmp_path / "a.obj")])
-    assert "exports are .png" in capsys.readouterr().err
+    for name, more, says in (("a.obj", [], "exports are .png"), ("a.tif", ["--weights"], "Only masks")):
+        with pytest.raises(SystemExit):
+            command_line.main(["export", str(tmp_path / "a.esker"), "-o", str(tmp_path / name), *more])
+        assert says in capsys.readouterr().err
+    masks = tmp_path / "a.zip"
+    assert command_line.main([*args[:2], "-o", str(masks), "--level", "1", "--weights", "-q"]) == 0
+    np.testing.assert_array_equal(sum(mask.astype(int) for mask in masks_of(masks).values()), 255)

@@ -8,14 +8,14 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
-from tests.cones import LEVELS, SIZE_M, Bump, Ground, lay, solve
 
 from esker import grid
+from esker.api.live_ground import StreamedGround
 from esker.contract import Channel
 from esker.grid import TileKey
-from esker.ground import StreamedGround
-from esker.tiles.codec import child_window, predict
+from esker.tiles.codec.payload import child_window, predict
 from esker.tiles.delivery import ClientTiles, TileServer
+from tests.cones import LEVELS, SIZE_M, Bump, Ground, lay, solve
 
 
 def streamed() -> StreamedGround:

@@ -1,4 +1,4 @@
-"""The chronicle: ops gathered into what people did (SPEC HI1 to HI6)."""
+"""The activity_log: ops gathered into what people did (SPEC HI1 to HI6)."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from esker import contract as c
-from esker.document.chronicle import Chronicle, Entry, Told
-from esker.document.chronicle_words import sentence
+from esker.document.history.activity import ActivityLog, Entry, JournalEntry
+from esker.document.history.words import sentence
 from esker.document.ops import StrokeSet
 from esker.document.sync import SyncDoc
 from esker.document.wire import op_json
@@ -23,22 +23,22 @@ def stroke(stroke_id: str, **fields: Any) -> c.Stroke:
 
 
 class Told_:
-    """A terrain that is told what happens, and what its chronicle says then."""
+    """A terrain that is told what happens, and what its activity log says then."""
 
     def __init__(self, **birth: Any) -> None:
         self.birth = c.Document(id="t", **birth)
         self.now = StrokeSet.from_document(self.birth)
-        self.told: list[Told] = []
+        self.told: list[JournalEntry] = []
 
     def does(self, author: str, *ops: c.Op, at: float | None = None) -> None:
         for op in ops:
             self.now, _ = self.now.apply(op)
-            self.told.append(Told(self.now.clock, author, op_json(op), at))
+            self.told.append(JournalEntry(self.now.clock, author, op_json(op), at))
 
-    def entries(self, chronicle: Chronicle | None = None) -> list[Entry]:
-        chronicle = chronicle or Chronicle(self.birth)
-        chronicle.add(self.told)
-        return sorted(chronicle.entries, key=lambda e: e.last)
+    def entries(self, activity_log: ActivityLog | None = None) -> list[Entry]:
+        activity_log = activity_log or ActivityLog(self.birth)
+        activity_log.add(self.told)
+        return sorted(activity_log.entries, key=lambda e: e.last)
 
     def says(self) -> list[str]:
         strokes, layers = self.now.deleted | self.now.strokes, self.now.deleted_layers | self.now.layers
@@ -114,7 +114,7 @@ def test_what_the_undo_of_the_clients_does_is_told_as_such() -> None:
     """HI4: the same steps that ``SyncDoc`` makes, in a page and in Python."""
     t = Told_(strokes=(stroke("b"),))
     sync = SyncDoc("ana")
-    welcome = {"server": "", "client": "ana", "role": "edit", "colour": "#000000", "device": ""}
+    welcome = {"server": "", "client": "ana", "token": "", "role": "edit", "colour": "#000000", "device": ""}
     numbers = {"protocol": c.PROTOCOL_VERSION, "levels": 0, "finest": 0, "clock": 0}
     sync.welcome(c.Welcome.model_validate({**welcome, **numbers, "members": (), "document": t.birth}))
 
@@ -139,7 +139,7 @@ def test_what_the_undo_of_the_clients_does_is_told_as_such() -> None:
         "ana drew a mountain",
         "ana moved the mountain “B”",
         "ana changed the title and seed",
-        "ana undid changing the title and seed",
+        "ana changed the title and seed back",
         "ana undid moving the mountain “B”",
         "ana undid drawing a mountain",
         "ana redid drawing a mountain",
@@ -160,14 +160,22 @@ def test_a_chronicle_may_be_continued_or_begin_anywhere() -> None:
     """HI5."""
     t = Told_(strokes=(stroke("b"),))
     t.does("ana", *drawn("a", author="Ana"), label("b", "B"))
-    whole = Chronicle(t.birth)
+    whole = ActivityLog(t.birth)
     for told in t.told:
         whole.add([told])
     whole.add(t.told)
     assert [repr(e) for e in whole.entries] == [repr(e) for e in t.entries()]
     assert whole.names == {"ana": "Ana"}
-    late = Chronicle(None, 2)
+    late = ActivityLog(None, 2)
     assert [(e.action, e.first, e.last) for e in t.entries(late)] == [("reshape", 3, 4), ("name", 6, 6)]
+
+
+def test_a_choice_that_was_made_back_by_hand_is_not_called_undone() -> None:
+    """HI310."""
+    t = Told_()
+    for look in ("desert", "natural", "desert"):
+        t.does("ana", c.SetTerrain(fields=c.TerrainFields(look=look)))
+    assert t.says() == ["ana changed the look", "ana changed the look back", "ana changed the look again"]
 
 
 def test_who_undoes_half_of_an_entry_undid_that_half() -> None:
@@ -188,10 +196,10 @@ def test_who_undoes_half_of_an_entry_undid_that_half() -> None:
 
 def test_a_switch_thrown_back_reads_as_what_became_of_the_thing() -> None:
     told = [
-        Told(k + 1, "ann", f'{{"type":"layer.set","layer":"l","fields":{{"hidden":{hidden}}}}}', None)
+        JournalEntry(k + 1, "ann", f'{{"type":"layer.set","layer":"l","fields":{{"hidden":{hidden}}}}}', None)
         for k, hidden in enumerate(["true", "false", "true", "false"])
     ]
-    chronicle = Chronicle(None)
-    chronicle.add(told)
-    words = [sentence(entry, {}, {}) for entry in chronicle.entries]
+    activity_log = ActivityLog(None)
+    activity_log.add(told)
+    words = [sentence(entry, {}, {}) for entry in activity_log.entries]
     assert words == ["hid a layer", "showed a layer", "hid a layer again", "showed a layer again"]

@@ -6,37 +6,30 @@ import ast
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Set
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
 
-from esker import contract_emit
-from esker.bench import report
+from bench import report
+from esker.contract import emit
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / "backend" / "esker"
 
 # A room may import the rooms to its left and itself (DESIGN 2).
 LAYERS: tuple[frozenset[str], ...] = (
-    frozenset({"child_process", "contract", "fractal", "http_protocol", "link", "version", "websocket_protocol"}),
-    frozenset({"contract_emit", "grid", "lakes"}),
-    frozenset({"document"}),
-    frozenset({"patchwork"}),
-    frozenset({"importing"}),
-    frozenset({"templates"}),
-    frozenset({"solve", "tiles", "store", "settings", "synthesis"}),
-    frozenset({"terrain_layers"}),
-    frozenset({"session", "terrain", "exports"}),
-    frozenset({"ground"}),
-    frozenset(
-        {"client", "client_history", "client_layers", "elevation", "imports", "tls", "headers", "upload", "render"}
-    ),
+    frozenset({"compiled", "errors", "fairness", "process", "resources", "version", "wgsl"}),
+    frozenset({"contract"}),
+    frozenset({"events", "grid"}),
+    frozenset({"document", "patchwork", "synthesis", "tiles"}),
+    frozenset({"importing", "solve", "store"}),
+    frozenset({"exporting", "session"}),
+    frozenset({"api", "jobs", "keeper"}),
+    frozenset({"render", "templates"}),
     frozenset({"server"}),
-    frozenset({"run"}),
-    frozenset({"bench", "history_command", "export_command"}),
-    frozenset({"cli"}),
-    frozenset({"__main__"}),
+    frozenset({"cli", "doctor", "__main__"}),
 )
 RANK = {room: rank for rank, rooms in enumerate(LAYERS) for room in rooms}
 # Rooms of one rank that may not see each other, and rooms that a lower-ranked one may never see.
@@ -46,13 +39,13 @@ FORBIDDEN |= {("synthesis", room) for room in ("solve", "tiles", "store", "patch
 FORBIDDEN |= {(room, other) for room in ("session", "tiles", "solve") for other in ("patchwork", "importing")}
 ONLY = {
     "pyopencl": {"solve", "synthesis", "patchwork"},
-    "numba": {"patchwork", "tiles"},
-    "rasterio": {"importing", "exports"},
+    "numba": {"compiled", "patchwork"},
+    "rasterio": {"importing", "exporting"},
     "pyproj": {"importing"},
     "fastapi": {"server"},
     "starlette": {"server"},
     "moderngl": {"render"},
-    "uvicorn": {"run", "http_protocol", "websocket_protocol"},
+    "uvicorn": {"server"},
     "sqlite3": {"store"},
 }
 
@@ -111,9 +104,98 @@ def test_the_import_rule_can_fail(room: str, name: str) -> None:
     assert list(violations(room, iter([name])))
 
 
+def knows_people(room: str, names: Iterator[str]) -> list[str]:
+    """What a file of ``session/ground`` may not import."""
+    return [name for name in names if room == "ground" and f"{name}.".startswith("esker.session.room.")]
+
+
+def test_the_ground_of_a_room_knows_no_people() -> None:
+    """SPEC H460."""
+    paths = sorted((PACKAGE / "session").rglob("*.py"))
+    assert [found for path in paths for found in knows_people(path.parent.name, imports(path))] == []
+    assert any(path.parent.name == "ground" for path in paths)
+    assert knows_people("ground", iter(["esker.session.room.core", "esker.session.ground.jobs"])) == [
+        "esker.session.room.core"
+    ]
+
+
+def test_what_has_a_code_for_programs_has_one_base() -> None:
+    """SPEC H427: exceptions with a ``code`` are ``EskerError``s; none is made from ``Exception`` by itself."""
+    apart = []
+    for room, path in modules():
+        for node in ast.walk(ast.parse(path.read_text())):
+            if room != "errors" and isinstance(node, ast.ClassDef) and "self.code" in ast.unparse(node):
+                bases = {ast.unparse(base) for base in node.bases}
+                apart += [f"{path.name}: {node.name}"] if bases & {"Exception", "RuntimeError", "ValueError"} else []
+    assert apart == []
+
+
+MOST_NAMES = 16
+"""Names that a folder shows: what one looks through in half a minute."""
+WIDE = {"backend/esker": "the list of all rooms"}
+
+
+def crowded(folders: dict[str, int]) -> dict[str, int]:
+    """Folders with more names than one looks through."""
+    return {folder: count for folder, count in folders.items() if count > MOST_NAMES and folder not in WIDE}
+
+
+def test_folders_are_looked_through_in_half_a_minute() -> None:
+    """SPEC H490: rooms within rooms. Tests are looked for by the name of what they test, not looked through."""
+    counts: dict[str, int] = {}
+    for root in ("backend/esker", "bench"):
+        for folder in [ROOT / root, *(path for path in (ROOT / root).rglob("*") if path.is_dir())]:
+            if (
+                "__pycache__" not in folder.parts
+                and "results" not in folder.parts
+                and "node_modules" not in folder.parts
+            ):
+                names = [path.name for path in folder.iterdir() if path.name not in ("__pycache__", "__init__.py")]
+                counts[folder.relative_to(ROOT).as_posix()] = len(names)
+    assert crowded(counts) == {}
+    assert crowded({"backend/esker/solve": MOST_NAMES + 1}) != {}
+
+
+def files_and_imports() -> dict[str, set[str]]:
+    """Modules of the package and of the benchmarks by name, with those of them that each imports."""
+    folders = ((PACKAGE, ROOT / "backend"), (ROOT / "bench", ROOT))
+    paths = {
+        ".".join(path.relative_to(root).with_suffix("").parts).removesuffix(".__init__"): path
+        for folder, root in folders
+        for path in folder.rglob("*.py")
+    }
+    return {name: set(imported(path, paths.keys())) - {name} for name, path in paths.items()}
+
+
+def imported(path: Path, known: Set[str]) -> Iterator[str]:
+    """Those of the known modules that a file imports, for types too."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and node.module:
+            for alias in node.names:
+                name = f"{node.module}.{alias.name}"
+                yield from {name if name in known else node.module} & known
+        elif isinstance(node, ast.Import):
+            yield from {alias.name for alias in node.names} & known
+
+
+def circle(graph: dict[str, set[str]]) -> list[str]:
+    """One circle of a graph, or nothing."""
+    try:
+        tuple(TopologicalSorter(graph).static_order())
+    except CycleError as error:
+        return list(error.args[1])
+    return []
+
+
+def test_files_import_each_other_in_no_circle() -> None:
+    """SPEC H491: for types neither; whoever reads a file has read, or can read first, all that it stands on."""
+    assert circle(files_and_imports()) == []
+    assert circle({"a": {"b"}, "b": {"a"}}) != []
+
+
 def test_generated_files_are_fresh() -> None:
     """SPEC H3."""
-    for path, text in contract_emit.outputs().items():
+    for path, text in emit.outputs().items():
         assert path.read_text() == text, f"{path.relative_to(ROOT)} is stale: run `make generate`"
 
 
@@ -145,7 +227,7 @@ def test_lock_files_pin_every_requirement() -> None:
 def test_figures_in_the_readme_come_from_committed_results() -> None:
     """CONTRIBUTING: figures in docs come from committed benchmark output."""
     text = report.README.read_text(encoding="utf-8")
-    assert report.readme(text) == text, "run python -m esker.bench.report"
+    assert report.readme(text) == text, "run python -m bench.report"
 
 
 def test_file_sizes() -> None:

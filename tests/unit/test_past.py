@@ -10,9 +10,9 @@ import pytest
 from esker import contract as c
 from esker.document.ops import StrokeSet
 from esker.document.wire import op_json
-from esker.session import past
-from esker.store import chronicles
-from esker.store.chronicles import Chronicles
+from esker.session.room import past
+from esker.store import activity
+from esker.store.activity import ActivityLogs
 from esker.store.journal import Journal, Loaded, Row
 
 PROFILE = {"kind": "profile", "first": (0, 0, 0), "last": (1, 1, 1), "curve": ((0, 1),), "finished": True}
@@ -87,10 +87,10 @@ def test_of_many_documents_few_are_kept(journal: Watched) -> None:
 
 
 def test_histories_of_few_terrains_are_kept(journal: Watched, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(chronicles, "OPEN_TERRAINS", 2)
+    monkeypatch.setattr(activity, "OPEN_TERRAINS", 2)
     for terrain in ("a", "b"):
         journal.create(c.Document(id=terrain)).result()
-    read = Chronicles(journal)
+    read = ActivityLogs(journal)
     for terrain in ("t", "a", "b"):
         read.page(terrain, None, 5)
     journal.asked.clear()
@@ -105,6 +105,6 @@ def test_each_entry_has_the_time_of_its_own_ops(tmp_path: Path) -> None:
     for clock, author in ((1, "a"), (2, "b"), (3, "a")):
         journal.append("t", rows(clock, 1, author)).result()
         now[0] += 500.0
-    entries = Chronicles(journal).page("t", None, 10).entries
+    entries = ActivityLogs(journal).page("t", None, 10).entries
     assert [(e.author, e.at) for e in entries] == [("a", 2000.0), ("b", 1500.0), ("a", 1000.0)]
     journal.close()

@@ -6,26 +6,26 @@ import json
 from collections.abc import Sequence
 
 from esker import contract as c
-from esker.session import core
-from esker.session.members import COLOURS, Member, Members
-from esker.session.outbox import Outbox
+from esker.session.room import recent as recent_ops
+from esker.session.room.members import COLOURS, Member, Members
+from esker.session.room.outbox import Outbox
 
 
 def test_recent_ops_are_bounded_in_number_and_size() -> None:
-    recent = core.Recent()
+    recent = recent_ops.Recent()
     assert recent.after(0) is None
-    for clock in range(1, core.RECENT_OPS + 11):
+    for clock in range(1, recent_ops.RECENT_OPS + 11):
         recent.add(clock, str(clock))
     assert recent.after(9) is None
-    assert recent.after(10) == [str(k) for k in range(11, core.RECENT_OPS + 11)]
-    assert recent.after(core.RECENT_OPS + 10) == []
-    half = core.RECENT_CHARACTERS // 2
-    last = core.RECENT_OPS + 11
+    assert recent.after(10) == [(k, str(k)) for k in range(11, recent_ops.RECENT_OPS + 11)]
+    assert recent.after(recent_ops.RECENT_OPS + 10) == []
+    half = recent_ops.RECENT_CHARACTERS // 2
+    last = recent_ops.RECENT_OPS + 11
     recent.add(last, "x" * half)
     recent.add(last + 1, "y" * half)
     recent.add(last + 2, "z")
     assert recent.after(last - 1) is None
-    assert [len(text) for text in recent.after(last) or ()] == [half, 1]
+    assert [len(text) for _, text in recent.after(last) or ()] == [half, 1]
 
 
 def test_an_outbox_that_overflows_closes_and_forgets() -> None:
@@ -52,7 +52,7 @@ def test_an_outbox_gives_back_in_order_and_counts() -> None:
     outbox.message(c.Pong(t=1.0))
     assert outbox.backlog == 1 + len('{"type":"pong","t":1.0}')
     assert outbox.pop() == "a"
-    assert json.loads(outbox.pop() or "") == {"type": "pong", "t": 1.0}
+    assert json.loads(str(outbox.pop() or "")) == {"type": "pong", "t": 1.0}
     assert (outbox.pop(), outbox.backlog) == (None, 0)
 
 
@@ -103,10 +103,10 @@ def test_a_client_that_lags_gets_the_list_but_no_cursors() -> None:
     members.tick()
     assert not members.pending
     slow.outbox.pop()
-    assert json.loads(slow.outbox.pop() or "")["type"] == "members"
+    assert json.loads(str(slow.outbox.pop() or ""))["type"] == "members"
     assert slow.outbox.pop() is None
-    assert json.loads(ada.outbox.pop() or "")["type"] == "members"
-    assert json.loads(ada.outbox.pop() or "")["members"][0]["cursor"] == [1, 2, 3]
+    assert json.loads(str(ada.outbox.pop() or ""))["type"] == "members"
+    assert json.loads(str(ada.outbox.pop() or ""))["members"][0]["cursor"] == [1, 2, 3]
 
 
 def test_who_left_is_not_removed_twice() -> None:

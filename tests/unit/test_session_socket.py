@@ -11,9 +11,10 @@ from typing import Any
 import pytest
 
 from esker import contract as c
-from esker.session import protocol
-from esker.session.outbox import Outbox
-from esker.session.socket import Session
+from esker.fairness.spending import Account
+from esker.session.room import protocol
+from esker.session.room.outbox import Outbox
+from esker.session.room.socket import Session
 
 LONG = 50
 
@@ -59,6 +60,13 @@ class Wire:
 
     def abort(self) -> None:
         self.gone = True
+
+    def charge(self, account: Account, broke: Callable[[], None]) -> None:
+        self.account, self.broke = account, broke
+
+    def pay(self, seconds: float) -> None:
+        if not self.account.pay(0.0, seconds):
+            self.broke()
 
     def _fail(self) -> None:
         if self.gone:
@@ -202,5 +210,18 @@ def test_a_peer_that_is_gone_when_something_should_go_at_once_ends_the_session()
         outbox.push("late")  # must not raise: a room tells all its members in one go
         await asyncio.wait_for(call.task, 60)
         assert not call.hall.inside
+
+    asyncio.run(run())
+
+
+def test_who_asks_for_too_much_work_is_closed_and_may_come_back() -> None:
+    async def run() -> None:
+        call = Call()
+        await call.greet()
+        call.wire.pay(1000.0)
+        await call.task
+        texts = [m for m in call.wire.sent if isinstance(m, str)]
+        assert json.loads(texts[-2])["code"] == "rate_limited"
+        assert texts[-1].startswith(f"close {c.WS_CLOSE['rate_limited']} ")
 
     asyncio.run(run())

@@ -8,7 +8,8 @@ import threading
 
 import pytest
 
-from esker.solve import device, priority
+from esker.process import priority
+from esker.solve.opencl import device
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="threads have no priorities of their own")

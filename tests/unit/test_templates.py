@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from esker import contract, templates
+from esker.api.layers import Patchwork
 from esker.document.ops import StrokeSet
 from esker.document.strokes import world_points
 from esker.templates import draw, survey
-from esker.terrain_layers import Patchwork
 
 
 def test_drawing_again_changes_nothing() -> None:
@@ -59,7 +59,7 @@ def test_real_ground_comes_with_its_grids(name: str) -> None:
         assert layer.facts == raster.facts(geo=True, file=layer.facts.file, format=layer.facts.format)
         assert layer.source
         assert layer.licence.startswith("Public domain")
-    base = Patchwork(document.settings.size_m, document.layers, grids).base
+    base = Patchwork(document.settings, document.layers, grids).base
     assert base is not None
     assert base.survey(0).min() > contract.BASE_SURVEY
     assert np.isfinite(base.level(1)).all()

@@ -9,9 +9,9 @@ import pytest
 from numpy.typing import NDArray
 
 from esker import Stroke, Terrain, contract, grid
+from esker.api.layers import Sample
 from esker.document import archive
 from esker.synthesis.detailed import on_the_wire
-from esker.terrain_layers import Sample
 
 SIZE = 1024.0
 LEVEL = 2
@@ -139,7 +139,7 @@ def test_what_cannot_be_laid_is_refused() -> None:
         ({"spacing": None}, "spacing"),
         ({"spacing": (1.0, 2.0, 3.0)}, "spacing"),
         ({"spacing": -1.0}, "spacing_m"),
-        ({"spacing": 5.0, "accuracy": float("nan")}, "accuracy_m"),
+        ({"spacing": 5.0, "accuracy": float("nan")}, "accuracy must be"),
         ({"spacing": 5.0, "anchor": (1e9, 0.0)}, "anchor"),
     ):
         with pytest.raises(ValueError, match=words):

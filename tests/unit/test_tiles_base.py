@@ -6,15 +6,15 @@ import itertools
 
 import numpy as np
 import pytest
-from tests.cones import FINEST, LEVELS, SIZE_M, Bump, Client, Ground, Made, drawn, lay, near, settle, solve
 
 from esker import grid
 from esker.contract import Channel, FrameKind, View
 from esker.grid import TileKey
 from esker.tiles.channels import values
-from esker.tiles.codec import SAMPLE_LIMIT
+from esker.tiles.codec.payload import SAMPLE_LIMIT
 from esker.tiles.delivery import ClientTiles, TileServer
 from esker.tiles.surface import total
+from tests.cones import FINEST, LEVELS, SIZE_M, Bump, Client, Ground, Made, drawn, lay, near, settle, solve
 
 TIP = Bump(200.0, 300.0, 40.0, 60.0)
 LOOK = near(200.0, 275.0, 40.0, tau_px=0.7)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tests.cones import SIZE_M, Client
 
 from esker import grid
 from esker.contract import Channel
 from esker.tiles.channels import values
 from esker.tiles.delivery import TileServer
+from tests.cones import SIZE_M, Client
 
 
 def test_channels_go_whole_coarse_to_fine_after_the_heights() -> None:

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from esker.contract import Filter, Predictor
-from esker.tiles import coding
-from esker.tiles.codec import Ints, child_window, cost, predict
-from esker.tiles.filters import pack_smallest
+from esker.tiles.codec import coding
+from esker.tiles.codec.filters import pack_smallest
+from esker.tiles.codec.payload import Ints, child_window, cost, predict
 
 Rng = np.random.Generator
 

@@ -9,11 +9,19 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.vectors import make_tiles
 
-from esker.contract import CHANNEL_LEVELS_BELOW, MAX_LEVEL, MAX_REFINED_LEVEL, Channel, Filter, FrameKind, Predictor
+from esker.contract import (
+    CHANNEL_LEVELS_BELOW,
+    MAX_LEVEL,
+    MAX_REFINED_LEVEL,
+    Channel,
+    Filter,
+    FrameKind,
+    Predictor,
+)
+from esker.tiles.codec.frame import GROUND, FrameError, FrameHead, read_frame, write_frame
 from esker.tiles.decoder import FrameDecoder
-from esker.tiles.frame import GROUND, FrameError, FrameHead, read_frame, write_frame
+from tests.vectors import make_tiles
 
 VECTORS: dict[str, Any] = json.loads(make_tiles.PATH.read_text())
 SESSION = [base64.b64decode(step["frame"]) for step in VECTORS["sessions"][0]["steps"]]

@@ -8,9 +8,9 @@ import pytest
 from esker import grid
 from esker.tiles import loops
 from esker.tiles.bounds import SubPatches, block_reduce, sub_error
-from esker.tiles.codec import SAMPLE_LIMIT, predict, upsampled
+from esker.tiles.codec.payload import SAMPLE_LIMIT, predict, upsampled
 from esker.tiles.pyramid import quantise
-from esker.tiles.steady import Steadier, steadied
+from esker.tiles.stabiliser import Steadier, steadied
 
 LEVEL, SIZE_M = 2, 512.0
 N = grid.samples(LEVEL)

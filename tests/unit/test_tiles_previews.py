@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from esker import grid
 from esker.contract import View
-from esker.tiles.codec import SAMPLE_LIMIT, follow, predict
+from esker.tiles.codec.frame import read_frame
+from esker.tiles.codec.payload import SAMPLE_LIMIT, follow, predict
 from esker.tiles.delivery import ClientTiles, TileServer
-from esker.tiles.frame import read_frame
 from esker.tiles.pyramid import PREVIEW_STEP, Level, Pyramid, follow_parents, moved_along
 
 SIZE_M = 1024.0
@@ -43,9 +43,9 @@ def level(pyramid: Pyramid, index: int) -> Level:
 def solve(pyramid: Pyramid, clock: int, height: float, *, show: bool, settle: bool = False) -> None:
     for index in range(LEVELS + 1):
         wrong = 0.05 * (LEVELS - index)
-        pyramid.put(clock, index, ground(index, height, wrong), False, show or index in (0, LEVELS))
+        (pyramid.preview if show or index in (0, LEVELS) else pyramid.note)(clock, index, ground(index, height, wrong))
     for index in range(LEVELS + 1) if settle else ():
-        pyramid.put(clock, index, ground(index, height), True)
+        pyramid.settle(clock, index, ground(index, height))
 
 
 @pytest.fixture
@@ -58,9 +58,9 @@ def settled() -> Pyramid:
 def test_a_preview_that_is_not_shown_changes_nothing_until_the_finest_brings_its_injection(settled: Pyramid) -> None:
     before = [level(settled, index) for index in range(LEVELS + 1)]
     for index in (1, 2):
-        assert settled.put(2, index, ground(index, 130.0, 0.2), False, False) == 0
+        settled.note(2, index, ground(index, 130.0, 0.2))
         assert level(settled, index) is before[index]
-    settled.put(2, LEVELS, ground(LEVELS, 130.0), False)
+    settled.preview(2, LEVELS, ground(LEVELS, 130.0))
     stamps = [level(settled, index).stamp for index in range(LEVELS + 1)]
     assert stamps == sorted(stamps), "coarse before fine"
     for index in range(LEVELS + 1):
@@ -73,7 +73,7 @@ def test_a_preview_that_is_not_shown_changes_nothing_until_the_finest_brings_its
 def test_a_coarse_preview_that_was_shown_stays_as_it_was_shown(settled: Pyramid) -> None:
     solve(settled, 2, 130.0, show=True)
     shown = [level(settled, index).samples.copy() for index in range(LEVELS)]
-    settled.put(2, LEVELS, ground(LEVELS, 130.0), False)
+    settled.preview(2, LEVELS, ground(LEVELS, 130.0))
     for index in range(LEVELS):
         np.testing.assert_array_equal(level(settled, index).samples, shown[index])
 
@@ -81,9 +81,9 @@ def test_a_coarse_preview_that_was_shown_stays_as_it_was_shown(settled: Pyramid)
 def test_a_finest_preview_keeps_what_a_newer_coarsest_one_has_moved(settled: Pyramid) -> None:
     """SPEC T53."""
     for clock, height in ((2, 120.0), (3, 150.0), (4, 160.0)):  # 3 and 4 are drawn while 2 is solved
-        settled.put(clock, 0, ground(0, height), False)
+        settled.preview(clock, 0, ground(0, height))
     coarse = level(settled, 0)
-    settled.put(2, LEVELS, ground(LEVELS, 120.0), False)
+    settled.preview(2, LEVELS, ground(LEVELS, 120.0))
     assert level(settled, 0) is coarse, "what is newer is not taken back"
     finest = level(settled, LEVELS)
     assert finest.clock == 2
@@ -96,7 +96,7 @@ def test_a_finest_preview_keeps_what_a_newer_coarsest_one_has_moved(settled: Pyr
         injected = finest.samples[::apart, ::apart] * quantum
         off = np.abs(level(settled, index).samples * grid.quantum(index, SIZE_M) - injected).max()
         assert off < (2 * PREVIEW_STEP + 0.6) * quantum
-    settled.put(4, LEVELS, ground(LEVELS, 160.0), False)
+    settled.preview(4, LEVELS, ground(LEVELS, 160.0))
     assert level(settled, 0) is not coarse or level(settled, 0).clock == 4
     assert (
         np.abs(level(settled, LEVELS).samples * quantum - ground(LEVELS, 160.0)).max() <= (PREVIEW_STEP + 0.1) * quantum
@@ -104,8 +104,8 @@ def test_a_finest_preview_keeps_what_a_newer_coarsest_one_has_moved(settled: Pyr
 
 
 def test_a_finest_preview_without_a_coarsest_one_of_its_own_is_shown_as_it_is(settled: Pyramid) -> None:
-    settled.put(3, 0, ground(0, 150.0), False)
-    settled.put(2, LEVELS, ground(LEVELS, 120.0), False)
+    settled.preview(3, 0, ground(0, 150.0))
+    settled.preview(2, LEVELS, ground(LEVELS, 120.0))
     quantum = grid.quantum(LEVELS, SIZE_M)
     assert (
         np.abs(level(settled, LEVELS).samples * quantum - ground(LEVELS, 120.0)).max() <= (PREVIEW_STEP + 0.1) * quantum

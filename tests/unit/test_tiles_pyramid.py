@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from esker import grid
 from esker.contract import Channel, Predictor
 from esker.grid import TileKey
-from esker.tiles.codec import SAMPLE_LIMIT
+from esker.tiles.codec.frame import TileRecord
+from esker.tiles.codec.payload import SAMPLE_LIMIT
 from esker.tiles.delivery import TileServer
-from esker.tiles.frame import TileRecord
 from esker.tiles.plans import EncodedTiles
 from esker.tiles.pyramid import Pyramid, quantise
 
@@ -28,7 +28,7 @@ def heights(level: int, seed: int = 0, scale: float = 40.0) -> NDArray[np.float3
 def filled(seed: int = 0) -> Pyramid:
     pyramid = Pyramid(SIZE_M, LEVELS)
     for level in range(LEVELS + 1):
-        pyramid.put(1, level, heights(level, seed + level), True)
+        pyramid.settle(1, level, heights(level, seed + level))
     return pyramid
 
 
@@ -54,7 +54,7 @@ def test_heights_that_are_not_finite_are_refused_and_change_nothing(bad: float) 
     h = heights(1, 77)
     h[5, 6] = bad
     with pytest.raises(ValueError, match="not finite"):
-        pyramid.put(2, 1, h, False)
+        pyramid.preview(2, 1, h)
     assert pyramid.level(1) is before
     assert pyramid.stamp == stamp
 
@@ -62,26 +62,26 @@ def test_heights_that_are_not_finite_are_refused_and_change_nothing(bad: float) 
 def test_wrong_levels_and_shapes_are_refused() -> None:
     pyramid = Pyramid(SIZE_M, LEVELS)
     with pytest.raises(ValueError, match="level 4"):
-        pyramid.put(1, 4, heights(4), False)
+        pyramid.preview(1, 4, heights(4))
     with pytest.raises(ValueError, match="65x65"):
-        pyramid.put(1, 0, heights(1), False)
+        pyramid.preview(1, 0, heights(1))
 
 
 def test_a_preview_moves_samples_in_steps_and_settling_to_where_they_belong() -> None:
     q = np.float32(grid.quantum(0, SIZE_M))
     pyramid = Pyramid(SIZE_M, 0)
     base = np.full((65, 65), 10 * q, dtype=np.float32)
-    pyramid.put(1, 0, base, False)
+    pyramid.preview(1, 0, base)
     moved = base.copy()
     moved[3, 3] += np.float32(7.9) * q
-    assert pyramid.put(2, 0, moved, False) == 0
+    assert pyramid.preview(2, 0, moved) == 0
     moved[4, 4] += np.float32(8.1) * q
     moved[5, 5] -= np.float32(21) * q
-    assert pyramid.put(3, 0, moved, False) == 1
+    assert pyramid.preview(3, 0, moved) == 1
     level = pyramid.level(0)
     assert level is not None
     assert [int(level.samples[i, i]) for i in (3, 4, 5)] == [10, 18, 10 - 24]
-    assert pyramid.put(4, 0, moved, True) == 1
+    assert pyramid.settle(4, 0, moved) == 1
     level = pyramid.level(0)
     assert level is not None
     assert [int(level.samples[i, i]) for i in (3, 4, 5)] == [18, 18, -11]
@@ -103,10 +103,10 @@ def test_a_preview_moves_samples_in_steps_and_settling_to_where_they_belong() ->
 def test_versions_change_where_samples_do_and_nowhere_else(row: int, col: int, changed: set[tuple[int, int]]) -> None:
     pyramid = Pyramid(SIZE_M, LEVELS)
     h = heights(LEVELS)
-    assert pyramid.put(1, LEVELS, h, True) == 64
+    assert pyramid.settle(1, LEVELS, h) == 64
     before = pyramid.level(LEVELS)
     h[row, col] += 5
-    assert pyramid.put(2, LEVELS, h, True) == len(changed)
+    assert pyramid.settle(2, LEVELS, h) == len(changed)
     after = pyramid.level(LEVELS)
     assert before is not None
     assert after is not None
@@ -118,7 +118,7 @@ def test_versions_change_where_samples_do_and_nowhere_else(row: int, col: int, c
 def test_an_unchanged_level_keeps_its_samples_and_versions_but_is_newer() -> None:
     pyramid = filled()
     before = pyramid.level(2)
-    assert pyramid.put(5, 2, heights(2, 2), True) == 0
+    assert pyramid.settle(5, 2, heights(2, 2)) == 0
     after = pyramid.level(2)
     assert before is not None
     assert after is not None
@@ -174,18 +174,18 @@ def test_bounds_hold_every_sample_and_every_error_also_after_local_edits() -> No
         h = heights(level, level)
         n = h.shape[0]
         h[n // 3, n // 5 : n // 5 + 4] += 500
-        pyramid.put(2, level, h, True)
+        pyramid.settle(2, level, h)
     assert_bounds(pyramid)
     coarse = heights(1, 1)
     coarse[20, 20] -= 900  # changes the error of level 2, whose own samples stay
-    pyramid.put(3, 1, coarse, True)
+    pyramid.settle(3, 1, coarse)
     assert_bounds(pyramid)
 
 
 def test_levels_that_were_never_put_are_not_valid() -> None:
     pyramid = Pyramid(SIZE_M, LEVELS)
-    pyramid.put(1, 0, heights(0), False)
-    pyramid.put(1, 1, heights(1), False)
+    pyramid.preview(1, 0, heights(0))
+    pyramid.preview(1, 1, heights(1))
     assert pyramid.bounds().valid.tolist() == [True] * 5 + [False] * 80
 
 
@@ -219,9 +219,9 @@ def test_clients_share_coded_tiles() -> None:
 def test_a_pyramid_knows_where_its_ground_last_changed() -> None:
     pyramid = Pyramid(SIZE_M, 2)
     for level in range(3):
-        pyramid.put(1, level, np.zeros((grid.samples(level),) * 2, dtype=np.float32), True)
+        pyramid.settle(1, level, np.zeros((grid.samples(level),) * 2, dtype=np.float32))
     first = pyramid.changes().copy()
     h = np.zeros((grid.samples(2),) * 2, dtype=np.float32)
     h[10, 10] = 5
-    pyramid.put(2, 2, h, True)
+    pyramid.settle(2, 2, h)
     assert (pyramid.changes() > first).tolist() == [[y == x == 0 for x in range(4)] for y in range(4)]

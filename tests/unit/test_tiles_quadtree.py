@@ -30,7 +30,7 @@ def pyramid(rough: float = 6.0, flat: bool = False) -> Pyramid:
     made = Pyramid(SIZE_M, LEVELS)
     for level in range(LEVELS + 1):
         h = ground(level, rough)
-        made.put(1, level, np.full_like(h, 12.0) if flat else h, True)
+        made.settle(1, level, np.full_like(h, 12.0) if flat else h)
     return made
 
 

@@ -6,14 +6,14 @@ import random
 
 import numpy as np
 import pytest
-from tests.cones import FINEST, LEVELS, SIZE_M, Bump, Client, Ground, Made, near, settle, solve
 
 from esker import grid
 from esker.contract import MAX_REFINED_LEVEL, MAX_REFINED_TILES, FrameKind, Predictor, View
 from esker.grid import TileKey
 from esker.tiles import sparse
+from esker.tiles.codec.frame import read_frame
 from esker.tiles.delivery import ClientTiles, TileServer
-from esker.tiles.frame import read_frame
+from tests.cones import FINEST, LEVELS, SIZE_M, Bump, Client, Ground, Made, near, settle, solve
 
 TIP = Bump(200.0, 300.0, 40.0, 60.0)
 LOOK = near(200.0, 275.0, 40.0, tau_px=0.7)
@@ -186,7 +186,7 @@ def test_a_preview_that_is_only_noted_ends_nothing() -> None:
     """The worker holds back coarse previews that the finest follows at once (docs/decisions/0014)."""
     server, ground, client = at_rest()
     epoch = server.refined.epoch
-    server.put_level(2, 0, ground.level(0, False), False, show=False)
+    server.note(2, 0, ground.level(0, False))
     assert (server.refined.active, server.refined.epoch, server.refined.clock) == (True, epoch, 1)
     assert server.wishes([client.tiles]) == ((), 0), "what was made is still right"
     server.put_level(2, LEVELS, ground.level(LEVELS, False), False)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from esker import grid
 from esker.tiles.pyramid import Level, Pyramid
-from esker.tiles.steady import Steadier
+from esker.tiles.stabiliser import Steadier
 
 SIZE_M = 1024.0
 LEVELS = 3
@@ -31,9 +31,9 @@ def preview(level: int, edited: bool) -> Heights:
 
 
 def solve(pyramid: Pyramid, clock: int, edited: bool, settle: bool = True) -> list[int]:
-    changed = [pyramid.put(clock, level, preview(level, edited), False) for level in range(LEVELS + 1)]
+    changed = [pyramid.preview(clock, level, preview(level, edited)) for level in range(LEVELS + 1)]
     if settle:
-        changed += [pyramid.put(clock, level, truth(level, edited), True) for level in range(LEVELS + 1)]
+        changed += [pyramid.settle(clock, level, truth(level, edited)) for level in range(LEVELS + 1)]
     return changed
 
 
@@ -96,20 +96,20 @@ def test_settled_levels_are_exact_whatever_was_shown(settled: Pyramid) -> None:
 def test_signs_of_life_while_settling_are_ignored(settled: Pyramid) -> None:
     solve(settled, 2, True, settle=False)
     stamp = settled.stamp
-    assert settled.put(2, 0, truth(0, True), False) == 0
+    assert settled.preview(2, 0, truth(0, True)) == 0
     assert settled.stamp == stamp
-    assert settled.put(3, 0, preview(0, False), False) == 1
+    assert settled.preview(3, 0, preview(0, False)) == 1
 
 
 def test_coarse_previews_that_come_behind_the_finest_are_known_when_the_ground_settles(settled: Pyramid) -> None:
     """A solver that begins with the ground before brings the finest preview first."""
     for level in (0, LEVELS, *range(1, LEVELS)):
-        settled.put(2, level, preview(level, True), False)
+        settled.preview(2, level, preview(level, True))
     for level in range(LEVELS + 1):
-        settled.put(2, level, truth(level, True), True)
+        settled.settle(2, level, truth(level, True))
     stamps = [now(settled, level).versions.copy() for level in range(LEVELS)]
     for level in range(LEVELS):
-        settled.put(3, level, preview(level, True), False)
+        settled.preview(3, level, preview(level, True))
         assert np.array_equal(now(settled, level).versions, stamps[level]), "shown as settled"
 
 

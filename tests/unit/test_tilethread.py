@@ -7,7 +7,7 @@ from concurrent.futures import CancelledError
 
 import pytest
 
-from esker.session.tilethread import TileThread
+from esker.session.ground.tilethread import TileThread
 
 
 def test_what_is_first_runs_before_what_waits_and_each_in_its_order() -> None:

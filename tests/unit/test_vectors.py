@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.vectors import make
 
 from esker import contract as c
 from esker.document.ops import Refusal, StrokeSet
+from tests.vectors import make
 
 VECTORS = Path(make.__file__).parent
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from esker.contract import LAKE_LEVEL, NO_LAKE, TILE_CELLS
-from esker.lakes import find_lakes, waves_of
+from esker.synthesis.lakes import find_lakes, waves_of
 
 SIDE = 25
 SCALE = 16

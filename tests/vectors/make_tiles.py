@@ -19,11 +19,11 @@ from esker import grid
 from esker.contract import FRAME_HEADER, Channel, Filter, FrameKind, Predictor, View
 from esker.grid import TileKey
 from esker.tiles.bounds import block_reduce, parent_distance
-from esker.tiles.codec import SAMPLE_LIMIT, pack, predict
+from esker.tiles.codec.filters import pack_smallest
+from esker.tiles.codec.frame import GROUND, FrameHead, TileRecord, ratio, write_frame
+from esker.tiles.codec.payload import SAMPLE_LIMIT, pack, predict
 from esker.tiles.decoder import DecodedFrame, FrameDecoder
 from esker.tiles.delivery import ClientTiles, TileServer
-from esker.tiles.filters import pack_smallest
-from esker.tiles.frame import GROUND, FrameHead, TileRecord, ratio, write_frame
 
 PATH = Path(__file__).with_name("tiles.json")
 SIZE_M = 1000.0

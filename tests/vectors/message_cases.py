@@ -11,7 +11,7 @@ from esker import contract as c
 from tests.vectors.op_cases import NEW, PAINTED, SNOW, VALLEY
 from tests.vectors.scenes import Json, op
 
-HELLO: Json = {"type": "hello", "protocol": 5, "terrain": "t1", "secret": "s", "client": "c1"}
+HELLO: Json = {"type": "hello", "protocol": c.PROTOCOL_VERSION, "terrain": "t1", "secret": "s", "client": "c1"}
 VIEW: Json = {"type": "view", "eye": [0, 0, 100], "target": [1, 1, 0]}
 PRESENCE: Json = {"type": "presence", "cursor": [1, 2, 3.5], "tool": "mountain", "stroke": "c1-1"}
 
@@ -31,6 +31,7 @@ def _lay(**fields: Any) -> Json:
 ACCEPT: list[tuple[str, Json]] = [
     ("hello, short", HELLO),
     ("hello, full", HELLO | {"name": "Ada", "colour": "#00ffaa", "clock": 12}),
+    ("hello with a token", HELLO | {"token": "18f." + "0a" * 32}),
     ("hello of another protocol is well formed", HELLO | {"protocol": 99}),
     ("ops", ops(op("stroke.begin", stroke=NEW), op("stroke.finish", stroke="n"))),
     ("group", ops(op("group", ops=[_set(label="x"), op("stroke.delete", stroke="a")]))),
@@ -69,6 +70,8 @@ REFUSE: list[tuple[str, Json | str]] = [
     ("hello with a secret of 129 characters", HELLO | {"secret": "s" * 129}),
     ("hello with a slash in the id", HELLO | {"terrain": "../t1"}),
     ("hello with a long client id", HELLO | {"client": "c" * 41}),
+    ("hello with a token of another form", HELLO | {"token": "0a" * 32}),
+    ("hello with a long token", HELLO | {"token": "1" * 17 + "." + "0a" * 32}),
     ("hello with a negative clock", HELLO | {"clock": -1}),
     ("hello with a fractional clock", HELLO | {"clock": 1.5}),
     ("hello with a name of 81 characters", HELLO | {"name": "n" * 81}),
@@ -96,6 +99,8 @@ REFUSE: list[tuple[str, Json | str]] = [
     ("negative extent", ops(_set(left={"slope_deg": 30, "extent_m": -1}))),
     ("slope of 86 degrees", ops(_set(left={"slope_deg": 86}))),
     ("roughness of 1.5", ops(_set(roughness=1.5))),
+    ("yields more than wholly", ops(_set(yields=1.01))),
+    ("yields less than nothing", ops(_set(yields=-0.01))),
     ("paint of an unknown channel", ops(_set(paint=SNOW | {"channel": "height"}))),
     ("paint stronger than 1", ops(_set(paint=SNOW | {"value": 1.01}))),
     ("paint weaker than -1", ops(_set(paint=SNOW | {"value": -1.01}))),
@@ -119,6 +124,8 @@ REFUSE: list[tuple[str, Json | str]] = [
     ("the content of a layer cannot be set", ops(_lay(content="0" * 64))),
     ("place at the pole", ops(op("terrain.set", fields={"place": {"lat_deg": 90, "lon_deg": 0}}))),
     ("reach of zero", ops(op("terrain.set", fields={"reach_m": 0}))),
+    ("reach that no float32 can square", ops(op("terrain.set", fields={"reach_m": 1e-300}))),
+    ("reach just below the least", ops(op("terrain.set", fields={"reach_m": 0.015}))),
     ("unknown look", ops(op("terrain.set", fields={"look": "neon"}))),
     ("negative credit", {"type": "credit", "bytes": -1}),
     ("credit of a fraction", {"type": "credit", "bytes": 0.5}),

@@ -55,8 +55,24 @@ def _applies() -> list[tuple[str, Json, Json]]:
         (
             "set many fields",
             BASE,
-            op(set_, stroke="m", fields={"plateau_radius_m": 40.5, "hidden": True, "roughness": 1}),
+            op(set_, stroke="m", fields={"plateau_radius_m": 40.5, "hidden": True, "roughness": 1, "yields": 0.25}),
         ),
+        (
+            "a label loses what nobody sees and what turns text around",
+            BASE,
+            op(
+                set_,
+                stroke="a",
+                fields={"label": "a\u202eb\u0007c\n\td\u200be \u2067f\u2069 \U0001f469\u200d\U0001f33e \u200f\u05d0"},
+            ),
+        ),
+        (
+            "so do names of a new stroke",
+            BASE,
+            op("stroke.begin", stroke=NEW | {"author": "A\u202eda\u0000", "label": "\ufeffHill\u2028"}),
+        ),
+        ("and the title", BASE, op("terrain.set", fields={"title": "T\u2066o\u007fr"})),
+        ("and a layer's", LAID, op("layer.set", layer="v", fields={"name": "T\u061cal", "source": "a\r\nb"})),
         ("set no field", BASE, op(set_, stroke="a", fields={})),
         ("a mountain has null for paint", BASE, op(set_, stroke="a", fields={"label": "x", "paint": None})),
         ("null flank means no flank", BASE, op(set_, stroke="a", fields={"left": None})),

@@ -6,8 +6,8 @@ from typing import Final
 
 # --- protocol ---------------------------------------------------------------------------------------------------
 
-PROTOCOL_VERSION: Final = 5
-SUBPROTOCOL: Final = "esker.5"
+PROTOCOL_VERSION: Final = 6
+SUBPROTOCOL: Final = "esker.6"
 
 # --- grid (DESIGN 3) --------------------------------------------------------------------------------------------
 
@@ -32,6 +32,13 @@ DEFAULT_SIZE_M: Final = 4096.0
 MIN_SIZE_M: Final = 64.0
 MAX_SIZE_M: Final = 65536.0
 DEFAULT_REACH_FRACTION: Final = 1.0 / 32.0
+MIN_REACH_M: Final = MIN_SIZE_M / 4096
+"""A cell of the finest global level on the smallest domain; no solver takes a reach below such a cell."""
+
+CURRENT_EDITION: Final = 3
+"""By which edition of the rules ground follows from strokes of a new terrain; each keeps that of its birth. 1: jagged
+profiles are smoothed from their first end. 2: from their middle, so that they are the same drawn from the other end.
+3: differences of strokes are taken in pairs, elevation grids go on with the bend at their borders."""
 
 # --- solver (DESIGN 5.2, 5.3) -----------------------------------------------------------------------------------
 
@@ -138,6 +145,12 @@ MAX_HISTORY_OPS: Final = 100_000
 """Ops that the list of the history reaches back; earlier clocks can be looked at and copied all the same."""
 MAX_HISTORY_PAGE: Final = 200
 MAX_NAME_LENGTH: Final = 80
+UNSEEN: Final = {
+    0x00: 0x1F, 0x7F: 0x9F, 0x061C: 0x061C, 0x200B: 0x200B, 0x200E: 0x200F, 0x2028: 0x202E, 0x2060: 0x206F,
+    0xFEFF: 0xFEFF, 0xFFF9: 0xFFFB,
+}  # fmt: skip
+"""Characters, by the first of a range its last, that names lose: controls, what turns the direction of text around, and
+what takes no room. What joins letters and emoji (U+200C, U+200D) stays. Tabs and line ends become spaces."""
 MAX_OPS_PER_MESSAGE: Final = 256
 MAX_OPS_PER_GROUP: Final = 64
 DOMAIN_MARGIN: Final = 10.0

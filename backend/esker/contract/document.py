@@ -7,6 +7,7 @@ from typing import Annotated, Final
 from pydantic import Field
 
 from esker.contract.constants import (
+    CURRENT_EDITION,
     DEFAULT_DETAIL,
     DEFAULT_EXTENT_FRACTION,
     DEFAULT_REACH_FRACTION,
@@ -22,6 +23,7 @@ from esker.contract.constants import (
     MAX_VERTICAL_SCALE,
     MIN_GRID_SIDE,
     MIN_GRID_SPACING_M,
+    MIN_REACH_M,
     MIN_SIZE_M,
 )
 from esker.contract.values import (
@@ -77,6 +79,8 @@ class Stroke(Wire):
     ``paint``: the line of a brush, in the frame of ``level``; it lies on the ground, and no height follows from it.
     Strokes of this kind have ``paint``, and no others; flanks, plateau, amplitude and roughness mean nothing to them.
     ``left``/``right`` are the flanks left and right of the direction of travel; None means no flank on that side.
+    ``yields``: how far the stroke gives way where it meets others: at 0 all count alike, at 1 it only counts where no
+    other one says anything. Where a stroke is alone nothing follows from it.
     """
 
     id: Id
@@ -90,6 +94,7 @@ class Stroke(Wire):
     plateau_radius_m: Length = 0.0
     amplitude_m: Length = 0.0
     roughness: Unit = 0.5
+    yields: Unit = 0.0
     paint: Paint | None = None
     locked: bool = False
     hidden: bool = False
@@ -108,6 +113,7 @@ class StrokeFields(Wire):
     plateau_radius_m: Length | None = None
     amplitude_m: Length | None = None
     roughness: Unit | None = None
+    yields: Unit | None = None
     paint: Paint | None = None
     locked: bool | None = None
     hidden: bool | None = None
@@ -199,16 +205,21 @@ class Place(Wire):
     lon_deg: Annotated[float, Field(ge=-180, le=180, allow_inf_nan=False)]
 
 
+Reach = Annotated[float, Field(ge=MIN_REACH_M, le=ABSOLUTE_BOUND_M, allow_inf_nan=False)]
+
+
 class TerrainSettings(Wire):
     """Settings of a terrain. ``reach_m`` None is infinity: the papers' pure, global diffusion (DESIGN 5.1).
 
     ``lakes_m``: basins of the ground that are deeper than this hold a lake, None: none does (docs/renderer.md).
-    ``detail`` and ``rule`` are of the synthesis (DESIGN 10): no solved height depends on them.
+    ``detail`` and ``rule`` are of the synthesis (DESIGN 10): no solved height depends on them. ``edition``: see
+    CURRENT_EDITION; documents that do not say have the first.
     """
 
     size_m: Annotated[float, Field(ge=MIN_SIZE_M, le=MAX_SIZE_M)] = DEFAULT_SIZE_M
+    edition: Annotated[int, Field(ge=1, le=CURRENT_EDITION)] = 1
     title: Name = "Untitled terrain"
-    reach_m: Annotated[float, Field(gt=0, le=ABSOLUTE_BOUND_M)] | None = DEFAULT_SIZE_M * DEFAULT_REACH_FRACTION
+    reach_m: Reach | None = DEFAULT_SIZE_M * DEFAULT_REACH_FRACTION
     border: Border = "free"
     sea_level_m: Metres | None = None
     lakes_m: Length | None = None
@@ -225,7 +236,7 @@ class TerrainFields(Wire):
     """The settings that ``terrain.set`` may change (the size is fixed at birth)."""
 
     title: Name | None = None
-    reach_m: Annotated[float, Field(gt=0, le=ABSOLUTE_BOUND_M)] | None = None
+    reach_m: Reach | None = None
     border: Border | None = None
     sea_level_m: Metres | None = None
     lakes_m: Length | None = None

@@ -20,13 +20,14 @@ ExportFormat = Literal["png16", "r16", "geotiff", "npy", "glb", "masks"]
 ExportStage = Literal["waiting", "solving", "detail", "writing", "done", "failed", "cancelled"]
 
 
-class ExportWish(Wire):
-    """What is to be exported. ``detail``: with the synthesised detail, as the page shows it; masks always are. ``at``:
-    the clock of the document, None for now."""
+class ExportRequest(Wire):
+    """What is to be exported. ``detail``: with the synthesised detail, as the page shows it; masks always are.
+    ``weights``: masks that sum to one, of masks only. ``at``: the clock of the document, None for now."""
 
     format: ExportFormat
     samples: Annotated[int, Field(ge=2, le=4097)] = 1025
     detail: bool = True
+    weights: bool = False
     at: Clock | None = None
 
 

@@ -88,6 +88,25 @@ differences to those of the tile before in the frame (0 at first); bytes of the 
 times what is coded; no payload: no residual. Bounds and errors of the 16-cell sub-patches follow from the samples and
 the parent, both of which the decoder holds, so they do not travel (docs/decisions/0003-derived-bounds.md)."""
 
+TILE_SAMPLE_LIMIT: Final = 1 << 28
+"""Samples are within +-2^28 quanta, so that a residual always fits 32 bits."""
+
+CODER_SIZES: Final = 32
+"""Classes of neighbouring magnitudes: two an octave."""
+CODER_PLACES: Final = 5
+"""Any residual; and of a lattice: on a sample of the parent, between two of a row, of a column, between four."""
+CODER_NODES: Final = 48
+"""Decisions in a context: 0 zero or not, 1 sign, 2 to 32 one more in the exponent, 36 to 47 the second highest bit."""
+CODER_MAX_EXPONENT: Final = 31
+CODER_LIMIT: Final = 1 << 32
+"""Residuals are below this."""
+CODER_MAX_BYTES: Final = 1 << 18
+"""More than any tile takes: 4,225 times 35 decisions of at most 11 bits, and 30 bits, are 219 KB."""
+CODER_SURE: Final = 32
+"""Of 65,536: no decision is held for more certain than that."""
+CODER_SLOWEST: Final = 255
+"""Decisions after which a probability goes on learning at the same rate."""
+
 LATTICE_CLASSES: Final = 20
 """Classes of the size of the residuals around, of which each has weights; larger ones take those of the last."""
 LATTICE_WEIGHTS: Final = (

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Final, Literal
 
 from pydantic import Field, StringConstraints
 
@@ -54,6 +54,8 @@ class ImportReport(Wire):
 
 
 ImportStage = Literal["upload", "reading", "question", "mipmaps", "errors", "saving", "done", "refused", "cancelled"]
+ENDED_IMPORT: Final = frozenset({"done", "refused", "cancelled"})
+"""Stages after which an import goes on no more."""
 
 
 class ImportStatus(Wire):

@@ -10,7 +10,7 @@ from esker.contract.constants import DEFAULT_TAU_PX, MAX_OPS_PER_MESSAGE
 from esker.contract.document import Document
 from esker.contract.imports import ImportStatus
 from esker.contract.operations import CloseCode, Op, OpEnvelope, OrderedOp, RejectCode
-from esker.contract.values import Clock, Colour, Id, Name, OpId, Role, Secret, Vec3, Wire
+from esker.contract.values import Clock, Colour, Id, Name, OpId, Role, Secret, Token, Vec3, Wire
 
 # --- messages: client to server ---------------------------------------------------------------------------------
 
@@ -27,6 +27,8 @@ class Hello(Wire):
     terrain: Id
     secret: Secret
     client: Id
+    token: Token | None = None
+    """What a ``welcome`` gave this client id: without it nobody comes again under an id that was used."""
     name: Name = ""
     colour: Colour | None = None
     clock: Clock | None = None
@@ -110,6 +112,8 @@ class Welcome(Wire):
     protocol: int
     server: str
     client: Id
+    token: str
+    """To be shown in the next ``hello`` of this client id. It is bound to the link."""
     role: Role
     colour: Colour
     levels: int
@@ -183,6 +187,8 @@ class Progress(Wire):
     note: str = ""
     refining: Annotated[int, Field(ge=0)] = 0
     """Tiles above the global levels that somebody looks at and that are still to be made."""
+    laying: bool = False
+    """Whether the server makes the base of the elevation layers and takes long for it."""
 
 
 class ErrorMessage(Wire):

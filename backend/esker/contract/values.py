@@ -4,9 +4,24 @@ from __future__ import annotations
 
 from typing import Annotated, Final, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, StringConstraints
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints
 
-from esker.contract.constants import DOMAIN_MARGIN, MAX_NAME_LENGTH, MAX_SIZE_M
+from esker.contract.constants import DOMAIN_MARGIN, MAX_NAME_LENGTH, MAX_SIZE_M, UNSEEN
+
+# --- texts ------------------------------------------------------------------------------------------------------
+
+_PLAIN: Final = {code: None for first, last in UNSEEN.items() for code in range(first, last + 1)} | dict.fromkeys(
+    (9, 10, 13), " "
+)
+
+
+def plain(text: str) -> str:
+    """A text that shows all that is in it, in the order in which it is: without the characters of ``UNSEEN``.
+
+    They are taken out rather than refused, so that a journal from before this opens.
+    """
+    return text if text.isprintable() else text.translate(_PLAIN)
+
 
 # --- scalar types -----------------------------------------------------------------------------------------------
 
@@ -20,9 +35,10 @@ CurvePoint = tuple[FrameCoord, FrameCoord]
 Id = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_-]{1,40}$")]
 Digest = Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{64}$")]
 OpId = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_-]{1,40}:[0-9]{1,12}$")]
-Name = Annotated[str, StringConstraints(max_length=MAX_NAME_LENGTH)]
+Name = Annotated[str, StringConstraints(max_length=MAX_NAME_LENGTH), AfterValidator(plain)]
 Secret = Annotated[str, StringConstraints(min_length=1, max_length=128)]
-Line = Annotated[str, StringConstraints(max_length=240)]
+Token = Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{1,16}\.[0-9a-f]{64}$")]
+Line = Annotated[str, StringConstraints(max_length=240), AfterValidator(plain)]
 Colour = Annotated[str, StringConstraints(pattern=r"^#[0-9a-f]{6}$")]
 Clock = Annotated[int, Field(ge=0, le=2**53)]
 

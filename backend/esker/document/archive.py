@@ -25,12 +25,14 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from esker.contract import MAX_GRID_SAMPLES, Document
+from esker.document.former import read_document
+from esker.document.wire import document_json
 
 FORMAT = "esker-terrain"
-VERSION = 3
-"""1 had neither paint nor settings of the detail, 2 no elevation layers; they are read as they are, with the defaults.
-What has no layers is still written as 2, so that an older Esker opens it."""
-PLAIN_VERSION = 2
+VERSION = 5
+"""1 had neither paint nor settings of the detail, 2 no elevation layers, 3 no edition, 4 the second at most; they are
+read as they are, with the defaults. A document is written as the oldest that has what is in it."""
+EDITION_VERSION, LAYERS_VERSION, PLAIN_VERSION = 4, 3, 2
 MAX_ARCHIVE_BYTES = 512 * 1024 * 1024
 MAX_DOCUMENT_BYTES = 512 * 1024 * 1024
 MAX_GRIDS_BYTES = 1 << 30
@@ -86,15 +88,23 @@ def write(file: BinaryIO, document: Document, grids: Mapping[str, Grid] | None =
         raise ArchiveError(
             f"The elevation grids of this terrain are larger than the {MAX_GRIDS_BYTES >> 20} MiB of a file."
         )
-    header = json.dumps({"format": FORMAT, "version": VERSION if named else PLAIN_VERSION}).encode()
+    header = json.dumps({"format": FORMAT, "version": _version(document)}).encode()
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, data in ((_HEADER, header), (_DOCUMENT, document.model_dump_json().encode())):
+        for name, data in ((_HEADER, header), (_DOCUMENT, document_json(document).encode())):
             archive.writestr(_member(name), data)
         for digest in named:
             _write_array(archive, f"{_GRIDS}/{digest}.npy", grids[digest].heights)
             warp = grids[digest].warp
             if warp is not None:
                 _write_array(archive, f"{_GRIDS}/{digest}.warp.npy", warp)
+
+
+def _version(document: Document) -> int:
+    """The oldest version of files that has what is in a document."""
+    edition = document.settings.edition
+    if edition > 1:
+        return VERSION if edition > 2 else EDITION_VERSION
+    return LAYERS_VERSION if document.layers or document.deleted_layers else PLAIN_VERSION
 
 
 def dumps(document: Document, grids: Mapping[str, Grid] | None = None) -> bytes:
@@ -141,7 +151,7 @@ def unpack(file: BinaryIO, folder: Path) -> Document:
 def document_from_json(text: bytes) -> Document:
     """A document from JSON text. Raises ArchiveError that names the first field that is wrong."""
     try:
-        return Document.model_validate_json(text)
+        return read_document(text)
     except ValidationError as error:
         first = error.errors(include_url=False, include_input=False)[0]
         where = ".".join(str(part) for part in first["loc"]) or "it"

@@ -23,6 +23,7 @@ STROKE_WORDS: Final[dict[str, str]] = {
     "plateau_radius_m": "plateau radius",
     "amplitude_m": "noise amplitude",
     "roughness": "roughness",
+    "yields": "yielding",
     "paint": "paint",
     "locked": "lock",
     "hidden": "visibility",

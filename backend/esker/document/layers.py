@@ -34,6 +34,20 @@ def size_for(farthest_m: float) -> float:
     return float(math.ceil(farthest_m / c.LAYER_HEIGHT_MARGIN))
 
 
+def check_layer(layer: Layer, size_m: float) -> None:
+    """Raises Refusal for a layer whose heights the quanta of the finest tiles of such a domain could not hold."""
+    facts = layer.facts
+    farthest = max(abs(layer.scale * z + layer.lift_m) for z in (facts.low_m, facts.high_m))
+    bound = c.LAYER_HEIGHT_MARGIN * size_m
+    if farthest > bound:
+        raise Refusal(
+            "out_of_domain",
+            f"Heights of this layer would reach {farthest:.0f} metres from zero; a terrain "
+            f"{size_m:.0f} metres wide holds {bound:.0f}. Lower it, or make a terrain of at least "
+            f"{size_for(farthest):.0f} metres.",
+        )
+
+
 class LayerEditor:
     """The layers of one application in progress. Copies the dictionaries on first write only."""
 
@@ -57,17 +71,8 @@ class LayerEditor:
                 self._restore(op.layer)
 
     def check(self, layer: Layer) -> None:
-        """Raises Refusal for a layer whose heights the quanta of the finest tiles could not hold."""
-        facts = layer.facts
-        farthest = max(abs(layer.scale * z + layer.lift_m) for z in (facts.low_m, facts.high_m))
-        bound = c.LAYER_HEIGHT_MARGIN * self._size_m
-        if farthest > bound:
-            raise Refusal(
-                "out_of_domain",
-                f"Heights of this layer would reach {farthest:.0f} metres from zero; a terrain "
-                f"{self._size_m:.0f} metres wide holds {bound:.0f}. Lower it, or make a terrain of at least "
-                f"{size_for(farthest):.0f} metres.",
-            )
+        """See ``check_layer``."""
+        check_layer(layer, self._size_m)
 
     def _own(self) -> None:
         if not self._copied:

@@ -6,7 +6,7 @@ page; ``tests/vectors/ops.json`` holds the cases that both languages read.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
@@ -14,10 +14,14 @@ from esker import contract as c
 from esker.contract import Layer, Op, Stroke, TerrainSettings
 from esker.document.layers import LayerEditor
 from esker.document.refusal import Limits, Refusal, changed, trim, trim_points
+from esker.document.revisions import revision
 from esker.document.strokes import CurveBox, bounds, curve_box, misfit, reach, world_points
 from esker.grid import Rect
 
-__all__ = ["CHANNEL_FIELDS", "GROUND_FIELDS", "Limits", "Refusal", "StrokeSet", "changed", "check_document"]
+__all__ = [
+    "CHANNEL_FIELDS", "GROUND_FIELDS", "Limits", "Refusal", "StrokeSet", "changed", "check_document", "check_put",
+    "check_stroke",
+]  # fmt: skip
 
 GROUND_FIELDS: Final = frozenset(c.StrokeFields.model_fields) - {"label", "locked"}
 """Fields of a stroke that the ground depends on; changing another one leaves the ground alone."""
@@ -44,13 +48,13 @@ class StrokeSet:
     clock: int = 0
     layers: dict[str, Layer] = field(default_factory=dict)
     deleted_layers: dict[str, Layer] = field(default_factory=dict)
-    shape: object = field(default_factory=object, compare=False, repr=False)
-    """Of what the heights follow from. A successor has the same object exactly when nothing of that changed."""
-    says: object = field(default_factory=object, compare=False, repr=False)
+    heights_rev: int = field(default_factory=revision, compare=False, repr=False)
+    """Revision of what the heights follow from. A successor has the same exactly when nothing of that changed."""
+    channels_rev: int = field(default_factory=revision, compare=False, repr=False)
     """The same of what the other channels follow from: amplitude, roughness, paint, and where strokes lie."""
-    painted: object = field(default_factory=object, compare=False, repr=False)
-    """The same of what paint alone says."""
-    ground: object = field(default_factory=object, compare=False, repr=False)
+    paint_rev: int = field(default_factory=revision, compare=False, repr=False)
+    """The same of paint alone."""
+    layers_rev: int = field(default_factory=revision, compare=False, repr=False)
     """The same of what the base under the strokes follows from: the visible layers, but for what is told of them."""
     _rects: dict[str, _Bounds] = field(default_factory=dict, compare=False, repr=False)
     """Bounds of strokes as last seen: a cache that successors share."""
@@ -89,10 +93,10 @@ class StrokeSet:
         """
         editor = _Editor(self, limits or Limits())
         editor.run(op)
-        shape = self.shape if editor.dirty is None else object()
-        says = object() if editor.said or editor.dirty is not None else self.says
-        painted = object() if editor.painted else self.painted
-        ground = object() if editor.layers.grounded else self.ground
+        heights_rev = self.heights_rev if editor.dirty is None else revision()
+        channels_rev = revision() if editor.said or editor.dirty is not None else self.channels_rev
+        paint_rev = revision() if editor.painted else self.paint_rev
+        layers_rev = revision() if editor.layers.grounded else self.layers_rev
         after = StrokeSet(
             self.id,
             editor.settings,
@@ -101,10 +105,10 @@ class StrokeSet:
             self.clock + 1,
             editor.layers.layers,
             editor.layers.deleted,
-            shape,
-            says,
-            painted,
-            ground,
+            heights_rev,
+            channels_rev,
+            paint_rev,
+            layers_rev,
             self._rects,
             editor.points,
         )
@@ -122,7 +126,7 @@ def check_document(document: c.Document, limits: Limits | None = None) -> None:
     if len({stroke.id for stroke in everything}) != len(everything):
         raise Refusal("duplicate_stroke", "Two strokes have the same id.")
     if len(document.strokes) > limits.strokes or len(document.deleted) > c.MAX_STROKES:
-        raise Refusal("too_many_strokes", f"A terrain holds at most {limits.strokes} strokes.")
+        raise _too_many_strokes(limits.strokes)
     for strokes, most in ((document.strokes, limits.all_points), (document.deleted, c.MAX_POINTS_PER_TERRAIN)):
         if _points_of(strokes) > most:
             raise _too_many_points(most)
@@ -136,6 +140,48 @@ def check_document(document: c.Document, limits: Limits | None = None) -> None:
         raise Refusal("too_many_layers", f"A terrain holds at most {limits.layers} elevation layers.")
     for layer in layers:
         editor.layers.check(layer)
+
+
+def check_stroke(
+    stroke: Stroke, size_m: float, limits: Limits | None = None, box: CurveBox | None = None
+) -> CurveBox | None:
+    """The box of the curve of a stroke, which may be known already, once the stroke is good for a terrain of this size.
+
+    Raises Refusal for too many or too far points, and for fields that are not of its kind.
+    """
+    limits = limits or Limits()
+    if len(stroke.curve) > limits.points:
+        raise Refusal("too_many_points", f"A stroke holds at most {limits.points} points.")
+    bound = c.DOMAIN_MARGIN * size_m
+    anchors = (*stroke.first, *stroke.last)
+    if max(anchors) > bound or min(anchors) < -bound:
+        raise Refusal("out_of_domain", "An anchor lies farther than ten times the terrain from its corner.")
+    wrong = misfit(stroke)
+    if wrong is not None:
+        raise Refusal("bad_field", wrong)
+    box = box or curve_box(stroke.curve)
+    # Points are made where the box says that one may lie too far.
+    if box is not None and reach(stroke, box) > bound and abs(world_points(stroke)).max() > bound:
+        raise Refusal("out_of_domain", "A point lies farther than ten times the terrain from its corner.")
+    return box
+
+
+def check_put(stroke: Stroke, strokes: Mapping[str, Stroke], size_m: float, limits: Limits | None = None) -> None:
+    """Refuses a stroke that a terrain with these strokes cannot take, new or in place of the one of its id.
+
+    Raises Refusal.
+    """
+    limits = limits or Limits()
+    check_stroke(stroke, size_m, limits)
+    if stroke.id not in strokes and len(strokes) >= limits.strokes:
+        raise _too_many_strokes(limits.strokes)
+    others = _points_of(other for key, other in strokes.items() if key != stroke.id)
+    if others + len(stroke.curve) > limits.all_points:
+        raise _too_many_points(limits.all_points)
+
+
+def _too_many_strokes(most: int) -> Refusal:
+    return Refusal("too_many_strokes", f"A terrain holds at most {most} strokes.")
 
 
 def _points_of(strokes: Iterable[Stroke]) -> int:
@@ -250,30 +296,14 @@ class _Editor:
             self.dirty = rect.union(self.dirty)
 
     def check(self, stroke: Stroke, box: CurveBox | None = None) -> CurveBox | None:
-        """The box of its curve, which may be known already.
-
-        Raises Refusal for too many or too far points, and for fields that are not of its kind.
-        """
-        if len(stroke.curve) > self.limits.points:
-            raise Refusal("too_many_points", f"A stroke holds at most {self.limits.points} points.")
-        bound = c.DOMAIN_MARGIN * self.settings.size_m
-        anchors = (*stroke.first, *stroke.last)
-        if max(anchors) > bound or min(anchors) < -bound:
-            raise Refusal("out_of_domain", "An anchor lies farther than ten times the terrain from its corner.")
-        wrong = misfit(stroke)
-        if wrong is not None:
-            raise Refusal("bad_field", wrong)
-        box = box or curve_box(stroke.curve)
-        # Points are made where the box says that one may lie too far.
-        if box is not None and reach(stroke, box) > bound and abs(world_points(stroke)).max() > bound:
-            raise Refusal("out_of_domain", "A point lies farther than ten times the terrain from its corner.")
-        return box
+        """See ``check_stroke``."""
+        return check_stroke(stroke, self.settings.size_m, self.limits, box)
 
     def _begin(self, stroke: Stroke) -> None:
         if stroke.id in self.strokes or stroke.id in self.deleted:
             raise Refusal("duplicate_stroke", "A stroke with this id exists already.")
         if len(self.strokes) >= self.limits.strokes:
-            raise Refusal("too_many_strokes", f"A terrain holds at most {self.limits.strokes} strokes.")
+            raise _too_many_strokes(self.limits.strokes)
         self._put(stroke)
 
     def _append(self, op: c.AppendPoints) -> None:
@@ -314,7 +344,7 @@ class _Editor:
         if stroke is None:
             raise Refusal("unknown_stroke", "There is no such deleted stroke to restore.")
         if len(self.strokes) >= self.limits.strokes:
-            raise Refusal("too_many_strokes", f"A terrain holds at most {self.limits.strokes} strokes.")
+            raise _too_many_strokes(self.limits.strokes)
         self._own()
         del self.deleted[stroke_id]
         self._put(stroke)

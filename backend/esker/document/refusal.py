@@ -8,17 +8,17 @@ from typing import Final
 
 from esker import contract as c
 from esker.contract import RejectCode
+from esker.errors import EskerError
 
 NOT_NULLABLE: Final[frozenset[str]] = frozenset()
 
 
-class Refusal(Exception):
+class Refusal(EskerError):
     """An op that cannot apply: ``code`` for machines, the message for a person. The document is unchanged."""
 
     def __init__(self, code: RejectCode, message: str) -> None:
-        super().__init__(message)
+        super().__init__(code, message)
         self.code: RejectCode = code
-        self.message = message
 
 
 @dataclass(frozen=True)

@@ -18,3 +18,15 @@ def op_json(op: Op) -> str:
     if isinstance(op, c.SetTerrain):
         return op.model_dump_json(include={"type": True, "fields": op.fields.model_fields_set})
     return op.model_dump_json()
+
+
+def document_json(document: c.Document) -> str:
+    """``document.model_dump_json()``, stroke by stroke: of a heavy document that holds the interpreter for seconds, and
+    whoever encodes one in a thread of its own wants others to go on."""
+    lists = ("strokes", "deleted", "layers", "deleted_layers")
+    parts = [document.model_dump_json(exclude=set(lists))[:-1]]
+    for name in lists:
+        items = ",".join([item.model_dump_json() for item in getattr(document, name)])
+        parts.append(f',"{name}":[{items}]')
+    parts.append("}")
+    return "".join(parts)

@@ -7,14 +7,13 @@ from __future__ import annotations
 
 import os
 import sys
-import threading
 import time
 from pathlib import Path
 from typing import Final
 
 from esker import contract as c
-from esker.child_process import end_with_parent
 from esker.importing import limits, wire
+from esker.process.child_process import end_with_parent
 
 STEP_SECONDS: Final = 0.1
 
@@ -46,7 +45,7 @@ def _work(task: wire.Task, out: Out) -> wire.Inspected | wire.Converted:
     from esker.importing.answers import given
     from esker.importing.convert import convert
     from esker.importing.examine import examine
-    from esker.importing.placing import Terrain
+    from esker.importing.placement.placing import Terrain
 
     path, workdir = Path(task.path), Path(task.workdir)
     terrain = None if task.size_m is None else Terrain(task.place, task.size_m)
@@ -63,7 +62,8 @@ def main() -> int:
     from esker.importing.refusal import ImportRefused
 
     task = wire.Task.model_validate_json(sys.stdin.buffer.readline())
-    threading.Thread(target=end_with_parent, name="parent", daemon=True).start()
+    limits.confine(task)
+    end_with_parent()
     limits.apply(task.task)
     out = Out()
     try:

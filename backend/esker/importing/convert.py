@@ -15,11 +15,11 @@ from esker import contract as c
 from esker.importing import questions
 from esker.importing.answers import MIDDLE, given
 from esker.importing.examine import Exam, examine
-from esker.importing.laying import Laid
-from esker.importing.placing import Terrain
+from esker.importing.placement.fitting import Laid
+from esker.importing.placement.placing import Terrain
 from esker.importing.refusal import ImportRefused
 from esker.importing.scan import usable
-from esker.patchwork import rasters
+from esker.patchwork.raster import rasters
 
 Progress = Callable[[c.ImportStage, float], None]
 UNNAMED: Final = "new"

@@ -10,12 +10,14 @@ from pathlib import Path
 import numpy as np
 
 from esker import contract as c
-from esker.importing import colours, placing, questions
+from esker.importing import questions
 from esker.importing.answers import FEET, KEEP, SHIFT, STOP
-from esker.importing.gdal_source import GdalSource
-from esker.importing.georef import horizontal_unit_m
+from esker.importing.formats import colours
+from esker.importing.formats.gdal_source import GdalSource
 from esker.importing.opening import Opened, open_source, set_encoding
-from esker.importing.placing import Placed, Terrain
+from esker.importing.placement import placing
+from esker.importing.placement.georef import horizontal_unit_m
+from esker.importing.placement.placing import Placed, Terrain
 from esker.importing.refusal import ImportRefused
 from esker.importing.scan import Scan, scan
 from esker.importing.source import Source
@@ -133,7 +135,7 @@ def _first_scan(source: Source, answers: Mapping[str, str], asked: list[c.Import
 def _masked(
     source: Source, found: Scan, answers: Mapping[str, str], asked: list[c.ImportQuestion]
 ) -> tuple[float, ...]:
-    suspects = questions.suspects(found, source)
+    suspects = () if source.own is not None else questions.suspects(found, source)
     if "nodata" in answers:
         return questions.parse_nodata(answers["nodata"])
     if not suspects:

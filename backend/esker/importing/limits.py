@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import os
-import resource
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Final
+
+from esker.importing import wire
+from esker.process import confinement, system
+from esker.process.bounds import Bounds
 
 MEMORY_BYTES: Final = 1 << 30
 """Memory of its own (RLIMIT_DATA) that reading may take; files that it maps do not count."""
@@ -25,8 +29,14 @@ KEPT: Final = (
     "HOME",
     "TMPDIR",
     "NUMBA_CACHE_DIR",
-    "SYSTEMROOT",
     "VIRTUAL_ENV",
+    # Windows: without the first two no process starts there, and the others are its HOME and TMPDIR.
+    "SYSTEMROOT",
+    "PATHEXT",
+    "USERPROFILE",
+    "LOCALAPPDATA",
+    "TEMP",
+    "TMP",
 )
 """What the process gets of the server's environment; nothing that could hold a secret."""
 ALONE: Final[Mapping[str, str]] = {
@@ -61,18 +71,29 @@ def environment() -> dict[str, str]:
     return {name: os.environ[name] for name in KEPT if name in os.environ} | dict(HARDENED)
 
 
+def confine(task: wire.Task) -> None:
+    """Keeps this process to the file, its work folders and compiled loops, without a network, where that is to be had.
+
+    Call it before any thread is started.
+    """
+    folders = [Path(path) for path in (task.workdir, os.path.dirname(task.out_dir)) if path]
+    confinement.confine([Path(task.path)], folders, compiled_folders())
+
+
+def compiled_folders() -> list[Path]:
+    """Where numba keeps compiled loops: a reader that could not write there would compile them anew each time."""
+    package, own = Path(__file__).resolve().parents[1], os.environ.get("NUMBA_CACHE_DIR")
+    return [*package.rglob("__pycache__"), *([Path(own)] if own else [])]
+
+
 def apply(task: str) -> None:
     """Bounds this process from now on. ``task``: "inspect" or "convert"."""
-    os.nice(NICENESS)
-    for kind, value in (
-        (resource.RLIMIT_DATA, MEMORY_BYTES),
-        (resource.RLIMIT_AS, ADDRESS_BYTES[task]),
-        (resource.RLIMIT_CPU, CPU_SECONDS[task]),
-        (resource.RLIMIT_FSIZE, FILE_BYTES),
-        (resource.RLIMIT_NOFILE, OPEN_FILES),
-        (resource.RLIMIT_CORE, 0),
-    ):
-        _, hard = resource.getrlimit(kind)
-        if hard != resource.RLIM_INFINITY:
-            value = min(value, hard)
-        resource.setrlimit(kind, (value, value))
+    system.step_back(NICENESS)
+    Bounds(
+        memory_bytes=MEMORY_BYTES,
+        address_bytes=ADDRESS_BYTES[task],
+        cpu_seconds=CPU_SECONDS[task],
+        file_bytes=FILE_BYTES,
+        open_files=OPEN_FILES,
+        core_bytes=0,
+    ).apply()

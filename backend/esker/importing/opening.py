@@ -9,9 +9,11 @@ from typing import Final
 
 import pyproj
 
-from esker.importing import arrays, ascii_grid, colours, zipped
-from esker.importing.gdal_source import GdalSource, open_raster
-from esker.importing.georef import parse_crs
+from esker.importing.formats import arrays, ascii_grid, colours, zipped
+from esker.importing.formats.gdal_source import GdalSource, open_raster
+from esker.importing.formats.own_png import recognise
+from esker.importing.formats.zipped import Unpacked
+from esker.importing.placement.georef import Georef, parse_crs, world_affine
 from esker.importing.refusal import ImportRefused
 from esker.importing.source import Source
 
@@ -54,19 +56,35 @@ def open_source(path: Path, name: str, workdir: Path, answers: Mapping[str, str]
         raise ImportRefused("It is empty.")
     with path.open("rb") as file:
         head = file.read(4096)
-    prj = None
+    beside: Unpacked | None = None
     if head.startswith(b"PK"):
         with zipped.open_zip(path) as archive:
             if not zipped.is_npz(archive):
-                path, name, prj = zipped.unpack(archive, workdir)
+                beside = zipped.unpack(archive, workdir)
+                path, name = beside.path, beside.name
                 with path.open("rb") as file:
                     head = file.read(4096)
                 if head.startswith(b"PK"):
                     raise ImportRefused("A zip file inside a zip file is not opened.")
     opened = _open(path, name, head, workdir, answers)
-    if prj is not None and opened.source.georef is not None and opened.source.georef.crs is None:
-        opened.source.georef = opened.source.georef.with_crs(_prj(prj))
+    if beside is not None:
+        _take_beside(opened.source, beside)
     return opened
+
+
+def _take_beside(source: Source, beside: Unpacked) -> None:
+    """What the files beside a zipped grid say of its place, where the grid itself says nothing of it."""
+    if beside.world is not None:
+        name, text = beside.world
+        affine = world_affine(text)
+        if source.georef is not None or source.own is not None:
+            source.notes.append(f"{name[:40]} is not used: the file itself says where it lies.")
+        elif affine is None:
+            source.notes.append(f"{name[:40]} is not used: it does not hold the six numbers of a world file.")
+        else:
+            source.georef, source.row_order_known = Georef(None, affine), True
+    if beside.prj is not None and source.georef is not None and source.georef.crs is None:
+        source.georef = source.georef.with_crs(_prj(beside.prj))
 
 
 def _prj(text: str) -> pyproj.CRS | None:
@@ -82,7 +100,9 @@ def _open(path: Path, name: str, head: bytes, workdir: Path, answers: Mapping[st
     if head.startswith(TIFF):
         return Opened(_raster(path, "GTiff", answers), name)
     if head.startswith(PNG):
-        return Opened(_raster(path, "PNG", answers), name)
+        picture = _raster(path, "PNG", answers)
+        recognise(picture, path)
+        return Opened(picture, name)
     if head.startswith(HFA):
         return Opened(_raster(path, "HFA", answers), name)
     if head.startswith((b"UHL1", b"HDR1", b"VOL1")):

@@ -10,7 +10,6 @@ import contextlib
 import logging
 import math
 import shutil
-import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -19,9 +18,9 @@ from typing import Final
 from pydantic import ValidationError
 
 from esker import contract as c
-from esker.child_process import put_down, tail
 from esker.importing import limits, wire
 from esker.importing.refusal import ImportCancelled, ImportRefused
+from esker.process import child_process
 
 log = logging.getLogger("esker.importing")
 
@@ -45,16 +44,18 @@ async def inspect(
     size_m: float | None = None,
     on_progress: Progress | None = None,
     cancel: asyncio.Event | None = None,
+    folder: Path | None = None,
 ) -> c.ImportReport:
     """What the file at ``path`` (called ``name`` by its owner) is and what would happen.
 
     Never raises for bad files: the verdict is then "refused" with a sentence. ``place`` and ``size_m``: of the terrain
-    that it is meant for, so that a file from elsewhere is asked about; ``answers`` take their questions away. Raises
-    ImportCancelled once ``cancel`` is set.
+    that it is meant for, so that a file from elsewhere is asked about; ``answers`` take their questions away;
+    ``folder``: where archives are unpacked meanwhile (default: that for temporary files). Raises ImportCancelled once
+    ``cancel`` is set.
     """
     given = answers or c.ImportAnswers()
     try:
-        with tempfile.TemporaryDirectory(prefix="esker-inspect-") as workdir:
+        with tempfile.TemporaryDirectory(prefix="esker-inspect-", dir=folder) as workdir:
             task = wire.Task(
                 task="inspect",
                 path=str(path.resolve()),
@@ -126,6 +127,8 @@ def suggest_size(report: c.ImportReport) -> float:
     if side < farthest <= HEIGHT_GROWTH * side:
         side = farthest
     side = min(max(side, c.MIN_SIZE_M), c.MAX_SIZE_M)
+    if report.format == wire.OWN_FORMAT:  # as it was
+        return side
     unit = 10.0 ** (math.floor(math.log10(side)) - 2)
     return float(min(math.ceil(round(side / unit, 6)) * unit, c.MAX_SIZE_M))
 
@@ -134,11 +137,7 @@ async def _run(
     task: wire.Task, on_progress: Progress | None, cancel: asyncio.Event | None
 ) -> wire.Inspected | wire.Converted:
     """Runs one task to its end. Raises ImportRefused, ImportCancelled; the process is gone in any case."""
-    process = await asyncio.create_subprocess_exec(
-        sys.executable, "-m", "esker.importing",
-        stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE,
-        env=limits.environment(), limit=MAX_LINE_BYTES,
-    )  # fmt: skip
+    process = await child_process.start("esker.importing", env=limits.environment(), limit=MAX_LINE_BYTES)
     waiting = asyncio.create_task(_talk(process, task, on_progress))
     stop = asyncio.create_task(cancel.wait()) if cancel is not None else None
     try:
@@ -153,7 +152,7 @@ async def _run(
         for left in (waiting, stop):
             if left is not None and not left.done():
                 left.cancel()
-        await put_down(process)
+        await child_process.put_down(process)
         await asyncio.gather(*(left for left in (waiting, stop) if left is not None), return_exceptions=True)
 
 
@@ -161,29 +160,20 @@ async def _talk(
     process: asyncio.subprocess.Process, task: wire.Task, on_progress: Progress | None
 ) -> wire.Inspected | wire.Converted:
     """Hands the task over and listens until the process says how it ended. Raises ImportRefused."""
-    assert process.stdin is not None
-    assert process.stdout is not None
-    assert process.stderr is not None
-    errors = asyncio.create_task(tail(process.stderr))
     try:
-        with contextlib.suppress(ConnectionError):
-            process.stdin.write(task.model_dump_json().encode() + b"\n")
-            await process.stdin.drain()
-        while text := await process.stdout.readline():
-            match wire.LINE.validate_json(text):
-                case wire.Step(stage=stage, share=share):
-                    if on_progress is not None:
-                        on_progress(stage, share)
-                case wire.Refused(sentence=sentence):
-                    raise ImportRefused(sentence)
-                case wire.Inspected() | wire.Converted() as done:
-                    return done
-        status = await process.wait()
-        log.warning("the reader of %r ended with %s: %s", task.name, status, (await errors).strip())
+        async with contextlib.aclosing(child_process.lines(process, task.model_dump_json())) as said:
+            async for text in said:
+                match wire.LINE.validate_json(text):
+                    case wire.Step(stage=stage, share=share):
+                        if on_progress is not None:
+                            on_progress(stage, share)
+                    case wire.Refused(sentence=sentence):
+                        raise ImportRefused(sentence)
+                    case wire.Inspected() | wire.Converted() as done:
+                        return done
+    except child_process.Ended as end:
+        log.warning("the reader of %r ended with %s", task.name, end)
     except (ValidationError, ValueError) as error:  # a line that is cut off or too long
         log.warning("the reader of %r said something odd: %s", task.name, error)
-    finally:
-        errors.cancel()
-        await asyncio.gather(errors, return_exceptions=True)
     full = await asyncio.to_thread(lambda: shutil.disk_usage(task.workdir).free < ROOM_BYTES)
     raise ImportRefused(FULL if full else STOPPED)

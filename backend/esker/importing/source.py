@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from esker import contract as c
-from esker.importing.georef import Georef
+from esker.importing.placement.georef import Georef
 from esker.importing.refusal import ImportRefused
 
 PIECE_SAMPLES: Final = 1 << 20
@@ -29,6 +29,16 @@ class Piece:
     col: int
     values: NDArray[np.float64]
     valid: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Own:
+    """Where a heightmap of Esker's own lay: its south-western sample in its terrain, and that terrain."""
+
+    south_west_m: tuple[float, float]
+    spacing_m: float
+    terrain_m: float
+    place: c.Place | None
 
 
 @dataclass(eq=False)
@@ -57,6 +67,8 @@ class Source(ABC):
     bands: int = 1
     unit_m: float | None = None
     """Metres per unit of height that the file itself names, None when it names none."""
+    own: Own | None = None
+    """Where it lay in a terrain of Esker's, when it is a picture that Esker made and says so."""
     row_order_known: bool = True
     """False: nothing says whether the first row is the northern one."""
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Final, Literal
 
 from pydantic import Field, TypeAdapter
 
 from esker import contract as c
+
+OWN_FORMAT: Final = "PNG by Esker"
+"""A heightmap of Esker's own: its text says how high it is and where it lay."""
 
 
 class Task(c.Wire):

@@ -20,17 +20,22 @@ from numpy.typing import NDArray
 
 from esker import grid
 from esker.contract import MAX_LEVEL, MAX_SYNTHESIS_LEVEL
-from esker.patchwork import blend, blend_points, outside, reuse, survey
-from esker.patchwork.blend_device import ClDevice
-from esker.patchwork.blend_loops import BIN
-from esker.patchwork.lod_space import Model
-from esker.patchwork.melt import Melt
-from esker.patchwork.query import Index
+from esker.patchwork import data_level, outside
+from esker.patchwork.blend import lattice as blend
+from esker.patchwork.blend import points as blend_points
+from esker.patchwork.blend import reuse
+from esker.patchwork.blend.device import ClDevice
+from esker.patchwork.blend.loops import BIN
+from esker.patchwork.lod.space import Model
+from esker.patchwork.query.queries import Index
+from esker.patchwork.seams.seam_blend import SeamBlend
 
 Grid = NDArray[np.float32]
 Floats = NDArray[np.float64]
 
 _FORMAT: Final = b"esker base 3"
+BENT_EDITION: Final = 3
+"""From this edition of a terrain on grids go on beyond their borders with the bend that they have there."""
 _CHUNK: Final = 1024
 """Samples along one side of what is evaluated at once: bounds the memory of coefficients."""
 _KEPT_LEVELS: Final = 5
@@ -62,14 +67,16 @@ class Base:
 
     ``digest``: of everything that it follows from. ``low``, ``high``: bounds of its heights, metres. ``spacing_m``:
     finest sample spacing of a layer. ``before``: another one, of which parts that no changed layer reaches are used.
+    ``edition``: that of the terrain (``contract.CURRENT_EDITION``).
     Kinds of devices differ in their last bits: each level stays with the device that it was first asked for with, and
     so does that of a base made from one before.
     """
 
-    def __init__(self, model: Model, size_m: float, before: Base | None = None) -> None:
-        self.model, self.size_m = model, size_m
+    def __init__(self, model: Model, size_m: float, before: Base | None = None, edition: int = 1) -> None:
+        self.model, self.size_m, self.edition = model, size_m, edition
+        self._bent = edition >= BENT_EDITION
         self.spacing_m = min((min(p.layer.spacing_m) for p in model.placed), default=math.inf)
-        self.digest = _digest(model, size_m)
+        self.digest = _digest(model, size_m, self._bent)
         self.low, self.high = _bounds(model)
         self.index: Index = Index(model) if before is None else before.index.updated(model)
         self._lock = threading.RLock()
@@ -78,12 +85,12 @@ class Base:
         self._surveys: dict[int, Grid] = {}
         self._blocks: OrderedDict[tuple[int, int, int], Grid] = OrderedDict()
         self._devices: dict[int, ClDevice | None] = {}
-        self._melt: Melt | None = None
-        self._before: tuple[Model, Melt, dict[int, Blended]] | None = None
-        if before is not None and before.size_m == size_m:
+        self._seam_blend: SeamBlend | None = None
+        self._before: tuple[Model, SeamBlend, dict[int, Blended]] | None = None
+        if before is not None and before.size_m == size_m and before._bent == self._bent:
             with before._lock:
-                if before._melt is not None:
-                    self._before = before.model, before._melt, dict(before._blended)
+                if before._seam_blend is not None:
+                    self._before = before.model, before._seam_blend, dict(before._blended)
                 self._devices = dict(before._devices)
 
     def tolerance(self, level: int) -> float:
@@ -91,12 +98,13 @@ class Base:
         return grid.spacing(level, self.size_m) / 4
 
     @property
-    def melt(self) -> Melt:
+    def seam_blend(self) -> SeamBlend:
         """How the ground of older layers is bent to meet newer ones."""
         with self._lock:
-            if self._melt is None:
-                self._melt = Melt(self.model, self.size_m, None if self._before is None else self._before[1])
-            return self._melt
+            if self._seam_blend is None:
+                before = None if self._before is None else self._before[1]
+                self._seam_blend = SeamBlend(self.model, self.size_m, before, self._bent)
+            return self._seam_blend
 
     def level(self, level: int, device: ClDevice | None = None) -> Grid:
         """The whole level: read-only float32 (64 * 2^level + 1 a side), metres, never NaN."""
@@ -130,7 +138,7 @@ class Base:
         """How far down there is data: read-only float32 (64 * 2^level + 1 a side), see ``Channel.SURVEY``."""
         with self._lock:
             if level not in self._surveys:
-                made = survey.levels(self.model, self.size_m, grid.samples(level))
+                made = data_level.levels(self.model, self.size_m, grid.samples(level))
                 made.setflags(write=False)
                 self._surveys[level] = made
             return self._surveys[level]
@@ -161,9 +169,9 @@ class Base:
         # As on a level: beside newer ground all patches of the older are stale, and the finest are shown.
         spacing = max(4 * tolerance, self.spacing_m / 64)
         chosen = self.index.resolved(spacing, tolerance, (low[0], low[1], high[0], high[1]))
-        packed = blend.pack(self.model, chosen, smooth, tolerance)
+        packed = blend.pack(self.model, chosen, smooth, tolerance, self._bent)
         jets = blend_points.evaluate(packed, points)
-        self.melt.lay_jets(packed, points, jets.heights)
+        self.seam_blend.lay_jets(packed, points, jets.heights)
         bare = np.flatnonzero(jets.cover[:, 0] < 1)
         heights = jets.heights
         if len(bare):
@@ -177,12 +185,12 @@ class Base:
         Where there is ground beyond the data, levels up to ``outside.ANCHOR`` are made and compared.
         """
         whole = grid.Rect(0.0, 0.0, self.size_m, self.size_m)
-        if other is None or other.size_m != self.size_m:
+        if other is None or other.size_m != self.size_m or other._bent != self._bent:
             return whole
         if other.digest == self.digest:
             return None
         rect = reuse.reached(self.model, other.model)
-        for corrected in self.melt.changed(other.melt):
+        for corrected in self.seam_blend.changed(other.seam_blend):
             rect = grid.Rect(*corrected).union(rect)
         step = grid.spacing(outside.ANCHOR, self.size_m)
         for level in range(outside.ANCHOR + 1):
@@ -218,8 +226,8 @@ class Base:
         """
         heights, cover = heights.copy(), cover.copy()
         spacing, last = grid.spacing(outside.ANCHOR, self.size_m), grid.samples(outside.ANCHOR) - 1
-        for placed, first, sheet in zip(self.model.placed, self.model.first, self.model.sheets, strict=True):
-            corners = self.model.kernel[first : first + sheet.count].reshape(-1, 2)
+        for placed, first, held in zip(self.model.placed, self.model.first, self.model.layers, strict=True):
+            corners = self.model.kernel[first : first + held.count].reshape(-1, 2)
             if len(corners) == 0 or np.ptp(corners, axis=0).max() > 2 * spacing:
                 continue
             col, row = np.round((corners.min(axis=0) + corners.max(axis=0)) / (2 * spacing)).astype(int)
@@ -304,14 +312,14 @@ class Base:
     def _taken_over(self, level: int, device: ClDevice | None) -> tuple[Grid, Grid] | None:
         if self._before is None:
             return None
-        model, melt, kept = self._before
+        model, seam_blend, kept = self._before
         old = kept.pop(level, None)
         if old is None:
             return None
         n = grid.samples(level)
         lattice = blend.Lattice(grid.spacing(level, self.size_m), 0, n, 0, n)
         differ = reuse.changed_bins(self.model, model, self.tolerance(level), lattice)
-        hit = np.argwhere(differ | reuse.met_bins(self.melt.changed(melt), lattice))
+        hit = np.argwhere(differ | reuse.met_bins(self.seam_blend.changed(seam_blend), lattice))
         if len(hit) == 0:
             return old.heights, old.cover
         (r0, c0), (r1, c1) = hit.min(axis=0) * BIN, np.minimum((hit.max(axis=0) + 1) * BIN, n)
@@ -328,13 +336,13 @@ class Base:
         for r, c in itertools.product(_chunks(rows), _chunks(cols)):
             lattice = blend.Lattice(spacing, r.start, r.stop, c.start, c.stop)
             chosen = self.index.resolved(spacing, tolerance, lattice.rect())
-            packed = blend.pack(self.model, chosen, True, tolerance)
+            packed = blend.pack(self.model, chosen, True, tolerance, self._bent)
             up, across = (
                 slice(r.start - rows.start, r.stop - rows.start),
                 slice(c.start - cols.start, c.stop - cols.start),
             )
             heights[up, across], cover[up, across] = blend.evaluate(packed, lattice, device)
-            self.melt.lay(packed, lattice, heights[up, across])
+            self.seam_blend.lay(packed, lattice, heights[up, across])
         # Ground that goes on beyond a grid, or is raised as far as lower ground beside it, might leave the bounds.
         low, high = np.float32(self.low), np.float32(self.high)
         np.clip(heights, np.nextafter(low, high), np.nextafter(high, low), out=heights)
@@ -363,14 +371,17 @@ def _chunks(span: slice) -> list[slice]:
     return [slice(a, b) for a, b in itertools.pairwise(cuts)]
 
 
-def _digest(model: Model, size_m: float) -> bytes:
+def _digest(model: Model, size_m: float, bent: bool) -> bytes:
     """SHA-256 of everything that the ground follows from."""
     lines = sorted(
         repr((p.layer.id, p.layer.content, p.layer.anchor, p.layer.rotation_deg, p.layer.spacing_m, p.layer.scale,
               p.layer.lift_m, p.layer.accuracy_m, p.layer.priority))
         for p in model.placed
     )  # fmt: skip
-    return hashlib.sha256(b"\0".join([_FORMAT, repr(size_m).encode(), *(line.encode() for line in lines)])).digest()
+    bending = [b"bent"] if bent else []
+    return hashlib.sha256(
+        b"\0".join([_FORMAT, *bending, repr(size_m).encode(), *(line.encode() for line in lines)])
+    ).digest()
 
 
 def _bounds(model: Model) -> tuple[float, float]:

@@ -1,4 +1,4 @@
-"""Compiled loops: one way to compile them and one to spread them over the processors.
+"""Compiled loops of this room: where they are kept, and one way to spread them over the processors.
 
 Loops are compiled at their first call and kept on disk, so that nothing is compiled at import nor twice on a machine.
 None is compiled with numba's own ``parallel``: its thread pools must not be entered by two threads at once, and a
@@ -14,11 +14,14 @@ import shutil
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Any, TypeVar, cast
 
 import numba
 
-F = TypeVar("F", bound=Callable[..., Any])
+from esker import compiled
+from esker.compiled import kernel
+from esker.process import system
+
+__all__ = ["bands", "kernel", "processors", "spread"]
 
 
 def _keep_by_content() -> None:
@@ -28,7 +31,8 @@ def _keep_by_content() -> None:
     folder cannot be written, numba finds another place by its own rules.
     """
     room = Path(__file__).parent
-    texts = hashlib.sha256(b"".join(path.read_bytes() for path in sorted(room.glob("*.py")))).hexdigest()[:16]
+    files = [Path(compiled.__file__), *sorted(room.rglob("*.py"))]
+    texts = hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()[:16]
     kept = room / "__pycache__" / f"compiled-{texts}"
     try:
         kept.mkdir(parents=True, exist_ok=True)
@@ -46,21 +50,9 @@ def _keep_by_content() -> None:
 _keep_by_content()
 
 
-def kernel(function: F) -> F:
-    """The compiled form of a loop: exact IEEE arithmetic, no interpreter lock, kept on disk where a disk allows it."""
-    options: dict[str, Any] = {"nogil": True, "boundscheck": False, "error_model": "numpy"}
-    try:
-        return cast(F, numba.njit(cache=True, **options)(function))
-    except RuntimeError:  # no place on this machine to keep compiled code in
-        return cast(F, numba.njit(**options)(function))
-
-
 def processors() -> int:
     """Threads that :func:`spread` uses: the processors that this process may run on, 16 at most."""
-    try:
-        return min(16, len(os.sched_getaffinity(0)))
-    except AttributeError:  # not Linux
-        return min(16, os.cpu_count() or 1)
+    return min(16, system.processors())
 
 
 def bands(count: int, least: int = 1, per_thread: int = 4) -> list[tuple[int, int]]:

@@ -20,7 +20,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from esker.patchwork.jets import spline_jet
+from esker.patchwork.blend.jets import spline_jet
 from esker.patchwork.jit import bands, kernel, spread
 
 Grid = NDArray[np.float32]

@@ -1,4 +1,4 @@
-"""Tiles on the device: the page's atlas (frontend/src/gpu/atlas.ts) for one picture."""
+"""Tiles on the device: the page's atlas (frontend/src/gpu/atlas/atlas.ts) for one picture."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from esker.render import sources
 from esker.render.layout import StructLayout
 from esker.render.programs import Compute, Resources, Textured
 from esker.render.surface import SLOT, SlotData, Surface, Tile
-from esker.render.wgsl_tree import Module
 from esker.synthesis.state import H_SCALE, Array, State
+from esker.wgsl.tree import Module
 
 SLOTS_ACROSS: Final = 16
 SLOTS_PER_LAYER: Final = SLOTS_ACROSS**2
@@ -26,7 +26,7 @@ GROUPS: Final = -(-(TILE_SAMPLES + 2) // 8)
 PENUMBRA: Final = 0.02
 NO_SLOT: Final = 0xFFFFFFFF
 
-# A shorter march, as the page uses where the device computes on the CPU (frontend/src/gpu/tilecompute.ts).
+# A shorter march, as the page uses where the device computes on the CPU (frontend/src/gpu/atlas/tilecompute.ts).
 PLAIN_MARCH: Final = {"SUN_STEPS": 32, "SUN_GROWTH": 0.18, "SKY_DIRECTIONS": 5, "SKY_STEPS": 4}
 
 
@@ -101,7 +101,7 @@ def attribute_texels(state: State, grain: Array) -> tuple[NDArray[np.uint8], NDA
 
 
 def page_table(slots: dict[Tile, int]) -> NDArray[np.uint32]:
-    """The hash table by which shaders find a tile's slot (frontend/src/gpu/pagetable.ts): (places, 2)."""
+    """The hash table by which shaders find a tile's slot (frontend/src/gpu/atlas/pagetable.ts): (places, 2)."""
     places = sources.number(sources.sun(), "PLACES")
     if len(slots) > places // 2:
         raise ValueError(f"the page table is made for {places // 2} tiles")

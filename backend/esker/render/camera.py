@@ -1,4 +1,4 @@
-"""Cameras: the twin of the page's (frontend/src/core/camerastate.ts, eyeprojection.ts)."""
+"""Cameras: the twin of the page's (frontend/src/core/camera/state.ts, camera/projection.ts)."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from esker.contract import MAX_SYNTHESIS_LEVEL, TILE_CELLS, TerrainSettings
-from esker.fractal import relief_m, shore_m, zero_m
+from esker.contract.fractal import relief_m, shore_m, zero_m
 from esker.render.camera import Camera, Vec3, axes, eye_projection, part, reversed_depth
 
 Overlay = Literal["none", "contours", "slope", "patches", "detail"]

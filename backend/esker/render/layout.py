@@ -8,8 +8,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from esker.render.glsl_types import Array, Type, scalar_of, type_of
-from esker.render.wgsl_tree import Constant, Literal, Module, Struct, WgslError
+from esker.wgsl.tree import Constant, Literal, Module, Struct, WgslError
+from esker.wgsl.types import Array, Type, scalar_of, type_of
 
 _SIZES: Final = {"vec2": (8, 8), "vec3": (12, 16), "vec4": (16, 16), "mat4x4": (64, 16)}
 

@@ -9,8 +9,8 @@ from typing import Final
 import moderngl
 
 from esker.contract import PATCH_CELLS
-from esker.render.glsl_stage import FRAME, Bindings, Feed, functions, translate
-from esker.render.wgsl_tree import Module
+from esker.wgsl.stage import FRAME, Bindings, Feed, functions, translate
+from esker.wgsl.tree import Module
 
 PITCH: Final = PATCH_CELLS + 1
 VERTICES_PER_DRAW: Final = 60_000

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from esker.contract import NO_LAKE, PATCH_CELLS, SUBPATCHES, TerrainSettings
-from esker.lakes import Lakes, Surfaces, levels_on, sheet, waves_of
 from esker.render import sources
 from esker.render.atlas import MAX_SLOTS, PLAIN_MARCH, Atlas
 from esker.render.camera import eye_projection, part
@@ -22,6 +21,7 @@ from esker.render.programs import Compute, Draw, Resources
 from esker.render.select import Cut, choose, frustum
 from esker.render.surface import Surface
 from esker.render.tables import noise_mipmaps, stone_mipmaps
+from esker.synthesis.lakes import Lakes, Surfaces, levels_on, sheet, waves_of
 
 Pixels = NDArray[np.uint8]
 
@@ -333,7 +333,7 @@ def _sheets(
     cut: Cut, words: NDArray[np.uint32], seen: NDArray[np.bool_], settings: TerrainSettings, lakes: Lakes | None
 ) -> NDArray[np.uint32]:
     """Sheets of water on patches, (n, 8): record, level, level that the lake is known by, waves. The sea comes first
-    (frontend/src/gpu/patches.ts)."""
+    (frontend/src/gpu/passes/patches.ts)."""
     waves = {} if lakes is None else waves_of(lakes, settings.size_m)
     rows: list[tuple[int, float, float, float]] = []
     sea = settings.sea_level_m
@@ -355,7 +355,7 @@ def _sheets(
 
 
 def channel_texels(channels: Channels) -> tuple[Pixels, float]:
-    """(side, side, 2) bytes, amplitude in parts of its greatest value, and that value (gpu/channeltexture.ts)."""
+    """(side, side, 2) bytes, amplitude in parts of its greatest value, and that value (gpu/atlas/channeltexture.ts)."""
     side = max(len(channels.amplitude), len(channels.roughness))
     grids = []
     for values in channels:

@@ -1,4 +1,4 @@
-"""Which 16-cell patches are drawn: the rule of the page's selection (frontend/src/tiles/selection.ts) on arrays.
+"""Which 16-cell patches are drawn: the rule of the page's selection (tiles/patches/selection.ts) on arrays.
 
 A patch is split while it commits more than ``tau`` pixels of error; then neighbours, across corners too, are split
 until they differ by at most one level. Each corner of a drawn patch gets a morph weight that belongs to its point: 1
@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from esker.contract import PATCH_CELLS, QUANTA_PER_CELL, SUBPATCHES
-from esker.lakes import Surfaces
 from esker.render.camera import Camera, eye_projection
+from esker.synthesis.lakes import Surfaces
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from functools import cache
-from pathlib import Path
 from typing import Final
 
-from esker.render.wgsl import parse
-from esker.render.wgsl_tree import Constant, Literal, Module
+from esker.resources import SHADERS
+from esker.wgsl.parse import parse
+from esker.wgsl.tree import Constant, Literal, Module
 
-FOLDER: Final = Path(__file__).resolve().parents[3] / "shaders"
 _COMMON: Final = ("view", "tile", "sky", "noise", "tonemap")
 
 
@@ -54,7 +53,7 @@ def number(module: Module, name: str) -> int:
 
 @cache
 def _module(*names: str, contract: bool = True) -> Module:
-    texts = [(FOLDER / "wgsl" / f"{name}.wgsl").read_text(encoding="utf-8") for name in names]
+    texts = [(SHADERS / "wgsl" / f"{name}.wgsl").read_text(encoding="utf-8") for name in names]
     if contract:
-        texts.insert(0, (FOLDER / "generated" / "contract.wgsl").read_text(encoding="utf-8"))
+        texts.insert(0, (SHADERS / "generated" / "contract.wgsl").read_text(encoding="utf-8"))
     return parse("\n".join(texts))

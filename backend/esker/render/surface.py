@@ -13,18 +13,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from esker.contract import LAKE_LEVEL, PATCH_CELLS, SUBPATCHES, TILE_CELLS, TILE_SAMPLES, TerrainSettings
-from esker.fractal import H_RANGE
-from esker.lakes import Lakes, find_lakes
+from esker.contract.fractal import H_RANGE
 from esker.render.select import Floats, Ints
 from esker.synthesis.detailed import DetailedTerrain
 from esker.synthesis.hash import full, hashed
+from esker.synthesis.lakes import Lakes, find_lakes
 from esker.synthesis.site import BORDER, extended, tile_window
 from esker.synthesis.state import Array, State
 from esker.synthesis.subdivide import Samples, interpolated, root, subdivide, whole
 
 SLOT: Final = TILE_SAMPLES + 2 * BORDER
 RATIOS: Final = {"landscape": 0.5, "smooth": 0.25, "plain": 0.25}
-"""Likely error of a level that is not made yet, in that of the one above it (frontend/src/tiles/synthetic.ts)."""
+"""Likely error of a level that is not made yet, in that of the one above it (tiles/detail/synthetic.ts)."""
 FALL: Final = 2.0 ** -H_RANGE[0]
 """What a level may add falls by this at least: for bounds."""
 

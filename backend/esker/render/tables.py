@@ -1,4 +1,4 @@
-"""Tables that all materials read: tiling noise and stones (twins of frontend/src/gpu/noise.ts and stones.ts)."""
+"""Tables that all materials read: tiling noise and stones (twins of gpu/synthesis/noise.ts and stones.ts)."""
 
 from __future__ import annotations
 

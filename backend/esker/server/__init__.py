@@ -1,6 +1,4 @@
-"""The web server: HTTP routes and the websocket (DESIGN 13, docs/protocol.md). The only room that imports FastAPI."""
+"""The web server: HTTP routes and the websocket (DESIGN 13, docs/protocol.md). The only room that imports FastAPI.
 
-from esker.server.app import create_app
-from esker.server.previews import Pictures
-
-__all__ = ["Pictures", "create_app"]
+It may know every room that ranks below it.
+"""

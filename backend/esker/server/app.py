@@ -10,41 +10,70 @@ from typing import Final
 
 from fastapi import FastAPI
 
-from esker.exports.service import Exports
-from esker.headers import Headers
-from esker.imports import Imports
-from esker.server.answers import add_errors
-from esker.server.bodies import Bodies
-from esker.server.exports import add_exports
-from esker.server.history import add_history
-from esker.server.imports import add_imports
-from esker.server.links import add_links
-from esker.server.page import add_page
-from esker.server.previews import Pictures, add_previews
-from esker.server.socket import add_socket
-from esker.server.terrains import add_terrains
-from esker.session.hub import Hub
-from esker.session.limits import RateByKey
+from esker.fairness.shares import Places, Rate, Rates, Share
+from esker.jobs import Imports
+from esker.jobs.exports import Exports
+from esker.keeper.private import Key
+from esker.server.routes.answers import add_errors
+from esker.server.routes.deletion import add_deletion
+from esker.server.routes.exports import add_exports
+from esker.server.routes.health import add_health
+from esker.server.routes.history import add_history
+from esker.server.routes.imports import add_imports
+from esker.server.routes.keeper import add_keeper
+from esker.server.routes.links import add_links
+from esker.server.routes.page import add_page
+from esker.server.routes.previews import Pictures, add_previews
+from esker.server.routes.socket import add_socket
+from esker.server.routes.terrains import add_terrains
+from esker.server.upload import AT_ONCE
+from esker.server.wire.bodies import Bodies
+from esker.server.wire.descriptors import watch
+from esker.server.wire.front import Forwarded, Front, Gate
+from esker.server.wire.headers import Headers
+from esker.server.wire.pacing import Paced
+from esker.session.room.hub import Hub
+from esker.session.room.turns import Turns
 from esker.store.grids import GridStore
-from esker.upload import AT_ONCE
 from esker.version import VERSION
 
 NEW_TERRAINS: Final = (1 / 3, 60)
 """New terrains by address: rate a second, burst. A whole class may sit behind one address."""
 CODE_TRIES: Final = (1 / 3, 60)
-"""Join codes by address: of 31^6 codes a guesser tries 360 in the fifteen minutes that one lives."""
+"""Join codes by address: right or wrong, as a whole class types at once."""
+NEW_CODES: Final = (0.2, 60)
+"""Join codes that are made, by address and by link: where many live all get longer."""
+NEW_LINKS: Final = (2.0, 200)
+"""Links that are made or renewed, by address: each is a line of the database and a commit."""
+WRONG_CODES: Final = (0.5, 300)
+"""Wrong ones of the whole server: of 10^8 for each that lives, all guessers together try 750 in fifteen minutes."""
+ALL_NEW_TERRAINS: Final = (5.0, 600)
+"""New terrains of all addresses together."""
+UPLOADS: Final = Share(16, address=6, network=8)
+"""Terrain files that are on their way or being read at a time."""
 IMPORTS: Final = (1 / 6, 20)
 """Elevation files by address."""
 
 
 def create_app(
-    hub: Hub, page: Path, data: Path, pictures: Pictures, grids: GridStore, imports: Imports, exports: Exports
+    hub: Hub,
+    page: Path,
+    data: Path,
+    pictures: Pictures,
+    grids: GridStore,
+    imports: Imports,
+    exports: Exports,
+    key: Key,
+    front: Front,
 ) -> FastAPI:
-    """The application over an open hub. ``page``: the built front-end; ``data``: where the LAN certificate lies."""
+    """The application over an open hub. ``page``: the built front-end; ``data``: where the LAN certificate lies;
+    ``key``: of the machine's owner; ``front``: how it is reached."""
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:  # noqa: ARG001
+        watching = asyncio.create_task(watch())
         yield
+        watching.cancel()
         await imports.close()
         await exports.close()
         await pictures.previews.close()
@@ -59,19 +88,29 @@ def create_app(
         lifespan=lifespan,
     )
     app.add_middleware(Bodies)
-    app.add_middleware(Headers)
+    app.add_middleware(Gate, front=front)
+    app.add_middleware(Paced)
+    app.add_middleware(Headers, strict=front.strict)
+    app.add_middleware(Forwarded, front=front)
     app.state.hub = hub
-    app.state.new_terrains = RateByKey(*NEW_TERRAINS)
-    app.state.uploads = asyncio.Semaphore(AT_ONCE)
-    app.state.code_tries = RateByKey(*CODE_TRIES)
-    app.state.imports = RateByKey(*IMPORTS)
+    app.state.new_terrains = Rates(Rate(*NEW_TERRAINS), total=Rate(*ALL_NEW_TERRAINS))
+    app.state.uploads = Turns(AT_ONCE)
+    app.state.receiving = Places(UPLOADS)
+    app.state.code_tries = Rates(Rate(*CODE_TRIES))
+    app.state.new_codes = Rates(Rate(*NEW_CODES), link=Rate(*NEW_CODES))
+    app.state.new_links = Rates(Rate(*NEW_LINKS))
+    app.state.wrong_codes = Rates(total=Rate(*WRONG_CODES))
+    app.state.imports = Rates(Rate(*IMPORTS))
     add_errors(app)
     add_imports(app, hub, grids, imports)
     add_terrains(app, hub, grids)
-    add_exports(app, exports)
+    add_exports(app, hub, exports)
+    add_deletion(app, hub)
+    add_health(app, hub)
     add_history(app, hub, grids)
     add_links(app, hub)
-    add_socket(app, hub)
+    add_keeper(app, hub, key)
+    add_socket(app, hub, front)
     add_previews(app, hub, pictures)
     add_page(app, hub, page, data, pictures)
     return app

@@ -10,14 +10,15 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from esker import grid
-from esker.contract import Stroke, TerrainSettings
-from esker.solve import multigrid, reference, reference_raster
+from esker.contract import MAX_LEVEL, Stroke, TerrainSettings
+from esker.solve import multigrid, reference
 from esker.solve.base import Base
-from esker.solve.constraints import pack
+from esker.solve.constraints import raster_reference
+from esker.solve.constraints.computable import computable
+from esker.solve.constraints.constraints import pack
 
 Field = NDArray[np.float64]
 System = tuple[sp.csr_array, Field]
-GRADIENT_CYCLES = 60
 GRADIENT_TOLERANCE = 1e-11
 
 
@@ -29,9 +30,11 @@ def assemble(strokes: Sequence[Stroke], settings: TerrainSettings, level: int, b
     (crests, a pinned border) are identity rows and are eliminated from the other rows. Raises ValueError for a level
     outside 0..6.
     """
-    tables = pack(strokes, settings, level, base=base)
+    if not 0 <= level <= MAX_LEVEL:
+        raise ValueError(f"level must be 0..{MAX_LEVEL}, not {level}")
+    tables = pack(strokes, computable(settings), level, base=base)
     under = None if base is None else base.level(level).astype(np.float64)
-    c = reference_raster.rasterise(tables, under)
+    c = raster_reference.rasterise(tables, under)
     static = c.height_f
     if under is not None:
         static = reference.over_base(static, c.height_d, c.share, c.target, under, tables.spacing_m)
@@ -76,12 +79,10 @@ def system(d: Field, f: Field, screening: float) -> System:
 
 
 def _diffuse(gradient: reference.NumpySystem) -> None:
-    """The gradient step to float64 rest."""
+    """The gradient step to float64 rest. Raises DivergedError."""
     for level in range(gradient.top):
         multigrid.start(gradient, level)
         multigrid.finish(gradient, level)
     multigrid.start(gradient, gradient.top)
-    for _ in range(GRADIENT_CYCLES if gradient.top > 0 else 0):
-        multigrid.cycle(gradient)
-        if gradient.change("v", "u") < GRADIENT_TOLERANCE:
-            return
+    for _ in multigrid.converge(gradient, GRADIENT_TOLERANCE):
+        pass

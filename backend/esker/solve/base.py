@@ -98,7 +98,7 @@ def bound(base: Base | None, device: Any) -> Bound | None:
 
 
 @dataclass(frozen=True)
-class Ground:
+class BaseUnderStroke:
     """What packing a stroke needs to know of the base under it.
 
     Every height of the base is within ``half`` of ``datum``, metres. fill, cut: how far the stroke's bands fill ground
@@ -115,8 +115,8 @@ class Ground:
         return np.asarray(np.abs(np.asarray(heights, dtype=np.float64) - self.datum) + self.half)
 
 
-SHEET: Final = Ground()
-"""The blank sheet: a plane at 0."""
+FLAT: Final = BaseUnderStroke()
+"""Flat ground: a plane at 0."""
 
 
 def bounds_of(base: Base) -> tuple[float, float]:
@@ -124,14 +124,14 @@ def bounds_of(base: Base) -> tuple[float, float]:
     return math.floor(base.low / BOUNDS_M) * BOUNDS_M, math.ceil(base.high / BOUNDS_M) * BOUNDS_M
 
 
-def ground_under(base: Base | None, points: Floats, plateau_m: float, closed: bool, size_m: float) -> Ground:
-    """What a stroke with this crest, (n, 3) metres, is to a base; ``SHEET`` without one."""
+def ground_under(base: Base | None, points: Floats, plateau_m: float, closed: bool, size_m: float) -> BaseUnderStroke:
+    """What a stroke with this crest, (n, 3) metres, is to a base; ``FLAT`` without one."""
     if base is None:
-        return SHEET
+        return FLAT
     low, high = bounds_of(base)
     datum, half = 0.5 * (high + low), 0.5 * (high - low)
     fill, cut = _sides(base, points, plateau_m, closed, size_m)
-    return Ground(datum, half, fill, cut)
+    return BaseUnderStroke(datum, half, fill, cut)
 
 
 def _sides(base: Base, points: Floats, plateau_m: float, closed: bool, size_m: float) -> tuple[float, float]:

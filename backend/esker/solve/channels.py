@@ -10,7 +10,7 @@ nobody asks anything costs nothing.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from typing import Any, Protocol
 
@@ -27,15 +27,17 @@ from esker.contract import (
     Stroke,
     TerrainSettings,
 )
-from esker.solve import gpu_levels, levels, multigrid, raster, reference_raster
+from esker.solve import multigrid
 from esker.solve.base import Base
-from esker.solve.constraints import Packer
-from esker.solve.device import Device
-from esker.solve.faults import finished
-from esker.solve.fields import Shape
+from esker.solve.constraints import raster_reference
+from esker.solve.constraints.constraints import Packer
+from esker.solve.constraints.sayings import BASES, STROKES_SPEAK, Layer, Speakers, reach_of, speakers
 from esker.solve.injection import frozen, injections
+from esker.solve.opencl import gpu_levels, levels, raster
+from esker.solve.opencl.device import Device
+from esker.solve.opencl.faults import finished
+from esker.solve.opencl.fields import Shape
 from esker.solve.reference import NumpySystem
-from esker.solve.sayings import BASES, STROKES_SPEAK, Layer, Speakers, reach_of, speakers
 
 TOLERANCES = {
     Channel.AMPLITUDE: 0.25 / AMPLITUDE_QUANTA_PER_M,
@@ -45,6 +47,7 @@ TOLERANCES = {
 
 Values = NDArray[np.float32]
 Levels = tuple[Values, ...]
+Loading = Generator[None, None, bool]
 
 
 def channel_level(top: int) -> int:
@@ -65,7 +68,7 @@ class LayerWorkspace(Protocol):
     @property
     def system(self) -> multigrid.System: ...
 
-    def load(self, strokes: Sequence[Stroke], settings: TerrainSettings, base: Base | None) -> bool:
+    def loading(self, strokes: Sequence[Stroke], settings: TerrainSettings, base: Base | None) -> Loading:
         """Rasterise and coarsen what changed since the last stroke set and base; whether anything did."""
 
     def read(self) -> Values:
@@ -90,10 +93,10 @@ class _NumpyLayer:
         self.level, self.packer, self._covers = level, Packer(level, layer), _covers(layer)
         self.system: NumpySystem
 
-    def load(self, strokes: Sequence[Stroke], settings: TerrainSettings, base: Base | None) -> bool:
-        tables, window = self.packer.pack(strokes, settings, base)
+    def loading(self, strokes: Sequence[Stroke], settings: TerrainSettings, base: Base | None) -> Loading:
+        tables, window = yield from self.packer.packing(strokes, settings, base)
         if window is not None:
-            d, *f = reference_raster.rasterise_channel(tables, None if base is None else base.level(self.level))
+            d, *f = raster_reference.rasterise_channel(tables, None if base is None else base.level(self.level))
             self.system = NumpySystem(d[None], np.stack(f[: 1 + self._covers]), tables.screening, self.level)
         return window is not None
 
@@ -110,8 +113,8 @@ class _ClLayer:
         self.level, self.packer, self.system, self._launch = level, Packer(level, layer), system, launch
         self._base: tuple[bytes, Any] = b"", None
 
-    def load(self, strokes: Sequence[Stroke], settings: TerrainSettings, base: Base | None) -> bool:
-        tables, window = self.packer.pack(strokes, settings, base)
+    def loading(self, strokes: Sequence[Stroke], settings: TerrainSettings, base: Base | None) -> Loading:
+        tables, window = yield from self.packer.packing(strokes, settings, base)
         if window is None:
             return False
         shape, fields = self.system.shapes[self.level], self.system.fields
@@ -181,9 +184,20 @@ class ChannelSolver:
     ) -> Iterator[tuple[Channel, Levels]]:
         """The same for some channels, with levels 0..``level`` of each; what did not change since the last time are
         the same arrays. ``spoken``: ``sayings.speakers`` of the strokes."""
+        return (found for found in self.making(spoken, settings, channels, base) if found is not None)
+
+    def making(
+        self,
+        spoken: Mapping[Layer, Speakers],
+        settings: TerrainSettings,
+        channels: Iterable[Channel] = BASES,
+        base: Base | None = None,
+    ) -> Iterator[tuple[Channel, Levels] | None]:
+        """``pyramids``, with None wherever the work can be left; others may use this solver meanwhile."""
         for channel in channels:
-            layers = (Layer(channel, painted) for painted in (False, True))
-            ground, paint = (self._diffused(layer, spoken.get(layer), settings, base) for layer in layers)
+            said, painted = Layer(channel, painted=False), Layer(channel, painted=True)
+            ground = yield from self._diffused(said, spoken.get(said), settings, base)
+            paint = yield from self._diffused(painted, spoken.get(painted), settings, base)
             made = self._made.get(channel)
             if made is None or made[0] is not ground or made[1] is not paint:
                 made = ground, paint, self._composed(channel, ground, paint)
@@ -200,14 +214,14 @@ class ChannelSolver:
 
     def _diffused(
         self, layer: Layer, said: Speakers | None, settings: TerrainSettings, base: Base | None
-    ) -> Values | None:
+    ) -> Generator[None, None, Values | None]:
         """A layer as ``LayerWorkspace.read`` gives it, the same array as last time if nothing changed; None at zero."""
         kept = self._layers.pop(layer, None)  # kept again only if nothing fails: half a raster is not to be trusted
         if said is None:
             return None
         workspace = new_layer(self._device, self.level, layer) if kept is None else kept[0]
         under = None if layer.painted else base  # a brush lies on the ground, however high that is
-        changed = workspace.load(
+        changed = yield from workspace.loading(
             said.strokes, settings.model_copy(update={"reach_m": reach_of(layer, settings)}), under
         )
         if changed:
@@ -227,6 +241,5 @@ def diffuse(system: multigrid.System, tolerance: float) -> None:
         multigrid.start(system, level)
         multigrid.finish(system, level)
     multigrid.start(system, system.top)
-    if system.top > 0:
-        for _ in multigrid.converge(system, tolerance):
-            pass
+    for _ in multigrid.converge(system, tolerance):
+        pass

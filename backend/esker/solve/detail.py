@@ -12,11 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from esker.contract import DEFAULT_REFINED_LEVEL, MAX_REFINED_LEVEL, Channel, Stroke, TerrainSettings
+from esker.events import ChannelLevel, Done, SolveEvent
 from esker.solve.base import Base
 from esker.solve.channels import channel_level
-from esker.solve.device import Device
-from esker.solve.faults import finished
-from esker.solve.solver import Basis, LevelResult, Solver
+from esker.solve.opencl.device import Device
+from esker.solve.opencl.faults import finished
+from esker.solve.solver import Basis, Solver
 from esker.synthesis.detailed import DetailedTerrain, site_of
 from esker.synthesis.interpolate import Window
 from esker.synthesis.kernels import Kernels
@@ -37,7 +38,7 @@ def settle(
     strokes: Sequence[Stroke],
     settings: TerrainSettings,
     level: int,
-    step: Callable[[LevelResult | None], None] | None = None,
+    step: Callable[[SolveEvent], None] | None = None,
     *,
     base: Base | None = None,
 ) -> Settled:
@@ -48,11 +49,9 @@ def settle(
     for result in solver.steps(strokes, settings, level, basis=True, base=base):
         if step is not None:
             step(result)
-        if result is None:
-            continue
-        if result.channel != Channel.HEIGHT:
+        if isinstance(result, ChannelLevel):
             channels[result.channel.name.lower()] = result.heights  # coarse to fine: the last is the finest
-        basis = result.basis or basis
+        basis = result.basis if isinstance(result, Done) else basis
     if basis is None:
         raise RuntimeError("The solve ended before the ground was settled.")
     if base is not None:

@@ -16,16 +16,15 @@ FMG_BOTTOM_CYCLES = 4
 LONE_BOTTOM_CYCLES = 24
 """Bottom cycles when level 0 is the finest: they must settle it."""
 
-MAX_CYCLES = 40
+MOST_BOTTOM_CYCLES = 24 << 6
+
+MAX_CYCLES = 120
 UPDATE_SHARE = 0.5
-"""Error after a cycle as a share of its last update: convergence factors are below 0.4 (DESIGN 5.3)."""
-STALLED = 0.8
-STALLED_AFTER = 8
-"""After this many cycles a ratio of two updates above STALLED means that float32 has nothing left to gain."""
+"""Error after a cycle as a share of its last update, at least: convergence factors of ordinary scenes are below 0.4."""
+FIRST_SHARE = 1.0
+"""The same after the first cycle, when nothing tells the factor yet."""
 DIVERGED = 10.0
 """An update above this many times the first one does not come back: the corrections feed on themselves."""
-DOUBTFUL = 2.0
-"""What stalls above this many times its first update may diverge slowly: some cycles more tell."""
 
 
 class DivergedError(RuntimeError):
@@ -36,9 +35,13 @@ class DivergedError(RuntimeError):
 
 
 class System(Protocol):
-    """One family of equations A u = f, all channels with the same A, on every level."""
+    """One family of equations A u = f, all channels with the same A, on every level.
+
+    floor: what its numbers leave of an update that could be zero, as a share of the largest value.
+    """
 
     top: int
+    floor: float
 
     def visit(
         self, level: int, *, rhs: str, out: str, guess: str | None, correction: str | None, residual: bool
@@ -63,6 +66,9 @@ class System(Protocol):
 
     def change(self, old: str, new: str) -> float:
         """Largest absolute difference of two fields of the finest level."""
+
+    def largest(self, name: str) -> float:
+        """Largest absolute value of a field of the finest level."""
 
 
 def correct(system: System, level: int, *, full: bool) -> None:
@@ -112,8 +118,13 @@ def cycle(system: System) -> None:
 def converge(system: System, tolerance: float) -> Iterator[None]:
     """Cycles until the estimated error of the finest level is below ``tolerance``; leaves off between them.
 
-    Raises DivergedError when an update is not finite, or above DIVERGED times the first.
+    With a factor r, the error after a cycle is at most r / (1 - r) of its update; r is the ratio of the last two.
+    Updates that have stopped to shrink are rounding if they are as small as ``System.floor``, else the cycle does not
+    converge. Raises DivergedError then, and when an update is not finite, or above DIVERGED times the first.
     """
+    if system.top == 0:
+        yield from _converge_bottom(system, tolerance)
+        return
     first = before = math.inf
     for k in range(1, MAX_CYCLES + 1):
         cycle(system)
@@ -121,9 +132,29 @@ def converge(system: System, tolerance: float) -> Iterator[None]:
         first = update if k == 1 else first
         if not math.isfinite(update) or update > DIVERGED * first:
             raise DivergedError
-        if update * UPDATE_SHARE < tolerance:
+        ratio = update / before if before > 0 else 0.0
+        share = FIRST_SHARE if k == 1 else max(UPDATE_SHARE, ratio / (1 - ratio)) if ratio < 1 else math.inf
+        if update == 0 or update * share < tolerance:
             return
-        if k >= STALLED_AFTER and STALLED * before < update <= DOUBTFUL * first:
+        if k > 1 and ratio >= 1 and update <= system.floor * system.largest("u"):
             return
         before = update
         yield
+    raise DivergedError
+
+
+def _converge_bottom(system: System, tolerance: float) -> Iterator[None]:
+    """The same for level 0 alone: bottom cycles, twice as many every time, until they change nothing any more."""
+    cycles = LONE_BOTTOM_CYCLES
+    system.bottom(rhs="f", out="u", cycles=cycles)
+    while cycles < MOST_BOTTOM_CYCLES:
+        cycles *= 2
+        system.bottom(rhs="f", out="v", cycles=cycles)
+        update = system.change("v", "u")
+        if not math.isfinite(update):
+            raise DivergedError
+        if update < max(tolerance, system.floor * system.largest("u")):
+            return
+        system.swap(0)
+        yield
+    raise DivergedError

@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from esker import grid
-from esker.contract import Channel, Stroke, TerrainSettings
+from esker.contract import Stroke, TerrainSettings
+from esker.events import PAUSE, Done, Pause, Preview, Settled, pauses
 from esker.solve import multigrid
 from esker.solve.base import Base, Bound
-from esker.solve.constraints import Packer
+from esker.solve.constraints.constraints import Packer
 from esker.solve.injection import frozen, injections
 
 PREVIEW_GRADIENT_CYCLES = 1
@@ -45,24 +46,6 @@ class Basis:
     heights: NDArray[np.float32]
     gradient: NDArray[np.float32]
     base: Base | None = None
-
-
-@dataclass(frozen=True)
-class LevelResult:
-    """One finished level. heights: (N_l, N_l) float32, metres above the base, row 0 south, read-only. ``settled``
-    False: a preview that later results correct; True: final for this stroke set, and the injection of the next finer
-    level.
-
-    ``channel`` other than HEIGHT: ``heights`` holds that channel instead, in its unit (metres, 0..1, -1..1, levels);
-    the same array as last time if nothing of it changed.
-    ``basis``: with the last result of a settled solve, if it was asked for.
-    """
-
-    level: int
-    heights: NDArray[np.float32]
-    settled: bool
-    channel: Channel = Channel.HEIGHT
-    basis: Basis | None = None
 
 
 class Workspace(Protocol):
@@ -108,13 +91,13 @@ def preview_gradient_cycles(settings: TerrainSettings) -> int:
     return PREVIEW_GRADIENT_CYCLES + sum(reach > share * settings.size_m for share in WIDE_REACHES)
 
 
-def scouted(w: Workspace, job: Job) -> LevelResult:
+def scouting(w: Workspace, job: Job) -> Iterator[Preview | Pause]:
     """The coarsest preview, made by a workspace's scout of constraints that were rasterised coarsely."""
     scout = w.scout
     assert scout is not None
-    scout.load(*job)
+    yield from pauses(scout.loading(*job))
     _coarse(scout, 0)
-    return LevelResult(0, frozen(scout.read(0)), settled=False)
+    yield Preview(0, frozen(scout.read(0)))
 
 
 def _coarse(w: Workspace, level: int) -> None:
@@ -128,20 +111,40 @@ def _coarse(w: Workspace, level: int) -> None:
 
 def previews(
     w: Workspace, gradient_cycles: int = PREVIEW_GRADIENT_CYCLES, *, coarsest: bool = True
-) -> Iterator[LevelResult | None]:
+) -> Iterator[Preview | Pause]:
     """Full multigrid, both steps level by level, so that a coarse level is out before the next one is touched.
 
     Not ``coarsest``: without level 0, which is out already.
     """
+    for level in full_multigrid(w, gradient_cycles):
+        if level is None:
+            yield PAUSE
+        elif level > 0 or coarsest or w.top == 0:
+            yield Preview(level, frozen(w.read(level)))
+
+
+def unseen(w: Workspace, job: Job) -> Iterator[Settled | Pause]:
+    """The heights of the finest level at rest, those of ``previews``, ``to_rest`` and ``settled`` to the bit, and
+    nothing of what they show on the way. Raises DivergedError."""
+    yield from pauses(w.loading(*job))
+    w.standing = None
+    for _ in full_multigrid(w, preview_gradient_cycles(job.settings)):
+        yield PAUSE
+    w.standing = standing_on(job)
+    yield from pauses(to_rest(w, job.settings))
+    yield Settled(w.top, finest(w))
+
+
+def full_multigrid(w: Workspace, gradient_cycles: int) -> Iterator[int | None]:
+    """Both steps level by level: each level when it is done; None where the work can be left before that."""
     for level in range(w.top):
         _coarse(w, level)
-        if level > 0 or coarsest:
-            yield LevelResult(level, frozen(w.read(level)), settled=False)
+        yield level
     w.standing = None
     yield from _cycles(w.gradient, gradient_cycles)
     w.guide(w.top)
     yield from _cycles(w.height, PREVIEW_HEIGHT_CYCLES)
-    yield LevelResult(w.top, frozen(w.read(w.top)), settled=False)
+    yield w.top
 
 
 def standing_on(job: Job) -> object:
@@ -149,7 +152,7 @@ def standing_on(job: Job) -> object:
     return job.settings, None if job.base is None else job.base.base.digest
 
 
-def amended(w: Workspace, settings: TerrainSettings, relief_m: float) -> Iterator[LevelResult | None]:
+def amended(w: Workspace, settings: TerrainSettings, relief_m: float) -> Iterator[Preview | Pause]:
     """The finest preview of an edit from the ground before it, which ``w`` still holds: no level of full multigrid, and
     as many cycles as it takes. No result where those are too many: full multigrid is better then.
 
@@ -164,9 +167,9 @@ def amended(w: Workspace, settings: TerrainSettings, relief_m: float) -> Iterato
             amend_guidance(w)
         multigrid.cycle(w.height)
         if w.height.change("v", "u") * multigrid.UPDATE_SHARE < AMEND_SHARE * relief_m:
-            yield LevelResult(w.top, frozen(w.read(w.top)), settled=False)
+            yield Preview(w.top, frozen(w.read(w.top)))
             return
-        yield None
+        yield PAUSE
 
 
 def amend_gradient(w: Workspace, settings: TerrainSettings) -> None:
@@ -201,29 +204,35 @@ def gradients(w: Workspace) -> None:
 
 
 def to_rest(w: Workspace, settings: TerrainSettings) -> Iterator[None]:
-    """Cycle both steps until their error is too small to see."""
-    if w.top == 0:
-        return
+    """Cycle both steps until their error is too small to see. Raises DivergedError."""
     quantum = grid.quantum(w.top, settings.size_m)
     span = min(settings.reach_m or settings.size_m / 4, settings.size_m / 4)
     yield from multigrid.converge(w.gradient, GRADIENT_SHARE * quantum / span)
     w.guide(w.top)
-    multigrid.refresh(w.height)
+    if w.top > 0:
+        multigrid.refresh(w.height)
     yield from multigrid.converge(w.height, HEIGHT_SHARE * quantum)
 
 
-def settled(w: Workspace, job: Job, basis: bool) -> Iterator[LevelResult]:
+def finest(w: Workspace) -> NDArray[np.float32]:
+    """The heights of the finest level of a system at rest. Raises DivergedError for heights that are not finite."""
+    heights = frozen(w.read(w.top))
+    if not np.isfinite(heights).all():
+        raise multigrid.DivergedError
+    return heights
+
+
+def settled(w: Workspace, job: Job, basis: bool) -> Iterator[Settled | Done]:
     """All levels of a system at rest: the finest, and its injections.
 
     Raises DivergedError for heights that are not finite: a kernel's largest update passes over what is not a number.
     """
-    heights = frozen(w.read(w.top))
-    if not np.isfinite(heights).all():
-        raise multigrid.DivergedError
-    *coarser, finest = enumerate(injections(heights))
+    heights = finest(w)
+    *coarser, last = enumerate(injections(heights))
     for level, samples in coarser:
-        yield LevelResult(level, samples, settled=True)
+        yield Settled(level, samples)
     strokes, settings, base = job
     own = None if base is None else base.base
     found = Basis(tuple(strokes), settings, w.top, heights, frozen(w.read_gradient()), own) if basis else None
-    yield LevelResult(finest[0], finest[1], settled=True, basis=found)
+    yield Settled(*last)
+    yield Done(found)

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import fields, replace
-from typing import TYPE_CHECKING
+from functools import lru_cache
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,22 +24,35 @@ from esker.contract import (
     TerrainSettings,
 )
 from esker.grid import samples
-from esker.solve import reference_raster
 from esker.solve.base import Base
-from esker.solve.constraints import Packer
-from esker.solve.tables import BIN, PINNED, PINNED_STIFFNESS, Window
+from esker.solve.constraints import raster_reference
+from esker.solve.constraints.constraints import Packer
+from esker.solve.constraints.tables import (
+    BALANCE_M,
+    BIN,
+    FIRM_STIFFNESS,
+    LINE_STIFFNESS,
+    PINNED,
+    PINNED_STIFFNESS,
+    Window,
+)
 
 if TYPE_CHECKING:
     from esker.solve.passes import Workspace
 
 Field = NDArray[np.float64]
+Scalar = TypeVar("Scalar", bound=np.generic)
 
 BOTTOM_LEVELS = 4
 """Levels below level 0 (33, 17, 9 and 5 samples a side) that ``bottom`` uses for itself."""
 COARSEST_SWEEPS = 60
 COARSEST_RELAXATION = 1.4
+LEAST_HOLD = 1e-9
+"""Stiffness, of springs and screening of all samples together, below which nothing holds the ground: its mean is then
+that of the base. The widest band there can be has ten times as much."""
 
 
+@lru_cache
 def chebyshev_weights(sweeps: int = CHEBYSHEV_SWEEPS) -> Field:
     """Relaxation of each Jacobi sweep: the Chebyshev polynomial on [CHEBYSHEV_LOW, CHEBYSHEV_HIGH]."""
     mid, half = (CHEBYSHEV_HIGH + CHEBYSHEV_LOW) / 2, (CHEBYSHEV_HIGH - CHEBYSHEV_LOW) / 2
@@ -46,17 +60,28 @@ def chebyshev_weights(sweeps: int = CHEBYSHEV_SWEEPS) -> Field:
     return np.asarray(1 / (mid + half * np.cos(np.pi * (2 * k + 1) / (2 * sweeps))))
 
 
+def mirrored(a: NDArray[Scalar]) -> NDArray[Scalar]:
+    """(channels, n, m) with a ring of mirrored samples around: a quarter of the time of ``np.pad``."""
+    channels, rows, columns = a.shape
+    p = np.empty((channels, rows + 2, columns + 2), dtype=a.dtype)
+    p[:, 1:-1, 1:-1] = a
+    p[:, 0, 1:-1], p[:, -1, 1:-1] = a[:, 1], a[:, -2]
+    p[:, :, 0], p[:, :, -1] = p[:, :, 2], p[:, :, -3]
+    return p
+
+
 def laplacian(u: Field) -> Field:
     """Sum over the four neighbours of (u_j - u_i), borders mirrored."""
-    p = np.pad(u, ((0, 0), (1, 1), (1, 1)), mode="reflect")
-    return (
-        (p[:, :-2, 1:-1] - u) + (p[:, 2:, 1:-1] - u) + (p[:, 1:-1, :-2] - u) + (p[:, 1:-1, 2:] - u)
-    )  # difference form: float32 keeps the small differences that a sum minus 4u would lose
+    p = mirrored(u)
+    out = p[:, :-2, 1:-1] - u  # differences: float32 keeps the small ones that a sum minus 4u would lose
+    for side in (p[:, 2:, 1:-1], p[:, 1:-1, :-2], p[:, 1:-1, 2:]):
+        out += side - u
+    return np.asarray(out)
 
 
 def restriction(f: Field) -> Field:
     """R = P^T for mirrored borders: weights 1, 1/2, 1/4 over 3 x 3, so that a constant grows fourfold."""
-    p = np.pad(f, ((0, 0), (1, 1), (1, 1)), mode="reflect")
+    p = mirrored(f)
     rows = p[:, :-2:2] / 2 + p[:, 1:-1:2] + p[:, 2::2] / 2
     return np.asarray(rows[:, :, :-2:2] / 2 + rows[:, :, 1:-1:2] + rows[:, :, 2::2] / 2)
 
@@ -75,15 +100,37 @@ def coarsen(d: Field, f: Field) -> tuple[Field, Field]:
     """Constraints one level coarser: springs summed by R, saturating like springs in series (DESIGN 5.3).
 
     d: (1, n, n); f: (channels, n, n), stiffness times target (the value itself where fixed). A pinned border is
-    on every level: there it stays as good as fixed, at 0; with springs that saturate the cycle diverges.
+    on every level: there it stays as good as fixed, at 0; with springs that saturate the cycle diverges. A crest along
+    a line of the coarse level is there, too: ``on_lines``.
     """
     hard = d < 0
     total = restriction(np.where(hard, CREST_STIFFNESS, d))
     pull = restriction(np.where(hard, CREST_STIFFNESS * f, f))
     k = 1 / (1 + SATURATION * total)
-    centre = d[:, ::2, ::2]
+    centre, target = d[:, ::2, ::2], np.where(hard, f, f / np.maximum(d, 1))[:, ::2, ::2]
+    line = on_lines(d)
     pinned = (centre <= PINNED) | (centre >= PINNED_STIFFNESS / 2)
-    return np.where(pinned, PINNED_STIFFNESS, total * k), np.where(pinned, 0.0, pull * k)
+    coarse_d, coarse_f = np.where(line, LINE_STIFFNESS, total * k), np.where(line, LINE_STIFFNESS * target, pull * k)
+    return np.where(pinned, PINNED_STIFFNESS, coarse_d), np.where(pinned, 0.0, coarse_f)
+
+
+def on_lines(d: Field) -> NDArray[np.bool_]:
+    """Coarse samples, of (1, n, n), that lie on a crest along one of the two lines of samples through them.
+
+    So do those whose two neighbours on the line are fixed, or on a finer line, as they are; and those that are firm, as
+    are these two, but neither of the other two.
+    """
+
+    def around(stiff: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], ...]:
+        p = mirrored(stiff)
+        sides = p[:, 1:-1, :-2], p[:, 1:-1, 2:], p[:, :-2, 1:-1], p[:, 2:, 1:-1], stiff
+        return tuple(side[:, ::2, ::2] for side in sides)
+
+    west, east, south, north, here = around((d < 0) | (d >= LINE_STIFFNESS / 2))
+    strong = here & ((west & east) | (south & north))
+    west, east, south, north, here = around((d < 0) | (d >= FIRM_STIFFNESS))
+    lone = (west & east & ~south & ~north) | (south & north & ~west & ~east)
+    return np.asarray(strong | (here & lone))
 
 
 def divergence(static: Field, d: Field, g: Field, spacing_m: float) -> Field:
@@ -114,7 +161,8 @@ def over_base(static: Field, d: Field, share: Field, target: Field, base: Field,
     ``share`` of the guidance prescribes the ground itself: so that much of the base's own difference along each edge,
     with the mean share of its two ends, is taken off what lies above the base. Where a cliff of the base leaves a band
     that is too much or too little: then, to within ``slack`` metres, what the two ends' ``target`` differ by, with a
-    share between those of the ends; between a fill and a cut it may be less than either. Borders are mirrored.
+    share between those of the ends; between a fill and a cut, of BALANCE_M each, it may be less than either. Borders
+    are mirrored.
     """
     s, b, t = (np.pad(a, 1, mode="reflect") for a in (share, base, target))
     out = np.zeros_like(static)
@@ -122,8 +170,9 @@ def over_base(static: Field, d: Field, share: Field, target: Field, base: Field,
                           (slice(1, -1), slice(0, -2)), (slice(1, -1), slice(2, None))):  # fmt: skip
         step, fall = b[rows, columns] - base, target - t[rows, columns]
         low, high = np.sort([share * step, s[rows, columns] * step], axis=0)
-        through = target * t[rows, columns] < 0
-        low, high = np.where(through, np.minimum(low, 0), low), np.where(through, np.maximum(high, 0), high)
+        lesser = np.minimum(np.abs(target), np.abs(t[rows, columns]))
+        through = np.where(target * t[rows, columns] < 0, np.minimum(lesser / BALANCE_M, 1), 0)
+        low, high = low - through * np.maximum(low, 0), high - through * np.minimum(high, 0)
         mean = 0.5 * (share + s[rows, columns]) * step
         out += np.clip(np.clip(mean, fall - slack, fall + slack), low, high)
     return np.asarray(np.where(d < 0, static, static + out))
@@ -137,8 +186,14 @@ def residual(u: Field, rhs: Field, d: Field, screening: float) -> Field:
 def sweeps(u: Field, rhs: Field, d: Field, screening: float) -> Field:
     """The Chebyshev-Jacobi sweeps."""
     q = np.where(d < 0, 0.0, 1 / (4 + screening + np.maximum(d, 0)))
+    stiffness = d + screening
     for w in chebyshev_weights():
-        u = u + w * q * residual(u, rhs, d, screening)
+        left = laplacian(u)  # a residual, which counts nowhere where a sample is fixed
+        left += rhs
+        left -= stiffness * u
+        left *= w * q
+        left += u
+        u = left
     return u
 
 
@@ -152,8 +207,11 @@ def visit(guess: Field | None, correction: Field | None, rhs: Field, d: Field, s
     return u, restriction(residual(u, rhs, d, screening))
 
 
-def bottom(rhs: Field, d: list[Field], screening: list[float], cycles: int, coarsest: Field) -> Field:
-    """V-cycles from zero for rhs on a list of levels, finest first; ``coarsest``: see ``relaxation_matrix``."""
+def bottom(
+    rhs: Field, d: list[Field], screening: list[float], cycles: int, coarsest: Field, u: Field | None = None
+) -> Field:
+    """V-cycles from ``u``, or from zero, for rhs on a list of levels, finest first; ``coarsest``: see
+    ``relaxation_matrix``."""
 
     def v_cycle(k: int, u: Field, b: Field) -> Field:
         if k == len(d) - 1:
@@ -162,30 +220,50 @@ def bottom(rhs: Field, d: list[Field], screening: list[float], cycles: int, coar
         e = v_cycle(k + 1, np.zeros_like(r), r)
         return sweeps(u + np.where(d[k] < 0, 0.0, prolongation(e)), b, d[k], screening[k])
 
-    u = np.where(d[0] < 0, rhs, 0.0)
+    u = np.where(d[0] < 0, rhs, 0.0) if u is None else u
     for _ in range(cycles):
         u = v_cycle(0, u, rhs)
     return u
 
 
 def relaxation_matrix(d: Field, screening: float) -> Field:
-    """The linear map, b to u, of COARSEST_SWEEPS lexicographic over-relaxations from zero, shape (n*n, n*n)."""
+    """The linear map, b to u, of COARSEST_SWEEPS lexicographic over-relaxations, shape (n*n, n*n).
+
+    They start from the constant that balances b: where the ground is held by weak springs alone, relaxations would take
+    hundreds to find it. Where nothing holds it, the mean of u is zero.
+    """
     n = d.shape[1]
     mirror = np.abs(np.arange(-1, n + 1))
     mirror[-1] = n - 2
+    share = control_volumes(n)
+    stiffness = float((share * (d[0] + screening)).sum())
+    held = stiffness > LEAST_HOLD
     b = np.eye(n * n).reshape(n * n, n, n)
     u = np.zeros_like(b)
+    if held:
+        u += share.reshape(-1, 1, 1) / stiffness
     for _ in range(COARSEST_SWEEPS):
         for y in range(n):
             for x in range(n):
                 around = u[:, mirror[y], x] + u[:, mirror[y + 2], x] + u[:, y, mirror[x]] + u[:, y, mirror[x + 2]]
                 value = (b[:, y, x] + around) / (4 + d[0, y, x] + screening)
                 u[:, y, x] += COARSEST_RELAXATION * (value - u[:, y, x])
+    if not held:
+        u -= ((u * share).sum(axis=(1, 2)) / share.sum())[:, None, None]
     return u.reshape(n * n, n * n).T
+
+
+def control_volumes(n: int) -> Field:
+    """Area of each sample's control volume, (n, n), in cells: 1, at borders 1/2, in corners 1/4."""
+    share = np.ones(n)
+    share[[0, -1]] = 0.5
+    return np.outer(share, share)
 
 
 class NumpySystem:
     """``multigrid.System`` in float64. Level ``top`` holds the fixed samples; ``screening`` is that of the top."""
+
+    floor = 1e-13
 
     def __init__(self, d: Field, f: Field, screening: float, top: int) -> None:
         self.top = top
@@ -196,6 +274,8 @@ class NumpySystem:
             self.d[level - 1], self.static[level - 1] = coarsen(self.d[level], self.static[level])
         self.coarsest = relaxation_matrix(self.d[-BOTTOM_LEVELS], self.eps[-BOTTOM_LEVELS])
         self.fields: dict[tuple[str, int], Field] = {("f", level): a for level, a in self.static.items()}
+        self._bottom: tuple[Field, int, Field] | None = None
+        """Right-hand side, number of cycles and result of the last ``bottom``: more cycles go on from there."""
 
     def visit(
         self, level: int, *, rhs: str, out: str, guess: str | None, correction: str | None, residual: bool
@@ -217,7 +297,11 @@ class NumpySystem:
     def bottom(self, *, rhs: str, out: str, cycles: int) -> None:
         levels = range(0, -BOTTOM_LEVELS - 1, -1)
         d, eps = [self.d[level] for level in levels], [self.eps[level] for level in levels]
-        self.fields[out, 0] = bottom(self.fields[rhs, 0], d, eps, cycles, self.coarsest)
+        f, done, u = self.fields[rhs, 0], 0, None
+        if self._bottom is not None and self._bottom[0] is f and self._bottom[1] <= cycles:
+            done, u = self._bottom[1:]
+        self.fields[out, 0] = u = bottom(f, d, eps, cycles - done, self.coarsest, u)
+        self._bottom = f, cycles, u
 
     def swap(self, level: int) -> None:
         self.fields["u", level], self.fields["v", level] = self.fields["v", level], self.fields["u", level]
@@ -229,10 +313,13 @@ class NumpySystem:
     def change(self, old: str, new: str) -> float:
         return float(np.abs(self.fields[new, self.top] - self.fields[old, self.top]).max())
 
+    def largest(self, name: str) -> float:
+        return float(np.abs(self.fields[name, self.top]).max())
+
 
 def within(
-    window: Window, new: reference_raster.Constraints, old: reference_raster.Constraints | None
-) -> reference_raster.Constraints:
+    window: Window, new: raster_reference.Constraints, old: raster_reference.Constraints | None
+) -> raster_reference.Constraints:
     """The new constraints in the bins of ``window``, the old ones elsewhere: there the tables may lack strokes."""
     if old is None:
         return new
@@ -250,7 +337,7 @@ class NumpyWorkspace:
         self.top, self.based = top, based
         self.scout: Workspace | None = None
         self.standing: object = None
-        self._constraints: reference_raster.Constraints | None = None
+        self._constraints: raster_reference.Constraints | None = None
         self.size_m = 1.0
         self.packer = Packer(top)
         self.gradient: NumpySystem
@@ -258,11 +345,16 @@ class NumpyWorkspace:
 
     def load(self, strokes: Sequence[Stroke], settings: TerrainSettings, base: Base | None = None) -> None:
         """Rasterise and coarsen."""
-        tables, window = self.packer.pack(strokes, settings, base)
+        for _ in self.loading(strokes, settings, base):
+            pass
+
+    def loading(self, strokes: Sequence[Stroke], settings: TerrainSettings, base: Base | None = None) -> Iterator[None]:
+        """The same; may be left between strokes."""
+        tables, window = yield from self.packer.packing(strokes, settings, base)
         if window is None:
             return
         under = None if base is None else base.level(self.top).astype(np.float64)
-        c = self._constraints = within(window, reference_raster.rasterise(tables, under), self._constraints)
+        c = self._constraints = within(window, raster_reference.rasterise(tables, under), self._constraints)
         height_f = (
             c.height_f
             if under is None
@@ -275,11 +367,6 @@ class NumpyWorkspace:
         for system, u in zip((self.gradient, self.height), before, strict=False):
             if u is not None:
                 system.fields["u", self.top] = u
-
-    def loading(self, strokes: Sequence[Stroke], settings: TerrainSettings, base: Base | None = None) -> Iterator[None]:
-        """The same, in one piece."""
-        self.load(strokes, settings, base)
-        yield
 
     def warm(self, heights: NDArray[np.float32]) -> None:
         """Start the height step from these heights of the finest level instead of from coarser levels."""

@@ -11,43 +11,32 @@ every solve starts from zero, strokes are ordered by id, and no cache changes a 
 
 from __future__ import annotations
 
-import os
 import time
-import weakref
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from esker import grid
 from esker.contract import MAX_LEVEL, Channel, Stroke, TerrainSettings
-from esker.solve import multigrid, passes, proof
+from esker.events import PAUSE, BaseLevel, ChannelLevel, Done, Pause, Preview, Settled, SolveEvent, pauses
+from esker.solve import blank, multigrid, passes
 from esker.solve.base import Base, bound
+from esker.solve.blank import is_blank
 from esker.solve.channels import ChannelSolver, channel_level
-from esker.solve.constraints import Shapes
-from esker.solve.device import NUMPY, NUMPY_NAME, Device, open_device
-from esker.solve.faults import OutOfDeviceMemoryError, guarded, is_fault
-from esker.solve.passes import (
-    PREVIEW_GRADIENT_CYCLES,
-    PREVIEW_HEIGHT_CYCLES,
-    Basis,
-    Job,
-    LevelResult,
-    Workspace,
-)
-from esker.solve.refine import Refiner, Refinery
-from esker.solve.sayings import BASES, Layer, Speakers, speakers
+from esker.solve.constraints.computable import computable
+from esker.solve.constraints.constraints import Shapes
+from esker.solve.constraints.sayings import BASES, Layer, Speakers, speakers
+from esker.solve.opencl import proof
+from esker.solve.opencl.device import NUMPY, NUMPY_NAME, Device, open_device
+from esker.solve.opencl.faults import OutOfDeviceMemoryError, guarded, is_fault
+from esker.solve.opencl.spares import Spares
+from esker.solve.passes import PREVIEW_GRADIENT_CYCLES, PREVIEW_HEIGHT_CYCLES, Basis, Job, Workspace
+from esker.solve.refine.refinement import Refiner, Refinery
 from esker.solve.solving import Seat, Solving
-from esker.solve.workspaces import give_back, new_workspace
 
-__all__ = ["PREVIEW_GRADIENT_CYCLES", "PREVIEW_HEIGHT_CYCLES", "Basis", "LevelResult", "Pyramid", "Solver", "Workspace"]
+__all__ = ["PREVIEW_GRADIENT_CYCLES", "PREVIEW_HEIGHT_CYCLES", "Basis", "Pyramid", "Solver", "Workspace"]
 
-SPARE_BYTES = 5 << 30
-"""Memory that idle workspaces may keep, with the raster of the strokes that they last solved, but no more than a
-fifth of the machine's: a room whose workspace was given to another one has all its strokes rasterised again."""
-SPARE_SECONDS = 300.0
-"""How long a workspace is kept that nobody uses: who has been away for longer waits once for the raster."""
 EDITED = 4
 """Strokes that may be new or changed for a preview to be made from the ground before."""
 PACED_ABOVE = 4
@@ -80,13 +69,11 @@ class Solver:
         if not 0 <= max_level <= MAX_LEVEL:
             raise ValueError(f"max_level must be 0..{MAX_LEVEL}, not {max_level}")
         self.max_level = max_level
-        self._spare: list[Workspace] = []
-        self._idle_since: weakref.WeakKeyDictionary[Workspace, float] = weakref.WeakKeyDictionary()
         self._refinery: Refinery | None = None
         self._shapes = Shapes()
         self._channel_solvers: dict[int, ChannelSolver] = {}
-        self._spare_bytes = min(SPARE_BYTES, os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // 5)
         self._device: Device | None = None
+        self._spares = Spares(self._shapes)
         self._device = open_device(device, threads, self._check)
 
     @property
@@ -117,16 +104,16 @@ class Solver:
     ) -> Solving:
         """Previews of levels 0..G, each when it is finished, then 0..G settled.
 
-        None comes wherever the work can be left for a while, or for good: between the cycles of the finest level, so
+        Pause comes wherever the work can be left for a while, or for good: between the cycles of the finest level, so
         that many rooms can share a device. Close the generator to stop; G is ``levels`` or the solver's ``max_level``.
-        With ``basis`` the last result carries what refinement starts from. ``base``: the ground without strokes, above
-        which heights are then given. Not ``coarsest``: without level 0, a glimpse of these strokes is out already.
+        With ``basis`` Done, the last event, carries what refinement starts from. ``base``: the ground without strokes,
+        above which heights are then given. Not ``coarsest``: without level 0, which was previewed early.
         Raises ValueError for a level outside 0..MAX_LEVEL.
         """
-        job, seat = Job(strokes, settings, bound(base, self._device)), Seat()
+        job, seat = Job(strokes, computable(settings), bound(base, self._device)), Seat()
         return Solving(self._run(job, self._level(levels), None, basis, seat, coarsest), seat, self._device)
 
-    def base_levels(self, base: Base, levels: int | None = None) -> Iterator[LevelResult]:
+    def base_levels(self, base: Base, levels: int | None = None) -> Iterator[BaseLevel]:
         """The base itself, channel BASE on levels 0..G, then how fine its data are, SURVEY on the levels of channels.
 
         Raises ValueError like ``steps``, DeviceErrors.
@@ -134,9 +121,9 @@ class Solver:
         top = self._level(levels)
         with guarded(self._device):
             for level in range(top + 1):
-                yield LevelResult(level, base.level(level, self._device), settled=True, channel=Channel.BASE)
+                yield BaseLevel(level, base.level(level, self._device), Channel.BASE)
             for level in range(channel_level(top) + 1):
-                yield LevelResult(level, base.survey(level), settled=True, channel=Channel.SURVEY)
+                yield BaseLevel(level, base.survey(level), Channel.SURVEY)
 
     def channels(
         self,
@@ -145,12 +132,12 @@ class Solver:
         levels: int | None = None,
         *,
         base: Base | None = None,
-    ) -> Iterator[LevelResult | None]:
+    ) -> Iterator[SolveEvent]:
         """What ``steps`` gives out beside the heights, alone: for strokes of which only that has changed.
 
-        None comes wherever the work can be left. Raises ValueError like ``steps``.
+        Pause comes wherever the work can be left, and Done at the end. Raises ValueError like ``steps``.
         """
-        job = Job(strokes, settings, bound(base, self._device))
+        job = Job(strokes, computable(settings), bound(base, self._device))
         return self._retried(lambda top: self._alone(job, top), self._level(levels))
 
     def solve(
@@ -158,7 +145,7 @@ class Solver:
         strokes: Sequence[Stroke],
         settings: TerrainSettings,
         levels: int | None = None,
-        on_level: Callable[[LevelResult], None] | None = None,
+        on_level: Callable[[Preview | Settled], None] | None = None,
         should_stop: Callable[[], bool] | None = None,
         guess: Pyramid | None = None,
         *,
@@ -171,10 +158,10 @@ class Solver:
         """
         top = self._level(levels)
         warm = guess.levels[top] if guess is not None and len(guess) == top + 1 else None
-        latest: dict[int, LevelResult] = {}
-        run = self._run(Job(strokes, settings, bound(base, self._device)), top, warm, basis=False)
+        latest: dict[int, Preview | Settled] = {}
+        run = self._run(Job(strokes, computable(settings), bound(base, self._device)), top, warm, basis=False)
         for result in run:
-            if result is not None and result.channel == Channel.HEIGHT:
+            if isinstance(result, Preview | Settled):
                 latest[result.level] = result
                 if on_level is not None:
                     on_level(result)
@@ -184,18 +171,33 @@ class Solver:
         done = [latest[level] for level in range(top + 1) if level in latest]
         return Pyramid(tuple(r.heights for r in done), len(done) == top + 1 and all(r.settled for r in done))
 
+    def heights(
+        self,
+        strokes: Sequence[Stroke],
+        settings: TerrainSettings,
+        level: int | None = None,
+        *,
+        base: Base | None = None,
+        step: Callable[[], None] = lambda: None,
+    ) -> NDArray[np.float32]:
+        """The settled heights of one level above the base, (N, N) float32, metres, row 0 south, read-only: those of
+        ``solve`` with ``level`` as its finest, to the bit, without what only people who wait are shown on the way.
+
+        ``step`` is called now and then. Raises ValueError like ``steps``, DeviceErrors, DivergedError.
+        """
+        job = Job(strokes, computable(settings), bound(base, self._device))
+        for found in self._retried(lambda top: self._quietly(job, top), self._level(level)):
+            step()
+            if isinstance(found, Settled):
+                return found.heights
+        raise AssertionError("a solve ends with heights or raises")
+
     def tidy(self, now: float | None = None) -> int:
         """Gives back the memory of workspaces that have been idle for SPARE_SECONDS; returns how many there were.
 
         ``now``: of ``time.monotonic``.
         """
-        late = (time.monotonic() if now is None else now) - SPARE_SECONDS
-        count = len(self._spare)
-        self._spare = [w for w in self._spare if self._idle_since[w] > late]
-        count -= len(self._spare)
-        if count:
-            give_back()
-        return count
+        return self._spares.tidy(time.monotonic() if now is None else now)
 
     def _check(self, device: Device) -> None:
         """Compile the kernels now, not under somebody's first stroke, and trust none whose ground is not the twin's.
@@ -204,8 +206,18 @@ class Solver:
         """
         self._device = device
         mine, twin = (s.solve(proof.STROKES, TerrainSettings(), proof.LEVEL) for s in (self, Solver(NUMPY)))
-        self._spare.clear()
+        self._spares.clear()
         proof.compare(device, mine[proof.LEVEL], twin[proof.LEVEL])
+
+    def prove(self) -> None:
+        """Solves a small scene that is known to work. Raises DeviceErrors when the device does not."""
+        if self._device is None:
+            return
+        kept, self._spares = self._spares, Spares(self._shapes)
+        try:
+            self._check(self._device)
+        finally:
+            self._spares = kept
 
     def _level(self, levels: int | None) -> int:
         top = self.max_level if levels is None else levels
@@ -221,80 +233,106 @@ class Solver:
         basis: bool,
         seat: Seat | None = None,
         coarsest: bool = True,
-    ) -> Generator[LevelResult | None]:
+    ) -> Generator[SolveEvent]:
         yield from self._retried(lambda level: self._attempt(job, level, warm, basis, seat or Seat(), coarsest), top)
 
-    def _retried(
-        self, attempt: Callable[[int], Iterator[LevelResult | None]], top: int
-    ) -> Generator[LevelResult | None]:
+    def _retried(self, attempt: Callable[[int], Iterator[SolveEvent]], top: int) -> Generator[SolveEvent]:
         """Without memory for it, once more without what is kept for later."""
         try:
             yield from attempt(top)
             return
         except OutOfDeviceMemoryError:
-            if not self._spare and not self._channel_solvers:
+            if not self._spares.idle and not self._channel_solvers:
                 raise
-        self._spare.clear()
+        self._spares.clear()
         self._channel_solvers.clear()
         yield from attempt(top)
 
     def _attempt(
         self, job: Job, top: int, warm: NDArray[np.float32] | None, basis: bool, seat: Seat, coarsest: bool
-    ) -> Generator[LevelResult | None]:
+    ) -> Generator[SolveEvent]:
         """One solve. A workspace whose device failed, or that diverged, is dropped, all others are kept.
 
         Painted channels come right after the coarsest preview, so that they keep up with a pen that never rests; those
         of which the strokes speak that the pen draws would hold it up, and come when it does rest.
         """
         with guarded(self._device):
-            settings, spoken = job.settings, speakers(job.strokes, job.settings)
-            late = [layer.channel for layer in spoken if not layer.painted]
-            early = [channel for channel in BASES if channel not in late]
-            workspace = seat.workspace = self._take(job, top)
-            keep, half = True, False
-            try:
-                scouting = warm is None and workspace.scout is not None
-                if scouting:
-                    if coarsest:
-                        yield passes.scouted(workspace, job)
-                    yield from self._channels(spoken, job, top, early)
-                edited = scouting and _edited(workspace, job)
-                half = True
-                yield from workspace.loading(*job)
-                half, workspace.standing = False, None
-                if warm is None:
-                    previews = self._previews(workspace, job, coarsest=not scouting, edited=edited)
-                    if not scouting:
-                        yield next(previews)
-                        yield from self._channels(spoken, job, top, early)
-                    yield from previews
-                else:
-                    passes.gradients(workspace)
-                    workspace.warm(warm)
-                    yield from self._channels(spoken, job, top, early)
-                workspace.standing = passes.standing_on(job)
-                yield from passes.to_rest(workspace, settings)
-                yield from self._channels(spoken, job, top, late)
-                yield from passes.settled(workspace, job, basis)
-            except GeneratorExit:
-                if half:
-                    workspace.packer.forget()
-                raise
-            except BaseException as error:
-                workspace.packer.forget()
-                if workspace.scout is not None:
-                    workspace.scout.packer.forget()
-                keep = not (is_fault(error) or isinstance(error, multigrid.DivergedError))
-                raise
-            finally:
-                seat.workspace = None
-                if keep:
-                    self._give(workspace)
-                del workspace  # the traceback of an error would keep it
+            spoken = speakers(job.strokes, job.settings)
+            if is_blank(job.strokes) and warm is None:
+                yield from self._channels(spoken, job, top, BASES)
+                yield from blank.settled(job, top, basis)
+                return
+            yield from self._working(seat, job, top, lambda w: self._shown(w, job, warm, basis, coarsest, spoken))
 
-    def _previews(
-        self, workspace: Workspace, job: Job, *, coarsest: bool, edited: bool
-    ) -> Iterator[LevelResult | None]:
+    def _shown(
+        self,
+        workspace: Workspace,
+        job: Job,
+        warm: NDArray[np.float32] | None,
+        basis: bool,
+        coarsest: bool,
+        spoken: Mapping[Layer, Speakers],
+    ) -> Iterator[SolveEvent]:
+        """Previews, channels and settled levels of one solve; see ``_attempt``."""
+        top = workspace.top
+        late = [layer.channel for layer in spoken if not layer.painted]
+        early = [channel for channel in BASES if channel not in late]
+        scouting = warm is None and workspace.scout is not None
+        if scouting:
+            if coarsest:
+                yield from passes.scouting(workspace, job)
+            yield from self._channels(spoken, job, top, early)
+        edited = scouting and _edited(workspace, job)
+        yield from pauses(workspace.loading(*job))
+        workspace.standing = None
+        if warm is None:
+            previews = self._previews(workspace, job, coarsest=not scouting, edited=edited)
+            if not scouting:
+                yield next(previews)
+                yield from self._channels(spoken, job, top, early)
+            yield from previews
+        else:
+            passes.gradients(workspace)
+            workspace.warm(warm)
+            yield from self._channels(spoken, job, top, early)
+        workspace.standing = passes.standing_on(job)
+        yield from pauses(passes.to_rest(workspace, job.settings))
+        yield from self._channels(spoken, job, top, late)
+        yield from passes.settled(workspace, job, basis)
+
+    def _quietly(self, job: Job, top: int) -> Iterator[SolveEvent]:
+        """One solve of which nothing is shown; see ``_attempt``."""
+        with guarded(self._device):
+            if is_blank(job.strokes):
+                *_, last, _ = blank.settled(job, top, basis=False)
+                yield last
+                return
+            yield from self._working(Seat(), job, top, lambda w: passes.unseen(w, job))
+
+    def _working(
+        self, seat: Seat, job: Job, top: int, work: Callable[[Workspace], Iterator[SolveEvent]]
+    ) -> Iterator[SolveEvent]:
+        """What is done with a workspace for a job, which is free for others afterwards; it is dropped if its device
+        failed, or if the solve diverged."""
+        workspace = seat.workspace = self._spares.take(job, top, self._device)
+        keep = True
+        try:
+            yield from work(workspace)
+        except GeneratorExit:  # what is packed and rasterised is still that of some set
+            raise
+        except BaseException as error:
+            workspace.packer.forget()
+            if workspace.scout is not None:
+                workspace.scout.packer.forget()
+            keep = not (is_fault(error) or isinstance(error, multigrid.DivergedError))
+            raise
+        finally:
+            seat.workspace = None
+            if keep:
+                self._spares.give(workspace)
+            del workspace  # the traceback of an error would keep it
+
+    def _previews(self, workspace: Workspace, job: Job, *, coarsest: bool, edited: bool) -> Iterator[SolveEvent]:
         """Previews coarse to fine. Of ground of which little was ``edited`` the finest comes first, made from what it
         was: then the others go with it, so that what settles depends on the strokes alone."""
         settings, shown = job.settings, False
@@ -302,69 +340,42 @@ class Solver:
             assert workspace.scout is not None
             relief = max(float(np.ptp(workspace.scout.read(0))), 1.0)
             for result in passes.amended(workspace, settings, relief):
-                if result is not None:
+                if isinstance(result, Preview):
                     shown, workspace.standing = True, passes.standing_on(job)
                 yield result
         cycles = passes.preview_gradient_cycles(settings)
         paced = shown or workspace.top > PACED_ABOVE
-        for result in self._paced(passes.previews(workspace, cycles, coarsest=coarsest), paced):
-            again = shown and result is not None and result.level == workspace.top
-            yield None if again else result
+        for event in self._paced(passes.previews(workspace, cycles, coarsest=coarsest), paced):
+            again = shown and isinstance(event, Preview) and event.level == workspace.top
+            yield PAUSE if again else event
 
-    def _paced(self, steps: Iterator[LevelResult | None], paced: bool) -> Iterator[LevelResult | None]:
+    def _paced(self, steps: Iterator[SolveEvent], paced: bool) -> Iterator[SolveEvent]:
         """``paced``: what is enqueued is done before somebody else has a turn, as the queue is in order: on big levels,
         and where nobody waits."""
         for result in steps:
-            if result is None and self._device is not None and paced:
+            if isinstance(result, Pause) and self._device is not None and paced:
                 self._device.queue.finish()
             yield result
 
-    def _alone(self, job: Job, top: int) -> Iterator[LevelResult | None]:
+    def _alone(self, job: Job, top: int) -> Iterator[SolveEvent]:
         with guarded(self._device):
             yield from self._channels(speakers(job.strokes, job.settings), job, top, BASES)
+            yield Done()
 
     def _channels(
         self, spoken: Mapping[Layer, Speakers], job: Job, top: int, channels: Iterable[Channel]
-    ) -> Iterator[LevelResult | None]:
+    ) -> Iterator[SolveEvent]:
         """Channels other than the heights, final, levels coarse to fine."""
         level = channel_level(top)
         solver = self._channel_solvers.setdefault(level, ChannelSolver(self._device, level))
-        for channel, levels in solver.pyramids(spoken, job.settings, channels, job.base):
+        for found in solver.making(spoken, job.settings, channels, job.base):
+            if found is None:
+                yield PAUSE
+                continue
+            channel, levels = found
             for coarser, samples in enumerate(levels):
-                yield LevelResult(coarser, samples, settled=True, channel=channel)
-            yield None
-
-    def _take(self, job: Job, top: int) -> Workspace:
-        """An idle workspace that has most of these strokes rasterised already; or a new one; or the longest idle."""
-        based = job.base is not None
-        idle = [w for w in self._spare if w.top == top and w.based == based]
-        strokes, settings = job.strokes, job.settings
-        best = max(idle, key=lambda w: w.packer.likeness(strokes, settings), default=None)
-        if best is not None and 2 * best.packer.likeness(strokes, settings) < len(strokes):
-            # Where everybody in a room draws at once, most strokes differ from solve to solve: it is theirs still.
-            best = max(idle, key=lambda w: w.packer.kinship(strokes))
-            if 2 * best.packer.kinship(strokes) < len(strokes):
-                best = idle[0] if self._kept() + grid.solve_bytes(top, based) > self._spare_bytes else None
-        if best is not None:
-            self._spare.remove(best)
-            return best
-        while self._spare and self._kept() + grid.solve_bytes(top, based) > self._spare_bytes:
-            self._spare.pop(0)
-        made = new_workspace(self._device, top, based)
-        made.packer.shapes = self._shapes
-        if top >= grid.SCOUT_FROM:
-            made.scout = new_workspace(self._device, grid.SCOUT, based)
-            made.scout.packer.shapes = self._shapes
-        return made
-
-    def _kept(self) -> int:
-        return sum(grid.solve_bytes(w.top, w.based) for w in self._spare)
-
-    def _give(self, workspace: Workspace) -> None:
-        self._spare.append(workspace)
-        self._idle_since[workspace] = time.monotonic()
-        while len(self._spare) > 1 and self._kept() > self._spare_bytes:
-            self._spare.pop(0)
+                yield ChannelLevel(coarser, samples, channel)
+            yield PAUSE
 
 
 def _edited(workspace: Workspace, job: Job) -> bool:

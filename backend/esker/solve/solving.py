@@ -7,11 +7,16 @@ from dataclasses import dataclass
 from typing import Any
 
 from esker.contract import Stroke, TerrainSettings
+from esker.events import Preview, SolveEvent
 from esker.solve import passes
 from esker.solve.base import Base, bound
-from esker.solve.device import Device
-from esker.solve.faults import guarded
-from esker.solve.passes import Job, LevelResult, Workspace
+from esker.solve.constraints.computable import computable
+from esker.solve.opencl.device import Device
+from esker.solve.opencl.faults import guarded
+from esker.solve.passes import Job, Workspace
+
+EARLY_STROKES = 128
+"""Strokes that may be packed for an early preview, which cannot be left."""
 
 
 @dataclass(eq=False)
@@ -21,23 +26,24 @@ class Seat:
     workspace: Workspace | None = None
 
 
-class Solving(Iterator[LevelResult | None]):
+class Solving(Iterator[SolveEvent]):
     """What ``Solver.steps`` gives: an iterator to be closed when it is left early."""
 
-    def __init__(self, run: Generator[LevelResult | None, Any, Any], seat: Seat, device: Device | None) -> None:
+    def __init__(self, run: Generator[SolveEvent, Any, Any], seat: Seat, device: Device | None) -> None:
         self._run, self._seat, self._device = run, seat, device
 
-    def __next__(self) -> LevelResult | None:
+    def __next__(self) -> SolveEvent:
         return next(self._run)
 
     def close(self) -> None:
         """Ends the solve; its workspace is free for others."""
         self._run.close()
 
-    def glimpse(
+    def early_preview(
         self, strokes: Sequence[Stroke], settings: TerrainSettings, base: Base | None = None
-    ) -> LevelResult | None:
-        """The coarsest preview of other strokes, as their own solve would begin with; None where that has no scout.
+    ) -> Preview | None:
+        """The coarsest preview of other strokes, as their own solve would begin with; None where that has no scout, or
+        where so many strokes are others that it would take longer than a turn.
 
         Changes nothing of the solve: its scout has done its work. To be called between two steps, in their thread.
         Raises DeviceErrors.
@@ -47,7 +53,10 @@ class Solving(Iterator[LevelResult | None]):
             return None
         try:
             with guarded(self._device):
-                return passes.scouted(workspace, Job(strokes, settings, bound(base, self._device)))
+                job = Job(strokes, computable(settings), bound(base, self._device))
+                if len(strokes) - workspace.scout.packer.likeness(*job[:2]) > EARLY_STROKES:
+                    return None
+                return next(found for found in passes.scouting(workspace, job) if isinstance(found, Preview))
         except BaseException:
             workspace.scout.packer.forget()
             raise

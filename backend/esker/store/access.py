@@ -1,5 +1,8 @@
 """Links, roles and join codes (DESIGN 13). A secret is shown once; the store keeps its SHA-256.
 
+A link knows its parent: the link through which it was made, also by a join code. When a link is revoked so is all that
+was made through it, in the same commit, so whoever is sent away leaves no spare key behind.
+
 Secrets are 192 random bits, so a plain hash is enough: there is nothing to guess. Every comparison is constant-time.
 """
 
@@ -10,20 +13,27 @@ import hmac
 import secrets
 import sqlite3
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
-from dataclasses import dataclass
-from typing import Final
+from dataclasses import dataclass, field, replace
+from typing import Any, Final, Protocol, TypeVar
 
 from esker.contract import Role
-from esker.store.journal import Journal
+
+T = TypeVar("T")
 
 CODE_SECONDS: Final = 15 * 60
+CODE_LIFE_SECONDS: Final = 10 * 3600
+"""A code can be prolonged for as long as a day at school takes; then another one must be made."""
 CODE_LENGTH: Final = 6
+CODES_TO_GUESS: Final = 10**8
+"""There are so many codes for each that lives: codes are longer when many do."""
 CODE_ALPHABET: Final = "ABCDEFGHJKMNPQRSTUVWXYZ23456789"
 """No 0/O, 1/I/L: codes are read from a wall and typed by hand."""
 MAX_LINKS: Final = 2_000
 """Live links per terrain. Links made by join codes count too."""
+KEPT_REVOKED: Final = 2_000
+"""Revoked links per terrain that are remembered; of more the oldest are forgotten, and open nothing either."""
 MAX_CODES: Final = 16
 """Live join codes that one link may have made; with one more its oldest ends."""
 
@@ -38,6 +48,18 @@ class Link:
     name: str
     created: float
     revoked: float | None
+    parent: str | None = None
+    digest: bytes = field(default=b"", repr=False)
+    """Hash of the secret by which it was opened; another one after it was renewed."""
+
+
+@dataclass(frozen=True)
+class JoinCode:
+    """What a join code opens. ``link``: the id of the link by which it was made."""
+
+    terrain: str
+    role: Role
+    link: str
 
 
 @dataclass(frozen=True)
@@ -46,6 +68,20 @@ class _Code:
     role: Role
     link: str
     expires: float
+    until: float
+    """Time at which the code ends, however often it is prolonged."""
+
+
+class SecretTaken(Exception):
+    """Another link has this secret already."""
+
+
+class Ended(Exception):
+    """The link by which something was asked is revoked or renewed. Nothing was done."""
+
+
+class OwnLink(Exception):
+    """The link by which somebody asks would end with the one that they want to revoke."""
 
 
 class TooManyLinks(Exception):
@@ -57,12 +93,22 @@ def hashed(secret: str) -> bytes:
     return hashlib.sha256(secret.encode()).digest()
 
 
+class Database(Protocol):
+    """Where links are kept: the journal of a server, or a visit to it by another program (``store/kept.py``)."""
+
+    def reader(self) -> sqlite3.Connection:
+        """A connection for this thread."""
+
+    def submit(self, write: Callable[[sqlite3.Connection], T]) -> Future[T]:
+        """Runs ``write`` in a commit."""
+
+
 class Access:
     """Links in the journal's database, join codes in memory (they live for fifteen minutes)."""
 
     def __init__(
         self,
-        journal: Journal,
+        journal: Database,
         now: Callable[[], float] = time.time,
         ticks: Callable[[], float] = time.monotonic,
     ) -> None:
@@ -73,67 +119,99 @@ class Access:
     def check(self, terrain: str, secret: str) -> Link | None:
         """The link of this terrain that has this secret (see ``revoked``), or None."""
         digest = hashed(secret)
-        rows = self._journal.reader().execute(
-            "SELECT id,terrain,role,name,created,revoked,hash FROM links WHERE hash=?", (digest,)
-        )
-        for row in rows:
-            same = hmac.compare_digest(bytes(row[6]), digest)
-            link = Link(*row[:6])
+        for row in self._journal.reader().execute(f"SELECT {_COLUMNS} FROM links WHERE hash=?", (digest,)):
+            link = _link(row)
+            same = hmac.compare_digest(link.digest, digest)
             if same and link.terrain == terrain:  # an id is no secret, and may be any text here
                 return link
         return None
 
+    def alive(self, link: Link) -> bool:
+        """Returns whether a link that was opened before is neither revoked nor renewed since."""
+        return _alive(self._journal.reader(), link)
+
     def links(self, terrain: str) -> list[Link]:
         """All links of a terrain, oldest first, revoked ones too."""
         rows = self._journal.reader().execute(
-            "SELECT id,terrain,role,name,created,revoked FROM links WHERE terrain=? ORDER BY created, id", (terrain,)
+            f"SELECT {_COLUMNS} FROM links WHERE terrain=? ORDER BY created, id", (terrain,)
         )
-        return [Link(*row) for row in rows]
+        return [_link(row) for row in rows]
 
-    def add(self, terrain: str, role: Role, name: str) -> Future[tuple[Link, str]]:
-        """A new link and its secret. Fails with TooManyLinks, Unwritable."""
-        link, secret, insert = self.make(terrain, role, name)
+    def add(self, terrain: str, role: Role, name: str, by: Link | str | None = None) -> Future[tuple[Link, str]]:
+        """A new link and its secret. ``by``: the link through which it is made, or its id where a join code stands for
+        it. Fails with TooManyLinks, Ended, Unwritable."""
+        link, secret, insert = self.make(terrain, role, name, by.id if isinstance(by, Link) else by)
 
         def write(db: sqlite3.Connection) -> tuple[Link, str]:
+            _demand(db, by)
             live = db.execute("SELECT count(*) FROM links WHERE terrain=? AND revoked IS NULL", (terrain,)).fetchone()
             if live[0] >= MAX_LINKS:
                 raise TooManyLinks
             insert(db)
+            db.execute(_FORGET, (terrain, terrain, KEPT_REVOKED))
             return link, secret
 
         return self._journal.submit(write)
 
-    def make(self, terrain: str, role: Role, name: str) -> tuple[Link, str, Callable[[sqlite3.Connection], object]]:
+    def make(
+        self, terrain: str, role: Role, name: str, parent: str | None = None
+    ) -> tuple[Link, str, Callable[[sqlite3.Connection], object]]:
         """A link that is not written yet, its secret, and what writes it; a terrain's first comes with its birth."""
         secret = secrets.token_urlsafe(24)
-        link = Link(secrets.token_urlsafe(9), terrain, role, name, self._now(), None)
-        row = (link.id, terrain, role, name, hashed(secret), link.created)
-        return link, secret, lambda db: db.execute("INSERT INTO links VALUES (?,?,?,?,?,?,NULL)", row)
+        link = Link(secrets.token_urlsafe(9), terrain, role, name, self._now(), None, parent, hashed(secret))
+        row = (link.id, terrain, role, name, link.digest, link.created, parent)
+        insert = "INSERT INTO links (id,terrain,role,name,hash,created,parent) VALUES (?,?,?,?,?,?,?)"
+        return link, secret, lambda db: db.execute(insert, row)
 
-    def rotate(self, terrain: str, link_id: str) -> Future[str | None]:
-        """A new secret for a live link; the old one stops working. None when there is no such link."""
-        secret = secrets.token_urlsafe(24)
+    def rotate(
+        self, terrain: str, link_id: str, by: Link | None = None, secret: str | None = None
+    ) -> Future[tuple[str, list[str]] | None]:
+        """A new secret for a live link, and the ids of the links that ended; None when there is no such link.
 
-        def write(db: sqlite3.Connection) -> str | None:
-            changed = db.execute(
-                "UPDATE links SET hash=? WHERE id=? AND terrain=? AND revoked IS NULL",
-                (hashed(secret), link_id, terrain),
-            )
-            return secret if changed.rowcount else None
+        The old secret stops working. What was made through a link to draw ends too: whoever had the old secret may have
+        made it. What was made through an owner's link stays: it stands in the owners' list.
+        ``secret``: made by whoever asks, who then has it even if the answer is lost. Fails with Ended, SecretTaken.
+        """
+        secret = secret or secrets.token_urlsafe(24)
+
+        def write(db: sqlite3.Connection) -> tuple[str, list[str]] | None:
+            _demand(db, by)
+            found = db.execute(
+                "SELECT role FROM links WHERE id=? AND terrain=? AND revoked IS NULL", (link_id, terrain)
+            ).fetchone()
+            if found is None:
+                return None
+            try:
+                db.execute("UPDATE links SET hash=? WHERE id=?", (hashed(secret), link_id))
+            except sqlite3.IntegrityError:
+                raise SecretTaken from None
+            return secret, [] if found[0] == "owner" else self._end(db, _tree(db, link_id)[1:])
 
         return self._journal.submit(write)
 
-    def revoke(self, terrain: str, link_id: str) -> Future[bool]:
-        """Ends a link. False when there is no such live link."""
+    def revoke(self, terrain: str, link_id: str, by: Link | None = None) -> Future[list[str]]:
+        """Ends a link and all that was made through it; returns the ids of those that ended, none when there is no such
+        live link. Fails with Ended, and with OwnLink where the link of who asks would be among them."""
 
-        def write(db: sqlite3.Connection) -> bool:
-            changed = db.execute(
-                "UPDATE links SET revoked=? WHERE id=? AND terrain=? AND revoked IS NULL",
-                (self._now(), link_id, terrain),
-            )
-            return changed.rowcount > 0
+        def write(db: sqlite3.Connection) -> list[str]:
+            _demand(db, by)
+            if db.execute("SELECT 1 FROM links WHERE id=? AND terrain=?", (link_id, terrain)).fetchone() is None:
+                return []
+            tree = _tree(db, link_id)
+            if by is not None and by.id in tree:
+                raise OwnLink
+            return self._end(db, tree)
 
         return self._journal.submit(write)
+
+    def _end(self, db: sqlite3.Connection, ids: list[str]) -> list[str]:
+        """Revokes these; returns those that were alive."""
+        now = self._now()
+        return [
+            each
+            for each in ids
+            if db.execute("UPDATE links SET revoked=? WHERE id=? AND revoked IS NULL", (now, each)).rowcount
+        ]
 
     def make_code(self, terrain: str, role: Role, link: str) -> str:
         """A join code that opens the terrain in this role for fifteen minutes, as often as it is typed.
@@ -141,20 +219,36 @@ class Access:
         ``link``: the id of the link by which it is made; when that ends, so do its codes.
         """
         self._forget_old()
+        length = code_length(len(self._codes) + 1)
         own = [digest for digest, code in self._codes.items() if code.link == link]
         for digest in own[: max(0, len(own) + 1 - MAX_CODES)]:
             del self._codes[digest]
         while True:
-            code = "".join(secrets.choice(CODE_ALPHABET) for _ in range(CODE_LENGTH))
+            code = "".join(secrets.choice(CODE_ALPHABET) for _ in range(length))
             if hashed(code) not in self._codes:
-                self._codes[hashed(code)] = _Code(terrain, role, link, self._ticks() + CODE_SECONDS)
+                now = self._ticks()
+                self._codes[hashed(code)] = _Code(terrain, role, link, now + CODE_SECONDS, now + CODE_LIFE_SECONDS)
                 return code
 
-    def open_code(self, code: str) -> tuple[str, Role] | None:
-        """Terrain and role behind a code, or None when it is wrong or too old. Case and spaces do not matter."""
+    def prolong_code(self, terrain: str, code: str, link: str) -> float | None:
+        """The code lives for another fifteen minutes from now; returns for how many seconds it does live.
+
+        Only the link by which it was made can prolong it. None: there is no such code any more.
+        """
         self._forget_old()
-        found = self._codes.get(hashed(code.strip().upper().replace(" ", "").replace("-", "")))
-        return None if found is None else (found.terrain, found.role)
+        digest = hashed(_typed(code))
+        found = self._codes.get(digest)
+        if found is None or (found.terrain, found.link) != (terrain, link):
+            return None
+        now = self._ticks()
+        self._codes[digest] = longer = replace(found, expires=min(now + CODE_SECONDS, found.until))
+        return longer.expires - now
+
+    def open_code(self, code: str) -> JoinCode | None:
+        """Returns what a code opens, or None when it is wrong or too old. Case and spaces do not matter."""
+        self._forget_old()
+        found = self._codes.get(hashed(_typed(code)))
+        return None if found is None else JoinCode(found.terrain, found.role, found.link)
 
     def drop_codes(self, link: str) -> None:
         """Ends every join code that was made by this link."""
@@ -163,3 +257,53 @@ class Access:
     def _forget_old(self) -> None:
         now = self._ticks()
         self._codes = {k: v for k, v in self._codes.items() if v.expires > now}
+
+
+def code_length(live: int) -> int:
+    """Characters of a new code when so many live."""
+    length = CODE_LENGTH
+    while len(CODE_ALPHABET) ** length < live * CODES_TO_GUESS:
+        length += 1
+    return length
+
+
+def _typed(code: str) -> str:
+    """A code as it was made, from what somebody typed."""
+    return code.strip().upper().replace(" ", "").replace("-", "")
+
+
+_FORGET: Final = (
+    "DELETE FROM links WHERE terrain=? AND id IN (SELECT id FROM links WHERE terrain=? AND revoked IS NOT NULL"
+    " ORDER BY revoked DESC, created DESC LIMIT -1 OFFSET ?)"
+)
+"""A link that was revoked has no living children: they ended in the same commit."""
+_COLUMNS: Final = "id,terrain,role,name,created,revoked,parent,hash"
+
+
+def _link(row: Sequence[Any]) -> Link:
+    return Link(*(*row[:7], bytes(row[7])))
+
+
+def _alive(db: sqlite3.Connection, link: Link) -> bool:
+    row = db.execute("SELECT hash FROM links WHERE id=? AND revoked IS NULL", (link.id,)).fetchone()
+    return row is not None and hmac.compare_digest(bytes(row[0]), link.digest)
+
+
+def _demand(db: sqlite3.Connection, by: Link | str | None) -> None:
+    """Raises Ended unless the link by which something is asked lives, in the very commit that does it."""
+    if isinstance(by, Link):
+        if not _alive(db, by):
+            raise Ended
+    elif by is not None and not db.execute("SELECT 1 FROM links WHERE id=? AND revoked IS NULL", (by,)).fetchone():
+        raise Ended
+
+
+def _tree(db: sqlite3.Connection, link_id: str) -> list[str]:
+    """A link and all that was made through it, the link itself first."""
+    rows = db.execute(
+        "WITH RECURSIVE tree(id) AS (VALUES(?) UNION SELECT links.id FROM links JOIN tree ON links.parent = tree.id)"
+        " SELECT id FROM tree",
+        (link_id,),
+    )
+    found = [str(row[0]) for row in rows]
+    return [link_id, *(each for each in found if each != link_id)]

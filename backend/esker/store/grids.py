@@ -2,30 +2,41 @@
 
 A grid comes to be in a work folder beside the others; when it is whole, its files and the folder are synced to disk and
 it is renamed to its digest, in one step. An op names a grid only after that, so ``kill -9`` leaves a terrain without a
-layer or with all of it. What a kill leaves over (work folders, grids that no terrain names) is swept at the next start.
+layer or with all of it. What a kill leaves over is swept at the next start: work folders are removed, and grids that no
+terrain names go to a trash, ``.trash/<digest>-<seconds since 1970>``, from which they are removed two weeks later. A
+database that lost its memory of a grid cannot take the grid with it.
 """
 
 from __future__ import annotations
 
 import logging
+import math
 import os
 import re
 import secrets
 import shutil
 import tempfile
 import threading
+import time
 import weakref
 from collections.abc import Collection, Iterable
 from pathlib import Path
 from typing import Final
 
-from esker.patchwork import rasters
-from esker.patchwork.rasters import Raster, RasterError
+from esker.patchwork.raster import rasters
+from esker.patchwork.raster.rasters import Raster, RasterError
+from esker.process import system
+from esker.store.space import Space
 
 log = logging.getLogger("esker.grids")
 
 FOLDER: Final = "grids"
 _WORK: Final = ".work-"
+_TRASH: Final = ".trash"
+TRASH_SECONDS: Final = 14 * 86_400.0
+"""How long a grid that no terrain names is kept in the trash."""
+NAMED_WITHIN: Final = 86_400.0
+"""Seconds within which an op names a grid that was stored, or brought a second time."""
 _DIGEST: Final = re.compile(r"[0-9a-f]{64}")
 
 
@@ -36,21 +47,27 @@ class MissingGrid(RasterError):
 class GridStore:
     """The grids of one server, of all terrains: who brings the same file twice shares one. Safe from any thread."""
 
-    def __init__(self, data: Path) -> None:
-        """``data``: the server's folder. Raises OSError."""
+    def __init__(self, data: Path, space: Space | None = None) -> None:
+        """``data``: the server's folder; ``space``: the disk that it may use. Raises OSError."""
         self.folder = data / FOLDER
         self.folder.mkdir(parents=True, exist_ok=True)
+        self.space = Space(self.folder) if space is None else space
         self._lock = threading.Lock()
         self._open: weakref.WeakValueDictionary[str, Raster] = weakref.WeakValueDictionary()
 
     def work(self) -> Path:
-        """A new, empty work folder, on the same file system as the grids."""
+        """A new, empty work folder, on the same file system as the grids. Raises OSError, space.NoSpace among them."""
+        self.space.need()
         path = self.folder / f"{_WORK}{secrets.token_hex(8)}"
         path.mkdir()
         return path
 
     def temporary(self, suffix: str) -> Path:
-        """A new, empty file that may become large, for the caller to remove; one that is left over is swept."""
+        """A new, empty file that may become large, for the caller to remove; one that is left over is swept.
+
+        Raises OSError, space.NoSpace among them.
+        """
+        self.space.need()
         handle, name = tempfile.mkstemp(prefix=_WORK, suffix=suffix, dir=self.folder)
         os.close(handle)
         return Path(name)
@@ -60,7 +77,7 @@ class GridStore:
         shutil.rmtree(work, ignore_errors=True)
 
     def path(self, digest: str) -> Path:
-        """Where the grid of this digest lies, or would lie. Raises ValueError for what is no digest."""
+        """Returns where the grid of this digest lies, or would lie. Raises ValueError for what is no digest."""
         if not _DIGEST.fullmatch(digest):
             raise ValueError(f"{digest!r} is no digest of a grid")
         return self.folder / digest
@@ -76,16 +93,21 @@ class GridStore:
         """
         target = self.path(digest)
         for file in (*raster_dir.iterdir(), raster_dir):
-            _sync(file)
+            system.sync(file)
         with self._lock:
-            if not target.is_dir():
+            if target.is_dir():
+                os.utime(target)  # an op is about to name this grid, so a sweep must not take it for forgotten
+            else:
                 raster_dir.rename(target)
-        _sync(self.folder)
+        system.sync(self.folder)
 
     def put(self, raster: Raster) -> None:
-        """Stores a raster that is in memory. Raises OSError."""
-        if self.has(raster.digest):
-            return
+        """Stores a raster that is in memory. Raises OSError, space.NoSpace among them."""
+        with self._lock:
+            if self.has(raster.digest):
+                os.utime(self.path(raster.digest))
+                return
+        self.space.need(raster.heights.nbytes)
         work = self.work()
         try:
             rasters.write(work / "raster", raster)
@@ -111,20 +133,68 @@ class GridStore:
         paths = (self.path(digest) for digest in set(digests))
         return sum(file.stat().st_size for path in paths if path.is_dir() for file in path.iterdir())
 
-    def sweep(self, named: Collection[str]) -> None:
-        """Removes work folders and the grids that are not ``named``. Call it before anybody imports anything."""
+    def sweep(self, named: Collection[str], now: float | None = None, forgotten: bool = True) -> None:
+        """Removes work folders; grids that are not ``named`` go to the trash, and old ones from there.
+
+        Call it before anybody imports anything. ``forgotten`` False: grids stay where they are, whoever names them.
+        """
+        now = time.time() if now is None else now
+        self.bring_back(named)
         for path in self.folder.iterdir():
-            if path.name.startswith(_WORK) or (_DIGEST.fullmatch(path.name) and path.name not in named):
-                log.info("removing %s, which nothing refers to", path.name)
-                if path.is_dir():
-                    shutil.rmtree(path, ignore_errors=True)
-                else:
-                    path.unlink(missing_ok=True)
+            if path.name.startswith(_WORK):
+                log.info("removing %s, which an import left", path.name)
+                _remove(path)
+            elif forgotten and _DIGEST.fullmatch(path.name) and path.name not in named:
+                self._throw(path, now)
+        self.empty_trash(now)
+
+    def throw_forgotten(self, named: Collection[str], now: float | None = None) -> None:
+        """Puts grids that are not ``named`` into the trash while people import; not those of the last day, which an op
+        may be about to name."""
+        now = time.time() if now is None else now
+        for path in list(self.folder.iterdir()):
+            if _DIGEST.fullmatch(path.name) and path.name not in named:
+                with self._lock:
+                    if path.is_dir() and now - path.stat().st_mtime > NAMED_WITHIN:
+                        self._throw(path, now)
+
+    def _throw(self, path: Path, now: float) -> None:
+        log.info("no terrain names the grid %s: it goes to the trash for two weeks", path.name)
+        self._trash.mkdir(exist_ok=True)
+        path.rename(self._trash / f"{path.name}-{int(now)}")
+
+    def empty_trash(self, now: float | None = None) -> None:
+        """Removes what has been in the trash for two weeks."""
+        now = time.time() if now is None else now
+        for path in self._trashed():
+            if now - _time_of(path) > TRASH_SECONDS:
+                log.info("removing %s from the trash", path.name)
+                _remove(path)
+
+    def bring_back(self, named: Collection[str]) -> None:
+        """Takes grids that are ``named`` out of the trash again. Raises OSError."""
+        for path in self._trashed():
+            digest = path.name.partition("-")[0]
+            if digest in named and not self.has(digest):
+                log.info("taking the grid %s out of the trash", digest)
+                path.rename(self.path(digest))
+
+    @property
+    def _trash(self) -> Path:
+        return self.folder / _TRASH
+
+    def _trashed(self) -> list[Path]:
+        return sorted(self._trash.iterdir()) if self._trash.is_dir() else []
 
 
-def _sync(path: Path) -> None:
-    handle = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
+def _time_of(trashed: Path) -> float:
+    """Returns when a grid went to the trash; the end of time for what is not a name of ours."""
+    seconds = trashed.name.partition("-")[2]
+    return float(seconds) if seconds.isdigit() else math.inf
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        path.unlink(missing_ok=True)

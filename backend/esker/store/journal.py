@@ -4,95 +4,64 @@ WAL mode, ``synchronous=FULL``. One writer thread serves all rooms: whatever is 
 the next one (group commit), each item under its own savepoint, so one refused item does not undo the others. An op is
 acknowledged after the commit that holds it, so ``kill -9`` loses nothing that was acknowledged.
 
-Tables: ``terrains`` (id, created), ``ops`` (terrain, clock, client, counter, author, op), ``snapshots`` (terrain,
-clock, document), ``grids`` (terrain, digest: every grid that a layer of the terrain ever was, written in the same
-commit as the op or the birth that names it); ``store/access.py`` and ``store/moments.py`` add their own. Ops are never
-removed: any clock can be opened again.
+Tables (``upkeep/migrations.py``): ``terrains`` (id, created), ``ops`` (terrain, clock, client, counter, author, op),
+``snapshots`` (terrain, clock, document), ``grids`` (terrain, digest: every grid that a layer of the terrain ever was,
+written in the same commit as the op or the birth that names it); ``store/access.py``, ``store/timestamps.py`` and
+``store/upkeep/folds.py`` use others. Any clock can be opened again; of old gestures only the last op stays
+(``store/upkeep/compaction.py``).
 """
 
 from __future__ import annotations
 
-import os
 import queue
 import sqlite3
 import threading
 import time
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Future
-from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any, Final, NamedTuple, TypeVar
 
 from esker import contract as c
-from esker.document.ops import Limits, Refusal, StrokeSet
-from esker.store import moments
-from esker.store.backup import last_backup, write_backup
+from esker.document.former import read_document, read_op
+from esker.document.history.folding import SILENT, UNLIMITED, silent
+from esker.document.ops import Refusal, StrokeSet
+from esker.document.wire import op_json
+from esker.store import timestamps
+from esker.store.row import Row as Row
+from esker.store.row import ordered_json as ordered_json
+from esker.store.space import NoSpace, Space
+from esker.store.upkeep import folds, migrations
+from esker.store.upkeep.backup import keep_copy, write_backup
+from esker.store.upkeep.inspection import DATABASE_NAME, check
+from esker.store.writing import LOG_BYTES, contents, lengthen, name_grids, put_snapshot
 
 T = TypeVar("T")
 
-DATABASE_NAME: Final = "esker.db"
-SNAPSHOT_EVERY: Final = 500
-"""Ops between snapshots: opening a terrain replays at most this many."""
-MILESTONES: Final = 8
-"""Snapshots that stay, spread over the history: an earlier clock is opened without replaying all before it."""
 GROUP_LIMIT: Final = 256
 """Most queued items that one commit takes."""
-LOG_BYTES: Final = 5 << 20
-"""How long the write-ahead log is from the start: more than the 1,000 pages after which it is begun anew."""
-_SCHEMA_VERSION: Final = 2
-"""1 knew no elevation layers; it becomes 2 by itself."""
-_SCHEMA: Final = """
-CREATE TABLE IF NOT EXISTS terrains (id TEXT PRIMARY KEY, created REAL NOT NULL) WITHOUT ROWID;
-CREATE TABLE IF NOT EXISTS ops (
-  terrain TEXT NOT NULL, clock INTEGER NOT NULL, client TEXT NOT NULL, counter INTEGER NOT NULL,
-  author TEXT NOT NULL, op TEXT NOT NULL, PRIMARY KEY (terrain, clock)) WITHOUT ROWID;
-CREATE UNIQUE INDEX IF NOT EXISTS ops_by_id ON ops (terrain, client, counter);
-CREATE TABLE IF NOT EXISTS snapshots (
-  terrain TEXT NOT NULL, clock INTEGER NOT NULL, document TEXT NOT NULL, PRIMARY KEY (terrain, clock)) WITHOUT ROWID;
-CREATE TABLE IF NOT EXISTS grids (
-  terrain TEXT NOT NULL, digest TEXT NOT NULL, PRIMARY KEY (terrain, digest)) WITHOUT ROWID;
-CREATE TABLE IF NOT EXISTS links (
-  id TEXT PRIMARY KEY, terrain TEXT NOT NULL, role TEXT NOT NULL, name TEXT NOT NULL, hash BLOB NOT NULL,
-  created REAL NOT NULL, revoked REAL) WITHOUT ROWID;
-CREATE INDEX IF NOT EXISTS links_by_terrain ON links (terrain, created);
-CREATE UNIQUE INDEX IF NOT EXISTS links_by_hash ON links (hash);
-"""
-
-
-class CorruptDatabase(Exception):
-    """The database file is damaged. It is left exactly as it is; the message names the last good copy."""
+HISTORY_BYTES: Final = 256 << 20
+"""What the operations of one terrain may take: some 200 hours of drawing without a pause."""
+COUNTED_TERRAINS: Final = 10_000
+SWEEP_AFTER: Final = 30 * 86_400.0
+"""Seconds for which a new or restored database lets every stored grid be (``store/grids.py``)."""
 
 
 class Unwritable(Exception):
     """The database cannot be written to at present. Of what was asked nothing was done; it may be asked again later."""
 
-    def __init__(self, error: sqlite3.OperationalError) -> None:
+    def __init__(self, error: sqlite3.OperationalError | NoSpace) -> None:
         super().__init__(str(error))
-        self.full = error.sqlite_errorcode == sqlite3.SQLITE_FULL
+        self.full = isinstance(error, NoSpace) or error.sqlite_errorcode == sqlite3.SQLITE_FULL
         """Whether it is for want of room."""
+
+
+class HistoryFull(Exception):
+    """The history of one terrain takes as much of the disk as it may; the message says what to do."""
 
 
 class DamagedTerrain(Exception):
     """The journal of one terrain does not replay (a gap, or an op that does not apply)."""
-
-
-class Row(NamedTuple):
-    """One op as it is stored. ``op`` is its JSON text; the op's id is ``client:counter``."""
-
-    clock: int
-    client: str
-    counter: int
-    author: str
-    op: str
-
-    def ordered_json(self) -> str:
-        """The JSON text of the ``OrderedOp``."""
-        return ordered_json(self.clock, f"{self.client}:{self.counter}", self.author, self.op)
-
-
-def ordered_json(clock: int, op_id: str, author: str, op: str) -> str:
-    """The JSON text of an ``OrderedOp`` around the already encoded op: ids and authors are plain client ids."""
-    return f'{{"clock":{clock},"id":"{op_id}","author":"{author}","op":{op}}}'
 
 
 class Loaded(NamedTuple):
@@ -106,21 +75,41 @@ class Loaded(NamedTuple):
 class Journal:
     """The database of one server. Reads may come from any thread; writes are queued to the one writer."""
 
-    def __init__(self, directory: Path, now: Callable[[], float] = time.time) -> None:
-        """Opens or creates ``directory/esker.db``. Raises CorruptDatabase, OSError."""
+    def __init__(
+        self,
+        directory: Path,
+        now: Callable[[], float] = time.time,
+        *,
+        space: Space | None = None,
+        quota: int = HISTORY_BYTES,
+    ) -> None:
+        """Opens or creates ``directory/esker.db``. Raises CorruptDatabase, OSError.
+
+        ``space``: the disk that the server may use; ``quota``: bytes that the operations of one terrain may take.
+        """
         self.directory, self.path = directory, directory / DATABASE_NAME
-        self._now, self._moments = now, moments.Moments()
+        self._quota = quota
+        self._sizes: dict[str, int] = {}
+        """Bytes of the operations of terrains that were appended to."""
+        self._now, self._timestamps = now, timestamps.Timestamps()
         directory.mkdir(parents=True, exist_ok=True)
+        self.space = Space(directory) if space is None else space
         check(self.path, directory)
+        new = not self.path.exists()
         self._writer_db = connect(self.path)
-        self._writer_db.executescript(_SCHEMA + moments.SCHEMA)
-        self._writer_db.execute(f"PRAGMA user_version={_SCHEMA_VERSION}")
-        _lengthen(directory / f"{DATABASE_NAME}-wal")
+        migrations.migrate(self._writer_db, lambda old: keep_copy(self.path, directory, f"format-{old}", now()))
+        if new:
+            migrations.state(self._writer_db, "swept_from", str(now() + SWEEP_AFTER))
+        lengthen(directory / f"{DATABASE_NAME}-wal")
         self._readers = threading.local()
         self._open_readers: list[sqlite3.Connection] = []
         self._queue: queue.SimpleQueue[tuple[Callable[[sqlite3.Connection], Any], Future[Any]] | None]
         self._queue = queue.SimpleQueue()
         self._closed = False
+        self.writable = True
+        """Whether the last commit could be written."""
+        self.hear_of_full: Callable[[str], object] = lambda _: None
+        """Called in the writer's thread with a terrain whose history has no room left."""
         self._thread = threading.Thread(target=self._write_all, name="journal", daemon=True)
         self._thread.start()
 
@@ -137,30 +126,64 @@ class Journal:
         self._queue.put((write, future))
         return future
 
+    @property
+    def waiting(self) -> int:
+        """Items that wait for a commit, about."""
+        return self._queue.qsize()
+
     def append(
         self,
         terrain: str,
         rows: Sequence[Row],
         snapshot: c.Document | None = None,
-        people: Sequence[moments.Person] = (),
+        people: Sequence[timestamps.Person] = (),
     ) -> Future[None]:
         """Appends ops (a snapshot after them, and what their authors are called, where that is new).
 
-        Fails with sqlite3.IntegrityError on a clock or id used before.
+        Fails with sqlite3.IntegrityError on a clock or id used before, with Unwritable and HistoryFull.
         """
+        more = sum(len(row.op) for row in rows)
 
         def write(db: sqlite3.Connection) -> None:
+            self._make_room(db, terrain, more)
             db.executemany("INSERT INTO ops VALUES (?,?,?,?,?,?)", ((terrain, *row) for row in rows))
             if rows:
-                self._moments.note(db, terrain, rows[0].clock, self._now())
+                self._timestamps.note(db, terrain, rows[0].clock, self._now())
             if people:
-                moments.keep(db, terrain, people)
-            if digests := [digest for row in rows for digest in _contents(row.op)]:
-                _name_grids(db, terrain, digests)
+                timestamps.keep(db, terrain, people)
+            if digests := [digest for row in rows for digest in contents(row.op)]:
+                name_grids(db, terrain, digests)
             if snapshot is not None:
-                _put_snapshot(db, snapshot)
+                put_snapshot(db, snapshot)
 
         return self.submit(write)
+
+    def _make_room(self, db: sqlite3.Connection, terrain: str, more: int) -> None:
+        """Counts ``more`` characters of operations. Raises NoSpace, HistoryFull."""
+        if terrain not in self._sizes:
+            if len(self._sizes) >= COUNTED_TERRAINS:
+                self._sizes.clear()
+            found = db.execute("SELECT coalesce(sum(length(op)), 0) FROM ops WHERE terrain=?", (terrain,)).fetchone()
+            self._sizes[terrain] = int(found[0])
+        if self._sizes[terrain] + more > self._quota:
+            self.hear_of_full(terrain)
+            raise HistoryFull(
+                f"The history of this terrain takes {self._quota >> 20} MiB, which is the most on this server. "
+                "Try again in a few minutes: what can be folded of it is. A copy of the terrain begins with an empty "
+                "history."
+            )
+        self.space.need(more, drawing=True)
+        self._sizes[terrain] += more
+
+    def shrunk(self, terrain: str, less: int) -> None:
+        """``less`` characters of operations were folded away. For the writer's thread, within the commit."""
+        if terrain in self._sizes:
+            self._sizes[terrain] -= less
+
+    def crowded(self, terrain: str) -> bool:
+        """Returns whether the operations of a terrain take more than half of what they may, as far as that was
+        counted."""
+        return self._sizes.get(terrain, 0) > self._quota // 2
 
     def create(self, document: c.Document, also: Callable[[sqlite3.Connection], Any] | None = None) -> Future[None]:
         """A new terrain, born as ``document``, with what ``also`` writes, or neither.
@@ -169,9 +192,10 @@ class Journal:
         """
 
         def write(db: sqlite3.Connection) -> None:
-            db.execute("INSERT INTO terrains VALUES (?,?)", (document.id, self._now()))
-            _name_grids(db, document.id, (layer.content for layer in (*document.layers, *document.deleted_layers)))
-            _put_snapshot(db, document)
+            self.space.need()
+            db.execute("INSERT INTO terrains (id,created) VALUES (?,?)", (document.id, self._now()))
+            name_grids(db, document.id, (layer.content for layer in (*document.layers, *document.deleted_layers)))
+            put_snapshot(db, document)
             if also is not None:
                 also(db)
 
@@ -198,10 +222,10 @@ class Journal:
 
     def _commit(self, batch: list[tuple[Callable[[sqlite3.Connection], Any], Future[Any]]]) -> None:
         db = self._writer_db
-        # From here on an item cannot be cancelled any more; one that was (its HTTP client hung up) is not written.
+        # From here on an item cannot be cancelled. An item whose HTTP client hung up before is not written.
         batch = [(write, future) for write, future in batch if future.set_running_or_notify_cancel()]
         outcomes: list[tuple[Future[Any], Any, Exception | None]] = []
-        # Every statement gives the interpreter's lock away and waits to have it back: an item alone has no savepoint.
+        # Every statement gives the interpreter's lock away and waits for it, so an item that is alone has no savepoint.
         alone = len(batch) == 1
         try:
             db.execute("BEGIN IMMEDIATE")
@@ -219,15 +243,19 @@ class Journal:
                     db.execute("RELEASE item")
             if not alone or outcomes[0][2] is None:
                 db.execute("COMMIT")
+            self.writable = True
         except sqlite3.Error as error:  # nothing of this batch is durable
             if db.in_transaction:
                 db.execute("ROLLBACK")
+            self.writable = False
             outcomes = [(future, None, error) for _, future in batch]
         for future, value, failure in outcomes:
             if failure is None:
                 future.set_result(value)
             else:
-                future.set_exception(Unwritable(failure) if isinstance(failure, sqlite3.OperationalError) else failure)
+                if isinstance(failure, (sqlite3.OperationalError, NoSpace)):
+                    failure = Unwritable(failure)
+                future.set_exception(failure)
 
     # --- reading ------------------------------------------------------------------------------------------------
 
@@ -249,7 +277,7 @@ class Journal:
             "SELECT clock FROM ops WHERE terrain=? AND client=? AND counter=?", (terrain, client, counter)
         )
         found = row.fetchone()
-        return None if found is None else int(found[0])
+        return folds.find(self.reader(), terrain, client, counter) if found is None else int(found[0])
 
     def newest(self, terrain: str) -> int:
         """Clock of the terrain's last op; 0 where there is none."""
@@ -257,36 +285,68 @@ class Journal:
         return int(row[0] or 0)
 
     def rows(self, terrain: str, after: int, upto: int | None = None) -> list[Row]:
-        """The ops with after < clock <= upto, in order."""
+        """The ops with after < clock <= upto that are stored, in order: there is none at a clock that was folded."""
         cursor = self.reader().execute(
             "SELECT clock,client,counter,author,op FROM ops WHERE terrain=? AND clock>? AND clock<=? ORDER BY clock",
             (terrain, after, 2**62 if upto is None else upto),
         )
         return [Row(*row) for row in cursor]
 
+    def steps(self, terrain: str, after: int, upto: int | None = None) -> list[Row]:
+        """The same with a row for every clock: one that changes nothing (``SILENT``) where a gesture was folded.
+
+        Raises DamagedTerrain when ops of a folded stretch are missing.
+        """
+        db = self.reader()
+        with folds.at_one_moment(db):
+            rows = self.rows(terrain, after, upto)
+            last = folds.folded_upto(db, terrain)
+            end = last if upto is None else min(last, upto)
+            if end <= after:
+                return rows
+            try:
+                folds.check(db, terrain, after, end)
+            except folds.MissingOps as error:
+                raise DamagedTerrain(f"the journal of {terrain}: {error}") from error
+        return folds.filled(rows, Row(0, "-", 0, "", SILENT), after, end)
+
     def load(self, terrain: str, upto: int | None = None) -> Loaded | None:
         """The terrain at clock ``upto`` (default: now), or None. Raises DamagedTerrain when it does not replay."""
         db = self.reader()
-        snapshot = db.execute(
-            "SELECT document FROM snapshots WHERE terrain=? AND clock<=? ORDER BY clock DESC LIMIT 1",
-            (terrain, 2**62 if upto is None else upto),
-        ).fetchone()
-        if snapshot is None:
-            return None
-        document = StrokeSet.from_document(c.Document.model_validate_json(snapshot[0]))
-        rows = self.rows(terrain, document.clock, upto)
-        counters = db.execute("SELECT client, max(counter) FROM ops WHERE terrain=? GROUP BY client", (terrain,))
-        return Loaded(replay(document, rows), rows, dict(counters))
+        with folds.at_one_moment(db):  # what is being folded meanwhile is, or is not
+            snapshot = db.execute(
+                "SELECT clock, document FROM snapshots WHERE terrain=? AND clock<=? ORDER BY clock DESC LIMIT 1",
+                (terrain, 2**62 if upto is None else upto),
+            ).fetchone()
+            if snapshot is None:
+                return None
+            rows = self.steps(terrain, int(snapshot[0]), upto)
+            counters = db.execute("SELECT client, max(counter) FROM ops WHERE terrain=? GROUP BY client", (terrain,))
+            known = dict(counters.fetchall())
+        document = StrokeSet.from_document(read_document(snapshot[1]))
+        return Loaded(replay(document, rows), [_as_read(row) for row in rows], known)
 
     def grids(self, terrain: str | None = None) -> set[str]:
         """Digests of the grids that were ever layers of a terrain (default: of any), deleted ones too."""
         where, values = ("", ()) if terrain is None else (" WHERE terrain=?", (terrain,))
         return {str(row[0]) for row in self.reader().execute(f"SELECT DISTINCT digest FROM grids{where}", values)}
 
+    def may_sweep(self) -> bool:
+        """Returns whether a stored grid that this database does not name is one that nobody needs.
+
+        A database that is new or was restored does not know all that people brought.
+        """
+        since = migrations.fact(self.reader(), "swept_from")
+        return since is None or self._now() >= float(since)
+
     # --- care ---------------------------------------------------------------------------------------------------
 
     def backup(self) -> Path:
-        """Copies the live database to ``backup/``; readers and the writer go on meanwhile."""
+        """Copies the live database to ``backup/``; readers and the writer go on meanwhile.
+
+        Raises NoSpace, store.backup.BadCopy, OSError, sqlite3.Error.
+        """
+        self.space.need(self.path.stat().st_size)
         return write_backup(self.path, self.directory, self._now())
 
     def close(self) -> None:
@@ -307,82 +367,25 @@ def connect(path: Path) -> sqlite3.Connection:
     db.execute("PRAGMA journal_mode=WAL")
     db.execute("PRAGMA synchronous=FULL")
     db.execute("PRAGMA foreign_keys=ON")
+    db.execute(f"PRAGMA journal_size_limit={LOG_BYTES}")
     return db
-
-
-def _lengthen(log: Path) -> None:
-    """Gives a write-ahead log its length at once, by zeros that no reader takes for its frames.
-
-    To sync a file that has grown a file system waits for its own journal, and so for what others have just written: on
-    a busy disk hundreds of milliseconds, now and then, for a commit that takes one where the log is written over.
-    """
-    with suppress(OSError), log.open("ab") as file:  # without room it only takes longer
-        file.write(bytes(max(0, LOG_BYTES - file.tell())))
-        file.flush()
-        os.fsync(file.fileno())
-
-
-def check(path: Path, directory: Path) -> None:
-    """Reads the whole file without writing to it. Raises CorruptDatabase with a sentence that says what to do."""
-    if not path.exists():
-        return
-    problem = ""
-    try:
-        with closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)) as db:
-            result = db.execute("PRAGMA quick_check(1)").fetchone()[0]
-            problem = "" if result == "ok" else str(result)
-            version = int(db.execute("PRAGMA user_version").fetchone()[0])
-            if not problem and version > _SCHEMA_VERSION:
-                problem = f"it was written by a newer Esker (format {version})"
-    except sqlite3.DatabaseError as error:
-        problem = str(error)
-    if problem:
-        good = last_backup(directory)
-        hint = f"The last good copy is {good}." if good else "There is no earlier copy in the backup folder."
-        raise CorruptDatabase(
-            f"The database {path} cannot be read ({problem}). It was left untouched. {hint} "
-            "To go on with the copy, move the damaged file away and put the copy in its place."
-        )
 
 
 def replay(document: StrokeSet, rows: Iterable[Row]) -> StrokeSet:
     """The document after ``rows``. Raises DamagedTerrain on a gap in the clocks or an op that does not apply."""
-    unlimited = Limits(strokes=2**31, points=2**31, layers=2**31, all_points=2**31)
     for row in rows:
         if row.clock != document.clock + 1:
             raise DamagedTerrain(f"op {row.clock} follows op {document.clock} in the journal of {document.id}")
+        if row.op == SILENT:
+            document = silent(document)
+            continue
         try:
-            document, _ = document.apply(c.OP.validate_json(row.op), unlimited)
+            document, _ = document.apply(read_op(row.op), UNLIMITED)
         except (Refusal, ValueError) as error:
             raise DamagedTerrain(f"op {row.clock} of {document.id} does not apply: {error}") from error
     return document
 
 
-def _contents(op: str) -> list[str]:
-    """Digests of the grids that an op, as JSON text, names first."""
-    if '"layer.add"' not in op:
-        return []
-    parsed = c.OP.validate_json(op)
-    parts = parsed.ops if isinstance(parsed, c.Group) else (parsed,)
-    return [part.layer.content for part in parts if isinstance(part, c.AddLayer)]
-
-
-def _name_grids(db: sqlite3.Connection, terrain: str, digests: Iterable[str]) -> None:
-    db.executemany("INSERT OR IGNORE INTO grids VALUES (?,?)", ((terrain, digest) for digest in digests))
-
-
-def _put_snapshot(db: sqlite3.Connection, document: c.Document) -> None:
-    db.execute(
-        "INSERT OR REPLACE INTO snapshots VALUES (?,?,?)", (document.id, document.clock, document.model_dump_json())
-    )
-    # The first snapshot (the terrain's birth) stays for ever, the two newest do, and between them one in each stretch
-    # of the history: no clock is much farther than a stretch from a snapshot before it. Stretches double as it grows.
-    stretch = SNAPSHOT_EVERY
-    while stretch * MILESTONES < document.clock:
-        stretch *= 2
-    db.execute(
-        "DELETE FROM snapshots WHERE terrain=?1 AND clock > (SELECT min(clock) FROM snapshots WHERE terrain=?1)"
-        " AND clock NOT IN (SELECT clock FROM snapshots WHERE terrain=?1 ORDER BY clock DESC LIMIT 2)"
-        " AND clock NOT IN (SELECT min(clock) FROM snapshots WHERE terrain=?1 AND clock >= ?2 GROUP BY clock / ?2)",
-        (document.id, stretch),
-    )
+def _as_read(row: Row) -> Row:
+    """The row with its op as it was understood: clients that resume get the numbers that the document has."""
+    return row if row.op == SILENT else row._replace(op=op_json(read_op(row.op)))

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import fcntl
 import os
 from pathlib import Path
 from typing import Final
+
+from esker.process import system
 
 LOCK_FILE: Final = "esker.lock"
 
@@ -21,14 +22,12 @@ class DataLock:
         """Takes the lock of folder ``data``, which is made if need be. Raises InUse, OSError."""
         data.mkdir(parents=True, exist_ok=True)
         self._file = (data / LOCK_FILE).open("a+")
-        try:
-            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
+        if not system.lock(self._file):
             self._file.seek(0)
             holder = self._file.read(20).strip()
             self._file.close()
             who = f"Another Esker (process {holder})" if holder.isdigit() else "Another Esker"
-            raise InUse(f"{who} uses the data folder {data}. Stop it, or choose another folder with --data.") from None
+            raise InUse(f"{who} uses the data folder {data}. Stop it, or choose another folder with --data.")
         self._file.seek(0)
         self._file.truncate()
         self._file.write(f"{os.getpid()}\n")

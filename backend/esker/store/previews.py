@@ -9,14 +9,9 @@ from __future__ import annotations
 import secrets
 import sqlite3
 from concurrent.futures import Future
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 from esker.store.journal import Journal
-
-_SCHEMA: Final = """
-CREATE TABLE IF NOT EXISTS previews (
-  terrain TEXT PRIMARY KEY, token TEXT NOT NULL UNIQUE, shown INTEGER NOT NULL) WITHOUT ROWID
-"""
 
 
 class Preview(NamedTuple):
@@ -32,7 +27,6 @@ class PreviewTokens:
 
     def __init__(self, journal: Journal) -> None:
         self._journal = journal
-        journal.submit(lambda db: db.execute(_SCHEMA)).result()
 
     def terrain(self, token: str) -> str | None:
         """The terrain whose picture this token opens now, if there is one."""

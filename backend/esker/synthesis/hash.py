@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from esker.fractal import HASH_MULTIPLIER_1, HASH_MULTIPLIER_2, HASH_STEP, HASH_STREAMS
+from esker.contract.fractal import HASH_MULTIPLIER_1, HASH_MULTIPLIER_2, HASH_STEP, HASH_STREAMS
 
 Words = NDArray[np.uint32]
 

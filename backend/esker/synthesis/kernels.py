@@ -6,15 +6,15 @@ Twin: ``subdivide``. The root is made in NumPy: 4,761 samples at most.
 from __future__ import annotations
 
 import warnings
-from pathlib import Path
 from typing import Any, Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from esker import contract_emit, grid
-from esker import fractal as f
-from esker.contract import BASE_ROUGHNESS, BASE_SURVEY
+from esker import grid
+from esker.contract import BASE_ROUGHNESS, BASE_SURVEY, emit
+from esker.contract import fractal as f
+from esker.resources import SHADERS
 from esker.synthesis.interpolate import Window
 from esker.synthesis.rules import RULES
 from esker.synthesis.rules.targets import tie
@@ -98,11 +98,11 @@ class Kernels:
 
 def source() -> str:
     """The program's text: constants, then the rule."""
-    folder = Path(__file__).resolve().parents[3] / "shaders" / "opencl"
+    folder = SHADERS / "opencl"
     texts = [(folder / name).read_text(encoding="utf-8") for name in SOURCES]
     bases = f"#define SYNTH_BASE_ROUGHNESS {BASE_ROUGHNESS!r}f\n#define SYNTH_BASE_SURVEY ({BASE_SURVEY!r}f)"
     defines = f"{bases}\n#define SYNTH_GROUP {GROUP}\n#define SYNTH_GRIDS {len(Biases._fields)}"
-    return "\n".join([contract_emit.shader("cl"), defines, *texts])
+    return "\n".join([emit.shader("cl"), defines, *texts])
 
 
 def _packed(site: Site) -> tuple[NDArray[np.float32], list[int], list[int]]:

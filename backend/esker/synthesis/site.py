@@ -11,7 +11,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from esker import contract, grid
 from esker.contract import BASE_ROUGHNESS, BASE_SURVEY, TILE_CELLS
-from esker.fractal import ALPHA, LOOKS, LookRule, relief_m, shore_m, zero_m
+from esker.contract.fractal import ALPHA, LOOKS, LookRule, relief_m, shore_m, zero_m
 from esker.synthesis.interpolate import Window
 from esker.synthesis.state import Array, State
 

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from esker import fractal, grid
-from esker.contract import MAX_SYNTHESIS_LEVEL
+from esker import grid
+from esker.contract import MAX_SYNTHESIS_LEVEL, fractal
 from esker.synthesis.interpolate import (
     B_SPLINE,
     DERIVATIVE,

@@ -1,6 +1,7 @@
 """The starting terrains: five stroke documents, drawn by ``draw.py``, and two of real ground, cut out by ``real.py``.
 
-They are real input for benchmarks and tests too. ``catalogue()`` lists them, ``load(id)`` gives one.
+They are real input for benchmarks and tests too. ``catalogue()`` lists them, ``load(id)`` gives one. It may know
+``api``, ``contract``, ``document``, ``importing``, ``patchwork`` and ``resources``.
 """
 
 from __future__ import annotations
@@ -12,8 +13,8 @@ from functools import cache
 from pathlib import Path
 
 from esker.contract import Document
-from esker.patchwork import rasters
-from esker.patchwork.rasters import Raster
+from esker.patchwork.raster import rasters
+from esker.patchwork.raster.rasters import Raster
 from esker.templates import survey
 
 FOLDER = Path(__file__).parent

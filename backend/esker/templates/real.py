@@ -17,11 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from esker.contract import Document, GridFacts, Layer, Place, Stroke, TerrainSettings
-from esker.importing import laying
-from esker.importing.georef import Georef
 from esker.importing.opening import open_source
+from esker.importing.placement import fitting
+from esker.importing.placement.georef import Georef
 from esker.importing.source import Source
-from esker.patchwork import rasters
+from esker.patchwork.raster import rasters
 from esker.templates import FOLDER, survey
 from esker.templates.pen import Pen
 
@@ -42,7 +42,7 @@ class Cut:
     licence: str = "Public domain (United States Government)"
 
 
-def cut(spec: Cut, folder: Path, settings: TerrainSettings, work: Path) -> tuple[survey.Grid, laying.Laid]:
+def cut(spec: Cut, folder: Path, settings: TerrainSettings, work: Path) -> tuple[survey.Grid, fitting.Laid]:
     """The part of a file that lies on the terrain, turned as a layer wants it, and where it lies."""
     assert settings.place is not None
     source = open_source(folder / spec.file, spec.file, work, {}).source
@@ -51,7 +51,7 @@ def cut(spec: Cut, folder: Path, settings: TerrainSettings, work: Path) -> tuple
     rows, cols = _window(source.georef, settings, heights.shape)
     heights = heights[rows, cols]
     georef = _moved(source.georef, rows.start, cols.start)
-    laid = laying.lay(laying.on_frame(georef, settings.place, settings.size_m), *heights.shape)
+    laid = fitting.lay(fitting.on_frame(georef, settings.place, settings.size_m), *heights.shape)
     heights = heights[:: -1 if laid.flip_rows else 1, :: -1 if laid.flip_cols else 1]
     return survey.Grid(np.ascontiguousarray(heights), laid.warp), laid
 
@@ -70,7 +70,7 @@ def _window(georef: Georef, settings: TerrainSettings, shape: tuple[int, ...]) -
     """Rows and columns of a file between the domain's edges and a margin beyond them."""
     assert settings.place is not None
     col, row = np.meshgrid(np.arange(shape[1], dtype=float), np.arange(shape[0], dtype=float))
-    x, y = laying.on_frame(georef, settings.place, settings.size_m)(col.ravel(), row.ravel())
+    x, y = fitting.on_frame(georef, settings.place, settings.size_m)(col.ravel(), row.ravel())
     inside = ((x >= 0) & (x <= settings.size_m) & (y >= 0) & (y <= settings.size_m)).reshape(shape)
     spans = []
     for axis, n in ((1, shape[0]), (0, shape[1])):
@@ -86,7 +86,7 @@ def _moved(georef: Georef, row: int, col: int) -> Georef:
     return Georef(georef.crs, (a, b, x + a * col + b * row, d, e, y + d * col + e * row))
 
 
-def layer_of(name: str, priority: int, spec: Cut, grid: survey.Grid, laid: laying.Laid) -> Layer:
+def layer_of(name: str, priority: int, spec: Cut, grid: survey.Grid, laid: fitting.Laid) -> Layer:
     """The layer that the document has. ``name``: of the terrain."""
     raster = rasters.build(grid.heights, grid.warp)
     facts: GridFacts = raster.facts(geo=True, file=spec.file, format="GeoTIFF")

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from esker import grid
 from esker.contract import PATCH_CELLS, SUBPATCHES
 from esker.tiles import loops
-from esker.tiles.codec import Ints
+from esker.tiles.codec.payload import Ints
 
 Floats = NDArray[np.float32]
 Counts = NDArray[np.uint32]

@@ -26,7 +26,7 @@ from esker.contract import (
     TILE_CELLS,
     Channel,
 )
-from esker.tiles.codec import Ints
+from esker.tiles.codec.payload import Ints
 from esker.tiles.pyramid import Pyramid
 
 UNIT_SIZE_M: Final = float(TILE_CELLS * QUANTA_PER_CELL)
@@ -70,15 +70,25 @@ class ChannelPyramid(Pyramid):
         super().__init__(UNIT_SIZE_M, channel_levels(levels))
         self.channel = channel
 
-    def put(self, clock: int, level: int, heights: NDArray[np.float32], settled: bool, show: bool = True) -> int:
-        """Replaces a level of the channel: (N_l, N_l) float32 in its unit. See ``Pyramid.put``; raises the same.
+    def settle(self, clock: int, level: int, heights: NDArray[np.float32]) -> int:
+        """Replaces a level of the channel: (N_l, N_l) float32 in its unit. See ``Pyramid.settle``; raises the same.
 
         The base of a channel that was never anything else is not held: what nobody asks for is not sent.
         """
+        away = self._away(clock, level, heights)
+        return 0 if away is None else super().settle(clock, level, away)
+
+    def preview(self, clock: int, level: int, heights: NDArray[np.float32]) -> int:
+        """Replaces a level of the channel by a preview. See ``settle`` and ``Pyramid.preview``."""
+        away = self._away(clock, level, heights)
+        return 0 if away is None else super().preview(clock, level, away)
+
+    def _away(self, clock: int, level: int, heights: NDArray[np.float32]) -> NDArray[np.float32] | None:
+        """The samples as heights of a pyramid; None for a base that is not held."""
         away = heights - np.float32(BASE[self.channel])
         away *= np.float32(QUANTA[self.channel] / (1 << max(0, level)))
         if 0 <= level <= self.top and self.level(level) is None:
             if heights.shape == (grid.samples(level),) * 2 and not away.any():
-                return 0
+                return None
             self.begin(clock, level)
-        return super().put(clock, level, away, settled, show)
+        return away

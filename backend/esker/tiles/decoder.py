@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 
 from esker.contract import Channel, Filter, FrameKind, Predictor
 from esker.grid import TileKey
-from esker.tiles.codec import CodecError, Ints, Wide, child_window, follow, predict, reconstruct, unpack
-from esker.tiles.filters import undo
-from esker.tiles.frame import FrameError, FrameHead, TileRecord, ratio, read_frame
+from esker.tiles.codec.filters import undo
+from esker.tiles.codec.frame import FrameError, FrameHead, TileRecord, ratio, read_frame
+from esker.tiles.codec.payload import CodecError, Ints, Wide, child_window, follow, predict, reconstruct, unpack
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from esker.contract import DEFAULT_LEVEL, Channel, View
 from esker.grid import TileKey
 from esker.tiles.channels import ChannelPyramid, channel_levels
-from esker.tiles.frame import GROUND
+from esker.tiles.codec.frame import GROUND
 from esker.tiles.ledger import Ledger
 from esker.tiles.plans import EncodedTiles, FramePlan
 from esker.tiles.pyramid import Mask, Pyramid
@@ -37,7 +37,7 @@ CHANNELS: Final[tuple[Channel, ...]] = tuple(channel for channel in Channel if c
 
 
 class RefinedTile(Protocol):
-    """A tile as the refiner makes it (``solve/refine.py``): heights (65, 65) float32, metres, offsets from the base;
+    """A tile as the refiner makes it (``solve/refine/``): heights (65, 65) float32, metres, offsets from the base;
     base: the same of the elevation layers, None where there are none; content: digest of all that it depends on."""
 
     @property
@@ -92,7 +92,6 @@ class TileServer:
         heights: NDArray[np.float32],
         settled: bool,
         channel: Channel = Channel.HEIGHT,
-        show: bool = True,
     ) -> int:
         """Takes a level of a solve: (N_l, N_l) float32, row 0 south. Returns the number of changed tiles.
 
@@ -107,14 +106,19 @@ class TileServer:
             # Data finer than any tile of the base are not shown: detail goes on where the tiles end.
             heights = np.minimum(heights, np.float32(self.refined.finest))
         if channel != Channel.HEIGHT:
-            return self.channels[channel].put(clock, level, heights, settled, show)
+            pyramid = self.channels[channel]
+            return (pyramid.settle if settled else pyramid.preview)(clock, level, heights)
         before = self.pyramid.stamp
-        changed = self.pyramid.put(clock, level, heights, settled, show)
+        changed = (self.pyramid.settle if settled else self.pyramid.preview)(clock, level, heights)
         if self.pyramid.stamp != before:
             self.refined.suspend()
             if self.pyramid.top == self.levels and self.settled():
                 self.refined.begin(clock)
         return changed
+
+    def note(self, clock: int, level: int, heights: NDArray[np.float32]) -> None:
+        """Takes note of a coarse preview whose finest one is expected soon. Raises like ``put_level``."""
+        self.pyramid.note(clock, level, heights)
 
     def _put_base(self, clock: int, level: int, heights: NDArray[np.float32]) -> int:
         before = self.base.stamp

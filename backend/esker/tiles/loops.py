@@ -8,29 +8,17 @@ it.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, TypeVar, cast
-
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
-F = TypeVar("F", bound=Callable[..., Any])
+from esker.compiled import kernel
+
 Ints = NDArray[np.int32]
 Wide = NDArray[np.signedinteger]
 Floats = NDArray[np.float32]
 
 
-def _compiled(function: F) -> F:
-    """Exact IEEE arithmetic, no lock."""
-    options: dict[str, Any] = {"nogil": True, "boundscheck": False, "error_model": "numpy"}
-    try:
-        return cast(F, numba.njit(cache=True, **options)(function))
-    except RuntimeError:  # no place on this machine to keep compiled code in
-        return cast(F, numba.njit(**options)(function))
-
-
-@_compiled
+@kernel
 def steadied(heights: Floats, before: Floats, correction: Floats, out: Floats) -> None:
     """``steady.steadied`` of whole levels, (n, n) float32 each."""
     rows, cols = heights.shape
@@ -42,7 +30,7 @@ def steadied(heights: Floats, before: Floats, correction: Floats, out: Floats) -
             out[r, k] = np.copysign(left, c) + h
 
 
-@_compiled
+@kernel
 def finite(heights: Floats) -> bool:
     """Whether all of (n, m) float32 are: infinities and NaN have the largest exponent."""
     bits = heights.view(np.int32)
@@ -53,7 +41,7 @@ def finite(heights: Floats) -> bool:
     return bool(most < np.int32(0x7F800000))
 
 
-@_compiled
+@kernel
 def quantised(heights: Floats, kept: Ints, scale: np.float32, quanta: int, limit: np.float32, out: Ints) -> None:
     """``pyramid.quantise`` of ``heights`` with ``kept``, (n, n).
 
@@ -70,7 +58,7 @@ def quantised(heights: Floats, kept: Ints, scale: np.float32, quanta: int, limit
             out[r, k] = value
 
 
-@_compiled
+@kernel
 def changed(new: Ints, old: Ints, cells: int, out: NDArray[np.bool_]) -> None:
     """Which closed blocks of ``cells`` + 1 samples a side hold a sample that differs; out: (m, n) of False.
 
@@ -93,7 +81,7 @@ def changed(new: Ints, old: Ints, cells: int, out: NDArray[np.bool_]) -> None:
                 out[last, b] = True
 
 
-@_compiled
+@kernel
 def predicted(tile: Wide, shift: int, out: Wide) -> None:
     """``codec.predict`` of one tile, (n, n) into (2n - 1, 2n - 1) of the same dtype, wide enough for the sums."""
     n = tile.shape[0]
@@ -120,7 +108,7 @@ def predicted(tile: Wide, shift: int, out: Wide) -> None:
             out[2 * r + 1, k] = (inner + half) >> shift
 
 
-@_compiled
+@kernel
 def followed(
     samples: Ints, then: Ints, now: Ints, tiles: NDArray[np.int64], cells: int, shift: int, limit: int, out: Ints
 ) -> None:
@@ -140,7 +128,7 @@ def followed(
                 out[2 * y + r, 2 * x + k] = min(max(moved, -limit), limit)
 
 
-@_compiled
+@kernel
 def bounded(samples: Ints, cells: int, low: Ints, high: Ints) -> None:
     """Lowest and highest sample of closed blocks of ``cells`` + 1 samples a side; low, high: (m, n)."""
     for i in range(low.shape[0]):
@@ -152,7 +140,7 @@ def bounded(samples: Ints, cells: int, low: Ints, high: Ints) -> None:
             low[i, j], high[i, j] = least, most
 
 
-@_compiled
+@kernel
 def erred(samples: Ints, parent: Ints, cells: int, out: NDArray[np.uint32]) -> None:
     """``bounds.sub_error``: largest distance to the parent's surface per block of ``cells`` (even); (m, n)."""
     for i in range(out.shape[0]):

@@ -15,10 +15,10 @@ import numpy as np
 
 from esker.contract import Channel, Filter, FrameKind, Predictor
 from esker.grid import TileKey
-from esker.tiles import coding
-from esker.tiles.codec import Ints, Wide, child_window, cost, predict
-from esker.tiles.filters import pack_smallest
-from esker.tiles.frame import FrameHead, TileRecord, ratio, write_frame
+from esker.tiles.codec import coding
+from esker.tiles.codec.filters import pack_smallest
+from esker.tiles.codec.frame import FrameHead, TileRecord, ratio, write_frame
+from esker.tiles.codec.payload import Ints, Wide, child_window, cost, predict
 
 CACHE_BYTES: Final = 32 * 1024 * 1024
 

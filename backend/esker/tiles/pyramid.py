@@ -1,7 +1,7 @@
 """Quantised levels with versions (DESIGN 6, 7): what the server knows of the ground, as integers.
 
-A ``Level`` is immutable, so that frames can be encoded from it in another thread; ``Pyramid.put`` replaces it.
-Heights are int32 in quanta ``q_l = s_l / 256``, ``[row, col]``, row 0 south.
+A ``Level`` is immutable, so that frames can be encoded from it in another thread; ``Pyramid`` replaces it. Heights are
+int32 in quanta ``q_l = s_l / 256``, ``[row, col]``, row 0 south.
 """
 
 from __future__ import annotations
@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 
 from esker import grid
 from esker.contract import TILE_CELLS
-from esker.tiles import coding, entropy, loops
+from esker.tiles import loops
 from esker.tiles.bounds import Bounds, SubPatches, dilate, nest
-from esker.tiles.codec import SAMPLE_LIMIT, Ints, predict
-from esker.tiles.steady import Steadier
+from esker.tiles.codec import coding, entropy
+from esker.tiles.codec.payload import SAMPLE_LIMIT, Ints, predict
+from esker.tiles.stabiliser import Steadier
 
 BLOCK_CELLS: Final = 4
 """Changes are remembered per block of this many cells. What a changed sample moves on finer levels, through the
@@ -31,7 +32,7 @@ Mask = NDArray[np.bool_]
 PREVIEW_STEP: Final = 8
 """Quanta in which a preview changes samples of the finest level; half as many on each level above, so that all levels
 are equally exact in metres, and an error of a parent is none to its children. Settled levels are exact."""
-GLIMPSES: Final = 8
+EARLY_PREVIEWS: Final = 8
 """Coarsest previews that may have been shown since the job began whose finest preview comes."""
 FOLLOW_TILES: Final = 256
 """Most parents of which a level follows the movement; above, as after a change of all the ground, it starts afresh."""
@@ -160,9 +161,9 @@ class Pyramid:
         self.top = levels
         """The finest level that is solved at present; see ``limit``."""
         self.stamp = 0
-        """Counts ``put``; every version and stamp is a value of this counter."""
+        """Counts what is taken; every version and stamp is a value of this counter."""
         self.generation = 0
-        """Rises when bounds may have changed enough to select again: see ``put``."""
+        """Rises when bounds may have changed enough to select again: see ``_store``."""
         self._levels: list[Level | None] = [None] * (levels + 1)
         self._subs = [SubPatches(level) for level in range(levels + 1)]
         self._dirty: list[Mask] = [np.zeros((1 << level, 1 << level), dtype=np.bool_) for level in range(levels + 1)]
@@ -172,7 +173,7 @@ class Pyramid:
         """Per level: the level above as it was when this one was last put."""
         self._previewed = -1
         """Clock of the newest preview of the finest level."""
-        self._glimpses: deque[tuple[int, Ints]] = deque(maxlen=GLIMPSES)
+        self._early: deque[tuple[int, Ints]] = deque(maxlen=EARLY_PREVIEWS)
         """The coarsest level as it was shown for the last previews, with their clocks, oldest first."""
         self._touched = [np.zeros((16 << level, 16 << level), dtype=np.uint32) for level in range(levels)]
         """Per block: the stamp of its last change. The finest level moves nothing below it and keeps none."""
@@ -187,44 +188,42 @@ class Pyramid:
         return [] if newest is None else [newest, *self._past[level]]
 
     def level(self, level: int) -> Level | None:
-        """The level as it is now, None before its first ``put``."""
+        """The level as it is now, None before it first came."""
         return self._levels[level]
 
-    def put(self, clock: int, level: int, heights: NDArray[np.float32], settled: bool, show: bool = True) -> int:
-        """Replaces a level; returns the number of tiles of which a sample changed.
+    def settle(self, clock: int, level: int, heights: NDArray[np.float32]) -> int:
+        """Replaces a level by settled heights, which are rounded exactly; returns the number of tiles of which a
+        sample changed.
 
-        ``heights``: (N_l, N_l) float32 metres, not to be changed afterwards. Unsettled heights are steadied (see
-        ``steady``), then shown as they were but for coarse steps (``quantise``); settled ones are rounded exactly.
-        With ``show`` False a coarse preview is only noted: its level is injected from the finest preview, which is
-        expected soon (docs/decisions/0014-consistent-previews.md). Between a complete preview and the settled levels
-        of the same clock a solver may repeat coarse levels as a sign of life, or bring them only now: these are not
-        shown, as they would only move the ground there and back. Raises ValueError for a wrong level or shape, or for
-        heights that are not finite, and changes nothing then.
+        ``heights``: (N_l, N_l) float32 metres, not to be changed afterwards. Raises ValueError for a wrong level or
+        shape, or for heights that are not finite, and changes nothing then.
         """
-        if not 0 <= level <= self.levels:
-            raise ValueError(f"level {level} is not one of 0..{self.levels}")
-        n = grid.samples(level)
-        if heights.shape != (n, n):
-            raise ValueError(f"level {level} has {n}x{n} samples, not {heights.shape}")
-        if level > self.top:
+        if not self._takes(level, heights):
             return 0
-        if not loops.finite(heights):
-            raise ValueError(f"level {level} has heights that are not finite")
-        steadier = self._steadiers[level]
-        if not settled and level < self.top and self._previewed == clock:
-            steadier.late(clock, heights)
+        self._steadiers[level].settled(clock, heights)
+        return self._store(clock, level, heights, True)
+
+    def note(self, clock: int, level: int, heights: NDArray[np.float32]) -> None:
+        """Takes note of a coarse preview, and shows nothing of it: its level is injected from the finest preview, which
+        is expected soon (docs/decisions/0014-consistent-previews.md). Raises like ``settle``."""
+        if self._takes(level, heights) and not self._comes_late(clock, level, heights):
+            self._steadiers[level].note(clock, heights)
+
+    def preview(self, clock: int, level: int, heights: NDArray[np.float32]) -> int:
+        """Replaces a level by a preview; returns the number of tiles of which a sample changed.
+
+        Heights are steadied (see ``steady``), then shown as they were but for coarse steps (``quantise``). Between a
+        complete preview and the settled levels of the same clock a solver may repeat coarse levels as a sign of life,
+        or bring them only now: these are not shown, as they would only move the ground there and back. Takes and
+        raises what ``settle`` does.
+        """
+        if not self._takes(level, heights) or self._comes_late(clock, level, heights):
             return 0
-        if settled:
-            steadier.settled(clock, heights)
-            return self._store(clock, level, heights, settled)
-        if level < self.top and not show:
-            steadier.note(clock, heights)
-            return 0
-        steady = steadier.preview(clock, heights)
+        steady = self._steadiers[level].preview(clock, heights)
         if level < self.top:
-            count = self._store(clock, level, steady, settled)
+            count = self._store(clock, level, steady, False)
             if level == 0:
-                self._glimpsed(clock)
+                self._early_shown(clock)
             return count
         self._previewed = clock
         count = 0
@@ -233,26 +232,46 @@ class Pyramid:
             old = self._levels[coarse]
             if (old is None or old.clock != clock) and not (newer and coarse == 0):
                 step = 1 << (level - coarse)
-                count += self._store(clock, coarse, np.ascontiguousarray(steady[::step, ::step]), settled)
-        return count + self._store(clock, level, steady, settled)
+                count += self._store(clock, coarse, np.ascontiguousarray(steady[::step, ::step]), False)
+        return count + self._store(clock, level, steady, False)
 
-    def _glimpsed(self, clock: int) -> None:
+    def _takes(self, level: int, heights: NDArray[np.float32]) -> bool:
+        """Returns whether a level is solved at present. Raises ValueError, see ``settle``."""
+        if not 0 <= level <= self.levels:
+            raise ValueError(f"level {level} is not one of 0..{self.levels}")
+        n = grid.samples(level)
+        if heights.shape != (n, n):
+            raise ValueError(f"level {level} has {n}x{n} samples, not {heights.shape}")
+        if level > self.top:
+            return False
+        if not loops.finite(heights):
+            raise ValueError(f"level {level} has heights that are not finite")
+        return True
+
+    def _comes_late(self, clock: int, level: int, heights: NDArray[np.float32]) -> bool:
+        """Returns whether a coarse preview comes behind the finest one of its clock; then it is only noted."""
+        if level == self.top or self._previewed != clock:
+            return False
+        self._steadiers[level].late(clock, heights)
+        return True
+
+    def _early_shown(self, clock: int) -> None:
         """Remembers how the coarsest level is shown for this clock."""
         now = self._levels[0]
         assert now is not None
-        if self._glimpses and self._glimpses[-1][0] == clock:
-            self._glimpses.pop()
-        self._glimpses.append((clock, now.samples))
+        if self._early and self._early[-1][0] == clock:
+            self._early.pop()
+        self._early.append((clock, now.samples))
 
     def _ahead(self, clock: int, heights: NDArray[np.float32]) -> tuple[NDArray[np.float32], bool]:
         """A finest preview moved by what the coarsest level has moved since it showed the same clock, and whether it
         shows a newer one: strokes go on while the finest preview of what they were is made."""
-        then = next((samples for shown, samples in self._glimpses if shown == clock), None)
-        if then is None or self._glimpses[-1][0] == clock:
+        then = next((samples for shown, samples in self._early if shown == clock), None)
+        if then is None or self._early[-1][0] == clock:
             return heights, False
-        while self._glimpses[0][0] != clock:
-            self._glimpses.popleft()
-        return moved_along(heights, then, self._glimpses[-1][1], grid.quantum(0, self.size_m)), True
+        while self._early[0][0] != clock:
+            self._early.popleft()
+        return moved_along(heights, then, self._early[-1][1], grid.quantum(0, self.size_m)), True
 
     def begin(self, clock: int, count: int) -> None:
         """Of the coarsest ``count`` levels those that were never put become zero."""
@@ -376,7 +395,8 @@ def warm() -> None:
     for clock, settled in enumerate((False, True, False, False)):
         for level in (0, 1):
             n = grid.samples(level)
-            pyramid.put(clock, level, np.full((n, n), clock, dtype=np.float32), settled)
+            take = pyramid.settle if settled else pyramid.preview
+            take(clock, level, np.full((n, n), clock, dtype=np.float32))
         pyramid.bounds()
     for amplitude in (1, SAMPLE_LIMIT):
         predict(np.full((TILE_CELLS + 1, TILE_CELLS + 1), amplitude, dtype=np.int32))

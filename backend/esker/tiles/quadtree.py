@@ -30,7 +30,7 @@ MARGIN: Final = 0.8
 SHADING_CELL_PX: Final = 5.0
 SHADING_ERROR: Final = 1.5 / QUANTA_PER_CELL
 """Lighting shows more than height does: where the parent's cells are wider than SHADING_CELL_PX taus, an error of this
-part of such a cell is reason enough (as in ``frontend/src/tiles/selection.ts``)."""
+part of such a cell is reason enough (as in ``frontend/src/tiles/patches/selection.ts``)."""
 FRUSTUM_MARGIN: Final = 1.15
 """The half-angle tangents of the frustum are enlarged by this factor, so that a turning camera finds tiles."""
 _NEAR_CELLS: Final = 4.0

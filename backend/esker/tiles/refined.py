@@ -20,7 +20,7 @@ from esker.contract import MAX_REFINED_LEVEL, MAX_REFINED_TILES, PATCH_CELLS, SU
 from esker.grid import TileKey
 from esker.tiles import loops
 from esker.tiles.bounds import Floats
-from esker.tiles.codec import SAMPLE_LIMIT, Ints
+from esker.tiles.codec.payload import SAMPLE_LIMIT, Ints
 from esker.tiles.ledger import state_of
 from esker.tiles.plans import TileState
 from esker.tiles.pyramid import Pyramid

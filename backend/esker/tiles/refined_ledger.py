@@ -16,7 +16,7 @@ import numpy as np
 
 from esker.contract import Channel, FrameKind
 from esker.grid import TileKey
-from esker.tiles.codec import Ints
+from esker.tiles.codec.payload import Ints
 from esker.tiles.ledger import FILL_TILES, Ledger
 from esker.tiles.plans import EncodedTiles, FramePlan, TilePlan, TileState
 from esker.tiles.refined import RefinedTiles

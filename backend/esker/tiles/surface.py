@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from esker import grid
 from esker.tiles.bounds import Bounds, SubPatches, nest
-from esker.tiles.codec import SAMPLE_LIMIT, Ints
+from esker.tiles.codec.payload import SAMPLE_LIMIT, Ints
 from esker.tiles.pyramid import Counts, Level, Pyramid
 
 
@@ -21,7 +21,7 @@ class BasePyramid(Pyramid):
     """The newest levels of the base. They are never previews: each put is final until the layers change."""
 
     def put_base(self, clock: int, level: int, heights: NDArray[np.float32]) -> int:
-        """Replaces a level: (N_l, N_l) float32 metres. See ``Pyramid.put``; raises the same.
+        """Replaces a level: (N_l, N_l) float32 metres. See ``Pyramid.settle``; raises the same.
 
         A base that was never anything but zero is not held: what no layer lies under is not sent.
         """
@@ -29,7 +29,7 @@ class BasePyramid(Pyramid):
             if not self.held and not heights.any():
                 return 0
             self.begin(clock, level)
-        return self.put(clock, level, heights, True)
+        return self.settle(clock, level, heights)
 
     @property
     def held(self) -> bool:

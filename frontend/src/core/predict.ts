@@ -1,6 +1,6 @@
 /**
  * A child tile predicted from its parent (DESIGN 6): the interpolating 4-point rule (-1, 9, 9, -1)/16 in both
- * directions, one-sided (5, 15, -5, 1)/16 at the border of the parent tile. Twin of `backend/esker/tiles/codec.py`.
+ * directions, one-sided (5, 15, -5, 1)/16 at the border of the parent tile. Twin of `backend/esker/tiles/codec/payload.py`.
  *
  * Samples on a tile's edge depend on the parent's samples on that edge only, so neighbours predict equal edges.
  */

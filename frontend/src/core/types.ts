@@ -9,7 +9,7 @@ import type { Stroke, StrokeKind, TerrainSettings } from "../generated/contract.
 export type Vec3 = readonly [number, number, number];
 export type Rgba = readonly [number, number, number, number];
 
-/** A camera at one moment. `Camera.state` (core/camera.ts) makes these; nobody else does. */
+/** A camera at one moment. `Camera.state` (core/camera/camera.ts) makes these; nobody else does. */
 export interface CameraState {
   readonly mode: "orbit" | "fly" | "map";
   readonly eye: Vec3;
@@ -152,12 +152,12 @@ export interface FootprintVisual {
   /** xyz triples, metres; the last point is the first again. */
   readonly points: Float32Array;
   readonly colour: Rgba;
-  /** Selected, or being laid. */
+  /** Selected, or being placed. */
   readonly strong: boolean;
 }
 
 /** A coarse picture of a grid that has no place yet: a lattice of points over the ground. Immutable. */
-export interface SheetVisual {
+export interface PlacingVisual {
   /** Points along one side. */
   readonly side: number;
   /** xyz triples [row, col], metres; z is NaN where the grid has no data. */
@@ -191,7 +191,7 @@ export interface Scene {
   readonly cursors: readonly CursorVisual[];
   /** Outlines of elevation grids; they show whether strokes do or not. */
   readonly footprints?: readonly FootprintVisual[];
-  readonly sheet?: SheetVisual | null;
+  readonly placing?: PlacingVisual | null;
   /** Screen-error bound in pixels. */
   readonly tauPx: number;
   /** `automatic` where it is left out. */

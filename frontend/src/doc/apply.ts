@@ -4,6 +4,7 @@
  * Twin of `backend/esker/document/ops.py`; `tests/vectors/ops.json` holds the cases that both languages read.
  */
 
+import { plainOp } from "../core/plain.ts";
 import {
   type AppendPoints,
   DOMAIN_MARGIN,
@@ -28,7 +29,7 @@ export { type Doc, Refusal } from "./document.ts";
 /** The document after `op` (clock + 1). Throws Refusal, leaving `doc` as it was. */
 export function apply(doc: Doc, op: Op): Doc {
   const editor = new Editor(doc);
-  for (const part of op.type === "group" ? op.ops : [op]) editor.run(part);
+  for (const part of op.type === "group" ? op.ops : [op]) editor.run(plainOp(part));
   return {
     id: doc.id,
     clock: doc.clock + 1,

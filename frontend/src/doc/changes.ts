@@ -18,6 +18,7 @@ export const STROKE_WORDS = {
   plateau_radius_m: "plateau radius",
   amplitude_m: "noise amplitude",
   roughness: "roughness",
+  yields: "yielding",
   paint: "paint",
   locked: "lock",
   hidden: "visibility",

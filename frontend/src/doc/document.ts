@@ -79,6 +79,7 @@ export function fullStroke(stroke: Partial<Stroke> & Pick<Stroke, "id" | "kind" 
     plateau_radius_m: 0,
     amplitude_m: 0,
     roughness: 0.5,
+    yields: 0,
     paint: null,
     locked: false,
     hidden: false,

@@ -30,6 +30,8 @@ import { type UndoPlan, UndoStack } from "./undo.ts";
 export interface RefusedOp {
   readonly code: RejectCode;
   readonly message: string;
+  /** What was refused, where it is still known. */
+  readonly op?: Op;
 }
 
 /** `skipped` holds sentences for a person: what was left alone because somebody else changed it since. */
@@ -231,7 +233,8 @@ export class SyncDoc {
     if (entry?.op.type === "stroke.begin") this.#abandon(entry.op.stroke.id);
     this.#rebuild();
     if (!silent)
-      for (const listener of this.#refusedListeners) listener({ code: message.code, message: message.message });
+      for (const listener of this.#refusedListeners)
+        listener({ code: message.code, message: message.message, ...(entry && { op: entry.op }) });
   }
 
   /** The socket is gone: whatever was sent and not acknowledged will be sent again. Ids make that harmless. */

@@ -1,17 +1,17 @@
 /** What all passes of a frame bind: the view uniform, the atlas, the sky tables, noise and stones (shaders/wgsl/view.wgsl). */
 
-import { eyeProjection, reversedDepth, viewAxes } from "../core/eyeprojection.ts";
+import { eyeProjection, reversedDepth, viewAxes } from "../core/camera/projection.ts";
 import type { Scene, Vec3 } from "../core/types.ts";
 import { type Look, MAX_SYNTHESIS_LEVEL, TILE_CELLS } from "../generated/contract.ts";
-import type { Lakes } from "../tiles/lakes.ts";
+import type { Lakes } from "../tiles/lakes/lakes.ts";
 import { reliefM, shoreM, zeroM } from "../tiles/rules/rule.ts";
-import type { Atlas } from "./atlas.ts";
-import { ChannelTexture, overlayGrid } from "./channeltexture.ts";
-import { LakeTexture } from "./laketexture.ts";
+import type { Atlas } from "./atlas/atlas.ts";
+import { ChannelTexture, overlayGrid } from "./atlas/channeltexture.ts";
+import { LakeTexture } from "./atlas/laketexture.ts";
 import { StructWriter, structLayout } from "./layout.ts";
 import { adaptation, contourInterval, LOOKS } from "./looks.ts";
+import type { SkyTables } from "./passes/sky.ts";
 import { VIEW_SOURCE } from "./shaders.ts";
-import type { SkyTables } from "./sky.ts";
 
 const MAX_CURSORS = 32;
 const OVERLAYS = {
@@ -48,25 +48,36 @@ export function sunDirection(azimuthDeg: number, elevationDeg: number): Vec3 {
 
 export class FrameBindings {
   readonly layout: GPUBindGroupLayout;
-  private readonly writer = new StructWriter(structLayout(VIEW_SOURCE, "View"));
-  private readonly uniform: GPUBuffer;
-  private readonly clamp: GPUSampler;
-  private readonly repeat: GPUSampler;
-  private readonly channels: ChannelTexture;
-  private readonly lakes: LakeTexture;
-  private atlas: Atlas | null = null;
+  readonly #writer = new StructWriter(structLayout(VIEW_SOURCE, "View"));
+  readonly #uniform: GPUBuffer;
+  readonly #clamp: GPUSampler;
+  readonly #repeat: GPUSampler;
+  readonly #channels: ChannelTexture;
+  readonly #lakes: LakeTexture;
+  #atlas: Atlas | null = null;
   /** Pixels that the last update was for. */
-  private drawn = { width: 1, height: 1 };
-  private group: GPUBindGroup | null = null;
+  #drawn = { width: 1, height: 1 };
+  #group: GPUBindGroup | null = null;
+
+  readonly #device: GPUDevice;
+  readonly #sky: SkyTables;
+  readonly #noise: GPUTexture;
+  readonly #stones: GPUTexture;
+  readonly #guardPx: number;
 
   constructor(
-    private readonly device: GPUDevice,
-    private readonly sky: SkyTables,
-    private readonly noise: GPUTexture,
-    private readonly stones: GPUTexture,
+    device: GPUDevice,
+    sky: SkyTables,
+    noise: GPUTexture,
+    stones: GPUTexture,
     software: boolean,
-    private readonly guardPx = 0,
+    guardPx: number = 0,
   ) {
+    this.#device = device;
+    this.#sky = sky;
+    this.#noise = noise;
+    this.#stones = stones;
+    this.#guardPx = guardPx;
     const visibility = GPUShaderStage.VERTEX | GPUShaderStage.FRAGMENT;
     const texture = (
       binding: number,
@@ -92,15 +103,15 @@ export class FrameBindings {
         texture(13, "unfilterable-float", "2d"),
       ],
     });
-    this.channels = new ChannelTexture(device);
-    this.lakes = new LakeTexture(device);
-    this.uniform = device.createBuffer({
+    this.#channels = new ChannelTexture(device);
+    this.#lakes = new LakeTexture(device);
+    this.#uniform = device.createBuffer({
       label: "view",
-      size: this.writer.layout.size,
+      size: this.#writer.layout.size,
       usage: GPUBufferUsage.UNIFORM | GPUBufferUsage.COPY_DST,
     });
-    this.clamp = device.createSampler({ label: "clamp", magFilter: "linear", minFilter: "linear" });
-    this.repeat = device.createSampler({
+    this.#clamp = device.createSampler({ label: "clamp", magFilter: "linear", minFilter: "linear" });
+    this.#repeat = device.createSampler({
       label: "repeat",
       addressModeU: "repeat",
       addressModeV: "repeat",
@@ -113,59 +124,59 @@ export class FrameBindings {
 
   /** Binds another atlas. */
   attach(atlas: Atlas): void {
-    this.atlas = atlas;
+    this.#atlas = atlas;
     const array = (texture: GPUTexture): GPUTextureView => texture.createView({ dimension: "2d-array" });
-    this.group = this.device.createBindGroup({
+    this.#group = this.#device.createBindGroup({
       label: "frame",
       layout: this.layout,
       entries: [
-        { binding: 0, resource: { buffer: this.uniform } },
+        { binding: 0, resource: { buffer: this.#uniform } },
         { binding: 1, resource: array(atlas.heights) },
         { binding: 2, resource: array(atlas.slopes) },
         { binding: 3, resource: array(atlas.light) },
-        { binding: 4, resource: this.sky.radiance.createView() },
-        { binding: 5, resource: { buffer: this.sky.ambient } },
-        { binding: 6, resource: this.noise.createView() },
-        { binding: 7, resource: this.clamp },
-        { binding: 8, resource: this.repeat },
-        { binding: 9, resource: this.channels.texture.createView() },
+        { binding: 4, resource: this.#sky.radiance.createView() },
+        { binding: 5, resource: { buffer: this.#sky.ambient } },
+        { binding: 6, resource: this.#noise.createView() },
+        { binding: 7, resource: this.#clamp },
+        { binding: 8, resource: this.#repeat },
+        { binding: 9, resource: this.#channels.texture.createView() },
         { binding: 10, resource: array(atlas.attributes0) },
         { binding: 11, resource: array(atlas.attributes1) },
-        { binding: 12, resource: this.stones.createView() },
-        { binding: 13, resource: this.lakes.texture.createView() },
+        { binding: 12, resource: this.#stones.createView() },
+        { binding: 13, resource: this.#lakes.texture.createView() },
       ],
     });
   }
 
   /** The view uniform, for passes that bind nothing else of a frame. */
   get view(): GPUBuffer {
-    return this.uniform;
+    return this.#uniform;
   }
 
   /** The bind group; `attach` must have been called. */
   get bindGroup(): GPUBindGroup {
-    if (this.group === null) throw new Error("frame: no atlas attached");
-    return this.group;
+    if (this.#group === null) throw new Error("frame: no atlas attached");
+    return this.#group;
   }
 
-  /** From here on a pass draws patches: their vertices are for a viewport with a border (gpu/guard.ts). */
+  /** From here on a pass draws patches: their vertices are for a viewport with a border (gpu/passes/guard.ts). */
   widen(pass: GPURenderPassEncoder): void {
-    if (this.guardPx > 0) this.setViewport(pass, this.guardPx);
+    if (this.#guardPx > 0) this.#setViewport(pass, this.#guardPx);
   }
 
   /** From here on a pass draws all else. */
   narrow(pass: GPURenderPassEncoder): void {
-    if (this.guardPx > 0) this.setViewport(pass, 0);
+    if (this.#guardPx > 0) this.#setViewport(pass, 0);
   }
 
   /** Writes the uniform for this frame. */
   update(scene: Scene, facts: FrameFacts): void {
     const { lakes = null } = facts;
-    const channels = this.channels.update(scene.channels, overlayGrid(scene));
-    const grown = this.lakes.update(lakes);
-    if ((channels || grown) && this.atlas !== null) this.attach(this.atlas);
-    this.writeCamera(scene, facts);
-    const w = this.writer;
+    const channels = this.#channels.update(scene.channels, overlayGrid(scene));
+    const grown = this.#lakes.update(lakes);
+    if ((channels || grown) && this.#atlas !== null) this.attach(this.#atlas);
+    this.#writeCamera(scene, facts);
+    const w = this.#writer;
     const { settings } = scene;
     const size = scene.tiles.sizeM;
     const name = facts.look ?? settings.look;
@@ -188,27 +199,27 @@ export class FrameBindings {
     w.set("contour", contourInterval(relief));
     w.set("contour_strength", relief > 0 ? look.contours : 0);
     w.set("look", look.index);
-    w.set("amplitude", this.channels.fullScale);
+    w.set("amplitude", this.#channels.fullScale);
     w.set("relief", reliefM({ ...climate, size_m: size }));
     w.set("shore", shoreM(size, settings.place));
     w.set("overlay", OVERLAYS[scene.overlay]);
-    this.writeCursors(scene);
-    this.device.queue.writeBuffer(this.uniform, 0, w.buffer);
+    this.#writeCursors(scene);
+    this.#device.queue.writeBuffer(this.#uniform, 0, w.buffer);
   }
 
   destroy(): void {
-    this.uniform.destroy();
-    this.channels.destroy();
-    this.lakes.destroy();
+    this.#uniform.destroy();
+    this.#channels.destroy();
+    this.#lakes.destroy();
   }
 
-  private setViewport(pass: GPURenderPassEncoder, border: number): void {
-    const { width, height } = this.drawn;
+  #setViewport(pass: GPURenderPassEncoder, border: number): void {
+    const { width, height } = this.#drawn;
     pass.setViewport(-border, -border, width + 2 * border, height + 2 * border, 0, 1);
   }
 
-  private writeCamera(scene: Scene, facts: FrameFacts): void {
-    const w = this.writer;
+  #writeCamera(scene: Scene, facts: FrameFacts): void {
+    const w = this.#writer;
     const { camera } = scene;
     const { forward, right, up } = viewAxes(camera);
     const ortho = camera.orthoHeight > 0;
@@ -225,12 +236,12 @@ export class FrameBindings {
     w.set("up", [...up, tan]);
     w.set("forward", [...forward, ortho ? camera.orthoHeight / facts.height : (2 * tan) / facts.height]);
     w.set("viewport", [facts.width, facts.height]);
-    const border = 2 * this.guardPx;
+    const border = 2 * this.#guardPx;
     w.set("guard", [facts.width / (facts.width + border), facts.height / (facts.height + border)]);
-    this.drawn = { width: facts.width, height: facts.height };
+    this.#drawn = { width: facts.width, height: facts.height };
   }
 
-  private writeCursors(scene: Scene): void {
+  #writeCursors(scene: Scene): void {
     const shown = scene.cursors.slice(0, MAX_CURSORS);
     const { camera } = scene;
     const scale = camera.orthoHeight > 0 ? camera.orthoHeight : 2 * Math.tan((camera.fovDeg * Math.PI) / 360);
@@ -238,9 +249,9 @@ export class FrameBindings {
       const [x, y, z] = cursor.position;
       const away = camera.orthoHeight > 0 ? 1 : Math.hypot(x - camera.eye[0], y - camera.eye[1], z - camera.eye[2]);
       const pixel = (scale * away) / camera.height;
-      this.writer.set("cursors", [x, y, cursor.radiusPx * pixel, 1.6 * pixel, ...cursor.colour], i * 8);
+      this.#writer.set("cursors", [x, y, cursor.radiusPx * pixel, 1.6 * pixel, ...cursor.colour], i * 8);
     });
-    this.writer.set("cursor_count", shown.length);
+    this.#writer.set("cursor_count", shown.length);
   }
 }
 

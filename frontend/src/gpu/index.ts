@@ -2,7 +2,7 @@
 
 import type { SceneRenderer } from "../core/types.ts";
 import { NoWebGpu, openGpu } from "./device.ts";
-import { createMapRenderer } from "./map.ts";
+import { createMapRenderer } from "./map/map.ts";
 import { GpuRenderer } from "./renderer.ts";
 
 export { createMapRenderer, NoWebGpu };

@@ -61,20 +61,20 @@ export function structLayout(source: string, name: string): StructLayout {
 /** Writes named fields of a struct into a buffer of its size. */
 export class StructWriter {
   readonly buffer: ArrayBuffer;
-  private readonly floats: Float32Array;
-  private readonly words: Uint32Array;
+  readonly #floats: Float32Array;
+  readonly #words: Uint32Array;
 
   constructor(readonly layout: StructLayout) {
     this.buffer = new ArrayBuffer(layout.size);
-    this.floats = new Float32Array(this.buffer);
-    this.words = new Uint32Array(this.buffer);
+    this.#floats = new Float32Array(this.buffer);
+    this.#words = new Uint32Array(this.buffer);
   }
 
   /** Sets a field; `skip` counts 4-byte elements from its start. Throws for an unknown field. */
   set(field: string, value: number | ArrayLike<number>, skip = 0): void {
     const offset = this.layout.offsets[field];
     if (offset === undefined) throw new Error(`layout: no field ${field}`);
-    const into = this.layout.integers.has(field) ? this.words : this.floats;
+    const into = this.layout.integers.has(field) ? this.#words : this.#floats;
     if (typeof value === "number") into[offset / 4 + skip] = value;
     else into.set(value, offset / 4 + skip);
   }

@@ -77,7 +77,7 @@ export function samePicture(a: Scene, stampA: number, b: Scene, stampB: number):
     sameCamera(a.camera, b.camera) &&
     sameSettings(a.settings, b.settings) &&
     sameGhost(a.ghost, b.ghost) &&
-    (a.sheet ?? null) === (b.sheet ?? null) &&
+    (a.placing ?? null) === (b.placing ?? null) &&
     sameList(a.footprints ?? [], b.footprints ?? [], sameFootprint) &&
     sameList(a.cursors, b.cursors, sameCursor) &&
     sameList(a.strokes, b.strokes, sameStroke)

@@ -27,11 +27,11 @@ import material from "@shaders/wgsl/material.wgsl?raw";
 import noise from "@shaders/wgsl/noise.wgsl?raw";
 import overlay from "@shaders/wgsl/overlay.wgsl?raw";
 import patch from "@shaders/wgsl/patch.wgsl?raw";
+import placing from "@shaders/wgsl/placing.wgsl?raw";
 import ribbon from "@shaders/wgsl/ribbon.wgsl?raw";
 import ruleLandscape from "@shaders/wgsl/rule_landscape.wgsl?raw";
 import rulePlain from "@shaders/wgsl/rule_plain.wgsl?raw";
 import ruleSmooth from "@shaders/wgsl/rule_smooth.wgsl?raw";
-import sheet from "@shaders/wgsl/sheet.wgsl?raw";
 import sky from "@shaders/wgsl/sky.wgsl?raw";
 import stonesPlain from "@shaders/wgsl/stones_plain.wgsl?raw";
 import stonesRich from "@shaders/wgsl/stones_rich.wgsl?raw";
@@ -47,7 +47,7 @@ import view from "@shaders/wgsl/view.wgsl?raw";
 import wall from "@shaders/wgsl/wall.wgsl?raw";
 import water from "@shaders/wgsl/water.wgsl?raw";
 import type { Look } from "../generated/contract.ts";
-import type { SynthesisRule } from "./synthsite.ts";
+import type { SynthesisRule } from "./synthesis/site.ts";
 
 const join = (...parts: string[]): string => parts.join("\n");
 
@@ -94,7 +94,7 @@ export function sceneSource(part: "wall" | "background", detail: Detail): string
 export const SOURCES = {
   ribbon: join(contract, view, ribbon),
   ghost: join(contract, view, overlayLines, ghost),
-  sheet: join(contract, view, overlayLines, sheet),
+  placing: join(contract, view, overlayLines, placing),
   label: join(contract, view, label),
   normals: join(contract, tile, computeNormals),
   sun: join(contract, tile, computeSun),

@@ -1,30 +1,32 @@
 /**
  * Pointers and keys on the terrain: which tool gets them, and what they change (DESIGN 12).
  *
- * One pointer is the main one and does one thing at a time (`presses.ts`): draw, drag a handle, move a stroke, or move the
+ * One pointer is the main one and does one thing at a time (`pointeractions.ts`): draw, drag a handle, move a stroke, or move the
  * camera. A second finger, or Esc, ends it. Events come in CSS pixels and become device pixels here, at the DOM's edge.
  */
 
 import { computed, type ReadonlySignal, type Signal, signal } from "@preact/signals-core";
-import type { Camera } from "../core/camera.ts";
+import type { Camera } from "../core/camera/camera.ts";
 import type { GhostVisual, Ground, Vec3 } from "../core/types.ts";
 import type { SyncDoc } from "../doc/sync.ts";
-import { type Action, createActions, type ToolId } from "./actions.ts";
 import type { ToolDefaults } from "./defaults.ts";
-import { Grips, type GripVisual } from "./grips.ts";
-import { Keyboard } from "./keyboard.ts";
-import { KeyPen } from "./keypen.ts";
-import { type Finger, Navigation, type NavigationMode } from "./navigation.ts";
-import { OversketchTool } from "./oversketch.ts";
-import type { Laying } from "./placement.ts";
-import { Pointing, takePointer } from "./pointing.ts";
-import { type Activity, Presses } from "./presses.ts";
-import { type FinishedStroke, type InkVisual, StrokeTool } from "./stroketool.ts";
+import { HitTest, takePointer } from "./hittest.ts";
+import type { Action, ToolId } from "./keys/action.ts";
+import { createActions } from "./keys/actions.ts";
+import { Keyboard } from "./keys/keyboard.ts";
+import { KeyPen } from "./keys/keypen.ts";
+import { type Activity, PointerActions } from "./pointeractions.ts";
+import type { Say } from "./say.ts";
+import { OversketchTool } from "./sketch/oversketch.ts";
+import { type AnyHandle, HandleSet } from "./tools/handleset.ts";
+import { type Finger, Navigation, type NavigationMode } from "./tools/navigation.ts";
+import type { Placing } from "./tools/placement.ts";
+import { type FinishedStroke, type InkVisual, StrokeTool } from "./tools/stroketool.ts";
 
-export type { ActionId, ToolId } from "./actions.ts";
-export type { GripVisual } from "./grips.ts";
-export type { KeyPenVisual } from "./keypen.ts";
-export type { Laying } from "./placement.ts";
+export type { ActionId, ToolId } from "./keys/action.ts";
+export type { KeyPenVisual } from "./keys/keypen.ts";
+export type { AnyHandle } from "./tools/handleset.ts";
+export type { Placing } from "./tools/placement.ts";
 
 export type InputMode = "idle" | "draw" | "handle" | NavigationMode;
 
@@ -42,7 +44,7 @@ export interface InputOptions {
   readonly defaults: ToolDefaults;
   /** Where the pointer is on the ground; null when it has left. */
   readonly onCursor: (p: Vec3 | null) => void;
-  readonly onMessage: (text: string) => void;
+  readonly onMessage: Say;
   /** The name that new strokes carry. */
   readonly author?: () => string;
   /** Milliseconds. */
@@ -70,8 +72,8 @@ export class InputController {
   readonly selection: Signal<string | null> = signal<string | null>(null);
   /** Whether one finger draws; becomes false when a pen is seen. */
   readonly fingerDraws: Signal<boolean> = signal(true);
-  /** The elevation grid that is being laid: it has the pointer to itself. */
-  readonly laying: Signal<Laying | null> = signal<Laying | null>(null);
+  /** The elevation grid that is being placed: it has the pointer to itself. */
+  readonly placing: Signal<Placing | null> = signal<Placing | null>(null);
   readonly actions: Map<string, Action>;
   /** The pen that the arrow keys move. */
   readonly keyPen: KeyPen;
@@ -81,11 +83,11 @@ export class InputController {
   readonly #strokes: StrokeTool;
   readonly #oversketch: OversketchTool;
   readonly #inks: ReadonlySignal<InkVisual | null>;
-  readonly #grips: Grips;
+  readonly #handleSet: HandleSet;
   readonly #navigation: Navigation;
-  readonly #pointing: Pointing;
+  readonly #hitTest: HitTest;
   readonly #keyboard: Keyboard;
-  readonly #presses: Presses;
+  readonly #pointerActions: PointerActions;
   readonly #touches = new Map<number, Finger>();
   readonly #abort = new AbortController();
   #main: Main | null = null;
@@ -96,16 +98,16 @@ export class InputController {
     this.#o = options;
     const now = options.now ?? (() => performance.timeOrigin + performance.now());
     this.#navigation = new Navigation(options.camera, options.ground);
-    this.#pointing = new Pointing(options.canvas, options.camera, options.doc);
+    this.#hitTest = new HitTest(options.canvas, options.camera, options.doc);
     this.#strokes = new StrokeTool({ author: () => "", ...options, now });
     this.#oversketch = new OversketchTool({ ...options, now });
     this.#inks = computed(() => this.#oversketch.ink.value ?? this.#strokes.ink.value);
-    const { tool, selection, laying } = this;
-    this.#grips = new Grips({ ...options, tool, selection, laying, now });
+    const { tool, selection, placing } = this;
+    this.#handleSet = new HandleSet({ ...options, tool, selection, placing, now });
     this.keyPen = new KeyPen({
       ...options,
       tool,
-      laying,
+      placing,
       strokes: this.#strokes,
       hit: (x, y) => this.#navigation.hit(x, y),
       onDrawn: (made) => this.#drawn(made),
@@ -114,7 +116,7 @@ export class InputController {
       ...options,
       tool,
       selection,
-      laying,
+      placing,
       fingerDraws: this.fingerDraws,
       newId: () => this.#strokes.newId(),
       cancel: () => this.#cancel(),
@@ -122,17 +124,17 @@ export class InputController {
       now,
     });
     this.#keyboard = new Keyboard(options.camera, this.#navigation, this.actions, this.keyPen);
-    this.#presses = new Presses({
+    this.#pointerActions = new PointerActions({
       ...options,
       tool,
       selection,
-      laying,
+      placing,
       fingerDraws: this.fingerDraws,
       navigation: this.#navigation,
-      pointing: this.#pointing,
+      hitTest: this.#hitTest,
       strokes: this.#strokes,
       oversketch: this.#oversketch,
-      grips: this.#grips,
+      handleSet: this.#handleSet,
       spaceHeld: () => this.#keyboard.spaceHeld,
     });
     this.#listen();
@@ -142,9 +144,9 @@ export class InputController {
     return this.#hovered;
   }
 
-  /** Handles of the grid that is being laid, else of the selected stroke in the select tool; of paint with the brush too. */
-  get handles(): ReadonlySignal<readonly GripVisual[]> {
-    return this.#grips.handles;
+  /** Handles of the grid that is being placed, else of the selected stroke in the select tool; of paint with the brush too. */
+  get handles(): ReadonlySignal<readonly AnyHandle[]> {
+    return this.#handleSet.handles;
   }
 
   get ghost(): ReadonlySignal<GhostVisual | null> {
@@ -165,6 +167,13 @@ export class InputController {
   get inputMode(): ReadonlySignal<InputMode> {
     return this.#mode;
   }
+
+  /** Id of the stroke whose handle is dragged, or of which a part is drawn anew; null: I hold none. */
+  readonly held: ReadonlySignal<string | null> = computed(() => {
+    const holds =
+      this.#mode.value === "handle" || (this.#mode.value === "draw" && this.#strokes.drawing.value === null);
+    return holds && this.placing.value === null ? this.selection.value : null;
+  });
 
   /** Ends everything under way and all listening. */
   dispose(): void {
@@ -191,7 +200,7 @@ export class InputController {
     on("pointercancel", (e) => this.#lost(e));
     on("pointerleave", () => this.#leave());
     on("wheel", (e) => this.#wheel(e), false);
-    on("dblclick", (e) => this.#navigation.flyTo(...this.#pointing.pixel(e)));
+    on("dblclick", (e) => this.#navigation.flyTo(...this.#hitTest.pixel(e)));
     on("contextmenu", (e) => e.preventDefault(), false);
   }
 
@@ -199,7 +208,7 @@ export class InputController {
     if (e.pointerType === "touch" && this.#penDown) return;
     e.preventDefault();
     if (e.pointerType === "pen") this.#pen();
-    const [x, y] = this.#pointing.pixel(e);
+    const [x, y] = this.#hitTest.pixel(e);
     if (e.pointerType === "touch") {
       this.#touches.set(e.pointerId, { id: e.pointerId, x, y });
       if (this.#touches.size > 1) {
@@ -215,7 +224,7 @@ export class InputController {
       startX: x,
       startY: y,
       moved: false,
-      activity: this.#presses.begin(e, x, y),
+      activity: this.#pointerActions.begin(e, x, y),
     };
     this.#publishMode();
   }
@@ -238,7 +247,7 @@ export class InputController {
   }
 
   #move(e: PointerEvent): void {
-    const [x, y] = this.#pointing.pixel(e);
+    const [x, y] = this.#hitTest.pixel(e);
     const finger = this.#touches.get(e.pointerId);
     if (finger !== undefined) Object.assign(finger, { x, y });
     if (this.#navigation.mode === "pinch" && finger !== undefined) {
@@ -253,9 +262,9 @@ export class InputController {
     }
     if (e.pointerId !== main.pointerId) return;
     if (!main.moved) {
-      if (Math.hypot(x - main.startX, y - main.startY) <= CLICK_PX * this.#pointing.ratio) return;
+      if (Math.hypot(x - main.startX, y - main.startY) <= CLICK_PX * this.#hitTest.ratio) return;
       main.moved = true;
-      main.activity = this.#presses.moved(main.activity, main.startX, main.startY);
+      main.activity = this.#pointerActions.moved(main.activity, main.startX, main.startY);
       this.#publishMode();
     }
     this.#continue(main, e, x, y);
@@ -264,14 +273,14 @@ export class InputController {
   #continue(main: Main, e: PointerEvent, x: number, y: number): void {
     const { activity } = main;
     if (activity.kind === "draw") {
-      this.#strokes.move(this.#pointing.samples(e), this.#pointing.predicted(e));
+      this.#strokes.move(this.#hitTest.samples(e), this.#hitTest.predicted(e));
       this.#cursor(x, y);
     } else if (activity.kind === "redraw") {
-      this.#oversketch.move(this.#pointing.samples(e), this.#pointing.predicted(e));
+      this.#oversketch.move(this.#hitTest.samples(e), this.#hitTest.predicted(e));
       this.#cursor(x, y);
     } else if (activity.kind === "navigate") this.#navigation.drag(x, y);
     else if (activity.kind === "drag") {
-      this.#grips.move(x, y, !e.altKey);
+      this.#handleSet.move(x, y, !e.altKey);
       this.#cursor(x, y);
     }
   }
@@ -293,8 +302,8 @@ export class InputController {
       if (made !== null) this.#drawn(made);
     } else if (activity.kind === "redraw") this.#oversketch.finish();
     else if (activity.kind === "drag") {
-      this.#grips.move(...this.#pointing.pixel(e), !e.altKey);
-      this.#grips.finish();
+      this.#handleSet.move(...this.#hitTest.pixel(e), !e.altKey);
+      this.#handleSet.finish();
     }
     this.#endMain();
   }
@@ -311,7 +320,7 @@ export class InputController {
 
   /** A click without movement selects the stroke under it, or nothing; with the brush, beside all paint, it is a dab. */
   #click(activity: Activity, e: PointerEvent): void {
-    const picked = this.#presses.pick(e);
+    const picked = this.#pointerActions.pick(e);
     if (activity.kind === "draw" && picked === null) {
       const made = this.#strokes.touch();
       if (made !== null) {
@@ -321,9 +330,9 @@ export class InputController {
     }
     if (activity.kind === "draw") this.#strokes.cancel();
     if (activity.kind === "redraw") this.#oversketch.cancel();
-    if (activity.kind === "drag") this.#grips.cancel();
+    if (activity.kind === "drag") this.#handleSet.cancel();
     if (e.button !== 0 || activity.kind === "drag" || activity.kind === "navigate") return;
-    if (this.laying.value !== null) return;
+    if (this.placing.value !== null) return;
     this.selection.value = picked?.stroke.id ?? null;
   }
 
@@ -339,7 +348,7 @@ export class InputController {
   #leave(): void {
     if (this.#main !== null) return;
     this.#hovered.value = null;
-    this.#grips.hover(null);
+    this.#handleSet.hover(null);
     this.#o.onCursor(null);
   }
 
@@ -349,11 +358,11 @@ export class InputController {
       this.#penSeen = true;
       this.fingerDraws.value = false;
     }
-    const handle = this.#pointing.handle(this.handles.value, e);
-    this.#grips.hover(handle?.kind ?? null);
+    const handle = this.#hitTest.handle(this.handles.value, e);
+    this.#handleSet.hover(handle?.kind ?? null);
     const picks = this.tool.value === "select" || this.tool.value === "paint";
-    const over = handle === null && picks ? this.#presses.pick(e) : null;
-    const redraws = handle === null && !picks && this.#presses.over(e);
+    const over = handle === null && picks ? this.#pointerActions.pick(e) : null;
+    const redraws = handle === null && !picks && this.#pointerActions.over(e);
     this.#hovered.value = redraws ? this.selection.value : (over?.stroke.id ?? null);
     this.#showCursor(handle !== null || over !== null, redraws);
   }
@@ -365,7 +374,7 @@ export class InputController {
   #wheel(e: WheelEvent): void {
     e.preventDefault();
     this.keyPen.leave();
-    const [x, y] = this.#pointing.pixel(e);
+    const [x, y] = this.#hitTest.pixel(e);
     this.#navigation.wheel(e.deltaY, e.deltaMode, e.ctrlKey, x, y);
   }
 
@@ -377,7 +386,7 @@ export class InputController {
     const { kind } = main.activity;
     if (kind === "draw") this.#strokes.cancel();
     else if (kind === "redraw") this.#oversketch.cancel();
-    else if (kind === "drag") this.#grips.cancel();
+    else if (kind === "drag") this.#handleSet.cancel();
     return kind === "draw" || kind === "redraw" || kind === "drag";
   }
 
@@ -398,7 +407,7 @@ export class InputController {
 
   /** `over`: something can be taken hold of; `redraws`: a line begun here changes the selected one. */
   #showCursor(over: boolean, redraws = false): void {
-    const still = this.tool.value === "select" || this.laying.value !== null;
+    const still = this.tool.value === "select" || this.placing.value !== null;
     const idle = redraws ? "cell" : over ? "pointer" : still ? "default" : "crosshair";
     const mode = this.#mode.value;
     this.#o.canvas.style.cursor = mode === "idle" || mode === "draw" ? idle : "grabbing";

@@ -3,7 +3,7 @@
 import { type Signal, signal } from "@preact/signals-core";
 import type { Flank, Paint, Stroke } from "../generated/contract.ts";
 import { DEFAULT_EXTENT_FRACTION, DEFAULT_SLOPE_DEG } from "../generated/contract.ts";
-import { brushRadius } from "./painttool.ts";
+import { brushRadius } from "./tools/painttool.ts";
 
 export type DrawToolId = "mountain" | "crevice" | "plateau";
 /** Tools that put strokes on the ground. */

@@ -1,12 +1,12 @@
 /** Which stroke or handle is under the pointer, measured in device pixels. */
 
-import type { Camera } from "../core/camera.ts";
+import type { Camera } from "../core/camera/camera.ts";
 import { segmentDistance } from "../core/geometry.ts";
 import type { Ground, Vec3 } from "../core/types.ts";
 import type { Doc } from "../doc/document.ts";
 import { worldPoints } from "../doc/strokes.ts";
 import type { Stroke } from "../generated/contract.ts";
-import { solvedHeight } from "./strokeops.ts";
+import { solvedHeight } from "./sketch/strokeops.ts";
 
 export interface Shape {
   /** xyz triples. */

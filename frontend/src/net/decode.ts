@@ -10,6 +10,8 @@ import { isUnderAny, keyLevel, parentKey, tileKey } from "../core/tilekey.ts";
 import type { DecodedFrame, DecodedTile } from "../core/types.ts";
 import {
   Channel,
+  CODER_LIMIT,
+  CODER_MAX_BYTES,
   Filter,
   FRAME_HEADER,
   FRAME_MAGIC,
@@ -22,9 +24,10 @@ import {
   TILE_FILTER_BITS,
   TILE_MAX_SHIFT,
   TILE_PREDICTOR_BITS,
+  TILE_SAMPLE_LIMIT,
   TILE_SAMPLES,
 } from "../generated/contract.ts";
-import { decodeResiduals, LIMIT, MAX_BYTES } from "./entropy.ts";
+import { decodeResiduals } from "./entropy.ts";
 
 /** A frame that is truncated, malformed or does not fit what is held. */
 export class FrameError extends Error {
@@ -33,7 +36,6 @@ export class FrameError extends Error {
 
 const AREA = TILE_SAMPLES * TILE_SAMPLES;
 const SUBS = SUBPATCHES * SUBPATCHES;
-const SAMPLE_LIMIT = 2 ** 28;
 const CHANNELS = Object.keys(Channel).length;
 
 interface Head {
@@ -77,11 +79,11 @@ type Tiles = Map<number, Held>;
  * of its own: its tiles are predicted from its own, and a drop names its own.
  */
 export class FrameDecoder {
-  private readonly channels: readonly Tiles[] = Array.from({ length: CHANNELS }, () => new Map());
+  readonly #channels: readonly Tiles[] = Array.from({ length: CHANNELS }, () => new Map());
 
   /** Forgets everything, as after a reconnect. */
   reset(): void {
-    for (const held of this.channels) held.clear();
+    for (const held of this.#channels) held.clear();
   }
 
   /** Tiles of the heights held now. */
@@ -91,7 +93,7 @@ export class FrameDecoder {
 
   /** Tiles of a channel held now. */
   sizeOf(channel: number): number {
-    return this.channels[channel]?.size ?? 0;
+    return this.#channels[channel]?.size ?? 0;
   }
 
   /** Decodes and applies one frame. Throws FrameError, and then changes nothing that is held. */
@@ -100,7 +102,7 @@ export class FrameDecoder {
     const head = readHead(view);
     const drops = readDrops(view, head);
     const dropped = new Set(drops.map((d) => tileKey(head.level, d.x, d.y)));
-    const held = this.channels[head.channel]!;
+    const held = this.#channels[head.channel]!;
     const tiles: DecodedTile[] = [];
     const seen = new Set<number>();
     const reader = new TileReader(view, FRAME_HEADER.size + head.drops * TILE_DROP.size);
@@ -221,44 +223,48 @@ function readDrops(view: DataView, head: Head): { x: number; y: number }[] {
 
 /** Reads tiles, whose versions are differences to those of the tile before. */
 class TileReader {
-  private version = 0;
-  private base = 0;
+  #version = 0;
+  #base = 0;
+
+  readonly #view: DataView;
 
   constructor(
-    private readonly view: DataView,
+    view: DataView,
     public at: number,
-  ) {}
+  ) {
+    this.#view = view;
+  }
 
   /** The numbers of the next tile. */
   tile(level: number): TileHead {
-    const x = this.number();
-    const y = this.number();
+    const x = this.#number();
+    const y = this.#number();
     checkPlace(level, x, y);
-    const coding = this.number();
+    const coding = this.#number();
     const filterBits = 2 ** TILE_PREDICTOR_BITS;
     const shiftBits = filterBits * 2 ** TILE_FILTER_BITS;
     const shift = Math.floor(coding / shiftBits);
     if (shift > TILE_MAX_SHIFT)
       throw new FrameError(`residuals are shifted by ${TILE_MAX_SHIFT} bits at most, not ${shift}`);
-    this.version = this.versionAfter(this.version);
-    this.base = this.versionAfter(this.base);
-    const bytes = this.number();
-    if (bytes > MAX_BYTES) throw new FrameError(`a tile payload of ${bytes} bytes is too large`);
+    this.#version = this.#versionAfter(this.#version);
+    this.#base = this.#versionAfter(this.#base);
+    const bytes = this.#number();
+    if (bytes > CODER_MAX_BYTES) throw new FrameError(`a tile payload of ${bytes} bytes is too large`);
     return {
       x,
       y,
       predictor: coding % filterBits,
       filter: Math.floor(coding / filterBits) % 2 ** TILE_FILTER_BITS,
       shift,
-      version: this.version,
-      baseVersion: this.base,
+      version: this.#version,
+      baseVersion: this.#base,
       bytes,
     };
   }
 
   /** The bytes that follow the numbers, as a view. */
   payload(bytes: number): Uint8Array {
-    const { buffer, byteOffset, byteLength } = this.view;
+    const { buffer, byteOffset, byteLength } = this.#view;
     if (this.at + bytes > byteLength) throw new FrameError("the frame ends inside a tile payload");
     const out = new Uint8Array(buffer, byteOffset + this.at, bytes);
     this.at += bytes;
@@ -266,18 +272,18 @@ class TileReader {
   }
 
   /** LEB128: seven bits a byte, the lowest first; 35 bits at most. */
-  private number(): number {
+  #number(): number {
     let value = 0;
-    for (let scale = 1; scale < 2 ** 35 && this.at < this.view.byteLength; scale *= 128) {
-      const byte = this.view.getUint8(this.at++);
+    for (let scale = 1; scale < 2 ** 35 && this.at < this.#view.byteLength; scale *= 128) {
+      const byte = this.#view.getUint8(this.at++);
       value += (byte & 127) * scale;
       if (byte < 128) return value;
     }
     throw new FrameError("the frame ends inside a tile's numbers, or one of them is too long");
   }
 
-  private versionAfter(last: number): number {
-    const folded = this.number();
+  #versionAfter(last: number): number {
+    const folded = this.#number();
     const version = last + (folded % 2 > 0 ? -(folded + 1) / 2 : folded / 2);
     if (version < 0 || version > 0xffffffff) throw new FrameError(`version ${version} has more than 32 bits`);
     return version;
@@ -292,7 +298,7 @@ function checkPlace(level: number, x: number, y: number): void {
 function readResidual(payload: Uint8Array, tile: TileHead): void {
   residual.fill(0);
   if (payload.length === 0) return;
-  const limit = LIMIT / 2 ** tile.shift;
+  const limit = CODER_LIMIT / 2 ** tile.shift;
   const fits = decodeResiduals(payload, tile.filter === Filter.LATTICE, residual);
   if (!fits || residual.some((v) => Math.abs(v) >= limit))
     throw new FrameError("a tile payload has bytes left over or numbers that are too large");
@@ -312,7 +318,7 @@ function undoFilter(filter: number): void {
 function addResidual(samples: Int32Array): void {
   for (let i = 0; i < AREA; i++) {
     const value = base[i]! + residual[i]!;
-    if (value > SAMPLE_LIMIT || value < -SAMPLE_LIMIT) throw new FrameError("a tile sample is out of range");
+    if (value > TILE_SAMPLE_LIMIT || value < -TILE_SAMPLE_LIMIT) throw new FrameError("a tile sample is out of range");
     samples[i] = value;
   }
 }

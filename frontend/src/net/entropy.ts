@@ -1,21 +1,21 @@
 /**
- * Residuals of a tile out of their adaptive binary arithmetic code (DESIGN 6). Twin of `backend/esker/tiles/entropy.py`,
+ * Residuals of a tile out of their adaptive binary arithmetic code (DESIGN 6). Twin of `backend/esker/tiles/codec/entropy.py`,
  * which says what is coded and why; both read `tests/vectors/tiles.json`. All numbers are integers below 2^48, exact in
  * float64.
  */
 
-import { LATTICE_CLASSES, LATTICE_WEIGHTS, TILE_SAMPLES } from "../generated/contract.ts";
-
-const SIZES = 32;
-const PLACES = 5;
-const NODES = 48;
-const MAX_EXPONENT = 31;
-const SURE = 32;
-const SLOWEST = 255;
-/** Residuals are below this. */
-export const LIMIT = 2 ** 32;
-/** More than any tile takes. */
-export const MAX_BYTES = 1 << 18;
+import {
+  LATTICE_CLASSES,
+  LATTICE_WEIGHTS,
+  CODER_LIMIT as LIMIT,
+  CODER_MAX_EXPONENT as MAX_EXPONENT,
+  CODER_NODES as NODES,
+  CODER_PLACES as PLACES,
+  CODER_SIZES as SIZES,
+  CODER_SLOWEST as SLOWEST,
+  CODER_SURE as SURE,
+  TILE_SAMPLES,
+} from "../generated/contract.ts";
 
 /** The tile with two rows to the south and two columns to the west and east, of zeros. */
 const STRIDE = TILE_SAMPLES + 4;

@@ -6,7 +6,7 @@
 import { tileKey } from "../core/tilekey.ts";
 import type { Ground, Ray, Tile, Vec3 } from "../core/types.ts";
 import { PATCH_CELLS, SUBPATCHES, TILE_CELLS, TILE_SAMPLES } from "../generated/contract.ts";
-import { clip, clipSquare, type March, marchPatch, passesOver } from "./march.ts";
+import { clip, clipSquare, type March, marchPatch, passesOver } from "./detail/march.ts";
 
 /** Highest point of a tile, and of each of its sub-patches [row*4 + col], with all held tiles below it. Metres. */
 export interface Summit {
@@ -21,44 +21,44 @@ export class TileGround implements Ground {
   readonly sizeM: number;
   /** Finest level of the tiles that are there; -1 while there are none. */
   readonly finest: number;
-  private readonly tiles: ReadonlyMap<number, Tile>;
-  private found: Summits | null = null;
+  readonly #tiles: ReadonlyMap<number, Tile>;
+  #found: Summits | null = null;
 
   constructor(sizeM: number, tiles: ReadonlyMap<number, Tile>) {
     this.sizeM = sizeM;
-    this.tiles = tiles;
+    this.#tiles = tiles;
     let finest = -1;
     for (const tile of tiles.values()) if (tile.level > finest) finest = tile.level;
     this.finest = finest;
   }
 
   tile(level: number, x: number, y: number): Tile | undefined {
-    return this.tiles.get(tileKey(level, x, y));
+    return this.#tiles.get(tileKey(level, x, y));
   }
 
   /** Metres. Outside the domain the height of the nearest border; 0 while nothing is held. */
   heightAt(x: number, y: number): number {
-    const [px, py] = [this.inside(x), this.inside(y)];
-    const tile = this.finestAt(px, py);
+    const [px, py] = [this.#inside(x), this.#inside(y)];
+    const tile = this.#finestAt(px, py);
     if (tile === undefined) return 0;
     const width = this.sizeM / 2 ** tile.level;
-    return bilinear(tile.heights, (px / width - tile.x) * TILE_CELLS, (py / width - tile.y) * TILE_CELLS);
+    return bilinear(tile.heights, TILE_CELLS, (px / width - tile.x) * TILE_CELLS, (py / width - tile.y) * TILE_CELLS);
   }
 
   /** Level of the finest tile that covers a place; -1 while nothing is held. */
   levelAt(x: number, y: number): number {
-    return this.finestAt(this.inside(x), this.inside(y))?.level ?? -1;
+    return this.#finestAt(this.#inside(x), this.#inside(y))?.level ?? -1;
   }
 
-  private inside(v: number): number {
+  #inside(v: number): number {
     return Math.min(Math.max(v, 0), this.sizeM);
   }
 
-  private finestAt(x: number, y: number): Tile | undefined {
+  #finestAt(x: number, y: number): Tile | undefined {
     for (let level = this.finest; level >= 0; level--) {
       const n = 2 ** level;
       const at = (v: number): number => Math.min(Math.floor((v / this.sizeM) * n), n - 1);
-      const tile = this.tiles.get(tileKey(level, at(x), at(y)));
+      const tile = this.#tiles.get(tileKey(level, at(x), at(y)));
       if (tile !== undefined) return tile;
     }
     return undefined;
@@ -69,7 +69,7 @@ export class TileGround implements Ground {
    * surface, through its side, hits nothing.
    */
   raycast(ray: Ray): Vec3 | null {
-    const root = this.tiles.get(tileKey(0, 0, 0));
+    const root = this.#tiles.get(tileKey(0, 0, 0));
     const [ox, oy, oz] = ray.origin;
     const [dx, dy, dz] = ray.dir;
     const span = { from: 0, to: Number.POSITIVE_INFINITY };
@@ -77,20 +77,20 @@ export class TileGround implements Ground {
     const above = oz + span.from * dz >= this.heightAt(ox + span.from * dx, oy + span.from * dy);
     if (!above && span.from > 0) return null;
     const march: March = { ox, oy, oz, dx, dy, dz, above };
-    const t = this.visit(root, march, span.from, span.to);
+    const t = this.#visit(root, march, span.from, span.to);
     return t === null ? null : [ox + t * dx, oy + t * dy, oz + t * dz];
   }
 
   /** The summits of all tiles, found when somebody first asks. */
   get summits(): Summits {
-    this.found ??= this.findSummits();
-    return this.found;
+    this.#found ??= this.#findSummits();
+    return this.#found;
   }
 
-  private findSummits(): Summits {
+  #findSummits(): Summits {
     const summits = new Map<number, Summit>();
     const byLevel: Tile[][] = Array.from({ length: this.finest + 1 }, () => []);
-    for (const tile of this.tiles.values()) byLevel[tile.level]!.push(tile);
+    for (const tile of this.#tiles.values()) byLevel[tile.level]!.push(tile);
     for (let level = this.finest; level >= 0; level--) {
       for (const tile of byLevel[level]!) {
         const subs = tile.subMax.slice();
@@ -105,7 +105,7 @@ export class TileGround implements Ground {
   }
 
   /** Marches a tile and the held tiles below it over ray parameters [from, to]. */
-  private visit(tile: Tile, march: March, from: number, to: number): number | null {
+  #visit(tile: Tile, march: March, from: number, to: number): number | null {
     if (passesOver(march, from, to, this.summits.get(tileKey(tile.level, tile.x, tile.y))!.top)) return null;
     const flip = (march.dx < 0 ? 1 : 0) | (march.dy < 0 ? 2 : 0);
     for (let i = 0; i < 4; i++) {
@@ -116,17 +116,17 @@ export class TileGround implements Ground {
       const x = 2 * tile.x + qx;
       const y = 2 * tile.y + qy;
       if (!clipSquare(span, march, x, y, 2 << tile.level, this.sizeM)) continue;
-      const child = this.tiles.get(tileKey(tile.level + 1, x, y));
+      const child = this.#tiles.get(tileKey(tile.level + 1, x, y));
       const t = child
-        ? this.visit(child, march, span.from, span.to)
-        : this.visitQuarter(tile, qx, qy, flip, march, span.from, span.to);
+        ? this.#visit(child, march, span.from, span.to)
+        : this.#visitQuarter(tile, qx, qy, flip, march, span.from, span.to);
       if (t !== null) return t;
     }
     return null;
   }
 
   /** The four sub-patches of a tile's quarter, where no child is held. */
-  private visitQuarter(
+  #visitQuarter(
     tile: Tile,
     qx: number,
     qy: number,
@@ -171,14 +171,15 @@ function raise(subs: Float32Array, below: Float32Array, q: number): void {
     }
 }
 
-/** Height at fractional column `c` and row `r` of a tile's 65x65 samples. */
-function bilinear(heights: Float32Array, c: number, r: number): number {
-  const col = Math.min(Math.floor(c), TILE_CELLS - 1);
-  const row = Math.min(Math.floor(r), TILE_CELLS - 1);
+/** Height at fractional column `c` and row `r` of a square of `cells` cells a side and one sample more. */
+export function bilinear(heights: Float32Array, cells: number, c: number, r: number): number {
+  const col = Math.min(Math.floor(c), cells - 1);
+  const row = Math.min(Math.floor(r), cells - 1);
   const u = c - col;
   const v = r - row;
-  const at = row * TILE_SAMPLES + col;
-  const south = heights[at]! * (1 - u) + heights[at + 1]! * u;
-  const north = heights[at + TILE_SAMPLES]! * (1 - u) + heights[at + TILE_SAMPLES + 1]! * u;
-  return south * (1 - v) + north * v;
+  const at = row * (cells + 1) + col;
+  const north = at + cells + 1;
+  const a = heights[at]! * (1 - u) + heights[at + 1]! * u;
+  const b = heights[north]! * (1 - u) + heights[north + 1]! * u;
+  return a * (1 - v) + b * v;
 }

@@ -6,12 +6,12 @@
 import { tileKey } from "../core/tilekey.ts";
 import type { Ground, Ray, Vec3 } from "../core/types.ts";
 import { SUBPATCHES, TILE_CELLS } from "../generated/contract.ts";
-import { BLOCK_CELLS, BLOCK_SIDE, blockArea, blockKey, type DetailField, ROOT_BLOCKS } from "./detail.ts";
-import type { TileGround } from "./ground.ts";
-import { fillKnown, type HeightOf, heightsOfTiles } from "./guide.ts";
-import { clip, clipSquare, type March, marchPatch, passesOver } from "./march.ts";
+import { BLOCK_CELLS, BLOCK_SIDE, blockArea, blockKey, type DetailField, ROOT_BLOCKS } from "./detail/detail.ts";
+import { clip, clipSquare, type March, marchPatch, passesOver } from "./detail/march.ts";
+import { BORDER, interpolated } from "./detail/subdivide.ts";
+import { bilinear, type TileGround } from "./ground.ts";
 import { Memo } from "./memo.ts";
-import { BORDER, interpolated } from "./subdivide.ts";
+import { fillKnown, type HeightOf, heightsOfTiles } from "./patches/guide.ts";
 
 const SAMPLES = BLOCK_CELLS + 1;
 /** The level below 0 at which one block covers the domain. */
@@ -44,19 +44,20 @@ interface Surface {
 /** A ground that never changes. */
 export class ShownGround implements Ground {
   readonly sizeM: number;
-  private readonly solved: TileGround;
-  private readonly solvedLevels: number;
-  private readonly field: DetailField;
-  private readonly heightOf: HeightOf;
-  private readonly surfaces = new Memo<Surface>(REMEMBERED);
+  readonly #solved: TileGround;
+  readonly #solvedLevels: number;
+  /** The detail that is added to the solved ground. */
+  readonly field: DetailField;
+  readonly #heightOf: HeightOf;
+  readonly #surfaces = new Memo<Surface>(REMEMBERED);
 
   /** `solvedLevels`: the finest level that is solved everywhere. */
   constructor(solved: TileGround, solvedLevels: number, field: DetailField) {
     this.sizeM = solved.sizeM;
-    this.solved = solved;
-    this.solvedLevels = solvedLevels;
+    this.#solved = solved;
+    this.#solvedLevels = solvedLevels;
     this.field = field;
-    this.heightOf = heightsOfTiles((level, x, y) => solved.tile(level, x, y));
+    this.#heightOf = heightsOfTiles((level, x, y) => solved.tile(level, x, y));
   }
 
   /**
@@ -64,7 +65,7 @@ export class ShownGround implements Ground {
    * Outside the domain the height of the nearest border; 0 while nothing is held.
    */
   heightAt(x: number, y: number, cellM?: number): number {
-    const level = cellM === undefined ? this.solved.levelAt(x, y) : this.levelFor(cellM);
+    const level = cellM === undefined ? this.#solved.levelAt(x, y) : this.#levelFor(cellM);
     if (level < 0) return 0;
     const px = Math.min(Math.max(x, 0), this.sizeM);
     const py = Math.min(Math.max(y, 0), this.sizeM);
@@ -72,11 +73,12 @@ export class ShownGround implements Ground {
       const n = ROOT_BLOCKS * 2 ** l;
       const bx = Math.min(Math.floor((px / this.sizeM) * n), n - 1);
       const by = Math.min(Math.floor((py / this.sizeM) * n), n - 1);
-      const surface = this.surface(l, bx, by);
+      const surface = this.#surface(l, bx, by);
       if (surface === null) return 0;
-      if (l < level && (cellM === undefined || !this.isDone(surface, l, bx, by, NEGLIGIBLE * cellM))) continue;
+      if (l < level && (cellM === undefined || !this.#isDone(surface, l, bx, by, NEGLIGIBLE * cellM))) continue;
       return bilinear(
         surface.heights,
+        BLOCK_CELLS,
         ((px / this.sizeM) * n - bx) * BLOCK_CELLS,
         ((py / this.sizeM) * n - by) * BLOCK_CELLS,
       );
@@ -85,7 +87,7 @@ export class ShownGround implements Ground {
 
   /** Metres without detail: what strokes constrain. */
   solvedAt(x: number, y: number): number {
-    return this.solved.heightAt(x, y);
+    return this.#solved.heightAt(x, y);
   }
 
   /**
@@ -96,46 +98,38 @@ export class ShownGround implements Ground {
     const [ox, oy, oz] = ray.origin;
     const [dx, dy, dz] = ray.dir;
     const span = { from: 0, to: Number.POSITIVE_INFINITY };
-    if (this.solved.finest < 0 || this.surface(0, 0, 0) === null) return null;
+    if (this.#solved.finest < 0 || this.#surface(0, 0, 0) === null) return null;
     if (!clip(span, ox, dx, 0, this.sizeM, true) || !clip(span, oy, dy, 0, this.sizeM, true)) return null;
     const pixel = new Footprint(ray);
     const ground = this.heightAt(ox + span.from * dx, oy + span.from * dy, CELL_PIXELS * pixel.at(span.from));
     const above = oz + span.from * dz >= ground;
     if (!above && span.from > 0) return null;
     const march: March = { ox, oy, oz, dx, dy, dz, above };
-    const t = this.visit(WHOLE, 0, 0, march, pixel, span.from, span.to);
+    const t = this.#visit(WHOLE, 0, 0, march, pixel, span.from, span.to);
     return t === null ? null : [ox + t * dx, oy + t * dy, oz + t * dz];
   }
 
-  private levelFor(cellM: number): number {
+  #levelFor(cellM: number): number {
     const level = Math.ceil(Math.log2(this.sizeM / TILE_CELLS / Math.max(cellM, 1e-6)));
     return Math.min(Math.max(level, 0), this.field.finest);
   }
 
   /** Whether nothing finer than `size` metres is left below a block. */
-  private isDone({ rest }: Surface, level: number, x: number, y: number, size: number): boolean {
-    return rest <= size && this.riseOf(level, x, y) === Number.NEGATIVE_INFINITY;
+  #isDone({ rest }: Surface, level: number, x: number, y: number, size: number): boolean {
+    return rest <= size && this.#riseOf(level, x, y) === Number.NEGATIVE_INFINITY;
   }
 
   /** Marches a block, or those below it, over ray parameters [from, to]. */
-  private visit(
-    level: number,
-    x: number,
-    y: number,
-    march: March,
-    pixel: Footprint,
-    from: number,
-    to: number,
-  ): number | null {
+  #visit(level: number, x: number, y: number, march: March, pixel: Footprint, from: number, to: number): number | null {
     if (level >= 0) {
-      const surface = this.surface(level, x, y)!;
-      if (passesOver(march, from, to, this.topOf(surface, level, x, y))) return null;
+      const surface = this.#surface(level, x, y)!;
+      if (passesOver(march, from, to, this.#topOf(surface, level, x, y))) return null;
       const size = pixel.at(from);
       const cell = this.sizeM / (TILE_CELLS * 2 ** level);
       if (
         cell <= CELL_PIXELS * size ||
         level >= this.field.finest ||
-        this.isDone(surface, level, x, y, NEGLIGIBLE * size)
+        this.#isDone(surface, level, x, y, NEGLIGIBLE * size)
       ) {
         const [x0, y0] = [x * BLOCK_CELLS * cell, y * BLOCK_CELLS * cell];
         const patch = { heights: surface.heights, stride: SAMPLES, origin: 0, x0, y0, cell, cells: BLOCK_CELLS };
@@ -148,49 +142,49 @@ export class ShownGround implements Ground {
       const [cx, cy] = [2 * x + (q & 1), 2 * y + (q >> 1)];
       const span = { from, to };
       if (!clipSquare(span, march, cx, cy, ROOT_BLOCKS * 2 ** (level + 1), this.sizeM)) continue;
-      const t = this.visit(level + 1, cx, cy, march, pixel, span.from, span.to);
+      const t = this.#visit(level + 1, cx, cy, march, pixel, span.from, span.to);
       if (t !== null) return t;
     }
     return null;
   }
 
   /** Nothing of the ground over a block, at whatever level it is drawn, is higher. */
-  private topOf(surface: Surface, level: number, x: number, y: number): number {
-    return Math.max(surface.top, this.riseOf(level, x, y) + surface.relief + surface.rest);
+  #topOf(surface: Surface, level: number, x: number, y: number): number {
+    return Math.max(surface.top, this.#riseOf(level, x, y) + surface.relief + surface.rest);
   }
 
   /** Greatest height of finer held tiles over a block; -infinity where there are none. */
-  private riseOf(level: number, x: number, y: number): number {
-    if (level >= this.solved.finest) return Number.NEGATIVE_INFINITY;
+  #riseOf(level: number, x: number, y: number): number {
+    if (level >= this.#solved.finest) return Number.NEGATIVE_INFINITY;
     // Eight cells of a level are one sub-patch of the next.
     const key = tileKey(level + 1, Math.floor(x / SUBPATCHES), Math.floor(y / SUBPATCHES));
-    const summit = this.solved.summits.get(key);
+    const summit = this.#solved.summits.get(key);
     return summit?.subs[(y % SUBPATCHES) * SUBPATCHES + (x % SUBPATCHES)] ?? Number.NEGATIVE_INFINITY;
   }
 
   /** The block at its level; null while level 0 is not held. */
-  private surface(level: number, x: number, y: number): Surface | null {
+  #surface(level: number, x: number, y: number): Surface | null {
     const key = blockKey(level, x, y);
-    const known = this.surfaces.get(key);
+    const known = this.#surfaces.get(key);
     if (known !== undefined) return known;
     const detail = this.field.block(level, x, y);
     if (detail === null) return null;
-    const base = this.baseOf(level, x, y, detail.guide);
+    const base = this.#baseOf(level, x, y, detail.guide);
     const ratio = 2 ** -Math.max(0.2, detail.exponent - LESS_SMOOTH);
-    const slack = level < this.solvedLevels ? SLACK_SOLVED : SLACK;
+    const slack = level < this.#solvedLevels ? SLACK_SOLVED : SLACK;
     const made = dressed(base, detail.d, (slack * detail.sigma * ratio) / (1 - ratio));
-    this.surfaces.put(key, made);
+    this.#surfaces.put(key, made);
     return made;
   }
 
   /** Heights without detail: those of held tiles, between and beyond them interpolated from the parent. */
-  private baseOf(level: number, x: number, y: number, guide: Float64Array): Float64Array {
+  #baseOf(level: number, x: number, y: number, guide: Float64Array): Float64Array {
     const area = blockArea(level, x, y);
     const known = new Float64Array(BLOCK_SIDE * BLOCK_SIDE);
-    const held = level <= this.solved.finest ? fillKnown(this.heightOf, area, known) : 0;
+    const held = level <= this.#solved.finest ? fillKnown(this.#heightOf, area, known) : 0;
     if (held === known.length) return known;
     if (level === 0) return guide;
-    const parent = this.surface(level - 1, x >> 1, y >> 1)!;
+    const parent = this.#surface(level - 1, x >> 1, y >> 1)!;
     const between = interpolated(parent.base, blockArea(level - 1, x >> 1, y >> 1), area, this.field.spline);
     if (held > 0) for (let k = 0; k < known.length; k += 1) if (!Number.isNaN(known[k]!)) between[k] = known[k]!;
     return between;
@@ -199,16 +193,16 @@ export class ShownGround implements Ground {
 
 /** Metres of the ground that a pixel covers along a ray. */
 class Footprint {
-  private readonly near: number;
-  private readonly gain: number;
+  readonly #near: number;
+  readonly #gain: number;
 
   constructor({ dir, spread = USUAL_SPREAD }: Ray) {
-    this.near = spread[0];
-    this.gain = spread[1] * Math.hypot(...dir);
+    this.#near = spread[0];
+    this.#gain = spread[1] * Math.hypot(...dir);
   }
 
   at(t: number): number {
-    return this.near + this.gain * t;
+    return this.#near + this.#gain * t;
   }
 }
 
@@ -241,16 +235,4 @@ function bendAt(z: Float64Array, at: number): number {
   const across = z[at - 1]! - 2 * z[at]! + z[at + 1]!;
   const upward = z[at - BLOCK_SIDE]! - 2 * z[at]! + z[at + BLOCK_SIDE]!;
   return Math.max(Math.abs(across), Math.abs(upward));
-}
-
-/** Height at fractional column `c` and row `r` of a block. */
-function bilinear(heights: Float32Array, c: number, r: number): number {
-  const col = Math.min(Math.floor(c), BLOCK_CELLS - 1);
-  const row = Math.min(Math.floor(r), BLOCK_CELLS - 1);
-  const u = c - col;
-  const v = r - row;
-  const at = row * SAMPLES + col;
-  const south = heights[at]! * (1 - u) + heights[at + 1]! * u;
-  const north = heights[at + SAMPLES]! * (1 - u) + heights[at + SAMPLES + 1]! * u;
-  return south * (1 - v) + north * v;
 }

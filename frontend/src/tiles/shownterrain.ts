@@ -4,9 +4,9 @@
  */
 
 import type { Ground } from "../core/types.ts";
-import type { ChannelStore } from "./channels.ts";
-import { type Attributes, DetailField } from "./detail.ts";
-import { heightsOfTiles } from "./guide.ts";
+import type { ChannelStore } from "./detail/channels.ts";
+import { type Attributes, DetailField } from "./detail/detail.ts";
+import { heightsOfTiles } from "./patches/guide.ts";
 import { type RuleSettings, reliefM, zeroM } from "./rules/rule.ts";
 import { ShownGround } from "./shown.ts";
 import type { TileStore } from "./store.ts";
@@ -21,34 +21,34 @@ const STEP_M = 0.03;
 export class ShownTerrain {
   /** The ground as it is drawn now; `freeze` gives one that stays. */
   readonly ground: Ground;
-  private readonly tiles: TileStore;
-  private readonly channels: ChannelStore;
-  private readonly settings: () => RuleSettings | null;
-  private field: { readonly key: string; readonly field: DetailField } | null = null;
-  private shown: { readonly stamp: number; readonly field: DetailField; readonly ground: ShownGround } | null = null;
+  readonly #tiles: TileStore;
+  readonly #channels: ChannelStore;
+  readonly #settings: () => RuleSettings | null;
+  #field: { readonly key: string; readonly field: DetailField } | null = null;
+  #shown: { readonly stamp: number; readonly field: DetailField; readonly ground: ShownGround } | null = null;
 
   /** `settings`: null while there is no document; the ground is then the solved one. */
   constructor(tiles: TileStore, channels: ChannelStore, settings: () => RuleSettings | null) {
-    this.tiles = tiles;
-    this.channels = channels;
-    this.settings = settings;
+    this.#tiles = tiles;
+    this.#channels = channels;
+    this.#settings = settings;
     this.ground = {
       sizeM: tiles.sizeM,
       heightAt: (x, y, cellM) => this.freeze().heightAt(x, y, cellM),
-      solvedAt: (x, y) => this.tiles.ground.heightAt(x, y),
+      solvedAt: (x, y) => this.#tiles.ground.heightAt(x, y),
       raycast: (ray) => this.freeze().raycast(ray),
     };
   }
 
   /** The ground at this moment, which no later frame changes. */
   freeze(): Ground {
-    const field = this.currentField();
-    if (field === null) return this.tiles.freeze();
-    if (this.shown?.stamp !== this.tiles.stamp || this.shown.field !== field) {
-      const ground = new ShownGround(this.tiles.freeze(), this.tiles.solved, field);
-      this.shown = { stamp: this.tiles.stamp, field, ground };
+    const field = this.#currentField();
+    if (field === null) return this.#tiles.freeze();
+    if (this.#shown?.stamp !== this.#tiles.stamp || this.#shown.field !== field) {
+      const ground = new ShownGround(this.#tiles.freeze(), this.#tiles.solved, field);
+      this.#shown = { stamp: this.#tiles.stamp, field, ground };
     }
-    return this.shown.ground;
+    return this.#shown.ground;
   }
 
   /** Height of the ground under an eye at height z, metres, with all the detail that can be told from there. */
@@ -60,12 +60,12 @@ export class ShownTerrain {
 
   /** What grows and lies at a place; null before the ground has come. */
   attributesAt(x: number, y: number): Attributes | null {
-    const field = this.currentField();
+    const field = this.#currentField();
     return field?.attributesAt(x, y, Math.min(ATTRIBUTE_LEVEL, field.finest)) ?? null;
   }
 
-  private currentField(): DetailField | null {
-    const s = this.settings();
+  #currentField(): DetailField | null {
+    const s = this.#settings();
     if (s === null) return null;
     const key = [
       s.size_m,
@@ -76,30 +76,30 @@ export class ShownTerrain {
       s.rule,
       zeroM(s),
       reliefM(s),
-      this.channels.stamp,
-      this.guideStamp(),
+      this.#channels.stamp,
+      this.#guideStamp(),
     ].join();
-    if (this.field?.key !== key) {
-      const snapshot = this.tiles.freeze();
+    if (this.#field?.key !== key) {
+      const snapshot = this.#tiles.freeze();
       const heightOf = heightsOfTiles((level, x, y) => snapshot.tile(level, x, y));
-      this.field = { key, field: new DetailField(s, this.channels, heightOf, this.tiles.solved) };
+      this.#field = { key, field: new DetailField(s, this.#channels, heightOf, this.#tiles.solved) };
     }
-    return this.field.field;
+    return this.#field.field;
   }
 
-  private guide = { stamp: -1, value: "" };
+  #guide = { stamp: -1, value: "" };
 
   /** Changes whenever a tile of the levels that are solved everywhere does. */
-  private guideStamp(): string {
-    if (this.guide.stamp === this.tiles.stamp) return this.guide.value;
+  #guideStamp(): string {
+    if (this.#guide.stamp === this.#tiles.stamp) return this.#guide.value;
     let count = 0;
     let newest = 0;
-    for (const tile of this.tiles.tiles()) {
-      if (tile.level > this.tiles.solved) continue;
+    for (const tile of this.#tiles.tiles()) {
+      if (tile.level > this.#tiles.solved) continue;
       count += 1;
       newest = Math.max(newest, tile.stamp);
     }
-    this.guide = { stamp: this.tiles.stamp, value: `${count}/${newest}` };
-    return this.guide.value;
+    this.#guide = { stamp: this.#tiles.stamp, value: `${count}/${newest}` };
+    return this.#guide.value;
   }
 }

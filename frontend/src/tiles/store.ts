@@ -12,7 +12,7 @@ import { predictMetres } from "../core/predict.ts";
 import { keyLevel, keyX, keyY, parentKey, tileKey } from "../core/tilekey.ts";
 import type { DecodedFrame, Ground, Tile, TileView } from "../core/types.ts";
 import { Channel, QUANTA_PER_CELL, SUBPATCHES, TILE_CELLS, TILE_SAMPLES } from "../generated/contract.ts";
-import { FLAT, type Link, type SentBounds, TileChain } from "./chain.ts";
+import { FLAT, type Link, type SentBounds, TileChain } from "./detail/chain.ts";
 import { TileGround } from "./ground.ts";
 
 const AREA = TILE_SAMPLES * TILE_SAMPLES;
@@ -45,24 +45,24 @@ export class TileStore implements TileView {
   readonly revision: ReadonlySignal<number>;
   /** The ground as it is now; `freeze` gives one that stays. */
   readonly ground: Ground;
-  private readonly rev = signal(0);
-  private readonly offsets: TileChain;
-  private readonly base: TileChain;
+  readonly #rev = signal(0);
+  readonly #offsets: TileChain;
+  readonly #base: TileChain;
   /** What is drawn, as somebody last looked at it: where several frames come at once, the tiles are made once. */
-  private drawn = new Map<number, Shown>();
+  #drawn = new Map<number, Shown>();
   /** What frames have changed since then. */
-  private stale: "nothing" | "offsets" | "all" = "nothing";
-  private snapshot: { readonly stamp: number; readonly ground: TileGround } | null = null;
-  private readonly distance = new Float64Array(SUBS);
+  #stale: "nothing" | "offsets" | "all" = "nothing";
+  #snapshot: { readonly stamp: number; readonly ground: TileGround } | null = null;
+  readonly #distance = new Float64Array(SUBS);
 
   /** `levels`: the finest level that can exist; `solved`: the finest that exists everywhere. */
   constructor(sizeM: number, levels: number, solved = levels) {
     this.sizeM = sizeM;
     this.levels = levels;
     this.solved = solved;
-    this.offsets = new TileChain(sizeM, levels);
-    this.base = new TileChain(sizeM, levels);
-    this.revision = this.rev;
+    this.#offsets = new TileChain(sizeM, levels);
+    this.#base = new TileChain(sizeM, levels);
+    this.revision = this.#rev;
     this.ground = {
       sizeM,
       heightAt: (x, y) => this.freeze().heightAt(x, y),
@@ -71,106 +71,106 @@ export class TileStore implements TileView {
   }
 
   get stamp(): number {
-    return this.rev.peek();
+    return this.#rev.peek();
   }
 
   /** True unless some level that is solved everywhere was last seen as a preview: its samples may be a little off. */
   get settled(): boolean {
-    return this.offsets.settledTo(this.solved) && this.base.settledTo(this.solved);
+    return this.#offsets.settledTo(this.solved) && this.#base.settledTo(this.solved);
   }
 
   tile(level: number, x: number, y: number): Tile | undefined {
-    return this.shown.get(tileKey(level, x, y))?.tile;
+    return this.#shown.get(tileKey(level, x, y))?.tile;
   }
 
   *tiles(): Iterable<Tile> {
-    for (const shown of this.shown.values()) yield shown.tile;
+    for (const shown of this.#shown.values()) yield shown.tile;
   }
 
   /** Number of tiles held, those included that wait for their base. */
   get size(): number {
-    return this.offsets.size;
+    return this.#offsets.size;
   }
 
   /** Number of tiles of the base held. */
   get baseSize(): number {
-    return this.base.size;
+    return this.#base.size;
   }
 
   /** The ground at this moment, which no later frame changes. Cheap: tiles are immutable and shared. */
   freeze(): TileGround {
-    if (this.snapshot?.stamp !== this.stamp) {
+    if (this.#snapshot?.stamp !== this.stamp) {
       const tiles = new Map<number, Tile>();
-      for (const [key, shown] of this.shown) tiles.set(key, shown.tile);
-      this.snapshot = { stamp: this.stamp, ground: new TileGround(this.sizeM, tiles) };
+      for (const [key, shown] of this.#shown) tiles.set(key, shown.tile);
+      this.#snapshot = { stamp: this.stamp, ground: new TileGround(this.sizeM, tiles) };
     }
-    return this.snapshot.ground;
+    return this.#snapshot.ground;
   }
 
   /** Forgets all tiles, as the server does when a connection begins. */
   clear(): void {
-    this.offsets.clear();
-    this.base.clear();
-    this.drawn = new Map();
-    this.stale = "nothing";
-    this.rev.value++;
+    this.#offsets.clear();
+    this.#base.clear();
+    this.#drawn = new Map();
+    this.#stale = "nothing";
+    this.#rev.value++;
   }
 
   /** Shows a frame of the offsets or the base: all of it at once, with everything that moves along. One step of `revision`. */
   apply(frame: DecodedFrame): void {
-    const based = this.based;
-    (frame.channel === Channel.BASE ? this.base : this.offsets).apply(frame);
-    this.stale = based || this.based || this.stale === "all" ? "all" : "offsets";
-    this.rev.value++;
+    const based = this.#based;
+    (frame.channel === Channel.BASE ? this.#base : this.#offsets).apply(frame);
+    this.#stale = based || this.#based || this.#stale === "all" ? "all" : "offsets";
+    this.#rev.value++;
   }
 
   /** What is drawn now. */
-  private get shown(): ReadonlyMap<number, Shown> {
-    if (this.stale === "nothing") return this.drawn;
-    const all = this.stale === "all";
-    this.stale = "nothing";
-    const touched = this.offsets.follow();
-    this.base.follow();
-    this.drawn = all
-      ? this.composed(this.offsets.keys(), new Map(), this.stamp)
-      : this.composed(touched, new Map(this.drawn), this.stamp);
-    return this.drawn;
+  get #shown(): ReadonlyMap<number, Shown> {
+    if (this.#stale === "nothing") return this.#drawn;
+    const all = this.#stale === "all";
+    this.#stale = "nothing";
+    const touched = this.#offsets.follow();
+    this.#base.follow();
+    this.#drawn = all
+      ? this.#composed(this.#offsets.keys(), new Map(), this.stamp)
+      : this.#composed(touched, new Map(this.#drawn), this.stamp);
+    return this.#drawn;
   }
 
   /** Whether there is a base: its root is always held with anything of it. */
-  private get based(): boolean {
-    return this.base.get(ROOT) !== undefined;
+  get #based(): boolean {
+    return this.#base.get(ROOT) !== undefined;
   }
 
   /** Shows these tiles, coarse to fine, beside those that `next` has. */
-  private composed(keys: Iterable<number>, next: Map<number, Shown>, stamp: number): Map<number, Shown> {
+  #composed(keys: Iterable<number>, next: Map<number, Shown>, stamp: number): Map<number, Shown> {
     for (const key of [...keys].sort((a, b) => a - b)) {
-      const link = this.offsets.get(key);
+      const link = this.#offsets.get(key);
       const parent = keyLevel(key) > 0 ? next.get(parentKey(key)) : undefined;
-      const footing = link && this.footing(key, parent);
-      if (footing) next.set(key, this.show(key, link, footing, parent?.tile, stamp));
+      const footing = link && this.#footing(key, parent);
+      if (footing) next.set(key, this.#show(key, link, footing, parent?.tile, stamp));
       else next.delete(key);
     }
     return next;
   }
 
   /** What a tile stands on; null where it has to wait for that. */
-  private footing(key: number, parent: Shown | undefined): Footing | null {
-    if (!this.based) return NO_BASE;
-    const own = this.base.get(key);
+  #footing(key: number, parent: Shown | undefined): Footing | null {
+    if (!this.#based) return NO_BASE;
+    const own = this.#base.get(key);
     if (own && (parent || keyLevel(key) === 0)) return { base: own.heights, own, from: null };
-    if (!parent?.base || this.base.countOf(keyLevel(key)) > 0) return null;
-    const old = this.drawn.get(key);
+    if (!parent?.base || this.#base.countOf(keyLevel(key)) > 0) return null;
+    const old = this.#drawn.get(key);
     if (old && old.from === parent.base) return old;
     return { base: predicted(key, parent.base), own: null, from: parent.base };
   }
 
   /** The tile as it is drawn; the same object where nothing that one sees has changed. */
-  private show(key: number, offset: Link, footing: Footing, parent: Tile | undefined, stamp: number): Shown {
+  #show(key: number, offset: Link, footing: Footing, parent: Tile | undefined, stamp: number): Shown {
     const { base, own, from } = footing;
     const { version } = offset;
     const exact = offset.exact && from === null && own?.exact !== false;
-    const old = this.drawn.get(key);
+    const old = this.#drawn.get(key);
     if (old && old.offset.mark === offset.mark && old.own?.mark === own?.mark && old.base === base) {
       const kept = old.tile.exact === exact && old.tile.version === version;
       return { tile: kept ? old.tile : { ...old.tile, exact, version, stamp }, offset, base, own, from };
@@ -178,24 +178,24 @@ export class TileStore implements TileView {
     const heights = sum(offset.heights, base);
     const place = { level: keyLevel(key), x: keyX(key), y: keyY(key) };
     const bounds =
-      offset.sent && !base ? this.sentBounds(offset.sent, place.level) : this.measured(heights, parent, place);
+      offset.sent && !base ? this.#sentBounds(offset.sent, place.level) : this.#measured(heights, parent, place);
     return { tile: { ...place, version, exact, stamp, heights, ...bounds }, offset, base, own, from };
   }
 
-  private sentBounds(sent: SentBounds, level: number): Bounds {
+  #sentBounds(sent: SentBounds, level: number): Bounds {
     const quantum = this.sizeM / (TILE_CELLS << level) / QUANTA_PER_CELL;
     const scaled = (a: ArrayLike<number>) => Float32Array.from(a, (v) => v * quantum);
     return { subMin: scaled(sent.subMin), subMax: scaled(sent.subMax), subError: scaled(sent.subError) };
   }
 
-  private measured(heights: Float32Array, parent: Tile | undefined, { x, y }: Pick<Tile, "x" | "y">): Bounds {
+  #measured(heights: Float32Array, parent: Tile | undefined, { x, y }: Pick<Tile, "x" | "y">): Bounds {
     const subMin = new Float32Array(SUBS);
     const subMax = new Float32Array(SUBS);
     const subError = new Float32Array(SUBS);
     subRange(heights, subMin, subMax);
     if (parent) {
-      subDistance(heights, parent.heights, 1, x, y, this.distance);
-      for (let i = 0; i < SUBS; i++) subError[i] = this.distance[i]! / 2;
+      subDistance(heights, parent.heights, 1, x, y, this.#distance);
+      for (let i = 0; i < SUBS; i++) subError[i] = this.#distance[i]! / 2;
     }
     return { subMin, subMax, subError };
   }

@@ -1,34 +1,11 @@
-// The camera's projections, modes and animations (SPEC I1-I5).
+// The camera's moves, modes and flights (SPEC I2-I5, I340).
 
 import { describe, expect, it } from "vitest";
-import { Camera } from "../../src/core/camera.ts";
-import { addScaled, distance, distanceXY, dot, normalize, sub } from "../../src/core/math.ts";
+import { Camera } from "../../src/core/camera/camera.ts";
+import { addScaled, distance, distanceXY, dot, sub } from "../../src/core/math.ts";
 import type { Ground, Vec3 } from "../../src/core/types.ts";
 import { random } from "../gpu/world.ts";
-
-const SIZE = 4096;
-/** Eye and pivot of home on 390 × 844 pixels; the same numbers stand in tests/render/test_camera.py. */
-const HOME_TALL = [-2235, -7137, 4725.8, 2048, 2048, 1432.9];
-const flat = (z = 0): Ground => ({ sizeM: SIZE, heightAt: () => z, raycast: () => null });
-const hill: Ground = {
-  sizeM: SIZE,
-  heightAt: (x, y) => 1500 * Math.exp(-((x - 2048) ** 2 + (y - 2048) ** 2) / 400 ** 2),
-  raycast: () => null,
-};
-
-function camera(mode: "orbit" | "fly" | "map" = "orbit"): Camera {
-  const c = new Camera(SIZE);
-  c.resize(1200, 800);
-  c.setMode(mode);
-  return c;
-}
-
-/** Clip coordinates of a point through the published matrix. */
-function clip(c: Camera, p: Vec3): { x: number; y: number; z: number } {
-  const m = c.state.value.viewProj;
-  const r = [0, 1, 2, 3].map((i) => m[i]! * p[0] + m[4 + i]! * p[1] + m[8 + i]! * p[2] + m[12 + i]!);
-  return { x: r[0]! / r[3]!, y: r[1]! / r[3]!, z: r[2]! / r[3]! };
-}
+import { camera, flat, hill, SIZE, settle } from "./cameras.ts";
 
 /** 9 x 9 places of the near plane, to the picture's corners. */
 function nearPlane(c: Camera): Vec3[] {
@@ -42,148 +19,6 @@ function nearPlane(c: Camera): Vec3[] {
     }),
   );
 }
-
-/** Runs an animation to its end, 60 steps a second. */
-function settle(c: Camera, ground: Ground = flat()): void {
-  for (let i = 0; i < 600 && c.update(1 / 60, ground); i++);
-}
-
-describe("projection (SPEC I1)", () => {
-  it.each(["orbit", "fly", "map"] as const)("%s: project inverts ray, and agrees with viewProj", (mode) => {
-    const c = camera(mode);
-    c.orbit(123, 45);
-    for (const [x, y] of [
-      [1, 1],
-      [600, 400],
-      [1199, 13],
-      [77, 780],
-    ] as const) {
-      const ray = c.ray(x, y);
-      const p = addScaled(ray.origin, ray.dir, mode === "map" ? ray.origin[2] : 3000);
-      const q = c.project(p);
-      expect(q.x).toBeCloseTo(x, 6);
-      expect(q.y).toBeCloseTo(y, 6);
-      expect(q.visible).toBe(true);
-      const ndc = clip(c, p);
-      expect(((ndc.x + 1) / 2) * 1200).toBeCloseTo(x, 1);
-      expect(((1 - ndc.y) / 2) * 800).toBeCloseTo(y, 1);
-      expect(ndc.z).toBeGreaterThan(0);
-      expect(ndc.z).toBeLessThan(1);
-    }
-  });
-
-  it("points behind the eye are not visible", () => {
-    const c = camera("fly");
-    const { eye, target } = c.state.value;
-    const behind = addScaled(eye, normalize(sub(target, eye)), -100);
-    expect(c.project(behind).visible).toBe(false);
-    expect(c.project(target).visible).toBe(true);
-  });
-
-  it("the whole domain is visible from home on a wide canvas; a tall one cuts off two corners and is filled", () => {
-    for (const [w, h, hidden] of [
-      [1600, 900, 0],
-      [800, 800, 0],
-      [390, 844, 2],
-    ] as const) {
-      const c = new Camera(SIZE);
-      c.resize(w, h);
-      c.home(0);
-      const corners = [0, SIZE].flatMap((x) => [0, SIZE].map((y) => c.project([x, y, 0])));
-      expect(corners.filter((p) => !p.visible).length).toBe(hidden);
-      for (const p of corners) expect(Math.abs(p.x / w - 0.5)).toBeLessThan(0.5 + 0.21);
-    }
-  });
-
-  it("on a tall canvas home is that of the reference (tests/render/test_camera.py)", () => {
-    const c = new Camera(SIZE);
-    c.resize(390, 844);
-    c.home(0);
-    const { eye, target } = c.state.value;
-    expect([...eye, ...target].map((v) => Math.round(v * 10) / 10)).toEqual(HOME_TALL);
-  });
-
-  it("home shows the sky above a horizon in the upper third and the land large below it", () => {
-    for (const [w, h, least] of [
-      [1440, 900, 0.66],
-      [720, 540, 0.72],
-      [360, 740, 1.25],
-    ] as const) {
-      const c = new Camera(SIZE);
-      c.resize(w, h);
-      c.home(0);
-      const { eye, target } = c.state.value;
-      const away = sub(target, eye);
-      const horizon = c.project(addScaled(eye, normalize([away[0], away[1], 0]), 1e7)).y / h;
-      expect(horizon).toBeGreaterThan(0.1);
-      expect(horizon).toBeLessThan(0.33);
-      const corners = [0, SIZE].flatMap((x) => [0, SIZE].map((y) => c.project([x, y, 0])));
-      const xs = corners.map((p) => p.x / w);
-      expect(Math.max(...xs) - Math.min(...xs)).toBeGreaterThan(least);
-      expect(Math.min(...corners.map((p) => p.y / h))).toBeGreaterThan(horizon + 0.15);
-      expect(eye[0]).toBeLessThan(SIZE / 2);
-      expect(eye[1]).toBeLessThan(0);
-    }
-  });
-
-  it("the map has north up and east right, and covers orthoHeight metres", () => {
-    const c = camera("map");
-    const a = c.project([2048, 2048, 0]);
-    expect(c.project([2048, 2148, 0]).y).toBeLessThan(a.y);
-    expect(c.project([2148, 2048, 0]).x).toBeGreaterThan(a.x);
-    const { orthoHeight } = c.state.value;
-    expect(c.project([2048, 2048 + orthoHeight / 2, 0]).y).toBeCloseTo(0, 6);
-    expect(c.metresPerPixelAt([0, 0, 0])).toBeCloseTo(orthoHeight / 800, 9);
-  });
-});
-
-describe("home over land that lies high (SPEC U32)", () => {
-  const land = { groundM: 2150, lowM: 1780 };
-
-  it("looks at the land where it lies, down to its foot", () => {
-    const c = new Camera(4096);
-    c.resize(1200, 800);
-    c.stand(land);
-    c.home(0);
-    for (const x of [0, 4096])
-      for (const y of [0, 4096])
-        for (const z of [land.groundM, land.lowM]) expect(c.project([x, y, z]).visible).toBe(true);
-    expect(c.state.value.eye[2]).toBeGreaterThan(land.groundM);
-  });
-
-  it("goes along while nobody has moved the view, and only then", () => {
-    const c = new Camera(4096);
-    c.resize(1200, 800);
-    c.home(0);
-    const before = c.state.value.eye;
-    c.stand(land);
-    expect(c.state.value.eye[2] - before[2]).toBeGreaterThan(1500);
-    c.orbit(40, 0);
-    const moved = c.state.value.eye;
-    c.stand({ groundM: 0, lowM: 0 });
-    expect(c.state.value.eye).toEqual(moved);
-  });
-
-  it("goes along when the picture changes its shape, and only then (U33)", () => {
-    const [turned, upright] = [new Camera(4096), new Camera(4096)];
-    upright.resize(390, 844);
-    upright.home(0);
-    turned.resize(844, 390);
-    turned.home(0);
-    turned.resize(390, 844);
-    expect(turned.state.value.eye).toEqual(upright.state.value.eye);
-    turned.orbit(40, 0);
-    const moved = turned.state.value.eye;
-    turned.resize(844, 390);
-    expect(turned.state.value.eye).toEqual(moved);
-  });
-
-  it("is what it was on flat land", () => {
-    const [a, b] = [new Camera(4096), new Camera(4096)];
-    b.stand({ groundM: 0, lowM: 0 });
-    expect(b.state.value.eye).toEqual(a.state.value.eye);
-  });
-});
 
 describe("moves", () => {
   it("zoom keeps the anchor under the pointer (SPEC I2)", () => {
@@ -284,6 +119,8 @@ describe("moves", () => {
 describe("modes and flights", () => {
   it("the map keeps place and scale, and going back restores the view (SPEC I3)", () => {
     const c = camera();
+    c.goTo([100, 200, 900], [2000, 2500, 100], 0);
+    c.update(0.1, flat());
     const before = c.state.value;
     const scale = c.metresPerPixelAt(before.target);
     c.setMode("map");
@@ -291,6 +128,23 @@ describe("modes and flights", () => {
     expect(c.metresPerPixelAt(before.target)).toBeCloseTo(scale, 6);
     c.setMode("orbit");
     expect(distance(c.state.value.eye, before.eye)).toBeLessThan(1e-6);
+  });
+
+  it("the first map shows the whole land beside the bars, and going back is home again (SPEC I340)", () => {
+    const c = camera();
+    c.inset({ left: 70, top: 80, right: 20, bottom: 60 }, true);
+    const home = c.state.value;
+    c.setMode("map");
+    for (const x of [0, SIZE])
+      for (const y of [0, SIZE]) {
+        const p = c.project([x, y, 0]);
+        expect(p.x).toBeGreaterThan(70);
+        expect(p.x).toBeLessThan(1180);
+        expect(p.y).toBeGreaterThan(80);
+        expect(p.y).toBeLessThan(740);
+      }
+    c.setMode("orbit");
+    expect(distance(c.state.value.eye, home.eye)).toBeLessThan(1e-6);
   });
 
   it("goTo arrives exactly, and a user's move ends the flight", () => {

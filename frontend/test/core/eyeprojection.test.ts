@@ -1,8 +1,8 @@
 /** Places relative to the eye (SPEC R24). */
 
 import { describe, expect, it } from "vitest";
-import { cameraState, type Pose } from "../../src/core/camerastate.ts";
-import { eyeProjection, reversedDepth } from "../../src/core/eyeprojection.ts";
+import { eyeProjection, reversedDepth } from "../../src/core/camera/projection.ts";
+import { cameraState, type Pose } from "../../src/core/camera/state.ts";
 import type { CameraState, Vec3 } from "../../src/core/types.ts";
 
 const SIZE = 65536;

@@ -21,6 +21,7 @@ const ridge: Stroke = {
   plateau_radius_m: 0,
   amplitude_m: 0,
   roughness: 0.5,
+  yields: 0,
   paint: null,
   locked: false,
   hidden: false,

@@ -12,6 +12,7 @@ import type {
   Stroke,
   Welcome,
 } from "../../src/generated/contract.ts";
+import { PROTOCOL_VERSION } from "../../src/generated/contract.ts";
 import { SETTINGS } from "../settings.ts";
 
 /** Mulberry32: a small seeded generator of numbers in [0, 1). */
@@ -48,6 +49,7 @@ export function ridge(id: string, over: Partial<Stroke> = {}): Stroke {
     plateau_radius_m: 0,
     amplitude_m: 0,
     roughness: 0.5,
+    yields: 0,
     paint: null,
     locked: false,
     hidden: false,
@@ -101,7 +103,8 @@ export class ServerModel {
     const resume = clock !== null && this.doc.clock - clock <= this.keep;
     return {
       type: "welcome",
-      protocol: 5,
+      token: "",
+      protocol: PROTOCOL_VERSION,
       server: "model",
       client: "c",
       role: "edit",

@@ -1,8 +1,8 @@
 /** Slots, uploads and residency (SPEC R10, R11): a recording device stands in for the GPU; no drawing here. */
 
 import { beforeAll, describe, expect, it } from "vitest";
-import { assembleBordered, assembleSlot, BORDER, SLOT_AREA, SLOT_TEXELS } from "../../src/gpu/apron.ts";
-import { Atlas, type Resident } from "../../src/gpu/atlas.ts";
+import { assembleBordered, assembleSlot, BORDER, SLOT_AREA, SLOT_TEXELS } from "../../src/gpu/atlas/apron.ts";
+import { Atlas, type Resident } from "../../src/gpu/atlas/atlas.ts";
 import { craggyField, FieldView, filteredField, SparseView } from "./world.ts";
 
 beforeAll(() => {

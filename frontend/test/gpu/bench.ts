@@ -8,8 +8,8 @@ import type { FrameStats, QualityMode, Scene, TerrainSettings, TileView, Vec3 } 
 import { PATCH_CELLS, SUBPATCHES } from "../../src/generated/contract.ts";
 import { openGpu } from "../../src/gpu/device.ts";
 import { GpuRenderer } from "../../src/gpu/renderer.ts";
-import { recordColumn, recordLevel, recordRow } from "../../src/tiles/records.ts";
-import { type Cut, Selection } from "../../src/tiles/selection.ts";
+import { recordColumn, recordLevel, recordRow } from "../../src/tiles/patches/records.ts";
+import { type Cut, Selection } from "../../src/tiles/patches/selection.ts";
 import { drawReference } from "./dense.ts";
 import { type DrawnPatch, drawnPatch, samplesOf, shownHeight } from "./drawn.ts";
 import { flightCamera, fly, type Moment, Tally } from "./flight.ts";
@@ -122,6 +122,7 @@ function scene(step: number): Scene {
     channels: PLAIN_CHANNELS,
     settings: {
       size_m: sizeM,
+      edition: 1,
       title: "Bench",
       reach_m: 128,
       border: "free",

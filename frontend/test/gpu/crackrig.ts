@@ -5,24 +5,24 @@
  */
 
 import type { CameraState, Scene, TileView } from "../../src/core/types.ts";
-import { Atlas, type Changes, SOFTWARE_SLOTS } from "../../src/gpu/atlas.ts";
+import { Atlas, type Changes, SOFTWARE_SLOTS } from "../../src/gpu/atlas/atlas.ts";
+import { LightQueue } from "../../src/gpu/atlas/lightqueue.ts";
+import { TakeLightPass } from "../../src/gpu/atlas/takelight.ts";
+import { SunPass } from "../../src/gpu/atlas/tilecompute.ts";
+import { TileFill } from "../../src/gpu/atlas/tilefill.ts";
 import { FrameBindings, sunDirection } from "../../src/gpu/frame.ts";
-import { guardOf } from "../../src/gpu/guard.ts";
-import { LightQueue } from "../../src/gpu/lightqueue.ts";
-import { createNoiseTexture } from "../../src/gpu/noise.ts";
-import { INDEX_COUNT, PatchPasses, PITCH, patchIndices } from "../../src/gpu/patches.ts";
-import { createPass, GrowingBuffer, type PassContext } from "../../src/gpu/pipeline.ts";
+import { guardOf } from "../../src/gpu/passes/guard.ts";
+import { INDEX_COUNT, PatchPasses, PITCH, patchIndices } from "../../src/gpu/passes/patches.ts";
+import { createPass, GrowingBuffer, type PassContext } from "../../src/gpu/passes/pipeline.ts";
+import { SkyTables } from "../../src/gpu/passes/sky.ts";
+import { createStonesTexture } from "../../src/gpu/passes/stones.ts";
 import { terrainSource } from "../../src/gpu/shaders.ts";
-import { SkyTables } from "../../src/gpu/sky.ts";
-import { createStonesTexture } from "../../src/gpu/stones.ts";
-import { TakeLightPass } from "../../src/gpu/takelight.ts";
+import { createNoiseTexture } from "../../src/gpu/synthesis/noise.ts";
 import { DEPTH_FORMAT } from "../../src/gpu/target.ts";
-import { SunPass } from "../../src/gpu/tilecompute.ts";
-import { TileFill } from "../../src/gpu/tilefill.ts";
-import { finestLevel } from "../../src/tiles/detail.ts";
-import { RECORD_WORDS, recordLevel } from "../../src/tiles/records.ts";
-import { type Cut, Selection } from "../../src/tiles/selection.ts";
-import { expectation } from "../../src/tiles/synthetic.ts";
+import { finestLevel } from "../../src/tiles/detail/detail.ts";
+import { expectation } from "../../src/tiles/detail/synthetic.ts";
+import { RECORD_WORDS, recordLevel } from "../../src/tiles/patches/records.ts";
+import { type Cut, Selection } from "../../src/tiles/patches/selection.ts";
 import { type Drawn, HEIGHT, WIDTH } from "./cracktally.ts";
 import { PLAIN_CHANNELS } from "./world.ts";
 
@@ -168,6 +168,7 @@ export function sceneOf(view: TileView, state: CameraState, look: Scene["setting
     channels: PLAIN_CHANNELS,
     settings: {
       size_m: view.sizeM,
+      edition: 1,
       title: "",
       reach_m: null,
       border: "free",

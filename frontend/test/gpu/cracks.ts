@@ -5,7 +5,7 @@
 
 import { tileKey } from "../../src/core/tilekey.ts";
 import type { CameraState, Scene, Tile, TileView, Vec3 } from "../../src/core/types.ts";
-import type { PatchTree } from "../../src/tiles/patchtree.ts";
+import type { PatchTree } from "../../src/tiles/patches/patchtree.ts";
 import { makeWorld, picture, sceneOf, settle, sharedRig, spoilRecords } from "./crackrig.ts";
 import { type CrackReport, HEIGHT, KINDS, type Kind, Tally, WIDTH } from "./cracktally.ts";
 import { craggyField, FieldView, filteredField, lookAt, mapCamera, random, SparseView } from "./world.ts";
@@ -218,7 +218,7 @@ export async function deepCrackTest(seed: number, views: number, how: How = {}):
   return tally.report(views);
 }
 
-/** Room that the page's camera keeps to all sides (core/camerafloor.ts), metres. */
+/** Room that the page's camera keeps to all sides (core/camera/floor.ts), metres. */
 const ROOM = 0.45;
 /** Where ground is asked for that may rise beside an eye. */
 const AROUND = [

@@ -14,8 +14,8 @@ import {
   recordLevel,
   recordMorph,
   recordRow,
-} from "../../src/tiles/records.ts";
-import type { Cut } from "../../src/tiles/selection.ts";
+} from "../../src/tiles/patches/records.ts";
+import type { Cut } from "../../src/tiles/patches/selection.ts";
 
 /** Vertices a side. */
 export const SIDE = PATCH_CELLS + 1;

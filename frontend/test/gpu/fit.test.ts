@@ -1,9 +1,9 @@
 /** The bound grows until what a view needs fits the atlas, and a picture at rest is reached (SPEC R57). */
 
 import { beforeAll, describe, expect, it } from "vitest";
-import { Atlas } from "../../src/gpu/atlas.ts";
-import { Fit } from "../../src/gpu/fit.ts";
-import { Selection } from "../../src/tiles/selection.ts";
+import { Atlas } from "../../src/gpu/atlas/atlas.ts";
+import { Fit } from "../../src/gpu/atlas/fit.ts";
+import { Selection } from "../../src/tiles/patches/selection.ts";
 import { FieldView, filteredField, lookAt } from "./world.ts";
 
 beforeAll(() => {

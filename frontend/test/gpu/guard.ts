@@ -1,6 +1,6 @@
-/** Which pixels the device fills of triangles that leave the view: with the border of gpu/guard.ts and without. */
+/** Which pixels the device fills of triangles that leave the view: with the border of gpu/passes/guard.ts and without. */
 
-import { createPass, GrowingBuffer, type PassContext } from "../../src/gpu/pipeline.ts";
+import { createPass, GrowingBuffer, type PassContext } from "../../src/gpu/passes/pipeline.ts";
 import { VIEW_SOURCE } from "../../src/gpu/shaders.ts";
 import { makeWorld, sceneOf, sharedRig } from "./crackrig.ts";
 import { HEIGHT, WIDTH } from "./cracktally.ts";

@@ -71,7 +71,7 @@ interface Shot {
   strokes?: boolean;
   map?: number;
   /** Draw with the 2D map. */
-  sheet?: boolean;
+  print?: boolean;
   /** Draw as on a real GPU: all detail, multisampled. */
   rich?: boolean;
   /** Paint over the whole domain: values of channels, -1..1. */
@@ -177,7 +177,7 @@ function painted(paint: NonNullable<Shot["paint"]>): ChannelView {
 
 const renderers = new Map<string, SceneRenderer>();
 
-const canvasOf = (shot: Shot): string => (shot.sheet === true ? "sheet" : shot.rich === true ? "rich" : "plain");
+const canvasOf = (shot: Shot): string => (shot.print === true ? "print" : shot.rich === true ? "rich" : "plain");
 
 /** The renderer that a shot asks for, its canvas shown. */
 async function rendererFor(shot: Shot): Promise<SceneRenderer> {
@@ -186,7 +186,7 @@ async function rendererFor(shot: Shot): Promise<SceneRenderer> {
   const canvas = document.querySelector<HTMLCanvasElement>(`#${id}`)!;
   let made = renderers.get(id);
   if (made === undefined) {
-    if (id === "sheet") made = createMapRenderer(canvas);
+    if (id === "print") made = createMapRenderer(canvas);
     else if (id === "rich") made = await GpuRenderer.create(canvas, { ...(await openGpu(canvas)), software: false });
     else made = await createRenderer(canvas);
     renderers.set(id, made);
@@ -212,7 +212,7 @@ async function shoot(shot: Shot): Promise<FrameStats & { frames: number; descrip
 async function picture(shot: Shot): Promise<string> {
   await shoot(shot);
   const canvas = document.querySelector<HTMLCanvasElement>(`#${canvasOf(shot)}`)!;
-  if (shot.sheet !== true) {
+  if (shot.print !== true) {
     // A WebGPU canvas keeps its picture only until the task ends: draw once more, changed by nothing that shows.
     const used = await rendererFor(shot);
     const again = scene(shot, shot.width ?? 1280, shot.height ?? 720);

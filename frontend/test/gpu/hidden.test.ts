@@ -1,8 +1,8 @@
 /** The search for hidden patches: its pyramid, and where it pays (SPEC R58, R59). Drawing: tests/gpu/test_hidden.py. */
 
 import { describe, expect, it } from "vitest";
-import { pyramidLevels } from "../../src/gpu/hidden.ts";
-import { HiddenChoice } from "../../src/gpu/picture.ts";
+import { pyramidLevels } from "../../src/gpu/passes/hidden.ts";
+import { HiddenChoice } from "../../src/gpu/passes/picture.ts";
 
 describe("hidden patches", () => {
   it("R59: the levels of the pyramid lie one after the other down to one texel, whatever the size", () => {

@@ -1,14 +1,14 @@
 /** Twin of hidden.wgsl in float64, and its comparison with the device on pictures of depth made up for it (SPEC R59). */
 
-import { eyeProjection, reversedDepth } from "../../src/core/eyeprojection.ts";
+import { eyeProjection, reversedDepth } from "../../src/core/camera/projection.ts";
 import type { CameraState } from "../../src/core/types.ts";
 import { MAX_SYNTHESIS_LEVEL, PATCH_CELLS, TILE_CELLS } from "../../src/generated/contract.ts";
-import { HiddenPatches, pyramidLevels } from "../../src/gpu/hidden.ts";
 import { StructWriter, structLayout } from "../../src/gpu/layout.ts";
-import { INDEX_COUNT } from "../../src/gpu/patches.ts";
+import { HiddenPatches, pyramidLevels } from "../../src/gpu/passes/hidden.ts";
+import { INDEX_COUNT } from "../../src/gpu/passes/patches.ts";
 import { VIEW_SOURCE } from "../../src/gpu/shaders.ts";
-import { FACT_WORDS, recordColumn, recordLevel, recordRow } from "../../src/tiles/records.ts";
-import { type Cut, Selection } from "../../src/tiles/selection.ts";
+import { FACT_WORDS, recordColumn, recordLevel, recordRow } from "../../src/tiles/patches/records.ts";
+import { type Cut, Selection } from "../../src/tiles/patches/selection.ts";
 import { FieldView, filteredField, lookAt, random } from "./world.ts";
 
 const [WIDTH, HEIGHT] = [301, 203];

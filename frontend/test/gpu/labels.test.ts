@@ -1,7 +1,7 @@
 /** Labels on index contours (R60). */
 
 import { describe, expect, test } from "vitest";
-import { LETTERS, letterInstances } from "../../src/gpu/labels.ts";
+import { LETTERS, letterInstances } from "../../src/gpu/passes/labels.ts";
 import { contourLabels, heightText } from "../../src/tiles/contourlabels.ts";
 import { FieldView, lookAt, mapCamera } from "./world.ts";
 
@@ -61,7 +61,7 @@ describe("labels on index contours", () => {
     expect(heightText(-0, 10)).toBe("0 m");
   });
 
-  test("R60: letters are centred on the label and known to the sheet", () => {
+  test("R60: letters are centred on the label and among the glyphs", () => {
     const [label] = labels;
     const data = letterInstances([label!], camera, 20);
     const letters = [...label!.text].filter((c) => c !== " ");

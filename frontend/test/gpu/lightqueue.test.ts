@@ -1,10 +1,10 @@
 /** Whose light is marched anew (SPEC R25). */
 
 import { describe, expect, it } from "vitest";
-import type { Atlas, Resident } from "../../src/gpu/atlas.ts";
-import { LightQueue } from "../../src/gpu/lightqueue.ts";
-import type { TakeLightPass } from "../../src/gpu/takelight.ts";
-import type { SunPass } from "../../src/gpu/tilecompute.ts";
+import type { Atlas, Resident } from "../../src/gpu/atlas/atlas.ts";
+import { LightQueue } from "../../src/gpu/atlas/lightqueue.ts";
+import type { TakeLightPass } from "../../src/gpu/atlas/takelight.ts";
+import type { SunPass } from "../../src/gpu/atlas/tilecompute.ts";
 
 const tile = (level: number, x: number, y: number): Resident => ({
   level,

@@ -1,7 +1,7 @@
 /** Where shaders find the slot of a tile (SPEC R21). */
 
 import { describe, expect, it } from "vitest";
-import { NO_SLOT, PageTable } from "../../src/gpu/pagetable.ts";
+import { NO_SLOT, PageTable } from "../../src/gpu/atlas/pagetable.ts";
 import { random } from "./world.ts";
 
 describe("PageTable", () => {

@@ -8,13 +8,13 @@ import { NoWebGpu, openGpu } from "../../src/gpu/device.ts";
 import { baseHeight, sunDirection } from "../../src/gpu/frame.ts";
 import { StructWriter, structLayout } from "../../src/gpu/layout.ts";
 import { contourInterval } from "../../src/gpu/looks.ts";
-import { hillshade, shadeTile } from "../../src/gpu/mapshade.ts";
-import { NOISE_SIZE, noiseMipmaps } from "../../src/gpu/noise.ts";
-import { PITCH, patchIndices } from "../../src/gpu/patches.ts";
+import { hillshade, shadeTile } from "../../src/gpu/map/shade.ts";
+import { PITCH, patchIndices } from "../../src/gpu/passes/patches.ts";
+import { RibbonBuilder } from "../../src/gpu/passes/ribbons.ts";
+import { STONES_SIZE, stoneTexels } from "../../src/gpu/passes/stones.ts";
 import { QualityControl } from "../../src/gpu/quality.ts";
-import { RibbonBuilder } from "../../src/gpu/ribbons.ts";
 import { samePicture } from "../../src/gpu/scenediff.ts";
-import { STONES_SIZE, stoneTexels } from "../../src/gpu/stones.ts";
+import { NOISE_SIZE, noiseMipmaps } from "../../src/gpu/synthesis/noise.ts";
 import { FieldView, lookAt, PLAIN_CHANNELS } from "./world.ts";
 
 /** rgba of stones at (0, 0), (17, 300), (255, 511), (400, 33); tests/render/test_picture.py has them too. */
@@ -159,6 +159,7 @@ function scene(): Scene {
     channels: PLAIN_CHANNELS,
     settings: {
       size_m: 64,
+      edition: 1,
       title: "",
       reach_m: null,
       border: "free",

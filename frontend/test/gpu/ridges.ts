@@ -5,7 +5,7 @@
 
 import type { CameraState, FrameStats, Scene, Vec3 } from "../../src/core/types.ts";
 import { openGpu } from "../../src/gpu/device.ts";
-import type { Picture } from "../../src/gpu/picture.ts";
+import type { Picture } from "../../src/gpu/passes/picture.ts";
 import { GpuRenderer } from "../../src/gpu/renderer.ts";
 import { samplesOf } from "./drawn.ts";
 import { LAMBERT } from "./lambert.ts";
@@ -86,6 +86,7 @@ function scene(camera: CameraState): Scene {
     channels: PLAIN_CHANNELS,
     settings: {
       size_m: SIZE,
+      edition: 1,
       title: "Ridges",
       reach_m: 128,
       border: "free",

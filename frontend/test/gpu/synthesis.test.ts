@@ -5,9 +5,9 @@ import { describe, expect, it } from "vitest";
 import vectors from "../../../tests/vectors/synthesis.json";
 import type { ChannelGrid, ChannelView } from "../../src/core/types.ts";
 import { structLayout } from "../../src/gpu/layout.ts";
-import { channelWords } from "../../src/gpu/synthchannels.ts";
-import { SITE_BYTES, type SynthesisSettings, sameSettings, siteWords } from "../../src/gpu/synthsite.ts";
-import { mixBits } from "../../src/tiles/noise.ts";
+import { channelWords } from "../../src/gpu/synthesis/channels.ts";
+import { SITE_BYTES, type SynthesisSettings, sameSettings, siteWords } from "../../src/gpu/synthesis/site.ts";
+import { mixBits } from "../../src/tiles/detail/noise.ts";
 
 const SETTINGS: SynthesisSettings = {
   sizeM: 4096,

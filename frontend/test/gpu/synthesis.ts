@@ -2,7 +2,7 @@
 
 import type { ChannelGrid, ChannelView } from "../../src/core/types.ts";
 import type { Place as Home, Look } from "../../src/generated/contract.ts";
-import { type BoundsJob, BoundsPass, TILE_BOUNDS } from "../../src/gpu/bounds.ts";
+import { type BoundsJob, BoundsPass, TILE_BOUNDS } from "../../src/gpu/atlas/bounds.ts";
 import {
   GROUND_BYTES,
   SLOT_AREA,
@@ -11,7 +11,7 @@ import {
   type SynthesisJob,
   SynthesisPass,
   type SynthesisRule,
-} from "../../src/gpu/synthesis.ts";
+} from "../../src/gpu/synthesis/synthesis.ts";
 
 interface VectorSite {
   readonly name: string;

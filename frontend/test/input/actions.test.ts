@@ -1,15 +1,18 @@
 // @vitest-environment happy-dom
 // Every action on a key, and keys only where they are meant (SPEC I60-I64).
+
 import { signal } from "@preact/signals-core";
 import { beforeEach, describe, expect, it } from "vitest";
-import type { Camera } from "../../src/core/camera.ts";
+import type { Camera } from "../../src/core/camera/camera.ts";
 import { distance } from "../../src/core/math.ts";
 import { SyncDoc } from "../../src/doc/sync.ts";
-import { type Action, type ActionId, createActions, type ToolId } from "../../src/input/actions.ts";
+import { PROTOCOL_VERSION } from "../../src/generated/contract.ts";
 import { toolDefaults } from "../../src/input/defaults.ts";
-import { actionFor, combination, Keyboard, meantForCanvas } from "../../src/input/keyboard.ts";
-import { Navigation } from "../../src/input/navigation.ts";
-import { createOps } from "../../src/input/strokeops.ts";
+import type { Action, ActionId, ToolId } from "../../src/input/keys/action.ts";
+import { createActions } from "../../src/input/keys/actions.ts";
+import { actionFor, combination, Keyboard, meantForCanvas } from "../../src/input/keys/keyboard.ts";
+import { createOps } from "../../src/input/sketch/strokeops.ts";
+import { Navigation } from "../../src/input/tools/navigation.ts";
 import { EMPTY, ridge } from "../doc/model.ts";
 import { camera, FLAT, SIZE } from "./scene.ts";
 
@@ -52,7 +55,8 @@ beforeEach(() => {
   ];
   doc.welcome({
     type: "welcome",
-    protocol: 5,
+    token: "",
+    protocol: PROTOCOL_VERSION,
     server: "",
     client: "me",
     role: "edit",
@@ -76,7 +80,7 @@ beforeEach(() => {
     canEdit: () => editable,
     tool,
     selection,
-    laying: signal(null),
+    placing: signal(null),
     fingerDraws,
     defaults: toolDefaults(SIZE),
     newId: () => `copy${ids++}`,

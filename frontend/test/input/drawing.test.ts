@@ -24,7 +24,7 @@ import {
   stroke,
   strokes,
 } from "./hands.ts";
-import { SIZE, SLOPE } from "./scene.ts";
+import { FLAT, SIZE, SLOPE } from "./scene.ts";
 
 openForEach();
 
@@ -222,12 +222,47 @@ describe("drawing", () => {
     expect(c.state.value.eye).not.toEqual(before);
   });
 
-  it("a line that begins in the sky says so and moves the view", () => {
-    fire("pointerdown", 500, 3);
-    fire("pointermove", 560, 40);
-    fire("pointerup", 560, 40);
-    expect(messages).toEqual(["Begin the line on the ground."]);
+  it("a line that begins in the sky or far beside the land is refused in place: the view stays (SPEC I312)", () => {
+    const before = c.state.value;
+    for (const type of ["mouse", "touch"] as const)
+      for (const [x, y] of [[500, 3], at([-1500, 1700, 0])] as const) {
+        fire("pointerdown", x, y, { pointerType: type });
+        fire("pointermove", x + 60, y + 40, { pointerType: type });
+        fire("pointermove", x + 200, y + 40, { pointerType: type });
+        fire("pointerup", x + 200, y + 40, { pointerType: type });
+      }
+    expect(messages).toEqual(Array(4).fill("Begin the line on the land."));
     expect(strokes()).toEqual([]);
+    expect(c.state.value).toBe(before);
+  });
+
+  it("a view that is on its way somewhere stays when a line begins (SPEC I312)", () => {
+    c.goTo([2048, -900, 950], [2048, 1900, 0], 400);
+    c.update(0.1, FLAT);
+    expect(c.moving).toBe(true);
+    const before = c.state.value.eye;
+    stroke(PEAK, {}, false);
+    expect(c.moving).toBe(false);
+    c.update(0.1, FLAT);
+    expect(c.state.value.eye).toEqual(before);
+  });
+
+  it("a line that begins just beside the land begins at its border (SPEC I312)", () => {
+    c.goTo([2048, -4500, 2500], [2048, 1800, 0], 0);
+    const before = c.state.value;
+    for (const beside of [
+      [-60, 1700, 0],
+      [SIZE + 60, 1700, 0],
+    ] as const)
+      stroke([beside, [2048, 1700, 400], [2048 + (beside[0] < 0 ? 900 : -900), 1700, 0]]);
+    expect(strokes().length).toBe(2);
+    expect(strokes().map((s) => Math.round(s.first[0]))).toEqual([
+      Math.round(SIZE / 1000),
+      Math.round(SIZE - SIZE / 1000),
+    ]);
+    for (const s of strokes()) expect(Math.abs(s.first[1] - 1700)).toBeLessThan(15);
+    expect(messages).toEqual([]);
+    expect(c.state.value).toBe(before);
   });
 
   it("a stroke that somebody deletes under the pen ends with a message", () => {

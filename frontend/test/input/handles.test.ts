@@ -1,12 +1,26 @@
 // @vitest-environment happy-dom
 // Choosing strokes and dragging their handles, with synthetic events (SPEC I44-I46).
 import { beforeEach, describe, expect, it } from "vitest";
+import { strokeOf } from "../../src/app/history/gone.ts";
 import { distance, distanceXY } from "../../src/core/math.ts";
 import type { Vec3 } from "../../src/core/types.ts";
 import { worldPoints } from "../../src/doc/strokes.ts";
-import { type HandleKind, handlesOf } from "../../src/input/handles.ts";
+import { type HandleKind, handlesOf } from "../../src/input/tools/handles.ts";
 import { ridge } from "../doc/model.ts";
-import { at, c, doc, fire, handle, input, messages, only, openForEach, type PointerType, place } from "./hands.ts";
+import {
+  at,
+  c,
+  doc,
+  fire,
+  handle,
+  input,
+  messages,
+  only,
+  openForEach,
+  type PointerType,
+  place,
+  refusals,
+} from "./hands.ts";
 import { groundOf, SIZE } from "./scene.ts";
 
 openForEach();
@@ -43,6 +57,16 @@ describe("select and drag (SPEC I44)", () => {
       fire("pointermove", from[0] + ((x - from[0]) * k) / 6, from[1] + ((y - from[1]) * k) / 6, init);
     fire("pointerup", x, y, init);
   }
+
+  it("a stroke that was deleted meanwhile is named, so that it can be restored (SPEC U344)", () => {
+    const from = at(handle("last").position);
+    fire("pointerdown", ...from);
+    fire("pointermove", from[0] + 12, from[1]);
+    doc.submit({ type: "stroke.delete", stroke: "r" });
+    fire("pointermove", from[0] + 40, from[1]);
+    fire("pointerup", from[0] + 40, from[1]);
+    expect(refusals.map(({ code, op }) => [code, strokeOf(op)])).toEqual([["deleted_stroke", "r"]]);
+  });
 
   it("an end slides on the ground and re-projects the stroke (SPEC I45)", () => {
     const before = worldPoints(only());

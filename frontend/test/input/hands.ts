@@ -1,13 +1,15 @@
 /** Synthetic pointers over a canvas with a real controller, camera and document, for the input tests (SPEC I40-I54). */
 
 import { afterEach, beforeEach, expect, vi } from "vitest";
-import type { Camera } from "../../src/core/camera.ts";
+import type { Camera } from "../../src/core/camera/camera.ts";
 import type { Vec3 } from "../../src/core/types.ts";
 import { SyncDoc } from "../../src/doc/sync.ts";
 import type { Stroke } from "../../src/generated/contract.ts";
+import { PROTOCOL_VERSION } from "../../src/generated/contract.ts";
 import { InputController, type InputOptions } from "../../src/input/controller.ts";
 import { toolDefaults } from "../../src/input/defaults.ts";
-import type { HandleKind } from "../../src/input/handles.ts";
+import type { RefusedHere } from "../../src/input/say.ts";
+import type { HandleKind } from "../../src/input/tools/handles.ts";
 import { EMPTY, ridge } from "../doc/model.ts";
 import { camera, FLAT, SIZE } from "./scene.ts";
 
@@ -19,6 +21,8 @@ export let c: Camera;
 export let doc: SyncDoc;
 export let input: InputController;
 export let messages: string[];
+/** Ops of the tools that were refused, with the codes. */
+export let refusals: RefusedHere[];
 export let cursors: (Vec3 | null)[];
 export let time: number;
 let editable: boolean;
@@ -33,7 +37,8 @@ export function open(mode: "orbit" | "map" = "orbit", over: Partial<InputOptions
   doc = new SyncDoc("me", () => time);
   doc.welcome({
     type: "welcome",
-    protocol: 5,
+    token: "",
+    protocol: PROTOCOL_VERSION,
     server: "",
     client: "me",
     role: "edit",
@@ -47,6 +52,7 @@ export function open(mode: "orbit" | "map" = "orbit", over: Partial<InputOptions
     device: "",
   });
   messages = [];
+  refusals = [];
   cursors = [];
   editable = true;
   input = new InputController({
@@ -59,7 +65,10 @@ export function open(mode: "orbit" | "map" = "orbit", over: Partial<InputOptions
     canEdit: () => editable,
     defaults: toolDefaults(SIZE),
     onCursor: (p) => cursors.push(p),
-    onMessage: (m) => messages.push(m),
+    onMessage: (m, refused) => {
+      messages.push(m);
+      if (refused !== undefined) refusals.push(refused);
+    },
     now: () => time,
     ...over,
   });
@@ -88,7 +97,7 @@ export function at(p: Vec3): [number, number] {
   return [x, y];
 }
 
-/** Presses, moves in steps over world points, and releases unless told otherwise. */
+/** Goes down, moves in steps over world points, and is lifted unless told otherwise. */
 export function stroke(path: readonly Vec3[], init: PointerEventInit = {}, release = true): void {
   fire("pointerdown", ...at(path[0]!), init);
   for (let i = 1; i < path.length; i++) {

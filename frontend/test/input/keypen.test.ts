@@ -2,7 +2,7 @@
 // Drawing with the keys alone (SPEC I65).
 import { describe, expect, it } from "vitest";
 import { distance } from "../../src/core/math.ts";
-import { type Pixel, through } from "../../src/input/spline.ts";
+import { type Pixel, through } from "../../src/input/sketch/spline.ts";
 import { at, c, cursors, doc, fire, input, lookOnly, messages, only, openForEach, pass, strokes } from "./hands.ts";
 
 openForEach();
@@ -131,7 +131,7 @@ describe("the pen of the arrow keys (SPEC I65)", () => {
     press("Enter");
     press("ArrowUp", 40);
     press("Enter");
-    expect(messages.at(-1)).toContain("Begin the line on the ground");
+    expect(messages.at(-1)).toContain("Begin the line on the land");
     press("Escape");
     lookOnly();
     press("Enter");

@@ -3,7 +3,7 @@
 import { describe, expect, it } from "vitest";
 import type { Vec3 } from "../../src/core/types.ts";
 import type { CurvePoint } from "../../src/doc/strokes.ts";
-import { redraws, spliced } from "../../src/input/oversketch.ts";
+import { redraws, spliced } from "../../src/input/sketch/oversketch.ts";
 import { at, c, canvas, doc, fire, input, only, openForEach, place, stroke, strokes } from "./hands.ts";
 
 openForEach();

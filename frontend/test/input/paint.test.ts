@@ -4,8 +4,14 @@ import { describe, expect, it, vi } from "vitest";
 import type { Vec3 } from "../../src/core/types.ts";
 import { fullStroke } from "../../src/doc/document.ts";
 import { worldPoints } from "../../src/doc/strokes.ts";
-import { BrushSketch, brushRadius, PAINT_CHANNELS, pressedPaint, radiusRange } from "../../src/input/painttool.ts";
 import { drape, drapedOf, pickStroke } from "../../src/input/picking.ts";
+import {
+  BrushSketch,
+  brushRadius,
+  PAINT_CHANNELS,
+  pressedPaint,
+  radiusRange,
+} from "../../src/input/tools/painttool.ts";
 import {
   at,
   canvas,
@@ -137,7 +143,7 @@ describe("the brush", () => {
     fire("pointerdown", 500, 2);
     fire("pointermove", 600, 4);
     expect(strokes()).toEqual([]);
-    expect(messages).toEqual(["Begin the line on the ground."]);
+    expect(messages).toEqual(["Begin the line on the land."]);
   });
 });
 

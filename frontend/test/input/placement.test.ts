@@ -4,7 +4,7 @@ import { signal } from "@preact/signals-core";
 import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
 import { centreOf, cornersOf, type GridPlace } from "../../src/core/lattice.ts";
 import type { Vec3 } from "../../src/core/types.ts";
-import type { GridHandleKind, Laying } from "../../src/input/placement.ts";
+import type { GridHandleKind, Placing } from "../../src/input/tools/placement.ts";
 import { at, fire, input, open, strokes } from "./hands.ts";
 
 const SHAPE = { rows: 101, cols: 201 };
@@ -13,15 +13,15 @@ const START: GridPlace = { anchor: [1048, 1548], rotation_deg: 0, spacing_m: [10
 let laid: { place: GridPlace; gesture: string }[];
 let ends: string[];
 
-function hold(start: GridPlace = START): Laying {
+function hold(start: GridPlace = START): Placing {
   const place = signal(start);
-  const laying: Laying = {
+  const placing: Placing = {
     id: "g",
     ...SHAPE,
     low_m: 0,
     high_m: 200,
     place,
-    lay(next, gesture) {
+    moveTo(next, gesture) {
       laid.push({ place: next, gesture });
       place.value = next;
       return null;
@@ -29,8 +29,8 @@ function hold(start: GridPlace = START): Laying {
     finish: () => ends.push("finish"),
     cancel: () => ends.push("cancel"),
   };
-  input.laying.value = laying;
-  return laying;
+  input.placing.value = placing;
+  return placing;
 }
 
 const handle = (kind: GridHandleKind) => input.handles.value.find((h) => h.kind === kind)!;
@@ -176,7 +176,7 @@ describe("a grid in hand", () => {
     expect(last().rotation_deg).toBe(0);
     input.actions.get("set-point")!.run();
     expect(ends).toEqual(["finish"]);
-    input.laying.value = null;
+    input.placing.value = null;
     input.tool.value = "select";
     expect(input.actions.get("set-point")!.enabled()).toBe(false);
   });

@@ -1,8 +1,8 @@
 /** Grounds with known heights, and a camera before them, for the input tests. */
 
-import { Camera } from "../../src/core/camera.ts";
+import { Camera } from "../../src/core/camera/camera.ts";
 import type { Ground, Ray, Vec3 } from "../../src/core/types.ts";
-import type { Sample } from "../../src/input/sketch.ts";
+import type { Sample } from "../../src/input/sketch/sketch.ts";
 
 export const SIZE = 4096;
 

@@ -1,14 +1,14 @@
 // Projections from the pen to strokes (SPEC I10-I17; paper 0, III-B).
 import { describe, expect, it } from "vitest";
-import type { Camera } from "../../src/core/camera.ts";
+import type { Camera } from "../../src/core/camera/camera.ts";
 import { simplify, simplifyTo } from "../../src/core/geometry.ts";
 import { distance, distanceXY } from "../../src/core/math.ts";
 import type { Ground, Vec3 } from "../../src/core/types.ts";
 import { profileCurve, worldPoints } from "../../src/doc/strokes.ts";
-import { LevelSketch, RidgeSketch } from "../../src/input/levelsketch.ts";
-import { ProfileSketch } from "../../src/input/profilesketch.ts";
-import type { SketchShape, SketchStart } from "../../src/input/sketch.ts";
-import { shadowOf } from "../../src/input/stroketool.ts";
+import { LevelSketch, RidgeSketch } from "../../src/input/sketch/levelsketch.ts";
+import { ProfileSketch } from "../../src/input/sketch/profilesketch.ts";
+import type { SketchShape, SketchStart } from "../../src/input/sketch/sketch.ts";
+import { shadowOf, strokeId } from "../../src/input/tools/stroketool.ts";
 import { camera, FLAT, groundOf, SLOPE, sampleAt, sampleOf } from "./scene.ts";
 
 function startAt(c: Camera, ground: Ground, p: Vec3): SketchStart {
@@ -337,5 +337,17 @@ describe("the shadow", () => {
     expect(shadow.length / 3).toBeGreaterThanOrEqual(48);
     for (let i = 0; i < shadow.length; i += 3) expect(shadow[i + 2]).toBeCloseTo(0.1 * shadow[i + 1]!, 2);
     expect([...shadow.slice(-3)]).toEqual([900, 1700, 170]);
+  });
+});
+
+describe("the id of a stroke", () => {
+  it("comes after those of all strokes before it, whoever drew them (SPEC S443)", () => {
+    const client = "f".repeat(32);
+    const drawn = [
+      ["alpine-ridge-001", "s049", "0".repeat(32), "yeti"],
+      [strokeId(1.79e12, 1, client), strokeId(1.79e12 + 1, 2, "0"), strokeId(1.79e12 + 2.5, 3, client)],
+    ].flat();
+    expect([...drawn].sort().slice(-3)).toEqual(drawn.slice(-3));
+    expect(strokeId(4e12, 99_999, client)).toMatch(/^[A-Za-z0-9_-]{1,32}$/);
   });
 });

@@ -3,6 +3,7 @@
 import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
 import type { DecodedFrame } from "../../src/core/types.ts";
 import type { ServerMessage } from "../../src/generated/contract.ts";
+import { PROTOCOL_VERSION, SUBPROTOCOL } from "../../src/generated/contract.ts";
 import { Connection, type FrameSource } from "../../src/net/connection.ts";
 
 class FakeSocket {
@@ -69,7 +70,7 @@ class FakeDecoder implements FrameSource {
   close(): void {}
 }
 
-const WELCOME = { type: "welcome", clock: 0, members: [] };
+const WELCOME = { type: "welcome", token: "", clock: 0, members: [] };
 let decoder: FakeDecoder;
 let messages: ServerMessage[];
 let frames: { bytes: number; sent: number }[];
@@ -81,7 +82,7 @@ function connect(random = () => 0.5): Connection {
   frames = [];
   const connection = new Connection({
     url: "ws://localhost/ws",
-    hello: () => ({ type: "hello", protocol: 5, terrain: "t", secret: "s", client: "c", clock: null }),
+    hello: () => ({ type: "hello", protocol: PROTOCOL_VERSION, terrain: "t", secret: "s", client: "c", clock: null }),
     onMessage: (m) => messages.push(m),
     onFrame: (f) => frames.push({ bytes: f.bytes, sent: FakeSocket.last.sent.length }),
     random,
@@ -113,7 +114,7 @@ afterEach(() => {
 describe("opening", () => {
   it("says hello first and is online with the welcome (SPEC I30)", () => {
     const c = connect();
-    expect(FakeSocket.last.protocol).toBe("esker.5");
+    expect(FakeSocket.last.protocol).toBe(SUBPROTOCOL);
     expect(FakeSocket.last.binaryType).toBe("arraybuffer");
     expect(c.send({ type: "credit", bytes: 1 })).toBe(false);
     FakeSocket.last.open();

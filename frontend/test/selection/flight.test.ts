@@ -2,8 +2,8 @@
 
 import { describe, expect, it } from "vitest";
 import type { CameraState, TileView, Vec3 } from "../../src/core/types.ts";
-import { recordColumn, recordLevel, recordRow } from "../../src/tiles/records.ts";
-import { type Cut, Selection } from "../../src/tiles/selection.ts";
+import { recordColumn, recordLevel, recordRow } from "../../src/tiles/patches/records.ts";
+import { type Cut, Selection } from "../../src/tiles/patches/selection.ts";
 import { samplesOf, shownVertex } from "../gpu/drawn.ts";
 import { craggyField, lookAt, random, SparseView } from "../gpu/world.ts";
 

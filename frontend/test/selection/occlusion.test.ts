@@ -2,10 +2,10 @@
 
 import { beforeAll, describe, expect, it } from "vitest";
 import type { CameraState, Vec3 } from "../../src/core/types.ts";
-import { Surfaces } from "../../src/tiles/lakes.ts";
-import { frontToBack, Horizon } from "../../src/tiles/occlusion.ts";
-import { RECORD_WORDS } from "../../src/tiles/records.ts";
-import { type Cut, Selection } from "../../src/tiles/selection.ts";
+import { Surfaces } from "../../src/tiles/lakes/lakes.ts";
+import { frontToBack, Horizon } from "../../src/tiles/patches/occlusion.ts";
+import { RECORD_WORDS } from "../../src/tiles/patches/records.ts";
+import { type Cut, Selection } from "../../src/tiles/patches/selection.ts";
 import { type DrawnPatch, drawnPatch, rasterise, samplesOf } from "../gpu/drawn.ts";
 import { FieldView, filteredField, lookAt, mapCamera, random } from "../gpu/world.ts";
 

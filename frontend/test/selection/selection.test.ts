@@ -2,7 +2,7 @@
 
 import { beforeAll, describe, expect, it } from "vitest";
 import type { CameraState, Vec3 } from "../../src/core/types.ts";
-import { Surfaces } from "../../src/tiles/lakes.ts";
+import { Surfaces } from "../../src/tiles/lakes/lakes.ts";
 import {
   EDGE_EAST,
   EDGE_NORTH,
@@ -16,8 +16,8 @@ import {
   recordParent,
   recordRow,
   recordSlot,
-} from "../../src/tiles/records.ts";
-import { type Cut, Selection, type TileRequest } from "../../src/tiles/selection.ts";
+} from "../../src/tiles/patches/records.ts";
+import { type Cut, Selection, type TileRequest } from "../../src/tiles/patches/selection.ts";
 import { samplesOf, shownVertex } from "../gpu/drawn.ts";
 import { FieldView, filteredField, lookAt, mapCamera, random } from "../gpu/world.ts";
 

@@ -2,9 +2,9 @@
 
 import { describe, expect, it } from "vitest";
 import type { CameraState, Vec3 } from "../../src/core/types.ts";
-import { PatchTree } from "../../src/tiles/patchtree.ts";
-import { recordColumn, recordLevel, recordRow } from "../../src/tiles/records.ts";
-import { type Cut, Selection } from "../../src/tiles/selection.ts";
+import { PatchTree } from "../../src/tiles/patches/patchtree.ts";
+import { recordColumn, recordLevel, recordRow } from "../../src/tiles/patches/records.ts";
+import { type Cut, Selection } from "../../src/tiles/patches/selection.ts";
 import { craggyField, lookAt, random, SparseView } from "../gpu/world.ts";
 
 const SIZE = 65536;

@@ -2,11 +2,11 @@
 
 import { beforeAll, describe, expect, it } from "vitest";
 import type { CameraState, TerrainSettings } from "../../src/core/types.ts";
-import { Atlas, type Resident } from "../../src/gpu/atlas.ts";
-import { finestLevel } from "../../src/tiles/detail.ts";
-import { recordColumn, recordLevel, recordRow, recordSlot } from "../../src/tiles/records.ts";
-import { type Cut, Selection } from "../../src/tiles/selection.ts";
-import { expectation } from "../../src/tiles/synthetic.ts";
+import { Atlas, type Resident } from "../../src/gpu/atlas/atlas.ts";
+import { finestLevel } from "../../src/tiles/detail/detail.ts";
+import { expectation } from "../../src/tiles/detail/synthetic.ts";
+import { recordColumn, recordLevel, recordRow, recordSlot } from "../../src/tiles/patches/records.ts";
+import { type Cut, Selection } from "../../src/tiles/patches/selection.ts";
 import { alpineField, FieldView, lookAt, PLAIN_CHANNELS } from "../gpu/world.ts";
 
 const SIZE = 4096;

@@ -9,9 +9,9 @@ import {
   FrameKind,
   ROUGHNESS_QUANTA,
 } from "../../src/generated/contract.ts";
-import { channelTexels, overlayGrid } from "../../src/gpu/channeltexture.ts";
-import { detailColour, paintedColour } from "../../src/gpu/mapdetail.ts";
-import { ChannelStore } from "../../src/tiles/channels.ts";
+import { channelTexels, overlayGrid } from "../../src/gpu/atlas/channeltexture.ts";
+import { detailColour, paintedColour } from "../../src/gpu/map/detail.ts";
+import { ChannelStore } from "../../src/tiles/detail/channels.ts";
 
 const SIZE = 1000;
 

@@ -1,8 +1,8 @@
 /** What it costs to point at the shown ground and to stand on it: `npm run bench:ground`. Best of several runs, as JSON. */
 
 import { performance } from "node:perf_hooks";
-import { DetailField } from "../../src/tiles/detail.ts";
-import { heightsOfTiles } from "../../src/tiles/guide.ts";
+import { DetailField } from "../../src/tiles/detail/detail.ts";
+import { heightsOfTiles } from "../../src/tiles/patches/guide.ts";
 import type { RuleSettings } from "../../src/tiles/rules/rule.ts";
 import { ShownGround } from "../../src/tiles/shown.ts";
 import { TileStore } from "../../src/tiles/store.ts";

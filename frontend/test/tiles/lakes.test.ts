@@ -3,8 +3,8 @@
 import { readFileSync } from "node:fs";
 import { describe, expect, it } from "vitest";
 import { NO_LAKE } from "../../src/generated/contract.ts";
-import { wavesOf } from "../../src/gpu/patches.ts";
-import { findLakes, flooded, LAKE_SIDE, lakeGround, levelsOn, Surfaces } from "../../src/tiles/lakes.ts";
+import { wavesOf } from "../../src/gpu/passes/patches.ts";
+import { findLakes, flooded, LAKE_SIDE, lakeGround, levelsOn, Surfaces } from "../../src/tiles/lakes/lakes.ts";
 
 interface Case {
   name: string;

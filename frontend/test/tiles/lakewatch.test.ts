@@ -3,7 +3,7 @@
 import { describe, expect, it } from "vitest";
 import type { Tile, TileView } from "../../src/core/types.ts";
 import { NO_LAKE } from "../../src/generated/contract.ts";
-import { LakeWatch } from "../../src/tiles/lakewatch.ts";
+import { LakeWatch } from "../../src/tiles/lakes/lakewatch.ts";
 
 const SIZE = 4096;
 const RULE = { lakes_m: 4, sea_level_m: null };

@@ -4,14 +4,14 @@ import fc from "fast-check";
 import { describe, expect, test } from "vitest";
 import type { Ground, Ray, Vec3 } from "../../src/core/types.ts";
 import { TILE_CELLS } from "../../src/generated/contract.ts";
-import { Biases } from "../../src/tiles/biases.ts";
-import { BLOCK_CELLS, BLOCK_SIDE, DetailField, finestLevel } from "../../src/tiles/detail.ts";
-import { heightsOfTiles } from "../../src/tiles/guide.ts";
+import { Biases } from "../../src/tiles/detail/biases.ts";
+import { BLOCK_CELLS, BLOCK_SIDE, DetailField, finestLevel } from "../../src/tiles/detail/detail.ts";
+import { detailOf, RULES } from "../../src/tiles/detail/subdivide.ts";
+import { heightsOfTiles } from "../../src/tiles/patches/guide.ts";
 import type { RuleSettings } from "../../src/tiles/rules/rule.ts";
 import { siteOf } from "../../src/tiles/rules/rule.ts";
 import { ShownGround } from "../../src/tiles/shown.ts";
 import { TileStore } from "../../src/tiles/store.ts";
-import { detailOf, RULES } from "../../src/tiles/subdivide.ts";
 import { frame, tileOf } from "./frames.ts";
 import { channelsOf, type SiteVector, unpacked, vectors } from "./synthesis.ts";
 
@@ -83,7 +83,7 @@ describe("a block of detail", () => {
       site: siteOf(settings()),
       rule: RULES.landscape,
       biases: new Biases(painted),
-      guide: (field as unknown as { recipe: { guide: (w: never, o: Float64Array) => boolean } }).recipe.guide,
+      guide: field.recipe.guide,
     };
     for (let level = 0; level <= 12; level++) {
       const n = (TILE_CELLS / BLOCK_CELLS) * 2 ** level;

@@ -1,13 +1,15 @@
 /** SPEC T41, T42: the shown ground follows tiles, channels and settings, and makes anew only what they change. */
 
 import { describe, expect, test } from "vitest";
-import { Camera } from "../../src/core/camera.ts";
+import { Camera } from "../../src/core/camera/camera.ts";
+import type { Ground } from "../../src/core/types.ts";
 import { Channel, FrameKind } from "../../src/generated/contract.ts";
-import { ChannelStore } from "../../src/tiles/channels.ts";
-import { DetailField } from "../../src/tiles/detail.ts";
-import { heightsOfTiles } from "../../src/tiles/guide.ts";
+import { ChannelStore } from "../../src/tiles/detail/channels.ts";
+import { DetailField } from "../../src/tiles/detail/detail.ts";
 import { Memo } from "../../src/tiles/memo.ts";
+import { heightsOfTiles } from "../../src/tiles/patches/guide.ts";
 import type { RuleSettings } from "../../src/tiles/rules/rule.ts";
+import type { ShownGround } from "../../src/tiles/shown.ts";
 import { ShownTerrain } from "../../src/tiles/shownterrain.ts";
 import { TileStore } from "../../src/tiles/store.ts";
 import { frame, tileOf } from "./frames.ts";
@@ -37,7 +39,7 @@ function terrain(settings: () => RuleSettings | null = () => SETTINGS) {
 }
 
 /** The field that a frozen ground has inside. */
-const fieldOf = (ground: unknown): DetailField => (ground as { field: DetailField }).field;
+const fieldOf = (ground: Ground): DetailField => (ground as ShownGround).field;
 
 describe("the shown terrain", () => {
   test("keeps its detail when refined tiles come and go, and makes it anew when anything it depends on changes", () => {

@@ -2,8 +2,8 @@
 
 import { describe, expect, test } from "vitest";
 import { TILE_CELLS } from "../../src/generated/contract.ts";
-import { hashAt, rowStart, streamStart } from "../../src/tiles/noise.ts";
-import { detailOf, interpolated, type Samples, subdivide } from "../../src/tiles/subdivide.ts";
+import { hashAt, rowStart, streamStart } from "../../src/tiles/detail/noise.ts";
+import { detailOf, interpolated, type Samples, subdivide } from "../../src/tiles/detail/subdivide.ts";
 import { areaOf, recipeOf, samplesOf, unpacked, vectors } from "./synthesis.ts";
 
 /** Settings have no cyclic domains, so the page knows bounded ones only. */

@@ -5,10 +5,10 @@ import { resolve } from "node:path";
 import type { ChannelGrid, ChannelView } from "../../src/core/types.ts";
 import type { Look, Place, Rule } from "../../src/generated/contract.ts";
 import { QUANTA_PER_CELL, TILE_CELLS } from "../../src/generated/contract.ts";
-import { Biases } from "../../src/tiles/biases.ts";
-import { fillArea } from "../../src/tiles/guide.ts";
+import { Biases } from "../../src/tiles/detail/biases.ts";
+import { type Area, type Recipe, RULES, type Samples } from "../../src/tiles/detail/subdivide.ts";
+import { fillArea } from "../../src/tiles/patches/guide.ts";
 import { siteOf } from "../../src/tiles/rules/rule.ts";
-import { type Area, type Recipe, RULES, type Samples } from "../../src/tiles/subdivide.ts";
 
 export interface SiteVector {
   readonly name: string;

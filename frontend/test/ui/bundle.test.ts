@@ -20,8 +20,8 @@ function loaded(entry: string, seen = new Set<string>()): Set<string> {
 
 describe("the landing page", () => {
   it("loads neither the 3D view nor the component library", () => {
-    const modules = [...loaded(join(SRC, "main.ts")), ...loaded(join(SRC, "ui/landing.ts"))];
-    expect(modules.some((m) => m.endsWith("ui/landing.ts") || m.endsWith("ui/ridges.ts"))).toBe(true);
+    const modules = [...loaded(join(SRC, "main.ts")), ...loaded(join(SRC, "ui/pages/landing.ts"))];
+    expect(modules.some((m) => m.endsWith("ui/pages/landing.ts") || m.endsWith("ui/pages/ridges.ts"))).toBe(true);
     const heavy = modules.filter((m) =>
       /webawesome\/dist\/components|wgpu-matrix|\/(gpu|input|tiles|doc|net)\//.test(m),
     );
@@ -29,7 +29,7 @@ describe("the landing page", () => {
   });
 
   it("would be caught loading it", () => {
-    const modules = [...loaded(join(SRC, "ui/terrain-page.ts"))];
+    const modules = [...loaded(join(SRC, "ui/pages/terrain-page.ts"))];
     expect(modules.some((m) => /\/gpu\//.test(m))).toBe(true);
     expect(modules.some((m) => /webawesome/.test(m))).toBe(true);
   });
@@ -49,7 +49,7 @@ describe("the sources of the page", () => {
   });
 
   it("use only icons that the sprite holds", () => {
-    const sprite = readFileSync(join(SRC, "ui/icons.svg"), "utf8");
+    const sprite = readFileSync(join(SRC, "ui/controls/icons.svg"), "utf8");
     const known = new Set([...sprite.matchAll(/<symbol id="([^"]+)"/g)].map((m) => m[1]));
     const used = new Set<string>();
     for (const file of files.filter((f) => f.endsWith(".ts"))) {

@@ -4,17 +4,18 @@ import { signal } from "@preact/signals-core";
 import { html } from "lit";
 import { afterEach, describe, expect, it, vi } from "vitest";
 import { type Flank, MAX_SLOPE_DEG } from "../../src/generated/contract.ts";
-import type { EskRange } from "../../src/ui/range-field.ts";
-import "../../src/ui/range-field.ts";
-import type { EskSectionForm, SectionChange } from "../../src/ui/section-form.ts";
-import "../../src/ui/section-form.ts";
-import type { EskSegmented } from "../../src/ui/segmented.ts";
-import "../../src/ui/segmented.ts";
-import { SignalElement } from "../../src/ui/signal-element.ts";
-import type { EskSunPad } from "../../src/ui/sun-pad.ts";
-import "../../src/ui/sun-pad.ts";
-import type { EskToasts } from "../../src/ui/toasts.ts";
-import { ToastList } from "../../src/ui/toasts.ts";
+import type { EskRange } from "../../src/ui/controls/range-field.ts";
+import "../../src/ui/controls/range-field.ts";
+import type { EskSectionForm, SectionChange } from "../../src/ui/panels/section-form.ts";
+import "../../src/ui/panels/section-form.ts";
+import type { EskSegmented } from "../../src/ui/controls/segmented.ts";
+import "../../src/ui/controls/segmented.ts";
+import { SignalElement } from "../../src/ui/controls/signal-element.ts";
+import type { EskSunPad } from "../../src/ui/controls/sun-pad.ts";
+import "../../src/ui/controls/sun-pad.ts";
+import { ToastList } from "../../src/app/toasts.ts";
+import "../../src/ui/controls/toasts.ts";
+import type { EskToasts } from "../../src/ui/controls/toasts.ts";
 
 // The library's form controls need ElementInternals, which happy-dom lacks: plain elements stand in for them here.
 vi.mock("@awesome.me/webawesome/dist/components/slider/slider.js", () => ({ default: class {} }));
@@ -136,6 +137,24 @@ describe("the cross-section form", () => {
     });
     return { element, changes };
   }
+
+  it("names its sliders and switches by what they are of (SPEC U349)", async () => {
+    const { element } = await form(flank(30, 100), flank(40, 100));
+    const words = (e: Element): string => e.textContent!.replace(/\s+/g, " ").trim();
+    expect(all(element, "wa-switch").map(words)).toEqual([
+      "Flank: left side",
+      "Slope finds itself of the left flank",
+      "Flank: right side",
+      "Slope finds itself of the right flank",
+    ]);
+    const ranges = all(element, "esk-range") as EskRange[];
+    await Promise.all(ranges.map((r) => r.updateComplete));
+    const names = ranges.map((r) => words(r.shadowRoot!.querySelector('[slot="label"]')!));
+    expect(new Set(names).size, "no two have the same name").toBe(names.length);
+    expect(names).toContain("Slope of the right flank");
+    const fields = ranges.map((r) => r.shadowRoot!.querySelector("input")!.getAttribute("aria-label"));
+    expect(fields).toContain("Extent of the left flank, in metres");
+  });
 
   it("shows one side for both while they are alike, and two when they differ", async () => {
     const { element } = await form(flank(30, 100), flank(30, 100));

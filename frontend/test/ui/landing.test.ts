@@ -1,9 +1,10 @@
 // SPEC U3, U4
 // @vitest-environment happy-dom
 import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
-import type { EskLanding } from "../../src/ui/landing.ts";
-import "../../src/ui/landing.ts";
-import { rememberTerrain } from "../../src/ui/storage.ts";
+import type { EskLanding } from "../../src/ui/pages/landing.ts";
+import "../../src/ui/pages/landing.ts";
+import { keepStarted } from "../../src/app/device/kept-imports.ts";
+import { rememberTerrain } from "../../src/app/device/storage.ts";
 
 type Answer = { readonly status?: number; readonly body: unknown };
 let answers: Record<string, Answer>;
@@ -116,7 +117,7 @@ describe("the landing page", () => {
     const element = await landing();
     asked.length = 0;
     await join(element, "what?");
-    expect(element.problem).toMatch(/neither a code/);
+    expect(element.problem).toMatch(/neither a (join )?code/);
     expect(asked).toEqual([]);
     await join(element, `${window.location.origin}/t/t9#key`);
     expect(assign).toHaveBeenLastCalledWith("/t/t9#key");
@@ -154,14 +155,32 @@ describe("a file that falls on the landing page (SPEC U31)", () => {
     vi.stubGlobal("XMLHttpRequest", FakeRequest);
     const element = await landing();
     fall(new File(["x"], "St Helens.tif"));
-    await vi.waitFor(() => expect(FakeRequest.last?.path).toBe("/api/terrains/from-grid?name=St%20Helens.tif"));
+    await vi.waitFor(() =>
+      expect(FakeRequest.last?.path).toMatch(/^\/api\/terrains\/from-grid\?name=St%20Helens\.tif&client=[0-9a-f]{32}$/),
+    );
     FakeRequest.last.leave(45, 100);
     await element.updateComplete;
     expect(one(element, ".file").textContent).toContain("Uploading, 45 %");
     FakeRequest.last.answer(201, { id: "t1", secret: "s", role: "owner", import: { id: "job" } });
     await vi.waitFor(() => expect(assign).toHaveBeenCalledWith("/t/t1#s"));
-    expect(window.sessionStorage.getItem("esker.imports.t1")).toBe('[{"id":"job","file":"St Helens.tif"}]');
+    expect(window.sessionStorage.getItem("esker.jobs.t1")).toBe('[{"id":"job","file":"St Helens.tif"}]');
     window.sessionStorage.clear();
+  });
+
+  it("leads to the file of mine that is in the way, and cancels it (SPEC P348)", async () => {
+    vi.stubGlobal("XMLHttpRequest", FakeRequest);
+    keepStarted(localStorage, { terrain: "t1", secret: "s1", job: "j1", file: "first.tif" });
+    const element = await landing();
+    fall(new File(["x"], "second.tif"));
+    await vi.waitFor(() => expect(FakeRequest.last?.path).toContain("second.tif"));
+    FakeRequest.last.answer(409, { code: "busy", message: "Another file of yours is still being brought in." });
+    await vi.waitFor(() => expect(one(element, ".problem").textContent).toContain("first.tif"));
+    answers["DELETE /api/terrains/t1/imports/j1"] = { status: 204, body: null };
+    [...element.shadowRoot!.querySelectorAll<HTMLElement>(".problem button")]
+      .find((b) => b.textContent === "Cancel it")!
+      .click();
+    await vi.waitFor(() => expect(asked.some((a) => a.path === "/api/terrains/t1/imports/j1")).toBe(true));
+    await vi.waitFor(() => expect(one(element, ".problem").textContent).toBe(""));
   });
 
   it("says why it cannot", async () => {

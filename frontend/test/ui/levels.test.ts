@@ -1,10 +1,19 @@
 // What the status line and the legend say (SPEC U18, U19).
 // @vitest-environment happy-dom
 import { describe, expect, it } from "vitest";
-import { amplitudeEnds } from "../../src/ui/legend.ts";
-import { progressText } from "../../src/ui/status-line.ts";
+import { progressText } from "../../src/ui/bars/status-line.ts";
+import { amplitudeEnds } from "../../src/ui/panels/legend.ts";
 
-const progress = { type: "progress", clock: 3, level: 2, of: 4, settled: false, note: "", refining: 0 } as const;
+const progress = {
+  type: "progress",
+  clock: 3,
+  level: 2,
+  of: 4,
+  settled: false,
+  note: "",
+  refining: 0,
+  laying: false,
+} as const;
 
 describe("progressText", () => {
   it("U18: says the level, then what is left to refine, then that all is final", () => {

@@ -2,23 +2,23 @@
 // @vitest-environment happy-dom
 import { signal } from "@preact/signals-core";
 import { afterEach, describe, expect, it, vi } from "vitest";
-import { Camera } from "../../src/core/camera.ts";
+import { Camera } from "../../src/core/camera/camera.ts";
 import type { Ground, Scene, Vec3 } from "../../src/core/types.ts";
 import { fullStroke } from "../../src/doc/document.ts";
 import { MAX_DETAIL, type Paint, type Stroke } from "../../src/generated/contract.ts";
 import { toolDefaults } from "../../src/input/defaults.ts";
-import { PAINT_CHANNELS, radiusRange } from "../../src/input/painttool.ts";
-import type { EskLegend } from "../../src/ui/legend.ts";
-import "../../src/ui/legend.ts";
-import type { EskOverlay } from "../../src/ui/overlay.ts";
-import { brushRim } from "../../src/ui/overlay.ts";
-import type { EskPaintForm, PaintChange } from "../../src/ui/paint-form.ts";
-import "../../src/ui/paint-form.ts";
-import { paintName, paintWords, SUBSTANCES } from "../../src/ui/paints.ts";
-import type { EskRange } from "../../src/ui/range-field.ts";
-import { type People, strokeVisuals } from "../../src/ui/scene.ts";
-import { kindWord } from "../../src/ui/stroke-panel.ts";
-import { detailWords } from "../../src/ui/terrain-panel.ts";
+import { PAINT_CHANNELS, radiusRange } from "../../src/input/tools/painttool.ts";
+import type { EskLegend } from "../../src/ui/panels/legend.ts";
+import "../../src/ui/panels/legend.ts";
+import type { EskOverlay } from "../../src/ui/panels/overlay.ts";
+import { brushRim } from "../../src/ui/panels/overlay.ts";
+import type { EskPaintForm, PaintChange } from "../../src/ui/panels/paint-form.ts";
+import "../../src/ui/panels/paint-form.ts";
+import { type People, strokeVisuals } from "../../src/app/view/scene.ts";
+import { kindWord } from "../../src/app/words/kind-word.ts";
+import { paintName, paintWords, SUBSTANCES } from "../../src/app/words/paints.ts";
+import type { EskRange } from "../../src/ui/controls/range-field.ts";
+import { detailWords } from "../../src/ui/panels/terrain-panel.ts";
 
 vi.mock("@awesome.me/webawesome/dist/components/slider/slider.js", () => ({ default: class {} }));
 vi.mock("@awesome.me/webawesome/dist/components/switch/switch.js", () => ({ default: class {} }));
@@ -151,8 +151,8 @@ describe("lines of paint", () => {
   });
 });
 
-/** What the overlay and the legend read of a stage. */
-function stage(paint: Paint, cursor: Vec3 | null, tool = "paint", overlay: Scene["overlay"] = "snow") {
+/** What the overlay and the legend show. */
+function shown(paint: Paint, cursor: Vec3 | null, tool = "paint", overlay: Scene["overlay"] = "snow") {
   const camera = new Camera(4096);
   camera.resize(800, 600);
   const defaults = toolDefaults(4096);
@@ -160,10 +160,11 @@ function stage(paint: Paint, cursor: Vec3 | null, tool = "paint", overlay: Scene
   const ground: Ground = { sizeM: 4096, heightAt: (x) => x / 100, raycast: () => null };
   return {
     camera,
-    defaults,
+    paint: defaults.paint,
     cursor: signal(cursor),
     overlay: signal(overlay),
-    shown: { ground, attributesAt: () => ({ snow: 0.62, wet: 0.1, grass: 0.2, forest: 0.3, foam: 0.5, h: 1 }) },
+    meets: signal([]),
+    ground: { ...ground, attributesAt: () => ({ snow: 0.62, wet: 0.1, grass: 0.2, forest: 0.3, foam: 0.5, h: 1 }) },
     channels: { revision: signal(1), valueAt: () => -0.25, amplitude: { side: 2, values: new Float32Array(4) } },
     input: {
       tool: signal(tool),
@@ -171,10 +172,9 @@ function stage(paint: Paint, cursor: Vec3 | null, tool = "paint", overlay: Scene
       handles: signal([]),
       keyPen: { visual: signal(null) },
     },
-    session: {
-      canEdit: signal(true),
-      people: signal({ members: [], presences: new Map(), me: "me", myColour: "#000000" }),
-    },
+    canEdit: signal(true),
+    doc: signal(null),
+    people: signal({ members: [], presences: new Map(), me: "me", myColour: "#000000" }),
   };
 }
 
@@ -188,8 +188,8 @@ describe("the ring of the brush", () => {
   });
 
   it("is drawn with the brush in hand, over the ground, in the colour of what it paints, dashed where it takes away", async () => {
-    const rims = async (...args: Parameters<typeof stage>) => {
-      const element = await put<EskOverlay>("esk-overlay", { stage: stage(...args) });
+    const rims = async (...args: Parameters<typeof shown>) => {
+      const element = await put<EskOverlay>("esk-overlay", shown(...args));
       const found = all(element, ".rim");
       element.remove();
       return found;
@@ -208,15 +208,15 @@ describe("the ring of the brush", () => {
 
 describe("the legend of a painted channel", () => {
   it("tells what paint asks for under the cursor, and what comes of it", async () => {
-    const element = await put<EskLegend>("esk-legend", { stage: stage(snow, [1, 2, 3]) });
+    const element = await put<EskLegend>("esk-legend", shown(snow, [1, 2, 3]));
     const text = element.shadowRoot!.textContent!.replace(/\s+/g, " ");
     expect(text).toContain("Painted snow");
     expect(text).toContain("Paint here−25 %");
     expect(text).toContain("Snow here62 %");
     expect(element.hasAttribute("hidden")).toBe(false);
-    const levels = await put<EskLegend>("esk-legend", { stage: stage(snow, [1, 2, 3], "paint", "patches") });
+    const levels = await put<EskLegend>("esk-legend", shown(snow, [1, 2, 3], "paint", "patches"));
     expect(levels.shadowRoot!.textContent).toContain("Levels of detail");
-    const plain = await put<EskLegend>("esk-legend", { stage: stage(snow, [1, 2, 3], "paint", "none") });
+    const plain = await put<EskLegend>("esk-legend", shown(snow, [1, 2, 3], "paint", "none"));
     expect(plain.hasAttribute("hidden")).toBe(true);
   });
 });

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from esker import fractal as f
 from esker.contract import BASE_ROUGHNESS
+from esker.contract import fractal as f
 from esker.synthesis import hash as noise
 from esker.synthesis.interpolate import Window
 from esker.synthesis.rules.targets import blended, painted, smoothstep, targets

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from esker import fractal as f
+from esker.contract import fractal as f
 from esker.synthesis.interpolate import Window
 from esker.synthesis.rules.targets import blended, painted, targets
 from esker.synthesis.site import Biases, Ground, Site

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from esker import fractal as f
+from esker.contract import fractal as f
 from esker.synthesis.site import Ground, Site
 from esker.synthesis.state import Array
 

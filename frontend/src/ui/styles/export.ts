@@ -101,23 +101,8 @@ export const exportStyles = css`
     margin-left: auto;
   }
   progress {
-    appearance: none;
-    width: 100%;
     height: 6px;
-    border: 0;
     border-radius: 3px;
-    overflow: hidden;
-    background: var(--esk-line-strong);
-  }
-  progress::-webkit-progress-bar {
-    background: transparent;
-  }
-  progress::-webkit-progress-value {
-    background: var(--esk-accent);
-    transition: width 160ms linear;
-  }
-  progress::-moz-progress-bar {
-    background: var(--esk-accent);
   }
   .says {
     font-variant-numeric: tabular-nums;

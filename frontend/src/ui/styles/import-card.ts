@@ -38,25 +38,6 @@ export const importCardStyles = css`
     color: var(--esk-quiet);
     font-variant-numeric: tabular-nums;
   }
-  progress {
-    appearance: none;
-    width: 100%;
-    height: 4px;
-    border: 0;
-    border-radius: 2px;
-    overflow: hidden;
-    background: var(--esk-line-strong);
-  }
-  progress::-webkit-progress-bar {
-    background: transparent;
-  }
-  progress::-webkit-progress-value {
-    background: var(--esk-accent);
-    transition: width 160ms linear;
-  }
-  progress::-moz-progress-bar {
-    background: var(--esk-accent);
-  }
   .problem {
     color: var(--esk-bad);
   }
@@ -69,26 +50,6 @@ export const importCardStyles = css`
     width: 15px;
     height: 15px;
     margin-top: 2px;
-  }
-  summary {
-    width: max-content;
-    cursor: pointer;
-    color: var(--esk-quiet);
-  }
-  dl {
-    display: grid;
-    grid-template-columns: auto 1fr;
-    gap: 3px 12px;
-    margin: 6px 0 0;
-  }
-  dt {
-    color: var(--esk-quiet);
-  }
-  dd {
-    margin: 0;
-    text-align: right;
-    overflow-wrap: anywhere;
-    font-variant-numeric: tabular-nums;
   }
   form {
     display: grid;

@@ -146,13 +146,23 @@ export const landingStyles = css`
   .btn.solid {
     background: var(--esk-hover);
   }
+  /* On a ground of its own: the picture behind it has every brightness. */
   .problem {
+    width: fit-content;
+    max-width: 100%;
     margin: 12px 0 8px;
-    color: color-mix(in oklab, var(--esk-bad) 85%, var(--ink));
+    padding: 7px 12px;
+    border-radius: 10px;
+    background: var(--esk-panel-solid);
+    color: var(--esk-bad);
     font-weight: 550;
+  }
+  .problem button {
+    margin-left: 10px;
   }
   .problem:empty {
     margin: 6px 0;
+    padding: 0;
   }
   .file {
     display: inline-flex;
@@ -164,6 +174,13 @@ export const landingStyles = css`
     border-radius: 8px;
     font-weight: 500;
     cursor: pointer;
+  }
+  .kept {
+    display: block;
+    width: fit-content;
+    margin-top: 6px;
+    color: var(--ink);
+    font-weight: 500;
   }
   .file:hover {
     background: var(--esk-hover);

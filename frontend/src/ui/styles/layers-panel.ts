@@ -44,7 +44,7 @@ export const layersPanelStyles = css`
     border-radius: 3px;
     border: 1px solid rgb(0 0 0 / 25%);
   }
-  .grip {
+  .order {
     flex: none;
     display: grid;
     place-items: center;
@@ -58,7 +58,7 @@ export const layersPanelStyles = css`
     cursor: grab;
     touch-action: none;
   }
-  .grip:active {
+  .order:active {
     cursor: grabbing;
   }
   .note .icon {
@@ -67,7 +67,7 @@ export const layersPanelStyles = css`
     height: 16px;
   }
   @media (pointer: coarse) {
-    .grip {
+    .order {
       width: 44px;
       height: 44px;
     }

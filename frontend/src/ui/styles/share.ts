@@ -37,6 +37,9 @@ export const shareStyles = css`
     color: #14191f;
     background: #fff;
   }
+  wa-switch {
+    margin-top: 14px;
+  }
   .problem {
     margin-top: 8px;
     color: var(--esk-bad);
@@ -86,6 +89,17 @@ export const shareStyles = css`
     line-height: 1.15;
     white-space: nowrap;
   }
+  .projected .left {
+    display: flex;
+    flex-wrap: wrap;
+    align-items: center;
+    justify-content: center;
+    gap: 0.6em;
+    font-size: 1rem;
+  }
+  .projected strong {
+    overflow-wrap: anywhere;
+  }
   .projected .qr {
     width: auto;
     margin: 0;
@@ -97,34 +111,5 @@ export const shareStyles = css`
     font-weight: 680;
     letter-spacing: 0.08em;
     line-height: 1.3;
-  }
-  details {
-    margin-top: 14px;
-    padding-top: 12px;
-    border-top: 1px solid var(--esk-line);
-  }
-  summary {
-    cursor: pointer;
-    font-weight: 550;
-    font-size: 0.8125rem;
-  }
-  ul {
-    margin: 6px 0 0;
-    padding: 0;
-    list-style: none;
-  }
-  li {
-    display: flex;
-    align-items: center;
-    gap: 8px;
-    min-height: 36px;
-    font-size: 0.8125rem;
-  }
-  li .name {
-    flex: 1;
-    min-width: 0;
-    overflow: hidden;
-    text-overflow: ellipsis;
-    white-space: nowrap;
   }
 `;

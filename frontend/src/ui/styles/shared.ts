@@ -98,6 +98,13 @@ export const shared = css`
   .btn.primary:hover:not(:disabled) {
     background: var(--esk-accent-hover);
   }
+  .btn.danger {
+    background: #b3261e;
+    color: #fff;
+  }
+  .btn.danger:hover:not(:disabled) {
+    background: #93201a;
+  }
   .btn.outline {
     border-color: var(--esk-edge);
   }

@@ -49,7 +49,7 @@ export const terrainPageStyles = css`
     position: absolute;
     top: calc(var(--edge) + 60px);
     right: var(--edge);
-    width: 312px;
+    width: 328px;
     max-height: calc(100% - 2 * var(--edge) - 60px - 54px);
     display: flex;
     flex-direction: column;
@@ -107,6 +107,8 @@ export const terrainPageStyles = css`
     bottom: auto;
     top: 74px;
     width: max-content;
+  }
+  .closed button {
     pointer-events: auto;
   }
   .closed .icon {
@@ -120,6 +122,7 @@ export const terrainPageStyles = css`
     display: flex;
     align-items: center;
     gap: 10px;
+    width: max-content;
     max-width: calc(100% - 2 * var(--edge));
     padding: 8px 16px 8px 12px;
     font-size: 0.8125rem;
@@ -197,23 +200,33 @@ export const terrainPageStyles = css`
     text-align: right;
     overflow-wrap: anywhere;
   }
+  /* Sentences stand beside the inspector, not under it. */
+  @media (min-width: 721px) {
+    :host([drawer]) .hint,
+    :host([drawer]) .closed,
+    :host([drawer]) .importing,
+    :host([drawer]) esk-toasts {
+      left: calc((100% - 340px) / 2);
+      max-width: calc(100% - 340px - 2 * var(--edge));
+    }
+  }
   @media (max-width: 720px) {
     :host {
       --edge: 8px;
-      --sheet: 0px;
+      --drawer: 0px;
     }
-    /* The sheet stands below the picture, not on it: what one changes must be seen. One height for all its tabs. */
-    :host([sheet]) {
-      --sheet: min(46%, 400px);
+    /* The drawer stands below the picture, not on it: what one changes must be seen. One height for all its tabs. */
+    :host([drawer]) {
+      --drawer: min(46%, 400px);
     }
-    :host([sheet]) .viewport {
-      bottom: calc(var(--sheet) - var(--esk-radius));
+    :host([drawer]) .viewport {
+      bottom: calc(var(--drawer) - var(--esk-radius));
     }
-    :host([sheet]) .foot {
+    :host([drawer]) .foot {
       display: none;
     }
-    :host([sheet]) esk-tools {
-      bottom: calc(var(--sheet) + var(--edge));
+    :host([drawer]) esk-tools {
+      bottom: calc(var(--drawer) + var(--edge));
     }
     esk-tools {
       left: 50%;
@@ -234,7 +247,7 @@ export const terrainPageStyles = css`
       right: 0;
       bottom: 0;
       width: auto;
-      height: var(--sheet);
+      height: var(--drawer);
       max-height: none;
       z-index: 2;
       border-radius: var(--esk-radius) var(--esk-radius) 0 0;
@@ -246,18 +259,37 @@ export const terrainPageStyles = css`
         transform: translateY(24px);
       }
     }
-    /* A small window on its side, or a page at 200 %: the sheet stands beside the picture. */
+    /* A small window on its side, or a page at 200 %: the drawer stands beside the picture. */
     @media (max-height: 440px) and (min-width: 480px) {
-      :host([sheet]) {
-        --sheet: 0px;
-        --beside: min(46%, 300px);
+      :host([drawer]) {
+        --drawer: 0px;
+        --beside: min(46vw, 300px);
       }
-      :host([sheet]) .viewport {
+      :host([drawer]) .viewport {
         right: calc(var(--beside) - var(--esk-radius));
         bottom: 0;
       }
-      :host([sheet]) esk-tools {
+      :host([drawer]) esk-tools,
+      :host([drawer]) .hint,
+      :host([drawer]) .closed,
+      :host([drawer]) .importing,
+      :host([drawer]) esk-toasts {
         left: calc((100% - var(--beside)) / 2);
+        max-width: calc(100% - var(--beside) - 2 * var(--edge));
+      }
+      /* Eight tools beside each other in what is left. Where they would be too narrow to hit, the row scrolls. */
+      :host([drawer]) esk-tools {
+        --tool-width: clamp(32px, (100vw - var(--beside) - 2 * var(--edge) - 54px) / 8, 44px);
+        overflow-x: auto;
+        scrollbar-width: thin;
+        justify-content: safe center;
+      }
+      .side header {
+        padding: 8px 6px 6px 10px;
+        gap: 4px;
+      }
+      .side header esk-segmented {
+        --segment-pad: 3px;
       }
       .side {
         top: calc(var(--edge) + 52px);
@@ -267,17 +299,34 @@ export const terrainPageStyles = css`
         border-radius: var(--esk-radius) 0 0 0;
       }
     }
+    /* Four tabs and a cross do not stand side by side here: two and two do. */
+    @media (max-height: 440px) and (min-width: 480px) and (max-width: 620px) {
+      .side header esk-segmented {
+        --segments-wrap: wrap;
+        --segment-basis: 40%;
+      }
+    }
     .hint,
     esk-toasts {
-      bottom: calc(118px + var(--sheet) + env(safe-area-inset-bottom));
+      bottom: calc(132px + var(--drawer) + env(safe-area-inset-bottom));
       width: max-content;
+    }
+    /* Over the tools it would lie on the land, for which the drawer leaves little: above the land is mist and sky. */
+    :host([drawer]) .hint {
+      bottom: auto;
+      top: 66px;
+    }
+    /* Sentences that matter more have that place. */
+    :host([drawer]) .hint:has(~ .closed, ~ .importing) {
+      bottom: calc(var(--drawer) + var(--edge) + 62px);
+      top: auto;
     }
     .hint {
       font-size: 0.8125rem;
       padding: 9px 14px 9px 12px;
     }
     esk-toasts {
-      bottom: calc(170px + var(--sheet) + env(safe-area-inset-bottom));
+      bottom: calc(188px + var(--drawer) + env(safe-area-inset-bottom));
     }
   }
 `;

@@ -1,0 +1,434 @@
+"""A live terrain from Python (DESIGN 5.7): ``esker.connect(link)`` has the methods of ``Terrain`` and of a session.
+
+    with esker.connect("http://127.0.0.1:8000/t/abc#secret") as t:
+        ridge = t.add(Stroke.profile([(500, 2000, 0), (2000, 2200, 900), (3500, 2000, 0)]))
+        t.set(ridge, label="Ridge")
+        h = t.heights(level=4)
+
+A thread holds the socket. Calls apply at once here and are confirmed by the server; after a cut the thread reconnects
+and sends again what was not acknowledged. ``heights`` are solved here from the document; with ``ground=True`` the
+client also takes what the server streams:
+
+    with esker.connect(link, ground=True) as t:
+        t.ground.look(eye=(2000, 1900, 40), target=(2000, 2000, 30))
+        t.ground.wait()
+        fine = t.ground.tile(8, 120, 131)   # (65, 65) float32, metres, where one looks
+        rough = t.ground.roughness(2)       # (257, 257)
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import random
+import secrets
+import ssl
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Final, Self, get_args
+
+from websockets.asyncio.client import ClientConnection
+from websockets.asyncio.client import connect as open_socket
+from websockets.exceptions import ConnectionClosed, InvalidHandshake, InvalidMessage
+
+from esker import contract as c
+from esker.api import arguments
+from esker.api.link import Link, Refused
+from esker.api.live_ground import StreamedGround
+from esker.api.live_heights import LiveHeights
+from esker.api.live_history import LiveHistory
+from esker.api.live_layers import Grids, LiveLayers
+from esker.contract import Document, Op, Stroke, TerrainSettings
+from esker.document.ops import Refusal
+from esker.document.sync import Diverged, SyncDoc
+from esker.document.undo import UndoPlan
+from esker.document.wire import op_json
+from esker.session.room.limits import TokenBucket
+from esker.solve.solver import Solver
+from esker.tiles.codec.frame import FrameError
+
+log = logging.getLogger("esker.api.live")
+
+__all__ = ["Link", "LiveTerrain", "Refused", "connect"]
+
+RATE: Final = 0.8 * c.MAX_OPS_PER_SECOND
+BURST: Final = 0.5 * c.OPS_BURST
+"""A little below the server's own, so that nothing is refused for its rate."""
+MESSAGE_BYTES: Final = c.MAX_MESSAGE_BYTES - 1024
+MAX_CURVE_POINTS: Final = 1_024
+"""A longer curve is sent by appends: one message does not hold it."""
+BACKOFF_SECONDS: Final = (0.2, 10.0)
+FINAL_CODES: Final = frozenset(code for code in c.WS_CLOSE.values() if code <= 4008 or code == 4011)
+CONNECT_SECONDS: Final = 15.0
+LOST: Final = (OSError, ConnectionClosed, InvalidHandshake, InvalidMessage, TimeoutError, Diverged, FrameError)
+"""After these the client connects again."""
+
+
+class LiveTerrain(LiveLayers, LiveHistory, LiveHeights):
+    """A terrain that others may be changing too. All methods may be called from any thread."""
+
+    def __init__(
+        self,
+        link: str,
+        name: str = "Python",
+        *,
+        ca_file: str | Path | None = None,
+        timeout: float = CONNECT_SECONDS,
+        solver: Solver | None = None,
+        ground: bool = False,
+    ) -> None:
+        """Connects and waits for the document. ``ca_file``: the ``esker-ca.pem`` of a classroom server; ``ground``:
+        take the tiles that the server streams.
+
+        Raises ValueError for what is no link, Refused when the server does not let us in, TimeoutError.
+        """
+        timeout, ground = arguments.wait("timeout", timeout), arguments.flag("ground", ground)
+        self._ca_file = None if ca_file is None else arguments.path("ca_file", ca_file)
+        self._link, self._name = Link(link), arguments.text("name", name, c.MAX_NAME_LENGTH)
+        self._solver, self._address = arguments.kind("solver", solver, Solver), link
+        self._tls = ssl.create_default_context(cafile=ca_file) if self._link.secure else None
+        self._grids = Grids(link, self._tls)
+        self._client = f"py-{secrets.token_hex(8)}"
+        self._token: str | None = None
+        self._sync = SyncDoc(self._client)
+        self._changed = threading.Condition()
+        self._failure: Refused | None = None
+        self._refusals: list[Refused] = []
+        self._online = False
+        self._closing = False
+        self._role: c.Role = "view"
+        self._members: tuple[c.Member, ...] = ()
+        self._bucket = TokenBucket(RATE, BURST)
+        self._local = None
+        self._ground: StreamedGround | None = None
+        if ground:
+            self._ground = StreamedGround(self._sync, self._changed, self._poke, self._raise_failure)
+        self._loop = asyncio.new_event_loop()
+        self._wake = asyncio.Event()
+        self._thread = threading.Thread(target=self._run, name="esker-client", daemon=True)
+        self._thread.start()
+        try:
+            self._await(lambda: self._sync.clock is not None, timeout, "no answer from the server")
+        except BaseException:
+            self.close()
+            raise
+
+    # --- reading ------------------------------------------------------------------------------------------------
+
+    @property
+    def id(self) -> str:
+        """The terrain's id."""
+        return self._link.terrain
+
+    @property
+    def role(self) -> c.Role:
+        """What this link allows."""
+        return self._role
+
+    @property
+    def online(self) -> bool:
+        """False while the connection is being made again."""
+        return self._online
+
+    @property
+    def members(self) -> tuple[c.Member, ...]:
+        """Who is here, ourselves included."""
+        with self._changed:
+            return self._members
+
+    @property
+    def strokes(self) -> tuple[Stroke, ...]:
+        """The strokes as seen from here: confirmed, with our unconfirmed changes on top."""
+        with self._changed:
+            return tuple(self._sync.document.strokes.values())
+
+    @property
+    def settings(self) -> TerrainSettings:
+        """The terrain's settings."""
+        with self._changed:
+            return self._sync.document.settings
+
+    @property
+    def clock(self) -> int:
+        """Clock of the confirmed document."""
+        with self._changed:
+            return self._sync.confirmed.clock
+
+    @property
+    def document(self) -> Document:
+        """The confirmed document."""
+        with self._changed:
+            return self._sync.confirmed.to_document()
+
+    @property
+    def ground(self) -> StreamedGround:
+        """What the server streams. Raises RuntimeError unless connected with ``ground=True``."""
+        if self._ground is None:
+            raise RuntimeError("connect with ground=True to take the ground that the server streams")
+        return self._ground
+
+    # --- changing -----------------------------------------------------------------------------------------------
+
+    def add(self, stroke: Stroke) -> str:
+        """Adds a stroke, or replaces the one of the same id; returns the id. One undo step.
+
+        Raises Refused, TypeError for what is no stroke, RuntimeError after ``close``.
+        """
+        if not isinstance(stroke, c.Stroke):
+            raise TypeError(f"add takes a stroke, as Stroke.profile(...) makes one, not {type(stroke).__name__}")
+        arguments.model(c.Stroke, stroke.model_dump())  # it may be a copy with any fields
+        gesture = f"add-{secrets.token_hex(4)}"
+        with self._changed:
+            exists = stroke.id in self._sync.document.strokes
+        long = len(stroke.curve) > MAX_CURVE_POINTS
+        if exists:
+            fields = {n: getattr(stroke, n) for n in c.StrokeFields.model_fields if not (long and n == "curve")}
+            self._submit(c.SetStroke(stroke=stroke.id, fields=c.StrokeFields.model_validate(fields)), gesture)
+        else:
+            born = stroke.model_copy(update={"curve": (), "finished": False, "locked": False}) if long else stroke
+            self._submit(c.BeginStroke(stroke=born), gesture)
+        if long:
+            step = c.MAX_POINTS_PER_APPEND
+            for start in range(0, len(stroke.curve), step):
+                points = stroke.curve[start : start + step]
+                op = c.AppendPoints(stroke=stroke.id, start=start, points=points, last=stroke.last)
+                self._submit(op, gesture)
+            if stroke.finished:
+                self._submit(c.FinishStroke(stroke=stroke.id), gesture)
+            if stroke.locked:
+                self._submit(c.SetStroke(stroke=stroke.id, fields=c.StrokeFields(locked=True)), gesture)
+        return stroke.id
+
+    def remove(self, stroke_id: str) -> None:
+        """Deletes a stroke. Raises Refused, ValueError for what is no id."""
+        self._submit(arguments.model(c.DeleteStroke, {"stroke": stroke_id}))
+
+    def restore(self, stroke_id: str) -> None:
+        """Brings a deleted stroke back. Raises Refused, ValueError for what is no id."""
+        self._submit(arguments.model(c.RestoreStroke, {"stroke": stroke_id}))
+
+    def set(self, stroke_id: str, **fields: Any) -> None:
+        """Changes fields of a stroke: ``label``, ``left``, ``hidden`` … Raises Refused, ValueError."""
+        changes = arguments.model(c.StrokeFields, fields)
+        self._submit(arguments.model(c.SetStroke, {"stroke": stroke_id, "fields": changes}))
+
+    def set_terrain(self, **fields: Any) -> None:
+        """Changes settings: ``title``, ``sea_level_m``, ``look`` … Raises Refused, ValueError."""
+        self._submit(c.SetTerrain(fields=arguments.model(c.TerrainFields, fields)))
+
+    def apply(self, op: Op) -> None:
+        """Any op of the contract. Raises Refused when it does not apply here, TypeError for what is none."""
+        if not isinstance(op, get_args(get_args(c.Op)[0])):
+            raise TypeError(f"apply takes an op of esker.contract, not {type(op).__name__}")
+        self._submit(op)
+
+    def undo(self) -> UndoPlan:
+        """Takes back our own last step; never what others did since (``skipped`` says what was left)."""
+        return self._travel(self._sync.undo)
+
+    def redo(self) -> UndoPlan:
+        """Takes back our own last undo."""
+        return self._travel(self._sync.redo)
+
+    def wait(self, timeout: float = CONNECT_SECONDS) -> int:
+        """Returns the clock once all our changes are in the server's journal.
+
+        Raises TimeoutError, and Refused when the server refused one of them since the last ``wait``.
+        """
+        timeout = arguments.wait("timeout", timeout)
+        self._await(lambda: not self._sync.pending, timeout, "the server has not saved everything")
+        with self._changed:
+            refusals, self._refusals = self._refusals, []
+            if refusals:
+                raise refusals[0]
+            return self._sync.confirmed.clock
+
+    def wait_clock(self, clock: int, timeout: float = CONNECT_SECONDS) -> None:
+        """Returns once the confirmed document has reached ``clock``. Raises TimeoutError, ValueError."""
+        clock, timeout = arguments.clock("clock", clock), arguments.wait("timeout", timeout)
+        self._await(lambda: self._sync.confirmed.clock >= clock, timeout, f"clock {clock} did not come")
+
+    def close(self) -> None:
+        """Leaves. What is unsent then is lost: call ``wait`` first."""
+        if self._closing:
+            return
+        self._closing = True
+        self._poke()
+        self._thread.join(timeout=10)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        try:
+            if kind is None:
+                self.wait()
+        finally:
+            self.close()
+
+    def _submit(self, op: Op, gesture: str | None = None) -> None:
+        if len(op_json(op)) > MESSAGE_BYTES:
+            raise Refused("too_large", "This change is too large for one message.")
+        with self._changed:
+            self._raise_failure()
+            self._raise_closed()
+            try:
+                self._sync.submit(op, gesture)
+            except Refusal as refusal:
+                raise Refused(refusal.code, refusal.message) from None
+        self._poke()
+
+    def _travel(self, move: Callable[[], UndoPlan]) -> UndoPlan:
+        with self._changed:
+            self._raise_failure()
+            self._raise_closed()
+            plan = move()
+        self._poke()
+        return plan
+
+    def _raise_failure(self) -> None:
+        if self._failure is not None:
+            raise self._failure
+
+    def _raise_closed(self) -> None:
+        if self._closing:
+            raise RuntimeError("this connection was closed: connect again to change the terrain")
+
+    def _await(self, ready: Callable[[], bool], timeout: float, what: str) -> None:
+        with self._changed:
+            done = self._changed.wait_for(lambda: self._failure is not None or ready(), timeout)
+            if not ready():
+                self._raise_failure()
+            if not done:
+                raise TimeoutError(what)
+
+    def _poke(self) -> None:
+        if not self._loop.is_closed():
+            self._loop.call_soon_threadsafe(self._wake.set)
+
+    # --- the thread ---------------------------------------------------------------------------------------------
+
+    def _run(self) -> None:
+        try:
+            self._loop.run_until_complete(self._stay_connected())
+        finally:
+            self._loop.close()
+
+    async def _stay_connected(self) -> None:
+        low, high = BACKOFF_SECONDS
+        delay = low
+        while not self._closing and self._failure is None:
+            started = time.monotonic()
+            try:
+                await self._connection()
+            except LOST as error:
+                log.info("connection lost: %s", error)
+                if isinstance(error, Diverged):
+                    with self._changed:
+                        self._sync.start_over()
+            with self._changed:
+                self._online = False
+                self._sync.disconnected()
+                self._changed.notify_all()
+            if self._closing or self._failure is not None:
+                return
+            delay = low if time.monotonic() - started > high else min(high, delay * 2)
+            self._wake.clear()
+            await self._sleep(delay * random.uniform(0.5, 1.0))
+
+    async def _sleep(self, seconds: float) -> None:
+        end = time.monotonic() + seconds
+        while not self._closing and time.monotonic() < end:
+            await asyncio.sleep(min(0.1, seconds))
+
+    async def _connection(self) -> None:
+        options: dict[str, Any] = {"ssl": self._tls} if self._tls else {}
+        async with open_socket(
+            self._link.url,
+            subprotocols=[c.SUBPROTOCOL],  # type: ignore[list-item]
+            max_size=None,
+            compression=None,
+            open_timeout=10,
+            **options,
+        ) as socket:
+            hello = c.Hello(
+                protocol=c.PROTOCOL_VERSION,
+                terrain=self._link.terrain,
+                secret=self._link.secret,
+                client=self._client,
+                token=self._token,
+                name=self._name,
+                clock=self._sync.clock,
+            )
+            await socket.send(hello.model_dump_json())
+            if self._ground is not None:
+                with self._changed:
+                    self._ground.connected()
+            sender = asyncio.create_task(self._send(socket))
+            try:
+                async for message in socket:
+                    if isinstance(message, str):
+                        self._receive(c.SERVER_MESSAGE.validate_json(message))
+                    elif self._ground is not None:  # else frames are not read, and no credit is given for them
+                        with self._changed:
+                            credit = self._ground.applied(message)
+                        await socket.send(credit.model_dump_json())
+            finally:
+                sender.cancel()
+                await asyncio.gather(sender, return_exceptions=True)
+
+    async def _send(self, socket: ClientConnection) -> None:
+        while True:
+            await self._wake.wait()
+            self._wake.clear()
+            if self._closing:
+                await socket.close()
+                return
+            if self._ground is not None and self._online:
+                with self._changed:
+                    view = self._ground.unsent()
+                if view is not None:
+                    await socket.send(view.model_dump_json())
+            while self._online and not self._closing:
+                with self._changed:
+                    envelopes = self._sync.outgoing(1) if self._bucket.take(time.monotonic()) else None
+                if envelopes is None:
+                    await asyncio.sleep(1 / RATE)
+                    continue
+                if not envelopes:
+                    break
+                envelope = envelopes[0]
+                await socket.send(f'{{"type":"ops","ops":[{{"id":"{envelope.id}","op":{op_json(envelope.op)}}}]}}')
+
+    def _receive(self, message: object) -> None:
+        with self._changed:
+            match message:
+                case c.Welcome():
+                    self._sync.welcome(message)
+                    self._token = message.token
+                    self._role, self._members, self._online = message.role, message.members, True
+                    self._wake.set()
+                case c.OpsBroadcast():
+                    self._sync.ordered(message)
+                case c.Ack():
+                    self._sync.ack(message)
+                case c.Reject():
+                    self._sync.reject(message)
+                    self._refusals.append(Refused(message.code, message.message))
+                case c.Members():
+                    self._members = message.members
+                case c.Progress() if self._ground is not None:
+                    self._ground.progressed(message)
+                case c.ErrorMessage() if message.fatal and c.WS_CLOSE[message.code] in FINAL_CODES:
+                    self._failure = Refused(message.code, message.message)
+            self._changed.notify_all()
+
+
+def connect(link: str, name: str = "Python", **options: Any) -> LiveTerrain:
+    """A live terrain by its share link; see ``LiveTerrain``. Raises ValueError, Refused, TimeoutError."""
+    return LiveTerrain(link, name, **options)

@@ -1,0 +1,52 @@
+"""The heights of a live terrain from Python, solved here from the confirmed document."""
+
+from __future__ import annotations
+
+import threading
+from abc import ABC
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from esker import contract as c
+from esker.api import arguments
+from esker.api.live_layers import Grids
+from esker.api.terrain import Terrain
+from esker.contract import Document
+from esker.document.sync import SyncDoc
+from esker.solve.solver import Solver
+
+
+class LiveHeights(ABC):
+    """The methods of ``LiveTerrain`` that an offline ``Terrain`` of the same document answers."""
+
+    _solver: Solver | None
+    _grids: Grids
+    _sync: SyncDoc
+    _changed: threading.Condition
+    _local: tuple[Document, Terrain] | None
+
+    def heights(self, level: int = c.DEFAULT_LEVEL) -> NDArray[np.float32]:
+        """Settled heights of the confirmed document, solved here; see ``Terrain.heights``."""
+        level = arguments.whole("level", level, 0, c.MAX_LEVEL)
+        return self._offline().heights(level)
+
+    def assemble(self, level: int) -> Any:
+        """The sparse system of the confirmed document; see ``Terrain.assemble``."""
+        level = arguments.whole("level", level, 0, c.MAX_LEVEL)
+        return self._offline().assemble(level)
+
+    def save(self, path: str | Path) -> None:
+        """Writes the confirmed document as an ``.esker`` file. Raises ValueError for what is no path, OSError."""
+        path = arguments.path("path", path)
+        self._offline().save(path)
+
+    def _offline(self) -> Terrain:
+        with self._changed:
+            document = self._sync.confirmed.to_document()
+        if self._local is None or self._local[0] != document:
+            grids = self._grids.of(document.layers)
+            self._local = (document, Terrain.from_document(document, grids, self._solver, trusted=True))
+        return self._local[1]

@@ -1,1 +1,0 @@
-"""Benchmarks: ``esker bench NAME --json``. Each module has ``main(argv) -> int``; results are kept in bench/results."""

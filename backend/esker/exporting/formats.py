@@ -1,0 +1,136 @@
+"""Formats by name and by the suffix of a file."""
+
+from __future__ import annotations
+
+import shutil
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final, NamedTuple
+
+from esker import contract
+from esker.contract import ExportEstimate, ExportFormat, ExportRequest
+from esker.exporting.ground import Extent, Ground, HeightSource, take
+from esker.exporting.heightmaps import write_geotiff, write_npy, write_png, write_r16
+from esker.exporting.masks import write_masks
+from esker.exporting.mesh import write_glb
+from esker.exporting.weights import weighted
+
+Step = Callable[[contract.ExportStage, float], None]
+"""Told the stage, and the share of it that is done."""
+
+
+class Format(NamedTuple):
+    """How a kind of file is written. ``covers``: it needs them; ``bytes_each``: of a sample, as measured on terrains
+    with detail; ``sent``: the suffix that the page's file has, where one name stands for several files."""
+
+    suffixes: tuple[str, ...]
+    write: Callable[[Path, Ground], None]
+    media: str
+    bytes_each: float
+    covers: bool = False
+    sent: str = ""
+    most: int = 4097
+
+
+FORMATS: Final[dict[ExportFormat, Format]] = {
+    "png16": Format((".png",), write_png, "image/png", 1.4),
+    "r16": Format((".r16", ".raw"), write_r16, "application/zip", 1.4, sent=".zip"),
+    "geotiff": Format((".tif", ".tiff"), write_geotiff, "image/tiff", 2.6),
+    "npy": Format((".npy",), write_npy, "application/octet-stream", 4.0),
+    "glb": Format((".glb",), write_glb, "model/gltf-binary", 58.5, covers=True, most=contract.EXPORT_MESH_SAMPLES),
+    "masks": Format((".zip",), write_masks, "application/zip", 2.1, covers=True),
+}
+SUFFIXES: Final = {suffix: name for name, made in FORMATS.items() for suffix in made.suffixes}
+
+MASKS: Final = "masks"
+ONLY_MASKS: Final = "Only masks (.zip) can be made to sum to one."
+PLAIN_SECONDS, DETAIL_SECONDS, START_SECONDS = 0.4, 1.0, 3.0
+"""Of processor time: of a million samples without and with detail, and of the process (docs/exporting.md)."""
+FALLEN: Final = {"solving": (0.0, 0.3), "detail": (0.3, 0.9), "writing": (0.9, 1.0)}
+
+
+def format_of(path: Path) -> ExportFormat:
+    """The format of a file's suffix. Raises ValueError."""
+    found = SUFFIXES.get(path.suffix.lower())
+    if found is None:
+        raise ValueError(f"exports are {', '.join(SUFFIXES)}, not '{path.suffix or path.name}'")
+    return found
+
+
+def refusal(wish: ExportRequest) -> str:
+    """Why there is no such export, as a sentence; empty where there is."""
+    if str(wish.samples) not in contract.EXPORT_LEVELS:
+        return f"Samples a side are one of {', '.join(contract.EXPORT_LEVELS)}."
+    if wish.weights and wish.format != MASKS:
+        return ONLY_MASKS
+    if wish.samples > FORMATS[wish.format].most:
+        return f"A mesh has at most {contract.EXPORT_MESH_SAMPLES} samples a side."
+    return ""
+
+
+def estimate(wish: ExportRequest) -> ExportEstimate:
+    """About what an export costs; see Format.bytes_each."""
+    form = FORMATS[wish.format]
+    million = wish.samples**2 / 1e6
+    seconds = START_SECONDS + million * (DETAIL_SECONDS if wish.detail or form.covers else PLAIN_SECONDS)
+    return ExportEstimate(bytes=round(form.bytes_each * wish.samples**2), seconds=round(seconds, 1))
+
+
+def export(
+    terrain: HeightSource,
+    path: Path,
+    kind: ExportFormat,
+    extent: Extent,
+    *,
+    detail: bool,
+    step: Step,
+    weights: bool = False,
+    **levels: int,
+) -> Ground:
+    """Takes the ground of a terrain and writes it to ``path``; returns what was written. ``weights``: masks that sum to
+    one (``exports.weights``); ``levels``: as in ``take``.
+
+    A file is whole or is not there. Raises ValueError, OSError, and what solves raise."""
+    form = FORMATS[kind]
+    if weights and kind != MASKS:
+        raise ValueError(ONLY_MASKS)
+    ground = take(
+        terrain, extent, detail=detail, masks=form.covers, progress=lambda share: step("detail", share), **levels
+    )
+    if weights:
+        ground = weighted(ground)
+    step("writing", 0.0)
+    try:
+        form.write(path, ground)
+    except BaseException:
+        path.unlink(missing_ok=True)
+        raise
+    return ground
+
+
+def sent_name(kind: ExportFormat, stem: str) -> str:
+    """What the page's file is called."""
+    form = FORMATS[kind]
+    return stem + (form.sent or form.suffixes[0])
+
+
+def packed(folder: Path, name: str) -> None:
+    """All files of a folder as one .zip in it, in their place: a heightmap with its side-car travels as one file."""
+    files = sorted(folder.iterdir())
+    with zipfile.ZipFile(folder / name, "w", zipfile.ZIP_DEFLATED, compresslevel=4) as archive:
+        for file in files:
+            archive.write(file, file.name)
+    for file in files:
+        file.unlink()
+
+
+def free_bytes(folder: Path) -> int:
+    """Room on the disk of a folder."""
+    return shutil.disk_usage(folder).free
+
+
+def share_of(stage: str, share: float) -> float:
+    """The share of the whole work."""
+    begin, end = FALLEN[stage]
+    return begin + (end - begin) * min(1.0, max(0.0, share))

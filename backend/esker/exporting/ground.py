@@ -1,0 +1,236 @@
+"""The ground that is exported: heights and covers of a level, of a window of it, or of a few samples less."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, Final, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from esker import contract, grid
+from esker.contract import TerrainSettings
+from esker.exporting.resample import resampled
+from esker.exporting.water import under_water
+from esker.synthesis.lakes import find_lakes
+
+Heights = NDArray[np.float32]
+Mask = NDArray[np.uint8]
+COVERS: Final = ("snow", "wetness", "grass", "forest")
+"""Attributes of the synthesis that become masks, under their own names."""
+BAND_SAMPLES: Final = 1 << 20
+"""Samples whose attributes are held as numbers at a time; what is kept of them is a byte each."""
+WHOLE: Final = 255
+
+
+class Window(Protocol):
+    """Heights of a rectangle, as ``Ground`` has them; with detail, attributes as ``Terrain.attributes`` has them."""
+
+    @property
+    def heights(self) -> Heights: ...
+    @property
+    def x_m(self) -> float: ...
+    @property
+    def y_m(self) -> float: ...
+    @property
+    def spacing_m(self) -> float: ...
+    @property
+    def attributes(self) -> Mapping[str, Heights]: ...
+
+
+class HeightSource(Protocol):
+    """What a file is written from. ``Terrain`` is one; its methods say what these give."""
+
+    @property
+    def settings(self) -> TerrainSettings: ...
+
+    def heights(self, level: int) -> Heights:
+        """Settled heights of a level."""
+        ...
+
+    def window(
+        self,
+        level: int,
+        x0: float,
+        y0: float,
+        x1: float,
+        y1: float,
+        detail: bool = False,
+        *,
+        global_level: int = ...,
+        refined_level: int = ...,
+        progress: Progress | None = None,
+    ) -> Window:
+        """Settled heights of the samples of ``level`` in a rectangle of world metres."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Ground:
+    """What is written. ``heights``: (rows, columns) float32, metres, row 0 south; sample [0, 0] lies at world
+    (x_m, y_m), neighbours ``spacing_m`` apart. ``masks``: the same shape, uint8, 255 where there is all of it: COVERS
+    and ``water``; empty where they were not asked for. ``lakes_m``: levels of the lakes, rising, metres."""
+
+    heights: Heights
+    x_m: float
+    y_m: float
+    spacing_m: float
+    settings: TerrainSettings
+    masks: Mapping[str, Mask] = field(default_factory=dict)
+    lakes_m: tuple[float, ...] = ()
+
+    @property
+    def range_m(self) -> tuple[float, float]:
+        """The lowest and the highest sample, metres."""
+        return float(self.heights.min()), float(self.heights.max())
+
+    def facts(self) -> dict[str, Any]:
+        """What other programs do not read from the heights, for side-cars and for text inside of files."""
+        rows, columns = self.heights.shape
+        low, high = self.range_m
+        place = self.settings.place
+        return {
+            "title": self.settings.title,
+            "samples": [columns, rows],
+            "spacing_m": self.spacing_m,
+            "size_m": [(columns - 1) * self.spacing_m, (rows - 1) * self.spacing_m],
+            "south_west_m": [self.x_m, self.y_m],
+            "terrain_m": self.settings.size_m,
+            "low_m": low,
+            "high_m": high,
+            "sea_level_m": self.settings.sea_level_m,
+            "lakes_m": list(self.lakes_m),
+            "place": None if place is None else {"lat_deg": place.lat_deg, "lon_deg": place.lon_deg},
+        }
+
+
+@dataclass(frozen=True)
+class Extent:
+    """Which samples: ``samples`` a side of the whole terrain, taken from ``level``; or those of ``level`` inside
+    ``window`` (x0, y0, x1, y1), world metres."""
+
+    level: int
+    samples: int
+    window: tuple[float, float, float, float] | None = None
+
+    @classmethod
+    def of(
+        cls, level: int | None, samples: int | None, window: tuple[float, float, float, float] | None = None
+    ) -> Extent:
+        """From what somebody says: a level, or samples a side; DEFAULT_LEVEL without. Raises ValueError."""
+        if level is not None and samples is not None:
+            raise ValueError("say a level or how many samples a side, not both")
+        if samples is None:
+            level = contract.DEFAULT_LEVEL if level is None else level
+            if window is None and not 0 <= level <= contract.MAX_LEVEL:
+                raise ValueError(f"level must be 0..{contract.MAX_LEVEL}, not {level}")
+            return cls(level, grid.samples(level), window)
+        known = contract.EXPORT_LEVELS.get(str(samples))
+        if known is None or window is not None:
+            there = ", ".join(contract.EXPORT_LEVELS)
+            raise ValueError(
+                "a window is exported by level" if known is not None else f"samples a side must be one of {there}"
+            )
+        return cls(known, samples, None)
+
+
+Progress = Callable[[float], None]
+
+
+def take(
+    terrain: HeightSource,
+    extent: Extent,
+    *,
+    detail: bool,
+    masks: bool,
+    progress: Progress | None = None,
+    **levels: int,
+) -> Ground:
+    """The ground of a terrain: ``Terrain.heights`` or ``Terrain.window``, interpolated where ``extent`` has a few
+    samples less than its level. ``masks``: with covers, which come with the detail; ``levels``: ``global_level`` and
+    ``refined_level`` of the detail. Raises ValueError, and what solves raise."""
+    if not detail and not masks:
+        ground = _plain(terrain, extent, progress)
+    else:
+        ground = _detailed(terrain, extent, progress, levels, masks)
+        if not detail:
+            ground = replace(ground, heights=_plain(terrain, extent, None).heights)
+    if extent.window is None and extent.samples != grid.samples(extent.level):
+        ground = _fewer(ground, extent.samples)
+    return _with_water(terrain, ground, levels.get("global_level", contract.DEFAULT_LEVEL)) if masks else ground
+
+
+def _plain(terrain: HeightSource, extent: Extent, progress: Progress | None) -> Ground:
+    settings, level = terrain.settings, extent.level
+    if extent.window is None:
+        return Ground(terrain.heights(level), 0.0, 0.0, grid.spacing(level, settings.size_m), settings)
+    found = terrain.window(level, *extent.window, progress=progress)
+    return Ground(found.heights, found.x_m, found.y_m, found.spacing_m, settings)
+
+
+def _detailed(
+    terrain: HeightSource, extent: Extent, progress: Progress | None, levels: Mapping[str, int], masks: bool
+) -> Ground:
+    """In bands of rows: seven attributes of a large level take more memory than all else together."""
+    settings, level = terrain.settings, extent.level
+    size = settings.size_m
+    r0, r1, c0, c1 = grid.Rect(*(extent.window or (0.0, 0.0, size, size))).sample_window(level, size)
+    if r0 >= r1 or c0 >= c1:
+        raise ValueError(f"no sample of level {level} lies in that window; the terrain is {size:g} m wide")
+    s = grid.spacing(level, size)
+    heights = np.empty((r1 - r0, c1 - c0), dtype=np.float32)
+    covers = {name: np.empty(heights.shape, dtype=np.uint8) for name in (COVERS if masks else ())}
+    band = max(1, BAND_SAMPLES // (c1 - c0))
+    for start in range(r0, r1, band):
+        stop = min(start + band, r1)
+
+        def told(share: float, start: int = start, stop: int = stop) -> None:
+            if progress is not None:
+                progress((start - r0 + (stop - start) * share) / (r1 - r0))
+
+        # A quarter of a cell beyond its samples, which rounding does not lose.
+        corners = ((c0 - 0.25) * s, (start - 0.25) * s, (c1 - 0.75) * s, (stop - 0.75) * s)
+        found = terrain.window(level, *corners, detail=True, progress=told, **levels)
+        heights[start - r0 : stop - r0] = found.heights
+        for name, mask in covers.items():
+            mask[start - r0 : stop - r0] = eight_bits(found.attributes[name])
+    return Ground(heights, c0 * s, r0 * s, s, settings, covers)
+
+
+def _fewer(ground: Ground, samples: int) -> Ground:
+    """The whole terrain with ``samples`` a side."""
+    spacing = ground.settings.size_m / (samples - 1)
+    masks = {
+        name: np.rint(np.clip(resampled(mask, samples), 0.0, WHOLE)).astype(np.uint8)
+        for name, mask in ground.masks.items()
+    }
+    return replace(ground, heights=resampled(ground.heights, samples), spacing_m=spacing, masks=masks)
+
+
+def _with_water(terrain: HeightSource, ground: Ground, global_level: int) -> Ground:
+    """With the mask of the sea and of the lakes, which stand in the solved ground of LAKE_LEVEL."""
+    settings = ground.settings
+    lakes = None
+    if settings.lakes_m is not None:
+        top = max(global_level, contract.LAKE_LEVEL)
+        step = 1 << (top - contract.LAKE_LEVEL)
+        cell = grid.spacing(contract.LAKE_LEVEL, settings.size_m)
+        solved = np.ascontiguousarray(terrain.heights(top)[::step, ::step])
+        lakes = find_lakes(solved, cell, settings.lakes_m, settings.sea_level_m)
+    per_m = (grid.samples(contract.LAKE_LEVEL) - 1) / settings.size_m
+    rows, columns = ground.heights.shape
+    u, v = (
+        (corner + np.arange(n, dtype=np.float64) * ground.spacing_m) * per_m
+        for corner, n in ((ground.x_m, columns), (ground.y_m, rows))
+    )
+    wet = under_water(ground.heights, u, v, lakes, settings.sea_level_m)
+    water = np.where(wet, np.uint8(WHOLE), np.uint8(0))
+    found = () if lakes is None else tuple(sorted(lakes.samples))
+    return replace(ground, masks={**ground.masks, "water": water}, lakes_m=found)
+
+
+def eight_bits(values: NDArray[np.float32]) -> Mask:
+    """0..1 in steps of 1/255."""
+    steps: Mask = np.rint(np.clip(values, 0.0, 1.0) * WHOLE).astype(np.uint8)
+    return steps

@@ -1,5 +1,0 @@
-"""How a terrain leaves for game engines, modellers and GIS: heightmaps, grids, meshes and masks (docs/exporting.md).
-
-``ground`` takes the ground and ``formats`` writes it, for ``Terrain.export`` and ``esker export``; on a server ``run``
-has both done by a process of its own, for ``service``, which keeps the exports of all terrains.
-"""

@@ -1,0 +1,120 @@
+"""What connections and requests may take of the event loop's processor time (decisions 31, 45). Pure: times come in.
+
+Every connection has a purse that fills at a rate, and pays what its bytes cost before and after they are read. The
+connections of one address, and of one IPv6 /48, pay into shared purses as well: when one of those is empty, the
+connections that have spent much of their own end, and those beside them that have not go on. Requests of HTTP are paid
+by their address alone, and wait where it cannot (``server/wire/pacing.py``).
+"""
+
+from __future__ import annotations
+
+import math
+from collections import OrderedDict
+from collections.abc import Callable
+from contextvars import ContextVar
+from dataclasses import dataclass
+from typing import Final
+
+from esker.fairness.shares import MOST_KEYS, Rate, Who
+
+STRANGER: Final = Rate(0.02, 0.1)
+"""Processor time of a connection that has not been let in: seconds a second, and seconds that may be saved up."""
+MEMBER: Final = Rate(0.2, 1.0)
+"""Processor time of a connection that was let in. Somebody who draws without a pause takes a hundredth of a core."""
+STRANGERS: Final = Rate(0.1, 0.5)
+"""Processor time of all connections of one address together that were not let in."""
+MEMBERS: Final = Rate(0.6, 3.0)
+"""Processor time of all connections of one address together that were let in."""
+ASKERS: Final = Rate(0.25, 3.0)
+"""Processor time of all requests of one address: thirty people behind one who open the page at once take a second."""
+NETWORK: Final = 3.0
+"""An IPv6 /48 has so many times the processor time of an address."""
+BYTE_SECONDS: Final = 1e-8
+"""Seconds that a byte costs before anybody looks at it."""
+DOUBT: Final = 0.5
+"""A connection that has less than this share of its own purse left pays where its address's purse is empty."""
+
+
+PAYS: ContextVar[Callable[[float], None] | None] = ContextVar("PAYS", default=None)
+"""Who pays for what is done for the present request in other threads: a function of seconds, called in the loop."""
+
+
+class Purse:
+    """Seconds that may be spent. It may be overdrawn, as what something costs is known afterwards."""
+
+    __slots__ = ("_at", "_rate", "left")
+
+    def __init__(self, rate: Rate) -> None:
+        self._rate, self._at, self.left = rate, math.inf, rate.burst
+
+    def pay(self, now: float, seconds: float) -> bool:
+        """Takes ``seconds`` out at time ``now``; False when that is more than there was."""
+        self.left = min(self._rate.burst, self.left + max(0.0, now - self._at) * self._rate.per_second) - seconds
+        self._at = now
+        return self.left >= 0
+
+    @property
+    def debt(self) -> float:
+        """Seconds from the last payment until it is no longer overdrawn."""
+        return max(0.0, -self.left / self._rate.per_second)
+
+    @property
+    def share(self) -> float:
+        """Share of the purse that is left, at most 1."""
+        return self.left / self._rate.burst
+
+
+@dataclass(frozen=True)
+class _Kind:
+    own: Rate
+    shared: Rate
+
+
+_STRANGER, _MEMBER, _ASKER = _Kind(STRANGER, STRANGERS), _Kind(MEMBER, MEMBERS), _Kind(ASKERS, ASKERS)
+
+
+class Account:
+    """The purse of one connection, with those that it shares."""
+
+    def __init__(self, shared: tuple[Purse, ...] = (), kind: _Kind = _STRANGER) -> None:
+        self._own, self._shared = Purse(kind.own), shared
+
+    def pay(self, now: float, seconds: float) -> bool:
+        """Pays; False when the connection has to end."""
+        going_on = self._own.pay(now, seconds)
+        for purse in self._shared:
+            if not purse.pay(now, seconds) and self._own.share < DOUBT:
+                going_on = False
+        return going_on
+
+
+class Accounts:
+    """The shared purses of a server. When too many are known, those that were used longest ago are forgotten."""
+
+    def __init__(self, most_keys: int = MOST_KEYS) -> None:
+        self._purses: OrderedDict[tuple[str, str, _Kind], Purse] = OrderedDict()
+        self._most = most_keys
+
+    def stranger(self, address: str) -> Account:
+        """Opens the account of a connection that has said nothing yet."""
+        return self._open(address, _STRANGER)
+
+    def member(self, address: str) -> Account:
+        """Opens the account of a connection that was let in."""
+        return self._open(address, _MEMBER)
+
+    def asker(self, address: str) -> tuple[Purse, ...]:
+        """Returns the purses out of which a request of this address is paid."""
+        return tuple(self._purse(place, key, _ASKER) for place, key in Who(address).counted())
+
+    def _open(self, address: str, kind: _Kind) -> Account:
+        return Account(tuple(self._purse(place, key, kind) for place, key in Who(address).counted()), kind)
+
+    def _purse(self, place: str, key: str, kind: _Kind) -> Purse:
+        times = NETWORK if place == "network" else 1.0
+        rate = Rate(times * kind.shared.per_second, times * kind.shared.burst)
+        purse = self._purses.pop((place, key, kind), None) or Purse(rate)
+        self._purses[place, key, kind] = purse
+        while len(self._purses) > self._most:
+            self._purses.popitem(last=False)
+        return purse

@@ -1,0 +1,290 @@
+"""All exports of one server: who may, how many at once, how long what was made is kept."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import re
+import secrets
+import shutil
+import time
+from collections import Counter
+from collections.abc import Awaitable, Callable, Collection
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Final, NamedTuple
+
+from esker import contract as c
+from esker.contract import ExportEstimate, ExportRequest, ExportStage, ExportStatus
+from esker.errors import Cannot
+from esker.exporting import formats, wire
+from esker.exporting.run import FAILED, ExportFailed, Progress
+from esker.fairness.shares import Place, Places, Share, Who
+from esker.session.room.hub import Hub
+from esker.session.room.turns import Turns
+from esker.session.room.viewing import shown
+from esker.store.access import Link
+
+log = logging.getLogger("esker.exporting")
+
+OPEN: Final = Share(12, address=8, network=10, link=4)
+"""Exports that wait or are made at a time, of the whole server; one is made, the others wait for their turn."""
+OPEN_IN_ROOM: Final = 4
+KEPT_SECONDS: Final = 10 * 60.0
+"""How long a file, or why there is none, can be asked for."""
+KEPT_BYTES: Final = 1 << 30
+"""Of all files together; the oldest go."""
+SPARE_BYTES: Final = 64 << 20
+"""Of the disk, left free beside an export."""
+STEM: Final = 48
+OVER: Final = frozenset({"done", "failed", "cancelled"})
+WAITING: Final = "Waiting for its turn."
+PACE: Final = (0.3, 30.0)
+"""Bounds of how much slower than ``formats.estimate`` this server is taken to be."""
+
+Maker = Callable[[wire.Task, Progress], Awaitable[wire.Made]]
+
+
+class Plant(NamedTuple):
+    """How this server solves: device and threads for ``Solver``, its global and its finest refined level."""
+
+    device: str | None = None
+    threads: int | None = None
+    level: int = c.DEFAULT_LEVEL
+    refine: int = c.DEFAULT_REFINED_LEVEL
+
+
+class Finished(NamedTuple):
+    """A file to be sent."""
+
+    path: Path
+    name: str
+    media: str
+
+
+@dataclass(eq=False)
+class Job:
+    """One export from its beginning until it is forgotten."""
+
+    id: str
+    terrain: str
+    link: Link
+    person: str
+    """Of whom one export at a time is taken."""
+    wish: ExportRequest
+    folder: Path
+    status: ExportStatus
+    place: Place
+    """Of those that the server has; with who asked for it."""
+    task: asyncio.Task[None] | None = None
+    ended: float = 0.0
+
+    @property
+    def over(self) -> bool:
+        """Whether nothing will change any more."""
+        return self.status.stage in OVER
+
+    def at(self, stage: ExportStage, **fields: object) -> None:
+        """Where it stands now; the end is the end."""
+        if not self.over:
+            self.status = self.status.model_copy(update={"stage": stage, **fields})
+
+
+class Exports:
+    """All exports of one server. Lives in the event loop."""
+
+    def __init__(
+        self,
+        hub: Hub,
+        folder: Path,
+        grids: Path,
+        maker: Maker,
+        plant: Plant = Plant(),  # noqa: B008  (immutable)
+        *,
+        now: Callable[[], float] = time.monotonic,
+        kept_seconds: float = KEPT_SECONDS,
+        kept_bytes: int = KEPT_BYTES,
+    ) -> None:
+        """``folder``: for what is made; what an earlier server left there is removed. ``grids``: where the rasters of
+        layers lie, by digest. ``maker``: ``run.make``, or another for tests. Raises OSError."""
+        self._hub, self._folder, self._grids, self._maker, self._plant = hub, folder, grids, maker, plant
+        self._now, self._kept_seconds, self._kept_bytes = now, kept_seconds, kept_bytes
+        self._jobs: dict[str, Job] = {}
+        self._turn = Turns(1)
+        self._places = Places(OPEN)
+        self._closing = False
+        self._pace = 1.0
+        shutil.rmtree(folder, ignore_errors=True)
+        hub.hear_of_ended.append(self.end)
+
+    # --- for routes ---------------------------------------------------------------------------------------------
+
+    async def begin(self, terrain: str, link: Link, person: str, wish: ExportRequest, who: Who) -> ExportStatus:
+        """Begins an export, or has it wait for its turn; it goes on by itself. Raises Cannot, OSError, and Denied where
+        there is no such terrain."""
+        if sentence := formats.refusal(wish):
+            raise Cannot(400, "malformed", sentence)
+        self._check(terrain, person, who)
+        document = await self._hub.document(terrain, wish.at, who)
+        if link.role == "view":
+            document = shown(document)
+        self._hub.demand(link)
+        self._check(terrain, person, who)  # others may have come meanwhile
+        job_id = secrets.token_urlsafe(9)
+        folder = self._folder / job_id
+        folder.mkdir(parents=True)
+        try:
+            room = formats.free_bytes(self._folder) - SPARE_BYTES - 2 * formats.estimate(wish).bytes
+            if room < 0:
+                raise Cannot(507, "storage", "The server has no room for this file (is its disk full?).")
+        except BaseException:
+            shutil.rmtree(folder, ignore_errors=True)
+            raise
+        status = ExportStatus(id=job_id, stage="waiting", text=WAITING if self._turn.locked() else "")
+        job = self._jobs[job_id] = Job(job_id, terrain, link, person, wish, folder, status, self._places.take(who))
+        job.task = asyncio.create_task(self._run(job, self._task(job, document)))
+        job.task.add_done_callback(lambda _: job.place.release())  # also where it was cancelled before it began
+        return job.status
+
+    def estimate(self, wish: ExportRequest) -> ExportEstimate:
+        """About what an export costs, at the pace of the last ones here. Raises Cannot."""
+        if sentence := formats.refusal(wish):
+            raise Cannot(400, "malformed", sentence)
+        plain = formats.estimate(wish)
+        return plain.model_copy(update={"seconds": round(plain.seconds * self._pace, 1)})
+
+    def status(self, terrain: str, job_id: str, link: Link) -> ExportStatus:
+        """Where an export stands. Raises Cannot."""
+        return self._own(terrain, job_id, link).status
+
+    async def cancel(self, terrain: str, job_id: str, link: Link) -> None:
+        """Stops an export, or removes its file. Harmless when it is over. Raises Cannot."""
+        job = self._own(terrain, job_id, link)
+        if job.task is not None and not job.task.done():
+            job.task.cancel()
+            await asyncio.gather(job.task, return_exceptions=True)
+        self._forget(job)
+
+    def file(self, terrain: str, job_id: str, link: Link) -> Finished:
+        """What an export made. Raises Cannot: there is none (yet)."""
+        job = self._own(terrain, job_id, link)
+        if job.status.stage != "done":
+            raise Cannot(409, "not_done", "This export is not done.")
+        return Finished(job.folder / job.status.file, job.status.file, formats.FORMATS[job.wish.format].media)
+
+    def end(self, terrain: str, links: Collection[str]) -> None:
+        """Links were revoked: what is being made for them ends, and what was made is removed."""
+        for job in list(self._jobs.values()):
+            if job.terrain == terrain and job.link.id in links:
+                if job.task is not None and not job.task.done():
+                    job.task.cancel()
+                    job.task.add_done_callback(partial(self._forget_late, job))
+                else:
+                    self._forget(job)
+
+    async def close(self) -> None:
+        """Stops all exports and removes what was made."""
+        self._closing = True
+        tasks = [job.task for job in self._jobs.values() if job.task is not None]
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+        for job in list(self._jobs.values()):
+            self._forget(job)
+        shutil.rmtree(self._folder, ignore_errors=True)
+
+    # --- the work -----------------------------------------------------------------------------------------------
+
+    def _check(self, terrain: str, person: str, who: Who) -> None:
+        self._forget_old()
+        if self._closing:
+            raise Cannot(503, "shutting_down", "The server is stopping.")
+        going = [job for job in self._jobs.values() if not job.over]
+        if any(job.person == person for job in going):
+            raise Cannot(409, "busy", "Another export of yours is still being made. Wait for it, or cancel it.")
+        against = self._places.refusal(who)
+        if against is not None or sum(job.terrain == terrain for job in going) >= OPEN_IN_ROOM:
+            sentence = "Many exports are being made just now. Try again in a few minutes."
+            if against not in (None, "total"):
+                sentence = "Several exports for your address or link are being made. Wait for them."
+            raise Cannot(503, "busy", sentence)
+
+    def _task(self, job: Job, document: c.Document) -> wire.Task:
+        plant = self._plant
+        stem = re.sub(r"[\W_]+", "-", document.settings.title)[:STEM].strip("-").lower() or "terrain"
+        return wire.Task(
+            document=document.model_copy(update={"deleted": (), "deleted_layers": ()}),
+            wish=job.wish,
+            grids=str(self._grids.resolve()),
+            folder=str(job.folder.resolve()),
+            name=f"{stem}-{job.wish.samples}",
+            device=plant.device,
+            threads=plant.threads,
+            global_level=plant.level,
+            refined_level=plant.refine,
+        )
+
+    async def _run(self, job: Job, task: wire.Task) -> None:
+        try:
+            async with self._turn.turn(job.place.who):
+                started = self._now()
+                job.at("solving", text="")
+                made = await self._maker(task, lambda stage, share: job.at(stage, share=share))
+            told = made.model_dump(exclude={"type"})
+            job.at("done", share=1.0, **told)
+            took = self._now() - started
+            low, high = PACE
+            pace = min(max(took / formats.estimate(job.wish).seconds, low), high)
+            self._pace = 0.5 * (self._pace + pace)
+            log.info("export %s of %s in %.1f s", made.file, job.terrain, took)
+        except asyncio.CancelledError:
+            job.at("cancelled", text="The export was cancelled.")
+        except ExportFailed as error:
+            job.at("failed", text=str(error)[:240])
+        except Exception:
+            log.exception("the export of %s failed", job.terrain)
+            job.at("failed", text=FAILED)
+        job.ended = self._now()
+        job.place.release()
+        if job.status.stage != "done":
+            shutil.rmtree(job.folder, ignore_errors=True)
+        self._forget_old()
+        if not self._closing:
+            asyncio.get_running_loop().call_later(self._kept_seconds + 1.0, self._forget_old)
+
+    def _forget_old(self) -> None:
+        """Removes what was kept long enough and, beyond ``kept_bytes``, the oldest files of whichever address has the
+        most; never the newest of all."""
+        late = self._now() - self._kept_seconds
+        over = sorted((job for job in self._jobs.values() if job.over), key=lambda job: job.ended)
+        for job in over:
+            if job.ended < late:
+                self._forget(job)
+        newest = over[-1:]
+        over = [job for job in over if job.ended >= late]
+        while over and sum(job.status.bytes for job in over) > self._kept_bytes:
+            kept: Counter[str] = Counter()
+            for job in over:
+                kept[job.place.who.site] += job.status.bytes
+            most = kept.most_common(1)[0][0]
+            going = next((job for job in over if job.place.who.site == most and job not in newest), None)
+            if going is None:
+                break
+            over.remove(going)
+            self._forget(going)
+
+    def _forget_late(self, job: Job, _: object) -> None:
+        self._forget(job)
+
+    def _forget(self, job: Job) -> None:
+        self._jobs.pop(job.id, None)
+        shutil.rmtree(job.folder, ignore_errors=True)
+
+    def _own(self, terrain: str, job_id: str, link: Link) -> Job:
+        job = self._jobs.get(job_id)
+        if job is None or job.terrain != terrain:
+            raise Cannot(404, "no_export", "This export is not on the server any more. Export again.")
+        if job.link.id != link.id and link.role != "owner":
+            raise Cannot(403, "not_allowed", "Only who began an export, or an owner of the terrain, may do this.")
+        return job

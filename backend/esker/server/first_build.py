@@ -1,0 +1,204 @@
+"""Compiles, in a process of its own, what a server runs.
+
+``python -m esker.server.first_build kernels | driver | loops`` is that process.
+A compiler that hangs, takes all memory or aborts then harms nobody (``solve.prepare`` starts this and bounds it). What
+is compiled is kept on disk by PoCL and by numba, and whoever starts this process only loads it.
+
+PoCL compiles a program's front half when it is built, and each kernel when it is first enqueued, once for each size of
+its work-groups. So ``kernels`` solves a small known scene, over a base too, and asks for the rest by name. Graphics
+drivers compile whole programs; ``driver`` has one build them all and solves the same scene.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import logging
+import os
+import sys
+import threading
+from contextlib import suppress
+from dataclasses import replace
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from esker import grid
+from esker.contract import TerrainSettings
+from esker.events import Done
+from esker.process import system
+from esker.process.child_process import end_with_parent
+from esker.solve.opencl import prepare, proof
+from esker.solve.opencl.pocl import cpu, home
+
+SCENE_LEVEL: Final = 2
+ROWS: Final = "1-1-1-goffs0-smallgrid"
+"""How PoCL names the shape of the launches of row-wise kernels."""
+log = logging.getLogger("esker.server.first_build")
+
+
+class Slope:
+    """A base that rises to the east: the smallest ground that strokes can stand on."""
+
+    digest, low, high = b"slope", 0.0, 100.0
+
+    def level(self, level: int, device: Any = None) -> NDArray[np.float32]:  # noqa: ARG002
+        """Heights of a whole level."""
+        return self.window(level, slice(None), slice(None))
+
+    def window(self, level: int, rows: slice, cols: slice, device: Any = None) -> NDArray[np.float32]:  # noqa: ARG002
+        """Heights of some samples of a level."""
+        n = grid.samples(level)
+        row = np.linspace(self.low, self.high, n, dtype=np.float32)
+        return np.ascontiguousarray(np.broadcast_to(row, (n, n))[rows, cols])
+
+    def survey(self, level: int) -> NDArray[np.float32]:
+        """Returns how fine the data are."""
+        return np.zeros((grid.samples(level),) * 2, dtype=np.float32)
+
+    def changed(self, other: Any) -> grid.Rect | None:  # noqa: ARG002
+        """Nowhere: there is one such base."""
+        return None
+
+
+def kernels(wanted: str | None, threads: int | None, level: str, name: str | None = None) -> dict[str, Any]:
+    """Compiles every kernel for the device that ``wanted`` names, if it is PoCL's; what came of it.
+
+    ``name``: a CPU to compile for in place of the level's own, for tests of what does not fit.
+    """
+    from esker.solve.opencl import device as devices
+    from esker.solve.solver import Solver
+
+    at = next(one for one in cpu.LEVELS if one.name == level)
+    prepare.adopt(replace(at, name=name or at.name))
+    found = [(name, d) for name, d in devices.listed(threads) if wanted is None or wanted.lower() in name.lower()]
+    if not found or cpu.compiled_for(found[0][1].version) is None:
+        return {"other": True}
+    solver = Solver(found[0][0], SCENE_LEVEL, threads)
+    device = solver.device
+    assert device is not None, "a device that was asked for by name is there"
+    _solve(solver)
+    for program, names in devices.programs(device):
+        _complete(program, names)
+    _blend(device)
+    return {"device": device.name}
+
+
+def driver(name: str, threads: int | None, level: str | None) -> dict[str, Any]:
+    """Builds every program with the driver of one device, which is not PoCL's. Raises NoDeviceError, BuildError.
+
+    ``level``: what PoCL compiles for in the process that asks, so that devices are listed as they are there.
+    """
+    from esker.solve.opencl import device as devices
+    from esker.solve.solver import Solver
+
+    if level is not None:
+        prepare.adopt(next(one for one in cpu.LEVELS if one.name == level))
+    solver = Solver(name, SCENE_LEVEL, threads)
+    device = solver.device
+    assert device is not None, "a device that was asked for by name is there"
+    _solve(solver)
+    devices.programs(device)
+    _blend(device)
+    return {"device": device.name}
+
+
+def _solve(solver: Any) -> None:
+    """A scene in which most kernels have something to do; the device's proof has been made already."""
+    from esker.solve.opencl.workspaces import new_workspace
+
+    strokes = [*proof.STROKES, proof.STROKES[0].model_copy(update={"id": "rough", "amplitude_m": 8.0})]
+    settings = TerrainSettings()
+    for base in (None, Slope()):
+        *_, last = solver.steps(strokes, settings, SCENE_LEVEL, basis=True, base=base)
+        assert isinstance(last, Done)
+        for _ in solver.refiner(last.basis).tiles([grid.TileKey(SCENE_LEVEL + 1, 0, 0)]):
+            pass
+    new_workspace(solver.device, SCENE_LEVEL, False).height.hold()  # only ground that is edited needs this kernel
+    solver.device.queue.finish()
+
+
+def _complete(program: Any, names: tuple[str, ...]) -> None:
+    """Compiles those kernels of a row-wise program that no scene has used."""
+    kept = Path(os.environ["POCL_CACHE_DIR"])
+    missing = [name for name in names if not any(kept.glob(f"*/*/{name}/{ROWS}/{name}.so"))]
+    if missing:
+        log.debug("not in the scene: %s", missing)
+        os.environ["POCL_BINARY_SPECIALIZE_WG"] = ROWS
+        prepare.machine_code(program)
+
+
+def _blend(device: Any) -> None:
+    """The kernels that blend elevation layers: one bin that no patch meets."""
+    from esker.patchwork.blend import device as blend_device
+    from esker.patchwork.blend import packs
+
+    none = np.zeros(0, dtype=np.int32)
+    for smooth in (False, True):
+        coefficients, to_patch = np.zeros((0, 34, 34), dtype=np.float32), np.zeros((0, 2, 3))
+        domain, volume = np.zeros((0, 4)), np.zeros(0)
+        pack = packs.Pack(smooth, coefficients, to_patch, domain, domain, volume, none, none, none)
+        found = packs.Bins(
+            np.zeros(2, dtype=np.int32), none, np.zeros((0, 2), np.float32), np.zeros((0, 4), np.float32)
+        )
+        constants = np.zeros((0, 9), dtype=np.float32)
+        blend_device.program(device, smooth).run(device.queue, pack, constants, found, (1, 1))
+
+
+def loops() -> dict[str, Any]:
+    """Compiles the loops that every server runs."""
+    from esker.tiles.pyramid import warm
+
+    warm()
+    return {"loops": True}
+
+
+def have_loops(stopped: threading.Event, told: threading.Event) -> None:
+    """Compiles the loops in a child process, unless one has done so, then loads them into this process.
+
+    ``told`` is set while they are compiled.
+    """
+    from esker import compiled
+    from esker.tiles import pyramid
+
+    files = [Path(compiled.__file__), *sorted(Path(pyramid.__file__).parent.rglob("*.py"))]
+    texts = [path.read_bytes() for path in files]
+    content = hashlib.sha256(b"".join([version("numba").encode(), pyramid.__file__.encode(), *texts])).hexdigest()
+    record = home.root() / f"loops-{content[:16]}"
+    try:
+        if not record.exists():
+            told.set()
+            if "failed" not in prepare.bounded(["loops"], stopped=stopped):
+                with suppress(OSError):
+                    record.parent.mkdir(parents=True, exist_ok=True)
+                    record.touch()
+    except prepare.Stopped:
+        return
+    pyramid.warm()
+
+
+def main(arguments: list[str]) -> int:
+    """Does one of the three; prints one line of JSON: what came of it, or ``failed`` with a sentence."""
+    end_with_parent()
+    system.end_with_parent()  # compiling may hold the interpreter for minutes
+    logging.basicConfig(stream=sys.stderr, level=os.environ.get("ESKER_LOG_LEVEL", "warning").upper())
+    prepare.THIS_IS_THE_CHILD = True
+    try:
+        if arguments[:1] == ["loops"]:
+            done = loops()
+        else:
+            given = json.loads(arguments[1])
+            done = driver(**given) if arguments[0] == "driver" else kernels(**given)
+    except Exception as error:
+        log.debug("the first build failed", exc_info=True)
+        done = {"failed": str(error) or type(error).__name__}
+    sys.stdout.write(json.dumps(done) + "\n")
+    sys.stdout.flush()
+    os._exit(0)  # PoCL's threads need not be waited for
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

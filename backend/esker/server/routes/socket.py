@@ -1,0 +1,157 @@
+"""The websocket route."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import AsyncIterator, Callable, Iterator, Sequence
+from contextlib import suppress
+from functools import lru_cache
+from typing import Any, Final
+
+from fastapi import FastAPI, WebSocket
+from starlette.websockets import WebSocketDisconnect
+from websockets.frames import Frame, Opcode
+
+from esker import contract as c
+from esker.fairness.shares import Full, Places, Share, Who
+from esker.fairness.spending import Account, Accounts
+from esker.server.routes.answers import address
+from esker.server.wire.front import Front
+from esker.server.wire.websocket import WebSocketProtocol
+from esker.session.room.hub import Hub
+from esker.session.room.socket import Session
+
+log = logging.getLogger("esker.server")
+
+
+SOCKETS: Final = Share(8_192, address=512, network=1_024)
+"""Sockets at a time: also of addresses behind a proxy, whose connections all come from one."""
+CROWDED: Final = "Many sockets are open from your address. Close some pages, or wait a moment."
+SHARED_TEXTS: Final = 16
+SHARED_CHARACTERS: Final = 1 << 18
+"""Frames of so many of the last texts are kept, up to this length: what everybody in a room is told is framed once."""
+_WHOLE_TEXT: Final = 0x80 | Opcode.TEXT
+FRAGMENT_BYTES: Final = 1 << 16
+"""Longer texts go in frames of this size (RFC 6455, 5.4): it shows that a peer reads them, however slowly."""
+
+
+def _frame(text: str) -> bytes:
+    """A text as a frame of the websocket, as a server sends it: whole and without a mask (RFC 6455, 5.2)."""
+    data = text.encode()
+    size = len(data)
+    if size < 126:
+        head = bytes((_WHOLE_TEXT, size))
+    elif size < 1 << 16:
+        head = bytes((_WHOLE_TEXT, 126)) + size.to_bytes(2)
+    else:
+        head = bytes((_WHOLE_TEXT, 127)) + size.to_bytes(8)
+    return head + data
+
+
+def _fragments(parts: Sequence[bytes]) -> Iterator[bytes]:
+    """A text whose bytes lie in parts, in several frames, each made when it is its turn."""
+    ends = [(part, at) for part in parts for at in range(0, len(part), FRAGMENT_BYTES)]
+    for n, (part, at) in enumerate(ends):
+        data = part[at : at + FRAGMENT_BYTES]
+        yield Frame(Opcode.CONT if n else Opcode.TEXT, data, fin=n == len(ends) - 1).serialize(mask=False)
+
+
+_framed = lru_cache(SHARED_TEXTS)(_frame)
+
+
+class _Transport:
+    """``session.room.socket.Transport`` over Starlette's websocket."""
+
+    def __init__(self, socket: WebSocket) -> None:
+        self._socket = socket
+        self._wire: WebSocketProtocol | None = socket.scope.get("esker.socket")
+
+    def listen(self, listener: Callable[[str | bytes], None]) -> None:
+        if self._wire is not None:
+            self._wire.listen(listener)
+
+    def send_now(self, texts: Sequence[str]) -> bool:
+        if self._wire is None or any(len(text) > SHARED_CHARACTERS for text in texts):
+            return False
+        return self._wire.write_now(_framed(texts[0]) if len(texts) == 1 else b"".join(map(_framed, texts)))
+
+    async def send_text(self, text: str, went_on: Callable[[], None]) -> None:
+        if self._wire is None:
+            await self._send({"type": "websocket.send", "text": text})
+        elif len(text) <= SHARED_CHARACTERS:
+            await self._wire.write(_framed(text))
+        else:
+            await self.send_long((text.encode(),), went_on)
+
+    async def send_long(self, parts: Sequence[bytes], went_on: Callable[[], None]) -> None:
+        if self._wire is None:
+            await self._send({"type": "websocket.send", "text": b"".join(parts).decode()})
+            return
+        for fragment in _fragments(parts):
+            await self._wire.write(fragment)
+            went_on()
+
+    async def send_bytes(self, data: bytes) -> None:
+        await self._send({"type": "websocket.send", "bytes": data})
+
+    async def close(self, code: int, reason: str) -> None:
+        await self._send({"type": "websocket.close", "code": code, "reason": reason})
+
+    async def _send(self, message: dict[str, Any]) -> None:
+        try:
+            await self._socket.send(message)
+        except (WebSocketDisconnect, RuntimeError) as error:  # Starlette's ways to say that the peer is gone
+            raise ConnectionResetError("the peer is gone") from error
+
+    def charge(self, account: Account, broke: Callable[[], None]) -> None:
+        if self._wire is not None:
+            self._wire.charge(account, broke)
+
+    def pay(self, seconds: float) -> None:
+        if self._wire is not None:
+            self._wire.pay(seconds)
+
+    def abort(self) -> None:
+        if self._wire is not None:
+            self._wire.abort()
+
+
+async def _messages(socket: WebSocket) -> AsyncIterator[str | bytes]:
+    while True:
+        message = await socket.receive()
+        if message["type"] != "websocket.receive":
+            return
+        text, data = message.get("text"), message.get("bytes")
+        yield text if text is not None else data or b""
+
+
+def add_socket(app: FastAPI, hub: Hub, front: Front) -> None:
+    """Adds it."""
+    accounts = Accounts()
+    sockets = Places(SOCKETS)
+
+    @app.websocket("/ws")
+    async def ws(socket: WebSocket) -> None:
+        offered = socket.scope.get("subprotocols", [])
+        subprotocol = c.SUBPROTOCOL if c.SUBPROTOCOL in offered else None
+        await socket.accept(subprotocol)
+        transport = _Transport(socket)
+        against = front.against(socket.scope)
+        if against is not None:
+            await _refuse(socket, transport, "bad_origin", against[2])
+            return
+        try:
+            place = sockets.take(Who(address(socket)))
+        except Full:
+            await _refuse(socket, transport, "rate_limited", CROWDED)
+            return
+        with place:
+            await Session(hub, transport, address(socket), subprotocol, accounts=accounts).run(_messages(socket))
+
+
+async def _refuse(socket: WebSocket, transport: _Transport, code: c.CloseCode, sentence: str) -> None:
+    log.info("closed a connection from %s: %s", address(socket), code)
+    text = c.ErrorMessage(code=code, message=sentence, fatal=True).model_dump_json()
+    with suppress(ConnectionResetError):
+        await transport.send_text(text, lambda: None)
+        await transport.close(c.WS_CLOSE[code], sentence)

@@ -1,0 +1,350 @@
+"""Puts the server together and runs it: journal, solver thread, tiles, HTTP (DESIGN 8)."""
+
+from __future__ import annotations
+
+import asyncio
+import gc
+import logging
+import socket
+import ssl
+import sys
+import threading
+from collections.abc import Awaitable, Callable
+from contextlib import suppress
+from typing import Any, Final
+
+import uvicorn
+
+from esker import contract as c
+from esker.document.ops import Limits
+from esker.exporting import run as exporting
+from esker.importing import run as importing
+from esker.jobs import Imports
+from esker.jobs.exports import Exports, Plant
+from esker.keeper.lesson import greeting, open_lesson
+from esker.keeper.private import Key, Private
+from esker.process import confinement, system
+from esker.render.pictures.previews import Previews
+from esker.server import first_build
+from esker.server.app import create_app
+from esker.server.elevation import Elevation
+from esker.server.routes.previews import Pictures
+from esker.server.settings import Settings
+from esker.server.starting import CannotServe, FrontDoor, WaitingRoom
+from esker.server.wire.door import BACKLOG, Door
+from esker.server.wire.front import Front, Proxies, hosts, local_names
+from esker.server.wire.http import Connections, HttpProtocol, bounded
+from esker.server.wire.tls import CA_FILE
+from esker.server.wire.websocket import WebSocketProtocol
+from esker.session.ground.ports import Solver, SolverFactory
+from esker.session.ground.recovery import LAST_RESORT, Fault
+from esker.session.ground.worker import Worker
+from esker.session.room.hub import Hub
+from esker.solve.multigrid import DivergedError
+from esker.solve.opencl import prepare
+from esker.solve.opencl.device import candidates, ready
+from esker.solve.opencl.faults import DeviceError, NoDeviceError, OutOfDeviceMemoryError
+from esker.solve.solver import Solver as OpenClSolver
+from esker.store.access import Access, TooManyLinks
+from esker.store.claims import Claims, key_in
+from esker.store.grids import FOLDER, GridStore
+from esker.store.journal import Journal, Unwritable
+from esker.store.lock import DataLock, InUse
+from esker.store.previews import PreviewTokens
+from esker.store.space import Space
+from esker.store.upkeep.care import Care, sweep_parts
+from esker.tiles.delivery import ClientTiles, TileServer
+
+log = logging.getLogger("esker")
+
+GOODBYE_SECONDS: Final = 0.3
+"""Time for the farewells to leave before the sockets are closed."""
+HARD_MESSAGE_LIMIT: Final = 4 * c.MAX_MESSAGE_BYTES
+"""Above ``MAX_MESSAGE_BYTES`` a client gets a sentence (4007); above this the websocket library hangs up (1009)."""
+PING_SECONDS, PONG_SECONDS = 20.0, 20.0
+"""A websocket is asked so often whether its peer is there, and dropped without an answer in so long."""
+SEND_BUFFER: Final = 256 * 1024
+"""The kernel would queue megabytes for a client that does not read, and show it old tiles when it does."""
+
+
+OWN_FILES: Final = 256
+"""Descriptors that connections leave to the database, uploads and children, and a quarter of all at least."""
+SWITCH_SECONDS: Final = 0.0002
+"""An append passes four threads on its way to the screen; at each Python would let the other go on for 5 ms first."""
+
+
+GARBAGE_OBJECTS: Final = 10_000
+"""Objects made before the collector looks at them. It never looks at what is there at the start, modules and compiled
+code, which made all threads wait for 100 ms now and then."""
+
+
+FLAWS: Final = (ArithmeticError, AssertionError, AttributeError, LookupError, TypeError, ValueError)
+"""What Python and NumPy raise where a program is wrong about its numbers. No device is the reason."""
+
+
+class _Tiles:
+    """``session.ground.ports.Tiles`` by the real tiles."""
+
+    def server(self, size_m: float, levels: int, finest: int) -> TileServer:
+        return TileServer(size_m, levels, finest)
+
+    def client(self, server: Any) -> ClientTiles:
+        return ClientTiles(server)
+
+
+class _Server(uvicorn.Server):
+    """Says goodbye to the members of all rooms before the sockets are closed."""
+
+    def __init__(
+        self, config: uvicorn.Config, hub: Hub, imports: Imports, host: str, started: Callable[[], Awaitable[None]]
+    ) -> None:
+        """``host``: where to send who speaks plain HTTP and names no host."""
+        super().__init__(config)
+        self._hub, self._imports, self._host, self._announce = hub, imports, host, started
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        context, self.config.ssl = self.config.ssl, None
+        if context is None or not sockets:
+            await super().startup(sockets)
+        else:  # the door makes the connections: some of them begin without TLS and are sent to https
+            for each in sockets:  # connections that come before the door is made wait in the backlog
+                each.listen(BACKLOG)
+            await super().startup([])
+            self.servers: list[Any] = [Door(each, context, self._protocol, self._host) for each in sockets]
+        if self.started:
+            await self._announce()
+
+    def _protocol(self) -> asyncio.Protocol:
+        make: Any = self.config.http_protocol_class
+        made: asyncio.Protocol = make(config=self.config, server_state=self.server_state, app_state=self.lifespan.state)
+        return made
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        await self._imports.close()
+        await self._hub.close()
+        await asyncio.sleep(GOODBYE_SECONDS)
+        await super().shutdown(sockets)
+
+
+class Assembly:
+    """A server put together but not yet running. ``close`` must be called, whatever happened."""
+
+    def __init__(
+        self,
+        settings: Settings,
+        make_solver: SolverFactory | None = None,
+        door: FrontDoor | None = None,
+        tell: Callable[[prepare.Step], None] = lambda _: None,
+    ) -> None:
+        """Takes the port, opens the journal, compiles what is not compiled, starts the solver's thread.
+
+        ``make_solver``: another solver, for tests; ``door``: the port where it was taken already; ``tell``: called with
+        how far it is. Raises CannotServe, store.journal.CorruptDatabase, OSError.
+        """
+        self.settings, self._tell = settings, tell
+        door = door or FrontDoor(settings)
+        self.address, self._listener, self._context = door.address, door.listener, door.context
+        self.port = int(self._listener.getsockname()[1])
+        self._worker: Worker | None = None
+        self._journal: Journal | None = None
+        self._lock: DataLock | None = None
+        self._care: Care | None = None
+        self.imports: Imports | None = None
+        """Once there is a server."""
+        self.exports: Exports | None = None
+        try:
+            self._open(make_solver or self._solver)
+        except BaseException:
+            self.close()
+            raise
+
+    @property
+    def base(self) -> str:
+        """Where people reach this server."""
+        scheme = "https" if self._context else "http"
+        return (self.settings.public_url or f"{scheme}://{self.address}:{self.port}").rstrip("/")
+
+    def _open(self, make_solver: SolverFactory) -> None:
+        settings = self.settings
+        try:
+            self._lock = DataLock(settings.data)
+        except InUse as error:
+            raise CannotServe(str(error)) from None
+        sweep_parts(settings.data)
+        self._space = Space(settings.data, settings.storage_mb << 20)
+        self._journal = Journal(settings.data, space=self._space, quota=settings.history_quota_mb << 20)
+        self._grids = GridStore(settings.data, self._space)
+        self.private = Private(settings.data)
+        self._grids.sweep(self._journal.grids(), forgotten=self._journal.may_sweep())
+        self._worker = Worker(
+            make_solver, settings.device, candidates=lambda: candidates(settings.threads), diagnose=diagnose
+        )
+        self._compile(kernels=make_solver == self._solver)
+        self._worker.start()
+        log.info("solver: %s, levels 0 to %d", self._worker.device_name, settings.level)
+        if not confinement.possible():
+            log.warning("this system cannot keep readers of people's files from the data folder and the network")
+        self.hub = Hub(
+            self._journal,
+            Access(self._journal),
+            self._worker,
+            _Tiles(),
+            levels=settings.level,
+            finest=settings.refine,
+            limits=Limits(settings.max_strokes, settings.max_points),
+            max_members=settings.max_members,
+            elevation=Elevation(self._grids),
+            claims=Claims(key_in(settings.data)),
+        )
+        self._care = Care(self._journal, self.hub.deletion, self._grids)
+
+    def _compile(self, kernels: bool) -> None:
+        """Loops and kernels, each in a child process where they are not compiled yet, side by side."""
+        stopped, compiling = threading.Event(), threading.Event()
+        loops = threading.Thread(
+            target=first_build.have_loops, args=[stopped, compiling], name="compiling", daemon=True
+        )
+        loops.start()
+        try:
+            if kernels and (self.settings.device or "").lower() != LAST_RESORT:
+                with suppress(NoDeviceError):  # the solver will say so
+                    ready(self.settings.device, self.settings.threads, self._tell, stopped)
+            if compiling.is_set() and loops.is_alive():
+                self._tell(prepare.Step("Compiling loops, once on this machine"))
+            while loops.is_alive():
+                loops.join(0.1)
+            self._tell(prepare.Step("Opening the solver"))
+        finally:
+            stopped.set()
+            loops.join()
+
+    def _solver(self, device: str | None) -> Solver:
+        return OpenClSolver(device=device, max_level=self.settings.level, threads=self.settings.threads)
+
+    def server(self, announce: bool = True) -> _Server:
+        """The HTTP server, to be run with ``run``."""
+        assert self._journal is not None, "an assembly is open until it is closed"
+        pictures = Pictures(
+            Previews(self.settings.data / "previews", self.settings.device, grids=self.settings.data / FOLDER),
+            PreviewTokens(self._journal),
+            self.settings.public_url.rstrip("/") if self.settings.public_url else None,
+        )
+        self.imports = Imports(self.hub, self._grids, importing, quota_bytes=self.settings.grid_quota_mb << 20)
+        settings = self.settings
+        plant = Plant(settings.device, settings.threads, settings.level, settings.refine)
+        self.exports = Exports(self.hub, settings.data / "exports", self._grids.folder, exporting.make, plant)
+        key = Key(self.private.open().key)
+        front = _front(settings, self.address)
+        app = create_app(
+            self.hub, settings.page, settings.data, pictures, self._grids, self.imports, self.exports, key, front
+        )
+
+        async def started() -> None:
+            if announce:
+                await _announce(self.hub, self.private, self.base, self.settings)
+
+        host = f"{self.address}:{self.port}"
+        return _Server(_config(app, front.proxies, self._context), self.hub, self.imports, host, started)
+
+    def run(self, server: _Server) -> None:
+        """Serves until the server is told to stop."""
+        sys.setswitchinterval(SWITCH_SECONDS)
+        gc.collect()
+        gc.freeze()
+        system.give_memory_back()  # compiling took memory that is free now
+        gc.set_threshold(GARBAGE_OBJECTS)
+        if self._care is not None:
+            self._care.start()
+        if threading.current_thread() is threading.main_thread():
+            # The HTTP server raises the signal that stopped it once more when it is done; by then it has been obeyed.
+            # A signal that comes before the server listens to signals itself is obeyed too.
+            system.on_stop(lambda *_: setattr(server, "should_exit", True))
+        server.run(sockets=[self._listener])
+
+    def close(self) -> None:
+        """Stops the threads, commits what is queued, frees the port."""
+        if self._care is not None:
+            self._care.stop()
+        if self._worker is not None:
+            self._worker.stop()
+        if self._journal is not None:
+            self._journal.close()
+        if self._lock is not None:
+            self._lock.release()
+        self._listener.close()
+
+
+def serve(settings: Settings, door: FrontDoor, room: WaitingRoom) -> None:
+    """Runs until SIGINT or SIGTERM, once the waiting room has left the door to it.
+
+    Raises CannotServe, store.journal.CorruptDatabase, OSError; what a handler of signals raises before it serves.
+    """
+    assembly = Assembly(settings, door=door, tell=lambda step: room.tell(step.said, step.done, step.of))
+    try:
+        server = assembly.server()
+        room.leave()
+        assembly.run(server)
+    finally:
+        assembly.close()
+    log.info("stopped; everything is saved")
+
+
+def diagnose(error: Exception) -> Fault:
+    """Returns what an exception of the solver means for the worker."""
+    if isinstance(error, (OutOfDeviceMemoryError, MemoryError)):
+        return Fault.MEMORY
+    if isinstance(error, DivergedError):
+        return Fault.JOB
+    if isinstance(error, DeviceError):
+        return Fault.DEVICE
+    return Fault.FLAW if isinstance(error, FLAWS) else Fault.UNKNOWN
+
+
+def _front(settings: Settings, address: str) -> Front:
+    """Returns by which names this server is reached, and behind which proxies. Raises CannotServe."""
+    try:
+        proxies = Proxies(settings.forwarded_allow_ips)
+    except ValueError as error:
+        raise CannotServe(f"ESKER_FORWARDED_ALLOW_IPS: {error}.") from None
+    url = settings.public_url.rstrip("/").lower() if settings.public_url else None
+    names = {*local_names(), *(name.strip() for name in settings.hosts.split(",") if name.strip())}
+    near = settings.lan or settings.host in ("localhost", "127.0.0.1", "::1")
+    known = hosts((*names, address), url) if near or url or settings.hosts else None
+    # HTTPS with a certificate that people must trust first, or click away, may not be made the only way in.
+    return Front(proxies, known, url, strict=url is not None and url.startswith("https:") and not settings.lan)
+
+
+def _config(app: Any, proxies: Proxies, context: ssl.SSLContext | None) -> uvicorn.Config:
+    config = uvicorn.Config(
+        app,
+        ws=WebSocketProtocol,
+        ws_max_size=HARD_MESSAGE_LIMIT,
+        # Tiles are deflated already, and control texts are small: a second deflate costs more than it saves.
+        ws_per_message_deflate=False,
+        ws_ping_interval=PING_SECONDS,
+        ws_ping_timeout=PONG_SECONDS,
+        http=HttpProtocol,
+        log_config=None,
+        access_log=False,
+        server_header=False,
+        timeout_graceful_shutdown=5,
+        proxy_headers=False,  # server/wire/front.py reads the headers of proxies
+    )
+    config.load()
+    config.ssl = context
+    files = system.raise_open_files()
+    bounded(config, Connections(files - max(files // 4, min(OWN_FILES, files // 2)), proxies.__contains__))
+    return config
+
+
+async def _announce(hub: Hub, private: Private, base: str, settings: Settings) -> None:
+    """Opens the terrain of the last start, or a new one, and prints how to reach it: secrets only on a terminal."""
+    try:
+        content, kept = await open_lesson(hub, private, base, settings.new_terrain)
+    except (TooManyLinks, Unwritable, OSError) as error:
+        log.error("no terrain can be printed: %s", error or type(error).__name__)
+        sys.stdout.write(f"\n  Esker is ready: {base}\n\n")
+    else:
+        lan = f"{base}/{CA_FILE}" if settings.lan else None
+        sys.stdout.write(greeting(content, kept, settings.data, private=sys.stdout.isatty(), lan=lan))
+    sys.stdout.flush()

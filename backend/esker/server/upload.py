@@ -1,0 +1,131 @@
+"""Reads an uploaded ``.esker`` file in a process of its own, with bounds on its memory and time (DESIGN 13).
+
+``python -m esker.server.upload FILE FOLDER`` is that process: the document as JSON on stdout, the rasters of its
+elevation layers as ``FOLDER/<digest>/``, or a sentence on stderr.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from contextlib import AbstractAsyncContextManager
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from esker.contract import Document
+from esker.document import archive
+from esker.document.former import read_document
+from esker.document.ops import Refusal, check_document
+from esker.importing import limits
+from esker.process import confinement, system
+from esker.process.bounds import Bounds
+from esker.process.child_process import end_with_parent, put_down
+
+MEMORY_BYTES: Final = 1 << 30
+"""Memory of the process's own; mapped files do not count."""
+ADDRESS_BYTES: Final = 6 << 30
+CPU_SECONDS: Final = 10
+CPU_SECONDS_A_GIB: Final = 600
+"""More for the grids in the file, by its size."""
+WALL_FACTOR: Final = 3.0
+AT_ONCE: Final = 2
+BAD_FILE: Final = 3
+"""Exit status for a file that is not good; anything else but 0 means that the reader itself was stopped."""
+
+
+async def read_archive(path: Path, folder: Path, turn: AbstractAsyncContextManager[object]) -> Document:
+    """The document in an ``.esker`` file; the rasters of its layers come to lie in ``folder`` under their digests.
+
+    Raises archive.ArchiveError with a sentence for a person. ``turn``: at most ``AT_ONCE`` of these run at a time.
+    """
+    async with turn:
+        process = await asyncio.create_subprocess_exec(
+            sys.executable,
+            "-m",
+            "esker.server.upload",
+            str(path),
+            str(folder),
+            stdin=asyncio.subprocess.PIPE,
+            stdout=asyncio.subprocess.PIPE,
+            stderr=asyncio.subprocess.PIPE,
+            env=limits.environment(),
+            **system.apart(),
+        )
+        try:
+            out, err = await asyncio.wait_for(_answer(process), WALL_FACTOR * cpu_seconds(path))
+        except TimeoutError:
+            raise archive.ArchiveError("Reading this file took too long.") from None
+        finally:
+            await put_down(process)
+    if process.returncode == BAD_FILE:
+        raise archive.ArchiveError(err.decode("utf-8", "replace").strip())
+    if process.returncode != 0:
+        raise archive.ArchiveError("Reading this file took too much memory or time.")
+    return await asyncio.to_thread(read_document, out)  # stroke by stroke: the event loop goes on meanwhile
+
+
+async def _answer(process: asyncio.subprocess.Process) -> tuple[bytes, bytes]:
+    """Everything that the reader says. Its stdin stays open until then: by its end it knows that the server is gone."""
+    assert process.stdout is not None
+    assert process.stderr is not None
+    out, err, _ = await asyncio.gather(process.stdout.read(), process.stderr.read(), process.wait())
+    return out, err
+
+
+def cpu_seconds(path: Path) -> int:
+    """Seconds that the reader may take."""
+    return CPU_SECONDS + CPU_SECONDS_A_GIB * path.stat().st_size // (1 << 28)
+
+
+def bound(path: Path) -> None:
+    """Bounds this process from now on; it stands behind everything that rooms do."""
+    system.step_back(limits.NICENESS)
+    Bounds(
+        memory_bytes=MEMORY_BYTES,
+        address_bytes=ADDRESS_BYTES,
+        cpu_seconds=cpu_seconds(path),
+        file_bytes=limits.FILE_BYTES,
+        open_files=limits.OPEN_FILES,
+        core_bytes=0,
+    ).apply()
+
+
+def main(path: Path, folder: Path) -> int:
+    """The process that reads."""
+    system.speak_utf8()
+    confinement.confine([path], [folder], limits.compiled_folders())
+    end_with_parent()
+    bound(path)
+    try:
+        with path.open("rb") as file:
+            document = archive.unpack(file, folder)
+        check_document(document)
+        for digest in {layer.content for layer in (*document.layers, *document.deleted_layers)}:
+            _build(folder, digest)
+    except (archive.ArchiveError, Refusal) as error:
+        sys.stderr.write(str(error))
+        return BAD_FILE
+    sys.stdout.write(document.model_dump_json())
+    return 0
+
+
+def _build(folder: Path, digest: str) -> None:
+    """The raster of one grid, from its unpacked arrays. Raises ArchiveError."""
+    from esker.patchwork.raster import rasters  # compiled loops take a second to load, and most files have no layers
+
+    heights, warp = folder / f"{digest}.npy", folder / f"{digest}.warp.npy"
+    try:
+        net = np.load(warp, allow_pickle=False) if warp.exists() else None
+        raster = rasters.build_out_of_core(np.load(heights, mmap_mode="r", allow_pickle=False), folder / digest, net)
+    except rasters.RasterError as error:
+        raise archive.ArchiveError(f"An elevation grid in this file cannot be used: {error}.") from error
+    if raster.digest != digest:
+        raise archive.ArchiveError("An elevation grid in this file is not the one that its layer names.")
+    heights.unlink()
+    warp.unlink(missing_ok=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main(Path(sys.argv[1]), Path(sys.argv[2])))

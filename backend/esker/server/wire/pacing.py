@@ -1,0 +1,90 @@
+"""Requests are paced by the processor time that they take, as ASGI middleware (SPEC P451).
+
+What a request takes of the event loop is taken from whoever draws. It is measured step by step and paid by the address,
+and a request of an address that has spent its share waits until it has some again. What a request asks for does not
+count: a page that is not there costs about as much as one that is.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable, Coroutine, Generator
+from typing import Any, Final
+
+from esker.fairness.spending import PAYS, Accounts, Purse
+from esker.server.routes.answers import answer
+
+REQUEST_SECONDS: Final = 0.0003
+"""What a request costs at least, before and after the application has it; paid in advance."""
+PATIENCE_SECONDS: Final = 10.0
+"""A request that would wait for longer is refused then."""
+PAUSE_SECONDS: Final = 0.25
+"""The longest pause between two parts of an answer."""
+TOO_MUCH: Final = "Too much was asked for from your address. Wait a moment."
+
+
+class Paced:
+    """Runs requests at the pace of their addresses; sockets pay by themselves (``server/wire/websocket.py``)."""
+
+    def __init__(self, app: Any) -> None:
+        self.app, self._accounts = app, Accounts()
+
+    async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
+        if scope["type"] != "http":
+            await self.app(scope, receive, send)
+            return
+        purses = self._accounts.asker(scope["client"][0] if scope.get("client") else "")
+
+        def pay(seconds: float) -> None:
+            now = time.monotonic()
+            for purse in purses:
+                purse.pay(now, seconds)
+
+        pay(REQUEST_SECONDS)
+        wait = _debt(purses)
+        if wait > 0:
+            await asyncio.sleep(min(wait, PATIENCE_SECONDS))
+        if wait > PATIENCE_SECONDS:
+            await answer(429, "rate_limited", TOO_MUCH, again=int(wait))(scope, receive, send)
+            return
+
+        async def paced(message: Any) -> None:
+            await send(message)
+            if message.get("more_body") and (behind := _debt(purses)) > 0:
+                await asyncio.sleep(min(behind, PAUSE_SECONDS))
+
+        token = PAYS.set(pay)
+        try:
+            await _Metered(self.app(scope, receive, paced), pay)
+        finally:
+            PAYS.reset(token)
+
+
+def _debt(purses: tuple[Purse, ...]) -> float:
+    """Seconds until all these purses are level."""
+    return max((purse.debt for purse in purses), default=0.0)
+
+
+class _Metered:
+    """Runs a coroutine and has each of its steps paid for by the processor time that this thread spent on it."""
+
+    def __init__(self, steps: Coroutine[Any, Any, None], pay: Callable[[float], None]) -> None:
+        self._steps, self._pay = steps, pay
+
+    def __await__(self) -> Generator[Any, Any, None]:
+        steps = self._steps.__await__()
+        value, error = None, None
+        while True:
+            began = time.thread_time()
+            try:
+                awaited = steps.send(value) if error is None else steps.throw(error)
+            except StopIteration:
+                return
+            finally:
+                self._pay(time.thread_time() - began)
+            value = error = None
+            try:
+                value = yield awaited
+            except BaseException as thrown:  # a cancellation, or what the awaited raised: the coroutine's to handle
+                error = thrown

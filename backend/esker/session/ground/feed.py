@@ -1,0 +1,361 @@
+"""The way of solved levels and refined tiles to the clients of one room (DESIGN 5.6; 8, "Flow control").
+
+All work on tiles (taking a level, planning, encoding) happens in one thread of its own, so the event loop never waits
+for it and no lock is needed. A client is planned for only while its byte window is open and its last frames have been
+handed to the socket: versions in between are skipped by construction, and no more than ``BATCH_BYTES`` are ever queued.
+
+A coarsest preview of newer strokes may come at any time. What is coarser and newer bars finer levels, so it waits until
+the frames of a finest preview that has just come were made.
+
+What the clients want refined goes the other way: the tile thread publishes it, the solver's thread reads it, and the
+tiles that come back are taken together, so that a hundred of them cost a few selections and not a hundred.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import threading
+from collections import deque
+from collections.abc import Callable, Sequence
+from concurrent.futures import CancelledError, Future
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import Final
+
+from esker import contract as c
+from esker.events import Level, Preview
+from esker.grid import TileKey
+from esker.session.ground.ports import ClientTiles, FrameOutlet, Tiles
+from esker.session.ground.tilethread import TileThread
+from esker.tiles.delivery import RefinedTile
+
+log = logging.getLogger("esker.feed")
+
+PUTS_AHEAD: Final = 1
+"""Levels that may wait to become tiles while the solver goes on."""
+BATCH_BYTES: Final = 48 << 10
+"""Frames of one client are made in one go up to this size: each way to the loop and back costs a millisecond."""
+BATCH_SECONDS: Final = 0.03
+"""Refined tiles that come within this time are taken together."""
+BATCH_TILES: Final = 16
+"""A batch of so many refined tiles is taken without waiting for more."""
+BATCH_SHARE: Final = 0.25
+"""Taking tiles, and working out what is wanted then for a room full of people, takes at most this share of the time."""
+WISHES_SECONDS: Final = 0.05
+"""While cameras move, what is wanted is worked out at most this often."""
+
+
+@dataclass(eq=False)
+class Stream:
+    """The tiles of one client: its window, and the encoded frames that wait for the socket."""
+
+    outbox: FrameOutlet
+    view: c.View | None = None
+    in_flight: int = 0
+    hungry: bool = True
+    busy: bool = False
+    frames: deque[bytes] = field(default_factory=deque)
+
+    @property
+    def ready(self) -> bool:
+        """True when a frame may be made for it now."""
+        free = not self.frames and not self.busy and self.in_flight < c.BYTE_WINDOW
+        return self.hungry and free and self.outbox.closing is None
+
+
+class TileFeed:
+    """Tiles of one room. Call it from the event loop's thread, except where another is named."""
+
+    def __init__(
+        self,
+        tiles: Tiles,
+        size_m: float,
+        levels: int,
+        finest: int,
+        executor: TileThread,
+        loop: asyncio.AbstractEventLoop,
+        on_level: Callable[[int, int, bool], None],
+        on_wishes: Callable[[int, bool], None],
+    ) -> None:
+        """``executor`` has one thread. ``on_level(clock, level, settled)``, with whether now all levels are final, and
+        ``on_wishes(count, more)``, with the number of tiles that are wanted refined and whether the solver should look
+        at ``wanted`` again, are called in the loop."""
+        self._tiles, self._executor, self._loop = tiles, executor, loop
+        self._on_level, self._on_wishes = on_level, on_wishes
+        self._server = tiles.server(size_m, levels, finest)
+        self._refines = finest > levels
+        self._streams: set[Stream] = set()
+        self._clients: dict[Stream, ClientTiles] = {}
+        """What each stream's client holds. Only the tile thread may touch it."""
+        self._puts: list[Future[None]] = []
+        self._newest: dict[tuple[c.Channel, int], object] = {}
+        """The newest array of each level of the channels other than heights. Only the solver's thread may touch it."""
+        self._lock = threading.Lock()
+        self._wishes: tuple[TileKey, ...] = ()
+        self._made: dict[TileKey, tuple[int, RefinedTile]] = {}
+        """Refined tiles that wait to be taken. This and ``_wishes`` need the lock."""
+        self._coarse: tuple[int, Level] | None = None
+        """The newest coarsest preview that waits to be taken. Access needs the lock."""
+        self._owing = False
+        """Whether a finest preview was taken whose frames nobody was sent yet. Only the tile thread may touch it."""
+        self._taking = False
+        self._rest_until = 0.0
+        """Time of the loop from which on the next batch may be taken."""
+        self._wishes_timer: asyncio.TimerHandle | None = None
+
+    def add(self, outbox: FrameOutlet) -> Stream:
+        """A new client."""
+        stream = Stream(outbox)
+        self._streams.add(stream)
+        self._feed(stream)
+        return stream
+
+    def remove(self, stream: Stream) -> None:
+        """The client left."""
+        self._streams.discard(stream)
+        self._submit(self._forget, stream)
+
+    def view(self, stream: Stream, view: c.View) -> None:
+        """The client looks somewhere else."""
+        stream.view = view
+        self._wake(stream)
+
+    def credit(self, stream: Stream, count: int) -> None:
+        """The client has applied so many bytes."""
+        stream.in_flight = max(0, stream.in_flight - count)
+        self._feed(stream)
+
+    def sent(self, stream: Stream) -> bytes | None:
+        """Takes the frame that waits, to hand it to the socket; the next one may be made."""
+        if not stream.frames:
+            return None
+        frame = stream.frames.popleft()
+        if not stream.frames:
+            self._loop.call_soon(self._feed, stream)
+        return frame
+
+    # --- in the solver's thread -----------------------------------------------------------------------------------
+
+    def put(self, clock: int, result: Level) -> None:
+        """Takes a solved level; waits while an earlier level is still being taken."""
+        place = (result.channel, result.level)
+        if result.channel != c.Channel.HEIGHT:
+            if self._newest.get(place) is result.heights:
+                return
+            self._newest[place] = result.heights
+        if result.channel == c.Channel.BASE:
+            with self._lock:  # tiles that wait were made over another base
+                self._made.clear()
+        try:
+            if result.level == 0 and result.channel == c.Channel.HEIGHT and not result.settled:
+                self._put_coarse(clock, result)
+                return
+            while len(self._puts) > PUTS_AHEAD - 1:
+                self._puts.pop(0).result()
+            self._puts.append(self._executor.first(self._put, clock, result))
+        except (CancelledError, RuntimeError):
+            log.debug("the tile thread has stopped")
+
+    def note(self, clock: int, preview: Preview) -> None:
+        """Takes a preview that is not shown, as the finest follows soon (``tiles/pyramid.py``). Never waits."""
+        with suppress(RuntimeError):  # the tile thread has stopped
+            self._executor.first(self._note, clock, preview)
+
+    def _put_coarse(self, clock: int, result: Level) -> None:
+        """Takes a coarsest preview in place of one that still waits. Never waits."""
+        with self._lock:
+            waiting, self._coarse = self._coarse, (clock, result)
+        if waiting is None:
+            self._executor.first(self._take_coarse)
+
+    def confirm(self, clock: int, level: int) -> None:
+        """Heights up to ``level`` are final for ``clock`` too: only other channels followed from what has changed."""
+        with suppress(RuntimeError):  # the tile thread has stopped
+            self._executor.first(self._confirm, clock, level)
+
+    def limit(self, top: int) -> None:
+        """From now on levels 0..``top`` are solved."""
+        self._newest.clear()
+        with suppress(RuntimeError):  # the tile thread has stopped
+            self._executor.first(self._limit, top)
+
+    def wanted(self) -> Sequence[TileKey]:
+        """Tiles to refine next, most urgent first; none while the ground moves. From any thread."""
+        with self._lock:
+            return tuple(key for key in self._wishes if key not in self._made)
+
+    def deliver_tile(self, clock: int, tile: RefinedTile) -> None:
+        """Takes a refined tile of the settled solve at ``clock``. Never waits."""
+        with self._lock:
+            self._made[tile.key] = (clock, tile)
+            full = len(self._made) >= min(BATCH_TILES, len(self._wishes))
+            first, self._taking = not self._taking, True
+            rest = self._rest_until - self._loop.time()
+        if full and rest <= 0:
+            self._submit(self._take)
+        elif first:
+            self._call(self._loop.call_later, max(BATCH_SECONDS, rest), self._submit, self._take)
+
+    # --- in the tile thread ---------------------------------------------------------------------------------------
+
+    def _take_coarse(self) -> None:
+        """Puts the coarsest preview, unless frames of a finest one are owed: then it comes again behind these."""
+        if self._owing:
+            self._call(self._submit, self._take_coarse_now)
+            return
+        self._take_coarse_now()
+
+    def _take_coarse_now(self) -> None:
+        with self._lock:
+            waiting, self._coarse = self._coarse, None
+        if waiting is not None:
+            self._put(*waiting)
+
+    def _told(self) -> None:
+        self._owing = False
+
+    def _put(self, clock: int, result: Level) -> None:
+        channel = result.channel
+        try:
+            self._server.put_level(clock, result.level, result.heights, result.settled, channel)
+        except Exception:
+            log.exception("level %d of %s at clock %d could not become tiles", result.level, channel.name, clock)
+            return
+        if channel == c.Channel.BASE:
+            self._publish(False)
+        if channel != c.Channel.HEIGHT:
+            self._call(self._wake_all)
+            return
+        settled = self._server.settled()
+        self._publish(settled)
+        self._owing = result.level > 0 and not result.settled
+        self._call(self._level_taken, clock, result.level, settled)
+        if self._owing:
+            self._call(self._submit, self._told)
+
+    def _note(self, clock: int, preview: Preview) -> None:
+        try:
+            self._server.note(clock, preview.level, preview.heights)
+        except Exception:
+            log.exception("level %d at clock %d could not be noted", preview.level, clock)
+
+    def _confirm(self, clock: int, level: int) -> None:
+        self._call(self._level_taken, clock, level, self._server.settled())
+
+    def _limit(self, top: int) -> None:
+        self._server.limit(top)
+        self._call(self._wake_all)
+
+    def _take(self) -> None:
+        """Takes the refined tiles that wait, and says what is wanted then."""
+        with self._lock:
+            made, self._taking = list(self._made.values()), False
+        if not made:
+            return
+        began = self._loop.time()
+        taken = 0
+        for clock, tile in made:
+            try:
+                taken += self._server.put_tile(clock, tile)
+            except Exception:
+                log.exception("the refined tile %s at clock %d was refused", tuple(tile.key), clock)
+        self._publish(taken > 0, made)
+        ended = self._loop.time()
+        with self._lock:
+            self._rest_until = ended + (ended - began) * (1 / BATCH_SHARE - 1)
+        if taken:
+            self._call(self._wake_all)
+
+    def _publish(self, look: bool, taken: Sequence[tuple[int, RefinedTile]] = ()) -> None:
+        """Works out what is wanted refined. ``look``: the solver should look even if that is the same as before."""
+        if not self._refines:
+            return
+        try:
+            wishes, count = self._server.wishes(list(self._clients.values()))
+        except Exception:
+            log.exception("what to refine could not be worked out")
+            return
+        with self._lock:
+            for made in taken:
+                if self._made.get(made[1].key) is made:
+                    del self._made[made[1].key]
+            look = bool(wishes) and (look or wishes != self._wishes)
+            self._wishes = wishes
+        self._call(self._on_wishes, count, look)
+
+    def _forget(self, stream: Stream) -> None:
+        if self._clients.pop(stream, None) is not None:
+            self._publish(False)
+
+    def _make(self, stream: Stream, view: c.View | None, most: int) -> None:
+        """Makes frames of the latest state, up to ``most`` bytes and the rest of a frame; hands each over when made."""
+        made = 0
+        try:
+            tiles = self._clients.get(stream)
+            if tiles is None:
+                tiles = self._clients[stream] = self._tiles.client(self._server)
+            if view is not None:
+                tiles.set_view(view)
+            # All frames of a level are made once the first is; only then a coarsest preview that waits goes first.
+            while made < most and (plan := tiles.plan(made > 0 and self._coarse is not None)) is not None:
+                frame = plan.encode()
+                tiles.commit(plan)
+                made += len(frame)
+                self._call(self._frame_made, stream, frame)
+        except Exception:
+            log.exception("a tile frame could not be made")
+            self._call(stream.outbox.close, "server_error", "The server failed to prepare the ground for you.")
+            return
+        self._call(self._all_made, stream, made > 0)
+
+    def _call(self, callback: Callable[..., object], *args: object) -> None:
+        if not self._loop.is_closed():
+            self._loop.call_soon_threadsafe(callback, *args)
+
+    # --- in the loop ----------------------------------------------------------------------------------------------
+
+    def _level_taken(self, clock: int, level: int, settled: bool) -> None:
+        self._wake_all()
+        self._on_level(clock, level, settled)
+
+    def _wake_all(self) -> None:
+        for stream in self._streams:
+            self._wake(stream)
+
+    def _wake(self, stream: Stream) -> None:
+        stream.hungry = True
+        self._feed(stream)
+
+    def _feed(self, stream: Stream) -> None:
+        if stream not in self._streams or not stream.ready:
+            return
+        view, stream.view = stream.view, None
+        stream.busy, stream.hungry = True, False
+        if view is not None and self._refines and self._wishes_timer is None:
+            self._wishes_timer = self._loop.call_later(WISHES_SECONDS, self._wishes_due)
+        most = min(BATCH_BYTES, c.BYTE_WINDOW - stream.in_flight)
+        if not self._submit(self._make, stream, view, most):
+            self._streams.discard(stream)
+
+    def _wishes_due(self) -> None:
+        self._wishes_timer = None
+        self._submit(self._publish, False)
+
+    def _submit(self, work: Callable[..., None], *args: object) -> bool:
+        """Has the tile thread do something; False when it has been shut down: the server is stopping."""
+        try:
+            self._executor.submit(work, *args)
+        except RuntimeError:
+            return False
+        return True
+
+    def _frame_made(self, stream: Stream, frame: bytes) -> None:
+        stream.frames.append(frame)
+        stream.in_flight += len(frame)
+        stream.outbox.notify()
+
+    def _all_made(self, stream: Stream, some: bool) -> None:
+        stream.busy = False
+        stream.hungry |= some
+        self._feed(stream)  # something may have changed while the frames were made, or there may be more

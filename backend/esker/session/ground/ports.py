@@ -1,0 +1,179 @@
+"""What the ground of a room needs from other rooms of the house, as protocols: tests stand in for all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from esker import contract as c
+from esker.contract import CloseCode
+from esker.events import BaseLevel, SolveEvent
+from esker.grid import TileKey
+from esker.tiles.delivery import RefinedTile
+
+
+class FrameOutlet(Protocol):
+    """The connection of one client, as far as frames need it (``room.outbox.Outbox``)."""
+
+    @property
+    def closing(self) -> object:
+        """None while frames may be sent."""
+        ...
+
+    def notify(self) -> None:
+        """A frame waits."""
+        ...
+
+    def close(self, code: CloseCode, reason: str) -> None:
+        """Ends the connection with a sentence."""
+        ...
+
+
+class FramePlan(Protocol):
+    """A binary frame decided but not yet encoded. ``encode`` is pure and may run in any thread."""
+
+    def encode(self) -> bytes: ...
+
+
+class ClientTiles(Protocol):
+    """What one client holds and looks at (``tiles/delivery.py``)."""
+
+    def set_view(self, view: c.View) -> None: ...
+
+    def plan(self, hurry: bool = False) -> Any: ...
+
+    def commit(self, plan: Any) -> None: ...
+
+
+class TileServer(Protocol):
+    """The tiles of one terrain (``tiles/delivery.py``)."""
+
+    def put_level(
+        self,
+        clock: int,
+        level: int,
+        heights: NDArray[np.float32],
+        settled: bool,
+        channel: c.Channel = ...,
+    ) -> int: ...
+
+    def note(self, clock: int, level: int, heights: NDArray[np.float32]) -> None: ...
+
+    def settled(self) -> bool: ...
+
+    def put_tile(self, clock: int, tile: RefinedTile) -> bool: ...
+
+    def limit(self, top: int) -> None: ...
+
+    def wishes(self, clients: Sequence[Any]) -> tuple[tuple[TileKey, ...], int]: ...
+
+
+class Tiles(Protocol):
+    """Makes the two above."""
+
+    def server(self, size_m: float, levels: int, finest: int) -> TileServer: ...
+
+    def client(self, server: TileServer) -> ClientTiles: ...
+
+
+class Refiner(Protocol):
+    """Refines one settled solve, in the worker's thread (``solve/refine/refinement.py``)."""
+
+    def tiles(
+        self, keys: Sequence[TileKey], urgent: Callable[[], bool] | None = None
+    ) -> Iterator[RefinedTile | None]: ...
+
+
+class Refinement(Protocol):
+    """Which tiles above the global levels a room wants, and where they go (``feed.TileFeed``)."""
+
+    def wanted(self) -> Sequence[TileKey]:
+        """The next tiles to refine, most urgent first; none while the ground moves. From any thread."""
+        ...
+
+    def deliver_tile(self, clock: int, tile: RefinedTile) -> None:
+        """Takes a tile of the settled solve at ``clock``. In the worker's thread; never waits."""
+        ...
+
+
+class Base(Protocol):
+    """The ground of the elevation layers (``patchwork/base.py``): immutable, so the same object is the same ground."""
+
+    @property
+    def digest(self) -> bytes: ...
+
+
+class Elevation(Protocol):
+    """Makes the base of a terrain's layers (``server.elevation``). May block for seconds: not for the event loop."""
+
+    def base(
+        self,
+        layers: tuple[c.Layer, ...],
+        size_m: float,
+        before: Base | None,
+        tell: Callable[[str], None] = ...,
+        edition: int = 1,
+    ) -> Base | None:
+        """The base of these layers, hidden ones left out; None when nothing is visible.
+
+        ``before``: an earlier base of the same terrain, whose parts that no changed layer reaches are used again.
+        ``tell`` is called with a sentence for each layer that had to be left out. ``edition``: of the terrain's rules.
+        """
+        ...
+
+
+class Solver(Protocol):
+    """The solver as the worker uses it (``solve/solver.py``)."""
+
+    @property
+    def device_name(self) -> str: ...
+
+    def steps(
+        self,
+        strokes: Sequence[c.Stroke],
+        settings: c.TerrainSettings,
+        levels: int | None = None,
+        *,
+        basis: bool = False,
+        base: Any = None,
+    ) -> Iterator[SolveEvent]:
+        """The last event is Done, with a basis where it was asked for. Solvers whose solves are
+        ``work.PreviewingEarly`` also take ``coarsest=False``, which leaves out level 0: it was shown."""
+        ...
+
+    def base_levels(self, base: Any, levels: int) -> Iterator[BaseLevel]:
+        """The base up to a level, coarse to fine, then the survey channel: to be shown before what is solved on it."""
+        ...
+
+    def channels(
+        self, strokes: Sequence[c.Stroke], settings: c.TerrainSettings, levels: int | None = None, *, base: Any = None
+    ) -> Iterator[SolveEvent]:
+        """The channels alone; the last event is Done."""
+        ...
+
+    def refiner(self, basis: Any) -> Refiner: ...
+
+
+@runtime_checkable
+class Tidying(Protocol):
+    """A solver that keeps memory for rooms that may come back."""
+
+    def tidy(self) -> int:
+        """Gives back what nobody has used for long; how many pieces that were. Called while there is nothing to do."""
+        ...
+
+
+@runtime_checkable
+class Proving(Protocol):
+    """A solver that can tell whether its device works."""
+
+    def prove(self) -> None:
+        """Solves a small scene that is known to work. Raises when the device does not."""
+        ...
+
+
+SolverFactory = Callable[[str | None], Solver]
+"""Makes a solver for a device name (None: the default device). Called in the worker's thread."""

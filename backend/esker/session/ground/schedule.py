@@ -1,0 +1,232 @@
+"""Whose turn it is on the solver (DESIGN 8): rooms that wait for a first coarse preview, finer previews, settling, and
+refinement, in this order; in turn within each, a slice at a time. Finer previews are finished one after the other,
+the smallest terrains first: interleaved, all of them would come late.
+
+That order is among rooms that have had about as much time as each other. A room that has had ``AHEAD`` more than one
+that waits comes behind it, whatever it waits for: however much work a room makes, it takes its share and no more. Idle
+time is not saved up: a room that comes back begins level with those that are busy.
+
+A lower class that has waited for ``PATIENCE`` gets a slice all the same, so nothing starves. A solve in progress holds
+memory, so only so many may be in progress as fit the budget: a room that waits for its coarse preview ends the settling
+solve that began last, which starts again later.
+
+Channels that are made beside a solve have their turns like everything else, and are made to their end.
+
+Everything here is a pure function of the grounds of all rooms, the time, and a tally of the time that they had.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Final, Generic, TypeVar
+
+from esker.grid import solve_bytes
+from esker.process import memory
+from esker.session.ground import states
+from esker.session.ground.states import COARSE, FINER, REFINE, Ground, Previewing
+
+PATIENCE: Final = 0.150
+AHEAD: Final = 0.500
+"""Seconds of the solver by which a room may be ahead of one that waits: a few passes of an ordinary terrain."""
+BUDGET, BUDGET_SHARE = 1 << 30, 12
+"""Bytes for solves in progress, of all rooms together."""
+
+Room = TypeVar("Room", bound=Hashable)
+
+
+def default_budget() -> int:
+    """Returns the bytes for solves in progress on this machine."""
+    return min(BUDGET, memory.available_bytes() // BUDGET_SHARE)
+
+
+@dataclass(frozen=True)
+class Used:
+    """What one room had of the solver's time.
+
+    turn: number of its last slice, where slices of all rooms are counted. began: number of the slice at which its solve
+    began. ran_at: when it had its last slice, or began to wait. seconds: how long it had, when it is
+    compared with others that are busy. is_busy: whether it had something to do when the tally was last levelled.
+    is_spared: its solve has made room for another one already, and is not made to a second time.
+    """
+
+    turn: int = 0
+    began: int = 0
+    ran_at: float = 0.0
+    seconds: float = 0.0
+    is_busy: bool = False
+    is_spared: bool = False
+
+
+@dataclass(frozen=True)
+class Tally(Generic[Room]):
+    """What all rooms had. budget: bytes for their solves. turns: slices so far. least: the least time used of
+    the rooms that were busy at the last choice. favoured: the room that was chosen out of turn, and the next one not
+    before ``favour_after``."""
+
+    budget: int
+    rooms: Mapping[Room, Used] = field(default_factory=dict)
+    turns: int = 0
+    least: float = 0.0
+    favoured: Room | None = None
+    favour_after: float = -math.inf
+
+    def noted(self, room: Room, **what: Any) -> Tally[Room]:
+        """The tally with something else noted of one room."""
+        return replace(self, rooms={**self.rooms, room: replace(self.rooms[room], **what)})
+
+    def opened(self, room: Room) -> Tally[Room]:
+        """A room comes."""
+        return replace(self, rooms={**self.rooms, room: Used()})
+
+    def closed(self, room: Room) -> Tally[Room]:
+        """A room goes."""
+        return replace(self, rooms={other: had for other, had in self.rooms.items() if other != room})
+
+    def ended(self, room: Room, now: float) -> Tally[Room]:
+        """The slice of a room is over: from now on that room waits. After a slice out of turn the others have at least
+        as long."""
+        had = self.rooms.get(room)
+        if had is None:
+            return self
+        took = now - had.ran_at
+        tally = self.noted(room, seconds=had.seconds + took, ran_at=now)
+        return replace(tally, favour_after=now + max(PATIENCE, took)) if room is self.favoured else tally
+
+
+Grounds = Mapping[Room, Ground]
+
+
+def choose(grounds: Grounds[Room], now: float, tally: Tally[Room]) -> tuple[Room | None, Tally[Room]]:
+    """Returns the room whose turn it is, None when there is nothing to do; and the tally after the choice."""
+    found = ((states.stage(ground, now), room) for room, ground in grounds.items())
+    staged = [(stage, room) for stage, room in found if stage is not None and _fits(room, stage, grounds, now, tally)]
+    waiting = {room for stage, room in staged if stage != REFINE} or {room for _, room in staged}
+    tally = _levelled(waiting, tally)
+    if not staged:
+        return None, tally
+    rooms = tally.rooms
+    least = min(rooms[room].seconds for room in waiting)
+    # who has had more than its share waits
+    staged = [(stage, room) for stage, room in staged if rooms[room].seconds <= least + AHEAD]
+    stage, best = min(staged, key=lambda s: (s[0], *_order(s[0], grounds[s[1]], rooms[s[1]])))
+    late = [room for other, room in staged if other > stage and now - rooms[room].ran_at > PATIENCE]
+    if not late or now <= tally.favour_after:
+        return best, replace(tally, favoured=None)
+    best = min(late, key=lambda room: rooms[room].turn)
+    return best, replace(tally, favoured=best)
+
+
+def begin(
+    room: Room, grounds: Grounds[Room], now: float, tally: Tally[Room]
+) -> tuple[bool, Sequence[Room], Tally[Room]]:
+    """The slice of a room begins. Returns whether it begins its newest job, and whose solves end for that."""
+    ground = grounds[room]
+    tally = replace(tally, turns=tally.turns + 1)
+    tally = tally.noted(room, turn=tally.turns, ran_at=now)
+    may = not ground.channels.making or _may_begin(room, COARSE, grounds, now, tally)
+    if not states.starts(ground, now) or not may:
+        return False, (), tally
+    stage = states.stage(ground, now)
+    gone = _in_the_way(room, COARSE if stage is None else stage, grounds, tally)
+    for other in gone:
+        tally = tally.noted(other, is_spared=True)
+    spared = tally.rooms[room].is_spared
+    if not states.needs_channels_only(ground):
+        wanted, begun = ground.jobs.wanted, ground.jobs.begun
+        spared = spared and wanted is not None and begun is not None and wanted.job.number == begun.job.number
+    return True, gone, tally.noted(room, began=tally.turns, is_spared=spared)
+
+
+def has_something_else(room: Room, grounds: Grounds[Room]) -> bool:
+    """Returns whether there is anything to do but to go on with the room's solve."""
+    return any(
+        ground.jobs.wanted is not None
+        or (other is not room and (states.is_solving(ground) or isinstance(ground.state, states.ChannelsOnly)))
+        for other, ground in grounds.items()
+    )
+
+
+def _levelled(waiting: set[Room], tally: Tally[Room]) -> Tally[Room]:
+    """Who comes begins with the least time of those who were busy. ``waiting``: all who wait for more than refinement,
+    which waits for all."""
+    rooms = tally.rooms
+    least = max(tally.least, min((rooms[x].seconds for x in waiting if rooms[x].is_busy), default=0.0))
+    changed = {
+        room: replace(had, is_busy=not had.is_busy, seconds=max(had.seconds, least if room in waiting else 0.0))
+        for room, had in rooms.items()
+        if had.is_busy != (room in waiting)
+    }
+    if changed:
+        return replace(tally, least=least, rooms={**rooms, **changed})
+    return tally if least == tally.least else replace(tally, least=least)
+
+
+def _order(stage: int, ground: Ground, had: Used) -> tuple[int, int]:
+    """Within a class the least comes first."""
+    return (ground.top, had.began) if stage == FINER else (0, had.turn)
+
+
+# --- memory ---------------------------------------------------------------------------------------------------------
+
+
+def bytes_of(ground: Ground) -> int:
+    """Returns the memory that the room's solve holds, or would hold."""
+    wanted, begun = ground.jobs.wanted, ground.jobs.begun
+    open_ = states.is_solving(ground) or isinstance(ground.state, states.ChannelsOnly)
+    attempt = begun if wanted is None or open_ else wanted
+    return solve_bytes(ground.top, attempt is not None and attempt.job.base is not None)
+
+
+def _fits(room: Room, stage: int, grounds: Grounds[Room], now: float, tally: Tally[Room]) -> bool:
+    """Returns whether its slice may run."""
+    return grounds[room].channels.making or _may_begin(room, stage, grounds, now, tally)
+
+
+def _may_begin(room: Room, stage: int, grounds: Grounds[Room], now: float, tally: Tally[Room]) -> bool:
+    """Returns whether its newest job may be begun: in what memory there is, or in what others can leave."""
+    ground = grounds[room]
+    if states.is_solving(ground) or isinstance(ground.state, states.ChannelsOnly):
+        return True
+    if states.needs_channels_only(ground) or not states.starts(ground, now):
+        return True
+    return _has_room(room, (), grounds, tally) or _has_room(
+        room, _settling(room, stage, grounds, tally), grounds, tally
+    )
+
+
+def _settling(room: Room, stage: int, grounds: Grounds[Room], tally: Tally[Room]) -> list[Room]:
+    """Others whose solves may end for its: that are only settling, have had no less time (for more than a coarse
+    preview: too much) and were not ended before; longest first."""
+    rooms = tally.rooms
+    had = rooms[room].seconds if stage == COARSE else rooms[room].seconds + AHEAD
+    found = [
+        other
+        for other in _solving(room, grounds)
+        if not isinstance(grounds[other].state, Previewing)
+        and not rooms[other].is_spared
+        and rooms[other].seconds >= had
+    ]
+    return sorted(found, key=lambda other: grounds[other].shown.finest_at)
+
+
+def _solving(room: Room, grounds: Grounds[Room]) -> list[Room]:
+    """Others whose solves hold memory."""
+    return [other for other, ground in grounds.items() if other is not room and states.is_solving(ground)]
+
+
+def _in_the_way(room: Room, stage: int, grounds: Grounds[Room], tally: Tally[Room]) -> Sequence[Room]:
+    """The fewest settling solves, last begun first, without which the room's has memory."""
+    gone: list[Room] = []
+    if states.needs_channels_only(grounds[room]):
+        return gone
+    settling = _settling(room, stage, grounds, tally)
+    while settling and not _has_room(room, gone, grounds, tally):
+        gone.append(settling.pop())
+    return gone
+
+
+def _has_room(room: Room, gone: Sequence[Room], grounds: Grounds[Room], tally: Tally[Room]) -> bool:
+    held = [other for other in _solving(room, grounds) if other not in gone]
+    return not held or sum(bytes_of(grounds[other]) for other in [*held, room]) <= tally.budget

@@ -1,0 +1,447 @@
+"""The document of a room and who is told what about it (DESIGN 4 "Order", 8 "Ticks", "Resume"). No I/O, no time.
+
+Ops are checked and ordered against ``head`` as they come. ``take`` hands the tick's ops to whoever writes the
+journal; after the commit ``committed`` tells the members, so nobody ever sees an op that could still be lost. If the
+commit fails, ``failed`` forgets the ops and refuses them.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import OrderedDict
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from esker import contract as c
+from esker.contract import CloseCode, RejectCode, Role
+from esker.document.ops import Limits, Refusal, StrokeSet
+from esker.document.wire import op_json
+from esker.errors import EskerError
+from esker.fairness.shares import RANK, Full, Place, Places, Rates, Who
+from esker.session.room.limits import history_rates
+from esker.session.room.members import Member, Members, seats
+from esker.session.room.outbox import Long, Outbox
+from esker.session.room.recent import Recent, encoded, points_of
+from esker.session.room.viewing import Viewing
+from esker.store.claims import Claims
+from esker.store.journal import Loaded, Row
+from esker.store.writing import SNAPSHOT_EVERY
+from esker.version import VERSION
+
+UNSAVED: Final = "The server could not save this change (is its disk full?). It was taken back."
+MOST_OWNERS: Final = 4_096
+"""Client ids of which a room remembers whose they are, besides those in the journal."""
+HEAVY_BYTES: Final = 256 * 1024
+"""Documents that are longer as JSON are sent as one piece of memory to all who come."""
+HEAVY_POINTS: Final = 4_000
+"""Documents with more points are encoded outside of the event loop."""
+SINCE_CHARACTERS: Final = 512 * 1024
+"""While no more was done since, who comes gets a heavy document as it was encoded, and then what was done."""
+
+
+STATUS: Final = {
+    "bad_secret": 403,
+    "revoked": 403,
+    "no_terrain": 404,
+    "rate_limited": 429,
+    "server_error": 500,
+    "shutting_down": 503,
+}
+"""What HTTP answers where a route is denied for a reason that also closes sockets."""
+
+
+class Denied(EskerError):
+    """A client that may not come in: the close code and a sentence."""
+
+    def __init__(self, code: CloseCode, message: str) -> None:
+        super().__init__(code, message, STATUS.get(code, 400))
+        self.code: CloseCode = code
+
+
+@dataclass(frozen=True)
+class Batch:
+    """One tick's ops, in clock order, with the document after them."""
+
+    rows: tuple[Row, ...]
+    after: StrokeSet
+    snapshot: c.Document | None
+
+
+@dataclass(frozen=True)
+class RoomInfo:
+    """What a welcome says about the server."""
+
+    levels: int
+    finest: int
+    device: str
+
+
+@dataclass
+class Owner:
+    """The owner of a client id. ``since``: when the id was claimed, milliseconds since 1970; ``heard``: whether
+    anything was said under the id, so that its token is known to have arrived."""
+
+    since: int
+    link: str
+    heard: bool = False
+
+
+class RoomCore:
+    """One terrain with its members."""
+
+    def __init__(
+        self,
+        loaded: Loaded,
+        find: Callable[[str, int], int | None],
+        limits: Limits | None = None,
+        max_members: int = c.MAX_MEMBERS,
+        rates: Rates | None = None,
+        now: Callable[[], float] = time.monotonic,
+        claims: Claims | None = None,
+    ) -> None:
+        """``find``: the clock of an op of (client, counter) that is in the journal already, or None.
+
+        ``rates``: characters of operations that a link and an address may send (``history_rates``); ``claims``: tells
+        whose a client id is (default: of whoever comes with it).
+        """
+        self.head = self.document = loaded.document
+        self.geometry_clock = loaded.document.clock
+        """Clock of the last op that changed the ground."""
+        self.base_clock = loaded.document.clock
+        """Clock of the last op that changed the elevation layers' part of it."""
+        self.members = Members()
+        self._find, self._limits, self._seats = find, limits or Limits(), Places(seats(max_members))
+        self._rates, self._now = rates or history_rates(), now
+        self._counters = dict(loaded.counters)
+        self._claims = claims or Claims()
+        self._owners: OrderedDict[str, Owner] = OrderedDict()
+        """Owners of the client ids that were seen here; the id that was unseen for longest comes first."""
+        self._recent, self._viewing = Recent(), Viewing()
+        for row in loaded.recent:
+            self._recent.add(row.clock, row.ordered_json())
+            self._viewing.loaded(row.clock, row.op)
+        self._snapshot_clock = loaded.document.clock - len(loaded.recent)
+        self._waiting: list[Row] = []
+        self._in_flight: list[Row] = []
+        self._kept: dict[bool, tuple[int, bytes]] = {}
+        """Documents as they were encoded with their clocks; True: as links to look are shown them."""
+
+    # --- people -------------------------------------------------------------------------------------------------
+
+    def join(
+        self,
+        hello: c.Hello,
+        role: Role,
+        link: str,
+        outbox: Outbox,
+        info: RoomInfo,
+        address: str = "",
+        asked: int | None = None,
+    ) -> Member:
+        """Lets a client in and queues its welcome. Raises Denied (room_full, bad_hello).
+
+        ``asked``: the document's clock when it came (default: now), if it had to wait for a heavy document.
+        """
+        owner = self._owner(hello, link)
+        old = self.members.by_client.get(hello.client)
+        if old is not None:
+            self.members.remove(old)
+            old.outbox.close("bad_hello", "This page connected again; the older connection is closed.")
+        seat = self._seat(Who(address, link, RANK[role]))
+        colour = self.members.colour(hello.colour)
+        member = Member(hello.client, hello.name, colour, role, link, outbox, address, seat)
+        self.members.add(member)
+        self._owners[hello.client] = owner
+        self._owners.move_to_end(hello.client)
+        while len(self._owners) > MOST_OWNERS:
+            self._owners.popitem(last=False)
+        outbox.push(*self._welcome(member, hello.clock, info, asked=asked), counted=False)
+        return member
+
+    def _owner(self, hello: c.Hello, link: str) -> Owner:
+        """Returns whose the client id is once this client is in. Raises Denied (bad_hello): somebody else's.
+
+        Who has no token comes under an id that was not used; or under one whose welcome did not arrive, as nothing was
+        heard since. Of two who have one for the same id, it is that of whoever claimed it first.
+        """
+        known = self._owners.get(hello.client)
+        since = self._claims.since(hello.token, self.document.id, hello.client, link)
+        if since is not None:
+            if known is None or since <= known.since:
+                return Owner(since, link, heard=True)
+        elif known is not None:
+            if known.link == link and not known.heard:
+                return Owner(known.since, link)
+        elif hello.client not in self._counters:
+            return Owner(self._claims.now(), link)
+        raise Denied("bad_hello", "Another page has this client id. Reload this page.")
+
+    def heard(self, member: Member) -> None:
+        """A member said something, so it has its welcome."""
+        owner = self._owners.get(member.client)
+        if owner is not None and owner.link == member.link:
+            owner.heard = True
+
+    def belongs(self, client: str, link: str) -> bool:
+        """Returns whether things may be done in the name of a client id by who came in by this link."""
+        owner = self._owners.get(client)
+        return client not in self._counters if owner is None else owner.link == link
+
+    def _seat(self, who: Who) -> Place:
+        try:
+            return self._seats.take(who)
+        except Full as full:
+            most = self._seats.share.total
+            sentence = f"This terrain has {most} people in it, which is the limit."
+            if full.yours:
+                sentence = "As many people as may came in to look by this link or from your address. Try again later."
+            elif len(self._seats) < most:
+                sentence = "The last seats of this terrain are kept for people who draw. Try again later."
+            raise Denied("room_full", sentence) from None
+
+    def leave(self, member: Member) -> None:
+        """Takes a member out. Harmless when it is out already."""
+        self.members.remove(member)
+
+    def revoke(
+        self,
+        link: str,
+        code: CloseCode = "revoked",
+        sentence: str = "The link that you opened was revoked by the owner.",
+    ) -> None:
+        """Closes everybody who came in by this link."""
+        for member in self.members:
+            if member.link == link:
+                member.outbox.close(code, sentence)
+
+    def tell_owners(self, sentence: str, besides: str) -> None:
+        """Tells a sentence to the owners who did not come in by the link ``besides``."""
+        text = c.ErrorMessage(code="revoked", message=sentence, fatal=False).model_dump_json()
+        for member in self.members:
+            if member.role == "owner" and member.link != besides:
+                member.outbox.push(text)
+
+    def _welcome(
+        self, member: Member, clock: int | None, info: RoomInfo, *, exact: bool = False, asked: int | None = None
+    ) -> tuple[str | Long, ...]:
+        """The welcome; and, where a heavy document was encoded a while ago and not ``exact`` is asked, what was done
+        since."""
+        view = self._looks(member)
+        missed = self._missed(clock, view)
+        if missed is not None:
+            now, body, member.since = self.document.clock, b"", clock or 0
+        else:
+            now, body = self._usable(view, exact, asked) or self._encode(view)
+            member.since = now
+        head = c.Welcome(
+            protocol=c.PROTOCOL_VERSION,
+            server=f"esker {VERSION}",
+            client=member.client,
+            token=self._token(member),
+            role=member.role,
+            colour=member.colour,
+            levels=info.levels,
+            finest=info.finest,
+            clock=now,
+            members=self.members.public(),
+            device=info.device,
+        ).model_dump_json(exclude={"document", "ops"})
+        if missed is not None:
+            return (f'{head[:-1]},"document":null,"ops":[{",".join(self._as_seen(member, missed))}]}}',)
+        if len(body) <= HEAVY_BYTES:
+            return (f'{head[:-1]},"document":{body.decode()},"ops":null}}',)
+        text = Long(f'{head[:-1]},"document":'.encode(), body, b',"ops":null}')
+        since = self._recent.after(now) if now < self.document.clock else None
+        if not since:
+            return (text,)
+        return text, f'{{"type":"ordered","ops":[{",".join(self._as_seen(member, since))}]}}'
+
+    def _looks(self, member: Member) -> bool:
+        """Returns whether a member is shown what a link to look shows."""
+        return member.role == "view"
+
+    def _as_seen(self, member: Member, ordered: list[tuple[int, str]]) -> list[str]:
+        if self._looks(member):
+            return self._viewing.texts(ordered, member.since)
+        return [text for _, text in ordered]
+
+    def _token(self, member: Member) -> str:
+        since = self._owners[member.client].since
+        return self._claims.token(self.document.id, member.client, member.link, since)
+
+    def _usable(self, view: bool, exact: bool = False, asked: int | None = None) -> tuple[int, bytes] | None:
+        """The document as it was encoded, with its clock, as far as it is still good for who came when the clock was
+        ``asked``: a viewer gets nothing that was deleted before."""
+        kept = self._kept.get(view)
+        if kept is None or kept[0] == self.document.clock:
+            return kept
+        if exact or len(kept[1]) <= HEAVY_BYTES:
+            return None
+        if view and kept[0] < (self.document.clock if asked is None else asked) and self._viewing.ended(kept[0]):
+            return None
+        since = self._recent.after(kept[0])
+        return kept if since is not None and sum(len(text) for _, text in since) <= SINCE_CHARACTERS else None
+
+    def _encode(self, view: bool) -> tuple[int, bytes]:
+        found = self._kept[view] = self.document.clock, encoded(self.document, view)
+        return found
+
+    def keep(self, clock: int, body: bytes, view: bool = False) -> None:
+        """The document of a clock was encoded elsewhere, ``view``: as a link to look is shown it."""
+        if view not in self._kept or self._kept[view][0] < clock:
+            self._kept[view] = clock, body
+
+    def ready(self, clock: int | None, view: bool = False, asked: int | None = None) -> bool:
+        """Returns whether who has seen ``clock`` (None: nothing) can be welcomed without encoding a heavy document."""
+        if self._missed(clock, view) is not None or points_of(self.document) <= HEAVY_POINTS:
+            return True
+        return self._usable(view, asked=asked) is not None
+
+    def _missed(self, clock: int | None, view: bool = False) -> list[tuple[int, str]] | None:
+        """The committed ops after ``clock``, or None when only a snapshot will do."""
+        now = self.document.clock
+        if clock is None or clock > now or (view and not self._viewing.resumable(clock)):
+            return None
+        return [] if clock == now else self._recent.after(clock)
+
+    # --- ops ----------------------------------------------------------------------------------------------------
+
+    def submit(self, member: Member, ops: Sequence[c.OpEnvelope]) -> int:
+        """Orders what applies and refuses the rest; returns how many ops were ordered."""
+        if member.role == "view":
+            for envelope in ops:
+                self.refuse(member, envelope.id, "view_only", "You opened this terrain with a link to look at it.")
+            return 0
+        ordered = 0
+        for envelope in ops:
+            ordered += self._one(member, envelope)
+        return ordered
+
+    def refuse(self, member: Member, op_id: str, code: RejectCode, message: str) -> None:
+        """Answers one op with a reason."""
+        member.outbox.message(c.Reject(id=op_id, code=code, message=message))
+
+    def _one(self, member: Member, envelope: c.OpEnvelope) -> bool:
+        client, _, digits = envelope.id.partition(":")
+        counter = int(digits)
+        if client != member.client:
+            self.refuse(member, envelope.id, "malformed", "An op's id starts with the id of the client that sends it.")
+            return False
+        if counter <= self._counters.get(client, -1) and self._known(member, client, counter):
+            return False
+        if _adds_layer(envelope.op):
+            self.refuse(member, envelope.id, "server_only", "A layer is added by importing a file, not by this op.")
+            return False
+        text = op_json(envelope.op)
+        if not self._rates.take(Who(member.address, member.link), self._now(), len(text)):
+            sentence = "Far more came than a pen draws. Slow down and send it again."
+            self.refuse(member, envelope.id, "rate_limited", sentence)
+            return False
+        try:
+            self._order(envelope.op, text, client, counter, client)
+        except Refusal as refusal:
+            self.refuse(member, envelope.id, refusal.code, refusal.message)
+            return False
+        return True
+
+    def perform(self, op: c.Op, agent: str, author: str) -> int:
+        """Orders an op of the server's own, the first and only one of ``agent``; returns its clock. Raises Refusal.
+
+        ``author``: the client in whose name it is done, who may undo it (``document/sync.py``).
+        """
+        if self._counters.get(agent, -1) >= 0:
+            raise Refusal("duplicate_layer", "This was done already.")
+        self._order(op, op_json(op), agent, 0, author)
+        return self.head.clock
+
+    def _order(self, op: c.Op, text: str, client: str, counter: int, author: str) -> None:
+        before = self.head
+        after, _ = before.apply(op, self._limits)
+        self.head = after
+        self._viewing.note(before, op, after.clock)
+        if after.layers_rev != before.layers_rev:
+            self.base_clock = self.geometry_clock = after.clock
+        if after.channels_rev != before.channels_rev:
+            self.geometry_clock = after.clock
+        self._counters[client] = max(counter, self._counters.get(client, -1))
+        self._waiting.append(Row(after.clock, client, counter, author, text))
+
+    def _known(self, member: Member, client: str, counter: int) -> bool:
+        """True for an op that is ordered already: acknowledged now, or with its tick if that is still under way."""
+        if any(r.client == client and r.counter == counter for r in (*self._in_flight, *self._waiting)):
+            return True
+        clock = self._find(client, counter)
+        if clock is not None:
+            member.outbox.message(c.Ack(ids=(f"{client}:{counter}",), clocks=(clock,)))
+        return clock is not None
+
+    # --- ticks --------------------------------------------------------------------------------------------------
+
+    @property
+    def busy(self) -> bool:
+        """True while ops are ordered that are not committed yet."""
+        return bool(self._waiting or self._in_flight)
+
+    @property
+    def waiting(self) -> bool:
+        """True when ``take`` has something to give."""
+        return bool(self._waiting) and not self._in_flight
+
+    def take(self) -> Batch | None:
+        """The ops of this tick, to be committed. None when there are none or a commit is still under way."""
+        if not self.waiting:
+            return None
+        self._in_flight, self._waiting = self._waiting, []
+        due = self.head.clock - self._snapshot_clock >= SNAPSHOT_EVERY
+        return Batch(tuple(self._in_flight), self.head, self.head.to_document() if due else None)
+
+    def committed(self, batch: Batch) -> None:
+        """The batch is in the journal: tell everybody, then acknowledge the authors."""
+        self.document = batch.after
+        if batch.snapshot is not None:
+            self._snapshot_clock = batch.after.clock
+        self._in_flight = []
+        texts = [row.ordered_json() for row in batch.rows]
+        for row, text in zip(batch.rows, texts, strict=True):
+            self._recent.add(row.clock, text)
+        shared = f'{{"type":"ordered","ops":[{",".join(texts)}]}}'
+        looking: dict[object, str] = {}
+        acks: dict[str, list[Row]] = {}
+        for row in batch.rows:
+            acks.setdefault(row.client, []).append(row)
+        for member in self.members:
+            mine = acks.get(member.client)
+            if self._looks(member):
+                variant = self._viewing.variant((row.clock for row in batch.rows), member.since)
+                if variant not in looking:
+                    told = self._as_seen(
+                        member, [(row.clock, text) for row, text in zip(batch.rows, texts, strict=True)]
+                    )
+                    looking[variant] = f'{{"type":"ordered","ops":[{",".join(told)}]}}'
+                member.outbox.push(looking[variant])
+            elif mine is None:
+                member.outbox.push(shared)
+            else:
+                member.outbox.push(shared, _ack(mine))
+
+    def failed(self, sentence: str = UNSAVED) -> None:
+        """The journal did not take the batch: back to what is committed; every op since is refused with a sentence."""
+        lost = [*self._in_flight, *self._waiting]
+        self._in_flight, self._waiting = [], []
+        self.head = self.document
+        self._viewing.forget(self.head.clock)
+        self.geometry_clock = self.base_clock = self.head.clock
+        for row in lost:
+            author = self.members.by_client.get(row.client)
+            if author is not None:
+                self.refuse(author, f"{row.client}:{row.counter}", "unavailable", sentence)
+
+
+def _ack(rows: Sequence[Row]) -> str:
+    ids, clocks = ",".join(f'"{r.client}:{r.counter}"' for r in rows), ",".join(str(r.clock) for r in rows)
+    return f'{{"type":"ack","ids":[{ids}],"clocks":[{clocks}]}}'
+
+
+def _adds_layer(op: c.Op) -> bool:
+    return any(isinstance(part, c.AddLayer) for part in (op.ops if isinstance(op, c.Group) else (op,)))

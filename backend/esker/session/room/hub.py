@@ -1,0 +1,397 @@
+"""All open rooms of one server, and who may enter them (DESIGN 8, 13)."""
+
+from __future__ import annotations
+
+import asyncio
+import gc
+import logging
+import secrets
+import time
+from collections.abc import Callable, Collection
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from typing import Any, Final, ParamSpec, TypeVar
+
+from esker import contract as c
+from esker.document.ops import Limits, StrokeSet
+from esker.fairness.shares import Full, Rate, Rates, Share, Who
+from esker.process import memory, system
+from esker.session.ground.ports import Elevation, Tiles
+from esker.session.ground.tilethread import TileThread
+from esker.session.ground.worker import Worker
+from esker.session.room.core import Denied, RoomCore, RoomInfo
+from esker.session.room.limits import history_rates
+from esker.session.room.openrooms import OpenRooms
+from esker.session.room.outbox import Outbox, Waiting
+from esker.session.room.past import PastCore, PastRoom, Pasts, Present
+from esker.session.room.room import Guest, Room
+from esker.session.room.turns import SERVER, FairThreads
+from esker.store.access import Access, Link
+from esker.store.claims import Claims
+from esker.store.journal import DamagedTerrain, Journal
+from esker.store.upkeep.deletion import GRACE_SECONDS, Deletion
+
+log = logging.getLogger("esker.hub")
+
+GIVE_BACK_SECONDS: Final = 5.0
+IDLE_SECONDS: Final = 30.0
+"""A room without members stays open this long, so that a reload finds it warm."""
+REST_SECONDS: Final = 600.0
+"""Where all rooms are open, one in which nobody did anything for so long is closed for somebody who comes."""
+RESTED: Final = "Nobody did anything here for a while, so the server made room for others. Reload the page to go on."
+WRONG_SECRETS_PER_MINUTE: Final = 30
+HELLOS: Final = Rate(5.0, 300.0)
+"""Pages of one address, or by one link, that come: a full room may come back at once."""
+WAITING_BYTES: Final = 256 << 20
+READERS, READS_WAITING = 6, 100
+PACKERS, PACKS_WAITING = 2, 20
+"""Threads, and how much of one address may wait for them."""
+P = ParamSpec("P")
+T = TypeVar("T")
+
+
+DELETED: Final = "The owner deleted this terrain."
+
+
+class Deleted(Denied):
+    """The terrain was deleted and can still be brought back by its owners, until ``until`` (seconds since 1970)."""
+
+    def __init__(self, link: Link, until: float) -> None:
+        super().__init__("no_terrain", "This terrain was deleted.")
+        self.link, self.until = link, until
+
+
+class Hub:
+    """Opens rooms, closes idle ones, checks secrets. Lives in one event loop."""
+
+    def __init__(
+        self,
+        journal: Journal,
+        access: Access,
+        worker: Worker,
+        tiles: Tiles,
+        *,
+        levels: int = c.DEFAULT_LEVEL,
+        finest: int | None = None,
+        limits: Limits | None = None,
+        max_members: int = c.MAX_MEMBERS,
+        idle_seconds: float = IDLE_SECONDS,
+        now: Callable[[], float] = time.monotonic,
+        elevation: Elevation | None = None,
+        claims: Claims | None = None,
+        rooms: Share | None = None,
+    ) -> None:
+        """``levels``: the finest level solved as a whole; ``finest``: the finest refined (default: none is);
+        ``elevation``: makes the base of elevation layers (default: none is laid); ``rooms``: how many may be open."""
+        self.journal, self.access, self.deletion = journal, access, Deletion(journal)
+        self._worker, self._tiles = worker, tiles
+        self._levels, self._finest = levels, levels if finest is None else max(levels, finest)
+        self._limits, self._max_members = limits or Limits(), max_members
+        self._idle_seconds, self._now = idle_seconds, now
+        self._rooms: dict[str, asyncio.Task[Room | None]] = {}
+        self._places = OpenRooms(self._sleep, rooms, self._rest)
+        self._tile_thread = TileThread()
+        self._elevation = elevation
+        self._laying = ThreadPoolExecutor(1, thread_name_prefix="elevation")
+        self._wrong = Rates(Rate(WRONG_SECRETS_PER_MINUTE / 60, WRONG_SECRETS_PER_MINUTE))
+        self.reading = FairThreads(READERS, "reading", READS_WAITING)
+        """Threads that read the journal: of one address half of them at most."""
+        self.packing = FairThreads(PACKERS, "packing", PACKS_WAITING)
+        """Threads that make files of what is stored."""
+        self._history_rates = history_rates()
+        self._hellos = Rates(HELLOS, link=HELLOS)
+        self.waiting = Waiting(min(WAITING_BYTES, memory.available_bytes() // 16))
+        """What waits to be sent to everybody."""
+        self._closing = False
+        self._giving_back: asyncio.TimerHandle | None = None
+        self.hear_of_ended: list[Callable[[str, Collection[str]], object]] = []
+        """Who is told of links that were revoked: terrain, ids."""
+        self._claims = claims or Claims()
+        self._pasts = Pasts(journal, self._past_room, claims=self._claims)
+
+    @property
+    def device(self) -> str:
+        """The solver's device, in words."""
+        return self._worker.device_name
+
+    # --- entering -----------------------------------------------------------------------------------------------
+
+    def authorise(self, terrain: str, secret: str, address: str) -> Link:
+        """The live link behind a secret. Raises Denied (no_terrain, bad_secret, revoked, rate_limited)."""
+        link = self.access.check(terrain, secret)
+        if link is None:
+            if not self._wrong.take(Who(address), self._now()):
+                raise Denied("rate_limited", "Too many wrong links came from your address. Wait a minute.")
+            if not self.journal.exists(terrain):
+                raise Denied("no_terrain", "There is no such terrain on this server.")
+            raise Denied("bad_secret", "This link does not open this terrain. Ask for a new one.")
+        if link.revoked is not None:
+            raise Denied("revoked", "This link was revoked by the owner of the terrain.")
+        if (deleted := self.deletion.deleted(terrain)) is not None:
+            raise Deleted(link, deleted + GRACE_SECONDS)
+        return link
+
+    def demand(self, link: Link) -> None:
+        """Asks again whether a link still opens its terrain: after everything that was waited for, and before anything
+        is given out or laid. Raises Denied (revoked, bad_secret)."""
+        if (deleted := self.deletion.deleted(link.terrain)) is not None:
+            raise Deleted(link, deleted + GRACE_SECONDS)
+        if not self.access.alive(link):
+            found = next((each for each in self.access.links(link.terrain) if each.id == link.id), None)
+            if found is None or found.revoked is not None:
+                raise Denied("revoked", "This link was revoked by the owner of the terrain.")
+            raise Denied("bad_secret", "This link was renewed meanwhile. Ask for the new one.")
+
+    async def enter(self, hello: c.Hello, outbox: Outbox, address: str) -> tuple[Room, Guest]:
+        """Lets a client into its room, opening it if need be. Raises Denied."""
+        if self._closing:
+            raise Denied("shutting_down", "The server is stopping. Your page will come back by itself.")
+        link = self.authorise(hello.terrain, hello.secret, address)
+        if hello.at is not None:
+            who = Who(address, link.id)
+            present = partial(self.strokes, hello.terrain, None, who) if link.role == "view" else None
+            read = partial(self.read, who)
+            return await self._pasts.enter(hello, who, outbox, lambda: self.demand(link), read, present)
+        who = Who(address, link.id)
+        if not self._hellos.take(who, self._now()):
+            raise Denied("rate_limited", "Too many pages came at once. Yours comes back by itself.")
+        room = await self.room(hello.terrain, who)
+        asked = await room.prepare(hello.clock, partial(self.read, who), link.role == "view")
+        while room.closed:  # the last member left meanwhile
+            room = await self.room(hello.terrain, who)
+        self.demand(link)  # the link may have been revoked while the room was being opened
+        return room, room.join(hello, link.role, link.id, outbox, address, asked)
+
+    # --- rooms --------------------------------------------------------------------------------------------------
+
+    async def read(self, who: Who, work: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
+        """Runs what reads the journal, in a thread. Raises Denied (rate_limited) where too much waits already."""
+        try:
+            return await self.reading.run(who, work, *args, **kwargs)
+        except Full:
+            raise Denied("rate_limited", "Too much was asked for from your address at once. Wait a moment.") from None
+
+    async def room(self, terrain: str, who: Who = SERVER) -> Room:
+        """The open room of a terrain. Raises Denied (no_terrain, server_error, rate_limited)."""
+        room = await self._room(terrain, who)
+        while room.closed:  # the room was idle and closed in this very moment
+            room = await self._room(terrain, who)
+        return room
+
+    async def _room(self, terrain: str, who: Who) -> Room:
+        task = self._rooms.get(terrain)
+        if task is None:
+            self._places.take(terrain, who)
+            task = self._rooms[terrain] = asyncio.create_task(self._open(terrain, who))
+        self._places.used(terrain)
+        try:
+            room = await asyncio.shield(task)
+        except DamagedTerrain as error:
+            self._forget(terrain, task)
+            log.error("terrain %s cannot be opened: %s", terrain, error)
+            raise Denied("server_error", "The journal of this terrain is damaged; nothing was changed.") from error
+        except BaseException:
+            if task.done():
+                self._forget(terrain, task)
+            raise
+        if room is None:
+            self._forget(terrain, task)
+            raise Denied("no_terrain", "There is no such terrain on this server.")
+        return room
+
+    def _forget(self, terrain: str, task: asyncio.Task[Room | None]) -> None:
+        if self._rooms.get(terrain) is task:
+            del self._rooms[terrain]
+            self._places.release(terrain)
+
+    async def _open(self, terrain: str, who: Who) -> Room | None:
+        loaded = await self.read(who, self.journal.load, terrain)
+        if loaded is None or self.deletion.deleted(terrain) is not None:
+            return None
+        core = RoomCore(
+            loaded,
+            lambda client, counter: self.journal.find(terrain, client, counter),
+            self._limits,
+            self._max_members,
+            rates=self._history_rates,
+            claims=self._claims,
+        )
+        return Room(core, journal=self.journal, on_empty=lambda: self._empty(terrain), **self._needs())
+
+    def _past_room(self, core: PastCore, on_empty: Callable[[], None], present: Present | None = None) -> PastRoom:
+        more = {"idle_seconds": c.PAST_IDLE_SECONDS, "present": present} | self._needs()
+        return PastRoom(core, journal=self.journal, on_empty=on_empty, **more)
+
+    def _needs(self) -> dict[str, Any]:
+        """Returns what every room is made with."""
+        return {
+            "worker": self._worker,
+            "tiles": self._tiles,
+            "executor": self._tile_thread,
+            "info": RoomInfo(self._levels, self._finest, self._worker.device_name),
+            "elevation": self._elevation,
+            "laying": self._laying,
+        }
+
+    @property
+    def open_rooms(self) -> int:
+        """Rooms that are open or opening, those of the past not counted."""
+        return len(self._rooms)
+
+    def open_room(self, terrain: str) -> Room | None:
+        """The room if it is open already."""
+        task = self._rooms.get(terrain)
+        if task is None or not task.done() or task.cancelled() or task.exception() is not None:
+            return None
+        return task.result()
+
+    def _empty(self, terrain: str) -> None:
+        asyncio.get_running_loop().call_later(self._idle_seconds, self._close_idle, terrain)
+
+    def _close_idle(self, terrain: str) -> None:
+        self._sleep(terrain)
+
+    def _sleep(self, terrain: str) -> bool:
+        """Closes a room that nobody is in; whether it is closed now."""
+        room = self.open_room(terrain)
+        if room is None or len(room.core.members) or room.core.busy:
+            return False
+        del self._rooms[terrain]
+        self._places.release(terrain)
+        room.shut()
+        self._give_back_soon()
+        return True
+
+    def _rest(self, terrain: str) -> bool:
+        """Closes a room in which nobody has done anything for long: whoever is in it is told. Whether it did."""
+        room = self.open_room(terrain)
+        if room is None or room.core.busy or not room.idle_for(REST_SECONDS):
+            return False
+        for member in room.core.members:
+            member.outbox.close("room_full", RESTED)
+            room.core.leave(member)
+        log.info("terrain %s was closed for others: nobody did anything in it for %.0f s", terrain, REST_SECONDS)
+        return self._sleep(terrain)
+
+    def _give_back_soon(self) -> None:
+        """Gives memory of closed rooms back to the system soon, once for all that close within a while."""
+        if self._giving_back is None:
+            self._giving_back = asyncio.get_running_loop().call_later(GIVE_BACK_SECONDS, self._give_back)
+
+    def _give_back(self) -> None:
+        self._giving_back = None
+        gc.collect()
+        asyncio.get_running_loop().run_in_executor(None, system.give_memory_back)
+
+    # --- terrains -----------------------------------------------------------------------------------------------
+
+    async def create(self, document: c.Document) -> tuple[c.Document, Link, str]:
+        """A new terrain born as ``document`` under a fresh id, with its owner link and that link's secret.
+
+        Raises store.journal.Unwritable; then there is neither.
+        """
+        born = document.model_copy(update={"id": _fresh_id(), "clock": 0})
+        link, secret, insert = self.access.make(born.id, "owner", "Owner")
+        await asyncio.wrap_future(self.journal.create(born, insert))
+        return born, link, secret
+
+    async def document(self, terrain: str, at: int | None = None, who: Who = SERVER) -> c.Document:
+        """The committed document, or that of an earlier clock, for ``who``.
+
+        Raises Denied (no_terrain, server_error, rate_limited)."""
+        return (await self.strokes(terrain, at, who)).to_document()
+
+    async def strokes(self, terrain: str, at: int | None = None, who: Who = SERVER) -> StrokeSet:
+        """Returns the document of ``document`` as a stroke set, which is what a room holds."""
+        room = self.open_room(terrain)
+        if room is not None and (at is None or at >= room.core.document.clock):
+            return room.core.document
+        try:
+            loaded = await self.read(who, self.journal.load, terrain, at)
+        except DamagedTerrain as error:
+            raise Denied("server_error", "The journal of this terrain is damaged; nothing was changed.") from error
+        if loaded is None:
+            raise Denied("no_terrain", "There is no such terrain on this server.")
+        return loaded.document
+
+    async def delete(self, link: Link) -> float:
+        """Deletes the terrain of an owner's link: closes everybody in it. Returns when it will be gone for good.
+
+        Raises store.journal.Unwritable.
+        """
+        until = await asyncio.wrap_future(self.deletion.delete(link.terrain))
+        task = self._rooms.pop(link.terrain, None)
+        self._places.release(link.terrain)
+        room = None if task is None else await task
+        self._pasts.close_terrain(link.terrain, "no_terrain", DELETED)
+        if room is not None:
+            await room.flush()
+            for member in room.core.members:
+                member.outbox.close("no_terrain", DELETED)
+            room.shut()
+        for hears in self.hear_of_ended:
+            hears(link.terrain, [each.id for each in self.access.links(link.terrain)])
+        return until
+
+    def end_links(self, terrain: str, links: Collection[str]) -> None:
+        """Links were revoked: closes everybody who came in by them, ends their join codes and what they have going."""
+        for link in links:
+            self.access.drop_codes(link)
+            self.revoke_members(terrain, link)
+        for hears in self.hear_of_ended:
+            hears(terrain, links)
+
+    def revoke_members(self, terrain: str, link: str) -> None:
+        """Closes everybody who came in by a link that no longer works."""
+        self._revoke(terrain, link, "revoked", "The link that you opened was revoked by the owner.")
+
+    def renew_members(self, terrain: str, link: str, who: str = "") -> None:
+        """Lets everybody who came in by a link show its new secret: they are closed and may come back.
+
+        ``who``: the name of whoever replaced the link.
+        """
+        by = f" by {who}" if who else ""
+        sentence = f"The link was replaced{by}. Your page comes back if it has the new one; else ask for it."
+        self._revoke(terrain, link, "shutting_down", sentence)
+
+    def tell_owners(self, terrain: str, sentence: str, besides: str) -> None:
+        """Tells a sentence to the owners who are here and did not come in by the link ``besides``."""
+        room = self.open_room(terrain)
+        if room is not None:
+            room.core.tell_owners(sentence, besides)
+
+    def name_of(self, terrain: str, client: str, link: str) -> str:
+        """Returns what the member is called who came in by this link as this client; empty when nobody did."""
+        room = self.open_room(terrain)
+        member = room.core.members.by_client.get(client) if room is not None else None
+        return member.name if member is not None and member.link == link else ""
+
+    def _revoke(self, terrain: str, link: str, code: c.CloseCode, sentence: str) -> None:
+        room = self.open_room(terrain)
+        if room is not None:
+            room.core.revoke(link, code, sentence)
+        self._pasts.revoke(terrain, link, code, sentence)
+
+    async def close(self) -> None:
+        """Tells everybody, commits what was ordered, stops the rooms. The journal stays open."""
+        self._closing = True
+        rooms = [room for room in (self.open_room(t) for t in list(self._rooms)) if room is not None]
+        for room in rooms:
+            await room.flush()
+            for member in room.core.members:
+                member.outbox.close("shutting_down", "The server is stopping. Your page will come back by itself.")
+        self._pasts.close("shutting_down", "The server is stopping. Your page will come back by itself.")
+        for room in rooms:
+            room.shut()
+        self._rooms.clear()
+        self._tile_thread.shutdown(wait=False, cancel_futures=True)
+        self._laying.shutdown(wait=False, cancel_futures=True)
+        self.reading.shutdown()
+        self.packing.shutdown()
+
+
+def _fresh_id() -> str:
+    """An id that no terrain has: 72 random bits. It may stand in a command, so it begins with no dash."""
+    while (made := secrets.token_urlsafe(9)).startswith("-"):
+        pass
+    return made

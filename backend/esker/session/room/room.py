@@ -1,0 +1,382 @@
+"""The room: one open terrain, the only owner of its document, members and tiles (DESIGN 8).
+
+Everything here runs in the event loop's thread; the journal's writer, the solver and the tile thread call back into
+it. ``core.py`` holds the rules; this file holds the timers.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Awaitable, Callable, Iterable
+from concurrent.futures import Executor, Future
+from functools import partial
+from typing import Final
+
+from esker import contract as c
+from esker.contract import Role
+from esker.document.ops import Refusal
+from esker.document.revisions import revision
+from esker.session.ground.base_builder import Layers
+from esker.session.ground.feed import Stream, TileFeed
+from esker.session.ground.ports import Elevation, Tiles
+from esker.session.ground.tilethread import TileThread
+from esker.session.ground.worker import Job, Worker
+from esker.session.room import protocol
+from esker.session.room.core import UNSAVED, Batch, RoomCore, RoomInfo
+from esker.session.room.members import QUIET_BACKLOG_BYTES, Member
+from esker.session.room.outbox import Outbox
+from esker.session.room.ports import Journal
+from esker.session.room.recent import encoded
+from esker.store.journal import HistoryFull
+from esker.store.timestamps import Person
+
+log = logging.getLogger("esker.room")
+
+TICK: Final = c.TICK_MS / 1000
+PRESENCE_TICK: Final = 1 / c.PRESENCE_HZ
+PROGRESS_TICK: Final = 0.1
+CLOCK_TICK: Final = 0.25
+
+
+class Guest:
+    """A member together with its tiles: what a connection holds on to."""
+
+    def __init__(self, member: Member, stream: Stream) -> None:
+        self.member, self.stream = member, stream
+
+
+class Room:
+    """Wires one ``RoomCore`` to the journal, the solver and the clock."""
+
+    def __init__(
+        self,
+        core: RoomCore,
+        *,
+        journal: Journal,
+        worker: Worker,
+        tiles: Tiles,
+        executor: TileThread,
+        info: RoomInfo,
+        on_empty: Callable[[], None],
+        elevation: Elevation | None = None,
+        laying: Executor | None = None,
+    ) -> None:
+        """``elevation`` makes the base of the layers, in a thread of ``laying``; without them nothing is laid."""
+        self.core, self.info = core, info
+        self.id = core.document.id
+        self._journal, self._worker, self._on_empty = journal, worker, on_empty
+        self._loop = asyncio.get_running_loop()
+        size_m = core.document.settings.size_m
+        self._feed = TileFeed(
+            tiles, size_m, info.levels, info.finest, executor, self._loop, self._level_taken, self._wishes_changed
+        )
+        refinement = self._feed if info.finest > info.levels else None
+        self._solve_client = worker.add(
+            info.levels,
+            self._feed.put,
+            self._solve_failed,
+            refinement,
+            limit=self._feed.limit,
+            confirm=self._feed.confirm,
+            note=self._feed.note,
+        )
+        self._layers = Layers(elevation, laying, self._loop, self._laid, self._tell, self._slow_changed)
+        self._job: Job | None = None
+        """The job that was asked for last."""
+        self._tick_timer: asyncio.TimerHandle | None = None
+        self._tick_at = float("-inf")
+        self._presence_timer: asyncio.TimerHandle | None = None
+        self._solve_due = False
+        self._requested_clock = -1
+        self._progress = c.Progress(clock=core.head.clock, level=0, of=info.levels, settled=False)
+        self._progress_timer: asyncio.TimerHandle | None = None
+        self._note = ""
+        self._called: dict[str, Person] = {}
+        """Authors of ops as the journal knows them."""
+        self._refining = 0
+        self._encoding: dict[bool, asyncio.Future[bytes]] = {}
+        self._flushed = asyncio.Event()
+        self._flushed.set()
+        self.closed = False
+        self._active_at = self._loop.time()
+        """When somebody came, or did more than to answer by itself."""
+        self._request_solve()
+
+    # --- people -------------------------------------------------------------------------------------------------
+
+    async def prepare(
+        self, clock: int | None, run: Callable[[Callable[[], bytes]], Awaitable[bytes]], view: bool = False
+    ) -> int:
+        """Has a heavy document encoded by ``run``, in another thread, once for all who come meanwhile.
+
+        ``view``: as a link to look is shown it. Returns the clock when it was asked for.
+        """
+        asked = self.core.document.clock
+        while not self.core.ready(clock, view, asked) and not self.closed:
+            if view not in self._encoding:
+                document = self.core.document
+                self._encoding[view] = asyncio.ensure_future(run(partial(encoded, document, view)))
+                self._encoding[view].add_done_callback(partial(self._encoded, document.clock, view))
+            await asyncio.shield(self._encoding[view])
+        return asked
+
+    def _encoded(self, clock: int, view: bool, done: asyncio.Future[bytes]) -> None:
+        del self._encoding[view]
+        if not done.cancelled() and done.exception() is None:
+            self.core.keep(clock, done.result(), view)
+
+    def join(
+        self, hello: c.Hello, role: Role, link: str, outbox: Outbox, address: str = "", asked: int | None = None
+    ) -> Guest:
+        """Lets a client in; ``asked`` is what ``prepare`` returned. Raises Denied."""
+        member = self.core.join(hello, role, link, outbox, self.info, address, asked)
+        outbox.message(self._newest_progress())
+        guest = Guest(member, self._feed.add(outbox))
+        self._active_at = self._loop.time()
+        self._presence_soon()
+        return guest
+
+    def leave(self, guest: Guest) -> None:
+        """The connection of a client ended."""
+        self._feed.remove(guest.stream)
+        self.core.leave(guest.member)
+        self._presence_soon()
+        if not len(self.core.members):
+            self._on_empty()
+
+    def idle_for(self, seconds: float) -> bool:
+        """Whether nobody came or did anything for so long."""
+        return self._loop.time() - self._active_at >= seconds
+
+    def receive(self, guest: Guest, event: protocol.Event) -> None:
+        """Does what a member asks by a message, after the protocol has checked it."""
+        self.core.heard(guest.member)
+        if not isinstance(event, protocol.Reply) and not (
+            isinstance(event, protocol.Message) and isinstance(event.body, c.Credit)
+        ):
+            self._active_at = self._loop.time()
+        match event:
+            case protocol.Accepted(ops):
+                if self.core.submit(guest.member, ops):
+                    self._ordered()
+            case protocol.Refused(op_id, code, message):
+                self.core.refuse(guest.member, op_id, code, message)
+            case protocol.Message(c.View() as view):
+                self._feed.view(guest.stream, view)
+            case protocol.Message(c.Credit() as credit):
+                self._feed.credit(guest.stream, credit.bytes)
+            case protocol.Message(c.Presence() as presence):
+                self.core.members.moved(guest.member, presence)
+                self._presence_soon()
+            case protocol.Message(c.Rename() as rename):
+                self.core.members.rename(guest.member, rename.name, rename.colour)
+                self._presence_soon()
+                if guest.member.client in self._called and guest.member.role != "view":
+                    self._journal.append(self.id, (), None, self._new_names((guest.member.client,)))
+            case protocol.Reply(message):
+                guest.member.outbox.message(message)
+
+    def frame(self, guest: Guest) -> bytes | None:
+        """The binary frame that waits for this member's socket, if there is one."""
+        return self._feed.sent(guest.stream)
+
+    def _presence_soon(self) -> None:
+        if self._presence_timer is None and not self.closed:
+            self._presence_timer = self._loop.call_later(PRESENCE_TICK, self._presence_tick)
+
+    def _presence_tick(self) -> None:
+        self._presence_timer = None
+        if self.core.members.pending:
+            self.core.members.tick()
+
+    # --- imports ------------------------------------------------------------------------------------------------
+
+    async def perform(self, op: c.Op, agent: str, author: str) -> int:
+        """Does an op of the server's own in the name of client ``author``; returns its clock once it is in the journal.
+
+        ``agent``: the id under which it is done, once. Raises Refusal (also when it could not be saved).
+        """
+        clock = self.core.perform(op, agent, author)
+        self._ordered()
+        await self.flush()
+        if not len(self.core.members):
+            self._on_empty()
+        if self._journal.find(self.id, agent, 0) != clock:
+            raise Refusal("unavailable", UNSAVED)
+        return clock
+
+    def importing(self, message: c.Importing) -> None:
+        """Tells everybody how far somebody's import is."""
+        text = message.model_dump_json()
+        here = any(member.name == message.author for member in self.core.members)
+        shown = text if here else message.model_copy(update={"author": ""}).model_dump_json()
+        for member in self.core.members:
+            if member.outbox.backlog < QUIET_BACKLOG_BYTES or message.status.stage in c.ENDED_IMPORT:
+                member.outbox.push(shown if member.role == "view" else text)
+
+    # --- ticks --------------------------------------------------------------------------------------------------
+
+    def _ordered(self) -> None:
+        """Ops were ordered: they are committed with the next tick, and solved at once."""
+        if self.core.geometry_clock > self._requested_clock:
+            if not self._solve_due:
+                self._solve_due = True
+                self._loop.call_soon(self._solve)
+        elif self._progress.settled:
+            # Nothing but the clock changes, and the members see that from the ops: no hurry.
+            self._progress_soon(CLOCK_TICK)
+        self._tick_soon()
+
+    def _tick_soon(self) -> None:
+        if self._tick_timer is None and self.core.waiting:
+            # An op that comes after a pause is committed at once (with all that is read in the same turn of the loop).
+            self._tick_timer = self._loop.call_at(max(self._loop.time(), self._tick_at + TICK), self._tick)
+
+    def _tick(self) -> None:
+        self._tick_timer = None
+        batch = self.core.take()
+        if batch is None:
+            return
+        self._tick_at = self._loop.time()
+        self._flushed.clear()
+        people = self._new_names(row.author for row in batch.rows)
+        future = self._journal.append(self.id, batch.rows, batch.snapshot, people)
+        future.add_done_callback(lambda f: self._loop.call_soon_threadsafe(self._committed, batch, f))
+
+    def _new_names(self, clients: Iterable[str]) -> list[Person]:
+        """Returns what authors of ops are called, where the journal does not have it from this room yet."""
+        here = (self.core.members.by_client.get(client) for client in dict.fromkeys(clients))
+        people = [Person(m.client, m.name, m.colour) for m in here if m is not None]
+        new = [person for person in people if self._called.get(person.client) != person]
+        self._called |= {person.client: person for person in new}
+        return new
+
+    def _committed(self, batch: Batch, future: Future[None]) -> None:
+        error = future.exception()
+        if error is None:
+            self.core.committed(batch)
+        else:
+            log.error("terrain %s: a commit failed: %s", self.id, error)
+            self.core.failed(f"{error} This change was taken back." if isinstance(error, HistoryFull) else UNSAVED)
+            self._request_solve()
+        if self.core.waiting:
+            self._tick_soon()
+        else:
+            self._flushed.set()
+
+    # --- the ground ---------------------------------------------------------------------------------------------
+
+    def _solve(self) -> None:
+        self._solve_due = False
+        if self.core.geometry_clock > self._requested_clock:
+            self._request_solve()
+
+    def _request_solve(self) -> None:
+        head = self.core.head
+        self._requested_clock = head.clock
+        fresh = self._layers.want(head)
+        if self._layers.empty:
+            return  # the first look at a terrain with real ground shows that ground, and no plane before
+        base = self._layers.base
+        last = self._job
+        if last is not None and last.base is base:
+            layers_rev = last.layers_rev
+            if not fresh and (last.heights_rev, last.channels_rev) == (head.heights_rev, head.channels_rev):
+                return  # nothing better can be solved until the new base is there
+        else:
+            layers_rev = 0 if base is None else revision()
+        # The base is still an older one, so this is not the ground of any clock since the layers changed.
+        clock = head.clock if fresh else self.core.base_clock - 1
+        self._job = Job(
+            clock,
+            tuple(head.strokes.values()),
+            head.settings,
+            head.heights_rev,
+            head.channels_rev,
+            head.paint_rev,
+            layers_rev,
+            base,
+        )
+        self._worker.request(self._solve_client, self._job)
+
+    def _laid(self) -> None:
+        """Another base is there."""
+        if not self.closed:
+            self._request_solve()
+
+    def _slow_changed(self) -> None:
+        """A base takes long, or takes no longer."""
+        self._note_progress(self._progress)
+
+    def _level_taken(self, clock: int, level: int, settled: bool) -> None:
+        """A level became tiles. An op that does not touch the ground leaves an older solve as good as new."""
+        if clock >= self.core.geometry_clock:
+            clock = self.core.head.clock
+        self._note_progress(
+            c.Progress(
+                clock=clock,
+                level=level,
+                of=self.info.levels,
+                settled=settled,
+                refining=self._refining if settled else 0,
+            )
+        )
+
+    def _wishes_changed(self, count: int, more: bool) -> None:
+        """``count`` refined tiles are wanted; ``more``: the solver does not know of all of them yet."""
+        if more and not self.closed:
+            self._worker.nudge(self._solve_client)
+        self._refining = count
+        if self._progress.settled and count != self._progress.refining:
+            self._note_progress(self._progress.model_copy(update={"refining": count}))
+
+    def _note_progress(self, progress: c.Progress, delay: float = PROGRESS_TICK) -> None:
+        self._progress = progress
+        self._progress_soon(delay)
+
+    def _progress_soon(self, delay: float) -> None:
+        if self._progress_timer is None and not self.closed:
+            self._progress_timer = self._loop.call_later(delay, self._send_progress)
+
+    def _newest_progress(self) -> c.Progress:
+        """Ground that is settled is so for every clock since at which none of it changed."""
+        progress, head = self._progress, self.core.head
+        if progress.settled and self.core.geometry_clock <= progress.clock < head.clock and self._layers.current(head):
+            self._progress = progress.model_copy(update={"clock": head.clock})
+        return self._progress.model_copy(update={"laying": self._layers.slow})
+
+    def _send_progress(self) -> None:
+        self._progress_timer = None
+        text = self._newest_progress().model_copy(update={"note": self._note}).model_dump_json()
+        self._note = ""
+        for member in self.core.members:
+            member.outbox.push(text)
+
+    def _solve_failed(self, note: str) -> None:
+        """Something went wrong with the solver, or right again. Called in the solver's thread."""
+        self._loop.call_soon_threadsafe(self._tell, note)
+
+    def _tell(self, note: str) -> None:
+        """The note goes out with the next progress, whatever that is: no level may hide it."""
+        self._note = note
+        self._note_progress(self._progress)
+
+    # --- the end ------------------------------------------------------------------------------------------------
+
+    async def flush(self) -> None:
+        """Returns when every op that was ordered so far is committed or refused."""
+        await self._flushed.wait()
+        while self.core.waiting:
+            self._flushed.clear()
+            self._tick_soon()
+            await self._flushed.wait()
+
+    def shut(self) -> None:
+        """Stops the timers and the solver's work for this room. Call ``flush`` first."""
+        self.closed = True
+        self._layers.close()
+        self._worker.remove(self._solve_client)
+        for timer in (self._tick_timer, self._presence_timer, self._progress_timer):
+            if timer is not None:
+                timer.cancel()

@@ -1,0 +1,95 @@
+"""Turns in the event loop: at most so many at a time, one address after another (``esker.fairness.shares.Line``)."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import AsyncIterator, Callable
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import asynccontextmanager
+from typing import ParamSpec, TypeVar
+
+from esker.fairness.shares import Line, Who
+from esker.fairness.spending import PAYS
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+SERVER = Who("")
+"""Stands for the server itself, where it asks for a turn of its own."""
+
+
+class Turns:
+    """``async with turns.turn(who):`` holds a turn. Lives in one event loop."""
+
+    def __init__(self, most: int, each: int | None = None, waiting: int | None = None) -> None:
+        """Parameters are those of ``shares.Line``."""
+        self._line: Line[asyncio.Future[None]] = Line(most, each, waiting)
+        self._most = most
+
+    def locked(self) -> bool:
+        """Returns whether the next to come has to wait."""
+        return self._line.running >= self._most
+
+    @asynccontextmanager
+    async def turn(self, who: Who) -> AsyncIterator[None]:
+        """Waits for a turn. Raises Full when too many of this address wait already."""
+        key, mine = who.site, asyncio.get_running_loop().create_future()
+        self._line.join(key, mine)
+        self._serve()
+        try:
+            await mine
+            yield
+        finally:
+            if not self._line.leave(key, mine):
+                self._line.done(key)
+                self._serve()
+
+    def _serve(self) -> None:
+        while (found := self._line.next()) is not None:
+            if (
+                not found.done()
+            ):  # where the waiting task was cancelled just now, its turn ends when the task hears of that
+                found.set_result(None)
+
+
+class FairThreads:
+    """Threads for work that blocks: of one address at most half of them at a time, in turns with the others."""
+
+    def __init__(self, threads: int, name: str, waiting: int | None = None) -> None:
+        self._turns = Turns(threads, max(1, threads // 2), waiting)
+        self._executor = ThreadPoolExecutor(threads, thread_name_prefix=name)
+
+    async def run(self, who: Who, work: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
+        """Returns what ``work`` returns or raises. Raises Full when too much of this address waits already.
+
+        The turn lasts until the thread is done, also when nobody waits for it any more.
+        """
+
+        spent = [0.0]
+
+        def paid() -> T:
+            began = time.thread_time()
+            try:
+                return work(*args, **kwargs)
+            finally:
+                spent[0] = time.thread_time() - began
+
+        async def turn() -> T:
+            async with self._turns.turn(who):
+                try:
+                    return await asyncio.get_running_loop().run_in_executor(self._executor, paid)
+                finally:
+                    if (pay := PAYS.get()) is not None:
+                        pay(spent[0])
+
+        task = asyncio.ensure_future(turn())
+        try:
+            return await asyncio.shield(task)
+        except asyncio.CancelledError:
+            task.add_done_callback(lambda t: t.cancelled() or t.exception())
+            raise
+
+    def shutdown(self) -> None:
+        """Begins nothing more."""
+        self._executor.shutdown(wait=False, cancel_futures=True)

@@ -1,0 +1,142 @@
+"""What a server keeps: its terrains, with what their journals say of them, without opening them."""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+from collections.abc import Callable
+from concurrent.futures import Future
+from contextlib import closing
+from pathlib import Path
+from typing import Any, Final, NamedTuple, Protocol, TypeVar
+
+from esker.store.journal import connect
+from esker.store.upkeep.inspection import DATABASE_NAME
+from esker.store.upkeep.migrations import FORMAT
+
+T = TypeVar("T")
+MOST: Final = 100
+"""Terrains of one answer."""
+
+_SELECT: Final = """
+SELECT t.id, t.created,
+  coalesce((SELECT at FROM moments WHERE terrain=t.id ORDER BY clock DESC LIMIT 1), t.created) AS changed,
+  coalesce((SELECT max(clock) FROM ops WHERE terrain=t.id), 0),
+  (SELECT count(*) FROM links WHERE terrain=t.id AND revoked IS NULL),
+  (SELECT json_extract(document, '$.settings.title') FROM snapshots WHERE terrain=t.id ORDER BY clock DESC LIMIT 1)
+FROM terrains t
+"""
+
+
+class Kept(NamedTuple):
+    """One terrain of a server. Times are seconds since 1970."""
+
+    id: str
+    created: float
+    changed: float
+    """When the last op came; when it was made, where none has come."""
+    clock: int
+    links: int
+    """Links that work."""
+    title: str
+
+
+class Reads(Protocol):
+    """What can be asked: the journal of a running server, or a visit."""
+
+    def reader(self) -> sqlite3.Connection:
+        """A connection for this thread."""
+
+
+class Visit:
+    """Another program on the database of a server that may be running. It reads, and writes links; it orders no op.
+
+    >>> with Visit(data) as visit:  # doctest: +SKIP
+    ...     print([terrain.title for terrain in all_kept(visit)])
+    """
+
+    def __init__(self, data: Path) -> None:
+        """Raises FileNotFoundError where nothing was kept yet, ValueError where the format is another one."""
+        path = data / DATABASE_NAME
+        if not path.is_file():
+            raise FileNotFoundError(f"There is no {DATABASE_NAME} in {data}: no server has kept anything there.")
+        self._db = connect(path)
+        found = int(self._db.execute("PRAGMA user_version").fetchone()[0])
+        if found != FORMAT:
+            self._db.close()
+            older = "an older Esker: start the server once" if found < FORMAT else "a newer Esker"
+            raise ValueError(f"{path} is of {older} (format {found}, not {FORMAT}).")
+
+    def __enter__(self) -> Visit:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._db.close()
+
+    def reader(self) -> sqlite3.Connection:
+        """The connection."""
+        return self._db
+
+    def submit(self, write: Callable[[sqlite3.Connection], T]) -> Future[T]:
+        """Runs ``write`` in a transaction of its own, now. The future is done, with what it returned or raised."""
+        future: Future[T] = Future()
+        try:
+            self._db.execute("BEGIN IMMEDIATE")
+            try:
+                result = write(self._db)
+            except BaseException:
+                self._db.execute("ROLLBACK")
+                raise
+            self._db.execute("COMMIT")
+            future.set_result(result)
+        except Exception as error:
+            future.set_exception(error)
+        return future
+
+
+def all_kept(store: Reads, skip: int = 0, most: int = MOST) -> list[Kept]:
+    """The terrains that were changed last come first. ``skip``: so many of them are left out."""
+    ordered = _SELECT + " ORDER BY changed DESC, t.id LIMIT ? OFFSET ?"
+    return [_kept(store, row) for row in store.reader().execute(ordered, (most, skip)).fetchall()]
+
+
+def kept_one(store: Reads, terrain: str) -> Kept | None:
+    """Returns one terrain that the server keeps, or None."""
+    row = store.reader().execute(_SELECT + " WHERE t.id=?", (terrain,)).fetchone()
+    return None if row is None else _kept(store, row)
+
+
+def count_kept(store: Reads) -> int:
+    """Returns the number of terrains that the server keeps."""
+    return int(store.reader().execute("SELECT count(*) FROM terrains").fetchone()[0])
+
+
+def _kept(store: Reads, row: tuple[Any, ...]) -> Kept:
+    terrain, created, changed, clock, links, title = row
+    later = _title_since(store.reader(), terrain)
+    return Kept(terrain, created, changed, clock, links, (title or "") if later is None else later)
+
+
+def _title_since(db: sqlite3.Connection, terrain: str) -> str | None:
+    """The title that ops gave the terrain after its newest snapshot, or None where none did."""
+    with closing(
+        db.execute(
+            "SELECT op FROM ops WHERE terrain=?1 AND clock > (SELECT max(clock) FROM snapshots WHERE terrain=?1)"
+            " AND op LIKE '%\"terrain.set\"%' ORDER BY clock DESC",
+            (terrain,),
+        )
+    ) as rows:
+        for (text,) in rows:
+            title = _title_of(json.loads(text))
+            if title is not None:
+                return title
+    return None
+
+
+def _title_of(op: dict[str, Any]) -> str | None:
+    """The title that an op sets last."""
+    if op["type"] == "group":
+        titles = [_title_of(part) for part in op["ops"]]
+        return next((title for title in reversed(titles) if title is not None), None)
+    title = op["fields"].get("title") if op["type"] == "terrain.set" else None
+    return title if isinstance(title, str) else None

@@ -1,0 +1,60 @@
+"""When ops were done and by whom: what the history needs beside the journal's ops (docs/decisions/0021-history.md).
+
+``moments`` (terrain, clock, at): ops from ``clock`` on were committed at ``at``, or at most TIMESTAMP_SECONDS later,
+until the next row; a second of drawing is one row. ``people`` (terrain, client, name, colour): how an author of ops was
+last called there. A journal from before these tables has ops without a time, by authors without a name.
+"""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Iterable
+from typing import Final, NamedTuple
+
+TIMESTAMP_SECONDS: Final = 1.0
+
+
+class Person(NamedTuple):
+    """An author of ops as the others saw them."""
+
+    client: str
+    name: str
+    colour: str
+
+
+class Timestamps:
+    """Writes both, in the commits of the ops; for the journal's writer thread."""
+
+    def __init__(self) -> None:
+        self._last: dict[str, float] = {}
+
+    def note(self, db: sqlite3.Connection, terrain: str, clock: int, now: float) -> None:
+        """Ops from ``clock`` on are committed at ``now``, seconds since 1970."""
+        last = self._last.get(terrain)
+        # A clock that was set back must not leave ops without a moment for as long.
+        if last is None or not last <= now < last + TIMESTAMP_SECONDS:
+            db.execute("INSERT OR IGNORE INTO moments VALUES (?,?,?)", (terrain, clock, now))
+            self._last[terrain] = now
+            if len(self._last) > 10_000:
+                self._last.clear()
+
+
+def keep(db: sqlite3.Connection, terrain: str, people: Iterable[Person]) -> None:
+    """Stores what these people are called now."""
+    db.executemany("INSERT OR REPLACE INTO people VALUES (?,?,?,?)", ((terrain, *person) for person in people))
+
+
+def read_timestamps(db: sqlite3.Connection, terrain: str, after: int, upto: int) -> list[tuple[int, float]]:
+    """Clock and time of the moments that ops with after < clock <= upto need, in order; the first may be earlier."""
+    rows = db.execute(
+        "SELECT clock, at FROM moments WHERE terrain=?1 AND clock<=?3 AND clock >= coalesce("
+        "(SELECT max(clock) FROM moments WHERE terrain=?1 AND clock<=?2), 0) ORDER BY clock",
+        (terrain, after + 1, upto),
+    )
+    return [(int(clock), float(at)) for clock, at in rows]
+
+
+def read_people(db: sqlite3.Connection, terrain: str) -> dict[str, Person]:
+    """Everybody who is the author of an op of the terrain, by client."""
+    rows = db.execute("SELECT client, name, colour FROM people WHERE terrain=?", (terrain,))
+    return {str(row[0]): Person(*map(str, row)) for row in rows}

@@ -1,0 +1,1 @@
+"""Benchmarks of real ground: the patchwork, bases, imports, exports, refinement."""

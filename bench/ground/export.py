@@ -1,0 +1,135 @@
+"""Exports: what each kind of file costs, and whether drawing waits for one (docs/exporting.md).
+
+``files``: processor time of all threads, the solve included, and bytes of each kind of file of a starting terrain.
+``drawing``: the latencies of ``esker bench stream`` on a terrain of a server, alone and while the same server makes the
+largest export of another terrain, in turns; each is the median of the rounds.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import json
+import sys
+import tempfile
+import threading
+import time
+import urllib.request
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from statistics import median
+from typing import Any, Final
+
+from bench.room import _serving, stream
+from esker import templates
+from esker.api.terrain import Terrain
+from esker.exporting.formats import FORMATS, export
+from esker.exporting.ground import Extent
+from esker.solve.solver import Solver
+from esker.version import VERSION
+
+SCENE: Final = "alpine-ridge"
+WISH: Final = {"format": "png16", "samples": 4097, "detail": True}
+TOLD: Final = ("first_coarse_tile_ms", "level_4_preview_ms")
+
+
+def measure_files(solver: Solver, sizes: list[int]) -> dict[str, Any]:
+    """Returns processor seconds, bytes, and bytes a sample of each kind and size, with and without detail."""
+    out: dict[str, Any] = {}
+    with tempfile.TemporaryDirectory(prefix="esker-bench-") as folder:
+        for samples in sizes:
+            for kind, form in FORMATS.items():
+                for detail in (False, True):
+                    if samples > form.most or (form.covers and not detail):
+                        continue
+                    terrain = Terrain.from_document(templates.load(SCENE).document, solver=solver)
+                    path = Path(folder) / f"a{form.suffixes[0]}"
+                    began = time.process_time()
+                    export(terrain, path, kind, Extent.of(None, samples), detail=detail, step=lambda *_: None)
+                    size = path.stat().st_size
+                    out[f"{kind}_{samples}{'_detail' if detail else ''}"] = {
+                        "cpu_s": round(time.process_time() - began, 2),
+                        "bytes": size,
+                        "bytes_per_sample": round(size / samples**2, 2),
+                    }
+    return out
+
+
+@contextmanager
+def exporting(base: str, terrain: str, secret: str) -> Iterator[list[str]]:
+    """Has the server make one export after the other; gives the names of those that came to their end."""
+    stop, done = threading.Event(), []
+
+    def ask(method: str, path: str, body: Any = None) -> Any:
+        headers = {"Authorization": f"Bearer {secret}", "Content-Type": "application/json"}
+        data = None if body is None else json.dumps(body).encode()
+        request = urllib.request.Request(f"{base}/api/terrains/{terrain}{path}", data, headers, method=method)
+        with urllib.request.urlopen(request, timeout=30) as answer:
+            return json.loads(answer.read() or b"null")
+
+    def work() -> None:
+        while not stop.is_set():
+            job = ask("POST", "/exports", WISH)["id"]
+            while not stop.wait(0.2) and (told := ask("GET", f"/exports/{job}"))["stage"] not in ("done", "failed"):
+                pass
+            if stop.is_set():
+                ask("DELETE", f"/exports/{job}")
+            else:
+                done.append(f"{told['stage']} {told['file']}")
+
+    worker = threading.Thread(target=work)
+    worker.start()
+    try:
+        time.sleep(4.0)  # until it computes
+        yield done
+    finally:
+        stop.set()
+        worker.join()
+
+
+def measure_drawing(rounds: int, appends: int) -> dict[str, Any]:
+    """Medians of p50 and p99 over the rounds, alone and beside an export."""
+    found: dict[str, list[dict[str, Any]]] = {"alone": [], "exporting": []}
+    for _ in range(rounds):
+        with _serving.server() as base:
+            other = _serving.upload(base, templates.load(SCENE).document)
+            found["alone"].append(asyncio.run(stream._draw(base, *_serving.upload(base, stream.fifty()), appends)))
+            with exporting(base, *other):
+                drawn = asyncio.run(stream._draw(base, *_serving.upload(base, stream.fifty()), appends))
+            found["exporting"].append(drawn)
+    return {
+        name: {
+            f"{how}.{what}": {q: round(median(r[how][what][q] for r in runs), 1) for q in ("p50", "p99")}
+            for how in ("at_rest", "drawing")
+            for what in TOLD
+        }
+        for name, runs in found.items()
+    }
+
+
+def main(argv: list[str]) -> int:
+    """``esker bench export [--json] [--samples N ...] [--rounds N] [--appends N]``."""
+    parser = argparse.ArgumentParser(prog="esker bench export", description=__doc__)
+    parser.add_argument("--samples", type=int, action="append", help="default: 1025, 2049, 4097")
+    parser.add_argument("--rounds", type=int, default=3, help="of drawing; 0: only the files")
+    parser.add_argument("--appends", type=int, default=40)
+    parser.add_argument("--json", action="store_true", help="print the result as JSON")
+    arguments = parser.parse_args(argv)
+    solver = Solver()
+    result: dict[str, Any] = {
+        "bench": "export",
+        "version": VERSION,
+        "machine": _serving.machine(solver.device_name),
+        "scene": SCENE,
+        "files": measure_files(solver, arguments.samples or [1025, 2049, 4097]),
+    }
+    if arguments.rounds:
+        result["drawing"] = measure_drawing(arguments.rounds, arguments.appends)
+    if arguments.json:
+        sys.stdout.write(json.dumps(result, indent=1) + "\n")
+    else:
+        for part in ("files", "drawing"):
+            for key, value in result.get(part, {}).items():
+                sys.stdout.write(f"{part}.{key}: {value}\n")
+    return 0

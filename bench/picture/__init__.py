@@ -1,0 +1,1 @@
+"""Benchmarks of pictures: the page and the reference renderer, their detail and their cracks."""

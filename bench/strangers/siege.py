@@ -1,0 +1,327 @@
+"""Siege: what four people who draw notice of attacks by a stranger and by a viewer, one after another and all at once.
+
+A server process of its own. Four people draw on one terrain, ``--seconds`` with each attack and as long without any;
+attacks come from a process of their own. Measured for the people: from an append to its acknowledgement, from an append
+to the first tile that shows it, and from their last append to settled ground; for the server: memory, disk,
+descriptors, while the attack goes on and some seconds after it. Ratios are to the same without an attack in this run.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import json
+import math
+import multiprocessing
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import psutil
+from websockets.asyncio.client import ClientConnection
+from websockets.asyncio.client import connect as open_socket
+from websockets.exceptions import ConnectionClosed
+
+from bench.room import _serving, stream
+from bench.strangers._attacks import ATTACKS, BY_LINK, Target
+from esker import contract as c
+from esker.tiles.codec.frame import read_frame
+from esker.version import VERSION
+
+PEOPLE: Final = 4
+PERIOD: Final = 0.2
+SETTLED_SECONDS: Final = 20.0
+"""Longer than this nobody waits for settled ground: then it counts as this."""
+SECONDS, RECOVERY_SECONDS = 6.0, 3.0
+MINUTES: Final = 8.0
+"""Within which it ends unless ``--minutes`` says otherwise; what there was no time for is listed."""
+ALL_SECONDS: Final = 45.0
+"""About what an attack takes with its recovery where settling takes long: so much is kept for all of them at once."""
+SHORT: Final = (3.0, 1.0)
+"""Seconds of drawing and of recovery in the short form."""
+TIMES: Final = {"ack_p99_ms": 2.0, "tile_p50_ms": 2.0, "settling_s": 3.0}
+"""Aims: times what the same room has without an attack, while it goes on and after it."""
+MOST_MEMORY_MB: Final = 2048
+ROLES: Final = ("stranger", "viewer")
+
+
+@dataclass
+class _Person:
+    """Somebody who draws. Times are ``time.perf_counter()``."""
+
+    name: str
+    ws: ClientConnection
+    sent: dict[int, float] = field(default_factory=dict)
+    """Times of sending by the counter of an op, then by its clock once it is acknowledged."""
+    clocks: dict[int, float] = field(default_factory=dict)
+    acks: list[float] = field(default_factory=list)
+    tiles: list[float] = field(default_factory=list)
+    settled_clock: int = -1
+    newest: int = -1
+    """Clock of the last of its changes that was acknowledged."""
+    closed: bool = False
+    lost: int = 0
+    count: int = 0
+
+    async def listen(self) -> None:
+        """Notes what comes."""
+        with suppress(ConnectionClosed):
+            async for message in self.ws:
+                now = time.perf_counter()
+                if isinstance(message, bytes):
+                    await self.ws.send(f'{{"type":"credit","bytes":{len(message)}}}')
+                    shown = int(read_frame(message)[0].clock)
+                    done = [k for k in self.clocks if k <= shown]
+                    self.tiles += [now - self.clocks.pop(k) for k in done]
+                else:
+                    self._told(json.loads(message), now)
+        self.closed = True
+
+    def _told(self, message: dict[str, Any], now: float) -> None:
+        if message["type"] == "ack":
+            for op_id, clock in zip(message["ids"], message["clocks"], strict=True):
+                at = self.sent.pop(int(op_id.partition(":")[2]), None)
+                if at is not None:
+                    self.acks.append(now - at)
+                    self.clocks[clock] = at
+                    self.newest = max(self.newest, clock)
+        elif message["type"] == "progress" and message["settled"]:
+            self.settled_clock = max(self.settled_clock, message["clock"])
+        elif message["type"] == "reject":
+            self.lost += 1
+            self.sent.pop(int(message["id"].partition(":")[2]), None)
+        elif message["type"] == "error":
+            self.lost += 1
+
+    async def draw(self) -> None:
+        """One more segment."""
+        self.count += 1
+        n = (self.count - 1) % 24
+        op: dict[str, Any] = {
+            "type": "stroke.append", "stroke": self.name, "start": n * 4,
+            "points": [[(n * 4 + k) / 96, 40.0 + (n * 7 + k) % 60] for k in range(4)], "last": [2600, 2000, 20],
+        }  # fmt: skip
+        await self._send(op)
+
+    async def begin(self, index: int) -> None:
+        """A stroke of one's own."""
+        ends = {"first": [900 + 300 * index, 900, 0], "last": [2600, 2000, 20]}
+        stroke = {"id": self.name, "kind": "profile", "curve": [[0, 0]], **ends}
+        await self._send({"type": "stroke.begin", "stroke": stroke})
+
+    async def _send(self, op: dict[str, Any]) -> None:
+        self.sent[self.count] = time.perf_counter()
+        await self.ws.send(json.dumps({"type": "ops", "ops": [{"id": f"{self.name}:{self.count}", "op": op}]}))
+
+
+@dataclass(frozen=True)
+class Server:
+    """The server that is attacked."""
+
+    base: str
+    process: psutil.Process
+    folder: Path
+
+    def state(self) -> dict[str, float]:
+        """Memory of the server and its children, disk, descriptors."""
+        family = [self.process, *self.process.children(recursive=True)]
+        memory = 0
+        for each in family:
+            with suppress(psutil.Error):
+                memory += each.memory_info().rss
+        disk = sum(path.stat().st_size for path in self.folder.rglob("*") if path.is_file())
+        return {
+            "memory_mb": round(memory / 1e6),
+            "disk_mb": round(disk / 1e6, 1),
+            "descriptors": self.process.num_fds(),
+        }
+
+
+@contextmanager
+def serve(log: Path) -> Iterator[Server]:
+    """Runs ``esker serve`` over an empty folder, what it logs in a file."""
+    with tempfile.TemporaryDirectory(prefix="esker-siege-") as folder, log.open("wb") as out:
+        port = _serving.free_port()
+        command = [sys.executable, "-m", "esker", "serve", "--port", str(port), "--data", folder]
+        with subprocess.Popen([*command, "--log-level", "info"], stdout=subprocess.DEVNULL, stderr=out) as process:
+            try:
+                _serving.wait(f"http://127.0.0.1:{port}", process)
+                yield Server(f"http://127.0.0.1:{port}", psutil.Process(process.pid), Path(folder))
+            finally:
+                process.terminate()
+
+
+def _attack(names: Sequence[str], at: Target) -> None:
+    """The process that attacks."""
+
+    async def run() -> None:
+        await asyncio.gather(*(ATTACKS[name](at) for name in names), return_exceptions=True)
+
+    asyncio.run(run())
+
+
+async def _people(base: str, terrain: str, secret: str) -> list[_Person]:
+    people = []
+    url = base.replace("http", "ws") + "/ws"
+    for index in range(PEOPLE):
+        ws = await open_socket(url, subprotocols=[c.SUBPROTOCOL], compression=None, max_size=None, proxy=None)  # type: ignore[list-item]
+        person = _Person(f"p{index}", ws)
+        hello = {"type": "hello", "protocol": c.PROTOCOL_VERSION, "terrain": terrain, "secret": secret}
+        await ws.send(json.dumps(hello | {"client": person.name, "name": person.name}))
+        await ws.send(stream.NEAR.model_dump_json())
+        person.listening = asyncio.create_task(person.listen())  # type: ignore[attr-defined]
+        await person.begin(index)
+        people.append(person)
+    return people
+
+
+async def _drawn(people: list[_Person], seconds: float) -> dict[str, Any]:
+    """Draws for so long, then waits for settled ground; the figures."""
+    for person in people:
+        person.acks, person.tiles, person.lost = [], [], 0
+    end = time.perf_counter() + seconds
+    while time.perf_counter() < end:
+        for person in people:
+            with suppress(ConnectionClosed):
+                await person.draw()
+            await asyncio.sleep(PERIOD / PEOPLE)
+    rested = time.perf_counter()
+    while time.perf_counter() < rested + SETTLED_SECONDS:
+        here = [person for person in people if not person.closed]
+        newest = max((person.newest for person in people), default=-1)
+        if not here or (not any(person.sent for person in here) and here[0].settled_clock >= newest):
+            break
+        await asyncio.sleep(0.01)
+    settled = time.perf_counter() - rested
+    acks = np.array([t for person in people for t in person.acks] or [np.nan]) * 1000
+    tiles = np.array([t for person in people for t in person.tiles] or [np.nan]) * 1000
+    return {
+        "acks": len(acks),
+        "ack_p50_ms": round(float(np.percentile(acks, 50)), 1),
+        "ack_p99_ms": round(float(np.percentile(acks, 99)), 1),
+        "tile_p50_ms": round(float(np.percentile(tiles, 50)), 1),
+        "settling_s": round(settled, 2),
+        "refused": sum(person.lost for person in people),
+        "unanswered": sum(len(person.sent) for person in people),
+        "closed": sum(person.closed for person in people),
+    }
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How long people draw beside an attack, how long the server is left alone after it, and when to end."""
+
+    seconds: float
+    recovery: float
+    until: float = math.inf
+    """``time.monotonic()`` after which no further attack is begun."""
+    kept: float = 0.0
+    """Seconds before that from which on only all attacks at once are begun."""
+
+
+async def _besieged(
+    server: Server, names: Sequence[str], plan: Plan, known: tuple[str, str], people: list[_Person]
+) -> Any:
+    """The people's figures while these attacks go on, and the server's during and after."""
+    target = Target(server.base, *known, time.monotonic() + plan.seconds + 2)
+    attacker = multiprocessing.get_context("spawn").Process(target=_attack, args=(list(names), target), daemon=True)
+    attacker.start()
+    await asyncio.sleep(1.5)
+    figures = await _drawn(people, plan.seconds - 1)
+    figures["server"] = server.state()
+    await asyncio.to_thread(attacker.join, 10)
+    attacker.kill()
+    await asyncio.sleep(plan.recovery)
+    after = await _drawn(people, 2.0)
+    figures["after"] = {key: after[key] for key in TIMES} | server.state()
+    return figures
+
+
+async def _run(server: Server, names: Sequence[str], plan: Plan) -> tuple[dict[str, Any], list[str]]:
+    """Figures by attack and role, and what was left out for want of time."""
+    made, own = (_serving.post(f"{server.base}/api/terrains", {}) for _ in range(2))
+    viewer = _serving.post(f"{server.base}/api/terrains/{made['id']}/links", {"role": "view"}, made["secret"])
+    known = {"stranger": (own["id"], own["secret"]), "viewer": (made["id"], viewer["secret"])}
+    people = await _people(server.base, made["id"], made["secret"])
+    await _drawn(people, 2.0)
+    out: dict[str, Any] = {"alone": await _drawn(people, plan.seconds) | {"server": server.state()}}
+    attacks = [([name], role) for name in names for role in ROLES if role == "stranger" or name in BY_LINK]
+    if len(names) > 1:
+        attacks += [(list(names), role) for role in ROLES]
+    left: list[str] = []
+    for group, role in attacks:
+        name = f"{group[0] if len(group) == 1 else 'all'} by a {role}"
+        if time.monotonic() > plan.until - (plan.kept if len(group) == 1 else 0.0):
+            left.append(name)
+            continue
+        out[name] = await _besieged(server, group, plan, known[role], people)
+    for person in people:
+        await person.ws.close()
+    return out, left
+
+
+def judged(runs: dict[str, Any]) -> dict[str, list[str]]:
+    """Adds ``times_alone`` to each run, during and after; returns which aims do not hold, in words, by run."""
+    alone, wrong = runs["alone"], dict[str, list[str]]()
+    for name, figures in runs.items():
+        said = wrong.setdefault(name, [])
+        for when, found in (("", figures), (" afterwards", figures.get("after", {}))):
+            times = {key: round(found[key] / alone[key], 2) for key in TIMES if found.get(key) and alone[key]}
+            found |= {"times_alone": times} if times else {}
+            said += [
+                f"{key}{when}: {times[key]} times, aim {most}"
+                for key, most in TIMES.items()
+                if times.get(key, 0) > most
+            ]
+        memory = figures["server"]["memory_mb"]
+        said += [f"memory: {memory} MB, aim {MOST_MEMORY_MB}"] if memory > MOST_MEMORY_MB else []
+        lost = figures["closed"] + figures["unanswered"]
+        said += [f"{lost} of the people's changes or connections were lost"] if lost else []
+    return {name: said for name, said in wrong.items() if said}
+
+
+def main(argv: list[str]) -> int:
+    """``esker bench siege [--json] [--seconds S] [--minutes M] [--short] [--attack NAME ...]``."""
+    parser = argparse.ArgumentParser(prog="esker bench siege", description=__doc__)
+    parser.add_argument("--seconds", type=float, default=SECONDS, help="of drawing beside each attack")
+    parser.add_argument("--minutes", type=float, default=MINUTES, help="for all of it")
+    parser.add_argument("--short", action="store_true", help="a few seconds for each, to see whether it works")
+    parser.add_argument(
+        "--attack", action="append", choices=sorted(ATTACKS), help="only these (default: each, then all)"
+    )
+    parser.add_argument("--json", action="store_true", help="print the result as JSON")
+    parser.add_argument("--note", default="", help="a sentence about the circumstances, kept in the result")
+    arguments = parser.parse_args(argv)
+    machine, began = _serving.machine(), time.monotonic()
+    seconds, recovery = SHORT if arguments.short else (arguments.seconds, RECOVERY_SECONDS)
+    with tempfile.TemporaryDirectory() as folder:
+        log = Path(folder) / "server.log"
+        with serve(log) as server:
+            plan = Plan(seconds, recovery, began + 60 * arguments.minutes - ALL_SECONDS, ALL_SECONDS)
+            runs, left = asyncio.run(_run(server, arguments.attack or list(ATTACKS), plan))
+            alive = server.process.is_running()
+        text = log.read_text(encoding="utf-8", errors="replace")
+    missed = judged(runs)
+    result = {
+        "bench": "siege", "version": VERSION, "machine": machine, "note": arguments.note,
+        "scene": {"people": PEOPLE, "appends_per_s_each": 1 / PERIOD, "seconds": seconds},
+        "aims": TIMES | {"memory_mb": MOST_MEMORY_MB}, "alive": alive, "tracebacks": text.count("Traceback"),
+        "errors": text.count(" E "), "held": alive and "Traceback" not in text and not missed, "missed": missed,
+        "left_out": left, "minutes": round((time.monotonic() - began) / 60, 1), "runs": runs,
+    }  # fmt: skip
+    if arguments.json:
+        sys.stdout.write(json.dumps(result, indent=1) + "\n")
+    else:
+        for name, run in runs.items():
+            sys.stdout.write(f"{name}: {run}\n")
+        for name, said in missed.items():
+            sys.stdout.write(f"not held, {name}: {'; '.join(said)}\n")
+        sys.stdout.write(f"every aim held: {result['held']}\n")
+    return 0

@@ -1,0 +1,25 @@
+/** Which page an address means (DESIGN 13: `/t/{id}#{secret}`, the secret only ever in the fragment). */
+export type Route =
+  | { readonly page: "landing" }
+  | { readonly page: "terrain"; readonly id: string; readonly secret: string }
+  | { readonly page: "server"; readonly key: string }
+  | { readonly page: "missing"; readonly path: string };
+
+const TERRAIN = /^\/t\/([A-Za-z0-9_-]{1,40})\/?$/;
+
+/** Reads an address. A terrain without a secret is still a terrain: the page then asks for the whole link. */
+export function route(url: URL): Route {
+  if (url.pathname === "/" || url.pathname === "/index.html") return { page: "landing" };
+  const match = TERRAIN.exec(url.pathname);
+  if (match?.[1]) return { page: "terrain", id: match[1], secret: decode(url.hash.slice(1)) };
+  if (/^\/server\/?$/.test(url.pathname)) return { page: "server", key: decode(url.hash.slice(1)) };
+  return { page: "missing", path: url.pathname };
+}
+
+function decode(fragment: string): string {
+  try {
+    return decodeURIComponent(fragment);
+  } catch {
+    return fragment;
+  }
+}

@@ -1,0 +1,431 @@
+/**
+ * One open terrain: the connection, the document, the people and, once the server has said how large the terrain is,
+ * the stage on which it is seen (stage.ts). The page's components read its signals and call its methods.
+ */
+
+import { computed, effect, type ReadonlySignal, signal } from "@preact/signals-core";
+import type { DecodedFrame } from "../core/types.ts";
+import { type Doc, Refusal } from "../doc/document.ts";
+import { SyncDoc } from "../doc/sync.ts";
+import type {
+  ErrorMessage,
+  Hello,
+  Member,
+  MemberPresence,
+  Op,
+  Progress,
+  Role,
+  ServerMessage,
+  StrokeFields,
+  TerrainFields,
+  Welcome,
+} from "../generated/contract.ts";
+import { MAX_PRESENCE_PER_SECOND, PRESENCE_HZ, PROTOCOL_VERSION, TICK_MS } from "../generated/contract.ts";
+import { Connection } from "../net/connection.ts";
+import { Deletion } from "./deletion.ts";
+import { friendlyName } from "./device/names.ts";
+import { keepRenewing, renewing } from "./device/share-links.ts";
+import {
+  deviceStore,
+  forgetSecret,
+  type Identity,
+  identity,
+  rememberIdentity,
+  rememberTerrain,
+  type Store,
+} from "./device/storage.ts";
+import { GoneStrokes, strokeOf } from "./history/gone.ts";
+import { History } from "./history/history.ts";
+import { Past } from "./history/past.ts";
+import { TimeLapse } from "./history/timelapse.ts";
+import type { OpenTerrain, ServerInfo } from "./open-terrain.ts";
+import { api } from "./server/api.ts";
+import { terrainPath } from "./server/links.ts";
+import { type Status, status } from "./status.ts";
+import { Throttle } from "./throttle.ts";
+import { ToastList } from "./toasts.ts";
+import type { People } from "./view/scene.ts";
+import { Stage } from "./view/stage.ts";
+
+const VIEWS_PER_SECOND = 10;
+export class TerrainSession implements OpenTerrain {
+  readonly id: string;
+  secret: string;
+  readonly client: string;
+  /** By which the server knows that the client id is this page's, once it has welcomed it. */
+  #token: string | null = null;
+  readonly store: Store = deviceStore();
+  readonly toasts = new ToastList();
+  readonly doc: SyncDoc;
+  readonly connection: Connection;
+  readonly past: Past;
+  readonly timeLapse = new TimeLapse(this);
+  readonly history: History;
+  readonly deletion: Deletion;
+  /** Clock of the present, also while the past is shown. */
+  readonly newest = signal(0);
+  readonly role = signal<Role | null>(null);
+  readonly members = signal<readonly Member[]>([]);
+  readonly presences = signal<ReadonlyMap<string, MemberPresence>>(new Map());
+  readonly progress = signal<Progress | null>(null);
+  /** The server makes the ground of the elevation layers, and it takes long. */
+  readonly baseBuilding = signal(false);
+  /** What the server last said about its solver, until somebody has read it. */
+  readonly notice = signal<string | null>(null);
+  readonly server = signal<ServerInfo | null>(null);
+  readonly me = signal<Identity>({ name: "", colour: "#888888" });
+  readonly stage = signal<Stage | null>(null);
+  /** What the link allows. */
+  readonly mayEdit = computed(() => this.role.value === "owner" || this.role.value === "edit");
+  /** What can be done now: nobody changes the past. */
+  readonly canEdit: ReadonlySignal<boolean>;
+  readonly status: ReadonlySignal<Status>;
+  readonly people: ReadonlySignal<People>;
+  readonly #viewport: HTMLElement;
+  readonly #views: Throttle;
+  readonly #presence: Throttle;
+  readonly #stops: (() => void)[] = [];
+  readonly #read = new Set<string>();
+  readonly #gone = new GoneStrokes();
+  #gesture = 0;
+  #again: ReturnType<typeof setTimeout> | undefined;
+
+  constructor(id: string, secret: string, viewport: HTMLElement) {
+    this.id = id;
+    this.secret = secret;
+    this.client = crypto.randomUUID().replaceAll("-", "");
+    this.#viewport = viewport;
+    this.me.value = identity(this.store, Math.random, this.client);
+    this.doc = new SyncDoc(this.client);
+    this.doc.onRefused((refusal) => this.refused(refusal, refusal.op));
+    this.doc.onDiverged(() => this.connection.reconnect());
+    const url = `${window.location.protocol === "https:" ? "wss" : "ws"}://${window.location.host}/ws`;
+    this.past = this.#makePast(url);
+    this.history = new History((before) => api.history(this.id, this.secret, before));
+    this.deletion = new Deletion(this.id, () => this.secret);
+    this.connection = new Connection({
+      url,
+      hello: () => this.#hello(),
+      onMessage: (message) => this.#receive(message),
+      onFrame: (frame) => this.#frame(frame),
+    });
+    this.canEdit = computed(() => this.mayEdit.value && !this.past.active.value);
+    this.status = computed(() =>
+      status({
+        connection: this.connection.state.value,
+        reason: this.connection.reason.value,
+        pending: this.doc.pending.value,
+        canEdit: this.mayEdit.value,
+      }),
+    );
+    this.people = computed(() => ({
+      members: this.members.value,
+      presences: this.past.active.value ? new Map() : this.presences.value,
+      me: this.client,
+      myColour: this.members.value.find((m) => m.client === this.client)?.colour ?? this.me.value.colour,
+    }));
+    this.#views = new Throttle(VIEWS_PER_SECOND, () => this.#sendView());
+    this.#presence = new Throttle(Math.min(PRESENCE_HZ, MAX_PRESENCE_PER_SECOND), () => this.#sendPresence());
+    this.#watch();
+  }
+
+  /** Applies an op at once and sends it; a refusal becomes a toast. True when it was applied. */
+  submit(op: Op, gesture?: string): boolean {
+    if (this.past.active.peek()) {
+      this.toasts.show("This is how the terrain was. Go back to now to change it.", "warn");
+      return false;
+    }
+    if (!this.canEdit.value) {
+      this.toasts.show("This link lets you look, not draw. Ask for an edit link to change the terrain.", "warn");
+      return false;
+    }
+    const refusal = this.doc.submit(op, gesture);
+    if (refusal instanceof Refusal) this.refused(refusal, op);
+    return refusal === null;
+  }
+
+  /** Says why; where the stroke was deleted, by whom, with the way back. */
+  refused(refusal: { readonly code: string; readonly message: string }, op: Op | undefined): void {
+    const stroke = strokeOf(op);
+    if (refusal.code !== "deleted_stroke" || stroke === null) {
+      this.toasts.show(refusal.message, "warn");
+      return;
+    }
+    const run = (): void => void this.submit({ type: "stroke.restore", stroke });
+    this.toasts.show(this.#gone.words(stroke), "warn", { label: "Restore", run });
+  }
+
+  /** Changes fields of a stroke; one gesture is one step of undo. */
+  setStroke(stroke: string, fields: StrokeFields, gesture?: string): boolean {
+    return this.submit({ type: "stroke.set", stroke, fields }, gesture);
+  }
+
+  /** Changes settings of the terrain. */
+  setTerrain(fields: TerrainFields, gesture?: string): boolean {
+    return this.submit({ type: "terrain.set", fields }, gesture);
+  }
+
+  /** A name for a gesture that no other has. */
+  newGesture(): string {
+    this.#gesture += 1;
+    return `panel-${this.#gesture}`;
+  }
+
+  /** Goes on with a new secret for the same link, in the address bar and in this device's memory too. */
+  adoptSecret(secret: string): void {
+    forgetSecret(this.store, this.id, this.secret);
+    this.secret = secret;
+    window.history.replaceState(null, "", terrainPath(this.id, secret));
+    const doc = this.doc.doc.peek();
+    const role = this.role.peek();
+    if (!doc || !role) return;
+    rememberTerrain(this.store, { id: this.id, secret, title: doc.settings.title, role, opened: Date.now() });
+  }
+
+  rename(who: Identity): void {
+    const name = who.name.trim().slice(0, 80) || friendlyName(this.client);
+    this.me.value = { name, colour: who.colour };
+    rememberIdentity(this.store, this.me.value);
+    this.connection.send({ type: "rename", name, colour: who.colour });
+  }
+
+  /** Asks for a presence message; many requests become few messages. */
+  presenceChanged(): void {
+    this.#presence.request();
+  }
+
+  viewChanged(): void {
+    this.#views.request();
+  }
+
+  leavePresent(): void {
+    const input = this.stage.peek()?.input;
+    input?.actions.get("cancel")?.run();
+    input?.placing.peek()?.cancel();
+    if (input) input.selection.value = null;
+  }
+
+  dispose(): void {
+    for (const stop of this.#stops) stop();
+    clearTimeout(this.#again);
+    this.#views.stop();
+    this.#presence.stop();
+    this.toasts.dispose();
+    this.timeLapse.pause();
+    this.past.dispose();
+    this.history.stop();
+    this.connection.close();
+    this.stage.value?.dispose();
+    this.stage.value = null;
+  }
+
+  /** The browser asks before it closes a page that still holds work of mine. */
+  readonly #warn = (event: Event): void => {
+    if (this.doc.pending.peek() > 0) event.preventDefault();
+  };
+
+  #makePast(url: string): Past {
+    return new Past({
+      connect: (handlers) => new Connection({ url, ...handlers }),
+      hello: () => this.#hello(),
+      show: (doc) => this.doc.lookAt(doc),
+      restart: () => {
+        this.stage.peek()?.restart();
+        this.viewChanged();
+      },
+      frame: (frame) => this.stage.peek()?.apply(frame),
+      progress: (progress) => {
+        this.progress.value = progress;
+      },
+      ended: (why) => this.toasts.show(why, "warn"),
+      // The server counts the tiles of now as held: only a new connection sends them all again.
+      back: () => this.connection.reconnect("Back to now."),
+    });
+  }
+
+  #hello(): Hello {
+    return {
+      type: "hello",
+      protocol: PROTOCOL_VERSION,
+      terrain: this.id,
+      secret: this.secret,
+      client: this.client,
+      token: this.#token,
+      name: this.me.value.name,
+      colour: this.me.value.colour,
+      clock: this.doc.clock,
+    };
+  }
+
+  /** Sends what waits whenever something waits, and keeps the title and this device's memory up to date. */
+  #watch(): void {
+    window.addEventListener("beforeunload", this.#warn);
+    this.#stops.push(
+      () => window.removeEventListener("beforeunload", this.#warn),
+      effect(() => {
+        this.doc.doc.value;
+        if (this.doc.pending.value > 0) queueMicrotask(() => this.#flush());
+      }),
+      effect(() => {
+        const state = this.connection.state.value;
+        if (state === "reconnecting") this.doc.disconnected();
+        // Without a connection nobody knows where the others point.
+        if (state !== "online") this.presences.value = new Map();
+      }),
+      effect(() => {
+        const doc = this.doc.doc.value;
+        const role = this.role.value;
+        if (!doc || !role || this.past.active.value) return;
+        document.title = `${doc.settings.title || "Untitled terrain"} · Esker`;
+      }),
+      effect(() => {
+        const title = this.doc.doc.value?.settings.title;
+        const role = this.role.value;
+        if (title === undefined || !role || this.past.active.value) return;
+        rememberTerrain(this.store, { id: this.id, secret: this.secret, title, role, opened: Date.now() });
+      }),
+    );
+  }
+
+  /** Sends what may be sent now, and comes back for the rest until the server has acknowledged all. */
+  #flush(): void {
+    clearTimeout(this.#again);
+    this.#again = undefined;
+    if (this.connection.state.peek() !== "online" || this.role.peek() === null) return;
+    const ops = this.doc.outgoing();
+    if (ops.length > 0) this.connection.send({ type: "ops", ops });
+    if (this.doc.pending.peek() > 0) this.#again = setTimeout(() => this.#flush(), TICK_MS);
+  }
+
+  #receive(message: ServerMessage): void {
+    switch (message.type) {
+      case "welcome":
+        this.#welcome(message);
+        break;
+      case "ack":
+        this.doc.ack(message);
+        break;
+      case "reject":
+        this.doc.reject(message);
+        break;
+      case "ordered":
+        this.#gone.note(message, this.members.peek(), this.client);
+        this.doc.ordered(message);
+        break;
+      case "members":
+        this.#setMembers(message.members);
+        break;
+      case "presences":
+        this.#setPresences(message.members);
+        break;
+      case "progress":
+        if (!this.past.active.peek()) this.progress.value = message;
+        if (message.note) this.#setNotice(message.note);
+        // The new base is on its way until what is solved on it has settled.
+        if (message.laying) this.baseBuilding.value = true;
+        else if (message.settled) this.baseBuilding.value = false;
+        break;
+      case "importing":
+        this.stage.value?.groundwork.receive(message);
+        break;
+      case "error":
+        this.#error(message);
+        break;
+      case "pong":
+        break;
+    }
+    this.newest.value = this.doc.clock ?? this.newest.peek();
+  }
+
+  /** The notice has been read: the same sentence does not come again on this page. */
+  dismissNotice(): void {
+    if (this.notice.value !== null) this.#read.add(this.notice.value);
+    this.notice.value = null;
+  }
+
+  #setNotice(note: string): void {
+    if (!this.#read.has(note)) this.notice.value = note;
+  }
+
+  #error(message: ErrorMessage): void {
+    if (!message.fatal) this.toasts.show(message.message, "warn");
+    // A dead link must not stand among the recent terrains, nor keep a living one from taking its place.
+    else if (["bad_secret", "revoked"].includes(message.code)) {
+      forgetSecret(this.store, this.id, this.secret);
+      // I was replacing my own link when the answer got lost: the new secret is the one that works.
+      const next = renewing(this.store, this.id);
+      keepRenewing(this.store, this.id, null);
+      if (next !== null && message.code === "bad_secret") window.location.replace(terrainPath(this.id, next));
+    } else if (message.code === "no_terrain")
+      void this.deletion.ask().then((restorable) => {
+        if (!restorable) forgetSecret(this.store, this.id, this.secret);
+      });
+  }
+
+  #welcome(message: Welcome): void {
+    this.doc.welcome(message);
+    this.#token = message.token;
+    this.role.value = message.role;
+    this.server.value = { version: message.server, device: message.device, levels: message.levels };
+    this.#setMembers(message.members);
+    const doc = this.doc.doc.value;
+    if (doc && this.stage.value === null) this.#openStage(doc, message);
+    else if (!this.past.active.peek()) this.stage.value?.restart();
+    this.viewChanged();
+    this.#flush();
+  }
+
+  #openStage(doc: Doc, { levels, finest }: Welcome): void {
+    const sizeM = doc.settings.size_m;
+    const stage = new Stage({ session: this, sizeM, levels, finest, viewport: this.#viewport });
+    this.stage.value = stage;
+    void stage.start();
+  }
+
+  #frame(frame: DecodedFrame): void {
+    if (this.past.active.peek()) return;
+    if (this.stage.value?.apply(frame) === false) this.connection.reconnect();
+  }
+
+  #setMembers(members: readonly Member[]): void {
+    this.members.value = members;
+    const here = new Set(members.map((m) => m.client));
+    const kept = [...this.presences.value].filter(([client]) => here.has(client));
+    if (kept.length !== this.presences.value.size) this.presences.value = new Map(kept);
+  }
+
+  #setPresences(changed: readonly MemberPresence[]): void {
+    const next = new Map(this.presences.value);
+    for (const presence of changed) next.set(presence.client, presence);
+    this.presences.value = next;
+    if (!this.past.active.peek()) this.stage.value?.followed(changed);
+  }
+
+  #sendView(): void {
+    const camera = this.stage.value?.camera.state.value;
+    if (!camera) return;
+    (this.past.active.peek() ? this.past : this.connection).send({
+      type: "view",
+      eye: [...camera.eye],
+      target: [...camera.target],
+      fov_deg: camera.fovDeg,
+      width: Math.max(1, Math.min(16384, camera.width)),
+      height: Math.max(1, Math.min(16384, camera.height)),
+    });
+  }
+
+  #sendPresence(): void {
+    const stage = this.stage.value;
+    if (!stage || this.connection.state.value !== "online" || this.past.active.peek()) return;
+    const { eye, target } = stage.camera.state.value;
+    const cursor = stage.cursor.value;
+    this.connection.send({
+      type: "presence",
+      cursor: cursor ? [...cursor] : null,
+      tool: stage.input.tool.value,
+      stroke: stage.input.drawing.value ?? stage.input.held.value,
+      eye: [...eye],
+      target: [...target],
+    });
+  }
+}

@@ -1,0 +1,429 @@
+/** Where the terrain is seen and touched: tiles, camera, input, renderer and the loop that draws frames. */
+
+import { computed, effect, type ReadonlySignal, signal } from "@preact/signals-core";
+import { Camera } from "../../core/camera/camera.ts";
+import type { Land } from "../../core/camera/state.ts";
+import { isGround } from "../../core/streams.ts";
+import type {
+  ChannelGrid,
+  CursorVisual,
+  DecodedFrame,
+  FrameStats,
+  Ground,
+  Scene,
+  StrokeVisual,
+  Vec3,
+} from "../../core/types.ts";
+import type { Doc } from "../../doc/document.ts";
+import { strokeInfluence } from "../../doc/influence.ts";
+import { spanOf } from "../../doc/layers.ts";
+import { type Meeting, meetings } from "../../doc/meetings.ts";
+import type { MemberPresence } from "../../generated/contract.ts";
+import { MAX_REFINED_TILES, TILE_SAMPLES } from "../../generated/contract.ts";
+import { InputController } from "../../input/controller.ts";
+import { type ToolDefaults, toolDefaults } from "../../input/defaults.ts";
+import { ChannelStore } from "../../tiles/detail/channels.ts";
+import { ShownTerrain } from "../../tiles/shownterrain.ts";
+import { TileStore } from "../../tiles/store.ts";
+import { keepImports, keptImports } from "../device/kept-imports.ts";
+import { keepViews, keptViews } from "../device/kept-views.ts";
+import { QualityChoice, TAU_PX } from "../device/quality-choice.ts";
+import { Groundwork } from "../layers/groundwork.ts";
+import type { OpenTerrain } from "../open-terrain.ts";
+import { deepFocus } from "../regions.ts";
+import { gridTransport } from "../server/grid-transport.ts";
+import { coveredEdges } from "./covered.ts";
+import { FrameLoop } from "./frame-loop.ts";
+import { FreshTiles } from "./fresh-tiles.ts";
+import { Graphics } from "./graphics.ts";
+import { landOf } from "./land.ts";
+import { QuietStrokes } from "./quiet-strokes.ts";
+import { cursorVisuals, strokeVisuals } from "./scene.ts";
+
+export interface StageOptions {
+  readonly session: OpenTerrain;
+  readonly sizeM: number;
+  /** Finest level that is solved everywhere. */
+  readonly levels: number;
+  /** Finest level to which tiles are refined where somebody looks. */
+  readonly finest: number;
+  /** The element that fills the window: holds the canvas, takes the pointer and the keys. */
+  readonly viewport: HTMLElement;
+}
+
+/** How long a view at home takes to go along when the inspector opens. */
+const COVER_MS = 260;
+
+export class Stage {
+  readonly session: OpenTerrain;
+  readonly sizeM: number;
+  readonly levels: number;
+  readonly finest: number;
+  readonly camera: Camera;
+  readonly tiles: TileStore;
+  readonly channels: ChannelStore;
+  /** The ground as it is drawn: solved heights with synthesised detail. */
+  readonly shown: ShownTerrain;
+  readonly input: InputController;
+  readonly groundwork: Groundwork;
+  readonly defaults: ToolDefaults;
+  readonly loop: FrameLoop;
+  readonly overlay = signal<Scene["overlay"]>("none");
+  readonly showStrokes = signal(true);
+  readonly quietStrokes = new QuietStrokes();
+  readonly cursor = signal<Vec3 | null>(null);
+  readonly graphics: Graphics;
+  readonly quality: QualityChoice;
+  readonly following = signal<string | null>(null);
+  readonly stats = signal<FrameStats | null>(null);
+  /** Screen-error bound of the picture, pixels, where this device has no room for the chosen one. */
+  readonly coarsenedPx = computed(() => this.stats.value?.coarsenedPx ?? null);
+  /** Strokes that cross the selected one, in the select tool. */
+  readonly meets: ReadonlySignal<readonly Meeting[]> = computed(() => {
+    const doc = this.session.doc.doc.value;
+    const stroke = doc?.strokes.get(this.input.selection.value ?? "");
+    return doc && stroke && this.input.tool.value === "select" ? meetings(stroke, doc.strokes.values()) : [];
+  });
+  readonly #viewport: HTMLElement;
+  readonly #strokes: ReadonlySignal<readonly StrokeVisual[]>;
+  readonly #cursors: ReadonlySignal<readonly CursorVisual[]>;
+  /** Where the selected stroke is felt, while that overlay is shown. */
+  readonly #influence: ReadonlySignal<ChannelGrid | null>;
+  readonly #calm = window.matchMedia("(prefers-reduced-motion: reduce)");
+  readonly #stops: (() => void)[] = [];
+  /** What the eye may not dip under. */
+  readonly #floor: Ground;
+  #fresh: FreshTiles | null = null;
+  /** The layers whose ground home stands on, and whether it is still on its way. */
+  #standsOn: Doc["layers"] | undefined;
+  #arriving = true;
+  #disposed = false;
+  /** Finds what floats on the picture. */
+  #find: ((selector: string) => Element | null) | null = null;
+
+  constructor({ session, sizeM, levels, finest, viewport }: StageOptions) {
+    this.session = session;
+    this.sizeM = sizeM;
+    this.levels = levels;
+    this.finest = finest;
+    this.#viewport = viewport;
+    this.camera = new Camera(sizeM);
+    this.camera.calm = this.#calm.matches;
+    this.camera.landNow = () => this.#land();
+    this.tiles = new TileStore(sizeM, finest, levels);
+    this.channels = new ChannelStore(sizeM);
+    this.shown = new ShownTerrain(this.tiles, this.channels, () => {
+      const doc = session.doc.doc.peek();
+      return doc && { ...doc.settings, ground: spanOf(doc.layers.values()) };
+    });
+    this.#floor = {
+      ...this.shown.ground,
+      heightAt: (x, y) => this.shown.floorUnder(x, y, this.camera.state.peek().eye[2]),
+    };
+    this.defaults = toolDefaults(sizeM);
+    this.loop = new FrameLoop((dt, time) => this.#draw(dt, time));
+    this.quality = new QualityChoice(session.store);
+    this.graphics = new Graphics({
+      viewport,
+      camera: this.camera,
+      say: (text) => session.toasts.show(text),
+      onOpened: () => this.loop.invalidate(),
+    });
+    this.input = new InputController({
+      canvas: viewport,
+      camera: this.camera,
+      doc: session.doc,
+      ground: () => {
+        // Handles lie on the ground and follow it.
+        this.tiles.revision.value;
+        return this.shown.ground;
+      },
+      freeze: () => this.shown.freeze(),
+      clientId: session.client,
+      canEdit: () => session.canEdit.value,
+      defaults: this.defaults,
+      onCursor: (point) => {
+        this.cursor.value = point;
+      },
+      onMessage: (text, refused) => {
+        if (refused === undefined) session.toasts.show(text);
+        else session.refused({ code: refused.code, message: text }, refused.op);
+      },
+      author: () => session.me.value.name,
+    });
+    this.groundwork = new Groundwork({
+      sizeM,
+      doc: session.doc,
+      camera: this.camera,
+      placing: this.input.placing,
+      canEdit: () => session.canEdit.value,
+      ground: () => {
+        this.tiles.revision.value;
+        return this.shown.freeze();
+      },
+      transport: gridTransport(session),
+      calm: () => this.input.tool.value !== "select",
+      kept: keptImports(session.id),
+      keep: (kept) => keepImports(session.id, kept),
+      say: (text, tone) => session.toasts.show(text, tone),
+      progress: session.progress,
+      author: () => session.me.value.name,
+    });
+    this.#strokes = computed(() => this.#visuals());
+    this.#cursors = computed(() => cursorVisuals(session.people.value));
+    this.#influence = computed(() => {
+      if (this.overlay.value !== "influence") return null;
+      const doc = session.doc.doc.value;
+      const stroke = doc?.strokes.get(this.input.selection.value ?? "");
+      return doc && stroke ? strokeInfluence(stroke, doc.settings.reach_m, sizeM) : null;
+    });
+  }
+
+  #visuals(): StrokeVisual[] {
+    const doc = this.session.doc.doc.value;
+    const { selection, hovered, drawing, tool } = this.input;
+    const marks = {
+      tool: tool.value === "select" || tool.value === "paint" ? tool.value : ("draw" as const),
+      selection: selection.value,
+      hovered: hovered.value,
+      drawing: drawing.value,
+      quiet: this.quietStrokes.quiet.value,
+    };
+    // Lines of paint lie on the ground and move with it.
+    if (hasPaint(doc)) this.tiles.revision.value;
+    return doc ? strokeVisuals(doc, marks, this.session.people.value, this.shown.freeze()) : [];
+  }
+
+  /** Finds a renderer and starts drawing. */
+  async start(): Promise<void> {
+    this.camera.loadViews(keptViews(this.session.store, this.session.id));
+    this.#watch();
+    const empty = (this.session.doc.doc.value?.strokes.size ?? 0) === 0;
+    this.input.tool.value = empty && this.session.canEdit.value ? "mountain" : "select";
+    if (!empty) this.quietStrokes.begin(this.input);
+    this.camera.home(0);
+    await this.graphics.open();
+    if (this.#disposed) return;
+    this.loop.start();
+  }
+
+  /**
+   * Shows a frame. False when the page now holds more tiles than the server may have sent: the two no longer agree on what
+   * is held, and only a new connection helps.
+   */
+  apply(frame: DecodedFrame): boolean {
+    if (!isGround(frame.channel)) this.channels.apply(frame);
+    else if (this.#fresh) this.#fresh.apply(frame);
+    else this.tiles.apply(frame);
+    const most = Math.max(this.tiles.size, this.tiles.baseSize);
+    return most <= (4 ** (this.levels + 1) - 1) / 3 + 2 * MAX_REFINED_TILES;
+  }
+
+  /** The server starts anew after a reconnect and sends every tile again: the old ground stays until the new is here. */
+  restart(): void {
+    this.channels.restart();
+    this.#fresh?.stop();
+    this.#fresh = new FreshTiles(this.tiles, () => {
+      this.#fresh = null;
+      this.channels.renewed();
+    });
+  }
+
+  /** Where a world point is in the window: CSS pixels. */
+  toWindow(point: Vec3): { x: number; y: number; visible: boolean } {
+    const p = this.camera.project(point);
+    const box = this.#viewport.getBoundingClientRect();
+    const ratio = this.camera.state.peek().width / Math.max(1, box.width);
+    return { x: box.left + p.x / ratio, y: box.top + p.y / ratio, visible: p.visible };
+  }
+
+  /** Follows a person's view until I move the camera myself; the same person again stops it. */
+  follow(client: string | null): void {
+    this.following.value = this.following.value === client ? null : client;
+    if (this.following.value) this.#goToView(this.session.presences.value.get(this.following.value), 700);
+  }
+
+  /** New presences have come: the view goes along with the person that is followed. */
+  followed(changed: readonly MemberPresence[]): void {
+    const leader = changed.find((p) => p.client === this.following.value);
+    if (leader) this.#goToView(leader, 180);
+  }
+
+  /** Says what floats on the picture, found by its selector. `follow`: a view that is still at home goes along. */
+  cover(find: (selector: string) => Element | null, follow: boolean): void {
+    this.#find = find;
+    const box = (selector: string): DOMRect | null => find(selector)?.getBoundingClientRect() ?? null;
+    const picture = this.#viewport.getBoundingClientRect();
+    if (picture.width === 0) return;
+    const chrome = {
+      top: box("esk-top-bar"),
+      tools: box("esk-tools"),
+      foot: box("esk-view-bar"),
+      side: box("aside.side"),
+    };
+    const edges = coveredEdges(picture, chrome);
+    const ratio = this.camera.state.peek().width / picture.width;
+    const scaled = Object.fromEntries(Object.entries(edges).map(([edge, px]) => [edge, px * ratio]));
+    this.camera.inset({ ...edges, ...scaled }, follow, this.loop.frames > 0 ? COVER_MS : 0);
+    this.loop.invalidate();
+  }
+
+  /** Shows all strokes, or none; those that are still quiet are shown. */
+  toggleStrokes(): void {
+    this.showStrokes.value = this.quietStrokes.quiet.value || !this.showStrokes.value;
+    this.quietStrokes.end();
+  }
+
+  setOverlay(overlay: Scene["overlay"]): void {
+    this.overlay.value = overlay;
+  }
+
+  dispose(): void {
+    this.#disposed = true;
+    this.#fresh?.stop();
+    this.loop.stop();
+    for (const stop of this.#stops) stop();
+    this.quietStrokes.stop();
+    this.groundwork.dispose();
+    this.input.dispose();
+    this.graphics.dispose();
+  }
+
+  #goToView(presence: MemberPresence | undefined, durationMs: number): void {
+    if (!presence?.eye || !presence.target) return;
+    this.camera.goTo(presence.eye, presence.target, this.#calm.matches ? 0 : durationMs);
+    this.loop.invalidate();
+  }
+
+  /** Redraws on every change that a frame shows, and tells the server where I look. */
+  #watch(): void {
+    const { session, input } = this;
+    const stopFollowing = (): void => {
+      this.following.value = null;
+    };
+    // Drawing prevents the default of the pointer, so a field that had the keys would keep them.
+    const takeKeys = (): void => {
+      const active = deepFocus();
+      if (active instanceof HTMLElement && active !== document.body) active.blur();
+    };
+    this.#viewport.addEventListener("pointerdown", takeKeys);
+    this.#stops.push(() => this.#viewport.removeEventListener("pointerdown", takeKeys));
+    for (const type of ["pointerdown", "wheel"] as const) {
+      this.#viewport.addEventListener(type, stopFollowing, { passive: true });
+      this.#stops.push(() => this.#viewport.removeEventListener(type, stopFollowing));
+    }
+    this.#stops.push(
+      effect(() => {
+        this.camera.state.value;
+        session.viewChanged();
+        session.presenceChanged();
+        this.loop.invalidate();
+      }),
+      effect(() => keepViews(session.store, session.id, this.camera.views.value)),
+      effect(() => {
+        this.cursor.value;
+        input.drawing.value;
+        input.held.value;
+        input.tool.value;
+        session.presenceChanged();
+      }),
+      effect(() => {
+        this.tiles.revision.value;
+        this.channels.revision.value;
+        session.doc.doc.value;
+        this.#strokes.value;
+        this.#cursors.value;
+        input.ghost.value;
+        this.groundwork.footprints.value;
+        this.groundwork.visual.value;
+        this.overlay.value;
+        this.quality.mode.value;
+        this.showStrokes.value;
+        this.loop.invalidate();
+      }),
+    );
+    this.#stops.push(
+      effect(() => {
+        this.tiles.revision.value;
+        this.#standOnArrival();
+      }),
+    );
+    this.#watchSize();
+  }
+
+  /** How the land lies now; null before it has come. */
+  #land(): Land | null {
+    const heights = this.tiles.tile(0, 0, 0)?.heights;
+    return heights === undefined ? null : landOf(heights, TILE_SAMPLES, this.sizeM);
+  }
+
+  /**
+   * A view at home goes along with ground that arrives: that of a terrain that is opened, and that of elevation layers. It
+   * stays where it is for what is drawn.
+   */
+  #standOnArrival(): void {
+    const { session } = this;
+    const layers = session.doc.doc.value?.layers;
+    if (layers !== this.#standsOn) {
+      this.#arriving ||= JSON.stringify([...(layers ?? [])]) !== JSON.stringify([...(this.#standsOn ?? [])]);
+      this.#standsOn = layers;
+    }
+    const land = this.#land();
+    if (!this.#arriving || land === null) return;
+    if (this.input.drawing.value === null) this.camera.stand(land);
+    const { progress, doc, baseBuilding } = session;
+    const solved = progress.value?.settled === true && progress.value.clock === doc.clock;
+    if (this.input.drawing.value !== null || (solved && !baseBuilding.value && doc.pending.value === 0))
+      this.#arriving = false;
+  }
+
+  #watchSize(): void {
+    const resize = (): void => {
+      const canvas = this.#viewport.querySelector("canvas");
+      const ratio = Math.min(window.devicePixelRatio, 2);
+      const width = Math.max(1, Math.round(this.#viewport.clientWidth * ratio));
+      const height = Math.max(1, Math.round(this.#viewport.clientHeight * ratio));
+      if (canvas && (canvas.width !== width || canvas.height !== height)) Object.assign(canvas, { width, height });
+      this.camera.resize(width, height);
+      if (this.#find !== null) this.cover(this.#find, true);
+      this.loop.invalidate();
+    };
+    const observer = new ResizeObserver(resize);
+    observer.observe(this.#viewport);
+    this.#stops.push(() => observer.disconnect());
+    resize();
+  }
+
+  #draw(dtS: number, timeS: number): boolean {
+    const moving = this.camera.update(dtS, this.#floor);
+    const doc = this.session.doc.doc.value;
+    const { renderer } = this.graphics;
+    const quality = this.quality.mode.peek();
+    if (!renderer || !doc) return moving;
+    const stats = renderer.render({
+      camera: this.camera.state.value,
+      tiles: this.tiles,
+      channels: this.channels,
+      settings: doc.settings,
+      ground: spanOf(doc.layers.values()),
+      strokes: this.#strokes.value,
+      ghost: this.input.ghost.value,
+      cursors: this.#cursors.value,
+      footprints: this.groundwork.footprints.value,
+      placing: this.groundwork.visual.value,
+      tauPx: TAU_PX[quality],
+      quality,
+      time: this.#calm.matches ? 0 : timeS,
+      overlay: this.overlay.value,
+      influence: this.#influence.value,
+      showStrokes: this.showStrokes.value,
+    });
+    this.stats.value = stats;
+    return moving || stats.busy;
+  }
+}
+
+function hasPaint(doc: Doc | null): boolean {
+  for (const stroke of doc?.strokes.values() ?? []) if (stroke.paint !== null) return true;
+  return false;
+}

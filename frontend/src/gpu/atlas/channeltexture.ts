@@ -1,0 +1,110 @@
+/**
+ * What the ground's overlays read over the whole domain, as one small texture (rgba8unorm; `detail_at` in terrain.wgsl): noise
+ * amplitude, roughness, and where the selected stroke is felt or a channel is painted.
+ */
+
+import type { ChannelGrid, ChannelView, Scene } from "../../core/types.ts";
+
+const TEXEL_BYTES = 4;
+
+const shares = new WeakMap<ChannelGrid, ChannelGrid>();
+
+/** What the third component of the texture shows: influence, or a painted channel as 0.5 + bias / 2; null with other overlays. */
+export function overlayGrid({ overlay, influence, channels }: Scene): ChannelGrid | null {
+  if (overlay === "influence") return influence ?? null;
+  if (overlay !== "snow" && overlay !== "forest" && overlay !== "grass" && overlay !== "wetness") return null;
+  const grid = channels[overlay];
+  const known = shares.get(grid);
+  if (known !== undefined) return known;
+  const made = { side: grid.side, values: grid.values.map((bias) => 0.5 + bias / 2) };
+  shares.set(grid, made);
+  return made;
+}
+
+export class ChannelTexture {
+  texture: GPUTexture;
+  /** Metres of amplitude that the value 1 stands for. */
+  fullScale = 1;
+  #source: ChannelView | null = null;
+  #stamp = -1;
+  #influence: ChannelGrid | null = null;
+
+  readonly #device: GPUDevice;
+
+  constructor(device: GPUDevice) {
+    this.#device = device;
+    this.texture = this.#make(2);
+  }
+
+  /** Takes over what changed. True when the texture is another one and must be bound again. */
+  update(channels: ChannelView, influence: ChannelGrid | null): boolean {
+    if (channels === this.#source && channels.stamp === this.#stamp && influence === this.#influence) return false;
+    this.#source = channels;
+    this.#stamp = channels.stamp;
+    this.#influence = influence;
+    const { bytes, side, fullScale } = channelTexels(channels, influence);
+    this.fullScale = fullScale;
+    const resized = this.texture.width !== side;
+    if (resized) {
+      this.texture.destroy();
+      this.texture = this.#make(side);
+    }
+    this.#device.queue.writeTexture({ texture: this.texture }, bytes, { bytesPerRow: TEXEL_BYTES * side }, [
+      side,
+      side,
+    ]);
+    return resized;
+  }
+
+  destroy(): void {
+    this.texture.destroy();
+  }
+
+  #make(side: number): GPUTexture {
+    return this.#device.createTexture({
+      label: "channels",
+      format: "rgba8unorm",
+      size: [side, side],
+      usage: GPUTextureUsage.TEXTURE_BINDING | GPUTextureUsage.COPY_DST,
+    });
+  }
+}
+
+/**
+ * Four bytes a sample: amplitude in parts of its greatest value, roughness, influence (0 without one), 255. The finest of the
+ * grids gives the side.
+ */
+export function channelTexels(
+  { amplitude, roughness }: ChannelView,
+  influence: ChannelGrid | null = null,
+): { bytes: Uint8Array<ArrayBuffer>; side: number; fullScale: number } {
+  const side = Math.max(amplitude.side, roughness.side, influence?.side ?? 0);
+  let greatest = 0;
+  for (const v of amplitude.values) if (v > greatest) greatest = v;
+  const fullScale = Math.max(greatest, 1e-3);
+  const bytes = new Uint8Array(TEXEL_BYTES * side * side).fill(255);
+  const fill = (channel: number, grid: ChannelGrid | null, scale: number): void => {
+    for (let row = 0; row < side; row += 1) {
+      for (let col = 0; col < side; col += 1) {
+        const value = grid === null ? 0 : sampleOf(grid, row / (side - 1), col / (side - 1)) * scale;
+        bytes[TEXEL_BYTES * (row * side + col) + channel] = Math.round(255 * Math.min(1, Math.max(0, value)));
+      }
+    }
+  };
+  fill(0, amplitude, 1 / fullScale);
+  fill(1, roughness, 1);
+  fill(2, influence, 1);
+  return { bytes, side, fullScale };
+}
+
+/** Bilinear; `v` from south to north and `u` from west to east, 0..1. */
+function sampleOf({ side, values }: ChannelGrid, v: number, u: number): number {
+  const [y, x] = [v * (side - 1), u * (side - 1)];
+  const j = Math.min(side - 2, Math.floor(y));
+  const i = Math.min(side - 2, Math.floor(x));
+  const [s, t] = [x - i, y - j];
+  const k = j * side + i;
+  const south = values[k]! + (values[k + 1]! - values[k]!) * s;
+  const north = values[k + side]! + (values[k + side + 1]! - values[k + side]!) * s;
+  return south + (north - south) * t;
+}

@@ -1,0 +1,26 @@
+/** A line that begins beside the land: at the border where that is near, else not at all. Pure. */
+
+import type { Camera } from "../../core/camera/camera.ts";
+import { clamp } from "../../core/math.ts";
+import type { Ground } from "../../core/types.ts";
+import { groundBeyond } from "./profileend.ts";
+import type { Sample } from "./sketch.ts";
+
+/** So far beside the land, CSS pixels, a line still begins at its border. */
+export const BESIDE_PX = 64;
+/** Such a line begins this share of the land's side inside the border, so that its ray meets the land. */
+const INSIDE = 1 / 1000;
+
+/** The sample with which a line begins: its own on the land, that at the border within `reachPx` device pixels of it; else null. */
+export function beginOnLand(camera: Camera, ground: Ground, sample: Sample, reachPx: number): Sample | null {
+  if (ground.raycast(sample.ray) !== null) return sample;
+  const { sizeM } = ground;
+  const beyond = groundBeyond(sample.ray, ground, ground.heightAt(sizeM / 2, sizeM / 2), sizeM * INSIDE);
+  if (beyond === null) return null;
+  const inside = (v: number): number => clamp(v, sizeM * INSIDE, sizeM * (1 - INSIDE));
+  const [x, y] = [inside(beyond[0]), inside(beyond[1])];
+  const at = camera.project([x, y, ground.heightAt(x, y)]);
+  if (!at.visible || Math.hypot(at.x - sample.x, at.y - sample.y) > reachPx) return null;
+  const ray = camera.ray(at.x, at.y);
+  return ground.raycast(ray) === null ? null : { ...sample, x: at.x, y: at.y, ray };
+}

@@ -1,0 +1,114 @@
+import type { ReadonlySignal } from "@preact/signals-core";
+import { html, nothing, type TemplateResult } from "lit";
+import type { History } from "../../app/history/history.ts";
+import { entryAt } from "../../app/history/history.ts";
+import { SPEEDS } from "../../app/history/pace.ts";
+import type { Past } from "../../app/history/past.ts";
+import type { TimeLapse } from "../../app/history/timelapse.ts";
+import { ago } from "../../app/words/words.ts";
+import { icon } from "../controls/icons.ts";
+import { SignalElement } from "../controls/signal-element.ts";
+import { pastBarStyles } from "../styles/past-bar.ts";
+import { shared } from "../styles/shared.ts";
+
+/** While the past is shown: what one sees, the slider and the time lapse, a copy, and the way back. */
+export class EskPastBar extends SignalElement {
+  static override properties = {
+    past: { attribute: false },
+    timeLapse: { attribute: false },
+    history: { attribute: false },
+    newest: { attribute: false },
+    mayEdit: { attribute: false },
+    client: { attribute: false },
+  };
+  static override styles = [shared, pastBarStyles];
+
+  /** The clock that is asked for. */
+  declare past: Pick<Past, "wanted">;
+  declare timeLapse: TimeLapse;
+  declare history: History;
+  /** Clock of the present. */
+  declare newest: ReadonlySignal<number>;
+  declare mayEdit: ReadonlySignal<boolean>;
+  /** My client. */
+  declare client: string;
+
+  protected override render(): TemplateResult | typeof nothing {
+    const { timeLapse, mayEdit } = this;
+    const clock = this.past.wanted.value;
+    if (clock === null) return nothing;
+    return html`
+      <section class="panel bar" aria-label="The terrain as it was">
+        <div class="row head">
+          ${icon("clock")}
+          <div class="says" role="status">
+            <strong>As it was</strong>
+            <span title=${this.#words(clock)}>${this.#what(clock)}</span>
+          </div>
+          <button
+            class="btn outline"
+            ?disabled=${!mayEdit.value || timeLapse.copying.value}
+            title=${mayEdit.value ? "A new terrain of your own that begins here" : "This link lets you look, not copy."}
+            @click=${() => void timeLapse.copy()}
+          >
+            ${icon("copy")} Make a copy
+          </button>
+          <button class="btn primary" @click=${() => timeLapse.leave()}>Back to now</button>
+        </div>
+        ${this.#time(clock)}
+      </section>
+    `;
+  }
+
+  #time(clock: number): TemplateResult {
+    const { timeLapse } = this;
+    const playing = timeLapse.playing.value;
+    const newest = this.newest.value;
+    const label = playing ? "Pause" : "Play";
+    return html`<div class="row">
+      <button class="icon-btn small" aria-label=${label} title=${label} @click=${() => (playing ? timeLapse.pause() : timeLapse.play())}>
+        ${icon(playing ? "pause" : "play")}
+      </button>
+      <input
+        type="range"
+        aria-label="Moment of the history"
+        aria-valuetext=${`${clock} of ${newest}: ${this.#words(clock)}`}
+        min="0"
+        max=${newest}
+        .value=${String(clock)}
+        style=${`--share:${newest > 0 ? (100 * clock) / newest : 0}%`}
+        @input=${(e: Event) => timeLapse.show(Number((e.target as HTMLInputElement).value))}
+      />
+      <button
+        class="btn speed"
+        aria-label=${`Speed ${timeLapse.speed.value}, change it`}
+        title="Speed of the time lapse"
+        @click=${() => {
+          const at = SPEEDS.indexOf(timeLapse.speed.value as (typeof SPEEDS)[number]);
+          timeLapse.speed.value = SPEEDS[(at + 1) % SPEEDS.length]!;
+        }}
+      >
+        ${timeLapse.speed.value}×
+      </button>
+    </div>`;
+  }
+
+  #what(clock: number): TemplateResult {
+    const entry = entryAt(this.history.entries.value, clock);
+    const at = entry?.at ?? null;
+    const when = at === null ? "" : ` · ${ago(Math.max(0, Date.now() - at * 1000))}`;
+    return html`${this.#words(clock)}${when}`;
+  }
+
+  #words(clock: number): string {
+    const { history, client } = this;
+    if (clock === 0) return "at the beginning";
+    const entry = entryAt(history.entries.value, clock);
+    if (entry === null) return `step ${clock}`;
+    const name = entry.author === client ? "you" : history.nameOf(entry.author);
+    const verb = entry.last > clock ? "while" : "after";
+    return `${verb} ${name} ${entry.text}`;
+  }
+}
+
+customElements.define("esk-past-bar", EskPastBar);

@@ -1,0 +1,146 @@
+import "@awesome.me/webawesome/dist/components/divider/divider.js";
+import "@awesome.me/webawesome/dist/components/dropdown/dropdown.js";
+import "@awesome.me/webawesome/dist/components/dropdown-item/dropdown-item.js";
+import { css, html, type TemplateResult } from "lit";
+import { live } from "lit/directives/live.js";
+import { QUALITIES } from "../../app/device/quality-choice.ts";
+import { OVERLAYS } from "../../app/view/overlays.ts";
+import { keyText } from "../../app/words/keys.ts";
+import type { QualityMode, Scene } from "../../core/types.ts";
+import { icon } from "../controls/icons.ts";
+import "../controls/segmented.ts";
+import type { ReadonlySignal } from "@preact/signals-core";
+import type { RendererInfo } from "../../app/view/graphics.ts";
+import type { CameraState } from "../../core/types.ts";
+import type { Action } from "../../input/keys/action.ts";
+import { SignalElement } from "../controls/signal-element.ts";
+import { shared } from "../styles/shared.ts";
+
+/**
+ * How the terrain is looked at: camera mode, the whole terrain, overlays. Fires `overlay` and `quality` with what was chosen,
+ * and `strokes` to show or hide them.
+ */
+export class EskViewBar extends SignalElement {
+  static override properties = {
+    view: { attribute: false },
+    overlay: { attribute: false },
+    showStrokes: { attribute: false },
+    quiet: { attribute: false },
+    quality: { attribute: false },
+    coarsenedPx: { attribute: false },
+    renderer: { attribute: false },
+    actions: { attribute: false },
+  };
+  static override styles = [
+    shared,
+    css`
+      :host {
+        display: flex;
+        align-items: center;
+        gap: 2px;
+        padding: 4px;
+      }
+      esk-segmented {
+        margin-right: 2px;
+      }
+      .heading {
+        display: block;
+        padding: 2px 12px 4px;
+        color: var(--esk-quiet);
+      }
+    `,
+  ];
+
+  declare view: ReadonlySignal<CameraState>;
+  declare overlay: ReadonlySignal<Scene["overlay"]>;
+  declare showStrokes: ReadonlySignal<boolean>;
+  /** Strokes of a terrain that was just opened are not shown yet. */
+  declare quiet: ReadonlySignal<boolean>;
+  declare quality: ReadonlySignal<QualityMode>;
+  /** Screen-error bound of the picture, pixels, where this device has no room for the chosen one. */
+  declare coarsenedPx: ReadonlySignal<number | null>;
+  declare renderer: ReadonlySignal<RendererInfo | null>;
+  /** What the buttons run. */
+  declare actions: ReadonlyMap<string, Action>;
+
+  #run(id: string): void {
+    this.actions.get(id)?.run();
+  }
+
+  #fire(name: string, detail?: string): void {
+    this.dispatchEvent(new CustomEvent(name, { detail }));
+  }
+
+  #overlay(event: CustomEvent<{ item: { value: string } }>): void {
+    const value = event.detail.item.value;
+    const quality = QUALITIES.find((q) => q.value === value);
+    if (quality) this.#fire("quality", quality.value);
+    else if (value === "strokes") this.#fire("strokes");
+    else this.#fire("overlay", value);
+    // The item has ticked itself: ticks follow the state, also where the choice changed nothing.
+    this.requestUpdate();
+  }
+
+  #qualities(chosen: QualityMode): TemplateResult {
+    const coarsened = this.coarsenedPx.value;
+    return html`
+      <wa-divider></wa-divider>
+      <small class="heading">Quality</small>
+      ${
+        coarsened === null
+          ? null
+          : html`<small class="heading" role="status">This view is held to ${coarsened.toFixed(1)} px: no room for finer ground</small>`
+      }
+      ${QUALITIES.map(
+        (q) => html`
+          <wa-dropdown-item type="checkbox" value=${q.value} title=${q.title} .checked=${live(chosen === q.value)}>${q.label}</wa-dropdown-item>
+        `,
+      )}
+    `;
+  }
+
+  protected override render(): TemplateResult {
+    const { actions, overlay, showStrokes, quiet, quality, renderer } = this;
+    const flat = renderer.value?.kind === "map";
+    const modes = [
+      { value: "orbit", label: "Orbit", icon: "orbit", title: keyText("Orbit", actions.get("camera-orbit")) },
+      { value: "fly", label: "Fly", icon: "fly", title: keyText("Fly", actions.get("camera-fly")) },
+      { value: "map", label: "Map", icon: "map", title: keyText("Map", actions.get("camera-map")) },
+    ];
+    return html`
+      ${
+        flat
+          ? null
+          : html`<esk-segmented
+              compact
+              label="Camera"
+              .segments=${modes}
+              .value=${this.view.value.mode}
+              @pick=${(e: CustomEvent<string>) => this.#run(`camera-${e.detail}`)}
+            ></esk-segmented>`
+      }
+      <button
+        class="icon-btn small"
+        aria-label="See the whole terrain"
+        title=${keyText("See the whole terrain", actions.get("home"))}
+        @click=${() => this.#run("home")}
+      >
+        ${icon("frame")}
+      </button>
+      <wa-dropdown placement="top-end" @wa-select=${this.#overlay}>
+        <button slot="trigger" class="icon-btn small" aria-label="Overlays" title="Overlays" aria-pressed=${overlay.value !== "none"}>
+          ${icon("layers")}
+        </button>
+        ${OVERLAYS.map(
+          (o) => html`
+            <wa-dropdown-item type="checkbox" value=${o.value} .checked=${live(overlay.value === o.value)}>${o.label}</wa-dropdown-item>
+          `,
+        )}
+        <wa-dropdown-item type="checkbox" value="strokes" .checked=${live(showStrokes.value && !quiet.value)}>Show strokes</wa-dropdown-item>
+        ${flat ? null : this.#qualities(quality.value)}
+      </wa-dropdown>
+    `;
+  }
+}
+
+customElements.define("esk-view-bar", EskViewBar);

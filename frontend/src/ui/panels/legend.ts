@@ -1,0 +1,155 @@
+import type { ReadonlySignal } from "@preact/signals-core";
+import { css, html, nothing, type TemplateResult } from "lit";
+import { SUBSTANCES } from "../../app/words/paints.ts";
+import { metres } from "../../app/words/words.ts";
+import type { PaintedOverlay, Scene, Vec3 } from "../../core/types.ts";
+import type { Doc } from "../../doc/document.ts";
+import type { ChannelStore } from "../../tiles/detail/channels.ts";
+import type { ShownTerrain } from "../../tiles/shownterrain.ts";
+import { SignalElement } from "../controls/signal-element.ts";
+import { shared } from "../styles/shared.ts";
+
+/** The words under the ends of a scale. */
+export function amplitudeEnds(greatestM: number): [string, string] {
+  return ["0", greatestM > 0 ? metres(greatestM) : "none yet"];
+}
+
+/** Overlays without a scale: the key that goes through them all should say which it has come to. */
+const NAMED = { contours: "Contour lines", patches: "Levels of detail, a colour each" } as const;
+
+/** What the colours of an overlay mean. */
+export class EskLegend extends SignalElement {
+  static override properties = {
+    overlay: { attribute: false },
+    channels: { attribute: false },
+    ground: { attribute: false },
+    cursor: { attribute: false },
+    doc: { attribute: false },
+    selection: { attribute: false },
+  };
+  static override styles = [
+    shared,
+    css`
+      :host {
+        display: grid;
+        gap: 8px;
+        width: 196px;
+        padding: 10px 12px;
+        font-size: 0.75rem;
+        color: var(--esk-quiet);
+      }
+      :host([hidden]) {
+        display: none;
+      }
+      .scale {
+        display: grid;
+        gap: 3px;
+      }
+      .name {
+        color: var(--esk-text);
+        font-weight: 550;
+      }
+      .bar {
+        height: 8px;
+        border-radius: 4px;
+      }
+      .ends {
+        display: flex;
+        justify-content: space-between;
+        font-variant-numeric: tabular-nums;
+      }
+      /* The colours of slope_tint and detail_tint in overlay.wgsl, as they look on lit ground. */
+      .slope {
+        background: linear-gradient(
+          to right,
+          #6fa57c 0%,
+          #6fa57c 8%,
+          #e0d66f 38%,
+          #dc7a4e 64%,
+          #93405f 100%
+        );
+      }
+      .roughness {
+        background: linear-gradient(to right, #3d7da3, #a9a06c 50%, #b34a58);
+      }
+      .influence {
+        background: linear-gradient(to right, #a7a7a7, #d6c183 45%, #d35a3c);
+      }
+      .painted {
+        background: linear-gradient(to right, #b37442, #8d8d8d 50%, #3595b3);
+      }
+      .amplitude {
+        background: linear-gradient(to right, #8d8d8d, #a9a06c);
+      }
+    `,
+  ];
+
+  declare overlay: ReadonlySignal<Scene["overlay"]>;
+  declare channels: ChannelStore;
+  declare ground: Pick<ShownTerrain, "attributesAt">;
+  declare cursor: ReadonlySignal<Vec3 | null>;
+  declare doc: ReadonlySignal<Doc | null>;
+  declare selection: ReadonlySignal<string | null>;
+
+  protected override render(): TemplateResult | typeof nothing {
+    const overlay = this.overlay.value;
+    this.toggleAttribute("hidden", overlay === "none");
+    if (overlay === "none") return nothing;
+    if (overlay === "contours" || overlay === "patches") return html`<div class="name">${NAMED[overlay]}</div>`;
+    if (overlay === "slope") return scale("Steepness", "slope", ["0°", "30°", "60°"]);
+    if (overlay === "influence") return this.#influence();
+    this.channels.revision.value;
+    if (overlay !== "detail") return this.#painted(overlay);
+    const greatest = this.channels.amplitude.values.reduce((a, b) => Math.max(a, b), 0);
+    return html`
+      ${scale("Roughness", "roughness", ["smooth", "rough"])} ${scale("Amplitude", "amplitude", amplitudeEnds(greatest))}
+      ${this.#here()}
+    `;
+  }
+
+  #influence(): TemplateResult {
+    const chosen = this.doc.value?.strokes.has(this.selection.value ?? "") === true;
+    if (!chosen) return html`<div class="name">Select a stroke to see where it is felt.</div>`;
+    return scale("Felt from the selected stroke", "influence", ["far", "its flanks", "its line"]);
+  }
+
+  /** What paint says of a channel, and how much of it there is in the end under the cursor. */
+  #painted(channel: PaintedOverlay): TemplateResult {
+    const name = `Painted ${SUBSTANCES[channel].title.toLowerCase()}`;
+    return html`${scale(name, "painted", ["less", "as it grows", "more"])} ${this.#share(channel)}`;
+  }
+
+  #share(channel: PaintedOverlay): TemplateResult | typeof nothing {
+    const at = this.cursor.value;
+    const found = at && this.ground.attributesAt(at[0], at[1]);
+    if (!at || !found) return nothing;
+    const bias = Math.round(100 * this.channels.valueAt(channel, at[0], at[1]));
+    const share = Math.round(100 * found[channel === "wetness" ? "wet" : channel]);
+    return html`<div>
+      <div class="ends"><span>Paint here</span><span>${signed(bias)} %</span></div>
+      <div class="ends"><span>${SUBSTANCES[channel].title} here</span><span>${share} %</span></div>
+    </div>`;
+  }
+
+  /** The two values under the cursor. */
+  #here(): TemplateResult | typeof nothing {
+    const at = this.cursor.value;
+    if (!at) return nothing;
+    const { channels } = this;
+    const amplitude = metres(channels.amplitudeAt(at[0], at[1]));
+    const roughness = Math.round(100 * channels.roughnessAt(at[0], at[1]));
+    return html`<div class="ends"><span>Here</span><span>${amplitude}, ${roughness} % rough</span></div>`;
+  }
+}
+
+const signed = (v: number): string => (v > 0 ? `+${v}` : v < 0 ? `−${-v}` : "0");
+
+function scale(name: string, kind: string, ends: readonly string[]): TemplateResult {
+  return html`<div class="scale" role="img" aria-label=${`${name}: ${ends.join(" to ")}`}>
+    <span class="name">${name}</span>
+    <span class="bar ${kind}"></span>
+    <span class="ends">${ends.map((end) => html`<span>${end}</span>`)}</span>
+  </div>`;
+}
+
+customElements.define("esk-legend", EskLegend);

@@ -1,0 +1,276 @@
+import "@awesome.me/webawesome/dist/components/switch/switch.js";
+import { html, nothing, type TemplateResult } from "lit";
+import { live } from "lit/directives/live.js";
+import type { Border, Look, Rule, TerrainFields, TerrainSettings } from "../../generated/contract.ts";
+import { DEFAULT_LAKES_FRACTION, DEFAULT_REACH_FRACTION, MAX_DETAIL } from "../../generated/contract.ts";
+import "../controls/range-field.ts";
+import "../controls/segmented.ts";
+import type { ReadonlySignal } from "@preact/signals-core";
+import type { OpenTerrain } from "../../app/open-terrain.ts";
+import { seaSpan, seaStart } from "../../app/view/sea.ts";
+import type { Doc } from "../../doc/document.ts";
+import type { TileStore } from "../../tiles/store.ts";
+import { SignalElement } from "../controls/signal-element.ts";
+import { panelStyles } from "../styles/panel.ts";
+import { shared } from "../styles/shared.ts";
+import "../controls/sun-pad.ts";
+import { type SunPosition, sunWords } from "../../app/view/sun.ts";
+
+/** Before the first tile. */
+const NO_HEIGHTS = new Float32Array(0);
+
+const LOOKS = [
+  { value: "natural", label: "Natural" },
+  { value: "alpine", label: "Alpine" },
+  { value: "desert", label: "Desert" },
+  { value: "paper", label: "Paper" },
+];
+
+const BORDERS = [
+  { value: "free", label: "Free", title: "The land runs on past the border" },
+  { value: "pinned", label: "Pinned", title: "The border stays at the base height" },
+];
+
+const BORDER_WORDS: Readonly<Record<Border, string>> = {
+  free: "The ground may rise and fall at the border of the terrain.",
+  pinned: "The ground at the border of the terrain stays at height zero.",
+};
+
+const RULES = [
+  {
+    value: "landscape",
+    label: "Landscape",
+    title: "Crags and meadows that know slope and height, down to a centimetre",
+  },
+  { value: "smooth", label: "Smooth", title: "Soft ground without noise" },
+  { value: "plain", label: "Plain", title: "The strokes' own ground, nothing added" },
+];
+
+const RULE_WORDS: Readonly<Record<Rule, string>> = {
+  landscape: "Rough on steep faces, calm in valleys, on down to a centimetre.",
+  smooth: "No noise; ground between the solved samples is a soft curve.",
+  plain: "What the strokes make, and nothing else.",
+};
+
+/** What a strength of the detail looks like. */
+export function detailWords(detail: number): string {
+  if (detail === 0) return "None: only strokes with an amplitude of their own are broken.";
+  if (detail < 0.7) return "Gentle: old, worn hills.";
+  if (detail <= 1.4) return "Natural.";
+  if (detail <= 2.5) return "Rugged: broken rock, steep gullies.";
+  return "Wild: the ground bristles.";
+}
+
+const tenth = (v: number): number => Math.round(10 * v) / 10;
+
+/** Settings of the whole terrain: look, detail, sun, sea and lakes, and how far strokes reach. */
+export class EskTerrainPanel extends SignalElement {
+  static override properties = {
+    doc: { attribute: false },
+    canEdit: { attribute: false },
+    tiles: { attribute: false },
+    edits: { attribute: false },
+  };
+  static override styles = [shared, panelStyles];
+
+  declare doc: ReadonlySignal<Doc | null>;
+  declare canEdit: ReadonlySignal<boolean>;
+  /** The coarsest tile says how high a sea can stand. */
+  declare tiles: Pick<TileStore, "tile">;
+  declare edits: Pick<OpenTerrain, "newGesture" | "setTerrain">;
+  #gesture: string | null = null;
+  /** Where the sea stood that was turned off here. */
+  #seaM: number | null = null;
+
+  #set(fields: TerrainFields, settled = true): void {
+    this.#gesture ??= this.edits.newGesture();
+    this.edits.setTerrain(fields, this.#gesture);
+    if (settled) this.#gesture = null;
+  }
+
+  protected override render(): TemplateResult | typeof nothing {
+    const settings = this.doc.value?.settings;
+    if (!settings) return nothing;
+    const disabled = !this.canEdit.value;
+    return html`
+      <div class="group">
+        <h3>Look</h3>
+        <esk-segmented
+          label="Look"
+          .segments=${LOOKS}
+          .value=${settings.look}
+          ?disabled=${disabled}
+          @pick=${(e: CustomEvent<Look>) => this.#set({ look: e.detail })}
+        ></esk-segmented>
+      </div>
+      ${this.#detail(settings, disabled)} ${this.#sun(settings, disabled)} ${this.#sea(settings, disabled)} ${this.#lakes(settings, disabled)} ${this.#reach(settings, disabled)}
+      <div class="group">
+        <h3>Border</h3>
+        <esk-segmented
+          label="Border"
+          .segments=${BORDERS}
+          .value=${settings.border}
+          ?disabled=${disabled}
+          @pick=${(e: CustomEvent<Border>) => this.#set({ border: e.detail })}
+        ></esk-segmented>
+        <p class="lead">${BORDER_WORDS[settings.border]}</p>
+      </div>
+    `;
+  }
+
+  #detail({ rule, detail }: TerrainSettings, disabled: boolean): TemplateResult {
+    return html`
+      <div class="group">
+        <h3>Detail</h3>
+        <esk-segmented
+          label="Rule of the detail"
+          .segments=${RULES}
+          .value=${rule}
+          ?disabled=${disabled}
+          @pick=${(e: CustomEvent<Rule>) => this.#set({ rule: e.detail })}
+        ></esk-segmented>
+        <p class="lead">${RULE_WORDS[rule]}</p>
+        ${
+          rule === "landscape"
+            ? html`<esk-range
+                  label="Strength"
+                  of="of the detail"
+                  unit="×"
+                  min="0"
+                  max=${MAX_DETAIL}
+                  step="0.1"
+                  .value=${detail}
+                  ?disabled=${disabled}
+                  @value=${(e: CustomEvent<number>) => this.#set({ detail: tenth(e.detail) }, false)}
+                  @settle=${(e: CustomEvent<number>) => this.#set({ detail: tenth(e.detail) })}
+                ></esk-range>
+                <p class="lead">${detailWords(detail)}</p>`
+            : nothing
+        }
+      </div>
+    `;
+  }
+
+  #sun(settings: TerrainSettings, disabled: boolean): TemplateResult {
+    const { sun_azimuth_deg: azimuth, sun_elevation_deg: elevation } = settings;
+    const move = (e: CustomEvent<SunPosition>, settled: boolean): void =>
+      this.#set({ sun_azimuth_deg: e.detail.azimuthDeg, sun_elevation_deg: e.detail.elevationDeg }, settled);
+    return html`
+      <div class="group">
+        <h3>Sun</h3>
+        <esk-sun-pad
+          .azimuthDeg=${azimuth}
+          .elevationDeg=${elevation}
+          ?disabled=${disabled}
+          @sun=${(e: CustomEvent<SunPosition>) => move(e, false)}
+          @settle=${(e: CustomEvent<SunPosition>) => move(e, true)}
+        ></esk-sun-pad>
+        <p class="lead">${sunWords({ azimuthDeg: azimuth, elevationDeg: elevation })}</p>
+      </div>
+    `;
+  }
+
+  #sea(settings: TerrainSettings, disabled: boolean): TemplateResult {
+    const level = settings.sea_level_m;
+    const heights = this.tiles.tile(0, 0, 0)?.heights ?? NO_HEIGHTS;
+    const [lowest, highest] = seaSpan(heights, settings.size_m);
+    const turn = (on: boolean): void => {
+      if (!on) this.#seaM = level;
+      this.#set({ sea_level_m: on ? (this.#seaM ?? seaStart(heights, settings.size_m)) : null });
+    };
+    return html`
+      <div class="group">
+        <wa-switch
+          size="s"
+          .checked=${live(level !== null)}
+          ?disabled=${disabled}
+          @change=${(e: Event) => turn((e.target as HTMLInputElement).checked)}
+          >Sea</wa-switch
+        >
+        ${
+          level === null
+            ? nothing
+            : html`<esk-range
+                label="Sea level"
+                unit="m"
+                min=${lowest}
+                max=${highest}
+                step=${settings.size_m / 4096}
+                .value=${level}
+                ?disabled=${disabled}
+                @value=${(e: CustomEvent<number>) => this.#set({ sea_level_m: e.detail }, false)}
+                @settle=${(e: CustomEvent<number>) => this.#set({ sea_level_m: e.detail })}
+              ></esk-range>`
+        }
+      </div>
+    `;
+  }
+
+  #lakes({ lakes_m: least, size_m: size }: TerrainSettings, disabled: boolean): TemplateResult {
+    const standard = size * DEFAULT_LAKES_FRACTION;
+    return html`
+      <div class="group">
+        <wa-switch
+          size="s"
+          .checked=${live(least !== null)}
+          ?disabled=${disabled}
+          @change=${(e: Event) => this.#set({ lakes_m: (e.target as HTMLInputElement).checked ? standard : null })}
+          >Lakes</wa-switch
+        >
+        ${
+          least === null
+            ? html`<p class="lead">Basins stay dry.</p>`
+            : html`<esk-range
+                  label="From a depth of"
+                  of="for lakes"
+                  unit="m"
+                  log
+                  min=${standard / 8}
+                  max=${standard * 32}
+                  .value=${least}
+                  ?disabled=${disabled}
+                  @value=${(e: CustomEvent<number>) => this.#set({ lakes_m: e.detail }, false)}
+                  @settle=${(e: CustomEvent<number>) => this.#set({ lakes_m: e.detail })}
+                ></esk-range>
+                <p class="lead">Basins fill to their brim. Draw a dam across a valley, or a crater.</p>`
+        }
+      </div>
+    `;
+  }
+
+  #reach(settings: TerrainSettings, disabled: boolean): TemplateResult {
+    const { reach_m: reach, size_m: size } = settings;
+    return html`
+      <div class="group">
+        <h3>Reach</h3>
+        <wa-switch
+          size="s"
+          .checked=${live(reach === null)}
+          ?disabled=${disabled}
+          @change=${(e: Event) =>
+            this.#set({ reach_m: (e.target as HTMLInputElement).checked ? null : size * DEFAULT_REACH_FRACTION })}
+          >Unlimited<span class="visually-hidden"> reach</span></wa-switch
+        >
+        ${
+          reach === null
+            ? html`<p class="lead">Every stroke moves the whole terrain, as on a rubber sheet.</p>`
+            : html`<esk-range
+                label="Distance"
+                of="that strokes reach"
+                unit="m"
+                log
+                min=${size / 256}
+                max=${size}
+                .value=${reach}
+                ?disabled=${disabled}
+                @value=${(e: CustomEvent<number>) => this.#set({ reach_m: e.detail }, false)}
+                @settle=${(e: CustomEvent<number>) => this.#set({ reach_m: e.detail })}
+              ></esk-range>
+              <p class="lead">Beyond its flanks a stroke moves the ground about this far.</p>`
+        }
+      </div>
+    `;
+  }
+}
+
+customElements.define("esk-terrain-panel", EskTerrainPanel);

@@ -1,0 +1,113 @@
+"""Workspaces stay within their bound at every moment, blank terrains need none (SPEC S30, S223, S224)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from esker import grid
+from esker.api.terrain import Stroke as Make
+from esker.contract import Channel, Stroke, TerrainSettings
+from esker.events import Done, Level
+from esker.solve.constraints.packing import Shape, pack_one
+from esker.solve.opencl.spares import PACKED, SPARE_SECONDS
+from esker.solve.solver import Solver
+from tests.solver.bases import hills
+from tests.solver.scenes import PINNED, SCENES, SETTINGS, mixed
+
+HIDDEN = SCENES["one"][0].model_copy(update={"hidden": True})
+BARE = SCENES["one"][0].model_copy(update={"curve": ()})
+
+
+@pytest.fixture
+def solver() -> Solver:
+    return Solver()
+
+
+def named(prefix: str) -> list[Stroke]:
+    return [s.model_copy(update={"id": f"{prefix}-{s.id}"}) for s in SCENES["five"]]
+
+
+@pytest.mark.parametrize("settings", [SETTINGS, PINNED, TerrainSettings(reach_m=None)])
+@pytest.mark.parametrize("strokes", [[], [HIDDEN, BARE]], ids=["empty", "without effect"])
+@pytest.mark.parametrize("based", [False, True])
+@pytest.mark.parametrize("device", ["numpy", None])
+def test_a_blank_terrain_is_what_its_equations_give_and_takes_no_workspace(
+    device: str | None, strokes: list[Stroke], settings: TerrainSettings, based: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    solver, base = Solver(device), hills() if based else None
+    *events, done = solver.steps(strokes, settings, 1, basis=True, base=base)
+    results = [r for r in events if isinstance(r, Level)]
+    assert solver._spares.held == 0
+    heights = {r.level: r.heights for r in results if r.channel == Channel.HEIGHT}
+    assert [r.settled for r in results] == [True] * len(results)
+    assert isinstance(done, Done)
+    assert done.basis is not None
+    monkeypatch.setattr("esker.solve.solver.is_blank", lambda _: False)
+    *events, again = solver.steps(strokes, settings, 1, basis=True, base=base)
+    solved = [r for r in events if isinstance(r, Level) and r.settled]
+    assert solver._spares.held > 0
+    for result in solved:
+        if result.channel == Channel.HEIGHT:
+            assert np.array_equal(result.heights, heights[result.level])
+            assert not np.signbit(heights[result.level]).any()
+    assert isinstance(again, Done)
+    assert np.array_equal(again.basis.gradient, done.basis.gradient)
+    assert {r.channel for r in solved} == {r.channel for r in results}
+
+
+def test_paint_on_blank_ground_is_painted(solver: Solver) -> None:
+    snow = Make.paint([(900, 900), (2000, 2000)], "snow", 1.0, radius_m=80, id="snow")
+    found = [r for r in solver.steps([snow], SETTINGS, 2) if isinstance(r, Level) and r.channel == Channel.SNOW]
+    assert found[-1].heights.max() > 0.9
+    assert solver._spares.held == 0
+
+
+def test_the_bound_holds_at_every_moment_with_solves_in_progress(solver: Solver) -> None:
+    """58 terrains that had been opened and left held 7.4 GB where a fifth of the machine was the bound."""
+    solver._spares.bound = 4 * grid.solve_bytes(1)
+    most, running = 0, []
+    for n in range(12):
+        steps = solver.steps(named(str(n)), SETTINGS, 1)
+        next(steps)
+        running.append(steps)
+        if len(running) > 2:
+            for _ in running.pop(0):
+                most = max(most, solver._spares.held)
+        most = max(most, solver._spares.held)
+    for steps in running:
+        steps.close()
+    assert most <= 4 * grid.solve_bytes(1)
+    assert solver._spares.held == len(solver._spares.idle) * grid.solve_bytes(1)
+
+
+def test_who_comes_back_is_rasterised_and_not_packed_again(solver: Solver, monkeypatch: pytest.MonkeyPatch) -> None:
+    strokes = mixed(20, 4)
+    expected = solver.solve(strokes, SETTINGS, 1)[1]
+    [workspace] = solver._spares.idle
+    assert solver.tidy(solver._spares.since[workspace] + SPARE_SECONDS) == 1
+    del workspace
+    assert solver._spares.held == 0
+    packed: list[str] = []
+
+    def counted(shape: Shape, *given: Any) -> Any:
+        packed.append(shape.crest.stroke.id)
+        return pack_one(shape, *given)
+
+    monkeypatch.setattr("esker.solve.constraints.constraints.pack_one", counted)
+    changed = strokes[0].model_copy(update={"last": (2000.0, 2000.0, 0.0)})
+    assert np.array_equal(solver.solve(strokes, SETTINGS, 1)[1], expected)
+    assert packed == []
+    found = solver.solve([changed, *strokes[1:]], SETTINGS, 1)[1]
+    assert np.array_equal(found, Solver().solve([changed, *strokes[1:]], SETTINGS, 1)[1])
+
+
+def test_only_so_much_is_kept_of_rooms_that_left(solver: Solver) -> None:
+    for n in range(PACKED + 3):
+        solver.solve(named(str(n)), SETTINGS, 0)
+        solver.tidy(1e12)
+    assert len(solver._spares._packed) == PACKED
+    solver.tidy(1e13)
+    assert solver._spares._packed == []

@@ -1,0 +1,174 @@
+"""Rooms have the solver by the time that they take, not by the work that they make (SPEC P225, P226).
+
+The worker's own steps are driven here by hand, with a clock that only the solver's work moves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+
+from esker import contract as c
+from esker.events import PAUSE, BaseLevel, Preview, Settled, SolveEvent
+from esker.session.ground.client import Client
+from esker.session.ground.jobs import Job
+from esker.session.ground.schedule import AHEAD
+from esker.session.ground.worker import Worker
+
+SETTINGS = c.TerrainSettings()
+FLAT = np.zeros((2, 2), dtype=np.float32)
+LEVELS = 2
+CYCLES = 20
+"""In which a solve settles, between its previews and its settled levels."""
+
+
+class Works:
+    """A solver whose slices take as long as the first stroke is high, in seconds."""
+
+    device_name = "simulated"
+
+    def __init__(self, world: World) -> None:
+        self.world = world
+
+    def steps(
+        self, strokes: Sequence[c.Stroke], settings: c.TerrainSettings, levels: int | None = None, **_: Any
+    ) -> Iterator[SolveEvent]:
+        assert settings.size_m > 0
+        cost, top = strokes[0].first[2], levels or 0
+        for level in range(top + 1):
+            self.world.now += cost
+            yield Preview(level, FLAT)
+        for _cycle in range(CYCLES):
+            self.world.now += cost
+            yield PAUSE
+        for level in range(top + 1):
+            yield Settled(level, FLAT)
+
+    def channels(self, *_: Any, **__: Any) -> Iterator[Any]:
+        for _layer in range(5):
+            self.world.now += 0.05
+            yield PAUSE
+
+    def base_levels(self, base: Any, levels: int) -> Iterator[BaseLevel]:
+        raise AssertionError(f"{base} of {levels} levels")
+
+    def refiner(self, basis: object) -> Any:
+        raise AssertionError(f"nobody was given {basis}")
+
+
+class World:
+    """A worker without its thread."""
+
+    def __init__(self, budget: int | None = None) -> None:
+        self.now = 0.0
+        self.worker = Worker(lambda _: Works(self), now=lambda: self.now, budget=budget)
+        self.worker._repairs.open()
+        self.settled: dict[str, list[float]] = {}
+        self.previews: dict[str, list[float]] = {}
+        self.slices: dict[Client, float] = {}
+        self.churning: list[tuple[Client, float, float]] = []
+        """Rooms whose document changes all the time: what a slice of theirs takes, and when they changed last."""
+        self.clock = 0
+
+    def room(self, name: str) -> Client:
+        self.settled[name], self.previews[name] = [], []
+
+        def deliver(_: int, result: Any) -> None:
+            if result.level == LEVELS:
+                (self.settled if result.settled else self.previews)[name].append(self.now)
+
+        return self.worker.add(LEVELS, deliver, lambda note: pytest.fail(note))
+
+    def ask(self, client: Client, cost: float, **like: Any) -> None:
+        self.clock += 1
+        stroke = c.Stroke(id="s", kind="profile", first=(0, 0, cost), last=(1, 1, 0), curve=((0, 0),))
+        self.worker.request(client, Job(self.clock, (stroke,), SETTINGS, **like))
+
+    def run(self, seconds: float) -> None:
+        end = self.now + seconds
+        while self.now < end:
+            for n, (client, cost, at) in enumerate(self.churning):
+                if self.now - at >= 1 / 30:
+                    self.churning[n] = client, cost, self.now
+                    self.ask(client, cost)
+            turn = self.worker._choose()
+            if turn is None:
+                self.now += 0.001
+                continue
+            began = self.now
+            self.worker._step(turn)
+            self.slices[turn] = self.slices.get(turn, 0.0) + self.now - began
+
+
+def test_a_light_room_settles_beside_one_that_changes_all_the_time() -> None:
+    """Beside 5,000 strokes whose reach changed all the time it had not settled after 25 s; alone it took 0.43."""
+    alone = World()
+    light = alone.room("light")
+    alone.ask(light, 0.018)
+    alone.run(1.0)
+    [by_itself] = alone.settled["light"]
+
+    world = World()
+    heavy, light = world.room("heavy"), world.room("light")
+    world.churning.append((heavy, 0.2, 0.0))
+    world.run(30.0)
+    asked = world.now
+    world.ask(light, 0.018)
+    world.run(10.0)
+    [settled] = world.settled["light"]
+    assert settled - asked < 3 * by_itself + 2 * AHEAD
+    assert world.previews["heavy"][-1] > settled, "the heavy one goes on"
+
+
+def test_two_rooms_that_both_want_everything_have_half_each() -> None:
+    world = World()
+    rooms = [world.room(name) for name in ("heavy", "light")]
+    for room, cost in zip(rooms, (0.2, 0.01), strict=True):
+        world.churning.append((room, cost, 0.0))
+    world.run(60.0)
+    heavy, light = (world.slices[room] for room in rooms)
+    assert abs(heavy - light) < AHEAD + 0.5
+    assert len(world.previews["heavy"]) > 10, "its passes are finished, at the pace of its share"
+    assert len(world.previews["light"]) > 10 * len(world.previews["heavy"])
+
+
+def test_time_that_nobody_wanted_is_held_against_nobody_and_not_saved_up() -> None:
+    world = World()
+    old, new = world.room("old"), world.room("new")
+    world.churning.append((old, 0.05, 0.0))
+    world.run(100.0)
+    assert world.worker._tally.rooms[old].seconds > 90
+    world.churning.append((new, 0.05, 0.0))
+    world.slices.clear()
+    world.run(20.0)
+    assert abs(world.slices[old] - world.slices[new]) < AHEAD + 0.2, "old is not made to wait for a hundred seconds"
+    world.churning.clear()
+    world.run(20.0)
+    world.churning += [(old, 0.05, world.now), (new, 0.05, world.now)]
+    world.slices.clear()
+    world.run(20.0)
+    assert abs(world.slices[old] - world.slices[new]) < 2 * AHEAD + 0.2
+
+
+def test_many_rooms_each_have_their_part() -> None:
+    world = World()
+    rooms = [world.room(str(n)) for n in range(10)]
+    for n, room in enumerate(rooms):
+        world.churning.append((room, 0.1 if n < 5 else 0.01, 0.0))
+    world.run(100.0)
+    shares = [world.slices[room] for room in rooms]
+    assert max(shares) - min(shares) < AHEAD + 0.5
+
+
+def test_settling_is_ended_only_for_who_has_had_no_more() -> None:
+    """Memory for one solve at a time: who changes all the time does not end the other's solve again and again."""
+    world = World(budget=1)
+    heavy, light = world.room("heavy"), world.room("light")
+    world.churning.append((heavy, 0.2, 0.0))
+    world.run(10.0)
+    world.ask(light, 0.018)
+    world.run(20.0)
+    assert len(world.settled["light"]) == 1

@@ -1,0 +1,148 @@
+"""Opening a heavy document holds nobody up: it is read stroke by stroke, in a thread (SPEC J395)."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import sys
+from collections.abc import Awaitable, Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pydantic import ValidationError
+
+from esker import contract as c
+from esker.contract import Document
+from esker.document import archive
+from esker.document.former import read_document
+from esker.document.wire import document_json
+from esker.exporting import wire
+from esker.server.run import SWITCH_SECONDS
+from esker.server.upload import read_archive
+from esker.store.journal import Journal
+
+STROKES, POINTS = 600, 500
+TURNS = 20
+"""Turns of the event loop that a bystander has at least while a document is read: at once it would be one or two."""
+
+
+@pytest.fixture(scope="module")
+def heavy() -> Document:
+    curve = tuple((k / POINTS, float(k % 97) + 0.25) for k in range(POINTS))
+    ends: dict[str, Any] = {"kind": "profile", "first": (0.0, 0.0, 0.0), "last": (900.0, 1.0, 1.0)}
+    return Document(id="t", strokes=tuple(c.Stroke(id=f"s{k}", curve=curve, **ends) for k in range(STROKES)))
+
+
+@contextlib.contextmanager
+def _as_served() -> Iterator[None]:
+    """Threads take turns as often as in a server."""
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(SWITCH_SECONDS)
+    try:
+        yield
+    finally:
+        sys.setswitchinterval(before)
+
+
+def _turns_while(
+    reads: list[Any], monkeypatch: pytest.MonkeyPatch, module: str, work: Callable[[], Awaitable[Any]]
+) -> int:
+    """Turns of a bystander's loop while ``module`` reads its document."""
+    going, turns = [False], [0]
+
+    def read(text: str | bytes) -> Document:
+        going[0] = True
+        try:
+            reads.append(read_document(text))
+            return reads[-1]  # type: ignore[no-any-return]
+        finally:
+            going[0] = False
+
+    monkeypatch.setattr(f"{module}.read_document", read)
+
+    async def run() -> None:
+        task = asyncio.ensure_future(work())
+        while not task.done():
+            turns[0] += going[0]
+            await asyncio.sleep(0)
+        await task
+
+    with _as_served():
+        asyncio.run(run())
+    return turns[0]
+
+
+def test_a_bystander_has_his_turns_while_a_heavy_journal_is_opened(
+    tmp_path: Path, heavy: Document, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    journal, reads = Journal(tmp_path), []  # type: ignore[var-annotated]
+    journal.create(heavy).result()
+    # Without names: a check of a name gives others the interpreter by chance.
+    plain = heavy.model_dump_json(exclude_defaults=True)
+    journal.submit(lambda db: db.execute("UPDATE snapshots SET document=?", (plain,))).result()
+    turns = _turns_while(reads, monkeypatch, "esker.store.journal", lambda: asyncio.to_thread(journal.load, "t"))
+    assert reads == [heavy]
+    assert turns >= TURNS
+    journal.close()
+
+
+def test_a_bystander_has_his_turns_while_a_heavy_file_is_taken_in(
+    tmp_path: Path, heavy: Document, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "t.esker").write_bytes(archive.dumps(heavy))
+    reads: list[Any] = []
+    turn: Any = contextlib.nullcontext()
+    work = tmp_path / "work"
+    work.mkdir()
+    turns = _turns_while(
+        reads, monkeypatch, "esker.server.upload", lambda: read_archive(tmp_path / "t.esker", work, turn)
+    )
+    assert reads == [heavy]
+    assert turns >= TURNS
+
+
+def test_a_document_read_in_pieces_is_that_read_at_once(heavy: Document) -> None:
+    few = heavy.model_copy(update={"strokes": heavy.strokes[:3], "deleted": heavy.strokes[3:5], "clock": 7})
+    for text in (
+        document_json(few),
+        json.dumps(json.loads(document_json(few)), indent=2),
+        '{"id":"a"}',
+        ' {"id": "a" }\n',
+    ):
+        assert read_document(text) == read_document(text.encode()) == Document.model_validate_json(text)
+    assert document_json(few) == few.model_dump_json()
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "", "[]", "{", "{}", '{"id":"a"} x', '{"id":"a",}', '{"id":"a","strokes":[1,]}', '{"id":"a","strokes":[}',
+        '{"id":"a","strokes":null}', '{"id":"a","strokes":[{}]}', '{"id":"a","what":1}', '{"id":"a" "clock":1}',
+        '{"id":"a","strokes":[' + "[" * 100_000, '{1:2}', '{"id":"a","layers":[{"id":3}]}', "nonsense",
+    ],
+)  # fmt: skip
+def test_what_is_no_document_is_refused_as_before(text: str) -> None:
+    with pytest.raises(ValidationError):
+        Document.model_validate_json(text)
+    with pytest.raises(ValidationError):
+        read_document(text)
+    with pytest.raises(archive.ArchiveError):
+        archive.document_from_json(text.encode())
+
+
+def test_an_error_names_its_place(heavy: Document) -> None:
+    raw = json.loads(document_json(heavy.model_copy(update={"strokes": heavy.strokes[:3]})))
+    raw["strokes"][2]["kind"] = "nonsense"
+    with pytest.raises(archive.ArchiveError, match=r"strokes\.2\.kind"):
+        archive.document_from_json(json.dumps(raw).encode())
+    raw["strokes"][2]["kind"] = "profile"
+    raw["strokes"][2]["plateau_radius_m"] = 1e30
+    assert read_document(json.dumps(raw)).strokes[2].plateau_radius_m < 1e30
+
+
+def test_the_line_of_an_export_is_that_of_the_task(heavy: Document) -> None:
+    task = wire.Task(document=heavy, wish=c.ExportRequest(samples=65, format="npy"), grids="g", folder="f", name="n")
+    assert wire.Task.model_validate_json(wire.task_line(task)) == task
+    assert "\n" not in wire.task_line(task)

@@ -1,0 +1,83 @@
+"""The benchmark of attacks notes what it should (SPEC P404)."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from pathlib import Path
+from typing import Any
+
+import psutil
+import pytest
+
+from bench.strangers import siege
+from bench.strangers._attacks import ATTACKS, BY_LINK
+from tests.sync.harness import LiveServer
+
+
+def figures(**over: Any) -> dict[str, Any]:
+    usual = {"ack_p99_ms": 10.0, "tile_p50_ms": 40.0, "settling_s": 1.0, "closed": 0, "unanswered": 0}
+    return usual | {"server": {"memory_mb": 500}} | over
+
+
+def test_aims_that_do_not_hold_are_named() -> None:
+    runs = {
+        "alone": figures(),
+        "fine": figures(ack_p99_ms=19.0, after=figures()),
+        "slow": figures(ack_p99_ms=21.0, settling_s=2.9),
+        "stays": figures(after=figures(tile_p50_ms=90.0)),
+        "big": figures(server={"memory_mb": 3000}),
+        "loses": figures(unanswered=2),
+    }
+    missed = siege.judged(runs)
+    assert missed == {
+        "slow": ["ack_p99_ms: 2.1 times, aim 2.0"],
+        "stays": ["tile_p50_ms afterwards: 2.25 times, aim 2.0"],
+        "big": ["memory: 3000 MB, aim 2048"],
+        "loses": ["2 of the people's changes or connections were lost"],
+    }
+    assert runs["fine"]["after"]["times_alone"]["settling_s"] == 1.0
+
+
+def test_people_draw_what_is_taken_and_their_ground_settles(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """SPEC P404: each first change was refused, and what is refused was waited for as if it were on its way."""
+    monkeypatch.setattr(siege, "_attack", lambda *_: None)
+    with LiveServer(tmp_path) as live:
+        server = siege.Server(live.base, psutil.Process(), tmp_path)
+        plan = siege.Plan(1.0, 0.0)
+        runs, left = asyncio.run(siege._run(server, [], plan))
+    alone = runs["alone"]
+    assert left == []
+    assert alone["acks"] > 0
+    assert (alone["refused"], alone["unanswered"], alone["closed"]) == (0, 0, 0)
+    assert alone["settling_s"] < siege.SETTLED_SECONDS
+
+
+def test_what_there_is_no_time_for_is_listed(tmp_path: Path) -> None:
+    with LiveServer(tmp_path) as live:
+        server = siege.Server(live.base, psutil.Process(), tmp_path)
+        runs, left = asyncio.run(siege._run(server, ["pings", "codes"], siege.Plan(1.0, 0.0, until=0.0)))
+    assert set(runs) == {"alone"}
+    assert left == [
+        "pings by a stranger",
+        "pings by a viewer",
+        "codes by a stranger",
+        "all by a stranger",
+        "all by a viewer",
+    ]
+    assert set(ATTACKS) >= BY_LINK
+
+
+def test_time_is_kept_for_all_attacks_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """SPEC P404: they come last, and are what a server has to stand."""
+
+    async def besieged(*_: Any) -> dict[str, Any]:
+        return {}
+
+    monkeypatch.setattr(siege, "_besieged", besieged)
+    with LiveServer(tmp_path) as live:
+        server = siege.Server(live.base, psutil.Process(), tmp_path)
+        plan = siege.Plan(1.0, 0.0, until=time.monotonic() + 1_000, kept=2_000)
+        runs, left = asyncio.run(siege._run(server, ["codes", "journal"], plan))
+    assert left == ["codes by a stranger", "journal by a stranger"]
+    assert set(runs) == {"alone", "all by a stranger", "all by a viewer"}

@@ -1,0 +1,130 @@
+"""Requests are paid by their address in processor time, and wait for it (SPEC P451)."""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from esker.fairness.shares import Who
+from esker.fairness.spending import PAYS
+from esker.server.wire import pacing
+from esker.server.wire.pacing import Paced, _Metered
+from esker.session.room.turns import FairThreads
+from tests.sync.harness import LiveServer
+
+
+@pytest.fixture
+def ticks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Between two looks at the processor time of any thread a second of it passes."""
+    count = itertools.count()
+    monkeypatch.setattr(time, "thread_time", lambda: float(next(count)))
+
+
+async def _app(scope: Any, receive: Any, send: Any) -> None:
+    assert receive is not None
+    await send({"type": "http.response.start", "status": 200, "headers": [], "path": scope.get("path")})
+    await send({"type": "http.response.body", "body": b""})
+
+
+def _status(paced: Paced, address: str) -> int:
+    said: list[Any] = []
+
+    async def send(message: Any) -> None:
+        said.append(message)
+
+    asyncio.run(paced({"type": "http", "client": (address, 1), "method": "GET", "path": "/"}, object(), send))
+    return int(said[0]["status"])
+
+
+def test_an_address_that_has_spent_its_share_waits_and_others_do_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pacing, "PATIENCE_SECONDS", 0.0)
+    paced = Paced(_app)
+    assert _status(paced, "192.0.2.7") == 200
+    for address in ("192.0.2.7", "2001:db8::7"):
+        for purse in paced._accounts.asker(address):
+            purse.pay(0.0, 1e9)
+    assert _status(paced, "192.0.2.7") == 429
+    assert _status(paced, "::ffff:192.0.2.7") == 429
+    assert _status(paced, "2001:db8::ffff:1") == 429, "of the same /64"
+    assert _status(paced, "2001:db8:0:1::1") == 429, "of the same /48, whose share is three times as large"
+    assert _status(paced, "192.0.2.8") == 200
+    assert _status(paced, "2001:db8:1::1") == 200
+
+
+def test_a_request_that_need_not_wait_long_waits(monkeypatch: pytest.MonkeyPatch) -> None:
+    waits: list[float] = []
+
+    async def sleep(seconds: float) -> None:
+        waits.append(seconds)
+
+    monkeypatch.setattr(asyncio, "sleep", sleep)
+    paced = Paced(_app)
+    (purse,) = paced._accounts.asker("192.0.2.7")
+    purse.pay(time.monotonic(), purse.left + 1.0)
+    assert _status(paced, "192.0.2.7") == 200
+    assert len(waits) == 1
+    assert 0 < waits[0] <= pacing.PATIENCE_SECONDS
+
+
+@pytest.mark.usefixtures("ticks")
+def test_every_step_is_paid_however_it_ends() -> None:
+    paid: list[float] = []
+
+    async def fails() -> None:
+        await asyncio.sleep(0)
+        raise ValueError("so it does")
+
+    async def hangs() -> None:
+        try:
+            await asyncio.Event().wait()
+        finally:
+            await asyncio.sleep(0)
+
+    async def all_of_them() -> None:
+        await _Metered(asyncio.sleep(0), paid.append)
+        with pytest.raises(ValueError, match="so it does"):
+            await _Metered(fails(), paid.append)
+        task = asyncio.ensure_future(_waits(_Metered(hangs(), paid.append)))
+        await asyncio.sleep(0)
+        task.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await task
+
+    asyncio.run(all_of_them())
+    assert paid == [1.0] * 7, "two steps, two, and three: to the wait, to the pause after it, to the end"
+
+
+async def _waits(what: Any) -> None:
+    await what
+
+
+@pytest.mark.usefixtures("ticks")
+def test_what_other_threads_do_for_a_request_is_paid_too() -> None:
+    paid: list[float] = []
+
+    async def ask() -> None:
+        threads = FairThreads(1, "asked")
+        token = PAYS.set(paid.append)
+        assert await threads.run(Who("192.0.2.7"), lambda: 4) == 4
+        PAYS.reset(token)
+        assert await threads.run(Who(""), lambda: 5) == 5, "and where nobody pays it is done as well"
+        threads.shutdown()
+
+    asyncio.run(ask())
+    assert paid == [1.0]
+
+
+def test_the_server_paces_requests_and_not_sockets(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with LiveServer(tmp_path) as server:
+        assert server.http("GET", "/healthz")[0] == 200
+        terrain, secret = server.create()
+        monkeypatch.setattr(pacing, "REQUEST_SECONDS", 1e9)
+        monkeypatch.setattr(pacing, "PATIENCE_SECONDS", 0.0)
+        status, told = server.http("GET", "/healthz")
+        assert (status, told["code"]) == (429, "rate_limited")
+        server.join(terrain, secret).close()
