@@ -163,12 +163,18 @@ def told(port: int) -> str:
 
 INTERRUPTED = """
 import os, runpy, signal, sys
-at = sys.argv.pop()
+at, _, seen = sys.argv.pop().partition(" ")
 class CtrlC:
     def find_spec(self, name, path=None, target=None):
         if name == at:
             sys.meta_path.remove(self)
-            os.kill(os.getpid(), signal.SIGINT)
+            try:
+                os.kill(os.getpid(), signal.SIGINT)
+            except BaseException:
+                if not seen:
+                    raise
+                if seen == "turned":
+                    raise ValueError("not a model")
 sys.meta_path.insert(0, CtrlC())
 runpy.run_module("esker", run_name="__main__", alter_sys=True)
 """
@@ -183,10 +189,16 @@ runpy.run_module("esker", run_name="__main__", alter_sys=True)
         ("esker.server.settings", STOPPED),
         ("esker.server.starting", STOPPED),
         ("uvicorn", 0),
+        ("uvicorn turned", 0),
+        ("uvicorn dropped", 0),
     ],
 )
 def test_ctrl_c_in_the_first_moments_shows_no_traceback(module: str, status: int, tmp_path: Path) -> None:
-    """SPEC P410: before anything is begun it ends by the signal, or as shells say of that; then as P142 says."""
+    """SPEC P410: before anything is begun it ends by the signal, or as shells say of that; then as P142 says.
+
+    Then also where a library turns what the handler raised into an error of its own, or drops it. CI met the first:
+    pydantic made a model just then.
+    """
     command = [sys.executable, "-c", INTERRUPTED, "serve", "--port", "0", "--data", str(tmp_path / "data"), module]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=120, check=False)
     assert done.returncode == status, done.stderr

@@ -108,19 +108,23 @@ def _serve(parsed: argparse.Namespace) -> int:
     from esker.store.upkeep.inspection import CorruptDatabase
 
     os.umask(PRIVATE_UMASK)
+    stopping = starting.Stopping()
     try:
-        system.on_stop(starting.interrupted)
+        system.on_stop(stopping)
         door = starting.FrontDoor(settings)
         with starting.WaitingRoom(door.listener, door.context, sys.stdout) as room:
             from esker.server.run import serve  # this import takes a second, in which the door already listens
 
-            serve(settings, door, room)
-    except (starting.CannotServe, CorruptDatabase) as error:
-        return _fail(str(error))
-    except starting.Interrupted:
-        sys.stderr.write("esker: stopped before it was ready\n")
-    except OSError as error:
-        return _fail(f"Cannot use the data folder {settings.data}: {error}")
+            serve(settings, door, room, stopping)
+    except BaseException as error:
+        if stopping.asked:
+            sys.stderr.write("esker: stopped before it was ready\n")
+        elif isinstance(error, (starting.CannotServe, CorruptDatabase)):
+            return _fail(str(error))
+        elif isinstance(error, OSError):
+            return _fail(f"Cannot use the data folder {settings.data}: {error}")
+        else:
+            raise
     return 0
 
 

@@ -30,7 +30,7 @@ from esker.server.app import create_app
 from esker.server.elevation import Elevation
 from esker.server.routes.previews import Pictures
 from esker.server.settings import Settings
-from esker.server.starting import CannotServe, FrontDoor, WaitingRoom
+from esker.server.starting import CannotServe, FrontDoor, Stopping, WaitingRoom
 from esker.server.wire.door import BACKLOG, Door
 from esker.server.wire.front import Front, Proxies, hosts, local_names
 from esker.server.wire.http import Connections, HttpProtocol, bounded
@@ -274,14 +274,21 @@ class Assembly:
         self._listener.close()
 
 
-def serve(settings: Settings, door: FrontDoor, room: WaitingRoom) -> None:
+def serve(settings: Settings, door: FrontDoor, room: WaitingRoom, stopping: Stopping) -> None:
     """Runs until SIGINT or SIGTERM, once the waiting room has left the door to it.
 
-    Raises CannotServe, store.journal.CorruptDatabase, OSError; what a handler of signals raises before it serves.
+    Raises CannotServe, store.journal.CorruptDatabase, OSError; starting.Interrupted before it serves.
     """
-    assembly = Assembly(settings, door=door, tell=lambda step: room.tell(step.said, step.done, step.of))
+
+    def tell(step: prepare.Step) -> None:
+        stopping.check()
+        room.tell(step.said, step.done, step.of)
+
+    stopping.check()
+    assembly = Assembly(settings, door=door, tell=tell)
     try:
         server = assembly.server()
+        stopping.check()
         room.leave()
         assembly.run(server)
     finally:

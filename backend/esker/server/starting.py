@@ -262,10 +262,23 @@ class _Line:
             self._out.flush()
 
 
-def interrupted(*_: object) -> None:
-    """A handler of the signals that stop a program, for the time before the server handles them itself.
+class Stopping:
+    """What the signals that stop a program do before the server handles them itself. ``system.on_stop(stopping)``.
 
-    Ctrl-C a second time does not wait for what the first one tidies up.
+    It raises Interrupted wherever the main thread is, and remembers that it did: a library may turn that exception into
+    one of its own (pydantic does, while a model is made), or drop it.
     """
-    interrupt.ends()
-    raise Interrupted
+
+    def __init__(self) -> None:
+        self.asked = False
+
+    def __call__(self, *_: object) -> None:
+        """The handler. Ctrl-C a second time does not wait for what the first one tidies up."""
+        self.asked = True
+        interrupt.ends()
+        raise Interrupted
+
+    def check(self) -> None:
+        """Raises Interrupted when that was asked for and the exception came to nothing."""
+        if self.asked:
+            raise Interrupted
