@@ -16,10 +16,10 @@ from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIO
 from websockets.exceptions import WebSocketException
 from websockets.frames import CloseCode, Frame, Opcode
 from websockets.protocol import State
-from websockets.streams import StreamReader
 
 from esker.fairness.shares import Place
 from esker.fairness.spending import BYTE_SECONDS, Account
+from esker.server.wire.boundaries import FrameBoundaries
 
 try:
     from websockets.speedups import apply_mask
@@ -46,7 +46,6 @@ _WHOLE_TEXT: Final = 0x80 | Opcode.TEXT
 _MASKED: Final = 0x80
 _TWO_BYTES, _EIGHT_BYTES = 126, 127
 """Codes that stand for a length which follows in two or in eight bytes (RFC 6455, 5.2)."""
-_BETWEEN_FRAMES: Final = StreamReader.at_eof.__code__
 
 
 class WebSocketProtocol(WebSocketsSansIOProtocol):
@@ -61,6 +60,11 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
     _turn: asyncio.TimerHandle | None = None
     place: Place | None = None
     """Place of this connection among those that the server has."""
+
+    def __init__(self, *arguments: Any, **named: Any) -> None:
+        """As uvicorn makes its own."""
+        super().__init__(*arguments, **named)
+        self._boundaries = FrameBoundaries()
 
     async def run_asgi(self) -> None:
         """Runs the application."""
@@ -158,7 +162,9 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
             taken = self._take_texts(data, at, began)
             if not taken:
                 taken = min(SLICE_BYTES, len(data) - at)
-                super().data_received(data[at : at + taken] if taken < len(data) else data)
+                piece = data[at : at + taken] if taken < len(data) else data
+                self._boundaries.feed(piece)
+                super().data_received(piece)
                 if self.conn.handshake_exc is not None and not self.handshake_initiated:
                     self._refuse_handshake()
             at += taken
@@ -224,10 +230,7 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
         message that waits, no farewell."""
         if self._listener is None or self.close_sent or self.conn.state is not State.OPEN or not self.queue.empty():
             return False
-        waiting: Any = self.conn.parser
-        while (inner := getattr(waiting, "gi_yieldfrom", None)) is not None:
-            waiting = inner
-        return self.conn.current_size is None and getattr(waiting, "gi_code", None) is _BETWEEN_FRAMES
+        return self._boundaries.is_between
 
     def send_receive_event_to_app(self) -> None:
         """A whole message has come: to the listener, or into the queue behind those that wait there."""
