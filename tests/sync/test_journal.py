@@ -155,6 +155,25 @@ def test_a_full_disk_is_reported_and_survived(journal: Journal) -> None:
     journal.close()
 
 
+@pytest.mark.parametrize("others", [0, 1])
+def test_a_failure_that_others_of_the_batch_survive_is_told(journal: Journal, others: int) -> None:
+    """SPEC J264. SQLite may end the statement alone that finds the disk full."""
+
+    def fails(db: sqlite3.Connection) -> None:
+        db.execute("INSERT INTO nowhere VALUES (1)")
+
+    gate = threading.Event()
+    held = journal.submit(lambda _: gate.wait(60))
+    failed = journal.submit(fails)
+    beside = [journal.append("t", _rows(1, 1)) for _ in range(others)]
+    gate.set()
+    assert held.result(60)
+    assert isinstance(failed.exception(60), Unwritable)
+    assert [future.exception(60) for future in beside] == [None] * others
+    journal.close()
+    assert not journal.writable
+
+
 def test_snapshots_shorten_the_replay_and_change_nothing(journal: Journal) -> None:
     document = StrokeSet.from_document(BIRTH)
     for first in range(1, 50, 7):

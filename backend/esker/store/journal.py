@@ -243,7 +243,8 @@ class Journal:
                     db.execute("RELEASE item")
             if not alone or outcomes[0][2] is None:
                 db.execute("COMMIT")
-            self.writable = True
+            # A statement that finds the disk full may end alone, and leave the transaction to the others of its batch.
+            self.writable = not any(isinstance(failure, sqlite3.OperationalError) for _, _, failure in outcomes)
         except sqlite3.Error as error:  # nothing of this batch is durable
             if db.in_transaction:
                 db.execute("ROLLBACK")
