@@ -16,11 +16,11 @@ SOLVE_FIELDS = 19
 """Float32 a sample that a solve holds: 12 fields of the finest level, and a third of the 21 of those below it."""
 BASE_FIELDS = 4
 """Fields of the finest level that a base adds (``solve.device_workspace.OverBase``)."""
-SCOUT = 2
-"""Level on which strokes are rasterised for the coarsest preview alone. It takes a sixteenth of level 4's work or
-less."""
-SCOUT_FROM = 4
-"""Terrains of this level and above have such a preview; for smaller ones it would save nothing (docs/solver.md)."""
+PREVIEW_WORKSPACE_LEVEL = 2
+"""Level of a preview workspace, on which strokes are rasterised for the coarsest preview alone. It takes a sixteenth of
+level 4's work or less."""
+PREVIEW_WORKSPACE_FROM = 4
+"""Terrains of this level and above have a preview workspace; smaller ones would save nothing by it (docs/solver.md)."""
 SOLVE_PADDING = 96
 """Columns more that padded rows and scratch come to: in between, as kernels for GPUs need less than those for CPUs."""
 
@@ -46,14 +46,15 @@ def quantum(level: int, size_m: float) -> float:
 
 
 def solve_bytes(level: int, based: bool = False) -> int:
-    """Memory of the device that a solve up to ``level`` holds, its scout included, to share it out by: 90 MiB at level
-    4, 109 over a base, four times as much a level.
+    """Memory of the device that a solve up to ``level`` holds, its preview workspace included, to share it out by.
+
+    90 MiB at level 4, 109 over a base, four times as much a level.
 
     From level 3 up within a tenth of what ``solve.workspaces.planned_bytes`` says exactly, for a known device.
     """
     n, fields = samples(level), SOLVE_FIELDS + (BASE_FIELDS if based else 0)
-    scout = solve_bytes(SCOUT, based) if level >= SCOUT_FROM else 0
-    return 4 * fields * n * (n + SOLVE_PADDING) + scout
+    preview = solve_bytes(PREVIEW_WORKSPACE_LEVEL, based) if level >= PREVIEW_WORKSPACE_FROM else 0
+    return 4 * fields * n * (n + SOLVE_PADDING) + preview
 
 
 class TileKey(NamedTuple):

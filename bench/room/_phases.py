@@ -58,12 +58,12 @@ def measure(solver: Solver, documents: Sequence[c.Document], tiles: TileServer, 
             tiles.put_level(first.clock, result.level, result.heights, result.settled, result.channel)
     _send(client, lambda _, work: work())
     clock = _Clock(solver.device.queue.finish)
-    workspace = solver._spares.idle[-1]
-    assert workspace.scout is not None
+    workspace = solver._pool.idle[-1]
+    assert workspace.preview_workspace is not None
     for number, document in enumerate(rest):
         clock.segment()
         job = Job(document.strokes, document.settings, None)
-        coarse = _solve(clock, workspace.scout, job, "level 0: ", 0)
+        coarse = _solve(clock, workspace.preview_workspace, job, "level 0: ", 0)
         clock("level 0: take", lambda: tiles.put_level(first.clock + number + 1, 0, coarse, False))  # noqa: B023
         _send(client, clock, "level 0: ")
         fine = _solve(clock, workspace, job, "", tiles.levels)

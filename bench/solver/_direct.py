@@ -79,7 +79,7 @@ def twin_constraints(scene: Scene) -> Constraints:
 
 def device_constraints(solver: Solver, scene: Scene) -> Constraints:
     """Returns what the device of the solver made of a scene that it has just solved."""
-    w: Any = solver._spares.idle[-1]
+    w: Any = solver._pool.idle[-1]
     top = w.top
     static = w.height.get(w.height.static, top)[0]
     fields = (w.gradient.get("d", top)[0], w.gradient.get("f", top), w.height.get("d", top)[0], static)

@@ -65,7 +65,7 @@ def phases(solver: Solver, document: contract.Document, level: int, added: list[
     rows: list[dict[str, float]] = []
     for k in range(len(added)):
         job = Job((*document.strokes, *added[: k + 1]), settings, None)
-        w = solver._spares.take(job, level, device)
+        w = solver._pool.take(job, level, device)
         row: dict[str, float] = {}
 
         def timed(name: str, work: Iterable[object], row: dict[str, float] = row) -> int:
@@ -80,7 +80,7 @@ def phases(solver: Solver, document: contract.Document, level: int, added: list[
         rest = list(_rest(w, job))
         row["gradient_cycles"], row["height_cycles"] = (timed(name, work) + 1 for name, work in rest)
         timed("reading", [passes.finest(w)])
-        solver._spares.give(w)
+        solver._pool.give(w)
         rows.append(row)
     return {name: round(min(row[name] for row in rows), 2) for name in rows[0]}
 
@@ -105,7 +105,7 @@ def changed(solver: Solver, document: contract.Document, level: int, added: list
 
     def fields(strokes: tuple[Stroke, ...]) -> dict[str, Any]:
         heights = solver.heights(strokes, document.settings, level)
-        w = solver._spares.idle[-1]
+        w = solver._pool.idle[-1]
         assert isinstance(w, _exact.DeviceWorkspace)
         corrections = {
             f"{name}_correction": s.get("e", level - 1) for name, s in (("gradient", w.gradient), ("height", w.height))

@@ -104,7 +104,7 @@ def fresh() -> Callable[[Terrain, int], np.ndarray]:
     solver = Solver()
 
     def solved(terrain: Terrain, level: int) -> np.ndarray:
-        solver._spares.clear()
+        solver._pool.clear()
         return solver.solve(terrain.strokes, terrain.settings, level)[level]
 
     return solved
@@ -180,13 +180,13 @@ def test_a_solve_for_detail_is_used_for_heights() -> None:
 
 
 def test_nothing_is_shown_where_nobody_looks(monkeypatch: pytest.MonkeyPatch) -> None:
-    """SPEC S382: no preview is made, read or scouted, and no channel solved, for heights alone."""
+    """SPEC S382: no preview is made or read, and no channel solved, for heights alone."""
     from esker.solve import passes, solver
 
     def shown(*_: object, **__: object) -> None:
         raise AssertionError("something to be shown was made")
 
-    for name in ("scouting", "previews", "amended", "settled"):
+    for name in ("coarsest_preview", "previews", "amended", "settled"):
         monkeypatch.setattr(passes, name, shown)
     monkeypatch.setattr(solver, "ChannelSolver", shown)
     t = Terrain(SIZE, solver=default_solver())

@@ -431,5 +431,5 @@ def test_one_workspace_follows_a_layer(solver: Solver) -> None:
     for k in range(3):
         base = mound(1000 + 100 * k, 2800, 300, 10.0, HILLS)
         found = one.solve(FIVE, SETTINGS, 2, base=base)[2]
-        assert len(one._spares.idle) == 1
+        assert len(one._pool.idle) == 1
         assert np.array_equal(found, solver.solve(FIVE[::-1], SETTINGS, 2, base=base)[2])

@@ -23,8 +23,8 @@ from esker.events import Level
 from esker.solve.assembly import system
 from esker.solve.channels import ChannelSolver, channel_level
 from esker.solve.constraints import raster_reference
+from esker.solve.constraints.channel_targets import Layer
 from esker.solve.constraints.constraints import pack
-from esker.solve.constraints.sayings import Layer
 from esker.solve.opencl.device import open_device
 from esker.solve.solver import Solver
 

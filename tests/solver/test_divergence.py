@@ -113,12 +113,12 @@ def test_a_ground_that_is_no_number_is_an_error(device: str | None, monkeypatch:
         [workspace] = taken
         workspace.warm(np.full(good.shape, np.nan, dtype=np.float32))
 
-    taken = list(solver._spares.idle)
+    taken = list(solver._pool.idle)
     with monkeypatch.context() as patch:
         patch.setattr(multigrid, "converge", spoilt)
         with pytest.raises(DivergedError):
             solver.solve(strokes, SETTINGS, 2)
-    assert not solver._spares.idle, "nothing of it is used again"
+    assert not solver._pool.idle, "nothing of it is used again"
     assert (solver.solve(strokes, SETTINGS, 2)[2] == good).all()
 
 

@@ -94,7 +94,7 @@ def test_a_fault_in_the_middle_of_a_solve(
             heights(used) if after else used.solve(STROKES[1:], SETTINGS, 2)
     assert failing.calls == after + 1
     assert isinstance(caught.value.__cause__, cl.Error)
-    assert used._spares.idle == []
+    assert used._pool.idle == []
     assert held(used) == 0, "even though the error, with its frames, is still here"
     assert np.array_equal(heights(used), expected)
     assert held(used) == before

@@ -15,7 +15,7 @@ from esker import grid
 from esker.contract import MAX_LEVEL
 from esker.solve.opencl import workspaces
 from esker.solve.opencl.faults import OutOfDeviceMemoryError
-from esker.solve.opencl.spares import SPARE_SECONDS
+from esker.solve.opencl.pool import SPARE_SECONDS
 from esker.solve.solver import Solver
 from tests.solver.bases import Analytic, hills
 from tests.solver.failing import INVALID_VALUE, NO_MEMORY, STROKES, Failing, heights, held
@@ -25,14 +25,14 @@ from tests.solver.scenes import SETTINGS
 def test_idle_workspaces_make_room(used: Solver, monkeypatch: pytest.MonkeyPatch) -> None:
     """SPEC S26: out of memory once, with idle workspaces around: they are dropped and the solve succeeds."""
     expected = heights(used, 1)
-    assert len(used._spares.idle) == 2
-    used._spares.idle = [w for w in used._spares.idle if w.top == 2]
+    assert len(used._pool.idle) == 2
+    used._pool.idle = [w for w in used._pool.idle if w.top == 2]
     with monkeypatch.context() as patch:
         failing = Failing(cl.Buffer, NO_MEMORY, after=9, times=1)
         patch.setattr(cl, "Buffer", failing)
         assert np.array_equal(heights(used, 1), expected)
     assert failing.calls > 10
-    assert [w.top for w in used._spares.idle] == [1]
+    assert [w.top for w in used._pool.idle] == [1]
 
 
 def test_a_room_where_everybody_draws_keeps_its_workspace() -> None:
@@ -41,12 +41,12 @@ def test_a_room_where_everybody_draws_keeps_its_workspace() -> None:
     for step in range(4):
         moved = [s.model_copy(update={"last": (s.last[0], s.last[1], s.last[2] + step)}) for s in STROKES]
         again = solver.solve(moved, SETTINGS, 1)
-        assert len(solver._spares.idle) == 1
+        assert len(solver._pool.idle) == 1
     fresh = Solver().solve(moved, SETTINGS, 1)
     assert all(np.array_equal(a, b) for a, b in zip(again.levels, fresh.levels, strict=True))
     others = [s.model_copy(update={"id": f"other-{s.id}"}) for s in STROKES]
     solver.solve(others, SETTINGS, 1)
-    assert len(solver._spares.idle) == 2, "another terrain does not take the raster of the first"
+    assert len(solver._pool.idle) == 2, "another terrain does not take the raster of the first"
 
 
 def test_workspaces_that_nobody_uses_are_given_back(used: Solver) -> None:
@@ -56,7 +56,7 @@ def test_workspaces_that_nobody_uses_are_given_back(used: Solver) -> None:
     assert used.tidy() == 0
     assert held(used) == before > 0
     later = time.monotonic() + SPARE_SECONDS + 1
-    used._spares.since[used._spares.idle[0]] = later
+    used._pool.since[used._pool.idle[0]] = later
     assert used.tidy(later) == 1
     assert 0 < held(used) < before
     assert used.tidy(2 * later) == 1
@@ -75,9 +75,9 @@ def test_out_of_memory_in_the_middle_of_a_solve(used: Solver, monkeypatch: pytes
         for _ in run:
             pass
         assert failing.calls > 30
-    assert [w.top for w in used._spares.idle] == [1]
+    assert [w.top for w in used._pool.idle] == [1]
     with monkeypatch.context() as patch:
-        used._spares.idle.clear()
+        used._pool.idle.clear()
         patch.setattr(cl, "enqueue_nd_range_kernel", Failing(cl.enqueue_nd_range_kernel, NO_MEMORY, after=30))
         with pytest.raises(OutOfDeviceMemoryError):
             heights(used)
@@ -85,7 +85,7 @@ def test_out_of_memory_in_the_middle_of_a_solve(used: Solver, monkeypatch: pytes
 
 
 def test_out_of_memory_without_anything_to_drop(used: Solver, monkeypatch: pytest.MonkeyPatch) -> None:
-    used._spares.idle.clear()
+    used._pool.idle.clear()
     with monkeypatch.context() as patch:
         failing = Failing(cl.Buffer, NO_MEMORY, after=9)
         patch.setattr(cl, "Buffer", failing)
@@ -102,7 +102,7 @@ def test_a_plan_that_cannot_fit_allocates_nothing(used: Solver, monkeypatch: pyt
     limits = {"memory": used._device.memory, "largest": used._device.largest} | {limit: 40 << 20}
     small = replace(used._device, name="small one", memory=limits["memory"], largest=limits["largest"])
     monkeypatch.setattr(used, "_device", small)
-    used._spares.idle.clear()
+    used._pool.idle.clear()
     assert heights(used, 1).max() > 0
     with monkeypatch.context() as patch:
         patch.setattr(cl, "Buffer", Failing(cl.Buffer, INVALID_VALUE))
@@ -145,11 +145,15 @@ def test_the_plan_is_what_is_allocated(used: Solver, monkeypatch: pytest.MonkeyP
 @pytest.mark.parametrize("strips", [1, 8])
 @pytest.mark.parametrize("based", [False, True])
 def test_what_solves_are_shared_out_by_is_about_the_plan(used: Solver, strips: int, level: int, based: bool) -> None:
-    """SPEC S26: a base and a scout included."""
+    """SPEC S26: a base and a preview workspace included."""
     assert used._device is not None
     device = replace(used._device, strips=strips)
     planned = workspaces.planned_bytes(device, level, based)[0]
-    planned += workspaces.planned_bytes(device, grid.SCOUT, based)[0] if level >= grid.SCOUT_FROM else 0
+    planned += (
+        workspaces.planned_bytes(device, grid.PREVIEW_WORKSPACE_LEVEL, based)[0]
+        if level >= grid.PREVIEW_WORKSPACE_FROM
+        else 0
+    )
     assert grid.solve_bytes(level, based) == pytest.approx(planned, rel=0.1)
 
 

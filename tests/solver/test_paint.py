@@ -19,8 +19,8 @@ from esker.events import Level
 from esker.solve.assembly import system
 from esker.solve.channels import ChannelSolver, at_base
 from esker.solve.constraints import raster_reference
+from esker.solve.constraints.channel_targets import PAINTED, Layer, contributors
 from esker.solve.constraints.constraints import Packer, WindowPacker, pack
-from esker.solve.constraints.sayings import PAINTED, Layer, speakers
 from esker.solve.opencl.device import Device, open_device
 from esker.solve.solver import Solver
 from tests.solver.twins import tile_device
@@ -167,9 +167,9 @@ def test_what_did_not_change_is_the_same_array() -> None:
     """SPEC S67: so nobody quantises, compares or sends it again."""
     solver = ChannelSolver(open_device(), LEVEL)
     snow, wet = paint("snow", 1.0), paint("wetness", 1.0)
-    first = dict(solver.pyramids(speakers([snow, wet, MOUNTAIN], SETTINGS), SETTINGS))
+    first = dict(solver.pyramids(contributors([snow, wet, MOUNTAIN], SETTINGS), SETTINGS))
     moved = MOUNTAIN.model_copy(update={"amplitude_m": 3.0})
-    second = dict(solver.pyramids(speakers([snow.model_copy(update={"label": "x"}), moved], SETTINGS), SETTINGS))
+    second = dict(solver.pyramids(contributors([snow.model_copy(update={"label": "x"}), moved], SETTINGS), SETTINGS))
     same = {channel for channel in first if all(a is b for a, b in zip(first[channel], second[channel], strict=True))}
     assert same == set(first) - {Channel.AMPLITUDE, Channel.WETNESS}
 

@@ -12,7 +12,7 @@ from esker import grid
 from esker.api.terrain import Stroke as Make
 from esker.contract import Channel, Stroke
 from esker.events import Level, Preview, Settled
-from esker.solve.constraints.sayings import BASES
+from esker.solve.constraints.channel_targets import BASES
 from esker.solve.constraints.tables import Tables, Window
 from esker.solve.opencl.device_workspace import DeviceWorkspace
 from esker.solve.solver import Solver
@@ -117,11 +117,11 @@ def test_the_coarsest_preview_waits_for_no_fine_raster(solver: Solver, monkeypat
         assert 4 in rasterised
     a, b = (r.heights for r in first if isinstance(r, Level))
     assert np.array_equal(a, b)
-    kept = solver._spares.idle[-1].packer
+    kept = solver._pool.idle[-1].packer
     stopped = solver.steps(strokes[1:], SETTINGS, 4)
     next(r for r in stopped if isinstance(r, Level))
     stopped.close()
-    assert kept.likeness(strokes, SETTINGS) == len(strokes), "the fine raster is as it was: nothing of it began"
+    assert kept.unchanged_count(strokes, SETTINGS) == len(strokes), "the fine raster is as it was: nothing of it began"
     settled = solver.solve(strokes, SETTINGS, 4)[0]
     assert np.sqrt(np.mean((a - settled) ** 2)) < 0.05 * np.ptp(settled)
 

@@ -14,9 +14,9 @@ from esker.api.terrain import Stroke as Make
 from esker.contract import MAX_REFINED_LEVEL, Channel, Stroke, TerrainSettings
 from esker.contract.fractal import PAINT_LESS, PAINT_MORE
 from esker.solve.constraints import constraints, packing, raster_reference
+from esker.solve.constraints.channel_targets import Layer, natural_amplitude_m
 from esker.solve.constraints.constraints import BIN, BinBox, Shapes, Tables, WindowPacker, bins, everything, pack
 from esker.solve.constraints.packing import Shape
-from esker.solve.constraints.sayings import Layer, natural_amplitude_m
 from esker.solve.opencl import raster
 from esker.solve.opencl.device import Device
 from esker.solve.opencl.levels import PAD, ClWorkspace, Launcher

@@ -2,7 +2,7 @@
 
 A channel is made from two layers, each with an equation of its own, solved CHANNEL_LEVELS_BELOW levels below the
 heights: sum_edges (c_j - c_i)^2 + sum_i a_i (c_i - t_i)^2 + eps sum_i (c_i - k_i t_i)^2 for c, the difference from the
-base, where k is how far a sample is known, 0..1. What strokes of the ground say is known on crests and in flank bands,
+base, where k is how far a sample is known, 0..1. What strokes of the ground ask is known on crests and in flank bands,
 free elsewhere, and back at the base a few reaches away. Paint is known under the brush and lies over it: beside the
 painted value its cover is diffused, 1 on its line, and the channel is strokes (1 - cover) + paint. A layer of which
 nobody asks anything costs nothing.
@@ -30,8 +30,8 @@ from esker.contract import (
 from esker.solve import multigrid
 from esker.solve.base import Base
 from esker.solve.constraints import raster_reference
+from esker.solve.constraints.channel_targets import BASES, STROKES_ASK, Contributors, Layer, contributors, reach_of
 from esker.solve.constraints.constraints import Packer
-from esker.solve.constraints.sayings import BASES, STROKES_SPEAK, Layer, Speakers, reach_of, speakers
 from esker.solve.injection import frozen, injections
 from esker.solve.opencl import gpu_levels, levels, raster
 from esker.solve.opencl.device import Device
@@ -85,7 +85,7 @@ def new_layer(device: Device | None, level: int, layer: Layer) -> LayerWorkspace
 
 def _covers(layer: Layer) -> bool:
     """Whether there is something for this paint to lie over."""
-    return layer.painted and layer.channel in STROKES_SPEAK
+    return layer.painted and layer.channel in STROKES_ASK
 
 
 class _NumpyLayer:
@@ -172,32 +172,32 @@ class ChannelSolver:
 
         A pure function of the strokes and the settings. Raises DeviceErrors.
         """
-        for channel, pyramid in self.pyramids(speakers(strokes, settings), settings, base=base):
+        for channel, pyramid in self.pyramids(contributors(strokes, settings), settings, base=base):
             yield channel, pyramid[-1]
 
     def pyramids(
         self,
-        spoken: Mapping[Layer, Speakers],
+        asked: Mapping[Layer, Contributors],
         settings: TerrainSettings,
         channels: Iterable[Channel] = BASES,
         base: Base | None = None,
     ) -> Iterator[tuple[Channel, Levels]]:
         """The same for some channels, with levels 0..``level`` of each; what did not change since the last time are
-        the same arrays. ``spoken``: ``sayings.speakers`` of the strokes."""
-        return (found for found in self.making(spoken, settings, channels, base) if found is not None)
+        the same arrays. ``asked``: ``channel_targets.contributors`` of the strokes."""
+        return (found for found in self.making(asked, settings, channels, base) if found is not None)
 
     def making(
         self,
-        spoken: Mapping[Layer, Speakers],
+        asked: Mapping[Layer, Contributors],
         settings: TerrainSettings,
         channels: Iterable[Channel] = BASES,
         base: Base | None = None,
     ) -> Iterator[tuple[Channel, Levels] | None]:
         """``pyramids``, with None wherever the work can be left; others may use this solver meanwhile."""
         for channel in channels:
-            said, painted = Layer(channel, painted=False), Layer(channel, painted=True)
-            ground = yield from self._diffused(said, spoken.get(said), settings, base)
-            paint = yield from self._diffused(painted, spoken.get(painted), settings, base)
+            ground_layer, paint_layer = Layer(channel, painted=False), Layer(channel, painted=True)
+            ground = yield from self._diffused(ground_layer, asked.get(ground_layer), settings, base)
+            paint = yield from self._diffused(paint_layer, asked.get(paint_layer), settings, base)
             made = self._made.get(channel)
             if made is None or made[0] is not ground or made[1] is not paint:
                 made = ground, paint, self._composed(channel, ground, paint)
@@ -213,24 +213,24 @@ class ChannelSolver:
         return tuple(injections(frozen(np.asarray(finest, dtype=np.float32))))
 
     def _diffused(
-        self, layer: Layer, said: Speakers | None, settings: TerrainSettings, base: Base | None
+        self, layer: Layer, asking: Contributors | None, settings: TerrainSettings, base: Base | None
     ) -> Generator[None, None, Values | None]:
         """A layer as ``LayerWorkspace.read`` gives it, the same array as last time if nothing changed; None at zero."""
         kept = self._layers.pop(layer, None)  # kept again only if nothing fails: half a raster is not to be trusted
-        if said is None:
+        if asking is None:
             return None
         workspace = new_layer(self._device, self.level, layer) if kept is None else kept[0]
         under = None if layer.painted else base  # a brush lies on the ground, however high that is
         changed = yield from workspace.loading(
-            said.strokes, settings.model_copy(update={"reach_m": reach_of(layer, settings)}), under
+            asking.strokes, settings.model_copy(update={"reach_m": reach_of(layer, settings)}), under
         )
         if changed:
             diffuse(workspace.system, TOLERANCES[layer.channel])
-        if kept is None or changed or kept[1] != said.bounds:
+        if kept is None or changed or kept[1] != asking.bounds:
             values = workspace.read()
-            np.clip(values[0], *said.bounds, out=values[0])
+            np.clip(values[0], *asking.bounds, out=values[0])
             np.clip(values[1:], 0, 1, out=values[1:])
-            kept = workspace, said.bounds, values
+            kept = workspace, asking.bounds, values
         self._layers[layer] = kept
         return kept[2]
 

@@ -51,15 +51,16 @@ class Basis:
 class Workspace(Protocol):
     """Memory and kernels for one solve at a time of one finest level; ``device_workspace`` says what each does.
 
-    scout: a small one that makes the coarsest preview of the same strokes, None below ``grid.SCOUT_FROM``;
-    standing: what the ground of the finest level, u of both steps, was solved with (``standing_on``), if it is that
-    of the strokes that are packed; None where it is not.
+    preview_workspace: a small one that makes the coarsest preview of the same strokes; None below level
+    ``grid.PREVIEW_WORKSPACE_FROM``.
+    solved_for: settings and base (``conditions``) that the ground of the finest level, u of both steps, was solved
+    with, if that ground is of the strokes that are packed; None where it is not.
     """
 
     top: int
     packer: Packer
-    scout: Workspace | None
-    standing: object
+    preview_workspace: Workspace | None
+    solved_for: object
 
     @property
     def based(self) -> bool: ...
@@ -91,13 +92,13 @@ def preview_gradient_cycles(settings: TerrainSettings) -> int:
     return PREVIEW_GRADIENT_CYCLES + sum(reach > share * settings.size_m for share in WIDE_REACHES)
 
 
-def scouting(w: Workspace, job: Job) -> Iterator[Preview | Pause]:
-    """The coarsest preview, made by a workspace's scout of constraints that were rasterised coarsely."""
-    scout = w.scout
-    assert scout is not None
-    yield from pauses(scout.loading(*job))
-    _coarse(scout, 0)
-    yield Preview(0, frozen(scout.read(0)))
+def coarsest_preview(w: Workspace, job: Job) -> Iterator[Preview | Pause]:
+    """The coarsest preview, made by the preview workspace from constraints that were rasterised coarsely."""
+    small = w.preview_workspace
+    assert small is not None
+    yield from pauses(small.loading(*job))
+    _coarse(small, 0)
+    yield Preview(0, frozen(small.read(0)))
 
 
 def _coarse(w: Workspace, level: int) -> None:
@@ -127,10 +128,10 @@ def unseen(w: Workspace, job: Job) -> Iterator[Settled | Pause]:
     """The heights of the finest level at rest, those of ``previews``, ``to_rest`` and ``settled`` to the bit, and
     nothing of what they show on the way. Raises DivergedError."""
     yield from pauses(w.loading(*job))
-    w.standing = None
+    w.solved_for = None
     for _ in full_multigrid(w, preview_gradient_cycles(job.settings)):
         yield PAUSE
-    w.standing = standing_on(job)
+    w.solved_for = conditions(job)
     yield from pauses(to_rest(w, job.settings))
     yield Settled(w.top, finest(w))
 
@@ -140,14 +141,14 @@ def full_multigrid(w: Workspace, gradient_cycles: int) -> Iterator[int | None]:
     for level in range(w.top):
         _coarse(w, level)
         yield level
-    w.standing = None
+    w.solved_for = None
     yield from _cycles(w.gradient, gradient_cycles)
     w.guide(w.top)
     yield from _cycles(w.height, PREVIEW_HEIGHT_CYCLES)
     yield w.top
 
 
-def standing_on(job: Job) -> object:
+def conditions(job: Job) -> object:
     """What must not have changed for ``amended``, strokes aside."""
     return job.settings, None if job.base is None else job.base.base.digest
 

@@ -335,8 +335,8 @@ class NumpyWorkspace:
 
     def __init__(self, top: int, based: bool = False) -> None:
         self.top, self.based = top, based
-        self.scout: Workspace | None = None
-        self.standing: object = None
+        self.preview_workspace: Workspace | None = None
+        self.solved_for: object = None
         self._constraints: raster_reference.Constraints | None = None
         self.size_m = 1.0
         self.packer = Packer(top)
@@ -361,7 +361,7 @@ class NumpyWorkspace:
             else over_base(c.height_f, c.height_d, c.share, c.target, under, tables.spacing_m)
         )
         self.size_m = tables.size_m
-        before = [s.fields.get(("u", self.top)) for s in (self.gradient, self.height)] if self.standing else []
+        before = [s.fields.get(("u", self.top)) for s in (self.gradient, self.height)] if self.solved_for else []
         self.gradient = NumpySystem(c.gradient_d[None], c.gradient_f, tables.screening, self.top)
         self.height = NumpySystem(c.height_d[None], height_f[None], tables.screening, self.top)
         for system, u in zip((self.gradient, self.height), before, strict=False):

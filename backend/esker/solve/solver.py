@@ -14,26 +14,27 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from esker.contract import MAX_LEVEL, Channel, Stroke, TerrainSettings
 from esker.events import PAUSE, BaseLevel, ChannelLevel, Done, Pause, Preview, Settled, SolveEvent, pauses
-from esker.solve import blank, multigrid, passes
+from esker.solve import blank, passes
 from esker.solve.base import Base, bound
 from esker.solve.blank import is_blank
 from esker.solve.channels import ChannelSolver, channel_level
+from esker.solve.constraints.channel_targets import BASES, Contributors, Layer, contributors
 from esker.solve.constraints.computable import computable
 from esker.solve.constraints.constraints import Shapes
-from esker.solve.constraints.sayings import BASES, Layer, Speakers, speakers
 from esker.solve.opencl import proof
 from esker.solve.opencl.device import NUMPY, NUMPY_NAME, Device, open_device
-from esker.solve.opencl.faults import OutOfDeviceMemoryError, guarded, is_fault
-from esker.solve.opencl.spares import Spares
+from esker.solve.opencl.faults import OutOfDeviceMemoryError, guarded
+from esker.solve.opencl.pool import Lease, WorkspacePool
 from esker.solve.passes import PREVIEW_GRADIENT_CYCLES, PREVIEW_HEIGHT_CYCLES, Basis, Job, Workspace
 from esker.solve.refine.refinement import Refiner, Refinery
-from esker.solve.solving import Seat, Solving
+from esker.solve.solving import Solving
 
 __all__ = ["PREVIEW_GRADIENT_CYCLES", "PREVIEW_HEIGHT_CYCLES", "Basis", "Pyramid", "Solver", "Workspace"]
 
@@ -73,7 +74,7 @@ class Solver:
         self._shapes = Shapes()
         self._channel_solvers: dict[int, ChannelSolver] = {}
         self._device: Device | None = None
-        self._spares = Spares(self._shapes)
+        self._pool = WorkspacePool(self._shapes)
         self._device = open_device(device, threads, self._check)
 
     @property
@@ -110,8 +111,8 @@ class Solver:
         above which heights are then given. Not ``coarsest``: without level 0, which was previewed early.
         Raises ValueError for a level outside 0..MAX_LEVEL.
         """
-        job, seat = Job(strokes, computable(settings), bound(base, self._device)), Seat()
-        return Solving(self._run(job, self._level(levels), None, basis, seat, coarsest), seat, self._device)
+        job, lease = Job(strokes, computable(settings), bound(base, self._device)), Lease()
+        return Solving(self._run(job, self._level(levels), None, basis, lease, coarsest), lease, self._device)
 
     def base_levels(self, base: Base, levels: int | None = None) -> Iterator[BaseLevel]:
         """The base itself, channel BASE on levels 0..G, then how fine its data are, SURVEY on the levels of channels.
@@ -197,7 +198,7 @@ class Solver:
 
         ``now``: of ``time.monotonic``.
         """
-        return self._spares.tidy(time.monotonic() if now is None else now)
+        return self._pool.tidy(time.monotonic() if now is None else now)
 
     def _check(self, device: Device) -> None:
         """Compile the kernels now, not under somebody's first stroke, and trust none whose ground is not the twin's.
@@ -206,18 +207,18 @@ class Solver:
         """
         self._device = device
         mine, twin = (s.solve(proof.STROKES, TerrainSettings(), proof.LEVEL) for s in (self, Solver(NUMPY)))
-        self._spares.clear()
+        self._pool.clear()
         proof.compare(device, mine[proof.LEVEL], twin[proof.LEVEL])
 
     def prove(self) -> None:
         """Solves a small scene that is known to work. Raises DeviceErrors when the device does not."""
         if self._device is None:
             return
-        kept, self._spares = self._spares, Spares(self._shapes)
+        kept, self._pool = self._pool, WorkspacePool(self._shapes)
         try:
             self._check(self._device)
         finally:
-            self._spares = kept
+            self._pool = kept
 
     def _level(self, levels: int | None) -> int:
         top = self.max_level if levels is None else levels
@@ -231,10 +232,10 @@ class Solver:
         top: int,
         warm: NDArray[np.float32] | None,
         basis: bool,
-        seat: Seat | None = None,
+        lease: Lease | None = None,
         coarsest: bool = True,
     ) -> Generator[SolveEvent]:
-        yield from self._retried(lambda level: self._attempt(job, level, warm, basis, seat or Seat(), coarsest), top)
+        yield from self._retried(lambda level: self._attempt(job, level, warm, basis, lease or Lease(), coarsest), top)
 
     def _retried(self, attempt: Callable[[int], Iterator[SolveEvent]], top: int) -> Generator[SolveEvent]:
         """Without memory for it, once more without what is kept for later."""
@@ -242,27 +243,28 @@ class Solver:
             yield from attempt(top)
             return
         except OutOfDeviceMemoryError:
-            if not self._spares.idle and not self._channel_solvers:
+            if not self._pool.idle and not self._channel_solvers:
                 raise
-        self._spares.clear()
+        self._pool.clear()
         self._channel_solvers.clear()
         yield from attempt(top)
 
     def _attempt(
-        self, job: Job, top: int, warm: NDArray[np.float32] | None, basis: bool, seat: Seat, coarsest: bool
+        self, job: Job, top: int, warm: NDArray[np.float32] | None, basis: bool, lease: Lease, coarsest: bool
     ) -> Generator[SolveEvent]:
-        """One solve. A workspace whose device failed, or that diverged, is dropped, all others are kept.
+        """One solve.
 
-        Painted channels come right after the coarsest preview, so that they keep up with a pen that never rests; those
-        of which the strokes speak that the pen draws would hold it up, and come when it does rest.
+        Painted channels come right after the coarsest preview, so that they keep up with a pen that never rests.
+        Channels of which drawn strokes ask something would hold the pen up: they come when the pen rests.
         """
         with guarded(self._device):
-            spoken = speakers(job.strokes, job.settings)
+            asked = contributors(job.strokes, job.settings)
             if is_blank(job.strokes) and warm is None:
-                yield from self._channels(spoken, job, top, BASES)
+                yield from self._channels(asked, job, top, BASES)
                 yield from blank.settled(job, top, basis)
                 return
-            yield from self._working(seat, job, top, lambda w: self._shown(w, job, warm, basis, coarsest, spoken))
+            work = partial(self._shown, job=job, warm=warm, basis=basis, coarsest=coarsest, asked=asked)
+            yield from self._pool.leased(lease, job, top, self._device, work)
 
     def _shown(
         self,
@@ -271,33 +273,33 @@ class Solver:
         warm: NDArray[np.float32] | None,
         basis: bool,
         coarsest: bool,
-        spoken: Mapping[Layer, Speakers],
+        asked: Mapping[Layer, Contributors],
     ) -> Iterator[SolveEvent]:
         """Previews, channels and settled levels of one solve; see ``_attempt``."""
         top = workspace.top
-        late = [layer.channel for layer in spoken if not layer.painted]
+        late = [layer.channel for layer in asked if not layer.painted]
         early = [channel for channel in BASES if channel not in late]
-        scouting = warm is None and workspace.scout is not None
-        if scouting:
+        early_made = warm is None and workspace.preview_workspace is not None
+        if early_made:
             if coarsest:
-                yield from passes.scouting(workspace, job)
-            yield from self._channels(spoken, job, top, early)
-        edited = scouting and _edited(workspace, job)
+                yield from passes.coarsest_preview(workspace, job)
+            yield from self._channels(asked, job, top, early)
+        edited = early_made and _edited(workspace, job)
         yield from pauses(workspace.loading(*job))
-        workspace.standing = None
+        workspace.solved_for = None
         if warm is None:
-            previews = self._previews(workspace, job, coarsest=not scouting, edited=edited)
-            if not scouting:
+            previews = self._previews(workspace, job, coarsest=not early_made, edited=edited)
+            if not early_made:
                 yield next(previews)
-                yield from self._channels(spoken, job, top, early)
+                yield from self._channels(asked, job, top, early)
             yield from previews
         else:
             passes.gradients(workspace)
             workspace.warm(warm)
-            yield from self._channels(spoken, job, top, early)
-        workspace.standing = passes.standing_on(job)
+            yield from self._channels(asked, job, top, early)
+        workspace.solved_for = passes.conditions(job)
         yield from pauses(passes.to_rest(workspace, job.settings))
-        yield from self._channels(spoken, job, top, late)
+        yield from self._channels(asked, job, top, late)
         yield from passes.settled(workspace, job, basis)
 
     def _quietly(self, job: Job, top: int) -> Iterator[SolveEvent]:
@@ -307,41 +309,18 @@ class Solver:
                 *_, last, _ = blank.settled(job, top, basis=False)
                 yield last
                 return
-            yield from self._working(Seat(), job, top, lambda w: passes.unseen(w, job))
-
-    def _working(
-        self, seat: Seat, job: Job, top: int, work: Callable[[Workspace], Iterator[SolveEvent]]
-    ) -> Iterator[SolveEvent]:
-        """What is done with a workspace for a job, which is free for others afterwards; it is dropped if its device
-        failed, or if the solve diverged."""
-        workspace = seat.workspace = self._spares.take(job, top, self._device)
-        keep = True
-        try:
-            yield from work(workspace)
-        except GeneratorExit:  # what is packed and rasterised is still that of some set
-            raise
-        except BaseException as error:
-            workspace.packer.forget()
-            if workspace.scout is not None:
-                workspace.scout.packer.forget()
-            keep = not (is_fault(error) or isinstance(error, multigrid.DivergedError))
-            raise
-        finally:
-            seat.workspace = None
-            if keep:
-                self._spares.give(workspace)
-            del workspace  # the traceback of an error would keep it
+            yield from self._pool.leased(Lease(), job, top, self._device, lambda w: passes.unseen(w, job))
 
     def _previews(self, workspace: Workspace, job: Job, *, coarsest: bool, edited: bool) -> Iterator[SolveEvent]:
         """Previews coarse to fine. Of ground of which little was ``edited`` the finest comes first, made from what it
         was: then the others go with it, so that what settles depends on the strokes alone."""
         settings, shown = job.settings, False
         if edited:
-            assert workspace.scout is not None
-            relief = max(float(np.ptp(workspace.scout.read(0))), 1.0)
+            assert workspace.preview_workspace is not None
+            relief = max(float(np.ptp(workspace.preview_workspace.read(0))), 1.0)
             for result in passes.amended(workspace, settings, relief):
                 if isinstance(result, Preview):
-                    shown, workspace.standing = True, passes.standing_on(job)
+                    shown, workspace.solved_for = True, passes.conditions(job)
                 yield result
         cycles = passes.preview_gradient_cycles(settings)
         paced = shown or workspace.top > PACED_ABOVE
@@ -359,16 +338,16 @@ class Solver:
 
     def _alone(self, job: Job, top: int) -> Iterator[SolveEvent]:
         with guarded(self._device):
-            yield from self._channels(speakers(job.strokes, job.settings), job, top, BASES)
+            yield from self._channels(contributors(job.strokes, job.settings), job, top, BASES)
             yield Done()
 
     def _channels(
-        self, spoken: Mapping[Layer, Speakers], job: Job, top: int, channels: Iterable[Channel]
+        self, asked: Mapping[Layer, Contributors], job: Job, top: int, channels: Iterable[Channel]
     ) -> Iterator[SolveEvent]:
         """Channels other than the heights, final, levels coarse to fine."""
         level = channel_level(top)
         solver = self._channel_solvers.setdefault(level, ChannelSolver(self._device, level))
-        for found in solver.making(spoken, job.settings, channels, job.base):
+        for found in solver.making(asked, job.settings, channels, job.base):
             if found is None:
                 yield PAUSE
                 continue
@@ -380,7 +359,7 @@ class Solver:
 
 def _edited(workspace: Workspace, job: Job) -> bool:
     """Whether the finest level still holds the ground of nearly the same strokes."""
-    if workspace.standing is None or workspace.standing != passes.standing_on(job):
+    if workspace.solved_for is None or workspace.solved_for != passes.conditions(job):
         return False
-    known = workspace.packer.likeness(job.strokes, job.settings)
+    known = workspace.packer.unchanged_count(job.strokes, job.settings)
     return known >= 0 and len(job.strokes) - known <= EDITED

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from esker.contract import Stroke, TerrainSettings
@@ -13,24 +12,18 @@ from esker.solve.base import Base, bound
 from esker.solve.constraints.computable import computable
 from esker.solve.opencl.device import Device
 from esker.solve.opencl.faults import guarded
-from esker.solve.passes import Job, Workspace
+from esker.solve.opencl.pool import Lease
+from esker.solve.passes import Job
 
 EARLY_STROKES = 128
 """Strokes that may be packed for an early preview, which cannot be left."""
 
 
-@dataclass(eq=False)
-class Seat:
-    """Where a solve keeps the workspace that it has at present."""
-
-    workspace: Workspace | None = None
-
-
 class Solving(Iterator[SolveEvent]):
     """What ``Solver.steps`` gives: an iterator to be closed when it is left early."""
 
-    def __init__(self, run: Generator[SolveEvent, Any, Any], seat: Seat, device: Device | None) -> None:
-        self._run, self._seat, self._device = run, seat, device
+    def __init__(self, run: Generator[SolveEvent, Any, Any], lease: Lease, device: Device | None) -> None:
+        self._run, self._lease, self._device = run, lease, device
 
     def __next__(self) -> SolveEvent:
         return next(self._run)
@@ -42,21 +35,22 @@ class Solving(Iterator[SolveEvent]):
     def early_preview(
         self, strokes: Sequence[Stroke], settings: TerrainSettings, base: Base | None = None
     ) -> Preview | None:
-        """The coarsest preview of other strokes, as their own solve would begin with; None where that has no scout, or
-        where so many strokes are others that it would take longer than a turn.
+        """The coarsest preview of other strokes, as their own solve would begin with; None where that has no
+        preview workspace, or where so many strokes are others that it would take longer than a turn.
 
-        Changes nothing of the solve: its scout has done its work. To be called between two steps, in their thread.
+        Changes nothing of the solve: its preview workspace has done its work. To be called between two steps, in their
+        thread.
         Raises DeviceErrors.
         """
-        workspace = self._seat.workspace
-        if workspace is None or workspace.scout is None or (base is None) == workspace.based:
+        workspace = self._lease.workspace
+        if workspace is None or workspace.preview_workspace is None or (base is None) == workspace.based:
             return None
         try:
             with guarded(self._device):
                 job = Job(strokes, computable(settings), bound(base, self._device))
-                if len(strokes) - workspace.scout.packer.likeness(*job[:2]) > EARLY_STROKES:
+                if len(strokes) - workspace.preview_workspace.packer.unchanged_count(*job[:2]) > EARLY_STROKES:
                     return None
-                return next(found for found in passes.scouting(workspace, job) if isinstance(found, Preview))
+                return next(found for found in passes.coarsest_preview(workspace, job) if isinstance(found, Preview))
         except BaseException:
-            workspace.scout.packer.forget()
+            workspace.preview_workspace.packer.forget()
             raise

@@ -18,8 +18,8 @@ from esker.contract import DEFAULT_REACH_FRACTION, MAX_REFINED_LEVEL, MAX_STROKE
 from esker.document.strokes import world_points
 from esker.solve.base import SIDES_LEVEL, Base, BaseUnderStroke, bounds_of
 from esker.solve.constraints import dirty
+from esker.solve.constraints.channel_targets import Layer
 from esker.solve.constraints.packing import Packed, Shape, join, pack_one, reach_m, shape_for, window_of
-from esker.solve.constraints.sayings import Layer
 from esker.solve.constraints.tables import (
     BIN,
     BinBox,
@@ -96,13 +96,13 @@ class Packer:
         self.order: list[str] = []
         """Ids of the strokes of the last set's tables, ascending."""
 
-    def likeness(self, strokes: Sequence[Stroke], settings: TerrainSettings) -> int:
+    def unchanged_count(self, strokes: Sequence[Stroke], settings: TerrainSettings) -> int:
         """How many strokes of this set were in the last one; -1 when nothing of it can be kept."""
         if self._settings != _settings_key(settings):
             return -1
         return sum(1 for s in strokes if s.id in self._packed and self._packed[s.id][0] is s)
 
-    def kinship(self, strokes: Sequence[Stroke]) -> int:
+    def shared_ids(self, strokes: Sequence[Stroke]) -> int:
         """How many strokes of this set the last one had too, be it with other points."""
         return sum(1 for s in strokes if s.id in self._packed)
 

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from esker.contract import Flank, Stroke, TerrainSettings
 from esker.solve.base import FLAT, Base, BaseUnderStroke, ground_under, under
+from esker.solve.constraints.channel_targets import Layer, target
 from esker.solve.constraints.crest import Crest, crest_of, line_of
 from esker.solve.constraints.outline import cut, segments_of, spans_of
-from esker.solve.constraints.sayings import Layer, says
 from esker.solve.constraints.silhouette import Silhouette, silhouette
 from esker.solve.constraints.tables import (
     BIN,
@@ -135,8 +135,8 @@ class Packed:
 
 
 def shape_for(layer: Layer | None, stroke: Stroke, settings: TerrainSettings, base: Base | None = None) -> Shape | None:
-    """A stroke ready to be packed into the tables of a layer (None: the heights); None when it says nothing of it."""
-    value = 0.0 if layer is None else says(stroke, layer, settings)
+    """A stroke ready to be packed into the tables of a layer (None: the heights); None when it asks nothing of it."""
+    value = 0.0 if layer is None else target(stroke, layer, settings)
     if value is None:
         return None
     if layer is not None and stroke.paint is not None:

@@ -311,7 +311,7 @@ def cross_section(near: Nearest, inside: Mask, params: Floats, tables: Tables) -
 
 
 def channel_section(near: Nearest, inside: Mask, params: Floats, tables: Tables) -> tuple[Floats, Floats]:
-    """How far samples know what one stroke says of a channel, 0..1, and the weight of that (DESIGN 5.4)."""
+    """How far samples know what one stroke asks of a channel, 0..1, and the weight of that (DESIGN 5.4)."""
     s = tables.spacing_m
     b = flanks_of(near, inside, params, s)
     r = b.ds / np.maximum(b.end, CHANNEL_FLOOR_CELLS * s)

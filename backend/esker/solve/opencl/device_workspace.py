@@ -74,8 +74,8 @@ class DeviceWorkspace(Generic[S]):
         self.top = height.top
         self.gradient, self.height = gradient, height
         self.packer = Packer(self.top)
-        self.scout: Workspace | None = None
-        self.standing: object = None
+        self.preview_workspace: Workspace | None = None
+        self.solved_for: object = None
         self.size_m = 1.0
         self._queue, self._bins, self._over = queue, bins, over
         self._kept = KeptSums(queue, bins_of(grid.samples(self.top)), over is not None) if bins.keeps_sums else None

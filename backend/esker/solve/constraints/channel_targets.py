@@ -1,4 +1,4 @@
-"""What strokes ask of the channels other than the heights (DESIGN 5.4): numbers, as differences from the base."""
+"""Channel targets: what strokes ask of all channels but the heights (DESIGN 5.4), as differences from the base."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ BASES: Final = {
     Channel.FOREST: BASE_BIAS,
     Channel.WETNESS: BASE_BIAS,
 }
-"""The channels in the order in which they are solved, and what they are where no stroke says otherwise."""
+"""The channels in the order in which they are solved, and their values where no stroke asks for others."""
 PAINTED: Final[dict[PaintChannel, Channel]] = {
     "amplitude": Channel.AMPLITUDE,
     "roughness": Channel.ROUGHNESS,
@@ -35,24 +35,24 @@ PAINTED: Final[dict[PaintChannel, Channel]] = {
     "forest": Channel.FOREST,
     "wetness": Channel.WETNESS,
 }
-STROKES_SPEAK: Final = frozenset({Channel.AMPLITUDE, Channel.ROUGHNESS})
-"""Channels of which every stroke of the ground says something, not paint alone."""
+STROKES_ASK: Final = frozenset({Channel.AMPLITUDE, Channel.ROUGHNESS})
+"""Channels of which every stroke of the ground asks something, not paint alone."""
 PAINT_REACH_FRACTION: Final = 1 / 256
 """How far paint is felt beyond its radius, as a share of the domain: a brush paints what its ring shows."""
 
 
 class Layer(NamedTuple):
-    """One of the two fields that a channel is made from: what strokes of the ground say of it, or what is painted."""
+    """One of the two fields that a channel is made from: what strokes of the ground ask of it, or what is painted."""
 
     channel: Channel
     painted: bool
 
 
-GROUND_LAYERS: Final[tuple[Layer, ...]] = tuple(Layer(channel, painted=False) for channel in sorted(STROKES_SPEAK))
+GROUND_LAYERS: Final[tuple[Layer, ...]] = tuple(Layer(channel, painted=False) for channel in sorted(STROKES_ASK))
 
 
-def says(stroke: Stroke, layer: Layer, settings: TerrainSettings) -> float | None:
-    """What a stroke asks of a layer, as a difference from its base, in its unit; None when it says nothing of it.
+def target(stroke: Stroke, layer: Layer, settings: TerrainSettings) -> float | None:
+    """What a stroke asks of a layer, as a difference from its base, in its unit; None when it asks nothing of it.
 
     Paint of roughness asks for 0 (value -1) to 1; of amplitude, for PAINT_MORE times the natural detail of the terrain
     (value 1), or to take PAINT_LESS of it away (value -1); of the others, for the value itself.
@@ -77,8 +77,8 @@ def natural_amplitude_m(settings: TerrainSettings) -> float:
 
 
 @dataclass
-class Speakers:
-    """The visible strokes that speak of a layer, and the least and the greatest that any of them asks, 0 included."""
+class Contributors:
+    """The visible strokes that ask something of a layer, and the least and the greatest that any asks, 0 included."""
 
     strokes: list[Stroke]
     low: float = 0.0
@@ -90,10 +90,13 @@ class Speakers:
         return self.low, self.high
 
 
-def speakers(strokes: Sequence[Stroke], settings: TerrainSettings) -> dict[Layer, Speakers]:
-    """Who speaks of each layer of which anybody asks anything but its base; the others are their base everywhere."""
+def contributors(strokes: Sequence[Stroke], settings: TerrainSettings) -> dict[Layer, Contributors]:
+    """Returns the contributors of each layer of which any stroke asks anything but its base.
+
+    Layers that are missing are their base everywhere.
+    """
     crests: list[Stroke] = []
-    found = {layer: Speakers(crests) for layer in GROUND_LAYERS}
+    found = {layer: Contributors(crests) for layer in GROUND_LAYERS}
     for stroke in strokes:
         if stroke.hidden or not stroke.curve:
             continue
@@ -104,9 +107,9 @@ def speakers(strokes: Sequence[Stroke], settings: TerrainSettings) -> dict[Layer
             layers = GROUND_LAYERS
         else:
             layers = (Layer(PAINTED[stroke.paint.channel], painted=True),)
-            found.setdefault(layers[0], Speakers([])).strokes.append(stroke)
+            found.setdefault(layers[0], Contributors([])).strokes.append(stroke)
         for layer in layers:
-            value, mine = says(stroke, layer, settings) or 0.0, found[layer]
+            value, mine = target(stroke, layer, settings) or 0.0, found[layer]
             mine.low, mine.high = min(mine.low, value), max(mine.high, value)
     return {layer: mine for layer, mine in found.items() if mine.bounds != (0, 0)}
 
@@ -114,7 +117,7 @@ def speakers(strokes: Sequence[Stroke], settings: TerrainSettings) -> dict[Layer
 def reach_of(layer: Layer, settings: TerrainSettings) -> float | None:
     """How far a layer's values are felt, metres; None for everywhere.
 
-    What strokes of the ground say, as far as their heights are. Paint hardly beyond its radius: with the papers'
+    What strokes of the ground ask is felt as far as their heights are. Paint hardly beyond its radius: with the papers'
     endless diffusion a dab of snow would lie on everything.
     """
     if not layer.painted:

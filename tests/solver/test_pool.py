@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from esker.api.terrain import Stroke as Make
 from esker.contract import Channel, Stroke, TerrainSettings
 from esker.events import Done, Level
 from esker.solve.constraints.packing import Shape, pack_one
-from esker.solve.opencl.spares import PACKED, SPARE_SECONDS
+from esker.solve.opencl.pool import PACKED, SPARE_SECONDS, best_packed
 from esker.solve.solver import Solver
 from tests.solver.bases import hills
 from tests.solver.scenes import PINNED, SCENES, SETTINGS, mixed
@@ -40,7 +41,7 @@ def test_a_blank_terrain_is_what_its_equations_give_and_takes_no_workspace(
     solver, base = Solver(device), hills() if based else None
     *events, done = solver.steps(strokes, settings, 1, basis=True, base=base)
     results = [r for r in events if isinstance(r, Level)]
-    assert solver._spares.held == 0
+    assert solver._pool.held == 0
     heights = {r.level: r.heights for r in results if r.channel == Channel.HEIGHT}
     assert [r.settled for r in results] == [True] * len(results)
     assert isinstance(done, Done)
@@ -48,7 +49,7 @@ def test_a_blank_terrain_is_what_its_equations_give_and_takes_no_workspace(
     monkeypatch.setattr("esker.solve.solver.is_blank", lambda _: False)
     *events, again = solver.steps(strokes, settings, 1, basis=True, base=base)
     solved = [r for r in events if isinstance(r, Level) and r.settled]
-    assert solver._spares.held > 0
+    assert solver._pool.held > 0
     for result in solved:
         if result.channel == Channel.HEIGHT:
             assert np.array_equal(result.heights, heights[result.level])
@@ -62,12 +63,12 @@ def test_paint_on_blank_ground_is_painted(solver: Solver) -> None:
     snow = Make.paint([(900, 900), (2000, 2000)], "snow", 1.0, radius_m=80, id="snow")
     found = [r for r in solver.steps([snow], SETTINGS, 2) if isinstance(r, Level) and r.channel == Channel.SNOW]
     assert found[-1].heights.max() > 0.9
-    assert solver._spares.held == 0
+    assert solver._pool.held == 0
 
 
 def test_the_bound_holds_at_every_moment_with_solves_in_progress(solver: Solver) -> None:
     """58 terrains that had been opened and left held 7.4 GB where a fifth of the machine was the bound."""
-    solver._spares.bound = 4 * grid.solve_bytes(1)
+    solver._pool.bound = 4 * grid.solve_bytes(1)
     most, running = 0, []
     for n in range(12):
         steps = solver.steps(named(str(n)), SETTINGS, 1)
@@ -75,21 +76,21 @@ def test_the_bound_holds_at_every_moment_with_solves_in_progress(solver: Solver)
         running.append(steps)
         if len(running) > 2:
             for _ in running.pop(0):
-                most = max(most, solver._spares.held)
-        most = max(most, solver._spares.held)
+                most = max(most, solver._pool.held)
+        most = max(most, solver._pool.held)
     for steps in running:
         steps.close()
     assert most <= 4 * grid.solve_bytes(1)
-    assert solver._spares.held == len(solver._spares.idle) * grid.solve_bytes(1)
+    assert solver._pool.held == len(solver._pool.idle) * grid.solve_bytes(1)
 
 
 def test_who_comes_back_is_rasterised_and_not_packed_again(solver: Solver, monkeypatch: pytest.MonkeyPatch) -> None:
     strokes = mixed(20, 4)
     expected = solver.solve(strokes, SETTINGS, 1)[1]
-    [workspace] = solver._spares.idle
-    assert solver.tidy(solver._spares.since[workspace] + SPARE_SECONDS) == 1
+    [workspace] = solver._pool.idle
+    assert solver.tidy(solver._pool.since[workspace] + SPARE_SECONDS) == 1
     del workspace
-    assert solver._spares.held == 0
+    assert solver._pool.held == 0
     packed: list[str] = []
 
     def counted(shape: Shape, *given: Any) -> Any:
@@ -108,6 +109,47 @@ def test_only_so_much_is_kept_of_rooms_that_left(solver: Solver) -> None:
     for n in range(PACKED + 3):
         solver.solve(named(str(n)), SETTINGS, 0)
         solver.tidy(1e12)
-    assert len(solver._spares._packed) == PACKED
+    assert len(solver._pool._packed) == PACKED
     solver.tidy(1e13)
-    assert solver._spares._packed == []
+    assert solver._pool._packed == []
+
+
+def remembering(unchanged: int, shared: int) -> Any:
+    """A packer without a device: what it would answer to whoever asks how much it knows of a set."""
+    return SimpleNamespace(unchanged_count=lambda *_: unchanged, shared_ids=lambda *_: shared)
+
+
+@pytest.mark.parametrize(
+    ("known", "count", "chosen"),
+    [
+        ([], 4, None),
+        ([(0, 0)], 4, None),
+        ([(1, 1)], 4, None),
+        ([(2, 2)], 4, 0),
+        ([(1, 1), (3, 3)], 4, 1),
+        ([(2, 4), (3, 3)], 4, 1),
+        ([(1, 4), (0, 1)], 4, 0),
+        ([(-1, 1), (-1, 3)], 4, 1),
+        ([(3, 3), (3, 4)], 4, 0),
+        ([(-1, 0)], 0, 0),
+    ],
+    ids=[
+        "nothing is idle",
+        "another room's",
+        "too little of it",
+        "half of it",
+        "most of it",
+        "unchanged strokes count more than shared ids",
+        "everybody draws at once",
+        "other settings",
+        "the longest idle of equals",
+        "an empty set",
+    ],
+)
+def test_who_solves_takes_over_what_was_packed_of_its_room(
+    known: list[tuple[int, int]], count: int, chosen: int | None
+) -> None:
+    """SPEC S445: the choice of a workspace, without one."""
+    packers = [remembering(*each) for each in known]
+    found = best_packed(packers, SCENES["five"][:count], SETTINGS)
+    assert found is (None if chosen is None else packers[chosen])
