@@ -33,7 +33,13 @@ class Stroke:
     def profile(
         points: ArrayLike, left: FlankLike = DEFAULT_FLANK, right: FlankLike = DEFAULT_FLANK, **fields: Any
     ) -> contract.Stroke:
-        """A mountain or a crevice: points (n, 3), seen in the vertical plane through the first and the last."""
+        """A mountain or a crevice: points (n, 3), metres, seen in the vertical plane through the first and the last.
+
+        >>> from esker import Stroke
+        >>> ridge = Stroke.profile([(0, 0, 0), (500, 0, 300), (1000, 0, 0)], left=(35, 400), right=None)
+        >>> ridge.kind, ridge.last, ridge.right
+        ('profile', (1000.0, 0.0, 0.0), None)
+        """
         p = _points(points)
         first, last = _vec(p[0]), _vec(p[-1])
         return _stroke("profile", first, last, profile_curve(p, first, last), left, right, fields)
@@ -42,7 +48,12 @@ class Stroke:
     def level(
         points: ArrayLike, left: FlankLike = DEFAULT_FLANK, right: FlankLike = DEFAULT_FLANK, **fields: Any
     ) -> contract.Stroke:
-        """A plateau outline or a level ridge: points (n, 3), all at the height of the first."""
+        """A plateau outline or a level ridge: points (n, 3), metres, all at the height of the first.
+
+        >>> from esker import Stroke
+        >>> Stroke.level([(0, 0, 80), (900, 300, 75)]).last
+        (900.0, 300.0, 80.0)
+        """
         p = _points(points)
         p[:, 2] = p[0, 2]
         first, last = _ends(p)
@@ -60,6 +71,10 @@ class Stroke:
 
         Within ``radius_m`` of it one channel of the detail is raised or lowered: "snow", "grass", "forest", "wetness",
         "roughness" or "amplitude", by ``value`` from -1 (none of it) to 1 (all of it). No height is constrained.
+
+        >>> from esker import Stroke
+        >>> Stroke.paint([(100, 100), (900, 500)], "snow", radius_m=80).paint.value
+        1.0
         """
         xy = _points(points, (2, 3))[:, :2]
         p = np.column_stack([xy, np.zeros(len(xy))])

@@ -1,9 +1,12 @@
 """The offline Python API (DESIGN 5.7): strokes in, heights out, no server.
 
-from esker import Terrain, Stroke
-t = Terrain(size_m=4096)
-t.add(Stroke.profile([(500, 2000, 0), (2000, 2200, 900), (3500, 2000, 0)], left=(35, 300), right=(50, 200)))
-h = t.heights(level=4)          # float32 (1025, 1025), metres, row 0 south
+>>> from esker import Terrain, Stroke
+>>> t = Terrain(size_m=4096)
+>>> ridge = Stroke.profile([(500, 2000, 0), (2000, 2200, 900), (3500, 2000, 0)], left=(35, 300), right=(50, 200))
+>>> _ = t.add(ridge)
+>>> h = t.heights(level=2)
+>>> h.shape, h.dtype.name, bool(880 < h.max() < 901)
+((257, 257), 'float32', True)
 """
 
 from __future__ import annotations
@@ -20,6 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 from esker import contract, grid
 from esker.api import arguments
 from esker.api.heights import HeightCache, HeightWindow, Solved
+from esker.api.kept_ground import KeptGround, Source
 from esker.api.layers import Patchwork, Sample, held_to, imported, laid, unpacked
 from esker.api.strokes import Stroke
 from esker.contract import Border, Document, Layer, TerrainSettings
@@ -29,9 +33,7 @@ from esker.document.ops import check_document, check_put
 from esker.patchwork.lod.precedence import default_priority
 from esker.patchwork.raster.rasters import Raster
 from esker.solve.assembly import System, assemble
-from esker.solve.detail import Settled, detailed, settle
 from esker.solve.solver import Solver
-from esker.synthesis.detailed import Detail, DetailedTerrain
 from esker.synthesis.subdivide import finest_level
 
 __all__ = ["HeightWindow", "Sample", "Stroke", "Terrain", "default_solver"]
@@ -49,16 +51,29 @@ def default_solver() -> Solver:
     return _solver
 
 
-def _same(a: Strokes, b: Strokes) -> bool:
-    """The very same values in the same order: strokes are immutable."""
-    return len(a) == len(b) and all(x is y for x, y in zip(a, b, strict=True))
-
-
 class Terrain:
     """A terrain without a server. Heights are a pure function of ``strokes``, ``layers`` and ``settings``.
 
-    size_m: side of the domain, metres; border: "free" or "pinned" to the base; reach_m: how far strokes are felt
-    (DESIGN 5.1), default size / 32, None or infinity for pure diffusion. Raises ValueError out of range.
+    Parameters
+    ----------
+    size_m: side of the square domain, metres.
+    border: "free", or "pinned" to the base.
+    reach_m: how far strokes are felt, metres (DESIGN 5.1); by default size / 32; None or infinity for pure diffusion.
+    solver: what solves; by default one for the whole process, on the best device there is.
+
+    Raises
+    ------
+    ValueError: a number is out of its range.
+
+    Examples
+    --------
+    >>> from esker import Terrain
+    >>> Terrain(size_m=1024, reach_m=64).settings.reach_m
+    64.0
+    >>> Terrain(size_m=-1)
+    Traceback (most recent call last):
+    ...
+    ValueError: size_m ...
     """
 
     def __init__(
@@ -82,9 +97,7 @@ class Terrain:
         self._solver = arguments.kind("solver", solver, Solver)
         self._patchwork = Patchwork(self.settings)
         self._heights = HeightCache()
-        self._settled: Settled | None = None
-        self._detailed: tuple[Settled, int, DetailedTerrain] | None = None
-        self._detail: tuple[DetailedTerrain, int, Detail] | None = None
+        self._ground = KeptGround(self._heights)
 
     @property
     def settings(self) -> TerrainSettings:
@@ -107,10 +120,22 @@ class Terrain:
         return tuple(self._strokes.values())
 
     def add(self, stroke: contract.Stroke) -> str:
-        """Add a stroke, or replace the one of the same id; returns the id.
+        """Adds a stroke, or replaces the one of the same id; returns the id.
 
-        Raises TypeError for what is no stroke, ValueError for one that a server would refuse: beyond its limits, too
-        far outside, with fields that are not of its kind.
+        Raises
+        ------
+        TypeError: ``stroke`` is none.
+        ValueError: a server would refuse the stroke: it is beyond its limits, too far outside, or has fields that are
+            not of its kind.
+
+        Examples
+        --------
+        >>> from esker import Stroke, Terrain
+        >>> t = Terrain()
+        >>> t.add(Stroke.level([(1000, 1000, 120), (2000, 1200, 120)], plateau_radius_m=60, id="mesa"))
+        'mesa'
+        >>> [stroke.id for stroke in t.strokes]
+        ['mesa']
         """
         if not isinstance(stroke, contract.Stroke):
             raise TypeError(f"add takes a stroke, as Stroke.profile(...) makes one, not {type(stroke).__name__}")
@@ -151,16 +176,34 @@ class Terrain:
         licence: str = "",
         answers: Mapping[str, str] | None = None,
     ) -> str:
-        """Lay an elevation grid on the terrain; returns the layer's id. Nothing is resampled, nothing is rebuilt.
+        """Lays an elevation grid on the terrain; returns the layer's id. Nothing is resampled, nothing is rebuilt.
 
-        ``grid``: an array (rows, cols) of heights, NaN or masked where there are none, row 0 south; or the path of a
-        file (docs/importing.md), whose own place counts where it has one. ``anchor``: world position of sample [0, 0],
-        without which a grid lies in the middle; ``rotation``: degrees counter-clockwise; ``spacing``: metres, or
-        (sX, sY); ``accuracy``: the largest error of the grid anywhere, metres, by default from its spacing;
-        ``priority``: of layers that say different things the greater is believed, by default the one added last,
-        unless it is coarser and less accurate than what it lies on;
-        height = ``scale`` * sample + ``lift``. ``answers``: to what a file leaves open. Raises ValueError for a grid
-        that cannot be laid, or a file that is refused or leaves something open; OSError.
+        Parameters
+        ----------
+        grid: heights (rows, cols), NaN or masked where there are none, row 0 south; or the path of a file
+            (docs/importing.md), whose own place counts where it has one.
+        anchor: world position of sample [0, 0], metres; by default the grid lies in the middle.
+        rotation: degrees counter-clockwise.
+        spacing: metres between samples, or (sX, sY).
+        accuracy: the largest error of the grid anywhere, metres; by default it follows from the spacing.
+        priority: of layers that disagree the greater is believed; by default the one added last, unless it is coarser
+            and less accurate than what it lies on.
+        scale, lift: height = ``scale`` * sample + ``lift``, metres.
+        answers: to what a file leaves open.
+
+        Raises
+        ------
+        ValueError: the grid cannot be laid, or the file is refused or leaves something open.
+        OSError: the file cannot be read.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from esker import Terrain
+        >>> t = Terrain(size_m=1000)
+        >>> table = t.add_grid(np.full((11, 11), 50.0), anchor=(250, 250), spacing=50, name="table")
+        >>> [layer.name for layer in t.layers], t.sample([(500, 500)])
+        (['table'], array([50.]))
         """
         more: dict[str, Any] = {
             "name": name, "source": source, "licence": licence,
@@ -201,11 +244,31 @@ class Terrain:
     def sample(
         self, points: ArrayLike, tolerance: float = 0.0, derivatives: bool = False
     ) -> NDArray[np.float64] | Sample:
-        """The ground of the elevation layers, without strokes, at places (n, 2), world metres; 0 without layers.
+        """The ground of the elevation layers at some places, without strokes; 0 where no layer is.
 
-        ``tolerance``: the error that may be made, metres; 0 gives the data. Returns heights (n,), or with
-        ``derivatives`` a ``Sample``: heights, gradient and curvature of the same, twice differentiable surface. Raises
-        ValueError for points that are not finite (n, 2).
+        Parameters
+        ----------
+        points: places (n, 2), world metres.
+        tolerance: the error that may be made, metres; 0 gives the data.
+        derivatives: whether gradient and curvature of the same, twice differentiable surface are wanted too.
+
+        Returns
+        -------
+        Heights (n,) float64, metres; with ``derivatives`` a ``Sample``.
+
+        Raises
+        ------
+        ValueError: the points are not finite (n, 2).
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from esker import Terrain
+        >>> t = Terrain(size_m=1000)
+        >>> slope = t.add_grid(np.tile(np.arange(11.0), (11, 1)), anchor=(0, 0), spacing=100)
+        >>> found = t.sample([(500, 500)], derivatives=True)
+        >>> found.heights.round(3), found.slope_deg.round(2)
+        (array([5.]), array([0.57]))
         """
         places = arguments.points("points", points, (2,))
         tolerance = arguments.number("tolerance", tolerance, 0.0)
@@ -227,22 +290,41 @@ class Terrain:
         refined_level: int = contract.DEFAULT_REFINED_LEVEL,
         progress: Callable[[float], None] | None = None,
     ) -> NDArray[np.float32]:
-        """Settled heights of a level: float32 (N, N), metres, row 0 south, read-only.
+        """Settled heights of a level: what strokes make of the ground of the elevation layers.
 
-        Strokes on the ground of the elevation layers. Without ``detail``, the solve with ``level`` as its finest. With
-        it, what the page shows: heights as they come from a server that solves levels 0..``global_level`` as a whole
-        and refines to ``refined_level``, and the detail synthesised on them (docs/synthesis.md); ``progress`` is told
-        the share of that which is done. Raises ValueError
-        for a level outside 0..MAX_LEVEL; ``window`` goes further.
+        Parameters
+        ----------
+        level: 0..6; a level has 64 * 2**level + 1 samples a side. ``window`` goes further.
+        detail: False for the solve with ``level`` as its finest. True for what the page shows: a server solves levels
+            0..``global_level`` as a whole, refines to ``refined_level``, and detail grows on that (docs/synthesis.md).
+        progress: is told the share of the detail that is done, 0..1.
+
+        Returns
+        -------
+        float32 (N, N), metres, row 0 south, read-only.
+
+        Raises
+        ------
+        ValueError: there is no such level.
+
+        Examples
+        --------
+        >>> from esker import Stroke, Terrain
+        >>> t = Terrain()
+        >>> _ = t.add(Stroke.profile([(900, 2000, 0), (2000, 2000, 700), (3200, 2000, 0)]))
+        >>> coarse, fine = t.heights(level=0), t.heights(level=1)
+        >>> coarse.shape, fine.shape
+        ((65, 65), (129, 129))
         """
         level = arguments.whole("level", level, 0, contract.MAX_LEVEL)
         if arguments.detailed(detail, global_level, refined_level, progress):
-            return self._whole(level, global_level, refined_level, progress).heights
+            levels = global_level, refined_level
+            return self._ground.whole(self._solving(), self._source(), level, levels, progress).heights
         base = self._patchwork.base
         wanted = Solved.of(level, self.settings, self.strokes, base)
         ground = self._heights.find(wanted)
         if ground is None:
-            solver = self._solver or default_solver()
+            solver = self._solving()
             ground = solver.heights(self.strokes, self.settings, level, base=base)
             if base is not None:
                 ground = ground + base.level(level, solver.device)
@@ -265,7 +347,8 @@ class Terrain:
         """
         level = arguments.whole("level", level, 0, contract.MAX_LEVEL)
         arguments.detailed(True, global_level, refined_level, progress)
-        return dict(self._whole(level, global_level, refined_level, progress).attributes)
+        levels = global_level, refined_level
+        return dict(self._ground.whole(self._solving(), self._source(), level, levels, progress).attributes)
 
     def window(
         self,
@@ -280,13 +363,29 @@ class Terrain:
         refined_level: int = contract.DEFAULT_REFINED_LEVEL,
         progress: Callable[[float], None] | None = None,
     ) -> HeightWindow:
-        """Settled heights of the samples of ``level`` inside a rectangle of world metres, at what the rectangle costs.
+        """Settled heights inside a rectangle, at what the rectangle costs (DESIGN 5.6).
 
-        Levels 0..``global_level`` are solved as a whole, those above, up to MAX_REFINED_LEVEL, are refined from them
-        where they are looked at (DESIGN 5.6). With ``detail``, heights and attributes as the page shows them, down to
-        cells of a centimetre: refined to ``refined_level`` as a server does, interpolated beyond. ``progress`` is told
-        the share of the refinement, or of the detail, that is done. Raises ValueError for a level out of range and for
-        a rectangle that holds no sample.
+        Parameters
+        ----------
+        level: whose samples are wanted. Levels 0..``global_level`` are solved as a whole; those above, up to
+            MAX_REFINED_LEVEL, are refined from them where they are looked at.
+        x0, y0, x1, y1: the rectangle, world metres.
+        detail: whether heights and attributes are wanted as the page shows them, down to cells of a centimetre: refined
+            to ``refined_level`` as a server does, interpolated beyond.
+        progress: is told the share of the refinement, or of the detail, that is done, 0..1.
+
+        Raises
+        ------
+        ValueError: there is no such level, or the rectangle holds no sample.
+
+        Examples
+        --------
+        >>> from esker import Stroke, Terrain
+        >>> t = Terrain()
+        >>> _ = t.add(Stroke.profile([(900, 2000, 0), (2000, 2000, 700), (3200, 2000, 0)]))
+        >>> near = t.window(4, 1900, 1900, 2100, 2100, global_level=2)
+        >>> near.heights.shape, near.spacing_m
+        ((51, 51), 4.0)
         """
         size = self.settings.size_m
         detail = arguments.detailed(detail, global_level, refined_level, progress)
@@ -298,10 +397,11 @@ class Terrain:
         s = grid.spacing(level, size)
         rows, cols = slice(r0, r1), slice(c0, c1)
         if detail:
-            made = self._with_detail(global_level, refined_level).window(level, rows, cols, progress)
+            maker = self._ground.detailed(self._solving(), self._source(), global_level, refined_level)
+            made = maker.window(level, rows, cols, progress)
             return HeightWindow(made.heights, c0 * s, r0 * s, s, made.attributes)
-        solver = self._solver or default_solver()
-        settled, base = self._settle(solver, min(level, global_level)), self._patchwork.base
+        solver, source = self._solving(), self._source()
+        settled, base = self._ground.settled(solver, source, min(level, global_level)), source.base
         ground = solver.refiner(settled.basis).window(level, rows, cols, progress)
         if base is not None:
             ground = ground + base.window(level, rows, cols, solver.device)
@@ -352,52 +452,22 @@ class Terrain:
             self, where, formats.format_of(where), extent, detail=detail, step=step, weights=weights, **levels
         )
 
-    def _whole(
-        self, level: int, global_level: int, refined_level: int, progress: Callable[[float], None] | None
-    ) -> Detail:
-        """A whole level with detail; that of the last time if nothing has changed."""
-        terrain, held = self._with_detail(global_level, refined_level), self._detail
-        if held is None or held[0] is not terrain or held[1] != level:
-            every = slice(0, grid.samples(level))
-            made = terrain.window(level, every, every, progress)
-            for values in (made.heights, *made.attributes.values()):
-                values.flags.writeable = False
-            held = self._detail = (terrain, level, made)
-        return held[2]
+    def _source(self) -> Source:
+        return Source(self.strokes, self.settings, self._patchwork.base, span_m(self.layers))
 
-    def _with_detail(self, global_level: int, refined_level: int) -> DetailedTerrain:
-        """Returns what makes detail. What was made last time serves again if nothing has changed."""
-        solver = self._solver or default_solver()
-        settled, held = self._settle(solver, global_level), self._detailed
-        if held is None or held[0] is not settled or held[1] != refined_level:
-            held = self._detailed = (
-                settled, refined_level, detailed(solver, settled, refined_level, span_m(self.layers))
-            )  # fmt: skip
-        return held[2]
-
-    def _settle(self, solver: Solver, level: int) -> Settled:
-        """Returns what refinement and detail start from. What was solved last time serves again if nothing has
-        changed."""
-        strokes, base, held = self.strokes, self._patchwork.base, self._settled
-        basis = None if held is None else held.basis
-        if (
-            held is None
-            or basis is None
-            or basis.level != level
-            or basis.settings != self.settings
-            or basis.base is not base
-            or not _same(basis.strokes, strokes)
-        ):
-            held = self._settled = settle(solver, strokes, self.settings, level, base=base)
-            if base is None:
-                self._heights.put(Solved.of(level, self.settings, strokes, base), held.basis.heights)
-        return held
+    def _solving(self) -> Solver:
+        return self._solver or default_solver()
 
     def assemble(self, level: int) -> System:
-        """(A, b): the float64 sparse system of the height step at ``level``, see ``esker.solve.assembly``.
+        """(A, b): the sparse system of the height step at ``level``, float64; see ``esker.solve.assembly``.
 
-        Its unknowns are heights above the ground of the elevation layers. Raises ValueError for a level outside
-        0..MAX_LEVEL: the next one would take many gigabytes.
+        Its unknowns are heights above the ground of the elevation layers, in row-major order, row 0 south. Raises
+        ValueError for a level outside 0..MAX_LEVEL: the next one would take many gigabytes.
+
+        >>> from esker import Terrain
+        >>> A, b = Terrain().assemble(level=0)
+        >>> A.shape, b.shape
+        ((4225, 4225), (4225,))
         """
         level = arguments.whole("level", level, 0, contract.MAX_LEVEL)
         return assemble(self.strokes, self.settings, level, base=self._patchwork.base)

@@ -1,0 +1,58 @@
+"""Examples in docstrings run, and give what they print (SPEC H500)."""
+
+from __future__ import annotations
+
+import doctest
+import importlib
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+PACKAGE = Path(__file__).resolve().parents[2] / "backend"
+USERS = {
+    "esker.api.strokes": {"Stroke.profile", "Stroke.level", "Stroke.paint"},
+    "esker.api.terrain": {
+        "Terrain",
+        "Terrain.add",
+        "Terrain.add_grid",
+        "Terrain.assemble",
+        "Terrain.heights",
+        "Terrain.sample",
+        "Terrain.window",
+    },
+}
+"""What people call first, and what therefore has an example."""
+
+
+def written() -> list[str]:
+    """Modules that have an example."""
+    paths = sorted(path for path in PACKAGE.rglob("*.py") if ">>> " in path.read_text(encoding="utf-8"))
+    return [".".join(path.relative_to(PACKAGE).with_suffix("").parts) for path in paths]
+
+
+def examples(name: str) -> list[doctest.DocTest]:
+    """The examples of a module, each docstring's together."""
+    found: Any = doctest.DocTestFinder(exclude_empty=True).find(importlib.import_module(name))
+    return [each for each in found if each.examples]
+
+
+@pytest.mark.parametrize("name", written())
+def test_examples_give_what_they_print(name: str) -> None:
+    """SPEC H500."""
+    runner = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE)
+    report: list[str] = []
+    for each in examples(name):
+        runner.run(each, out=report.append)
+    assert runner.summarize(verbose=False).failed == 0, "".join(report)
+
+
+@pytest.mark.parametrize("name", USERS)
+def test_what_people_call_has_an_example(name: str) -> None:
+    """SPEC H500."""
+    assert {each.name.removeprefix(f"{name}.") for each in examples(name)} >= USERS[name]
+
+
+def test_a_wrong_example_is_noticed() -> None:
+    wrong = doctest.DocTestParser().get_doctest(">>> 1 + 1\n3\n", {}, "wrong", None, None)
+    assert doctest.DocTestRunner(verbose=False).run(wrong, out=lambda _: None).failed == 1
