@@ -12,15 +12,8 @@ import pytest
 PACKAGE = Path(__file__).resolve().parents[2] / "backend"
 USERS = {
     "esker.api.strokes": {"Stroke.profile", "Stroke.level", "Stroke.paint"},
-    "esker.api.terrain": {
-        "Terrain",
-        "Terrain.add",
-        "Terrain.add_grid",
-        "Terrain.assemble",
-        "Terrain.heights",
-        "Terrain.sample",
-        "Terrain.window",
-    },
+    "esker.api.terrain": {"Terrain", "Terrain.add", "Terrain.assemble", "Terrain.heights", "Terrain.window"},
+    "esker.api.terrain_layers": {"TerrainLayers.add_grid", "TerrainLayers.sample"},
 }
 """What people call first, and what therefore has an example."""
 

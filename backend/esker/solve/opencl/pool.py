@@ -10,7 +10,6 @@ import time
 import weakref
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Protocol, TypeVar
 
 from esker import grid
 from esker.contract import Stroke, TerrainSettings
@@ -34,17 +33,7 @@ PACKED = 16
 PACKED_SECONDS = 300.0
 
 
-class Remembers(Protocol):
-    """What a choice asks of a packer: how much of a stroke set was in the last one that it packed."""
-
-    def unchanged_count(self, strokes: Sequence[Stroke], settings: TerrainSettings) -> int: ...
-    def shared_ids(self, strokes: Sequence[Stroke]) -> int: ...
-
-
-R = TypeVar("R", bound=Remembers)
-
-
-def best_packed(packers: Sequence[R], strokes: Sequence[Stroke], settings: TerrainSettings) -> R | None:
+def best_packed(packers: Sequence[Packer], strokes: Sequence[Stroke], settings: TerrainSettings) -> Packer | None:
     """Returns the packer whose last set has at least half of these strokes, or None where all are of other rooms.
 
     Unchanged strokes count first: what they ask need not be rasterised again. Where everybody in a room draws at once
@@ -129,12 +118,11 @@ class WorkspacePool:
         based = job.base is not None
         idle = [w for w in self.idle if w.top == top and w.based == based]
         packer = best_packed([w.packer for w in idle], job.strokes, job.settings)
-        full = self.held + grid.solve_bytes(top, based) > self.bound
-        taken = next((w for w in idle if w.packer is packer), idle[0] if idle and full else None)
+        taken = next((w for w in idle if w.packer is packer), idle[0] if idle and self._is_full(top, based) else None)
         if taken is not None:
             self.idle.remove(taken)
             return taken
-        while self.idle and self.held + grid.solve_bytes(top, based) > self.bound:
+        while self.idle and self._is_full(top, based):
             self._drop(self.idle[0])
         return self._new(job, top, device)
 
@@ -161,6 +149,10 @@ class WorkspacePool:
     def held(self) -> int:
         """Bytes of all workspaces that there are."""
         return sum(grid.solve_bytes(w.top, w.based) for w in self._made)
+
+    def _is_full(self, top: int, based: bool) -> bool:
+        """Whether one more workspace would be beyond the bound."""
+        return self.held + grid.solve_bytes(top, based) > self.bound
 
     def give(self, workspace: Workspace) -> None:
         """Takes back a workspace that ``take`` gave: it may be leased again."""
