@@ -12,6 +12,7 @@ from esker import contract as c
 from esker.api.live import Link, LiveTerrain, Refused, connect
 from esker.solve.solver import Solver
 from tests.sync.harness import LiveServer, stroke
+from tests.unit import test_examples
 
 
 def _link(server: LiveServer, terrain: str, secret: str) -> str:
@@ -42,6 +43,12 @@ def test_a_change_here_is_a_change_there(link: str) -> None:
         ada.wait()
         with pytest.raises(Refused, match="deleted"):
             ada.set("ridge", label="x")
+
+
+@pytest.mark.parametrize("name", sorted(test_examples.SERVED))
+def test_examples_of_live_terrains_run(link: str, name: str) -> None:
+    """SPEC H511."""
+    assert test_examples.failures(name, {"link": link}) == ""
 
 
 def test_undo_is_my_own(link: str) -> None:

@@ -430,5 +430,32 @@ class LiveTerrain(LiveLayers, LiveHistory, LiveHeights):
 
 
 def connect(link: str, name: str = "Python", **options: Any) -> LiveTerrain:
-    """A live terrain by its share link; see ``LiveTerrain``. Raises ValueError, Refused, TimeoutError."""
+    """Joins a terrain of a running server by its share link.
+
+    Parameters
+    ----------
+    link: the share link, as a browser opens it; its role says what may be done.
+    name: what other people see.
+    options: those of ``LiveTerrain``: ``ca_file``, ``timeout``, ``solver``, ``ground``.
+
+    Returns
+    -------
+    The live terrain. It has the methods of ``Terrain``; ``close`` it, or use it in a ``with`` statement.
+
+    Raises
+    ------
+    ValueError: the link is none. Refused: the server lets nobody in with it. TimeoutError: no server answers.
+
+    Examples
+    --------
+    ``link`` is one that may draw, such as "http://127.0.0.1:8000/t/abc#secret".
+
+    >>> from esker import Stroke, connect
+    >>> with connect(link, "Ada") as t:
+    ...     _ = t.add(Stroke.level([(1000, 1000, 120), (2000, 1200, 120)], id="mesa"))
+    ...     t.set("mesa", label="Table hill")
+    ...     clock = t.wait()
+    ...     t.role, t.strokes[0].label, clock > 0, t.heights(level=0).shape
+    ('owner', 'Table hill', True, (65, 65))
+    """
     return LiveTerrain(link, name, **options)

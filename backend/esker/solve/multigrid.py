@@ -109,7 +109,41 @@ def refresh(system: System) -> None:
 
 
 def cycle(system: System) -> None:
-    """One F-cycle on the finest level. Needs its residual in b of the next; leaves the new one there."""
+    """One F-cycle on the finest level. Its residual is in b of the level below, before the cycle and after it.
+
+    Here a system prints what a cycle on four levels asks of it. Indentation is the level. A visit S(...) prolongs the
+    correction (P) and sweeps; where it says "residual", it restricts the new residual to b of the level below.
+
+    >>> class Printing:
+    ...     top, floor = 3, 0.0
+    ...
+    ...     def visit(self, level, *, rhs, out, guess, correction, residual):
+    ...         start = " + ".join(name for name in (guess, f"P {correction}") if name)
+    ...         print("    " * level + f"{level}: {out} = S({start})" + (", residual" if residual else ""))
+    ...
+    ...     def restrict(self, level):
+    ...         print("    " * level + f"{level}: restrict b")
+    ...
+    ...     def bottom(self, *, rhs, out, cycles):
+    ...         print(f"0: {out} = bottom, cycles: {cycles}")
+    ...
+    ...     def swap(self, level):
+    ...         print("    " * level + f"{level}: swap u and v")
+    >>> cycle(Printing())
+            2: restrict b
+        1: restrict b
+    0: e = bottom, cycles: 2
+        1: t = S(P e), residual
+    0: e = bottom, cycles: 1
+        1: e = S(t + P e)
+            2: t = S(P e), residual
+        1: restrict b
+    0: e = bottom, cycles: 1
+        1: e = S(P e)
+            2: e = S(t + P e)
+                3: v = S(u + P e), residual
+                3: swap u and v
+    """
     correct(system, system.top - 1, full=True)
     system.visit(system.top, rhs="f", out="v", guess="u", correction="e", residual=True)
     system.swap(system.top)

@@ -59,11 +59,28 @@ class Pyramid:
 
 
 class Solver:
-    """Solves stroke sets on one device. Use it from one thread; solves may be interleaved level by level.
+    """Solves stroke sets on one device. Use a solver from one thread; its solves may be interleaved level by level.
 
-    ``device``: part of the name of an OpenCL platform or device, or "numpy"; None takes the best there is.
-    ``threads`` limits PoCL and counts for the first solver of a process (default: all cores). Raises NoDeviceError
-    when a device that was asked for by name is missing, ValueError for a level that is not solved globally.
+    Parameters
+    ----------
+    device: part of the name of an OpenCL platform or device, or "numpy"; None takes the best there is.
+    max_level: the finest level that is solved as a whole where a call names none, 0..6.
+    threads: how many PoCL uses (all cores by default). The first solver of a process decides.
+
+    Raises
+    ------
+    NoDeviceError: a device that was asked for by name is missing. ValueError: ``max_level`` is not solved globally.
+
+    Examples
+    --------
+    >>> from esker import Stroke
+    >>> from esker.contract import TerrainSettings
+    >>> from esker.solve.solver import Solver
+    >>> solver = Solver("numpy", max_level=1)
+    >>> mesa = Stroke.level([(1000, 1000, 120), (2000, 1200, 120)], plateau_radius_m=200)
+    >>> ground = solver.solve([mesa], TerrainSettings())
+    >>> len(ground), ground.settled, ground[1].shape, float(ground[1].max())
+    (2, True, (129, 129), 120.0)
     """
 
     def __init__(self, device: str | None = None, max_level: int = 4, threads: int | None = None) -> None:

@@ -51,8 +51,13 @@ class Reads(Protocol):
 class Visit:
     """Another program on the database of a server that may be running. It reads, and writes links; it orders no op.
 
-    >>> with Visit(data) as visit:  # doctest: +SKIP
-    ...     print([terrain.title for terrain in all_kept(visit)])
+    >>> import tempfile
+    >>> from esker.store.journal import Journal
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     Journal(Path(folder)).close()
+    ...     with Visit(Path(folder)) as visit:
+    ...         [terrain.title for terrain in all_kept(visit)]
+    []
     """
 
     def __init__(self, data: Path) -> None:
