@@ -155,10 +155,11 @@ class Hub:
         who = Who(address, link.id)
         if not self._hellos.take(who, self._now()):
             raise Denied("rate_limited", "Too many pages came at once. Yours comes back by itself.")
-        room = await self.room(hello.terrain, who)
-        asked = await room.prepare(hello.clock, partial(self.read, who), link.role == "view")
-        while room.closed:  # the last member left meanwhile
+        while True:
             room = await self.room(hello.terrain, who)
+            asked = await room.prepare(hello.clock, partial(self.read, who), link.role == "view")
+            if not room.closed:  # else the last member left meanwhile
+                break
         self.demand(link)  # the link may have been revoked while the room was being opened
         return room, room.join(hello, link.role, link.id, outbox, address, asked)
 

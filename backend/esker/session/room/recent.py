@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections import deque
-from typing import Final
+from collections.abc import Awaitable, Callable
+from functools import partial
+from typing import Final, Protocol
 
 from esker.document.ops import StrokeSet
 from esker.document.wire import document_json
@@ -24,6 +27,57 @@ def encoded(document: StrokeSet, view: bool = False) -> bytes:
     another thread."""
     whole = document.to_document()
     return document_json(shown(whole) if view else whole).encode()
+
+
+class Kept(Protocol):
+    """What keeps encoded documents: ``RoomCore``."""
+
+    document: StrokeSet
+
+    def ready(self, clock: int | None, view: bool = False, asked: int | None = None) -> bool: ...
+
+    def keep(self, clock: int, body: bytes, view: bool = False) -> None: ...
+
+
+class Encoder:
+    """Has heavy documents of one room encoded in another thread, each once for all who wait for it."""
+
+    def __init__(self, core: Kept) -> None:
+        self._core = core
+        self._going: dict[bool, asyncio.Task[None]] = {}
+
+    async def prepare(
+        self,
+        clock: int | None,
+        run: Callable[[Callable[[], bytes]], Awaitable[bytes]],
+        view: bool = False,
+        over: Callable[[], bool] = lambda: False,
+    ) -> int:
+        """Returns when who has seen ``clock`` can be welcomed, or when it is ``over``: the clock when it was asked for.
+
+        ``run`` encodes, in another thread; ``view``: as a link to look is shown it. Raises what ``run`` raises; what
+        the ``run`` of somebody else raised is no reason, as that one's share may be used up.
+        """
+        asked = self._core.document.clock
+        while not self._core.ready(clock, view, asked) and not over():
+            mine = view not in self._going
+            if mine:
+                self._going[view] = asyncio.create_task(self._encode(run, view))
+            try:
+                await asyncio.shield(self._going[view])
+            except Exception:
+                if mine:
+                    raise
+        return asked
+
+    async def _encode(self, run: Callable[[Callable[[], bytes]], Awaitable[bytes]], view: bool) -> None:
+        # A callback at the end of the task would come too late for whoever asks between the two: waiting for a task
+        # that is done does not wait, so such a loop never gave way to the callback.
+        document = self._core.document
+        try:
+            self._core.keep(document.clock, await run(partial(encoded, document, view)), view)
+        finally:
+            del self._going[view]
 
 
 class Recent:

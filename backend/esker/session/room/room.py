@@ -10,7 +10,6 @@ import asyncio
 import logging
 from collections.abc import Awaitable, Callable, Iterable
 from concurrent.futures import Executor, Future
-from functools import partial
 from typing import Final
 
 from esker import contract as c
@@ -27,7 +26,7 @@ from esker.session.room.core import UNSAVED, Batch, RoomCore, RoomInfo
 from esker.session.room.members import QUIET_BACKLOG_BYTES, Member
 from esker.session.room.outbox import Outbox
 from esker.session.room.ports import Journal
-from esker.session.room.recent import encoded
+from esker.session.room.recent import Encoder
 from esker.store.journal import HistoryFull
 from esker.store.timestamps import Person
 
@@ -95,7 +94,7 @@ class Room:
         self._called: dict[str, Person] = {}
         """Authors of ops as the journal knows them."""
         self._refining = 0
-        self._encoding: dict[bool, asyncio.Future[bytes]] = {}
+        self._encoder = Encoder(core)
         self._flushed = asyncio.Event()
         self._flushed.set()
         self.closed = False
@@ -112,19 +111,7 @@ class Room:
 
         ``view``: as a link to look is shown it. Returns the clock when it was asked for.
         """
-        asked = self.core.document.clock
-        while not self.core.ready(clock, view, asked) and not self.closed:
-            if view not in self._encoding:
-                document = self.core.document
-                self._encoding[view] = asyncio.ensure_future(run(partial(encoded, document, view)))
-                self._encoding[view].add_done_callback(partial(self._encoded, document.clock, view))
-            await asyncio.shield(self._encoding[view])
-        return asked
-
-    def _encoded(self, clock: int, view: bool, done: asyncio.Future[bytes]) -> None:
-        del self._encoding[view]
-        if not done.cancelled() and done.exception() is None:
-            self.core.keep(clock, done.result(), view)
+        return await self._encoder.prepare(clock, run, view, lambda: self.closed)
 
     def join(
         self, hello: c.Hello, role: Role, link: str, outbox: Outbox, address: str = "", asked: int | None = None
