@@ -62,7 +62,7 @@ def test_a_share_that_is_used_up_denies_only_its_owner() -> None:
         await asyncio.sleep(0)
         raise Denied("rate_limited", "Too much was asked for from your address at once.")
 
-    async def run() -> list[int | BaseException]:
+    async def run() -> tuple[int | BaseException, int | BaseException]:
         encoder = Encoder(Heavy())
         return await asyncio.gather(encoder.prepare(None, refused), encoder.prepare(None, slow), return_exceptions=True)
 
