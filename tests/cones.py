@@ -16,7 +16,7 @@ from esker.contract import Channel, View
 from esker.grid import TileKey
 from esker.tiles.codec.payload import Wide, child_window, predict
 from esker.tiles.decoder import FrameDecoder, HeldTile
-from esker.tiles.delivery import WISHES, ClientTiles, TileServer
+from esker.tiles.delivery import MOST_REQUESTS, ClientTiles, TileServer
 from esker.tiles.plans import FramePlan
 
 SIZE_M = 512.0
@@ -230,13 +230,13 @@ def settle(
     made = 0
     clients = list(clients)
     for _ in range(200):
-        wishes, count = server.wishes([client.tiles for client in clients])
-        assert len(wishes) <= min(count, WISHES)
-        for key in wishes:
+        requests, count = server.requests([client.tiles for client in clients])
+        assert len(requests) <= min(count, MOST_REQUESTS)
+        for key in requests:
             assert server.put_tile(clock, ground.tile(key, base))
             made += 1
         for client in clients:
             client.drain()
-        if not wishes:
+        if not requests:
             return made
     raise AssertionError("it never comes to rest")

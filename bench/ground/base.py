@@ -69,7 +69,7 @@ def drained(client: ClientTiles) -> tuple[list[tuple[FramePlan, int]], float]:
     return frames, 1000 * (time.perf_counter() - began)
 
 
-def told(frames: list[tuple[FramePlan, int]], took_ms: float) -> dict[str, Any]:
+def figures(frames: list[tuple[FramePlan, int]], took_ms: float) -> dict[str, Any]:
     """Bytes of a client's frames: of the base by level, and of what lies on it."""
     out: dict[str, Any] = {"bytes": sum(size for _, size in frames), "encode_ms": round(took_ms, 1)}
     base = [(plan, size) for plan, size in frames if plan.channel == Channel.BASE]
@@ -93,14 +93,14 @@ def measure(name: str) -> dict[str, Any]:
     for label, view in views(base, size_m):
         client = ClientTiles(server, rest_level=-1)
         client.set_view(view)
-        out[f"first_view_{label}"] = told(*drained(client))
+        out[f"first_view_{label}"] = figures(*drained(client))
     whole = ClientTiles(server)
-    out["everything"] = told(*drained(whole))
+    out["everything"] = figures(*drained(whole))
     last = document.layers[-1]
     moved = last.model_copy(update={"anchor": (last.anchor[0] + 30, last.anchor[1])})
     put(server, laid((*document.layers[:-1], moved), template, size_m, base), 2)
-    out["layer_moved_whole"] = told(*drained(whole))
-    out["layer_moved_in_view"] = told(*drained(client))
+    out["layer_moved_whole"] = figures(*drained(whole))
+    out["layer_moved_in_view"] = figures(*drained(client))
     return out
 
 

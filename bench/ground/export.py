@@ -30,8 +30,8 @@ from esker.solve.solver import Solver
 from esker.version import VERSION
 
 SCENE: Final = "alpine-ridge"
-WISH: Final = {"format": "png16", "samples": 4097, "detail": True}
-TOLD: Final = ("first_coarse_tile_ms", "level_4_preview_ms")
+WANTED: Final = {"format": "png16", "samples": 4097, "detail": True}
+SHOWN: Final = ("first_coarse_tile_ms", "level_4_preview_ms")
 
 
 def measure_files(solver: Solver, sizes: list[int]) -> dict[str, Any]:
@@ -70,13 +70,13 @@ def exporting(base: str, terrain: str, secret: str) -> Iterator[list[str]]:
 
     def work() -> None:
         while not stop.is_set():
-            job = ask("POST", "/exports", WISH)["id"]
-            while not stop.wait(0.2) and (told := ask("GET", f"/exports/{job}"))["stage"] not in ("done", "failed"):
+            job = ask("POST", "/exports", WANTED)["id"]
+            while not stop.wait(0.2) and (answer := ask("GET", f"/exports/{job}"))["stage"] not in ("done", "failed"):
                 pass
             if stop.is_set():
                 ask("DELETE", f"/exports/{job}")
             else:
-                done.append(f"{told['stage']} {told['file']}")
+                done.append(f"{answer['stage']} {answer['file']}")
 
     worker = threading.Thread(target=work)
     worker.start()
@@ -102,7 +102,7 @@ def measure_drawing(rounds: int, appends: int) -> dict[str, Any]:
         name: {
             f"{how}.{what}": {q: round(median(r[how][what][q] for r in runs), 1) for q in ("p50", "p99")}
             for how in ("at_rest", "drawing")
-            for what in TOLD
+            for what in SHOWN
         }
         for name, runs in found.items()
     }

@@ -227,7 +227,7 @@ def settle_view(scene: str, depth: int, low: int, least: int) -> dict[str, Any]:
     refining = 0.0
     for _ in range(MAX_ROUNDS):
         now = time.perf_counter()
-        keys = server.wishes([client])[0]
+        keys = server.requests([client])[0]
         selecting += time.perf_counter() - now
         if not keys:
             break

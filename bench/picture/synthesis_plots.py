@@ -78,7 +78,7 @@ def levels(path: Path) -> None:
 
     terrain = Terrain.from_document(templates.load("figure-six").document)
     rows = -(-len(PANELS) // 3)
-    sheet = Image.new("L", (3 * PIXELS + 8, rows * PIXELS + 4 * (rows - 1)), 255)
+    page = Image.new("L", (3 * PIXELS + 8, rows * PIXELS + 4 * (rows - 1)), 255)
     for k, level in enumerate(PANELS):
         half = 0.5 * PIXELS * SIZE / 64 / 2**level
         (x, y), fit = PLACE, SIZE / 2 - half
@@ -89,8 +89,8 @@ def levels(path: Path) -> None:
         width = PIXELS * window.spacing_m
         label = f"{width:,.0f} m" if width > 9 else f"{width:.1f} m"
         ImageDraw.Draw(image).text((8, PIXELS - 18), label, fill=255, stroke_width=2, stroke_fill=0)
-        sheet.paste(image, ((k % 3) * (PIXELS + 4), (k // 3) * (PIXELS + 4)))
-    sheet.save(path, quality=88)
+        page.paste(image, ((k % 3) * (PIXELS + 4), (k // 3) * (PIXELS + 4)))
+    page.save(path, quality=88)
 
 
 def main() -> int:

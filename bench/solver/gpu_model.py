@@ -21,7 +21,7 @@ from esker.solve.opencl.gpu_levels import MOST_CHAINED
 from esker.solve.solver import PREVIEW_GRADIENT_CYCLES, PREVIEW_HEIGHT_CYCLES
 
 H100_BYTES = 3.3e12
-"""Bytes a second of an H100's memory (SXM5, HBM3), by its data sheet."""
+"""Bytes a second of an H100's memory (SXM5, HBM3), as its maker states."""
 GUIDE_FIELDS = 5
 """Fields of one level: two of the gradient, stiffness, static part, right-hand side."""
 

@@ -60,10 +60,10 @@ def settle(server: TileServer, solver: Solver, basis: Basis, clock: int, client:
             client.commit(plan)
             if plan.level > LEVEL:
                 frames.append(plan)
-        wishes, _ = server.wishes([client])
-        if not wishes:
+        requests, _ = server.requests([client])
+        if not requests:
             return frames
-        for tile in refiner.tiles(wishes):
+        for tile in refiner.tiles(requests):
             if tile is not None:
                 server.put_tile(clock, tile)
 
@@ -110,11 +110,11 @@ def measure(solver: Solver, document: c.Document, finest: int, repeats: int = RE
         x, y, z = view.eye
         other.set_view(view.model_copy(update={"eye": (x + i, y - i, z)}))
 
-    def wish() -> None:
+    def request() -> None:
         server.refined.generation += 1
-        server.wishes(crowd)
+        server.requests(crowd)
 
-    out[f"wishes_of_{VIEWERS}"] = timed(wish, max(1, repeats // 10))
+    out[f"requests_of_{VIEWERS}"] = timed(request, max(1, repeats // 10))
     nearest = min(document.strokes, key=lambda s: abs(s.first[0] - view.eye[0]) + abs(s.first[1] - view.eye[1]))
     moved = nearest.model_copy(update={"plateau_radius_m": nearest.plateau_radius_m + 4})
     strokes = tuple(moved if s.id == moved.id else s for s in document.strokes)

@@ -206,8 +206,8 @@ async def seats(at: Target) -> int:
         _close(held)
 
 
-async def past_rooms(at: Target) -> int:
-    """Rooms of the past, each with a solver's work."""
+async def history_rooms(at: Target) -> int:
+    """History rooms, each with a solver's work."""
     held: list[asyncio.StreamWriter] = []
     try:
         return await _many(at, lambda: _hold(held, _member(at, at.terrain, at.viewer, {"at": 1})), 400)
@@ -363,9 +363,9 @@ async def requests(at: Target) -> int:
 ATTACKS: Final[dict[str, Attack]] = {
     attack.__name__: attack
     for attack in (
-        bad_operations, continuations, pings, garbage, silent_connections, seats, past_rooms, new_rooms, heavy_room,
+        bad_operations, continuations, pings, garbage, silent_connections, seats, history_rooms, new_rooms, heavy_room,
         impossible_numbers, journal, deaf_readers, uploads, codes, requests,
     )
 }  # fmt: skip
-BY_LINK: Final = frozenset({"bad_operations", "pings", "seats", "past_rooms", "requests"})
+BY_LINK: Final = frozenset({"bad_operations", "pings", "seats", "history_rooms", "requests"})
 """Those that need a link: a viewer has one to the terrain where people draw, a stranger one to another terrain."""

@@ -122,10 +122,10 @@ class Siege:
         return self._strike(kind, life)
 
     def _strike(self, kind: str, life: Life) -> bool:
-        told = len(life.said)
+        heard = len(life.said)
         time.sleep(self.rng.uniform(0, WITHIN[kind]))
         life.end()
-        return f"end {kind}" not in life.said[told:]
+        return f"end {kind}" not in life.said[heard:]
 
     def _import(self) -> bool:
         life = self._serving()

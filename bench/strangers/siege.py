@@ -81,10 +81,10 @@ class _Person:
                     done = [k for k in self.clocks if k <= shown]
                     self.tiles += [now - self.clocks.pop(k) for k in done]
                 else:
-                    self._told(json.loads(message), now)
+                    self._heard(json.loads(message), now)
         self.closed = True
 
-    def _told(self, message: dict[str, Any], now: float) -> None:
+    def _heard(self, message: dict[str, Any], now: float) -> None:
         if message["type"] == "ack":
             for op_id, clock in zip(message["ids"], message["clocks"], strict=True):
                 at = self.sent.pop(int(op_id.partition(":")[2]), None)

@@ -30,7 +30,7 @@ HISTORY = "() => window.esker.history()"
 
 def as_it_was(visitor: Visitor, server: Server, terrain: str, secret: str, clock: int) -> None:
     """The page shows the ground of that clock: that of an offline solve, within a quantisation step."""
-    wait(visitor, "c => window.esker.past() === c && window.esker.settled()", clock, timeout=90)
+    wait(visitor, "c => window.esker.historyClock() === c && window.esker.settled()", clock, timeout=90)
     text = server.request("GET", f"/api/terrains/{terrain}/document?at={clock}", secret=secret)
     document = c.Document.model_validate_json(text)
     assert {s["id"] for s in visitor.js("() => window.esker.strokes()")} == {s.id for s in document.strokes}
@@ -79,20 +79,20 @@ def test_two_people_look_back(visitors: Visitors, server: Server, tmp_path: Path
 
     draw(ben, "b", arch(on_screen(ben, 2600, 500), on_screen(ben, 3600, 600), 20))
     wait(ada, "() => window.esker.history().length === 3")
-    assert ada.js("() => window.esker.past()") == drawn
+    assert ada.js("() => window.esker.historyClock()") == drawn
     ada.page.get_by_role("button", name="Back to now").first.click()
-    wait(ada, "() => window.esker.past() === null && window.esker.strokes().length === 3")
+    wait(ada, "() => window.esker.historyClock() === null && window.esker.strokes().length === 3")
     wait_settled(ada)
 
     ada.page.get_by_role("button", name="Watch it come to be").click()
-    wait(ada, "() => window.esker.past() !== null && window.esker.strokes().length === 1")
+    wait(ada, "() => window.esker.historyClock() !== null && window.esker.strokes().length === 1")
     ada.shot("history-lapse")
-    wait(ada, "() => window.esker.past() === window.esker.clock()")
+    wait(ada, "() => window.esker.historyClock() === window.esker.clock()")
     ada.page.keyboard.press("Escape")
-    wait(ada, "() => window.esker.past() === null")
+    wait(ada, "() => window.esker.historyClock() === null")
 
     ada.page.locator("esk-history-panel .item").last.click()
-    wait(ada, "c => window.esker.past() === c", drawn)
+    wait(ada, "c => window.esker.historyClock() === c", drawn)
     ada.page.get_by_role("button", name="Make a copy").click()
     wait(ada, "t => !location.pathname.endsWith(t) && window.esker?.ready()", terrain, timeout=90)
     assert [s["id"] for s in ada.js("() => window.esker.strokes()")] == [first]

@@ -254,13 +254,13 @@ def test_the_border_goes_around_nodata() -> None:
     assert sorted(map(tuple, np.round(found, 6).tolist())) == sorted(expected)
 
 
-def test_no_layers_and_no_overlap_melt_nothing() -> None:
+def test_no_layers_and_no_overlap_bend_nothing() -> None:
     far = newer(anchor=(5000.0, 5000.0))
     for model in (space.build([]), space.build([wide()]), space.build([wide(), far])):
         assert not SeamBlend(model, SIZE).zones
 
 
-def test_differences_are_those_to_the_ground_below_as_it_was_melted() -> None:
+def test_differences_are_those_to_the_ground_below_as_it_was_bent() -> None:
     """SPEC PW64: of three layers the second counts where it lies, and the first, raised to meet it, beside it."""
     model = space.build([wide(), newer(), third()])
     points, _, difference, _ = SeamBlend(model, SIZE).differences(2)

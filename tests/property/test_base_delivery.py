@@ -69,9 +69,9 @@ def test_random_sessions_come_to_rest_on_offsets_plus_base(seed: int) -> None:
                     if rng.random() < 0.6:
                         client.step()
         for _ in range(rng.choice([0, 1, 4, 12])):
-            wishes = list(server.wishes([client.tiles for client in clients])[0])
-            rng.shuffle(wishes)
-            for key in wishes[: rng.choice([3, 20, 64])]:
+            requests = list(server.requests([client.tiles for client in clients])[0])
+            rng.shuffle(requests)
+            for key in requests[: rng.choice([3, 20, 64])]:
                 server.put_tile(clock, ground.tile(key, base))
             for client in clients:
                 for _ in range(rng.choice([0, 1, 5, 60])):

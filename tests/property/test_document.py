@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 
 from esker import contract as c
-from esker.document.layers import TOLD_FIELDS
+from esker.document.layers import CREDIT_FIELDS
 from esker.document.ops import CHANNEL_FIELDS, GROUND_FIELDS, Limits, Refusal, StrokeSet, check_document
 from esker.document.strokes import bounds
 from esker.document.undo import LAYER_WORDS, STROKE_WORDS, UndoStack, inverse
@@ -277,7 +277,7 @@ def _born_layer(layer_id: str, **fields: Any) -> c.Layer:
 
 def _laid(document: StrokeSet) -> list[dict[str, object]]:
     """All that the base follows from (SPEC D30), by id."""
-    some = [layer.model_dump(exclude=set(TOLD_FIELDS)) for layer in document.layers.values() if not layer.hidden]
+    some = [layer.model_dump(exclude=set(CREDIT_FIELDS)) for layer in document.layers.values() if not layer.hidden]
     return sorted(some, key=lambda layer: str(layer["id"]))
 
 

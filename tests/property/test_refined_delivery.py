@@ -44,9 +44,9 @@ def test_random_sessions_come_to_rest_on_the_refined_ground(seed: int) -> None:
                     if rng.random() < 0.7:
                         client.step()
         for _ in range(rng.choice([0, 1, 3, 8])):
-            wishes = list(server.wishes([client.tiles for client in clients])[0])
-            rng.shuffle(wishes)
-            for key in wishes[: rng.choice([3, 20, 64])]:
+            requests = list(server.requests([client.tiles for client in clients])[0])
+            rng.shuffle(requests)
+            for key in requests[: rng.choice([3, 20, 64])]:
                 server.put_tile(clock, ground.tile(key))
             for client in clients:
                 for _ in range(rng.choice([0, 1, 5, 40])):

@@ -24,7 +24,7 @@ from esker.document.history.words import sentence
 from esker.document.ops import StrokeSet
 from esker.document.wire import op_json
 from esker.session.room import core
-from esker.session.room.past import Past
+from esker.session.room.history_view import HistoryReader
 from esker.store.journal import DamagedTerrain, Journal, Row
 from esker.store.upkeep.compaction import Compaction
 from tests.gestures import Done, session
@@ -112,7 +112,7 @@ def test_steps_through_a_folded_history_have_no_gap(journal: Journal) -> None:
     done = session(1, 300, BIRTH)
     _stored(journal, done)
     _folding(journal).terrain("t")
-    past = Past(journal, StrokeSet.from_document(BIRTH))
+    past = HistoryReader(journal, StrokeSet.from_document(BIRTH))
     clocks = iter(range(1, len(done) + 1))
     for clock in clocks:
         document, rows = past.go(clock)

@@ -24,7 +24,7 @@ from esker.fairness.shares import Places, Share
 from esker.jobs import exports
 from tests.sync.harness import LiveServer
 
-WISH = {"format": "npy", "samples": 257, "detail": False}
+WANTED = {"format": "npy", "samples": 257, "detail": False}
 CONTENT = b"x" * 1000
 
 
@@ -74,8 +74,8 @@ def live(tmp_path: Path, maker: Maker) -> Iterator[LiveServer]:
         maker.gate.set()
 
 
-def begin(live: LiveServer, terrain: str, secret: str, client: str = "", **wish: Any) -> tuple[int, Any]:
-    return live.http("POST", f"/api/terrains/{terrain}/exports?client={client}", WISH | wish, secret)
+def begin(live: LiveServer, terrain: str, secret: str, client: str = "", **wanted: Any) -> tuple[int, Any]:
+    return live.http("POST", f"/api/terrains/{terrain}/exports?client={client}", WANTED | wanted, secret)
 
 
 def wait(live: LiveServer, terrain: str, secret: str, job: str, *stages: str, patience: float = 60) -> dict[str, Any]:
@@ -108,7 +108,7 @@ def test_a_file_is_made_and_given_out(live: LiveServer, maker: Maker) -> None:
     terrain, owner = live.create(strokes=(stroke,), **titled("Föhn / ridge_1"))
     _, link = live.http("POST", f"/api/terrains/{terrain}/links", {"role": "view"}, owner)
     secret = link["secret"]
-    assert live.http("POST", f"/api/terrains/{terrain}/exports/estimate", WISH, secret)[1]["bytes"] == 4 * 257**2
+    assert live.http("POST", f"/api/terrains/{terrain}/exports/estimate", WANTED, secret)[1]["bytes"] == 4 * 257**2
     status, job = begin(live, terrain, secret)
     assert status == 202
     done = wait(live, terrain, secret, job["id"], "done")
@@ -139,18 +139,19 @@ def test_exports_belong_to_their_link_and_to_owners(live: LiveServer) -> None:
     other, secret = live.create()
     assert live.http("GET", f"/api/terrains/{other}/exports/{job}", secret=secret)[1]["code"] == "no_export"
     assert begin(live, terrain, "wrong")[0] == 403
-    assert live.http("POST", f"/api/terrains/{terrain}/exports/estimate", WISH)[0] == 401
+    assert live.http("POST", f"/api/terrains/{terrain}/exports/estimate", WANTED)[0] == 401
 
 
 @pytest.mark.parametrize(
-    "wish", [{"samples": 1000}, {"format": "glb", "samples": 2049}, {"format": "obj"}, {"samples": "257"}, {"more": 1}]
+    "wanted",
+    [{"samples": 1000}, {"format": "glb", "samples": 2049}, {"format": "obj"}, {"samples": "257"}, {"more": 1}],
 )
-def test_wishes_that_cannot_be(live: LiveServer, wish: dict[str, Any]) -> None:
+def test_requests_that_cannot_be(live: LiveServer, wanted: dict[str, Any]) -> None:
     """SPEC X8."""
     terrain, secret = live.create()
-    status, told = begin(live, terrain, secret, **wish)
+    status, told = begin(live, terrain, secret, **wanted)
     assert (status, told["code"]) == (400, "malformed")
-    assert live.http("POST", f"/api/terrains/{terrain}/exports/estimate", WISH | wish, secret)[0] == 400
+    assert live.http("POST", f"/api/terrains/{terrain}/exports/estimate", WANTED | wanted, secret)[0] == 400
     assert folders(live) == []
 
 
@@ -236,14 +237,14 @@ def test_the_estimate_follows_the_pace_of_this_server(live: LiveServer, maker: M
     assert service is not None
     terrain, secret = live.create(**titled("slow"))
     path = f"/api/terrains/{terrain}/exports/estimate"
-    before = live.http("POST", path, WISH, secret)[1]["seconds"]
+    before = live.http("POST", path, WANTED, secret)[1]["seconds"]
     maker.gate.clear()
     job = begin(live, terrain, secret)[1]["id"]
     wait(live, terrain, secret, job, "detail")
     service._now = lambda: time.monotonic() + 9.0 * before
     maker.gate.set()
     wait(live, terrain, secret, job, "done")
-    assert live.http("POST", path, WISH, secret)[1]["seconds"] > 3 * before
+    assert live.http("POST", path, WANTED, secret)[1]["seconds"] > 3 * before
 
 
 def test_a_full_disk(live: LiveServer, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -276,8 +277,8 @@ def ridge() -> Terrain:
 
 
 def task_of(terrain: Terrain, folder: Path, **more: Any) -> wire.Task:
-    wish = c.ExportRequest(format="npy", samples=257)
-    made: dict[str, Any] = {"wish": wish, "grids": str(folder / "grids"), "folder": str(folder), "name": "a"}
+    wanted = c.ExportRequest(format="npy", samples=257)
+    made: dict[str, Any] = {"wanted": wanted, "grids": str(folder / "grids"), "folder": str(folder), "name": "a"}
     return wire.Task(document=terrain.document, **(made | more))
 
 
@@ -312,8 +313,8 @@ def test_a_cancelled_process_is_gone(tmp_path: Path) -> None:
 
     async def cancelled() -> None:
         begun = asyncio.Event()
-        wish = c.ExportRequest(format="npy", samples=4097)
-        task = asyncio.create_task(run.make(task_of(ridge(), tmp_path, wish=wish), lambda *_: begun.set()))
+        wanted = c.ExportRequest(format="npy", samples=4097)
+        task = asyncio.create_task(run.make(task_of(ridge(), tmp_path, wanted=wanted), lambda *_: begun.set()))
         await begun.wait()
         mine = psutil.Process().children()
         assert any("esker.api.export_child" in process.cmdline() for process in mine)
@@ -343,8 +344,8 @@ def test_a_process_that_the_system_kills(tmp_path: Path) -> None:
 
 def test_the_process_ends_with_the_server(tmp_path: Path) -> None:
     """SPEC X23."""
-    wish = c.ExportRequest(format="npy", samples=4097)
-    text = task_of(ridge(), tmp_path, wish=wish).model_dump_json().encode() + b"\n"
+    wanted = c.ExportRequest(format="npy", samples=4097)
+    text = task_of(ridge(), tmp_path, wanted=wanted).model_dump_json().encode() + b"\n"
     child = subprocess.Popen(
         [sys.executable, "-m", "esker.api.export_child"],
         stdin=subprocess.PIPE,

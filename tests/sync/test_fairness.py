@@ -1,4 +1,4 @@
-"""One stranger takes nothing from anybody: rooms of the past, seats, imports, exports, threads, sockets (SPEC P290 to
+"""One stranger takes nothing from anybody: history rooms, seats, imports, exports, threads, sockets (SPEC P290 to
 P293)."""
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ from esker import contract as c
 from esker.fairness.shares import Full, Who
 from esker.server.wire import descriptors
 from esker.server.wire.http import Connections
-from esker.session.room import past
+from esker.session.room import history_view
 from esker.session.room.members import seats
 from tests.sync.harness import PATIENCE, LiveServer, Peer
 from tests.sync.scripted_reader import Reader
-from tests.sync.test_exports import WISH, Maker
+from tests.sync.test_exports import WANTED, Maker
 
 STRANGER, CITIZEN = "192.0.2.66", "192.0.2.7"
 
@@ -86,7 +86,7 @@ def test_a_stranger_in_all_rooms_of_the_past_gives_one_up(live: LiveServer) -> N
     """SPEC P290: eight ids of one address, then somebody else comes."""
     strange, key = live.create()
     mine, secret = live.create()
-    strangers = [enter(live, STRANGER, strange, key, f"s{i}", at=0) for i in range(c.MAX_PAST_ROOMS)]
+    strangers = [enter(live, STRANGER, strange, key, f"s{i}", at=0) for i in range(c.MAX_HISTORY_ROOMS)]
     for peer in strangers:
         peer.wait("welcome")
     ninth = enter(live, STRANGER, strange, key, "s9", at=0)
@@ -94,7 +94,7 @@ def test_a_stranger_in_all_rooms_of_the_past_gives_one_up(live: LiveServer) -> N
     me = enter(live, CITIZEN, mine, secret, "me", at=0)
     me.wait("welcome")
     code, error = strangers[0].closed()
-    assert (code, error and error["message"]) == (c.WS_CLOSE["room_full"], past.YIELDED)
+    assert (code, error and error["message"]) == (c.WS_CLOSE["room_full"], history_view.YIELDED)
     for peer in (*strangers[1:], me):
         peer.close()
 
@@ -147,10 +147,10 @@ def test_a_stranger_s_exports_leave_places(live: LiveServer, maker: Maker) -> No
     answers = []
     for i in range(10):
         terrain, secret = live.create(settings=c.TerrainSettings(title=f"slow {i}"))
-        answers.append(ask(live, STRANGER, "POST", f"/api/terrains/{terrain}/exports?client=s{i}", WISH, secret)[0])
+        answers.append(ask(live, STRANGER, "POST", f"/api/terrains/{terrain}/exports?client=s{i}", WANTED, secret)[0])
     assert answers == [202] * 8 + [503] * 2
     terrain, secret = live.create(settings=c.TerrainSettings(title="mine"))
-    status, job = ask(live, CITIZEN, "POST", f"/api/terrains/{terrain}/exports", WISH, secret)
+    status, job = ask(live, CITIZEN, "POST", f"/api/terrains/{terrain}/exports", WANTED, secret)
     assert status == 202
     maker.gate.set()
     path = f"/api/terrains/{terrain}/exports/{job['id']}"

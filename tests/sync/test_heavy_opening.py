@@ -143,6 +143,6 @@ def test_an_error_names_its_place(heavy: Document) -> None:
 
 
 def test_the_line_of_an_export_is_that_of_the_task(heavy: Document) -> None:
-    task = wire.Task(document=heavy, wish=c.ExportRequest(samples=65, format="npy"), grids="g", folder="f", name="n")
+    task = wire.Task(document=heavy, wanted=c.ExportRequest(samples=65, format="npy"), grids="g", folder="f", name="n")
     assert wire.Task.model_validate_json(wire.task_line(task)) == task
     assert "\n" not in wire.task_line(task)

@@ -22,7 +22,7 @@ from esker.document.wire import op_json
 from esker.fairness.shares import Places, Share
 from esker.grid import TileKey, quantum
 from esker.patchwork.raster import rasters
-from esker.session.room import past
+from esker.session.room import history_view
 from esker.store.activity import ActivityLogs
 from esker.store.journal import Journal, Row
 from esker.store.timestamps import Person
@@ -192,7 +192,7 @@ def test_a_seek_goes_forward_by_ops_and_back_by_a_document(tmp_path: Path, monke
         assert (back["type"], back["document"]["clock"], len(back["document"]["strokes"])) == ("welcome", 2, 2)
         peer.settled(2, PATIENCE)
         ground_is(peer, 30)
-        monkeypatch.setattr(past, "STEP_CHARACTERS", 10)
+        monkeypatch.setattr(history_view, "STEP_CHARACTERS", 10)
         peer.say("seek", clock=99)
         assert peer.wait("ordered", "welcome")["document"]["clock"] == 5
         peer.settled(5, PATIENCE)
@@ -214,8 +214,8 @@ def test_rooms_of_the_past_are_few_and_not_for_ever(tmp_path: Path, monkeypatch:
     """HI13."""
     with LiveServer(tmp_path) as server:
         terrain, secret, _ = drawn(server, 1)
-        pasts = server.assembly.hub._pasts
-        pasts._places = Places(Share(2))
+        rooms = server.assembly.hub._history_rooms
+        rooms._places = Places(Share(2))
         first = server.join(terrain, secret, "p0", at=0)
         again = server.join(terrain, secret, "p0", at=1)
         assert first.closed()[0] == c.WS_CLOSE["bad_hello"]
@@ -223,20 +223,20 @@ def test_rooms_of_the_past_are_few_and_not_for_ever(tmp_path: Path, monkeypatch:
         third = Peer(server.socket())
         third.say("hello", protocol=c.PROTOCOL_VERSION, terrain=terrain, secret=secret, client="p2", at=1)
         code, error = third.closed()
-        assert (code, error and error["message"]) == (c.WS_CLOSE["room_full"], past.CROWDED)
+        assert (code, error and error["message"]) == (c.WS_CLOSE["room_full"], history_view.CROWDED)
         for peer in (again, other):
             peer.close()
-        empty(pasts)
-        monkeypatch.setattr(c, "PAST_IDLE_SECONDS", 0.3)
+        empty(rooms)
+        monkeypatch.setattr(c, "HISTORY_IDLE_SECONDS", 0.3)
         code, error = server.join(terrain, secret, "p3", at=1).closed()
-        assert (code, error and error["message"]) == (c.WS_CLOSE["room_full"], past.IDLE)
-        empty(pasts)
+        assert (code, error and error["message"]) == (c.WS_CLOSE["room_full"], history_view.IDLE)
+        empty(rooms)
 
 
-def empty(pasts: past.Pasts) -> None:
+def empty(rooms: history_view.HistoryRooms) -> None:
     """Waits until nobody looks at the past."""
     deadline = time.monotonic() + 60
-    while len(pasts):
+    while len(rooms):
         assert time.monotonic() < deadline
         time.sleep(0.02)
 
@@ -253,13 +253,13 @@ def test_a_revoked_link_ends_looking_back_too(tmp_path: Path) -> None:
 
 def test_the_past_of_any_clock_is_what_the_journal_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """HI12: back and forth, with waypoints dropped and the journal asked in between."""
-    monkeypatch.setattr(past, "FAR_OPS", 7)
-    monkeypatch.setattr(past, "WAYPOINT_OPS", 3)
-    monkeypatch.setattr(past, "WAYPOINTS", 4)
+    monkeypatch.setattr(history_view, "FAR_OPS", 7)
+    monkeypatch.setattr(history_view, "WAYPOINT_OPS", 3)
+    monkeypatch.setattr(history_view, "WAYPOINTS", 4)
     journal = Journal(tmp_path)
     journal.create(c.Document(id="t")).result()
     journal.append("t", rows(1, 40)).result()
-    reader = past.Past(journal, StrokeSet("t"))
+    reader = history_view.HistoryReader(journal, StrokeSet("t"))
     for clock in (5, 9, 30, 28, 40, 0, 1, 12, 39, 20, 99):
         document, steps = reader.go(clock)
         assert document.clock == min(clock, 40)

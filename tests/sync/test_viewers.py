@@ -18,7 +18,7 @@ import pytest
 from esker import contract as c
 from esker.contract import Stroke
 from tests.sync.harness import LiveServer, Peer, set_op, stroke
-from tests.sync.test_exports import WISH, Maker
+from tests.sync.test_exports import WANTED, Maker
 
 NAME, LABEL, ID, HEIGHT = "Zerubabel", "Gravenhurst", "xq7deleted", 543.2109375
 SECRETS = (NAME, LABEL, str(HEIGHT))
@@ -90,7 +90,7 @@ def test_every_route_that_a_link_to_look_reaches(live: LiveServer, maker: Maker)
     status, body, _ = live.raw("GET", f"/api/terrains/{terrain}/document", None, owner)
     assert status == 200
     assert set(found(body)) == set(SECRETS), "the owner sees all of it: the search can find"
-    exported = live.http("POST", f"/api/terrains/{terrain}/exports", WISH, view)[1]["id"]
+    exported = live.http("POST", f"/api/terrains/{terrain}/exports", WANTED, view)[1]["id"]
     asked = 0
     for method, path in routes(live):
         known = {"terrain": terrain, "job": exported, "link_id": "x", "digest": "0" * 64}

@@ -256,7 +256,7 @@ def live() -> Iterator[Call]:
     for name, bads in {
         "anchor": (1, (1,), (NAN, 0), (1e9, 0.0)), "rotation": ("a", NAN, 400.0), "spacing": ("5", NAN, -1.0),
         "accuracy": (NAN, -1.0), "priority": (1.5, NAN, 10**9), "scale": (NAN, 1e9), "lift": (NAN, 1e300),
-        "name": (5, "x" * 81), "source": (5, "x" * 241), "told": (5,), "answers": (5, {"a": 5}),
+        "name": (5, "x" * 81), "source": (5, "x" * 241), "on_status": (5,), "answers": (5, {"a": 5}),
     }.items():  # fmt: skip
         for bad in bads:
             yield call(t.add_grid, HILLS, **({"spacing": 5.0} | {name: bad}))

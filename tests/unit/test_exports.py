@@ -373,13 +373,15 @@ def test_a_file_is_whole_or_not_there(terrain: Terrain, tmp_path: Path, monkeypa
     assert list(tmp_path.iterdir()) == []
 
 
-def test_every_wish_of_the_page_has_an_estimate() -> None:
+def test_every_export_of_the_page_has_an_estimate() -> None:
     """SPEC X30."""
     for kind in formats.FORMATS:
         sizes = [int(n) for n in contract.EXPORT_LEVELS]
-        wishes = [ExportRequest(format=kind, samples=n) for n in sizes]
-        fine = [w for w in wishes if not formats.refusal(w)]
-        assert [w.samples for w in wishes if w not in fine] == ([n for n in sizes if n > 1025] if kind == "glb" else [])
+        requests = [ExportRequest(format=kind, samples=n) for n in sizes]
+        fine = [w for w in requests if not formats.refusal(w)]
+        assert [w.samples for w in requests if w not in fine] == (
+            [n for n in sizes if n > 1025] if kind == "glb" else []
+        )
         costs = [formats.estimate(w) for w in fine]
         assert [c.bytes for c in costs] == sorted(c.bytes for c in costs)
         assert all(c.seconds > 0 for c in costs)

@@ -156,7 +156,7 @@ def test_taking_back_what_another_did_is_no_undo() -> None:
     assert t.says() == ["ana drew a mountain", "ben deleted a mountain", "ben undid deleting a mountain"]
 
 
-def test_a_chronicle_may_be_continued_or_begin_anywhere() -> None:
+def test_a_log_may_be_continued_or_begin_anywhere() -> None:
     """HI5."""
     t = Told_(strokes=(stroke("b"),))
     t.does("ana", *drawn("a", author="Ana"), label("b", "B"))

@@ -166,7 +166,7 @@ def test_views_select_by_the_sum() -> None:
         solve(server, ground, 1, True)
         client = ClientTiles(server)
         client.set_view(LOOK)
-        wanted.append((sum(int(m.sum()) for m in client.wanted()), len(server.wishes([client])[0])))
+        wanted.append((sum(int(m.sum()) for m in client.wanted()), len(server.requests([client])[0])))
         found = server.surface.bounds()
         assert found.error.max() > 0.5 if ground.__class__ is Ground else found.error.max() == 0
     assert wanted[0][1] > 5
@@ -184,7 +184,7 @@ def test_refined_tiles_are_looked_into_by_the_sum() -> None:
     solve(server, Ground(), 1, True)
 
     for _ in range(3):
-        for key in server.wishes([client.tiles])[0]:
+        for key in server.requests([client.tiles])[0]:
             under = base.tile(key).heights
             assert server.put_tile(1, Made(key, -under, under))
     assert max(key.level for key in client.tiles.wanted_refined()) <= LEVELS + 2
@@ -203,11 +203,11 @@ def test_the_ground_is_settled_when_heights_came_after_the_base() -> None:
     assert not server.settled(), "these heights were solved over another base"
     client = ClientTiles(server)
     client.set_view(LOOK)
-    assert server.wishes([client]) == ((), 0)
+    assert server.requests([client]) == ((), 0)
     assert not server.put_tile(1, ground.tile(TileKey(LEVELS + 1, 3, 4), base))
     solve(server, ground, 1, True)
     assert server.settled()
-    assert server.wishes([client])[0]
+    assert server.requests([client])[0]
 
 
 def test_refined_base_is_made_once_more_when_the_layers_change() -> None:

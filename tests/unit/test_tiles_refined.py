@@ -104,8 +104,8 @@ def test_the_selection_is_closed_under_parents_and_restricted(seed: int, levels:
     client = ClientTiles(server)
     client.set_view(near(200.0, 275.0, 50.0, rng.uniform(-0.5, 0.5), tau_px=0.5))
     solve(server, ground, 1, True, range(levels + 1))
-    while wishes := server.wishes([client])[0]:
-        assert all(server.put_tile(1, ground.tile(key)) for key in wishes)
+    while requests := server.requests([client])[0]:
+        assert all(server.put_tile(1, ground.tile(key)) for key in requests)
     wanted, below = client.wanted_refined(), client.wanted()
     assert wanted
     for key in wanted:
@@ -120,27 +120,29 @@ def test_the_selection_is_closed_under_parents_and_restricted(seed: int, levels:
             assert below[level - 1][y >> 1, x >> 1]
 
 
-def test_wishes_go_coarse_to_fine_then_by_screen_error_and_after_their_parents() -> None:
+def test_requests_go_coarse_to_fine_then_by_screen_error_and_after_their_parents() -> None:
     server, ground = TileServer(SIZE_M, LEVELS, FINEST), Ground([TIP, Bump(220.0, 330.0, 9.0, 4.0)])
     client = ClientTiles(server)
     client.set_view(LOOK)
     solve(server, ground, 1, True)
     seen: list[int] = []
-    while wishes := server.wishes([client])[0]:
-        assert [k.level for k in wishes] == sorted(k.level for k in wishes)
+    while requests := server.requests([client])[0]:
+        assert [k.level for k in requests] == sorted(k.level for k in requests)
         errors = dict(client.missing())
-        for level in {k.level for k in wishes}:
-            here = [errors[k] for k in wishes if k.level == level]
+        for level in {k.level for k in requests}:
+            here = [errors[k] for k in requests if k.level == level]
             assert here == sorted(here, reverse=True)
-        for key in wishes:
-            assert key.level == LEVELS + 1 or server.refined.get(key.parent()) or key.parent() in wishes
+        for key in requests:
+            assert key.level == LEVELS + 1 or server.refined.get(key.parent()) or key.parent() in requests
             server.put_tile(1, ground.tile(key))
-        seen += [k.level for k in wishes]
+        seen += [k.level for k in requests]
     assert set(seen) == set(range(LEVELS + 1, FINEST + 1))
 
 
 @pytest.mark.parametrize("eye_m", [6.0, 40.0])
-def test_several_unknown_levels_are_wished_at_once_near_a_crest(eye_m: float, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_several_unknown_levels_are_requested_at_once_near_a_crest(
+    eye_m: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """SPEC Q7: fewer rounds than levels, the same tiles wanted in the end, and few made for nothing."""
 
     def made(likely: float) -> tuple[int, int, set[TileKey]]:
@@ -150,9 +152,9 @@ def test_several_unknown_levels_are_wished_at_once_near_a_crest(eye_m: float, mo
         client.set_view(near(200.0, 275.0, eye_m, tau_px=0.7))
         solve(server, ground, 1, True)
         rounds = 0
-        while wishes := server.wishes([client])[0]:
+        while requests := server.requests([client])[0]:
             rounds += 1
-            assert all(server.put_tile(1, ground.tile(key)) for key in wishes)
+            assert all(server.put_tile(1, ground.tile(key)) for key in requests)
         return rounds, len(server.refined), client.wanted_refined()
 
     guessed, one_by_one = made(sparse.LIKELY), made(np.inf)
@@ -162,23 +164,23 @@ def test_several_unknown_levels_are_wished_at_once_near_a_crest(eye_m: float, mo
     assert guessed[2] == one_by_one[2]
 
 
-def test_clients_wishes_are_merged() -> None:
+def test_clients_requests_are_merged() -> None:
     server, ground = TileServer(SIZE_M, LEVELS, FINEST), Ground([TIP])
     clients = [ClientTiles(server) for _ in range(3)]
     for client, view in zip(clients, (LOOK, LOOK, near(100.0, 300.0, 5.0, turn=1.57)), strict=True):
         client.set_view(view)
     solve(server, ground, 1, True)
-    wishes, count = server.wishes(clients)
-    assert len(wishes) == len(set(wishes)) == count
-    assert set(wishes) == {key for client in clients for key, _ in client.missing()}
+    requests, count = server.requests(clients)
+    assert len(requests) == len(set(requests)) == count
+    assert set(requests) == {key for client in clients for key, _ in client.missing()}
 
 
 def test_nothing_is_wanted_while_the_ground_moves() -> None:
     server, ground, client = at_rest()
     client.tiles.set_view(near(220.0, 320.0, 5.0))
-    assert server.wishes([client.tiles])[0]
+    assert server.requests([client.tiles])[0]
     solve(server, ground, 2, False, range(1))
-    assert server.wishes([client.tiles]) == ((), 0)
+    assert server.requests([client.tiles]) == ((), 0)
     assert not server.put_tile(1, ground.tile(TileKey(LEVELS + 1, 3, 4)))
 
 
@@ -188,7 +190,7 @@ def test_a_preview_that_is_only_noted_ends_nothing() -> None:
     epoch = server.refined.epoch
     server.note(2, 0, ground.level(0, False))
     assert (server.refined.active, server.refined.epoch, server.refined.clock) == (True, epoch, 1)
-    assert server.wishes([client.tiles]) == ((), 0), "what was made is still right"
+    assert server.requests([client.tiles]) == ((), 0), "what was made is still right"
     server.put_level(2, LEVELS, ground.level(LEVELS, False), False)
     assert not server.refined.active
 
@@ -298,8 +300,8 @@ def pairs(keys: set[TileKey], others: set[TileKey], level: int) -> list[tuple[Ti
 def make_all_but(server: TileServer, ground: Ground, clock: int, client: Client, late: TileKey) -> None:
     """Refines what is wanted, without one tile and what depends on it."""
     for _ in range(20):
-        wishes = [k for k in server.wishes([client.tiles])[0] if k.level <= late.level and k != late]
-        for key in wishes:
+        requests = [k for k in server.requests([client.tiles])[0] if k.level <= late.level and k != late]
+        for key in requests:
             server.put_tile(clock, ground.tile(key))
         client.drain()
     assert {k for k, _ in client.tiles.missing() if k.level <= late.level} == {late}
@@ -370,7 +372,7 @@ def test_the_room_is_bounded_whatever_everybody_wants() -> None:
     solve(server, ground, 1, True)
     settle(server, ground, 1, clients)
     assert len(server.refined) <= 50
-    assert server.wishes([c.tiles for c in clients]) == ((), 0), "what there is no room for is not asked for"
+    assert server.requests([c.tiles for c in clients]) == ((), 0), "what there is no room for is not asked for"
 
 
 def test_clients_share_what_they_hold() -> None:
@@ -406,7 +408,7 @@ def test_levels_that_cannot_be_refined_are_refused() -> None:
 
 def test_heights_that_are_not_a_tile_are_refused_and_change_nothing() -> None:
     server, ground, _ = at_rest()
-    key = next(k for k in server.wishes([])[0] or [TileKey(LEVELS + 1, 3, 4)])
+    key = next(k for k in server.requests([])[0] or [TileKey(LEVELS + 1, 3, 4)])
     before, stamp = server.refined.get(key), server.refined.stamp
     bad = ground.tile(key).heights.copy()
     bad[3, 3] = np.nan
@@ -436,7 +438,7 @@ def test_levels_above_a_limit_are_forgotten_and_come_back() -> None:
     client.drain()
     assert {k.level for k in client.decoder.held} == {0, 1}
     assert server.settled()
-    assert server.wishes([client.tiles]) == ((), 0)
+    assert server.requests([client.tiles]) == ((), 0)
     server.limit(LEVELS)
     assert not server.settled()
     solve(server, ground, 3, True)

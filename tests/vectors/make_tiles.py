@@ -205,8 +205,8 @@ def refined() -> list[bytes]:
             drain()
 
     def settle(clock: int, lift: float) -> None:
-        while wishes := server.wishes([client])[0]:
-            for key in wishes:
+        while requests := server.requests([client])[0]:
+            for key in requests:
                 assert server.put_tile(clock, Made(key, lift))
             drain()
 
@@ -251,8 +251,8 @@ def based() -> list[bytes]:
             send(int(rng.integers(0, 3)))
 
     def settle(clock: int, lift: float, hill: float | None) -> None:
-        while wishes := server.wishes([client])[0]:
-            for key in wishes:
+        while requests := server.requests([client])[0]:
+            for key in requests:
                 tile = Made(key, lift, 0.0)
                 if hill is not None:
                     step = SIZE_M / (64 << key.level)

@@ -96,12 +96,12 @@ def _solver(device: str | None, level: int, threads: int | None, out: Out) -> An
     from esker.solve.solver import Solver
 
     class Watched(Solver):
-        told = 0
+        steps_done = 0
 
         def tell(self, event: SolveEvent) -> None:
             if isinstance(event, Pause):
-                self.told += 1
-            out.step("solving", self.told / (self.told + EXPECTED_CYCLES))
+                self.steps_done += 1
+            out.step("solving", self.steps_done / (self.steps_done + EXPECTED_CYCLES))
 
         def steps(self, *given: Any, **more: Any) -> Any:
             for result in (solving := super().steps(*given, **more)):
@@ -120,19 +120,19 @@ def _made(task: wire.Task, device: str | None, grids: dict[str, Raster], out: Ou
     from esker.exporting.formats import FORMATS, export, packed, sent_name
     from esker.exporting.ground import Extent
 
-    wish, folder = task.wish, Path(task.folder)
-    form = FORMATS[wish.format]
-    extent = Extent.of(None, wish.samples)
+    wanted, folder = task.wanted, Path(task.folder)
+    form = FORMATS[wanted.format]
+    extent = Extent.of(None, wanted.samples)
     out.step("solving", 0.0)
     solver = _solver(device, extent.level, task.threads, out)
     terrain = Terrain.from_document(task.document, grids, solver, trusted=True)
     levels = {"global_level": task.global_level, "refined_level": max(task.refined_level, task.global_level)}
     path = folder / (task.name + form.suffixes[0])
     ground = export(
-        terrain, path, wish.format, extent, detail=wish.detail, step=out.step, weights=wish.weights, **levels
+        terrain, path, wanted.format, extent, detail=wanted.detail, step=out.step, weights=wanted.weights, **levels
     )
     if form.sent:
-        packed(folder, sent_name(wish.format, task.name))
+        packed(folder, sent_name(wanted.format, task.name))
     return ground
 
 
@@ -155,7 +155,7 @@ def work(task: wire.Task, out: Out) -> wire.Made:
                 raise
             log.warning("exporting on %s failed: %s", device, error)
     assert ground is not None, "numpy is always there"
-    file = sent_name(task.wish.format, task.name)
+    file = sent_name(task.wanted.format, task.name)
     low, high = ground.range_m
     size = (Path(task.folder) / file).stat().st_size
     return wire.Made(file=file, bytes=size, low_m=low, high_m=high, spacing_m=ground.spacing_m)

@@ -96,12 +96,12 @@ class LiveLayers(ABC):
         source: str | None = None,
         licence: str | None = None,
         answers: Mapping[str, str] | None = None,
-        told: Callable[[c.ImportStatus], None] = lambda _: None,
+        on_status: Callable[[c.ImportStatus], None] = lambda _: None,
     ) -> str:
         """Lays an elevation grid on the terrain, for everybody; returns the layer's id. An undo step of ours.
 
-        As ``Terrain.add_grid``, done by the server: ``told`` hears how far it is. Raises Refused, ValueError for what
-        is no grid, OSError, TimeoutError.
+        As ``Terrain.add_grid``, done by the server: ``on_status`` hears how far the import is. Raises Refused,
+        ValueError for what is no grid, OSError, TimeoutError.
         """
         fields = {
             "anchor": None if anchor is None else arguments.pair("anchor", anchor),
@@ -115,11 +115,11 @@ class LiveLayers(ABC):
             "licence": licence,
         }
         rank = None if priority is None else arguments.whole("priority", priority, -(10**6), 10**6)
-        arguments.called("told", told)
+        arguments.called("on_status", on_status)
         said = arguments.texts("answers", answers)
         arguments.model(c.ImportAnswers, {"answers": said, **fields})  # before anything is sent
         with Uploads(self._address, self._ca_file) as uploads:
-            layer = bring_in(uploads, grid, fields, said, told, self._client)
+            layer = bring_in(uploads, grid, fields, said, on_status, self._client)
         self._await(lambda: layer in self._sync.confirmed.layers, ARRIVES_SECONDS, "the new layer did not come")
         if rank is not None:
             self.set_grid(layer, priority=rank)
@@ -144,7 +144,7 @@ def bring_in(
     grid: ArrayLike | str | Path,
     fields: Mapping[str, Any],
     answers: Mapping[str, str],
-    told: Callable[[c.ImportStatus], None],
+    on_status: Callable[[c.ImportStatus], None],
     client: str,
 ) -> str:
     """Uploads a file or an array and follows its import to the end; returns the id of the layer.
@@ -155,14 +155,14 @@ def bring_in(
     """
     given = {name: value for name, value in fields.items() if value is not None}
     if isinstance(grid, str | Path):
-        return _follow(uploads, arguments.path("grid", grid), given, answers, told, client)
+        return _follow(uploads, arguments.path("grid", grid), given, answers, on_status, client)
     array = rasters.numbers(grid)
     if "spacing_m" not in given:
         raise ValueError("an array does not say how far its samples are apart: give spacing=metres or (sX, sY)")
     with tempfile.TemporaryDirectory(prefix="esker-grid-") as folder:
         path = Path(folder) / "array.npy"
         np.save(path, array, allow_pickle=False)
-        return _follow(uploads, path, given, {**ARRAY_ANSWERS, **answers}, told, client, always=True)
+        return _follow(uploads, path, given, {**ARRAY_ANSWERS, **answers}, on_status, client, always=True)
 
 
 def _follow(
@@ -170,13 +170,13 @@ def _follow(
     path: Path,
     given: Mapping[str, Any],
     answers: Mapping[str, str],
-    told: Callable[[c.ImportStatus], None],
+    on_status: Callable[[c.ImportStatus], None],
     client: str,
     always: bool = False,
 ) -> str:
     """``always``: what the answers leave open is taken as the server proposes."""
     query = f"&client={client}" + ("&hold=true" if given or answers else "")
-    status = uploads.follow(uploads.send(path, lambda _: None, query), told)
+    status = uploads.follow(uploads.send(path, lambda _: None, query), on_status)
     if status.stage == "question":
         asked = status.report.questions if status.report is not None else ()
         by_hand = {"size", "place"} if "spacing_m" in given else {"place"} if "anchor" in given else set()
@@ -186,7 +186,7 @@ def _follow(
             uploads.cancel(status)
             hints = " ".join(f"{q.text} (answers={{{q.id!r}: {q.default!r}}}, for instance)" for q in open_ones)
             raise Refused("question", f"{path.name} leaves something open. {hints}")
-        status = uploads.follow(uploads.answer(status, c.ImportAnswers(answers=found, **given)), told)
+        status = uploads.follow(uploads.answer(status, c.ImportAnswers(answers=found, **given)), on_status)
     if status.layer is None:
         raise Refused(status.stage, status.text or "The server did not take this file.")
     return status.layer

@@ -46,10 +46,10 @@ class Uploads:
             body = _CountedBody(file, size, lambda done: on_progress(done / size if size else 1.0))
             return self._call("POST", f"?name={quote(path.name, safe='')}{query}", body, size)
 
-    def follow(self, status: c.ImportStatus, told: OnStatus) -> c.ImportStatus:
-        """Asks until the import is over or asks something itself; every status is ``told``. Raises as ``send``."""
+    def follow(self, status: c.ImportStatus, on_status: OnStatus) -> c.ImportStatus:
+        """Asks until the import is over or has a question. ``on_status`` hears every status. Raises as ``send``."""
         while True:
-            told(status)
+            on_status(status)
             if status.stage in c.ENDED_IMPORT or status.stage == "question":
                 return status
             time.sleep(POLL_SECONDS)
@@ -90,8 +90,8 @@ class _CountedBody:
     """The first ``size`` bytes of a file, that tells how much of it was read. Raises OSError if it has become shorter:
     the server would wait for the rest."""
 
-    def __init__(self, file: BinaryIO, size: int, told: Callable[[int], None]) -> None:
-        self._file, self._size, self._told, self._done = file, size, told, 0
+    def __init__(self, file: BinaryIO, size: int, on_read: Callable[[int], None]) -> None:
+        self._file, self._size, self._on_read, self._done = file, size, on_read, 0
 
     def read(self, count: int = -1) -> bytes:
         left = self._size - self._done
@@ -99,5 +99,5 @@ class _CountedBody:
         if not part and left:
             raise OSError("the file became shorter while it was sent")
         self._done += len(part)
-        self._told(self._done)
+        self._on_read(self._done)
         return part

@@ -35,8 +35,8 @@ def main(argv: list[str]) -> int:
             sys.stdout.write(f"{MARKS[finding.state]}{finding.name}: {finding.text}\n")
             sys.stdout.flush()
     if options.json:
-        told = {"version": VERSION, "findings": [asdict(finding) for finding in found]}
-        sys.stdout.write(json.dumps(told, indent=1) + "\n")
+        answer = {"version": VERSION, "findings": [asdict(finding) for finding in found]}
+        sys.stdout.write(json.dumps(answer, indent=1) + "\n")
     return int(any(finding.state == "broken" for finding in found))
 
 

@@ -27,11 +27,11 @@ def main(argv: list[str]) -> int:
     except (CannotRestore, InUse, OSError) as error:
         sys.stderr.write(f"esker: {error}\n")
         return 1
-    sys.stdout.write(_told(done))
+    sys.stdout.write(_report(done))
     return 0
 
 
-def _told(done: Restored) -> str:
+def _report(done: Restored) -> str:
     lines = [f"Restored from {done.copy}: {done.terrains} terrains, {done.ops} operations."]
     if done.aside is not None:
         lines.append(f"What was there before is in {done.aside}.")

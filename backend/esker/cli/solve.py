@@ -283,8 +283,8 @@ def _with_detail(
     size, n = document.settings.size_m, grid.samples(level)
     r0, r1, c0, c1 = (0, n, 0, n) if corners is None else _samples(level, size, corners, MOST_SAMPLES // 10)
     progress = None if quiet else Progress(sys.stderr, DEFAULT_LEVEL)
-    told = progress.step if progress else None
-    settled = settle(solver, document.strokes, document.settings, DEFAULT_LEVEL, told, base=base)
+    step = progress.step if progress else None
+    settled = settle(solver, document.strokes, document.settings, DEFAULT_LEVEL, step, base=base)
     if progress:
         progress.close(f"{_name(DEFAULT_LEVEL)} settled in {progress.clock() - progress.start:.2f} s")
     live = not quiet and sys.stderr.isatty()

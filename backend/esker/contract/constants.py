@@ -137,9 +137,9 @@ MAX_PRESENCE_PER_SECOND: Final = 30
 MAX_VIEWS_PER_SECOND: Final = 60
 MAX_SEEKS_PER_SECOND: Final = 15
 MAX_MEMBERS: Final = 200
-MAX_PAST_ROOMS: Final = 8
+MAX_HISTORY_ROOMS: Final = 8
 """People of one server who look at the past at the same time: each has a solve and tiles of their own."""
-PAST_IDLE_SECONDS: Final = 600.0
+HISTORY_IDLE_SECONDS: Final = 600.0
 """Who looks at the past and neither moves the view nor goes to another clock for so long makes room for others."""
 MAX_HISTORY_OPS: Final = 100_000
 """Ops that the list of the history reaches back; earlier clocks can be looked at and copied all the same."""

@@ -32,7 +32,7 @@ class ExportRequest(Wire):
 
 
 class ExportEstimate(Wire):
-    """What a wish would cost. ``seconds``: of work, waiting for others' exports not counted."""
+    """What an export would cost. ``seconds``: of work, waiting for others' exports not counted."""
 
     bytes: int
     seconds: float

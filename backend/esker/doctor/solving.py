@@ -44,8 +44,8 @@ def devices(wanted: str | None) -> Iterator[Finding]:
         yield Finding("devices", "poor", text, {"devices": names, "drivers": {}})
     else:
         drivers = {name: driver(name) for name in names[:-1]}
-        told = "; ".join(f"{name}, driver {version}" for name, version in drivers.items())
-        yield Finding("devices", "good", f"{told}; and NumPy.", {"devices": names, "drivers": drivers})
+        listed = "; ".join(f"{name}, driver {version}" for name, version in drivers.items())
+        yield Finding("devices", "good", f"{listed}; and NumPy.", {"devices": names, "drivers": drivers})
     try:
         yield known_scene(wanted)
     except NoDeviceError as error:

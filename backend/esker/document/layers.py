@@ -13,7 +13,7 @@ from esker import contract as c
 from esker.contract import Layer
 from esker.document.refusal import Limits, Refusal, changed, trim
 
-TOLD_FIELDS: Final = frozenset({"name", "outline", "source", "licence"})
+CREDIT_FIELDS: Final = frozenset({"name", "outline", "source", "licence"})
 """Fields of a layer that are for people only; the ground follows from all the others."""
 LayerOp = c.AddLayer | c.SetLayer | c.DeleteLayer | c.RestoreLayer
 
@@ -106,7 +106,7 @@ class LayerEditor:
         self.check(new)
         self._own()
         self.layers[new.id] = new
-        differs = any(getattr(old, name) != value for name, value in update.items() if name not in TOLD_FIELDS)
+        differs = any(getattr(old, name) != value for name, value in update.items() if name not in CREDIT_FIELDS)
         self.grounded |= differs and not (old.hidden and new.hidden)
 
     def _delete(self, layer_id: str) -> None:

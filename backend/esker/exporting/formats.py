@@ -58,23 +58,23 @@ def format_of(path: Path) -> ExportFormat:
     return found
 
 
-def refusal(wish: ExportRequest) -> str:
+def refusal(wanted: ExportRequest) -> str:
     """Why there is no such export, as a sentence; empty where there is."""
-    if str(wish.samples) not in contract.EXPORT_LEVELS:
+    if str(wanted.samples) not in contract.EXPORT_LEVELS:
         return f"Samples a side are one of {', '.join(contract.EXPORT_LEVELS)}."
-    if wish.weights and wish.format != MASKS:
+    if wanted.weights and wanted.format != MASKS:
         return ONLY_MASKS
-    if wish.samples > FORMATS[wish.format].most:
+    if wanted.samples > FORMATS[wanted.format].most:
         return f"A mesh has at most {contract.EXPORT_MESH_SAMPLES} samples a side."
     return ""
 
 
-def estimate(wish: ExportRequest) -> ExportEstimate:
+def estimate(wanted: ExportRequest) -> ExportEstimate:
     """About what an export costs; see Format.bytes_each."""
-    form = FORMATS[wish.format]
-    million = wish.samples**2 / 1e6
-    seconds = START_SECONDS + million * (DETAIL_SECONDS if wish.detail or form.covers else PLAIN_SECONDS)
-    return ExportEstimate(bytes=round(form.bytes_each * wish.samples**2), seconds=round(seconds, 1))
+    form = FORMATS[wanted.format]
+    million = wanted.samples**2 / 1e6
+    seconds = START_SECONDS + million * (DETAIL_SECONDS if wanted.detail or form.covers else PLAIN_SECONDS)
+    return ExportEstimate(bytes=round(form.bytes_each * wanted.samples**2), seconds=round(seconds, 1))
 
 
 def export(

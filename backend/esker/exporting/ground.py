@@ -185,13 +185,13 @@ def _detailed(
     for start in range(r0, r1, band):
         stop = min(start + band, r1)
 
-        def told(share: float, start: int = start, stop: int = stop) -> None:
+        def report(share: float, start: int = start, stop: int = stop) -> None:
             if progress is not None:
                 progress((start - r0 + (stop - start) * share) / (r1 - r0))
 
         # A quarter of a cell beyond its samples, which rounding does not lose.
         corners = ((c0 - 0.25) * s, (start - 0.25) * s, (c1 - 0.75) * s, (stop - 0.75) * s)
-        found = terrain.window(level, *corners, detail=True, progress=told, **levels)
+        found = terrain.window(level, *corners, detail=True, progress=report, **levels)
         heights[start - r0 : stop - r0] = found.heights
         for name, mask in covers.items():
             mask[start - r0 : stop - r0] = eight_bits(found.attributes[name])

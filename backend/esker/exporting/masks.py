@@ -22,10 +22,10 @@ def write_masks(path: Path, ground: Ground) -> None:
     if not ground.masks:
         raise ValueError("masks come with the detail: there is none here")
     meaning = MEANING + (SUMMED if BARE in ground.masks else "")
-    told: dict[str, Any] = ground.facts() | {"encoding": meaning, "masks": [f"{name}.png" for name in ground.masks]}
+    facts: dict[str, Any] = ground.facts() | {"encoding": meaning, "masks": [f"{name}.png" for name in ground.masks]}
     with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
         for name, mask in ground.masks.items():
             out = io.BytesIO()
             Image.fromarray(mask[::-1]).save(out, format="PNG", compress_level=6)
             archive.writestr(f"{name}.png", out.getvalue())
-        archive.writestr("masks.json", json.dumps(told, indent=2) + "\n")
+        archive.writestr("masks.json", json.dumps(facts, indent=2) + "\n")

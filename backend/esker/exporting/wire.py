@@ -15,7 +15,7 @@ class Task(c.Wire):
     ``name``: of the file, without a suffix. ``device``, ``threads``: as for ``Solver``."""
 
     document: c.Document
-    wish: c.ExportRequest
+    wanted: c.ExportRequest
     grids: str
     folder: str
     name: str

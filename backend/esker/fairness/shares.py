@@ -1,6 +1,6 @@
 """Fair shares of what a server has only so much of: places that are held, rates, turns (decision 33).
 
-Whatever strangers can take (seats, rooms of the past, imports, exports, connections, threads) has a sum over the server
+Whatever strangers can take (seats, history rooms, imports, exports, connections, threads) has a sum over the server
 and a share by who asks. Who asks is told by the address and by the link, never by an id that a client chooses. An IPv6
 address counts as its /64, which is what one household has, and as its /48 more loosely. Pure: no I/O; times come in.
 

@@ -224,7 +224,7 @@ def parse_size(text: str) -> float | None:
 def system_question(degrees: bool, reason: str, elsewhere: bool) -> c.ImportQuestion:
     """Asks in which coordinate system a file lies.
 
-    ``reason``: why that is not known; ``elsewhere``: as degrees it would lie outside the terrain, so that laying it by
+    ``reason``: why that is not known; ``elsewhere``: as degrees it would lie outside the terrain, so that placing it by
     hand is the default.
     """
     if degrees:

@@ -72,7 +72,7 @@ class Job:
     link: Link
     person: str
     """Of whom one export at a time is taken."""
-    wish: ExportRequest
+    wanted: ExportRequest
     folder: Path
     status: ExportStatus
     place: Place
@@ -120,13 +120,13 @@ class Exports:
 
     # --- for routes ---------------------------------------------------------------------------------------------
 
-    async def begin(self, terrain: str, link: Link, person: str, wish: ExportRequest, who: Who) -> ExportStatus:
+    async def begin(self, terrain: str, link: Link, person: str, wanted: ExportRequest, who: Who) -> ExportStatus:
         """Begins an export, or has it wait for its turn; it goes on by itself. Raises Cannot, OSError, and Denied where
         there is no such terrain."""
-        if sentence := formats.refusal(wish):
+        if sentence := formats.refusal(wanted):
             raise Cannot(400, "malformed", sentence)
         self._check(terrain, person, who)
-        document = await self._hub.document(terrain, wish.at, who)
+        document = await self._hub.document(terrain, wanted.at, who)
         if link.role == "view":
             document = shown(document)
         self._hub.demand(link)
@@ -135,23 +135,23 @@ class Exports:
         folder = self._folder / job_id
         folder.mkdir(parents=True)
         try:
-            room = formats.free_bytes(self._folder) - SPARE_BYTES - 2 * formats.estimate(wish).bytes
+            room = formats.free_bytes(self._folder) - SPARE_BYTES - 2 * formats.estimate(wanted).bytes
             if room < 0:
                 raise Cannot(507, "storage", "The server has no room for this file (is its disk full?).")
         except BaseException:
             shutil.rmtree(folder, ignore_errors=True)
             raise
         status = ExportStatus(id=job_id, stage="waiting", text=WAITING if self._turn.locked() else "")
-        job = self._jobs[job_id] = Job(job_id, terrain, link, person, wish, folder, status, self._places.take(who))
+        job = self._jobs[job_id] = Job(job_id, terrain, link, person, wanted, folder, status, self._places.take(who))
         job.task = asyncio.create_task(self._run(job, self._task(job, document)))
         job.task.add_done_callback(lambda _: job.place.release())  # also where it was cancelled before it began
         return job.status
 
-    def estimate(self, wish: ExportRequest) -> ExportEstimate:
+    def estimate(self, wanted: ExportRequest) -> ExportEstimate:
         """About what an export costs, at the pace of the last ones here. Raises Cannot."""
-        if sentence := formats.refusal(wish):
+        if sentence := formats.refusal(wanted):
             raise Cannot(400, "malformed", sentence)
-        plain = formats.estimate(wish)
+        plain = formats.estimate(wanted)
         return plain.model_copy(update={"seconds": round(plain.seconds * self._pace, 1)})
 
     def status(self, terrain: str, job_id: str, link: Link) -> ExportStatus:
@@ -171,7 +171,7 @@ class Exports:
         job = self._own(terrain, job_id, link)
         if job.status.stage != "done":
             raise Cannot(409, "not_done", "This export is not done.")
-        return Finished(job.folder / job.status.file, job.status.file, formats.FORMATS[job.wish.format].media)
+        return Finished(job.folder / job.status.file, job.status.file, formats.FORMATS[job.wanted.format].media)
 
     def end(self, terrain: str, links: Collection[str]) -> None:
         """Links were revoked: what is being made for them ends, and what was made is removed."""
@@ -215,10 +215,10 @@ class Exports:
         stem = re.sub(r"[\W_]+", "-", document.settings.title)[:STEM].strip("-").lower() or "terrain"
         return wire.Task(
             document=document.model_copy(update={"deleted": (), "deleted_layers": ()}),
-            wish=job.wish,
+            wanted=job.wanted,
             grids=str(self._grids.resolve()),
             folder=str(job.folder.resolve()),
-            name=f"{stem}-{job.wish.samples}",
+            name=f"{stem}-{job.wanted.samples}",
             device=plant.device,
             threads=plant.threads,
             global_level=plant.level,
@@ -231,11 +231,11 @@ class Exports:
                 started = self._now()
                 job.at("solving", text="")
                 made = await self._maker(task, lambda stage, share: job.at(stage, share=share))
-            told = made.model_dump(exclude={"type"})
-            job.at("done", share=1.0, **told)
+            fields = made.model_dump(exclude={"type"})
+            job.at("done", share=1.0, **fields)
             took = self._now() - started
             low, high = PACE
-            pace = min(max(took / formats.estimate(job.wish).seconds, low), high)
+            pace = min(max(took / formats.estimate(job.wanted).seconds, low), high)
             self._pace = 0.5 * (self._pace + pace)
             log.info("export %s of %s in %.1f s", made.file, job.terrain, took)
         except asyncio.CancelledError:

@@ -72,7 +72,7 @@ class Job:
     answers: c.ImportAnswers = field(default_factory=c.ImportAnswers)
     answered: asyncio.Event = field(default_factory=asyncio.Event)
     task: asyncio.Task[None] | None = None
-    told: tuple[str, float] = ("", 0.0)
+    last_sent: tuple[str, float] = ("", 0.0)
     """Stage and time of the last broadcast."""
     ended: float = 0.0
 

@@ -393,9 +393,9 @@ class Imports:
             return
         job.stage, job.share, job.text = stage, share, text
         now = self._now()
-        if job.told[0] == stage and now - job.told[1] < TELL_SECONDS:
+        if job.last_sent[0] == stage and now - job.last_sent[1] < TELL_SECONDS:
             return
-        job.told = (stage, now)
+        job.last_sent = (stage, now)
         room = self._hub.open_room(job.terrain) if job.terrain else None
         if room is not None:
             # The report is for who brings the file in, and comes with the answers of HTTP.

@@ -16,26 +16,26 @@ PITCH: Final = PATCH_CELLS + 1
 VERTICES_PER_DRAW: Final = 60_000
 """llvmpipe of Mesa 22 can take 65,536 tessellated vertices at once."""
 
-# Sheets of water have a level of their own beside the record (water.wgsl).
+# Patches of water have a level of their own beside the record (water.wgsl).
 _RECORD_VERTEX: Final = """#version 430
 layout(location = 0) in uvec4 a_0;
 layout(location = 1) in vec4 a_1;
 out uvec4 record_in;
-out vec4 sheet_in;
-void main() { record_in = a_0; sheet_in = a_1; }
+out vec4 water_in;
+void main() { record_in = a_0; water_in = a_1; }
 """
 # A patch has 16 segments a side; 8 where its neighbour is coarser, which leaves exactly the vertices that both have.
 _CONTROL: Final = """#version 430
 layout(vertices = 1) out;
 in uvec4 record_in[];
-in vec4 sheet_in[];
+in vec4 water_in[];
 patch out uvec4 record_out;
-patch out vec4 sheet_out;
+patch out vec4 water_out;
 {functions}
 void main() {{
   uvec4 record = record_in[0];
   record_out = record;
-  sheet_out = sheet_in[0];
+  water_out = water_in[0];
   uint edges = patch_edges(record);
   float full = {cells}.0;
   gl_TessLevelOuter[0] = (edges & 1u) != 0u ? 0.5 * full : full;
@@ -46,7 +46,7 @@ void main() {{
   gl_TessLevelInner[1] = full;
 }}
 """
-_HEAD: Final = "layout(quads, equal_spacing, ccw) in;\npatch in uvec4 record_out;\npatch in vec4 sheet_out;"
+_HEAD: Final = "layout(quads, equal_spacing, ccw) in;\npatch in uvec4 record_out;\npatch in vec4 water_out;"
 _NEAREST: Final = f"""
 uint grid_point() {{
   uvec2 g = uvec2(gl_TessCoord.xy * {PATCH_CELLS}.0 + 0.5);
@@ -67,7 +67,7 @@ _BETWEEN: Final = f"""ivec2 g = ivec2(gl_TessCoord.xy * {PATCH_CELLS}.0 * {{fact
 
 def _evaluation(factor: int) -> Feed:
     """What the tessellation evaluation stage feeds to a vertex entry point, ``factor`` segments a cell."""
-    locations = {0: "record_out", 1: "sheet_out"}
+    locations = {0: "record_out", 1: "water_out"}
     if factor == 1:
         return Feed({"vertex_index": "grid_point()"}, locations, _HEAD + _NEAREST)
     return Feed({"vertex_index": "at[k]"}, locations, _HEAD, _BETWEEN.format(factor=factor))

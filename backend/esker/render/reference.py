@@ -21,7 +21,7 @@ from esker.render.programs import Compute, Draw, Resources
 from esker.render.select import Cut, choose, frustum
 from esker.render.surface import Surface
 from esker.render.tables import noise_mipmaps, stone_mipmaps
-from esker.synthesis.lakes import Lakes, Surfaces, levels_on, sheet, waves_of
+from esker.synthesis.lakes import Lakes, Surfaces, lake_texture, levels_on, waves_of
 
 Pixels = NDArray[np.uint8]
 
@@ -125,7 +125,7 @@ class Reference:
             view = StructLayout(sources.background(self._detail), "View").pack(values)
             resources.buffers["view"] = self.context.buffer(view)
             seen = self._seen(cut, scene, rect, surface)
-            records = _Records(self.context, cut, words, seen, _sheets(cut, words, seen, scene.settings, lakes))
+            records = _Records(self.context, cut, words, seen, _water_patches(cut, words, seen, scene.settings, lakes))
             out[rect.top : rect.top + rect.height, rect.left : rect.left + rect.width] = self._part(
                 rect, scene, resources, records, bare=bare
             )
@@ -188,7 +188,7 @@ class Reference:
         return Resources(textures, self._fixed, {"skylight": ambient}), amplitude
 
     def _lake_map(self, lakes: Lakes | None) -> moderngl.Texture:
-        texels = np.zeros((2, 2, 2), dtype=np.float32) if lakes is None else sheet(lakes)
+        texels = np.zeros((2, 2, 2), dtype=np.float32) if lakes is None else lake_texture(lakes)
         return self.context.texture(texels.shape[:2], 2, texels.tobytes(), dtype="f4")
 
     def _bake(self, scene: Scene) -> tuple[moderngl.Texture, moderngl.Buffer]:
@@ -284,13 +284,13 @@ class Reference:
         self.context.enable(moderngl.BLEND)
         over = (moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA)
         self.context.blend_func = (*over, moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA)  # type: ignore[assignment]
-        run("water", records.sheets, records.sheet_count, layout="4u4 4f4", writes=False)
+        run("water", records.water, records.water_count, layout="4u4 4f4", writes=False)
         self.context.disable(moderngl.BLEND)
         target.depth_mask = True
 
 
 class _Records:
-    """Patches of the cut on the device; see patch.wgsl for what the words are. ``seen``: which ones; ``sheets``: of
+    """Patches of the cut on the device; see patch.wgsl for what the words are. ``seen``: which ones; ``water``: of
     water, (n, 8)."""
 
     def __init__(
@@ -299,14 +299,14 @@ class _Records:
         cut: Cut,
         words: NDArray[np.uint32],
         seen: NDArray[np.bool_],
-        sheets: NDArray[np.uint32],
+        water: NDArray[np.uint32],
     ) -> None:
         borders = np.where(seen, cut.border, 0).tolist()
         sides = [(i, bit) for i, border in enumerate(borders) for bit in (1, 2, 4, 8) if border & bit]
         walls = np.array([[*words[i], bit] for i, bit in sides], dtype=np.uint32).reshape(-1, 5)
         ground = words[seen]
-        self.count, self.wall_count, self.sheet_count = len(ground), len(walls), len(sheets)
-        self.all, self.walls, self.sheets = (_buffer(context, data) for data in (ground, walls, sheets))
+        self.count, self.wall_count, self.water_count = len(ground), len(walls), len(water)
+        self.all, self.walls, self.water = (_buffer(context, data) for data in (ground, walls, water))
 
 
 def _buffer(context: moderngl.Context, data: NDArray[np.uint32]) -> moderngl.Buffer:
@@ -329,10 +329,10 @@ def _words(cut: Cut, atlas: Atlas) -> NDArray[np.uint32]:
     return out
 
 
-def _sheets(
+def _water_patches(
     cut: Cut, words: NDArray[np.uint32], seen: NDArray[np.bool_], settings: TerrainSettings, lakes: Lakes | None
 ) -> NDArray[np.uint32]:
-    """Sheets of water on patches, (n, 8): record, level, level that the lake is known by, waves. The sea comes first
+    """Patches of water, (n, 8): record, level, level that the lake is known by, waves. The sea comes first
     (frontend/src/gpu/passes/patches.ts)."""
     waves = {} if lakes is None else waves_of(lakes, settings.size_m)
     rows: list[tuple[int, float, float, float]] = []

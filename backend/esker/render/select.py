@@ -2,7 +2,7 @@
 
 A patch is split while it commits more than ``tau`` pixels of error; then neighbours, across corners too, are split
 until they differ by at most one level. Each corner of a drawn patch gets a morph weight that belongs to its point: 1
-where a coarser patch meets it, 0 where a finer one does, else the greatest wish of the patches there
+where a coarser patch meets it, 0 where a finer one does, else the greatest weight that is asked by the patches there
 (docs/renderer.md).
 """
 

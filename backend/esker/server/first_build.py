@@ -156,10 +156,10 @@ def loops() -> dict[str, Any]:
     return {"loops": True}
 
 
-def have_loops(stopped: threading.Event, told: threading.Event) -> None:
+def have_loops(stopped: threading.Event, begun: threading.Event) -> None:
     """Compiles the loops in a child process, unless one has done so, then loads them into this process.
 
-    ``told`` is set while they are compiled.
+    ``begun`` is set before they are compiled.
     """
     from esker import compiled
     from esker.tiles import pyramid
@@ -170,7 +170,7 @@ def have_loops(stopped: threading.Event, told: threading.Event) -> None:
     record = home.root() / f"loops-{content[:16]}"
     try:
         if not record.exists():
-            told.set()
+            begun.set()
             if "failed" not in prepare.bounded(["loops"], stopped=stopped):
                 with suppress(OSError):
                     record.parent.mkdir(parents=True, exist_ok=True)

@@ -37,11 +37,11 @@ const text = document.getElementById("said"), bar = document.getElementById("bar
 async function look() {
   try {
     const answer = await fetch("/healthz", {cache: "no-store"});
-    const told = await answer.json();
+    const state = await answer.json();
     if (answer.ok) { location.reload(); return; }
-    if (told.starting) {
-      text.textContent = told.starting.said;
-      if (told.starting.of) { bar.max = told.starting.of; bar.value = told.starting.done; }
+    if (state.starting) {
+      text.textContent = state.starting.said;
+      if (state.starting.of) { bar.max = state.starting.of; bar.value = state.starting.done; }
       else bar.removeAttribute("value");
     }
   } catch { /* the server changes hands: ask again */ }
@@ -214,9 +214,9 @@ def answer(head: bytes, progress: Progress) -> bytes:
     if people:
         body, kind, policy = _PAGE.replace("SAID", f"{progress.said} ..."), "text/html; charset=utf-8", _POLICY
     else:
-        told = {"ok": False, "version": VERSION, "starting": asdict(progress)}
+        state = {"ok": False, "version": VERSION, "starting": asdict(progress)}
         refusal = {"code": "starting", "message": f"{STARTING}: {progress.said}."}
-        body, kind = json.dumps(told if path.startswith("/healthz") else refusal), "application/json"
+        body, kind = json.dumps(state if path.startswith("/healthz") else refusal), "application/json"
         policy = "default-src 'none'"
     content = body.encode()
     headers = {

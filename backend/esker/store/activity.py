@@ -66,7 +66,7 @@ class ActivityLogs:
         if not held or newest - held[0].first > 2 * self._reach:
             held[:] = [self._begin(terrain, newest)]
         activity_log = held[0]
-        activity_log.add(self._told(terrain, activity_log.clock, newest))
+        activity_log.add(self._entries(terrain, activity_log.clock, newest))
         return activity_log
 
     def _begin(self, terrain: str, newest: int) -> ActivityLog:
@@ -74,7 +74,7 @@ class ActivityLogs:
         loaded = self._journal.load(terrain, 0) if start == 0 else None
         return ActivityLog(None if loaded is None else loaded.document.to_document(), start)
 
-    def _told(self, terrain: str, after: int, upto: int) -> Iterator[JournalEntry]:
+    def _entries(self, terrain: str, after: int, upto: int) -> Iterator[JournalEntry]:
         known = timestamps.read_timestamps(self._journal.reader(), terrain, after, upto)
         clocks = [clock for clock, _ in known]
         for start in range(after, upto, READ_AT_ONCE):

@@ -99,7 +99,7 @@ def flooded(ground: NDArray[np.float64]) -> NDArray[np.float64]:
     return out
 
 
-def sheet(lakes: Lakes) -> NDArray[np.float32]:
+def lake_texture(lakes: Lakes) -> NDArray[np.float32]:
     """Returns what shaders read of lakes: (n, n, 2), ground and level of each sample (``lakes`` in view.wgsl)."""
     return np.stack((lakes.heights, lakes.levels), axis=-1)
 

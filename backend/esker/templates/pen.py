@@ -1,4 +1,4 @@
-"""A steady hand for drawing starting terrains in code: ridges, crevices, plateaux and rings as strokes.
+"""A sure hand for drawing starting terrains in code: ridges, crevices, plateaux and rings as strokes.
 
 A profile stroke lies in one vertical plane, so a chain that bends is drawn leg by leg, as a person would.
 """

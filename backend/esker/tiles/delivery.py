@@ -28,7 +28,7 @@ from esker.tiles.refined_ledger import RefinedLedger
 from esker.tiles.sparse import Selection, restrict_below, select_refined
 from esker.tiles.surface import BasePyramid, Surface
 
-WISHES: Final = 128
+MOST_REQUESTS: Final = 128
 """Most tiles that the refiner is asked for at once."""
 TAU_STEP: Final = 1.3
 """Where a view wants more refined tiles than a client may hold, its tau grows by this factor until they fit."""
@@ -174,10 +174,10 @@ class TileServer:
         final = all(level is not None and level.settled and level.stamp > self._based for level in levels)
         return final and self._base_whole and len({v.clock for v in levels if v}) == 1
 
-    def wishes(self, clients: Sequence[ClientTiles]) -> tuple[tuple[TileKey, ...], int]:
+    def requests(self, clients: Sequence[ClientTiles]) -> tuple[tuple[TileKey, ...], int]:
         """The tiles to refine next for all clients together, coarse before fine, then by screen error.
 
-        At most WISHES, with the number of all that are wanted; none while the ground moves.
+        At most MOST_REQUESTS, with the number of all that are wanted; none while the ground moves.
         """
         if not self.refined.active:
             return (), 0
@@ -194,7 +194,7 @@ class TileServer:
             fresh = (key for key in order if self.refined.get(key) is None)
             beyond = set(itertools.islice(fresh, room, None))
             order = [key for key in order if key not in beyond]
-        return tuple(order[:WISHES]), len(order)
+        return tuple(order[:MOST_REQUESTS]), len(order)
 
 
 class ClientTiles:

@@ -1,7 +1,7 @@
 """Compiled loops for what is done with every sample of a level that is put (DESIGN 6, 7).
 
 They let go of the interpreter's lock, so the solver's thread and the event loop go on beside them. Each does, to the
-bit, what its NumPy twin does: ``steady.steadied``, ``pyramid.quantise``, ``pyramid.follow_parents``,
+bit, what its NumPy twin does: ``stabiliser.steadied``, ``pyramid.quantise``, ``pyramid.follow_parents``,
 ``bounds.SubPatches``, ``codec.upsampled``. They are compiled at their first call and kept on disk where a disk allows
 it.
 """
@@ -20,7 +20,7 @@ Floats = NDArray[np.float32]
 
 @kernel
 def steadied(heights: Floats, before: Floats, correction: Floats, out: Floats) -> None:
-    """``steady.steadied`` of whole levels, (n, n) float32 each."""
+    """``stabiliser.steadied`` of whole levels, (n, n) float32 each."""
     rows, cols = heights.shape
     for r in range(rows):
         for k in range(cols):

@@ -143,7 +143,7 @@ def _between(a: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def _depth(level: int) -> int:
-    """Past states kept of a level: up to six, and no more than 64 MiB."""
+    """Earlier states kept of a level: up to six, and no more than 64 MiB."""
     return max(1, min(6, (64 << 20) // (4 * grid.samples(level) ** 2)))
 
 
@@ -167,7 +167,7 @@ class Pyramid:
         self._levels: list[Level | None] = [None] * (levels + 1)
         self._subs = [SubPatches(level) for level in range(levels + 1)]
         self._dirty: list[Mask] = [np.zeros((1 << level, 1 << level), dtype=np.bool_) for level in range(levels + 1)]
-        self._past: list[deque[Level]] = [deque(maxlen=_depth(level)) for level in range(levels + 1)]
+        self._earlier: list[deque[Level]] = [deque(maxlen=_depth(level)) for level in range(levels + 1)]
         self._steadiers = [Steadier() for _ in range(levels + 1)]
         self._parents: list[Level | None] = [None] * (levels + 1)
         """Per level: the level above as it was when this one was last put."""
@@ -185,7 +185,7 @@ class Pyramid:
     def states(self, level: int) -> list[Level]:
         """The level as it is and as it was before the last few changes, newest first."""
         newest = self._levels[level]
-        return [] if newest is None else [newest, *self._past[level]]
+        return [] if newest is None else [newest, *self._earlier[level]]
 
     def level(self, level: int) -> Level | None:
         """The level as it is now, None before it first came."""
@@ -212,28 +212,28 @@ class Pyramid:
     def preview(self, clock: int, level: int, heights: NDArray[np.float32]) -> int:
         """Replaces a level by a preview; returns the number of tiles of which a sample changed.
 
-        Heights are steadied (see ``steady``), then shown as they were but for coarse steps (``quantise``). Between a
+        Heights are stabilised (``stabiliser``), then shown as they were but for coarse steps (``quantise``). Between a
         complete preview and the settled levels of the same clock a solver may repeat coarse levels as a sign of life,
         or bring them only now: these are not shown, as they would only move the ground there and back. Takes and
         raises what ``settle`` does.
         """
         if not self._takes(level, heights) or self._comes_late(clock, level, heights):
             return 0
-        steady = self._steadiers[level].preview(clock, heights)
+        stable = self._steadiers[level].preview(clock, heights)
         if level < self.top:
-            count = self._store(clock, level, steady, False)
+            count = self._store(clock, level, stable, False)
             if level == 0:
                 self._early_shown(clock)
             return count
         self._previewed = clock
         count = 0
-        steady, newer = self._ahead(clock, steady)
+        stable, newer = self._ahead(clock, stable)
         for coarse in range(level):
             old = self._levels[coarse]
             if (old is None or old.clock != clock) and not (newer and coarse == 0):
                 step = 1 << (level - coarse)
-                count += self._store(clock, coarse, np.ascontiguousarray(steady[::step, ::step]), False)
-        return count + self._store(clock, level, steady, False)
+                count += self._store(clock, coarse, np.ascontiguousarray(stable[::step, ::step]), False)
+        return count + self._store(clock, level, stable, False)
 
     def _takes(self, level: int, heights: NDArray[np.float32]) -> bool:
         """Returns whether a level is solved at present. Raises ValueError, see ``settle``."""
@@ -302,7 +302,7 @@ class Pyramid:
             self._levels[level] = replace(old, stamp=stamp, clock=clock, settled=settled)
         else:
             if old is not None:
-                self._past[level].appendleft(old)
+                self._earlier[level].appendleft(old)
             samples.flags.writeable = False
             versions = np.where(changed, np.uint32(stamp), 0 if old is None else old.versions).astype(np.uint32)
             versions.flags.writeable = False
@@ -362,7 +362,7 @@ class Pyramid:
             raise ValueError(f"level {top} is not one of 0..{self.levels}")
         for level in range(top + 1, self.levels + 1):
             self._levels[level] = None
-            self._past[level].clear()
+            self._earlier[level].clear()
             self._steadiers[level] = Steadier()
         self.top = top
         self.stamp += 1

@@ -7,7 +7,7 @@ import type { Connection } from "../net/connection.ts";
 import type { Deletion } from "./deletion.ts";
 import type { Identity, Store } from "./device/storage.ts";
 import type { History } from "./history/history.ts";
-import type { Past } from "./history/past.ts";
+import type { HistoryView } from "./history/history-view.ts";
 import type { TimeLapse } from "./history/timelapse.ts";
 import type { Status } from "./status.ts";
 import type { ToastList } from "./toasts.ts";
@@ -28,7 +28,7 @@ export interface OpenTerrain {
   readonly toasts: ToastList;
   readonly doc: SyncDoc;
   readonly connection: Connection;
-  readonly past: Past;
+  readonly historyView: HistoryView;
   readonly timeLapse: TimeLapse;
   readonly history: History;
   readonly deletion: Deletion;

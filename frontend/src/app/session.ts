@@ -36,7 +36,7 @@ import {
 } from "./device/storage.ts";
 import { GoneStrokes, strokeOf } from "./history/gone.ts";
 import { History } from "./history/history.ts";
-import { Past } from "./history/past.ts";
+import { HistoryView } from "./history/history-view.ts";
 import { TimeLapse } from "./history/timelapse.ts";
 import type { OpenTerrain, ServerInfo } from "./open-terrain.ts";
 import { api } from "./server/api.ts";
@@ -58,7 +58,7 @@ export class TerrainSession implements OpenTerrain {
   readonly toasts = new ToastList();
   readonly doc: SyncDoc;
   readonly connection: Connection;
-  readonly past: Past;
+  readonly historyView: HistoryView;
   readonly timeLapse = new TimeLapse(this);
   readonly history: History;
   readonly deletion: Deletion;
@@ -100,7 +100,7 @@ export class TerrainSession implements OpenTerrain {
     this.doc.onRefused((refusal) => this.refused(refusal, refusal.op));
     this.doc.onDiverged(() => this.connection.reconnect());
     const url = `${window.location.protocol === "https:" ? "wss" : "ws"}://${window.location.host}/ws`;
-    this.past = this.#makePast(url);
+    this.historyView = this.#makeHistoryView(url);
     this.history = new History((before) => api.history(this.id, this.secret, before));
     this.deletion = new Deletion(this.id, () => this.secret);
     this.connection = new Connection({
@@ -109,7 +109,7 @@ export class TerrainSession implements OpenTerrain {
       onMessage: (message) => this.#receive(message),
       onFrame: (frame) => this.#frame(frame),
     });
-    this.canEdit = computed(() => this.mayEdit.value && !this.past.active.value);
+    this.canEdit = computed(() => this.mayEdit.value && !this.historyView.active.value);
     this.status = computed(() =>
       status({
         connection: this.connection.state.value,
@@ -120,7 +120,7 @@ export class TerrainSession implements OpenTerrain {
     );
     this.people = computed(() => ({
       members: this.members.value,
-      presences: this.past.active.value ? new Map() : this.presences.value,
+      presences: this.historyView.active.value ? new Map() : this.presences.value,
       me: this.client,
       myColour: this.members.value.find((m) => m.client === this.client)?.colour ?? this.me.value.colour,
     }));
@@ -131,7 +131,7 @@ export class TerrainSession implements OpenTerrain {
 
   /** Applies an op at once and sends it; a refusal becomes a toast. True when it was applied. */
   submit(op: Op, gesture?: string): boolean {
-    if (this.past.active.peek()) {
+    if (this.historyView.active.peek()) {
       this.toasts.show("This is how the terrain was. Go back to now to change it.", "warn");
       return false;
     }
@@ -212,7 +212,7 @@ export class TerrainSession implements OpenTerrain {
     this.#presence.stop();
     this.toasts.dispose();
     this.timeLapse.pause();
-    this.past.dispose();
+    this.historyView.dispose();
     this.history.stop();
     this.connection.close();
     this.stage.value?.dispose();
@@ -224,8 +224,8 @@ export class TerrainSession implements OpenTerrain {
     if (this.doc.pending.peek() > 0) event.preventDefault();
   };
 
-  #makePast(url: string): Past {
-    return new Past({
+  #makeHistoryView(url: string): HistoryView {
+    return new HistoryView({
       connect: (handlers) => new Connection({ url, ...handlers }),
       hello: () => this.#hello(),
       show: (doc) => this.doc.lookAt(doc),
@@ -275,13 +275,13 @@ export class TerrainSession implements OpenTerrain {
       effect(() => {
         const doc = this.doc.doc.value;
         const role = this.role.value;
-        if (!doc || !role || this.past.active.value) return;
+        if (!doc || !role || this.historyView.active.value) return;
         document.title = `${doc.settings.title || "Untitled terrain"} · Esker`;
       }),
       effect(() => {
         const title = this.doc.doc.value?.settings.title;
         const role = this.role.value;
-        if (title === undefined || !role || this.past.active.value) return;
+        if (title === undefined || !role || this.historyView.active.value) return;
         rememberTerrain(this.store, { id: this.id, secret: this.secret, title, role, opened: Date.now() });
       }),
     );
@@ -319,7 +319,7 @@ export class TerrainSession implements OpenTerrain {
         this.#setPresences(message.members);
         break;
       case "progress":
-        if (!this.past.active.peek()) this.progress.value = message;
+        if (!this.historyView.active.peek()) this.progress.value = message;
         if (message.note) this.#setNotice(message.note);
         // The new base is on its way until what is solved on it has settled.
         if (message.laying) this.baseBuilding.value = true;
@@ -370,7 +370,7 @@ export class TerrainSession implements OpenTerrain {
     this.#setMembers(message.members);
     const doc = this.doc.doc.value;
     if (doc && this.stage.value === null) this.#openStage(doc, message);
-    else if (!this.past.active.peek()) this.stage.value?.restart();
+    else if (!this.historyView.active.peek()) this.stage.value?.restart();
     this.viewChanged();
     this.#flush();
   }
@@ -383,7 +383,7 @@ export class TerrainSession implements OpenTerrain {
   }
 
   #frame(frame: DecodedFrame): void {
-    if (this.past.active.peek()) return;
+    if (this.historyView.active.peek()) return;
     if (this.stage.value?.apply(frame) === false) this.connection.reconnect();
   }
 
@@ -398,13 +398,13 @@ export class TerrainSession implements OpenTerrain {
     const next = new Map(this.presences.value);
     for (const presence of changed) next.set(presence.client, presence);
     this.presences.value = next;
-    if (!this.past.active.peek()) this.stage.value?.followed(changed);
+    if (!this.historyView.active.peek()) this.stage.value?.followed(changed);
   }
 
   #sendView(): void {
     const camera = this.stage.value?.camera.state.value;
     if (!camera) return;
-    (this.past.active.peek() ? this.past : this.connection).send({
+    (this.historyView.active.peek() ? this.historyView : this.connection).send({
       type: "view",
       eye: [...camera.eye],
       target: [...camera.target],
@@ -416,7 +416,7 @@ export class TerrainSession implements OpenTerrain {
 
   #sendPresence(): void {
     const stage = this.stage.value;
-    if (!stage || this.connection.state.value !== "online" || this.past.active.peek()) return;
+    if (!stage || this.connection.state.value !== "online" || this.historyView.active.peek()) return;
     const { eye, target } = stage.camera.state.value;
     const cursor = stage.cursor.value;
     this.connection.send({

@@ -39,7 +39,7 @@ export interface PageView {
   /** The solver has finished for the present clock and nothing of mine is on its way. */
   settled(): boolean;
   /** The clock that is shown instead of now, once its document is here. */
-  past(): number | null;
+  historyClock(): number | null;
   /** What the history says, newest first, as far as it was read. */
   history(): string[];
   /** My operations that are not yet in the server's journal. */
@@ -104,12 +104,12 @@ export function installTestHook(session: TerrainSession): () => void {
     clock: () => session.doc.clock,
     settled: () => {
       const progress = session.progress.peek();
-      const clock = session.past.active.peek() ? session.past.shown.peek() : session.doc.clock;
+      const clock = session.historyView.active.peek() ? session.historyView.shown.peek() : session.doc.clock;
       return (
         session.doc.pending.peek() === 0 && progress?.settled === true && progress.clock === clock && allExact(session)
       );
     },
-    past: () => session.past.shown.peek(),
+    historyClock: () => session.historyView.shown.peek(),
     history: () => session.history.entries.peek().map((e) => `${session.history.nameOf(e.author)} ${e.text}`),
     pending: () => session.doc.pending.peek(),
     strokes: () => [...(doc()?.strokes.values() ?? [])],

@@ -142,9 +142,9 @@ export const MAX_SEEKS_PER_SECOND = 15 as const;
 
 export const MAX_MEMBERS = 200 as const;
 
-export const MAX_PAST_ROOMS = 8 as const;
+export const MAX_HISTORY_ROOMS = 8 as const;
 
-export const PAST_IDLE_SECONDS = 600.0 as const;
+export const HISTORY_IDLE_SECONDS = 600.0 as const;
 
 export const MAX_HISTORY_OPS = 100000 as const;
 

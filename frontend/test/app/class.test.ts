@@ -74,7 +74,7 @@ describe("hints (SPEC U39)", () => {
       session: {
         doc: { doc: signal({ strokes: new Map(strokes.map((s) => [s.id, s])), layers: new Map() }) },
         canEdit: signal(true),
-        past: { active: signal(false) },
+        historyView: { active: signal(false) },
         store,
       },
       following: signal(over.following ?? null),

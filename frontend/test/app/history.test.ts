@@ -2,8 +2,8 @@
 import { signal } from "@preact/signals-core";
 import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
 import { entryAt, History, type HistoryEntry, type HistoryPage, joined } from "../../src/app/history/history.ts";
+import { HistoryView, type HistoryViewHandlers } from "../../src/app/history/history-view.ts";
 import { Pace, rate } from "../../src/app/history/pace.ts";
-import { Past, type PastHandlers } from "../../src/app/history/past.ts";
 import type { Doc } from "../../src/doc/document.ts";
 import { SyncDoc } from "../../src/doc/sync.ts";
 import type { ClientMessage, Document, Op, Welcome } from "../../src/generated/contract.ts";
@@ -106,9 +106,9 @@ describe("the list", () => {
 function looking() {
   const sent: ClientMessage[] = [];
   const shown: (number | null)[] = [];
-  const lines: { state: ReturnType<typeof signal<string>>; closed: boolean; handlers: PastHandlers }[] = [];
+  const lines: { state: ReturnType<typeof signal<string>>; closed: boolean; handlers: HistoryViewHandlers }[] = [];
   const calls = { restart: 0, back: 0, ended: "" };
-  const past = new Past({
+  const historyView = new HistoryView({
     connect: (handlers) => {
       const line = { state: signal("online"), closed: false, handlers };
       lines.push(line);
@@ -132,7 +132,7 @@ function looking() {
     },
     back: () => calls.back++,
   });
-  return { past, sent, shown, lines, calls };
+  return { historyView, sent, shown, lines, calls };
 }
 
 describe("the past", () => {
@@ -140,16 +140,16 @@ describe("the past", () => {
   afterEach(() => void vi.useRealTimers());
 
   it("opens at a clock and goes to the last one that was asked for, one step at a time", async () => {
-    const { past, sent, shown, lines, calls } = looking();
-    past.look(7);
+    const { historyView, sent, shown, lines, calls } = looking();
+    historyView.look(7);
     expect(lines[0]!.handlers.hello()).toMatchObject({ at: 7, clock: null });
-    past.look(8);
-    past.look(9);
+    historyView.look(8);
+    historyView.look(9);
     expect(sent).toEqual([]);
     lines[0]!.handlers.onMessage(welcome(document(7, "seven")));
     await vi.advanceTimersByTimeAsync(200);
     expect(sent).toEqual([{ type: "seek", clock: 9 }]);
-    past.look(3);
+    historyView.look(3);
     await vi.advanceTimersByTimeAsync(200);
     expect(sent.length).toBe(1);
     const ops = [8, 9].map((clock) => ({ clock, id: `c:${clock}`, author: "c", op: title(`${clock}`) }));
@@ -158,19 +158,19 @@ describe("the past", () => {
     expect(sent.at(-1)).toEqual({ type: "seek", clock: 3 });
     lines[0]!.handlers.onMessage(welcome(document(3, "three")));
     expect(shown).toEqual([7, 9, 3]);
-    expect(past.shown.value).toBe(3);
+    expect(historyView.shown.value).toBe(3);
     expect(calls.restart).toBe(1);
   });
 
   it("does not ask for more clocks a second than the server takes", async () => {
-    const { past, sent, lines } = looking();
-    past.look(0);
+    const { historyView, sent, lines } = looking();
+    historyView.look(0);
     lines[0]!.handlers.onMessage(welcome(document(0, "")));
     for (let clock = 1; clock <= 100; clock++) {
-      past.look(clock);
+      historyView.look(clock);
       await vi.advanceTimersByTimeAsync(10);
       const last = sent.at(-1);
-      if (last?.type === "seek" && last.clock !== past.shown.peek())
+      if (last?.type === "seek" && last.clock !== historyView.shown.peek())
         lines[0]!.handlers.onMessage(welcome(document(last.clock, "")));
     }
     expect(sent.length).toBeGreaterThan(8);
@@ -178,17 +178,17 @@ describe("the past", () => {
   });
 
   it("goes back to now, by itself where the server ends it", async () => {
-    const { past, shown, lines, calls } = looking();
-    past.look(2);
+    const { historyView, shown, lines, calls } = looking();
+    historyView.look(2);
     lines[0]!.handlers.onMessage(welcome(document(2, "")));
-    past.leave();
-    expect([past.active.value, shown.at(-1), lines[0]!.closed, calls.back]).toEqual([false, null, true, 1]);
+    historyView.leave();
+    expect([historyView.active.value, shown.at(-1), lines[0]!.closed, calls.back]).toEqual([false, null, true, 1]);
     lines[0]!.handlers.onMessage(welcome(document(1, "late")));
     expect(shown.at(-1)).toBe(null);
-    past.look(2);
+    historyView.look(2);
     lines[1]!.state.value = "closed";
     await vi.advanceTimersByTimeAsync(0);
-    expect([past.active.value, calls.ended, calls.back]).toEqual([false, "crowded", 2]);
+    expect([historyView.active.value, calls.ended, calls.back]).toEqual([false, "crowded", 2]);
   });
 });
 

@@ -40,16 +40,16 @@ def sentence(entry: Entry, strokes: Mapping[str, c.Stroke], layers: Mapping[str,
 
     ``strokes``, ``layers``: those of the terrain now, deleted ones too; what is not among them any more has no name.
     """
-    past, gerund = _VERBS[entry.action]
+    done, doing = _VERBS[entry.action]
     what = _settings(entry) if entry.action == "settings" else _things(entry, strokes, layers)
     if entry.turn and entry.action in _OPPOSITE:
         now = _OPPOSITE[entry.action] if entry.turn == "undo" else entry.action
         return f"{_VERBS[now][0]} {what} again"
     if entry.turn and entry.action in _TURNED:
-        return f"{past} {what} {'back' if entry.turn == 'undo' else 'again'}"
+        return f"{done} {what} {'back' if entry.turn == 'undo' else 'again'}"
     if entry.turn:
-        return f"{'undid' if entry.turn == 'undo' else 'redid'} {gerund} {what}"
-    return f"{past} {what}"
+        return f"{'undid' if entry.turn == 'undo' else 'redid'} {doing} {what}"
+    return f"{done} {what}"
 
 
 def _settings(entry: Entry) -> str:

@@ -4,7 +4,7 @@ that they give.
 A table is a ladder of levels of nodes, each RUNG times as far apart as those of the level below. Border points are
 spread on the nodes of a level with cubic B-splines and read with them again: a kernel of variance 2/3 pitch^2 whatever
 the places, since B-splines reproduce quadratics. Only blocks of nodes near the border are held.
-Twin: ``melt_reference``.
+Twin: ``reference``.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ detail along the border fades near it, as in a membrane. So a difference is gone
 the cap is an eighth of the domain. What differs by less than a quarter of the newer layer's cell agrees: there u is 0,
 and no bit changes.
 
-D(x) and d come from one ladder of kernel sums (``melt_loops``): nodes h apart, 1.4 h, 2 h, ... from the border's own
+D(x) and d come from one ladder of kernel sums (``loops``): nodes h apart, 1.4 h, 2 h, ... from the border's own
 spacing on. The density of the border's kernel sum says how far the border is, since the kernel is nearly Gaussian,
 and the quotient of sums is the mean difference (a normalised convolution, Knutsson and Westin 1993). Each place takes
 the finest level that the border is near enough to. The result is a smooth function (C2) of the place alone, the same
@@ -56,7 +56,7 @@ _CAP: Final = 8
 
 class Zone(NamedTuple):
     """What a layer does to the ground around it. ``digest``: of all that it follows from. ``rect``: x0, y0, x1, y1,
-    nothing is corrected outside. The rest as in ``melt_loops.Tables``."""
+    nothing is corrected outside. The rest as in ``loops.Tables``."""
 
     digest: bytes
     rect: Rect
@@ -292,7 +292,7 @@ def _add_products(share: Floats, corrected: Floats, places: NDArray[np.int64], o
 def _spread_out(
     points: Floats, weight: Floats, difference: Floats, pitch: float
 ) -> tuple[tuple[int, int, int, int], NDArray[np.int32], NDArray[np.float32], NDArray[np.bool_]]:
-    """One level of nodes: corner, chart of blocks, blocks and their dense cells, see ``melt_loops.Tables``."""
+    """One level of nodes: corner, chart of blocks, blocks and their dense cells, see ``loops.Tables``."""
     base = np.floor(points / pitch).astype(np.int64) - 1
     low, high = (base.min(axis=0) - 3) // BLOCK, (base.max(axis=0) + 3) // BLOCK + 1
     wide, tall = (high - low).tolist()

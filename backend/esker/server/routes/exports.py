@@ -24,15 +24,17 @@ def add_exports(app: FastAPI, hub: Hub, exports: Exports) -> None:
     path = "/api/terrains/{terrain}/exports"
 
     @app.post(f"{path}/estimate")
-    async def estimate(terrain: str, link: AnyLink, wish: c.ExportRequest) -> c.ExportEstimate:  # noqa: ARG001
-        return exports.estimate(wish)
+    async def estimate(terrain: str, link: AnyLink, wanted: c.ExportRequest) -> c.ExportEstimate:  # noqa: ARG001
+        return exports.estimate(wanted)
 
     @app.post(path, status_code=202)
     async def begin(
-        request: Request, terrain: str, link: AnyLink, wish: c.ExportRequest, client: ClientId = ""
+        request: Request, terrain: str, link: AnyLink, wanted: c.ExportRequest, client: ClientId = ""
     ) -> c.ExportStatus:
         limited(request, app.state.exports, "exports were asked for")
-        return await exports.begin(terrain, link, f"{link.id} {client or address(request)}", wish, asker(request, link))
+        return await exports.begin(
+            terrain, link, f"{link.id} {client or address(request)}", wanted, asker(request, link)
+        )
 
     @app.get(f"{path}/{{job}}")
     async def status(terrain: str, job: str, link: AnyLink) -> c.ExportStatus:

@@ -52,8 +52,8 @@ def add_history(app: FastAPI, hub: Hub, grids: GridStore) -> None:
         if link.role == "view":
             room = hub.open_room(terrain)
             here = {} if room is None else {m.client: m.name for m in room.core.members}
-            return _told(_without_names(page, here), replace(document, deleted={}, deleted_layers={}))
-        return _told(page, document)
+            return _answer(_without_names(page, here), replace(document, deleted={}, deleted_layers={}))
+        return _answer(page, document)
 
     @app.get("/api/terrains/{terrain}/document", response_model=c.Document)
     async def at_clock(request: Request, terrain: str, link: AnyLink, at: At | None = None) -> Response:
@@ -94,7 +94,7 @@ def _without_names(page: Page, here: Mapping[str, str]) -> Page:
     return page._replace(people={k: Person(k, here[k], each.colour) for k, each in page.people.items() if k in here})
 
 
-def _told(page: Page, document: StrokeSet) -> dict[str, Any]:
+def _answer(page: Page, document: StrokeSet) -> dict[str, Any]:
     strokes, layers = document.deleted | document.strokes, document.deleted_layers | document.layers
     return {
         "clock": page.clock,

@@ -21,7 +21,7 @@ from esker.document.ops import StrokeSet
 from esker.events import BaseLevel
 from esker.session.ground.ports import Base, Elevation
 
-log = logging.getLogger("esker.laying")
+log = logging.getLogger("esker.base")
 
 SLOW_SECONDS: Final = 0.7
 """``Layers.slow`` says that a base takes longer."""

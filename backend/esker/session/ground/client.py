@@ -19,7 +19,7 @@ class Client:
     """A room as the worker sees it: whom it calls, its ground, and what is open for it.
 
     ``levels``: the finest level that it wants. ``backoff``: when that is tried again, after there was no memory for it.
-    ``told``: what the room was told of the device.
+    ``notified``: what the room was notified of the device.
     """
 
     levels: int
@@ -32,7 +32,7 @@ class Client:
     ground: Ground = field(init=False)
     work: Work = field(default_factory=Work)
     backoff: Backoff = field(default_factory=Backoff)
-    told: str = ""
+    notified: str = ""
 
     def __post_init__(self) -> None:
         self.ground = Ground(self.levels)

@@ -42,7 +42,7 @@ BATCH_TILES: Final = 16
 """A batch of so many refined tiles is taken without waiting for more."""
 BATCH_SHARE: Final = 0.25
 """Taking tiles, and working out what is wanted then for a room full of people, takes at most this share of the time."""
-WISHES_SECONDS: Final = 0.05
+REQUESTS_SECONDS: Final = 0.05
 """While cameras move, what is wanted is worked out at most this often."""
 
 
@@ -76,13 +76,16 @@ class TileFeed:
         executor: TileThread,
         loop: asyncio.AbstractEventLoop,
         on_level: Callable[[int, int, bool], None],
-        on_wishes: Callable[[int, bool], None],
+        on_requests: Callable[[int, bool], None],
     ) -> None:
-        """``executor`` has one thread. ``on_level(clock, level, settled)``, with whether now all levels are final, and
-        ``on_wishes(count, more)``, with the number of tiles that are wanted refined and whether the solver should look
-        at ``wanted`` again, are called in the loop."""
+        """``executor`` has one thread. The callbacks run in the loop.
+
+        ``on_level(clock, level, settled)``: a level was taken; ``settled``, whether now all levels are final.
+        ``on_requests(count, more)``: how many tiles are wanted refined, and whether the solver should look at
+        ``wanted`` again.
+        """
         self._tiles, self._executor, self._loop = tiles, executor, loop
-        self._on_level, self._on_wishes = on_level, on_wishes
+        self._on_level, self._on_requests = on_level, on_requests
         self._server = tiles.server(size_m, levels, finest)
         self._refines = finest > levels
         self._streams: set[Stream] = set()
@@ -92,17 +95,17 @@ class TileFeed:
         self._newest: dict[tuple[c.Channel, int], object] = {}
         """The newest array of each level of the channels other than heights. Only the solver's thread may touch it."""
         self._lock = threading.Lock()
-        self._wishes: tuple[TileKey, ...] = ()
+        self._requests: tuple[TileKey, ...] = ()
         self._made: dict[TileKey, tuple[int, RefinedTile]] = {}
-        """Refined tiles that wait to be taken. This and ``_wishes`` need the lock."""
+        """Refined tiles that wait to be taken. This and ``_requests`` need the lock."""
         self._coarse: tuple[int, Level] | None = None
         """The newest coarsest preview that waits to be taken. Access needs the lock."""
-        self._owing = False
+        self._frames_pending = False
         """Whether a finest preview was taken whose frames nobody was sent yet. Only the tile thread may touch it."""
         self._taking = False
         self._rest_until = 0.0
         """Time of the loop from which on the next batch may be taken."""
-        self._wishes_timer: asyncio.TimerHandle | None = None
+        self._requests_timer: asyncio.TimerHandle | None = None
 
     def add(self, outbox: FrameOutlet) -> Stream:
         """A new client."""
@@ -183,13 +186,13 @@ class TileFeed:
     def wanted(self) -> Sequence[TileKey]:
         """Tiles to refine next, most urgent first; none while the ground moves. From any thread."""
         with self._lock:
-            return tuple(key for key in self._wishes if key not in self._made)
+            return tuple(key for key in self._requests if key not in self._made)
 
     def deliver_tile(self, clock: int, tile: RefinedTile) -> None:
         """Takes a refined tile of the settled solve at ``clock``. Never waits."""
         with self._lock:
             self._made[tile.key] = (clock, tile)
-            full = len(self._made) >= min(BATCH_TILES, len(self._wishes))
+            full = len(self._made) >= min(BATCH_TILES, len(self._requests))
             first, self._taking = not self._taking, True
             rest = self._rest_until - self._loop.time()
         if full and rest <= 0:
@@ -201,7 +204,7 @@ class TileFeed:
 
     def _take_coarse(self) -> None:
         """Puts the coarsest preview, unless frames of a finest one are owed: then it comes again behind these."""
-        if self._owing:
+        if self._frames_pending:
             self._call(self._submit, self._take_coarse_now)
             return
         self._take_coarse_now()
@@ -212,8 +215,8 @@ class TileFeed:
         if waiting is not None:
             self._put(*waiting)
 
-    def _told(self) -> None:
-        self._owing = False
+    def _frames_submitted(self) -> None:
+        self._frames_pending = False
 
     def _put(self, clock: int, result: Level) -> None:
         channel = result.channel
@@ -229,10 +232,10 @@ class TileFeed:
             return
         settled = self._server.settled()
         self._publish(settled)
-        self._owing = result.level > 0 and not result.settled
+        self._frames_pending = result.level > 0 and not result.settled
         self._call(self._level_taken, clock, result.level, settled)
-        if self._owing:
-            self._call(self._submit, self._told)
+        if self._frames_pending:
+            self._call(self._submit, self._frames_submitted)
 
     def _note(self, clock: int, preview: Preview) -> None:
         try:
@@ -272,7 +275,7 @@ class TileFeed:
         if not self._refines:
             return
         try:
-            wishes, count = self._server.wishes(list(self._clients.values()))
+            requests, count = self._server.requests(list(self._clients.values()))
         except Exception:
             log.exception("what to refine could not be worked out")
             return
@@ -280,9 +283,9 @@ class TileFeed:
             for made in taken:
                 if self._made.get(made[1].key) is made:
                     del self._made[made[1].key]
-            look = bool(wishes) and (look or wishes != self._wishes)
-            self._wishes = wishes
-        self._call(self._on_wishes, count, look)
+            look = bool(requests) and (look or requests != self._requests)
+            self._requests = requests
+        self._call(self._on_requests, count, look)
 
     def _forget(self, stream: Stream) -> None:
         if self._clients.pop(stream, None) is not None:
@@ -332,14 +335,14 @@ class TileFeed:
             return
         view, stream.view = stream.view, None
         stream.busy, stream.hungry = True, False
-        if view is not None and self._refines and self._wishes_timer is None:
-            self._wishes_timer = self._loop.call_later(WISHES_SECONDS, self._wishes_due)
+        if view is not None and self._refines and self._requests_timer is None:
+            self._requests_timer = self._loop.call_later(REQUESTS_SECONDS, self._requests_due)
         most = min(BATCH_BYTES, c.BYTE_WINDOW - stream.in_flight)
         if not self._submit(self._make, stream, view, most):
             self._streams.discard(stream)
 
-    def _wishes_due(self) -> None:
-        self._wishes_timer = None
+    def _requests_due(self) -> None:
+        self._requests_timer = None
         self._submit(self._publish, False)
 
     def _submit(self, work: Callable[..., None], *args: object) -> bool:

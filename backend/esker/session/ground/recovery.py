@@ -90,7 +90,7 @@ class Devices:
 
     @property
     def second_best(self) -> bool:
-        """Whether the device in use is not what one would wish for."""
+        """Whether the device in use is a slower one than the first choice."""
         return bool(self.better()) or (self.current == LAST_RESORT and self.preferred is None)
 
     def better(self) -> list[str]:

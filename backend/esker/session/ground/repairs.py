@@ -30,12 +30,12 @@ GIVEN_UP: Final = "The ground could not be computed, and waits for the next chan
 class Repairs:
     """The solver, the devices that it may run on, and how rooms go on after a failure. Belongs to the worker's thread.
 
-    ``solver`` None: it was not made yet. ``standing``: what is wrong with the device for as long as it lasts, told to
+    ``solver`` None: it was not made yet. ``notice``: what is wrong with the device for as long as it lasts, told to
     every room once.
     """
 
     solver: Solver | None = None
-    standing: str = ""
+    notice: str = ""
 
     def __init__(
         self,
@@ -56,7 +56,7 @@ class Repairs:
         self.solver = self._factory(self.devices.preferred)
         self.devices.opened(self.solver.device_name, self._now())
         if self.devices.second_best:
-            self.standing = f"The solver runs on {self.solver.device_name}: slower, but it goes on."
+            self.notice = f"The solver runs on {self.solver.device_name}: slower, but it goes on."
 
     @property
     def name(self) -> str:
@@ -65,8 +65,8 @@ class Repairs:
 
     def inform(self, client: Client) -> None:
         """Tells a room what is wrong with the device, once."""
-        if self.standing and client.told != self.standing:
-            self._tell(client, self.standing)
+        if self.notice and client.notified != self.notice:
+            self._tell(client, self.notice)
 
     # --- a failure ----------------------------------------------------------------------------------------------
 
@@ -170,16 +170,16 @@ class Repairs:
             self.solver = solver
             self.devices.left(name, self._now())
             why = str(error).strip().rstrip(".") or f"{left} failed"
-            self.standing = f"{why}. The solver now runs on {solver.device_name} and goes on."
+            self.notice = f"{why}. The solver now runs on {solver.device_name} and goes on."
             for client in self._rooms():
                 self._drop(client)
-                self._tell(client, self.standing)
+                self._tell(client, self.notice)
                 self._happen(client, does.Again())
             return True
         return False
 
     def _tell(self, client: Client, sentence: str) -> None:
-        client.told = sentence
+        client.notified = sentence
         client.tell(sentence)
 
     # --- later --------------------------------------------------------------------------------------------------
@@ -206,12 +206,12 @@ class Repairs:
                 log.info("the device %s still does not work: %s", name, error)
                 continue
             log.warning("the solver runs on %s again", solver.device_name)
-            self.solver, self.standing = solver, ""
+            self.solver, self.notice = solver, ""
             self.devices.returned(name)
             for client in self._rooms():
-                if client.told:
+                if client.notified:
                     client.tell(f"The solver runs on {solver.device_name} again.")
-                client.told = ""
+                client.notified = ""
             break
         self.devices.backoff.failed(now)
 

@@ -415,10 +415,10 @@ class RoomCore:
             if self._looks(member):
                 variant = self._viewing.variant((row.clock for row in batch.rows), member.since)
                 if variant not in looking:
-                    told = self._as_seen(
+                    shown = self._as_seen(
                         member, [(row.clock, text) for row, text in zip(batch.rows, texts, strict=True)]
                     )
-                    looking[variant] = f'{{"type":"ordered","ops":[{",".join(told)}]}}'
+                    looking[variant] = f'{{"type":"ordered","ops":[{",".join(shown)}]}}'
                 member.outbox.push(looking[variant])
             elif mine is None:
                 member.outbox.push(shared)

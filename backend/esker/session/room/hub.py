@@ -20,10 +20,10 @@ from esker.session.ground.ports import Elevation, Tiles
 from esker.session.ground.tilethread import TileThread
 from esker.session.ground.worker import Worker
 from esker.session.room.core import Denied, RoomCore, RoomInfo
+from esker.session.room.history_view import HistoryCore, HistoryRoom, HistoryRooms, Present
 from esker.session.room.limits import history_rates
 from esker.session.room.openrooms import OpenRooms
 from esker.session.room.outbox import Outbox, Waiting
-from esker.session.room.past import PastCore, PastRoom, Pasts, Present
 from esker.session.room.room import Guest, Room
 from esker.session.room.turns import SERVER, FairThreads
 from esker.store.access import Access, Link
@@ -92,7 +92,7 @@ class Hub:
         self._places = OpenRooms(self._sleep, rooms, self._rest)
         self._tile_thread = TileThread()
         self._elevation = elevation
-        self._laying = ThreadPoolExecutor(1, thread_name_prefix="elevation")
+        self._base_threads = ThreadPoolExecutor(1, thread_name_prefix="elevation")
         self._wrong = Rates(Rate(WRONG_SECRETS_PER_MINUTE / 60, WRONG_SECRETS_PER_MINUTE))
         self.reading = FairThreads(READERS, "reading", READS_WAITING)
         """Threads that read the journal: of one address half of them at most."""
@@ -107,7 +107,7 @@ class Hub:
         self.hear_of_ended: list[Callable[[str, Collection[str]], object]] = []
         """Who is told of links that were revoked: terrain, ids."""
         self._claims = claims or Claims()
-        self._pasts = Pasts(journal, self._past_room, claims=self._claims)
+        self._history_rooms = HistoryRooms(journal, self._history_room, claims=self._claims)
 
     @property
     def device(self) -> str:
@@ -151,7 +151,7 @@ class Hub:
             who = Who(address, link.id)
             present = partial(self.strokes, hello.terrain, None, who) if link.role == "view" else None
             read = partial(self.read, who)
-            return await self._pasts.enter(hello, who, outbox, lambda: self.demand(link), read, present)
+            return await self._history_rooms.enter(hello, who, outbox, lambda: self.demand(link), read, present)
         who = Who(address, link.id)
         if not self._hellos.take(who, self._now()):
             raise Denied("rate_limited", "Too many pages came at once. Yours comes back by itself.")
@@ -219,9 +219,11 @@ class Hub:
         )
         return Room(core, journal=self.journal, on_empty=lambda: self._empty(terrain), **self._needs())
 
-    def _past_room(self, core: PastCore, on_empty: Callable[[], None], present: Present | None = None) -> PastRoom:
-        more = {"idle_seconds": c.PAST_IDLE_SECONDS, "present": present} | self._needs()
-        return PastRoom(core, journal=self.journal, on_empty=on_empty, **more)
+    def _history_room(
+        self, core: HistoryCore, on_empty: Callable[[], None], present: Present | None = None
+    ) -> HistoryRoom:
+        more = {"idle_seconds": c.HISTORY_IDLE_SECONDS, "present": present} | self._needs()
+        return HistoryRoom(core, journal=self.journal, on_empty=on_empty, **more)
 
     def _needs(self) -> dict[str, Any]:
         """Returns what every room is made with."""
@@ -231,7 +233,7 @@ class Hub:
             "executor": self._tile_thread,
             "info": RoomInfo(self._levels, self._finest, self._worker.device_name),
             "elevation": self._elevation,
-            "laying": self._laying,
+            "base_threads": self._base_threads,
         }
 
     @property
@@ -324,7 +326,7 @@ class Hub:
         task = self._rooms.pop(link.terrain, None)
         self._places.release(link.terrain)
         room = None if task is None else await task
-        self._pasts.close_terrain(link.terrain, "no_terrain", DELETED)
+        self._history_rooms.close_terrain(link.terrain, "no_terrain", DELETED)
         if room is not None:
             await room.flush()
             for member in room.core.members:
@@ -371,7 +373,7 @@ class Hub:
         room = self.open_room(terrain)
         if room is not None:
             room.core.revoke(link, code, sentence)
-        self._pasts.revoke(terrain, link, code, sentence)
+        self._history_rooms.revoke(terrain, link, code, sentence)
 
     async def close(self) -> None:
         """Tells everybody, commits what was ordered, stops the rooms. The journal stays open."""
@@ -381,12 +383,12 @@ class Hub:
             await room.flush()
             for member in room.core.members:
                 member.outbox.close("shutting_down", "The server is stopping. Your page will come back by itself.")
-        self._pasts.close("shutting_down", "The server is stopping. Your page will come back by itself.")
+        self._history_rooms.close("shutting_down", "The server is stopping. Your page will come back by itself.")
         for room in rooms:
             room.shut()
         self._rooms.clear()
         self._tile_thread.shutdown(wait=False, cancel_futures=True)
-        self._laying.shutdown(wait=False, cancel_futures=True)
+        self._base_threads.shutdown(wait=False, cancel_futures=True)
         self.reading.shutdown()
         self.packing.shutdown()
 

@@ -84,7 +84,7 @@ class Connection:
         self._opened = opened
         self._subprotocol = subprotocol
         self._greeted = False
-        self._past = False
+        self._is_history = False
         self._closed = False
         self._ops = TokenBucket(c.MAX_OPS_PER_SECOND, c.OPS_BURST)
         self._presences = TokenBucket(c.MAX_PRESENCE_PER_SECOND, c.MAX_PRESENCE_PER_SECOND)
@@ -144,7 +144,7 @@ class Connection:
                 if not self._views.take(now):
                     return self._notice(f"More than {c.MAX_VIEWS_PER_SECOND} views a second.", now)
             case c.Seek():
-                if not self._past:
+                if not self._is_history:
                     return self._close("malformed", "Only who looks at the past goes to another clock.")
                 if not self._seeks.take(now):
                     return self._notice(f"More than {c.MAX_SEEKS_PER_SECOND} clocks a second.", now)
@@ -160,7 +160,7 @@ class Connection:
                 "bad_protocol",
                 f"This server speaks protocol {c.PROTOCOL_VERSION}, not {hello.protocol}. Reload the page.",
             )
-        self._greeted, self._past = True, hello.at is not None
+        self._greeted, self._is_history = True, hello.at is not None
         return [Hi(hello)]
 
     def _rated(self, ops: tuple[c.OpEnvelope, ...], events: list[Event], now: float) -> list[Event]:

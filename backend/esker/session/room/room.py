@@ -59,16 +59,16 @@ class Room:
         info: RoomInfo,
         on_empty: Callable[[], None],
         elevation: Elevation | None = None,
-        laying: Executor | None = None,
+        base_threads: Executor | None = None,
     ) -> None:
-        """``elevation`` makes the base of the layers, in a thread of ``laying``; without them nothing is laid."""
+        """``elevation`` makes the base of the layers, in a thread of ``base_threads``; without them nothing is laid."""
         self.core, self.info = core, info
         self.id = core.document.id
         self._journal, self._worker, self._on_empty = journal, worker, on_empty
         self._loop = asyncio.get_running_loop()
         size_m = core.document.settings.size_m
         self._feed = TileFeed(
-            tiles, size_m, info.levels, info.finest, executor, self._loop, self._level_taken, self._wishes_changed
+            tiles, size_m, info.levels, info.finest, executor, self._loop, self._level_taken, self._requests_changed
         )
         refinement = self._feed if info.finest > info.levels else None
         self._solve_client = worker.add(
@@ -80,7 +80,7 @@ class Room:
             confirm=self._feed.confirm,
             note=self._feed.note,
         )
-        self._layers = Layers(elevation, laying, self._loop, self._laid, self._tell, self._slow_changed)
+        self._layers = Layers(elevation, base_threads, self._loop, self._laid, self._tell, self._slow_changed)
         self._job: Job | None = None
         """The job that was asked for last."""
         self._tick_timer: asyncio.TimerHandle | None = None
@@ -310,7 +310,7 @@ class Room:
             )
         )
 
-    def _wishes_changed(self, count: int, more: bool) -> None:
+    def _requests_changed(self, count: int, more: bool) -> None:
         """``count`` refined tiles are wanted; ``more``: the solver does not know of all of them yet."""
         if more and not self.closed:
             self._worker.nudge(self._solve_client)

@@ -20,7 +20,7 @@ Points = NDArray[np.float64]
 Under = Callable[[Points], Points]
 
 
-def on_the_sheet(places: Points) -> Points:
+def on_blank_ground(places: Points) -> Points:
     """Flat ground: 0 at all places (n, 2)."""
     return np.zeros(len(places))
 
@@ -45,7 +45,7 @@ class Crest:
     closed: bool
 
 
-def crest_of(stroke: Stroke, under: Under = on_the_sheet) -> Crest | None:
+def crest_of(stroke: Stroke, under: Under = on_blank_ground) -> Crest | None:
     """The crest line of a stroke, or None for one that constrains no height (hidden, without points, or paint).
 
     ``under``: the base at places (n, 2), metres.

@@ -168,7 +168,7 @@ def _bordered(base: NDArray[np.floating], rows: int, columns: int) -> Floats:
 
 
 def _add(total: dict[str, Floats], at: Places, band: Band, in_pairs: bool) -> None:
-    """Adds a stroke's weights and weighted wishes to the sums at samples.
+    """Adds a stroke's weights and weighted targets to the sums at samples.
 
     ``in_pairs``: wtt is the sum of w (target - mean)^2, from pairs of strokes (West 1979), and joint that of what
     a pair weighs, w v / (w + v): no difference of nearly equal numbers.

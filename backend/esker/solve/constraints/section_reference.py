@@ -232,7 +232,7 @@ def skirt(b: Flanks, reach_m: float | None) -> Skirt:
 
 @dataclass
 class Band:
-    """A stroke's wishes at samples: targets with their weights and how far they count (``reference_raster``).
+    """What a stroke asks of samples: targets with their weights and how far they count (``reference_raster``).
 
     follows: how far the gradient is that of the ground, base included.
     """

@@ -4,8 +4,8 @@ import { type ReadonlySignal, signal } from "@preact/signals-core";
 import { ApiError, api } from "../server/api.ts";
 import { terrainPath } from "../server/links.ts";
 import type { ToastList } from "../toasts.ts";
+import type { HistoryView } from "./history-view.ts";
 import { Pace } from "./pace.ts";
-import type { Past } from "./past.ts";
 
 const TICK_MS = 100;
 
@@ -13,7 +13,7 @@ const TICK_MS = 100;
 export interface TimeLapseTerrain {
   readonly id: string;
   readonly secret: string;
-  readonly past: Past;
+  readonly historyView: HistoryView;
   readonly newest: ReadonlySignal<number>;
   readonly toasts: ToastList;
   /** Gives up what is being drawn or laid: it belongs to the present. */
@@ -41,8 +41,8 @@ export class TimeLapse {
 
   /** Goes on from what is shown; from the beginning in the present, and at the end. */
   play(): void {
-    const { past, newest } = this.#terrain;
-    const at = past.wanted.peek();
+    const { historyView, newest } = this.#terrain;
+    const at = historyView.wanted.peek();
     const from = at === null || at >= newest.peek() ? 0 : at;
     this.#pace.start(from);
     this.#enter(from);
@@ -59,17 +59,17 @@ export class TimeLapse {
 
   /** Back to now; false when that is what is shown. */
   leave(): boolean {
-    const { past } = this.#terrain;
-    if (!past.active.peek()) return false;
+    const { historyView } = this.#terrain;
+    if (!historyView.active.peek()) return false;
     this.pause();
-    past.leave();
+    historyView.leave();
     return true;
   }
 
   /** A new terrain as this one was at what is shown; the page goes there. */
   async copy(): Promise<void> {
     const terrain = this.#terrain;
-    const clock = terrain.past.wanted.peek();
+    const clock = terrain.historyView.wanted.peek();
     if (clock === null || this.copying.peek()) return;
     this.pause();
     this.copying.value = true;
@@ -84,14 +84,14 @@ export class TimeLapse {
   }
 
   #enter(clock: number): void {
-    const { past } = this.#terrain;
-    if (!past.active.peek()) this.#terrain.leavePresent();
-    past.look(clock);
+    const { historyView } = this.#terrain;
+    if (!historyView.active.peek()) this.#terrain.leavePresent();
+    historyView.look(clock);
   }
 
   #tick(): void {
-    const { past, newest } = this.#terrain;
-    if (!past.active.peek()) {
+    const { historyView, newest } = this.#terrain;
+    if (!historyView.active.peek()) {
       this.pause();
       return;
     }
@@ -100,7 +100,7 @@ export class TimeLapse {
     this.#at = now;
     // Where the server does not keep up with the pace, steps become longer; it never falls behind.
     const clock = this.#pace.advance(seconds, newest.peek(), this.speed.peek());
-    past.look(clock);
+    historyView.look(clock);
     if (clock >= newest.peek()) this.pause();
   }
 }

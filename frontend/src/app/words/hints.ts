@@ -17,7 +17,7 @@ const STRAIGHTENED: readonly (string | null)[] = ["mountain", "crevice"];
 export function hintWords(stage: Stage, busy: boolean): string | null {
   const { session, input, camera } = stage;
   const doc = session.doc.doc.value;
-  if (!doc || !session.canEdit.value || session.past.active.value || stage.following.value !== null) return null;
+  if (!doc || !session.canEdit.value || session.historyView.active.value || stage.following.value !== null) return null;
   if (input.inputMode.value === "draw" || input.placing.value !== null || input.keyPen.visual.value !== null)
     return null;
   const map = camera.state.value.mode === "map";

@@ -57,7 +57,7 @@ export class EskExport extends SignalElement {
   static override properties = { terrain: { attribute: false }, sizeM: { attribute: false }, open: { type: Boolean } };
   static override styles = [shared, progressStyles, exportStyles];
 
-  declare terrain: Pick<OpenTerrain, "id" | "secret" | "client" | "past" | "toasts">;
+  declare terrain: Pick<OpenTerrain, "id" | "secret" | "client" | "historyView" | "toasts">;
   declare sizeM: number;
   declare open: boolean;
   #exporter: Exporter | null = null;
@@ -97,7 +97,7 @@ export class EskExport extends SignalElement {
     this.#exporter ??= new Exporter(
       exportTransport(terrain.id, () => terrain.secret, terrain.client),
       (file) => this.#keep(file),
-      () => (terrain.past.active.peek() ? terrain.past.shown.peek() : null),
+      () => (terrain.historyView.active.peek() ? terrain.historyView.shown.peek() : null),
     );
     return this.#exporter;
   }
@@ -124,7 +124,7 @@ export class EskExport extends SignalElement {
   #choose(exporter: Exporter): TemplateResult {
     const { format, samples, detail, weights } = exporter.choice.value;
     const covers = format === "masks";
-    const past = this.terrain.past.active.value;
+    const isHistory = this.terrain.historyView.active.value;
     return html`
       <form
         @submit=${(e: Event) => {
@@ -132,7 +132,7 @@ export class EskExport extends SignalElement {
           void exporter.begin();
         }}
       >
-        ${past ? html`<p class="note">This exports the terrain as it was, as it is shown now.</p>` : nothing}
+        ${isHistory ? html`<p class="note">This exports the terrain as it was, as it is shown now.</p>` : nothing}
         <fieldset aria-label="Kind of file">
           ${CARDS.map(
             (card) => html`<label class="card">

@@ -6,7 +6,7 @@ import type { Stage } from "../../app/view/stage.ts";
 import type { QualityMode, Scene } from "../../core/types.ts";
 import type { PageCommand } from "../bars/top-bar.ts";
 import "../bars/people.ts";
-import "../bars/past-bar.ts";
+import "../bars/history-view-bar.ts";
 import "../bars/status-line.ts";
 import "../bars/tool-rail.ts";
 import "../bars/top-bar.ts";
@@ -120,16 +120,16 @@ export function foot(stage: Stage): TemplateResult {
   </div>`;
 }
 
-export function pastBar({ session }: Stage, beside: boolean): TemplateResult {
-  return html`<esk-past-bar
-    .past=${session.past}
+export function historyViewBar({ session }: Stage, beside: boolean): TemplateResult {
+  return html`<esk-history-view-bar
+    .historyView=${session.historyView}
     .timeLapse=${session.timeLapse}
     .history=${session.history}
     .newest=${session.newest}
     .mayEdit=${session.mayEdit}
     .client=${session.client}
     ?beside=${beside}
-  ></esk-past-bar>`;
+  ></esk-history-view-bar>`;
 }
 
 /** One tab of the inspector. */
@@ -151,7 +151,7 @@ export function inspector(stage: Stage, tab: PanelTab, browse: () => void): Temp
   if (tab === "history")
     return html`<esk-history-panel
       .history=${session.history}
-      .past=${session.past}
+      .historyView=${session.historyView}
       .timeLapse=${session.timeLapse}
       .newest=${session.newest}
       .members=${session.members}

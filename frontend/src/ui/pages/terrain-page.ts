@@ -26,10 +26,10 @@ import {
   type DialogId,
   dialogs,
   foot,
+  historyViewBar,
   inspector,
   overlay,
   type PanelTab,
-  pastBar,
   toolRail,
   topBar,
 } from "./handover.ts";
@@ -103,7 +103,8 @@ export class EskTerrain extends SignalElement {
       effect(() => {
         // The drawer would hide the ground on which the grid is laid, or the past.
         const laid = session.stage.value?.input.placing.value ?? null;
-        if ((laid !== null || session.past.active.value) && window.matchMedia(NARROW).matches) this.#panel.value = null;
+        if ((laid !== null || session.historyView.active.value) && window.matchMedia(NARROW).matches)
+          this.#panel.value = null;
       }),
       effect(() => {
         this.toggleAttribute("drawer", this.#panel.value !== null);
@@ -257,7 +258,7 @@ export class EskTerrain extends SignalElement {
           this.#panel.value = "ground";
         }}
       ></esk-placing-bar>
-      ${pastBar(stage, this.#panel.value !== null)}
+      ${historyViewBar(stage, this.#panel.value !== null)}
       ${this.#panel.value === null ? nothing : this.#side(stage, this.#panel.value)} ${this.#ways(stage)}
       ${dialogs(stage, this.#dialog.value, this.#closeDialog)}
     `;

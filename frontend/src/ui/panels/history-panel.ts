@@ -4,7 +4,7 @@ import { html, nothing, type TemplateResult } from "lit";
 import { repeat } from "lit/directives/repeat.js";
 import type { History } from "../../app/history/history.ts";
 import { type HistoryEntry, keyOf } from "../../app/history/history.ts";
-import type { Past } from "../../app/history/past.ts";
+import type { HistoryView } from "../../app/history/history-view.ts";
 import type { TimeLapse } from "../../app/history/timelapse.ts";
 import { ago } from "../../app/words/words.ts";
 import type { Member } from "../../generated/contract.ts";
@@ -39,7 +39,7 @@ const TICK_MS = 30_000;
 export class EskHistoryPanel extends SignalElement {
   static override properties = {
     history: { attribute: false },
-    past: { attribute: false },
+    historyView: { attribute: false },
     timeLapse: { attribute: false },
     newest: { attribute: false },
     members: { attribute: false },
@@ -48,7 +48,7 @@ export class EskHistoryPanel extends SignalElement {
   static override styles = [shared, panelStyles, historyPanelStyles];
 
   declare history: History;
-  declare past: Pick<Past, "active" | "wanted" | "leave">;
+  declare historyView: Pick<HistoryView, "active" | "wanted" | "leave">;
   declare timeLapse: Pick<TimeLapse, "play" | "show">;
   /** Clock of the present. */
   declare newest: ReadonlySignal<number>;
@@ -80,7 +80,7 @@ export class EskHistoryPanel extends SignalElement {
   }
 
   protected override render(): TemplateResult {
-    const { history, past } = this;
+    const { history, historyView } = this;
     const entries = history.entries.value;
     const state = history.state.value;
     if (state === "failed" && entries.length === 0) return this.#failed();
@@ -88,7 +88,7 @@ export class EskHistoryPanel extends SignalElement {
       return html`<p class="lead" role="status">Reading the history…</p>`;
     if (entries.length === 0) return this.#empty();
     return html`
-      ${this.#now(past.active.value)}
+      ${this.#now(historyView.active.value)}
       <ol class="entries" aria-label="What people did, newest first">
         ${repeat(entries, keyOf, (entry) => this.#entry(entry))}
       </ol>
@@ -116,20 +116,20 @@ export class EskHistoryPanel extends SignalElement {
     </div>`;
   }
 
-  #now(past: boolean): TemplateResult {
+  #now(isHistory: boolean): TemplateResult {
     return html`<div class="ways">
       <button
-        class="btn ${past ? "outline" : "primary"}"
-        @click=${() => (past ? this.past.leave() : this.timeLapse.play())}
+        class="btn ${isHistory ? "outline" : "primary"}"
+        @click=${() => (isHistory ? this.historyView.leave() : this.timeLapse.play())}
       >
-        ${icon(past ? "arrow-right" : "play")} ${past ? "Back to now" : "Watch it come to be"}
+        ${icon(isHistory ? "arrow-right" : "play")} ${isHistory ? "Back to now" : "Watch it come to be"}
       </button>
     </div>`;
   }
 
   #entry(entry: HistoryEntry): TemplateResult {
-    const { history, past, client } = this;
-    const shown = past.wanted.value;
+    const { history, historyView, client } = this;
+    const shown = historyView.wanted.value;
     const chosen = shown !== null && shown === entry.last;
     const later = shown !== null && entry.first > shown;
     const name = entry.author === client ? "You" : history.nameOf(entry.author);

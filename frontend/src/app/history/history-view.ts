@@ -11,7 +11,7 @@ import type { ClientMessage, Hello, OpsBroadcast, Progress, ServerMessage, Welco
 import { MAX_SEEKS_PER_SECOND } from "../../generated/contract.ts";
 
 /** The connection as it is needed here (`net/connection.ts`). */
-export interface PastLine {
+export interface HistoryViewLine {
   readonly state: ReadonlySignal<string>;
   readonly reason: ReadonlySignal<string | null>;
   send(message: ClientMessage): boolean;
@@ -19,14 +19,14 @@ export interface PastLine {
   close(): void;
 }
 
-export interface PastHandlers {
+export interface HistoryViewHandlers {
   readonly hello: () => Hello;
   readonly onMessage: (message: ServerMessage) => void;
   readonly onFrame: (frame: DecodedFrame) => void;
 }
 
-export interface PastOptions {
-  readonly connect: (handlers: PastHandlers) => PastLine;
+export interface HistoryViewOptions {
+  readonly connect: (handlers: HistoryViewHandlers) => HistoryViewLine;
   /** The hello of the live connection. */
   readonly hello: () => Hello;
   /** Shows another document, or the present again. */
@@ -45,12 +45,12 @@ export interface PastOptions {
 /** A little slower than the server allows. */
 const STEP_MS = 1000 / (0.8 * MAX_SEEKS_PER_SECOND);
 
-export class Past {
-  readonly #options: PastOptions;
+export class HistoryView {
+  readonly #options: HistoryViewOptions;
   readonly #active = signal(false);
   readonly #shown = signal<number | null>(null);
   readonly #wanted = signal<number | null>(null);
-  #line: PastLine | null = null;
+  #line: HistoryViewLine | null = null;
   #doc: Doc | null = null;
   #welcomed = false;
   /** A seek is under way. */
@@ -58,7 +58,7 @@ export class Past {
   #askedAt = Number.NEGATIVE_INFINITY;
   #timer: ReturnType<typeof setTimeout> | undefined;
 
-  constructor(options: PastOptions) {
+  constructor(options: HistoryViewOptions) {
     this.#options = options;
   }
 

@@ -27,7 +27,7 @@ from esker.session.room.room import PROGRESS_TICK, Guest, Room
 from esker.store.claims import Claims
 from esker.store.journal import DamagedTerrain, Loaded, Row, replay
 
-log = logging.getLogger("esker.past")
+log = logging.getLogger("esker.history")
 
 STEP_CHARACTERS: Final = 128 * 1024
 """Ops of a step forward are sent if they have at most so many characters as text, else the document is."""
@@ -44,7 +44,7 @@ YIELDED: Final = "Somebody else wants to look at the past, and several do from y
 CROWDED: Final = "As many people as this server allows look at the past just now. Try again in a minute."
 
 
-class PastCore(RoomCore):
+class HistoryCore(RoomCore):
     """The document of an earlier clock and the one person who looks at it.
 
     ``document`` has the clock of the journal. ``head`` is the same under a clock that only ever rises, as solver and
@@ -114,7 +114,7 @@ class PastCore(RoomCore):
         return self._welcome(member, None, info, exact=True)[0]
 
 
-class Past:
+class HistoryReader:
     """Documents of one terrain at any clock, out of the journal. For one thread at a time."""
 
     def __init__(self, journal: Journal, document: StrokeSet) -> None:
@@ -154,12 +154,12 @@ class Past:
             del self._waypoints[1::2]
 
 
-class PastRoom(Room):
+class HistoryRoom(Room):
     """One person's view of the past."""
 
     def __init__(
         self,
-        core: PastCore,
+        core: HistoryCore,
         *,
         journal: Journal,
         idle_seconds: float,
@@ -169,8 +169,8 @@ class PastRoom(Room):
         """``present``: what the terrain is now, where only what is still there may be shown; ``room``: what any room
         needs."""
         super().__init__(core, journal=journal, **room)
-        self._past_core = core
-        self._past, self._present, self._present_clock = Past(journal, core.document), present, -1
+        self._history_core = core
+        self._reader, self._present, self._present_clock = HistoryReader(journal, core.document), present, -1
         self._guest: Guest | None = None
         self._wanted: int | None = None
         self._seeking: asyncio.Task[None] | None = None
@@ -217,7 +217,7 @@ class PastRoom(Room):
                     await asyncio.sleep(BEHIND_SECONDS)
                     continue
                 clock, self._wanted = self._wanted, None
-                document, rows = await self.read(self._past.go, clock)
+                document, rows = await self.read(self._reader.go, clock)
                 await self._look_again()
                 if not self.closed:
                     self._show(guest, document, rows)
@@ -236,16 +236,16 @@ class PastRoom(Room):
         newest = await self.read(self._journal.newest, self.id)
         if newest != self._present_clock:
             present = await self._present()
-            self._past_core.still, self._present_clock = viewing.things(present), present.clock
+            self._history_core.still, self._present_clock = viewing.things(present), present.clock
 
     def _show(self, guest: Guest, document: StrokeSet, rows: list[Row] | None) -> None:
         outbox = guest.member.outbox
-        texts = None if rows is None else self._past_core.steps(rows)
-        self._past_core.turn_to(document)
+        texts = None if rows is None else self._history_core.steps(rows)
+        self._history_core.turn_to(document)
         if texts is not None and sum(map(len, texts)) <= STEP_CHARACTERS:
             outbox.push(f'{{"type":"ordered","ops":[{",".join(texts)}]}}')
         else:
-            outbox.push(self._past_core.welcome(guest.member, self.info), counted=False)
+            outbox.push(self._history_core.welcome(guest.member, self.info), counted=False)
         self._note_progress(self._progress.model_copy(update={"settled": False}))
         self._ordered()
 
@@ -282,21 +282,21 @@ async def _in_a_thread(work: Callable[..., Any], *arguments: Any) -> Any:
     return await asyncio.to_thread(work, *arguments)
 
 
-MakeRoom = Callable[[PastCore, Callable[[], None], Present | None], PastRoom]
+MakeRoom = Callable[[HistoryCore, Callable[[], None], Present | None], HistoryRoom]
 """Makes the room over a core; the second is to be called when nobody is left in it, the third says what is there now,
 where only that may be shown."""
 
 
-class Pasts:
-    """The rooms of all who look at the past, of one server: a bounded number. Lives in the event loop."""
+class HistoryRooms:
+    """The history rooms of one server, at most ``most`` at a time. They live in the event loop."""
 
     def __init__(
-        self, journal: Journal, make: MakeRoom, most: int = c.MAX_PAST_ROOMS, claims: Claims | None = None
+        self, journal: Journal, make: MakeRoom, most: int = c.MAX_HISTORY_ROOMS, claims: Claims | None = None
     ) -> None:
         self._journal, self._make = journal, make
         self._claims = claims or Claims()
-        self._rooms: dict[PastRoom, Place] = {}
-        """Rooms of the past, each with the place that it holds."""
+        self._rooms: dict[HistoryRoom, Place] = {}
+        """History rooms, each with the place that it holds."""
         self._places = Places(Share(most))
 
     def __len__(self) -> int:
@@ -310,7 +310,7 @@ class Pasts:
         demand: Callable[[], object] = lambda: None,
         read: Read | None = None,
         present: Present | None = None,
-    ) -> tuple[PastRoom, Guest]:
+    ) -> tuple[HistoryRoom, Guest]:
         """Opens a room at ``hello.at``. ``demand`` asks once more whether the link opens it, and raises Denied;
         ``read`` runs the reading of the journal; ``present``: what the terrain is now, for who is shown no more. When
         all rooms are taken, whose address has the most gives one up.
@@ -329,7 +329,7 @@ class Pasts:
                 raise Denied("no_terrain", "There is no such terrain on this server.")
             still = None if present is None else viewing.things(await present())
             demand()
-            room = self._make(PastCore(loaded, self._claims, still), lambda: self._close(room), present)
+            room = self._make(HistoryCore(loaded, self._claims, still), lambda: self._close(room), present)
         except DamagedTerrain as error:
             place.release()
             raise Denied("server_error", "The journal of this terrain is damaged; nothing was changed.") from error
@@ -366,7 +366,7 @@ class Pasts:
                 member.outbox.close(code, sentence)
             self._close(room)
 
-    def _close(self, room: PastRoom) -> None:
+    def _close(self, room: HistoryRoom) -> None:
         place = self._rooms.pop(room, None)
         if place is not None:
             place.release()

@@ -10,7 +10,7 @@ import pytest
 from esker import contract as c
 from esker.document.ops import StrokeSet
 from esker.document.wire import op_json
-from esker.session.room import past
+from esker.session.room import history_view
 from esker.store import activity
 from esker.store.activity import ActivityLogs
 from esker.store.journal import Journal, Loaded, Row
@@ -42,9 +42,9 @@ class Watched(Journal):
 
 @pytest.fixture
 def journal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Watched]:
-    monkeypatch.setattr(past, "FAR_OPS", 7)
-    monkeypatch.setattr(past, "WAYPOINT_OPS", 3)
-    monkeypatch.setattr(past, "WAYPOINTS", 4)
+    monkeypatch.setattr(history_view, "FAR_OPS", 7)
+    monkeypatch.setattr(history_view, "WAYPOINT_OPS", 3)
+    monkeypatch.setattr(history_view, "WAYPOINTS", 4)
     made = Watched(tmp_path)
     made.asked, made.loads = [], []
     made.create(c.Document(id="t")).result()
@@ -54,7 +54,7 @@ def journal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Watched
 
 
 def test_steps_lead_on_from_the_present_document_only(journal: Watched) -> None:
-    reader = past.Past(journal, StrokeSet("t"))
+    reader = history_view.HistoryReader(journal, StrokeSet("t"))
     _, steps = reader.go(6)
     assert steps is not None
     assert [row.clock for row in steps] == [1, 2, 3, 4, 5, 6]
@@ -66,7 +66,7 @@ def test_steps_lead_on_from_the_present_document_only(journal: Watched) -> None:
 
 
 def test_far_from_all_that_is_kept_the_snapshots_are_asked(journal: Watched) -> None:
-    reader = past.Past(journal, StrokeSet("t"))
+    reader = history_view.HistoryReader(journal, StrokeSet("t"))
     assert reader.go(7)[1] is not None
     assert journal.loads == []
     document, steps = reader.go(15)
@@ -74,7 +74,7 @@ def test_far_from_all_that_is_kept_the_snapshots_are_asked(journal: Watched) -> 
 
 
 def test_of_many_documents_few_are_kept(journal: Watched) -> None:
-    reader = past.Past(journal, StrokeSet("t"))
+    reader = history_view.HistoryReader(journal, StrokeSet("t"))
     for clock in range(0, 61, 3):
         reader.go(clock)
     reader.go(0)

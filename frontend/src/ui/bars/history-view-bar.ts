@@ -2,29 +2,29 @@ import type { ReadonlySignal } from "@preact/signals-core";
 import { html, nothing, type TemplateResult } from "lit";
 import type { History } from "../../app/history/history.ts";
 import { entryAt } from "../../app/history/history.ts";
+import type { HistoryView } from "../../app/history/history-view.ts";
 import { SPEEDS } from "../../app/history/pace.ts";
-import type { Past } from "../../app/history/past.ts";
 import type { TimeLapse } from "../../app/history/timelapse.ts";
 import { ago } from "../../app/words/words.ts";
 import { icon } from "../controls/icons.ts";
 import { SignalElement } from "../controls/signal-element.ts";
-import { pastBarStyles } from "../styles/past-bar.ts";
+import { historyViewBarStyles } from "../styles/history-view-bar.ts";
 import { shared } from "../styles/shared.ts";
 
 /** While the past is shown: what one sees, the slider and the time lapse, a copy, and the way back. */
-export class EskPastBar extends SignalElement {
+export class EskHistoryViewBar extends SignalElement {
   static override properties = {
-    past: { attribute: false },
+    historyView: { attribute: false },
     timeLapse: { attribute: false },
     history: { attribute: false },
     newest: { attribute: false },
     mayEdit: { attribute: false },
     client: { attribute: false },
   };
-  static override styles = [shared, pastBarStyles];
+  static override styles = [shared, historyViewBarStyles];
 
   /** The clock that is asked for. */
-  declare past: Pick<Past, "wanted">;
+  declare historyView: Pick<HistoryView, "wanted">;
   declare timeLapse: TimeLapse;
   declare history: History;
   /** Clock of the present. */
@@ -35,7 +35,7 @@ export class EskPastBar extends SignalElement {
 
   protected override render(): TemplateResult | typeof nothing {
     const { timeLapse, mayEdit } = this;
-    const clock = this.past.wanted.value;
+    const clock = this.historyView.wanted.value;
     if (clock === null) return nothing;
     return html`
       <section class="panel bar" aria-label="The terrain as it was">
@@ -111,4 +111,4 @@ export class EskPastBar extends SignalElement {
   }
 }
 
-customElements.define("esk-past-bar", EskPastBar);
+customElements.define("esk-history-view-bar", EskHistoryViewBar);

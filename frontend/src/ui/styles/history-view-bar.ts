@@ -1,7 +1,7 @@
 import { css } from "lit";
 
 /** The bar over a picture of the past. */
-export const pastBarStyles = css`
+export const historyViewBarStyles = css`
   :host {
     position: absolute;
     left: 50%;
