@@ -23,6 +23,7 @@ LAYERS: tuple[frozenset[str], ...] = (
     frozenset({"compiled", "errors", "fairness", "process", "resources", "version", "wgsl"}),
     frozenset({"contract"}),
     frozenset({"events", "grid"}),
+    frozenset({"flow"}),
     frozenset({"document", "patchwork", "synthesis", "tiles"}),
     frozenset({"importing", "solve", "store"}),
     frozenset({"exporting", "session"}),

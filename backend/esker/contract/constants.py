@@ -115,6 +115,13 @@ NO_LAKE: Final = -1.0e9
 DEFAULT_LAKES_FRACTION: Final = 1.0 / 1024.0
 """Least depth of a basin that fills, in sides of the domain, where a person says no other."""
 
+# --- rivers (docs/water.md) ---------------------------------------------------------------------------------------
+
+RIVER_AREA_SHARE: Final = 1.0 / 16.0
+"""A river drains at least the square of so much of the domain's side, where a terrain asks for one time the rivers."""
+RIVER_FALL_SHARE: Final = 1.0 / 256.0
+"""A river has come down by at least so much of the domain's side: where all is level there is none."""
+
 # --- stroke defaults (DESIGN 5.2, 12) ---------------------------------------------------------------------------
 
 DEFAULT_SLOPE_DEG: Final = 35.0

@@ -1,16 +1,15 @@
 """Lakes in the basins of the ground: how high water stands that cannot run off (twin of tiles/lakes/lakes.ts).
 
-Basins are found by priority flood (Barnes, Lehman & Mulla, "Priority-flood: An optimal depression-filling and
-watershed-labeling algorithm for digital elevation models", Computers & Geosciences 62, 2014) on the samples of one
-level. Samples are joined as the drawn triangles join them: to the four beside them and along the diagonals from
-south-east to north-west. On such ground the flood is exact: water leaves a basin over a vertex.
+How high water stands that runs over its brim says ``flow``: what a flood of all samples of one level gives (Barnes,
+Lehman & Mulla, "Priority-flood: An optimal depression-filling and watershed-labeling algorithm for digital elevation
+models", Computers & Geosciences 62, 2014). Samples are joined as the drawn triangles join them: to the four beside
+them and along the diagonals from south-east to north-west. On such ground the flood is exact: water leaves a basin over
+a vertex.
 """
 
 from __future__ import annotations
 
-import heapq
 import math
-from collections import deque
 from collections.abc import Iterator
 from typing import Final, NamedTuple
 
@@ -28,6 +27,7 @@ from esker.contract import (
     SUBPATCHES,
     TILE_CELLS,
 )
+from esker.flow.water import find_water
 
 Heights = NDArray[np.float32]
 _MESH: Final = ((0, 1), (0, -1), (1, 0), (-1, 0), (1, -1), (-1, 1))
@@ -52,10 +52,8 @@ def find_lakes(heights: Heights, cell_m: float, least_m: float, sea_m: float | N
     """The lakes of ``heights``, (n, n) float32 metres: of basins at least ``least_m`` deep and of LAKE_LEAST_SAMPLES
     samples. What reaches the border runs off; below ``sea_m`` the ground is the sea's. ``cell_m``: metres between
     samples."""
-    ground = heights.astype(np.float64)
-    if sea_m is not None:
-        ground = np.maximum(ground, np.float64(np.float32(sea_m)))
-    filled = flooded(ground)
+    floor = heights if sea_m is None else np.maximum(heights, np.float32(sea_m))
+    ground, filled = floor.astype(np.float64), flooded(floor).astype(np.float64)
     levels = np.full(heights.shape, NO_LAKE, dtype=np.float32)
     for basin in _basins(filled > ground):
         at = tuple(np.array(basin).T)
@@ -72,31 +70,23 @@ def find_lakes(heights: Heights, cell_m: float, least_m: float, sea_m: float | N
     return Lakes(heights, levels, dict(zip(found.tolist(), counts.tolist(), strict=True)))
 
 
-def flooded(ground: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Returns how high water stands on (n, n) ground whose border is open: at least the ground, metres."""
-    rows, cols = ground.shape
-    out = np.full(ground.shape, np.inf)
-    heap: list[tuple[float, int, int]] = []
-    for r in range(rows):
-        for c in range(cols) if r in (0, rows - 1) else (0, cols - 1):
-            out[r, c] = ground[r, c]
-            heap.append((float(ground[r, c]), r, c))
-    heapq.heapify(heap)
-    # Samples of a basin come in any order: they are all as high as its outlet.
-    pit: deque[tuple[float, int, int]] = deque()
-    while pit or heap:
-        level, r, c = pit.popleft() if pit else heapq.heappop(heap)
-        for y, x in _around(r, c, rows, cols):
-            if out[y, x] < np.inf:
-                continue
-            z = float(ground[y, x])
-            if z <= level:
-                out[y, x] = level
-                pit.append((level, y, x))
-            else:
-                out[y, x] = z
-                heapq.heappush(heap, (z, y, x))
-    return out
+def flooded(ground: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Returns how high water stands on (n, n) ground whose border is open: at least the ground, metres.
+
+    A flood only compares heights, so it is one of whole numbers in the same order (docs/water.md).
+    """
+    return _from_order(find_water(_in_order(ground)).filled)
+
+
+def _in_order(heights: NDArray[np.float32]) -> NDArray[np.int32]:
+    """Whole numbers that compare as the heights do: the bits of a positive one, and for negative ones all but the sign
+    turned round."""
+    bits = (heights + np.float32(0.0)).view(np.int32)  # -0.0 becomes 0.0
+    return bits ^ ((bits >> 31) & np.int32(0x7FFFFFFF))
+
+
+def _from_order(order: NDArray[np.int32]) -> NDArray[np.float32]:
+    return (order ^ ((order >> 31) & np.int32(0x7FFFFFFF))).view(np.float32)
 
 
 def lake_texture(lakes: Lakes) -> NDArray[np.float32]:

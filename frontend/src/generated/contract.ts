@@ -114,6 +114,10 @@ export const NO_LAKE = -1000000000.0 as const;
 
 export const DEFAULT_LAKES_FRACTION = 0.0009765625 as const;
 
+export const RIVER_AREA_SHARE = 0.0625 as const;
+
+export const RIVER_FALL_SHARE = 0.00390625 as const;
+
 export const DEFAULT_SLOPE_DEG = 35.0 as const;
 
 export const DEFAULT_EXTENT_FRACTION = 0.5 as const;
