@@ -152,7 +152,7 @@ function reliefOf(frame: Frame): number {
 type Points = [number, number][];
 
 interface Half {
-  /** What the stroke prescribes, from the crest outwards. */
+  /** Returns the profile that the stroke prescribes, from the crest outwards. */
   readonly firm: Points;
   /** From there to the base: what the diffusion decides, drawn as a soft fall. */
   readonly free: Points;
@@ -370,7 +370,7 @@ function nice(m: number, frame: Frame): number {
   return Math.round(Math.round(m / step) * step * 10) / 10;
 }
 
-/** Whether both flanks say the same, so that the inspector may show one for both. */
+/** Says whether both flanks are alike, so that the inspector may show one for both. */
 export function symmetric(section: Pick<Section, "left" | "right">): boolean {
   const { left, right } = section;
   if (left === null || right === null) return left === right;

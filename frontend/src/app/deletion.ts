@@ -7,7 +7,7 @@ export interface Deleted {
   readonly restorable: boolean;
 }
 
-/** What the page knows of the deletion of its terrain, and what an owner does about it. */
+/** The deletion of this page's terrain: what is known of it, and what an owner does about it. */
 export class Deletion {
   readonly #id: string;
   readonly #secret: () => string;

@@ -13,7 +13,7 @@ import type { Status } from "./status.ts";
 import type { ToastList } from "./toasts.ts";
 import type { People } from "./view/scene.ts";
 
-/** What the server told of itself. */
+/** Facts that the server gave about itself. */
 export interface ServerInfo {
   readonly version: string;
   readonly device: string;
@@ -40,13 +40,13 @@ export interface OpenTerrain {
   readonly progress: Signal<Progress | null>;
   /** The server makes the ground of the elevation layers, and it takes long. */
   readonly baseBuilding: ReadonlySignal<boolean>;
-  /** What the server last said about its solver, until somebody has read it. */
+  /** The server's last sentence about its solver, until somebody has read it. */
   readonly notice: ReadonlySignal<string | null>;
   readonly server: ReadonlySignal<ServerInfo | null>;
   readonly me: ReadonlySignal<Identity>;
-  /** What the link allows. */
+  /** Whether the link allows changes. */
   readonly mayEdit: ReadonlySignal<boolean>;
-  /** What can be done now: nobody changes the past. */
+  /** Whether the terrain can be changed now: an earlier clock cannot. */
   readonly canEdit: ReadonlySignal<boolean>;
   readonly status: ReadonlySignal<Status>;
   readonly people: ReadonlySignal<People>;

@@ -52,7 +52,7 @@ export class TerrainSession implements OpenTerrain {
   readonly id: string;
   secret: string;
   readonly client: string;
-  /** By which the server knows that the client id is this page's, once it has welcomed it. */
+  /** The server's token, by which it knows later that the client id is this page's; null before the first welcome. */
   #token: string | null = null;
   readonly store: Store = deviceStore();
   readonly toasts = new ToastList();
@@ -70,14 +70,14 @@ export class TerrainSession implements OpenTerrain {
   readonly progress = signal<Progress | null>(null);
   /** The server makes the ground of the elevation layers, and it takes long. */
   readonly baseBuilding = signal(false);
-  /** What the server last said about its solver, until somebody has read it. */
+  /** The server's last sentence about its solver, until somebody has read it. */
   readonly notice = signal<string | null>(null);
   readonly server = signal<ServerInfo | null>(null);
   readonly me = signal<Identity>({ name: "", colour: "#888888" });
   readonly stage = signal<Stage | null>(null);
-  /** What the link allows. */
+  /** Whether the link allows changes. */
   readonly mayEdit = computed(() => this.role.value === "owner" || this.role.value === "edit");
-  /** What can be done now: nobody changes the past. */
+  /** Whether the terrain can be changed now: an earlier clock cannot. */
   readonly canEdit: ReadonlySignal<boolean>;
   readonly status: ReadonlySignal<Status>;
   readonly people: ReadonlySignal<People>;

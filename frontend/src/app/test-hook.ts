@@ -19,9 +19,9 @@ export interface PageView {
   heightAt(x: number, y: number): number | null;
   /** Height in metres of the ground as drawn, with synthesised detail down to cells of `cellM` metres. */
   shownAt(x: number, y: number, cellM?: number): number | null;
-  /** What grows and lies at a place, shares 0..1; null before the ground has come. */
+  /** Attributes of a place, shares 0..1: what grows and lies there; null before the ground has come. */
   attributesAt(x: number, y: number): Attributes | null;
-  /** What strokes ask of a channel at a place: metres of amplitude, roughness 0..1, biases -1..1. */
+  /** The value that strokes ask of a channel at a place: metres of amplitude, roughness 0..1, biases -1..1. */
   channelAt(channel: PaintChannel, x: number, y: number): number | null;
   /** Level of the finest tile held at a place, -1 before the ground has come. */
   levelAt(x: number, y: number): number;
@@ -32,7 +32,7 @@ export interface PageView {
   levels(): { solved: number; finest: number } | null;
   /** Tiles that the server is still refining for somebody. */
   refining(): number;
-  /** What the server last said about its solver, if nobody has read it away. */
+  /** The server's last sentence about its solver, if nobody has read it away. */
   notice(): string | null;
   /** Document clock as confirmed here. */
   clock(): number | null;
@@ -40,7 +40,7 @@ export interface PageView {
   settled(): boolean;
   /** The clock that is shown instead of now, once its document is here. */
   historyClock(): number | null;
-  /** What the history says, newest first, as far as it was read. */
+  /** Entries of the activity log, newest first, as far as it was read. */
   history(): string[];
   /** My operations that are not yet in the server's journal. */
   pending(): number;
@@ -49,7 +49,7 @@ export interface PageView {
   layers(): Layer[];
   /** Elevation files that I bring in. */
   imports(): { file: string; phase: string; share: number; problem: string }[];
-  /** What other people bring in, as it is told. */
+  /** Imports of other people, as the server tells of them. */
   importing(): string[];
   /** Where handles are in the window, CSS pixels. */
   handles(): { kind: string; x: number; y: number }[];

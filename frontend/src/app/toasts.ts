@@ -6,7 +6,7 @@ export interface Toast {
   readonly tone: "info" | "warn";
   /** How often the same sentence came while it stood. */
   readonly times: number;
-  /** What can be done about it at once. */
+  /** The action that can be taken at once. */
   readonly act?: { readonly label: string; readonly run: () => void };
 }
 

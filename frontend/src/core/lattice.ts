@@ -64,7 +64,7 @@ export function extentOf({ rows, cols }: GridShape, place: GridPlace): Point {
   return [(cols - 1) * place.spacing_m[0], (rows - 1) * place.spacing_m[1]];
 }
 
-/** Whether a world position lies on the grid. */
+/** Says whether a world position lies on the grid. */
 export function covers(shape: GridShape, place: GridPlace, x: number, y: number): boolean {
   const [u, v] = latticeOf(place, x, y);
   return u >= 0 && v >= 0 && u <= shape.cols - 1 && v <= shape.rows - 1;
@@ -74,27 +74,33 @@ export function moved(place: GridPlace, dx: number, dy: number): GridPlace {
   return { ...place, anchor: [place.anchor[0] + dx, place.anchor[1] + dy] };
 }
 
-/** Laid with the lattice point (u, v) at a world position. */
+/** Returns the place laid so that its lattice point (u, v) is at a world position. */
 export function pinned(place: GridPlace, u: number, v: number, [x, y]: Point): GridPlace {
   const at = latticePoint(place, u, v);
   return moved(place, x - at[0], y - at[1]);
 }
 
-/** Turned about its middle to a rotation in degrees counter-clockwise. */
+/** Returns the place turned about its middle to a rotation in degrees counter-clockwise. */
 export function turned(shape: GridShape, place: GridPlace, rotationDeg: number): GridPlace {
   const middle = centreOf(shape, place);
   const next = { ...place, rotation_deg: wrapDegrees(rotationDeg) };
   return pinned(next, (shape.cols - 1) / 2, (shape.rows - 1) / 2, middle);
 }
 
-/** With another spacing, the lattice point (u, v) staying where it is. Spacings are kept within the contract's bounds. */
+/**
+ * Returns the place with another spacing; its lattice point (u, v) stays where it is. Spacings are kept within the
+ * contract's bounds.
+ */
 export function respaced(place: GridPlace, spacing: Point, u: number, v: number): GridPlace {
   const fixed = latticePoint(place, u, v);
   const within = (step: number): number => clamp(step, MIN_GRID_SPACING_M, MAX_GRID_SPACING_M);
   return pinned({ ...place, spacing_m: [within(spacing[0]), within(spacing[1])] }, u, v, fixed);
 }
 
-/** As large as the terrain holds in its present direction and proportions, in the middle of the terrain. */
+/**
+ * Returns the place as large as the terrain holds, in its present direction and proportions, in the middle of the
+ * terrain.
+ */
 export function fitted(shape: GridShape, place: GridPlace, sizeM: number, share = 1): GridPlace {
   const [wide, tall] = extentOf(shape, place);
   const [c, s] = turn(place.rotation_deg).map(Math.abs) as [number, number];

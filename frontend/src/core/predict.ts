@@ -83,7 +83,7 @@ export function predictInts(parent: Int32Array, x: number, y: number, out: Int32
   for (let i = 0; i < N * N; i++) out[i] = Math.floor((scaled[i]! + whole / 2) / whole);
 }
 
-/** The same rule in metres, without rounding to quanta: what a child moves by when its parent moves by `parent`. */
+/** Predicts in metres, without rounding to quanta, what a child moves by when its parent moves by `parent`. */
 export function predictMetres(parent: Float32Array, x: number, y: number, out: Float32Array): void {
   interpolate(parent, x, y);
   for (let i = 0; i < N * N; i++) out[i] = scaled[i]! / 256;

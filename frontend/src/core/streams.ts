@@ -1,4 +1,6 @@
-/** Which streams of tiles make up the ground. Twin of `ratio` and `finest_level` in `backend/esker/tiles/codec/frame.py`. */
+/**
+ * Streams of tiles that make up the ground. Twin of `ratio` and `finest_level` in `backend/esker/tiles/codec/frame.py`.
+ */
 
 import { CHANNEL_LEVELS_BELOW, Channel, MAX_LEVEL, MAX_REFINED_LEVEL } from "../generated/contract.ts";
 

@@ -65,7 +65,7 @@ export interface Tile {
   readonly subError: Float32Array;
 }
 
-/** What selection, renderers and picking read of the tile store. */
+/** The part of the tile store that selection, renderers and picking read. */
 export interface TileView {
   readonly sizeM: number;
   /** Finest level that can exist. */
@@ -84,7 +84,7 @@ export interface ChannelGrid {
   readonly values: Float32Array;
 }
 
-/** What strokes ask of the detail that is synthesised on the ground (DESIGN 5.4). */
+/** Channels by which strokes change the detail that is synthesised on the ground (DESIGN 5.4). */
 export interface ChannelView {
   /** Rises with every change. */
   readonly stamp: number;
@@ -92,7 +92,7 @@ export interface ChannelView {
   readonly amplitude: ChannelGrid;
   /** Roughness, 0..1. */
   readonly roughness: ChannelGrid;
-  /** What paint adds to the rule's own snow, grass, forest and wetness, -1..1. */
+  /** Paint, which is added to the rule's own snow, grass, forest and wetness, -1..1. */
   readonly snow: ChannelGrid;
   readonly grass: ChannelGrid;
   readonly forest: ChannelGrid;
@@ -172,7 +172,7 @@ export interface CursorVisual {
   readonly radiusPx: number;
 }
 
-/** What a picture trades: `automatic` holds the frame rate, the others hold their screen-error bound. */
+/** Quality settings of a picture: `automatic` holds the frame rate, the others hold their screen-error bound. */
 export type QualityMode = "automatic" | "fast" | "balanced" | "fine";
 
 /** Overlays of what paint adds to a channel, or takes from it. */

@@ -1,4 +1,4 @@
-/** What an op changed, field by field: the memory of undo (`undo.ts`). Pure. */
+/** The changes of an op, field by field, which undo remembers (`undo.ts`). Pure. */
 
 import type { Layer, Op, SetTerrain, SimpleOp, Stroke, TerrainSettings } from "../generated/contract.ts";
 import type { Doc } from "./document.ts";
@@ -60,7 +60,7 @@ export const TERRAIN_WORDS = {
   place: "place on Earth",
 } as const;
 
-/** What one step of mine did to a stroke or layer. `content` is the item as I left it when it came to life or died. */
+/** One step's changes of one stroke or layer. `content` is the item as I left it when it came to life or died. */
 export interface ItemChange {
   readonly before: State;
   readonly after: State;
@@ -89,7 +89,7 @@ export function fieldOf(item: Item, name: string): unknown {
   return (item as unknown as Record<string, unknown>)[name];
 }
 
-/** Whether the stroke or layer is there, and it (or its tombstone). */
+/** Returns whether the stroke or layer is there, and the item or its tombstone. */
 export function stateOf(kind: Kind, doc: Doc, id: string): [State, Item | null] {
   const live = (kind === "stroke" ? doc.strokes : doc.layers).get(id);
   if (live !== undefined) return ["live", live];
@@ -104,7 +104,7 @@ export function subjectOf(op: Exclude<SimpleOp, SetTerrain>): [kind: Kind, id: s
   return "layer" in op ? ["layer", op.layer] : ["stroke", op.stroke];
 }
 
-/** What `op` changed between the two documents, field by field. */
+/** Returns the changes between the two documents that `op` made, field by field. */
 export function changes(op: Op, before: Doc, after: Doc): Changes {
   const items = { stroke: new Map<string, ItemChange>(), layer: new Map<string, ItemChange>() };
   const terrain = new Map<string, Change>();
@@ -166,7 +166,7 @@ function mergeItems(
   return out;
 }
 
-/** These changes followed by later ones. */
+/** Joins these changes with later ones. */
 export function merge(earlier: Changes, later: Changes): Changes {
   return {
     strokes: mergeItems(earlier.strokes, later.strokes),

@@ -6,9 +6,9 @@ import { worldPoints } from "./strokes.ts";
 
 /** Samples a side: a cell is a 128th of the domain, and the overlay fades over many. */
 export const INFLUENCE_SIDE = 129;
-/** More points of a line than this are thinned: the overlay is far coarser. */
+/** A line of more points than this is thinned: the overlay is far coarser. */
 const MOST_POINTS = 96;
-/** What an infinite reach counts as, in sides of the domain: pure diffusion, which the other strokes end. */
+/** An infinite reach counts as so many sides of the domain. It means pure diffusion, which the other strokes end. */
 const INFINITE_REACH = 0.25;
 
 /**

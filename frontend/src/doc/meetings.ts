@@ -12,7 +12,7 @@ export interface Meeting {
   readonly theirs: number;
 }
 
-/** More crossings than these are not listed. */
+/** At most so many crossings are listed. */
 export const MOST_MEETINGS = 24;
 /** Heights that differ by less than this, metres, do not spoil one another. */
 const AGREE_M = 1;
@@ -56,7 +56,9 @@ function crestOf(stroke: Stroke): Crest {
   return crest;
 }
 
-/** The curve without its ways back: points of ever greater u, as the ground, which has no overhangs, follows it. */
+/**
+ * Returns the curve without its ways back: points of ever greater u. Ground has no overhangs and follows the curve so.
+ */
 function skyline(curve: readonly CurvePoint[]): CurvePoint[] {
   const out: CurvePoint[] = [];
   for (const [u, w] of [...curve].sort((a, b) => a[0] - b[0])) {

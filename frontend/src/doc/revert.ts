@@ -15,7 +15,10 @@ import type { Doc } from "./document.ts";
 /** A longer curve is restored by appends, since one message of 64 KiB does not hold it. */
 const LARGE_CURVE_POINTS = 1024;
 
-/** What strokes and layers have in common: appends to `ops` what takes the change back, and to `skipped` what was left. */
+/**
+ * Takes back one change. Strokes and layers share this: ops that do it are appended to `ops`, sentences about the rest
+ * to `skipped`.
+ */
 abstract class Reverter {
   readonly #kind: Kind;
   protected readonly id: string;

@@ -30,7 +30,7 @@ import { type UndoPlan, UndoStack } from "./undo.ts";
 export interface RefusedOp {
   readonly code: RejectCode;
   readonly message: string;
-  /** What was refused, where it is still known. */
+  /** The refused op, where it is still known. */
   readonly op?: Op;
 }
 
@@ -79,7 +79,7 @@ export class SyncDoc {
   #confirmed: Doc | null = null;
   /** Confirmed and unconfirmed together. */
   #present: Doc | null = null;
-  /** What is shown instead. */
+  /** The earlier document that is shown instead; null while the present one is. */
   #past: Doc | null = null;
   #entries: Entry[] = [];
   /** Ops whose clock is known, waiting for an earlier one. */
@@ -101,7 +101,7 @@ export class SyncDoc {
     this.#tokensAt = now();
   }
 
-  /** What to show: confirmed and unconfirmed together, or an earlier state. Null before the first welcome. */
+  /** The document to show: confirmed and unconfirmed together, or an earlier state. Null before the first welcome. */
   get doc(): ReadonlySignal<Doc | null> {
     return this.#doc;
   }
@@ -320,7 +320,7 @@ export class SyncDoc {
       const before = this.#confirmed;
       try {
         this.#confirmed = apply(before, next.op);
-        // What the server did in my name, as the end of an import, is mine to undo.
+        // An op that the server made in my name, at the end of an import, is mine to undo.
         if (!own && next.author === this.#client) this.#undo.record(before, next.op, this.#confirmed);
       } catch (error) {
         if (!(error instanceof Refusal)) throw error;

@@ -13,7 +13,7 @@ import { grouped, LayerReverter, StrokeReverter } from "./revert.ts";
 
 const DEFAULT_DEPTH = 500;
 
-/** What to submit, in order, and what was left alone: a sentence each. No ops: nothing was undone. */
+/** Ops to submit in order, and a sentence for each thing that was left alone. Without ops nothing was undone. */
 export interface UndoPlan {
   readonly ops: readonly Op[];
   readonly skipped: readonly string[];

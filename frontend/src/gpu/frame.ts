@@ -1,4 +1,7 @@
-/** What all passes of a frame bind: the view uniform, the atlas, the sky tables, noise and stones (shaders/wgsl/view.wgsl). */
+/**
+ * Bindings that all passes of a frame share: the view uniform, the atlas, the sky tables, noise and stones
+ * (shaders/wgsl/view.wgsl).
+ */
 
 import { eyeProjection, reversedDepth, viewAxes } from "../core/camera/projection.ts";
 import type { Scene, Vec3 } from "../core/types.ts";
@@ -27,15 +30,18 @@ const OVERLAYS = {
   wetness: 6,
 } as const;
 
-/** What a frame is drawn with besides the scene. */
+/** Facts that a frame is drawn with besides the scene. */
 export interface FrameFacts {
   readonly width: number;
   readonly height: number;
   readonly low: number;
   readonly high: number;
-  /** None: no lake is drawn. */
+  /** The lakes of the terrain; without them no lake is drawn. */
   readonly lakes?: Lakes | null;
-  /** In which the ground is drawn, while the one that the terrain has is still being made; none: the terrain's. */
+  /**
+   * The look in which the ground is drawn while the terrain's own look is still being made; without it the terrain's
+   * own.
+   */
   readonly look?: Look;
 }
 

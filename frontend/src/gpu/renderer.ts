@@ -64,7 +64,7 @@ interface World {
   readonly atlas: Atlas;
   readonly light: LightQueue;
   readonly selection: Selection;
-  /** What the atlas has no slots for is left out by a coarser bound. */
+  /** Tells whether the atlas has slots for the view: where it lacks them, the bound becomes coarser. */
   readonly fit: Fit;
   /** Tiles that the last cut rested on and lacked. */
   needed: number;
@@ -323,7 +323,7 @@ export class GpuRenderer implements SceneRenderer {
       const more = atlas.admit(cut.requests, limit - entered.length);
       entered.push(...more);
       if (more.length > 0) continue;
-      // What is only needed soon waits for a frame with room to spare; the CPU never has any.
+      // Tiles that are only needed soon wait for a frame with room to spare; a renderer on the CPU never has any.
       const room = Math.min(limit - entered.length, atlas.capacity - cut.tiles);
       if (!this.#gpu.software && room > 0) entered.push(...atlas.admit(cut.early, room));
       return { cut, entered };

@@ -1,4 +1,7 @@
-/** Whether two scenes show the same picture. The app builds scenes anew each frame, so values count, not identity. */
+/**
+ * Decides whether two scenes show the same picture. The app builds scenes anew each frame, so values count, not
+ * identity.
+ */
 
 import type { CameraState, CursorVisual, FootprintVisual, GhostVisual, Scene, StrokeVisual } from "../core/types.ts";
 

@@ -112,7 +112,7 @@ const RULES: Readonly<Record<SynthesisRule, string>> = {
   plain: rulePlain,
 };
 
-/** What makes the detail of the ground by one of the rules. */
+/** Returns the source of the shader that makes the detail of the ground by one of the rules. */
 export function synthesisSource(rule: SynthesisRule): string {
   return join(
     contract,

@@ -37,7 +37,7 @@ export interface InputOptions {
   readonly doc: SyncDoc;
   /** The ground as it is drawn now. */
   readonly ground: () => Ground;
-  /** The same, held fast for one stroke or drag. */
+  /** Returns the ground, held fast for one stroke or drag. */
   readonly freeze: () => Ground;
   readonly clientId: string;
   readonly canEdit: () => boolean;
@@ -70,7 +70,7 @@ const FLUSH: Readonly<Record<Exclude<ToolId, "select" | "paint">, string>> = {
 export class InputController {
   readonly tool: Signal<ToolId> = signal<ToolId>("mountain");
   readonly selection: Signal<string | null> = signal<string | null>(null);
-  /** Whether one finger draws; becomes false when a pen is seen. */
+  /** Whether one finger draws. It becomes false when a pen is seen. */
   readonly fingerDraws: Signal<boolean> = signal(true);
   /** The elevation grid that is being placed: it has the pointer to itself. */
   readonly placing: Signal<Placing | null> = signal<Placing | null>(null);
@@ -163,7 +163,7 @@ export class InputController {
     return this.#inks;
   }
 
-  /** What the main pointer is doing. */
+  /** The gesture of the main pointer. */
   get inputMode(): ReadonlySignal<InputMode> {
     return this.#mode;
   }
@@ -310,7 +310,7 @@ export class InputController {
 
   /** A new stroke is selected. One that changes nothing to be seen is put in hand, with a word on what to do. */
   #drawn(made: FinishedStroke): void {
-    // With the brush one goes on painting: keys and inspector stay with the brush.
+    // A person with the brush goes on painting: keys and inspector stay with the brush.
     const tool = this.tool.value;
     this.selection.value = tool === "paint" ? null : made.id;
     if (!made.flush || tool === "paint" || tool === "select") return;

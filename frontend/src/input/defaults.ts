@@ -1,4 +1,4 @@
-/** What a new stroke starts with, per tool: signals that the inspector writes and the stroke tool reads. */
+/** The values that a new stroke starts with, per tool: signals that the inspector writes and the stroke tool reads. */
 
 import { type Signal, signal } from "@preact/signals-core";
 import type { Flank, Paint, Stroke } from "../generated/contract.ts";
@@ -18,7 +18,7 @@ export interface ToolDefaults {
   readonly plateau: Signal<ToolStyle>;
   /** The brush. */
   readonly paint: Signal<Paint>;
-  /** What the pressure of a pen changes: the extent of flanks, the radius of the brush. */
+  /** The property that the pressure of a pen changes: the extent of flanks, the radius of the brush. */
   readonly pressure: Signal<"none" | "extent">;
 }
 

@@ -88,6 +88,6 @@ export function takePointer(element: HTMLElement, pointerId: number): void {
   try {
     element.setPointerCapture(pointerId);
   } catch {
-    // Without capture the gesture ends at the border of the element; nothing else depends on it.
+    // Without capture the gesture ends at the border of the element. Nothing else depends on the capture.
   }
 }

@@ -1,4 +1,4 @@
-/** Which stroke or handle is under the pointer, measured in device pixels. */
+/** Finds the stroke or handle under the pointer, measured in device pixels. */
 
 import type { Camera } from "../core/camera/camera.ts";
 import { segmentDistance } from "../core/geometry.ts";

@@ -1,4 +1,7 @@
-/** What a pointer that goes down begins, by tool, button and what lies under it; and what becomes of it when it moves. */
+/**
+ * The gesture that a pointer begins when it goes down, by tool, button and what lies under it; and its course as the
+ * pointer moves.
+ */
 
 import type { ReadonlySignal } from "@preact/signals-core";
 import type { Camera } from "../core/camera/camera.ts";
@@ -29,7 +32,7 @@ export type Activity =
   | { readonly kind: "drag" }
   | { readonly kind: "navigate"; readonly mode: NavigationMode };
 
-/** What pointer actions act on. */
+/** The parts of the page that pointer actions change. */
 export interface PressContext {
   readonly camera: Camera;
   /** The ground as it is drawn now, held fast. */
@@ -51,7 +54,10 @@ export interface PressContext {
 
 /** Number of the button that the other end of a pen stands for. */
 const ERASER = 5;
-/** What a click takes: paint lies over the land like a veil, so it comes last, and the drawing tools do not see it. */
+/**
+ * The order in which a click takes strokes: paint lies over the land like a veil, so it comes last, and the drawing
+ * tools do not see it.
+ */
 const PICKS: Readonly<Record<ToolId, PickOrder>> = {
   select: ["land", "paint"],
   mountain: ["land"],
@@ -109,13 +115,13 @@ export class PointerActions {
     return this.#navigate(navigate, x, y);
   }
 
-  /** What lies under the pointer, of what the tool shows. */
+  /** Returns what lies under the pointer of the strokes that the tool shows. */
   pick(e: PointerEvent): Picked | null {
     if (this.#c.placing.value !== null) return null;
     return this.#c.hitTest.stroke(e, this.#c.freeze(), PICKS[this.#c.tool.value]);
   }
 
-  /** Whether a line begun here would redraw a part of the selected one. */
+  /** Says whether a line begun here would redraw a part of the selected one. */
   over(e: PointerEvent): boolean {
     const { doc, selection, tool, hitTest, oversketch } = this.#c;
     const stroke = doc.doc.value?.strokes.get(selection.value ?? "");
@@ -123,7 +129,7 @@ export class PointerActions {
     return oversketch.would(stroke, hitTest.sample(e), hitTest.near(e), hitTest.ratio);
   }
 
-  /** Whether the pen came down on the line of the selected stroke, with the tool that draws such lines. */
+  /** Says whether the pen came down on the line of the selected stroke, with the tool that draws such lines. */
   #redraw(e: PointerEvent): boolean {
     const { doc, selection, tool, hitTest, oversketch } = this.#c;
     const stroke = doc.doc.value?.strokes.get(selection.value ?? "");

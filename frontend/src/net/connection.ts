@@ -12,7 +12,7 @@ import { DecodeClient } from "./decodeclient.ts";
 
 export type ConnectionState = "connecting" | "online" | "reconnecting" | "closed";
 
-/** What decodes tile frames; the worker's client unless a test brings its own. */
+/** The decoder of tile frames; the worker's client unless a test brings its own. */
 export interface FrameSource {
   push(buffer: ArrayBuffer): void;
   onFrame(listener: (frame: DecodedFrame) => void): void;
@@ -83,7 +83,7 @@ export class Connection {
   readonly #reason = signal<string | null>(null);
   readonly #rttMs = signal<number | null>(null);
   #socket: WebSocket | null = null;
-  /** What the server said just before it closed. */
+  /** The server's words just before it closed. */
   #lastWords: string | null = null;
   #attempt = 0;
   #retry: ReturnType<typeof setTimeout> | undefined;

@@ -1,4 +1,4 @@
-/** What passes between the page and its decoding worker. */
+/** Messages between the page and its decoding worker. */
 
 import type { DecodedFrame } from "../core/types.ts";
 

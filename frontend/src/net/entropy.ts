@@ -48,14 +48,14 @@ let read = 0;
 /** 0 for 0, then two classes an octave. */
 function sizeClass(total: number): number {
   if (total <= 0) return 0;
-  // Beyond 32 bits all are of the last class; so are all from 2^15.5 on.
+  // Numbers from 2^15.5 on are of the last class, whatever their size.
   const whole = Math.min(total, 0x7fffffff);
   const exponent = 31 - Math.clz32(whole);
   const half = exponent > 0 ? (whole >>> (exponent - 1)) & 1 : 0;
   return Math.min(1 + 2 * exponent + half, SIZES - 1);
 }
 
-/** One decision of these odds of a 1, of 65,536. */
+/** Decodes one decision whose odds of a 1 are given in 65,536ths. */
 function getBit(chance: number): 0 | 1 {
   const sure = Math.min(Math.max(chance, SURE), 65536 - SURE);
   const middle = low + Math.floor(((high - low) * sure) / 65536);
@@ -71,7 +71,7 @@ function getBit(chance: number): 0 | 1 {
   return bit;
 }
 
-/** A decision in a context, which learns from it. */
+/** Decodes a decision in a context, which learns from it. */
 function decide(at: number): 0 | 1 {
   const chance = odds[at]!;
   const bit = getBit(chance);
@@ -81,7 +81,7 @@ function decide(at: number): 0 | 1 {
   return bit;
 }
 
-/** A number, coded in the contexts from `first` on. */
+/** Decodes a number in the contexts from `first` on. */
 function getNumber(first: number): number {
   if (!decide(first)) return 0;
   let exponent = 0;
@@ -95,7 +95,7 @@ function getNumber(first: number): number {
   return negative ? -size : size;
 }
 
-/** How large the known residuals around a place are. */
+/** Returns how large the known residuals around a place are. */
 function sizeAround(at: number, place: number): number {
   const w = Math.abs(known[at + W]!);
   const s = Math.abs(known[at + S]!);
@@ -107,7 +107,7 @@ function sizeAround(at: number, place: number): number {
   return place === 2 ? 3 * s + 2 * ww + ss + diagonal : 3 * w + diagonal + ss + ww;
 }
 
-/** What is expected of a residual between samples of the parent. */
+/** Returns the residual that is expected between samples of the parent. */
 function expected(at: number, place: number, size: number): number {
   const first = (Math.min(size, LATTICE_CLASSES - 1) * 3 + place - 2) * AROUND.length;
   let sum = 32;

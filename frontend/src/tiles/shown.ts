@@ -30,9 +30,9 @@ const SLACK_SOLVED = 3;
 
 /** A block of the ground as it is drawn at its level. */
 interface Surface {
-  /** Without detail, with the border. */
+  /** The block's heights without detail, with the border. */
   readonly base: Float64Array;
-  /** With detail: 9 x 9. */
+  /** The block's heights with detail: 9 x 9. */
   readonly heights: Float32Array;
   /** How far finer levels may reach above these heights where no finer tile is held, metres. */
   readonly rest: number;
@@ -114,7 +114,7 @@ export class ShownGround implements Ground {
     return Math.min(Math.max(level, 0), this.field.finest);
   }
 
-  /** Whether nothing finer than `size` metres is left below a block. */
+  /** Says whether nothing finer than `size` metres is left below a block. */
   #isDone({ rest }: Surface, level: number, x: number, y: number, size: number): boolean {
     return rest <= size && this.#riseOf(level, x, y) === Number.NEGATIVE_INFINITY;
   }

@@ -58,7 +58,7 @@ export class ShownTerrain {
     return ground.heightAt(x, y, Math.max(STEP_M, Math.abs(z - near) / EYE_CELLS));
   }
 
-  /** What grows and lies at a place; null before the ground has come. */
+  /** Returns what grows and lies at a place; null before the ground has come. */
   attributesAt(x: number, y: number): Attributes | null {
     const field = this.#currentField();
     return field?.attributesAt(x, y, Math.min(ATTRIBUTE_LEVEL, field.finest)) ?? null;

@@ -25,7 +25,7 @@ interface Shown extends Footing {
   readonly offset: Link;
 }
 
-/** What a tile stands on. */
+/** The ground that a tile stands on. */
 interface Footing {
   /** Metres; null where there is no base. */
   readonly base: Float32Array | null;
@@ -41,16 +41,16 @@ export class TileStore implements TileView {
   readonly sizeM: number;
   readonly levels: number;
   readonly solved: number;
-  /** The same as `stamp`, to subscribe to. */
+  /** The value of `stamp`, to subscribe to. */
   readonly revision: ReadonlySignal<number>;
   /** The ground as it is now; `freeze` gives one that stays. */
   readonly ground: Ground;
   readonly #rev = signal(0);
   readonly #offsets: TileChain;
   readonly #base: TileChain;
-  /** What is drawn, as somebody last looked at it: where several frames come at once, the tiles are made once. */
+  /** Tiles as they were drawn when somebody last looked: where several frames come at once, tiles are made once. */
   #drawn = new Map<number, Shown>();
-  /** What frames have changed since then. */
+  /** How much of `#drawn` frames have made stale since then. */
   #stale: "nothing" | "offsets" | "all" = "nothing";
   #snapshot: { readonly stamp: number; readonly ground: TileGround } | null = null;
   readonly #distance = new Float64Array(SUBS);
@@ -124,7 +124,7 @@ export class TileStore implements TileView {
     this.#rev.value++;
   }
 
-  /** What is drawn now. */
+  /** Returns the tiles that are drawn now. */
   get #shown(): ReadonlyMap<number, Shown> {
     if (this.#stale === "nothing") return this.#drawn;
     const all = this.#stale === "all";
@@ -137,7 +137,7 @@ export class TileStore implements TileView {
     return this.#drawn;
   }
 
-  /** Whether there is a base: its root is always held with anything of it. */
+  /** Says whether there is a base: its root is held with anything of it. */
   get #based(): boolean {
     return this.#base.get(ROOT) !== undefined;
   }
@@ -154,7 +154,7 @@ export class TileStore implements TileView {
     return next;
   }
 
-  /** What a tile stands on; null where it has to wait for that. */
+  /** Returns the ground that a tile stands on; null where the tile has to wait for it. */
   #footing(key: number, parent: Shown | undefined): Footing | null {
     if (!this.#based) return NO_BASE;
     const own = this.#base.get(key);

@@ -3,7 +3,7 @@
 import type { Store } from "./storage.ts";
 
 export interface KeptImport {
-  /** Of the import on the server. */
+  /** Id of the import on the server. */
   readonly id: string;
   readonly file: string;
 }
@@ -28,12 +28,12 @@ export function keepImports(terrain: string, kept: readonly KeptImport[]): void 
   }
 }
 
-/** One more, begun on another page of this tab. */
+/** Adds an import that was begun on another page of this tab. */
 export function keepImport(terrain: string, kept: KeptImport): void {
   keepImports(terrain, [...keptImports(terrain), kept]);
 }
 
-/** The last file that became a terrain on the start page: whose card it is can cancel it from there too. */
+/** The last file that became a terrain on the start page. The card of its import can be cancelled from there too. */
 export interface StartedImport {
   readonly terrain: string;
   readonly secret: string;
@@ -58,7 +58,7 @@ export function keepStarted(store: Store, what: StartedImport | null): void {
     if (what === null) store.removeItem(STARTED);
     else store.setItem(STARTED, JSON.stringify(what));
   } catch {
-    // Without it the import is cancelled on its terrain's page only.
+    // Where storage is blocked, the import is cancelled on its terrain's page only.
   }
 }
 

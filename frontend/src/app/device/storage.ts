@@ -1,4 +1,7 @@
-/** What this device remembers: recent terrains, my name and colour, the theme. Storage may be blocked: then nothing. */
+/**
+ * The memory of this device: recent terrains, my name and colour, the theme. Storage may be blocked; then nothing is
+ * kept.
+ */
 
 import type { Role } from "../../generated/contract.ts";
 import { friendlyName } from "./names.ts";
@@ -86,7 +89,7 @@ function write(store: Store, key: string, value: string): void {
   }
 }
 
-/** Who I am to the others. */
+/** My name and colour, as other people see them. */
 export interface Identity {
   readonly name: string;
   readonly colour: string;
@@ -105,8 +108,8 @@ export const MEMBER_COLOURS = [
 ] as const;
 
 /**
- * Who I am on this device. Who never chose a name gets a friendly one from `client` (any string of one's own), which is
- * kept from then on; an empty name that somebody saved means the same.
+ * Returns my name and colour on this device. A person who never chose a name gets a friendly one from `client` (any
+ * string of one's own), and it is kept from then on. An empty name that somebody saved means the same.
  */
 export function identity(store: Store, random: () => number, client: string): Identity {
   let name = (store.getItem("esker.name") ?? "").trim().slice(0, 80);

@@ -3,7 +3,7 @@
 import type { Member, Op, OpsBroadcast } from "../../generated/contract.ts";
 import { memberName } from "../device/names.ts";
 
-/** So many deletions are remembered, the last ones. */
+/** The last deletions are remembered, so many of them. */
 const MOST = 500;
 
 export class GoneStrokes {

@@ -62,7 +62,7 @@ export class HistoryView {
     this.#options = options;
   }
 
-  /** Whether the past is looked at, or about to be. */
+  /** Whether an earlier clock is shown, or about to be. */
   get active(): ReadonlySignal<boolean> {
     return this.#active;
   }

@@ -1,9 +1,9 @@
-/** What people did on this terrain, newest first, in pages, and kept up to date while somebody reads it. */
+/** The activity log of this terrain, newest first, in pages, and kept up to date while somebody reads it. */
 
 import { signal } from "@preact/signals-core";
 import { friendlyName } from "../device/names.ts";
 
-/** One thing that somebody did, from clock `first` to `last`; `at`: seconds since 1970, where that is known. */
+/** One thing that somebody did, from clock `first` to `last`. `at`: seconds since 1970, where the time is known. */
 export interface HistoryEntry {
   readonly first: number;
   readonly last: number;
@@ -40,7 +40,7 @@ export class History {
   readonly entries = signal<readonly HistoryEntry[]>([]);
   readonly people = signal<ReadonlyMap<string, HistoryPerson>>(new Map());
   readonly state = signal<HistoryState>("waiting");
-  /** There are earlier entries. */
+  /** Whether there are earlier entries. */
   readonly more = signal(false);
   readonly first = signal(0);
   readonly #fetch: FetchHistory;
@@ -130,7 +130,7 @@ export function joined(
   return { entries: [...page.entries, ...kept].slice(0, KEPT), more: kept.length > 0 ? more : page.more };
 }
 
-/** What stays the same of an entry while it grows. */
+/** Returns a key that stays the same while an entry grows. */
 export function keyOf(entry: HistoryEntry): string {
   return `${entry.first}:${entry.author}`;
 }

@@ -9,7 +9,7 @@ import { Pace } from "./pace.ts";
 
 const TICK_MS = 100;
 
-/** What a time lapse needs of the terrain that it shows. */
+/** The parts of a terrain that a time lapse needs. */
 export interface TimeLapseTerrain {
   readonly id: string;
   readonly secret: string;

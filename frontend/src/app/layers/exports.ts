@@ -1,6 +1,6 @@
 /**
- * One export of one terrain: what is asked for, what it would cost, how far the server is, and the file. Knows no DOM;
- * what carries it to the server, and what saves the file, is given.
+ * One export of one terrain: its choices, its estimate, its progress on the server, and its file. The class knows no
+ * DOM: what carries requests to the server and what saves the file are given to it.
  */
 
 import { type ReadonlySignal, signal } from "@preact/signals-core";
@@ -29,7 +29,7 @@ export interface ExportChoice {
   readonly format: ExportFormat;
   readonly samples: number;
   readonly detail: boolean;
-  /** Of masks: they sum to one. */
+  /** Whether masks sum to one. */
   readonly weights: boolean;
 }
 
@@ -40,7 +40,7 @@ export interface ExportedFile {
 }
 
 const POLL_MS = 400;
-/** After so many polls in a row without an answer the export is given up. */
+/** An export is given up after so many polls in a row without an answer. */
 const MOST_SILENCE = 40;
 const SETTLE_MS = 150;
 
@@ -83,7 +83,7 @@ export class Exporter {
   get choice(): ReadonlySignal<ExportChoice> {
     return this.#choice;
   }
-  /** What the choice would cost, null until the server has said so. */
+  /** The estimate of the choice, null until the server has given it. */
   get estimate(): ReadonlySignal<ExportEstimate | null> {
     return this.#estimate;
   }
@@ -119,7 +119,7 @@ export class Exporter {
         const found = await this.#transport.estimate(this.#request());
         if (asked === this.#asked) this.#estimate.value = found;
       } catch {
-        // It is a help only: beginning says what is wrong.
+        // The estimate is a help only: beginning the export says what is wrong.
       }
     }, SETTLE_MS);
   }

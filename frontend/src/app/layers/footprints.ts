@@ -19,7 +19,7 @@ import { layerColour } from "./layers.ts";
 
 /** Points of an outline lie at most this share of the domain apart. */
 const STEP = 1 / 192;
-/** Of grids that are being placed. */
+/** Colours of grids that are being placed, and of grids that are. */
 const PLACING_COLOUR = hexColour("#ff8a5c");
 const PLACED_COLOUR = hexColour("#ffb48f");
 /** Greatest value of `ImportReport.preview`. */

@@ -115,7 +115,7 @@ export class Groundwork {
     const given = this.#answers.value.get(job.key) ?? {};
     const questions = job.status?.report?.questions ?? [];
     const answers = Object.fromEntries(questions.map((q) => [q.id, given[q.id] ?? q.default]));
-    // What its numbers mean nobody knows, and where it lies neither: then its heights follow its size.
+    // Nobody knows what the file's numbers mean or where it lies: its heights then follow its size.
     const sized = !questions.some((q) => q.id === SIZE_QUESTION);
     if (!sized && given.range === undefined && "range" in answers) answers.range = reliefRange(this.#side());
     return answers;
@@ -221,7 +221,7 @@ export class Groundwork {
     this.#o.say(`${arriving.file} is part of the ground now.`);
   }
 
-  /** What of mine is on its way, in a sentence, until its ground is there; null: nothing. */
+  /** A sentence about my import that is on its way, until its ground is there; null without one. */
   get onItsWay(): string | null {
     const job = this.imports.jobs.value.find((j) => j.phase === "upload" || j.phase === "work");
     if (job) return `${job.file} is on its way, ${Math.round(100 * job.share)} %`;

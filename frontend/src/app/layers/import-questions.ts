@@ -12,17 +12,17 @@ const MIDDLE = "middle";
 /** The answer that gives the file up. */
 const STOP = "stop";
 
-/** Whether this answer leaves it to me where the grid lies. */
+/** Says whether this answer leaves it to me where the grid lies. */
 export function laidByHand({ id }: ImportQuestion, answer: string): boolean {
   return id === SIZE_QUESTION || (id === PLACE_QUESTION && answer === MIDDLE);
 }
 
-/** Whether placing a grid by hand answers a question: where it lies, how large it is, and how high. */
+/** Says whether placing a grid by hand answers a question: where it lies, how large it is, and how high. */
 export function handAnswers({ id }: ImportQuestion): boolean {
   return id === SIZE_QUESTION || id === HEIGHT_QUESTION;
 }
 
-/** What a person is still to be asked while placing a grid by hand. */
+/** Returns the questions that a person is still to be asked while placing a grid by hand. */
 export function leftToAsk(
   questions: readonly ImportQuestion[],
   answers: Readonly<Record<string, string>>,
@@ -30,12 +30,15 @@ export function leftToAsk(
   return questions.filter((q) => !handAnswers(q) && !laidByHand(q, answers[q.id] ?? q.default));
 }
 
-/** Whether a coordinate system may be named: not where the file has one and lies elsewhere, which is laid by hand or not at all. */
+/**
+ * Says whether a coordinate system may be named. It may not where the file has one and lies elsewhere: such a file is
+ * laid by hand or not at all.
+ */
 export function namesSystem({ id, options }: ImportQuestion): boolean {
   return id === PLACE_QUESTION && !options.includes(STOP);
 }
 
-/** Whether a refusal says which formats there are (`backend/esker/importing/opening.py`). */
+/** Says whether a refusal names the formats that there are (`backend/esker/importing/opening.py`). */
 export function listsFormats(refusal: string): boolean {
   return refusal.includes("There are: ");
 }

@@ -31,7 +31,7 @@ export interface ImportJob {
 }
 
 const POLL_MS = 250;
-/** After so many polls in a row without an answer the import is given up. */
+/** An import is given up after so many polls in a row without an answer. */
 const MOST_SILENCE = 40;
 /** The server may still be clearing away my file before this one: then it is asked again, so often. */
 const BUSY_MS = 1500;

@@ -63,7 +63,7 @@ export function spacingWords([sx, sy]: readonly [number, number]): string {
 
 type Row = readonly [what: string, how: string];
 
-/** What a layer is, as rows of a table. */
+/** Returns the facts of a layer, as rows of a table. */
 export function layerFacts(layer: Layer): Row[] {
   const { facts } = layer;
   const [wide, tall] = extentOf(facts, layer);
@@ -79,7 +79,7 @@ export function layerFacts(layer: Layer): Row[] {
   ];
 }
 
-/** What a file is, as rows of a table. Only what is known. */
+/** Returns the facts of a file that are known, as rows of a table. */
 export function reportFacts(report: ImportReport): Row[] {
   const rows: Row[] = [];
   const put = (what: string, how: string | null): void => {

@@ -7,7 +7,7 @@ import type { HistoryPage } from "../history/history.ts";
 /** A refusal or failure with a sentence for a person. */
 export class ApiError extends Error {
   readonly code: string;
-  /** What else the server said: when a deleted terrain will be gone, for example. */
+  /** Further facts of the answer: when a deleted terrain will be gone, for example. */
   readonly facts: Readonly<Record<string, unknown>>;
 
   constructor(code: string, message: string, facts: Readonly<Record<string, unknown>> = {}) {
@@ -29,7 +29,7 @@ export interface AccessLink {
   readonly name: string;
   readonly created: string | number;
   readonly revoked: string | number | boolean | null;
-  /** Whether it is the link that asks. */
+  /** Whether this is the link by which the list was asked for. */
   readonly own?: boolean;
 }
 
@@ -80,13 +80,13 @@ export async function request(method: Method, path: string, secret?: string, bod
   return response;
 }
 
-/** What the server said when it refused. */
+/** Reads the error out of an answer by which the server refused. */
 export function readRefusal(status: number, text: string): ApiError {
   try {
     const { code, message, ...facts } = JSON.parse(text) as { code?: unknown; message?: unknown };
     if (typeof message === "string") return new ApiError(String(code ?? status), message, facts);
   } catch {
-    // Not JSON: a proxy answered. The status says enough.
+    // The answer is no JSON: a proxy gave it. The status says enough.
   }
   return new ApiError(String(status), `The server refused (${status}). Try again in a moment.`);
 }
@@ -148,7 +148,7 @@ export const api = {
     await request("DELETE", `/api/terrains/${id}/imports/${job}`, secret);
   },
 
-  /** What people did, newest first; `before`: only what had ended before this clock. */
+  /** Returns what people did, newest first. `before`: only what had ended before this clock. */
   history: (id: string, secret: string, before: number | null): Promise<HistoryPage> =>
     json("GET", `/api/terrains/${id}/history${before === null ? "" : `?before=${before}`}`, secret),
 
@@ -162,7 +162,7 @@ export const api = {
   prolong: (id: string, secret: string, code: string): Promise<JoinCode> =>
     json("POST", `/api/terrains/${id}/codes/prolong`, secret, { code }),
 
-  /** What this server keeps; `key` is that of the machine's owner. */
+  /** Returns the terrains that this server keeps; `key` is that of the machine's owner. */
   kept: (key: string, skip: number): Promise<{ readonly total: number; readonly terrains: readonly KeptTerrain[] }> =>
     json("GET", `/api/server/terrains?skip=${skip}`, key),
 

@@ -7,7 +7,7 @@ export interface TerrainLink {
   readonly secret: string;
 }
 
-/** What somebody typed or pasted into the Join field. */
+/** Reads what somebody typed or pasted into the Join field. */
 export type JoinInput =
   | ({ readonly kind: "link" } & TerrainLink)
   | { readonly kind: "code"; readonly code: string }

@@ -1,4 +1,4 @@
-/** Which page an address means (DESIGN 13: `/t/{id}#{secret}`, the secret only ever in the fragment). */
+/** The pages that addresses mean (DESIGN 13: `/t/{id}#{secret}`, the secret only ever in the fragment). */
 export type Route =
   | { readonly page: "landing" }
   | { readonly page: "terrain"; readonly id: string; readonly secret: string }

@@ -1,4 +1,7 @@
-/** What of the picture the page's bars and the inspector cover, so that home shows the whole land beside them. Pure. */
+/**
+ * Margins of the picture that the page's bars and the inspector cover, so that home shows the whole land beside them.
+ * Pure.
+ */
 
 import type { Insets } from "../../core/camera/home.ts";
 

@@ -13,7 +13,7 @@ export interface RendererInfo {
   readonly description: string;
 }
 
-/** What the page says about the graphics device. */
+/** Notices of the page about the graphics device. */
 export interface GraphicsNotice {
   readonly text: string;
   /** The map stands in for the 3D view, which may be tried again. */
@@ -28,13 +28,13 @@ export interface GraphicsOptions {
   };
   /** Something short to tell. */
   readonly say: (text: string) => void;
-  /** There is another renderer now. */
+  /** Called when there is another renderer. */
   readonly onOpened: () => void;
   /** Milliseconds of a clock that only rises. */
   readonly now?: () => number;
 }
 
-/** With more losses than this within `LOSS_WINDOW_MS` the device is taken for unusable: the map is shown. */
+/** A device that is lost more often than this within `LOSS_WINDOW_MS` counts as unusable: the map is shown. */
 export const MOST_LOSSES = 3;
 const LOSS_WINDOW_MS = 60_000;
 /** Waits before each try to open another device: after a crash the browser needs a moment until it has one. */
@@ -61,7 +61,7 @@ export class Graphics {
     this.#now = options.now ?? (() => performance.now());
   }
 
-  /** What draws now; null while none is open. */
+  /** The renderer that draws now; null while none is open. */
   get renderer(): SceneRenderer | null {
     return this.#renderer;
   }

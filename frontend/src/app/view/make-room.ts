@@ -23,12 +23,14 @@ const GLIDE_MS = 260;
 /** Views that differ by less than this share of their distance are the same. */
 const NEAR = 1e-3;
 
-/** By how many CSS pixels the picture must go to the left so that no point lies under the panel at the right. */
+/**
+ * Returns by how many CSS pixels the picture must go to the left so that no point lies under the panel at the right.
+ */
 export function roomNeeded(points: readonly Pixel[], panel: Box): number {
   const hidden = points.filter((p) => p.x > panel.left - MARGIN_PX && p.y > panel.top && p.y < panel.bottom);
   if (hidden.length === 0) return 0;
   const need = Math.max(...hidden.map((p) => p.x)) - panel.left + MARGIN_PX;
-  // What is selected is not pushed out at the other side.
+  // The selected stroke is not pushed out at the other side.
   return Math.max(0, Math.min(need, Math.min(...points.map((p) => p.x)) - TOOLS_PX));
 }
 
@@ -89,7 +91,7 @@ export class Room {
     return { eye, target };
   }
 
-  /** Whether the view is the one that this made, or on its way there: nobody has moved it since. */
+  /** Says whether the view is the one that this class chose, or on its way there: nobody has moved it since. */
   #isThere(): boolean {
     const after = this.#after;
     if (after === null) return false;

@@ -2,7 +2,7 @@
 
 import { effect, type ReadonlySignal, signal } from "@preact/signals-core";
 
-/** What shows that somebody wants the strokes. */
+/** Signs that somebody wants to see the strokes. */
 export interface Hands {
   readonly tool: ReadonlySignal<string>;
   readonly selection: ReadonlySignal<string | null>;

@@ -75,7 +75,7 @@ export interface Marks {
   readonly quiet?: boolean;
 }
 
-/** Who draws which stroke at this moment, as colours by stroke id. */
+/** Returns the person who draws each stroke at this moment, as colours by stroke id. */
 function liveColours(people: People, drawing: string | null): Map<string, string> {
   const colours = new Map<string, string>();
   for (const member of people.members) {
@@ -86,7 +86,7 @@ function liveColours(people: People, drawing: string | null): Map<string, string
   return colours;
 }
 
-/** Who of the others draws or drags which stroke. */
+/** Returns the person, of the others, who draws or drags each stroke. */
 export function holders(people: People): { readonly member: Member; readonly stroke: string }[] {
   return people.members.flatMap((member) => {
     const stroke = people.presences.get(member.client)?.stroke;

@@ -91,7 +91,7 @@ export class Stage {
   readonly #influence: ReadonlySignal<ChannelGrid | null>;
   readonly #calm = window.matchMedia("(prefers-reduced-motion: reduce)");
   readonly #stops: (() => void)[] = [];
-  /** What the eye may not dip under. */
+  /** The ground that the eye may not dip under. */
   readonly #floor: Ground;
   #fresh: FreshTiles | null = null;
   /** The layers whose ground home stands on, and whether it is still on its way. */

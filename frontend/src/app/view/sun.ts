@@ -5,7 +5,7 @@ import { compass } from "../words/words.ts";
 export interface SunPosition {
   /** Clockwise from north, 0..360. */
   readonly azimuthDeg: number;
-  /** Above the horizon, 0..90. */
+  /** Height of the sun above the horizon, degrees, 0..90. */
   readonly elevationDeg: number;
 }
 

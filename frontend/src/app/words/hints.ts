@@ -1,13 +1,18 @@
-/** What a newcomer is told at the foot of the picture, one sentence at a time; null where hands are busy or know better. */
+/**
+ * Hints for a newcomer at the foot of the picture, one sentence at a time; null where hands are busy or know better.
+ */
 
 import { redraws } from "../../input/sketch/oversketch.ts";
 import { flag } from "../device/storage.ts";
 import type { Stage } from "../view/stage.ts";
 
-/** This device has drawn before; it has drawn a second line or changed the first. */
+/**
+ * Names under which this device remembers that it has drawn before, and that it has drawn a second line or changed the
+ * first.
+ */
 export const DRAWN = "drawn";
 export const DRAWN_ON = "drawn-on";
-/** This device has drawn a ridge on the map. */
+/** Name under which this device remembers that it has drawn a ridge on the map. */
 export const DRAWN_ON_MAP = "drawn-on-map";
 
 /** Tools whose line, drawn from above, becomes the straight ridge between its ends. */

@@ -17,7 +17,7 @@ const NAMES: Readonly<Record<string, string>> = {
   Backspace: "Backspace",
 };
 
-/** One combination such as `Ctrl+Shift+z` as the parts that are printed: ["Ctrl", "Shift", "Z"]. */
+/** Splits a combination such as `Ctrl+Shift+z` into the parts that are printed: ["Ctrl", "Shift", "Z"]. */
 export function keyParts(combination: string): string[] {
   return combination.split(/\+(?=.)/).map((part) => NAMES[part] ?? (part.length === 1 ? part.toUpperCase() : part));
 }

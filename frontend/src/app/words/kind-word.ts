@@ -2,7 +2,7 @@ import type { Stroke } from "../../generated/contract.ts";
 import { shapeOf } from "../view/scene.ts";
 import { paintName } from "./paints.ts";
 
-/** What a stroke is, in a word. */
+/** Returns the kind of a stroke in a word. */
 export function kindWord(stroke: Stroke): string {
   if (stroke.paint !== null) return paintName(stroke.paint);
   if (stroke.kind === "level") return "Plateau";

@@ -1,12 +1,12 @@
-/** What can be painted, in words and colours. */
+/** Paints in words and colours. */
 
 import type { Paint, PaintChannel } from "../../generated/contract.ts";
 
 export interface Substance {
   readonly title: string;
-  /** Of swatches, lines and the ring of the brush, `#rrggbb`. */
+  /** Colour of swatches, lines and the ring of the brush, `#rrggbb`. */
   readonly colour: string;
-  /** What painting more and less of it does. */
+  /** Words for painting more of the channel, and for painting less. */
   readonly more: string;
   readonly less: string;
 }
@@ -20,7 +20,7 @@ export const SUBSTANCES: Readonly<Record<PaintChannel, Substance>> = {
   amplitude: { title: "Relief", colour: "#b98a4a", more: "Detail stands higher.", less: "Detail flattens out." },
 };
 
-/** What a paint does, in a sentence. */
+/** Returns the effect of a paint, in a sentence. */
 export function paintWords({ channel, value }: Paint): string {
   const { more, less } = SUBSTANCES[channel];
   return value < 0 ? less : more;

@@ -1,4 +1,4 @@
-/** What a stroke under way measures, in words for beside the pen. Pure. */
+/** Measures of a stroke under way, in words for beside the pen. Pure. */
 
 import { worldPoints } from "../../doc/strokes.ts";
 import type { Stroke } from "../../generated/contract.ts";

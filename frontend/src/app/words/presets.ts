@@ -11,7 +11,7 @@ export interface SectionFields {
 export interface Preset {
   readonly id: string;
   readonly title: string;
-  /** Whether it is meant for ground that rises or that sinks; the inspector offers the fitting ones first. */
+  /** The kind of ground that a preset is meant for, rising or sinking; the inspector offers the fitting ones first. */
   readonly sense: "up" | "down";
   section(sizeM: number): SectionFields;
 }

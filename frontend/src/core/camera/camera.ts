@@ -68,7 +68,7 @@ export class Camera {
   /** The land that home looks at. */
   #land: Land = FLAT;
   #canvas: Canvas = { width: 1, height: 1 };
-  /** What covers the picture's edges, device pixels; null where nobody has said. */
+  /** Margins that the page covers of the picture, device pixels; null where nobody has said. */
   #insets: Insets | null = null;
   /** Views change at once instead of flying: for people who asked for less motion. */
   calm = false;
@@ -360,7 +360,7 @@ export class Camera {
     return this.#sizeM * 8;
   }
 
-  /** Whether nobody has moved the view since it was home, or sent home. */
+  /** Says whether nobody has moved the view since it was home or was sent home. */
   #atHome(): boolean {
     const home = this.#homePose(this.#pose.mode);
     const { pivot, distanceM, heading, pitch } = this.#flight?.to ?? this.#pose;

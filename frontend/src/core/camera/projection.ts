@@ -49,7 +49,10 @@ export function eyeProjection(camera: CameraState): Float64Array {
   return m;
 }
 
-/** The same matrix with depth from w at the near plane to 0 at the far one: float depth keeps its precision everywhere. */
+/**
+ * Returns that matrix with depth from w at the near plane to 0 at the far one: float depth keeps its precision
+ * everywhere.
+ */
 export function reversedDepth(m: Float64Array): Float64Array {
   const out = m.slice();
   for (let c = 0; c < 4; c += 1) out[4 * c + 2] = m[4 * c + 3]! - m[4 * c + 2]!;

@@ -70,8 +70,8 @@ export const HOME_PITCH = -16 * DEG;
 const HOME_ELEVATION = 19 * DEG;
 const HOME_MARGIN = 0.06;
 /**
- * What a picture adds to these that is twice as tall as wide: there all of the land would be a small tile. The eye stands
- * higher and so near that the corners at the left and the right are cut off.
+ * A picture twice as tall as wide adds this to home's angles: without it all of the land would be a small tile there.
+ * The eye stands higher and so near that the corners at the left and the right are cut off.
  */
 const TALL = { pitch: -2 * DEG, elevation: 6 * DEG, margin: -0.46 } as const;
 

@@ -26,7 +26,7 @@ export interface Resident {
   readonly x: number;
   readonly y: number;
   readonly slot: number;
-  /** What the slot was filled from: the newest stamp of the nine tiles, and the mask of those that were held. */
+  /** Sources of the slot's samples: the newest stamp of the nine tiles, and the mask of those that were held. */
   stamp: number;
   held: number;
   /** Its held heights, as they were last sent. */
@@ -152,7 +152,9 @@ export class Atlas implements Slots {
     return this.#byTile.size;
   }
 
-  /** What fills all slots has changed: seed, strength and rule of the detail, what strokes ask of it. */
+  /**
+   * Says that seed, strength or rule of the detail, or what strokes ask of it, has changed: all slots are filled again.
+   */
   remakeAll(): void {
     this.#allStale = true;
   }
@@ -280,7 +282,7 @@ export class Atlas implements Slots {
     return false;
   }
 
-  /** What a tile's ground is where it is held or blends, else undefined. */
+  /** Returns a tile's ground where the tile is held or blends, else undefined. */
   #heightsAt(level: number, x: number, y: number): Float32Array | undefined {
     const side = 2 ** level;
     if (x < 0 || y < 0 || x >= side || y >= side) return undefined;
@@ -351,7 +353,7 @@ export class Atlas implements Slots {
     if (slot !== undefined) return slot;
     let oldest: Resident | undefined;
     for (const resident of this.residents()) {
-      // What the last cut rests on is pinned; the root never leaves.
+      // Tiles that the last cut rests on stay; the root never leaves.
       if (resident.used >= this.#frame - 1 || resident.level === 0) continue;
       const later = oldest === undefined ? -1 : resident.used - oldest.used || oldest.level - resident.level;
       if (later < 0) oldest = resident;

@@ -1,6 +1,6 @@
 /**
- * What the selection has to know of synthesised ground: a reduction on the device, read back in batches and never waited
- * for (DESIGN 10; paper 1, section 3.3). Shader: compute_bounds.wgsl.
+ * Bounds of synthesised ground for the selection: a reduction on the device, read back in batches and never waited for
+ * (DESIGN 10; paper 1, section 3.3). Shader: compute_bounds.wgsl.
  */
 
 import { SUBPATCHES } from "../../generated/contract.ts";
@@ -11,7 +11,7 @@ export const BOUND_VALUES = 4;
 /** Numbers of one tile: sub-patches row by row from the south-west. */
 export const TILE_BOUNDS: number = SUBPATCHES * SUBPATCHES * BOUND_VALUES;
 
-/** What the pass asks of a job; the object itself comes back with the answer. */
+/** The fields of a job that the pass reads. The job itself comes back with the answer. */
 export interface BoundsJob {
   readonly slot: number;
   readonly level: number;

@@ -1,6 +1,6 @@
 /**
- * What the ground's overlays read over the whole domain, as one small texture (rgba8unorm; `detail_at` in terrain.wgsl): noise
- * amplitude, roughness, and where the selected stroke is felt or a channel is painted.
+ * One small texture over the whole domain, which the ground's overlays read (rgba8unorm; `detail_at` in terrain.wgsl):
+ * noise amplitude, roughness, and where the selected stroke is felt or a channel is painted.
  */
 
 import type { ChannelGrid, ChannelView, Scene } from "../../core/types.ts";
@@ -9,7 +9,7 @@ const TEXEL_BYTES = 4;
 
 const shares = new WeakMap<ChannelGrid, ChannelGrid>();
 
-/** What the third component of the texture shows: influence, or a painted channel as 0.5 + bias / 2; null with other overlays. */
+/** The third component of the texture: influence, or a painted channel as 0.5 + bias / 2; null with other overlays. */
 export function overlayGrid({ overlay, influence, channels }: Scene): ChannelGrid | null {
   if (overlay === "influence") return influence ?? null;
   if (overlay !== "snow" && overlay !== "forest" && overlay !== "grass" && overlay !== "wetness") return null;

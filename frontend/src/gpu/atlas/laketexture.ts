@@ -1,4 +1,6 @@
-/** What shaders read of lakes over the whole domain (lakes.wgsl): ground and level of each sample, rg32float, metres. */
+/**
+ * The lake texture, which shaders read (lakes.wgsl): ground and level of each sample of the domain, rg32float, metres.
+ */
 
 import { LAKE_SIDE, type Lakes } from "../../tiles/lakes/lakes.ts";
 

@@ -1,7 +1,6 @@
 /**
- * Which tiles need their sun and sky visibility marched anew, and when (DESIGN 9: only when the tile or the sun changes).
- *
- * A tile that has just entered has no light at all and never waits. The others may show light that is a few frames old
+ * The queue of tiles whose sun and sky visibility is marched anew (DESIGN 9: only when the tile or the sun changes). A
+ * tile that has just entered has no light at all and never waits. The others may show light that is a few frames old
  * while somebody draws. Where the march costs too much, synthetic tiles take their light over from their parents.
  */
 
@@ -68,7 +67,7 @@ export class LightQueue {
     for (const resident of this.#stale) {
       if (!this.#atlas.holds(resident)) this.#stale.delete(resident);
       else if (this.#takes(resident)) {
-        // It follows its parent; what was marched while it was held is not its own any more.
+        // The tile follows its parent: light that was marched while the tile was held is not its own any more.
         if (!this.#taken.has(resident)) changed.add(resident);
         this.#stale.delete(resident);
       } else if (this.#atlas.isCurrent(resident)) due.push(resident);

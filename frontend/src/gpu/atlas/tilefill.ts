@@ -11,7 +11,7 @@ import { NormalsPass } from "./tilecompute.ts";
 
 interface Measured extends BoundsJob, SynthesisJob {
   readonly resident: Resident;
-  /** Of the slot's contents when they were measured. */
+  /** Version of the slot's contents when they were measured. */
   readonly version: number;
 }
 
@@ -20,7 +20,7 @@ interface Answer {
   readonly figures: Float32Array;
 }
 
-/** What has come back from the device and nobody has looked at yet. */
+/** Answers that have come back from the device and that nobody has looked at yet. */
 class Inbox {
   readonly answers: Answer[] = [];
   underWay = 0;
@@ -74,7 +74,7 @@ export class TileFill {
     const answers = this.#inbox.answers.splice(0);
     for (const { jobs, figures } of answers)
       jobs.forEach(({ resident, version }, i) => {
-        // What was filled again since will be measured again.
+        // A slot that was filled again since will be measured again.
         if (this.#atlas?.holds(resident) !== true || resident.version !== version) return;
         tree.measure(resident.level, resident.x, resident.y, figures, i * TILE_BOUNDS);
       });
@@ -89,7 +89,7 @@ export class TileFill {
       const { slot, level, x, y, held, version } = resident;
       return { slot, level, x, y, parentSlot: atlas.parentOf(resident).slot, held, resident, version };
     };
-    // What entered may have taken the slot of what changed.
+    // A tile that entered may have taken the slot of one that changed.
     const here = (residents: readonly Resident[]): Measured[] => residents.filter((r) => atlas.holds(r)).map(job);
     const moved = here(changes.moved);
     const made = [...here(changes.remade), ...here(entered)];

@@ -64,7 +64,7 @@ export function paintedColour(share: number): Rgb {
   return mix(NONE, share < 0.5 ? LESS : MORE, strength);
 }
 
-/** What is painted of a channel, as a picture to lay over the map. */
+/** The paint of one channel, as a picture to lay over the map. */
 export class PaintedPicture {
   #canvas: HTMLCanvasElement | null = null;
   #source: ChannelGrid | null = null;

@@ -13,7 +13,7 @@ import { BORDER, SLOT_TEXELS } from "../atlas/apron.ts";
 
 type Rgb = readonly [number, number, number];
 
-/** What a tile of the map is shaded with. */
+/** The settings by which a tile of the map is shaded. */
 export interface MapStyle {
   readonly look: Look;
   readonly sizeM: number;

@@ -7,7 +7,9 @@
  * larger than the picture only triangles longer than the border are cut in sight. Real GPUs have such a border themselves.
  */
 
-/** Longer than slivers that are cut usually are, and cheap: what lies in the border is set up but fills no pixel. */
+/**
+ * Slivers that are cut are seldom longer than this. The border is cheap: triangles in it are set up but fill no pixel.
+ */
 export const GUARD_PX = 64;
 
 /** Width of the border for a device, pixels: none on real GPUs, and none where viewports must lie within the picture. */

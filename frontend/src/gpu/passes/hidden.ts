@@ -17,7 +17,7 @@ import { SOURCES } from "../shaders.ts";
 
 const BASE_PIXELS = 4;
 const MAX_LEVELS = 12;
-/** Of patches that were never tested this share, the nearest, is drawn in the first round. */
+/** The first round draws this share of the patches that were never tested, the nearest ones. */
 const FIRST_SHARE = 1 / 3;
 /** Least distance of dynamic offsets. */
 const STRIDE = 256;
@@ -48,7 +48,7 @@ export function pyramidLevels(width: number, height: number): PyramidLevel[] {
   return out;
 }
 
-/** What one round draws: records and the arguments of an indirect draw. */
+/** The draw of one round: its records and the arguments of an indirect draw. */
 export interface Round {
   readonly records: GPUBuffer;
   readonly recordOffset: number;
@@ -231,7 +231,10 @@ export class HiddenPatches {
     return this.#round(1);
   }
 
-  /** After the submission: how many patches were drawn of how many, when the device has told; null while a reading is due. */
+  /**
+   * Reads after the submission how many patches were drawn of how many, as the device tells; null while a reading is
+   * due.
+   */
   measure(encoder: GPUCommandEncoder): (() => Promise<{ total: number; drawn: number }>) | null {
     if (this.#reading) return null;
     this.#reading = true;

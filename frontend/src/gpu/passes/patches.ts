@@ -95,7 +95,7 @@ const WATER_LAYOUT: GPUVertexBufferLayout = {
   ],
 };
 
-/** What water lies on the ground. */
+/** The water that lies on the ground. */
 export interface Waters extends ShownLakes {
   readonly sizeM: number;
   readonly seaM: number | null;
@@ -226,7 +226,7 @@ export class PatchPasses {
     if (this.#terrain !== null) this.#drawPatches(pass, this.#terrain, this.#recordBuffer, this.#count);
   }
 
-  /** Of the ground what one round of the search for hidden patches leaves. */
+  /** Draws the ground that one round of the search for hidden patches leaves. */
   drawRound(pass: GPURenderPassEncoder, round: Round): void {
     if (this.#terrain === null || this.#count === 0) return;
     pass.setPipeline(this.#terrain);

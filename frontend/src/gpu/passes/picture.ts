@@ -25,12 +25,12 @@ interface Passes {
 
 /** Fewer patches than this cost less than looking for hidden ones. */
 const LEAST_PATCHES = 256;
-/** What must be hidden for the search to pay: so much of the patches. */
+/** The search for hidden patches pays when it hides this share of them. */
 const LEAST_HIDDEN = 0.15;
-/** Where it does not pay it is tried again after so many frames. */
+/** A search that does not pay is tried again after so many frames. */
 const PAUSE_FRAMES = 40;
 
-/** Whether the search for hidden patches pays in this view, by what it found in the last frames. */
+/** Decides whether the search for hidden patches pays in this view, by what it found in the last frames. */
 export class HiddenChoice {
   #pause = 0;
 
@@ -56,7 +56,7 @@ export interface Canvas {
 }
 
 export class Picture {
-  /** Whether hidden patches are looked for. Measurements and tests say so themselves. */
+  /** When hidden patches are looked for. Measurements and tests choose; people get "automatic". */
   search: "automatic" | "always" | "never" = "automatic";
   /** Patches that the last measured frame drew, of how many. */
   found = { total: 0, drawn: 0 };
@@ -101,7 +101,7 @@ export class Picture {
     target.finish(encoder, canvas);
   }
 
-  /** After the submission of what was encoded. */
+  /** Reads what the search found. Called after the submission of the commands that were encoded. */
   submitted(): void {
     const told = this.#told;
     this.#told = null;

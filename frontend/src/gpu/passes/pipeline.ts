@@ -1,4 +1,4 @@
-/** What the passes' pipelines have in common. */
+/** Settings that the passes' pipelines share. */
 
 import type { Detail } from "../shaders.ts";
 import { DEPTH_FORMAT } from "../target.ts";

@@ -1,6 +1,6 @@
 /**
- * What strokes ask of the detail and where elevation data hold it back, as the synthesis reads it: all channels on one grid
- * (compute_synthesis.wgsl, channel_value).
+ * Channels as the synthesis reads them, all on one grid (compute_synthesis.wgsl, channel_value): what strokes ask of
+ * the detail, and the data level that holds it back.
  */
 
 import type { ChannelGrid, ChannelView } from "../../core/types.ts";

@@ -16,7 +16,7 @@ import type { ChannelFacts } from "./channels.ts";
 
 export type SynthesisRule = Rule;
 
-/** What all detail of a terrain depends on, besides ground and channels. */
+/** Settings that all detail of a terrain depends on, besides ground and channels. */
 export interface SynthesisSettings {
   readonly sizeM: number;
   readonly seed: number;

@@ -39,7 +39,10 @@ export interface SynthesisJob {
   readonly held: number;
 }
 
-/** What the passes ask of the atlas: the samples of all slots. Textures are 2d-arrays in its layout (tile.wgsl). */
+/**
+ * The part of the atlas that the passes use: the samples of all slots. Textures are 2d-arrays in its layout
+ * (tile.wgsl).
+ */
 export interface SynthesisAtlas {
   /** vec2f per sample: guide, base; metres. STORAGE | COPY_DST. */
   readonly grounds: GPUBuffer;
@@ -115,7 +118,7 @@ export class SynthesisPass {
     return true;
   }
 
-  /** The same for what strokes ask of the detail. */
+  /** Takes the channels that strokes ask of the detail. Returns whether they have changed. */
   setChannels(channels: ChannelView): boolean {
     if (channels === this.#channelSource && channels.stamp === this.#channelStamp) return false;
     this.#channelSource = channels;

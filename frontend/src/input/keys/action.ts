@@ -1,4 +1,6 @@
-/** What an action is, and what actions are made from. Makers of actions know this file, not each other. */
+/**
+ * The type of an action, and the parts that actions are made from. Makers of actions know this file, not each other.
+ */
 
 import type { Signal } from "@preact/signals-core";
 import type { Camera, CameraMode } from "../../core/camera/camera.ts";
@@ -59,7 +61,7 @@ export interface ActionContext {
   readonly camera: Camera;
   readonly doc: SyncDoc;
   readonly ground: () => Ground;
-  /** The same, held fast. */
+  /** Returns the ground, held fast for one stroke or drag. */
   readonly freeze: () => Ground;
   readonly canEdit: () => boolean;
   readonly tool: Signal<ToolId>;

@@ -17,7 +17,7 @@ function stronger(paint: Paint, sign: number): Paint {
 }
 
 export function brushActions(c: ActionContext, edits: StrokeActions, put: Put): void {
-  /** Of the selected stroke; the brush's own where none, or no paint, is selected. */
+  /** Returns the paint of the selected stroke; null where the brush's own counts, since no paint is selected. */
   const selected = (): Paint | null => edits.stroke()?.paint ?? null;
   const change = (to: (paint: Paint) => Paint): void => {
     const paint = selected();

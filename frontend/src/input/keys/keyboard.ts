@@ -46,7 +46,9 @@ export function combination(event: KeyLike): string {
   return modifiers.join("") + key;
 }
 
-/** Whether the key event is meant for the terrain: not for a field, a dialog, or the control that has the focus. */
+/**
+ * Says whether the key event is meant for the terrain: not for a field, a dialog, or the control that has the focus.
+ */
 export function meantForCanvas(event: KeyboardEvent): boolean {
   if (event.defaultPrevented || event.isComposing) return false;
   for (const node of event.composedPath()) {

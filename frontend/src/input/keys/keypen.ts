@@ -35,7 +35,7 @@ export interface KeyPenContext {
   readonly onDrawn: (made: FinishedStroke) => void;
 }
 
-/** One press of an arrow, and one with Shift, in parts of the height of the picture. */
+/** An arrow key moves by this part of the height of the picture; with Shift by the second. */
 const STEP = 0.025;
 const FINE = 0.0025;
 const ARROWS: Readonly<Record<string, Pixel>> = {
@@ -63,7 +63,7 @@ export class KeyPen {
   #rest: Pixel = [0.5, 0.55];
   /** The view in which the line was begun; null while the pen is up. */
   #ray: ((x: number, y: number) => Ray) | null = null;
-  /** What the line under way was begun with. */
+  /** The tool with which the line under way was begun. */
   #tool: ToolId | null = null;
 
   constructor(context: KeyPenContext) {
@@ -83,7 +83,7 @@ export class KeyPen {
     return this.#visual;
   }
 
-  /** What to do next, or what has just been done: shown, and read aloud. */
+  /** A sentence about the next step, or about the last one: shown, and read aloud. */
   get words(): ReadonlySignal<string> {
     return this.#words;
   }

@@ -4,7 +4,7 @@ import { moved, rounded, turned } from "../../core/lattice.ts";
 import { type ActionContext, GESTURE_MS, type Put } from "./action.ts";
 
 const TURN_DEG = 1;
-/** One step of an arrow key, as a share of the terrain. */
+/** An arrow key moves a grid by this share of the terrain. */
 const STEP = 1 / 256;
 
 /**
@@ -47,7 +47,7 @@ function say(c: ActionContext, refusal: string | null): void {
   if (refusal !== null) c.onMessage(refusal);
 }
 
-/** One name for repeats of a key, so that a held key is one step of undo. */
+/** Repeats of a key share one name, so that a held key is one step of undo. */
 class Gestures {
   #last = { kind: "", name: "", at: -Infinity };
   readonly #now: () => number;

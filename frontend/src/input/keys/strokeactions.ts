@@ -1,4 +1,4 @@
-/** What keys do to the selected stroke. */
+/** Actions by which keys change the selected stroke. */
 
 import type { Op, Paint, Stroke } from "../../generated/contract.ts";
 import { drapedOf, shapeOf } from "../picking.ts";
@@ -7,7 +7,7 @@ import { moveOps, raiseOps } from "../tools/handledrag.ts";
 import { handlesOf } from "../tools/handles.ts";
 import { type ActionContext, GESTURE_MS } from "./action.ts";
 
-/** What can be done to the selected stroke. */
+/** Edits that the selected stroke allows. */
 export class StrokeActions {
   readonly #c: ActionContext;
   #gesture = { name: "", kind: "", at: -Infinity };
@@ -23,7 +23,7 @@ export class StrokeActions {
 
   readonly selected = (): boolean => this.#c.canEdit() && this.stroke() !== null;
   readonly usable = (): boolean => this.selected() && this.stroke()?.locked === false;
-  /** There is height and a section to change: paint has neither. */
+  /** Says whether the stroke has height and a section to change: paint has neither. */
   readonly shaped = (): boolean => this.usable() && this.stroke()?.kind !== "paint";
   readonly any = (): boolean => (this.#c.doc.doc.value?.strokes.size ?? 0) > 0;
 

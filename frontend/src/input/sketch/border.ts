@@ -6,7 +6,7 @@ import type { Ground } from "../../core/types.ts";
 import { groundBeyond } from "./profileend.ts";
 import type { Sample } from "./sketch.ts";
 
-/** So far beside the land, CSS pixels, a line still begins at its border. */
+/** A line that begins up to so many CSS pixels beside the land begins at the land's border. */
 export const BESIDE_PX = 64;
 /** Such a line begins this share of the land's side inside the border, so that its ray meets the land. */
 const INSIDE = 1 / 1000;

@@ -27,7 +27,7 @@ interface Place {
 
 /** The pen begins on the line, not at its ends: there new lines begin. CSS pixels. */
 const END_PX = 26;
-/** It is back on the line when it ends so near, CSS pixels. */
+/** A line that ends within so many CSS pixels of the stroke is back on it. */
 const BACK_PX = 26;
 /** A plane that is seen more edge-on than this (sine) cannot be drawn on. */
 const EDGE_ON = 0.2;
@@ -37,7 +37,7 @@ const FAR = 8;
 const EASE = 0.25;
 const MOST_POINTS = 400;
 
-/** Whether a tool draws what the stroke is: mountains are redrawn by the mountain's tool. */
+/** Says whether a tool draws strokes like this one: mountains are redrawn by the mountain's tool. */
 export function redraws(tool: ToolId, stroke: Stroke): boolean {
   if (stroke.locked || stroke.hidden || stroke.curve.length < 2) return false;
   if (stroke.kind === "level") return tool === "plateau";
@@ -45,7 +45,7 @@ export function redraws(tool: ToolId, stroke: Stroke): boolean {
   return tool === ((stroke.curve[crestIndex(stroke)]?.[1] ?? 0) < 0 ? "crevice" : "mountain");
 }
 
-/** One line over a stroke. */
+/** One line that is drawn over a stroke. */
 export class Oversketch {
   readonly #stroke: Stroke;
   readonly #camera: Camera;
@@ -120,7 +120,7 @@ export class Oversketch {
     const { kind, first, last, curve } = this.#stroke;
     const drawn = frameCurve(kind, points, first, last);
     if (kind !== "profile") return drawn;
-    // What never lay under its anchors does not sink below them by a slip of the pen, nor the other way round.
+    // A stroke that never lay under its anchors does not sink below them by a slip of the pen, nor the other way round.
     const up = curve.every(([, w]) => w > -1e-3);
     const down = curve.every(([, w]) => w < 1e-3);
     return drawn.map(([u, w]) => [u, up ? Math.max(0, w) : down ? Math.min(0, w) : w]);
@@ -223,7 +223,7 @@ export class OversketchTool {
     return this.#ink;
   }
 
-  /** Whether a pen that comes down here draws over the line. */
+  /** Says whether a pen that comes down here draws over the line. */
   would(stroke: Stroke, sample: Sample, nearPx: number, ratio: number): boolean {
     return Oversketch.begin(stroke, this.#c.camera, sample, nearPx, ratio) !== null;
   }

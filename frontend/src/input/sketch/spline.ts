@@ -15,7 +15,7 @@ export function through(points: readonly Pixel[]): Pixel[] {
   const out: Pixel[] = p.slice(0, 1);
   for (let i = 0; i + 1 < p.length; i++) {
     const [b, c] = [p[i]!, p[i + 1]!];
-    // Beyond the ends the curve goes on as it comes: mirrored points.
+    // The curve goes on beyond its ends as it comes: points are mirrored there.
     const a = p[i - 1] ?? mirrored(c, b);
     const d = p[i + 2] ?? mirrored(b, c);
     const parts = Math.max(1, Math.ceil(chord(b, c) / SAMPLE_PX));

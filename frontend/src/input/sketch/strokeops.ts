@@ -6,7 +6,7 @@ import { MAX_POINTS_PER_APPEND, type Op, type Stroke } from "../../generated/con
 
 export type Triple = [number, number, number];
 
-/** More points than this in one op may not fit into one message. */
+/** One op takes at most so many points: more may not fit into one message. */
 const MOST_POINTS_IN_SET = 1024;
 
 /** Millimetres are far below a quantum; shorter numbers make shorter messages. */

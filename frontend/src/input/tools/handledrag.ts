@@ -1,4 +1,4 @@
-/** One drag of a handle: where the pointer is now gives the ops that bring the stroke there (DESIGN 12). Pure. */
+/** One drag of a handle: the place of the pointer gives the ops that bring the stroke there (DESIGN 12). Pure. */
 
 import type { Camera } from "../../core/camera/camera.ts";
 import { along, rayPlane } from "../../core/geometry.ts";
@@ -20,7 +20,7 @@ import { brushRadius } from "./painttool.ts";
 
 /** A plane near the horizon turns a pixel into kilometres: farther than this many times the handle is not believed. */
 const FAR = 4;
-/** Below this height over the anchors a crest is raised by a bump, as there is no shape to scale. */
+/** A crest lower than this over its anchors is raised by a bump: it has no shape to scale. */
 const FLAT_CREST_M = 1;
 
 export interface DragStart {

@@ -169,7 +169,7 @@ function paintHandles(stroke: Stroke, paint: Paint, ground: Ground, active: Hand
   ];
 }
 
-/** What the crest handle shows: height over the line between the anchors, or of the plateau above zero. */
+/** Returns the words of the crest handle: height over the line between the anchors, or of the plateau above zero. */
 function crestHeight(stroke: Stroke): number {
   return stroke.kind === "level" ? stroke.first[2] : (stroke.curve[crestIndex(stroke)]?.[1] ?? 0);
 }

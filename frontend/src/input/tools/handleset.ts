@@ -52,7 +52,7 @@ export class HandleSet {
     else this.#strokes.start(this.#stroke()!, { kind, position }, x, y);
   }
 
-  /** What the ground of the grid itself is held by, where a ray meets it: it moves the grid. Null beside the grid. */
+  /** Returns the hold on the grid's own ground, where a ray meets it: that moves the grid. Null beside the grid. */
   ground(hit: readonly [number, number, number] | null): Held | null {
     return this.placing !== null && hit !== null && gridAt(this.placing, hit)
       ? { kind: "grid-move", position: hit }

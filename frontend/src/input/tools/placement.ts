@@ -24,7 +24,7 @@ import type { Ground, Ray, Vec3 } from "../../core/types.ts";
 /** A grid that somebody lays: a file that has no place of its own yet, or a layer that is moved. */
 export interface Placing extends GridShape {
   readonly id: string;
-  /** Of the samples, before scale and lift, metres. */
+  /** Lowest and highest sample, before scale and lift, metres. */
   readonly low_m: number;
   readonly high_m: number;
   readonly place: ReadonlySignal<GridPlace>;
@@ -99,7 +99,7 @@ function lengths(wide: number, tall: number): string {
   return `${text(wide)} × ${text(tall)} ${km ? "km" : "m"}`;
 }
 
-/** Whether a point of the ground lies on the grid, so that dragging there moves it. */
+/** Says whether a point of the ground lies on the grid, so that dragging there moves it. */
 export function gridAt(placing: Placing, point: Vec3): boolean {
   return covers(placing, placing.place.peek(), point[0], point[1]);
 }
@@ -114,7 +114,7 @@ export interface GridDragStart {
   readonly y: number;
 }
 
-/** One drag of a handle, always from the place at its start: nothing adds up. */
+/** One drag of a handle. Moves are reckoned from the place at its start, so that nothing adds up. */
 export class GridDrag {
   readonly kind: GridHandleKind;
   readonly #o: GridDragStart;

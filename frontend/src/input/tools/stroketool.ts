@@ -220,7 +220,7 @@ export class StrokeTool {
     this.#submit(session, { type: "stroke.begin", stroke });
   }
 
-  /** What the tool's defaults make of the stroke, and the pen's pressure of those. */
+  /** Returns the style that the tool's defaults give the stroke, changed by the pen's pressure. */
   #style(session: Session): Style {
     const { defaults } = this.#o;
     const pressure = session.pen && defaults.pressure.value !== "none" ? meanPressure(session.sketch.samples) : null;
@@ -333,7 +333,7 @@ function flatness(tool: PenToolId, points: Float64Array): number {
   return Math.max(FLUSH_M, FLAT_PROFILE * Math.hypot(points[n - 3]! - points[0]!, points[n - 2]! - points[1]!));
 }
 
-/** Whether every point (xyz triples) lies within `most` metres of the ground. */
+/** Says whether every point (xyz triples) lies within `most` metres of the ground. */
 function liesOnGround(points: Float64Array, ground: Ground, most: number): boolean {
   for (let i = 0; i + 2 < points.length; i += 3)
     if (Math.abs(points[i + 2]! - ground.heightAt(points[i]!, points[i + 1]!)) > most) return false;

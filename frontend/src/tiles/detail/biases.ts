@@ -1,10 +1,13 @@
-/** What strokes ask of the synthesis at its samples, and where data hold it back: channels read at exact fractions, so both sides of a seam agree. */
+/**
+ * Biases that strokes give the synthesis at its samples, and the data level that holds it back. Channels are read at
+ * exact fractions, so both sides of a seam agree.
+ */
 
 import type { ChannelGrid, ChannelView } from "../../core/types.ts";
 import { TILE_CELLS } from "../../generated/contract.ts";
 import type { Sample } from "../rules/rule.ts";
 
-/** One channel, bilinear over the whole domain; outside, that of the nearest border. */
+/** One channel, bilinear over the whole domain. A place outside gets the value of the nearest border. */
 class Channel {
   readonly #grid: ChannelGrid;
   /** The value everywhere, where it is the same everywhere; else null. */

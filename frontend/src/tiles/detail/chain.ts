@@ -24,7 +24,7 @@ export interface Link {
   readonly version: number;
   /** False while `heights` are the exact ones moved along with a newer parent. */
   readonly exact: boolean;
-  /** What is shown. */
+  /** The samples that are shown. */
   readonly heights: Float32Array;
   readonly exactHeights: Float32Array;
   readonly parentThen: Float32Array | null;
@@ -98,7 +98,7 @@ export class TileChain {
     this.#moveTo(frame.level, sent);
     const next = new Map(this.#links);
     for (const key of drop(next, frame)) this.#touched.add(key);
-    // Who holds nothing of a level is told nothing of it: the first tiles that fill it speak for themselves.
+    // A listener that holds nothing of a level hears nothing of it: the first tiles that fill the level say all.
     if (!holds(next, frame.level)) this.#finals.set(frame.level, frame.settled || frame.tiles.length === 0);
     for (const t of frame.tiles) {
       const key = tileKey(frame.level, t.x, t.y);

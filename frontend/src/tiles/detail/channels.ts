@@ -27,7 +27,7 @@ interface Stream {
   readonly base: number;
   /** The finest complete level, -1 for none: what is shown. */
   level: number;
-  /** What is shown, until it changes. */
+  /** The grid that is shown, until it changes. */
   grid: ChannelGrid | null;
 }
 
@@ -91,7 +91,7 @@ export class ChannelStore implements ChannelView {
     return sampleGrid(this.amplitude, x / this.sizeM, y / this.sizeM);
   }
 
-  /** What strokes ask of any channel at a place: metres of amplitude, roughness 0..1, biases -1..1. */
+  /** Returns what strokes ask of any channel at a place: metres of amplitude, roughness 0..1, biases -1..1. */
   valueAt(channel: PaintChannel, x: number, y: number): number {
     return sampleGrid(this[channel], x / this.sizeM, y / this.sizeM);
   }

@@ -21,7 +21,7 @@ export const ROOT_BLOCKS: number = TILE_CELLS / BLOCK_CELLS;
 /** Blocks that are remembered: some 6 KB each. */
 const REMEMBERED = 2048;
 
-/** What grows and lies at a place: shares 0..1. */
+/** Attributes of a place, shares 0..1: what grows and lies there. */
 export interface Attributes {
   readonly snow: number;
   readonly wet: number;
@@ -53,7 +53,7 @@ export class DetailField {
   readonly finest: number;
   /** Ground that was never solved is a B-spline (rule `smooth`). */
   readonly spline: boolean;
-  /** What every block is made of: site, rule, painted biases and the solved guide. */
+  /** Inputs of every block: site, rule, painted biases and the solved guide. */
   readonly recipe: Recipe;
   readonly #blocks: Memo<Samples>;
 
@@ -94,7 +94,7 @@ export class DetailField {
     return parent === null ? null : subdivide(parent, area, this.recipe, true);
   }
 
-  /** What grows and lies at a place, in metres, of the level's nearest sample; null while level 0 is not held. */
+  /** Returns the attributes of a place in metres, at the level's nearest sample; null while level 0 is not held. */
   attributesAt(x: number, y: number, level: number): Attributes | null {
     const n = TILE_CELLS * 2 ** level;
     const index = (v: number): number => Math.round(Math.min(Math.max(v / this.sizeM, 0), 1) * n);

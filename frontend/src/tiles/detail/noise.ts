@@ -19,7 +19,9 @@ export function mixBits(x: number): number {
   return (v ^ (v >>> 16)) >>> 0;
 }
 
-/** What all samples of a stream of a level have in common; `row` and `column` of a sample follow. */
+/**
+ * Returns the part of the hash that all samples of a stream of a level share; `row` and `column` of a sample follow.
+ */
 export function streamStart(seed: number, level: number, stream: number): number {
   return mixBits((seed + Math.imul(SYNTH_HASH_STEP, SYNTH_HASH_STREAMS * level + stream)) >>> 0);
 }
@@ -44,7 +46,7 @@ export function low(word: number): number {
   return (word & 0xffff) * 2 ** -15 - (1 - 2 ** -16);
 }
 
-/** The same of the high half. */
+/** Returns a number of the same distribution as `low` from the high half. */
 export function high(word: number): number {
   return (word >>> 16) * 2 ** -15 - (1 - 2 ** -16);
 }

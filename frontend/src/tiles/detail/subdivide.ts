@@ -60,7 +60,7 @@ export interface Samples {
   readonly exponent: number;
 }
 
-/** What the synthesis of a terrain is made from, besides the parent. */
+/** Sources of a terrain's synthesis besides the parent. */
 export interface Recipe {
   readonly site: Site;
   readonly rule: Rule;

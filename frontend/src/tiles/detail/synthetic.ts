@@ -10,7 +10,7 @@ import type { Expectation } from "../patches/figures.ts";
  */
 const RATIOS = { landscape: 0.5, smooth: 0.25, plain: 0.25 } as const;
 
-/** What detail to expect of levels that have not been made. */
+/** Detail to expect of levels that have not been made. */
 export function expectation(sizeM: number, settings: TerrainSettings, channels: ChannelView): Expectation {
   let most = 0;
   if (settings.rule === "landscape") {

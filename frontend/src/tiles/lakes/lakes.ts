@@ -36,13 +36,13 @@ export interface Lakes {
   readonly samples: ReadonlyMap<number, number>;
 }
 
-/** What basins become lakes. */
+/** Rules by which basins become lakes. */
 export interface LakeRule {
   /** Metres between samples. */
   readonly cellM: number;
   /** A basin is at least so deep, metres. */
   readonly leastM: number;
-  /** Below this the ground is the sea's. */
+  /** Ground below this height is the sea's. */
   readonly seaM: number | null;
 }
 
@@ -269,7 +269,7 @@ export class Surfaces {
     return Math.max(this.seaM, this.#tops[held]![(py >> up) * (SUBPATCHES << held) + (px >> up)]!);
   }
 
-  /** Whether there is a lake. */
+  /** Says whether there is a lake. */
   get lakes(): boolean {
     return this.#tops.length > 0;
   }

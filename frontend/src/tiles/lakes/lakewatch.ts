@@ -23,7 +23,7 @@ type Rule = Pick<TerrainSettings, "lakes_m" | "sea_level_m">;
 type Later = (run: () => void) => void;
 
 export class LakeWatch implements ShownLakes {
-  /** What is drawn; null without a lake. The same object until the samples change. */
+  /** The lakes that are drawn; null without any. The object stays the same until the samples change. */
   lakes: Lakes | null = null;
   /** How high each lake stands now, by its level: metres. */
   readonly heights = new Map<number, number>();

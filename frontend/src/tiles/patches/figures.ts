@@ -13,12 +13,12 @@ import { SUBPATCHES, SYNTH_H_RANGE_FROM } from "../../generated/contract.ts";
 const SUBS = SUBPATCHES * SUBPATCHES;
 /** Nothing measured yet. */
 const UNKNOWN = -1;
-/** What a level may add falls by this at least: 2^-H, H the least exponent. */
+/** A level adds at most this share of what its parent adds: 2^-H, H the least exponent. */
 const FALL = 2 ** -SYNTH_H_RANGE_FROM;
 /** Levels that are asked for on guesses alone; then figures must have come. */
 const MOST_BLIND = 3;
 
-/** What detail is to be expected on levels that nobody has made yet. */
+/** Detail to expect on levels that nobody has made yet. */
 export interface Expectation {
   /** Noise of level 0, metres. */
   readonly amplitudeM: number;
@@ -26,7 +26,7 @@ export interface Expectation {
   readonly ratio: number;
 }
 
-/** What figures need to know of the tree. */
+/** The part of the tree that figures need. */
 export interface Nodes {
   readonly levels: number;
   readonly tileLevel: Uint8Array;
@@ -101,7 +101,7 @@ export class Figures {
     this.#measured[page] = 0;
   }
 
-  /** What was measured of the children of a page is about another rule. */
+  /** Measurements of a page's children are forgotten: they were of another rule. */
   forgetBelow(page: number): void {
     this.#below.fill(UNKNOWN, page * SUBS, (page + 1) * SUBS);
   }

@@ -16,7 +16,10 @@ import { TILE_CELLS, TILE_SAMPLES } from "../../generated/contract.ts";
 const COLUMNS = 1024;
 /** A view whose lowest rays are steeper than this looks down on the ground: nothing to hide, and columns degenerate. */
 const LEAST_DEPTH = 0.1;
-/** What counts as below the horizon must be so by this much of a slope: far less than a pixel, far more than rounding. */
+/**
+ * A patch is hidden only when it lies below the horizon by this much of a slope: far less than a pixel, far more than
+ * rounding.
+ */
 const MARGIN = 1e-6;
 const NONE = Number.NEGATIVE_INFINITY;
 
@@ -32,7 +35,7 @@ export class Horizon {
   #forwardY = 0;
   #perT = 1;
   #active = false;
-  // Of the square that was measured last: columns and depths between which it lies.
+  // Columns that the square measured last covers, and the depths between which it lies.
   #from = 0;
   #to = 0;
   #near = 0;

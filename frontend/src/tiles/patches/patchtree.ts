@@ -41,7 +41,7 @@ export class PatchTree {
   near = new Int32Array(FIRST_PAGES * 9);
   held = new Uint8Array(FIRST_PAGES);
   usable = new Uint8Array(FIRST_PAGES);
-  /** What is left of the tile's entrance, 1 to 0: it starts out as its parent's surface. */
+  /** Share of the tile's entrance that is still to come, 1 to 0: a tile starts out as its parent's surface. */
   fade = new Float32Array(FIRST_PAGES);
 
   // Per node.
@@ -128,7 +128,7 @@ export class PatchTree {
     return this.#index.get(tileKey(level, x, y)) ?? -1;
   }
 
-  /** What detail to expect from now on. */
+  /** Sets the detail to expect from now on. */
   expect(expected: Expectation | null): void {
     const [a, b] = [this.#figures.expected, expected];
     if (a === b || (a !== null && b !== null && a.amplitudeM === b.amplitudeM && a.ratio === b.ratio)) return;

@@ -19,10 +19,10 @@ const INDEX_MASK = 0xffffff;
 const SLOT_MASK = 0xfff;
 const WET = 1 << 31;
 
-/** What a record says. */
+/** The fields of a record. */
 export interface PatchRecord {
   readonly level: number;
-  /** Of the south-west vertex, in samples of the level. */
+  /** Place of the south-west vertex, in samples of the level. */
   readonly column: number;
   readonly row: number;
   readonly slot: number;

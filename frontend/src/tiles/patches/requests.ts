@@ -28,7 +28,7 @@ export class TileRequests {
   }
 
   clear(): void {
-    // What was given out stays as it was.
+    // Requests that were given out stay as they were.
     this.#list = [];
     this.#known.clear();
   }

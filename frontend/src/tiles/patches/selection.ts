@@ -48,7 +48,7 @@ export interface Cut {
   readonly tiles: number;
 }
 
-/** What the selection asks of the atlas. */
+/** The part of the atlas that the selection asks. */
 export interface Slots {
   /** Slot of a usable tile. */
   slot(level: number, x: number, y: number): number;
@@ -230,7 +230,9 @@ export class Selection {
     this.#slots!.touch(tileLevel[page]!, tileX[page]!, tileY[page]!);
   }
 
-  /** Whether the eye is above the ground that is drawn: else nearer ground need not hide what is behind it. */
+  /**
+   * Says whether the eye is above the ground that is drawn: from below, nearer ground need not hide what is behind it.
+   */
   #above(view: TileView): boolean {
     const { tree } = this;
     const { sizeM } = this.#sight;

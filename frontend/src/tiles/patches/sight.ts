@@ -1,4 +1,4 @@
-/** What an eye sees of the patches of a tree: which lie in view, and how many pixels their error covers. */
+/** Patches of a tree as an eye sees them: which lie in view, and how many pixels their error covers. */
 
 import { eyeProjection } from "../../core/camera/projection.ts";
 import type { CameraState } from "../../core/types.ts";
@@ -78,7 +78,7 @@ export class Sight {
     return Math.max(1e-3, Math.sqrt(dx * dx + dy * dy + dz * dz));
   }
 
-  /** Whether some of the box of a patch, with the water on it, may be in view. */
+  /** Says whether some of the box of a patch, with the water on it, may be in view. */
   visible(level: number, node: number): boolean {
     const w = this.sizeM / (SUBPATCHES << level);
     const x0 = this.column(node) * w - this.eye[0]!;
@@ -96,7 +96,7 @@ export class Sight {
     return true;
   }
 
-  /** Of the ground of a patch and the water on it. */
+  /** Returns the highest place of a patch: its ground, or the water on it. */
   highest(level: number, node: number): number {
     return Math.max(this.#tree.max[node]!, this.waterOn(level, this.column(node), this.row(node)));
   }

@@ -23,7 +23,7 @@ import {
 import { clamp, type Sample, type Site, smoothstep } from "./rule.ts";
 import { blended, painted, targets, tie } from "./targets.ts";
 
-/** What depends on the level alone. */
+/** Values that depend on the level alone. */
 interface Octave {
   readonly tied: number;
   readonly grain: number;

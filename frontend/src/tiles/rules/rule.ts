@@ -19,9 +19,9 @@ import {
 /** One terrain as its rule sees it. */
 export interface Site {
   readonly sizeM: number;
-  /** What elevations are shares of, metres. */
+  /** Elevations are shares of this height, metres. */
   readonly reliefM: number;
-  /** What the elevation of wet shores is a share of, metres. */
+  /** The elevation of wet shores is a share of this height, metres. */
   readonly shoreM: number;
   readonly seed: number;
   /** Amplitude of the coarsest octave on steep ground, metres. */
@@ -50,9 +50,10 @@ export function zeroM(settings: Pick<RuleSettings, "sea_level_m" | "place" | "gr
 }
 
 /**
- * What elevations are shares of, metres: the domain's side, so that a sketch of any size has its own climate; where the
- * terrain has a place on Earth, that of which the natural look's snow line is the real one's height there. Without a place,
- * ground of elevation layers has the snow line at a share of its relief at least.
+ * Returns the height that elevations are shares of, metres. Without data it is the domain's side, so that a sketch of
+ * any size has its own climate. Where the terrain has a place on Earth, it is chosen so that the natural look's snow
+ * line is the real one's height there. Ground of elevation layers without a place has the snow line at a share of its
+ * relief at least.
  */
 export function reliefM(settings: Pick<RuleSettings, "size_m" | "sea_level_m" | "place" | "ground">): number {
   const { size_m, place, ground } = settings;
@@ -64,7 +65,7 @@ export function reliefM(settings: Pick<RuleSettings, "size_m" | "sea_level_m" | 
   return Math.max(SYNTH_LEAST_SNOW_LINE_M, line) / SYNTH_LOOKS.natural.snowLine;
 }
 
-/** What the elevation of wet shores is a share of, metres. */
+/** Returns the height that the elevation of wet shores is a share of, metres. */
 export function shoreM(sizeM: number, place: Place | null | undefined): number {
   return place == null ? sizeM : SYNTH_SHORE_M;
 }
@@ -95,7 +96,7 @@ export interface Sample {
   slopeY: number;
   concavity: number;
   guideSlope: number;
-  /** What strokes ask for: metres, 0..1, and biases -1..1. */
+  /** Channels that strokes ask for: metres, 0..1, and biases -1..1. */
   amplitude: number;
   roughness: number;
   snowBias: number;

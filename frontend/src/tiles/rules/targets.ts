@@ -1,5 +1,5 @@
 /**
- * What the ground asks of the channels (docs/synthesis.md, "Targets"), and the ways to follow it. Twin of
+ * Targets that the ground sets for the channels (docs/synthesis.md, "Targets"), and the ways to follow them. Twin of
  * `backend/esker/synthesis/rules/targets.py`.
  */
 

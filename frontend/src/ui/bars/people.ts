@@ -18,9 +18,7 @@ const SHOWN = { wide: 5, narrow: 2, phone: 1 } as const;
 const NARROW = "(max-width: 720px)";
 const PHONE = "(max-width: 430px)";
 
-/**
- * Who is here. A click on a person fires `follow` with that client, a click on oneself `profile`.
- */
+/** The people who are here. A click on a person fires `follow` with that client, a click on oneself `profile`. */
 export class EskPeople extends SignalElement {
   static override properties = {
     client: { attribute: false },

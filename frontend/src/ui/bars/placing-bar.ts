@@ -45,7 +45,7 @@ export class EskPlacingBar extends SignalElement {
         display: flex;
         gap: 6px;
       }
-      /* The panel at the right has the buttons too. */
+      /* The panel at the right has these buttons too. */
       @media (min-width: 721px) {
         :host([beside]) {
           left: calc((100% - 324px) / 2);

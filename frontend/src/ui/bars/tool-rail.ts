@@ -96,12 +96,12 @@ export class EskTools extends SignalElement {
   ];
 
   declare tool: ReadonlySignal<ToolId>;
-  /** One finger draws on a touch screen; else it moves the view. */
+  /** One finger draws on a touch screen while this is on; else it moves the view. */
   declare fingerDraws: ReadonlySignal<boolean>;
   declare canUndo: ReadonlySignal<boolean>;
   declare canRedo: ReadonlySignal<boolean>;
   declare canEdit: ReadonlySignal<boolean>;
-  /** What the buttons run. */
+  /** Actions that the buttons run. */
   declare actions: ReadonlyMap<string, Action>;
   readonly #coarse = window.matchMedia("(pointer: coarse)");
 

@@ -13,7 +13,7 @@ import { SignalElement } from "../controls/signal-element.ts";
 import { blurOnEnter } from "../panels/stroke-panel.ts";
 import { shared } from "../styles/shared.ts";
 
-/** What the top bar asks of the page. */
+/** The parts of the page that the top bar asks. */
 export type PageCommand =
   | "share"
   | "profile"

@@ -60,7 +60,7 @@ export class EskViewBar extends SignalElement {
   /** Screen-error bound of the picture, pixels, where this device has no room for the chosen one. */
   declare coarsenedPx: ReadonlySignal<number | null>;
   declare renderer: ReadonlySignal<RendererInfo | null>;
-  /** What the buttons run. */
+  /** Actions that the buttons run. */
   declare actions: ReadonlyMap<string, Action>;
 
   #run(id: string): void {

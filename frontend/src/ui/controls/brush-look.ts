@@ -1,4 +1,4 @@
-/** What the ring of the brush is filled with: a pattern that looks like what it paints. */
+/** The pattern that fills the ring of the brush. It looks like what the brush paints. */
 
 import { svg, type TemplateResult } from "lit";
 import { SUBSTANCES } from "../../app/words/paints.ts";

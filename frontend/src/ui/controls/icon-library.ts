@@ -7,6 +7,7 @@ for (const library of ["default", "system"])
   registerIconLibrary(library, {
     resolver: iconUrl,
     spriteSheet: true,
-    // Without proportions of its own a drawing is 300 pixels wide: unseen, it took clicks and made dialogs scroll sideways.
+    // A drawing without proportions of its own would be 300 pixels wide: unseen, it took clicks and made dialogs scroll
+    // sideways.
     mutator: (svg) => svg?.setAttribute("viewBox", "0 0 24 24"),
   });

@@ -86,7 +86,10 @@ export class EskRange extends LitElement {
   ];
 
   declare label: string;
-  /** What the label leaves to the heading above it: "of the left flank". Part of the name, not shown. */
+  /**
+   * The end of the name that the label leaves to the heading above it: "of the left flank". It is part of the name, not
+   * shown.
+   */
   declare of: string;
   declare unit: string;
   declare value: number;

@@ -3,7 +3,7 @@ import { html, nothing, type TemplateResult } from "lit";
 import type { OpenTerrain } from "../../app/open-terrain.ts";
 import type { Graphics } from "../../app/view/graphics.ts";
 
-/** What the dialog tells of. */
+/** The facts that the dialog shows. */
 export interface AboutTerrain {
   readonly sizeM: number;
   /** Finest level that is solved everywhere. */
@@ -14,7 +14,7 @@ export interface AboutTerrain {
   readonly session: Pick<OpenTerrain, "server" | "doc" | "connection">;
 }
 
-/** What this terrain is, what draws it and what solves it. Styled by the page (`.facts`). */
+/** Facts about this terrain, what draws it and what solves it. Styled by the page (`.facts`). */
 export function aboutDialog(about: AboutTerrain, open: boolean, close: () => void): TemplateResult {
   const { session, sizeM, levels, finest, graphics } = about;
   const server = session.server.value;

@@ -4,7 +4,7 @@ import { untilDay } from "../../app/deletion.ts";
 import type { OpenTerrain } from "../../app/open-terrain.ts";
 import { ApiError } from "../../app/server/api.ts";
 
-/** What the question before a deletion names, and what deletes. */
+/** The terrain that the question before a deletion names, and the function that deletes it. */
 type Deletable = Pick<OpenTerrain, "doc" | "members" | "deletion" | "toasts">;
 
 /** Asks an owner before the terrain is deleted for everybody. `remove` deletes it. */

@@ -77,7 +77,7 @@ export class EskExport extends SignalElement {
     if (changed.has("open") && this.open) this.#made().ask();
   }
 
-  /** What was pressed is gone with its part of the dialog: the keys go to the next one. */
+  /** Moves the focus on when the pressed button has gone with its part of the dialog. */
   protected override updated(): void {
     const phase = this.#exporter?.phase.peek() ?? "choose";
     if (phase === this.#shown) return;

@@ -4,7 +4,7 @@ import { type KeyedAction, keyParts } from "../../app/words/keys.ts";
 import { SignalElement } from "../controls/signal-element.ts";
 import { shared } from "../styles/shared.ts";
 
-/** What pointers do; the keys come from the actions themselves. */
+/** Gestures of pointers. Keys come from the actions themselves. */
 const POINTERS: readonly { readonly what: string; readonly how: string }[] = [
   { what: "Draw, or use the chosen tool", how: "Left button, pen or one finger" },
   { what: "Redraw a part of the selected line", how: "Begin on it with the tool that drew it (Alt: a new line)" },

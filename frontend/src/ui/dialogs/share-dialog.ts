@@ -36,7 +36,7 @@ interface Shown {
   readonly ends: number;
 }
 
-/** What links are made of. */
+/** The part of an open terrain by which links are made and changed. */
 type Shareable = Pick<OpenTerrain, "id" | "secret" | "client" | "store" | "role" | "adoptSecret" | "toasts">;
 
 /** Links to give away, with QR code and join code; for the owner also the list of links, to rotate and revoke. */
@@ -353,7 +353,7 @@ function left(code: Shown): string {
   return `Valid for ${minutes} more ${minutes === 1 ? "minute" : "minutes"}.`;
 }
 
-/** Whether a secret no longer opens the terrain. */
+/** Says whether a secret no longer opens the terrain. */
 async function dead(id: string, secret: string): Promise<boolean> {
   try {
     await api.about(id, secret);

@@ -17,7 +17,7 @@ export class EskShareList extends LitElement {
   };
 
   declare links: readonly AccessLink[];
-  /** What a link allows, in words. */
+  /** The rights of a link, in words. */
   declare words: (link: AccessLink) => string;
   declare disabled: boolean;
   /** The question that stands open. */
@@ -46,7 +46,7 @@ export class EskShareList extends LitElement {
     return html`
       <details
         @toggle=${(e: Event) => {
-          // Others may have joined by code since: each of them has a link of their own.
+          // Other people may have joined by code since: each of them has a link of their own.
           if ((e.target as HTMLDetailsElement).open) this.dispatchEvent(new CustomEvent("reload"));
         }}
       >
@@ -104,7 +104,7 @@ export class EskShareList extends LitElement {
   }
 }
 
-/** What will happen, before it does. */
+/** Returns the question that tells what a button will do before it does it. */
 export function question(link: AccessLink, act: Act, lastOwner: boolean): string {
   const name = link.name === "" ? "this link" : `“${link.name}”`;
   if (act === "revoke") return `Revoke ${name}? Whoever came by it is sent away, and so are those whom they let in.`;

@@ -1,4 +1,7 @@
-/** What the page of a terrain hands to its bars, panels and dialogs: each gets what it shows and what it may do. */
+/**
+ * The values and functions that the page of a terrain hands to its bars, panels and dialogs: each gets what it shows
+ * and what it may do.
+ */
 
 import { html, type TemplateResult } from "lit";
 import type { Identity } from "../../app/device/storage.ts";
@@ -79,7 +82,7 @@ export function toolRail({ input, session }: Stage): TemplateResult {
   ></esk-tools>`;
 }
 
-/** What colours mean, how far the ground is, and how it is looked at. */
+/** The legend, the progress of the ground, and the ways to look at it. */
 export function foot(stage: Stage): TemplateResult {
   const { camera, channels, cursor, graphics, input, levels, quality, quietStrokes, session } = stage;
   return html`<div class="foot">

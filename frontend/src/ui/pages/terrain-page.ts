@@ -322,7 +322,7 @@ export class EskTerrain extends SignalElement {
     `;
   }
 
-  /** What others bring in, while the panel that lists it is shut. */
+  /** Imports of other people, shown while the panel that lists them is shut. */
   #importing(stage: Stage): TemplateResult | typeof nothing {
     const { groundwork } = stage;
     const other = this.#panel.value === "ground" ? undefined : groundwork.others.list.value.at(-1);
@@ -336,7 +336,7 @@ export class EskTerrain extends SignalElement {
     return words === null ? nothing : html`<div class="hint panel">${icon("sketch")}<span>${words}</span></div>`;
   }
 
-  /** What the pen of the arrow keys awaits: read aloud, and shown while the pen is. */
+  /** The next step of the pen of the arrow keys: read aloud, and shown while the pen is. */
   #keyPen(stage: Stage): TemplateResult {
     const { visual, words } = stage.input.keyPen;
     return html`<div class=${visual.value === null ? "visually-hidden" : "hint panel"} role="status" aria-live="polite">
@@ -384,11 +384,11 @@ export class EskTerrain extends SignalElement {
     </div>`;
   }
 
-  /** What the server said about its solver: another device, a lower level. Stands until it is read. */
+  /** The server's sentence about its solver: another device, a lower level. It stands until it is read. */
   #notice(stage: Stage): TemplateResult | typeof nothing {
     const { connection, notice } = stage.session;
     if (notice.value === null || connection.state.value === "closed") return nothing;
-    // One at a time: they share a place.
+    // Notices share one place, so one is shown at a time.
     if (stage.graphics.notice.value !== null) return nothing;
     return html`<div class="closed notice panel" role="status">
       ${icon("info")}<span>${notice.value}</span>

@@ -5,7 +5,7 @@ import { shared } from "../styles/shared.ts";
 
 export type DetailFields = Pick<Stroke, "amplitude_m" | "roughness">;
 
-/** What `change` carries: the new fields, and whether the gesture is over. */
+/** The event `change` carries the new fields, and whether the gesture is over. */
 export interface DetailChange {
   readonly fields: Partial<DetailFields>;
   readonly settled: boolean;

@@ -35,7 +35,7 @@ const ICONS: Readonly<Record<string, string>> = {
 /** How long ago something was is told anew this often. */
 const TICK_MS = 30_000;
 
-/** What people did, newest first. A click shows the terrain as it was then. */
+/** The activity log, newest first. A click shows the terrain as it was then. */
 export class EskHistoryPanel extends SignalElement {
   static override properties = {
     history: { attribute: false },
@@ -149,7 +149,7 @@ export class EskHistoryPanel extends SignalElement {
     </li>`;
   }
 
-  /** Who is here has the colour of now; others the one that they had. */
+  /** People who are here have the colour of now; others the one that they had. */
   #colour(author: string): string {
     const { history, members } = this;
     const here = members.value.find((m) => m.client === author)?.colour;

@@ -32,7 +32,7 @@ const STAGES: Readonly<Record<string, string>> = {
   saving: "Saving",
 };
 
-/** What an import does at this moment, with how far it is. */
+/** Returns the stage of an import in words, with how far it is. */
 export function jobWords(job: ImportJob): string {
   const percent = `${Math.round(100 * job.share)}\u00a0%`;
   switch (job.phase) {
@@ -55,7 +55,7 @@ export function jobWords(job: ImportJob): string {
   }
 }
 
-/** One file on its way: how far it is, what it is, what it asks. */
+/** One file on its way: how far its import is, what the file is, what it asks. */
 export class EskImportCard extends SignalElement {
   static override properties = {
     groundwork: { attribute: false },

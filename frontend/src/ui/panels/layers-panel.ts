@@ -63,7 +63,7 @@ export class EskLayersPanel extends SignalElement {
     return html`
       ${this.#adding(layers.length)}
       ${repeat(
-        // What is under way comes before what is over.
+        // Imports under way come before those that are over.
         [...jobs].sort((a, b) => Number(isOver(a.phase)) - Number(isOver(b.phase))),
         (j) => j.key,
         (j) =>

@@ -17,7 +17,7 @@ export function amplitudeEnds(greatestM: number): [string, string] {
 /** Overlays without a scale: the key that goes through them all should say which it has come to. */
 const NAMED = { contours: "Contour lines", patches: "Levels of detail, a colour each" } as const;
 
-/** What the colours of an overlay mean. */
+/** The meaning of an overlay's colours. */
 export class EskLegend extends SignalElement {
   static override properties = {
     overlay: { attribute: false },
@@ -113,7 +113,7 @@ export class EskLegend extends SignalElement {
     return scale("Felt from the selected stroke", "influence", ["far", "its flanks", "its line"]);
   }
 
-  /** What paint says of a channel, and how much of it there is in the end under the cursor. */
+  /** Words for the paint of a channel under the cursor, and for how much of the channel there is in the end. */
   #painted(channel: PaintedOverlay): TemplateResult {
     const name = `Painted ${SUBSTANCES[channel].title.toLowerCase()}`;
     return html`${scale(name, "painted", ["less", "as it grows", "more"])} ${this.#share(channel)}`;

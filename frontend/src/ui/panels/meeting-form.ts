@@ -7,21 +7,27 @@ import { height } from "../../app/words/words.ts";
 export interface MeetingRow {
   readonly id: string;
   readonly name: string;
-  /** What the selected stroke and the other one ask for where they cross, metres. */
+  /** The heights that the selected stroke and the other one ask for where they cross, metres. */
   readonly mine: number;
   readonly theirs: number;
   readonly yields: boolean;
   readonly locked: boolean;
 }
 
-/** What `change` carries: how far which stroke yields, and whether the gesture is over; without an id the selected one. */
+/**
+ * The event `change` carries how far which stroke yields, and whether the gesture is over; without an id it is the
+ * selected one.
+ */
 export interface YieldChange {
   readonly id: string | null;
   readonly yields: number;
   readonly settled: boolean;
 }
 
-/** Which strokes cross the selected one, and which of them gives way. Fires `change`, and `select` with an id. */
+/**
+ * Lists the strokes that cross the selected one, and says which of them gives way. Fires `change`, and `select` with an
+ * id.
+ */
 export class EskMeetingForm extends LitElement {
   static override properties = {
     yields: { type: Number },

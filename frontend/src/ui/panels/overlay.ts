@@ -23,7 +23,7 @@ import { shared } from "../styles/shared.ts";
 const WORDS_ABOVE_PX = 64;
 const WORDS_TOP_PX = 66;
 
-/** What is in my hand: handles, the line under the pen, the pen of the arrow keys. */
+/** The things in my hand: handles, the line under the pen, the pen of the arrow keys. */
 type Hand = Pick<InputController, "handles" | "ink" | "drawing" | "selection" | "tool"> & {
   readonly keyPen: Pick<KeyPen, "visual">;
 };
@@ -161,7 +161,7 @@ export class EskOverlay extends SignalElement {
   declare input: Hand;
   /** The ground under the cursor. */
   declare cursor: ReadonlySignal<Vec3 | null>;
-  /** What the brush paints. */
+  /** The paint of the brush. */
   declare paint: ReadonlySignal<Paint>;
   declare ground: Ground;
   declare doc: ReadonlySignal<Doc | null>;
@@ -289,7 +289,10 @@ export class EskOverlay extends SignalElement {
     ` as unknown as TemplateResult;
   }
 
-  /** Who has a stroke in hand: colour and name at its first handle, unless that person's pointer is there already. */
+  /**
+   * People who have a stroke in hand: colour and name at its first handle, unless that person's pointer is there
+   * already.
+   */
   #holders(): TemplateResult[] {
     const strokes = this.doc.value?.strokes;
     return holders(this.people.value).flatMap(({ member, stroke }) => {
@@ -326,7 +329,7 @@ export function brushRim([x, y]: Vec3, radiusM: number, ground: Ground): Vec3[] 
   });
 }
 
-/** What each handle does, drawn on it: up and down, in and out, all ways. */
+/** The directions of each handle, drawn on it: up and down, in and out, all ways. */
 const GLYPHS: Readonly<Partial<Record<AnyHandle["kind"], unknown>>> = {
   crest: svg`<path class="glyph" d="M0-3.5v7M-2-1.800 0-3.800 2-1.800M-2 1.800 0 3.800 2 1.800"></path>`,
   move: svg`<path class="glyph" d="M-3.500 0h7M0-3.500v7"></path>`,

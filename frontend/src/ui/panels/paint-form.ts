@@ -6,7 +6,7 @@ import "../controls/range-field.ts";
 import "../controls/segmented.ts";
 import { shared } from "../styles/shared.ts";
 
-/** What `change` carries: the whole paint, and whether the gesture is over. */
+/** The event `change` carries the whole paint, and whether the gesture is over. */
 export interface PaintChange {
   readonly paint: Paint;
   readonly settled: boolean;
@@ -17,7 +17,7 @@ const WAYS = [
   { value: "remove", label: "Remove", title: "Less of it (Shift+U)" },
 ];
 
-/** What a brush paints: channel, more or less of it, how strongly, how wide. Fires `change`. */
+/** The paint of a brush: channel, more or less of it, how strongly, how wide. Fires `change`. */
 export class EskPaintForm extends LitElement {
   static override properties = {
     paint: { attribute: false },

@@ -73,7 +73,7 @@ export class EskPlacementForm extends SignalElement {
 
   #space(axis: 0 | 1, value: number): void {
     const [sx, sy] = this.place.spacing_m;
-    // One number while they are one; apart, each has its own.
+    // Equal spacings are one number and change together; unequal ones change by themselves.
     const next: [number, number] = sx === sy && axis === 0 ? [value, value] : axis === 0 ? [value, sy] : [sx, value];
     this.#emit(respaced(this.place, next, ...this.#middle));
   }

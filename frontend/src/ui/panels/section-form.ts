@@ -17,7 +17,7 @@ const SHAPES = [
   { value: "convex", label: "Rounded", title: "Convex: gentle at the crest, steeper below" },
 ];
 
-/** What `change` carries: the new fields, and whether the gesture is over. */
+/** The event `change` carries the new fields, and whether the gesture is over. */
 export interface SectionChange {
   readonly fields: Partial<SectionFields>;
   readonly settled: boolean;
@@ -207,7 +207,7 @@ export class EskSectionForm extends LitElement {
     if (on && !symmetric(this.fields)) this.#emit({ right: this.fields.left && { ...this.fields.left } }, true);
   }
 
-  /** Of which flank a slope or an extent is. */
+  /** Returns the words that say whose slope or extent it is. */
   #of(side: Side): string {
     return this.#linked ? "of both flanks" : `of the ${side} flank`;
   }

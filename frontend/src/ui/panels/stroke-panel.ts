@@ -56,12 +56,12 @@ export class EskStrokePanel extends SignalElement {
   declare selection: Signal<string | null>;
   declare tool: ReadonlySignal<ToolId>;
   declare canEdit: ReadonlySignal<boolean>;
-  /** What new strokes get, which the form of a drawing tool changes. */
+  /** The values that new strokes get. The form of a drawing tool changes them. */
   declare defaults: ToolDefaults;
   /** Strokes that cross the chosen one. */
   declare meets: ReadonlySignal<readonly Meeting[]>;
   declare sizeM: number;
-  /** What the buttons run. */
+  /** Actions that the buttons run. */
   declare actions: ReadonlyMap<string, Action>;
   declare edits: Pick<OpenTerrain, "newGesture" | "setStroke">;
   declare filter: string;
@@ -124,7 +124,7 @@ export class EskStrokePanel extends SignalElement {
     ></esk-paint-form>`;
   }
 
-  /** What the brush will paint. */
+  /** The form for the paint of the brush. */
   #brush(): TemplateResult {
     const { defaults, sizeM } = this;
     return html`
@@ -162,7 +162,7 @@ export class EskStrokePanel extends SignalElement {
     `;
   }
 
-  /** Which strokes cross this one, and which gives way. */
+  /** The strokes that cross this one, and which of them gives way. */
   #meetings(stroke: Stroke, disabled: boolean): TemplateResult {
     const { edits, meets } = this;
     const strokes = this.doc.value?.strokes;

@@ -16,7 +16,7 @@ import { shared } from "../styles/shared.ts";
 import "../controls/sun-pad.ts";
 import { type SunPosition, sunWords } from "../../app/view/sun.ts";
 
-/** Before the first tile. */
+/** The heights before the first tile. */
 const NO_HEIGHTS = new Float32Array(0);
 
 const LOOKS = [
@@ -52,7 +52,7 @@ const RULE_WORDS: Readonly<Record<Rule, string>> = {
   plain: "What the strokes make, and nothing else.",
 };
 
-/** What a strength of the detail looks like. */
+/** Returns in words how a strength of the detail looks. */
 export function detailWords(detail: number): string {
   if (detail === 0) return "None: only strokes with an amplitude of their own are broken.";
   if (detail < 0.7) return "Gentle: old, worn hills.";

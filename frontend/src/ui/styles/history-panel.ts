@@ -1,6 +1,6 @@
 import { css } from "lit";
 
-/** What people did on the terrain. */
+/** Styles of the activity log. */
 export const historyPanelStyles = css`
   .ways {
     display: grid;

@@ -145,7 +145,7 @@ export const terrainPageStyles = css`
   .notes > * {
     pointer-events: auto;
   }
-  /* Beside the tools where there is no room below them. */
+  /* The legend stands beside the tools where there is no room below them. */
   @media (max-height: 700px) and (min-width: 721px) {
     .notes esk-legend {
       margin-left: 60px;
