@@ -12,13 +12,14 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from esker.contract import BASE_ROUGHNESS, MAX_SYNTHESIS_LEVEL, SUBPATCHES, TILE_SAMPLES, fractal
+from esker.contract import BASE_FAR, BASE_ROUGHNESS, BASE_SURVEY, MAX_SYNTHESIS_LEVEL, SUBPATCHES, TILE_SAMPLES, fractal
 from esker.resources import SHADERS
 from esker.synthesis import hash as noise
+from esker.synthesis.rules import gullies
 from esker.synthesis.rules.targets import tie
 from esker.synthesis.site import BORDER, Biases, Site
 
-PARTS: Final = ("tile", "synth_hash", "synth_interpolate", "synth_site", "synth_targets")
+PARTS: Final = ("tile", "synth_hash", "synth_interpolate", "synth_site", "synth_targets", "synth_gullies")
 SLOT: Final = TILE_SAMPLES + 2 * BORDER
 """Samples along one side of a slot."""
 AREA: Final = SLOT * SLOT
@@ -30,6 +31,8 @@ JOB_WORDS: Final = 8
 JOB_ALIGN: Final = 256 // (4 * JOB_WORDS)
 HELD: Final = 0b111_111_111
 """All nine tiles are held."""
+NODE: Final = (*Biases._fields[:6], "survey", "far", "erosion")
+"""Channels in the order in which a node has them."""
 TEXTURES: Final = ("heights", "attributes0", "attributes1")
 
 
@@ -57,7 +60,9 @@ def site_words(site: Site, bits: int, varied: bool, biased: bool) -> NDArray[np.
     words = [
         np.array(head, np.float32).view(np.uint32),
         np.array([site.solved, site.cyclic, bits, varied, biased, site.surveyed], np.uint32),
-        np.array([site.relief_m, site.shore_m, 0], np.float32).view(np.uint32),
+        np.array([site.relief_m, site.shore_m], np.float32).view(np.uint32),
+        np.array([5 if _wide(site) else 3, site.eroded, site.gully_side], np.uint32),
+        np.array([site.erosion, site.hold, site.far_m, site.far_margin_m, 0, 0], np.float32).view(np.uint32),
     ]
     for level in range(MAX_SYNTHESIS_LEVEL + 1):
         starts = [site.seed + fractal.HASH_STEP * (fractal.HASH_STREAMS * level + stream) for stream in range(4)]
@@ -69,16 +74,27 @@ def site_words(site: Site, bits: int, varied: bool, biased: bool) -> NDArray[np.
             fractal.SMOOTHNESS_NOISE * 2.0 ** (-fractal.SMOOTHNESS_NOISE_DECAY * level),
         ]
         words.append(np.array(numbers, np.float32).view(np.uint32))
+        start = site.seed + fractal.HASH_STEP * (fractal.HASH_STREAMS * level + fractal.GULLY_STREAM)
+        words.append(noise.mix(np.array([start & 0xFFFFFFFF], np.uint32)))
+        octave = [gullies.wave_m(site, level), gullies.depth_m(site, level), 0]
+        words.append(np.array(octave, np.float32).view(np.uint32))
     return np.concatenate(words)
 
 
+def _wide(site: Site) -> bool:
+    """Whether nodes of the channels hold survey, far and erosion too."""
+    return any(name in site.channels for name in ("survey", "far", "erosion"))
+
+
 def channel_values(site: Site) -> tuple[NDArray[np.float32], int, bool, bool]:
-    """All channels on the finest of their grids, (n, n, 6), or 8 with a survey; log2(n - 1); do they vary; is any bias
+    """All channels on the finest of their grids, (n, n, 6), or 10 of wide nodes; log2(n - 1); do they vary; is any bias
     asked for."""
     cells = max([1, *(len(values) - 1 for values in site.channels.values())])
-    out = np.zeros((cells + 1, cells + 1, 8 if site.surveyed else 6), np.float32)
+    out = np.zeros((cells + 1, cells + 1, 10 if _wide(site) else 6), np.float32)
     out[..., 1] = BASE_ROUGHNESS
-    for k, name in enumerate(Biases._fields):
+    if _wide(site):
+        out[..., 6], out[..., 7] = BASE_SURVEY, BASE_FAR
+    for k, name in enumerate(NODE):
         if name in site.channels:
             values = site.channels[name].astype(np.float64)
             while len(values) <= cells:

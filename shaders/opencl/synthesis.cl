@@ -10,7 +10,7 @@
 
 // What a launch is told: Launch in backend/esker/synthesis/kernels.py.
 typedef struct {
-    int level, rule, cyclic, own_guide, surveyed;
+    int level, rule, cyclic, own_guide, surveyed, eroded;
     int row, col, rows, cols;                          // the child's window
     int parent_row, parent_col, parent_rows, parent_cols;
     uint seed;
@@ -18,6 +18,8 @@ typedef struct {
     float spacing, relief, shore, zero, amplitude; // of the parent; elevations of share 1, and where they count from; detail * alpha * s_0
     float snow_line, tree_line, plants, tie;
     float grain, strength;                             // of the noise of h, and of the other channels
+    int gully_side;                                    // of a lattice cell, samples
+    float erosion, hold, wave, depth, far, margin;     // wave, depth: of the level's octave; far: distance of share 1
     int offset[SYNTH_GRIDS], side[SYNTH_GRIDS];        // of the channels' grids, in the order of Biases
 } Launch;
 
@@ -30,7 +32,7 @@ typedef struct {
 } Ground;
 
 typedef struct {
-    float amplitude, roughness, snow, grass, forest, wetness, survey;
+    float amplitude, roughness, snow, grass, forest, wetness, survey, erosion, far;
 } Biases;
 
 uint synth_mix(uint x) {

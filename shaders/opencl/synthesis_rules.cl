@@ -46,6 +46,70 @@ float synth_exponent(const Launch *l, float h, float target) {
     return clamp(synth_blended(l, h, target), SYNTH_SMOOTHNESS_MIN, SYNTH_SMOOTHNESS_MAX);
 }
 
+// Gullies (docs/synthesis.md, "Gullies"): backend/esker/synthesis/rules/gullies.py.
+float synth_sine(float a) {
+    float p = a * a, inner = SYNTH_GULLY_SINE_5 + p * (SYNTH_GULLY_SINE_7 + p * SYNTH_GULLY_SINE_9);
+    return a * (SYNTH_GULLY_SINE_1 + p * (SYNTH_GULLY_SINE_3 + p * inner));
+}
+
+// |atan2(s, c)| / pi.
+float synth_half_turns(float s, float c) {
+    float high = max(fabs(s), fabs(c)), low = min(fabs(s), fabs(c));
+    float x = low / max(high, 1e-20f), p = x * x;
+    float inner = SYNTH_GULLY_ARC_7 + p * (SYNTH_GULLY_ARC_9 + p * SYNTH_GULLY_ARC_11);
+    float a = x * (SYNTH_GULLY_ARC_1 + p * (SYNTH_GULLY_ARC_3 + p * (SYNTH_GULLY_ARC_5 + p * inner)));
+    if (fabs(s) > fabs(c)) a = 0.5f - a;
+    return c < 0.0f ? 1.0f - a : a;
+}
+
+float synth_rounded(float t, float radius) {
+    return (sqrt(t * t + radius * radius) - radius) / (sqrt(1.0f + radius * radius) - radius);
+}
+
+float synth_gully_profile(float t) {
+    float low = synth_rounded(t, SYNTH_GULLY_RIDGE), high = 1.0f - synth_rounded(1.0f - t, SYNTH_GULLY_BED);
+    return SYNTH_GULLY_MIDDLE - (low * (1.0f - t) + high * t);
+}
+
+// The octave of the level for a depth of 1.
+float synth_gullies(const Launch *l, Ground g, int i, int j) {
+    int side = l->gully_side, cells = l->cells / side;
+    int ci = (i + side) / side - 1, cj = (j + side) / side - 1;  // no index is below -side
+    float u = (float)(i - ci * side) * (1.0f / (float)side), v = (float)(j - cj * side) * (1.0f / (float)side);
+    float turn = 1.0f / sqrt(g.slope_x * g.slope_x + g.slope_y * g.slope_y + SYNTH_GULLY_TURN * SYNTH_GULLY_TURN);
+    float nx = -g.slope_y * turn, ny = g.slope_x * turn, cosine = 0.0f, sine = 0.0f, weights = 0.0f;
+    for (int k = 0; k < 9; k++) {
+        int di = k % 3 - 1, dj = k / 3 - 1, a = ci + di, b = cj + dj;
+        if (l->cyclic) a = (a + cells) % cells, b = (b + cells) % cells;
+        uint word = synth_hash(l, SYNTH_GULLY_STREAM, a, b);
+        float qx = u - ((float)di + (0.5f + SYNTH_GULLY_JITTER * synth_low(word)));
+        float qy = v - ((float)dj + (0.5f + SYNTH_GULLY_JITTER * synth_high(word)));
+        float w = max(0.0f, 1.0f - (qx * qx + qy * qy)), t = SYNTH_GULLY_CELL * (qx * nx + qy * ny);
+        t -= floor(t + 0.5f);
+        float weight = w * w;
+        cosine += weight * synth_sine(0.25f - fabs(t));
+        sine += weight * synth_sine(fabs(t) <= 0.25f ? t : copysign(0.5f, t) - t);
+        weights += weight;
+    }
+    float length = sqrt(cosine * cosine + sine * sine);
+    float agree = min(1.0f, length / (SYNTH_GULLY_AGREEMENT * weights + SYNTH_GULLY_AGREEMENT_LEAST));
+    return agree * agree * (3.0f - 2.0f * agree) * synth_gully_profile(synth_half_turns(sine, cosine));
+}
+
+// What gullies leave of the noise of d at a sample, and how deep they are there, metres.
+void synth_wear(const Launch *l, Ground g, Biases bias, float *calm, float *depth) {
+    float painted = l->erosion * (1.0f + min(bias.erosion, 0.0f)) + max(bias.erosion, 0.0f), level = (float)l->level;
+    float strength = min(painted, MAX_EROSION), shallow = min(strength, 1.0f);
+    float steep = STEP(GULLY_FLAT, g.guide_slope) * min(g.guide_slope, SYNTH_GULLY_STEEP);
+    float held = l->hold * (1.0f - STEP(GULLY_HOLD, max(0.0f, l->far * bias.far - l->margin) / l->wave));
+    float back = SYNTH_GULLY_CALM_GAIN * STEP(GULLY_CALM_LEVELS, level);
+    float less = (SYNTH_GULLY_CALM - back) / SYNTH_GULLY_STEEP * shallow * steep;
+    *calm = (1.0f - less) * (1.0f - (1.0f - STEP(GULLY_QUIET_LEVELS, level)) * shallow * held);
+    float crest = 1.0f - l->hold * STEP(GULLY_CREST, -g.concavity);
+    float foot = 1.0f - SYNTH_GULLY_FOOT_SHARE * STEP(GULLY_FOOT, g.concavity);
+    *depth = l->depth * strength * steep * crest * foot * (1.0f - held);
+}
+
 State synth_landscape(const Launch *l, Ground g, State before, Biases bias, int i, int j) {
     State t = synth_targets(l, g), s;
     uint words[4];
@@ -60,8 +124,17 @@ State synth_landscape(const Launch *l, Ground g, State before, Biases bias, int 
     float share = SYNTH_FLAT_SHARE + (1.0f - SYNTH_FLAT_SHARE) * STEP(AMPLITUDE_SLOPE, g.guide_slope);
     float amplitude = max(0.0f, l->amplitude * share + bias.amplitude);
     float size = amplitude * exp2(-(float)l->level * clamp(exponent, SYNTH_H_RANGE_FROM, SYNTH_H_RANGE_TO));
-    if (l->surveyed) size *= clamp((float)l->level - bias.survey, 0.0f, 1.0f);
-    s.d = before.d + size * synth_full(words[0]);
+    float heard = l->surveyed ? clamp((float)l->level - bias.survey, 0.0f, 1.0f) : 1.0f;
+    if (l->surveyed) size *= heard;
+    if (!l->eroded) {
+        s.d = before.d + size * synth_full(words[0]);
+        return s;
+    }
+    float calm, depth;
+    synth_wear(l, g, bias, &calm, &depth);
+    s.d = before.d + size * calm * synth_full(words[0]);
+    depth *= heard;
+    if (depth != 0.0f) s.d += depth * synth_gullies(l, g, i, j);
     return s;
 }
 
@@ -107,6 +180,7 @@ __kernel void synthesise(__global const Launch *launch, __global const float *gr
         synth_channel(&l, grids, 0, wi, wj), synth_channel(&l, grids, 1, wi, wj), synth_channel(&l, grids, 2, wi, wj),
         synth_channel(&l, grids, 3, wi, wj), synth_channel(&l, grids, 4, wi, wj), synth_channel(&l, grids, 5, wi, wj),
         l.surveyed ? synth_channel(&l, grids, 6, wi, wj) : SYNTH_BASE_SURVEY,
+        l.eroded ? synth_channel(&l, grids, 7, wi, wj) : 0.0f, l.eroded ? synth_channel(&l, grids, 8, wi, wj) : 1.0f,
     };
     State s;
     if (l.rule == 0) s = synth_landscape(&l, ground, before, bias, wi, wj);

@@ -95,7 +95,8 @@ fn noise_of(level: u32, i: vec2i, j: vec2i) -> SynthNoise {
   let keys = site.levels[level].keys;
   let u = bitcast<vec2u>(i);
   let v = bitcast<vec2u>(j);
-  return SynthNoise(synth_words(keys.x, u, v), synth_words(keys.y, u, v), synth_words(keys.z, u, v), synth_words(keys.w, u, v));
+  return SynthNoise(
+    synth_words(keys.x, u, v), synth_words(keys.y, u, v), synth_words(keys.z, u, v), synth_words(keys.w, u, v), i, j);
 }
 
 // Along one axis: the two nodes of the channels' grid from which two neighbouring samples take their values, and where
@@ -119,9 +120,10 @@ fn channel_place(level: u32, index: vec2i) -> ChannelPlace {
   return ChannelPlace(low, low + 1u, vec2f(i - (low << shift)) / f32(1u << shift));
 }
 
-// Of a node: (amplitude, roughness), (snow, grass), (forest, wetness), and with data (survey, nothing).
+// Of a node: (amplitude, roughness), (snow, grass), (forest, wetness), and with data or gullies (survey, far), (erosion,
+// nothing).
 fn channel_value(row: u32, col: u32, which: u32) -> vec2f {
-  return channels[(3u + site.surveyed) * (row * ((1u << site.channel_bits) + 1u) + col) + which];
+  return channels[site.stride * (row * ((1u << site.channel_bits) + 1u) + col) + which];
 }
 
 fn along(a: f32, b: f32, part: vec2f) -> vec2f {
@@ -148,6 +150,10 @@ fn asked_of(level: u32, i: vec2i, j: vec2i) -> Asked {
     out.amplitude = vec4f(channels[0].x);
     out.roughness = vec4f(channels[0].y);
     if (site.surveyed == 1u) { out.survey = vec4f(channels[3].x); }
+    if (site.eroded == 1u) {
+      out.far = vec4f(channels[3].y);
+      out.erosion = vec4f(channels[4].x);
+    }
     return out;
   }
   let x = channel_place(level, i);
@@ -163,7 +169,12 @@ fn asked_of(level: u32, i: vec2i, j: vec2i) -> Asked {
     out.forest = plants.low;
     out.wetness = plants.high;
   }
-  if (site.surveyed == 1u) { out.survey = channel_pair(x, y, 3u).low; }
+  if (site.stride > 3u) {
+    let places = channel_pair(x, y, 3u);
+    out.survey = places.low;
+    out.far = places.high;
+    if (site.eroded == 1u) { out.erosion = channel_pair(x, y, 4u).low; }
+  }
   return out;
 }
 

@@ -24,13 +24,24 @@ fn rule(site: SynthSite, level: u32, ground: Ground, before: SynthState, asked: 
   let exponent = clamp(
     out.h + SYNTH_ROUGHNESS_TO_H * (0.5 - asked.roughness) + SYNTH_SNOW_TO_H * out.snow,
     vec4f(SYNTH_H_RANGE_FROM), vec4f(SYNTH_H_RANGE_TO));
-  let size = amplitude * exp2(-f32(level) * exponent);
+  var size = amplitude * exp2(-f32(level) * exponent);
   out.finer = size * exp2(-exponent);
+  var heard = vec4f(1.0);
   if (site.surveyed == 1u) {
-    out.d = before.d + size * audible(f32(level), asked.survey) * noise_full(noise.a);
+    heard = audible(f32(level), asked.survey);
+    size *= heard;
     out.finer *= hushed(f32(level), asked.survey, exponent);
-  } else {
-    out.d = before.d + size * noise_full(noise.a);
   }
+  if (site.eroded == 0u) {
+    out.d = before.d + size * noise_full(noise.a);
+    return out;
+  }
+  let worn = wear(site, level, ground, asked);
+  out.d = before.d + size * worn.calm * noise_full(noise.a);
+  let depth = worn.depth * heard;
+  if (any(depth != vec4f(0.0))) { out.d += depth * gullies(site, level, ground, noise.i, noise.j); }
+  var below = worn.finer;
+  if (site.surveyed == 1u) { below *= hushed(f32(level), asked.survey, vec4f(-log2(SYNTH_GULLY_FALL))); }
+  out.finer += below;
   return out;
 }

@@ -6,6 +6,10 @@ struct SynthLevel {
   tie: f32,               // how strictly channels follow their targets
   channel_noise: f32,
   smoothness_noise: f32,
+  gully_key: u32,         // of the stream of gullies
+  wave: f32,              // wavelength of the level's octave of gullies, metres
+  depth: f32,             // its depth on a slope of 1, metres; level 0 has none, and tells that of level 1 by it
+  pad0: f32,
 };
 
 struct SynthSite {
@@ -24,7 +28,15 @@ struct SynthSite {
   surveyed: u32,          // 1: elevation data hold detail back somewhere
   relief: f32,            // elevations are shares of it, metres
   shore: f32,             // those of wet shores of this
+  stride: u32,            // pairs of a node of the channels: 3, or 5 where there are data or gullies
+  eroded: u32,            // 1: there are gullies somewhere
+  gully_side: i32,        // side of a cell of their lattice, samples
+  erosion: f32,           // their strength
+  hold: f32,              // how strictly what strokes fix keeps its height, 0..1
+  far: f32,               // distance of which the channel is a share, metres
+  far_margin: f32,        // what is taken off it, metres
   pad0: u32,
+  pad1: u32,
   levels: array<SynthLevel, 18>,
 };
 
@@ -45,6 +57,8 @@ struct Asked {
   forest: vec4f,
   wetness: vec4f,
   survey: vec4f,          // level whose spacing is that of the finest elevation data
+  far: vec4f,             // distance from what strokes fix, 0..1
+  erosion: vec4f,         // -1..1
 };
 
 struct SynthState {
@@ -71,10 +85,12 @@ fn hushed(level: f32, survey: vec4f, exponent: vec4f) -> vec4f {
   return exp2(-exponent * whole) * (1.0 - (silent - whole) * (1.0 - exp2(-exponent)));
 }
 
-// Words of the four streams.
+// Words of the four streams, and the children's columns and rows, as the hash takes them.
 struct SynthNoise {
   a: vec4u,
   b: vec4u,
   c: vec4u,
   d: vec4u,
+  i: vec2i,
+  j: vec2i,
 };

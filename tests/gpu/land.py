@@ -38,6 +38,13 @@ def surveyed(seed: int) -> dict[str, NDArray[np.float32]]:
     return {"survey": np.maximum(levels, -1).astype(np.float32)}
 
 
+def fixed(seed: int) -> dict[str, NDArray[np.float32]]:
+    """Paint of gullies, and distances from what strokes fix."""
+    rng = np.random.default_rng(seed)
+    far, erosion = rng.uniform(0, 1, (257, 257)), rng.uniform(-1, 1, (17, 17))
+    return {"far": far.astype(np.float32), "erosion": erosion.astype(np.float32)}
+
+
 def painted(seed: int) -> dict[str, NDArray[np.float32]]:
     """Channels as strokes leave them, on grids of several sizes, one of them finer than level 0."""
     rng = np.random.default_rng(seed)

@@ -17,11 +17,14 @@ VECTORS = Path(__file__).parents[1] / "vectors" / "synthesis.json"
 def check(found: list[dict[str, Any]], vectors: dict[str, Any]) -> None:
     """Each place is within the vectors' tolerance, or within what float32 gives there."""
     assert len(found) == len(vectors["places"])
+    # Slopes turn gullies, and what slopes are wrong by is rounding over the cell.
+    worn = {site["name"] for site in vectors["sites"] if site["erosion"] > 0}
     for place in found:
+        metres = (3 if place["site"] in worn else 1) * vectors["metres"]
         # A few units in the last place of float32 heights, gathered over the levels.
         rounding = 5 * 2.0**-23 * max(abs(height) for height in place["range"])
         assert place["ground"] <= max(vectors["metres"] * place["cellM"], rounding), place
-        assert place["detail"] <= max(vectors["metres"] * place["cellM"], rounding), place
+        assert place["detail"] <= max(metres * place["cellM"], rounding), place
         # Rounding of heights over the cell is what slopes are wrong by.
         assert place["halves"] <= vectors["unorm"] + STEEPEST * 65535 * rounding / place["cellM"], place
         assert place["bounds"] == place["range"], place

@@ -40,8 +40,8 @@ def channels(seed: int = 5) -> dict[str, Grid]:
     """Something of every channel, on grids of several sizes."""
     rng = np.random.default_rng(seed)
     out = {}
-    ranges = {"amplitude": (-2.0, 20.0), "roughness": (0.0, 1.0), "survey": (-1.0, 4.0)}
-    for side, name in zip((2, 3, 5, 9, 17, 5, 9), Biases._fields, strict=True):
+    ranges = {"amplitude": (-2.0, 20.0), "roughness": (0.0, 1.0), "survey": (-1.0, 4.0), "far": (0.0, 1.0)}
+    for side, name in zip((2, 3, 5, 9, 17, 5, 9, 3, 65), Biases._fields, strict=True):
         low, high = ranges.get(name, (-1.0, 1.0))
         out[name] = rng.uniform(low, high, (side, side)).astype(np.float32)
     return out

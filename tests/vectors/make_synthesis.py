@@ -50,6 +50,7 @@ def fields(name: str, **changes: Any) -> dict[str, Any]:
     out: dict[str, Any] = {
         "name": name, "size_m": SIZE_M, "seed": 1, "detail": 1.0, "rule": "landscape", "look": "natural",
         "sea_level_m": None, "cyclic": False, "place": None, "ground": None, "solved": 0, "channels": {},
+        "erosion": 0.0, "erosion_scale": 10.0, "hold": 1.0,
     }  # fmt: skip
     return out | changes
 
@@ -72,6 +73,16 @@ def survey(seed: int) -> dict[str, list[list[float]]]:
     return {"survey": (np.round(levels * 256).astype(int) / 256).tolist()}
 
 
+def fixed(seed: int) -> dict[str, list[list[float]]]:
+    """Paint of gullies, and distances from strokes that are drawn anywhere."""
+    rng = np.random.default_rng(seed)
+    far, erosion = rng.uniform(0.0, 1.0, (129, 129)), rng.uniform(-1.0, 1.0, (9, 9))
+    return {
+        "erosion": (np.round(erosion * 1024).astype(int) / 1024).tolist(),
+        "far": (np.round(far * 1024).astype(int) / 1024).tolist(),
+    }
+
+
 SITES = (
     fields("hill", sea_level_m=5.0, solved=1),
     fields("painted", seed=4294967295, detail=2.5, look="alpine", channels=strokes(5)),
@@ -86,6 +97,9 @@ SITES = (
         channels=strokes(9) | survey(9),
     ),
     fields("laid", seed=11, rule="plain", ground=[200.0, 1400.0]),
+    fields("gullies", seed=21, solved=1, erosion=1.0, erosion_scale=9.0, hold=0.75, channels=fixed(21)),
+    fields("worn", seed=22, erosion=1.75, channels=strokes(22) | survey(22) | {"erosion": fixed(22)["erosion"]}),
+    fields("rilled", cyclic=True, seed=23, detail=0.0, erosion=0.5, erosion_scale=12.0),
     fields("wide", size_m=65536.0, seed=123456789, look="paper"),
 )
 
@@ -104,6 +118,7 @@ def site_of(data: dict[str, Any]) -> Site:
         size, data["seed"], guides, channels, data["detail"], data["rule"], data["look"], data["sea_level_m"],
         data["cyclic"], None if data["place"] is None else data["place"]["lat_deg"],
         None if data["ground"] is None else tuple(data["ground"]),
+        erosion=data["erosion"], erosion_scale=data["erosion_scale"], hold=data["hold"],
     )  # fmt: skip
 
 
@@ -177,11 +192,12 @@ def document() -> dict[str, Any]:
     sites = {data["name"]: site_of(data) for data in described}
     steps = []
     for k, name in enumerate(("painted", "hill", "painted", "smooth", "plain", "cyclic", "wide", "painted",
-                              "surveyed")):  # fmt: skip
+                              "surveyed", "gullies", "worn", "rilled", "gullies")):  # fmt: skip
         site = sites[name]
-        level = (2, 3, 6, 4, 5, 7, 12, 17, 6)[k]
+        level = (2, 3, 6, 4, 5, 7, 12, 17, 6, 4, 3, 5, 16)[k]
         n = grid.cells(level)
-        tile = tile_window(level, (0, 3, 63, 5, 9, 127, 4095, 70000, 40)[k], (1, 7, 20, 15, 0, 127, 17, 130000, 41)[k])
+        tile = tile_window(level, (0, 3, 63, 5, 9, 127, 4095, 70000, 40, 9, 2, 31, 40000)[k],
+                           (1, 7, 20, 15, 0, 127, 17, 130000, 41, 3, 7, 31, 20000)[k])  # fmt: skip
         window = Window(level, max(tile.r0, -2), min(tile.r0 + 9, n + 3), tile.c1 - 8, tile.c1)
         steps.append(step(site, name, window, k))
     return {

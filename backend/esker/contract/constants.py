@@ -69,6 +69,10 @@ SURVEY_QUANTA: Final = 256
 """Quantisation steps of one level of the survey channel."""
 BASE_SURVEY: Final = -1.0
 """The survey channel where no elevation grid lies: below level 0, so that no detail is held back there."""
+FAR_QUANTA: Final = 1024
+"""Quantisation steps of the channel of distances, of which 1 is ``fractal.FAR_SHARE`` of the domain's side."""
+BASE_FAR: Final = 1.0
+"""The channel of distances where no stroke fixes the ground: so far away that no gully is held."""
 
 # --- elevation grids (DESIGN 11) --------------------------------------------------------------------------------
 
@@ -96,6 +100,15 @@ strokes reach ``DOMAIN_MARGIN`` = 10, so their offsets from any layer fit, with 
 DEFAULT_DETAIL: Final = 1.0
 MAX_DETAIL: Final = 4.0
 """Strength of the natural detail: 0 takes it away, 1 is the rule's own."""
+DEFAULT_EROSION: Final = 0.0
+"""Strength of the gullies of documents that do not say: those of before there were any keep their ground."""
+MAX_EROSION: Final = 2.0
+MIN_EROSION_SCALE: Final = 7.0
+DEFAULT_EROSION_SCALE: Final = 10.0
+MAX_EROSION_SCALE: Final = 14.0
+"""Wavelength of the gullies of a level, in its cells: shorter waves are not resolved, longer ones are no gullies."""
+DEFAULT_HOLD: Final = 1.0
+"""How strictly what strokes fix keeps its height under gullies and noise: 1 wholly, 0 not at all."""
 
 # --- lakes (docs/renderer.md, "Lakes") ---------------------------------------------------------------------------
 

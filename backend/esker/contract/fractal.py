@@ -18,7 +18,7 @@ HASH_STEP: Final = 0x9E3779B9
 HASH_MULTIPLIER_1: Final = 0x7FEB352D
 HASH_MULTIPLIER_2: Final = 0x846CA68B
 HASH_STREAMS: Final = 8
-"""Streams of numbers that a level may have; four are used, two half-words each but the first."""
+"""Streams of numbers that a level may have; five are used, two half-words each but the first."""
 
 # --- detail height --------------------------------------------------------------------------------------------------
 
@@ -36,6 +36,70 @@ H_RANGE: Final = (0.75, 2.5)
 PAINT_MORE: Final = 2.0
 PAINT_LESS: Final = 1.0
 """Amplitude that paint of value 1 adds, and of value -1 takes away, both times ALPHA s_0: the latter all there is."""
+
+# --- gullies: one octave a level of waves that run down the slope (docs/synthesis.md, "Gullies") ---------------------
+
+GULLY_STREAM: Final = 4
+"""Stream of the hash that places the pivots of the waves."""
+GULLY_CELL: Final = 1.5
+"""Side of a cell of the lattice of pivots, in wavelengths."""
+GULLY_CYCLIC_SIDE: Final = 16
+"""Side of such a cell in samples where the domain is cyclic, whatever the scale: it divides every level's side."""
+GULLY_JITTER: Final = 0.42
+"""How far a pivot may lie from the middle of its cell, in cells."""
+GULLY_DEPTH: Final = 0.45
+"""Depth of the octave of level 1 in wavelengths, on a slope of 1."""
+GULLY_GAIN: Final = 0.75
+"""Depth of an octave in its own wavelengths, as a share of that of the level above it."""
+GULLY_FLAT: Final = (0.04, 0.35)
+"""Slopes of the drawn ground: there are no gullies below the first, all of them above the second."""
+GULLY_STEEP: Final = 0.8
+"""Slope from which gullies get no deeper."""
+GULLY_CREST: Final = (0.3, 1.0)
+"""Convexity, the negative of v, over which crests are held."""
+GULLY_FOOT: Final = (0.3, 1.0)
+GULLY_FOOT_SHARE: Final = 0.4
+"""Concavity over which gullies lose this share of their depth, or water would stand in every one of them."""
+GULLY_HOLD: Final = (0.04, 0.45)
+"""Distance from what strokes fix, in wavelengths, over which gullies get their depth."""
+GULLY_TURN: Final = 0.02
+"""Slope below which waves stretch instead of turning, or level places were singular points of their direction."""
+GULLY_RIDGE: Final = 0.1
+GULLY_BED: Final = 0.05
+"""Rounding of ridges and of beds, in half waves."""
+GULLY_MIDDLE: Final = 0.45
+"""What ridges stand above the drawn ground, in depths: an octave's mean is nearly 0."""
+GULLY_AGREEMENT: Final = 0.4
+GULLY_AGREEMENT_LEAST: Final = 0.05
+"""Length of the sum of waves, as a share of their weights and added to it, from which an octave has its full depth.
+Where waves cancel out there is no phase, and nothing is cut: such a point would hang on the last bit of a number."""
+GULLY_CALM: Final = 0.85
+GULLY_CALM_GAIN: Final = 0.65
+GULLY_CALM_LEVELS: Final = (2.0, 6.0)
+"""Share of the noise of d that gullies take away on coarse levels, and how much of it comes back between these."""
+GULLY_QUIET_LEVELS: Final = (5.0, 8.0)
+"""Levels between which the noise of d comes back on what strokes fix: finer noise moves no crest by a decimetre."""
+GULLY_MOST: Final = 0.55
+"""The most that an octave moves the ground, in its depths: the rest of ``GULLY_MIDDLE``."""
+GULLY_FALL: Final = GULLY_GAIN / 2
+"""What the most that an octave adds falls by from level to level, metres to metres: for bounds."""
+GULLY_STEEPER: Final = 1.25
+"""How much steeper the guide of finer levels is taken to be between the samples of this one: for bounds."""
+GULLY_SINE_1: Final = 6.28318531
+GULLY_SINE_3: Final = -41.3416962
+GULLY_SINE_5: Final = 81.602208
+GULLY_SINE_7: Final = -76.575127
+GULLY_SINE_9: Final = 39.710612
+"""Odd polynomial of the sine of a phase in turns, on a quarter of a turn; its error is at most 3e-7."""
+GULLY_ARC_1: Final = 0.318302140
+GULLY_ARC_3: Final = -0.105865160
+GULLY_ARC_5: Final = 0.061527325
+GULLY_ARC_7: Final = -0.036854605
+GULLY_ARC_9: Final = 0.016527812
+GULLY_ARC_11: Final = -0.003637512
+"""Odd polynomial of the arc tangent in half turns, on 0..1; its error is at most 6e-7, and at 1 it is a quarter."""
+FAR_SHARE: Final = 1.0 / 16.0
+"""What the channel ``far`` is a share of, as a share of the domain's side: beyond it no octave of any scale is held."""
 
 # --- smoothness exponent h, a fractal itself ------------------------------------------------------------------------
 

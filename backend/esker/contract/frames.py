@@ -57,6 +57,10 @@ class Channel(IntEnum):
     """The elevation layers' ground, in the quanta of heights: what is drawn is HEIGHT + BASE."""
     SURVEY = 8
     """Level whose spacing is that of the finest elevation data here; detail begins below it."""
+    EROSION = 9
+    """What is painted of gullies."""
+    FAR = 10
+    """Distance from what strokes fix, as a share of ``fractal.FAR_SHARE`` of the domain's side, 1 beyond."""
 
 
 FRAME_HEADER: Final = np.dtype(

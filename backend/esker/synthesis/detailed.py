@@ -18,9 +18,11 @@ from esker.contract import (
     AMPLITUDE_QUANTA_PER_M,
     BASE_AMPLITUDE_M,
     BASE_BIAS,
+    BASE_FAR,
     BASE_ROUGHNESS,
     BASE_SURVEY,
     BIAS_QUANTA,
+    FAR_QUANTA,
     ROUGHNESS_QUANTA,
     SURVEY_QUANTA,
     TILE_CELLS,
@@ -46,7 +48,8 @@ QUANTA: Final = {
     "amplitude": (AMPLITUDE_QUANTA_PER_M, BASE_AMPLITUDE_M),
     "roughness": (ROUGHNESS_QUANTA, BASE_ROUGHNESS),
     "survey": (SURVEY_QUANTA, BASE_SURVEY),
-} | dict.fromkeys(("snow", "grass", "forest", "wetness"), (BIAS_QUANTA, BASE_BIAS))
+    "far": (FAR_QUANTA, BASE_FAR),
+} | dict.fromkeys(("snow", "grass", "forest", "wetness", "erosion"), (BIAS_QUANTA, BASE_BIAS))
 
 
 class Maker(Protocol):

@@ -16,7 +16,7 @@ from esker.contract import BASE_ROUGHNESS, BASE_SURVEY, emit
 from esker.contract import fractal as f
 from esker.resources import SHADERS
 from esker.synthesis.interpolate import Window
-from esker.synthesis.rules import RULES
+from esker.synthesis.rules import RULES, gullies
 from esker.synthesis.rules.targets import tie
 from esker.synthesis.site import BASES, Biases, Site
 from esker.synthesis.state import WORDS, pack, unpack
@@ -26,11 +26,13 @@ SOURCES: Final = ("synthesis.cl", "synthesis_rules.cl")
 GROUP: Final = 64
 """Work-groups are always full: what compilers do with the rest of a row may round differently."""
 LAUNCH: Final = np.dtype(
-    [(name, "<i4") for name in ("level", "rule", "cyclic", "own_guide", "surveyed", "row", "col", "rows", "cols",
-                                "parent_row", "parent_col", "parent_rows", "parent_cols")]
+    [(name, "<i4") for name in ("level", "rule", "cyclic", "own_guide", "surveyed", "eroded", "row", "col", "rows",
+                                "cols", "parent_row", "parent_col", "parent_rows", "parent_cols")]
     + [("seed", "<u4"), ("sea", "<i4"), ("cells", "<i4"), ("shift", "<i4")]
     + [(name, "<f4") for name in ("spacing", "relief", "shore", "zero", "amplitude", "snow_line", "tree_line",
                                   "plants", "tie", "grain", "strength")]
+    + [("gully_side", "<i4")]
+    + [(name, "<f4") for name in ("erosion", "hold", "wave", "depth", "far", "margin")]
     + [("offset", "<i4", len(Biases._fields)), ("side", "<i4", len(Biases._fields))]
 )  # fmt: skip
 """``Launch`` of synthesis.cl."""
@@ -131,7 +133,9 @@ def _launch(site: Site, parent: Window, child: Window, offsets: list[int], sides
         "plants": look.plants, "tie": tie(level),
         "grain": f.SMOOTHNESS_NOISE * 2.0 ** (-f.SMOOTHNESS_NOISE_DECAY * level),
         "strength": f.CHANNEL_NOISE * 2.0 ** (-f.CHANNEL_NOISE_DECAY * level),
-        "offset": offsets, "side": sides,
+        "eroded": site.eroded and level > 0, "gully_side": site.gully_side, "erosion": site.erosion, "hold": site.hold,
+        "wave": gullies.wave_m(site, level), "depth": gullies.depth_m(site, level), "far": site.far_m,
+        "margin": site.far_margin_m, "offset": offsets, "side": sides,
     }  # fmt: skip
     for name, value in values.items():
         out[name] = value

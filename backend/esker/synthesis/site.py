@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple, get_args
@@ -10,8 +11,26 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from esker import contract, grid
-from esker.contract import BASE_ROUGHNESS, BASE_SURVEY, TILE_CELLS
-from esker.contract.fractal import ALPHA, LOOKS, LookRule, relief_m, shore_m, zero_m
+from esker.contract import (
+    BASE_FAR,
+    BASE_ROUGHNESS,
+    BASE_SURVEY,
+    DEFAULT_EROSION,
+    DEFAULT_EROSION_SCALE,
+    DEFAULT_HOLD,
+    TILE_CELLS,
+)
+from esker.contract.fractal import (
+    ALPHA,
+    FAR_SHARE,
+    GULLY_CELL,
+    GULLY_CYCLIC_SIDE,
+    LOOKS,
+    LookRule,
+    relief_m,
+    shore_m,
+    zero_m,
+)
 from esker.synthesis.interpolate import Window
 from esker.synthesis.state import Array, State
 
@@ -35,10 +54,11 @@ class Ground(NamedTuple):
 
 
 class Biases(NamedTuple):
-    """What strokes ask for, and what elevation data hold back.
+    """What strokes ask for, what elevation data hold back, and how far it is to what strokes fix.
 
     ``amplitude``: metres; ``roughness``: 0..1; ``survey``: the level whose spacing is that of the finest data here,
-    BASE_SURVEY where there are none; the rest -1..1, and 0 where none asks.
+    BASE_SURVEY where there are none; ``far``: 0..1, a distance as a share of FAR_SHARE of the domain's side, BASE_FAR
+    beyond; the rest -1..1, and 0 where none asks.
     """
 
     amplitude: Array
@@ -48,9 +68,11 @@ class Biases(NamedTuple):
     forest: Array
     wetness: Array
     survey: Array
+    erosion: Array
+    far: Array
 
 
-BASES: Final = {"roughness": BASE_ROUGHNESS, "survey": BASE_SURVEY}
+BASES: Final = {"roughness": BASE_ROUGHNESS, "survey": BASE_SURVEY, "far": BASE_FAR}
 """Channels that are not 0 where nothing is asked."""
 
 Rule = Callable[["Site", Ground, State, Window, Biases], State]
@@ -65,7 +87,9 @@ class Site:
 
     ``guides``: heights of levels 0..G as sent on the wire, metres, (N_l, N_l) float32; ``channels``: grids (n, n) over
     the whole domain, corners on corners, n - 1 a power of two, by the names of ``Biases``; one that is missing is its
-    base everywhere. ``detail``: strength, 0..4. ``sea_level_m``: None where there is no sea. ``cyclic``: the domain's
+    base everywhere. ``detail``: strength, 0..4. ``erosion``: strength of the gullies, 0..2; ``erosion_scale``: their
+    wavelength in cells; ``hold``: how strictly what strokes fix keeps its height, 0..1. ``sea_level_m``: None where
+    there is no sea. ``cyclic``: the domain's
     east edge is its west edge, north its south. ``lat_deg``: where on Earth it lies, if anywhere. ``ground_m``: lowest
     and highest sample of its elevation layers, None without any. ``dtype``: of the arithmetic. Raises ValueError for
     what does not fit.
@@ -83,6 +107,9 @@ class Site:
     lat_deg: float | None = None
     ground_m: tuple[float, float] | None = None
     dtype: DTypeLike = np.float64
+    erosion: float = DEFAULT_EROSION
+    erosion_scale: float = DEFAULT_EROSION_SCALE
+    hold: float = DEFAULT_HOLD
 
     def __post_init__(self) -> None:
         if not self.guides:
@@ -129,6 +156,27 @@ class Site:
     def surveyed(self) -> bool:
         """Whether elevation data hold detail back anywhere."""
         return "survey" in self.channels
+
+    @property
+    def eroded(self) -> bool:
+        """Whether gullies are asked for anywhere."""
+        return self.erosion > 0 or ("erosion" in self.channels and bool((self.channels["erosion"] > 0).any()))
+
+    @property
+    def gully_side(self) -> int:
+        """Side of a cell of the lattice of gullies, in samples of any level. It is whole: every device has the same."""
+        return GULLY_CYCLIC_SIDE if self.cyclic else math.floor(GULLY_CELL * self.erosion_scale + 0.5)
+
+    @property
+    def far_m(self) -> float:
+        """Distance of which the channel ``far`` is a share, metres."""
+        return FAR_SHARE * self.size_m
+
+    @property
+    def far_margin_m(self) -> float:
+        """What is taken off a distance, metres: half a cell of its grid, as bilinear values on a line are up to it."""
+        cells = len(self.channels["far"]) - 1 if "far" in self.channels else TILE_CELLS
+        return self.size_m / (2 * max(TILE_CELLS, cells))
 
     @property
     def amplitude_m(self) -> float:

@@ -1,4 +1,4 @@
-"""Noise amplitude, roughness, what is painted and how fine the data are, as levels of integers (DESIGN 5.4, 6).
+"""Noise amplitude, roughness, what is painted, how fine data and how far strokes are: levels of integers (DESIGN 5.4).
 
 A channel has the same quantum on every level, and its base value (what it is where no stroke says otherwise) is
 subtracted, so untouched ground is all zeros. Its levels end ``CHANNEL_LEVELS_BELOW`` below those of the heights.
@@ -16,10 +16,12 @@ from esker.contract import (
     AMPLITUDE_QUANTA_PER_M,
     BASE_AMPLITUDE_M,
     BASE_BIAS,
+    BASE_FAR,
     BASE_ROUGHNESS,
     BASE_SURVEY,
     BIAS_QUANTA,
     CHANNEL_LEVELS_BELOW,
+    FAR_QUANTA,
     QUANTA_PER_CELL,
     ROUGHNESS_QUANTA,
     SURVEY_QUANTA,
@@ -32,17 +34,19 @@ from esker.tiles.pyramid import Pyramid
 UNIT_SIZE_M: Final = float(TILE_CELLS * QUANTA_PER_CELL)
 """A domain of this size has a quantum of exactly 2^-l on level l: values scaled by powers of two become integers by
 the rules of the heights, dead zone and steadiness included, without a rounding of their own."""
-BIASES: Final = (Channel.SNOW, Channel.GRASS, Channel.FOREST, Channel.WETNESS)
+BIASES: Final = (Channel.SNOW, Channel.GRASS, Channel.FOREST, Channel.WETNESS, Channel.EROSION)
 QUANTA: Final = {
     Channel.AMPLITUDE: AMPLITUDE_QUANTA_PER_M,
     Channel.ROUGHNESS: ROUGHNESS_QUANTA,
     Channel.SURVEY: SURVEY_QUANTA,
+    Channel.FAR: FAR_QUANTA,
     **dict.fromkeys(BIASES, BIAS_QUANTA),
 }
 BASE: Final = {
     Channel.AMPLITUDE: BASE_AMPLITUDE_M,
     Channel.ROUGHNESS: BASE_ROUGHNESS,
     Channel.SURVEY: BASE_SURVEY,
+    Channel.FAR: BASE_FAR,
     **dict.fromkeys(BIASES, BASE_BIAS),
 }
 
@@ -53,7 +57,7 @@ def channel_levels(levels: int) -> int:
 
 
 def values(samples: Ints, channel: Channel) -> NDArray[np.float32]:
-    """Samples of a channel as metres (amplitude), 0..1 (roughness), -1..1 (a bias) or a level (survey).
+    """Samples of a channel as metres (amplitude), 0..1 (roughness), -1..1 (a bias), a level (survey) or 0..1 (far).
 
     float32, same shape. Raises KeyError for heights and their base.
     """

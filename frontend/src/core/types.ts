@@ -99,6 +99,10 @@ export interface ChannelView {
   readonly wetness: ChannelGrid;
   /** Level whose spacing is that of the finest elevation data, BASE_SURVEY where there are none. */
   readonly survey: ChannelGrid;
+  /** What paint adds to gullies or takes from them, -1..1. */
+  readonly erosion: ChannelGrid;
+  /** Distance from what strokes fix, 0..1 of a share of the domain; 1 beyond. */
+  readonly far: ChannelGrid;
 }
 
 /** A binary frame after decoding (net/decode.ts), applied atomically by tiles/store.ts. */

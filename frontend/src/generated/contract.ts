@@ -70,6 +70,10 @@ export const SURVEY_QUANTA = 256 as const;
 
 export const BASE_SURVEY = -1.0 as const;
 
+export const FAR_QUANTA = 1024 as const;
+
+export const BASE_FAR = 1.0 as const;
+
 export const PATCH_SAMPLES = 32 as const;
 
 export const PATCH_KERNEL_CELLS = 28 as const;
@@ -97,6 +101,18 @@ export const LAYER_HEIGHT_MARGIN = 5.0 as const;
 export const DEFAULT_DETAIL = 1.0 as const;
 
 export const MAX_DETAIL = 4.0 as const;
+
+export const DEFAULT_EROSION = 0.0 as const;
+
+export const MAX_EROSION = 2.0 as const;
+
+export const MIN_EROSION_SCALE = 7.0 as const;
+
+export const DEFAULT_EROSION_SCALE = 10.0 as const;
+
+export const MAX_EROSION_SCALE = 14.0 as const;
+
+export const DEFAULT_HOLD = 1.0 as const;
 
 export const LAKE_LEVEL = 2 as const;
 
@@ -284,6 +300,92 @@ export const SYNTH_PAINT_MORE = 2.0;
 
 export const SYNTH_PAINT_LESS = 1.0;
 
+export const SYNTH_GULLY_STREAM = 4;
+
+export const SYNTH_GULLY_CELL = 1.5;
+
+export const SYNTH_GULLY_CYCLIC_SIDE = 16;
+
+export const SYNTH_GULLY_JITTER = 0.42;
+
+export const SYNTH_GULLY_DEPTH = 0.45;
+
+export const SYNTH_GULLY_GAIN = 0.75;
+
+export const SYNTH_GULLY_FLAT_FROM = 0.04;
+
+export const SYNTH_GULLY_FLAT_TO = 0.35;
+
+export const SYNTH_GULLY_STEEP = 0.8;
+
+export const SYNTH_GULLY_CREST_FROM = 0.3;
+
+export const SYNTH_GULLY_CREST_TO = 1.0;
+
+export const SYNTH_GULLY_FOOT_FROM = 0.3;
+
+export const SYNTH_GULLY_FOOT_TO = 1.0;
+
+export const SYNTH_GULLY_FOOT_SHARE = 0.4;
+
+export const SYNTH_GULLY_HOLD_FROM = 0.04;
+
+export const SYNTH_GULLY_HOLD_TO = 0.45;
+
+export const SYNTH_GULLY_TURN = 0.02;
+
+export const SYNTH_GULLY_RIDGE = 0.1;
+
+export const SYNTH_GULLY_BED = 0.05;
+
+export const SYNTH_GULLY_MIDDLE = 0.45;
+
+export const SYNTH_GULLY_AGREEMENT = 0.4;
+
+export const SYNTH_GULLY_AGREEMENT_LEAST = 0.05;
+
+export const SYNTH_GULLY_CALM = 0.85;
+
+export const SYNTH_GULLY_CALM_GAIN = 0.65;
+
+export const SYNTH_GULLY_CALM_LEVELS_FROM = 2.0;
+
+export const SYNTH_GULLY_CALM_LEVELS_TO = 6.0;
+
+export const SYNTH_GULLY_QUIET_LEVELS_FROM = 5.0;
+
+export const SYNTH_GULLY_QUIET_LEVELS_TO = 8.0;
+
+export const SYNTH_GULLY_MOST = 0.55;
+
+export const SYNTH_GULLY_FALL = 0.375;
+
+export const SYNTH_GULLY_STEEPER = 1.25;
+
+export const SYNTH_GULLY_SINE_1 = 6.28318531;
+
+export const SYNTH_GULLY_SINE_3 = -41.3416962;
+
+export const SYNTH_GULLY_SINE_5 = 81.602208;
+
+export const SYNTH_GULLY_SINE_7 = -76.575127;
+
+export const SYNTH_GULLY_SINE_9 = 39.710612;
+
+export const SYNTH_GULLY_ARC_1 = 0.31830214;
+
+export const SYNTH_GULLY_ARC_3 = -0.10586516;
+
+export const SYNTH_GULLY_ARC_5 = 0.061527325;
+
+export const SYNTH_GULLY_ARC_7 = -0.036854605;
+
+export const SYNTH_GULLY_ARC_9 = 0.016527812;
+
+export const SYNTH_GULLY_ARC_11 = -0.003637512;
+
+export const SYNTH_FAR_SHARE = 0.0625;
+
 export const SYNTH_SMOOTHNESS = 1.05;
 
 export const SYNTH_SMOOTHNESS_MIN = 0.72;
@@ -438,6 +540,8 @@ export const Channel = {
   WETNESS: 6,
   BASE: 7,
   SURVEY: 8,
+  EROSION: 9,
+  FAR: 10,
 } as const;
 
 export type SimpleOp =

@@ -35,6 +35,7 @@ import ruleSmooth from "@shaders/wgsl/rule_smooth.wgsl?raw";
 import sky from "@shaders/wgsl/sky.wgsl?raw";
 import stonesPlain from "@shaders/wgsl/stones_plain.wgsl?raw";
 import stonesRich from "@shaders/wgsl/stones_rich.wgsl?raw";
+import synthGullies from "@shaders/wgsl/synth_gullies.wgsl?raw";
 import synthHash from "@shaders/wgsl/synth_hash.wgsl?raw";
 import synthInterpolate from "@shaders/wgsl/synth_interpolate.wgsl?raw";
 import synthSite from "@shaders/wgsl/synth_site.wgsl?raw";
@@ -121,6 +122,7 @@ export function synthesisSource(rule: SynthesisRule): string {
     synthInterpolate,
     synthSite,
     synthTargets,
+    synthGullies,
     RULES[rule],
     synthSlots,
     computeSynthesis,

@@ -5,7 +5,7 @@
 
 import { tileKey } from "../core/tilekey.ts";
 import type { Ground, Ray, Vec3 } from "../core/types.ts";
-import { SUBPATCHES, TILE_CELLS } from "../generated/contract.ts";
+import { SUBPATCHES, SYNTH_GULLY_FALL, TILE_CELLS } from "../generated/contract.ts";
 import { BLOCK_CELLS, BLOCK_SIDE, blockArea, blockKey, type DetailField, ROOT_BLOCKS } from "./detail/detail.ts";
 import { clip, clipSquare, type March, marchPatch, passesOver } from "./detail/march.ts";
 import { BORDER, interpolated } from "./detail/subdivide.ts";
@@ -172,7 +172,9 @@ export class ShownGround implements Ground {
     const base = this.#baseOf(level, x, y, detail.guide);
     const ratio = 2 ** -Math.max(0.2, detail.exponent - LESS_SMOOTH);
     const slack = level < this.#solvedLevels ? SLACK_SOLVED : SLACK;
-    const made = dressed(base, detail.d, (slack * detail.sigma * ratio) / (1 - ratio));
+    const noise = (detail.sigma * ratio) / (1 - ratio);
+    const gullies = (detail.gully * SYNTH_GULLY_FALL) / (1 - SYNTH_GULLY_FALL);
+    const made = dressed(base, detail.d, slack * (noise + gullies));
     this.#surfaces.put(key, made);
     return made;
   }

@@ -5,7 +5,7 @@ import { describe, expect, it } from "vitest";
 import vectors from "../../../tests/vectors/synthesis.json";
 import type { ChannelGrid, ChannelView } from "../../src/core/types.ts";
 import { structLayout } from "../../src/gpu/layout.ts";
-import { channelWords } from "../../src/gpu/synthesis/channels.ts";
+import { channelWords, NO_CHANNELS } from "../../src/gpu/synthesis/channels.ts";
 import { SITE_BYTES, type SynthesisSettings, sameSettings, siteWords } from "../../src/gpu/synthesis/site.ts";
 import { mixBits } from "../../src/tiles/detail/noise.ts";
 
@@ -37,6 +37,8 @@ function view(change: Partial<ChannelView> = {}): ChannelView {
     forest: none,
     wetness: none,
     survey: flat(-1),
+    erosion: none,
+    far: flat(1),
   };
   return { stamp: 1, ...base, ...change };
 }
@@ -45,7 +47,7 @@ describe("siteWords", () => {
   it("R18: lies where the shader's struct says", () => {
     const head = synthSite.replace(/\s*levels: array<SynthLevel, 18>,/, "");
     const layout = structLayout(head, "SynthSite");
-    const words = siteWords(SETTINGS, { bits: 6, varied: true, biased: false, surveyed: true });
+    const words = siteWords(SETTINGS, { ...NO_CHANNELS, bits: 6, varied: true, surveyed: true });
     const floats = new Float32Array(words.buffer);
     const at = (field: string): number => layout.offsets[field]! / 4;
     expect(floats[at("size")]).toBe(4096);
@@ -60,13 +62,13 @@ describe("siteWords", () => {
     expect(layout.size + 18 * level.size).toBe(SITE_BYTES);
     const third = (layout.size + 3 * level.size) / 4;
     expect(floats[third + level.offsets.inverse_spacing! / 4]).toBe(1 / 16);
-    expect(floats[third + level.offsets.tie! / 4]).toBeGreaterThan(floats[third + 8 + level.offsets.tie! / 4]!);
+    expect(floats[third + level.offsets.tie! / 4]).toBeGreaterThan(floats[third + 12 + level.offsets.tie! / 4]!);
   });
 
   it("R26: keys are where the hashes of the vectors start", () => {
     for (const { seed, level, stream, i, j, hash } of vectors.hashes) {
-      const words = siteWords({ ...SETTINGS, seed }, { bits: 0, varied: false, biased: false, surveyed: false });
-      const key = words[16 + 8 * level + stream]!;
+      const words = siteWords({ ...SETTINGS, seed }, NO_CHANNELS);
+      const key = words[24 + 12 * level + stream]!;
       expect(mixBits((mixBits((key + j) >>> 0) + i) >>> 0)).toBe(hash);
     }
   });
@@ -110,12 +112,16 @@ describe("channelWords", () => {
     expect(channelWords(view({ wetness: flat(1) }))).toMatchObject({ varied: true, biased: true });
   });
 
-  it("R26: a survey comes as an eighth of eight values a node, and none where no data are", () => {
+  it("R26: wide nodes hold survey, distance and paint of gullies too; without any of them nodes are narrow", () => {
     const words = channelWords(view({ survey: grid(3, (r, c) => 2 * r + c), roughness: grid(2, (r) => r) }));
     expect([words.bits, words.varied, words.biased, words.surveyed]).toEqual([1, true, false, true]);
-    expect([...words.values.subarray(8 * 5, 8 * 6)]).toEqual([0, 0.5, 0, 0, 0, 0, 4, 0]);
-    expect(channelWords(view()).surveyed).toBe(false);
+    expect([...words.values.subarray(10 * 4, 10 * 5)]).toEqual([0, 0.5, 0, 0, 0, 0, 3, 1, 0, 0]);
+    expect([words.stride, words.farCells, words.gullied]).toEqual([5, 2, false]);
+    expect(channelWords(view())).toMatchObject({ surveyed: false, gullied: false, stride: 3 });
     expect(channelWords(view()).values.length).toBe(6 * 9);
+    const worn = channelWords(view({ erosion: flat(0.5), far: grid(3, (r, c) => (r + c) / 4) }));
+    expect([...worn.values.subarray(10 * 5, 10 * 6)]).toEqual([0, 0.5, 0, 0, 0, 0, -1, 0.75, 0.5, 0]);
+    expect([worn.stride, worn.farCells, worn.gullied, worn.surveyed]).toEqual([5, 2, true, false]);
     expect(channelWords(view({ survey: flat(3) }))).toMatchObject({ varied: false, surveyed: true });
   });
 

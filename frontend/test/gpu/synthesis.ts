@@ -18,6 +18,9 @@ interface VectorSite {
   readonly size_m: number;
   readonly seed: number;
   readonly detail: number;
+  readonly erosion: number;
+  readonly erosion_scale: number;
+  readonly hold: number;
   readonly rule: SynthesisRule;
   readonly look: Look;
   readonly sea_level_m: number | null;
@@ -108,6 +111,8 @@ function channelsOf(site: VectorSite): ChannelView {
     forest: grid("forest", 0),
     wetness: grid("wetness", 0),
     survey: grid("survey", -1),
+    erosion: grid("erosion", 0),
+    far: grid("far", 1),
   };
 }
 
@@ -155,6 +160,7 @@ export async function synthesisVectors(vectors: Vectors, featureLevel = "core"):
       sizeM: site.size_m,
       seed: site.seed,
       detail: site.detail,
+      erosion: { erosion: site.erosion, erosion_scale: site.erosion_scale, hold: site.hold },
       rule: site.rule,
       look: site.look,
       seaLevelM: site.sea_level_m,

@@ -298,6 +298,8 @@ export const PLAIN_CHANNELS: ChannelView = {
   forest: zero,
   wetness: zero,
   survey: { side: 2, values: new Float32Array(4).fill(-1) },
+  erosion: zero,
+  far: { side: 2, values: new Float32Array(4).fill(1) },
 };
 
 /** Levels up to `solved` everywhere, finer ones only where asked for: what the page holds near the ground. */

@@ -82,7 +82,7 @@ describe("a block of detail", () => {
     const recipe = {
       site: siteOf(settings()),
       rule: RULES.landscape,
-      biases: new Biases(painted),
+      biases: new Biases(painted, siteOf(settings())),
       guide: field.recipe.guide,
     };
     for (let level = 0; level <= 12; level++) {

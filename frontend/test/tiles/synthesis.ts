@@ -15,6 +15,9 @@ export interface SiteVector {
   readonly size_m: number;
   readonly seed: number;
   readonly detail: number;
+  readonly erosion: number;
+  readonly erosion_scale: number;
+  readonly hold: number;
   readonly rule: Rule;
   readonly look: Look;
   readonly sea_level_m: number | null;
@@ -53,7 +56,17 @@ interface Vectors {
 const path = resolve(import.meta.dirname, "../../../tests/vectors/synthesis.json");
 export const vectors = JSON.parse(readFileSync(path, "utf8")) as Vectors;
 
-const BASES = { amplitude: 0, roughness: 0.5, snow: 0, grass: 0, forest: 0, wetness: 0, survey: -1 };
+const BASES = {
+  amplitude: 0,
+  roughness: 0.5,
+  snow: 0,
+  grass: 0,
+  forest: 0,
+  wetness: 0,
+  survey: -1,
+  erosion: 0,
+  far: 1,
+};
 
 /** Channels of which some are given; the others are their base everywhere. */
 export function channelsOf(given: SiteVector["channels"] = {}): ChannelView {
@@ -71,6 +84,8 @@ export function channelsOf(given: SiteVector["channels"] = {}): ChannelView {
     forest: grid("forest"),
     wetness: grid("wetness"),
     survey: grid("survey"),
+    erosion: grid("erosion"),
+    far: grid("far"),
   };
 }
 
@@ -80,7 +95,7 @@ export function recipeOf(site: SiteVector): Recipe {
   return {
     site: siteOf(site),
     rule: RULES[site.rule],
-    biases: new Biases(channelsOf(site.channels)),
+    biases: new Biases(channelsOf(site.channels), siteOf(site)),
     guide: (area, out) => fillArea((level, j, i) => heights[level]?.[j * (TILE_CELLS * 2 ** level + 1) + i], area, out),
   };
 }
@@ -123,5 +138,6 @@ export function samplesOf(level: number, given: StepVector["parent"]): Samples {
     ...unpacked(given.state),
     sigma: 0,
     exponent: 1,
+    gully: 0,
   };
 }

@@ -8,6 +8,7 @@ from esker.contract import BASE_ROUGHNESS
 from esker.contract import fractal as f
 from esker.synthesis import hash as noise
 from esker.synthesis.interpolate import Window
+from esker.synthesis.rules import gullies
 from esker.synthesis.rules.targets import blended, painted, smoothstep, targets
 from esker.synthesis.site import Biases, Ground, Site
 from esker.synthesis.state import Array, State
@@ -26,7 +27,8 @@ def audible(level: int, survey: Array) -> Array:
 
 
 def landscape(site: Site, ground: Ground, before: State, window: Window, biases: Biases) -> State:
-    """Each channel is the parent's, drawn to its target, plus noise; d gets noise of amplitude A 2^(-level H)."""
+    """Each channel is the parent's, drawn to its target, plus noise; d gets noise of amplitude A 2^(-level H), and an
+    octave of gullies where the terrain has any."""
     level, dtype = window.level, site.dtype
     rows, cols = site.indices(window.rows, level), site.indices(window.cols, level)
     words = [noise.hashed(site.seed, level, stream, rows, cols) for stream in range(4)]
@@ -51,4 +53,11 @@ def landscape(site: Site, ground: Ground, before: State, window: Window, biases:
     size = amplitude(site, ground.guide_slope, biases.amplitude) * np.exp2(-level * np.clip(exponent, *f.H_RANGE))
     if site.surveyed:
         size = size * audible(level, biases.survey)
-    return State(before.d + size * noise.full(words[0], dtype), h, snow, wet, grass, forest, foam)
+    if not site.eroded:
+        return State(before.d + size * noise.full(words[0], dtype), h, snow, wet, grass, forest, foam)
+    wear = gullies.wear(site, ground, biases)
+    d = before.d + size * gullies.calm(level, wear) * noise.full(words[0], dtype)
+    depth = gullies.depth(site, ground, wear)
+    if site.surveyed:
+        depth = depth * audible(level, biases.survey)
+    return State(d + depth * gullies.octave(site, ground, window, depth), h, snow, wet, grass, forest, foam)

@@ -5,12 +5,16 @@ import {
   MAX_SYNTHESIS_LEVEL,
   SYNTH_CHANNEL_NOISE,
   SYNTH_CHANNEL_NOISE_DECAY,
+  SYNTH_FAR_SHARE,
+  SYNTH_GULLY_CYCLIC_SIDE,
+  SYNTH_GULLY_STREAM,
   SYNTH_SMOOTHNESS_NOISE,
   SYNTH_SMOOTHNESS_NOISE_DECAY,
   TILE_CELLS,
 } from "../../generated/contract.ts";
 import { streamStart } from "../../tiles/detail/noise.ts";
-import { type GroundSpan, siteOf } from "../../tiles/rules/rule.ts";
+import { depthM, waveM } from "../../tiles/rules/gullies.ts";
+import { type ErosionSettings, type GroundSpan, siteOf } from "../../tiles/rules/rule.ts";
 import { tie } from "../../tiles/rules/targets.ts";
 import type { ChannelFacts } from "./channels.ts";
 
@@ -22,6 +26,7 @@ export interface SynthesisSettings {
   readonly seed: number;
   /** Strength of the detail, 0..4. */
   readonly detail: number;
+  readonly erosion?: ErosionSettings;
   readonly rule: SynthesisRule;
   readonly look: Look;
   readonly seaLevelM: number | null;
@@ -36,8 +41,8 @@ export interface SynthesisSettings {
 }
 
 const LEVELS = MAX_SYNTHESIS_LEVEL + 1;
-const HEAD_WORDS = 16;
-const LEVEL_WORDS = 8;
+const HEAD_WORDS = 24;
+const LEVEL_WORDS = 12;
 export const SITE_BYTES: number = 4 * (HEAD_WORDS + LEVELS * LEVEL_WORDS);
 
 /** The words of `SynthSite`. */
@@ -54,12 +59,17 @@ export function siteWords(s: SynthesisSettings, channels: ChannelFacts): Uint32A
     rule: s.rule,
     place: s.place ?? null,
     ground: s.ground ?? null,
+    ...s.erosion,
   });
   floats.set([sizeM, site.amplitudeM, site.zeroM, seaLevelM === null ? 0 : 1]);
   floats.set([site.snowLine, site.treeLine, site.plants], 4);
-  const { bits, varied, biased, surveyed } = channels;
+  const { bits, varied, biased, surveyed, gullied, stride, farCells } = channels;
   words.set([s.solved, s.cyclic === true ? 1 : 0, bits, varied ? 1 : 0, biased ? 1 : 0, surveyed ? 1 : 0], 7);
   floats.set([site.reliefM, site.shoreM], 13);
+  const cyclic = s.cyclic === true;
+  const lattice = { sizeM, gullySide: cyclic ? SYNTH_GULLY_CYCLIC_SIDE : site.gullySide };
+  words.set([stride, gullied || site.erosion > 0 ? 1 : 0, lattice.gullySide], 15);
+  floats.set([site.erosion, site.hold, SYNTH_FAR_SHARE * sizeM, sizeM / (2 * Math.max(TILE_CELLS, farCells))], 18);
   for (let level = 0; level < LEVELS; level += 1) {
     const at = HEAD_WORDS + LEVEL_WORDS * level;
     for (let stream = 0; stream < 4; stream += 1) words[at + stream] = streamStart(s.seed, level, stream);
@@ -67,6 +77,8 @@ export function siteWords(s: SynthesisSettings, channels: ChannelFacts): Uint32A
     const channel = SYNTH_CHANNEL_NOISE * 2 ** (-SYNTH_CHANNEL_NOISE_DECAY * level);
     const smoothness = SYNTH_SMOOTHNESS_NOISE * 2 ** (-SYNTH_SMOOTHNESS_NOISE_DECAY * level);
     floats.set([1 / spacing, tie(level), channel, smoothness], at + 4);
+    words[at + 8] = streamStart(s.seed, level, SYNTH_GULLY_STREAM);
+    floats.set([waveM(lattice, level), depthM(lattice, level)], at + 9);
   }
   return words;
 }
@@ -77,6 +89,9 @@ export function sameSettings(a: SynthesisSettings, b: SynthesisSettings): boolea
     a.sizeM === b.sizeM &&
     a.seed === b.seed &&
     a.detail === b.detail &&
+    a.erosion?.erosion === b.erosion?.erosion &&
+    a.erosion?.erosion_scale === b.erosion?.erosion_scale &&
+    a.erosion?.hold === b.erosion?.hold &&
     a.rule === b.rule &&
     a.look === b.look &&
     a.seaLevelM === b.seaLevelM &&

@@ -12,7 +12,7 @@
 import type { ChannelView } from "../../core/types.ts";
 import { MAX_SYNTHESIS_LEVEL, TILE_SAMPLES } from "../../generated/contract.ts";
 import { synthesisSource } from "../shaders.ts";
-import { type ChannelFacts, channelWords } from "./channels.ts";
+import { type ChannelFacts, channelWords, NO_CHANNELS } from "./channels.ts";
 import { SITE_BYTES, type SynthesisRule, type SynthesisSettings, sameSettings, siteWords } from "./site.ts";
 
 export type { SynthesisRule, SynthesisSettings } from "./site.ts";
@@ -76,7 +76,7 @@ export class SynthesisPass {
   #channels: GPUBuffer | null = null;
   #channelSource: ChannelView | null = null;
   #channelStamp = -1;
-  #channelFacts: ChannelFacts = { bits: 0, varied: false, biased: false, surveyed: false };
+  #channelFacts: ChannelFacts = NO_CHANNELS;
   #settings: SynthesisSettings | null = null;
   #atlas: SynthesisAtlas | null = null;
   #group: GPUBindGroup | null = null;

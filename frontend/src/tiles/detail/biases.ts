@@ -4,8 +4,8 @@
  */
 
 import type { ChannelGrid, ChannelView } from "../../core/types.ts";
-import { TILE_CELLS } from "../../generated/contract.ts";
-import type { Sample } from "../rules/rule.ts";
+import { SYNTH_FAR_SHARE, TILE_CELLS } from "../../generated/contract.ts";
+import type { Sample, Site } from "../rules/rule.ts";
 
 /** One channel, bilinear over the whole domain. A place outside gets the value of the nearest border. */
 class Channel {
@@ -37,6 +37,16 @@ class Channel {
   }
 }
 
+/** What is taken off a distance, metres: half a cell of its grid, as bilinear values on a line are up to that. */
+export function farMarginM(far: ChannelGrid, sizeM: number): number {
+  return sizeM / (2 * Math.max(TILE_CELLS, far.side - 1));
+}
+
+/** Whether settings or paint ask for gullies anywhere. */
+export function isEroded(erosion: ChannelGrid, strength: number): boolean {
+  return strength > 0 || erosion.values.some((v) => v > 0);
+}
+
 /** The channels as they are at this moment: grids are immutable. */
 export class Biases {
   readonly #amplitude: Channel;
@@ -46,8 +56,16 @@ export class Biases {
   readonly #forest: Channel;
   readonly #wetness: Channel;
   readonly #survey: Channel;
+  readonly #erosion: Channel;
+  readonly #far: Channel;
+  /** Metres of which `far` is a share, and what is taken off a distance: half a cell of its grid (Site.far_margin_m). */
+  readonly #farM: number;
+  readonly #farMarginM: number;
+  /** Gullies are asked for anywhere. */
+  readonly eroded: boolean;
 
-  constructor(channels: Omit<ChannelView, "stamp">) {
+  /** `site`: of the terrain whose channels these are. */
+  constructor(channels: Omit<ChannelView, "stamp">, site: Pick<Site, "sizeM" | "erosion">) {
     this.#amplitude = new Channel(channels.amplitude);
     this.#roughness = new Channel(channels.roughness);
     this.#snow = new Channel(channels.snow);
@@ -55,6 +73,11 @@ export class Biases {
     this.#forest = new Channel(channels.forest);
     this.#wetness = new Channel(channels.wetness);
     this.#survey = new Channel(channels.survey);
+    this.#erosion = new Channel(channels.erosion);
+    this.#far = new Channel(channels.far);
+    this.#farM = SYNTH_FAR_SHARE * site.sizeM;
+    this.#farMarginM = farMarginM(channels.far, site.sizeM);
+    this.eroded = isEroded(channels.erosion, site.erosion);
   }
 
   /** Fills in the biases of the sample in row j and column i of a level; with `relief`, those that heights depend on. */
@@ -63,6 +86,11 @@ export class Biases {
     into.roughness = this.#roughness.at(level, j, i);
     into.snowBias = this.#snow.at(level, j, i);
     into.survey = this.#survey.at(level, j, i);
+    into.eroded = this.eroded;
+    if (this.eroded) {
+      into.erosionBias = this.#erosion.at(level, j, i);
+      into.farM = Math.max(0, this.#farM * this.#far.at(level, j, i) - this.#farMarginM);
+    }
     if (relief) return;
     into.grassBias = this.#grass.at(level, j, i);
     into.forestBias = this.#forest.at(level, j, i);

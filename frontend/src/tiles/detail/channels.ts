@@ -10,10 +10,12 @@ import {
   AMPLITUDE_QUANTA_PER_M,
   BASE_AMPLITUDE_M,
   BASE_BIAS,
+  BASE_FAR,
   BASE_ROUGHNESS,
   BASE_SURVEY,
   BIAS_QUANTA,
   Channel,
+  FAR_QUANTA,
   type PaintChannel,
   ROUGHNESS_QUANTA,
   SURVEY_QUANTA,
@@ -33,7 +35,7 @@ interface Stream {
 
 const stream = (quanta: number, base: number): Stream => ({ tiles: new Map(), quanta, base, level: -1, grid: null });
 
-const BIASES: readonly number[] = [Channel.SNOW, Channel.GRASS, Channel.FOREST, Channel.WETNESS];
+const BIASES: readonly number[] = [Channel.SNOW, Channel.GRASS, Channel.FOREST, Channel.WETNESS, Channel.EROSION];
 
 export class ChannelStore implements ChannelView {
   readonly sizeM: number;
@@ -44,6 +46,7 @@ export class ChannelStore implements ChannelView {
     [Channel.AMPLITUDE, stream(AMPLITUDE_QUANTA_PER_M, BASE_AMPLITUDE_M)],
     [Channel.ROUGHNESS, stream(ROUGHNESS_QUANTA, BASE_ROUGHNESS)],
     [Channel.SURVEY, stream(SURVEY_QUANTA, BASE_SURVEY)],
+    [Channel.FAR, stream(FAR_QUANTA, BASE_FAR)],
     ...BIASES.map((channel) => [channel, stream(BIAS_QUANTA, BASE_BIAS)] as const),
   ]);
   /** The next frame of a new connection replaces everything. */
@@ -80,6 +83,14 @@ export class ChannelStore implements ChannelView {
 
   get wetness(): ChannelGrid {
     return this.#grid(Channel.WETNESS);
+  }
+
+  get erosion(): ChannelGrid {
+    return this.#grid(Channel.EROSION);
+  }
+
+  get far(): ChannelGrid {
+    return this.#grid(Channel.FAR);
   }
 
   get survey(): ChannelGrid {

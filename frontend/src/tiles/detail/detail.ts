@@ -69,10 +69,11 @@ export class DetailField {
     this.sizeM = settings.size_m;
     this.finest = finestLevel(settings.size_m);
     this.spline = settings.rule === "smooth";
+    const site = siteOf(settings);
     this.recipe = {
-      site: siteOf(settings),
+      site,
       rule: RULES[settings.rule],
-      biases: new Biases(channels),
+      biases: new Biases(channels, site),
       guide: (area, out) => area.level <= solved && fillArea(heightOf, area, out),
     };
   }

@@ -4,7 +4,13 @@
  */
 
 import type { Rule as RuleName } from "../../generated/contract.ts";
-import { SYNTH_CONCAVITY_SCALE, SYNTH_H_RANGE_TO, SYNTH_SMOOTHNESS, TILE_CELLS } from "../../generated/contract.ts";
+import {
+  SYNTH_CONCAVITY_SCALE,
+  SYNTH_GULLY_STREAM,
+  SYNTH_H_RANGE_TO,
+  SYNTH_SMOOTHNESS,
+  TILE_CELLS,
+} from "../../generated/contract.ts";
 import { landscape } from "../rules/landscape.ts";
 import { plain } from "../rules/plain.ts";
 import { clamp, newSample, type Rule, type Sample, type Site } from "../rules/rule.ts";
@@ -58,6 +64,8 @@ export interface Samples {
    */
   readonly sigma: number;
   readonly exponent: number;
+  /** The most that this level's gullies could move the ground if nothing held them, metres. */
+  readonly gully: number;
 }
 
 /** Sources of a terrain's synthesis besides the parent. */
@@ -95,6 +103,7 @@ function emptySamples(area: Area, relief: boolean): Out {
     foam: made(!relief),
     sigma: 0,
     exponent: SYNTH_H_RANGE_TO,
+    gully: 0,
   };
 }
 
@@ -320,6 +329,7 @@ function applyRule(recipe: Recipe, area: Area, relief: boolean, out: Out, place:
   const streams = [0, 1, 2, 3].map((stream) => streamStart(site.seed, area.level, stream));
   const cols = colsOf(area);
   sample.level = area.level;
+  sample.gullyKey = streamStart(site.seed, area.level, SYNTH_GULLY_STREAM);
   for (let j = area.r0, k = 0; j < area.r1; j += 1) {
     const starts = streams.map((stream) => rowStart(stream, j));
     for (let i = area.c0; i < area.c0 + cols; i += 1, k += 1) {
@@ -327,10 +337,13 @@ function applyRule(recipe: Recipe, area: Area, relief: boolean, out: Out, place:
       place(k);
       biases.at(area.level, j, i, relief, sample);
       noiseAt(starts, i, relief);
+      sample.row = j;
+      sample.col = i;
       rule(site, sample, relief);
       store(out, k, relief);
       out.sigma = Math.max(out.sigma, sample.sigma);
       out.exponent = Math.min(out.exponent, sample.exponent);
+      out.gully = Math.max(out.gully, sample.gully);
     }
   }
 }

@@ -20,6 +20,7 @@ import {
   SYNTH_SMOOTHNESS_NOISE_DECAY,
   SYNTH_SNOW_TO_H,
 } from "../../generated/contract.ts";
+import { gullies, wear } from "./gullies.ts";
 import { clamp, type Sample, type Site, smoothstep } from "./rule.ts";
 import { blended, painted, targets, tie } from "./targets.ts";
 
@@ -68,7 +69,16 @@ export function landscape(site: Site, at: Sample, relief: boolean): void {
   at.exponent = clamp(exponent, SYNTH_H_RANGE_FROM, SYNTH_H_RANGE_TO);
   const size = amplitude(site, at.guideSlope, at.amplitude);
   at.sigma = size === 0 ? 0 : size * 2 ** (-at.level * at.exponent);
-  at.d += at.sigma * audible(at.level, at.survey) * at.noiseD;
+  const heard = audible(at.level, at.survey);
+  if (!at.eroded) {
+    at.d += at.sigma * heard * at.noiseD;
+    at.gully = 0;
+    return;
+  }
+  const { calm, depth, most } = wear(site, at);
+  at.gully = most;
+  at.d += at.sigma * heard * calm * at.noiseD;
+  if (depth * heard !== 0) at.d += depth * heard * gullies(site, at);
 }
 
 /** Noise is strongest where the target is undecided, so that the border of a forest frays and its inside is whole. */

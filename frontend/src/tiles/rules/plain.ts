@@ -17,4 +17,5 @@ export function plain(site: Site, at: Sample, relief: boolean): void {
   at.d = 0;
   at.sigma = 0;
   at.exponent = 1;
+  at.gully = 0;
 }

@@ -7,7 +7,11 @@
 import type { Place, TerrainSettings } from "../../generated/contract.ts";
 import {
   BASE_SURVEY,
+  DEFAULT_EROSION,
+  DEFAULT_EROSION_SCALE,
+  DEFAULT_HOLD,
   SYNTH_ALPHA,
+  SYNTH_GULLY_CELL,
   SYNTH_LEAST_SNOW_LINE_M,
   SYNTH_LOOKS,
   SYNTH_SHORE_M,
@@ -32,10 +36,24 @@ export interface Site {
   readonly snowLine: number;
   readonly treeLine: number;
   readonly plants: number;
+  /** Strength of the gullies, 0..2. */
+  readonly erosion: number;
+  /** Side of a cell of the lattice of gullies, in samples of any level. */
+  readonly gullySide: number;
+  /** How strictly what strokes fix keeps its height, 0..1. */
+  readonly hold: number;
+}
+
+/** Strength, wavelength in cells and hold of gullies, as settings have them. */
+export interface ErosionSettings {
+  readonly erosion: number;
+  readonly erosion_scale: number;
+  readonly hold: number;
 }
 
 export type RuleSettings = Pick<TerrainSettings, "size_m" | "seed" | "sea_level_m" | "look" | "detail" | "rule"> &
-  Partial<Pick<TerrainSettings, "place">> & { readonly ground?: GroundSpan | null };
+  Partial<Pick<TerrainSettings, "place">> &
+  Partial<ErosionSettings> & { readonly ground?: GroundSpan | null };
 
 /** Lowest and highest sample of the elevation layers that are shown, metres. */
 export type GroundSpan = readonly [number, number];
@@ -84,10 +102,13 @@ export function siteOf(settings: RuleSettings): Site {
     snowLine: look.snowLine,
     treeLine: look.treeLine,
     plants: look.plants,
+    erosion: settings.erosion ?? DEFAULT_EROSION,
+    gullySide: Math.floor(SYNTH_GULLY_CELL * (settings.erosion_scale ?? DEFAULT_EROSION_SCALE) + 0.5),
+    hold: settings.hold ?? DEFAULT_HOLD,
   };
 }
 
-/** A sample between its parent and its rule. The rule reads all and overwrites `d` to `exponent`. */
+/** A sample between its parent and its rule. The rule reads all and overwrites `d` to `gully`. */
 export interface Sample {
   level: number;
   /** The parent's ground with its detail, metres, its slopes, its concavity -1..1, and the slope of the guide alone. */
@@ -105,6 +126,15 @@ export interface Sample {
   wetBias: number;
   /** The level whose spacing is that of the finest elevation data here: detail begins below it. */
   survey: number;
+  /** Paint of gullies, -1..1; distance from what strokes fix, metres. */
+  erosionBias: number;
+  farM: number;
+  /** Gullies are asked for somewhere on the terrain. */
+  eroded: boolean;
+  /** Global row and column, and what the hash of the pivots of gullies starts from on this level. */
+  row: number;
+  col: number;
+  gullyKey: number;
   /** Uniform in -1..1, one for each of the six values below. */
   noiseD: number;
   noiseH: number;
@@ -127,6 +157,8 @@ export interface Sample {
    */
   sigma: number;
   exponent: number;
+  /** The most that this level's gullies could move the ground if nothing held them, metres. */
+  gully: number;
 }
 
 export function newSample(): Sample {
@@ -144,6 +176,12 @@ export function newSample(): Sample {
     forestBias: 0,
     wetBias: 0,
     survey: BASE_SURVEY,
+    erosionBias: 0,
+    farM: 0,
+    eroded: false,
+    row: 0,
+    col: 0,
+    gullyKey: 0,
     noiseD: 0,
     noiseH: 0,
     noiseSnow: 0,
@@ -160,6 +198,7 @@ export function newSample(): Sample {
     foam: 0,
     sigma: 0,
     exponent: 1,
+    gully: 0,
   };
 }
 

@@ -22,4 +22,5 @@ export function smooth(site: Site, at: Sample, relief: boolean): void {
   at.d = 0;
   at.sigma = 0;
   at.exponent = 1;
+  at.gully = 0;
 }
