@@ -144,10 +144,19 @@ def test_exports_belong_to_their_link_and_to_owners(live: LiveServer) -> None:
 
 @pytest.mark.parametrize(
     "wanted",
-    [{"samples": 1000}, {"format": "glb", "samples": 2049}, {"format": "obj"}, {"samples": "257"}, {"more": 1}],
+    [
+        {"samples": 1000},
+        {"format": "glb", "samples": 2049},
+        {"format": "obj"},
+        {"samples": "257"},
+        {"more": 1},
+        {"paper": {}},
+        {"format": "stl", "model": {"width_mm": 5.0}},
+        {"format": "map_svg", "paper": {"size": "a9"}},
+    ],
 )
 def test_requests_that_cannot_be(live: LiveServer, wanted: dict[str, Any]) -> None:
-    """SPEC X8."""
+    """SPEC X8, N44."""
     terrain, secret = live.create()
     status, told = begin(live, terrain, secret, **wanted)
     assert (status, told["code"]) == (400, "malformed")
@@ -298,6 +307,20 @@ def test_the_process_makes_the_file_of_the_python_interface(tmp_path: Path) -> N
         "detail",
         "writing",
     ]
+
+
+def test_the_process_makes_maps_and_solids(tmp_path: Path) -> None:
+    """SPEC N44, N47: those of ``Terrain.export``; a map that does not fit its paper is a sentence."""
+    terrain = ridge()
+    model = c.ModelOptions(width_mm=90, exaggeration=2)
+    wanted = c.ExportRequest(format="stl", samples=257, detail=False, model=model)
+    made = asyncio.run(run.make(task_of(terrain, tmp_path, wanted=wanted), lambda *_: None))
+    terrain.export(tmp_path / "b.stl", level=2, detail=False, model=model)
+    assert made.file == "a.stl"
+    assert (tmp_path / "a.stl").read_bytes() == (tmp_path / "b.stl").read_bytes()
+    wanted = c.ExportRequest(format="map_pdf", samples=257, detail=False, paper=c.PaperOptions(scale=500))
+    with pytest.raises(ExportFailed, match="larger than A4 paper"):
+        asyncio.run(run.make(task_of(terrain, tmp_path, wanted=wanted), lambda *_: None))
 
 
 def test_missing_ground_is_a_sentence(tmp_path: Path) -> None:

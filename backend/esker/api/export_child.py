@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from esker import contract as c
 from esker.exporting import wire
+from esker.exporting.printing.drawing import CannotPrint
 from esker.process import system
 from esker.process.bounds import Bounds
 from esker.process.child_process import end_with_parent
@@ -129,8 +130,9 @@ def _made(task: wire.Task, device: str | None, grids: dict[str, Raster], out: Ou
     levels = {"global_level": task.global_level, "refined_level": max(task.refined_level, task.global_level)}
     path = folder / (task.name + form.suffixes[0])
     ground = export(
-        terrain, path, wanted.format, extent, detail=wanted.detail, step=out.step, weights=wanted.weights, **levels
-    )
+        terrain, path, wanted.format, extent, detail=wanted.detail, step=out.step, weights=wanted.weights,
+        paper=wanted.paper, model=wanted.model, **levels,
+    )  # fmt: skip
     if form.sent:
         packed(folder, sent_name(wanted.format, task.name))
     return ground
@@ -172,6 +174,8 @@ def main() -> int:
         out.line(work(task, out))
     except Failure as failure:
         out.line(wire.Failed(sentence=str(failure)))
+    except CannotPrint as cannot:
+        out.line(wire.Failed(sentence=str(cannot)))
     except MemoryError:
         out.line(wire.Failed(sentence="This export needs more memory than the server has. Take fewer samples."))
     except OSError as error:

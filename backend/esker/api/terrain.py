@@ -283,6 +283,8 @@ class Terrain(TerrainLayers):
         samples: int | None = None,
         detail: bool = True,
         weights: bool = False,
+        paper: contract.PaperOptions | None = None,
+        model: contract.ModelOptions | None = None,
         window: tuple[float, float, float, float] | None = None,
         global_level: int = contract.DEFAULT_LEVEL,
         refined_level: int = contract.DEFAULT_REFINED_LEVEL,
@@ -290,11 +292,13 @@ class Terrain(TerrainLayers):
     ) -> None:
         """Write the terrain for other programs, as the suffix of ``path`` says (docs/exporting.md): ``.png``, ``.r16``
         and ``.raw`` (heightmaps of 16 bits, the raw ones with a .json beside them), ``.tif`` (GeoTIFF), ``.npy``,
-        ``.glb`` (a mesh with colours), ``.zip`` (masks of 8 bits).
+        ``.glb`` (a mesh with colours), ``.zip`` (masks of 8 bits), ``.pdf`` and ``.svg`` (a contour map to scale),
+        ``.stl`` (a solid for printers).
 
         ``level``, or ``samples`` a side (one of EXPORT_LEVELS); ``window``: only the samples of ``level`` in this
         rectangle (x0, y0, x1, y1) of world metres. ``detail`` and the levels: as in ``heights``; masks and colours
-        always come from the detail. ``weights``: masks that sum to one, with one for bare ground. ``progress`` is told
+        always come from the detail. ``weights``: masks that sum to one, with one for bare ground. ``paper``: paper,
+        scale and interval of a contour map; ``model``: width, base and exaggeration of a solid. ``progress`` is told
         the share that is done. Raises ValueError for what cannot be written so, OSError.
         """
         from esker.exporting import formats  # not with this module: it brings pyproj
@@ -317,8 +321,9 @@ class Terrain(TerrainLayers):
         extent = Extent.of(level, samples, window)
         levels = {"global_level": global_level, "refined_level": refined_level}
         formats.export(
-            self, where, formats.format_of(where), extent, detail=detail, step=step, weights=weights, **levels
-        )
+            self, where, formats.format_of(where), extent, detail=detail, step=step, weights=weights,
+            paper=paper, model=model, **levels,
+        )  # fmt: skip
 
     def _source(self) -> Source:
         return Source(self.strokes, self.settings, self._patchwork.base, span_m(self.layers))

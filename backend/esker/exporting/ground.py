@@ -70,7 +70,8 @@ class HeightSource(Protocol):
 class Ground:
     """What is written. ``heights``: (rows, columns) float32, metres, row 0 south; sample [0, 0] lies at world
     (x_m, y_m), neighbours ``spacing_m`` apart. ``masks``: the same shape, uint8, 255 where there is all of it: COVERS
-    and ``water``; empty where they were not asked for. ``lakes_m``: levels of the lakes, rising, metres."""
+    and ``water``; empty where they were not asked for. ``lakes_m``: levels of the lakes, rising, metres.
+    ``solved``: heights without detail, where they were asked for."""
 
     heights: Heights
     x_m: float
@@ -79,6 +80,7 @@ class Ground:
     settings: TerrainSettings
     masks: Mapping[str, Mask] = field(default_factory=dict)
     lakes_m: tuple[float, ...] = ()
+    solved: Heights | None = None
 
     @property
     def range_m(self) -> tuple[float, float]:
@@ -144,18 +146,21 @@ def take(
     *,
     detail: bool,
     masks: bool,
+    solved: bool = False,
     progress: Progress | None = None,
     **levels: int,
 ) -> Ground:
     """The ground of a terrain: ``Terrain.heights`` or ``Terrain.window``, interpolated where ``extent`` has a few
-    samples less than its level. ``masks``: with covers, which come with the detail; ``levels``: ``global_level`` and
+    samples less than its level. ``masks``: with covers, which come with the detail; ``solved``: beside them the heights
+    without it; ``levels``: ``global_level`` and
     ``refined_level`` of the detail. Raises ValueError, and what solves raise."""
     if not detail and not masks:
         ground = _plain(terrain, extent, progress)
     else:
         ground = _detailed(terrain, extent, progress, levels, masks)
-        if not detail:
-            ground = replace(ground, heights=_plain(terrain, extent, None).heights)
+        if solved or not detail:
+            plain = _plain(terrain, extent, None).heights
+            ground = replace(ground, solved=plain if solved else None, heights=ground.heights if detail else plain)
     if extent.window is None and extent.samples != grid.samples(extent.level):
         ground = _fewer(ground, extent.samples)
     return _with_water(terrain, ground, levels.get("global_level", contract.DEFAULT_LEVEL)) if masks else ground
@@ -205,7 +210,8 @@ def _fewer(ground: Ground, samples: int) -> Ground:
         name: np.rint(np.clip(resampled(mask, samples), 0.0, WHOLE)).astype(np.uint8)
         for name, mask in ground.masks.items()
     }
-    return replace(ground, heights=resampled(ground.heights, samples), spacing_m=spacing, masks=masks)
+    solved = None if ground.solved is None else resampled(ground.solved, samples)
+    return replace(ground, heights=resampled(ground.heights, samples), spacing_m=spacing, masks=masks, solved=solved)
 
 
 def _with_water(terrain: HeightSource, ground: Ground, global_level: int) -> Ground:

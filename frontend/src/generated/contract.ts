@@ -240,6 +240,8 @@ export const EXPORT_LEVELS = {
 
 export const EXPORT_MESH_SAMPLES = 1025 as const;
 
+export const EXPORT_MAP_SAMPLES = 2049 as const;
+
 export const FRAME_MAGIC = 19283 as const;
 
 export const FRAME_SETTLED = 1 as const;
@@ -643,7 +645,10 @@ export type ExportFormat =
   | "geotiff"
   | "npy"
   | "glb"
-  | "masks";
+  | "masks"
+  | "map_pdf"
+  | "map_svg"
+  | "stl";
 
 export type RejectCode =
   | "malformed"
@@ -960,11 +965,25 @@ export interface ImportAnswers {
   licence?: string | null;
 }
 
+export interface PaperOptions {
+  size: "a4" | "a3";
+  scale: number;
+  interval_m: number;
+}
+
+export interface ModelOptions {
+  width_mm: number;
+  base_mm: number;
+  exaggeration: number;
+}
+
 export interface ExportRequest {
-  format: "png16" | "r16" | "geotiff" | "npy" | "glb" | "masks";
+  format: "png16" | "r16" | "geotiff" | "npy" | "glb" | "masks" | "map_pdf" | "map_svg" | "stl";
   samples?: number;
   detail?: boolean;
   weights?: boolean;
+  paper?: PaperOptions | null;
+  model?: ModelOptions | null;
   at?: number | null;
 }
 

@@ -11,6 +11,7 @@ import {
   sizesOf,
   waitWords,
 } from "../../src/app/layers/exports.ts";
+import { scalesFor, solidWords } from "../../src/app/layers/print-sizes.ts";
 import { ApiError } from "../../src/app/server/api.ts";
 import type { ExportEstimate, ExportRequest, ExportStatus } from "../../src/generated/contract.ts";
 
@@ -200,5 +201,38 @@ describe("the words", () => {
       "Unreal: scale 400, 400, 19.5315",
       "Unity: width and length 4096, height 100, position y -5",
     ]);
+  });
+});
+
+describe("what is printed", () => {
+  it("sends paper and size with maps and solids only (SPEC N48)", async () => {
+    const server = new FakeTransport();
+    const exporter = new Exporter(server, () => {});
+    exporter.choose({ paper: { size: "a3", scale: 25_000, interval_m: 20 } });
+    exporter.choose({ model: { width_mm: 90, base_mm: 2, exaggeration: 3 } });
+    for (const format of ["png16", "map_pdf", "stl"] as const) {
+      exporter.choose({ format });
+      await exporter.begin();
+      exporter.cancel();
+    }
+    expect(server.requests.map((r) => [r.format, r.paper, r.model])).toEqual([
+      ["png16", undefined, undefined],
+      ["map_pdf", { size: "a3", scale: 25_000, interval_m: 20 }, undefined],
+      ["stl", undefined, { width_mm: 90, base_mm: 2, exaggeration: 3 }],
+    ]);
+    exporter.dispose();
+  });
+
+  it("has no more samples than paper shows and printers take", () => {
+    expect(sizesOf("map_svg").at(-1)).toBe(2049);
+    expect(sizesOf("stl").at(-1)).toBe(1025);
+  });
+
+  it("offers scales that fit the paper, the largest picture first (SPEC N48)", () => {
+    expect(scalesFor(4096, "a4").slice(0, 3)).toEqual([25_000, 30_000, 40_000]);
+    expect(scalesFor(640, "a4")[0]).toBe(4000);
+    expect(scalesFor(640, "a3")[0]).toBe(2500);
+    for (const n of scalesFor(7777, "a3")) expect((1000 * 7777) / n).toBeLessThanOrEqual(257);
+    expect(solidWords(150, 4096)).toContain("1 : 27,300");
   });
 });

@@ -6,11 +6,14 @@
 import { type ReadonlySignal, signal } from "@preact/signals-core";
 import {
   EXPORT_LEVELS,
+  EXPORT_MAP_SAMPLES,
   EXPORT_MESH_SAMPLES,
   type ExportEstimate,
   type ExportFormat,
   type ExportRequest,
   type ExportStatus,
+  type ModelOptions,
+  type PaperOptions,
 } from "../../generated/contract.ts";
 import { ApiError } from "../server/api.ts";
 
@@ -31,6 +34,10 @@ export interface ExportChoice {
   readonly detail: boolean;
   /** Whether masks sum to one. */
   readonly weights: boolean;
+  /** Of contour maps. */
+  readonly paper: Required<PaperOptions>;
+  /** Of solids for printers. */
+  readonly model: Required<ModelOptions>;
 }
 
 /** A file that came, and where it lies for as long as the page is open. */
@@ -44,9 +51,17 @@ const POLL_MS = 400;
 const MOST_SILENCE = 40;
 const SETTLE_MS = 150;
 
+/** Contour maps on paper. */
+export const isMap = (format: ExportFormat): boolean => format === "map_pdf" || format === "map_svg";
+
 /** Samples a side that a format may have, coarse to fine. */
 export function sizesOf(format: ExportFormat): readonly number[] {
-  const most = format === "glb" ? EXPORT_MESH_SAMPLES : Number.POSITIVE_INFINITY;
+  const most =
+    format === "glb" || format === "stl"
+      ? EXPORT_MESH_SAMPLES
+      : isMap(format)
+        ? EXPORT_MAP_SAMPLES
+        : Number.POSITIVE_INFINITY;
   return Object.keys(EXPORT_LEVELS)
     .map(Number)
     .filter((n) => n <= most)
@@ -57,7 +72,14 @@ export function sizesOf(format: ExportFormat): readonly number[] {
 export const ofUnreal = (samples: number): boolean => !Number.isInteger(Math.log2(samples - 1));
 
 export class Exporter {
-  readonly #choice = signal<ExportChoice>({ format: "png16", samples: 1025, detail: true, weights: false });
+  readonly #choice = signal<ExportChoice>({
+    format: "png16",
+    samples: 1025,
+    detail: true,
+    weights: false,
+    paper: { size: "a4", scale: 0, interval_m: 0 },
+    model: { width_mm: 150, base_mm: 3, exaggeration: 1 },
+  });
   readonly #estimate = signal<ExportEstimate | null>(null);
   readonly #phase = signal<ExportPhase>("choose");
   readonly #status = signal<ExportStatus | null>(null);
@@ -170,8 +192,13 @@ export class Exporter {
   }
 
   #request(): ExportRequest {
-    const { weights, ...choice } = this.#choice.peek();
-    return { ...choice, ...(weights && choice.format === "masks" ? { weights } : {}), at: this.#at() };
+    const { weights, paper, model, ...choice } = this.#choice.peek();
+    const own = {
+      ...(weights && choice.format === "masks" ? { weights } : {}),
+      ...(isMap(choice.format) ? { paper } : {}),
+      ...(choice.format === "stl" ? { model } : {}),
+    };
+    return { ...choice, ...own, at: this.#at() };
   }
 
   #leave(): void {

@@ -8,6 +8,7 @@ import {
   type ExportPhase,
   engineWords,
   exportWords,
+  isMap,
   ofUnreal,
   sizesOf,
   waitWords,
@@ -20,6 +21,7 @@ import { SignalElement } from "../controls/signal-element.ts";
 import { exportStyles } from "../styles/export.ts";
 import { progressStyles } from "../styles/progress.ts";
 import { shared } from "../styles/shared.ts";
+import { printChoice } from "./print-choice.ts";
 
 interface Card {
   readonly value: ExportFormat;
@@ -49,6 +51,19 @@ const CARDS: readonly Card[] = [
     suffix: ".zip",
     says: "Snow, grass, forest, wetness and water, as pictures for splat maps.",
   },
+  {
+    value: "map_pdf",
+    label: "Contour map",
+    suffix: ".pdf",
+    says: "To scale, for printing: contours with heights, grid, legend.",
+  },
+  {
+    value: "map_svg",
+    label: "Contour map",
+    suffix: ".svg",
+    says: "The same, to be drawn on in Inkscape or Illustrator.",
+  },
+  { value: "stl", label: "3D print", suffix: ".stl", says: "A closed solid in millimetres, for printers." },
   { value: "npy", label: "Array", suffix: ".npy", says: "Heights in metres, row 0 south. NumPy." },
 ];
 
@@ -159,6 +174,7 @@ export class EskExport extends SignalElement {
             )}
           </select>
         </label>
+        ${isMap(format) || format === "stl" ? printChoice(exporter, this.sizeM) : nothing}
         ${
           covers
             ? html`<p class="note">Masks come from the detail: what the page shows on the ground.</p>

@@ -74,6 +74,15 @@ export const exportStyles = css`
     font-size: 0.8125rem;
     font-weight: 550;
   }
+  .pair {
+    display: grid;
+    grid-template-columns: repeat(auto-fit, minmax(150px, 1fr));
+    gap: 12px;
+    align-items: end;
+  }
+  .pair .field {
+    width: 100%;
+  }
   select.field {
     width: 100%;
     padding-right: 0.5em;
