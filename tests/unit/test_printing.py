@@ -112,7 +112,7 @@ def test_a_map_is_to_scale(wanted: PaperOptions, scale: float) -> None:
     assert frame.scale == scale
     assert (x1 - x0) * scale / 1000 == pytest.approx(640.0)
     assert min(x0, y0, frame.width_mm - x1, frame.height_mm - y1) > 0
-    assert (frame.width_mm, frame.height_mm) == ((297.0, 420.0) if wanted.paper == "a3" else (210.0, 297.0))
+    assert (frame.width_mm, frame.height_mm) == ((297.0, 420.0) if wanted.size == "a3" else (210.0, 297.0))
     made = contour_map(ground, wanted.model_copy(update={"interval_m": 20.0}), TODAY)
     rings = [ring for s in shapes(made) if isinstance(s, Shape) and s.colour == EARTH for ring in s.rings]
     whole = [ring for ring in rings if len(ring) > 2 and np.array_equal(ring[0], ring[-1])]
@@ -186,7 +186,7 @@ def test_what_does_not_fit_is_refused(tmp_path: Path) -> None:
     terrain = Terrain(size_m=512)
     for name, more in (("a.png", {"paper": PaperOptions()}), ("a.svg", {"model": ModelOptions()})):
         with pytest.raises(ValueError, match=r"^Only"):
-            terrain.export(tmp_path / name, level=1, **more)  # type: ignore[arg-type]
+            terrain.export(tmp_path / name, level=1, **more)
     with pytest.raises(CannotPrint):
         terrain.export(tmp_path / "a.svg", level=1, paper=PaperOptions(scale=10))
     assert list(tmp_path.iterdir()) == []
