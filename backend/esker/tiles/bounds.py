@@ -40,7 +40,10 @@ def block_reduce(ufunc: np.ufunc, a: NDArray[T], cells: int) -> NDArray[T]:
 
 
 def dilate(a: NDArray[T]) -> NDArray[T]:
-    """The largest of each value (rows, cols) and its eight neighbours; on booleans, those of every True too."""
+    """Returns the largest of each value (rows, cols) and its eight neighbours.
+
+    Of booleans, True spreads to the eight neighbours.
+    """
     rows = a.copy()
     np.maximum(rows[1:], a[:-1], out=rows[1:])
     np.maximum(rows[:-1], a[1:], out=rows[:-1])
@@ -134,7 +137,7 @@ class Bounds:
 
 
 def nest(subs: Sequence[SubPatches], valid: Sequence[bool], size_m: float) -> Bounds:
-    """Builds the flat, nested arrays from each level's sub-patches."""
+    """Makes the flat, nested arrays from each level's sub-patches."""
     levels = len(subs) - 1
     low: list[Floats] = []
     high: list[Floats] = []

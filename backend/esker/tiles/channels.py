@@ -88,7 +88,7 @@ class ChannelPyramid(Pyramid):
         return 0 if away is None else super().preview(clock, level, away)
 
     def _away(self, clock: int, level: int, heights: NDArray[np.float32]) -> NDArray[np.float32] | None:
-        """The samples as heights of a pyramid; None for a base that is not held."""
+        """Returns the samples as heights of a pyramid; None for a base that is not held."""
         away = heights - np.float32(BASE[self.channel])
         away *= np.float32(QUANTA[self.channel] / (1 << max(0, level)))
         if 0 <= level <= self.top and self.level(level) is None:

@@ -123,6 +123,6 @@ def _previous(held: Held, head: FrameHead, key: TileKey, record: TileRecord) -> 
 
 
 def _under(key: TileKey, dropped: set[TileKey], level: int) -> bool:
-    """True for a dropped tile and for its descendants."""
+    """Returns True for a dropped tile and for its descendants."""
     shift = key.level - level
     return shift >= 0 and TileKey(level, key.x >> shift, key.y >> shift) in dropped

@@ -72,7 +72,7 @@ class TileServer:
         self._based = -1
         """The heights' stamp when the base last came: levels put before then belong to another base."""
         self._base_whole = True
-        """All levels of the base have come since it last changed."""
+        """Whether all levels of the base have come since it last changed."""
 
     @property
     def levels(self) -> int:
@@ -150,15 +150,15 @@ class TileServer:
         return self.refined.put(clock, tile.key, tile.heights, tile.content, self.pyramid, under)
 
     def _put_base_tile(self, tile: RefinedTile) -> bool:
-        """The base of a refined tile: a stream of its own, which outlives the solve."""
-        if not self.base.held:  # layers so small that no level that is solved as a whole sees them
+        """Puts the base of a refined tile: a stream of its own, which outlives the solve."""
+        if not self.base.held:  # no level that is solved as a whole sees layers so small
             self.base.begin(self.refined.clock, self.levels + 1)
             self.refined_base.begin(self.refined.clock)
         heights = np.zeros_like(tile.heights) if tile.base is None else tile.base
         return self.refined_base.put(self.refined_base.clock, tile.key, heights, tile.content, self.base)
 
     def limit(self, top: int) -> None:
-        """From now on levels above ``top`` are not solved: clients are made to forget them."""
+        """Says that levels above ``top`` are not solved from now on: clients are made to forget them."""
         if top != self.pyramid.top:
             self.refined.suspend()
             self.refined_base.suspend()
@@ -169,7 +169,7 @@ class TileServer:
                 channel.limit(channel_levels(top))
 
     def settled(self) -> bool:
-        """True when every level that is solved is final for one and the same clock, over the base as it is."""
+        """Whether every level that is solved is final for one and the same clock, over the base as it is."""
         levels = [self.pyramid.level(level) for level in range(self.pyramid.top + 1)]
         final = all(level is not None and level.settled and level.stamp > self._based for level in levels)
         return final and self._base_whole and len({v.clock for v in levels if v}) == 1
@@ -224,13 +224,13 @@ class ClientTiles:
         self._idle_stamp = -1
 
     def set_view(self, view: View) -> None:
-        """The client's camera. Selection follows at the next ``plan``."""
+        """Takes the client's camera. The selection follows it at the next ``plan``."""
         if view != self._view:
             self._view = view
             self._view_changed = True
 
     def held(self, channel: Channel = Channel.HEIGHT) -> dict[TileKey, int]:
-        """Versions that the client holds once it has applied every committed frame."""
+        """Returns the versions that the client holds once it has applied every committed frame."""
         if channel == Channel.BASE:
             return self._base.held() | self._refined_base.held()
         if channel != Channel.HEIGHT:
@@ -238,26 +238,30 @@ class ClientTiles:
         return self._heights.held() | self._refined.held()
 
     def wanted(self) -> list[Mask]:
-        """The present selection of the levels that are solved as a whole, one (2^l, 2^l) mask per level."""
+        """Returns the present selection of the levels that are solved as a whole, one (2^l, 2^l) mask per level."""
         self.refresh()
         return self._wanted
 
     def shown(self) -> list[Mask]:
-        """Those of them that the view shows as it is; the others are for an eye a step nearer."""
+        """Returns the selected tiles that the view shows as it is.
+
+        The other selected tiles are for an eye a step nearer.
+        """
         self.refresh()
         return self._shown
 
     def wanted_refined(self) -> set[TileKey]:
-        """The present selection above these levels."""
+        """Returns the present selection above the levels that are solved as a whole."""
         self.refresh()
         return set(self._selection.tiles)
 
     def held_refined(self) -> set[TileKey]:
-        """What the client holds above these levels."""
+        """Returns the tiles that the client holds above the levels that are solved as a whole."""
         return self._refined.keys()
 
     def missing(self) -> list[tuple[TileKey, float]]:
-        """Wanted tiles that the settled ground has not been refined to yet, with their projected errors in pixels."""
+        """Returns the wanted tiles to which the settled ground has not been refined yet, with their projected errors in
+        pixels."""
         return [(k, e) for k, e in self._selection.tiles.items() if self._server.refined.verified(k) is None]
 
     def plan(self, hurry: bool = False) -> FramePlan | None:
@@ -309,7 +313,8 @@ class ClientTiles:
     def _plan_fill(
         self, level: int, wanted: Mask | np.bool_, errors: NDArray[np.float32] | None = None
     ) -> FramePlan | None:
-        """Tiles on a base that is held; then base, and what lies on it next; then whatever has to wait for its base."""
+        """Plans tiles on a base that is held; then base, and the tiles that lie on it next; then tiles that wait for
+        their base."""
         if not self._server.base.held:
             return self._heights.plan_fill(level, wanted, errors)
         based = self._base.versions[level] > 0
@@ -320,7 +325,7 @@ class ClientTiles:
         )
 
     def _plan_refined(self) -> FramePlan | None:
-        """The same above the levels that are solved as a whole."""
+        """Plans a frame above the levels that are solved as a whole."""
         selection = self._selection
         plan, finest = self._refined.plan_levels(selection)
         if not self._server.refined_base.active:
@@ -329,7 +334,7 @@ class ClientTiles:
         return under or plan or self._fill_refined(finest, finest_base)
 
     def _fill_refined(self, finest: int, finest_base: int | None) -> FramePlan | None:
-        """``finest``, ``finest_base``: the levels up to which tiles, and their base, may be filled in."""
+        """Fills tiles in up to level ``finest``, and their base up to ``finest_base``."""
         selection = self._selection
         based = None if finest_base is None else self._refined_base.keys()
         for level in range(self._server.levels + 1, finest + 1):
@@ -359,7 +364,7 @@ class ClientTiles:
         return None
 
     def commit(self, plan: FramePlan) -> None:
-        """The frame was handed to the socket: from now on the client counts as holding it."""
+        """Says that the frame was handed to the socket: from now on the client counts as holding it."""
         self._idle_stamp = -1
         if plan.channel not in GROUND:
             self._channels[plan.channel].commit(plan)

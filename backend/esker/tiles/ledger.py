@@ -28,7 +28,7 @@ SPARE_TILES: Final = 32
 
 
 def state_of(level: Level, key: TileKey) -> TileState:
-    """A tile of a level, its samples as a view."""
+    """Returns a tile of a level, its samples as a view."""
     r, c = 64 * key.y, 64 * key.x
     return TileState(int(level.versions[key.y, key.x]), level.samples[r : r + 65, c : c + 65])
 
@@ -47,13 +47,13 @@ class Ledger:
         self._always, self._rest_level = always, rest_level
         n = pyramid.levels + 1
         self.versions: list[Counts] = [np.zeros((1 << level, 1 << level), dtype=np.uint32) for level in range(n)]
-        """Version that the client holds, 0 for none."""
+        """Versions that the client holds, 0 for none."""
         self._bases: list[Counts] = [np.zeros_like(held) for held in self.versions]
-        """Version of the parent when the client's tile was last sent or confirmed: its decoder remembers that one."""
+        """Versions of the parents when the client's tiles were last sent or confirmed: its decoder remembers these."""
         self._stamps = [0] * n
-        """The put of each level of which the client has, or needs, nothing more."""
+        """The last put of each level that the client has, as far as it needs it."""
         self._moved = [False] * n
-        """The client shows a preview of this level: an ancestor was sent since its last LEVEL frame."""
+        """Whether the client shows a preview of this level: an ancestor was sent since its last LEVEL frame."""
         self._settled = [False] * n
 
     @property
@@ -62,7 +62,7 @@ class Ledger:
         return self._pyramid.levels
 
     def held(self) -> dict[TileKey, int]:
-        """Versions that the client holds once it has applied every committed frame."""
+        """Returns the versions that the client holds once it has applied every committed frame."""
         return {
             TileKey(level, int(x), int(y)): int(versions[y, x])
             for level, versions in enumerate(self.versions)
@@ -70,7 +70,7 @@ class Ledger:
         }
 
     def newest(self, key: TileKey) -> TileState | None:
-        """The tile as the client holds it, when that is the newest there is."""
+        """Returns the tile as the client holds it, when that is the newest there is."""
         level = self._pyramid.level(key.level)
         at = (key.y, key.x)
         if level is None or not level.versions[at] or self.versions[key.level][at] != level.versions[at]:
@@ -78,14 +78,15 @@ class Ledger:
         return state_of(level, key)
 
     def plan_level(self, index: int, wanted: Mask | np.bool_) -> FramePlan | None:
-        """A LEVEL frame of level ``index``, when a newer put waits that the client should see."""
+        """Plans a LEVEL frame of level ``index``, when a newer put waits that the client should see."""
         pyramid = self._pyramid
         level = pyramid.level(index)
         if level is None or level.stamp == self._stamps[index]:
             return None
         held = self.versions[index]
         if index > self._always and not held.any():
-            # Nothing to keep in step: FILL frames bring the level by and by, the most visible tiles first.
+            # The client has nothing that must be kept in step: FILL frames bring the level by and by, the most visible
+            # tiles first.
             self._stamps[index], self._moved[index], self._settled[index] = level.stamp, False, level.settled
             return None
         coarser = [pyramid.level(i) for i in range(index)]
@@ -108,7 +109,7 @@ class Ledger:
     def plan_fill(
         self, index: int, wanted: Mask | np.bool_, errors: NDArray[np.float32] | None = None
     ) -> FramePlan | None:
-        """A FILL frame of wanted tiles of a level that are not held, the largest of ``errors`` first."""
+        """Plans a FILL frame of wanted tiles of a level that are not held, the largest of ``errors`` first."""
         level = self._pyramid.level(index)
         if level is None:
             return None
@@ -124,7 +125,7 @@ class Ledger:
         return self._frame(FrameKind.FILL, level, keys[:FILL_TILES], []) if keys else None
 
     def plan_limit(self) -> FramePlan | None:
-        """Drops what is held above the finest level that is solved at present (``Pyramid.limit``)."""
+        """Drops the held tiles above the finest level that is solved at present (``Pyramid.limit``)."""
         for index in range(self._pyramid.top + 1, self._pyramid.levels + 1):
             gone = _keys(index, self.versions[index] > 0)
             if gone:
@@ -134,7 +135,7 @@ class Ledger:
         return None
 
     def commit(self, plan: FramePlan) -> None:
-        """The frame was handed to the socket: from now on the client counts as holding it."""
+        """Says that the frame was handed to the socket: from now on the client counts as holding it."""
         index, keys = plan.level, plan.keys
         held = self.versions[index]
         for key in plan.drops:
@@ -161,7 +162,7 @@ class Ledger:
                     self._moved[below] = True
 
     def _parents_held(self, level: int) -> Mask | bool:
-        """Where the parent's newest version is held, so that a child may be predicted from it."""
+        """Returns where the parent's newest version is held, so that a child may be predicted from it."""
         if level == 0:
             return True
         parent = self._pyramid.level(level - 1)
@@ -177,7 +178,8 @@ class Ledger:
         )
 
     def _tiles(self, level: Level, keys: Sequence[TileKey]) -> list[TilePlan]:
-        """Each tile with the states in which the client holds it and its parent, as far as the server knows them."""
+        """Returns each tile with the states in which the client holds it and its parent, as far as the server knows
+        them."""
         index = level.level
         held, bases = self.versions[index], self._bases[index]
         parent = self._pyramid.level(index - 1) if index else None

@@ -2,7 +2,7 @@
 
 They let go of the interpreter's lock, so the solver's thread and the event loop go on beside them. Each does, to the
 bit, what its NumPy twin does: ``stabiliser.steadied``, ``pyramid.quantise``, ``pyramid.follow_parents``,
-``bounds.SubPatches``, ``codec.upsampled``. They are compiled at their first call and kept on disk where a disk allows
+``bounds.SubPatches``, ``payload.upsampled``. They are compiled at their first call and kept on disk where a disk allows
 it.
 """
 
@@ -20,7 +20,7 @@ Floats = NDArray[np.float32]
 
 @kernel
 def steadied(heights: Floats, before: Floats, correction: Floats, out: Floats) -> None:
-    """``stabiliser.steadied`` of whole levels, (n, n) float32 each."""
+    """Computes ``stabiliser.steadied`` of whole levels, (n, n) float32 each."""
     rows, cols = heights.shape
     for r in range(rows):
         for k in range(cols):
@@ -32,7 +32,7 @@ def steadied(heights: Floats, before: Floats, correction: Floats, out: Floats) -
 
 @kernel
 def finite(heights: Floats) -> bool:
-    """Whether all of (n, m) float32 are: infinities and NaN have the largest exponent."""
+    """Returns whether all of (n, m) float32 are finite: infinities and NaN have the largest exponent."""
     bits = heights.view(np.int32)
     most = np.int32(0)
     for r in range(bits.shape[0]):
@@ -60,9 +60,9 @@ def quantised(heights: Floats, kept: Ints, scale: np.float32, quanta: int, limit
 
 @kernel
 def changed(new: Ints, old: Ints, cells: int, out: NDArray[np.bool_]) -> None:
-    """Which closed blocks of ``cells`` + 1 samples a side hold a sample that differs; out: (m, n) of False.
+    """Finds the closed blocks of ``cells`` + 1 samples a side that hold a sample that differs; out: (m, n) of False.
 
-    Most rows of a put are as they were: each is looked at as a whole first.
+    Most rows of a put are as they were, so each row is looked at as a whole first.
     """
     rows, cols = out.shape
     for r in range(new.shape[0]):
@@ -83,7 +83,8 @@ def changed(new: Ints, old: Ints, cells: int, out: NDArray[np.bool_]) -> None:
 
 @kernel
 def predicted(tile: Wide, shift: int, out: Wide) -> None:
-    """``codec.predict`` of one tile, (n, n) into (2n - 1, 2n - 1) of the same dtype, wide enough for the sums."""
+    """Computes ``payload.predict`` of one tile, (n, n) into (2n - 1, 2n - 1) of the same dtype, wide enough for the
+    sums."""
     n = tile.shape[0]
     wide = 2 * n - 1
     half = 1 << (shift - 1)
@@ -130,7 +131,7 @@ def followed(
 
 @kernel
 def bounded(samples: Ints, cells: int, low: Ints, high: Ints) -> None:
-    """Lowest and highest sample of closed blocks of ``cells`` + 1 samples a side; low, high: (m, n)."""
+    """Finds the lowest and highest sample of closed blocks of ``cells`` + 1 samples a side; low, high: (m, n)."""
     for i in range(low.shape[0]):
         for j in range(low.shape[1]):
             least, most = samples[i * cells, j * cells], samples[i * cells, j * cells]

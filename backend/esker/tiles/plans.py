@@ -25,12 +25,13 @@ CACHE_BYTES: Final = 32 * 1024 * 1024
 DIFFERENCES: Final = (Filter.ROW, Filter.PLANE)
 
 CacheKey = tuple[Channel, TileKey, int, int, int, int]
-"""Channel, tile, its version, its parent's; and the versions of both that it may be predicted from instead, 0 for
-none."""
+"""Channel, tile, its version, its parent's version; then the versions of both that the tile may be predicted from
+instead, 0 for none."""
 
 
 class EncodedTiles:
-    """LRU of coded tiles by (key, version, base version), shared by all clients of a room; safe across threads."""
+    """The coded tiles used last, by (key, version, base version), shared by all clients of a room; safe across
+    threads."""
 
     def __init__(self, limit: int = CACHE_BYTES) -> None:
         self._limit = limit
@@ -39,7 +40,7 @@ class EncodedTiles:
         self._bytes = 0
 
     def get(self, key: CacheKey) -> TileRecord | None:
-        """The coded tile, or None."""
+        """Returns the coded tile, or None."""
         with self._lock:
             found = self._items.get(key)
             if found is not None:
@@ -85,7 +86,7 @@ class TilePlan:
     parent_before: TileState | None = None
 
     def cache_key(self, channel: Channel) -> CacheKey:
-        """What the coded bytes depend on."""
+        """Returns all that the coded bytes depend on."""
         parent, before, above = (0 if s is None else s.version for s in (self.parent, self.before, self.parent_before))
         return channel, self.key, self.now.version, parent, before, above
 
@@ -104,20 +105,20 @@ class FramePlan:
     source: object
     cache: EncodedTiles
     smooth: bool = False
-    """Residuals are smooth, so filters are worth trying: those of refined tiles."""
+    """Whether residuals are smooth, so that filters are worth trying: those of refined tiles are."""
 
     @property
     def keys(self) -> tuple[TileKey, ...]:
-        """The tiles that it carries."""
+        """The tiles that the frame carries."""
         return tuple(tile.key for tile in self.tiles)
 
     def encode(self) -> bytes:
-        """The binary frame. Pure: the same plan always gives the same bytes."""
+        """Returns the binary frame. The function is pure: the same plan always gives the same bytes."""
         predictions: dict[tuple[TileKey, int], Wide] = {}
         scale = ratio(self.channel)
 
         def predicted(key: TileKey, state: TileState) -> Wide:
-            """The part of its parent's prediction that belongs to ``key``: made once for all four children."""
+            """Returns the part of its parent's prediction that belongs to ``key``: made once for all four children."""
             place = (key.parent(), state.version)
             if place not in predictions:
                 predictions[place] = predict(state.samples, scale)
@@ -136,7 +137,7 @@ class FramePlan:
 
 
 def _coded(tile: TilePlan, predicted: Callable[[TileKey, TileState], Wide], smooth: bool) -> TileRecord:
-    """A tile with the cheapest of its predictors, and the smallest of the filters that are worth a try."""
+    """Codes a tile with the cheapest of its predictors, and the smallest of the filters that are worth a try."""
     if tile.parent is not None and not smooth:
         own = predicted(tile.key, tile.parent)
         before, then = tile.before, tile.parent_before
@@ -164,7 +165,7 @@ def _coded(tile: TilePlan, predicted: Callable[[TileKey, TileState], Wide], smoo
 
 
 def _options(tile: TilePlan, predicted: Callable[[TileKey, TileState], Wide]) -> list[tuple[Predictor, int, Wide]]:
-    """What a tile may be predicted from, the version of that, and the residual."""
+    """Returns each way to predict a tile: predictor, version of what it predicts from, and residual."""
     key, now, parent, before, then = tile.key, tile.now, tile.parent, tile.before, tile.parent_before
     found: list[tuple[Predictor, int, Wide]] = []
     moved: Wide | None = None

@@ -33,9 +33,10 @@ PREVIEW_STEP: Final = 8
 """Quanta in which a preview changes samples of the finest level; half as many on each level above, so that all levels
 are equally exact in metres, and an error of a parent is none to its children. Settled levels are exact."""
 EARLY_PREVIEWS: Final = 8
-"""Coarsest previews that may have been shown since the job began whose finest preview comes."""
+"""So many coarsest previews are remembered: a finest preview is of one that was shown since its job began."""
 FOLLOW_TILES: Final = 256
-"""Most parents of which a level follows the movement; above, as after a change of all the ground, it starts afresh."""
+"""A level follows the movement of at most so many parents. With more, as after a change of all the ground, it starts
+afresh."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +56,7 @@ class Level:
     settled: bool
 
     def window(self, rows: slice, cols: slice) -> Ints:
-        """Some of the samples, as a view."""
+        """Returns some of the samples, as a view."""
         return self.samples[rows, cols]
 
 
@@ -77,7 +78,7 @@ def quantise(
     np.clip(steps, -SAMPLE_LIMIT, SAMPLE_LIMIT, out=steps)
     if kept is None:
         return np.asarray(np.rint(steps), dtype=np.int32)
-    # In float32 throughout: mixed with int32, numpy would compute in float64, four times as long.
+    # All stays in float32: with int32 beside it numpy would compute in float64, four times as long.
     away = kept.astype(np.float32)
     np.subtract(steps, away, out=away)
     moved = np.abs(away) >= step
@@ -87,7 +88,7 @@ def quantise(
 
 
 def follow_parents(samples: Ints, then: Level | None, now: Level | None, ratio: int = 2) -> Ints:
-    """A level moved along with its parent, as every client's decoder moves it (``codec.follow``); no new array if not.
+    """A level moved along with its parent, as every client's decoder moves it (``payload.follow``).
 
     ``samples``: (N_l, N_l); ``then`` and ``now``: the level above when the samples were put, and at present. Each
     parent tile moves its own four children. On an edge that two parents share both say the same, as the prediction
@@ -131,7 +132,7 @@ def moved_along(heights: NDArray[np.float32], then: Ints, now: Ints, quantum: fl
 
 
 def _between(a: NDArray[np.float32]) -> NDArray[np.float32]:
-    """(m, n) -> (m, 2n - 1): the four-point rule (-1, 9, 9, -1)/16 along rows, linear beside the ends."""
+    """Upsamples rows, (m, n) -> (m, 2n - 1): the four-point rule (-1, 9, 9, -1)/16, linear beside the ends."""
     out = np.empty((a.shape[0], 2 * a.shape[1] - 1), dtype=np.float32)
     out[:, ::2] = a
     odd = out[:, 1::2]
@@ -151,7 +152,7 @@ class Pyramid:
     """The newest quantised levels of one terrain. Mutable; owned by ``delivery.TileServer``."""
 
     ratio: ClassVar[int] = 2
-    """Quanta of a level in one of the next coarser level (see ``codec.predict``)."""
+    """Quanta of a level in one of the next coarser level (see ``payload.predict``)."""
 
     preview_step: ClassVar[int] = PREVIEW_STEP
 
@@ -170,25 +171,25 @@ class Pyramid:
         self._earlier: list[deque[Level]] = [deque(maxlen=_depth(level)) for level in range(levels + 1)]
         self._steadiers = [Steadier() for _ in range(levels + 1)]
         self._parents: list[Level | None] = [None] * (levels + 1)
-        """Per level: the level above as it was when this one was last put."""
+        """Each level's parent as it was when the level was last put."""
         self._previewed = -1
         """Clock of the newest preview of the finest level."""
         self._early: deque[tuple[int, Ints]] = deque(maxlen=EARLY_PREVIEWS)
         """The coarsest level as it was shown for the last previews, with their clocks, oldest first."""
         self._touched = [np.zeros((16 << level, 16 << level), dtype=np.uint32) for level in range(levels)]
-        """Per block: the stamp of its last change. The finest level moves nothing below it and keeps none."""
+        """Stamps of each block's last change. The finest level moves nothing below it and keeps none."""
         self._lineage: list[Counts] = []
         self._lineage_stamp = -1
         self._bounds: Bounds | None = None
         self._bounds_stamp = -1
 
     def states(self, level: int) -> list[Level]:
-        """The level as it is and as it was before the last few changes, newest first."""
+        """Returns the level as it is and as it was before the last few changes, newest first."""
         newest = self._levels[level]
         return [] if newest is None else [newest, *self._earlier[level]]
 
     def level(self, level: int) -> Level | None:
-        """The level as it is now, None before it first came."""
+        """Returns the level as it is now, None before it first came."""
         return self._levels[level]
 
     def settle(self, clock: int, level: int, heights: NDArray[np.float32]) -> int:
@@ -264,8 +265,11 @@ class Pyramid:
         self._early.append((clock, now.samples))
 
     def _ahead(self, clock: int, heights: NDArray[np.float32]) -> tuple[NDArray[np.float32], bool]:
-        """A finest preview moved by what the coarsest level has moved since it showed the same clock, and whether it
-        shows a newer one: strokes go on while the finest preview of what they were is made."""
+        """Moves a finest preview by what the coarsest level has moved since it showed the same clock.
+
+        Also returns whether the coarsest level shows a newer clock: strokes go on while the finest preview of older
+        ones is made.
+        """
         then = next((samples for shown, samples in self._early if shown == clock), None)
         if then is None or self._early[-1][0] == clock:
             return heights, False
@@ -274,14 +278,17 @@ class Pyramid:
         return moved_along(heights, then, self._early[-1][1], grid.quantum(0, self.size_m)), True
 
     def begin(self, clock: int, count: int) -> None:
-        """Of the coarsest ``count`` levels those that were never put become zero."""
+        """Makes those of the coarsest ``count`` levels zero that were never put."""
         for level in range(min(count, self.top + 1)):
             if self._levels[level] is None:
                 n = grid.samples(level)
                 self._store(clock, level, np.zeros((n, n), dtype=np.float32), True)
 
     def _store(self, clock: int, level: int, heights: NDArray[np.float32], settled: bool) -> int:
-        """Quantises what is to be shown of a level; versions rise where a sample changed. Returns how many tiles."""
+        """Quantises the heights that are to be shown of a level; versions rise where a sample changed.
+
+        Returns how many tiles changed.
+        """
         old = self._levels[level]
         parent = self._levels[level - 1] if level else None
         kept = None
@@ -327,7 +334,7 @@ class Pyramid:
         return np.asarray(blocks.reshape(side, per, side, per).any(axis=(1, 3)), dtype=np.bool_)
 
     def lineage(self) -> list[Counts]:
-        """Per level, (2^l, 2^l): when an ancestor last changed where it moves this tile, 0 for never."""
+        """Returns for each level, (2^l, 2^l), when an ancestor last changed where it moves this tile, 0 for never."""
         if self._lineage_stamp == self.stamp:
             return self._lineage
         self._lineage = [np.zeros((1 << level, 1 << level), dtype=np.uint32) for level in range(self.levels + 1)]
@@ -345,19 +352,20 @@ class Pyramid:
         return self._lineage
 
     def _mark(self, level: int, changed: Mask) -> None:
-        """Bounds to recompute: of the changed tiles, and of their children, whose error is against them."""
+        """Returns the tiles whose bounds are recomputed: the changed ones and their children, whose error is against
+        them."""
         self._dirty[level] |= changed
         if level < self.levels:
             self._dirty[level + 1] |= changed.repeat(2, axis=0).repeat(2, axis=1)
 
     def changes(self) -> Counts:
-        """Per tile of the finest level: when it or an ancestor last changed there, 0 for never."""
+        """Returns for each tile of the finest level when it or an ancestor last changed there, 0 for never."""
         level = self._levels[self.levels]
         above = self.lineage()[self.levels]
         return above if level is None else np.maximum(above, level.versions)
 
     def limit(self, top: int) -> None:
-        """From now on only levels 0..``top`` are solved: those above are forgotten. Raises ValueError."""
+        """Solves only levels 0..``top`` from now on: levels above are forgotten. Raises ValueError."""
         if not 0 <= top <= self.levels:
             raise ValueError(f"level {top} is not one of 0..{self.levels}")
         for level in range(top + 1, self.levels + 1):
@@ -369,12 +377,12 @@ class Pyramid:
         self.generation += 1
 
     def sub_patches(self, level: int) -> SubPatches:
-        """Bounds of a level's sub-patches as they are now; not to be changed."""
+        """Returns the bounds of a level's sub-patches as they are now; not to be changed."""
         self.bounds()
         return self._subs[level]
 
     def bounds(self) -> Bounds:
-        """Bounds of the newest levels, recomputed where samples changed since the last call."""
+        """Returns the bounds of the newest levels, recomputed where samples changed since the last call."""
         if self._bounds is not None and self._bounds_stamp == self.stamp:
             return self._bounds
         for i, level in enumerate(self._levels):
@@ -390,7 +398,10 @@ class Pyramid:
 
 @lru_cache(maxsize=1)
 def warm() -> None:
-    """Goes once through all compiled loops, so that they are compiled before anybody draws. Seconds, once a machine."""
+    """Goes once through all compiled loops, so that they are compiled before anybody draws.
+
+    This takes seconds, once a machine.
+    """
     pyramid = Pyramid(TILE_CELLS, 1)
     for clock, settled in enumerate((False, True, False, False)):
         for level in (0, 1):

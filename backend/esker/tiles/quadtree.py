@@ -38,12 +38,15 @@ _NEAR_CELLS: Final = 4.0
 
 
 def default_selection(levels: int) -> list[Mask]:
-    """What a client gets before it has sent a view: levels 0..2, one (2^l, 2^l) mask per level."""
+    """Returns the tiles that a client gets before it has sent a view: levels 0..2, one (2^l, 2^l) mask per level."""
     return [np.full((1 << level, 1 << level), level <= ALWAYS, dtype=np.bool_) for level in range(levels + 1)]
 
 
 def _axes(view: View) -> tuple[Vector, Vector, Vector, Vector]:
-    """Eye and unit vectors forward, right, up; some valid frame when eye and target coincide or lie on a plumb line."""
+    """Returns eye and unit vectors forward, right, up.
+
+    Where eye and target coincide or lie on a plumb line, the frame is some valid one.
+    """
     eye = np.asarray(view.eye, dtype=np.float64)
     forward = np.asarray(view.target, dtype=np.float64) - eye
     length = float(np.linalg.norm(forward))
@@ -51,7 +54,7 @@ def _axes(view: View) -> tuple[Vector, Vector, Vector, Vector]:
     fx, fy, fz = forward.tolist()
     across = math.hypot(fx, fy)
     rx, ry = (fy / across, -fx / across) if across > 1e-6 else (1.0, 0.0)
-    up = np.array([ry * fz, -rx * fz, rx * fy - ry * fx])  # right x forward: np.cross takes ten times as long
+    up = np.array([ry * fz, -rx * fz, rx * fy - ry * fx])  # this is right x forward: np.cross takes ten times as long
     return eye, forward, np.array([rx, ry, 0.0]), up
 
 
@@ -111,7 +114,7 @@ def screen_error(bounds: Boxes, view: View) -> tuple[Mask, Floats, Floats]:
 
 
 def restrict(masks: list[Mask]) -> list[Mask]:
-    """Smallest superset that holds every tile's parent and the parent's eight neighbours; changes ``masks``."""
+    """Grows ``masks`` to the smallest superset that holds every tile's parent and the parent's eight neighbours."""
     for level in range(len(masks) - 1, 0, -1):
         n = 1 << (level - 1)
         parents: Mask = np.asarray(masks[level].reshape(n, 2, n, 2).any(axis=(1, 3)), dtype=np.bool_)
@@ -120,13 +123,14 @@ def restrict(masks: list[Mask]) -> list[Mask]:
 
 
 def select(bounds: Bounds, view: View) -> tuple[list[Mask], list[Floats]]:
-    """Wanted tiles and their projected errors (pixels), one (2^l, 2^l) array per level, rows from the south."""
+    """Returns wanted tiles and their projected errors (pixels), one (2^l, 2^l) array per level, rows from the south."""
     found = screen_error(bounds, view)
     return _chosen(bounds, *found, MARGIN * view.tau_px), _by_level(bounds, found[1])
 
 
 def select_shown(bounds: Bounds, view: View) -> tuple[list[Mask], list[Mask], list[Floats]]:
-    """``select``, and between the two those of the wanted tiles that the view shows as it is: without MARGIN."""
+    """Returns what ``select`` does, with the wanted tiles that the view shows as it is, without MARGIN, between the
+    two."""
     found = screen_error(bounds, view)
     wanted, shown = (_chosen(bounds, *found, margin * view.tau_px) for margin in (MARGIN, 1.0))
     return wanted, shown, _by_level(bounds, found[1])
@@ -141,6 +145,6 @@ def _chosen(bounds: Bounds, inside: Mask, error: Floats, cell: Floats, tau: floa
 
 
 def _by_level(bounds: Bounds, flat: NDArray[T]) -> list[NDArray[T]]:
-    """An array over all tiles as one (2^l, 2^l) array per level."""
+    """Cuts an array over all tiles into one (2^l, 2^l) array per level."""
     sides = (1 << level for level in range(len(bounds.starts)))
     return [flat[start : start + n * n].reshape(n, n) for start, n in zip(bounds.starts, sides, strict=True)]

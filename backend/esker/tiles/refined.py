@@ -65,7 +65,7 @@ class Known:
 
 
 def code(x: NDArray[np.int64], y: NDArray[np.int64], level: int) -> NDArray[np.int64]:
-    """Tiles (n,) of a level as integers that sort by rows."""
+    """Returns tiles (n,) of a level as integers that sort by rows."""
     return (y << level) | x
 
 
@@ -82,10 +82,10 @@ class Under:
 
 
 class RefinedTiles:
-    """Mutable; owned by ``delivery.TileServer``, used from its thread.
+    """Refined tiles of one room.
 
-    ``levels``: the finest level solved as a whole; ``finest``: the finest that is refined. ``client_tiles``: most that
-    one client holds.
+    Mutable; owned by ``delivery.TileServer``, used from its thread. ``levels``: the finest level solved as a whole;
+    ``finest``: the finest that is refined. ``client_tiles``: most that one client holds.
     """
 
     def __init__(self, size_m: float, levels: int, finest: int, room_tiles: int | None = None) -> None:
@@ -95,9 +95,9 @@ class RefinedTiles:
         self.room_tiles = ROOM_TILES if room_tiles is None else room_tiles
         self.client_tiles = min(MAX_REFINED_TILES, self.room_tiles)
         self.stamp = 0
-        """Rises with every change; versions are values of this counter."""
+        """A counter that rises with every change; versions are its values."""
         self.generation = 0
-        """Rises when a selection might come out differently."""
+        """A counter that rises when a selection might come out differently."""
         self.epoch = 0
         self.active = False
         self.clock = -1
@@ -110,16 +110,17 @@ class RefinedTiles:
         return len(self._tiles)
 
     def get(self, key: TileKey) -> Refined | None:
-        """The tile as it was last made."""
+        """Returns the tile as it was last made."""
         return self._tiles.get(key)
 
     def verified(self, key: TileKey) -> Refined | None:
-        """The tile, if it belongs to the settled ground as it is."""
+        """Returns the tile, if it belongs to the settled ground as it is."""
         found = self._tiles.get(key)
         return found if found is not None and self.active and found.epoch == self.epoch else None
 
     def kept(self, key: TileKey, state: TileState) -> TileState:
-        """The same tile without the level that its samples may be a view of: one copy for all clients."""
+        """Returns the tile with samples of its own, since they may be a view of a whole level: one copy for all
+        clients."""
         if state.samples.base is None:
             return state
         found = self._bases.get((key, state.version))
@@ -128,19 +129,19 @@ class RefinedTiles:
         return found
 
     def suspend(self) -> None:
-        """The ground moves: nothing is verified until it has settled again."""
+        """Says that the ground moves: nothing is verified until it has settled again."""
         if self.active:
             self.active = False
             self.stamp += 1
 
     def begin(self, clock: int) -> None:
-        """The ground has settled at ``clock``."""
+        """Says that the ground has settled at ``clock``."""
         self.active, self.clock = True, clock
         self.epoch += 1
         self._changed()
 
     def takes(self, clock: int, key: TileKey, heights: NDArray[np.float32], pyramid: Pyramid) -> bool:
-        """Whether ``put`` would take this tile. Raises as it does."""
+        """Returns whether ``put`` would take this tile. Raises as ``put`` does."""
         side = 1 << max(0, key.level)
         if not (self.levels < key.level <= self.finest and 0 <= key.x < side and 0 <= key.y < side):
             raise ValueError(f"tile {tuple(key)} is not refined here")
@@ -157,9 +158,10 @@ class RefinedTiles:
         pyramid: Pyramid,
         under: Under | None = None,
     ) -> bool:
-        """Takes a tile of the settled solve at ``clock``; False when that is over, or the parent is not known.
+        """Takes a tile of the settled solve at ``clock``.
 
-        Raises ValueError for a key that is not refined here, a wrong shape, NaN or infinity.
+        Returns False when that ground is no longer the newest, or the parent is not known. Raises ValueError for a key
+        that is not refined here, a wrong shape, NaN or infinity.
         """
         if not self.takes(clock, key, heights, pyramid):
             return False
@@ -178,7 +180,7 @@ class RefinedTiles:
         return True
 
     def parent(self, key: TileKey, pyramid: Pyramid) -> Ints | None:
-        """The parent's samples as they are now."""
+        """Returns the parent's samples as they are now."""
         if key.level - 1 > self.levels:
             found = self.verified(key.parent())
             return None if found is None else found.state.samples
@@ -199,7 +201,7 @@ class RefinedTiles:
         return Refined(key, state, content, self.epoch, under.ground, *bounds)
 
     def known(self, level: int) -> Known:
-        """All tiles of a level, as arrays."""
+        """Returns all tiles of a level, as arrays."""
         found = self._known.get(level)
         if found is None:
             tiles = sorted((t for k, t in self._tiles.items() if k.level == level), key=lambda t: (t.key.y, t.key.x))
@@ -231,7 +233,7 @@ class RefinedTiles:
         return max(0, self.room_tiles - len(self._tiles))
 
     def keep(self, others: RefinedTiles) -> None:
-        """Forgets the tiles that ``others`` has not."""
+        """Forgets the tiles that are not in ``others``."""
         for key in [key for key in self._tiles if key not in others._tiles]:
             del self._tiles[key]
             self._known.pop(key.level, None)
@@ -246,7 +248,7 @@ class RefinedTiles:
 
 
 def _quantise(heights: NDArray[np.float32], level: int, size_m: float) -> Ints:
-    """Metres to quanta of the level, halves to even, saturating as the levels below do."""
+    """Rounds metres to quanta of the level, halves to even, saturating as the levels below do."""
     steps = heights * np.float32(1.0 / grid.quantum(level, size_m))
     samples: Ints = np.rint(np.clip(steps, -SAMPLE_LIMIT, SAMPLE_LIMIT)).astype(np.int32)
     samples.flags.writeable = False

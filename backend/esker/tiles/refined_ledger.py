@@ -40,7 +40,10 @@ class _Blocked(Exception):
 
 
 class RefinedLedger:
-    """Mutable; used from the room's tile thread. ``below``: the ledger of the channel up to the finest whole level."""
+    """The refined tiles that one client holds of a channel.
+
+    Mutable; used from the room's tile thread. ``below``: the ledger of the channel up to the finest whole level.
+    """
 
     def __init__(
         self, refined: RefinedTiles, below: Ledger, cache: EncodedTiles, channel: Channel = Channel.HEIGHT
@@ -49,16 +52,16 @@ class RefinedLedger:
         self._held: dict[int, dict[TileKey, _Held]] = {
             level: {} for level in range(refined.levels + 1, refined.finest + 1)
         }
-        """Per level, oldest first."""
+        """Tiles held of each level, oldest first."""
         self._moved: set[int] = set()
         """Levels that may show a preview: an ancestor was sent since their last LEVEL frame."""
 
     def held(self) -> dict[TileKey, int]:
-        """Versions that the client holds."""
+        """Returns the versions that the client holds."""
         return {key: tile.state.version for tiles in self._held.values() for key, tile in tiles.items()}
 
     def keys(self) -> set[TileKey]:
-        """What the client holds."""
+        """Returns the tiles that the client holds."""
         return {key for tiles in self._held.values() for key in tiles}
 
     # --- planning -----------------------------------------------------------------------------------------------
@@ -78,7 +81,8 @@ class RefinedLedger:
         return None, finest
 
     def plan_fill(self, level: int, selection: Selection, among: Set[TileKey] | None = None) -> FramePlan | None:
-        """A FILL frame of wanted tiles of a level, only of ``among`` if that is given, by their projected errors."""
+        """Plans a FILL frame of wanted tiles of a level, by their projected errors; only of those ``among``, if
+        given."""
         held = self._held[level]
         ready = [
             key
@@ -92,7 +96,10 @@ class RefinedLedger:
         return self._fill(level, ready, selection) if ready else None
 
     def _plan_level(self, level: int, selection: Selection) -> FramePlan | None:
-        """Raises _Blocked when a tile that is to be replaced, or fits one that is, has not been made yet."""
+        """Plans a LEVEL frame of a level.
+
+        Raises _Blocked when a tile that is to be replaced, or that fits such a tile, has not been made yet.
+        """
         held = self._held[level]
         if not held:
             self._moved.discard(level)
@@ -114,7 +121,10 @@ class RefinedLedger:
         return self._frame(FrameKind.LEVEL, level, sorted(send), sorted(drop))
 
     def _misfits(self, level: int, send: set[TileKey], drop: set[TileKey], selection: Selection) -> set[TileKey]:
-        """Held neighbours of older solves that tiles to send contradict and nobody looks at. Raises _Blocked."""
+        """Returns held neighbours of older solves that contradict tiles to send and at which nobody looks.
+
+        Raises _Blocked.
+        """
         gone: set[TileKey] = set()
         for key in send:
             for other in self._contradicted(level, key, send | drop):
@@ -124,7 +134,8 @@ class RefinedLedger:
         return gone
 
     def _contradicted(self, level: int, key: TileKey, besides: set[TileKey]) -> Iterator[TileKey]:
-        """Held neighbours, not of the present solve, whose samples on the common edge are not those of ``key``."""
+        """Returns held neighbours, not of the present solve, whose samples on the common edge are not those of
+        ``key``."""
         held, now = self._held[level], self._refined.verified(key)
         assert now is not None
         for dx, dy in AROUND:
@@ -162,7 +173,10 @@ class RefinedLedger:
         return None
 
     def _parent(self, key: TileKey) -> TileState | None:
-        """The parent as the client holds it, if it does. It is the newest: the levels below were brought up to date."""
+        """Returns the parent as the client holds it, or None.
+
+        It is the newest: the levels below were brought up to date.
+        """
         up = key.parent()
         if up.level == self._refined.levels:
             return self._below.newest(up)
@@ -170,7 +184,7 @@ class RefinedLedger:
         return None if held is None else held.state
 
     def _held_parent(self, key: TileKey) -> TileState:
-        """The parent of a held tile."""
+        """Returns the parent of a held tile."""
         found = self._parent(key)
         assert found is not None, "whoever holds a tile holds its parent"
         return found
@@ -191,7 +205,8 @@ class RefinedLedger:
     # --- what was sent ------------------------------------------------------------------------------------------
 
     def commit(self, plan: FramePlan) -> None:
-        """A frame of the channel was handed to the socket, of these levels or of one below (then committed there)."""
+        """Says that a frame of the channel was handed to the socket, of these levels or of one below (then committed
+        there)."""
         for key in plan.drops:
             self._forget(key)
         if plan.level > self._refined.levels:
@@ -205,7 +220,7 @@ class RefinedLedger:
             self._moved |= {level for level, tiles in self._held.items() if level > plan.level and tiles}
 
     def _confirm(self, level: int) -> None:
-        """All tiles of the level are exact: their decoder takes their parents as they are now."""
+        """Says that all tiles of the level are exact: their decoder takes their parents as they are now."""
         self._moved.discard(level)
         held = self._held[level]
         for key, tile in held.items():
@@ -214,7 +229,7 @@ class RefinedLedger:
                 held[key] = _Held(tile.state, self._refined.kept(key.parent(), parent))
 
     def _forget(self, gone: TileKey) -> None:
-        """A tile was dropped, and with it all its descendants."""
+        """Forgets a tile that was dropped, and with it all its descendants."""
         for below, tiles in self._held.items():
             shift = below - gone.level
             if shift < 0:
@@ -224,7 +239,7 @@ class RefinedLedger:
 
 
 def _edge(samples: Ints, dx: int, dy: int) -> Ints:
-    """The samples that a tile shares with its neighbour in this direction."""
+    """Returns the samples that a tile shares with its neighbour in this direction."""
     rows = {-1: slice(0, 1), 0: slice(None), 1: slice(64, 65)}[dy]
     cols = {-1: slice(0, 1), 0: slice(None), 1: slice(64, 65)}[dx]
     return samples[rows, cols]

@@ -27,7 +27,7 @@ from esker.tiles.refined import Known, RefinedTiles, code
 Index = NDArray[np.int64]
 
 EXPECTED: Final = np.float32(0.5)
-"""The error of a tile as a part of its parent's, where it is not known."""
+"""A tile whose error is not known is taken to have this part of its parent's error."""
 LIKELY: Final = 8.0
 """A tile that is not known is taken for as bad as that where it is this many times too bad: so several levels are made
 in one go near crests, in fewer and fuller steps."""
@@ -44,14 +44,14 @@ class Selection:
 
     @staticmethod
     def nothing(levels: int, finest: int) -> Selection:
-        """No tile of any level above ``levels``."""
+        """Returns a selection without tiles, for all levels above ``levels``."""
         n = finest - levels
         empty = np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.float32)
         return Selection(levels + 1, (empty[0],) * n, (empty[1],) * n)
 
     @property
     def count(self) -> int:
-        """Tiles wanted."""
+        """The number of tiles wanted."""
         return sum(len(c) for c in self.codes)
 
     @cached_property
@@ -67,7 +67,7 @@ class Selection:
 
 @dataclass(frozen=True, eq=False)
 class _Boxes:
-    """Tiles of one level as ``quadtree.screen_error`` reads them."""
+    """Returns tiles of one level as ``quadtree.screen_error`` reads them."""
 
     size_m: float
     x: Floats
@@ -142,7 +142,10 @@ def select_refined(pyramid: Relief, refined: RefinedTiles, wanted: Mask, view: V
 
 
 def restrict_below(selection: Selection, wanted: list[Mask]) -> bool:
-    """Adds to the mask of the level below the parents of selected tiles and their neighbours; True if it changed."""
+    """Adds the parents of selected tiles and their neighbours to the mask of the level below.
+
+    Returns True if it changed.
+    """
     level = selection.first - 1
     if not selection.codes or not len(selection.codes[0]):
         return False
@@ -155,7 +158,7 @@ def restrict_below(selection: Selection, wanted: list[Mask]) -> bool:
 
 
 def _around_parents(codes: Index, level: int) -> Index:
-    """Codes of the parents' level: each tile's parent and the parent's eight neighbours; sorted, unique."""
+    """Returns codes of the parents' level: each tile's parent and the parent's eight neighbours; sorted, unique."""
     side = 1 << (level - 1)
     parents = np.unique(code((codes & ((1 << level) - 1)) >> 1, codes >> (level + 1), level - 1))
     x, y = parents & (side - 1), parents >> (level - 1)
@@ -167,7 +170,7 @@ def _around_parents(codes: Index, level: int) -> Index:
 
 
 def _finest(pyramid: Relief, wanted: Mask) -> _Parents:
-    """The wanted tiles of the pyramid's finest level."""
+    """Returns the wanted tiles of the pyramid's finest level."""
     y, x = np.nonzero(wanted)
     q = np.float32(grid.quantum(pyramid.levels, pyramid.size_m))
     subs = pyramid.sub_patches(pyramid.levels)
@@ -184,7 +187,7 @@ def _finest(pyramid: Relief, wanted: Mask) -> _Parents:
 
 @dataclass(frozen=True, eq=False)
 class _Children:
-    """The four children of each parent: places and boxes (4n,); which are known, and where in ``made``."""
+    """Returns the four children of each parent: places and boxes (4n,); which are known, and where in ``made``."""
 
     x: Index
     y: Index
@@ -192,11 +195,11 @@ class _Children:
     known: NDArray[np.bool_]
     at: Index
     same: NDArray[np.bool_]
-    """The ground there has not changed since the tile was made."""
+    """Tiles under which the ground has not changed since they were made."""
     made: Known
 
     def parents(self, chosen: NDArray[np.bool_], likely: NDArray[np.bool_]) -> _Parents:
-        """The chosen ones that are known, and the likely ones that are not: from them selection goes on downward."""
+        """Selection goes on downward from the chosen tiles that are known and the likely ones that are not."""
         mask = chosen & self.known
         at, changed = self.at[mask], ~self.same[mask]
         low, high, error = self.made.low[at], self.made.high[at], self.made.error[at]

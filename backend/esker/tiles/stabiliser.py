@@ -29,7 +29,10 @@ class Steadier:
         self._reference: tuple[Heights, Heights] | None = None
 
     def settled(self, clock: int, heights: Heights) -> None:
-        """The level is final for ``clock``; its preview, if it was one of the same clock, becomes the reference."""
+        """Says that the level is final for ``clock``.
+
+        Its preview, if it was one of the same clock, becomes the reference.
+        """
         if self._preview is None or self._preview[0] != clock:
             self._reference = None
             return
@@ -37,16 +40,16 @@ class Steadier:
         self._reference = (preview, heights - preview)
 
     def note(self, clock: int, heights: Heights) -> None:
-        """A preview that is not shown: remembered as what the settled heights of its clock will be compared with."""
+        """Remembers a preview that is not shown: the settled heights of its clock will be compared with it."""
         self._preview = (clock, heights)
 
     def late(self, clock: int, heights: Heights) -> None:
-        """A preview that comes behind a finer one of its clock and is not shown: noted, unless one was before."""
+        """Notes a preview that comes behind a finer one of its clock and is not shown, unless one was noted before."""
         if self._preview is None or self._preview[0] != clock:
             self.note(clock, heights)
 
     def preview(self, clock: int, heights: Heights) -> Heights:
-        """What to show for a preview; ``heights`` itself when nothing is known."""
+        """Returns what to show for a preview: ``heights`` itself when nothing is known."""
         self.note(clock, heights)
         if self._reference is None:
             return heights
@@ -56,7 +59,7 @@ class Steadier:
 
 
 def steadied(heights: Heights, before: Heights, correction: Heights) -> Heights:
-    """What to show for a preview: the rule above for ``p1``, ``p0`` and ``b``. Twin of ``loops.steadied``."""
+    """Returns what to show for a preview: the rule above for ``p1``, ``p0`` and ``b``. Twin of ``loops.steadied``."""
     moved = heights - before
     np.abs(moved, out=moved)
     left = np.abs(correction)

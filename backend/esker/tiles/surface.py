@@ -38,7 +38,7 @@ class BasePyramid(Pyramid):
 
 
 def total(offset: Ints, base: Ints) -> Ints:
-    """Quanta of the ground as it is drawn, saturating like its parts."""
+    """Returns the quanta of the ground as it is drawn, offsets and base, saturating like both."""
     return np.asarray(np.clip(offset + base, -SAMPLE_LIMIT, SAMPLE_LIMIT))
 
 
@@ -51,10 +51,10 @@ class Surface:
         self._subs: list[SubPatches] | None = None
         n = offsets.levels + 1
         self._seen: list[tuple[Level | None, Level | None]] = [(None, None)] * n
-        """Per level: what ``_subs`` was made from."""
+        """The samples from which each level of ``_subs`` was made."""
         self._bounds: tuple[int, Bounds] | None = None
         self._moved: tuple[Counts, Counts] | None = None
-        """What each pyramid said last of its changes."""
+        """The changes that each pyramid reported last."""
         self._changes = np.zeros((1 << offsets.levels,) * 2, dtype=np.uint32)
         self._changes_stamp = -1
 
@@ -70,12 +70,12 @@ class Surface:
 
     @property
     def stamp(self) -> int:
-        """Rises with every put of either part."""
+        """A counter that rises with every put of either part."""
         return self._offsets.stamp + self._base.stamp
 
     @property
     def generation(self) -> int:
-        """Rises when a selection might come out differently."""
+        """A counter that rises when a selection might come out differently."""
         return self._offsets.generation + self._base.generation
 
     def changes(self) -> Counts:
@@ -94,7 +94,7 @@ class Surface:
         return self._changes
 
     def sub_patches(self, level: int) -> SubPatches:
-        """Bounds of a level's sub-patches as they are now; not to be changed."""
+        """Returns the bounds of a level's sub-patches as they are now; not to be changed."""
         if not self._base.held:
             return self._offsets.sub_patches(level)
         self.bounds()
@@ -123,7 +123,7 @@ class Surface:
         return found
 
     def _dirty(self, level: int) -> NDArray[np.bool_] | None:
-        """Which tiles of the level changed since ``bounds`` saw it; None where there is no such level."""
+        """Returns which tiles of the level changed since ``bounds`` saw it; None where there is no such level."""
         now = self._offsets.level(level), self._base.level(level)
         if now[0] is None:
             return None

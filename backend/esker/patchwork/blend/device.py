@@ -28,7 +28,7 @@ _lock: Final = threading.Lock()
 
 
 class ClDevice(Protocol):
-    """What is used of an opened OpenCL device."""
+    """The part of an opened OpenCL device that the blend uses."""
 
     @property
     def context(self) -> Any: ...
@@ -37,7 +37,7 @@ class ClDevice(Protocol):
 
 
 class Program:
-    """The kernel for smooth or linear patches, built for one context. Raises pyopencl errors if it does not build."""
+    """Builds the kernel for smooth or linear patches for one context. Raises pyopencl errors if it does not build."""
 
     def __init__(self, device: ClDevice, smooth: bool) -> None:
         import pyopencl as cl
@@ -88,7 +88,7 @@ class Program:
 
 
 def program(device: ClDevice, smooth: bool) -> Program:
-    """The built kernel for a device: once a context."""
+    """Returns the built kernel for a device: built once a context."""
     with _lock:
         built = _programs.setdefault(device.context, {})
         if smooth not in built:

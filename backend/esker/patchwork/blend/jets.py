@@ -17,13 +17,13 @@ Line = tuple[float, float, float]
 
 @kernel
 def tensor(g: Line, h: Line) -> Jet:
-    """Of g(u) h(v), in u and v."""
+    """Returns the jet of g(u) h(v), in u and v."""
     return g[0] * h[0], g[1] * h[0], g[0] * h[1], g[2] * h[0], g[1] * h[1], g[0] * h[2]
 
 
 @kernel
 def turned(f: Jet, to: NDArray[np.float64]) -> Jet:
-    """From u, v to x, y, where (u, v) = ``to`` (2, 3) (x, y, 1)."""
+    """Takes a jet from u, v to x, y, where (u, v) = ``to`` (2, 3) (x, y, 1)."""
     a, b, d, e = to[0, 0], to[0, 1], to[1, 0], to[1, 1]
     return (
         f[0],
@@ -37,7 +37,7 @@ def turned(f: Jet, to: NDArray[np.float64]) -> Jet:
 
 @kernel
 def product(f: Jet, g: Jet) -> Jet:
-    """Of f g."""
+    """Returns the jet of f g."""
     return (
         f[0] * g[0],
         f[1] * g[0] + f[0] * g[1],
@@ -50,7 +50,7 @@ def product(f: Jet, g: Jet) -> Jet:
 
 @kernel
 def quotient(f: Jet, g: Jet) -> Jet:
-    """Of f / g, g not 0."""
+    """Returns the jet of f / g, g not 0."""
     q = f[0] / g[0]
     x, y = (f[1] - q * g[1]) / g[0], (f[2] - q * g[2]) / g[0]
     return (
@@ -65,25 +65,25 @@ def quotient(f: Jet, g: Jet) -> Jet:
 
 @kernel
 def total(f: Jet, g: Jet) -> Jet:
-    """Of f + g."""
+    """Returns the jet of f + g."""
     return f[0] + g[0], f[1] + g[1], f[2] + g[2], f[3] + g[3], f[4] + g[4], f[5] + g[5]
 
 
 @kernel
 def scaled(f: Jet, by: float) -> Jet:
-    """Of f times a number."""
+    """Returns the jet of f times a number."""
     return by * f[0], by * f[1], by * f[2], by * f[3], by * f[4], by * f[5]
 
 
 @kernel
 def rest(f: Jet) -> Jet:
-    """Of 1 - f."""
+    """Returns the jet of 1 - f."""
     return 1 - f[0], -f[1], -f[2], -f[3], -f[4], -f[5]
 
 
 @kernel
 def composed(f: Jet, g: Line) -> Jet:
-    """Of g(f), where ``g`` is the value and the derivatives of g at f."""
+    """Returns the jet of g(f), where ``g`` is the value and the derivatives of g at f."""
     return (
         g[0],
         g[1] * f[1],
@@ -96,7 +96,8 @@ def composed(f: Jet, g: Line) -> Jet:
 
 @kernel
 def spline_jet(c: NDArray[np.float32], u: float, v: float, end: int) -> Jet:
-    """Of a cubic spline with B-spline coefficients ``c``, ``c[1, 1]`` at u = v = 0; cells 0..``end`` a side."""
+    """Returns the jet of a cubic spline with B-spline coefficients ``c``, ``c[1, 1]`` at u = v = 0; cells 0..``end`` a
+    side."""
     i, j = min(max(int(u), 0), end), min(max(int(v), 0), end)
     f, g = u - i, v - j
     a, b = weights(f), weights(g)
@@ -127,7 +128,7 @@ def weights(f: float) -> tuple[Line, Line, Line, Line]:
 
 @kernel
 def linear_jet(c: NDArray[np.float32], u: float, v: float, end: int) -> Jet:
-    """Of a bilinear patch with samples ``c``."""
+    """Returns the jet of a bilinear patch with samples ``c``."""
     i, j = min(max(int(u), 0), end), min(max(int(v), 0), end)
     f, g = u - i, v - j
     south, north = c[j, i + 1] - c[j, i], c[j + 1, i + 1] - c[j + 1, i]

@@ -126,7 +126,7 @@ def identities(model: Model, index: NDArray[np.int32]) -> NDArray[np.uint64]:
 
 
 def layer_number(layer: Layer) -> int:
-    """Of all that the heights of a layer's patches follow from."""
+    """Returns a number that follows from all that the heights of a layer's patches follow from."""
     text = repr((layer.content, layer.anchor, layer.rotation_deg, layer.spacing_m, layer.scale, layer.lift_m))
     return int.from_bytes(hashlib.blake2b(text.encode(), digest_size=8).digest(), "little")
 
@@ -139,7 +139,7 @@ def _mixed(x: NDArray[np.uint64]) -> NDArray[np.uint64]:
 
 
 def bins(packed: Pack, lattice: Lattice) -> Bins:
-    """Which patches meet which bin of a lattice."""
+    """Finds which patches meet which bin of a lattice."""
     r0, r1, c0, c1 = lattice.bins
     count = (r1 - r0) * (c1 - c0)
     found = np.zeros(count + 1, dtype=np.int64)

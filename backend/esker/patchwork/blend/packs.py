@@ -35,7 +35,7 @@ class Pack:
 
 
 class Bins(NamedTuple):
-    """Which patches meet which bin (CSR), and where the bin's first sample lies in them.
+    """A table of the patches that meet each bin (CSR), and of where the bin's first sample lies in them.
 
     Patches of bin b (row by row) are ``patch[start[b]:start[b + 1]]``; ``origin`` float32 (entries, 2) are u and v of
     the bin's first sample; ``step`` float32 (n, 4) u and v a column, then u and v a row, of every patch.

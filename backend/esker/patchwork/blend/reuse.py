@@ -1,4 +1,5 @@
-"""What of a base stays when layers change: which bins of a level the patches that differ between two models reach."""
+"""Finds the part of a base that stays when layers change: which bins of a level the patches that differ between two
+models reach."""
 
 from __future__ import annotations
 
@@ -75,7 +76,8 @@ def met_bins(rects: Iterable[tuple[float, float, float, float]], lattice: Lattic
 
 
 def reached(model: Model, other: Model) -> grid.Rect | None:
-    """Around the domains of all patches in which two models differ at any tolerance; None if in none."""
+    """Returns a rectangle around the domains of all patches in which two models differ at any tolerance; None if in
+    none."""
     rect = None
     for m, index in zip((model, other), differing(model, other, None), strict=True):
         if len(index) == 0:

@@ -139,9 +139,10 @@ def _meet(
     count: int,
     best: float,
 ) -> tuple[Ints, int, float]:
-    """What a greater patch q is to a kernel at (x, y): all of it, then its error is ``best``; a part, then it is found.
+    """Compares a greater patch q with a kernel at (x, y).
 
-    ``other``: room for its corners.
+    Where q holds all of the kernel its error becomes ``best``; where q holds a part it is found. ``other``: room for
+    its corners.
     """
     local(ix.kernel, q, x, y, other)
     if contains(other, quad, ix.slack[q] + tolerance):
@@ -225,7 +226,7 @@ def _tops(ix: Index, which: Ints, start: int, stop: int, out: Floats) -> None:
 def _better(ix: Index, p: int, layer: int, found: Ints, count: int) -> tuple[Ints, int]:
     """Add the greatest patches of a layer that are more accurate than p and near it, from the layer's top down."""
     x0, x1, y0, y1 = _box(ix, layer, ix.kernel[p])
-    # One patch is at the top and each has four children, so this many can wait at most.
+    # At most so many can wait: one patch is at the top, and each has four children.
     stack = np.empty((4 * ix.scales[layer] + 4, 3), np.int64)
     stack[0, 0], stack[0, 1], stack[0, 2] = ix.scales[layer] - 1, 0, 0
     waiting = 1
@@ -262,7 +263,7 @@ def _better(ix: Index, p: int, layer: int, found: Ints, count: int) -> tuple[Int
 
 @kernel
 def _floors(ix: Index, which: Ints, start: int, stop: int, out: NDArray[np.bool_]) -> None:
-    """Whether more accurate patches leave some of the kernels of patches to them."""
+    """Returns whether more accurate patches leave some of the kernels of patches to them."""
     own, quad, other = np.empty((4, 2)), np.empty((4, 2)), np.empty((4, 2))
     found = np.empty(64, np.int64)
     for w in range(start, stop):
@@ -285,14 +286,14 @@ def _floors(ix: Index, which: Ints, start: int, stop: int, out: NDArray[np.bool_
 
 
 def tops(ix: Index, which: Ints) -> Floats:
-    """Tops of the patches ``which``."""
+    """Returns the tops of the patches ``which``."""
     out = np.empty(len(which))
     spread(lambda a, b: _tops(ix, which, a, b, out), bands(len(which), 64))
     return out
 
 
 def floors(ix: Index, which: Ints) -> NDArray[np.bool_]:
-    """Which of the patches ``which`` are the floor of some place."""
+    """Returns which of the patches ``which`` are the floor of some place."""
     out = np.empty(len(which), bool)
     spread(lambda a, b: _floors(ix, which, a, b, out), bands(len(which), 64))
     return out

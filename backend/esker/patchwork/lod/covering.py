@@ -65,7 +65,7 @@ def _cut(
     count: int,
     best: float,
 ) -> float:
-    """:func:`least_cover` by cutting."""
+    """Computes :func:`least_cover` by cutting."""
     other = np.empty((4, 2))
     pieces, corners = np.empty((1, MOST, 2)), np.full(1, 4, np.int64)
     for c in range(4):
@@ -148,7 +148,7 @@ def least_cover(
         if limit <= found or (whether and limit < best):
             continue
         if met <= FEW or depth == DEEPEST:
-            # What may be left is a share of the whole quad: a sliver lies in one quarter, seldom in two.
+            # The share that may be left over is of the whole quad: a sliver lies in one quarter, seldom in two.
             z = _cut(kernels, slack, min_z, part, whole, x, y, lists[depth], met, limit)
             if z == best:
                 return best

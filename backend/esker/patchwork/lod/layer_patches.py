@@ -1,4 +1,4 @@
-"""All patches of one layer in the world, as arrays. What follows from the layer alone."""
+"""All patches of one layer in the world, as arrays: all that follows from the layer alone."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def mapped(matrix: Floats, points: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class LayerPatches:
-    """The n patches of one layer, ordered by (scale, j, i). Fields as in ``lod_space.Model``; and
+    """The n patches of one layer, ordered by (scale, j, i). Fields as in ``space.Model``; and
 
     ``own``: accuracy + own error, metres. ``area``: log2 of the nominal kernel's area in steps of AREA_QUANTA.
     ``tables[scale]``: index of patch (j, i) of the layer, -1 where there is none. Patches of the rim come first, by
@@ -204,7 +204,7 @@ def _counter_clockwise(kernel: Floats) -> Floats:
 
 
 def reached(of: LayerPatches, by: LayerPatches) -> NDArray[np.bool_]:
-    """Which patches of ``of`` have a domain that may touch the grid of ``by`` (never misses one)."""
+    """Returns which patches of ``of`` have a domain that may touch the grid of ``by`` (never misses one)."""
     rows, cols = by.placed.raster.heights.shape
     edge = 0.5 + by.sway
     out = np.empty(of.count, np.bool_)

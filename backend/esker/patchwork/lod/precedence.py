@@ -41,7 +41,7 @@ def _cell(layer: Layer) -> float:
 
 
 def _meet(a: Layer, b: Layer) -> bool:
-    """Whether the bounds of two layers' footprints overlap."""
+    """Returns whether the bounds of two layers' footprints overlap."""
     (ax0, ay0, ax1, ay1), (bx0, by0, bx1, by1) = _bounds(a), _bounds(b)
     return ax0 < bx1 and bx0 < ax1 and ay0 < by1 and by0 < ay1
 

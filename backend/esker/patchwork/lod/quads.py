@@ -57,7 +57,7 @@ def clipped(
 
 @kernel
 def contains(quad: Floats, points: Floats, tolerance: float) -> bool:
-    """Whether a quad, grown by ``tolerance``, holds all four corners of another."""
+    """Returns whether a quad, grown by ``tolerance``, holds all four corners of another."""
     for k in range(4):
         m = (k + 1) % 4
         dx, dy = quad[m, 0] - quad[k, 0], quad[m, 1] - quad[k, 1]
@@ -70,7 +70,8 @@ def contains(quad: Floats, points: Floats, tolerance: float) -> bool:
 
 @kernel
 def overlap(first: Floats, second: Floats, slack: float) -> bool:
-    """Whether two quads share more than an edge, the second one grown by ``slack`` (separating axes of both)."""
+    """Returns whether two quads share more than an edge, the second one grown by ``slack`` (separating axes of
+    both)."""
     for turn in range(2):
         a, b = (first, second) if turn == 0 else (second, first)
         for k in range(4):

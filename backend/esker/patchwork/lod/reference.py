@@ -100,7 +100,8 @@ def top(model: Model, p: int) -> float:
 
 
 def floor(model: Model, p: int) -> bool:
-    """Whether p is not wiped out and more accurate patches (of equal ones the greater) leave some of its kernel."""
+    """Returns whether p is not wiped out and more accurate patches (of equal ones the greater) leave some of its
+    kernel."""
     if model.max_z[p] <= model.min_z[p]:
         return False
     mine = float(model.min_z[p])

@@ -148,8 +148,8 @@ def _by_blocks(
     start: int,
     stop: int,
 ) -> float:
-    """The same for lattices without a bend, less the blocks that cannot hold the greatest: samples and patch are too
-    near to each other there. The middles of all blocks come first."""
+    """Finds the greatest distance for lattices without a bend, leaving out the blocks that cannot hold it: samples and
+    patch are too near to each other there. The middles of all blocks come first."""
     cols = heights.shape[1]
     left, right = np.empty(BLOCK, np.int64), np.empty(BLOCK, np.int64)
     worst = -1.0
@@ -192,7 +192,7 @@ def _most(
     first: int,
     last: int,
 ) -> float:
-    """More than any distance of a sample [top..end, first..last] of block [bj, bi] from a patch."""
+    """Returns more than any distance of a sample [top..end, first..last] of block [bj, bi] from a patch."""
     low, high = blocks.low[bj - blocks.row, bi - blocks.col], blocks.high[bj - blocks.row, bi - blocks.col]
     if low > high:
         return -2.0

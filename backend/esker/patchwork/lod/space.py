@@ -64,7 +64,7 @@ class Model:
 
     @property
     def count(self) -> int:
-        """Patches, wiped out ones too."""
+        """The number of patches, wiped out ones counted."""
         return len(self.min_z)
 
     def samples(self, index: int) -> NDArray[np.float32]:

@@ -143,7 +143,8 @@ def _summarise(layer: int, t: Tree, found: Boxes) -> None:
 
 @kernel
 def apart(corners: Floats, x0: float, y0: float, x1: float, y1: float) -> bool:
-    """Whether a parallelogram (4, 2) and an upright rectangle whose boxes meet are apart: by the former's own axes."""
+    """Returns whether a parallelogram (4, 2) and an upright rectangle whose boxes meet are apart, by the axes of the
+    parallelogram."""
     for side in range(2):
         ax, ay = corners[side, 0], corners[side, 1]
         nx, ny = -(corners[side + 1, 1] - ay), corners[side + 1, 0] - ax

@@ -138,7 +138,10 @@ def _least(values: Floats, step: int, axis: int) -> Floats:
 
 
 class Index:
-    """What queries of one model need. Immutable; ``updated`` makes that of a changed model with what stayed."""
+    """The arrays that queries of one model need.
+
+    Immutable; ``updated`` makes those of a changed model and keeps what stayed.
+    """
 
     def __init__(self, model: Model) -> None:
         self.model = model
@@ -295,7 +298,7 @@ class Index:
         return safe
 
     def _needed(self, chosen: Chosen, surface: Surface) -> Chosen:
-        """Without those that other layers' greater patches, accurate enough themselves, cover."""
+        """Leaves out patches that other layers' greater patches, accurate enough themselves, cover."""
         lowest = surface.lowest(self.boxes.box[chosen])
         keep = np.ones(len(chosen), dtype=bool)
         for at in np.flatnonzero(self.model.max_z[chosen] <= lowest):
@@ -308,7 +311,7 @@ class Index:
 
 
 def difference(before: Chosen, after: Chosen) -> tuple[Chosen, Chosen]:
-    """What came and what went between two answers from one model: (added, removed), each ascending."""
+    """Returns the patches that came and went between two answers from one model: (added, removed), each ascending."""
     return np.setdiff1d(after, before), np.setdiff1d(before, after)
 
 

@@ -48,7 +48,7 @@ def _whole_kernels(heights: Heights, size: int, start: int, stop: int, out: NDAr
 
 
 def whole_kernels(heights: Heights) -> NDArray[np.bool_] | None:
-    """Which of the smallest kernels of a grid hold no nodata; None if the grid holds none at all."""
+    """Finds which of the smallest kernels of a grid hold no nodata; None if the grid holds none at all."""
     rows, cols = heights.shape
     holed = np.zeros(rows, np.bool_)
     paging.sweep(lambda a, b: _any_nodata(heights, a, b, holed), heights, 64)

@@ -35,7 +35,8 @@ def mipmaps(heights: Floats) -> tuple[Floats, ...]:
 
 
 def following(a: float, b: float, c: float) -> float:
-    """What comes after c, b, a: the lesser of the two slopes goes on, none where they have opposite signs."""
+    """Returns the sample that comes after c, b, a: the lesser of the two slopes goes on, none where they have opposite
+    signs."""
     if np.isnan([a, b, c]).any():
         return float("nan")
     steps = np.array([a - b, b - c])

@@ -12,7 +12,7 @@ from esker.contract import EDGE_POINTS, CurvePoint
 from esker.patchwork.raster.patches import warped
 
 LEAST_BEND: Final = 0.25
-"""Of a step of the lattice: an edge that bends less is as good as straight."""
+"""An edge that bends less than this share of a step of the lattice is as good as straight."""
 DIGITS: Final = 3
 
 

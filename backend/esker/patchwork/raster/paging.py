@@ -21,9 +21,10 @@ STRIP_BYTES: Final = 1 << 24
 
 
 def let_go(array: NDArray[Any], start: int = 0, stop: int | None = None) -> None:
-    """Take rows start..stop of a mapped file out of this process's memory. Does nothing for any other array.
+    """Takes rows start..stop of a mapped file out of this process's memory.
 
-    Nor for one that is mapped copy-on-write: what was written to it is nowhere else.
+    An array that is no such file is left alone, and so is one that is mapped copy-on-write: what was written to it is
+    nowhere else.
     """
     holder = _mapping(array)
     if holder is None or not hasattr(mmap, "MADV_DONTNEED"):
@@ -51,7 +52,7 @@ def _mapping(array: NDArray[Any]) -> mmap.mmap | None:
 
 
 def mapped(array: NDArray[Any]) -> bool:
-    """Whether an array is a view of a mapped file that rows can be let go of."""
+    """Returns whether an array is a view of a mapped file that rows can be let go of."""
     return _mapping(array) is not None
 
 

@@ -167,14 +167,14 @@ def _bend(rows: int, cols: int, warp: Floats, low: Floats, high: Floats, kernel:
 
 
 def _all_of_four(valid: Mask) -> Mask:
-    """Whether all (up to four) children of each parent are valid."""
+    """Returns whether all (up to four) children of each parent are valid."""
     padded = np.ones((-(-valid.shape[0] // 2) * 2, -(-valid.shape[1] // 2) * 2), bool)
     padded[: valid.shape[0], : valid.shape[1]] = valid
     return np.asarray(padded.reshape(padded.shape[0] // 2, 2, -1, 2).all(axis=(1, 3)), np.bool_)
 
 
 def _four_of(parents: Mask, shape: tuple[int, int]) -> Mask:
-    """What a parent is, for each of its children."""
+    """Repeats each parent's value for its children."""
     return parents.repeat(2, 0).repeat(2, 1)[: shape[0], : shape[1]]
 
 

@@ -60,7 +60,8 @@ class Raster:
     valid: float
 
     def facts(self, **more: Any) -> contract.GridFacts:
-        """What the document keeps of the grid; ``more``: fields that only the file knows (geo, crs, format, file)."""
+        """Returns the facts of the grid that the document keeps; ``more``: fields that only the file knows (geo, crs,
+        format, file)."""
         return contract.GridFacts(
             rows=self.heights.shape[0],
             cols=self.heights.shape[1],
@@ -167,7 +168,7 @@ def _check_rim(raster_dir: Path, found: NDArray[Any], measured: NDArray[Any], sh
 
 
 def verify(raster: Raster) -> bool:
-    """Whether the heights and the net still are what the digest says (reads all of them)."""
+    """Returns whether the heights and the net still are what the digest says (reads all of them)."""
     return digest(raster.heights, raster.warp) == raster.digest
 
 

@@ -231,7 +231,7 @@ def fill(out: NDArray[np.float32], bent: bool = False) -> None:
 
 @kernel
 def _filled(known: NDArray[np.float32], row: int, col: int, bent: bool) -> float:
-    """What a sample of nodata is taken for, NaN if it has no known neighbour."""
+    """Returns the height that a sample of nodata is taken for, NaN if it has no known neighbour."""
     side = known.shape[0]
     sloping, slopes, total, count = 0.0, 0, 0.0, 0
     for dr in range(-1, 2):

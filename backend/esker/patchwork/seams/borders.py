@@ -1,4 +1,4 @@
-"""The border of a layer: points along the edge of what its kernels cover, around nodata in it, too."""
+"""The border of a layer: points along the edge of the ground that its kernels cover, around nodata in it as well."""
 
 from __future__ import annotations
 

@@ -46,13 +46,13 @@ SOFT: Final = 0.1
 NEAR: Final = 1.2
 """Squared distance from the border in pitches up to which a level is believed wholly."""
 FAR: Final = 4.8
-"""And from which on it is not believed at all."""
+"""Squared distance from the border in pitches from which on a level is not believed at all."""
 LEAST: Final = PEAK * math.exp(-FAR / SPREAD)
-"""The kernel's value there."""
+"""The kernel's value at ``FAR``."""
 RUN: Final = 5.0
 """Metres over which a metre of difference is faded out: no steeper than 1 in 2.9."""
 MOST_LAYERS: Final = 1 << 30
-"""More than there can be."""
+"""A number above any count of layers."""
 AGREED: Final = 0.25
 """Cells of the newer layer up to which a difference is none; from twice as many on it is blended wholly."""
 
@@ -203,7 +203,7 @@ def mean_and_square(t: Tables, z: int, x: float, y: float) -> tuple[float, float
 
 @kernel
 def _in_reach(t: Tables, z: int, x: float, y: float) -> bool:
-    """Whether the cell of a layer's reach that a place lies in is held."""
+    """Returns whether the cell of a layer's reach that a place lies in is held."""
     i, j = int(np.floor(x / t.wide[z])) - t.reach[z, 0], int(np.floor(y / t.wide[z])) - t.reach[z, 1]
     if i < 0 or j < 0 or i >= t.reach[z, 2] or j >= t.reach[z, 3]:
         return False
@@ -212,7 +212,8 @@ def _in_reach(t: Tables, z: int, x: float, y: float) -> bool:
 
 @kernel
 def reach_cells(t: Tables, far: float, held: NDArray[np.bool_]) -> None:
-    """Which cells of layer 0's reach are no farther from its border than ``far`` metres, told from their middles."""
+    """Finds which cells of layer 0's reach are no farther from its border than ``far`` metres, measured from their
+    middles."""
     wide, cols = t.wide[0], t.reach[0, 2]
     limit = (far + 1.5 * wide) ** 2
     for k in range(len(held)):
@@ -319,7 +320,7 @@ def correction_jets(t: Tables, place: int, points: Floats, first: int, last: int
 
 @kernel
 def _touches(t: Tables, z: int, x0: float, y0: float, x1: float, y1: float) -> bool:
-    """Whether layer ``z`` may correct something in a rectangle."""
+    """Returns whether layer ``z`` may correct something in a rectangle."""
     wide, part = t.wide[z], t.reach[z]
     i0, i1 = max(int(np.floor(x0 / wide)) - part[0], 0), min(int(np.floor(x1 / wide)) - part[0], part[2] - 1)
     j0, j1 = max(int(np.floor(y0 / wide)) - part[1], 0), min(int(np.floor(y1 / wide)) - part[1], part[3] - 1)

@@ -55,8 +55,11 @@ _CAP: Final = 8
 
 
 class Zone(NamedTuple):
-    """What a layer does to the ground around it. ``digest``: of all that it follows from. ``rect``: x0, y0, x1, y1,
-    nothing is corrected outside. The rest as in ``loops.Tables``."""
+    """The correction of the ground around a layer.
+
+    ``digest``: of all that the zone follows from. ``rect``: x0, y0, x1, y1, nothing is corrected outside. The other
+    fields are as in ``loops.Tables``.
+    """
 
     digest: bytes
     rect: Rect
@@ -98,7 +101,8 @@ class SeamBlend:
         self._numbers = [blend.layer_number(p.layer) for p in model.placed]
         self._boxes = [_box(held.kernel.reshape(-1, 2)) for held in model.layers]
         self.zones: dict[int, Zone] = {}
-        """By place in the order of precedence, least first; none for layers that agree with all ground below them."""
+        """Zones by place in the order of precedence, least first; layers that agree with all ground below them have
+        none."""
         self._known: dict[bytes, Zone | None] = {}
         was = {} if before is None or before._bent != bent else before._known
         self.tables = _flat({})
@@ -131,7 +135,7 @@ class SeamBlend:
         return found
 
     def _asked(self, place: int, size_m: float) -> Rect | None:
-        """What of a layer can have a border that matters; None if nothing lies below it."""
+        """Returns the rectangle of a layer that can have a border that matters; None if nothing lies below it."""
         k = self._order[place]
         reach = 3 * max(max(p.layer.spacing_m) for p in self._model.placed)
         box = _grown(self._boxes[k], reach)
@@ -141,7 +145,8 @@ class SeamBlend:
         return box if any(_meet(self._boxes[self._order[p]], box) for p in range(place)) else None
 
     def _key(self, place: int, asked: Rect, size_m: float) -> bytes:
-        """Of all that a zone follows from: the layer, those below it in order, and what those do around them."""
+        """Returns a digest of all that a zone follows from: the layer, those below it in order, and their zones around
+        them."""
         parts = [self._numbers[self._order[place]].to_bytes(8, "little"), repr(size_m).encode()]
         for p in self._below(place, asked):
             zone = self.zones.get(p)
@@ -176,7 +181,7 @@ class SeamBlend:
         return zone._replace(rect=(x0, y0, x1, y1))
 
     def differences(self, place: int) -> Differences:
-        """Of the layer at ``place`` in the order of precedence to the ground below it."""
+        """Returns the differences of the layer at ``place`` in the order of precedence to the ground below it."""
         k = self._order[place]
         border = border_of(self._model.layers[k])
         there = ((border.points > -self._cap) & (border.points < (_CAP + 1) * self._cap)).all(axis=1)
@@ -317,7 +322,7 @@ def _first_reach(hot: Floats, pitch: list[float]) -> tuple[float, tuple[int, int
 
 
 def _flat(zones: dict[int, Zone]) -> Tables:
-    """The zones of all places, laid one behind the other in an order of their own, so that sums have one order, too."""
+    """Lays the zones of all places one behind the other, in an order of their own, so that sums have one order."""
     ordered = sorted(zones.items(), key=lambda item: item[1].digest)
     all_blocks, all_nodes, all_dense, charts, done, at = [], [], [], [], 0, 0
     for _, zone in ordered:
@@ -348,7 +353,7 @@ def _flat(zones: dict[int, Zone]) -> Tables:
 
 
 def _near(kernels: Floats, grown: float, points: Floats) -> NDArray[np.int64]:
-    """Which quads (n, 4, 2), grown by ``grown`` metres, may hold one of the points: never misses one."""
+    """Returns which quads (n, 4, 2), grown by ``grown`` metres, may hold one of the points: never misses one."""
     if len(points) == 0 or len(kernels) == 0:
         return np.zeros(0, dtype=np.int64)
     low, high = kernels.min(axis=1) - grown, kernels.max(axis=1) + grown

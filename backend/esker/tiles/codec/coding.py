@@ -1,7 +1,7 @@
 """A tile of a level that is solved as a whole, from its samples to its payload in one compiled piece (DESIGN 6).
 
 It lets go of the interpreter's lock from beginning to end, so that tiles of a frame are coded in two threads. What it
-makes is, to the bit, what ``plans._options``, ``codec.cost`` and ``filters.pack_smallest`` make one after the other,
+makes is, to the bit, what ``plans._options``, ``payload.cost`` and ``filters.pack_smallest`` make one after the other,
 but for tiles of ``FEW`` bytes, which are not tried as a lattice.
 """
 
@@ -22,9 +22,10 @@ from esker.tiles.codec.payload import Ints, Wide
 PREDICTORS: Final = (Predictor.PARENT, Predictor.HELD, Predictor.PREVIOUS)
 LOGS: Final = np.log2(np.arange(1, 1025, dtype=np.float32))
 FEW: Final = 96
-"""A tile of at most so many bytes is not tried as a lattice, too: most of a segment's, and half of their time."""
+"""A tile that takes at most so many bytes is not tried as a lattice as well. Most tiles of a segment are that small,
+and the second try is half of their time."""
 IN_TWO: Final = 4
-"""Tiles from which on a second thread is worth being woken."""
+"""A second thread is woken for at least so many tiles."""
 _local = threading.local()
 _second = ThreadPoolExecutor(1, thread_name_prefix="coding")
 A = TypeVar("A")
@@ -32,7 +33,7 @@ B = TypeVar("B")
 
 
 class Coded(NamedTuple):
-    """The cheapest predictor, the smaller of the filters NONE and LATTICE, and what they make of the tile."""
+    """Codes a tile with the cheapest predictor and the smaller of the filters NONE and LATTICE."""
 
     predictor: Predictor
     filter: Filter
@@ -63,7 +64,7 @@ def code(now: Ints, own: Wide, before: Ints | None, then: Wide | None) -> Coded 
 
 
 def in_two(work: Callable[[A], B], items: Sequence[A]) -> list[B]:
-    """``work`` of each, in order; one half of many in a second thread."""
+    """Does ``work`` for each, in order. Where there are many, a second thread does one half of them."""
     half = len(items) // 2 if len(items) >= IN_TWO else len(items)
     second = [_second.submit(lambda part: [work(item) for item in part], items[half:])] if half < len(items) else []
     first = [work(item) for item in items[:half]]
@@ -71,7 +72,7 @@ def in_two(work: Callable[[A], B], items: Sequence[A]) -> list[B]:
 
 
 def both(work: Callable[[A], object], first: A, second: A) -> None:
-    """``work`` of the first, and meanwhile of the second in a second thread."""
+    """Does ``work`` for the first, and meanwhile for the second in a second thread."""
     other = _second.submit(work, second)
     try:
         work(first)
@@ -80,7 +81,7 @@ def both(work: Callable[[A], object], first: A, second: A) -> None:
 
 
 def _room() -> NDArray[np.uint8]:
-    """This thread's own space for two payloads: fresh pages every time cost more than some tiles."""
+    """Returns this thread's own space for two payloads: fresh pages every time cost more than some tiles."""
     room: NDArray[np.uint8] | None = getattr(_local, "room", None)
     if room is None:
         room = _local.room = np.empty((2, entropy.MAX_BYTES), dtype=np.uint8)
@@ -88,6 +89,6 @@ def _room() -> NDArray[np.uint8]:
 
 
 def warm() -> None:
-    """Compiles it."""
+    """Compiles the loop of this file."""
     tile = np.eye(TILE_SAMPLES, dtype=np.int32)
     code(tile, np.zeros_like(tile), tile, tile)

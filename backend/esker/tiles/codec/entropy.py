@@ -49,7 +49,7 @@ WEIGHTS: Final = np.array(LATTICE_WEIGHTS.split(), dtype=np.int64).reshape(LATTI
 
 @kernel
 def size_class(total: int) -> int:
-    """0 for 0, then two classes an octave, SIZES - 1 at most."""
+    """Returns the class of a size: 0 for 0, then two classes an octave, SIZES - 1 at most."""
     if total <= 0:
         return 0
     exponent = 0
@@ -61,9 +61,10 @@ def size_class(total: int) -> int:
 
 @kernel
 def surroundings(known: Longs, row: int, col: int, lattice: bool, weights: Longs, out: Longs) -> None:
-    """What the known residuals around a place say: ``out`` = place, class of size, expected residual.
+    """Describes the known residuals around a place:
 
-    ``known``: (67, 69) int64, the tile with two rows to the south, two columns to the west and east, of zeros.
+    ``out`` = place, class of size, expected residual. ``known``: (67, 69) int64, the tile with two rows to the south,
+    two columns to the west and east, of zeros.
     """
     r, c = row + 2, col + 2
     w, n, nw, ne = known[r, c - 1], known[r - 1, c], known[r - 1, c - 1], known[r - 1, c + 1]
@@ -74,7 +75,7 @@ def surroundings(known: Longs, row: int, col: int, lattice: bool, weights: Longs
         return
     place = 1 + 2 * (row & 1) + (col & 1)
     out[0], out[1], out[2] = place, 0, 0
-    if place == 1:  # a sample of the parent: rounding is all that there is
+    if place == 1:  # on a sample of the parent only rounding is left
         return
     if place == 2:
         total = 3 * abs(n) + 2 * abs(ww) + abs(nn) + abs(nw) + abs(ne)
@@ -103,7 +104,7 @@ def learn(odds: Longs, seen: Longs, at: int, bit: int, rates: Longs) -> None:
 
 @kernel
 def put_bit(out: Bytes, state: Longs, bit: int, odds: int) -> None:
-    """``state``: low and high end of the range, bytes written. ``odds``: of a 1, of 65,536."""
+    """Codes one decision. ``state``: low and high end of the range, bytes written. ``odds``: of a 1, of 65,536."""
     low, high = state[0], state[1]
     middle = low + (((high - low) * min(max(odds, SURE), 65536 - SURE)) >> 16)
     if bit:
@@ -120,7 +121,7 @@ def put_bit(out: Bytes, state: Longs, bit: int, odds: int) -> None:
 
 @kernel
 def get_bit(data: Bytes, state: Longs, odds: int) -> int:
-    """``state``: low and high end of the range, bytes read, the number in between."""
+    """Decodes one decision. ``state``: low and high end of the range, bytes read, the number in between."""
     low, high, code = state[0], state[1], state[3]
     middle = low + (((high - low) * min(max(odds, SURE), 65536 - SURE)) >> 16)
     bit = 1 if code <= middle else 0
@@ -228,7 +229,7 @@ def _decode(data: Bytes, lattice: bool, weights: Longs, rates: Longs, known: Lon
 
 @kernel
 def _cost(residual: Longs, logs: NDArray[np.float32]) -> float:
-    """``codec.cost``; infinite where a number is too large to be coded."""
+    """Returns ``payload.cost`` of a residual; infinity where a number is too large to be coded."""
     total = 0.0
     for r in range(residual.shape[0]):
         for k in range(residual.shape[1]):
@@ -254,12 +255,12 @@ def encode_cheapest(
     lattice: Bytes,
     few: int,
 ) -> tuple[int, int, int, int]:
-    """Which predictor, its shift, and the bytes written of ``plain`` and ``lattice``; predictor -1: none will do.
+    """Returns a predictor, its shift, and the bytes written of ``plain`` and ``lattice``; predictor -1: none will do.
 
     Where ``plain`` takes no more than ``few`` bytes ``lattice`` is not tried, -1.
 
-    It is here, and not where it is called (``coding.code``), since what is kept of compiled code is made anew when the
-    text of its own file changes, not that of others.
+    This function is here, and not where it is called (``coding.code``): compiled code that is kept is made anew when
+    the text of its own file changes, not that of others.
 
     ``own``, ``then``: the parent's prediction, now and as it was for ``before``; ``known``: how many of ``before`` and
     ``then`` there are.

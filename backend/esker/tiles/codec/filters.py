@@ -16,7 +16,7 @@ from esker.tiles.codec.payload import CodecError, Wide, pack
 
 
 def apply(kind: Filter, residual: Wide) -> Wide:
-    """(65, 65) -> (65, 65) int64: what is coded instead of the residual."""
+    """Applies a filter, (65, 65) -> (65, 65) int64: its result is coded instead of the residual."""
     out = residual.astype(np.int64)
     if kind == Filter.ROW:
         out[:, 1:] -= residual[:, :-1]
@@ -43,9 +43,10 @@ def undo(kind: int, coded: Wide) -> Wide:
 
 
 def pack_smallest(residual: Wide, kinds: Sequence[Filter]) -> tuple[Filter, int, bytes]:
-    """A residual of 32 bits coded with each of the filters that keeps it there: the smallest, (filter, shift, payload).
+    """Codes a residual of 32 bits with each of the filters that keeps it there.
 
-    They are tried in earnest: what a coder that learns makes of them is hard to guess. NONE is always among them.
+    Returns the smallest: (filter, shift, payload). Each filter is really tried, since the size that a coder that learns
+    will reach is hard to guess. NONE is always among them.
     """
     found = pack(residual)
     assert found is not None, "a residual of 32 bits can be coded as it is"

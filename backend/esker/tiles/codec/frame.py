@@ -47,23 +47,24 @@ class FrameHead:
 
 
 GROUND: Final = frozenset({Channel.HEIGHT, Channel.BASE})
-"""The channels in quanta of heights, with all levels: what is drawn is their sum."""
+"""Channels in quanta of heights, with all levels: the ground that is drawn is their sum."""
 
 
 def ratio(channel: Channel) -> int:
-    """Quanta of a level in one of the next coarser level: heights halve their step, the other channels keep it."""
+    """Returns the quanta of a level in one of the next coarser level: heights halve their step, the other channels keep
+    it."""
     return 2 if channel in GROUND else 1
 
 
 def finest_level(channel: Channel) -> int:
-    """The finest level that a frame of this channel may have."""
+    """Returns the finest level that a frame of this channel may have."""
     return MAX_REFINED_LEVEL if channel in GROUND else MAX_LEVEL - CHANNEL_LEVELS_BELOW
 
 
 @dataclass(frozen=True)
 class TileRecord:
     """One coded tile. ``base_version``: of the parent for ``Predictor.PARENT``, of the same tile as held for
-    ``PREVIOUS`` and ``HELD``, 0 for ``ZERO``; versions have 32 bits. ``shift``: see ``codec.pack``."""
+    ``PREVIOUS`` and ``HELD``, 0 for ``ZERO``; versions have 32 bits. ``shift``: see ``payload.pack``."""
 
     x: int
     y: int
@@ -96,12 +97,12 @@ def write_frame(head: FrameHead, drops: Sequence[tuple[int, int]], tiles: Sequen
 
 
 def _folded(number: int) -> int:
-    """0, -1, 1, -2, 2 ... -> 0, 1, 2, 3, 4 ..."""
+    """Maps 0, -1, 1, -2, 2 ... to 0, 1, 2, 3, 4 ..."""
     return 2 * number if number >= 0 else -2 * number - 1
 
 
 def _write_number(out: bytearray, number: int) -> None:
-    """LEB128: seven bits a byte, the lowest first, the highest bit set where more follow."""
+    """Writes LEB128: seven bits a byte, the lowest first, the highest bit set where more follow."""
     while number > 127:
         out.append(number & 127 | 128)
         number >>= 7
@@ -109,13 +110,13 @@ def _write_number(out: bytearray, number: int) -> None:
 
 
 class _Reader:
-    """What is left of a frame. ``version``, ``base``: those of the tile before."""
+    """A reader of the rest of a frame. ``version``, ``base``: those of the tile before."""
 
     def __init__(self, view: memoryview) -> None:
         self.view, self.at, self.version, self.base = view, 0, 0, 0
 
     def number(self) -> int:
-        """The next number; raises FrameError beyond 35 bits or the end."""
+        """Returns the next number; raises FrameError beyond 35 bits or the end."""
         value = 0
         for shift in range(0, 35, 7):
             if self.at >= len(self.view):
@@ -128,7 +129,7 @@ class _Reader:
         raise FrameError("the frame ends inside a tile's numbers, or one of them is too long")
 
     def version_after(self, last: int) -> int:
-        """A version, written as the difference to one before it."""
+        """Returns a version, written as the difference to one before it."""
         folded = self.number()
         version = last + (-(folded + 1) // 2 if folded & 1 else folded // 2)
         if not 0 <= version <= 0xFFFFFFFF:
@@ -136,7 +137,7 @@ class _Reader:
         return version
 
     def tile(self) -> TileRecord:
-        """The next tile; its payload is a view."""
+        """Returns the next tile; its payload is a view."""
         x, y, coding = self.number(), self.number(), self.number()
         predictor = coding & (1 << TILE_PREDICTOR_BITS) - 1
         kind = coding >> TILE_PREDICTOR_BITS & (1 << TILE_FILTER_BITS) - 1

@@ -48,13 +48,14 @@ def predict(parent: Ints, ratio: int = 2) -> Wide:
 
 
 def upsampled(parent: Ints, ratio: int = 2) -> Wide:
-    """``predict`` in plain NumPy, (n, n) -> (2n - 1, 2n - 1) int64."""
+    """Computes ``predict`` in plain NumPy, (n, n) -> (2n - 1, 2n - 1) int64."""
     both = _upsample(_upsample(parent.astype(np.int64)).T).T
     return np.asarray((both + (1 << (8 - ratio))) >> (9 - ratio))
 
 
 def _upsample(a: Wide) -> Wide:
-    """Along the last axis, n -> 2n-1 samples, scaled by 16: interpolating 4-point rule, one-sided at both ends."""
+    """Upsamples along the last axis, n -> 2n-1 samples, scaled by 16: interpolating 4-point rule, one-sided at both
+    ends."""
     out = np.empty((*a.shape[:-1], 2 * a.shape[-1] - 1), dtype=a.dtype)
     out[..., 0::2] = 16 * a
     odd = out[..., 1::2]
@@ -65,7 +66,7 @@ def _upsample(a: Wide) -> Wide:
 
 
 def child_window(prediction: Wide, x: int, y: int) -> Wide:
-    """The 65x65 part of ``predict``'s grid that belongs to child tile (x, y); only their parities matter."""
+    """Returns the 65x65 part of ``predict``'s grid that belongs to child tile (x, y); only their parities matter."""
     r, c = TILE_CELLS * (y & 1), TILE_CELLS * (x & 1)
     return prediction[..., r : r + TILE_SAMPLES, c : c + TILE_SAMPLES]
 
@@ -83,7 +84,7 @@ def follow(samples: Ints, then: Ints | None, now: Ints | None, x: int, y: int, r
 
 
 def cost(residual: Wide) -> float:
-    """Roughly the bits that a residual will take: enough to choose between two predictors."""
+    """Estimates the bits that a residual will take: near enough to choose between two predictors."""
     return float(np.log2(np.abs(residual).astype(np.float32) + 1).sum())
 
 
