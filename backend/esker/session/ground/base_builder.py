@@ -52,7 +52,7 @@ class Layers:
         self._making: int | None = None
         self._timer: asyncio.TimerHandle | None = None
         self.slow = False
-        """Whether making what is wanted has taken long, until nothing more is wanted."""
+        """Whether making the wanted base has taken long. It stays so until no other base is wanted."""
         self._closed = False
 
     def current(self, document: StrokeSet) -> bool:
@@ -61,11 +61,11 @@ class Layers:
 
     @property
     def empty(self) -> bool:
-        """True until the first base is there (which may be None)."""
+        """Whether the first base is still to come (a base may be None)."""
         return self._made_of is None
 
     def want(self, document: StrokeSet) -> bool:
-        """Sees to it that ``base`` will be of this document. True when it is already."""
+        """Sees to it that ``base`` will be of this document. Returns True when it already is."""
         if self.current(document):
             self._wanted = None
             return True
@@ -83,7 +83,7 @@ class Layers:
         self._quiet()
 
     def _next(self) -> None:
-        """Begins with what is wanted, unless a base is being made: then it comes after that."""
+        """Begins to make the wanted base. Where one is being made, the next begins after it."""
         document = self._wanted
         if document is None or self._making is not None or self._closed:
             return
@@ -146,7 +146,7 @@ def _visible(document: StrokeSet) -> bool:
 
 
 def blank_levels(top: int) -> Iterator[BaseLevel]:
-    """Yields what takes a base away again: levels 0..``top`` of zeros, and a survey of nothing."""
+    """Yields the levels that take a base away again: levels 0..``top`` of zeros, and a data level of none."""
     for level in range(top + 1):
         n = grid.samples(level)
         yield BaseLevel(level, np.zeros((n, n), dtype=np.float32), c.Channel.BASE)

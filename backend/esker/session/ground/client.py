@@ -1,4 +1,4 @@
-"""A room as the solver's thread sees it."""
+"""The view that the solver's thread has of a room."""
 
 from __future__ import annotations
 

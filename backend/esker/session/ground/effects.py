@@ -1,6 +1,6 @@
-"""What happens to the ground of a room beside the events of a solve, and what is done then (``machine.py``).
+"""Events that happen to the ground of a room beside those of a solve, and effects that follow (``machine.py``).
 
-Events come in, effects go out; the solver's own events are in ``esker.events``.
+Events come in, effects go out. The solver's own events are in ``esker.events``.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ class NothingRequested:
 
 @dataclass(frozen=True)
 class Dropped:
-    """All that ran for the room was ended. settled: whether what is settled stays so."""
+    """All work for the room was ended. settled: whether the settled heights stay settled."""
 
     settled: bool = False
 
@@ -78,17 +78,17 @@ class Again:
 
 @dataclass(frozen=True)
 class Unsolved:
-    """The job could not be computed, for a reason of its own or an unknown one; all that ran for it was ended."""
+    """The job could not be computed, for a reason of its own or an unknown one. All work for the room was ended."""
 
 
 @dataclass(frozen=True)
 class Unsolvable:
-    """No device would solve the job, and trying again is in vain until it changes; all that ran for it was ended."""
+    """No device would solve the job, and trying again is in vain until it changes. All work for the room was ended."""
 
 
 @dataclass(frozen=True)
 class Coarser:
-    """There is no memory for ``top``: from now on the level below is the finest. All that ran was ended."""
+    """There is no memory for ``top``: the level below is the finest from now on. All work for the room was ended."""
 
 
 @dataclass(frozen=True)
@@ -121,8 +121,11 @@ Event = (
 
 @dataclass(frozen=True)
 class Leave:
-    """End the solve and refinement that are open; what refinement held is given back behind the next result. keeps:
-    the channels that are made alone go on beside what comes next."""
+    """End the solve and refinement that are open.
+
+    The memory that refinement held is given back behind the next result. keeps: the channels that are made alone go on
+    beside the next solve.
+    """
 
     keeps: bool = False
 
@@ -139,8 +142,10 @@ class OpenSolve:
 
 @dataclass(frozen=True)
 class OpenChannels:
-    """Begin to make the channels of a job alone; those that are being made beside a solve become these. beside: beside
-    a solve."""
+    """Begin to make the channels of a job alone. beside: begin them beside a solve.
+
+    Channels that are being made beside a solve become the ones made alone.
+    """
 
     job: Job
     top: int
@@ -149,17 +154,17 @@ class OpenChannels:
 
 @dataclass(frozen=True)
 class AdoptChannels:
-    """The channels that are made beside a solve are all that is made from now on."""
+    """Go on with the channels that are made beside a solve, and with nothing else."""
 
 
 @dataclass(frozen=True)
 class Step:
-    """Go on with the solve, or with the channels alone, until it can be left."""
+    """Go on with the solve, or with the channels alone, until that work can be left."""
 
 
 @dataclass(frozen=True)
 class StepBeside:
-    """Go on with the channels beside it."""
+    """Go on with the channels beside the solve."""
 
 
 @dataclass(frozen=True)
@@ -192,7 +197,7 @@ class Note:
 
 @dataclass(frozen=True)
 class Confirm:
-    """Tell people that the heights of before are those of this job too, and that its channels have come."""
+    """Tell people that the settled heights are those of this job too, and that its channels have come."""
 
     job: Job
     top: int
@@ -200,19 +205,19 @@ class Confirm:
 
 @dataclass(frozen=True)
 class Yield:
-    """Leave the processor for so many seconds to those who bring people what was delivered."""
+    """Leave the processor for so many seconds to the threads that bring people the delivered tiles."""
 
     seconds: float
 
 
 @dataclass(frozen=True)
 class GiveBack:
-    """Give back what the refinement before held: something newer is out."""
+    """Give back the memory that the refinement before held: something newer is out."""
 
 
 @dataclass(frozen=True)
 class OpenRefinement:
-    """Get ready to refine what is settled, from the basis of the solve."""
+    """Get ready to refine the settled heights, from the basis of the solve."""
 
     basis: object
 

@@ -35,15 +35,15 @@ log = logging.getLogger("esker.feed")
 PUTS_AHEAD: Final = 1
 """Levels that may wait to become tiles while the solver goes on."""
 BATCH_BYTES: Final = 48 << 10
-"""Frames of one client are made in one go up to this size: each way to the loop and back costs a millisecond."""
+"""Frames of one client are made in one go up to this size: each hand-over to the loop and back costs a millisecond."""
 BATCH_SECONDS: Final = 0.03
 """Refined tiles that come within this time are taken together."""
 BATCH_TILES: Final = 16
 """A batch of so many refined tiles is taken without waiting for more."""
 BATCH_SHARE: Final = 0.25
-"""Taking tiles, and working out what is wanted then for a room full of people, takes at most this share of the time."""
+"""Taking tiles, and working out the requests of a room full of people, takes at most this share of the time."""
 REQUESTS_SECONDS: Final = 0.05
-"""While cameras move, what is wanted is worked out at most this often."""
+"""While cameras move, requests are worked out at most this often."""
 
 
 @dataclass(eq=False)
@@ -59,7 +59,7 @@ class Stream:
 
     @property
     def ready(self) -> bool:
-        """True when a frame may be made for it now."""
+        """Whether a frame may be made for this client now."""
         free = not self.frames and not self.busy and self.in_flight < c.BYTE_WINDOW
         return self.hungry and free and self.outbox.closing is None
 
@@ -90,7 +90,7 @@ class TileFeed:
         self._refines = finest > levels
         self._streams: set[Stream] = set()
         self._clients: dict[Stream, ClientTiles] = {}
-        """What each stream's client holds. Only the tile thread may touch it."""
+        """Tiles that each stream's client holds. Only the tile thread may touch it."""
         self._puts: list[Future[None]] = []
         self._newest: dict[tuple[c.Channel, int], object] = {}
         """The newest array of each level of the channels other than heights. Only the solver's thread may touch it."""
@@ -108,24 +108,24 @@ class TileFeed:
         self._requests_timer: asyncio.TimerHandle | None = None
 
     def add(self, outbox: FrameOutlet) -> Stream:
-        """A new client."""
+        """Takes a new client."""
         stream = Stream(outbox)
         self._streams.add(stream)
         self._feed(stream)
         return stream
 
     def remove(self, stream: Stream) -> None:
-        """The client left."""
+        """Forgets a client that left."""
         self._streams.discard(stream)
         self._submit(self._forget, stream)
 
     def view(self, stream: Stream, view: c.View) -> None:
-        """The client looks somewhere else."""
+        """Takes a client's new view."""
         stream.view = view
         self._wake(stream)
 
     def credit(self, stream: Stream, count: int) -> None:
-        """The client has applied so many bytes."""
+        """Takes note that a client has applied so many bytes."""
         stream.in_flight = max(0, stream.in_flight - count)
         self._feed(stream)
 
@@ -173,18 +173,22 @@ class TileFeed:
             self._executor.first(self._take_coarse)
 
     def confirm(self, clock: int, level: int) -> None:
-        """Heights up to ``level`` are final for ``clock`` too: only other channels followed from what has changed."""
+        """Says that heights up to ``level`` are final for ``clock`` too: only other channels followed from the
+        change."""
         with suppress(RuntimeError):  # the tile thread has stopped
             self._executor.first(self._confirm, clock, level)
 
     def limit(self, top: int) -> None:
-        """From now on levels 0..``top`` are solved."""
+        """Says that levels 0..``top`` are solved from now on."""
         self._newest.clear()
         with suppress(RuntimeError):  # the tile thread has stopped
             self._executor.first(self._limit, top)
 
     def wanted(self) -> Sequence[TileKey]:
-        """Tiles to refine next, most urgent first; none while the ground moves. From any thread."""
+        """Returns the tiles to refine next, most urgent first; none while the ground moves.
+
+        It may be called from any thread.
+        """
         with self._lock:
             return tuple(key for key in self._requests if key not in self._made)
 
@@ -203,7 +207,8 @@ class TileFeed:
     # --- in the tile thread ---------------------------------------------------------------------------------------
 
     def _take_coarse(self) -> None:
-        """Puts the coarsest preview, unless frames of a finest one are owed: then it comes again behind these."""
+        """Puts the coarsest preview, unless frames of a finest one are pending: then the coarsest comes again behind
+        these."""
         if self._frames_pending:
             self._call(self._submit, self._take_coarse_now)
             return
@@ -271,7 +276,7 @@ class TileFeed:
             self._call(self._wake_all)
 
     def _publish(self, look: bool, taken: Sequence[tuple[int, RefinedTile]] = ()) -> None:
-        """Works out what is wanted refined. ``look``: the solver should look even if that is the same as before."""
+        """Works out the requests. ``look``: the solver should look even if they are the same as before."""
         if not self._refines:
             return
         try:
@@ -300,7 +305,8 @@ class TileFeed:
                 tiles = self._clients[stream] = self._tiles.client(self._server)
             if view is not None:
                 tiles.set_view(view)
-            # All frames of a level are made once the first is; only then a coarsest preview that waits goes first.
+            # All frames of a level are made once the first one is. A coarsest preview that waits goes before them only
+            # then.
             while made < most and (plan := tiles.plan(made > 0 and self._coarse is not None)) is not None:
                 frame = plan.encode()
                 tiles.commit(plan)
@@ -346,7 +352,10 @@ class TileFeed:
         self._submit(self._publish, False)
 
     def _submit(self, work: Callable[..., None], *args: object) -> bool:
-        """Has the tile thread do something; False when it has been shut down: the server is stopping."""
+        """Has the tile thread do something.
+
+        Returns False when the thread has been shut down: the server is stopping.
+        """
         try:
             self._executor.submit(work, *args)
         except RuntimeError:

@@ -1,4 +1,4 @@
-"""What a room asks the solver for (DESIGN 8)."""
+"""Jobs: requests of rooms for the solver (DESIGN 8)."""
 
 from __future__ import annotations
 
@@ -30,7 +30,8 @@ class Job:
 
     @property
     def heights(self) -> tuple[int, int]:
-        """What its heights follow from: jobs of one room for which this is equal differ in other channels alone."""
+        """Revisions that the heights follow from: jobs of one room for which this is equal differ in other channels
+        alone."""
         return self.heights_rev, self.layers_rev
 
 

@@ -49,7 +49,7 @@ def next(ground: Ground, event: Event, now: float) -> Result:
         case does.Turn(begins):
             begun, first = _begin(ground, now) if begins else (ground, ())
             if any(isinstance(effect, does.OpenSolve) for effect in first):
-                return begun, first  # what its first slice is, it says when it is open
+                return begun, first  # the solver says what the first slice is when the solve is open
             after, then = _slice(begun)
             return after, (*first, *then)
         case does.Opened(previews_early):
@@ -69,7 +69,7 @@ def next(ground: Ground, event: Event, now: float) -> Result:
 
 
 def _changed(ground: Ground, event: Event, now: float) -> Result:
-    """What comes from outside of the solve."""
+    """Takes an event from outside of the solve."""
     match event:
         case does.Requested(job):
             return _want(ground, Attempt(job)), ()
@@ -169,7 +169,7 @@ def _begin_channels(ground: Ground, attempt: Attempt) -> Result:
 
 
 def _dropped(ground: Ground, settled: bool) -> Ground:
-    """Nothing runs any more."""
+    """Returns the ground with nothing running."""
     heights = ground.shown.heights if settled else None
     return replace(
         ground,
@@ -180,7 +180,7 @@ def _dropped(ground: Ground, settled: bool) -> Ground:
 
 
 def _unsolved(ground: Ground, now: float) -> Result:
-    """The job is tried again soon, unless it has failed too often."""
+    """Has the job tried again soon, unless it has failed too often."""
     begun = ground.jobs.begun
     assert begun is not None
     begun = replace(begun, tries=begun.tries + 1)
@@ -195,7 +195,7 @@ def _unsolved(ground: Ground, now: float) -> Result:
 
 
 def _looking(ground: Ground, looking: bool) -> State:
-    """Whether tiles may be wanted that were not made."""
+    """Returns whether tiles may be wanted that were not made."""
     match ground.state:
         case Idle(True) | Waiting(True) | Refining():
             return _at_rest(ground, refines=True, looking=looking)
@@ -209,7 +209,7 @@ def _looking(ground: Ground, looking: bool) -> State:
 
 
 def _slice(ground: Ground) -> Result:
-    """What the room does with its turn."""
+    """Chooses what the room does with its turn."""
     if states.channels_are_next(ground):
         return _slice_beside(ground)
     if states.early_preview_is_due(ground):
@@ -235,7 +235,7 @@ def _slice_beside(ground: Ground) -> Result:
 
 
 def _made_beside(ground: Ground, event: Event, now: float) -> Result:
-    """Channels that are made beside a solve."""
+    """Follows the channels that are made beside a solve."""
     job = ground.channels.beside
     if isinstance(event, Done):
         return replace(ground, channels=replace(ground.channels, making=False, complete_at=now)), ()
@@ -245,7 +245,7 @@ def _made_beside(ground: Ground, event: Event, now: float) -> Result:
 
 
 def _channel(ground: Ground, job: Job, event: ChannelLevel) -> Result:
-    """A level of a channel is shown, unless a newer job's has come already."""
+    """Shows a level of a channel, unless a newer job's level has come already."""
     channels, place = ground.channels, (int(event.channel), event.level)
     newest = -1 if channels.beside is None else channels.beside.number
     if job.number < max(newest, channels.came.get(place, -1)):
@@ -255,7 +255,7 @@ def _channel(ground: Ground, job: Job, event: ChannelLevel) -> Result:
 
 
 def _solved(ground: Ground, event: Event, now: float) -> Result:
-    """The solve, or the channels alone, went on."""
+    """Follows a solve, or channels alone, that went on."""
     job = _running(ground)
     match event:
         case Done(basis):
@@ -279,10 +279,10 @@ def _solved(ground: Ground, event: Event, now: float) -> Result:
 
 
 def _previewed(ground: Ground, preview: Preview, now: float) -> tuple[Ground, bool]:
-    """Notes a preview; returns also whether to show it.
+    """Notes a preview, and returns also whether to show it.
 
-    The coarsest level is always shown at once. Of a preview that ends soon it is the only one: what levels say in
-    between would be corrected before anybody saw it (docs/decisions/0014-consistent-previews.md).
+    The coarsest level is always shown at once. Where the whole preview ends soon, no other level is shown: the finest
+    would correct it before anybody saw it (docs/decisions/0014-consistent-previews.md).
     """
     state, shown, level = ground.state, ground.shown, preview.level
     if not isinstance(state, Previewing):
@@ -297,7 +297,7 @@ def _previewed(ground: Ground, preview: Preview, now: float) -> tuple[Ground, bo
 
 
 def _ended(ground: Ground, basis: object, now: float) -> Result:
-    """The solve, or the channels alone, came to its end."""
+    """Follows the end of a solve, or of channels alone."""
     job, state = _running(ground), ground.state
     ground = replace(ground, channels=replace(ground.channels, complete_at=now))
     if isinstance(state, ChannelsOnly):

@@ -1,4 +1,4 @@
-"""What the ground of a room needs from other rooms of the house, as protocols: tests stand in for all of them."""
+"""Protocols of all that the ground of a room needs from other rooms of the house. Tests stand in for them."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ class FrameOutlet(Protocol):
 
     @property
     def closing(self) -> object:
-        """None while frames may be sent."""
+        """None while frames may be sent; else the reason why not."""
         ...
 
     def notify(self) -> None:
-        """A frame waits."""
+        """Says that a frame waits."""
         ...
 
     def close(self, code: CloseCode, reason: str) -> None:
@@ -39,7 +39,7 @@ class FramePlan(Protocol):
 
 
 class ClientTiles(Protocol):
-    """What one client holds and looks at (``tiles/delivery.py``)."""
+    """The tiles that one client holds, and its view (``tiles/delivery.py``)."""
 
     def set_view(self, view: c.View) -> None: ...
 
@@ -88,14 +88,17 @@ class Refiner(Protocol):
 
 
 class Refinement(Protocol):
-    """Which tiles above the global levels a room wants, and where they go (``feed.TileFeed``)."""
+    """The requests of a room for tiles above the global levels, and the place to bring them (``feed.TileFeed``)."""
 
     def wanted(self) -> Sequence[TileKey]:
-        """The next tiles to refine, most urgent first; none while the ground moves. From any thread."""
+        """Returns the next tiles to refine, most urgent first; none while the ground moves.
+
+        It may be called from any thread.
+        """
         ...
 
     def deliver_tile(self, clock: int, tile: RefinedTile) -> None:
-        """Takes a tile of the settled solve at ``clock``. In the worker's thread; never waits."""
+        """Takes a tile of the settled solve at ``clock``. Called in the worker's thread; never waits."""
         ...
 
 
@@ -145,13 +148,16 @@ class Solver(Protocol):
         ...
 
     def base_levels(self, base: Any, levels: int) -> Iterator[BaseLevel]:
-        """The base up to a level, coarse to fine, then the survey channel: to be shown before what is solved on it."""
+        """Yields the base up to a level, coarse to fine, then its data level.
+
+        All of it is shown before strokes solved on it.
+        """
         ...
 
     def channels(
         self, strokes: Sequence[c.Stroke], settings: c.TerrainSettings, levels: int | None = None, *, base: Any = None
     ) -> Iterator[SolveEvent]:
-        """The channels alone; the last event is Done."""
+        """Yields the channels alone; the last event is Done."""
         ...
 
     def refiner(self, basis: Any) -> Refiner: ...
@@ -162,7 +168,10 @@ class Tidying(Protocol):
     """A solver that keeps memory for rooms that may come back."""
 
     def tidy(self) -> int:
-        """Gives back what nobody has used for long; how many pieces that were. Called while there is nothing to do."""
+        """Gives back memory that nobody has used for long, and returns the number of pieces.
+
+        Called while there is nothing to do.
+        """
         ...
 
 

@@ -1,7 +1,5 @@
-"""What to do when the solver's device fails (DESIGN 8, 16): which device is next, and when to try a better one again.
-
-Pure policy, without threads or OpenCL: the worker tells what happened, asks, and acts.
-"""
+"""A policy for failures of the solver's device (DESIGN 8, 16): which device is next, and when to try a better one
+again. It is pure, without threads or OpenCL: the worker tells it what happened, asks, and acts."""
 
 from __future__ import annotations
 
@@ -11,29 +9,29 @@ from enum import Enum
 from typing import Final
 
 RETRY_SECONDS: Final = 60.0
-"""After a fault the better device, or the finer level, is tried again after so many seconds, then after twice as many,
-and so on."""
+"""A better device, or a finer level, is tried again so many seconds after a fault, then after twice as many, and so
+on."""
 RETRY_AT_MOST: Final = 960.0
 MAX_FAILURES: Final = 3
-"""A job that failed so often waits for a change. Where a solver cannot prove its device, so many failed jobs in a row,
-for reasons unknown, are taken for a fault of the device."""
+"""A job that failed so often waits for a change. Where a solver cannot prove its device, so many jobs in a row that
+fail for reasons unknown are taken for a fault of the device."""
 LAST_RESORT: Final = "numpy"
-"""Name of the device that needs none."""
+"""Name of the solver that needs no device."""
 
 
 class Fault(Enum):
-    """Why a solve failed."""
+    """The reason for which a solve failed."""
 
     MEMORY = "memory"
     """The level does not fit the device's memory; a coarser one may."""
     DEVICE = "device"
     """The device is lost, or does not work: it cannot be used for now."""
     JOB = "job"
-    """The job itself: no device would do better, and trying again is in vain until it changes."""
+    """The job itself failed: no device would do better, and trying again is in vain until the job changes."""
     FLAW = "flaw"
-    """The program met numbers of the job that it cannot compute. It may be tried again, on the same device."""
+    """The program met numbers of the job that it cannot compute. The job may be tried again, on the same device."""
     UNKNOWN = "unknown"
-    """Perhaps this job, perhaps the device."""
+    """Either the job or the device failed; nobody knows which."""
 
 
 Diagnose = Callable[[Exception], Fault]
@@ -46,7 +44,8 @@ def unknown(_: Exception) -> Fault:
 
 @dataclass
 class Backoff:
-    """When to try again: after ``RETRY_SECONDS``, doubling up to ``RETRY_AT_MOST`` while it keeps failing."""
+    """When something is tried again: after ``RETRY_SECONDS``, doubling up to ``RETRY_AT_MOST`` while it keeps
+    failing."""
 
     wait: float = RETRY_SECONDS
     at: float | None = None
@@ -61,7 +60,7 @@ class Backoff:
         return self.at is not None and now >= self.at
 
     def clear(self) -> None:
-        """Notes a success: nothing is to be tried again."""
+        """Notes a success: nothing more is tried again."""
         self.at = None
 
 
@@ -80,7 +79,7 @@ class Devices:
     backoff: Backoff = field(default_factory=Backoff)
 
     def opened(self, device_name: str, now: float) -> None:
-        """The solver that was asked for first runs on this device."""
+        """Notes that the solver that was asked for first runs on this device."""
         self.current = self.preferred
         if self.preferred is None:
             numpy = device_name.lower().startswith(LAST_RESORT)
@@ -94,7 +93,7 @@ class Devices:
         return bool(self.better()) or (self.current == LAST_RESORT and self.preferred is None)
 
     def better(self) -> list[str]:
-        """Devices to be preferred to the present one, best first."""
+        """Returns the devices that are preferred to the present one, best first."""
         listed = list(self.candidates())
         if self.preferred is not None:
             listed = [self.preferred, *(x for x in listed if x != self.preferred)]
@@ -107,23 +106,23 @@ class Devices:
         return [*(x for x in listed if x not in later), LAST_RESORT]
 
     def blame(self, fault: Fault) -> bool:
-        """Counts a failed job; True when the device should be left."""
+        """Counts a failed job. Returns True when the device should be left."""
         if fault in (Fault.JOB, Fault.FLAW):
             return False
         self.failures += 1
         return self.current != LAST_RESORT and (fault != Fault.UNKNOWN or self.failures >= MAX_FAILURES)
 
     def left(self, name: str, now: float) -> None:
-        """The present device failed, and ``name`` takes over."""
+        """Notes that the present device failed and ``name`` takes over."""
         self.current, self.failures = name, 0
         self.backoff.failed(now)
 
     def returned(self, name: str) -> None:
-        """A better device is in use again. Whether it lasts is seen when a solve has ``settled``."""
+        """Notes that a better device is in use again. Once a solve has ``settled`` it counts as lasting."""
         self.current, self.failures = name, 0
 
     def settled(self) -> None:
-        """A whole solve went through on the present device."""
+        """Notes that a whole solve went through on the present device."""
         self.failures = 0
         if not self.better():
             self.backoff.clear()

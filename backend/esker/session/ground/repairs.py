@@ -22,7 +22,7 @@ from esker.session.ground.states import Failed
 log = logging.getLogger("esker.worker")
 
 PROVE_EVERY: Final = 2.0
-"""Seconds for which a device that was found in order counts as in order: jobs that fail ask for no more than this."""
+"""A device that was found in order counts as in order for so many seconds: failed jobs ask for no more than this."""
 AGAIN: Final = "The ground could not be computed; it will be tried again soon."
 GIVEN_UP: Final = "The ground could not be computed, and waits for the next change."
 
@@ -71,7 +71,7 @@ class Repairs:
     # --- a failure ----------------------------------------------------------------------------------------------
 
     def failed(self, client: Client, error: Exception) -> None:
-        """A solve of a room failed: what runs for it is dropped."""
+        """Drops what runs for a room whose solve failed, and has the room go on."""
         fault = self._diagnose(error)
         log.error("solving at %s failed (%s): %s: %s", _clock(client), fault.value, type(error).__name__, error)
         self._drop(client)
@@ -84,7 +84,10 @@ class Repairs:
             self._happen(client, does.Unsolved())
 
     def unrefined(self, client: Client, error: Exception) -> None:
-        """Refining failed. The ground itself is there, so only a broken device is a reason to solve it again."""
+        """Deals with refining that failed.
+
+        The ground itself is there, so only a broken device is a reason to solve it again.
+        """
         fault = self._diagnose(error)
         if fault == Fault.DEVICE:
             self.failed(client, error)
@@ -99,7 +102,7 @@ class Repairs:
         client.tell(AGAIN if again else GIVEN_UP)
 
     def solved(self, client: Client) -> None:
-        """A whole solve went through."""
+        """Notes that a whole solve went through."""
         self.devices.settled()
         if client.ground.top == client.levels:
             client.backoff.clear()
@@ -144,7 +147,7 @@ class Repairs:
         return True
 
     def _coarser(self, client: Client) -> None:
-        """The room goes on one level coarser, until there may be memory again."""
+        """Has the room go on one level coarser, until there may be memory again."""
         top = client.ground.top - 1
         client.backoff.failed(self._now())
         client.tell(
@@ -158,7 +161,7 @@ class Repairs:
             client.limit(top)
 
     def _next_device(self, error: Exception) -> bool:
-        """Every room goes on with the next device that works. False when none could be had."""
+        """Has every room go on with the next device that works. Returns False when none works."""
         left = self.name
         for name in self.devices.others():
             try:
@@ -198,7 +201,7 @@ class Repairs:
                 self._happen(client, does.Again())
 
     def _better_device(self, now: float) -> None:
-        """Solves in progress end where they began; the next ones use the better device."""
+        """Goes over to a better device. Solves in progress end where they began; the next ones use it."""
         for name in self.devices.better():
             try:
                 solver = self._factory(name)

@@ -73,20 +73,22 @@ class Tally(Generic[Room]):
     favour_after: float = -math.inf
 
     def noted(self, room: Room, **what: Any) -> Tally[Room]:
-        """The tally with something else noted of one room."""
+        """Returns the tally with something else noted of one room."""
         return replace(self, rooms={**self.rooms, room: replace(self.rooms[room], **what)})
 
     def opened(self, room: Room) -> Tally[Room]:
-        """A room comes."""
+        """Returns the tally with a room that comes."""
         return replace(self, rooms={**self.rooms, room: Used()})
 
     def closed(self, room: Room) -> Tally[Room]:
-        """A room goes."""
+        """Returns the tally without a room that goes."""
         return replace(self, rooms={other: had for other, had in self.rooms.items() if other != room})
 
     def ended(self, room: Room, now: float) -> Tally[Room]:
-        """The slice of a room is over: from now on that room waits. After a slice out of turn the others have at least
-        as long."""
+        """Returns the tally after the slice of a room, which waits from now on.
+
+        After a slice out of turn the other rooms have at least as long.
+        """
         had = self.rooms.get(room)
         if had is None:
             return self
@@ -108,7 +110,7 @@ def choose(grounds: Grounds[Room], now: float, tally: Tally[Room]) -> tuple[Room
         return None, tally
     rooms = tally.rooms
     least = min(rooms[room].seconds for room in waiting)
-    # who has had more than its share waits
+    # a room that has had more than its share waits
     staged = [(stage, room) for stage, room in staged if rooms[room].seconds <= least + AHEAD]
     stage, best = min(staged, key=lambda s: (s[0], *_order(s[0], grounds[s[1]], rooms[s[1]])))
     late = [room for other, room in staged if other > stage and now - rooms[room].ran_at > PATIENCE]
@@ -121,7 +123,10 @@ def choose(grounds: Grounds[Room], now: float, tally: Tally[Room]) -> tuple[Room
 def begin(
     room: Room, grounds: Grounds[Room], now: float, tally: Tally[Room]
 ) -> tuple[bool, Sequence[Room], Tally[Room]]:
-    """The slice of a room begins. Returns whether it begins its newest job, and whose solves end for that."""
+    """Begins the slice of a room.
+
+    Returns whether the room begins its newest job, and the rooms whose solves end for that.
+    """
     ground = grounds[room]
     tally = replace(tally, turns=tally.turns + 1)
     tally = tally.noted(room, turn=tally.turns, ran_at=now)
@@ -149,8 +154,10 @@ def has_something_else(room: Room, grounds: Grounds[Room]) -> bool:
 
 
 def _levelled(waiting: set[Room], tally: Tally[Room]) -> Tally[Room]:
-    """Who comes begins with the least time of those who were busy. ``waiting``: all who wait for more than refinement,
-    which waits for all."""
+    """Levels the tally: a room that comes begins with the least time of those that were busy.
+
+    ``waiting``: all rooms that wait for more than refinement, since refinement waits for them.
+    """
     rooms = tally.rooms
     least = max(tally.least, min((rooms[x].seconds for x in waiting if rooms[x].is_busy), default=0.0))
     changed = {
@@ -164,7 +171,7 @@ def _levelled(waiting: set[Room], tally: Tally[Room]) -> Tally[Room]:
 
 
 def _order(stage: int, ground: Ground, had: Used) -> tuple[int, int]:
-    """Within a class the least comes first."""
+    """Returns a key by which rooms of one class are ordered: the least comes first."""
     return (ground.top, had.began) if stage == FINER else (0, had.turn)
 
 
@@ -212,12 +219,12 @@ def _settling(room: Room, stage: int, grounds: Grounds[Room], tally: Tally[Room]
 
 
 def _solving(room: Room, grounds: Grounds[Room]) -> list[Room]:
-    """Others whose solves hold memory."""
+    """Returns the other rooms whose solves hold memory."""
     return [other for other, ground in grounds.items() if other is not room and states.is_solving(ground)]
 
 
 def _in_the_way(room: Room, stage: int, grounds: Grounds[Room], tally: Tally[Room]) -> Sequence[Room]:
-    """The fewest settling solves, last begun first, without which the room's has memory."""
+    """Returns the fewest settling solves, last begun first, without which there is memory for the room's."""
     gone: list[Room] = []
     if states.needs_channels_only(grounds[room]):
         return gone

@@ -16,19 +16,19 @@ from esker.session.ground.jobs import Attempt, Job
 FINEST_WITHIN: Final = 0.150
 """Drawing without a pause must not starve the fine levels: a preview pass goes on whose finest level is this old."""
 FINISH: Final = 0.300
-"""A pass that should end within this time is not left: early previews of newer jobs are made in between."""
+"""A pass that should end within this time is not left, and early previews of newer jobs are made during it."""
 
 
 @dataclass(frozen=True)
 class Idle:
-    """Nothing is to be done. refines: what is settled can be refined where somebody looks."""
+    """Nothing is to be done. refines: whether the settled heights can be refined where somebody looks."""
 
     refines: bool = False
 
 
 @dataclass(frozen=True)
 class Waiting:
-    """A job waits for its turn, and nothing is open for the room but what is settled."""
+    """A job waits for its turn. Nothing is open for the room but its settled heights."""
 
     refines: bool = False
 
@@ -152,7 +152,7 @@ class Ground:
 # --- what is due ----------------------------------------------------------------------------------------------------
 
 COARSE, FINER, SETTLE, REFINE = range(4)
-"""Classes of what a room waits for (``schedule.py``)."""
+"""Classes of what rooms wait for (``schedule.py``)."""
 
 
 def is_solving(ground: Ground) -> bool:
@@ -214,9 +214,9 @@ def starts(ground: Ground, now: float) -> bool:
         return False
     others = channels.beside is None or channels.beside.number != wanted.job.number
     if needs_channels_only(ground) and channels.making and others:
-        return False  # what was begun is sent first
+        return False  # frames of what was begun are sent first
     if isinstance(state, Previewing | Settling | ChannelsOnly) and wanted.job.heights == state.job.heights:
-        # the heights go on, or the channels
+        # either the heights go on, or the channels
         return isinstance(state, ChannelsOnly) and now - channels.complete_at <= FINEST_WITHIN
     if not isinstance(state, Previewing):
         return True

@@ -1,4 +1,4 @@
-"""What is open for one room on the device: its solve, channels beside it, refinement (DESIGN 8).
+"""The solver's work that is open for one room: its solve, channels beside the solve, refinement (DESIGN 8).
 
 It belongs to the solver's thread and decides nothing.
 """
@@ -21,12 +21,12 @@ from esker.tiles.delivery import RefinedTile
 
 @runtime_checkable
 class PreviewingEarly(Protocol):
-    """A solve that can tell, while it goes on, what newer strokes look like on the coarsest level."""
+    """A solve that can make, while it goes on, a coarsest preview of newer strokes."""
 
     def early_preview(
         self, strokes: Sequence[c.Stroke], settings: c.TerrainSettings, base: Any = None
     ) -> Preview | None:
-        """The coarsest preview of other strokes, None when this solve cannot make one now."""
+        """Returns the coarsest preview of other strokes, None when this solve cannot make one now."""
         ...
 
 
@@ -45,7 +45,10 @@ class Work:
     retained: object = None
 
     def open_solve(self, solver: Solver, effect: OpenSolve, basis: bool) -> bool:
-        """Begins a solve, with its base before where that is not shown yet. Returns whether it can preview early."""
+        """Begins a solve, after its base where that base is not shown yet.
+
+        Returns whether the solve can preview early.
+        """
         job, top = effect.job, effect.top
         more: dict[str, Any] = {} if job.base is None else {"base": job.base}
         if not effect.coarsest:
@@ -66,12 +69,12 @@ class Work:
             self.solve = made
 
     def adopt_channels(self) -> None:
-        """The channels beside are all that is made from now on."""
+        """Goes on with the channels that were made beside a solve, and with nothing else."""
         _close(self.solve)
         self.solve, self.beside = self.beside, None
 
     def step(self) -> SolveEvent | BaseShown:
-        """Goes on with the solve until it can be left."""
+        """Goes on with the solve until the solve can be left."""
         if self.base is not None:
             found = next(self.base, None)
             if found is not None:
@@ -86,7 +89,7 @@ class Work:
         return event
 
     def step_beside(self) -> SolveEvent:
-        """Goes on with the channels beside it."""
+        """Goes on with the channels beside the solve."""
         assert self.beside is not None
         event = next(self.beside, Done())
         if isinstance(event, Done):
@@ -95,12 +98,12 @@ class Work:
         return event
 
     def preview_early(self, job: Job) -> Preview | None:
-        """The coarsest preview of a newer job."""
+        """Returns the coarsest preview of a newer job."""
         assert isinstance(self.solve, PreviewingEarly)
         return self.solve.early_preview(job.strokes, job.settings, job.base)
 
     def looks(self, refinement: Refinement, urgent: Any) -> bool:
-        """Starts on the tiles that are wanted now and were not made yet; False when there are none."""
+        """Starts on the tiles that are wanted now and were not made yet. Returns False when there are none."""
         assert self.refiner is not None
         if self.tiles is None:
             keys = [key for key in refinement.wanted() if key not in self.refined]
@@ -120,7 +123,7 @@ class Work:
         return tile
 
     def leave(self, keeps: bool) -> None:
-        """Ends the solve and refinement. ``keeps``: the channels that are made alone go on beside what comes next."""
+        """Ends the solve and refinement. ``keeps``: the channels that are made alone go on beside the next solve."""
         if keeps:
             self.beside, self.solve = self.solve, None
         retained = self.refiner

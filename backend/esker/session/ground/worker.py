@@ -33,13 +33,13 @@ L = TypeVar("L", bound=Level)
 __all__ = ["Client", "Job", "Worker"]
 
 IDLE_CHECK: Final = 1.0
-"""Seconds between looks at what may be tried again, when nothing else wakes the thread."""
+"""The thread looks this often at failures that may be tried again, when nothing else wakes it."""
 TIDY_EVERY: Final = 30.0
-"""Seconds between looks at what the solver keeps of rooms that have gone, on a server that is never idle."""
+"""The thread looks this often at what the solver keeps of rooms that have gone, on a server that is never idle."""
 
 
 class Worker:
-    """Owns the solver and the thread it runs in."""
+    """The solver, and the thread that it runs in."""
 
     def __init__(
         self,
@@ -59,7 +59,7 @@ class Worker:
         self._now = now
         self._changed = threading.Condition()
         self._grounds: dict[Client, Ground] = {}
-        """The grounds of all rooms. They, ``_tally``, and the flags below need the lock."""
+        """The grounds of all rooms. Access to them, to ``_tally`` and to the flags below needs the lock."""
         self._tally: Tally[Client] = Tally(schedule.default_budget() if budget is None else budget)
         self._leaving: list[Client] = []
         self._stopping = False
@@ -111,17 +111,17 @@ class Worker:
         return client
 
     def request(self, client: Client, job: Job) -> None:
-        """The newest job of a room; replaces one that waits or runs."""
+        """Takes the newest job of a room. It replaces the job that waits or runs."""
         self._happen(client, does.Requested(job))
 
     def nudge(self, client: Client) -> None:
-        """The room may want other refined tiles than before."""
+        """Says that the room may want other refined tiles than before."""
         with self._changed:
             client.work.refined.clear()
             self._happen(client, does.Nudged())
 
     def remove(self, client: Client) -> None:
-        """The room closes: whatever runs for it is dropped."""
+        """Drops whatever runs for a room that closes."""
         with self._changed:
             if self._grounds.pop(client, None) is not None:
                 self._tally = self._tally.closed(client)
@@ -129,7 +129,7 @@ class Worker:
             self._changed.notify()
 
     def stop(self) -> None:
-        """Ends the thread where the solver can next be left."""
+        """Ends the thread at the next place where the solver can be left."""
         with self._changed:
             self._stopping = True
             self._changed.notify()
@@ -171,14 +171,15 @@ class Worker:
         return client
 
     def _tidy(self, idle: bool) -> None:
-        """Memory that nobody uses goes back while nothing is to be done, and where that never comes too."""
+        """Gives back memory that nobody uses: while nothing is to be done, and now and then on a server that is never
+        idle."""
         now = self._now()
         if isinstance(self._solver, Tidying) and (idle or now - self._tidied >= TIDY_EVERY):
             self._tidied = now
             self._solver.tidy()
 
     def _step(self, client: Client) -> None:
-        """One slice of one room: what the solver does until it can be left."""
+        """Runs one slice of one room: the solver works until it can be left."""
         with self._changed:
             if client not in self._grounds:
                 return
@@ -192,7 +193,7 @@ class Worker:
             self._tally = self._tally.ended(client, self._now())
 
     def _happen(self, client: Client, event: Event) -> None:
-        """Something happens to a room; what is to be done then is done, but for a room that has closed."""
+        """Puts an event into the machine of a room and carries its effects out, unless the room has closed."""
         with self._changed:
             before, now = client.ground, self._now()
             client.ground, effects = machine.next(before, event, now)
@@ -206,7 +207,7 @@ class Worker:
                 break
 
     def _do(self, client: Client, effect: Effect) -> bool:
-        """Carries out an effect; False when the solver failed at it."""
+        """Carries out an effect. Returns False when the solver failed at it."""
         match effect:
             case does.Deliver(job, level):
                 self._deliver(client, job, level, client.deliver)
@@ -239,7 +240,7 @@ class Worker:
         return True
 
     def _compute(self, client: Client, effect: Effect) -> Event | None:
-        """Does what the solver is needed for; returns what came of it."""
+        """Carries out an effect that needs the solver. Returns the event that came of it."""
         work = client.work
         match effect:
             case does.Leave(keeps):
@@ -277,7 +278,7 @@ class Worker:
             log.exception("level %d at clock %d could not be delivered", level.level, job.clock)
 
     def _refine(self, client: Client) -> None:
-        """One slice of refinement: at most one tile is finished."""
+        """Runs one slice of refinement: at most one tile is finished."""
         refinement = client.refinement
         assert refinement is not None
         try:
@@ -292,7 +293,9 @@ class Worker:
             refinement.deliver_tile(client.ground.shown.clock, tile)
 
     def _is_urgent(self) -> bool:
-        """Returns whether refinement is to be left for something else. Asked a thousand times a second, so without the
-        lock."""
+        """Returns whether refinement is to be left for something else.
+
+        It is asked a thousand times a second, so it takes no lock.
+        """
         called = any(ground.jobs.wanted is not None for ground in tuple(self._grounds.values()))
         return self._stopping or bool(self._leaving) or called

@@ -31,13 +31,14 @@ from esker.version import VERSION
 
 UNSAVED: Final = "The server could not save this change (is its disk full?). It was taken back."
 MOST_OWNERS: Final = 4_096
-"""Client ids of which a room remembers whose they are, besides those in the journal."""
+"""A room remembers so many owners of client ids, besides those in the journal."""
 HEAVY_BYTES: Final = 256 * 1024
 """Documents that are longer as JSON are sent as one piece of memory to all who come."""
 HEAVY_POINTS: Final = 4_000
 """Documents with more points are encoded outside of the event loop."""
 SINCE_CHARACTERS: Final = 512 * 1024
-"""While no more was done since, who comes gets a heavy document as it was encoded, and then what was done."""
+"""A heavy document that was encoded is sent to newcomers, and then the ops after it, while these are no more than
+this."""
 
 
 STATUS: Final = {
@@ -48,7 +49,7 @@ STATUS: Final = {
     "server_error": 500,
     "shutting_down": 503,
 }
-"""What HTTP answers where a route is denied for a reason that also closes sockets."""
+"""The status that HTTP answers where a route is denied for a reason that also closes sockets."""
 
 
 class Denied(EskerError):
@@ -70,7 +71,7 @@ class Batch:
 
 @dataclass(frozen=True)
 class RoomInfo:
-    """What a welcome says about the server."""
+    """Facts that a welcome gives about the server."""
 
     levels: int
     finest: int
@@ -109,14 +110,14 @@ class RoomCore:
         self.geometry_clock = loaded.document.clock
         """Clock of the last op that changed the ground."""
         self.base_clock = loaded.document.clock
-        """Clock of the last op that changed the elevation layers' part of it."""
+        """Clock of the last op that changed the ground's elevation layers."""
         self.members = Members()
         self._find, self._limits, self._seats = find, limits or Limits(), Places(seats(max_members))
         self._rates, self._now = rates or history_rates(), now
         self._counters = dict(loaded.counters)
         self._claims = claims or Claims()
         self._owners: OrderedDict[str, Owner] = OrderedDict()
-        """Owners of the client ids that were seen here; the id that was unseen for longest comes first."""
+        """Owners of the client ids that were seen here. The id that was unseen for longest comes first."""
         self._recent, self._viewing = Recent(), Viewing()
         for row in loaded.recent:
             self._recent.add(row.clock, row.ordered_json())
@@ -125,7 +126,7 @@ class RoomCore:
         self._waiting: list[Row] = []
         self._in_flight: list[Row] = []
         self._kept: dict[bool, tuple[int, bytes]] = {}
-        """Documents as they were encoded with their clocks; True: as links to look are shown them."""
+        """Encoded documents with their clocks. The key says whether they are as links to look are shown them."""
 
     # --- people -------------------------------------------------------------------------------------------------
 
@@ -178,7 +179,7 @@ class RoomCore:
         raise Denied("bad_hello", "Another page has this client id. Reload this page.")
 
     def heard(self, member: Member) -> None:
-        """A member said something, so it has its welcome."""
+        """Notes that a member said something, so that its welcome has arrived."""
         owner = self._owners.get(member.client)
         if owner is not None and owner.link == member.link:
             owner.heard = True
@@ -201,7 +202,7 @@ class RoomCore:
             raise Denied("room_full", sentence) from None
 
     def leave(self, member: Member) -> None:
-        """Takes a member out. Harmless when it is out already."""
+        """Takes a member out. It is harmless when the member is out already."""
         self.members.remove(member)
 
     def revoke(
@@ -225,8 +226,10 @@ class RoomCore:
     def _welcome(
         self, member: Member, clock: int | None, info: RoomInfo, *, exact: bool = False, asked: int | None = None
     ) -> tuple[str | Long, ...]:
-        """The welcome; and, where a heavy document was encoded a while ago and not ``exact`` is asked, what was done
-        since."""
+        """Returns the welcome.
+
+        Where a heavy document was encoded a while ago, and not ``exact`` is asked, the ops after it too.
+        """
         view = self._looks(member)
         missed = self._missed(clock, view)
         if missed is not None:
@@ -271,7 +274,7 @@ class RoomCore:
         return self._claims.token(self.document.id, member.client, member.link, since)
 
     def _usable(self, view: bool, exact: bool = False, asked: int | None = None) -> tuple[int, bytes] | None:
-        """The document as it was encoded, with its clock, as far as it is still good for who came when the clock was
+        """Returns the encoded document with its clock, if it is still good for a client that came when the clock was
         ``asked``: a viewer gets nothing that was deleted before."""
         kept = self._kept.get(view)
         if kept is None or kept[0] == self.document.clock:
@@ -288,7 +291,7 @@ class RoomCore:
         return found
 
     def keep(self, clock: int, body: bytes, view: bool = False) -> None:
-        """The document of a clock was encoded elsewhere, ``view``: as a link to look is shown it."""
+        """Takes the document of a clock that was encoded elsewhere. ``view``: as a link to look is shown it."""
         if view not in self._kept or self._kept[view][0] < clock:
             self._kept[view] = clock, body
 
@@ -299,7 +302,7 @@ class RoomCore:
         return self._usable(view, asked=asked) is not None
 
     def _missed(self, clock: int | None, view: bool = False) -> list[tuple[int, str]] | None:
-        """The committed ops after ``clock``, or None when only a snapshot will do."""
+        """Returns the committed ops after ``clock``, or None when only a snapshot will do."""
         now = self.document.clock
         if clock is None or clock > now or (view and not self._viewing.resumable(clock)):
             return None
@@ -308,7 +311,7 @@ class RoomCore:
     # --- ops ----------------------------------------------------------------------------------------------------
 
     def submit(self, member: Member, ops: Sequence[c.OpEnvelope]) -> int:
-        """Orders what applies and refuses the rest; returns how many ops were ordered."""
+        """Orders the ops that apply and refuses the others; returns how many ops were ordered."""
         if member.role == "view":
             for envelope in ops:
                 self.refuse(member, envelope.id, "view_only", "You opened this terrain with a link to look at it.")
@@ -368,7 +371,10 @@ class RoomCore:
         self._waiting.append(Row(after.clock, client, counter, author, text))
 
     def _known(self, member: Member, client: str, counter: int) -> bool:
-        """True for an op that is ordered already: acknowledged now, or with its tick if that is still under way."""
+        """Returns True for an op that is ordered already.
+
+        It is acknowledged now, or with its tick if that is still under way.
+        """
         if any(r.client == client and r.counter == counter for r in (*self._in_flight, *self._waiting)):
             return True
         clock = self._find(client, counter)
@@ -380,16 +386,16 @@ class RoomCore:
 
     @property
     def busy(self) -> bool:
-        """True while ops are ordered that are not committed yet."""
+        """Whether ops are ordered that are not committed yet."""
         return bool(self._waiting or self._in_flight)
 
     @property
     def waiting(self) -> bool:
-        """True when ``take`` has something to give."""
+        """Whether ``take`` has something to give."""
         return bool(self._waiting) and not self._in_flight
 
     def take(self) -> Batch | None:
-        """The ops of this tick, to be committed. None when there are none or a commit is still under way."""
+        """Returns the ops of this tick, to be committed. None when there are none or a commit is still under way."""
         if not self.waiting:
             return None
         self._in_flight, self._waiting = self._waiting, []
@@ -397,7 +403,7 @@ class RoomCore:
         return Batch(tuple(self._in_flight), self.head, self.head.to_document() if due else None)
 
     def committed(self, batch: Batch) -> None:
-        """The batch is in the journal: tell everybody, then acknowledge the authors."""
+        """Tells everybody about a batch that is in the journal, then acknowledges its authors."""
         self.document = batch.after
         if batch.snapshot is not None:
             self._snapshot_clock = batch.after.clock
@@ -426,7 +432,10 @@ class RoomCore:
                 member.outbox.push(shared, _ack(mine))
 
     def failed(self, sentence: str = UNSAVED) -> None:
-        """The journal did not take the batch: back to what is committed; every op since is refused with a sentence."""
+        """Goes back to the committed document, since the journal did not take the batch.
+
+        Every op since is refused with a sentence.
+        """
         lost = [*self._in_flight, *self._waiting]
         self._in_flight, self._waiting = [], []
         self.head = self.document

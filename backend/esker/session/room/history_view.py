@@ -30,12 +30,12 @@ from esker.store.journal import DamagedTerrain, Loaded, Row, replay
 log = logging.getLogger("esker.history")
 
 STEP_CHARACTERS: Final = 128 * 1024
-"""Ops of a step forward are sent if they have at most so many characters as text, else the document is."""
+"""A step forward is sent as ops if they have at most so many characters as text, else as a document."""
 WAYPOINT_OPS: Final = 200
 WAYPOINTS: Final = 64
-"""Documents that a room keeps of the clocks it was at, so many ops apart at least."""
+"""A room keeps so many documents of the clocks it was at, WAYPOINT_OPS apart at least."""
 FAR_OPS: Final = 2_000
-"""Farther than this from any of them, the journal's snapshots are asked."""
+"""A clock farther than this from any kept document is read from the journal's snapshots."""
 BEHIND_SECONDS: Final = 0.05
 """A client that has not taken the last step gets the next one after so many seconds."""
 IDLE_CHECKS: Final = 20
@@ -54,7 +54,7 @@ class HistoryCore(RoomCore):
     def __init__(
         self, loaded: Loaded, claims: Claims | None = None, still: frozenset[viewing.Key] | None = None
     ) -> None:
-        """``still``: what of the terrain is there now, where that is all that may be shown; None: everything is."""
+        """``still``: the things that are there now, where nothing else may be shown; None: everything is."""
         super().__init__(loaded, lambda *_: None, max_members=1, claims=claims)
         self._still = still
 
@@ -73,7 +73,7 @@ class HistoryCore(RoomCore):
 
     @property
     def still(self) -> frozenset[viewing.Key] | None:
-        """What is there now, where that is all that may be shown."""
+        """The things that are there now, where nothing else may be shown."""
         return self._still
 
     @still.setter
@@ -93,7 +93,7 @@ class HistoryCore(RoomCore):
         return found
 
     def steps(self, rows: list[Row]) -> list[str] | None:
-        """The ops of a step forward as they may be shown; None where only the document will do."""
+        """Returns the ops of a step forward as they may be shown; None where only the document will do."""
         if self._still is None:
             return [row.ordered_json() for row in rows]
         if not all(viewing.concerns(row.op, self._still) for row in rows):
@@ -110,7 +110,7 @@ class HistoryCore(RoomCore):
             self.base_clock = self.head.clock
 
     def welcome(self, member: Member, info: RoomInfo) -> str | Long:
-        """The document as a ``welcome``."""
+        """Returns the document as a ``welcome``."""
         return self._welcome(member, None, info, exact=True)[0]
 
 
@@ -140,8 +140,8 @@ class HistoryReader:
         return found, rows
 
     def _nearest(self, clock: int) -> StrokeSet | None:
-        """The document to replay from; None where a snapshot of the journal may be nearer."""
-        known = [self.document, *self._waypoints]  # of equal ones the first: steps go on from the present document
+        """Returns the document to replay from; None where a snapshot of the journal may be nearer."""
+        known = [self.document, *self._waypoints]  # of equal clocks the first: steps go on from the present document
         best = max((d for d in known if d.clock <= clock), key=lambda d: d.clock, default=None)
         return best if best is not None and clock - best.clock <= FAR_OPS else None
 
@@ -155,7 +155,7 @@ class HistoryReader:
 
 
 class HistoryRoom(Room):
-    """One person's view of the past."""
+    """The room of one person who looks at an earlier clock."""
 
     def __init__(
         self,
@@ -179,7 +179,7 @@ class HistoryRoom(Room):
         self.read: Read = _in_a_thread
         """Reads the journal, in a thread of those that addresses have shares of."""
         self.place: Place | None = None
-        """Place of this room among those that the server keeps for the past."""
+        """Place of this room among the history rooms that the server keeps."""
         self._idle_timer = self._loop.call_later(idle_seconds / IDLE_CHECKS, self._idle)
 
     def join(
@@ -190,7 +190,7 @@ class HistoryRoom(Room):
         return self._guest
 
     def receive(self, guest: Guest, event: protocol.Event) -> None:
-        """A seek, a view, a credit; ops are refused; of people nobody else hears."""
+        """Takes a seek, a view or a credit. Ops are refused, and nobody else hears of presence."""
         match event:
             case protocol.Message(c.Seek() as seek):
                 self._touch()
@@ -210,7 +210,7 @@ class HistoryRoom(Room):
             self.place.touch()
 
     async def _seek(self, guest: Guest) -> None:
-        """Goes where was asked last, until that is where we are."""
+        """Goes to the clock that was asked for last, until the room is there."""
         try:
             while self._wanted is not None and not self.closed:
                 if guest.member.outbox.waits:
@@ -230,7 +230,7 @@ class HistoryRoom(Room):
             self._seeking = None
 
     async def _look_again(self) -> None:
-        """What is there now may have changed, where only that may be shown."""
+        """Shows the document again where only the things that are there now may be shown: they may have changed."""
         if self._present is None:
             return
         newest = await self.read(self._journal.newest, self.id)
@@ -360,7 +360,7 @@ class HistoryRooms:
                     member.outbox.close(code, sentence)
 
     def close_terrain(self, terrain: str, code: c.CloseCode, sentence: str) -> None:
-        """Closes everybody who looks at the past of this terrain."""
+        """Closes every history room of this terrain."""
         for room in [each for each in self._rooms if each.id == terrain]:
             for member in room.core.members:
                 member.outbox.close(code, sentence)
@@ -373,7 +373,7 @@ class HistoryRooms:
             room.shut()
 
     def close(self, code: c.CloseCode, sentence: str) -> None:
-        """Ends them all."""
+        """Ends all history rooms."""
         for room in list(self._rooms):
             for member in room.core.members:
                 member.outbox.close(code, sentence)

@@ -37,15 +37,15 @@ GIVE_BACK_SECONDS: Final = 5.0
 IDLE_SECONDS: Final = 30.0
 """A room without members stays open this long, so that a reload finds it warm."""
 REST_SECONDS: Final = 600.0
-"""Where all rooms are open, one in which nobody did anything for so long is closed for somebody who comes."""
+"""Where the server has no place left, a room in which nobody did anything for so long is closed for a newcomer."""
 RESTED: Final = "Nobody did anything here for a while, so the server made room for others. Reload the page to go on."
 WRONG_SECRETS_PER_MINUTE: Final = 30
 HELLOS: Final = Rate(5.0, 300.0)
-"""Pages of one address, or by one link, that come: a full room may come back at once."""
+"""Pages that may come from one address, or by one link: a full room may come back at once."""
 WAITING_BYTES: Final = 256 << 20
 READERS, READS_WAITING = 6, 100
 PACKERS, PACKS_WAITING = 2, 20
-"""Threads, and how much of one address may wait for them."""
+"""Threads, and the share of them for which one address may wait."""
 P = ParamSpec("P")
 T = TypeVar("T")
 
@@ -95,17 +95,17 @@ class Hub:
         self._base_threads = ThreadPoolExecutor(1, thread_name_prefix="elevation")
         self._wrong = Rates(Rate(WRONG_SECRETS_PER_MINUTE / 60, WRONG_SECRETS_PER_MINUTE))
         self.reading = FairThreads(READERS, "reading", READS_WAITING)
-        """Threads that read the journal: of one address half of them at most."""
+        """Threads that read the journal. One address has at most half of them."""
         self.packing = FairThreads(PACKERS, "packing", PACKS_WAITING)
-        """Threads that make files of what is stored."""
+        """Threads that make files of stored data."""
         self._history_rates = history_rates()
         self._hellos = Rates(HELLOS, link=HELLOS)
         self.waiting = Waiting(min(WAITING_BYTES, memory.available_bytes() // 16))
-        """What waits to be sent to everybody."""
+        """Bytes that wait to be sent to everybody."""
         self._closing = False
         self._giving_back: asyncio.TimerHandle | None = None
         self.hear_of_ended: list[Callable[[str, Collection[str]], object]] = []
-        """Who is told of links that were revoked: terrain, ids."""
+        """Listeners for links that were revoked: terrain, ids."""
         self._claims = claims or Claims()
         self._history_rooms = HistoryRooms(journal, self._history_room, claims=self._claims)
 
@@ -117,7 +117,7 @@ class Hub:
     # --- entering -----------------------------------------------------------------------------------------------
 
     def authorise(self, terrain: str, secret: str, address: str) -> Link:
-        """The live link behind a secret. Raises Denied (no_terrain, bad_secret, revoked, rate_limited)."""
+        """Returns the live link behind a secret. Raises Denied (no_terrain, bad_secret, revoked, rate_limited)."""
         link = self.access.check(terrain, secret)
         if link is None:
             if not self._wrong.take(Who(address), self._now()):
@@ -158,7 +158,7 @@ class Hub:
         while True:
             room = await self.room(hello.terrain, who)
             asked = await room.prepare(hello.clock, partial(self.read, who), link.role == "view")
-            if not room.closed:  # else the last member left meanwhile
+            if not room.closed:  # a room is closed where its last member left meanwhile
                 break
         self.demand(link)  # the link may have been revoked while the room was being opened
         return room, room.join(hello, link.role, link.id, outbox, address, asked)
@@ -173,7 +173,7 @@ class Hub:
             raise Denied("rate_limited", "Too much was asked for from your address at once. Wait a moment.") from None
 
     async def room(self, terrain: str, who: Who = SERVER) -> Room:
-        """The open room of a terrain. Raises Denied (no_terrain, server_error, rate_limited)."""
+        """Returns the open room of a terrain. Raises Denied (no_terrain, server_error, rate_limited)."""
         room = await self._room(terrain, who)
         while room.closed:  # the room was idle and closed in this very moment
             room = await self._room(terrain, who)
@@ -238,11 +238,11 @@ class Hub:
 
     @property
     def open_rooms(self) -> int:
-        """Rooms that are open or opening, those of the past not counted."""
+        """Rooms that are open or opening, history rooms not counted."""
         return len(self._rooms)
 
     def open_room(self, terrain: str) -> Room | None:
-        """The room if it is open already."""
+        """Returns the room if it is open already."""
         task = self._rooms.get(terrain)
         if task is None or not task.done() or task.cancelled() or task.exception() is not None:
             return None
@@ -255,7 +255,7 @@ class Hub:
         self._sleep(terrain)
 
     def _sleep(self, terrain: str) -> bool:
-        """Closes a room that nobody is in; whether it is closed now."""
+        """Closes a room that nobody is in. Returns whether it is closed now."""
         room = self.open_room(terrain)
         if room is None or len(room.core.members) or room.core.busy:
             return False
@@ -266,7 +266,10 @@ class Hub:
         return True
 
     def _rest(self, terrain: str) -> bool:
-        """Closes a room in which nobody has done anything for long: whoever is in it is told. Whether it did."""
+        """Closes a room in which nobody has done anything for long, and says so to whoever is in it.
+
+        Returns whether it did.
+        """
         room = self.open_room(terrain)
         if room is None or room.core.busy or not room.idle_for(REST_SECONDS):
             return False
@@ -337,7 +340,8 @@ class Hub:
         return until
 
     def end_links(self, terrain: str, links: Collection[str]) -> None:
-        """Links were revoked: closes everybody who came in by them, ends their join codes and what they have going."""
+        """Deals with links that were revoked: closes everybody who came in by them, ends their join codes and their
+        jobs."""
         for link in links:
             self.access.drop_codes(link)
             self.revoke_members(terrain, link)
@@ -376,7 +380,7 @@ class Hub:
         self._history_rooms.revoke(terrain, link, code, sentence)
 
     async def close(self) -> None:
-        """Tells everybody, commits what was ordered, stops the rooms. The journal stays open."""
+        """Tells everybody, commits the ordered ops, stops the rooms. The journal stays open."""
         self._closing = True
         rooms = [room for room in (self.open_room(t) for t in list(self._rooms)) if room is not None]
         for room in rooms:
@@ -394,7 +398,7 @@ class Hub:
 
 
 def _fresh_id() -> str:
-    """An id that no terrain has: 72 random bits. It may stand in a command, so it begins with no dash."""
+    """Returns an id that no terrain has: 72 random bits. It may stand in a command, so it begins with no dash."""
     while (made := secrets.token_urlsafe(9)).startswith("-"):
         pass
     return made

@@ -50,7 +50,7 @@ class Member:
     address: str = ""
     seat: Place | None = None
     since: int = 0
-    """Clock of the document that it got."""
+    """Clock of the document that the member got."""
     presence: c.MemberPresence | None = field(default=None)
 
     def public(self) -> c.Member:
@@ -73,11 +73,11 @@ class Members:
         return iter(tuple(self.by_client.values()))
 
     def public(self) -> tuple[c.Member, ...]:
-        """Everybody, in the order of joining."""
+        """All members, in the order of joining."""
         return tuple(m.public() for m in self)
 
     def add(self, member: Member) -> None:
-        """Lets a member in; where others are, they are told at the next tick."""
+        """Lets a member in. Where there are others, they hear of it at the next tick."""
         self.by_client[member.client] = member
         self._listed = True
         self._moved.update(m.client for m in self if m.presence is not None)
@@ -94,16 +94,16 @@ class Members:
         return True
 
     def rename(self, member: Member, name: str, colour: str | None) -> None:
-        """A new name, and a new colour unless None."""
+        """Takes a new name, and a new colour unless it is None."""
         member.name, member.colour, self._listed = name, colour or member.colour, True
 
     def moved(self, member: Member, presence: c.Presence) -> None:
-        """The newest presence replaces the one before."""
+        """Takes the newest presence, which replaces the one before."""
         member.presence = c.MemberPresence(client=member.client, **presence.model_dump(exclude={"type"}))
         self._moved.add(member.client)
 
     def colour(self, wanted: str | None) -> str:
-        """The wanted colour, else the one of the palette that the fewest members have."""
+        """Returns the wanted colour, else the one of the palette that the fewest members have."""
         if wanted is not None:
             return wanted
         used = [m.colour for m in self]
@@ -111,7 +111,7 @@ class Members:
 
     @property
     def pending(self) -> bool:
-        """True when ``tick`` has something to send."""
+        """Whether ``tick`` has something to send."""
         return bool(self._moved) or self._listed
 
     def tick(self) -> None:

@@ -1,4 +1,4 @@
-"""Which terrains are open, and who opened them: so many on a server, half of them by one address (decision 31)."""
+"""Places for open terrains: so many on a server, half of them for one address at most (decision 31)."""
 
 from __future__ import annotations
 
@@ -31,7 +31,8 @@ class OpenRooms:
         bound: Share | None = None,
         rest: Callable[[str], bool] = lambda _: False,
     ) -> None:
-        """``rest(terrain)`` closes a room in which nobody has done anything for long, and says whether it did."""
+        """``rest(terrain)`` closes a room in which nobody has done anything for long, and says whether the room could
+        be closed."""
         self._places = Places(bound or share())
         self._sleep, self._rest = sleep, rest
         self._held: dict[str, Place] = {}
@@ -62,13 +63,13 @@ class OpenRooms:
         return self._held[terrain].who.site == who.site
 
     def used(self, terrain: str) -> None:
-        """Somebody came into the room."""
+        """Notes that somebody came into the room."""
         place = self._held.pop(terrain, None)
         if place is not None:
             self._held[terrain] = place
 
     def release(self, terrain: str) -> None:
-        """The room is closed."""
+        """Gives the place of a closed room back."""
         place = self._held.pop(terrain, None)
         if place is not None:
             place.release()

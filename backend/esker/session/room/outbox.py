@@ -16,7 +16,7 @@ from esker import contract as c
 from esker.contract import CloseCode
 
 FEW_BYTES: Final = 64 * 1024
-"""A client for whom no more than this waits is not closed when the server has too much to send."""
+"""A client for whom no more bytes than this wait is not closed when the server has too much to send."""
 SLOW: Final = "Your connection did not keep up. It will resume by itself."
 
 
@@ -33,7 +33,7 @@ class Long:
 
 
 class Waiting:
-    """Counts the bytes that wait to be sent by the whole server."""
+    """A count of the bytes that wait to be sent by the whole server."""
 
     def __init__(self, most: int) -> None:
         self.most, self.held = most, 0
@@ -53,7 +53,7 @@ class Outbox:
         now: Callable[[Sequence[str]], bool] | None = None,
         waiting: Waiting | None = None,
     ) -> None:
-        """``waiting``: of the server; when it is full, who has much to send is closed."""
+        """``waiting``: the server's count; when it is full, a client that has much to send is closed."""
         self._wake, self._limit, self._now = wake, limit, now
         self._waiting = waiting or Waiting(limit)
         self._texts: deque[tuple[str | Long, int]] = deque()
@@ -92,14 +92,14 @@ class Outbox:
         self.push(message.model_dump_json())
 
     def close(self, code: CloseCode, reason: str) -> None:
-        """Ends the connection with an error message; what is queued is dropped (the client resumes or is refused)."""
+        """Ends the connection with an error message. Queued texts are dropped: the client resumes, or is refused."""
         if self.closing is None:
             self.closing = (code, reason)
             self.drop()
             self._wake()
 
     def pop(self) -> str | Long | None:
-        """The next text to send, or None."""
+        """Returns the next text to send, or None."""
         if not self._texts:
             return None
         text, size = self._texts.popleft()
@@ -108,9 +108,9 @@ class Outbox:
 
     @property
     def waits(self) -> bool:
-        """True while there is text that was not taken yet."""
+        """Whether there is text that was not taken yet."""
         return bool(self._texts)
 
     def notify(self) -> None:
-        """Something outside the queue changed: tiles, a view, credit."""
+        """Says that something outside the queue changed: tiles, a view, credit."""
         self._wake()

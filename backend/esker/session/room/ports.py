@@ -1,4 +1,4 @@
-"""What a room needs from the store, as a protocol: tests stand in for it."""
+"""A protocol of what a room needs from the store. Tests stand in for it."""
 
 from __future__ import annotations
 

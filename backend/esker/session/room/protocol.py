@@ -18,14 +18,14 @@ from esker.session.room.limits import TokenBucket
 
 HELLO_SECONDS: Final = 10.0
 MAX_MESSAGES_PER_SECOND: Final = 600
-"""All kinds together: above it the client is out of control and the connection is closed."""
+"""Messages of all kinds together: a client above this rate is out of control, and its connection is closed."""
 MESSAGES_BURST: Final = 1_200
 MAX_REFUSED_OPS: Final = 4 * c.OPS_BURST
 """The connection is closed after so many ops in a row were refused for their rate."""
 FITS_CHARACTERS: Final = c.MAX_MESSAGE_BYTES // 4
-"""Bytes of a text with no more characters need not be counted, since a character has four bytes at most."""
+"""A text with no more characters than this need not be counted in bytes, since a character has four bytes at most."""
 MAX_NAME: Final = 120
-"""Characters of the name of a field in a sentence."""
+"""Characters that a sentence shows of the name of a field."""
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ class Connection:
         self._refused_in_a_row = 0
 
     def opened(self) -> list[Event]:
-        """First events: refuses a client that does not speak this protocol."""
+        """Returns the first events: a client that does not speak this protocol is refused."""
         if self._subprotocol == c.SUBPROTOCOL:
             return []
         return self._close(
@@ -110,13 +110,13 @@ class Connection:
         return []
 
     def binary(self, data: bytes) -> list[Event]:
-        """Clients have no binary messages."""
+        """Refuses a binary message: clients have none."""
         if self._closed:
             return []
         return self._close("malformed", f"A client sends no binary messages ({len(data)} bytes came).")
 
     def text(self, text: str, now: float) -> list[Event]:
-        """One text message."""
+        """Takes one text message."""
         if self._closed:
             return []
         if len(text) > FITS_CHARACTERS and len(text.encode("utf-8", "replace")) > c.MAX_MESSAGE_BYTES:
@@ -179,7 +179,7 @@ class Connection:
         return [*events, Accepted(ops)]
 
     def _refuses(self, count: int) -> bool:
-        """Notes ops that are refused for their rate; True when they are too many to go on."""
+        """Notes ops that are refused for their rate. Returns True when they are too many to go on."""
         self._refused_in_a_row += count
         return self._refused_in_a_row > MAX_REFUSED_OPS
 
@@ -190,7 +190,7 @@ class Connection:
         return [Reply(c.ErrorMessage(code="rate_limited", message=text, fatal=False))]
 
     def _broken(self, text: str, error: ValidationError, now: float) -> list[Event]:
-        """Bad ops inside a well-formed envelope are refused one by one; anything else ends the connection."""
+        """Refuses bad ops inside a well-formed envelope one by one. Anything else ends the connection."""
         events = self._salvage(text, now) if self._greeted else None
         if events is not None:
             return events

@@ -39,7 +39,7 @@ CLOCK_TICK: Final = 0.25
 
 
 class Guest:
-    """A member together with its tiles: what a connection holds on to."""
+    """A member together with its tiles, for a connection to hold on to."""
 
     def __init__(self, member: Member, stream: Stream) -> None:
         self.member, self.stream = member, stream
@@ -99,7 +99,7 @@ class Room:
         self._flushed.set()
         self.closed = False
         self._active_at = self._loop.time()
-        """When somebody came, or did more than to answer by itself."""
+        """The time at which somebody came, or did more than to answer by itself."""
         self._request_solve()
 
     # --- people -------------------------------------------------------------------------------------------------
@@ -125,7 +125,7 @@ class Room:
         return guest
 
     def leave(self, guest: Guest) -> None:
-        """The connection of a client ended."""
+        """Lets a client go whose connection ended."""
         self._feed.remove(guest.stream)
         self.core.leave(guest.member)
         self._presence_soon()
@@ -133,11 +133,11 @@ class Room:
             self._on_empty()
 
     def idle_for(self, seconds: float) -> bool:
-        """Whether nobody came or did anything for so long."""
+        """Returns whether nobody came or did anything for so long."""
         return self._loop.time() - self._active_at >= seconds
 
     def receive(self, guest: Guest, event: protocol.Event) -> None:
-        """Does what a member asks by a message, after the protocol has checked it."""
+        """Does what a member's message asks, after the protocol has checked it."""
         self.core.heard(guest.member)
         if not isinstance(event, protocol.Reply) and not (
             isinstance(event, protocol.Message) and isinstance(event.body, c.Credit)
@@ -165,7 +165,7 @@ class Room:
                 guest.member.outbox.message(message)
 
     def frame(self, guest: Guest) -> bytes | None:
-        """The binary frame that waits for this member's socket, if there is one."""
+        """Returns the binary frame that waits for this member's socket, if there is one."""
         return self._feed.sent(guest.stream)
 
     def _presence_soon(self) -> None:
@@ -205,13 +205,13 @@ class Room:
     # --- ticks --------------------------------------------------------------------------------------------------
 
     def _ordered(self) -> None:
-        """Ops were ordered: they are committed with the next tick, and solved at once."""
+        """Has ordered ops committed with the next tick, and solved at once."""
         if self.core.geometry_clock > self._requested_clock:
             if not self._solve_due:
                 self._solve_due = True
                 self._loop.call_soon(self._solve)
         elif self._progress.settled:
-            # Nothing but the clock changes, and the members see that from the ops: no hurry.
+            # Only the clock changes, and the members see that from the ops: there is no hurry.
             self._progress_soon(CLOCK_TICK)
         self._tick_soon()
 
@@ -288,16 +288,19 @@ class Room:
         self._worker.request(self._solve_client, self._job)
 
     def _laid(self) -> None:
-        """Another base is there."""
+        """Goes on with another base."""
         if not self.closed:
             self._request_solve()
 
     def _slow_changed(self) -> None:
-        """A base takes long, or takes no longer."""
+        """Tells people that a base takes long, or takes no longer."""
         self._note_progress(self._progress)
 
     def _level_taken(self, clock: int, level: int, settled: bool) -> None:
-        """A level became tiles. An op that does not touch the ground leaves an older solve as good as new."""
+        """Tells people that a level became tiles.
+
+        An op that does not touch the ground leaves an older solve as good as new.
+        """
         if clock >= self.core.geometry_clock:
             clock = self.core.head.clock
         self._note_progress(
@@ -311,7 +314,7 @@ class Room:
         )
 
     def _requests_changed(self, count: int, more: bool) -> None:
-        """``count`` refined tiles are wanted; ``more``: the solver does not know of all of them yet."""
+        """Takes the number of refined tiles that are wanted. ``more``: the solver does not know of all of them yet."""
         if more and not self.closed:
             self._worker.nudge(self._solve_client)
         self._refining = count
@@ -327,7 +330,7 @@ class Room:
             self._progress_timer = self._loop.call_later(delay, self._send_progress)
 
     def _newest_progress(self) -> c.Progress:
-        """Ground that is settled is so for every clock since at which none of it changed."""
+        """Returns the newest progress. Settled ground is settled for every clock since at which none of it changed."""
         progress, head = self._progress, self.core.head
         if progress.settled and self.core.geometry_clock <= progress.clock < head.clock and self._layers.current(head):
             self._progress = progress.model_copy(update={"clock": head.clock})
@@ -341,11 +344,14 @@ class Room:
             member.outbox.push(text)
 
     def _solve_failed(self, note: str) -> None:
-        """Something went wrong with the solver, or right again. Called in the solver's thread."""
+        """Takes a sentence about the solver, that something went wrong, or right again.
+
+        Called in the solver's thread.
+        """
         self._loop.call_soon_threadsafe(self._tell, note)
 
     def _tell(self, note: str) -> None:
-        """The note goes out with the next progress, whatever that is: no level may hide it."""
+        """Sends the note with the next progress, whatever that is: no level may hide it."""
         self._note = note
         self._note_progress(self._progress)
 

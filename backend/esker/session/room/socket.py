@@ -20,7 +20,7 @@ log = logging.getLogger("esker.socket")
 
 WATCH_SECONDS: Final = 0.5
 GOODBYE_SECONDS: Final = 0.8
-"""How long a closing connection may take to accept the reason."""
+"""A closing connection has this time to accept the reason."""
 BROKE: Final = "This connection asked for more work than people's drawing takes."
 REASON_BYTES: Final = 123
 """Most bytes that a close frame holds for its reason (RFC 6455, 5.5)."""
@@ -35,12 +35,17 @@ class Transport(Protocol):
     """
 
     def listen(self, listener: Callable[[str | bytes], None]) -> None:
-        """From now on the transport may call ``listener`` with a message as it is read, where no earlier message waits.
-        Such a message does not come by the iterator. ``listener`` must not raise."""
+        """Lets the transport call ``listener`` with each message as it is read, where no earlier message waits.
+
+        Such a message does not come by the iterator. ``listener`` must not raise.
+        """
         ...
 
     def send_now(self, texts: Sequence[str]) -> bool:
-        """Sends texts if there is room for them at once; False when there is not, or when one of them is long."""
+        """Sends texts if there is room for them at once.
+
+        Returns False when there is not, or when one of them is long.
+        """
         ...
 
     async def send_text(self, text: str, went_on: Callable[[], None]) -> None: ...
@@ -56,7 +61,7 @@ class Transport(Protocol):
     def abort(self) -> None: ...
 
     def charge(self, account: Account, broke: Callable[[], None]) -> None:
-        """From now on what is read is paid for by ``account``; ``broke`` is called when it cannot pay."""
+        """Has ``account`` pay from now on for what is read; ``broke`` is called when it cannot pay."""
         ...
 
     def pay(self, seconds: float) -> None:
@@ -141,7 +146,7 @@ class Session:
             self._failed()
 
     def _read(self, message: str | bytes) -> None:
-        """A message of a member, as it is read: what is not a hello needs no task to wait in."""
+        """Takes a message of a member, as it is read: only a hello needs a task to wait in."""
         try:
             for event in self._events(message):
                 self._do(event)

@@ -16,7 +16,7 @@ P = ParamSpec("P")
 T = TypeVar("T")
 
 SERVER = Who("")
-"""Stands for the server itself, where it asks for a turn of its own."""
+"""A name for the server itself, where it asks for a turn of its own."""
 
 
 class Turns:
@@ -54,7 +54,7 @@ class Turns:
 
 
 class FairThreads:
-    """Threads for work that blocks: of one address at most half of them at a time, in turns with the others."""
+    """Threads for work that blocks. One address has at most half of them at a time, in turns with the others."""
 
     def __init__(self, threads: int, name: str, waiting: int | None = None) -> None:
         self._turns = Turns(threads, max(1, threads // 2), waiting)
@@ -91,5 +91,5 @@ class FairThreads:
             raise
 
     def shutdown(self) -> None:
-        """Begins nothing more."""
+        """Begins no more work."""
         self._executor.shutdown(wait=False, cancel_futures=True)

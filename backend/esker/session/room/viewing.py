@@ -82,19 +82,19 @@ class _Mark:
 
 
 class Viewing:
-    """The ops of one room as those see them who came in by a link to look."""
+    """The ops of one room as viewers see them, people who came in by a link to look."""
 
     def __init__(self) -> None:
         self._deleted: dict[Key, int] = {}
         self._marks: OrderedDict[int, _Mark] = OrderedDict()
 
     def loaded(self, clock: int, op: str) -> None:
-        """An op from before the room was opened."""
+        """Takes an op from before the room was opened."""
         if any(word in op for word in _ENDS):
             self._put(clock, _Mark(ends=True))
 
     def note(self, before: StrokeSet, op: c.Op, clock: int) -> None:
-        """An op that was ordered."""
+        """Takes an op that was ordered."""
         mark = _Mark()
         for part in op.ops if isinstance(op, c.Group) else (op,):
             match part:
@@ -105,7 +105,7 @@ class Viewing:
                     key = _key(part)
                     kept = before.deleted if key[0] == "stroke" else before.deleted_layers
                     thing = kept.get(key[1])
-                    if thing is not None:  # else it was deleted by this very op
+                    if thing is not None:  # a thing that is in neither was deleted by this very op
                         mark.back[key] = thing, self._deleted.get(key, -1)
         if mark.ends or mark.back:
             self._put(clock, mark)
@@ -119,7 +119,7 @@ class Viewing:
             self._marks.popitem(last=False)
 
     def forget(self, clock: int) -> None:
-        """Nothing that was ordered after ``clock`` was committed."""
+        """Forgets what was ordered after ``clock``: nothing of it was committed."""
         self._deleted = {key: at for key, at in self._deleted.items() if at <= clock}
         for each in [each for each in self._marks if each > clock]:
             del self._marks[each]
@@ -134,7 +134,8 @@ class Viewing:
         return any(at > clock and mark.ends for at, mark in self._marks.items())
 
     def texts(self, ordered: Iterable[tuple[int, str]], since: int) -> list[str]:
-        """Ordered ops (clock, text) for who got the document at clock ``since`` and all ops from there on."""
+        """Yields ordered ops (clock, text) for a viewer who got the document at clock ``since`` and all ops from there
+        on."""
         return [self._text(clock, text, since) for clock, text in ordered]
 
     def _text(self, clock: int, text: str, since: int) -> str:
@@ -152,7 +153,7 @@ class Viewing:
         return {} if mark is None else {key: thing for key, (thing, at) in mark.back.items() if at <= since}
 
     def variant(self, clocks: Iterable[int], since: int) -> frozenset[tuple[int, Key]]:
-        """Two viewers for whom this is equal get the same texts of these ops."""
+        """Returns a key: two viewers for whom it is equal get the same texts of these ops."""
         return frozenset((clock, key) for clock in clocks for key in self._unknown(clock, since))
 
 
