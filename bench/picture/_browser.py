@@ -41,12 +41,23 @@ FLAGS: Final = [
 ]
 
 
+def vite(*arguments: str) -> list[str]:
+    """The command that runs Vite: with the Node.js beside this Python, where set-up put one, else with the system's.
+
+    Raises FileNotFoundError where there is none.
+    """
+    beside = f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}"
+    node = shutil.which("node", path=beside)
+    if node is None:
+        raise FileNotFoundError("Node.js is missing: `make setup` installs it beside this Python.")
+    return [node, str(FRONTEND / "node_modules" / "vite" / "bin" / "vite.js"), *arguments]
+
+
 @contextmanager
 def pages() -> Iterator[str]:
     """Builds and serves the pages of frontend/dev; gives the base address. Raises CalledProcessError."""
     with tempfile.TemporaryDirectory(prefix="esker-bench-") as folder:
-        command = ["node", str(FRONTEND / "node_modules" / "vite" / "bin" / "vite.js"), "build"]
-        command += ["--config", "dev/vite.config.ts", "--outDir", folder, "--logLevel", "warn"]
+        command = vite("build", "--config", "dev/vite.config.ts", "--outDir", folder, "--logLevel", "warn")
         subprocess.run(command, cwd=FRONTEND, check=True, stdout=sys.stderr)
         with files(Path(folder)) as base:
             yield base

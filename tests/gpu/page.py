@@ -14,6 +14,7 @@ from pathlib import Path
 
 from playwright.sync_api import Page, sync_playwright
 
+from bench.picture._browser import vite
 from tests.browser import FLAGS, chromium_path, free_port
 
 FRONTEND = Path(__file__).resolve().parents[2] / "frontend"
@@ -23,11 +24,10 @@ FRONTEND = Path(__file__).resolve().parents[2] / "frontend"
 def _vite() -> str:
     """Address of the server of the sources. It is started once for all modules and ends with this process."""
     port = free_port()
-    vite = FRONTEND / "node_modules" / "vite" / "bin" / "vite.js"
     # No file watching: an edit during the run must not reload the page.
     env = {**os.environ, "CI": "1", "CHOKIDAR_USEPOLLING": "0"}
     process = subprocess.Popen(
-        ["node", str(vite), "--port", str(port), "--strictPort", "--host", "127.0.0.1", "--mode", "test"],
+        vite("--port", str(port), "--strictPort", "--host", "127.0.0.1", "--mode", "test"),
         cwd=FRONTEND,
         env=env,
         stdout=subprocess.PIPE,
