@@ -25,6 +25,7 @@ from esker.contract import (
     MIN_REACH_M,
     MIN_SIZE_M,
     Border,
+    Course,
     CurvePoint,
     Flank,
     FlankShape,
@@ -40,7 +41,7 @@ LATTICE = 8
 """Lattice lines are this share of the side apart: all levels have samples there."""
 Place = tuple[float, float]
 
-KINDS: st.SearchStrategy[StrokeKind] = st.sampled_from(("profile", "profile", "level"))
+KINDS: st.SearchStrategy[StrokeKind] = st.sampled_from(("profile", "profile", "level", "course"))
 SHAPES: st.SearchStrategy[FlankShape] = st.sampled_from(("straight", "concave", "convex"))
 BORDERS: st.SearchStrategy[Border] = st.sampled_from(("free", "pinned"))
 
@@ -111,11 +112,20 @@ def flanks(draw: st.DrawFn, size: float, spacing: float) -> Flank | None:
 def curves(draw: st.DrawFn, kind: StrokeKind, size: float) -> tuple[CurvePoint, ...]:
     """Points of a crest in the frame of its anchors: straight, jagged, going back, beyond the anchors, a point."""
     u = st.sampled_from((0.0, 1.0, 0.5)) | st.floats(-0.5, 1.5)
-    v = number(-0.5, 0.5, 0.0) if kind == "level" else number(-size, size, 0.0, size / 16, -size / 16, 1e-3)
+    v = number(-0.5, 0.5, 0.0) if kind != "profile" else number(-size, size, 0.0, size / 16, -size / 16, 1e-3)
     middle = draw(st.lists(st.tuples(u, v), max_size=4))
     if draw(st.booleans()):
         return ((0.0, 0.0), *middle, (1.0, 0.0))
     return tuple(middle) or ((0.0, 0.0),)
+
+
+@st.composite
+def courses(draw: st.DrawFn, size: float) -> Course:
+    """What a course is: heights anyhow, or of a river."""
+    rises = draw(st.lists(number(-size, size, size / 16, 0.0, -size / 16, 1e-3), max_size=6))
+    if draw(st.booleans()):
+        return Course(use="river", rises=tuple(sorted(rises, reverse=True)))
+    return Course(use="road", rises=tuple(rises))
 
 
 @st.composite
@@ -137,6 +147,7 @@ def strokes(draw: st.DrawFn, settings: TerrainSettings, spacing: float, known: S
         plateau_radius_m=plateau,
         yields=draw(number(0.0, 1.0, 0.0, 0.0)),
         finished=True,
+        course=draw(courses(size)) if kind == "course" else None,
     )
     bound = DOMAIN_MARGIN * size
     return stroke if np.abs(world_points(stroke)).max() <= bound else stroke.model_copy(update={"curve": ((0.0, 0.0),)})

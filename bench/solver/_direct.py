@@ -192,7 +192,7 @@ def _rounded(scene: Scene, rng: np.random.Generator) -> Scene:
 
     def moved(stroke: Stroke) -> Stroke:
         heights = {name: (*getattr(stroke, name)[:2], number(getattr(stroke, name)[2])) for name in ("first", "last")}
-        curve = stroke.curve if stroke.kind == "level" else tuple((u, number(z)) for u, z in stroke.curve)
+        curve = tuple((u, number(z)) for u, z in stroke.curve) if stroke.kind == "profile" else stroke.curve
         radius = number(stroke.plateau_radius_m)
         sides = {"left": side(stroke.left), "right": side(stroke.right)}
         return stroke.model_copy(update={**heights, **sides, "curve": curve, "plateau_radius_m": radius})

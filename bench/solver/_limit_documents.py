@@ -46,7 +46,8 @@ def document(seed: int) -> c.Document:
 def _stroke(k: int, size: float, rng: random.Random) -> c.Stroke:
     kind = rng.choice(get_args(c.StrokeKind))
     paint = _fields(c.Paint, rng, {}) if kind == "paint" else None
-    own = {"id": f"s{k}", "kind": kind, "paint": paint, "hidden": False}
+    course = _fields(c.Course, rng, {"rises": _rises(size, rng)}) if kind == "course" else None
+    own = {"id": f"s{k}", "kind": kind, "paint": paint, "course": course, "hidden": False}
     own |= {"first": _anchor(size, rng), "last": _anchor(size, rng), "curve": _curve(size, rng)}
     return c.Stroke.model_validate(_fields(c.Stroke, rng, own))
 
@@ -63,6 +64,13 @@ def _curve(size: float, rng: random.Random) -> tuple[tuple[float, float], ...]:
     ends = (0.0, 1.0, 0.5, -1e-300, 1e-300, 1 + 2**-52, rng.random())
     heights = (*ends, size, -size, 1e7, -1e7, rng.uniform(-size, size))
     return tuple((rng.choice(ends), rng.choice(heights)) for _ in range(rng.randint(0, LONGEST)))
+
+
+def _rises(size: float, rng: random.Random) -> tuple[float, ...]:
+    """Of a course: falling, so that a river is taken, or anything."""
+    ends = (0.0, size, -size, 1e-300, c.ABSOLUTE_BOUND_M, -c.ABSOLUTE_BOUND_M, rng.uniform(-size, size))
+    rises = [rng.choice(ends) for _ in range(rng.randint(0, LONGEST))]
+    return tuple(sorted(rises, reverse=True) if rng.random() < 0.5 else rises)
 
 
 def _fields(model: type[BaseModel], rng: random.Random, own: dict[str, Any]) -> dict[str, Any]:

@@ -47,7 +47,7 @@ inline int nearest_in_bin(int *best, segments_t s, int first, int count, float r
 // The sums of all strokes at this work-item's sample; (x0, y0): the bin's first.
 inline sums_t gather(const tables_t *t, int bx, int by, int gx, int gy, int n, local int *least_bits, local uint *marks,
                      int channels) {
-    sums_t sum = {0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f};
+    sums_t sum = {0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f};
     float x = gx, y = gy, cx = bx * BIN + 0.5f * (BIN - 1), cy = by * BIN + 0.5f * (BIN - 1);
     for (int i = t->row_start[by - t->row0]; i < t->row_start[by - t->row0 + 1]; i++) {
         global const int *item = t->row_items + ITEM_STRIDE * i;
@@ -60,7 +60,7 @@ inline sums_t gather(const tables_t *t, int bx, int by, int gx, int gy, int n, l
             int best;
             reached = nearest_in_bin(&best, t->outlines, at[I_FIRST], at[I_COUNT], p[P_REACH], x, y, cx, cy, least_bits,
                                      marks);
-            if (best != NOTHING) resolve(&near, 1, t->outlines, best, x, y, t->edition);
+            if (best != NOTHING) resolve(&near, 1, t->outlines, best, x, y, p[P_STOP], t->edition);
             if (at[I_SPANS] >= 0 && gy < n) {
                 global const int *span = t->span_index + at[I_SPANS] + gy - t->row0 * BIN;
                 in = inside_row(t->spans, span[0], span[1], x);

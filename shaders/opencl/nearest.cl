@@ -89,9 +89,9 @@ typedef struct {
 } nearest_t;
 
 // wtt: of squares of what strokes want; from PAIRS_EDITION on of squares of what pairs of them want differently, and
-// joint: of the pairs' weights (reference_raster._add).
+// joint: of the pairs' weights (reference_raster._add); quiet: how far the bank of a course takes the springs away.
 typedef struct {
-    REAL w, wt, wtt, wa, fade, held, g, gx, gy, toe, hard, joint;
+    REAL w, wt, wtt, wa, fade, held, g, gx, gy, toe, hard, joint, quiet;
 #ifdef OVER_BASE
     REAL share;
 #endif
@@ -102,7 +102,7 @@ INLINE REAL smooth(REAL t) {
     return fmin(t * t * (3.0f - 2.0f * t), 1.0f);
 }
 
-// --- outlines: level crests, curved in plan ---
+// --- outlines: crests that are curved in plan; level, but for courses ---
 
 // From the nearest point of segment `at` to the samples of a row: (rx, ry); returns the share of the segment where it is.
 INLINE REAL foot_of(REAL *rx, REAL *ry, segments_t s, int at, REAL x, float y) {
@@ -148,8 +148,8 @@ INLINE void consider(REAL *best2, MASK *best, segments_t s, int at, REAL x, floa
     *best = select(*best, (MASK)(at), better);
 }
 
-// What the samples whose nearest segment is `at` need to know of their nearest crest point.
-INLINE void resolve(nearest_t *out, MASK mine, segments_t s, int at, REAL x, float y, int edition) {
+// What the samples whose nearest segment is `at` need to know of their nearest crest point. stop: P_STOP.
+INLINE void resolve(nearest_t *out, MASK mine, segments_t s, int at, REAL x, float y, float stop, int edition) {
     global const float *t = s.table + at;
     size_t m = s.m;
     REAL rx, ry, u = foot_of(&rx, &ry, s, at, x, y), square = square_of(rx, ry), distance = sqrt(square);
@@ -158,7 +158,12 @@ INLINE void resolve(nearest_t *out, MASK mine, segments_t s, int at, REAL x, flo
     REAL ty = select(select((REAL)(t[3 * m]), (REAL)(t[8 * m]), at1), (REAL)(t[6 * m]), at0);
     REAL away = ty * rx, cross = fma(tx, ry, -away);
     MASK cap = (at0 && MASK_OF(t[9 * m] > 0.0f)) || (at1 && MASK_OF(t[10 * m] > 0.0f));
-    REAL lesser = lesser_side(cap, fma(tx, rx, ty * ry), cross, square, distance);
+    REAL past = fma(tx, rx, ty * ry);
+    REAL lesser = lesser_side(cap, past, cross, square, distance);
+    REAL along = t[12 * m] * t[4 * m] * (1.0f - select((REAL)(0.0f), fmin(fabs(past) * stop, 1.0f), cap));
+    out->height = select(out->height, fma(u, (REAL)(t[12 * m]), (REAL)(t[11 * m])), mine);
+    out->along_x = select(out->along_x, along * t[2 * m], mine);
+    out->along_y = select(out->along_y, along * t[3 * m], mine);
     out->distance = select(out->distance, distance, mine);
     out->rx = select(out->rx, rx, mine);
     out->ry = select(out->ry, ry, mine);

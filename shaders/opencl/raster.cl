@@ -30,11 +30,11 @@ inline int least_int16(int16 v) {
     return min(c.x, c.y);
 }
 
-inline nearest_t nearest_of_row(int16 best, const tables_t *t, float height, float16 x, float y) {
-    nearest_t out = {1e15f, height, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 1.0f, 1e30f, 0.0f};
+inline nearest_t nearest_of_row(int16 best, const tables_t *t, global const float *p, float16 x, float y) {
+    nearest_t out = {1e15f, p[P_HEIGHT], 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 1.0f, 1e30f, 0.0f};
     for (int at = least_int16(best); at < NOTHING; at = least_int16(best)) {
         int16 mine = best == at;
-        resolve(&out, mine, t->outlines, at, x, y, t->edition);
+        resolve(&out, mine, t->outlines, at, x, y, p[P_STOP], t->edition);
         best = select(best, (int16)(NOTHING), mine);
     }
     return out;
@@ -87,7 +87,7 @@ inline void outline_in_bin(sums_t *sums, const tables_t *t, global const float *
     if (!reached && at[I_SPANS] < 0) return;
     for (int y = 0; y < rows; y++) {
         int16 in = 0;
-        nearest_t near = nearest_of_row(best[y], t, p[P_HEIGHT], x, y0 + y);
+        nearest_t near = nearest_of_row(best[y], t, p, x, y0 + y);
         LOWER(near, t, y);
         if (at[I_SPANS] >= 0) {
             global const int *span = t->span_index + at[I_SPANS] + ((int)y0 + y - t->row0 * BIN);
@@ -99,7 +99,7 @@ inline void outline_in_bin(sums_t *sums, const tables_t *t, global const float *
 
 inline void clear(sums_t *sums, int rows) {
     for (int y = 0; y < rows; y++) {
-        sums_t none = {0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f};
+        sums_t none = {0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f};
         sums[y] = none;
     }
 }

@@ -97,6 +97,10 @@ INLINE void cross_section(sums_t *sum, const nearest_t *near, MASK inside, globa
         need = skirt(&b, t->cliff, &width, &foot_height, &foot_lift);
         toe_end = fmax(toe_end, 1.0f + width * wide);
     }
+    if (p[P_LB] + p[P_RB] > 0.0f) {
+        REAL bank = near->left * p[P_LB] + near->right * p[P_RB];
+        sum->quiet = fmax(sum->quiet, select(zero, smooth(1.0f - b.d / fmax(bank, TINY)), b.within));
+    }
     MASK reached = b.within && (b.hard || (b.has && rt < toe_end));
     if (!ANY(reached)) return;
     REAL z, fall, lift, free = 0.0f, skirted = 0.0f;
@@ -209,7 +213,7 @@ INLINE constraint_t conclude(const sums_t *sum, MASK x, int y, int n, float scre
     REAL quarrel = apart / (apart + AGREEMENT * square + TINY);
     if (t->edition >= PAIRS_EDITION) quarrel *= sum->joint / (sum->joint + AGREEMENT * w);
     REAL a = sum->wa / w;
-    a = (a + fmin(OVERLAP_STIFFENING * a, OVERLAP_STIFFEST) * quarrel * quarrel) * sum->fade;
+    a = (a + fmin(OVERLAP_STIFFENING * a, OVERLAP_STIFFEST) * quarrel * quarrel) * sum->fade * (1.0f - sum->quiet);
     MASK hard = sum->hard > 0.0f;
     out.height_d = select(a, fixed, hard);
     out.height_f = select((a + screening * sum->held) * target, target, hard);

@@ -66,7 +66,19 @@ brushes = st.builds(
     paint=st.one_of(paint, paint, st.none()),
     hidden=st.booleans(),
 )
-strokes = st.one_of(crests, crests, brushes)
+course = st.builds(c.Course, use=st.sampled_from(get_args(c.CourseUse)), rises=st.lists(metres, max_size=4).map(tuple))
+courses = st.builds(
+    c.Stroke,
+    id=stroke_id,
+    kind=st.just("course"),
+    first=vec,
+    last=vec,
+    curve=curve,
+    course=st.one_of(course, course, st.none()),
+    left=flank,
+    hidden=st.booleans(),
+)
+strokes = st.one_of(crests, crests, brushes, courses)
 field_values: dict[str, st.SearchStrategy[Any]] = {
     "first": vec,
     "last": st.one_of(vec, st.tuples(metres, metres, metres)),

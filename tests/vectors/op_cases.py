@@ -19,6 +19,11 @@ SNOW: Json = {"channel": "snow", "value": 1.0, "radius_m": 80.0}
 PAINTED = stroke(
     "p", kind="paint", first=[500, 500, 0], last=[900, 700, 0], curve=[[0, 0], [0.5, 0.1], [1, 0]], paint=SNOW
 )
+RUN: Json = {"use": "river", "rises": [0.0, -4.5, -4.5], "depth_m": 3.0}
+RIVER = stroke(
+    "r", kind="course", first=[500, 500, 90], last=[900, 700, 80], curve=[[0, 0], [0.5, 0.1], [1, 0], [1.5, 0]],
+    course=RUN, left=None, right={"slope_deg": None, "extent_m": 40},
+)  # fmt: skip
 VALLEY = layer("v")
 CRATER = layer("k", name="crater 2004", priority=2, spacing_m=[2, 2], hidden=True)
 LOST = layer("d", name="lost")
@@ -114,6 +119,18 @@ def _applies() -> list[tuple[str, Json, Json]]:
             document(PAINTED),
             op(set_, stroke="p", fields={"paint": {"channel": "wetness", "value": -0.5, "radius_m": 12}}),
         ),
+        ("begin a river whose last points have one height", BASE, op("stroke.begin", stroke=RIVER)),
+        (
+            "append to a river",
+            document(RIVER),
+            op("stroke.append", stroke="r", start=4, points=[[2, 0.5]], last=[950, 700, 80]),
+        ),
+        (
+            "a river becomes a road that rises",
+            document(RIVER),
+            _set("r", course=RUN | {"use": "road", "rises": [0, 9]}),
+        ),
+        ("a course without heights", BASE, op("stroke.begin", stroke=RIVER | {"course": {"use": "ridge"}})),
         ("delete paint", document(PAINTED), op("stroke.delete", stroke="p")),
         ("terrain detail and rule", BASE, op("terrain.set", fields={"detail": 2.5, "rule": "plain"})),
         ("exactly the most points", document(NEW), op("stroke.begin", stroke=LONG)),
@@ -236,6 +253,16 @@ def _refuses() -> list[tuple[str, Json, Json, str]]:
         ("a mountain with paint", BASE, op("stroke.begin", stroke=NEW | {"paint": SNOW}), "bad_field"),
         ("paint set on a mountain", BASE, _set("a", paint=SNOW), "bad_field"),
         ("paint taken from a paint stroke", document(PAINTED), _set("p", paint=None), "bad_field"),
+        ("a course without course", BASE, op("stroke.begin", stroke=RIVER | {"course": None}), "bad_field"),
+        ("a mountain with a course", BASE, _set("a", course=RUN), "bad_field"),
+        ("a river that rises", document(RIVER), _set("r", course=RUN | {"rises": [0, -5, -4]}), "bad_field"),
+        (
+            "a course of too many points",
+            document(RIVER),
+            _set("r", curve=[[0, 0]] * (c.MAX_COURSE_POINTS + 1)),
+            "bad_field",
+        ),
+        ("a course too high", document(RIVER), _set("r", course={"use": "ridge", "rises": [40960]}), "out_of_domain"),
         ("paint too far", document(PAINTED), _set("p", curve=[[200, 0]]), "out_of_domain"),
         ("terrain detail null", BASE, op("terrain.set", fields={"detail": None}), "bad_field"),
         ("anchor too far", BASE, op("stroke.anchor", stroke="a", which="last", to=[40961, 0, 0]), "out_of_domain"),

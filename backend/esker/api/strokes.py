@@ -12,7 +12,7 @@ from esker import contract
 from esker.api.arguments import model, number, shown
 from esker.api.arguments import points as checked_points
 from esker.contract import Flank, Vec3
-from esker.document.strokes import level_curve, profile_curve
+from esker.document.strokes import level_curve, misfit, profile_curve
 
 FlankLike = tuple[float | None, float] | Flank | None
 DEFAULT_FLANK: Flank = Flank()
@@ -82,6 +82,50 @@ class Stroke:
         said = {"channel": channel, "value": number("value", value), "radius_m": number("radius_m", radius_m)}
         paint = model(contract.Paint, said)
         return _stroke("paint", first, last, level_curve(p, first, last), None, None, {**fields, "paint": paint})
+
+    @staticmethod
+    def course(
+        points: ArrayLike,
+        use: contract.CourseUse = "river",
+        width_m: float = 0.0,
+        left: FlankLike = None,
+        right: FlankLike = None,
+        **fields: Any,
+    ) -> contract.Stroke:
+        """A river bed, a road or a ridge along a line over the ground, with a height at each of its points.
+
+        Parameters
+        ----------
+        points : (n, 3) array, metres
+            At most ``contract.MAX_COURSE_POINTS``. Heights are the bed's, the road's, or the ridge's own.
+        use : "river", "road" or "ridge"
+            A river runs from its first point to its last and never rises.
+        width_m : float
+            How wide the line is level across.
+        left, right
+            Banks: flanks down (or up) to the base. None: the ground itself leads to the line.
+
+        Raises
+        ------
+        ValueError
+            Too many points, points that are not finite, or a river that rises.
+
+        >>> from esker import Stroke
+        >>> road = Stroke.course([(0, 0, 80), (900, 300, 75), (1500, 300, 90)], "road", width_m=12)
+        >>> road.course.rises, road.plateau_radius_m
+        ((0.0, -5.0, 10.0), 6.0)
+        """
+        p = _points(points)
+        first, last = _ends(p)
+        rises = tuple(float(z) for z in p[:, 2] - p[0, 2])
+        stroke = _stroke(
+            "course", first, last, level_curve(p, first, last), left, right,
+            {**fields, "course": model(contract.Course, {"use": use, "rises": rises}),
+             "plateau_radius_m": number("width_m", width_m) / 2},
+        )  # fmt: skip
+        if wrong := misfit(stroke):
+            raise ValueError(wrong)
+        return stroke
 
 
 def _ends(p: NDArray[np.float64]) -> tuple[Vec3, Vec3]:

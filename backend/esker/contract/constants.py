@@ -6,8 +6,8 @@ from typing import Final
 
 # --- protocol ---------------------------------------------------------------------------------------------------
 
-PROTOCOL_VERSION: Final = 6
-SUBPROTOCOL: Final = "esker.6"
+PROTOCOL_VERSION: Final = 7
+SUBPROTOCOL: Final = "esker.7"
 
 # --- grid (DESIGN 3) --------------------------------------------------------------------------------------------
 
@@ -147,6 +147,11 @@ MAX_SLOPE_DEG: Final = 85.0
 
 MAX_STROKES: Final = 5_000
 MAX_POINTS_PER_STROKE: Final = 4_096
+MAX_COURSE_POINTS: Final = 512
+"""Points of a river, road or ridge that was drawn over the ground: each has a handle."""
+DEFAULT_COURSE_GRADE: Final = 0.08
+"""Steepest grade of a new road, as a tangent: what lorries climb."""
+MIN_COURSE_GRADE: Final = 0.005
 MAX_POINTS_PER_TERRAIN: Final = 500_000
 """Of its strokes together, and again of its tombstones: everybody who comes in is sent them all."""
 MAX_POINTS_PER_APPEND: Final = 256

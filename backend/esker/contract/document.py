@@ -8,12 +8,14 @@ from pydantic import Field
 
 from esker.contract.constants import (
     CURRENT_EDITION,
+    DEFAULT_COURSE_GRADE,
     DEFAULT_DETAIL,
     DEFAULT_EXTENT_FRACTION,
     DEFAULT_REACH_FRACTION,
     DEFAULT_SIZE_M,
     DEFAULT_SLOPE_DEG,
     EDGE_POINTS,
+    MAX_COURSE_POINTS,
     MAX_DETAIL,
     MAX_GRID_SAMPLES,
     MAX_GRID_SPACING_M,
@@ -21,6 +23,7 @@ from esker.contract.constants import (
     MAX_SIZE_M,
     MAX_SLOPE_DEG,
     MAX_VERTICAL_SCALE,
+    MIN_COURSE_GRADE,
     MIN_GRID_SIDE,
     MIN_GRID_SPACING_M,
     MIN_REACH_M,
@@ -30,6 +33,7 @@ from esker.contract.values import (
     ABSOLUTE_BOUND_M,
     Border,
     Clock,
+    CourseUse,
     CurvePoint,
     Digest,
     FlankShape,
@@ -69,6 +73,21 @@ class Paint(Wire):
     radius_m: Length
 
 
+class Course(Wire):
+    """What a course stroke is: a line over the ground with a height at each of its points (DESIGN 21).
+
+    ``rises``: metres of each point of the curve above the first anchor; points beyond the last one have its height.
+    ``use``: a ``river`` never rises along its way, which the server holds it to; a ``road`` is laid by the page so that
+    its steepest grade is ``grade`` (rise over run, as a tangent); a ``ridge`` goes up and down.
+    ``depth_m``: how far below (of a ridge: above) the ground the page lays it.
+    """
+
+    use: CourseUse
+    rises: Annotated[tuple[Metres, ...], Field(max_length=MAX_COURSE_POINTS)] = ()
+    grade: Annotated[float, Field(ge=MIN_COURSE_GRADE, le=1, allow_inf_nan=False)] = DEFAULT_COURSE_GRADE
+    depth_m: Length = 0.0
+
+
 class Stroke(Wire):
     """One stroke (immutable). Curve points live in the frame of the anchors, so moving an anchor re-projects.
 
@@ -78,6 +97,9 @@ class Stroke(Wire):
     ``d = last.xy - first.xy`` and ``perp((x, y)) = (-y, x)`` (left of the direction of travel).
     ``paint``: the line of a brush, in the frame of ``level``; it lies on the ground, and no height follows from it.
     Strokes of this kind have ``paint``, and no others; flanks, plateau, amplitude and roughness mean nothing to them.
+    ``course``: a line in the frame of ``level`` with a height at each of its points. Strokes of this kind have
+    ``course``, and no others, hold at most ``MAX_COURSE_POINTS`` points and are never closed; ``plateau_radius_m`` is
+    half their width, and a flank without a slope is a bank, where the diffusion alone leads to the line.
     ``left``/``right`` are the flanks left and right of the direction of travel; None means no flank on that side.
     ``yields``: how far the stroke gives way where it meets others: at 0 all count alike, at 1 it only counts where no
     other one says anything. Where a stroke is alone nothing follows from it.
@@ -96,6 +118,7 @@ class Stroke(Wire):
     roughness: Unit = 0.5
     yields: Unit = 0.0
     paint: Paint | None = None
+    course: Course | None = None
     locked: bool = False
     hidden: bool = False
     label: Name = ""
@@ -115,12 +138,13 @@ class StrokeFields(Wire):
     roughness: Unit | None = None
     yields: Unit | None = None
     paint: Paint | None = None
+    course: Course | None = None
     locked: bool | None = None
     hidden: bool | None = None
     label: Name | None = None
 
 
-NULLABLE_STROKE_FIELDS: Final = frozenset({"left", "right", "paint"})
+NULLABLE_STROKE_FIELDS: Final = frozenset({"left", "right", "paint", "course"})
 """Fields of ``StrokeFields`` for which an explicit null is a value (no flank, no paint), not an error."""
 
 

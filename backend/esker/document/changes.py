@@ -25,6 +25,7 @@ STROKE_WORDS: Final[dict[str, str]] = {
     "roughness": "roughness",
     "yields": "yielding",
     "paint": "paint",
+    "course": "course",
     "locked": "lock",
     "hidden": "visibility",
     "label": "label",

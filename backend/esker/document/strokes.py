@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from itertools import chain
+from itertools import chain, pairwise
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from esker.contract import CurvePoint, Flank, Stroke, Vec3
+from esker.contract import MAX_COURSE_POINTS, CurvePoint, Flank, Stroke, Vec3
 from esker.grid import Rect
 
 Points = NDArray[np.float64]
@@ -33,6 +33,9 @@ def world_points(stroke: Stroke) -> Points:
     perp = np.array([-d[1], d[0]])
     out[:, :2] = first[:2] + curve[:, :1] * d + curve[:, 1:] * perp
     out[:, 2] = first[2]
+    if stroke.course is not None and stroke.course.rises:
+        rises = stroke.course.rises
+        out[:, 2] += np.asarray((*rises, *(rises[-1:] * (count - len(rises)))))[:count]
     return out
 
 
@@ -63,9 +66,17 @@ def level_curve(points: Points, first: Vec3, last: Vec3) -> tuple[CurvePoint, ..
 
 def misfit(stroke: Stroke) -> str | None:
     """What is wrong with the fields of a stroke of its kind, for a person; None when nothing is."""
-    if (stroke.kind == "paint") == (stroke.paint is not None):
+    if (stroke.kind == "paint") != (stroke.paint is not None):
+        return "A paint stroke needs 'paint' (channel, value, radius), and only a paint stroke."
+    if (stroke.kind == "course") != (stroke.course is not None):
+        return "A course needs 'course' (use, heights), and only a course."
+    if stroke.course is None:
         return None
-    return "A paint stroke needs 'paint' (channel, value, radius), and only a paint stroke."
+    if len(stroke.curve) > MAX_COURSE_POINTS:
+        return f"A course holds at most {MAX_COURSE_POINTS} points."
+    if stroke.course.use == "river" and any(b > a for a, b in pairwise(stroke.course.rises)):
+        return "A river never rises along its way."
+    return None
 
 
 def influence_extent(stroke: Stroke) -> float:
@@ -103,7 +114,9 @@ def reach(stroke: Stroke, box: CurveBox) -> float:
     if stroke.kind == "profile":
         far = max(abs(ax) + u * dx, abs(ay) + u * dy, abs(az) + u * abs(bz - az) + v)
     else:
-        far = max(abs(ax) + u * dx + v * dy, abs(ay) + u * dy + v * dx, abs(az))
+        rises = () if stroke.course is None else stroke.course.rises
+        highest = abs(az) + max(map(abs, rises), default=0.0)
+        far = max(abs(ax) + u * dx + v * dy, abs(ay) + u * dy + v * dx, highest)
     return far * (1 + ROUNDING)
 
 

@@ -20,9 +20,9 @@ import {
   type Stroke,
   type TerrainSettings,
 } from "../generated/contract.ts";
-import { changed, type Doc, fullFlank, fullStroke, Refusal } from "./document.ts";
+import { changed, type Doc, fullCourse, fullFlank, fullStroke, Refusal } from "./document.ts";
 import { LayerEditor } from "./layers.ts";
-import { worldPoints } from "./strokes.ts";
+import { misfit, worldPoints } from "./strokes.ts";
 
 export { type Doc, Refusal } from "./document.ts";
 
@@ -122,8 +122,8 @@ class Editor {
     const outside = (v: number): boolean => !(Math.abs(v) <= bound);
     if (stroke.first.some(outside) || stroke.last.some(outside))
       throw new Refusal("out_of_domain", "An anchor lies farther than ten times the terrain from its corner.");
-    if ((stroke.kind === "paint") !== (stroke.paint !== null))
-      throw new Refusal("bad_field", "A paint stroke needs 'paint' (channel, value, radius), and only a paint stroke.");
+    const wrong = misfit(stroke);
+    if (wrong !== null) throw new Refusal("bad_field", wrong);
     if (worldPoints(stroke).some(outside))
       throw new Refusal("out_of_domain", "A point lies farther than ten times the terrain from its corner.");
   }
@@ -154,7 +154,7 @@ class Editor {
     if (old.locked && Object.keys(update).some((name) => name !== "locked"))
       throw new Refusal("locked_stroke", "This stroke is locked. Unlock it to change it.");
     const next: Stroke = { ...old, ...(update as Partial<Stroke>) };
-    this.#put({ ...next, left: fullFlank(next.left), right: fullFlank(next.right) });
+    this.#put({ ...next, left: fullFlank(next.left), right: fullFlank(next.right), course: fullCourse(next.course) });
   }
 
   #delete(id: string): void {

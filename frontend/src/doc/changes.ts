@@ -20,6 +20,7 @@ export const STROKE_WORDS = {
   roughness: "roughness",
   yields: "yielding",
   paint: "paint",
+  course: "course",
   locked: "lock",
   hidden: "visibility",
   label: "label",

@@ -1,6 +1,8 @@
 /** The document as the page holds it: an immutable value. Maps keep the order in which strokes came. */
 
 import {
+  type Course,
+  DEFAULT_COURSE_GRADE,
   DEFAULT_EXTENT_FRACTION,
   DEFAULT_SIZE_M,
   DEFAULT_SLOPE_DEG,
@@ -72,6 +74,11 @@ export function fullFlank(flank: Partial<Flank> | null): Flank | null {
   };
 }
 
+/** A course with the defaults of the contract filled in. */
+export function fullCourse(course: (Partial<Course> & Pick<Course, "use">) | null): Course | null {
+  return course === null ? null : { rises: [], grade: DEFAULT_COURSE_GRADE, depth_m: 0, ...course };
+}
+
 /** A stroke with the defaults of the contract filled in: ops from other clients may leave them out. */
 export function fullStroke(stroke: Partial<Stroke> & Pick<Stroke, "id" | "kind" | "first" | "last" | "curve">): Stroke {
   return {
@@ -88,6 +95,7 @@ export function fullStroke(stroke: Partial<Stroke> & Pick<Stroke, "id" | "kind" 
     ...stroke,
     left: fullFlank(stroke.left ?? null),
     right: fullFlank(stroke.right ?? null),
+    course: fullCourse(stroke.course ?? null),
   };
 }
 

@@ -1,11 +1,11 @@
 /** Strokes as geometry: frames, world points, bounds (DESIGN 4). Twin of `backend/esker/document/strokes.py`. Pure. */
 
-import type { Flank, Stroke } from "../generated/contract.ts";
+import { type Flank, MAX_COURSE_POINTS, type Stroke } from "../generated/contract.ts";
 
 /** An anchor: x, y, z in metres. */
 export type Anchor = readonly [number, number, number];
 export type CurvePoint = [number, number];
-export type StrokeShape = Pick<Stroke, "kind" | "first" | "last" | "curve">;
+export type StrokeShape = Pick<Stroke, "kind" | "first" | "last" | "curve"> & { readonly course?: Stroke["course"] };
 
 /** Axis-aligned rectangle in world metres. */
 export interface Rect {
@@ -23,11 +23,13 @@ export function worldPoints(stroke: StrokeShape): Float64Array {
   const dy = last[1] - first[1];
   const dz = last[2] - first[2];
   const profile = stroke.kind === "profile";
+  const rises = stroke.course?.rises ?? [];
   for (let i = 0; i < curve.length; i++) {
     const [u, v] = curve[i]!;
     out[3 * i] = first[0] + u * dx - (profile ? 0 : v * dy);
     out[3 * i + 1] = first[1] + u * dy + (profile ? 0 : v * dx);
     out[3 * i + 2] = profile ? first[2] + u * dz + v : first[2];
+    if (rises.length > 0) out[3 * i + 2] = first[2] + rises[Math.min(i, rises.length - 1)]!;
   }
   return out;
 }
@@ -61,6 +63,20 @@ export function levelCurve(points: ArrayLike<number>, first: Anchor, last: Ancho
     curve.push(length2 > 0 ? [(qx * dx + qy * dy) / length2, (qy * dx - qx * dy) / length2] : [0, 0]);
   }
   return curve;
+}
+
+/** What is wrong with the fields of a stroke of its kind, for a person; null when nothing is. */
+export function misfit(stroke: Stroke): string | null {
+  if ((stroke.kind === "paint") !== (stroke.paint !== null))
+    return "A paint stroke needs 'paint' (channel, value, radius), and only a paint stroke.";
+  if ((stroke.kind === "course") !== (stroke.course !== null))
+    return "A course needs 'course' (use, heights), and only a course.";
+  if (stroke.course === null) return null;
+  if (stroke.curve.length > MAX_COURSE_POINTS) return `A course holds at most ${MAX_COURSE_POINTS} points.`;
+  const { rises } = stroke.course;
+  if (stroke.course.use === "river" && rises.some((rise, i) => i > 0 && rise > rises[i - 1]!))
+    return "A river never rises along its way.";
+  return null;
 }
 
 /** Farthest horizontal distance from the crest at which the stroke constrains anything, metres. */

@@ -46,6 +46,16 @@ export const WIRE_MODELS: Readonly<Record<string, WireModel>> = {
     },
     may: {},
   },
+  Course: {
+    must: {
+      use: { oneOf: ["river", "road", "ridge"] },
+    },
+    may: {
+      rises: { list: { number: [-655360, 655360] }, length: [0, 512] },
+      grade: { number: [0.005, 1] },
+      depth_m: { number: [0, 655360] },
+    },
+  },
   Credit: {
     must: {
       type: { oneOf: ["credit"] },
@@ -273,7 +283,7 @@ export const WIRE_MODELS: Readonly<Record<string, WireModel>> = {
   Stroke: {
     must: {
       id: { matches: "^[A-Za-z0-9_-]{1,40}$" },
-      kind: { oneOf: ["profile", "level", "paint"] },
+      kind: { oneOf: ["profile", "level", "paint", "course"] },
       first: { tuple: [{ number: [-655360, 655360] }, { number: [-655360, 655360] }, { number: [-655360, 655360] }] },
       last: { tuple: [{ number: [-655360, 655360] }, { number: [-655360, 655360] }, { number: [-655360, 655360] }] },
       curve: { list: { tuple: [{ number: [-10000000, 10000000] }, { number: [-10000000, 10000000] }] }, length: [0, 4096] },
@@ -287,6 +297,7 @@ export const WIRE_MODELS: Readonly<Record<string, WireModel>> = {
       roughness: { number: [0, 1] },
       yields: { number: [0, 1] },
       paint: { nullable: { model: "Paint" } },
+      course: { nullable: { model: "Course" } },
       locked: { bool: true },
       hidden: { bool: true },
       label: { text: [0, 80] },
@@ -306,6 +317,7 @@ export const WIRE_MODELS: Readonly<Record<string, WireModel>> = {
       roughness: { nullable: { number: [0, 1] } },
       yields: { nullable: { number: [0, 1] } },
       paint: { nullable: { model: "Paint" } },
+      course: { nullable: { model: "Course" } },
       locked: { nullable: { bool: true } },
       hidden: { nullable: { bool: true } },
       label: { nullable: { text: [0, 80] } },

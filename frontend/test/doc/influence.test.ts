@@ -23,6 +23,7 @@ const ridge: Stroke = {
   roughness: 0.5,
   yields: 0,
   paint: null,
+  course: null,
   locked: false,
   hidden: false,
   label: "",

@@ -51,6 +51,7 @@ export function ridge(id: string, over: Partial<Stroke> = {}): Stroke {
     roughness: 0.5,
     yields: 0,
     paint: null,
+    course: null,
     locked: false,
     hidden: false,
     label: "",

@@ -90,10 +90,18 @@ def _stroke(stroke: c.Stroke | None, action: Action) -> str:
         return "the ground" if action == "paint" else "a stroke"
     if stroke.paint is not None:
         return stroke.paint.channel if action == "paint" else f"a stroke of {stroke.paint.channel} paint"
-    noun = "plateau" if stroke.kind == "level" else ("crevice" if _sinks(stroke) else "mountain")
+    noun = _noun(stroke)
     if stroke.label:
         return f"the {noun} “{stroke.label}”"
     return f"a {noun}"
+
+
+def _noun(stroke: c.Stroke) -> str:
+    if stroke.course is not None:
+        return stroke.course.use
+    if stroke.kind == "level":
+        return "plateau"
+    return "crevice" if _sinks(stroke) else "mountain"
 
 
 def _sinks(stroke: c.Stroke) -> bool:

@@ -56,7 +56,7 @@ def crest_of(stroke: Stroke, under: Under = on_blank_ground) -> Crest | None:
     if stroke.kind == "profile":
         return Crest(stroke, _single_valued(points, stroke, under), closed=False)
     points = _without_repeats(points)
-    closed = is_closed(points)
+    closed = stroke.kind != "course" and is_closed(points)
     if closed and np.hypot(*(points[0, :2] - points[-1, :2])) < CLOSEST_M:
         points = points[:-1]
     return Crest(stroke, points, closed)

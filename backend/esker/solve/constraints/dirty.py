@@ -44,7 +44,7 @@ def _read(array: Floats) -> NDArray[np.float32]:
 
 
 def _changed_outline(old: Floats, new: Floats, reach: float, box: BinBox) -> Window | None:
-    """Segments (11, m) that only one of two open outlines has, apart from a common beginning and end."""
+    """Segments (13, m) that only one of two open outlines has, apart from a common beginning and end."""
     shorter = min(old.shape[1], new.shape[1])
     differ = np.flatnonzero((_read(old[:, :shorter]) != _read(new[:, :shorter])).any(axis=0))
     start = int(differ[0]) if len(differ) else shorter

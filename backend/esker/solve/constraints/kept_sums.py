@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 from esker.solve.constraints.tables import BIN, Window
 
 MOST_BINS: Final = 1024
-"""Bins whose sums a workspace keeps, 12 KiB each: a stroke of a kilometre at level 4 reaches half as many."""
+"""Bins whose sums a workspace keeps, 13 KiB each: a stroke of a kilometre at level 4 reaches half as many."""
 LEAST_STROKES: Final = 4
 """With fewer strokes before the one that changes there is nothing to gain."""
 BETWEEN: Final = 3
 """Strokes between those that are kept and the one that changes, before sums are made anew: where several people draw,
 now this stroke changes and now that."""
-SUMS: Final = 12
+SUMS: Final = 13
 """Numbers of a sample, float32; one more over a base (``sums_t`` of shaders/opencl/nearest.cl)."""
 NO_STROKE: Final = 0x7FFFFFFF
 """First stroke to go on with of a raster that keeps nothing."""

@@ -8,16 +8,16 @@ from esker.solve.constraints.tables import LONGEST_CELLS, SEGMENT_FIELDS, Floats
 
 
 def segments_of(ring: Floats, closed: bool) -> Floats:
-    """SEGMENT_FIELDS of a polyline (n, 2) in cells, shape (11, segments); a point is one segment of no length.
+    """SEGMENT_FIELDS of a polyline (n, 3), cells and metres of height, shape (13, segments).
 
-    A closed one ends where it begins.
+    A point is one segment of no length. A closed polyline ends where it begins.
     """
     if len(ring) == 1:
         out = np.zeros((len(SEGMENT_FIELDS), 1))
-        out[:2, 0] = ring[0]
+        out[:2, 0], out[11, 0] = ring[0, :2], ring[0, 2]
         out[5], out[7], out[9], out[10] = 1.0, 1.0, 1.0, 1.0
         return out
-    d = np.diff(ring, axis=0)
+    d, rise = np.diff(ring[:, :2], axis=0), np.diff(ring[:, 2])
     length2 = d[:, 0] ** 2 + d[:, 1] ** 2
     unit = d / np.sqrt(length2)[:, None]
     joint = unit[:-1] + unit[1:]
@@ -27,16 +27,16 @@ def segments_of(ring: Floats, closed: bool) -> Floats:
     caps = np.zeros((2, len(d)))
     if not closed:
         caps[0, 0] = caps[1, -1] = 1.0
-    return np.vstack([ring[:-1].T, d.T, 1 / length2, before.T, after.T, caps])
+    return np.vstack([ring[:-1, :2].T, d.T, 1 / length2, before.T, after.T, caps, ring[:-1, 2], rise])
 
 
 def cut(line: Floats) -> Floats:
-    """A polyline (n, 2) in cells whose segments are at most LONGEST_CELLS long."""
-    parts = np.ceil(np.hypot(*np.diff(line, axis=0).T) / LONGEST_CELLS).astype(int)
+    """A polyline (n, 3), cells and metres of height, whose segments are at most LONGEST_CELLS long."""
+    parts = np.ceil(np.hypot(*np.diff(line[:, :2], axis=0).T) / LONGEST_CELLS).astype(int)
     if (parts <= 1).all():
         return line
     knots = np.concatenate([k + np.arange(m) / m for k, m in enumerate(np.maximum(parts, 1))] + [[len(line) - 1.0]])
-    return np.column_stack([np.interp(knots, np.arange(len(line)), line[:, axis]) for axis in range(2)])
+    return np.column_stack([np.interp(knots, np.arange(len(line)), line[:, axis]) for axis in range(3)])
 
 
 def _unit_or(v: Floats, fallback: Floats) -> Floats:

@@ -19,7 +19,9 @@ from esker.solve.constraints.silhouette import Silhouette, silhouette
 from esker.solve.constraints.tables import (
     BIN,
     CHANNEL_FLOOR_CELLS,
+    COURSE_SAY,
     CREST_HALF_WIDTH,
+    EDGE_CELLS,
     FLATTEST,
     HALF_DIAGONAL,
     INDEX_AT,
@@ -105,7 +107,8 @@ class Shape:
             return np.full(len(tops), self.brush(s) + 0.01)
         wide, skirt = self.widths(tops)
         wide = np.maximum(wide / s, SPRING_FLOOR_CELLS)
-        return self.crest.stroke.plateau_radius_m / s + np.maximum(TOE * wide, wide + skirt / s) + 0.01
+        felt = np.maximum(np.maximum(TOE * wide, wide + skirt / s), max(_banks(self.crest.stroke)) / s)
+        return self.crest.stroke.plateau_radius_m / s + felt + 0.01
 
 
 @dataclass(frozen=True)
@@ -225,11 +228,12 @@ def _pack_profile(shape: Shape, s: float, box: BinBox, low: Ints, high: Ints) ->
 
 def _pack_outline(shape: Shape, s: float, box: BinBox, low: Ints, high: Ints) -> Packed | None:
     points, closed = shape.crest.points[:, :2] / s, shape.crest.closed
-    height = float(shape.crest.points[0, 2])
-    reach = float(shape.reach(shape.ground.tops([height]), s)[0])
+    heights = shape.crest.points[:, 2]
+    reach = float(shape.reach(shape.ground.tops(heights), s).max())
     if (points.min(axis=0) - reach > high).any() or (points.max(axis=0) + reach < low).any():
         return None
-    segments = segments_of(cut(np.vstack([points, points[:1]]) if closed else points), closed)
+    line = np.column_stack([points, heights])
+    segments = segments_of(cut(np.vstack([line, line[:1]]) if closed else line), closed)
     span_index, spans = spans_of(points, box[0] * BIN, box[1] * BIN) if closed else (None, None)
     ends = segments[:2], segments[:2] + segments[2:4]
     near = _near_box(*ends, reach + HALF_DIAGONAL + 1, low, high)
@@ -246,7 +250,7 @@ def _pack_outline(shape: Shape, s: float, box: BinBox, low: Ints, high: Ints) ->
     if window is None:
         return None
     params = _params(shape, s, reach)
-    params[STROKE_AT["height"]] = height
+    params[STROKE_AT["height"]], params[STROKE_AT["stop"]] = heights[0], 1 / EDGE_CELLS
     padded = np.pad(segments, ((0, 0), (0, -segments.shape[1] % LANES)), mode="edge")
     return Packed(params, window, padded, span_index=span_index, spans=spans)
 
@@ -270,9 +274,10 @@ def _params(shape: Shape, s: float, reach: float) -> Floats:
         "run": 1.0,
         "fill": shape.ground.fill,
         "cut": shape.ground.cut,
-        "say": YIELDING_SAY**stroke.yields,
+        "say": YIELDING_SAY**stroke.yields * (COURSE_SAY if stroke.kind == "course" else 1.0),
         "skirt": _skirt(stroke, shape.edition),
     }
+    values |= dict(zip(("lb", "rb"), (width / s for width in _banks(stroke)), strict=True))
     plateau = float(np.float32(values["plateau"]))
     values |= {"plateau2": plateau**2, "crest2": (plateau + CREST_HALF_WIDTH) ** 2}
     values |= {"value": shape.value, "brush": shape.brush(s)}
@@ -287,6 +292,16 @@ def _params(shape: Shape, s: float, reach: float) -> Floats:
     for name, value in values.items():
         out[STROKE_AT[name]] = value
     return out
+
+
+def _banks(stroke: Stroke) -> tuple[float, float]:
+    """Widths of a course's banks left and right, metres: flanks without a slope, within which the diffusion decides."""
+    if stroke.kind != "course":
+        return 0.0, 0.0
+    left, right = (
+        side.extent_m if side is not None and side.slope_deg is None else 0.0 for side in (stroke.left, stroke.right)
+    )
+    return left, right
 
 
 def _skirt(stroke: Stroke, edition: int) -> float:

@@ -41,7 +41,7 @@ Places = tuple[NDArray[np.int64], NDArray[np.int64]]
 
 HARD = -1.0
 """Stiffness that marks a sample as fixed, on a crest; on a pinned border it is ``tables.PINNED``."""
-_SUMS = ("w", "wt", "wtt", "wa", "fade", "held", "g", "gx", "gy", "toe", "hard", "follows", "joint")
+_SUMS = ("w", "wt", "wtt", "wa", "fade", "held", "g", "gx", "gy", "toe", "hard", "follows", "joint", "quiet")
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ def rasterise(tables: Tables, base: NDArray[np.floating] | None = None) -> Const
         quarrel = apart / (apart + AGREEMENT * square + TINY)
     stiffness = total["wa"] / w
     stiffer = np.minimum(OVERLAP_STIFFENING * stiffness, OVERLAP_STIFFEST) * quarrel**2
-    stiffness = (stiffness + stiffer) * total["fade"]
+    stiffness = (stiffness + stiffer) * total["fade"] * (1 - total["quiet"])
     hard = total["hard"] > 0
     height_d = np.where(hard, HARD, stiffness)
     height_f = np.where(hard, target, (stiffness + tables.screening * total["held"]) * target)
@@ -188,6 +188,7 @@ def _add(total: dict[str, Floats], at: Places, band: Band, in_pairs: bool) -> No
         total[name][at] += value
     for name, value in (("fade", band.fade), ("held", band.held), ("toe", band.toe_fade), ("hard", band.hard)):
         total[name][at] = np.maximum(total[name][at], np.where(band.reached, value, 0.0))
+    total["quiet"][at] = np.maximum(total["quiet"][at], band.quiet)
 
 
 def _nearest(tables: Tables, k: int, x: Floats, y: Floats) -> Nearest:
@@ -207,7 +208,8 @@ def _nearest(tables: Tables, k: int, x: Floats, y: Floats) -> Nearest:
     out.height[:] = params[STROKE_AT["height"]]
     for rank in range(int(counts.max(initial=0))):
         blocks = np.flatnonzero(counts > rank)
-        _update(out, segments[:, order[blocks, rank]][:, :, None, None], x[blocks], y[blocks], blocks)
+        candidates = segments[:, order[blocks, rank]][:, :, None, None]
+        _update(out, candidates, x[blocks], y[blocks], blocks, params[STROKE_AT["stop"]])
     return out
 
 
@@ -217,8 +219,8 @@ def _distance2(seg: Floats, x: Floats, y: Floats) -> Floats:
     return np.asarray(rx * rx + ry * ry)
 
 
-def _update(out: Nearest, seg: Floats, x: Floats, y: Floats, blocks: NDArray[np.intp]) -> None:
-    ax, ay, dx, dy, il2, t0x, t0y, t1x, t1y, cap0, cap1 = seg
+def _update(out: Nearest, seg: Floats, x: Floats, y: Floats, blocks: NDArray[np.intp], stop: float) -> None:
+    ax, ay, dx, dy, il2, t0x, t0y, t1x, t1y, cap0, cap1, z, rise = seg
     px, py = rounded(x - ax), rounded(y - ay)
     u = np.clip(rounded(fused(px, dx, rounded(py * dy)) * il2), 0, 1)
     rx, ry = fused(-u, dx, px), fused(-u, dy, py)
@@ -227,10 +229,15 @@ def _update(out: Nearest, seg: Floats, x: Floats, y: Floats, blocks: NDArray[np.
     tx, ty = np.where(at0, t0x, np.where(at1, t1x, dx)), np.where(at0, t0y, np.where(at1, t1y, dy))
     cross = fused(tx, ry, -rounded(ty * rx))
     cap = (at0 & (cap0 > 0)) | (at1 & (cap1 > 0))
-    left, right = sides(cap, fused(tx, rx, rounded(ty * ry)), cross, square, distance)
+    past = fused(tx, rx, rounded(ty * ry))
+    left, right = sides(cap, past, cross, square, distance)
+    along = rise * il2 * (1 - np.where(cap, np.minimum(np.abs(past) * stop, 1.0), 0.0))
     better = square < out.square[blocks]
     for name, value in (
         ("distance", distance),
+        ("height", z + u * rise),
+        ("along_x", along * dx),
+        ("along_y", along * dy),
         ("square", square),
         ("rx", rx),
         ("ry", ry),

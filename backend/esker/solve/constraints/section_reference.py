@@ -234,7 +234,8 @@ def skirt(b: Flanks, reach_m: float | None) -> Skirt:
 class Band:
     """What a stroke asks of samples: targets with their weights and how far they count (``reference_raster``).
 
-    follows: how far the gradient is that of the ground, base included.
+    follows: how far the gradient is that of the ground, base included; quiet: how far the bank of a course takes the
+    springs of all strokes away.
     """
 
     reached: Mask
@@ -249,6 +250,7 @@ class Band:
     gx: Floats
     gy: Floats
     follows: Floats
+    quiet: Floats
 
 
 def nearness(b: Flanks, tables: Tables) -> Floats:
@@ -307,7 +309,17 @@ def cross_section(near: Nearest, inside: Mask, params: Floats, tables: Tables) -
         gx=unit * near.rx + rise * near.along_x,
         gy=unit * near.ry + rise * near.along_y,
         follows=follows,
+        quiet=np.where(b.within, bank(near, b, params), 0.0),
     )
+
+
+def bank(near: Nearest, b: Flanks, params: Floats) -> Floats:
+    """How far samples lie in the bank of a course, where the diffusion alone leads the ground to its line, 0..1."""
+    left, right = (float(params[STROKE_AT[side]]) for side in ("lb", "rb"))
+    if left + right == 0:
+        return np.zeros(near.distance.shape)
+    width = near.left * left + near.right * right
+    return smoothstep(1 - b.d / np.maximum(width, TINY))
 
 
 def channel_section(near: Nearest, inside: Mask, params: Floats, tables: Tables) -> tuple[Floats, Floats]:

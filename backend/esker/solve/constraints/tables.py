@@ -77,6 +77,8 @@ more, and the ground beyond sinks below the base; less, and a step shows."""
 YIELDING_SAY = 1e-6
 """What a stroke that yields wholly counts beside others: less than theirs but in the last tenth of a band; more than a
 skirt, so that it still leads its own flanks."""
+COURSE_SAY = 1e3
+"""How many times the weight of other strokes a course has: a bed or a road leads through the flanks that it crosses."""
 SKIRT_SAY = 1e4
 """From PAIRS_EDITION on a skirt has so many times more weight than before: another's band leads until a hundredth of
 its width is left, not a thousandth, of which float32 knows too few digits."""
@@ -125,12 +127,12 @@ drawn silhouette run farther down the flank; less, and flanks are made of rubber
 OCTAVE_SHARE = 1 / 8
 """The controls of the last octave are at most this share of the crest's length apart: its shape at large stays."""
 
-SEGMENT_FIELDS = ("ax", "ay", "dx", "dy", "il2", "t0x", "t0y", "t1x", "t1y", "cap0", "cap1")
+SEGMENT_FIELDS = ("ax", "ay", "dx", "dy", "il2", "t0x", "t0y", "t1x", "t1y", "cap0", "cap1", "z", "rise")
 KNOT_FIELDS = ("t", "z", "slope")
 STROKE_FIELDS = (
     *("plateau", "reach", "lh", "ls", "le", "lk", "lf", "rh", "rs", "re", "rk", "rf", "same", "run"),
     *("height", "ax", "ay", "tx", "ty", "length", "value", "brush", "fill", "cut", "say", "plateau2", "crest2"),
-    *("middle", "stop", "skirt"),
+    *("middle", "stop", "skirt", "lb", "rb"),
 )
 STROKE_STRIDE = len(STROKE_FIELDS)
 INDEX_FIELDS = ("first", "count", "spans", "octave", "octaves")
@@ -144,20 +146,24 @@ INDEX_AT = {name: k for k, name in enumerate(INDEX_FIELDS)}
 class Tables:
     """The constraints of one level, packed. Arrays are float32 and int32: kernels and twins read the same numbers.
 
-    segments: (11, m) by SEGMENT_FIELDS, of outlines. a: start; d: end - start; il2: 1 / length^2; t0, t1: unit
-      directions of travel at the ends; cap: 1 where the line ends there.
+    segments: (13, m) by SEGMENT_FIELDS, of outlines. a: start; d: end - start; il2: 1 / length^2; t0, t1: unit
+      directions of travel at the ends; cap: 1 where the line ends there; z: height of the start, rise: how much higher
+      the end is, 0 but of a course.
     knots: (3, q) by KNOT_FIELDS, of profiles: distance from the crest's start, height, slope per cell up to the next.
     pieces: (c, 4) cubics of the octaves: height a0 + a1 f + a2 f^2 + a3 f^3 at the share f of a piece; octaves: (o,)
       per profile and octave the place in ``pieces`` of piece 0 (which may lie outside the window's part).
     strokes: (k, STROKE_STRIDE) by STROKE_FIELDS. plateau, reach in cells (reach: outermost distance with any effect);
       per side h: 1 if there is a flank, s: slope (tangent), e: extent in metres, k and f: shares of the crest height
-      taken by a round shoulder and a round foot; same: 1 if both sides are alike, then run: 1 / slope; height: of an
-      outline; a, t, length: start, unit direction and length of a profile in plan. In tables of a channel other than
-      heights, value: what the stroke asks of it, as a difference from its base; brush: radius of paint in cells, or 0.
+      taken by a round shoulder and a round foot; same: 1 if both sides are alike, then run: 1 / slope; height: of the
+      first point of an outline; a, t, length: start, unit direction and length of a profile in plan. In tables of a
+      channel other than heights, value: what the stroke asks of it, as a difference from its base; brush: radius of
+      paint in cells, or 0.
       fill, cut: how far bands raise ground below the crest and lower ground above it, 0..1; read over a base only.
       say: weight beside other strokes, 1 but where it yields.
       middle: from where the pieces of a profile's octaves count, cells from its start; stop: over 1 / stop of a cell
-      past its ends its slope along the crest ends; skirt: how many times the weight of the first edition a skirt has.
+      past its ends its slope along the crest ends (of an outline, too); skirt: how many times the weight of the first
+      edition a skirt has; lb, rb: widths in cells of the banks of a course, where no spring holds the ground and the
+      diffusion leads to its line.
       plateau2, crest2: squares of the distances up to which a sample is plateau, and crest: what is decided is decided
       alike in every precision.
     index: (k, INDEX_STRIDE) by INDEX_FIELDS: first segment or knot, number of them, start in span_index or -1, start in

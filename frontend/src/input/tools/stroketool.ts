@@ -212,6 +212,7 @@ export class StrokeTool {
       curve: [],
       ...this.#style(session),
       yields: 0,
+      course: null,
       locked: false,
       hidden: false,
       label: "",
