@@ -1,4 +1,4 @@
-"""Puts the routes together."""
+"""The web application: all routes together."""
 
 from __future__ import annotations
 
@@ -42,11 +42,11 @@ NEW_TERRAINS: Final = (1 / 3, 60)
 CODE_TRIES: Final = (1 / 3, 60)
 """Join codes by address: right or wrong, as a whole class types at once."""
 NEW_CODES: Final = (0.2, 60)
-"""Join codes that are made, by address and by link: where many live all get longer."""
+"""Join codes that are made, by address and by link: codes become longer for all where many live."""
 NEW_LINKS: Final = (2.0, 200)
 """Links that are made or renewed, by address: each is a line of the database and a commit."""
 WRONG_CODES: Final = (0.5, 300)
-"""Wrong ones of the whole server: of 10^8 for each that lives, all guessers together try 750 in fifteen minutes."""
+"""Wrong codes of the whole server: of 10^8 for each that lives, all guessers together try 750 in fifteen minutes."""
 ALL_NEW_TERRAINS: Final = (5.0, 600)
 """New terrains of all addresses together."""
 UPLOADS: Final = Share(16, address=6, network=8)

@@ -36,7 +36,7 @@ from esker.solve.opencl.pocl import cpu, home
 
 SCENE_LEVEL: Final = 2
 ROWS: Final = "1-1-1-goffs0-smallgrid"
-"""How PoCL names the shape of the launches of row-wise kernels."""
+"""The name that PoCL gives the shape of the launches of row-wise kernels."""
 log = logging.getLogger("esker.server.first_build")
 
 
@@ -60,7 +60,7 @@ class Slope:
         return np.zeros((grid.samples(level),) * 2, dtype=np.float32)
 
     def changed(self, other: Any) -> grid.Rect | None:  # noqa: ARG002
-        """Nowhere: there is one such base."""
+        """Returns None, as no such base differs from another anywhere."""
         return None
 
 
@@ -132,7 +132,7 @@ def _complete(program: Any, names: tuple[str, ...]) -> None:
 
 
 def _blend(device: Any) -> None:
-    """The kernels that blend elevation layers: one bin that no patch meets."""
+    """Runs the kernels that blend elevation layers: one bin that no patch meets."""
     from esker.patchwork.blend import device as blend_device
     from esker.patchwork.blend import packs
 

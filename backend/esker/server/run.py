@@ -62,13 +62,13 @@ GOODBYE_SECONDS: Final = 0.3
 HARD_MESSAGE_LIMIT: Final = 4 * c.MAX_MESSAGE_BYTES
 """Above ``MAX_MESSAGE_BYTES`` a client gets a sentence (4007); above this the websocket library hangs up (1009)."""
 PING_SECONDS, PONG_SECONDS = 20.0, 20.0
-"""A websocket is asked so often whether its peer is there, and dropped without an answer in so long."""
+"""A websocket's peer is asked so often whether it is there. Without an answer in so long it is dropped."""
 SEND_BUFFER: Final = 256 * 1024
 """The kernel would queue megabytes for a client that does not read, and show it old tiles when it does."""
 
 
 OWN_FILES: Final = 256
-"""Descriptors that connections leave to the database, uploads and children, and a quarter of all at least."""
+"""Descriptors that connections leave to the database, uploads and children: so many, and a quarter of all at least."""
 SWITCH_SECONDS: Final = 0.0002
 """An append passes four threads on its way to the screen; at each Python would let the other go on for 5 ms first."""
 
@@ -79,7 +79,7 @@ code, which made all threads wait for 100 ms now and then."""
 
 
 FLAWS: Final = (ArithmeticError, AssertionError, AttributeError, LookupError, TypeError, ValueError)
-"""What Python and NumPy raise where a program is wrong about its numbers. No device is the reason."""
+"""Errors that Python and NumPy raise where a program is wrong about its numbers. No device is the reason for them."""
 
 
 class _Tiles:
@@ -98,7 +98,7 @@ class _Server(uvicorn.Server):
     def __init__(
         self, config: uvicorn.Config, hub: Hub, imports: Imports, host: str, started: Callable[[], Awaitable[None]]
     ) -> None:
-        """``host``: where to send who speaks plain HTTP and names no host."""
+        """``host``: the address for people who speak plain HTTP and name no host."""
         super().__init__(config)
         self._hub, self._imports, self._host, self._announce = hub, imports, host, started
 
@@ -150,7 +150,7 @@ class Assembly:
         self._lock: DataLock | None = None
         self._care: Care | None = None
         self.imports: Imports | None = None
-        """Once there is a server."""
+        """The HTTP server, once there is one."""
         self.exports: Exports | None = None
         try:
             self._open(make_solver or self._solver)
@@ -160,7 +160,7 @@ class Assembly:
 
     @property
     def base(self) -> str:
-        """Where people reach this server."""
+        """The address at which people reach this server."""
         scheme = "https" if self._context else "http"
         return (self.settings.public_url or f"{scheme}://{self.address}:{self.port}").rstrip("/")
 
@@ -199,7 +199,7 @@ class Assembly:
         self._care = Care(self._journal, self.hub.deletion, self._grids)
 
     def _compile(self, kernels: bool) -> None:
-        """Loops and kernels, each in a child process where they are not compiled yet, side by side."""
+        """Compiles loops and kernels, each in a child process where they are not compiled yet, side by side."""
         stopped, compiling = threading.Event(), threading.Event()
         loops = threading.Thread(
             target=first_build.have_loops, args=[stopped, compiling], name="compiling", daemon=True
@@ -207,7 +207,7 @@ class Assembly:
         loops.start()
         try:
             if kernels and (self.settings.device or "").lower() != LAST_RESORT:
-                with suppress(NoDeviceError):  # the solver will say so
+                with suppress(NoDeviceError):  # the solver will say what went wrong
                     ready(self.settings.device, self.settings.threads, self._tell, stopped)
             if compiling.is_set() and loops.is_alive():
                 self._tell(prepare.Step("Compiling loops, once on this machine"))
@@ -222,7 +222,7 @@ class Assembly:
         return OpenClSolver(device=device, max_level=self.settings.level, threads=self.settings.threads)
 
     def server(self, announce: bool = True) -> _Server:
-        """The HTTP server, to be run with ``run``."""
+        """Returns the HTTP server, to be run with ``run``."""
         assert self._journal is not None, "an assembly is open until it is closed"
         pictures = Pictures(
             Previews(self.settings.data / "previews", self.settings.device, grids=self.settings.data / FOLDER),
@@ -345,7 +345,7 @@ def _config(app: Any, proxies: Proxies, context: ssl.SSLContext | None) -> uvico
 
 
 async def _announce(hub: Hub, private: Private, base: str, settings: Settings) -> None:
-    """Opens the terrain of the last start, or a new one, and prints how to reach it: secrets only on a terminal."""
+    """Opens the terrain of the last start, or a new one, and prints the way to it: secrets only on a terminal."""
     try:
         content, kept = await open_lesson(hub, private, base, settings.new_terrain)
     except (TooManyLinks, Unwritable, OSError) as error:

@@ -26,16 +26,17 @@ class Settings:
     page: Path = PAGE
     lan: bool = False
     new_terrain: bool = False
-    """A start prints a new terrain, and not that of the last start."""
+    """Whether a start prints a new terrain, and not that of the last start."""
     public_url: str | None = None
     """Where people reach this server, when it stands behind a proxy: https://terrain.example.org"""
     forwarded_allow_ips: str = "127.0.0.1"
-    """Proxies whose X-Forwarded-For is believed, as addresses and networks ("*": whoever connects, of what it adds)."""
+    """Proxies whose X-Forwarded-For is believed, as addresses and networks. "*": any that connects, for what it
+    adds."""
     hosts: str = ""
     """More names by which people reach this server, separated by commas; they stand in the ``Host`` of requests."""
     level: int = c.DEFAULT_LEVEL
     refine: int = c.DEFAULT_REFINED_LEVEL
-    """The finest level that is refined tile by tile where somebody looks; at or below ``level``: none is."""
+    """The finest level that is refined tile by tile where somebody looks. With one at or below ``level`` none is."""
     device: str | None = None
     threads: int | None = None
     max_members: int = c.MAX_MEMBERS
@@ -46,7 +47,7 @@ class Settings:
     history_quota_mb: int = 256
     """MiB that the operations of one terrain may take in the database."""
     storage_mb: int = 0
-    """MiB that all of the data folder may take; 0: what the disk has, but for the part that stays free."""
+    """MiB that all of the data folder may take. 0: all that the disk has, but for the part that stays free."""
     log_level: str = "info"
 
     def __post_init__(self) -> None:

@@ -1,4 +1,4 @@
-"""What a server says while it starts: it listens at once, and says to the page and the terminal how far it is.
+"""A server that starts: it listens at once, and says to the page and the terminal how far it is.
 
 Importing the server takes a second and compiling its kernels may take many more. Meanwhile a thread with an event loop
 of its own answers on the same socket. When the server is put together that thread leaves the socket to it; connections
@@ -27,9 +27,9 @@ SEND_BUFFER: Final = 256 * 1024
 HEAD_BYTES: Final = 16 * 1024
 HEAD_SECONDS: Final = 5.0
 AT_ONCE: Final = 200
-"""Requests that are read at the same time; more than these are hung up on, and asked again by the page."""
+"""So many requests are read at the same time. Further ones are hung up on, and the page asks again."""
 TICK: Final = 0.2
-"""Seconds between pictures of the line that moves."""
+"""Seconds between pictures of the moving line."""
 DIALS: Final = "|/-\\"
 STARTING: Final = "Esker is starting"
 _SCRIPT: Final = """
@@ -130,7 +130,7 @@ class WaitingRoom:
     """Answers on a socket until the server takes it over. ``with WaitingRoom(...) as room: ... room.leave()``."""
 
     def __init__(self, listener: socket.socket, context: ssl.SSLContext | None, out: TextIO | None) -> None:
-        """``out``: where the line is written that says how far it is; None writes none."""
+        """``out``: where the line of the progress is written; None writes none."""
         self._listener, self._context = listener, context
         self._progress = Progress("Opening the database and the solver")
         self._line = _Line(out) if out is not None else None
@@ -148,7 +148,7 @@ class WaitingRoom:
         self.leave()
 
     def tell(self, said: str, done: int = 0, of: int = 0) -> None:
-        """From now on this is how far it is."""
+        """Takes the progress that is shown from now on."""
         self._progress = Progress(said, done, of)
         if self._line is not None:
             self._line.show(self._progress)
@@ -243,7 +243,7 @@ class _Line:
                 self._write(f"  {progress.said}\n")
 
     def tick(self) -> None:
-        """Another picture of the line."""
+        """Draws another picture of the line."""
         with self._lock:
             if self._moves and self._progress.said:
                 self._turn += 1
@@ -263,9 +263,9 @@ class _Line:
 
 
 class Stopping:
-    """What the signals that stop a program do before the server handles them itself. ``system.on_stop(stopping)``.
+    """A handler of signals that stop a program, before the server handles them itself.
 
-    It raises Interrupted wherever the main thread is, and remembers that it did: a library may turn that exception into
+    ``system.on_stop(stopping)`` installs it.     It raises Interrupted wherever the main thread is, and remembers that it did: a library may turn that exception into
     one of its own (pydantic does, while a model is made), or drop it.
     """
 
@@ -273,7 +273,7 @@ class Stopping:
         self.asked = False
 
     def __call__(self, *_: object) -> None:
-        """The handler. Ctrl-C a second time does not wait for what the first one tidies up."""
+        """Handles the signal. A second Ctrl-C does not wait for what the first one tidies up."""
         self.asked = True
         interrupt.ends()
         raise Interrupted

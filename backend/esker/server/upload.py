@@ -24,11 +24,11 @@ from esker.process.bounds import Bounds
 from esker.process.child_process import end_with_parent, put_down
 
 MEMORY_BYTES: Final = 1 << 30
-"""Memory of the process's own; mapped files do not count."""
+"""Bytes that the process may take of its own; mapped files do not count."""
 ADDRESS_BYTES: Final = 6 << 30
 CPU_SECONDS: Final = 10
 CPU_SECONDS_A_GIB: Final = 600
-"""More for the grids in the file, by its size."""
+"""Further bytes for the grids in the file, by its size."""
 WALL_FACTOR: Final = 3.0
 AT_ONCE: Final = 2
 BAD_FILE: Final = 3
@@ -67,7 +67,10 @@ async def read_archive(path: Path, folder: Path, turn: AbstractAsyncContextManag
 
 
 async def _answer(process: asyncio.subprocess.Process) -> tuple[bytes, bytes]:
-    """Everything that the reader says. Its stdin stays open until then: by its end it knows that the server is gone."""
+    """Returns all that the reader says.
+
+    Its stdin stays open until then: the end of it tells the reader that the server is gone.
+    """
     assert process.stdout is not None
     assert process.stderr is not None
     out, err, _ = await asyncio.gather(process.stdout.read(), process.stderr.read(), process.wait())
@@ -80,7 +83,7 @@ def cpu_seconds(path: Path) -> int:
 
 
 def bound(path: Path) -> None:
-    """Bounds this process from now on; it stands behind everything that rooms do."""
+    """Bounds this process from now on, and puts it behind everything that rooms do."""
     system.step_back(limits.NICENESS)
     Bounds(
         memory_bytes=MEMORY_BYTES,
@@ -93,7 +96,7 @@ def bound(path: Path) -> None:
 
 
 def main(path: Path, folder: Path) -> int:
-    """The process that reads."""
+    """Starts the process that reads."""
     system.speak_utf8()
     confinement.confine([path], [folder], limits.compiled_folders())
     end_with_parent()
@@ -112,7 +115,7 @@ def main(path: Path, folder: Path) -> int:
 
 
 def _build(folder: Path, digest: str) -> None:
-    """The raster of one grid, from its unpacked arrays. Raises ArchiveError."""
+    """Returns the raster of one grid, from its unpacked arrays. Raises ArchiveError."""
     from esker.patchwork.raster import rasters  # compiled loops take a second to load, and most files have no layers
 
     heights, warp = folder / f"{digest}.npy", folder / f"{digest}.warp.npy"

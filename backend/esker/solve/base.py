@@ -26,7 +26,8 @@ SLIGHT_M: Final = 1 / 16
 """Heights above the base below this many cells of SIDES_LEVEL say nothing of filling or cutting."""
 SIDES_FROM: Final = 0.05
 SIDES_TO: Final = 0.25
-"""What a stroke does with less than the first share of its section it does not do at all, from the second on fully."""
+"""A stroke that does something (fills, cuts) on less than the first share of its section counts as not doing it; from
+the second share on it counts fully."""
 
 
 class Base(Protocol):
@@ -62,33 +63,33 @@ class Bound:
 
     @property
     def digest(self) -> bytes:
-        """As of the base."""
+        """The digest of the base."""
         return self.base.digest
 
     @property
     def low(self) -> float:
-        """As of the base."""
+        """The lowest height of the base."""
         return self.base.low
 
     @property
     def high(self) -> float:
-        """As of the base."""
+        """The highest height of the base."""
         return self.base.high
 
     def level(self, level: int, device: Any = None) -> NDArray[np.float32]:  # noqa: ARG002
-        """As of the base, on the bound device."""
+        """The level of the base, on the bound device."""
         return self.base.level(level, self.device)
 
     def window(self, level: int, rows: slice, cols: slice, device: Any = None) -> NDArray[np.float32]:  # noqa: ARG002
-        """As of the base, on the bound device."""
+        """A window of the base, on the bound device."""
         return self.base.window(level, rows, cols, self.device)
 
     def survey(self, level: int) -> NDArray[np.float32]:
-        """As of the base."""
+        """The data level of the base."""
         return self.base.survey(level)
 
     def changed(self, other: Any) -> grid.Rect | None:
-        """As of the base."""
+        """The rectangle outside of which the two bases are equal."""
         return self.base.changed(other.base if isinstance(other, Bound) else other)
 
 
@@ -99,7 +100,7 @@ def bound(base: Base | None, device: Any) -> Bound | None:
 
 @dataclass(frozen=True)
 class BaseUnderStroke:
-    """What packing a stroke needs to know of the base under it.
+    """The base under one stroke, as far as packing needs it.
 
     Every height of the base is within ``half`` of ``datum``, metres. fill, cut: how far the stroke's bands fill ground
     below its crest and cut ground above it, 0..1.
@@ -125,7 +126,7 @@ def bounds_of(base: Base) -> tuple[float, float]:
 
 
 def ground_under(base: Base | None, points: Floats, plateau_m: float, closed: bool, size_m: float) -> BaseUnderStroke:
-    """What a stroke with this crest, (n, 3) metres, is to a base; ``FLAT`` without one."""
+    """Returns the base under a stroke with this crest, (n, 3) metres; ``FLAT`` without a base."""
     if base is None:
         return FLAT
     low, high = bounds_of(base)

@@ -16,7 +16,7 @@ from esker.solve.passes import Basis, Job
 
 
 def is_blank(strokes: Sequence[Stroke]) -> bool:
-    """Whether no stroke constrains a height (``crest.crest_of`` of each is None)."""
+    """Returns whether no stroke constrains a height (``crest.crest_of`` of each is None)."""
     return all(stroke.hidden or not stroke.curve or stroke.kind == "paint" for stroke in strokes)
 
 

@@ -84,7 +84,7 @@ def new_layer(device: Device | None, level: int, layer: Layer) -> LayerWorkspace
 
 
 def _covers(layer: Layer) -> bool:
-    """Whether there is something for this paint to lie over."""
+    """Returns whether drawn strokes may ask something of the channel, for this paint to lie over."""
     return layer.painted and layer.channel in STROKES_ASK
 
 

@@ -65,7 +65,7 @@ def detailed(
     refined_level: int = DEFAULT_REFINED_LEVEL,
     ground_m: tuple[float, float] | None = None,
 ) -> DetailedTerrain:
-    """What makes windows with detail of a settled solve, on the solver's device.
+    """A maker of windows with detail of a settled solve, on the solver's device.
 
     ``ground_m``: lowest and highest sample of the elevation layers (``document.layers.span_m``), None without any.
     Raises ValueError for a level that is not refined, DeviceErrors for a device that fails.

@@ -22,7 +22,7 @@ MAX_CYCLES = 120
 UPDATE_SHARE = 0.5
 """Error after a cycle as a share of its last update, at least: convergence factors of ordinary scenes are below 0.4."""
 FIRST_SHARE = 1.0
-"""The same after the first cycle, when nothing tells the factor yet."""
+"""Share that stands for UPDATE_SHARE after the first cycle, when nothing tells the factor yet."""
 DIVERGED = 10.0
 """An update above this many times the first one does not come back: the corrections feed on themselves."""
 
@@ -178,7 +178,7 @@ def converge(system: System, tolerance: float) -> Iterator[None]:
 
 
 def _converge_bottom(system: System, tolerance: float) -> Iterator[None]:
-    """The same for level 0 alone: bottom cycles, twice as many every time, until they change nothing any more."""
+    """Converges level 0 alone: bottom cycles, twice as many every time, until they change nothing any more."""
     cycles = LONE_BOTTOM_CYCLES
     system.bottom(rhs="f", out="u", cycles=cycles)
     while cycles < MOST_BOTTOM_CYCLES:

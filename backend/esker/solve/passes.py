@@ -34,7 +34,7 @@ GRADIENT_SHARE = 1 / 16
 
 @dataclass(frozen=True)
 class Basis:
-    """What refinement above the global levels starts from (DESIGN 5.6): a settled solve.
+    """A settled solve, from which refinement above the global levels starts (DESIGN 5.6).
 
     heights: (N, N) float32 of level ``level``, metres above the ``base`` (None: a plane at 0); gradient: (2, N, N)
     float32, d/dx and d/dy, metres per metre: in bands that of the ground, elsewhere of the heights. Both read-only.
@@ -102,7 +102,7 @@ def coarsest_preview(w: Workspace, job: Job) -> Iterator[Preview | Pause]:
 
 
 def _coarse(w: Workspace, level: int) -> None:
-    """Both steps on a level below the finest, once the next coarser one is done."""
+    """Makes both steps on a level below the finest, once the next coarser one is done."""
     multigrid.start(w.gradient, level)
     multigrid.finish(w.gradient, level)
     w.guide(level)
@@ -137,7 +137,10 @@ def unseen(w: Workspace, job: Job) -> Iterator[Settled | Pause]:
 
 
 def full_multigrid(w: Workspace, gradient_cycles: int) -> Iterator[int | None]:
-    """Both steps level by level: each level when it is done; None where the work can be left before that."""
+    """Makes both steps level by level.
+
+    Yields each level when it is done, and None where the work can be left before that.
+    """
     for level in range(w.top):
         _coarse(w, level)
         yield level
@@ -149,7 +152,7 @@ def full_multigrid(w: Workspace, gradient_cycles: int) -> Iterator[int | None]:
 
 
 def conditions(job: Job) -> object:
-    """What must not have changed for ``amended``, strokes aside."""
+    """Returns the conditions under which ``amended`` may be used: strokes may have changed, these not."""
     return job.settings, None if job.base is None else job.base.base.digest
 
 

@@ -349,7 +349,7 @@ class NumpyWorkspace:
             pass
 
     def loading(self, strokes: Sequence[Stroke], settings: TerrainSettings, base: Base | None = None) -> Iterator[None]:
-        """The same; may be left between strokes."""
+        """Loads constraints as ``load`` does; the work may be left between strokes."""
         tables, window = yield from self.packer.packing(strokes, settings, base)
         if window is None:
             return

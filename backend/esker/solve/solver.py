@@ -96,7 +96,7 @@ class Solver:
 
     @property
     def device_name(self) -> str:
-        """What solves, for logs and people."""
+        """Name of the device that solves, for logs and people."""
         return NUMPY_NAME if self._device is None else self._device.name
 
     @property
@@ -105,7 +105,7 @@ class Solver:
         return self._device
 
     def refiner(self, basis: Basis) -> Refiner:
-        """What refines a settled solve of this solver above its level (DESIGN 5.6). Refiners share a cache."""
+        """Returns a refiner of a settled solve of this solver, above its level (DESIGN 5.6). Refiners share a cache."""
         if self._refinery is None:
             self._refinery = Refinery(self._device, shapes=self._shapes)
         return self._refinery.refiner(basis)
@@ -151,7 +151,7 @@ class Solver:
         *,
         base: Base | None = None,
     ) -> Iterator[SolveEvent]:
-        """What ``steps`` gives out beside the heights, alone: for strokes of which only that has changed.
+        """Yields the channels alone, which ``steps`` gives out beside the heights: for strokes whose heights stayed.
 
         Pause comes wherever the work can be left, and Done at the end. Raises ValueError like ``steps``.
         """
@@ -255,7 +255,7 @@ class Solver:
         yield from self._retried(lambda level: self._attempt(job, level, warm, basis, lease or Lease(), coarsest), top)
 
     def _retried(self, attempt: Callable[[int], Iterator[SolveEvent]], top: int) -> Generator[SolveEvent]:
-        """Without memory for it, once more without what is kept for later."""
+        """Makes an attempt. Where there is no memory for it, it is made once more without what is kept for later."""
         try:
             yield from attempt(top)
             return
@@ -375,7 +375,7 @@ class Solver:
 
 
 def _edited(workspace: Workspace, job: Job) -> bool:
-    """Whether the finest level still holds the ground of nearly the same strokes."""
+    """Returns whether the finest level still holds the ground of nearly the same strokes."""
     if workspace.solved_for is None or workspace.solved_for != passes.conditions(job):
         return False
     known = workspace.packer.unchanged_count(job.strokes, job.settings)

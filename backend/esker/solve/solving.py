@@ -20,7 +20,7 @@ EARLY_STROKES = 128
 
 
 class Solving(Iterator[SolveEvent]):
-    """What ``Solver.steps`` gives: an iterator to be closed when it is left early."""
+    """The iterator that ``Solver.steps`` gives. It is to be closed when it is left early."""
 
     def __init__(self, run: Generator[SolveEvent, Any, Any], lease: Lease, device: Device | None) -> None:
         self._run, self._lease, self._device = run, lease, device

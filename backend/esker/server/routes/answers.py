@@ -1,4 +1,4 @@
-"""Answers that are not what was asked for, and who asks (docs/protocol.md)."""
+"""Answers that refuse or fail, and the address and link of who asks (docs/protocol.md)."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def answer(status: int, code: str, message: str, again: int | None = None) -> JS
 
 
 def add_errors(app: FastAPI) -> None:
-    """Every error becomes an answer with a code and a sentence."""
+    """Turns every error into an answer with a code and a sentence."""
 
     @app.exception_handler(EskerError)
     async def refused(_: Request, error: EskerError) -> JSONResponse:
@@ -93,7 +93,7 @@ def add_errors(app: FastAPI) -> None:
 
 
 def _path(request: Request) -> str:
-    """The path for the log. ``request.url`` would also parse ``Host``, which may be anything, and raise."""
+    """Returns the path for the log. ``request.url`` would also parse ``Host``, which may be anything, and raise."""
     return quote(request.scope["path"])
 
 
@@ -123,7 +123,7 @@ def limited(request: Request, rates: Rates, what: str, link: Link | None = None)
 
 
 def secret_of(request: Request) -> str:
-    """The secret in the Authorization header. Raises Cannot (401)."""
+    """Returns the secret in the Authorization header. Raises Cannot (401)."""
     scheme, _, secret = request.headers.get("authorization", "").partition(" ")
     if scheme.lower() != "bearer" or not secret or len(secret) > 128:
         raise Cannot(401, "bad_secret", "Send the secret of a link as 'Authorization: Bearer ...'.")

@@ -13,7 +13,7 @@ from esker.session.room.hub import Deleted, Hub
 
 
 def add_deletion(app: FastAPI, hub: Hub) -> None:
-    """Adds them."""
+    """Adds the routes."""
 
     @app.delete("/api/terrains/{terrain}")
     async def delete(terrain: str, link: OwnerLink) -> dict[str, Any]:

@@ -19,7 +19,7 @@ ClientId = Annotated[str, Query(max_length=40, pattern=r"^[A-Za-z0-9_-]*$")]
 
 
 def add_exports(app: FastAPI, hub: Hub, exports: Exports) -> None:
-    """Adds them."""
+    """Adds the routes."""
     app.state.exports = Rates(Rate(*EXPORTS))
     path = "/api/terrains/{terrain}/exports"
 

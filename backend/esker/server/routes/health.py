@@ -12,16 +12,17 @@ from esker.version import VERSION
 
 
 def add_health(app: FastAPI, hub: Hub) -> None:
-    """Adds them. While a server starts both answer 503 (``server/starting.py``)."""
+    """Adds the routes. While a server starts both answer 503 (``server/starting.py``)."""
 
     @app.get("/healthz")
     async def healthz() -> dict[str, Any]:
-        """The process answers: 200, with what it is made of and how that is."""
+        """The process answers 200, with what it is made of and how that is."""
         return {"ok": True, "version": VERSION, "device": hub.device, **_state(hub)}
 
     @app.get("/readyz")
     async def readyz() -> JSONResponse:
-        """200 where people can be served in full; 503, with the reasons, where something would be refused."""
+        """The server answers 200 where people can be served in full; 503, with the reasons, where something would be
+        refused."""
         state = _state(hub)
         reasons = [name for name in ("journal", "disk") if state[name] != "ok"]
         return JSONResponse({"ready": not reasons, "reasons": reasons} | state, 503 if reasons else 200)

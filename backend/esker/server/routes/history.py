@@ -34,7 +34,7 @@ class NewFork(c.Wire):
 
 
 def add_history(app: FastAPI, hub: Hub, grids: GridStore) -> None:
-    """Adds them."""
+    """Adds the routes."""
     activity_logs = ActivityLogs(hub.journal)
 
     @app.get("/api/terrains/{terrain}/history")
@@ -60,7 +60,7 @@ def add_history(app: FastAPI, hub: Hub, grids: GridStore) -> None:
         who = asker(request, link)
         document = await hub.document(terrain, at, who)
         still = None if at is None else things(await hub.strokes(terrain, None, who))
-        # In a thread, stroke by stroke: the framework would encode it in the event loop, at once.
+        # This runs in a thread, stroke by stroke: the framework would encode the document in the event loop, at once.
         text = await hub.read(who, document_json, shown(document, link, still))
         hub.demand(link)
         return Response(text, media_type="application/json")
@@ -83,14 +83,14 @@ def add_history(app: FastAPI, hub: Hub, grids: GridStore) -> None:
 
 
 def _copy(document: c.Document, title: str | None) -> c.Document:
-    """The terrain without what had been deleted from it: nobody there could bring it back."""
+    """Returns the terrain without what had been deleted from it: nobody there could bring it back."""
     name = (COPY + document.settings.title)[: c.MAX_NAME_LENGTH] if title is None else title
     settings = document.settings.model_copy(update={"title": name})
     return document.model_copy(update={"settings": settings, "deleted": (), "deleted_layers": ()})
 
 
 def _without_names(page: Page, here: Mapping[str, str]) -> Page:
-    """The same for a link to look: only who is ``here`` (names by client) has a name."""
+    """Returns the page for a link to look: only people who are ``here`` (names by client) have a name."""
     return page._replace(people={k: Person(k, here[k], each.colour) for k, each in page.people.items() if k in here})
 
 

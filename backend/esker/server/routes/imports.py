@@ -25,7 +25,7 @@ Digest = Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{64}$")]
 
 
 def add_imports(app: FastAPI, hub: Hub, grids: GridStore, imports: Imports) -> None:
-    """Adds them."""
+    """Adds the routes."""
     _add_uploads(app, imports)
     _add_grids(app, hub, grids)
 
@@ -35,7 +35,7 @@ def add_imports(app: FastAPI, hub: Hub, grids: GridStore, imports: Imports) -> N
 
     @app.post("/api/terrains/{terrain}/imports/{job}/answers")
     async def answers(request: Request, terrain: str, job: str, link: EditorLink) -> c.ImportStatus:
-        # The body is read from JSON itself: pydantic's strict mode takes no Python list for a pair.
+        # The body is parsed as JSON by the model: pydantic's strict mode takes no Python list for a pair.
         try:
             body = c.ImportAnswers.model_validate_json(await _short(request))
         except ValidationError as error:
@@ -119,7 +119,8 @@ def _length(request: Request) -> int | None:
 
 
 def _packed(grids: GridStore, digest: str) -> Path:
-    """A temporary .npz file with the heights, float32 metres, row 0 south, and the control net if there is one."""
+    """Returns a temporary .npz file with the heights, float32 metres, row 0 south, and the control net if there is
+    one."""
     raster = grids.read(digest)
     arrays = {"heights": raster.heights} | ({} if raster.warp is None else {"warp": raster.warp})
     path = grids.temporary(".npz")

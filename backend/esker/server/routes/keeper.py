@@ -31,11 +31,11 @@ class KeeperLink(c.Wire):
 
 
 def add_keeper(app: FastAPI, hub: Hub, key: Key) -> None:
-    """Adds them."""
+    """Adds the routes."""
     wrong = Rates(Rate(*WRONG_KEYS))
 
     async def keeper(request: Request) -> None:
-        """Lets through who shows the server's key. Raises Cannot."""
+        """Lets a person through who shows the server's key. Raises Cannot."""
         scheme, _, shown = request.headers.get("authorization", "").partition(" ")
         if scheme.lower() == "bearer" and len(shown) <= 128 and key.fits(shown.strip()):
             return

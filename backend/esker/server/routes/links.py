@@ -38,7 +38,7 @@ class Replacement(c.Wire):
     secret: Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_-]{32,128}$")] | None = None
     """The link's new secret: 192 random bits at least, made by whoever asks."""
     client: Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_-]{0,40}$")] = ""
-    """Who asks, as the room knows them: the other owners are told the name."""
+    """Returns a person's name as the room knows it: the other owners are told the name."""
 
 
 class JoinCode(c.Wire):
@@ -48,7 +48,7 @@ class JoinCode(c.Wire):
 
 
 def add_links(app: FastAPI, hub: Hub) -> None:
-    """Adds them."""
+    """Adds the routes."""
     access = hub.access
     _add_codes(app, hub)
 
@@ -88,7 +88,7 @@ def add_links(app: FastAPI, hub: Hub) -> None:
         replaced = next((each for each in access.links(terrain) if each.id == link_id), None)
         if link_id != link.id:
             hub.revoke_members(terrain, link_id)
-        else:  # the owner who asked has the new secret in a moment and comes back; others with the old one do not
+        else:  # the owner who asked has the new secret in a moment and comes back; people with the old one do not
             asyncio.get_running_loop().call_later(RENEWED_AFTER, hub.renew_members, terrain, link_id, who)
         if replaced is not None and replaced.role == "owner":
             what = "an owner link" if replaced.name == "" else f"the owner link “{replaced.name}”"
@@ -116,7 +116,7 @@ def _ended() -> Cannot:
 
 
 async def _new(hub: Hub, terrain: str, role: Role, name: str, by: Link | str) -> tuple[Link, str]:
-    """A new link and its secret. Raises Cannot, Ended."""
+    """Returns a new link and its secret. Raises Cannot, Ended."""
     try:
         return await asyncio.wrap_future(hub.access.add(terrain, role, name, by))
     except TooManyLinks:

@@ -21,14 +21,17 @@ from esker.session.room.hub import Hub
 
 
 class _Files(StaticFiles):
-    """The page's files. Who types an address that is none of them gets the page itself, which says so (404)."""
+    """The page's files.
+
+    A person who types an address that is none of them gets the page itself, which says so (404).
+    """
 
     def __init__(self, page: Path) -> None:
         super().__init__(directory=page)
         self._index = page / "index.html"
 
     async def get_response(self, path: str, scope: Scope) -> Response:
-        """The file, or for a person who looks for a page the page. Raises HTTPException (404, 405)."""
+        """Returns the file. A person who looks for a page gets the page. Raises HTTPException (404, 405)."""
         try:
             return await super().get_response(path, scope)
         except HTTPException as error:
@@ -40,7 +43,7 @@ class _Files(StaticFiles):
 
 
 def add_page(app: FastAPI, hub: Hub, page: Path, data: Path, pictures: Pictures) -> None:
-    """Adds them; all that no other route takes is a file of the page."""
+    """Adds the routes. Every path that no other route takes is a file of the page."""
 
     def index(more: str = "") -> Response:
         path = page / "index.html"

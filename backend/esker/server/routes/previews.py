@@ -45,7 +45,7 @@ class Pictures:
 
 
 def add_previews(app: FastAPI, hub: Hub, pictures: Pictures) -> None:
-    """Adds them."""
+    """Adds the routes."""
     previews, tokens = pictures.previews, pictures.tokens
     app.state.pictures = Rates(Rate(*PICTURES))
 
@@ -94,7 +94,7 @@ async def _draw_ahead(hub: Hub, pictures: Pictures, terrain: str, who: Who) -> c
 
 
 async def card_of(hub: Hub, pictures: Pictures, request: Request, terrain: str, token: str) -> str:
-    """Tags for programs that unfold links: of this terrain, where the token opens its picture; else of none."""
+    """Returns tags for programs that unfold links: of this terrain, where the token opens its picture; else of none."""
     if pictures.tokens.terrain(token) != terrain or not pictures.previews.available:
         return ""
     if not request.app.state.pictures.take(asker(request), time.monotonic()):

@@ -25,18 +25,19 @@ log = logging.getLogger("esker.server")
 
 
 SOCKETS: Final = Share(8_192, address=512, network=1_024)
-"""Sockets at a time: also of addresses behind a proxy, whose connections all come from one."""
+"""Sockets at a time; the bound holds too for addresses behind a proxy, whose connections all come from one."""
 CROWDED: Final = "Many sockets are open from your address. Close some pages, or wait a moment."
 SHARED_TEXTS: Final = 16
 SHARED_CHARACTERS: Final = 1 << 18
-"""Frames of so many of the last texts are kept, up to this length: what everybody in a room is told is framed once."""
+"""Frames of so many of the last texts are kept, up to this length: a text that goes to everybody in a room is framed
+once."""
 _WHOLE_TEXT: Final = 0x80 | Opcode.TEXT
 FRAGMENT_BYTES: Final = 1 << 16
 """Longer texts go in frames of this size (RFC 6455, 5.4): it shows that a peer reads them, however slowly."""
 
 
 def _frame(text: str) -> bytes:
-    """A text as a frame of the websocket, as a server sends it: whole and without a mask (RFC 6455, 5.2)."""
+    """Returns a text as a frame of the websocket, as a server sends it: whole and without a mask (RFC 6455, 5.2)."""
     data = text.encode()
     size = len(data)
     if size < 126:
@@ -49,7 +50,7 @@ def _frame(text: str) -> bytes:
 
 
 def _fragments(parts: Sequence[bytes]) -> Iterator[bytes]:
-    """A text whose bytes lie in parts, in several frames, each made when it is its turn."""
+    """Yields a text whose bytes lie in parts, in several frames, each made when it is its turn."""
     ends = [(part, at) for part in parts for at in range(0, len(part), FRAGMENT_BYTES)]
     for n, (part, at) in enumerate(ends):
         data = part[at : at + FRAGMENT_BYTES]
@@ -126,7 +127,7 @@ async def _messages(socket: WebSocket) -> AsyncIterator[str | bytes]:
 
 
 def add_socket(app: FastAPI, hub: Hub, front: Front) -> None:
-    """Adds it."""
+    """Adds the route."""
     accounts = Accounts()
     sockets = Places(SOCKETS)
 

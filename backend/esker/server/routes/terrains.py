@@ -36,7 +36,7 @@ class NewTerrain(c.Wire):
 
 
 def add_terrains(app: FastAPI, hub: Hub, grids: GridStore) -> None:
-    """Adds them."""
+    """Adds the routes."""
 
     @app.get("/api/templates")
     async def list_templates() -> list[dict[str, str]]:
@@ -81,7 +81,7 @@ def add_terrains(app: FastAPI, hub: Hub, grids: GridStore) -> None:
 
 
 async def _taken_in(request: Request, grids: GridStore, uploads: Turns) -> c.Document:
-    """The terrain in the file that a request brings; its grids are stored."""
+    """Reads the terrain in the file that a request brings, and stores its grids."""
     work = grids.work()
     try:
         await _receive(request, work / "upload.esker", MAX_IMPORT_BYTES, grids.space)
@@ -122,7 +122,7 @@ def _put_all(grids: GridStore, template: templates.Template) -> None:
 
 
 def _packed(grids: GridStore, document: c.Document) -> Path:
-    """A temporary .esker file. Raises ArchiveError, RasterError: a grid that is missing or damaged."""
+    """Returns a temporary .esker file. Raises ArchiveError, RasterError: a grid that is missing or damaged."""
     live = {layer.content: grids.read(layer.content) for layer in document.layers}
     gone = {layer.content for layer in document.deleted_layers if layer.content not in live}
     found = live | {digest: grids.read(digest) for digest in gone if grids.has(digest)}
@@ -137,7 +137,7 @@ def _packed(grids: GridStore, document: c.Document) -> Path:
 
 
 async def _receive(request: Request, path: Path, limit: int, space: Space) -> None:
-    """The body of a request, to the disk. Raises Cannot, space.NoSpace."""
+    """Writes the body of a request to the disk. Raises Cannot, space.NoSpace."""
     size = 0
     with path.open("wb") as file:
         async for part in request.stream():

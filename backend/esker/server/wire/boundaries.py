@@ -1,4 +1,4 @@
-"""Where the frames of a websocket's stream end, from their headers alone (RFC 6455, section 5.2).
+"""Finds where the frames of a websocket's stream end, from their headers alone (RFC 6455, section 5.2).
 
 The short way in (``websocket.py``) may take a text only where nothing is left over from what came before. The library
 that parses all else does not say where it stands, so the bytes that it is given are counted here too.
@@ -11,7 +11,7 @@ from typing import Final
 END_OF_REQUEST: Final = b"\r\n\r\n"
 MASK_BYTES: Final = 4
 MOST_HEADER_BYTES: Final = 14
-"""Two bytes, a length of eight and a mask."""
+"""A header's two bytes, a length of eight and a mask."""
 _FINAL, _CONTROL, _MASKED = 0x80, 0x08, 0x80
 _TWO_BYTES, _EIGHT_BYTES = 126, 127
 """Codes that stand for a length which follows in two or in eight bytes."""
@@ -58,7 +58,7 @@ class FrameBoundaries:
         return self._is_open and not self._payload_left and not self._header and not self._in_message
 
     def feed(self, data: bytes) -> None:
-        """The peer's next bytes."""
+        """Takes the peer's next bytes."""
         at = 0 if self._is_open else self._after_request(data)
         while at < len(data):
             if self._payload_left:

@@ -21,7 +21,7 @@ AGAIN: Final = "there are file descriptors again"
 
 
 def used_up() -> bool:
-    """Whether no file can be opened, of this process or of the whole system."""
+    """Returns whether no file can be opened, of this process or of the whole system."""
     try:
         os.close(os.open(os.devnull, os.O_RDONLY))
     except OSError as error:

@@ -33,11 +33,11 @@ WAITING: Final = 512
 """Connections that may be silent at a time. With one more the longest silent one is closed."""
 HEADER_SECONDS: Final = 10.0
 MAX_HEADER_BYTES: Final = 8 * 1024
-"""Most bytes of the header of a plain request that is answered with a redirect."""
+"""Most bytes that the header of a plain request may have to be answered with a redirect."""
 BACKLOG: Final = 2048
 LOOK_SECONDS: Final = 0.5
 FULL_SECONDS: Final = 0.2
-"""How long nobody is accepted when the process has no descriptor left."""
+"""Seconds for which nobody is accepted when the process has no descriptor left."""
 _HOST: Final = re.compile(rb"[A-Za-z0-9.\-]{1,253}(:[0-9]{1,5})?|\[[0-9A-Fa-f:.]{2,45}\](:[0-9]{1,5})?")
 _TARGET: Final = re.compile(rb"/[!-~]*")
 
@@ -73,7 +73,7 @@ class Door:
         self._thread.start()
 
     def close(self) -> None:
-        """Accepts nobody more, and closes who has said nothing yet. Connections of the server live on."""
+        """Accepts nobody more, and closes connections that have said nothing yet. Connections of the server live on."""
         if not self._stopping:
             self._stopping = True
             self._waker.send(b"\0")
@@ -180,12 +180,12 @@ class Redirect(asyncio.Protocol):
         self._timer: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """The request is awaited for so long."""
+        """Gives the request up, which has been awaited for so long."""
         self._transport = cast(asyncio.Transport, transport)
         self._timer = asyncio.get_running_loop().call_later(HEADER_SECONDS, self.abort)
 
     def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002
-        """The connection ended."""
+        """Notes that the connection ended."""
         if self._timer is not None:
             self._timer.cancel()
         self._ended(self)
@@ -196,7 +196,7 @@ class Redirect(asyncio.Protocol):
             self._transport.abort()
 
     def data_received(self, data: bytes) -> None:
-        """Bytes of the request. Its body is of no interest."""
+        """Takes bytes of the request. Its body is of no interest."""
         if self._transport is None or self._transport.is_closing():
             return
         self._got += data

@@ -1,4 +1,4 @@
-"""What stands before the application, as plain ASGI middleware: who really asks, and whether a browser may ask for it.
+"""Plain ASGI middleware before the application: it says who really asks, and whether a browser may ask for it.
 
 A reverse proxy tells the address of who asks in X-Forwarded-For, each proxy at its end: the last entry that is not of a
 trusted proxy counts, as whatever stands before it was written by who asks. A request that changes something is refused
@@ -25,7 +25,7 @@ WRONG_SITE: Final = "A page of another site may not ask for this."
 
 
 class Proxies:
-    """Proxies whose word is taken for who asks: addresses and networks, or "*": whoever connects directly."""
+    """Proxies that are believed about who asks: addresses and networks, or "*": any that connects directly."""
 
     def __init__(self, trusted: str) -> None:
         """``trusted``: separated by commas. Raises ValueError for what is no address, network or "*"."""
@@ -59,7 +59,7 @@ class Proxies:
 
 
 def _bare(entry: str) -> str | None:
-    """An address without its port; None when it is none."""
+    """Returns an address without its port; None when it is none."""
     if entry.startswith("["):
         entry = entry[1:].partition("]")[0]
     elif entry.count(":") == 1:
@@ -78,18 +78,20 @@ def local_names() -> set[str]:
 
 @dataclass(frozen=True)
 class Front:
-    """How this server is reached."""
+    """The ways by which this server is reached."""
 
     proxies: Proxies = field(default_factory=lambda: Proxies("127.0.0.1"))
     hosts: frozenset[str] | None = None
-    """Names in ``Host`` besides addresses and "localhost"; None: any, as nobody said which."""
+    """Names in ``Host`` besides addresses and "localhost". None: any, since nobody named some."""
     origin: str | None = None
-    """Where people reach it, when a proxy may change ``Host``: ``https://terrain.example.org``."""
+    """The address at which people reach the server, when a proxy may change ``Host``:
+    ``https://terrain.example.org``."""
     strict: bool = False
     """Whether browsers are told to come by HTTPS only (Strict-Transport-Security)."""
 
     def against(self, scope: Any) -> tuple[int, str, str] | None:
-        """Status, code and sentence of what stands against a change that this request asks for; None: nothing."""
+        """Returns status, code and sentence of what stands against a change that this request asks for; None:
+        nothing."""
         found: dict[bytes, bytes] = dict(scope["headers"])
         host = found.get(b"host", b"").decode("latin1").lower()
         if not self._mine(_name(host)):
@@ -119,19 +121,19 @@ class Front:
 
 
 def hosts(names: Iterable[str], *urls: str | None) -> frozenset[str]:
-    """Names and those of URLs, as they stand in ``Host`` without a port."""
+    """Returns names, and the names in URLs, as they stand in ``Host`` without a port."""
     return frozenset({name.lower() for name in names} | {_name(urlsplit(url).netloc) for url in urls if url})
 
 
 def _name(host: str) -> str:
-    """A host without its port and brackets."""
+    """Returns a host without its port and brackets."""
     if host.startswith("["):
         return host[1:].partition("]")[0]
     return host.partition(":")[0].rstrip(".").lower()
 
 
 class Forwarded:
-    """Puts who really asks, and whether by HTTPS, where a trusted proxy says so."""
+    """Middleware that tells the application who really asks, and whether by HTTPS, where a trusted proxy says so."""
 
     def __init__(self, app: Any, front: Front) -> None:
         self.app, self._proxies = app, front.proxies

@@ -25,7 +25,7 @@ class Headers:
     """Files whose name holds their hash (``/assets/``) may be kept for ever; all else is asked for again."""
 
     def __init__(self, app: Any, strict: bool = False) -> None:
-        """``strict``: who came by HTTPS is told to come by nothing else for a year."""
+        """``strict``: browsers that came by HTTPS are told to come by nothing else for a year."""
         self.app, self._strict = app, strict
 
     async def __call__(self, scope: Any, receive: Any, send: Any) -> None:

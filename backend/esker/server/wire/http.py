@@ -36,7 +36,7 @@ _TOO_MANY: Final = (
     b"content-length: 41\r\nconnection: close\r\n\r\nToo many connections are open. Try later."
 )
 ADDRESS_CONNECTIONS: Final = 1_024
-"""Most connections of one address, where there are so many at all. A school has one address, and each page holds some
+"""Most connections of one address, as far as the server has so many. A school has one address, and each page holds some
 seven."""
 
 
@@ -53,12 +53,12 @@ class Connections:
         return len(self._places)
 
     def take(self, address: str) -> Place:
-        """A place for a connection from there. Raises Full."""
+        """Returns a place for a connection from there. Raises Full."""
         return self._places.take(Who("", rank=OWNER) if self._exempt(address) else Who(address))
 
 
 def bounded(config: Any, connections: Connections) -> None:
-    """Has the protocols of a uvicorn.Config keep to these bounds."""
+    """Makes the protocols of a uvicorn.Config keep to these bounds."""
     config.esker_connections = connections
 
 
@@ -75,7 +75,7 @@ class HttpProtocol(HttpToolsProtocol):
     _place: Place | None = None
 
     def connection_made(self, transport: Any) -> None:
-        """A connection begins: its first header is awaited. Beyond the shares it is told so and closed."""
+        """Begins a connection: its first header is awaited. A connection beyond the shares is told so and closed."""
         super().connection_made(transport)
         connections: Connections | None = getattr(self.config, "esker_connections", None)
         if connections is not None:
@@ -89,14 +89,14 @@ class HttpProtocol(HttpToolsProtocol):
         self._look_timer = self.loop.call_later(LOOK_SECONDS, self._look)
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """The connection ended."""
+        """Notes that the connection ended."""
         self._leave()
         if self._place is not None:
             self._place.release()
         super().connection_lost(exc)
 
     def handle_websocket_upgrade(self) -> None:
-        """From here on the websocket has its own rules."""
+        """Leaves the connection to the rules of the websocket."""
         self._leave()
         super().handle_websocket_upgrade()
         socket = self.transport.get_protocol()
@@ -104,7 +104,10 @@ class HttpProtocol(HttpToolsProtocol):
             socket.place, self._place = self._place, None
 
     def data_received(self, data: bytes) -> None:
-        """Bytes of the peer, unless it is being sent away. A header above ``MAX_HEADER_BYTES`` ends the connection."""
+        """Takes bytes of the peer, unless it is being sent away.
+
+        A header above ``MAX_HEADER_BYTES`` ends the connection.
+        """
         if self.transport.is_closing():
             return
         super().data_received(data)
@@ -115,42 +118,42 @@ class HttpProtocol(HttpToolsProtocol):
                 self.transport.close()
 
     def on_message_begin(self) -> None:
-        """The first byte of a request. Raises ValueError, upon which the parser gives up, behind too many that wait."""
+        """Notes the first byte of a request. Raises ValueError behind too many that wait: the parser gives up then."""
         if len(self.pipeline) >= MOST_WAITING:
             raise ValueError("too many requests at a time")
         self._await_header()
         super().on_message_begin()
 
     def on_headers_complete(self) -> None:
-        """The header is whole; a body may follow."""
+        """Notes that the header is whole; a body may follow."""
         self._reading, self._body_bytes, self._since = "body", 0, time.monotonic()
         super().on_headers_complete()
 
     def on_body(self, body: bytes) -> None:
-        """A part of the body."""
+        """Notes a part of the body."""
         self._body_bytes += len(body)
         super().on_body(body)
 
     def on_message_complete(self) -> None:
-        """The request is whole; it may have been answered before."""
+        """Notes that the request is whole; it may have been answered before."""
         self._reading = "nothing"
         super().on_message_complete()
         if self.cycle is None or self.cycle.response_complete:
             self._await_header()
 
     def on_response_complete(self) -> None:
-        """The answer was handed over; another request may come."""
+        """Notes that the answer was handed over; another request may come."""
         if self._reading == "nothing" and not self.pipeline:
             self._await_header()
         super().on_response_complete()
 
     def pause_writing(self) -> None:
-        """The peer does not read as fast as is sent."""
+        """Notes that the peer does not read as fast as is sent."""
         self._unread_since = time.monotonic()
         super().pause_writing()
 
     def resume_writing(self) -> None:
-        """The peer has read what was sent."""
+        """Notes that the peer has read what was sent."""
         self._unread_since = None
         super().resume_writing()
 

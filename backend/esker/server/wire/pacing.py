@@ -16,7 +16,7 @@ from esker.fairness.spending import PAYS, Accounts, Purse
 from esker.server.routes.answers import answer
 
 REQUEST_SECONDS: Final = 0.0003
-"""What a request costs at least, before and after the application has it; paid in advance."""
+"""Processor time that a request costs at least, before and after the application has it; paid in advance."""
 PATIENCE_SECONDS: Final = 10.0
 """A request that would wait for longer is refused then."""
 PAUSE_SECONDS: Final = 0.25
@@ -62,7 +62,7 @@ class Paced:
 
 
 def _debt(purses: tuple[Purse, ...]) -> float:
-    """Seconds until all these purses are level."""
+    """Returns the seconds until all these purses are level."""
     return max((purse.debt for purse in purses), default=0.0)
 
 

@@ -15,7 +15,7 @@ from esker.session.room.hub import Hub
 from esker.store.access import Link
 
 ASK_SECONDS: Final = 0.25
-"""Between two looks at whether the link still lives, while a file is being sent."""
+"""Seconds between two looks at whether the link still lives, while a file is being sent."""
 
 
 class _Cut(Exception):

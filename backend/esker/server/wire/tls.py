@@ -52,7 +52,7 @@ class Authority:
 
 
 def lan_address() -> str:
-    """The address by which other devices on the network reach this one; 127.0.0.1 when there is no network."""
+    """Returns the address by which other devices on the network reach this one; 127.0.0.1 when there is no network."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
             probe.connect(("192.0.2.1", 9))  # a documentation address: a datagram socket sends nothing on connect
@@ -102,7 +102,7 @@ def names(address: str) -> list[str]:
 
 
 def server_context(data: Path, address: str) -> ssl.SSLContext:
-    """A TLS context with a fresh certificate for ``address``, signed by the authority in the data folder."""
+    """Returns a TLS context with a fresh certificate for ``address``, signed by the authority in the data folder."""
     signer = authority(data, address)
     key = ec.generate_private_key(ec.SECP256R1())
     certificate = sign(signer, names(address), key)
@@ -118,7 +118,7 @@ def server_context(data: Path, address: str) -> ssl.SSLContext:
 
 
 def sign(signer: Authority, found: list[str], key: ec.EllipticCurvePrivateKey) -> x509.Certificate:
-    """A server's certificate for these names and addresses."""
+    """Returns a server's certificate for these names and addresses."""
     now = datetime.now(UTC)
     alternatives = x509.SubjectAlternativeName([_general(name) for name in found])
     usage = x509.ExtendedKeyUsage([ExtendedKeyUsageOID.SERVER_AUTH])
@@ -163,14 +163,14 @@ def _make(address: str) -> Authority:
 
 
 def _networks(address: str) -> list[IPv4Network | IPv6Network]:
-    """The private ranges, and this host's own address where it is in none of them."""
+    """Returns the private ranges, and this host's own address where it is in none of them."""
     ranges = [ip_network(text) for text in PRIVATE]
     own = ip_network(address)
     return ranges if any(own.version == net.version and own[0] in net for net in ranges) else [*ranges, own]
 
 
 def _against(certificate: x509.Certificate, address: str) -> str:
-    """Why an authority is not to be used any more, as a sentence; empty when it is."""
+    """Returns in a sentence why an authority is not to be used any more; an empty one when it may be."""
     if certificate.not_valid_after_utc <= datetime.now(UTC) + _RENEW_BEFORE:
         return "its two years are nearly over."
     try:

@@ -52,7 +52,7 @@ GROUND_LAYERS: Final[tuple[Layer, ...]] = tuple(Layer(channel, painted=False) fo
 
 
 def target(stroke: Stroke, layer: Layer, settings: TerrainSettings) -> float | None:
-    """What a stroke asks of a layer, as a difference from its base, in its unit; None when it asks nothing of it.
+    """Returns a stroke's target for a layer, as a difference from the layer's base in its unit; None without one.
 
     Paint of roughness asks for 0 (value -1) to 1; of amplitude, for PAINT_MORE times the natural detail of the terrain
     (value 1), or to take PAINT_LESS of it away (value -1); of the others, for the value itself.

@@ -1,4 +1,4 @@
-"""What kernels can compute of a document's numbers: the contract's bounds leave room for numbers that float32 does not.
+"""Numbers of a document that kernels can compute: the contract's bounds leave room for numbers that float32 does not.
 
 A solver reads settings through ``computable`` and lengths of strokes through the floors below, so that every document
 that the contract allows has finite ground (docs/decisions/0031-what-a-room-may-take.md). Ordinary ones pass unchanged.

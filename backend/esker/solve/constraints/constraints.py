@@ -60,7 +60,7 @@ AT_A_STRETCH = 16
 
 
 def driven(work: Generator[Any, None, T]) -> T:
-    """What a generator returns at its end."""
+    """Runs a generator to its end. Returns what it returns."""
     while True:
         try:
             next(work)
@@ -86,13 +86,13 @@ class Packer:
     def __init__(self, level: int, layer: Layer | None = None) -> None:
         self.level, self.layer = level, layer
         self.shapes: Shapes | None = None
-        """What other packers made ready, for the heights."""
+        """Shapes that other packers made ready, for the heights."""
         self._settings: SettingsKey | None = None
         self._base: Base | None = None
         self._packed: dict[str, tuple[Stroke, Packed | None]] = {}
         self._rastered = True
         self.earliest: str | None = None
-        """Of the last set the least id of a stroke that is new, other or gone; None where all count as such."""
+        """The least id among strokes of the last set that are new, changed or gone; None where all count as such."""
         self.order: list[str] = []
         """Ids of the strokes of the last set's tables, ascending."""
 
@@ -145,7 +145,7 @@ class Packer:
         return _tables(self.level, settings, list(meeting.values()), box), window
 
     def unrastered(self) -> None:
-        """What is packed is not in any raster any more: all of it is the next window."""
+        """Says that packed strokes are in no raster any more: the next window is all of them."""
         self._rastered = False
 
     def forget(self) -> None:
@@ -162,7 +162,7 @@ def _same(one: Base | None, other: Base | None) -> bool:
 
 
 def _meet(packed: Packed, window: Window | None) -> bool:
-    """Whether a stroke can reach the rectangle around a window."""
+    """Returns whether a stroke can reach the rectangle around a window."""
     if window is None:
         return False
     (r0, r1, c0, c1), (s0, s1, d0, d1) = packed.window.bounds, window.bounds
@@ -175,7 +175,7 @@ def _moved(old: Base | None, new: Base | None) -> grid.Rect | None:
 
 
 def _stale(old: Base | None, new: Base | None, moved: grid.Rect | None, margin: float) -> Callable[[Stroke], bool]:
-    """Whether what was packed of a stroke over one base may be wrong over another that differs in a rectangle."""
+    """Returns whether a stroke that was packed over one base may be wrong over another that differs in a rectangle."""
     if old is None or new is None or moved is None:
         return _none
     if bounds_of(old) != bounds_of(new):
@@ -260,7 +260,7 @@ class Shapes:
 def _ready(
     shapes: Shapes | None, layer: Layer | None
 ) -> Callable[[Stroke, TerrainSettings, Base | None], Shape | None]:
-    """What makes a stroke ready to be packed."""
+    """Returns the function that makes a stroke ready to be packed."""
     return partial(shape_for, layer) if shapes is None or layer is not None else shapes.of
 
 
@@ -307,7 +307,7 @@ class WindowPacker:
 
     @property
     def grounds(self) -> dict[str, BaseUnderStroke]:
-        """What each stroke is to the base, by its id."""
+        """The base under each stroke, by the stroke's id."""
         return {stroke.id: shape.ground for stroke, shape in zip(self._strokes, self._shapes, strict=True)}
 
     def reaching(self, level: int, box: BinBox) -> list[Stroke]:

@@ -39,7 +39,7 @@ def changed(old: Packed | None, new: Packed | None, box: BinBox) -> Window | Non
 
 
 def _read(array: Floats) -> NDArray[np.float32]:
-    """What a kernel reads of a table."""
+    """Rounds a table to what a kernel reads of it."""
     return array.astype(np.float32)
 
 

@@ -18,7 +18,7 @@ from esker.solve.constraints.tables import BIN, Window
 MOST_BINS: Final = 1024
 """Bins whose sums a workspace keeps, 13 KiB each: a stroke of a kilometre at level 4 reaches half as many."""
 LEAST_STROKES: Final = 4
-"""With fewer strokes before the one that changes there is nothing to gain."""
+"""Sums are kept only where so many strokes come before the one that changes: with fewer there is nothing to gain."""
 BETWEEN: Final = 3
 """Strokes between those that are kept and the one that changes, before sums are made anew: where several people draw,
 now this stroke changes and now that."""
@@ -29,7 +29,7 @@ NO_STROKE: Final = 0x7FFFFFFF
 
 
 class Kept(NamedTuple):
-    """What the kernel is told. first: the strokes of the tables from here on are not in the sums; slots: int32, by bin
+    """Arguments of the kernel. first: the strokes of the tables from here on are not in the sums; slots: int32, by bin
     of the window, k + 1 where sums are kept in slot k, -k - 1 where they are to be, 0 where they are not; sums: buffer.
     """
 
@@ -39,8 +39,11 @@ class Kept(NamedTuple):
 
 
 class Changes(Protocol):
-    """What ``constraints.Packer`` says of its last set. earliest: least id of a stroke that changed, None where no sums
-    of before can be kept; order: ids of the strokes of the tables, ascending."""
+    """Facts that ``constraints.Packer`` gives of its last set.
+
+    earliest: least id of a stroke that changed, None where no sums of before can be kept; order: ids of the strokes of
+    the tables, ascending.
+    """
 
     @property
     def earliest(self) -> str | None: ...
@@ -66,7 +69,8 @@ class KeptSums:
         self._buffer: Any = None
 
     def plan(self, changes: Changes, window: Window) -> Kept | None:
-        """What to keep, and to go on from, in the bins of a window that is rasterised next; None: all strokes anew."""
+        """Returns the sums to keep, and those to go on from, in the bins of a window that is rasterised next; None: all
+        strokes are summed anew."""
         until = self._bound(changes)
         if until != self._until:
             self._slots[:] = 0

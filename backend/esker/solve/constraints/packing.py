@@ -65,7 +65,7 @@ class Side:
 
 @dataclass(frozen=True)
 class Shape:
-    """What the tables of any level and window are made from: a crest and its band, in metres.
+    """A crest and its band, in metres. The tables of any level and window are made from it.
 
     cliff: 1 / reach of the terrain, 0 for endless; silhouette: of a profile, None of an outline. For another channel
     than the heights, value: what the stroke asks of it, as a difference from its base; brush_m: radius of paint.

@@ -46,7 +46,7 @@ _SUMS = ("w", "wt", "wtt", "wa", "fade", "held", "g", "gx", "gy", "toe", "hard",
 
 @dataclass(frozen=True)
 class Constraints:
-    """What the strokes say in a box of a level (all of it or a window).
+    """Constraints of the strokes in a box of a level (all of it or a window).
 
     Every array float64, (rows, columns) or (2, rows, columns), row 0 south. height_d: spring stiffness, HARD where
     fixed. height_f: stiffness times target (plus what the screening must give back), or the fixed height. gradient_d:

@@ -37,7 +37,7 @@ Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 TINY = 1e-20
 LEAST = 1e-30
-"""Of sums of weights: below it strokes have no say."""
+"""Strokes have no say where the sum of their weights is below this."""
 SLIGHT = 1e-10
 
 
@@ -72,9 +72,9 @@ def square_of(x: Floats, y: Floats) -> Floats:
 
 
 def sides(cap: Mask, past: Floats, cross: Floats, square: Floats, distance: Floats) -> tuple[Floats, Floats]:
-    """Shares of the left and the right side: one of them, both on the line itself, and around its ends (``cap``), where
-    samples are ``past`` it, as the sine of the angle says. No difference of nearly equal numbers: a small share is
-    exact too."""
+    """Returns the shares of the left and the right side: one of them, or both on the line itself and around its ends
+    (``cap``), where samples are ``past`` an end, as the sine of the angle says. Nearly equal numbers are never
+    subtracted, so a small share is exact too."""
     lesser = np.where(cross == 0, 0.5, 0.0)
     lesser = np.where(cap, 0.5 * (past**2 + TINY) / (square + distance * np.abs(cross) + TINY), lesser)
     return np.where(cross > 0, 1 - lesser, lesser), np.where(cross < 0, 1 - lesser, lesser)

@@ -129,7 +129,7 @@ def _octaves(t: Floats, z: Floats, base: float, count: int) -> list[Floats]:
 
 
 def _mirrored_octaves(t: Floats, z: Floats, base: float, middle: float, halves: list[int]) -> list[Floats]:
-    """The same with controls counted from ``middle``, ``halves[o]`` pieces on each side of it."""
+    """Computes the octaves with controls counted from ``middle``, ``halves[o]`` pieces on each side of it."""
     out: list[Floats] = []
     level = np.zeros(0)
     for o, half in enumerate(halves):

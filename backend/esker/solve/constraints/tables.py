@@ -44,8 +44,8 @@ NEAR_SHARE = 1 / 80
 """Strokes are weighed by the square of their distance; nearer to its crest than this share of its width one has most of
 the say. A length on the ground, so that every level sees the same crossing."""
 NEAR_FLOOR = 2.0
-"""That length is at least so many 1,024ths of the domain, or cells of a level coarser than 4: a narrower notch would
-turn into beads."""
+"""The length that NEAR gives is at least so many 1,024ths of the domain, or cells of a level coarser than 4: a narrower
+notch would turn into beads."""
 OVERLAP_STIFFENING = 200.0
 """Where strokes want different heights the springs are up to this many times stiffer: the mean of their gradients is
 not the gradient of their mean height there, and a crest would stand out of the ground sample by sample."""
@@ -54,7 +54,7 @@ OVERLAP_STIFFEST = 8.0
 PINNED = -2.0
 """Stiffness that marks a sample of a pinned border; like all that are negative it means a fixed sample."""
 PINNED_STIFFNESS = 1e6
-"""What it becomes on coarse levels: as good as fixed."""
+"""Stiffness of a pinned sample on coarse levels: as good as fixed."""
 LINE_STIFFNESS = 64.0
 """Stiffness, on a coarse level, of a crest that runs along one of its lines of samples, and so lies exactly there.
 Saturating springs would let the ground slip by half a cell, again on every coarser level, until corrections are more
@@ -70,13 +70,13 @@ PAIRS_EDITION = 3
 float32 loses that of high ground when it takes it from sums of squares. A stroke with less than AGREEMENT of the weight
 counts less, as far as it has hardly any. And a plateau is one where its crest has no height, too."""
 TOE = 1.3
-"""Beyond its end a band still tells the gradient, fading out at this multiple of its width: nothing overshoots."""
+"""A band still tells the gradient beyond its end, fading out at this multiple of its width: nothing overshoots."""
 EXIT_SHARE = 0.25
 """Where a band ends above the base the gradient leaves as if this share of the height there decayed over the reach:
 more, and the ground beyond sinks below the base; less, and a step shows."""
 YIELDING_SAY = 1e-6
-"""What a stroke that yields wholly counts beside others: less than theirs but in the last tenth of a band; more than a
-skirt, so that it still leads its own flanks."""
+"""Weight of a stroke that yields wholly: less than that of others but in the last tenth of a band; more than a skirt's,
+so that the stroke still leads its own flanks."""
 COURSE_SAY = 1e3
 """How many times the weight of other strokes a course has: a bed or a road leads through the flanks that it crosses."""
 SKIRT_SAY = 1e4
@@ -306,7 +306,7 @@ class Window:
         return int((self.spans[:, 1] - self.spans[:, 0]).max(initial=0))
 
     def bands(self, bins: int) -> Iterator[Window]:
-        """The same bins in bands of whole rows with about ``bins`` of them at most, for work that may be left."""
+        """Yields the bins in bands of whole rows with about ``bins`` of them at most, for work that may be left."""
         rows = max(1, bins // max(1, self.width))
         for row in range(0, len(self.spans), rows):
             yield Window(self.first + row, self.spans[row : row + rows])

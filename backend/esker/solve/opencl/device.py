@@ -297,10 +297,8 @@ def _open(name: str, device: Any) -> Device:
 
 
 def row_kernels(device: Device) -> Device:
-    """The same device, context and queue with row-wise kernels: for what has no others, correct anywhere.
-
-    Raises BuildError.
-    """
+    """Returns the device, with its context and queue, with row-wise kernels: for work that has no other kernels,
+    correct anywhere. Raises BuildError."""
     if device.plan is None:
         return device
     key = device.name + _ROWS_TOO

@@ -82,7 +82,7 @@ class DeviceWorkspace(Generic[S]):
 
     @property
     def based(self) -> bool:
-        """Whether it solves over a base."""
+        """Whether the workspace solves over a base."""
         return self._over is not None
 
     def load(self, strokes: Sequence[Stroke], settings: TerrainSettings, base: Base | None = None) -> None:

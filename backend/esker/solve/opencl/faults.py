@@ -1,4 +1,4 @@
-"""What can go wrong with a device, as typed errors with a sentence for people.
+"""Faults of devices as typed errors, each with a sentence for people.
 
 pyopencl raises its own errors wherever a call is made; ``guarded`` turns those that pass through it into the types
 below. What to do about a fault (another device, a lower level, NumPy) is for the caller to decide.
@@ -17,7 +17,7 @@ Result = TypeVar("Result")
 
 
 class Faulty(Protocol):
-    """What is asked of a device that failed: ``device.Faulty`` is one."""
+    """The part of a device that ``guarded`` asks when something failed: ``device.Faulty`` has it."""
 
     @property
     def name(self) -> str: ...
@@ -89,12 +89,12 @@ def classify(error: BaseException, device: Faulty | None) -> DeviceError | None:
 
 
 def is_fault(error: BaseException) -> bool:
-    """Whether an exception comes from a device: a DeviceError, or one of pyopencl."""
+    """Returns whether an exception comes from a device: a DeviceError, or one of pyopencl."""
     return isinstance(error, DeviceError) or type(error).__module__.startswith("pyopencl")
 
 
 def build_error(error: BaseException, name: str) -> BuildError:
-    """What a compiler's complaint means for the device called ``name``."""
+    """Returns the error that a compiler's complaint means for the device called ``name``."""
     return BuildError(f"{name} could not compile the solver's kernels ({_short(error)}).", name)
 
 
@@ -105,7 +105,7 @@ def _short(error: BaseException) -> str:
 
 
 def _alive(device: Faulty) -> bool:
-    """Whether the device's queue still does what it is told."""
+    """Returns whether the device's queue still does what it is told."""
     import pyopencl as cl
 
     sent, got = np.array([0x5EED], dtype=np.uint32), np.zeros(1, dtype=np.uint32)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from esker.solve.opencl.queue import Queue
 
 FLOOR = 1e-6
-"""Of float32 (``multigrid.System``)."""
+"""The floor of ``multigrid.System`` in float32."""
 
 
 @dataclass(frozen=True)

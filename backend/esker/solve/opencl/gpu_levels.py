@@ -67,7 +67,7 @@ class GpuLauncher(Queue):
         self._enqueue(self.bound(name, *args), groups, block)
 
     def run_once(self, name: str, groups: tuple[int, ...], block: tuple[int, ...], *args: Any) -> None:
-        """The same with arguments that will not come again."""
+        """Enqueues a kernel with arguments that will not come again."""
         self._enqueue(self.once(name, args), groups, block)
 
     def _enqueue(self, kernel: Any, groups: tuple[int, ...], block: tuple[int, ...]) -> None:
@@ -197,7 +197,7 @@ class GpuSystem(Fields):
 
 
 class Bins:
-    """What ``raster.rasterise`` launches with: a work-group of one work-item a sample for every bin."""
+    """The launch of ``raster.rasterise``: a work-group of one work-item a sample for every bin."""
 
     keeps_sums = False
 

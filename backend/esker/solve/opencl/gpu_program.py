@@ -66,7 +66,10 @@ SMALL = (Tile(32, 8, 4), Tile(32, 4, 8), Tile(32, 2, 16))
 
 @dataclass(frozen=True)
 class Plan:
-    """What fits a device. ``wide`` by number of channels; ``units`` compute units; ``bottom_items`` of that kernel."""
+    """Sizes of kernels that fit a device.
+
+    ``wide`` by number of channels; ``units``: compute units; ``bottom_items``: work-items of the bottom kernel.
+    """
 
     wide: tuple[Tile, ...]
     small: Tile

@@ -55,7 +55,8 @@ class Lease:
 
 @dataclass(frozen=True)
 class Packed:
-    """What a workspace that went had packed. since: of ``time.monotonic``; preview: of its preview workspace."""
+    """Strokes that a workspace had packed before it went. since: of ``time.monotonic``; preview: those of its preview
+    workspace."""
 
     since: float
     top: int
@@ -151,7 +152,7 @@ class WorkspacePool:
         return sum(grid.solve_bytes(w.top, w.based) for w in self._made)
 
     def _is_full(self, top: int, based: bool) -> bool:
-        """Whether one more workspace would be beyond the bound."""
+        """Returns whether one more workspace would be beyond the bound."""
         return self.held + grid.solve_bytes(top, based) > self.bound
 
     def give(self, workspace: Workspace) -> None:

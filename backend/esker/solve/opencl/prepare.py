@@ -52,7 +52,7 @@ THIS_IS_THE_CHILD = False
 
 
 class Stopped(Exception):
-    """Whoever asked for a build wants it no more."""
+    """A build is no longer wanted by whoever asked for it."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ Tell = Callable[[Step], None]
 
 @dataclass
 class _State:
-    """What this process knows. PoCL is loaded once in a process, so its level is settled once."""
+    """State of this process. PoCL is loaded once in a process, so its level is settled once."""
 
     level: cpu.Level | None = None
     settled: bool = False
@@ -145,7 +145,7 @@ def ready(
 def _tried(
     one: cpu.Level, wanted: str | None, threads: int | None, tell: Tell, stopped: threading.Event | None
 ) -> str | None:
-    """None when the kernels of this level are there; else what went wrong."""
+    """Returns None when the kernels of this level are there; else a sentence about what went wrong."""
     if _kept(one):
         _settle(one)
         _state.ready = True
@@ -210,7 +210,7 @@ def _driver(known: str, name: str, threads: int | None, tell: Tell, stopped: thr
 
 
 def task(one: cpu.Level, wanted: str | None, threads: int | None) -> dict[str, Any]:
-    """What the child is told."""
+    """Returns the environment of the child."""
     return {"wanted": wanted, "threads": threads, "level": one.name}
 
 
@@ -350,7 +350,7 @@ def expected() -> int:
 
 
 def key() -> str:
-    """What compiled kernels depend on beside the level: sources, constants, versions, kind of kernels."""
+    """Returns all that compiled kernels depend on beside the level: sources, constants, versions, kind of kernels."""
     parts = [program_text.sources(), _texts(), os.environ.get("ESKER_KERNELS", "")]
     for package in ("pyopencl", "pocl-binary-distribution"):
         with contextlib.suppress(PackageNotFoundError):
@@ -367,7 +367,7 @@ def _compiled(one: cpu.Level) -> list[Path]:
 
 
 def _kept(one: cpu.Level) -> bool:
-    """Whether everything for this level was compiled and is still there."""
+    """Returns whether everything for this level was compiled and is still there."""
     record = _read(_record(one, "ready"))
     place = home.folder(one)
     return record is not None and all((place / name).is_file() for name in record["files"])

@@ -31,7 +31,7 @@ def files() -> dict[str, str]:
 
 
 def sources() -> str:
-    """What the row-wise programs are compiled from, constants included."""
+    """Returns the source of the row-wise programs, constants included."""
     return source(None) + over_source(None)
 
 

@@ -1,4 +1,4 @@
-"""What a device has to do right before it is trusted: a small terrain, solved as the NumPy twin solves it."""
+"""A proof that a device must give before it is trusted: a small terrain, solved as the NumPy twin solves it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from esker.solve.opencl.faults import DeviceError
 
 LEVEL: Final = 1
 TOLERANCE: Final = 1e-3
-"""Of the relief."""
+"""Largest difference to the twin, as a share of the relief."""
 STROKES: Final = (
     Stroke(
         id="proof",

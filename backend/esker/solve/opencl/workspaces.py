@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from esker.solve.passes import Workspace
 
 SHARE = 0.9
-"""Of a device's memory that workspaces may take: tables, the driver and the display need some too."""
+"""Workspaces may take this share of a device's memory: tables, the driver and the display need some too."""
 _held: Counter[str] = Counter()
 _lock = threading.Lock()
 

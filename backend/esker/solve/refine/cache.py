@@ -1,4 +1,4 @@
-"""What refinement keeps: fields of tiles by their content."""
+"""Memory of refinement: fields of tiles by their content."""
 
 from __future__ import annotations
 

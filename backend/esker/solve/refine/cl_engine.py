@@ -48,7 +48,7 @@ _STRIPS_ROWS: Final = 64
 _MEMORY: Final = {"u": 3, "v": 3, "gd": 1, "gf": 2, "hd": 1, "hf": 1, "q": 2, "rhs": 1}
 """Fields of a window and their channels."""
 _OVER: Final = {"base": 1, "share": 1, "target": 1, "raw": 1}
-"""Those that it has over a base."""
+"""Further fields of a window over a base."""
 
 
 class ClEngine:
@@ -157,7 +157,7 @@ class _Room:
             flight.prepare()
 
     def complete(self, event: Any) -> bool:
-        """Whether what was enqueued up to an event is done. Raises DeviceError where it failed."""
+        """Returns whether all that was enqueued up to an event is done. Raises DeviceError where it failed."""
         status = event.command_execution_status
         if status < 0:
             event.wait()

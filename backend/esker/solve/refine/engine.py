@@ -26,8 +26,8 @@ from esker.solve.refine.base_blocks import BaseWindows
 
 GRADIENT_SWEEPS: Final = 8
 HEIGHT_SWEEPS: Final = 70
-"""Both even, and as many as whole bins have room for: tiles begin on bins, so that a halo of 79 takes no more of them
-than one of 65. docs/decisions/0012-refinement.md."""
+"""Both counts are even, and as large as whole bins have room for: tiles begin on bins, so that a halo of 79 takes no
+more of them than one of 65. docs/decisions/0012-refinement.md."""
 GRADIENT_LOW: Final = 0.25
 """The sweeps of the gradient damp errors from here upward."""
 HALO: Final = GRADIENT_SWEEPS + 1 + HEIGHT_SWEEPS
@@ -49,7 +49,7 @@ class Span(NamedTuple):
     c1: int
 
     def grown(self, by: int, samples: int) -> Span:
-        """With ``by`` more samples on every side, as far as the level goes."""
+        """Returns the span with ``by`` more samples on every side, as far as the level goes."""
         return Span(max(0, self.r0 - by), min(samples, self.r1 + by), max(0, self.c0 - by), min(samples, self.c1 + by))
 
     @property
@@ -60,8 +60,10 @@ class Span(NamedTuple):
 
 @dataclass(frozen=True)
 class Step:
-    """Which samples one step computes and reads. core: the result; box: the bins of the window; parent: what is read of
-    the next coarser level."""
+    """Spans of samples that one step computes and reads.
+
+    core: the result; box: the bins of the window; parent: what is read of the next coarser level.
+    """
 
     level: int
     core: Span
@@ -150,7 +152,10 @@ class StrokeWindows(Protocol):
         """The rasteriser's tables of a box of bins."""
 
     def shared_tables(self, level: int, box: BinBox) -> Generator[None, None, Tables]:
-        """The same for kernels, made bit by bit: lists may name strokes that do not reach the box."""
+        """Yields, and returns at its end, the tables for kernels.
+
+        They are made bit by bit: lists may name strokes that do not reach the box.
+        """
 
     def bins_digest(self, level: int, box: BinBox) -> bytes:
         """Digest of all that decides the constraints of a box of bins at this level."""

@@ -86,7 +86,7 @@ class _Begun:
     pending: Pending
 
     def holds(self, key: TileKey) -> bool:
-        """Whether it makes a tile."""
+        """Returns whether the step makes a tile."""
         x0, y0, x1, y1 = self.box
         return key.level == self.level and x0 <= key.x < x1 and y0 <= key.y < y1
 
@@ -113,7 +113,7 @@ class Refiner:
         """Oldest first; they outlive the iterator that began them."""
         self._urgent: Callable[[], bool] | None = None
         self._waiting: dict[int, dict[TileKey, Fields | None]] = {}
-        """What the iterators need of them, by the identity of the dictionary."""
+        """Fields that the iterators need of tiles, by the identity of their dictionary."""
 
     def content(self, key: TileKey) -> bytes:
         """Digest of all that a tile depends on: the key, the settings, the strokes that reach its windows at any level
@@ -143,8 +143,10 @@ class Refiner:
             yield RefinedTile(key, field[2], self.content(key), self._under(key))
 
     def _plan(self, keys: Iterable[TileKey]) -> Plan:
-        """Those tiles that are not kept, nor under way, by level: when some are made, as parents of finer ones too, so
-        are others that lie beside them."""
+        """Returns by level the tiles that are neither kept nor under way.
+
+        Where tiles are made, as parents of finer ones too, tiles beside them are made with them.
+        """
         left: Plan = {level: set() for level in range(self.basis.level + 1, MAX_REFINED_LEVEL + 1)}
         for key in keys:
             if self.content(key) not in self.cache and not self._is_under_way(key):
@@ -283,7 +285,7 @@ class Refiner:
                     waiting[key] = tile
 
     def _parent(self, at: Step, plan: Plan) -> Generator[None, None, Fields]:
-        """What a step reads of the next coarser level."""
+        """Returns the span of the next coarser level that a step reads."""
         p = at.parent
         if at.level - 1 == self.basis.level:
             return self._ground[:, p.r0 : p.r1, p.c0 : p.c1]
@@ -323,7 +325,7 @@ class Refiner:
 
 
 class Refinery:
-    """What the refiners of one solver share: the kernels' memory on ``device`` (None: NumPy) and the cache.
+    """The parts that the refiners of one solver share: the kernels' memory on ``device`` (None: NumPy) and the cache.
 
     Refinement has row-wise kernels only; a GPU runs them too, correctly and slowly.
     """

@@ -63,7 +63,7 @@ class Symbol:
 
 @dataclass
 class Output:
-    """What is being laid out: parts by address, dynamic relocations, and the table of addresses of symbols."""
+    """The layout under way: parts by address, dynamic relocations, and the table of addresses of symbols."""
 
     parts: list[tuple[int, bytearray]] = field(default_factory=list)
     relocations: list[tuple[int, int, int, int]] = field(default_factory=list)
@@ -173,7 +173,8 @@ class _Names:
 
 @dataclass
 class _Needs:
-    """What relocations ask for: symbols by number that are called, whose address is read, and pointers in data."""
+    """Collects what relocations ask for: symbols by number that are called, whose address is read, and pointers in
+    data."""
 
     calls: set[int] = field(default_factory=set)
     addresses: set[int] = field(default_factory=set)
