@@ -24,7 +24,7 @@ from esker.contract import ABSOLUTE_BOUND_M, MAX_GRID_SAMPLES, MAX_LEVEL, MAX_RE
 Model = TypeVar("Model", bound=BaseModel)
 Kind = TypeVar("Kind")
 LONGEST_WAIT_S: Final = 86_400.0 * 365
-"""What a lock of the system can be told to wait for is not much longer."""
+"""A lock of the system cannot wait much longer."""
 
 
 def shown(value: object) -> str:
@@ -76,7 +76,7 @@ def pair(name: str, value: object) -> tuple[float, float]:
 
 
 def numbers(name: str, value: object, count: int) -> tuple[float, ...]:
-    """So many finite numbers. Raises ValueError."""
+    """Returns a value as ``count`` finite numbers. Raises ValueError."""
     try:
         if isinstance(value, (str, bytes, Mapping)):
             raise TypeError

@@ -29,7 +29,7 @@ log = logging.getLogger("esker.exporting")
 NICENESS: Final = 15
 FILE_BYTES: Final = 4 << 30
 CPU_SECONDS: Final = 4 * 3600
-"""Of all threads together; the server looks at the clock (``run.WALL_SECONDS``)."""
+"""Processor time of all threads together; the server looks at the clock (``run.WALL_SECONDS``)."""
 OPEN_FILES: Final = 1_024
 STEP_SECONDS: Final = 0.1
 EXPECTED_CYCLES: Final = 10

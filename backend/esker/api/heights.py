@@ -38,7 +38,7 @@ class HeightWindow:
 
 
 class Solved(NamedTuple):
-    """What heights of a level follow from, strokes by id; two of the same have the same heights, to the bit."""
+    """Facts that heights of a level follow from, strokes by id. Equal facts have the same heights, to the bit."""
 
     level: int
     settings: tuple[object, ...]
@@ -47,7 +47,7 @@ class Solved(NamedTuple):
 
     @classmethod
     def of(cls, level: int, settings: TerrainSettings, strokes: Sequence[Stroke], base: Base | None) -> Solved:
-        """Of a document."""
+        """Returns the facts of a document's level."""
         shaping = sorted((stroke for stroke in strokes if not is_blank((stroke,))), key=lambda stroke: stroke.id)
         said = settings.size_m, settings.edition, settings.reach_m, settings.border
         return cls(level, said, tuple(shaping), base)

@@ -1,4 +1,4 @@
-"""What a terrain without a server solved last, and the detail on it: they serve again while nothing has changed."""
+"""The last solve of a terrain without a server, and the detail on it: they serve again while nothing has changed."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from esker.synthesis.detailed import Detail, DetailedTerrain
 
 
 class Source(NamedTuple):
-    """What the ground of a terrain follows from.
+    """Facts that the ground of a terrain follows from.
 
     span_m: lowest and highest sample of the elevation layers, metres; None without any.
     """

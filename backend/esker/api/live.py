@@ -125,7 +125,7 @@ class LiveTerrain(LiveLayers, LiveHistory, LiveHeights):
 
     @property
     def role(self) -> c.Role:
-        """What this link allows."""
+        """The role that this link gives."""
         return self._role
 
     @property
@@ -165,7 +165,7 @@ class LiveTerrain(LiveLayers, LiveHistory, LiveHeights):
 
     @property
     def ground(self) -> StreamedGround:
-        """What the server streams. Raises RuntimeError unless connected with ``ground=True``."""
+        """The ground that the server streams. Raises RuntimeError unless connected with ``ground=True``."""
         if self._ground is None:
             raise RuntimeError("connect with ground=True to take the ground that the server streams")
         return self._ground

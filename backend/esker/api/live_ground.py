@@ -25,7 +25,7 @@ Heights = NDArray[np.float32]
 
 
 class StreamedGround:
-    """What the server has sent and not taken back. All public methods may be called from any thread.
+    """The tiles that the server has sent and not taken back. All public methods may be called from any thread.
 
     Heights, their base and amplitude in metres, roughness 0..1, survey in levels, paint of the other channels -1..1;
     float32, [row, col], row 0 south. Heights are those of the ground as it is drawn: offsets by strokes plus the base.

@@ -28,7 +28,7 @@ GRID_SECONDS: Final = 120.0
 ARRIVES_SECONDS: Final = 15.0
 """Time for the op of a finished import to come over the socket."""
 ARRAY_ANSWERS: Final[Mapping[str, str]] = {"rows": "south first", "nodata": "none"}
-"""What holds of arrays: row 0 is in the south, and what is no data is NaN."""
+"""Answers that hold of arrays: row 0 is in the south, and what is no data is NaN."""
 
 
 class Grids:

@@ -59,7 +59,7 @@ def main(argv: list[str]) -> int:
 def _options(
     kind: type[Options], options: argparse.Namespace, names: tuple[str, ...], formats: tuple[str, ...], otherwise: str
 ) -> Options | None:
-    """What was said of a map or a solid; None where nothing was. Raises ValueError."""
+    """Returns the options of a map or a solid that were given; None where none were. Raises ValueError."""
     said = {name: value for name in names if (value := getattr(options, name)) is not None}
     if not said:
         return None

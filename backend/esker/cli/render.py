@@ -92,7 +92,7 @@ def _sun(text: str) -> tuple[float, float]:
 
 
 def _check(options: argparse.Namespace) -> None:
-    """What must be right before the long part begins. Raises ValueError."""
+    """Checks all that must be right before the long part begins. Raises ValueError."""
     output: Path = options.output
     if not options.tau > 0:
         raise ValueError("The screen error is above 0 pixels.")

@@ -29,7 +29,7 @@ PLAIN_SECONDS = 2.0
 """Where nobody watches, a line as often as this while a long level is under way."""
 BAR = 24
 MOST_SAMPLES = 1 << 29
-"""Of a window: 2 GiB of heights; a tenth of it with detail, whose attributes are ten more of them."""
+"""Samples of a window: 2 GiB of heights. With detail a tenth as many, since its attributes are ten times as much."""
 
 
 BaseOf = Callable[[Document, bytes], Base | None]
@@ -123,7 +123,7 @@ def _writable(what: str, path: Path, suffixes: Sequence[str]) -> None:
 
 
 class _Terrain(NamedTuple):
-    """What is to be solved, on what ground."""
+    """The strokes to be solved, and the ground below them."""
 
     document: Document
     base: Base | None
@@ -139,7 +139,7 @@ def _read(path: Path, base_of: BaseOf) -> _Terrain:
 
 
 class Progress:
-    """What a person sees while a solve runs: one line that changes on a terminal, plain lines elsewhere.
+    """The progress of a solve for a person: one line that changes on a terminal, plain lines elsewhere.
 
     ``done`` counts in cycles of the finest level: a preview of a level l costs 4^(l - top) of one. How many cycles a
     scene takes is known only when it is at rest, so the bar slows down where more than EXPECTED_CYCLES are needed.

@@ -153,7 +153,7 @@ DEFAULT_COURSE_GRADE: Final = 0.08
 """Steepest grade of a new road, as a tangent: what lorries climb."""
 MIN_COURSE_GRADE: Final = 0.005
 MAX_POINTS_PER_TERRAIN: Final = 500_000
-"""Of its strokes together, and again of its tombstones: everybody who comes in is sent them all."""
+"""Points of a terrain's strokes together, and again of its tombstones: everybody who comes in is sent them all."""
 MAX_POINTS_PER_APPEND: Final = 256
 MAX_MESSAGE_BYTES: Final = 64 * 1024
 MAX_OPS_PER_SECOND: Final = 120

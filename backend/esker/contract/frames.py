@@ -107,7 +107,7 @@ CODER_LIMIT: Final = 1 << 32
 CODER_MAX_BYTES: Final = 1 << 18
 """More than any tile takes: 4,225 times 35 decisions of at most 11 bits, and 30 bits, are 219 KB."""
 CODER_SURE: Final = 32
-"""Of 65,536: no decision is held for more certain than that."""
+"""No decision is held for more certain than this share of 65,536."""
 CODER_SLOWEST: Final = 255
 """Decisions after which a probability goes on learning at the same rate."""
 

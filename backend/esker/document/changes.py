@@ -1,4 +1,4 @@
-"""What an op changed, field by field: the memory of undo (``undo.py``). Twin of ``frontend/src/doc/changes.ts``."""
+"""The changes of an op, field by field, which undo remembers (``undo.py``). Twin of ``frontend/src/doc/changes.ts``."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ WORDS: Final[dict[Kind, dict[str, str]]] = {"stroke": STROKE_WORDS, "layer": LAY
 
 @dataclass(frozen=True)
 class ItemChange:
-    """What one step of mine did to a stroke or a layer.
+    """One step's changes of a stroke or a layer.
 
     ``content`` is the stroke or layer as I left it when it came to life or died.
     """
@@ -126,7 +126,7 @@ def _joined(earlier: Mapping[str, ItemChange], later: Mapping[str, ItemChange]) 
 
 
 def changes(op: Op, before: StrokeSet, after: StrokeSet) -> Changes:
-    """What ``op`` changed between the two documents, field by field."""
+    """Returns the changes between the two documents that ``op`` made, field by field."""
     out = Changes({}, {})
     for part in op.ops if isinstance(op, c.Group) else (op,):
         if isinstance(part, c.SetTerrain):

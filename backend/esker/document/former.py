@@ -64,8 +64,8 @@ def read_document(text: str | bytes) -> c.Document:
 
 
 def _pieces(text: str) -> Iterator[tuple[str, int | None, str]]:
-    """What a document consists of: the text of each item of its long lists with the list's name and the item's number
-    (-1, without a text, for the beginning of the list), and of everything else with its name and None."""
+    """Yields the parts of a document: the text of each item of its long lists with the list's name and the item's
+    number (-1, without a text, for the beginning of the list), and of everything else with its name and None."""
     scan = json.JSONDecoder().raw_decode
     at = _after(text, 0, "{")
     while text[at] != "}":

@@ -30,7 +30,7 @@ CHANNEL_FIELDS: Final = frozenset({"amplitude_m", "roughness", "paint"})
 
 
 class _Bounds(NamedTuple):
-    """What was found of a stroke, and the very stroke of which it is true."""
+    """Bounds that were found of a stroke, and the very stroke of which they are true."""
 
     stroke: Stroke
     box: CurveBox | None
@@ -51,11 +51,11 @@ class StrokeSet:
     heights_rev: int = field(default_factory=revision, compare=False, repr=False)
     """Revision of what the heights follow from. A successor has the same exactly when nothing of that changed."""
     channels_rev: int = field(default_factory=revision, compare=False, repr=False)
-    """The same of what the other channels follow from: amplitude, roughness, paint, and where strokes lie."""
+    """Revision of what the other channels follow from: amplitude, roughness, paint, and where strokes lie."""
     paint_rev: int = field(default_factory=revision, compare=False, repr=False)
-    """The same of paint alone."""
+    """Revision of paint alone."""
     layers_rev: int = field(default_factory=revision, compare=False, repr=False)
-    """The same of what the base under the strokes follows from: the visible layers, but for what is told of them."""
+    """Revision of what the base under the strokes follows from: the visible layers, without their names and credits."""
     _rects: dict[str, _Bounds] = field(default_factory=dict, compare=False, repr=False)
     """Bounds of strokes as last seen: a cache that successors share."""
     _points: int = field(default=-1, compare=False, repr=False)

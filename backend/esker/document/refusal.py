@@ -50,7 +50,7 @@ def trim(tombstones: dict[str, c.Stroke] | dict[str, c.Layer], most: int) -> Non
 
 
 def trim_points(tombstones: dict[str, c.Stroke], most: int) -> None:
-    """The same above ``most`` points of all of them together."""
+    """Forgets the oldest tombstones above ``most`` points of all of them together."""
     held = sum(len(stroke.curve) for stroke in tombstones.values())
     while held > most:
         held -= len(tombstones.pop(next(iter(tombstones))).curve)

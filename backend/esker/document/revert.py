@@ -18,8 +18,8 @@ LARGE_CURVE_POINTS = 1_024
 
 
 class Reverter(ABC):
-    """What strokes and layers have in common: appends to ``ops`` what takes the change back, and to ``skipped`` what
-    was left alone, a sentence each."""
+    """Takes one change back, for strokes and layers: appends to ``ops`` what takes the change back, and to
+    ``skipped`` what was left alone, a sentence each."""
 
     kind: Kind
 

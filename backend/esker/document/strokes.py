@@ -65,7 +65,7 @@ def level_curve(points: Points, first: Vec3, last: Vec3) -> tuple[CurvePoint, ..
 
 
 def misfit(stroke: Stroke) -> str | None:
-    """What is wrong with the fields of a stroke of its kind, for a person; None when nothing is."""
+    """Returns a sentence about what is wrong with the fields of a stroke of its kind; None when nothing is."""
     if (stroke.kind == "paint") != (stroke.paint is not None):
         return "A paint stroke needs 'paint' (channel, value, radius), and only a paint stroke."
     if (stroke.kind == "course") != (stroke.course is not None):

@@ -44,7 +44,7 @@ class SyncDoc:
 
     @property
     def confirmed(self) -> StrokeSet:
-        """What the server has. Raises Refusal before the first welcome."""
+        """The document that the server has. Raises Refusal before the first welcome."""
         if self._confirmed is None:
             raise Refusal("unavailable", "The terrain is still loading.")
         return self._confirmed

@@ -26,7 +26,7 @@ DEFAULT_DEPTH: Final = 500
 
 @dataclass(frozen=True)
 class UndoPlan:
-    """What to submit, in order, and what was left alone: a sentence each. Nothing to submit: nothing was undone."""
+    """Ops to submit, in order, and a sentence for each thing that was left alone. Without ops nothing was undone."""
 
     ops: tuple[Op, ...]
     skipped: tuple[str, ...]

@@ -92,7 +92,7 @@ ONLY_MAPS: Final = "Only contour maps (.pdf, .svg) have paper, a scale and an in
 ONLY_SOLIDS: Final = "Only solids (.stl) have a width, a base and an exaggeration."
 ONLY_MASKS: Final = "Only masks (.zip) can be made to sum to one."
 PLAIN_SECONDS, DETAIL_SECONDS, START_SECONDS = 0.4, 1.0, 3.0
-"""Of processor time: of a million samples without and with detail, and of the process (docs/exporting.md)."""
+"""Processor time of a million samples without and with detail, and of the process's start (docs/exporting.md)."""
 FALLEN: Final = {"solving": (0.0, 0.3), "detail": (0.3, 0.9), "writing": (0.9, 1.0)}
 
 

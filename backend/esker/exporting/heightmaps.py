@@ -58,7 +58,7 @@ def write_png(path: Path, ground: Ground) -> None:
 
 
 def write_r16(path: Path, ground: Ground) -> None:
-    """The same numbers alone, without a header, and beside them ``hints`` as JSON. Raises OSError."""
+    """Writes the quantised numbers alone, without a header, and beside them ``hints`` as JSON. Raises OSError."""
     quantised(ground.heights).tofile(path)
     path.with_suffix(".json").write_text(json.dumps(hints(ground), indent=2) + "\n", encoding="utf-8")
 

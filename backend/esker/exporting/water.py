@@ -16,7 +16,7 @@ Float = NDArray[np.float64]
 def under_water(
     heights: NDArray[np.float32], u: Float, v: Float, lakes: Lakes | None, sea_m: float | None
 ) -> NDArray[np.bool_]:
-    """Which samples of ``heights`` (rows, columns), metres, lie under the sea or in a lake.
+    """Returns which samples of ``heights`` (rows, columns), metres, lie under the sea or in a lake.
 
     ``u`` (columns,), ``v`` (rows,): where they lie in the lattice of the lakes, in its samples. A lake ends where
     ``inside_lake`` of shaders/wgsl/lakes.wgsl does; where two meet in a cell the higher one counts.

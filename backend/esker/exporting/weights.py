@@ -13,11 +13,11 @@ from esker.exporting.ground import WHOLE, Ground, Mask
 ON_TOP: Final = ("water", "snow", "forest", "grass", "wetness")
 """Masks, what lies over the others first. Wetness is ground that nothing covers and that is wet."""
 BARE: Final = "ground"
-"""What none of them covers: earth, or rock where it is steep."""
+"""The mask of ground that no other mask covers: earth, or rock where it is steep."""
 
 
 def weighted(ground: Ground) -> Ground:
-    """The same ground with masks that sum to 255 at every sample, ``BARE`` among them. Without masks, itself."""
+    """Returns the ground with masks that sum to 255 at every sample, ``BARE`` among them. Without masks, itself."""
     return replace(ground, masks=weights(ground.masks)) if ground.masks else ground
 
 

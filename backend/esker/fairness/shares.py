@@ -215,7 +215,7 @@ class Places:
 
 @dataclass(frozen=True)
 class Rate:
-    """So many a second, and so many saved up."""
+    """A rate: tokens a second, and tokens that can be saved up."""
 
     per_second: float
     burst: float

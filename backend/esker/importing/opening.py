@@ -1,4 +1,4 @@
-"""Which format a file is of, told by its first bytes, and opening it."""
+"""Opens a file in the format that its first bytes show."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ EARTH_M: Final = (-12_000.0, 9_500.0)
 GAP_SHARE: Final = 0.5
 """A value that stands apart from all others by more than this share of their range may be none of them."""
 LOW_GAP_SHARE: Final = 0.1
-"""The same for zero and for negative codes: ground comes down to its lowest values little by little."""
+"""This share is enough for zero and for negative codes: ground comes down to its lowest values little by little."""
 MIN_ZERO_SHARE: Final = 1e-3
 DECIMETRE: Final = 0.1
 EIGHT_BIT_STEP_M: Final = 4.0

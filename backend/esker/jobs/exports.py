@@ -34,9 +34,9 @@ OPEN_IN_ROOM: Final = 4
 KEPT_SECONDS: Final = 10 * 60.0
 """How long a file, or why there is none, can be asked for."""
 KEPT_BYTES: Final = 1 << 30
-"""Of all files together; the oldest go."""
+"""Bytes of all files together; the oldest go."""
 SPARE_BYTES: Final = 64 << 20
-"""Of the disk, left free beside an export."""
+"""Bytes of the disk that an export leaves free."""
 STEM: Final = 48
 OVER: Final = frozenset({"done", "failed", "cancelled"})
 WAITING: Final = "Waiting for its turn."
@@ -71,7 +71,7 @@ class Job:
     terrain: str
     link: Link
     person: str
-    """Of whom one export at a time is taken."""
+    """The person, of whom one export at a time is taken."""
     wanted: ExportRequest
     folder: Path
     status: ExportStatus

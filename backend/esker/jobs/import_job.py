@@ -53,11 +53,11 @@ class Job:
     id: str
     file: str
     person: str
-    """Of whom one import at a time is taken."""
+    """The person, of whom one import at a time is taken."""
     link: Link | None
-    """By which it is brought in; None until there is a terrain."""
+    """The link by which the file is brought in; None until there is a terrain."""
     client: str
-    """In whose name the layer is added."""
+    """The client in whose name the layer is added."""
     work: Path
     place: Place
     """Of those that the server has; with who brings the file in."""
@@ -83,7 +83,7 @@ class Job:
 
     @property
     def link_id(self) -> str:
-        """Of ``link``; empty without one."""
+        """The id of ``link``; empty without one."""
         return "" if self.link is None else self.link.id
 
     def status(self) -> ImportStatus:

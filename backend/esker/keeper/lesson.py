@@ -1,4 +1,4 @@
-"""Which terrain a start prints, and in which words (DESIGN 13)."""
+"""The terrain that a start prints, and the words for it (DESIGN 13)."""
 
 from __future__ import annotations
 

@@ -30,8 +30,8 @@ _SYSTEMS: Final[dict[str, tuple[int, tuple[int, ...], dict[str, int]]]] = {
 rt_tgsigqueueinfo, process_vm_readv and process_vm_writev, which are refused; and of calls that a process may do to
 itself alone."""
 _NEVER: Final = (424, 425, 434, 438)
-"""The same on all processors: pidfd_send_signal, io_uring_setup (which makes sockets without ``socket``), pidfd_open
-and pidfd_getfd."""
+"""Numbers of calls that are the same on all processors: pidfd_send_signal, io_uring_setup (which makes sockets
+without ``socket``), pidfd_open and pidfd_getfd."""
 
 
 def known() -> bool:

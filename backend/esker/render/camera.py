@@ -60,7 +60,7 @@ class Camera:
         return math.tan(math.radians(self.fov_deg) / 2)
 
     def sized(self, width: int, height: int) -> Camera:
-        """The same view on a picture of another size."""
+        """Returns the view on a picture of another size."""
         return replace(self, width=width, height=height)
 
 
@@ -91,7 +91,8 @@ def eye_projection(camera: Camera) -> Floats:
 
 
 def reversed_depth(m: Floats) -> Floats:
-    """The same (4, 4) with depth from w at the near plane to 0 at the far one: floats hold it equally well."""
+    """Returns the matrix (4, 4) with depth from w at the near plane to 0 at the far one: floats hold it equally
+    well."""
     out = m.copy()
     out[2] = m[3] - m[2]
     return out

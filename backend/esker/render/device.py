@@ -34,7 +34,8 @@ def open_context() -> moderngl.Context:
             f"Pictures need OpenGL 4.3 by EGL, and there is none here ({reason}). "
             "On Debian: apt install libegl1 libgl1-mesa-dri."
         ) from error
-    # What Python drops is freed when its own context is current: objects of two contexts have the same numbers.
+    # An object that Python drops is freed when its own context is current: objects of two contexts have the same
+    # numbers.
     context.gc_mode = "context_gc"
     return context
 

@@ -19,7 +19,8 @@ OVERLAYS: Final[dict[str, int]] = {"none": 0, "contours": 1, "slope": 2, "patche
 
 
 class LookFigures(NamedTuple):
-    """Of a look: number in view.wgsl, exposure, optical depth of the haze across the domain, strength of contours."""
+    """Figures of a look: number in view.wgsl, exposure, optical depth of the haze across the domain, strength of
+    contours."""
 
     number: int
     exposure: float

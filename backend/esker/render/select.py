@@ -43,8 +43,8 @@ class Figures(Protocol):
         """Finest level that can be drawn."""
 
     def bounds(self, level: int, nodes: Ints) -> tuple[Floats, Floats, Floats]:
-        """Of (n, 2) patches (column, row): lowest and highest ground of them and all below, and the largest distance,
-        metres, between a patch as drawn and what is below it (0: nothing is)."""
+        """Returns of (n, 2) patches (column, row): lowest and highest ground of them and all below, and the largest
+        distance, metres, between a patch as drawn and what is below it (0: nothing is)."""
 
 
 @dataclass(frozen=True)
@@ -67,8 +67,10 @@ class Cut:
     split: Split
 
     def within(self, camera: Camera, planes: Floats, foot_m: float) -> NDArray[np.bool_]:
-        """Which patches may be seen inside ``planes`` (``frustum``). On the domain's border the ground reaches down to
-        ``foot_m``."""
+        """Returns which patches may be seen inside ``planes`` (``frustum``).
+
+        On the domain's border the ground reaches down to ``foot_m``.
+        """
         near, far = self.near - np.array(camera.eye), self.far - np.array(camera.eye)
         near[self.border != 0, 2] = np.minimum(near[self.border != 0, 2], foot_m - camera.eye[2])
         far[self.wet, 2] = np.maximum(far[self.wet, 2], self.water[self.wet] - camera.eye[2])
@@ -90,7 +92,7 @@ def frustum(m: Floats) -> Floats:
 
 
 def _touching(planes: Floats, near: Floats, far: Floats) -> NDArray[np.bool_]:
-    """Which boxes, (n, 3) corners relative to the eye, are not wholly outside one of the planes."""
+    """Returns which boxes, (n, 3) corners relative to the eye, are not wholly outside one of the planes."""
     inside = np.ones(len(near), dtype=np.bool_)
     for plane in planes:
         furthest = np.where(plane[:3] > 0, far, near)
@@ -164,7 +166,7 @@ class _Walk:
         )
 
     def _boxes(self, table: Ints) -> tuple[NDArray[np.bool_], Floats, Floats, Floats]:
-        """Which patches are wet, the boxes of all, and how high water may stand on them."""
+        """Returns which patches are wet, the boxes of all, and how high water may stand on them."""
         near, far, water = np.empty((len(table), 3)), np.empty((len(table), 3)), np.empty(len(table))
         for level in np.unique(table[:, 0]):
             here = table[:, 0] == level

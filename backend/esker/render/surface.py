@@ -26,7 +26,7 @@ SLOT: Final = TILE_SAMPLES + 2 * BORDER
 RATIOS: Final = {"landscape": 0.5, "smooth": 0.25, "plain": 0.25}
 """Likely error of a level that is not made yet, in that of the one above it (tiles/detail/synthetic.ts)."""
 FALL: Final = 2.0 ** -H_RANGE[0]
-"""What a level may add falls by this at least: for bounds."""
+"""A level adds at most this share of what its parent adds: for bounds."""
 
 Tile = tuple[int, int, int]
 """Level, column, row."""

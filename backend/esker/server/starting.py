@@ -27,7 +27,7 @@ SEND_BUFFER: Final = 256 * 1024
 HEAD_BYTES: Final = 16 * 1024
 HEAD_SECONDS: Final = 5.0
 AT_ONCE: Final = 200
-"""So many requests are read at the same time. Further ones are hung up on, and the page asks again."""
+"""Requests that are read at the same time. Further ones are hung up on, and the page asks again."""
 TICK: Final = 0.2
 """Seconds between pictures of the moving line."""
 DIALS: Final = "|/-\\"
@@ -265,8 +265,8 @@ class _Line:
 class Stopping:
     """A handler of signals that stop a program, before the server handles them itself.
 
-    ``system.on_stop(stopping)`` installs it.     It raises Interrupted wherever the main thread is, and remembers that it did: a library may turn that exception into
-    one of its own (pydantic does, while a model is made), or drop it.
+    ``system.on_stop(stopping)`` installs it. It raises Interrupted wherever the main thread is, and remembers that it
+    did: a library may turn that exception into one of its own (pydantic does, while a model is made), or drop it.
     """
 
     def __init__(self) -> None:

@@ -182,7 +182,7 @@ class ChannelSolver:
         channels: Iterable[Channel] = BASES,
         base: Base | None = None,
     ) -> Iterator[tuple[Channel, Levels]]:
-        """The same for some channels, with levels 0..``level`` of each; what did not change since the last time are
+        """Yields some channels, with levels 0..``level`` of each. Channels that did not change since the last time are
         the same arrays. ``asked``: ``channel_targets.contributors`` of the strokes."""
         return (found for found in self.making(asked, settings, channels, base) if found is not None)
 

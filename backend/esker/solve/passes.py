@@ -79,7 +79,7 @@ class Workspace(Protocol):
 
 
 class Job(NamedTuple):
-    """What is to be solved. ``base``: see ``Basis``, on the device that solves."""
+    """The strokes, settings and base to be solved. ``base``: see ``Basis``, on the device that solves."""
 
     strokes: Sequence[Stroke]
     settings: TerrainSettings

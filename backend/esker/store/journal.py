@@ -294,7 +294,7 @@ class Journal:
         return [Row(*row) for row in cursor]
 
     def steps(self, terrain: str, after: int, upto: int | None = None) -> list[Row]:
-        """The same with a row for every clock: one that changes nothing (``SILENT``) where a gesture was folded.
+        """Returns a row for every clock: one that changes nothing (``SILENT``) where a gesture was folded.
 
         Raises DamagedTerrain when ops of a folded stretch are missing.
         """

@@ -53,7 +53,7 @@ QUANTA: Final = {
 
 
 class Maker(Protocol):
-    """What makes samples: ``kernels.Kernels``, or the twin."""
+    """A maker of samples: ``kernels.Kernels``, or the twin."""
 
     def detail(self, site: Site, window: Window) -> Samples: ...
 

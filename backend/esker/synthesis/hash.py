@@ -44,5 +44,5 @@ def low(words: Words, dtype: DTypeLike) -> NDArray[np.floating]:
 
 
 def high(words: Words, dtype: DTypeLike) -> NDArray[np.floating]:
-    """The same of the high half."""
+    """Uniform in (-1, 1) and symmetric, from the high half of each word."""
     return (words >> np.uint32(16)).astype(dtype) * 2.0**-15 - (1.0 - 2.0**-16)

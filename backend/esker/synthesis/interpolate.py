@@ -88,7 +88,7 @@ def along_x(z: Array, taps: Taps, parent: Window, child: Window) -> Array:
 
 
 def along_y(z: Array, taps: Taps, parent: Window, child: Window) -> Array:
-    """The same along columns. ``z``: (rows of ``parent``, any)."""
+    """Interpolates along columns, as ``along_x`` does along rows. ``z``: (rows of ``parent``, any)."""
     across = Window(parent.level, 0, z.shape[1], parent.r0, parent.r1)
     return along_x(z.T, taps, across, Window(child.level, 0, z.shape[1], child.r0, child.r1)).T
 

@@ -39,7 +39,7 @@ LAUNCH: Final = np.dtype(
 
 
 class ClDevice(Protocol):
-    """What is used of an opened OpenCL device."""
+    """The part of an opened OpenCL device that the synthesis uses."""
 
     @property
     def context(self) -> Any: ...
@@ -63,7 +63,7 @@ class Kernels:
         self._kernel = cl.Kernel(program, "synthesise")
 
     def detail(self, site: Site, window: Window) -> Samples:
-        """The same as ``subdivide.detail``, in float32."""
+        """Computes what ``subdivide.detail`` does, in float32."""
         cl, flags = self._cl, self._cl.mem_flags
         first, *rest = chain(window)
         samples = root(site, first)

@@ -139,7 +139,7 @@ class Site:
 
     @property
     def relief_m(self) -> float:
-        """What elevations are shares of, metres."""
+        """The height that elevations are shares of, metres."""
         return relief_m(self.size_m, self.lat_deg, 0.0 if self.ground_m is None else self.ground_m[1] - self.zero_m)
 
     @property
@@ -149,7 +149,7 @@ class Site:
 
     @property
     def shore_m(self) -> float:
-        """What the elevation of wet shores is a share of, metres."""
+        """The height that the elevation of wet shores is a share of, metres."""
         return shore_m(self.size_m, self.lat_deg)
 
     @property

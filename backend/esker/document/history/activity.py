@@ -21,7 +21,7 @@ Action = Literal[
 ]  # fmt: skip
 Turn = Literal["", "undo", "redo"]
 Key = tuple[str, str, str]
-"""What a change is of: "stroke", "layer" or "terrain"; which; which field. The field "alive" is of being there."""
+"""The thing that a change is of: "stroke", "layer" or "terrain"; its id; the field. The field "alive": being there."""
 
 MERGE_SECONDS: Final = 60.0
 """Changes of the same thing by the same person within this time are one entry."""

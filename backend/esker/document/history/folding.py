@@ -1,4 +1,4 @@
-"""Which operations of a history can go because a later one of the same gesture says it all. Pure.
+"""Finds the operations of a history that can go because a later one of the same gesture says it all. Pure.
 
 A pen sends its curve again with every move, a handle its place, a slider its value: a row of operations by one person,
 of the same field of the same thing, of which only the last counts once the gesture is over. ``fold`` keeps the last of
@@ -169,7 +169,7 @@ def _key(op: Op) -> Hashable:
 
 
 def _subjects(op: Op) -> frozenset[str]:
-    """What an operation is done to."""
+    """Returns the thing that an operation changes."""
     match op:
         case c.Group():
             return frozenset[str]().union(*(_subjects(part) for part in op.ops))

@@ -54,7 +54,7 @@ def steep_cells(solved: Grid, interval_m: float) -> NDArray[np.bool_]:
 
 
 def _sides(above: NDArray[np.bool_]) -> dict[str, NDArray[np.bool_]]:
-    """Which of a cell's four sides a line crosses."""
+    """Returns which of a cell's four sides a line crosses."""
     sw, se, nw, ne = above[:-1, :-1], above[:-1, 1:], above[1:, :-1], above[1:, 1:]
     return {"south": sw != se, "north": nw != ne, "west": sw != nw, "east": se != ne}
 

@@ -138,7 +138,8 @@ def open_raster(path: Path, driver: str, band: int = 1) -> GdalSource:
 
 
 def _interpretation(dataset: Any) -> tuple[ColorInterp, ...]:
-    """What the bands are for; undefined where PROJ's complaint about an odd coordinate system comes up here."""
+    """Returns the purpose of the bands; undefined where PROJ's complaint about an odd coordinate system comes up
+    here."""
     try:
         return tuple(dataset.colorinterp)
     except CPLE_BaseError:

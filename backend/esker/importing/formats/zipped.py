@@ -33,7 +33,7 @@ MAX_MEMBERS: Final = 256
 MAX_MEMBER_BYTES: Final = 1 << 30
 COPY_BYTES: Final = 1 << 20
 MAX_TEXT_BYTES: Final = 1 << 16
-"""Of what lies beside a grid."""
+"""Bytes of a text file beside a grid."""
 
 
 def extract(archive: zipfile.ZipFile, info: zipfile.ZipInfo, to: Path, limit: int) -> Path:

@@ -42,7 +42,7 @@ class Georef:
         return x, y
 
     def with_crs(self, crs: pyproj.CRS | None) -> Georef:
-        """The same coordinates in another system."""
+        """Returns the coordinates, taken to be of another system."""
         return Georef(crs, self.affine, self.xs, self.ys)
 
     def looks_like_degrees(self, rows: int, cols: int) -> bool:

@@ -23,9 +23,9 @@ from esker.solve.solver import Solver
 BESIDE_SUN_DEG: Final = 55.0
 ELEVATION_DEG: Final = 16.0
 DISTANCE: Final = 0.78
-"""From the middle, in sides of the domain."""
+"""Distance of the eye from the middle, in sides of the domain."""
 SIGHT_HEIGHT: Final = 0.3
-"""Of the middle of the picture, in the relief."""
+"""Height of the middle of the picture, as a share of the relief."""
 
 
 @cache

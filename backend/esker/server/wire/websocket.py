@@ -49,7 +49,7 @@ _TWO_BYTES, _EIGHT_BYTES = 126, 127
 
 
 class WebSocketProtocol(WebSocketsSansIOProtocol):
-    """What an application finds as ``scope["esker.socket"]``, beside ASGI's ``receive`` and ``send``."""
+    """The object that an application finds as ``scope["esker.socket"]``, beside ASGI's ``receive`` and ``send``."""
 
     _listener: Callable[[str | bytes], None] | None = None
     _account: Account | None = None

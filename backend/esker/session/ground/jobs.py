@@ -11,7 +11,8 @@ from esker.session.ground.ports import Base
 
 @dataclass(frozen=True)
 class Job:
-    """What to solve: the strokes at a document's ``clock``, with revisions of what its ground follows from.
+    """One request for the solver: the strokes at a document's ``clock``, with revisions of what the ground follows
+    from.
 
     heights_rev, channels_rev, paint_rev: those of the document (``StrokeSet``). layers_rev: of ``base``, the ground
     under the strokes; 0 without one. number: of two jobs the newer one has the greater number. A clock goes back where

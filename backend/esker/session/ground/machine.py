@@ -1,4 +1,4 @@
-"""What follows on what in the ground of one room: ``next(ground, event, now)`` gives the ground after it, and effects.
+"""The transitions of the ground of one room: ``next(ground, event, now)`` gives the ground after it, and effects.
 
 Nothing here computes, waits or sends: ``worker.py`` carries the effects out, in their order.
 """

@@ -1,4 +1,4 @@
-"""What the solver's thread does when a solve fails: again, coarser, later, or on another device (DESIGN 8, 16).
+"""Ways on for the solver's thread when a solve fails: again, coarser, later, or on another device (DESIGN 8, 16).
 
 A device is left only when it fails on a scene of the solver's own: one terrain must not take it from all others. What
 cannot be computed is a fault of its job, which is tried again twice and then waits for a change of its document.

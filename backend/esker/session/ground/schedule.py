@@ -1,4 +1,4 @@
-"""Whose turn it is on the solver (DESIGN 8): rooms that wait for a first coarse preview, finer previews, settling, and
+"""Turns of rooms on the solver (DESIGN 8): rooms that wait for a first coarse preview, finer previews, settling, and
 refinement, in this order; in turn within each, a slice at a time. Finer previews are finished one after the other,
 the smallest terrains first: interleaved, all of them would come late.
 
@@ -43,7 +43,7 @@ def default_budget() -> int:
 
 @dataclass(frozen=True)
 class Used:
-    """What one room had of the solver's time.
+    """Time of the solver that one room had.
 
     turn: number of its last slice, where slices of all rooms are counted. began: number of the slice at which its solve
     began. ran_at: when it had its last slice, or began to wait. seconds: how long it had, when it is
@@ -61,9 +61,11 @@ class Used:
 
 @dataclass(frozen=True)
 class Tally(Generic[Room]):
-    """What all rooms had. budget: bytes for their solves. turns: slices so far. least: the least time used of
-    the rooms that were busy at the last choice. favoured: the room that was chosen out of turn, and the next one not
-    before ``favour_after``."""
+    """Time of the solver that all rooms had.
+
+    budget: bytes for their solves. turns: slices so far. least: the least time used of the rooms that were busy at the
+    last choice. favoured: the room that was chosen out of turn, and the next one not before ``favour_after``.
+    """
 
     budget: int
     rooms: Mapping[Room, Used] = field(default_factory=dict)

@@ -100,7 +100,7 @@ class Channels:
 
 @dataclass(frozen=True)
 class Shown:
-    """What people have been shown.
+    """The ground that people have been shown.
 
     heights: ``Job.heights`` and finest level of what is settled; None while that is nobody's. clock: of the job whose
     heights those are, or will be. base: ``layers_rev`` and finest level of the base that was shown whole; a terrain

@@ -1,4 +1,4 @@
-"""What waits to be sent to one client (DESIGN 8, "Flow control").
+"""Texts that wait to be sent to one client (DESIGN 8, "Flow control").
 
 Control texts are queued and never dropped; a client that lets more than ``MAX_BACKLOG_BYTES`` pile up is closed and
 resumes. Tile frames are not queued at all: one is made when the queue is empty and the byte window is open, so it

@@ -1,4 +1,4 @@
-"""What a link to look is shown of a terrain: what is there, and neither what was deleted nor who drew it (decision 39).
+"""A terrain as a link to look shows it: all that is there, without what was deleted and who drew it (decision 39).
 
 A viewer's document has no tombstones but of what was deleted while the viewer was here. So a stroke that is brought
 back comes as a stroke that begins, to every viewer who was not here when it was deleted.

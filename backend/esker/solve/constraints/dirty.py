@@ -1,4 +1,4 @@
-"""Which bins an edit inside one stroke can change (DESIGN 5.5): those that its changed part reaches, before or after.
+"""Finds the bins that an edit inside one stroke can change (DESIGN 5.5): its changed part reaches them before or after.
 
 What a sample gets depends on its nearest crest point and what the tables say there. So segments that both versions of
 an outline have, and stretches of a profile that are the same in both, keep the bits of all samples nearest to them.

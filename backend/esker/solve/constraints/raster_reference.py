@@ -94,7 +94,7 @@ def rasterise(tables: Tables, base: NDArray[np.floating] | None = None) -> Const
 
 
 def rasterise_channel(tables: Tables, base: NDArray[np.floating] | None = None) -> tuple[Floats, Floats, Floats]:
-    """What the strokes say of the tables' channel, as a difference from its base (DESIGN 5.4).
+    """Targets of the strokes for the tables' channel, as a difference from its base (DESIGN 5.4).
 
     d: stiffness; f: stiffness times value; its cover, that of a value of 1; all of shape ``tables.shape``. As far as a
     sample is known, screening pulls to its value too, and not to the base. Where strokes meet they come to a mean that

@@ -232,7 +232,7 @@ def skirt(b: Flanks, reach_m: float | None) -> Skirt:
 
 @dataclass
 class Band:
-    """What a stroke asks of samples: targets with their weights and how far they count (``reference_raster``).
+    """A stroke's targets at samples, with their weights and how far they count (``reference_raster``).
 
     follows: how far the gradient is that of the ground, base included; quiet: how far the bank of a course takes the
     springs of all strokes away.
@@ -260,7 +260,7 @@ def nearness(b: Flanks, tables: Tables) -> Floats:
 
 
 def cross_section(near: Nearest, inside: Mask, params: Floats, tables: Tables) -> Band:
-    """What one stroke wants at samples whose nearest crest point is known (DESIGN 5.2)."""
+    """Targets of one stroke at samples whose nearest crest point is known (DESIGN 5.2)."""
     s, decay = tables.spacing_m, 1 / tables.exit_length_m
     b = flanks_of(near, inside, params, s)
     apron = skirt(b, tables.reach_m)

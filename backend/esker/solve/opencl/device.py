@@ -226,7 +226,8 @@ def _asked_level() -> None:
 
 
 def kernels_for(device: Any) -> Kernels:
-    """Which kernels a pyopencl device gets: tiles for all but CPUs, if they fit it, unless ESKER_KERNELS says."""
+    """Returns the kind of kernels for a pyopencl device: tiles for all but CPUs, if they fit, unless ESKER_KERNELS
+    says."""
     import pyopencl as cl
 
     wanted = _asked_kernels() or ("rows" if device.type & cl.device_type.CPU else "tiles")

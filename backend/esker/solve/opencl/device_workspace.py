@@ -41,7 +41,7 @@ class DeviceSystem(multigrid.System, Protocol):
 
 
 class OverBase:
-    """What a workspace over a base holds on the device: the base at the finest level, the share of the guidance that is
+    """Memory of a workspace over a base on the device: the base at the finest level, the share of the guidance that is
     the ground's own, what strokes want above the base, and the right-hand side of the heights without what is owed to
     the base."""
 

@@ -71,7 +71,8 @@ class Launcher(Queue):
         self._enqueue(self.once(name, args), size)
 
     def again(self, name: str, size: tuple[int, ...], *args: Any, last: tuple[Any, ...] = ()) -> None:
-        """The same, for arguments that come again: setting them takes longer than most launches, so they are kept.
+        """Enqueues a kernel with arguments that come again. They are kept, as setting them takes longer than most
+        launches.
 
         ``last``: arguments behind them that change, and are set every time.
         """

@@ -29,9 +29,9 @@ log = logging.getLogger("esker.compaction")
 PIECE: Final = 500
 """Clocks of a stretch: so many ops are read, and at most so many removed in one commit."""
 FOLD_AFTER: Final = 7 * 86_400.0
-"""What was done so many seconds ago is folded."""
+"""Operations are folded when they are this old, seconds."""
 CROWDED_AFTER: Final = 3_600.0
-"""The same for a terrain whose history takes more than half of what it may."""
+"""Operations of a terrain whose history takes more than half of what it may are folded when they are this old."""
 ROUND_SECONDS: Final = 60.0
 """How long one round folds; the next one goes on where it ended."""
 

@@ -15,7 +15,7 @@ from esker.store.row import Row
 
 
 class MissingOps(Exception):
-    """Of a folded stretch not as many ops are there as were kept."""
+    """A folded stretch has fewer ops than were kept."""
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""Which CPU PoCL 3.0 compiles for, and which library of built-in functions goes with it.
+"""The CPU that PoCL 3.0 compiles for, and the library of built-in functions that goes with it.
 
 The PoCL wheel carries LLVM 14 (2022). It compiles kernels for the processor's *name*, as LLVM 14 knows it, and links
 one of eight libraries by the processor's *flags*. The two can disagree: LLVM 14 calls Zen 4 ``znver3``, which has no
@@ -49,7 +49,7 @@ NAMES: Final = tuple(level.name for level in LEVELS)
 
 @dataclass(frozen=True)
 class Choice:
-    """What PoCL is to compile for.
+    """The CPU that PoCL is to compile for.
 
     ``rename``: the name to give PoCL's device, None where it has this name already. ``forced``: whether PoCL itself
     would link another library than the level's.
