@@ -78,6 +78,8 @@ def test_what_was_deleted_is_gone_after_the_grace(tmp_path: Path) -> None:
                 db.execute("INSERT INTO previews VALUES (?,?,1)", (terrain, terrain)),
                 db.execute("INSERT INTO grids VALUES (?,?)", (terrain, "0" * 64)),
                 db.execute("INSERT INTO folds VALUES (?,?,?,?)", (terrain, 500, 1, 500)),
+                db.execute("INSERT INTO lessons VALUES (?,?)", (terrain, "{}")),
+                db.execute("INSERT INTO makers VALUES (?,?,?)", (terrain, "s", "c")),
                 db.execute("INSERT INTO folded_ids VALUES (?,?,?,?,?)", (terrain, "c", 1, 2, 2)),
             ]
         ).result()

@@ -205,7 +205,7 @@ FORMATS = sorted((Path(__file__).parents[1] / "databases").glob("format-*.sql"))
 
 
 def test_every_released_format_is_here() -> None:
-    assert [path.stem for path in FORMATS] == ["format-1", "format-2", "format-5"]
+    assert [path.stem for path in FORMATS] == ["format-1", "format-2", "format-5", "format-6"]
 
 
 @pytest.mark.parametrize("path", FORMATS, ids=lambda path: str(path.stem))
@@ -262,7 +262,9 @@ def test_what_a_killed_restore_left_does_not_spoil_the_next(tmp_path: Path) -> N
     db.execute("BEGIN")
     db.execute("DELETE FROM ops")
     count = "WITH RECURSIVE k(n) AS (SELECT 1 UNION ALL SELECT n + 1 FROM k WHERE n < 500)"
-    db.execute(f"INSERT INTO people {count} SELECT 't', n, hex(randomblob(2000)), '' FROM k")
+    db.execute(
+        f"INSERT INTO people (terrain, client, name, colour) {count} SELECT 't', n, hex(randomblob(2000)), '' FROM k"
+    )
     killed = {path.name: path.read_bytes() for path in tmp_path.glob(f"{DATABASE_NAME}.part*")}
     db.close()
     assert f"{part.name}-journal" in killed

@@ -61,7 +61,7 @@ MESSAGE_BYTES: Final = c.MAX_MESSAGE_BYTES - 1024
 MAX_CURVE_POINTS: Final = 1_024
 """A longer curve is sent by appends: one message does not hold it."""
 BACKOFF_SECONDS: Final = (0.2, 10.0)
-FINAL_CODES: Final = frozenset(code for code in c.WS_CLOSE.values() if code <= 4008 or code == 4011)
+FINAL_CODES: Final = frozenset(code for code in c.WS_CLOSE.values() if code <= 4008 or code in (4011, 4012))
 CONNECT_SECONDS: Final = 15.0
 LOST: Final = (OSError, ConnectionClosed, InvalidHandshake, InvalidMessage, TimeoutError, Diverged, FrameError)
 """After these the client connects again."""

@@ -15,5 +15,6 @@ from esker.contract.document import *  # noqa: F403
 from esker.contract.operations import *  # noqa: F403
 from esker.contract.imports import *  # noqa: F403
 from esker.contract.exports import *  # noqa: F403
+from esker.contract.lesson import *  # noqa: F403
 from esker.contract.messages import *  # noqa: F403
 from esker.contract.frames import *  # noqa: F403

@@ -176,6 +176,8 @@ UNSEEN: Final = {
 }  # fmt: skip
 """Characters, by the first of a range its last, that names lose: controls, what turns the direction of text around, and
 what takes no room. What joins letters and emoji (U+200C, U+200D) stays. Tabs and line ends become spaces."""
+MAX_PEOPLE: Final = 200
+"""People that one message of a conductor may name."""
 MAX_OPS_PER_MESSAGE: Final = 256
 MAX_OPS_PER_GROUP: Final = 64
 DOMAIN_MARGIN: Final = 10.0

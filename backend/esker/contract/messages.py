@@ -9,8 +9,9 @@ from pydantic import Field, StringConstraints, TypeAdapter
 from esker.contract.constants import DEFAULT_TAU_PX, MAX_OPS_PER_MESSAGE
 from esker.contract.document import Document
 from esker.contract.imports import ImportStatus
+from esker.contract.lesson import Conduct, Lesson, Notice, People
 from esker.contract.operations import CloseCode, Op, OpEnvelope, OrderedOp, RejectCode
-from esker.contract.values import Clock, Colour, Id, Name, OpId, Role, Secret, Token, Vec3, Wire
+from esker.contract.values import Clock, Colour, Id, Name, OpId, Role, Secret, Ticket, Token, Vec3, Wire
 
 # --- messages: client to server ---------------------------------------------------------------------------------
 
@@ -29,6 +30,8 @@ class Hello(Wire):
     client: Id
     token: Token | None = None
     """What a ``welcome`` gave this client id: without it nobody comes again under an id that was used."""
+    ticket: Ticket | None = None
+    """What a ``welcome`` gave this device for this terrain: with it the device is the same person again."""
     name: Name = ""
     colour: Colour | None = None
     clock: Clock | None = None
@@ -92,7 +95,9 @@ class Ping(Wire):
     t: float
 
 
-ClientMessage = Annotated[Hello | Ops | View | Presence | Credit | Rename | Seek | Ping, Field(discriminator="type")]
+ClientMessage = Annotated[
+    Hello | Ops | View | Presence | Credit | Rename | Seek | Ping | Conduct | People, Field(discriminator="type")
+]
 
 
 # --- messages: server to client ---------------------------------------------------------------------------------
@@ -103,6 +108,11 @@ class Member(Wire):
     name: Name
     colour: Colour
     role: Role
+    person: Id = "-"
+    """Who it is, the same over reloads of the page."""
+    conducts: bool = False
+    pen: bool = False
+    """Whether they may draw while hands are off."""
 
 
 class Welcome(Wire):
@@ -114,6 +124,8 @@ class Welcome(Wire):
     client: Id
     token: str
     """To be shown in the next ``hello`` of this client id. It is bound to the link."""
+    ticket: str = ""
+    """To be kept by the device, for this terrain, and shown in every ``hello``: a secret."""
     role: Role
     colour: Colour
     levels: int
@@ -125,6 +137,7 @@ class Welcome(Wire):
     ops: tuple[OrderedOp, ...] | None = None
     members: tuple[Member, ...]
     device: str
+    lesson: Lesson | None = None
 
 
 class Ack(Wire):
@@ -196,6 +209,8 @@ class ErrorMessage(Wire):
     code: CloseCode
     message: str
     fatal: bool
+    ticket: str = ""
+    """With the code ``removed``: of who may be let in; to be kept as that of a ``welcome``."""
 
 
 class Pong(Wire):
@@ -213,7 +228,18 @@ class Importing(Wire):
 
 
 ServerMessage = Annotated[
-    Welcome | Ack | Reject | OpsBroadcast | Members | PresenceBroadcast | Progress | ErrorMessage | Pong | Importing,
+    Welcome
+    | Ack
+    | Reject
+    | OpsBroadcast
+    | Members
+    | PresenceBroadcast
+    | Progress
+    | ErrorMessage
+    | Pong
+    | Importing
+    | Lesson
+    | Notice,
     Field(discriminator="type"),
 ]
 

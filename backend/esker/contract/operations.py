@@ -163,6 +163,8 @@ RejectCode = Literal[
     "too_many_layers",
     "server_only",
     "view_only",
+    "hands_off",
+    "protected",
     "rate_limited",
     "too_large",
     "unavailable",
@@ -180,6 +182,7 @@ CloseCode = Literal[
     "slow_client",
     "rate_limited",
     "bad_origin",
+    "removed",
     "server_error",
     "shutting_down",
 ]
@@ -196,7 +199,8 @@ WS_CLOSE: Final[dict[str, int]] = {
     "slow_client": 4009,
     "rate_limited": 4010,
     "bad_origin": 4011,
+    "removed": 4012,
     "server_error": 4500,
     "shutting_down": 4501,
 }
-"""Websocket close codes. 4000..4008 and 4011 are final for the page; it reconnects after any other."""
+"""Websocket close codes. 4000..4008, 4011 and 4012 are final for the page; it reconnects after any other."""

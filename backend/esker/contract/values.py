@@ -38,6 +38,7 @@ OpId = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_-]{1,40}:[0-9]{1,1
 Name = Annotated[str, StringConstraints(max_length=MAX_NAME_LENGTH), AfterValidator(plain)]
 Secret = Annotated[str, StringConstraints(min_length=1, max_length=128)]
 Token = Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{1,16}\.[0-9a-f]{64}$")]
+Ticket = Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{1,16}-[0-9a-f]{16}\.[0-9a-f]{64}$")]
 Line = Annotated[str, StringConstraints(max_length=240), AfterValidator(plain)]
 Colour = Annotated[str, StringConstraints(pattern=r"^#[0-9a-f]{6}$")]
 Clock = Annotated[int, Field(ge=0, le=2**53)]
@@ -51,6 +52,7 @@ Look = Literal["natural", "alpine", "desert", "paper"]
 Rule = Literal["landscape", "smooth", "plain"]
 Role = Literal["owner", "edit", "view"]
 Which = Literal["first", "last"]
+Animals = Literal["", "en", "de"]
 
 
 class Wire(BaseModel):

@@ -11,6 +11,7 @@ from typing import Any, Protocol
 from esker import contract as c
 from esker.contract import ImportStage, ImportStatus
 from esker.fairness.shares import Place
+from esker.session.room.entry import Caller
 from esker.store.access import Link
 
 
@@ -62,6 +63,8 @@ class Job:
     place: Place
     """Of those that the server has; with who brings the file in."""
     terrain: str = ""
+    caller: Caller | None = None
+    """Who brings it in, as a lesson knows them; None: a lesson has no say."""
     hold: bool = False
     """Whether it waits for answers even where it asks nothing."""
     stage: ImportStage = "upload"

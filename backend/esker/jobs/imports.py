@@ -18,7 +18,9 @@ from esker.fairness.shares import Full, Places, Share, Who
 from esker.importing.refusal import ImportCancelled, ImportRefused
 from esker.jobs.import_job import Importer, Job, clean_name
 from esker.patchwork.lod.precedence import default_priority
+from esker.session.lesson.rules import HANDS_OFF
 from esker.session.room.core import Denied
+from esker.session.room.entry import Caller
 from esker.session.room.hub import Hub
 from esker.session.room.turns import Turns
 from esker.store.access import Link
@@ -41,6 +43,9 @@ CONVERTED: Final = 0.97
 """Shares of the work that are done after each part."""
 ROUNDS: Final = 12
 """How often an import asks at most: answers may be wrong, or raise other questions."""
+HANDS_SECONDS: Final = 1.0
+"""A file that is ready while hands are off is laid when they are on again: that is looked for so often."""
+SETTINGS: Final = c.SetTerrain(fields=c.TerrainFields())
 ENDED: Final = "The link by which this file came was revoked."
 STOP: Final = "stop"
 """The answer that ends an import (``importing.questions``)."""
@@ -82,12 +87,15 @@ class Imports:
         client: str,
         who: Who,
         hold: bool = False,
+        caller: Caller | None = None,
     ) -> ImportStatus:
-        """Takes a file for a terrain; the import goes on by itself (``hold``: once it is answered). Raises Cannot."""
+        """Takes a file for a terrain; the import goes on by itself (``hold``: once it is answered).
+
+        ``caller``: whom a lesson must let change the terrain when it is laid. Raises Cannot."""
         await self._check_terrain(terrain, who)
         self._hub.demand(link)
         job = self._begin(name, person, link, client, who)
-        job.terrain, job.hold = terrain, hold
+        job.terrain, job.hold, job.caller = terrain, hold, caller
         await self._receive(job, body, length)
         self._demand(job)
         self._go_on(job)
@@ -361,6 +369,11 @@ class Imports:
         """Stores the raster, then has the room add the layer."""
         await asyncio.to_thread(self._grids.keep, job.work / "raster", layer.content)
         room = await self._hub.room(job.terrain)
+        while job.caller is not None and not room.core.lesson.draws(job.caller):
+            self._demand(job)
+            self._at(job, "saving", CONVERTED, HANDS_OFF)
+            await asyncio.sleep(HANDS_SECONDS)
+            room = await self._hub.room(job.terrain)
         head = room.core.head
         others = (*head.layers.values(), *head.deleted_layers.values())
         named = layer.model_copy(
@@ -372,7 +385,8 @@ class Imports:
         )
         op: c.Op = c.AddLayer(layer=named)
         place = self._importer.suggest_place(job.report) if job.report is not None else None
-        if named.facts.geo and head.settings.place is None and place is not None:
+        settings = job.caller is None or room.core.lesson.refusal(job.caller, SETTINGS) is None
+        if settings and named.facts.geo and head.settings.place is None and place is not None:
             op = c.Group(ops=(c.SetTerrain(fields=c.TerrainFields(place=place)), c.AddLayer(layer=named)))
         self._demand(job)  # nothing is waited for between this and the op
         mine = job.client and room.core.belongs(job.client, job.link_id)

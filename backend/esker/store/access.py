@@ -25,6 +25,8 @@ T = TypeVar("T")
 CODE_SECONDS: Final = 15 * 60
 CODE_LIFE_SECONDS: Final = 10 * 3600
 """A code can be prolonged for as long as a day at school takes; then another one must be made."""
+JOINED_BY_CODE: Final = "Joined by code"
+"""The name of a link that a join code made: it is one device's."""
 CODE_LENGTH: Final = 6
 CODES_TO_GUESS: Final = 10**8
 """There are so many codes for each that lives: codes are longer when many do."""

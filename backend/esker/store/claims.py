@@ -52,6 +52,22 @@ class Claims:
         text = f"{terrain}\0{client}\0{link}\0{since}"
         return f"{since:x}.{hmac.new(self._key, text.encode(), hashlib.sha256).hexdigest()}"
 
+    def ticket(self, terrain: str) -> str:
+        """A new ticket of a terrain: whoever shows it is one person, whatever their client id and link."""
+        return self._ticket(terrain, f"{self.now():x}-{secrets.token_hex(8)}")
+
+    def _ticket(self, terrain: str, who: str) -> str:
+        text = f"ticket\0{terrain}\0{who}"
+        return f"{who}.{hmac.new(self._key, text.encode(), hashlib.sha256).hexdigest()}"
+
+    def holder(self, ticket: str | None, terrain: str) -> tuple[str, int] | None:
+        """Returns the id of the person who has a ticket of this server's, and when it was given; else None."""
+        who = (ticket or "").partition(".")[0]
+        if ticket is None or not hmac.compare_digest(self._ticket(terrain, who), ticket):
+            return None
+        since, _, nonce = who.partition("-")
+        return f"p{nonce}", int(since, 16)
+
     def since(self, token: str | None, terrain: str, client: str, link: str) -> int | None:
         """Returns when the id was claimed, if the token is one of this server's for it; else None."""
         try:

@@ -27,7 +27,7 @@ from esker.document.former import read_document, read_op
 from esker.document.history.folding import SILENT, UNLIMITED, silent
 from esker.document.ops import Refusal, StrokeSet
 from esker.document.wire import op_json
-from esker.store import timestamps
+from esker.store import lessons, timestamps
 from esker.store.row import Row as Row
 from esker.store.row import ordered_json as ordered_json
 from esker.store.space import NoSpace, Space
@@ -151,12 +151,18 @@ class Journal:
                 self._timestamps.note(db, terrain, rows[0].clock, self._now())
             if people:
                 timestamps.keep(db, terrain, people)
+            if made := [(thing, row.author) for row in rows for thing in lessons.begun(row.op)]:
+                lessons.keep_makers(db, terrain, made)
             if digests := [digest for row in rows for digest in contents(row.op)]:
                 name_grids(db, terrain, digests)
             if snapshot is not None:
                 put_snapshot(db, snapshot)
 
         return self.submit(write)
+
+    def keep_lesson(self, terrain: str, state: str) -> Future[None]:
+        """Keeps how the lesson of a terrain stands. Fails with Unwritable."""
+        return self.submit(lambda db: lessons.keep_state(db, terrain, state))
 
     def _make_room(self, db: sqlite3.Connection, terrain: str, more: int) -> None:
         """Counts ``more`` characters of operations. Raises NoSpace, HistoryFull."""
@@ -279,6 +285,13 @@ class Journal:
         )
         found = row.fetchone()
         return folds.find(self.reader(), terrain, client, counter) if found is None else int(found[0])
+
+    def first_by(self, terrain: str, clients: Sequence[str]) -> int | None:
+        """Clock of the first op of which one of these clients is the author; None where there is none."""
+        marks = ",".join("?" * len(clients))
+        sql = f"SELECT min(clock) FROM ops WHERE terrain=? AND author IN ({marks})"
+        found = self.reader().execute(sql, (terrain, *clients)).fetchone()
+        return None if found[0] is None else int(found[0])
 
     def newest(self, terrain: str) -> int:
         """Clock of the terrain's last op; 0 where there is none."""

@@ -1,8 +1,9 @@
 """When ops were done and by whom: what the history needs beside the journal's ops (docs/decisions/0021-history.md).
 
 ``moments`` (terrain, clock, at): ops from ``clock`` on were committed at ``at``, or at most TIMESTAMP_SECONDS later,
-until the next row; a second of drawing is one row. ``people`` (terrain, client, name, colour): how an author of ops was
-last called there. A journal from before these tables has ops without a time, by authors without a name.
+until the next row; a second of drawing is one row. ``people`` (terrain, client, name, colour, person, conducts): how an
+author of ops was last called there, who that was over reloads of the page, and whether they conducted a lesson. A
+journal from before these tables has ops without a time, by authors without a name.
 """
 
 from __future__ import annotations
@@ -20,6 +21,9 @@ class Person(NamedTuple):
     client: str
     name: str
     colour: str
+    person: str = ""
+    """Who it was, the same over reloads of the page; empty where that was not written down."""
+    conducts: bool = True
 
 
 class Timestamps:
@@ -41,7 +45,7 @@ class Timestamps:
 
 def keep(db: sqlite3.Connection, terrain: str, people: Iterable[Person]) -> None:
     """Stores what these people are called now."""
-    db.executemany("INSERT OR REPLACE INTO people VALUES (?,?,?,?)", ((terrain, *person) for person in people))
+    db.executemany("INSERT OR REPLACE INTO people VALUES (?,?,?,?,?,?)", ((terrain, *person) for person in people))
 
 
 def read_timestamps(db: sqlite3.Connection, terrain: str, after: int, upto: int) -> list[tuple[int, float]]:
@@ -56,5 +60,8 @@ def read_timestamps(db: sqlite3.Connection, terrain: str, after: int, upto: int)
 
 def read_people(db: sqlite3.Connection, terrain: str) -> dict[str, Person]:
     """Everybody who is the author of an op of the terrain, by client."""
-    rows = db.execute("SELECT client, name, colour FROM people WHERE terrain=?", (terrain,))
-    return {str(row[0]): Person(*map(str, row)) for row in rows}
+    rows = db.execute("SELECT client, name, colour, person, conducts FROM people WHERE terrain=?", (terrain,))
+    return {
+        str(client): Person(str(client), str(name), str(colour), person or "", conducts is None or bool(conducts))
+        for client, name, colour, person, conducts in rows
+    }

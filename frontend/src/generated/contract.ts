@@ -190,6 +190,8 @@ export const UNSEEN = {
   65529: 65531,
 } as const;
 
+export const MAX_PEOPLE = 200 as const;
+
 export const MAX_OPS_PER_MESSAGE = 256 as const;
 
 export const MAX_OPS_PER_GROUP = 64 as const;
@@ -226,6 +228,7 @@ export const WS_CLOSE = {
   slow_client: 4009,
   rate_limited: 4010,
   bad_origin: 4011,
+  removed: 4012,
   server_error: 4500,
   shutting_down: 4501,
 } as const;
@@ -589,7 +592,9 @@ export type ClientMessage =
   | Credit
   | Rename
   | Seek
-  | Ping;
+  | Ping
+  | Conduct
+  | People;
 
 export type ServerMessage =
   | Welcome
@@ -601,7 +606,9 @@ export type ServerMessage =
   | Progress
   | ErrorMessage
   | Pong
-  | Importing;
+  | Importing
+  | Lesson
+  | Notice;
 
 export type StrokeKind =
   | "profile"
@@ -674,6 +681,8 @@ export type RejectCode =
   | "too_many_layers"
   | "server_only"
   | "view_only"
+  | "hands_off"
+  | "protected"
   | "rate_limited"
   | "too_large"
   | "unavailable";
@@ -690,6 +699,7 @@ export type CloseCode =
   | "slow_client"
   | "rate_limited"
   | "bad_origin"
+  | "removed"
   | "server_error"
   | "shutting_down";
 
@@ -1020,6 +1030,46 @@ export interface ExportStatus {
   spacing_m: number;
 }
 
+export interface Conduct {
+  type: "conduct";
+  hands_off: boolean | null;
+  protect: boolean | null;
+  hide: boolean | null;
+  animals: "" | "en" | "de" | null;
+  look: boolean | null;
+  held: boolean | null;
+}
+
+export interface People {
+  type: "people";
+  action: "pen" | "no_pen" | "conductor" | "no_conductor" | "remove" | "let_in" | "undo";
+  people: string[];
+}
+
+export interface Outsider {
+  person: string;
+  name: string;
+}
+
+export interface Notice {
+  type: "notice";
+  text: string;
+}
+
+export interface Lesson {
+  type: "lesson";
+  hands_off: boolean;
+  protect: boolean;
+  hide: boolean;
+  animals: "" | "en" | "de";
+  look: string | null;
+  held: boolean;
+  draws: boolean;
+  conducts: boolean;
+  removed: Outsider[];
+  waiting: Outsider[];
+}
+
 export interface Hello {
   type: "hello";
   protocol: number;
@@ -1027,6 +1077,7 @@ export interface Hello {
   secret: string;
   client: string;
   token?: string | null;
+  ticket?: string | null;
   name?: string;
   colour?: string | null;
   clock?: number | null;
@@ -1083,6 +1134,9 @@ export interface Member {
   name: string;
   colour: string;
   role: "owner" | "edit" | "view";
+  person: string;
+  conducts: boolean;
+  pen: boolean;
 }
 
 export interface Welcome {
@@ -1091,6 +1145,7 @@ export interface Welcome {
   server: string;
   client: string;
   token: string;
+  ticket: string;
   role: "owner" | "edit" | "view";
   colour: string;
   levels: number;
@@ -1100,6 +1155,7 @@ export interface Welcome {
   ops: OrderedOp[] | null;
   members: Member[];
   device: string;
+  lesson: Lesson | null;
 }
 
 export interface Ack {
@@ -1111,7 +1167,7 @@ export interface Ack {
 export interface Reject {
   type: "reject";
   id: string;
-  code: "malformed" | "unknown_stroke" | "duplicate_stroke" | "deleted_stroke" | "locked_stroke" | "too_many_strokes" | "too_many_points" | "out_of_domain" | "bad_index" | "bad_field" | "unknown_layer" | "duplicate_layer" | "deleted_layer" | "too_many_layers" | "server_only" | "view_only" | "rate_limited" | "too_large" | "unavailable";
+  code: "malformed" | "unknown_stroke" | "duplicate_stroke" | "deleted_stroke" | "locked_stroke" | "too_many_strokes" | "too_many_points" | "out_of_domain" | "bad_index" | "bad_field" | "unknown_layer" | "duplicate_layer" | "deleted_layer" | "too_many_layers" | "server_only" | "view_only" | "hands_off" | "protected" | "rate_limited" | "too_large" | "unavailable";
   message: string;
 }
 
@@ -1152,9 +1208,10 @@ export interface Progress {
 
 export interface ErrorMessage {
   type: "error";
-  code: "bad_protocol" | "bad_hello" | "bad_secret" | "revoked" | "no_terrain" | "room_full" | "too_large" | "malformed" | "slow_client" | "rate_limited" | "bad_origin" | "server_error" | "shutting_down";
+  code: "bad_protocol" | "bad_hello" | "bad_secret" | "revoked" | "no_terrain" | "room_full" | "too_large" | "malformed" | "slow_client" | "rate_limited" | "bad_origin" | "removed" | "server_error" | "shutting_down";
   message: string;
   fatal: boolean;
+  ticket: string;
 }
 
 export interface Pong {

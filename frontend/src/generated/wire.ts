@@ -46,6 +46,19 @@ export const WIRE_MODELS: Readonly<Record<string, WireModel>> = {
     },
     may: {},
   },
+  Conduct: {
+    must: {
+      type: { oneOf: ["conduct"] },
+    },
+    may: {
+      hands_off: { nullable: { bool: true } },
+      protect: { nullable: { bool: true } },
+      hide: { nullable: { bool: true } },
+      animals: { nullable: { oneOf: ["", "en", "de"] } },
+      look: { nullable: { bool: true } },
+      held: { nullable: { bool: true } },
+    },
+  },
   Course: {
     must: {
       use: { oneOf: ["river", "road", "ridge"] },
@@ -125,6 +138,7 @@ export const WIRE_MODELS: Readonly<Record<string, WireModel>> = {
     },
     may: {
       token: { nullable: { matches: "^[0-9a-f]{1,16}\\.[0-9a-f]{64}$" } },
+      ticket: { nullable: { matches: "^[0-9a-f]{1,16}-[0-9a-f]{16}\\.[0-9a-f]{64}$" } },
       name: { text: [0, 80] },
       colour: { nullable: { matches: "^#[0-9a-f]{6}$" } },
       clock: { nullable: { integer: [0, 9007199254740992] } },
@@ -198,6 +212,14 @@ export const WIRE_MODELS: Readonly<Record<string, WireModel>> = {
       channel: { oneOf: ["roughness", "amplitude", "snow", "grass", "forest", "wetness"] },
       value: { number: [-1, 1] },
       radius_m: { number: [0, 655360] },
+    },
+    may: {},
+  },
+  People: {
+    must: {
+      type: { oneOf: ["people"] },
+      action: { oneOf: ["pen", "no_pen", "conductor", "no_conductor", "remove", "let_in", "undo"] },
+      people: { list: { matches: "^[A-Za-z0-9_-]{1,40}$" }, length: [1, 200] },
     },
     may: {},
   },
@@ -356,6 +378,6 @@ export const WIRE_MODELS: Readonly<Record<string, WireModel>> = {
 };
 
 export const WIRE_UNIONS = {
-  ClientMessage: ["Hello", "Ops", "View", "Presence", "Credit", "Rename", "Seek", "Ping"],
+  ClientMessage: ["Hello", "Ops", "View", "Presence", "Credit", "Rename", "Seek", "Ping", "Conduct", "People"],
   Op: ["BeginStroke", "AppendPoints", "FinishStroke", "SetStroke", "MoveAnchor", "DeleteStroke", "RestoreStroke", "SetTerrain", "AddLayer", "SetLayer", "DeleteLayer", "RestoreLayer", "Group"],
 };

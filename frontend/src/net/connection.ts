@@ -52,6 +52,7 @@ const SENTENCES: Readonly<Record<CloseCode, string>> = {
   malformed: "The server did not understand this page. Reload it.",
   slow_client: "The connection was too slow to keep up.",
   rate_limited: "This page sent too much at once.",
+  removed: "You were sent out of this terrain. Ask whoever leads it to let you in.",
   bad_origin: "This page does not come from the server that it talks to.",
   server_error: "The server had a problem.",
   shutting_down: "The server is restarting.",
@@ -68,11 +69,13 @@ const SERVER_TYPES: ReadonlySet<string> = new Set<ServerMessage["type"]>([
   "error",
   "pong",
   "importing",
+  "lesson",
+  "notice",
 ]);
 
 /** After these codes the same page would only be refused again (contract, WS_CLOSE). */
 function isFinal(code: number): boolean {
-  return (code >= 4000 && code <= 4008) || code === 4011;
+  return (code >= 4000 && code <= 4008) || code === 4011 || code === 4012;
 }
 
 export class Connection {

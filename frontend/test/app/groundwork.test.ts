@@ -62,6 +62,8 @@ function open(layers: Layer[] = []): void {
   const document = { ...EMPTY, layers };
   doc.welcome({
     type: "welcome",
+    ticket: "",
+    lesson: null,
     token: "",
     protocol: PROTOCOL_VERSION,
     levels: 4,

@@ -30,6 +30,8 @@ function welcome(doc: Document): Welcome {
   return {
     ...{
       type: "welcome",
+      ticket: "",
+      lesson: null,
       token: "",
       protocol: PROTOCOL_VERSION,
       server: "",

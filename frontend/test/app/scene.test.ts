@@ -41,7 +41,15 @@ function doc(...strokes: Stroke[]): Doc {
   });
 }
 
-const member = (client: string, colour: string): Member => ({ client, colour, name: client, role: "edit" });
+const member = (client: string, colour: string): Member => ({
+  client,
+  colour,
+  name: client,
+  role: "edit",
+  person: "p",
+  conducts: false,
+  pen: false,
+});
 const presence = (client: string, change: Partial<MemberPresence> = {}): MemberPresence => ({
   client,
   cursor: null,

@@ -69,6 +69,8 @@ const { fullStroke } = await import("../../src/doc/document.ts");
 function welcome(role: Role = "owner", change: Partial<Welcome> = {}): Welcome {
   return {
     type: "welcome",
+    ticket: "",
+    lesson: null,
     token: "",
     protocol: PROTOCOL_VERSION,
     server: "0.1.0",
@@ -219,9 +221,9 @@ describe("a session", () => {
   it("forgets a secret that the server refuses, and no other", () => {
     say(welcome());
     expect(recentTerrains(localStorage)).toHaveLength(1);
-    say({ type: "error", code: "slow_client", message: "Too slow.", fatal: true });
+    say({ type: "error", code: "slow_client", message: "Too slow.", fatal: true, ticket: "" });
     expect(recentTerrains(localStorage)).toHaveLength(1);
-    say({ type: "error", code: "revoked", message: "This link has been revoked.", fatal: true });
+    say({ type: "error", code: "revoked", message: "This link has been revoked.", fatal: true, ticket: "" });
     expect(recentTerrains(localStorage)).toEqual([]);
   });
 
@@ -262,7 +264,15 @@ describe("a session", () => {
   it("keeps the presence of those who are here only", () => {
     say(welcome());
     const presence = (client: string) => ({ client, cursor: null, tool: "", stroke: null, eye: null, target: null });
-    const member = (client: string) => ({ client, name: client, colour: "#123456", role: "edit" as const });
+    const member = (client: string) => ({
+      client,
+      name: client,
+      colour: "#123456",
+      role: "edit" as const,
+      person: "p",
+      conducts: false,
+      pen: false,
+    });
     say({ type: "members", members: [member("ana"), member("bo")] });
     say({ type: "presences", members: [presence("ana"), presence("bo")] });
     say({ type: "members", members: [member("bo")] });

@@ -104,6 +104,8 @@ export class ServerModel {
     const resume = clock !== null && this.doc.clock - clock <= this.keep;
     return {
       type: "welcome",
+      ticket: "",
+      lesson: null,
       token: "",
       protocol: PROTOCOL_VERSION,
       server: "model",

@@ -55,6 +55,8 @@ beforeEach(() => {
   ];
   doc.welcome({
     type: "welcome",
+    ticket: "",
+    lesson: null,
     token: "",
     protocol: PROTOCOL_VERSION,
     server: "",

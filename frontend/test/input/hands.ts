@@ -37,6 +37,8 @@ export function open(mode: "orbit" | "map" = "orbit", over: Partial<InputOptions
   doc = new SyncDoc("me", () => time);
   doc.welcome({
     type: "welcome",
+    ticket: "",
+    lesson: null,
     token: "",
     protocol: PROTOCOL_VERSION,
     server: "",

@@ -8,7 +8,15 @@ import type { Member, MemberPresence, Op, OpsBroadcast } from "../../src/generat
 import type { EskToasts } from "../../src/ui/controls/toasts.ts";
 import "../../src/ui/controls/toasts.ts";
 
-const member = (client: string, name: string): Member => ({ client, name, colour: "#2b8a3e", role: "edit" });
+const member = (client: string, name: string): Member => ({
+  client,
+  name,
+  colour: "#2b8a3e",
+  role: "edit",
+  person: "p",
+  conducts: false,
+  pen: false,
+});
 const ordered = (author: string, op: Op): OpsBroadcast => ({
   type: "ordered",
   ops: [{ clock: 1, id: `${author}:1`, author, op }],

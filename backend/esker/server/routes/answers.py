@@ -18,6 +18,7 @@ from starlette.requests import ClientDisconnect
 from esker import contract as c
 from esker.errors import Cannot, EskerError
 from esker.fairness.shares import Full, Rates, Who
+from esker.session.lesson.rules import Lesson
 from esker.session.room import viewing
 from esker.session.room.hub import Deleted, Hub
 from esker.store.access import Link
@@ -107,12 +108,14 @@ def asker(connection: Request | WebSocket, link: Link | None = None) -> Who:
     return Who(address(connection), "" if link is None else link.id)
 
 
-def shown(document: c.Document, link: Link, still: Collection[viewing.Key] | None = None) -> c.Document:
+def shown(document: c.Document, link: Link, lesson: Lesson, still: Collection[viewing.Key] | None = None) -> c.Document:
     """Returns what a link may take of a terrain as a whole: one to look takes neither what was deleted nor who drew
-    what.
+    what; while a lesson hides names only owners take these.
 
     ``still``: of an earlier document, what is there now."""
-    return viewing.shown(document, still) if link.role == "view" else document
+    if link.role == "view":
+        return viewing.shown(document, still)
+    return viewing.anonymous(document) if lesson.state.hide and link.role != "owner" else document
 
 
 def limited(request: Request, rates: Rates, what: str, link: Link | None = None) -> None:

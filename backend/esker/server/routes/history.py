@@ -49,9 +49,12 @@ def add_history(app: FastAPI, hub: Hub, grids: GridStore) -> None:
         document = await hub.strokes(terrain, None, who)
         page = await hub.read(who, activity_logs.page, terrain, before, limit)
         hub.demand(link)
-        if link.role == "view":
+        lesson = hub.lesson_of(terrain).state
+        if link.role != "owner" and (lesson.hide or lesson.animals or link.role == "view"):
             room = hub.open_room(terrain)
-            here = {} if room is None else {m.client: m.name for m in room.core.members}
+            here = {} if room is None or lesson.hide else {m.client: m.name for m in room.core.members}
+            if link.role == "edit":
+                return _answer(_without_names(page, here), document)
             return _answer(_without_names(page, here), replace(document, deleted={}, deleted_layers={}))
         return _answer(page, document)
 
@@ -61,7 +64,7 @@ def add_history(app: FastAPI, hub: Hub, grids: GridStore) -> None:
         document = await hub.document(terrain, at, who)
         still = None if at is None else things(await hub.strokes(terrain, None, who))
         # This runs in a thread, stroke by stroke: the framework would encode the document in the event loop, at once.
-        text = await hub.read(who, document_json, shown(document, link, still))
+        text = await hub.read(who, document_json, shown(document, link, hub.lesson_of(terrain), still))
         hub.demand(link)
         return Response(text, media_type="application/json")
 

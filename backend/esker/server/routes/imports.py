@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Final
 
 import numpy as np
 from fastapi import FastAPI, Query, Request, Response
@@ -16,9 +16,12 @@ from esker.jobs import Imports
 from esker.patchwork.raster.rasters import RasterError
 from esker.server.routes.answers import AnyLink, EditorLink, address, asker, limited
 from esker.server.wire.sending import Sent
+from esker.session.lesson.rules import HANDS_OFF
 from esker.session.room.hub import Hub
 from esker.store.grids import GridStore
 
+TICKET_HEADER: Final = "Esker-Ticket"
+"""By which a lesson knows who brings a file in, as by the ticket of a ``hello``."""
 FileName = Annotated[str, Query(max_length=400)]
 ClientId = Annotated[str, Query(max_length=40, pattern=r"^[A-Za-z0-9_-]*$")]
 Digest = Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{64}$")]
@@ -26,7 +29,7 @@ Digest = Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{64}$")]
 
 def add_imports(app: FastAPI, hub: Hub, grids: GridStore, imports: Imports) -> None:
     """Adds the routes."""
-    _add_uploads(app, imports)
+    _add_uploads(app, hub, imports)
     _add_grids(app, hub, grids)
 
     @app.get("/api/terrains/{terrain}/imports/{job}")
@@ -50,7 +53,7 @@ def add_imports(app: FastAPI, hub: Hub, grids: GridStore, imports: Imports) -> N
         await imports.cancel(terrain, job, link)
 
 
-def _add_uploads(app: FastAPI, imports: Imports) -> None:
+def _add_uploads(app: FastAPI, hub: Hub, imports: Imports) -> None:
     @app.post("/api/terrains/from-grid", status_code=201)
     async def from_grid(request: Request, name: FileName = "", client: ClientId = "") -> dict[str, Any]:
         limited(request, app.state.new_terrains, "new terrains came")
@@ -72,6 +75,9 @@ def _add_uploads(app: FastAPI, imports: Imports) -> None:
     ) -> c.ImportStatus:
         limited(request, app.state.imports, "files came")
         person = f"{link.id} {client or address(request)}"
+        caller = hub.caller(link, request.headers.get(TICKET_HEADER), address(request))
+        if not hub.lesson_of(terrain).draws(caller):
+            raise Cannot(403, "hands_off", HANDS_OFF)
         return await imports.upload(
             name,
             person,
@@ -82,6 +88,7 @@ def _add_uploads(app: FastAPI, imports: Imports) -> None:
             client=client,
             who=asker(request, link),
             hold=hold,
+            caller=caller,
         )
 
 

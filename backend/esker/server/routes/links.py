@@ -14,7 +14,7 @@ from esker.contract import Role
 from esker.errors import Cannot
 from esker.server.routes.answers import AnyLink, OwnerLink, asker, limited
 from esker.session.room.hub import Hub
-from esker.store.access import CODE_SECONDS, Ended, Link, OwnLink, SecretTaken, TooManyLinks
+from esker.store.access import CODE_SECONDS, JOINED_BY_CODE, Ended, Link, OwnLink, SecretTaken, TooManyLinks
 
 RENEWED_AFTER: Final = 1.0
 
@@ -152,7 +152,7 @@ def _add_codes(app: FastAPI, hub: Hub) -> None:
             app.state.wrong_codes.take(who, now)
             raise _bad_code()
         try:
-            _, secret = await _new(hub, found.terrain, found.role, "Joined by code", found.link)
+            _, secret = await _new(hub, found.terrain, found.role, JOINED_BY_CODE, found.link)
         except Ended:  # the link that made the code ended in this very moment
             raise _bad_code() from None
         return {"id": found.terrain, "secret": secret, "role": found.role}

@@ -8,7 +8,6 @@ commit fails, ``failed`` forgets the ops and refuses them.
 from __future__ import annotations
 
 import time
-from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -17,47 +16,31 @@ from esker import contract as c
 from esker.contract import CloseCode, RejectCode, Role
 from esker.document.ops import Limits, Refusal, StrokeSet
 from esker.document.wire import op_json
-from esker.errors import EskerError
-from esker.fairness.shares import RANK, Full, Place, Places, Rates, Who
+from esker.fairness.shares import RANK, Full, Place, Places, Rates, Who, homes
+from esker.session.lesson.rules import WAIT, Lesson
+from esker.session.room import protocol
+from esker.session.room.entry import Denied as Denied
+from esker.session.room.entry import Owners
 from esker.session.room.limits import history_rates
 from esker.session.room.members import Member, Members, seats
 from esker.session.room.outbox import Long, Outbox
 from esker.session.room.recent import Recent, encoded, points_of
-from esker.session.room.viewing import Viewing
+from esker.session.room.viewing import Viewing, nameless, unsigned
 from esker.store.claims import Claims
 from esker.store.journal import Loaded, Row
 from esker.store.writing import SNAPSHOT_EVERY
 from esker.version import VERSION
 
 UNSAVED: Final = "The server could not save this change (is its disk full?). It was taken back."
-MOST_OWNERS: Final = 4_096
-"""A room remembers so many owners of client ids, besides those in the journal."""
 HEAVY_BYTES: Final = 256 * 1024
 """Documents that are longer as JSON are sent as one piece of memory to all who come."""
 HEAVY_POINTS: Final = 4_000
 """Documents with more points are encoded outside of the event loop."""
+MOST_AGAINST: Final = protocol.MAX_REFUSED_OPS
+"""The connection is closed after so many ops in a row that the lesson did not allow."""
 SINCE_CHARACTERS: Final = 512 * 1024
 """A heavy document that was encoded is sent to newcomers, and then the ops after it, while these are no more than
 this."""
-
-
-STATUS: Final = {
-    "bad_secret": 403,
-    "revoked": 403,
-    "no_terrain": 404,
-    "rate_limited": 429,
-    "server_error": 500,
-    "shutting_down": 503,
-}
-"""The status that HTTP answers where a route is denied for a reason that also closes sockets."""
-
-
-class Denied(EskerError):
-    """A client that may not come in: the close code and a sentence."""
-
-    def __init__(self, code: CloseCode, message: str) -> None:
-        super().__init__(code, message, STATUS.get(code, 400))
-        self.code: CloseCode = code
 
 
 @dataclass(frozen=True)
@@ -78,16 +61,6 @@ class RoomInfo:
     device: str
 
 
-@dataclass
-class Owner:
-    """The owner of a client id. ``since``: when the id was claimed, milliseconds since 1970; ``heard``: whether
-    anything was said under the id, so that its token is known to have arrived."""
-
-    since: int
-    link: str
-    heard: bool = False
-
-
 class RoomCore:
     """One terrain with its members."""
 
@@ -100,24 +73,26 @@ class RoomCore:
         rates: Rates | None = None,
         now: Callable[[], float] = time.monotonic,
         claims: Claims | None = None,
+        lesson: Lesson | None = None,
     ) -> None:
         """``find``: the clock of an op of (client, counter) that is in the journal already, or None.
 
         ``rates``: characters of operations that a link and an address may send (``history_rates``); ``claims``: tells
-        whose a client id is (default: of whoever comes with it).
+        whose a client id is (default: of whoever comes with it); ``lesson``: its rules (default: nothing is switched).
         """
         self.head = self.document = loaded.document
         self.geometry_clock = loaded.document.clock
         """Clock of the last op that changed the ground."""
         self.base_clock = loaded.document.clock
         """Clock of the last op that changed the ground's elevation layers."""
-        self.members = Members()
+        self.lesson = lesson or Lesson()
+        self.look: str | None = None
+        """The client whose view all follow."""
+        self.members = Members(self.lesson)
         self._find, self._limits, self._seats = find, limits or Limits(), Places(seats(max_members))
         self._rates, self._now = rates or history_rates(), now
         self._counters = dict(loaded.counters)
-        self._claims = claims or Claims()
-        self._owners: OrderedDict[str, Owner] = OrderedDict()
-        """Owners of the client ids that were seen here. The id that was unseen for longest comes first."""
+        self._owners = Owners(loaded.document.id, claims or Claims(), self._counters)
         self._recent, self._viewing = Recent(), Viewing()
         for row in loaded.recent:
             self._recent.add(row.clock, row.ordered_json())
@@ -127,6 +102,8 @@ class RoomCore:
         self._in_flight: list[Row] = []
         self._kept: dict[bool, tuple[int, bytes]] = {}
         """Encoded documents with their clocks. The key says whether they are as links to look are shown them."""
+        self._unsigned: tuple[int, bytes] | None = None
+        """The same without the names of who drew what."""
 
     # --- people -------------------------------------------------------------------------------------------------
 
@@ -140,54 +117,46 @@ class RoomCore:
         address: str = "",
         asked: int | None = None,
     ) -> Member:
-        """Lets a client in and queues its welcome. Raises Denied (room_full, bad_hello).
+        """Lets a client in and queues its welcome. Raises Denied (room_full, bad_hello, removed).
 
         ``asked``: the document's clock when it came (default: now), if it had to wait for a heavy document.
         """
-        owner = self._owner(hello, link)
+        owner, caller = self._owners.owner(hello, link), self._owners.caller(hello, role)
+        kept_out = self.lesson.door(caller, caller.since, homes(address)[0])
+        if kept_out is not None:
+            if kept_out == WAIT:
+                self.lesson.waits(caller.person, hello.name)
+            raise Denied("removed", kept_out, caller.ticket)
         old = self.members.by_client.get(hello.client)
         if old is not None:
             self.members.remove(old)
             old.outbox.close("bad_hello", "This page connected again; the older connection is closed.")
         seat = self._seat(Who(address, link, RANK[role]))
         colour = self.members.colour(hello.colour)
-        member = Member(hello.client, hello.name, colour, role, link, outbox, address, seat)
+        member = Member(
+            hello.client,
+            hello.name,
+            colour,
+            role,
+            link,
+            outbox,
+            address,
+            seat,
+            person=caller.person,
+            ticket=caller.ticket,
+        )
         self.members.add(member)
-        self._owners[hello.client] = owner
-        self._owners.move_to_end(hello.client)
-        while len(self._owners) > MOST_OWNERS:
-            self._owners.popitem(last=False)
+        self._owners.put(hello.client, owner)
         outbox.push(*self._welcome(member, hello.clock, info, asked=asked), counted=False)
         return member
 
-    def _owner(self, hello: c.Hello, link: str) -> Owner:
-        """Returns whose the client id is once this client is in. Raises Denied (bad_hello): somebody else's.
-
-        Who has no token comes under an id that was not used; or under one whose welcome did not arrive, as nothing was
-        heard since. Of two who have one for the same id, it is that of whoever claimed it first.
-        """
-        known = self._owners.get(hello.client)
-        since = self._claims.since(hello.token, self.document.id, hello.client, link)
-        if since is not None:
-            if known is None or since <= known.since:
-                return Owner(since, link, heard=True)
-        elif known is not None:
-            if known.link == link and not known.heard:
-                return Owner(known.since, link)
-        elif hello.client not in self._counters:
-            return Owner(self._claims.now(), link)
-        raise Denied("bad_hello", "Another page has this client id. Reload this page.")
-
     def heard(self, member: Member) -> None:
         """Notes that a member said something, so that its welcome has arrived."""
-        owner = self._owners.get(member.client)
-        if owner is not None and owner.link == member.link:
-            owner.heard = True
+        self._owners.heard(member.client, member.link)
 
     def belongs(self, client: str, link: str) -> bool:
         """Returns whether things may be done in the name of a client id by who came in by this link."""
-        owner = self._owners.get(client)
-        return client not in self._counters if owner is None else owner.link == link
+        return self._owners.belongs(client, link)
 
     def _seat(self, who: Who) -> Place:
         try:
@@ -237,18 +206,22 @@ class RoomCore:
         else:
             now, body = self._usable(view, exact, asked) or self._encode(view)
             member.since = now
+            if not view and self.lesson.nameless(member):
+                body = self._without_names(now, body)
         head = c.Welcome(
             protocol=c.PROTOCOL_VERSION,
             server=f"esker {VERSION}",
             client=member.client,
-            token=self._token(member),
+            token=self._owners.token(member.client, member.link),
+            ticket=member.ticket,
             role=member.role,
             colour=member.colour,
             levels=info.levels,
             finest=info.finest,
             clock=now,
-            members=self.members.public(),
+            members=self.members.public(member),
             device=info.device,
+            lesson=self.told(member),
         ).model_dump_json(exclude={"document", "ops"})
         if missed is not None:
             return (f'{head[:-1]},"document":null,"ops":[{",".join(self._as_seen(member, missed))}]}}',)
@@ -260,6 +233,15 @@ class RoomCore:
             return (text,)
         return text, f'{{"type":"ordered","ops":[{",".join(self._as_seen(member, since))}]}}'
 
+    def _without_names(self, clock: int, body: bytes) -> bytes:
+        if self._unsigned is None or self._unsigned[0] != clock:
+            self._unsigned = clock, unsigned(body)
+        return self._unsigned[1]
+
+    def told(self, member: Member) -> c.Lesson:
+        """How the lesson stands, as a member may know it."""
+        return self.lesson.told(member, self.look)
+
     def _looks(self, member: Member) -> bool:
         """Returns whether a member is shown what a link to look shows."""
         return member.role == "view"
@@ -267,11 +249,9 @@ class RoomCore:
     def _as_seen(self, member: Member, ordered: list[tuple[int, str]]) -> list[str]:
         if self._looks(member):
             return self._viewing.texts(ordered, member.since)
+        if self.lesson.nameless(member):
+            return [nameless(text) for _, text in ordered]
         return [text for _, text in ordered]
-
-    def _token(self, member: Member) -> str:
-        since = self._owners[member.client].since
-        return self._claims.token(self.document.id, member.client, member.link, since)
 
     def _usable(self, view: bool, exact: bool = False, asked: int | None = None) -> tuple[int, bytes] | None:
         """Returns the encoded document with its clock, if it is still good for a client that came when the clock was
@@ -341,21 +321,34 @@ class RoomCore:
             sentence = "Far more came than a pen draws. Slow down and send it again."
             self.refuse(member, envelope.id, "rate_limited", sentence)
             return False
+        refused = self.lesson.refusal(member, envelope.op)
+        if refused is not None:
+            self._against(member, envelope.id, *refused)
+            return False
+        member.refused = 0
+        signed = self.lesson.signed(member, member.name, envelope.op)
         try:
-            self._order(envelope.op, text, client, counter, client)
+            self._order(signed, text if signed is envelope.op else op_json(signed), client, counter, client)
         except Refusal as refusal:
             self.refuse(member, envelope.id, refusal.code, refusal.message)
             return False
         return True
 
-    def perform(self, op: c.Op, agent: str, author: str) -> int:
-        """Orders an op of the server's own, the first and only one of ``agent``; returns its clock. Raises Refusal.
+    def _against(self, member: Member, op_id: str, code: RejectCode, message: str) -> None:
+        """Refuses an op that the lesson does not let this member do; a page knows that, so who goes on is closed."""
+        self.refuse(member, op_id, code, message)
+        member.refused += 1
+        if member.refused > MOST_AGAINST:
+            member.outbox.close("rate_limited", "Far too many changes came that are not allowed now.")
+
+    def perform(self, op: c.Op, agent: str, author: str, number: int = 0) -> int:
+        """Orders an op of the server's own, the one of ``agent`` with this number; returns its clock. Raises Refusal.
 
         ``author``: the client in whose name it is done, who may undo it (``document/sync.py``).
         """
-        if self._counters.get(agent, -1) >= 0:
+        if self._counters.get(agent, -1) >= number:
             raise Refusal("duplicate_layer", "This was done already.")
-        self._order(op, op_json(op), agent, 0, author)
+        self._order(op, op_json(op), agent, number, author)
         return self.head.clock
 
     def _order(self, op: c.Op, text: str, client: str, counter: int, author: str) -> None:
@@ -363,6 +356,7 @@ class RoomCore:
         after, _ = before.apply(op, self._limits)
         self.head = after
         self._viewing.note(before, op, after.clock)
+        self.lesson.made(op, author, self.members.by_client.get(author))
         if after.layers_rev != before.layers_rev:
             self.base_clock = self.geometry_clock = after.clock
         if after.channels_rev != before.channels_rev:
@@ -426,10 +420,14 @@ class RoomCore:
                     )
                     looking[variant] = f'{{"type":"ordered","ops":[{",".join(shown)}]}}'
                 member.outbox.push(looking[variant])
-            elif mine is None:
-                member.outbox.push(shared)
+                continue
+            text = shared
+            if self.lesson.nameless(member):
+                text = looking.setdefault("", f'{{"type":"ordered","ops":[{",".join(map(nameless, texts))}]}}')
+            if mine is None:
+                member.outbox.push(text)
             else:
-                member.outbox.push(shared, _ack(mine))
+                member.outbox.push(text, _ack(mine))
 
     def failed(self, sentence: str = UNSAVED) -> None:
         """Goes back to the committed document, since the journal did not take the batch.

@@ -18,6 +18,8 @@ from esker.contract import Role
 from esker.document.ops import StrokeSet
 from esker.document.wire import document_json
 from esker.fairness.shares import Place, Places, Share, Who
+from esker.session.lesson.rules import Lesson
+from esker.session.lesson.state import State
 from esker.session.room import protocol, viewing
 from esker.session.room.core import Denied, RoomCore, RoomInfo
 from esker.session.room.members import Member
@@ -52,10 +54,16 @@ class HistoryCore(RoomCore):
     """
 
     def __init__(
-        self, loaded: Loaded, claims: Claims | None = None, still: frozenset[viewing.Key] | None = None
+        self,
+        loaded: Loaded,
+        claims: Claims | None = None,
+        still: frozenset[viewing.Key] | None = None,
+        hide: bool = False,
     ) -> None:
-        """``still``: the things that are there now, where nothing else may be shown; None: everything is."""
-        super().__init__(loaded, lambda *_: None, max_members=1, claims=claims)
+        """``still``: the things that are there now, where nothing else may be shown; None: everything is;
+        ``hide``: without the names of who drew what."""
+        lesson = Lesson(State(hide=hide))
+        super().__init__(loaded, lambda *_: None, max_members=1, claims=claims, lesson=lesson)
         self._still = still
 
     def join(
@@ -95,7 +103,8 @@ class HistoryCore(RoomCore):
     def steps(self, rows: list[Row]) -> list[str] | None:
         """Returns the ops of a step forward as they may be shown; None where only the document will do."""
         if self._still is None:
-            return [row.ordered_json() for row in rows]
+            texts = [row.ordered_json() for row in rows]
+            return [viewing.nameless(text) for text in texts] if self.lesson.state.hide else texts
         if not all(viewing.concerns(row.op, self._still) for row in rows):
             return None
         return [viewing.nameless(row.ordered_json()) for row in rows]
@@ -310,9 +319,11 @@ class HistoryRooms:
         demand: Callable[[], object] = lambda: None,
         read: Read | None = None,
         present: Present | None = None,
+        hide: bool = False,
     ) -> tuple[HistoryRoom, Guest]:
         """Opens a room at ``hello.at``. ``demand`` asks once more whether the link opens it, and raises Denied;
-        ``read`` runs the reading of the journal; ``present``: what the terrain is now, for who is shown no more. When
+        ``read`` runs the reading of the journal; ``present``: what the terrain is now, for who is shown no more;
+        ``hide``: names are not shown. When
         all rooms are taken, whose address has the most gives one up.
 
         Raises Denied (room_full, no_terrain, server_error)."""
@@ -329,7 +340,7 @@ class HistoryRooms:
                 raise Denied("no_terrain", "There is no such terrain on this server.")
             still = None if present is None else viewing.things(await present())
             demand()
-            room = self._make(HistoryCore(loaded, self._claims, still), lambda: self._close(room), present)
+            room = self._make(HistoryCore(loaded, self._claims, still, hide), lambda: self._close(room), present)
         except DamagedTerrain as error:
             place.release()
             raise Denied("server_error", "The journal of this terrain is damaged; nothing was changed.") from error

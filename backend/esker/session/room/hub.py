@@ -14,21 +14,27 @@ from typing import Any, Final, ParamSpec, TypeVar
 
 from esker import contract as c
 from esker.document.ops import Limits, StrokeSet
-from esker.fairness.shares import Full, Rate, Rates, Share, Who
+from esker.fairness.shares import Full, Rate, Rates, Share, Who, homes
 from esker.process import memory, system
 from esker.session.ground.ports import Elevation, Tiles
 from esker.session.ground.tilethread import TileThread
 from esker.session.ground.worker import Worker
+from esker.session.lesson import state as lesson_state
+from esker.session.lesson.rules import Hand, Lesson
+from esker.session.room.conducting import Desk
 from esker.session.room.core import Denied, RoomCore, RoomInfo
+from esker.session.room.entry import Caller, caller_of
 from esker.session.room.history_view import HistoryCore, HistoryRoom, HistoryRooms, Present
 from esker.session.room.limits import history_rates
 from esker.session.room.openrooms import OpenRooms
 from esker.session.room.outbox import Outbox, Waiting
 from esker.session.room.room import Guest, Room
 from esker.session.room.turns import SERVER, FairThreads
-from esker.store.access import Access, Link
+from esker.store import timestamps
+from esker.store.access import JOINED_BY_CODE, Access, Link
 from esker.store.claims import Claims
 from esker.store.journal import DamagedTerrain, Journal
+from esker.store.lessons import read_makers, read_state
 from esker.store.upkeep.deletion import GRACE_SECONDS, Deletion
 
 log = logging.getLogger("esker.hub")
@@ -151,7 +157,9 @@ class Hub:
             who = Who(address, link.id)
             present = partial(self.strokes, hello.terrain, None, who) if link.role == "view" else None
             read = partial(self.read, who)
-            return await self._history_rooms.enter(hello, who, outbox, lambda: self.demand(link), read, present)
+            self.caller(link, hello.ticket, address)
+            hide = link.role != "owner" and self.lesson_of(hello.terrain).state.hide
+            return await self._history_rooms.enter(hello, who, outbox, lambda: self.demand(link), read, present, hide)
         who = Who(address, link.id)
         if not self._hellos.take(who, self._now()):
             raise Denied("rate_limited", "Too many pages came at once. Yours comes back by itself.")
@@ -206,7 +214,7 @@ class Hub:
             self._places.release(terrain)
 
     async def _open(self, terrain: str, who: Who) -> Room | None:
-        loaded = await self.read(who, self.journal.load, terrain)
+        loaded, lesson = await self.read(who, lambda: (self.journal.load(terrain), self._lesson(terrain)))
         if loaded is None or self.deletion.deleted(terrain) is not None:
             return None
         core = RoomCore(
@@ -216,8 +224,43 @@ class Hub:
             self._max_members,
             rates=self._history_rates,
             claims=self._claims,
+            lesson=lesson,
         )
-        return Room(core, journal=self.journal, on_empty=lambda: self._empty(terrain), **self._needs())
+        desk = Desk(partial(self.read, SERVER), partial(self._end_code_link, terrain))
+        return Room(core, journal=self.journal, on_empty=lambda: self._empty(terrain), desk=desk, **self._needs())
+
+    def _lesson(self, terrain: str) -> Lesson:
+        """The lesson of a terrain as the database has it."""
+        db = self.journal.reader()
+        state = lesson_state.read(read_state(db, terrain), terrain)
+        people = timestamps.read_people(db, terrain).values()
+        return Lesson(state, read_makers(db, terrain), {p.client: Hand(p.person, p.conducts) for p in people})
+
+    def lesson_of(self, terrain: str) -> Lesson:
+        """The lesson of a terrain, whether its room is open or not; of one that is not, without who made what."""
+        room = self.open_room(terrain)
+        if room is not None:
+            return room.core.lesson
+        return Lesson(lesson_state.read(read_state(self.journal.reader(), terrain), terrain))
+
+    def caller(self, link: Link, ticket: str | None, address: str) -> Caller:
+        """Who asks beside a room, by a link and with a ticket. Raises Denied (removed)."""
+        caller = caller_of(self._claims, link.terrain, link.role, ticket)
+        kept_out = self.lesson_of(link.terrain).door(caller, caller.since, homes(address)[0])
+        if kept_out is not None:
+            raise Denied("removed", kept_out, caller.ticket)
+        return caller
+
+    def _end_code_link(self, terrain: str, link: str) -> None:
+        """Ends a link that a join code made: it is one device's alone."""
+        found = next((each for each in self.access.links(terrain) if each.id == link), None)
+        if found is None or found.name != JOINED_BY_CODE or found.revoked is not None:
+            return
+        loop = asyncio.get_running_loop()
+        ended = self.access.revoke(terrain, link)
+        ended.add_done_callback(
+            lambda done: done.exception() or loop.call_soon_threadsafe(self.end_links, terrain, done.result())
+        )
 
     def _history_room(
         self, core: HistoryCore, on_empty: Callable[[], None], present: Present | None = None

@@ -9,6 +9,7 @@ from typing import Final
 from esker import contract as c
 from esker.contract import Role
 from esker.fairness.shares import Place, Share
+from esker.session.lesson.rules import Lesson
 from esker.session.room.outbox import Outbox
 
 COLOURS: Final = (
@@ -52,17 +53,22 @@ class Member:
     since: int = 0
     """Clock of the document that the member got."""
     presence: c.MemberPresence | None = field(default=None)
-
-    def public(self) -> c.Member:
-        """Returns what the others may know."""
-        return c.Member(client=self.client, name=self.name, colour=self.colour, role=self.role)
+    person: str = "-"
+    """Who it is, over reloads of the page."""
+    ticket: str = ""
+    own: str = ""
+    """What they call themselves; ``name`` is what the others read."""
+    refused: int = 0
+    """Ops in a row that the lesson did not allow."""
 
 
 class Members:
     """The members of a room by client id, and what the others must be told about them at the next presence tick."""
 
-    def __init__(self) -> None:
+    def __init__(self, lesson: Lesson | None = None) -> None:
+        """``lesson``: says what people are called, and who sees whom."""
         self.by_client: dict[str, Member] = {}
+        self._lesson = lesson or Lesson()
         self._moved: set[str] = set()
         self._listed = False
 
@@ -72,13 +78,26 @@ class Members:
     def __iter__(self) -> Iterator[Member]:
         return iter(tuple(self.by_client.values()))
 
-    def public(self) -> tuple[c.Member, ...]:
-        """All members, in the order of joining."""
-        return tuple(m.public() for m in self)
+    def public(self, reader: Member) -> tuple[c.Member, ...]:
+        """Everybody of whom a member is told, in the order of joining."""
+        return tuple(self._public(m) for m in self if self._lesson.sees(reader, m))
+
+    def _public(self, member: Member) -> c.Member:
+        return c.Member(
+            client=member.client,
+            name=member.name,
+            colour=member.colour,
+            role=member.role,
+            person=member.person,
+            conducts=self._lesson.conducts(member),
+            pen=member.person in self._lesson.state.pens,
+        )
 
     def add(self, member: Member) -> None:
         """Lets a member in. Where there are others, they hear of it at the next tick."""
         self.by_client[member.client] = member
+        member.own = member.own or member.name
+        member.name = self._lesson.name(member, member.own)
         self._listed = True
         self._moved.update(m.client for m in self if m.presence is not None)
 
@@ -95,7 +114,15 @@ class Members:
 
     def rename(self, member: Member, name: str, colour: str | None) -> None:
         """Takes a new name, and a new colour unless it is None."""
-        member.name, member.colour, self._listed = name, colour or member.colour, True
+        member.own, member.colour, self._listed = name, colour or member.colour, True
+        member.name = self._lesson.name(member, name)
+
+    def switched(self) -> None:
+        """The lesson stands otherwise: names, and who sees whom, may be others."""
+        for member in self:
+            member.name = self._lesson.name(member, member.own)
+        self._listed = True
+        self._moved.update(m.client for m in self if m.presence is not None)
 
     def moved(self, member: Member, presence: c.Presence) -> None:
         """Takes the newest presence, which replaces the one before."""
@@ -116,16 +143,24 @@ class Members:
 
     def tick(self) -> None:
         """Sends the list of members if it changed, and the presences that changed."""
-        texts: list[tuple[str, bool]] = []
-        if self._listed:
-            texts.append((c.Members(members=self.public()).model_dump_json(), True))
-        live = [self.by_client[k].presence for k in self._moved if k in self.by_client]
-        presences = tuple(p for p in live if p is not None)
-        if presences:
-            texts.append((c.PresenceBroadcast(members=presences).model_dump_json(), False))
-        self._listed = False
-        self._moved.clear()
-        for member in self:
-            for text, always in texts:
+        listed, moved, self._listed, self._moved = self._listed, self._moved, False, set()
+        members = tuple(self)
+        presences = tuple(m.presence for m in members if m.client in moved and m.presence is not None)
+        texts: dict[object, list[tuple[str, bool]]] = {}
+        for member in members:
+            # All who see everybody are told the same text, made once.
+            shared = None if self._lesson.nameless(member) else "all"
+            key = shared or member
+            if key not in texts:
+                texts[key] = self._texts(member, listed, presences)
+            for text, always in texts[key]:
                 if always or member.outbox.backlog < QUIET_BACKLOG_BYTES:
                     member.outbox.push(text)
+
+    def _texts(self, reader: Member, listed: bool, presences: tuple[c.MemberPresence, ...]) -> list[tuple[str, bool]]:
+        """What a reader is told: texts, and whether also who is behind needs them."""
+        texts = [(c.Members(members=self.public(reader)).model_dump_json(), True)] if listed else []
+        seen = tuple(each for each in presences if self._lesson.sees(reader, self.by_client[each.client]))
+        if seen:
+            texts.append((c.PresenceBroadcast(members=seen).model_dump_json(), False))
+        return texts

@@ -59,6 +59,8 @@ class Outbox:
         self._texts: deque[tuple[str | Long, int]] = deque()
         self.backlog = 0
         self.closing: tuple[CloseCode, str] | None = None
+        self.ticket = ""
+        """By which who is closed may be let in later."""
 
     def push(self, *texts: str | Long, counted: bool = True) -> None:
         """Queues control texts. ``counted`` False is for a welcome, whose size is the document's."""
@@ -91,10 +93,10 @@ class Outbox:
         """Queues a server message."""
         self.push(message.model_dump_json())
 
-    def close(self, code: CloseCode, reason: str) -> None:
+    def close(self, code: CloseCode, reason: str, ticket: str = "") -> None:
         """Ends the connection with an error message. Queued texts are dropped: the client resumes, or is refused."""
         if self.closing is None:
-            self.closing = (code, reason)
+            self.closing, self.ticket = (code, reason), ticket
             self.drop()
             self._wake()
 

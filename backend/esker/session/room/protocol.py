@@ -20,6 +20,8 @@ HELLO_SECONDS: Final = 10.0
 MAX_MESSAGES_PER_SECOND: Final = 600
 """Messages of all kinds together: a client above this rate is out of control, and its connection is closed."""
 MESSAGES_BURST: Final = 1_200
+CONDUCTS_PER_SECOND, CONDUCTS_BURST = 5, 30
+"""Switches of a lesson, and what is done about people: each may be a commit."""
 MAX_REFUSED_OPS: Final = 4 * c.OPS_BURST
 """The connection is closed after so many ops in a row were refused for their rate."""
 FITS_CHARACTERS: Final = c.MAX_MESSAGE_BYTES // 4
@@ -53,9 +55,9 @@ class Refused:
 
 @dataclass(frozen=True)
 class Message:
-    """A well-formed view, presence, credit, rename or seek."""
+    """A well-formed view, presence, credit, rename, seek, or what a conductor says."""
 
-    body: c.View | c.Presence | c.Credit | c.Rename | c.Seek
+    body: c.View | c.Presence | c.Credit | c.Rename | c.Seek | c.Conduct | c.People
 
 
 @dataclass(frozen=True)
@@ -90,6 +92,7 @@ class Connection:
         self._presences = TokenBucket(c.MAX_PRESENCE_PER_SECOND, c.MAX_PRESENCE_PER_SECOND)
         self._seeks = TokenBucket(c.MAX_SEEKS_PER_SECOND, c.MAX_SEEKS_PER_SECOND)
         self._views = TokenBucket(c.MAX_VIEWS_PER_SECOND, c.MAX_VIEWS_PER_SECOND)
+        self._conducts = TokenBucket(CONDUCTS_PER_SECOND, CONDUCTS_BURST)
         self._messages = TokenBucket(MAX_MESSAGES_PER_SECOND, MESSAGES_BURST)
         self._notices = TokenBucket(1.0, 1.0)
         self._refused_in_a_row = 0
@@ -148,6 +151,9 @@ class Connection:
                     return self._close("malformed", "Only who looks at the past goes to another clock.")
                 if not self._seeks.take(now):
                     return self._notice(f"More than {c.MAX_SEEKS_PER_SECOND} clocks a second.", now)
+            case c.Conduct() | c.People():
+                if not self._conducts.take(now):
+                    return self._notice(f"More than {CONDUCTS_PER_SECOND} switches of a lesson a second.", now)
             case c.Ping():
                 return [Reply(c.Pong(t=message.t))]
         return [Message(message)]

@@ -22,7 +22,9 @@ from esker.session.ground.ports import Elevation, Tiles
 from esker.session.ground.tilethread import TileThread
 from esker.session.ground.worker import Job, Worker
 from esker.session.room import protocol
+from esker.session.room.conducting import Conducting, Desk
 from esker.session.room.core import UNSAVED, Batch, RoomCore, RoomInfo
+from esker.session.room.entry import Denied
 from esker.session.room.members import QUIET_BACKLOG_BYTES, Member
 from esker.session.room.outbox import Outbox
 from esker.session.room.ports import Journal
@@ -60,8 +62,10 @@ class Room:
         on_empty: Callable[[], None],
         elevation: Elevation | None = None,
         base_threads: Executor | None = None,
+        desk: Desk | None = None,
     ) -> None:
-        """``elevation`` makes the base of the layers, in a thread of ``base_threads``; without them nothing is laid."""
+        """``elevation`` makes the base of the layers, in a thread of ``base_threads``; without them nothing is laid.
+        ``desk``: what a lesson asks of the server."""
         self.core, self.info = core, info
         self.id = core.document.id
         self._journal, self._worker, self._on_empty = journal, worker, on_empty
@@ -97,6 +101,15 @@ class Room:
         self._encoder = Encoder(core)
         self._flushed = asyncio.Event()
         self._flushed.set()
+        self.conducting = Conducting(
+            core,
+            journal,
+            self._loop,
+            desk,
+            ordered=self._ordered,
+            flush=self.flush,
+            people_changed=self._presence_soon,
+        )
         self.closed = False
         self._active_at = self._loop.time()
         """The time at which somebody came, or did more than to answer by itself."""
@@ -117,9 +130,15 @@ class Room:
         self, hello: c.Hello, role: Role, link: str, outbox: Outbox, address: str = "", asked: int | None = None
     ) -> Guest:
         """Lets a client in; ``asked`` is what ``prepare`` returned. Raises Denied."""
-        member = self.core.join(hello, role, link, outbox, self.info, address, asked)
+        try:
+            member = self.core.join(hello, role, link, outbox, self.info, address, asked)
+        except Denied as denied:
+            if denied.code == "removed":
+                self.conducting.tell()  # somebody waits to be let in
+            raise
         outbox.message(self._newest_progress())
         guest = Guest(member, self._feed.add(outbox))
+        self.conducting.joined(member)
         self._active_at = self._loop.time()
         self._presence_soon()
         return guest
@@ -128,6 +147,7 @@ class Room:
         """Lets a client go whose connection ended."""
         self._feed.remove(guest.stream)
         self.core.leave(guest.member)
+        self.conducting.left(guest.member)
         self._presence_soon()
         if not len(self.core.members):
             self._on_empty()
@@ -161,6 +181,8 @@ class Room:
                 self._presence_soon()
                 if guest.member.client in self._called and guest.member.role != "view":
                     self._journal.append(self.id, (), None, self._new_names((guest.member.client,)))
+            case protocol.Message((c.Conduct() | c.People()) as message):
+                self.conducting.receive(guest.member, message)
             case protocol.Reply(message):
                 guest.member.outbox.message(message)
 
@@ -196,11 +218,12 @@ class Room:
     def importing(self, message: c.Importing) -> None:
         """Tells everybody how far somebody's import is."""
         text = message.model_dump_json()
-        here = any(member.name == message.author for member in self.core.members)
-        shown = text if here else message.model_copy(update={"author": ""}).model_dump_json()
+        here = next((member for member in self.core.members if member.name == message.author), None)
+        nameless = message.model_copy(update={"author": ""}).model_dump_json()
         for member in self.core.members:
             if member.outbox.backlog < QUIET_BACKLOG_BYTES or message.status.stage in c.ENDED_IMPORT:
-                member.outbox.push(shown if member.role == "view" else text)
+                known = member.role != "view" if here is None else self.core.lesson.sees(member, here)
+                member.outbox.push(text if known else nameless)
 
     # --- ticks --------------------------------------------------------------------------------------------------
 
@@ -234,10 +257,14 @@ class Room:
     def _new_names(self, clients: Iterable[str]) -> list[Person]:
         """Returns what authors of ops are called, where the journal does not have it from this room yet."""
         here = (self.core.members.by_client.get(client) for client in dict.fromkeys(clients))
-        people = [Person(m.client, m.name, m.colour) for m in here if m is not None]
+        people = [self._person(m) for m in here if m is not None]
         new = [person for person in people if self._called.get(person.client) != person]
         self._called |= {person.client: person for person in new}
         return new
+
+    def _person(self, member: Member) -> Person:
+        conducts = self.core.lesson.conducts(member)
+        return Person(member.client, member.name, member.colour, member.person, conducts)
 
     def _committed(self, batch: Batch, future: Future[None]) -> None:
         error = future.exception()
@@ -369,6 +396,7 @@ class Room:
         """Stops the timers and the solver's work for this room. Call ``flush`` first."""
         self.closed = True
         self._layers.close()
+        self.conducting.close()
         self._worker.remove(self._solve_client)
         for timer in (self._tick_timer, self._presence_timer, self._progress_timer):
             if timer is not None:

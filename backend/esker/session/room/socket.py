@@ -171,7 +171,7 @@ class Session:
             self._transport.charge(self._accounts.member(self._address), self._broke)
             self._transport.listen(self._read)  # a second hello is refused, so none comes this way
         except Denied as denied:
-            self.outbox.close(denied.code, denied.message)
+            self.outbox.close(denied.code, denied.message, denied.ticket)
 
     def _broke(self) -> None:
         self.outbox.close("rate_limited", BROKE)
@@ -219,7 +219,7 @@ class Session:
 
     async def _farewell(self, code: c.CloseCode, reason: str) -> None:
         log.info("closed a connection from %s: %s (%s)", self._address, code, reason)
-        text = c.ErrorMessage(code=code, message=reason, fatal=True).model_dump_json()
+        text = c.ErrorMessage(code=code, message=reason, fatal=True, ticket=self.outbox.ticket).model_dump_json()
         await self._transport.send_text(text, self._went_on)
         await self._transport.close(c.WS_CLOSE[code], reason.encode()[:REASON_BYTES].decode(errors="ignore"))
 

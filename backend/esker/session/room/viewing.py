@@ -20,6 +20,7 @@ from esker.document.wire import op_json
 Key = tuple[str, str]
 """A thing of the document: "stroke" or "layer", and its id."""
 _AUTHOR: Final = re.compile(r'"author":"(?:[^"\\]|\\.)*"')
+_AUTHORS: Final = re.compile(_AUTHOR.pattern.encode())
 _NOBODY: Final = '"author":""'
 _ENDS: Final = ('"stroke.delete"', '"stroke.restore"', '"layer.delete"', '"layer.restore"')
 MOST_MARKS: Final = 8_000
@@ -45,6 +46,15 @@ def shown(document: c.Document, still: Collection[Key] | None = None) -> c.Docum
     )
 
 
+def anonymous(document: c.Document) -> c.Document:
+    """The document without the names of who drew what."""
+    groups = ("strokes", "deleted", "layers", "deleted_layers")
+    update = {
+        name: tuple(each.model_copy(update={"author": ""}) for each in getattr(document, name)) for name in groups
+    }
+    return document.model_copy(update=update)
+
+
 def things(document: StrokeSet) -> frozenset[Key]:
     """Returns what is there."""
     return frozenset((*(("stroke", key) for key in document.strokes), *(("layer", key) for key in document.layers)))
@@ -57,6 +67,11 @@ def nameless(ordered: str) -> str:
     """
     head, op, rest = ordered.partition(',"op":')
     return head + op + _AUTHOR.sub(_NOBODY, rest)
+
+
+def unsigned(document: bytes) -> bytes:
+    """A document as JSON text without the names of who drew what."""
+    return _AUTHORS.sub(_NOBODY.encode(), document)
 
 
 def concerns(op: str, still: Collection[Key]) -> bool:

@@ -19,7 +19,9 @@ GRACE_SECONDS: Final = 7 * 86_400.0
 UNTOUCHED_SECONDS: Final = 30 * 86_400.0
 """A terrain without one operation and without real ground is nobody's after this time."""
 ROWS_AT_A_TIME: Final = 500
-TABLES: Final = ("ops", "snapshots", "folds", "folded_ids", "grids", "links", "moments", "people", "previews")
+TABLES: Final = (
+    "ops", "snapshots", "folds", "folded_ids", "grids", "links", "moments", "people", "previews", "lessons", "makers"
+)  # fmt: skip
 """All that has rows by terrain; ``terrains`` itself goes last."""
 
 
@@ -88,7 +90,8 @@ class Deletion:
 def _some(table: str, terrain: str) -> Callable[[sqlite3.Connection], int]:
     """Removes a few rows of a table without row ids, by its primary key; says how many."""
     key = {"ops": "clock", "snapshots": "clock", "folds": "last", "grids": "digest", "links": "id", "moments": "clock"}
-    column = key.get(table, "terrain" if table == "previews" else "client")
+    key |= {"makers": "thing", "previews": "terrain", "lessons": "terrain"}
+    column = key.get(table, "client")
     sql = (
         f"DELETE FROM {table} WHERE terrain=?1 AND {column} IN"
         f" (SELECT {column} FROM {table} WHERE terrain=?1 LIMIT {ROWS_AT_A_TIME})"

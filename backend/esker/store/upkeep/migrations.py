@@ -77,6 +77,17 @@ BEGIN SELECT RAISE(ABORT, 'a folded clock or id is used again'); END
 of ``ops`` kept: a clock and an id are used once."""
 
 
+_FORMAT_7: Final = """
+CREATE TABLE lessons (terrain TEXT PRIMARY KEY, state TEXT NOT NULL) WITHOUT ROWID;
+CREATE TABLE makers (
+  terrain TEXT NOT NULL, thing TEXT NOT NULL, client TEXT NOT NULL, PRIMARY KEY (terrain, thing)) WITHOUT ROWID;
+ALTER TABLE people ADD COLUMN person TEXT;
+ALTER TABLE people ADD COLUMN conducts INTEGER;
+"""
+"""``lessons``: how the lesson of a terrain stands. ``makers``: the client by which a stroke or a layer came
+(``store/lessons.py``). ``people``: who a client is over reloads, and whether they conducted."""
+
+
 def _script(text: str) -> Callable[[sqlite3.Connection], None]:
     def run(db: sqlite3.Connection) -> None:
         for statement in text.split(";"):
@@ -98,6 +109,7 @@ STEPS: Final[tuple[Callable[[sqlite3.Connection], None], ...]] = (
     _script(_FORMAT_4),  # links know their parent
     _script(_FORMAT_5),  # terrains can be deleted
     _folding,  # bursts of ops are folded
+    _script(_FORMAT_7),  # lessons
 )
 """``STEPS[n]`` makes format n + 1 of format n; an empty file has format 0."""
 FORMAT: Final = len(STEPS)

@@ -1,0 +1,262 @@
+"""Conductors' messages, carried out: the state of the lesson into the journal, and to everybody (DESIGN 19).
+
+``session/lesson/rules.py`` has the rules. What is switched is enforced at once and told when it is in the journal;
+where it cannot be written it holds as long as the server runs, and whoever switched it is told that.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import secrets
+import time
+from collections import OrderedDict
+from collections.abc import Awaitable, Callable, Iterable
+from concurrent.futures import Future
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Final
+
+from esker import contract as c
+from esker.contract import Role
+from esker.document.ops import Refusal
+from esker.document.takeback import Deeds, sentence
+from esker.fairness.shares import homes
+from esker.session.lesson.rules import NO_CHANGE, NOT_LEADERS, NOT_OWNERS, OWNERS_ONLY, REMOVED
+from esker.session.lesson.state import Removed, State
+from esker.session.room.core import RoomCore
+from esker.session.room.entry import Denied
+from esker.session.room.members import Member
+from esker.session.room.ports import Journal
+from esker.store.deeds import read_deeds
+from esker.store.journal import DamagedTerrain
+
+log = logging.getLogger("esker.lesson")
+
+GRACE_SECONDS: Final = 10.0
+"""A conductor whose view all follow, and whose page reloads, goes on showing if they are back within this."""
+MOST_GONE: Final = 200
+"""People who left and of whom a room remembers how they came, so that they can be removed."""
+UNSAVED: Final = "The server could not save this (is its disk full?). It holds until the server stops."
+BUSY: Final = "What somebody did is being taken back already. Try again in a moment."
+UNREADABLE: Final = "The history could not be read, so nothing was taken back."
+
+
+@dataclass(frozen=True)
+class Desk:
+    """What a room asks of its server. ``read`` runs work in a thread; ``end_link`` ends a link that a join code made
+    for one device; ``now``: seconds since 1970."""
+
+    read: Callable[[Callable[[], Deeds]], Awaitable[Deeds]]
+    end_link: Callable[[str], object]
+    now: Callable[[], float] = time.time
+
+
+@dataclass(frozen=True)
+class _Gone:
+    """How somebody who left had come."""
+
+    name: str
+    role: Role
+    person: str
+    link: str
+    address: str
+
+
+class Conducting:
+    """The lesson of one room, towards its members and the journal."""
+
+    def __init__(
+        self,
+        core: RoomCore,
+        journal: Journal,
+        loop: asyncio.AbstractEventLoop,
+        desk: Desk | None,
+        *,
+        ordered: Callable[[], None],
+        flush: Callable[[], Awaitable[None]],
+        people_changed: Callable[[], None],
+    ) -> None:
+        """``ordered``: called when ops were; ``flush``: waits until they are in the journal; ``people_changed``: the
+        list of members is to be told anew."""
+        self._core, self._journal, self._loop, self._desk = core, journal, loop, desk
+        self._ordered, self._flush, self._people_changed = ordered, flush, people_changed
+        self._gone: OrderedDict[str, _Gone] = OrderedDict()
+        self._undoing: asyncio.Task[None] | None = None
+        self._grace: asyncio.TimerHandle | None = None
+        if core.lesson.state.look is not None:
+            self._grace = loop.call_later(GRACE_SECONDS, self._end_look)
+
+    # --- people come and go -------------------------------------------------------------------------------------
+
+    def joined(self, member: Member) -> None:
+        """Somebody came in: whose view all followed goes on showing."""
+        self._gone.pop(member.person, None)
+        if self._core.look is None and self._core.lesson.state.look == member.person:
+            self._stop_grace()
+            self._core.look = member.client
+            self.tell()
+
+    def left(self, member: Member) -> None:
+        """Somebody left: who showed has a while to come back."""
+        self._gone[member.person] = _Gone(member.name, member.role, member.person, member.link, member.address)
+        while len(self._gone) > MOST_GONE:
+            self._gone.popitem(last=False)
+        if self._core.look == member.client and member.client not in self._core.members.by_client:
+            self._core.look = next((m.client for m in self._core.members if m.person == member.person), None)
+            if self._core.look is None:
+                self._stop_grace()
+                self._grace = self._loop.call_later(GRACE_SECONDS, self._end_look)
+            self.tell()
+
+    def _end_look(self) -> None:
+        self._grace = None
+        if self._core.look is None and self._core.lesson.state.look is not None:
+            self._change(self._core.lesson.state.model_copy(update={"look": None, "held": False}), None)
+
+    def _stop_grace(self) -> None:
+        if self._grace is not None:
+            self._grace.cancel()
+            self._grace = None
+
+    def tell(self) -> None:
+        """Tells everybody how the lesson stands."""
+        for member in self._core.members:
+            member.outbox.message(self._core.told(member))
+
+    # --- what conductors say ------------------------------------------------------------------------------------
+
+    def receive(self, member: Member, message: c.Conduct | c.People) -> None:
+        """Does what a member asks, if they may."""
+        if not self._core.lesson.conducts(member):
+            member.outbox.message(c.Notice(text=NO_CHANGE))
+            return
+        if isinstance(message, c.Conduct):
+            self._switch(member, message)
+        elif message.action == "undo":
+            self._undo(member, message.people)
+        elif message.action == "remove":
+            self._remove(member, message.people)
+        elif message.action in ("conductor", "no_conductor") and member.role != "owner":
+            member.outbox.message(c.Notice(text=OWNERS_ONLY))
+        else:
+            self._change(self._core.lesson.turned(message), member)
+
+    def _switch(self, member: Member, message: c.Conduct) -> None:
+        state = self._core.lesson.switched(message, member)
+        if message.look is not None:
+            self._stop_grace()
+            self._core.look = member.client if message.look else None
+        self._change(state, member)
+        if state.hands_off:
+            self._finish_what_is_in_hand()
+
+    def _change(self, state: State, by: Member | None) -> None:
+        """The lesson stands so from now on."""
+        lesson = self._core.lesson
+        lesson.state = state
+        if self._core.look is not None and state.look is None:
+            self._core.look = None
+        self._core.members.switched()
+        self._people_changed()
+        future = self._journal.keep_lesson(self._core.document.id, lesson.state.model_dump_json())
+        future.add_done_callback(lambda done: self._loop.call_soon_threadsafe(self._kept, done, by))
+
+    def _kept(self, future: Future[None], by: Member | None) -> None:
+        error = future.exception()
+        if error is not None:
+            log.error("terrain %s: the state of its lesson was not saved: %s", self._core.document.id, error)
+            if by is not None:
+                by.outbox.message(c.Notice(text=UNSAVED))
+        self.tell()
+
+    def _finish_what_is_in_hand(self) -> None:
+        """Strokes that are being drawn end as they are. They stay their authors', who may undo them."""
+        core = self._core
+        for client, strokes in core.lesson.in_hand().items():
+            author = core.members.by_client.get(client)
+            if author is not None and core.lesson.draws(author):
+                continue
+            alive = [each for each in strokes if each in core.head.strokes]
+            for start in range(0, len(alive), c.MAX_OPS_PER_GROUP):
+                parts = tuple(c.FinishStroke(stroke=each) for each in alive[start : start + c.MAX_OPS_PER_GROUP])
+                with suppress(Refusal):
+                    core.perform(c.Group(ops=parts), _agent(), client)
+        self._ordered()
+
+    # --- removing -----------------------------------------------------------------------------------------------
+
+    def _remove(self, by: Member, people: Iterable[str]) -> None:
+        core, lesson = self._core, self._core.lesson
+        out: list[Removed] = []
+        links: set[str] = set()
+        for person in dict.fromkeys(people):
+            here = [m for m in core.members if m.person == person]
+            ways: list[Member | _Gone] = [*here, *([self._gone[person]] if person in self._gone else [])]
+            if not ways:
+                by.outbox.message(c.Notice(text="Nobody like that is here, or was here a while ago."))
+                continue
+            if any(way.role == "owner" for way in ways) or person == by.person:
+                by.outbox.message(c.Notice(text=NOT_OWNERS if person != by.person else "You cannot send yourself out."))
+                continue
+            if by.role != "owner" and person in lesson.state.conductors:
+                by.outbox.message(c.Notice(text=NOT_LEADERS))
+                continue
+            now = int((self._desk.now() if self._desk is not None else time.time()) * 1000)
+            addresses = {homes(way.address)[0] for way in ways}
+            out += [Removed(person=person, name=ways[0].name, address=each, at=now) for each in addresses]
+            links |= {way.link for way in ways}
+        if not out:
+            return
+        self._change(lesson.sent_out(out), by)
+        gone = {each.person for each in out}
+        for member in core.members:
+            if member.person in gone:
+                member.outbox.close("removed", REMOVED)
+        if self._desk is not None:
+            for link in links:
+                self._desk.end_link(link)
+
+    # --- taking back --------------------------------------------------------------------------------------------
+
+    def _undo(self, by: Member, people: tuple[str, ...]) -> None:
+        if self._desk is None or (self._undoing is not None and not self._undoing.done()):
+            by.outbox.message(c.Notice(text=BUSY))
+            return
+        self._undoing = asyncio.ensure_future(self._take_back(by, people, self._desk))
+
+    async def _take_back(self, by: Member, people: tuple[str, ...], desk: Desk) -> None:
+        core = self._core
+        here = {m.client for m in core.members if m.person in people}
+        clients = sorted(core.lesson.clients_of(people) | here)
+        await self._flush()
+        try:
+            deeds = await desk.read(lambda: read_deeds(self._journal, core.document.id, clients))
+        except (DamagedTerrain, Denied) as error:
+            log.error("terrain %s: nothing was taken back: %s", core.document.id, error)
+            by.outbox.message(c.Notice(text=UNREADABLE))
+            return
+        result = deeds.plan(core.head)
+        agent = _agent()
+        try:
+            for number, op in enumerate(result.ops):
+                core.perform(op, agent, by.client, number)
+        except Refusal as refusal:
+            by.outbox.message(c.Notice(text=refusal.message))
+        self._ordered()
+        await self._flush()
+        names = {m.name for m in core.members if m.person in people} | {
+            self._gone[each].name for each in people if each in self._gone
+        }
+        by.outbox.message(c.Notice(text=sentence(" and ".join(sorted(filter(None, names))[:3]) or "they", result)))
+
+    def close(self) -> None:
+        """Stops the timer, and what is being taken back."""
+        self._stop_grace()
+        if self._undoing is not None:
+            self._undoing.cancel()
+
+
+def _agent() -> str:
+    """An id under which the server does something for the lesson."""
+    return f"lesson-{secrets.token_hex(8)}"
