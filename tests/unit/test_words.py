@@ -46,7 +46,9 @@ WORDS = {
 }
 """Old words that nothing says, in names, comments or strings. What is said instead."""
 ALLOWED = {
-    "section_reference.py": {"past"},  # how far a sample lies past the end of a crest; the kernel says so too
+    # how far a sample lies past the end of a crest; the kernels say so too
+    "section_reference.py": {"past"},
+    "raster_reference.py": {"past"},
     "messages.py": {"laying"},  # a field on the wire keeps its name
 }
 

@@ -1,4 +1,4 @@
-// What the page holds of others goes with their licences (SPEC U37).
+// What the page holds of others goes with their licences (SPEC U40).
 import { mkdirSync, mkdtempSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";

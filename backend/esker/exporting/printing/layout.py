@@ -1,4 +1,4 @@
-"""A contour map to scale on one sheet of paper: what is drawn where, in millimetres."""
+"""A contour map to scale on one page of paper: what is drawn where, in millimetres."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ GRID: Final[Colour] = (0.62, 0.68, 0.72)
 
 @dataclass(frozen=True)
 class Frame:
-    """Where the ground lies on the sheet. ``scale``: its denominator; ``box``: of the map, millimetres."""
+    """Where the ground lies on the page. ``scale``: its denominator; ``box``: of the map, millimetres."""
 
     width_mm: float
     height_mm: float
@@ -54,7 +54,7 @@ class Frame:
 
 
 def frame_of(ground: Ground, wanted: PaperOptions) -> Frame:
-    """The sheet of a ground, turned where that is much wider than tall. Raises CannotPrint for a scale at which the map
+    """The page of a ground, turned where that is much wider than tall. Raises CannotPrint for a scale at which the map
     is larger than the paper."""
     rows, columns = ground.heights.shape
     if rows < 2 or columns < 2:
@@ -113,7 +113,7 @@ def _water(ground: Ground, frame: Frame) -> list[Path]:
     mask = ground.masks.get("water")
     if mask is None or not mask.any():
         return []
-    # Dry ground around it closes every shore; a sheet that is all water is closed by it too.
+    # Dry ground around it closes every shore; a page that is all water is closed by it too.
     ringed = np.pad(mask.astype(np.float32), 1, constant_values=0.0)
     rings = [frame.place(ground, line.points - 1.0) for line in contour(ringed, 127.5)]
     return [Path(rings, 0.18, SEA_LINE, fill=SEA, closed=True)]
