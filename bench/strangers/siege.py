@@ -132,13 +132,14 @@ class Server:
     def state(self) -> dict[str, float]:
         """Memory of the server and its children, disk, descriptors."""
         family = [self.process, *self.process.children(recursive=True)]
-        memory = 0
+        own, memory = self.process.memory_info().rss, 0
         for each in family:
             with suppress(psutil.Error):
                 memory += each.memory_info().rss
         disk = sum(path.stat().st_size for path in self.folder.rglob("*") if path.is_file())
         return {
             "memory_mb": round(memory / 1e6),
+            "children_mb": round((memory - own) / 1e6),
             "disk_mb": round(disk / 1e6, 1),
             "descriptors": self.process.num_fds(),
         }
@@ -297,6 +298,7 @@ def main(argv: list[str]) -> int:
         "--attack", action="append", choices=sorted(ATTACKS), help="only these (default: each, then all)"
     )
     parser.add_argument("--json", action="store_true", help="print the result as JSON")
+    parser.add_argument("--log", type=Path, help="keep here what the server logs")
     parser.add_argument("--note", default="", help="a sentence about the circumstances, kept in the result")
     arguments = parser.parse_args(argv)
     machine, began = _serving.machine(), time.monotonic()
@@ -308,6 +310,8 @@ def main(argv: list[str]) -> int:
             runs, left = asyncio.run(_run(server, arguments.attack or list(ATTACKS), plan))
             alive = server.process.is_running()
         text = log.read_text(encoding="utf-8", errors="replace")
+        if arguments.log is not None:
+            arguments.log.write_text(text, encoding="utf-8")
     missed = judged(runs)
     result = {
         "bench": "siege", "version": VERSION, "machine": machine, "note": arguments.note,

@@ -162,6 +162,28 @@ def test_a_stranger_s_exports_leave_places(live: LiveServer, maker: Maker) -> No
     assert made.index("mine") <= 2
 
 
+def test_links_to_look_leave_exports_of_a_terrain_to_those_who_draw(live: LiveServer, maker: Maker) -> None:
+    """SPEC A443: one link to look, under four ids of clients, took all four that a terrain has at a time."""
+    terrain, secret = live.create(settings=c.TerrainSettings(title="slow"))
+    made = [
+        live.http("POST", f"/api/terrains/{terrain}/links", {"role": role}, secret)[1]["secret"]
+        for role in ("view", "view", "edit")
+    ]
+
+    def asks(address: str, key: str, client: str) -> int:
+        return ask(live, address, "POST", f"/api/terrains/{terrain}/exports?client={client}", WISH, key)[0]
+
+    assert [asks(STRANGER, made[0], f"s{i}") for i in range(4)] == [202, 202, 503, 503]
+    assert asks("198.51.100.20", made[1], "other") == 503, "all links to look together have no more"
+    assert [asks("198.51.100.30", made[2], f"e{i}") for i in range(2)] == [202, 503]
+    assert asks(STRANGER, secret, "owner") == 202, "behind the address of the viewer, too"
+    maker.gate.set()
+    deadline = time.monotonic() + PATIENCE
+    while asks(STRANGER, made[0], "later") != 202:
+        assert time.monotonic() < deadline, "places come back"
+        time.sleep(0.01)
+
+
 def test_a_stranger_s_reading_does_not_hold_all_threads(live: LiveServer, monkeypatch: pytest.MonkeyPatch) -> None:
     """SPEC P292: thirty requests that take long, and another terrain opens meanwhile."""
     strange, key = live.create()

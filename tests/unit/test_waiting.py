@@ -132,7 +132,7 @@ def test_a_heavy_document_is_encoded_outside_of_the_event_loop(tmp_path: Path, m
         where.append(threading.current_thread().name)
         return whole(document, view)
 
-    monkeypatch.setattr("esker.session.room.room.encoded", noted)
+    monkeypatch.setattr("esker.session.room.recent.encoded", noted)
     monkeypatch.setattr(module, "encoded", noted)
     with LiveServer(tmp_path) as server:
         terrain, secret = server.create(strokes=tuple(heavy().strokes.values()))
@@ -180,9 +180,52 @@ def test_what_waits_for_all_is_bounded_and_who_has_little_goes_on() -> None:
     slow[3].push("z")
     assert slow[3].closing is None, "it has no more than a few"
     slow[1].pop()
+    assert waiting.held == 3 * len(text) + 1, "what was taken waits until it has left"
+    slow[1].sent()
+    assert waiting.held == 2 * len(text) + 1
     slow[2].drop()
     slow[3].drop()
     assert waiting.held == 0
+
+
+def test_what_waits_has_a_share_by_address_and_by_link() -> None:
+    """SPEC A442: one address with many connections that do not read held all that might wait for everybody."""
+    waiting = Waiting(40 * FEW_BYTES)
+    text = "x" * (2 * FEW_BYTES)
+
+    def comes(address: str, link: str = "") -> Outbox:
+        outbox = Outbox(lambda: None, waiting=waiting, who=Who(address))
+        outbox.belongs(link)
+        outbox.push(text, counted=False)
+        return outbox
+
+    deaf = [comes("192.0.2.7") for _ in range(40)]
+    assert sum(outbox.closing is None for outbox in deaf) == 5, "a quarter of all"
+    assert waiting.of("address", "192.0.2.7") == 10 * FEW_BYTES == waiting.held
+    by_link = [comes(f"198.51.100.{k}", "spread") for k in range(40)]
+    assert sum(outbox.closing is None for outbox in by_link) == 5, "a link has no more from many addresses"
+    assert comes("203.0.113.9", "another").closing is None, "there is room for others"
+    many = [comes(f"2001:db8:7:{k}::1", f"link{k}") for k in range(40)]
+    assert sum(outbox.closing is None for outbox in many) == 9, "a /48 has half, and all have all there is"
+    assert deaf[0].pop() == text
+    assert comes("192.0.2.7").closing is not None, "what was taken and has not left waits still"
+    deaf[0].sent()
+    assert comes("192.0.2.7").closing is None
+    for outbox in deaf:
+        outbox.drop()
+    assert waiting.of("address", "192.0.2.7") == 2 * FEW_BYTES
+
+
+def test_a_welcome_with_all_that_was_missed_counts() -> None:
+    """SPEC A442: who resumes far behind gets megabytes of ops; each such text was one more copy that nobody counted."""
+    waiting = Waiting(8 * FEW_BYTES)
+    outbox = Outbox(lambda: None, limit=10, waiting=waiting, who=Who("192.0.2.7"))
+    outbox.push("x" * FEW_BYTES, counted=False)
+    outbox.push("12345")
+    assert (outbox.backlog, outbox.closing, waiting.held) == (5, None, FEW_BYTES + 5)
+    other = Outbox(lambda: None, waiting=waiting, who=Who("192.0.2.7"))
+    other.push("x" * (2 * FEW_BYTES), counted=False)
+    assert other.closing is not None
 
 
 # --- open rooms -----------------------------------------------------------------------------------------------------

@@ -20,7 +20,7 @@ from esker.contract import ExportEstimate, ExportRequest, ExportStage, ExportSta
 from esker.errors import Cannot
 from esker.exporting import formats, wire
 from esker.exporting.run import FAILED, ExportFailed, Progress
-from esker.fairness.shares import Place, Places, Share, Who
+from esker.fairness.shares import RANK, Place, Places, Share, Who
 from esker.session.room.hub import Hub
 from esker.session.room.turns import Turns
 from esker.session.room.viewing import shown
@@ -30,7 +30,8 @@ log = logging.getLogger("esker.exporting")
 
 OPEN: Final = Share(12, address=8, network=10, link=4)
 """Exports that wait or are made at a time, of the whole server; one is made, the others wait for their turn."""
-OPEN_IN_ROOM: Final = 4
+OPEN_IN_ROOM: Final = Share(4, address=2, network=2, link=2, reserve=(2, 1))
+"""Of these those of one terrain: links to look have two at most, whoever draws has three, and the last is an owner's."""
 KEPT_SECONDS: Final = 10 * 60.0
 """How long a file, or why there is none, can be asked for."""
 KEPT_BYTES: Final = 1 << 30
@@ -40,6 +41,8 @@ SPARE_BYTES: Final = 64 << 20
 STEM: Final = 48
 OVER: Final = frozenset({"done", "failed", "cancelled"})
 WAITING: Final = "Waiting for its turn."
+BUSY: Final = "Many exports are being made just now. Try again in a few minutes."
+BUSY_SHARE: Final = "Several exports for your address or link are being made. Wait for them."
 PACE: Final = (0.3, 30.0)
 """Bounds of how much slower than ``formats.estimate`` this server is taken to be."""
 
@@ -77,6 +80,8 @@ class Job:
     status: ExportStatus
     place: Place
     """Of those that the server has; with who asked for it."""
+    seat: Place
+    """Of those that the terrain has."""
     task: asyncio.Task[None] | None = None
     ended: float = 0.0
 
@@ -84,6 +89,11 @@ class Job:
     def over(self) -> bool:
         """Whether nothing will change any more."""
         return self.status.stage in OVER
+
+    def release(self) -> None:
+        """Gives its places back."""
+        self.place.release()
+        self.seat.release()
 
     def at(self, stage: ExportStage, **fields: object) -> None:
         """Where it stands now; the end is the end."""
@@ -113,6 +123,8 @@ class Exports:
         self._jobs: dict[str, Job] = {}
         self._turn = Turns(1)
         self._places = Places(OPEN)
+        self._in_room: dict[str, Places] = {}
+        """Places of the terrains of which something is being exported."""
         self._closing = False
         self._pace = 1.0
         shutil.rmtree(folder, ignore_errors=True)
@@ -125,12 +137,12 @@ class Exports:
         there is no such terrain."""
         if sentence := formats.refusal(wanted):
             raise Cannot(400, "malformed", sentence)
-        self._check(terrain, person, who)
+        self._check(terrain, person, who, link)
         document = await self._hub.document(terrain, wanted.at, who)
         if link.role == "view":
             document = shown(document)
         self._hub.demand(link)
-        self._check(terrain, person, who)  # others may have come meanwhile
+        self._check(terrain, person, who, link)  # others may have come meanwhile
         job_id = secrets.token_urlsafe(9)
         folder = self._folder / job_id
         folder.mkdir(parents=True)
@@ -142,9 +154,10 @@ class Exports:
             shutil.rmtree(folder, ignore_errors=True)
             raise
         status = ExportStatus(id=job_id, stage="waiting", text=WAITING if self._turn.locked() else "")
-        job = self._jobs[job_id] = Job(job_id, terrain, link, person, wanted, folder, status, self._places.take(who))
+        place, seat = self._places.take(who), self._in(terrain).take(_in_terrain(who, link))
+        job = self._jobs[job_id] = Job(job_id, terrain, link, person, wanted, folder, status, place, seat)
         job.task = asyncio.create_task(self._run(job, self._task(job, document)))
-        job.task.add_done_callback(lambda _: job.place.release())  # also where it was cancelled before it began
+        job.task.add_done_callback(lambda _: job.release())  # also where it was cancelled before it began
         return job.status
 
     def estimate(self, wanted: ExportRequest) -> ExportEstimate:
@@ -196,19 +209,21 @@ class Exports:
 
     # --- the work -----------------------------------------------------------------------------------------------
 
-    def _check(self, terrain: str, person: str, who: Who) -> None:
+    def _check(self, terrain: str, person: str, who: Who, link: Link) -> None:
         self._forget_old()
         if self._closing:
             raise Cannot(503, "shutting_down", "The server is stopping.")
-        going = [job for job in self._jobs.values() if not job.over]
-        if any(job.person == person for job in going):
+        if any(job.person == person and not job.over for job in self._jobs.values()):
             raise Cannot(409, "busy", "Another export of yours is still being made. Wait for it, or cancel it.")
-        against = self._places.refusal(who)
-        if against is not None or sum(job.terrain == terrain for job in going) >= OPEN_IN_ROOM:
-            sentence = "Many exports are being made just now. Try again in a few minutes."
-            if against not in (None, "total"):
-                sentence = "Several exports for your address or link are being made. Wait for them."
-            raise Cannot(503, "busy", sentence)
+        for against in (self._places.refusal(who), self._in(terrain).refusal(_in_terrain(who, link))):
+            if against is not None:
+                raise Cannot(503, "busy", BUSY if against == "total" else BUSY_SHARE)
+
+    def _in(self, terrain: str) -> Places:
+        """Returns the places of a terrain; those of terrains that have none taken are forgotten."""
+        for other in [key for key, places in self._in_room.items() if not len(places) and key != terrain]:
+            del self._in_room[other]
+        return self._in_room.setdefault(terrain, Places(OPEN_IN_ROOM))
 
     def _task(self, job: Job, document: c.Document) -> wire.Task:
         plant = self._plant
@@ -246,7 +261,7 @@ class Exports:
             log.exception("the export of %s failed", job.terrain)
             job.at("failed", text=FAILED)
         job.ended = self._now()
-        job.place.release()
+        job.release()
         if job.status.stage != "done":
             shutil.rmtree(job.folder, ignore_errors=True)
         self._forget_old()
@@ -288,3 +303,8 @@ class Exports:
         if job.link.id != link.id and link.role != "owner":
             raise Cannot(403, "not_allowed", "Only who began an export, or an owner of the terrain, may do this.")
         return job
+
+
+def _in_terrain(who: Who, link: Link) -> Who:
+    """Returns who asks, with what the link allows in the terrain."""
+    return Who(who.address, link.id, RANK[link.role])

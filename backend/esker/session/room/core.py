@@ -147,6 +147,7 @@ class RoomCore:
         )
         self.members.add(member)
         self._owners.put(hello.client, owner)
+        outbox.belongs(link)
         outbox.push(*self._welcome(member, hello.clock, info, asked=asked), counted=False)
         return member
 

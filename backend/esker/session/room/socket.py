@@ -9,6 +9,7 @@ from collections.abc import AsyncIterator, Callable, Sequence
 from typing import Final, Protocol
 
 from esker import contract as c
+from esker.fairness.shares import Who
 from esker.fairness.spending import Account, Accounts
 from esker.session.room import protocol
 from esker.session.room.core import Denied
@@ -86,7 +87,8 @@ class Session:
         self._hub, self._transport, self._address, self._now = hub, transport, address, now
         self._protocol = protocol.Connection(now(), subprotocol)
         self._wake = asyncio.Event()
-        self.outbox = Outbox(self._woken, now=self._send_now, waiting=getattr(hub, "waiting", None))
+        waiting = getattr(hub, "waiting", None)
+        self.outbox = Outbox(self._woken, now=self._send_now, waiting=waiting, who=Who(address))
         self._end: asyncio.TimerHandle | None = None
         self._room: Room | None = None
         self._guest: Guest | None = None
