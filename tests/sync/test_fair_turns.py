@@ -73,14 +73,14 @@ class World:
         """Rooms whose document changes all the time: what a slice of theirs takes, and when they changed last."""
         self.clock = 0
 
-    def room(self, name: str) -> Client:
+    def room(self, name: str, home: str | None = None) -> Client:
         self.settled[name], self.previews[name] = [], []
 
         def deliver(_: int, result: Any) -> None:
             if result.level == LEVELS:
                 (self.settled if result.settled else self.previews)[name].append(self.now)
 
-        return self.worker.add(LEVELS, deliver, lambda note: pytest.fail(note))
+        return self.worker.add(LEVELS, deliver, lambda note: pytest.fail(note), home=home)
 
     def ask(self, client: Client, cost: float, **like: Any) -> None:
         self.clock += 1
@@ -135,12 +135,56 @@ def test_two_rooms_that_both_want_everything_have_half_each() -> None:
     assert len(world.previews["light"]) > 10 * len(world.previews["heavy"])
 
 
+def test_sixty_rooms_of_one_address_have_what_two_have() -> None:
+    """SPEC A444: a stranger's sixty rooms had sixty turns for each of somebody else's."""
+    world = World()
+    mine = world.room("mine", "198.51.100.1")
+    many = [world.room(f"r{k}", "203.0.113.7") for k in range(60)]
+    world.churning += [(room, 0.01, 0.0) for room in (mine, *many)]
+    world.run(60.0)
+    theirs = [world.slices.get(room, 0.0) for room in many]
+    assert abs(sum(theirs) - 2 * world.slices[mine]) < 4 * AHEAD
+    assert min(theirs) > 0.25 * max(theirs), "they share evenly"
+
+
+def test_a_room_settles_while_a_stranger_opens_one_after_another() -> None:
+    """SPEC A444: who comes begins level with who was there, so each new room was one more that came first."""
+    alone = World()
+    light = alone.room("light", "198.51.100.1")
+    alone.ask(light, 0.018)
+    alone.run(1.0)
+    [by_itself] = alone.settled["light"]
+    world = World()
+    light = world.room("light", "198.51.100.1")
+    for k in range(60):
+        world.ask(world.room(f"r{k}", "203.0.113.7"), 0.018)
+    world.ask(light, 0.018)
+    world.run(60.0)
+    [settled] = world.settled["light"]
+    assert settled < 3 * by_itself + 3 * AHEAD
+
+
+def test_a_room_is_of_whoever_draws_in_it() -> None:
+    """SPEC A444: the rooms of one address, opened by others, share as if they had been opened from there."""
+    world = World()
+    mine = world.room("mine", "198.51.100.1")
+    many = [world.room(f"r{k}", f"203.0.113.{k}") for k in range(20)]
+    for room in many:
+        world.worker.move(room, "192.0.2.9")
+    world.churning += [(room, 0.01, 0.0) for room in (mine, *many)]
+    world.run(30.0)
+    assert abs(sum(world.slices.get(room, 0.0) for room in many) - 2 * world.slices[mine]) < 4 * AHEAD
+    for room in many:
+        world.worker.remove(room)
+    assert set(world.worker._tally.homes) == {"198.51.100.1"}
+
+
 def test_time_that_nobody_wanted_is_held_against_nobody_and_not_saved_up() -> None:
     world = World()
     old, new = world.room("old"), world.room("new")
     world.churning.append((old, 0.05, 0.0))
     world.run(100.0)
-    assert world.worker._tally.rooms[old].seconds > 90
+    assert world.worker._tally.rooms[old].time.seconds > 90
     world.churning.append((new, 0.05, 0.0))
     world.slices.clear()
     world.run(20.0)

@@ -16,8 +16,8 @@ from esker.session.ground import effects as does
 from esker.session.ground import machine, schedule, states
 from esker.session.ground.effects import Effect, Event
 from esker.session.ground.jobs import Job
-from esker.session.ground.schedule import Tally
 from esker.session.ground.states import Early, Ground, Idle, Previewing, Settling
+from esker.session.ground.tally import PATIENCE, Tally
 
 SETTINGS = c.TerrainSettings()
 FLAT = np.zeros((1, 1), dtype=np.float32)
@@ -110,13 +110,13 @@ def test_settling_gets_its_share_while_others_draw_without_end() -> None:
         desk.slice(0.02)
         if (settling, "2s") in desk.log:
             break
-    assert desk.now < 4 * 3 * schedule.PATIENCE
+    assert desk.now < 4 * 3 * PATIENCE
 
 
 def test_a_coarse_preview_waits_for_one_slice_of_a_big_terrain_however_long_they_are() -> None:
     desk = Desk()
     big = desk.room(6)
-    desk.pace[big] = 4 * schedule.PATIENCE
+    desk.pace[big] = 4 * PATIENCE
     desk.ask(big)
     desk.until(big, "6")
     small = [desk.room() for _ in range(4)]

@@ -15,7 +15,7 @@ import pytest
 from esker import contract as c
 from esker.events import BaseLevel, ChannelLevel, Done, Pause, Preview, Settled
 from esker.session.ground import effects as does
-from esker.session.ground import machine, schedule, states
+from esker.session.ground import machine, states
 from esker.session.ground.effects import Effect, Event
 from esker.session.ground.jobs import Attempt, Job
 from esker.session.ground.states import (
@@ -33,6 +33,7 @@ from esker.session.ground.states import (
     State,
     Waiting,
 )
+from esker.session.ground.tally import Favour, Home, Tally, Time, Used
 
 NOW = 10.0
 TOP = 2
@@ -200,7 +201,7 @@ def test_the_table_has_every_state_event_and_effect() -> None:
 
 def test_states_are_small_values() -> None:
     """SPEC P461: at most six fields each, none of which is ever assigned to."""
-    for kind in (*get_args(State), Ground, Jobs, Channels, Shown, Early, schedule.Used, schedule.Tally):
+    for kind in (*get_args(State), Ground, Jobs, Channels, Shown, Early, Used, Time, Home, Favour, Tally):
         assert len(fields(kind)) <= 6, kind
         assert kind.__dataclass_params__.frozen, kind
 

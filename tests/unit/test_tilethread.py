@@ -7,7 +7,7 @@ from concurrent.futures import CancelledError
 
 import pytest
 
-from esker.session.ground.tilethread import TileThread
+from esker.session.ground.tilethread import Lane, TileThread
 
 
 def test_what_is_first_runs_before_what_waits_and_each_in_its_order() -> None:
@@ -47,3 +47,61 @@ def test_shutting_down_may_drop_what_waits() -> None:
     running.result(60)
     with pytest.raises(CancelledError):
         waiting.result(60)
+
+
+class Held:
+    """A thread that is held while work is given to it, and what it then did."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+        self.log: list[str] = []
+        self.thread, self._gate = TileThread(now=lambda: self.now), threading.Event()
+        started = threading.Event()
+        self.thread.first(lambda: (started.set(), self._gate.wait()))
+        assert started.wait(60)
+
+    def lane(self, home: str) -> Lane:
+        lane = self.thread.lane()
+        lane.home = home
+        return lane
+
+    def done(self) -> list[str]:
+        self._gate.set()
+        self.thread.shutdown()
+        return self.log
+
+
+def test_sixty_rooms_of_one_address_have_one_turn_before_the_next() -> None:
+    """SPEC A445: levels of sixty new rooms lay before the one that somebody waited for."""
+    held = Held()
+    for k in range(60):
+        held.lane("stranger").first(held.log.append, f"s{k}")
+    mine = held.lane("me")
+    for name in ("m0", "m1"):
+        mine.first(held.log.append, name)
+    done = held.done()
+    assert max(done.index("m0"), done.index("m1")) <= 3
+    assert len(done) == 62
+    assert [name for name in done if name[0] == "s"] == [f"s{k}" for k in range(60)]
+
+
+def test_frames_come_while_levels_of_another_address_come_without_end() -> None:
+    """SPEC A445: frames were made only when no level of anybody waited."""
+    held = Held()
+    stranger, mine = held.lane("stranger"), held.lane("me")
+    for k in range(6):
+        stranger.first(held.log.append, f"s{k}")
+    for name in ("f0", "f1"):
+        mine.submit(held.log.append, name)
+    held.now = 1.0
+    assert held.done() == ["f0", "s0", "f1", "s1", "s2", "s3", "s4", "s5"]
+
+
+def test_frames_of_who_has_levels_wait_for_these() -> None:
+    """SPEC A445, P59: within one address levels go first, however long frames have waited."""
+    held = Held()
+    lane = held.lane("me")
+    lane.submit(held.log.append, "f")
+    held.now = 1.0
+    lane.first(held.log.append, "l")
+    assert held.done() == ["l", "f"]

@@ -31,7 +31,7 @@ log = logging.getLogger("esker.exporting")
 OPEN: Final = Share(12, address=8, network=10, link=4)
 """Exports that wait or are made at a time, of the whole server; one is made, the others wait for their turn."""
 OPEN_IN_ROOM: Final = Share(4, address=2, network=2, link=2, reserve=(2, 1))
-"""Of these those of one terrain: links to look have two at most, whoever draws has three, and the last is an owner's."""
+"""Of these those of one terrain: links to look have two at most, who draws has three, and the last is an owner's."""
 KEPT_SECONDS: Final = 10 * 60.0
 """How long a file, or why there is none, can be asked for."""
 KEPT_BYTES: Final = 1 << 30

@@ -27,7 +27,7 @@ from esker import contract as c
 from esker.events import Level, Preview
 from esker.grid import TileKey
 from esker.session.ground.ports import ClientTiles, FrameOutlet, Tiles
-from esker.session.ground.tilethread import TileThread
+from esker.session.ground.tilethread import Lane, TileThread
 from esker.tiles.delivery import RefinedTile
 
 log = logging.getLogger("esker.feed")
@@ -73,7 +73,7 @@ class TileFeed:
         size_m: float,
         levels: int,
         finest: int,
-        executor: TileThread,
+        executor: Lane | TileThread,
         loop: asyncio.AbstractEventLoop,
         on_level: Callable[[int, int, bool], None],
         on_requests: Callable[[int, bool], None],

@@ -4,7 +4,8 @@ the smallest terrains first: interleaved, all of them would come late.
 
 That order is among rooms that have had about as much time as each other. A room that has had ``AHEAD`` more than one
 that waits comes behind it, whatever it waits for: however much work a room makes, it takes its share and no more. Idle
-time is not saved up: a room that comes back begins level with those that are busy.
+time is not saved up: a room that comes back begins level with those that are busy. Rooms of one address share what one
+or two rooms have (``tally.py``).
 
 A lower class that has waited for ``PATIENCE`` gets a slice all the same, so nothing starves. A solve in progress holds
 memory, so only so many may be in progress as fit the budget: a room that waits for its coarse preview ends the settling
@@ -17,86 +18,25 @@ Everything here is a pure function of the grounds of all rooms, the time, and a 
 
 from __future__ import annotations
 
-import math
-from collections.abc import Hashable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import Any, Final, Generic, TypeVar
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Final
 
 from esker.grid import solve_bytes
 from esker.process import memory
 from esker.session.ground import states
 from esker.session.ground.states import COARSE, FINER, REFINE, Ground, Previewing
+from esker.session.ground.tally import PATIENCE, Room, Tally, Used
 
-PATIENCE: Final = 0.150
 AHEAD: Final = 0.500
 """Seconds of the solver by which a room may be ahead of one that waits: a few passes of an ordinary terrain."""
 BUDGET, BUDGET_SHARE = 1 << 30, 12
 """Bytes for solves in progress, of all rooms together."""
 
-Room = TypeVar("Room", bound=Hashable)
-
 
 def default_budget() -> int:
     """Returns the bytes for solves in progress on this machine."""
     return min(BUDGET, memory.available_bytes() // BUDGET_SHARE)
-
-
-@dataclass(frozen=True)
-class Used:
-    """Time of the solver that one room had.
-
-    turn: number of its last slice, where slices of all rooms are counted. began: number of the slice at which its solve
-    began. ran_at: when it had its last slice, or began to wait. seconds: how long it had, when it is
-    compared with others that are busy. is_busy: whether it had something to do when the tally was last levelled.
-    is_spared: its solve has made room for another one already, and is not made to a second time.
-    """
-
-    turn: int = 0
-    began: int = 0
-    ran_at: float = 0.0
-    seconds: float = 0.0
-    is_busy: bool = False
-    is_spared: bool = False
-
-
-@dataclass(frozen=True)
-class Tally(Generic[Room]):
-    """Time of the solver that all rooms had.
-
-    budget: bytes for their solves. turns: slices so far. least: the least time used of the rooms that were busy at the
-    last choice. favoured: the room that was chosen out of turn, and the next one not before ``favour_after``.
-    """
-
-    budget: int
-    rooms: Mapping[Room, Used] = field(default_factory=dict)
-    turns: int = 0
-    least: float = 0.0
-    favoured: Room | None = None
-    favour_after: float = -math.inf
-
-    def noted(self, room: Room, **what: Any) -> Tally[Room]:
-        """Returns the tally with something else noted of one room."""
-        return replace(self, rooms={**self.rooms, room: replace(self.rooms[room], **what)})
-
-    def opened(self, room: Room) -> Tally[Room]:
-        """Returns the tally with a room that comes."""
-        return replace(self, rooms={**self.rooms, room: Used()})
-
-    def closed(self, room: Room) -> Tally[Room]:
-        """Returns the tally without a room that goes."""
-        return replace(self, rooms={other: had for other, had in self.rooms.items() if other != room})
-
-    def ended(self, room: Room, now: float) -> Tally[Room]:
-        """Returns the tally after the slice of a room, which waits from now on.
-
-        After a slice out of turn the other rooms have at least as long.
-        """
-        had = self.rooms.get(room)
-        if had is None:
-            return self
-        took = now - had.ran_at
-        tally = self.noted(room, seconds=had.seconds + took, ran_at=now)
-        return replace(tally, favour_after=now + max(PATIENCE, took)) if room is self.favoured else tally
 
 
 Grounds = Mapping[Room, Ground]
@@ -107,19 +47,17 @@ def choose(grounds: Grounds[Room], now: float, tally: Tally[Room]) -> tuple[Room
     found = ((states.stage(ground, now), room) for room, ground in grounds.items())
     staged = [(stage, room) for stage, room in found if stage is not None and _fits(room, stage, grounds, now, tally)]
     waiting = {room for stage, room in staged if stage != REFINE} or {room for _, room in staged}
-    tally = _levelled(waiting, tally)
+    tally = tally.levelled(waiting)
     if not staged:
         return None, tally
-    rooms = tally.rooms
-    least = min(rooms[room].seconds for room in waiting)
-    # a room that has had more than its share waits
-    staged = [(stage, room) for stage, room in staged if rooms[room].seconds <= least + AHEAD]
+    rooms, level = tally.rooms, tally.within(waiting, AHEAD)
+    staged = [(stage, room) for stage, room in staged if room in level]  # who has had more than its share waits
     stage, best = min(staged, key=lambda s: (s[0], *_order(s[0], grounds[s[1]], rooms[s[1]])))
     late = [room for other, room in staged if other > stage and now - rooms[room].ran_at > PATIENCE]
-    if not late or now <= tally.favour_after:
-        return best, replace(tally, favoured=None)
+    if not late or now <= tally.favour.after:
+        return best, replace(tally, favour=replace(tally.favour, room=None))
     best = min(late, key=lambda room: rooms[room].turn)
-    return best, replace(tally, favoured=best)
+    return best, replace(tally, favour=replace(tally.favour, room=best))
 
 
 def begin(
@@ -153,23 +91,6 @@ def has_something_else(room: Room, grounds: Grounds[Room]) -> bool:
         or (other is not room and (states.is_solving(ground) or isinstance(ground.state, states.ChannelsOnly)))
         for other, ground in grounds.items()
     )
-
-
-def _levelled(waiting: set[Room], tally: Tally[Room]) -> Tally[Room]:
-    """Levels the tally: a room that comes begins with the least time of those that were busy.
-
-    ``waiting``: all rooms that wait for more than refinement, since refinement waits for them.
-    """
-    rooms = tally.rooms
-    least = max(tally.least, min((rooms[x].seconds for x in waiting if rooms[x].is_busy), default=0.0))
-    changed = {
-        room: replace(had, is_busy=not had.is_busy, seconds=max(had.seconds, least if room in waiting else 0.0))
-        for room, had in rooms.items()
-        if had.is_busy != (room in waiting)
-    }
-    if changed:
-        return replace(tally, least=least, rooms={**rooms, **changed})
-    return tally if least == tally.least else replace(tally, least=least)
 
 
 def _order(stage: int, ground: Ground, had: Used) -> tuple[int, int]:
@@ -208,14 +129,13 @@ def _may_begin(room: Room, stage: int, grounds: Grounds[Room], now: float, tally
 def _settling(room: Room, stage: int, grounds: Grounds[Room], tally: Tally[Room]) -> list[Room]:
     """Others whose solves may end for its: that are only settling, have had no less time (for more than a coarse
     preview: too much) and were not ended before; longest first."""
-    rooms = tally.rooms
-    had = rooms[room].seconds if stage == COARSE else rooms[room].seconds + AHEAD
+    least = 0.0 if stage == COARSE else AHEAD
     found = [
         other
         for other in _solving(room, grounds)
         if not isinstance(grounds[other].state, Previewing)
-        and not rooms[other].is_spared
-        and rooms[other].seconds >= had
+        and not tally.rooms[other].is_spared
+        and tally.ahead(other, room) >= least
     ]
     return sorted(found, key=lambda other: grounds[other].shown.finest_at)
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from typing import Final, TypeVar
 
 from esker.events import Level, Preview
@@ -23,8 +23,8 @@ from esker.session.ground.jobs import Job
 from esker.session.ground.ports import Refinement, Solver, SolverFactory, Tidying
 from esker.session.ground.recovery import LAST_RESORT, Devices, Diagnose, unknown
 from esker.session.ground.repairs import Repairs
-from esker.session.ground.schedule import Tally
 from esker.session.ground.states import Ground
+from esker.session.ground.tally import Tally
 
 log = logging.getLogger("esker.worker")
 
@@ -96,6 +96,7 @@ class Worker:
         limit: Callable[[int], None] | None = None,
         confirm: Callable[[int, int], None] | None = None,
         note: Callable[[int, Preview], None] | None = None,
+        home: Hashable = None,
     ) -> Client:
         """A new room. All callbacks are called in the worker's thread.
 
@@ -103,12 +104,18 @@ class Worker:
         ``tell(sentence)``: something went wrong, or right again. ``limit(top)``: from now on levels 0..top come, as
         finer ones do not fit the device, or fit it again. ``refinement``: who wants tiles above the global levels.
         ``confirm(clock, top)``: the heights that were delivered last are those of this job too; its channels have come.
+        ``home``: for whom the room's work is done (``tally.py``).
         """
         client = Client(levels, deliver, tell, refinement, limit, confirm, note)
         with self._changed:
             self._grounds[client] = client.ground
-            self._tally = self._tally.opened(client)
+            self._tally = self._tally.opened(client, home)
         return client
+
+    def move(self, client: Client, home: Hashable) -> None:
+        """From now on the room's work is done for another home."""
+        with self._changed:
+            self._tally = self._tally.moved(client, home)
 
     def request(self, client: Client, job: Job) -> None:
         """Takes the newest job of a room. It replaces the job that waits or runs."""

@@ -291,9 +291,9 @@ async def _in_a_thread(work: Callable[..., Any], *arguments: Any) -> Any:
     return await asyncio.to_thread(work, *arguments)
 
 
-MakeRoom = Callable[[HistoryCore, Callable[[], None], Present | None], HistoryRoom]
+MakeRoom = Callable[[HistoryCore, Callable[[], None], Present | None, str], HistoryRoom]
 """Makes the room over a core; the second is to be called when nobody is left in it, the third says what is there now,
-where only that may be shown."""
+where only that may be shown, the last is the address for which its work is done."""
 
 
 class HistoryRooms:
@@ -340,7 +340,9 @@ class HistoryRooms:
                 raise Denied("no_terrain", "There is no such terrain on this server.")
             still = None if present is None else viewing.things(await present())
             demand()
-            room = self._make(HistoryCore(loaded, self._claims, still, hide), lambda: self._close(room), present)
+            room = self._make(
+                HistoryCore(loaded, self._claims, still, hide), lambda: self._close(room), present, who.site
+            )
         except DamagedTerrain as error:
             place.release()
             raise Denied("server_error", "The journal of this terrain is damaged; nothing was changed.") from error

@@ -227,7 +227,8 @@ class Hub:
             lesson=lesson,
         )
         desk = Desk(partial(self.read, SERVER), partial(self._end_code_link, terrain))
-        return Room(core, journal=self.journal, on_empty=lambda: self._empty(terrain), desk=desk, **self._needs())
+        needs = self._needs() | {"desk": desk, "home": who.site}
+        return Room(core, journal=self.journal, on_empty=lambda: self._empty(terrain), **needs)
 
     def _lesson(self, terrain: str) -> Lesson:
         """The lesson of a terrain as the database has it."""
@@ -263,9 +264,9 @@ class Hub:
         )
 
     def _history_room(
-        self, core: HistoryCore, on_empty: Callable[[], None], present: Present | None = None
+        self, core: HistoryCore, on_empty: Callable[[], None], present: Present | None = None, home: str = ""
     ) -> HistoryRoom:
-        more = {"idle_seconds": c.HISTORY_IDLE_SECONDS, "present": present} | self._needs()
+        more = {"idle_seconds": c.HISTORY_IDLE_SECONDS, "present": present, "home": home} | self._needs()
         return HistoryRoom(core, journal=self.journal, on_empty=on_empty, **more)
 
     def _needs(self) -> dict[str, Any]:

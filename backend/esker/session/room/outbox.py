@@ -36,7 +36,7 @@ class Long:
 
 
 class Waiting:
-    """A count of the bytes that wait to be sent: of the whole server, and by address and link of those for whom they wait.
+    """A count of the bytes that wait to be sent: of the whole server, and by address and link of those who get them.
 
     An address has a quarter of all, a link too, a /48 half. Whoever makes others' pages fall behind thus fills up a
     share and not the server.

@@ -16,6 +16,7 @@ from esker import contract as c
 from esker.contract import Role
 from esker.document.ops import Refusal
 from esker.document.revisions import revision
+from esker.fairness.shares import Who
 from esker.session.ground.base_builder import Layers
 from esker.session.ground.feed import Stream, TileFeed
 from esker.session.ground.ports import Elevation, Tiles
@@ -63,16 +64,20 @@ class Room:
         elevation: Elevation | None = None,
         base_threads: Executor | None = None,
         desk: Desk | None = None,
+        home: str = "",
     ) -> None:
         """``elevation`` makes the base of the layers, in a thread of ``base_threads``; without them nothing is laid.
-        ``desk``: what a lesson asks of the server."""
+        ``desk``: what a lesson asks of the server; ``home``: the address of who opened it, for whom its work is done
+        until somebody comes who draws."""
         self.core, self.info = core, info
         self.id = core.document.id
         self._journal, self._worker, self._on_empty = journal, worker, on_empty
         self._loop = asyncio.get_running_loop()
         size_m = core.document.settings.size_m
+        self._home, self._lane = home, executor.lane()
+        self._lane.home = home or None
         self._feed = TileFeed(
-            tiles, size_m, info.levels, info.finest, executor, self._loop, self._level_taken, self._requests_changed
+            tiles, size_m, info.levels, info.finest, self._lane, self._loop, self._level_taken, self._requests_changed
         )
         refinement = self._feed if info.finest > info.levels else None
         self._solve_client = worker.add(
@@ -83,6 +88,7 @@ class Room:
             limit=self._feed.limit,
             confirm=self._feed.confirm,
             note=self._feed.note,
+            home=home or None,
         )
         self._layers = Layers(elevation, base_threads, self._loop, self._laid, self._tell, self._slow_changed)
         self._job: Job | None = None
@@ -137,11 +143,19 @@ class Room:
                 self.conducting.tell()  # somebody waits to be let in
             raise
         outbox.message(self._newest_progress())
+        self._works_for(member)
         guest = Guest(member, self._feed.add(outbox))
         self.conducting.joined(member)
         self._active_at = self._loop.time()
         self._presence_soon()
         return guest
+
+    def _works_for(self, member: Member) -> None:
+        """The room's work is done for the address of who came last to draw, or drew: many rooms of one share turns."""
+        home = Who(member.address).site
+        if home and home != self._home and member.role != "view":
+            self._home = self._lane.home = home
+            self._worker.move(self._solve_client, home)
 
     def leave(self, guest: Guest) -> None:
         """Lets a client go whose connection ended."""
@@ -166,6 +180,7 @@ class Room:
         match event:
             case protocol.Accepted(ops):
                 if self.core.submit(guest.member, ops):
+                    self._works_for(guest.member)
                     self._ordered()
             case protocol.Refused(op_id, code, message):
                 self.core.refuse(guest.member, op_id, code, message)
