@@ -171,7 +171,7 @@ def test_links_to_look_leave_exports_of_a_terrain_to_those_who_draw(live: LiveSe
     ]
 
     def asks(address: str, key: str, client: str) -> int:
-        return ask(live, address, "POST", f"/api/terrains/{terrain}/exports?client={client}", WISH, key)[0]
+        return ask(live, address, "POST", f"/api/terrains/{terrain}/exports?client={client}", WANTED, key)[0]
 
     assert [asks(STRANGER, made[0], f"s{i}") for i in range(4)] == [202, 202, 503, 503]
     assert asks("198.51.100.20", made[1], "other") == 503, "all links to look together have no more"
