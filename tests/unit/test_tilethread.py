@@ -57,7 +57,12 @@ class Held:
         self.log: list[str] = []
         self.thread, self._gate = TileThread(now=lambda: self.now), threading.Event()
         started = threading.Event()
-        self.thread.first(lambda: (started.set(), self._gate.wait()))
+
+        def hold() -> None:
+            started.set()
+            self._gate.wait()
+
+        self.thread.first(hold)
         assert started.wait(60)
 
     def lane(self, home: str) -> Lane:
