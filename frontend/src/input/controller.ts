@@ -61,7 +61,7 @@ interface Main {
 
 /** CSS pixels a pointer may tremble within a click. */
 const CLICK_PX = 4;
-const FLUSH: Readonly<Record<Exclude<ToolId, "select" | "paint">, string>> = {
+const FLUSH: Readonly<Record<Exclude<ToolId, "select" | "paint" | "course">, string>> = {
   mountain: "This line lies on the ground. Draw it up into the air, or drag its middle handle up.",
   crevice: "This line lies on the ground. Draw it as a hollow, or drag its middle handle down.",
   plateau: "This plateau lies level with the ground. Drag its handle up to raise it.",
@@ -313,7 +313,7 @@ export class InputController {
     // A person with the brush goes on painting: keys and inspector stay with the brush.
     const tool = this.tool.value;
     this.selection.value = tool === "paint" ? null : made.id;
-    if (!made.flush || tool === "paint" || tool === "select") return;
+    if (!made.flush || tool === "paint" || tool === "course" || tool === "select") return;
     this.tool.value = "select";
     this.#o.onMessage(FLUSH[tool]);
   }

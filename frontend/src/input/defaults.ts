@@ -1,13 +1,14 @@
 /** The values that a new stroke starts with, per tool: signals that the inspector writes and the stroke tool reads. */
 
 import { type Signal, signal } from "@preact/signals-core";
-import type { Flank, Paint, Stroke } from "../generated/contract.ts";
-import { DEFAULT_EXTENT_FRACTION, DEFAULT_SLOPE_DEG } from "../generated/contract.ts";
+import type { Course, Flank, Paint, Stroke } from "../generated/contract.ts";
+import { DEFAULT_COURSE_GRADE, DEFAULT_EXTENT_FRACTION, DEFAULT_SLOPE_DEG } from "../generated/contract.ts";
+import type { CourseStyle } from "./sketch/courseline.ts";
 import { brushRadius } from "./tools/painttool.ts";
 
 export type DrawToolId = "mountain" | "crevice" | "plateau";
 /** Tools that put strokes on the ground. */
-export type PenToolId = DrawToolId | "paint";
+export type PenToolId = DrawToolId | "paint" | "course";
 
 /** Cross-section and noise of the next stroke of a tool. */
 export type ToolStyle = Pick<Stroke, "left" | "right" | "plateau_radius_m" | "amplitude_m" | "roughness">;
@@ -18,6 +19,8 @@ export interface ToolDefaults {
   readonly plateau: Signal<ToolStyle>;
   /** The brush. */
   readonly paint: Signal<Paint>;
+  /** The river, road or ridge that is drawn next. */
+  readonly course: Signal<CourseStyle>;
   /** The property that the pressure of a pen changes: the extent of flanks, the radius of the brush. */
   readonly pressure: Signal<"none" | "extent">;
 }
@@ -36,6 +39,14 @@ function style(slopeDeg: number, extentM: number, plateauRadiusM: number): ToolS
   return { left: flank, right: { ...flank }, plateau_radius_m: plateauRadiusM, amplitude_m: 0, roughness: 0.5 };
 }
 
+/** What a course of a use begins with on a terrain of `sizeM` metres. */
+export function courseStyle(use: Course["use"], sizeM: number): CourseStyle {
+  const grade = DEFAULT_COURSE_GRADE;
+  if (use === "road") return { use, widthM: sizeM / 320, bankM: sizeM / 100, depthM: 0, grade };
+  if (use === "ridge") return { use, widthM: 0, bankM: sizeM / 20, depthM: sizeM / 50, grade };
+  return { use, widthM: sizeM / 320, bankM: sizeM / 50, depthM: sizeM / 512, grade };
+}
+
 /** The defaults for a terrain of `sizeM` metres. */
 export function toolDefaults(sizeM: number): ToolDefaults {
   return {
@@ -43,6 +54,7 @@ export function toolDefaults(sizeM: number): ToolDefaults {
     crevice: signal(style(CREVICE_SLOPE_DEG, sizeM * CREVICE_EXTENT_FRACTION, 0)),
     plateau: signal(style(PLATEAU_SLOPE_DEG, sizeM * DEFAULT_EXTENT_FRACTION, sizeM / 40)),
     paint: signal({ channel: "snow", value: BRUSH_VALUE, radius_m: brushRadius(sizeM * BRUSH_RADIUS, sizeM) }),
+    course: signal(courseStyle("river", sizeM)),
     pressure: signal("extent"),
   };
 }

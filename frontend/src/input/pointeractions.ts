@@ -64,6 +64,7 @@ const PICKS: Readonly<Record<ToolId, PickOrder>> = {
   crevice: ["land"],
   plateau: ["land"],
   paint: ["paint"],
+  course: ["land"],
 };
 const VIEW_ONLY = "This link lets you look, not draw. Ask for an edit link to change the terrain.";
 const LOCKED = "This stroke is locked. Unlock it to change it.";

@@ -1,7 +1,7 @@
 /** Stroke and member colours as renderers take them: sRGB components in 0..1. */
 
 import type { Rgba } from "../../core/types.ts";
-import type { Paint, StrokeKind } from "../../generated/contract.ts";
+import type { Course, Paint, StrokeKind } from "../../generated/contract.ts";
 import { SUBSTANCES } from "../words/paints.ts";
 
 /** Paper 0, figure 6: mountains and crevices in blue, plateaus in red. */
@@ -16,8 +16,15 @@ export function paintColour({ channel, value }: Paint): Rgba {
   return [r * k, g * k, b * k, 1];
 }
 
+const COURSES: Readonly<Record<Course["use"], Rgba>> = {
+  river: [0.12, 0.55, 0.86, 1],
+  road: [0.55, 0.45, 0.34, 1],
+  ridge: MOUNTAIN,
+};
+
 /** The colour of a finished stroke by what it makes of the land. */
-export function strokeColour(kind: StrokeKind, sinks: boolean): Rgba {
+export function strokeColour(kind: StrokeKind, sinks: boolean, use?: Course["use"]): Rgba {
+  if (use !== undefined) return COURSES[use];
   if (kind === "level") return PLATEAU;
   return sinks ? CREVICE : MOUNTAIN;
 }

@@ -132,7 +132,7 @@ export function strokeVisuals(doc: Doc, marks: Marks, people: People, ground: Gr
       ? hexColour(author)
       : stroke.paint
         ? paintColour(stroke.paint)
-        : strokeColour(stroke.kind, sinks);
+        : strokeColour(stroke.kind, sinks, stroke.course?.use);
     const alpha = calm ? calmAlpha(marks.tool, stroke) : 1;
     out.push({
       id: stroke.id,

@@ -3,6 +3,7 @@
 import { worldPoints } from "../../doc/strokes.ts";
 import type { Stroke } from "../../generated/contract.ts";
 import { reliefOf } from "../view/scene.ts";
+import { courseFacts } from "./course-words.ts";
 import { paintName } from "./paints.ts";
 import { height, metres } from "./words.ts";
 
@@ -12,6 +13,10 @@ export function penWords(stroke: Stroke): string | null {
   const line = worldPoints(stroke);
   if (stroke.paint !== null)
     return `${paintName(stroke.paint)}, ${metres(2 * stroke.paint.radius_m)} wide, ${metres(alongOf(line))} long`;
+  if (stroke.course !== null) {
+    const facts = courseFacts(stroke).map(({ name, text }) => `${name.toLowerCase()} ${text}`);
+    return facts.length === 0 ? null : facts.join(", ");
+  }
   if (stroke.kind === "level") return `at ${height(stroke.first[2])}, ${metres(alongOf(line))} round`;
   const relief = reliefOf(stroke);
   return `${Math.abs(relief).toFixed(0)} m ${relief < 0 ? "deep" : "high"}, ${metres(spanOf(line))} long`;

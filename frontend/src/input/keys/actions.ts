@@ -11,6 +11,7 @@ const TOOL_TITLES: Readonly<Record<ToolId, string>> = {
   crevice: "Draw crevices",
   plateau: "Draw plateaux",
   paint: "Paint snow, plants, wetness and roughness",
+  course: "Draw rivers, roads and ridges over the ground",
 };
 
 /** Builds the map of actions. Its owner may add more (page-only ones such as the help dialog). */
@@ -30,6 +31,7 @@ export function createActions(c: ActionContext): Map<string, Action> {
     ["crevice", ["c", "2"]],
     ["plateau", ["p", "3"]],
     ["paint", ["k", "4"]],
+    ["course", ["j", "5"]],
   ] as const)
     put(id, TOOL_TITLES[id], [...keys], () => {
       c.tool.value = id;

@@ -5,7 +5,9 @@ import { along, rayPlane } from "../../core/geometry.ts";
 import { distance } from "../../core/math.ts";
 import type { Ground, Ray, Vec3 } from "../../core/types.ts";
 import type { Op, Stroke } from "../../generated/contract.ts";
+import { bank } from "../sketch/courseline.ts";
 import { anchorOn, curveOps, metres, roundCurve, solvedHeight } from "../sketch/strokeops.ts";
+import { vertexOps } from "./coursedrag.ts";
 import {
   across,
   crestIndex,
@@ -56,6 +58,10 @@ export class HandleDrag {
   /** The ops for the pointer at (x, y); `both` drags equal flanks together. Empty when the place makes no sense. */
   ops(x: number, y: number, both = true): Op[] {
     const ray = this.#o.camera.ray(x + this.#dx, y + this.#dy);
+    const { stroke, ground } = this.#o;
+    if (stroke.course !== null && this.kind.startsWith("vertex-"))
+      return vertexOps(stroke, Number(this.kind.slice(7)), both ? this.#onGround(ray) : this.#rise(ray, y), ground);
+    if (stroke.course !== null && this.kind === "radius") return this.#bank(ray);
     switch (this.kind) {
       case "first":
       case "last":
@@ -69,13 +75,14 @@ export class HandleDrag {
         return this.#radius(ray);
       case "move":
         return this.#move(ray);
+      default:
+        return [];
     }
   }
 
   #anchor(ray: Ray, which: "first" | "last"): Op[] {
     const { stroke, ground } = this.#o;
-    const hit = ground.raycast(ray);
-    const point = hit !== null && distance(ray.origin, hit) <= FAR * this.#range ? hit : this.#drop(ray);
+    const point = this.#onGround(ray);
     if (point === null) return [];
     const to = anchorOn(ground, point);
     if (stroke.kind === "profile") return [{ type: "stroke.anchor", stroke: stroke.id, which, to }];
@@ -86,6 +93,12 @@ export class HandleDrag {
     }
     const last = metres([stroke.last[0], stroke.last[1], to[2]]);
     return [{ type: "stroke.set", stroke: stroke.id, fields: { first: to, last } }];
+  }
+
+  /** The ground under the pen; beside it, or far away, the ground under the plane through the handle. */
+  #onGround(ray: Ray): Vec3 | null {
+    const hit = this.#o.ground.raycast(ray);
+    return hit !== null && distance(ray.origin, hit) <= FAR * this.#range ? hit : this.#drop(ray);
   }
 
   /** The pen's point on the camera-facing vertical plane through the handle, dropped on the ground. */
@@ -105,16 +118,28 @@ export class HandleDrag {
   }
 
   #crest(ray: Ray, y: number): Op[] {
-    const { stroke, handle, camera } = this.#o;
+    const rise = this.#rise(ray, y);
+    return rise === null ? [] : raiseOps(this.#o.stroke, rise);
+  }
+
+  /** How far above the handle the pen is, metres; seen from above, how far up on the screen. */
+  #rise(ray: Ray, y: number): number | null {
+    const { handle, camera } = this.#o;
     const steep = camera.state.value.mode === "map" || Math.abs(ray.dir[2]) > 0.978;
-    let rise: number;
-    if (steep) rise = (this.#o.y - y) * camera.metresPerPixelAt(handle.position);
-    else {
-      const point = this.#onFacingPlane(ray);
-      if (point === null) return [];
-      rise = point[2] - handle.position[2];
-    }
-    return raiseOps(stroke, rise);
+    if (steep) return (this.#o.y - y) * camera.metresPerPixelAt(handle.position);
+    const point = this.#onFacingPlane(ray);
+    return point === null ? null : point[2] - handle.position[2];
+  }
+
+  /** Both banks of a course, by where one of them ends. */
+  #bank(ray: Ray): Op[] {
+    const { stroke, ground } = this.#o;
+    const point = this.#onLevel(ray);
+    if (point === null) return [];
+    const [cx, cy] = across(this.#section, 0);
+    const away = Math.hypot(point[0] - cx, point[1] - cy) - stroke.plateau_radius_m;
+    const side = bank(Math.round(10 * Math.max(ground.sizeM / 1024, Math.min(ground.sizeM / 8, away))) / 10);
+    return [{ type: "stroke.set", stroke: stroke.id, fields: { left: side, right: side } }];
   }
 
   #flank(ray: Ray, side: "left" | "right", both: boolean): Op[] {

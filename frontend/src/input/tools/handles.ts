@@ -6,7 +6,7 @@ import { MAX_SLOPE_DEG } from "../../generated/contract.ts";
 import { shapeOf } from "../picking.ts";
 import { solvedHeight } from "../sketch/strokeops.ts";
 
-export type HandleKind = "first" | "last" | "crest" | "left" | "right" | "move" | "radius";
+export type HandleKind = "first" | "last" | "crest" | "left" | "right" | "move" | "radius" | `vertex-${number}`;
 
 export interface HandleVisual {
   readonly id: string;
@@ -76,7 +76,8 @@ function middleOf(points: Float64Array): Section {
   }
   const n = leg(i) || 1;
   const [dx, dy] = [(points[i + 3]! - points[i]!) / n, (points[i + 4]! - points[i + 1]!) / n];
-  return { crest: [points[i]! + left * dx, points[i + 1]! + left * dy, points[i + 2]!], left: [-dy, dx] };
+  const z = points[i + 2]! + (left / n) * ((points[i + 5] ?? points[i + 2]!) - points[i + 2]!);
+  return { crest: [points[i]! + left * dx, points[i + 1]! + left * dy, z], left: [-dy, dx] };
 }
 
 /** The point at a distance across the stroke from the crest; negative is right of the direction of travel. */
@@ -123,6 +124,7 @@ export function flankWithFoot(flank: Flank, relief: number, foot: number): Flank
 export function handlesOf(stroke: Stroke, ground: Ground, active: HandleKind | null): HandleVisual[] {
   if (stroke.curve.length < 2) return [];
   if (stroke.paint !== null) return paintHandles(stroke, stroke.paint, ground, active);
+  if (stroke.course !== null) return courseHandles(stroke, active);
   const section = sectionOf(stroke);
   const out: HandleVisual[] = [];
   const put = (kind: HandleKind, position: Vec3, label: string): void => {
@@ -166,6 +168,29 @@ function paintHandles(stroke: Stroke, paint: Paint, ground: Ground, active: Hand
     handle("move", across(section, 0), "Move"),
     handle("radius", across(section, paint.radius_m), `Radius ${Math.round(paint.radius_m)} m`),
     ...(dab ? [] : [handle("first", [first[0], first[1]], "Start"), handle("last", [last[0], last[1]], "End")]),
+  ];
+}
+
+/** A course of more points than this has handles at some of them, both ends among them. */
+const MOST_VERTICES = 24;
+
+/** Handles of a course: its points, the middle that moves it all, and the end of a bank. */
+function courseHandles(stroke: Stroke, active: HandleKind | null): HandleVisual[] {
+  const { points } = shapeOf(stroke);
+  const section = sectionOf(stroke);
+  const n = stroke.curve.length;
+  const handle = (kind: HandleKind, position: Vec3, label: string): HandleVisual => {
+    return { id: `${stroke.id}/${kind}`, kind, position, label, active: kind === active };
+  };
+  const at = (i: number): Vec3 => [points[3 * i]!, points[3 * i + 1]!, points[3 * i + 2]!];
+  const count = Math.min(n, MOST_VERTICES);
+  const shown = new Set(Array.from({ length: count }, (_, k) => Math.round((k * (n - 1)) / Math.max(1, count - 1))));
+  const bankM = stroke.left?.extent_m ?? 0;
+  const [ex, ey] = across(section, stroke.plateau_radius_m + bankM);
+  return [
+    handle("move", middleOf(points).crest, "Move"),
+    ...(bankM > 0 ? [handle("radius", [ex, ey, section.crest[2]], `Banks ${Math.round(bankM)} m`)] : []),
+    ...[...shown].map((i) => handle(`vertex-${i}`, at(i), `${Math.round(at(i)[2])} m · Alt: height`)),
   ];
 }
 

@@ -11,6 +11,8 @@ import { MAX_POINTS_PER_STROKE, type Op, type Stroke, TICK_MS } from "../../gene
 import { type PenToolId, pressed, type ToolDefaults } from "../defaults.ts";
 import type { Say } from "../say.ts";
 import { beginOnLand } from "../sketch/border.ts";
+import { courseFields, courseOf, courseSection } from "../sketch/courseline.ts";
+import { CourseSketch } from "../sketch/coursesketch.ts";
 import { LevelSketch, RidgeSketch } from "../sketch/levelsketch.ts";
 import { ProfileSketch } from "../sketch/profilesketch.ts";
 import { meanPressure, type Sample, type Sketch, type SketchShape, type SketchStart } from "../sketch/sketch.ts";
@@ -47,6 +49,7 @@ const COLOURS: Readonly<Record<PenToolId, Rgba>> = {
   crevice: [0.2, 0.65, 0.8, 1],
   plateau: [0.95, 0.4, 0.3, 1],
   paint: [0.95, 0.95, 0.98, 1],
+  course: [0.2, 0.65, 0.8, 1],
 };
 
 /** A stroke that has just been drawn. */
@@ -121,7 +124,7 @@ export class StrokeTool {
     const nowMs = this.#o.now();
     const start: SketchStart = { camera: this.#o.camera, ground, hit, sample, nowMs };
     const id = this.newId();
-    const sketch = sketchFor(tool, start);
+    const sketch = this.#sketchFor(tool, start);
     const gesture = `draw-${id}`;
     this.#session = { tool, start, opposite, ground, sketch, id, gesture, pen, begun: false, sentAt: -Infinity };
     return true;
@@ -145,9 +148,13 @@ export class StrokeTool {
   redraw(samples: readonly Sample[]): void {
     const session = this.#session;
     if (session === null || samples.length === 0) return;
-    session.sketch = sketchFor(session.tool, session.start);
+    session.sketch = this.#sketchFor(session.tool, session.start);
     for (const sample of samples) session.sketch.add(sample);
     this.#show(session, []);
+  }
+
+  #sketchFor(tool: PenToolId, start: SketchStart): Sketch & { readonly samples: readonly Sample[] } {
+    return tool === "course" ? new CourseSketch(start, this.#o.defaults.course.value) : sketchFor(tool, start);
   }
 
   #show(session: Session, predicted: readonly Sample[]): void {
@@ -167,7 +174,8 @@ export class StrokeTool {
       this.cancel(); // nothing of the line could be projected
       return null;
     }
-    const flush = session.tool !== "paint" && liesOnGround(points, session.ground, flatness(session.tool, points));
+    const drapes = session.tool === "paint" || session.tool === "course";
+    const flush = !drapes && liesOnGround(points, session.ground, flatness(session.tool, points));
     if (session.begun) {
       this.#submitShape(session, true);
       if (this.#session !== null) this.#submit(session, { type: "stroke.finish", stroke: session.id });
@@ -212,7 +220,6 @@ export class StrokeTool {
       curve: [],
       ...this.#style(session),
       yields: 0,
-      course: null,
       locked: false,
       hidden: false,
       label: "",
@@ -225,13 +232,17 @@ export class StrokeTool {
   #style(session: Session): Style {
     const { defaults } = this.#o;
     const pressure = session.pen && defaults.pressure.value !== "none" ? meanPressure(session.sketch.samples) : null;
+    if (session.tool === "course") {
+      const style = defaults.course.value;
+      return { ...courseSection(style), paint: null, course: { ...courseOf(style), rises: [] } };
+    }
     if (session.tool !== "paint") {
       const base = defaults[session.tool].value;
-      return { ...(pressure === null ? base : pressed(base, pressure)), paint: null };
+      return { ...(pressure === null ? base : pressed(base, pressure)), paint: null, course: null };
     }
     const base = defaults.paint.value;
     const paint = pressure === null ? base : pressedPaint(base, pressure);
-    return { ...NO_SECTION, paint: session.opposite ? { ...paint, value: -paint.value } : paint };
+    return { ...NO_SECTION, paint: session.opposite ? { ...paint, value: -paint.value } : paint, course: null };
   }
 
   /** Submits now if the last time is long enough ago, else when it is; goes on while the plane still turns. */
@@ -252,7 +263,7 @@ export class StrokeTool {
   #submitShape(session: Session, exact: boolean): void {
     const shape = session.sketch.shape(this.#o.now(), exact, exact ? FINAL_POINTS : LIVE_POINTS);
     if (!this.#submitCurve(session, shape)) return;
-    if (exact && session.pen && this.#o.defaults.pressure.value !== "none") {
+    if (exact && session.tool !== "course" && session.pen && this.#o.defaults.pressure.value !== "none") {
       const { left, right, paint } = this.#style(session);
       const fields = paint === null ? { left, right } : { paint };
       this.#submit(session, { type: "stroke.set", stroke: session.id, fields });
@@ -263,6 +274,10 @@ export class StrokeTool {
   /** The curve is that of the line as drawn; its frame stands on the solved ground. */
   #submitCurve(session: Session, shape: SketchShape): boolean {
     session.sentAt = this.#o.now();
+    if (session.tool === "course") {
+      const fields = courseFields(shape.points, courseOf(this.#o.defaults.course.value));
+      return this.#submit(session, { type: "stroke.set", stroke: session.id, fields });
+    }
     const curve = frameCurve(KINDS[session.tool], shape.points, metres(shape.first), metres(shape.last));
     return appendOps(session.id, curve, anchors(session, shape)[1]).every((op) => this.#submit(session, op));
   }
@@ -296,17 +311,19 @@ export class StrokeTool {
   }
 }
 
-type Style = Pick<Stroke, "left" | "right" | "plateau_radius_m" | "amplitude_m" | "roughness" | "paint">;
+type Style = Pick<Stroke, "left" | "right" | "plateau_radius_m" | "amplitude_m" | "roughness" | "paint" | "course">;
 
 const KINDS: Readonly<Record<PenToolId, Stroke["kind"]>> = {
   mountain: "profile",
   crevice: "profile",
   plateau: "level",
   paint: "paint",
+  course: "course",
 };
 
 /** First and last anchor of a shape. The ground was drawn with its detail, which comes on top of what a stroke makes. */
 function anchors({ tool, ground }: Session, shape: SketchShape): [Triple, Triple] {
+  if (tool === "course") return [metres(shape.first), metres(shape.last)];
   const first = anchorOn(ground, shape.first);
   const last = anchorOn(ground, shape.last);
   if (tool === "plateau") last[2] = first[2];

@@ -11,6 +11,7 @@ const TOOLS: readonly { readonly id: ToolId; readonly icon: string; readonly lab
   { id: "mountain", icon: "mountain", label: "Mountain" },
   { id: "crevice", icon: "crevice", label: "Crevice" },
   { id: "plateau", icon: "plateau", label: "Plateau" },
+  { id: "course", icon: "river", label: "River, road or ridge" },
   { id: "paint", icon: "brush", label: "Paint" },
 ];
 
@@ -51,6 +52,7 @@ export class EskTools extends SignalElement {
         background: color-mix(in oklab, var(--esk-plateau) 18%, transparent);
         color: var(--esk-plateau);
       }
+      .course[aria-checked="true"],
       .paint[aria-checked="true"] {
         background: color-mix(in oklab, var(--esk-accent) 18%, transparent);
         color: var(--esk-accent);
@@ -84,9 +86,9 @@ export class EskTools extends SignalElement {
         }
       }
       @media (max-width: 430px) {
-        /* Eight of them beside each other. */
+        /* Nine of them beside each other. */
         .icon-btn {
-          width: min(44px, calc((100vw - 58px) / 8));
+          width: min(44px, calc((100vw - 60px) / 9));
         }
         :host {
           gap: 2px;

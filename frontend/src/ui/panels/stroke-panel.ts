@@ -6,7 +6,13 @@ import "./detail-form.ts";
 import { icon } from "../controls/icons.ts";
 import type { YieldChange } from "./meeting-form.ts";
 import "./meeting-form.ts";
+import { type CourseFact, courseFacts } from "../../app/words/course-words.ts";
 import { kindWord } from "../../app/words/kind-word.ts";
+import { courseStyle } from "../../input/defaults.ts";
+import type { CourseStyle } from "../../input/sketch/courseline.ts";
+import { restyled } from "../../input/tools/coursedrag.ts";
+import type { CourseChange } from "./course-form.ts";
+import "./course-form.ts";
 import type { PaintChange } from "./paint-form.ts";
 import "./paint-form.ts";
 import { reliefOf, shapeOf } from "../../app/view/scene.ts";
@@ -27,10 +33,24 @@ const LISTED = 200;
 const PAINT_BY_MOUSE = "Draw on the ground to paint. Alt, or the other end of a pen, does the opposite.";
 const PAINT_BY_HAND = "Draw on the ground to paint. Remove takes it away again, and so does the other end of a pen.";
 
+const COURSE_LEADS = {
+  river: "Draw along the ground. The bed runs down from its higher end and never rises.",
+  road: "Draw along the ground. The road cuts and fills so that it is nowhere steeper than this.",
+  ridge: "Draw along the ground, in 3D or on the map. It rises along the line.",
+} as const;
+
+/** The measures of a drawn course. */
+function styleOf({ course, left, right, plateau_radius_m }: Stroke): CourseStyle {
+  const { use, grade, depth_m } = course!;
+  const bankM = Math.max(left?.extent_m ?? 0, right?.extent_m ?? 0);
+  return { use, grade, depthM: depth_m, widthM: 2 * plateau_radius_m, bankM };
+}
+
 /** The dot before a stroke's name. */
 function swatch(stroke: Stroke): TemplateResult {
   if (stroke.paint !== null)
     return html`<span class="swatch paint" style=${`background:${SUBSTANCES[stroke.paint.channel].colour}`}></span>`;
+  if (stroke.course !== null) return html`<span class="swatch ${stroke.course.use}"></span>`;
   const tone = stroke.kind === "level" ? "plateau" : shapeOf(stroke).sinks ? "crevice" : "mountain";
   return html`<span class="swatch ${tone}"></span>`;
 }
@@ -81,7 +101,8 @@ export class EskStrokePanel extends SignalElement {
     const beside = tool === "paint" && stroke?.paint === null && canEdit;
     if (stroke && !beside) return this.#selected(stroke);
     if (tool === "paint" && canEdit) return this.#brush();
-    if (tool !== "select" && tool !== "paint" && canEdit) return this.#defaults(tool);
+    if (tool === "course" && canEdit) return this.#nextCourse();
+    if (tool !== "select" && tool !== "paint" && tool !== "course" && canEdit) return this.#defaults(tool);
     return this.#list([...(doc?.strokes.values() ?? [])]);
   }
 
@@ -110,7 +131,13 @@ export class EskStrokePanel extends SignalElement {
       </div>
       ${this.#buttons(stroke, disabled)}
       ${stroke.locked ? html`<p class="note">${icon("lock")} Locked. Unlock it to change it.</p>` : nothing}
-      ${stroke.paint === null ? this.#section(stroke, disabled) : this.#paint(stroke, stroke.paint, disabled)}
+      ${
+        stroke.paint !== null
+          ? this.#paint(stroke, stroke.paint, disabled)
+          : stroke.course !== null
+            ? this.#course(stroke, disabled)
+            : this.#section(stroke, disabled)
+      }
       ${stroke.author ? html`<p class="quiet small">Drawn by ${stroke.author}</p>` : nothing}
     `;
   }
@@ -137,6 +164,38 @@ export class EskStrokePanel extends SignalElement {
         }}
       ></esk-paint-form>
     `;
+  }
+
+  /** The form of a river, a road or a ridge. */
+  #course(stroke: Stroke, disabled: boolean): TemplateResult {
+    const change = (e: CustomEvent<CourseChange>): void =>
+      this.#set(stroke, restyled(stroke, e.detail.style), e.detail.settled);
+    return this.#courseForm(styleOf(stroke), courseFacts(stroke), disabled, change);
+  }
+
+  /** The form for the next river, road or ridge; another use begins with its own measures. */
+  #nextCourse(): TemplateResult {
+    const { course } = this.defaults;
+    const change = ({ detail: { style } }: CustomEvent<CourseChange>): void => {
+      course.value = style.use === course.value.use ? style : courseStyle(style.use, this.sizeM);
+    };
+    return html`<p class="lead">${COURSE_LEADS[course.value.use]}</p>
+      ${this.#courseForm(course.value, [], false, change)}`;
+  }
+
+  #courseForm(
+    value: CourseStyle,
+    facts: readonly CourseFact[],
+    disabled: boolean,
+    change: (e: CustomEvent<CourseChange>) => void,
+  ): TemplateResult {
+    return html`<esk-course-form
+      .value=${value}
+      .facts=${facts}
+      .sizeM=${this.sizeM}
+      ?disabled=${disabled}
+      @change=${change}
+    ></esk-course-form>`;
   }
 
   #section(stroke: Stroke, disabled: boolean): TemplateResult {
