@@ -277,7 +277,7 @@ async def heavy_room(at: Target) -> int:
 async def impossible_numbers(at: Target) -> int:
     """A terrain of one's own with every number at its end, in messages that are well formed."""
     ends = ["1e-300", "5e-324", "1e308", "-1e308", "0", "-0.0", "NaN", "1e999"]
-    fields = ("reach_m", "sea_level_m", "lakes_m", "seed")
+    fields = ("reach_m", "sea_level_m", "lakes_m", "rivers", "wetness", "seed")
     ops = ",".join(
         f'{{"id":"y:{k}","op":{{"type":"terrain.set","fields":{{"{name}":{end}}}}}}}'
         for k, (name, end) in enumerate((name, end) for name in fields for end in ends)

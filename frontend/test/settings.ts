@@ -9,6 +9,8 @@ export const SETTINGS: TerrainSettings = {
   border: "free",
   sea_level_m: null,
   lakes_m: null,
+  rivers: 0,
+  wetness: 1,
   seed: 1,
   look: "natural",
   detail: 1,

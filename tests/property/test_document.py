@@ -104,6 +104,8 @@ terrain_fields = st.fixed_dictionaries(
         "reach_m": st.one_of(st.none(), st.floats(1, 1000)),
         "sea_level_m": st.one_of(st.none(), st.floats(-10, 10)),
         "lakes_m": st.one_of(st.none(), st.floats(0, 50)),
+        "rivers": st.floats(0, c.MAX_RIVERS),
+        "wetness": st.floats(c.MIN_WETNESS, c.MAX_WETNESS),
         "border": st.sampled_from(("free", "pinned")),
         "seed": st.integers(0, 2**32 - 1),
         "detail": st.floats(0, 4),

@@ -15,6 +15,7 @@ USERS = {
     "esker.api.strokes": {"Stroke.profile", "Stroke.level", "Stroke.paint"},
     "esker.api.terrain": {"Terrain", "Terrain.add", "Terrain.assemble", "Terrain.heights", "Terrain.window"},
     "esker.api.terrain_layers": {"TerrainLayers.add_grid", "TerrainLayers.sample"},
+    "esker.api.terrain_water": {"TerrainWater.rivers", "TerrainWater.watershed", "TerrainWater.raindrop"},
     "esker.api.live": {"connect"},
     "esker.solve.solver": {"Solver"},
 }

@@ -98,6 +98,8 @@ def _applies() -> list[tuple[str, Json, Json]]:
         ("terrain sea on", BASE, op("terrain.set", fields={"sea_level_m": 12.5, "look": "desert", "seed": 4294967295})),
         ("terrain sea off", document(sea_level_m=3), op("terrain.set", fields={"sea_level_m": None})),
         ("terrain lakes on", BASE, op("terrain.set", fields={"lakes_m": 4.0})),
+        ("terrain rivers on", BASE, op("terrain.set", fields={"rivers": 1.5, "wetness": 3.0})),
+        ("terrain rivers off", document(rivers=1.0), op("terrain.set", fields={"rivers": 0.0})),
         ("terrain lakes off", document(lakes_m=4.0), op("terrain.set", fields={"lakes_m": None})),
         ("terrain sun", BASE, op("terrain.set", fields={"sun_azimuth_deg": 0, "sun_elevation_deg": 90})),
         ("group is one tick", BASE, op("group", ops=[_set("a", label="1"), _set("m", label="2")])),

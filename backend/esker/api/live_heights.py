@@ -14,8 +14,10 @@ from esker import contract as c
 from esker.api import arguments
 from esker.api.live_layers import Grids
 from esker.api.terrain import Terrain
+from esker.api.terrain_water import Raindrop, Watershed
 from esker.contract import Document
 from esker.document.sync import SyncDoc
+from esker.flow.rivers import River
 from esker.solve.solver import Solver
 
 
@@ -32,6 +34,20 @@ class LiveHeights(ABC):
         """Settled heights of the confirmed document, solved here; see ``Terrain.heights``."""
         level = arguments.whole("level", level, 0, c.MAX_LEVEL)
         return self._offline().heights(level)
+
+    def rivers(
+        self, level: int = c.DEFAULT_LEVEL, many: float | None = None, wetness: float | None = None
+    ) -> tuple[River, ...]:
+        """The rivers of the confirmed document, found here; see ``Terrain.rivers``."""
+        return self._offline().rivers(level, many, wetness)
+
+    def watershed(self, x: float, y: float, level: int = c.DEFAULT_LEVEL) -> Watershed:
+        """What drains through a point of the confirmed document; see ``Terrain.watershed``."""
+        return self._offline().watershed(x, y, level)
+
+    def raindrop(self, x: float, y: float, level: int = c.DEFAULT_LEVEL) -> Raindrop:
+        """The way of a drop on the confirmed document; see ``Terrain.raindrop``."""
+        return self._offline().raindrop(x, y, level)
 
     def assemble(self, level: int) -> Any:
         """The sparse system of the confirmed document; see ``Terrain.assemble``."""

@@ -21,11 +21,11 @@ from numpy.typing import NDArray
 
 from esker import contract, grid
 from esker.api import arguments
-from esker.api.heights import HeightCache, HeightWindow, Solved
-from esker.api.kept_ground import KeptGround, Source
+from esker.api.heights import HeightCache, HeightWindow, KeptGround, Solved, Source
 from esker.api.layers import Patchwork, Sample, held_to, unpacked
 from esker.api.strokes import Stroke
 from esker.api.terrain_layers import TerrainLayers
+from esker.api.terrain_water import TerrainWater
 from esker.contract import Border, Document, TerrainSettings
 from esker.document import archive
 from esker.document.layers import span_m
@@ -50,7 +50,7 @@ def default_solver() -> Solver:
     return _solver
 
 
-class Terrain(TerrainLayers):
+class Terrain(TerrainLayers, TerrainWater):
     """A terrain without a server. Heights are a pure function of ``strokes``, ``layers`` and ``settings``.
 
     Parameters

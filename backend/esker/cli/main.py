@@ -43,6 +43,8 @@ def main(argv: list[str] | None = None) -> int:
         return _run("esker.cli.solve", arguments[1:], _base_of)
     if arguments[:1] == ["export"]:
         return _run("esker.cli.export", arguments[1:])
+    if arguments[:1] == ["flow"]:
+        return _run("esker.cli.flow", arguments[1:])
     if arguments[:1] == ["render"]:
         return _run("esker.cli.render", arguments[1:])
     if arguments[:1] == ["doctor"]:
@@ -85,6 +87,7 @@ def _parser() -> argparse.ArgumentParser:
     commands.add_parser("fork", help="a new terrain as one was at a clock (see esker fork --help)", add_help=False)
     commands.add_parser("solve", help="solve a terrain file into heights (see esker solve --help)", add_help=False)
     commands.add_parser("export", help="a terrain for other programs (see esker export --help)", add_help=False)
+    commands.add_parser("flow", help="the rivers of a terrain as lines (see esker flow --help)", add_help=False)
     commands.add_parser("render", help="draw a terrain: pictures, turntables (see esker render --help)", add_help=False)
     commands.add_parser("doctor", help="what this machine has and lacks (see esker doctor --help)", add_help=False)
     commands.add_parser("bench", help="measure: esker bench NAME --json (without NAME: the list)",

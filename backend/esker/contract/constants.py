@@ -132,6 +132,15 @@ DEFAULT_LAKES_FRACTION: Final = 1.0 / 1024.0
 
 RIVER_AREA_SHARE: Final = 1.0 / 16.0
 """A river drains at least the square of so much of the domain's side, where a terrain asks for one time the rivers."""
+MAX_RIVERS: Final = 4.0
+"""How many times as many rivers a terrain may ask for. With more of them water that runs side by side down the even
+flank of a coarse level would be rivers."""
+DEFAULT_RIVERS: Final = 1.0
+"""What a new terrain asks for; 0 is none, and what documents say that are older than rivers."""
+MIN_WETNESS: Final = 0.1
+MAX_WETNESS: Final = 10.0
+DEFAULT_WETNESS: Final = 1.0
+"""How many times as much water rivers carry as those of the same area in the mean of the United States."""
 RIVER_FALL_SHARE: Final = 1.0 / 256.0
 """A river has come down by at least so much of the domain's side: where all is level there is none."""
 

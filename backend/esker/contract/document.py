@@ -14,20 +14,24 @@ from esker.contract.constants import (
     DEFAULT_REACH_FRACTION,
     DEFAULT_SIZE_M,
     DEFAULT_SLOPE_DEG,
+    DEFAULT_WETNESS,
     EDGE_POINTS,
     MAX_COURSE_POINTS,
     MAX_DETAIL,
     MAX_GRID_SAMPLES,
     MAX_GRID_SPACING_M,
     MAX_POINTS_PER_STROKE,
+    MAX_RIVERS,
     MAX_SIZE_M,
     MAX_SLOPE_DEG,
     MAX_VERTICAL_SCALE,
+    MAX_WETNESS,
     MIN_COURSE_GRADE,
     MIN_GRID_SIDE,
     MIN_GRID_SPACING_M,
     MIN_REACH_M,
     MIN_SIZE_M,
+    MIN_WETNESS,
 )
 from esker.contract.values import (
     ABSOLUTE_BOUND_M,
@@ -230,12 +234,15 @@ class Place(Wire):
 
 
 Reach = Annotated[float, Field(ge=MIN_REACH_M, le=ABSOLUTE_BOUND_M, allow_inf_nan=False)]
+Rivers = Annotated[float, Field(ge=0, le=MAX_RIVERS, allow_inf_nan=False)]
+Wetness = Annotated[float, Field(ge=MIN_WETNESS, le=MAX_WETNESS, allow_inf_nan=False)]
 
 
 class TerrainSettings(Wire):
     """Settings of a terrain. ``reach_m`` None is infinity: the papers' pure, global diffusion (DESIGN 5.1).
 
     ``lakes_m``: basins of the ground that are deeper than this hold a lake, None: none does (docs/renderer.md).
+    ``rivers``: how many there are, 0: none; ``wetness``: how many times as much water they carry (docs/water.md).
     ``detail`` and ``rule`` are of the synthesis (DESIGN 10): no solved height depends on them. ``edition``: see
     CURRENT_EDITION; documents that do not say have the first.
     """
@@ -247,6 +254,8 @@ class TerrainSettings(Wire):
     border: Border = "free"
     sea_level_m: Metres | None = None
     lakes_m: Length | None = None
+    rivers: Rivers = 0.0
+    wetness: Wetness = DEFAULT_WETNESS
     seed: Annotated[int, Field(ge=0, lt=2**32)] = 1
     look: Look = "natural"
     detail: Annotated[float, Field(ge=0, le=MAX_DETAIL, allow_inf_nan=False)] = DEFAULT_DETAIL
@@ -264,6 +273,8 @@ class TerrainFields(Wire):
     border: Border | None = None
     sea_level_m: Metres | None = None
     lakes_m: Length | None = None
+    rivers: Rivers | None = None
+    wetness: Wetness | None = None
     seed: Annotated[int, Field(ge=0, lt=2**32)] | None = None
     look: Look | None = None
     detail: Annotated[float, Field(ge=0, le=MAX_DETAIL, allow_inf_nan=False)] | None = None

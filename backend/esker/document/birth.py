@@ -1,4 +1,4 @@
-"""How a terrain is born: empty, by the newest edition of the rules that ground follows from."""
+"""How a terrain is born: empty, by the newest edition of the rules that ground follows from, with rivers."""
 
 from __future__ import annotations
 
@@ -12,4 +12,5 @@ def new_document(size_m: float = c.DEFAULT_SIZE_M) -> c.Document:
     True
     """
     reach_m = size_m * c.DEFAULT_REACH_FRACTION
-    return c.Document(id="new", settings=c.TerrainSettings(size_m=size_m, edition=c.CURRENT_EDITION, reach_m=reach_m))
+    born = {"size_m": size_m, "edition": c.CURRENT_EDITION, "reach_m": reach_m, "rivers": c.DEFAULT_RIVERS}
+    return c.Document(id="new", settings=c.TerrainSettings.model_validate(born))

@@ -51,6 +51,8 @@ TERRAIN_WORDS: Final[dict[str, str]] = {
     "border": "border",
     "sea_level_m": "sea level",
     "lakes_m": "lakes",
+    "rivers": "rivers",
+    "wetness": "wetness",
     "seed": "seed",
     "look": "look",
     "detail": "detail",

@@ -52,6 +52,8 @@ export const TERRAIN_WORDS = {
   border: "border",
   sea_level_m: "sea level",
   lakes_m: "lakes",
+  rivers: "rivers",
+  wetness: "wetness",
   seed: "seed",
   look: "look",
   detail: "detail",

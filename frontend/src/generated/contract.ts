@@ -132,6 +132,16 @@ export const DEFAULT_LAKES_FRACTION = 0.0009765625 as const;
 
 export const RIVER_AREA_SHARE = 0.0625 as const;
 
+export const MAX_RIVERS = 4.0 as const;
+
+export const DEFAULT_RIVERS = 1.0 as const;
+
+export const MIN_WETNESS = 0.1 as const;
+
+export const MAX_WETNESS = 10.0 as const;
+
+export const DEFAULT_WETNESS = 1.0 as const;
+
 export const RIVER_FALL_SHARE = 0.00390625 as const;
 
 export const DEFAULT_SLOPE_DEG = 35.0 as const;
@@ -820,6 +830,8 @@ export interface TerrainSettings {
   border: "free" | "pinned";
   sea_level_m: number | null;
   lakes_m: number | null;
+  rivers: number;
+  wetness: number;
   seed: number;
   look: "natural" | "alpine" | "desert" | "paper";
   detail: number;
@@ -835,6 +847,8 @@ export interface TerrainFields {
   border?: "free" | "pinned" | null;
   sea_level_m?: number | null;
   lakes_m?: number | null;
+  rivers?: number | null;
+  wetness?: number | null;
   seed?: number | null;
   look?: "natural" | "alpine" | "desert" | "paper" | null;
   detail?: number | null;

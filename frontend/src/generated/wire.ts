@@ -353,6 +353,8 @@ export const WIRE_MODELS: Readonly<Record<string, WireModel>> = {
       border: { nullable: { oneOf: ["free", "pinned"] } },
       sea_level_m: { nullable: { number: [-655360, 655360] } },
       lakes_m: { nullable: { number: [0, 655360] } },
+      rivers: { nullable: { number: [0, 4] } },
+      wetness: { nullable: { number: [0.1, 10] } },
       seed: { nullable: { integer: [0, 4294967295] } },
       look: { nullable: { oneOf: ["natural", "alpine", "desert", "paper"] } },
       detail: { nullable: { number: [0, 4] } },

@@ -128,6 +128,8 @@ function scene(step: number): Scene {
       border: "free",
       sea_level_m: null,
       lakes_m: null,
+      rivers: 0,
+      wetness: 1,
       seed: 1,
       look: "natural",
       ...detail,

@@ -174,6 +174,8 @@ export function sceneOf(view: TileView, state: CameraState, look: Scene["setting
       border: "free",
       sea_level_m: null,
       lakes_m: null,
+      rivers: 0,
+      wetness: 1,
       seed: 1,
       look,
       detail: 1,

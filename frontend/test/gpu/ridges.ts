@@ -92,6 +92,8 @@ function scene(camera: CameraState): Scene {
       border: "free",
       sea_level_m: null,
       lakes_m: null,
+      rivers: 0,
+      wetness: 1,
       seed: 1,
       look: "natural",
       rule: "plain",
