@@ -44,11 +44,9 @@ def _placed(rivers: Sequence[River], settings: TerrainSettings) -> list[tuple[An
     lines = [(river.points[:, 0], river.points[:, 1]) for river in rivers]
     if settings.place is None or not lines:
         return lines
-    from pyproj import Transformer
+    from esker.importing.placement.fitting import on_earth_from_frame  # not with this module: it brings pyproj
 
-    from esker.importing.placement.fitting import frame
-
-    to_earth = Transformer.from_crs(frame(settings.place, settings.size_m), "EPSG:4326", always_xy=True)
     cuts = np.cumsum([len(x) for x, _ in lines])[:-1]
-    lon, lat = to_earth.transform(np.concatenate([x for x, _ in lines]), np.concatenate([y for _, y in lines]))
+    x, y = (np.concatenate([line[axis] for line in lines]) for axis in (0, 1))
+    lon, lat = on_earth_from_frame(settings.place, settings.size_m, x, y)
     return list(zip(np.split(lon, cuts), np.split(lat, cuts), strict=True))

@@ -60,6 +60,13 @@ def frame(place: c.Place, size_m: float) -> pyproj.CRS:
     )
 
 
+def on_earth_from_frame(place: c.Place, size_m: float, x: Points, y: Points) -> tuple[Points, Points]:
+    """WGS 84 longitudes and latitudes of points of the terrain's frame, metres."""
+    to_earth = pyproj.Transformer.from_crs(frame(place, size_m), WGS84, always_xy=True)
+    lon, lat = to_earth.transform(x, y)
+    return lon, lat
+
+
 def middle(georef: Georef, rows: int, cols: int) -> tuple[float, float] | None:
     """WGS 84 (lat, lon) of the middle of a grid on Earth; None when it cannot be told."""
     if georef.crs is None or not on_earth(georef.crs):
