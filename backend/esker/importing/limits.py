@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from esker.importing import wire
+from esker.patchwork import kept_loops
 from esker.process import confinement, system
 from esker.process.bounds import Bounds
 
@@ -21,6 +22,8 @@ WALL_SECONDS: Final = {"inspect": 600.0, "convert": 2400.0}
 FILE_BYTES: Final = 3 << 30
 OPEN_FILES: Final = 128
 NICENESS: Final = 5
+LOOPS: Final = ".loops"
+"""The folder of compiled loops within a reader's work folder."""
 
 KEPT: Final = (
     "PATH",
@@ -72,18 +75,21 @@ def environment() -> dict[str, str]:
 
 
 def confine(task: wire.Task) -> None:
-    """Keeps this process to the file, its work folders and compiled loops, without a network, where that is to be had.
+    """Keeps this process to the file and its work folders, without a network, where that is to be had.
 
     Call it before any thread is started.
     """
     folders = [Path(path) for path in (task.workdir, os.path.dirname(task.out_dir)) if path]
-    confinement.confine([Path(task.path)], folders, compiled_folders())
+    keep_to(Path(task.path), folders)
 
 
-def compiled_folders() -> list[Path]:
-    """Where numba keeps compiled loops: a reader that could not write there would compile them anew each time."""
-    package, own = Path(__file__).resolve().parents[1], os.environ.get("NUMBA_CACHE_DIR")
-    return [*package.rglob("__pycache__"), *([Path(own)] if own else [])]
+def keep_to(file: Path, folders: list[Path]) -> None:
+    """Keeps this process to a file and to folders, in the first of which it keeps the loops that it compiles.
+
+    Nothing that another process loads can be written: neither compiled loops nor compiled modules.
+    """
+    confinement.confine([file, kept_loops.folder()], folders)
+    kept_loops.use_own(folders[0] / LOOPS)
 
 
 def apply(task: str) -> None:

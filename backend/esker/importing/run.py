@@ -18,7 +18,7 @@ from typing import Final
 from pydantic import ValidationError
 
 from esker import contract as c
-from esker.importing import limits, wire
+from esker.importing import limits, warm, wire
 from esker.importing.refusal import ImportCancelled, ImportRefused
 from esker.process import child_process
 
@@ -137,6 +137,7 @@ async def _run(
     task: wire.Task, on_progress: Progress | None, cancel: asyncio.Event | None
 ) -> wire.Inspected | wire.Converted:
     """Runs one task to its end. Raises ImportRefused, ImportCancelled; the process is gone in any case."""
+    await warm.loops()
     process = await child_process.start("esker.importing", env=limits.environment(), limit=MAX_LINE_BYTES)
     waiting = asyncio.create_task(_talk(process, task, on_progress))
     stop = asyncio.create_task(cancel.wait()) if cancel is not None else None

@@ -8,17 +8,15 @@ Bands write to places of their own, so that the result has the same bits for any
 
 from __future__ import annotations
 
-import hashlib
 import os
 import shutil
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
 import numba
 
-from esker import compiled
 from esker.compiled import kernel
+from esker.patchwork import kept_loops
 from esker.process import system
 
 __all__ = ["bands", "kernel", "processors", "spread"]
@@ -30,10 +28,7 @@ def _keep_by_content() -> None:
     numba asks only whether the file of a function has changed, not those of the functions that it calls. Where the
     folder cannot be written, numba finds another place by its own rules.
     """
-    room = Path(__file__).parent
-    files = [Path(compiled.__file__), *sorted(room.rglob("*.py"))]
-    texts = hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()[:16]
-    kept = room / "__pycache__" / f"compiled-{texts}"
+    kept = kept_loops.beside()
     try:
         kept.mkdir(parents=True, exist_ok=True)
         if not os.access(kept, os.W_OK):
@@ -43,7 +38,7 @@ def _keep_by_content() -> None:
     for other in kept.parent.glob("compiled-*"):
         if other != kept:
             shutil.rmtree(other, ignore_errors=True)
-    if "NUMBA_CACHE_DIR" not in os.environ:
+    if kept_loops.VARIABLE not in os.environ:
         numba.config.CACHE_DIR = str(kept)  # type: ignore[attr-defined]
 
 

@@ -32,9 +32,9 @@ _SCOPES: Final = 3
 _SYSTEM: Final = ("/usr", "/lib", "/lib64", "/etc", "/opt", "/proc", "/sys/devices/system", "/dev")
 
 
-def confine(read: Iterable[Path], work: Iterable[Path], compiled: Iterable[Path] = ()) -> frozenset[str]:
+def confine(read: Iterable[Path], work: Iterable[Path]) -> frozenset[str]:
     """Keeps this process, and whatever it starts, to Python, what it may ``read`` and its ``work`` folders, where it
-    may write, and without a network. ``compiled``: folders of compiled code, where it may write as well.
+    may write, and without a network.
 
     Call it before the first thread is started. Returns what is kept: "files", "network", both or neither. It cannot be
     undone.
@@ -49,7 +49,7 @@ def confine(read: Iterable[Path], work: Iterable[Path], compiled: Iterable[Path]
         if version >= 1:
             folders = [path.resolve() for path in work]
             seen = [part for path in _python() for part in _without_surroundings(path, folders)]
-            _keep_to(libc, version, [*seen, *read], [*folders, *compiled])
+            _keep_to(libc, version, [*seen, *read], folders)
             kept.add("files")
     with suppress(OSError):
         if syscalls.restrict(libc):

@@ -18,8 +18,8 @@ from esker.contract import Document
 from esker.document import archive
 from esker.document.former import read_document
 from esker.document.ops import Refusal, check_document
-from esker.importing import limits
-from esker.process import confinement, system
+from esker.importing import limits, warm
+from esker.process import system
 from esker.process.bounds import Bounds
 from esker.process.child_process import end_with_parent, put_down
 
@@ -40,6 +40,7 @@ async def read_archive(path: Path, folder: Path, turn: AbstractAsyncContextManag
 
     Raises archive.ArchiveError with a sentence for a person. ``turn``: at most ``AT_ONCE`` of these run at a time.
     """
+    warm.begin()  # most files have no grids, so that their reader does not wait for the loops
     async with turn:
         process = await asyncio.create_subprocess_exec(
             sys.executable,
@@ -98,7 +99,7 @@ def bound(path: Path) -> None:
 def main(path: Path, folder: Path) -> int:
     """Starts the process that reads."""
     system.speak_utf8()
-    confinement.confine([path], [folder], limits.compiled_folders())
+    limits.keep_to(path, [folder])
     end_with_parent()
     bound(path)
     try:
