@@ -14,6 +14,7 @@ import pytest
 from esker import contract as c
 from esker.importing import limits, warm, wire
 from esker.patchwork import kept_loops
+from esker.process import confinement
 from tests.importing.conftest import PLACE, SIZE_M
 
 FILES = Path(__file__).parent / "files"
@@ -64,7 +65,7 @@ def test_a_reader_that_runs_a_stranger_s_code_leaves_nothing_that_the_server_loa
     said = json.loads(reader("-c", ATTACK, FILES / "gray8.png", work, work.parent))
     assert said["own"]
     assert said["reads"]
-    if not limits.confinement.possible():
+    if not confinement.possible():
         pytest.skip("this kernel has no Landlock")
     assert said["written"] == []
     assert not said["through"], "nor by the links that lead there"
