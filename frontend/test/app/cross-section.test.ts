@@ -13,7 +13,7 @@ import {
   type Section,
   slopeThrough,
   symmetric,
-} from "../../src/app/cross-section.ts";
+} from "../../src/app/view/cross-section.ts";
 import { PRESETS, presetsFor } from "../../src/app/words/presets.ts";
 import { type Flank, MAX_SIZE_M, MAX_SLOPE_DEG, MIN_SIZE_M } from "../../src/generated/contract.ts";
 

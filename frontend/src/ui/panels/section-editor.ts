@@ -10,7 +10,7 @@ import {
   outline,
   type Section,
   type SectionLimits,
-} from "../../app/cross-section.ts";
+} from "../../app/view/cross-section.ts";
 import { metres } from "../../app/words/words.ts";
 import { shared } from "../styles/shared.ts";
 

@@ -1,7 +1,7 @@
 import "@awesome.me/webawesome/dist/components/switch/switch.js";
 import { css, html, LitElement, nothing, type TemplateResult } from "lit";
 import { live } from "lit/directives/live.js";
-import { type Section, type SectionLimits, type Side, symmetric } from "../../app/cross-section.ts";
+import { type Section, type SectionLimits, type Side, symmetric } from "../../app/view/cross-section.ts";
 import { type Preset, presetsFor, type SectionFields } from "../../app/words/presets.ts";
 import type { Flank } from "../../generated/contract.ts";
 import { DEFAULT_EXTENT_FRACTION, DEFAULT_SLOPE_DEG, MAX_SLOPE_DEG } from "../../generated/contract.ts";

@@ -6,7 +6,7 @@
  * scale is that of the profile; an extent that ends outside the picture has its knob at the picture's edge.
  */
 
-import { type Flank, MAX_SLOPE_DEG } from "../generated/contract.ts";
+import { type Flank, MAX_SLOPE_DEG } from "../../generated/contract.ts";
 
 export interface Section {
   readonly left: Flank | null;
