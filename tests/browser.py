@@ -5,9 +5,13 @@ from __future__ import annotations
 import contextlib
 import os
 import shutil
-import socket
 
 import psutil
+
+from bench.picture._browser import SOFTWARE_ADAPTER
+from bench.room._serving import free_port
+
+__all__ = ["FLAGS", "chromium_path", "draw_politely", "free_port"]
 
 # The last list counts: the first three lines are Playwright's own. The others are pages of the address bar,
 # which every window starts in a process of its own, though nobody sees them: 0.9 s of processor time a window.
@@ -18,20 +22,7 @@ WITHOUT = (
     "WebUIOmniboxPopup,WebUIOmniboxAimPopup,WebUIOmniboxFullPopup"
 )
 
-# WebGPU in headless Chromium on the software adapter needs all of these (DESIGN 16).
-FLAGS = [
-    "--no-sandbox",
-    "--enable-unsafe-webgpu",
-    "--enable-features=Vulkan",
-    "--use-vulkan=swiftshader",
-    "--use-angle=swiftshader",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--disable-quic",
-    "--no-first-run",
-    f"--disable-features={WITHOUT}",
-]
+FLAGS = [*SOFTWARE_ADAPTER, f"--disable-features={WITHOUT}"]
 
 
 def chromium_path() -> str:
@@ -40,13 +31,6 @@ def chromium_path() -> str:
     if path is None:
         raise RuntimeError("Chromium is missing: run `make browser`.")
     return path
-
-
-def free_port() -> int:
-    """A TCP port of the loopback interface that nobody listens on now."""
-    with socket.socket() as s:
-        s.bind(("127.0.0.1", 0))
-        return int(s.getsockname()[1])
 
 
 def draw_politely() -> None:

@@ -22,8 +22,7 @@ from esker import resources
 
 ROOT: Final = resources.sources()
 FRONTEND: Final = ROOT / "frontend"
-# WebGPU and WebGL of headless Chromium on the software adapter (DESIGN 16).
-FLAGS: Final = [
+SOFTWARE_ADAPTER: Final = (
     "--no-sandbox",
     "--enable-unsafe-webgpu",
     "--enable-features=Vulkan",
@@ -34,11 +33,15 @@ FLAGS: Final = [
     "--disable-sync",
     "--disable-quic",
     "--no-first-run",
+)
+"""Headless Chromium needs these for WebGPU and WebGL on the software adapter (DESIGN 16). The tests use them too."""
+FLAGS: Final = (
+    *SOFTWARE_ADAPTER,
     "--disable-backgrounding-occluded-windows",
     "--disable-renderer-backgrounding",
     "--enable-precise-memory-info",
     "--js-flags=--expose-gc",
-]
+)
 
 
 def vite(*arguments: str) -> list[str]:

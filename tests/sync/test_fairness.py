@@ -28,24 +28,10 @@ from esker.server.wire.http import Connections
 from esker.session.room import history_view
 from esker.session.room.members import seats
 from tests.sync.harness import PATIENCE, LiveServer, Peer
+from tests.sync.scripted_maker import WANTED, Maker
 from tests.sync.scripted_reader import Reader
-from tests.sync.test_exports import WANTED, Maker
 
 STRANGER, CITIZEN = "192.0.2.66", "192.0.2.7"
-
-
-@pytest.fixture
-def reader(monkeypatch: pytest.MonkeyPatch) -> Reader:
-    made = Reader()
-    monkeypatch.setattr("esker.server.run.importing", made)
-    return made
-
-
-@pytest.fixture
-def maker(monkeypatch: pytest.MonkeyPatch) -> Maker:
-    made = Maker()
-    monkeypatch.setattr("esker.server.run.exporting", made)
-    return made
 
 
 @pytest.fixture

@@ -28,14 +28,6 @@ from tests.sync.scripted_reader import GRID, Reader, layers, send, wait, works
 
 
 @pytest.fixture
-def reader(monkeypatch: pytest.MonkeyPatch) -> Reader:
-    """In the place of the process that reads files, which has tests of its own (tests/importing)."""
-    made = Reader()
-    monkeypatch.setattr("esker.server.run.importing", made)
-    return made
-
-
-@pytest.fixture
 def live(tmp_path: Path, reader: Reader) -> Iterator[LiveServer]:
     with LiveServer(tmp_path, grid_quota_mb=1) as server:
         yield server

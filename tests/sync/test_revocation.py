@@ -44,13 +44,6 @@ class Pause:
 
 
 @pytest.fixture
-def reader(monkeypatch: pytest.MonkeyPatch) -> Reader:
-    made = Reader()
-    monkeypatch.setattr("esker.server.run.importing", made)
-    return made
-
-
-@pytest.fixture
 def live(tmp_path: Path, reader: Reader) -> Iterator[LiveServer]:
     with LiveServer(tmp_path) as server:
         yield server

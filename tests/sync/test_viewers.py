@@ -18,7 +18,7 @@ import pytest
 from esker import contract as c
 from esker.contract import Stroke
 from tests.sync.harness import LiveServer, Peer, set_op, stroke
-from tests.sync.test_exports import WANTED, Maker
+from tests.sync.scripted_maker import WANTED, Maker
 
 NAME, LABEL, ID, HEIGHT = "Zerubabel", "Gravenhurst", "xq7deleted", 543.2109375
 SECRETS = (NAME, LABEL, str(HEIGHT))

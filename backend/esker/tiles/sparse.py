@@ -67,7 +67,7 @@ class Selection:
 
 @dataclass(frozen=True, eq=False)
 class _Boxes:
-    """Returns tiles of one level as ``quadtree.screen_error`` reads them."""
+    """Tiles of one level as ``quadtree.screen_error`` reads them."""
 
     size_m: float
     x: Floats
@@ -187,7 +187,7 @@ def _finest(pyramid: Relief, wanted: Mask) -> _Parents:
 
 @dataclass(frozen=True, eq=False)
 class _Children:
-    """Returns the four children of each parent: places and boxes (4n,); which are known, and where in ``made``."""
+    """The four children of each parent: places and boxes (4n,); which are known, and where in ``made``."""
 
     x: Index
     y: Index

@@ -9,11 +9,11 @@ import { Camera } from "../../src/core/camera/camera.ts";
 import type { Ground, Vec3 } from "../../src/core/types.ts";
 import { SyncDoc } from "../../src/doc/sync.ts";
 import type { ImportAnswers, ImportStatus, Layer, Progress } from "../../src/generated/contract.ts";
-import { PROTOCOL_VERSION } from "../../src/generated/contract.ts";
 import type { Placing } from "../../src/input/tools/placement.ts";
 import "../../src/ui/panels/layers-panel.ts";
 import type { EskLayersPanel } from "../../src/ui/panels/layers-panel.ts";
 import { EMPTY } from "../doc/model.ts";
+import { welcomeOf } from "../doc/welcome.ts";
 import { layer, REPORT } from "../ui/grids.ts";
 
 const ground: Ground = { sizeM: 4096, heightAt: () => 0, raycast: () => null };
@@ -50,28 +50,7 @@ let cancelled: string[];
 
 function open(layers: Layer[] = []): void {
   doc = new SyncDoc("me", () => 0);
-  const rest = {
-    server: "",
-    client: "me",
-    role: "edit" as const,
-    colour: "#000000",
-    ops: null,
-    members: [],
-    device: "",
-  };
-  const document = { ...EMPTY, layers };
-  doc.welcome({
-    type: "welcome",
-    ticket: "",
-    lesson: null,
-    token: "",
-    protocol: PROTOCOL_VERSION,
-    levels: 4,
-    finest: 4,
-    clock: 0,
-    document,
-    ...rest,
-  });
+  doc.welcome(welcomeOf({ document: { ...EMPTY, layers } }));
   work = new Groundwork({
     sizeM: 4096,
     doc,

@@ -8,6 +8,7 @@ import type { Doc } from "../../src/doc/document.ts";
 import { SyncDoc } from "../../src/doc/sync.ts";
 import type { ClientMessage, Document, Op, Welcome } from "../../src/generated/contract.ts";
 import { PROTOCOL_VERSION } from "../../src/generated/contract.ts";
+import { welcomeOf } from "../doc/welcome.ts";
 
 const entry = (first: number, last = first, author = "ana"): HistoryEntry => ({
   ...{ first, last, author, at: null, action: "draw", turn: "", text: `did ${first}` },
@@ -27,21 +28,7 @@ function document(clock: number, text: string): Document {
 }
 
 function welcome(doc: Document): Welcome {
-  return {
-    ...{
-      type: "welcome",
-      ticket: "",
-      lesson: null,
-      token: "",
-      protocol: PROTOCOL_VERSION,
-      server: "",
-      client: "me",
-      role: "view",
-      colour: "#000000",
-      device: "",
-    },
-    ...{ levels: 4, finest: 8, clock: doc.clock, document: doc, ops: null, members: [] },
-  };
+  return welcomeOf({ role: "view", finest: 8, clock: doc.clock, document: doc });
 }
 
 describe("the list", () => {

@@ -4,7 +4,7 @@ import { type Signal, signal } from "@preact/signals-core";
 import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
 import type { DecodedFrame } from "../../src/core/types.ts";
 import type { ClientMessage, Hello, Role, ServerMessage, Stroke, Welcome } from "../../src/generated/contract.ts";
-import { PROTOCOL_VERSION } from "../../src/generated/contract.ts";
+import { welcomeOf } from "../doc/welcome.ts";
 import { SETTINGS } from "../settings.ts";
 
 /** Stands for the websocket: the test plays the server. */
@@ -67,18 +67,11 @@ const { recentTerrains } = await import("../../src/app/device/storage.ts");
 const { fullStroke } = await import("../../src/doc/document.ts");
 
 function welcome(role: Role = "owner", change: Partial<Welcome> = {}): Welcome {
-  return {
-    type: "welcome",
-    ticket: "",
-    lesson: null,
-    token: "",
-    protocol: PROTOCOL_VERSION,
+  return welcomeOf({
     server: "0.1.0",
     client: "c",
     role,
     colour: "#ff8000",
-    levels: 4,
-    finest: 4,
     clock: 3,
     document: {
       id: "t",
@@ -89,12 +82,21 @@ function welcome(role: Role = "owner", change: Partial<Welcome> = {}): Welcome {
       layers: [],
       deleted_layers: [],
     },
-    ops: null,
-    members: [],
     device: "numpy",
     ...change,
-  };
+  });
 }
+
+/** The solver has settled everything. */
+const progress = {
+  type: "progress",
+  clock: 3,
+  level: 4,
+  of: 4,
+  settled: true,
+  refining: 0,
+  laying: false,
+} as const;
 
 const line: Stroke = fullStroke({
   id: "s1",
@@ -290,15 +292,6 @@ describe("a session", () => {
 
   it("keeps what the server says about its solver until it is read, and says each thing once (U18)", () => {
     say(welcome());
-    const progress = {
-      type: "progress",
-      clock: 3,
-      level: 4,
-      of: 4,
-      settled: true,
-      refining: 0,
-      laying: false,
-    } as const;
     say({ ...progress, note: "The graphics device is gone. Solving on the processor." });
     say({ ...progress, note: "" });
     expect(session.notice.value).toBe("The graphics device is gone. Solving on the processor.");
@@ -324,15 +317,6 @@ describe("a session", () => {
 describe("real ground (SPEC U18, U30)", () => {
   it("the making of the base is told in the status line, not as a notice", () => {
     say(welcome());
-    const progress = {
-      type: "progress",
-      clock: 3,
-      level: 4,
-      of: 4,
-      settled: true,
-      refining: 0,
-      laying: false,
-    } as const;
     say({ ...progress, settled: false, note: "", laying: true });
     expect(session.baseBuilding.value).toBe(true);
     expect(session.notice.value).toBeNull();

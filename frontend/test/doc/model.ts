@@ -12,8 +12,8 @@ import type {
   Stroke,
   Welcome,
 } from "../../src/generated/contract.ts";
-import { PROTOCOL_VERSION } from "../../src/generated/contract.ts";
 import { SETTINGS } from "../settings.ts";
+import { welcomeOf } from "./welcome.ts";
 
 /** Mulberry32: a small seeded generator of numbers in [0, 1). */
 export function random(seed: number): () => number {
@@ -102,24 +102,14 @@ export class ServerModel {
 
   welcome(clock: number | null): Welcome {
     const resume = clock !== null && this.doc.clock - clock <= this.keep;
-    return {
-      type: "welcome",
-      ticket: "",
-      lesson: null,
-      token: "",
-      protocol: PROTOCOL_VERSION,
+    return welcomeOf({
       server: "model",
       client: "c",
-      role: "edit",
-      colour: "#000000",
-      levels: 4,
-      finest: 4,
       clock: this.doc.clock,
       document: resume ? null : toDocument(this.doc),
       ops: resume ? this.journal.filter((o) => o.clock > clock) : null,
-      members: [],
       device: "model",
-    };
+    });
   }
 }
 

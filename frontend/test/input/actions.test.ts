@@ -6,7 +6,6 @@ import { beforeEach, describe, expect, it } from "vitest";
 import type { Camera } from "../../src/core/camera/camera.ts";
 import { distance } from "../../src/core/math.ts";
 import { SyncDoc } from "../../src/doc/sync.ts";
-import { PROTOCOL_VERSION } from "../../src/generated/contract.ts";
 import { toolDefaults } from "../../src/input/defaults.ts";
 import type { Action, ActionId, ToolId } from "../../src/input/keys/action.ts";
 import { createActions } from "../../src/input/keys/actions.ts";
@@ -14,6 +13,7 @@ import { actionFor, combination, Keyboard, meantForCanvas } from "../../src/inpu
 import { createOps } from "../../src/input/sketch/strokeops.ts";
 import { Navigation } from "../../src/input/tools/navigation.ts";
 import { EMPTY, ridge } from "../doc/model.ts";
+import { welcomeOf } from "../doc/welcome.ts";
 import { camera, FLAT, SIZE } from "./scene.ts";
 
 let c: Camera;
@@ -53,24 +53,7 @@ beforeEach(() => {
       locked: true,
     }),
   ];
-  doc.welcome({
-    type: "welcome",
-    ticket: "",
-    lesson: null,
-    token: "",
-    protocol: PROTOCOL_VERSION,
-    server: "",
-    client: "me",
-    role: "edit",
-    colour: "#000000",
-    levels: 4,
-    finest: 4,
-    clock: 0,
-    document: { ...EMPTY, strokes },
-    ops: null,
-    members: [],
-    device: "",
-  });
+  doc.welcome(welcomeOf({ document: { ...EMPTY, strokes } }));
   tool.value = "mountain";
   selection.value = null;
   let ids = 0;

@@ -5,12 +5,12 @@ import type { Camera } from "../../src/core/camera/camera.ts";
 import type { Vec3 } from "../../src/core/types.ts";
 import { SyncDoc } from "../../src/doc/sync.ts";
 import type { Stroke } from "../../src/generated/contract.ts";
-import { PROTOCOL_VERSION } from "../../src/generated/contract.ts";
 import { InputController, type InputOptions } from "../../src/input/controller.ts";
 import { toolDefaults } from "../../src/input/defaults.ts";
 import type { RefusedHere } from "../../src/input/say.ts";
 import type { HandleKind } from "../../src/input/tools/handles.ts";
 import { EMPTY, ridge } from "../doc/model.ts";
+import { welcomeOf } from "../doc/welcome.ts";
 import { camera, FLAT, SIZE } from "./scene.ts";
 
 // Read as live bindings; only this module assigns them.
@@ -35,24 +35,7 @@ export function open(mode: "orbit" | "map" = "orbit", over: Partial<InputOptions
   c = camera(mode);
   time = 1_000_000;
   doc = new SyncDoc("me", () => time);
-  doc.welcome({
-    type: "welcome",
-    ticket: "",
-    lesson: null,
-    token: "",
-    protocol: PROTOCOL_VERSION,
-    server: "",
-    client: "me",
-    role: "edit",
-    colour: "#000000",
-    levels: 4,
-    finest: 4,
-    clock: 0,
-    document: EMPTY,
-    ops: null,
-    members: [],
-    device: "",
-  });
+  doc.welcome(welcomeOf({ document: EMPTY }));
   messages = [];
   refusals = [];
   cursors = [];

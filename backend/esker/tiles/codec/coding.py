@@ -33,7 +33,7 @@ B = TypeVar("B")
 
 
 class Coded(NamedTuple):
-    """Codes a tile with the cheapest predictor and the smaller of the filters NONE and LATTICE."""
+    """A coded tile: the cheapest predictor, the smaller of the filters NONE and LATTICE, and the payload."""
 
     predictor: Predictor
     filter: Filter
