@@ -14,6 +14,9 @@ from esker.contract import QUANTA_PER_CELL, TILE_CELLS
 
 SOLVE_FIELDS = 19
 """Float32 a sample that a solve holds: 12 fields of the finest level, and a third of the 21 of those below it."""
+PARKED_FIELDS = 10
+"""Float32 a sample that a solve under way keeps while others have their turns: of the finest level five fields of
+constraints and three of the ground; of the levels below the ground and one residual, nearly two more."""
 BASE_FIELDS = 4
 """Fields of the finest level that a base adds (``solve.device_workspace.OverBase``)."""
 PREVIEW_WORKSPACE_LEVEL = 2
@@ -45,16 +48,29 @@ def quantum(level: int, size_m: float) -> float:
     return spacing(level, size_m) / QUANTA_PER_CELL
 
 
-def solve_bytes(level: int, based: bool = False) -> int:
-    """Memory of the device that a solve up to ``level`` holds, its preview workspace included, to share it out by.
+def arena_bytes(level: int, based: bool = False) -> int:
+    """Memory of the device that one workspace solves with up to ``level``, to share it out by.
 
-    90 MiB at level 4, 109 over a base, four times as much a level.
-
-    From level 3 up within a tenth of what ``solve.workspaces.planned_bytes`` says exactly, for a known device.
+    From level 3 up within a tenth of what ``solve.opencl.workspaces.planned_bytes`` says exactly, for a known device.
     """
-    n, fields = samples(level), SOLVE_FIELDS + (BASE_FIELDS if based else 0)
-    preview = solve_bytes(PREVIEW_WORKSPACE_LEVEL, based) if level >= PREVIEW_WORKSPACE_FROM else 0
-    return 4 * fields * n * (n + SOLVE_PADDING) + preview
+    return _bytes(level, SOLVE_FIELDS + (BASE_FIELDS if based else 0))
+
+
+def solve_bytes(level: int, based: bool = False) -> int:
+    """The same with the preview workspace: 90 MiB at level 4, 109 over a base, four times as much a level."""
+    preview = arena_bytes(PREVIEW_WORKSPACE_LEVEL, based) if level >= PREVIEW_WORKSPACE_FROM else 0
+    return arena_bytes(level, based) + preview
+
+
+def parked_bytes(level: int, based: bool = False) -> int:
+    """Memory that a solve under way holds while it has no arena: 45 MiB at level 4, 58 over a base. At rest it is half
+    of that."""
+    return _bytes(level, PARKED_FIELDS + (BASE_FIELDS - 1 if based else 0))
+
+
+def _bytes(level: int, fields: int) -> int:
+    n = samples(level)
+    return 4 * fields * n * (n + SOLVE_PADDING)
 
 
 class TileKey(NamedTuple):

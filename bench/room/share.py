@@ -131,14 +131,21 @@ def _percentiles(seconds: list[float]) -> dict[str, float]:
     return {"p50": p50, "p99": p99, "max": round(float(ms.max()), 1), "n": len(seconds)}
 
 
+def _own(seed: int) -> c.Document:
+    """Fifty strokes with ids that no other room has, as in life: solvers know a room by the ids of its strokes."""
+    document = stream.fifty(seed)
+    strokes = tuple(stroke.model_copy(update={"id": f"{seed}-{stroke.id}"}) for stroke in document.strokes)
+    return document.model_copy(update={"strokes": strokes})
+
+
 def measure(solver: Solver, rooms: int, big: int, seconds: float, level: int) -> dict[str, Any]:
     """One run. ``level``: of the rooms that draw; the big terrains have BIG_LEVEL."""
     timed = _Timed(solver)
     worker = Worker(lambda _: timed)
     worker.start()
     try:
-        people = [_Room(stream.fifty(100 + i), level) for i in range(rooms)]
-        giants = [_Room(stream.fifty(200 + i), BIG_LEVEL) for i in range(big)]
+        people = [_Room(_own(100 + i), level) for i in range(rooms)]
+        giants = [_Room(_own(200 + i), BIG_LEVEL) for i in range(big)]
         for room in [*people, *giants]:
             room.client = worker.add(room.levels, room.deliver, _unexpected)
         _warm(worker, [*people, *giants])

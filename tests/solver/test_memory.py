@@ -15,7 +15,7 @@ from esker import grid
 from esker.contract import MAX_LEVEL
 from esker.solve.opencl import workspaces
 from esker.solve.opencl.faults import OutOfDeviceMemoryError
-from esker.solve.opencl.pool import SPARE_SECONDS
+from esker.solve.pool.pool import SPARE_SECONDS
 from esker.solve.solver import Solver
 from tests.solver.bases import Analytic, hills
 from tests.solver.failing import INVALID_VALUE, NO_MEMORY, STROKES, Failing, heights, held

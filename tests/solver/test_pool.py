@@ -13,7 +13,7 @@ from esker.api.terrain import Stroke as Make
 from esker.contract import Channel, Stroke, TerrainSettings
 from esker.events import Done, Level
 from esker.solve.constraints.packing import Shape, pack_one
-from esker.solve.opencl.pool import PACKED, SPARE_SECONDS, best_packed
+from esker.solve.pool.pool import PACKED, SPARE_SECONDS, best_packed
 from esker.solve.solver import Solver
 from tests.solver.bases import hills
 from tests.solver.scenes import PINNED, SCENES, SETTINGS, mixed
@@ -81,7 +81,7 @@ def test_the_bound_holds_at_every_moment_with_solves_in_progress(solver: Solver)
     for steps in running:
         steps.close()
     assert most <= 4 * grid.solve_bytes(1)
-    assert solver._pool.held == len(solver._pool.idle) * grid.solve_bytes(1)
+    assert solver._pool.held == sum(w.bytes for w in solver._pool.idle) + solver._pool.residency.bytes
 
 
 def test_who_comes_back_is_rasterised_and_not_packed_again(solver: Solver, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 
 from esker import contract as c
 from esker.events import Done, Preview, Settled
-from esker.grid import solve_bytes
+from esker.grid import parked_bytes
 from esker.session.ground import effects as does
 from esker.session.ground import machine, schedule, states
 from esker.session.ground.effects import Effect, Event
@@ -131,7 +131,7 @@ def test_a_coarse_preview_waits_for_one_slice_of_a_big_terrain_however_long_they
 
 
 def test_a_coarse_preview_ends_the_settling_solve_that_began_last_and_that_settles_later() -> None:
-    desk = Desk(budget=2 * solve_bytes(4))
+    desk = Desk(budget=2 * parked_bytes(4))
     early, late, new = (desk.room(4) for _ in range(3))
     for client in (early, late):
         desk.ask(client)
@@ -145,7 +145,7 @@ def test_a_coarse_preview_ends_the_settling_solve_that_began_last_and_that_settl
 
 
 def test_previews_are_not_ended_for_a_coarse_one_and_never_more_solves_run_than_fit() -> None:
-    desk = Desk(budget=3 * solve_bytes(4))
+    desk = Desk(budget=3 * parked_bytes(4))
     clients = [desk.room(4) for _ in range(12)]
     for client in clients:
         desk.ask(client)
@@ -160,7 +160,7 @@ def test_previews_are_not_ended_for_a_coarse_one_and_never_more_solves_run_than_
 
 
 def test_a_solve_bigger_than_the_budget_still_runs_alone() -> None:
-    desk = Desk(budget=solve_bytes(4))
+    desk = Desk(budget=parked_bytes(4))
     big, small = desk.room(6), desk.room(4)
     desk.ask(big)
     desk.until(big, "6")

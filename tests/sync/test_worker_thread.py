@@ -307,10 +307,11 @@ def test_rooms_take_turns() -> None:
         for room in rooms.values():
             bench.worker.request(room, _job(1))
         got = bench.let(18)
-        # The first room may be a level ahead, as it asked first.
-        for count in range(3, 19):
-            made = [sum(entry[0] == name for entry in got[:count]) for name in rooms]
-            assert max(made) - min(made) <= 2, got
+        assert [settled for *_, settled in got] == [False] * 9 + [True] * 9, "previews of all come first"
+        assert {name for name, *_ in got[:4]} == set(rooms), "the first room may be a level ahead, as it asked first"
+        for part in (got[:9], got[9:]):
+            assert sorted(name for name, *_ in part) == [*"aaabbbccc"]
+        assert [name for name, *_ in got[9:]] == [*"aaabbbccc"], "what was begun is settled before the next"
 
     _bench(run)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
@@ -53,6 +53,8 @@ class Workspace(Protocol):
 
     preview_workspace: a small one that makes the coarsest preview of the same strokes; None below level
     ``grid.PREVIEW_WORKSPACE_FROM``.
+    relief_m: about how high the ground is from its deepest to its highest, once there was a coarsest preview.
+    bytes: memory that it holds, without its preview workspace.
     solved_for: settings and base (``conditions``) that the ground of the finest level, u of both steps, was solved
     with, if that ground is of the strokes that are packed; None where it is not.
     """
@@ -61,9 +63,11 @@ class Workspace(Protocol):
     packer: Packer
     preview_workspace: Workspace | None
     solved_for: object
+    relief_m: float
+    based: bool
 
     @property
-    def based(self) -> bool: ...
+    def bytes(self) -> int: ...
     @property
     def gradient(self) -> multigrid.System: ...
     @property
@@ -76,6 +80,8 @@ class Workspace(Protocol):
     def warm(self, heights: NDArray[np.float32]) -> None: ...
     def read(self, level: int) -> NDArray[np.float32]: ...
     def read_gradient(self) -> NDArray[np.float32]: ...
+    def given(self, heights: NDArray[np.float32], gradient: NDArray[np.float32]) -> None: ...
+    def rest(self) -> None: ...
 
 
 class Job(NamedTuple):
@@ -98,7 +104,10 @@ def coarsest_preview(w: Workspace, job: Job) -> Iterator[Preview | Pause]:
     assert small is not None
     yield from pauses(small.loading(*job))
     _coarse(small, 0)
-    yield Preview(0, frozen(small.read(0)))
+    found = frozen(small.read(0))
+    w.relief_m = max(float(np.ptp(found)), 1.0)
+    small.rest()
+    yield Preview(0, found)
 
 
 def _coarse(w: Workspace, level: int) -> None:
@@ -124,7 +133,7 @@ def previews(
             yield Preview(level, frozen(w.read(level)))
 
 
-def unseen(w: Workspace, job: Job) -> Iterator[Settled | Pause]:
+def unseen(w: Workspace, job: Job) -> Generator[Settled | Pause]:
     """The heights of the finest level at rest, those of ``previews``, ``to_rest`` and ``settled`` to the bit, and
     nothing of what they show on the way. Raises DivergedError."""
     yield from pauses(w.loading(*job))
@@ -238,5 +247,7 @@ def settled(w: Workspace, job: Job, basis: bool) -> Iterator[Settled | Done]:
     strokes, settings, base = job
     own = None if base is None else base.base
     found = Basis(tuple(strokes), settings, w.top, heights, frozen(w.read_gradient()), own) if basis else None
+    if found is not None:
+        w.given(heights, found.gradient)
     yield Settled(*last)
     yield Done(found)

@@ -23,7 +23,7 @@ from esker.contract import (
     Stroke,
     TerrainSettings,
 )
-from esker.grid import samples
+from esker.grid import arena_bytes, samples
 from esker.solve.base import Base
 from esker.solve.constraints import raster_reference
 from esker.solve.constraints.constraints import Packer
@@ -337,11 +337,23 @@ class NumpyWorkspace:
         self.top, self.based = top, based
         self.preview_workspace: Workspace | None = None
         self.solved_for: object = None
+        self.relief_m = 1.0
         self._constraints: raster_reference.Constraints | None = None
         self.size_m = 1.0
         self.packer = Packer(top)
         self.gradient: NumpySystem
         self.height: NumpySystem
+
+    @property
+    def bytes(self) -> int:
+        """What a device would take: of NumPy's own memory nothing is known."""
+        return arena_bytes(self.top, self.based)
+
+    def given(self, heights: NDArray[np.float32], gradient: NDArray[np.float32]) -> None:
+        """See ``device_workspace.DeviceWorkspace``: nothing is ever parked here."""
+
+    def rest(self) -> None:
+        """The same."""
 
     def load(self, strokes: Sequence[Stroke], settings: TerrainSettings, base: Base | None = None) -> None:
         """Rasterise and coarsen."""

@@ -31,8 +31,8 @@ from esker.solve.constraints.constraints import Shapes
 from esker.solve.opencl import proof
 from esker.solve.opencl.device import NUMPY, NUMPY_NAME, Device, open_device
 from esker.solve.opencl.faults import OutOfDeviceMemoryError, guarded
-from esker.solve.opencl.pool import Lease, WorkspacePool
 from esker.solve.passes import PREVIEW_GRADIENT_CYCLES, PREVIEW_HEIGHT_CYCLES, Basis, Job, Workspace
+from esker.solve.pool.pool import Lease, WorkspacePool
 from esker.solve.refine.refinement import Refiner, Refinery
 from esker.solve.solving import Solving
 
@@ -291,7 +291,7 @@ class Solver:
         basis: bool,
         coarsest: bool,
         asked: Mapping[Layer, Contributors],
-    ) -> Iterator[SolveEvent]:
+    ) -> Generator[SolveEvent]:
         """Previews, channels and settled levels of one solve; see ``_attempt``."""
         top = workspace.top
         late = [layer.channel for layer in asked if not layer.painted]
@@ -333,9 +333,7 @@ class Solver:
         was: then the others go with it, so that what settles depends on the strokes alone."""
         settings, shown = job.settings, False
         if edited:
-            assert workspace.preview_workspace is not None
-            relief = max(float(np.ptp(workspace.preview_workspace.read(0))), 1.0)
-            for result in passes.amended(workspace, settings, relief):
+            for result in passes.amended(workspace, settings, workspace.relief_m):
                 if isinstance(result, Preview):
                     shown, workspace.solved_for = True, passes.conditions(job)
                 yield result

@@ -12,8 +12,8 @@ from esker.solve.base import Base, bound
 from esker.solve.constraints.computable import computable
 from esker.solve.opencl.device import Device
 from esker.solve.opencl.faults import guarded
-from esker.solve.opencl.pool import Lease
 from esker.solve.passes import Job
+from esker.solve.pool.pool import Lease
 
 EARLY_STROKES = 128
 """Strokes that may be packed for an early preview, which cannot be left."""

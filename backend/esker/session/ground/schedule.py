@@ -1,6 +1,6 @@
 """Turns of rooms on the solver (DESIGN 8): rooms that wait for a first coarse preview, finer previews, settling, and
-refinement, in this order; in turn within each, a slice at a time. Finer previews are finished one after the other,
-the smallest terrains first: interleaved, all of them would come late.
+refinement, in this order; in turn within each, a slice at a time. Finer previews are finished one after the other, and
+so is settling, the smallest terrains first: interleaved, all of them would come late.
 
 That order is among rooms that have had about as much time as each other. A room that has had ``AHEAD`` more than one
 that waits comes behind it, whatever it waits for: however much work a room makes, it takes its share and no more. Idle
@@ -22,10 +22,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
-from esker.grid import solve_bytes
+from esker.grid import parked_bytes
 from esker.process import memory
 from esker.session.ground import states
-from esker.session.ground.states import COARSE, FINER, REFINE, Ground, Previewing
+from esker.session.ground.states import COARSE, FINER, REFINE, SETTLE, Ground, Previewing
 from esker.session.ground.tally import PATIENCE, Room, Tally, Used
 
 AHEAD: Final = 0.500
@@ -94,19 +94,20 @@ def has_something_else(room: Room, grounds: Grounds[Room]) -> bool:
 
 
 def _order(stage: int, ground: Ground, had: Used) -> tuple[int, int]:
-    """Returns a key by which rooms of one class are ordered: the least comes first."""
-    return (ground.top, had.began) if stage == FINER else (0, had.turn)
+    """Returns a key by which rooms of one class are ordered: the least comes first. What was begun is finished before
+    the next one of its class, since a room amid a solve holds memory."""
+    return (ground.top, had.began) if stage in (FINER, SETTLE) else (0, had.turn)
 
 
 # --- memory ---------------------------------------------------------------------------------------------------------
 
 
 def bytes_of(ground: Ground) -> int:
-    """Returns the memory that the room's solve holds, or would hold."""
+    """Returns the memory that the room's solve holds between its turns, or would hold."""
     wanted, begun = ground.jobs.wanted, ground.jobs.begun
     open_ = states.is_solving(ground) or isinstance(ground.state, states.ChannelsOnly)
     attempt = begun if wanted is None or open_ else wanted
-    return solve_bytes(ground.top, attempt is not None and attempt.job.base is not None)
+    return parked_bytes(ground.top, attempt is not None and attempt.job.base is not None)
 
 
 def _fits(room: Room, stage: int, grounds: Grounds[Room], now: float, tally: Tally[Room]) -> bool:

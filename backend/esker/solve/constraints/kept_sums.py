@@ -61,16 +61,30 @@ class Memory(Protocol):
 class KeptSums:
     """The sums that one workspace keeps. ``side``: bins along a side of its finest level."""
 
-    def __init__(self, queue: Memory, side: int, based: bool) -> None:
-        self._queue, self._bytes = queue, 4 * BIN * BIN * (SUMS + int(based))
+    def __init__(self, side: int, based: bool) -> None:
+        self._bytes = 4 * BIN * BIN * (SUMS + int(based))
         self._slots = np.zeros((side, side), dtype=np.int32)
-        self._used = 0
+        self._used = self._most = 0
         self._until: str | None = None
         self._buffer: Any = None
 
-    def plan(self, changes: Changes, window: Window) -> Kept | None:
+    @property
+    def bytes(self) -> int:
+        """Memory of the sums that are kept, or were since the buffer was made."""
+        return self._most * self._bytes
+
+    def clear(self) -> None:
+        """Lets the sums go."""
+        self._slots[:] = 0
+        self._used = self._most = 0
+        self._until = self._buffer = None
+
+    def plan(self, memory: Memory, changes: Changes, window: Window) -> Kept | None:
         """Returns the sums to keep, and those to go on from, in the bins of a window that is rasterised next; None: all
-        strokes are summed anew."""
+        strokes are summed anew.
+
+        ``memory``: makes buffers on the device.
+        """
         until = self._bound(changes)
         if until != self._until:
             self._slots[:] = 0
@@ -79,8 +93,8 @@ class KeptSums:
         if first < LEAST_STROKES:
             return None
         if self._buffer is None:
-            self._buffer = self._queue.raw(MOST_BINS * self._bytes)
-        return Kept(first, self._queue.constant(self._codes(window)), self._buffer)
+            self._buffer = memory.raw(MOST_BINS * self._bytes)
+        return Kept(first, memory.constant(self._codes(window)), self._buffer)
 
     def _bound(self, changes: Changes) -> str | None:
         """The id below which strokes are in the sums: that of the first that changes, or one shortly before it."""
@@ -100,4 +114,5 @@ class KeptSums:
             known[fresh] = np.arange(self._used + 1, self._used + len(fresh) + 1)
             codes[row, fresh] = -known[fresh]
             self._used += len(fresh)
+        self._most = max(self._most, self._used)
         return codes

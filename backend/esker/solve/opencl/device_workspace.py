@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
-from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,8 @@ from esker.solve.constraints.kept_sums import KeptSums
 from esker.solve.constraints.tables import RASTER_BINS, Tables, Window
 from esker.solve.constraints.tables import bins as bins_of
 from esker.solve.opencl import raster
-from esker.solve.opencl.fields import Shape, rectangle
+from esker.solve.opencl.fields import Shape, SystemMemory, rectangle
+from esker.solve.opencl.parking import Parked, Saved, Spares, copied, restored
 from esker.solve.opencl.queue import Queue
 
 if TYPE_CHECKING:
@@ -38,6 +40,15 @@ class DeviceSystem(multigrid.System, Protocol):
 
     def put(self, name: str, level: int, value: NDArray[Any]) -> None:
         """See ``fields.Fields``."""
+
+    def flush(self) -> None:
+        """See ``fields.Fields``."""
+
+    def lend(self) -> SystemMemory:
+        """Gives its memory away; it can do nothing until it borrows some."""
+
+    def borrow(self, memory: SystemMemory) -> None:
+        """Works with the memory of another system of the same shape from now on, whatever is in it."""
 
 
 class OverBase:
@@ -64,26 +75,130 @@ class OverBase:
         self._enqueue(self._queue, self._shape, (self.base, self.share, self.target, d, self.raw, f), slack, rows)
 
 
+class Arena(NamedTuple):
+    """The device memory of one workspace, which can go from one to another: a queue with its kernels, what rasterises,
+    and the memory of both systems, None where they are to make it."""
+
+    queue: Any
+    bins: raster.Launcher
+    gradient: SystemMemory | None
+    height: SystemMemory | None
+    over: OverBase | None
+
+
+class Home(Protocol):
+    """Whoever sees to it that workspaces have device memory while they solve."""
+
+    def admit(self, workspace: DeviceWorkspace[Any]) -> None:
+        """The workspace is not parked from now on. Raises DeviceErrors."""
+
+
 S = TypeVar("S", bound=DeviceSystem)
 
 
-class DeviceWorkspace(Generic[S]):
-    """``solver.Workspace`` but for ``guide``, which is the kernels' own."""
+class DeviceWorkspace(ABC, Generic[S]):
+    """``solver.Workspace`` but for ``guide``, which is the kernels' own.
 
-    def __init__(self, queue: Queue, gradient: S, height: S, bins: raster.Launcher, over: OverBase | None) -> None:
+    in_progress: whether a solve is in the middle of it. home: None where it always has device memory.
+    """
+
+    def __init__(self, arena: Arena, gradient: S, height: S) -> None:
         self.top = height.top
+        self.based, self.device = arena.over is not None, arena.queue.device
         self.gradient, self.height = gradient, height
         self.packer = Packer(self.top)
         self.preview_workspace: Workspace | None = None
         self.solved_for: object = None
-        self.size_m = 1.0
-        self._queue, self._bins, self._over = queue, bins, over
-        self._kept = KeptSums(queue, bins_of(grid.samples(self.top)), over is not None) if bins.keeps_sums else None
+        self.size_m = self.relief_m = 1.0
+        self.home: Home | None = None
+        self.in_progress = False
+        self._screening = 0.0
+        self._at_rest: tuple[NDArray[np.float32], NDArray[np.float32]] | None = None
+        self._parked: Parked | None = None
+        self._resident(arena)
+        self._kept = KeptSums(bins_of(grid.samples(self.top)), self.based) if arena.bins.keeps_sums else None
+
+    def _resident(self, arena: Arena) -> None:
+        self.launch: Any
+        self.launch = self._queue = arena.queue
+        self._bins, self._over = arena.bins, arena.over
 
     @property
-    def based(self) -> bool:
-        """Whether the workspace solves over a base."""
-        return self._over is not None
+    def is_parked(self) -> bool:
+        """Returns whether it has no device memory."""
+        return self._parked is not None
+
+    @property
+    def bytes(self) -> int:
+        """Memory that it holds, without its preview workspace; an arena is about what a solve takes."""
+        sums = 0 if self._kept is None else self._kept.bytes
+        return sums + (grid.arena_bytes(self.top, self.based) if self._parked is None else self._parked.bytes)
+
+    def park(self, spares: Spares, *, empty: bool = False) -> Arena:
+        """Gives its device memory away, after copying what cannot be made again from what is left; ``empty``: nothing.
+
+        Raises DeviceErrors.
+        """
+        parked = Parked([]) if empty else self._copied(spares)
+        arena = Arena(self._queue, self._bins, self.gradient.lend(), self.height.lend(), self._over)
+        self._parked = parked
+        del self.launch, self._queue, self._bins, self._over
+        return arena
+
+    def _copied(self, spares: Spares) -> Parked:
+        saved, queue = self._saved(), self._queue
+        self.gradient.flush()
+        self.height.flush()
+        parked = Parked(copied(queue, saved.constraints, spares))
+        if self._at_rest is not None:
+            parked.at_rest = self._at_rest
+        elif self.in_progress or self.solved_for is not None:
+            parked.ground = copied(queue, saved.ground, spares)
+        if self.in_progress:
+            parked.progress = copied(queue, saved.progress, spares)
+        return parked
+
+    def resume(self, arena: Arena, spares: Spares) -> None:
+        """Takes over the device memory that another workspace gave away, and is as it was. Raises DeviceErrors."""
+        assert self._parked is not None
+        assert arena.gradient is not None
+        assert arena.height is not None
+        parked, self._parked = self._parked, None
+        self._resident(arena)
+        self.gradient.borrow(arena.gradient)
+        self.height.borrow(arena.height)
+        if not parked.constraints:
+            return
+        saved = self._saved()
+        restored(self._queue, parked.constraints, saved.constraints)
+        if parked.at_rest is not None:
+            heights, gradient = parked.at_rest
+            self.height.put("u", self.top, heights[None])
+            self.gradient.put("u", self.top, gradient)
+        for copies, buffers in ((parked.ground, saved.ground), (parked.progress, saved.progress)):
+            if copies is not None:
+                restored(self._queue, copies, buffers)
+        for system in (self.gradient, self.height):
+            system.coarsen(self._screening)
+        if self.in_progress:
+            self.guide(self.top)
+        parked.released(spares)
+
+    def _saved(self) -> Saved:
+        top, g, h = self.top, self.gradient.fields, self.height.fields
+        over = () if self._over is None else (self._over.share, self._over.target, self._over.raw)
+        constraints = (g["d", top], g["f", top], h["d", top], h["s", top], *over)
+        progress = [f["b", top - 1] for f in (g, h) if top > 0]
+        progress += [f["u", level] for f in (g, h) for level in range(top)]
+        return Saved(constraints, (g["u", top], h["u", top]), progress)
+
+    @abstractmethod
+    def guide(self, level: int) -> None:
+        """f of the height step at ``level`` from u of the gradient step."""
+
+    def rest(self) -> None:
+        """Nothing solves with it any more."""
+        self.in_progress = False
 
     def load(self, strokes: Sequence[Stroke], settings: TerrainSettings, base: Base | None = None) -> None:
         """``loading`` without a pause."""
@@ -96,13 +211,16 @@ class DeviceWorkspace(Generic[S]):
             raise ValueError("a workspace solves with a base or without one, as it was made")
         tables, window = yield from self.packer.packing(strokes, settings, base)
         try:
+            if self.home is not None:
+                self.home.admit(self)
+            self.in_progress, self._at_rest = True, None
             yield from self._rasterising(tables, window, base)
         except BaseException:  # half of the raster is not that of any set
             self.packer.forget()
             raise
 
     def _rasterising(self, tables: Tables, window: Window | None, base: Base | None) -> Iterator[None]:
-        self.size_m = tables.size_m
+        self.size_m, self._screening = tables.size_m, tables.screening
         if window is None:
             return
         if base is not None and self._over is not None:
@@ -133,7 +251,7 @@ class DeviceWorkspace(Generic[S]):
         fields = (h["d", self.top], static, g["d", self.top], g["f", self.top])
         pair = None if over is None else raster.Over(over.base, over.share, over.target)
         target = raster.Target(*fields, shape.pitch, shape.stride, pair)
-        kept = None if self._kept is None else self._kept.plan(self.packer, window)
+        kept = None if self._kept is None else self._kept.plan(self._queue, self.packer, window)
         raster.rasterise(self._bins, tables, window, target, kept=kept)
 
     def read(self, level: int) -> NDArray[np.float32]:
@@ -143,3 +261,8 @@ class DeviceWorkspace(Generic[S]):
     def read_gradient(self) -> NDArray[np.float32]:
         """Both gradient components of the finest level, (2, n, n), metres per metre."""
         return self.gradient.get("u", self.top)
+
+    def given(self, heights: NDArray[np.float32], gradient: NDArray[np.float32]) -> None:
+        """Both solutions of the finest level, at rest, were given out as these arrays, which never change: a workspace
+        that is parked need not copy them."""
+        self._at_rest = heights, gradient

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,15 @@ def fields_of(top: int, static: str) -> list[tuple[str, int]]:
     return out
 
 
+class SystemMemory(NamedTuple):
+    """What a system works with and can lend: its queue, with the kernels that are bound to the buffers, the fields, and
+    a buffer that only its kind of kernels knows."""
+
+    launch: Any
+    fields: dict[tuple[str, int], Any]
+    own: Any
+
+
 class Fields:
     """Memory of a ``multigrid.System`` on a device. Names and their meaning: see there; d is the stiffness, with one
     channel. ``pad``: floats before sample 0 of a row."""
@@ -41,19 +50,31 @@ class Fields:
     pad: ClassVar[int] = 0
     floor: float = FLOOR
 
-    def __init__(self, launch: Queue, shape_of: Callable[[int], Shape], top: int, channels: int, static: str) -> None:
+    def __init__(
+        self,
+        launch: Queue,
+        shape_of: Callable[[int], Shape],
+        top: int,
+        channels: int,
+        static: str,
+        memory: SystemMemory | None = None,
+    ) -> None:
+        """``memory``: to be worked with instead of new memory."""
         self.top, self.channels, self.static = top, channels, static
         self.shapes = {level: shape_of(level) for level in range(top + 1)}
         self.eps = dict.fromkeys(range(top + 1), 0.0)
         self.fields: dict[tuple[str, int], Any] = {
             (name, level): launch.zeros(self.shapes[level].stride * (1 if name == "d" else channels) + self.pad)
-            for name, level in fields_of(top, static)
+            for name, level in (fields_of(top, static) if memory is None else ())
         }
         self._queue = launch
 
     def swap(self, level: int) -> None:
         """See ``multigrid.System``."""
         self.fields["u", level], self.fields["v", level] = self.fields["v", level], self.fields["u", level]
+
+    def flush(self) -> None:
+        """Enqueues what was put off: all buffers may be read after it."""
 
     def largest(self, name: str) -> float:
         """See ``multigrid.System``. For rare cases: reads the field."""

@@ -16,8 +16,8 @@ from esker import grid
 from esker.contract import TILE_CELLS
 from esker.solve.constraints.tables import BIN
 from esker.solve.opencl.device import Device, named
-from esker.solve.opencl.device_workspace import DeviceWorkspace, OverBase
-from esker.solve.opencl.fields import Fields, Shape
+from esker.solve.opencl.device_workspace import Arena, DeviceWorkspace, OverBase
+from esker.solve.opencl.fields import Fields, Shape, SystemMemory
 from esker.solve.opencl.gpu_program import CHAIN, CHAIN_ITEMS, CHANGE_ITEMS, Plan
 from esker.solve.opencl.queue import Queue
 from esker.solve.reference import BOTTOM_LEVELS
@@ -83,12 +83,30 @@ def _blocks(columns: int, rows: int) -> tuple[int, int]:
 class GpuSystem(Fields):
     """``multigrid.System`` on a GPU. Fields and their meaning: see there; ``static`` names the static part of f."""
 
-    def __init__(self, launcher: GpuLauncher, top: int, channels: int, static: str) -> None:
-        super().__init__(launcher, shape_of, top, channels, static)
+    def __init__(
+        self, launcher: GpuLauncher, top: int, channels: int, static: str, memory: SystemMemory | None = None
+    ) -> None:
+        super().__init__(launcher, shape_of, top, channels, static, memory)
         self.launch = launcher
         self._waiting: list[int] = []
         coarsest = ((TILE_CELLS >> BOTTOM_LEVELS) + 1) ** 2
-        self.matrix = launcher.zeros(coarsest * coarsest)
+        if memory is None:
+            self.matrix = launcher.zeros(coarsest * coarsest)
+        else:
+            self.borrow(memory)
+
+    def lend(self) -> SystemMemory:
+        """See ``device_workspace.DeviceSystem``."""
+        self._restrict_now()
+        memory = SystemMemory(self.launch, self.fields, self.matrix)
+        self.fields = {}
+        del self.launch, self._queue, self.matrix
+        return memory
+
+    def borrow(self, memory: SystemMemory) -> None:
+        """See ``device_workspace.DeviceSystem``."""
+        self.launch, self.fields, self.matrix = memory
+        self._queue = memory.launch
 
     def _layout(self, level: int) -> tuple[np.int32, ...]:
         """n, pitch, stride, and pitch and stride of the next coarser level."""
@@ -185,6 +203,10 @@ class GpuSystem(Fields):
         self.launch.cl.enqueue_copy(self.launch.queue, out, self.launch.partial)
         return float(out.max())
 
+    def flush(self) -> None:
+        """See ``fields.Fields``."""
+        self._restrict_now()
+
     def get(self, name: str, level: int) -> NDArray[np.float32]:
         """A field as (channels, n, n); d has one channel."""
         self._restrict_now()
@@ -223,11 +245,13 @@ def _over_base(launch: GpuLauncher, shape: Shape, fields: Sequence[Any], slack: 
 class GpuWorkspace(DeviceWorkspace[GpuSystem]):
     """``solver.Workspace`` on a GPU."""
 
-    def __init__(self, device: Device, top: int, based: bool = False) -> None:
-        self.launch = GpuLauncher(device)
-        gradient, height = GpuSystem(self.launch, top, 2, "f"), GpuSystem(self.launch, top, 1, "s")
-        over = OverBase(self.launch, shape_of(top), 0, _over_base) if based else None
-        super().__init__(self.launch, gradient, height, Bins(self.launch), over)
+    def __init__(self, device: Device, top: int, based: bool = False, arena: Arena | None = None) -> None:
+        if arena is None:
+            launch = GpuLauncher(device)
+            over = OverBase(launch, shape_of(top), 0, _over_base) if based else None
+            arena = Arena(launch, Bins(launch), None, None, over)
+        gradient = GpuSystem(arena.queue, top, 2, "f", arena.gradient)
+        super().__init__(arena, gradient, GpuSystem(arena.queue, top, 1, "s", arena.height))
 
     def guide(self, level: int) -> None:
         """f of the height step at ``level`` from u of the gradient step."""

@@ -16,8 +16,8 @@ from esker import grid
 from esker.contract import TILE_CELLS
 from esker.solve.opencl import wave
 from esker.solve.opencl.device import Device, named
-from esker.solve.opencl.device_workspace import DeviceWorkspace, OverBase
-from esker.solve.opencl.fields import Fields, Shape
+from esker.solve.opencl.device_workspace import Arena, DeviceWorkspace, OverBase
+from esker.solve.opencl.fields import Fields, Shape, SystemMemory
 from esker.solve.opencl.queue import Queue
 from esker.solve.reference import BOTTOM_LEVELS
 
@@ -97,12 +97,29 @@ class ClSystem(Fields):
 
     pad = PAD
 
-    def __init__(self, launcher: Launcher, top: int, channels: int, static: str) -> None:
-        super().__init__(launcher, shape_of, top, channels, static)
+    def __init__(
+        self, launcher: Launcher, top: int, channels: int, static: str, memory: SystemMemory | None = None
+    ) -> None:
+        super().__init__(launcher, shape_of, top, channels, static, memory)
         self.launch = launcher
         self.settling = False
         self.changed: tuple[Any, Any] | None = None
-        self.changes = launcher.zeros(channels * launcher.device.strips)
+        if memory is None:
+            self.changes = launcher.zeros(channels * launcher.device.strips)
+        else:
+            self.borrow(memory)
+
+    def lend(self) -> SystemMemory:
+        """See ``device_workspace.DeviceSystem``."""
+        memory = SystemMemory(self.launch, self.fields, self.changes)
+        self.fields, self.changed = {}, None
+        del self.launch, self._queue, self.changes
+        return memory
+
+    def borrow(self, memory: SystemMemory) -> None:
+        """See ``device_workspace.DeviceSystem``."""
+        self.launch, self.fields, self.changes = memory
+        self._queue, self.changed = memory.launch, None
 
     def coarsen(self, screening: float, rows: tuple[int, int] | None = None) -> None:
         """Constraints of all coarser levels from those of the top, of which only ``rows`` (half open) changed."""
@@ -211,11 +228,13 @@ def _over_level(launch: Launcher, shape: Shape, fields: Sequence[Any], slack: fl
 class ClWorkspace(DeviceWorkspace[ClSystem]):
     """``solver.Workspace`` on an OpenCL device."""
 
-    def __init__(self, device: Device, top: int, based: bool = False) -> None:
-        self.launch = Launcher(device, top)
-        gradient, height = ClSystem(self.launch, top, 2, "f"), ClSystem(self.launch, top, 1, "s")
-        over = OverBase(self.launch, shape_of(top), PAD, _over_level) if based else None
-        super().__init__(self.launch, gradient, height, self.launch, over)
+    def __init__(self, device: Device, top: int, based: bool = False, arena: Arena | None = None) -> None:
+        if arena is None:
+            launch = Launcher(device, top)
+            over = OverBase(launch, shape_of(top), PAD, _over_level) if based else None
+            arena = Arena(launch, launch, None, None, over)
+        gradient = ClSystem(arena.queue, top, 2, "f", arena.gradient)
+        super().__init__(arena, gradient, ClSystem(arena.queue, top, 1, "s", arena.height))
 
     def guide(self, level: int) -> None:
         """f of the height step at ``level`` from u of the gradient step."""

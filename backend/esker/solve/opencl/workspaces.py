@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 from esker import grid
 from esker.solve.opencl import gpu_levels, levels
 from esker.solve.opencl.device import Device
+from esker.solve.opencl.device_workspace import Arena
 from esker.solve.opencl.faults import OutOfDeviceMemoryError, finished
 from esker.solve.opencl.fields import fields_of
 from esker.solve.reference import NumpyWorkspace
@@ -21,6 +22,7 @@ from esker.solve.reference import NumpyWorkspace
 if TYPE_CHECKING:
     from esker.solve.passes import Workspace
 
+OnDevice = levels.ClWorkspace | gpu_levels.GpuWorkspace
 SHARE = 0.9
 """Workspaces may take this share of a device's memory: tables, the driver and the display need some too."""
 _held: Counter[str] = Counter()
@@ -34,6 +36,11 @@ def new_workspace(device: Device | None, top: int, based: bool = False) -> Works
     """
     if device is None:
         return NumpyWorkspace(top, based)
+    return on_device(device, top, based)
+
+
+def on_device(device: Device, top: int, based: bool = False) -> OnDevice:
+    """``new_workspace`` for a device."""
     needed, largest = planned_bytes(device, top, based)
     name = device.name
     with _lock:
@@ -55,7 +62,7 @@ def new_workspace(device: Device | None, top: int, based: bool = False) -> Works
     except BaseException:
         _release(name, needed)
         raise
-    weakref.finalize(made, _release, name, needed)
+    weakref.finalize(made.launch, _release, name, needed)  # memory goes from workspace to workspace with its queue
     return made
 
 
@@ -81,9 +88,14 @@ def planned_bytes(device: Device, top: int, based: bool = False) -> tuple[int, i
     return 4 * sum(floats), 4 * max(floats)
 
 
-def _make(device: Device, top: int, based: bool) -> Workspace:
+def with_arena(device: Device, top: int, based: bool, arena: Arena) -> OnDevice:
+    """A workspace that works with the memory of another one of its kind, which gave it away."""
+    return _make(device, top, based, arena)
+
+
+def _make(device: Device, top: int, based: bool, arena: Arena | None = None) -> OnDevice:
     kind = levels.ClWorkspace if device.plan is None else gpu_levels.GpuWorkspace
-    return kind(device, top, based)
+    return kind(device, top, based, arena)
 
 
 def _release(name: str, size: int) -> None:

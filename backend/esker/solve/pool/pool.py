@@ -1,14 +1,16 @@
 """The workspaces of one solver: who solves leases one, and those that nobody leases go (DESIGN 5.3; decision 31).
 
-All of them together stay within a bound at every moment, leased ones included, as far as idle ones can make room. What
-a workspace that went had packed is kept: the room that comes back is rasterised again, but not packed again.
+All of them together stay within a bound at every moment, leased ones included, as far as idle ones can make room. Few
+of them have device memory at a time: the others are parked (decision 57). What a workspace that went had packed is
+kept: the room that comes back is rasterised again, but not packed again.
 """
 
 from __future__ import annotations
 
 import time
 import weakref
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 
 from esker import grid
@@ -18,9 +20,12 @@ from esker.process import memory, system
 from esker.solve import multigrid
 from esker.solve.constraints.constraints import Packer, Shapes
 from esker.solve.opencl.device import Device
+from esker.solve.opencl.device_workspace import DeviceWorkspace
 from esker.solve.opencl.faults import is_fault
 from esker.solve.opencl.workspaces import new_workspace
 from esker.solve.passes import Job, Workspace
+from esker.solve.pool.residency import SHARE as ARENAS_SHARE
+from esker.solve.pool.residency import Residency
 
 MOST_BYTES = 3 << 29
 """Memory that workspaces may hold, with the raster of the strokes that they last solved, but no more than an eighth of
@@ -44,6 +49,12 @@ def best_packed(packers: Sequence[Packer], strokes: Sequence[Stroke], settings: 
         counts = [packer.shared_ids(strokes) for packer in packers]
     most = max(counts, default=0)
     return packers[counts.index(most)] if packers and 2 * most >= len(strokes) else None
+
+
+def _both(workspace: Workspace) -> list[Workspace]:
+    """A workspace and its preview workspace."""
+    small = workspace.preview_workspace
+    return [workspace] if small is None else [workspace, small]
 
 
 @dataclass(eq=False)
@@ -75,6 +86,7 @@ class WorkspacePool:
     def __init__(self, shapes: Shapes) -> None:
         self._shapes = shapes
         self.bound = min(MOST_BYTES, memory.available_bytes() // SHARE)
+        self.residency = Residency(self.bound // ARENAS_SHARE)
         self.idle: list[Workspace] = []
         self.since: weakref.WeakKeyDictionary[Workspace, float] = weakref.WeakKeyDictionary()
         self._made: weakref.WeakSet[Workspace] = weakref.WeakSet()
@@ -86,7 +98,7 @@ class WorkspacePool:
         job: Job,
         top: int,
         device: Device | None,
-        work: Callable[[Workspace], Iterator[SolveEvent]],
+        work: Callable[[Workspace], Generator[SolveEvent]],
     ) -> Iterator[SolveEvent]:
         """Does ``work`` with a workspace for a job, which is idle afterwards.
 
@@ -96,7 +108,7 @@ class WorkspacePool:
         workspace = lease.workspace = self.take(job, top, device)
         keep = True
         try:
-            yield from work(workspace)
+            yield from self._resident(workspace, work(workspace))
         except GeneratorExit:  # what is packed and rasterised is still that of some set
             raise
         except BaseException as error:
@@ -107,19 +119,22 @@ class WorkspacePool:
             raise
         finally:
             lease.workspace = None
+            for each in _both(workspace):
+                each.rest()
             if keep:
                 self.give(workspace)
             del workspace  # the traceback of an error would keep it
 
     def take(self, job: Job, top: int, device: Device | None) -> Workspace:
-        """Returns an idle workspace that has most of these strokes already; or a new one; or the longest idle.
+        """Returns an idle workspace that has most of these strokes already; or a new one, for which those go that are
+        idle longest.
 
         Raises OutOfDeviceMemoryError.
         """
         based = job.base is not None
         idle = [w for w in self.idle if w.top == top and w.based == based]
         packer = best_packed([w.packer for w in idle], job.strokes, job.settings)
-        taken = next((w for w in idle if w.packer is packer), idle[0] if idle and self._is_full(top, based) else None)
+        taken = next((w for w in idle if w.packer is packer), None)
         if taken is not None:
             self.idle.remove(taken)
             return taken
@@ -130,11 +145,9 @@ class WorkspacePool:
     def _new(self, job: Job, top: int, device: Device | None) -> Workspace:
         """Makes a workspace, with what an earlier one had packed of the same room."""
         based = job.base is not None
-        made = new_workspace(device, top, based)
-        made.packer.shapes = self._shapes
+        made = self._empty(device, top, based)
         if top >= grid.PREVIEW_WORKSPACE_FROM:
-            made.preview_workspace = new_workspace(device, grid.PREVIEW_WORKSPACE_LEVEL, based)
-            made.preview_workspace.packer.shapes = self._shapes
+            made.preview_workspace = self._empty(device, grid.PREVIEW_WORKSPACE_LEVEL, based)
         self._made.add(made)
         for kept in self._packed:
             same = (kept.top, kept.based) == (top, based)
@@ -146,14 +159,31 @@ class WorkspacePool:
                 break
         return made
 
+    def _empty(self, device: Device | None, top: int, based: bool) -> Workspace:
+        made = new_workspace(None, top, based) if device is None else self.residency.new(device, top, based)
+        made.packer.shapes = self._shapes
+        return made
+
+    def _resident(self, workspace: Workspace, steps: Generator[SolveEvent]) -> Iterator[SolveEvent]:
+        """The steps of a solve. When it goes on, somebody else may have had its memory meanwhile."""
+        with closing(steps):
+            for event in steps:
+                yield event
+                for each in _both(workspace):
+                    if isinstance(each, DeviceWorkspace) and each.in_progress:
+                        self.residency.admit(each)
+
     @property
     def held(self) -> int:
-        """Bytes of all workspaces that there are."""
-        return sum(grid.solve_bytes(w.top, w.based) for w in self._made)
+        """Bytes of all workspaces that there are, and of what is kept for the next ones."""
+        return self.residency.bytes + sum(each.bytes for w in self._made for each in _both(w))
 
     def _is_full(self, top: int, based: bool) -> bool:
         """Returns whether one more workspace would be beyond the bound."""
-        return self.held + grid.solve_bytes(top, based) > self.bound
+        kinds = [(top, based)]
+        if top >= grid.PREVIEW_WORKSPACE_FROM:
+            kinds.append((grid.PREVIEW_WORKSPACE_LEVEL, based))
+        return self.held + sum(self.residency.cost(*kind) for kind in kinds) > self.bound
 
     def give(self, workspace: Workspace) -> None:
         """Takes back a workspace that ``take`` gave: it may be leased again."""
@@ -167,9 +197,10 @@ class WorkspacePool:
         self.idle.remove(workspace)
         self._made.discard(workspace)
         preview = None if workspace.preview_workspace is None else workspace.preview_workspace.packer
-        for packer in (workspace.packer, preview):
-            if packer is not None:
-                packer.unrastered()
+        for each in _both(workspace):
+            each.packer.unrastered()
+            if isinstance(each, DeviceWorkspace):
+                self.residency.drop(each)
         since = time.monotonic() if now is None else now
         self._packed.append(Packed(since, workspace.top, workspace.based, workspace.packer, preview))
         del self._packed[:-PACKED]
@@ -181,6 +212,7 @@ class WorkspacePool:
             self._drop(late, now)
             count += 1
         if count:
+            self.residency.clear()
             system.give_memory_back()
         self._packed = [kept for kept in self._packed if kept.since > now - PACKED_SECONDS]
         return count
@@ -189,3 +221,4 @@ class WorkspacePool:
         """Forgets at once what is kept for later: there is no memory for it."""
         self.idle.clear()
         self._packed.clear()
+        self.residency.clear()

@@ -1,0 +1,220 @@
+"""Workspaces that lend their memory to others and go on where they were (SPEC S500 to S505; decision 57)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+from esker import grid
+from esker.contract import Stroke, TerrainSettings
+from esker.events import BaseLevel, Done, Level, SolveEvent
+from esker.solve.base import Base
+from esker.solve.opencl import parking
+from esker.solve.opencl.device_workspace import DeviceWorkspace
+from esker.solve.opencl.parking import Spares
+from esker.solve.solver import Solver
+from tests.solver.bases import hills
+from tests.solver.scenes import PINNED, SCENES, SETTINGS
+
+ROOMS = ("a", "b", "c")
+TOP = 2
+
+
+def of_room(room: str, name: str = "five") -> list[Stroke]:
+    return [s.model_copy(update={"id": f"{room}-{s.id}"}) for s in SCENES[name]]
+
+
+def edited(strokes: list[Stroke], by: float) -> list[Stroke]:
+    """One stroke has moved: the others keep their packing, and the first preview comes from the ground before."""
+    last = strokes[0].last
+    return [strokes[0].model_copy(update={"last": (last[0] + by, last[1], last[2])}), *strokes[1:]]
+
+
+def shown(event: SolveEvent) -> list[np.ndarray]:
+    """All heights and gradients of an event."""
+    if isinstance(event, Done) and event.basis is not None:
+        return [event.basis.heights, event.basis.gradient]
+    return [event.heights] if isinstance(event, Level) and not isinstance(event, BaseLevel) else []
+
+
+@pytest.fixture(autouse=True)
+def previews_on_small_levels(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Level 2 has a preview workspace, as level 4 has where nothing is tested."""
+    monkeypatch.setattr(grid, "PREVIEW_WORKSPACE_FROM", TOP)
+    monkeypatch.setattr(grid, "PREVIEW_WORKSPACE_LEVEL", 1)
+
+
+def one_arena(solver: Solver) -> Solver:
+    """From now on one workspace of each kind has memory at a time."""
+    solver._pool.residency.bound = 0
+    return solver
+
+
+@pytest.fixture(params=["rows", "tiles"])
+def kernels(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Solver:
+    monkeypatch.setenv("ESKER_KERNELS", request.param)
+    made = Solver()
+    if made._device is None:
+        pytest.skip("no OpenCL device")
+    return made
+
+
+def sets(room: str) -> list[list[Stroke]]:
+    """What is drawn in a room, one after the other."""
+    first = of_room(room)
+    return [first, edited(first, 40.0), edited(first, 80.0)]
+
+
+def alone(solver: Solver, room: str, settings: TerrainSettings, base: Base | None, basis: bool) -> list[Any]:
+    found = []
+    for strokes in sets(room):
+        for event in solver.steps(strokes, settings, TOP, base=base, basis=basis):
+            found += shown(event)
+    return found
+
+
+@pytest.mark.parametrize("basis", [True, False], ids=["refined later", "not refined"])
+@pytest.mark.parametrize("settings", [SETTINGS, PINNED], ids=["free", "pinned"])
+@pytest.mark.parametrize("base", [None, hills()], ids=["flat", "hills"])
+def test_solves_that_take_each_others_memory_at_every_pause_give_the_bits_of_solves_alone(
+    kernels: Solver, settings: TerrainSettings, base: Base | None, basis: bool
+) -> None:
+    """SPEC S500: previews, previews from the ground before, settled levels, gradients."""
+    expected = {room: alone(Solver(kernels.device_name), room, settings, base, basis) for room in ROOMS[:2]}
+    solver, got = one_arena(kernels), {room: list[Any]() for room in ROOMS[:2]}
+
+    def drawing(room: str) -> Iterator[None]:
+        for strokes in sets(room):
+            for event in solver.steps(strokes, settings, TOP, base=base, basis=basis):
+                got[room] += shown(event)
+                yield
+
+    running = [drawing(room) for room in ROOMS[:2]]
+    while running:
+        running = [each for each in running if next(each, "over") is None]
+    for room, found in expected.items():
+        assert len(got[room]) == len(found)
+        assert all(np.array_equal(one, other) for one, other in zip(found, got[room], strict=True)), room
+    assert sum(not w.is_parked for w in solver._pool.idle if isinstance(w, DeviceWorkspace)) == 1
+
+
+def test_what_was_in_the_memory_before_does_not_matter(kernels: Solver) -> None:
+    """SPEC S500: not even numbers that are none."""
+    expected = kernels.solve(of_room("b"), SETTINGS, 2)[2]
+    kernels._pool.clear()
+    one_arena(kernels).solve(of_room("a"), SETTINGS, 2)
+    kernels.solve(of_room("b"), SETTINGS, 2)
+    residency, (first, second) = kernels._pool.residency, kernels._pool.idle
+    assert first.is_parked
+    arena = second.park(residency.spares)
+    for system in (arena.gradient, arena.height):
+        for buffer in system.fields.values():
+            nothing = np.full(1, np.nan, dtype=np.float32)
+            system.launch.cl.enqueue_fill_buffer(system.launch.queue, buffer, nothing, 0, buffer.size)
+    second.resume(arena, residency.spares)
+    moved = edited(of_room("b"), 1.0)
+    assert np.array_equal(kernels.solve(of_room("b"), SETTINGS, 2)[2], expected)
+    assert np.array_equal(kernels.solve(moved, SETTINGS, 2)[2], Solver().solve(moved, SETTINGS, 2)[2])
+
+
+def test_the_strokes_of_a_parked_workspace_are_not_rasterised_again(
+    kernels: Solver, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """SPEC S501."""
+    solver = one_arena(kernels)
+    for room in ROOMS:
+        solver.solve(of_room(room), SETTINGS, 2)
+    done: list[int] = []
+    whole = DeviceWorkspace.rasterise
+    monkeypatch.setattr(
+        DeviceWorkspace, "rasterise", lambda w, tables, window: (done.append(w.top), whole(w, tables, window))
+    )
+    for room in ROOMS:
+        solver.solve(of_room(room), SETTINGS, 2)
+    assert done == []
+
+
+def test_few_have_memory_and_the_least_recent_that_rests_gives_it(kernels: Solver) -> None:
+    """SPEC S502: not one in the middle of a solve, while another rests."""
+    kernels._pool.residency.bound = 2 * grid.arena_bytes(1)
+    running = kernels.steps(of_room("a"), SETTINGS, 1)
+    next(running)
+    kernels.solve(of_room("b"), SETTINGS, 1)
+    [rests] = kernels._pool.idle
+    kernels.solve(of_room("c"), SETTINGS, 1)
+    held = {w.top: w for w in kernels._pool.residency._turns}
+    assert len(kernels._pool.residency._turns) == 2
+    assert rests.is_parked
+    assert set(held) == {1}
+    running.close()
+
+
+def test_a_workspace_at_rest_that_was_given_out_keeps_the_constraints_alone(kernels: Solver) -> None:
+    """SPEC S503: a quarter of what it solves with; in the middle of a solve, and with a ground of its own, half."""
+    solver = one_arena(kernels)
+    whole = grid.arena_bytes(3)
+    for basis, most in ((True, 0.3), (False, 0.45)):
+        for _ in solver.steps(of_room("a"), SETTINGS, 3, basis=basis):
+            pass
+        solver.solve(of_room("b"), SETTINGS, 3)
+        parked = next(w for w in solver._pool.idle if isinstance(w, DeviceWorkspace) and w.is_parked)
+        assert 0.1 * whole < parked.bytes - (0 if parked._kept is None else parked._kept.bytes) < most * whole
+        solver._pool.clear()
+    steps = solver.steps(of_room("a"), SETTINGS, 3)
+    while not isinstance(event := next(steps), Level) or event.level < 3:
+        pass
+    solver.solve(of_room("b"), SETTINGS, 3)
+    [amid] = [w for w in solver._pool._made if isinstance(w, DeviceWorkspace) and w.in_progress]
+    assert amid.is_parked
+    assert amid.bytes <= 1.1 * grid.parked_bytes(3)
+    steps.close()
+
+
+def test_a_solve_whose_memory_is_refused_ends_and_leaves_nothing_behind(
+    kernels: Solver, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """SPEC S504: a device may fail while contents come back."""
+    solver = one_arena(kernels)
+    expected = solver.solve(of_room("a"), SETTINGS, 2)[2]
+    running = solver.steps(of_room("a"), SETTINGS, 2)
+    next(running)
+    solver.solve(of_room("b"), SETTINGS, 2)
+    with monkeypatch.context() as patch:
+
+        def refused(*_: object) -> None:
+            raise RuntimeError("the copy fails")
+
+        patch.setattr("esker.solve.opencl.device_workspace.restored", refused)
+        with pytest.raises(RuntimeError, match="the copy fails"):
+            list(running)
+    assert np.array_equal(solver.solve(of_room("a"), SETTINGS, 2)[2], expected)
+
+
+def test_copies_come_from_memory_that_is_kept_and_that_has_a_bound(monkeypatch: pytest.MonkeyPatch) -> None:
+    """SPEC S505."""
+    monkeypatch.setattr(parking, "SPARE_BYTES", 100)
+    spares = Spares()
+    first = spares.take(60)
+    spares.give(first)
+    assert spares.bytes == 60
+    spares.give(np.empty(60, dtype=np.uint8))
+    assert spares.bytes == 60, "no more than that is kept"
+    assert spares.take(30) is not first
+    assert spares.take(60) is first
+    assert spares.bytes == 0
+    spares.give(first)
+    spares.clear()
+    assert spares.bytes == 0
+
+
+def test_memory_that_is_not_wanted_goes_with_the_last_that_rests(kernels: Solver) -> None:
+    """SPEC S30: arenas and spare copies, too."""
+    solver = one_arena(kernels)
+    for room in ROOMS:
+        solver.solve(of_room(room, "one"), SETTINGS, 2)
+    assert solver._pool.held > 0
+    assert solver.tidy(1e12) == len(ROOMS)
+    assert solver._pool.held == 0
