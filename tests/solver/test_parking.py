@@ -12,6 +12,7 @@ from esker import grid
 from esker.contract import Stroke, TerrainSettings
 from esker.events import BaseLevel, Done, Level, SolveEvent
 from esker.solve.base import Base
+from esker.solve.constraints.tables import Tables, Window
 from esker.solve.opencl import parking
 from esker.solve.opencl.device_workspace import DeviceWorkspace
 from esker.solve.opencl.parking import Spares
@@ -51,6 +52,11 @@ def one_arena(solver: Solver) -> Solver:
     """From now on one workspace of each kind has memory at a time."""
     solver._pool.residency.bound = 0
     return solver
+
+
+def on_device(solver: Solver) -> list[DeviceWorkspace[Any]]:
+    """The workspaces that rest."""
+    return [w for w in solver._pool.idle if isinstance(w, DeviceWorkspace)]
 
 
 @pytest.fixture(params=["rows", "tiles"])
@@ -98,7 +104,7 @@ def test_solves_that_take_each_others_memory_at_every_pause_give_the_bits_of_sol
     for room, found in expected.items():
         assert len(got[room]) == len(found)
         assert all(np.array_equal(one, other) for one, other in zip(found, got[room], strict=True)), room
-    assert sum(not w.is_parked for w in solver._pool.idle if isinstance(w, DeviceWorkspace)) == 1
+    assert sum(not w.is_parked for w in on_device(solver)) == 1
 
 
 def test_what_was_in_the_memory_before_does_not_matter(kernels: Solver) -> None:
@@ -107,10 +113,11 @@ def test_what_was_in_the_memory_before_does_not_matter(kernels: Solver) -> None:
     kernels._pool.clear()
     one_arena(kernels).solve(of_room("a"), SETTINGS, 2)
     kernels.solve(of_room("b"), SETTINGS, 2)
-    residency, (first, second) = kernels._pool.residency, kernels._pool.idle
+    residency, (first, second) = kernels._pool.residency, on_device(kernels)
     assert first.is_parked
     arena = second.park(residency.spares)
     for system in (arena.gradient, arena.height):
+        assert system is not None
         for buffer in system.fields.values():
             nothing = np.full(1, np.nan, dtype=np.float32)
             system.launch.cl.enqueue_fill_buffer(system.launch.queue, buffer, nothing, 0, buffer.size)
@@ -129,9 +136,12 @@ def test_the_strokes_of_a_parked_workspace_are_not_rasterised_again(
         solver.solve(of_room(room), SETTINGS, 2)
     done: list[int] = []
     whole = DeviceWorkspace.rasterise
-    monkeypatch.setattr(
-        DeviceWorkspace, "rasterise", lambda w, tables, window: (done.append(w.top), whole(w, tables, window))
-    )
+
+    def counted(self: DeviceWorkspace[Any], tables: Tables, window: Window) -> None:
+        done.append(self.top)
+        whole(self, tables, window)
+
+    monkeypatch.setattr(DeviceWorkspace, "rasterise", counted)
     for room in ROOMS:
         solver.solve(of_room(room), SETTINGS, 2)
     assert done == []
@@ -143,7 +153,7 @@ def test_few_have_memory_and_the_least_recent_that_rests_gives_it(kernels: Solve
     running = kernels.steps(of_room("a"), SETTINGS, 1)
     next(running)
     kernels.solve(of_room("b"), SETTINGS, 1)
-    [rests] = kernels._pool.idle
+    [rests] = on_device(kernels)
     kernels.solve(of_room("c"), SETTINGS, 1)
     held = {w.top: w for w in kernels._pool.residency._turns}
     assert len(kernels._pool.residency._turns) == 2
@@ -160,7 +170,7 @@ def test_a_workspace_at_rest_that_was_given_out_keeps_the_constraints_alone(kern
         for _ in solver.steps(of_room("a"), SETTINGS, 3, basis=basis):
             pass
         solver.solve(of_room("b"), SETTINGS, 3)
-        parked = next(w for w in solver._pool.idle if isinstance(w, DeviceWorkspace) and w.is_parked)
+        parked = next(w for w in on_device(solver) if w.is_parked)
         assert 0.1 * whole < parked.bytes - (0 if parked._kept is None else parked._kept.bytes) < most * whole
         solver._pool.clear()
     steps = solver.steps(of_room("a"), SETTINGS, 3)
