@@ -47,6 +47,8 @@ class _NoTiles:
     def client(self, *_: Any) -> Any:
         return self
 
+    watcher = client
+
     def plan(self, *_: Any) -> None:
         return None
 

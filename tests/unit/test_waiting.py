@@ -151,7 +151,7 @@ def test_a_long_text_arrives_whole_from_its_parts() -> None:
         wire.take()
         parts = ("é".encode() * 7, "ü".encode() * route.FRAGMENT_BYTES, b'"}')
         went_on = Mock()
-        await route._Transport(Mock(scope=wire.scope)).send_long(parts, went_on)
+        await route.WireTransport(Mock(scope=wire.scope)).send_long(parts, went_on)
         frames: Any = wire.take()
         assert b"".join(bytes(frame.data) for frame in frames) == b"".join(parts)
         assert [frame.fin for frame in frames] == [False] * (len(frames) - 1) + [True]

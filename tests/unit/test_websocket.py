@@ -66,7 +66,7 @@ def test_a_frame_made_once_arrives_as_a_text_and_not_after_the_end() -> None:
         for size in (0, 125, 126, 65_535, 65_536, route.SHARED_CHARACTERS + 1):
             text = "é" * size
             went_on = Mock()
-            await route._Transport(Mock(scope=wire.scope)).send_text(text, went_on)
+            await route.WireTransport(Mock(scope=wire.scope)).send_text(text, went_on)
             frames = wire.take()
             assert all(isinstance(frame, Frame) for frame in frames)
             assert b"".join(bytes(frame.data) for frame in frames).decode() == text

@@ -16,5 +16,6 @@ from esker.contract.operations import *  # noqa: F403
 from esker.contract.imports import *  # noqa: F403
 from esker.contract.exports import *  # noqa: F403
 from esker.contract.lesson import *  # noqa: F403
+from esker.contract.classes import *  # noqa: F403
 from esker.contract.messages import *  # noqa: F403
 from esker.contract.frames import *  # noqa: F403

@@ -126,7 +126,7 @@ def _interfaces() -> Iterable[str]:
         yield "\n".join([*lines, "}"])
 
 
-_SENT = {"Hello", "View", "Presence", "Rename", "ImportAnswers", "ExportRequest"}
+_SENT = {"Hello", "View", "Presence", "Rename", "ImportAnswers", "ExportRequest", "WallFocus"}
 """Messages that the page only sends: their defaults may be left out. All other values carry every field."""
 
 

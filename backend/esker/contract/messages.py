@@ -6,6 +6,7 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import Field, StringConstraints, TypeAdapter
 
+from esker.contract.classes import InClass
 from esker.contract.constants import DEFAULT_TAU_PX, MAX_OPS_PER_MESSAGE
 from esker.contract.document import Document
 from esker.contract.imports import ImportStatus
@@ -239,7 +240,8 @@ ServerMessage = Annotated[
     | Pong
     | Importing
     | Lesson
-    | Notice,
+    | Notice
+    | InClass,
     Field(discriminator="type"),
 ]
 

@@ -165,6 +165,7 @@ RejectCode = Literal[
     "view_only",
     "hands_off",
     "protected",
+    "frozen",
     "rate_limited",
     "too_large",
     "unavailable",

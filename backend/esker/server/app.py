@@ -14,7 +14,10 @@ from esker.fairness.shares import Places, Rate, Rates, Share
 from esker.jobs import Imports
 from esker.jobs.exports import Exports
 from esker.keeper.private import Key
+from esker.lesson.classes import Classes
+from esker.lesson.collect import Collections
 from esker.server.routes.answers import add_errors
+from esker.server.routes.classes import add_classes
 from esker.server.routes.deletion import add_deletion
 from esker.server.routes.exports import add_exports
 from esker.server.routes.health import add_health
@@ -26,6 +29,7 @@ from esker.server.routes.page import add_page
 from esker.server.routes.previews import Pictures, add_previews
 from esker.server.routes.socket import add_socket
 from esker.server.routes.terrains import add_terrains
+from esker.server.routes.wall import add_wall
 from esker.server.upload import AT_ONCE
 from esker.server.wire.bodies import Bodies
 from esker.server.wire.descriptors import watch
@@ -76,6 +80,7 @@ def create_app(
         watching.cancel()
         await imports.close()
         await exports.close()
+        await collections.close()
         await pictures.previews.close()
         await hub.close()
 
@@ -92,6 +97,8 @@ def create_app(
     app.add_middleware(Paced)
     app.add_middleware(Headers, strict=front.strict)
     app.add_middleware(Forwarded, front=front)
+    classes = Classes(hub, grids)
+    collections = Collections(classes, data / "collections")
     app.state.hub = hub
     app.state.new_terrains = Rates(Rate(*NEW_TERRAINS), total=Rate(*ALL_NEW_TERRAINS))
     app.state.uploads = Turns(AT_ONCE)
@@ -105,7 +112,9 @@ def create_app(
     add_imports(app, hub, grids, imports)
     add_terrains(app, hub, grids)
     add_exports(app, hub, exports)
-    add_deletion(app, hub)
+    add_deletion(app, hub, classes)
+    add_classes(app, classes, collections)
+    add_wall(app, classes, front)
     add_health(app, hub)
     add_history(app, hub, grids)
     add_links(app, hub)

@@ -54,6 +54,7 @@ from esker.store.previews import PreviewTokens
 from esker.store.space import Space
 from esker.store.upkeep.care import Care, sweep_parts
 from esker.tiles.delivery import ClientTiles, TileServer
+from esker.tiles.watcher import Watcher
 
 log = logging.getLogger("esker")
 
@@ -90,6 +91,9 @@ class _Tiles:
 
     def client(self, server: Any) -> ClientTiles:
         return ClientTiles(server)
+
+    def watcher(self, server: Any, top: int) -> Watcher:
+        return Watcher(server, top)
 
 
 class _Server(uvicorn.Server):

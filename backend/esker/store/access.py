@@ -13,7 +13,7 @@ import hmac
 import secrets
 import sqlite3
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
 from typing import Any, Final, Protocol, TypeVar
@@ -139,6 +139,12 @@ class Access:
         )
         return [_link(row) for row in rows]
 
+    def elsewhere(self, terrain: str, links: Collection[str]) -> dict[str, str]:
+        """Returns the terrains of those links, by id, that are not of ``terrain``."""
+        db = self._journal.reader()
+        found = ((each, db.execute("SELECT terrain FROM links WHERE id=?", (each,)).fetchone()) for each in links)
+        return {each: str(row[0]) for each, row in found if row is not None and row[0] != terrain}
+
     def add(self, terrain: str, role: Role, name: str, by: Link | str | None = None) -> Future[tuple[Link, str]]:
         """A new link and its secret. ``by``: the link through which it is made, or its id where a join code stands for
         it. Fails with TooManyLinks, Ended, Unwritable."""
@@ -156,10 +162,11 @@ class Access:
         return self._journal.submit(write)
 
     def make(
-        self, terrain: str, role: Role, name: str, parent: str | None = None
+        self, terrain: str, role: Role, name: str, parent: str | None = None, secret: str | None = None
     ) -> tuple[Link, str, Callable[[sqlite3.Connection], object]]:
-        """A link that is not written yet, its secret, and what writes it; a terrain's first comes with its birth."""
-        secret = secrets.token_urlsafe(24)
+        """A link that is not written yet, its secret (default: a new one), and what writes it; a terrain's first comes
+        with its birth."""
+        secret = secret or secrets.token_urlsafe(24)
         link = Link(secrets.token_urlsafe(9), terrain, role, name, self._now(), None, parent, hashed(secret))
         row = (link.id, terrain, role, name, link.digest, link.created, parent)
         insert = "INSERT INTO links (id,terrain,role,name,hash,created,parent) VALUES (?,?,?,?,?,?,?)"

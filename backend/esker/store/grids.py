@@ -23,6 +23,8 @@ from collections.abc import Collection, Iterable
 from pathlib import Path
 from typing import Final
 
+from esker import contract as c
+from esker.document import archive
 from esker.patchwork.raster import rasters
 from esker.patchwork.raster.rasters import Raster, RasterError
 from esker.process import system
@@ -127,6 +129,21 @@ class GridStore:
                     raise RasterError("The stored elevation grid is not the one that it should be.")
                 self._open[digest] = found
             return found
+
+    def pack(self, document: c.Document) -> Path:
+        """A temporary .esker file of a document. Raises document.archive.ArchiveError, RasterError: a grid that is
+        missing or damaged."""
+        live = {layer.content: self.read(layer.content) for layer in document.layers}
+        gone = {layer.content for layer in document.deleted_layers if layer.content not in live}
+        found = live | {digest: self.read(digest) for digest in gone if self.has(digest)}
+        path = self.temporary(".esker")
+        with path.open("wb") as file:
+            try:
+                archive.write(file, document, found)
+            except BaseException:
+                path.unlink()
+                raise
+        return path
 
     def size(self, digests: Iterable[str]) -> int:
         """Bytes on disk of these grids together; those that are not stored count nothing."""

@@ -15,6 +15,7 @@ from typing import Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from esker import grid
 from esker.contract import DEFAULT_LEVEL, Channel, View
 from esker.grid import TileKey
 from esker.tiles.channels import ChannelPyramid, channel_levels
@@ -26,7 +27,7 @@ from esker.tiles.quadtree import ALWAYS, default_selection, restrict, select_sho
 from esker.tiles.refined import RefinedTiles, Under
 from esker.tiles.refined_ledger import RefinedLedger
 from esker.tiles.sparse import Selection, restrict_below, select_refined
-from esker.tiles.surface import BasePyramid, Surface
+from esker.tiles.surface import BasePyramid, Surface, total
 
 MOST_REQUESTS: Final = 128
 """Most tiles that the refiner is asked for at once."""
@@ -173,6 +174,14 @@ class TileServer:
         levels = [self.pyramid.level(level) for level in range(self.pyramid.top + 1)]
         final = all(level is not None and level.settled and level.stamp > self._based for level in levels)
         return final and self._base_whole and len({v.clock for v in levels if v}) == 1
+
+    def heights(self, level: int) -> NDArray[np.float32] | None:
+        """The ground of a level as it is drawn, metres, row 0 south; None where it was not solved yet."""
+        offset, base = self.pyramid.level(level), self.base.level(level)
+        if offset is None:
+            return None
+        quanta = offset.samples if base is None else total(offset.samples, base.samples)
+        return np.asarray(quanta * np.float32(grid.quantum(level, self.pyramid.size_m)), dtype=np.float32)
 
     def requests(self, clients: Sequence[ClientTiles]) -> tuple[tuple[TileKey, ...], int]:
         """The tiles to refine next for all clients together, coarse before fine, then by screen error.

@@ -10,6 +10,7 @@ import { SyncDoc } from "../doc/sync.ts";
 import type {
   ErrorMessage,
   Hello,
+  InClass,
   Member,
   MemberPresence,
   Op,
@@ -73,6 +74,8 @@ export class TerrainSession implements OpenTerrain {
   /** The server's last sentence about its solver, until somebody has read it. */
   readonly notice = signal<string | null>(null);
   readonly server = signal<ServerInfo | null>(null);
+  /** The class whose copy this terrain is, as the server last said; null where it is none. */
+  readonly inClass = signal<InClass | null>(null);
   readonly me = signal<Identity>({ name: "", colour: "#888888" });
   readonly stage = signal<Stage | null>(null);
   /** Whether the link allows changes. */
@@ -330,6 +333,9 @@ export class TerrainSession implements OpenTerrain {
         break;
       case "error":
         this.#error(message);
+        break;
+      case "class":
+        this.inClass.value = message;
         break;
       case "pong":
         break;

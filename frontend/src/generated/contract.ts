@@ -261,6 +261,22 @@ export const EXPORT_MESH_SAMPLES = 1025 as const;
 
 export const EXPORT_MAP_SAMPLES = 2049 as const;
 
+export const MAX_PUPILS = 60 as const;
+
+export const DEFAULT_PUPILS = 40 as const;
+
+export const MAX_TOGETHER = 4 as const;
+
+export const MAX_CLASSES = 8 as const;
+
+export const WALL_LEVEL = 1 as const;
+
+export const WALL_CLOSE_LEVEL = 3 as const;
+
+export const WALL_PACE_MS = 500 as const;
+
+export const MAX_COMPARED = 2 as const;
+
 export const FRAME_MAGIC = 19283 as const;
 
 export const FRAME_SETTLED = 1 as const;
@@ -618,7 +634,8 @@ export type ServerMessage =
   | Pong
   | Importing
   | Lesson
-  | Notice;
+  | Notice
+  | InClass;
 
 export type StrokeKind =
   | "profile"
@@ -693,6 +710,7 @@ export type RejectCode =
   | "view_only"
   | "hands_off"
   | "protected"
+  | "frozen"
   | "rate_limited"
   | "too_large"
   | "unavailable";
@@ -1084,6 +1102,59 @@ export interface Lesson {
   waiting: Outsider[];
 }
 
+export interface Shown {
+  terrain: string;
+  secret: string;
+  name: string;
+}
+
+export interface InClass {
+  type: "class";
+  lesson: string;
+  title: string;
+  number: number;
+  names: string[];
+  frozen: boolean;
+  show: Shown | null;
+}
+
+export interface WallHello {
+  type: "wall";
+  protocol: number;
+  terrain: string;
+  secret: string;
+  lesson: string;
+}
+
+export interface WallFocus {
+  type: "focus";
+  numbers?: number[];
+}
+
+export interface WallCopy {
+  number: number;
+  terrain: string;
+  names: string[];
+  online: number;
+  last: number | null;
+  strokes: number;
+  frozen: boolean;
+  settings: TerrainSettings;
+}
+
+export interface Wall {
+  type: "wall";
+  lesson: string;
+  title: string;
+  code: string | null;
+  expires_s: number;
+  together: number;
+  places: number;
+  pupils: number;
+  show: number | null;
+  copies: WallCopy[];
+}
+
 export interface Hello {
   type: "hello";
   protocol: number;
@@ -1181,7 +1252,7 @@ export interface Ack {
 export interface Reject {
   type: "reject";
   id: string;
-  code: "malformed" | "unknown_stroke" | "duplicate_stroke" | "deleted_stroke" | "locked_stroke" | "too_many_strokes" | "too_many_points" | "out_of_domain" | "bad_index" | "bad_field" | "unknown_layer" | "duplicate_layer" | "deleted_layer" | "too_many_layers" | "server_only" | "view_only" | "hands_off" | "protected" | "rate_limited" | "too_large" | "unavailable";
+  code: "malformed" | "unknown_stroke" | "duplicate_stroke" | "deleted_stroke" | "locked_stroke" | "too_many_strokes" | "too_many_points" | "out_of_domain" | "bad_index" | "bad_field" | "unknown_layer" | "duplicate_layer" | "deleted_layer" | "too_many_layers" | "server_only" | "view_only" | "hands_off" | "protected" | "frozen" | "rate_limited" | "too_large" | "unavailable";
   message: string;
 }
 
@@ -1239,6 +1310,13 @@ export interface Importing {
   file: string;
   status: ImportStatus;
 }
+
+export const WALL_HEADER = {
+  size: 4,
+  number: { offset: 0, type: "Uint16", count: 1 },
+  fresh: { offset: 2, type: "Uint8", count: 1 },
+  spare: { offset: 3, type: "Uint8", count: 1 },
+} as const;
 
 export const FRAME_HEADER = {
   size: 16,

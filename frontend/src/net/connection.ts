@@ -71,6 +71,7 @@ const SERVER_TYPES: ReadonlySet<string> = new Set<ServerMessage["type"]>([
   "importing",
   "lesson",
   "notice",
+  "class",
 ]);
 
 /** After these codes the same page would only be refused again (contract, WS_CLOSE). */

@@ -5,8 +5,8 @@ from __future__ import annotations
 import errno
 import logging
 import time
-from collections.abc import Collection
-from typing import Annotated, Final
+from collections.abc import Callable, Collection
+from typing import Annotated, Final, TypeVar
 from urllib.parse import quote
 
 from fastapi import Depends, FastAPI, Request, WebSocket
@@ -25,6 +25,7 @@ from esker.store.access import Link
 from esker.store.journal import Unwritable
 
 log = logging.getLogger("esker.server")
+T = TypeVar("T")
 
 FULL: Final = "The server has no room for this (is its disk full?). Nothing was changed."
 UNWRITABLE: Final = "The server cannot save anything at the moment. Nothing was changed; try again later."
@@ -123,6 +124,28 @@ def limited(request: Request, rates: Rates, what: str, link: Link | None = None)
     if not rates.take(asker(request, link), time.monotonic()):
         whose = "address" if link is None else "address or by your link"
         raise Cannot(429, "rate_limited", f"Too many {what} from your {whose}. Wait a minute.")
+
+
+def guess(request: Request, find: Callable[[], T | None]) -> T:
+    """Returns what a typed code opens; who types wrong ones is slowed down, by address and over the whole server.
+
+    Raises Cannot (404, 429).
+    """
+    state = request.app.state
+    limited(request, state.code_tries, "join codes came")
+    who, now = asker(request), time.monotonic()
+    if not state.wrong_codes.has(who, now):
+        raise Cannot(429, "rate_limited", "Somebody is guessing codes. Wait a minute, or ask for the link.")
+    found = find()
+    if found is None:
+        state.wrong_codes.take(who, now)
+        raise bad_code()
+    return found
+
+
+def bad_code() -> Cannot:
+    """A code that opens nothing."""
+    return Cannot(404, "bad_code", "This code is wrong or too old. Ask for a new one.")
 
 
 def secret_of(request: Request) -> str:

@@ -8,16 +8,19 @@ from typing import Any
 from fastapi import FastAPI, Request
 
 from esker.errors import Cannot
+from esker.lesson.classes import Classes
 from esker.server.routes.answers import OwnerLink, address, secret_of
 from esker.session.room.hub import Deleted, Hub
 
 
-def add_deletion(app: FastAPI, hub: Hub) -> None:
+def add_deletion(app: FastAPI, hub: Hub, classes: Classes) -> None:
     """Adds the routes."""
 
     @app.delete("/api/terrains/{terrain}")
     async def delete(terrain: str, link: OwnerLink) -> dict[str, Any]:
-        return {"id": terrain, "until": await hub.delete(link)}
+        until = await hub.delete(link)
+        await classes.end_all(terrain)
+        return {"id": terrain, "until": until}
 
     @app.post("/api/terrains/{terrain}/restore")
     async def restore(request: Request, terrain: str) -> dict[str, Any]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import time
 from typing import Annotated, Any, Final
 
 from fastapi import FastAPI, Request
@@ -12,9 +11,13 @@ from pydantic import StringConstraints
 from esker import contract as c
 from esker.contract import Role
 from esker.errors import Cannot
-from esker.server.routes.answers import AnyLink, OwnerLink, asker, limited
+from esker.lesson.classes import Classes
+from esker.server.routes.answers import AnyLink, OwnerLink, bad_code, guess, limited
+from esker.server.routes.classes import asked_in
 from esker.session.room.hub import Hub
 from esker.store.access import CODE_SECONDS, JOINED_BY_CODE, Ended, Link, OwnLink, SecretTaken, TooManyLinks
+from esker.store.access import JoinCode as OpenedCode
+from esker.store.classes import Class
 
 RENEWED_AFTER: Final = 1.0
 
@@ -142,21 +145,18 @@ def _add_codes(app: FastAPI, hub: Hub) -> None:
         return {"code": body.code, "expires_s": left}
 
     @app.post("/api/join")
-    async def join(request: Request, body: JoinCode) -> dict[str, str]:
-        limited(request, app.state.code_tries, "join codes came")
-        who, now = asker(request), time.monotonic()
-        if not app.state.wrong_codes.has(who, now):
-            raise Cannot(429, "rate_limited", "Somebody is guessing codes. Wait a minute, or ask for the link.")
-        found = access.open_code(body.code)
-        if found is None:
-            app.state.wrong_codes.take(who, now)
-            raise _bad_code()
+    async def join(request: Request, body: JoinCode) -> dict[str, Any]:
+        classes: Classes = app.state.classes
+
+        def find() -> OpenedCode | Class | None:
+            return access.open_code(body.code) or classes.by_code(body.code)
+
+        found = guess(request, find)
+        if isinstance(found, Class):
+            return asked_in(classes, found)
+        assert isinstance(found, OpenedCode)
         try:
             _, secret = await _new(hub, found.terrain, found.role, JOINED_BY_CODE, found.link)
         except Ended:  # the link that made the code ended in this very moment
-            raise _bad_code() from None
+            raise bad_code() from None
         return {"id": found.terrain, "secret": secret, "role": found.role}
-
-
-def _bad_code() -> Cannot:
-    return Cannot(404, "bad_code", "This code is wrong or too old. Ask for a new one.")

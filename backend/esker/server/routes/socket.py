@@ -60,7 +60,7 @@ def _fragments(parts: Sequence[bytes]) -> Iterator[bytes]:
 _framed = lru_cache(SHARED_TEXTS)(_frame)
 
 
-class _Transport:
+class WireTransport:
     """``session.room.socket.Transport`` over Starlette's websocket."""
 
     def __init__(self, socket: WebSocket) -> None:
@@ -117,7 +117,7 @@ class _Transport:
             self._wire.abort()
 
 
-async def _messages(socket: WebSocket) -> AsyncIterator[str | bytes]:
+async def messages(socket: WebSocket) -> AsyncIterator[str | bytes]:
     while True:
         message = await socket.receive()
         if message["type"] != "websocket.receive":
@@ -136,21 +136,21 @@ def add_socket(app: FastAPI, hub: Hub, front: Front) -> None:
         offered = socket.scope.get("subprotocols", [])
         subprotocol = c.SUBPROTOCOL if c.SUBPROTOCOL in offered else None
         await socket.accept(subprotocol)
-        transport = _Transport(socket)
+        transport = WireTransport(socket)
         against = front.against(socket.scope)
         if against is not None:
-            await _refuse(socket, transport, "bad_origin", against[2])
+            await refuse(socket, transport, "bad_origin", against[2])
             return
         try:
             place = sockets.take(Who(address(socket)))
         except Full:
-            await _refuse(socket, transport, "rate_limited", CROWDED)
+            await refuse(socket, transport, "rate_limited", CROWDED)
             return
         with place:
-            await Session(hub, transport, address(socket), subprotocol, accounts=accounts).run(_messages(socket))
+            await Session(hub, transport, address(socket), subprotocol, accounts=accounts).run(messages(socket))
 
 
-async def _refuse(socket: WebSocket, transport: _Transport, code: c.CloseCode, sentence: str) -> None:
+async def refuse(socket: WebSocket, transport: WireTransport, code: c.CloseCode, sentence: str) -> None:
     log.info("closed a connection from %s: %s", address(socket), code)
     text = c.ErrorMessage(code=code, message=sentence, fatal=True).model_dump_json()
     with suppress(ConnectionResetError):

@@ -74,7 +74,7 @@ def add_terrains(app: FastAPI, hub: Hub, grids: GridStore) -> None:
     async def download(request: Request, terrain: str, link: AnyLink) -> Response:
         document = shown(await hub.document(terrain, None, asker(request, link)), link, hub.lesson_of(terrain))
         try:
-            path = await hub.packing.run(asker(request, link), _packed, grids, document)
+            path = await hub.packing.run(asker(request, link), grids.pack, document)
         except (archive.ArchiveError, RasterError) as error:
             raise Cannot(409, "no_grid", str(error)) from error
         return Sent(hub, link, path, "application/zip", f"{terrain}.esker", passing=True)
@@ -119,21 +119,6 @@ async def _create(hub: Hub, document: c.Document) -> dict[str, str]:
 def _put_all(grids: GridStore, template: templates.Template) -> None:
     for raster in template.rasters().values():
         grids.put(raster)
-
-
-def _packed(grids: GridStore, document: c.Document) -> Path:
-    """Returns a temporary .esker file. Raises ArchiveError, RasterError: a grid that is missing or damaged."""
-    live = {layer.content: grids.read(layer.content) for layer in document.layers}
-    gone = {layer.content for layer in document.deleted_layers if layer.content not in live}
-    found = live | {digest: grids.read(digest) for digest in gone if grids.has(digest)}
-    path = grids.temporary(".esker")
-    with path.open("wb") as file:
-        try:
-            archive.write(file, document, found)
-        except BaseException:
-            path.unlink()
-            raise
-    return path
 
 
 async def _receive(request: Request, path: Path, limit: int, space: Space) -> None:

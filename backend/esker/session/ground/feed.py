@@ -23,6 +23,9 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Final
 
+import numpy as np
+from numpy.typing import NDArray
+
 from esker import contract as c
 from esker.events import Level, Preview
 from esker.grid import TileKey
@@ -51,6 +54,8 @@ class Stream:
     """The tiles of one client: its window, and the encoded frames that wait for the socket."""
 
     outbox: FrameOutlet
+    top: int | None = None
+    """The finest level of somebody who only watches, None: of a client with a view."""
     view: c.View | None = None
     in_flight: int = 0
     hungry: bool = True
@@ -107,9 +112,9 @@ class TileFeed:
         """Time of the loop from which on the next batch may be taken."""
         self._requests_timer: asyncio.TimerHandle | None = None
 
-    def add(self, outbox: FrameOutlet) -> Stream:
-        """Takes a new client."""
-        stream = Stream(outbox)
+    def add(self, outbox: FrameOutlet, top: int | None = None) -> Stream:
+        """A new client; or, with ``top``, somebody who watches the levels up to it."""
+        stream = Stream(outbox, top)
         self._streams.add(stream)
         self._feed(stream)
         return stream
@@ -128,6 +133,10 @@ class TileFeed:
         """Takes note that a client has applied so many bytes."""
         stream.in_flight = max(0, stream.in_flight - count)
         self._feed(stream)
+
+    def heights(self, level: int) -> Future[NDArray[np.float32] | None]:
+        """The ground of a level, once the tile thread comes to it. Raises RuntimeError after the server's end."""
+        return self._executor.submit(self._server.heights, level)
 
     def sent(self, stream: Stream) -> bytes | None:
         """Takes the frame that waits, to hand it to the socket; the next one may be made."""
@@ -302,7 +311,11 @@ class TileFeed:
         try:
             tiles = self._clients.get(stream)
             if tiles is None:
-                tiles = self._clients[stream] = self._tiles.client(self._server)
+                if stream.top is None:
+                    tiles = self._tiles.client(self._server)
+                else:
+                    tiles = self._tiles.watcher(self._server, stream.top)
+                self._clients[stream] = tiles
             if view is not None:
                 tiles.set_view(view)
             # All frames of a level are made once the first one is. A coarsest preview that waits goes before them only

@@ -64,6 +64,8 @@ class TileServer(Protocol):
 
     def settled(self) -> bool: ...
 
+    def heights(self, level: int) -> NDArray[np.float32] | None: ...
+
     def put_tile(self, clock: int, tile: RefinedTile) -> bool: ...
 
     def limit(self, top: int) -> None: ...
@@ -72,11 +74,13 @@ class TileServer(Protocol):
 
 
 class Tiles(Protocol):
-    """Makes the two above."""
+    """Makes the two above. ``watcher``: a client that is sent all levels up to ``top`` and nothing else."""
 
     def server(self, size_m: float, levels: int, finest: int) -> TileServer: ...
 
     def client(self, server: TileServer) -> ClientTiles: ...
+
+    def watcher(self, server: TileServer, top: int) -> ClientTiles: ...
 
 
 class Refiner(Protocol):

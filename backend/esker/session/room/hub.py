@@ -95,7 +95,7 @@ class Hub:
         self._limits, self._max_members = limits or Limits(), max_members
         self._idle_seconds, self._now = idle_seconds, now
         self._rooms: dict[str, asyncio.Task[Room | None]] = {}
-        self._places = OpenRooms(self._sleep, rooms, self._rest)
+        self._places = OpenRooms(self.sleep, rooms, self._rest)
         self._tile_thread = TileThread()
         self._elevation = elevation
         self._base_threads = ThreadPoolExecutor(1, thread_name_prefix="elevation")
@@ -112,6 +112,8 @@ class Hub:
         self._giving_back: asyncio.TimerHandle | None = None
         self.hear_of_ended: list[Callable[[str, Collection[str]], object]] = []
         """Listeners for links that were revoked: terrain, ids."""
+        self.class_of: Callable[[str], c.InClass | None] = lambda _: None
+        """Returns what members of a terrain are told of the class whose copy it is."""
         self._claims = claims or Claims()
         self._history_rooms = HistoryRooms(journal, self._history_room, claims=self._claims)
 
@@ -228,7 +230,9 @@ class Hub:
         )
         desk = Desk(partial(self.read, SERVER), partial(self._end_code_link, terrain))
         needs = self._needs() | {"desk": desk, "home": who.site}
-        return Room(core, journal=self.journal, on_empty=lambda: self._empty(terrain), **needs)
+        room = Room(core, journal=self.journal, on_empty=lambda: self._empty(terrain), **needs)
+        room.in_class = self.class_of(terrain)
+        return room
 
     def _lesson(self, terrain: str) -> Lesson:
         """The lesson of a terrain as the database has it."""
@@ -296,9 +300,9 @@ class Hub:
         asyncio.get_running_loop().call_later(self._idle_seconds, self._close_idle, terrain)
 
     def _close_idle(self, terrain: str) -> None:
-        self._sleep(terrain)
+        self.sleep(terrain)
 
-    def _sleep(self, terrain: str) -> bool:
+    def sleep(self, terrain: str) -> bool:
         """Closes a room that nobody is in. Returns whether it is closed now."""
         room = self.open_room(terrain)
         if room is None or len(room.core.members) or room.core.busy:
@@ -321,7 +325,7 @@ class Hub:
             member.outbox.close("room_full", RESTED)
             room.core.leave(member)
         log.info("terrain %s was closed for others: nobody did anything in it for %.0f s", terrain, REST_SECONDS)
-        return self._sleep(terrain)
+        return self.sleep(terrain)
 
     def _give_back_soon(self) -> None:
         """Gives memory of closed rooms back to the system soon, once for all that close within a while."""
@@ -340,7 +344,7 @@ class Hub:
 
         Raises store.journal.Unwritable; then there is neither.
         """
-        born = document.model_copy(update={"id": _fresh_id(), "clock": 0})
+        born = born_as(document)
         link, secret, insert = self.access.make(born.id, "owner", "Owner")
         await asyncio.wrap_future(self.journal.create(born, insert))
         return born, link, secret
@@ -370,27 +374,36 @@ class Hub:
         Raises store.journal.Unwritable.
         """
         until = await asyncio.wrap_future(self.deletion.delete(link.terrain))
-        task = self._rooms.pop(link.terrain, None)
-        self._places.release(link.terrain)
+        await self.close_deleted(link.terrain)
+        return until
+
+    async def close_deleted(self, terrain: str) -> None:
+        """A terrain was deleted: closes everybody in it, and ends what was under way for its links."""
+        task = self._rooms.pop(terrain, None)
+        self._places.release(terrain)
         room = None if task is None else await task
-        self._history_rooms.close_terrain(link.terrain, "no_terrain", DELETED)
+        self._history_rooms.close_terrain(terrain, "no_terrain", DELETED)
         if room is not None:
             await room.flush()
             for member in room.core.members:
                 member.outbox.close("no_terrain", DELETED)
             room.shut()
         for hears in self.hear_of_ended:
-            hears(link.terrain, [each.id for each in self.access.links(link.terrain)])
-        return until
+            hears(terrain, [each.id for each in self.access.links(terrain)])
 
     def end_links(self, terrain: str, links: Collection[str]) -> None:
-        """Deals with links that were revoked: closes everybody who came in by them, ends their join codes and their
-        jobs."""
-        for link in links:
-            self.access.drop_codes(link)
-            self.revoke_members(terrain, link)
-        for hears in self.hear_of_ended:
-            hears(terrain, links)
+        """Links were revoked: closes everybody who came in by them, ends their join codes and what they have going.
+
+        Some may open other terrains: a teacher's to the copies of a class.
+        """
+        others = self.access.elsewhere(terrain, links)
+        for where in {terrain, *others.values()}:
+            ended = [link for link in links if others.get(link, terrain) == where]
+            for link in ended:
+                self.access.drop_codes(link)
+                self.revoke_members(where, link)
+            for hears in self.hear_of_ended:
+                hears(where, ended)
 
     def revoke_members(self, terrain: str, link: str) -> None:
         """Closes everybody who came in by a link that no longer works."""
@@ -439,6 +452,11 @@ class Hub:
         self._base_threads.shutdown(wait=False, cancel_futures=True)
         self.reading.shutdown()
         self.packing.shutdown()
+
+
+def born_as(document: c.Document) -> c.Document:
+    """The document of a terrain that begins as ``document``, under an id of its own."""
+    return document.model_copy(update={"id": _fresh_id(), "clock": 0})
 
 
 def _fresh_id() -> str:

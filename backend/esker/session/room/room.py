@@ -22,6 +22,7 @@ from esker.session.ground.feed import Stream, TileFeed
 from esker.session.ground.ports import Elevation, Tiles
 from esker.session.ground.tilethread import TileThread
 from esker.session.ground.worker import Job, Worker
+from esker.session.lesson.classroom import FROZEN, ClassRoom
 from esker.session.room import protocol
 from esker.session.room.conducting import Conducting, Desk
 from esker.session.room.core import UNSAVED, Batch, RoomCore, RoomInfo
@@ -48,7 +49,7 @@ class Guest:
         self.member, self.stream = member, stream
 
 
-class Room:
+class Room(ClassRoom):
     """Wires one ``RoomCore`` to the journal, the solver and the clock."""
 
     def __init__(
@@ -143,6 +144,8 @@ class Room:
                 self.conducting.tell()  # somebody waits to be let in
             raise
         outbox.message(self._newest_progress())
+        if self.in_class is not None:
+            outbox.message(self.in_class)
         self._works_for(member)
         guest = Guest(member, self._feed.add(outbox))
         self.conducting.joined(member)
@@ -179,7 +182,10 @@ class Room:
             self._active_at = self._loop.time()
         match event:
             case protocol.Accepted(ops):
-                if self.core.submit(guest.member, ops):
+                if self.frozen and guest.member.role == "edit":
+                    for envelope in ops:
+                        self.core.refuse(guest.member, envelope.id, "frozen", FROZEN)
+                elif self.core.submit(guest.member, ops):
                     self._works_for(guest.member)
                     self._ordered()
             case protocol.Refused(op_id, code, message):
@@ -216,11 +222,14 @@ class Room:
 
     # --- imports ------------------------------------------------------------------------------------------------
 
-    async def perform(self, op: c.Op, agent: str, author: str) -> int:
+    async def perform(self, op: c.Op, agent: str, author: str, *, teacher: bool = False) -> int:
         """Does an op of the server's own in the name of client ``author``; returns its clock once it is in the journal.
 
-        ``agent``: the id under which it is done, once. Raises Refusal (also when it could not be saved).
+        ``agent``: the id under which it is done, once; ``teacher``: for whom a copy is not frozen. Raises Refusal (also
+        when it could not be saved).
         """
+        if self.frozen and not teacher:
+            raise Refusal("frozen", FROZEN)
         clock = self.core.perform(op, agent, author)
         self._ordered()
         await self.flush()

@@ -13,6 +13,7 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Final
 
+from esker.store import classes
 from esker.store.journal import Journal
 
 GRACE_SECONDS: Final = 7 * 86_400.0
@@ -81,10 +82,18 @@ class Deletion:
             for table in TABLES:
                 while self._journal.submit(_some(table, terrain)).result():
                     pass
-            self._journal.submit(
-                lambda db, terrain=terrain: db.execute("DELETE FROM terrains WHERE id=?", (terrain,))  # type: ignore[misc]
-            ).result()
+            self._journal.submit(_last(terrain)).result()
         return gone
+
+
+def _last(terrain: str) -> Callable[[sqlite3.Connection], None]:
+    """Removes what says that a terrain was there."""
+
+    def write(db: sqlite3.Connection) -> None:
+        classes.forget(db, terrain)
+        db.execute("DELETE FROM terrains WHERE id=?", (terrain,))
+
+    return write
 
 
 def _some(table: str, terrain: str) -> Callable[[sqlite3.Connection], int]:

@@ -76,6 +76,23 @@ BEGIN SELECT RAISE(ABORT, 'a folded clock or id is used again'); END
 ``folded_ids``: ops ``counter`` to ``upto`` of a client, which now stand at ``clock``. The trigger keeps what the keys
 of ``ops`` kept: a clock and an id are used once."""
 
+_CLASSES: Final = """
+CREATE TABLE classes (
+  id TEXT PRIMARY KEY, terrain TEXT NOT NULL, title TEXT NOT NULL, created REAL NOT NULL, clock INTEGER NOT NULL,
+  document TEXT NOT NULL, together INTEGER NOT NULL, places INTEGER NOT NULL, code TEXT, code_until REAL, ended REAL);
+CREATE INDEX classes_by_terrain ON classes (terrain);
+CREATE UNIQUE INDEX classes_by_code ON classes (code) WHERE code IS NOT NULL;
+CREATE TABLE copies (
+  class TEXT NOT NULL, number INTEGER NOT NULL, terrain TEXT NOT NULL UNIQUE, frozen INTEGER NOT NULL,
+  PRIMARY KEY (class, number)) WITHOUT ROWID;
+CREATE TABLE pupils (
+  link TEXT PRIMARY KEY, class TEXT NOT NULL, number INTEGER NOT NULL, name TEXT NOT NULL, joined REAL NOT NULL)
+  WITHOUT ROWID;
+CREATE INDEX pupils_by_class ON pupils (class, number);
+"""
+"""Classes (``store/classes.py``). ``document``: what a copy begins as, at the clock ``clock`` of ``terrain``.
+``code``: opens the class until ``code_until``, seconds since 1970. A pupil is a device: its link opens its copy."""
+
 
 _FORMAT_7: Final = """
 CREATE TABLE lessons (terrain TEXT PRIMARY KEY, state TEXT NOT NULL) WITHOUT ROWID;
@@ -109,7 +126,7 @@ STEPS: Final[tuple[Callable[[sqlite3.Connection], None], ...]] = (
     _script(_FORMAT_4),  # links know their parent
     _script(_FORMAT_5),  # terrains can be deleted
     _folding,  # bursts of ops are folded
-    _script(_FORMAT_7),  # lessons
+    _script(_FORMAT_7 + ";" + _CLASSES),  # lessons, classes and their copies
 )
 """``STEPS[n]`` makes format n + 1 of format n; an empty file has format 0."""
 FORMAT: Final = len(STEPS)
