@@ -1,12 +1,13 @@
 // Lines and tints over the ground: contours, slope, patches, the scale grid, cursors. All are anti-aliased by the
 // pixel's footprint and fade out before they could become moire.
 
-fn contours(height: f32, rate: f32) -> f32 {
+// `share`: how far contours show here; they fade on ground that is flat without its detail (frontend/src/tiles/flat.ts).
+fn contours(height: f32, rate: f32, share: f32) -> f32 {
   // A hair above the round value: ground that is flat at exactly that height is not one wide line.
   let z = height - 0.01 * view.contour;
-  let minor = lines(z, view.contour, rate, 0.35) * 0.5;
-  let major = lines(z, view.contour * 5.0, rate, 0.7);
-  return max(minor, major);
+  let minor = lines(z, view.contour, rate, 0.35 * view.line_scale) * 0.5;
+  let major = lines(z, view.contour * 5.0, rate, 0.7 * view.line_scale);
+  return max(minor, major) * share;
 }
 
 // Contours in ink: brown on the paper model, else the ground's own colour, darker.

@@ -8,7 +8,7 @@ struct TerrainVertex {
   @location(8) @interpolate(flat) layers: vec3i,   // and in which layers; its level
   @location(4) through: vec3f,
   @location(5) glow: vec3f,
-  @location(6) detail: vec3f,
+  @location(6) detail: vec4f,
   @location(7) above_lake: f32,
 };
 
@@ -31,11 +31,11 @@ fn terrain_vertex(@builtin(vertex_index) index: u32, patch_in: PatchIn) -> Terra
   return out;
 }
 
-// Noise amplitude (1 = view.amplitude metres), roughness, and how far the selected stroke is felt at a place. They are
-// smooth: taken at the vertices.
-fn detail_at(p: vec2f) -> vec3f {
+// Noise amplitude (1 = view.amplitude metres), roughness, how far the selected stroke is felt and contours show at a place.
+// They are smooth: taken at the vertices.
+fn detail_at(p: vec2f) -> vec4f {
   let side = vec2f(textureDimensions(channels));
-  return textureSampleLevel(channels, smooth_clamp, (p / view.size * (side - 1.0) + 0.5) / side, 0.0).xyz;
+  return textureSampleLevel(channels, smooth_clamp, (p / view.size * (side - 1.0) + 0.5) / side, 0.0);
 }
 
 // What lies and grows on the ground here (the words of compute_synthesis.wgsl).
@@ -47,8 +47,9 @@ fn cover_of(surface: Surface) -> Attributes {
 
 // Sun, sky and the far ground on a rough surface.
 fn shade(m: Material, gradient: vec2f, surface: Surface, dir: vec3f) -> vec3f {
-  let n = normalize(vec3f(-(gradient + m.slope), 1.0));
-  let broad = normalize(vec3f(-gradient, 1.0));
+  // Slopes are lit as steep as they are seen.
+  let n = normalize(vec3f(-(gradient + m.slope) * view.exaggeration, 1.0));
+  let broad = normalize(vec3f(-gradient * view.exaggeration, 1.0));
   // Facing the sun counts for the fine relief; whether the sun is up at all for the broad one. Snow and leaves let light
   // round the edge.
   let turned_to = dot(n, view.sun.xyz);
@@ -106,7 +107,7 @@ fn terrain_fragment(v: TerrainVertex) -> @location(0) vec4f {
   }
   let strength = select(view.contour_strength, max(view.contour_strength, 0.8), view.overlay == OVERLAY_CONTOURS);
   if (strength > 0.0) {
-    colour = inked(colour, contours(world.z, rate) * strength);
+    colour = inked(colour, contours(world.z, rate, v.detail.w) * strength);
   }
   if (view.overlay == OVERLAY_PATCHES) {
     let cell = abs(fract(v.at / f32(PATCH_CELLS) - 0.5) - 0.5) * f32(PATCH_CELLS);

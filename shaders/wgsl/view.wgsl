@@ -24,6 +24,8 @@ struct View {
   grid: f32,             // strength of the scale grid, 0..1
   contour: f32,          // contour interval, metres
   contour_strength: f32,
+  line_scale: f32,       // contours are this many times as wide
+  exaggeration: f32,     // heights are seen so many times larger than they are; places here are true
   finest_cell: f32,      // metres between samples of level MAX_SYNTHESIS_LEVEL
   amplitude: f32,        // metres of noise amplitude that the value 1 of `channels` stands for
   relief: f32,           // metres of elevation that count as 1, for stone and plants
@@ -87,7 +89,13 @@ fn ray_through(ndc: vec2f) -> vec3f {
   return select(normalize(d), view.forward.xyz, view.eye.w > 0.5);
 }
 
+// Metres from the eye to a point in the world as it is seen.
+fn seen_distance(p: vec3f) -> f32 {
+  let d = p - view.eye.xyz;
+  return length(vec3f(d.xy, d.z * view.exaggeration));
+}
+
 // Metres that one pixel covers at a point.
 fn pixel_size(p: vec3f) -> f32 {
-  return select(distance(p, view.eye.xyz), 1.0, view.eye.w > 0.5) * view.forward.w;
+  return select(seen_distance(p), 1.0, view.eye.w > 0.5) * view.forward.w;
 }

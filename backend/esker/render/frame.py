@@ -112,6 +112,8 @@ def view_values(
         "grid": 1 - _smoothstep(0.02, 0.1, relief / settings.size_m),
         "contour": contour_interval(relief),
         "contour_strength": look.contours if relief > 0 else 0.0,
+        "line_scale": 1.0,
+        "exaggeration": 1.0,
         "look": look.number,
         "amplitude": amplitude,
         "relief": relief_m(settings.size_m, lat, 0.0 if scene.ground_m is None else scene.ground_m[1] - zero),

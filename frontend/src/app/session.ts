@@ -4,6 +4,7 @@
  */
 
 import { computed, effect, type ReadonlySignal, signal } from "@preact/signals-core";
+import { askedOf } from "../core/camera/asked.ts";
 import type { DecodedFrame } from "../core/types.ts";
 import { type Doc, Refusal } from "../doc/document.ts";
 import { SyncDoc } from "../doc/sync.ts";
@@ -21,7 +22,13 @@ import type {
   TerrainFields,
   Welcome,
 } from "../generated/contract.ts";
-import { MAX_PRESENCE_PER_SECOND, PRESENCE_HZ, PROTOCOL_VERSION, TICK_MS } from "../generated/contract.ts";
+import {
+  DEFAULT_TAU_PX,
+  MAX_PRESENCE_PER_SECOND,
+  PRESENCE_HZ,
+  PROTOCOL_VERSION,
+  TICK_MS,
+} from "../generated/contract.ts";
 import { Connection } from "../net/connection.ts";
 import { Deletion } from "./deletion.ts";
 import { friendlyName } from "./device/names.ts";
@@ -414,7 +421,7 @@ export class TerrainSession implements OpenTerrain {
       type: "view",
       eye: [...camera.eye],
       target: [...camera.target],
-      fov_deg: camera.fovDeg,
+      ...askedOf(camera, DEFAULT_TAU_PX),
       width: Math.max(1, Math.min(16384, camera.width)),
       height: Math.max(1, Math.min(16384, camera.height)),
     });

@@ -4,6 +4,8 @@
  */
 
 import type { GridPlace } from "../core/lattice.ts";
+import type { AreaFigures } from "../core/measure/area.ts";
+import { isImpossible } from "../core/measure/places.ts";
 import type { CameraState, FrameStats } from "../core/types.ts";
 import { type Layer, type PaintChannel, type Stroke, TILE_SAMPLES } from "../generated/contract.ts";
 import type { Attributes } from "../tiles/detail/detail.ts";
@@ -55,6 +57,9 @@ export interface PageView {
   handles(): { kind: string; x: number; y: number }[];
   /** The elevation grid that is being placed by hand. */
   placing(): (GridPlace & { id: string }) | null;
+  /** What is measured, and its figures in metres; null: nothing, or it cannot be. */
+  profile(): { lengthM: number; min: number; max: number; gain: number; points: number } | null;
+  area(): AreaFigures | null;
   title(): string;
   role(): string | null;
   members(): string[];
@@ -127,6 +132,16 @@ export function installTestHook(session: TerrainSession): () => void {
     placing: () => {
       const placing = stage()?.input.placing.peek();
       return placing ? { id: placing.id, ...placeOf(placing.place.peek()) } : null;
+    },
+    profile: () => {
+      const found = stage()?.instruments.profile.peek() ?? null;
+      if (found === null || isImpossible(found)) return null;
+      const { lengthM, min, max, gainM, corners } = found;
+      return { lengthM, min: min.m, max: max.m, gain: gainM, points: corners.length };
+    },
+    area: () => {
+      const found = stage()?.instruments.area.peek() ?? null;
+      return found === null || isImpossible(found) ? null : found;
     },
     title: () => doc()?.settings.title ?? "",
     role: () => session.role.peek(),

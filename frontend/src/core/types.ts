@@ -24,7 +24,9 @@ export interface CameraState {
   /** Canvas size in device pixels. */
   readonly width: number;
   readonly height: number;
-  /** Column-major 4x4, WebGPU clip space (z 0..1). */
+  /** How many times heights are seen larger than they are (core/camera/lens.ts); 1 where it is left out. Places here are true. */
+  readonly exaggeration?: number;
+  /** Column-major 4x4 of true places, WebGPU clip space (z 0..1). */
   readonly viewProj: Float32Array;
 }
 
@@ -206,6 +208,10 @@ export interface Scene {
   /** Where the selected stroke is felt, 0..1, for the overlay of that name; null: none is selected. */
   readonly influence?: ChannelGrid | null;
   readonly showStrokes: boolean;
+  /** Height between contours, metres; 0, or left out: what suits the relief. */
+  readonly contourM?: number;
+  /** Lines of the contours are this many times as wide: for projectors. 1 where it is left out. */
+  readonly lineScale?: number;
 }
 
 export interface FrameStats {
@@ -216,6 +222,8 @@ export interface FrameStats {
   readonly uploads: number;
   /** Screen-error bound that the device's memory has room for where that is coarser than the one asked for, else null. */
   readonly coarsenedPx?: number | null;
+  /** Height between the contours of the picture, metres. */
+  readonly contourM?: number;
   /** True when another frame is needed even if nothing changes (uploads pending, something moving). */
   readonly busy: boolean;
 }

@@ -9,7 +9,7 @@ import { type Look, MAX_SYNTHESIS_LEVEL, TILE_CELLS } from "../generated/contrac
 import type { Lakes } from "../tiles/lakes/lakes.ts";
 import { reliefM, shoreM, zeroM } from "../tiles/rules/rule.ts";
 import type { Atlas } from "./atlas/atlas.ts";
-import { ChannelTexture, overlayGrid } from "./atlas/channeltexture.ts";
+import { ChannelTexture, contourShares, overlayGrid } from "./atlas/channeltexture.ts";
 import { LakeTexture } from "./atlas/laketexture.ts";
 import { StructWriter, structLayout } from "./layout.ts";
 import { adaptation, contourInterval, LOOKS } from "./looks.ts";
@@ -178,7 +178,8 @@ export class FrameBindings {
   /** Writes the uniform for this frame. */
   update(scene: Scene, facts: FrameFacts): void {
     const { lakes = null } = facts;
-    const channels = this.#channels.update(scene.channels, overlayGrid(scene));
+    const every = scene.contourM || contourInterval(facts.high - facts.low);
+    const channels = this.#channels.update(scene.channels, overlayGrid(scene), contourShares(scene, every));
     const grown = this.#lakes.update(lakes);
     if ((channels || grown) && this.#atlas !== null) this.attach(this.#atlas);
     this.#writeCamera(scene, facts);
@@ -202,7 +203,8 @@ export class FrameBindings {
     w.set("low", facts.low);
     w.set("high", facts.high);
     w.set("grid", 1 - smoothstep(0.02, 0.1, relief / size));
-    w.set("contour", contourInterval(relief));
+    w.set("contour", scene.contourM || contourInterval(relief));
+    w.set("line_scale", scene.lineScale ?? 1);
     w.set("contour_strength", relief > 0 ? look.contours : 0);
     w.set("look", look.index);
     w.set("amplitude", this.#channels.fullScale);
@@ -238,9 +240,13 @@ export class FrameBindings {
     w.set("eye_cell", whole);
     w.set("eye_part", [camera.eye[0] - whole[0]! * cell, camera.eye[1] - whole[1]! * cell]);
     w.set("finest_cell", cell);
-    w.set("right", [...right, (tan * facts.width) / facts.height]);
-    w.set("up", [...up, tan]);
-    w.set("forward", [...forward, ortho ? camera.orthoHeight / facts.height : (2 * tan) / facts.height]);
+    const k = camera.exaggeration ?? 1;
+    // Directions of the true world, in which all that is lit lies.
+    const truly = (v: Vec3): Vec3 => (ortho ? v : [v[0], v[1], v[2] / k]);
+    w.set("exaggeration", k);
+    w.set("right", [...truly(right), (tan * facts.width) / facts.height]);
+    w.set("up", [...truly(up), tan]);
+    w.set("forward", [...truly(forward), ortho ? camera.orthoHeight / facts.height : (2 * tan) / facts.height]);
     w.set("viewport", [facts.width, facts.height]);
     const border = 2 * this.#guardPx;
     w.set("guard", [facts.width / (facts.width + border), facts.height / (facts.height + border)]);
@@ -253,7 +259,8 @@ export class FrameBindings {
     const scale = camera.orthoHeight > 0 ? camera.orthoHeight : 2 * Math.tan((camera.fovDeg * Math.PI) / 360);
     shown.forEach((cursor, i) => {
       const [x, y, z] = cursor.position;
-      const away = camera.orthoHeight > 0 ? 1 : Math.hypot(x - camera.eye[0], y - camera.eye[1], z - camera.eye[2]);
+      const dz = (camera.exaggeration ?? 1) * (z - camera.eye[2]);
+      const away = camera.orthoHeight > 0 ? 1 : Math.hypot(x - camera.eye[0], y - camera.eye[1], dz);
       const pixel = (scale * away) / camera.height;
       this.#writer.set("cursors", [x, y, cursor.radiusPx * pixel, 1.6 * pixel, ...cursor.colour], i * 8);
     });

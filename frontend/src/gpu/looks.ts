@@ -28,9 +28,6 @@ export function adaptation(sunElevationDeg: number): number {
   return ((s + 0.354) / (s + 0.004) / 1.85) ** 0.7;
 }
 
-/** Every so many contours one is an index contour, drawn heavier and labelled (shaders/wgsl/overlay.wgsl). */
-export const INDEX_EVERY = 5;
-
 /** A round contour interval (1, 2 or 5 times a power of ten) that gives about `wanted` lines over the relief. */
 export function contourInterval(reliefM: number, wanted = 24): number {
   const raw = Math.max(reliefM, 1e-3) / wanted;

@@ -13,6 +13,7 @@ import { SunPass } from "./atlas/tilecompute.ts";
 import { TileFill } from "./atlas/tilefill.ts";
 import type { Gpu } from "./device.ts";
 import { FrameBindings, sunDirection } from "./frame.ts";
+import { contourInterval } from "./looks.ts";
 import { BackgroundPass } from "./passes/background.ts";
 import { GhostPass } from "./passes/ghostplane.ts";
 import { guardOf } from "./passes/guard.ts";
@@ -287,7 +288,8 @@ export class GpuRenderer implements SceneRenderer {
     this.#passes.frame.update(scene, { width, height, low: cut.minHeight, high: cut.maxHeight, lakes, look });
     this.#passes.patches.update(cut, { sizeM: scene.tiles.sizeM, seaM: scene.settings.sea_level_m, lakes, heights });
     const unit = quality.scale * pixelRatio();
-    this.#passes.ribbons.update(scene.showStrokes ? scene.strokes : [], scene.ghost, unit, scene.footprints);
+    const wide = unit * (scene.lineScale ?? 1);
+    this.#passes.ribbons.update(scene.showStrokes ? scene.strokes : [], scene.ghost, wide, scene.footprints);
     this.#passes.placing.update(scene.placing ?? null);
     this.#passes.ghost.update(scene.ghost);
     this.#passes.labels.update(scene, cut.maxHeight - cut.minHeight, unit, quality.scale);
@@ -303,6 +305,7 @@ export class GpuRenderer implements SceneRenderer {
       patches: cut.count,
       triangles: this.#passes.patches.triangles,
       selectMs,
+      contourM: scene.contourM || contourInterval(cut.maxHeight - cut.minHeight),
       coarsenedPx: world.fit.factor > 1 ? scene.tauPx * world.fit.factor : null,
       cpuMs: performance.now() - how.began,
       uploads,

@@ -77,6 +77,8 @@ export function samePicture(a: Scene, stampA: number, b: Scene, stampB: number):
     a.overlay === b.overlay &&
     (a.overlay !== "influence" || a.influence === b.influence) &&
     a.showStrokes === b.showStrokes &&
+    a.contourM === b.contourM &&
+    a.lineScale === b.lineScale &&
     sameCamera(a.camera, b.camera) &&
     sameSettings(a.settings, b.settings) &&
     sameGhost(a.ghost, b.ghost) &&

@@ -21,6 +21,7 @@ import { OversketchTool } from "./sketch/oversketch.ts";
 import { type AnyHandle, HandleSet } from "./tools/handleset.ts";
 import { type Finger, Navigation, type NavigationMode } from "./tools/navigation.ts";
 import type { Placing } from "./tools/placement.ts";
+import { MOST_POINTS, Ruler } from "./tools/ruler.ts";
 import { type FinishedStroke, type InkVisual, StrokeTool } from "./tools/stroketool.ts";
 
 export type { ActionId, ToolId } from "./keys/action.ts";
@@ -74,6 +75,8 @@ export class InputController {
   readonly fingerDraws: Signal<boolean> = signal(true);
   /** The elevation grid that is being placed: it has the pointer to itself. */
   readonly placing: Signal<Placing | null> = signal<Placing | null>(null);
+  /** What is measured: while it is open it has the pointer to itself. */
+  readonly ruler = new Ruler();
   readonly actions: Map<string, Action>;
   /** The pen that the arrow keys move. */
   readonly keyPen: KeyPen;
@@ -102,12 +105,13 @@ export class InputController {
     this.#strokes = new StrokeTool({ author: () => "", ...options, now });
     this.#oversketch = new OversketchTool({ ...options, now });
     this.#inks = computed(() => this.#oversketch.ink.value ?? this.#strokes.ink.value);
-    const { tool, selection, placing } = this;
-    this.#handleSet = new HandleSet({ ...options, tool, selection, placing, now });
+    const { tool, selection, placing, ruler } = this;
+    this.#handleSet = new HandleSet({ ...options, tool, selection, placing, ruler, now });
     this.keyPen = new KeyPen({
       ...options,
       tool,
       placing,
+      ruler,
       strokes: this.#strokes,
       hit: (x, y) => this.#navigation.hit(x, y),
       onDrawn: (made) => this.#drawn(made),
@@ -117,6 +121,7 @@ export class InputController {
       tool,
       selection,
       placing,
+      ruler,
       fingerDraws: this.fingerDraws,
       newId: () => this.#strokes.newId(),
       cancel: () => this.#cancel(),
@@ -129,6 +134,7 @@ export class InputController {
       tool,
       selection,
       placing,
+      ruler,
       fingerDraws: this.fingerDraws,
       navigation: this.#navigation,
       hitTest: this.#hitTest,
@@ -172,7 +178,7 @@ export class InputController {
   readonly held: ReadonlySignal<string | null> = computed(() => {
     const holds =
       this.#mode.value === "handle" || (this.#mode.value === "draw" && this.#strokes.drawing.value === null);
-    return holds && this.placing.value === null ? this.selection.value : null;
+    return holds && this.placing.value === null && this.ruler.kind.value === null ? this.selection.value : null;
   });
 
   /** Ends everything under way and all listening. */
@@ -278,6 +284,10 @@ export class InputController {
     } else if (activity.kind === "redraw") {
       this.#oversketch.move(this.#hitTest.samples(e), this.#hitTest.predicted(e));
       this.#cursor(x, y);
+    } else if (activity.kind === "measure") {
+      const hit = this.#navigation.hit(x, y);
+      this.ruler.draw(hit);
+      this.#o.onCursor(hit);
     } else if (activity.kind === "navigate") this.#navigation.drag(x, y);
     else if (activity.kind === "drag") {
       this.#handleSet.move(x, y, !e.altKey);
@@ -301,6 +311,7 @@ export class InputController {
       const made = this.#strokes.finish();
       if (made !== null) this.#drawn(made);
     } else if (activity.kind === "redraw") this.#oversketch.finish();
+    else if (activity.kind === "measure") this.ruler.finish(this.#o.camera.metresPerPixelAt(activity.from));
     else if (activity.kind === "drag") {
       this.#handleSet.move(...this.#hitTest.pixel(e), !e.altKey);
       this.#handleSet.finish();
@@ -329,10 +340,12 @@ export class InputController {
       }
     }
     if (activity.kind === "draw") this.#strokes.cancel();
+    if (activity.kind === "measure" && !this.ruler.add(activity.from))
+      this.#o.onMessage(`A line has at most ${MOST_POINTS} points.`);
     if (activity.kind === "redraw") this.#oversketch.cancel();
     if (activity.kind === "drag") this.#handleSet.cancel();
     if (e.button !== 0 || activity.kind === "drag" || activity.kind === "navigate") return;
-    if (this.placing.value !== null) return;
+    if (this.placing.value !== null || this.ruler.kind.value !== null) return;
     this.selection.value = picked?.stroke.id ?? null;
   }
 
@@ -387,6 +400,7 @@ export class InputController {
     if (kind === "draw") this.#strokes.cancel();
     else if (kind === "redraw") this.#oversketch.cancel();
     else if (kind === "drag") this.#handleSet.cancel();
+    else if (kind === "measure") return this.ruler.cancel();
     return kind === "draw" || kind === "redraw" || kind === "drag";
   }
 
@@ -407,7 +421,7 @@ export class InputController {
 
   /** `over`: something can be taken hold of; `redraws`: a line begun here changes the selected one. */
   #showCursor(over: boolean, redraws = false): void {
-    const still = this.tool.value === "select" || this.placing.value !== null;
+    const still = (this.tool.value === "select" && this.ruler.kind.value === null) || this.placing.value !== null;
     const idle = redraws ? "cell" : over ? "pointer" : still ? "default" : "crosshair";
     const mode = this.#mode.value;
     this.#o.canvas.style.cursor = mode === "idle" || mode === "draw" ? idle : "grabbing";

@@ -5,7 +5,7 @@
 
 import type { ReadonlySignal } from "@preact/signals-core";
 import type { Camera } from "../core/camera/camera.ts";
-import type { Ground } from "../core/types.ts";
+import type { Ground, Vec3 } from "../core/types.ts";
 import type { SyncDoc } from "../doc/sync.ts";
 import type { HitTest } from "./hittest.ts";
 import type { ToolId } from "./keys/action.ts";
@@ -15,6 +15,7 @@ import { type OversketchTool, redraws } from "./sketch/oversketch.ts";
 import type { AnyHandle, HandleSet } from "./tools/handleset.ts";
 import type { Navigation, NavigationMode } from "./tools/navigation.ts";
 import type { Placing } from "./tools/placement.ts";
+import type { Ruler } from "./tools/ruler.ts";
 import type { StrokeTool } from "./tools/stroketool.ts";
 
 export type Activity =
@@ -29,6 +30,8 @@ export type Activity =
   | { readonly kind: "refused"; readonly notice: string }
   /** A line over the selected stroke, which takes the place of a part of it. */
   | { readonly kind: "redraw" }
+  /** A point, or with movement a line, of what is measured. */
+  | { readonly kind: "measure"; readonly from: Vec3 }
   | { readonly kind: "drag" }
   | { readonly kind: "navigate"; readonly mode: NavigationMode };
 
@@ -49,6 +52,7 @@ export interface PressContext {
   readonly oversketch: OversketchTool;
   readonly doc: SyncDoc;
   readonly handleSet: HandleSet;
+  readonly ruler: Ruler;
   readonly spaceHeld: () => boolean;
 }
 
@@ -86,6 +90,7 @@ export class PointerActions {
       return this.#navigate("pan", x, y);
     if (e.button !== 0 && !erases) return this.#navigate(this.#turning(), x, y);
     if (placing.value !== null) return this.#startPlacing(e, x, y);
+    if (this.#c.ruler.kind.value !== null) return this.#measure(e, x, y);
     if (tool.value === "select") return this.#select(e, x, y);
     if (e.pointerType === "touch" && !this.#c.fingerDraws.value) return this.#press(null);
     if (!this.#c.canEdit()) {
@@ -106,6 +111,7 @@ export class PointerActions {
   /** The pointer has left the place (x, y) where it went down: a press becomes a drag of the stroke or of the view. */
   moved(activity: Activity, x: number, y: number): Activity {
     if (activity.kind === "refused") this.#c.onMessage(activity.notice);
+    if (activity.kind === "measure") this.#c.ruler.begin(activity.from);
     if (activity.kind !== "press") return activity;
     const { picked, navigate, notice } = activity;
     if (notice !== null) this.#c.onMessage(notice);
@@ -118,12 +124,13 @@ export class PointerActions {
 
   /** Returns what lies under the pointer of the strokes that the tool shows. */
   pick(e: PointerEvent): Picked | null {
-    if (this.#c.placing.value !== null) return null;
+    if (this.#c.placing.value !== null || this.#c.ruler.kind.value !== null) return null;
     return this.#c.hitTest.stroke(e, this.#c.freeze(), PICKS[this.#c.tool.value]);
   }
 
   /** Says whether a line begun here would redraw a part of the selected one. */
   over(e: PointerEvent): boolean {
+    if (this.#c.ruler.kind.value !== null) return false;
     const { doc, selection, tool, hitTest, oversketch } = this.#c;
     const stroke = doc.doc.value?.strokes.get(selection.value ?? "");
     if (stroke === undefined || e.altKey || !redraws(tool.value, stroke)) return false;
@@ -156,6 +163,16 @@ export class PointerActions {
   #select(e: PointerEvent, x: number, y: number): Activity {
     const handle = this.#c.hitTest.handle(this.#c.handleSet.handles.value, e);
     return handle !== null ? this.#drag(handle, x, y) : this.#press(this.pick(e));
+  }
+
+  /** Something is measured: its points, then the ground. A finger that does not draw moves the view. */
+  #measure(e: PointerEvent, x: number, y: number): Activity {
+    const { handleSet, hitTest, navigation } = this.#c;
+    const handle = hitTest.handle(handleSet.handles.value, e);
+    if (handle !== null) return this.#drag(handle, x, y);
+    if (e.pointerType === "touch" && !this.#c.fingerDraws.value) return this.#press(null);
+    const from = navigation.hit(x, y);
+    return from === null ? { kind: "refused", notice: OFF_LAND } : { kind: "measure", from };
   }
 
   /** A grid is being placed: its handles, then its ground, then the view. */

@@ -5,6 +5,7 @@
 
 import type { CameraState, Tile, TileView } from "../core/types.ts";
 import { TILE_CELLS, TILE_SAMPLES } from "../generated/contract.ts";
+import { flatSlope, INDEX_EVERY } from "./flat.ts";
 
 /** A label on an index contour. */
 export interface ContourLabel {
@@ -95,7 +96,8 @@ function drawnTiles(tiles: TileView, camera: CameraState): Tile[] {
 /** Pixels that a metre across the sight covers at the nearest point of a ball. */
 function pixelsPerMetre(camera: CameraState, at: readonly [number, number, number], reach: number): number {
   if (camera.orthoHeight > 0) return camera.height / camera.orthoHeight;
-  const away = Math.hypot(at[0] - camera.eye[0], at[1] - camera.eye[1], at[2] - camera.eye[2]) - reach;
+  const k = camera.exaggeration ?? 1;
+  const away = Math.hypot(at[0] - camera.eye[0], at[1] - camera.eye[1], k * (at[2] - camera.eye[2])) - reach;
   return camera.height / (2 * Math.tan((camera.fovDeg * Math.PI) / 360) * Math.max(away, 1));
 }
 
@@ -159,7 +161,7 @@ function consider(
   const gx = (bilinear(tile, at + 1, row) - bilinear(tile, at - 1, row)) / (2 * cell);
   const gy = (bilinear(tile, at, row + 1) - bilinear(tile, at, row - 1)) / (2 * cell);
   const slope = Math.hypot(gx, gy);
-  if (slope < 1e-3) return null;
+  if (slope < Math.max(1e-3, flatSlope(everyM / INDEX_EVERY, cell * TILE_CELLS * 2 ** tile.level))) return null;
   const x = (tile.x * TILE_CELLS + at) * cell;
   const y = (tile.y * TILE_CELLS + row) * cell;
   const middle = project(camera, x, y, z);

@@ -13,6 +13,7 @@ import { SyncDoc } from "../../src/doc/sync.ts";
 import { toolDefaults } from "../../src/input/defaults.ts";
 import type { Action, ToolId } from "../../src/input/keys/action.ts";
 import { createActions } from "../../src/input/keys/actions.ts";
+import { Ruler } from "../../src/input/tools/ruler.ts";
 
 const GUIDE = resolve(import.meta.dirname, "../../../docs/user-guide.md");
 const MARKS = /(<!-- keys:.*?-->\n\| what \| keys \|\n\|---\|---\|\n)([\s\S]*?)(<!-- \/keys -->)/;
@@ -44,6 +45,7 @@ function everyAction() {
     doc: new SyncDoc("me", () => 0),
     ground: () => flat,
     freeze: () => flat,
+    ruler: new Ruler(),
     defaults: toolDefaults(4096),
     canEdit: () => true,
     tool: signal<ToolId>("select"),

@@ -12,6 +12,7 @@ import { createActions } from "../../src/input/keys/actions.ts";
 import { actionFor, combination, Keyboard, meantForCanvas } from "../../src/input/keys/keyboard.ts";
 import { createOps } from "../../src/input/sketch/strokeops.ts";
 import { Navigation } from "../../src/input/tools/navigation.ts";
+import { Ruler } from "../../src/input/tools/ruler.ts";
 import { EMPTY, ridge } from "../doc/model.ts";
 import { welcomeOf } from "../doc/welcome.ts";
 import { camera, FLAT, SIZE } from "./scene.ts";
@@ -66,6 +67,7 @@ beforeEach(() => {
     tool,
     selection,
     placing: signal(null),
+    ruler: new Ruler(),
     fingerDraws,
     defaults: toolDefaults(SIZE),
     newId: () => `copy${ids++}`,

@@ -173,6 +173,9 @@ function shown(paint: Paint, cursor: Vec3 | null, tool = "paint", overlay: Scene
       keyPen: { visual: signal(null) },
     },
     canEdit: signal(true),
+    choices: { exaggeration: 1 },
+    automaticM: signal(20),
+    marked: signal(null),
     doc: signal(null),
     people: signal({ members: [], presences: new Map(), me: "me", myColour: "#000000" }),
   };

@@ -28,6 +28,7 @@ import { TileStore } from "../../tiles/store.ts";
 import { keepImports, keptImports } from "../device/kept-imports.ts";
 import { keepViews, keptViews } from "../device/kept-views.ts";
 import { QualityChoice, TAU_PX } from "../device/quality-choice.ts";
+import { largeLetters, ViewChoices } from "../device/view-choices.ts";
 import { Groundwork } from "../layers/groundwork.ts";
 import type { OpenTerrain } from "../open-terrain.ts";
 import { deepFocus } from "../regions.ts";
@@ -36,6 +37,7 @@ import { coveredEdges } from "./covered.ts";
 import { FrameLoop } from "./frame-loop.ts";
 import { FreshTiles } from "./fresh-tiles.ts";
 import { Graphics } from "./graphics.ts";
+import { Instruments } from "./instruments/instruments.ts";
 import { landOf } from "./land.ts";
 import { QuietStrokes } from "./quiet-strokes.ts";
 import { cursorVisuals, strokeVisuals } from "./scene.ts";
@@ -66,14 +68,19 @@ export class Stage {
   readonly shown: ShownTerrain;
   readonly input: InputController;
   readonly groundwork: Groundwork;
+  readonly instruments: Instruments;
   readonly defaults: ToolDefaults;
   readonly loop: FrameLoop;
   readonly overlay = signal<Scene["overlay"]>("none");
   readonly showStrokes = signal(true);
+  /** Height between the contours that are drawn, metres. */
+  readonly contourM = computed(() => this.view.contourM || (this.stats.value?.contourM ?? 0));
   readonly quietStrokes = new QuietStrokes();
   readonly cursor = signal<Vec3 | null>(null);
   readonly graphics: Graphics;
   readonly quality: QualityChoice;
+  /** How this device shows terrains. */
+  readonly view: ViewChoices;
   readonly following = signal<string | null>(null);
   readonly stats = signal<FrameStats | null>(null);
   /** Screen-error bound of the picture, pixels, where this device has no room for the chosen one. */
@@ -123,6 +130,8 @@ export class Stage {
     this.defaults = toolDefaults(sizeM);
     this.loop = new FrameLoop((dt, time) => this.#draw(dt, time));
     this.quality = new QualityChoice(session.store);
+    this.view = new ViewChoices(session.store);
+    this.camera.exaggerate(this.view.exaggeration);
     this.graphics = new Graphics({
       viewport,
       camera: this.camera,
@@ -151,6 +160,7 @@ export class Stage {
       },
       author: () => session.me.value.name,
     });
+    this.instruments = new Instruments(this.input.ruler, this.tiles);
     this.groundwork = new Groundwork({
       sizeM,
       doc: session.doc,
@@ -285,6 +295,7 @@ export class Stage {
     for (const stop of this.#stops) stop();
     this.quietStrokes.stop();
     this.groundwork.dispose();
+    this.instruments.dispose();
     this.input.dispose();
     this.graphics.dispose();
   }
@@ -319,6 +330,9 @@ export class Stage {
         session.presenceChanged();
         this.loop.invalidate();
       }),
+      effect(() => this.camera.exaggerate(this.view.exaggeration)),
+      effect(() => largeLetters(this.view.projector)),
+      () => largeLetters(false),
       effect(() => keepViews(session.store, session.id, this.camera.views.value)),
       effect(() => {
         this.cursor.value;
@@ -335,9 +349,11 @@ export class Stage {
         this.#cursors.value;
         input.ghost.value;
         this.groundwork.footprints.value;
+        this.instruments.lines.value;
         this.groundwork.visual.value;
         this.overlay.value;
         this.quality.mode.value;
+        this.view.choices.value;
         this.showStrokes.value;
         this.loop.invalidate();
       }),
@@ -409,7 +425,7 @@ export class Stage {
       strokes: this.#strokes.value,
       ghost: this.input.ghost.value,
       cursors: this.#cursors.value,
-      footprints: this.groundwork.footprints.value,
+      footprints: [...this.groundwork.footprints.value, ...this.instruments.lines.value],
       placing: this.groundwork.visual.value,
       tauPx: TAU_PX[quality],
       quality,
@@ -417,6 +433,8 @@ export class Stage {
       overlay: this.overlay.value,
       influence: this.#influence.value,
       showStrokes: this.showStrokes.value,
+      contourM: this.view.contourM,
+      lineScale: this.view.lineScale,
     });
     this.stats.value = stats;
     return moving || stats.busy;

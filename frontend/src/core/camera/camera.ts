@@ -7,15 +7,15 @@
  */
 
 import { type ReadonlySignal, signal } from "@preact/signals-core";
-import { add, addScaled, clamp, DEG, distance, dot, mix3, normalize, sub, wrapAngle } from "../math.ts";
+import { add, addScaled, clamp, DEG, distance, dot, normalize, sub, wrapAngle } from "../math.ts";
 import type { CameraState, Ground, Ray, Vec3 } from "../types.ts";
 import { type Flight, poseOn } from "./flight.ts";
 import { lifted, MAX_PITCH, MIN_PITCH, standingRoom } from "./floor.ts";
-import { frameIn, homeIn, type Insets } from "./home.ts";
+import { framed, homeIn, type Insets, raisedLand } from "./home.ts";
+import { lowered, loweredRay, MOST_EXAGGERATION, raised, raisedGround } from "./lens.ts";
 import {
   cameraState,
   FLAT,
-  fitDistance,
   HOME_HEADING,
   HOME_PITCH,
   homePose,
@@ -68,6 +68,8 @@ export class Camera {
   /** The land that home looks at. */
   #land: Land = FLAT;
   #canvas: Canvas = { width: 1, height: 1 };
+  /** How many times heights of the pose are the true ones. */
+  #k = 1;
   /** Margins that the page covers of the picture, device pixels; null where nobody has said. */
   #insets: Insets | null = null;
   /** Views change at once instead of flying: for people who asked for less motion. */
@@ -147,7 +149,7 @@ export class Camera {
     const foreshortening = Math.max(0.25, -forward[2]);
     const moved = addScaled(addScaled(pivot, right, -dxPx * perPixel), north, (dyPx * perPixel) / foreshortening);
     const lift = ground.heightAt(moved[0], moved[1]) - ground.heightAt(pivot[0], pivot[1]);
-    this.#set({ pivot: this.#leash([moved[0], moved[1], moved[2] + lift]) });
+    this.#set({ pivot: this.#leash([moved[0], moved[1], moved[2] + this.#k * lift]) });
   }
 
   /** Moves the camera over the map by metres, height and direction unchanged. */
@@ -176,7 +178,7 @@ export class Camera {
       this.#zoomLeft = 0;
       return;
     }
-    const centre = anchor ?? pivot;
+    const centre = anchor ? raised(anchor, this.#k) : pivot;
     this.#set({ distanceM: next, pivot: this.#leash(addScaled(centre, sub(pivot, centre), k)) });
   }
 
@@ -234,43 +236,30 @@ export class Camera {
   /** Where the view is going, or is when nothing moves it. */
   destination(): { readonly eye: Vec3; readonly target: Vec3 } {
     const pose = this.#flight?.to ?? this.#pose;
-    return { eye: poseEye(pose), target: pose.pivot };
+    return { eye: lowered(poseEye(pose), this.#k), target: lowered(pose.pivot, this.#k) };
   }
 
   /** Moves the pivot along the view to the depth of `point`, so that orbiting turns about what is looked at. */
   pivotAt(point: Vec3): void {
     if (this.#pose.mode === "map") return;
     const eye = poseEye(this.#pose);
-    const depth = dot(sub(point, eye), poseBasis(this.#pose).forward);
+    const depth = dot(sub(raised(point, this.#k), eye), poseBasis(this.#pose).forward);
     this.#keepEye(this.#pose.heading, this.#pose.pitch, clamp(depth, this.#nearest, this.#farthest));
   }
 
   /** Flies to where the rectangle (at ground level) or all points are in view. */
   frame(what: FrameRect | readonly Vec3[], durationMs = 450): void {
-    const points: readonly Vec3[] =
-      "x0" in what ? [[what.x0, what.y0, 0] as const, [what.x1, what.y1, 0] as const] : what;
-    if (points.length === 0) return;
-    const low = points.reduce<Vec3>(
-      (a, p) => [Math.min(a[0], p[0]), Math.min(a[1], p[1]), Math.min(a[2], p[2])],
-      points[0]!,
-    );
-    const high = points.reduce<Vec3>(
-      (a, p) => [Math.max(a[0], p[0]), Math.max(a[1], p[1]), Math.max(a[2], p[2])],
-      points[0]!,
-    );
-    const pitch = this.#pose.mode === "map" ? this.#pose.pitch : clamp(this.#pose.pitch, -75 * DEG, -15 * DEG);
-    const pose: Pose = { ...this.#pose, pivot: mix3(low, high, 0.5), pitch };
-    const { width, height } = this.#canvas;
-    const found =
-      this.#insets === null
-        ? { ...pose, distanceM: fitDistance(pose, points, this.#aspect, 0.2, 0) }
-        : frameIn(pose, points, width, height, this.#insets);
+    const corners: readonly Vec3[] = "x0" in what ? [[what.x0, what.y0, 0], [what.x1, what.y1, 0]] : what; // biome-ignore format: one line
+    if (corners.length === 0) return;
+    const points = corners.map((p) => raised(p, this.#k));
+    const found = framed(this.#pose, points, this.#canvas, this.#insets);
     const distanceM = clamp(Math.max(found.distanceM, this.#sizeM / 40), this.#nearest, this.#farthest);
     this.#flyTo({ ...found, distanceM }, durationMs);
   }
 
   /** Flies to a pose given by its eye and target. In map mode only place and scale are taken. */
-  goTo(eye: Vec3, target: Vec3, durationMs = 600): void {
+  goTo(trueEye: Vec3, trueTarget: Vec3, durationMs = 600): void {
+    const [eye, target] = [raised(trueEye, this.#k), raised(trueTarget, this.#k)];
     const d = sub(target, eye);
     const distanceM = clamp(distance(eye, target), this.#nearest, this.#farthest);
     const dir = normalize(d);
@@ -279,6 +268,21 @@ export class Camera {
     const angles =
       this.#pose.mode === "map" ? {} : { heading, pitch: clamp(Math.atan2(dir[2], flat), MIN_PITCH, FLY_PITCH) };
     this.#flyTo({ ...this.#pose, ...angles, pivot: target, distanceM }, durationMs);
+  }
+
+  /** Turns the view until north is up; the place stays. */
+  north(durationMs = 350): void {
+    this.#flyTo({ ...this.#pose, heading: 0 }, durationMs);
+  }
+
+  /** How many times heights are seen larger than they are; what is looked at stays in the middle. */
+  exaggerate(times: number): void {
+    const k = clamp(Number.isFinite(times) ? times : 1, 1, MOST_EXAGGERATION);
+    if (k === this.#k) return;
+    const there = this.#atHome();
+    const pivot = raised(lowered(this.#pose.pivot, this.#k), k);
+    this.#k = k;
+    this.#set(there ? this.#homePose(this.#pose.mode) : { pivot });
   }
 
   /** Flies back to the view of the whole terrain, as it lies now. */
@@ -302,34 +306,35 @@ export class Camera {
     const before = this.#pose;
     this.#stepFlight(dtS);
     this.#stepZoom(dtS);
-    this.#keepAbove(ground);
+    this.#keepAbove(raisedGround(ground, this.#k));
     return this.moving || this.#pose !== before;
   }
 
   /** The ray through a device pixel. */
   ray(xPx: number, yPx: number): Ray {
-    return rayThrough(this.#pose, this.#canvas, xPx, yPx, 2 * this.#sizeM);
+    return this.held()(xPx, yPx);
   }
 
   /** The rays of the picture as it is now, for whoever must not notice that the view moves on. */
   held(): (xPx: number, yPx: number) => Ray {
-    const [pose, canvas] = [this.#pose, this.#canvas];
-    return (xPx, yPx) => rayThrough(pose, canvas, xPx, yPx, 2 * this.#sizeM);
+    const [pose, canvas, k] = [this.#pose, this.#canvas, this.#k];
+    return (xPx, yPx) => loweredRay(rayThrough(pose, canvas, xPx, yPx, 2 * k * this.#sizeM), k);
   }
 
   /** Where a world point is on the canvas. */
   project(p: Vec3): Projection {
-    return projected(this.#pose, this.#canvas, p);
+    return projected(this.#pose, this.#canvas, raised(p, this.#k));
   }
 
   /** Metres that one device pixel covers at a world point. */
   metresPerPixelAt(p: Vec3): number {
-    return metresPerPixelAt(this.#pose, this.#canvas, p);
+    return metresPerPixelAt(this.#pose, this.#canvas, raised(p, this.#k));
   }
 
   /** Remembers the present view under a name. */
   saveView(slot: string): SavedView {
-    const view: SavedView = { mode: this.#pose.mode, eye: poseEye(this.#pose), target: this.#pose.pivot };
+    const { eye, target } = this.#state.value;
+    const view: SavedView = { mode: this.#pose.mode, eye, target };
     this.#views.value = new Map(this.#views.value).set(slot, view);
     return view;
   }
@@ -372,10 +377,11 @@ export class Camera {
 
   #homePose(mode: CameraMode): Pose {
     const { width, height } = this.#canvas;
+    const land = raisedLand(this.#land, this.#k);
     const pose =
       this.#insets === null
-        ? homePose(mode, this.#sizeM, this.#aspect, this.#land)
-        : homeIn(mode, this.#sizeM, width, height, this.#insets, this.#land);
+        ? homePose(mode, this.#sizeM, this.#aspect, land)
+        : homeIn(mode, this.#sizeM, width, height, this.#insets, land);
     return { ...pose, distanceM: Math.min(pose.distanceM, this.#farthest) };
   }
 
@@ -433,7 +439,7 @@ export class Camera {
   }
 
   #snapshot(): CameraState {
-    return cameraState(this.#pose, this.#canvas.width, this.#canvas.height, this.#sizeM);
+    return cameraState(this.#pose, this.#canvas.width, this.#canvas.height, this.#sizeM, this.#k);
   }
 
   #publish(): void {

@@ -2,7 +2,9 @@
 
 import { addScaled, clamp, DEG, dot, mix, sub } from "../math.ts";
 import type { Vec3 } from "../types.ts";
-import { FLAT, FOV_DEG, HOME_HEADING, HOME_PITCH, type Land, type Pose, poseBasis } from "./state.ts";
+import { raised } from "./lens.ts";
+import { FLAT, FOV_DEG, fitDistance, HOME_HEADING, HOME_PITCH, type Land, type Pose, poseBasis } from "./state.ts";
+import type { Canvas } from "./view.ts";
 
 /** How much of a picture's edges is covered, in its pixels. */
 export interface Insets {
@@ -89,6 +91,27 @@ export function frameIn(pose: Pose, points: readonly Vec3[], width: number, heig
   const middle: Vec3 = [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, (low[2] + high[2]) / 2];
   const distanceM = dot(sub(middle, eye), forward);
   return { ...pose, distanceM, pivot: addScaled(eye, forward, distanceM) };
+}
+
+/** The view in which all points lie beside what covers the picture, or with room around them where nobody has said what does. */
+export function framed(from: Pose, points: readonly Vec3[], canvas: Canvas, insets: Insets | null): Pose {
+  const of = (k: 0 | 1 | 2): number => {
+    const values = points.map((p) => p[k]);
+    return (Math.min(...values) + Math.max(...values)) / 2;
+  };
+  const pitch = from.mode === "map" ? from.pitch : clamp(from.pitch, -75 * DEG, -15 * DEG);
+  const pose: Pose = { ...from, pivot: [of(0), of(1), of(2)], pitch };
+  const { width, height } = canvas;
+  return insets === null
+    ? { ...pose, distanceM: fitDistance(pose, points, width / height, 0.2, 0) }
+    : frameIn(pose, points, width, height, insets);
+}
+
+/** How the land lies as it is seen. */
+export function raisedLand(land: Land, k: number): Land {
+  if (k === 1) return land;
+  const peaks = land.peaks?.map((p) => raised(p, k));
+  return { groundM: k * land.groundM, lowM: k * land.lowM, ...(peaks ? { peaks } : {}) };
 }
 
 function within({ x0, x1, y0, y1 }: Free, room: number): Free {

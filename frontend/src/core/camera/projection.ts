@@ -11,9 +11,14 @@ export interface Axes {
   readonly up: Vec3;
 }
 
-/** Orthonormal axes of a view. */
-export function viewAxes({ eye, target, up }: Pick<CameraState, "eye" | "target" | "up">): Axes {
-  const forward = unit([target[0] - eye[0], target[1] - eye[1], target[2] - eye[2]]);
+/** Orthonormal axes of a view, in the world as it is seen. */
+export function viewAxes({
+  eye,
+  target,
+  up,
+  exaggeration = 1,
+}: Pick<CameraState, "eye" | "target" | "up" | "exaggeration">): Axes {
+  const forward = unit([target[0] - eye[0], target[1] - eye[1], exaggeration * (target[2] - eye[2])]);
   const right = unit(cross(forward, up));
   return { forward, right, up: cross(right, forward) };
 }
@@ -24,7 +29,7 @@ export function viewAxes({ eye, target, up }: Pick<CameraState, "eye" | "target"
  */
 export function eyeProjection(camera: CameraState): Float64Array {
   const { forward, right, up } = viewAxes(camera);
-  const { near, far, orthoHeight } = camera;
+  const { near, far, orthoHeight, exaggeration = 1 } = camera;
   const aspect = camera.width / camera.height;
   const depth = far / (far - near);
   const rows: readonly (readonly [Vec3, number, number])[] =
@@ -43,7 +48,7 @@ export function eyeProjection(camera: CameraState): Float64Array {
         ];
   const m = new Float64Array(16);
   rows.forEach(([axis, scale, constant], r) => {
-    for (let c = 0; c < 3; c += 1) m[4 * c + r] = scale * axis[c]!;
+    for (let c = 0; c < 3; c += 1) m[4 * c + r] = scale * axis[c]! * (c === 2 ? exaggeration : 1);
     m[12 + r] = constant;
   });
   return m;

@@ -2,6 +2,7 @@
 
 import { addScaled, clamp, DEG, dot, sub } from "../math.ts";
 import type { CameraState, Vec3 } from "../types.ts";
+import { lowered } from "./lens.ts";
 
 /** Vertical field of view, degrees; the map covers at its pivot what the perspective view does. */
 export const FOV_DEG = 45;
@@ -121,8 +122,9 @@ export function homePose(mode: Pose["mode"], sizeM: number, aspect: number, land
  *
  * The near plane is as near as eyes come to the ground (camera/floor.ts), from a walk to a view from space: reversed depth
  * does not lose precision by it, and what is beside a cliff is not cut off. Matrices are built in float64 and rounded once.
+ * `k`: heights of the pose are this many times the true ones, which the state has.
  */
-export function cameraState(pose: Pose, width: number, height: number, sizeM: number): CameraState {
+export function cameraState(pose: Pose, width: number, height: number, sizeM: number, k = 1): CameraState {
   const basis = poseBasis(pose);
   const eye = poseEye(pose);
   const map = pose.mode === "map";
@@ -134,10 +136,11 @@ export function cameraState(pose: Pose, width: number, height: number, sizeM: nu
   const viewProj = map
     ? orthographic(basis, eye, orthoHeight, width / height, near, far)
     : perspective(basis, eye, tan, width / height, near, far);
+  for (let row = 0; row < 4; row++) viewProj[8 + row]! *= k;
   return {
     mode: pose.mode,
-    eye,
-    target: pose.pivot,
+    eye: lowered(eye, k),
+    target: lowered(pose.pivot, k),
     up: basis.up,
     fovDeg: pose.fovDeg,
     orthoHeight,
@@ -145,6 +148,7 @@ export function cameraState(pose: Pose, width: number, height: number, sizeM: nu
     far,
     width,
     height,
+    exaggeration: k,
     viewProj: new Float32Array(viewProj),
   };
 }

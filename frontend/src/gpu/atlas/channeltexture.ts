@@ -1,9 +1,11 @@
 /**
  * One small texture over the whole domain, which the ground's overlays read (rgba8unorm; `detail_at` in terrain.wgsl):
- * noise amplitude, roughness, and where the selected stroke is felt or a channel is painted.
+ * noise amplitude, roughness, where the selected stroke is felt or a channel is painted, and how far contours show.
  */
 
 import type { ChannelGrid, ChannelView, Scene } from "../../core/types.ts";
+import { sharesOf } from "../../tiles/flat.ts";
+import { LOOKS } from "../looks.ts";
 
 const TEXEL_BYTES = 4;
 
@@ -21,6 +23,12 @@ export function overlayGrid({ overlay, influence, channels }: Scene): ChannelGri
   return made;
 }
 
+/** How far contours show, over the domain: not on flat ground. Null where there are none to be drawn. */
+export function contourShares({ tiles, overlay, settings }: Scene, everyM: number): ChannelGrid | null {
+  const drawn = overlay === "contours" || LOOKS[settings.look].contours > 0;
+  return drawn ? sharesOf(tiles, everyM) : null;
+}
+
 export class ChannelTexture {
   texture: GPUTexture;
   /** Metres of amplitude that the value 1 stands for. */
@@ -28,6 +36,7 @@ export class ChannelTexture {
   #source: ChannelView | null = null;
   #stamp = -1;
   #influence: ChannelGrid | null = null;
+  #contours: ChannelGrid | null = null;
 
   readonly #device: GPUDevice;
 
@@ -37,12 +46,14 @@ export class ChannelTexture {
   }
 
   /** Takes over what changed. True when the texture is another one and must be bound again. */
-  update(channels: ChannelView, influence: ChannelGrid | null): boolean {
-    if (channels === this.#source && channels.stamp === this.#stamp && influence === this.#influence) return false;
+  update(channels: ChannelView, influence: ChannelGrid | null, contours: ChannelGrid | null = null): boolean {
+    const same = channels === this.#source && channels.stamp === this.#stamp;
+    if (same && influence === this.#influence && contours === this.#contours) return false;
     this.#source = channels;
     this.#stamp = channels.stamp;
     this.#influence = influence;
-    const { bytes, side, fullScale } = channelTexels(channels, influence);
+    this.#contours = contours;
+    const { bytes, side, fullScale } = channelTexels(channels, influence, contours);
     this.fullScale = fullScale;
     const resized = this.texture.width !== side;
     if (resized) {
@@ -71,14 +82,15 @@ export class ChannelTexture {
 }
 
 /**
- * Four bytes a sample: amplitude in parts of its greatest value, roughness, influence (0 without one), 255. The finest of the
- * grids gives the side.
+ * Four bytes a sample: amplitude in parts of its greatest value, roughness, influence (0 without one), contours (all of them
+ * without one). The finest of the grids gives the side.
  */
 export function channelTexels(
   { amplitude, roughness }: ChannelView,
   influence: ChannelGrid | null = null,
+  contours: ChannelGrid | null = null,
 ): { bytes: Uint8Array<ArrayBuffer>; side: number; fullScale: number } {
-  const side = Math.max(amplitude.side, roughness.side, influence?.side ?? 0);
+  const side = Math.max(amplitude.side, roughness.side, influence?.side ?? 0, contours?.side ?? 0);
   let greatest = 0;
   for (const v of amplitude.values) if (v > greatest) greatest = v;
   const fullScale = Math.max(greatest, 1e-3);
@@ -94,11 +106,12 @@ export function channelTexels(
   fill(0, amplitude, 1 / fullScale);
   fill(1, roughness, 1);
   fill(2, influence, 1);
+  if (contours !== null) fill(3, contours, 1);
   return { bytes, side, fullScale };
 }
 
 /** Bilinear; `v` from south to north and `u` from west to east, 0..1. */
-function sampleOf({ side, values }: ChannelGrid, v: number, u: number): number {
+export function sampleOf({ side, values }: ChannelGrid, v: number, u: number): number {
   const [y, x] = [v * (side - 1), u * (side - 1)];
   const j = Math.min(side - 2, Math.floor(y));
   const i = Math.min(side - 2, Math.floor(x));

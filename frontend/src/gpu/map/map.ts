@@ -2,6 +2,7 @@
 
 import type { CameraState, FrameStats, Rgba, Scene, SceneRenderer, Tile, TileView } from "../../core/types.ts";
 import { SUBPATCHES } from "../../generated/contract.ts";
+import { sharesOf } from "../../tiles/flat.ts";
 import { levelsOn } from "../../tiles/lakes/lakes.ts";
 import { LakeWatch } from "../../tiles/lakes/lakewatch.ts";
 import { assembleBordered, SLOT_TEXELS } from "../atlas/apron.ts";
@@ -88,6 +89,7 @@ export class MapRenderer implements SceneRenderer {
       selectMs: 0,
       cpuMs: performance.now() - began,
       uploads,
+      contourM: scene.contourM || contourInterval(relief(scene.tiles)),
       busy: busy || this.#lakes.busy,
     };
   }
@@ -99,12 +101,15 @@ export class MapRenderer implements SceneRenderer {
   #drawTiles(scene: Scene, frame: Frame, began: number): { drawn: number; uploads: number; busy: boolean } {
     const { tiles, settings } = scene;
     const root = tiles.tile(0, 0, 0);
+    const contourM = scene.contourM || contourInterval(relief(tiles));
     const style: MapStyle = {
       look: settings.look,
       sizeM: tiles.sizeM,
       seaM: settings.sea_level_m,
       lakes: this.#lakes.lakes,
-      contourM: contourInterval(relief(tiles)),
+      contourM,
+      contourShares: sharesOf(tiles, contourM),
+      lineScale: scene.lineScale ?? 1,
       contours: scene.overlay === "contours" || root !== undefined,
       slope: scene.overlay === "slope",
     };
@@ -216,7 +221,7 @@ function pictureKey(view: TileView, tile: Tile, side: number, style: MapStyle): 
   const { level, x, y } = tile;
   const lakes =
     style.lakes === null ? "" : levelsOn(style.lakes, level, x * SUBPATCHES, y * SUBPATCHES, SUBPATCHES).join(" ");
-  return `${side} ${style.look} ${lakes} ${style.seaM} ${style.contourM} ${style.contours} ${style.slope} ${stamps}`;
+  return `${side} ${style.look} ${lakes} ${style.seaM} ${style.contourM} ${style.lineScale} ${style.contours} ${style.slope} ${stamps}`;
 }
 
 function relief(view: TileView): number {

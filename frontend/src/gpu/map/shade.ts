@@ -5,11 +5,13 @@
  * Source of the manner: E. Imhof, "Cartographic Relief Presentation" (1982), chapters 9 and 13.
  */
 
-import type { Tile } from "../../core/types.ts";
+import type { ChannelGrid, Tile } from "../../core/types.ts";
 import type { Look } from "../../generated/contract.ts";
 import { NO_LAKE, TILE_CELLS } from "../../generated/contract.ts";
+import { INDEX_EVERY } from "../../tiles/flat.ts";
 import { type Lakes, lakeOver } from "../../tiles/lakes/lakes.ts";
 import { BORDER, SLOT_TEXELS } from "../atlas/apron.ts";
+import { sampleOf } from "../atlas/channeltexture.ts";
 
 type Rgb = readonly [number, number, number];
 
@@ -21,6 +23,10 @@ export interface MapStyle {
   /** Where lakes stand, and how high; null without a lake. */
   readonly lakes: Lakes | null;
   readonly contourM: number;
+  /** How far contours show over the domain; null: everywhere. */
+  readonly contourShares?: ChannelGrid | null;
+  /** How many times as wide they are. */
+  readonly lineScale?: number;
   readonly contours: boolean;
   readonly slope: boolean;
 }
@@ -111,7 +117,7 @@ export function hillshade(gx: number, gy: number): number {
 }
 
 /** Ink of contour lines, 0..1, at height z where it changes by `rate` metres a pixel. */
-function contourInk(height: number, rate: number, every: number): number {
+function contourInk(height: number, rate: number, every: number, scale: number): number {
   // A hair above the round value: ground that is flat at exactly that height is not one wide line.
   const z = height - 0.01 * every;
   const width = Math.max(rate, 1e-6);
@@ -120,7 +126,7 @@ function contourInk(height: number, rate: number, every: number): number {
     const fade = Math.min(1, Math.max(0, 1.6 - (4 * width) / interval));
     return Math.min(1, Math.max(0, half + 0.5 - away / width)) * fade;
   };
-  return Math.max(0.34 * line(every, 0.3), 0.6 * line(5 * every, 0.55));
+  return Math.max(0.34 * line(every, 0.3 * scale), 0.6 * line(INDEX_EVERY * every, 0.55 * scale));
 }
 
 /** Gradients at all samples of a slot but its outermost ring, metres per metre. */
@@ -164,8 +170,17 @@ export function shadeTile(
       const fx = x - i;
       const at = (j + BORDER) * SLOT_TEXELS + i + BORDER;
       const z = bilinear(slot, at, fx, fy);
-      const water = waterOver(style, (tile.x * TILE_CELLS + x) * cell, (tile.y * TILE_CELLS + y) * cell, z);
-      shadePoint(z, water, [bilinear(gx, at, fx, fy), bilinear(gy, at, fx, fy)], cell * perPixel, style, colour);
+      const [u, v] = [(tile.x * TILE_CELLS + x) * cell, (tile.y * TILE_CELLS + y) * cell];
+      const water = waterOver(style, u, v, z);
+      const shown = style.contourShares && sampleOf(style.contourShares, v / style.sizeM, u / style.sizeM);
+      shadePoint(
+        z,
+        { water, shown: shown ?? 1 },
+        [bilinear(gx, at, fx, fy), bilinear(gy, at, fx, fy)],
+        cell * perPixel,
+        style,
+        colour,
+      );
       const to = 4 * (row * side + col);
       out[to] = colour[0]!;
       out[to + 1] = colour[1]!;
@@ -190,7 +205,7 @@ function waterOver({ lakes, seaM, sizeM }: MapStyle, x: number, y: number, z: nu
 
 function shadePoint(
   z: number,
-  water: number | null,
+  { water, shown }: { readonly water: number | null; readonly shown: number },
   [gx, gy]: readonly [number, number],
   pixelM: number,
   style: MapStyle,
@@ -217,8 +232,8 @@ function shadePoint(
     const cool = SHADOW[k]! + (1 - SHADOW[k]!) * t;
     out[k] = Math.min(255, out[k]! * (cool + (LIT[k]! - 1) * (0.4 + light)));
   }
-  if (style.contours) {
-    const ink = contourInk(z, steep * pixelM, style.contourM);
+  if (style.contours && shown > 0) {
+    const ink = shown * contourInk(z, steep * pixelM, style.contourM, style.lineScale ?? 1);
     for (let k = 0; k < 3; k += 1) out[k] = out[k]! + (look.line[k]! - out[k]!) * ink;
   }
 }

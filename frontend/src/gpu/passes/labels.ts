@@ -2,7 +2,8 @@
 
 import type { CameraState, Scene } from "../../core/types.ts";
 import { type ContourLabel, contourLabels } from "../../tiles/contourlabels.ts";
-import { contourInterval, INDEX_EVERY } from "../looks.ts";
+import { INDEX_EVERY } from "../../tiles/flat.ts";
+import { contourInterval } from "../looks.ts";
 import { SOURCES } from "../shaders.ts";
 import { createPass, GrowingBuffer, type PassContext } from "./pipeline.ts";
 
@@ -24,6 +25,7 @@ export class LabelPass {
   #camera: CameraState | null = null;
   #stamp = -1;
   #everyM = 0;
+  #size = 0;
 
   readonly #pipeline: GPURenderPipeline;
   readonly #glyphs: GPUTexture;
@@ -73,12 +75,14 @@ export class LabelPass {
       this.#camera = null;
       return;
     }
-    const everyM = INDEX_EVERY * contourInterval(reliefM);
+    const everyM = INDEX_EVERY * (scene.contourM || contourInterval(reliefM));
     const { camera, tiles } = scene;
-    if (this.#camera === camera && this.#stamp === tiles.stamp && this.#everyM === everyM) return;
-    [this.#camera, this.#stamp, this.#everyM] = [camera, tiles.stamp, everyM];
-    const labels = contourLabels(tiles, camera, { everyM, sizePx: (SIZE_PX * pixels) / scale });
-    const data = letterInstances(labels, camera, SIZE_PX * pixels);
+    const size = SIZE_PX * (scene.lineScale ?? 1);
+    if (this.#camera === camera && this.#stamp === tiles.stamp && this.#everyM === everyM && this.#size === size)
+      return;
+    [this.#camera, this.#stamp, this.#everyM, this.#size] = [camera, tiles.stamp, everyM, size];
+    const labels = contourLabels(tiles, camera, { everyM, sizePx: (size * pixels) / scale });
+    const data = letterInstances(labels, camera, size * pixels);
     this.#count = data.length / FLOATS;
     this.#vertices = this.#buffer.write(data, data.length);
   }

@@ -9,6 +9,7 @@ import type { SyncDoc } from "../../doc/sync.ts";
 import type { PenToolId, ToolDefaults } from "../defaults.ts";
 import type { Say } from "../say.ts";
 import type { Placing } from "../tools/placement.ts";
+import type { Ruler } from "../tools/ruler.ts";
 
 export type ToolId = "select" | PenToolId;
 
@@ -30,6 +31,8 @@ export type ActionId =
   | "brush-channel"
   | "brush-opposite"
   | "set-point"
+  | "measure-line"
+  | "measure-area"
   | "turn-grid-left"
   | "turn-grid-right"
   | "next-stroke"
@@ -38,6 +41,7 @@ export type ActionId =
   | `nudge-${Direction}`
   | "frame-selection"
   | "home"
+  | "north"
   | `camera-${CameraMode}`
   | "zoom-in"
   | "zoom-out"
@@ -58,6 +62,7 @@ export interface Action {
 }
 
 export interface ActionContext {
+  readonly ruler: Ruler;
   readonly camera: Camera;
   readonly doc: SyncDoc;
   readonly ground: () => Ground;

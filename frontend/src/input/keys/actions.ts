@@ -34,6 +34,7 @@ export function createActions(c: ActionContext): Map<string, Action> {
     ["course", ["j", "5"]],
   ] as const)
     put(id, TOOL_TITLES[id], [...keys], () => {
+      c.ruler.close();
       c.tool.value = id;
     });
   put(
@@ -50,7 +51,24 @@ export function createActions(c: ActionContext): Map<string, Action> {
     () => edits.travel("redo"),
     () => c.canEdit() && c.doc.canRedo.value,
   );
-  put("delete", "Delete the stroke", ["Delete", "Backspace"], () => edits.remove(), edits.usable);
+  put(
+    "delete",
+    "Delete the stroke, or the last point of what is measured",
+    ["Delete", "Backspace"],
+    () => {
+      if (!c.ruler.removeLast()) edits.remove();
+    },
+    () => (c.ruler.kind.value !== null ? c.ruler.points.value.length > 0 : edits.usable()),
+  );
+  for (const [kind, title, key] of [
+    ["line", "Measure along a line: profile, distance, slope", "j"],
+    ["area", "Measure an area: size, volume, change", "Shift+j"],
+  ] as const)
+    put(`measure-${kind}`, title, [key], () => {
+      if (c.placing.value !== null) return;
+      if (c.ruler.kind.value === kind) c.ruler.close();
+      else c.ruler.open(kind);
+    });
   put("duplicate", "Duplicate the stroke", ["Ctrl+d"], () => edits.duplicate(), edits.selected);
   put("mirror", "Swap the stroke's flanks", ["m"], () => edits.mirror(), edits.shaped);
   put("lock", "Lock or unlock the stroke", ["l"], () => edits.toggle("locked"), edits.selected);
@@ -63,6 +81,7 @@ export function createActions(c: ActionContext): Map<string, Action> {
   put("cancel", "Cancel, or select nothing", ["Escape"], () => {
     if (c.cancel()) return;
     if (c.placing.value !== null) c.placing.value.cancel();
+    else if (c.ruler.kind.value !== null) c.ruler.close();
     else c.selection.value = null;
   });
   const nudgeGrid = placeActions(c, (right, away) => edits.direction(right, away), put);
@@ -106,6 +125,7 @@ function nudgeActions(
 function cameraActions(c: ActionContext, edits: StrokeActions, put: Put): void {
   const { camera } = c;
   put("frame-selection", "Look at the selection", ["f"], () => edits.frame());
+  put("north", "Turn the view north", ["'"], () => camera.north());
   put("home", "See the whole terrain", ["Home"], () => camera.home());
   put("camera-orbit", "Orbit camera", ["o"], () => camera.setMode("orbit"));
   put("camera-fly", "Fly camera (W A S D, Q E)", ["g"], () => camera.setMode("fly"));

@@ -11,6 +11,7 @@ import type { Ray, Vec3 } from "../../core/types.ts";
 import type { Sample } from "../sketch/sketch.ts";
 import { type Pixel, through } from "../sketch/spline.ts";
 import type { Placing } from "../tools/placement.ts";
+import type { Ruler } from "../tools/ruler.ts";
 import type { FinishedStroke, StrokeTool } from "../tools/stroketool.ts";
 import type { ToolId } from "./action.ts";
 
@@ -26,6 +27,7 @@ export interface KeyPenContext {
   readonly canEdit: () => boolean;
   readonly tool: ReadonlySignal<ToolId>;
   readonly placing: ReadonlySignal<Placing | null>;
+  readonly ruler: Ruler;
   readonly strokes: StrokeTool;
   /** Ground under a device pixel. */
   readonly hit: (x: number, y: number) => Vec3 | null;
@@ -50,6 +52,8 @@ const FREE: ReadonlySet<string> = new Set(["Tab", "Shift", "Control", "Alt", "Me
 const READY = "Arrow keys move the pen. Enter begins the line, Esc puts the pen away.";
 const BEGUN = "Begun. Move the pen into the air or along the ground; Enter sets the next point.";
 const UNDER_WAY = "Enter sets the next point; Enter again ends the line. Backspace takes a point back, Esc all of it.";
+const MEASURING = "Arrow keys move the pen, Enter sets a point, Backspace takes the last one back, Esc ends.";
+const MANY_POINTS = "A line has no room for more points.";
 const MOVE_FIRST = "Move the pen with the arrow keys first.";
 const OFF_GROUND = "Begin the line on the land.";
 const BUSY = "A line is under way: Enter twice ends it, Esc gives it up.";
@@ -70,7 +74,7 @@ export class KeyPen {
     this.#c = context;
     this.#stop = effect(() => {
       const tool = context.tool.value;
-      const away = tool === "select" || context.placing.value !== null;
+      const away = (tool === "select" && context.ruler.kind.value === null) || context.placing.value !== null;
       untracked(() => {
         if (away) this.hide();
         else if (tool !== this.#tool) this.cancel();
@@ -93,14 +97,15 @@ export class KeyPen {
     return this.#ray !== null;
   }
 
-  readonly usable = (): boolean => this.#c.canEdit() && this.#c.tool.value !== "select";
+  readonly usable = (): boolean =>
+    this.#c.ruler.kind.value !== null || (this.#c.canEdit() && this.#c.tool.value !== "select");
 
   /** Brings the pen where it was last, at first to the middle of the picture. */
   show(): void {
     if (!this.usable() || this.#visual.peek() !== null) return;
     const { width, height } = this.#c.camera.state.peek();
     this.#place([this.#rest[0] * width, this.#rest[1] * height], []);
-    this.#words.value = READY;
+    this.#words.value = this.#measures ? MEASURING : READY;
   }
 
   /** Takes a key that is meant for the terrain; false when it is not the pen's. */
@@ -157,6 +162,10 @@ export class KeyPen {
 
   #point(): void {
     const { at, points } = this.#visual.peek()!;
+    if (this.#measures) {
+      this.#measure(at);
+      return;
+    }
     if (!this.down) {
       this.#begin(at);
       return;
@@ -169,6 +178,17 @@ export class KeyPen {
     }
     this.#visual.value = { at, points: [...points, at] };
     this.#words.value = `Point ${points.length + 1} is set. ${UNDER_WAY}`;
+  }
+
+  get #measures(): boolean {
+    return this.#c.ruler.kind.peek() !== null;
+  }
+
+  #measure(at: Pixel): void {
+    const hit = this.#c.hit(...at);
+    if (hit === null) this.#c.onMessage(OFF_GROUND);
+    else if (!this.#c.ruler.add(hit)) this.#c.onMessage(MANY_POINTS);
+    else this.#words.value = `Point ${this.#c.ruler.points.peek().length} is set. ${MEASURING}`;
   }
 
   #begin(at: Pixel): void {

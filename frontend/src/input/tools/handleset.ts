@@ -8,11 +8,13 @@ import { GridTool } from "./gridtool.ts";
 import { type HandleKind, type HandleVisual, handlesOf } from "./handles.ts";
 import { HandleTool, type HandleToolOptions } from "./handletool.ts";
 import { type GridHandle, type GridHandleKind, gridAt, gridHandles, type Placing } from "./placement.ts";
+import type { Ruler, RulerHandle } from "./ruler.ts";
 
-export type AnyHandle = HandleVisual | GridHandle;
-type Held = Pick<HandleVisual, "kind" | "position"> | Pick<GridHandle, "kind" | "position">;
+export type AnyHandle = HandleVisual | GridHandle | RulerHandle;
+type Held = Pick<AnyHandle, "kind" | "position">;
 
 export interface HandleSetOptions extends HandleToolOptions {
+  readonly ruler: Ruler;
   readonly ground: () => Ground;
   readonly canEdit: () => boolean;
   readonly tool: Signal<ToolId>;
@@ -41,6 +43,7 @@ export class HandleSet {
   }
 
   hover(kind: AnyHandle["kind"] | null): void {
+    if (kind === "ruler") return;
     this.#grids.hover(kind !== null && isGrid(kind) ? kind : null);
     this.#strokes.hover(kind !== null && !isGrid(kind) ? (kind as HandleKind) : null);
   }
@@ -48,8 +51,9 @@ export class HandleSet {
   /** Takes a handle at a device pixel. */
   start(held: Held, x: number, y: number): void {
     const { kind, position } = held;
-    if (isGrid(kind)) this.#grids.start(this.placing!, { kind, position }, x, y);
-    else this.#strokes.start(this.#stroke()!, { kind, position }, x, y);
+    if (kind === "ruler") this.#o.ruler.take({ position });
+    else if (isGrid(kind)) this.#grids.start(this.placing!, { kind, position }, x, y);
+    else this.#strokes.start(this.#stroke()!, { kind: kind as HandleKind, position }, x, y);
   }
 
   /** Returns the hold on the grid's own ground, where a ray meets it: that moves the grid. Null beside the grid. */
@@ -60,18 +64,28 @@ export class HandleSet {
   }
 
   move(x: number, y: number, regular: boolean): void {
+    if (this.#measures) {
+      this.#o.ruler.move(this.#o.ground().raycast(this.#o.camera.ray(x, y)));
+      return;
+    }
     this.#grids.move(x, y, regular);
     this.#strokes.move(x, y, regular);
   }
 
   finish(): void {
+    if (this.#measures) this.#o.ruler.finish(0);
     this.#grids.finish();
     this.#strokes.finish();
   }
 
   cancel(): void {
-    if (this.#grids.dragging) this.#grids.cancel();
+    if (this.#measures) this.#o.ruler.cancel();
+    else if (this.#grids.dragging) this.#grids.cancel();
     else this.#strokes.cancel();
+  }
+
+  get #measures(): boolean {
+    return this.#o.ruler.kind.peek() !== null && this.#o.placing.peek() === null;
   }
 
   #stroke(): Stroke | null {
@@ -79,6 +93,8 @@ export class HandleSet {
   }
 
   #visible(): readonly AnyHandle[] {
+    // One may measure with a link that only looks.
+    if (this.#o.ruler.kind.value !== null && this.placing === null) return this.#o.ruler.handles(this.#o.ground());
     if (!this.#o.canEdit()) return [];
     const placing = this.placing;
     const map = this.#o.camera.state.value.mode === "map";

@@ -47,7 +47,7 @@ export class Horizon {
     if (!above || camera.orthoHeight > 0) return;
     const x = camera.target[0] - camera.eye[0];
     const y = camera.target[1] - camera.eye[1];
-    const z = camera.target[2] - camera.eye[2];
+    const z = (camera.exaggeration ?? 1) * (camera.target[2] - camera.eye[2]);
     const level = Math.hypot(x, y);
     const length = Math.hypot(level, z);
     if (level === 0 || camera.up[2] < 0.999) return;

@@ -24,6 +24,8 @@ export class Sight {
   #pixels = 1;
   #ortho = false;
   #tau = 1;
+  /** How many times heights are seen larger than they are. */
+  #k = 1;
   #water = DRY;
 
   readonly #tree: PatchTree;
@@ -38,6 +40,7 @@ export class Sight {
     this.#water = water;
     this.#tau = tauPx;
     this.eye = camera.eye;
+    this.#k = camera.exaggeration ?? 1;
     this.#ortho = camera.orthoHeight > 0;
     const heightPx = camera.height * pixelScale;
     this.#pixels = this.#ortho
@@ -53,8 +56,8 @@ export class Sight {
     const cellPx = cell * scale;
     if (cellPx <= SMALLEST_CELL * this.#tau) return 0;
     const error = this.#tree.error[node]!;
-    const geometric = (error * scale) / this.#tau;
-    const rough = error > SHADING_ERROR * cell ? cellPx / (SHADING_CELL_PX * this.#tau) : 0;
+    const geometric = (this.#k * error * scale) / this.#tau;
+    const rough = this.#k * error > SHADING_ERROR * cell ? cellPx / (SHADING_CELL_PX * this.#tau) : 0;
     return Math.max(geometric, rough);
   }
 
@@ -74,7 +77,7 @@ export class Sight {
     const py = this.row(node);
     const dx = outside(this.eye[0]!, px * w, (px + 1) * w);
     const dy = outside(this.eye[1]!, py * w, (py + 1) * w);
-    const dz = outside(this.eye[2]!, this.#tree.min[node]!, this.#tree.max[node]!);
+    const dz = this.#k * outside(this.eye[2]!, this.#tree.min[node]!, this.#tree.max[node]!);
     return Math.max(1e-3, Math.sqrt(dx * dx + dy * dy + dz * dz));
   }
 

@@ -3,7 +3,9 @@ import { css, html, nothing, type TemplateResult } from "lit";
 import type { Graphics } from "../../app/view/graphics.ts";
 import { height, metres, roundBelow } from "../../app/words/words.ts";
 import type { Camera } from "../../core/camera/camera.ts";
+import { lonLatOf, lonLatWords } from "../../core/lonlat.ts";
 import type { Vec3 } from "../../core/types.ts";
+import type { Doc } from "../../doc/document.ts";
 import type { Progress } from "../../generated/contract.ts";
 import { icon } from "../controls/icons.ts";
 import { SignalElement } from "../controls/signal-element.ts";
@@ -27,6 +29,7 @@ export function progressText(progress: Progress | null, levels: number): string 
 export class EskStatusLine extends SignalElement {
   static override properties = {
     cursor: { attribute: false },
+    doc: { attribute: false },
     camera: { attribute: false },
     baseBuilding: { attribute: false },
     progress: { attribute: false },
@@ -51,6 +54,9 @@ export class EskStatusLine extends SignalElement {
         min-width: 4.6em;
         color: var(--esk-text);
         font-weight: 550;
+      }
+      .place {
+        min-width: 8.4em;
       }
       .scale {
         display: inline-flex;
@@ -108,6 +114,11 @@ export class EskStatusLine extends SignalElement {
           display: none;
         }
       }
+      @media (max-width: 900px) {
+        .place {
+          display: none;
+        }
+      }
       @media (max-width: 460px) {
         .height,
         .building ~ .levels {
@@ -125,6 +136,7 @@ export class EskStatusLine extends SignalElement {
 
   /** The ground under the cursor. */
   declare cursor: ReadonlySignal<Vec3 | null>;
+  declare doc: ReadonlySignal<Doc | null>;
   declare camera: Pick<Camera, "state" | "metresPerPixelAt">;
   /** The server makes the ground of the elevation layers, and it takes long. */
   declare baseBuilding: ReadonlySignal<boolean>;
@@ -138,10 +150,21 @@ export class EskStatusLine extends SignalElement {
     const point = this.cursor.value;
     return html`
       <span class="height" title="Height of the ground under the cursor">${point ? height(point[2]) : "–"}</span>
+      ${this.#place(point)}
       ${this.baseBuilding.value ? html`<span class="building" role="status">Laying the real ground…</span>` : nothing}
       ${this.#scale()} ${this.#levels(this.progress.value, this.levels)}
       <span class="renderer" title=${graphics.reason.value ?? ""}>${graphics.info.value?.description ?? nothing}</span>
     `;
+  }
+
+  /** Where the cursor is: on Earth where the terrain lies there, else metres from its south-western corner. */
+  #place(point: Vec3 | null): TemplateResult | typeof nothing {
+    const settings = this.doc.value?.settings;
+    if (!point || !settings) return nothing;
+    const [x, y] = point;
+    const metric = `${x.toFixed(0)} E, ${y.toFixed(0)} N m`;
+    const words = settings.place ? lonLatWords(lonLatOf(settings.place, settings.size_m, x, y)) : metric;
+    return html`<span class="place" title=${`Under the cursor: ${metric} from the south-western corner`}>${words}</span>`;
   }
 
   #scale(): TemplateResult | typeof nothing {

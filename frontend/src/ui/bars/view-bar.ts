@@ -10,11 +10,15 @@ import type { QualityMode, Scene } from "../../core/types.ts";
 import { icon } from "../controls/icons.ts";
 import "../controls/segmented.ts";
 import type { ReadonlySignal } from "@preact/signals-core";
+import type { ViewChoices } from "../../app/device/view-choices.ts";
 import type { RendererInfo } from "../../app/view/graphics.ts";
 import type { CameraState } from "../../core/types.ts";
 import type { Action } from "../../input/keys/action.ts";
+import type { RulerKind } from "../../input/tools/ruler.ts";
 import { SignalElement } from "../controls/signal-element.ts";
 import { shared } from "../styles/shared.ts";
+import { compassButton } from "./compass.ts";
+import "./view-options.ts";
 
 /**
  * How the terrain is looked at: camera mode, the whole terrain, overlays. Fires `overlay` and `quality` with what was chosen,
@@ -29,6 +33,8 @@ export class EskViewBar extends SignalElement {
     quality: { attribute: false },
     coarsenedPx: { attribute: false },
     renderer: { attribute: false },
+    measuring: { attribute: false },
+    choices: { attribute: false },
     actions: { attribute: false },
   };
   static override styles = [
@@ -60,6 +66,10 @@ export class EskViewBar extends SignalElement {
   /** Screen-error bound of the picture, pixels, where this device has no room for the chosen one. */
   declare coarsenedPx: ReadonlySignal<number | null>;
   declare renderer: ReadonlySignal<RendererInfo | null>;
+  /** How this device shows terrains. */
+  declare choices: ViewChoices;
+  /** What is measured; null: nothing. */
+  declare measuring: ReadonlySignal<RulerKind | null>;
   /** Actions that the buttons run. */
   declare actions: ReadonlyMap<string, Action>;
 
@@ -119,6 +129,7 @@ export class EskViewBar extends SignalElement {
               @pick=${(e: CustomEvent<string>) => this.#run(`camera-${e.detail}`)}
             ></esk-segmented>`
       }
+      ${compassButton(this.view.value, keyText("North up", actions.get("north")), () => this.#run("north"))}
       <button
         class="icon-btn small"
         aria-label="See the whole terrain"
@@ -126,6 +137,15 @@ export class EskViewBar extends SignalElement {
         @click=${() => this.#run("home")}
       >
         ${icon("frame")}
+      </button>
+      <button
+        class="icon-btn small"
+        aria-label="Measure"
+        title=${keyText("Measure: profile, distance, area, volume", actions.get("measure-line"))}
+        aria-pressed=${this.measuring.value !== null}
+        @click=${() => this.#run(this.measuring.value === "area" ? "measure-area" : "measure-line")}
+      >
+        ${icon("ruler")}
       </button>
       <wa-dropdown placement="top-end" @wa-select=${this.#overlay}>
         <button slot="trigger" class="icon-btn small" aria-label="Overlays" title="Overlays" aria-pressed=${overlay.value !== "none"}>
@@ -139,6 +159,7 @@ export class EskViewBar extends SignalElement {
         <wa-dropdown-item type="checkbox" value="strokes" .checked=${live(showStrokes.value && !quiet.value)}>Show strokes</wa-dropdown-item>
         ${flat ? null : this.#qualities(quality.value)}
       </wa-dropdown>
+      <esk-view-options .choices=${this.choices}></esk-view-options>
     `;
   }
 }

@@ -1,9 +1,9 @@
 /** What only things for the hand have a choice of: paper, scale and contours of a map; size, base and heights of a solid. */
 
 import { html, type TemplateResult } from "lit";
-import { contourSteps } from "../../app/instruments/contour-steps.ts";
 import { type Exporter, isMap } from "../../app/layers/exports.ts";
 import { scalesFor, solidWords } from "../../app/layers/print-sizes.ts";
+import { contourSteps } from "../../app/view/instruments/contour-steps.ts";
 
 /** The part of the export's form for contour maps and solids. */
 export function printChoice(exporter: Exporter, sizeM: number): TemplateResult {

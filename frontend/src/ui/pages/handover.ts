@@ -3,7 +3,8 @@
  * and what it may do.
  */
 
-import { html, type TemplateResult } from "lit";
+import { computed, type ReadonlySignal } from "@preact/signals-core";
+import { html, nothing, type TemplateResult } from "lit";
 import type { Identity } from "../../app/device/storage.ts";
 import type { Stage } from "../../app/view/stage.ts";
 import type { QualityMode, Scene } from "../../core/types.ts";
@@ -23,6 +24,7 @@ import "../dialogs/share-dialog.ts";
 import "../panels/history-panel.ts";
 import "../panels/layers-panel.ts";
 import "../panels/legend.ts";
+import "../panels/measuring/measure-panel.ts";
 import "../panels/overlay.ts";
 import "../panels/stroke-panel.ts";
 import "../panels/terrain-panel.ts";
@@ -31,7 +33,16 @@ export type PanelTab = "stroke" | "ground" | "terrain" | "history";
 export type DialogId = "share" | "profile" | "help" | "about" | "export" | "delete";
 
 /** Handles, cursors and the brush, over the picture. */
-export function overlay({ camera, input, cursor, defaults, shown, meets, session }: Stage): TemplateResult {
+export function overlay({
+  camera,
+  input,
+  cursor,
+  defaults,
+  shown,
+  meets,
+  session,
+  instruments,
+}: Stage): TemplateResult {
   return html`<esk-overlay
     .camera=${camera}
     .input=${input}
@@ -42,6 +53,7 @@ export function overlay({ camera, input, cursor, defaults, shown, meets, session
     .meets=${meets}
     .people=${session.people}
     .canEdit=${session.canEdit}
+    .marked=${instruments.marked}
   ></esk-overlay>`;
 }
 
@@ -95,10 +107,13 @@ export function foot(stage: Stage): TemplateResult {
         .cursor=${cursor}
         .doc=${session.doc.doc}
         .selection=${input.selection}
+        .choices=${stage.view}
+        .automaticM=${stage.contourM}
       ></esk-legend>
       <esk-status-line
         class="panel"
         .cursor=${cursor}
+        .doc=${session.doc.doc}
         .camera=${camera}
         .baseBuilding=${session.baseBuilding}
         .progress=${session.progress}
@@ -115,12 +130,37 @@ export function foot(stage: Stage): TemplateResult {
       .quality=${quality.mode}
       .coarsenedPx=${stage.coarsenedPx}
       .renderer=${graphics.info}
+      .measuring=${input.ruler.kind}
+      .choices=${stage.view}
       .actions=${input.actions}
       @overlay=${(e: CustomEvent<Scene["overlay"]>) => stage.setOverlay(e.detail)}
       @strokes=${() => stage.toggleStrokes()}
       @quality=${(e: CustomEvent<QualityMode>) => quality.choose(e.detail)}
     ></esk-view-bar>
   </div>`;
+}
+
+const headings = new WeakMap<Stage, ReadonlySignal<string>>();
+
+function headingOf(stage: Stage): ReadonlySignal<string> {
+  const known = headings.get(stage) ?? computed(() => stage.session.doc.doc.value?.settings.title ?? "");
+  headings.set(stage, known);
+  return known;
+}
+
+/** What is measured, while something is. */
+export function measurePanel(stage: Stage, beside: boolean): TemplateResult | typeof nothing {
+  if (stage.input.ruler.kind.value === null) return nothing;
+  return html`<esk-measure
+    class="panel"
+    role="region"
+    aria-label="Measuring"
+    .instruments=${stage.instruments}
+    .sizeM=${stage.sizeM}
+    .heading=${headingOf(stage)}
+    .historyClock=${stage.session.historyView.shown}
+    ?beside=${beside}
+  ></esk-measure>`;
 }
 
 export function historyViewBar({ session }: Stage, beside: boolean): TemplateResult {

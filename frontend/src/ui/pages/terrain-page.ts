@@ -28,6 +28,7 @@ import {
   foot,
   historyViewBar,
   inspector,
+  measurePanel,
   overlay,
   type PanelTab,
   toolRail,
@@ -258,6 +259,7 @@ export class EskTerrain extends SignalElement {
           this.#panel.value = "ground";
         }}
       ></esk-placing-bar>
+      ${measurePanel(stage, this.#panel.value !== null)}
       ${historyViewBar(stage, this.#panel.value !== null)}
       ${this.#panel.value === null ? nothing : this.#side(stage, this.#panel.value)} ${this.#ways(stage)}
       ${dialogs(stage, this.#dialog.value, this.#closeDialog)}

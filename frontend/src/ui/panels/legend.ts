@@ -1,10 +1,12 @@
 import type { ReadonlySignal } from "@preact/signals-core";
 import { css, html, nothing, type TemplateResult } from "lit";
+import type { ViewChoices } from "../../app/device/view-choices.ts";
 import { SUBSTANCES } from "../../app/words/paints.ts";
 import { metres } from "../../app/words/words.ts";
 import type { PaintedOverlay, Scene, Vec3 } from "../../core/types.ts";
 import type { Doc } from "../../doc/document.ts";
 import type { ChannelStore } from "../../tiles/detail/channels.ts";
+import { INDEX_EVERY } from "../../tiles/flat.ts";
 import type { ShownTerrain } from "../../tiles/shownterrain.ts";
 import { SignalElement } from "../controls/signal-element.ts";
 import { shared } from "../styles/shared.ts";
@@ -15,7 +17,7 @@ export function amplitudeEnds(greatestM: number): [string, string] {
 }
 
 /** Overlays without a scale: the key that goes through them all should say which it has come to. */
-const NAMED = { contours: "Contour lines", patches: "Levels of detail, a colour each" } as const;
+const NAMED = { patches: "Levels of detail, a colour each" } as const;
 
 /** The meaning of an overlay's colours. */
 export class EskLegend extends SignalElement {
@@ -26,6 +28,8 @@ export class EskLegend extends SignalElement {
     cursor: { attribute: false },
     doc: { attribute: false },
     selection: { attribute: false },
+    choices: { attribute: false },
+    automaticM: { attribute: false },
   };
   static override styles = [
     shared,
@@ -90,12 +94,21 @@ export class EskLegend extends SignalElement {
   declare cursor: ReadonlySignal<Vec3 | null>;
   declare doc: ReadonlySignal<Doc | null>;
   declare selection: ReadonlySignal<string | null>;
+  declare choices: ViewChoices;
+  /** Height between the contours that are drawn, metres; 0: none yet. */
+  declare automaticM: ReadonlySignal<number>;
 
   protected override render(): TemplateResult | typeof nothing {
     const overlay = this.overlay.value;
-    this.toggleAttribute("hidden", overlay === "none");
-    if (overlay === "none") return nothing;
-    if (overlay === "contours" || overlay === "patches") return html`<div class="name">${NAMED[overlay]}</div>`;
+    const times = this.choices.exaggeration;
+    this.toggleAttribute("hidden", overlay === "none" && times === 1);
+    const heights = times === 1 ? nothing : html`<div class="name">Heights drawn × ${times}</div>`;
+    return html`${overlay === "none" ? nothing : this.#overlay(overlay)}${heights}`;
+  }
+
+  #overlay(overlay: Exclude<Scene["overlay"], "none">): TemplateResult {
+    if (overlay === "contours") return this.#contours();
+    if (overlay === "patches") return html`<div class="name">${NAMED[overlay]}</div>`;
     if (overlay === "slope") return scale("Steepness", "slope", ["0°", "30°", "60°"]);
     if (overlay === "influence") return this.#influence();
     this.channels.revision.value;
@@ -105,6 +118,16 @@ export class EskLegend extends SignalElement {
       ${scale("Roughness", "roughness", ["smooth", "rough"])} ${scale("Amplitude", "amplitude", amplitudeEnds(greatest))}
       ${this.#here()}
     `;
+  }
+
+  #contours(): TemplateResult {
+    const every = this.automaticM.value;
+    if (every === 0) return html`<div class="name">Contour lines</div>`;
+    const words = (m: number): string => `${Number(m.toPrecision(6))} m`;
+    return html`<div>
+      <div class="name">Contours every ${words(every)}</div>
+      <div>Each fifth stronger, with its height: every ${words(INDEX_EVERY * every)}</div>
+    </div>`;
   }
 
   #influence(): TemplateResult {

@@ -40,6 +40,7 @@ export class EskOverlay extends SignalElement {
     meets: { attribute: false },
     people: { attribute: false },
     canEdit: { attribute: false },
+    marked: { attribute: false },
   };
   static override styles = [
     shared,
@@ -109,6 +110,10 @@ export class EskOverlay extends SignalElement {
       .handle.grid-move .dot {
         fill: #ffd9c7;
       }
+      .handle.ruler .dot {
+        fill: #ffd166;
+      }
+      .marked .dot,
       .handle.active .dot {
         fill: #f46a45;
         stroke: #fff;
@@ -169,6 +174,8 @@ export class EskOverlay extends SignalElement {
   declare meets: ReadonlySignal<readonly Meeting[]>;
   declare people: ReadonlySignal<People>;
   declare canEdit: ReadonlySignal<boolean>;
+  /** The place on the ground that a pointer on the section marks. */
+  declare marked: ReadonlySignal<Vec3 | null>;
 
   /** A world point in CSS pixels of the window, or null when it is out of view. */
   #at(position: Vec3): { x: number; y: number } | null {
@@ -186,7 +193,7 @@ export class EskOverlay extends SignalElement {
     this.camera.state.value;
     return html`
       <svg aria-hidden="true">
-        ${this.#brush()} ${this.#ink()} ${this.#meetings()} ${this.input.handles.value.map((h) => this.#handle(h))} ${this.#keyPen()}
+        ${this.#mark()} ${this.#brush()} ${this.#ink()} ${this.#meetings()} ${this.input.handles.value.map((h) => this.#handle(h))} ${this.#keyPen()}
       </svg>
       ${this.#penWords()} ${this.#cursors()} ${this.#holders()}
     `;
@@ -227,6 +234,14 @@ export class EskOverlay extends SignalElement {
       ></path>
       ${input.ink.value === null ? svg`<text class="tip" x=${top.x / this.#ratio} y=${top.y / this.#ratio - 8}>${paintName(paint.value)}</text>` : nothing}
     ` as unknown as TemplateResult;
+  }
+
+  #mark(): TemplateResult | typeof nothing {
+    const at = this.marked.value && this.#at(this.marked.value);
+    if (!at) return nothing;
+    return svg`<g class="marked" transform="translate(${at.x.toFixed(1)} ${at.y.toFixed(1)})">
+      <circle class="halo" r="10"></circle><circle class="dot" r="5"></circle>
+    </g>` as unknown as TemplateResult;
   }
 
   /** The line under the pen itself: it is there before the ground has answered. */

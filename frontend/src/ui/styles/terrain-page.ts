@@ -83,6 +83,25 @@ export const terrainPageStyles = css`
       width: 352px;
     }
   }
+  esk-measure {
+    position: absolute;
+    left: calc(var(--edge) + 62px);
+    right: var(--edge);
+    bottom: calc(var(--edge) + 54px);
+    max-width: 940px;
+    max-height: min(46%, 420px);
+    overflow: hidden;
+    animation: rise 160ms ease-out;
+  }
+  @keyframes rise {
+    from {
+      opacity: 0;
+      transform: translateY(10px);
+    }
+  }
+  esk-measure[beside] {
+    right: calc(var(--edge) + 340px);
+  }
   .hint,
   .closed {
     position: absolute;
@@ -305,6 +324,20 @@ export const terrainPageStyles = css`
         --segments-wrap: wrap;
         --segment-basis: 40%;
       }
+    }
+    esk-measure,
+    esk-measure[beside] {
+      left: 0;
+      right: 0;
+      bottom: calc(var(--drawer) + 72px + env(safe-area-inset-bottom));
+      margin: 0 var(--edge);
+      background: var(--esk-panel-solid);
+    }
+    :host([drawer]) esk-measure {
+      display: none;
+    }
+    .foot:has(~ esk-measure) {
+      display: none;
     }
     .hint,
     esk-toasts {
