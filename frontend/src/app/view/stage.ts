@@ -268,7 +268,7 @@ export class Stage {
     const chrome = {
       top: box("esk-top-bar"),
       tools: box("esk-tools"),
-      foot: box("esk-view-bar"),
+      foot: box("esk-measure") ?? box("esk-view-bar"),
       side: box("aside.side"),
     };
     const edges = coveredEdges(picture, chrome);

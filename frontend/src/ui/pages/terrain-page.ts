@@ -115,6 +115,7 @@ export class EskTerrain extends SignalElement {
       }),
       effect(() => {
         this.#panel.value;
+        session.stage.value?.input.ruler.kind.value;
         if (session.stage.value) setTimeout(() => this.#tellCovered(), 0);
       }),
       installTestHook(session),

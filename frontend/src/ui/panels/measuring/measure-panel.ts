@@ -22,7 +22,7 @@ const KINDS = [
   { value: "area", label: "Area" },
 ];
 /** Half the height of the panel is the section; on small windows it is less. */
-const CHART_PX = 176;
+const CHART_PX = 156;
 const SMALL_CHART_PX = 112;
 
 const row = (name: string, value: string, kind = ""): TemplateResult =>
