@@ -315,7 +315,7 @@ def malformed() -> list[dict[str, str]]:
         "level too fine": patched(first, offset["level"], b"\x0b"),
         "channel level too fine": retold(5, [], [], Channel.AMPLITUDE),
         "channel predicted from the heights": retold(1, [one(Predictor.PARENT, 1, b"")], [], Channel.ROUGHNESS),
-        "unknown channel": patched(first, offset["channel"], b"\x09"),
+        "unknown channel": patched(first, offset["channel"], b"\xff"),
         "more tiles than bytes": patched(first, offset["tiles"], b"\xff\xff"),
         "more drops than bytes": patched(first, offset["drops"], b"\xff\xff"),
         "tile numbers cut": last[:-2],
