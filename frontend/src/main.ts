@@ -17,6 +17,9 @@ async function show(): Promise<void> {
   } else if (target.page === "server") {
     const { serverPage } = await import("./ui/pages/server-page.ts");
     app.replaceChildren(serverPage(target.key));
+  } else if (target.page === "privacy") {
+    const { privacyPage } = await import("./ui/pages/privacy.ts");
+    app.replaceChildren(privacyPage());
   } else {
     const { missingPage } = await import("./ui/pages/missing.ts");
     app.replaceChildren(missingPage(target.path));

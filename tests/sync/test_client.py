@@ -181,3 +181,30 @@ def test_over_https_with_the_servers_own_authority(tmp_path: Path) -> None:
             LiveTerrain(_link(server, terrain, secret), timeout=1)
     with LiveServer(tmp_path, lan=True) as server:
         assert server.raw("GET", "/esker-ca.pem")[1] == authority.read_bytes(), "the authority is kept"
+
+
+def test_a_program_leads_a_lesson_and_is_led(server: LiveServer) -> None:
+    """SPEC L1, L4: what is refused is a sentence; a program that leads switches for all."""
+    terrain, secret = server.create()
+    made = server.http("POST", f"/api/terrains/{terrain}/links", {"role": "edit"}, secret)[1]
+    with (
+        connect(f"{server.base}/t/{terrain}#{secret}") as teacher,
+        connect(f"{server.base}/t/{terrain}#{made['secret']}") as pupil,
+    ):
+        teacher.conduct(hands_off=True)
+        pupil._await(lambda: pupil._lesson.hands_off, 60, "nobody was told")
+        assert (teacher.lesson.draws, pupil.lesson.draws) == (True, False)
+        pupil.set_terrain(title="mine")
+        with pytest.raises(Refused, match="Hands off"):
+            pupil.wait(60)
+        pupil.conduct(hands_off=False)
+        pupil._await(lambda: bool(pupil._notices), 60, "no notice came")
+        assert "Only whoever leads" in pupil.notices[-1]
+        teacher._await(lambda: len(teacher._members) == 2, 60, "nobody came")
+        person = next(m.person for m in teacher.members if m.role == "edit")
+        teacher.about("pen", person)
+        pupil._await(lambda: pupil._lesson.draws, 60, "no pen came")
+        pupil.set_terrain(title="ours")
+        assert pupil.wait(60) == 1
+        with pytest.raises(ValueError, match="hands"):
+            teacher.conduct(hands=True)

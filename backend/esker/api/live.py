@@ -39,7 +39,7 @@ from esker.api import arguments
 from esker.api.link import Link, Refused
 from esker.api.live_ground import StreamedGround
 from esker.api.live_heights import LiveHeights
-from esker.api.live_history import LiveHistory
+from esker.api.live_history import LiveHistory, LiveLesson
 from esker.api.live_layers import Grids, LiveLayers
 from esker.contract import Document, Op, Stroke, TerrainSettings
 from esker.document.ops import Refusal
@@ -60,6 +60,7 @@ BURST: Final = 0.5 * c.OPS_BURST
 MESSAGE_BYTES: Final = c.MAX_MESSAGE_BYTES - 1024
 MAX_CURVE_POINTS: Final = 1_024
 """A longer curve is sent by appends: one message does not hold it."""
+NOTICES: Final = 100
 BACKOFF_SECONDS: Final = (0.2, 10.0)
 FINAL_CODES: Final = frozenset(code for code in c.WS_CLOSE.values() if code <= 4008 or code in (4011, 4012))
 CONNECT_SECONDS: Final = 15.0
@@ -67,7 +68,7 @@ LOST: Final = (OSError, ConnectionClosed, InvalidHandshake, InvalidMessage, Time
 """After these the client connects again."""
 
 
-class LiveTerrain(LiveLayers, LiveHistory, LiveHeights):
+class LiveTerrain(LiveLayers, LiveHistory, LiveHeights, LiveLesson):
     """A terrain that others may be changing too. All methods may be called from any thread."""
 
     def __init__(
@@ -93,6 +94,9 @@ class LiveTerrain(LiveLayers, LiveHistory, LiveHeights):
         self._grids = Grids(link, self._tls)
         self._client = f"py-{secrets.token_hex(8)}"
         self._token: str | None = None
+        self._ticket: str | None = None
+        self._lesson, self._notices = c.Lesson(), []
+        self._socket: ClientConnection | None = None
         self._sync = SyncDoc(self._client)
         self._changed = threading.Condition()
         self._failure: Refused | None = None
@@ -307,6 +311,13 @@ class LiveTerrain(LiveLayers, LiveHistory, LiveHeights):
             if not done:
                 raise TimeoutError(what)
 
+    def _say(self, message: c.Conduct | c.People) -> None:
+        self._raise_closed()
+        socket = self._socket
+        if socket is None or not self._online:
+            raise RuntimeError("there is no connection at the moment: try again when `online` is True")
+        asyncio.run_coroutine_threadsafe(socket.send(message.model_dump_json()), self._loop).result(CONNECT_SECONDS)
+
     def _poke(self) -> None:
         if not self._loop.is_closed():
             self._loop.call_soon_threadsafe(self._wake.set)
@@ -362,6 +373,7 @@ class LiveTerrain(LiveLayers, LiveHistory, LiveHeights):
                 secret=self._link.secret,
                 client=self._client,
                 token=self._token,
+                ticket=self._ticket,
                 name=self._name,
                 clock=self._sync.clock,
             )
@@ -369,7 +381,7 @@ class LiveTerrain(LiveLayers, LiveHistory, LiveHeights):
             if self._ground is not None:
                 with self._changed:
                     self._ground.connected()
-            sender = asyncio.create_task(self._send(socket))
+            sender, self._socket = asyncio.create_task(self._send(socket)), socket
             try:
                 async for message in socket:
                     if isinstance(message, str):
@@ -379,6 +391,7 @@ class LiveTerrain(LiveLayers, LiveHistory, LiveHeights):
                             credit = self._ground.applied(message)
                         await socket.send(credit.model_dump_json())
             finally:
+                self._socket = None
                 sender.cancel()
                 await asyncio.gather(sender, return_exceptions=True)
 
@@ -410,7 +423,8 @@ class LiveTerrain(LiveLayers, LiveHistory, LiveHeights):
             match message:
                 case c.Welcome():
                     self._sync.welcome(message)
-                    self._token = message.token
+                    self._token, self._ticket = message.token, message.ticket or None
+                    self._lesson = message.lesson or self._lesson
                     self._role, self._members, self._online = message.role, message.members, True
                     self._wake.set()
                 case c.OpsBroadcast():
@@ -420,6 +434,10 @@ class LiveTerrain(LiveLayers, LiveHistory, LiveHeights):
                 case c.Reject():
                     self._sync.reject(message)
                     self._refusals.append(Refused(message.code, message.message))
+                case c.Lesson():
+                    self._lesson = message
+                case c.Notice():
+                    self._notices = [*self._notices, message.text][-NOTICES:]
                 case c.Members():
                     self._members = message.members
                 case c.Progress() if self._ground is not None:

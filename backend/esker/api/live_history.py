@@ -1,9 +1,12 @@
-"""The history of a live terrain from Python: what people did, the terrain as it was, copies (docs/protocol.md)."""
+"""What people did to a live terrain, and how they are led, from Python: history, copies, the lesson (docs/protocol.md,
+docs/teaching.md)."""
 
 from __future__ import annotations
 
 import json
 import ssl
+import threading
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -98,3 +101,43 @@ class LiveHistory:
         if title is not None:
             title = arguments.text("title", title, c.MAX_NAME_LENGTH)
         return HistoryReader(self._address, self._tls).fork(clock, title)
+
+
+class LiveLesson(ABC):
+    """The part of ``LiveTerrain`` that knows how the lesson stands."""
+
+    _changed: threading.Condition
+    _lesson: c.Lesson
+    _notices: list[str]
+
+    @property
+    def lesson(self) -> c.Lesson:
+        """How the lesson stands: whether hands are off, whether we draw, who was sent out."""
+        with self._changed:
+            return self._lesson
+
+    @property
+    def notices(self) -> tuple[str, ...]:
+        """What the server said to us about the lesson, the last thing last."""
+        with self._changed:
+            return tuple(self._notices)
+
+    def conduct(self, **switches: object) -> None:
+        """Switches ``hands_off``, ``protect``, ``hide``, ``animals``, ``look`` or ``held``. The others stay.
+
+        Whoever does not lead gets a notice. Raises ValueError for what is no switch, RuntimeError while nobody is
+        connected.
+        """
+        self._say(arguments.model(c.Conduct, switches))
+
+    def about(self, action: c.PersonAction, *people: str) -> None:
+        """Does something about people, by their ids (``members`` has them as ``person``): ``pen``, ``no_pen``,
+        ``conductor``, ``no_conductor``, ``remove``, ``let_in`` or ``undo``.
+
+        Raises ValueError, and RuntimeError while nobody is connected.
+        """
+        self._say(arguments.model(c.People, {"action": action, "people": tuple(people)}))
+
+    @abstractmethod
+    def _say(self, message: c.Conduct | c.People) -> None:
+        """Sends a message. Raises RuntimeError while nobody is connected."""

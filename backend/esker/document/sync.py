@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 from esker import contract as c
 from esker.contract import Op
+from esker.document.changes import changes
 from esker.document.ops import Refusal, StrokeSet
 from esker.document.undo import UndoPlan, UndoStack
 
@@ -143,9 +144,10 @@ class SyncDoc:
                 confirmed, _ = confirmed.apply(ordered.op)
             except Refusal as refusal:
                 raise Diverged(f"op {ordered.clock} does not apply: {refusal.message}") from refusal
-            if ordered.author == self.client and not ordered.id.startswith(f"{self.client}:"):
-                # What the server did in my name, as the end of an import, is mine to undo.
-                self.stack.record(before, ordered.op, confirmed)
+            agent = ordered.id.partition(":")[0]
+            if ordered.author == self.client != agent and not changes(ordered.op, before, confirmed).empty:
+                # What the server did in my name, as the end of an import, is mine to undo: under one id one step.
+                self.stack.record(before, ordered.op, confirmed, agent)
         self._confirmed = confirmed
         self._drop([ordered.id for ordered in ops])
         self._rebuild()

@@ -4,11 +4,12 @@ import type { ReadonlySignal, Signal } from "@preact/signals-core";
 import type { SyncDoc } from "../doc/sync.ts";
 import type { Member, MemberPresence, Op, Progress, Role, StrokeFields, TerrainFields } from "../generated/contract.ts";
 import type { Connection } from "../net/connection.ts";
-import type { Deletion } from "./deletion.ts";
 import type { Identity, Store } from "./device/storage.ts";
 import type { History } from "./history/history.ts";
 import type { HistoryView } from "./history/history-view.ts";
 import type { TimeLapse } from "./history/timelapse.ts";
+import type { LessonView } from "./lesson/lesson-view.ts";
+import type { Deletion } from "./server/deletion.ts";
 import type { Status } from "./status.ts";
 import type { ToastList } from "./toasts.ts";
 import type { People } from "./view/scene.ts";
@@ -32,6 +33,7 @@ export interface OpenTerrain {
   readonly timeLapse: TimeLapse;
   readonly history: History;
   readonly deletion: Deletion;
+  readonly lesson: LessonView;
   /** Clock of the present, also while the past is shown. */
   readonly newest: ReadonlySignal<number>;
   readonly role: ReadonlySignal<Role | null>;

@@ -30,7 +30,6 @@ import {
   TICK_MS,
 } from "../generated/contract.ts";
 import { Connection } from "../net/connection.ts";
-import { Deletion } from "./deletion.ts";
 import { friendlyName } from "./device/names.ts";
 import { keepRenewing, renewing } from "./device/share-links.ts";
 import {
@@ -46,8 +45,10 @@ import { GoneStrokes, strokeOf } from "./history/gone.ts";
 import { History } from "./history/history.ts";
 import { HistoryView } from "./history/history-view.ts";
 import { TimeLapse } from "./history/timelapse.ts";
+import { HANDS_OFF, LessonView } from "./lesson/lesson-view.ts";
 import type { OpenTerrain, ServerInfo } from "./open-terrain.ts";
 import { api } from "./server/api.ts";
+import { Deletion } from "./server/deletion.ts";
 import { terrainPath } from "./server/links.ts";
 import { type Status, status } from "./status.ts";
 import { Throttle } from "./throttle.ts";
@@ -70,6 +71,7 @@ export class TerrainSession implements OpenTerrain {
   readonly timeLapse = new TimeLapse(this);
   readonly history: History;
   readonly deletion: Deletion;
+  readonly lesson: LessonView;
   /** Clock of the present, also while the past is shown. */
   readonly newest = signal(0);
   readonly role = signal<Role | null>(null);
@@ -119,7 +121,10 @@ export class TerrainSession implements OpenTerrain {
       onMessage: (message) => this.#receive(message),
       onFrame: (frame) => this.#frame(frame),
     });
-    this.canEdit = computed(() => this.mayEdit.value && !this.historyView.active.value);
+    this.lesson = new LessonView(this, () => this.stage.peek()?.input.lift());
+    this.canEdit = computed(
+      () => this.mayEdit.value && !this.historyView.active.value && this.lesson.state.value.draws,
+    );
     this.status = computed(() =>
       status({
         connection: this.connection.state.value,
@@ -146,7 +151,8 @@ export class TerrainSession implements OpenTerrain {
       return false;
     }
     if (!this.canEdit.value) {
-      this.toasts.show("This link lets you look, not draw. Ask for an edit link to change the terrain.", "warn");
+      if (this.mayEdit.value) this.toasts.show(HANDS_OFF, "warn");
+      else this.toasts.show("This link lets you look, not draw. Ask for an edit link to change the terrain.", "warn");
       return false;
     }
     const refusal = this.doc.submit(op, gesture);
@@ -156,6 +162,7 @@ export class TerrainSession implements OpenTerrain {
 
   /** Says why; where the stroke was deleted, by whom, with the way back. */
   refused(refusal: { readonly code: string; readonly message: string }, op: Op | undefined): void {
+    if (refusal.code === "hands_off" && !this.lesson.state.peek().draws) return; // the bar says so, and keeps the line
     const stroke = strokeOf(op);
     if (refusal.code !== "deleted_stroke" || stroke === null) {
       this.toasts.show(refusal.message, "warn");
@@ -223,6 +230,7 @@ export class TerrainSession implements OpenTerrain {
     this.toasts.dispose();
     this.timeLapse.pause();
     this.historyView.dispose();
+    this.lesson.dispose();
     this.history.stop();
     this.connection.close();
     this.stage.value?.dispose();
@@ -261,6 +269,7 @@ export class TerrainSession implements OpenTerrain {
       secret: this.secret,
       client: this.client,
       token: this.#token,
+      ticket: this.lesson.ticket,
       name: this.me.value.name,
       colour: this.me.value.colour,
       clock: this.doc.clock,
@@ -344,6 +353,12 @@ export class TerrainSession implements OpenTerrain {
       case "class":
         this.inClass.value = message;
         break;
+      case "lesson":
+        this.lesson.receive(message);
+        break;
+      case "notice":
+        this.toasts.show(message.text);
+        break;
       case "pong":
         break;
     }
@@ -361,6 +376,7 @@ export class TerrainSession implements OpenTerrain {
   }
 
   #error(message: ErrorMessage): void {
+    this.lesson.keepTicket(message.ticket);
     if (!message.fatal) this.toasts.show(message.message, "warn");
     // A dead link must not stand among the recent terrains, nor keep a living one from taking its place.
     else if (["bad_secret", "revoked"].includes(message.code)) {
@@ -378,6 +394,8 @@ export class TerrainSession implements OpenTerrain {
   #welcome(message: Welcome): void {
     this.doc.welcome(message);
     this.#token = message.token;
+    this.lesson.keepTicket(message.ticket);
+    if (message.lesson) this.lesson.receive(message.lesson);
     this.role.value = message.role;
     this.server.value = { version: message.server, device: message.device, levels: message.levels };
     this.#setMembers(message.members);

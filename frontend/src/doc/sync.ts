@@ -19,10 +19,11 @@ import {
   type OpsBroadcast,
   type Reject,
   type RejectCode,
+  type Stroke,
   type Welcome,
 } from "../generated/contract.ts";
 import { apply, type Doc, Refusal } from "./apply.ts";
-import { subjectOf } from "./changes.ts";
+import { changes, isEmpty, subjectOf } from "./changes.ts";
 import { fromDocument } from "./document.ts";
 import { mergeOps } from "./merge.ts";
 import { type UndoPlan, UndoStack } from "./undo.ts";
@@ -143,6 +144,12 @@ export class SyncDoc {
     });
     this.#publishCounts();
     return refusal;
+  }
+
+  /** Strokes as I see them, of which changes of mine are not in the server's journal yet. */
+  unconfirmed(): Stroke[] {
+    const ids = new Set(this.#entries.filter((e) => !e.acked).flatMap((e) => strokesOf(e.op)));
+    return [...ids].flatMap((id) => this.#present?.strokes.get(id) ?? []);
   }
 
   /** Takes back my last step, as far as nobody else has changed the same fields since. */
@@ -321,7 +328,9 @@ export class SyncDoc {
       try {
         this.#confirmed = apply(before, next.op);
         // An op that the server made in my name, at the end of an import, is mine to undo.
-        if (!own && next.author === this.#client) this.#undo.record(before, next.op, this.#confirmed);
+        const agent = next.id.split(":")[0]!;
+        if (!own && next.author === this.#client && !isEmpty(changes(next.op, before, this.#confirmed)))
+          this.#undo.record(before, next.op, this.#confirmed, agent);
       } catch (error) {
         if (!(error instanceof Refusal)) throw error;
         this.#diverged();

@@ -181,6 +181,17 @@ export class InputController {
     return holds && this.placing.value === null && this.ruler.kind.value === null ? this.selection.value : null;
   });
 
+  /** Ends what a pointer does as if it were lifted: a stroke is finished as it is. */
+  lift(): void {
+    const main = this.#main;
+    if (main === null) return;
+    const { kind } = main.activity;
+    if (kind === "draw") this.#strokes.finish();
+    else if (kind === "redraw") this.#oversketch.finish();
+    else if (kind === "drag") this.#handleSet.finish();
+    this.#endMain();
+  }
+
   /** Ends everything under way and all listening. */
   dispose(): void {
     this.#cancel();

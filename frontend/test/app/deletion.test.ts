@@ -1,6 +1,6 @@
 import { afterEach, describe, expect, it, vi } from "vitest";
-import { Deletion, untilDay } from "../../src/app/deletion.ts";
 import { ApiError } from "../../src/app/server/api.ts";
+import { Deletion, untilDay } from "../../src/app/server/deletion.ts";
 
 function answers(status: number, body: unknown): ReturnType<typeof vi.fn> {
   const fetched = vi.fn(async () => new Response(JSON.stringify(body), { status }));

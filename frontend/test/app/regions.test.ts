@@ -1,7 +1,7 @@
 // @vitest-environment happy-dom
 // The keys go from part to part (SPEC U34).
 import { afterEach, describe, expect, it } from "vitest";
-import { deepFocus, firstFocusable, nextRegion } from "../../src/app/regions.ts";
+import { deepFocus, firstFocusable, nextRegion } from "../../src/app/view/regions.ts";
 
 function page(html: string): ShadowRoot {
   const host = document.createElement("div");

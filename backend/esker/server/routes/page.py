@@ -57,6 +57,10 @@ def add_page(app: FastAPI, hub: Hub, page: Path, data: Path, pictures: Pictures)
     async def landing() -> Response:
         return index()
 
+    @app.api_route("/privacy", methods=["GET", "HEAD"], include_in_schema=False)
+    async def privacy() -> Response:
+        return index()
+
     @app.api_route("/server", methods=["GET", "HEAD"], include_in_schema=False)
     async def keeper() -> Response:
         return index()

@@ -3,6 +3,7 @@ export type Route =
   | { readonly page: "landing" }
   | { readonly page: "terrain"; readonly id: string; readonly secret: string }
   | { readonly page: "server"; readonly key: string }
+  | { readonly page: "privacy" }
   | { readonly page: "missing"; readonly path: string };
 
 const TERRAIN = /^\/t\/([A-Za-z0-9_-]{1,40})\/?$/;
@@ -13,6 +14,7 @@ export function route(url: URL): Route {
   const match = TERRAIN.exec(url.pathname);
   if (match?.[1]) return { page: "terrain", id: match[1], secret: decode(url.hash.slice(1)) };
   if (/^\/server\/?$/.test(url.pathname)) return { page: "server", key: decode(url.hash.slice(1)) };
+  if (/^\/privacy\/?$/.test(url.pathname)) return { page: "privacy" };
   return { page: "missing", path: url.pathname };
 }
 

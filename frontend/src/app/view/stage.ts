@@ -31,7 +31,6 @@ import { QualityChoice, TAU_PX } from "../device/quality-choice.ts";
 import { largeLetters, ViewChoices } from "../device/view-choices.ts";
 import { Groundwork } from "../layers/groundwork.ts";
 import type { OpenTerrain } from "../open-terrain.ts";
-import { deepFocus } from "../regions.ts";
 import { gridTransport } from "../server/grid-transport.ts";
 import { coveredEdges } from "./covered.ts";
 import { FrameLoop } from "./frame-loop.ts";
@@ -40,6 +39,7 @@ import { Graphics } from "./graphics.ts";
 import { Instruments } from "./instruments/instruments.ts";
 import { landOf } from "./land.ts";
 import { QuietStrokes } from "./quiet-strokes.ts";
+import { deepFocus } from "./regions.ts";
 import { cursorVisuals, strokeVisuals } from "./scene.ts";
 
 export interface StageOptions {
@@ -249,6 +249,7 @@ export class Stage {
 
   /** Follows a person's view until I move the camera myself; the same person again stops it. */
   follow(client: string | null): void {
+    if (this.session.lesson.leader.peek() !== null) return;
     this.following.value = this.following.value === client ? null : client;
     if (this.following.value) this.#goToView(this.session.presences.value.get(this.following.value), 700);
   }
@@ -310,7 +311,14 @@ export class Stage {
   #watch(): void {
     const { session, input } = this;
     const stopFollowing = (): void => {
-      this.following.value = null;
+      session.lesson.lookAway(true);
+      if (session.lesson.leader.peek() === null) this.following.value = null;
+    };
+    // Where nobody may look away, a view that a hand has moved springs back.
+    const springBack = (): void => {
+      const leader = session.lesson.leader.peek();
+      if (leader !== null && session.lesson.state.peek().held)
+        this.#goToView(session.presences.peek().get(leader), 180);
     };
     // Drawing prevents the default of the pointer, so a field that had the keys would keep them.
     const takeKeys = (): void => {
@@ -323,6 +331,19 @@ export class Stage {
       this.#viewport.addEventListener(type, stopFollowing, { passive: true });
       this.#stops.push(() => this.#viewport.removeEventListener(type, stopFollowing));
     }
+    for (const type of ["pointerup", "wheel", "keyup"] as const) {
+      window.addEventListener(type, springBack, { passive: true });
+      this.#stops.push(() => window.removeEventListener(type, springBack));
+    }
+    this.#stops.push(
+      effect(() => {
+        const leader = session.lesson.leader.value;
+        if (leader !== null) {
+          this.following.value = leader;
+          this.#goToView(session.presences.peek().get(leader), 700);
+        } else if (this.following.peek() !== null) this.following.value = null;
+      }),
+    );
     this.#stops.push(
       effect(() => {
         this.camera.state.value;

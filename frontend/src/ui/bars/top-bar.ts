@@ -7,7 +7,7 @@ import { chooseTheme, type ThemeChoice, themeChoice } from "../../app/device/the
 import type { Status } from "../../app/status.ts";
 import { type KeyedAction, keyText } from "../../app/words/keys.ts";
 import type { Doc } from "../../doc/document.ts";
-import type { Role } from "../../generated/contract.ts";
+import type { Lesson, Role } from "../../generated/contract.ts";
 import { icon } from "../controls/icons.ts";
 import { SignalElement } from "../controls/signal-element.ts";
 import { blurOnEnter } from "../panels/stroke-panel.ts";
@@ -25,7 +25,8 @@ export type PageCommand =
   | "delete"
   | "add-ground"
   | "layers"
-  | "history";
+  | "history"
+  | "lesson";
 
 const THEMES: readonly { readonly value: ThemeChoice; readonly label: string }[] = [
   { value: "system", label: "Colours like the system" },
@@ -40,6 +41,7 @@ export class EskTopBar extends SignalElement {
     status: { attribute: false },
     canEdit: { attribute: false },
     myRole: { attribute: false },
+    lesson: { attribute: false },
     actions: { attribute: false },
     panelOpen: { type: Boolean },
   };
@@ -186,6 +188,7 @@ export class EskTopBar extends SignalElement {
   declare status: ReadonlySignal<Status>;
   declare canEdit: ReadonlySignal<boolean>;
   declare myRole: ReadonlySignal<Role | null>;
+  declare lesson: ReadonlySignal<Lesson>;
   declare actions: ReadonlyMap<string, KeyedAction>;
   declare panelOpen: boolean;
 
@@ -257,6 +260,7 @@ export class EskTopBar extends SignalElement {
         <wa-dropdown-item value="add-ground" ?disabled=${!this.canEdit.value}>Add real ground…</wa-dropdown-item>
         <wa-dropdown-item value="layers">Layers of real ground</wa-dropdown-item>
         <wa-dropdown-item value="history">History</wa-dropdown-item>
+        ${this.lesson.value.conducts ? html`<wa-dropdown-item value="lesson">Lead the lesson</wa-dropdown-item>` : nothing}
         <wa-dropdown-item value="export">Export for other programs…</wa-dropdown-item>
         <wa-dropdown-item value="download">Download a copy (.esker)</wa-dropdown-item>
         <wa-dropdown-item value="help">Keys and help</wa-dropdown-item>

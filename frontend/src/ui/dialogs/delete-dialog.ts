@@ -1,8 +1,8 @@
 import "@awesome.me/webawesome/dist/components/dialog/dialog.js";
 import { html, nothing, type TemplateResult } from "lit";
-import { untilDay } from "../../app/deletion.ts";
 import type { OpenTerrain } from "../../app/open-terrain.ts";
 import { ApiError } from "../../app/server/api.ts";
+import { untilDay } from "../../app/server/deletion.ts";
 
 /** The terrain that the question before a deletion names, and the function that deletes it. */
 type Deletable = Pick<OpenTerrain, "doc" | "members" | "deletion" | "toasts">;

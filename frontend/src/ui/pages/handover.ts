@@ -11,6 +11,7 @@ import type { QualityMode, Scene } from "../../core/types.ts";
 import type { PageCommand } from "../bars/top-bar.ts";
 import "../bars/people.ts";
 import "../bars/history-view-bar.ts";
+import "../bars/lesson-bar.ts";
 import "../bars/status-line.ts";
 import "../bars/tool-rail.ts";
 import "../bars/top-bar.ts";
@@ -24,12 +25,13 @@ import "../dialogs/share-dialog.ts";
 import "../panels/history-panel.ts";
 import "../panels/layers-panel.ts";
 import "../panels/legend.ts";
+import "../panels/lesson-panel.ts";
 import "../panels/measuring/measure-panel.ts";
 import "../panels/overlay.ts";
 import "../panels/stroke-panel.ts";
 import "../panels/terrain-panel.ts";
 
-export type PanelTab = "stroke" | "ground" | "terrain" | "history";
+export type PanelTab = "stroke" | "ground" | "terrain" | "history" | "lesson";
 export type DialogId = "share" | "profile" | "help" | "about" | "export" | "delete";
 
 /** Handles, cursors and the brush, over the picture. */
@@ -63,6 +65,7 @@ export function topBar(stage: Stage, panelOpen: boolean, command: (command: Page
     .doc=${session.doc.doc}
     .status=${session.status}
     .canEdit=${session.canEdit}
+    .lesson=${session.lesson.state}
     .myRole=${session.role}
     .actions=${input.actions}
     .panelOpen=${panelOpen}
@@ -175,6 +178,10 @@ export function historyViewBar({ session }: Stage, beside: boolean): TemplateRes
   ></esk-history-view-bar>`;
 }
 
+export function lessonBar({ session }: Stage): TemplateResult {
+  return html`<esk-lesson-bar .lesson=${session.lesson} .mayEdit=${session.mayEdit} .client=${session.client}></esk-lesson-bar>`;
+}
+
 /** One tab of the inspector. */
 export function inspector(stage: Stage, tab: PanelTab, browse: () => void): TemplateResult {
   const { session, input, sizeM } = stage;
@@ -200,6 +207,13 @@ export function inspector(stage: Stage, tab: PanelTab, browse: () => void): Temp
       .members=${session.members}
       .client=${session.client}
     ></esk-history-panel>`;
+  if (tab === "lesson")
+    return html`<esk-lesson-panel
+      .lesson=${session.lesson}
+      .members=${session.members}
+      .myRole=${session.role}
+      .client=${session.client}
+    ></esk-lesson-panel>`;
   if (tab === "terrain")
     return html`<esk-terrain-panel
       .doc=${doc}

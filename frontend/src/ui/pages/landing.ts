@@ -181,6 +181,7 @@ export class EskLanding extends LitElement {
       <footer>
         <span>A terrain is its strokes: nothing is ever baked.</span>
         <span>Everything stays on this server. No account, no tracking.</span>
+        <a href="/privacy">What is known of people</a>
         <a href="/licences.txt">Licences and sources</a>
       </footer>
     `;

@@ -12,10 +12,10 @@ import { memberName } from "../../app/device/names.ts";
 import { setFlag } from "../../app/device/storage.ts";
 import { importingWords } from "../../app/layers/others.ts";
 import { pageActions } from "../../app/page-actions.ts";
-import { deepFocus, nextRegion } from "../../app/regions.ts";
 import { TerrainSession } from "../../app/session.ts";
 import { installTestHook } from "../../app/test-hook.ts";
 import { Room } from "../../app/view/make-room.ts";
+import { deepFocus, nextRegion } from "../../app/view/regions.ts";
 import type { Stage } from "../../app/view/stage.ts";
 import { SignalElement } from "../controls/signal-element.ts";
 import { shared } from "../styles/shared.ts";
@@ -28,6 +28,7 @@ import {
   foot,
   historyViewBar,
   inspector,
+  lessonBar,
   measurePanel,
   overlay,
   type PanelTab,
@@ -41,6 +42,7 @@ const TABS = [
   { value: "terrain", label: "Terrain" },
   { value: "history", label: "History", title: "What everybody did, and the terrain as it was" },
 ];
+const LEADING = [...TABS, { value: "lesson", label: "Lesson", title: "Lead the lesson: hands off, look here, people" }];
 
 const WIDE = "(min-width: 1000px)";
 const NARROW = "(max-width: 720px)";
@@ -188,7 +190,7 @@ export class EskTerrain extends SignalElement {
     else if (command === "download") void this.#download();
     else if (command === "add-ground") this.#browse();
     else if (command === "layers") this.#toggle("ground");
-    else if (command === "history") this.#toggle("history");
+    else if (command === "history" || command === "lesson") this.#toggle(command);
     else this.#show(command);
   }
 
@@ -252,7 +254,7 @@ export class EskTerrain extends SignalElement {
       ${overlay(stage)} ${topBar(stage, this.#panel.value !== null, (command) => this.#command(command))}
       ${toolRail(stage)} ${foot(stage)}
       ${this.#hint(stage)} ${this.#keyPen(stage)} ${this.#following(stage)} ${this.#closedBar(stage)} ${this.#offline(stage)} ${this.#graphics(stage)} ${this.#notice(stage)}
-      ${this.#importing(stage)}
+      ${this.#importing(stage)} ${lessonBar(stage)}
       <esk-placing-bar
         .placing=${stage.input.placing}
         ?beside=${this.#panel.value === "ground"}
@@ -280,11 +282,11 @@ export class EskTerrain extends SignalElement {
 
   #side(stage: Stage, tab: PanelTab): TemplateResult {
     return html`
-      <aside class="side panel" aria-label="Inspector">
+      <aside class="side panel ${stage.session.lesson.state.value.conducts ? "leads" : ""}" aria-label="Inspector">
         <header>
           <esk-segmented
             label="Inspector"
-            .segments=${TABS}
+            .segments=${stage.session.lesson.state.value.conducts ? LEADING : TABS}
             .value=${tab}
             @pick=${(e: CustomEvent<PanelTab>) => {
               this.#openedBySelection = false;
@@ -349,7 +351,7 @@ export class EskTerrain extends SignalElement {
 
   #following(stage: Stage): TemplateResult | typeof nothing {
     const leader = stage.session.members.value.find((m) => m.client === stage.following.value);
-    if (!leader) return nothing;
+    if (!leader || stage.session.lesson.leader.value !== null) return nothing;
     return html`<div class="hint panel" style="border-color:${leader.colour}">
       ${icon("eye")}<span>Following ${memberName(leader)}. Move the view to stop.</span>
     </div>`;

@@ -72,6 +72,13 @@ export const terrainPageStyles = css`
     flex: 1;
     min-width: 0;
   }
+  /* Five tabs and the cross. */
+  .side.leads {
+    width: 356px;
+  }
+  .side.leads header esk-segmented {
+    --segment-pad: 3px;
+  }
   .scroll {
     overflow-y: auto;
     padding: 6px 16px 18px;
@@ -147,6 +154,14 @@ export const terrainPageStyles = css`
     font-size: 0.8125rem;
     font-variant-numeric: tabular-nums;
     pointer-events: none;
+  }
+  esk-lesson-bar {
+    position: absolute;
+    left: 50%;
+    top: 70px;
+    width: max-content;
+    max-width: calc(100% - 2 * var(--edge));
+    transform: translateX(-50%);
   }
   .importing .icon {
     color: var(--esk-accent-text);
@@ -224,6 +239,7 @@ export const terrainPageStyles = css`
     :host([drawer]) .hint,
     :host([drawer]) .closed,
     :host([drawer]) .importing,
+    :host([drawer]) esk-lesson-bar,
     :host([drawer]) esk-toasts {
       left: calc((100% - 340px) / 2);
       max-width: calc(100% - 340px - 2 * var(--edge));
@@ -260,7 +276,8 @@ export const terrainPageStyles = css`
       gap: 6px;
       bottom: calc(var(--edge) + 62px + env(safe-area-inset-bottom));
     }
-    .side {
+    .side,
+    .side.leads {
       top: auto;
       left: 0;
       right: 0;
@@ -310,7 +327,8 @@ export const terrainPageStyles = css`
       .side header esk-segmented {
         --segment-pad: 3px;
       }
-      .side {
+      .side,
+      .side.leads {
         top: calc(var(--edge) + 52px);
         left: auto;
         width: var(--beside);

@@ -1,5 +1,5 @@
 import { type ReadonlySignal, signal } from "@preact/signals-core";
-import { ApiError, api } from "./server/api.ts";
+import { ApiError, api } from "./api.ts";
 
 /** A terrain that was deleted: until when it can be brought back (seconds since 1970), and whether by this link. */
 export interface Deleted {
