@@ -33,9 +33,9 @@ def authors(visitor: Visitor) -> list[str]:
     return [str(s["author"]) for s in visitor.js("() => window.esker.strokes()")]
 
 
-def pupil(visitors: Visitors, name: str, path: str, **options: int) -> Visitor:
+def pupil(visitors: Visitors, name: str, path: str, width: int = 720, height: int = 540) -> Visitor:
     """Somebody who calls themself so."""
-    made = visitors(seen=True, **options)
+    made = visitors(width, height, seen=True)
     made.context.add_init_script(f"localStorage.setItem('esker.name', {json.dumps(name)})")
     made.open(path)
     return made
