@@ -64,7 +64,7 @@ def test_a_channel_follows_its_parents_without_doubling() -> None:
     assert np.unique(found.samples).tolist() == [48]
 
 
-@pytest.mark.parametrize(("channel", "base"), [(Channel.ROUGHNESS, 0.5), (Channel.WETNESS, 0.0)])
+@pytest.mark.parametrize(("channel", "base"), [(Channel.ROUGHNESS, 0.5), (Channel.WETNESS, 0.0), (Channel.FAR, 1.0)])
 def test_a_channel_that_nobody_speaks_of_is_not_sent(channel: Channel, base: float) -> None:
     """SPEC T36: until somebody does; then once more when it is back at its base."""
     server = TileServer(SIZE_M, 4)

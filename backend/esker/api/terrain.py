@@ -90,7 +90,8 @@ class Terrain(TerrainLayers, TerrainWater):
         else:
             reach = arguments.number("reach_m", reach_m)
         self.id = secrets.token_hex(6)
-        fields = {"size_m": size, "edition": contract.CURRENT_EDITION, "border": border, "reach_m": reach}
+        born = {"erosion": contract.BORN_EROSION, "hold": contract.BORN_HOLD}
+        fields = {"size_m": size, "edition": contract.CURRENT_EDITION, "border": border, "reach_m": reach, **born}
         self._settings = arguments.model(TerrainSettings, fields)
         self._strokes: dict[str, contract.Stroke] = {}
         self._solver = arguments.kind("solver", solver, Solver)

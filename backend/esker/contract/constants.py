@@ -102,6 +102,10 @@ MAX_DETAIL: Final = 4.0
 """Strength of the natural detail: 0 takes it away, 1 is the rule's own."""
 DEFAULT_EROSION: Final = 0.0
 """Strength of the gullies of documents that do not say: those of before there were any keep their ground."""
+BORN_EROSION: Final = 1.0
+BORN_HOLD: Final = 0.9
+"""Strength of the gullies of new terrains, and how strictly their crests keep their height: a little less than wholly
+looks less ruled."""
 MAX_EROSION: Final = 2.0
 MIN_EROSION_SCALE: Final = 7.0
 DEFAULT_EROSION_SCALE: Final = 10.0

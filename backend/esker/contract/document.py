@@ -10,7 +10,10 @@ from esker.contract.constants import (
     CURRENT_EDITION,
     DEFAULT_COURSE_GRADE,
     DEFAULT_DETAIL,
+    DEFAULT_EROSION,
+    DEFAULT_EROSION_SCALE,
     DEFAULT_EXTENT_FRACTION,
+    DEFAULT_HOLD,
     DEFAULT_REACH_FRACTION,
     DEFAULT_SIZE_M,
     DEFAULT_SLOPE_DEG,
@@ -18,6 +21,8 @@ from esker.contract.constants import (
     EDGE_POINTS,
     MAX_COURSE_POINTS,
     MAX_DETAIL,
+    MAX_EROSION,
+    MAX_EROSION_SCALE,
     MAX_GRID_SAMPLES,
     MAX_GRID_SPACING_M,
     MAX_POINTS_PER_STROKE,
@@ -27,6 +32,7 @@ from esker.contract.constants import (
     MAX_VERTICAL_SCALE,
     MAX_WETNESS,
     MIN_COURSE_GRADE,
+    MIN_EROSION_SCALE,
     MIN_GRID_SIDE,
     MIN_GRID_SPACING_M,
     MIN_REACH_M,
@@ -233,6 +239,8 @@ class Place(Wire):
     lon_deg: Annotated[float, Field(ge=-180, le=180, allow_inf_nan=False)]
 
 
+Erosion = Annotated[float, Field(ge=0, le=MAX_EROSION, allow_inf_nan=False)]
+ErosionScale = Annotated[float, Field(ge=MIN_EROSION_SCALE, le=MAX_EROSION_SCALE, allow_inf_nan=False)]
 Reach = Annotated[float, Field(ge=MIN_REACH_M, le=ABSOLUTE_BOUND_M, allow_inf_nan=False)]
 Rivers = Annotated[float, Field(ge=0, le=MAX_RIVERS, allow_inf_nan=False)]
 Wetness = Annotated[float, Field(ge=MIN_WETNESS, le=MAX_WETNESS, allow_inf_nan=False)]
@@ -243,7 +251,9 @@ class TerrainSettings(Wire):
 
     ``lakes_m``: basins of the ground that are deeper than this hold a lake, None: none does (docs/renderer.md).
     ``rivers``: how many there are, 0: none; ``wetness``: how many times as much water they carry (docs/water.md).
-    ``detail`` and ``rule`` are of the synthesis (DESIGN 10): no solved height depends on them. ``edition``: see
+    ``detail``, ``rule``, ``erosion`` (strength of gullies), ``erosion_scale`` (their wavelength in cells of a level)
+    and ``hold`` (how strictly what strokes fix keeps its height) are of the synthesis (DESIGN 10): no solved height
+    depends on them. ``edition``: see
     CURRENT_EDITION; documents that do not say have the first.
     """
 
@@ -260,6 +270,9 @@ class TerrainSettings(Wire):
     look: Look = "natural"
     detail: Annotated[float, Field(ge=0, le=MAX_DETAIL, allow_inf_nan=False)] = DEFAULT_DETAIL
     rule: Rule = "landscape"
+    erosion: Erosion = DEFAULT_EROSION
+    erosion_scale: ErosionScale = DEFAULT_EROSION_SCALE
+    hold: Unit = DEFAULT_HOLD
     sun_azimuth_deg: Annotated[float, Field(ge=0, le=360)] = 115.0
     sun_elevation_deg: Annotated[float, Field(ge=0, le=90)] = 24.0
     place: Place | None = None
@@ -279,6 +292,9 @@ class TerrainFields(Wire):
     look: Look | None = None
     detail: Annotated[float, Field(ge=0, le=MAX_DETAIL, allow_inf_nan=False)] | None = None
     rule: Rule | None = None
+    erosion: Erosion | None = None
+    erosion_scale: ErosionScale | None = None
+    hold: Unit | None = None
     sun_azimuth_deg: Annotated[float, Field(ge=0, le=360)] | None = None
     sun_elevation_deg: Annotated[float, Field(ge=0, le=90)] | None = None
     place: Place | None = None

@@ -45,7 +45,7 @@ Clock = Annotated[int, Field(ge=0, le=2**53)]
 
 StrokeKind = Literal["profile", "level", "paint", "course"]
 CourseUse = Literal["river", "road", "ridge"]
-PaintChannel = Literal["roughness", "amplitude", "snow", "grass", "forest", "wetness"]
+PaintChannel = Literal["roughness", "amplitude", "snow", "grass", "forest", "wetness", "erosion"]
 FlankShape = Literal["straight", "concave", "convex"]
 Border = Literal["free", "pinned"]
 Look = Literal["natural", "alpine", "desert", "paper"]

@@ -1,4 +1,4 @@
-"""How a terrain is born: empty, by the newest edition of the rules that ground follows from, with rivers."""
+"""How a terrain is born: empty, by the newest edition of the rules that ground follows from, with rivers and gullies."""
 
 from __future__ import annotations
 
@@ -13,4 +13,5 @@ def new_document(size_m: float = c.DEFAULT_SIZE_M) -> c.Document:
     """
     reach_m = size_m * c.DEFAULT_REACH_FRACTION
     born = {"size_m": size_m, "edition": c.CURRENT_EDITION, "reach_m": reach_m, "rivers": c.DEFAULT_RIVERS}
-    return c.Document(id="new", settings=c.TerrainSettings.model_validate(born))
+    worn = {"erosion": c.BORN_EROSION, "hold": c.BORN_HOLD}
+    return c.Document(id="new", settings=c.TerrainSettings.model_validate(born | worn))

@@ -356,3 +356,5 @@ class _Editor:
             size = self.settings.size_m
             self.dirty = Rect(0, 0, size, size).union(self.dirty)
             self.painted = True
+        if "erosion" in update:  # distances from strokes are there for gullies alone
+            self.said = self.painted = True

@@ -42,7 +42,7 @@ from esker.solve.reference import NumpySystem
 TOLERANCES = {
     Channel.AMPLITUDE: 0.25 / AMPLITUDE_QUANTA_PER_M,
     Channel.ROUGHNESS: 0.25 / ROUGHNESS_QUANTA,
-} | dict.fromkeys((Channel.SNOW, Channel.GRASS, Channel.FOREST, Channel.WETNESS), 0.25 / BIAS_QUANTA)
+} | dict.fromkeys((Channel.SNOW, Channel.GRASS, Channel.FOREST, Channel.WETNESS, Channel.EROSION), 0.25 / BIAS_QUANTA)
 """Error at which a channel is at rest: a quarter of a quantum."""
 
 Values = NDArray[np.float32]

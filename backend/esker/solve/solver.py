@@ -28,6 +28,7 @@ from esker.solve.channels import ChannelSolver, channel_level
 from esker.solve.constraints.channel_targets import BASES, Contributors, Layer, contributors
 from esker.solve.constraints.computable import computable
 from esker.solve.constraints.constraints import Shapes
+from esker.solve.far import FarField
 from esker.solve.opencl import proof
 from esker.solve.opencl.device import NUMPY, NUMPY_NAME, Device, open_device
 from esker.solve.opencl.faults import OutOfDeviceMemoryError, guarded
@@ -90,6 +91,7 @@ class Solver:
         self._refinery: Refinery | None = None
         self._shapes = Shapes()
         self._channel_solvers: dict[int, ChannelSolver] = {}
+        self._far_fields: dict[int, FarField] = {}
         self._device: Device | None = None
         self._pool = WorkspacePool(self._shapes)
         self._device = open_device(device, threads, self._check)
@@ -278,6 +280,7 @@ class Solver:
             asked = contributors(job.strokes, job.settings)
             if is_blank(job.strokes) and warm is None:
                 yield from self._channels(asked, job, top, BASES)
+                yield from self._far(job, top)
                 yield from blank.settled(job, top, basis)
                 return
             work = partial(self._shown, job=job, warm=warm, basis=basis, coarsest=coarsest, asked=asked)
@@ -296,11 +299,14 @@ class Solver:
         top = workspace.top
         late = [layer.channel for layer in asked if not layer.painted]
         early = [channel for channel in BASES if channel not in late]
+        quick = self._far_field(top).is_quick(job.strokes, job.settings)
         early_made = warm is None and workspace.preview_workspace is not None
         if early_made:
             if coarsest:
                 yield from passes.coarsest_preview(workspace, job)
             yield from self._channels(asked, job, top, early)
+            if quick:
+                yield from self._far(job, top)
         edited = early_made and _edited(workspace, job)
         yield from pauses(workspace.loading(*job))
         workspace.solved_for = None
@@ -317,6 +323,8 @@ class Solver:
         workspace.solved_for = passes.conditions(job)
         yield from pauses(passes.to_rest(workspace, job.settings))
         yield from self._channels(asked, job, top, late)
+        if not (early_made and quick):
+            yield from self._far(job, top)
         yield from passes.settled(workspace, job, basis)
 
     def _quietly(self, job: Job, top: int) -> Iterator[SolveEvent]:
@@ -354,6 +362,7 @@ class Solver:
     def _alone(self, job: Job, top: int) -> Iterator[SolveEvent]:
         with guarded(self._device):
             yield from self._channels(contributors(job.strokes, job.settings), job, top, BASES)
+            yield from self._far(job, top)
             yield Done()
 
     def _channels(
@@ -370,6 +379,24 @@ class Solver:
             for coarser, samples in enumerate(levels):
                 yield ChannelLevel(coarser, samples, channel)
             yield PAUSE
+
+    def _far_field(self, top: int) -> FarField:
+        level = channel_level(top)
+        return self._far_fields.setdefault(level, FarField(level))
+
+    def _far(self, job: Job, top: int) -> Iterator[SolveEvent]:
+        """Distances from what strokes fix, final, levels coarse to fine."""
+        work = self._far_field(top).making(job.strokes, job.settings)
+        while True:
+            try:
+                next(work)
+            except StopIteration as end:
+                levels: Sequence[NDArray[np.float32]] = end.value
+                break
+            yield PAUSE
+        for level, samples in enumerate(levels):
+            yield ChannelLevel(level, samples, Channel.FAR)
+        yield PAUSE
 
 
 def _edited(workspace: Workspace, job: Job) -> bool:

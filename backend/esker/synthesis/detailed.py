@@ -124,6 +124,7 @@ def site_of(
         {name: _rounded(values, *QUANTA[name]) for name, values in channels.items() if name in Biases._fields},
         settings.detail, settings.rule, settings.look, settings.sea_level_m,
         lat_deg=None if settings.place is None else settings.place.lat_deg, ground_m=ground_m,
+        erosion=settings.erosion, erosion_scale=settings.erosion_scale, hold=settings.hold,
     )  # fmt: skip
 
 

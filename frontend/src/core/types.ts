@@ -182,7 +182,7 @@ export interface CursorVisual {
 export type QualityMode = "automatic" | "fast" | "balanced" | "fine";
 
 /** Overlays of what paint adds to a channel, or takes from it. */
-export type PaintedOverlay = "snow" | "forest" | "grass" | "wetness";
+export type PaintedOverlay = "snow" | "forest" | "grass" | "wetness" | "erosion";
 
 /** All that one frame shows. Built anew by the app each frame; renderers only read it. */
 export interface Scene {

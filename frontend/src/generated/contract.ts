@@ -104,6 +104,10 @@ export const MAX_DETAIL = 4.0 as const;
 
 export const DEFAULT_EROSION = 0.0 as const;
 
+export const BORN_EROSION = 1.0 as const;
+
+export const BORN_HOLD = 0.9 as const;
+
 export const MAX_EROSION = 2.0 as const;
 
 export const MIN_EROSION_SCALE = 7.0 as const;
@@ -649,7 +653,8 @@ export type PaintChannel =
   | "snow"
   | "grass"
   | "forest"
-  | "wetness";
+  | "wetness"
+  | "erosion";
 
 export type FlankShape =
   | "straight"
@@ -738,7 +743,7 @@ export interface Flank {
 }
 
 export interface Paint {
-  channel: "roughness" | "amplitude" | "snow" | "grass" | "forest" | "wetness";
+  channel: "roughness" | "amplitude" | "snow" | "grass" | "forest" | "wetness" | "erosion";
   value: number;
   radius_m: number;
 }
@@ -854,6 +859,9 @@ export interface TerrainSettings {
   look: "natural" | "alpine" | "desert" | "paper";
   detail: number;
   rule: "landscape" | "smooth" | "plain";
+  erosion: number;
+  erosion_scale: number;
+  hold: number;
   sun_azimuth_deg: number;
   sun_elevation_deg: number;
   place: Place | null;
@@ -871,6 +879,9 @@ export interface TerrainFields {
   look?: "natural" | "alpine" | "desert" | "paper" | null;
   detail?: number | null;
   rule?: "landscape" | "smooth" | "plain" | null;
+  erosion?: number | null;
+  erosion_scale?: number | null;
+  hold?: number | null;
   sun_azimuth_deg?: number | null;
   sun_elevation_deg?: number | null;
   place?: Place | null;

@@ -209,7 +209,7 @@ export const WIRE_MODELS: Readonly<Record<string, WireModel>> = {
   },
   Paint: {
     must: {
-      channel: { oneOf: ["roughness", "amplitude", "snow", "grass", "forest", "wetness"] },
+      channel: { oneOf: ["roughness", "amplitude", "snow", "grass", "forest", "wetness", "erosion"] },
       value: { number: [-1, 1] },
       radius_m: { number: [0, 655360] },
     },
@@ -359,6 +359,9 @@ export const WIRE_MODELS: Readonly<Record<string, WireModel>> = {
       look: { nullable: { oneOf: ["natural", "alpine", "desert", "paper"] } },
       detail: { nullable: { number: [0, 4] } },
       rule: { nullable: { oneOf: ["landscape", "smooth", "plain"] } },
+      erosion: { nullable: { number: [0, 2] } },
+      erosion_scale: { nullable: { number: [7, 14] } },
+      hold: { nullable: { number: [0, 1] } },
       sun_azimuth_deg: { nullable: { number: [0, 360] } },
       sun_elevation_deg: { nullable: { number: [0, 90] } },
       place: { nullable: { model: "Place" } },

@@ -28,6 +28,7 @@ const OVERLAYS = {
   forest: 6,
   grass: 6,
   wetness: 6,
+  erosion: 6,
 } as const;
 
 /** Facts that a frame is drawn with besides the scene. */

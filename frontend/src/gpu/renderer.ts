@@ -364,6 +364,7 @@ export class GpuRenderer implements SceneRenderer {
       sizeM: tiles.sizeM,
       seed: settings.seed,
       detail: settings.detail,
+      erosion: settings,
       rule: settings.rule,
       look: settings.look,
       seaLevelM: settings.sea_level_m,

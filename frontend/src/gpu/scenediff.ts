@@ -62,6 +62,9 @@ function sameSettings(a: Scene["settings"], b: Scene["settings"]): boolean {
       a.seed === b.seed &&
       a.detail === b.detail &&
       a.rule === b.rule &&
+      a.erosion === b.erosion &&
+      a.erosion_scale === b.erosion_scale &&
+      a.hold === b.hold &&
       a.sun_azimuth_deg === b.sun_azimuth_deg &&
       a.sun_elevation_deg === b.sun_elevation_deg)
   );

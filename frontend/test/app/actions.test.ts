@@ -91,7 +91,19 @@ describe("actions", () => {
       return stage.overlay.value;
     });
     expect(overlays).toEqual([
-      ...["contours", "slope", "detail", "snow", "forest", "grass", "wetness", "influence", "patches", "none"],
+      ...[
+        "contours",
+        "slope",
+        "detail",
+        "snow",
+        "forest",
+        "grass",
+        "wetness",
+        "erosion",
+        "influence",
+        "patches",
+        "none",
+      ],
     ]);
   });
 

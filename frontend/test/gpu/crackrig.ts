@@ -180,6 +180,9 @@ export function sceneOf(view: TileView, state: CameraState, look: Scene["setting
       look,
       detail: 1,
       rule: "landscape",
+      erosion: 1,
+      erosion_scale: 10,
+      hold: 1,
       sun_azimuth_deg: SUN.azimuth,
       sun_elevation_deg: SUN.elevation,
       place: null,
@@ -231,7 +234,13 @@ const STILL: Changes = { remade: [], moved: [] };
 /** Brings the atlas up to date for a view, as a lean frame does. Returns the cut and how many tiles were made. */
 function prepare(rig: Rig, world: World, scene: Scene, tau: number, how: Pace): { cut: Cut; made: number } {
   const { tiles, settings, channels } = scene;
-  const detail = { sizeM: tiles.sizeM, seed: settings.seed, detail: settings.detail, rule: settings.rule };
+  const detail = {
+    sizeM: tiles.sizeM,
+    seed: settings.seed,
+    detail: settings.detail,
+    rule: settings.rule,
+    erosion: settings,
+  };
   const { synthesis } = rig.fill;
   const anew = synthesis.configure({ ...detail, look: settings.look, seaLevelM: null, solved: tiles.solved });
   if (synthesis.setChannels(channels) || anew) world.atlas.remakeAll();

@@ -5,7 +5,7 @@ import { afterEach, describe, expect, it, vi } from "vitest";
 import { Camera } from "../../src/core/camera/camera.ts";
 import type { Ground, Scene, Vec3 } from "../../src/core/types.ts";
 import { fullStroke } from "../../src/doc/document.ts";
-import { MAX_DETAIL, type Paint, type Stroke } from "../../src/generated/contract.ts";
+import { MAX_DETAIL, MAX_EROSION, type Paint, type Stroke } from "../../src/generated/contract.ts";
 import { toolDefaults } from "../../src/input/defaults.ts";
 import { PAINT_CHANNELS, radiusRange } from "../../src/input/tools/painttool.ts";
 import type { EskLegend } from "../../src/ui/panels/legend.ts";
@@ -18,7 +18,7 @@ import { type People, strokeVisuals } from "../../src/app/view/scene.ts";
 import { kindWord } from "../../src/app/words/kind-word.ts";
 import { paintName, paintWords, SUBSTANCES } from "../../src/app/words/paints.ts";
 import type { EskRange } from "../../src/ui/controls/range-field.ts";
-import { detailWords } from "../../src/ui/panels/terrain-panel.ts";
+import { detailWords, erosionWords, holdWords } from "../../src/ui/panels/terrain-panel.ts";
 
 vi.mock("@awesome.me/webawesome/dist/components/slider/slider.js", () => ({ default: class {} }));
 vi.mock("@awesome.me/webawesome/dist/components/switch/switch.js", () => ({ default: class {} }));
@@ -55,7 +55,7 @@ describe("the paint form", () => {
     const { element, changes } = await form();
     const radios = all(element, ".channel");
     expect(radios.map((r) => r.textContent!.trim())).toEqual(PAINT_CHANNELS.map((c) => SUBSTANCES[c].title));
-    expect(radios.map((r) => r.getAttribute("tabindex"))).toEqual(["0", "-1", "-1", "-1", "-1", "-1"]);
+    expect(radios.map((r) => r.getAttribute("tabindex"))).toEqual(["0", "-1", "-1", "-1", "-1", "-1", "-1"]);
     radios[3]!.click();
     await element.updateComplete;
     all(element, ".channel")[3]!.dispatchEvent(
@@ -94,7 +94,7 @@ describe("words", () => {
     const seen = PAINT_CHANNELS.flatMap((channel) =>
       [1, -1].map((value) => paintWords({ channel, value, radius_m: 1 })),
     );
-    expect(new Set(seen).size).toBe(12);
+    expect(new Set(seen).size).toBe(14);
     expect(paintName(snow)).toBe("Snow");
     expect(paintName({ ...snow, channel: "grass", value: -0.5 })).toBe("Less meadow");
     expect(kindWord(painted())).toBe("Snow");
@@ -104,6 +104,8 @@ describe("words", () => {
     const seen = [0, 0.4, 1, 2, MAX_DETAIL].map(detailWords);
     expect(new Set(seen).size).toBe(5);
     expect(detailWords(0)).toMatch(/^None/);
+    expect(new Set([0, 0.4, 1, MAX_EROSION].map(erosionWords)).size).toBe(4);
+    expect(new Set([1, 0.6, 0].map(holdWords)).size).toBe(3);
   });
 });
 

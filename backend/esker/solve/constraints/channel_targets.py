@@ -25,6 +25,7 @@ BASES: Final = {
     Channel.GRASS: BASE_BIAS,
     Channel.FOREST: BASE_BIAS,
     Channel.WETNESS: BASE_BIAS,
+    Channel.EROSION: BASE_BIAS,
 }
 """The channels in the order in which they are solved, and their values where no stroke asks for others."""
 PAINTED: Final[dict[PaintChannel, Channel]] = {
@@ -34,6 +35,7 @@ PAINTED: Final[dict[PaintChannel, Channel]] = {
     "grass": Channel.GRASS,
     "forest": Channel.FOREST,
     "wetness": Channel.WETNESS,
+    "erosion": Channel.EROSION,
 }
 STROKES_ASK: Final = frozenset({Channel.AMPLITUDE, Channel.ROUGHNESS})
 """Channels of which every stroke of the ground asks something, not paint alone."""

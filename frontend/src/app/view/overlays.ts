@@ -10,6 +10,7 @@ export const OVERLAYS: readonly { readonly value: Scene["overlay"]; readonly lab
   { value: "forest", label: "Painted forest" },
   { value: "grass", label: "Painted meadow" },
   { value: "wetness", label: "Painted wetness" },
+  { value: "erosion", label: "Painted gullies" },
   { value: "influence", label: "Reach of the selected stroke" },
   { value: "patches", label: "Levels of detail" },
 ];

@@ -18,6 +18,7 @@ export const SUBSTANCES: Readonly<Record<PaintChannel, Substance>> = {
   wetness: { title: "Wetness", colour: "#3aa6e0", more: "The ground is wet.", less: "The ground dries." },
   roughness: { title: "Roughness", colour: "#c9563c", more: "More small detail.", less: "Less small detail." },
   amplitude: { title: "Relief", colour: "#b98a4a", more: "Detail stands higher.", less: "Detail flattens out." },
+  erosion: { title: "Gullies", colour: "#9a7b63", more: "Water cuts gullies here.", less: "No gullies here." },
 };
 
 /** Returns the effect of a paint, in a sentence. */

@@ -3,7 +3,7 @@
  * noise amplitude, roughness, where the selected stroke is felt or a channel is painted, and how far contours show.
  */
 
-import type { ChannelGrid, ChannelView, Scene } from "../../core/types.ts";
+import type { ChannelGrid, ChannelView, PaintedOverlay, Scene } from "../../core/types.ts";
 import { sharesOf } from "../../tiles/flat.ts";
 import { LOOKS } from "../looks.ts";
 
@@ -11,10 +11,16 @@ const TEXEL_BYTES = 4;
 
 const shares = new WeakMap<ChannelGrid, ChannelGrid>();
 
+const PAINTED: readonly string[] = ["snow", "forest", "grass", "wetness", "erosion"] satisfies PaintedOverlay[];
+
+function isPainted(overlay: Scene["overlay"]): overlay is PaintedOverlay {
+  return PAINTED.includes(overlay);
+}
+
 /** The third component of the texture: influence, or a painted channel as 0.5 + bias / 2; null with other overlays. */
 export function overlayGrid({ overlay, influence, channels }: Scene): ChannelGrid | null {
   if (overlay === "influence") return influence ?? null;
-  if (overlay !== "snow" && overlay !== "forest" && overlay !== "grass" && overlay !== "wetness") return null;
+  if (!isPainted(overlay)) return null;
   const grid = channels[overlay];
   const known = shares.get(grid);
   if (known !== undefined) return known;

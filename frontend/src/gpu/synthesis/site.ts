@@ -59,7 +59,7 @@ export function siteWords(s: SynthesisSettings, channels: ChannelFacts): Uint32A
     rule: s.rule,
     place: s.place ?? null,
     ground: s.ground ?? null,
-    ...s.erosion,
+    ...(s.erosion === undefined ? {} : erosionOf(s.erosion)),
   });
   floats.set([sizeM, site.amplitudeM, site.zeroM, seaLevelM === null ? 0 : 1]);
   floats.set([site.snowLine, site.treeLine, site.plants], 4);
@@ -81,6 +81,11 @@ export function siteWords(s: SynthesisSettings, channels: ChannelFacts): Uint32A
     floats.set([waveM(lattice, level), depthM(lattice, level)], at + 9);
   }
   return words;
+}
+
+/** The settings of the gullies alone: a terrain's settings hold more. */
+function erosionOf({ erosion, erosion_scale, hold }: ErosionSettings): ErosionSettings {
+  return { erosion, erosion_scale, hold };
 }
 
 /** Settings that make the same detail. */

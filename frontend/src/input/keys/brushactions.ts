@@ -35,7 +35,7 @@ export function brushActions(c: ActionContext, edits: StrokeActions, put: Put): 
   put("brush-stronger", "Stronger brush", ["}"], () => change((p) => stronger(p, 1)), enabled);
   put(
     "brush-channel",
-    "Next paint: snow, forest, meadow, wetness, roughness, amplitude",
+    "Next paint: snow, forest, meadow, wetness, roughness, amplitude, gullies",
     ["u"],
     () =>
       change((p) => {

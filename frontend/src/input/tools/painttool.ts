@@ -18,7 +18,15 @@ import {
 } from "../sketch/sketch.ts";
 
 /** Channels in the order in which a key and the inspector go through them. */
-export const PAINT_CHANNELS: readonly PaintChannel[] = ["snow", "forest", "grass", "wetness", "roughness", "amplitude"];
+export const PAINT_CHANNELS: readonly PaintChannel[] = [
+  "snow",
+  "forest",
+  "grass",
+  "wetness",
+  "roughness",
+  "amplitude",
+  "erosion",
+];
 
 /** A line that comes back to within this share of its length has its last anchor where it is farthest from the first. */
 const CLOSED = 0.25;

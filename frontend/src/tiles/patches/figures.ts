@@ -14,7 +14,7 @@ const SUBS = SUBPATCHES * SUBPATCHES;
 /** Nothing measured yet. */
 const UNKNOWN = -1;
 /** A level adds at most this share of what its parent adds: 2^-H, H the least exponent. */
-const FALL = 2 ** -SYNTH_H_RANGE_FROM;
+export const FALL: number = 2 ** -SYNTH_H_RANGE_FROM;
 /** Levels that are asked for on guesses alone; then figures must have come. */
 const MOST_BLIND = 3;
 

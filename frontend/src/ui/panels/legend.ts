@@ -147,9 +147,11 @@ export class EskLegend extends SignalElement {
     const found = at && this.ground.attributesAt(at[0], at[1]);
     if (!at || !found) return nothing;
     const bias = Math.round(100 * this.channels.valueAt(channel, at[0], at[1]));
+    const paint = html`<div class="ends"><span>Paint here</span><span>${signed(bias)} %</span></div>`;
+    if (channel === "erosion") return paint;
     const share = Math.round(100 * found[channel === "wetness" ? "wet" : channel]);
     return html`<div>
-      <div class="ends"><span>Paint here</span><span>${signed(bias)} %</span></div>
+      ${paint}
       <div class="ends"><span>${SUBSTANCES[channel].title} here</span><span>${share} %</span></div>
     </div>`;
   }

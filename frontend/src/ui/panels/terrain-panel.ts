@@ -2,7 +2,14 @@ import "@awesome.me/webawesome/dist/components/switch/switch.js";
 import { html, nothing, type TemplateResult } from "lit";
 import { live } from "lit/directives/live.js";
 import type { Border, Look, Rule, TerrainFields, TerrainSettings } from "../../generated/contract.ts";
-import { DEFAULT_LAKES_FRACTION, DEFAULT_REACH_FRACTION, MAX_DETAIL } from "../../generated/contract.ts";
+import {
+  DEFAULT_LAKES_FRACTION,
+  DEFAULT_REACH_FRACTION,
+  MAX_DETAIL,
+  MAX_EROSION,
+  MAX_EROSION_SCALE,
+  MIN_EROSION_SCALE,
+} from "../../generated/contract.ts";
 import "../controls/range-field.ts";
 import "../controls/segmented.ts";
 import type { ReadonlySignal } from "@preact/signals-core";
@@ -61,6 +68,22 @@ export function detailWords(detail: number): string {
   return "Wild: the ground bristles.";
 }
 
+/** What a strength of the erosion looks like. */
+export function erosionWords(erosion: number): string {
+  if (erosion === 0) return "None: flanks are as smooth as they are drawn, but for what is painted.";
+  if (erosion < 0.6) return "Young: shallow rills on steep flanks.";
+  if (erosion <= 1.3) return "Natural: gullies that branch and join.";
+  return "Old: deep gullies between sharp ridges.";
+}
+
+/** What a hold of the crests does. */
+export function holdWords(hold: number): string {
+  if (hold >= 0.95) return "Drawn crests keep their height.";
+  if (hold > 0.3) return "Drawn crests are notched a little.";
+  return "Gullies cut through drawn crests: wilder, and less exact.";
+}
+
+const hundredth = (v: number): number => Math.round(v) / 100;
 const tenth = (v: number): number => Math.round(10 * v) / 10;
 
 /** Settings of the whole terrain: look, detail, sun, sea and lakes, and how far strokes reach. */
@@ -103,7 +126,7 @@ export class EskTerrainPanel extends SignalElement {
           @pick=${(e: CustomEvent<Look>) => this.#set({ look: e.detail })}
         ></esk-segmented>
       </div>
-      ${this.#detail(settings, disabled)} ${this.#sun(settings, disabled)} ${this.#sea(settings, disabled)} ${this.#lakes(settings, disabled)} ${this.#reach(settings, disabled)}
+      ${this.#detail(settings, disabled)} ${this.#erosion(settings, disabled)} ${this.#sun(settings, disabled)} ${this.#sea(settings, disabled)} ${this.#lakes(settings, disabled)} ${this.#reach(settings, disabled)}
       <div class="group">
         <h3>Border</h3>
         <esk-segmented
@@ -147,6 +170,54 @@ export class EskTerrainPanel extends SignalElement {
                 <p class="lead">${detailWords(detail)}</p>`
             : nothing
         }
+      </div>
+    `;
+  }
+
+  #erosion(settings: TerrainSettings, disabled: boolean): TemplateResult | typeof nothing {
+    const { rule, erosion, erosion_scale: scale, hold } = settings;
+    if (rule !== "landscape") return nothing;
+    return html`
+      <div class="group">
+        <h3>Erosion</h3>
+        <esk-range
+          label="Strength"
+          of="of the erosion"
+          unit="×"
+          min="0"
+          max=${MAX_EROSION}
+          step="0.1"
+          .value=${erosion}
+          ?disabled=${disabled}
+          @value=${(e: CustomEvent<number>) => this.#set({ erosion: tenth(e.detail) }, false)}
+          @settle=${(e: CustomEvent<number>) => this.#set({ erosion: tenth(e.detail) })}
+        ></esk-range>
+        <p class="lead">${erosionWords(erosion)}</p>
+        <esk-range
+          label="Size"
+          of="of the gullies"
+          unit="cells"
+          min=${MIN_EROSION_SCALE}
+          max=${MAX_EROSION_SCALE}
+          step="1"
+          .value=${scale}
+          ?disabled=${disabled}
+          @value=${(e: CustomEvent<number>) => this.#set({ erosion_scale: tenth(e.detail) }, false)}
+          @settle=${(e: CustomEvent<number>) => this.#set({ erosion_scale: tenth(e.detail) })}
+        ></esk-range>
+        <esk-range
+          label="Hold"
+          of="of the crests"
+          unit="%"
+          min="0"
+          max="100"
+          step="5"
+          .value=${Math.round(100 * hold)}
+          ?disabled=${disabled}
+          @value=${(e: CustomEvent<number>) => this.#set({ hold: hundredth(e.detail) }, false)}
+          @settle=${(e: CustomEvent<number>) => this.#set({ hold: hundredth(e.detail) })}
+        ></esk-range>
+        <p class="lead">${holdWords(hold)}</p>
       </div>
     `;
   }
