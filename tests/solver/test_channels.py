@@ -54,7 +54,7 @@ def at(values: np.ndarray, x: float, y: float) -> float:
 def test_no_strokes_leave_the_base() -> None:
     """SPEC S60: exactly, for every channel."""
     got = channels([])
-    assert got.keys() == set(Channel) - {Channel.HEIGHT, Channel.BASE, Channel.SURVEY}
+    assert got.keys() == set(Channel) - {Channel.HEIGHT, Channel.BASE, Channel.SURVEY, Channel.FAR}
     for channel, values in got.items():
         assert (values == (BASE_ROUGHNESS if channel == Channel.ROUGHNESS else 0)).all()
 
@@ -125,7 +125,7 @@ def test_a_failed_raster_is_not_remembered(monkeypatch: pytest.MonkeyPatch) -> N
 def test_a_solve_gives_out_its_channels() -> None:
     """SPEC S63: coarse to fine, final, each the injection of the next finer, two levels below the heights."""
     results = [r for r in Solver().steps([ROUGH], SETTINGS, 3) if isinstance(r, Level)]
-    for channel in set(Channel) - {Channel.HEIGHT, Channel.BASE, Channel.SURVEY}:
+    for channel in set(Channel) - {Channel.HEIGHT, Channel.BASE, Channel.SURVEY, Channel.FAR}:
         mine = [r for r in results if r.channel == channel]
         assert [r.level for r in mine] == list(range(channel_level(3) + 1))
         assert all(r.settled and not r.heights.flags.writeable for r in mine)

@@ -10,6 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from esker import Stroke
+from esker import contract as c
 from esker.contract import BASE_FAR, Channel, SetTerrain, TerrainFields, TerrainSettings
 from esker.contract.fractal import FAR_SHARE
 from esker.document.birth import new_document
@@ -24,13 +25,13 @@ SIZE = 4096.0
 LEVEL = 2
 SETTINGS = TerrainSettings(erosion=1.0)
 CELL = SIZE / 256
-RIDGE = Stroke.profile([(1000, 1500, 0), (2000, 2100, 400), (3000, 2700, 0)], left=(35, 400), right=(35, 400))
-MESA = Stroke.level([(900, 900, 80), (1500, 900, 80), (1500, 400, 80), (900, 400, 80), (900, 880, 80)], left=(35, 300),
-                    right=(35, 300), plateau_radius_m=20.0)  # fmt: skip
-BRUSH = Stroke.paint([(500, 500), (900, 700)], "erosion", 0.7, radius_m=80)
+RIDGE: c.Stroke = Stroke.profile([(1000, 1500, 0), (2000, 2100, 400), (3000, 2700, 0)], left=(35, 400), right=(35, 400))
+OUTLINE = [(900, 900, 80), (1500, 900, 80), (1500, 400, 80), (900, 400, 80), (900, 880, 80)]
+MESA: c.Stroke = Stroke.level(OUTLINE, left=(35, 300), right=(35, 300), plateau_radius_m=20.0)
+BRUSH: c.Stroke = Stroke.paint([(500, 500), (900, 700)], "erosion", 0.7, radius_m=80)
 
 
-def far(strokes: Sequence[Stroke], settings: TerrainSettings = SETTINGS) -> NDArray[np.float32]:
+def far(strokes: Sequence[c.Stroke], settings: TerrainSettings = SETTINGS) -> NDArray[np.float32]:
     """The finest level of a field that was never used before."""
     return driven(FarField(LEVEL).making(strokes, settings))[-1]
 
@@ -94,7 +95,7 @@ def test_far_is_made_where_there_are_gullies_and_only_there() -> None:
 
 
 @pytest.mark.parametrize("strokes", [[], [RIDGE], [RIDGE, BRUSH]])
-def test_a_solve_gives_out_far_once_with_every_channel(strokes: list[Stroke]) -> None:
+def test_a_solve_gives_out_far_once_with_every_channel(strokes: list[c.Stroke]) -> None:
     """SPEC F207: levels coarse to fine, final, and the channels alone give the same."""
     solver = Solver("numpy", 3)
     for events in (solver.steps(strokes, SETTINGS), solver.channels(strokes, SETTINGS)):

@@ -311,7 +311,7 @@ def malformed() -> list[dict[str, str]]:
         "header cut": first[: head - 1],
         "wrong magic": patched(first, 0, b"\0\0"),
         "wrong protocol": patched(first, offset["protocol"], b"\x63"),
-        "unknown kind": patched(first, offset["kind"], b"\x09"),
+        "unknown kind": patched(first, offset["kind"], bytes([max(Channel) + 1])),
         "level too fine": patched(first, offset["level"], b"\x0b"),
         "channel level too fine": retold(5, [], [], Channel.AMPLITUDE),
         "channel predicted from the heights": retold(1, [one(Predictor.PARENT, 1, b"")], [], Channel.ROUGHNESS),

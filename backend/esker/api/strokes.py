@@ -70,8 +70,8 @@ class Stroke:
         """A line of paint on the ground: points (n, 2), or (n, 3) whose heights do not matter.
 
         Within ``radius_m`` of it one channel of the detail is raised or lowered: "snow", "grass", "forest", "wetness",
-        "roughness", "amplitude" or "erosion" (gullies), by ``value`` from -1 (none of it) to 1 (all of it). No height is
-        constrained.
+        "roughness", "amplitude" or "erosion" (gullies), by ``value`` from -1 (none of it) to 1 (all of it). No height
+        is constrained.
 
         >>> from esker import Stroke
         >>> Stroke.paint([(100, 100), (900, 500)], "snow", radius_m=80).paint.value
