@@ -1,4 +1,4 @@
-"""How a terrain is born: empty, by the newest edition of the rules that ground follows from, with rivers and gullies."""
+"""How a terrain is born: empty, by the newest edition of the rules of its ground, with rivers and gullies."""
 
 from __future__ import annotations
 
