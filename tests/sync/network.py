@@ -18,6 +18,8 @@ from esker import contract as c
 from esker.document.ops import Refusal, StrokeSet
 from esker.document.sync import SyncDoc
 from esker.document.wire import op_json
+from esker.session.lesson.rules import Lesson
+from esker.session.lesson.state import State
 from esker.session.room import protocol
 from esker.session.room.core import Batch, RoomCore, RoomInfo
 from esker.session.room.members import Member
@@ -68,6 +70,8 @@ class Server:
         self.generation = 0
         self.links: list[Link] = []
         self.claims = Claims()
+        self.state = State()
+        """How the lesson stands; all clients are pupils."""
         self.core = self._open()
         self._ticking = False
 
@@ -76,7 +80,7 @@ class Server:
         for row in self.rows:
             counters[row.client] = max(row.counter, counters.get(row.client, -1))
         loaded = Loaded(replay(self.birth, self.rows), self.rows[-50:], counters)
-        return RoomCore(loaded, self._find, claims=self.claims)
+        return RoomCore(loaded, self._find, claims=self.claims, lesson=Lesson(self.state))
 
     def _find(self, client: str, counter: int) -> int | None:
         return next((r.clock for r in self.rows if (r.client, r.counter) == (client, counter)), None)
@@ -107,6 +111,10 @@ class Server:
         with suppress(Refusal):  # a server that died may find that it has done this already
             self.core.perform(c.AddLayer(layer=layer), f"import-{author}-{n}", author)
             self.ordered()
+
+    def hands(self, off: bool) -> None:
+        """A conductor switches."""
+        self.state = self.core.lesson.state = self.state.model_copy(update={"hands_off": off})
 
     def die(self) -> None:
         """SIGKILL and restart: uncommitted ops are gone, every connection is cut."""
@@ -151,7 +159,9 @@ class Link:
         elif isinstance(event, protocol.Accepted):
             assert self.member is not None
             core.heard(self.member)
+            before = core.head.clock
             core.submit(self.member, event.ops)
+            assert core.lesson.draws(self.member) or core.head.clock == before, "an op came in while hands were off"
             self.server.ordered()
         else:
             raise AssertionError(f"the simulated client misbehaved: {event}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import time
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -206,6 +207,19 @@ def test_a_restart_in_the_middle_of_a_lesson(tmp_path: Path) -> None:
         ticket = room.ben.welcome["ticket"]
         ben.say("hello", protocol=c.PROTOCOL_VERSION, terrain=room.terrain, secret=room.edit, client="z", ticket=ticket)
         assert ben.closed()[0] == c.WS_CLOSE["removed"]
+
+
+def test_a_kill_in_the_middle_of_a_lesson(tmp_path: Path) -> None:
+    """SPEC L8: what was told is on the disk; a copy of it at that moment is what a killed server leaves."""
+    with LiveServer(tmp_path / "living") as server:
+        room = a_class(server, "kill")
+        room.teacher.say("conduct", hands_off=True, animals="en")
+        lesson(room.anne, hands_off=True, animals="en")
+        shutil.copytree(tmp_path / "living", tmp_path / "killed")
+    with LiveServer(tmp_path / "killed") as server:
+        anne = server.join(room.terrain, room.edit, "kill-a2", ticket=room.anne.welcome["ticket"])
+        assert (anne.welcome["lesson"]["hands_off"], anne.welcome["lesson"]["animals"]) == (True, "en")
+        assert answer(anne, "kill-a2:0", stroke("s"))["code"] == "hands_off"
 
 
 def refused_at(server: LiveServer, room: Class, client: str, secret: str = "", **hello: Any) -> dict[str, Any]:

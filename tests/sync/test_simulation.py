@@ -6,6 +6,7 @@ A seed that ever failed is kept by name in ``KEPT``.
 from __future__ import annotations
 
 import random
+from functools import partial
 from typing import Any
 
 import pytest
@@ -149,6 +150,34 @@ def _converges(seed: int) -> None:
         assert client.doc.confirmed == final, f"seed {seed}: {client.name} differs"
         assert client.doc.document == final, f"seed {seed}: {client.name} shows something else"
         assert client.acked <= set(ids), f"seed {seed}: an acknowledged op is missing"
+
+
+@pytest.mark.parametrize("block", range(5))
+def test_all_converge_while_a_conductor_switches(block: int) -> None:
+    """SPEC L24: over cuts and a restart; and what is refused leaves nothing behind."""
+    assert sum(_converges_with_switches(seed) for seed in range(block, 60, 5)) > 0
+
+
+def _converges_with_switches(seed: int) -> int:
+    """Returns how many ops were refused because hands were off."""
+    world = World(20_000 + seed)
+    server = Server(world, _birth())
+    clients = [Client(world, server, f"c{i}") for i in range(4)]
+    for client in clients:
+        for n in range(20):
+            world.after(world.random.uniform(0, 4), partial(_act, world.random, client, n))
+    for _ in range(6):
+        world.after(world.random.uniform(0, 4), partial(server.hands, world.random.random() < 0.5))
+    if seed % 2:
+        world.after(world.random.uniform(1, 4), server.die)
+    _settle(world, clients)
+    final = server.core.document
+    for client in clients:
+        assert client.doc.pending == (), f"seed {seed}: {client.name} still has unconfirmed ops"
+        assert client.doc.document == client.doc.confirmed == final, f"seed {seed}: {client.name} differs"
+    assert any(each.code == "hands_off" for client in clients for each in client.refusals) or seed % 7, (
+        "none was refused"
+    )
 
 
 @pytest.mark.parametrize("block", range(4))

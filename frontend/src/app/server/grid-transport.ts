@@ -10,12 +10,14 @@ export function gridTransport(terrain: {
   readonly id: string;
   readonly secret: string;
   readonly client: string;
+  readonly lesson: { readonly ticket: string | null };
 }): ImportTransport {
   return {
     upload: (file, onShare, signal) =>
       upload<ImportStatus>({
         path: `/api/terrains/${terrain.id}/imports?name=${encodeURIComponent(file.name)}&client=${terrain.client}`,
         secret: terrain.secret,
+        ticket: terrain.lesson.ticket,
         file,
         onShare,
         signal,

@@ -5,6 +5,8 @@ import { ApiError, readRefusal } from "./api.ts";
 export interface Upload {
   readonly path: string;
   readonly secret?: string;
+  /** By which a lesson knows who brings the file in. */
+  readonly ticket?: string | null;
   readonly file: Blob;
   /** Share of the bytes that have left, 0..1. */
   readonly onShare: (share: number) => void;
@@ -12,7 +14,7 @@ export interface Upload {
 }
 
 /** The JSON answer. Throws ApiError; of code "cancelled" after an abort. */
-export function upload<T>({ path, secret, file, onShare, signal }: Upload): Promise<T> {
+export function upload<T>({ path, secret, ticket, file, onShare, signal }: Upload): Promise<T> {
   return new Promise((resolve, reject) => {
     const request = new XMLHttpRequest();
     const cancelled = (): void => {
@@ -49,6 +51,7 @@ export function upload<T>({ path, secret, file, onShare, signal }: Upload): Prom
     );
     request.open("POST", path);
     if (secret) request.setRequestHeader("Authorization", `Bearer ${secret}`);
+    if (ticket) request.setRequestHeader("Esker-Ticket", ticket);
     request.setRequestHeader("Content-Type", "application/octet-stream");
     request.send(file);
   });
