@@ -175,9 +175,7 @@ def _converges_with_switches(seed: int) -> int:
     for client in clients:
         assert client.doc.pending == (), f"seed {seed}: {client.name} still has unconfirmed ops"
         assert client.doc.document == client.doc.confirmed == final, f"seed {seed}: {client.name} differs"
-    assert any(each.code == "hands_off" for client in clients for each in client.refusals) or seed % 7, (
-        "none was refused"
-    )
+    return sum(each.code == "hands_off" for client in clients for each in client.refusals)
 
 
 @pytest.mark.parametrize("block", range(4))
