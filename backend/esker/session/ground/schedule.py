@@ -44,8 +44,11 @@ Grounds = Mapping[Room, Ground]
 
 def choose(grounds: Grounds[Room], now: float, tally: Tally[Room]) -> tuple[Room | None, Tally[Room]]:
     """Returns the room whose turn it is, None when there is nothing to do; and the tally after the choice."""
-    found = ((states.stage(ground, now), room) for room, ground in grounds.items())
-    staged = [(stage, room) for stage, room in found if stage is not None and _fits(room, stage, grounds, now, tally)]
+    found = [(states.stage(ground, now), room) for room, ground in grounds.items()]
+    solving = _solving(grounds)
+    staged = [
+        (stage, room) for stage, room in found if stage is not None and _fits(room, stage, grounds, now, tally, solving)
+    ]
     waiting = {room for stage, room in staged if stage != REFINE} or {room for _, room in staged}
     tally = tally.levelled(waiting)
     if not staged:
@@ -70,7 +73,7 @@ def begin(
     ground = grounds[room]
     tally = replace(tally, turns=tally.turns + 1)
     tally = tally.noted(room, turn=tally.turns, ran_at=now)
-    may = not ground.channels.making or _may_begin(room, COARSE, grounds, now, tally)
+    may = not ground.channels.making or _may_begin(room, COARSE, grounds, now, tally, _solving(grounds))
     if not states.starts(ground, now) or not may:
         return False, (), tally
     stage = states.stage(ground, now)
@@ -110,30 +113,39 @@ def bytes_of(ground: Ground) -> int:
     return parked_bytes(ground.top, attempt is not None and attempt.job.base is not None)
 
 
-def _fits(room: Room, stage: int, grounds: Grounds[Room], now: float, tally: Tally[Room]) -> bool:
+def _fits(
+    room: Room, stage: int, grounds: Grounds[Room], now: float, tally: Tally[Room], solving: Sequence[Room]
+) -> bool:
     """Returns whether its slice may run."""
-    return grounds[room].channels.making or _may_begin(room, stage, grounds, now, tally)
+    return grounds[room].channels.making or _may_begin(room, stage, grounds, now, tally, solving)
 
 
-def _may_begin(room: Room, stage: int, grounds: Grounds[Room], now: float, tally: Tally[Room]) -> bool:
+def _may_begin(
+    room: Room, stage: int, grounds: Grounds[Room], now: float, tally: Tally[Room], solving: Sequence[Room]
+) -> bool:
     """Returns whether its newest job may be begun: in what memory there is, or in what others can leave."""
     ground = grounds[room]
     if states.is_solving(ground) or isinstance(ground.state, states.ChannelsOnly):
         return True
     if states.needs_channels_only(ground) or not states.starts(ground, now):
         return True
-    return _has_room(room, (), grounds, tally) or _has_room(
-        room, _settling(room, stage, grounds, tally), grounds, tally
-    )
+    held = [other for other in solving if other is not room]
+    if _has_room(room, held, grounds, tally):
+        return True
+    settling = _settling(room, stage, grounds, tally, held)
+    return _has_room(room, [other for other in held if other not in settling], grounds, tally)
 
 
-def _settling(room: Room, stage: int, grounds: Grounds[Room], tally: Tally[Room]) -> list[Room]:
-    """Others whose solves may end for its: that are only settling, have had no less time (for more than a coarse
-    preview: too much) and were not ended before; longest first."""
+def _settling(room: Room, stage: int, grounds: Grounds[Room], tally: Tally[Room], held: Sequence[Room]) -> list[Room]:
+    """Returns those of ``held`` whose solves may end for the room's, longest first.
+
+    ``held``: the others whose solves hold memory. Those may end that are only settling, have had no less time (for more
+    than a coarse preview: too much) and were not ended before.
+    """
     least = 0.0 if stage == COARSE else AHEAD
     found = [
         other
-        for other in _solving(room, grounds)
+        for other in held
         if not isinstance(grounds[other].state, Previewing)
         and not tally.rooms[other].is_spared
         and tally.ahead(other, room) >= least
@@ -141,9 +153,9 @@ def _settling(room: Room, stage: int, grounds: Grounds[Room], tally: Tally[Room]
     return sorted(found, key=lambda other: grounds[other].shown.finest_at)
 
 
-def _solving(room: Room, grounds: Grounds[Room]) -> list[Room]:
-    """Returns the other rooms whose solves hold memory."""
-    return [other for other, ground in grounds.items() if other is not room and states.is_solving(ground)]
+def _solving(grounds: Grounds[Room]) -> list[Room]:
+    """Returns the rooms whose solves hold memory. They are few, and rooms are many, so they are found once a choice."""
+    return [room for room, ground in grounds.items() if states.is_solving(ground)]
 
 
 def _in_the_way(room: Room, stage: int, grounds: Grounds[Room], tally: Tally[Room]) -> Sequence[Room]:
@@ -151,12 +163,13 @@ def _in_the_way(room: Room, stage: int, grounds: Grounds[Room], tally: Tally[Roo
     gone: list[Room] = []
     if states.needs_channels_only(grounds[room]):
         return gone
-    settling = _settling(room, stage, grounds, tally)
-    while settling and not _has_room(room, gone, grounds, tally):
+    held = [other for other in _solving(grounds) if other is not room]
+    settling = _settling(room, stage, grounds, tally, held)
+    while settling and not _has_room(room, held, grounds, tally):
         gone.append(settling.pop())
+        held.remove(gone[-1])
     return gone
 
 
-def _has_room(room: Room, gone: Sequence[Room], grounds: Grounds[Room], tally: Tally[Room]) -> bool:
-    held = [other for other in _solving(room, grounds) if other not in gone]
+def _has_room(room: Room, held: Sequence[Room], grounds: Grounds[Room], tally: Tally[Room]) -> bool:
     return not held or sum(bytes_of(grounds[other]) for other in [*held, room]) <= tally.budget

@@ -11,6 +11,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence, Set
 from dataclasses import dataclass
+from functools import cached_property
 from hashlib import blake2b
 from typing import Final, Protocol
 
@@ -105,7 +106,6 @@ class Refiner:
         self.basis, self.cache, self._engine = basis, cache, engine
         under = bound(basis.base, engine.device)
         self._base = None if under is None else BaseWindows(under, BlockCache() if blocks is None else blocks)
-        self._ground = np.concatenate([basis.gradient, basis.heights[None]])
         self._digests: dict[TileKey, bytes] = {}
         self._content: dict[TileKey, bytes] = {}
         self._strokes = Strokes(basis.strokes, basis.settings, self._base, shapes)
@@ -114,6 +114,14 @@ class Refiner:
         self._urgent: Callable[[], bool] | None = None
         self._waiting: dict[int, dict[TileKey, Fields | None]] = {}
         """Fields that the iterators need of tiles, by the identity of their dictionary."""
+
+    @cached_property
+    def _ground(self) -> NDArray[np.float32]:
+        """Gradient and heights of the settled solve, one above the other.
+
+        They take twelve megabytes at level 4, so a room in which nobody looks closely has none.
+        """
+        return np.concatenate([self.basis.gradient, self.basis.heights[None]])
 
     def content(self, key: TileKey) -> bytes:
         """Digest of all that a tile depends on: the key, the settings, the strokes that reach its windows at any level
