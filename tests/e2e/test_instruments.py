@@ -28,7 +28,7 @@ def test_a_profile_follows_what_somebody_else_draws(visitors: Visitors, server: 
     # A line across the ridge, drawn in one go; the panel shows its section.
     ada.page.keyboard.press("t")  # from above nothing hides what is behind it
     wait_still(ada)
-    ada.page.keyboard.press("j")
+    ada.page.keyboard.press("y")
     assert "Draw a line over the land" in ada.page.locator("esk-measure .empty").inner_text()
     press_and_move(ada.page, polyline([on_screen(ada, 2000, 700), on_screen(ada, 2100, 3200)]))
     ada.page.mouse.up()
@@ -75,7 +75,7 @@ def test_a_profile_follows_what_somebody_else_draws(visitors: Visitors, server: 
     wait_still(ada)
     ada.page.keyboard.press("Backspace")
     ada.page.locator("esk-measure").get_by_role("button", name="Begin anew").click()
-    ada.page.keyboard.press("Shift+J")
+    ada.page.keyboard.press("Shift+Y")
     for place in ((1400, 600), (2800, 600), (2800, 1500), (1400, 1500)):
         ada.page.mouse.click(*on_screen(ada, *place))
     wait(ada, "() => window.esker.area() !== null")

@@ -119,4 +119,11 @@ describe("actions", () => {
     if (process.env.ESKER_WRITE_GUIDE) writeFileSync(GUIDE, wanted);
     else expect(guide).toBe(wanted);
   });
+
+  it("have keys that belong to one action each", () => {
+    const owners = new Map<string, string[]>();
+    for (const [id, action] of everyAction().actions)
+      for (const key of action.keys) owners.set(key, [...(owners.get(key) ?? []), id]);
+    expect([...owners].filter(([, ids]) => ids.length > 1)).toEqual([]);
+  });
 });

@@ -75,7 +75,7 @@ describe("the ruler", () => {
   });
 
   it("is used with the keys alone (SPEC N6)", () => {
-    key("j");
+    key("y");
     expect(input.ruler.kind.value).toBe("line");
     key("Enter");
     key("Enter");
@@ -88,7 +88,7 @@ describe("the ruler", () => {
     key("Escape");
     key("Escape");
     expect(input.ruler.kind.value).toBeNull();
-    key("J", { shiftKey: true });
+    key("Y", { shiftKey: true });
     expect(input.ruler.kind.value).toBe("area");
     expect(points()).toHaveLength(1);
   });

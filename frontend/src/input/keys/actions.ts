@@ -61,8 +61,8 @@ export function createActions(c: ActionContext): Map<string, Action> {
     () => (c.ruler.kind.value !== null ? c.ruler.points.value.length > 0 : edits.usable()),
   );
   for (const [kind, title, key] of [
-    ["line", "Measure along a line: profile, distance, slope", "j"],
-    ["area", "Measure an area: size, volume, change", "Shift+j"],
+    ["line", "Measure along a line: profile, distance, slope", "y"],
+    ["area", "Measure an area: size, volume, change", "Shift+y"],
   ] as const)
     put(`measure-${kind}`, title, [key], () => {
       if (c.placing.value !== null) return;

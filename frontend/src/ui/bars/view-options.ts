@@ -104,7 +104,7 @@ export class EskViewOptions extends SignalElement {
           this.open = !this.open;
         }}
       >
-        ${icon("settings")}
+        ${icon("eye")}
       </button>
       ${this.open ? this.#card() : null}`;
   }

@@ -269,10 +269,15 @@ export const terrainPageStyles = css`
       bottom: calc(var(--edge) + env(safe-area-inset-bottom));
       transform: translateX(-50%);
     }
+    .notes {
+      flex: 1 0 auto;
+    }
     esk-view-bar {
       flex: none;
     }
     .foot {
+      flex-wrap: wrap;
+      justify-content: flex-end;
       gap: 6px;
       bottom: calc(var(--edge) + 62px + env(safe-area-inset-bottom));
     }
