@@ -20,6 +20,12 @@ async function show(): Promise<void> {
   } else if (target.page === "privacy") {
     const { privacyPage } = await import("./ui/pages/privacy.ts");
     app.replaceChildren(privacyPage());
+  } else if (target.page === "join") {
+    const { joinPage } = await import("./ui/pages/join-page.ts");
+    app.replaceChildren(joinPage(target.code));
+  } else if (target.page === "wall") {
+    const { wallPage } = await import("./ui/pages/wall-page.ts");
+    app.replaceChildren(wallPage(target.id, target.lesson, target.secret));
   } else {
     const { missingPage } = await import("./ui/pages/missing.ts");
     app.replaceChildren(missingPage(target.path));

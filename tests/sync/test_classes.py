@@ -391,3 +391,23 @@ def test_a_class_is_collected(server: LiveServer, teacher: Teacher) -> None:
     assert rows[0]["last_changed"] > "2"
     assert rows[1]["last_changed"] == ""
     assert eve.status == 201
+
+
+def test_a_laptop_sleeps_and_returns(server: LiveServer, teacher: Teacher) -> None:
+    """SPEC L74: it resumes in its copy, with what was pushed and whether it is frozen; it loses nothing of its own."""
+    ada = Pupil(teacher, "Ada")
+    peer = ada.join("ada20")
+    _drawn(peer, "ada20", "mine")
+    peer.ws.socket.close()  # no farewell
+    owner = server.join(teacher.terrain, teacher.secret, "own20")
+    _drawn(owner, "own20", "t1")
+    owner.ops(("own20:2", {"type": "stroke.finish", "stroke": "t1"}))
+    owner.wait("ack")
+    assert teacher.ask("push") == (200, {"changed": 1})
+    assert teacher.ask("freeze", {"frozen": True})[0] == 200
+    back = server.join(ada.terrain, ada.seat, "ada20", clock=1)
+    assert [each["op"]["type"] for each in back.welcome["ops"]] == ["group"]
+    assert back.wait("class")["frozen"]
+    back.ops(("ada20:2", set_op("mine", label="late")))
+    assert back.wait("reject")["code"] == "frozen"
+    assert _strokes(server, ada.terrain, ada.seat) == {"mine", "t1"}

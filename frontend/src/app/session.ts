@@ -88,7 +88,9 @@ export class TerrainSession implements OpenTerrain {
   readonly me = signal<Identity>({ name: "", colour: "#888888" });
   readonly stage = signal<Stage | null>(null);
   /** Whether the link allows changes. */
-  readonly mayEdit = computed(() => this.role.value === "owner" || this.role.value === "edit");
+  readonly mayEdit = computed(
+    () => this.role.value === "owner" || (this.role.value === "edit" && this.inClass.value?.frozen !== true),
+  );
   /** Whether the terrain can be changed now: an earlier clock cannot. */
   readonly canEdit: ReadonlySignal<boolean>;
   readonly status: ReadonlySignal<Status>;

@@ -65,6 +65,14 @@ def add_page(app: FastAPI, hub: Hub, page: Path, data: Path, pictures: Pictures)
     async def keeper() -> Response:
         return index()
 
+    @app.api_route("/join", methods=["GET", "HEAD"], include_in_schema=False)
+    async def join() -> Response:
+        return index()
+
+    @app.api_route("/wall/{terrain}/{lesson}", methods=["GET", "HEAD"], include_in_schema=False)
+    async def wall() -> Response:
+        return index()
+
     @app.api_route("/t/{terrain}", methods=["GET", "HEAD"], include_in_schema=False)
     async def shared(request: Request, terrain: str, p: Annotated[str, Query(max_length=40)] = "") -> Response:
         return index(await card_of(hub, pictures, request, terrain, p) if p else "")

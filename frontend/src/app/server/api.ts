@@ -44,6 +44,14 @@ export interface KeptTerrain {
   readonly here: number;
 }
 
+/** What somebody is told who typed the code of a class. */
+export interface ClassDoor {
+  readonly class: string;
+  readonly title: string;
+  readonly together: number;
+  readonly groups: readonly { readonly number: number; readonly names: readonly string[] }[];
+}
+
 export interface JoinCode {
   readonly code: string;
   readonly expires_s: number;
@@ -103,7 +111,8 @@ export const api = {
 
   open: (file: Blob): Promise<OpenedTerrain> => json("POST", "/api/terrains/import", undefined, file),
 
-  join: (code: string): Promise<OpenedTerrain> => json("POST", "/api/join", undefined, { code }),
+  /** A terrain; or the class whose code it is, which asks for a name first. */
+  join: (code: string): Promise<OpenedTerrain | ClassDoor> => json("POST", "/api/join", undefined, { code }),
 
   /** Answers only to a living secret. */
   about: (id: string, secret: string): Promise<{ readonly id: string; readonly role: Role }> =>

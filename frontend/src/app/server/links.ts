@@ -18,6 +18,11 @@ export function terrainPath(id: string, secret: string): string {
   return `/t/${encodeURIComponent(id)}#${encodeURIComponent(secret)}`;
 }
 
+/** The wall of a class, for an owner of the terrain that it was made from. */
+export function wallPath(id: string, lesson: string, secret: string): string {
+  return `/wall/${encodeURIComponent(id)}/${encodeURIComponent(lesson)}#${encodeURIComponent(secret)}`;
+}
+
 /**
  * The whole link, to copy or to show as a QR code. `preview`: the token by which programs that unfold links may see the
  * terrain's picture; it opens nothing else.
@@ -40,6 +45,7 @@ export function readJoinInput(text: string, origin: string): JoinInput {
     return { kind: "unreadable", message: "This is neither a code nor a link." };
   }
   const target = route(url);
+  if (target.page === "join" && url.origin === origin && target.code !== "") return { kind: "code", code: target.code };
   if (target.page !== "terrain") {
     return { kind: "unreadable", message: "This is neither a code nor a link to a terrain." };
   }

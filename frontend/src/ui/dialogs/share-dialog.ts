@@ -15,6 +15,7 @@ import {
   rememberLink,
   type ShareRole,
 } from "../../app/device/share-links.ts";
+import "./class-form.ts";
 import "./share-list.ts";
 import type { OpenTerrain } from "../../app/open-terrain.ts";
 import { SignalElement } from "../controls/signal-element.ts";
@@ -225,6 +226,7 @@ export class EskShare extends SignalElement {
         ${this.#link()}
         <p class="problem" role="alert">${this.problem}</p>
         ${role !== "view" && this.tab !== "owner" ? this.#codeRow(this.tab) : nothing}
+        ${role === "owner" && this.open ? html`<esk-class-form .terrain=${this.terrain.id} .secret=${this.terrain.secret}></esk-class-form>` : nothing}
         ${role === "owner" && this.preview?.available ? this.#picture(this.preview) : nothing}
         ${
           role === "owner" && this.links

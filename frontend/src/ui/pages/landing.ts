@@ -151,7 +151,21 @@ export class EskLanding extends LitElement {
     } else if (input.kind === "link") {
       window.location.assign(terrainPath(input.id, input.secret));
     } else {
-      void this.#open("join", () => api.join(input.code));
+      void this.#code(input.code);
+    }
+  }
+
+  /** A class asks for a name first, on a page of its own. */
+  async #code(code: string): Promise<void> {
+    if (this.busy) return;
+    this.busy = "join";
+    this.problem = "";
+    try {
+      const opened = await api.join(code);
+      window.location.assign("secret" in opened ? terrainPath(opened.id, opened.secret) : `/join#${code}`);
+    } catch (error) {
+      this.problem = sentence(error);
+      this.busy = "";
     }
   }
 

@@ -7,6 +7,7 @@ import { VIEW_ONLY } from "../../app/layers/groundwork.ts";
 import "../controls/icon-library.ts";
 import { DRAWN, DRAWN_ON, DRAWN_ON_MAP, hintWords } from "../../app/words/hints.ts";
 import { icon } from "../controls/icons.ts";
+import "../bars/class-note.ts";
 import "../bars/placing-bar.ts";
 import { memberName } from "../../app/device/names.ts";
 import { setFlag } from "../../app/device/storage.ts";
@@ -223,6 +224,7 @@ export class EskTerrain extends SignalElement {
         aria-label="Terrain. Enter draws with the arrow keys, question mark lists all keys."
       ></div>
       ${stage ? this.#chrome(stage) : this.#veil(session)}
+      ${session ? html`<esk-class-note .told=${session.inClass} .standing=${session.role} .state=${session.connection.state} .terrain=${session.id} .secret=${session.secret}></esk-class-note>` : nothing}
       ${session ? html`<esk-toasts .toasts=${session.toasts}></esk-toasts>` : nothing}
     `;
   }

@@ -1,0 +1,485 @@
+import "@awesome.me/webawesome/dist/components/qr-code/qr-code.js";
+import { effect, signal } from "@preact/signals-core";
+import { html, nothing, type TemplateResult } from "lit";
+import { ApiError } from "../../app/server/api.ts";
+import { type ClassInfo, ClassOrders, type Collecting } from "../../app/server/classes/class-api.ts";
+import { arrange, codeWords, copyName, type Sorting } from "../../app/server/classes/copies.ts";
+import { WallConnection } from "../../app/server/classes/wall.ts";
+import { terrainPath } from "../../app/server/links.ts";
+import { ago } from "../../app/words/words.ts";
+import { MAX_COMPARED, type WallCopy } from "../../generated/contract.ts";
+import { drawCard } from "../../gpu/map/card.ts";
+import { icon } from "../controls/icons.ts";
+import "../controls/segmented.ts";
+import { SignalElement } from "../controls/signal-element.ts";
+import { shared } from "../styles/shared.ts";
+import "./wall-compare.ts";
+import { wallStyles } from "./wall-styles.ts";
+
+const CARD_PX = 256;
+const SORTS = [
+  { value: "number", label: "As they came" },
+  { value: "name", label: "By name" },
+  { value: "last", label: "Drawn last" },
+];
+const POLL_MS = 400;
+const WORDS_MS = 15_000;
+
+/** `/wall/terrain/class#secret`: every copy of a class, live, for its teacher and the projector. */
+export class EskWall extends SignalElement {
+  static override styles = [shared, wallStyles];
+  static override properties = {
+    sorting: { state: true },
+    filter: { state: true },
+    chosen: { state: true },
+    comparing: { state: true },
+    asking: { state: true },
+    busy: { state: true },
+    problem: { state: true },
+    done: { state: true },
+    qr: { state: true },
+    collecting: { state: true },
+  };
+
+  terrain = "";
+  secret = "";
+  lesson = "";
+  declare sorting: Sorting;
+  declare filter: string;
+  declare chosen: ReadonlySet<number>;
+  declare comparing: readonly number[] | null;
+  /** What is about to be done and is asked for once more. */
+  declare asking: "delete" | "restart" | null;
+  declare busy: boolean;
+  declare problem: string;
+  /** What was done, in words. */
+  declare done: string;
+  declare qr: boolean;
+  declare collecting: Collecting | null;
+
+  #wall: WallConnection | null = null;
+  #orders: ClassOrders | null = null;
+  readonly #tick = signal(0);
+  readonly #stale = new Set<number>();
+  #frame = 0;
+  #timer: ReturnType<typeof setInterval> | undefined;
+  #stop: (() => void) | null = null;
+
+  constructor() {
+    super();
+    this.sorting = "number";
+    this.filter = "";
+    this.chosen = new Set();
+    this.comparing = null;
+    this.asking = null;
+    this.busy = false;
+    this.problem = "";
+    this.done = "";
+    this.qr = true;
+    this.collecting = null;
+  }
+
+  override connectedCallback(): void {
+    super.connectedCallback();
+    document.title = "The wall · Esker";
+    const { terrain, secret, lesson } = this;
+    const scheme = window.location.protocol === "https:" ? "wss" : "ws";
+    const wall = new WallConnection({ terrain, secret, lesson, url: `${scheme}://${window.location.host}/ws/wall` });
+    this.#wall = wall;
+    this.#orders = new ClassOrders(terrain, secret, lesson);
+    this.#timer = setInterval(() => {
+      this.#tick.value += 1;
+    }, WORDS_MS);
+    this.#stop = effect(() => {
+      if (wall.changed.value.size === 0) return;
+      for (const number of wall.take()) this.#stale.add(number);
+      this.#frame ||= requestAnimationFrame(() => this.#draw());
+    });
+    // For tests, which look at what was drawn.
+    Object.assign(window, { __wall: wall });
+  }
+
+  override disconnectedCallback(): void {
+    super.disconnectedCallback();
+    clearInterval(this.#timer);
+    cancelAnimationFrame(this.#frame);
+    this.#stop?.();
+    this.#wall?.close();
+  }
+
+  /** One card a frame: the page goes on answering, however many copies have changed. */
+  #draw(): void {
+    this.#frame = 0;
+    const number = this.#stale.values().next().value;
+    if (number === undefined) return;
+    this.#stale.delete(number);
+    const ground = this.#wall?.ground(number);
+    const copy = this.#wall?.copies.peek().get(number);
+    const canvas = this.renderRoot.querySelector<HTMLCanvasElement>(`canvas[data-copy="${number}"]`);
+    if (ground && copy && canvas && drawCard(ground, copy.settings, canvas, CARD_PX)) canvas.classList.add("drawn");
+    if (this.#stale.size > 0) this.#frame = requestAnimationFrame(() => this.#draw());
+  }
+
+  protected override updated(): void {
+    // A card that has just come into the page has an empty canvas.
+    for (const canvas of this.renderRoot.querySelectorAll<HTMLCanvasElement>("canvas[data-copy]:not(.drawn)"))
+      this.#stale.add(Number(canvas.dataset.copy));
+    if (this.#stale.size > 0) this.#frame ||= requestAnimationFrame(() => this.#draw());
+  }
+
+  async #do(what: (orders: ClassOrders) => Promise<string>): Promise<void> {
+    if (this.busy || this.#orders === null) return;
+    this.busy = true;
+    this.problem = this.done = "";
+    this.asking = null;
+    try {
+      this.done = await what(this.#orders);
+    } catch (error) {
+      this.problem = error instanceof ApiError ? error.message : "Something went wrong. Try again.";
+    } finally {
+      this.busy = false;
+    }
+  }
+
+  get #numbers(): number[] {
+    const there = this.#wall?.copies.value ?? new Map<number, WallCopy>();
+    return [...this.chosen].filter((n) => there.has(n)).sort((a, b) => a - b);
+  }
+
+  #toggle(number: number): void {
+    const next = new Set(this.chosen);
+    if (!next.delete(number)) next.add(number);
+    this.chosen = next;
+    this.asking = null;
+  }
+
+  /** Opens another page, which a browser allows only while the press is being handled. */
+  #open(get: (orders: ClassOrders) => Promise<{ id: string; secret: string }>, words: string): Promise<void> {
+    const page = window.open("about:blank", "_blank");
+    return this.#do(async (orders) => {
+      try {
+        const { id, secret } = await get(orders);
+        const path = terrainPath(id, secret);
+        if (page) page.location.href = window.location.origin + path;
+        else window.location.assign(path);
+        return words;
+      } catch (error) {
+        page?.close();
+        throw error;
+      }
+    });
+  }
+
+  #compare(numbers: readonly number[]): void {
+    this.comparing = numbers;
+    this.#wall?.focus(numbers);
+  }
+
+  async #collect(): Promise<void> {
+    await this.#do(async (orders) => {
+      let job = await orders.collect();
+      while (job.stage === "waiting" || job.stage === "collecting") {
+        this.collecting = job;
+        await new Promise((resolve) => setTimeout(resolve, POLL_MS));
+        job = await orders.collected(job.id);
+      }
+      this.collecting = null;
+      if (job.stage !== "done") throw new ApiError("failed", job.text || "The class could not be collected.");
+      const url = URL.createObjectURL(await orders.file(job.id));
+      const name = `${this.#wall?.state.peek()?.title || "class"}.zip`;
+      Object.assign(document.createElement("a"), { href: url, download: name }).click();
+      setTimeout(() => URL.revokeObjectURL(url), 10_000);
+      return "The class is collected: a file and a picture of each copy, and a table.";
+    });
+    this.collecting = null;
+  }
+
+  protected override render(): TemplateResult {
+    const wall = this.#wall;
+    if (wall === null) return html``;
+    const state = wall.state.value;
+    if (wall.over.value || state === null) return this.#closed(wall);
+    void this.#tick.value;
+    const copies = arrange([...wall.copies.value.values()], this.sorting, this.filter);
+    return html`
+      ${this.#head(state)} ${this.#toolbar(wall.copies.value.size)}
+      ${
+        wall.copies.value.size === 0
+          ? this.#nobody(state.code)
+          : html`<ul>${copies.map((copy) => this.#card(copy, state.show === copy.number))}</ul>`
+      }
+      ${this.#actions(state.show)}
+      ${this.comparing === null ? nothing : this.#compared(this.comparing)}
+    `;
+  }
+
+  /** Before anybody is here the way in fills the page. */
+  #nobody(code: string | null): TemplateResult {
+    if (code === null) return html`<div class="empty"><p>The door is closed, and nobody is in.</p></div>`;
+    return html`<div class="empty">
+      <p class="where">Open <strong>${window.location.host}</strong> and type</p>
+      <p class="letters">${codeWords(code)}</p>
+      <div class="qr"><wa-qr-code .value=${joinLink(code)} label="QR code to join" size="220"></wa-qr-code></div>
+      <p>Nobody is here yet.</p>
+      <p class="quiet">Each device that types the code gets its own copy, and it appears here.</p>
+    </div>`;
+  }
+
+  #closed(wall: WallConnection): TemplateResult {
+    const problem = wall.problem.value;
+    return html`<div class="empty">
+      <img src="/favicon.svg" alt="" width="52" height="52" />
+      <p role="status">${problem ?? "Opening the wall…"}</p>
+      <p class="problem" role="alert">${this.problem}</p>
+      ${
+        wall.over.value
+          ? html`<button class="btn outline" @click=${() => this.#bringBack()}>Bring a deleted class back</button>
+              <a class="btn" href=${terrainPath(this.terrain, this.secret)}>Go to the terrain</a>`
+          : nothing
+      }
+    </div>`;
+  }
+
+  async #bringBack(): Promise<void> {
+    await this.#do(async (orders) => {
+      await orders.bringBack();
+      window.location.reload();
+      return "";
+    });
+  }
+
+  #head(state: Pick<ClassInfo, "title" | "code" | "pupils">): TemplateResult {
+    const here = [...(this.#wall?.copies.value.values() ?? [])].reduce((sum, copy) => sum + copy.online, 0);
+    return html`<header>
+      <div class="title">
+        <h1>${state.title || "Untitled terrain"}</h1>
+        <p class="quiet">${state.pupils === 0 ? "The wall of this class" : `${here} of ${state.pupils} ${state.pupils === 1 ? "device is" : "devices are"} here`}</p>
+      </div>
+      ${
+        state.code === null
+          ? html`<button class="btn outline" ?disabled=${this.busy} @click=${() => this.#door(true)}>${icon("unlock")} Let more people in</button>`
+          : state.pupils === 0
+            ? nothing
+            : html`<div class="door">
+              <div>
+                <small>Open <strong>${window.location.host}</strong> and type</small>
+                <span class="letters" aria-label=${`Code ${state.code}`}>${codeWords(state.code)}</span>
+              </div>
+              ${this.qr ? html`<div class="qr"><wa-qr-code .value=${joinLink(state.code)} label="QR code to join" size="104"></wa-qr-code></div>` : nothing}
+              <button class="icon-btn" title="Close the door: who is in stays in" aria-label="Close the door" ?disabled=${this.busy} @click=${() => this.#door(false)}>
+                ${icon("xmark")}
+              </button>
+            </div>`
+      }
+    </header>`;
+  }
+
+  #door(open: boolean): Promise<void> {
+    return this.#do(async (orders) => {
+      await orders.door(open);
+      return open ? "" : "The door is closed. Who is in stays in.";
+    });
+  }
+
+  #toolbar(count: number): TemplateResult {
+    const problem = this.#wall?.problem.value ?? "";
+    return html`
+      <div class="tools">
+        <esk-segmented
+          label="Order"
+          .segments=${SORTS}
+          .value=${this.sorting}
+          @pick=${(e: CustomEvent<Sorting>) => {
+            this.sorting = e.detail;
+          }}
+        ></esk-segmented>
+        <input
+          class="field"
+          type="search"
+          placeholder="Find a name"
+          aria-label="Find a name"
+          .value=${this.filter}
+          @input=${(e: Event) => {
+            this.filter = (e.target as HTMLInputElement).value;
+          }}
+        />
+        <span class="grow"></span>
+        <button class="btn outline" ?disabled=${this.busy || count === 0} @click=${() => this.#push()}>
+          ${icon("share")} Send my additions
+        </button>
+        <button class="btn outline" ?disabled=${this.busy || count === 0} @click=${() => this.#collect()}>
+          ${icon("download")} ${this.collecting ? `Collecting, ${Math.round(100 * this.collecting.share)} %` : "Collect"}
+        </button>
+        <button
+          class="btn outline"
+          ?disabled=${this.busy}
+          @click=${() => {
+            this.asking = "delete";
+          }}
+        >
+          ${icon("trash")} Delete this class
+        </button>
+      </div>
+      ${problem || this.problem ? html`<p class="notice problem" role="alert">${this.problem || problem}</p>` : nothing}
+      ${this.done ? html`<p class="notice" role="status">${this.done}</p>` : nothing}
+      ${this.asking === "delete" ? this.#confirmDelete(count) : nothing}
+    `;
+  }
+
+  #push(): Promise<void> {
+    return this.#do(async (orders) => {
+      const { changed } = await orders.push();
+      if (changed === 0) return "There is nothing new in your terrain.";
+      return `Your additions are in ${changed === 1 ? "one copy" : `${changed} copies`}. What pupils changed stayed as they have it.`;
+    });
+  }
+
+  #confirmDelete(count: number): TemplateResult {
+    return html`<div class="notice" role="alertdialog" aria-label="Delete this class">
+      <span>Delete this class with ${count === 1 ? "its copy" : `its ${count} copies`}, all names and links? Within a week it can be brought back; at once, never.</span>
+      <button class="btn danger" @click=${() => this.#delete(false)}>Delete</button>
+      <button class="btn danger" @click=${() => this.#delete(true)}>Delete at once</button>
+      <button class="btn outline" @click=${this.#neverMind}>Keep it</button>
+    </div>`;
+  }
+
+  readonly #neverMind = (): void => {
+    this.asking = null;
+  };
+
+  #delete(atOnce: boolean): Promise<void> {
+    return this.#do(async (orders) => {
+      await orders.delete(atOnce);
+      return "";
+    });
+  }
+
+  #card(copy: WallCopy, shown: boolean): TemplateResult {
+    const name = copyName(copy);
+    const last = copy.last === null ? "nothing drawn yet" : ago(Date.now() - 1000 * copy.last);
+    const lines = copy.strokes === 1 ? "1 line" : `${copy.strokes} lines`;
+    return html`<li>
+      <button
+        class="copy"
+        aria-pressed=${this.chosen.has(copy.number) ? "true" : "false"}
+        aria-label=${`${name}, ${copy.online > 0 ? "here" : "away"}, ${last}, ${lines}`}
+        @click=${() => this.#toggle(copy.number)}
+      >
+        <span class="picture"><canvas data-copy=${copy.number} aria-hidden="true"></canvas></span>
+        <span class="badges">
+          ${shown ? html`<span class="badge shown">${icon("eye")} Shown to all</span>` : nothing}
+          ${copy.frozen ? html`<span class="badge">${icon("lock")} Frozen</span>` : nothing}
+        </span>
+        <span class="words">
+          <span class="name"><i class=${copy.online > 0 ? "dot here" : "dot"}></i><span title=${name}>${name}</span></span>
+          <span class="facts">${last} · ${lines}</span>
+        </span>
+      </button>
+    </li>`;
+  }
+
+  #actions(shown: number | null): TemplateResult | typeof nothing {
+    const numbers = this.#numbers;
+    if (numbers.length === 0 && shown === null) return nothing;
+    const copies = this.#wall?.copies.value;
+    const frozen = numbers.length > 0 && numbers.every((n) => copies?.get(n)?.frozen);
+    const [one] = numbers;
+    const single = numbers.length === 1 && one !== undefined;
+    const button = (words: string, name: string, on: () => unknown, able = true): TemplateResult =>
+      html`<button class="btn outline" ?disabled=${this.busy || !able} @click=${on}>${icon(name)} ${words}</button>`;
+    return html`<footer>
+      ${
+        shown === null
+          ? nothing
+          : html`<button class="btn primary" ?disabled=${this.busy} @click=${() => this.#show(null)}>${icon("eye-slash")} Stop showing</button>`
+      }
+      ${
+        numbers.length === 0
+          ? nothing
+          : html`<span class="count">${numbers.length === 1 ? copyName(copies!.get(one!)!) : `${numbers.length} copies`}</span>
+              ${button("Open", "arrow-right", () => single && this.#open((o) => o.open(one), ""), single)}
+              ${button("Show to all", "eye", () => single && this.#show(one), single)}
+              ${button("Compare", "swap", () => this.#compare(numbers), numbers.length === MAX_COMPARED)}
+              ${button("Put together", "layers", () => this.#open((o) => o.together(numbers), "The new terrain is open in a page of its own."), numbers.length > 1)}
+              ${button(frozen ? "Let them go on" : "Freeze", frozen ? "unlock" : "lock", () => this.#freeze(numbers, !frozen))}
+              ${
+                this.asking === "restart"
+                  ? html`<button class="btn danger" @click=${() => this.#restart(numbers)}>Yes, start again</button>
+                      <button class="btn outline" @click=${this.#neverMind}>No</button>`
+                  : button("Start again", "rotate", () => {
+                      this.asking = "restart";
+                    })
+              }
+              <button
+                class="btn"
+                @click=${() => {
+                  this.chosen = new Set();
+                }}
+              >
+                Choose none
+              </button>`
+      }
+      ${
+        numbers.length > 0 && copies && numbers.length < copies.size
+          ? html`<button
+              class="btn"
+              @click=${() => {
+                this.chosen = new Set(copies.keys());
+              }}
+            >
+              Choose all
+            </button>`
+          : nothing
+      }
+    </footer>`;
+  }
+
+  #show(number: number | null): Promise<void> {
+    return this.#do(async (orders) => {
+      await orders.show(number);
+      return "";
+    });
+  }
+
+  #freeze(numbers: readonly number[], frozen: boolean): Promise<void> {
+    return this.#do(async (orders) => {
+      await orders.freeze(frozen, numbers);
+      return "";
+    });
+  }
+
+  #restart(numbers: readonly number[]): Promise<void> {
+    return this.#do(async (orders) => {
+      const { changed } = await orders.restart(numbers);
+      return changed === 0
+        ? "They were as they began already."
+        : "They are as they were at the beginning. What was drawn stays in their history.";
+    });
+  }
+
+  #compared(numbers: readonly number[]): TemplateResult {
+    return html`<esk-wall-compare
+      .wall=${this.#wall}
+      .numbers=${numbers}
+      @close=${() => {
+        this.comparing = null;
+        this.#wall?.focus([]);
+        this.requestUpdate();
+      }}
+    ></esk-wall-compare>`;
+  }
+}
+
+/** What the picture of the code holds: the page on which a name is asked for. */
+function joinLink(code: string): string {
+  return `${window.location.origin}/join#${code}`;
+}
+
+customElements.define("esk-wall", EskWall);
+
+/** The page, to be put into the document. */
+export function wallPage(terrain: string, lesson: string, secret: string): HTMLElement {
+  const page = document.createElement("esk-wall") as EskWall;
+  Object.assign(page, { terrain, lesson, secret });
+  return page;
+}
