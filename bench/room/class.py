@@ -178,7 +178,8 @@ async def _play(base: str, process: psutil.Process, options: argparse.Namespace)
     terrain = await asyncio.to_thread(_serving.post, f"{base}/api/terrains", {"title": "A class"})
     path = f"{base}/api/terrains/{terrain['id']}/classes"
     made = await asyncio.to_thread(_serving.post, path, {"places": options.pupils}, terrain["secret"])
-    times, pupils = _Times(), {}
+    times = _Times()
+    pupils: dict[int, _Pupil] = {}
     wall = asyncio.create_task(_wall(base, made, terrain["secret"], pupils, times))
     began = time.perf_counter()
     came = await asyncio.gather(*(_come_in(base, made, n, times) for n in range(options.pupils)))

@@ -411,3 +411,12 @@ def test_a_laptop_sleeps_and_returns(server: LiveServer, teacher: Teacher) -> No
     back.ops(("ada20:2", set_op("mine", label="late")))
     assert back.wait("reject")["code"] == "frozen"
     assert _strokes(server, ada.terrain, ada.seat) == {"mine", "t1"}
+
+
+def test_a_class_comes_in_behind_one_address(tmp_path: Path) -> None:
+    """SPEC L66: a right code counts once for each device, so forty devices of one school come in at once."""
+    with LiveServer(tmp_path) as server:
+        teacher = Teacher(server)
+        for n in range(c.DEFAULT_PUPILS):
+            assert server.http("POST", "/api/join", {"code": teacher.made["code"]})[0] == 200
+            assert Pupil(teacher, f"P{n}").status == 201

@@ -133,6 +133,7 @@ class WallSession:
         self._told: c.Wall | None = None
         self._seen, self._looked = -1, float("-inf")
         self._start: c.TerrainSettings | None = None
+        self._rousing: set[asyncio.Task[None]] = set()
 
     async def run(self, messages: AsyncIterator[str | bytes]) -> None:
         """Serves the wall until either side ends it."""
@@ -268,7 +269,9 @@ class WallSession:
             if copy.room is None and not copy.drawn and not copy.waking and now >= copy.wake_at:
                 copy.waking, copy.wake_at = True, now + WAKE_AGAIN_SECONDS
                 busy += 1
-                asyncio.create_task(self._rouse(copy))  # noqa: RUF006  (it is short, and ends by itself)
+                task = asyncio.create_task(self._rouse(copy))
+                self._rousing.add(task)
+                task.add_done_callback(self._rousing.discard)
 
     async def _rouse(self, copy: _Copy) -> None:
         try:

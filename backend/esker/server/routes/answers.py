@@ -126,19 +126,23 @@ def limited(request: Request, rates: Rates, what: str, link: Link | None = None)
         raise Cannot(429, "rate_limited", f"Too many {what} from your {whose}. Wait a minute.")
 
 
-def guess(request: Request, find: Callable[[], T | None]) -> T:
+def guess(request: Request, find: Callable[[], T | None], *, again: bool = False) -> T:
     """Returns what a typed code opens; who types wrong ones is slowed down, by address and over the whole server.
 
+    ``again``: the code was asked for just now, as everybody in a class does; a right one does not count a second time.
     Raises Cannot (404, 429).
     """
     state = request.app.state
-    limited(request, state.code_tries, "join codes came")
     who, now = asker(request), time.monotonic()
+    if not again or not state.code_tries.has(who, now):
+        limited(request, state.code_tries, "join codes came")
     if not state.wrong_codes.has(who, now):
         raise Cannot(429, "rate_limited", "Somebody is guessing codes. Wait a minute, or ask for the link.")
     found = find()
     if found is None:
         state.wrong_codes.take(who, now)
+        if again:
+            limited(request, state.code_tries, "join codes came")
         raise bad_code()
     return found
 

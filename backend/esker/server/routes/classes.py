@@ -190,7 +190,7 @@ def _add_seats(app: FastAPI, classes: Classes) -> None:
 
     @app.post("/api/classes/{lesson}/seats", status_code=201)
     async def sit(request: Request, lesson: str, body: NewSeat) -> dict[str, Any]:
-        found = guess(request, lambda: classes.by_code(body.code))
+        found = guess(request, lambda: classes.by_code(body.code), again=True)
         if found.id != lesson:
             raise Cannot(404, "bad_code", "This code opens another class. Type it again.")
         if classes.store.seated(body.seat) is None:
