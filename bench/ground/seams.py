@@ -30,7 +30,7 @@ SUN: Final = (0.55, -0.28, 0.79)
 
 
 class Plain(Base):
-    """The same ground as the blend alone leaves it."""
+    """The ground as the blend alone leaves it."""
 
     @property
     def seam_blend(self) -> SeamBlend:

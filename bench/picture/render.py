@@ -159,7 +159,7 @@ def beside_cesium(
 
 
 def growth(browser: Browser, base: str, ground: dict[str, Any], args: argparse.Namespace) -> dict[str, Any]:
-    """The same view of terrains of ever more samples, plain shading, τ = 1.5."""
+    """Measures one view of terrains of ever more samples, plain shading, τ = 1.5."""
     out: dict[str, Any] = {}
     with _browser.page(browser, f"{base}/dev/bench.html", "globalThis.bench !== undefined") as page:
         page.evaluate("g => bench.load(g)", ground)

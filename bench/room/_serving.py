@@ -49,9 +49,10 @@ def server() -> Iterator[str]:
 
 @contextmanager
 def running(where: Path | None = None) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
-    """The same with its process. ``where``: the folder in which its data folder is made (default: the temporary one).
+    """Runs a server as ``server`` does, and gives its process too.
 
-    Raises RuntimeError when it does not start.
+    ``where``: the folder in which its data folder is made (default: the temporary one). Raises RuntimeError when the
+    server does not start.
     """
     port = free_port()
     with tempfile.TemporaryDirectory(prefix="esker-bench-", dir=where) as folder:

@@ -37,9 +37,9 @@ TERRAINS: Final = 12
 LINKS: Final = ("edit", "edit", "edit", "view", "view")
 AT_ONCE: Final = 24
 FRAMES_EACH: Final = 120
-"""Of a connection, at most."""
+"""Frames of a connection, at most."""
 STRANGERS: Final = 0.1
-"""Of connections: those that are not let in."""
+"""Share of the connections that are not let in."""
 ANSWER_SECONDS: Final = 60.0
 TELL_SECONDS: Final = 30.0
 DRAW_EVERY: Final = 0.25

@@ -67,7 +67,7 @@ def _curve(size: float, rng: random.Random) -> tuple[tuple[float, float], ...]:
 
 
 def _rises(size: float, rng: random.Random) -> tuple[float, ...]:
-    """Of a course: falling, so that a river is taken, or anything."""
+    """Rises of a course: falling, so that a river is taken, or anything."""
     ends = (0.0, size, -size, 1e-300, c.ABSOLUTE_BOUND_M, -c.ABSOLUTE_BOUND_M, rng.uniform(-size, size))
     rises = [rng.choice(ends) for _ in range(rng.randint(0, LONGEST))]
     return tuple(sorted(rises, reverse=True) if rng.random() < 0.5 else rises)

@@ -1,4 +1,4 @@
-"""The same systems by other solvers: PyAMG (Ruge-Stüben, smoothed aggregation), and direct ones (SuperLU, CHOLMOD).
+"""Other solvers on the same systems: PyAMG (Ruge-Stüben, smoothed aggregation), and direct ones (SuperLU, CHOLMOD).
 
 Each runs in a process of its own under a limit of address space and of time, so that one that needs more than the
 machine has says so and the run goes on. The system is the height step's, float64, free samples alone; making the

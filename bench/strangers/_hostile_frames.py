@@ -30,7 +30,7 @@ TEXTS: Final = (
 IDS: Final = tuple(f"s{n}" for n in range(6))
 MOST_ITEMS: Final = 5
 FATAL: Final = 0.02
-"""Of frames that break the framing or the envelope, upon which the server hangs up."""
+"""Share of frames that break the framing or the envelope. The server hangs up upon these."""
 
 
 class Frames:

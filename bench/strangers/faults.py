@@ -207,7 +207,7 @@ class Siege:
 
 
 def killed(kills: int, seed: int, tell: Callable[[str], object] = lambda _: None) -> dict[str, Any]:
-    """So many kills, each kind in turn; what was found."""
+    """Kills servers ``kills`` times, each kind in turn. Returns what was found."""
     come_back_soon()
     with tempfile.TemporaryDirectory(prefix="esker-faults-") as folder:
         siege = Siege(Path(folder), seed)

@@ -51,6 +51,17 @@ function oldWords(text: string): string[] {
   return [...new Set([...words].map((m) => m[0].toLowerCase()).filter((word) => Object.hasOwn(OLD, word)))];
 }
 
+/** Beginnings of sentences whose noun stands somewhere else. */
+const OPENING = /^(?:That|Of|As of|So many|So much|The same|Whose|Theirs|Its own|And)\b/;
+
+/** Comments of a text, each from its first word on. Lines with // that follow each other are one. */
+function comments(text: string): string[] {
+  const found = text.matchAll(
+    /\/\*\*?\s*(?:\*\s)?\s*([^*\n]*)|((?:^[ \t]*\/\/[^\n]*\n)+)|(?<=[;,{}() ])\/\/ ([^\n]*)/gm,
+  );
+  return [...found].map((m) => (m[1] ?? m[2]?.replace(/^[ \t]*\/\/ ?/, "") ?? m[3] ?? "").trim());
+}
+
 describe("words", () => {
   const files = [...sources(join(PAGE, "src")), ...sources(join(PAGE, "test"))];
 
@@ -60,6 +71,18 @@ describe("words", () => {
       return oldWords(`${name}\n${readFileSync(path, "utf8")}`).map((word) => `${name}: ${word}, say ${OLD[word]}`);
     });
     expect(wrong).toEqual([]);
+  });
+
+  it("stand in sentences that have their noun (SPEC H513)", () => {
+    const wrong = sources(join(PAGE, "src")).flatMap((path) => {
+      const riddles = comments(readFileSync(path, "utf8")).filter((comment) => OPENING.test(comment));
+      return riddles.map((riddle) => `${relative(PAGE, path)}: ${riddle.split("\n")[0]}`);
+    });
+    expect(wrong).toEqual([]);
+    const text =
+      "/** Of masks. */\n/**\n * The same as above.\n */\n  // That is over.\n  // of it\nx(); // And why.\n";
+    expect(comments(text).filter((comment) => OPENING.test(comment))).toHaveLength(4);
+    expect(comments("// Offsets\n// of masks\n/** Andes */\n").filter((c) => OPENING.test(c))).toEqual([]);
   });
 
   it("would notice an old one", () => {

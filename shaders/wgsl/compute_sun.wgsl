@@ -69,7 +69,7 @@ fn place_on(start: Start, offset: vec2f, level: u32) -> Place {
   return Place(page(level, vec2u(kept / TILE_CELLS)), kept % TILE_CELLS, part);
 }
 
-// The same in the atlas: on `wanted` or the nearest coarser level that is there.
+// Returns the place in the atlas: on `wanted` or the nearest coarser level that is there.
 fn locate(start: Start, offset: vec2f, wanted: u32) -> Place {
   var level = wanted;
   var found = place_on(start, offset, level);

@@ -120,8 +120,8 @@ fn channel_place(level: u32, index: vec2i) -> ChannelPlace {
   return ChannelPlace(low, low + 1u, vec2f(i - (low << shift)) / f32(1u << shift));
 }
 
-// Of a node: (amplitude, roughness), (snow, grass), (forest, wetness), and with data or gullies (survey, far), (erosion,
-// nothing).
+// Channels of a node: (amplitude, roughness), (snow, grass), (forest, wetness), and with data or gullies (survey, far),
+// (erosion, nothing).
 fn channel_value(row: u32, col: u32, which: u32) -> vec2f {
   return channels[site.stride * (row * ((1u << site.channel_bits) + 1u) + col) + which];
 }
@@ -256,7 +256,7 @@ fn root_start(job: SynthJob, at: vec2i) -> Start {
   return Start(ground, before, Grounds(z, z));
 }
 
-// The same from the parent's samples.
+// Returns the start at the children of a cell from the parent's samples.
 fn child_start(cell: Cell) -> Start {
   let a = ground_row(cell, 0u);
   let b = ground_row(cell, 1u);

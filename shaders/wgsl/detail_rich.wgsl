@@ -12,8 +12,8 @@ fn noise_sample(at: vec2f, dx: vec2f, dy: vec2f, scale: f32) -> vec4f {
   return textureSampleGrad(noise, smooth_repeat, at * k, dx * k, dy * k);
 }
 
-// The same rock on all faces: sampled on three planes, weighted by the normal. On faces it is drawn out downhill, as water
-// cuts it.
+// Rock that is the same on all faces: sampled on three planes, weighted by the normal. On faces it is drawn out
+// downhill, as water cuts it.
 fn rock_noise(p: vec3f, n: vec3f, f: Footprint, scale: f32) -> vec4f {
   var w = n * n;
   w = w * w;

@@ -49,13 +49,14 @@ fn covers(s: vec2f, lake: f32) -> bool {
   return s.y == lake && s.x < lake;
 }
 
-// Of one sample: how far it lies inside a lake or above it, metres; below zero on lower ground that is not the lake's.
+// Returns how far one sample lies inside a lake or above it, metres; below zero on lower ground that is not the lake's.
 fn lake_side(s: vec2f, lake: f32) -> f32 {
   return select(s.x - lake, lake - s.x, covers(s, lake));
 }
 
-// The same between the samples: a lake ends where the ground outside its basin falls below it. Where it covers none of the
-// four samples around, all four must be its shore: beyond the brim finer ground may dip below it.
+// Returns whether a place between samples lies in a lake. A lake ends where the ground outside its basin falls below it.
+// Where the lake covers none of the four samples around, all four must be its shore: beyond the brim finer ground may dip
+// below the lake.
 fn inside_lake(p: vec2f, lake: f32) -> f32 {
   let at = lake_lattice(p);
   let i = lake_cell(at);

@@ -34,7 +34,7 @@ CALLS = re.compile(
 
 
 def environment() -> dict[str, str]:
-    """Of a process without POSIX whose system writes text in a code page of its own."""
+    """The environment of a process without POSIX whose system writes text in a code page of its own."""
     text = {"PYTHONIOENCODING": "cp1252", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", "LC_ALL": "C"}
     kept = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "ESKER_"))}
     return kept | text | {"PYTHONPATH": str(WITHOUT)}

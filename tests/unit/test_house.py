@@ -87,6 +87,22 @@ def violations(room: str, names: Iterator[str]) -> Iterator[str]:
                 yield f"{room} imports esker.{target}"
 
 
+def ranks(text: str) -> tuple[frozenset[str], ...]:
+    """The ranks that a text gives: names in backquotes, with an arrow between two ranks."""
+    chain = re.search(r"`\w+`(?:[\s,←]+`\w+`)+", text)
+    assert chain is not None
+    return tuple(frozenset(re.findall(r"`(\w+)`", rank)) for rank in chain[0].split("←"))
+
+
+def test_documents_give_the_ranks_that_are_kept() -> None:
+    """SPEC H514."""
+    kept = tuple(rooms - {"__main__"} for rooms in LAYERS)
+    for path, start in (("tests/SPEC.md", "- **H1** "), ("docs/design.md", "- **Imports point one way.** ")):
+        text = (ROOT / path).read_text(encoding="utf-8").split(start, 1)[1]
+        assert ranks(text[text.index("`compiled`") :]) == kept, path
+    assert ranks("`a`, `b` ←\n`c`") == (frozenset({"a", "b"}), frozenset({"c"}))
+
+
 def test_every_room_has_a_rank() -> None:
     assert {room for room, _ in modules()} <= RANK.keys()
 

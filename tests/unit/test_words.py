@@ -1,7 +1,8 @@
-"""The backend and the benchmarks say each thing in one word, the glossary's (SPEC H512, docs/glossary.md)."""
+"""The backend and the benchmarks say each thing in one word, the glossary's (SPEC H512, H513, docs/glossary.md)."""
 
 from __future__ import annotations
 
+import ast
 import io
 import re
 import tokenize
@@ -78,6 +79,46 @@ def test_words_are_the_glossarys() -> None:
     """SPEC H512."""
     files = {path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8") for path in sources()}
     assert [found for name, text in files.items() for found in old_words(name, text)] == []
+
+
+OPENINGS = re.compile(r"(That|Of|As of|So many|So much|The same|Whose|Theirs|Its own|And)\b")
+"""Beginnings of sentences whose noun stands somewhere else."""
+
+
+def remarks(source: str) -> Iterator[str]:
+    """Docstrings, of attributes too, and comments. Lines of comments that follow each other are one."""
+    for node in ast.walk(ast.parse(source)):
+        body = getattr(node, "body", None)
+        for each in body if isinstance(body, list) else ():
+            if (
+                isinstance(each, ast.Expr)
+                and isinstance(each.value, ast.Constant)
+                and isinstance(each.value.value, str)
+            ):
+                yield each.value.value
+    before = -1
+    for token in tokenize.generate_tokens(io.StringIO(source).readline):
+        if token.type == tokenize.COMMENT:
+            if token.start[0] != before + 1:
+                yield token.string.lstrip("# ")
+            before = token.start[0]
+
+
+def riddles(source: str) -> list[str]:
+    """Comments and docstrings that begin without their noun."""
+    return [said.split("\n")[0] for said in remarks(source) if OPENINGS.match(said)]
+
+
+def test_sentences_have_their_noun() -> None:
+    """SPEC H513."""
+    found = {path.relative_to(ROOT).as_posix(): riddles(path.read_text(encoding="utf-8")) for path in sources()}
+    assert {name: said for name, said in found.items() if said} == {}
+
+
+def test_a_riddle_is_noticed() -> None:
+    assert riddles('x = 1\n"""Of the relief."""\n# And from which on it is not.\ny = 2  # That is over.\n') != []
+    assert len(riddles('"""The same as above."""\n# Whose turn it is,\n# of all rooms.\n')) == 2
+    assert riddles('"""Offsets that have theirs."""\n# A line that goes on\n# of itself.\n') == []
 
 
 def test_exceptions_are_needed() -> None:

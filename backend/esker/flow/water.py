@@ -27,7 +27,7 @@ Mask = NDArray[np.bool_]
 NO_SEA: Final = -(1 << 40)
 """A sea below all ground."""
 MOST_SAMPLES: Final = 1 << 30
-"""So many samples have indices and areas in 32 bits."""
+"""Indices and areas of so many samples fit 32 bits."""
 MOST_QUANTA: Final = (1 << 31) - 1
 
 

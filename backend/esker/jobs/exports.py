@@ -31,7 +31,8 @@ log = logging.getLogger("esker.exporting")
 OPEN: Final = Share(12, address=8, network=10, link=4)
 """Exports that wait or are made at a time, of the whole server; one is made, the others wait for their turn."""
 OPEN_IN_ROOM: Final = Share(4, address=2, network=2, link=2, reserve=(2, 1))
-"""Of these those of one terrain: links to look have two at most, who draws has three, and the last is an owner's."""
+"""Exports of one terrain among these: links to look have two at most, people who draw have three, and the last is an
+owner's."""
 KEPT_SECONDS: Final = 10 * 60.0
 """How long a file, or why there is none, can be asked for."""
 KEPT_BYTES: Final = 1 << 30
@@ -79,9 +80,9 @@ class Job:
     folder: Path
     status: ExportStatus
     place: Place
-    """Of those that the server has; with who asked for it."""
+    """A place among those that the server has; it knows who asked for it."""
     seat: Place
-    """Of those that the terrain has."""
+    """A place among those that the terrain has."""
     task: asyncio.Task[None] | None = None
     ended: float = 0.0
 

@@ -61,7 +61,7 @@ class Job:
     """The client in whose name the layer is added."""
     work: Path
     place: Place
-    """Of those that the server has; with who brings the file in."""
+    """A place among those that the server has; it knows who brings the file in."""
     terrain: str = ""
     caller: Caller | None = None
     """Who brings it in, as a lesson knows them; None: a lesson has no say."""

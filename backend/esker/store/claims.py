@@ -1,4 +1,4 @@
-"""Whose a client id is (decision 33).
+"""Owners of client ids (decision 33).
 
 Client ids are chosen by clients and known to everybody in a room. Whoever claims one first is given a token for it, and
 comes again only with that: the time of the claim and a hash over it that only this server can make, bound to terrain

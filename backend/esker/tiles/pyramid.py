@@ -33,7 +33,7 @@ PREVIEW_STEP: Final = 8
 """Quanta in which a preview changes samples of the finest level; half as many on each level above, so that all levels
 are equally exact in metres, and an error of a parent is none to its children. Settled levels are exact."""
 EARLY_PREVIEWS: Final = 8
-"""So many coarsest previews are remembered: a finest preview is of one that was shown since its job began."""
+"""Coarsest previews that are remembered: a finest preview is of one that was shown since its job began."""
 FOLLOW_TILES: Final = 256
 """A level follows the movement of at most so many parents. With more, as after a change of all the ground, it starts
 afresh."""

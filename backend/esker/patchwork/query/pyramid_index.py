@@ -45,8 +45,11 @@ class Tree(NamedTuple):
 
 
 class Boxes(NamedTuple):
-    """Of every patch of a model: ``low``, ``max_z`` and ``kernel`` as there; ``corners`` (n, 4, 2) of its domain, in
-    turn, and the ``box`` (n, 4) around it, x0, y0, x1, y1."""
+    """The boxes of all patches of a model:
+
+    ``low``, ``max_z`` and ``kernel`` as there; ``corners`` (n, 4, 2) of the domains, in turn, and the ``box`` (n, 4)
+    around each, x0, y0, x1, y1.
+    """
 
     low: Floats
     max_z: Floats

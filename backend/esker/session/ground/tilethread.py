@@ -18,7 +18,7 @@ from typing import Any, Final
 
 PATIENCE: Final = 0.1
 MOST_HOMES: Final = 4_096
-"""So many homes are remembered; those that had a turn longest ago are forgotten."""
+"""The thread remembers so many homes; those that had a turn longest ago are forgotten."""
 
 _Work = tuple[Future[Any], Callable[[], Any], float]
 
@@ -128,7 +128,10 @@ class TileThread(Executor):
             return work
 
     def _chosen(self) -> Lane:
-        """Whose turn it is, of lanes that have work. ``_was_late`` then says whether frames were late."""
+        """Returns the lane whose turn it is, of those that have work.
+
+        ``_was_late`` then says whether frames were late.
+        """
         levels = [lane for lane in self._lanes if lane.levels]
         homes, since = {_home(lane) for lane in levels}, self._now() - PATIENCE
         late = [] if self._was_late or not levels else [lane for lane in self._lanes if _home(lane) not in homes]

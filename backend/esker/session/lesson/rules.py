@@ -23,7 +23,7 @@ WAIT: Final = (
     "Somebody with your address was sent out, so whoever leads this terrain must let you in. Ask them, then try again."
 )
 MOST_WAITING: Final = 50
-"""Of whoever asks to be let in the server remembers so many."""
+"""The server remembers so many people who ask to be let in."""
 NO_CHANGE: Final = "Only whoever leads the lesson may do this."
 OWNERS_ONLY: Final = "Only an owner of the terrain may say who else leads."
 NOT_OWNERS: Final = "An owner of the terrain cannot be sent out. Their link can be revoked."
@@ -156,7 +156,7 @@ class Lesson:
             return op.model_copy(update={"ops": tuple(_signed(part, shown) for part in op.ops)})
         return _signed(op, shown)
 
-    def told(self, who: Somebody, look: str | None) -> c.Lesson:
+    def message_for(self, who: Somebody, look: str | None) -> c.Lesson:
         """How the lesson stands, as somebody may know it. ``look``: the client whose view all follow."""
         state, conducts = self.state, self.conducts(who)
         out = {each.person: each.name for each in state.removed} if conducts else {}

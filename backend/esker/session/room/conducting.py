@@ -122,7 +122,7 @@ class Conducting:
     def tell(self) -> None:
         """Tells everybody how the lesson stands."""
         for member in self._core.members:
-            member.outbox.message(self._core.told(member))
+            member.outbox.message(self._core.lesson_for(member))
 
     # --- what conductors say ------------------------------------------------------------------------------------
 

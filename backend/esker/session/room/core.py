@@ -103,7 +103,7 @@ class RoomCore:
         self._kept: dict[bool, tuple[int, bytes]] = {}
         """Encoded documents with their clocks. The key says whether they are as links to look are shown them."""
         self._unsigned: tuple[int, bytes] | None = None
-        """The same without the names of who drew what."""
+        """The encoded document without the names of people who drew, with its clock."""
 
     # --- people -------------------------------------------------------------------------------------------------
 
@@ -222,7 +222,7 @@ class RoomCore:
             clock=now,
             members=self.members.public(member),
             device=info.device,
-            lesson=self.told(member),
+            lesson=self.lesson_for(member),
         ).model_dump_json(exclude={"document", "ops"})
         if missed is not None:
             return (f'{head[:-1]},"document":null,"ops":[{",".join(self._as_seen(member, missed))}]}}',)
@@ -239,9 +239,9 @@ class RoomCore:
             self._unsigned = clock, unsigned(body)
         return self._unsigned[1]
 
-    def told(self, member: Member) -> c.Lesson:
+    def lesson_for(self, member: Member) -> c.Lesson:
         """How the lesson stands, as a member may know it."""
-        return self.lesson.told(member, self.look)
+        return self.lesson.message_for(member, self.look)
 
     def _looks(self, member: Member) -> bool:
         """Returns whether a member is shown what a link to look shows."""

@@ -58,7 +58,7 @@ class Waiting:
         return all(self._of[kind, key] + size <= self.share.most(kind) for kind, key in _named(who))
 
     def count(self, who: Who, size: int) -> None:
-        """So many bytes more wait for ``who``; fewer where ``size`` is negative."""
+        """Counts ``size`` bytes more that wait for ``who``; fewer where ``size`` is negative."""
         self.held += size
         for key in _named(who):
             self._of[key] += size

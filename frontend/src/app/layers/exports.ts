@@ -34,9 +34,9 @@ export interface ExportChoice {
   readonly detail: boolean;
   /** Whether masks sum to one. */
   readonly weights: boolean;
-  /** Of contour maps. */
+  /** Options of contour maps. */
   readonly paper: Required<PaperOptions>;
-  /** Of solids for printers. */
+  /** Options of solids for printers. */
   readonly model: Required<ModelOptions>;
 }
 

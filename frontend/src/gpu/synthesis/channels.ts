@@ -28,7 +28,7 @@ export interface ChannelWords extends ChannelFacts {
   readonly values: Float32Array<ArrayBuffer>;
 }
 
-/** Of a terrain of which no channel is known yet. */
+/** Facts of a terrain of which no channel is known yet. */
 export const NO_CHANNELS: ChannelFacts = {
   bits: 0,
   varied: false,

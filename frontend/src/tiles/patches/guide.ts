@@ -36,7 +36,7 @@ export function fillKnown(heightOf: HeightOf, { level, r0, r1, c0, c1 }: Area, o
   return known;
 }
 
-/** The same; false when one of them is not known. */
+/** Fills an area as `fillKnown` does. Returns false when one of the samples is not known. */
 export function fillArea(heightOf: HeightOf, area: Area, out: Float64Array): boolean {
   return fillKnown(heightOf, area, out) === (area.r1 - area.r0) * (area.c1 - area.c0);
 }
