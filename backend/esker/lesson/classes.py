@@ -59,7 +59,7 @@ class Classes:
         self._locks: dict[str, asyncio.Lock] = {}
         self.hear: list[Callable[[str], object]] = []
         """Who is told that something of a class changed."""
-        hub.class_of = self.told
+        hub.class_of = self.facts_of
 
     # --- a class ------------------------------------------------------------------------------------------------
 
@@ -182,7 +182,7 @@ class Classes:
 
     # --- what pages are told ------------------------------------------------------------------------------------
 
-    def told(self, terrain: str) -> c.InClass | None:
+    def facts_of(self, terrain: str) -> c.InClass | None:
         """What members of a terrain are told of the class whose copy it is; None where it is no copy."""
         found = self.store.copy_of(terrain)
         lesson = None if found is None else self.store.find(found[0])
@@ -209,7 +209,7 @@ class Classes:
         for copy in self.store.copies(lesson) if copies is None else copies:
             room = self.hub.open_room(copy.terrain)
             if room is not None:
-                room.tell_class(self.told(copy.terrain))
+                room.tell_class(self.facts_of(copy.terrain))
 
     def _changed(self, lesson: str) -> None:
         for hears in self.hear:

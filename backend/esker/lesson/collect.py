@@ -207,7 +207,7 @@ class Collections:
                 self._forget(job)
 
     def _drop_deleted(self, lesson: str) -> None:
-        """Of a class that was deleted nothing stays here either."""
+        """Drops what is kept here of a class that was deleted."""
         found = self._classes.store.find(lesson)
         for job in list(self._jobs.values()):
             if job.lesson.id == lesson and (found is None or found.ended is not None):

@@ -117,7 +117,7 @@ def _put(strokes: dict[str, c.Stroke], stroke: c.Stroke) -> None:
 
 
 def groups(ops: Sequence[c.SimpleOp]) -> Iterator[c.Op]:
-    """The same ops in groups that are neither too many nor too long, in order."""
+    """Yields the ops in groups that are neither too many nor too long, in order."""
     held: list[c.SimpleOp] = []
     points = 0
     for op in ops:

@@ -83,10 +83,10 @@ class _Copy:
     last: float | None = None
     strokes: int = 0
     online: int = 0
-    told: c.WallCopy | None = None
+    notified: c.WallCopy | None = None
 
     def facts(self) -> c.WallCopy:
-        """What is told of it now."""
+        """Returns the facts that pages are told of the copy now."""
         return c.WallCopy(
             number=self.number,
             terrain=self.terrain,
@@ -130,7 +130,7 @@ class WallSession:
         self._copies: dict[int, _Copy] = {}
         self._focus: tuple[int, ...] = ()
         self._focusing = TokenBucket(FOCUS_PER_SECOND, 4 * FOCUS_PER_SECOND)
-        self._told: c.Wall | None = None
+        self._notified: c.Wall | None = None
         self._seen, self._looked = -1, float("-inf")
         self._start: c.TerrainSettings | None = None
         self._rousing: set[asyncio.Task[None]] = set()
@@ -304,8 +304,8 @@ class WallSession:
         changed = []
         for copy in self._copies.values():
             facts = copy.facts()
-            if facts != copy.told:
-                copy.told = facts
+            if facts != copy.notified:
+                copy.notified = facts
                 changed.append(facts)
         wall = c.Wall(
             lesson=lesson,
@@ -318,10 +318,12 @@ class WallSession:
             show=self._classes.shown(lesson),
             copies=tuple(changed),
         )
-        still = self._told is not None and wall.model_copy(update={"expires_s": 0.0, "copies": ()}) == self._told
+        still = (
+            self._notified is not None and wall.model_copy(update={"expires_s": 0.0, "copies": ()}) == self._notified
+        )
         if still and not changed:
             return None
-        self._told = wall.model_copy(update={"expires_s": 0.0, "copies": ()})
+        self._notified = wall.model_copy(update={"expires_s": 0.0, "copies": ()})
         return wall
 
     async def _farewell(self, code: CloseCode, reason: str) -> None:

@@ -353,7 +353,7 @@ class NumpyWorkspace:
         """See ``device_workspace.DeviceWorkspace``: nothing is ever parked here."""
 
     def rest(self) -> None:
-        """The same."""
+        """See ``device_workspace.DeviceWorkspace``: nothing is ever parked here either."""
 
     def load(self, strokes: Sequence[Stroke], settings: TerrainSettings, base: Base | None = None) -> None:
         """Rasterise and coarsen."""

@@ -94,11 +94,11 @@ def _add_class(app: FastAPI, classes: Classes) -> None:
     async def make(request: Request, terrain: str, link: OwnerLink, body: NewClass) -> dict[str, Any]:  # noqa: ARG001
         limited(request, app.state.new_terrains, "new terrains came")
         made = await classes.make(link, body.title, body.together, body.places, body.at, asker(request, link))
-        return _told(classes, made)
+        return _answer(classes, made)
 
     @app.get(path)
     async def all_classes(terrain: str, link: OwnerLink) -> list[dict[str, Any]]:  # noqa: ARG001
-        return [_told(classes, each) for each in classes.store.of_terrain(link.terrain)]
+        return [_answer(classes, each) for each in classes.store.of_terrain(link.terrain)]
 
     @app.delete(f"{path}/{{lesson}}")
     async def delete(request: Request, lesson: str, link: OwnerLink, at_once: bool = False) -> dict[str, Any]:
@@ -109,15 +109,15 @@ def _add_class(app: FastAPI, classes: Classes) -> None:
     @app.post(f"{path}/{{lesson}}/restore")
     async def restore(lesson: str, link: OwnerLink) -> dict[str, Any]:
         await classes.bring_back(classes.owned(link, lesson, ended=True))
-        return _told(classes, classes.owned(link, lesson))
+        return _answer(classes, classes.owned(link, lesson))
 
     @app.post(f"{path}/{{lesson}}/door")
     async def door(request: Request, lesson: str, link: OwnerLink, body: Door) -> dict[str, Any]:
         limited(request, app.state.new_codes, "join codes were made", link)
-        return _told(classes, await classes.door(classes.owned(link, lesson), body.open))
+        return _answer(classes, await classes.door(classes.owned(link, lesson), body.open))
 
 
-def _told(classes: Classes, found: Class) -> dict[str, Any]:
+def _answer(classes: Classes, found: Class) -> dict[str, Any]:
     keys = ("id", "terrain", "title", "created", "clock", "together", "places", "ended")
     left = max(0.0, found.code_until - classes.store.now())
     pupils, copies = len(classes.store.pupils(found.id)), len(classes.store.copies(found.id))

@@ -30,14 +30,14 @@ class ClassRoom:
         """Whether nobody but owners may change it."""
         return self.in_class is not None and self.in_class.frozen
 
-    def tell_class(self, told: c.InClass | None) -> None:
+    def tell_class(self, facts: c.InClass | None) -> None:
         """Something may have changed of the class whose copy this is; where it did, everybody is told."""
-        if told == self.in_class:
+        if facts == self.in_class:
             return
-        self.in_class = told
-        if told is not None:
+        self.in_class = facts
+        if facts is not None:
             for member in self.core.members:
-                member.outbox.message(told)
+                member.outbox.message(facts)
 
     def watch(self, outlet: FrameOutlet, top: int) -> Stream:
         """The ground up to level ``top`` for somebody who is no member. Watching does not keep a room open."""
