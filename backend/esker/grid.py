@@ -57,7 +57,10 @@ def arena_bytes(level: int, based: bool = False) -> int:
 
 
 def solve_bytes(level: int, based: bool = False) -> int:
-    """Returns the bytes of a solve and its preview workspace: 90 MiB at level 4, 109 over a base; a level more, 4 times."""
+    """Returns the bytes of a solve and its preview workspace.
+
+    Level 4 takes 90 MiB, 109 over a base; each further level takes four times as much.
+    """
     preview = arena_bytes(PREVIEW_WORKSPACE_LEVEL, based) if level >= PREVIEW_WORKSPACE_FROM else 0
     return arena_bytes(level, based) + preview
 
