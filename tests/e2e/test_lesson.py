@@ -113,6 +113,46 @@ def test_a_teacher_leads_a_lesson(visitors: Visitors, server: Server) -> None:
     assert teacher.errors == []
 
 
+QUIET = """() => {
+  const bar = document.querySelector("esk-terrain").shadowRoot.querySelector("esk-lesson-bar");
+  return !bar.shadowRoot.textContent.includes("Hands off");
+}"""
+SMALL = """() => {
+  const panel = document.querySelector("esk-terrain").shadowRoot.querySelector("esk-lesson-panel").shadowRoot;
+  const touched = [...panel.querySelectorAll("button, wa-switch")];
+  return touched.map((e) => [e.textContent.trim() || e.ariaLabel, e.getBoundingClientRect().height])
+    .filter(([, height]) => height < 40);
+}"""
+
+
+def test_a_lesson_is_led_from_a_phone(visitors: Visitors, server: Server) -> None:
+    """SPEC L28: by touch at 390 and at 720 pixels: what is pressed has 40 pixels, and nothing scrolls sideways."""
+    terrain, secret = server.create(title="Phone")
+    link = json.loads(server.request("POST", f"/api/terrains/{terrain}/links", {"role": "edit"}, secret))
+    for width, height in ((390, 780), (720, 540)):
+        pupils = [pupil(visitors, name, f"/t/{terrain}#{link['secret']}") for name in ("Anne", "Ben")]
+        teacher = visitors(width, height, device_scale_factor=1, has_touch=True, is_mobile=width < 720)
+        teacher.open(f"/t/{terrain}#{secret}")
+        press(teacher, "More")
+        teacher.page.locator("wa-dropdown-item", has_text="Lead the lesson").tap()
+        teacher.page.get_by_text("people are here").wait_for()
+        switch(teacher, "Hands off")
+        says(teacher, "Hands off")
+        press(teacher, "A pen for all")
+        says(pupils[0], "You have a pen")
+        assert teacher.js(SMALL) == []
+        assert teacher.js("() => document.scrollingElement.scrollWidth <= window.innerWidth")
+        teacher.shot(f"lesson-panel-{width}")
+        # The keys do the same.
+        toggle = teacher.page.locator("esk-lesson-panel wa-switch", has_text="Hands off")
+        toggle.focus()
+        teacher.page.keyboard.press("Space")
+        wait(pupils[0], QUIET)
+        for each in (teacher, *pupils):
+            each.context.close()
+            visitors.made.remove(each)
+
+
 def test_the_page_for_parents(visitors: Visitors, server: Server) -> None:
     """SPEC L25: it needs no link, and says that nothing leaves the server."""
     parent = visitors(seen=True, width=720, height=900)

@@ -178,7 +178,8 @@ export function historyViewBar({ session }: Stage, beside: boolean): TemplateRes
   ></esk-history-view-bar>`;
 }
 
-export function lessonBar({ session }: Stage): TemplateResult {
+export function lessonBar({ session }: Stage): TemplateResult | typeof nothing {
+  if (session.connection.state.value === "closed") return nothing;
   return html`<esk-lesson-bar .lesson=${session.lesson} .mayEdit=${session.mayEdit} .client=${session.client}></esk-lesson-bar>`;
 }
 

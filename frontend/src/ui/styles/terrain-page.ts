@@ -163,6 +163,11 @@ export const terrainPageStyles = css`
     max-width: calc(100% - 2 * var(--edge));
     transform: translateX(-50%);
   }
+  /* Below sentences that stand in its place. */
+  .closed ~ esk-lesson-bar,
+  .importing ~ esk-lesson-bar {
+    top: 128px;
+  }
   .importing .icon {
     color: var(--esk-accent-text);
   }
