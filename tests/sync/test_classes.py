@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import csv
 import io
 import secrets
@@ -14,6 +15,7 @@ import pytest
 
 from esker import contract as c
 from esker.document import archive
+from esker.document.ops import Refusal
 from esker.fairness.shares import Rates
 from tests.sync.harness import PATIENCE, LiveServer, Peer, set_op, stroke
 
@@ -420,3 +422,16 @@ def test_a_class_comes_in_behind_one_address(tmp_path: Path) -> None:
         for n in range(c.DEFAULT_PUPILS):
             assert server.http("POST", "/api/join", {"code": teacher.made["code"]})[0] == 200
             assert Pupil(teacher, f"P{n}").status == 201
+
+
+def test_nothing_is_laid_in_a_frozen_copy(server: LiveServer, teacher: Teacher) -> None:
+    """SPEC L68: an import that is ready is refused like an op."""
+    ada = Pupil(teacher, "Ada")
+    peer = ada.join("ada21")
+    assert teacher.ask("freeze", {"frozen": True})[0] == 200
+    assert [peer.wait("class")["frozen"] for _ in range(2)] == [False, True]
+    room = server.assembly.hub.open_room(ada.terrain)
+    assert room is not None
+    op = c.SetTerrain(fields=c.TerrainFields(title="by an import"))
+    with pytest.raises(Refusal, match="frozen"):
+        asyncio.run_coroutine_threadsafe(room.perform(op, "import-1", "ada21"), room._loop).result(PATIENCE)
