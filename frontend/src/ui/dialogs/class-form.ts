@@ -106,7 +106,7 @@ export class EskClassForm extends LitElement {
         >
           ${EACH.map((words, k) => html`<option value=${k + 1} ?selected=${this.together === k + 1}>${words}</option>`)}
         </select>
-        <button class="btn solid" ?disabled=${this.busy} @click=${() => this.#make()}>${icon("plus")} Make a class</button>
+        <button class="btn outline" ?disabled=${this.busy} @click=${() => this.#make()}>${icon("plus")} Make a class</button>
       </div>
       <p class="problem" role="alert">${this.problem}</p>
       ${
@@ -116,8 +116,7 @@ export class EskClassForm extends LitElement {
               ${this.classes.map(
                 (each) => html`<li>
                   <a class="btn outline" href=${wallPath(this.terrain, each.id, this.secret)}>
-                    ${icon("map")} The wall of ${ago(Date.now() - 1000 * each.created)} · ${each.pupils}
-                    ${each.pupils === 1 ? "device" : "devices"}
+                    ${icon("map")} To the wall · ${each.pupils} ${each.pupils === 1 ? "device" : "devices"} · made ${ago(Date.now() - 1000 * each.created)}
                   </a>
                 </li>`,
               )}
