@@ -287,9 +287,11 @@ class WallSession:
         if wall is not None:
             await self._transport.send_text(wall.model_dump_json(), lambda: None)
         for copy in list(self._copies.values()):
-            if copy.room is None or copy.stream is None or now < copy.next_at:
+            if copy.room is None or copy.stream is None:
                 continue
             room, stream = copy.room, copy.stream
+            if now >= copy.next_at:
+                room.look_again(stream)
             while (frame := room.watched(stream)) is not None:
                 header = bytes((copy.number & 255, copy.number >> 8, copy.fresh, 0))
                 copy.fresh, copy.quiet_since, copy.next_at = False, now, now + c.WALL_PACE_MS / 1000

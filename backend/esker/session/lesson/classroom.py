@@ -48,11 +48,17 @@ class ClassRoom:
         self._feed.remove(stream)
 
     def watched(self, stream: Stream) -> bytes | None:
-        """The binary frame that waits for who watches; it counts as received at once."""
+        """The binary frame that waits for who watches. No other is made until ``look_again``: what is sent then is the
+        ground of that moment, and not one that was kept since."""
         frame = self._feed.sent(stream)
         if frame is not None:
-            self._feed.credit(stream, len(frame))
+            stream.in_flight = c.BYTE_WINDOW
         return frame
+
+    def look_again(self, stream: Stream) -> None:
+        """From now on a frame is made when there is something new."""
+        if not stream.frames:
+            self._feed.credit(stream, stream.in_flight)
 
     @property
     def settled(self) -> bool:
