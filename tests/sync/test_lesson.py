@@ -410,6 +410,23 @@ def test_the_server_names_people_after_animals(server: LiveServer) -> None:
     assert history["people"]["zoo-a"]["name"] == names["zoo-a"]
 
 
+def test_animals_stay_the_same_over_a_restart(tmp_path: Path) -> None:
+    """SPEC L19: whoever comes back first."""
+    with LiveServer(tmp_path) as server:
+        room = a_class(server, "ark")
+        room.teacher.say("conduct", animals="en")
+        lesson(room.anne, animals="en")
+        crowd = [server.join(room.terrain, room.edit, f"ark-{k}") for k in range(60)]
+        names = {m["person"]: m["name"] for m in crowd[-1].welcome["members"]}
+    with LiveServer(tmp_path) as server:
+        for k, pupil in reversed(list(enumerate(crowd))):
+            ticket = pupil.welcome["ticket"]
+            last = server.join(room.terrain, room.edit, f"ark2-{k}", ticket=ticket)
+        now = {m["person"]: m["name"] for m in last.welcome["members"]}
+    assert len(now) == 60
+    assert all(names[each] == name for each, name in now.items())
+
+
 def test_everything_of_one_person_is_taken_back(server: LiveServer) -> None:
     """SPEC L20 to L22: as one step of the conductor's, over all pages of the person; what others changed stays."""
     room = a_class(server, "undo")

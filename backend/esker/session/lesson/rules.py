@@ -253,6 +253,10 @@ class Lesson:
             }
         )
 
+    def with_names(self) -> State:
+        """The state with the animals that people were called after since."""
+        return self._named({})
+
     def _named(self, wanted: Mapping[str, object]) -> State:
         return self.state.model_copy(update={**wanted, "named": dict(self._numbers)})
 

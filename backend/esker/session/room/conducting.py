@@ -92,6 +92,10 @@ class Conducting:
     def joined(self, member: Member) -> None:
         """Somebody came in: whose view all followed goes on showing."""
         self._gone.pop(member.person, None)
+        lesson = self._core.lesson
+        if lesson.state.animals and member.role != "view" and member.person not in lesson.state.named:
+            lesson.state = lesson.with_names()  # so that they are called the same after a restart
+            self._journal.keep_lesson(self._core.document.id, lesson.state.model_dump_json())
         if self._core.look is None and self._core.lesson.state.look == member.person:
             self._stop_grace()
             self._core.look = member.client
@@ -155,6 +159,8 @@ class Conducting:
         """The lesson stands so from now on."""
         lesson = self._core.lesson
         lesson.state = state
+        if not state.removed:
+            lesson.waiting.clear()  # the door is open to all
         if self._core.look is not None and state.look is None:
             self._core.look = None
         self._core.members.switched()

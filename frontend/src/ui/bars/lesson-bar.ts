@@ -65,9 +65,13 @@ export class EskLessonBar extends SignalElement {
   declare client: string;
 
   protected override render(): TemplateResult {
-    return html`<div role="status" aria-live="polite" style="display: contents">
-      ${this.#look()} ${this.#hands()} ${this.#kept()}
-    </div>`;
+    const said = [this.#look(), this.#hands(), this.#kept()];
+    // Other sentences make way for what is said here.
+    this.toggleAttribute(
+      "speaks",
+      said.some((each) => each !== nothing),
+    );
+    return html`<div role="status" aria-live="polite" style="display: contents">${said}</div>`;
   }
 
   #look(): TemplateResult | typeof nothing {

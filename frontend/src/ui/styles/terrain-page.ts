@@ -378,7 +378,7 @@ export const terrainPageStyles = css`
       top: 66px;
     }
     /* Sentences that matter more have that place. */
-    :host([drawer]) .hint:has(~ .closed, ~ .importing) {
+    :host([drawer]) .hint:has(~ .closed, ~ .importing, ~ esk-lesson-bar[speaks]) {
       bottom: calc(var(--drawer) + var(--edge) + 62px);
       top: auto;
     }

@@ -1,0 +1,81 @@
+"""The rules of a lesson by themselves (SPEC L7, L9, L10, L16, L19)."""
+
+from __future__ import annotations
+
+import json
+
+from esker import contract as c
+from esker.session.lesson import names
+from esker.session.lesson.rules import REMOVED, WAIT, Hand, Lesson
+from esker.session.lesson.state import MOST, Removed, State, read, with_people
+from esker.session.room import protocol
+from esker.session.room.entry import Caller
+
+
+def pupil(person: str, role: c.Role = "edit") -> Caller:
+    return Caller(role, person, "", None)
+
+
+def test_everybody_has_another_animal() -> None:
+    """SPEC L19: more people than animals, too; who it is says which."""
+    for language in ("en", "de"):
+        numbers: list[int] = []
+        for k in range(3 * names.COUNT):
+            numbers.append(names.choose(f"p{k}", set(numbers)))
+        called = [names.animal(each, language) for each in numbers]
+        assert len(set(called)) == len(called)
+        assert all(len(each) <= c.MAX_NAME_LENGTH for each in called)
+    assert names.choose("p1", ()) == names.choose("p1", {names.choose("p1", ()) + 1})
+
+
+def test_the_door() -> None:
+    """SPEC L9, L10."""
+    lesson = Lesson(State(removed=(Removed(person="ben", name="Ben", address="192.0.2.7", at=1_000),)))
+    assert lesson.door(pupil("ben"), 500, "198.51.100.1") == REMOVED
+    assert lesson.door(pupil("new"), None, "192.0.2.7") == WAIT
+    assert lesson.door(pupil("young"), 1_000, "192.0.2.7") == WAIT
+    assert lesson.door(pupil("old"), 999, "192.0.2.7") is None
+    assert lesson.door(pupil("new"), None, "198.51.100.1") is None
+    assert lesson.door(pupil("ben", "owner"), 500, "192.0.2.7") is None
+    for k in range(200):
+        lesson.waits(f"w{k}", "")
+    assert len(lesson.waiting) == 50
+    lesson.state = lesson.turned(c.People(action="let_in", people=("new", "ben")))
+    assert lesson.door(pupil("new"), None, "192.0.2.7") is None
+    assert lesson.door(pupil("ben"), 500, "192.0.2.7") is None
+
+
+def test_what_nobody_is_known_to_have_brought_is_protected() -> None:
+    """SPEC L16."""
+    hands = {"a": Hand("anne", False), "t": Hand("ray", True)}
+    lesson = Lesson(State(protect=True), {"s-anne": "a", "s-ray": "t", "s-lost": "x"}, hands)
+    assert [lesson.protected(each) for each in ("s-anne", "s-ray", "s-lost", "s-old")] == [False, True, True, True]
+
+
+def test_a_state_that_cannot_be_read_switches_nothing() -> None:
+    """SPEC L8."""
+    whole = State(hands_off=True, pens=("anne",), named={"anne": 3})
+    assert read(whole.model_dump_json(), "t") == whole
+    for broken in ("", "{", '{"hands_off": 1}', json.dumps({"pens": ["x"] * (MOST + 1)}), None):
+        assert read(broken, "t") == State()
+
+
+def test_lists_of_people_have_a_bound() -> None:
+    """SPEC L2: the first are forgotten."""
+    known: tuple[str, ...] = ()
+    for start in range(0, 2 * MOST, 200):
+        known = with_people(known, tuple(f"p{k}" for k in range(start, start + 200)))
+    assert len(known) == MOST
+    assert known[-1] == f"p{2 * MOST - 1}"
+    assert with_people(("a", "b"), ("a",)) == ("b", "a")
+
+
+def test_switches_have_a_rate() -> None:
+    """SPEC L7: the surplus is dropped, with one notice a second."""
+    connection = protocol.Connection(0.0, c.SUBPROTOCOL)
+    hello = c.Hello(protocol=c.PROTOCOL_VERSION, terrain="t", secret="s", client="c")
+    connection.text(hello.model_dump_json(), 0.0)
+    text = c.Conduct(hands_off=True).model_dump_json()
+    events = [event for _ in range(60) for event in connection.text(text, 1.0)]
+    assert sum(isinstance(event, protocol.Message) for event in events) == protocol.CONDUCTS_BURST
+    assert sum(isinstance(event, protocol.Reply) for event in events) == 1
