@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from esker.events import PAUSE, Level
+from esker import grid
+from esker.events import PAUSE, Level, Preview
 from esker.solve import solving
 from esker.solve.constraints.constraints import AT_A_STRETCH, Packer
 from esker.solve.solver import Solver
@@ -84,3 +85,24 @@ def test_an_early_preview_that_would_take_longer_than_a_turn_is_left_out(monkeyp
     assert steps.early_preview([*moved, *STROKES[3:40]], SETTINGS) is not None, "they are known by now"
     assert steps.early_preview(STROKES[:40], SETTINGS.model_copy(update={"reach_m": 50.0})) is None
     steps.close()
+
+
+def test_a_preview_from_the_ground_before_is_left_between_its_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """SPEC S507: after the raster, the gradient and a cycle of the heights."""
+    monkeypatch.setattr(grid, "PREVIEW_WORKSPACE_FROM", 2)
+    monkeypatch.setattr(grid, "PREVIEW_WORKSPACE_LEVEL", 1)
+    solver, strokes = Solver(max_level=2), mixed(20, 4)
+    if solver.device is None:
+        pytest.skip("NumPy queues nothing")
+    solver.solve(strokes, SETTINGS)
+    moved = [strokes[0].model_copy(update={"last": (2000.0, 2000.0, 40.0)}), *strokes[1:]]
+    events = []
+    for event in solver.steps(moved, SETTINGS):
+        events.append(event)
+        if isinstance(event, Preview) and event.level == 2:
+            break
+    assert isinstance(events[0], Preview), "the coarsest comes first"
+    after_channels = max(k for k, event in enumerate(events[:-1]) if isinstance(event, Level))
+    pauses = events[after_channels + 1 : -1]
+    assert pauses == [PAUSE] * len(pauses)
+    assert len(pauses) >= 4, "one of the channels, and three of its own"

@@ -169,11 +169,15 @@ def amended(w: Workspace, settings: TerrainSettings, relief_m: float) -> Iterato
     """The finest preview of an edit from the ground before it, which ``w`` still holds: no level of full multigrid, and
     as many cycles as it takes. No result where those are too many: full multigrid is better then.
 
-    Each cycle takes off the error of the ground of before, too, so edits may follow each other.
+    Each cycle takes off the error of the ground of before, too, so edits may follow each other. The work can be left
+    between the steps, as a newer stroke's first preview waits for what was begun.
     """
+    yield PAUSE
     amend_gradient(w, settings)
+    yield PAUSE
     amend_guidance(w)
     multigrid.cycle(w.height)
+    yield PAUSE
     for more in range(AMEND_CYCLES - 1):
         if more == 1:  # a large edit: then what is left of the gradient's error counts, too
             multigrid.cycle(w.gradient)

@@ -341,7 +341,7 @@ class Solver:
         was: then the others go with it, so that what settles depends on the strokes alone."""
         settings, shown = job.settings, False
         if edited:
-            for result in passes.amended(workspace, settings, workspace.relief_m):
+            for result in self._paced(passes.amended(workspace, settings, workspace.relief_m), paced=True):
                 if isinstance(result, Preview):
                     shown, workspace.solved_for = True, passes.conditions(job)
                 yield result
