@@ -46,6 +46,8 @@ ALL_SECONDS: Final = 45.0
 """About what an attack takes with its recovery where settling takes long: so much is kept for all of them at once."""
 SHORT: Final = (3.0, 1.0)
 """Seconds of drawing and of recovery in the short form."""
+ALONE_EVERY: Final = 5
+"""Before every so manyth attack the people draw without one, so that the machine's own noise is known."""
 TIMES: Final = {"ack_p99_ms": 2.0, "tile_p50_ms": 2.0, "settling_s": 3.0}
 """Aims: times what the same room has without an attack, while it goes on and after it."""
 MOST_MEMORY_MB: Final = 2048
@@ -252,7 +254,8 @@ async def _run(server: Server, names: Sequence[str], plan: Plan) -> tuple[dict[s
     known = {"stranger": (own["id"], own["secret"]), "viewer": (made["id"], viewer["secret"])}
     people = await _people(server.base, made["id"], made["secret"])
     await _drawn(people, 2.0)
-    out: dict[str, Any] = {"alone": await _drawn(people, plan.seconds) | {"server": server.state()}}
+    alone = [await _drawn(people, plan.seconds)]
+    out: dict[str, Any] = {"alone": alone[0] | {"server": server.state()}}
     attacks = [([name], role) for name in names for role in ROLES if role == "stranger" or name in BY_LINK]
     if len(names) > 1:
         attacks += [(list(names), role) for role in ROLES]
@@ -262,16 +265,32 @@ async def _run(server: Server, names: Sequence[str], plan: Plan) -> tuple[dict[s
         if time.monotonic() > plan.until - (plan.kept if len(group) == 1 else 0.0):
             left.append(name)
             continue
+        if len(out) % ALONE_EVERY == 0:
+            alone.append(await _drawn(people, plan.seconds))
         out[name] = await _besieged(server, group, plan, known[role], people)
+    out["alone"] |= floor(alone)
     for person in people:
         await person.ws.close()
     return out, left
+
+
+def floor(alone: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Returns the medians of what was measured without an attack, and how many times them the worst was.
+
+    So much the machine does by itself: of an attack that costs less nothing is known.
+    """
+    medians = {key: round(float(np.median([figures[key] for figures in alone])), 2) for key in TIMES}
+    worst = {key: max(figures[key] for figures in alone) for key in TIMES}
+    times = {key: round(worst[key] / medians[key], 2) for key in TIMES if medians[key]}
+    return medians | {"times_measured": len(alone), "floor": times}
 
 
 def judged(runs: dict[str, Any]) -> dict[str, list[str]]:
     """Adds ``times_alone`` to each run, during and after; returns which aims do not hold, in words, by run."""
     alone, wrong = runs["alone"], dict[str, list[str]]()
     for name, figures in runs.items():
+        if name == "alone":
+            continue
         said = wrong.setdefault(name, [])
         for when, found in (("", figures), (" afterwards", figures.get("after", {}))):
             times = {key: round(found[key] / alone[key], 2) for key in TIMES if found.get(key) and alone[key]}

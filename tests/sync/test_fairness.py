@@ -22,7 +22,7 @@ from typing import Any
 import pytest
 
 from esker import contract as c
-from esker.fairness.shares import Full, Who
+from esker.fairness.shares import Full, Rate, Rates, Who
 from esker.server.wire import descriptors
 from esker.server.wire.http import Connections
 from esker.session.room import history_view
@@ -83,6 +83,22 @@ def test_a_stranger_in_all_rooms_of_the_past_gives_one_up(live: LiveServer) -> N
     assert (code, error and error["message"]) == (c.WS_CLOSE["room_full"], history_view.YIELDED)
     for peer in (*strangers[1:], me):
         peer.close()
+
+
+def test_views_of_the_history_come_at_a_rate(live: LiveServer) -> None:
+    """SPEC A448: a viewer opened 40 a second, each of which reads the journal, and the server grew by 1.6 GB."""
+    live.assembly.hub._history_hellos = Rates(Rate(1e-6, 3.0))
+    terrain, secret = live.create()
+    for i in range(3):
+        looking = enter(live, STRANGER, terrain, secret, f"h{i}", at=0)
+        looking.wait("welcome")
+        looking.close()
+    code, error = enter(live, STRANGER, terrain, secret, "h3", at=0).closed()
+    assert (code, error and error["code"]) == (c.WS_CLOSE["rate_limited"], "rate_limited")
+    for address, more in ((STRANGER, {}), (CITIZEN, {"at": 0})):
+        others = enter(live, address, terrain, secret, f"o{len(more)}", **more)
+        others.wait("welcome")
+        others.close()
 
 
 def test_a_link_to_look_does_not_take_all_seats(tmp_path: Path) -> None:

@@ -39,6 +39,15 @@ def test_aims_that_do_not_hold_are_named() -> None:
     assert runs["fine"]["after"]["times_alone"]["settling_s"] == 1.0
 
 
+def test_the_machine_s_own_noise_is_measured() -> None:
+    """SPEC P404: one measurement without an attack, on a busy machine, made every attack look good or bad."""
+    found = siege.floor([figures(ack_p99_ms=ack) for ack in (10.0, 30.0, 12.0)])
+    assert (found["ack_p99_ms"], found["times_measured"]) == (12.0, 3)
+    assert found["floor"] == {"ack_p99_ms": 2.5, "tile_p50_ms": 1.0, "settling_s": 1.0}
+    still = siege.floor([figures(settling_s=0.0)])
+    assert "settling_s" not in still["floor"]
+
+
 def test_people_draw_what_is_taken_and_their_ground_settles(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """SPEC P404: each first change was refused, and what is refused was waited for as if it were on its way."""
     monkeypatch.setattr(siege, "_attack", lambda *_: None)

@@ -46,6 +46,8 @@ REST_SECONDS: Final = 600.0
 """Where the server has no place left, a room in which nobody did anything for so long is closed for a newcomer."""
 RESTED: Final = "Nobody did anything here for a while, so the server made room for others. Reload the page to go on."
 WRONG_SECRETS_PER_MINUTE: Final = 30
+HISTORY_HELLOS: Final = Rate(1.0, 60.0)
+"""Views of the history of one address, or by one link, that are opened: each reads the journal and is solved anew."""
 HELLOS: Final = Rate(5.0, 300.0)
 """Pages that may come from one address, or by one link: a full room may come back at once."""
 WAITING_BYTES: Final = 256 << 20
@@ -106,6 +108,7 @@ class Hub:
         """Threads that make files of stored data."""
         self._history_rates = history_rates()
         self._hellos = Rates(HELLOS, link=HELLOS)
+        self._history_hellos = Rates(HISTORY_HELLOS, link=HISTORY_HELLOS)
         self.waiting = Waiting(min(WAITING_BYTES, memory.available_bytes() // 16))
         """Bytes that wait to be sent to everybody."""
         self._closing = False
@@ -155,16 +158,16 @@ class Hub:
         if self._closing:
             raise Denied("shutting_down", "The server is stopping. Your page will come back by itself.")
         link = self.authorise(hello.terrain, hello.secret, address)
+        who = Who(address, link.id)
+        rates = self._hellos if hello.at is None else self._history_hellos
+        if not rates.take(who, self._now()):
+            raise Denied("rate_limited", "Too many pages came at once. Yours comes back by itself.")
         if hello.at is not None:
-            who = Who(address, link.id)
             present = partial(self.strokes, hello.terrain, None, who) if link.role == "view" else None
             read = partial(self.read, who)
             self.caller(link, hello.ticket, address)
             hide = link.role != "owner" and self.lesson_of(hello.terrain).state.hide
             return await self._history_rooms.enter(hello, who, outbox, lambda: self.demand(link), read, present, hide)
-        who = Who(address, link.id)
-        if not self._hellos.take(who, self._now()):
-            raise Denied("rate_limited", "Too many pages came at once. Yours comes back by itself.")
         while True:
             room = await self.room(hello.terrain, who)
             asked = await room.prepare(hello.clock, partial(self.read, who), link.role == "view")
