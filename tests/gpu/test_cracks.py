@@ -29,6 +29,16 @@ def test_no_crack_shows_from_above_below_and_the_side(page: Page, seed: int) -> 
     assert (report["full"], report["blind"]) == (10, 0)
 
 
+def test_no_crack_shows_where_heights_are_drawn_larger(page: Page) -> None:
+    """N25, R8, R9: heights three times as large: nothing opens, and nothing that is seen is culled."""
+    report = page.evaluate("() => esker.crackTest(1, 24, { full: 8, exaggeration: 3 })")
+    assert report["failures"] == []
+    assert report["cracks"] == 0
+    assert report["nans"] == 0
+    assert report["covered"] > 24 * 256 * 192 * 0.8
+    assert report["mixed"] >= 12
+
+
 def test_no_crack_shows_near_the_ground_of_the_largest_terrain(page: Page) -> None:
     """R8, R20, R22, R50: metres from a ground 65 km wide, refined around the place only, tiles still entering."""
     report = page.evaluate("() => esker.deepCrackTest(5, 16, { full: 8 })")

@@ -27,6 +27,8 @@ const MISSING = 0.06;
 export interface How {
   /** Every how many views one has its look and light. */
   readonly full?: number;
+  /** Heights are seen so many times larger than they are. */
+  readonly exaggeration?: number;
   /** Without edge bits and corner weights, to see the test fail. */
   readonly spoil?: boolean;
 }
@@ -134,8 +136,8 @@ export async function crackTest(seed: number, views: number, how: How = {}): Pro
       const kind = KINDS[k % 4]!;
       if (k % CAMERAS_A_TREE === 0) view.cut(next);
       const tau = 0.6 + 5 * next() ** 2;
-      const scene = sceneOf(view, camera(kind, next, view), look);
-      const drawn = await picture(rig, world, scene, tau, { full: isFull(seed, done, how) });
+      const state = { ...camera(kind, next, view), exaggeration: how.exaggeration ?? 1 };
+      const drawn = await picture(rig, world, sceneOf(view, state, look), tau, { full: isFull(seed, done, how) });
       tally.add(drawn, kind, `view ${done} ${kind} tau ${tau.toFixed(2)}`);
     }
     world.atlas.destroy();

@@ -3,6 +3,7 @@ import { css } from "lit";
 export const measurePanelStyles = css`
   :host {
     display: grid;
+    grid-template-columns: minmax(0, 1fr);
     gap: 8px;
     padding: 10px 12px 12px;
     font-size: 0.8125rem;
@@ -166,9 +167,20 @@ export const measurePanelStyles = css`
       grid-template-columns: repeat(2, auto 1fr);
     }
   }
-  @media (max-width: 430px) {
+  @media (max-width: 520px) {
+    dl,
+    dl.wide {
+      gap: 3px 8px;
+      font-size: 0.75rem;
+    }
     dl.wide {
       grid-template-columns: auto 1fr;
+    }
+    header .btn {
+      padding: 0 6px;
+    }
+    header .btn .icon {
+      display: none;
     }
   }
 `;

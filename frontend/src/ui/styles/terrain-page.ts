@@ -106,6 +106,10 @@ export const terrainPageStyles = css`
       transform: translateY(10px);
     }
   }
+  /* The panel stands where the legend does. */
+  .foot:has(~ esk-measure) esk-legend {
+    display: none;
+  }
   esk-measure[beside] {
     right: calc(var(--edge) + 340px);
   }
