@@ -326,6 +326,42 @@ describe("the map", () => {
   });
 });
 
+describe("contours on the map (SPEC N21, N22, N23)", () => {
+  const style = {
+    look: "natural",
+    sizeM: 4096,
+    seaM: null,
+    lakes: null,
+    contourM: 20,
+    contours: true,
+    slope: false,
+  } as const;
+  const whole = (share: number) => ({ side: 2, values: new Float32Array(4).fill(share) });
+  /** A plain on which the detail wavers about 20 m, the height of a contour. */
+  const noisy = Float32Array.from({ length: 69 * 69 }, (_, i) => 20 + 0.8 * Math.sin(i * 12.9898));
+  const slope = Float32Array.from({ length: 69 * 69 }, (_, i) => (i % 69) * 8);
+  const shade = (slot: Float32Array, over: object): Uint8ClampedArray => {
+    const out = new Uint8ClampedArray(128 * 128 * 4);
+    shadeTile(slot, { level: 0, x: 0, y: 0 }, 128, { ...style, ...over }, out);
+    return out;
+  };
+  const inked = (slot: Float32Array, over: object): number => {
+    const [plain, lines] = [shade(slot, { ...over, contours: false }), shade(slot, over)];
+    return lines.reduce((sum, v, i) => sum + Math.abs(v - plain[i]!), 0);
+  };
+
+  it("are not drawn where the solved ground is flat, and as ever where it rises", () => {
+    expect(inked(noisy, {})).toBeGreaterThan(10_000);
+    expect(inked(noisy, { contourShares: whole(0) })).toBe(0);
+    expect(inked(slope, { contourShares: whole(1) })).toBe(inked(slope, {}));
+  });
+
+  it("follow the interval, and are wider for projectors", () => {
+    expect(inked(slope, { contourM: 100 })).toBeLessThan(0.6 * inked(slope, { contourM: 40 }));
+    expect(inked(slope, { contourM: 100, lineScale: 1.7 })).toBeGreaterThan(1.2 * inked(slope, { contourM: 100 }));
+  });
+});
+
 describe("opening a device", () => {
   const canvas = {} as HTMLCanvasElement;
 
