@@ -21,7 +21,7 @@ from esker.api.terrain import default_solver
 from esker.cli import main as command_line
 from esker.contract import ExportRequest
 from esker.exporting import formats, mesh
-from esker.exporting.ground import Extent
+from esker.exporting.ground import Extent, wear_m
 from esker.exporting.resample import resampled
 from esker.exporting.water import under_water
 from esker.exporting.weights import weights
@@ -196,7 +196,10 @@ def test_masks_are_the_attributes(terrain: Terrain, tmp_path: Path) -> None:
             with Image.open(io.BytesIO(archive.read(name))) as picture:
                 assert picture.mode == "L"
                 masks[name.removesuffix(".png")] = np.asarray(picture)[::-1]
-    assert set(masks) == {"snow", "wetness", "grass", "forest", "water"}
+    assert set(masks) == {"snow", "wetness", "grass", "forest", "water", "wear"}
+    worn = np.clip(-attributes["detail"] / wear_m(terrain.settings), 0, 1)
+    assert np.abs(masks["wear"] / 255.0 - worn).max() <= 0.5001 / 255
+    assert masks["wear"].max() > 0
     for name in ("snow", "wetness", "grass", "forest"):
         assert np.abs(masks[name] / 255.0 - attributes[name]).max() <= 0.5001 / 255
     assert masks["grass"].max() > 0, "there is something to compare"
@@ -216,10 +219,10 @@ def test_masks_that_sum_to_one(terrain: Terrain, tmp_path: Path) -> None:
     """SPEC X380: at every sample, each within a step of its part of what those above it leave."""
     plain = masks_of(exported(terrain, tmp_path, "a.zip"))
     summed = masks_of(exported(terrain, tmp_path, "b.zip", weights=True))
-    assert set(summed) == {*plain, "ground"}
+    assert set(summed) == {*plain, "ground"} - {"wear"}
     assert max(mask.max() for mask in (summed["ground"], summed["grass"])) > 128, "there is something to share out"
     np.testing.assert_array_equal(sum(mask.astype(int) for mask in summed.values()), 255)
-    assert np.sum([mask.astype(int) for mask in plain.values()], axis=0).max() > 255
+    assert np.sum([mask.astype(int) for name, mask in plain.items() if name != "wear"], axis=0).max() > 255
     left = np.ones(summed["ground"].shape)
     for name in ("water", "snow", "forest", "grass", "wetness"):
         assert np.abs(summed[name] / 255 - left * plain[name] / 255).max() < 1.001 / 255

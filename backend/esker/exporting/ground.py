@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from esker import contract, grid
-from esker.contract import TerrainSettings
+from esker.contract import TerrainSettings, fractal
 from esker.exporting.resample import resampled
 from esker.exporting.water import under_water
 from esker.synthesis.lakes import find_lakes
@@ -19,6 +19,8 @@ Heights = NDArray[np.float32]
 Mask = NDArray[np.uint8]
 COVERS: Final = ("snow", "wetness", "grass", "forest")
 """Attributes of the synthesis that become masks, under their own names."""
+WEAR: Final = "wear"
+"""Mask of how far ground lies below what was drawn, of terrains with erosion: 255 is ``wear_m`` and more."""
 BAND_SAMPLES: Final = 1 << 20
 """Samples whose attributes are held as numbers at a time; what is kept of them is a byte each."""
 WHOLE: Final = 255
@@ -69,8 +71,8 @@ class HeightSource(Protocol):
 @dataclass(frozen=True, eq=False)
 class Ground:
     """What is written. ``heights``: (rows, columns) float32, metres, row 0 south; sample [0, 0] lies at world
-    (x_m, y_m), neighbours ``spacing_m`` apart. ``masks``: the same shape, uint8, 255 where there is all of it: COVERS
-    and ``water``; empty where they were not asked for. ``lakes_m``: levels of the lakes, rising, metres.
+    (x_m, y_m), neighbours ``spacing_m`` apart. ``masks``: the same shape, uint8, 255 where there is all of it: COVERS,
+    ``water`` and WEAR; empty where they were not asked for. ``lakes_m``: levels of the lakes, rising, metres.
     ``solved``: heights without detail, where they were asked for."""
 
     heights: Heights
@@ -185,7 +187,7 @@ def _detailed(
         raise ValueError(f"no sample of level {level} lies in that window; the terrain is {size:g} m wide")
     s = grid.spacing(level, size)
     heights = np.empty((r1 - r0, c1 - c0), dtype=np.float32)
-    covers = {name: np.empty(heights.shape, dtype=np.uint8) for name in (COVERS if masks else ())}
+    covers = {name: np.empty(heights.shape, dtype=np.uint8) for name in (_covers(settings) if masks else ())}
     band = max(1, BAND_SAMPLES // (c1 - c0))
     for start in range(r0, r1, band):
         stop = min(start + band, r1)
@@ -199,8 +201,22 @@ def _detailed(
         found = terrain.window(level, *corners, detail=True, progress=report, **levels)
         heights[start - r0 : stop - r0] = found.heights
         for name, mask in covers.items():
-            mask[start - r0 : stop - r0] = eight_bits(found.attributes[name])
+            share = (
+                found.attributes[name] if name != WEAR else found.attributes["detail"] / np.float32(-wear_m(settings))
+            )
+            mask[start - r0 : stop - r0] = eight_bits(share)
     return Ground(heights, c0 * s, r0 * s, s, settings, covers)
+
+
+def wear_m(settings: TerrainSettings) -> float:
+    """Depth of which the mask of wear is a share, metres: a bed of the coarsest gullies on a steep flank."""
+    wave_m = settings.erosion_scale * grid.spacing(1, settings.size_m)
+    return fractal.GULLY_MOST * fractal.GULLY_DEPTH * fractal.GULLY_STEEP * wave_m
+
+
+def _covers(settings: TerrainSettings) -> tuple[str, ...]:
+    """Masks that come with the detail of a terrain."""
+    return (*COVERS, WEAR) if settings.rule == "landscape" and settings.erosion > 0 else COVERS
 
 
 def _fewer(ground: Ground, samples: int) -> Ground:
