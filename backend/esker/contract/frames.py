@@ -16,11 +16,13 @@ class FrameKind(IntEnum):
     """What a binary frame means for the tiles of its level that it does not carry.
 
     LEVEL: the level is complete for this clock; held tiles of the level that are neither carried nor dropped are
-    confirmed as they are. FILL: only adds tiles (the view moved); says nothing of the others.
+    confirmed as they are. FILL: only adds tiles (the view moved); says nothing of the others. RIVERS: no tiles, but all
+    rivers of the terrain; they replace those of before (see RIVER_UNITS_PER_CELL).
     """
 
     LEVEL = 0
     FILL = 1
+    RIVERS = 2
 
 
 class Predictor(IntEnum):
@@ -91,6 +93,17 @@ first; ``version`` of the tile, and ``base_version`` of the parent or previous t
 differences to those of the tile before in the frame (0 at first); bytes of the payload; payload. Residuals are 2^shift
 times what is coded; no payload: no residual. Bounds and errors of the 16-cell sub-patches follow from the samples and
 the parent, both of which the decoder holds, so they do not travel (docs/decisions/0003-derived-bounds.md)."""
+
+RIVER_UNITS_PER_CELL: Final = 4
+"""A frame of rivers has FRAME_HEADER, with their level, the document's clock, and how many there are in ``tiles``; then
+for each, with numbers as LEB128 and differences zig-zag: how many points, at least 2; x and y of the first, in these
+parts of a cell of the level; RIVER_AREA_STEPS times the binary logarithm of the area in m2 that drains through its
+head, zig-zag, and how much more at its end; which river it runs into, counted from itself, 0 for none; then the
+differences of x and y from point to point. A river comes before the one that it runs into. There are no heights:
+whoever draws has the ground."""
+RIVER_AREA_STEPS: Final = 8
+MAX_RIVER_BYTES: Final = 32 << 10
+"""A frame of rivers is no larger: where all would not fit there are fewer, the largest."""
 
 TILE_SAMPLE_LIMIT: Final = 1 << 28
 """Samples are within +-2^28 quanta, so that a residual always fits 32 bits."""

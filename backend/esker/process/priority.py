@@ -35,6 +35,14 @@ def yielding() -> Iterator[None]:
             os.setpriority(os.PRIO_PROCESS, task, min(19, os.getpriority(os.PRIO_PROCESS, 0) + NICE))
 
 
+def yield_to_others() -> None:
+    """Makes the calling thread yield to others, as ``yielding`` does those of a library, where a system can."""
+    if can_yield():
+        with suppress(OSError):
+            task = threading.get_native_id()
+            os.setpriority(os.PRIO_PROCESS, task, min(19, os.getpriority(os.PRIO_PROCESS, task) + NICE))
+
+
 def _tasks() -> set[int]:
     try:
         return {int(task.name) for task in _TASKS.iterdir()}

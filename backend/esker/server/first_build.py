@@ -150,9 +150,11 @@ def _blend(device: Any) -> None:
 
 def loops() -> dict[str, Any]:
     """Compiles the loops that every server runs."""
+    from esker.flow import warming
     from esker.tiles.pyramid import warm
 
     warm()
+    warming.warm()
     return {"loops": True}
 
 
@@ -162,9 +164,11 @@ def have_loops(stopped: threading.Event, begun: threading.Event) -> None:
     ``begun`` is set before they are compiled.
     """
     from esker import compiled
+    from esker.flow import warming
     from esker.tiles import pyramid
 
-    files = [Path(compiled.__file__), *sorted(Path(pyramid.__file__).parent.rglob("*.py"))]
+    rooms = (Path(pyramid.__file__).parent, Path(warming.__file__).parent)
+    files = [Path(compiled.__file__), *(path for room in rooms for path in sorted(room.rglob("*.py")))]
     texts = [path.read_bytes() for path in files]
     content = hashlib.sha256(b"".join([version("numba").encode(), pyramid.__file__.encode(), *texts])).hexdigest()
     record = home.root() / f"loops-{content[:16]}"

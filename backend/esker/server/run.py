@@ -28,6 +28,7 @@ from esker.render.pictures.previews import Previews
 from esker.server import first_build
 from esker.server.app import create_app
 from esker.server.elevation import Elevation
+from esker.server.hydrology import Hydrology
 from esker.server.routes.previews import Pictures
 from esker.server.settings import Settings
 from esker.server.starting import CannotServe, FrontDoor, Stopping, WaitingRoom
@@ -54,6 +55,7 @@ from esker.store.previews import PreviewTokens
 from esker.store.space import Space
 from esker.store.upkeep.care import Care, sweep_parts
 from esker.tiles.delivery import ClientTiles, TileServer
+from esker.tiles.snapshot import Snapshot, snapshot
 from esker.tiles.watcher import Watcher
 
 log = logging.getLogger("esker")
@@ -84,7 +86,13 @@ FLAWS: Final = (ArithmeticError, AssertionError, AttributeError, LookupError, Ty
 
 
 class _Tiles:
-    """``session.ground.ports.Tiles`` by the real tiles."""
+    """``session.ground.ports.Tiles`` and ``WateredTiles`` by the real tiles."""
+
+    def __init__(self) -> None:
+        self.hydrology = Hydrology()
+
+    def snapshot(self, server: Any, level: int) -> Snapshot | None:
+        return snapshot(server, level)
 
     def server(self, size_m: float, levels: int, finest: int) -> TileServer:
         return TileServer(size_m, levels, finest)
@@ -150,6 +158,7 @@ class Assembly:
         self.address, self._listener, self._context = door.address, door.listener, door.context
         self.port = int(self._listener.getsockname()[1])
         self._worker: Worker | None = None
+        self._tiles: _Tiles | None = None
         self._journal: Journal | None = None
         self._lock: DataLock | None = None
         self._care: Care | None = None
@@ -188,11 +197,12 @@ class Assembly:
         log.info("solver: %s, levels 0 to %d", self._worker.device_name, settings.level)
         if not confinement.possible():
             log.warning("this system cannot keep readers of people's files from the data folder and the network")
+        self._tiles = _Tiles()
         self.hub = Hub(
             self._journal,
             Access(self._journal),
             self._worker,
-            _Tiles(),
+            self._tiles,
             levels=settings.level,
             finest=settings.refine,
             limits=Limits(settings.max_strokes, settings.max_points),
@@ -271,6 +281,8 @@ class Assembly:
             self._care.stop()
         if self._worker is not None:
             self._worker.stop()
+        if self._tiles is not None:
+            self._tiles.hydrology.close()
         if self._journal is not None:
             self._journal.close()
         if self._lock is not None:

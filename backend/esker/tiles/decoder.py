@@ -12,6 +12,7 @@ from esker.grid import TileKey
 from esker.tiles.codec.filters import undo
 from esker.tiles.codec.frame import FrameError, FrameHead, TileRecord, ratio, read_frame
 from esker.tiles.codec.payload import CodecError, Ints, Wide, child_window, follow, predict, reconstruct, unpack
+from esker.tiles.codec.rivers import is_rivers, read_rivers
 
 
 @dataclass(frozen=True)
@@ -58,6 +59,9 @@ class FrameDecoder:
 
     def decode(self, data: bytes | memoryview) -> DecodedFrame:
         """Decodes and applies one frame. Raises FrameError, and then changes nothing that is held."""
+        if is_rivers(data):  # they are no tiles; ``codec.rivers`` reads them
+            found = read_rivers(data)
+            return DecodedFrame(FrameKind.RIVERS, found.level, found.clock, found.settled, (), {}, len(data))
         head, gone, records = read_frame(data)
         drops = tuple(TileKey(head.level, x, y) for x, y in gone)
         dropped = set(drops)

@@ -5,7 +5,7 @@
 
 import { computed, effect, type ReadonlySignal, signal } from "@preact/signals-core";
 import { askedOf } from "../core/camera/asked.ts";
-import type { DecodedFrame } from "../core/types.ts";
+import type { DecodedFrame, RiverSet } from "../core/types.ts";
 import { type Doc, Refusal } from "../doc/document.ts";
 import { SyncDoc } from "../doc/sync.ts";
 import type {
@@ -78,6 +78,8 @@ export class TerrainSession implements OpenTerrain {
   readonly members = signal<readonly Member[]>([]);
   readonly presences = signal<ReadonlyMap<string, MemberPresence>>(new Map());
   readonly progress = signal<Progress | null>(null);
+  /** The rivers that the server found last; null before. */
+  readonly rivers = signal<RiverSet | null>(null);
   /** The server makes the ground of the elevation layers, and it takes long. */
   readonly baseBuilding = signal(false);
   /** The server's last sentence about its solver, until somebody has read it. */
@@ -417,6 +419,10 @@ export class TerrainSession implements OpenTerrain {
 
   #frame(frame: DecodedFrame): void {
     if (this.historyView.active.peek()) return;
+    if (frame.rivers !== undefined) {
+      this.rivers.value = frame.rivers;
+      return;
+    }
     if (this.stage.value?.apply(frame) === false) this.connection.reconnect();
   }
 

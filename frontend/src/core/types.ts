@@ -119,6 +119,25 @@ export interface DecodedTile {
   readonly subError: Uint32Array;
 }
 
+/** A river from its head, or a confluence, down to the next. */
+export interface RiverLine {
+  /** xy pairs, cells of the set's level. */
+  readonly cells: Float32Array;
+  /** What drains through its head and its end, square metres. */
+  readonly areasM2: readonly [number, number];
+  /** The index of the river that it runs into; null at the border or the sea. */
+  readonly into: number | null;
+}
+
+/** All rivers of a terrain at one clock, found on the samples of `level`. */
+export interface RiverSet {
+  readonly clock: number;
+  readonly level: number;
+  readonly settled: boolean;
+  /** Each comes before the one that it runs into. */
+  readonly rivers: readonly RiverLine[];
+}
+
 export interface DecodedFrame {
   readonly kind: number;
   readonly level: number;
@@ -129,6 +148,8 @@ export interface DecodedFrame {
   readonly tiles: readonly DecodedTile[];
   /** Bytes on the wire: returned to the server as credit once applied. */
   readonly bytes: number;
+  /** Of a frame without tiles: all rivers, in place of those of before. */
+  readonly rivers?: RiverSet;
 }
 
 /** A stroke as the renderers draw it: world points of its crest. */

@@ -291,6 +291,12 @@ export const TILE_FILTER_BITS = 2 as const;
 
 export const TILE_MAX_SHIFT = 15 as const;
 
+export const RIVER_UNITS_PER_CELL = 4 as const;
+
+export const RIVER_AREA_STEPS = 8 as const;
+
+export const MAX_RIVER_BYTES = 32768 as const;
+
 export const TILE_SAMPLE_LIMIT = 268435456 as const;
 
 export const CODER_SIZES = 32 as const;
@@ -555,6 +561,7 @@ export const SYNTH_LOOKS = {
 export const FrameKind = {
   LEVEL: 0,
   FILL: 1,
+  RIVERS: 2,
 } as const;
 
 export const Predictor = {

@@ -28,6 +28,7 @@ import {
   TILE_SAMPLES,
 } from "../generated/contract.ts";
 import { decodeResiduals } from "./entropy.ts";
+import { isRivers, RiverError, readRivers } from "./rivers.ts";
 
 /** A frame that is truncated, malformed or does not fit what is held. */
 export class FrameError extends Error {
@@ -98,6 +99,7 @@ export class FrameDecoder {
 
   /** Decodes and applies one frame. Throws FrameError, and then changes nothing that is held. */
   decode(buffer: ArrayBuffer): DecodedFrame {
+    if (isRivers(buffer)) return riversOf(buffer);
     const view = new DataView(buffer);
     const head = readHead(view);
     const drops = readDrops(view, head);
@@ -119,6 +121,17 @@ export class FrameDecoder {
     commit(held, head, dropped, tiles);
     const { kind, level, channel, clock, settled } = head;
     return { kind, level, channel, clock, settled, drops, tiles, bytes: buffer.byteLength };
+  }
+}
+
+function riversOf(buffer: ArrayBuffer): DecodedFrame {
+  try {
+    const rivers = readRivers(buffer);
+    const { level, clock, settled } = rivers;
+    const head = { kind: FrameKind.RIVERS, level, channel: Channel.HEIGHT, clock, settled };
+    return { ...head, drops: [], tiles: [], bytes: buffer.byteLength, rivers };
+  } catch (e) {
+    throw e instanceof RiverError ? new FrameError(e.message) : e;
   }
 }
 

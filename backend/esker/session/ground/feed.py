@@ -21,7 +21,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import CancelledError, Future
 from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from esker import contract as c
 from esker.events import Level, Preview
 from esker.grid import TileKey
-from esker.session.ground.ports import ClientTiles, FrameOutlet, Tiles
+from esker.session.ground.ports import ClientTiles, FrameOutlet, Tiles, WateredTiles
 from esker.session.ground.tilethread import Lane, TileThread
 from esker.tiles.delivery import RefinedTile
 
@@ -60,6 +60,8 @@ class Stream:
     in_flight: int = 0
     hungry: bool = True
     busy: bool = False
+    rivers: bytes | None = None
+    """The newest frame of rivers, until it is sent: behind all tiles."""
     frames: deque[bytes] = field(default_factory=deque)
 
     @property
@@ -108,13 +110,14 @@ class TileFeed:
         self._frames_pending = False
         """Whether a finest preview was taken whose frames nobody was sent yet. Only the tile thread may touch it."""
         self._taking = False
+        self._rivers: bytes | None = None
         self._rest_until = 0.0
         """Time of the loop from which on the next batch may be taken."""
         self._requests_timer: asyncio.TimerHandle | None = None
 
     def add(self, outbox: FrameOutlet, top: int | None = None) -> Stream:
         """A new client; or, with ``top``, somebody who watches the levels up to it."""
-        stream = Stream(outbox, top)
+        stream = Stream(outbox, top, rivers=self._rivers if top is None else None)
         self._streams.add(stream)
         self._feed(stream)
         return stream
@@ -146,6 +149,21 @@ class TileFeed:
         if not stream.frames:
             self._loop.call_soon(self._feed, stream)
         return frame
+
+    def snapshot(self, level: int, taken: Callable[[Any], None]) -> None:
+        """Reads the ground of a level once the tile thread has nothing else to do for this room; ``taken`` is called in
+        the loop, with None where there is no ground yet."""
+        assert isinstance(self._tiles, WateredTiles)
+        read = self._tiles.snapshot
+        self._submit(lambda: self._call(taken, read(self._server, level)))
+
+    def show_rivers(self, frame: bytes | None) -> None:
+        """Sends a frame of rivers to everybody, and to who comes, once they have their tiles; None: to nobody."""
+        self._rivers = frame
+        for stream in self._streams:
+            if stream.top is None:
+                stream.rivers = frame
+                self._wake(stream)
 
     # --- in the solver's thread -----------------------------------------------------------------------------------
 
@@ -383,4 +401,7 @@ class TileFeed:
     def _all_made(self, stream: Stream, some: bool) -> None:
         stream.busy = False
         stream.hungry |= some
+        if not stream.hungry and stream.rivers is not None:
+            frame, stream.rivers = stream.rivers, None
+            self._frame_made(stream, frame)
         self._feed(stream)  # something may have changed while the frames were made, or there may be more

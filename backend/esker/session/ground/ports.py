@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -81,6 +82,28 @@ class Tiles(Protocol):
     def client(self, server: TileServer) -> ClientTiles: ...
 
     def watcher(self, server: TileServer, top: int) -> ClientTiles: ...
+
+
+class Hydrology(Protocol):
+    """Finds rivers, in a thread of its own (``server.hydrology``)."""
+
+    def find(
+        self, ground: Any, settings: c.TerrainSettings, span_m: tuple[float, float] | None, settled: bool
+    ) -> Future[bytes]:
+        """Begins to look; the outcome is a frame of all rivers of a ground. Raises RuntimeError once it is closed."""
+        ...
+
+
+@runtime_checkable
+class WateredTiles(Protocol):
+    """Tiles on whose ground rivers are found."""
+
+    @property
+    def hydrology(self) -> Hydrology: ...
+
+    def snapshot(self, server: TileServer, level: int) -> Any:
+        """Returns the ground of a level at this moment, for ``Hydrology.find``; None before there is any."""
+        ...
 
 
 class Refiner(Protocol):

@@ -19,10 +19,11 @@ from esker.document.revisions import revision
 from esker.fairness.shares import Who
 from esker.session.ground.base_builder import Layers
 from esker.session.ground.feed import Stream, TileFeed
-from esker.session.ground.ports import Elevation, Tiles
+from esker.session.ground.ports import Elevation, Tiles, WateredTiles
 from esker.session.ground.tilethread import TileThread
 from esker.session.ground.worker import Job, Worker
 from esker.session.lesson.classroom import FROZEN, ClassRoom
+from esker.session.rivers import Rivers
 from esker.session.room import protocol
 from esker.session.room.conducting import Conducting, Desk
 from esker.session.room.core import UNSAVED, Batch, RoomCore, RoomInfo
@@ -91,6 +92,8 @@ class Room(ClassRoom):
             note=self._feed.note,
             home=home or None,
         )
+        hydrology = tiles.hydrology if isinstance(tiles, WateredTiles) else None
+        self._rivers = Rivers(hydrology, self._feed, self._loop)
         self._layers = Layers(elevation, base_threads, self._loop, self._laid, self._tell, self._slow_changed)
         self._job: Job | None = None
         """The job that was asked for last."""
@@ -120,6 +123,7 @@ class Room(ClassRoom):
         self.closed = False
         self._active_at = self._loop.time()
         """The time at which somebody came, or did more than to answer by itself."""
+        self._rivers.follow(core.head)
         self._request_solve()
 
     # --- people -------------------------------------------------------------------------------------------------
@@ -273,6 +277,7 @@ class Room(ClassRoom):
         if batch is None:
             return
         self._tick_at = self._loop.time()
+        self._rivers.follow(self.core.head)
         self._flushed.clear()
         people = self._new_names(row.author for row in batch.rows)
         future = self._journal.append(self.id, batch.rows, batch.snapshot, people)
@@ -352,6 +357,7 @@ class Room(ClassRoom):
 
         An op that does not touch the ground leaves an older solve as good as new.
         """
+        self._rivers.level_taken(level, settled)
         if clock >= self.core.geometry_clock:
             clock = self.core.head.clock
         self._note_progress(
@@ -420,6 +426,7 @@ class Room(ClassRoom):
         """Stops the timers and the solver's work for this room. Call ``flush`` first."""
         self.closed = True
         self._layers.close()
+        self._rivers.close()
         self.conducting.close()
         self._worker.remove(self._solve_client)
         for timer in (self._tick_timer, self._presence_timer, self._progress_timer):

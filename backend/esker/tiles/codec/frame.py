@@ -88,20 +88,25 @@ def write_frame(head: FrameHead, drops: Sequence[tuple[int, int]], tiles: Sequen
     for tile in tiles:
         coding = tile.predictor | tile.filter << TILE_PREDICTOR_BITS
         coding |= tile.shift << (TILE_PREDICTOR_BITS + TILE_FILTER_BITS)
-        for number in (tile.x, tile.y, coding, _folded(tile.version - version), _folded(tile.base_version - base)):
-            _write_number(out, number)
-        _write_number(out, len(tile.payload))
+        for number in (tile.x, tile.y, coding, folded(tile.version - version), folded(tile.base_version - base)):
+            write_number(out, number)
+        write_number(out, len(tile.payload))
         out += tile.payload
         version, base = tile.version, tile.base_version
     return bytes(out)
 
 
-def _folded(number: int) -> int:
+def unfolded(number: int) -> int:
+    """The number that ``folded`` made so."""
+    return -(number + 1) // 2 if number & 1 else number // 2
+
+
+def folded(number: int) -> int:
     """Maps 0, -1, 1, -2, 2 ... to 0, 1, 2, 3, 4 ..."""
     return 2 * number if number >= 0 else -2 * number - 1
 
 
-def _write_number(out: bytearray, number: int) -> None:
+def write_number(out: bytearray, number: int) -> None:
     """Writes LEB128: seven bits a byte, the lowest first, the highest bit set where more follow."""
     while number > 127:
         out.append(number & 127 | 128)
@@ -109,7 +114,7 @@ def _write_number(out: bytearray, number: int) -> None:
     out.append(number)
 
 
-class _Reader:
+class NumberReader:
     """A reader of the rest of a frame. ``version``, ``base``: those of the tile before."""
 
     def __init__(self, view: memoryview) -> None:
@@ -126,12 +131,11 @@ class _Reader:
             value |= (byte & 127) << shift
             if byte < 128:
                 return value
-        raise FrameError("the frame ends inside a tile's numbers, or one of them is too long")
+        raise FrameError("the frame ends inside its numbers, or one of them is too long")
 
     def version_after(self, last: int) -> int:
         """Returns a version, written as the difference to one before it."""
-        folded = self.number()
-        version = last + (-(folded + 1) // 2 if folded & 1 else folded // 2)
+        version = last + unfolded(self.number())
         if not 0 <= version <= 0xFFFFFFFF:
             raise FrameError(f"version {version} has more than 32 bits")
         return version
@@ -169,7 +173,7 @@ def read_frame(data: bytes | memoryview) -> tuple[FrameHead, list[tuple[int, int
         raise FrameError("the frame ends inside its list of dropped tiles")
     drops = [(int(d["x"]), int(d["y"])) for d in np.frombuffer(view, dtype=TILE_DROP, count=count, offset=at)]
     at += count * TILE_DROP.itemsize
-    reader = _Reader(view[at:])
+    reader = NumberReader(view[at:])
     tiles = [reader.tile() for _ in range(int(start["tiles"]))]
     if reader.at != len(reader.view):
         raise FrameError(f"{len(reader.view) - reader.at} bytes follow the last tile")

@@ -1,0 +1,145 @@
+"""When the rivers of a room are looked for: while somebody draws a few times a second, at rest once, exactly.
+
+They follow the ground at the lowest priority: the ground is read when the tile thread has nothing else to do, the
+search runs in a thread of low priority, and frames of rivers go out when a client has all tiles that it is to have.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import dataclass
+from typing import Any, Final, Protocol
+
+from esker.document.layers import span_m
+from esker.document.ops import StrokeSet
+from esker.session.ground.ports import Hydrology
+
+log = logging.getLogger("esker.rivers")
+
+PREVIEW_LEVEL: Final = 2
+"""Whose samples count while somebody draws."""
+REST_LEVEL: Final = 4
+"""Whose samples count at rest, or the finest that is solved as a whole."""
+EVERY_SECONDS: Final = 0.25
+"""While somebody draws they are looked for at most this often."""
+FOLLOWED: Final = ("rivers", "sea_level_m", "seed", "look", "detail", "rule", "place")
+"""Settings that rivers follow from beside the ground. Width follows from ``wetness`` where they are drawn."""
+
+
+class Ground(Protocol):
+    """Where the ground is read and frames are sent (``ground.feed.TileFeed``)."""
+
+    def snapshot(self, level: int, taken: Callable[[Any], None]) -> None:
+        """Reads the ground once the tile thread has nothing else to do; ``taken`` is called in the loop, with None
+        where there is none."""
+        ...
+
+    def show_rivers(self, frame: bytes | None) -> None:
+        """Sends a frame to everybody, and to who comes; None: to nobody."""
+        ...
+
+
+@dataclass(frozen=True)
+class Look:
+    """What is to be looked for: on which level, and whether the ground is at rest."""
+
+    level: int
+    settled: bool
+
+
+def next_look(wanted: Look | None, busy: bool, now: float, last: float) -> tuple[Look | None, float]:
+    """What to look for now, if anything, and else for how long to wait; 0 says until something happens."""
+    if wanted is None or busy:
+        return None, 0.0
+    wait = 0.0 if wanted.settled else last + EVERY_SECONDS - now
+    return (wanted, 0.0) if wait <= 0 else (None, wait)
+
+
+class Rivers:
+    """The rivers of one room. Call it from the event loop's thread."""
+
+    def __init__(self, hydrology: Hydrology | None, ground: Ground, loop: asyncio.AbstractEventLoop) -> None:
+        """Without ``hydrology`` there are none."""
+        self._hydrology, self._ground, self._loop = hydrology, ground, loop
+        self._document: StrokeSet | None = None
+        self._followed: tuple[object, ...] = ()
+        self._wanted: Look | None = None
+        self._settled = False
+        self._busy = self._closed = False
+        self._last = float("-inf")
+        self._timer: asyncio.TimerHandle | None = None
+
+    def follow(self, document: StrokeSet) -> None:
+        """The document has changed; where a setting of the rivers did, they are looked for anew."""
+        self._document = document
+        followed = tuple(getattr(document.settings, name) for name in FOLLOWED)
+        if followed == self._followed:
+            return
+        before, self._followed = self._followed, followed
+        if document.settings.rivers == 0:
+            self._wanted = None
+            if before and before[0]:
+                self._ground.show_rivers(None)
+        else:
+            self._wanted = Look(REST_LEVEL if self._settled else PREVIEW_LEVEL, self._settled)
+            self._go_on()
+
+    def level_taken(self, level: int, settled: bool) -> None:
+        """A level became tiles. ``settled``: now all of them are final."""
+        self._settled = settled
+        if self._document is None or self._document.settings.rivers == 0:
+            return
+        if settled:
+            self._wanted = Look(REST_LEVEL, True)
+        elif level == PREVIEW_LEVEL:
+            self._wanted = Look(PREVIEW_LEVEL, False)
+        self._go_on()
+
+    def close(self) -> None:
+        """Looks for no more."""
+        self._closed = True
+        if self._timer is not None:
+            self._timer.cancel()
+
+    def _go_on(self) -> None:
+        if self._hydrology is None or self._closed:
+            return
+        look, wait = next_look(self._wanted, self._busy, self._loop.time(), self._last)
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        if look is not None:
+            self._wanted, self._busy, self._last = None, True, self._loop.time()
+            self._ground.snapshot(look.level, lambda found: self._read(found, look.settled))
+        elif wait > 0:
+            self._timer = self._loop.call_later(wait, self._go_on)
+
+    def _read(self, found: Any, settled: bool) -> None:
+        document = self._document
+        if found is None or document is None or self._hydrology is None or self._closed or not document.settings.rivers:
+            self._busy = False
+            self._go_on()
+            return
+        try:
+            future = self._hydrology.find(found, document.settings, span_m(tuple(document.layers.values())), settled)
+        except RuntimeError:  # the server is stopping
+            return
+        future.add_done_callback(lambda done: self._call(self._found, done))
+
+    def _call(self, callback: Callable[..., object], *args: object) -> None:
+        if not self._loop.is_closed():
+            self._loop.call_soon_threadsafe(callback, *args)
+
+    def _found(self, future: Future[bytes]) -> None:
+        self._busy = False
+        if future.cancelled() or self._closed:
+            return
+        error = future.exception()
+        if error is not None:
+            log.error("rivers could not be found: %s: %s", type(error).__name__, error)
+        elif self._document is not None and self._document.settings.rivers:
+            self._ground.show_rivers(future.result())
+        self._go_on()

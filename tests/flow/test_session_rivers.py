@@ -1,0 +1,273 @@
+"""Rivers of open terrains (SPEC W33 to W36)."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable
+from concurrent.futures import Future
+from typing import Any
+
+import numpy as np
+import pytest
+
+from esker import contract as c
+from esker import grid
+from esker.document.ops import StrokeSet
+from esker.server.hydrology import Hydrology
+from esker.session import rivers as session_rivers
+from esker.session.ground.feed import TileFeed
+from esker.session.ground.tilethread import TileThread
+from esker.session.rivers import EVERY_SECONDS, Look, Rivers, next_look
+from esker.tiles.codec.rivers import is_rivers, read_rivers
+from esker.tiles.delivery import ClientTiles, TileServer
+from esker.tiles.snapshot import Snapshot, snapshot
+
+PREVIEW, REST = Look(2, False), Look(4, True)
+
+
+@pytest.mark.parametrize(
+    ("wanted", "busy", "last", "found"),
+    [
+        (None, False, 0.0, (None, 0.0)),
+        (PREVIEW, True, 0.0, (None, 0.0)),
+        (REST, True, 0.0, (None, 0.0)),
+        (PREVIEW, False, 10.0 - EVERY_SECONDS, (PREVIEW, 0.0)),
+        (PREVIEW, False, 9.9, (None, 0.15)),
+        (REST, False, 9.9, (REST, 0.0)),
+    ],
+)
+def test_when_rivers_are_looked_for(
+    wanted: Look | None, busy: bool, last: float, found: tuple[Look | None, float]
+) -> None:
+    """SPEC W33."""
+    look, wait = next_look(wanted, busy, 10.0, last)
+    assert look == found[0]
+    assert wait == pytest.approx(found[1])
+
+
+class Searches:
+    """A hydrology and a ground whose answers a test gives by hand."""
+
+    def __init__(self) -> None:
+        self.levels: list[int] = []
+        self.settled: list[bool] = []
+        self.answers: list[Future[bytes]] = []
+        self.shown: list[bytes | None] = []
+
+    def snapshot(self, level: int, taken: Callable[[Any], None]) -> None:
+        self.levels.append(level)
+        taken("the ground")
+
+    def show_rivers(self, frame: bytes | None) -> None:
+        self.shown.append(frame)
+
+    def find(self, _ground: Any, _settings: c.TerrainSettings, _span_m: Any, settled: bool) -> Future[bytes]:
+        self.settled.append(settled)
+        self.answers.append(Future())
+        return self.answers[-1]
+
+
+def document(**settings: Any) -> StrokeSet:
+    return StrokeSet.from_document(c.Document(id="t", settings=c.TerrainSettings(**settings)))
+
+
+async def turns() -> None:
+    """Lets the loop run what waits."""
+    for _ in range(3):
+        await asyncio.sleep(0)
+
+
+@pytest.fixture
+def now(monkeypatch: pytest.MonkeyPatch) -> None:
+    """While somebody draws, rivers may be looked for at once."""
+    monkeypatch.setattr(session_rivers, "EVERY_SECONDS", 0.0)
+
+
+def test_one_search_runs_at_a_time_and_the_newest_ground_is_next(now: None) -> None:
+    """SPEC W33."""
+
+    async def run() -> None:
+        searches = Searches()
+        rivers = Rivers(searches, searches, asyncio.get_running_loop())
+        rivers.follow(document(rivers=1.0))
+        assert searches.levels == [2]
+        rivers.level_taken(2, False)
+        rivers.level_taken(3, False)
+        rivers.level_taken(4, True)
+        assert searches.levels == [2]
+        searches.answers[0].set_result(b"first")
+        await turns()
+        assert searches.levels == [2, 4]
+        assert searches.settled == [False, True]
+        searches.answers[1].set_result(b"at rest")
+        await turns()
+        assert searches.shown == [b"first", b"at rest"]
+        rivers.level_taken(0, False)
+        assert searches.levels == [2, 4]
+        rivers.close()
+        rivers.level_taken(2, False)
+        assert searches.levels == [2, 4]
+
+    asyncio.run(run())
+
+
+def test_settings_that_rivers_follow_from_have_them_looked_for_anew(now: None) -> None:
+    """SPEC W34."""
+
+    async def run() -> None:
+        searches = Searches()
+        rivers = Rivers(searches, searches, asyncio.get_running_loop())
+        rivers.follow(document())
+        rivers.level_taken(4, True)
+        assert searches.levels == []
+        for fields in ({}, {"sea_level_m": 3.0}, {"detail": 0.0}, {"rivers": 2.0}):
+            rivers.follow(document(**({"rivers": 1.0} | fields)))
+            searches.answers[-1].set_result(b"x")
+            await turns()
+        assert searches.levels == [4] * 4
+        rivers.follow(document(rivers=2.0, wetness=3.0, title="another"))
+        assert searches.levels == [4] * 4
+        rivers.follow(document())
+        assert searches.shown[-1] is None
+        rivers.level_taken(4, True)
+        assert searches.levels == [4] * 4
+
+    asyncio.run(run())
+
+
+def test_rivers_that_come_after_they_were_turned_off_are_not_shown(now: None) -> None:
+    """SPEC W34."""
+
+    async def run() -> None:
+        searches = Searches()
+        rivers = Rivers(searches, searches, asyncio.get_running_loop())
+        rivers.follow(document(rivers=1.0))
+        rivers.follow(document())
+        searches.answers[0].set_result(b"late")
+        await turns()
+        assert searches.shown == [None]
+
+    asyncio.run(run())
+
+
+def test_a_search_that_fails_is_logged_and_the_next_one_runs(now: None, caplog: pytest.LogCaptureFixture) -> None:
+    """SPEC W36."""
+
+    async def run() -> None:
+        searches = Searches()
+        rivers = Rivers(searches, searches, asyncio.get_running_loop())
+        rivers.follow(document(rivers=1.0))
+        rivers.level_taken(2, False)
+        searches.answers[0].set_exception(ValueError("no ground"))
+        await turns()
+        searches.answers[1].set_result(b"again")
+        await turns()
+        assert searches.shown == [b"again"]
+
+    with caplog.at_level(logging.ERROR):
+        asyncio.run(run())
+    assert "rivers could not be found" in caplog.text
+
+
+class Outlet:
+    """A connection that takes what it is given."""
+
+    closing = None
+
+    def __init__(self) -> None:
+        self.has_frames = asyncio.Event()
+
+    def notify(self) -> None:
+        self.has_frames.set()
+
+    def close(self, code: str, reason: str) -> None:
+        raise AssertionError(f"{code}: {reason}")
+
+
+class RealTiles:
+    """The tiles of a server."""
+
+    def __init__(self) -> None:
+        self.hydrology = Hydrology()
+
+    def server(self, size_m: float, levels: int, finest: int) -> TileServer:
+        return TileServer(size_m, levels, finest)
+
+    def client(self, server: Any) -> ClientTiles:
+        return ClientTiles(server)
+
+    def snapshot(self, server: Any, level: int) -> Snapshot | None:
+        return snapshot(server, level)
+
+
+def valley(level: int) -> np.ndarray[Any, np.dtype[np.float32]]:
+    n = grid.samples(level)
+    y, x = np.mgrid[0:n, 0:n] / (n - 1)
+    return np.asarray(500 * y + 900 * np.abs(x - 0.5), dtype=np.float32)
+
+
+def test_a_client_gets_rivers_behind_its_tiles_and_who_comes_gets_the_newest() -> None:
+    """SPEC W35: found on real tiles by the real search."""
+
+    async def run() -> None:
+        loop, tiles, thread = asyncio.get_running_loop(), RealTiles(), TileThread()
+        feed = TileFeed(tiles, 4096.0, 2, 2, thread.lane(), loop, lambda *_: None, lambda *_: None)
+        rivers = Rivers(tiles.hydrology, feed, loop)
+        frames: list[bytes] = []
+        outlet = Outlet()
+        stream = feed.add(outlet)
+
+        async def drained(until: Callable[[], bool], to: Any, outlet: Outlet) -> None:
+            while not until():
+                await outlet.has_frames.wait()
+                outlet.has_frames.clear()
+                while (frame := feed.sent(to)) is not None:
+                    frames.append(frame)
+                    feed.credit(to, len(frame))
+
+        rivers.follow(document(rivers=1.0))
+        for level in range(3):
+            feed.put(3, _level(level))
+        rivers.level_taken(2, True)
+        await drained(lambda: any(is_rivers(f) and read_rivers(f).settled for f in frames), stream, outlet)
+        assert is_rivers(frames[-1])
+        assert sum(not is_rivers(f) for f in frames) >= 3
+        found = read_rivers(frames[-1])
+        assert (found.clock, found.level, found.settled) == (3, 2, True)
+        largest = max(found.rivers, key=lambda river: river.areas[1])
+        assert all(abs(x - 512) < 100 for x, _ in largest.points)
+        newest, frames[:] = frames[-1], []
+        outlet = Outlet()
+        late = feed.add(outlet)
+        await drained(lambda: any(is_rivers(f) for f in frames), late, outlet)
+        assert frames[-1] == newest
+        tiles.hydrology.close()
+        await asyncio.to_thread(thread.shutdown)
+
+    asyncio.run(asyncio.wait_for(run(), 120))
+
+
+def _level(level: int) -> Any:
+    from esker.events import Settled
+
+    return Settled(level, valley(level))
+
+
+def test_a_snapshot_is_the_ground_as_clients_have_it() -> None:
+    """SPEC W32, W33: offsets and base together, the finest level that is there, with its channels."""
+    server = TileServer(4096.0, 3)
+    assert snapshot(server, 2) is None
+    for level in range(3):
+        server.put_level(1, level, np.full((grid.samples(level),) * 2, 8.0, np.float32), True, c.Channel.BASE)
+        server.put_level(1, level, valley(level), True)
+    amplitude = np.linspace(0, 9, 65 * 65, dtype=np.float32).reshape(65, 65)
+    server.put_level(1, 0, amplitude, True, c.Channel.AMPLITUDE)
+    found = snapshot(server, 4)
+    assert found is not None
+    assert (found.clock, found.level) == (1, 2)
+    np.testing.assert_allclose(found.heights, valley(2) + 8.0, atol=grid.quantum(2, 4096.0))
+    np.testing.assert_allclose(found.channels["amplitude"], amplitude, atol=0.01)
+    shallow = snapshot(server, 0)
+    assert shallow is not None
+    assert shallow.level == 0
