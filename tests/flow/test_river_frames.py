@@ -14,11 +14,10 @@ from hypothesis import strategies as st
 
 from esker import contract as c
 from esker.contract import FrameKind, TerrainSettings
-from esker.server.hydrology import frame_of
+from esker.server.hydrology import Snapshot, frame_of
 from esker.tiles.codec.frame import FrameError
 from esker.tiles.codec.rivers import is_rivers, read_rivers, write_rivers
 from esker.tiles.decoder import FrameDecoder
-from esker.tiles.snapshot import Snapshot
 
 CASES: list[dict[str, Any]] = json.loads(
     (Path(__file__).parents[1] / "vectors" / "rivers.json").read_text(encoding="utf-8")

@@ -14,14 +14,14 @@ import pytest
 from esker import contract as c
 from esker import grid
 from esker.document.ops import StrokeSet
-from esker.server.hydrology import Hydrology
+from esker.server.hydrology import Hydrology, Snapshot, snapshot
 from esker.session import rivers as session_rivers
 from esker.session.ground.feed import TileFeed
 from esker.session.ground.tilethread import TileThread
 from esker.session.rivers import EVERY_SECONDS, Look, Rivers, next_look
 from esker.tiles.codec.rivers import is_rivers, read_rivers
 from esker.tiles.delivery import ClientTiles, TileServer
-from esker.tiles.snapshot import Snapshot, snapshot
+from esker.tiles.watcher import Watcher
 
 PREVIEW, REST = Look(2, False), Look(4, True)
 
@@ -196,6 +196,9 @@ class RealTiles:
 
     def client(self, server: Any) -> ClientTiles:
         return ClientTiles(server)
+
+    def watcher(self, server: Any, top: int) -> Watcher:
+        return Watcher(server, top)
 
     def snapshot(self, server: Any, level: int) -> Snapshot | None:
         return snapshot(server, level)

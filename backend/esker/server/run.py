@@ -28,7 +28,7 @@ from esker.render.pictures.previews import Previews
 from esker.server import first_build
 from esker.server.app import create_app
 from esker.server.elevation import Elevation
-from esker.server.hydrology import Hydrology
+from esker.server.hydrology import Hydrology, Snapshot, snapshot
 from esker.server.routes.previews import Pictures
 from esker.server.settings import Settings
 from esker.server.starting import CannotServe, FrontDoor, Stopping, WaitingRoom
@@ -55,7 +55,6 @@ from esker.store.previews import PreviewTokens
 from esker.store.space import Space
 from esker.store.upkeep.care import Care, sweep_parts
 from esker.tiles.delivery import ClientTiles, TileServer
-from esker.tiles.snapshot import Snapshot, snapshot
 from esker.tiles.watcher import Watcher
 
 log = logging.getLogger("esker")
