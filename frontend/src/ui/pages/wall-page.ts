@@ -206,7 +206,7 @@ export class EskWall extends SignalElement {
       ${
         wall.copies.value.size === 0
           ? this.#nobody(state.code)
-          : html`<ul>${copies.map((copy) => this.#card(copy, state.show === copy.number))}</ul>`
+          : html`<ul style=${`--card: ${cardWidth(wall.copies.value.size)}px`}>${copies.map((copy) => this.#card(copy, state.show === copy.number))}</ul>`
       }
       ${this.#actions(state.show)}
       ${this.comparing === null ? nothing : this.#compared(this.comparing)}
@@ -227,7 +227,7 @@ export class EskWall extends SignalElement {
 
   #closed(wall: WallConnection): TemplateResult {
     const problem = wall.problem.value;
-    return html`<div class="empty">
+    return html`<div class="empty alone">
       <img src="/favicon.svg" alt="" width="52" height="52" />
       <p role="status">${problem ?? "Opening the wall…"}</p>
       <p class="problem" role="alert">${this.problem}</p>
@@ -468,6 +468,11 @@ export class EskWall extends SignalElement {
       }}
     ></esk-wall-compare>`;
   }
+}
+
+/** Few copies are shown large. */
+function cardWidth(count: number): number {
+  return count <= 6 ? 360 : count <= 15 ? 270 : 210;
 }
 
 /** What the picture of the code holds: the page on which a name is asked for. */

@@ -192,6 +192,9 @@ export const wallStyles = css`
     text-align: center;
     font-size: 1.125rem;
   }
+  .alone {
+    grid-row: 1 / -1;
+  }
   .empty .letters {
     font: 700 clamp(3.4rem, 12vw, 11rem) / 1 ui-monospace, "SF Mono", Menlo, Consolas, monospace;
     letter-spacing: 0.05em;
@@ -235,7 +238,7 @@ export const wallStyles = css`
       justify-content: space-between;
     }
     ul {
-      --card: 150px;
+      grid-template-columns: repeat(auto-fill, minmax(150px, 1fr));
     }
     .tools esk-segmented {
       flex: 1 1 100%;
