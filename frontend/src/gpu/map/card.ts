@@ -13,7 +13,7 @@ const LEAST_RELIEF = 0.004;
 
 const slot = new Float32Array(SLOT_TEXELS * SLOT_TEXELS);
 
-/** Of a tile, along one side. */
+/** A tile is drawn with at least so many pixels along one side. */
 const LEAST_TILE_PX = 16;
 
 /** Draws the finest level that is held whole, `side` pixels along a side. Returns false where nothing is held yet. */

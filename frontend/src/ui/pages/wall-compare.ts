@@ -19,7 +19,7 @@ export class EskWallCompare extends SignalElement {
 
   declare wall: WallConnection;
   declare numbers: readonly number[];
-  /** Of the picture's middle, in pixels of the screen, and how much larger it is. */
+  /** `x`, `y`: where the picture's middle lies, in pixels from the pane's middle; `zoom`: how much larger the picture is. */
   declare camera: { readonly x: number; readonly y: number; readonly zoom: number };
 
   readonly #pointers = new Map<number, { x: number; y: number }>();

@@ -18,7 +18,7 @@ const browser = (): Ways => ({
   kept: window.sessionStorage,
   go: (path) => {
     window.location.href = path;
-    // The same terrain under another secret changes only the fragment; main.ts reloads then.
+    // Another secret of the same terrain changes the fragment alone, and main.ts reloads the page then.
   },
 });
 
