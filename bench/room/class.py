@@ -84,11 +84,11 @@ class _Pupil:
                     self.ready.set()
                     self._seen(self.appended, int(head["clock"]), self.times.coarse, now)
                 continue
-            told = json.loads(message)
-            if told["type"] == "reject":
-                raise RuntimeError(f"{self.client}: {told['message']}")
-            if told["type"] == "ack":
-                for op_id, clock in zip(told["ids"], told["clocks"], strict=True):
+            answer = json.loads(message)
+            if answer["type"] == "reject":
+                raise RuntimeError(f"{self.client}: {answer['message']}")
+            if answer["type"] == "ack":
+                for op_id, clock in zip(answer["ids"], answer["clocks"], strict=True):
                     at = self.sent.pop(op_id)
                     self.times.ack.append(now - at)
                     self.appended[clock] = self.unseen[clock] = at

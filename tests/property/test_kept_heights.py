@@ -44,6 +44,7 @@ class Artist:
             "plateau_radius_m": float(rng.uniform(0.0, 40.0)),
             "yields": float(rng.uniform(0.0, 1.0)),
             "hidden": not old.hidden,
+            "course": contract.Course(use="road", rises=(0.0, 50.0)),
         }.get(which)
         if which in ("first", "last"):
             x, y, z = getattr(old, which)
@@ -201,7 +202,8 @@ def test_each_field_that_heights_follow_from_counts(which: str) -> None:
     """SPEC S381: a stroke that differs in it alone is solved again."""
     solver = Counting("numpy")
     artist = Artist(11, Terrain(SIZE, solver=solver))
-    stroke = Stroke.profile([(100, 100, 0), (300, 500, 90), (700, 600, 10)], left=(30, 200), right=(40, 100))
+    line = [(100, 100, 0), (300, 500, 90), (700, 600, 10)]
+    stroke = Stroke.course(line, "road") if which == "course" else Stroke.profile(line, left=(30, 200), right=(40, 100))
     artist.terrain.add(stroke)
     before = artist.terrain.heights(0)
     artist.terrain.add(artist.changed(stroke, which))

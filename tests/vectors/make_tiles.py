@@ -142,7 +142,7 @@ def channels() -> list[bytes]:
     frames: list[bytes] = []
     units = {Channel.BASE: 700.0, Channel.HEIGHT: 40.0, Channel.AMPLITUDE: 30.0, Channel.ROUGHNESS: 0.4}
     units |= {Channel.SNOW: 1.0, Channel.GRASS: -1.0, Channel.FOREST: 0.3, Channel.WETNESS: -0.2}
-    units |= {Channel.SURVEY: 3.0}
+    units |= {Channel.SURVEY: 3.0, Channel.EROSION: 0.5, Channel.FAR: 0.6}
     bases = {Channel.ROUGHNESS: 0.5, Channel.SURVEY: -1.0}
 
     def drain() -> None:
