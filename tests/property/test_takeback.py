@@ -129,3 +129,19 @@ def test_nobody_did_anything() -> None:
     plan = Deeds({"ben"}).plan(document)
     assert plan.ops == ()
     assert sentence("Ben", plan) == "Nothing that Ben did still stands."
+
+
+def test_a_value_goes_back_to_what_somebody_else_wrote() -> None:
+    """SPEC L21: not to what it was before the person came."""
+    document, deeds = _birth(), Deeds({"ben"})
+    for author, label in (("ben", "A"), ("teacher", "B"), ("ben", "C")):
+        op = c.SetStroke(stroke="s0", fields=c.StrokeFields(label=label))
+        before = document
+        document, _ = before.apply(op)
+        deeds.note(author, op, before, document)
+        title = c.SetTerrain(fields=c.TerrainFields(title=label))
+        before = document
+        document, _ = before.apply(title)
+        deeds.note(author, title, before, document)
+    left = _after(deeds.plan(document), document)
+    assert (left.strokes["s0"].label, left.settings.title) == ("B", "B")

@@ -5,11 +5,15 @@ from __future__ import annotations
 import json
 
 from esker import contract as c
+from esker.document.ops import StrokeSet
 from esker.session.lesson import names
 from esker.session.lesson.rules import REMOVED, WAIT, Hand, Lesson
 from esker.session.lesson.state import MOST, Removed, State, read, with_people
 from esker.session.room import protocol
+from esker.session.room.core import MOST_AGAINST, RoomCore, RoomInfo
 from esker.session.room.entry import Caller
+from esker.session.room.outbox import Outbox
+from esker.store.journal import Loaded
 
 
 def pupil(person: str, role: c.Role = "edit") -> Caller:
@@ -79,3 +83,28 @@ def test_switches_have_a_rate() -> None:
     events = [event for _ in range(60) for event in connection.text(text, 1.0)]
     assert sum(isinstance(event, protocol.Message) for event in events) == protocol.CONDUCTS_BURST
     assert sum(isinstance(event, protocol.Reply) for event in events) == 1
+
+
+def test_who_goes_on_in_spite_of_it_is_closed() -> None:
+    """SPEC L7: however slowly; one op that is allowed begins the count anew."""
+    core = RoomCore(Loaded(StrokeSet("t"), [], {}), lambda *_: None)
+    hello = c.Hello(protocol=c.PROTOCOL_VERSION, terrain="t", secret="s", client="c")
+    outbox = Outbox(lambda: None, now=lambda _: True)
+    member = core.join(hello, "edit", "link", outbox, RoomInfo(1, 1, ""))
+
+    def try_(count: int, start: int) -> None:
+        for k in range(start, start + count):
+            op = c.SetTerrain(fields=c.TerrainFields(title=f"{k}"))
+            core.submit(member, [c.OpEnvelope(id=f"c:{k}", op=op)])
+
+    core.lesson.state = State(hands_off=True)
+    try_(MOST_AGAINST, 0)
+    core.lesson.state = State()
+    try_(1, MOST_AGAINST)
+    core.lesson.state = State(hands_off=True)
+    try_(MOST_AGAINST, MOST_AGAINST + 1)
+    assert outbox.closing is None
+    assert core.head.clock == 1
+    try_(1, 2 * MOST_AGAINST + 1)
+    assert outbox.closing is not None
+    assert outbox.closing[0] == "rate_limited"
