@@ -13,6 +13,7 @@ from typing import Any
 from bench.ground import _importing, _patchwork, _patchwork_cover, _refine
 from bench.picture import _render
 from bench.solver import _solver
+from bench.strangers import _siege_table
 from esker import resources
 
 ROOT = resources.sources()
@@ -23,6 +24,7 @@ REFINEMENT = ROOT / "docs" / "refinement.md"
 PATCHWORK = ROOT / "docs" / "patchwork.md"
 IMPORTING = ROOT / "docs" / "importing.md"
 RENDERER = ROOT / "docs" / "renderer.md"
+SECURITY = ROOT / "docs" / "security.md"
 BEGIN, END = "<!-- figures: written by `python -m bench.report` -->", "<!-- end of figures -->"
 
 
@@ -128,6 +130,7 @@ def documents() -> dict[Path, str]:
     page = _patchwork.document(PATCHWORK.read_text(encoding="utf-8"), result("patchwork"))
     out[PATCHWORK] = _patchwork_cover.document(page, result("patchwork_cover"))
     out[IMPORTING] = _importing.document(IMPORTING.read_text(encoding="utf-8"), result("importing"))
+    out[SECURITY] = _siege_table.document(SECURITY.read_text(encoding="utf-8"), result("siege"))
     drawn = (result(name) for name in ("render", "cracks", "flight"))
     out[RENDERER] = _render.document(RENDERER.read_text(encoding="utf-8"), *drawn)
     return out

@@ -1,0 +1,70 @@
+"""The table of ``docs/security.md`` out of the committed result of ``esker bench siege``."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+BEGIN: Final = "<!-- siege: written by `python -m bench.report` -->"
+END: Final = "<!-- end of siege -->"
+KEYS: Final = {"ack_p99_ms": "acknowledged, p99", "tile_p50_ms": "first tile, p50", "settling_s": "settled"}
+
+
+def document(text: str, result: dict[str, Any]) -> str:
+    """The page with its table renewed. Raises ValueError when the markers are missing."""
+    if BEGIN not in text or END not in text:
+        raise ValueError("docs/security.md has no place for the table")
+    before, after = text.split(BEGIN)[0], text.split(END)[1]
+    return f"{before}{BEGIN}\n\n{table(result)}\n\n{END}{after}"
+
+
+def table(result: dict[str, Any]) -> str:
+    """One line an attack: how many times as long things took, and the memory."""
+    machine, alone, aims = result["machine"], result["runs"]["alone"], result["aims"]
+    floor = ", ".join(f"{name} {alone['floor'].get(key, 1.0):.1f}" for key, name in KEYS.items())
+    rows = [name for name in result["runs"] if name != "alone"]
+    lines = [
+        f"Measured on {machine['cores']} cores ({machine['cpu']}), load {machine['load_before']} before it began, "
+        f"{result['scene']['seconds']:.0f} s of drawing beside each attack. {result['note']}".strip(),
+        "",
+        f"Without an attack ({alone['times_measured']} times, medians): acknowledged in {alone['ack_p99_ms']:.0f} ms "
+        f"(p99), first tile in {alone['tile_p50_ms']:.0f} ms (p50), settled {alone['settling_s']:.2f} s after the last "
+        f"change. The floor, which is the worst of these by the median: {floor}. Beside each attack, times the median; "
+        f"**bold** where it is above both the aim and the floor:",
+        "",
+        f"| attack | {' | '.join(f'{name} (aim {aims[key]:.0f})' for key, name in KEYS.items())} | memory "
+        f"(aim {aims['memory_mb']:,} MB) | afterwards |",
+        "|---|---|---|---|---|---|",
+        *(_line(name, result["runs"][name], alone["floor"], aims) for name in rows),
+        "",
+        f"Of {len(rows)} rows {sum(_met(result['runs'][name], alone['floor'], aims) for name in rows)} meet every aim "
+        f"or lie below the floor, during the attack and after it; connections or changes of the people that were lost: "
+        f"{sum(result['runs'][name]['closed'] + result['runs'][name]['unanswered'] for name in rows)}; tracebacks in "
+        f"the log: {result['tracebacks']}.",
+    ]
+    return "\n".join(lines)
+
+
+def _above(key: str, times: dict[str, float], floor: dict[str, float], aims: dict[str, float]) -> bool:
+    """Returns whether a figure is above its aim and above what the machine does by itself."""
+    return times.get(key, 0.0) > max(aims[key], floor.get(key, 1.0))
+
+
+def _met(run: dict[str, Any], floor: dict[str, float], aims: dict[str, float]) -> bool:
+    both = run["times_alone"], run["after"].get("times_alone", {})
+    slow = any(_above(key, times, floor, aims) for times in both for key in KEYS)
+    return not slow and run["server"]["memory_mb"] <= aims["memory_mb"]
+
+
+def _line(name: str, run: dict[str, Any], floor: dict[str, float], aims: dict[str, float]) -> str:
+    def cell(key: str) -> str:
+        text = f"{run['times_alone'].get(key, 0.0):.1f}"
+        return f"**{text}**" if _above(key, run["times_alone"], floor, aims) else text
+
+    memory = f"{run['server']['memory_mb']:,} MB"
+    memory = f"**{memory}**" if run["server"]["memory_mb"] > aims["memory_mb"] else memory
+    late = [
+        f"{words} {run['after']['times_alone'][key]:.1f}"
+        for key, words in KEYS.items()
+        if _above(key, run["after"].get("times_alone", {}), floor, aims)
+    ]
+    return f"| {name.replace('_', ' ')} | {' | '.join(map(cell, KEYS))} | {memory} | {', '.join(late) or 'as before'} |"
