@@ -223,6 +223,16 @@ describe("what is printed", () => {
     exporter.dispose();
   });
 
+  it("offers a solid with as many samples as printers can lay down, and takes more (SPEC N48)", () => {
+    const exporter = new Exporter(new FakeTransport(), () => {});
+    exporter.choose({ format: "stl" });
+    expect(exporter.choice.value.samples).toBe(513);
+    exporter.choose({ samples: 1025 });
+    exporter.choose({ model: { width_mm: 90, base_mm: 2, exaggeration: 3 } });
+    expect(exporter.choice.value.samples).toBe(1025);
+    exporter.dispose();
+  });
+
   it("has no more samples than paper shows and printers take", () => {
     expect(sizesOf("map_svg").at(-1)).toBe(2049);
     expect(sizesOf("stl").at(-1)).toBe(1025);

@@ -50,6 +50,8 @@ const POLL_MS = 400;
 /** An export is given up after so many polls in a row without an answer. */
 const MOST_SILENCE = 40;
 const SETTLE_MS = 150;
+/** Samples a side with which a solid is offered. */
+const SOLID_SAMPLES = 513;
 
 /** Contour maps on paper. */
 export const isMap = (format: ExportFormat): boolean => format === "map_pdf" || format === "map_svg";
@@ -125,7 +127,11 @@ export class Exporter {
 
   /** Changes what is asked for; samples that the format does not have become the most that it has. */
   choose(fields: Partial<ExportChoice>): void {
-    const next = { ...this.#choice.peek(), ...fields };
+    const before = this.#choice.peek();
+    const next = { ...before, ...fields };
+    // Printers lay down tenths of a millimetre: more samples make large files for nothing. They may still be chosen.
+    if (next.format === "stl" && before.format !== "stl" && fields.samples === undefined)
+      next.samples = Math.min(next.samples, SOLID_SAMPLES);
     const sizes = sizesOf(next.format);
     this.#choice.value = sizes.includes(next.samples) ? next : { ...next, samples: sizes.at(-1)! };
     this.ask();
