@@ -17,11 +17,11 @@ export interface RulerHandle {
   readonly active: boolean;
 }
 
-/** So many points at most are left of a line that was drawn in one go: each has a handle. */
+/** The most points that are left of a line drawn in one go: each has a handle. */
 const MOST_DRAWN = 24;
-/** And so many may be set. */
+/** The most points that may be set. */
 export const MOST_POINTS = 64;
-/** A drawn line may be moved by so many pixels when points are left out. */
+/** Pixels by which a drawn line may move when points are left out. */
 const TOLERANCE_PX = 2;
 
 export class Ruler {

@@ -1,10 +1,10 @@
 /** The section along a line, with axes; a pointer on it marks the place on the ground. */
 
 import { html, nothing, svg, type TemplateResult } from "lit";
-import type { Instruments } from "../../../app/view/instruments/instruments.ts";
-import { type Chart, chartOf } from "../../../app/view/instruments/profile-chart.ts";
-import { heightWords, lengthWords } from "../../../app/view/instruments/words.ts";
-import { type Profile, profileAt } from "../../../core/measure/profile.ts";
+import type { Instruments } from "../../app/view/instruments/instruments.ts";
+import { type Chart, chartOf } from "../../app/view/instruments/profile-chart.ts";
+import { heightWords, lengthWords } from "../../app/view/instruments/words.ts";
+import { type Profile, profileAt } from "../../core/measure/profile.ts";
 
 const rootPx = (): number => Number.parseFloat(getComputedStyle(document.documentElement).fontSize) || 16;
 

@@ -1,8 +1,8 @@
 /** The points of what is measured as numbers: for keyboards, and for places that one knows. */
 
 import { html, nothing, type TemplateResult } from "lit";
-import type { Ruler } from "../../../input/tools/ruler.ts";
-import { icon } from "../../controls/icons.ts";
+import type { Ruler } from "../../input/tools/ruler.ts";
+import { icon } from "../controls/icons.ts";
 
 export function pointFields(ruler: Ruler, sizeM: number): TemplateResult | typeof nothing {
   const points = ruler.points.value;
