@@ -351,6 +351,7 @@ export class InputController {
       }
     }
     if (activity.kind === "draw") this.#strokes.cancel();
+    if (activity.kind === "refused" && this.ruler.kind.value !== null) this.#o.onMessage(activity.notice);
     if (activity.kind === "measure" && !this.ruler.add(activity.from))
       this.#o.onMessage(`A line has at most ${MOST_POINTS} points.`);
     if (activity.kind === "redraw") this.#oversketch.cancel();

@@ -125,7 +125,9 @@ describe("the ruler", () => {
     fire("pointerdown", 500, 2);
     fire("pointermove", 560, 2);
     fire("pointerup", 560, 2);
-    expect(messages).toEqual(["Begin the line on the land."]);
+    fire("pointerdown", 500, 2);
+    fire("pointerup", 500, 2);
+    expect(messages).toEqual(["Begin the line on the land.", "Begin the line on the land."]);
     for (let i = 0; i < MOST_POINTS + 3; i++) input.ruler.add([i, i]);
     expect(points()).toHaveLength(MOST_POINTS);
   });

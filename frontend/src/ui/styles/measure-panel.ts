@@ -30,7 +30,7 @@ export const measurePanelStyles = css`
   }
   .empty,
   .problem {
-    padding: 14px 4px;
+    padding: 8px 4px;
     color: var(--esk-quiet);
     text-wrap: balance;
   }

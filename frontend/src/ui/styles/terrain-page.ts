@@ -371,6 +371,17 @@ export const terrainPageStyles = css`
     .foot:has(~ esk-measure) {
       display: none;
     }
+    /* Little height is left for the land: the tools come back when one stops measuring. */
+    @media (max-height: 440px) {
+      esk-measure,
+      esk-measure[beside] {
+        bottom: var(--edge);
+        max-height: 52%;
+      }
+      esk-tools:has(~ esk-measure) {
+        display: none;
+      }
+    }
     .hint,
     esk-toasts {
       bottom: calc(132px + var(--drawer) + env(safe-area-inset-bottom));
