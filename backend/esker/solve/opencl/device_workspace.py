@@ -115,6 +115,7 @@ class DeviceWorkspace(ABC, Generic[S]):
         self._screening = 0.0
         self._at_rest: tuple[NDArray[np.float32], NDArray[np.float32]] | None = None
         self._parked: Parked | None = None
+        self._loaded: tuple[Tables, tuple[Any, ...]] | None = None
         self._resident(arena)
         self._kept = KeptSums(bins_of(grid.samples(self.top)), self.based) if arena.bins.keeps_sums else None
 
@@ -230,6 +231,7 @@ class DeviceWorkspace(ABC, Generic[S]):
                 self._queue.queue.finish()
                 yield
             self.rasterise(tables, band)
+        self._loaded = None
         rows = window.sample_rows
         self.gradient.coarsen(tables.screening, rows)
         if self._over is not None:
@@ -252,7 +254,9 @@ class DeviceWorkspace(ABC, Generic[S]):
         pair = None if over is None else raster.Over(over.base, over.share, over.target)
         target = raster.Target(*fields, shape.pitch, shape.stride, pair)
         kept = None if self._kept is None else self._kept.plan(self._queue, self.packer, window)
-        raster.rasterise(self._bins, tables, window, target, kept=kept)
+        if self._loaded is None or self._loaded[0] is not tables:
+            self._loaded = tables, raster.load(self._bins, tables)
+        raster.rasterise(self._bins, tables, window, target, self._loaded[1], kept)
 
     def read(self, level: int) -> NDArray[np.float32]:
         """Heights of a level, metres."""
