@@ -31,8 +31,8 @@ BinBox = tuple[int, int, int, int]
 BIN = 16
 """Samples along one side of a bin: one float16 vector wide."""
 RASTER_BINS = 1000
-"""Bins rasterised at a stretch: a quarter of a level with 1025 x 1025 samples. All of it at once is up to a quarter of a
-second where sixty strokes meet in a bin, and others wait for it."""
+"""Bins rasterised at a stretch: a quarter of a level with 1025 x 1025 samples. All of it at once takes up to 400 ms
+where sixty strokes meet in a bin, and others wait for it."""
 LANES = 16
 """Segment tables are padded per stroke to a multiple of this with copies of the last segment."""
 CREST_HALF_WIDTH = 0.71
