@@ -93,7 +93,7 @@ def levels(name: str, **changes: float) -> dict[str, Any]:
 
 
 def statistics(z: Grid, cell_m: float) -> dict[str, float]:
-    """Of the hilly part of a square grid: median slope; exponent b of P(area > a) ~ a^-b and the share of samples with
+    """Measures the hilly part of a grid: median slope; exponent b of P(area > a) ~ a^-b and the share of samples with
     64 above them; theta of slope ~ area^-theta; hypsometric integral; basins of 1,000 samples; share under water."""
     n = min(z.shape)
     z = np.ascontiguousarray(z[:n, :n], np.float64)

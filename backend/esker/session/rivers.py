@@ -20,9 +20,9 @@ from esker.session.ground.ports import Hydrology
 log = logging.getLogger("esker.rivers")
 
 PREVIEW_LEVEL: Final = 2
-"""Whose samples count while somebody draws."""
+"""The level whose samples count while somebody draws."""
 REST_LEVEL: Final = 4
-"""Whose samples count at rest, or the finest that is solved as a whole."""
+"""The level whose samples count at rest, or the finest that is solved as a whole."""
 EVERY_SECONDS: Final = 0.25
 """While somebody draws they are looked for at most this often."""
 FOLLOWED: Final = ("rivers", "sea_level_m", "seed", "look", "detail", "rule", "place")

@@ -148,7 +148,7 @@ export interface DecodedFrame {
   readonly tiles: readonly DecodedTile[];
   /** Bytes on the wire: returned to the server as credit once applied. */
   readonly bytes: number;
-  /** Of a frame without tiles: all rivers, in place of those of before. */
+  /** All rivers, in place of those of before. A frame that has them has no tiles. */
   readonly rivers?: RiverSet;
 }
 
