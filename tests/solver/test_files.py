@@ -40,6 +40,7 @@ def zipped(**members: bytes) -> bytes:
 
 
 HEADER = json.dumps({"format": "esker-terrain", "version": 1}).encode()
+NEWER = json.dumps({"format": "esker-terrain", "version": archive.VERSION + 1}).encode()
 BODY = DOCUMENT.model_dump_json().encode()
 
 
@@ -75,7 +76,7 @@ def test_a_file_from_before_paint_opens_unchanged() -> None:
         (zipped(esker_json=HEADER), "has no document.json"),
         (zipped(esker_json=b"{", document_json=BODY), "damaged"),
         (zipped(esker_json=b"[]", document_json=BODY), "not an .esker file"),
-        (zipped(esker_json=b'{"format": "esker-terrain", "version": 6}', document_json=BODY), "newer"),
+        (zipped(esker_json=NEWER, document_json=BODY), "newer"),
         (zipped(esker_json=HEADER, document_json=b'{"id": "t", "strokes": 3}'), "strokes"),
         (zipped(esker_json=HEADER, document_json=b'{"id": "t", "clock": NaN}'), "not valid"),
         (zipped(esker_json=HEADER, document_json=b" " * 40_000_000), "unpacks to more"),

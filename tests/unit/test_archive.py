@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from esker import Stroke
 from esker import contract as c
 from esker.document import archive
 from esker.document.archive import ArchiveError
@@ -87,6 +88,19 @@ def test_what_has_no_layers_is_a_file_for_older_versions(grids: dict[str, Raster
         with zipfile.ZipFile(io.BytesIO(archive.dumps(c.Document(id="t"), given))) as file:
             assert json.loads(file.read("esker.json"))["version"] == 2
             assert file.namelist() == ["esker.json", "document.json"]
+
+
+def test_what_has_gullies_is_a_file_for_this_version() -> None:
+    """SPEC F201: what has none is written as before, and a file that does not say has none."""
+    plain = c.Document(id="t")
+    worn = plain.model_copy(update={"settings": c.TerrainSettings(erosion=1.0, hold=0.5)})
+    brush = Stroke.paint([(500, 500), (900, 700)], "erosion", -1.0)
+    painted = plain.model_copy(update={"strokes": (brush,)})
+    for document, version in ((plain, 2), (worn, archive.VERSION), (painted, archive.VERSION)):
+        data = archive.dumps(document)
+        with zipfile.ZipFile(io.BytesIO(data)) as file:
+            assert json.loads(file.read("esker.json"))["version"] == version
+        assert archive.loads(data) == document
 
 
 def test_a_grid_that_is_missing(document: c.Document, grids: dict[str, Raster]) -> None:
