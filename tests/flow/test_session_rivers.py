@@ -18,7 +18,7 @@ from esker.server.hydrology import Hydrology, Snapshot, snapshot
 from esker.session import rivers as session_rivers
 from esker.session.ground.feed import TileFeed
 from esker.session.ground.tilethread import TileThread
-from esker.session.rivers import EVERY_SECONDS, Look, Rivers, next_look
+from esker.session.rivers import EVERY_SECONDS, Look, Rivers, Wanted, next_look
 from esker.tiles.codec.rivers import is_rivers, read_rivers
 from esker.tiles.delivery import ClientTiles, TileServer
 from esker.tiles.watcher import Watcher
@@ -27,23 +27,25 @@ PREVIEW, REST = Look(2, False), Look(4, True)
 
 
 @pytest.mark.parametrize(
-    ("wanted", "busy", "last", "found"),
+    ("wanted", "busy", "last", "look", "wait"),
     [
-        (None, False, 0.0, (None, 0.0)),
-        (PREVIEW, True, 0.0, (None, 0.0)),
-        (REST, True, 0.0, (None, 0.0)),
-        (PREVIEW, False, 10.0 - EVERY_SECONDS, (PREVIEW, 0.0)),
-        (PREVIEW, False, 9.9, (None, 0.15)),
-        (REST, False, 9.9, (REST, 0.0)),
+        (Wanted(), False, 0.0, None, None),
+        (Wanted(True), True, 0.0, None, None),
+        (Wanted(False, 0.0), True, 0.0, None, None),
+        (Wanted(True), False, 10.0 - EVERY_SECONDS, PREVIEW, None),
+        (Wanted(True), False, 9.9, None, 0.15),
+        (Wanted(True, 5.0), False, 9.0, PREVIEW, None),
+        (Wanted(False, 10.0), False, 9.9, REST, None),
+        (Wanted(False, 10.5), False, 0.0, None, 0.5),
     ],
 )
 def test_when_rivers_are_looked_for(
-    wanted: Look | None, busy: bool, last: float, found: tuple[Look | None, float]
+    wanted: Wanted, busy: bool, last: float, look: Look | None, wait: float | None
 ) -> None:
     """SPEC W33."""
-    look, wait = next_look(wanted, busy, 10.0, last)
-    assert look == found[0]
-    assert wait == pytest.approx(found[1])
+    found, waits = next_look(wanted, busy, 10.0, last)
+    assert found == look
+    assert waits == (None if wait is None else pytest.approx(wait))
 
 
 class Searches:
@@ -52,7 +54,8 @@ class Searches:
     def __init__(self) -> None:
         self.levels: list[int] = []
         self.settled: list[bool] = []
-        self.answers: list[Future[bytes]] = []
+        self.answers: list[Future[bytes | None]] = []
+        self.is_wanted: list[Callable[[], bool]] = []
         self.shown: list[bytes | None] = []
 
     def snapshot(self, level: int, taken: Callable[[Any], None]) -> None:
@@ -62,8 +65,16 @@ class Searches:
     def show_rivers(self, frame: bytes | None) -> None:
         self.shown.append(frame)
 
-    def find(self, _ground: Any, _settings: c.TerrainSettings, _span_m: Any, settled: bool) -> Future[bytes]:
+    def find(
+        self,
+        ground: Any,  # noqa: ARG002
+        settings: c.TerrainSettings,  # noqa: ARG002
+        span_m: tuple[float, float] | None,  # noqa: ARG002
+        settled: bool,
+        is_wanted: Callable[[], bool],
+    ) -> Future[bytes | None]:
         self.settled.append(settled)
+        self.is_wanted.append(is_wanted)
         self.answers.append(Future())
         return self.answers[-1]
 
@@ -82,6 +93,7 @@ async def turns() -> None:
 def now(monkeypatch: pytest.MonkeyPatch) -> None:
     """While somebody draws, rivers may be looked for at once."""
     monkeypatch.setattr(session_rivers, "EVERY_SECONDS", 0.0)
+    monkeypatch.setattr(session_rivers, "REST_SECONDS", 0.0)
 
 
 def test_one_search_runs_at_a_time_and_the_newest_ground_is_next(now: None) -> None:
@@ -98,16 +110,19 @@ def test_one_search_runs_at_a_time_and_the_newest_ground_is_next(now: None) -> N
         assert searches.levels == [2]
         searches.answers[0].set_result(b"first")
         await turns()
-        assert searches.levels == [2, 4]
-        assert searches.settled == [False, True]
-        searches.answers[1].set_result(b"at rest")
+        assert searches.levels == [2, 2]
+        searches.answers[1].set_result(b"newest")
         await turns()
-        assert searches.shown == [b"first", b"at rest"]
+        assert searches.levels == [2, 2, 4]
+        assert searches.settled == [False, False, True]
+        searches.answers[2].set_result(b"at rest")
+        await turns()
+        assert searches.shown == [b"first", b"newest", b"at rest"]
         rivers.level_taken(0, False)
-        assert searches.levels == [2, 4]
+        assert len(searches.levels) == 3
         rivers.close()
         rivers.level_taken(2, False)
-        assert searches.levels == [2, 4]
+        assert len(searches.levels) == 3
 
     asyncio.run(run())
 
@@ -123,17 +138,52 @@ def test_settings_that_rivers_follow_from_have_them_looked_for_anew(now: None) -
         assert searches.levels == []
         for fields in ({}, {"sea_level_m": 3.0}, {"detail": 0.0}, {"rivers": 2.0}):
             rivers.follow(document(**({"rivers": 1.0} | fields)))
-            searches.answers[-1].set_result(b"x")
-            await turns()
-        assert searches.levels == [4] * 4
+            for _ in range(2):
+                searches.answers[-1].set_result(b"x")
+                await turns()
+        assert searches.levels == [2, 4] * 4
         rivers.follow(document(rivers=2.0, wetness=3.0, title="another"))
-        assert searches.levels == [4] * 4
+        assert searches.levels == [2, 4] * 4
         rivers.follow(document())
         assert searches.shown[-1] is None
         rivers.level_taken(4, True)
-        assert searches.levels == [4] * 4
+        assert searches.levels == [2, 4] * 4
 
     asyncio.run(run())
+
+
+def test_a_search_at_rest_ends_where_people_go_on_drawing(now: None) -> None:
+    """SPEC W33: and what it did not find is not shown."""
+
+    async def run() -> None:
+        searches = Searches()
+        rivers = Rivers(searches, searches, asyncio.get_running_loop())
+        rivers.follow(document(rivers=1.0))
+        rivers.level_taken(4, True)
+        for _ in range(2):
+            searches.answers[-1].set_result(b"preview")
+            await turns()
+        assert searches.levels == [2, 2, 4]
+        assert searches.is_wanted[-1]()
+        rivers.level_taken(0, False)
+        assert not searches.is_wanted[-1]()
+        assert searches.is_wanted[0]()
+        searches.answers[-1].set_result(None)
+        await turns()
+        assert searches.shown == [b"preview"] * 2
+
+    asyncio.run(run())
+
+
+def test_the_search_ends_when_it_is_wanted_no_more() -> None:
+    """SPEC W33."""
+    hydrology = Hydrology()
+    ground, asked = Snapshot(0, 1, valley(1)), c.TerrainSettings(rivers=1.0)
+    assert hydrology.find(ground, asked, None, True, lambda: False).result(120) is None
+    assert hydrology.find(ground, asked, None, True).result(120) is not None
+    hydrology.close()
+    with pytest.raises(RuntimeError):
+        hydrology.find(ground, asked, None, True)
 
 
 def test_rivers_that_come_after_they_were_turned_off_are_not_shown(now: None) -> None:

@@ -12,17 +12,18 @@ import os
 import shutil
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
+from typing import Final
 
 import numba
 
-from esker.compiled import kernel
+from esker import compiled
 from esker.patchwork import kept_loops
 from esker.process import system
 
 __all__ = ["bands", "kernel", "processors", "spread"]
 
 
-def _keep_by_content() -> None:
+def _keep_by_content() -> str | None:
     """Keeps compiled code in a folder that is named by what it was compiled from, and removes that of other texts.
 
     numba asks only whether the file of a function has changed, not those of the functions that it calls. Where the
@@ -32,17 +33,28 @@ def _keep_by_content() -> None:
     try:
         kept.mkdir(parents=True, exist_ok=True)
         if not os.access(kept, os.W_OK):
-            return
+            return None
     except OSError:
-        return
+        return None
     for other in kept.parent.glob("compiled-*"):
         if other != kept:
             shutil.rmtree(other, ignore_errors=True)
-    if kept_loops.VARIABLE not in os.environ:
-        numba.config.CACHE_DIR = str(kept)  # type: ignore[attr-defined]
+    return None if kept_loops.VARIABLE in os.environ else str(kept)
 
 
-_keep_by_content()
+_KEPT: Final = _keep_by_content()
+
+
+def kernel(function: compiled.F) -> compiled.F:
+    """``compiled.kernel``, kept in this room's folder. Other rooms' loops are kept beside their own files, whichever
+    room was imported first."""
+    before = numba.config.CACHE_DIR  # type: ignore[attr-defined]
+    try:
+        if _KEPT is not None:
+            numba.config.CACHE_DIR = _KEPT  # type: ignore[attr-defined]
+        return compiled.kernel(function)
+    finally:
+        numba.config.CACHE_DIR = before  # type: ignore[attr-defined]
 
 
 def processors() -> int:

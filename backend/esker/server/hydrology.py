@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 
@@ -64,22 +64,60 @@ class Hydrology:
         self._thread = ThreadPoolExecutor(1, "rivers", initializer=priority.yield_to_others)
 
     def find(
-        self, ground: Snapshot, settings: c.TerrainSettings, span_m: tuple[float, float] | None, settled: bool
-    ) -> Future[bytes]:
-        """Begins to look; the outcome is a frame of all rivers. ``span_m``: lowest and highest sample of the elevation
-        layers. Raises RuntimeError after ``close``."""
-        return self._thread.submit(frame_of, ground, settings, span_m, settled)
+        self,
+        ground: Snapshot,
+        settings: c.TerrainSettings,
+        span_m: tuple[float, float] | None,
+        settled: bool,
+        is_wanted: Callable[[], bool] = lambda: True,
+    ) -> Future[bytes | None]:
+        """Begins to look; the outcome is a frame of all rivers, None where ``is_wanted`` said no on the way.
+
+        ``span_m``: lowest and highest sample of the elevation layers. Raises RuntimeError after ``close``.
+        """
+        return self._thread.submit(_frame_unless, is_wanted, ground, settings, span_m, settled)
 
     def close(self) -> None:
         """Drops what waits, and takes no more."""
         self._thread.shutdown(wait=False, cancel_futures=True)
 
 
-def frame_of(ground: Snapshot, settings: c.TerrainSettings, span_m: tuple[float, float] | None, settled: bool) -> bytes:
-    """The rivers of a ground as a frame of MAX_RIVER_BYTES at most; where there are more, the largest."""
+class _Overtaken(Exception):
+    """Newer ground is there."""
+
+
+def _frame_unless(
+    is_wanted: Callable[[], bool],
+    ground: Snapshot,
+    settings: c.TerrainSettings,
+    span_m: tuple[float, float] | None,
+    settled: bool,
+) -> bytes | None:
+    def check(_: float = 0.0) -> None:
+        if not is_wanted():
+            raise _Overtaken
+
+    try:
+        check()
+        return frame_of(ground, settings, span_m, settled, check)
+    except _Overtaken:
+        return None
+
+
+def frame_of(
+    ground: Snapshot,
+    settings: c.TerrainSettings,
+    span_m: tuple[float, float] | None,
+    settled: bool,
+    progress: Callable[[float], None] | None = None,
+) -> bytes:
+    """The rivers of a ground as a frame of MAX_RIVER_BYTES at most; where there are more, the largest.
+
+    ``progress`` is told the share of the detail that is done, which is what takes time; what it raises ends it.
+    """
     every = slice(0, grid.samples(ground.level))
     site = site_of(settings, ground.heights, ground.channels, ground_m=span_m)
-    heights = DetailedTerrain(site).window(ground.level, every, every).heights
+    heights = DetailedTerrain(site).window(ground.level, every, every, progress).heights
     water = water_of(heights, settings.size_m, settings.sea_level_m)
     many = settings.rivers
     while True:

@@ -10,7 +10,7 @@ import asyncio
 import logging
 from collections.abc import Callable
 from concurrent.futures import Future
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final, Protocol
 
 from esker.document.layers import span_m
@@ -25,6 +25,8 @@ REST_LEVEL: Final = 4
 """The level whose samples count at rest, or the finest that is solved as a whole."""
 EVERY_SECONDS: Final = 0.25
 """While somebody draws they are looked for at most this often."""
+REST_SECONDS: Final = 0.6
+"""Ground that has been final for so long is at rest: small terrains settle between two strokes."""
 FOLLOWED: Final = ("rivers", "sea_level_m", "seed", "look", "detail", "rule", "place")
 """Settings that rivers follow from beside the ground. Width follows from ``wetness`` where they are drawn."""
 
@@ -50,12 +52,28 @@ class Look:
     settled: bool
 
 
-def next_look(wanted: Look | None, busy: bool, now: float, last: float) -> tuple[Look | None, float]:
-    """What to look for now, if anything, and else for how long to wait; 0 says until something happens."""
-    if wanted is None or busy:
-        return None, 0.0
-    wait = 0.0 if wanted.settled else last + EVERY_SECONDS - now
-    return (wanted, 0.0) if wait <= 0 else (None, wait)
+@dataclass(frozen=True)
+class Wanted:
+    """What is still to be looked for. ``preview``: on PREVIEW_LEVEL; ``rest_at``: from when on at rest, None: not."""
+
+    preview: bool = False
+    rest_at: float | None = None
+
+
+def next_look(wanted: Wanted, busy: bool, now: float, last: float) -> tuple[Look | None, float | None]:
+    """What to look for now, if anything; and else for how long to wait, None: until something happens.
+
+    ``last``: when a search began last. Rest comes after the previews of what led to it.
+    """
+    if busy:
+        return None, None
+    if wanted.preview:
+        wait = last + EVERY_SECONDS - now
+        return (Look(PREVIEW_LEVEL, False), None) if wait <= 0 else (None, wait)
+    if wanted.rest_at is None:
+        return None, None
+    wait = wanted.rest_at - now
+    return (Look(REST_LEVEL, True), None) if wait <= 0 else (None, wait)
 
 
 class Rivers:
@@ -66,9 +84,9 @@ class Rivers:
         self._hydrology, self._ground, self._loop = hydrology, ground, loop
         self._document: StrokeSet | None = None
         self._followed: tuple[object, ...] = ()
-        self._wanted: Look | None = None
+        self._wanted = Wanted()
         self._settled = False
-        self._busy = self._closed = False
+        self._busy = self._closed = self._overtaken = False
         self._last = float("-inf")
         self._timer: asyncio.TimerHandle | None = None
 
@@ -80,22 +98,26 @@ class Rivers:
             return
         before, self._followed = self._followed, followed
         if document.settings.rivers == 0:
-            self._wanted = None
+            self._wanted = Wanted()
             if before and before[0]:
                 self._ground.show_rivers(None)
         else:
-            self._wanted = Look(REST_LEVEL if self._settled else PREVIEW_LEVEL, self._settled)
-            self._go_on()
+            self._look_for(self._settled)
 
     def level_taken(self, level: int, settled: bool) -> None:
         """A level became tiles. ``settled``: now all of them are final."""
         self._settled = settled
         if self._document is None or self._document.settings.rivers == 0:
             return
-        if settled:
-            self._wanted = Look(REST_LEVEL, True)
-        elif level == PREVIEW_LEVEL:
-            self._wanted = Look(PREVIEW_LEVEL, False)
+        self._overtaken = not settled
+        if settled or level == PREVIEW_LEVEL:
+            self._look_for(settled)
+        else:
+            self._wanted = replace(self._wanted, rest_at=None)
+
+    def _look_for(self, settled: bool) -> None:
+        """On the coarse level soon, and, where the ground is final, on the finer one when it has rested."""
+        self._wanted = Wanted(True, self._loop.time() + REST_SECONDS if settled else None)
         self._go_on()
 
     def close(self) -> None:
@@ -112,9 +134,10 @@ class Rivers:
             self._timer.cancel()
             self._timer = None
         if look is not None:
-            self._wanted, self._busy, self._last = None, True, self._loop.time()
+            self._wanted = Wanted() if look.settled else replace(self._wanted, preview=False)
+            self._busy, self._last, self._overtaken = True, self._loop.time(), False
             self._ground.snapshot(look.level, lambda found: self._read(found, look.settled))
-        elif wait > 0:
+        elif wait is not None:
             self._timer = self._loop.call_later(wait, self._go_on)
 
     def _read(self, found: Any, settled: bool) -> None:
@@ -124,7 +147,11 @@ class Rivers:
             self._go_on()
             return
         try:
-            future = self._hydrology.find(found, document.settings, span_m(tuple(document.layers.values())), settled)
+            span = span_m(tuple(document.layers.values()))
+            # A search at rest takes a second: it ends where people go on drawing. Previews are short, and are shown.
+            future = self._hydrology.find(
+                found, document.settings, span, settled, lambda: not (settled and self._overtaken)
+            )
         except RuntimeError:  # the server is stopping
             return
         future.add_done_callback(lambda done: self._call(self._found, done))
@@ -133,7 +160,7 @@ class Rivers:
         if not self._loop.is_closed():
             self._loop.call_soon_threadsafe(callback, *args)
 
-    def _found(self, future: Future[bytes]) -> None:
+    def _found(self, future: Future[bytes | None]) -> None:
         self._busy = False
         if future.cancelled() or self._closed:
             return
@@ -141,5 +168,7 @@ class Rivers:
         if error is not None:
             log.error("rivers could not be found: %s: %s", type(error).__name__, error)
         elif self._document is not None and self._document.settings.rivers:
-            self._ground.show_rivers(future.result())
+            frame = future.result()
+            if frame is not None:
+                self._ground.show_rivers(frame)
         self._go_on()

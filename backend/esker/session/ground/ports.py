@@ -88,9 +88,17 @@ class Hydrology(Protocol):
     """Finds rivers, in a thread of its own (``server.hydrology``)."""
 
     def find(
-        self, ground: Any, settings: c.TerrainSettings, span_m: tuple[float, float] | None, settled: bool
-    ) -> Future[bytes]:
-        """Begins to look; the outcome is a frame of all rivers of a ground. Raises RuntimeError once it is closed."""
+        self,
+        ground: Any,
+        settings: c.TerrainSettings,
+        span_m: tuple[float, float] | None,
+        settled: bool,
+        is_wanted: Callable[[], bool],
+    ) -> Future[bytes | None]:
+        """Begins to look; the outcome is a frame of all rivers of a ground, or None where it was wanted no more.
+
+        Raises RuntimeError once it is closed.
+        """
         ...
 
 
