@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import importlib.util
+import importlib
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any, Final
 
 import numpy as np
@@ -48,5 +49,10 @@ PEERS: Final[dict[str, Callable[[Floats], Floats]]] = {
 
 
 def installed() -> dict[str, Callable[[Floats], Floats]]:
-    """Those that are at hand."""
-    return {name: run for name, run in PEERS.items() if importlib.util.find_spec(name) is not None}
+    """Those that are at hand, with what they need themselves."""
+    found = {}
+    for name, run in PEERS.items():
+        with suppress(ImportError):
+            importlib.import_module(name)
+            found[name] = run
+    return found
