@@ -31,12 +31,12 @@ def test_no_crack_shows_from_above_below_and_the_side(page: Page, seed: int) -> 
 
 def test_no_crack_shows_where_heights_are_drawn_larger(page: Page) -> None:
     """N25, R8, R9: heights three times as large: nothing opens, and nothing that is seen is culled."""
-    report = page.evaluate("() => esker.crackTest(1, 24, { full: 8, exaggeration: 3 })")
+    report = page.evaluate("() => esker.crackTest(1, 8, { full: 8, exaggeration: 3 })")
     assert report["failures"] == []
     assert report["cracks"] == 0
     assert report["nans"] == 0
-    assert report["covered"] > 24 * 256 * 192 * 0.8
-    assert report["mixed"] >= 12
+    assert report["covered"] > 8 * 256 * 192 * 0.8
+    assert report["mixed"] >= 4
 
 
 def test_no_crack_shows_near_the_ground_of_the_largest_terrain(page: Page) -> None:

@@ -103,6 +103,14 @@ function camera(kind: Kind, next: () => number, view: TileView): CameraState {
   );
 }
 
+/** The camera as far from the ground as before where heights are seen larger: no sight passes over the border then either. */
+function seenFrom(state: CameraState, view: TileView, exaggeration: number): CameraState {
+  if (exaggeration === 1) return state;
+  const ground = heightOf(view, state.eye[0], state.eye[1]);
+  const nearer = ([x, y, z]: Vec3): Vec3 => [x, y, ground + (z - ground) / exaggeration];
+  return { ...state, exaggeration, eye: nearer(state.eye), target: nearer(state.target) };
+}
+
 function heightOf(view: TileView, x: number, y: number): number {
   const root = view.tile(0, 0, 0)!;
   return root.heights[Math.round((y / SIZE) * 64) * 65 + Math.round((x / SIZE) * 64)]!;
@@ -136,7 +144,7 @@ export async function crackTest(seed: number, views: number, how: How = {}): Pro
       const kind = KINDS[k % 4]!;
       if (k % CAMERAS_A_TREE === 0) view.cut(next);
       const tau = 0.6 + 5 * next() ** 2;
-      const state = { ...camera(kind, next, view), exaggeration: how.exaggeration ?? 1 };
+      const state = seenFrom(camera(kind, next, view), view, how.exaggeration ?? 1);
       const drawn = await picture(rig, world, sceneOf(view, state, look), tau, { full: isFull(seed, done, how) });
       tally.add(drawn, kind, `view ${done} ${kind} tau ${tau.toFixed(2)}`);
     }
