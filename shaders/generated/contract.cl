@@ -7,6 +7,7 @@
 #define MAX_REFINED_LEVEL 10
 #define MAX_SYNTHESIS_LEVEL 17
 #define MAX_EROSION 2.0f
+#define BASE_FAR 1.0f
 #define CREST_STIFFNESS 4.0f
 #define SATURATION 0.12f
 #define SPRING_CELLS 30.0f

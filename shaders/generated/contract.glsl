@@ -7,6 +7,7 @@ const int QUANTA_PER_CELL = 256;
 const int MAX_REFINED_LEVEL = 10;
 const int MAX_SYNTHESIS_LEVEL = 17;
 const float MAX_EROSION = 2.0;
+const float BASE_FAR = 1.0;
 const float CREST_STIFFNESS = 4.0;
 const float SATURATION = 0.12;
 const float SPRING_CELLS = 30.0;

@@ -7,6 +7,7 @@ const QUANTA_PER_CELL: i32 = 256;
 const MAX_REFINED_LEVEL: i32 = 10;
 const MAX_SYNTHESIS_LEVEL: i32 = 17;
 const MAX_EROSION: f32 = 2.0;
+const BASE_FAR: f32 = 1.0;
 const CREST_STIFFNESS: f32 = 4.0;
 const SATURATION: f32 = 0.12;
 const SPRING_CELLS: f32 = 30.0;

@@ -146,11 +146,12 @@ fn channel_pair(x: ChannelPlace, y: ChannelPlace, which: u32) -> ChannelPair {
 
 fn asked_of(level: u32, i: vec2i, j: vec2i) -> Asked {
   var out: Asked;
+  out.far = vec4f(BASE_FAR);   // where nodes of the channels are narrow, no stroke fixes anything
   if (site.varied == 0u) {
     out.amplitude = vec4f(channels[0].x);
     out.roughness = vec4f(channels[0].y);
     if (site.surveyed == 1u) { out.survey = vec4f(channels[3].x); }
-    if (site.eroded == 1u) {
+    if (site.stride > 3u) {
       out.far = vec4f(channels[3].y);
       out.erosion = vec4f(channels[4].x);
     }
