@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from esker.contract import BORN_EROSION, BORN_HOLD, TerrainSettings
+from esker.contract import BORN_EROSION, BORN_HOLD, DEFAULT_RIVERS, TerrainSettings
 from esker.templates import FOLDER
 from esker.templates.pen import Pen, smooth_path
 
@@ -178,8 +178,8 @@ def archipelago() -> dict[str, object]:
 
 
 def template(pen: Pen, title: str, description: str, settings: TerrainSettings) -> dict[str, object]:
-    """The JSON value of one file: like all new terrains, with gullies."""
-    settings = settings.model_copy(update={"erosion": BORN_EROSION, "hold": BORN_HOLD})
+    """The JSON value of one file: like all new terrains, with gullies and rivers."""
+    settings = settings.model_copy(update={"erosion": BORN_EROSION, "hold": BORN_HOLD, "rivers": DEFAULT_RIVERS})
     document = pen.document(settings).model_dump(mode="json")
     return {"id": pen.name, "title": title, "description": description, "document": document}
 

@@ -1,6 +1,7 @@
 /** An open terrain as the stage and the page's components know it: all but how it is seen (stage.ts). */
 
 import type { ReadonlySignal, Signal } from "@preact/signals-core";
+import type { RiverSet } from "../core/types.ts";
 import type { SyncDoc } from "../doc/sync.ts";
 import type { Member, MemberPresence, Op, Progress, Role, StrokeFields, TerrainFields } from "../generated/contract.ts";
 import type { Connection } from "../net/connection.ts";
@@ -46,6 +47,8 @@ export interface OpenTerrain {
   readonly notice: ReadonlySignal<string | null>;
   readonly server: ReadonlySignal<ServerInfo | null>;
   readonly me: ReadonlySignal<Identity>;
+  /** The rivers that the server found last; null before. */
+  readonly rivers: ReadonlySignal<RiverSet | null>;
   /** Whether the link allows changes. */
   readonly mayEdit: ReadonlySignal<boolean>;
   /** Whether the terrain can be changed now: an earlier clock cannot. */

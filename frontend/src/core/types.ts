@@ -173,7 +173,7 @@ export interface GhostVisual {
   readonly colour: Rgba;
 }
 
-/** The outline of an elevation grid, as a line on the ground. */
+/** A line on the ground: the outline of an elevation grid, what is measured, or a river. */
 export interface FootprintVisual {
   readonly id: string;
   /** xyz triples, metres; the last point is the first again. */
@@ -181,6 +181,8 @@ export interface FootprintVisual {
   readonly colour: Rgba;
   /** Selected, or being placed. */
   readonly strong: boolean;
+  /** Half the width of a river on the screen; a river has no rim, and hills hide it. */
+  readonly halfWidthPx?: number;
 }
 
 /** A coarse picture of a grid that has no place yet: a lattice of points over the ground. Immutable. */

@@ -40,7 +40,12 @@ function sameCursor(a: CursorVisual, b: CursorVisual): boolean {
 }
 
 function sameFootprint(a: FootprintVisual, b: FootprintVisual): boolean {
-  return a.strong === b.strong && sameNumbers(a.colour, b.colour) && sameNumbers(a.points, b.points);
+  return (
+    a.strong === b.strong &&
+    a.halfWidthPx === b.halfWidthPx &&
+    sameNumbers(a.colour, b.colour) &&
+    sameNumbers(a.points, b.points)
+  );
 }
 
 function sameGhost(a: GhostVisual | null, b: GhostVisual | null): boolean {

@@ -8,6 +8,7 @@ import type {
   ChannelGrid,
   CursorVisual,
   DecodedFrame,
+  FootprintVisual,
   FrameStats,
   Ground,
   Scene,
@@ -30,6 +31,7 @@ import { keepViews, keptViews } from "../device/kept-views.ts";
 import { QualityChoice, TAU_PX } from "../device/quality-choice.ts";
 import { largeLetters, ViewChoices } from "../device/view-choices.ts";
 import { Groundwork } from "../layers/groundwork.ts";
+import { riverLines } from "../layers/river-lines.ts";
 import type { OpenTerrain } from "../open-terrain.ts";
 import { gridTransport } from "../server/grid-transport.ts";
 import { coveredEdges } from "./covered.ts";
@@ -93,6 +95,7 @@ export class Stage {
   });
   readonly #viewport: HTMLElement;
   readonly #strokes: ReadonlySignal<readonly StrokeVisual[]>;
+  readonly #rivers: ReadonlySignal<readonly FootprintVisual[]>;
   readonly #cursors: ReadonlySignal<readonly CursorVisual[]>;
   /** Where the selected stroke is felt, while that overlay is shown. */
   readonly #influence: ReadonlySignal<ChannelGrid | null>;
@@ -180,6 +183,13 @@ export class Stage {
       author: () => session.me.value.name,
     });
     this.#strokes = computed(() => this.#visuals());
+    this.#rivers = computed(() => {
+      const settings = session.doc.doc.value?.settings;
+      const set = session.rivers.value;
+      if (!settings?.rivers || set === null) return [];
+      this.tiles.revision.value; // rivers lie on the ground and move with it
+      return riverLines(set, settings.wetness, this.shown.freeze());
+    });
     this.#cursors = computed(() => cursorVisuals(session.people.value));
     this.#influence = computed(() => {
       if (this.overlay.value !== "influence") return null;
@@ -370,6 +380,7 @@ export class Stage {
         this.#cursors.value;
         input.ghost.value;
         this.groundwork.footprints.value;
+        this.#rivers.value;
         this.instruments.lines.value;
         this.groundwork.visual.value;
         this.overlay.value;
@@ -446,7 +457,7 @@ export class Stage {
       strokes: this.#strokes.value,
       ghost: this.input.ghost.value,
       cursors: this.#cursors.value,
-      footprints: [...this.groundwork.footprints.value, ...this.instruments.lines.value],
+      footprints: [...this.#rivers.value, ...this.groundwork.footprints.value, ...this.instruments.lines.value],
       placing: this.groundwork.visual.value,
       tauPx: TAU_PX[quality],
       quality,

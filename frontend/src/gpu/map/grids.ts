@@ -16,17 +16,19 @@ export function drawFootprints(
   unit: number,
 ): void {
   context.lineJoin = "round";
-  for (const { points, colour, strong } of footprints) {
+  for (const { points, colour, strong, halfWidthPx } of footprints) {
     context.beginPath();
     for (let i = 0; i + 2 < points.length; i += 3) {
       const [x, y] = to(points[i]!, points[i + 1]!);
       if (i === 0) context.moveTo(x, y);
       else context.lineTo(x, y);
     }
-    context.lineWidth = (strong ? 5 : 3) * unit;
-    context.strokeStyle = `rgba(255,253,247,${0.8 * colour[3]})`;
-    context.stroke();
-    context.lineWidth = (strong ? 2.4 : 1.4) * unit;
+    if (halfWidthPx === undefined) {
+      context.lineWidth = (strong ? 5 : 3) * unit;
+      context.strokeStyle = `rgba(255,253,247,${0.8 * colour[3]})`;
+      context.stroke();
+    }
+    context.lineWidth = (halfWidthPx === undefined ? (strong ? 2.4 : 1.4) : 2 * halfWidthPx) * unit;
     context.strokeStyle = css(colour, colour[3]);
     context.stroke();
   }

@@ -5,10 +5,14 @@ import type { Border, Look, Rule, TerrainFields, TerrainSettings } from "../../g
 import {
   DEFAULT_LAKES_FRACTION,
   DEFAULT_REACH_FRACTION,
+  DEFAULT_RIVERS,
   MAX_DETAIL,
   MAX_EROSION,
   MAX_EROSION_SCALE,
+  MAX_RIVERS,
+  MAX_WETNESS,
   MIN_EROSION_SCALE,
+  MIN_WETNESS,
 } from "../../generated/contract.ts";
 import "../controls/range-field.ts";
 import "../controls/segmented.ts";
@@ -126,7 +130,7 @@ export class EskTerrainPanel extends SignalElement {
           @pick=${(e: CustomEvent<Look>) => this.#set({ look: e.detail })}
         ></esk-segmented>
       </div>
-      ${this.#detail(settings, disabled)} ${this.#erosion(settings, disabled)} ${this.#sun(settings, disabled)} ${this.#sea(settings, disabled)} ${this.#lakes(settings, disabled)} ${this.#reach(settings, disabled)}
+      ${this.#detail(settings, disabled)} ${this.#erosion(settings, disabled)} ${this.#sun(settings, disabled)} ${this.#sea(settings, disabled)} ${this.#lakes(settings, disabled)} ${this.#rivers(settings, disabled)} ${this.#reach(settings, disabled)}
       <div class="group">
         <h3>Border</h3>
         <esk-segmented
@@ -304,6 +308,47 @@ export class EskTerrainPanel extends SignalElement {
                   @settle=${(e: CustomEvent<number>) => this.#set({ lakes_m: e.detail })}
                 ></esk-range>
                 <p class="lead">Basins fill to their brim. Draw a dam across a valley, or a crater.</p>`
+        }
+      </div>
+    `;
+  }
+
+  #rivers({ rivers, wetness }: TerrainSettings, disabled: boolean): TemplateResult {
+    return html`
+      <div class="group">
+        <wa-switch
+          size="s"
+          .checked=${live(rivers > 0)}
+          ?disabled=${disabled}
+          @change=${(e: Event) => this.#set({ rivers: (e.target as HTMLInputElement).checked ? DEFAULT_RIVERS : 0 })}
+          >Rivers</wa-switch
+        >
+        ${
+          rivers === 0
+            ? html`<p class="lead">Water stands, and does not run.</p>`
+            : html`<esk-range
+                  label="How many"
+                  of="of the rivers"
+                  log
+                  min=${MAX_RIVERS / 32}
+                  max=${MAX_RIVERS}
+                  .value=${rivers}
+                  ?disabled=${disabled}
+                  @value=${(e: CustomEvent<number>) => this.#set({ rivers: e.detail }, false)}
+                  @settle=${(e: CustomEvent<number>) => this.#set({ rivers: e.detail })}
+                ></esk-range>
+                <esk-range
+                  label="Wetness"
+                  of="of the rivers"
+                  log
+                  min=${MIN_WETNESS}
+                  max=${MAX_WETNESS}
+                  .value=${wetness}
+                  ?disabled=${disabled}
+                  @value=${(e: CustomEvent<number>) => this.#set({ wetness: e.detail }, false)}
+                  @settle=${(e: CustomEvent<number>) => this.#set({ wetness: e.detail })}
+                ></esk-range>
+                <p class="lead">Water runs down from where enough of it has gathered, through lakes, to the sea or the border.</p>`
         }
       </div>
     `;
