@@ -88,10 +88,14 @@ export class EskTools extends SignalElement {
       @media (max-width: 430px) {
         /* Nine of them beside each other. */
         .icon-btn {
-          width: min(44px, calc((100vw - 60px) / 9));
+          width: min(44px, calc((100vw - 22px) / 9));
         }
         :host {
-          gap: 2px;
+          gap: 0;
+          padding: 4px 2px;
+        }
+        hr {
+          margin: 6px 0;
         }
       }
     `,

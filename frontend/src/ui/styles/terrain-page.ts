@@ -327,9 +327,10 @@ export const terrainPageStyles = css`
         left: calc((100% - var(--beside)) / 2);
         max-width: calc(100% - var(--beside) - 2 * var(--edge));
       }
-      /* Eight tools beside each other in what is left. Where they would be too narrow to hit, the row scrolls. */
+      /* Nine tools beside each other in what is left. Where they would be too narrow to hit, the row scrolls. */
       :host([drawer]) esk-tools {
-        --tool-width: clamp(32px, (100vw - var(--beside) - 2 * var(--edge) - 54px) / 8, 44px);
+        --tool-width: clamp(32px, (100vw - var(--beside) - 2 * var(--edge) - 38px) / 9, 44px);
+        gap: 2px;
         overflow-x: auto;
         scrollbar-width: thin;
         justify-content: safe center;
