@@ -31,6 +31,7 @@ from esker.events import Level
 from esker.grid import TileKey
 from esker.solve.solver import Solver
 from esker.tiles.codec.frame import read_frame
+from esker.tiles.codec.rivers import is_rivers
 from esker.tiles.decoder import FrameDecoder
 from esker.tiles.delivery import ClientTiles, TileServer
 from esker.tiles.quadtree import select
@@ -215,6 +216,8 @@ class _Pen:
                 applier.cancel()
 
     def _take(self, message: Any, arrived: asyncio.Queue[Any], now: float) -> None:
+        if isinstance(message, bytes) and is_rivers(message):
+            return
         if isinstance(message, bytes):
             head, _, tiles = read_frame(message)
             arrived.put_nowait(message)

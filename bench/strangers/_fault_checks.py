@@ -50,7 +50,7 @@ class Checks:
 
 
 def old_database(data: Path) -> None:
-    """A database of the format before this one, with one terrain of many ops."""
+    """A database of an earlier format, OLD_FORMAT, with one terrain of many ops."""
     journal = Journal(data)
     journal.create(c.Document(id="t")).result()
     for start in range(0, OLD_OPS, 1000):
@@ -62,8 +62,11 @@ def old_database(data: Path) -> None:
     Access(journal).add("t", "owner", "o").result()
     journal.close()
     with closing(sqlite3.connect(data / DATABASE_NAME, isolation_level=None)) as db:
-        for statement in ("DROP TRIGGER ops_used_once", "DROP TABLE folds", "DROP TABLE folded_ids"):
-            db.execute(statement)
+        db.execute("DROP TRIGGER ops_used_once")
+        for table in ("folds", "folded_ids", "lessons", "makers", "pupils", "copies", "classes"):
+            db.execute(f"DROP TABLE {table}")
+        for column in ("person", "conducts"):
+            db.execute(f"ALTER TABLE people DROP COLUMN {column}")
         db.execute(f"PRAGMA user_version={OLD_FORMAT}")
 
 
