@@ -21,7 +21,7 @@ _TASKS: Final = Path("/proc/self/task")
 
 def can_yield() -> bool:
     """Returns whether threads have priorities of their own here: on Linux."""
-    return sys.platform == "linux" and _TASKS.is_dir()
+    return sys.platform == "linux" and _TASKS.is_dir() and hasattr(os, "setpriority")
 
 
 @contextmanager
