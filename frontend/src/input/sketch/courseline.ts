@@ -85,27 +85,6 @@ export function steepest(points: ArrayLike<number>): number {
   return most;
 }
 
-/** Earth to be taken away and to be brought, cubic metres, where a line of this width leaves the ground. */
-export function earthworks(
-  points: ArrayLike<number>,
-  widthM: number,
-  groundAt: (x: number, y: number) => number,
-): { cut: number; fill: number } {
-  const along = arcs(points);
-  let [cut, fill] = [0, 0];
-  for (let i = 1; i < along.length; i++) {
-    const [x, y, z] = [0, 1, 2].map((k) => (points[3 * i + k]! + points[3 * i + k - 3]!) / 2) as [
-      number,
-      number,
-      number,
-    ];
-    const up = (z - groundAt(x, y)) * widthM * (along[i]! - along[i - 1]!);
-    if (up > 0) fill += up;
-    else cut -= up;
-  }
-  return { cut, fill };
-}
-
 /** The points that a line needs: bends beyond `toleranceM` on the map, and heights that stray. */
 export function thinned(line: Float64Array, toleranceM: number, depthM: number, most: number): Float64Array {
   const along = arcs(line);
