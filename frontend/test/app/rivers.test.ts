@@ -36,5 +36,6 @@ describe("rivers on the ground (SPEC W37)", () => {
     });
     expect(riverLines(SET, 1, SLOPE)[0]).toBe(first);
     expect(riverLines(SET, 1, { ...SLOPE })[0]).not.toBe(first);
+    expect(riverLines(SET, 10, SLOPE)[1]!.halfWidthPx).toBeGreaterThan(riverLines(SET, 1, SLOPE)[1]!.halfWidthPx!);
   });
 });

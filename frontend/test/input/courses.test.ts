@@ -105,6 +105,9 @@ describe("drawing (SPEC I420, I423)", () => {
     const fields = (ops[0] as { fields: { course: { rises: number[] } } }).fields;
     expect(fields.course.rises[1]).toBe(fields.course.rises[0]);
     expect(vertexOps(only(), 99, 5, SLOPE)).toEqual([]);
+    const line = worldPoints(only());
+    const near = vertexOps(only(), 0, [line[0]! + 5, line[1]!, 0], SLOPE)[0] as { fields: { first: number[] } };
+    expect(near.fields.first[2]).toBeCloseTo(line[2]!, 2);
     expect(vertexOps(only(), 1, null, SLOPE)).toEqual([]);
   });
 

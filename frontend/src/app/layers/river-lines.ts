@@ -24,14 +24,15 @@ export function riverLines(set: RiverSet, wetness: number, ground: Ground): Foot
   const cellM = ground.sizeM / (TILE_CELLS << set.level);
   return set.rivers.map((river, k) => {
     const known = lines.get(river);
-    if (known?.ground === ground) return known.line;
+    const halfWidthPx = halfWidth(river, wetness);
+    if (known?.ground === ground && known.line.halfWidthPx === halfWidthPx) return known.line;
     const flat = new Float64Array((3 * river.cells.length) / 2);
     for (let i = 0; 2 * i < river.cells.length; i++) {
       flat[3 * i] = cellM * river.cells[2 * i]!;
       flat[3 * i + 1] = cellM * river.cells[2 * i + 1]!;
     }
     const points = new Float32Array(drape(flat, ground.sizeM * STEP, (x, y) => ground.heightAt(x, y)));
-    const line = { id: `river-${k}`, points, colour: WATER, strong: false, halfWidthPx: halfWidth(river, wetness) };
+    const line = { id: `river-${k}`, points, colour: WATER, strong: false, halfWidthPx };
     lines.set(river, { ground, line });
     return line;
   });

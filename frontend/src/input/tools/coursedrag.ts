@@ -16,8 +16,11 @@ export function vertexOps(stroke: Stroke, index: number, to: Vec3 | number | nul
   if (course === null || to === null || 3 * index >= points.length) return [];
   if (typeof to === "number") points[3 * index + 2]! += to;
   else {
-    const z = solvedHeight(ground, to[0], to[1]);
-    points.set([to[0], to[1], z + signed(course)], 3 * index);
+    // The ground beside the line is what the line made of it: there the point keeps its height.
+    const away = Math.hypot(to[0] - points[3 * index]!, to[1] - points[3 * index + 1]!);
+    const own = stroke.plateau_radius_m + Math.max(stroke.left?.extent_m ?? 0, stroke.right?.extent_m ?? 0);
+    const z = away < own ? points[3 * index + 2]! : solvedHeight(ground, to[0], to[1]) + signed(course);
+    points.set([to[0], to[1], z], 3 * index);
   }
   return [{ type: "stroke.set", stroke: stroke.id, fields: fieldsOf(points, course) }];
 }
