@@ -247,6 +247,31 @@ def test_figures_in_the_readme_come_from_committed_results() -> None:
     assert report.readme(text) == text, "run python -m bench.report"
 
 
+FOLDERS = {".ci", "backend", "bench", "docs", "frontend", "shaders", "tests"}
+FILES = re.compile(r"""[A-Z]+(\.md|\.in)?|Caddyfile|Dockerfile|Makefile|build\.in|docker-compose(\.cluster)?\.yml
+    |node\.lock|pyproject\.toml|requirements(-dev)?\.lock|setup\.py
+    |\.dockerignore|\.gitignore""", re.VERBOSE)  # fmt: skip
+MOST_BYTES = 2 * 1024 * 1024
+
+
+def strangers(files: dict[str, int]) -> set[str]:
+    """Committed files that have no place here: of no known name at the top, or too big for a source."""
+    return {
+        path
+        for path, size in files.items()
+        for top, within, _ in [path.partition("/")]
+        if size > MOST_BYTES or not (top in FOLDERS if within else FILES.fullmatch(top))
+    }
+
+
+def test_what_is_committed_has_a_place() -> None:
+    """SPEC H506: sixteen downloaded packages lay at the top level for a day, 21 MB of them."""
+    listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=True)
+    paths = [path for path in listed.stdout.decode().split("\0") if path and (ROOT / path).is_file()]
+    assert strangers({path: (ROOT / path).stat().st_size for path in paths}) == set()
+    assert strangers({"numpy-2.4.6.whl": 1, "docs/film.mp4": MOST_BYTES + 1}) == {"numpy-2.4.6.whl", "docs/film.mp4"}
+
+
 def test_file_sizes() -> None:
     """CONTRIBUTING: files stay near 400 lines, so that a newcomer finds the room of any line quickly."""
     suffixes = {".py", ".ts", ".cl", ".wgsl"}
