@@ -14,9 +14,9 @@ from esker import contract as c
 from esker.document.wire import op_json
 from esker.patchwork.raster import rasters
 from esker.store.access import Access
+from esker.store.engine.lock import DataLock, InUse
 from esker.store.grids import TRASH_SECONDS, GridStore
 from esker.store.journal import SWEEP_AFTER, Journal, Row
-from esker.store.lock import DataLock, InUse
 from esker.store.upkeep import backup, migrations
 from esker.store.upkeep.inspection import DATABASE_NAME, CorruptDatabase, MissingDatabase
 from esker.store.upkeep.restore import CannotRestore, restore

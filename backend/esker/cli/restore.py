@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 from esker.server.settings import from_environment
-from esker.store.lock import InUse
+from esker.store.engine.lock import InUse
 from esker.store.upkeep.restore import CannotRestore, Restored, restore
 
 

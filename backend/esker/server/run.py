@@ -48,9 +48,9 @@ from esker.solve.opencl.faults import DeviceError, NoDeviceError, OutOfDeviceMem
 from esker.solve.solver import Solver as OpenClSolver
 from esker.store.access import Access, TooManyLinks
 from esker.store.claims import Claims, key_in
+from esker.store.engine.lock import DataLock, InUse
 from esker.store.grids import FOLDER, GridStore
 from esker.store.journal import Journal, Unwritable
-from esker.store.lock import DataLock, InUse
 from esker.store.previews import PreviewTokens
 from esker.store.space import Space
 from esker.store.upkeep.care import Care, sweep_parts

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from esker.process import system
+from esker.store.engine.lock import DataLock
 from esker.store.grids import GridStore
 from esker.store.journal import SWEEP_AFTER
-from esker.store.lock import DataLock
 from esker.store.upkeep import migrations
 from esker.store.upkeep.backup import FOLDER, GRIDS, STAMP, copies_of, named_grids, take
 from esker.store.upkeep.inspection import DATABASE_NAME, problem_of
@@ -42,7 +42,7 @@ def restore(data: Path, copy: Path | None = None, now: float | None = None) -> R
 
     The files of the present database are moved to ``data/aside-<time>``; nothing is deleted. Grids that the copy names
     come back from the backup or the trash. Killed at any moment it can be called again: without a database the server
-    does not start. Raises CannotRestore, store.lock.InUse, OSError.
+    does not start. Raises CannotRestore, store.engine.lock.InUse, OSError.
     """
     now = time.time() if now is None else now
     if not data.is_dir():
