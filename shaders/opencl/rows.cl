@@ -1,5 +1,7 @@
+#if defined(__x86_64__) || defined(__aarch64__)
 // Vectors wider than the processor are passed by pieces: nothing that we would link against cares.
 #pragma clang diagnostic ignored "-Wpsabi"
+#endif
 
 // Rows of a level, for kernels that work a row at a time (CPU devices). Twins: backend/esker/solve/reference.py.
 //
@@ -18,9 +20,15 @@ typedef float8 __attribute__((aligned(4))) unaligned8;
 #define FORCE_INLINE inline __attribute__((always_inline))
 FORCE_INLINE float16 load16(crow_t p) { return *(global const unaligned16 *)p; }
 FORCE_INLINE float8 load8(crow_t p) { return *(global const unaligned8 *)p; }
+#if defined(__x86_64__) || defined(__aarch64__)
 // Into the second cache: the first has no room to spare.
 FORCE_INLINE void prefetch_read(crow_t p) { __builtin_prefetch((const void *)(size_t)p, 0, 2); }
 FORCE_INLINE void prefetch_write(row_t p) { __builtin_prefetch((const void *)(size_t)p, 1); }
+#else
+// Compilers for graphics cards do not know the builtin, or refuse a pointer without an address space.
+FORCE_INLINE void prefetch_read(crow_t p) {}
+FORCE_INLINE void prefetch_write(row_t p) {}
+#endif
 FORCE_INLINE void store16(float16 v, row_t p) { *(global unaligned16 *)p = v; }
 
 inline crow_t crow(crow_t a, int y, int pitch) { return a + (size_t)y * pitch + PAD; }

@@ -102,3 +102,13 @@ def test_a_driver_that_works_is_asked_once_a_version(
             prepare._state.drivers.clear()
             assert prepare.driver(NAME, release, None) is None, caplog.text
             assert len(children) == times
+
+
+def test_a_distributions_pocl_is_a_driver_like_any_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    """SPEC S580: nothing is settled for it, so it was left for NumPy on machines without the wheel."""
+    theirs = Card("OpenCL 3.0 PoCL HSTR: cpu-x86_64-pc-linux-gnu-skylake-avx512", "5.0+debian")
+    assert device._is_pocl(theirs)
+    monkeypatch.setattr(home, "site", lambda: None)
+    assert not device._is_pocl(theirs)
+    monkeypatch.setattr(prepare, "ready", None)
+    device._agree(theirs)

@@ -9,6 +9,7 @@ import sys
 import time
 from collections.abc import Iterator
 from dataclasses import replace
+from importlib import metadata
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -21,6 +22,7 @@ from esker.cli import doctor as command
 from esker.cli import main as cli
 from esker.doctor import findings, report, solving
 from esker.doctor.findings import Finding
+from esker.solve.opencl import prepare
 from esker.solve.solver import Solver
 
 NAMES = ["python", "packages", "files", "processor", "memory", "disk", "pictures", "browser", "devices", "solve"]
@@ -70,6 +72,31 @@ def test_wrong_ground_is_broken(small: None, monkeypatch: pytest.MonkeyPatch) ->
     found = {finding.name: finding for finding in solving.devices("numpy")}
     assert found["solve"].state == "broken"
     assert found["solve"].facts["error_quanta"] > 1
+
+
+def test_a_driver_that_was_refused_is_told(small: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """SPEC H181: a graphics card that stays unused is the first thing that its owner wants to know."""
+    monkeypatch.setattr(prepare._state, "drivers", {"A card, 550.1": "no such intrinsic", "Another, 1": None})
+    found = [finding for finding in solving.devices("numpy") if finding.name == "driver"]
+    assert [(one.state, one.text) for one in found] == [("broken", "A card, 550.1 cannot be used: no such intrinsic.")]
+    told = solving.kernels("numpy")
+    assert "A card, 550.1: no such intrinsic" in told["rows"]["failed"]
+    assert not report._absent(told)
+    monkeypatch.setattr(prepare._state, "drivers", {})
+    assert report._absent(solving.kernels("numpy"))
+
+
+def test_sources_that_were_never_installed_name_what_they_need(monkeypatch: pytest.MonkeyPatch) -> None:
+    """SPEC H181: ``python -m esker doctor`` beside ``PYTHONPATH=backend``."""
+    installed = set(findings.wanted())
+
+    def missing(name: str) -> list[str]:
+        raise metadata.PackageNotFoundError(name)
+
+    monkeypatch.setattr(metadata, "requires", missing)
+    assert set(findings.wanted()) == installed
+    monkeypatch.setattr(resources, "CHECKOUT", None)
+    assert findings.wanted() == []
 
 
 def test_a_device_that_is_not_there_is_named(small: None) -> None:

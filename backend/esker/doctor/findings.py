@@ -7,6 +7,7 @@ import platform
 import re
 import shutil
 import sys
+import tomllib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from importlib import metadata
@@ -75,7 +76,11 @@ def checkout() -> bool:
 def wanted() -> list[str]:
     """Names of the packages that an installation needs on this system."""
     found = []
-    for line in metadata.requires("esker") or []:
+    try:
+        lines = metadata.requires("esker") or []
+    except metadata.PackageNotFoundError:  # run from sources that were never installed
+        lines = _named_in_sources()
+    for line in lines:
         name, _, marker = line.partition(";")
         if "extra ==" in marker or ("win32" in marker and sys.platform == "win32"):
             continue
@@ -83,6 +88,14 @@ def wanted() -> list[str]:
             continue
         found.append(re.split(r"[\s\[<>=!~(]", name.strip())[0])
     return found
+
+
+def _named_in_sources() -> list[str]:
+    """The requirements that ``pyproject.toml`` of a checkout names."""
+    if resources.CHECKOUT is None:
+        return []
+    project = tomllib.loads((resources.CHECKOUT / "pyproject.toml").read_text(encoding="utf-8"))
+    return list(project["project"]["dependencies"])
 
 
 def packages() -> Finding:

@@ -14,6 +14,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
+from esker.doctor.solving import ABSENT
 from esker.version import VERSION
 
 FORMAT: Final = 1
@@ -82,4 +83,4 @@ def right(report: dict[str, Any]) -> bool:
 
 def _absent(part: dict[str, Any]) -> bool:
     """Returns whether there is no OpenCL, so that no kernels were tried."""
-    return all("there is no OpenCL device" in str(part.get(kind, {}).get("failed", "")) for kind in ("rows", "tiles"))
+    return all(ABSENT in str(part.get(kind, {}).get("failed", "")) for kind in ("rows", "tiles"))

@@ -17,7 +17,7 @@ from esker.doctor.findings import Finding
 from esker.events import Preview, Settled
 from esker.process import system
 from esker.solve.assembly import assemble
-from esker.solve.opencl.device import NUMPY, candidates, driver
+from esker.solve.opencl.device import NUMPY, candidates, driver, refusals
 from esker.solve.opencl.faults import NoDeviceError
 from esker.solve.solver import Solver
 from esker.templates import gallery
@@ -29,6 +29,7 @@ LEVEL: Final = 2
 TIMED: Final = "fifty"
 SOAK_LEVEL: Final = 4
 SOAK_STROKES: Final = 20
+ABSENT: Final = "there is no OpenCL device"
 TOLERANCE: Final = 2e-3
 """Share of the relief by which two devices may differ, since they may break ties between strokes differently. A wrong
 device is off by far more."""
@@ -47,7 +48,9 @@ def devices(wanted: str | None) -> Iterator[Finding]:
         listed = "; ".join(f"{name}, driver {version}" for name, version in drivers.items())
         yield Finding("devices", "good", f"{listed}; and NumPy.", {"devices": names, "drivers": drivers})
     try:
-        yield known_scene(wanted)
+        solved = known_scene(wanted)
+        yield from (Finding("driver", "broken", f"{name} cannot be used: {why}.") for name, why in refusals().items())
+        yield solved
     except NoDeviceError as error:
         yield Finding("solve", "broken", str(error))
     except Exception as error:
@@ -110,7 +113,7 @@ def _against(wanted: str | None, truths: dict[str, NDArray[np.float32]]) -> dict
     try:
         solver = Solver(wanted, max_level=LEVEL)
         if solver.device is None:
-            return {"failed": "there is no OpenCL device"}
+            return {"failed": _absence()}
         found: dict[str, Any] = {}
         for scene, truth in truths.items():
             heights, took = _solved(solver, scene)
@@ -120,6 +123,12 @@ def _against(wanted: str | None, truths: dict[str, NDArray[np.float32]]) -> dict
         return {"failed": f"{type(error).__name__}: {error}"}
     right = all(np.isfinite(row["of_relief"]) and row["of_relief"] < TOLERANCE for row in found.values())
     return {"device": solver.device_name, "scenes": found, "right": right}
+
+
+def _absence() -> str:
+    """Why NumPy solves: there is no other device, or those that are there cannot be used."""
+    refused = "; ".join(f"{name}: {why}" for name, why in refusals().items())
+    return f"no OpenCL device works ({refused})" if refused else ABSENT
 
 
 def soak(wanted: str | None, seconds: float, level: int = SOAK_LEVEL) -> dict[str, Any]:
@@ -189,7 +198,7 @@ def times(wanted: str | None, levels: tuple[int, ...]) -> Iterator[dict[str, Any
 
     solver = Solver(wanted, max_level=LEVEL)
     if solver.device is None:
-        yield {"failed": "there is no OpenCL device: NumPy is not worth timing"}
+        yield {"failed": f"{_absence()}: NumPy is not worth timing"}
         return
     out: dict[str, Any] = {}
     for level in levels:

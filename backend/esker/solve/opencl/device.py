@@ -17,7 +17,7 @@ from typing import Any, Literal, cast
 from esker.process import priority
 from esker.solve.opencl import gpu_program, prepare, program_text
 from esker.solve.opencl.faults import BuildError, NoDeviceError, build_error, finished
-from esker.solve.opencl.pocl import cpu
+from esker.solve.opencl.pocl import cpu, home
 
 log = logging.getLogger(__name__)
 
@@ -162,6 +162,11 @@ def driver(name: str) -> str:
     return next((f"{d.driver_version.strip()}, {d.version.strip()}" for n, d in listed(None) if n == name), "")
 
 
+def refusals() -> dict[str, str]:
+    """Devices that were looked at in this process and cannot be used, by name and release, each with a sentence."""
+    return prepare.refusals()
+
+
 def _checked(device: Device, check: Callable[[Device], None] | None) -> Device:
     if check is not None:
         finished(device, lambda: check(device))
@@ -215,7 +220,9 @@ def _rank(device: Any) -> int:
 
 
 def _is_pocl(device: Any) -> bool:
-    return cpu.compiled_for(getattr(device, "version", "")) is not None
+    """Returns whether this is the PoCL of the wheel. A distribution's PoCL links and names processors by itself: it is
+    a driver like any other."""
+    return home.site() is not None and cpu.compiled_for(getattr(device, "version", "")) is not None
 
 
 def _asked_level() -> None:
@@ -336,7 +343,7 @@ def _agree(device: Any) -> None:
 
     Raises BuildError where PoCL cannot be used in this process.
     """
-    present = cpu.compiled_for(device.version)
+    present = cpu.compiled_for(device.version) if _is_pocl(device) else None
     if present is None or device.int_ptr in _agreed:
         return
     level = prepare.level()

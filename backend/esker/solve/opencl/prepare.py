@@ -191,6 +191,11 @@ def driver(
         return _state.drivers[known]
 
 
+def refusals() -> dict[str, str]:
+    """Drivers that cannot be used, by device and release, each with what went wrong."""
+    return {known: why for known, why in _state.drivers.items() if why is not None}
+
+
 def _driver(known: str, name: str, threads: int | None, tell: Tell, stopped: threading.Event | None) -> str | None:
     named = hashlib.sha256(known.encode()).hexdigest()[:16]
     built, failed = (_drivers() / f"{kind}-{named}-{key()}.json" for kind in ("ready", "failed"))
