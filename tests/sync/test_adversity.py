@@ -14,6 +14,7 @@ import pytest
 
 from esker.server import run, starting
 from esker.server.wire import websocket
+from tests.store.engines import sqlite
 from tests.sync.harness import LiveServer, Peer, raw_socket, set_op, sleeping_member, stroke
 
 LAST_ANSWER_TO_OUT = 41.0
@@ -86,7 +87,7 @@ def test_a_database_that_takes_no_writes_is_told_apart(server: LiveServer) -> No
     # The pragma forbids the writer's own transactions, so it is lifted beside them.
     journal = server.assembly._journal
     assert journal is not None
-    journal._writer_db.execute("PRAGMA query_only=0")
+    sqlite(journal).writer_db.execute("PRAGMA query_only=0")
     assert _post(server, "/api/terrains", {})[0] == 201
 
 

@@ -17,13 +17,13 @@ import pytest
 from esker import contract as c
 from esker.importing import run as importing
 from esker.patchwork.raster import rasters
+from esker.store.engine.sqlite import LOG_BYTES
 from esker.store.grids import NAMED_WITHIN, TRASH_SECONDS, GridStore
 from esker.store.journal import HistoryFull, Journal, Row
 from esker.store.upkeep import backup, compaction, migrations
 from esker.store.upkeep.care import Care, sweep_parts
 from esker.store.upkeep.deletion import Deletion
 from esker.store.upkeep.inspection import DATABASE_NAME
-from esker.store.writing import LOG_BYTES
 from tests.gestures import session
 from tests.sync.harness import LiveServer
 

@@ -17,6 +17,7 @@ from esker import contract as c
 from esker.document import archive
 from esker.document.ops import Refusal
 from esker.fairness.shares import Rates
+from tests.store.engines import sqlite
 from tests.sync.harness import PATIENCE, LiveServer, Peer, set_op, stroke
 
 
@@ -318,7 +319,7 @@ def test_a_class_is_deleted_at_once(server: LiveServer, teacher: Teacher) -> Non
     assert server.http("DELETE", f"{teacher.path}?at_once=true", secret=teacher.secret)[0] == 200
     journal = server.assembly.hub.journal
     assert not journal.exists(ada.terrain)
-    text = "\n".join(journal.reader().iterdump())
+    text = "\n".join(sqlite(journal).reader().iterdump())
     assert "Ada Unmistakable" not in text
     assert ada.terrain not in text
     assert teacher.ask("restore")[0] == 404

@@ -7,7 +7,6 @@ import json
 import os
 import random
 import signal
-import sqlite3
 import subprocess
 import sys
 import time
@@ -25,6 +24,7 @@ from esker.document.ops import StrokeSet
 from esker.document.wire import op_json
 from esker.session.room import core
 from esker.session.room.history_view import HistoryReader
+from esker.store.engine.ports import UsedTwice
 from esker.store.journal import DamagedTerrain, Journal, Row
 from esker.store.upkeep.compaction import Compaction
 from tests.gestures import Done, session
@@ -131,9 +131,9 @@ def test_what_was_folded_is_used_once_and_missed_when_it_is_gone(journal: Journa
     _folding(journal).terrain("t")
     left = {row.clock for row in journal.rows("t", 0)}
     gone = next(d.row for d in done if d.row.clock not in left)
-    with pytest.raises(sqlite3.IntegrityError):
+    with pytest.raises(UsedTwice):
         journal.append("t", [gone._replace(client="new", counter=0)]).result()
-    with pytest.raises(sqlite3.IntegrityError):
+    with pytest.raises(UsedTwice):
         journal.append("t", [gone._replace(clock=len(done) + 1)]).result()
     journal.append("t", [Row(len(done) + 1, "new", 0, "new", SILENT)]).result()
     kept = min(clock for clock in left if clock > 5)

@@ -15,12 +15,14 @@ import pytest
 from esker import contract as c
 from esker.document.ops import StrokeSet
 from esker.document.wire import op_json
+from esker.store.engine.ports import Connection, UsedTwice
+from esker.store.engine.sqlite import LOG_BYTES
 from esker.store.journal import DamagedTerrain, Journal, Row, Unwritable
 from esker.store.upkeep import backup
 from esker.store.upkeep.backup import last_backup
 from esker.store.upkeep.inspection import DATABASE_NAME, CorruptDatabase
 from esker.store.upkeep.restore import restore
-from esker.store.writing import LOG_BYTES
+from tests.store.engines import copied, sqlite
 
 BIRTH = c.Document(id="t")
 
@@ -85,11 +87,11 @@ def test_the_log_has_its_length_from_the_start_and_is_read_as_far_as_it_is_writt
 
 def test_a_clock_or_an_id_is_used_once(journal: Journal) -> None:
     journal.append("t", _rows(1, 1)).result()
-    with pytest.raises(sqlite3.IntegrityError):
+    with pytest.raises(UsedTwice):
         journal.append("t", _rows(1, 1)).result()
-    with pytest.raises(sqlite3.IntegrityError):
+    with pytest.raises(UsedTwice):
         journal.append("t", [_rows(1, 1)[0]._replace(clock=2)]).result()
-    with pytest.raises(sqlite3.IntegrityError):
+    with pytest.raises(UsedTwice):
         journal.create(BIRTH).result()
     journal.close()
 
@@ -103,7 +105,7 @@ def test_a_refused_item_does_not_undo_the_rest_of_its_commit(journal: Journal) -
     wait(futures)
     assert hold.result()
     assert futures[0].exception() is None
-    assert isinstance(futures[1].exception(), sqlite3.IntegrityError)
+    assert isinstance(futures[1].exception(), UsedTwice)
     assert futures[2].exception() is None
     assert [row.clock for row in journal.rows("t", 0)] == [1, 2, 3]
     journal.close()
@@ -129,7 +131,7 @@ def test_many_rooms_share_a_commit(journal: Journal, tmp_path: Path) -> None:
         nonlocal commits
         commits += statement == "COMMIT"
 
-    journal._writer_db.set_trace_callback(count)
+    sqlite(journal).writer_db.set_trace_callback(count)
     gate = threading.Event()
     journal.submit(lambda _: gate.wait(5))
     futures = [journal.append(f"room{i}", _rows(1, 1)) for i in range(50)]
@@ -141,15 +143,15 @@ def test_many_rooms_share_a_commit(journal: Journal, tmp_path: Path) -> None:
 
 
 def test_a_full_disk_is_reported_and_survived(journal: Journal) -> None:
-    journal._writer_db.execute("PRAGMA max_page_count=1").fetchone()
-    pages = journal._writer_db.execute("PRAGMA page_count").fetchone()[0]
-    journal._writer_db.execute(f"PRAGMA max_page_count={pages}")
+    sqlite(journal).writer_db.execute("PRAGMA max_page_count=1").fetchone()
+    pages = sqlite(journal).writer_db.execute("PRAGMA page_count").fetchone()[0]
+    sqlite(journal).writer_db.execute(f"PRAGMA max_page_count={pages}")
     big = c.SetTerrain(fields=c.TerrainFields(title="x" * 80))
     rows = [Row(i, "c", i, "c", op_json(big)) for i in range(1, 5000)]
     with pytest.raises(Unwritable, match="full") as failure:
         journal.append("t", rows).result()
     assert failure.value.full
-    journal._writer_db.execute("PRAGMA max_page_count=1000000")
+    sqlite(journal).writer_db.execute("PRAGMA max_page_count=1000000")
     journal.append("t", _rows(1, 1)).result()
     assert [row.clock for row in journal.rows("t", 0)] == [1]
     journal.close()
@@ -159,7 +161,7 @@ def test_a_full_disk_is_reported_and_survived(journal: Journal) -> None:
 def test_a_failure_that_others_of_the_batch_survive_is_told(journal: Journal, others: int) -> None:
     """SPEC J264. SQLite may end the statement alone that finds the disk full."""
 
-    def fails(db: sqlite3.Connection) -> None:
+    def fails(db: Connection) -> None:
         db.execute("INSERT INTO nowhere VALUES (1)")
 
     gate = threading.Event()
@@ -208,7 +210,7 @@ def test_a_gap_or_an_op_that_does_not_apply_is_named(journal: Journal) -> None:
 def test_a_damaged_database_is_refused_and_left_alone(journal: Journal, tmp_path: Path, damage: str) -> None:
     for i in range(40):
         journal.append("t", _rows(1 + 20 * i, 20)).result()
-    good = journal.backup()
+    good = copied(journal)
     journal.close()
     path = tmp_path / "esker.db"
     content = bytearray(path.read_bytes())
@@ -250,7 +252,7 @@ def test_a_date_that_was_set_back_drops_no_newer_copy(journal: Journal, tmp_path
     for clock, date in enumerate(dates, 1):
         journal._now = lambda date=date: date  # type: ignore[misc]
         journal.append("t", _rows(clock, 1)).result()
-        copy = journal.backup()
+        copy = copied(journal)
         assert copy.exists()
         assert copy == last_backup(tmp_path)
     kept = sorted((tmp_path / "backup").glob("*.db"))
@@ -277,7 +279,7 @@ def test_backups_are_complete_while_the_journal_is_written(journal: Journal, tmp
     for i in range(8):
         before = appended[0]
         journal._now = lambda i=i: 1000.0 + i  # type: ignore[misc]
-        path = journal.backup()
+        path = copied(journal)
         with sqlite3.connect(path) as db:
             assert db.execute("PRAGMA integrity_check").fetchone()[0] == "ok"
             count = db.execute("SELECT count(*), max(clock) FROM ops").fetchone()

@@ -16,7 +16,7 @@ from esker.patchwork.raster import rasters
 from esker.store.access import Access
 from esker.store.engine.lock import DataLock, InUse
 from esker.store.grids import TRASH_SECONDS, GridStore
-from esker.store.journal import SWEEP_AFTER, Journal, Row
+from esker.store.journal import Journal, Row
 from esker.store.upkeep import backup, migrations
 from esker.store.upkeep.inspection import DATABASE_NAME, CorruptDatabase, MissingDatabase
 from esker.store.upkeep.restore import CannotRestore, restore
@@ -146,7 +146,7 @@ def test_a_new_or_restored_database_sweeps_nothing(tmp_path: Path) -> None:
     now = [1e9]
     journal = Journal(tmp_path, now=lambda: now[0])
     assert not journal.may_sweep()
-    now[0] += SWEEP_AFTER + 1
+    now[0] += migrations.SWEEP_AFTER + 1
     assert journal.may_sweep()
     journal.create(c.Document(id="t")).result()
     journal.backup()

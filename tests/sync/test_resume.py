@@ -11,6 +11,7 @@ import pytest
 from esker import contract as c
 from esker.session.room.recent import RECENT_OPS
 from esker.store.writing import SNAPSHOT_EVERY
+from tests.store.engines import sqlite
 from tests.sync.harness import LiveServer, Peer, set_op, stroke
 
 
@@ -130,7 +131,7 @@ def test_a_failing_disk_takes_the_change_back(tmp_path: Path) -> None:
         ada.ops(("ada:2", set_op(label="lost")))
         answer = ada.wait("reject", "ack")
         assert (answer["type"], answer["id"], answer["code"]) == ("reject", "ada:2", "unavailable")
-        journal._writer_db.execute("PRAGMA query_only=0")
+        sqlite(journal).writer_db.execute("PRAGMA query_only=0")
         ada.ops(("ada:3", set_op(label="kept")))
         assert _acked(ada, "ada:3") == {"ada:3": 2}
         seen = [o["id"] for m in [bob.wait("ordered"), bob.wait("ordered")] for o in m["ops"]]

@@ -17,6 +17,7 @@ from esker.session.room.core import RoomCore, RoomInfo
 from esker.session.room.outbox import Outbox
 from esker.store.journal import Loaded
 from esker.store.space import LOOK_SECONDS, MEASURE_SECONDS, NoSpace, Space
+from tests.store.engines import sqlite
 from tests.sync.harness import LiveServer, set_op, stroke
 
 SMALL: dict[str, Any] = {"kind": "profile", "first": (0, 0, 0), "last": (1, 1, 1), "curve": ((0, 0),)}
@@ -112,7 +113,7 @@ def test_who_watches_is_told_of_the_disk_and_the_journal(server: LiveServer) -> 
     _fill(server, lambda space: 2 * space.floor)
     journal = server.assembly._journal
     assert journal is not None
-    db, pages = journal._writer_db, "PRAGMA max_page_count"
+    db, pages = sqlite(journal).writer_db, "PRAGMA max_page_count"
     db.execute(f"{pages}={db.execute('PRAGMA page_count').fetchone()[0]}")
     terrain = c.Document(id="large", strokes=tuple(c.Stroke(**{**SMALL, "id": f"s{k}"}) for k in range(3_000)))
     assert journal.create(terrain).exception() is not None

@@ -169,7 +169,7 @@ class Classes:
         if copy is not None:
             link, _, insert = self.hub.access.make(copy.terrain, "edit", name, None, secret)
             pupil = Pupil(link.id, lesson.id, number, name, self.store.now())
-            await _done(self.hub.journal.submit(self.store.seating(insert, pupil)))
+            await _done(self.hub.journal.submit(self.store.seating(insert, pupil), lesson.terrain))
             return
         start = await asyncio.to_thread(self.store.document, lesson.id)
         if start is None:
@@ -178,7 +178,7 @@ class Classes:
         born = born_as(start.model_copy(update={"settings": settings}))
         link, _, insert = self.hub.access.make(born.id, "edit", name, None, secret)
         pupil = Pupil(link.id, lesson.id, number, name, self.store.now())
-        await _done(self.hub.journal.create(born, self.store.seating(insert, pupil, born.id)))
+        await _done(self.hub.journal.create(born, self.store.seating(insert, pupil, born.id), lesson.terrain))
 
     # --- what pages are told ------------------------------------------------------------------------------------
 

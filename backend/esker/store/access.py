@@ -11,16 +11,14 @@ from __future__ import annotations
 import hashlib
 import hmac
 import secrets
-import sqlite3
 import time
 from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
-from typing import Any, Final, Protocol, TypeVar
+from typing import Any, Final
 
 from esker.contract import Role
-
-T = TypeVar("T")
+from esker.store.engine.ports import Connection, Database
 
 CODE_SECONDS: Final = 15 * 60
 CODE_LIFE_SECONDS: Final = 10 * 3600
@@ -95,16 +93,6 @@ def hashed(secret: str) -> bytes:
     return hashlib.sha256(secret.encode()).digest()
 
 
-class Database(Protocol):
-    """Where links are kept: the journal of a server, or a visit to it by another program (``store/kept.py``)."""
-
-    def reader(self) -> sqlite3.Connection:
-        """A connection for this thread."""
-
-    def submit(self, write: Callable[[sqlite3.Connection], T]) -> Future[T]:
-        """Runs ``write`` in a commit."""
-
-
 class Access:
     """Links in the journal's database, join codes in memory (they live for fifteen minutes)."""
 
@@ -150,7 +138,7 @@ class Access:
         it. Fails with TooManyLinks, Ended, Unwritable."""
         link, secret, insert = self.make(terrain, role, name, by.id if isinstance(by, Link) else by)
 
-        def write(db: sqlite3.Connection) -> tuple[Link, str]:
+        def write(db: Connection) -> tuple[Link, str]:
             _demand(db, by)
             live = db.execute("SELECT count(*) FROM links WHERE terrain=? AND revoked IS NULL", (terrain,)).fetchone()
             if live[0] >= MAX_LINKS:
@@ -159,11 +147,11 @@ class Access:
             db.execute(_FORGET, (terrain, terrain, KEPT_REVOKED))
             return link, secret
 
-        return self._journal.submit(write)
+        return self._journal.submit(write, terrain)
 
     def make(
         self, terrain: str, role: Role, name: str, parent: str | None = None, secret: str | None = None
-    ) -> tuple[Link, str, Callable[[sqlite3.Connection], object]]:
+    ) -> tuple[Link, str, Callable[[Connection], object]]:
         """A link that is not written yet, its secret (default: a new one), and what writes it; a terrain's first comes
         with its birth."""
         secret = secret or secrets.token_urlsafe(24)
@@ -183,7 +171,7 @@ class Access:
         """
         secret = secret or secrets.token_urlsafe(24)
 
-        def write(db: sqlite3.Connection) -> tuple[str, list[str]] | None:
+        def write(db: Connection) -> tuple[str, list[str]] | None:
             _demand(db, by)
             found = db.execute(
                 "SELECT role FROM links WHERE id=? AND terrain=? AND revoked IS NULL", (link_id, terrain)
@@ -192,17 +180,17 @@ class Access:
                 return None
             try:
                 db.execute("UPDATE links SET hash=? WHERE id=?", (hashed(secret), link_id))
-            except sqlite3.IntegrityError:
+            except db.IntegrityError:
                 raise SecretTaken from None
             return secret, [] if found[0] == "owner" else self._end(db, _tree(db, link_id)[1:])
 
-        return self._journal.submit(write)
+        return self._journal.submit(write, terrain)
 
     def revoke(self, terrain: str, link_id: str, by: Link | None = None) -> Future[list[str]]:
         """Ends a link and all that was made through it; returns the ids of those that ended, none when there is no such
         live link. Fails with Ended, and with OwnLink where the link of who asks would be among them."""
 
-        def write(db: sqlite3.Connection) -> list[str]:
+        def write(db: Connection) -> list[str]:
             _demand(db, by)
             if db.execute("SELECT 1 FROM links WHERE id=? AND terrain=?", (link_id, terrain)).fetchone() is None:
                 return []
@@ -211,9 +199,9 @@ class Access:
                 raise OwnLink
             return self._end(db, tree)
 
-        return self._journal.submit(write)
+        return self._journal.submit(write, terrain)
 
-    def _end(self, db: sqlite3.Connection, ids: list[str]) -> list[str]:
+    def _end(self, db: Connection, ids: list[str]) -> list[str]:
         """Revokes these; returns those that were alive."""
         now = self._now()
         return [
@@ -283,7 +271,7 @@ def _typed(code: str) -> str:
 
 _FORGET: Final = (
     "DELETE FROM links WHERE terrain=? AND id IN (SELECT id FROM links WHERE terrain=? AND revoked IS NOT NULL"
-    " ORDER BY revoked DESC, created DESC LIMIT -1 OFFSET ?)"
+    " ORDER BY revoked DESC, created DESC LIMIT 9223372036854775807 OFFSET ?)"
 )
 """A link that was revoked has no living children: they ended in the same commit."""
 _COLUMNS: Final = "id,terrain,role,name,created,revoked,parent,hash"
@@ -293,12 +281,12 @@ def _link(row: Sequence[Any]) -> Link:
     return Link(*(*row[:7], bytes(row[7])))
 
 
-def _alive(db: sqlite3.Connection, link: Link) -> bool:
+def _alive(db: Connection, link: Link) -> bool:
     row = db.execute("SELECT hash FROM links WHERE id=? AND revoked IS NULL", (link.id,)).fetchone()
     return row is not None and hmac.compare_digest(bytes(row[0]), link.digest)
 
 
-def _demand(db: sqlite3.Connection, by: Link | str | None) -> None:
+def _demand(db: Connection, by: Link | str | None) -> None:
     """Raises Ended unless the link by which something is asked lives, in the very commit that does it."""
     if isinstance(by, Link):
         if not _alive(db, by):
@@ -307,7 +295,7 @@ def _demand(db: sqlite3.Connection, by: Link | str | None) -> None:
         raise Ended
 
 
-def _tree(db: sqlite3.Connection, link_id: str) -> list[str]:
+def _tree(db: Connection, link_id: str) -> list[str]:
     """A link and all that was made through it, the link itself first."""
     rows = db.execute(
         "WITH RECURSIVE tree(id) AS (VALUES(?) UNION SELECT links.id FROM links JOIN tree ON links.parent = tree.id)"

@@ -9,7 +9,6 @@ as it is, so that the teacher's page shows it again after a reload and a restart
 from __future__ import annotations
 
 import secrets
-import sqlite3
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
@@ -19,6 +18,7 @@ from esker import contract as c
 from esker.document.former import read_document
 from esker.document.wire import document_json
 from esker.store.access import CODE_ALPHABET, CODE_LIFE_SECONDS, code_length, hashed
+from esker.store.engine.ports import Connection
 from esker.store.journal import Journal
 
 
@@ -74,7 +74,7 @@ class ClassStore:
         """Writes a new class; False where the terrain has ``most`` classes already."""
         text = document_json(document)
 
-        def write(db: sqlite3.Connection) -> bool:
+        def write(db: Connection) -> bool:
             live = "SELECT count(*) FROM classes WHERE terrain=? AND ended IS NULL"
             if db.execute(live, (made.terrain,)).fetchone()[0] >= most:
                 return False
@@ -82,11 +82,16 @@ class ClassStore:
             db.execute(f"INSERT INTO classes ({_COLUMNS},document) VALUES (?,?,?,?,?,?,?,?,?,?,?)", (*made, text))
             return True
 
-        return self._journal.submit(write)
+        return self._journal.submit(write, made.terrain)
 
     def find(self, lesson: str) -> Class | None:
         """A class by its id, deleted ones too."""
         return self._one("id=?", lesson)
+
+    def home(self, lesson: str) -> str | None:
+        """The terrain from which a class was made: whoever has that one writes for the class and its copies."""
+        row = self._db.execute("SELECT terrain FROM classes WHERE id=?", (lesson,)).fetchone()
+        return None if row is None else str(row[0])
 
     def of_terrain(self, terrain: str) -> list[Class]:
         """The classes that were made from a terrain, newest first, deleted ones too."""
@@ -106,13 +111,13 @@ class ClassStore:
     def set_document(self, lesson: str, clock: int, document: c.Document) -> Future[None]:
         """From now on copies begin as this document, of the clock ``clock`` of the class's terrain."""
         text = document_json(document)
-        return self._write("UPDATE classes SET clock=?, document=? WHERE id=?", (clock, text, lesson))
+        return self._write(lesson, "UPDATE classes SET clock=?, document=? WHERE id=?", (clock, text, lesson))
 
     def open_door(self, lesson: str) -> Future[str]:
         """Gives the class a new code; the one before ends."""
         until = self.now() + CODE_LIFE_SECONDS
 
-        def write(db: sqlite3.Connection) -> str:
+        def write(db: Connection) -> str:
             db.execute("UPDATE classes SET code=NULL WHERE code_until<=?", (self.now(),))
             live = int(db.execute("SELECT count(*) FROM classes WHERE code IS NOT NULL").fetchone()[0])
             length = code_length(live + 1)
@@ -122,11 +127,11 @@ class ClassStore:
                     db.execute("UPDATE classes SET code=?, code_until=? WHERE id=?", (code, until, lesson))
                     return code
 
-        return self._journal.submit(write)
+        return self._journal.submit(write, self.home(lesson))
 
     def close_door(self, lesson: str) -> Future[None]:
         """Ends the code of the class."""
-        return self._write("UPDATE classes SET code=NULL WHERE id=?", (lesson,))
+        return self._write(lesson, "UPDATE classes SET code=NULL WHERE id=?", (lesson,))
 
     # --- copies -------------------------------------------------------------------------------------------------
 
@@ -142,9 +147,8 @@ class ClassStore:
 
     def freeze(self, lesson: str, numbers: Sequence[int], frozen: bool) -> Future[None]:
         """Freezes copies, or lets them be changed again."""
-        return self._many(
-            "UPDATE copies SET frozen=? WHERE class=? AND number=?", [(int(frozen), lesson, n) for n in numbers]
-        )
+        rows = [(int(frozen), lesson, n) for n in numbers]
+        return self._many(lesson, "UPDATE copies SET frozen=? WHERE class=? AND number=?", rows)
 
     # --- pupils -------------------------------------------------------------------------------------------------
 
@@ -165,14 +169,14 @@ class ClassStore:
         return None if row is None else Pupil(*row)
 
     def seating(
-        self, insert_link: Callable[[sqlite3.Connection], object], pupil: Pupil, new: str | None = None
-    ) -> Callable[[sqlite3.Connection], None]:
+        self, insert_link: Callable[[Connection], object], pupil: Pupil, new: str | None = None
+    ) -> Callable[[Connection], None]:
         """What writes a device with its link in one commit; ``new``: the terrain of the copy, where that is a new one.
 
         It raises NoPlace where the class or the copy is full, or the class deleted.
         """
 
-        def write(db: sqlite3.Connection) -> None:
+        def write(db: Connection) -> None:
             places, together, ended = db.execute(
                 "SELECT places, together, ended FROM classes WHERE id=?", (pupil.lesson,)
             ).fetchone()
@@ -191,7 +195,9 @@ class ClassStore:
 
     def rename(self, link: str, name: str) -> Future[None]:
         """Another name for a device."""
-        return self._write("UPDATE pupils SET name=? WHERE link=?", (name, link))
+        found = self._db.execute("SELECT class FROM pupils WHERE link=?", (link,)).fetchone()
+        lesson = "" if found is None else str(found[0])
+        return self._write(lesson, "UPDATE pupils SET name=? WHERE link=?", (name, link))
 
     # --- the end ------------------------------------------------------------------------------------------------
 
@@ -199,7 +205,7 @@ class ClassStore:
         """Deletes a class and all its copies; the future gives when. ``at_once``: nothing of it can be brought back."""
         now = self.now()
 
-        def write(db: sqlite3.Connection) -> float:
+        def write(db: Connection) -> float:
             db.execute("UPDATE classes SET ended=coalesce(ended, ?), code=NULL WHERE id=?", (now, lesson))
             db.execute(
                 "UPDATE terrains SET deleted=? WHERE (deleted IS NULL OR ?) AND id IN"
@@ -210,13 +216,13 @@ class ClassStore:
                 db.execute("DELETE FROM pupils WHERE class=?", (lesson,))
             return now
 
-        return self._journal.submit(write)
+        return self._journal.submit(write, self.home(lesson))
 
     def bring_back(self, lesson: str) -> Future[bool]:
         """Takes the deletion of a class back, with those copies that were deleted with it; False where there was
         none."""
 
-        def write(db: sqlite3.Connection) -> bool:
+        def write(db: Connection) -> bool:
             row = db.execute("SELECT ended FROM classes WHERE id=? AND ended IS NOT NULL", (lesson,)).fetchone()
             if row is None:
                 return False
@@ -227,26 +233,26 @@ class ClassStore:
             )
             return True
 
-        return self._journal.submit(write)
+        return self._journal.submit(write, self.home(lesson))
 
     # --- parts --------------------------------------------------------------------------------------------------
 
     @property
-    def _db(self) -> sqlite3.Connection:
+    def _db(self) -> Connection:
         return self._journal.reader()
 
     def _one(self, where: str, value: str) -> Class | None:
         row = self._db.execute(f"SELECT {_COLUMNS} FROM classes WHERE {where}", (value,)).fetchone()
         return None if row is None else _class(row)
 
-    def _write(self, sql: str, values: tuple[Any, ...]) -> Future[None]:
-        return self._many(sql, [values])
+    def _write(self, lesson: str, sql: str, values: tuple[Any, ...]) -> Future[None]:
+        return self._many(lesson, sql, [values])
 
-    def _many(self, sql: str, rows: Sequence[tuple[Any, ...]]) -> Future[None]:
-        def write(db: sqlite3.Connection) -> None:
+    def _many(self, lesson: str, sql: str, rows: Sequence[tuple[Any, ...]]) -> Future[None]:
+        def write(db: Connection) -> None:
             db.executemany(sql, rows)
 
-        return self._journal.submit(write)
+        return self._journal.submit(write, self.home(lesson))
 
 
 def changed_at(journal: Journal, terrain: str) -> float | None:
@@ -259,7 +265,7 @@ def changed_at(journal: Journal, terrain: str) -> float | None:
     return None if row is None else float(row[0])
 
 
-def forget(db: sqlite3.Connection, terrain: str) -> None:
+def forget(db: Connection, terrain: str) -> None:
     """A terrain is removed for good: so are its place in a class and the names there, and a class without copies that
     was deleted. The classes that were made from it are deleted, and their copies with them."""
     db.execute(

@@ -1,8 +1,8 @@
-"""The journal: append-only ops with the clock as key, in SQLite (DESIGN 13).
+"""The journal: append-only ops with the clock as key (DESIGN 13).
 
-WAL mode, ``synchronous=FULL``. One writer thread serves all rooms: whatever is queued when a commit ends goes into
-the next one (group commit), each item under its own savepoint, so one refused item does not undo the others. An op is
-acknowledged after the commit that holds it, so ``kill -9`` loses nothing that was acknowledged.
+One writer serves all rooms: whatever is queued when a commit ends goes into the next one (group commit). An op is
+acknowledged after the commit that holds it, so ``kill -9`` loses nothing that was acknowledged. What a commit is, and
+on what it lies, is the engine's (``engine/``): SQLite in the data folder, or PostgreSQL.
 
 Tables (``upkeep/migrations.py``): ``terrains`` (id, created), ``ops`` (terrain, clock, client, counter, author, op),
 ``snapshots`` (terrain, clock, document), ``grids`` (terrain, digest: every grid that a layer of the terrain ever was,
@@ -13,12 +13,10 @@ written in the same commit as the op or the birth that names it); ``store/access
 
 from __future__ import annotations
 
-import queue
-import sqlite3
-import threading
 import time
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Future
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, Final, NamedTuple, TypeVar
 
@@ -28,32 +26,20 @@ from esker.document.history.folding import SILENT, UNLIMITED, silent
 from esker.document.ops import Refusal, StrokeSet
 from esker.document.wire import op_json
 from esker.store import lessons, timestamps
+from esker.store.engine.ports import Connection, Engine
+from esker.store.engine.ports import Unwritable as Unwritable
+from esker.store.engine.sqlite import Sqlite
 from esker.store.row import Row as Row
 from esker.store.row import ordered_json as ordered_json
-from esker.store.space import NoSpace, Space
+from esker.store.space import Space
 from esker.store.upkeep import folds, migrations
-from esker.store.upkeep.backup import keep_copy, write_backup
-from esker.store.upkeep.inspection import DATABASE_NAME, check
-from esker.store.writing import LOG_BYTES, contents, lengthen, name_grids, put_snapshot
+from esker.store.writing import contents, name_grids, put_snapshot
 
 T = TypeVar("T")
 
-GROUP_LIMIT: Final = 256
-"""Most queued items that one commit takes."""
 HISTORY_BYTES: Final = 256 << 20
 """What the operations of one terrain may take: some 200 hours of drawing without a pause."""
 COUNTED_TERRAINS: Final = 10_000
-SWEEP_AFTER: Final = 30 * 86_400.0
-"""Seconds for which a new or restored database lets every stored grid be (``store/grids.py``)."""
-
-
-class Unwritable(Exception):
-    """The database cannot be written to at present. Of what was asked nothing was done; it may be asked again later."""
-
-    def __init__(self, error: sqlite3.OperationalError | NoSpace) -> None:
-        super().__init__(str(error))
-        self.full = isinstance(error, NoSpace) or error.sqlite_errorcode == sqlite3.SQLITE_FULL
-        """Whether it is for want of room."""
 
 
 class HistoryFull(Exception):
@@ -82,54 +68,43 @@ class Journal:
         *,
         space: Space | None = None,
         quota: int = HISTORY_BYTES,
+        engine: Engine | None = None,
     ) -> None:
-        """Opens or creates ``directory/esker.db``. Raises CorruptDatabase, OSError.
-
-        ``space``: the disk that the server may use; ``quota``: bytes that the operations of one terrain may take.
+        """``directory``: the data folder; ``space``: the disk that the server may use; ``quota``: bytes that the
+        operations of one terrain may take; ``engine``: the database (default: ``directory/esker.db``, which is opened
+        or created). Raises CorruptDatabase, OSError.
         """
-        self.directory, self.path = directory, directory / DATABASE_NAME
+        self.directory = directory
         self._quota = quota
         self._sizes: dict[str, int] = {}
         """Bytes of the operations of terrains that were appended to."""
         self._now, self._timestamps = now, timestamps.Timestamps()
         directory.mkdir(parents=True, exist_ok=True)
         self.space = Space(directory) if space is None else space
-        check(self.path, directory)
-        new = not self.path.exists()
-        self._writer_db = connect(self.path)
-        migrations.migrate(self._writer_db, lambda old: keep_copy(self.path, directory, f"format-{old}", now()))
-        if new:
-            migrations.state(self._writer_db, "swept_from", str(now() + SWEEP_AFTER))
-        lengthen(directory / f"{DATABASE_NAME}-wal")
-        self._readers = threading.local()
-        self._open_readers: list[sqlite3.Connection] = []
-        self._queue: queue.SimpleQueue[tuple[Callable[[sqlite3.Connection], Any], Future[Any]] | None]
-        self._queue = queue.SimpleQueue()
-        self._closed = False
-        self.writable = True
-        """Whether the last commit could be written."""
+        self.engine: Engine = Sqlite(directory, now(), self.space) if engine is None else engine
         self.hear_of_full: Callable[[str], object] = lambda _: None
         """Called in the writer's thread with a terrain whose history has no room left."""
-        self._thread = threading.Thread(target=self._write_all, name="journal", daemon=True)
-        self._thread.start()
 
     # --- writing ------------------------------------------------------------------------------------------------
 
-    def submit(self, write: Callable[[sqlite3.Connection], T]) -> Future[T]:
-        """Runs ``write`` in the next commit; the future resolves after the commit is on disk.
+    def submit(self, write: Callable[[Connection], T], terrain: str | None = None) -> Future[T]:
+        """Runs ``write`` in the next commit (``engine.ports.Database``)."""
+        return self.engine.submit(write, terrain)
 
-        It fails with Unwritable when that cannot be, and with whatever ``write`` raises.
-        """
-        if self._closed:
-            raise RuntimeError("the journal is closed")
-        future: Future[T] = Future()
-        self._queue.put((write, future))
-        return future
+    @property
+    def writable(self) -> bool:
+        """Whether the last commit could be written."""
+        return self.engine.writable
 
     @property
     def waiting(self) -> int:
         """Items that wait for a commit, about."""
-        return self._queue.qsize()
+        return self.engine.waiting
+
+    def forget(self, terrain: str) -> None:
+        """Forgets what was counted of a terrain: another server may have written meanwhile."""
+        self._sizes.pop(terrain, None)
+        self._timestamps.forget(terrain)
 
     def append(
         self,
@@ -140,11 +115,11 @@ class Journal:
     ) -> Future[None]:
         """Appends ops (a snapshot after them, and what their authors are called, where that is new).
 
-        Fails with sqlite3.IntegrityError on a clock or id used before, with Unwritable and HistoryFull.
+        Fails with UsedTwice on a clock or id used before, with Unwritable, Unknown, Moved and HistoryFull.
         """
         more = sum(len(row.op) for row in rows)
 
-        def write(db: sqlite3.Connection) -> None:
+        def write(db: Connection) -> None:
             self._make_room(db, terrain, more)
             db.executemany("INSERT INTO ops VALUES (?,?,?,?,?,?)", ((terrain, *row) for row in rows))
             if rows:
@@ -158,13 +133,13 @@ class Journal:
             if snapshot is not None:
                 put_snapshot(db, snapshot)
 
-        return self.submit(write)
+        return self.submit(write, terrain)
 
     def keep_lesson(self, terrain: str, state: str) -> Future[None]:
         """Keeps how the lesson of a terrain stands. Fails with Unwritable."""
-        return self.submit(lambda db: lessons.keep_state(db, terrain, state))
+        return self.submit(lambda db: lessons.keep_state(db, terrain, state), terrain)
 
-    def _make_room(self, db: sqlite3.Connection, terrain: str, more: int) -> None:
+    def _make_room(self, db: Connection, terrain: str, more: int) -> None:
         """Counts ``more`` characters of operations. Raises NoSpace, HistoryFull."""
         if terrain not in self._sizes:
             if len(self._sizes) >= COUNTED_TERRAINS:
@@ -191,13 +166,16 @@ class Journal:
         counted."""
         return self._sizes.get(terrain, 0) > self._quota // 2
 
-    def create(self, document: c.Document, also: Callable[[sqlite3.Connection], Any] | None = None) -> Future[None]:
+    def create(
+        self, document: c.Document, also: Callable[[Connection], Any] | None = None, by: str | None = None
+    ) -> Future[None]:
         """A new terrain, born as ``document``, with what ``also`` writes, or neither.
 
-        Fails with sqlite3.IntegrityError when the id exists.
+        ``by``: the terrain whose rows ``also`` writes beside those of the new one. Fails with UsedTwice when the id
+        exists.
         """
 
-        def write(db: sqlite3.Connection) -> None:
+        def write(db: Connection) -> None:
             self.space.need()
             db.execute("INSERT INTO terrains (id,created) VALUES (?,?)", (document.id, self._now()))
             name_grids(db, document.id, (layer.content for layer in (*document.layers, *document.deleted_layers)))
@@ -205,74 +183,17 @@ class Journal:
             if also is not None:
                 also(db)
 
-        return self.submit(write)
-
-    def _write_all(self) -> None:
-        while True:
-            item = self._queue.get()
-            if item is None:
-                return
-            batch, stop = [item], False
-            while len(batch) < GROUP_LIMIT:
-                try:
-                    more = self._queue.get_nowait()
-                except queue.Empty:
-                    break
-                if more is None:
-                    stop = True
-                    break
-                batch.append(more)
-            self._commit(batch)
-            if stop:
-                return
-
-    def _commit(self, batch: list[tuple[Callable[[sqlite3.Connection], Any], Future[Any]]]) -> None:
-        db = self._writer_db
-        # From here on an item cannot be cancelled. An item whose HTTP client hung up before is not written.
-        batch = [(write, future) for write, future in batch if future.set_running_or_notify_cancel()]
-        outcomes: list[tuple[Future[Any], Any, Exception | None]] = []
-        # Every statement gives the interpreter's lock away and waits for it, so an item that is alone has no savepoint.
-        alone = len(batch) == 1
-        try:
-            db.execute("BEGIN IMMEDIATE")
-            for write, future in batch:
-                if not alone:
-                    db.execute("SAVEPOINT item")
-                try:
-                    outcomes.append((future, write(db), None))
-                except Exception as error:
-                    if not db.in_transaction:  # SQLite gave the whole transaction up: a full disk, an I/O error
-                        raise
-                    db.execute("ROLLBACK" if alone else "ROLLBACK TO item")
-                    outcomes.append((future, None, error))
-                if not alone:
-                    db.execute("RELEASE item")
-            if not alone or outcomes[0][2] is None:
-                db.execute("COMMIT")
-            # A statement that finds the disk full may end alone, and leave the transaction to the others of its batch.
-            self.writable = not any(isinstance(failure, sqlite3.OperationalError) for _, _, failure in outcomes)
-        except sqlite3.Error as error:  # nothing of this batch is durable
-            if db.in_transaction:
-                db.execute("ROLLBACK")
-            self.writable = False
-            outcomes = [(future, None, error) for _, future in batch]
-        for future, value, failure in outcomes:
-            if failure is None:
-                future.set_result(value)
-            else:
-                if isinstance(failure, (sqlite3.OperationalError, NoSpace)):
-                    failure = Unwritable(failure)
-                future.set_exception(failure)
+        return self.submit(write, by)
 
     # --- reading ------------------------------------------------------------------------------------------------
 
-    def reader(self) -> sqlite3.Connection:
+    def reader(self) -> Connection:
         """This thread's own read connection."""
-        db: sqlite3.Connection | None = getattr(self._readers, "db", None)
-        if db is None:
-            db = self._readers.db = connect(self.path)
-            self._open_readers.append(db)
-        return db
+        return self.engine.reader()
+
+    def at_one_moment(self) -> AbstractContextManager[Connection]:
+        """Everything that this thread reads within is of the same commit."""
+        return self.engine.at_one_moment()
 
     def exists(self, terrain: str) -> bool:
         """True when the terrain was created."""
@@ -311,8 +232,7 @@ class Journal:
 
         Raises DamagedTerrain when ops of a folded stretch are missing.
         """
-        db = self.reader()
-        with folds.at_one_moment(db):
+        with self.at_one_moment() as db:
             rows = self.rows(terrain, after, upto)
             last = folds.folded_upto(db, terrain)
             end = last if upto is None else min(last, upto)
@@ -326,8 +246,7 @@ class Journal:
 
     def load(self, terrain: str, upto: int | None = None) -> Loaded | None:
         """The terrain at clock ``upto`` (default: now), or None. Raises DamagedTerrain when it does not replay."""
-        db = self.reader()
-        with folds.at_one_moment(db):  # what is being folded meanwhile is, or is not
+        with self.at_one_moment() as db:  # what is being folded meanwhile is, or is not
             snapshot = db.execute(
                 "SELECT clock, document FROM snapshots WHERE terrain=? AND clock<=? ORDER BY clock DESC LIMIT 1",
                 (terrain, 2**62 if upto is None else upto),
@@ -355,34 +274,16 @@ class Journal:
 
     # --- care ---------------------------------------------------------------------------------------------------
 
-    def backup(self) -> Path:
-        """Copies the live database to ``backup/``; readers and the writer go on meanwhile.
+    def backup(self) -> Path | None:
+        """Copies the live database; readers and the writer go on meanwhile. None where others keep copies of it.
 
         Raises NoSpace, store.backup.BadCopy, OSError, sqlite3.Error.
         """
-        self.space.need(self.path.stat().st_size)
-        return write_backup(self.path, self.directory, self._now())
+        return self.engine.backup(self._now())
 
     def close(self) -> None:
         """Commits what is queued, then closes every connection."""
-        if self._closed:
-            return
-        self._closed = True
-        self._queue.put(None)
-        self._thread.join()
-        for db in self._open_readers:
-            db.close()
-        self._writer_db.close()
-
-
-def connect(path: Path) -> sqlite3.Connection:
-    """A connection with the journal's pragmas, in autocommit mode (transactions are explicit)."""
-    db = sqlite3.connect(path, isolation_level=None, check_same_thread=False, timeout=10)
-    db.execute("PRAGMA journal_mode=WAL")
-    db.execute("PRAGMA synchronous=FULL")
-    db.execute("PRAGMA foreign_keys=ON")
-    db.execute(f"PRAGMA journal_size_limit={LOG_BYTES}")
-    return db
+        self.engine.close()
 
 
 def replay(document: StrokeSet, rows: Iterable[Row]) -> StrokeSet:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import json
-import sqlite3
 from collections.abc import Callable
 from concurrent.futures import Future
 from contextlib import closing
 from pathlib import Path
-from typing import Any, Final, NamedTuple, Protocol, TypeVar
+from typing import Any, Final, NamedTuple, TypeVar
 
-from esker.store.journal import connect
+from esker.store.engine.ports import Connection, Reads
+from esker.store.engine.sqlite import connect
 from esker.store.upkeep.inspection import DATABASE_NAME
 from esker.store.upkeep.migrations import FORMAT
 
@@ -39,13 +39,6 @@ class Kept(NamedTuple):
     links: int
     """Links that work."""
     title: str
-
-
-class Reads(Protocol):
-    """What can be asked: the journal of a running server, or a visit."""
-
-    def reader(self) -> sqlite3.Connection:
-        """A connection for this thread."""
 
 
 class Visit:
@@ -78,11 +71,11 @@ class Visit:
     def __exit__(self, *_: object) -> None:
         self._db.close()
 
-    def reader(self) -> sqlite3.Connection:
+    def reader(self) -> Connection:
         """The connection."""
         return self._db
 
-    def submit(self, write: Callable[[sqlite3.Connection], T]) -> Future[T]:
+    def submit(self, write: Callable[[Connection], T], terrain: str | None = None) -> Future[T]:  # noqa: ARG002
         """Runs ``write`` in a transaction of its own, now. The future is done, with what it returned or raised."""
         future: Future[T] = Future()
         try:
@@ -122,7 +115,7 @@ def _kept(store: Reads, row: tuple[Any, ...]) -> Kept:
     return Kept(terrain, created, changed, clock, links, (title or "") if later is None else later)
 
 
-def _title_since(db: sqlite3.Connection, terrain: str) -> str | None:
+def _title_since(db: Connection, terrain: str) -> str | None:
     """The title that ops gave the terrain after its newest snapshot, or None where none did."""
     with closing(
         db.execute(

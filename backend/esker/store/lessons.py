@@ -7,9 +7,10 @@ thing, client): written in the commit of the op by which the thing came; what ha
 from __future__ import annotations
 
 import re
-import sqlite3
 from collections.abc import Iterable
 from typing import Final
+
+from esker.store.engine.ports import Connection
 
 _BEGUN: Final = re.compile(r'"type":"(?:stroke\.begin","stroke|layer\.add","layer)":\{"id":"([A-Za-z0-9_-]{1,40})"')
 
@@ -22,23 +23,28 @@ def begun(op: str) -> list[str]:
     return _BEGUN.findall(op)
 
 
-def keep_makers(db: sqlite3.Connection, terrain: str, made: Iterable[tuple[str, str]]) -> None:
+def keep_makers(db: Connection, terrain: str, made: Iterable[tuple[str, str]]) -> None:
     """Writes down by which clients things (thing, client) came."""
-    db.executemany("INSERT OR REPLACE INTO makers VALUES (?,?,?)", ((terrain, *each) for each in made))
+    db.executemany(
+        "INSERT INTO makers VALUES (?,?,?) ON CONFLICT (terrain, thing) DO UPDATE SET client=excluded.client",
+        [(terrain, *each) for each in made],
+    )
 
 
-def keep_state(db: sqlite3.Connection, terrain: str, state: str) -> None:
+def keep_state(db: Connection, terrain: str, state: str) -> None:
     """Writes down how the lesson stands."""
-    db.execute("INSERT OR REPLACE INTO lessons VALUES (?,?)", (terrain, state))
+    db.execute(
+        "INSERT INTO lessons VALUES (?,?) ON CONFLICT (terrain) DO UPDATE SET state=excluded.state", (terrain, state)
+    )
 
 
-def read_state(db: sqlite3.Connection, terrain: str) -> str | None:
+def read_state(db: Connection, terrain: str) -> str | None:
     """How the lesson stands; None where there never was one."""
     row = db.execute("SELECT state FROM lessons WHERE terrain=?", (terrain,)).fetchone()
     return None if row is None else str(row[0])
 
 
-def read_makers(db: sqlite3.Connection, terrain: str) -> dict[str, str]:
+def read_makers(db: Connection, terrain: str) -> dict[str, str]:
     """The client by which each thing came of which that is known."""
     rows = db.execute("SELECT thing, client FROM makers WHERE terrain=?", (terrain,))
     return {str(thing): str(client) for thing, client in rows}

@@ -7,11 +7,13 @@ beside it, ``/t/{id}?p={token}#{secret}``, which opens the picture and the title
 from __future__ import annotations
 
 import secrets
-import sqlite3
 from concurrent.futures import Future
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
+from esker.store.engine.ports import Connection
 from esker.store.journal import Journal
+
+_MAKE: Final = "INSERT INTO previews VALUES (?,?,1) ON CONFLICT DO NOTHING"
 
 
 class Preview(NamedTuple):
@@ -40,27 +42,29 @@ class PreviewTokens:
     def of(self, terrain: str) -> Future[Preview]:
         """The token of a terrain, made when it has none."""
 
-        def write(db: sqlite3.Connection) -> Preview:
-            db.execute("INSERT OR IGNORE INTO previews VALUES (?,?,1)", (terrain, secrets.token_urlsafe(12)))
+        def write(db: Connection) -> Preview:
+            db.execute(
+                "INSERT INTO previews VALUES (?,?,1) ON CONFLICT DO NOTHING", (terrain, secrets.token_urlsafe(12))
+            )
             return _read(db, terrain)
 
-        return self._journal.submit(write)
+        return self._journal.submit(write, terrain)
 
     def change(self, terrain: str, *, shown: bool | None = None, renew: bool = False) -> Future[Preview]:
         """Shows or hides the picture; ``renew``: links with the old token no longer show it."""
         fresh = secrets.token_urlsafe(12)
 
-        def write(db: sqlite3.Connection) -> Preview:
-            db.execute("INSERT OR IGNORE INTO previews VALUES (?,?,1)", (terrain, fresh))
+        def write(db: Connection) -> Preview:
+            db.execute(_MAKE, (terrain, fresh))
             if renew:
                 db.execute("UPDATE previews SET token=? WHERE terrain=?", (fresh, terrain))
             if shown is not None:
                 db.execute("UPDATE previews SET shown=? WHERE terrain=?", (int(shown), terrain))
             return _read(db, terrain)
 
-        return self._journal.submit(write)
+        return self._journal.submit(write, terrain)
 
 
-def _read(db: sqlite3.Connection, terrain: str) -> Preview:
+def _read(db: Connection, terrain: str) -> Preview:
     token, shown = db.execute("SELECT token, shown FROM previews WHERE terrain=?", (terrain,)).fetchone()
     return Preview(str(token), bool(shown))

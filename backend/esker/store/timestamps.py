@@ -8,9 +8,10 @@ journal from before these tables has ops without a time, by authors without a na
 
 from __future__ import annotations
 
-import sqlite3
 from collections.abc import Iterable
 from typing import Final, NamedTuple
+
+from esker.store.engine.ports import Connection
 
 TIMESTAMP_SECONDS: Final = 1.0
 
@@ -32,23 +33,31 @@ class Timestamps:
     def __init__(self) -> None:
         self._last: dict[str, float] = {}
 
-    def note(self, db: sqlite3.Connection, terrain: str, clock: int, now: float) -> None:
+    def note(self, db: Connection, terrain: str, clock: int, now: float) -> None:
         """Ops from ``clock`` on are committed at ``now``, seconds since 1970."""
         last = self._last.get(terrain)
         # A clock that was set back must not leave ops without a moment for as long.
         if last is None or not last <= now < last + TIMESTAMP_SECONDS:
-            db.execute("INSERT OR IGNORE INTO moments VALUES (?,?,?)", (terrain, clock, now))
+            db.execute("INSERT INTO moments VALUES (?,?,?) ON CONFLICT DO NOTHING", (terrain, clock, now))
             self._last[terrain] = now
             if len(self._last) > 10_000:
                 self._last.clear()
 
+    def forget(self, terrain: str) -> None:
+        """Forgets the last moment of a terrain."""
+        self._last.pop(terrain, None)
 
-def keep(db: sqlite3.Connection, terrain: str, people: Iterable[Person]) -> None:
+
+def keep(db: Connection, terrain: str, people: Iterable[Person]) -> None:
     """Stores what these people are called now."""
-    db.executemany("INSERT OR REPLACE INTO people VALUES (?,?,?,?,?,?)", ((terrain, *person) for person in people))
+    db.executemany(
+        "INSERT INTO people VALUES (?,?,?,?,?,?) ON CONFLICT (terrain, client) DO UPDATE SET name=excluded.name,"
+        " colour=excluded.colour, person=excluded.person, conducts=excluded.conducts",
+        [(terrain, *person[:4], int(person.conducts)) for person in people],
+    )
 
 
-def read_timestamps(db: sqlite3.Connection, terrain: str, after: int, upto: int) -> list[tuple[int, float]]:
+def read_timestamps(db: Connection, terrain: str, after: int, upto: int) -> list[tuple[int, float]]:
     """Clock and time of the moments that ops with after < clock <= upto need, in order; the first may be earlier."""
     rows = db.execute(
         "SELECT clock, at FROM moments WHERE terrain=?1 AND clock<=?3 AND clock >= coalesce("
@@ -58,7 +67,7 @@ def read_timestamps(db: sqlite3.Connection, terrain: str, after: int, upto: int)
     return [(int(clock), float(at)) for clock, at in rows]
 
 
-def read_people(db: sqlite3.Connection, terrain: str) -> dict[str, Person]:
+def read_people(db: Connection, terrain: str) -> dict[str, Person]:
     """Everybody who is the author of an op of the terrain, by client."""
     rows = db.execute("SELECT client, name, colour, person, conducts FROM people WHERE terrain=?", (terrain,))
     return {

@@ -133,7 +133,7 @@ class HistoryReader:
     def go(self, clock: int) -> tuple[StrokeSet, list[Row] | None]:
         """The document at ``clock`` (or the newest before), and the ops from the present one, where it is later.
 
-        Raises DamagedTerrain, sqlite3.Error.
+        Raises DamagedTerrain.
         """
         start = self._nearest(clock)
         if start is None:

@@ -1,4 +1,4 @@
-"""What a store runs on: leases of terrains, the lock of a data folder, and the engines behind their ports.
+"""What a store runs on: the engines behind their ports, leases of terrains, and the lock of a data folder.
 
-It may know ``contract``, ``document`` and ``process``; it never knows the rest of the store.
+It may know ``contract``, ``document``, ``process`` and what the store does for a database: migrations, copies, space.
 """

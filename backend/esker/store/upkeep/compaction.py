@@ -10,7 +10,6 @@ all of its ops.
 from __future__ import annotations
 
 import logging
-import sqlite3
 import time
 from bisect import bisect_right
 from collections.abc import Callable, Iterator
@@ -21,6 +20,7 @@ from esker.document.history.folding import UNLIMITED, Dated, Folded, fold, same
 from esker.document.ops import Refusal, StrokeSet
 from esker.document.wire import op_json
 from esker.store import timestamps
+from esker.store.engine.ports import Connection
 from esker.store.journal import DamagedTerrain, Journal, Row, Unwritable
 from esker.store.upkeep import folds
 
@@ -71,7 +71,7 @@ class Compaction:
     def round(self, seconds: float = ROUND_SECONDS, stopped: Callable[[], bool] = lambda: False) -> int:
         """Folds what is old enough, of all terrains, for at most so long. Returns how many ops went.
 
-        A terrain that cannot be read is left as it is. Raises store.journal.Unwritable, sqlite3.Error.
+        A terrain that cannot be read is left as it is. Raises store.journal.Unwritable.
         """
         end, gone = time.monotonic() + seconds, 0
         for terrain in self._due():
@@ -107,7 +107,7 @@ class Compaction:
                         return
                     document = loaded.document
                 stretch, document = self._stretch(document, last)
-                if not journal.submit(self._write(stretch)).result():
+                if not journal.submit(self._write(stretch), terrain).result():
                     return
                 yield len(stretch.gone)
                 self._pause(time.monotonic() - began)
@@ -155,10 +155,10 @@ class Compaction:
             folded = Folded({}, {})
         return _made(terrain, rows, folded, times), after
 
-    def _write(self, stretch: Stretch) -> Callable[[sqlite3.Connection], bool]:
+    def _write(self, stretch: Stretch) -> Callable[[Connection], bool]:
         """Puts a stretch in the place of its ops, unless its terrain was deleted meanwhile; says whether it did."""
 
-        def write(db: sqlite3.Connection) -> bool:
+        def write(db: Connection) -> bool:
             there = db.execute("SELECT 1 FROM terrains WHERE id=? AND deleted IS NULL", (stretch.terrain,)).fetchone()
             if there is None:
                 return False

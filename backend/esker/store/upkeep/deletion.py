@@ -7,13 +7,13 @@ a few at a time so that nobody's commit waits for them; the grids that only it n
 
 from __future__ import annotations
 
-import sqlite3
 import time
 from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Final
 
 from esker.store import classes
+from esker.store.engine.ports import Connection
 from esker.store.journal import Journal
 
 GRACE_SECONDS: Final = 7 * 86_400.0
@@ -41,27 +41,27 @@ class Deletion:
         """Marks a terrain; the future gives when it will be gone. It fails with store.journal.Unwritable."""
         now = self._now()
 
-        def write(db: sqlite3.Connection) -> float:
+        def write(db: Connection) -> float:
             db.execute("UPDATE terrains SET deleted=? WHERE id=? AND deleted IS NULL", (now, terrain))
             row = db.execute("SELECT deleted FROM terrains WHERE id=?", (terrain,)).fetchone()
             return GRACE_SECONDS + (now if row is None else float(row[0]))
 
-        return self._journal.submit(write)
+        return self._journal.submit(write, terrain)
 
     def bring_back(self, terrain: str) -> Future[bool]:
         """Takes the mark away; the future gives False when there was none. It fails with store.journal.Unwritable."""
 
-        def write(db: sqlite3.Connection) -> bool:
+        def write(db: Connection) -> bool:
             changed = db.execute("UPDATE terrains SET deleted=NULL WHERE id=? AND deleted IS NOT NULL", (terrain,))
             return changed.rowcount > 0
 
-        return self._journal.submit(write)
+        return self._journal.submit(write, terrain)
 
     def expire(self) -> Future[int]:
         """Marks terrains that nobody ever drew on; the future gives how many."""
         now = self._now()
 
-        def write(db: sqlite3.Connection) -> int:
+        def write(db: Connection) -> int:
             changed = db.execute(
                 "UPDATE terrains SET deleted=?1 WHERE deleted IS NULL AND created < ?2"
                 " AND NOT EXISTS (SELECT 1 FROM ops WHERE ops.terrain = terrains.id)"
@@ -80,23 +80,23 @@ class Deletion:
         gone = [str(row[0]) for row in overdue.fetchall()]
         for terrain in gone:
             for table in TABLES:
-                while self._journal.submit(_some(table, terrain)).result():
+                while self._journal.submit(_some(table, terrain), terrain).result():
                     pass
-            self._journal.submit(_last(terrain)).result()
+            self._journal.submit(_last(terrain), terrain).result()
         return gone
 
 
-def _last(terrain: str) -> Callable[[sqlite3.Connection], None]:
+def _last(terrain: str) -> Callable[[Connection], None]:
     """Removes what says that a terrain was there."""
 
-    def write(db: sqlite3.Connection) -> None:
+    def write(db: Connection) -> None:
         classes.forget(db, terrain)
         db.execute("DELETE FROM terrains WHERE id=?", (terrain,))
 
     return write
 
 
-def _some(table: str, terrain: str) -> Callable[[sqlite3.Connection], int]:
+def _some(table: str, terrain: str) -> Callable[[Connection], int]:
     """Removes a few rows of a table without row ids, by its primary key; says how many."""
     key = {"ops": "clock", "snapshots": "clock", "folds": "last", "grids": "digest", "links": "id", "moments": "clock"}
     key |= {"makers": "thing", "previews": "terrain", "lessons": "terrain"}

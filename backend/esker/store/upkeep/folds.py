@@ -7,10 +7,9 @@ counter, upto, clock): ops client:counter to client:upto, whose work the op at `
 
 from __future__ import annotations
 
-import sqlite3
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 
+from esker.store.engine.ports import Connection
 from esker.store.row import Row
 
 
@@ -18,25 +17,12 @@ class MissingOps(Exception):
     """A folded stretch has fewer ops than were kept."""
 
 
-@contextmanager
-def at_one_moment(db: sqlite3.Connection) -> Iterator[None]:
-    """Everything that is read within is of the same commit."""
-    if db.in_transaction:
-        yield
-        return
-    db.execute("BEGIN")
-    try:
-        yield
-    finally:
-        db.execute("COMMIT")
-
-
-def folded_upto(db: sqlite3.Connection, terrain: str) -> int:
+def folded_upto(db: Connection, terrain: str) -> int:
     """The last clock of the folded part of a history; 0 where nothing is folded."""
     return int(db.execute("SELECT coalesce(max(last), 0) FROM folds WHERE terrain=?", (terrain,)).fetchone()[0])
 
 
-def find(db: sqlite3.Connection, terrain: str, client: str, counter: int) -> int | None:
+def find(db: Connection, terrain: str, client: str, counter: int) -> int | None:
     """The clock of the op that does the work of a folded one, by its id."""
     row = db.execute(
         "SELECT upto, clock FROM folded_ids WHERE terrain=? AND client=? AND counter<=? ORDER BY counter DESC LIMIT 1",
@@ -45,7 +31,7 @@ def find(db: sqlite3.Connection, terrain: str, client: str, counter: int) -> int
     return None if row is None or row[0] < counter else int(row[1])
 
 
-def check(db: sqlite3.Connection, terrain: str, after: int, upto: int) -> None:
+def check(db: Connection, terrain: str, after: int, upto: int) -> None:
     """Whether all ops are there that folding kept of the stretches around after < clock <= upto. Raises MissingOps."""
     stretches = db.execute(
         "SELECT first, last, kept, (SELECT count(*) FROM ops WHERE terrain=?1 AND clock BETWEEN first AND last)"

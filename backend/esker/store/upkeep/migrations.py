@@ -14,6 +14,11 @@ import sqlite3
 from collections.abc import Callable
 from typing import Final
 
+from esker.store.engine.ports import Connection
+
+SWEEP_AFTER: Final = 30 * 86_400.0
+"""Seconds for which a new or restored database lets every stored grid be (``store/grids.py``)."""
+
 _FORMAT_1: Final = """
 CREATE TABLE IF NOT EXISTS terrains (id TEXT PRIMARY KEY, created REAL NOT NULL) WITHOUT ROWID;
 CREATE TABLE IF NOT EXISTS ops (
@@ -158,12 +163,12 @@ def migrate(db: sqlite3.Connection, keep: Callable[[int], object]) -> None:
             raise
 
 
-def fact(db: sqlite3.Connection, key: str) -> str | None:
+def fact(db: Connection, key: str) -> str | None:
     """A fact about the database as a whole, or None."""
     row = db.execute("SELECT value FROM server WHERE key=?", (key,)).fetchone()
     return None if row is None else str(row[0])
 
 
-def state(db: sqlite3.Connection, key: str, value: str) -> None:
+def state(db: Connection, key: str, value: str) -> None:
     """Writes a fact about the database as a whole."""
-    db.execute("INSERT OR REPLACE INTO server VALUES (?,?)", (key, value))
+    db.execute("INSERT INTO server VALUES (?,?) ON CONFLICT (key) DO UPDATE SET value=excluded.value", (key, value))

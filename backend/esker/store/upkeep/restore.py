@@ -16,7 +16,6 @@ from pathlib import Path
 from esker.process import system
 from esker.store.engine.lock import DataLock
 from esker.store.grids import GridStore
-from esker.store.journal import SWEEP_AFTER
 from esker.store.upkeep import migrations
 from esker.store.upkeep.backup import FOLDER, GRIDS, STAMP, copies_of, named_grids, take
 from esker.store.upkeep.inspection import DATABASE_NAME, problem_of
@@ -57,7 +56,7 @@ def restore(data: Path, copy: Path | None = None, now: float | None = None) -> R
         shutil.copyfile(chosen, part)
         with closing(sqlite3.connect(part, isolation_level=None)) as db:
             migrations.migrate(db, lambda _: None)
-            migrations.state(db, "swept_from", str(now + SWEEP_AFTER))
+            migrations.state(db, "swept_from", str(now + migrations.SWEEP_AFTER))
             terrains, ops = (db.execute(f"SELECT count(*) FROM {table}").fetchone()[0] for table in ("terrains", "ops"))
         if problem := problem_of(part):
             raise CannotRestore(f"What was made of {chosen} cannot be read ({problem}).")

@@ -1,0 +1,197 @@
+"""SQLite as the engine of a store: one file in the data folder, one writer thread, readers beside it.
+
+WAL mode, ``synchronous=FULL``. Whatever is queued when a commit ends goes into the next one (group commit), each item
+under its own savepoint, so one refused item does not undo the others. The lock of the data folder keeps other servers
+away, so nothing is fenced.
+"""
+
+from __future__ import annotations
+
+import os
+import queue
+import sqlite3
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any, Final, TypeVar
+
+from esker.store.engine.ports import GROUP_LIMIT, Connection, Unwritable, UsedTwice
+from esker.store.space import NoSpace, Space
+from esker.store.upkeep import migrations
+from esker.store.upkeep.backup import keep_copy, write_backup
+from esker.store.upkeep.inspection import DATABASE_NAME, check
+
+T = TypeVar("T")
+Item = tuple[Callable[[sqlite3.Connection], Any], "Future[Any]"]
+
+LOG_BYTES: Final = 5 << 20
+"""How long the write-ahead log is from the start: more than the 1,000 pages after which it is begun anew. One that a
+large commit made longer is cut to this when it is begun anew."""
+
+
+class Sqlite:
+    """The database file of one server. Reads may come from any thread; writes are queued to the one writer."""
+
+    def __init__(self, directory: Path, now: float, space: Space) -> None:
+        """Opens or creates ``directory/esker.db``. Raises CorruptDatabase, OSError."""
+        self.directory, self.path, self._space = directory, directory / DATABASE_NAME, space
+        check(self.path, directory)
+        new = not self.path.exists()
+        self.writer_db = connect(self.path)
+        migrations.migrate(self.writer_db, lambda old: keep_copy(self.path, directory, f"format-{old}", now))
+        if new:
+            migrations.state(self.writer_db, "swept_from", str(now + migrations.SWEEP_AFTER))
+        lengthen(directory / f"{DATABASE_NAME}-wal")
+        self._readers = threading.local()
+        self._open_readers: list[sqlite3.Connection] = []
+        self._queue: queue.SimpleQueue[Item | None] = queue.SimpleQueue()
+        self._closed = False
+        self.writable = True
+        self._thread = threading.Thread(target=self._write_all, name="journal", daemon=True)
+        self._thread.start()
+
+    # --- writing ------------------------------------------------------------------------------------------------
+
+    def submit(self, write: Callable[[Connection], T], terrain: str | None = None) -> Future[T]:  # noqa: ARG002
+        """Runs ``write`` in the next commit; nobody else writes into this file."""
+        if self._closed:
+            raise RuntimeError("the journal is closed")
+        future: Future[T] = Future()
+        self._queue.put((write, future))
+        return future
+
+    @property
+    def waiting(self) -> int:
+        return self._queue.qsize()
+
+    def _write_all(self) -> None:
+        while True:
+            item = self._queue.get()
+            if item is None:
+                return
+            batch, stop = [item], False
+            while len(batch) < GROUP_LIMIT:
+                try:
+                    more = self._queue.get_nowait()
+                except queue.Empty:
+                    break
+                if more is None:
+                    stop = True
+                    break
+                batch.append(more)
+            self._commit(batch)
+            if stop:
+                return
+
+    def _commit(self, batch: list[Item]) -> None:
+        db = self.writer_db
+        # From here on an item cannot be cancelled. An item whose HTTP client hung up before is not written.
+        batch = [(write, future) for write, future in batch if future.set_running_or_notify_cancel()]
+        outcomes: list[tuple[Future[Any], Any, Exception | None]] = []
+        # Every statement gives the interpreter's lock away and waits for it, so an item that is alone has no savepoint.
+        alone = len(batch) == 1
+        try:
+            db.execute("BEGIN IMMEDIATE")
+            for write, future in batch:
+                if not alone:
+                    db.execute("SAVEPOINT item")
+                try:
+                    outcomes.append((future, write(db), None))
+                except Exception as error:
+                    if not db.in_transaction:  # SQLite gave the whole transaction up: a full disk, an I/O error
+                        raise
+                    db.execute("ROLLBACK" if alone else "ROLLBACK TO item")
+                    outcomes.append((future, None, error))
+                if not alone:
+                    db.execute("RELEASE item")
+            if not alone or outcomes[0][2] is None:
+                db.execute("COMMIT")
+            # A statement that finds the disk full may end alone, and leave the transaction to the others of its batch.
+            self.writable = not any(isinstance(failure, sqlite3.OperationalError) for _, _, failure in outcomes)
+        except sqlite3.Error as error:  # nothing of this batch is durable
+            if db.in_transaction:
+                db.execute("ROLLBACK")
+            self.writable = False
+            outcomes = [(future, None, error) for _, future in batch]
+        for future, value, failure in outcomes:
+            if failure is None:
+                future.set_result(value)
+            else:
+                future.set_exception(_as_asked(failure))
+
+    # --- reading ------------------------------------------------------------------------------------------------
+
+    def reader(self) -> sqlite3.Connection:
+        """This thread's own read connection."""
+        db: sqlite3.Connection | None = getattr(self._readers, "db", None)
+        if db is None:
+            db = self._readers.db = connect(self.path)
+            self._open_readers.append(db)
+        return db
+
+    @contextmanager
+    def at_one_moment(self) -> Iterator[Connection]:
+        """Everything that this thread reads within is of the same commit."""
+        db = self.reader()
+        if db.in_transaction:
+            yield db
+            return
+        db.execute("BEGIN")
+        try:
+            yield db
+        finally:
+            db.execute("COMMIT")
+
+    # --- care ---------------------------------------------------------------------------------------------------
+
+    def backup(self, now: float) -> Path:
+        """Copies the live database to ``backup/``; readers and the writer go on meanwhile.
+
+        Raises NoSpace, store.backup.BadCopy, OSError, sqlite3.Error.
+        """
+        self._space.need(self.path.stat().st_size)
+        return write_backup(self.path, self.directory, now)
+
+    def close(self) -> None:
+        """Commits what is queued, then closes every connection."""
+        if self._closed:
+            return
+        self._closed = True
+        self._queue.put(None)
+        self._thread.join()
+        for db in self._open_readers:
+            db.close()
+        self.writer_db.close()
+
+
+def connect(path: Path) -> sqlite3.Connection:
+    """A connection with the journal's pragmas, in autocommit mode (transactions are explicit)."""
+    db = sqlite3.connect(path, isolation_level=None, check_same_thread=False, timeout=10)
+    db.execute("PRAGMA journal_mode=WAL")
+    db.execute("PRAGMA synchronous=FULL")
+    db.execute("PRAGMA foreign_keys=ON")
+    db.execute(f"PRAGMA journal_size_limit={LOG_BYTES}")
+    return db
+
+
+def lengthen(log: Path) -> None:
+    """Gives a write-ahead log its length at once, by zeros that no reader takes for its frames.
+
+    To sync a file that has grown a file system waits for its own journal, and so for what others have just written: on
+    a busy disk hundreds of milliseconds, now and then, for a commit that takes one where the log is written over.
+    """
+    with suppress(OSError), log.open("ab") as file:  # where the disk has no room, commits only take longer
+        file.write(bytes(max(0, LOG_BYTES - file.tell())))
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def _as_asked(failure: Exception) -> Exception:
+    """The failure as whoever asked knows it."""
+    if isinstance(failure, NoSpace):
+        return Unwritable(str(failure), full=True)
+    if isinstance(failure, sqlite3.OperationalError):
+        return Unwritable(str(failure), full=failure.sqlite_errorcode == sqlite3.SQLITE_FULL)
+    return UsedTwice(str(failure)) if isinstance(failure, sqlite3.IntegrityError) else failure
