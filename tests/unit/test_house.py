@@ -27,7 +27,7 @@ LAYERS: tuple[frozenset[str], ...] = (
     frozenset({"document", "patchwork", "synthesis", "tiles"}),
     frozenset({"importing", "solve", "store"}),
     frozenset({"exporting", "session"}),
-    frozenset({"api", "jobs", "keeper", "lesson"}),
+    frozenset({"api", "cluster", "jobs", "keeper", "lesson"}),
     frozenset({"render", "templates"}),
     frozenset({"server"}),
     frozenset({"cli", "doctor", "__main__"}),

@@ -203,4 +203,7 @@ MAX_BACKLOG_BYTES: Final = 3 * 1024 * 1024
 """Control bytes queued for a client that does not read; above it the client is closed and resumes."""
 STALL_SECONDS: Final = 8.0
 """A client whose socket accepted nothing for this long while bytes were waiting is evicted."""
+MOVED_WITHIN_MS: Final = 1_500
+"""Whoever is told that a terrain moves comes back after a time drawn from so many milliseconds: all of a room come
+spread over it."""
 DEFAULT_TAU_PX: Final = 1.5

@@ -186,6 +186,7 @@ CloseCode = Literal[
     "removed",
     "server_error",
     "shutting_down",
+    "moved",
 ]
 
 WS_CLOSE: Final[dict[str, int]] = {
@@ -203,5 +204,6 @@ WS_CLOSE: Final[dict[str, int]] = {
     "removed": 4012,
     "server_error": 4500,
     "shutting_down": 4501,
+    "moved": 4502,
 }
 """Websocket close codes. 4000..4008, 4011 and 4012 are final for the page; it reconnects after any other."""

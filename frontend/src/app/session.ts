@@ -115,7 +115,8 @@ export class TerrainSession implements OpenTerrain {
     this.doc = new SyncDoc(this.client);
     this.doc.onRefused((refusal) => this.refused(refusal, refusal.op));
     this.doc.onDiverged(() => this.connection.reconnect());
-    const url = `${window.location.protocol === "https:" ? "wss" : "ws"}://${window.location.host}/ws`;
+    const scheme = window.location.protocol === "https:" ? "wss" : "ws";
+    const url = `${scheme}://${window.location.host}/ws?terrain=${id}`; // a balancer brings a terrain to one server by it
     this.historyView = this.#makeHistoryView(url);
     this.history = new History((before) => api.history(this.id, this.secret, before));
     this.deletion = new Deletion(this.id, () => this.secret);

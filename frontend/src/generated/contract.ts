@@ -222,6 +222,8 @@ export const MAX_BACKLOG_BYTES = 3145728 as const;
 
 export const STALL_SECONDS = 8.0 as const;
 
+export const MOVED_WITHIN_MS = 1500 as const;
+
 export const DEFAULT_TAU_PX = 1.5 as const;
 
 export const ABSOLUTE_BOUND_M = 655360.0 as const;
@@ -245,6 +247,7 @@ export const WS_CLOSE = {
   removed: 4012,
   server_error: 4500,
   shutting_down: 4501,
+  moved: 4502,
 } as const;
 
 export const ENDED_IMPORT = ["cancelled", "done", "refused"] as const;
@@ -741,7 +744,8 @@ export type CloseCode =
   | "bad_origin"
   | "removed"
   | "server_error"
-  | "shutting_down";
+  | "shutting_down"
+  | "moved";
 
 export interface Flank {
   slope_deg: number | null;
@@ -1311,7 +1315,7 @@ export interface Progress {
 
 export interface ErrorMessage {
   type: "error";
-  code: "bad_protocol" | "bad_hello" | "bad_secret" | "revoked" | "no_terrain" | "room_full" | "too_large" | "malformed" | "slow_client" | "rate_limited" | "bad_origin" | "removed" | "server_error" | "shutting_down";
+  code: "bad_protocol" | "bad_hello" | "bad_secret" | "revoked" | "no_terrain" | "room_full" | "too_large" | "malformed" | "slow_client" | "rate_limited" | "bad_origin" | "removed" | "server_error" | "shutting_down" | "moved";
   message: string;
   fatal: boolean;
   ticket: string;

@@ -7,7 +7,7 @@ import { type ReadonlySignal, signal } from "@preact/signals-core";
 import type { DecodedFrame } from "../core/types.ts";
 import { checkClientMessage } from "../core/wire.ts";
 import type { ClientMessage, CloseCode, Hello, ServerMessage } from "../generated/contract.ts";
-import { SUBPROTOCOL, WS_CLOSE } from "../generated/contract.ts";
+import { MOVED_WITHIN_MS, SUBPROTOCOL, WS_CLOSE } from "../generated/contract.ts";
 import { DecodeClient } from "./decodeclient.ts";
 
 export type ConnectionState = "connecting" | "online" | "reconnecting" | "closed";
@@ -56,6 +56,7 @@ const SENTENCES: Readonly<Record<CloseCode, string>> = {
   bad_origin: "This page does not come from the server that it talks to.",
   server_error: "The server had a problem.",
   shutting_down: "The server is restarting.",
+  moved: "This terrain moves to another server.",
 };
 
 const SERVER_TYPES: ReadonlySet<string> = new Set<ServerMessage["type"]>([
@@ -245,7 +246,10 @@ export class Connection {
     this.#reconnecting(
       sentence ?? (this.#attempt === 0 ? "The connection was lost." : "The server cannot be reached."),
     );
-    this.#schedule(this.#backoff());
+    // Nothing is wrong: the terrain is elsewhere in a moment. Whoever comes back to where it still moves waits longer.
+    const moved = code === WS_CLOSE.moved && this.#attempt === 0;
+    const backoff = this.#backoff();
+    this.#schedule(moved ? MOVED_WITHIN_MS * this.#random() : backoff);
   }
 
   /** Something came that cannot be understood: start afresh. */

@@ -3,7 +3,7 @@
 import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
 import type { DecodedFrame } from "../../src/core/types.ts";
 import type { ServerMessage } from "../../src/generated/contract.ts";
-import { PROTOCOL_VERSION, SUBPROTOCOL } from "../../src/generated/contract.ts";
+import { MOVED_WITHIN_MS, PROTOCOL_VERSION, SUBPROTOCOL } from "../../src/generated/contract.ts";
 import { Connection, type FrameSource } from "../../src/net/connection.ts";
 
 class FakeSocket {
@@ -214,12 +214,28 @@ describe("losing the connection", () => {
     expect(FakeSocket.all.length).toBe(1);
   });
 
-  it.each([1000, 1001, 1006, 1011, 4009, 4010, 4500, 4501])("close code %i is not final", (code) => {
+  it.each([1000, 1001, 1006, 1011, 4009, 4010, 4500, 4501, 4502])("close code %i is not final", (code) => {
     const c = online();
     FakeSocket.last.die(code);
     expect(c.state.value).toBe("reconnecting");
     vi.advanceTimersByTime(1000);
     expect(FakeSocket.all.length).toBe(2);
+  });
+
+  it("whoever is told that the terrain moves comes back within a time that it draws (SPEC P582)", () => {
+    const c = online(connect(() => 0.5));
+    FakeSocket.last.die(4502);
+    expect(c.reason.value).toBe("This terrain moves to another server.");
+    vi.advanceTimersByTime(MOVED_WITHIN_MS / 2 - 1);
+    expect(FakeSocket.all.length).toBe(1);
+    vi.advanceTimersByTime(1);
+    expect(FakeSocket.all.length).toBe(2);
+    FakeSocket.last.open();
+    FakeSocket.last.die(4502); // it moves still: one of the growing delays
+    vi.advanceTimersByTime(599);
+    expect(FakeSocket.all.length).toBe(2);
+    vi.advanceTimersByTime(1);
+    expect(FakeSocket.all.length).toBe(3);
   });
 
   it("the server's own sentence is the reason", () => {

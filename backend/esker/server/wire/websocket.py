@@ -20,6 +20,7 @@ from websockets.protocol import State
 from esker.fairness.shares import Place
 from esker.fairness.spending import BYTE_SECONDS, Account
 from esker.server.wire.boundaries import FrameBoundaries
+from esker.server.wire.holding import Holding
 
 try:
     from websockets.speedups import apply_mask
@@ -60,6 +61,8 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
     _turn: asyncio.TimerHandle | None = None
     place: Place | None = None
     """Place of this connection among those that the server has."""
+    _holding: Holding | None = None
+    """Where bytes go that this server does not read: the socket may be for another node."""
 
     def __init__(self, *arguments: Any, **named: Any) -> None:
         """As uvicorn makes its own."""
@@ -75,6 +78,8 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
         """The connection ended."""
         self._listener = self._broke = None
         self._rest = b""
+        if self._holding is not None:
+            self._holding.gone()
         if self._turn is not None:
             self._turn.cancel()
         if self.place is not None:
@@ -117,6 +122,29 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
             log.debug("a connection could not be closed in form: %s", error)
             self.transport.abort()
 
+    def hold(self) -> Holding:
+        """From now on what comes is not read but kept, until it is known who reads it. Called before the handshake."""
+        self._holding = Holding(self)
+        return self._holding
+
+    def go_on(self, held: bytes) -> None:
+        """Reads what was kept, and all that comes."""
+        self._holding = None
+        if held:
+            self.data_received(held)
+
+    def pause_writing(self) -> None:
+        """The peer does not read as fast as is sent."""
+        super().pause_writing()
+        if self._holding is not None:
+            self._holding.full()
+
+    def resume_writing(self) -> None:
+        """The peer has read."""
+        super().resume_writing()
+        if self._holding is not None:
+            self._holding.free()
+
     def listen(self, listener: Callable[[str | bytes], None]) -> None:
         """From now on messages are given to ``listener`` when they are read. Those that wait come by ``receive``,
         and so does the end. ``listener`` must not raise."""
@@ -145,6 +173,9 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
     def data_received(self, data: bytes) -> None:
         """Bytes of the peer. Each is paid for before it is parsed, and what it took afterwards."""
         if self._deaf:
+            return
+        if self._holding is not None:
+            self._holding.feed(data)
             return
         self.pay(BYTE_SECONDS * len(data))
         if self._deaf:

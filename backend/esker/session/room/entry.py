@@ -22,6 +22,7 @@ STATUS: Final = {
     "rate_limited": 429,
     "server_error": 500,
     "shutting_down": 503,
+    "moved": 503,
 }
 """What HTTP answers where a route is denied for a reason that also closes sockets."""
 

@@ -84,7 +84,12 @@ export class EskWall extends SignalElement {
     document.title = "The wall · Esker";
     const { terrain, secret, lesson } = this;
     const scheme = window.location.protocol === "https:" ? "wss" : "ws";
-    const wall = new WallConnection({ terrain, secret, lesson, url: `${scheme}://${window.location.host}/ws/wall` });
+    const wall = new WallConnection({
+      terrain,
+      secret,
+      lesson,
+      url: `${scheme}://${window.location.host}/ws/wall?terrain=${terrain}`,
+    });
     this.#wall = wall;
     this.#orders = new ClassOrders(terrain, secret, lesson);
     this.#timer = setInterval(() => {

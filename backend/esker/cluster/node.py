@@ -1,0 +1,401 @@
+"""This node among the others: which terrains it has, for how long still, and where the others are (DESIGN 18).
+
+Lives in the event loop. The database is asked in threads: leases are renewed by one that has a connection of its own,
+so that neither a slow query nor a full loop ends a tenure. What a tenure allows is decided here, by the time that has
+passed and by nothing that might come late.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import threading
+import time
+from collections.abc import Awaitable, Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any, Final, Protocol, TypeVar
+
+from esker.cluster.peers import Elsewhere, Peer
+from esker.cluster.rendezvous import chosen, stepped
+from esker.cluster.tenure import Phase, Tenure
+from esker.store.engine.leases import LEASE_SECONDS, RENEW_SECONDS, Lease, Leases, Node, Unreachable
+
+log = logging.getLogger("esker.cluster")
+T = TypeVar("T")
+
+IDLE_SECONDS: Final = 30.0
+"""A terrain in which nothing happens is given back after so long."""
+LOOK_SECONDS: Final = 0.25
+PATIENCE_SECONDS: Final = 8.5
+"""Whoever comes while a terrain moves is kept waiting for so long: a node that was killed has its leases for six."""
+AGAIN_SECONDS: Final = 0.2
+KNOWN_SECONDS: Final = 1.0
+"""For so long it is believed where a terrain was found. Who is wrong about it is told so by the node that is asked."""
+MOST_KNOWN: Final = 10_000
+LIVE_SECONDS: Final = 3 * RENEW_SECONDS
+THREADS: Final = 6
+
+
+class Rooms(Protocol):
+    """The rooms of this process, as a node needs them."""
+
+    def in_use(self, terrain: str) -> bool:
+        """Whether something of a terrain is open or under way here."""
+
+    def lose(self, terrain: str) -> None:
+        """Shuts what is open of a terrain without writing: another node may have it."""
+
+    async def hand_over(self, terrain: str) -> None:
+        """Commits what was ordered, sends everybody on, and shuts what is open of a terrain."""
+
+    def home(self, terrain: str) -> str:
+        """Returns the terrain with which this one moves: that of its class, else itself. Asks the database."""
+
+
+@dataclass(frozen=True)
+class Holding:
+    """A terrain that this node has. used: when it was last asked for."""
+
+    lease: Lease
+    tenure: Tenure
+    home: str
+    used: float
+
+
+@dataclass
+class Counts:
+    """What a node counts."""
+
+    taken: int = 0
+    lost: int = 0
+    released: int = 0
+    fenced: int = 0
+    sockets_passed: int = 0
+    sockets_passing: int = 0
+    requests_passed: int = 0
+    renewals_failed: int = 0
+
+
+class Cluster:
+    """The node that this process is."""
+
+    def __init__(
+        self,
+        name: str,
+        address: str,
+        leases: Leases,
+        key: bytes,
+        free: Callable[[], float] = lambda: 1.0,
+        now: Callable[[], float] = time.monotonic,
+    ) -> None:
+        """``free``: solver seconds a second that are not used, by which terrains are shared out."""
+        self.name, self.address, self.key = name, address, key
+        self.counts = Counts()
+        self.draining = False
+        self._leases, self._free, self._now = leases, free, now
+        self._held: dict[str, Holding] = {}
+        self._taking: dict[str, asyncio.Task[None]] = {}
+        self._nodes: tuple[Node, ...] = ()
+        self._peers: dict[str, Peer] = {}
+        self._known: dict[str, tuple[Node, float]] = {}
+        """Where terrains were found, and until when that is believed."""
+        self._homes: dict[str, str] = {}
+        self._using: dict[str, int] = {}
+        self._rooms: Rooms | None = None
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._threads = ThreadPoolExecutor(THREADS, "leases")
+        self._stop = threading.Event()
+        self._renewing = threading.Thread(target=self._renew_all, name="renewal", daemon=True)
+        self._look: asyncio.TimerHandle | None = None
+        self._heard = now()
+        """When the newest renewal that was answered was sent."""
+
+    # --- the life of a node -------------------------------------------------------------------------------------
+
+    async def start(self, rooms: Rooms, *, renewing: bool = True) -> None:
+        """Registers the node and begins to renew. ``renewing`` False: whoever tests it renews. Raises Unreachable."""
+        self._rooms, self._loop = rooms, asyncio.get_running_loop()
+        asked = self._now()
+        await self._ask(self._leases.register, self._me(), LIVE_SECONDS)
+        self._answered(asked, (), frozenset(), await self._ask(self._leases.nodes))
+        if renewing:
+            self._renewing.start()
+        self._watch()
+
+    def _me(self) -> Node:
+        return Node(self.name, self.address, stepped(self._free()))
+
+    async def drain(self) -> None:
+        """Takes no more terrains, and gives those that it has away, one after the other."""
+        self.draining = True
+        try:
+            await self._ask(self._leases.withdraw, self.name)
+        except Unreachable as error:
+            log.warning("node %s could not be withdrawn: %s", self.name, error)
+        await asyncio.gather(*self._taking.values(), return_exceptions=True)
+        log.info("node %s gives %d terrains away", self.name, len(self._held))
+        copies = sorted(self._held, key=lambda terrain: self._held[terrain].home == terrain)
+        for terrain in copies:  # a class goes after its copies
+            await self._give(terrain)
+
+    async def _give(self, terrain: str) -> None:
+        assert self._rooms is not None
+        await self._rooms.hand_over(terrain)
+        await self._release(terrain)
+
+    async def _release(self, terrain: str) -> None:
+        found = self._held.pop(terrain, None)
+        if found is None:
+            return
+        self.counts.released += 1
+        try:
+            await self._ask(self._leases.release, [found.lease])
+        except Unreachable as error:
+            log.warning("the lease of %s ends by itself: %s", terrain, error)
+
+    async def close(self) -> None:
+        """Ends the threads. Call ``drain`` first."""
+        self._stop.set()
+        if self._look is not None:
+            self._look.cancel()
+        for peer in self._peers.values():
+            peer.close()
+        self._threads.shutdown(wait=False, cancel_futures=True)
+
+    async def _ask(self, work: Callable[..., T], *arguments: Any) -> T:
+        return await asyncio.get_running_loop().run_in_executor(self._threads, partial(work, *arguments))
+
+    # --- having terrains ----------------------------------------------------------------------------------------
+
+    @property
+    def held(self) -> tuple[str, ...]:
+        """The terrains that this node has."""
+        return tuple(self._held)
+
+    @property
+    def age(self) -> float:
+        """Seconds since the newest renewal was sent that was answered."""
+        return self._now() - self._heard
+
+    @property
+    def nodes(self) -> tuple[Node, ...]:
+        """The live nodes as of the newest renewal."""
+        return self._nodes
+
+    def may_acknowledge(self, terrain: str) -> bool:
+        """Returns whether what is durable may be acknowledged now."""
+        return self._phase(terrain) is Phase.HELD
+
+    def _phase(self, terrain: str) -> Phase:
+        found = self._held.get(terrain)
+        return Phase.SHUT if found is None else found.tenure.phase(self._now())
+
+    async def hold(self, terrain: str) -> None:
+        """Returns when this node has a terrain. Raises Elsewhere."""
+        home = await self.home(terrain)
+        if home != terrain:
+            await self._have(home, home)
+        await self._have(terrain, home)
+
+    @contextmanager
+    def using(self, terrain: str) -> Iterator[None]:
+        """Keeps a terrain from being given back while something is done with it."""
+        self._using[terrain] = self._using.get(terrain, 0) + 1
+        try:
+            yield
+        finally:
+            self._using[terrain] -= 1
+            if not self._using[terrain]:
+                del self._using[terrain]
+
+    async def _have(self, terrain: str, home: str) -> None:
+        while True:
+            if self.draining:
+                raise Elsewhere("This node is being stopped.")
+            match self._phase(terrain):
+                case Phase.HELD:
+                    self._held = {**self._held, terrain: replace(self._held[terrain], used=self._now())}
+                    return
+                case Phase.DOUBTFUL:
+                    raise Elsewhere("This node does not reach its database.")
+                case Phase.SHUT:
+                    self._lose(terrain)
+            task = self._taking.get(terrain)
+            if task is None:
+                task = self._taking[terrain] = asyncio.create_task(self._take(terrain, home))
+                task.add_done_callback(lambda _: self._taking.pop(terrain, None))
+            await asyncio.shield(task)
+
+    async def _take(self, terrain: str, home: str) -> None:
+        if self.draining:
+            raise Elsewhere("This node is being stopped.")
+        asked = self._now()
+        try:
+            answer = await self._ask(self._leases.take, terrain, self.name, LEASE_SECONDS)
+        except Unreachable as error:
+            raise Elsewhere(f"This node does not reach its database: {error}") from None
+        if isinstance(answer, Node):
+            self._note(terrain, answer)
+            raise Elsewhere(f"Node {answer.name} has this terrain.")
+        if self.draining:
+            await self._ask(self._leases.release, [answer])
+            raise Elsewhere("This node is being stopped.")
+        self.counts.taken += 1
+        self._held = {**self._held, terrain: Holding(answer, Tenure(asked), home, asked)}
+
+    def fenced(self, terrain: str) -> None:
+        """The database refused a write: another node has the terrain."""
+        self.counts.fenced += 1
+        self._lose(terrain)
+
+    def _lose(self, terrain: str) -> None:
+        if terrain not in self._held:
+            return
+        self._held = {name: each for name, each in self._held.items() if name != terrain}
+        self.counts.lost += 1
+        log.warning("node %s no longer has terrain %s", self.name, terrain)
+        if self._rooms is not None:
+            self._rooms.lose(terrain)
+
+    async def home(self, terrain: str) -> str:
+        """The terrain with which this one moves."""
+        found = self._homes.get(terrain)
+        if found is None:
+            assert self._rooms is not None
+            found = await self._ask(self._rooms.home, terrain)
+            if len(self._homes) >= MOST_KNOWN:
+                self._homes.clear()
+            self._homes[terrain] = found
+        return found
+
+    # --- renewing -----------------------------------------------------------------------------------------------
+
+    def _renew_all(self) -> None:
+        """Runs in a thread of its own until the node ends."""
+        assert self._loop is not None
+        while not self._stop.wait(RENEW_SECONDS):
+            answer = self._renew()
+            if answer is not None and not self._stop.is_set():
+                self._loop.call_soon_threadsafe(self._answered, *answer)
+
+    def _renew(self) -> tuple[float, tuple[Lease, ...], frozenset[str], tuple[Node, ...]] | None:
+        """Asks the database to renew all leases; None where it does not answer."""
+        asked, leases = self._now(), tuple(each.lease for each in self._held.values())
+        try:
+            if not self.draining:
+                self._leases.register(self._me(), LIVE_SECONDS)
+            renewed = self._leases.renew(leases, LEASE_SECONDS) if leases else frozenset()
+            return asked, leases, renewed, self._leases.nodes()
+        except Unreachable as error:
+            self.counts.renewals_failed += 1
+            log.warning("the leases of node %s could not be renewed: %s", self.name, error)
+            return None
+
+    def _answered(
+        self, asked: float, leases: tuple[Lease, ...], renewed: frozenset[str], nodes: tuple[Node, ...]
+    ) -> None:
+        now = self._now()
+        self._heard = max(self._heard, asked)
+        self._nodes = nodes
+        for name in self._peers.keys() - {node.name for node in nodes}:
+            self._peers.pop(name).close()
+        held = dict(self._held)
+        for lease in leases:
+            found = held.get(lease.terrain)
+            if found is not None and found.lease == lease:
+                tenure = found.tenure.answered(asked, lease.terrain in renewed, now)
+                held[lease.terrain] = replace(found, tenure=tenure)
+        self._held = held
+
+    def _watch(self) -> None:
+        """Shuts what is over, and gives back what nobody uses."""
+        assert self._loop is not None
+        assert self._rooms is not None
+        self._look = self._loop.call_later(LOOK_SECONDS, self._watch)
+        now = self._now()
+        for terrain, found in list(self._held.items()):
+            if found.tenure.phase(now) is Phase.SHUT:
+                self._lose(terrain)
+            elif now - found.used > IDLE_SECONDS and not self._in_use(terrain):
+                self._loop.create_task(self._release(terrain))
+
+    def _in_use(self, terrain: str) -> bool:
+        assert self._rooms is not None
+        copies = any(each.home == terrain and name != terrain for name, each in self._held.items())
+        return terrain in self._using or copies or self._rooms.in_use(terrain)
+
+    # --- finding terrains ---------------------------------------------------------------------------------------
+
+    def peer(self, node: Node) -> Peer:
+        """The other node to be asked. Raises Elsewhere where it says no address."""
+        if not node.address:
+            raise Elsewhere(f"Node {node.name} is not there.")
+        found = self._peers.get(node.name)
+        if found is None or found.node.address != node.address:
+            if found is not None:
+                found.close()
+            found = self._peers[node.name] = Peer(node, self.name, self.key)
+        return found
+
+    def _note(self, terrain: str, node: Node) -> None:
+        if len(self._known) >= MOST_KNOWN:
+            self._known.clear()
+        self._known[terrain] = node, self._now() + KNOWN_SECONDS
+
+    async def _owner(self, home: str) -> Node | None:
+        found = self._known.get(home)
+        if found is not None and found[1] > self._now():
+            return found[0]
+        try:
+            owner = await self._ask(self._leases.owner, home)
+        except Unreachable as error:
+            raise Elsewhere(f"This node does not reach its database: {error}") from None
+        if owner is not None and owner.name != self.name:
+            self._note(home, owner)
+        return owner
+
+    async def reach(self, terrain: str, attempt: Callable[[Peer], Awaitable[None]], *, taking: bool) -> bool:
+        """Does something where a terrain is. Returns False where that is here, and nothing was done.
+
+        ``attempt`` raises Elsewhere as long as it may be tried again. ``taking``: a terrain that nobody has is taken,
+        by the node that should have it. Raises Elsewhere when the terrain was found nowhere in time.
+        """
+        end, tried = self._now() + PATIENCE_SECONDS, set[str]()
+        while True:
+            try:
+                return await self._reached(await self.home(terrain), terrain, attempt, taking, tried)
+            except Elsewhere as moved:
+                if self._now() > end:
+                    raise Elsewhere(f"This terrain is on its way to another server. {moved}") from None
+            await asyncio.sleep(AGAIN_SECONDS)
+
+    async def _reached(
+        self, home: str, terrain: str, attempt: Callable[[Peer], Awaitable[None]], taking: bool, tried: set[str]
+    ) -> bool:
+        if self._phase(home) is Phase.HELD:
+            if taking:
+                await self.hold(terrain)
+            return False
+        owner = await self._owner(home)
+        if owner is None and not taking:
+            return False
+        if owner is None:
+            others = [node for node in self._nodes if node.name not in tried and node.name != self.name]
+            owner = chosen(home, others if self.draining else [*others, self._me()])
+        if owner is None or owner.name == self.name:
+            await self.hold(terrain)
+            return False
+        try:
+            await attempt(self.peer(owner))
+        except Elsewhere:
+            self._known.pop(home, None)
+            tried.add(owner.name)
+            raise
+        return True
+
+    def counter(self) -> Node:
+        """The node that counts wrong join codes for all."""
+        return chosen("codes", [*(node for node in self._nodes if node.name != self.name), self._me()]) or self._me()

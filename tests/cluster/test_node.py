@@ -1,0 +1,202 @@
+"""A node among others: what it has, loses and gives away (SPEC P572, P579, P583, P584)."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+import pytest
+
+from esker.cluster.node import IDLE_SECONDS, Cluster
+from esker.cluster.peers import Elsewhere, Peer
+from esker.store.engine.leases import LEASE_SECONDS, Lease, Node, OwnLeases, Unreachable
+from tests.cluster.machines import KEY, NoRooms
+
+
+class Clock:
+    """Seconds that a test lets pass: of the database and of the node."""
+
+    def __init__(self) -> None:
+        self.now = 1000.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+class Cut(OwnLeases):
+    """Leases of a database that may be out of reach."""
+
+    cut = False
+
+    def renew(self, *arguments: object) -> frozenset[str]:
+        if self.cut:
+            raise Unreachable("the line is cut")
+        return super().renew(*arguments)  # type: ignore[arg-type]
+
+    def take(self, *arguments: object) -> Lease | Node:
+        if self.cut:
+            raise Unreachable("the line is cut")
+        return super().take(*arguments)  # type: ignore[arg-type]
+
+    def owner(self, terrain: str) -> Node | None:
+        if self.cut:
+            raise Unreachable("the line is cut")
+        return super().owner(terrain)
+
+
+class Scene:
+    """One node, its rooms, its database and the clock of both."""
+
+    def __init__(self, homes: dict[str, str] | None = None) -> None:
+        self.clock = Clock()
+        self.leases = Cut(self.clock)
+        self.rooms = NoRooms(homes)
+        self.node = Cluster("a", "http://10.0.0.1:8000", self.leases, KEY, now=self.clock)
+
+    def renew(self) -> None:
+        answer = self.node._renew()
+        if answer is not None:
+            self.node._answered(*answer)
+
+    async def look(self) -> None:
+        """What the node does by itself every so often."""
+        assert self.node._look is not None
+        self.node._look.cancel()
+        self.node._watch()
+        await asyncio.gather(*(task for task in asyncio.all_tasks() if task is not asyncio.current_task()))
+
+
+@asynccontextmanager
+async def scene(homes: dict[str, str] | None = None) -> AsyncIterator[Scene]:
+    made = Scene(homes)
+    await made.node.start(made.rooms, renewing=False)
+    yield made
+    await made.node.close()
+
+
+async def test_a_node_that_renews_keeps_its_terrains() -> None:
+    """SPEC P572."""
+    async with scene() as s:
+        await s.node.hold("lake")
+        for _ in range(10):
+            s.clock.now += 2
+            s.renew()
+            assert s.node.may_acknowledge("lake")
+        assert s.leases.take("lake", "b", LEASE_SECONDS) == Node("a", "http://10.0.0.1:8000", 1.0)
+
+
+async def test_a_node_without_its_database_shuts_its_rooms_before_another_has_them() -> None:
+    """SPEC P572, P573: it acknowledges nothing first; what comes then waits or is sent on."""
+    async with scene() as s:
+        await s.node.hold("lake")
+        s.leases.cut = True
+        s.clock.now += 2.9
+        s.renew()
+        assert s.node.may_acknowledge("lake")
+        s.clock.now += 0.2
+        assert not s.node.may_acknowledge("lake")
+        await s.look()
+        assert s.rooms.lost == []
+        with pytest.raises(Elsewhere, match="reach its database"):
+            await s.node.hold("lake")
+        s.clock.now += 2
+        await s.look()
+        assert s.rooms.lost == ["lake"]
+        assert s.leases._holds(Lease("lake", "a", 1)), "the database would have given it to nobody yet"
+        assert s.node.held == ()
+
+
+async def test_a_process_that_was_frozen_finds_its_rooms_shut_whatever_it_does_first() -> None:
+    """SPEC P573: before any timer and any answer."""
+    async with scene() as s:
+        await s.node.hold("lake")
+        s.clock.now += 60
+        assert not s.node.may_acknowledge("lake")
+        assert s.leases.take("lake", "b", LEASE_SECONDS) == Lease("lake", "b", 2)
+        s.renew()
+        assert not s.node.may_acknowledge("lake")
+        with pytest.raises(Elsewhere, match="Node b has"):
+            await s.node.hold("lake")
+        assert s.rooms.lost == ["lake"]
+
+
+async def test_a_refused_write_ends_a_tenure() -> None:
+    """SPEC P584."""
+    async with scene() as s:
+        await s.node.hold("lake")
+        s.node.fenced("lake")
+        assert (s.rooms.lost, s.node.held, s.node.counts.fenced) == (["lake"], (), 1)
+        await s.node.hold("lake")
+        assert s.node.may_acknowledge("lake")
+
+
+async def test_what_nobody_uses_is_given_back() -> None:
+    """SPEC P583: not while something is open, under way, or done by a request."""
+    async with scene() as s:
+        for terrain in ("idle", "open", "asked"):
+            await s.node.hold(terrain)
+        s.rooms.used = {"open"}
+        with s.node.using("asked"):
+            for _ in range(20):
+                s.clock.now += IDLE_SECONDS / 15
+                s.renew()
+            await s.look()
+            assert set(s.node.held) == {"open", "asked"}
+            assert s.leases.owner("idle") is None
+        await s.look()
+        assert set(s.node.held) == {"open"}
+
+
+async def test_a_copy_moves_with_its_class() -> None:
+    """SPEC P586: the class is had with any of its copies, and given back after the last."""
+    async with scene({"copy": "class"}) as s:
+        await s.node.hold("copy")
+        assert set(s.node.held) == {"copy", "class"}
+        s.rooms.used = {"copy"}
+        for _ in range(20):
+            s.clock.now += IDLE_SECONDS / 15
+            s.renew()
+        await s.look()
+        assert set(s.node.held) == {"copy", "class"}
+        await s.node.drain()
+        assert s.rooms.given == ["copy", "class"]
+        assert s.leases.owner("class") is None
+
+
+async def test_a_copy_is_looked_for_where_its_class_is() -> None:
+    """SPEC P586."""
+    async with scene({"copy": "class"}) as s:
+        s.leases.register(Node("b", "http://10.0.0.2:8000", 1.0), 60)
+        s.leases.take("class", "b", 60)
+        with pytest.raises(Elsewhere):
+            await s.node.hold("copy")
+        assert s.leases.owner("copy") is None
+        asked = []
+
+        async def attempt(peer: Peer) -> None:
+            asked.append(peer.node.name)
+
+        assert await s.node.reach("copy", attempt, taking=True)
+        assert asked == ["b"]
+
+
+async def test_a_node_that_is_stopped_takes_nothing_and_gives_everything_away() -> None:
+    """SPEC P583: what is asked of it meanwhile waits for another node."""
+    async with scene() as s:
+        await s.node.hold("lake")
+        await s.node.drain()
+        assert s.rooms.given == ["lake"]
+        assert s.leases.nodes() == ()
+        assert s.leases.owner("lake") is None
+        for terrain in ("lake", "hill"):
+            with pytest.raises(Elsewhere, match="being stopped"):
+                await s.node.hold(terrain)
+
+
+async def test_two_that_come_at_once_take_a_terrain_once() -> None:
+    """SPEC P579."""
+    async with scene() as s:
+        await asyncio.gather(*(s.node.hold("lake") for _ in range(20)))
+        assert s.node.counts.taken == 1
+        assert s.leases.take("lake", "a", LEASE_SECONDS) == Lease("lake", "a", 2)
