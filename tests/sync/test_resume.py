@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from esker import contract as c
-from esker.session.room.recent import RECENT_OPS
+from esker.session.room.replicas.recent import RECENT_OPS
 from esker.store.writing import SNAPSHOT_EVERY
 from tests.store.engines import sqlite
 from tests.sync.harness import LiveServer, Peer, set_op, stroke

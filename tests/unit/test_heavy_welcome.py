@@ -9,7 +9,7 @@ from collections.abc import Callable
 from esker import contract as c
 from esker.document.ops import StrokeSet
 from esker.session.room.core import Denied
-from esker.session.room.recent import Encoder
+from esker.session.room.replicas.recent import Encoder
 
 LOOKS = 1_000
 """Times that one may ask whether the document is ready; whoever asks more often never gives way."""

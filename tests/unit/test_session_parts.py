@@ -6,9 +6,9 @@ import json
 from collections.abc import Sequence
 
 from esker import contract as c
-from esker.session.room import recent as recent_ops
 from esker.session.room.members import COLOURS, Member, Members
 from esker.session.room.outbox import Outbox
+from esker.session.room.replicas import recent as recent_ops
 
 
 def test_recent_ops_are_bounded_in_number_and_size() -> None:

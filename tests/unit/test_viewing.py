@@ -13,7 +13,7 @@ from esker.document.sync import Diverged, SyncDoc
 from esker.document.wire import document_json
 from esker.session.room.core import RoomCore, RoomInfo
 from esker.session.room.outbox import Long, Outbox
-from esker.session.room.viewing import nameless
+from esker.session.room.replicas.viewing import nameless
 from esker.store.journal import Loaded, ordered_json
 
 INFO = RoomInfo(4, 4, "none")
@@ -163,8 +163,8 @@ def test_a_heavy_document_of_before_a_deletion_is_not_given_to_a_viewer_who_come
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """SPEC A400: one who had come before, and waited for it, gets it and the deletion."""
-    monkeypatch.setattr("esker.session.room.core.HEAVY_BYTES", 10)
-    monkeypatch.setattr("esker.session.room.core.HEAVY_POINTS", 0)
+    monkeypatch.setattr("esker.session.room.replicas.replicas.HEAVY_BYTES", 10)
+    monkeypatch.setattr("esker.session.room.replicas.replicas.HEAVY_POINTS", 0)
     core, anne = room()
     core.submit(anne, [c.OpEnvelope(id="anne:0", op=c.BeginStroke(stroke=stroke("gone")))])
     commit(core)

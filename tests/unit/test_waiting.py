@@ -17,11 +17,12 @@ from esker.fairness import shares
 from esker.fairness.shares import Share, Who
 from esker.process import memory
 from esker.server.routes import socket as route
-from esker.session.room import core as module
-from esker.session.room import hub, openrooms, recent
+from esker.session.room import hub, openrooms
 from esker.session.room.core import Denied, RoomCore, RoomInfo
 from esker.session.room.openrooms import OpenRooms
 from esker.session.room.outbox import FEW_BYTES, Long, Outbox, Waiting
+from esker.session.room.replicas import recent
+from esker.session.room.replicas import replicas as module
 from esker.store.journal import Loaded
 from tests.sync.harness import LiveServer, Peer
 from tests.unit.test_websocket import Wire, settle
@@ -132,7 +133,7 @@ def test_a_heavy_document_is_encoded_outside_of_the_event_loop(tmp_path: Path, m
         where.append(threading.current_thread().name)
         return whole(document, view)
 
-    monkeypatch.setattr("esker.session.room.recent.encoded", noted)
+    monkeypatch.setattr("esker.session.room.replicas.recent.encoded", noted)
     monkeypatch.setattr(module, "encoded", noted)
     with LiveServer(tmp_path) as server:
         terrain, secret = server.create(strokes=tuple(heavy().strokes.values()))

@@ -22,8 +22,8 @@ from esker.exporting import formats, wire
 from esker.exporting.run import FAILED, ExportFailed, Progress
 from esker.fairness.shares import RANK, Place, Places, Share, Who
 from esker.session.room.hub import Hub
+from esker.session.room.replicas.viewing import shown
 from esker.session.room.turns import Turns
-from esker.session.room.viewing import shown
 from esker.store.access import Link
 
 log = logging.getLogger("esker.exporting")

@@ -19,8 +19,8 @@ from esker import contract as c
 from esker.errors import Cannot, EskerError
 from esker.fairness.shares import Full, Rates, Who
 from esker.session.lesson.rules import Lesson
-from esker.session.room import viewing
 from esker.session.room.hub import Deleted, Hub
+from esker.session.room.replicas import viewing
 from esker.store.access import Link
 from esker.store.journal import Unwritable
 

@@ -15,7 +15,7 @@ from esker.document.wire import document_json
 from esker.errors import Cannot
 from esker.server.routes.answers import AnyLink, EditorLink, asker, limited, shown
 from esker.session.room.hub import Hub
-from esker.session.room.viewing import things
+from esker.session.room.replicas.viewing import things
 from esker.store.activity import ActivityLogs, Page
 from esker.store.grids import GridStore
 from esker.store.timestamps import Person

@@ -24,23 +24,15 @@ from esker.session.room.entry import Owners
 from esker.session.room.limits import history_rates
 from esker.session.room.members import Member, Members, seats
 from esker.session.room.outbox import Long, Outbox
-from esker.session.room.recent import Recent, encoded, points_of
-from esker.session.room.viewing import Viewing, nameless, unsigned
+from esker.session.room.replicas.replicas import Replicas
 from esker.store.claims import Claims
 from esker.store.journal import Loaded, Row
 from esker.store.writing import SNAPSHOT_EVERY
 from esker.version import VERSION
 
 UNSAVED: Final = "The server could not save this change (is its disk full?). It was taken back."
-HEAVY_BYTES: Final = 256 * 1024
-"""Documents that are longer as JSON are sent as one piece of memory to all who come."""
-HEAVY_POINTS: Final = 4_000
-"""Documents with more points are encoded outside of the event loop."""
 MOST_AGAINST: Final = protocol.MAX_REFUSED_OPS
 """The connection is closed after so many ops in a row that the lesson did not allow."""
-SINCE_CHARACTERS: Final = 512 * 1024
-"""A heavy document that was encoded is sent to newcomers, and then the ops after it, while these are no more than
-this."""
 
 
 @dataclass(frozen=True)
@@ -74,11 +66,13 @@ class RoomCore:
         now: Callable[[], float] = time.monotonic,
         claims: Claims | None = None,
         lesson: Lesson | None = None,
+        replicas: Replicas | None = None,
     ) -> None:
         """``find``: the clock of an op of (client, counter) that is in the journal already, or None.
 
         ``rates``: characters of operations that a link and an address may send (``history_rates``); ``claims``: tells
-        whose a client id is (default: of whoever comes with it); ``lesson``: its rules (default: nothing is switched).
+        whose a client id is (default: of whoever comes with it); ``lesson``: its rules (default: nothing is switched);
+        ``replicas``: what members are sent of the document.
         """
         self.head = self.document = loaded.document
         self.geometry_clock = loaded.document.clock
@@ -93,17 +87,10 @@ class RoomCore:
         self._rates, self._now = rates or history_rates(), now
         self._counters = dict(loaded.counters)
         self._owners = Owners(loaded.document.id, claims or Claims(), self._counters)
-        self._recent, self._viewing = Recent(), Viewing()
-        for row in loaded.recent:
-            self._recent.add(row.clock, row.ordered_json())
-            self._viewing.loaded(row.clock, row.op)
+        self._replicas = replicas or Replicas(loaded, self.lesson)
         self._snapshot_clock = loaded.document.clock - len(loaded.recent)
         self._waiting: list[Row] = []
         self._in_flight: list[Row] = []
-        self._kept: dict[bool, tuple[int, bytes]] = {}
-        """Encoded documents with their clocks. The key says whether they are as links to look are shown them."""
-        self._unsigned: tuple[int, bytes] | None = None
-        """The encoded document without the names of people who drew, with its clock."""
 
     # --- people -------------------------------------------------------------------------------------------------
 
@@ -200,15 +187,7 @@ class RoomCore:
 
         Where a heavy document was encoded a while ago, and not ``exact`` is asked, the ops after it too.
         """
-        view = self._looks(member)
-        missed = self._missed(clock, view)
-        if missed is not None:
-            now, body, member.since = self.document.clock, b"", clock or 0
-        else:
-            now, body = self._usable(view, exact, asked) or self._encode(view)
-            member.since = now
-            if not view and self.lesson.nameless(member):
-                body = self._without_names(now, body)
+        opening = self._replicas.opening(self.document, member, clock, exact=exact, asked=asked)
         head = c.Welcome(
             protocol=c.PROTOCOL_VERSION,
             server=f"esker {VERSION}",
@@ -219,75 +198,24 @@ class RoomCore:
             colour=member.colour,
             levels=info.levels,
             finest=info.finest,
-            clock=now,
+            clock=opening.clock,
             members=self.members.public(member),
             device=info.device,
             lesson=self.lesson_for(member),
         ).model_dump_json(exclude={"document", "ops"})
-        if missed is not None:
-            return (f'{head[:-1]},"document":null,"ops":[{",".join(self._as_seen(member, missed))}]}}',)
-        if len(body) <= HEAVY_BYTES:
-            return (f'{head[:-1]},"document":{body.decode()},"ops":null}}',)
-        text = Long(f'{head[:-1]},"document":'.encode(), body, b',"ops":null}')
-        since = self._recent.after(now) if now < self.document.clock else None
-        if not since:
-            return (text,)
-        return text, f'{{"type":"ordered","ops":[{",".join(self._as_seen(member, since))}]}}'
-
-    def _without_names(self, clock: int, body: bytes) -> bytes:
-        if self._unsigned is None or self._unsigned[0] != clock:
-            self._unsigned = clock, unsigned(body)
-        return self._unsigned[1]
+        return self._replicas.welcome(self.document, member, head, opening)
 
     def lesson_for(self, member: Member) -> c.Lesson:
         """How the lesson stands, as a member may know it."""
         return self.lesson.message_for(member, self.look)
 
-    def _looks(self, member: Member) -> bool:
-        """Returns whether a member is shown what a link to look shows."""
-        return member.role == "view"
-
-    def _as_seen(self, member: Member, ordered: list[tuple[int, str]]) -> list[str]:
-        if self._looks(member):
-            return self._viewing.texts(ordered, member.since)
-        if self.lesson.nameless(member):
-            return [nameless(text) for _, text in ordered]
-        return [text for _, text in ordered]
-
-    def _usable(self, view: bool, exact: bool = False, asked: int | None = None) -> tuple[int, bytes] | None:
-        """Returns the encoded document with its clock, if it is still good for a client that came when the clock was
-        ``asked``: a viewer gets nothing that was deleted before."""
-        kept = self._kept.get(view)
-        if kept is None or kept[0] == self.document.clock:
-            return kept
-        if exact or len(kept[1]) <= HEAVY_BYTES:
-            return None
-        if view and kept[0] < (self.document.clock if asked is None else asked) and self._viewing.ended(kept[0]):
-            return None
-        since = self._recent.after(kept[0])
-        return kept if since is not None and sum(len(text) for _, text in since) <= SINCE_CHARACTERS else None
-
-    def _encode(self, view: bool) -> tuple[int, bytes]:
-        found = self._kept[view] = self.document.clock, encoded(self.document, view)
-        return found
-
     def keep(self, clock: int, body: bytes, view: bool = False) -> None:
         """Takes the document of a clock that was encoded elsewhere. ``view``: as a link to look is shown it."""
-        if view not in self._kept or self._kept[view][0] < clock:
-            self._kept[view] = clock, body
+        self._replicas.keep(clock, body, view)
 
     def ready(self, clock: int | None, view: bool = False, asked: int | None = None) -> bool:
         """Returns whether who has seen ``clock`` (None: nothing) can be welcomed without encoding a heavy document."""
-        if self._missed(clock, view) is not None or points_of(self.document) <= HEAVY_POINTS:
-            return True
-        return self._usable(view, asked=asked) is not None
-
-    def _missed(self, clock: int | None, view: bool = False) -> list[tuple[int, str]] | None:
-        """Returns the committed ops after ``clock``, or None when only a snapshot will do."""
-        now = self.document.clock
-        if clock is None or clock > now or (view and not self._viewing.resumable(clock)):
-            return None
-        return [] if clock == now else self._recent.after(clock)
+        return self._replicas.ready(self.document, clock, view, asked)
 
     # --- ops ----------------------------------------------------------------------------------------------------
 
@@ -356,7 +284,7 @@ class RoomCore:
         before = self.head
         after, _ = before.apply(op, self._limits)
         self.head = after
-        self._viewing.note(before, op, after.clock)
+        self._replicas.note(before, op, after.clock)
         self.lesson.made(op, author, self.members.by_client.get(author))
         if after.layers_rev != before.layers_rev:
             self.base_clock = self.geometry_clock = after.clock
@@ -403,32 +331,13 @@ class RoomCore:
         if batch.snapshot is not None:
             self._snapshot_clock = batch.after.clock
         self._in_flight = []
-        texts = [row.ordered_json() for row in batch.rows]
-        for row, text in zip(batch.rows, texts, strict=True):
-            self._recent.add(row.clock, text)
-        shared = f'{{"type":"ordered","ops":[{",".join(texts)}]}}'
-        looking: dict[object, str] = {}
+        told = self._replicas.committed(batch.rows)
         acks: dict[str, list[Row]] = {}
         for row in batch.rows:
             acks.setdefault(row.client, []).append(row)
         for member in self.members:
-            mine = acks.get(member.client)
-            if self._looks(member):
-                variant = self._viewing.variant((row.clock for row in batch.rows), member.since)
-                if variant not in looking:
-                    shown = self._as_seen(
-                        member, [(row.clock, text) for row, text in zip(batch.rows, texts, strict=True)]
-                    )
-                    looking[variant] = f'{{"type":"ordered","ops":[{",".join(shown)}]}}'
-                member.outbox.push(looking[variant])
-                continue
-            text = shared
-            if self.lesson.nameless(member):
-                text = looking.setdefault("", f'{{"type":"ordered","ops":[{",".join(map(nameless, texts))}]}}')
-            if mine is None:
-                member.outbox.push(text)
-            else:
-                member.outbox.push(text, _ack(mine))
+            mine = None if self._replicas.looks(member) else acks.get(member.client)
+            member.outbox.push(told(member), *([] if mine is None else [_ack(mine)]))
 
     def failed(self, sentence: str = UNSAVED) -> None:
         """Goes back to the committed document, since the journal did not take the batch.
@@ -438,7 +347,7 @@ class RoomCore:
         lost = [*self._in_flight, *self._waiting]
         self._in_flight, self._waiting = [], []
         self.head = self.document
-        self._viewing.forget(self.head.clock)
+        self._replicas.forget(self.head.clock)
         self.geometry_clock = self.base_clock = self.head.clock
         for row in lost:
             author = self.members.by_client.get(row.client)

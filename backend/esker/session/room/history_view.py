@@ -16,15 +16,16 @@ from typing import Any, Final
 from esker import contract as c
 from esker.contract import Role
 from esker.document.ops import StrokeSet
-from esker.document.wire import document_json
 from esker.fairness.shares import Place, Places, Share, Who
 from esker.session.lesson.rules import Lesson
 from esker.session.lesson.state import State
-from esker.session.room import protocol, viewing
+from esker.session.room import protocol
 from esker.session.room.core import Denied, RoomCore, RoomInfo
 from esker.session.room.members import Member
 from esker.session.room.outbox import Long, Outbox
 from esker.session.room.ports import Journal
+from esker.session.room.replicas import viewing
+from esker.session.room.replicas.past import PastReplica
 from esker.session.room.room import PROGRESS_TICK, Guest, Room
 from esker.store.claims import Claims
 from esker.store.journal import DamagedTerrain, Loaded, Row, replay
@@ -63,8 +64,8 @@ class HistoryCore(RoomCore):
         """``still``: the things that are there now, where nothing else may be shown; None: everything is;
         ``hide``: without the names of who drew what."""
         lesson = Lesson(State(hide=hide))
-        super().__init__(loaded, lambda *_: None, max_members=1, claims=claims, lesson=lesson)
-        self._still = still
+        self._then = PastReplica(loaded, lesson, still)
+        super().__init__(loaded, lambda *_: None, max_members=1, claims=claims, lesson=lesson, replicas=self._then)
 
     def join(
         self,
@@ -82,30 +83,18 @@ class HistoryCore(RoomCore):
     @property
     def still(self) -> frozenset[viewing.Key] | None:
         """The things that are there now, where nothing else may be shown."""
-        return self._still
+        return self._then.still
 
     @still.setter
     def still(self, still: frozenset[viewing.Key] | None) -> None:
-        if still != self._still:
-            self._still = still
-            self._kept.clear()
-
-    def _looks(self, member: Member) -> bool:  # noqa: ARG002
-        return self._still is not None
-
-    def _encode(self, view: bool) -> tuple[int, bytes]:
-        if not view:
-            return super()._encode(view)
-        document = viewing.shown(self.document.to_document(), self._still)
-        found = self._kept[view] = self.document.clock, document_json(document).encode()
-        return found
+        self._then.turn(still)
 
     def steps(self, rows: list[Row]) -> list[str] | None:
         """Returns the ops of a step forward as they may be shown; None where only the document will do."""
-        if self._still is None:
+        if self._then.still is None:
             texts = [row.ordered_json() for row in rows]
             return [viewing.nameless(text) for text in texts] if self.lesson.state.hide else texts
-        if not all(viewing.concerns(row.op, self._still) for row in rows):
+        if not all(viewing.concerns(row.op, self._then.still) for row in rows):
             return None
         return [viewing.nameless(row.ordered_json()) for row in rows]
 

@@ -31,7 +31,7 @@ from esker.session.room.entry import Denied
 from esker.session.room.members import QUIET_BACKLOG_BYTES, Member
 from esker.session.room.outbox import Outbox
 from esker.session.room.ports import Journal
-from esker.session.room.recent import Encoder
+from esker.session.room.replicas.recent import Encoder
 from esker.store.journal import HistoryFull
 from esker.store.timestamps import Person
 

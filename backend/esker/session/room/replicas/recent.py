@@ -10,7 +10,7 @@ from typing import Final, Protocol
 
 from esker.document.ops import StrokeSet
 from esker.document.wire import document_json
-from esker.session.room.viewing import shown
+from esker.session.room.replicas.viewing import shown
 
 RECENT_OPS: Final = 2_000
 RECENT_CHARACTERS: Final = 4 * 1024 * 1024
