@@ -24,7 +24,7 @@ from esker.fairness.shares import (
     Who,
     homes,
 )
-from esker.session.room.turns import FairThreads, Turns
+from esker.fairness.turns import FairThreads, Turns
 
 ADDRESSES = st.one_of(
     st.integers(0, 5).map(lambda n: f"192.0.2.{n}"),

@@ -87,7 +87,7 @@ def test_a_stranger_in_all_rooms_of_the_past_gives_one_up(live: LiveServer) -> N
 
 def test_views_of_the_history_come_at_a_rate(live: LiveServer) -> None:
     """SPEC A448: a viewer opened 40 a second, each of which reads the journal, and the server grew by 1.6 GB."""
-    live.assembly.hub._history_hellos = Rates(Rate(1e-6, 3.0))
+    live.assembly.hub.door._history_hellos = Rates(Rate(1e-6, 3.0))
     terrain, secret = live.create()
     for i in range(3):
         looking = enter(live, STRANGER, terrain, secret, f"h{i}", at=0)

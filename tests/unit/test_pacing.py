@@ -12,9 +12,9 @@ import pytest
 
 from esker.fairness.shares import Who
 from esker.fairness.spending import PAYS
+from esker.fairness.turns import FairThreads
 from esker.server.wire import pacing
 from esker.server.wire.pacing import Paced, _Metered
-from esker.session.room.turns import FairThreads
 from tests.sync.harness import LiveServer
 
 

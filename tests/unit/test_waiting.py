@@ -343,8 +343,8 @@ def test_what_a_room_held_goes_back_to_the_system_after_it_closed(
         peer = server.join(terrain, secret)
         room = hub.open_room(terrain)
         assert room is not None
-        monkeypatch.setattr("esker.session.room.hub.GIVE_BACK_SECONDS", 0.0)
-        monkeypatch.setattr("esker.session.room.hub.system.give_memory_back", given.set)
+        monkeypatch.setattr("esker.session.room.openrooms.GIVE_BACK_SECONDS", 0.0)
+        monkeypatch.setattr("esker.session.room.openrooms.system.give_memory_back", given.set)
         room._loop.call_soon_threadsafe(hub._close_idle, terrain)
         peer.say("ping", t=1)
         peer.wait("pong")

@@ -21,9 +21,9 @@ from esker.errors import Cannot
 from esker.exporting import formats, wire
 from esker.exporting.run import FAILED, ExportFailed, Progress
 from esker.fairness.shares import RANK, Place, Places, Share, Who
+from esker.fairness.turns import Turns
 from esker.session.room.hub import Hub
 from esker.session.room.replicas.viewing import shown
-from esker.session.room.turns import Turns
 from esker.store.access import Link
 
 log = logging.getLogger("esker.exporting")
@@ -142,7 +142,7 @@ class Exports:
         document = await self._hub.document(terrain, wanted.at, who)
         if link.role == "view":
             document = shown(document)
-        self._hub.demand(link)
+        self._hub.door.demand(link)
         self._check(terrain, person, who, link)  # others may have come meanwhile
         job_id = secrets.token_urlsafe(9)
         folder = self._folder / job_id

@@ -15,6 +15,7 @@ from esker.contract import ImportStage, ImportStatus
 from esker.document.ops import Refusal
 from esker.errors import Cannot
 from esker.fairness.shares import Full, Places, Share, Who
+from esker.fairness.turns import Turns
 from esker.importing.refusal import ImportCancelled, ImportRefused
 from esker.jobs.import_job import Importer, Job, clean_name
 from esker.patchwork.lod.precedence import default_priority
@@ -22,7 +23,6 @@ from esker.session.lesson.rules import HANDS_OFF
 from esker.session.room.core import Denied
 from esker.session.room.entry import Caller
 from esker.session.room.hub import Hub
-from esker.session.room.turns import Turns
 from esker.store.access import Link
 from esker.store.grids import GridStore
 from esker.store.space import NoSpace
@@ -93,7 +93,7 @@ class Imports:
 
         ``caller``: whom a lesson must let change the terrain when it is laid. Raises Cannot."""
         await self._check_terrain(terrain, who)
-        self._hub.demand(link)
+        self._hub.door.demand(link)
         job = self._begin(name, person, link, client, who)
         job.terrain, job.hold, job.caller = terrain, hold, caller
         await self._receive(job, body, length)
@@ -218,7 +218,7 @@ class Imports:
         if job.link is None:
             return
         try:
-            self._hub.demand(job.link)
+            self._hub.door.demand(job.link)
         except Denied as denied:
             self._end(job, "cancelled", denied.message)
             raise

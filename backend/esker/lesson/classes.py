@@ -66,7 +66,7 @@ class Classes:
     async def make(self, link: Link, title: str, together: int, places: int, at: int | None, who: Who) -> Class:
         """A class from the terrain of an owner's link as it is, or as it was at a clock. Raises Cannot, Denied."""
         document = await self._source(link.terrain, at, who)
-        self.hub.demand(link)
+        self.hub.door.demand(link)
         lesson = secrets.token_urlsafe(9)
         title = title.strip() or document.settings.title
         made = Class(lesson, link.terrain, title, self.store.now(), document.clock, together, places, None, 0.0, None)

@@ -26,10 +26,10 @@ import numpy as np
 from esker.document.archive import ArchiveError
 from esker.errors import Cannot, EskerError
 from esker.fairness.shares import Who
+from esker.fairness.turns import Turns
 from esker.lesson import relief
 from esker.lesson.classes import Classes
 from esker.patchwork.raster.rasters import RasterError
-from esker.session.room.turns import Turns
 from esker.store.access import Link
 from esker.store.classes import Class, Copy, changed_at
 

@@ -162,7 +162,7 @@ class WallSession:
             raise WallRefused("bad_hello", "The first message must be wall.")
         if hello.protocol != c.PROTOCOL_VERSION:
             raise WallRefused("bad_protocol", f"This server speaks protocol {c.PROTOCOL_VERSION}. Reload the page.")
-        link = self._hub.authorise(hello.terrain, hello.secret, self._address)
+        link = self._hub.door.authorise(hello.terrain, hello.secret, self._address)
         if link.role != "owner":
             raise WallRefused("bad_secret", "Only an owner of the terrain sees the wall.")
         try:
@@ -170,7 +170,7 @@ class WallSession:
         except EskerError as error:
             raise WallRefused("no_terrain", error.message) from None
         start = await asyncio.to_thread(self._classes.store.document, lesson.id)
-        self._hub.demand(link)
+        self._hub.door.demand(link)
         self._start = None if start is None else start.settings
         return link, lesson
 
@@ -179,7 +179,7 @@ class WallSession:
         try:
             while not reader.done():
                 now = time.monotonic()
-                self._hub.demand(link)
+                self._hub.door.demand(link)
                 self._look(lesson.id, now)
                 for copy in list(self._copies.values()):
                     self._follow(copy, now)

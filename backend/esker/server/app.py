@@ -11,6 +11,7 @@ from typing import Final
 from fastapi import FastAPI
 
 from esker.fairness.shares import Places, Rate, Rates, Share
+from esker.fairness.turns import Turns
 from esker.jobs import Imports
 from esker.jobs.exports import Exports
 from esker.keeper.private import Key
@@ -37,7 +38,6 @@ from esker.server.wire.front import Forwarded, Front, Gate
 from esker.server.wire.headers import Headers
 from esker.server.wire.pacing import Paced
 from esker.session.room.hub import Hub
-from esker.session.room.turns import Turns
 from esker.store.grids import GridStore
 from esker.version import VERSION
 

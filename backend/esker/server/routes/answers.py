@@ -19,7 +19,8 @@ from esker import contract as c
 from esker.errors import Cannot, EskerError
 from esker.fairness.shares import Full, Rates, Who
 from esker.session.lesson.rules import Lesson
-from esker.session.room.hub import Deleted, Hub
+from esker.session.room.door import Deleted
+from esker.session.room.hub import Hub
 from esker.session.room.replicas import viewing
 from esker.store.access import Link
 from esker.store.journal import Unwritable
@@ -166,7 +167,7 @@ async def link_of(request: Request, terrain: str) -> Link:
     It is looked up in the event loop: in the threads that all requests share it would wait behind a stranger's."""
     secret = secret_of(request)
     hub: Hub = request.app.state.hub
-    return hub.authorise(terrain, secret, address(request))
+    return hub.door.authorise(terrain, secret, address(request))
 
 
 async def owner(request: Request, terrain: str) -> Link:

@@ -10,7 +10,8 @@ from fastapi import FastAPI, Request
 from esker.errors import Cannot
 from esker.lesson.classes import Classes
 from esker.server.routes.answers import OwnerLink, address, secret_of
-from esker.session.room.hub import Deleted, Hub
+from esker.session.room.door import Deleted
+from esker.session.room.hub import Hub
 
 
 def add_deletion(app: FastAPI, hub: Hub, classes: Classes) -> None:
@@ -25,7 +26,7 @@ def add_deletion(app: FastAPI, hub: Hub, classes: Classes) -> None:
     @app.post("/api/terrains/{terrain}/restore")
     async def restore(request: Request, terrain: str) -> dict[str, Any]:
         try:
-            hub.authorise(terrain, secret_of(request), address(request))
+            hub.door.authorise(terrain, secret_of(request), address(request))
         except Deleted as deleted:
             if deleted.link.role != "owner":
                 raise Cannot(403, "not_owner", "Only an owner of the terrain may do this.") from None

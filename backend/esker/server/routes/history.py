@@ -48,7 +48,7 @@ def add_history(app: FastAPI, hub: Hub, grids: GridStore) -> None:
         who = asker(request, link)
         document = await hub.strokes(terrain, None, who)
         page = await hub.read(who, activity_logs.page, terrain, before, limit)
-        hub.demand(link)
+        hub.door.demand(link)
         lesson = hub.lesson_of(terrain).state
         if link.role != "owner" and (lesson.hide or lesson.animals or link.role == "view"):
             room = hub.open_room(terrain)
@@ -65,7 +65,7 @@ def add_history(app: FastAPI, hub: Hub, grids: GridStore) -> None:
         still = None if at is None else things(await hub.strokes(terrain, None, who))
         # This runs in a thread, stroke by stroke: the framework would encode the document in the event loop, at once.
         text = await hub.read(who, document_json, shown(document, link, hub.lesson_of(terrain), still))
-        hub.demand(link)
+        hub.door.demand(link)
         return Response(text, media_type="application/json")
 
     @app.post("/api/terrains/{terrain}/fork", status_code=201)
@@ -74,7 +74,7 @@ def add_history(app: FastAPI, hub: Hub, grids: GridStore) -> None:
         document = await hub.document(terrain, body.at, asker(request, link))
         if not all(grids.has(layer.content) for layer in document.layers):
             raise Cannot(409, "no_grid", "An elevation grid of that time is not on this server any more.")
-        hub.demand(link)
+        hub.door.demand(link)
         born, made, secret = await hub.create(_copy(document, body.title))
         return {
             "id": born.id,

@@ -45,7 +45,7 @@ def add_imports(app: FastAPI, hub: Hub, grids: GridStore, imports: Imports) -> N
             raise RequestValidationError(
                 [{**found, "loc": ("body", *found["loc"])} for found in error.errors(include_url=False)]
             ) from error
-        hub.demand(link)
+        hub.door.demand(link)
         return imports.answer(terrain, job, link, body)
 
     @app.delete("/api/terrains/{terrain}/imports/{job}", status_code=204)

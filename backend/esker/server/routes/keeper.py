@@ -12,10 +12,10 @@ from esker import contract as c
 from esker.contract import Role
 from esker.errors import Cannot
 from esker.fairness.shares import Rate, Rates
+from esker.fairness.turns import SERVER
 from esker.keeper.private import Key
 from esker.server.routes.answers import asker
 from esker.session.room.hub import Hub
-from esker.session.room.turns import SERVER
 from esker.store.access import TooManyLinks
 from esker.store.kept import MOST, all_kept, count_kept
 

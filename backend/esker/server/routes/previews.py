@@ -51,7 +51,7 @@ def add_previews(app: FastAPI, hub: Hub, pictures: Pictures) -> None:
 
     async def answer(request: Request, terrain: str, link: Link, found: Future[Preview]) -> dict[str, Any]:
         preview = await asyncio.wrap_future(found)
-        hub.demand(link)
+        hub.door.demand(link)
         if preview.shown:
             await _draw_ahead(hub, pictures, terrain, asker(request, link))
         return {"token": preview.token, "shown": preview.shown, "available": previews.available}

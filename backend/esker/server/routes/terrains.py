@@ -14,12 +14,12 @@ from esker import templates
 from esker.document import archive
 from esker.document.birth import new_document
 from esker.errors import Cannot
+from esker.fairness.turns import Turns
 from esker.patchwork.raster.rasters import RasterError
 from esker.server.routes.answers import AnyLink, asker, limited, shown
 from esker.server.upload import read_archive
 from esker.server.wire.sending import Sent
 from esker.session.room.hub import Hub
-from esker.session.room.turns import Turns
 from esker.store.grids import GridStore
 from esker.store.space import Space
 
@@ -60,7 +60,7 @@ def add_terrains(app: FastAPI, hub: Hub, grids: GridStore) -> None:
     @app.get("/api/terrains/{terrain}")
     async def about(request: Request, terrain: str, link: AnyLink) -> dict[str, Any]:
         document = await hub.document(terrain, None, asker(request, link))
-        hub.demand(link)
+        hub.door.demand(link)
         return {
             "id": terrain,
             "title": document.settings.title,

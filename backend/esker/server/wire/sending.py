@@ -29,7 +29,7 @@ class Sent(FileResponse):
         """``passing``: the file was made for this answer and is removed after it. Raises Denied."""
         gone = BackgroundTask(path.unlink, missing_ok=True) if passing else None
         try:
-            hub.demand(link)
+            hub.door.demand(link)
         except Denied:
             if passing:
                 path.unlink(missing_ok=True)

@@ -1,9 +1,8 @@
-"""All open rooms of one server, and who may enter them (DESIGN 8, 13)."""
+"""All open rooms of one server: how people come in, and what closes them (DESIGN 8)."""
 
 from __future__ import annotations
 
 import asyncio
-import gc
 import logging
 import secrets
 import time
@@ -14,8 +13,9 @@ from typing import Any, Final, ParamSpec, TypeVar
 
 from esker import contract as c
 from esker.document.ops import Limits, StrokeSet
-from esker.fairness.shares import Full, Rate, Rates, Share, Who, homes
-from esker.process import memory, system
+from esker.fairness.shares import Full, Share, Who, homes
+from esker.fairness.turns import SERVER, FairThreads
+from esker.process import memory
 from esker.session.ground.ports import Elevation, Tiles
 from esker.session.ground.tilethread import TileThread
 from esker.session.ground.worker import Worker
@@ -23,33 +23,27 @@ from esker.session.lesson import state as lesson_state
 from esker.session.lesson.rules import Hand, Lesson
 from esker.session.room.conducting import Desk
 from esker.session.room.core import Denied, RoomCore, RoomInfo
+from esker.session.room.door import Door
 from esker.session.room.entry import Caller, caller_of
 from esker.session.room.history_view import HistoryCore, HistoryRoom, HistoryRooms, Present
 from esker.session.room.limits import history_rates
-from esker.session.room.openrooms import OpenRooms
+from esker.session.room.openrooms import ClosedRooms, OpenRooms
 from esker.session.room.outbox import Outbox, Waiting
 from esker.session.room.room import Guest, Room
-from esker.session.room.turns import SERVER, FairThreads
 from esker.store import timestamps
 from esker.store.access import JOINED_BY_CODE, Access, Link
 from esker.store.claims import Claims
 from esker.store.journal import DamagedTerrain, Journal
 from esker.store.lessons import read_makers, read_state
-from esker.store.upkeep.deletion import GRACE_SECONDS, Deletion
+from esker.store.upkeep.deletion import Deletion
 
 log = logging.getLogger("esker.hub")
 
-GIVE_BACK_SECONDS: Final = 5.0
 IDLE_SECONDS: Final = 30.0
 """A room without members stays open this long, so that a reload finds it warm."""
 REST_SECONDS: Final = 600.0
 """Where the server has no place left, a room in which nobody did anything for so long is closed for a newcomer."""
 RESTED: Final = "Nobody did anything here for a while, so the server made room for others. Reload the page to go on."
-WRONG_SECRETS_PER_MINUTE: Final = 30
-HISTORY_HELLOS: Final = Rate(1.0, 60.0)
-"""Views of the history of one address, or by one link, that are opened: each reads the journal and is solved anew."""
-HELLOS: Final = Rate(5.0, 300.0)
-"""Pages that may come from one address, or by one link: a full room may come back at once."""
 WAITING_BYTES: Final = 256 << 20
 READERS, READS_WAITING = 6, 100
 PACKERS, PACKS_WAITING = 2, 20
@@ -61,16 +55,8 @@ T = TypeVar("T")
 DELETED: Final = "The owner deleted this terrain."
 
 
-class Deleted(Denied):
-    """The terrain was deleted and can still be brought back by its owners, until ``until`` (seconds since 1970)."""
-
-    def __init__(self, link: Link, until: float) -> None:
-        super().__init__("no_terrain", "This terrain was deleted.")
-        self.link, self.until = link, until
-
-
 class Hub:
-    """Opens rooms, closes idle ones, checks secrets. Lives in one event loop."""
+    """Opens rooms and closes idle ones. Lives in one event loop."""
 
     def __init__(
         self,
@@ -95,24 +81,21 @@ class Hub:
         self._worker, self._tiles = worker, tiles
         self._levels, self._finest = levels, levels if finest is None else max(levels, finest)
         self._limits, self._max_members = limits or Limits(), max_members
-        self._idle_seconds, self._now = idle_seconds, now
+        self._idle_seconds = idle_seconds
+        self.door = Door(journal, access, self.deletion, now)
         self._rooms: dict[str, asyncio.Task[Room | None]] = {}
-        self._places = OpenRooms(self.sleep, rooms, self._rest)
+        self._places, self._memory = OpenRooms(self.sleep, rooms, self._rest), ClosedRooms()
         self._tile_thread = TileThread()
         self._elevation = elevation
         self._base_threads = ThreadPoolExecutor(1, thread_name_prefix="elevation")
-        self._wrong = Rates(Rate(WRONG_SECRETS_PER_MINUTE / 60, WRONG_SECRETS_PER_MINUTE))
         self.reading = FairThreads(READERS, "reading", READS_WAITING)
         """Threads that read the journal. One address has at most half of them."""
         self.packing = FairThreads(PACKERS, "packing", PACKS_WAITING)
         """Threads that make files of stored data."""
         self._history_rates = history_rates()
-        self._hellos = Rates(HELLOS, link=HELLOS)
-        self._history_hellos = Rates(HISTORY_HELLOS, link=HISTORY_HELLOS)
         self.waiting = Waiting(min(WAITING_BYTES, memory.available_bytes() // 16))
         """Bytes that wait to be sent to everybody."""
         self._closing = False
-        self._giving_back: asyncio.TimerHandle | None = None
         self.hear_of_ended: list[Callable[[str, Collection[str]], object]] = []
         """Listeners for links that were revoked: terrain, ids."""
         self.class_of: Callable[[str], c.InClass | None] = lambda _: None
@@ -127,53 +110,27 @@ class Hub:
 
     # --- entering -----------------------------------------------------------------------------------------------
 
-    def authorise(self, terrain: str, secret: str, address: str) -> Link:
-        """Returns the live link behind a secret. Raises Denied (no_terrain, bad_secret, revoked, rate_limited)."""
-        link = self.access.check(terrain, secret)
-        if link is None:
-            if not self._wrong.take(Who(address), self._now()):
-                raise Denied("rate_limited", "Too many wrong links came from your address. Wait a minute.")
-            if not self.journal.exists(terrain):
-                raise Denied("no_terrain", "There is no such terrain on this server.")
-            raise Denied("bad_secret", "This link does not open this terrain. Ask for a new one.")
-        if link.revoked is not None:
-            raise Denied("revoked", "This link was revoked by the owner of the terrain.")
-        if (deleted := self.deletion.deleted(terrain)) is not None:
-            raise Deleted(link, deleted + GRACE_SECONDS)
-        return link
-
-    def demand(self, link: Link) -> None:
-        """Asks again whether a link still opens its terrain: after everything that was waited for, and before anything
-        is given out or laid. Raises Denied (revoked, bad_secret)."""
-        if (deleted := self.deletion.deleted(link.terrain)) is not None:
-            raise Deleted(link, deleted + GRACE_SECONDS)
-        if not self.access.alive(link):
-            found = next((each for each in self.access.links(link.terrain) if each.id == link.id), None)
-            if found is None or found.revoked is not None:
-                raise Denied("revoked", "This link was revoked by the owner of the terrain.")
-            raise Denied("bad_secret", "This link was renewed meanwhile. Ask for the new one.")
-
     async def enter(self, hello: c.Hello, outbox: Outbox, address: str) -> tuple[Room, Guest]:
         """Lets a client into its room, opening it if need be. Raises Denied."""
         if self._closing:
             raise Denied("shutting_down", "The server is stopping. Your page will come back by itself.")
-        link = self.authorise(hello.terrain, hello.secret, address)
+        link = self.door.authorise(hello.terrain, hello.secret, address)
         who = Who(address, link.id)
-        rates = self._hellos if hello.at is None else self._history_hellos
-        if not rates.take(who, self._now()):
-            raise Denied("rate_limited", "Too many pages came at once. Yours comes back by itself.")
+        self.door.count(who, history=hello.at is not None)
         if hello.at is not None:
             present = partial(self.strokes, hello.terrain, None, who) if link.role == "view" else None
             read = partial(self.read, who)
             self.caller(link, hello.ticket, address)
             hide = link.role != "owner" and self.lesson_of(hello.terrain).state.hide
-            return await self._history_rooms.enter(hello, who, outbox, lambda: self.demand(link), read, present, hide)
+            return await self._history_rooms.enter(
+                hello, who, outbox, lambda: self.door.demand(link), read, present, hide
+            )
         while True:
             room = await self.room(hello.terrain, who)
             asked = await room.prepare(hello.clock, partial(self.read, who), link.role == "view")
             if not room.closed:  # a room is closed where its last member left meanwhile
                 break
-        self.demand(link)  # the link may have been revoked while the room was being opened
+        self.door.demand(link)  # the link may have been revoked while the room was being opened
         return room, room.join(hello, link.role, link.id, outbox, address, asked)
 
     # --- rooms --------------------------------------------------------------------------------------------------
@@ -313,7 +270,7 @@ class Hub:
         del self._rooms[terrain]
         self._places.release(terrain)
         room.shut()
-        self._give_back_soon()
+        self._memory.give_back_soon()
         return True
 
     def _rest(self, terrain: str) -> bool:
@@ -329,16 +286,6 @@ class Hub:
             room.core.leave(member)
         log.info("terrain %s was closed for others: nobody did anything in it for %.0f s", terrain, REST_SECONDS)
         return self.sleep(terrain)
-
-    def _give_back_soon(self) -> None:
-        """Gives memory of closed rooms back to the system soon, once for all that close within a while."""
-        if self._giving_back is None:
-            self._giving_back = asyncio.get_running_loop().call_later(GIVE_BACK_SECONDS, self._give_back)
-
-    def _give_back(self) -> None:
-        self._giving_back = None
-        gc.collect()
-        asyncio.get_running_loop().run_in_executor(None, system.give_memory_back)
 
     # --- terrains -----------------------------------------------------------------------------------------------
 

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import asyncio
+import gc
 from collections.abc import Callable
 from typing import Final
 
 from esker.fairness.shares import Full, Place, Places, Share, Who
-from esker.process import memory
+from esker.process import memory, system
 from esker.session.room.core import Denied
 
 ROOM_BYTES: Final = 128 << 20
 """The server may open one room for each so many bytes of its memory: twice what a drawn room takes."""
+GIVE_BACK_SECONDS: Final = 5.0
 FEWEST, MOST = 8, 256
 FULL: Final = "This server has as many terrains open as it can hold. Your page tries again by itself."
 YOURS: Final = "Many terrains are open from your address. Close some pages; yours comes back by itself."
@@ -73,3 +76,20 @@ class OpenRooms:
         place = self._held.pop(terrain, None)
         if place is not None:
             place.release()
+
+
+class ClosedRooms:
+    """The memory of rooms that were closed. Lives in one event loop."""
+
+    def __init__(self) -> None:
+        self._timer: asyncio.TimerHandle | None = None
+
+    def give_back_soon(self) -> None:
+        """Gives it back to the system soon, once for all rooms that close within a while."""
+        if self._timer is None:
+            self._timer = asyncio.get_running_loop().call_later(GIVE_BACK_SECONDS, self._give_back)
+
+    def _give_back(self) -> None:
+        self._timer = None
+        gc.collect()
+        asyncio.get_running_loop().run_in_executor(None, system.give_memory_back)
