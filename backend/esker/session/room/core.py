@@ -331,13 +331,13 @@ class RoomCore:
         if batch.snapshot is not None:
             self._snapshot_clock = batch.after.clock
         self._in_flight = []
-        told = self._replicas.committed(batch.rows)
+        text_for = self._replicas.committed(batch.rows)
         acks: dict[str, list[Row]] = {}
         for row in batch.rows:
             acks.setdefault(row.client, []).append(row)
         for member in self.members:
             mine = None if self._replicas.looks(member) else acks.get(member.client)
-            member.outbox.push(told(member), *([] if mine is None else [_ack(mine)]))
+            member.outbox.push(text_for(member), *([] if mine is None else [_ack(mine)]))
 
     def failed(self, sentence: str = UNSAVED) -> None:
         """Goes back to the committed document, since the journal did not take the batch.

@@ -148,7 +148,7 @@ class Replicas:
         shared = _ordered([text for _, text in texts])
         others: dict[object, str] = {}
 
-        def told(member: Member) -> str:
+        def text_for(member: Member) -> str:
             if self.looks(member):
                 variant: object = self._viewing.variant((row.clock for row in rows), member.since)
             elif self._lesson.nameless(member):
@@ -159,7 +159,7 @@ class Replicas:
                 others[variant] = _ordered(self._as_seen(member, texts))
             return others[variant]
 
-        return told
+        return text_for
 
     def _as_seen(self, member: Member, ordered: list[tuple[int, str]]) -> list[str]:
         if self.looks(member):
