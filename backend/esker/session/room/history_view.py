@@ -25,7 +25,7 @@ from esker.session.room.members import Member
 from esker.session.room.outbox import Long, Outbox
 from esker.session.room.ports import Journal
 from esker.session.room.replicas import viewing
-from esker.session.room.replicas.past import PastReplica
+from esker.session.room.replicas.earlier import EarlierReplica
 from esker.session.room.room import PROGRESS_TICK, Guest, Room
 from esker.store.claims import Claims
 from esker.store.journal import DamagedTerrain, Loaded, Row, replay
@@ -64,7 +64,7 @@ class HistoryCore(RoomCore):
         """``still``: the things that are there now, where nothing else may be shown; None: everything is;
         ``hide``: without the names of who drew what."""
         lesson = Lesson(State(hide=hide))
-        self._then = PastReplica(loaded, lesson, still)
+        self._then = EarlierReplica(loaded, lesson, still)
         super().__init__(loaded, lambda *_: None, max_members=1, claims=claims, lesson=lesson, replicas=self._then)
 
     def join(

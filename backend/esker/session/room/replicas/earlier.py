@@ -11,7 +11,7 @@ from esker.session.room.replicas.viewing import Key, shown
 from esker.store.journal import Loaded
 
 
-class PastReplica(Replicas):
+class EarlierReplica(Replicas):
     """The one replica in a view of the history."""
 
     def __init__(self, loaded: Loaded, lesson: Lesson, still: frozenset[Key] | None) -> None:
