@@ -5,14 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from esker.api.live import connect
+    from esker.api.live.client import connect
     from esker.api.terrain import Stroke, Terrain
     from esker.errors import EskerError
 
 _HOMES = {
     "Terrain": "esker.api.terrain",
     "Stroke": "esker.api.terrain",
-    "connect": "esker.api.live",
+    "connect": "esker.api.live.client",
     "EskerError": "esker.errors",
 }
 

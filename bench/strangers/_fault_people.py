@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from esker import contract as c
 from esker.api import live
-from esker.api.live import LiveTerrain, Refused
+from esker.api.live.client import LiveTerrain, Refused
 
 PEOPLE: Final = 3
 PERIOD: Final = 0.04

@@ -9,7 +9,7 @@ import pytest
 
 import esker
 from esker import contract as c
-from esker.api.live import Link, LiveTerrain, Refused, connect
+from esker.api.live.client import Link, LiveTerrain, Refused, connect
 from esker.solve.solver import Solver
 from tests.sync.harness import LiveServer, stroke
 from tests.unit import test_examples

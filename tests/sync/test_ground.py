@@ -104,7 +104,7 @@ def test_paint_on_a_live_terrain(tmp_path: Path, solver: Solver) -> None:
 
 def check(ground: object, keys: set[TileKey], solver: Solver, **fields: float) -> None:
     """Whole levels are the solver's to half a quantum, refined tiles its refiner's."""
-    from esker.api.live_ground import StreamedGround
+    from esker.api.live.ground import StreamedGround
 
     assert isinstance(ground, StreamedGround)
     strokes = (RIDGE.model_copy(update={"finished": True, **fields}),)

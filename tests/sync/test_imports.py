@@ -15,7 +15,7 @@ import pytest
 import esker
 from esker import contract as c
 from esker import grid
-from esker.api.live import LiveTerrain, Refused
+from esker.api.live.client import LiveTerrain, Refused
 from esker.errors import Cannot
 from esker.fairness.shares import Who
 from esker.patchwork.base import Base

@@ -21,9 +21,9 @@ import pytest
 
 import esker
 from esker import Stroke, Terrain, contract
-from esker.api.live import LiveTerrain
-from esker.api.live_ground import StreamedGround
-from esker.api.live_layers import bring_in
+from esker.api.live.client import LiveTerrain
+from esker.api.live.ground import StreamedGround
+from esker.api.live.layers import bring_in
 from esker.document import archive
 from esker.document.ops import Limits, Refusal, StrokeSet
 

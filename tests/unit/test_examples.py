@@ -16,11 +16,11 @@ USERS = {
     "esker.api.terrain": {"Terrain", "Terrain.add", "Terrain.assemble", "Terrain.heights", "Terrain.window"},
     "esker.api.terrain_layers": {"TerrainLayers.add_grid", "TerrainLayers.sample"},
     "esker.api.terrain_water": {"TerrainWater.rivers", "TerrainWater.watershed", "TerrainWater.raindrop"},
-    "esker.api.live": {"connect"},
+    "esker.api.live.client": {"connect"},
     "esker.solve.solver": {"Solver"},
 }
 """What people call first, and what therefore has an example."""
-SERVED = {"esker.api.live"}
+SERVED = {"esker.api.live.client"}
 """Modules whose examples need a server: ``tests/sync/test_client.py`` runs them."""
 
 

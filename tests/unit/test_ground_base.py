@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from esker import grid
-from esker.api.live_ground import StreamedGround
+from esker.api.live.ground import StreamedGround
 from esker.contract import Channel
 from esker.grid import TileKey
 from esker.tiles.codec.payload import child_window, predict

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from esker.api.link import Refused
-from esker.api.live_history import HistoryReader
+from esker.api.live.history import HistoryReader
 
 
 def main(argv: list[str]) -> int:

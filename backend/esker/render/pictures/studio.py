@@ -58,7 +58,7 @@ def open_terrain(name: str) -> Opened:
     Raises ValueError with a sentence, OSError, and what ``esker.connect`` raises for links.
     """
     if name.startswith(("http://", "https://")):
-        from esker.api.live import connect
+        from esker.api.live.client import connect
 
         with connect(name, "Picture") as live:
             return Opened(live.document, live.grids)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from esker import contract as c
 from esker.api import arguments
-from esker.api.live_layers import Grids
+from esker.api.live.layers import Grids
 from esker.api.terrain import Terrain
 from esker.api.terrain_water import Raindrop, Watershed
 from esker.contract import Document

@@ -5,8 +5,6 @@ from __future__ import annotations
 
 import json
 import ssl
-import threading
-from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -15,7 +13,8 @@ from urllib.parse import urlencode
 from esker import contract as c
 from esker.api import arguments
 from esker.api.http import Api
-from esker.api.live_layers import Grids
+from esker.api.live.connection import LiveConnection
+from esker.api.live.layers import Grids
 from esker.api.terrain import Terrain
 
 
@@ -103,24 +102,22 @@ class LiveHistory:
         return HistoryReader(self._address, self._tls).fork(clock, title)
 
 
-class LiveLesson(ABC):
+class LiveLesson:
     """The part of ``LiveTerrain`` that knows how the lesson stands."""
 
-    _changed: threading.Condition
-    _lesson: c.Lesson
-    _notices: list[str]
+    _connection: LiveConnection
 
     @property
     def lesson(self) -> c.Lesson:
         """How the lesson stands: whether hands are off, whether we draw, who was sent out."""
-        with self._changed:
-            return self._lesson
+        with self._connection.changed:
+            return self._connection.lesson
 
     @property
     def notices(self) -> tuple[str, ...]:
         """What the server said to us about the lesson, the last thing last."""
-        with self._changed:
-            return tuple(self._notices)
+        with self._connection.changed:
+            return tuple(self._connection.notices)
 
     def conduct(self, **switches: object) -> None:
         """Switches ``hands_off``, ``protect``, ``hide``, ``animals``, ``look`` or ``held``. The others stay.
@@ -128,7 +125,7 @@ class LiveLesson(ABC):
         Whoever does not lead gets a notice. Raises ValueError for what is no switch, RuntimeError while nobody is
         connected.
         """
-        self._say(arguments.model(c.Conduct, switches))
+        self._connection.say(arguments.model(c.Conduct, switches))
 
     def about(self, action: c.PersonAction, *people: str) -> None:
         """Does something about people, by their ids (``members`` has them as ``person``): ``pen``, ``no_pen``,
@@ -136,8 +133,4 @@ class LiveLesson(ABC):
 
         Raises ValueError, and RuntimeError while nobody is connected.
         """
-        self._say(arguments.model(c.People, {"action": action, "people": tuple(people)}))
-
-    @abstractmethod
-    def _say(self, message: c.Conduct | c.People) -> None:
-        """Sends a message. Raises RuntimeError while nobody is connected."""
+        self._connection.say(arguments.model(c.People, {"action": action, "people": tuple(people)}))

@@ -18,54 +18,32 @@ client also takes what the server streams:
 
 from __future__ import annotations
 
-import asyncio
-import logging
-import random
 import secrets
 import ssl
-import threading
-import time
 from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, Self, get_args
 
-from websockets.asyncio.client import ClientConnection
-from websockets.asyncio.client import connect as open_socket
-from websockets.exceptions import ConnectionClosed, InvalidHandshake, InvalidMessage
-
 from esker import contract as c
 from esker.api import arguments
 from esker.api.link import Link, Refused
-from esker.api.live_ground import StreamedGround
-from esker.api.live_heights import LiveHeights
-from esker.api.live_history import LiveHistory, LiveLesson
-from esker.api.live_layers import Grids, LiveLayers
+from esker.api.live.connection import CONNECT_SECONDS, LiveConnection
+from esker.api.live.ground import StreamedGround
+from esker.api.live.heights import LiveHeights
+from esker.api.live.history import LiveHistory, LiveLesson
+from esker.api.live.layers import Grids, LiveLayers
 from esker.contract import Document, Op, Stroke, TerrainSettings
 from esker.document.ops import Refusal
-from esker.document.sync import Diverged, SyncDoc
 from esker.document.undo import UndoPlan
 from esker.document.wire import op_json
-from esker.session.room.limits import TokenBucket
 from esker.solve.solver import Solver
-from esker.tiles.codec.frame import FrameError
-
-log = logging.getLogger("esker.api.live")
 
 __all__ = ["Link", "LiveTerrain", "Refused", "connect"]
 
-RATE: Final = 0.8 * c.MAX_OPS_PER_SECOND
-BURST: Final = 0.5 * c.OPS_BURST
-"""A little below the server's own, so that nothing is refused for its rate."""
 MESSAGE_BYTES: Final = c.MAX_MESSAGE_BYTES - 1024
 MAX_CURVE_POINTS: Final = 1_024
 """A longer curve is sent by appends: one message does not hold it."""
-NOTICES: Final = 100
-BACKOFF_SECONDS: Final = (0.2, 10.0)
-FINAL_CODES: Final = frozenset(code for code in c.WS_CLOSE.values() if code <= 4008 or code in (4011, 4012))
-CONNECT_SECONDS: Final = 15.0
-LOST: Final = (OSError, ConnectionClosed, InvalidHandshake, InvalidMessage, TimeoutError, Diverged, FrameError)
-"""After these the client connects again."""
 
 
 class LiveTerrain(LiveLayers, LiveHistory, LiveHeights, LiveLesson):
@@ -93,27 +71,9 @@ class LiveTerrain(LiveLayers, LiveHistory, LiveHeights, LiveLesson):
         self._tls = ssl.create_default_context(cafile=ca_file) if self._link.secure else None
         self._grids = Grids(link, self._tls)
         self._client = f"py-{secrets.token_hex(8)}"
-        self._token: str | None = None
-        self._ticket: str | None = None
-        self._lesson, self._notices = c.Lesson(), []
-        self._socket: ClientConnection | None = None
-        self._sync = SyncDoc(self._client)
-        self._changed = threading.Condition()
-        self._failure: Refused | None = None
-        self._refusals: list[Refused] = []
-        self._online = False
-        self._closing = False
-        self._role: c.Role = "view"
-        self._members: tuple[c.Member, ...] = ()
-        self._bucket = TokenBucket(RATE, BURST)
+        self._connection = LiveConnection(self._link, self._name, self._client, self._tls, ground=ground)
+        self._sync, self._changed = self._connection.sync, self._connection.changed
         self._local = None
-        self._ground: StreamedGround | None = None
-        if ground:
-            self._ground = StreamedGround(self._sync, self._changed, self._poke, self._raise_failure)
-        self._loop = asyncio.new_event_loop()
-        self._wake = asyncio.Event()
-        self._thread = threading.Thread(target=self._run, name="esker-client", daemon=True)
-        self._thread.start()
         try:
             self._await(lambda: self._sync.clock is not None, timeout, "no answer from the server")
         except BaseException:
@@ -130,18 +90,18 @@ class LiveTerrain(LiveLayers, LiveHistory, LiveHeights, LiveLesson):
     @property
     def role(self) -> c.Role:
         """The role that this link gives."""
-        return self._role
+        return self._connection.role
 
     @property
     def online(self) -> bool:
         """False while the connection is being made again."""
-        return self._online
+        return self._connection.is_online
 
     @property
     def members(self) -> tuple[c.Member, ...]:
         """Who is here, ourselves included."""
         with self._changed:
-            return self._members
+            return self._connection.members
 
     @property
     def strokes(self) -> tuple[Stroke, ...]:
@@ -170,9 +130,9 @@ class LiveTerrain(LiveLayers, LiveHistory, LiveHeights, LiveLesson):
     @property
     def ground(self) -> StreamedGround:
         """The ground that the server streams. Raises RuntimeError unless connected with ``ground=True``."""
-        if self._ground is None:
+        if self._connection.ground is None:
             raise RuntimeError("connect with ground=True to take the ground that the server streams")
-        return self._ground
+        return self._connection.ground
 
     # --- changing -----------------------------------------------------------------------------------------------
 
@@ -245,7 +205,7 @@ class LiveTerrain(LiveLayers, LiveHistory, LiveHeights, LiveLesson):
         timeout = arguments.wait("timeout", timeout)
         self._await(lambda: not self._sync.pending, timeout, "the server has not saved everything")
         with self._changed:
-            refusals, self._refusals = self._refusals, []
+            refusals, self._connection.refusals = self._connection.refusals, []
             if refusals:
                 raise refusals[0]
             return self._sync.confirmed.clock
@@ -257,11 +217,7 @@ class LiveTerrain(LiveLayers, LiveHistory, LiveHeights, LiveLesson):
 
     def close(self) -> None:
         """Leaves. What is unsent then is lost: call ``wait`` first."""
-        if self._closing:
-            return
-        self._closing = True
-        self._poke()
-        self._thread.join(timeout=10)
+        self._connection.close()
 
     def __enter__(self) -> Self:
         return self
@@ -279,172 +235,24 @@ class LiveTerrain(LiveLayers, LiveHistory, LiveHeights, LiveLesson):
         if len(op_json(op)) > MESSAGE_BYTES:
             raise Refused("too_large", "This change is too large for one message.")
         with self._changed:
-            self._raise_failure()
-            self._raise_closed()
+            self._connection.raise_failure()
+            self._connection.raise_closed()
             try:
                 self._sync.submit(op, gesture)
             except Refusal as refusal:
                 raise Refused(refusal.code, refusal.message) from None
-        self._poke()
+        self._connection.poke()
 
     def _travel(self, move: Callable[[], UndoPlan]) -> UndoPlan:
         with self._changed:
-            self._raise_failure()
-            self._raise_closed()
+            self._connection.raise_failure()
+            self._connection.raise_closed()
             plan = move()
-        self._poke()
+        self._connection.poke()
         return plan
 
-    def _raise_failure(self) -> None:
-        if self._failure is not None:
-            raise self._failure
-
-    def _raise_closed(self) -> None:
-        if self._closing:
-            raise RuntimeError("this connection was closed: connect again to change the terrain")
-
     def _await(self, ready: Callable[[], bool], timeout: float, what: str) -> None:
-        with self._changed:
-            done = self._changed.wait_for(lambda: self._failure is not None or ready(), timeout)
-            if not ready():
-                self._raise_failure()
-            if not done:
-                raise TimeoutError(what)
-
-    def _say(self, message: c.Conduct | c.People) -> None:
-        self._raise_closed()
-        socket = self._socket
-        if socket is None or not self._online:
-            raise RuntimeError("there is no connection at the moment: try again when `online` is True")
-        asyncio.run_coroutine_threadsafe(socket.send(message.model_dump_json()), self._loop).result(CONNECT_SECONDS)
-
-    def _poke(self) -> None:
-        if not self._loop.is_closed():
-            self._loop.call_soon_threadsafe(self._wake.set)
-
-    # --- the thread ---------------------------------------------------------------------------------------------
-
-    def _run(self) -> None:
-        try:
-            self._loop.run_until_complete(self._stay_connected())
-        finally:
-            self._loop.close()
-
-    async def _stay_connected(self) -> None:
-        low, high = BACKOFF_SECONDS
-        delay = low
-        while not self._closing and self._failure is None:
-            started = time.monotonic()
-            try:
-                await self._connection()
-            except LOST as error:
-                log.info("connection lost: %s", error)
-                if isinstance(error, Diverged):
-                    with self._changed:
-                        self._sync.start_over()
-            with self._changed:
-                self._online = False
-                self._sync.disconnected()
-                self._changed.notify_all()
-            if self._closing or self._failure is not None:
-                return
-            delay = low if time.monotonic() - started > high else min(high, delay * 2)
-            self._wake.clear()
-            await self._sleep(delay * random.uniform(0.5, 1.0))
-
-    async def _sleep(self, seconds: float) -> None:
-        end = time.monotonic() + seconds
-        while not self._closing and time.monotonic() < end:
-            await asyncio.sleep(min(0.1, seconds))
-
-    async def _connection(self) -> None:
-        options: dict[str, Any] = {"ssl": self._tls} if self._tls else {}
-        async with open_socket(
-            self._link.url,
-            subprotocols=[c.SUBPROTOCOL],  # type: ignore[list-item]
-            max_size=None,
-            compression=None,
-            open_timeout=10,
-            **options,
-        ) as socket:
-            hello = c.Hello(
-                protocol=c.PROTOCOL_VERSION,
-                terrain=self._link.terrain,
-                secret=self._link.secret,
-                client=self._client,
-                token=self._token,
-                ticket=self._ticket,
-                name=self._name,
-                clock=self._sync.clock,
-            )
-            await socket.send(hello.model_dump_json())
-            if self._ground is not None:
-                with self._changed:
-                    self._ground.connected()
-            sender, self._socket = asyncio.create_task(self._send(socket)), socket
-            try:
-                async for message in socket:
-                    if isinstance(message, str):
-                        self._receive(c.SERVER_MESSAGE.validate_json(message))
-                    elif self._ground is not None:  # else frames are not read, and no credit is given for them
-                        with self._changed:
-                            credit = self._ground.applied(message)
-                        await socket.send(credit.model_dump_json())
-            finally:
-                self._socket = None
-                sender.cancel()
-                await asyncio.gather(sender, return_exceptions=True)
-
-    async def _send(self, socket: ClientConnection) -> None:
-        while True:
-            await self._wake.wait()
-            self._wake.clear()
-            if self._closing:
-                await socket.close()
-                return
-            if self._ground is not None and self._online:
-                with self._changed:
-                    view = self._ground.unsent()
-                if view is not None:
-                    await socket.send(view.model_dump_json())
-            while self._online and not self._closing:
-                with self._changed:
-                    envelopes = self._sync.outgoing(1) if self._bucket.take(time.monotonic()) else None
-                if envelopes is None:
-                    await asyncio.sleep(1 / RATE)
-                    continue
-                if not envelopes:
-                    break
-                envelope = envelopes[0]
-                await socket.send(f'{{"type":"ops","ops":[{{"id":"{envelope.id}","op":{op_json(envelope.op)}}}]}}')
-
-    def _receive(self, message: object) -> None:
-        with self._changed:
-            match message:
-                case c.Welcome():
-                    self._sync.welcome(message)
-                    self._token, self._ticket = message.token, message.ticket or None
-                    self._lesson = message.lesson or self._lesson
-                    self._role, self._members, self._online = message.role, message.members, True
-                    self._wake.set()
-                case c.OpsBroadcast():
-                    self._sync.ordered(message)
-                case c.Ack():
-                    self._sync.ack(message)
-                case c.Reject():
-                    self._sync.reject(message)
-                    self._refusals.append(Refused(message.code, message.message))
-                case c.Lesson():
-                    self._lesson = message
-                case c.Notice():
-                    self._notices = [*self._notices, message.text][-NOTICES:]
-                case c.Members():
-                    self._members = message.members
-                case c.Progress() if self._ground is not None:
-                    self._ground.progressed(message)
-                case c.ErrorMessage() if message.fatal and c.WS_CLOSE[message.code] in FINAL_CODES:
-                    self._failure = Refused(message.code, message.message)
-            self._changed.notify_all()
+        self._connection.wait_for(ready, timeout, what)
 
 
 def connect(link: str, name: str = "Python", **options: Any) -> LiveTerrain:
