@@ -192,18 +192,18 @@ def test_a_program_leads_a_lesson_and_is_led(server: LiveServer) -> None:
         connect(f"{server.base}/t/{terrain}#{made['secret']}") as pupil,
     ):
         teacher.conduct(hands_off=True)
-        pupil._await(lambda: pupil._lesson.hands_off, 60, "nobody was told")
+        pupil._await(lambda: pupil.lesson.hands_off, 60, "nobody was told")
         assert (teacher.lesson.draws, pupil.lesson.draws) == (True, False)
         pupil.set_terrain(title="mine")
         with pytest.raises(Refused, match="Hands off"):
             pupil.wait(60)
         pupil.conduct(hands_off=False)
-        pupil._await(lambda: bool(pupil._notices), 60, "no notice came")
+        pupil._await(lambda: bool(pupil.notices), 60, "no notice came")
         assert "Only whoever leads" in pupil.notices[-1]
-        teacher._await(lambda: len(teacher._members) == 2, 60, "nobody came")
+        teacher._await(lambda: len(teacher.members) == 2, 60, "nobody came")
         person = next(m.person for m in teacher.members if m.role == "edit")
         teacher.about("pen", person)
-        pupil._await(lambda: pupil._lesson.draws, 60, "no pen came")
+        pupil._await(lambda: pupil.lesson.draws, 60, "no pen came")
         pupil.set_terrain(title="ours")
         assert pupil.wait(60) == 1
         with pytest.raises(ValueError, match="hands"):

@@ -1,6 +1,6 @@
 // What the page's bars cover of the picture (SPEC U315).
 import { describe, expect, it } from "vitest";
-import { coveredEdges } from "../../src/app/view/covered.ts";
+import { coveredEdges } from "../../src/app/view/eye/covered.ts";
 
 const box = (left: number, top: number, right: number, bottom: number) => ({ left, top, right, bottom });
 

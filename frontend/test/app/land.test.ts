@@ -1,6 +1,6 @@
 // How high the land lies, for the view of the whole of it (SPEC U430).
 import { describe, expect, it } from "vitest";
-import { landOf } from "../../src/app/view/land.ts";
+import { landOf } from "../../src/app/view/eye/land.ts";
 import { Camera } from "../../src/core/camera/camera.ts";
 import type { Insets } from "../../src/core/camera/home.ts";
 

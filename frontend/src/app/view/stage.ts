@@ -34,12 +34,14 @@ import { Groundwork } from "../layers/groundwork.ts";
 import { riverLines } from "../layers/river-lines.ts";
 import type { OpenTerrain } from "../open-terrain.ts";
 import { gridTransport } from "../server/grid-transport.ts";
-import { coveredEdges } from "./covered.ts";
+import { Arrival } from "./eye/arrival.ts";
+import { coveredEdges } from "./eye/covered.ts";
+import { Following } from "./eye/following.ts";
+import { landOf } from "./eye/land.ts";
 import { FrameLoop } from "./frame-loop.ts";
 import { FreshTiles } from "./fresh-tiles.ts";
 import { Graphics } from "./graphics.ts";
 import { Instruments } from "./instruments/instruments.ts";
-import { landOf } from "./land.ts";
 import { QuietStrokes } from "./quiet-strokes.ts";
 import { deepFocus } from "./regions.ts";
 import { cursorVisuals, strokeVisuals } from "./scene.ts";
@@ -83,7 +85,7 @@ export class Stage {
   readonly quality: QualityChoice;
   /** How this device shows terrains. */
   readonly view: ViewChoices;
-  readonly following = signal<string | null>(null);
+  readonly following: ReadonlySignal<string | null>;
   readonly stats = signal<FrameStats | null>(null);
   /** Screen-error bound of the picture, pixels, where this device has no room for the chosen one. */
   readonly coarsenedPx = computed(() => this.stats.value?.coarsenedPx ?? null);
@@ -104,9 +106,8 @@ export class Stage {
   /** The ground that the eye may not dip under. */
   readonly #floor: Ground;
   #fresh: FreshTiles | null = null;
-  /** The layers whose ground home stands on, and whether it is still on its way. */
-  #standsOn: Doc["layers"] | undefined;
-  #arriving = true;
+  readonly #follows: Following;
+  readonly #arrival: Arrival;
   #disposed = false;
   /** Finds what floats on the picture. */
   #find: ((selector: string) => Element | null) | null = null;
@@ -120,6 +121,14 @@ export class Stage {
     this.camera = new Camera(sizeM);
     this.camera.calm = this.#calm.matches;
     this.camera.landNow = () => this.#land();
+    this.#follows = new Following({
+      session,
+      camera: this.camera,
+      calm: () => this.#calm.matches,
+      redraw: () => this.loop.invalidate(),
+    });
+    this.following = this.#follows.client;
+    this.#arrival = new Arrival(session);
     this.tiles = new TileStore(sizeM, finest, levels);
     this.channels = new ChannelStore(sizeM);
     this.shown = new ShownTerrain(this.tiles, this.channels, () => {
@@ -259,15 +268,12 @@ export class Stage {
 
   /** Follows a person's view until I move the camera myself; the same person again stops it. */
   follow(client: string | null): void {
-    if (this.session.lesson.leader.peek() !== null) return;
-    this.following.value = this.following.value === client ? null : client;
-    if (this.following.value) this.#goToView(this.session.presences.value.get(this.following.value), 700);
+    this.#follows.toggle(client);
   }
 
   /** New presences have come: the view goes along with the person that is followed. */
   followed(changed: readonly MemberPresence[]): void {
-    const leader = changed.find((p) => p.client === this.following.value);
-    if (leader) this.#goToView(leader, 180);
+    this.#follows.moved(changed);
   }
 
   /** Says what floats on the picture, found by its selector. `follow`: a view that is still at home goes along. */
@@ -311,25 +317,9 @@ export class Stage {
     this.graphics.dispose();
   }
 
-  #goToView(presence: MemberPresence | undefined, durationMs: number): void {
-    if (!presence?.eye || !presence.target) return;
-    this.camera.goTo(presence.eye, presence.target, this.#calm.matches ? 0 : durationMs);
-    this.loop.invalidate();
-  }
-
   /** Redraws on every change that a frame shows, and tells the server where I look. */
   #watch(): void {
     const { session, input } = this;
-    const stopFollowing = (): void => {
-      session.lesson.lookAway(true);
-      if (session.lesson.leader.peek() === null) this.following.value = null;
-    };
-    // Where nobody may look away, a view that a hand has moved springs back.
-    const springBack = (): void => {
-      const leader = session.lesson.leader.peek();
-      if (leader !== null && session.lesson.state.peek().held)
-        this.#goToView(session.presences.peek().get(leader), 180);
-    };
     // Drawing prevents the default of the pointer, so a field that had the keys would keep them.
     const takeKeys = (): void => {
       const active = deepFocus();
@@ -337,23 +327,7 @@ export class Stage {
     };
     this.#viewport.addEventListener("pointerdown", takeKeys);
     this.#stops.push(() => this.#viewport.removeEventListener("pointerdown", takeKeys));
-    for (const type of ["pointerdown", "wheel"] as const) {
-      this.#viewport.addEventListener(type, stopFollowing, { passive: true });
-      this.#stops.push(() => this.#viewport.removeEventListener(type, stopFollowing));
-    }
-    for (const type of ["pointerup", "wheel", "keyup"] as const) {
-      window.addEventListener(type, springBack, { passive: true });
-      this.#stops.push(() => window.removeEventListener(type, springBack));
-    }
-    this.#stops.push(
-      effect(() => {
-        const leader = session.lesson.leader.value;
-        if (leader !== null) {
-          this.following.value = leader;
-          this.#goToView(session.presences.peek().get(leader), 700);
-        } else if (this.following.peek() !== null) this.following.value = null;
-      }),
-    );
+    this.#stops.push(...this.#follows.watch(this.#viewport));
     this.#stops.push(
       effect(() => {
         this.camera.state.value;
@@ -393,7 +367,8 @@ export class Stage {
     this.#stops.push(
       effect(() => {
         this.tiles.revision.value;
-        this.#standOnArrival();
+        const isDrawing = this.input.drawing.value !== null;
+        this.#arrival.follow(this.#land(), isDrawing, (land) => this.camera.stand(land));
       }),
     );
     this.#watchSize();
@@ -403,26 +378,6 @@ export class Stage {
   #land(): Land | null {
     const heights = this.tiles.tile(0, 0, 0)?.heights;
     return heights === undefined ? null : landOf(heights, TILE_SAMPLES, this.sizeM);
-  }
-
-  /**
-   * A view at home goes along with ground that arrives: that of a terrain that is opened, and that of elevation layers. It
-   * stays where it is for what is drawn.
-   */
-  #standOnArrival(): void {
-    const { session } = this;
-    const layers = session.doc.doc.value?.layers;
-    if (layers !== this.#standsOn) {
-      this.#arriving ||= JSON.stringify([...(layers ?? [])]) !== JSON.stringify([...(this.#standsOn ?? [])]);
-      this.#standsOn = layers;
-    }
-    const land = this.#land();
-    if (!this.#arriving || land === null) return;
-    if (this.input.drawing.value === null) this.camera.stand(land);
-    const { progress, doc, baseBuilding } = session;
-    const solved = progress.value?.settled === true && progress.value.clock === doc.clock;
-    if (this.input.drawing.value !== null || (solved && !baseBuilding.value && doc.pending.value === 0))
-      this.#arriving = false;
   }
 
   #watchSize(): void {

@@ -3,7 +3,7 @@
  * Pure.
  */
 
-import type { Insets } from "../../core/camera/home.ts";
+import type { Insets } from "../../../core/camera/home.ts";
 
 /** A box in the window, CSS pixels. */
 export type Box = Pick<DOMRect, "left" | "top" | "right" | "bottom">;

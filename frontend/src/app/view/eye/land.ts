@@ -1,7 +1,7 @@
 /** How high the land lies, for the view of the whole of it. Pure. */
 
-import type { Land } from "../../core/camera/state.ts";
-import type { Vec3 } from "../../core/types.ts";
+import type { Land } from "../../../core/camera/state.ts";
+import type { Vec3 } from "../../../core/types.ts";
 
 /** Heights are told in steps of this share of the side, so that a view at home does not tremble while the ground arrives. */
 const STEPS = 128;
