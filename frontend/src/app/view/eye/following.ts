@@ -1,4 +1,4 @@
-/** Whose view this page follows: that of a person who was chosen, or of the one whom a whole lesson looks at. */
+/** The view of somebody else, which this page follows: a person who was chosen, or the one a whole lesson looks at. */
 
 import { effect, signal } from "@preact/signals-core";
 import type { Camera } from "../../../core/camera/camera.ts";
