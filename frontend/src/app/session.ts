@@ -4,11 +4,11 @@
  */
 
 import { computed, effect, type ReadonlySignal, signal } from "@preact/signals-core";
-import { askedOf } from "../core/camera/asked.ts";
 import type { DecodedFrame, RiverSet } from "../core/types.ts";
 import { type Doc, Refusal } from "../doc/document.ts";
 import { SyncDoc } from "../doc/sync.ts";
 import type {
+  ClientMessage,
   ErrorMessage,
   Hello,
   InClass,
@@ -22,44 +22,27 @@ import type {
   TerrainFields,
   Welcome,
 } from "../generated/contract.ts";
-import {
-  DEFAULT_TAU_PX,
-  MAX_PRESENCE_PER_SECOND,
-  PRESENCE_HZ,
-  PROTOCOL_VERSION,
-  TICK_MS,
-} from "../generated/contract.ts";
+import { PROTOCOL_VERSION, TICK_MS } from "../generated/contract.ts";
 import { Connection } from "../net/connection.ts";
+import { KeptTerrain } from "./device/kept-terrain.ts";
 import { friendlyName } from "./device/names.ts";
-import { keepRenewing, renewing } from "./device/share-links.ts";
-import {
-  deviceStore,
-  forgetSecret,
-  type Identity,
-  identity,
-  rememberIdentity,
-  rememberTerrain,
-  type Store,
-} from "./device/storage.ts";
+import { deviceStore, type Identity, identity, rememberIdentity, type Store } from "./device/storage.ts";
 import { GoneStrokes, strokeOf } from "./history/gone.ts";
 import { History } from "./history/history.ts";
 import { HistoryView } from "./history/history-view.ts";
 import { TimeLapse } from "./history/timelapse.ts";
 import { HANDS_OFF, LessonView } from "./lesson/lesson-view.ts";
 import type { OpenTerrain, ServerInfo } from "./open-terrain.ts";
+import { Outgoing } from "./outgoing.ts";
 import { api } from "./server/api.ts";
 import { Deletion } from "./server/deletion.ts";
-import { terrainPath } from "./server/links.ts";
 import { type Status, status } from "./status.ts";
-import { Throttle } from "./throttle.ts";
 import { ToastList } from "./toasts.ts";
 import type { People } from "./view/scene.ts";
 import { Stage } from "./view/stage.ts";
 
-const VIEWS_PER_SECOND = 10;
 export class TerrainSession implements OpenTerrain {
   readonly id: string;
-  secret: string;
   readonly client: string;
   /** The server's token, by which it knows later that the client id is this page's; null before the first welcome. */
   #token: string | null = null;
@@ -98,8 +81,8 @@ export class TerrainSession implements OpenTerrain {
   readonly status: ReadonlySignal<Status>;
   readonly people: ReadonlySignal<People>;
   readonly #viewport: HTMLElement;
-  readonly #views: Throttle;
-  readonly #presence: Throttle;
+  readonly #kept: KeptTerrain;
+  readonly #outgoing: Outgoing;
   readonly #stops: (() => void)[] = [];
   readonly #read = new Set<string>();
   readonly #gone = new GoneStrokes();
@@ -108,7 +91,7 @@ export class TerrainSession implements OpenTerrain {
 
   constructor(id: string, secret: string, viewport: HTMLElement) {
     this.id = id;
-    this.secret = secret;
+    this.#kept = new KeptTerrain(this.store, id, secret);
     this.client = crypto.randomUUID().replaceAll("-", "");
     this.#viewport = viewport;
     this.me.value = identity(this.store, Math.random, this.client);
@@ -144,9 +127,18 @@ export class TerrainSession implements OpenTerrain {
       me: this.client,
       myColour: this.members.value.find((m) => m.client === this.client)?.colour ?? this.me.value.colour,
     }));
-    this.#views = new Throttle(VIEWS_PER_SECOND, () => this.#sendView());
-    this.#presence = new Throttle(Math.min(PRESENCE_HZ, MAX_PRESENCE_PER_SECOND), () => this.#sendPresence());
+    const inPresent = (): boolean => !this.historyView.active.peek();
+    const send = (message: ClientMessage): void => void this.connection.send(message);
+    this.#outgoing = new Outgoing({
+      stage: () => this.stage.value,
+      sendView: (view) => void (inPresent() ? this.connection : this.historyView).send(view),
+      sendPresence: () => (inPresent() && this.connection.state.value === "online" ? send : null),
+    });
     this.#watch();
+  }
+
+  get secret(): string {
+    return this.#kept.secret;
   }
 
   /** Applies an op at once and sends it; a refusal becomes a toast. True when it was applied. */
@@ -195,13 +187,10 @@ export class TerrainSession implements OpenTerrain {
 
   /** Goes on with a new secret for the same link, in the address bar and in this device's memory too. */
   adoptSecret(secret: string): void {
-    forgetSecret(this.store, this.id, this.secret);
-    this.secret = secret;
-    window.history.replaceState(null, "", terrainPath(this.id, secret));
+    this.#kept.adopt(secret);
     const doc = this.doc.doc.peek();
     const role = this.role.peek();
-    if (!doc || !role) return;
-    rememberTerrain(this.store, { id: this.id, secret, title: doc.settings.title, role, opened: Date.now() });
+    if (doc && role) this.#kept.remember(doc.settings.title, role);
   }
 
   rename(who: Identity): void {
@@ -213,11 +202,11 @@ export class TerrainSession implements OpenTerrain {
 
   /** Asks for a presence message; many requests become few messages. */
   presenceChanged(): void {
-    this.#presence.request();
+    this.#outgoing.presenceChanged();
   }
 
   viewChanged(): void {
-    this.#views.request();
+    this.#outgoing.viewChanged();
   }
 
   leavePresent(): void {
@@ -230,8 +219,7 @@ export class TerrainSession implements OpenTerrain {
   dispose(): void {
     for (const stop of this.#stops) stop();
     clearTimeout(this.#again);
-    this.#views.stop();
-    this.#presence.stop();
+    this.#outgoing.stop();
     this.toasts.dispose();
     this.timeLapse.pause();
     this.historyView.dispose();
@@ -306,7 +294,7 @@ export class TerrainSession implements OpenTerrain {
         const title = this.doc.doc.value?.settings.title;
         const role = this.role.value;
         if (title === undefined || !role || this.historyView.active.value) return;
-        rememberTerrain(this.store, { id: this.id, secret: this.secret, title, role, opened: Date.now() });
+        this.#kept.remember(title, role);
       }),
     );
   }
@@ -383,16 +371,10 @@ export class TerrainSession implements OpenTerrain {
   #error(message: ErrorMessage): void {
     this.lesson.keepTicket(message.ticket);
     if (!message.fatal) this.toasts.show(message.message, "warn");
-    // A dead link must not stand among the recent terrains, nor keep a living one from taking its place.
-    else if (["bad_secret", "revoked"].includes(message.code)) {
-      forgetSecret(this.store, this.id, this.secret);
-      // I was replacing my own link when the answer got lost: the new secret is the one that works.
-      const next = renewing(this.store, this.id);
-      keepRenewing(this.store, this.id, null);
-      if (next !== null && message.code === "bad_secret") window.location.replace(terrainPath(this.id, next));
-    } else if (message.code === "no_terrain")
+    else if (message.code === "bad_secret" || message.code === "revoked") this.#kept.ended(message.code);
+    else if (message.code === "no_terrain")
       void this.deletion.ask().then((restorable) => {
-        if (!restorable) forgetSecret(this.store, this.id, this.secret);
+        if (!restorable) this.#kept.forget();
       });
   }
 
@@ -439,33 +421,5 @@ export class TerrainSession implements OpenTerrain {
     for (const presence of changed) next.set(presence.client, presence);
     this.presences.value = next;
     if (!this.historyView.active.peek()) this.stage.value?.followed(changed);
-  }
-
-  #sendView(): void {
-    const camera = this.stage.value?.camera.state.value;
-    if (!camera) return;
-    (this.historyView.active.peek() ? this.historyView : this.connection).send({
-      type: "view",
-      eye: [...camera.eye],
-      target: [...camera.target],
-      ...askedOf(camera, DEFAULT_TAU_PX),
-      width: Math.max(1, Math.min(16384, camera.width)),
-      height: Math.max(1, Math.min(16384, camera.height)),
-    });
-  }
-
-  #sendPresence(): void {
-    const stage = this.stage.value;
-    if (!stage || this.connection.state.value !== "online" || this.historyView.active.peek()) return;
-    const { eye, target } = stage.camera.state.value;
-    const cursor = stage.cursor.value;
-    this.connection.send({
-      type: "presence",
-      cursor: cursor ? [...cursor] : null,
-      tool: stage.input.tool.value,
-      stroke: stage.input.drawing.value ?? stage.input.held.value,
-      eye: [...eye],
-      target: [...target],
-    });
   }
 }
