@@ -1,22 +1,20 @@
-import "@awesome.me/webawesome/dist/components/qr-code/qr-code.js";
 import { effect, signal } from "@preact/signals-core";
 import { html, nothing, type TemplateResult } from "lit";
 import { ApiError } from "../../app/server/api.ts";
 import { type ClassInfo, ClassOrders, type Collecting } from "../../app/server/classes/class-api.ts";
-import { arrange, codeWords, copyName, type Sorting } from "../../app/server/classes/copies.ts";
+import { arrange, copyName, type Sorting } from "../../app/server/classes/copies.ts";
 import { WallConnection } from "../../app/server/classes/wall.ts";
 import { terrainPath } from "../../app/server/links.ts";
-import { ago } from "../../app/words/words.ts";
 import { MAX_COMPARED, type WallCopy } from "../../generated/contract.ts";
-import { drawCard } from "../../gpu/map/card.ts";
 import { icon } from "../controls/icons.ts";
 import "../controls/segmented.ts";
 import { SignalElement } from "../controls/signal-element.ts";
 import { shared } from "../styles/shared.ts";
+import { CardPainter, cardWidth, wallCard } from "./wall-cards.ts";
 import "./wall-compare.ts";
+import { emptyWall, openDoor } from "./wall-door.ts";
 import { wallStyles } from "./wall-styles.ts";
 
-const CARD_PX = 256;
 const SORTS = [
   { value: "number", label: "As they came" },
   { value: "name", label: "By name" },
@@ -60,8 +58,7 @@ export class EskWall extends SignalElement {
   #wall: WallConnection | null = null;
   #orders: ClassOrders | null = null;
   readonly #tick = signal(0);
-  readonly #stale = new Set<number>();
-  #frame = 0;
+  #cards: CardPainter | null = null;
   #timer: ReturnType<typeof setInterval> | undefined;
   #stop: (() => void) | null = null;
 
@@ -91,14 +88,15 @@ export class EskWall extends SignalElement {
       url: `${scheme}://${window.location.host}/ws/wall?terrain=${terrain}`,
     });
     this.#wall = wall;
+    const cards = new CardPainter(this.renderRoot, wall);
+    this.#cards = cards;
     this.#orders = new ClassOrders(terrain, secret, lesson);
     this.#timer = setInterval(() => {
       this.#tick.value += 1;
     }, WORDS_MS);
     this.#stop = effect(() => {
       if (wall.changed.value.size === 0) return;
-      for (const number of wall.take()) this.#stale.add(number);
-      this.#frame ||= requestAnimationFrame(() => this.#draw());
+      cards.changed(wall.take());
     });
     // For tests, which look at what was drawn.
     Object.assign(window, { __wall: wall });
@@ -107,29 +105,13 @@ export class EskWall extends SignalElement {
   override disconnectedCallback(): void {
     super.disconnectedCallback();
     clearInterval(this.#timer);
-    cancelAnimationFrame(this.#frame);
+    this.#cards?.stop();
     this.#stop?.();
     this.#wall?.close();
   }
 
-  /** One card a frame: the page goes on answering, however many copies have changed. */
-  #draw(): void {
-    this.#frame = 0;
-    const number = this.#stale.values().next().value;
-    if (number === undefined) return;
-    this.#stale.delete(number);
-    const ground = this.#wall?.ground(number);
-    const copy = this.#wall?.copies.peek().get(number);
-    const canvas = this.renderRoot.querySelector<HTMLCanvasElement>(`canvas[data-copy="${number}"]`);
-    if (ground && copy && canvas && drawCard(ground, copy.settings, canvas, CARD_PX)) canvas.classList.add("drawn");
-    if (this.#stale.size > 0) this.#frame = requestAnimationFrame(() => this.#draw());
-  }
-
   protected override updated(): void {
-    // A card that has just come into the page has an empty canvas.
-    for (const canvas of this.renderRoot.querySelectorAll<HTMLCanvasElement>("canvas[data-copy]:not(.drawn)"))
-      this.#stale.add(Number(canvas.dataset.copy));
-    if (this.#stale.size > 0) this.#frame ||= requestAnimationFrame(() => this.#draw());
+    this.#cards?.rendered();
   }
 
   async #do(what: (orders: ClassOrders) => Promise<string>): Promise<void> {
@@ -210,24 +192,12 @@ export class EskWall extends SignalElement {
       ${this.#head(state)} ${this.#toolbar(wall.copies.value.size)}
       ${
         wall.copies.value.size === 0
-          ? this.#nobody(state.code)
+          ? emptyWall(state.code)
           : html`<ul style=${`--card: ${cardWidth(wall.copies.value.size)}px`}>${copies.map((copy) => this.#card(copy, state.show === copy.number))}</ul>`
       }
       ${this.#actions(state.show)}
       ${this.comparing === null ? nothing : this.#compared(this.comparing)}
     `;
-  }
-
-  /** Before anybody is here the way in fills the page. */
-  #nobody(code: string | null): TemplateResult {
-    if (code === null) return html`<div class="empty"><p>The door is closed, and nobody is in.</p></div>`;
-    return html`<div class="empty">
-      <p class="where">Open <strong>${window.location.host}</strong> and type</p>
-      <p class="letters">${codeWords(code)}</p>
-      <div class="qr"><wa-qr-code .value=${joinLink(code)} label="QR code to join" size="220"></wa-qr-code></div>
-      <p>Nobody is here yet.</p>
-      <p class="quiet">Each device that types the code gets its own copy, and it appears here.</p>
-    </div>`;
   }
 
   #closed(wall: WallConnection): TemplateResult {
@@ -265,16 +235,12 @@ export class EskWall extends SignalElement {
           ? html`<button class="btn outline" ?disabled=${this.busy} @click=${() => this.#door(true)}>${icon("unlock")} Let more people in</button>`
           : state.pupils === 0
             ? nothing
-            : html`<div class="door">
-              <div>
-                <small>Open <strong>${window.location.host}</strong> and type</small>
-                <span class="letters" aria-label=${`Code ${state.code}`}>${codeWords(state.code)}</span>
-              </div>
-              ${this.qr ? html`<div class="qr"><wa-qr-code .value=${joinLink(state.code)} label="QR code to join" size="104"></wa-qr-code></div>` : nothing}
-              <button class="icon-btn" title="Close the door: who is in stays in" aria-label="Close the door" ?disabled=${this.busy} @click=${() => this.#door(false)}>
-                ${icon("xmark")}
-              </button>
-            </div>`
+            : openDoor({
+                code: state.code,
+                busy: this.busy,
+                hasPicture: this.qr,
+                onClose: () => void this.#door(false),
+              })
       }
     </header>`;
   }
@@ -359,28 +325,9 @@ export class EskWall extends SignalElement {
     });
   }
 
-  #card(copy: WallCopy, shown: boolean): TemplateResult {
-    const name = copyName(copy);
-    const last = copy.last === null ? "nothing drawn yet" : ago(Date.now() - 1000 * copy.last);
-    const lines = copy.strokes === 1 ? "1 line" : `${copy.strokes} lines`;
-    return html`<li>
-      <button
-        class="copy"
-        aria-pressed=${this.chosen.has(copy.number) ? "true" : "false"}
-        aria-label=${`${name}, ${copy.online > 0 ? "here" : "away"}, ${last}, ${lines}`}
-        @click=${() => this.#toggle(copy.number)}
-      >
-        <span class="picture"><canvas data-copy=${copy.number} aria-hidden="true"></canvas></span>
-        <span class="badges">
-          ${shown ? html`<span class="badge shown">${icon("eye")} Shown to all</span>` : nothing}
-          ${copy.frozen ? html`<span class="badge">${icon("lock")} Frozen</span>` : nothing}
-        </span>
-        <span class="words">
-          <span class="name"><i class=${copy.online > 0 ? "dot here" : "dot"}></i><span title=${name}>${name}</span></span>
-          <span class="facts">${last} · ${lines}</span>
-        </span>
-      </button>
-    </li>`;
+  #card(copy: WallCopy, isShown: boolean): TemplateResult {
+    const { number } = copy;
+    return wallCard(copy, { isShown, isChosen: this.chosen.has(number), onPress: () => this.#toggle(number) });
   }
 
   #actions(shown: number | null): TemplateResult | typeof nothing {
@@ -473,16 +420,6 @@ export class EskWall extends SignalElement {
       }}
     ></esk-wall-compare>`;
   }
-}
-
-/** Few copies are shown large. */
-function cardWidth(count: number): number {
-  return count <= 6 ? 360 : count <= 15 ? 270 : 210;
-}
-
-/** What the picture of the code holds: the page on which a name is asked for. */
-function joinLink(code: string): string {
-  return `${window.location.origin}/join#${code}`;
 }
 
 customElements.define("esk-wall", EskWall);

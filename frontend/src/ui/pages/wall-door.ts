@@ -1,0 +1,45 @@
+/** The way into a class as the wall shows it: the address, the code in large letters, and its picture. */
+
+import "@awesome.me/webawesome/dist/components/qr-code/qr-code.js";
+import { html, nothing, type TemplateResult } from "lit";
+import { codeWords } from "../../app/server/classes/copies.ts";
+import { icon } from "../controls/icons.ts";
+
+/** Before anybody is here the way in fills the page. */
+export function emptyWall(code: string | null): TemplateResult {
+  if (code === null) return html`<div class="empty"><p>The door is closed, and nobody is in.</p></div>`;
+  return html`<div class="empty">
+      <p class="where">Open <strong>${window.location.host}</strong> and type</p>
+      <p class="letters">${codeWords(code)}</p>
+      <div class="qr"><wa-qr-code .value=${joinLink(code)} label="QR code to join" size="220"></wa-qr-code></div>
+      <p>Nobody is here yet.</p>
+      <p class="quiet">Each device that types the code gets its own copy, and it appears here.</p>
+    </div>`;
+}
+
+interface DoorState {
+  readonly code: string;
+  readonly busy: boolean;
+  /** Whether there is room for the picture of the code. */
+  readonly hasPicture: boolean;
+  readonly onClose: () => void;
+}
+
+/** The open door beside the title, once somebody is in. */
+export function openDoor({ code, busy, hasPicture, onClose }: DoorState): TemplateResult {
+  return html`<div class="door">
+              <div>
+                <small>Open <strong>${window.location.host}</strong> and type</small>
+                <span class="letters" aria-label=${`Code ${code}`}>${codeWords(code)}</span>
+              </div>
+              ${hasPicture ? html`<div class="qr"><wa-qr-code .value=${joinLink(code)} label="QR code to join" size="104"></wa-qr-code></div>` : nothing}
+              <button class="icon-btn" title="Close the door: who is in stays in" aria-label="Close the door" ?disabled=${busy} @click=${onClose}>
+                ${icon("xmark")}
+              </button>
+            </div>`;
+}
+
+/** What the picture of the code holds: the page on which a name is asked for. */
+function joinLink(code: string): string {
+  return `${window.location.origin}/join#${code}`;
+}
