@@ -126,12 +126,11 @@ class TerrainWater(ABC):
 
         Parameters
         ----------
-        x, y: the point, metres; the sample that is nearest to it counts.
-        level: 0..6, whose samples the water runs over.
+        x, y, level: those of ``watershed``.
 
         Raises
         ------
-        ValueError: the point lies outside of the terrain, or there is no such level.
+        ValueError: as ``watershed`` does.
 
         Examples
         --------

@@ -3,11 +3,11 @@
 import { signal } from "@preact/signals-core";
 import { describe, expect, test } from "vitest";
 import { Drafts } from "../../src/app/lesson/drafts.ts";
-import { LessonView } from "../../src/app/lesson/lesson-view.ts";
+import { LessonView, NOBODY_LEADS } from "../../src/app/lesson/lesson-view.ts";
 import { apply } from "../../src/doc/apply.ts";
 import { fromDocument, fullStroke } from "../../src/doc/document.ts";
 import { SyncDoc } from "../../src/doc/sync.ts";
-import type { ClientMessage, Document, Lesson, Member, Op, Stroke } from "../../src/generated/contract.ts";
+import type { ClientMessage, Document, Member, Op, Stroke } from "../../src/generated/contract.ts";
 import { PROTOCOL_VERSION } from "../../src/generated/contract.ts";
 import { SETTINGS } from "../settings.ts";
 
@@ -27,20 +27,6 @@ const LINE: Stroke = fullStroke({
   last: [100, 0, 0],
   curve: Array.from({ length: 1500 }, (_, i) => [i / 1499, i % 7]),
 });
-const OPEN: Lesson = {
-  type: "lesson",
-  hands_off: false,
-  protect: false,
-  hide: false,
-  animals: "",
-  look: null,
-  held: false,
-  draws: true,
-  conducts: false,
-  removed: [],
-  waiting: [],
-};
-
 function store() {
   const values = new Map<string, string>();
   return {
@@ -95,14 +81,14 @@ describe("lines that are kept (SPEC L26)", () => {
     doc.submit({ type: "stroke.begin", stroke: { ...LINE, curve: LINE.curve.slice(0, 9) } });
     const [begin] = doc.outgoing();
     doc.submit({ type: "stroke.set", stroke: "s", fields: { curve: LINE.curve.slice(0, 700) } });
-    lesson.receive({ ...OPEN, hands_off: true, draws: false });
+    lesson.receive({ ...NOBODY_LEADS, hands_off: true, draws: false });
     expect(lifted()).toBe(1);
     expect(lesson.drafts.list.value.map((s) => s.curve.length)).toEqual([700]);
     expect(new Drafts(memory, "t").list.value).toEqual(lesson.drafts.list.value);
     for (const { id } of [begin!, ...doc.outgoing()])
       doc.reject({ type: "reject", id, code: "hands_off", message: "Hands off." });
     expect(doc.doc.value!.strokes.size).toBe(0);
-    lesson.receive(OPEN);
+    lesson.receive(NOBODY_LEADS);
     expect(lesson.drafts.list.value).toHaveLength(1);
     lesson.putBack();
     const [back] = [...doc.doc.value!.strokes.values()];
@@ -142,17 +128,17 @@ describe("whose view mine follows (SPEC L27)", () => {
     members.value = [
       { client: "t", name: "Ms Ray", colour: "#000000", role: "owner", person: "p", conducts: true, pen: false },
     ];
-    lesson.receive({ ...OPEN, look: "t" });
+    lesson.receive({ ...NOBODY_LEADS, look: "t" });
     expect([lesson.leader.value, lesson.shower.value]).toEqual(["t", "Ms Ray"]);
     lesson.lookAway(true);
     expect([lesson.leader.value, lesson.shower.value]).toEqual([null, "Ms Ray"]);
-    lesson.receive({ ...OPEN, look: "t", held: true });
+    lesson.receive({ ...NOBODY_LEADS, look: "t", held: true });
     expect(lesson.leader.value).toBe("t");
     lesson.lookAway(true);
     expect(lesson.leader.value).toBe("t");
-    lesson.receive({ ...OPEN, look: "u" });
+    lesson.receive({ ...NOBODY_LEADS, look: "u" });
     expect(lesson.leader.value).toBe("u");
-    lesson.receive({ ...OPEN, look: "me" });
+    lesson.receive({ ...NOBODY_LEADS, look: "me" });
     expect([lesson.leader.value, lesson.shower.value]).toEqual([null, null]);
   });
 

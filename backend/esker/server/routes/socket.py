@@ -126,6 +126,18 @@ async def messages(socket: WebSocket) -> AsyncIterator[str | bytes]:
         yield text if text is not None else data or b""
 
 
+async def accepted(socket: WebSocket, front: Front) -> tuple[WireTransport, str | None, bool]:
+    """Answers the handshake. Returns the transport, the subprotocol, and whether the page comes from here."""
+    offered = socket.scope.get("subprotocols", [])
+    subprotocol = c.SUBPROTOCOL if c.SUBPROTOCOL in offered else None
+    await socket.accept(subprotocol)
+    transport = WireTransport(socket)
+    against = front.against(socket.scope)
+    if against is not None:
+        await refuse(socket, transport, "bad_origin", against[2])
+    return transport, subprotocol, against is None
+
+
 def add_socket(app: FastAPI, hub: Hub, front: Front) -> None:
     """Adds the route."""
     accounts = Accounts()
@@ -133,13 +145,8 @@ def add_socket(app: FastAPI, hub: Hub, front: Front) -> None:
 
     @app.websocket("/ws")
     async def ws(socket: WebSocket) -> None:
-        offered = socket.scope.get("subprotocols", [])
-        subprotocol = c.SUBPROTOCOL if c.SUBPROTOCOL in offered else None
-        await socket.accept(subprotocol)
-        transport = WireTransport(socket)
-        against = front.against(socket.scope)
-        if against is not None:
-            await refuse(socket, transport, "bad_origin", against[2])
+        transport, subprotocol, is_welcome = await accepted(socket, front)
+        if not is_welcome:
             return
         try:
             place = sockets.take(Who(address(socket)))

@@ -7,8 +7,8 @@ import { memberName } from "../device/names.ts";
 import type { Store } from "../device/storage.ts";
 import { Drafts } from "./drafts.ts";
 
-/** How it stands where nobody leads. */
-const OPEN: Lesson = {
+/** How a lesson stands where nobody leads. */
+export const NOBODY_LEADS: Lesson = {
   type: "lesson",
   hands_off: false,
   protect: false,
@@ -46,7 +46,7 @@ export interface LessonHost {
 }
 
 export class LessonView {
-  readonly state = signal<Lesson>(OPEN);
+  readonly state = signal<Lesson>(NOBODY_LEADS);
   readonly drafts: Drafts;
   /** I look away from what is shown, where that is allowed. */
   readonly away = signal(false);
