@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from typing import Any, Final
 
 from esker import contract as c
-from esker.api import live
+from esker.api.live import connection as live
 from esker.api.live.client import LiveTerrain, Refused
 
 PEOPLE: Final = 3

@@ -7,7 +7,7 @@ import os
 import pytest
 
 from bench.strangers import _fault_disk, faults
-from esker.api import live
+from esker.api.live import connection as live
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="kill -9 and fork")
 
