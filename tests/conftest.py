@@ -1,10 +1,15 @@
-"""Memory that solvers keep for later goes between modules: a process that runs hundreds of tests stays small."""
+"""What tests leave behind: no thread of ours, and no memory that solvers keep for later.
+
+A thread that outlives its test goes on beside others, which then fail for what it does.
+"""
 
 from __future__ import annotations
 
 import gc
 import math
 import sys
+import threading
+import time
 from collections.abc import Iterator
 
 import pytest
@@ -13,6 +18,29 @@ from esker.process import system
 
 MUCH = 1 << 30
 """Bytes resident from which on it is worth the time to look for what can go."""
+OURS = (
+    *("care", "door", "elevation", "esker-client", "journal", "leases", "packing", "reading", "renewal", "rivers"),
+    *("solver", "tiles"),
+)
+"""Names of threads that servers and clients start, and end before they are closed."""
+LEAVES_SECONDS = 60.0
+"""A thread that was asked to end may have a solve to finish, on a busy machine."""
+
+
+def threads_left(before: set[threading.Thread], seconds: float = LEAVES_SECONDS) -> list[str]:
+    """The names of our threads that were not there before and do not end in so many seconds."""
+    deadline = time.monotonic() + seconds
+    left = [each for each in threading.enumerate() if each not in before and each.name.startswith(OURS)]
+    for thread in left:
+        thread.join(max(0.0, deadline - time.monotonic()))
+    return [thread.name for thread in left if thread.is_alive()]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _no_thread_stays() -> Iterator[None]:
+    before = set(threading.enumerate())
+    yield
+    assert threads_left(before) == [], "a test left a server or a client open"
 
 
 @pytest.fixture(scope="module", autouse=True)

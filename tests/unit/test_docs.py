@@ -338,3 +338,20 @@ def test_the_design_draws_the_tree_that_is_there() -> None:
     page = text("docs/design.md")
     assert tree_of(page) == packages()
     assert tree_of(page.replace("  wgsl/ ", "  gone/ ")) != packages()
+
+
+def proofs(page: str) -> list[tuple[str, str]]:
+    """The tests that a page names: their file and their name."""
+    return re.findall(r"`((?:tests|frontend/test)/[^`:]+)::([^`]+)`", page)
+
+
+def test_points_of_the_first_hour_name_tests_that_are_there() -> None:
+    """SPEC H516."""
+    found = proofs(text("docs/first-hour.md"))
+    assert len(found) > 50
+    assert [(path, name) for path, name in found if name not in text(path)] == []
+    assert all(row[-1].strip() for row in rows("docs/first-hour.md"))
+    assert proofs("`tests/unit/test_docs.py::test_nothing` `frontend/test/a.test.ts::says so (SPEC U1)`") == [
+        ("tests/unit/test_docs.py", "test_nothing"),
+        ("frontend/test/a.test.ts", "says so (SPEC U1)"),
+    ]

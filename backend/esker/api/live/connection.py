@@ -14,6 +14,8 @@ from typing import Any, Final
 from websockets.asyncio.client import ClientConnection
 from websockets.asyncio.client import connect as open_socket
 from websockets.exceptions import ConnectionClosed, InvalidHandshake, InvalidMessage
+from websockets.proxy import get_proxy
+from websockets.uri import parse_uri
 
 from esker import contract as c
 from esker.api.link import Link, Refused
@@ -46,6 +48,8 @@ class LiveConnection:
     def __init__(self, link: Link, name: str, client: str, tls: ssl.SSLContext | None, *, ground: bool) -> None:
         """``ground``: take the tiles that the server streams."""
         self._link, self._name, self._client, self._tls = link, name, client, tls
+        # Whoever looks for a proxy goes through the environment, which the thread that made us may change at any time.
+        self._proxy = get_proxy(parse_uri(link.url))
         self.sync = SyncDoc(client)
         self.changed = threading.Condition()
         self.role: c.Role = "view"
@@ -151,6 +155,7 @@ class LiveConnection:
             max_size=None,
             compression=None,
             open_timeout=10,
+            proxy=self._proxy,
             **options,
         ) as socket:
             hello = c.Hello(
