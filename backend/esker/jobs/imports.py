@@ -132,7 +132,7 @@ class Imports:
                 reach_m=size_m * c.DEFAULT_REACH_FRACTION,
                 place=place,
             )
-            born, link, secret = await self._hub.create(c.Document(id="new", settings=settings))
+            born, link, secret = await self._hub.create(c.Document(id="new", settings=settings), who)
         except BaseException as error:
             self._end(job, "refused", error.message if isinstance(error, Cannot) else "")
             raise

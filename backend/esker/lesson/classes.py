@@ -9,20 +9,24 @@ from __future__ import annotations
 import asyncio
 import logging
 import secrets
+from collections import OrderedDict
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Future
 from functools import partial
 from typing import Final, NamedTuple, TypeVar
+from weakref import WeakValueDictionary
 
 from esker import contract as c
 from esker.document.ops import Refusal, StrokeSet
 from esker.errors import Cannot
 from esker.fairness.shares import Who
+from esker.fairness.turns import SERVER, Turns
 from esker.lesson import merge
 from esker.session.room.core import Denied
 from esker.session.room.hub import Hub, born_as
-from esker.store.access import Link
-from esker.store.classes import Class, ClassStore, Copy, NoPlace, Pupil
+from esker.session.room.room import Room
+from esker.store.access import Ended, Link, SecretTaken, TooManyLinks
+from esker.store.classes import Class, ClassStore, Copy, NoPlace, Pupil, TooManyClasses
 from esker.store.grids import GridStore
 from esker.store.timestamps import Person
 from esker.store.upkeep.deletion import GRACE_SECONDS
@@ -38,6 +42,19 @@ FULL: Final = "This class is full. Ask your teacher for a place."
 TAKEN: Final = "This group has all the people it may have. Choose another one."
 OVER: Final = "This class is over. Ask your teacher."
 NO_COPY: Final = "There is no such copy in this class."
+MANY: Final = f"A terrain has at most {c.MAX_CLASSES} classes. Delete one."
+MANY_DELETED: Final = (
+    "Many classes of this terrain were deleted within a week. Make this one from a copy of the terrain."
+)
+MOST_KEPT: Final = 40
+"""Classes of one terrain, with those that were deleted and can be brought back."""
+ORDERS, ORDERS_WAITING = 4, 8
+"""What teachers do to all copies of their classes: so much at a time on the server, of which one address has one; and
+what may wait of one address."""
+BEGINNINGS, BEGINNING_STROKES = 8, 500
+"""So many documents that copies begin as are held in memory, and only light ones."""
+PLANS: Final = 3
+"""What is to be done to a copy is planned in a thread so often, while somebody draws in it; then in the event loop."""
 
 
 class Seat(NamedTuple):
@@ -56,7 +73,10 @@ class Classes:
         self.store = ClassStore(hub.journal)
         self._shown: dict[str, tuple[int, c.Shown]] = {}
         """What each class is shown, by class: the number of the copy, and how it is reached."""
-        self._locks: dict[str, asyncio.Lock] = {}
+        self._locks: WeakValueDictionary[str, asyncio.Lock] = WeakValueDictionary()
+        self._orders = Turns(ORDERS, 1, ORDERS_WAITING)
+        self._beginnings: OrderedDict[tuple[str, int], c.Document] = OrderedDict()
+        """What copies begin as, by class and clock."""
         self.hear: list[Callable[[str], object]] = []
         """Who is told that something of a class changed."""
         hub.class_of = self.facts_of
@@ -65,15 +85,19 @@ class Classes:
 
     async def make(self, link: Link, title: str, together: int, places: int, at: int | None, who: Who) -> Class:
         """A class from the terrain of an owner's link as it is, or as it was at a clock. Raises Cannot, Denied."""
-        document = await self._source(link.terrain, at, who)
-        self.hub.door.demand(link)
-        lesson = secrets.token_urlsafe(9)
-        title = title.strip() or document.settings.title
-        made = Class(lesson, link.terrain, title, self.store.now(), document.clock, together, places, None, 0.0, None)
-        if not await _done(self.store.make(made, document, c.MAX_CLASSES)):
-            raise Cannot(409, "too_many_classes", f"A terrain has at most {c.MAX_CLASSES} classes. Delete one.")
-        await _done(self.store.open_door(lesson))
-        return self._found(lesson)
+        async with self._orders.turn(who):
+            document = await self._source(link.terrain, at, who)
+            text = await self.hub.births.encode(document, who)
+            self.hub.door.demand(link)
+            lesson, now = secrets.token_urlsafe(9), self.store.now()
+            title = title.strip() or document.settings.title
+            made = Class(lesson, link.terrain, title, now, document.clock, together, places, None, 0.0, None)
+            try:
+                await _done(self.store.make(made, text, c.MAX_CLASSES, MOST_KEPT))
+            except TooManyClasses as error:
+                raise Cannot(409, "too_many_classes", MANY_DELETED if error.deleted else MANY) from None
+            await _done(self.store.open_door(lesson))
+            return self._found(lesson)
 
     async def _source(self, terrain: str, at: int | None, who: Who) -> c.Document:
         document = await self.hub.document(terrain, at, who)
@@ -123,9 +147,10 @@ class Classes:
             raise Cannot(404, "no_seat", OVER)
         return Seat(lesson, copy, pupil)
 
-    async def sit(self, lesson: Class, secret: str, name: str, chosen: int | None) -> Seat:
+    async def sit(self, lesson: Class, secret: str, name: str, chosen: int | None, who: Who) -> Seat:
         """A seat for a device: the same one again where it has one. ``chosen``: the number of the copy that it wants to
-        share, 0 for one of its own, None for whichever has room. Raises Cannot, store.journal.Unwritable."""
+        share, 0 for one of its own, None for whichever has room. Raises Cannot, shares.Full, store.journal.Unwritable.
+        """
         lock = self._locks.setdefault(lesson.id, asyncio.Lock())
         async with lock:
             known = self.store.seated(secret)
@@ -137,9 +162,11 @@ class Classes:
             if len(pupils) >= lesson.places:
                 raise Cannot(409, "class_full", FULL)
             try:
-                await self._take(lesson, secret, name, self._number(lesson, copies, pupils, chosen))
+                await self._take(lesson, secret, name, self._number(lesson, copies, pupils, chosen), who)
             except NoPlace:
                 raise Cannot(409, "class_full", FULL) from None
+            except SecretTaken:
+                raise Cannot(409, "secret_taken", "This seat is not free any more. Reload the page.") from None
         seat = self.seat_of(secret)
         self._tell(lesson.id, [seat.copy])
         self._changed(lesson.id)
@@ -153,7 +180,7 @@ class Classes:
 
     def _number(self, lesson: Class, copies: Sequence[Copy], pupils: Sequence[Pupil], chosen: int | None) -> int:
         """The number of the copy for somebody who comes: of one that is there, or the next one."""
-        following = max((copy.number for copy in copies), default=0) + 1
+        following = min(set(range(1, len(copies) + 2)) - {copy.number for copy in copies})
         if lesson.together == 1 or chosen == 0:
             return following
         free = [k.number for k in copies if sum(p.number == k.number for p in pupils) < lesson.together]
@@ -163,7 +190,7 @@ class Classes:
             raise Cannot(409, "group_full", TAKEN)
         return chosen
 
-    async def _take(self, lesson: Class, secret: str, name: str, number: int) -> None:
+    async def _take(self, lesson: Class, secret: str, name: str, number: int, who: Who) -> None:
         """Writes the seat, and the copy where it is a new one, in one commit."""
         copy = next((each for each in self.store.copies(lesson.id) if each.number == number), None)
         if copy is not None:
@@ -171,14 +198,13 @@ class Classes:
             pupil = Pupil(link.id, lesson.id, number, name, self.store.now())
             await _done(self.hub.journal.submit(self.store.seating(insert, pupil), lesson.terrain))
             return
-        start = await asyncio.to_thread(self.store.document, lesson.id)
-        if start is None:
-            raise Cannot(404, "no_class", OVER)
+        start = await self.beginning(lesson, who)
         settings = start.settings.model_copy(update={"title": lesson.title})
         born = born_as(start.model_copy(update={"settings": settings}))
         link, _, insert = self.hub.access.make(born.id, "edit", name, None, secret)
         pupil = Pupil(link.id, lesson.id, number, name, self.store.now())
-        await _done(self.hub.journal.create(born, self.store.seating(insert, pupil, born.id), lesson.terrain))
+        seated = self.store.seating(insert, pupil, born.id)
+        await self.hub.births.write(born, seated, who, lesson.terrain)
 
     # --- what pages are told ------------------------------------------------------------------------------------
 
@@ -227,10 +253,19 @@ class Classes:
         return [copy for copy in copies if copy.number in numbers]
 
     async def open(self, lesson: Class, number: int, link: Link) -> tuple[str, str]:
-        """A link of an owner to a copy, made through the teacher's own: terrain and secret. It ends with that."""
+        """A link of an owner to a copy, made through the teacher's own: terrain and secret. It ends with that. Raises
+        Cannot."""
         (copy,) = self.chosen(lesson, [number])
-        _, secret = await _done(self.hub.access.add(copy.terrain, "owner", OPENED, link))
-        return copy.terrain, secret
+        return copy.terrain, await self._link(copy.terrain, "owner", OPENED, link)
+
+    async def _link(self, terrain: str, role: c.Role, name: str, by: Link | None = None) -> str:
+        try:
+            _, secret = await _done(self.hub.access.add(terrain, role, name, by))
+        except TooManyLinks:
+            raise Cannot(409, "too_many_links", "This copy has too many links. Revoke some.") from None
+        except Ended:
+            raise Cannot(403, "revoked", "Your own link was revoked or renewed meanwhile.") from None
+        return secret
 
     async def freeze(self, lesson: Class, numbers: Sequence[int] | None, frozen: bool) -> None:
         """Nobody but owners changes these copies any more, or everybody may again."""
@@ -239,39 +274,51 @@ class Classes:
         self._tell(lesson.id)
         self._changed(lesson.id)
 
-    async def restart(self, lesson: Class, numbers: Sequence[int] | None) -> int:
+    async def restart(self, lesson: Class, numbers: Sequence[int] | None, who: Who) -> int:
         """Brings copies back to their beginning; what was drawn stays in their history. Returns how many changed."""
-        start = await self._beginning(lesson)
-        return await self._each(self.chosen(lesson, numbers), partial(merge.beginning, start))
+        async with self._orders.turn(who):
+            start = await self.beginning(lesson, who)
+            return await self._each(self.chosen(lesson, numbers), partial(merge.beginning, start), who)
 
     async def push(self, lesson: Class, who: Who) -> int:
         """Brings what changed in the terrain of the class since into all copies. Returns how many copies changed.
 
         The class notes it last: cut off half way, it is done again, and nothing of it twice.
         """
-        before, now = await self._beginning(lesson), await self._source(lesson.terrain, None, who)
-        known = {stroke.id for stroke in before.strokes}
-        drawn = tuple(stroke for stroke in now.strokes if stroke.finished or stroke.id in known)
-        now = now.model_copy(update={"strokes": drawn})
-        changed = await self._each(self.store.copies(lesson.id), partial(merge.additions, before, now))
-        await _done(self.store.set_document(lesson.id, now.clock, now))
-        return changed
+        async with self._orders.turn(who):
+            before, now = await self.beginning(lesson, who), await self._source(lesson.terrain, None, who)
+            known = {stroke.id for stroke in before.strokes}
+            drawn = tuple(stroke for stroke in now.strokes if stroke.finished or stroke.id in known)
+            now = now.model_copy(update={"strokes": drawn})
+            text = await self.hub.births.encode(now, who)
+            changed = await self._each(self.store.copies(lesson.id), partial(merge.additions, before, now), who)
+            await _done(self.store.set_document(lesson.id, now.clock, text))
+            return changed
 
-    async def _beginning(self, lesson: Class) -> c.Document:
-        start = await asyncio.to_thread(self.store.document, lesson.id)
+    async def beginning(self, lesson: Class, who: Who) -> c.Document:
+        """What copies of a class begin as, read for ``who``. Raises Cannot, Denied."""
+        key = lesson.id, lesson.clock
+        if (held := self._beginnings.get(key)) is not None:
+            return held
+        start = await self.hub.read(who, self.store.document, lesson.id)
         if start is None:
             raise Cannot(404, "no_class", OVER)
+        if len(start.strokes) + len(start.layers) <= BEGINNING_STROKES:
+            self._beginnings[key] = start
+            while len(self._beginnings) > BEGINNINGS:
+                self._beginnings.popitem(last=False)
         return start
 
-    async def _each(self, copies: Sequence[Copy], plan: Callable[[StrokeSet], list[c.SimpleOp]]) -> int:
-        """Does in each copy what ``plan`` says of it, one copy after another. Raises Cannot once all were tried."""
+    async def _each(self, copies: Sequence[Copy], plan: Callable[[StrokeSet], list[c.SimpleOp]], who: Who) -> int:
+        """Does in each copy what ``plan`` says of it, one copy after another, for ``who``. Raises Cannot once all were
+        tried."""
         changed, refused = 0, ""
         for copy in copies:
             if self.hub.deletion.deleted(copy.terrain) is not None:
                 continue
             try:
-                room = await self.hub.room(copy.terrain)
-                ops = plan(room.core.head)
+                room = await self.hub.room(copy.terrain, who)
+                ops = await self._planned(room, plan, who)
                 for op in merge.groups(ops):
                     agent = f"class-{secrets.token_urlsafe(9)}"
                     self.hub.journal.append(copy.terrain, (), None, (Person(agent, OPENED, TEACHER_COLOUR),))
@@ -284,24 +331,37 @@ class Classes:
             raise Cannot(409, "refused", refused)
         return changed
 
+    async def _planned(self, room: Room, plan: Callable[[StrokeSet], list[c.SimpleOp]], who: Who) -> list[c.SimpleOp]:
+        """What ``plan`` says of a room as it is: a heavy one is compared in a thread."""
+        for _ in range(PLANS):
+            head = room.core.head
+            ops = await self.hub.read(who, plan, head)
+            if room.core.head is head:
+                return ops
+        return plan(room.core.head)
+
     async def together(self, lesson: Class, numbers: Sequence[int], title: str, who: Who) -> tuple[c.Document, str]:
         """A new terrain with the strokes of these copies: its document, and the secret of its owner's link."""
-        copies = self.chosen(lesson, numbers)
-        start = await self._beginning(lesson)
-        sets = [await self.hub.strokes(copy.terrain, None, who) for copy in copies]
-        try:
-            made = merge.together(start, [found.strokes.values() for found in sets], title.strip() or lesson.title)
-        except Refusal as refusal:
-            raise Cannot(409, "refused", f"Together they are too much for one terrain. {refusal.message}") from None
-        born, _, secret = await self.hub.create(made)
-        return born, secret
+        async with self._orders.turn(who):
+            copies = self.chosen(lesson, numbers)
+            made = merge.Together(await self.beginning(lesson, who))
+            try:
+                for copy in copies:
+                    found = await self.hub.strokes(copy.terrain, None, who)
+                    await self.hub.read(who, made.add, found.strokes.values())
+                document = await self.hub.read(who, made.document, title.strip() or lesson.title)
+            except Refusal as refusal:
+                message = f"Together they are too much for one terrain. {refusal.message}"
+                raise Cannot(409, "refused", message) from None
+            born, _, secret = await self.hub.create(document, who)
+            return born, secret
 
     async def show(self, lesson: Class, number: int | None) -> None:
-        """Sends the pages of the class to look at one copy; None: back to their own."""
+        """Sends the pages of the class to look at one copy; None: back to their own. Raises Cannot."""
         copies = self.store.copies(lesson.id)
         if number is not None:
             (copy,) = self.chosen(lesson, [number])
-            _, secret = await _done(self.hub.access.add(copy.terrain, "view", SHOWN))
+            secret = await self._link(copy.terrain, "view", SHOWN)
             names = ", ".join(p.name for p in self.store.pupils(lesson.id) if p.number == number and p.name)
             line = (names or f"Copy {number}")[:240]
             self._shown[lesson.id] = (number, c.Shown(terrain=copy.terrain, secret=secret, name=line))
@@ -311,16 +371,15 @@ class Classes:
         self._changed(lesson.id)
         keep = self._shown.get(lesson.id)
         for each in copies:  # links of former shows, also of before a restart of the server
-            for link in self.hub.access.links(each.terrain):
-                if link.name == SHOWN and link.role == "view" and link.revoked is None:
-                    if keep is not None and self.hub.access.check(each.terrain, keep[1].secret) == link:
-                        continue
-                    ended = await _done(self.hub.access.revoke(each.terrain, link.id))
-                    asyncio.get_running_loop().call_later(2.0, self.hub.end_links, each.terrain, ended)
+            for link in self.hub.access.called(each.terrain, "view", SHOWN):
+                if keep is not None and self.hub.access.check(each.terrain, keep[1].secret) == link:
+                    continue
+                ended = await _done(self.hub.access.revoke(each.terrain, link.id))
+                asyncio.get_running_loop().call_later(2.0, self.hub.end_links, each.terrain, ended)
 
     # --- the end ------------------------------------------------------------------------------------------------
 
-    async def end(self, lesson: Class, at_once: bool) -> float:
+    async def end(self, lesson: Class, at_once: bool, who: Who = SERVER) -> float:
         """Deletes a class with all its copies; everybody in them is closed. Returns until when it can be brought back,
         seconds since 1970. ``at_once``: never."""
         ended = await _done(self.store.end(lesson.id, at_once))
@@ -328,7 +387,7 @@ class Classes:
         for copy in self.store.copies(lesson.id):
             await self.hub.close_deleted(copy.terrain)
         if at_once:
-            await asyncio.to_thread(self.hub.deletion.remove_old)
+            await self.hub.read(who, self.hub.deletion.remove_old)
         self._changed(lesson.id)
         return ended if at_once else ended + GRACE_SECONDS
 

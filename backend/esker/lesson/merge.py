@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Final
 
 from esker import contract as c
-from esker.document.ops import StrokeSet, check_document
+from esker.document.ops import Refusal, StrokeSet, check_document
 
 GROUP_POINTS: Final = 8_000
 """Points of one group: what is told of it stays far below what a member's connection may hold."""
@@ -90,20 +90,38 @@ def beginning(start: c.Document, copy: StrokeSet) -> list[c.SimpleOp]:
     return [*ops, c.SetTerrain(fields=c.TerrainFields(**fields))] if fields else ops
 
 
-def together(start: c.Document, copies: Sequence[Iterable[c.Stroke]], title: str) -> c.Document:
-    """One document with the strokes of several copies, on the layers and settings of their beginning.
+class Together:
+    """Copies as they become one terrain, one after another: no more of them is held than what comes into it.
 
     A stroke that several have alike is there once. Where they differ under one id, the first keeps the id and the
-    others get new ones. Raises Refusal where they are too many for a terrain.
+    others get new ones.
     """
-    strokes: dict[str, c.Stroke] = {}
-    for copy in copies:
+
+    def __init__(self, start: c.Document) -> None:
+        """``start``: whose layers and settings it has."""
+        self._start, self._strokes = start, dict[str, c.Stroke]()
+
+    def add(self, copy: Iterable[c.Stroke]) -> None:
+        """The strokes of one more copy. Raises Refusal as soon as they are too many for a terrain."""
         for stroke in copy:
-            _put(strokes, stroke)
-    settings = start.settings.model_copy(update={"title": title})
-    made = start.model_copy(update={"settings": settings, "strokes": tuple(strokes.values())})
-    check_document(made)
-    return made
+            _put(self._strokes, stroke)
+            if len(self._strokes) > c.MAX_STROKES:
+                raise Refusal("too_many_strokes", f"A terrain holds at most {c.MAX_STROKES} strokes.")
+
+    def document(self, title: str) -> c.Document:
+        """All of them as one document. Raises Refusal where they are too much for a terrain."""
+        settings = self._start.settings.model_copy(update={"title": title})
+        made = self._start.model_copy(update={"settings": settings, "strokes": tuple(self._strokes.values())})
+        check_document(made)
+        return made
+
+
+def together(start: c.Document, copies: Iterable[Iterable[c.Stroke]], title: str) -> c.Document:
+    """One document with the strokes of several copies. Raises Refusal where they are too many for a terrain."""
+    made = Together(start)
+    for copy in copies:
+        made.add(copy)
+    return made.document(title)
 
 
 def _put(strokes: dict[str, c.Stroke], stroke: c.Stroke) -> None:

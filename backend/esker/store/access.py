@@ -127,6 +127,11 @@ class Access:
         )
         return [_link(row) for row in rows]
 
+    def called(self, terrain: str, role: Role, name: str) -> list[Link]:
+        """The living links of a terrain that have this role and name."""
+        sql = f"SELECT {_COLUMNS} FROM links WHERE terrain=? AND role=? AND name=? AND revoked IS NULL"
+        return [_link(row) for row in self._journal.reader().execute(sql, (terrain, role, name))]
+
     def elsewhere(self, terrain: str, links: Collection[str]) -> dict[str, str]:
         """Returns the terrains of those links, by id, that are not of ``terrain``."""
         db = self._journal.reader()

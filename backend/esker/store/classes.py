@@ -16,8 +16,7 @@ from typing import Any, Final, NamedTuple
 
 from esker import contract as c
 from esker.document.former import read_document
-from esker.document.wire import document_json
-from esker.store.access import CODE_ALPHABET, CODE_LIFE_SECONDS, code_length, hashed
+from esker.store.access import CODE_ALPHABET, CODE_LIFE_SECONDS, SecretTaken, code_length, hashed
 from esker.store.engine.ports import Connection
 from esker.store.journal import Journal
 
@@ -59,7 +58,16 @@ class NoPlace(Exception):
     """The class, or the copy that was chosen, has no place left. Nothing was done."""
 
 
+class TooManyClasses(Exception):
+    """The terrain has as many classes as it may have. ``deleted``: with those that can still be brought back."""
+
+    def __init__(self, deleted: bool) -> None:
+        super().__init__(deleted)
+        self.deleted = deleted
+
+
 _COLUMNS: Final = "id,terrain,title,created,clock,together,places,code,code_until,ended"
+_EMPTY: Final = "NOT EXISTS (SELECT 1 FROM copies WHERE copies.class=classes.id)"
 
 
 class ClassStore:
@@ -70,17 +78,17 @@ class ClassStore:
 
     # --- classes ------------------------------------------------------------------------------------------------
 
-    def make(self, made: Class, document: c.Document, most: int) -> Future[bool]:
-        """Writes a new class; False where the terrain has ``most`` classes already."""
-        text = document_json(document)
+    def make(self, made: Class, document: str, most: int, kept: int) -> Future[None]:
+        """Writes a new class with its document as JSON. It fails with TooManyClasses where the terrain has ``most``
+        classes already, or ``kept`` with those that were deleted."""
 
-        def write(db: Connection) -> bool:
-            live = "SELECT count(*) FROM classes WHERE terrain=? AND ended IS NULL"
-            if db.execute(live, (made.terrain,)).fetchone()[0] >= most:
-                return False
-            self._journal.space.need(len(text))
-            db.execute(f"INSERT INTO classes ({_COLUMNS},document) VALUES (?,?,?,?,?,?,?,?,?,?,?)", (*made, text))
-            return True
+        def write(db: Connection) -> None:
+            count = "SELECT count(*), count(*) - count(ended) FROM classes WHERE terrain=?"
+            found, live = db.execute(count, (made.terrain,)).fetchone()
+            if live >= most or found >= kept:
+                raise TooManyClasses(live < most)
+            self._journal.space.need(len(document))
+            db.execute(f"INSERT INTO classes ({_COLUMNS},document) VALUES (?,?,?,?,?,?,?,?,?,?,?)", (*made, document))
 
         return self._journal.submit(write, made.terrain)
 
@@ -108,10 +116,9 @@ class ClassStore:
         row = self._db.execute("SELECT document FROM classes WHERE id=?", (lesson,)).fetchone()
         return None if row is None else read_document(row[0])
 
-    def set_document(self, lesson: str, clock: int, document: c.Document) -> Future[None]:
-        """From now on copies begin as this document, of the clock ``clock`` of the class's terrain."""
-        text = document_json(document)
-        return self._write(lesson, "UPDATE classes SET clock=?, document=? WHERE id=?", (clock, text, lesson))
+    def set_document(self, lesson: str, clock: int, document: str) -> Future[None]:
+        """From now on copies begin as this document (JSON), of the clock ``clock`` of the class's terrain."""
+        return self._write(lesson, "UPDATE classes SET clock=?, document=? WHERE id=?", (clock, document, lesson))
 
     def open_door(self, lesson: str) -> Future[str]:
         """Gives the class a new code; the one before ends."""
@@ -173,7 +180,8 @@ class ClassStore:
     ) -> Callable[[Connection], None]:
         """What writes a device with its link in one commit; ``new``: the terrain of the copy, where that is a new one.
 
-        It raises NoPlace where the class or the copy is full, or the class deleted.
+        It raises NoPlace where the class or the copy is full, or the class deleted, and SecretTaken where a link has
+        the secret of the seat already.
         """
 
         def write(db: Connection) -> None:
@@ -188,7 +196,10 @@ class ClassStore:
                 raise NoPlace
             if new is not None:
                 db.execute("INSERT INTO copies VALUES (?,?,?,0)", (pupil.lesson, pupil.number, new))
-            insert_link(db)
+            try:
+                insert_link(db)
+            except db.IntegrityError:
+                raise SecretTaken from None
             db.execute("INSERT INTO pupils VALUES (?,?,?,?,?)", pupil)
 
         return write
@@ -214,6 +225,7 @@ class ClassStore:
             )
             if at_once:
                 db.execute("DELETE FROM pupils WHERE class=?", (lesson,))
+                db.execute(f"DELETE FROM classes WHERE id=? AND {_EMPTY}", (lesson,))
             return now
 
         return self._journal.submit(write, self.home(lesson))
@@ -266,8 +278,9 @@ def changed_at(journal: Journal, terrain: str) -> float | None:
 
 
 def forget(db: Connection, terrain: str) -> None:
-    """A terrain is removed for good: so are its place in a class and the names there, and a class without copies that
-    was deleted. The classes that were made from it are deleted, and their copies with them."""
+    """A terrain is removed for good: so are its place in a class and the names there, and its class where that was
+    deleted and has no other copy. The classes that were made from it are deleted, and their copies with them."""
+    copied = db.execute("SELECT class FROM copies WHERE terrain=?", (terrain,)).fetchone()
     db.execute(
         "DELETE FROM pupils WHERE (class, number) IN (SELECT class, number FROM copies WHERE terrain=?)", (terrain,)
     )
@@ -279,7 +292,15 @@ def forget(db: Connection, terrain: str) -> None:
         " (SELECT terrain FROM copies WHERE class IN (SELECT id FROM classes WHERE terrain=?))",
         (now, terrain),
     )
-    db.execute("DELETE FROM classes WHERE ended IS NOT NULL AND id NOT IN (SELECT class FROM copies)")
+    db.execute(
+        f"DELETE FROM classes WHERE ended IS NOT NULL AND {_EMPTY} AND (id=? OR terrain=?)",
+        ("" if copied is None else copied[0], terrain),
+    )
+
+
+def forget_empty(db: Connection, before: float) -> None:
+    """Removes classes without copies that were deleted before a time, seconds since 1970."""
+    db.execute(f"DELETE FROM classes WHERE ended<? AND {_EMPTY}", (before,))
 
 
 def _class(row: Sequence[Any]) -> Class:

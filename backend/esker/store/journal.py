@@ -167,19 +167,23 @@ class Journal:
         return self._sizes.get(terrain, 0) > self._quota // 2
 
     def create(
-        self, document: c.Document, also: Callable[[Connection], Any] | None = None, by: str | None = None
+        self,
+        document: c.Document,
+        also: Callable[[Connection], Any] | None = None,
+        by: str | None = None,
+        text: str | None = None,
     ) -> Future[None]:
-        """A new terrain, born as ``document``, with what ``also`` writes, or neither.
+        """A new terrain, born as ``document``, with what ``also`` writes, or neither. ``text``: the document as JSON.
 
         ``by``: the terrain whose rows ``also`` writes beside those of the new one. Fails with UsedTwice when the id
         exists.
         """
 
         def write(db: Connection) -> None:
-            self.space.need()
+            self.space.need(len(text or ""))
             db.execute("INSERT INTO terrains (id,created) VALUES (?,?)", (document.id, self._now()))
             name_grids(db, document.id, (layer.content for layer in (*document.layers, *document.deleted_layers)))
-            put_snapshot(db, document)
+            put_snapshot(db, document, text)
             if also is not None:
                 also(db)
 

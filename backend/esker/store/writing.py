@@ -32,11 +32,13 @@ def name_grids(db: Connection, terrain: str, digests: Iterable[str]) -> None:
     )
 
 
-def put_snapshot(db: Connection, document: c.Document) -> None:
-    """Keeps a document as a snapshot, and thins out those before it."""
+def put_snapshot(db: Connection, document: c.Document, text: str | None = None) -> None:
+    """Keeps a document as a snapshot, and thins out those before it. ``text``: the document as JSON, where it was
+    encoded before: of a heavy one that takes as long as many commits."""
+    text = document_json(document) if text is None else text
     db.execute(
         "INSERT INTO snapshots VALUES (?,?,?) ON CONFLICT (terrain, clock) DO UPDATE SET document=excluded.document",
-        (document.id, document.clock, document_json(document)),
+        (document.id, document.clock, text),
     )
     # The first snapshot (the terrain's birth) stays for ever, the two newest do, and between them one in each stretch
     # of the history: no clock is much farther than a stretch from a snapshot before it. Stretches double as it grows.

@@ -104,7 +104,7 @@ def _add_class(app: FastAPI, classes: Classes) -> None:
     async def delete(request: Request, lesson: str, link: OwnerLink, at_once: bool = False) -> dict[str, Any]:
         limited(request, app.state.class_asks, "orders")
         found = classes.owned(link, lesson, ended=at_once)
-        return {"id": lesson, "until": await classes.end(found, at_once)}
+        return {"id": lesson, "until": await classes.end(found, at_once, asker(request, link))}
 
     @app.post(f"{path}/{{lesson}}/restore")
     async def restore(lesson: str, link: OwnerLink) -> dict[str, Any]:
@@ -138,7 +138,7 @@ def _add_orders(app: FastAPI, classes: Classes) -> None:
     @app.post(f"{path}/restart")
     async def restart(request: Request, lesson: str, link: OwnerLink, body: Chosen) -> dict[str, Any]:
         limited(request, app.state.class_asks, "orders")
-        return {"changed": await classes.restart(classes.owned(link, lesson), body.numbers)}
+        return {"changed": await classes.restart(classes.owned(link, lesson), body.numbers, asker(request, link))}
 
     @app.post(f"{path}/push")
     async def push(request: Request, lesson: str, link: OwnerLink) -> dict[str, Any]:
@@ -195,7 +195,7 @@ def _add_seats(app: FastAPI, classes: Classes) -> None:
             raise Cannot(404, "bad_code", "This code opens another class. Type it again.")
         if classes.store.seated(body.seat) is None:
             limited(request, app.state.new_terrains, "new terrains came")
-        return _seat(await classes.sit(found, body.seat, body.name.strip(), body.number))
+        return _seat(await classes.sit(found, body.seat, body.name.strip(), body.number, asker(request)))
 
     @app.get("/api/seat")
     async def seat(request: Request) -> dict[str, Any]:

@@ -75,7 +75,7 @@ def add_history(app: FastAPI, hub: Hub, grids: GridStore) -> None:
         if not all(grids.has(layer.content) for layer in document.layers):
             raise Cannot(409, "no_grid", "An elevation grid of that time is not on this server any more.")
         hub.door.demand(link)
-        born, made, secret = await hub.create(_copy(document, body.title))
+        born, made, secret = await hub.create(_copy(document, body.title), asker(request, link))
         return {
             "id": born.id,
             "title": born.settings.title,

@@ -14,6 +14,7 @@ from esker import templates
 from esker.document import archive
 from esker.document.birth import new_document
 from esker.errors import Cannot
+from esker.fairness.shares import Who
 from esker.fairness.turns import Turns
 from esker.patchwork.raster.rasters import RasterError
 from esker.server.routes.answers import AnyLink, asker, limited, shown
@@ -48,14 +49,14 @@ def add_terrains(app: FastAPI, hub: Hub, grids: GridStore) -> None:
         document = _new_document(body)
         if body.template is not None and document.layers:
             await asyncio.to_thread(_put_all, grids, templates.load(body.template))
-        return await _create(hub, document)
+        return await _create(hub, document, asker(request))
 
     @app.post("/api/terrains/import", status_code=201)
     async def upload(request: Request) -> dict[str, str]:
         limited(request, app.state.new_terrains, "new terrains came")
         with app.state.receiving.take(asker(request)):
             document = await _taken_in(request, grids, app.state.uploads)
-        return await _create(hub, document)
+        return await _create(hub, document, asker(request))
 
     @app.get("/api/terrains/{terrain}")
     async def about(request: Request, terrain: str, link: AnyLink) -> dict[str, Any]:
@@ -111,8 +112,8 @@ def _new_document(body: NewTerrain) -> c.Document:
     return document
 
 
-async def _create(hub: Hub, document: c.Document) -> dict[str, str]:
-    born, link, secret = await hub.create(document)
+async def _create(hub: Hub, document: c.Document, who: Who) -> dict[str, str]:
+    born, link, secret = await hub.create(document, who)
     return {"id": born.id, "title": born.settings.title, "secret": secret, "role": link.role}
 
 

@@ -16,6 +16,7 @@ from esker.document.ops import Limits, StrokeSet
 from esker.fairness.shares import Full, Share, Who, homes
 from esker.fairness.turns import SERVER, FairThreads
 from esker.process import memory
+from esker.session.births import Births
 from esker.session.ground.ports import Elevation, Tiles
 from esker.session.ground.tilethread import TileThread
 from esker.session.ground.worker import Worker
@@ -90,6 +91,7 @@ class Hub:
         self._base_threads = ThreadPoolExecutor(1, thread_name_prefix="elevation")
         self.reading = FairThreads(READERS, "reading", READS_WAITING)
         """Threads that read the journal. One address has at most half of them."""
+        self.births = Births(journal, self.reading)
         self.packing = FairThreads(PACKERS, "packing", PACKS_WAITING)
         """Threads that make files of stored data."""
         self._history_rates = history_rates()
@@ -289,14 +291,14 @@ class Hub:
 
     # --- terrains -----------------------------------------------------------------------------------------------
 
-    async def create(self, document: c.Document) -> tuple[c.Document, Link, str]:
+    async def create(self, document: c.Document, who: Who = SERVER) -> tuple[c.Document, Link, str]:
         """A new terrain born as ``document`` under a fresh id, with its owner link and that link's secret.
 
-        Raises store.journal.Unwritable; then there is neither.
+        Raises Cannot (429), shares.Full, store.journal.Unwritable; then there is neither.
         """
         born = born_as(document)
         link, secret, insert = self.access.make(born.id, "owner", "Owner")
-        await asyncio.wrap_future(self.journal.create(born, insert))
+        await self.births.write(born, insert, who)
         return born, link, secret
 
     async def document(self, terrain: str, at: int | None = None, who: Who = SERVER) -> c.Document:

@@ -58,10 +58,11 @@ class Deletion:
         return self._journal.submit(write, terrain)
 
     def expire(self) -> Future[int]:
-        """Marks terrains that nobody ever drew on; the future gives how many."""
+        """Marks terrains that nobody ever drew on; the future gives how many. Classes without copies go for good."""
         now = self._now()
 
         def write(db: Connection) -> int:
+            classes.forget_empty(db, now - GRACE_SECONDS)
             changed = db.execute(
                 "UPDATE terrains SET deleted=?1 WHERE deleted IS NULL AND created < ?2"
                 " AND NOT EXISTS (SELECT 1 FROM ops WHERE ops.terrain = terrains.id)"
