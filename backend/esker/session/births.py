@@ -8,7 +8,6 @@ whoever asks for it a few bytes, and the server as many as the terrain has.
 from __future__ import annotations
 
 import asyncio
-import sqlite3
 import time
 from collections.abc import Callable
 from typing import Any, Final
@@ -38,10 +37,8 @@ class Births:
         self._turns = Turns(1, waiting=WAITING)
         self.rates = Rates(BORN, total=ALL_BORN)
 
-    async def write(
-        self, born: c.Document, also: Callable[[sqlite3.Connection], Any] | None = None, who: Who = SERVER
-    ) -> None:
-        """Writes a new terrain with what ``also`` writes, or neither.
+    async def write(self, born: c.Document, also: Callable[[Any], Any] | None = None, who: Who = SERVER) -> None:
+        """Writes a new terrain with what ``also`` writes into the database, or neither.
 
         Raises Cannot (429), shares.Full, store.journal.Unwritable, and what ``also`` raises.
         """
