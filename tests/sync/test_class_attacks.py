@@ -1,4 +1,4 @@
-"""Classes under attack, by whoever may make them: what a class costs is its teacher's own (SPEC P531 to P536, J452)."""
+"""Classes under attack, by whoever may make them: what a class costs is its teacher's own (SPEC P531 to P535, J452)."""
 
 from __future__ import annotations
 
