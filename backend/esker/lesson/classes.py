@@ -52,7 +52,7 @@ ORDERS, ORDERS_WAITING = 4, 8
 """What teachers do to all copies of their classes: so much at a time on the server, of which one address has one; and
 what may wait of one address."""
 BEGINNINGS, BEGINNING_STROKES = 8, 500
-"""So many documents that copies begin as are held in memory, and only light ones."""
+"""The memory holds the beginnings of copies of so many classes, light ones only."""
 PLANS: Final = 3
 """What is to be done to a copy is planned in a thread so often, while somebody draws in it; then in the event loop."""
 
