@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import secrets
-import sqlite3
 import threading
 from collections.abc import Iterator
 from concurrent.futures import Future
@@ -69,11 +68,11 @@ def test_new_terrains_are_written_one_after_another(journal: Journal) -> None:
     more, waiting = threading.Event(), []
     create = journal.create
 
-    def noted(document: c.Document, also: Any = None, text: str | None = None) -> Any:
+    def noted(document: c.Document, also: Any = None, by: str | None = None, text: str | None = None) -> Any:
         assert text is not None, "it was encoded before"
         written.append(document.id)
         waiting.append(journal.waiting)
-        return create(document, lambda _: more.wait(30), text)
+        return create(document, lambda _: more.wait(30), by, text)
 
     journal.create = noted  # type: ignore[method-assign]
 
@@ -231,7 +230,7 @@ def test_numbers_of_copies_stay_within_their_bound(server: LiveServer, teacher: 
     deletion = server.assembly.hub.deletion
     journal = server.assembly.hub.journal
 
-    def gone(db: sqlite3.Connection) -> None:
+    def gone(db: Any) -> None:
         db.execute("UPDATE terrains SET deleted=0 WHERE id=?", (pupils[1].terrain,))
 
     journal.submit(gone).result()

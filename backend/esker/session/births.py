@@ -37,17 +37,24 @@ class Births:
         self._turns = Turns(1, waiting=WAITING)
         self.rates = Rates(BORN, total=ALL_BORN)
 
-    async def write(self, born: c.Document, also: Callable[[Any], Any] | None = None, who: Who = SERVER) -> None:
-        """Writes a new terrain with what ``also`` writes into the database, or neither.
+    async def write(
+        self,
+        born: c.Document,
+        also: Callable[[Any], Any] | None = None,
+        who: Who = SERVER,
+        by: str | None = None,
+    ) -> None:
+        """Writes a new terrain with what ``also`` writes into the database, or neither. ``by``: the terrain whose rows
+        ``also`` writes beside those of the new one.
 
         Raises Cannot (429), shares.Full, store.journal.Unwritable, and what ``also`` raises.
         """
         if who == SERVER:  # what the server makes for itself is empty, and waits for nobody
-            await asyncio.wrap_future(self._journal.create(born, also))
+            await asyncio.wrap_future(self._journal.create(born, also, by))
             return
         text = await self.encode(born, who)
         async with self._turns.turn(who):
-            await asyncio.wrap_future(self._journal.create(born, also, text))
+            await asyncio.wrap_future(self._journal.create(born, also, by, text))
 
     async def encode(self, document: c.Document, who: Who) -> str:
         """A document that is to be written, as JSON; it counts for ``who``. Raises Cannot (429), shares.Full."""
