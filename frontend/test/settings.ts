@@ -21,4 +21,6 @@ export const SETTINGS: TerrainSettings = {
   sun_azimuth_deg: 115,
   sun_elevation_deg: 24,
   place: null,
+  task: null,
+  task_pictures: [],
 };

@@ -90,17 +90,27 @@ def test_what_has_no_layers_is_a_file_for_older_versions(grids: dict[str, Raster
             assert file.namelist() == ["esker.json", "document.json"]
 
 
-def test_what_has_gullies_is_a_file_for_this_version() -> None:
+def test_what_has_gullies_is_a_file_for_version_six() -> None:
     """SPEC F201: what has none is written as before, and a file that does not say has none."""
     plain = c.Document(id="t")
     worn = plain.model_copy(update={"settings": c.TerrainSettings(erosion=1.0, hold=0.5)})
     brush = Stroke.paint([(500, 500), (900, 700)], "erosion", -1.0)
     painted = plain.model_copy(update={"strokes": (brush,)})
-    for document, version in ((plain, 2), (worn, archive.VERSION), (painted, archive.VERSION)):
+    for document, version in ((plain, 2), (worn, 6), (painted, 6)):
         data = archive.dumps(document)
         with zipfile.ZipFile(io.BytesIO(data)) as file:
             assert json.loads(file.read("esker.json"))["version"] == version
         assert archive.loads(data) == document
+
+
+def test_what_has_a_task_is_a_file_for_this_version() -> None:
+    """SPEC L94: the task travels with the terrain; what has none is written as before."""
+    settings = c.TerrainSettings(task=c.Task(title="Dam it", goal=c.AreaGoal(level_m=5, at_least_m2=1e6)))
+    document = c.Document(id="t", settings=settings)
+    data = archive.dumps(document)
+    with zipfile.ZipFile(io.BytesIO(data)) as file:
+        assert json.loads(file.read("esker.json"))["version"] == archive.VERSION == 7
+    assert archive.loads(data) == document
 
 
 def test_a_grid_that_is_missing(document: c.Document, grids: dict[str, Raster]) -> None:

@@ -24,7 +24,7 @@ LAYERS: tuple[frozenset[str], ...] = (
     frozenset({"contract"}),
     frozenset({"events", "grid"}),
     frozenset({"flow"}),
-    frozenset({"document", "patchwork", "synthesis", "tiles"}),
+    frozenset({"document", "patchwork", "synthesis", "tasks", "tiles"}),
     frozenset({"importing", "solve", "store"}),
     frozenset({"exporting", "session"}),
     frozenset({"api", "cluster", "jobs", "keeper", "lesson"}),

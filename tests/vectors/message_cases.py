@@ -28,6 +28,22 @@ def _lay(**fields: Any) -> Json:
     return op("layer.set", layer="v", fields=fields)
 
 
+TARGET: Json = {"size_m": 4096, "level": 2, "low_m": -10.5, "step_m": 0.25, "data": "eJwDAAAAAAE="}
+GOALS: list[Json] = [
+    {"type": "terrain", "target": TARGET, "tolerance_m": 20},
+    {"type": "contours", "target": TARGET, "tolerance_m": 20, "interval_m": 50},
+    {"type": "profile", "first": [0, 0], "last": [4096, 4096], "heights": [0, 900.5, 12], "tolerance_m": 15},
+    {"type": "volume", "point": [900, 700], "level_m": 120, "at_least_m3": 2e6},
+    {"type": "slope", "path": [[0, 0], [100, 50], [300, 0]], "at_most": 0.08},
+    {"type": "area", "level_m": 5, "at_least_m2": 1e6, "dry": True},
+    {"type": "watershed", "point": [900, 700], "at_least_m2": 1e6},
+]
+
+
+def _task(**fields: Any) -> Json:
+    return op("terrain.set", fields={"task": fields})
+
+
 ACCEPT: list[tuple[str, Json]] = [
     ("hello, short", HELLO),
     ("hello, full", HELLO | {"name": "Ada", "colour": "#00ffaa", "clock": 12}),
@@ -46,6 +62,9 @@ ACCEPT: list[tuple[str, Json]] = [
     ("layer ops", ops(op("layer.delete", layer="v"), op("layer.restore", layer="v"), _lay(anchor=[1, 2], outline=0))),
     ("a layer, which the server refuses by name", ops(op("layer.add", layer=VALLEY))),
     ("place on Earth", ops(op("terrain.set", fields={"place": {"lat_deg": -89, "lon_deg": 180}}))),
+    *((f"a task: {goal['type']}", ops(op("terrain.set", fields={"task": {"goal": goal}}))) for goal in GOALS),
+    ("a task without a goal, and no task", ops(_task(title="Look", text="Only\nlook."), _task())),
+    ("no pictures of a task", ops(op("terrain.set", fields={"task": None, "task_pictures": []}))),
     ("credit", {"type": "credit", "bytes": 65536}),
     ("rename", {"type": "rename", "name": "Grace", "colour": "#123456"}),
     ("ping", {"type": "ping", "t": 12.5}),
@@ -118,6 +137,25 @@ REFUSE: list[tuple[str, Json | str]] = [
     ("more rivers than four times as many", ops(op("terrain.set", fields={"rivers": 4.1}))),
     ("rivers without water", ops(op("terrain.set", fields={"wetness": 0}))),
     ("rivers of eleven times the water", ops(op("terrain.set", fields={"wetness": 11}))),
+    ("a task with another goal", ops(_task(goal={"type": "win"}))),
+    ("a task with half a goal", ops(_task(goal={"type": "area", "level_m": 5}))),
+    ("a task with a text of 4001 characters", ops(_task(text="t" * (c.MAX_TASK_TEXT + 1)))),
+    ("a target of a finer level", ops(_task(goal=GOALS[0] | {"target": TARGET | {"level": c.TASK_LEVEL + 1}}))),
+    ("a target without a step", ops(_task(goal=GOALS[0] | {"target": TARGET | {"step_m": 0}}))),
+    ("a target that is no base64", ops(_task(goal=GOALS[0] | {"target": TARGET | {"data": "<b>"}}))),
+    (
+        "a target of too many characters",
+        ops(_task(goal=GOALS[0] | {"target": TARGET | {"data": "A" * (c.MAX_TARGET_CHARACTERS + 1)}})),
+    ),
+    ("a goal without a tolerance", ops(_task(goal=GOALS[0] | {"tolerance_m": 0}))),
+    ("a profile of one height", ops(_task(goal=GOALS[2] | {"heights": [1]}))),
+    ("a profile of 258 heights", ops(_task(goal=GOALS[2] | {"heights": [1] * (c.MAX_PROFILE_SAMPLES + 1)}))),
+    ("a path of one point", ops(_task(goal=GOALS[4] | {"path": [[1, 2]]}))),
+    ("a path of 65 points", ops(_task(goal=GOALS[4] | {"path": [[1, 2]] * (c.MAX_TASK_LINE + 1)}))),
+    ("a path that may not climb at all", ops(_task(goal=GOALS[4] | {"at_most": 0}))),
+    ("a rule that asks for nothing", ops(_task(goal=GOALS[5] | {"at_least_m2": 0}))),
+    ("three pictures of a task", ops(op("terrain.set", fields={"task_pictures": ["AAAA"] * 3}))),
+    ("a picture of too many characters", ops(op("terrain.set", fields={"task_pictures": ["A" * 28_004]}))),
     ("unknown rule", ops(op("terrain.set", fields={"rule": "fractal"}))),
     ("the kind of a stroke cannot be set", ops(_set(kind="paint"))),
     ("the size of a terrain cannot be set", ops(op("terrain.set", fields={"size_m": 128}))),

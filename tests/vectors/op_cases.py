@@ -29,6 +29,12 @@ CRATER = layer("k", name="crater 2004", priority=2, spacing_m=[2, 2], hidden=Tru
 LOST = layer("d", name="lost")
 LAID = document(RIDGE, layers=(VALLEY, CRATER), deleted_layers=(LOST,))
 FULL = document(layers=tuple(layer(f"f{i}") for i in range(c.MAX_LAYERS)), deleted_layers=(LOST,))
+TASK: Json = {
+    "title": "Dam the valley",
+    "text": "Hold water.\n\nWhere is it cheapest?",
+    "goal": {"type": "volume", "point": [900.0, 700.5], "level_m": 120.0, "at_least_m3": 2e6},
+    "difference": True,
+}
 NEW = stroke("n", curve=[], finished=False, first=[0, 0, 0], last=[0, 0, 0])
 
 
@@ -100,6 +106,13 @@ def _applies() -> list[tuple[str, Json, Json]]:
         ("terrain lakes on", BASE, op("terrain.set", fields={"lakes_m": 4.0})),
         ("terrain rivers on", BASE, op("terrain.set", fields={"rivers": 1.5, "wetness": 3.0})),
         ("terrain rivers off", document(rivers=1.0), op("terrain.set", fields={"rivers": 0.0})),
+        ("a task", BASE, op("terrain.set", fields={"task": TASK})),
+        (
+            "a task whose text hides nothing",
+            BASE,
+            op("terrain.set", fields={"task": TASK | {"title": "Dam\u202e\t1", "text": "One.\r\n\u200bTwo.\tThree"}}),
+        ),
+        ("no task", document(task=TASK), op("terrain.set", fields={"task": None, "task_pictures": []})),
         ("terrain lakes off", document(lakes_m=4.0), op("terrain.set", fields={"lakes_m": None})),
         ("terrain sun", BASE, op("terrain.set", fields={"sun_azimuth_deg": 0, "sun_elevation_deg": 90})),
         ("group is one tick", BASE, op("group", ops=[_set("a", label="1"), _set("m", label="2")])),

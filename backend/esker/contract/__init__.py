@@ -11,6 +11,7 @@ Conventions (DESIGN 3): metres, seconds, degrees at the interface; x east, y nor
 # isort: skip_file
 from esker.contract.constants import *  # noqa: F403
 from esker.contract.values import *  # noqa: F403
+from esker.contract.tasks import *  # noqa: F403
 from esker.contract.document import *  # noqa: F403
 from esker.contract.operations import *  # noqa: F403
 from esker.contract.imports import *  # noqa: F403

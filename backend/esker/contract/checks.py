@@ -78,7 +78,7 @@ def check(node: dict[str, Any]) -> dict[str, Any]:
         return _union(node)
     match node.get("type"):
         case "string" if "pattern" in node:
-            return {"matches": node["pattern"]}
+            return {"matches": node["pattern"]} | ({"most": node["maxLength"]} if "maxLength" in node else {})
         case "string":
             return {"text": [node.get("minLength", 0), node.get("maxLength", SAFE_INTEGER)]}
         case "number":

@@ -9,6 +9,7 @@ from pydantic import Field, StringConstraints, TypeAdapter
 
 from esker.contract.constants import DEFAULT_LEVEL
 from esker.contract.document import TerrainSettings
+from esker.contract.tasks import Score
 from esker.contract.values import Id, Line, Name, Secret, Wire
 
 MAX_PUPILS: Final = 60
@@ -80,7 +81,8 @@ WallMessage = Annotated[WallHello | WallFocus, Field(discriminator="type")]
 class WallCopy(Wire):
     """One copy as the wall shows it. ``last``: when somebody last changed it, seconds since 1970, None: nobody has.
 
-    ``online``: devices that have it open, owners not counted; ``settings``: what its picture depends on.
+    ``online``: devices that have it open, owners not counted; ``settings``: what its picture depends on, without the
+    task. ``score``: None where nothing is scored, or not yet.
     """
 
     number: int
@@ -91,6 +93,7 @@ class WallCopy(Wire):
     strokes: int
     frozen: bool
     settings: TerrainSettings
+    score: Score | None = None
 
 
 class Wall(Wire):

@@ -6,8 +6,8 @@ from typing import Final
 
 # --- protocol ---------------------------------------------------------------------------------------------------
 
-PROTOCOL_VERSION: Final = 7
-SUBPROTOCOL: Final = "esker.7"
+PROTOCOL_VERSION: Final = 8
+SUBPROTOCOL: Final = "esker.8"
 
 # --- grid (DESIGN 3) --------------------------------------------------------------------------------------------
 

@@ -39,6 +39,7 @@ from esker.contract.constants import (
     MIN_SIZE_M,
     MIN_WETNESS,
 )
+from esker.contract.tasks import MAX_TASK_PICTURES, Picture, Task
 from esker.contract.values import (
     ABSOLUTE_BOUND_M,
     Border,
@@ -243,6 +244,7 @@ Erosion = Annotated[float, Field(ge=0, le=MAX_EROSION, allow_inf_nan=False)]
 ErosionScale = Annotated[float, Field(ge=MIN_EROSION_SCALE, le=MAX_EROSION_SCALE, allow_inf_nan=False)]
 Reach = Annotated[float, Field(ge=MIN_REACH_M, le=ABSOLUTE_BOUND_M, allow_inf_nan=False)]
 Rivers = Annotated[float, Field(ge=0, le=MAX_RIVERS, allow_inf_nan=False)]
+Pictures = Annotated[tuple[Picture, ...], Field(max_length=MAX_TASK_PICTURES)]
 Wetness = Annotated[float, Field(ge=MIN_WETNESS, le=MAX_WETNESS, allow_inf_nan=False)]
 
 
@@ -254,7 +256,7 @@ class TerrainSettings(Wire):
     ``detail``, ``rule``, ``erosion`` (strength of gullies), ``erosion_scale`` (their wavelength in cells of a level)
     and ``hold`` (how strictly what strokes fix keeps its height) are of the synthesis (DESIGN 10): no solved height
     depends on them. ``edition``: see
-    CURRENT_EDITION; documents that do not say have the first.
+    CURRENT_EDITION; documents that do not say have the first. ``task``, with its pictures: what a class is asked.
     """
 
     size_m: Annotated[float, Field(ge=MIN_SIZE_M, le=MAX_SIZE_M)] = DEFAULT_SIZE_M
@@ -276,6 +278,8 @@ class TerrainSettings(Wire):
     sun_azimuth_deg: Annotated[float, Field(ge=0, le=360)] = 115.0
     sun_elevation_deg: Annotated[float, Field(ge=0, le=90)] = 24.0
     place: Place | None = None
+    task: Task | None = None
+    task_pictures: Pictures = ()
 
 
 class TerrainFields(Wire):
@@ -298,9 +302,11 @@ class TerrainFields(Wire):
     sun_azimuth_deg: Annotated[float, Field(ge=0, le=360)] | None = None
     sun_elevation_deg: Annotated[float, Field(ge=0, le=90)] | None = None
     place: Place | None = None
+    task: Task | None = None
+    task_pictures: Pictures | None = None
 
 
-NULLABLE_TERRAIN_FIELDS: Final = frozenset({"reach_m", "sea_level_m", "lakes_m", "place"})
+NULLABLE_TERRAIN_FIELDS: Final = frozenset({"reach_m", "sea_level_m", "lakes_m", "place", "task"})
 
 
 class Document(Wire):

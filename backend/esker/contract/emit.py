@@ -190,7 +190,7 @@ export type WireCheck =
   | { readonly between: readonly [low: number, high: number] }
   | { readonly integer: readonly [low: number, high: number] }
   | { readonly text: readonly [low: number, high: number] }
-  | { readonly matches: string }
+  | { readonly matches: string; readonly most?: number }
   | { readonly oneOf: readonly string[] }
   | { readonly bool: true }
   | { readonly nullable: WireCheck }

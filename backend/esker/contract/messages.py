@@ -12,6 +12,7 @@ from esker.contract.document import Document
 from esker.contract.imports import ImportStatus
 from esker.contract.lesson import Conduct, Lesson, Notice, People
 from esker.contract.operations import CloseCode, Op, OpEnvelope, OrderedOp, RejectCode
+from esker.contract.tasks import Score
 from esker.contract.values import Clock, Colour, Id, Name, OpId, Role, Secret, Ticket, Token, Vec3, Wire
 
 # --- messages: client to server ---------------------------------------------------------------------------------
@@ -241,7 +242,8 @@ ServerMessage = Annotated[
     | Importing
     | Lesson
     | Notice
-    | InClass,
+    | InClass
+    | Score,
     Field(discriminator="type"),
 ]
 

@@ -165,6 +165,7 @@ RejectCode = Literal[
     "view_only",
     "hands_off",
     "protected",
+    "leaders_only",
     "frozen",
     "rate_limited",
     "too_large",

@@ -29,10 +29,11 @@ from esker.document.former import read_document
 from esker.document.wire import document_json
 
 FORMAT = "esker-terrain"
-VERSION = 6
+VERSION = 7
 """1 had neither paint nor settings of the detail, 2 no elevation layers, 3 no edition, 4 the second at most, 5 no
-gullies; they are read as they are, with the defaults. A document is written as the oldest that has what is in it."""
-PAIRS_VERSION, EDITION_VERSION, LAYERS_VERSION, PLAIN_VERSION = 5, 4, 3, 2
+gullies, 6 no tasks; they are read as they are, with the defaults. A document is written as the oldest that has what is
+in it."""
+GULLIES_VERSION, PAIRS_VERSION, EDITION_VERSION, LAYERS_VERSION, PLAIN_VERSION = 6, 5, 4, 3, 2
 MAX_ARCHIVE_BYTES = 512 * 1024 * 1024
 MAX_DOCUMENT_BYTES = 512 * 1024 * 1024
 MAX_GRIDS_BYTES = 1 << 30
@@ -102,9 +103,11 @@ def write(file: BinaryIO, document: Document, grids: Mapping[str, Grid] | None =
 def _version(document: Document) -> int:
     """The oldest version of files that has what is in a document."""
     edition = document.settings.edition
+    if document.settings.task is not None or document.settings.task_pictures:
+        return VERSION
     strokes = (*document.strokes, *document.deleted)
     if document.settings.erosion > 0 or any(s.paint is not None and s.paint.channel == "erosion" for s in strokes):
-        return VERSION
+        return GULLIES_VERSION
     if edition > 1:
         return PAIRS_VERSION if edition > 2 else EDITION_VERSION
     return LAYERS_VERSION if document.layers or document.deleted_layers else PLAIN_VERSION

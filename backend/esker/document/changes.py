@@ -63,6 +63,8 @@ TERRAIN_WORDS: Final[dict[str, str]] = {
     "sun_azimuth_deg": "direction of the sun",
     "sun_elevation_deg": "height of the sun",
     "place": "place on Earth",
+    "task": "task",
+    "task_pictures": "pictures of the task",
 }
 WORDS: Final[dict[Kind, dict[str, str]]] = {"stroke": STROKE_WORDS, "layer": LAYER_WORDS}
 

@@ -44,7 +44,7 @@ SETTLE_SECONDS: Final = 20.0
 """A copy that has not settled by then gets the picture of what there is."""
 LOOK_SECONDS: Final = 0.02
 STEM: Final = 40
-COLUMNS: Final = ("copy", "names", "joined", "last_changed", "strokes", "file")
+COLUMNS: Final = ("copy", "names", "joined", "last_changed", "strokes", "score", "score_text", "file")
 FAILED: Final = "The class could not be collected. It is in the server's log."
 
 
@@ -155,10 +155,10 @@ class Collections:
         stem = "-".join(filter(None, (f"{copy.number:02}", _stem(names))))
         room = await self._hub.room(copy.terrain, Who(job.who.address))
         deadline = time.monotonic() + SETTLE_SECONDS
-        while not room.settled and not room.closed and time.monotonic() < deadline:
+        while not (room.settled and not room.scoring.busy) and not room.closed and time.monotonic() < deadline:
             await asyncio.sleep(LOOK_SECONDS)
         heights = await room.heights(min(PICTURE_LEVEL, room.info.levels))
-        document = room.core.document.to_document()
+        document, points = room.core.document.to_document(), room.scoring.newest
         self._hub.sleep(copy.terrain)
         packed = await self._hub.packing.run(job.who, self._classes.grids.pack, document)
         try:
@@ -177,6 +177,8 @@ class Collections:
             "joined": _date(min((p.joined for p in pupils), default=None)),
             "last_changed": _date(changed_at(self._hub.journal, copy.terrain) if document.clock else None),
             "strokes": len(document.strokes),
+            "score": "" if points is None or points.points is None else points.points,
+            "score_text": "" if points is None else points.text,
             "file": f"{stem}.esker",
         }
 

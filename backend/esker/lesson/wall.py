@@ -42,6 +42,8 @@ WAKING: Final = 2
 WAKE_AGAIN_SECONDS: Final = 5.0
 QUIET_SECONDS: Final = 1.0
 """A copy that was opened for the wall is closed once no frame of it came for so long."""
+LEFT_OUT: Final = {"task": None, "task_pictures": ()}
+"""What a wall does not need of the settings of a copy."""
 FOCUS_PER_SECOND: Final = 4.0
 
 
@@ -68,6 +70,8 @@ class _Copy:
     names: tuple[str, ...]
     frozen: bool
     settings: c.TerrainSettings
+    seen: c.TerrainSettings | None = None
+    """The settings that ``settings`` was made of last."""
     room: Room | None = None
     stream: Stream | None = None
     outlet: _Outlet = field(default_factory=_Outlet)
@@ -83,6 +87,7 @@ class _Copy:
     last: float | None = None
     strokes: int = 0
     online: int = 0
+    score: c.Score | None = None
     notified: c.WallCopy | None = None
 
     def facts(self) -> c.WallCopy:
@@ -96,6 +101,7 @@ class _Copy:
             strokes=self.strokes,
             frozen=self.frozen,
             settings=self.settings,
+            score=self.score,
         )
 
 
@@ -215,7 +221,7 @@ class WallSession:
         for found in store.copies(lesson):
             copy = self._copies.get(found.number)
             if copy is None:
-                settings = self._start or c.TerrainSettings()
+                settings = (self._start or c.TerrainSettings()).model_copy(update=LEFT_OUT)
                 copy = _Copy(found.number, found.terrain, (), found.frozen, settings)
                 self._copies[found.number] = copy
             copy.names, copy.frozen = tuple(names.get(found.number, ())), found.frozen
@@ -244,7 +250,10 @@ class WallSession:
             return
         document = room.core.document
         copy.online = sum(member.role != "owner" for member in room.core.members)
-        copy.strokes, copy.settings = len(document.strokes), document.settings
+        copy.strokes, copy.score = len(document.strokes), room.scoring.newest
+        if copy.seen is not document.settings:
+            copy.seen = document.settings
+            copy.settings = document.settings.model_copy(update=LEFT_OUT)
         if document.clock != copy.clock:
             copy.clock = document.clock
             copy.last = changed_at(self._hub.journal, copy.terrain)
@@ -258,7 +267,7 @@ class WallSession:
         """Opens copies whose ground was not sent yet, a few at a time, and closes those of which it was."""
         for copy in self._copies.values():
             if copy.waking and copy.room is not None:
-                quiet = now - copy.quiet_since > QUIET_SECONDS and copy.room.settled
+                quiet = now - copy.quiet_since > QUIET_SECONDS and copy.room.settled and not copy.room.scoring.busy
                 if quiet or len(copy.room.core.members):
                     copy.waking, copy.drawn = False, quiet
                     self._hub.sleep(copy.terrain)

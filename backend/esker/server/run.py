@@ -41,6 +41,7 @@ from esker.session.ground.ports import Solver, SolverFactory
 from esker.session.ground.recovery import LAST_RESORT, Fault
 from esker.session.ground.worker import Worker
 from esker.session.room.hub import Hub
+from esker.session.scoring import Scorer
 from esker.solve.multigrid import DivergedError
 from esker.solve.opencl import prepare
 from esker.solve.opencl.device import candidates, ready
@@ -89,6 +90,7 @@ class _Tiles:
 
     def __init__(self) -> None:
         self.hydrology = Hydrology()
+        self.scorer = Scorer()
 
     def snapshot(self, server: Any, level: int) -> Snapshot | None:
         return snapshot(server, level)
@@ -282,6 +284,7 @@ class Assembly:
             self._worker.stop()
         if self._tiles is not None:
             self._tiles.hydrology.close()
+            self._tiles.scorer.close()
         if self._journal is not None:
             self._journal.close()
         if self._lock is not None:

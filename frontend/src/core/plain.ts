@@ -5,7 +5,7 @@
  * same document before and after.
  */
 
-import { type SimpleOp, UNSEEN } from "../generated/contract.ts";
+import { type SimpleOp, type Task, UNSEEN } from "../generated/contract.ts";
 
 const RANGES = Object.entries(UNSEEN).map(([first, last]) => [Number(first), last] as const);
 const SPACES: ReadonlySet<number> = new Set([9, 10, 13]);
@@ -31,14 +31,28 @@ function plainFields<T extends object>(value: T): T {
   return out;
 }
 
+/** A text of paragraphs that shows all that is in it: its line ends stay (twin of `plain_text` in `contract/tasks.py`). */
+export function plainParagraphs(text: string): string {
+  return text.replaceAll("\r", "").split("\n").map(plainText).join("\n");
+}
+
+/** The task of a terrain as the server keeps it. */
+export function plainTask(task: Task): Task {
+  return { ...task, title: plainText(task.title), text: plainParagraphs(task.text) };
+}
+
 /** An op whose names are plain. */
 export function plainOp(op: SimpleOp): SimpleOp {
   switch (op.type) {
     case "stroke.begin":
       return { ...op, stroke: plainFields(op.stroke) };
     case "stroke.set":
-    case "terrain.set":
       return { ...op, fields: plainFields(op.fields) } as SimpleOp;
+    case "terrain.set":
+      return {
+        ...op,
+        fields: plainFields(op.fields.task ? { ...op.fields, task: plainTask(op.fields.task) } : op.fields),
+      };
     case "layer.set":
       return { ...op, fields: plainFields(op.fields) };
     case "layer.add":

@@ -34,9 +34,9 @@ const text =
       : `must be a text of ${low} to ${high} characters`;
 
 const matches =
-  (pattern: RegExp): Check =>
+  (pattern: RegExp, most: number): Check =>
   (v) =>
-    typeof v === "string" && pattern.test(v) ? null : "has a form that is not allowed";
+    typeof v === "string" && v.length <= most && pattern.test(v) ? null : "has a form that is not allowed";
 
 const oneOf =
   (values: readonly unknown[]): Check =>
@@ -113,7 +113,7 @@ function checkOf(rule: WireCheck): Check {
   if ("between" in rule) return number(...rule.between, true);
   if ("integer" in rule) return integer(...rule.integer);
   if ("text" in rule) return text(...rule.text);
-  if ("matches" in rule) return matches(new RegExp(rule.matches));
+  if ("matches" in rule) return matches(new RegExp(rule.matches), rule.most ?? Number.POSITIVE_INFINITY);
   if ("oneOf" in rule) return oneOf(rule.oneOf);
   if ("bool" in rule) return bool;
   if ("nullable" in rule) return nullable(checkOf(rule.nullable));

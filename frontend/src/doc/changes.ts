@@ -64,6 +64,8 @@ export const TERRAIN_WORDS = {
   sun_azimuth_deg: "direction of the sun",
   sun_elevation_deg: "height of the sun",
   place: "place on Earth",
+  task: "task",
+  task_pictures: "pictures of the task",
 } as const;
 
 /** One step's changes of one stroke or layer. `content` is the item as I left it when it came to life or died. */

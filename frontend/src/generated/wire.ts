@@ -6,7 +6,7 @@ export type WireCheck =
   | { readonly between: readonly [low: number, high: number] }
   | { readonly integer: readonly [low: number, high: number] }
   | { readonly text: readonly [low: number, high: number] }
-  | { readonly matches: string }
+  | { readonly matches: string; readonly most?: number }
   | { readonly oneOf: readonly string[] }
   | { readonly bool: true }
   | { readonly nullable: WireCheck }
@@ -39,6 +39,16 @@ export const WIRE_MODELS: Readonly<Record<string, WireModel>> = {
     },
     may: {},
   },
+  AreaGoal: {
+    must: {
+      type: { oneOf: ["area"] },
+      level_m: { number: [-655360, 655360] },
+      at_least_m2: { number: [1, 1000000000000000] },
+    },
+    may: {
+      dry: { bool: true },
+    },
+  },
   BeginStroke: {
     must: {
       type: { oneOf: ["stroke.begin"] },
@@ -58,6 +68,15 @@ export const WIRE_MODELS: Readonly<Record<string, WireModel>> = {
       look: { nullable: { bool: true } },
       held: { nullable: { bool: true } },
     },
+  },
+  ContoursGoal: {
+    must: {
+      type: { oneOf: ["contours"] },
+      target: { model: "Target" },
+      tolerance_m: { number: [0.01, 65536] },
+      interval_m: { number: [0.01, 65536] },
+    },
+    may: {},
   },
   Course: {
     must: {
@@ -249,6 +268,16 @@ export const WIRE_MODELS: Readonly<Record<string, WireModel>> = {
       target: { nullable: { tuple: [{ number: [-655360, 655360] }, { number: [-655360, 655360] }, { number: [-655360, 655360] }] } },
     },
   },
+  ProfileGoal: {
+    must: {
+      type: { oneOf: ["profile"] },
+      first: { tuple: [{ number: [-655360, 655360] }, { number: [-655360, 655360] }] },
+      last: { tuple: [{ number: [-655360, 655360] }, { number: [-655360, 655360] }] },
+      heights: { list: { number: [-655360, 655360] }, length: [2, 257] },
+      tolerance_m: { number: [0.01, 65536] },
+    },
+    may: {},
+  },
   Rename: {
     must: {
       type: { oneOf: ["rename"] },
@@ -302,6 +331,14 @@ export const WIRE_MODELS: Readonly<Record<string, WireModel>> = {
     },
     may: {},
   },
+  SlopeGoal: {
+    must: {
+      type: { oneOf: ["slope"] },
+      path: { list: { tuple: [{ number: [-655360, 655360] }, { number: [-655360, 655360] }] }, length: [2, 64] },
+      at_most: { number: [0.001, 10] },
+    },
+    may: {},
+  },
   Stroke: {
     must: {
       id: { matches: "^[A-Za-z0-9_-]{1,40}$" },
@@ -345,6 +382,25 @@ export const WIRE_MODELS: Readonly<Record<string, WireModel>> = {
       label: { nullable: { text: [0, 80] } },
     },
   },
+  Target: {
+    must: {
+      size_m: { number: [64, 65536] },
+      level: { integer: [0, 2] },
+      low_m: { number: [-655360, 655360] },
+      step_m: { number: [0.0001, 65536] },
+      data: { matches: "^[A-Za-z0-9+/]+={0,2}$", most: 40000 },
+    },
+    may: {},
+  },
+  Task: {
+    must: {},
+    may: {
+      title: { text: [0, 80] },
+      text: { text: [0, 4000] },
+      goal: { nullable: { union: ["TerrainGoal", "ContoursGoal", "ProfileGoal", "VolumeGoal", "SlopeGoal", "AreaGoal", "WatershedGoal"] } },
+      difference: { bool: true },
+    },
+  },
   TerrainFields: {
     must: {},
     may: {
@@ -365,7 +421,17 @@ export const WIRE_MODELS: Readonly<Record<string, WireModel>> = {
       sun_azimuth_deg: { nullable: { number: [0, 360] } },
       sun_elevation_deg: { nullable: { number: [0, 90] } },
       place: { nullable: { model: "Place" } },
+      task: { nullable: { model: "Task" } },
+      task_pictures: { nullable: { list: { matches: "^[A-Za-z0-9+/]+={0,2}$", most: 28000 }, length: [0, 2] } },
     },
+  },
+  TerrainGoal: {
+    must: {
+      type: { oneOf: ["terrain"] },
+      target: { model: "Target" },
+      tolerance_m: { number: [0.01, 65536] },
+    },
+    may: {},
   },
   View: {
     must: {
@@ -379,6 +445,23 @@ export const WIRE_MODELS: Readonly<Record<string, WireModel>> = {
       height: { integer: [1, 16384] },
       tau_px: { number: [0.25, 64] },
     },
+  },
+  VolumeGoal: {
+    must: {
+      type: { oneOf: ["volume"] },
+      point: { tuple: [{ number: [-655360, 655360] }, { number: [-655360, 655360] }] },
+      level_m: { number: [-655360, 655360] },
+      at_least_m3: { number: [1, 1000000000000000] },
+    },
+    may: {},
+  },
+  WatershedGoal: {
+    must: {
+      type: { oneOf: ["watershed"] },
+      point: { tuple: [{ number: [-655360, 655360] }, { number: [-655360, 655360] }] },
+      at_least_m2: { number: [1, 1000000000000000] },
+    },
+    may: {},
   },
 };
 

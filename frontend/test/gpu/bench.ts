@@ -139,6 +139,8 @@ function scene(step: number): Scene {
       sun_azimuth_deg: (Math.atan2(sun[0], sun[1]) * 180) / Math.PI,
       sun_elevation_deg: (Math.atan2(sun[2], Math.hypot(sun[0], sun[1])) * 180) / Math.PI,
       place: null,
+      task: null,
+      task_pictures: [],
     },
     strokes: [],
     ghost: null,

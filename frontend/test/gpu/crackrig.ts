@@ -186,6 +186,8 @@ export function sceneOf(view: TileView, state: CameraState, look: Scene["setting
       sun_azimuth_deg: SUN.azimuth,
       sun_elevation_deg: SUN.elevation,
       place: null,
+      task: null,
+      task_pictures: [],
     },
     strokes: [],
     ghost: null,

@@ -177,6 +177,8 @@ function scene(): Scene {
       sun_azimuth_deg: 100,
       sun_elevation_deg: 30,
       place: null,
+      task: null,
+      task_pictures: [],
     },
     strokes: [stroke],
     ghost: null,

@@ -104,6 +104,8 @@ function scene(camera: CameraState): Scene {
       sun_azimuth_deg: 115,
       sun_elevation_deg: 30,
       place: null,
+      task: null,
+      task_pictures: [],
     },
     strokes: [],
     ghost: null,

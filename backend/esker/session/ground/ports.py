@@ -114,6 +114,16 @@ class WateredTiles(Protocol):
         ...
 
 
+@runtime_checkable
+class ScoredTiles(Protocol):
+    """Tiles on whose ground tasks are scored."""
+
+    @property
+    def scorer(self) -> Any:
+        """What scores tasks (``session.scoring.Scorer``)."""
+        ...
+
+
 class Refiner(Protocol):
     """Refines one settled solve, in the worker's thread (``solve/refine/refinement.py``)."""
 

@@ -17,11 +17,14 @@ from esker.session.lesson.state import MOST, Removed, State, with_people, withou
 
 HANDS_OFF: Final = "Hands off: whoever leads the lesson has paused drawing for now."
 PROTECTED: Final = "Whoever leads the lesson protects this; it cannot be changed by others."
+TASK: Final = "Only whoever leads this terrain changes its task."
 SETTINGS: Final = "Whoever leads the lesson protects the settings of the terrain."
 REMOVED: Final = "You were sent out of this terrain. Ask whoever leads it to let you in again."
 WAIT: Final = (
     "Somebody with your address was sent out, so whoever leads this terrain must let you in. Ask them, then try again."
 )
+TASK_FIELDS: Final = frozenset({"task", "task_pictures"})
+"""Settings that only conductors change, protected or not."""
 MOST_WAITING: Final = 50
 """The server remembers so many people who ask to be let in."""
 NO_CHANGE: Final = "Only whoever leads the lesson may do this."
@@ -81,7 +84,11 @@ class Lesson:
         """Why an op of somebody's is not taken now: a code and a sentence."""
         if not self.draws(who):
             return "hands_off", HANDS_OFF
-        if not self.state.protect or self.conducts(who):
+        if self.conducts(who):
+            return None
+        if any(_sets_task(part) for part in (op.ops if isinstance(op, c.Group) else (op,))):
+            return "leaders_only", TASK
+        if not self.state.protect:
             return None
         for part in op.ops if isinstance(op, c.Group) else (op,):
             if isinstance(part, c.SetTerrain):
@@ -266,6 +273,10 @@ def _thing(part: c.SimpleOp) -> str | None:
     if isinstance(part, c.BeginStroke | c.AddLayer | c.SetTerrain):
         return None
     return part.layer if isinstance(part, c.SetLayer | c.DeleteLayer | c.RestoreLayer) else part.stroke
+
+
+def _sets_task(part: c.SimpleOp) -> bool:
+    return isinstance(part, c.SetTerrain) and not TASK_FIELDS.isdisjoint(part.fields.model_fields_set)
 
 
 def _signed(part: c.SimpleOp, name: str) -> c.SimpleOp:

@@ -19,7 +19,7 @@ from esker.document.revisions import revision
 from esker.fairness.shares import Who
 from esker.session.ground.base_builder import Layers
 from esker.session.ground.feed import Stream, TileFeed
-from esker.session.ground.ports import Elevation, Tiles, WateredTiles
+from esker.session.ground.ports import Elevation, ScoredTiles, Tiles, WateredTiles
 from esker.session.ground.tilethread import TileThread
 from esker.session.ground.worker import Job, Worker
 from esker.session.lesson.classroom import FROZEN, ClassRoom
@@ -32,6 +32,7 @@ from esker.session.room.members import QUIET_BACKLOG_BYTES, Member
 from esker.session.room.outbox import Outbox
 from esker.session.room.ports import Journal
 from esker.session.room.replicas.recent import Encoder
+from esker.session.scoring import Scoring
 from esker.store.journal import HistoryFull
 from esker.store.timestamps import Person
 
@@ -94,6 +95,9 @@ class Room(ClassRoom):
         )
         hydrology = tiles.hydrology if isinstance(tiles, WateredTiles) else None
         self._rivers = Rivers(hydrology, self._feed, self._loop)
+        scorer = tiles.scorer if isinstance(tiles, ScoredTiles) else None
+        scored = min(c.TASK_LEVEL, info.levels)
+        self.scoring = Scoring(scorer, lambda: self._feed.heights(scored), self._loop, self._tell_score)
         self._layers = Layers(elevation, base_threads, self._loop, self._laid, self._tell, self._slow_changed)
         self._job: Job | None = None
         """The job that was asked for last."""
@@ -124,6 +128,7 @@ class Room(ClassRoom):
         self._active_at = self._loop.time()
         """The time at which somebody came, or did more than to answer by itself."""
         self._rivers.follow(core.head)
+        self.scoring.follow(core.head)
         self._request_solve()
 
     # --- people -------------------------------------------------------------------------------------------------
@@ -150,6 +155,8 @@ class Room(ClassRoom):
         outbox.message(self._newest_progress())
         if self.in_class is not None:
             outbox.message(self.in_class)
+        if self.scoring.newest is not None:
+            outbox.message(self.scoring.newest)
         self._works_for(member)
         guest = Guest(member, self._feed.add(outbox))
         self.conducting.joined(member)
@@ -278,6 +285,7 @@ class Room(ClassRoom):
             return
         self._tick_at = self._loop.time()
         self._rivers.follow(self.core.head)
+        self.scoring.follow(self.core.head)
         self._flushed.clear()
         people = self._new_names(row.author for row in batch.rows)
         future = self._journal.append(self.id, batch.rows, batch.snapshot, people)
@@ -358,6 +366,7 @@ class Room(ClassRoom):
         An op that does not touch the ground leaves an older solve as good as new.
         """
         self._rivers.level_taken(level, settled)
+        self.scoring.level_taken(settled)
         if clock >= self.core.geometry_clock:
             clock = self.core.head.clock
         self._note_progress(
@@ -369,6 +378,10 @@ class Room(ClassRoom):
                 refining=self._refining if settled else 0,
             )
         )
+
+    def _tell_score(self, score: c.Score) -> None:
+        for member in self.core.members:
+            member.outbox.message(score)
 
     def _requests_changed(self, count: int, more: bool) -> None:
         """Takes the number of refined tiles that are wanted. ``more``: the solver does not know of all of them yet."""
@@ -427,6 +440,7 @@ class Room(ClassRoom):
         self.closed = True
         self._layers.close()
         self._rivers.close()
+        self.scoring.close()
         self.conducting.close()
         self._worker.remove(self._solve_client)
         for timer in (self._tick_timer, self._presence_timer, self._progress_timer):

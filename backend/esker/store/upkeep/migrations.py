@@ -109,6 +109,9 @@ ALTER TABLE people ADD COLUMN conducts INTEGER;
 """``lessons``: how the lesson of a terrain stands. ``makers``: the client by which a stroke or a layer came
 (``store/lessons.py``). ``people``: who a client is over reloads, and whether they conducted."""
 
+_FORMAT_8: Final = ""
+"""No table changes: ops and documents may hold tasks, which an Esker of before would take for damage."""
+
 
 def _script(text: str) -> Callable[[sqlite3.Connection], None]:
     def run(db: sqlite3.Connection) -> None:
@@ -132,6 +135,7 @@ STEPS: Final[tuple[Callable[[sqlite3.Connection], None], ...]] = (
     _script(_FORMAT_5),  # terrains can be deleted
     _folding,  # bursts of ops are folded
     _script(_FORMAT_7 + ";" + _CLASSES),  # lessons, classes and their copies
+    _script(_FORMAT_8),  # tasks
 )
 """``STEPS[n]`` makes format n + 1 of format n; an empty file has format 0."""
 FORMAT: Final = len(STEPS)
