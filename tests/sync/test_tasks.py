@@ -1,4 +1,4 @@
-"""Tasks over real sockets: who may set one, what everybody is told, the wall and the table (SPEC L94 to L112)."""
+"""Tasks over real sockets: who may set one, what everybody is told, the wall and the table (SPEC L94 to L108)."""
 
 from __future__ import annotations
 

@@ -50,7 +50,7 @@ def encode(heights: NDArray[Any], size_m: float) -> c.Target:
     steps = FINEST_STEPS
     while True:
         step = max(relief / steps, c.MIN_TARGET_STEP_M)
-        text = base64.b64encode(_packed(np.rint((z - low) / step).astype(np.int64))).decode()
+        text = base64.b64encode(zlib.compress(zigzagged(np.rint((z - low) / step).astype(np.int64)), 9)).decode()
         if len(text) <= c.MAX_TARGET_CHARACTERS:
             return c.Target(size_m=size_m, level=level, low_m=low, step_m=step, data=text)
         if steps > COARSEST_STEPS:
@@ -61,12 +61,13 @@ def encode(heights: NDArray[Any], size_m: float) -> c.Target:
             z, level, steps = z[::2, ::2], level - 1, FINEST_STEPS
 
 
-def _packed(k: NDArray[np.int64]) -> bytes:
+def zigzagged(k: NDArray[np.int64]) -> bytes:
+    """Steps as the bytes that are deflated."""
     around = np.pad(k, ((1, 0), (1, 0)))
     off = (k - around[1:, :-1] - around[:-1, 1:] + around[:-1, :-1]).astype(np.int16)
     zigzag = ((off.astype(np.int32) << 1) ^ (off.astype(np.int32) >> 15)).astype(np.uint16).ravel()
     planes = np.concatenate([(zigzag & 0xFF).astype(np.uint8), (zigzag >> 8).astype(np.uint8)])
-    return zlib.compress(planes.tobytes(), 9)
+    return planes.tobytes()
 
 
 def decode(target: c.Target) -> Heights:
