@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from esker import contract as c
-from esker.tasks.target import BadTarget, zigzagged, decode
+from esker.tasks.target import BadTarget, decode, zigzagged
 
 SIDE = 65
 PLACES = ((0, 0), (0, 64), (64, 0), (64, 64), (1, 0), (0, 1), (17, 40), (33, 32))
