@@ -14,9 +14,9 @@ import pytest
 
 from esker import contract as c
 from esker.fairness.shares import Rates
+from tests.sync.classroom import a_class, answer, lesson, people
 from tests.sync.harness import PATIENCE, LiveServer, Peer, set_op, stroke
 from tests.sync.test_classes import Pupil, Teacher
-from tests.sync.test_lesson import a_class, answer, lesson, people
 from tests.sync.test_wall import Wall
 
 GOAL = {"type": "area", "level_m": 1.0, "at_least_m2": 20e6, "dry": False}
