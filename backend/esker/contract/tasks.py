@@ -143,7 +143,7 @@ class SlopeGoal(Wire):
 
 
 class AreaGoal(Wire):
-    """So much ground is to be above ``level_m``; ``dry``: or lower, where a sea at that level does not come."""
+    """An area that is to be above ``level_m``; ``dry``: ground counts too where a sea at that level does not come."""
 
     type: Literal["area"] = "area"
     level_m: Metres
