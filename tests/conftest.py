@@ -11,10 +11,12 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
 from esker.process import system
+from tests.store.engines import ENGINES, Database, Store
 
 MUCH = 1 << 30
 """Bytes resident from which on it is worth the time to look for what can go."""
@@ -56,3 +58,18 @@ def _memory_given_back() -> Iterator[None]:
             found.tidy(math.inf)
     gc.collect()
     system.give_memory_back()
+
+
+@pytest.fixture(scope="session")
+def database() -> Iterator[Database]:
+    """A PostgreSQL server for the whole run. Where none can be had, tests that need it fail with a sentence."""
+    with Database() as made:
+        yield made
+
+
+@pytest.fixture(params=ENGINES)
+def store(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Store]:
+    """A store that is opened, closed and opened again, over each engine."""
+    made = Store(tmp_path, request.getfixturevalue("database") if request.param == "postgres" else None)
+    yield made
+    made.close()

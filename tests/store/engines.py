@@ -1,11 +1,75 @@
-"""Engines under journals, for tests that look below the ports."""
+"""Engines under journals: for tests that ask both the same, and for those that look below the ports."""
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any, Final
 
+from bench.cluster._postgres import Postgres as Server
+from esker.store.engine.leases import Lease
+from esker.store.engine.postgres import migrations
+from esker.store.engine.postgres.engine import Postgres
 from esker.store.engine.sqlite import Sqlite
 from esker.store.journal import Journal
+
+ENGINES: Final = ("sqlite", "postgres")
+
+
+class Database:
+    """A PostgreSQL server that gives databases of the present format."""
+
+    def __init__(self) -> None:
+        self.server = Server()
+        self._made = self.server.database()
+        migrations.migrate(self._made, 0.0)
+
+    def __enter__(self) -> Database:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.server.close()
+
+    def new(self) -> str:
+        """A new database of the present format, that is old enough to sweep."""
+        return self.server.database(like=self._made)
+
+
+class Holding:
+    """Which terrains a server has, as a test says."""
+
+    def __init__(self) -> None:
+        self.leases: dict[str, Lease] = {}
+        self.lost: list[str] = []
+
+    def right(self, terrain: str) -> tuple[str, int] | None:
+        found = self.leases.get(terrain)
+        return None if found is None else (terrain, found.epoch)
+
+    def fenced(self, terrain: str) -> None:
+        self.lost.append(terrain)
+
+
+class Store:
+    """Journals over one place, one after the other."""
+
+    def __init__(self, folder: Path, database: Database | None) -> None:
+        """``database``: None for SQLite in the folder."""
+        self.folder = folder
+        self.url = None if database is None else database.new()
+        self._open: list[Journal] = []
+
+    def open(self, now: Callable[[], float] = time.time, **more: Any) -> Journal:
+        """A journal over what is there. Close it before another one is opened."""
+        engine = None if self.url is None else Postgres(self.url, Holding())
+        self._open.append(Journal(self.folder, now, engine=engine, **more))
+        return self._open[-1]
+
+    def close(self) -> None:
+        """Closes what a test left open."""
+        for journal in self._open:
+            journal.close()
 
 
 def sqlite(journal: Journal) -> Sqlite:

@@ -1,91 +1,111 @@
-"""Leases of terrains, whatever keeps them (SPEC J460 to J463)."""
+"""Leases of terrains, in memory and in a database (SPEC J460 to J463)."""
 
 from __future__ import annotations
 
-from esker.store.engine.leases import Lease, Node, OwnLeases
+from collections.abc import Iterator
+
+import psycopg
+import pytest
+
+from esker.store.engine.leases import Lease, Leases, Node, OwnLeases
+from esker.store.engine.postgres.leases import PostgresLeases
+from tests.store.engines import ENGINES, Database
 
 A, B = Node("a", "http://10.0.0.1:8000", 1.0), Node("b", "http://10.0.0.2:8000", 2.5)
 
 
-class Clock:
-    """The clock of a store, which a test sets."""
+class Kept:
+    """Leases with a clock that a test sets on."""
 
-    def __init__(self) -> None:
-        self.now = 1000.0
+    def __init__(self, url: str | None) -> None:
+        """``url``: of the database that keeps them; None for memory."""
+        self._url, self._now = url, 1000.0
+        self._in_database = None if url is None else PostgresLeases(url)
+        self.leases: Leases = self._in_database or OwnLeases(lambda: self._now)
+        self.leases.register(A, 60.0)
+        self.leases.register(B, 60.0)
 
-    def __call__(self) -> float:
-        return self.now
+    def wait(self, seconds: float) -> None:
+        """Lets time pass: in a database all that lasts ends earlier by so much."""
+        self._now += seconds
+        if self._url is not None:
+            with psycopg.connect(self._url, autocommit=True) as db:
+                for table in ("leases", "nodes"):
+                    db.execute(f"UPDATE esker.{table} SET until = until - interval '{seconds} seconds'".encode())
+
+    def close(self) -> None:
+        if self._in_database is not None:
+            self._in_database.close()
 
 
-def made() -> tuple[OwnLeases, Clock]:
-    clock = Clock()
-    leases = OwnLeases(clock)
-    leases.register(A, 60.0)
-    leases.register(B, 60.0)
-    return leases, clock
+@pytest.fixture(params=ENGINES)
+def kept(request: pytest.FixtureRequest) -> Iterator[Kept]:
+    url = None
+    if request.param == "postgres":
+        database: Database = request.getfixturevalue("database")
+        url = database.new()
+    made = Kept(url)
+    yield made
+    made.close()
 
 
-def test_a_terrain_has_one_owner_until_the_lease_ends() -> None:
+def taken(kept: Kept, terrain: str, node: str, seconds: float = 6.0) -> Lease:
+    found = kept.leases.take(terrain, node, seconds)
+    assert isinstance(found, Lease)
+    return found
+
+
+def test_a_terrain_has_one_owner_until_the_lease_ends(kept: Kept) -> None:
     """SPEC J460."""
-    leases, clock = made()
-    assert leases.owner("lake") is None
-    first = leases.take("lake", "a", 6.0)
-    assert first == Lease("lake", "a", 1)
-    assert leases.take("lake", "b", 6.0) == A
-    assert leases.owner("lake") == A
-    clock.now += 6.0
-    assert leases.owner("lake") is None
-    assert leases.take("lake", "b", 6.0) == Lease("lake", "b", 2)
+    assert kept.leases.owner("lake") is None
+    assert taken(kept, "lake", "a") == Lease("lake", "a", 1)
+    assert kept.leases.take("lake", "b", 6.0) == A
+    assert kept.leases.owner("lake") == A
+    kept.wait(6.0)
+    assert kept.leases.owner("lake") is None
+    assert taken(kept, "lake", "b") == Lease("lake", "b", 2)
 
 
-def test_a_node_that_was_started_again_takes_its_terrains_at_once() -> None:
+def test_a_node_that_was_started_again_takes_its_terrains_at_once(kept: Kept) -> None:
     """SPEC J460."""
-    leases, _ = made()
-    before = leases.take("lake", "a", 6.0)
-    after = leases.take("lake", "a", 6.0)
-    assert isinstance(before, Lease)
+    before, after = taken(kept, "lake", "a"), taken(kept, "lake", "a")
     assert after == Lease("lake", "a", 2)
-    assert leases.renew([before], 6.0) == frozenset()
-    assert leases.renew([after], 6.0) == {"lake"}
+    assert kept.leases.renew([before], 6.0) == frozenset()
+    assert kept.leases.renew([after], 6.0) == {"lake"}
 
 
-def test_a_lease_that_ended_is_not_renewed() -> None:
+def test_a_lease_that_ended_is_not_renewed(kept: Kept) -> None:
     """SPEC J461."""
-    leases, clock = made()
-    lake, hill = leases.take("lake", "a", 6.0), leases.take("hill", "a", 8.0)
-    assert isinstance(lake, Lease)
-    assert isinstance(hill, Lease)
-    clock.now += 5.0
-    assert leases.renew([hill, lake], 6.0) == {"hill", "lake"}
-    clock.now += 5.0
-    assert leases.renew([lake], 6.0) == {"lake"}
-    clock.now += 5.0
-    assert leases.renew([lake, hill], 6.0) == {"lake"}
-    assert leases.take("hill", "b", 6.0) == Lease("hill", "b", 2)
+    lake, hill = taken(kept, "lake", "a", 30.0), taken(kept, "hill", "a", 40.0)
+    kept.wait(25.0)
+    assert kept.leases.renew([lake, hill], 30.0) == {"hill", "lake"}
+    kept.wait(25.0)
+    assert kept.leases.renew([lake], 30.0) == {"lake"}
+    kept.wait(25.0)
+    assert kept.leases.renew([lake, hill], 30.0) == {"lake"}
+    assert kept.leases.renew([], 30.0) == frozenset()
+    assert taken(kept, "hill", "b") == Lease("hill", "b", 2)
 
 
-def test_what_is_released_is_free_at_once_and_only_its_owner_releases_it() -> None:
+def test_what_is_released_is_free_at_once_and_only_its_owner_releases_it(kept: Kept) -> None:
     """SPEC J462."""
-    leases, _ = made()
-    old = leases.take("lake", "a", 6.0)
-    assert isinstance(old, Lease)
-    leases.release([old])
-    assert leases.owner("lake") is None
-    new = leases.take("lake", "b", 6.0)
-    assert new == Lease("lake", "b", 2)
-    leases.release([old])
-    assert leases.owner("lake") == B
+    old = taken(kept, "lake", "a")
+    kept.leases.release([old])
+    assert kept.leases.owner("lake") is None
+    assert taken(kept, "lake", "b") == Lease("lake", "b", 2)
+    kept.leases.release([old])
+    assert kept.leases.owner("lake") == B
 
 
-def test_nodes_are_live_as_long_as_they_said() -> None:
+def test_nodes_are_live_as_long_as_they_said(kept: Kept) -> None:
     """SPEC J463."""
-    leases, clock = made()
-    assert leases.nodes() == (A, B)
-    leases.register(Node("a", "http://10.0.0.9:8000", 3.0), 90.0)
-    clock.now += 60.0
-    assert leases.nodes() == (Node("a", "http://10.0.0.9:8000", 3.0),)
-    leases.take("lake", "a", 6.0)
-    leases.withdraw("a")
-    leases.withdraw("a")
-    assert leases.nodes() == ()
-    assert leases.owner("lake") == Node("a", "", 0.0)
+    assert kept.leases.nodes() == (A, B)
+    again = Node("a", "http://10.0.0.9:8000", 3.0)
+    kept.leases.register(again, 90.0)
+    kept.wait(60.0)
+    assert kept.leases.nodes() == (again,)
+    taken(kept, "lake", "a")
+    kept.leases.withdraw("a")
+    kept.leases.withdraw("a")
+    assert kept.leases.nodes() == ()
+    assert kept.leases.owner("lake") == Node("a", "", 0.0)

@@ -10,7 +10,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -28,6 +27,7 @@ from esker.store.engine.ports import UsedTwice
 from esker.store.journal import DamagedTerrain, Journal, Row
 from esker.store.upkeep.compaction import Compaction
 from tests.gestures import Done, session
+from tests.store.engines import Store
 from tests.sync.harness import LiveServer, set_op, stroke
 
 BIRTH = c.Document(id="t")
@@ -50,11 +50,11 @@ def _folding(journal: Journal) -> Compaction:
 
 
 @pytest.fixture
-def journal(tmp_path: Path) -> Iterator[Journal]:
-    made = Journal(tmp_path)
+def journal(store: Store) -> Journal:
+    """A journal over each engine."""
+    made = store.open()
     made.create(BIRTH).result()
-    yield made
-    made.close()
+    return made
 
 
 def _told(journal: Journal) -> list[Entry]:

@@ -10,9 +10,11 @@ import pytest
 from esker import contract as c
 from esker.document.wire import op_json
 from esker.store.access import Access
+from esker.store.engine.postgres import dialect
 from esker.store.journal import Journal, Row
 from esker.store.timestamps import Person
 from esker.store.upkeep.deletion import GRACE_SECONDS, TABLES, UNTOUCHED_SECONDS, Deletion
+from tests.store.engines import Store
 from tests.sync.harness import LiveServer, Peer, stroke
 
 CLASSES = ("classes", "copies", "pupils")
@@ -66,9 +68,9 @@ def _counted(journal: Journal, terrain: str) -> list[int]:
     return [db.execute(f"SELECT count(*) FROM {t} WHERE terrain=?", (terrain,)).fetchone()[0] for t in TABLES]
 
 
-def test_what_was_deleted_is_gone_after_the_grace(tmp_path: Path) -> None:
+def test_what_was_deleted_is_gone_after_the_grace(store: Store) -> None:
     """SPEC J261: every row of it, and no row of another terrain."""
-    journal, now = Journal(tmp_path), [1e9]
+    journal, now = store.open(), [1e9]
     deletion, access = Deletion(journal, lambda: now[0]), Access(journal)
     for terrain in ("t", "u"):
         journal.create(c.Document(id=terrain)).result()
@@ -98,15 +100,22 @@ def test_what_was_deleted_is_gone_after_the_grace(tmp_path: Path) -> None:
     assert _counted(journal, "u") == before
     assert not journal.exists("t")
     assert journal.exists("u")
-    tables = {row[0] for row in journal.reader().execute("SELECT name FROM sqlite_master WHERE type='table'")}
-    assert tables - {"terrains", "server", *CLASSES} == set(TABLES), "a table that is new is removed from too"
     journal.close()
 
 
-def test_terrains_that_nobody_drew_on_expire(tmp_path: Path) -> None:
+def test_a_table_that_is_new_is_removed_from_too(tmp_path: Path) -> None:
+    """SPEC J261. PostgreSQL knows the same tables."""
+    journal = Journal(tmp_path)
+    tables = {row[0] for row in journal.reader().execute("SELECT name FROM sqlite_master WHERE type='table'")}
+    assert tables - {"terrains", "server", *CLASSES} == set(TABLES)
+    assert tables == set(dialect.TABLES)
+    journal.close()
+
+
+def test_terrains_that_nobody_drew_on_expire(store: Store) -> None:
     """SPEC J262."""
     now = [1e9]
-    journal = Journal(tmp_path, now=lambda: now[0])
+    journal = store.open(now=lambda: now[0])
     deletion = Deletion(journal, lambda: now[0])
     for terrain in ("empty", "drawn", "laid"):
         journal.create(c.Document(id=terrain)).result()

@@ -22,7 +22,7 @@ from esker.store.upkeep import backup
 from esker.store.upkeep.backup import last_backup
 from esker.store.upkeep.inspection import DATABASE_NAME, CorruptDatabase
 from esker.store.upkeep.restore import restore
-from tests.store.engines import copied, sqlite
+from tests.store.engines import Store, copied, sqlite
 
 BIRTH = c.Document(id="t")
 
@@ -43,11 +43,19 @@ def journal(tmp_path: Path) -> Journal:
     return made
 
 
-def test_what_was_appended_is_there_after_a_restart(journal: Journal, tmp_path: Path) -> None:
-    journal.append("t", _rows(1, 3)).result()
-    journal.append("t", _rows(4, 2)).result()
-    journal.close()
-    again = Journal(tmp_path)
+@pytest.fixture
+def either(store: Store) -> Journal:
+    """A journal over each engine."""
+    made = store.open()
+    made.create(BIRTH).result()
+    return made
+
+
+def test_what_was_appended_is_there_after_a_restart(either: Journal, store: Store) -> None:
+    either.append("t", _rows(1, 3)).result()
+    either.append("t", _rows(4, 2)).result()
+    either.close()
+    again = store.open()
     loaded = again.load("t")
     assert loaded is not None
     assert loaded.document.clock == 5
@@ -85,43 +93,43 @@ def test_the_log_has_its_length_from_the_start_and_is_read_as_far_as_it_is_writt
     journal.close()
 
 
-def test_a_clock_or_an_id_is_used_once(journal: Journal) -> None:
-    journal.append("t", _rows(1, 1)).result()
+def test_a_clock_or_an_id_is_used_once(either: Journal) -> None:
+    either.append("t", _rows(1, 1)).result()
     with pytest.raises(UsedTwice):
-        journal.append("t", _rows(1, 1)).result()
+        either.append("t", _rows(1, 1)).result()
     with pytest.raises(UsedTwice):
-        journal.append("t", [_rows(1, 1)[0]._replace(clock=2)]).result()
+        either.append("t", [_rows(1, 1)[0]._replace(clock=2)]).result()
     with pytest.raises(UsedTwice):
-        journal.create(BIRTH).result()
-    journal.close()
+        either.create(BIRTH).result()
+    either.close()
 
 
-def test_a_refused_item_does_not_undo_the_rest_of_its_commit(journal: Journal) -> None:
-    journal.append("t", _rows(1, 1)).result()
+def test_a_refused_item_does_not_undo_the_rest_of_its_commit(either: Journal) -> None:
+    either.append("t", _rows(1, 1)).result()
     gate = threading.Event()
-    hold: Future[bool] = journal.submit(lambda _: gate.wait(5))  # the next three wait together behind this one
-    futures = [journal.append("t", rows) for rows in (_rows(2, 1), _rows(1, 1), _rows(3, 1))]
+    hold: Future[bool] = either.submit(lambda _: gate.wait(5))  # the next three wait together behind this one
+    futures = [either.append("t", rows) for rows in (_rows(2, 1), _rows(1, 1), _rows(3, 1))]
     gate.set()
     wait(futures)
     assert hold.result()
     assert futures[0].exception() is None
     assert isinstance(futures[1].exception(), UsedTwice)
     assert futures[2].exception() is None
-    assert [row.clock for row in journal.rows("t", 0)] == [1, 2, 3]
-    journal.close()
+    assert [row.clock for row in either.rows("t", 0)] == [1, 2, 3]
+    either.close()
 
 
-def test_a_cancelled_item_is_not_written_and_stops_nobody(journal: Journal) -> None:
+def test_a_cancelled_item_is_not_written_and_stops_nobody(either: Journal) -> None:
     gate = threading.Event()
-    hold: Future[bool] = journal.submit(lambda _: gate.wait(5))
+    hold: Future[bool] = either.submit(lambda _: gate.wait(5))
     while not hold.running():
         time.sleep(0.001)
-    cancelled, kept = journal.append("t", _rows(1, 1)), journal.append("t", _rows(2, 1))
+    cancelled, kept = either.append("t", _rows(1, 1)), either.append("t", _rows(2, 1))
     assert cancelled.cancel()
     gate.set()
     assert kept.result(5) is None
-    assert [row.clock for row in journal.rows("t", 0)] == [2]
-    journal.close()
+    assert [row.clock for row in either.rows("t", 0)] == [2]
+    either.close()
 
 
 def test_many_rooms_share_a_commit(journal: Journal, tmp_path: Path) -> None:
@@ -176,34 +184,34 @@ def test_a_failure_that_others_of_the_batch_survive_is_told(journal: Journal, ot
     assert not journal.writable
 
 
-def test_snapshots_shorten_the_replay_and_change_nothing(journal: Journal) -> None:
+def test_snapshots_shorten_the_replay_and_change_nothing(either: Journal) -> None:
     document = StrokeSet.from_document(BIRTH)
     for first in range(1, 50, 7):
         rows = _rows(first, 7)
         for row in rows:
             document, _ = document.apply(c.OP.validate_json(row.op))
-        journal.append("t", rows, document.to_document()).result()
-    loaded = journal.load("t")
+        either.append("t", rows, document.to_document()).result()
+    loaded = either.load("t")
     assert loaded is not None
     assert loaded.document == document
     assert loaded.recent == []
-    kept = [row[0] for row in journal.reader().execute("SELECT clock FROM snapshots ORDER BY clock")]
+    kept = [row[0] for row in either.reader().execute("SELECT clock FROM snapshots ORDER BY clock")]
     assert kept == [0, 42, 49]
-    past = journal.load("t", upto=20)
+    past = either.load("t", upto=20)
     assert past is not None
     assert (past.document.clock, len(past.document.strokes)) == (20, 20)
-    journal.close()
+    either.close()
 
 
-def test_a_gap_or_an_op_that_does_not_apply_is_named(journal: Journal) -> None:
-    journal.append("t", [_rows(2, 1)[0]]).result()
+def test_a_gap_or_an_op_that_does_not_apply_is_named(either: Journal) -> None:
+    either.append("t", [_rows(2, 1)[0]]).result()
     with pytest.raises(DamagedTerrain, match="op 2 follows op 0"):
-        journal.load("t")
-    journal.create(c.Document(id="u")).result()
-    journal.append("u", [_rows(1, 1)[0]._replace(op='{"type":"stroke.finish","stroke":"no"}')]).result()
+        either.load("t")
+    either.create(c.Document(id="u")).result()
+    either.append("u", [_rows(1, 1)[0]._replace(op='{"type":"stroke.finish","stroke":"no"}')]).result()
     with pytest.raises(DamagedTerrain, match="op 1 of u"):
-        journal.load("u")
-    journal.close()
+        either.load("u")
+    either.close()
 
 
 @pytest.mark.parametrize("damage", ["header", "middle", "truncated", "text", "newer"])
@@ -294,8 +302,8 @@ def test_backups_are_complete_while_the_journal_is_written(journal: Journal, tmp
     journal.close()
 
 
-def test_a_closed_journal_has_committed_everything(tmp_path: Path) -> None:
-    journal = Journal(tmp_path)
+def test_a_closed_journal_has_committed_everything(store: Store) -> None:
+    journal = store.open()
     journal.create(BIRTH)
     futures = [journal.append("t", _rows(i, 1)) for i in range(1, 400)]
     journal.close()

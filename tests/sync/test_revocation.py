@@ -18,7 +18,7 @@ from esker import contract as c
 from esker.server.wire import sending
 from esker.session.room.core import Denied
 from esker.store.access import Access, Ended, JoinCode, OwnLink
-from esker.store.journal import Journal
+from tests.store.engines import Store
 from tests.sync.harness import PATIENCE, LiveServer, Peer, raw_socket, sleeping_member, stroke
 from tests.sync.scripted_reader import Reader, layers, send, works
 
@@ -129,9 +129,9 @@ def test_nobody_ends_the_link_that_one_s_own_came_from(live: LiveServer) -> None
     revoke(live, terrain, owner, second_id)
 
 
-def test_authority_is_asked_in_the_commit_itself(tmp_path: Path) -> None:
+def test_authority_is_asked_in_the_commit_itself(store: Store) -> None:
     """SPEC P287: what was asked before a revocation and is written after it is not done."""
-    journal = Journal(tmp_path)
+    journal = store.open()
     journal.create(c.Document(id="t")).result()
     access = Access(journal)
     root, _ = access.add("t", "owner", "").result()

@@ -184,7 +184,8 @@ class Access:
             if found is None:
                 return None
             try:
-                db.execute("UPDATE links SET hash=? WHERE id=?", (hashed(secret), link_id))
+                # Some databases say only then that a key is used twice when they are asked what came of it.
+                _ = db.execute("UPDATE links SET hash=? WHERE id=?", (hashed(secret), link_id)).rowcount
             except db.IntegrityError:
                 raise SecretTaken from None
             return secret, [] if found[0] == "owner" else self._end(db, _tree(db, link_id)[1:])

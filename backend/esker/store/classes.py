@@ -87,7 +87,7 @@ class ClassStore:
             found, live = db.execute(count, (made.terrain,)).fetchone()
             if live >= most or found >= kept:
                 raise TooManyClasses(live < most)
-            self._journal.space.need(len(document))
+            self._journal.need(len(document))
             db.execute(f"INSERT INTO classes ({_COLUMNS},document) VALUES (?,?,?,?,?,?,?,?,?,?,?)", (*made, document))
 
         return self._journal.submit(write, made.terrain)

@@ -82,6 +82,7 @@ class Journal:
         directory.mkdir(parents=True, exist_ok=True)
         self.space = Space(directory) if space is None else space
         self.engine: Engine = Sqlite(directory, now(), self.space) if engine is None else engine
+        self.engine.hear_of_again = self._recount
         self.hear_of_full: Callable[[str], object] = lambda _: None
         """Called in the writer's thread with a terrain whose history has no room left."""
 
@@ -100,6 +101,16 @@ class Journal:
     def waiting(self) -> int:
         """Items that wait for a commit, about."""
         return self.engine.waiting
+
+    def need(self, more: int = 0, *, drawing: bool = False) -> None:
+        """Asks for room for what is written (``Space.need``); a database elsewhere says itself when it is full."""
+        if self.engine.is_local:
+            self.space.need(more, drawing=drawing)
+
+    def _recount(self) -> None:
+        """What was counted of a commit that is done again is counted again."""
+        self._sizes.clear()
+        self._timestamps.clear()
 
     def forget(self, terrain: str) -> None:
         """Forgets what was counted of a terrain: another server may have written meanwhile."""
@@ -153,7 +164,7 @@ class Journal:
                 "Try again in a few minutes: what can be folded of it is. A copy of the terrain begins with an empty "
                 "history."
             )
-        self.space.need(more, drawing=True)
+        self.need(more, drawing=True)
         self._sizes[terrain] += more
 
     def shrunk(self, terrain: str, less: int) -> None:
@@ -180,7 +191,7 @@ class Journal:
         """
 
         def write(db: Connection) -> None:
-            self.space.need(len(text or ""))
+            self.need(len(text or ""))
             db.execute("INSERT INTO terrains (id,created) VALUES (?,?)", (document.id, self._now()))
             name_grids(db, document.id, (layer.content for layer in (*document.layers, *document.deleted_layers)))
             put_snapshot(db, document, text)

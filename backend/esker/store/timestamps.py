@@ -43,6 +43,10 @@ class Timestamps:
             if len(self._last) > 10_000:
                 self._last.clear()
 
+    def clear(self) -> None:
+        """Forgets all last moments."""
+        self._last.clear()
+
     def forget(self, terrain: str) -> None:
         """Forgets the last moment of a terrain."""
         self._last.pop(terrain, None)

@@ -17,6 +17,8 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Final, Protocol
 
+from esker.store.engine.ports import Unreachable as Unreachable
+
 LEASE_SECONDS: Final = 6.0
 """How long a lease lives by the store's clock unless it is renewed."""
 RENEW_SECONDS: Final = 2.0
@@ -78,10 +80,6 @@ class Leases(Protocol):
 
     def owner(self, terrain: str) -> Node | None:
         """The node that owns a terrain now. One that is not registered any more has an empty address."""
-
-
-class Unreachable(Exception):
-    """The store did not answer. What was asked may have been done, or not."""
 
 
 class OwnLeases:

@@ -61,6 +61,10 @@ class Unwritable(Exception):
         self.full = full
 
 
+class Unreachable(Unwritable):
+    """The database does not answer. What was asked of leases may have been done, or not."""
+
+
 class Unknown(Exception):
     """The database went away while it committed: what was asked was done, or was not. What is there must be read."""
 
@@ -98,8 +102,12 @@ class Database(Reads, Protocol):
 class Engine(Database, Protocol):
     """A database with its one writer."""
 
+    is_local: bool
+    """Whether it lies on the disk of the data folder, and takes of its room."""
     writable: bool
     """Whether the last commit could be written."""
+    hear_of_again: Callable[[], object]
+    """Called in the writer's thread before items are run again that were run before in vain."""
 
     @property
     def waiting(self) -> int:

@@ -1,0 +1,1 @@
+"""Benchmarks of many servers over one database, and the real servers that they and the tests start."""

@@ -1,0 +1,68 @@
+"""A proxy in front of a Unix socket that cuts connections where a test says."""
+
+from __future__ import annotations
+
+import os
+import socket
+import threading
+from contextlib import suppress
+from pathlib import Path
+
+
+class Proxy:
+    """Passes bytes on in both directions. After ``cut_at`` was sent nothing comes back and the connection ends."""
+
+    def __init__(self, folder: Path, server: Path) -> None:
+        """``folder``: where the socket of the proxy lies; ``server``: the socket behind it."""
+        self.cut_at: bytes | None = None
+        self.is_open = True
+        """Whether new connections are let through."""
+        self.cuts = 0
+        self._server = server
+        self._listener = socket.socket(socket.AF_UNIX)
+        folder.mkdir()
+        self._listener.bind(os.fspath(folder / server.name))
+        self._listener.listen()
+        threading.Thread(target=self._accept, daemon=True).start()
+
+    def _accept(self) -> None:
+        while True:
+            try:
+                near, _ = self._listener.accept()
+            except OSError:
+                return
+            if not self.is_open:
+                near.close()
+                continue
+            far = socket.socket(socket.AF_UNIX)
+            far.connect(os.fspath(self._server))
+            threading.Thread(target=self._out, args=(near, far), daemon=True).start()
+            threading.Thread(target=self._back, args=(near, far), daemon=True).start()
+
+    def _out(self, near: socket.socket, far: socket.socket) -> None:
+        with suppress(OSError):
+            while data := near.recv(65536):
+                cut = self.cut_at is not None and self.cut_at in data
+                if cut:
+                    self.cuts += 1
+                    with suppress(OSError):
+                        near.shutdown(socket.SHUT_WR)  # what the server answers goes nowhere
+                far.sendall(data)
+                if cut:
+                    far.shutdown(socket.SHUT_WR)  # the server does what it was sent, and ends
+                    while far.recv(65536):
+                        pass
+                    break
+        for end in (near, far):
+            with suppress(OSError):
+                end.shutdown(socket.SHUT_RDWR)
+            end.close()
+
+    def _back(self, near: socket.socket, far: socket.socket) -> None:
+        with suppress(OSError):
+            while data := far.recv(65536):
+                near.sendall(data)
+
+    def close(self) -> None:
+        """Lets nobody through any more."""
+        self._listener.close()
