@@ -9,9 +9,9 @@ from esker.contract import CHEBYSHEV_SWEEPS, SATURATION
 from esker.resources import SHADERS
 from esker.solve import reference
 from esker.solve.constraints import tables
-from esker.solve.opencl import gpu_program, wave
+from esker.solve.opencl import gpu_program, pocket, wave
 
-SOURCES = ("rows.cl", "nearest.cl", "section.cl", "raster.cl", "setup.cl", "visit.cl", "refine.cl")
+SOURCES = ("rows.cl", "nearest.cl", "section.cl", "raster.cl", "setup.cl", "visit.cl", "refine.cl", "pockets.cl")
 OVER_SOURCES = ("rows.cl", "nearest.cl", "section.cl", "raster.cl", "over_base.cl")
 OVER_BASE = "#define OVER_BASE\n"
 INLINE = "#undef inline\n#define inline static inline\n"
@@ -58,6 +58,7 @@ def defines(more: dict[str, float | int]) -> str:
     values: dict[str, float | int] = {
         **tables.defines(),
         **wave.defines(),
+        **pocket.defines(),
         "SATURATION": SATURATION,
         "CHEBYSHEV_SWEEPS": CHEBYSHEV_SWEEPS,
         "BOTTOM_LEVELS": reference.BOTTOM_LEVELS,

@@ -1,4 +1,4 @@
-"""Steps of refinement on an OpenCL device, row by row (shaders/opencl/refine.cl); twin ``refine_engine.NumpyEngine``.
+"""Steps of refinement on an OpenCL device, row by row (refine.cl, pockets.cl); twin ``engine.NumpyEngine``.
 
 Two steps may be under way: while the sweeps of one run, which take one core of a CPU, the host prepares the next one.
 What waits in a queue is kept short, as who draws waits for it: bins are rasterised some at a time, and the sweeps are
@@ -24,10 +24,13 @@ from esker.solve.opencl.device import Device
 from esker.solve.opencl.faults import guarded
 from esker.solve.opencl.levels import PAD, Launcher, over_base
 from esker.solve.refine.bin_cache import BinCache, Part, exchange, missing
+from esker.solve.refine.cl_pockets import Pockets
 from esker.solve.refine.engine import (
     CHANNELS,
+    FIRST_SWEEPS,
     GRADIENT_SWEEPS,
-    HEIGHT_SWEEPS,
+    LAST_SWEEPS,
+    SWEPT,
     Fields,
     Pending,
     Span,
@@ -137,7 +140,9 @@ class _Room:
             queue = cl.CommandQueue(device.context, device.context.devices[0])
             self.device = device
             self.launch = Launcher(replace(device, queue=queue), 0)
-            weights = {GRADIENT_SWEEPS: gradient_weights(), HEIGHT_SWEEPS: height_weights()}
+            weights = {GRADIENT_SWEEPS: gradient_weights()}
+            weights |= {count: height_weights(count) for count in (FIRST_SWEEPS, LAST_SWEEPS)}
+            self.pockets = Pockets(self.launch)
             self.weights = {k: self.launch.constant(w.astype(np.float32)) for k, w in weights.items()}
         self.stride = 0
         self.fields: dict[str, Any] = {}
@@ -207,11 +212,12 @@ class _Room:
             i(host.shape[1] * host.shape[2]), a["gd"], a["hd"], a["hf"], a["u"], a["q"], *shape, f(screening),
             i(each),
         )  # fmt: skip
-        wide = span.grown(HEIGHT_SWEEPS + 1, 1 << 30)
-        wide = Span(wide.r0, min(rows, wide.r1), wide.c0, min(columns, wide.c1))
-        self._sweep(2, 0, "gf", "gd", 0, shape, screening, GRADIENT_SWEEPS, wide)
+        swept, guided = (_within(span.grown(by, rows + columns), rows, columns) for by in (SWEPT, SWEPT + FIRST_SWEEPS))
+        self._sweep(2, 0, "gf", "gd", 0, shape, screening, GRADIENT_SWEEPS, guided)
         run("refine_guide", (strips,), a["u"], a["hd"], a["hf"], a["rhs"], *shape, f(spacing), i(each))
-        self._sweep(1, 2, "rhs", "hd", 1, shape, screening, HEIGHT_SWEEPS, span)
+        self._sweep(1, 2, "rhs", "hd", 1, shape, screening, FIRST_SWEEPS, swept)
+        self.pockets.correct(a, (rows, columns, pitch, stride), span, screening)
+        self._sweep(1, 2, "rhs", "hd", 1, shape, screening, LAST_SWEEPS, span)
         return self._mark()
 
     def _constrain(
@@ -291,6 +297,11 @@ class _Room:
                 buffer_origin=(4 * (c * self.stride + span.r0 * pitch + PAD + span.c0), 0),
             )  # fmt: skip
         return out
+
+
+def _within(span: Span, rows: int, columns: int) -> Span:
+    """As much of a span as a window has."""
+    return Span(span.r0, min(rows, span.r1), span.c0, min(columns, span.c1))
 
 
 def _padded(parent: NDArray[np.float32], rows: int, columns: int) -> NDArray[np.float32]:

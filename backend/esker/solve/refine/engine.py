@@ -1,7 +1,8 @@
 """One step of refinement of one window: from the parent's fields to those of the next level (DESIGN 5.6).
 
 Cubic prolongation, then weighted Jacobi sweeps of both steps of the solver with the constraints of the finer level:
-first the two gradient components, then the heights with them as guidance. Each sample is a function of the samples
+first the two gradient components, then the heights with them as guidance, with a correction on a coarse grid
+(``correction``) before the last of them. Each sample is a function of the samples
 within HALO of it, and is computed by the same operations in every window: windows agree bit for bit on what they share.
 """
 
@@ -21,17 +22,26 @@ from esker.contract import CHEBYSHEV_HIGH, TerrainSettings
 from esker.solve import reference
 from esker.solve.constraints import raster_reference
 from esker.solve.constraints.constraints import BIN, BinBox, Tables
+from esker.solve.opencl import pocket
 from esker.solve.opencl.device import Device
+from esker.solve.refine import correction
 from esker.solve.refine.base_blocks import BaseWindows
 
 GRADIENT_SWEEPS: Final = 8
-HEIGHT_SWEEPS: Final = 70
-"""Both counts are even, and as large as whole bins have room for: tiles begin on bins, so that a halo of 79 takes no
-more of them than one of 65. docs/decisions/0012-refinement.md."""
+FIRST_SWEEPS: Final = 28
+"""Sweeps of the height before its correction, which sees what they leave."""
+LAST_SWEEPS: Final = 4
+"""Sweeps of the height after its correction. All counts are even, and as large as whole bins have room for: tiles begin
+on bins, so that a halo of 111 takes no more of them than one of 97. docs/decisions/0060-pockets.md."""
 GRADIENT_LOW: Final = 0.25
 """The sweeps of the gradient damp errors from here upward."""
-HALO: Final = GRADIENT_SWEEPS + 1 + HEIGHT_SWEEPS
-"""Samples around a window that take part: one more for the divergence."""
+CORRECTED: Final = LAST_SWEEPS + pocket.REACH
+"""Samples around a window whose residuals count."""
+SWEPT: Final = CORRECTED + 1
+"""Samples around a window that are right before its correction."""
+HALO: Final = SWEPT + FIRST_SWEEPS + GRADIENT_SWEEPS
+"""Samples around a window that take part. Of the first sweep's samples the right-hand side needs one less, and its
+divergence one more."""
 CHANNELS: Final = 3
 """d/dx, d/dy, height."""
 
@@ -101,16 +111,16 @@ def gradient_weights() -> NDArray[np.float64]:
     return 1 / _leja(mid + half * np.cos(np.pi * (2 * k + 1) / (2 * GRADIENT_SWEEPS)))
 
 
-@lru_cache(maxsize=1)
-def height_weights() -> NDArray[np.float64]:
-    """Relaxations of the sweeps of the height, whose polynomial is the smallest in the mean on the scaled spectrum.
+@lru_cache(maxsize=2)
+def height_weights(sweeps: int) -> NDArray[np.float64]:
+    """Relaxations of sweeps of the height, whose polynomial is the smallest in the mean on the scaled spectrum.
 
     Of all polynomials p of their degree n with p(0) = 1 the one with the least integral of p^2 over [0, 2], which is
     2 / (n + 1)^2: a kernel polynomial (Stiefel 1958), whose roots are those of (P_n - P_n+1)(1 - t), Legendre's P, but
     for the one at 0. What is nearly as smooth as the window is wide shrinks more than with Chebyshev's polynomial of an
     interval, which must leave that out, and so do kinks.
     """
-    series = np.zeros(HEIGHT_SWEEPS + 2)
+    series = np.zeros(sweeps + 2)
     series[-2:] = 1, -1
     return 1 / _leja(1 - np.sort(legroots(series).real)[:-1])
 
@@ -238,7 +248,7 @@ class NumpyEngine:
         fixed = c.height_d[None] < 0
         rhs = reference.divergence(f[None], c.height_d[None], gradient, tables.spacing_m)
         start = np.where(fixed, f[None], u[2:])
-        height = sweeps(start, rhs, c.height_d[None], tables.screening, height_weights())
+        height = relaxed(start, rhs, c.height_d[None], tables.screening)
         w, core = at.window, at.core
         rows, columns = slice(core.r0 - w.r0, core.r1 - w.r0), slice(core.c0 - w.c0, core.c1 - w.c0)
         return Done(np.concatenate([gradient, height])[:, rows, columns].astype(np.float32))
@@ -254,6 +264,16 @@ def prolongation(parent: NDArray[np.float64], window: Span) -> NDArray[np.float6
         out[1::2] = between[: count // 2]
         parent = np.moveaxis(out, 0, axis)
     return parent
+
+
+def relaxed(
+    u: NDArray[np.float64], rhs: NDArray[np.float64], d: NDArray[np.float64], screening: float
+) -> NDArray[np.float64]:
+    """The height step of a window from its start, (1, rows, columns)."""
+    u = sweeps(u, rhs, d, screening, height_weights(FIRST_SWEEPS))
+    residual = reference.residual(u, rhs, d, screening)
+    u = correction.corrected(u[0], residual[0], d[0], screening)[None]
+    return sweeps(u, rhs, d, screening, height_weights(LAST_SWEEPS))
 
 
 def sweeps(
