@@ -26,8 +26,8 @@ FLAT = np.zeros((1, 1), dtype=np.float32)
 class Desk:
     """Rooms by number, driven by hand: every slice is one level of a solve with levels 0..2."""
 
-    def __init__(self, budget: int = schedule.BUDGET) -> None:
-        self.now = 0.0
+    def __init__(self, budget: int = schedule.BUDGET, early: bool = False) -> None:
+        self.now, self.early = 0.0, early
         self.tally: Tally[int] = Tally(budget)
         self.grounds: dict[int, Ground] = {}
         self.left: dict[int, list[Preview | Settled]] = {}
@@ -62,7 +62,13 @@ class Desk:
         for effect in self.happen(room, does.Turn(begins)):
             if isinstance(effect, does.OpenSolve):
                 self.left[room] = _levels(effect.top)
-                self.happen(room, does.Opened(False))
+                self.happen(room, does.Opened(self.early))
+            if isinstance(effect, does.PreviewEarly):
+                self.now += seconds
+                self.tally = self.tally.ended(room, self.now)
+                self.happen(room, does.EarlyMade(effect.job, Preview(0, FLAT)))
+                self.log.append((room, f"early {effect.job.clock}"))
+                return room
         result = self.left[room].pop(0) if self.left[room] else None
         self.now += self.pace.get(room, seconds)
         self.tally = self.tally.ended(room, self.now)
@@ -228,6 +234,31 @@ def test_a_newer_job_shows_its_coarsest_level_while_a_pass_goes_on() -> None:
     assert not states.early_preview_is_due(ground), "the pass has not gone on since the last"
     ground = replace(ground, early=Early(newer.number, made=True))
     assert states.early_preview_is_due(ground), "its coarsest level is out"
+
+
+def test_a_pass_that_waits_for_its_turn_is_made_of_the_newest_strokes() -> None:
+    """SPEC S549: and the room keeps its place among those that wait, however often it is asked."""
+    desk = Desk(early=True)
+    busy, room = [desk.room() for _ in range(3)], desk.room()
+    for other in (*busy, room):
+        desk.ask(other)
+        desk.until(other, "0")
+    began = desk.tally.rooms[room].began
+    desk.ask(room, 2)
+    assert desk.until(room, "early 2") == 1, "a coarse preview comes first"
+    assert states.stage(desk.grounds[room], desk.now) == states.FINER
+    while (busy[-1], "2") not in desk.log:
+        assert desk.slice() in busy, "others have waited for longer"
+    last = desk.room()
+    desk.ask(last)
+    desk.until(last, "0")
+    assert desk.slice() == room, "it keeps its place before who came later"
+    desk.ask(room, 3)
+    desk.until(room, "2")
+    state = desk.grounds[room].state
+    assert isinstance(state, Settling)
+    assert state.job.clock == 2, "the newest when its turn came"
+    assert desk.tally.rooms[room].began == began
 
 
 def test_nobody_waits_while_something_else_is_to_be_done() -> None:

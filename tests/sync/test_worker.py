@@ -69,6 +69,7 @@ NONE: tuple[Effect, ...] = ()
 COARSE, MIDDLE, FINEST = (Preview(level, FLAT) for level in range(3))
 EXACT = Settled(0, FLAT)
 EARLY = Previewing(JOB, 0, {0: NOW}, previews_early=True)
+TRIED = Early(DRAWN.number)
 
 TABLE: list[tuple[Ground, Event, State, tuple[Effect, ...]]] = [
     # a job comes
@@ -107,7 +108,7 @@ TABLE: list[tuple[Ground, Event, State, tuple[Effect, ...]]] = [
     (ground(EARLY, DRAWN), does.Turn(begins=False), EARLY, (does.PreviewEarly(DRAWN),)),
     (ground(EARLY, DRAWN), does.EarlyMade(DRAWN, COARSE), EARLY, (does.Deliver(DRAWN, COARSE),)),
     (ground(EARLY, DRAWN), does.EarlyMade(DRAWN, None), EARLY, NONE),
-    (ground(EARLY, DRAWN, early=Early(DRAWN.number)), does.Turn(begins=False), EARLY, (does.Step(),)),
+    (ground(EARLY, DRAWN, early=TRIED), does.Turn(begins=False), replace(EARLY, finer=True), (does.Step(),)),
     # settling
     (ground(Settling(JOB)), does.Turn(begins=False), Settling(JOB), (does.Step(),)),
     (ground(Settling(JOB)), COARSE, Settling(JOB), shows(COARSE, wait=0.002)),
@@ -209,8 +210,13 @@ def test_states_are_small_values() -> None:
 PASS = Previewing(JOB, 1, {0: NOW, 1: NOW})
 OTHERS = replace(PAINTED, number=4)
 NEW, OLD = replace(SOON, lead={1: 1.0}), replace(SOON, finest_at=NOW - 1.0, lead={1: 1.0})
+SHOWN = Early(DRAWN.number, made=True)
 BEGINS: list[tuple[str, Ground, bool]] = [
     ("nothing is wanted", ground(Settling(JOB)), False),
+    ("it was shown early while a pass waited for its turn", ground(EARLY, DRAWN, shown=OLD, early=SHOWN), True),
+    ("its pass had its turn", ground(replace(EARLY, finer=True), DRAWN, shown=OLD, early=SHOWN), False),
+    ("another one was shown early", ground(EARLY, DRAWN, shown=OLD, early=Early(DRAWN.number - 1, made=True)), False),
+    ("it could not be shown early", ground(EARLY, DRAWN, shown=OLD, early=TRIED), False),
     ("nothing runs", ground(Waiting(), JOB), True),
     ("it only settles", ground(Settling(JOB), DRAWN), True),
     ("it refines", ground(Refining(), DRAWN), True),
@@ -232,7 +238,7 @@ BEGINS: list[tuple[str, Ground, bool]] = [
 
 @pytest.mark.parametrize(("before", "begins"), [row[1:] for row in BEGINS], ids=[row[0] for row in BEGINS])
 def test_when_the_newest_job_is_begun(before: Ground, begins: bool) -> None:
-    """SPEC P57, P58: at once, but for a preview pass that should end first."""
+    """SPEC P57, P58, S549: at once, but for a preview pass that should end first."""
     assert states.starts(before, NOW) == begins
 
 

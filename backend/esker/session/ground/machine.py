@@ -218,8 +218,10 @@ def _slice(ground: Ground) -> Result:
         return replace(ground, early=Early(job.number, solved_since=False)), (does.PreviewEarly(job),)
     if isinstance(ground.state, Previewing | Settling | ChannelsOnly):
         channels = replace(ground.channels, solved_since=True)
-        early = replace(ground.early, solved_since=True)
-        return replace(ground, channels=channels, early=early), (does.Step(),)
+        early, state = replace(ground.early, solved_since=True), ground.state
+        if isinstance(state, Previewing) and state.reached >= 0:
+            state = replace(state, finer=True)
+        return replace(ground, state=state, channels=channels, early=early), (does.Step(),)
     return ground, (does.Refine(),) if isinstance(ground.state, Refining) else ()
 
 

@@ -84,7 +84,8 @@ def begin(
     if not states.needs_channels_only(ground):
         wanted, begun = ground.jobs.wanted, ground.jobs.begun
         spared = spared and wanted is not None and begun is not None and wanted.job.number == begun.job.number
-    return True, gone, tally.noted(room, began=tally.turns, is_spared=spared)
+    began = tally.rooms[room].began if states.is_overtaken(ground) else tally.turns  # it has waited long enough
+    return True, gone, tally.noted(room, began=began, is_spared=spared)
 
 
 def has_something_else(room: Room, grounds: Grounds[Room]) -> bool:

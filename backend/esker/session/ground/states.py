@@ -38,13 +38,15 @@ class Previewing:
     """The levels of a job are made, coarse to fine, for the first time.
 
     reached: the finest level that is out, -1 before the first. came: when each level below the finest came.
-    previews_early: whether this solve can tell what newer strokes look like while it goes on.
+    previews_early: whether this solve can tell what newer strokes look like while it goes on. finer: whether anything
+    was done for a level after the coarsest.
     """
 
     job: Job
     reached: int = -1
     came: Mapping[int, float] = field(default_factory=dict)
     previews_early: bool = False
+    finer: bool = False
 
 
 @dataclass(frozen=True)
@@ -207,6 +209,15 @@ def early_preview_is_due(ground: Ground) -> bool:
     return state.reached >= 0 and wanted.job.layers_rev == state.job.layers_rev
 
 
+def is_overtaken(ground: Ground) -> bool:
+    """Returns whether a pass that has waited for its turn since its coarsest level has a newer job whose coarsest level
+    is out, too: then nothing is lost by making the finer levels of that one, and who draws sees the newest strokes."""
+    wanted, state, early = ground.jobs.wanted, ground.state, ground.early
+    if wanted is None or not isinstance(state, Previewing) or state.finer or state.reached < 0:
+        return False
+    return early.made and early.number == wanted.job.number
+
+
 def starts(ground: Ground, now: float) -> bool:
     """Returns whether the newest job is to be begun: at once, but for a preview pass that should end first."""
     wanted, state, channels = ground.jobs.wanted, ground.state, ground.channels
@@ -218,7 +229,7 @@ def starts(ground: Ground, now: float) -> bool:
     if isinstance(state, Previewing | Settling | ChannelsOnly) and wanted.job.heights == state.job.heights:
         # either the heights go on, or the channels
         return isinstance(state, ChannelsOnly) and now - channels.complete_at <= FINEST_WITHIN
-    if not isinstance(state, Previewing):
+    if not isinstance(state, Previewing) or is_overtaken(ground):
         return True
     starving = now - ground.shown.finest_at > FINEST_WITHIN
     return not starving and ground.shown.lead.get(state.reached, math.inf) > FINISH
@@ -229,6 +240,8 @@ def stage(ground: Ground, now: float) -> int | None:
     state, wanted = ground.state, ground.jobs.wanted
     if ground.channels.making or starts_channels_beside(ground):
         return COARSE
+    if is_overtaken(ground):
+        return FINER
     if wanted is not None and starts(ground, now):
         return SETTLE if wanted.job.number == ground.shown.previewed else COARSE
     if early_preview_is_due(ground):
