@@ -13,9 +13,13 @@ import pytest
 
 from esker import grid
 from esker.contract import MAX_LEVEL
+from esker.events import Done
+from esker.grid import TileKey
 from esker.solve.opencl import workspaces
 from esker.solve.opencl.faults import OutOfDeviceMemoryError
 from esker.solve.pool.pool import SPARE_SECONDS
+from esker.solve.refine.cl_engine import ClEngine
+from esker.solve.refine.refinement import SPARE_SECONDS as REFINED_SECONDS
 from esker.solve.solver import Solver
 from tests.solver.bases import Analytic, hills
 from tests.solver.failing import INVALID_VALUE, NO_MEMORY, STROKES, Failing, heights, held
@@ -62,6 +66,31 @@ def test_workspaces_that_nobody_uses_are_given_back(used: Solver) -> None:
     assert used.tidy(2 * later) == 1
     assert held(used) == 0
     assert np.array_equal(heights(used, 1), expected)
+
+
+def test_memory_of_refinement_is_given_back(used: Solver) -> None:
+    """SPEC S550: when no step was begun for long and none is under way; the next one gives the same bits."""
+    *_, done = used.steps(STROKES, SETTINGS, 1, basis=True)
+    assert isinstance(done, Done)
+    refiner, now, key = used.refiner(done.basis), time.monotonic(), TileKey(3, 4, 3)
+    assert used._refinery is not None
+
+    def made() -> list[bytes]:
+        return [tile.heights.tobytes() for tile in refiner.tiles([key]) if tile is not None]
+
+    expected, engine = made(), used._refinery._engine
+    assert isinstance(engine, ClEngine)
+    for seconds, empty in ((0, False), (REFINED_SECONDS - 1, False), (REFINED_SECONDS + 1, True)):
+        used.tidy(now + seconds)
+        assert engine.is_empty == empty == (len(refiner.cache) == 0)
+    under_way = refiner.tiles([TileKey(3, 1, 1), TileKey(3, 7, 7)], lambda: True)
+    while next(under_way) is None and not any(room.is_busy for room in engine._rooms):
+        pass
+    used.tidy(now + 2 * REFINED_SECONDS)
+    used.tidy(now + 4 * REFINED_SECONDS)
+    assert not engine.is_empty
+    under_way.close()  # type: ignore[attr-defined]
+    assert made() == expected
 
 
 def test_out_of_memory_in_the_middle_of_a_solve(used: Solver, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -63,6 +63,7 @@ class Counting:
 
     def __init__(self, engine: Engine) -> None:
         self.engine, self.device, self.ahead, self.steps = engine, engine.device, engine.ahead, 0
+        self.begun, self.is_empty = 0, True
 
     def begin(self, at: Step, strokes: StrokeWindows, parent: Fields) -> Pending:
         self.steps += 1
@@ -70,6 +71,9 @@ class Counting:
 
     def clear(self) -> None:
         self.engine.clear()
+
+    def release(self) -> bool:
+        return self.engine.release()
 
 
 def made(refiner: Refiner, keys: Sequence[TileKey]) -> dict[TileKey, RefinedTile]:

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from esker.contract import MAX_LEVEL, Channel, Stroke, TerrainSettings
 from esker.events import PAUSE, BaseLevel, ChannelLevel, Done, Pause, Preview, Settled, SolveEvent, pauses
+from esker.process import system
 from esker.solve import blank, passes
 from esker.solve.base import Base, bound
 from esker.solve.blank import is_blank
@@ -214,10 +215,14 @@ class Solver:
 
     def tidy(self, now: float | None = None) -> int:
         """Gives back the memory of workspaces that have been idle for SPARE_SECONDS; returns how many there were.
+        Memory of refinement goes, too, when nobody has needed it for longer.
 
         ``now``: of ``time.monotonic``.
         """
-        return self._pool.tidy(time.monotonic() if now is None else now)
+        now = time.monotonic() if now is None else now
+        if self._refinery is not None and self._refinery.tidy(now):
+            system.give_memory_back()
+        return self._pool.tidy(now)
 
     def _check(self, device: Device) -> None:
         """Compile the kernels now, not under somebody's first stroke, and trust none whose ground is not the twin's.

@@ -62,14 +62,30 @@ class ClEngine:
     def __init__(self, device: Device) -> None:
         self.device = device
         self.bin_cache = BinCache()
+        self.begun = 0
         self._rooms = deque(_Room(device) for _ in range(AHEAD))
+
+    @property
+    def is_empty(self) -> bool:
+        """See ``Engine``."""
+        return len(self.bin_cache) == 0 and not any(room.stride for room in self._rooms)
 
     def clear(self) -> None:
         """Drop the rasterised constraints."""
         self.bin_cache.clear()
 
+    def release(self) -> bool:
+        """See ``Engine``."""
+        if any(room.is_busy for room in self._rooms):
+            return False
+        self.clear()
+        for room in self._rooms:
+            room.release()
+        return True
+
     def begin(self, at: Step, strokes: StrokeWindows, parent: Fields) -> Pending:
         """See ``Engine``. The step that was begun ``ahead`` steps before is waited for, if anybody still wants it."""
+        self.begun += 1
         room = self._rooms[0]
         self._rooms.rotate(-1)
         room.make_free()
@@ -147,6 +163,17 @@ class _Room:
         self.stride = 0
         self.fields: dict[str, Any] = {}
         self._flight: weakref.ref[_Flight] | None = None
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether anybody wants the step that is here."""
+        return self._flight is not None and self._flight() is not None
+
+    def release(self) -> None:
+        """Drops the memory of windows."""
+        self.stride = 0
+        self.fields.clear()
+        self.pockets.release()
 
     def make_free(self) -> None:
         """Has the step that is still here read, if anybody wants it."""

@@ -62,6 +62,10 @@ class Pockets:
             i(y0), i(y1), i(STRIP_ROWS),
         )  # fmt: skip
 
+    def release(self) -> None:
+        """Drops the memory."""
+        self._held.clear()
+
     def _relax(self, grid: Any, shape: Shape, nodes: tuple[int, int, int, int], screening: float) -> None:
         """Enqueues the correction of these nodes (rows y0, y1, columns x0, x1) of the last grid."""
         run, i = self._launch.run, np.int32

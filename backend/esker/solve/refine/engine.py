@@ -192,7 +192,13 @@ class Pending(Protocol):
 
 
 class Engine(Protocol):
-    """Computes steps. ``device``: on what; None is NumPy. ``ahead``: how many steps may be under way at once."""
+    """Computes steps.
+
+    device: on what; None is NumPy. ahead: how many steps may be under way at once. begun: how many there were so far.
+    is_empty: there is nothing to ``release``.
+    """
+
+    begun: int
 
     @property
     def device(self) -> Device | None: ...
@@ -200,11 +206,17 @@ class Engine(Protocol):
     @property
     def ahead(self) -> int: ...
 
+    @property
+    def is_empty(self) -> bool: ...
+
     def begin(self, at: Step, strokes: StrokeWindows, parent: Fields) -> Pending:
         """Begins to make ``at.core``'s fields from the parent's on ``at.parent``. Raises DeviceError."""
 
     def clear(self) -> None:
         """Drop what is kept between steps."""
+
+    def release(self) -> bool:
+        """Drops the memory of steps, too, unless one is under way; returns whether it did."""
 
 
 @dataclass(frozen=True)
@@ -231,9 +243,15 @@ class NumpyEngine:
 
     device = None
     ahead = 1
+    begun = 0
+    is_empty = True
 
     def clear(self) -> None:
         """Nothing is kept."""
+
+    def release(self) -> bool:
+        """Nothing is held."""
+        return False
 
     def begin(self, at: Step, strokes: StrokeWindows, parent: Fields) -> Pending:
         """Nothing is under way: the step is done at once."""

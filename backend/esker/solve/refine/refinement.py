@@ -7,6 +7,7 @@ solve: which tiles were asked for, in which order, in which groups and from what
 
 from __future__ import annotations
 
+import math
 import time
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence, Set
@@ -43,6 +44,8 @@ from esker.solve.refine.stroke_set import DIGEST_BYTES, Strokes
 
 LOOK_SECONDS: Final = 0.0002
 """Between two looks at the device, and at who is in a hurry."""
+SPARE_SECONDS: Final = 30.0
+"""So long after the last step its memory is given back: who only looks at what there is needs none."""
 Plan = dict[int, set[TileKey]]
 """Per level the tiles that are still to be made."""
 
@@ -342,9 +345,25 @@ class Refinery:
         self.cache = FieldCache(cache_bytes)
         self._device, self._blocks, self._shapes = device, BlockCache(), shapes
         self._engine: Engine | None = None
+        self._looked_at = -math.inf
+        """When somebody asked last whether there is anything to give back, and there was a step since."""
+        self._steps = 0
 
     def refiner(self, basis: Basis) -> Refiner:
         """A refiner of a settled solve of the same solver. Raises DeviceError."""
         if self._engine is None:
             self._engine = NumpyEngine() if self._device is None else ClEngine(row_kernels(self._device))
         return Refiner(basis, self._engine, self.cache, self._blocks, self._shapes)
+
+    def tidy(self, now: float) -> bool:
+        """Gives back the memory of steps, and what is kept between them, when none was begun for SPARE_SECONDS; whether
+        there was any."""
+        if self._engine is None or self._engine.is_empty:
+            return False
+        if self._engine.begun != self._steps:
+            self._steps, self._looked_at = self._engine.begun, now
+        if now - self._looked_at < SPARE_SECONDS or not self._engine.release():
+            return False
+        self.cache.clear()
+        self._blocks.clear()
+        return True
