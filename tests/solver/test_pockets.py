@@ -10,11 +10,11 @@ from bench.ground.refine import scene_of
 from esker import grid
 from esker.solve import reference
 from esker.solve.opencl.device import Device
-from esker.solve.opencl.pocket import COARSENINGS, REACH
 from esker.solve.refine import engine
 from esker.solve.refine.cache import FieldCache
 from esker.solve.refine.cl_engine import ClEngine
 from esker.solve.refine.correction import corrected
+from esker.solve.refine.pocket import COARSENINGS, REACH
 from esker.solve.refine.refinement import Refiner
 from esker.solve.solver import Solver
 from tests.solver.test_refine import settled

@@ -9,7 +9,8 @@ from esker.contract import CHEBYSHEV_SWEEPS, SATURATION
 from esker.resources import SHADERS
 from esker.solve import reference
 from esker.solve.constraints import tables
-from esker.solve.opencl import gpu_program, pocket, wave
+from esker.solve.opencl import gpu_program, wave
+from esker.solve.refine import pocket
 
 SOURCES = ("rows.cl", "nearest.cl", "section.cl", "raster.cl", "setup.cl", "visit.cl", "refine.cl", "pockets.cl")
 OVER_SOURCES = ("rows.cl", "nearest.cl", "section.cl", "raster.cl", "over_base.cl")

@@ -7,8 +7,8 @@ from typing import Any, Final
 import numpy as np
 
 from esker.solve.opencl.levels import PAD, Launcher
-from esker.solve.opencl.pocket import COARSENINGS, MARGIN
 from esker.solve.refine.engine import LAST_SWEEPS, Span
+from esker.solve.refine.pocket import COARSENINGS, MARGIN
 
 STRIP_ROWS: Final = 32
 """Rows of a grid that one work-item does."""

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from esker.contract import SATURATION
-from esker.solve.opencl.pocket import BEYOND, COARSENINGS, MARGIN, OVER_RELAXATION, RELAXATIONS, SUBDOMAIN
+from esker.solve.refine.pocket import BEYOND, COARSENINGS, MARGIN, OVER_RELAXATION, RELAXATIONS, SUBDOMAIN
 
 NONE: Final = 2.0
 """An arm that meets nothing fixed."""

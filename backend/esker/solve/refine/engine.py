@@ -22,9 +22,8 @@ from esker.contract import CHEBYSHEV_HIGH, TerrainSettings
 from esker.solve import reference
 from esker.solve.constraints import raster_reference
 from esker.solve.constraints.constraints import BIN, BinBox, Tables
-from esker.solve.opencl import pocket
 from esker.solve.opencl.device import Device
-from esker.solve.refine import correction
+from esker.solve.refine import correction, pocket
 from esker.solve.refine.base_blocks import BaseWindows
 
 GRADIENT_SWEEPS: Final = 8
