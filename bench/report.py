@@ -125,7 +125,7 @@ def readme(text: str) -> str:
 def documents() -> dict[Path, str]:
     """Every document that carries figures, with its text renewed."""
     out = {README: readme(README.read_text(encoding="utf-8"))}
-    out[SOLVER] = _solver.document(SOLVER.read_text(encoding="utf-8"), result("solve"))
+    out[SOLVER] = _solver.document(SOLVER.read_text(encoding="utf-8"), result("solve") | {"card": result("gpu")})
     out[REFINEMENT] = _refine.document(REFINEMENT.read_text(encoding="utf-8"), result("refine"))
     page = _patchwork.document(PATCHWORK.read_text(encoding="utf-8"), result("patchwork"))
     out[PATCHWORK] = _patchwork_cover.document(page, result("patchwork_cover"))

@@ -5,6 +5,10 @@ from __future__ import annotations
 import re
 from typing import Any
 
+from bench.solver import gpu_model
+from esker import grid
+from esker.contract import TILE_CELLS
+
 PEERS = {
     "pyamg_ruge_stuben": "PyAMG Ruge–Stüben + CG",
     "pyamg_smoothed_aggregation": "PyAMG smoothed aggregation + CG",
@@ -173,7 +177,30 @@ def aims(solve: dict[str, Any]) -> str:
         times = levels.get("1025", {}).get(name, {}).get("times_ours", {}).get("2", {})
         if "preview" in times:
             out.append(f"| ≥ {aim} × {PEERS[name]}, 1025², 10⁻³ of the relief | {times['preview']:,.0f} × |")
-    out.append("| on a GPU, 4097², two steps ≤ 3 ms | no GPU was to be had |")
+    return "\n".join(out)
+
+
+def card(solve: dict[str, Any]) -> str:
+    """What ``esker doctor --report`` measured on a graphics card, beside the time that the bytes alone take."""
+    report = solve["card"]
+    bench, soak = report["bench"], report["soak"]
+    same = "every bit" if soak["from_new_quanta"] == 0 else "not every bit"
+    out = [
+        f"{bench['device']}, {report['when']}: a copy within its memory moves {bench['copy_gb_per_s']:,.0f} GB/s. "
+        f"A soak of {soak['seconds']:.0f} s edited and settled {grid.samples(soak['level'])}² {soak['edits']:,} times: "
+        f"first preview {number(soak['first_preview_ms']['p50'])} ms, at rest {number(soak['settled_ms']['p50'])} ms "
+        f"(medians), {same} that of a new solver.",
+        "",
+        "| grid | two steps | bytes alone | a height cycle, share of copy | all levels at rest |",
+        "|---|---|---|---|---|",
+    ]
+    for size, row in bench["scenes"][SCENE].items():
+        model = gpu_model.two_step((int(size) // TILE_CELLS).bit_length() - 1)
+        floor = 1e3 * model["gigabytes"] / bench["copy_gb_per_s"]
+        out.append(
+            f"| {size}² | {number(row['two_step']['ms']['least'])} ms | {floor:.2f} ms "
+            f"| {row['height_cycle']['share_of_copy']:.0%} | {number(row['from_rest_ms']['settled'])} ms |"
+        )
     return "\n".join(out)
 
 
@@ -205,7 +232,7 @@ def machine(solve: dict[str, Any]) -> str:
 
 
 TABLES = {"machine": machine, "accuracy": accuracy, "times": times, "bandwidth": bandwidth, "peers": peers}
-TABLES |= {"ties": ties, "aims": aims}
+TABLES |= {"ties": ties, "aims": aims, "card": card}
 
 
 def document(text: str, solve: dict[str, Any]) -> str:

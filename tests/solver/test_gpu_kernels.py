@@ -12,11 +12,11 @@ import pytest
 
 from bench.solver import gpu_model
 from esker import grid
-from esker.contract import TerrainSettings
+from esker.contract import CHEBYSHEV_SWEEPS, TerrainSettings
 from esker.solve import reference
 from esker.solve.opencl.device import Device
 from esker.solve.opencl.gpu_levels import GpuLauncher, GpuSystem, GpuWorkspace
-from esker.solve.opencl.gpu_program import Plan, plan
+from esker.solve.opencl.gpu_program import STRIP_WIDTH, TILE, Plan, Strip, plan
 from esker.solve.opencl.levels import ClWorkspace
 from esker.solve.passes import previews, to_rest
 from esker.solve.solver import Solver
@@ -55,14 +55,19 @@ def system(device: Device, level: int, channels: int) -> tuple[GpuSystem, dict[s
 @pytest.mark.parametrize("channels", [1, 2])
 def test_visit_does_not_depend_on_the_tile(tiles: Device, channels: int) -> None:
     """SPEC S15: which work-group does a sample, and with which neighbours, changes not one bit."""
-    results = []
-    for units in (1, 1 << 20):
-        s, _ = system(replace(tiles, plan=replace(plan_of(tiles), units=units)), 3, channels)
-        s.visit(3, rhs="f", out="v", guess="u", correction="e", residual=True)
-        results.append((s.launch.plan.tile(channels, grid.samples(3)), s.get("v", 3), s.get("b", 2)))
-    assert results[0][0] != results[1][0]
-    assert np.array_equal(results[0][1], results[1][1])
-    assert np.array_equal(results[0][2], results[1][2])
+    plan, n = plan_of(tiles), grid.samples(3)
+    shared = [replace(plan, units=units) for units in (1 << 20, 1, 32)]
+    assert len({each.strip(n) for each in shared}) == 3, "tiles, and strips of two lengths"
+    for given in ({"guess": "u"}, {"guess": None}):
+        results = []
+        for each in shared:
+            s, _ = system(replace(tiles, plan=each), 3, channels)
+            for correction, residual in (("e", True), (None, False)):
+                s.visit(3, rhs="f", out="v", correction=correction, residual=residual, **given)
+                results.append((s.get("v", 3), s.get("b", 2) if residual else s.get("v", 3)))
+        for k, (heights, rest) in enumerate(results[2:]):
+            assert np.array_equal(heights, results[k % 2][0])
+            assert np.array_equal(rest, results[k % 2][1])
 
 
 @pytest.mark.parametrize("channels", [1, 2])
@@ -179,23 +184,25 @@ def test_launches_are_those_of_the_model(tiles: Device, top: int) -> None:
 @pytest.mark.parametrize(
     ("items", "local", "units", "expected"),
     [
-        pytest.param(1024, 48 << 10, 132, (64, 16, 1024), id="H100"),
-        pytest.param(1024, 64 << 10, 8, (64, 16, 1024), id="integrated AMD"),
-        pytest.param(256, 64 << 10, 24, (64, 16, 256), id="integrated Intel"),
-        pytest.param(512, 32 << 10, 4, (64, 16, 512), id="mobile"),
-        pytest.param(256, 30 << 10, 1, (64, 8, 256), id="tight"),
+        pytest.param(1024, 48 << 10, 132, 1024, id="H100"),
+        pytest.param(1024, 64 << 10, 8, 1024, id="integrated AMD"),
+        pytest.param(256, 64 << 10, 24, 256, id="integrated Intel"),
+        pytest.param(512, 32 << 10, 4, 512, id="mobile"),
+        pytest.param(256, 30 << 10, 1, 256, id="tight"),
         pytest.param(64, 32 << 10, 1, None, id="groups too small"),
         pytest.param(1024, 16 << 10, 1, None, id="too little local memory"),
     ],
 )
-def test_plan(items: int, local: int, units: int, expected: tuple[int, int, int] | None) -> None:
-    """What a device can hold: (width, rows) of the two-channel tile and work-items of the bottom kernel."""
+def test_plan(items: int, local: int, units: int, expected: int | None) -> None:
+    """What a device can hold: work-items of the bottom kernel, and all that has one size."""
     found = plan(items, local, units)
     if found is None:
         assert expected is None
         return
-    tile = found.wide[1]
-    assert (tile.width, tile.rows, found.bottom_items) == expected
-    assert all(t.items <= items and t.bytes(2) <= local for t in (tile, found.small))
-    assert found.tile(1, grid.samples(1)) is (found.wide[0] if units < 5 else found.small)
-    assert found.tile(1, grid.samples(6)) is found.wide[0]
+    assert found.bottom_items == expected
+    assert TILE.items <= items
+    assert 4 * 2 * TILE.width * TILE.height <= local
+    assert items >= STRIP_WIDTH
+    assert local >= 4 * 2 * 2 * (CHEBYSHEV_SWEEPS + 2) * STRIP_WIDTH, "two rows of all that two channels look at"
+    assert units == 1 or found.strip(grid.samples(0)) is None
+    assert found.strip(grid.samples(6)) == Strip(64)

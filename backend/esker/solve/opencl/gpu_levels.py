@@ -18,7 +18,7 @@ from esker.solve.constraints.tables import BIN
 from esker.solve.opencl.device import Device, named
 from esker.solve.opencl.device_workspace import Arena, DeviceWorkspace, OverBase
 from esker.solve.opencl.fields import Fields, Shape, SystemMemory
-from esker.solve.opencl.gpu_program import CHAIN, CHAIN_ITEMS, CHANGE_ITEMS, Plan
+from esker.solve.opencl.gpu_program import CHAIN, CHAIN_ITEMS, CHANGE_ITEMS, STRIP_WIDTH, TILE, Plan, march_kernel
 from esker.solve.opencl.queue import Queue
 from esker.solve.reference import BOTTOM_LEVELS
 
@@ -64,16 +64,25 @@ class GpuLauncher(Queue):
 
     def run(self, name: str, groups: tuple[int, ...], block: tuple[int, ...], *args: Any) -> None:
         """Enqueue ``groups`` work-groups of ``block`` work-items, with arguments that live as long as the launcher."""
-        self._enqueue(self.bound(name, *args), groups, block)
+        self.enqueue(*sized(self.bound(name, *args), groups, block))
 
     def run_once(self, name: str, groups: tuple[int, ...], block: tuple[int, ...], *args: Any) -> None:
         """Enqueues a kernel with arguments that will not come again."""
-        self._enqueue(self.once(name, args), groups, block)
+        self.enqueue(*sized(self.once(name, args), groups, block))
 
-    def _enqueue(self, kernel: Any, groups: tuple[int, ...], block: tuple[int, ...]) -> None:
+    def enqueue(self, kernel: Any, size: tuple[int, ...], block: tuple[int, ...]) -> None:
+        """Enqueues ``size`` work-items of a kernel in work-groups of ``block``."""
         self.launches += 1
-        size = tuple(g * b for g, b in zip(groups, block, strict=True))
         self.cl.enqueue_nd_range_kernel(self.queue, kernel, size, block)
+
+
+Launch = tuple[Any, tuple[int, ...], tuple[int, ...]]
+"""A kernel with its arguments, its work-items and those of a work-group."""
+
+
+def sized(kernel: Any, groups: tuple[int, ...], block: tuple[int, ...]) -> Launch:
+    """Returns the launch of ``groups`` work-groups of ``block`` work-items."""
+    return kernel, tuple(g * b for g, b in zip(groups, block, strict=True)), block
 
 
 def _blocks(columns: int, rows: int) -> tuple[int, int]:
@@ -89,6 +98,8 @@ class GpuSystem(Fields):
         super().__init__(launcher, shape_of, top, channels, static, memory)
         self.launch = launcher
         self._waiting: list[int] = []
+        self._kept: dict[tuple[Any, ...], Launch] = {}
+        """Launches that come again in each cycle: finding their arguments anew takes longer than the launch."""
         coarsest = ((TILE_CELLS >> BOTTOM_LEVELS) + 1) ** 2
         if memory is None:
             self.matrix = launcher.zeros(coarsest * coarsest)
@@ -99,7 +110,7 @@ class GpuSystem(Fields):
         """See ``device_workspace.DeviceSystem``."""
         self._restrict_now()
         memory = SystemMemory(self.launch, self.fields, self.matrix)
-        self.fields = {}
+        self.fields, self._kept = {}, {}
         del self.launch, self._queue, self.matrix
         return memory
 
@@ -107,6 +118,7 @@ class GpuSystem(Fields):
         """See ``device_workspace.DeviceSystem``."""
         self.launch, self.fields, self.matrix = memory
         self._queue = memory.launch
+        self._kept = {}
 
     def _layout(self, level: int) -> tuple[np.int32, ...]:
         """n, pitch, stride, and pitch and stride of the next coarser level."""
@@ -117,6 +129,7 @@ class GpuSystem(Fields):
         """Constraints of all coarser levels from those of the top, of which only ``rows`` (half open) changed."""
         i, launch = np.int32, self.launch
         self.eps = {level: screening * 4.0 ** (self.top - level) for level in self.shapes}
+        self._kept = {}
         first, last = rows or (0, self.shapes[self.top].n)
         for level in range(self.top, 0, -1):
             under = self.shapes[level - 1]
@@ -136,15 +149,26 @@ class GpuSystem(Fields):
     ) -> None:
         """See ``multigrid.System``."""
         self._restrict_now()
-        n = self.shapes[level].n
-        tile = self.launch.plan.tile(self.channels, n)
-        self.launch.run(
-            tile.kernel(self.channels), tile.groups(n), (tile.width, tile.strips),
-            self.fields[guess, level] if guess else None, self.fields[correction, level - 1] if correction else None,
-            self.fields[rhs, level], self.fields["d", level], self.fields[out, level],
-            self.fields["b", level - 1] if residual else None, *self._layout(level), np.float32(self.eps[level]),
-            self.launch.weights,
+        held = self.fields
+        fields = (
+            held[guess, level] if guess else None, held[correction, level - 1] if correction else None,
+            held[rhs, level], held["d", level], held[out, level], held["b", level - 1] if residual else None,
         )  # fmt: skip
+        key = (level, self.eps[level], *map(id, fields))
+        launch = self._kept.get(key)
+        if launch is None:
+            launch = self._kept[key] = self._visit(level, fields)
+        self.launch.enqueue(*launch)
+
+    def _visit(self, level: int, fields: tuple[Any, ...]) -> Launch:
+        """The kernel of a visit with its arguments: strips where they fill the device, else tiles."""
+        n, plan = self.shapes[level].n, self.launch.plan
+        given = (*fields, *self._layout(level), np.float32(self.eps[level]), self.launch.weights)
+        strip = plan.strip(n)
+        if strip is not None:
+            bound = self.launch.bound(march_kernel(self.channels), *given, np.int32(strip.rows))
+            return sized(bound, strip.groups(n), (STRIP_WIDTH, 1))
+        return sized(self.launch.bound(TILE.kernel(self.channels), *given), TILE.groups(n), (TILE.width, TILE.strips))
 
     def restrict(self, level: int) -> None:
         """See ``multigrid.System``. Restrictions behind each other wait for the others: up to three are one launch."""
@@ -160,26 +184,37 @@ class GpuSystem(Fields):
             return
         level, count = self._waiting[0], len(self._waiting)
         self._waiting = []
+        launch = self._kept.get(("restrict", level, count))
+        if launch is None:
+            launch = self._kept["restrict", level, count] = self._restriction(level, count)
+        self.launch.enqueue(*launch)
+
+    def _restriction(self, level: int, count: int) -> Launch:
+        """The kernel of so many restrictions behind each other, with its arguments."""
         under = [self.shapes[max(level - k, 0)] for k in range(1, MOST_CHAINED + 1)]
         fields = [self.fields["b", level - k] if k <= count else None for k in range(MOST_CHAINED + 1)]
         if count == 1:
-            groups = (*_blocks(under[0].n, under[0].n), self.channels)
-            self.launch.run("restriction", groups, (*BLOCK, 1), *fields[:2], *self._layout(level))
-            return
+            bound = self.launch.bound("restriction", *fields[:2], *self._layout(level))
+            return sized(bound, (*_blocks(under[0].n, under[0].n), self.channels), (*BLOCK, 1))
         fine = self.shapes[level]
         across = -(-(fine.n // 8 + 1) // CHAIN)
         layout = (fine.n, fine.pitch, fine.stride, *(k for s in under for k in (s.pitch, s.stride)))
-        groups = (across, across, self.channels)
-        self.launch.run("restriction_chain", groups, (CHAIN_ITEMS, 1, 1), *fields, *(np.int32(k) for k in layout))
+        bound = self.launch.bound("restriction_chain", *fields, *(np.int32(k) for k in layout))
+        return sized(bound, (across, across, self.channels), (CHAIN_ITEMS, 1, 1))
 
     def bottom(self, *, rhs: str, out: str, cycles: int) -> None:
         """See ``multigrid.System``."""
         self._restrict_now()
-        self.launch.run(
-            "bottom", (self.channels,), (self.launch.plan.bottom_items,), self.fields[rhs, 0], self.fields["d", 0],
-            self.fields[out, 0], self.matrix, self.launch.table, np.int32(self.shapes[0].stride),
-            np.float32(self.eps[0]), self.launch.weights, np.int32(cycles),
-        )  # fmt: skip
+        given, made = self.fields[rhs, 0], self.fields[out, 0]
+        key = ("bottom", self.eps[0], id(given), id(made), cycles)
+        launch = self._kept.get(key)
+        if launch is None:
+            bound = self.launch.bound(
+                "bottom", given, self.fields["d", 0], made, self.matrix, self.launch.table,
+                np.int32(self.shapes[0].stride), np.float32(self.eps[0]), self.launch.weights, np.int32(cycles),
+            )  # fmt: skip
+            launch = self._kept[key] = sized(bound, (self.channels,), (self.launch.plan.bottom_items,))
+        self.launch.enqueue(*launch)
 
     def hold(self) -> None:
         """See ``multigrid.System``."""

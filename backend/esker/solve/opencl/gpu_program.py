@@ -7,6 +7,7 @@ bits, so the choice is one of speed alone.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -45,10 +46,6 @@ class Tile:
         """Work-items."""
         return self.width * self.strips
 
-    def bytes(self, channels: int) -> int:
-        """Local memory."""
-        return 4 * channels * self.width * self.height
-
     def groups(self, samples: int) -> tuple[int, int]:
         """Work-groups that cover a level of ``samples`` a side."""
         return -(-samples // (self.width - 2 * HALO)), -(-samples // (self.height - 2 * HALO))
@@ -58,43 +55,65 @@ class Tile:
         return f"visit_{channels}_{self.width}x{self.height}"
 
 
-WIDE = (Tile(64, 4, 16), Tile(64, 4, 8), Tile(32, 4, 8), Tile(32, 2, 16))
-"""For levels that fill the device, best first: 52 x 52 samples of 64 x 64 are outputs, 66 %."""
-SMALL = (Tile(32, 8, 4), Tile(32, 4, 8), Tile(32, 2, 16))
-"""For levels that do not: more, smaller groups."""
+@dataclass(frozen=True)
+class Strip:
+    """What one work-group of a marching visit does (``gpu_march.cl``): a strip of columns, ``rows`` of them."""
+
+    rows: int
+
+    def groups(self, samples: int) -> tuple[int, int]:
+        """Work-groups that cover a level of ``samples`` a side."""
+        return -(-samples // (STRIP_WIDTH - 2 * HALO)), -(-samples // self.rows)
+
+
+STRIP_WIDTH = 128
+"""Columns of a strip: 116 of them are outputs. Local memory is 12 KiB, less than the bottom's."""
+STRIP_ROWS = (64, 32)
+"""Rows of a strip, best first, and the strips that each compute unit should have: measured on an H200 (decision 13)."""
+STRIPS_A_UNIT = 2
+
+
+def march_kernel(channels: int) -> str:
+    """Name of the kernel that marches."""
+    return f"march_{channels}"
+
+
+TILE = Tile(32, 8, 4)
+"""For levels that strips do not fill the device with: 20 x 20 samples of 32 x 32 are outputs, in less local memory than
+the bottom's."""
 
 
 @dataclass(frozen=True)
 class Plan:
     """Sizes of kernels that fit a device.
 
-    ``wide`` by number of channels; ``units``: compute units; ``bottom_items``: work-items of the bottom kernel.
+    ``units``: compute units; ``bottom_items``: work-items of the bottom kernel.
     """
 
-    wide: tuple[Tile, ...]
-    small: Tile
     bottom_items: int
     units: int
 
-    def tile(self, channels: int, samples: int) -> Tile:
-        """The tile for a level: wide ones as soon as they give every compute unit two groups."""
-        wide = self.wide[channels - 1]
-        across, along = wide.groups(samples)
-        return wide if across * along >= 2 * self.units else self.small
+    def strip(self, samples: int) -> Strip | None:
+        """The strips in which a level is marched over: as long as they give every compute unit enough groups; None
+        where even short ones do not."""
+        for rows in STRIP_ROWS:
+            strip = Strip(rows)
+            across, along = strip.groups(samples)
+            if across * along >= STRIPS_A_UNIT * self.units:
+                return strip
+        return None
 
 
 def plan(items: int, local_bytes: int, units: int) -> Plan | None:
     """The plan for work-groups of at most ``items`` with ``local_bytes`` of local memory; None: not a GPU to us."""
-
-    def best(tiles: tuple[Tile, ...], channels: int) -> Tile | None:
-        return next((t for t in tiles if t.items <= items and t.bytes(channels) <= local_bytes), None)
-
-    wide = [best(WIDE, channels) for channels in CHANNELS]
-    small = best(SMALL, max(CHANNELS))
     fitting = [count for count in _ITEMS if count <= items]
-    if small is None or items < max(CHANGE_ITEMS, CHAIN_ITEMS, BIN_ITEMS) or not fitting or local_bytes < _BOTTOM_BYTES:
+    if (
+        items < max(CHANGE_ITEMS, CHAIN_ITEMS, BIN_ITEMS, TILE.items, STRIP_WIDTH)
+        or not fitting
+        or local_bytes < _BOTTOM_BYTES
+    ):
         return None
-    return Plan(tuple(t for t in wide if t is not None), small, fitting[0], units)
+    return Plan(fitting[0], units)
 
 
 def plan_of(device: Any) -> Plan | None:
@@ -119,6 +138,7 @@ SCALAR = "#define SECTION_SCALAR"
 SOURCES = ("gpu_level.cl", "gpu_setup.cl", "gpu_bottom.cl", "nearest.cl", "section.cl", "gpu_raster.cl")
 OVER_SOURCES = ("gpu_level.cl", "nearest.cl", "section.cl", "gpu_raster.cl", "gpu_over_base.cl")
 VISIT = "gpu_visit.cl"
+MARCHING = "gpu_march.cl"
 
 
 def over_source(files: dict[str, str]) -> str:
@@ -126,19 +146,23 @@ def over_source(files: dict[str, str]) -> str:
     return "\n".join([SCALAR, *(files[name] for name in OVER_SOURCES)])
 
 
-def source(of: Plan, files: dict[str, str]) -> str:
-    """The program's text from the files' texts; the visit comes once per tile and number of channels."""
+def source(files: dict[str, str]) -> str:
+    """The program's text from the files' texts; the visits come once per number of channels."""
     parts = [SCALAR, *(files[name] for name in SOURCES)]
     for channels in CHANNELS:
-        for tile in dict.fromkeys((of.wide[channels - 1], of.small)):
-            values = {
-                "VISIT": tile.kernel(channels),
-                "CHANNELS": channels,
-                "TILE_WIDTH": tile.width,
-                "TILE_STRIPS": tile.strips,
-                "TILE_ROWS": tile.rows,
-            }
-            parts += [f"#define {name} {value}" for name, value in values.items()]
-            parts.append(files[VISIT])
-            parts += [f"#undef {name}" for name in values]
+        values = {
+            "VISIT": TILE.kernel(channels),
+            "CHANNELS": channels,
+            "TILE_WIDTH": TILE.width,
+            "TILE_STRIPS": TILE.strips,
+            "TILE_ROWS": TILE.rows,
+        }
+        parts += _with(values, files[VISIT])
+        marching = {"MARCH": march_kernel(channels), "MARCH_CHANNELS": channels, "MARCH_WIDTH": STRIP_WIDTH}
+        parts += _with(marching, files[MARCHING])
     return "\n".join(parts)
+
+
+def _with(values: Mapping[str, object], text: str) -> list[str]:
+    """A file between definitions and their end."""
+    return [*(f"#define {name} {value}" for name, value in values.items()), text, *(f"#undef {n}" for n in values)]

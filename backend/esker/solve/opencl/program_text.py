@@ -46,7 +46,7 @@ def over_source(plan: gpu_program.Plan | None) -> str:
 def source(plan: gpu_program.Plan | None) -> str:
     """The solver of ground without a base. ``plan``: the tiles of a GPU's kernels, None for row-wise ones."""
     if plan is not None:
-        return INLINE + defines(gpu_program.defines(plan)) + gpu_program.source(plan, files())
+        return INLINE + defines(gpu_program.defines(plan)) + gpu_program.source(files())
     return INLINE + defines({}) + "\n".join(files()[name] for name in SOURCES)
 
 
