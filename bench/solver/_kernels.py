@@ -34,7 +34,7 @@ RUNS = 7
 COPY_BYTES = 256 * 1024 * 1024
 """Far above the last cache."""
 COPIES = 20
-"""So many that what a launch costs does not count."""
+"""Copies behind each other, enough that the cost of a launch does not count."""
 TARGET = 1e-3
 """Share of the relief to which a preview must be right (DESIGN 5.3)."""
 SWEEP_FLOPS = 14
