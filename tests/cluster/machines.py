@@ -43,7 +43,7 @@ class NoRooms:
 
     def __init__(self, homes: dict[str, str] | None = None) -> None:
         self.homes, self.lost, self.given = homes or {}, list[str](), list[str]()
-        self.used = set[str]()
+        self.used, self.fresh = set[str](), list[str]()
 
     def in_use(self, terrain: str) -> bool:
         return terrain in self.used
@@ -56,6 +56,14 @@ class NoRooms:
 
     def home(self, terrain: str) -> str:
         return self.homes.get(terrain, terrain)
+
+    def taken(self, terrain: str) -> None:
+        self.fresh.append(terrain)
+
+
+async def nowhere(*_: object) -> str:
+    """No class, seat or code belongs to a terrain here."""
+    return ""
 
 
 class Machine:
@@ -73,7 +81,7 @@ class Machine:
         self.ended = asyncio.Event()
         """The stream that is given out has ended, whole or not."""
         app = self._app()
-        app.add_middleware(Passing, cluster=self.cluster, terrain_of=lambda *_: "")
+        app.add_middleware(Passing, cluster=self.cluster, terrain_of=nowhere)
         app.add_middleware(Entrance, cluster=self.cluster)
         self.server = uvicorn.Server(_config(app, Proxies(""), None))
         self.task: asyncio.Task[None] | None = None
@@ -106,10 +114,6 @@ class Machine:
                 "header": request.headers.get("x-told", ""),
                 "forwarded": request.headers.get("x-forwarded-for", ""),
             }
-
-        @app.post("/api/join")
-        async def join() -> dict[str, str]:
-            return {"node": name}
 
         @app.websocket("/ws")
         async def ws(socket: WebSocket) -> None:

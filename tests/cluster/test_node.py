@@ -67,6 +67,11 @@ class Scene:
         await asyncio.gather(*(task for task in asyncio.all_tasks() if task is not asyncio.current_task()))
 
 
+async def settled() -> None:
+    """Lets the loop do what others gave it to do."""
+    await asyncio.sleep(0)
+
+
 @asynccontextmanager
 async def scene(homes: dict[str, str] | None = None) -> AsyncIterator[Scene]:
     made = Scene(homes)
@@ -126,6 +131,7 @@ async def test_a_refused_write_ends_a_tenure() -> None:
     async with scene() as s:
         await s.node.hold("lake")
         s.node.fenced("lake")
+        await settled()
         assert (s.rooms.lost, s.node.held, s.node.counts.fenced) == (["lake"], (), 1)
         await s.node.hold("lake")
         assert s.node.may_acknowledge("lake")
@@ -149,19 +155,37 @@ async def test_what_nobody_uses_is_given_back() -> None:
 
 
 async def test_a_copy_moves_with_its_class() -> None:
-    """SPEC P586: the class is had with any of its copies, and given back after the last."""
-    async with scene({"copy": "class"}) as s:
+    """SPEC P586: under one lease, which all that is written for any of them names; the class goes after its copies."""
+    async with scene({"copy": "class", "other": "class"}) as s:
         await s.node.hold("copy")
-        assert set(s.node.held) == {"copy", "class"}
-        s.rooms.used = {"copy"}
+        assert s.node.held == ("class",)
+        assert s.node.right("copy") == ("class", 1)
+        assert s.node.may_acknowledge("copy")
+        for terrain in ("class", "other"):
+            await s.node.hold(terrain)
+        assert s.node.counts.taken == 1
+        assert s.rooms.fresh == ["copy", "class", "other"]
+        s.rooms.used = {"other"}
         for _ in range(20):
             s.clock.now += IDLE_SECONDS / 15
             s.renew()
         await s.look()
-        assert set(s.node.held) == {"copy", "class"}
+        assert s.node.held == ("class",)
         await s.node.drain()
-        assert s.rooms.given == ["copy", "class"]
+        assert sorted(s.rooms.given[:2]) == ["copy", "other"]
+        assert s.rooms.given[2:] == ["class"]
         assert s.leases.owner("class") is None
+        assert s.node.right("copy") is None
+
+
+async def test_with_a_class_all_its_copies_are_lost() -> None:
+    """SPEC P584, P586."""
+    async with scene({"copy": "class"}) as s:
+        await s.node.hold("copy")
+        await s.node.hold("class")
+        s.node.fenced("copy")
+        await settled()
+        assert sorted(s.rooms.lost) == ["class", "copy"]
 
 
 async def test_a_copy_is_looked_for_where_its_class_is() -> None:

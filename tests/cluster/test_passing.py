@@ -56,12 +56,6 @@ async def test_who_reads_a_terrain_that_nobody_has_takes_nothing_and_who_changes
         assert found["node"] == owner.name
 
 
-async def test_join_codes_are_counted_on_one_node() -> None:
-    """SPEC P585: whichever is asked."""
-    async with machines(OwnLeases(), "a", "b", "c") as some:
-        assert len({(await ask(each, "POST", "/api/join")).json()["node"] for each in some}) == 1
-
-
 async def test_a_body_is_read_as_fast_as_the_owner_reads() -> None:
     """SPEC P580: of 32 MiB for a slow reader most wait at whoever sends them."""
     leases, size = OwnLeases(), 32 << 20

@@ -54,15 +54,21 @@ class Rooms(Protocol):
     def home(self, terrain: str) -> str:
         """Returns the terrain with which this one moves: that of its class, else itself. Asks the database."""
 
+    def taken(self, terrain: str) -> None:
+        """Forgets what was known of a terrain: another node may have written meanwhile."""
+
 
 @dataclass(frozen=True)
 class Holding:
-    """A terrain that this node has. used: when it was last asked for."""
+    """A terrain that this node has, with those that move with it: a class with its copies, under one lease.
+
+    terrains: those of them that were asked for here. used: when one was last asked for.
+    """
 
     lease: Lease
     tenure: Tenure
-    home: str
     used: float
+    terrains: frozenset[str] = frozenset()
 
 
 @dataclass
@@ -97,6 +103,9 @@ class Cluster:
         self.draining = False
         self._leases, self._free, self._now = leases, free, now
         self._held: dict[str, Holding] = {}
+        """By home: the terrain under whose lease others move with it. Never changed in place: threads read it."""
+        self._of: dict[str, str] = {}
+        """Homes of the terrains that were asked for here, while this node has them."""
         self._taking: dict[str, asyncio.Task[None]] = {}
         self._nodes: tuple[Node, ...] = ()
         self._peers: dict[str, Peer] = {}
@@ -137,24 +146,34 @@ class Cluster:
             log.warning("node %s could not be withdrawn: %s", self.name, error)
         await asyncio.gather(*self._taking.values(), return_exceptions=True)
         log.info("node %s gives %d terrains away", self.name, len(self._held))
-        copies = sorted(self._held, key=lambda terrain: self._held[terrain].home == terrain)
-        for terrain in copies:  # a class goes after its copies
-            await self._give(terrain)
+        for home in list(self._held):
+            await self._give(home)
 
-    async def _give(self, terrain: str) -> None:
+    async def _give(self, home: str) -> None:
         assert self._rooms is not None
-        await self._rooms.hand_over(terrain)
-        await self._release(terrain)
+        found = self._held.get(home)
+        if found is None:
+            return
+        for terrain in sorted(found.terrains, key=lambda terrain: terrain == home):  # a class goes after its copies
+            await self._rooms.hand_over(terrain)
+        await self._release(home)
 
-    async def _release(self, terrain: str) -> None:
-        found = self._held.pop(terrain, None)
+    async def _release(self, home: str) -> None:
+        found = self._forget(home)
         if found is None:
             return
         self.counts.released += 1
         try:
             await self._ask(self._leases.release, [found.lease])
         except Unreachable as error:
-            log.warning("the lease of %s ends by itself: %s", terrain, error)
+            log.warning("the lease of %s ends by itself: %s", home, error)
+
+    def _forget(self, home: str) -> Holding | None:
+        found = self._held.get(home)
+        self._held = {name: each for name, each in self._held.items() if name != home}
+        for terrain in found.terrains if found is not None else ():
+            self._of.pop(terrain, None)
+        return found
 
     async def close(self) -> None:
         """Ends the threads. Call ``drain`` first."""
@@ -172,7 +191,7 @@ class Cluster:
 
     @property
     def held(self) -> tuple[str, ...]:
-        """The terrains that this node has."""
+        """The terrains whose leases this node has."""
         return tuple(self._held)
 
     @property
@@ -187,18 +206,32 @@ class Cluster:
 
     def may_acknowledge(self, terrain: str) -> bool:
         """Returns whether what is durable may be acknowledged now."""
-        return self._phase(terrain) is Phase.HELD
+        return self._phase(self._of.get(terrain, terrain)) is Phase.HELD
 
-    def _phase(self, terrain: str) -> Phase:
-        found = self._held.get(terrain)
+    def right(self, terrain: str) -> tuple[str, int] | None:
+        """The name and the epoch of the lease under which this node writes for a terrain; None where it has none. For
+        any thread (``store.engine``)."""
+        home = self._of.get(terrain, terrain)
+        found = self._held.get(home)
+        return None if found is None else (home, found.lease.epoch)
+
+    def _phase(self, home: str) -> Phase:
+        found = self._held.get(home)
         return Phase.SHUT if found is None else found.tenure.phase(self._now())
 
     async def hold(self, terrain: str) -> None:
         """Returns when this node has a terrain. Raises Elsewhere."""
         home = await self.home(terrain)
-        if home != terrain:
-            await self._have(home, home)
-        await self._have(terrain, home)
+        await self._have(home)
+        found = self._held[home]
+        if terrain not in found.terrains:
+            assert self._rooms is not None
+            self._rooms.taken(terrain)
+            self._of[terrain] = home
+        self._held = {
+            **self._held,
+            home: replace(found, used=self._now(), terrains=found.terrains | {terrain}),
+        }
 
     @contextmanager
     def using(self, terrain: str) -> Iterator[None]:
@@ -211,53 +244,52 @@ class Cluster:
             if not self._using[terrain]:
                 del self._using[terrain]
 
-    async def _have(self, terrain: str, home: str) -> None:
+    async def _have(self, home: str) -> None:
         while True:
             if self.draining:
                 raise Elsewhere("This node is being stopped.")
-            match self._phase(terrain):
+            match self._phase(home):
                 case Phase.HELD:
-                    self._held = {**self._held, terrain: replace(self._held[terrain], used=self._now())}
                     return
                 case Phase.DOUBTFUL:
                     raise Elsewhere("This node does not reach its database.")
                 case Phase.SHUT:
-                    self._lose(terrain)
-            task = self._taking.get(terrain)
+                    self._lose(home)
+            task = self._taking.get(home)
             if task is None:
-                task = self._taking[terrain] = asyncio.create_task(self._take(terrain, home))
-                task.add_done_callback(lambda _: self._taking.pop(terrain, None))
+                task = self._taking[home] = asyncio.create_task(self._take(home))
+                task.add_done_callback(lambda _: self._taking.pop(home, None))
             await asyncio.shield(task)
 
-    async def _take(self, terrain: str, home: str) -> None:
-        if self.draining:
-            raise Elsewhere("This node is being stopped.")
+    async def _take(self, home: str) -> None:
         asked = self._now()
         try:
-            answer = await self._ask(self._leases.take, terrain, self.name, LEASE_SECONDS)
+            answer = await self._ask(self._leases.take, home, self.name, LEASE_SECONDS)
         except Unreachable as error:
             raise Elsewhere(f"This node does not reach its database: {error}") from None
         if isinstance(answer, Node):
-            self._note(terrain, answer)
+            self._note(home, answer)
             raise Elsewhere(f"Node {answer.name} has this terrain.")
         if self.draining:
             await self._ask(self._leases.release, [answer])
             raise Elsewhere("This node is being stopped.")
         self.counts.taken += 1
-        self._held = {**self._held, terrain: Holding(answer, Tenure(asked), home, asked)}
+        self._held = {**self._held, home: Holding(answer, Tenure(asked), self._now())}
 
     def fenced(self, terrain: str) -> None:
-        """The database refused a write: another node has the terrain."""
+        """The database refused a write: another node has the terrain. For any thread."""
         self.counts.fenced += 1
-        self._lose(terrain)
+        if self._loop is not None and not self._loop.is_closed():
+            self._loop.call_soon_threadsafe(self._lose, self._of.get(terrain, terrain))
 
-    def _lose(self, terrain: str) -> None:
-        if terrain not in self._held:
+    def _lose(self, home: str) -> None:
+        found = self._forget(home)
+        if found is None:
             return
-        self._held = {name: each for name, each in self._held.items() if name != terrain}
         self.counts.lost += 1
-        log.warning("node %s no longer has terrain %s", self.name, terrain)
-        if self._rooms is not None:
+        log.warning("node %s no longer has terrain %s", self.name, home)
+        assert self._rooms is not None
+        for terrain in found.terrains:
             self._rooms.lose(terrain)
 
     async def home(self, terrain: str) -> str:
@@ -322,10 +354,9 @@ class Cluster:
             elif now - found.used > IDLE_SECONDS and not self._in_use(terrain):
                 self._loop.create_task(self._release(terrain))
 
-    def _in_use(self, terrain: str) -> bool:
+    def _in_use(self, home: str) -> bool:
         assert self._rooms is not None
-        copies = any(each.home == terrain and name != terrain for name, each in self._held.items())
-        return terrain in self._using or copies or self._rooms.in_use(terrain)
+        return any(each in self._using or self._rooms.in_use(each) for each in self._held[home].terrains)
 
     # --- finding terrains ---------------------------------------------------------------------------------------
 
@@ -395,7 +426,3 @@ class Cluster:
             tried.add(owner.name)
             raise
         return True
-
-    def counter(self) -> Node:
-        """The node that counts wrong join codes for all."""
-        return chosen("codes", [*(node for node in self._nodes if node.name != self.name), self._me()]) or self._me()

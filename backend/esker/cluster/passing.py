@@ -7,10 +7,9 @@ them. ``Passing`` stands behind the gate and before the application, and passes 
 
 from __future__ import annotations
 
-import asyncio
 import json
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Awaitable, Callable
 from typing import Any, Final
 
 from esker.cluster import places, signing
@@ -25,6 +24,9 @@ PASSED: Final = "esker.passed"
 """What the scope of a request has under this name that another node passed on: its ``Visit``."""
 MOST_OPENING: Final = 1024
 AGAIN: Final = "This terrain is on its way to another server. Try again in a moment."
+
+
+TerrainOf = Callable[[places.About, Message, bytes], Awaitable[str]]
 
 
 class Entrance:
@@ -79,8 +81,8 @@ class Entrance:
 class Passing:
     """Passes requests on to the node that has the terrain."""
 
-    def __init__(self, app: Any, cluster: Cluster, terrain_of: Callable[[places.About, Mapping[bytes, bytes]], str]):
-        """``terrain_of``: asks the database for the terrain that a class or a seat belongs to; empty for none."""
+    def __init__(self, app: Any, cluster: Cluster, terrain_of: TerrainOf) -> None:
+        """``terrain_of``: asks the database for the terrain of a class, a seat or a code; empty for none."""
         self.app, self._cluster, self._terrain_of = app, cluster, terrain_of
 
     async def __call__(self, scope: Message, receive: Receive, send: Send) -> None:
@@ -88,19 +90,15 @@ class Passing:
         if about is None:
             await self.app(scope, receive, send)
             return
-        visit: Visit | None = scope.get(PASSED)
         try:
-            if about.codes:
-                await self._count(scope, receive, send, visit)
-                return
-            terrain = about.terrain
-            if not terrain:
-                fields = dict(scope["headers"])
-                terrain = await asyncio.to_thread(self._terrain_of, about, fields)
+            body = b""
+            if about.is_code:
+                body, receive = await _whole(receive)
+            terrain = about.terrain or await self._terrain_of(about, scope, body)
             if not terrain:
                 await self.app(scope, receive, send)
                 return
-            if visit is not None:
+            if PASSED in scope:
                 if about.changes:
                     await self._cluster.hold(terrain)
             elif await self._cluster.reach(terrain, self._attempt(scope, receive, send, terrain), taking=about.changes):
@@ -128,17 +126,20 @@ class Passing:
 
         return attempt
 
-    async def _count(self, scope: Message, receive: Receive, send: Send, visit: Visit | None) -> None:
-        """Has a join code looked up by the one node that counts wrong ones; by this one, where that is not there."""
-        node = self._cluster.counter()
-        if visit is None and node.name != self._cluster.name:
-            try:
-                await self._attempt(scope, receive, send, "")(self._cluster.peer(node))
-            except Elsewhere as error:
-                log.warning("join codes are counted here: %s", error)
-            else:
-                return
-        await self.app(scope, receive, send)
+
+async def _whole(receive: Receive) -> tuple[bytes, Receive]:
+    """Reads a short body, which is looked into here; returns the body and what gives it once more."""
+    body, more = b"", True
+    while more and len(body) <= MOST_OPENING:
+        message = await receive()
+        more = message["type"] == "http.request" and bool(message.get("more_body"))
+        body += message.get("body", b"")
+    first = [{"type": "http.request", "body": body, "more_body": more}]
+
+    async def again() -> Message:
+        return first.pop() if first else await receive()
+
+    return body, again
 
 
 async def relay(cluster: Cluster, scope: Message, terrain: str, near: Any) -> Relay | None:

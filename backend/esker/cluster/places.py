@@ -7,9 +7,6 @@ from dataclasses import dataclass
 from typing import Final
 
 CHANGES_NOTHING: Final = frozenset({"GET", "HEAD", "OPTIONS"})
-CODES: Final = "\0codes"
-"""What stands for all join codes in the choice of a node: who guesses is counted on one node, whatever others they ask.
-No terrain is called so."""
 MOST_HELLO: Final = 16 * 1024
 """Bytes of a first message that is looked into for its terrain."""
 _MOST_ID: Final = 64
@@ -17,15 +14,15 @@ _MOST_ID: Final = 64
 
 @dataclass(frozen=True)
 class About:
-    """What a request is about: a terrain, a class, the seat of a device, join codes; all empty: nothing of it.
+    """What a request is about: a terrain, a class, the seat of a device, or what a join code opens.
 
     changes: it may change something, so that only the owner does it.
     """
 
     terrain: str = ""
     lesson: str = ""
-    seat: bool = False
-    codes: bool = False
+    is_seat: bool = False
+    is_code: bool = False
     changes: bool = False
 
 
@@ -33,8 +30,8 @@ def about(method: str, path: str) -> About | None:
     """Returns what a request is about; None for one that every node answers by itself.
 
     >>> about("GET", "/api/terrains/abc/links")
-    About(terrain='abc', lesson='', seat=False, codes=False, changes=False)
-    >>> about("POST", "/api/join").codes
+    About(terrain='abc', lesson='', is_seat=False, is_code=False, changes=False)
+    >>> about("POST", "/api/join").is_code
     True
     >>> about("GET", "/assets/x.js"), about("POST", "/api/terrains"), about("POST", "/api/terrains/import")
     (None, None, None)
@@ -46,9 +43,11 @@ def about(method: str, path: str) -> About | None:
         case ["api", "classes", lesson, *_] if _is_id(lesson):
             return About(lesson=lesson, changes=changes)
         case ["api", "seat"]:
-            return About(seat=True, changes=changes)
+            return About(is_seat=True, changes=changes)
+        case ["api", "server", "terrains", terrain, *_] if _is_id(terrain):
+            return About(terrain=terrain, changes=changes)
         case ["api", "join"] if changes:
-            return About(codes=True, changes=True)
+            return About(is_code=True, changes=True)
         case _:
             return None
 
