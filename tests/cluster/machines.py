@@ -19,7 +19,6 @@ from esker.cluster.signing import made_key
 from esker.fairness.spending import Account
 from esker.server.routes.elsewhere import Arrival
 from esker.server.run import _config
-from esker.server.wire.front import Proxies
 from esker.store.engine.leases import Leases
 
 KEY = made_key("the key that the nodes of a test have together")
@@ -83,7 +82,7 @@ class Machine:
         app = self._app()
         app.add_middleware(Passing, cluster=self.cluster, terrain_of=nowhere)
         app.add_middleware(Entrance, cluster=self.cluster)
-        self.server = uvicorn.Server(_config(app, Proxies(""), None))
+        self.server = uvicorn.Server(_config(app, lambda _: False, None))
         self.task: asyncio.Task[None] | None = None
 
     def _app(self) -> FastAPI:

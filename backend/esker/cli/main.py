@@ -78,6 +78,9 @@ def _parser() -> argparse.ArgumentParser:
                        f"0 to {c.MAX_REFINED_LEVEL} (default {c.DEFAULT_REFINED_LEVEL})")  # fmt: skip
     serve.add_argument("--device", help="part of the name of the OpenCL device, or numpy")
     serve.add_argument("--threads", type=int, help="threads of a CPU device (default: all cores)")
+    serve.add_argument("--node", metavar="NAME", help="this server's name among several over one database "
+                       "(ESKER_DATABASE, ESKER_CLUSTER_KEY; docs/operations.md)")  # fmt: skip
+    serve.add_argument("--advertise", metavar="URL", help="where the other nodes reach this one")
     serve.add_argument("--log-level", choices=("debug", "info", "warning", "error"))
     commands.add_parser("restore", help="go on with a copy of the database (see esker restore --help)", add_help=False)
     commands.add_parser("list", help="the terrains that a server keeps (see esker list --help)", add_help=False)

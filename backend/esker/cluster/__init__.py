@@ -1,4 +1,4 @@
 """Several servers over one database: who has which terrain, how others reach it there, and how it moves.
 
-A server without ``--node`` uses nothing of it (DESIGN 18). It may know ``errors`` and ``store``.
+A server without ``--node`` uses nothing of it (DESIGN 18). It may know ``contract``, ``errors`` and ``store``.
 """

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import socket
 import threading
 import time
 from collections.abc import Awaitable, Callable, Iterator
@@ -17,6 +18,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Final, Protocol, TypeVar
+from urllib.parse import urlsplit
 
 from esker.cluster.peers import Elsewhere, Peer
 from esker.cluster.rendezvous import chosen, stepped
@@ -94,20 +96,22 @@ class Cluster:
         address: str,
         leases: Leases,
         key: bytes,
-        free: Callable[[], float] = lambda: 1.0,
         now: Callable[[], float] = time.monotonic,
     ) -> None:
-        """``free``: solver seconds a second that are not used, by which terrains are shared out."""
         self.name, self.address, self.key = name, address, key
+        self.free: Callable[[], float] = lambda: 1.0
+        """Solver seconds a second that are not used, by which terrains are shared out."""
         self.counts = Counts()
         self.draining = False
-        self._leases, self._free, self._now = leases, free, now
+        self._leases, self._now = leases, now
         self._held: dict[str, Holding] = {}
         """By home: the terrain under whose lease others move with it. Never changed in place: threads read it."""
         self._of: dict[str, str] = {}
         """Homes of the terrains that were asked for here, while this node has them."""
         self._taking: dict[str, asyncio.Task[None]] = {}
         self._nodes: tuple[Node, ...] = ()
+        self._addresses: dict[str, frozenset[str]] = {}
+        """Addresses of nodes on the network, by what they advertise."""
         self._peers: dict[str, Peer] = {}
         self._known: dict[str, tuple[Node, float]] = {}
         """Where terrains were found, and until when that is believed."""
@@ -135,7 +139,7 @@ class Cluster:
         self._watch()
 
     def _me(self) -> Node:
-        return Node(self.name, self.address, stepped(self._free()))
+        return Node(self.name, self.address, stepped(self.free()))
 
     async def drain(self) -> None:
         """Takes no more terrains, and gives those that it has away, one after the other."""
@@ -198,6 +202,10 @@ class Cluster:
     def age(self) -> float:
         """Seconds since the newest renewal was sent that was answered."""
         return self._now() - self._heard
+
+    def knows(self, address: str) -> bool:
+        """Returns whether a connection from an address may be another node's: it counts as nobody's share."""
+        return any(address in found for found in self._addresses.values())
 
     @property
     def nodes(self) -> tuple[Node, ...]:
@@ -320,11 +328,15 @@ class Cluster:
             if not self.draining:
                 self._leases.register(self._me(), LIVE_SECONDS)
             renewed = self._leases.renew(leases, LEASE_SECONDS) if leases else frozenset()
-            return asked, leases, renewed, self._leases.nodes()
+            nodes = self._leases.nodes()
         except Unreachable as error:
             self.counts.renewals_failed += 1
             log.warning("the leases of node %s could not be renewed: %s", self.name, error)
             return None
+        others = {node.address for node in nodes}
+        new = {each: _resolved(each) for each in others - self._addresses.keys()}
+        self._addresses = {each: found for each, found in (self._addresses | new).items() if each in others}
+        return asked, leases, renewed, nodes
 
     def _answered(
         self, asked: float, leases: tuple[Lease, ...], renewed: frozenset[str], nodes: tuple[Node, ...]
@@ -426,3 +438,12 @@ class Cluster:
             tried.add(owner.name)
             raise
         return True
+
+
+def _resolved(address: str) -> frozenset[str]:
+    """Returns the addresses of a node on the network; none where its name is unknown."""
+    host = urlsplit(address).hostname
+    try:
+        return frozenset(str(found[4][0]) for found in socket.getaddrinfo(host, None)) if host else frozenset()
+    except OSError:
+        return frozenset()

@@ -290,6 +290,11 @@ class Exports:
             over.remove(going)
             self._forget(going)
 
+    def has(self, terrain: str) -> bool:
+        """Returns whether something of a terrain is under way, or can still be asked about."""
+        self._forget_old()
+        return any(job.terrain == terrain for job in self._jobs.values())
+
     def _forget_late(self, job: Job, _: object) -> None:
         self._forget(job)
 

@@ -137,6 +137,7 @@ class Imports:
             self._end(job, "refused", error.message if isinstance(error, Cannot) else "")
             raise
         job.terrain, job.link = born.id, link
+        await self._hub.keep(born.id)
         self._go_on(job)
         return born, secret, job.status()
 
@@ -429,6 +430,11 @@ class Imports:
             for key, job in self._jobs.items()
             if job.stage not in c.ENDED_IMPORT or now - job.ended < KEPT_SECONDS
         }
+
+    def has(self, terrain: str) -> bool:
+        """Returns whether something of a terrain is under way, or can still be asked about."""
+        self._forget_old()
+        return any(job.terrain == terrain for job in self._jobs.values())
 
     def _job(self, terrain: str, job_id: str) -> Job:
         job = self._jobs.get(job_id)

@@ -196,6 +196,11 @@ class Collections:
             if job.over and job.ended < late:
                 self._forget(job)
 
+    def has(self, terrain: str) -> bool:
+        """Returns whether something of a terrain is under way, or can still be asked about."""
+        self._forget_old()
+        return any(job.lesson.terrain == terrain for job in self._jobs.values())
+
     def _forget(self, job: _Job) -> None:
         if job.task is not None and not job.over:
             job.task.cancel()

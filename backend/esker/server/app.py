@@ -10,6 +10,7 @@ from typing import Final
 
 from fastapi import FastAPI
 
+from esker.cluster.passing import Entrance, Passing
 from esker.fairness.shares import Places, Rate, Rates, Share
 from esker.fairness.turns import Turns
 from esker.jobs import Imports
@@ -17,6 +18,7 @@ from esker.jobs.exports import Exports
 from esker.keeper.private import Key
 from esker.lesson.classes import Classes
 from esker.lesson.collect import Collections
+from esker.server.nodes import Member
 from esker.server.routes.answers import add_errors
 from esker.server.routes.classes import add_classes
 from esker.server.routes.deletion import add_deletion
@@ -26,6 +28,7 @@ from esker.server.routes.history import add_history
 from esker.server.routes.imports import add_imports
 from esker.server.routes.keeper import add_keeper
 from esker.server.routes.links import add_links
+from esker.server.routes.metrics import Gauges, add_metrics
 from esker.server.routes.page import add_page
 from esker.server.routes.previews import Pictures, add_previews
 from esker.server.routes.socket import add_socket
@@ -69,9 +72,13 @@ def create_app(
     exports: Exports,
     key: Key,
     front: Front,
+    member: Member | None = None,
+    gauges: Gauges | None = None,
 ) -> FastAPI:
     """The application over an open hub. ``page``: the built front-end; ``data``: where the LAN certificate lies;
-    ``key``: of the machine's owner; ``front``: how it is reached."""
+    ``key``: of the machine's owner; ``front``: how it is reached; ``member``: this server as one of several;
+    ``gauges``: figures that are given out."""
+    cluster = None if member is None else member.cluster
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:  # noqa: ARG001
@@ -93,13 +100,20 @@ def create_app(
         lifespan=lifespan,
     )
     app.add_middleware(Bodies)
+    if member is not None and member.rooms is not None:
+        app.add_middleware(Passing, cluster=member.cluster, terrain_of=member.rooms.terrain_of)
     app.add_middleware(Gate, front=front)
     app.add_middleware(Paced)
     app.add_middleware(Headers, strict=front.strict)
     app.add_middleware(Forwarded, front=front)
+    if cluster is not None:
+        app.add_middleware(Entrance, cluster=cluster)
     classes = Classes(hub, grids)
     collections = Collections(classes, data / "collections")
+    if member is not None and member.rooms is not None:
+        member.rooms.jobs += [imports, exports, collections]
     app.state.hub = hub
+    app.state.nodes = (lambda: 1) if cluster is None else (lambda: max(1, len(cluster.nodes)))
     app.state.new_terrains = Rates(Rate(*NEW_TERRAINS), total=Rate(*ALL_NEW_TERRAINS))
     app.state.uploads = Turns(AT_ONCE)
     app.state.receiving = Places(UPLOADS)
@@ -114,12 +128,14 @@ def create_app(
     add_exports(app, hub, exports)
     add_deletion(app, hub, classes)
     add_classes(app, classes, collections)
-    add_wall(app, classes, front)
-    add_health(app, hub)
+    add_wall(app, classes, front, cluster)
+    add_health(app, hub, cluster)
+    if gauges is not None:
+        add_metrics(app, gauges)
     add_history(app, hub, grids)
     add_links(app, hub)
     add_keeper(app, hub, key)
-    add_socket(app, hub, front)
+    add_socket(app, hub, front, cluster)
     add_previews(app, hub, pictures)
     add_page(app, hub, page, data, pictures)
     return app

@@ -29,6 +29,8 @@ from esker.server import first_build
 from esker.server.app import create_app
 from esker.server.elevation import Elevation
 from esker.server.hydrology import Hydrology, Snapshot, snapshot
+from esker.server.nodes import Member
+from esker.server.routes.metrics import Gauges
 from esker.server.routes.previews import Pictures
 from esker.server.settings import Settings
 from esker.server.starting import CannotServe, FrontDoor, Stopping, WaitingRoom
@@ -109,13 +111,22 @@ class _Server(uvicorn.Server):
     """Says goodbye to the members of all rooms before the sockets are closed."""
 
     def __init__(
-        self, config: uvicorn.Config, hub: Hub, imports: Imports, host: str, started: Callable[[], Awaitable[None]]
+        self,
+        config: uvicorn.Config,
+        hub: Hub,
+        imports: Imports,
+        host: str,
+        started: Callable[[], Awaitable[None]],
+        node: Member | None = None,
     ) -> None:
-        """``host``: the address for people who speak plain HTTP and name no host."""
+        """``host``: the address for people who speak plain HTTP and name no host; ``node``: among others."""
         super().__init__(config)
+        self._node = node
         self._hub, self._imports, self._host, self._announce = hub, imports, host, started
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        if self._node is not None:
+            await self._node.begin()
         context, self.config.ssl = self.config.ssl, None
         if context is None or not sockets:
             await super().startup(sockets)
@@ -133,6 +144,8 @@ class _Server(uvicorn.Server):
         return made
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        if self._node is not None:
+            await self._node.leave()
         await self._imports.close()
         await self._hub.close()
         await asyncio.sleep(GOODBYE_SECONDS)
@@ -163,6 +176,8 @@ class Assembly:
         self._journal: Journal | None = None
         self._lock: DataLock | None = None
         self._care: Care | None = None
+        self.member: Member | None = None
+        """This server as a node, where several share the database."""
         self.imports: Imports | None = None
         """The HTTP server, once there is one."""
         self.exports: Exports | None = None
@@ -186,7 +201,9 @@ class Assembly:
             raise CannotServe(str(error)) from None
         sweep_parts(settings.data)
         self._space = Space(settings.data, settings.storage_mb << 20)
-        self._journal = Journal(settings.data, space=self._space, quota=settings.history_quota_mb << 20)
+        member = self.member = Member(settings) if settings.node else None
+        shared: dict[str, Any] = {} if member is None else {"now": member.date, "engine": member.engine}
+        self._journal = Journal(settings.data, space=self._space, quota=settings.history_quota_mb << 20, **shared)
         self._grids = GridStore(settings.data, self._space)
         self.private = Private(settings.data)
         self._grids.sweep(self._journal.grids(), forgotten=self._journal.may_sweep())
@@ -199,9 +216,11 @@ class Assembly:
         if not confinement.possible():
             log.warning("this system cannot keep readers of people's files from the data folder and the network")
         self._tiles = _Tiles()
+        self._gauges = _gauges(settings)
+        codes = None if member is None else member.codes(self._journal)
         self.hub = Hub(
             self._journal,
-            Access(self._journal),
+            Access(self._journal, self._journal.now, codes=codes),
             self._worker,
             self._tiles,
             levels=settings.level,
@@ -209,8 +228,15 @@ class Assembly:
             limits=Limits(settings.max_strokes, settings.max_points),
             max_members=settings.max_members,
             elevation=Elevation(self._grids),
-            claims=Claims(key_in(settings.data)),
+            claims=Claims(key_in(settings.data) if member is None else member.claims, self._journal.now),
+            tenancy=None if member is None else member.cluster,
+            meter=self._gauges,
         )
+        if member is not None:
+            member.join(self.hub, self._worker)
+        if self._gauges is not None:
+            self._gauges.hub, self._gauges.worker = self.hub, self._worker
+            self._gauges.cluster = None if member is None else member.cluster
         self._care = Care(self._journal, self.hub.deletion, self._grids)
 
     def _compile(self, kernels: bool) -> None:
@@ -248,18 +274,35 @@ class Assembly:
         settings = self.settings
         plant = Plant(settings.device, settings.threads, settings.level, settings.refine)
         self.exports = Exports(self.hub, settings.data / "exports", self._grids.folder, exporting.make, plant)
+        if self.member is not None:
+            self.private.write(self.private.open().model_copy(update={"key": self.member.keeper}))
         key = Key(self.private.open().key)
         front = _front(settings, self.address)
+        member, gauges = self.member, self._gauges
         app = create_app(
-            self.hub, settings.page, settings.data, pictures, self._grids, self.imports, self.exports, key, front
+            self.hub,
+            settings.page,
+            settings.data,
+            pictures,
+            self._grids,
+            self.imports,
+            self.exports,
+            key,
+            front,
+            member,
+            gauges,
         )
 
         async def started() -> None:
-            if announce:
+            if announce and member is None:
                 await _announce(self.hub, self.private, self.base, self.settings)
+            elif announce:
+                sys.stdout.write(f"\n  Node {settings.node} of Esker is ready: {self.base}\n\n")
+                sys.stdout.flush()
 
         host = f"{self.address}:{self.port}"
-        return _Server(_config(app, front.proxies, self._context), self.hub, self.imports, host, started)
+        near = front.proxies.__contains__ if member is None else lambda who: who in front.proxies or member.knows(who)
+        return _Server(_config(app, near, self._context), self.hub, self.imports, host, started, member)
 
     def run(self, server: _Server) -> None:
         """Serves until the server is told to stop."""
@@ -287,6 +330,8 @@ class Assembly:
             self._tiles.scorer.close()
         if self._journal is not None:
             self._journal.close()
+        if self.member is not None:
+            self.member.close()
         if self._lock is not None:
             self._lock.release()
         self._listener.close()
@@ -325,6 +370,16 @@ def diagnose(error: Exception) -> Fault:
     return Fault.FLAW if isinstance(error, FLAWS) else Fault.UNKNOWN
 
 
+def _gauges(settings: Settings) -> Gauges | None:
+    """Returns what counts figures, where the settings let somebody read them. Raises CannotServe."""
+    if not settings.metrics:
+        return None
+    try:
+        return Gauges(settings.metrics)
+    except ValueError as error:
+        raise CannotServe(f"ESKER_METRICS: {error}.") from None
+
+
 def _front(settings: Settings, address: str) -> Front:
     """Returns by which names this server is reached, and behind which proxies. Raises CannotServe."""
     try:
@@ -339,7 +394,8 @@ def _front(settings: Settings, address: str) -> Front:
     return Front(proxies, known, url, strict=url is not None and url.startswith("https:") and not settings.lan)
 
 
-def _config(app: Any, proxies: Proxies, context: ssl.SSLContext | None) -> uvicorn.Config:
+def _config(app: Any, exempt: Callable[[str], bool], context: ssl.SSLContext | None) -> uvicorn.Config:
+    """``exempt``: addresses of which any number of connections may come: proxies, other nodes."""
     config = uvicorn.Config(
         app,
         ws=WebSocketProtocol,
@@ -358,7 +414,7 @@ def _config(app: Any, proxies: Proxies, context: ssl.SSLContext | None) -> uvico
     config.load()
     config.ssl = context
     files = system.raise_open_files()
-    bounded(config, Connections(files - max(files // 4, min(OWN_FILES, files // 2)), proxies.__contains__))
+    bounded(config, Connections(files - max(files // 4, min(OWN_FILES, files // 2)), exempt))
     return config
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -49,6 +49,16 @@ class Settings:
     storage_mb: int = 0
     """MiB that all of the data folder may take. 0: all that the disk has, but for the part that stays free."""
     log_level: str = "info"
+    database: str = field(default="", repr=False)
+    """PostgreSQL that several servers share: postgresql://user@host/name. Empty: SQLite in the data folder."""
+    node: str = ""
+    """The name of this server among several over one database. Empty: it is alone."""
+    advertise: str = ""
+    """Where the other nodes reach this one: http://10.0.0.5:8000"""
+    cluster_key: str = field(default="", repr=False)
+    """What all nodes of a cluster have together, and nobody else."""
+    metrics: str = ""
+    """Who may read ``/metrics``: addresses and networks, separated by commas. "*": everybody. Empty: nobody."""
 
     def __post_init__(self) -> None:
         bounds = {

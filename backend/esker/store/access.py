@@ -15,7 +15,7 @@ import time
 from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
 from esker.contract import Role
 from esker.store.engine.ports import Connection, Database
@@ -93,18 +93,84 @@ def hashed(secret: str) -> bytes:
     return hashlib.sha256(secret.encode()).digest()
 
 
+class Codes(Protocol):
+    """Where codes are kept. ``is_slow``: a call may wait for a database, so it is made in a thread."""
+
+    is_slow: bool
+
+    def make(self, terrain: str, role: Role, link: str) -> str:
+        """Makes a code. Raises store.engine.ports.Unwritable, Moved."""
+
+    def prolong(self, terrain: str, code: str, link: str) -> float | None:
+        """Lets a code live longer; returns for how many seconds, None where there is none of this link."""
+
+    def open(self, code: str) -> JoinCode | None:
+        """Returns what a code opens."""
+
+    def drop(self, link: str) -> None:
+        """Ends the codes of a link."""
+
+
+class OwnCodes:
+    """Codes in the memory of this process."""
+
+    is_slow = False
+
+    def __init__(self, ticks: Callable[[], float] = time.monotonic) -> None:
+        """``ticks``: seconds that only ever go on, by which codes end."""
+        self._ticks = ticks
+        self._codes: dict[bytes, _Code] = {}
+
+    def make(self, terrain: str, role: Role, link: str) -> str:
+        self._forget_old()
+        length = code_length(len(self._codes) + 1)
+        own = [digest for digest, code in self._codes.items() if code.link == link]
+        for digest in own[: max(0, len(own) + 1 - MAX_CODES)]:
+            del self._codes[digest]
+        while True:
+            code = drawn(length)
+            if hashed(code) not in self._codes:
+                now = self._ticks()
+                self._codes[hashed(code)] = _Code(terrain, role, link, now + CODE_SECONDS, now + CODE_LIFE_SECONDS)
+                return code
+
+    def prolong(self, terrain: str, code: str, link: str) -> float | None:
+        self._forget_old()
+        digest = hashed(code)
+        found = self._codes.get(digest)
+        if found is None or (found.terrain, found.link) != (terrain, link):
+            return None
+        now = self._ticks()
+        self._codes[digest] = longer = replace(found, expires=min(now + CODE_SECONDS, found.until))
+        return longer.expires - now
+
+    def open(self, code: str) -> JoinCode | None:
+        self._forget_old()
+        found = self._codes.get(hashed(code))
+        return None if found is None else JoinCode(found.terrain, found.role, found.link)
+
+    def drop(self, link: str) -> None:
+        self._codes = {k: v for k, v in self._codes.items() if v.link != link}
+
+    def _forget_old(self) -> None:
+        now = self._ticks()
+        self._codes = {k: v for k, v in self._codes.items() if v.expires > now}
+
+
 class Access:
-    """Links in the journal's database, join codes in memory (they live for fifteen minutes)."""
+    """Links in the journal's database, and join codes, which live for fifteen minutes."""
 
     def __init__(
         self,
         journal: Database,
         now: Callable[[], float] = time.time,
         ticks: Callable[[], float] = time.monotonic,
+        codes: Codes | None = None,
     ) -> None:
-        """``now``: the date, which may be set; ``ticks``: seconds that only ever go on, by which codes end."""
-        self._journal, self._now, self._ticks = journal, now, ticks
-        self._codes: dict[bytes, _Code] = {}
+        """``now``: the date, which may be set; ``ticks``: seconds that only ever go on, by which codes end; ``codes``:
+        where codes are kept (default: in memory)."""
+        self._journal, self._now = journal, now
+        self.codes = OwnCodes(ticks) if codes is None else codes
 
     def check(self, terrain: str, secret: str) -> Link | None:
         """The link of this terrain that has this secret (see ``revoked``), or None."""
@@ -221,45 +287,27 @@ class Access:
 
         ``link``: the id of the link by which it is made; when that ends, so do its codes.
         """
-        self._forget_old()
-        length = code_length(len(self._codes) + 1)
-        own = [digest for digest, code in self._codes.items() if code.link == link]
-        for digest in own[: max(0, len(own) + 1 - MAX_CODES)]:
-            del self._codes[digest]
-        while True:
-            code = "".join(secrets.choice(CODE_ALPHABET) for _ in range(length))
-            if hashed(code) not in self._codes:
-                now = self._ticks()
-                self._codes[hashed(code)] = _Code(terrain, role, link, now + CODE_SECONDS, now + CODE_LIFE_SECONDS)
-                return code
+        return self.codes.make(terrain, role, link)
 
     def prolong_code(self, terrain: str, code: str, link: str) -> float | None:
         """The code lives for another fifteen minutes from now; returns for how many seconds it does live.
 
         Only the link by which it was made can prolong it. None: there is no such code any more.
         """
-        self._forget_old()
-        digest = hashed(_typed(code))
-        found = self._codes.get(digest)
-        if found is None or (found.terrain, found.link) != (terrain, link):
-            return None
-        now = self._ticks()
-        self._codes[digest] = longer = replace(found, expires=min(now + CODE_SECONDS, found.until))
-        return longer.expires - now
+        return self.codes.prolong(terrain, _typed(code), link)
 
     def open_code(self, code: str) -> JoinCode | None:
         """Returns what a code opens, or None when it is wrong or too old. Case and spaces do not matter."""
-        self._forget_old()
-        found = self._codes.get(hashed(_typed(code)))
-        return None if found is None else JoinCode(found.terrain, found.role, found.link)
+        return self.codes.open(_typed(code))
 
     def drop_codes(self, link: str) -> None:
         """Ends every join code that was made by this link."""
-        self._codes = {k: v for k, v in self._codes.items() if v.link != link}
+        self.codes.drop(link)
 
-    def _forget_old(self) -> None:
-        now = self._ticks()
-        self._codes = {k: v for k, v in self._codes.items() if v.expires > now}
+
+def drawn(length: int) -> str:
+    """A code of so many characters."""
+    return "".join(secrets.choice(CODE_ALPHABET) for _ in range(length))
 
 
 def code_length(live: int) -> int:

@@ -73,8 +73,9 @@ _EMPTY: Final = "NOT EXISTS (SELECT 1 FROM copies WHERE copies.class=classes.id)
 class ClassStore:
     """Reads and writes of one journal. Reads may come from any thread; a write's future resolves after its commit."""
 
-    def __init__(self, journal: Journal, now: Callable[[], float] = time.time) -> None:
-        self._journal, self.now = journal, now
+    def __init__(self, journal: Journal, now: Callable[[], float] | None = None) -> None:
+        """``now``: the date, by default the journal's."""
+        self._journal, self.now = journal, journal.now if now is None else now
 
     # --- classes ------------------------------------------------------------------------------------------------
 

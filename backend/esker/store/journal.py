@@ -98,6 +98,11 @@ class Journal:
         return self.engine.writable
 
     @property
+    def now(self) -> Callable[[], float]:
+        """The date of what is written: this machine's, or the one that several servers have together."""
+        return self._now
+
+    @property
     def waiting(self) -> int:
         """Items that wait for a commit, about."""
         return self.engine.waiting

@@ -137,11 +137,12 @@ def guess(request: Request, find: Callable[[], T | None], *, again: bool = False
     who, now = asker(request), time.monotonic()
     if not again or not state.code_tries.has(who, now):
         limited(request, state.code_tries, "join codes came")
-    if not state.wrong_codes.has(who, now):
+    cost = float(state.nodes())
+    if not state.wrong_codes.has(who, now, cost):
         raise Cannot(429, "rate_limited", "Somebody is guessing codes. Wait a minute, or ask for the link.")
     found = find()
     if found is None:
-        state.wrong_codes.take(who, now)
+        state.wrong_codes.take(who, now, cost)  # all nodes together allow no more than one
         if again:
             limited(request, state.code_tries, "join codes came")
         raise bad_code()

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-from typing import Annotated, Any, Final
+from collections.abc import Callable
+from typing import Annotated, Any, Final, TypeVar
 
 from fastapi import FastAPI, Request
 from pydantic import StringConstraints
@@ -18,6 +19,8 @@ from esker.session.room.hub import Hub
 from esker.store.access import CODE_SECONDS, JOINED_BY_CODE, Ended, Link, OwnLink, SecretTaken, TooManyLinks
 from esker.store.access import JoinCode as OpenedCode
 from esker.store.classes import Class
+
+T = TypeVar("T")
 
 RENEWED_AFTER: Final = 1.0
 
@@ -129,17 +132,21 @@ async def _new(hub: Hub, terrain: str, role: Role, name: str, by: Link | str) ->
 def _add_codes(app: FastAPI, hub: Hub) -> None:
     access = hub.access
 
+    async def coded(work: Callable[..., T], *arguments: object) -> T:
+        """Codes in a database are made in a thread."""
+        return await asyncio.to_thread(work, *arguments) if access.codes.is_slow else work(*arguments)
+
     @app.post("/api/terrains/{terrain}/codes", status_code=201)
     async def new_code(request: Request, terrain: str, link: AnyLink, body: NewCode) -> dict[str, Any]:
         if link.role == "view" or (link.role == "edit" and body.role == "owner"):
             raise Cannot(403, "not_allowed", "Your link does not allow you to invite people in this role.")
         limited(request, app.state.new_codes, "join codes were made", link)
-        return {"code": access.make_code(terrain, body.role, link.id), "expires_s": CODE_SECONDS}
+        return {"code": await coded(access.make_code, terrain, body.role, link.id), "expires_s": CODE_SECONDS}
 
     @app.post("/api/terrains/{terrain}/codes/prolong")
     async def prolong(request: Request, terrain: str, link: AnyLink, body: JoinCode) -> dict[str, Any]:
         limited(request, app.state.code_tries, "join codes came")
-        left = access.prolong_code(terrain, body.code, link.id)
+        left = await coded(access.prolong_code, terrain, body.code, link.id)
         if left is None:
             raise Cannot(404, "bad_code", "This code has ended. Make a new one.")
         return {"code": body.code, "expires_s": left}

@@ -13,9 +13,11 @@ from starlette.websockets import WebSocketDisconnect
 from websockets.frames import Frame, Opcode
 
 from esker import contract as c
+from esker.cluster.node import Cluster
 from esker.fairness.shares import Full, Places, Share, Who
 from esker.fairness.spending import Account, Accounts
 from esker.server.routes.answers import address
+from esker.server.routes.elsewhere import Arrival
 from esker.server.wire.front import Front
 from esker.server.wire.websocket import WebSocketProtocol
 from esker.session.room.hub import Hub
@@ -138,13 +140,16 @@ async def accepted(socket: WebSocket, front: Front) -> tuple[WireTransport, str 
     return transport, subprotocol, against is None
 
 
-def add_socket(app: FastAPI, hub: Hub, front: Front) -> None:
-    """Adds the route."""
+def add_socket(app: FastAPI, hub: Hub, front: Front, cluster: Cluster | None = None) -> None:
+    """Adds the route. ``cluster``: where other servers may have the terrain."""
     accounts = Accounts()
     sockets = Places(SOCKETS)
 
     @app.websocket("/ws")
     async def ws(socket: WebSocket) -> None:
+        arrival = None if cluster is None else Arrival(cluster, socket)
+        if arrival is not None and not await arrival.expected():
+            return
         transport, subprotocol, is_welcome = await accepted(socket, front)
         if not is_welcome:
             return
@@ -153,8 +158,15 @@ def add_socket(app: FastAPI, hub: Hub, front: Front) -> None:
         except Full:
             await refuse(socket, transport, "rate_limited", CROWDED)
             return
-        with place:
+
+        async def here() -> None:
             await Session(hub, transport, address(socket), subprotocol, accounts=accounts).run(messages(socket))
+
+        with place:
+            if arrival is None:
+                await here()
+            else:
+                await arrival.serve(here, lambda sentence: refuse(socket, transport, "moved", sentence))
 
 
 async def refuse(socket: WebSocket, transport: WireTransport, code: c.CloseCode, sentence: str) -> None:

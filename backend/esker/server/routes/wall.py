@@ -4,22 +4,34 @@ from __future__ import annotations
 
 from fastapi import FastAPI, WebSocket
 
+from esker.cluster.node import Cluster
 from esker.fairness.spending import Accounts
 from esker.lesson.classes import Classes
 from esker.lesson.wall import Walls, WallSession
 from esker.server.routes.answers import address
-from esker.server.routes.socket import accepted, messages
+from esker.server.routes.elsewhere import Arrival
+from esker.server.routes.socket import accepted, messages, refuse
 from esker.server.wire.front import Front
 
 
-def add_wall(app: FastAPI, classes: Classes, front: Front) -> None:
-    """Adds it."""
+def add_wall(app: FastAPI, classes: Classes, front: Front, cluster: Cluster | None = None) -> None:
+    """Adds it. ``cluster``: where other servers may have the class."""
     walls, accounts = Walls(classes), Accounts()
 
     @app.websocket("/ws/wall")
     async def wall(socket: WebSocket) -> None:
+        arrival = None if cluster is None else Arrival(cluster, socket)
+        if arrival is not None and not await arrival.expected():
+            return
         transport, subprotocol, is_welcome = await accepted(socket, front)
         if not is_welcome:
             return
-        transport.charge(accounts.member(address(socket)), transport.abort)
-        await WallSession(walls, transport, address(socket), subprotocol).run(messages(socket))
+
+        async def here() -> None:
+            transport.charge(accounts.member(address(socket)), transport.abort)
+            await WallSession(walls, transport, address(socket), subprotocol).run(messages(socket))
+
+        if arrival is None:
+            await here()
+        else:
+            await arrival.serve(here, lambda sentence: refuse(socket, transport, "moved", sentence))

@@ -67,6 +67,8 @@ class Worker:
         self._repairs = Repairs(factory, devices, self._rooms, diagnose, now, self._happen)
         self._broken: Exception | None = None
         self._tidied = now()
+        self.spent = 0.0
+        """Seconds that slices of solves took, of all rooms since the start."""
         self._ready = threading.Event()
         self._thread = threading.Thread(target=self._run, name="solver", daemon=True)
 
@@ -190,14 +192,17 @@ class Worker:
         with self._changed:
             if client not in self._grounds:
                 return
-            begins, gone, self._tally = schedule.begin(client, self._grounds, self._now(), self._tally)
+            began = self._now()
+            begins, gone, self._tally = schedule.begin(client, self._grounds, began, self._tally)
         for other in gone:
             other.work.drop()
             self._happen(other, does.Dropped())
             self._happen(other, does.Again())
         self._happen(client, does.Turn(begins))
         with self._changed:
-            self._tally = self._tally.ended(client, self._now())
+            ended = self._now()
+            self._tally = self._tally.ended(client, ended)
+            self.spent += ended - began
 
     def _happen(self, client: Client, event: Event) -> None:
         """Puts an event into the machine of a room and carries its effects out, unless the room has closed."""

@@ -339,6 +339,11 @@ class RoomCore:
             mine = None if self._replicas.looks(member) else acks.get(member.client)
             member.outbox.push(text_for(member), *([] if mine is None else [_ack(mine)]))
 
+    def abandon(self) -> None:
+        """Goes back to the committed document without a word: authors send again what was not acknowledged."""
+        self._in_flight, self._waiting = [], []
+        self.head = self.document
+
     def failed(self, sentence: str = UNSAVED) -> None:
         """Goes back to the committed document, since the journal did not take the batch.
 

@@ -361,6 +361,10 @@ class HistoryRooms:
                 for member in room.core.members:
                     member.outbox.close(code, sentence)
 
+    def has(self, terrain: str) -> bool:
+        """Returns whether a history room of this terrain is open."""
+        return any(room.id == terrain for room in self._rooms)
+
     def close_terrain(self, terrain: str, code: c.CloseCode, sentence: str) -> None:
         """Closes every history room of this terrain."""
         for room in [each for each in self._rooms if each.id == terrain]:

@@ -8,11 +8,13 @@ import secrets
 import time
 from collections.abc import Callable, Collection
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from functools import partial
 from typing import Any, Final, ParamSpec, TypeVar
 
 from esker import contract as c
 from esker.document.ops import Limits, StrokeSet
+from esker.errors import EskerError
 from esker.fairness.shares import Full, Share, Who, homes
 from esker.fairness.turns import SERVER, FairThreads
 from esker.process import memory
@@ -30,6 +32,7 @@ from esker.session.room.history_view import HistoryCore, HistoryRoom, HistoryRoo
 from esker.session.room.limits import history_rates
 from esker.session.room.openrooms import ClosedRooms, OpenRooms
 from esker.session.room.outbox import Outbox, Waiting
+from esker.session.room.ports import Meter, Tenancy
 from esker.session.room.room import Guest, Room
 from esker.store import timestamps
 from esker.store.access import JOINED_BY_CODE, Access, Link
@@ -54,6 +57,7 @@ T = TypeVar("T")
 
 
 DELETED: Final = "The owner deleted this terrain."
+MOVING: Final = "This terrain moves to another server. Your page goes with it by itself."
 
 
 class Hub:
@@ -75,9 +79,12 @@ class Hub:
         elevation: Elevation | None = None,
         claims: Claims | None = None,
         rooms: Share | None = None,
+        tenancy: Tenancy | None = None,
+        meter: Meter | None = None,
     ) -> None:
         """``levels``: the finest level solved as a whole; ``finest``: the finest refined (default: none is);
-        ``elevation``: makes the base of elevation layers (default: none is laid); ``rooms``: how many may be open."""
+        ``elevation``: makes the base of elevation layers (default: none is laid); ``rooms``: how many may be open;
+        ``tenancy``: where several servers share the database; ``meter``: where somebody reads figures."""
         self.journal, self.access, self.deletion = journal, access, Deletion(journal)
         self._worker, self._tiles = worker, tiles
         self._levels, self._finest = levels, levels if finest is None else max(levels, finest)
@@ -87,7 +94,7 @@ class Hub:
         self._rooms: dict[str, asyncio.Task[Room | None]] = {}
         self._places, self._memory = OpenRooms(self.sleep, rooms, self._rest), ClosedRooms()
         self._tile_thread = TileThread()
-        self._elevation = elevation
+        self._elevation, self._tenancy, self._meter = elevation, tenancy, meter
         self._base_threads = ThreadPoolExecutor(1, thread_name_prefix="elevation")
         self.reading = FairThreads(READERS, "reading", READS_WAITING)
         """Threads that read the journal. One address has at most half of them."""
@@ -178,9 +185,16 @@ class Hub:
             self._places.release(terrain)
 
     async def _open(self, terrain: str, who: Who) -> Room | None:
+        if self._tenancy is not None:
+            try:
+                await self._tenancy.hold(terrain)
+            except EskerError as error:
+                raise Denied("moved", error.message) from None
         loaded, lesson = await self.read(who, lambda: (self.journal.load(terrain), self._lesson(terrain)))
         if loaded is None or self.deletion.deleted(terrain) is not None:
             return None
+        if self._tenancy is not None and not self._tenancy.may_acknowledge(terrain):
+            raise Denied("moved", MOVING)
         core = RoomCore(
             loaded,
             lambda client, counter: self.journal.find(terrain, client, counter),
@@ -191,7 +205,8 @@ class Hub:
             lesson=lesson,
         )
         desk = Desk(partial(self.read, SERVER), partial(self._end_code_link, terrain))
-        needs = self._needs() | {"desk": desk, "home": who.site}
+        more = {"tenancy": self._tenancy, "on_lost": lambda: self.lose(terrain)}
+        needs = self._needs() | {"desk": desk, "home": who.site} | more
         room = Room(core, journal=self.journal, on_empty=lambda: self._empty(terrain), **needs)
         room.in_class = self.class_of(terrain)
         return room
@@ -244,12 +259,19 @@ class Hub:
             "info": RoomInfo(self._levels, self._finest, self._worker.device_name),
             "elevation": self._elevation,
             "base_threads": self._base_threads,
+            "meter": self._meter,
         }
 
     @property
     def open_rooms(self) -> int:
         """Rooms that are open or opening, history rooms not counted."""
         return len(self._rooms)
+
+    @property
+    def members(self) -> int:
+        """People who are in open rooms, history rooms not counted."""
+        rooms = (self.open_room(terrain) for terrain in self._rooms)
+        return sum(len(room.core.members) for room in rooms if room is not None)
 
     def open_room(self, terrain: str) -> Room | None:
         """Returns the room if it is open already."""
@@ -331,17 +353,50 @@ class Hub:
 
     async def close_deleted(self, terrain: str) -> None:
         """A terrain was deleted: closes everybody in it, and ends what was under way for its links."""
+        await self._take_out(terrain, "no_terrain", DELETED)
+        for hears in self.hear_of_ended:
+            hears(terrain, [each.id for each in self.access.links(terrain)])
+
+    async def _take_out(self, terrain: str, code: c.CloseCode, sentence: str) -> None:
+        """Commits what was ordered, and closes everybody in a terrain."""
         task = self._rooms.pop(terrain, None)
         self._places.release(terrain)
         room = None if task is None else await task
-        self._history_rooms.close_terrain(terrain, "no_terrain", DELETED)
+        self._history_rooms.close_terrain(terrain, code, sentence)
         if room is not None:
             await room.flush()
+            if not room.closed:
+                for member in room.core.members:
+                    member.outbox.close(code, sentence)
+                room.shut()
+
+    # --- where several servers share the database -----------------------------------------------------------------
+
+    async def keep(self, terrain: str) -> None:
+        """Has a terrain that this server has just made stay here, for what goes on with it. Raises EskerError."""
+        if self._tenancy is not None:
+            await self._tenancy.hold(terrain)
+
+    def in_use(self, terrain: str) -> bool:
+        """Returns whether a room of a terrain is open, of its history too."""
+        return terrain in self._rooms or self._history_rooms.has(terrain)
+
+    async def hand_over(self, terrain: str) -> None:
+        """Commits what was ordered, and sends everybody in a terrain on to whichever server has it then."""
+        with suppress(EskerError):  # a room that could not be opened has nobody in it
+            await self._take_out(terrain, "moved", MOVING)
+
+    def lose(self, terrain: str) -> None:
+        """Closes everybody in a terrain without a word to the journal."""
+        room, _ = self.open_room(terrain), self._rooms.pop(terrain, None)
+        self._places.release(terrain)
+        self._history_rooms.close_terrain(terrain, "moved", MOVING)
+        if room is not None:
             for member in room.core.members:
-                member.outbox.close("no_terrain", DELETED)
-            room.shut()
-        for hears in self.hear_of_ended:
-            hears(terrain, [each.id for each in self.access.links(terrain)])
+                member.outbox.close("moved", MOVING)
+            room.abandon()
+
+    # --- links ------------------------------------------------------------------------------------------------------
 
     def end_links(self, terrain: str, links: Collection[str]) -> None:
         """Links were revoked: closes everybody who came in by them, ends their join codes and what they have going.

@@ -1,4 +1,4 @@
-"""A protocol of what a room needs from the store. Tests stand in for it."""
+"""What a room needs of the store, and of other servers where there are some. Tests stand in for it."""
 
 from __future__ import annotations
 
@@ -33,3 +33,23 @@ class Journal(Protocol):
     def load(self, terrain: str, upto: int | None = None) -> Loaded | None: ...
 
     def steps(self, terrain: str, after: int, upto: int | None = None) -> list[Row]: ...
+
+
+class Tenancy(Protocol):
+    """Which terrains this server has, where several share a database. A server that is alone has none."""
+
+    async def hold(self, terrain: str) -> None:
+        """Returns when this server has a terrain. Raises EskerError where another one has it."""
+
+    def may_acknowledge(self, terrain: str) -> bool:
+        """Returns whether what is durable may be acknowledged: this server certainly has the terrain still."""
+
+
+class Meter(Protocol):
+    """Counts what a server does, where somebody reads the figures."""
+
+    def acknowledged(self, seconds: float) -> None:
+        """Operations were acknowledged, so long after the first of them came."""
+
+    def framed(self, size: int) -> None:
+        """A frame of tiles was taken for a socket."""

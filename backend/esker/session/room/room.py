@@ -30,9 +30,10 @@ from esker.session.room.core import UNSAVED, Batch, RoomCore, RoomInfo
 from esker.session.room.entry import Denied
 from esker.session.room.members import QUIET_BACKLOG_BYTES, Member
 from esker.session.room.outbox import Outbox
-from esker.session.room.ports import Journal
+from esker.session.room.ports import Journal, Meter, Tenancy
 from esker.session.room.replicas.recent import Encoder
 from esker.session.scoring import Scoring
+from esker.store.engine.ports import Moved, Unknown
 from esker.store.journal import HistoryFull
 from esker.store.timestamps import Person
 
@@ -42,6 +43,8 @@ TICK: Final = c.TICK_MS / 1000
 PRESENCE_TICK: Final = 1 / c.PRESENCE_HZ
 PROGRESS_TICK: Final = 0.1
 CLOCK_TICK: Final = 0.25
+DOUBT_TICK: Final = 0.1
+"""What is durable waits so long, again and again, while it is not certain whose the terrain is."""
 
 
 class Guest:
@@ -68,10 +71,13 @@ class Room(ClassRoom):
         base_threads: Executor | None = None,
         desk: Desk | None = None,
         home: str = "",
+        tenancy: Tenancy | None = None,
+        meter: Meter | None = None,
+        on_lost: Callable[[], None] = lambda: None,
     ) -> None:
         """``elevation`` makes the base of the layers, in a thread of ``base_threads``; without them nothing is laid.
         ``desk``: what a lesson asks of the server; ``home``: the address of who opened it, for whom its work is done
-        until somebody comes who draws."""
+        until somebody comes who draws. ``on_lost``: what is in the journal is known no longer."""
         self.core, self.info = core, info
         self.id = core.document.id
         self._journal, self._worker, self._on_empty = journal, worker, on_empty
@@ -113,6 +119,9 @@ class Room(ClassRoom):
         """Authors of ops as the journal knows them."""
         self._refining = 0
         self._encoder = Encoder(core)
+        self._tenancy, self._meter, self._on_lost = tenancy, meter, on_lost
+        self._ordered_at: float | None = None
+        """When the first op came that waits for a tick, where somebody measures."""
         self._flushed = asyncio.Event()
         self._flushed.set()
         self.conducting = Conducting(
@@ -220,7 +229,10 @@ class Room(ClassRoom):
 
     def frame(self, guest: Guest) -> bytes | None:
         """Returns the binary frame that waits for this member's socket, if there is one."""
-        return self._feed.sent(guest.stream)
+        frame = self._feed.sent(guest.stream)
+        if frame is not None and self._meter is not None:
+            self._meter.framed(len(frame))
+        return frame
 
     def _presence_soon(self) -> None:
         if self._presence_timer is None and not self.closed:
@@ -271,6 +283,8 @@ class Room(ClassRoom):
         elif self._progress.settled:
             # Only the clock changes, and the members see that from the ops: there is no hurry.
             self._progress_soon(CLOCK_TICK)
+        if self._meter is not None and self._ordered_at is None:
+            self._ordered_at = self._loop.time()
         self._tick_soon()
 
     def _tick_soon(self) -> None:
@@ -288,8 +302,9 @@ class Room(ClassRoom):
         self.scoring.follow(self.core.head)
         self._flushed.clear()
         people = self._new_names(row.author for row in batch.rows)
+        ordered, self._ordered_at = self._ordered_at, None
         future = self._journal.append(self.id, batch.rows, batch.snapshot, people)
-        future.add_done_callback(lambda f: self._loop.call_soon_threadsafe(self._committed, batch, f))
+        future.add_done_callback(lambda f: self._loop.call_soon_threadsafe(self._committed, batch, f, ordered))
 
     def _new_names(self, clients: Iterable[str]) -> list[Person]:
         """Returns what authors of ops are called, where the journal does not have it from this room yet."""
@@ -303,10 +318,21 @@ class Room(ClassRoom):
         conducts = self.core.lesson.conducts(member)
         return Person(member.client, member.name, member.colour, member.person, conducts)
 
-    def _committed(self, batch: Batch, future: Future[None]) -> None:
+    def _committed(self, batch: Batch, future: Future[None], ordered: float | None) -> None:
         error = future.exception()
+        if self.closed:
+            return  # another server may have the terrain: authors ask that one what became of this
+        if isinstance(error, (Moved, Unknown)):
+            log.warning("terrain %s: %s", self.id, error)
+            self._on_lost()
+            return
+        if error is None and self._tenancy is not None and not self._tenancy.may_acknowledge(self.id):
+            self._loop.call_later(DOUBT_TICK, self._committed, batch, future, ordered)
+            return
         if error is None:
             self.core.committed(batch)
+            if self._meter is not None and ordered is not None:
+                self._meter.acknowledged(self._loop.time() - ordered)
         else:
             log.error("terrain %s: a commit failed: %s", self.id, error)
             self.core.failed(f"{error} This change was taken back." if isinstance(error, HistoryFull) else UNSAVED)
@@ -434,6 +460,12 @@ class Room(ClassRoom):
             self._flushed.clear()
             self._tick_soon()
             await self._flushed.wait()
+
+    def abandon(self) -> None:
+        """Ends without a word to the journal: another server may have the terrain, or nobody knows what was written."""
+        self.core.abandon()
+        self.shut()
+        self._flushed.set()
 
     def shut(self) -> None:
         """Stops the timers and the solver's work for this room. Call ``flush`` first."""
