@@ -1,11 +1,11 @@
-"""Tests of this folder may be coroutines: each runs in an event loop of its own."""
+"""Tests of this folder may be coroutines: each runs in an event loop of its own, the one that servers have."""
 
 from __future__ import annotations
 
-import asyncio
 import inspect
 
 import pytest
+import uvloop
 
 
 def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> bool | None:
@@ -13,5 +13,5 @@ def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> bool | None:
     if not inspect.iscoroutinefunction(pyfuncitem.obj):
         return None
     wanted = pyfuncitem._fixtureinfo.argnames
-    asyncio.run(pyfuncitem.obj(**{name: pyfuncitem.funcargs[name] for name in wanted}))
+    uvloop.run(pyfuncitem.obj(**{name: pyfuncitem.funcargs[name] for name in wanted}))
     return True

@@ -14,7 +14,18 @@ from typing import Any, Final
 
 from esker.cluster import places, signing
 from esker.cluster.node import Cluster
-from esker.cluster.peers import MOVED_HEADER, SESSION_PATH, Elsewhere, Message, Peer, Receive, Send, host_of, target_of
+from esker.cluster.peers import (
+    MOVED_HEADER,
+    SESSION_PATH,
+    Elsewhere,
+    Lost,
+    Message,
+    Peer,
+    Receive,
+    Send,
+    host_of,
+    target_of,
+)
 from esker.cluster.relay import Relay
 from esker.cluster.signing import NotSigned, Opening, Sessions, Visit
 
@@ -106,6 +117,9 @@ class Passing:
         except Elsewhere as error:
             log.info("%s %s was not passed on: %s", scope["method"], scope["path"], error)
             await _answer(scope, send, 503, "moved", AGAIN, [(MOVED_HEADER, b"1"), (b"retry-after", b"1")])
+            return
+        except Lost as error:
+            await _answer(scope, send, error.status, error.code, error.message, [])
             return
         if not about.changes:
             await self.app(scope, receive, send)

@@ -11,12 +11,14 @@ import json
 import ssl
 import time
 from collections.abc import Awaitable, Callable, Iterable, MutableMapping
-from typing import Any, Final, NamedTuple
+from dataclasses import dataclass
+from typing import Any, Final
 from urllib.parse import urlsplit
 
 import h11
 
 from esker.cluster import signing
+from esker.cluster.places import CHANGES_NOTHING
 from esker.cluster.relay import Relay
 from esker.cluster.signing import NotSigned, Opened, Visit
 from esker.errors import EskerError
@@ -34,6 +36,8 @@ CONNECT_SECONDS: Final = 1.0
 """A node on the same network answers in a thousandth of it."""
 ANSWER_SECONDS: Final = 120.0
 """The longest that a node may take to begin an answer: a heavy document is read in seconds."""
+SOCKET_SECONDS: Final = 2.0
+"""The longest that a node may take to open a socket. Then it is tried again, or elsewhere."""
 IDLE_SECONDS: Final = 4.0
 """A connection that was not used for so long is closed, before the other end gives it up."""
 MOST_IDLE: Final = 32
@@ -58,11 +62,19 @@ class Elsewhere(EskerError):
         super().__init__("moved", sentence, 503)
 
 
+class Lost(EskerError):
+    """The other node went away in the middle of a change, or of an answer."""
+
+    def __init__(self) -> None:
+        super().__init__("lost", "The server that was asked went away. Look whether it was done, and ask again.", 502)
+
+
 class _Gone(Exception):
     """A kept connection was closed by the other end before it answered."""
 
 
-class _Connection(NamedTuple):
+@dataclass(eq=False)
+class _Connection:
     reader: asyncio.StreamReader
     writer: asyncio.StreamWriter
     state: h11.Connection
@@ -92,6 +104,9 @@ class Peer:
         self._host = parts.hostname or ""
         self._port = parts.port or (443 if self._tls else 80)
         self._idle: list[_Connection] = []
+        self._relays: set[Relay] = set()
+        self._busy: list[_Connection] = []
+        self._closed = False
         self._session: signing.Session | None = None
         self._opening = asyncio.Lock()
 
@@ -136,6 +151,8 @@ class Peer:
 
     async def _connected(self, *, fresh: bool = False) -> _Connection:
         """A connection, kept or new. Raises Elsewhere."""
+        if self._closed:
+            raise Elsewhere(f"Node {self.node.name} is not there any more.")
         while self._idle and not fresh:
             kept = self._idle.pop()
             if self._now() - kept.used < IDLE_SECONDS and not kept.reader.at_eof():
@@ -154,13 +171,17 @@ class Peer:
             connection.drop()
             return
         connection.state.start_next_cycle()
-        self._idle.append(connection._replace(used=self._now()))
+        connection.used = self._now()
+        self._idle.append(connection)
         if len(self._idle) > MOST_IDLE:
             self._idle.pop(0).drop()
 
     def close(self) -> None:
-        """Closes what is kept."""
-        for each in self._idle:
+        """Closes what is kept, and what is passed on to this node: it is not there any more, or frozen."""
+        self._closed = True
+        for relay in list(self._relays):
+            relay.abort()
+        for each in (*self._idle, *self._busy):
             each.drop()
         self._idle.clear()
 
@@ -169,25 +190,25 @@ class Peer:
     async def request(self, scope: Message, receive: Receive, send: Send, visit: Visit) -> None:
         """Passes a request on, and its answer back. Raises Elsewhere."""
         session = await self.session()
+        # Nothing is done twice: a change without a body may be under way as soon as its head was sent.
+        is_safe = scope["method"] in CHANGES_NOTHING or has_body(scope["headers"])
         for attempt in range(3):
-            connection = await self._connected(fresh=attempt > 0)
+            connection = await self._connected(fresh=attempt > 0 or not is_safe)
+            self._busy.append(connection)
             try:
                 answer = await self._asked(connection, session, scope, visit)
+                if answer is not None:
+                    await self._answered(connection, answer, receive, send)
+                    return
             except _Gone:
-                connection.drop()
+                if not is_safe:
+                    raise Lost from None
                 continue
-            except (OSError, TimeoutError, h11.ProtocolError) as error:
-                connection.drop()
-                raise Elsewhere(f"Node {self.node.name} gave no answer: {error}.") from None
-            except BaseException:
-                connection.drop()
-                raise
-            if answer is None:
-                connection.drop()
-                session = await self.session(session)
-                continue
-            await self._answered(connection, answer, receive, send)
-            return
+            finally:
+                self._busy.remove(connection)
+                if connection not in self._idle:
+                    connection.drop()
+            session = await self.session(session)
         raise Elsewhere(f"Node {self.node.name} closed the connection.")
 
     async def _asked(self, connection: _Connection, session: signing.Session, scope: Message, visit: Visit) -> Any:
@@ -204,12 +225,14 @@ class Peer:
         connection.writer.write(connection.state.send(request) or b"")
         if not body:
             connection.writer.write(connection.state.send(h11.EndOfMessage()) or b"")
-        async with asyncio.timeout(ANSWER_SECONDS):
-            answer = await connection.event()
+        try:
+            async with asyncio.timeout(ANSWER_SECONDS):
+                answer = await connection.event()
+        except (OSError, TimeoutError, h11.ProtocolError) as error:
+            raise (Elsewhere(f"Node {self.node.name} gave no answer: {error}.") if body else _Gone()) from None
         if answer.status_code == 401 and any(name == signing.HEADER.encode() for name, _ in answer.headers):
             return None
         if any(name == MOVED_HEADER for name, _ in answer.headers):
-            connection.drop()
             raise Elsewhere("The terrain has moved.")
         return answer
 
@@ -224,9 +247,6 @@ class Peer:
             while not isinstance(found := await self._unless(upward, connection.event()), h11.EndOfMessage):
                 await send({"type": "http.response.body", "body": bytes(found.data), "more_body": True})
             await send({"type": "http.response.body", "body": b"", "more_body": False})
-        except BaseException:
-            connection.drop()
-            raise
         finally:
             upward.cancel()
             await asyncio.gather(upward, return_exceptions=True)
@@ -276,12 +296,14 @@ class Peer:
                     await asyncio.get_running_loop().create_connection(
                         lambda: relay, self._host, self._port, ssl=self._tls
                     )
-                async with asyncio.timeout(ANSWER_SECONDS):
+                async with asyncio.timeout(SOCKET_SECONDS):
                     status, answer = await relay.opened(b"GET %b HTTP/1.1\r\n%b\r\n" % (target.encode(), text))
             except (OSError, TimeoutError) as error:
                 relay.abort()
                 raise Elsewhere(f"Node {self.node.name} cannot be reached: {error or 'no answer'}.") from None
             if status == 101:
+                self._relays.add(relay)
+                relay.ended.add_done_callback(lambda _: self._relays.discard(relay))
                 return
             relay.abort()
             if status != 401 or signing.HEADER.encode() not in answer.lower():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from contextlib import suppress
-from typing import Final, Protocol
+from typing import Final, Protocol, cast
 
 MOST_HEAD: Final = 1 << 16
 """Most bytes of the head of an answer."""
@@ -49,8 +49,7 @@ class Relay(asyncio.Protocol):
         return await self._opened
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        assert isinstance(transport, asyncio.Transport)
-        self._transport = transport
+        self._transport = cast(asyncio.Transport, transport)  # uvloop's are none by inheritance
 
     def data_received(self, data: bytes) -> None:
         if self._is_open:

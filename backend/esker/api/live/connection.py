@@ -124,11 +124,12 @@ class LiveConnection:
         low, high = BACKOFF_SECONDS
         delay = low
         while not self._is_closing and self._failure is None:
-            started = time.monotonic()
+            started, moved = time.monotonic(), False
             try:
                 await self._connection()
             except LOST as error:
                 log.info("connection lost: %s", error)
+                moved = self.is_online and _has_moved(error)
                 if isinstance(error, Diverged):
                     with self.changed:
                         self.sync.start_over()
@@ -140,7 +141,8 @@ class LiveConnection:
                 return
             delay = low if time.monotonic() - started > high else min(high, delay * 2)
             self._wake.clear()
-            await self._sleep(delay * random.uniform(0.5, 1.0))
+            spread = random.uniform(0.0, c.MOVED_WITHIN_MS / 1000)
+            await self._sleep(spread if moved else delay * random.uniform(0.5, 1.0))
 
     async def _sleep(self, seconds: float) -> None:
         end = time.monotonic() + seconds
@@ -236,3 +238,9 @@ class LiveConnection:
                 case c.ErrorMessage() if message.fatal and c.WS_CLOSE[message.code] in FINAL_CODES:
                     self._failure = Refused(message.code, message.message)
             self.changed.notify_all()
+
+
+def _has_moved(error: Exception) -> bool:
+    """Returns whether the server said that the terrain goes to another one: nothing is wrong, and it is there soon."""
+    received = error.rcvd if isinstance(error, ConnectionClosed) else None
+    return received is not None and received.code == c.WS_CLOSE["moved"]
