@@ -21,7 +21,7 @@ from tests.browser import free_port
 
 ROOT = Path(__file__).resolve().parents[2]
 KEY = "the key that the nodes of these tests have together"
-PATIENCE = 25.0
+PATIENCE = 90.0
 
 
 class NodeProcess:

@@ -144,5 +144,5 @@ def test_a_code_that_was_made_on_one_node_opens_on_another(database: Database, t
         assert b.refused("GET", f"/api/terrains/{terrain}", secret=joined["secret"]) == 403
         archives = [each.request("GET", f"/api/terrains/{terrain}/archive", secret=secret) for each in (a, b)]
         assert all(found[:2] == b"PK" for found in archives)
-        for each in artists:
-            each.close()
+        for artist in artists:
+            artist.close()

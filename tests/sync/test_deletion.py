@@ -108,7 +108,7 @@ def test_a_table_that_is_new_is_removed_from_too(tmp_path: Path) -> None:
     journal = Journal(tmp_path)
     tables = {row[0] for row in journal.reader().execute("SELECT name FROM sqlite_master WHERE type='table'")}
     assert tables - {"terrains", "server", *CLASSES} == set(TABLES)
-    assert tables == set(dialect.TABLES)
+    assert tables == set(dialect.TABLES) - {"codes"}, "a server that is alone has join codes in memory"
     journal.close()
 
 

@@ -150,9 +150,10 @@ def test_no_compiler_nor_linker_comes_from_the_system() -> None:
 def test_images_get_the_digests_that_a_registry_says(tmp_path: Path) -> None:
     """SPEC H168. No digest is in the files: none could be asked for where they were written."""
     digest = "sha256:" + "0123456789abcdef" * 4
+    names = ("Dockerfile", "docker-compose.yml", "docker-compose.cluster.yml")
     (tmp_path / "bin").mkdir()
     docker = tmp_path / "bin" / "docker"
-    for file in ("Dockerfile", "docker-compose.yml"):
+    for file in names:
         shutil.copy(ROOT / file, tmp_path / file)
 
     def pin(*options: str) -> subprocess.CompletedProcess[str]:
@@ -160,8 +161,8 @@ def test_images_get_the_digests_that_a_registry_says(tmp_path: Path) -> None:
         command = ["/bin/bash", str(ROOT / ".ci" / "pin-images"), *options]
         return subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
 
-    bare = {line: re.sub(r"@sha256:[0-9a-f]{64}", "", line) for file in ("Dockerfile", "docker-compose.yml")
-            for line in text(file).splitlines() if re.match(r"FROM |    image: ", line)}  # fmt: skip
+    before = "".join(text(file) for file in names)
+    images = re.findall(r"^(?:FROM|    image:) ", before, re.M)
     docker.write_text("#!/bin/sh\necho 'no such host'\n")
     docker.chmod(0o755)
     assert pin().returncode == 1, "what is no digest is not written"
@@ -169,13 +170,44 @@ def test_images_get_the_digests_that_a_registry_says(tmp_path: Path) -> None:
     docker.write_text(f"#!/bin/sh\necho {digest}\n")
     for _ in range(2):  # once more replaces what is there
         assert pin().returncode == 0
-        now = (tmp_path / "Dockerfile").read_text() + (tmp_path / "docker-compose.yml").read_text()
-        assert now.count(f"@{digest}") == len(bare) == 3
-        assert re.sub(rf"@{digest}", "", now) == re.sub(
-            r"@sha256:[0-9a-f]{64}", "", text("Dockerfile") + text("docker-compose.yml")
-        )
+        now = "".join((tmp_path / file).read_text() for file in names)
+        assert now.count(f"@{digest}") == len(images) == 7
+        assert re.sub(rf"@{digest}", "", now) == re.sub(r"@sha256:[0-9a-f]{64}", "", before)
     assert pin("--check").returncode == 0
     docker.unlink()
     shutil.copy(ROOT / "Dockerfile", tmp_path / "Dockerfile")
     checked = pin("--check")
     assert (checked.returncode == 1) == ("@sha256:" not in text("Dockerfile"))
+
+
+def test_the_cluster_is_whole() -> None:
+    """SPEC P597: what names what, as far as it can be known without an engine."""
+    compose, caddy = text("docker-compose.cluster.yml"), text("Caddyfile.cluster")
+    services = set(re.findall(r"^  ([\w-]+):$", compose.split("\nservices:\n")[1].split("\nvolumes:\n")[0], re.M))
+    assert services == {"node-a", "node-b", "database", "blobs", "bucket", "caddy"}
+    assert set(re.findall(r"(node-\w+):8000", caddy)) == {name for name in services if name.startswith("node-")}
+    assert "./Caddyfile.cluster:/etc/caddy/Caddyfile:ro" in compose
+    for name in ("a", "b"):
+        block = re.search(rf"^  node-{name}:\n((?:    .*\n)+)", compose, re.M)
+        assert block is not None
+        assert f"ESKER_NODE: {name}\n" in block[1]
+        assert f"ESKER_ADVERTISE: http://node-{name}:8000\n" in block[1]
+        assert f"- node-{name}:/data\n" in block[1]
+    given = set(re.findall(r"^ +ESKER_(\w+):", compose, re.M)) - {"DOMAIN", "BLOBS"}
+    assert {name.lower() for name in given} <= vars(settings.Settings()).keys()
+    assert "@database/esker" in compose
+    assert "image: postgres:16" in compose
+    volumes = set(re.findall(r"^  ([\w-]+):$", compose.split("\nvolumes:\n")[1], re.M))
+    assert volumes == set(re.findall(r"^      - ([\w-]+):/", compose, re.M))
+    asked = set(re.findall(r"\$\{(\w+):\?", compose))
+    assert all(name in compose.split("x-contained")[0] for name in asked), "the head names what has to be set"
+
+
+def test_caddy_asks_each_node_whether_people_should_be_sent_to_it() -> None:
+    """SPEC P597, P588."""
+    caddy = text("Caddyfile.cluster")
+    assert "health_uri /readyz" in caddy
+    assert '@app.get("/readyz")' in text("backend/esker/server/routes/health.py")
+    assert "lb_policy header Esker-Terrain" in caddy
+    assert "{query.terrain}" in caddy
+    assert "/ws?terrain=" in text("frontend/src/app/session.ts")

@@ -248,8 +248,8 @@ def test_figures_in_the_readme_come_from_committed_results() -> None:
 
 
 FOLDERS = {".ci", "backend", "bench", "docs", "frontend", "shaders", "tests"}
-FILES = re.compile(r"""[A-Z]+(\.md|\.in)?|Caddyfile|Dockerfile|Makefile|build\.in|docker-compose(\.cluster)?\.yml
-    |node\.lock|pyproject\.toml|requirements(-dev|-cluster)?\.lock|setup\.py
+FILES = re.compile(r"""[A-Z]+(\.md|\.in)?|Caddyfile(\.cluster)?|Dockerfile|Makefile|build\.in
+    |docker-compose(\.cluster)?\.yml|node\.lock|pyproject\.toml|requirements(-dev|-cluster)?\.lock|setup\.py
     |\.dockerignore|\.gitignore""", re.VERBOSE)  # fmt: skip
 MOST_BYTES = 2 * 1024 * 1024
 

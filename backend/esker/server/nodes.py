@@ -143,9 +143,13 @@ class Member:
     def __init__(self, settings: Settings) -> None:
         """Opens the database. Raises CannotServe."""
         check(settings)
-        from esker.store.engine.postgres.engine import Postgres  # a server that is alone needs none of its packages
-        from esker.store.engine.postgres.leases import PostgresLeases
-
+        try:  # a server that is alone needs none of these packages
+            from esker.store.engine.postgres.engine import Postgres
+            from esker.store.engine.postgres.leases import PostgresLeases
+        except ModuleNotFoundError as error:
+            raise CannotServe(
+                f"--node needs a package that is not here ({error.name}): install esker[cluster]."
+            ) from None
         key = signing.made_key(settings.cluster_key)
         try:
             self._leases = PostgresLeases(settings.database)

@@ -14,9 +14,9 @@ from typing import Final
 SCHEMA: Final = "esker"
 TABLES: Final = (
     "terrains", "ops", "snapshots", "links", "grids", "moments", "people", "previews", "server", "folds", "folded_ids",
-    "classes", "copies", "pupils", "lessons", "makers",
+    "classes", "copies", "pupils", "lessons", "makers", "codes",
 )  # fmt: skip
-"""Every table of the store. ``leases`` and ``nodes`` are PostgreSQL's own."""
+"""Every table of the store, and that of join codes. ``leases`` and ``nodes`` are PostgreSQL's own."""
 _PART: Final = re.compile(
     r"'(?:[^']|'')*'"  # texts stay as they are
     r"|\?(?P<number>\d*)"

@@ -63,6 +63,10 @@ CREATE INDEX pupils_by_class ON esker.pupils (class, number);
 CREATE TABLE esker.lessons (terrain text PRIMARY KEY, state text NOT NULL);
 CREATE TABLE esker.makers (
   terrain text NOT NULL, thing text NOT NULL, client text NOT NULL, PRIMARY KEY (terrain, thing));
+CREATE TABLE esker.codes (
+  hash bytea PRIMARY KEY, terrain text NOT NULL, role text NOT NULL, link text NOT NULL, expires float8 NOT NULL,
+  until float8 NOT NULL);
+CREATE INDEX codes_by_link ON esker.codes (link);
 CREATE TABLE esker.nodes (
   name text PRIMARY KEY, address text NOT NULL, weight float8 NOT NULL, until timestamptz NOT NULL);
 CREATE TABLE esker.leases (
