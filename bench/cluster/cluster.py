@@ -131,7 +131,7 @@ def _leases(server: Server) -> int:
 
 
 async def _forwarding(servers: list[Server], database: psutil.Process, seconds: float) -> Any:
-    """The same clients at the server that has the terrain, and at the one that passes them on."""
+    """Clients at the server that has the terrain, then as many at the one that passes them on."""
     where = terrain(servers[0].base)
     owner, other = await _owner(servers, where)
     right = await _latency(owner.socket, where)
