@@ -149,7 +149,7 @@ def _disk(folder: Path) -> float:
     for path in folder.rglob("*"):
         try:
             total += path.stat().st_blocks * 512
-        except OSError:  # gone meanwhile
+        except OSError:  # it has gone meanwhile
             continue
     return total / 2**20
 

@@ -87,7 +87,7 @@ class Draw:
     def one(self, scene: _direct.Scene) -> None:
         """Measures a scene. Raises WrongGroundError."""
         if time.monotonic() > self.until:
-            return  # simple enough
+            return  # this is simple enough
         found = measured(scene)
         off = wrong(found)
         if not self.wrong:

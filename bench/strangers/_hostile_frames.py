@@ -48,7 +48,7 @@ class Frames:
         if rng.random() < FATAL:
             return rng.choice((self._framing, self._envelope))()
         if self._last and rng.random() < 0.05:
-            return self._last  # once more, under the same id
+            return self._last  # this is sent once more, under the same id
         self._last = frame(json.dumps(self._ops() if rng.random() < 0.7 else self._other()).encode())
         return self._last
 
@@ -182,7 +182,7 @@ class Frames:
                 head[0] |= rng.choice((0x40, 0x20, 0x10, 0x70))
                 return bytes(head)
             case 6:
-                return b"\x81\x02{}"  # without a mask
+                return b"\x81\x02{}"  # this has no mask
             case 7:
                 size = rng.choice((2**20, 2**40, 2**63 - 1, 2**63, 2**64 - 1))
                 return struct.pack("!BBQ", 0x81, 0xFF, size) + bytes(9)

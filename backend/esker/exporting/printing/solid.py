@@ -40,7 +40,7 @@ def corners(ground: Ground, wanted: ModelOptions) -> Points:
     top[..., 2] = (z - z.min()) * (scale * wanted.exaggeration) + wanted.base_mm
     sw, se, nw, ne = top[:-1, :-1], top[:-1, 1:], top[1:, :-1], top[1:, 1:]
     surface = np.stack([sw, se, ne, sw, ne, nw], axis=2).reshape(-1, 3, 3)
-    rim = np.concatenate([top[0, :-1], top[:-1, -1], top[-1, :0:-1], top[:0:-1, 0]])  # anticlockwise from above
+    rim = np.concatenate([top[0, :-1], top[:-1, -1], top[-1, :0:-1], top[:0:-1, 0]])  # it runs anticlockwise
     after = np.roll(rim, -1, axis=0)
     foot, foot_after = rim * ON_FOOT, after * ON_FOOT
     walls = np.stack([foot, foot_after, after, foot, after, rim], axis=1).reshape(-1, 3, 3)

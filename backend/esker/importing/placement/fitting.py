@@ -169,7 +169,7 @@ def _rotation(across: Points, up: Points, rows: int, cols: int) -> tuple[float, 
     """
     a, b = across * (cols - 1), up * (rows - 1)
     angle = math.atan2(a[1] - b[0], a[0] + b[1])
-    degrees = round(math.degrees(angle), 7) + 0.0  # no -0.0
+    degrees = round(math.degrees(angle), 7) + 0.0  # makes 0.0 of -0.0
     matrix = _turn(degrees)
     steps = (float(across @ matrix[:, 0]), float(up @ matrix[:, 1]))
     if not all(c.MIN_GRID_SPACING_M <= step <= c.MAX_GRID_SPACING_M for step in steps):

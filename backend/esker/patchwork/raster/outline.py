@@ -24,7 +24,7 @@ def bent_edge(rows: int, cols: int, warp: NDArray[np.float64] | None) -> tuple[C
     side = EDGE_POINTS // 4
     share = np.arange(side)[:, None] / side
     straight = np.concatenate([a + (b - a) * share for a, b in itertools.pairwise(corners)])
-    moved = np.round(warped(warp, rows, cols, straight) - straight, DIGITS) + 0.0  # no -0.0
+    moved = np.round(warped(warp, rows, cols, straight) - straight, DIGITS) + 0.0  # makes 0.0 of -0.0
     if np.abs(moved).max() < LEAST_BEND:
         return ()
     return tuple((float(u), float(v)) for u, v in moved)

@@ -52,6 +52,6 @@ export function inkOn(hex: string): "#ffffff" | "#000000" {
   const linear = (c: number): number => (c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4);
   const [r, g, b] = hexColour(hex);
   const luminance = 0.2126 * linear(r) + 0.7152 * linear(g) + 0.0722 * linear(b);
-  // (L + 0.05) / 0.05 against 1.05 / (L + 0.05).
+  // (L + 0.05) / 0.05 is compared with 1.05 / (L + 0.05).
   return luminance + 0.05 > Math.sqrt(0.05 * 1.05) ? "#000000" : "#ffffff";
 }

@@ -29,7 +29,7 @@ export class PatchTree {
   /** Pages that the arrays have room for. */
   capacity = FIRST_PAGES;
 
-  // Per page.
+  // Each page has one of these.
   tileLevel = new Uint8Array(FIRST_PAGES);
   tileX = new Int32Array(FIRST_PAGES);
   tileY = new Int32Array(FIRST_PAGES);
@@ -44,7 +44,7 @@ export class PatchTree {
   /** Share of the tile's entrance that is still to come, 1 to 0: a tile starts out as its parent's surface. */
   fade = new Float32Array(FIRST_PAGES);
 
-  // Per node.
+  // Each node has one of these.
   /** Bounds of the sub-patch and all its known descendants, metres. */
   min = new Float32Array(FIRST_PAGES * SUBS);
   max = new Float32Array(FIRST_PAGES * SUBS);

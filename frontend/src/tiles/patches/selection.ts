@@ -61,12 +61,12 @@ export interface Slots {
 
 export class Selection {
   readonly tree: PatchTree;
-  // Per node of the tree.
+  // Each node of the tree has one of these.
   #split: Uint8Array;
   /** Screen error of a split patch in taus: its children morph towards it as this falls to 1. */
   #ratio: Float32Array;
   readonly #splitList: number[][];
-  // Per page.
+  // Each page has one of these.
   #touched: Uint8Array;
   #touchedCount = 0;
   #slotOf: Int32Array;
@@ -273,7 +273,7 @@ export class Selection {
     const page = tree.childPage(node);
     const childMorph = Math.max(morphOf(this.#ratio[node]!), tree.fade[page]!);
     const first = tree.firstChild(node, page);
-    // Nearest quadrant first: for the horizon, and for early depth rejection.
+    // The nearest quadrant comes first: for the horizon, and for early depth rejection.
     const near = (east < -0.5 * w ? 1 : 0) | (north < -0.5 * w ? 2 : 0);
     for (let flip = 0; flip < 4; flip += 1) {
       const i = near ^ flip;

@@ -64,7 +64,7 @@ export class EskDropZone extends LitElement {
     on("dragenter", (e) => this.#moved(e));
     on("dragover", (e) => this.#moved(e));
     on("dragleave", (e) => {
-      // Out of the window, not from one element to the next.
+      // The pointer went out of the window, not from one element to the next.
       if (e.relatedTarget === null) this.over = false;
     });
     on("drop", (e) => this.#dropped(e));

@@ -162,7 +162,7 @@ class _Names:
             place = 1 if there else 0
             table += struct.pack("<IBBHQQ", self._at[k], s.binding << 4 | s.kind, 0, place, value, s.size)
         count = len(self._order) + 1
-        chain = [0, *range(2, count), 0] if count > 1 else [0]  # one bucket: symbol 1, then 2, and so on
+        chain = [0, *range(2, count), 0] if count > 1 else [0]  # one bucket holds symbol 1, then 2 …
         hashed = struct.pack(f"<III{count}I", 1, count, 1 if count > 1 else 0, *chain)
         hash_at = at + len(table)
         strings_at = hash_at + len(hashed)
