@@ -343,9 +343,8 @@ def _connect(port: int) -> Any:
     from websockets.sync.client import connect
 
     protocols: Any = [c.SUBPROTOCOL]
-    opening: Any = connect(
-        f"ws://127.0.0.1:{port}/ws", subprotocols=protocols, max_size=None, compression=None, proxy=None
-    )
+    options: Any = {"max_size": None, "compression": None, "proxy": None, "ping_interval": None}
+    opening: Any = connect(f"ws://127.0.0.1:{port}/ws", subprotocols=protocols, **options)
     return opening.__enter__()
 
 

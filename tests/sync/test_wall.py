@@ -26,7 +26,8 @@ class Wall:
     def __init__(self, server: LiveServer, **hello: Any) -> None:
         url = f"ws://127.0.0.1:{server.port}/ws/wall"
         protocols: Any = [c.SUBPROTOCOL]
-        self.ws = connect(url, subprotocols=protocols, compression=None, proxy=None).__enter__()  # closed by hand
+        options: Any = {"compression": None, "proxy": None, "ping_interval": None}
+        self.ws = connect(url, subprotocols=protocols, **options).__enter__()  # closed by hand
         self.copies: dict[int, dict[str, Any]] = {}
         self.state: dict[str, Any] = {}
         self.decoders: dict[int, FrameDecoder] = {}
