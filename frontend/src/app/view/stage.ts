@@ -32,6 +32,7 @@ import { QualityChoice, TAU_PX } from "../device/quality-choice.ts";
 import { largeLetters, ViewChoices } from "../device/view-choices.ts";
 import { Groundwork } from "../layers/groundwork.ts";
 import { riverLines } from "../layers/river-lines.ts";
+import { StillGround } from "../layers/still-ground.ts";
 import type { OpenTerrain } from "../open-terrain.ts";
 import { gridTransport } from "../server/grid-transport.ts";
 import { Arrival } from "./eye/arrival.ts";
@@ -106,6 +107,7 @@ export class Stage {
   /** The ground that the eye may not dip under. */
   readonly #floor: Ground;
   #fresh: FreshTiles | null = null;
+  readonly #still: StillGround;
   readonly #follows: Following;
   readonly #arrival: Arrival;
   #disposed = false;
@@ -192,12 +194,13 @@ export class Stage {
       author: () => session.me.value.name,
     });
     this.#strokes = computed(() => this.#visuals());
+    this.#still = new StillGround(this.tiles.revision, () => this.shown.freeze());
     this.#rivers = computed(() => {
       const settings = session.doc.doc.value?.settings;
       const set = session.rivers.value;
       if (!settings?.rivers || set === null) return [];
-      this.tiles.revision.value; // rivers lie on the ground and move with it
-      return riverLines(set, settings.wetness, this.shown.freeze());
+      const ground = this.#still.ground.value;
+      return ground === null ? [] : riverLines(set, settings.wetness, ground);
     });
     this.#cursors = computed(() => cursorVisuals(session.people.value));
     this.#influence = computed(() => {
@@ -310,6 +313,7 @@ export class Stage {
     this.#fresh?.stop();
     this.loop.stop();
     for (const stop of this.#stops) stop();
+    this.#still.stop();
     this.quietStrokes.stop();
     this.groundwork.dispose();
     this.instruments.dispose();
