@@ -276,7 +276,8 @@ def test_a_server_without_descriptors_says_so_once_and_comes_back(tmp_path: Path
         known = http.client.HTTPConnection("127.0.0.1", port, timeout=PATIENCE)
         taken: list[socket.socket] = []
         said: list[bytes] = []
-        listening = threading.Thread(target=lambda: said.extend(iter(process.stderr.readline, b"")), daemon=True)
+        stderr = process.stderr
+        listening = threading.Thread(target=lambda: said.extend(iter(stderr.readline, b"")), daemon=True)
         listening.start()
 
         def healthy() -> bool:
