@@ -16,7 +16,7 @@ NODE_OK := node -e 'const [a,b]=process.versions.node.split(".").map(Number);pro
 PARTS ?= 2
 PEOPLE := tests/e2e
 DRAWN := tests/golden tests/gpu tests/render
-COMPUTED := tests/solver tests/golden tests/gpu tests/synthesis tests/patchwork tests/render tests/property
+COMPUTED := tests/solver tests/golden tests/gpu tests/synthesis tests/patchwork tests/flow tests/render tests/property
 SOLVED := tests/solver tests/sync tests/synthesis
 # Python shows a traceback when Ctrl-C comes while it starts itself; held back, the signal waits for our first line.
 HOLDING := $(shell env --block-signal=INT true 2>/dev/null && echo env --block-signal=INT)
@@ -35,23 +35,25 @@ test: ## set up, then run every check and every test
 # So many parts at a time, the longest first. Who waits for a page to rest leaves a core idle; with three at a time two cores
 # are never idle, but pages draw frames for nobody while servers wait, and the whole takes a minute longer. The checks and
 # the page come early and compile no loops: meanwhile the people's servers do, for the parts that follow (they are kept).
+# What computes is nicer than the people's pages and servers: they have what they need at once, it has the rest.
 #
 # What failed is run once more. A test that passes then depends on what else the machine did: it is a defect of the test, and
 # the output names it, but it says nothing against the change. What is wrong fails twice.
-tested = $(BIN)/python -m pytest --durations=12 -o cache_dir=.pytest_cache/$(1) $(2) || { echo "Once more, what failed:"; \
-  $(BIN)/python -m pytest -o cache_dir=.pytest_cache/$(1) --last-failed --last-failed-no-failures=none $(2); }
+NICE := $(shell command -v nice >/dev/null && echo nice -n 10)
+tested = $(3) $(BIN)/python -m pytest --durations=12 -o cache_dir=.pytest_cache/$(1) $(2) || { echo "Once more, what failed:"; \
+  $(3) $(BIN)/python -m pytest -o cache_dir=.pytest_cache/$(1) --last-failed --last-failed-no-failures=none $(2); }
 
 test-people:
 	$(call tested,people,$(PEOPLE))
 
 test-drawn:
-	$(call tested,drawn,$(DRAWN))
+	$(call tested,drawn,$(DRAWN),$(NICE))
 
 test-solved:
-	$(call tested,solved,$(SOLVED))
+	$(call tested,solved,$(SOLVED),$(NICE))
 
 test-rest:
-	$(call tested,rest,$(PEOPLE:%=--ignore=%) $(DRAWN:%=--ignore=%) $(SOLVED:%=--ignore=%))
+	$(call tested,rest,$(PEOPLE:%=--ignore=%) $(DRAWN:%=--ignore=%) $(SOLVED:%=--ignore=%),$(NICE))
 
 # What is computed, again as on narrower processors, one after the other. What depends on the processor shows here.
 LEVELS ?= haswell penryn
