@@ -27,11 +27,11 @@ from esker.solve.refine import correction, pocket
 from esker.solve.refine.base_blocks import BaseWindows
 
 GRADIENT_SWEEPS: Final = 8
-FIRST_SWEEPS: Final = 28
+FIRST_SWEEPS: Final = 36
 """Sweeps of the height before its correction, which sees what they leave."""
 LAST_SWEEPS: Final = 4
 """Sweeps of the height after its correction. All counts are even, and as large as whole bins have room for: tiles begin
-on bins, so that a halo of 111 takes no more of them than one of 97. docs/decisions/0060-pockets.md."""
+on bins, so that a halo of 127 takes no more of them than one of 113. docs/decisions/0060-pockets.md."""
 GRADIENT_LOW: Final = 0.25
 """The sweeps of the gradient damp errors from here upward."""
 CORRECTED: Final = LAST_SWEEPS + pocket.REACH

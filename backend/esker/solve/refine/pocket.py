@@ -7,9 +7,9 @@ from typing import Final
 
 COARSENINGS: Final = 3
 """From a level to the grid on which it is corrected: every eighth sample."""
-SUBDOMAIN: Final = 6
+SUBDOMAIN: Final = 7
 """Nodes of a subdomain on each side of its middle."""
-BEYOND: Final = 0.88
+BEYOND: Final = 0.92
 """The correction outside a subdomain, as a share of that at its border."""
 RELAXATIONS: Final = 24
 """Red-black over-relaxations of a subdomain."""
