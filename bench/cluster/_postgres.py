@@ -153,9 +153,9 @@ class Postgres:
             left.unlink(missing_ok=True)
 
     def close(self) -> None:
-        """Ends the server and removes its folder."""
+        """Ends the server at once, and removes its folder."""
         if self._process is not None and self._process.poll() is None:
-            self._process.send_signal(signal.SIGINT)
+            self._process.send_signal(signal.SIGQUIT)
             try:
                 self._process.wait(20)
             except subprocess.TimeoutExpired:

@@ -83,3 +83,9 @@ def copied(journal: Journal) -> Path:
     made = journal.backup()
     assert made is not None
     return made
+
+
+def postgres(journal: Journal) -> Postgres:
+    """The engine of a journal that lies in a shared database."""
+    assert isinstance(journal.engine, Postgres)
+    return journal.engine

@@ -79,7 +79,9 @@ def server(tmp_path: Path) -> Iterator[LiveServer]:
 
 
 def _fill(server: LiveServer, free: Callable[[Space], int]) -> None:
-    space = server.assembly._space
+    storing = server.assembly._storing
+    assert storing is not None
+    space = storing.space
     space._usage = lambda _: (1 << 40, 0, free(space))
     space._free, space._looked = free(space), float("-inf")
 

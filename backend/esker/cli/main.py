@@ -35,6 +35,8 @@ def main(argv: list[str] | None = None) -> int:
         return _run("esker.cli.import_files", arguments[1:])
     if arguments[:1] == ["restore"]:
         return _run("esker.cli.restore", arguments[1:])
+    if arguments[:1] == ["move"]:
+        return _run("esker.cli.move", arguments[1:])
     if arguments[:1] in (["list"], ["link"]):
         return _run("esker.cli.keep", arguments)
     if arguments[:1] in (["history"], ["fork"]):
@@ -83,6 +85,7 @@ def _parser() -> argparse.ArgumentParser:
     serve.add_argument("--advertise", metavar="URL", help="where the other nodes reach this one")
     serve.add_argument("--log-level", choices=("debug", "info", "warning", "error"))
     commands.add_parser("restore", help="go on with a copy of the database (see esker restore --help)", add_help=False)
+    commands.add_parser("move", help="take all terrains to another database (see esker move --help)", add_help=False)
     commands.add_parser("list", help="the terrains that a server keeps (see esker list --help)", add_help=False)
     commands.add_parser("link", help="links to a terrain of this computer (see esker link --help)", add_help=False)
     commands.add_parser("import", help="bring in elevation files (see esker import --help)", add_help=False)

@@ -113,12 +113,15 @@ class Exports:
         maker: Maker,
         plant: Plant = Plant(),  # noqa: B008  (immutable)
         *,
+        fetch: Callable[[c.Document], object] = lambda _: None,
         now: Callable[[], float] = time.monotonic,
         kept_seconds: float = KEPT_SECONDS,
         kept_bytes: int = KEPT_BYTES,
     ) -> None:
         """``folder``: for what is made; what an earlier server left there is removed. ``grids``: where the rasters of
-        layers lie, by digest. ``maker``: ``run.make``, or another for tests. Raises OSError."""
+        layers lie, by digest; ``fetch`` brings those of a document there. ``maker``: ``run.make``, or another for
+        tests. Raises OSError."""
+        self._fetch = fetch
         self._hub, self._folder, self._grids, self._maker, self._plant = hub, folder, grids, maker, plant
         self._now, self._kept_seconds, self._kept_bytes = now, kept_seconds, kept_bytes
         self._jobs: dict[str, Job] = {}
@@ -140,6 +143,7 @@ class Exports:
             raise Cannot(400, "malformed", sentence)
         self._check(terrain, person, who, link)
         document = await self._hub.document(terrain, wanted.at, who)
+        await asyncio.to_thread(self._fetch, document)
         if link.role == "view":
             document = shown(document)
         self._hub.door.demand(link)

@@ -199,10 +199,11 @@ class Imports:
         document = await self._hub.document(terrain, None, who)
         if len(document.layers) >= c.MAX_LAYERS:
             raise Cannot(409, "too_many_layers", f"A terrain holds at most {c.MAX_LAYERS} elevation layers.")
-        self._check_quota(terrain, 1)
+        await self._check_quota(terrain, 1)
 
-    def _check_quota(self, terrain: str, more: int) -> None:
-        if self._grids.size(self._hub.journal.grids(terrain)) + more > self._quota:
+    async def _check_quota(self, terrain: str, more: int) -> None:
+        stored = await asyncio.to_thread(lambda: self._grids.size(self._hub.journal.grids(terrain)))
+        if stored + more > self._quota:
             raise Cannot(
                 409, "quota", f"The elevation data of a terrain may take {self._quota >> 20} MiB on this server."
             )
@@ -361,8 +362,8 @@ class Imports:
                 name=job.file,
             )
         size = sum(file.stat().st_size for file in (job.work / "raster").iterdir())
-        if not self._grids.has(layer.content):
-            self._check_quota(job.terrain, size)
+        if not await asyncio.to_thread(self._grids.has, layer.content):
+            await self._check_quota(job.terrain, size)
             self._check_space(job)
         return layer
 

@@ -101,7 +101,7 @@ class Classes:
 
     async def _source(self, terrain: str, at: int | None, who: Who) -> c.Document:
         document = await self.hub.document(terrain, at, who)
-        if not all(self.grids.has(layer.content) for layer in document.layers):
+        if not await asyncio.to_thread(self.grids.has_all, document):
             raise Cannot(409, "no_grid", "An elevation grid of that time is not on this server any more.")
         return document.model_copy(update={"deleted": (), "deleted_layers": ()})
 

@@ -34,6 +34,7 @@ from esker.server.routes.metrics import Gauges
 from esker.server.routes.previews import Pictures
 from esker.server.settings import Settings
 from esker.server.starting import CannotServe, FrontDoor, Stopping, WaitingRoom
+from esker.server.storing import Storing
 from esker.server.wire.door import BACKLOG, Door
 from esker.server.wire.front import Front, Proxies, hosts, local_names
 from esker.server.wire.http import Connections, HttpProtocol, bounded
@@ -51,12 +52,11 @@ from esker.solve.opencl.faults import DeviceError, NoDeviceError, OutOfDeviceMem
 from esker.solve.solver import Solver as OpenClSolver
 from esker.store.access import Access, TooManyLinks
 from esker.store.claims import Claims, key_in
-from esker.store.engine.lock import DataLock, InUse
-from esker.store.grids import FOLDER, GridStore
+from esker.store.engine.ports import Engine
+from esker.store.grids import FOLDER
 from esker.store.journal import Journal, Unwritable
 from esker.store.previews import PreviewTokens
-from esker.store.space import Space
-from esker.store.upkeep.care import Care, sweep_parts
+from esker.store.upkeep.care import Care
 from esker.tiles.delivery import ClientTiles, TileServer
 from esker.tiles.watcher import Watcher
 
@@ -174,7 +174,8 @@ class Assembly:
         self._worker: Worker | None = None
         self._tiles: _Tiles | None = None
         self._journal: Journal | None = None
-        self._lock: DataLock | None = None
+        self._storing: Storing | None = None
+        self._server: _Server | None = None
         self._care: Care | None = None
         self.member: Member | None = None
         """This server as a node, where several share the database."""
@@ -195,18 +196,10 @@ class Assembly:
 
     def _open(self, make_solver: SolverFactory) -> None:
         settings = self.settings
-        try:
-            self._lock = DataLock(settings.data)
-        except InUse as error:
-            raise CannotServe(str(error)) from None
-        sweep_parts(settings.data)
-        self._space = Space(settings.data, settings.storage_mb << 20)
-        member = self.member = Member(settings) if settings.node else None
-        shared: dict[str, Any] = {} if member is None else {"now": member.date, "engine": member.engine}
-        self._journal = Journal(settings.data, space=self._space, quota=settings.history_quota_mb << 20, **shared)
-        self._grids = GridStore(settings.data, self._space)
+        self._storing = Storing(settings, self._lost, self._join if settings.node else None)
+        self._journal, self._grids = self._storing.journal, self._storing.grids
+        member = self.member
         self.private = Private(settings.data)
-        self._grids.sweep(self._journal.grids(), forgotten=self._journal.may_sweep())
         self._worker = Worker(
             make_solver, settings.device, candidates=lambda: candidates(settings.threads), diagnose=diagnose
         )
@@ -239,6 +232,11 @@ class Assembly:
             self._gauges.cluster = None if member is None else member.cluster
         self._care = Care(self._journal, self.hub.deletion, self._grids)
 
+    def _join(self) -> tuple[Engine, Callable[[], float]]:
+        """The database of this server as one of several, and the date that they have together. Raises CannotServe."""
+        member = self.member = Member(self.settings)
+        return member.engine, member.date
+
     def _compile(self, kernels: bool) -> None:
         """Compiles loops and kernels, each in a child process where they are not compiled yet, side by side."""
         stopped, compiling = threading.Event(), threading.Event()
@@ -266,14 +264,20 @@ class Assembly:
         """Returns the HTTP server, to be run with ``run``."""
         assert self._journal is not None, "an assembly is open until it is closed"
         pictures = Pictures(
-            Previews(self.settings.data / "previews", self.settings.device, grids=self.settings.data / FOLDER),
+            Previews(
+                self.settings.data / "previews",
+                self.settings.device,
+                grids=self.settings.data / FOLDER,
+                fetch=self._grids.fetch_all,
+            ),
             PreviewTokens(self._journal),
             self.settings.public_url.rstrip("/") if self.settings.public_url else None,
         )
         self.imports = Imports(self.hub, self._grids, importing, quota_bytes=self.settings.grid_quota_mb << 20)
         settings = self.settings
         plant = Plant(settings.device, settings.threads, settings.level, settings.refine)
-        self.exports = Exports(self.hub, settings.data / "exports", self._grids.folder, exporting.make, plant)
+        folder, fetch = self._grids.folder, self._grids.fetch_all
+        self.exports = Exports(self.hub, settings.data / "exports", folder, exporting.make, plant, fetch=fetch)
         if self.member is not None:
             self.private.write(self.private.open().model_copy(update={"key": self.member.keeper}))
         key = Key(self.private.open().key)
@@ -306,6 +310,7 @@ class Assembly:
 
     def run(self, server: _Server) -> None:
         """Serves until the server is told to stop."""
+        self._server = server
         sys.setswitchinterval(SWITCH_SECONDS)
         gc.collect()
         gc.freeze()
@@ -319,6 +324,11 @@ class Assembly:
             system.on_stop(lambda *_: setattr(server, "should_exit", True))
         server.run(sockets=[self._listener])
 
+    def _lost(self) -> None:
+        """Another server has the database."""
+        if self._server is not None:
+            self._server.should_exit = True
+
     def close(self) -> None:
         """Stops the threads, commits what is queued, frees the port."""
         if self._care is not None:
@@ -328,12 +338,10 @@ class Assembly:
         if self._tiles is not None:
             self._tiles.hydrology.close()
             self._tiles.scorer.close()
-        if self._journal is not None:
-            self._journal.close()
+        if self._storing is not None:
+            self._storing.close()
         if self.member is not None:
             self.member.close()
-        if self._lock is not None:
-            self._lock.release()
         self._listener.close()
 
 

@@ -51,6 +51,8 @@ class Settings:
     log_level: str = "info"
     database: str = field(default="", repr=False)
     """PostgreSQL that several servers share: postgresql://user@host/name. Empty: SQLite in the data folder."""
+    blobs: str = ""
+    """Where servers have elevation grids together: s3://bucket/prefix. Empty: each in its data folder."""
     node: str = ""
     """The name of this server among several over one database. Empty: it is alone."""
     advertise: str = ""
@@ -75,6 +77,8 @@ class Settings:
         for name, (low, high) in bounds.items():
             if not low <= getattr(self, name) <= high:
                 raise BadSetting(f"{name} must lie between {low} and {high}, not {getattr(self, name)}.")
+        if self.database and not self.database.startswith(("postgresql://", "postgres://")):
+            raise BadSetting("ESKER_DATABASE must begin with postgresql://; without it the data folder is used.")
         if self.threads is not None and self.threads < 1:
             raise BadSetting("threads must be at least 1.")
         if self.log_level not in ("debug", "info", "warning", "error"):

@@ -70,12 +70,14 @@ class Previews:
         device: str | None = None,
         *,
         grids: Path | None = None,
+        fetch: Callable[[Document], object] = lambda _: None,
         painter: Painter | None = None,
         executor: Callable[[], Executor] | None = None,
         now: Callable[[], float] = time.monotonic,
     ) -> None:
         """``folder``: where pictures are kept, made when needed. ``grids``: where the rasters of elevation layers lie,
-        by digest. ``painter``, ``executor``, ``now``: others, for tests."""
+        by digest; ``fetch`` brings those of a document there. ``painter``, ``executor``, ``now``: others, for tests."""
+        self._fetch = fetch
         self._folder, self._device, self._now = folder, device, now
         self._painter = painter or partial(paint, grids=grids)
         self._new_executor = executor or DrawingProcess
@@ -158,6 +160,7 @@ class Previews:
     async def _draw(self, document: Document) -> Path:
         async with self._turn:
             started = self._now()
+            await asyncio.to_thread(self._fetch, document)
             data = await self._paint(await asyncio.to_thread(document_json, document))
             self._drawn[document.id] = self._now()
             log.info("picture of %s at clock %d in %.1f s", document.id, document.clock, self._now() - started)

@@ -23,13 +23,15 @@ from esker.session.room.door import Deleted
 from esker.session.room.hub import Hub
 from esker.session.room.replicas import viewing
 from esker.store.access import Link
-from esker.store.journal import Unwritable
+from esker.store.engine.ports import Moved, Unknown, Unwritable
 
 log = logging.getLogger("esker.server")
 T = TypeVar("T")
 
 FULL: Final = "The server has no room for this (is its disk full?). Nothing was changed."
 UNWRITABLE: Final = "The server cannot save anything at the moment. Nothing was changed; try again later."
+MOVED: Final = "This terrain is just being moved to another server. Try again in a moment."
+UNKNOWN: Final = "The database went away meanwhile: nobody knows whether this was done. Look first."
 AGAIN_SECONDS: Final = 30
 NO_ROOM: Final = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG})
 
@@ -88,6 +90,16 @@ def add_errors(app: FastAPI) -> None:
         if error.full:
             return answer(507, "storage", FULL, AGAIN_SECONDS)
         return answer(503, "unavailable", UNWRITABLE, AGAIN_SECONDS)
+
+    @app.exception_handler(Moved)
+    async def moved(request: Request, error: Moved) -> JSONResponse:
+        log.info("%s %s: %s", request.method, _path(request), error)
+        return answer(503, "moved", MOVED, AGAIN_SECONDS)
+
+    @app.exception_handler(Unknown)
+    async def unknown(request: Request, error: Unknown) -> JSONResponse:
+        log.error("%s %s: %s", request.method, _path(request), error)
+        return answer(503, "unknown", UNKNOWN, AGAIN_SECONDS)
 
     @app.exception_handler(Exception)
     async def failed(request: Request, error: Exception) -> JSONResponse:

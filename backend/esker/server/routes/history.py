@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Annotated, Any, Final
@@ -72,7 +73,7 @@ def add_history(app: FastAPI, hub: Hub, grids: GridStore) -> None:
     async def fork(request: Request, terrain: str, link: EditorLink, body: NewFork) -> dict[str, Any]:
         limited(request, app.state.new_terrains, "new terrains came")
         document = await hub.document(terrain, body.at, asker(request, link))
-        if not all(grids.has(layer.content) for layer in document.layers):
+        if not await asyncio.to_thread(grids.has_all, document):
             raise Cannot(409, "no_grid", "An elevation grid of that time is not on this server any more.")
         hub.door.demand(link)
         born, made, secret = await hub.create(_copy(document, body.title), asker(request, link))

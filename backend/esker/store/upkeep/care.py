@@ -101,7 +101,9 @@ class Care:
 
     def _sweep(self) -> None:
         if self._journal.may_sweep():
-            self._grids.throw_forgotten(self._journal.grids())
+            named = self._journal.grids()
+            self._grids.throw_forgotten(named)
+            self._grids.throw_old_objects(named)
         self._grids.empty_trash()
 
     def _hear(self, terrain: str) -> None:

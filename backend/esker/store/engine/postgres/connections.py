@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from typing import Any, Final
 
 import psycopg
@@ -65,11 +65,18 @@ def connect(url: str) -> Database:
         raise Unreachable(f"the database {place_of(url)} does not answer ({first_line(error)})") from None
 
 
-def pool(url: str, name: str, most: int) -> ConnectionPool[Database]:
-    """Connections that are shared by threads."""
+def pool(url: str, name: str, most: int, *, checked: bool = False) -> ConnectionPool[Database]:
+    """Connections that are shared by threads. ``checked``: whether each is asked for a word before it is given out."""
     more = parameters(url)
     return ConnectionPool(
-        more.pop("conninfo"), kwargs=more, min_size=1, max_size=most, timeout=POOL_SECONDS, name=name, open=True
+        more.pop("conninfo"),
+        kwargs=more,
+        min_size=1,
+        max_size=most,
+        timeout=POOL_SECONDS,
+        name=name,
+        open=True,
+        check=ConnectionPool.check_connection if checked else None,
     )
 
 
@@ -148,7 +155,7 @@ class Writing:
     def _run(self, sql: str, values: Sequence[Any]) -> Coming:
         self.statements += not sql.startswith("SELECT")
         cursor = self._db.cursor()
-        cursor.execute(sql, values)
+        cursor.execute(sql, _storable(values))
         return Coming(cursor, self._pipeline)
 
 
@@ -195,7 +202,9 @@ class Reading:
         """Raises Unreachable."""
         try:
             return self._once(sql, values)
-        except Unreachable:  # the first connection may have been one of before the database was started again
+        except Unreachable:  # the connection may be one of before the database was started again, and so may others
+            with reached():
+                self._pool.check()
             return self._once(sql, values)
 
     def _once(self, sql: str, values: Sequence[Any]) -> Found:
@@ -241,22 +250,42 @@ class Readers:
         if getattr(self._pinned, "db", None) is not None:
             yield self._pinned.db
             return
-        with reached(), self._pool.connection() as db, db.transaction():
-            db.execute("SET TRANSACTION ISOLATION LEVEL REPEATABLE READ READ ONLY")
+        with reached(), ExitStack() as stack:
+            try:
+                db = self._begin(stack)
+            except psycopg.OperationalError:
+                self._pool.check()
+                db = self._begin(stack)
             self._pinned.db = Pinned(db)
             try:
                 yield self._pinned.db
             finally:
                 self._pinned.db = None
 
+    def _begin(self, stack: ExitStack) -> Database:
+        """A connection in a transaction, until the stack is left."""
+        with ExitStack() as tried:
+            db = tried.enter_context(self._pool.connection())
+            tried.enter_context(db.transaction())
+            db.execute("SET TRANSACTION ISOLATION LEVEL REPEATABLE READ READ ONLY")
+            stack.push(tried.pop_all())
+        return db
+
     def close(self) -> None:
         """Closes the connections."""
         self._pool.close()
 
 
+def _storable(values: Sequence[Any]) -> Sequence[Any]:
+    """The values without the one character that PostgreSQL's texts cannot have."""
+    if any(type(value) is str and "\0" in value for value in values):
+        return [value.replace("\0", "\ufffd") if type(value) is str else value for value in values]
+    return values
+
+
 def run(db: Database, sql: str, values: Sequence[Any]) -> Found:
     """Runs a statement of the store and takes all that it gives."""
-    cursor = db.execute(translated(sql), values)
+    cursor = db.execute(translated(sql), _storable(values))
     return Found(cursor.fetchall() if cursor.description is not None else [], cursor.rowcount)
 
 

@@ -46,7 +46,7 @@ class PostgresLeases:
     """``Leases`` by a few connections of their own: neither a slow query nor a long commit keeps a renewal waiting."""
 
     def __init__(self, url: str) -> None:
-        self._pool = pool(url, "leases", CONNECTIONS)
+        self._pool = pool(url, "leases", CONNECTIONS, checked=True)
 
     def register(self, node: Node, seconds: float) -> None:
         with self._connection() as db:

@@ -7,6 +7,7 @@ and a kill leaves the format before. An older release refuses a newer format, an
 
 from __future__ import annotations
 
+import time
 from typing import Final
 
 import psycopg
@@ -18,10 +19,10 @@ from esker.store.upkeep.migrations import FORMAT, SWEEP_AFTER
 
 LOCK: Final = 0x65736B6572
 """The key of the lock: "esker" in ASCII."""
-FIRST: Final = 7
+FIRST: Final = 8
 """The first format that PostgreSQL has had; what came before was SQLite's alone."""
 
-_FORMAT_7: Final = """
+_FORMAT_8: Final = """
 CREATE TABLE esker.server (key text PRIMARY KEY, value text NOT NULL);
 CREATE TABLE esker.terrains (id text PRIMARY KEY, created float8 NOT NULL, deleted float8);
 CREATE INDEX terrains_deleted ON esker.terrains (deleted) WHERE deleted IS NOT NULL;
@@ -74,7 +75,7 @@ CREATE TABLE esker.leases (
   WITH (fillfactor = 50);
 
 CREATE FUNCTION esker.json_extract(document text, path text) RETURNS text LANGUAGE sql IMMUTABLE AS
-  $$ SELECT document::json #>> string_to_array(substr(path, 3), '.') $$;
+  $$ SELECT replace(document, '\\u0000', '\\ufffd')::json #>> string_to_array(substr(path, 3), '.') $$;
 
 CREATE FUNCTION esker.ops_used_once() RETURNS trigger LANGUAGE plpgsql AS $$
 BEGIN
@@ -103,7 +104,7 @@ CREATE TRIGGER terrain_gone AFTER DELETE ON esker.terrains FOR EACH ROW EXECUTE 
 """``leases``: who has a terrain, in which taking, and until when by the database's clock; a row for every terrain, so
 that a write for one that nobody has can lock it. ``nodes``: the servers."""
 
-STEPS: Final[dict[int, str]] = {7: _FORMAT_7}
+STEPS: Final[dict[int, str]] = {FIRST: _FORMAT_8}
 """What makes the format of this number of the one before; the first makes it of nothing."""
 
 
@@ -116,13 +117,13 @@ def format_of(db: Database) -> int:
     return 0 if row is None else int(row[0])
 
 
-def migrate(url: str, now: float) -> None:
+def migrate(url: str, now: float | None = None) -> None:
     """Brings a database to the present format. Raises Unreachable, BadDatabase."""
     with connect(url) as db:
         try:
             with db.transaction():
                 db.execute("SELECT pg_advisory_xact_lock($1)", (LOCK,))
-                _migrate(db, url, now)
+                _migrate(db, url, time.time() if now is None else now)
         except psycopg.Error as error:
             raise BadDatabase(f"The database {place_of(url)} cannot be prepared: {first_line(error)}.") from error
 
