@@ -17,12 +17,13 @@ PARTS ?= 2
 PEOPLE := tests/e2e
 DRAWN := tests/golden tests/gpu tests/render
 COMPUTED := tests/solver tests/golden tests/gpu tests/synthesis tests/patchwork tests/flow tests/render tests/property
-SOLVED := tests/solver tests/sync tests/synthesis
+SOLVED := tests/solver tests/synthesis
+ROOMS := tests/sync
 # Python shows a traceback when Ctrl-C comes while it starts itself; held back, the signal waits for our first line.
 HOLDING := $(shell env --block-signal=INT true 2>/dev/null && echo env --block-signal=INT)
 SOURCES := $(shell find frontend/src shaders frontend/public -type f 2>/dev/null)
 
-.PHONY: run test test-levels test-people test-drawn test-solved test-rest test-page pictures wheel audit check check-python check-page format generate lock setup browser clean
+.PHONY: run test test-levels test-people test-drawn test-rooms test-solved test-rest test-page pictures wheel audit check check-python check-page format generate lock setup browser clean
 
 run: setup frontend/dist/index.html ## set up, build, start the server, print the link of a terrain
 	@exec $(HOLDING) $(BIN)/python -m esker serve $(ARGS)
@@ -30,7 +31,7 @@ run: setup frontend/dist/index.html ## set up, build, start the server, print th
 test: ## set up, then run every check and every test
 	@$(MAKE) --no-print-directory -j2 $(STAMPS)/dev browser frontend/dist/index.html
 	@if [ -n "$(ARGS)" ]; then $(MAKE) --no-print-directory -j2 check; exec $(BIN)/python -m pytest $(ARGS); \
-	else exec $(MAKE) --no-print-directory -j$(PARTS) test-people check test-page test-solved test-rest test-drawn; fi
+	else exec $(MAKE) --no-print-directory -j$(PARTS) test-people check test-page test-rooms test-solved test-rest test-drawn; fi
 
 # So many parts at a time, the longest first. Who waits for a page to rest leaves a core idle; with three at a time two cores
 # are never idle, but pages draw frames for nobody while servers wait, and the whole takes a minute longer. The checks and
@@ -50,11 +51,14 @@ test-people:
 test-drawn:
 	$(call tested,drawn,$(DRAWN),$(NICE))
 
+test-rooms:
+	$(call tested,rooms,$(ROOMS),$(NICE))
+
 test-solved:
 	$(call tested,solved,$(SOLVED),$(NICE))
 
 test-rest:
-	$(call tested,rest,$(PEOPLE:%=--ignore=%) $(DRAWN:%=--ignore=%) $(SOLVED:%=--ignore=%),$(NICE))
+	$(call tested,rest,$(PEOPLE:%=--ignore=%) $(DRAWN:%=--ignore=%) $(SOLVED:%=--ignore=%) $(ROOMS:%=--ignore=%),$(NICE))
 
 # What is computed, again as on narrower processors, one after the other. What depends on the processor shows here.
 LEVELS ?= haswell penryn

@@ -88,8 +88,9 @@ def against(figures: dict[str, Any], ours: dict[str, Any]) -> dict[str, float]:
     return out
 
 
-def peers(finest: int, threads: dict[str, Any], gib: float, seconds: float, wanted: str | None) -> dict[str, Any]:
-    """All peers on all sizes, each beside our own figures of this run with every number of threads."""
+def peers(finest: int, threads: dict[str, Any], options: argparse.Namespace) -> dict[str, Any]:
+    """The peers on all sizes, each beside our own figures of this run with every number of threads."""
+    wanted = options.device
     scene = TIMED[0]
     levels: dict[str, Any] = {}
     for level in range(min(TIMES_FROM, finest), finest + 1):
@@ -102,9 +103,9 @@ def peers(finest: int, threads: dict[str, Any], gib: float, seconds: float, want
         with tempfile.TemporaryDirectory(prefix="esker-bench-") as folder:
             file = Path(folder) / "problem.npz"
             row["unknowns"] = apart(problem, level, scene, ours["1"], file, wanted)
-            for name in _peers.NAMES:
+            for name in options.peer or _peers.NAMES:
                 say(f"peers {size}²: {name} ...")
-                figures = _peers.run(name, file, gib, seconds)
+                figures = _peers.run(name, file, options.peer_gib, options.peer_seconds)
                 figures["times_ours"] = {count: against(figures, mine) for count, mine in ours.items()}
                 row[name] = figures
                 say(f"peers {size}²: {name}: {figures.get('failed', figures['times_ours'])}")
@@ -150,11 +151,7 @@ def main(argv: list[str]) -> int:
         put("threads", {str(count): apart(times, count, upto(QUICK_TIMES), options.device) for count in counts}, now)
     if "peers" in parts:
         now = started()
-        put(
-            "peers",
-            peers(upto(QUICK_PEERS), result["threads"], options.peer_gib, options.peer_seconds, options.device),
-            now,
-        )
+        put("peers", peers(upto(QUICK_PEERS), result["threads"], options), now)
     if not options.output:
         sys.stdout.write(json.dumps(result, indent=1 if options.json else None) + "\n")
     return 0
@@ -172,6 +169,7 @@ def _parser() -> argparse.ArgumentParser:
     p.add_argument("--finest", type=int, choices=range(1, MAX_LEVEL + 1), default=MAX_LEVEL, metavar="N", help=levels)
     p.add_argument("--scene", action="append", choices=gallery.NAMES, metavar="NAME", help="accuracy of these alone")
     p.add_argument("--maps", type=Path, metavar="FILE.npz", help=f"write error maps (committed: {MAPS})")
+    p.add_argument("--peer", action="append", choices=_peers.NAMES, help="these alone (default: all)")
     p.add_argument("--peer-gib", type=float, default=14.0, metavar="GIB", help="memory limit of a peer (default 14)")
     p.add_argument("--peer-seconds", type=float, default=600.0, metavar="S", help="its time limit (default 600)")
     return p

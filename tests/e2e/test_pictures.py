@@ -2,6 +2,7 @@
 
 They are tests too: a picture without contrast, or an animation in which nothing rises, fails. The large picture takes a
 software adapter a minute or two and shows nothing that other tests do not ask for, so only `make pictures` draws it.
+There alone the animation is large.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import json
 import os
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,6 +22,7 @@ from tests.e2e.conftest import PATIENCE_MS, ROOT, Server, Visitor, Visitors
 from tests.e2e.hands import COARSE, heights, on_screen, polyline, press_and_move, wait_settled
 
 PICTURES = ROOT / "tests" / "artifacts" / "pictures"
+FOR_README = "ESKER_PICTURES" in os.environ
 HERO_VIEW = {"eye": [260.0, 240.0, 640.0], "target": [2000.0, 2350.0, 330.0]}
 HERO_STROKE = [(470.0, 690.0), (560.0, 590.0), (600.0, 600.0), (690.0, 500.0), (740.0, 530.0), (850.0, 690.0)]
 """Window pixels of a silhouette, foot to foot."""
@@ -57,7 +60,7 @@ def open_at(visitor: Visitor, terrain: str, secret: str, view: dict[str, list[fl
     visitor.wait(near, view["eye"][:2])
 
 
-@pytest.mark.skipif("ESKER_PICTURES" not in os.environ, reason="a picture for the README: make pictures")
+@pytest.mark.skipif(not FOR_README, reason="a picture for the README: make pictures")
 def test_hero(visitors: Visitors, server: Server) -> None:
     """A ridge in the morning, a summit just drawn before it, and somebody else who points at what comes next."""
     terrain, secret = server.create(template="alpine-ridge", title="Morning ridge")
@@ -85,21 +88,25 @@ def test_hero(visitors: Visitors, server: Server) -> None:
 def test_morph(visitors: Visitors, server: Server) -> None:
     """A mountain rises under the pen, frame by frame."""
     terrain, secret = server.create(title="Morph")
-    guest = visitors(800, 500, device_scale_factor=1, slow_screen=False)
+    width, height = (800, 500) if FOR_README else (480, 300)
+    large: dict[str, Any] = {"device_scale_factor": 1, "slow_screen": False} if FOR_README else {"seen": True}
+    guest = visitors(width, height, **large)
     guest.open(f"/t/{terrain}#{secret}")
     wait_settled(guest)
     rest(guest)
     guest.page.keyboard.press("b")
     (left, foot), (right, end) = on_screen(guest, 900, 2300), on_screen(guest, 3000, 2500)
-    legs = [(left + part * (right - left), foot + part * (end - foot) - rise) for part, rise in MORPH_STROKE]
-    path = polyline(legs, 5)
+    rises = height / 500
+    legs = [(left + part * (right - left), foot + part * (end - foot) - rises * rise) for part, rise in MORPH_STROKE]
+    path = polyline(legs, 5 if FOR_README else 2)
     frames = [picture(guest)]
     guest.page.mouse.move(*path[0])
     guest.page.mouse.down()
     for i, point in enumerate(path[1:]):
+        shown = guest.js("() => window.esker.frames")
         guest.page.mouse.move(*point)
-        guest.page.wait_for_timeout(60)
-        if i % 2 == 1:
+        guest.wait("n => window.esker.frames > n", shown)
+        if i % 2 == 1 or not FOR_README:
             frames.append(picture(guest))
     guest.page.mouse.up()
     wait_settled(guest)
