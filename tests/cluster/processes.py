@@ -97,9 +97,8 @@ class NodeProcess:
 
 
 @contextmanager
-def nodes(url: str, folder: Path, *names: str, hours: dict[str, float] | None = None) -> Iterator[list[NodeProcess]]:
-    """Some nodes that take people."""
-    made = [NodeProcess(name, url, folder / name, (hours or {}).get(name, 0.0)) for name in names]
+def running(made: list[NodeProcess]) -> Iterator[list[NodeProcess]]:
+    """Nodes that take people, until the block ends."""
     try:
         for each in made:
             each.start()
@@ -109,6 +108,13 @@ def nodes(url: str, folder: Path, *names: str, hours: dict[str, float] | None = 
     finally:
         for each in made:
             each.end(signal.SIGKILL)
+
+
+@contextmanager
+def nodes(url: str, folder: Path, *names: str, hours: dict[str, float] | None = None) -> Iterator[list[NodeProcess]]:
+    """Some nodes that take people."""
+    with running([NodeProcess(name, url, folder / name, (hours or {}).get(name, 0.0)) for name in names]) as made:
+        yield made
 
 
 def until(holds: Callable[[], Any], what: str = "it did not come") -> Any:

@@ -10,8 +10,9 @@ import signal
 from collections.abc import Sequence
 from pathlib import Path
 
-from tests.cluster.processes import Artist, NodeProcess, nodes, until
+from tests.cluster.processes import Artist, NodeProcess, nodes, running, until
 from tests.store.engines import Database
+from tests.store.proxy import Proxy
 
 
 def made(node: NodeProcess) -> tuple[str, str]:
@@ -114,6 +115,34 @@ def test_nodes_are_restarted_one_after_the_other(database: Database, tmp_path: P
             node.ready()
         assert "gives 1 terrains away" in some[0].log() + some[1].log()
         all_is_there(artists)
+
+
+def test_a_node_that_is_cut_off_from_the_database_shuts_its_rooms(database: Database, tmp_path: Path) -> None:
+    """SPEC P596: only its own line is cut, and people reach it still; later it passes them on."""
+    url, server = database.new(), database.server.folder
+    lines = [Proxy(tmp_path / f"line-{name}", server / ".s.PGSQL.5432") for name in ("a", "b")]
+    urls = [url.replace(str(server), str(tmp_path / f"line-{name}")) for name in ("a", "b")]
+    made_of = [NodeProcess(name, found, tmp_path / name) for name, found in zip(("a", "b"), urls, strict=True)]
+    with running(made_of) as some:
+        artists, _, _ = drawing([some[0]], [some[1]])
+        cut = owner_of(some)
+        left = next(each for each in some if each is not cut)
+        for each in artists:
+            each.turn_to(left.base)
+        lines[some.index(cut)].cut()
+        gone_on(artists)
+        until(lambda: left.figures()["esker_leases"] == 1)
+        until(lambda: cut.figures()["esker_leases"] == 0)
+        gone_on(artists)
+        assert cut.refused("GET", "/readyz") == 503
+        lines[some.index(cut)].is_open = True
+        cut.ready()
+        artists[0].turn_to(cut.base)
+        artists[0].cut()
+        gone_on(artists)
+        all_is_there(artists)
+    for line in lines:
+        line.close()
 
 
 def test_a_code_that_was_made_on_one_node_opens_on_another(database: Database, tmp_path: Path) -> None:

@@ -82,6 +82,8 @@ class Server:
 
     data: Path
     port: int = field(default_factory=free_port)
+    options: tuple[str, ...] = ()
+    environment: dict[str, str] = field(default_factory=dict)
     process: subprocess.Popen[bytes] | None = None
 
     @property
@@ -92,7 +94,9 @@ class Server:
         """Start and wait until /healthz answers. Raises RuntimeError with the log when it does not."""
         command = [sys.executable, "-m", "esker", "serve", "--port", str(self.port), "--data", str(self.data)]
         with (self.data.parent / "server.log").open("ab") as log:
-            self.process = subprocess.Popen(command, cwd=ROOT, stdout=log, stderr=log)
+            self.process = subprocess.Popen(
+                [*command, *self.options], cwd=ROOT, env={**os.environ, **self.environment}, stdout=log, stderr=log
+            )
         deadline = time.monotonic() + 300  # the first start of a machine compiles, beside whatever else it does
         while time.monotonic() < deadline:
             if self.process.poll() is not None:

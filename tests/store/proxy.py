@@ -18,6 +18,7 @@ class Proxy:
         self.is_open = True
         """Whether new connections are let through."""
         self.cuts = 0
+        self._ends: list[socket.socket] = []
         self._server = server
         self._listener = socket.socket(socket.AF_UNIX)
         folder.mkdir()
@@ -36,6 +37,7 @@ class Proxy:
                 continue
             far = socket.socket(socket.AF_UNIX)
             far.connect(os.fspath(self._server))
+            self._ends += [near, far]
             threading.Thread(target=self._out, args=(near, far), daemon=True).start()
             threading.Thread(target=self._back, args=(near, far), daemon=True).start()
 
@@ -62,6 +64,14 @@ class Proxy:
         with suppress(OSError):
             while data := far.recv(65536):
                 near.sendall(data)
+
+    def cut(self) -> None:
+        """Ends every connection, and lets nobody through until ``is_open`` is set again."""
+        self.is_open = False
+        ends, self._ends = self._ends, []
+        for end in ends:
+            with suppress(OSError):
+                end.shutdown(socket.SHUT_RDWR)
 
     def close(self) -> None:
         """Lets nobody through any more."""

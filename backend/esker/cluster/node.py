@@ -23,7 +23,15 @@ from urllib.parse import urlsplit
 from esker.cluster.peers import Elsewhere, Peer
 from esker.cluster.rendezvous import chosen, stepped
 from esker.cluster.tenure import Phase, Tenure
-from esker.store.engine.leases import LEASE_SECONDS, RENEW_SECONDS, Lease, Leases, Node, Unreachable
+from esker.store.engine.leases import (
+    LEASE_SECONDS,
+    RENEW_SECONDS,
+    SHUT_SECONDS,
+    Lease,
+    Leases,
+    Node,
+    Unreachable,
+)
 
 log = logging.getLogger("esker.cluster")
 T = TypeVar("T")
@@ -270,6 +278,7 @@ class Cluster:
             await asyncio.shield(task)
 
     async def _take(self, home: str) -> None:
+        self._demand_database()
         asked = self._now()
         try:
             answer = await self._ask(self._leases.take, home, self.name, LEASE_SECONDS)
@@ -283,6 +292,11 @@ class Cluster:
             raise Elsewhere("This node is being stopped.")
         self.counts.taken += 1
         self._held = {**self._held, home: Holding(answer, Tenure(asked), self._now())}
+
+    def _demand_database(self) -> None:
+        """Raises Elsewhere at once where the database has not answered for long: everybody would wait for it."""
+        if self.age >= SHUT_SECONDS:
+            raise Elsewhere("This node does not reach its database.")
 
     def fenced(self, terrain: str) -> None:
         """The database refused a write: another node has the terrain. For any thread."""
@@ -392,6 +406,7 @@ class Cluster:
         found = self._known.get(home)
         if found is not None and found[1] > self._now():
             return found[0]
+        self._demand_database()
         try:
             owner = await self._ask(self._leases.owner, home)
         except Unreachable as error:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Awaitable, Callable
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from typing import Final
 
 from fastapi import WebSocket
@@ -30,8 +30,8 @@ class Arrival:
     def __init__(self, cluster: Cluster, socket: WebSocket) -> None:
         self._cluster, self._socket = cluster, socket
         self._visit: Visit | None = socket.scope.get(passing.PASSED)
-        wire: WebSocketProtocol = socket.scope["esker.socket"]
-        self._held: Holding | None = wire.hold() if self._visit is None else None
+        self._wire: WebSocketProtocol = socket.scope["esker.socket"]
+        self._held: Holding | None = self._wire.hold() if self._visit is None else None
 
     async def expected(self) -> bool:
         """Returns whether the socket is to be accepted: another node that was wrong about this one is told so, before
@@ -42,7 +42,9 @@ class Arrival:
             await self._cluster.hold(self._visit.terrain)
         except Elsewhere as error:
             log.info("a socket that was passed on found no terrain here: %s", error)
-            await passing.refuse(self._socket.send, 409, b"{}", [(MOVED_HEADER, b"1")])
+            with suppress(OSError):  # whoever asked may have given up meanwhile
+                await passing.refuse(self._socket.send, 409, b"{}", [(MOVED_HEADER, b"1")])
+            self._wire.handshake_complete = True  # as far as it goes: the library would log an error
             return False
         return True
 

@@ -33,7 +33,7 @@ from esker.session.room.outbox import Outbox
 from esker.session.room.ports import Journal, Meter, Tenancy
 from esker.session.room.replicas.recent import Encoder
 from esker.session.scoring import Scoring
-from esker.store.engine.ports import Moved, Unknown
+from esker.store.engine.ports import Moved, Unknown, Unwritable
 from esker.store.journal import HistoryFull
 from esker.store.timestamps import Person
 
@@ -322,7 +322,9 @@ class Room(ClassRoom):
         error = future.exception()
         if self.closed:
             return  # another server may have the terrain: authors ask that one what became of this
-        if isinstance(error, (Moved, Unknown)):
+        # Where another server can go on, people's work is not taken back: they send it again, here or there.
+        is_away = self._tenancy is not None and isinstance(error, Unwritable) and not error.full
+        if isinstance(error, (Moved, Unknown)) or is_away:
             log.warning("terrain %s: %s", self.id, error)
             self._on_lost()
             return
