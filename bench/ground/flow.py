@@ -80,23 +80,32 @@ def points(water: Water, cell_m: float, many: float = 1.0) -> NDArray[np.float64
     return np.concatenate(out)
 
 
+def under_water(water: Water, at: NDArray[np.float64], cell_m: float) -> NDArray[np.bool_]:
+    """Whether points lie under standing water: ways through lakes are drawn nowhere, so they may differ."""
+    col, row = (np.clip(np.rint(at[:, axis] / cell_m).astype(int), 0, len(water.z) - 1) for axis in (0, 1))
+    return np.asarray(water.filled[row, col] > water.z[row, col])
+
+
 def levels_agree(terrain: Terrain) -> dict[str, Any]:
     """Rivers of level 2 against those of level 4, both with their detail; bytes of a frame of each."""
     settings = terrain.settings.model_copy(update={"rivers": 1.0})
-    coarse, fine = (
-        points(water_of(terrain.heights(level, True), settings.size_m, settings.sea_level_m),
-               grid.spacing(level, settings.size_m))
-        for level in (2, 4)
-    )  # fmt: skip
+    waters = {level: water_of(terrain.heights(level, True), settings.size_m, settings.sea_level_m) for level in (2, 4)}
+    coarse, fine = (points(water, grid.spacing(level, settings.size_m)) for level, water in waters.items())
     cell = grid.spacing(2, settings.size_m)
+    dry = ~under_water(waters[2], coarse, cell)
     out: dict[str, Any] = {"points": len(coarse)}
     if len(coarse) and len(fine):
-        moved, new = cKDTree(fine).query(coarse)[0], cKDTree(coarse).query(fine)[0]
+        moved, new = (np.asarray(cKDTree(a).query(b)[0]) for a, b in ((fine, coarse), (coarse, fine)))
         out |= {
             "moved_median_cells": round(float(np.median(moved)) / cell, 3),
             "moved_p90_cells": round(float(np.percentile(moved, 90)) / cell, 3),
             "missing": round(float(np.mean(moved > 2 * cell)), 4),
             "new": round(float(np.mean(new > 2 * cell)), 4),
+            "on_land": {
+                "points": int(dry.sum()),
+                "moved_median_cells": round(float(np.median(moved[dry])) / cell, 3),
+                "missing": round(float(np.mean(moved[dry] > 2 * cell)), 4),
+            },
         }
     for level in (2, 4):
         ground = Snapshot(0, level, terrain.heights(level))

@@ -47,6 +47,13 @@ fn influence_tint(albedo: vec3f, felt: f32) -> vec3f {
   return mix(grey, tint * (0.45 + 1.6 * grey), clamp(smoothstep(0.02, 0.5, felt) * 0.72 + bands, 0.0, 0.9));
 }
 
+// The ground that drains through a place: washed in blue; what lies beyond pales a little.
+fn watershed_tint(albedo: vec3f, share: f32) -> vec3f {
+  let grey = vec3f(dot(albedo, vec3f(0.2126, 0.7152, 0.0722)));
+  let inside = albedo * vec3f(0.42, 0.62, 0.78) + vec3f(0.012, 0.045, 0.115);
+  return mix(mix(albedo, grey, 0.35), inside, smoothstep(0.25, 0.75, share) * 0.85);
+}
+
 // A painted channel: 0 took all of it away, 0.5 left it as it grows, 1 asked for all of it.
 fn painted_tint(share: f32) -> vec3f {
   let toward = mix(vec3f(0.46, 0.17, 0.05), vec3f(0.03, 0.30, 0.44), step(0.5, share));

@@ -16,8 +16,9 @@ struct TerrainVertex {
 fn terrain_vertex(@builtin(vertex_index) index: u32, patch_in: PatchIn) -> TerrainVertex {
   let v = patch_vertex(patch_in.record, vec2i(i32(index % PITCH), i32(index / PITCH)));
   var out: TerrainVertex;
-  out.position = guarded(clip_of(v.relative));
-  out.relative = v.relative;
+  let relative = v.relative - vec3f(0.0, 0.0, river_bed(v.world.xy, length(v.relative)));
+  out.position = guarded(clip_of(relative));
+  out.relative = relative;
   out.at = v.at;
   out.morph = v.morph;
   let texels = patch_texels(patch_in.record);
@@ -83,7 +84,8 @@ fn terrain_fragment(v: TerrainVertex) -> @location(0) vec4f {
   let rate = abs(f.dx.z) + abs(f.dy.z);
   let surface = patch_surface(PatchTexels(v.origins, v.layers.xy), v.at, v.morph);
   let site = survey(world, surface.gradient, surface.curvature, f, cover_of(surface), v.above_lake);
-  var m = ground_material(site);
+  let river = river_near(world.xy, f);
+  var m = river_banks(ground_material(site), river, site);
   if (view.overlay == OVERLAY_SLOPE) {
     m.albedo = mix(m.albedo, slope_tint(site.steep), 0.8);
     m.gloss = 0.0;
@@ -96,11 +98,14 @@ fn terrain_fragment(v: TerrainVertex) -> @location(0) vec4f {
   } else if (view.overlay == OVERLAY_PAINTED) {
     m.albedo = mix(m.albedo, painted_tint(v.detail.z), 0.8);
     m.gloss = 0.0;
+  } else if (view.overlay == OVERLAY_WATERSHED) {
+    m.albedo = watershed_tint(m.albedo, v.detail.z);
   } else if (view.overlay == OVERLAY_PATCHES) {
     m.albedo = mix(m.albedo, level_tint(u32(v.layers.z)) * 0.5, 0.7);
   }
   let dir = ray_to(world);
   var colour = shade(m, surface.gradient, surface, dir);
+  colour = river_water(colour, river, site, surface, dir, min(v.above_lake, select(FAR_ABOVE, world.z - view.sea, view.has_sea > 0.5)));
   if (view.grid > 0.0) {
     let line = scale_grid(world.xy, f) * view.grid * exp(-distance(world, view.eye.xyz) / (1.1 * view.size) * (1.0 - view.eye.w));
     colour = mix(colour, colour * 1.9 + vec3f(0.05), line * 0.42);

@@ -17,6 +17,7 @@ struct View {
   sea: f32,              // sea level, metres; without a sea, where elevations count from
   has_sea: f32,          // 1 or 0
   has_lakes: f32,        // 1 or 0
+  has_rivers: f32,       // 1 or 0
   exposure: f32,
   haze: f32,             // extinction per metre at the ground
   low: f32,              // lowest and highest ground, metres
@@ -48,6 +49,7 @@ const OVERLAY_PATCHES: u32 = 3u;
 const OVERLAY_DETAIL: u32 = 4u;
 const OVERLAY_INFLUENCE: u32 = 5u;
 const OVERLAY_PAINTED: u32 = 6u;
+const OVERLAY_WATERSHED: u32 = 7u;
 
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var heights: texture_2d_array<f32>;
@@ -63,6 +65,7 @@ const OVERLAY_PAINTED: u32 = 6u;
 @group(0) @binding(11) var attributes1: texture_2d_array<f32>;  // grass, forest, grain, size of the next level's detail
 @group(0) @binding(12) var stones: texture_2d<f32>;  // stones_rich.wgsl
 @group(0) @binding(13) var lake_map: texture_2d<f32>;  // over the domain, metres: ground and level of a sample (lakes.wgsl)
+@group(0) @binding(14) var river_map: texture_2d<f32>;  // rivers.wgsl
 
 // Clip position of a point given relative to the eye.
 fn clip_of(relative: vec3f) -> vec4f {

@@ -21,10 +21,13 @@ from esker.api.terrain import default_solver
 from esker.cli import main as command_line
 from esker.contract import ExportRequest
 from esker.exporting import formats, mesh
+from esker.exporting.flowmasks import deposits
 from esker.exporting.ground import Extent, wear_m
 from esker.exporting.resample import resampled
 from esker.exporting.water import under_water
 from esker.exporting.weights import weights
+from esker.flow.rivers import water_of
+from esker.flow.water import find_water
 from esker.importing.examine import examine
 from esker.importing.placement import placing
 from esker.importing.placement.fitting import frame
@@ -196,7 +199,7 @@ def test_masks_are_the_attributes(terrain: Terrain, tmp_path: Path) -> None:
             with Image.open(io.BytesIO(archive.read(name))) as picture:
                 assert picture.mode == "L"
                 masks[name.removesuffix(".png")] = np.asarray(picture)[::-1]
-    assert set(masks) == {"snow", "wetness", "grass", "forest", "water", "wear"}
+    assert set(masks) == {"snow", "wetness", "grass", "forest", "water", "wear", "flow", "deposits"}
     worn = np.clip(-attributes["detail"] / wear_m(terrain.settings), 0, 1)
     assert np.abs(masks["wear"] / 255.0 - worn).max() <= 0.5001 / 255
     assert masks["wear"].max() > 0
@@ -205,6 +208,25 @@ def test_masks_are_the_attributes(terrain: Terrain, tmp_path: Path) -> None:
     assert masks["grass"].max() > 0, "there is something to compare"
     np.testing.assert_array_equal(masks["water"] > 0, heights < 4.0)
     assert 0 < (masks["water"] > 0).mean() < 1
+
+
+def test_masks_of_running_water(terrain: Terrain, tmp_path: Path) -> None:
+    """SPEC W51: flow is what drains through a place, by its logarithm; what is laid down lies where water slows."""
+    masks = masks_of(exported(terrain, tmp_path, "a.zip"))
+    size = terrain.settings.size_m
+    water = water_of(terrain.heights(4, detail=True), size, terrain.settings.sea_level_m)
+    step = (len(water.area) - 1) // (len(masks["flow"]) - 1)
+    area = water.area[::step, ::step]
+    share = np.log(area) / np.log(water.area.size)
+    assert np.abs(masks["flow"] / 255 - share).max() < 1.01 / 255
+    # A steep flank that runs out on a plain: what it brings is left at its foot, not on it.
+    y, x = np.mgrid[0:65, 0:65]
+    fan = np.where(y > 32, (y - 32) * 400, 0) + y * 4 + np.abs(x - 32) * 30
+    laid = deposits(find_water(fan.astype(np.int32)))
+    assert laid[28:34, 30:35].max() > 0.8
+    assert laid[40:60, 30:35].max() < 0.5
+    assert laid.min() >= 0
+    assert laid.max() <= 1
 
 
 def masks_of(path: Path) -> dict[str, NDArray[np.uint8]]:
@@ -219,10 +241,10 @@ def test_masks_that_sum_to_one(terrain: Terrain, tmp_path: Path) -> None:
     """SPEC X380: at every sample, each within a step of its part of what those above it leave."""
     plain = masks_of(exported(terrain, tmp_path, "a.zip"))
     summed = masks_of(exported(terrain, tmp_path, "b.zip", weights=True))
-    assert set(summed) == {*plain, "ground"} - {"wear"}
+    assert set(summed) == {*plain, "ground"} - {"wear", "flow", "deposits"}
     assert max(mask.max() for mask in (summed["ground"], summed["grass"])) > 128, "there is something to share out"
     np.testing.assert_array_equal(sum(mask.astype(int) for mask in summed.values()), 255)
-    assert np.sum([mask.astype(int) for name, mask in plain.items() if name != "wear"], axis=0).max() > 255
+    assert np.sum([mask.astype(int) for name, mask in plain.items() if name in summed], axis=0).max() > 255
     left = np.ones(summed["ground"].shape)
     for name in ("water", "snow", "forest", "grass", "wetness"):
         assert np.abs(summed[name] / 255 - left * plain[name] / 255).max() < 1.001 / 255

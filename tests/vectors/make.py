@@ -1,4 +1,4 @@
-"""Writes the vectors that pytest and vitest both read: ops, undo, lakes, flow, rivers, targets, messages, each a .json.
+"""Writes the vectors that pytest and vitest both read, each a .json.
 
 ``python tests/vectors/make.py`` rewrites them; ``tests/unit/test_vectors.py`` checks that doing so changes nothing.
 The expected outcome of every case is named here by hand (refusal code, or that it applies); the resulting documents
@@ -19,7 +19,9 @@ from tests.vectors.flow_cases import flow_vectors  # noqa: E402
 from tests.vectors.lake_cases import lake_vectors  # noqa: E402
 from tests.vectors.message_cases import message_vectors  # noqa: E402
 from tests.vectors.op_cases import op_vectors  # noqa: E402
+from tests.vectors.pour_cases import pour_vectors  # noqa: E402
 from tests.vectors.river_cases import river_vectors  # noqa: E402
+from tests.vectors.rivermap_cases import rivermap_vectors  # noqa: E402
 from tests.vectors.target_cases import target_vectors  # noqa: E402
 from tests.vectors.undo_cases import undo_vectors  # noqa: E402
 
@@ -37,6 +39,10 @@ def build() -> dict[str, str]:
         "undo.json": text("scripts of mine / theirs / undo / redo with the ops and sentences expected", undo_vectors()),
         "lakes.json": text("ground in sixteenths of a metre, row 0 south -> levels of lakes, waves", lake_vectors()),
         "flow.json": text("ground in whole steps, row 0 south -> receivers, water, areas, rivers", flow_vectors()),
+        "pour.json": text("ground in whole steps, water poured out -> pools and what runs off", pour_vectors()),
+        "rivermap.json": text(
+            "rivers in cells of a level -> the pieces that shaders read, by cell", rivermap_vectors()
+        ),
         "rivers.json": text("frames of rivers and what is in them, or a part of the sentence", river_vectors()),
         "targets.json": text("texts of targets with some of their heights, or null", target_vectors()),
         "messages.json": text("texts a client may send: accepted, or refused (accept false)", message_vectors()),

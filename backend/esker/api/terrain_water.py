@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,10 +12,13 @@ from numpy.typing import NDArray
 from esker import contract
 from esker.api import arguments
 from esker.contract import TerrainSettings
+from esker.flow import pour as pouring
 from esker.flow.rivers import River, rivers_of, water_of
 from esker.flow.water import Water
 
 Heights = NDArray[np.float32]
+MOST_POURED_M3: Final = 1e15
+MOST_RAIN_MM: Final = 100_000.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +47,34 @@ class Raindrop:
     distance_m: NDArray[np.float64]
     water_m: NDArray[np.float64]
     reaches_sea: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Lake:
+    """Water that stands in one hollow, or in several that have joined.
+
+    ``inside``: bool (N, N), the samples below its level, row 0 south. ``depth_m``: at its deepest sample.
+    """
+
+    inside: NDArray[np.bool_]
+    level_m: float
+    volume_m3: float
+    area_m2: float
+    depth_m: float
+
+
+@dataclass(frozen=True, eq=False)
+class Flood:
+    """Where water stands that was poured out at a point.
+
+    ``lakes``: in the order in which they fill; none where water runs off. ``runs_off_m3``: what leaves at the border or
+    into the sea. ``watershed_m2``: what drains through the brim of the lake, or through the point where there is none.
+    """
+
+    lakes: tuple[Lake, ...]
+    poured_m3: float
+    runs_off_m3: float
+    watershed_m2: float
 
 
 class TerrainWater(ABC):
@@ -152,6 +184,71 @@ class TerrainWater(ABC):
         row, col = divmod(int(way[-1]), n)
         at_border = row in (0, n - 1) or col in (0, n - 1)
         return Raindrop(points, np.concatenate(([0.0], np.cumsum(steps))), stands, not at_border)
+
+    def flood(
+        self,
+        x: float,
+        y: float,
+        volume_m3: float | None = None,
+        rain_mm: float | None = None,
+        level: int = contract.DEFAULT_LEVEL,
+    ) -> Flood:
+        """How high water stands that is poured out at a point, or that falls as rain on the lake's watershed.
+
+        Hollows are empty at first; each runs over at its lowest brim into the next.
+
+        Parameters
+        ----------
+        x, y: the point, metres; the sample that is nearest to it counts.
+        volume_m3: how much water, or
+        rain_mm: how much rain on all ground that drains through the brim of the lake below the point.
+        level: 0..6, whose samples hold the water.
+
+        Raises
+        ------
+        ValueError: the point lies outside of the terrain, there is no such level, a number is out of its range, or not
+            exactly one of ``volume_m3`` and ``rain_mm`` was said.
+
+        Examples
+        --------
+        >>> from esker import Stroke, Terrain
+        >>> t = Terrain(size_m=2048)
+        >>> for x in (500, 1500):
+        ...     _ = t.add(Stroke.profile([(x, 300, 300), (x, 1700, 300)]))
+        >>> for y in (500, 1500):
+        ...     _ = t.add(Stroke.profile([(300, y, 250), (1700, y, 250)]))
+        >>> flood = t.flood(1000, 1000, volume_m3=1e6, level=1)
+        >>> round(sum(lake.volume_m3 for lake in flood.lakes) + flood.runs_off_m3)
+        1000000
+        """
+        if (volume_m3 is None) == (rain_mm is None):
+            raise ValueError("say either volume_m3 or rain_mm, not both or neither")
+        water, index = self._at(x, y, level)
+        cell_m = self._settings.size_m / (water.shape[0] - 1)
+        quantum_m, cell_m2 = cell_m / contract.QUANTA_PER_CELL, cell_m * cell_m
+        out = pouring.brim(water, index)
+        shed_m2 = int(water.area.ravel()[index if out < 0 else out]) * cell_m2
+        if volume_m3 is not None:
+            poured_m3 = arguments.number("volume_m3", volume_m3, 0, MOST_POURED_M3)
+        else:
+            poured_m3 = arguments.number("rain_mm", rain_mm, 0, MOST_RAIN_MM) / 1000 * shed_m2
+        step_m3 = quantum_m * cell_m2
+        found = pouring.pour(water, index, poured_m3 / step_m3)
+        lakes = []
+        for pool in found.pools:
+            inside = np.zeros(water.z.size, np.bool_)
+            inside[pool.samples] = True
+            deepest = pool.level - float(water.z.ravel()[pool.samples].min()) if pool.samples.size else 0.0
+            lakes.append(
+                Lake(
+                    inside.reshape(water.shape),
+                    pool.level * quantum_m,
+                    pool.volume * step_m3,
+                    pool.samples.size * cell_m2,
+                    deepest * quantum_m,
+                )
+            )
+        return Flood(tuple(lakes), poured_m3, found.left * step_m3, shed_m2)
 
     def _at(self, x: float, y: float, level: int) -> tuple[Water, int]:
         """The water of a level, and the index of the sample that is nearest to a point."""

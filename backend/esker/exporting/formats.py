@@ -11,6 +11,7 @@ from typing import Final, NamedTuple
 
 from esker import contract
 from esker.contract import ExportEstimate, ExportFormat, ExportRequest, ModelOptions, PaperOptions
+from esker.exporting.flowmasks import with_flow
 from esker.exporting.ground import Extent, Ground, HeightSource, take
 from esker.exporting.heightmaps import write_geotiff, write_npy, write_png, write_r16
 from esker.exporting.masks import write_masks
@@ -164,6 +165,8 @@ def export(
     )
     if weights:
         ground = weighted(ground)
+    elif kind == MASKS:
+        ground = with_flow(terrain, ground, **levels)
     step("writing", 0.0)
     try:
         form.write(path, ground, Options(paper or PaperOptions(), model or ModelOptions()))

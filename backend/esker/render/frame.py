@@ -85,10 +85,16 @@ def base_height(low: float, size_m: float) -> float:
 
 
 def view_values(
-    scene: Scene, rect: Rect, range_m: tuple[float, float], amplitude: float, *, lakes: bool = False
+    scene: Scene,
+    rect: Rect,
+    range_m: tuple[float, float],
+    amplitude: float,
+    *,
+    lakes: bool = False,
+    rivers: bool = False,
 ) -> dict[str, ArrayLike]:
     """Fields of ``View`` (view.wgsl). ``range_m``: lowest and highest solved ground; ``amplitude``: metres that the
-    value 1 of the channel texture stands for; ``lakes``: there are some."""
+    value 1 of the channel texture stands for; ``lakes``, ``rivers``: there are some."""
     low, high = range_m
     settings, camera = scene.settings, scene.camera
     lat = None if settings.place is None else settings.place.lat_deg
@@ -105,6 +111,7 @@ def view_values(
         "sea": zero,
         "has_sea": 0.0 if settings.sea_level_m is None else 1.0,
         "has_lakes": 1.0 if lakes else 0.0,
+        "has_rivers": 1.0 if rivers else 0.0,
         "exposure": look.exposure * exposure,
         "haze": look.haze / settings.size_m,
         "low": low,

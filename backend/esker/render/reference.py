@@ -18,6 +18,7 @@ from esker.render.device import depth_buffer, half_depth, open_context
 from esker.render.frame import Detail, Rect, Scene, base_height, sun_direction, view_values
 from esker.render.layout import StructLayout
 from esker.render.programs import Compute, Draw, Resources
+from esker.render.rivers import river_map
 from esker.render.select import Cut, choose, frustum
 from esker.render.surface import Surface
 from esker.render.tables import noise_mipmaps, stone_mipmaps
@@ -114,14 +115,17 @@ class Reference:
         settings = scene.settings
         sun = sun_direction(settings.sun_azimuth_deg, settings.sun_elevation_deg)
         atlas.compute(self._normals, self._sun, settings.size_m, float(high.max()), sun)
-        resources, amplitude = self._resources(atlas, scene, channels, lakes)
+        rivers = river_map(surface.rivers(settings), settings.size_m, settings.wetness)
+        resources, amplitude = self._resources(atlas, scene, channels, lakes, rivers)
         words = _words(cut, atlas)
         out = np.empty((scene.camera.height, scene.camera.width, 3), dtype=np.uint8)
         parts = _parts(scene.camera.width, scene.camera.height)
         for done, rect in enumerate(parts):
             if progress is not None:
                 progress(done / len(parts))
-            values = view_values(scene, rect, surface.range_m, amplitude, lakes=lakes is not None)
+            values = view_values(
+                scene, rect, surface.range_m, amplitude, lakes=lakes is not None, rivers=rivers is not None
+            )
             view = StructLayout(sources.background(self._detail), "View").pack(values)
             resources.buffers["view"] = self.context.buffer(view)
             seen = self._seen(cut, scene, rect, surface)
@@ -171,7 +175,12 @@ class Reference:
         return texture
 
     def _resources(
-        self, atlas: Atlas, scene: Scene, channels: Channels, lakes: Lakes | None
+        self,
+        atlas: Atlas,
+        scene: Scene,
+        channels: Channels,
+        lakes: Lakes | None,
+        rivers: NDArray[np.float32] | None,
     ) -> tuple[Resources, float]:
         """All that passes bind but the view, and the amplitude that the channel texture's 1 stands for."""
         radiance, ambient = self._bake(scene)
@@ -184,12 +193,18 @@ class Reference:
             "stones": self._stones,
             "channels": grid,
             "lake_map": self._lake_map(lakes),
+            "river_map": self._river_map(rivers),
         }
         return Resources(textures, self._fixed, {"skylight": ambient}), amplitude
 
     def _lake_map(self, lakes: Lakes | None) -> moderngl.Texture:
         texels = np.zeros((2, 2, 2), dtype=np.float32) if lakes is None else lake_texture(lakes)
         return self.context.texture(texels.shape[:2], 2, texels.tobytes(), dtype="f4")
+
+    def _river_map(self, rivers: NDArray[np.float32] | None) -> moderngl.Texture:
+        texels = np.zeros((1, 1, 4), dtype=np.float32) if rivers is None else rivers
+        rows, columns = texels.shape[:2]
+        return self.context.texture((columns, rows), 4, texels.tobytes(), dtype="f4")
 
     def _bake(self, scene: Scene) -> tuple[moderngl.Texture, moderngl.Buffer]:
         module = sources.sky()

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from esker.contract import LAKE_LEVEL, PATCH_CELLS, SUBPATCHES, TILE_CELLS, TILE_SAMPLES, TerrainSettings
 from esker.contract.fractal import H_RANGE
+from esker.flow.rivers import River, rivers_of, water_of
 from esker.render.select import Floats, Ints
 from esker.synthesis.detailed import DetailedTerrain
 from esker.synthesis.hash import full, hashed
@@ -140,6 +141,14 @@ class Surface:
         cell = self.size_m / (TILE_CELLS << LAKE_LEVEL)
         found = find_lakes(ground, cell, settings.lakes_m, settings.sea_level_m)
         return found if found.any else None
+
+    def rivers(self, settings: TerrainSettings) -> tuple[River, ...]:
+        """The rivers of the ground with its detail, on the finest level that is solved as a whole."""
+        if settings.rivers == 0:
+            return ()
+        heights = self._heights[self.solved][BORDER:-BORDER, BORDER:-BORDER]
+        water = water_of(heights, settings.size_m, settings.sea_level_m)
+        return rivers_of(water, settings.size_m, settings.rivers, settings.wetness)
 
     def height_at(self, x_m: float, y_m: float, level: int | None = None) -> float:
         """Height of the ground at a place, bilinear in the samples of a level (default: the finest solved one)."""

@@ -5,6 +5,7 @@ import type { ClientMessage } from "../generated/contract.ts";
 import { DEFAULT_TAU_PX, MAX_PRESENCE_PER_SECOND, PRESENCE_HZ } from "../generated/contract.ts";
 import { Throttle } from "./throttle.ts";
 import type { Stage } from "./view/stage.ts";
+import { WATER } from "./view/water/others.ts";
 
 const VIEWS_PER_SECOND = 10;
 const MAX_SIDE_PX = 16_384;
@@ -60,11 +61,13 @@ function sendPresence({ stage: shown, sendPresence: to }: OutgoingOptions): void
   const send = to();
   if (!stage || send === null) return;
   const { eye, target } = stage.camera.state.value;
-  const cursor = stage.cursor.value;
+  // Who follows water is seen at the place that they ask about.
+  const drop = stage.water.place.value;
+  const cursor = drop ?? stage.cursor.value;
   send({
     type: "presence",
     cursor: cursor ? [...cursor] : null,
-    tool: stage.input.tool.value,
+    tool: drop === null ? stage.input.tool.value : WATER,
     stroke: stage.input.drawing.value ?? stage.input.held.value,
     eye: [...eye],
     target: [...target],

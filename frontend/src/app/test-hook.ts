@@ -5,9 +5,9 @@
 
 import type { GridPlace } from "../core/lattice.ts";
 import type { AreaFigures } from "../core/measure/area.ts";
-import { isImpossible } from "../core/measure/places.ts";
+import { isImpossible, lengthM } from "../core/measure/places.ts";
 import type { CameraState, FrameStats } from "../core/types.ts";
-import { type Layer, type PaintChannel, type Stroke, TILE_SAMPLES } from "../generated/contract.ts";
+import { type Layer, type PaintChannel, type Stroke, TILE_CELLS, TILE_SAMPLES } from "../generated/contract.ts";
 import type { Attributes } from "../tiles/detail/detail.ts";
 import { orderedLayers } from "./layers/layers.ts";
 import { importingWords } from "./layers/others.ts";
@@ -60,6 +60,10 @@ export interface PageView {
   /** What is measured, and its figures in metres; null: nothing, or it cannot be. */
   profile(): { lengthM: number; min: number; max: number; gain: number; points: number } | null;
   area(): AreaFigures | null;
+  /** The rivers that the server found last, metres; null before. */
+  rivers(): { clock: number; settled: boolean; lines: number[][][] } | null;
+  /** What the water tool found at its place; null while it is put away, or has not looked yet. */
+  water(): WaterFigures | null;
   title(): string;
   role(): string | null;
   members(): string[];
@@ -78,6 +82,19 @@ export interface PageView {
   stats(): FrameStats | null;
   /** Frames drawn so far. */
   readonly frames: number;
+}
+
+/** Metres, square metres, cubic metres; null where there is no place, or where the view shows something else. */
+export interface WaterFigures {
+  readonly view: string;
+  readonly way: { readonly lengthM: number; readonly ends: string; readonly lakes: number } | null;
+  readonly shedM2: number | null;
+  readonly peak: number | null;
+  readonly flood: { readonly levelM: number | null; readonly volumeM3: number; readonly runsOffM3: number } | null;
+  readonly seaM2: number | null;
+  readonly drops: number;
+  /** How deep water stands at the place. */
+  readonly depthM: number | null;
 }
 
 declare global {
@@ -143,6 +160,14 @@ export function installTestHook(session: TerrainSession): () => void {
       const found = stage()?.instruments.area.peek() ?? null;
       return found === null || isImpossible(found) ? null : found;
     },
+    rivers: () => {
+      const [found, settings] = [session.rivers.peek(), doc()?.settings];
+      if (found === null || settings === undefined) return null;
+      const cellM = settings.size_m / (TILE_CELLS << found.level);
+      const lines = found.rivers.map(({ cells }) => pairs(Array.from(cells, (v) => v * cellM)));
+      return { clock: found.clock, settled: found.settled, lines };
+    },
+    water: () => waterFigures(session),
     title: () => doc()?.settings.title ?? "",
     role: () => session.role.peek(),
     members: () => session.members.peek().map((m) => m.name),
@@ -168,6 +193,30 @@ export function installTestHook(session: TerrainSession): () => void {
   window.esker = view;
   return () => {
     if (window.esker === view) delete window.esker;
+  };
+}
+
+function pairs(flat: readonly number[]): number[][] {
+  return flat.flatMap((v, k) => (k % 2 === 0 ? [[v, flat[k + 1]!]] : []));
+}
+
+function waterFigures(session: TerrainSession): WaterFigures | null {
+  const water = session.stage.peek()?.water;
+  if (!water?.isOpen.peek() || water.found.peek() === null) return null;
+  const [way, flood] = [water.way.peek(), water.flood.peek()];
+  return {
+    view: water.view.peek(),
+    way: way && { lengthM: lengthM(way.points), ends: way.ends, lakes: way.lakes },
+    shedM2: water.shed.peek()?.areaM2 ?? null,
+    peak: water.gauge.peek()?.peak.flow ?? null,
+    flood: flood && {
+      levelM: flood.lakes[0]?.levelM ?? null,
+      volumeM3: flood.lakes.reduce((sum, lake) => sum + lake.volumeM3, 0),
+      runsOffM3: flood.runsOffM3,
+    },
+    seaM2: water.sea.peek()?.areaM2 ?? null,
+    drops: water.shower.drops,
+    depthM: water.depthM.peek(),
   };
 }
 

@@ -201,6 +201,27 @@ export interface CursorVisual {
   readonly radiusPx: number;
 }
 
+/** Rivers as shaders read them (tiles/water/rivermap.ts): four floats a texel. */
+export interface RiverMap {
+  readonly texels: Float32Array<ArrayBuffer>;
+  readonly rows: number;
+}
+
+/** Drops of rain on the ground: x y z in metres, and how far each is shown (0..1, with 2 added while it falls). */
+export interface DropsVisual {
+  readonly data: Float32Array;
+  readonly count: number;
+  /** Another one with every movement. */
+  readonly stamp: number;
+}
+
+/** Water that was poured out: lakes on the samples of one level, in place of those that their hollows hold otherwise. */
+export interface FloodVisual {
+  /** The ground of that level with its detail, metres. */
+  readonly heights: Float32Array;
+  readonly lakes: readonly { readonly levelM: number; readonly samples: Int32Array }[];
+}
+
 /** Quality settings of a picture: `automatic` holds the frame rate, the others hold their screen-error bound. */
 export type QualityMode = "automatic" | "fast" | "balanced" | "fine";
 
@@ -227,9 +248,16 @@ export interface Scene {
   readonly quality?: QualityMode;
   /** Seconds, for water and the like. */
   readonly time: number;
-  readonly overlay: "none" | "contours" | "slope" | "detail" | PaintedOverlay | "patches" | "influence";
-  /** Where the selected stroke is felt, 0..1, for the overlay of that name; null: none is selected. */
+  readonly overlay: "none" | "contours" | "slope" | "detail" | PaintedOverlay | "patches" | "influence" | "watershed";
+  /**
+   * Where the selected stroke is felt, 0..1, for the overlay of that name, or a watershed for its own; null: none is
+   * selected.
+   */
   readonly influence?: ChannelGrid | null;
+  /** Rivers of the 3D view; the 2D map draws them among the footprints. */
+  readonly rivers?: RiverMap | null;
+  readonly drops?: DropsVisual | null;
+  readonly flood?: FloodVisual | null;
   readonly showStrokes: boolean;
   /** Height between contours, metres; 0, or left out: what suits the relief. */
   readonly contourM?: number;

@@ -11,6 +11,7 @@ import { reliefM, shoreM, zeroM } from "../tiles/rules/rule.ts";
 import type { Atlas } from "./atlas/atlas.ts";
 import { ChannelTexture, contourShares, overlayGrid } from "./atlas/channeltexture.ts";
 import { LakeTexture } from "./atlas/laketexture.ts";
+import { RiverTexture } from "./atlas/rivertexture.ts";
 import { StructWriter, structLayout } from "./layout.ts";
 import { adaptation, contourInterval, LOOKS } from "./looks.ts";
 import type { SkyTables } from "./passes/sky.ts";
@@ -29,6 +30,7 @@ const OVERLAYS = {
   grass: 6,
   wetness: 6,
   erosion: 6,
+  watershed: 7,
 } as const;
 
 /** Facts that a frame is drawn with besides the scene. */
@@ -61,6 +63,7 @@ export class FrameBindings {
   readonly #repeat: GPUSampler;
   readonly #channels: ChannelTexture;
   readonly #lakes: LakeTexture;
+  readonly #rivers: RiverTexture;
   #atlas: Atlas | null = null;
   /** Pixels that the last update was for. */
   #drawn = { width: 1, height: 1 };
@@ -108,10 +111,12 @@ export class FrameBindings {
         texture(11, "float", "2d-array"),
         texture(12, "float", "2d"),
         texture(13, "unfilterable-float", "2d"),
+        texture(14, "unfilterable-float", "2d"),
       ],
     });
     this.#channels = new ChannelTexture(device);
     this.#lakes = new LakeTexture(device);
+    this.#rivers = new RiverTexture(device);
     this.#uniform = device.createBuffer({
       label: "view",
       size: this.#writer.layout.size,
@@ -151,6 +156,7 @@ export class FrameBindings {
         { binding: 11, resource: array(atlas.attributes1) },
         { binding: 12, resource: this.#stones.createView() },
         { binding: 13, resource: this.#lakes.texture.createView() },
+        { binding: 14, resource: this.#rivers.texture.createView() },
       ],
     });
   }
@@ -182,7 +188,8 @@ export class FrameBindings {
     const every = scene.contourM || contourInterval(facts.high - facts.low);
     const channels = this.#channels.update(scene.channels, overlayGrid(scene), contourShares(scene, every));
     const grown = this.#lakes.update(lakes);
-    if ((channels || grown) && this.#atlas !== null) this.attach(this.#atlas);
+    const rivers = this.#rivers.update(scene.rivers ?? null);
+    if ((channels || grown || rivers) && this.#atlas !== null) this.attach(this.#atlas);
     this.#writeCamera(scene, facts);
     const w = this.#writer;
     const { settings } = scene;
@@ -199,6 +206,7 @@ export class FrameBindings {
     w.set("sea", zeroM(climate));
     w.set("has_sea", settings.sea_level_m === null ? 0 : 1);
     w.set("has_lakes", lakes === null ? 0 : 1);
+    w.set("has_rivers", scene.rivers ? 1 : 0);
     w.set("exposure", look.exposure * (name === "paper" ? 1 : adaptation(settings.sun_elevation_deg)));
     w.set("haze", look.haze / size);
     w.set("low", facts.low);
@@ -220,6 +228,7 @@ export class FrameBindings {
     this.#uniform.destroy();
     this.#channels.destroy();
     this.#lakes.destroy();
+    this.#rivers.destroy();
   }
 
   #setViewport(pass: GPURenderPassEncoder, border: number): void {

@@ -15,6 +15,7 @@ import type { Gpu } from "./device.ts";
 import { FrameBindings, sunDirection } from "./frame.ts";
 import { contourInterval } from "./looks.ts";
 import { BackgroundPass } from "./passes/background.ts";
+import { DropPass } from "./passes/drops.ts";
 import { GhostPass } from "./passes/ghostplane.ts";
 import { guardOf } from "./passes/guard.ts";
 import { HiddenPatches } from "./passes/hidden.ts";
@@ -53,6 +54,7 @@ interface Passes {
   readonly background: BackgroundPass;
   readonly patches: PatchPasses;
   readonly ribbons: RibbonPass;
+  readonly drops: DropPass;
   readonly ghost: GhostPass;
   readonly placing: PlacingPass;
   readonly labels: LabelPass;
@@ -142,8 +144,8 @@ export class GpuRenderer implements SceneRenderer {
       samples,
       detail: gpu.software ? "plain" : "rich",
     };
-    const [target, fill, sun, taking, background, patches, ribbons, ghost, placing, labels, hidden] = await Promise.all(
-      [
+    const [target, fill, sun, taking, background, patches, ribbons, drops, ghost, placing, labels, hidden] =
+      await Promise.all([
         Target.create(device, format, samples, gpu.core),
         TileFill.create(device),
         SunPass.create(device, gpu.software),
@@ -151,13 +153,13 @@ export class GpuRenderer implements SceneRenderer {
         BackgroundPass.create(context),
         PatchPasses.create(context),
         RibbonPass.create(context),
+        DropPass.create(context),
         GhostPass.create(context),
         PlacingPass.create(context),
         LabelPass.create(context),
         // Devices of the compatibility mode cannot read depth in a shader.
         gpu.core ? HiddenPatches.create(device, frame.view, samples, INDEX_COUNT) : null,
-      ],
-    );
+      ]);
     const compute = { fill, sun, taking };
     return new GpuRenderer(canvas, gpu, {
       sky,
@@ -167,6 +169,7 @@ export class GpuRenderer implements SceneRenderer {
       background,
       patches,
       ribbons,
+      drops,
       ghost,
       placing,
       labels,
@@ -187,7 +190,7 @@ export class GpuRenderer implements SceneRenderer {
     this.#quality.mode = scene.quality ?? "automatic";
     // Time stands at zero for people who asked for less motion; the CPU draws too few frames for any.
     const smooth = !this.#gpu.software && scene.time !== 0;
-    const filled = this.#lakes.update(scene.tiles, scene.settings, began, smooth);
+    const filled = this.#lakes.update(scene.tiles, scene.settings, began, smooth, scene.flood);
     if (moved || filled) this.#ready = false;
     const quality = this.#quality.next(began, moved || (software && !this.#ready));
     if (
@@ -290,6 +293,7 @@ export class GpuRenderer implements SceneRenderer {
     const unit = quality.scale * pixelRatio();
     const wide = unit * (scene.lineScale ?? 1);
     this.#passes.ribbons.update(scene.showStrokes ? scene.strokes : [], scene.ghost, wide, scene.footprints);
+    this.#passes.drops.update(scene.drops ?? null);
     this.#passes.placing.update(scene.placing ?? null);
     this.#passes.ghost.update(scene.ghost);
     this.#passes.labels.update(scene, cut.maxHeight - cut.minHeight, unit, quality.scale);

@@ -83,7 +83,10 @@ export function samePicture(a: Scene, stampA: number, b: Scene, stampB: number):
     a.channels === b.channels &&
     a.tauPx === b.tauPx &&
     a.overlay === b.overlay &&
-    (a.overlay !== "influence" || a.influence === b.influence) &&
+    ((a.overlay !== "influence" && a.overlay !== "watershed") || a.influence === b.influence) &&
+    (a.drops ?? null)?.stamp === (b.drops ?? null)?.stamp &&
+    (a.flood ?? null) === (b.flood ?? null) &&
+    (a.rivers ?? null) === (b.rivers ?? null) &&
     a.showStrokes === b.showStrokes &&
     a.contourM === b.contourM &&
     a.lineScale === b.lineScale &&

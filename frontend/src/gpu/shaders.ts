@@ -11,6 +11,7 @@ import computeSun from "@shaders/wgsl/compute_sun.wgsl?raw";
 import computeSynthesis from "@shaders/wgsl/compute_synthesis.wgsl?raw";
 import detailPlain from "@shaders/wgsl/detail_plain.wgsl?raw";
 import detailRich from "@shaders/wgsl/detail_rich.wgsl?raw";
+import drops from "@shaders/wgsl/drops.wgsl?raw";
 import ghost from "@shaders/wgsl/ghost.wgsl?raw";
 import hidden from "@shaders/wgsl/hidden.wgsl?raw";
 import hiddenBase from "@shaders/wgsl/hidden_base.wgsl?raw";
@@ -29,6 +30,7 @@ import overlay from "@shaders/wgsl/overlay.wgsl?raw";
 import patch from "@shaders/wgsl/patch.wgsl?raw";
 import placing from "@shaders/wgsl/placing.wgsl?raw";
 import ribbon from "@shaders/wgsl/ribbon.wgsl?raw";
+import rivers from "@shaders/wgsl/rivers.wgsl?raw";
 import ruleLandscape from "@shaders/wgsl/rule_landscape.wgsl?raw";
 import rulePlain from "@shaders/wgsl/rule_plain.wgsl?raw";
 import ruleSmooth from "@shaders/wgsl/rule_smooth.wgsl?raw";
@@ -79,6 +81,7 @@ export function terrainSource(look: Look, detail: Detail): string {
     material,
     STONES[detail],
     LOOKS[look],
+    rivers,
     overlayLines,
     overlay,
     terrain,
@@ -94,6 +97,7 @@ export function sceneSource(part: "wall" | "background", detail: Detail): string
 
 export const SOURCES = {
   ribbon: join(contract, view, ribbon),
+  drops: join(contract, view, drops),
   ghost: join(contract, view, overlayLines, ghost),
   placing: join(contract, view, overlayLines, placing),
   label: join(contract, view, label),

@@ -42,7 +42,7 @@ export class ShownTerrain {
 
   /** The ground at this moment, which no later frame changes. */
   freeze(): Ground {
-    const field = this.#currentField();
+    const field = this.field();
     if (field === null) return this.#tiles.freeze();
     if (this.#shown?.stamp !== this.#tiles.stamp || this.#shown.field !== field) {
       const ground = new ShownGround(this.#tiles.freeze(), this.#tiles.solved, field);
@@ -60,11 +60,12 @@ export class ShownTerrain {
 
   /** Returns what grows and lies at a place; null before the ground has come. */
   attributesAt(x: number, y: number): Attributes | null {
-    const field = this.#currentField();
+    const field = this.field();
     return field?.attributesAt(x, y, Math.min(ATTRIBUTE_LEVEL, field.finest)) ?? null;
   }
 
-  #currentField(): DetailField | null {
+  /** All detail of the ground as it is now; null before there is a document. It is another one once anything changes. */
+  field(): DetailField | null {
     const s = this.#settings();
     if (s === null) return null;
     const key = [

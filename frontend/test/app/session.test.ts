@@ -44,6 +44,7 @@ class FakeStage {
     state: signal({ eye: [0, 0, 100], target: [10, 10, 0], fovDeg: 45, width: 800, height: 600 }),
   };
   readonly cursor = signal([1, 2, 3]);
+  readonly water = { place: signal(null) };
   readonly input = { tool: signal("mountain"), drawing: signal(null), held: signal(null) };
   static told: unknown[] = [];
   readonly groundwork = { receive: (message: unknown) => FakeStage.told.push(message) };

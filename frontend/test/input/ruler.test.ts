@@ -20,6 +20,32 @@ const key = (name: string, init: KeyboardEventInit = {}): void => {
   window.dispatchEvent(new KeyboardEvent("keydown", { key: name, code: name, cancelable: true, ...init }));
 };
 
+describe("the place from which water is followed", () => {
+  it("is one, set by a click and moved by a drag, with a link that only looks too (SPEC W49)", () => {
+    lookOnly();
+    input.ruler.open("water");
+    click(A);
+    click(B);
+    expect(points()).toEqual([[2500, 1500]]);
+    stroke([C, [1800, 2400, 0]]);
+    expect(points()).toEqual([[1800, 2400]]);
+    expect(strokes()).toEqual([]);
+    expect(input.ruler.removeLast()).toBe(true);
+    expect(points()).toEqual([]);
+  });
+
+  it("is the last point of a line, and stays one point when a line is measured again (SPEC W49)", () => {
+    input.ruler.open("line");
+    click(A);
+    click(B);
+    key("z");
+    expect(input.ruler.kind.value).toBe("water");
+    expect(points()).toEqual([[2500, 1500]]);
+    key("z");
+    expect(input.ruler.kind.value).toBeNull();
+  });
+});
+
 describe("the ruler", () => {
   it("takes points by clicks and changes no document, also with a link that only looks (SPEC N4)", () => {
     lookOnly();

@@ -14,7 +14,7 @@ from esker import contract as c
 from esker.api import arguments
 from esker.api.live.layers import Grids
 from esker.api.terrain import Terrain
-from esker.api.terrain_water import Raindrop, Watershed
+from esker.api.terrain_water import Flood, Raindrop, Watershed
 from esker.contract import Document
 from esker.document.sync import SyncDoc
 from esker.flow.rivers import River
@@ -48,6 +48,17 @@ class LiveHeights(ABC):
     def raindrop(self, x: float, y: float, level: int = c.DEFAULT_LEVEL) -> Raindrop:
         """The way of a drop on the confirmed document; see ``Terrain.raindrop``."""
         return self._offline().raindrop(x, y, level)
+
+    def flood(
+        self,
+        x: float,
+        y: float,
+        volume_m3: float | None = None,
+        rain_mm: float | None = None,
+        level: int = c.DEFAULT_LEVEL,
+    ) -> Flood:
+        """Where poured water or rain stands on the confirmed document; see ``Terrain.flood``."""
+        return self._offline().flood(x, y, volume_m3, rain_mm, level)
 
     def assemble(self, level: int) -> Any:
         """The sparse system of the confirmed document; see ``Terrain.assemble``."""

@@ -32,6 +32,7 @@ import { QualityChoice, TAU_PX } from "../device/quality-choice.ts";
 import { largeLetters, ViewChoices } from "../device/view-choices.ts";
 import { Groundwork } from "../layers/groundwork.ts";
 import { riverLines } from "../layers/river-lines.ts";
+import { ShownRivers } from "../layers/shown-rivers.ts";
 import { StillGround } from "../layers/still-ground.ts";
 import type { OpenTerrain } from "../open-terrain.ts";
 import { gridTransport } from "../server/grid-transport.ts";
@@ -46,6 +47,8 @@ import { Instruments } from "./instruments/instruments.ts";
 import { QuietStrokes } from "./quiet-strokes.ts";
 import { deepFocus } from "./regions.ts";
 import { cursorVisuals, strokeVisuals } from "./scene.ts";
+import { otherDrops } from "./water/others.ts";
+import { WaterTool } from "./water/water-tool.ts";
 
 export interface StageOptions {
   readonly session: OpenTerrain;
@@ -74,6 +77,9 @@ export class Stage {
   readonly input: InputController;
   readonly groundwork: Groundwork;
   readonly instruments: Instruments;
+  readonly water: WaterTool;
+  /** A place on a section that somebody points at, on the ground. */
+  readonly marked: ReadonlySignal<Vec3 | null>;
   readonly defaults: ToolDefaults;
   readonly loop: FrameLoop;
   readonly overlay = signal<Scene["overlay"]>("none");
@@ -99,6 +105,7 @@ export class Stage {
   readonly #viewport: HTMLElement;
   readonly #strokes: ReadonlySignal<readonly StrokeVisual[]>;
   readonly #rivers: ReadonlySignal<readonly FootprintVisual[]>;
+  readonly #shownRivers: ShownRivers;
   readonly #cursors: ReadonlySignal<readonly CursorVisual[]>;
   /** Where the selected stroke is felt, while that overlay is shown. */
   readonly #influence: ReadonlySignal<ChannelGrid | null>;
@@ -175,6 +182,22 @@ export class Stage {
       author: () => session.me.value.name,
     });
     this.instruments = new Instruments(this.input.ruler, this.tiles);
+    this.#still = new StillGround(this.tiles.revision, () => this.shown.freeze());
+    this.water = new WaterTool({
+      sizeM,
+      ruler: this.input.ruler,
+      ground: () => {
+        this.tiles.revision.value;
+        this.channels.revision.value;
+        session.doc.doc.value;
+        return this.shown.field();
+      },
+      shown: () => this.#still.ground.value ?? this.shown.freeze(),
+      seaM: () => session.doc.doc.value?.settings.sea_level_m ?? null,
+      others: () => otherDrops(session.people.value),
+      calm: () => this.#calm.matches,
+    });
+    this.marked = computed(() => this.water.marked.value ?? this.instruments.marked.value);
     this.groundwork = new Groundwork({
       sizeM,
       doc: session.doc,
@@ -194,14 +217,14 @@ export class Stage {
       author: () => session.me.value.name,
     });
     this.#strokes = computed(() => this.#visuals());
-    this.#still = new StillGround(this.tiles.revision, () => this.shown.freeze());
     this.#rivers = computed(() => {
       const settings = session.doc.doc.value?.settings;
       const set = session.rivers.value;
-      if (!settings?.rivers || set === null) return [];
+      if (!settings?.rivers || set === null || this.graphics.info.value?.kind !== "map") return [];
       const ground = this.#still.ground.value;
       return ground === null ? [] : riverLines(set, settings.wetness, ground);
     });
+    this.#shownRivers = new ShownRivers(sizeM);
     this.#cursors = computed(() => cursorVisuals(session.people.value));
     this.#influence = computed(() => {
       if (this.overlay.value !== "influence") return null;
@@ -288,7 +311,7 @@ export class Stage {
     const chrome = {
       top: box("esk-top-bar"),
       tools: box("esk-tools"),
-      foot: box("esk-measure") ?? box("esk-view-bar"),
+      foot: box("esk-measure") ?? box("esk-water") ?? box("esk-view-bar"),
       side: box("aside.side"),
     };
     const edges = coveredEdges(picture, chrome);
@@ -317,6 +340,7 @@ export class Stage {
     this.quietStrokes.stop();
     this.groundwork.dispose();
     this.instruments.dispose();
+    this.water.dispose();
     this.input.dispose();
     this.graphics.dispose();
   }
@@ -348,6 +372,7 @@ export class Stage {
         input.drawing.value;
         input.held.value;
         input.tool.value;
+        this.water.place.value;
         session.presenceChanged();
       }),
       effect(() => {
@@ -359,7 +384,11 @@ export class Stage {
         input.ghost.value;
         this.groundwork.footprints.value;
         this.#rivers.value;
+        session.rivers.value;
         this.instruments.lines.value;
+        this.water.lines.value;
+        this.water.floodVisual.value;
+        this.water.shower.raining.value;
         this.groundwork.visual.value;
         this.overlay.value;
         this.quality.mode.value;
@@ -407,6 +436,12 @@ export class Stage {
     const { renderer } = this.graphics;
     const quality = this.quality.mode.peek();
     if (!renderer || !doc) return moving;
+    const drops = this.water.drops(dtS);
+    const rivers = this.#shownRivers.map(
+      doc.settings.rivers ? this.session.rivers.value : null,
+      doc.settings.wetness,
+      this.#calm.matches ? Number.POSITIVE_INFINITY : timeS,
+    );
     const stats = renderer.render({
       camera: this.camera.state.value,
       tiles: this.tiles,
@@ -416,19 +451,33 @@ export class Stage {
       strokes: this.#strokes.value,
       ghost: this.input.ghost.value,
       cursors: this.#cursors.value,
-      footprints: [...this.#rivers.value, ...this.groundwork.footprints.value, ...this.instruments.lines.value],
+      footprints: [
+        ...this.#rivers.value,
+        ...this.groundwork.footprints.value,
+        ...this.instruments.lines.value,
+        ...this.water.lines.value,
+      ],
       placing: this.groundwork.visual.value,
       tauPx: TAU_PX[quality],
       quality,
       time: this.#calm.matches ? 0 : timeS,
-      overlay: this.overlay.value,
-      influence: this.#influence.value,
+      ...this.#overlaid(),
+      drops,
+      rivers: renderer.kind === "map" ? null : rivers,
+      flood: this.water.floodVisual.value,
       showStrokes: this.showStrokes.value,
       contourM: this.view.contourM,
       lineScale: this.view.lineScale,
     });
     this.stats.value = stats;
-    return moving || stats.busy;
+    return moving || stats.busy || this.#shownRivers.fading || (drops !== null && !this.#calm.matches);
+  }
+
+  /** The overlay; a watershed lies where no other does. */
+  #overlaid(): Pick<Scene, "overlay" | "influence"> {
+    const shed = this.water.tint.value;
+    if (shed !== null && this.overlay.value === "none") return { overlay: "watershed", influence: shed };
+    return { overlay: this.overlay.value, influence: this.#influence.value };
   }
 }
 

@@ -1,6 +1,6 @@
 /**
  * One small texture over the whole domain, which the ground's overlays read (rgba8unorm; `detail_at` in terrain.wgsl):
- * noise amplitude, roughness, where the selected stroke is felt or a channel is painted, and how far contours show.
+ * noise amplitude, roughness, where the selected stroke is felt, a channel is painted or a watershed lies, and how far contours show.
  */
 
 import type { ChannelGrid, ChannelView, PaintedOverlay, Scene } from "../../core/types.ts";
@@ -19,7 +19,7 @@ function isPainted(overlay: Scene["overlay"]): overlay is PaintedOverlay {
 
 /** The third component of the texture: influence, or a painted channel as 0.5 + bias / 2; null with other overlays. */
 export function overlayGrid({ overlay, influence, channels }: Scene): ChannelGrid | null {
-  if (overlay === "influence") return influence ?? null;
+  if (overlay === "influence" || overlay === "watershed") return influence ?? null;
   if (!isPainted(overlay)) return null;
   const grid = channels[overlay];
   const known = shares.get(grid);

@@ -54,6 +54,9 @@ export class DetailPicture {
 const FELT_FAR: Rgb = [0xc9, 0xb8, 0x6e];
 const FELT_NEAR: Rgb = [0xd3, 0x5a, 0x3c];
 
+/** The colour of a watershed on the map. */
+const SHED: Rgb = [0x2f, 0x72, 0xb8];
+
 /** The colours of painted_tint in overlay.wgsl and of ui/panels/legend.ts. */
 const LESS: Rgb = [0xb3, 0x74, 0x42];
 const MORE: Rgb = [0x35, 0x95, 0xb3];
@@ -81,6 +84,29 @@ export class PaintedPicture {
     values.forEach((share, k) => {
       const row = side - 1 - Math.floor(k / side);
       image.data.set([...paintedColour(share), 255], 4 * (row * side + (k % side)));
+    });
+    context.putImageData(image, 0, 0);
+    return this.#canvas;
+  }
+}
+
+/** A watershed, as a picture to lay over the map. */
+export class ShedPicture {
+  #canvas: HTMLCanvasElement | null = null;
+  #source: ChannelGrid | null = null;
+
+  /** The picture, north up, clear beyond the watershed. */
+  of(shed: ChannelGrid): HTMLCanvasElement {
+    if (this.#canvas !== null && this.#source === shed) return this.#canvas;
+    this.#source = shed;
+    const { side, values } = shed;
+    this.#canvas ??= document.createElement("canvas");
+    Object.assign(this.#canvas, { width: side, height: side });
+    const context = this.#canvas.getContext("2d")!;
+    const image = context.createImageData(side, side);
+    values.forEach((share, k) => {
+      const row = side - 1 - Math.floor(k / side);
+      image.data.set([...SHED, 150 * share], 4 * (row * side + (k % side)));
     });
     context.putImageData(image, 0, 0);
     return this.#canvas;

@@ -1,6 +1,15 @@
 /** The map: a relief as if printed on a 2D canvas, for browsers without WebGPU (DESIGN 9). Same scenes, same tiles. */
 
-import type { CameraState, FrameStats, Rgba, Scene, SceneRenderer, Tile, TileView } from "../../core/types.ts";
+import type {
+  CameraState,
+  ChannelGrid,
+  FrameStats,
+  Rgba,
+  Scene,
+  SceneRenderer,
+  Tile,
+  TileView,
+} from "../../core/types.ts";
 import { SUBPATCHES } from "../../generated/contract.ts";
 import { sharesOf } from "../../tiles/flat.ts";
 import { levelsOn } from "../../tiles/lakes/lakes.ts";
@@ -8,7 +17,8 @@ import { LakeWatch } from "../../tiles/lakes/lakewatch.ts";
 import { assembleBordered, SLOT_TEXELS } from "../atlas/apron.ts";
 import { overlayGrid } from "../atlas/channeltexture.ts";
 import { contourInterval } from "../looks.ts";
-import { DetailPicture, InfluencePicture, PaintedPicture } from "./detail.ts";
+import { DetailPicture, InfluencePicture, PaintedPicture, ShedPicture } from "./detail.ts";
+import { drawDrops } from "./drops.ts";
 import { drawFootprints, MapPlacing } from "./grids.ts";
 import { type MapStyle, shadeTile } from "./shade.ts";
 
@@ -46,6 +56,7 @@ export class MapRenderer implements SceneRenderer {
   readonly #detail = new DetailPicture();
   readonly #felt = new InfluencePicture();
   readonly #painted = new PaintedPicture();
+  readonly #shed = new ShedPicture();
   readonly #placing = new MapPlacing();
   readonly #lakes = new LakeWatch();
   readonly #slot = new Float32Array(SLOT_TEXELS * SLOT_TEXELS);
@@ -64,7 +75,7 @@ export class MapRenderer implements SceneRenderer {
     const began = performance.now();
     this.#frame += 1;
     const { camera } = scene;
-    this.#lakes.update(scene.tiles, scene.settings, began, false);
+    this.#lakes.update(scene.tiles, scene.settings, began, false, scene.flood);
     if (this.#canvas.width !== camera.width) this.#canvas.width = camera.width;
     if (this.#canvas.height !== camera.height) this.#canvas.height = camera.height;
     const frame = frameOf(camera);
@@ -73,14 +84,14 @@ export class MapRenderer implements SceneRenderer {
     if (scene.overlay === "detail") this.#drawOver(this.#detail.of(scene.channels), scene, frame);
     const shares = overlayGrid(scene);
     if (shares !== null) {
-      const picture = scene.overlay === "influence" ? this.#felt.of(shares) : this.#painted.of(shares);
-      this.#drawOver(picture, scene, frame);
+      this.#drawOver(this.#pictureOf(scene.overlay, shares), scene, frame);
     }
     drawGrid(this.#context, frame, scene.tiles.sizeM);
     const to = (x: number, y: number): [number, number] => toMap(frame, x, y);
     if (scene.placing) this.#placing.draw(this.#context, scene.placing, to);
     drawFootprints(this.#context, scene.footprints ?? [], to, globalThis.devicePixelRatio || 1);
     if (scene.showStrokes) drawStrokes(this.#context, frame, scene);
+    if (scene.drops) drawDrops(this.#context, scene.drops, to, globalThis.devicePixelRatio || 1);
     drawCursors(this.#context, frame, scene);
     this.#forget();
     return {
@@ -158,7 +169,11 @@ export class MapRenderer implements SceneRenderer {
     this.#context.drawImage(picture, left, top, right - left, bottom - top);
   }
 
-  /** Tints the relief, which shows through. */
+  #pictureOf(overlay: Scene["overlay"], shares: ChannelGrid): HTMLCanvasElement {
+    if (overlay === "watershed") return this.#shed.of(shares);
+    return overlay === "influence" ? this.#felt.of(shares) : this.#painted.of(shares);
+  }
+
   /** Stretches a picture of the whole domain over the map. */
   #drawOver(picture: HTMLCanvasElement, scene: Scene, frame: Frame): void {
     const [left, top] = toMap(frame, 0, scene.tiles.sizeM);

@@ -5,6 +5,7 @@ import type { Cut } from "../../tiles/patches/selection.ts";
 import type { FrameBindings } from "../frame.ts";
 import type { Target } from "../target.ts";
 import type { BackgroundPass } from "./background.ts";
+import type { DropPass } from "./drops.ts";
 import type { GhostPass } from "./ghostplane.ts";
 import type { HiddenPatches } from "./hidden.ts";
 import type { LabelPass } from "./labels.ts";
@@ -18,6 +19,7 @@ interface Passes {
   readonly background: BackgroundPass;
   readonly patches: PatchPasses;
   readonly ribbons: RibbonPass;
+  readonly drops: DropPass;
   readonly ghost: GhostPass;
   readonly placing: PlacingPass;
   readonly labels: LabelPass;
@@ -122,7 +124,7 @@ export class Picture {
 
   /** All that comes after the ground, whose viewport is set. */
   #rest(pass: GPURenderPassEncoder, scene: Scene): void {
-    const { frame, background, patches, ribbons, ghost, placing, labels } = this.#passes;
+    const { frame, background, patches, ribbons, drops, ghost, placing, labels } = this.#passes;
     patches.drawWalls(pass);
     const sea = scene.settings.sea_level_m !== null;
     frame.narrow(pass);
@@ -133,6 +135,7 @@ export class Picture {
     placing.draw(pass);
     ghost.draw(pass);
     labels.draw(pass);
+    drops.draw(pass);
     ribbons.draw(pass);
     pass.end();
   }

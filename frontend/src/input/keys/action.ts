@@ -31,6 +31,7 @@ export type ActionId =
   | "brush-channel"
   | "brush-opposite"
   | "set-point"
+  | "water"
   | "measure-line"
   | "measure-area"
   | "turn-grid-left"

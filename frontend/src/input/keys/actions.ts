@@ -63,8 +63,9 @@ export function createActions(c: ActionContext): Map<string, Action> {
   for (const [kind, title, key] of [
     ["line", "Measure along a line: profile, distance, slope", "y"],
     ["area", "Measure an area: size, volume, change", "Shift+y"],
+    ["water", "Follow water: a drop's way, watersheds, rain, floods", "z"],
   ] as const)
-    put(`measure-${kind}`, title, [key], () => {
+    put(kind === "water" ? kind : `measure-${kind}`, title, [key], () => {
       if (c.placing.value !== null) return;
       if (c.ruler.kind.value === kind) c.ruler.close();
       else c.ruler.open(kind);

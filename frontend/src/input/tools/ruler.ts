@@ -1,13 +1,14 @@
 /**
- * The line or outline that is measured: points on the map, set by clicks, drawn in one go, taken by their handles. It changes no
- * document and belongs to this page alone. While it is open it has the pointer, as a grid that is being placed has.
+ * The line or outline that is measured, or the place from which water is followed: points on the map, set by clicks, drawn in one
+ * go, taken by their handles. It changes no document and belongs to this page alone. While it is open it has the pointer, as a grid that is being placed has.
  */
 
 import { type ReadonlySignal, signal } from "@preact/signals-core";
 import { type Place, simplified } from "../../core/measure/places.ts";
 import type { Ground, Vec3 } from "../../core/types.ts";
 
-export type RulerKind = "line" | "area";
+/** `water`: one point, from which water is followed. */
+export type RulerKind = "line" | "area" | "water";
 
 /** A point as it is taken hold of. */
 export interface RulerHandle {
@@ -41,8 +42,9 @@ export class Ruler {
     return this.#points;
   }
 
-  /** Takes the ruler in hand; points that are set stay when a line becomes an outline. */
+  /** Takes the ruler in hand; points that are set stay when a line becomes an outline. Water begins at the last one. */
   open(kind: RulerKind): void {
+    if ((kind === "water") !== (this.#kind.peek() === "water")) this.#points.value = this.#points.peek().slice(-1);
     this.#kind.value = kind;
   }
 
@@ -54,6 +56,10 @@ export class Ruler {
 
   /** Sets a point at the end. False where there are too many. */
   add(hit: Place | Vec3): boolean {
+    if (this.#kind.peek() === "water") {
+      this.#points.value = [[hit[0], hit[1]]];
+      return true;
+    }
     if (this.#points.peek().length >= MOST_POINTS) return false;
     this.#points.value = [...this.#points.peek(), [hit[0], hit[1]]];
     return true;
@@ -101,12 +107,14 @@ export class Ruler {
   }
 
   draw(hit: Vec3 | null): void {
-    if (this.#drawing && hit !== null) this.#points.value = [...this.#points.peek(), [hit[0], hit[1]]];
+    if (!this.#drawing || hit === null) return;
+    const before = this.#kind.peek() === "water" ? [] : this.#points.peek();
+    this.#points.value = [...before, [hit[0], hit[1]]];
   }
 
   /** The pointer was lifted. `pixelM`: what a pixel covers there. */
   finish(pixelM: number): void {
-    if (this.#drawing) {
+    if (this.#drawing && this.#kind.peek() !== "water") {
       const kept = simplified(this.#points.peek(), TOLERANCE_PX * pixelM, MOST_DRAWN);
       // An outline that was drawn back to its beginning is closed by itself.
       const [first, last] = [kept[0]!, kept.at(-1)!];
@@ -134,7 +142,7 @@ export class Ruler {
     return this.#points.value.map(([x, y], i) => ({
       kind: "ruler",
       position: [x, y, ground.heightAt(x, y)],
-      label: `Point ${i + 1}`,
+      label: this.#kind.value === "water" ? "Where the drop falls" : `Point ${i + 1}`,
       active: i === active,
     }));
   }

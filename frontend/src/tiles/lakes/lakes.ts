@@ -73,7 +73,7 @@ export function findLakes(heights: Float32Array, side: number, { cellM, leastM, 
     }
     if (count > 0) samples.set(level, (samples.get(level) ?? 0) + count);
   }
-  for (let k = 0; k < LAKE_SHORE_SAMPLES && samples.size > 0; k += 1) levels = widened(levels, heights, side);
+  if (samples.size > 0) levels = widenedShores(levels, heights, side);
   return { side, heights, levels, samples };
 }
 
@@ -135,6 +135,17 @@ function takeBasin(left: Uint8Array, side: number, start: number): number[] {
     }
   }
   return basin;
+}
+
+/** Levels with their shores: the samples around a lake have its level too. */
+export function widenedShores(
+  levels: Float32Array<ArrayBuffer>,
+  heights: Float32Array,
+  side: number,
+): Float32Array<ArrayBuffer> {
+  let out = levels;
+  for (let k = 0; k < LAKE_SHORE_SAMPLES; k += 1) out = widened(out, heights, side);
+  return out;
 }
 
 /** Levels carried one sample further, over ground that is not below them; where lakes meet the lowest. */

@@ -1,7 +1,8 @@
 /** The lakes of a terrain while it changes: found anew a few times a second, their levels ease over. */
 
-import type { TileView } from "../../core/types.ts";
+import type { FloodVisual, TileView } from "../../core/types.ts";
 import { LAKE_LEVEL, NO_LAKE, type TerrainSettings, TILE_CELLS } from "../../generated/contract.ts";
+import { withFlood } from "./flooded.ts";
 import { findLakes, type Lakes, lakeGround, Surfaces } from "./lakes.ts";
 
 /** Lakes as they are drawn. */
@@ -32,6 +33,7 @@ export class LakeWatch implements ShownLakes {
   readonly #targets = new Map<number, number>();
   #view: TileView | null = null;
   #rule: Rule = { lakes_m: null, sea_level_m: null };
+  #flood: FloodVisual | null = null;
   #ground: Float32Array | null = null;
   #stamp = -1;
   #asked = Number.NEGATIVE_INFINITY;
@@ -52,17 +54,25 @@ export class LakeWatch implements ShownLakes {
   }
 
   /**
-   * Follows a scene; `smooth`: levels ease over. True when what is drawn has changed. `now`: milliseconds.
+   * Follows a scene; `smooth`: levels ease over. True when what is drawn has changed. `now`: milliseconds. `flood`: lakes
+   * that were poured out.
    */
-  update(view: TileView, { lakes_m, sea_level_m }: Rule, now: number, smooth: boolean): boolean {
+  update(
+    view: TileView,
+    { lakes_m, sea_level_m }: Rule,
+    now: number,
+    smooth: boolean,
+    flood: FloodVisual | null = null,
+  ): boolean {
     const other = view !== this.#view;
-    const ruled = lakes_m !== this.#rule.lakes_m || sea_level_m !== this.#rule.sea_level_m;
+    const ruled = lakes_m !== this.#rule.lakes_m || sea_level_m !== this.#rule.sea_level_m || flood !== this.#flood;
+    this.#flood = flood;
     if (other) this.#forget();
     if (other || ruled) this.#stamp = -1;
     this.#view = view;
     this.#rule = { lakes_m, sea_level_m };
     const began = this.lakes;
-    if (lakes_m === null) {
+    if (this.#isDry) {
       if (this.lakes !== null || ruled) this.#forget();
       this.#stamp = view.stamp;
     } else if (this.#stale && !this.#waiting && (ruled || now - this.#asked >= REST_MS)) {
@@ -77,8 +87,13 @@ export class LakeWatch implements ShownLakes {
     return changed;
   }
 
+  /** There is nothing to look for. */
+  get #isDry(): boolean {
+    return this.#rule.lakes_m === null && this.#flood === null;
+  }
+
   get #stale(): boolean {
-    return this.#view !== null && this.#rule.lakes_m !== null && this.#stamp !== this.#view.stamp;
+    return this.#view !== null && !this.#isDry && this.#stamp !== this.#view.stamp;
   }
 
   get #moving(): boolean {
@@ -103,7 +118,7 @@ export class LakeWatch implements ShownLakes {
     this.#waiting = false;
     const view = this.#view;
     const rule = this.#rule;
-    if (view === null || rule.lakes_m === null) return;
+    if (view === null || this.#isDry) return;
     const ruled = this.#stamp === -1;
     this.#stamp = view.stamp;
     const ground = lakeGround(view);
@@ -111,8 +126,9 @@ export class LakeWatch implements ShownLakes {
     this.#ground = ground;
     const cellM = view.sizeM / (TILE_CELLS << LAKE_LEVEL);
     const side = Math.sqrt(ground.length);
-    const found = findLakes(ground, side, { cellM, leastM: rule.lakes_m, seaM: rule.sea_level_m });
-    this.#take(found, smooth);
+    const leastM = rule.lakes_m ?? Number.POSITIVE_INFINITY;
+    const found = findLakes(ground, side, { cellM, leastM, seaM: rule.sea_level_m });
+    this.#take(this.#flood === null ? found : withFlood(found, this.#flood), smooth);
     this.#fresh = true;
   }
 

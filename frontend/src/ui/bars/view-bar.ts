@@ -142,10 +142,19 @@ export class EskViewBar extends SignalElement {
         class="icon-btn small"
         aria-label="Measure"
         title=${keyText("Measure: profile, distance, area, volume", actions.get("measure-line"))}
-        aria-pressed=${this.measuring.value !== null}
+        aria-pressed=${this.measuring.value !== null && this.measuring.value !== "water"}
         @click=${() => this.#run(this.measuring.value === "area" ? "measure-area" : "measure-line")}
       >
         ${icon("ruler")}
+      </button>
+      <button
+        class="icon-btn small"
+        aria-label="Water"
+        title=${keyText("Water: a drop's way, rain, floods, the sea", actions.get("water"))}
+        aria-pressed=${this.measuring.value === "water"}
+        @click=${() => this.#run("water")}
+      >
+        ${icon("drop")}
       </button>
       <wa-dropdown placement="top-end" @wa-select=${this.#overlay}>
         <button slot="trigger" class="icon-btn small" aria-label="Overlays" title="Overlays" aria-pressed=${overlay.value !== "none"}>

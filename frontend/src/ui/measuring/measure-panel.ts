@@ -67,7 +67,7 @@ export class EskMeasure extends SignalElement {
   protected override render(): TemplateResult | typeof nothing {
     const { ruler } = this.instruments;
     const kind = ruler.kind.value;
-    if (kind === null) return nothing;
+    if (kind === null || kind === "water") return nothing;
     return html`${this.#head(kind)} ${kind === "line" ? this.#line() : this.#area()}`;
   }
 

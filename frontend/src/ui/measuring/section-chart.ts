@@ -9,7 +9,7 @@ import { type Profile, profileAt } from "../../core/measure/profile.ts";
 const rootPx = (): number => Number.parseFloat(getComputedStyle(document.documentElement).fontSize) || 16;
 
 export function sectionChart(
-  instruments: Instruments,
+  instruments: Pick<Instruments, "beforeHeights" | "exaggeration" | "marker">,
   profile: Profile,
   width: number,
   height: number,

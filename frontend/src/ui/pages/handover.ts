@@ -7,7 +7,7 @@ import { computed, type ReadonlySignal } from "@preact/signals-core";
 import { html, nothing, type TemplateResult } from "lit";
 import type { Identity } from "../../app/device/storage.ts";
 import type { Stage } from "../../app/view/stage.ts";
-import type { QualityMode, Scene } from "../../core/types.ts";
+import type { Ground, QualityMode, Scene } from "../../core/types.ts";
 import type { PageCommand } from "../bars/top-bar.ts";
 import "../bars/people.ts";
 import "../bars/history-view-bar.ts";
@@ -30,21 +30,13 @@ import "../measuring/measure-panel.ts";
 import "../panels/overlay.ts";
 import "../panels/stroke-panel.ts";
 import "../panels/terrain-panel.ts";
+import "../water/water-panel.ts";
 
 export type PanelTab = "stroke" | "ground" | "terrain" | "history" | "lesson";
 export type DialogId = "share" | "profile" | "help" | "about" | "export" | "delete";
 
 /** Handles, cursors and the brush, over the picture. */
-export function overlay({
-  camera,
-  input,
-  cursor,
-  defaults,
-  shown,
-  meets,
-  session,
-  instruments,
-}: Stage): TemplateResult {
+export function overlay({ camera, input, cursor, defaults, shown, meets, session, marked }: Stage): TemplateResult {
   return html`<esk-overlay
     .camera=${camera}
     .input=${input}
@@ -55,7 +47,7 @@ export function overlay({
     .meets=${meets}
     .people=${session.people}
     .canEdit=${session.canEdit}
-    .marked=${instruments.marked}
+    .marked=${marked}
   ></esk-overlay>`;
 }
 
@@ -143,6 +135,20 @@ export function foot(stage: Stage): TemplateResult {
   </div>`;
 }
 
+const grounds = new WeakMap<Stage, () => Ground | null>();
+
+/** The solved ground, anew with its tiles. */
+function groundOf(stage: Stage): () => Ground | null {
+  const known = grounds.get(stage);
+  if (known !== undefined) return known;
+  const made = (): Ground | null => {
+    stage.tiles.revision.value;
+    return stage.tiles.size > 0 ? stage.tiles.freeze() : null;
+  };
+  grounds.set(stage, made);
+  return made;
+}
+
 const headings = new WeakMap<Stage, ReadonlySignal<string>>();
 
 function headingOf(stage: Stage): ReadonlySignal<string> {
@@ -153,7 +159,9 @@ function headingOf(stage: Stage): ReadonlySignal<string> {
 
 /** What is measured, while something is. */
 export function measurePanel(stage: Stage, beside: boolean): TemplateResult | typeof nothing {
-  if (stage.input.ruler.kind.value === null) return nothing;
+  const kind = stage.input.ruler.kind.value;
+  if (kind === null) return nothing;
+  if (kind === "water") return waterPanel(stage, beside);
   return html`<esk-measure
     class="panel"
     role="region"
@@ -164,6 +172,22 @@ export function measurePanel(stage: Stage, beside: boolean): TemplateResult | ty
     .historyClock=${stage.session.historyView.shown}
     ?beside=${beside}
   ></esk-measure>`;
+}
+
+function waterPanel(stage: Stage, beside: boolean): TemplateResult {
+  const { session, sizeM, tiles, water } = stage;
+  return html`<esk-water
+    class="panel"
+    role="region"
+    aria-label="Water"
+    .water=${water}
+    .doc=${session.doc.doc}
+    .canEdit=${session.canEdit}
+    .tiles=${tiles}
+    .edits=${session}
+    .sizeM=${sizeM}
+    ?beside=${beside}
+  ></esk-water>`;
 }
 
 export function historyViewBar({ session }: Stage, beside: boolean): TemplateResult {
@@ -195,6 +219,7 @@ export function inspector(stage: Stage, tab: PanelTab, browse: () => void): Temp
       .canEdit=${session.canEdit}
       .defaults=${stage.defaults}
       .meets=${stage.meets}
+      .ground=${groundOf(stage)}
       .sizeM=${sizeM}
       .actions=${input.actions}
       .edits=${session}

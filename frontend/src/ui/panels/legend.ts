@@ -17,7 +17,10 @@ export function amplitudeEnds(greatestM: number): [string, string] {
 }
 
 /** Overlays without a scale: the key that goes through them all should say which it has come to. */
-const NAMED = { patches: "Levels of detail, a colour each" } as const;
+const NAMED = {
+  patches: "Levels of detail, a colour each",
+  watershed: "All ground that drains through the place",
+} as const;
 
 /** The meaning of an overlay's colours. */
 export class EskLegend extends SignalElement {
@@ -108,7 +111,7 @@ export class EskLegend extends SignalElement {
 
   #overlay(overlay: Exclude<Scene["overlay"], "none">): TemplateResult {
     if (overlay === "contours") return this.#contours();
-    if (overlay === "patches") return html`<div class="name">${NAMED[overlay]}</div>`;
+    if (overlay === "patches" || overlay === "watershed") return html`<div class="name">${NAMED[overlay]}</div>`;
     if (overlay === "slope") return scale("Steepness", "slope", ["0°", "30°", "60°"]);
     if (overlay === "influence") return this.#influence();
     this.channels.revision.value;

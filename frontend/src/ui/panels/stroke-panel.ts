@@ -21,6 +21,7 @@ import type { SectionChange } from "./section-form.ts";
 import "./section-form.ts";
 import type { ReadonlySignal, Signal } from "@preact/signals-core";
 import type { OpenTerrain } from "../../app/open-terrain.ts";
+import type { Ground } from "../../core/types.ts";
 import type { Doc } from "../../doc/document.ts";
 import type { Meeting } from "../../doc/meetings.ts";
 import type { ToolDefaults } from "../../input/defaults.ts";
@@ -64,6 +65,7 @@ export class EskStrokePanel extends SignalElement {
     canEdit: { attribute: false },
     defaults: { attribute: false },
     meets: { attribute: false },
+    ground: { attribute: false },
     sizeM: { attribute: false },
     actions: { attribute: false },
     edits: { attribute: false },
@@ -80,6 +82,8 @@ export class EskStrokePanel extends SignalElement {
   declare defaults: ToolDefaults;
   /** Strokes that cross the chosen one. */
   declare meets: ReadonlySignal<readonly Meeting[]>;
+  /** The solved ground now; null before it has come. */
+  declare ground: () => Ground | null;
   declare sizeM: number;
   /** Actions that the buttons run. */
   declare actions: ReadonlyMap<string, Action>;
@@ -170,7 +174,7 @@ export class EskStrokePanel extends SignalElement {
   #course(stroke: Stroke, disabled: boolean): TemplateResult {
     const change = (e: CustomEvent<CourseChange>): void =>
       this.#set(stroke, restyled(stroke, e.detail.style), e.detail.settled);
-    return this.#courseForm(styleOf(stroke), courseFacts(stroke), disabled, change);
+    return this.#courseForm(styleOf(stroke), courseFacts(stroke, this.ground()), disabled, change);
   }
 
   /** The form for the next river, road or ridge; another use begins with its own measures. */

@@ -90,7 +90,7 @@ export const terrainPageStyles = css`
       width: 352px;
     }
   }
-  esk-measure {
+  :is(esk-measure, esk-water) {
     position: absolute;
     left: calc(var(--edge) + 62px);
     right: var(--edge);
@@ -107,10 +107,10 @@ export const terrainPageStyles = css`
     }
   }
   /* The panel stands where the legend does. */
-  .foot:has(~ esk-measure) esk-legend {
+  .foot:has(~ :is(esk-measure, esk-water)) esk-legend {
     display: none;
   }
-  esk-measure[beside] {
+  :is(esk-measure, esk-water)[beside] {
     right: calc(var(--edge) + 340px);
   }
   .hint,
@@ -358,28 +358,28 @@ export const terrainPageStyles = css`
         --segment-basis: 40%;
       }
     }
-    esk-measure,
-    esk-measure[beside] {
+    :is(esk-measure, esk-water),
+    :is(esk-measure, esk-water)[beside] {
       left: 0;
       right: 0;
       bottom: calc(var(--drawer) + 72px + env(safe-area-inset-bottom));
       margin: 0 var(--edge);
       background: var(--esk-panel-solid);
     }
-    :host([drawer]) esk-measure {
+    :host([drawer]) :is(esk-measure, esk-water) {
       display: none;
     }
-    .foot:has(~ esk-measure) {
+    .foot:has(~ :is(esk-measure, esk-water)) {
       display: none;
     }
     /* Little height is left for the land: the tools come back when one stops measuring. */
     @media (max-height: 440px) {
-      esk-measure,
-      esk-measure[beside] {
+      :is(esk-measure, esk-water),
+      :is(esk-measure, esk-water)[beside] {
         bottom: var(--edge);
         max-height: 52%;
       }
-      esk-tools:has(~ esk-measure) {
+      esk-tools:has(~ :is(esk-measure, esk-water)) {
         display: none;
       }
     }
