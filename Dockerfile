@@ -17,8 +17,8 @@ RUN apt-get update \
     && apt-get install -y --no-install-recommends libegl1 libexpat1 libgl1-mesa-dri \
     && rm -rf /var/lib/apt/lists/*
 WORKDIR /esker
-COPY requirements.lock build.in pyproject.toml README.md LICENSE NOTICE ./
-RUN pip install --no-cache-dir --require-hashes -r requirements.lock
+COPY requirements-cluster.lock build.in pyproject.toml README.md LICENSE NOTICE ./
+RUN pip install --no-cache-dir --require-hashes -r requirements-cluster.lock
 COPY backend backend
 COPY shaders shaders
 RUN pip install --no-cache-dir --no-deps --no-build-isolation -e .

@@ -193,9 +193,10 @@ def test_the_cluster_is_whole() -> None:
         assert f"ESKER_NODE: {name}\n" in block[1]
         assert f"ESKER_ADVERTISE: http://node-{name}:8000\n" in block[1]
         assert f"- node-{name}:/data\n" in block[1]
-    given = set(re.findall(r"^ +ESKER_(\w+):", compose, re.M)) - {"DOMAIN", "BLOBS"}
+    given = set(re.findall(r"^ +ESKER_(\w+):", compose, re.M)) - {"DOMAIN"}
     assert {name.lower() for name in given} <= vars(settings.Settings()).keys()
     assert "@database/esker" in compose
+    assert "-r requirements-cluster.lock" in DOCKERFILE, "the nodes have what they need for the database and the grids"
     assert "image: postgres:16" in compose
     volumes = set(re.findall(r"^  ([\w-]+):$", compose.split("\nvolumes:\n")[1], re.M))
     assert volumes == set(re.findall(r"^      - ([\w-]+):/", compose, re.M))
