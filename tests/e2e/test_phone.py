@@ -83,9 +83,14 @@ def test_a_phone_shows_the_land_beside_its_panel_and_follows_a_turn(visitors: Vi
     phone.page.locator("aside.side").wait_for()
     tools = phone.page.locator("esk-tools")
     assert tools.evaluate("e => e.scrollWidth <= e.clientWidth")
-    names = ("Stroke", "Ground", "Terrain", "History")
+    names = ("Stroke", "Ground", "Terrain", "History", "Lesson")
     tops = {phone.page.get_by_role("radio", name=name).evaluate("e => e.offsetTop") for name in names}
-    assert len(tops) == 1, "four tabs stand side by side"
+    assert len(tops) == 1, "five tabs stand side by side"
+    ends = phone.page.get_by_role("radio", name="Lesson").bounding_box()
+    cross = phone.page.get_by_role("button", name="Close the inspector").bounding_box()
+    assert ends is not None
+    assert cross is not None
+    assert ends["x"] + ends["width"] <= cross["x"], "and end before the cross"
     bars_apart(phone, "esk-top-bar .right", "esk-tools", "aside.side")
     phone.shot("phone-drawer-beside")
 

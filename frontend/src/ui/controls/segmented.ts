@@ -28,7 +28,7 @@ export class EskSegmented extends LitElement {
       div {
         display: flex;
         flex-wrap: var(--segments-wrap, nowrap);
-        gap: 2px;
+        gap: var(--segment-gap, 2px);
         padding: 2px;
         border-radius: 10px;
         background: var(--esk-hover);
@@ -46,7 +46,7 @@ export class EskSegmented extends LitElement {
         border-radius: 8px;
         background: transparent;
         color: var(--esk-quiet);
-        font: 500 0.8125rem/1 var(--wa-font-family-body);
+        font: 500 var(--segment-size, 0.8125rem) / 1 var(--wa-font-family-body);
         white-space: nowrap;
         cursor: pointer;
       }

@@ -342,6 +342,11 @@ export const terrainPageStyles = css`
       .side header esk-segmented {
         --segment-pad: 3px;
       }
+      .side.leads header esk-segmented {
+        --segment-pad: 1px;
+        --segment-gap: 0;
+        --segment-size: 0.75rem;
+      }
       .side,
       .side.leads {
         top: calc(var(--edge) + 52px);
