@@ -90,11 +90,11 @@ def frame(payload: bytes, opcode: int = 1, fin: bool = True) -> bytes:
     return head + bytes(4) + payload
 
 
-async def _socket(at: Target) -> Pipe:
+async def _socket(at: Target, path: str = "/ws") -> Pipe:
     reader, writer = await _connect(at)
     key = base64.b64encode(os.urandom(16)).decode()
     writer.write(
-        f"GET /ws HTTP/1.1\r\nHost: {at.place[0]}:{at.place[1]}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+        f"GET {path} HTTP/1.1\r\nHost: {at.place[0]}:{at.place[1]}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
         f"Sec-WebSocket-Key: {key}\r\nSec-WebSocket-Version: 13\r\n"
         f"Sec-WebSocket-Protocol: {c.SUBPROTOCOL}\r\n\r\n".encode()
     )
@@ -367,5 +367,5 @@ ATTACKS: Final[dict[str, Attack]] = {
         impossible_numbers, journal, deaf_readers, uploads, codes, requests,
     )
 }  # fmt: skip
-BY_LINK: Final = frozenset({"bad_operations", "pings", "seats", "history_rooms", "requests"})
+BY_LINK: Final = frozenset({"bad_operations", "pings", "seats", "history_rooms", "requests", "exports"})
 """Those that need a link: a viewer has one to the terrain where people draw, a stranger one to another terrain."""

@@ -2,10 +2,11 @@
 
 Three people draw on one terrain through ``esker.connect``; the server under them is killed again and again, and started
 anew on the same data: while they draw, and in the middle of an import, a backup, a restore, the removal of a deleted
-terrain, a migration, and folding. Afterwards every operation that was acknowledged must be there at its clock, every
-file must open, and all people must see the same terrain, which is that of the journal. ``inside``: kills that struck
-between the beginning and the end of what they were meant for. A disk is filled beside a running server in the same way.
-Not a timing: it says the same on a busy machine.
+terrain, a migration, and folding, while classes are made, entered and deleted, and while a lesson is switched.
+Afterwards every operation that was acknowledged must be there at its clock, every file must open, all people must see
+the same terrain, which is that of the journal, and classes, seats and switches must be as they were told. ``inside``:
+kills that struck between the beginning and the end of what they were meant for. A disk is filled beside a running
+server in the same way. Not a timing: it says the same on a busy machine.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from typing import Any, Final
 from bench.room import _serving
 from bench.strangers import _fault_disk
 from bench.strangers._fault_checks import Checks, final, old_database, opens
+from bench.strangers._fault_lessons import Teacher
 from bench.strangers._fault_people import PEOPLE, Person, come_back_soon
 from bench.strangers._fault_run import PATIENCE, Life, Lives, bring_in, request
 from esker import contract as c
@@ -39,7 +41,7 @@ from esker.store.upkeep.backup import write_backup
 from esker.store.upkeep.inspection import DATABASE_NAME
 from esker.version import VERSION
 
-KINDS: Final = ("drawing", "import", "backup", "restore", "delete", "migration", "compaction")
+KINDS: Final = ("drawing", "import", "backup", "restore", "delete", "migration", "compaction", "class", "lesson")
 WITHIN: Final = {
     "backup": 0.015,
     "restore": 0.03,
@@ -80,6 +82,7 @@ class Siege:
         born = new_document().model_copy(update={"id": "t"})
         journal.create(born).result()
         self.secret = Access(journal).add("t", "owner", "o").result()[1]
+        self.teacher = Teacher(self.base, self.secret, seed)
         journal.close()
         self.old = folder / "old"
         old_database(self.old)
@@ -95,10 +98,12 @@ class Siege:
         """One life and its end."""
         count = self.counts[kind]
         count.kills += 1
-        count.inside += {
+        ways: dict[str, Callable[[], bool]] = {
             "drawing": self._drawing, "import": self._import, "restore": self._restore, "delete": self._delete,
-            "migration": self._migration,
-        }.get(kind, lambda: self._marked(kind))()  # fmt: skip
+            "migration": self._migration, "class": lambda: self._taught(self.teacher.teach, "class"),
+            "lesson": lambda: self._taught(self.teacher.switch, "lesson"),
+        }  # fmt: skip
+        count.inside += ways[kind]() if kind in ways else self._marked(kind)
 
     def _serving(self) -> Life:
         """A server, with everybody back and what was acknowledged before looked for."""
@@ -175,6 +180,20 @@ class Siege:
         self.checks.problems += opens(data)
         return inside
 
+    def _taught(self, work: Callable[[], None], kind: str) -> bool:
+        """A server that is killed while a teacher does this. What was told before must be there when it begins."""
+        life = self._serving()
+        self.checks.problems += self.teacher.problems(self.data)
+        before = self.teacher.count + self.teacher.notified
+        thread = self.teacher.begin(work)
+        time.sleep(self.rng.uniform(0.1, 1.5))
+        inside = thread.is_alive()
+        life.end()
+        thread.join(PATIENCE)
+        if thread.is_alive():
+            self.counts[kind].missed.append("it never ended")
+        return inside and self.teacher.count + self.teacher.notified >= before
+
     def settle(self) -> dict[str, Any]:
         """Everybody rests and sees the same; then the files are looked at."""
         for person in self.people:
@@ -193,7 +212,11 @@ class Siege:
         life.end(signal.SIGTERM)
         stopped = "done" in life.said
         found = final(self.data, "t", self.doomed)
+        found["problems"] += self.teacher.problems(self.data, at_rest=True)
         return {
+            "classes": len(self.teacher.classes) + len(self.teacher.ended),
+            "seats": len(self.teacher.seats),
+            "switches": self.teacher.notified,
             "operations": found.pop("clock"),
             "acknowledged": sum(len(person.acked) for person in self.people),
             "lost": len(self.checks.lost),

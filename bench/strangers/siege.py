@@ -3,7 +3,9 @@
 A server process of its own. Four people draw on one terrain, ``--seconds`` with each attack and as long without any;
 attacks come from a process of their own. Measured for the people: from an append to its acknowledgement, from an append
 to the first tile that shows it, and from their last append to settled ground; for the server: memory, disk,
-descriptors, while the attack goes on and some seconds after it. Ratios are to the same without an attack in this run.
+descriptors, while the attack goes on and some seconds after it. Ratios are to the same without an attack in this run,
+and to the same beside a process that takes as much of the processors as the attack's did and sends nothing: that much
+the machine does by itself, whose processors attackers share here.
 """
 
 from __future__ import annotations
@@ -30,7 +32,9 @@ from websockets.asyncio.client import connect as open_socket
 from websockets.exceptions import ConnectionClosed
 
 from bench.room import _serving, stream
-from bench.strangers._attacks import ATTACKS, BY_LINK, Target
+from bench.strangers._attacks import ATTACKS as FIRST_ATTACKS
+from bench.strangers._attacks import BY_LINK, Target
+from bench.strangers._lesson_attacks import BY_PUPIL, LESSON_ATTACKS
 from esker import contract as c
 from esker.tiles.codec.frame import read_frame
 from esker.tiles.codec.rivers import is_rivers
@@ -51,8 +55,10 @@ ALONE_EVERY: Final = 5
 """Before every so manyth attack the people draw without one, so that the machine's own noise is known."""
 TIMES: Final = {"ack_p99_ms": 2.0, "tile_p50_ms": 2.0, "settling_s": 3.0}
 """Aims: times what the same room has without an attack, while it goes on and after it."""
+BUSY_SECONDS: Final = 0.01
+"""A process that sends nothing is busy for a part of each so many seconds."""
 MOST_MEMORY_MB: Final = 2048
-ROLES: Final = ("stranger", "viewer")
+ATTACKS: Final = FIRST_ATTACKS | LESSON_ATTACKS
 
 
 @dataclass
@@ -164,6 +170,15 @@ def serve(log: Path) -> Iterator[Server]:
                 process.terminate()
 
 
+def _nothing(share: float, until: float) -> None:
+    """A process that takes so much of a processor and sends nothing."""
+    while time.monotonic() < until:
+        busy = time.perf_counter() + share * BUSY_SECONDS
+        while time.perf_counter() < busy:
+            json.dumps(list(range(100)))
+        time.sleep((1 - share) * BUSY_SECONDS)
+
+
 def _attack(names: Sequence[str], at: Target) -> None:
     """The process that attacks."""
 
@@ -230,6 +245,8 @@ class Plan:
     """``time.monotonic()`` after which no further attack is begun."""
     kept: float = 0.0
     """Seconds before that from which on only all attacks at once are begun."""
+    apart: bool = False
+    """Whether no attacks are made at once."""
 
 
 async def _besieged(
@@ -240,28 +257,59 @@ async def _besieged(
     attacker = multiprocessing.get_context("spawn").Process(target=_attack, args=(list(names), target), daemon=True)
     attacker.start()
     await asyncio.sleep(1.5)
+    began, before = time.perf_counter(), _processor(attacker.pid)
     figures = await _drawn(people, plan.seconds - 1)
     figures["server"] = server.state()
+    share = min(1.0, (_processor(attacker.pid) - before) / (time.perf_counter() - began))
+    figures["attacker"] = round(share, 2)
     await asyncio.to_thread(attacker.join, 10)
     attacker.kill()
     await asyncio.sleep(plan.recovery)
     after = await _drawn(people, 2.0)
     figures["after"] = {key: after[key] for key in TIMES} | server.state()
+    figures["nothing"] = await _beside_nothing(people, share, plan)
     return figures
+
+
+async def _beside_nothing(people: list[_Person], share: float, plan: Plan) -> dict[str, Any]:
+    """The people's figures beside a process that takes as much of a processor as an attacker did."""
+    until = time.monotonic() + plan.seconds + 2
+    idler = multiprocessing.get_context("spawn").Process(target=_nothing, args=(share, until), daemon=True)
+    idler.start()
+    await asyncio.sleep(1.5)
+    found = await _drawn(people, plan.seconds - 1)
+    await asyncio.to_thread(idler.join, 10)
+    idler.kill()
+    return {key: found[key] for key in TIMES}
+
+
+def _processor(pid: int | None) -> float:
+    """Seconds of processor time that a process has used; 0 where it has ended."""
+    try:
+        used = psutil.Process(pid).cpu_times()
+    except psutil.Error:
+        return 0.0
+    return float(used.user + used.system)
 
 
 async def _run(server: Server, names: Sequence[str], plan: Plan) -> tuple[dict[str, Any], list[str]]:
     """Figures by attack and role, and what was left out for want of time."""
     made, own = (_serving.post(f"{server.base}/api/terrains", {}) for _ in range(2))
     viewer = _serving.post(f"{server.base}/api/terrains/{made['id']}/links", {"role": "view"}, made["secret"])
-    known = {"stranger": (own["id"], own["secret"]), "viewer": (made["id"], viewer["secret"])}
+    pupil = _serving.post(f"{server.base}/api/terrains/{made['id']}/links", {"role": "edit"}, made["secret"])
+    known = {
+        "stranger": (own["id"], own["secret"]),
+        "viewer": (made["id"], viewer["secret"]),
+        "pupil": (made["id"], pupil["secret"]),
+    }
     people = await _people(server.base, made["id"], made["secret"])
+    await people[0].ws.send('{"type":"conduct","hands_off":true}')  # all who draw are owners, who lead
     await _drawn(people, 2.0)
     alone = [await _drawn(people, plan.seconds)]
     out: dict[str, Any] = {"alone": alone[0] | {"server": server.state()}}
-    attacks = [([name], role) for name in names for role in ROLES if role == "stranger" or name in BY_LINK]
-    if len(names) > 1:
-        attacks += [(list(names), role) for role in ROLES]
+    attacks = [([name], role) for name in names for role in roles(name)]
+    if len(names) > 1 and not plan.apart:
+        attacks += [(list(names), role) for role in ("stranger", "viewer")]
     left: list[str] = []
     for group, role in attacks:
         name = f"{group[0] if len(group) == 1 else 'all'} by a {role}"
@@ -272,9 +320,19 @@ async def _run(server: Server, names: Sequence[str], plan: Plan) -> tuple[dict[s
             alone.append(await _drawn(people, plan.seconds))
         out[name] = await _besieged(server, group, plan, known[role], people)
     out["alone"] |= floor(alone)
+    for name, figures in out.items():
+        if name != "alone":
+            figures["alone"] = {key: out["alone"][key] for key in TIMES}
     for person in people:
         await person.ws.close()
     return out, left
+
+
+def roles(name: str) -> tuple[str, ...]:
+    """Returns by whom an attack is made."""
+    if name in BY_PUPIL:
+        return ("pupil",)
+    return ("stranger", "viewer") if name in BY_LINK else ("stranger",)
 
 
 def floor(alone: Sequence[dict[str, Any]]) -> dict[str, Any]:
@@ -289,19 +347,28 @@ def floor(alone: Sequence[dict[str, Any]]) -> dict[str, Any]:
 
 
 def judged(runs: dict[str, Any]) -> dict[str, list[str]]:
-    """Adds ``times_alone`` to each run, during and after; returns which aims do not hold, in words, by run."""
+    """Adds ``times_alone`` and ``times_beside_nothing`` to each run, during and after: times what the people had
+    without an attack, and times that or what they had beside as busy a process, whichever is more. Returns which aims
+    do not hold of the latter, in words, by run."""
     alone, wrong = runs["alone"], dict[str, list[str]]()
     for name, figures in runs.items():
         if name == "alone":
             continue
         said = wrong.setdefault(name, [])
+        nothing = figures.get("nothing", {})
         for when, found in (("", figures), (" afterwards", figures.get("after", {}))):
             times = {key: round(found[key] / alone[key], 2) for key in TIMES if found.get(key) and alone[key]}
             found |= {"times_alone": times} if times else {}
+            beside = {
+                key: round(found[key] / max(alone[key], nothing.get(key, 0.0)), 2)
+                for key in TIMES
+                if found.get(key) and alone[key]
+            }
+            found |= {"times_beside_nothing": beside} if beside else {}
             said += [
-                f"{key}{when}: {times[key]} times, aim {most}"
+                f"{key}{when}: {beside[key]} times, aim {most}"
                 for key, most in TIMES.items()
-                if times.get(key, 0) > most
+                if beside.get(key, 0) > most
             ]
         memory = figures["server"]["memory_mb"]
         said += [f"memory: {memory} MB, aim {MOST_MEMORY_MB}"] if memory > MOST_MEMORY_MB else []
@@ -310,8 +377,19 @@ def judged(runs: dict[str, Any]) -> dict[str, list[str]]:
     return {name: said for name, said in wrong.items() if said}
 
 
+def merged(
+    before: dict[str, Any], runs: dict[str, Any], missed: dict[str, list[str]]
+) -> tuple[dict[str, Any], dict[str, list[str]]]:
+    """Rows and misses of an earlier result with newer ones in their place. The figures without an attack are the
+    newest; the floor is the worst of all pieces, each of whose rows was compared with its own."""
+    alone, known = runs["alone"], before["runs"].get("alone", {})
+    worst = {key: max(alone["floor"].get(key, 1.0), known.get("floor", {}).get(key, 1.0)) for key in TIMES}
+    alone |= {"floor": worst, "times_measured": alone["times_measured"] + known.get("times_measured", 0)}
+    return before["runs"] | runs, {k: v for k, v in before["missed"].items() if k not in runs} | missed
+
+
 def main(argv: list[str]) -> int:
-    """``esker bench siege [--json] [--seconds S] [--minutes M] [--short] [--attack NAME ...]``."""
+    """Runs ``esker bench siege`` (--help says with what)."""
     parser = argparse.ArgumentParser(prog="esker bench siege", description=__doc__)
     parser.add_argument("--seconds", type=float, default=SECONDS, help="of drawing beside each attack")
     parser.add_argument("--minutes", type=float, default=MINUTES, help="for all of it")
@@ -321,6 +399,8 @@ def main(argv: list[str]) -> int:
     )
     parser.add_argument("--json", action="store_true", help="print the result as JSON")
     parser.add_argument("--log", type=Path, help="keep here what the server logs")
+    parser.add_argument("--apart", action="store_true", help="one after another only, not all at once")
+    parser.add_argument("--into", type=Path, help="a result whose other rows are kept: so it is measured in pieces")
     parser.add_argument("--note", default="", help="a sentence about the circumstances, kept in the result")
     arguments = parser.parse_args(argv)
     machine, began = _serving.machine(), time.monotonic()
@@ -328,13 +408,15 @@ def main(argv: list[str]) -> int:
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "server.log"
         with serve(log) as server:
-            plan = Plan(seconds, recovery, began + 60 * arguments.minutes - ALL_SECONDS, ALL_SECONDS)
+            plan = Plan(seconds, recovery, began + 60 * arguments.minutes - ALL_SECONDS, ALL_SECONDS, arguments.apart)
             runs, left = asyncio.run(_run(server, arguments.attack or list(ATTACKS), plan))
             alive = server.process.is_running()
         text = log.read_text(encoding="utf-8", errors="replace")
         if arguments.log is not None:
             arguments.log.write_text(text, encoding="utf-8")
     missed = judged(runs)
+    if arguments.into is not None and arguments.into.exists():
+        runs, missed = merged(json.loads(arguments.into.read_text(encoding="utf-8")), runs, missed)
     result = {
         "bench": "siege", "version": VERSION, "machine": machine, "note": arguments.note,
         "scene": {"people": PEOPLE, "appends_per_s_each": 1 / PERIOD, "seconds": seconds},

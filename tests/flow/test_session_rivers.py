@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import threading
 from collections.abc import Callable
 from concurrent.futures import Future
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -65,8 +67,12 @@ class Searches:
     def show_rivers(self, frame: bytes | None) -> None:
         self.shown.append(frame)
 
+    def lane(self) -> Any:
+        return SimpleNamespace(home=None)
+
     def find(
         self,
+        lane: Any,  # noqa: ARG002
         ground: Any,  # noqa: ARG002
         settings: c.TerrainSettings,  # noqa: ARG002
         span_m: tuple[float, float] | None,  # noqa: ARG002
@@ -179,11 +185,44 @@ def test_the_search_ends_when_it_is_wanted_no_more() -> None:
     """SPEC W33."""
     hydrology = Hydrology()
     ground, asked = Snapshot(0, 1, valley(1)), c.TerrainSettings(rivers=1.0)
-    assert hydrology.find(ground, asked, None, True, lambda: False).result(120) is None
-    assert hydrology.find(ground, asked, None, True).result(120) is not None
+    lane = hydrology.lane()
+    assert hydrology.find(lane, ground, asked, None, True, lambda: False).result(120) is None
+    assert hydrology.find(lane, ground, asked, None, True).result(120) is not None
     hydrology.close()
     with pytest.raises(RuntimeError):
-        hydrology.find(ground, asked, None, True)
+        hydrology.find(lane, ground, asked, None, True)
+
+
+def test_searches_of_many_rooms_of_one_address_wait_for_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    """SPEC P541: one of them is done before the next address has its own; those of closed rooms are not done."""
+    done: list[str] = []
+    held = threading.Event()
+
+    def frame(ground: Any, *_: Any) -> bytes:
+        held.wait(30)
+        done.append(ground)
+        return b""
+
+    monkeypatch.setattr("esker.server.hydrology.frame_of", frame)
+    hydrology, asked = Hydrology(), c.TerrainSettings(rivers=1.0)
+    ground: Any
+    found = []
+    for k in range(20):
+        lane = hydrology.lane()
+        lane.home = "192.0.2.7"
+        ground = f"stranger {k}"
+        found.append(hydrology.find(lane, ground, asked, None, True, lambda k=k: k != 3))  # type: ignore[misc]
+    for home in ("192.0.2.1", "192.0.2.2"):
+        lane = hydrology.lane()
+        lane.home = home
+        ground = home
+        found.append(hydrology.find(lane, ground, asked, None, True))
+    held.set()
+    for future in found:
+        future.result(30)
+    hydrology.close()
+    assert max(done.index("192.0.2.1"), done.index("192.0.2.2")) <= 3
+    assert "stranger 3" not in done
 
 
 def test_rivers_that_come_after_they_were_turned_off_are_not_shown(now: None) -> None:

@@ -128,10 +128,10 @@ class LiveServer:
 
     # --- websocket ----------------------------------------------------------------------------------------------
 
-    def socket(self, subprotocol: str | None = c.SUBPROTOCOL, **options: Any) -> ClientConnection:
+    def socket(self, subprotocol: str | None = c.SUBPROTOCOL, path: str = "/ws", **options: Any) -> ClientConnection:
         """An open websocket that has said nothing yet."""
         protocols: Any = [subprotocol] if subprotocol else None
-        url = f"ws://127.0.0.1:{self.port}/ws"
+        url = f"ws://127.0.0.1:{self.port}{path}"
         # Without pings of its own: a peer that a test leaves behind says nothing in the log of another.
         options = {"ping_interval": None, "proxy": None, **options}
         opening = connect(url, subprotocols=protocols, max_size=None, compression=None, **options)

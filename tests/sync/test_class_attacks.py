@@ -5,8 +5,10 @@ from __future__ import annotations
 import asyncio
 import secrets
 import threading
+import time
 from collections.abc import Iterator
 from concurrent.futures import Future
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -15,14 +17,15 @@ import pytest
 from esker import contract as c
 from esker.document.ops import Refusal
 from esker.errors import Cannot
-from esker.fairness.shares import Full, Rate, Rates, Who
+from esker.fairness.shares import Full, Rate, Rates, Share, Who
 from esker.fairness.turns import SERVER, FairThreads, Turns
-from esker.lesson import classes, merge
+from esker.lesson import classes, collect, merge, wall
 from esker.session import births
 from esker.store.classes import forget_empty
 from esker.store.journal import Journal
-from tests.sync.harness import LiveServer
+from tests.sync.harness import PATIENCE, LiveServer
 from tests.sync.test_classes import Pupil, Teacher
+from tests.sync.test_wall import Wall
 
 HERE, THERE = Who("192.0.2.1"), Who("192.0.2.2")
 
@@ -30,7 +33,8 @@ HERE, THERE = Who("192.0.2.1"), Who("192.0.2.2")
 @pytest.fixture(name="teacher")
 def _teacher(server: LiveServer) -> Teacher:
     state: Any = server._server.config.app.state  # type: ignore[union-attr]
-    state.new_terrains, state.code_tries, state.new_links, state.class_asks = Rates(), Rates(), Rates(), Rates()
+    for name in ("new_terrains", "code_tries", "new_links", "class_asks", "exports"):
+        setattr(state, name, Rates())
     return Teacher(server)
 
 
@@ -236,3 +240,96 @@ def test_numbers_of_copies_stay_within_their_bound(server: LiveServer, teacher: 
     journal.submit(gone).result()
     assert deletion.remove_old() == [pupils[1].terrain]
     assert Pupil(teacher, "New", seat=secrets.token_urlsafe(24)).got["number"] == 2
+
+
+def _wall(teacher: Teacher) -> Wall:
+    told = {"terrain": teacher.terrain, "secret": teacher.secret, "lesson": teacher.made["id"]}
+    return Wall(teacher.server, **told)
+
+
+def test_walls_have_a_share_by_address_and_count_as_pages(
+    server: LiveServer, teacher: Teacher, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """SPEC P539: one too many is closed, and so is one that comes too fast; who leaves gives its place back."""
+    monkeypatch.setattr(wall, "WALLS", Share(4, address=2))
+    walls = wall.Walls(server._server.config.app.state.classes)  # type: ignore[union-attr]
+    who = Who("192.0.2.1", "link")
+    with walls.watching("c", who), walls.watching("c", Who("192.0.2.1", "other")):
+        with pytest.raises(Full), walls.watching("c", who):
+            pass
+        walls._heard("c")
+        walls._heard("of nobody")
+        assert walls.stale == {"c": 1}
+    assert (len(walls.places), walls.stale) == (0, {})
+
+    rates = Rates(Rate(0.0, 1.0))
+    monkeypatch.setattr(server.assembly.hub.door, "_hellos", rates)
+    first = _wall(teacher)
+    first.until(lambda: first.state)
+    assert _wall(teacher).closed() == c.WS_CLOSE["rate_limited"]
+    first.ws.close()
+
+
+def test_walls_rest_by_what_they_took(server: LiveServer) -> None:
+    """SPEC P539: all of one address take a tenth of the event loop, and all of the server a third."""
+    walls = wall.Walls(server._server.config.app.state.classes)  # type: ignore[union-attr]
+    here = [Who("192.0.2.1", f"l{k}") for k in range(5)]
+    with ExitStack() as held:
+        for who in here:
+            held.enter_context(walls.watching("c", who))
+        for k in range(20):
+            held.enter_context(walls.watching("c", Who(f"192.0.2.{10 + k}")))
+        assert walls.rest(here[0], 0.02) == pytest.approx(0.02 * wall.ALL * 25)
+        assert len(here) * 0.02 / (0.02 + walls.rest(here[0], 0.02)) <= 1 / wall.MINE
+    with walls.watching("c", here[0]):
+        assert walls.rest(here[0], 0.0001) == wall.TURN_SECONDS
+
+
+def test_a_copy_that_a_wall_had_opened_sleeps_when_the_wall_goes(server: LiveServer, teacher: Teacher) -> None:
+    """SPEC P539: nothing stays open of a wall that is gone in the middle of waking them."""
+    copies = [Pupil(teacher, f"P{k}").terrain for k in range(3)]
+    hub = server.assembly.hub
+    gone = _wall(teacher)
+    gone.until(lambda: len(gone.copies) == 3)
+    gone.ws.close()
+    deadline = time.monotonic() + PATIENCE
+    while any(hub.open_room(copy) is not None for copy in copies) or teacher.made["id"] in _walls(server)._watched:
+        assert time.monotonic() < deadline
+        server.http("GET", "/healthz")
+
+
+def _walls(server: LiveServer) -> Any:
+    heard = server._server.config.app.state.classes.hear  # type: ignore[union-attr]
+    return next(each.__self__ for each in heard if isinstance(getattr(each, "__self__", None), wall.Walls))
+
+
+def test_collections_have_a_share_by_address_and_link(server: LiveServer, teacher: Teacher) -> None:
+    """SPEC P540: one address leaves some to others; a newer one of a class takes the place of the one before."""
+    answers = [teacher.ask("collections") for _ in range(1)]
+    for _ in range(collect.KEPT.most("address")):
+        other = Teacher(server)
+        answers.append(other.ask("collections"))
+    assert [status for status, _ in answers] == [202] * collect.KEPT.most("address") + [503]
+    assert "for your address" in answers[-1][1]["message"]
+    path = f"{teacher.path}/collections/{answers[0][1]['id']}"
+    while server.http("GET", path, secret=teacher.secret)[1]["stage"] != "done":
+        pass
+    again = teacher.ask("collections")
+    assert again[0] == 202
+    assert server.http("GET", path, secret=teacher.secret)[0] == 404
+    assert server.http("DELETE", teacher.path, secret=teacher.secret)[0] == 200
+    assert other.ask("collections")[0] == 202, "its place is free again"
+
+
+def test_a_collection_has_a_size(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """SPEC P540: told in a sentence, and nothing is left of it."""
+    monkeypatch.setattr(collect, "MOST_BYTES", 100)
+    with LiveServer(tmp_path) as server:
+        teacher = Teacher(server)
+        Pupil(teacher, "Ada")
+        _, job = teacher.ask("collections")
+        path = f"{teacher.path}/collections/{job['id']}"
+        while (told := server.http("GET", path, secret=teacher.secret)[1])["stage"] not in ("done", "failed"):
+            pass
+        assert (told["stage"], told["text"]) == ("failed", collect.TOO_LARGE)
+        assert not list((tmp_path / "collections").iterdir())

@@ -11,7 +11,7 @@ import psutil
 import pytest
 
 from bench.strangers import siege
-from bench.strangers._attacks import ATTACKS, BY_LINK
+from bench.strangers._attacks import BY_LINK
 from tests.sync.harness import LiveServer
 
 
@@ -48,6 +48,42 @@ def test_the_machine_s_own_noise_is_measured() -> None:
     assert "settling_s" not in still["floor"]
 
 
+def test_a_row_is_read_against_a_process_that_sends_nothing() -> None:
+    """SPEC P544: what as busy a process costs is the machine's doing, where it is more than without one."""
+    runs = {
+        "alone": figures(),
+        "machine": figures(ack_p99_ms=39.0, nothing={"ack_p99_ms": 20.0, "tile_p50_ms": 30.0, "settling_s": 1.0}),
+        "attack": figures(tile_p50_ms=90.0, nothing={"ack_p99_ms": 20.0, "tile_p50_ms": 30.0, "settling_s": 1.0}),
+    }
+    assert siege.judged(runs) == {"attack": ["tile_p50_ms: 2.25 times, aim 2.0"]}
+    assert runs["machine"]["times_alone"]["ack_p99_ms"] == 3.9
+    assert runs["machine"]["times_beside_nothing"]["ack_p99_ms"] == 1.95
+
+
+def test_a_result_is_put_together_from_pieces() -> None:
+    """SPEC P544: newer rows take the place of older ones, misses too; the floor is the worst."""
+
+    def piece(slow: float, worst: float) -> tuple[dict[str, Any], dict[str, list[str]]]:
+        runs = {"alone": figures(floor={"ack_p99_ms": worst}, times_measured=1), "x": figures(ack_p99_ms=slow)}
+        return runs, siege.judged(runs)
+
+    runs, missed = piece(90.0, 3.0)
+    runs |= {"y": figures(unanswered=1)}
+    before = {"runs": runs, "missed": siege.judged(runs)}
+    assert set(before["missed"]) == {"x", "y"}
+    found, missed = siege.merged(before, *piece(11.0, 1.5))
+    assert set(missed) == {"y"}
+    assert found["x"]["ack_p99_ms"] == 11.0
+    assert (found["alone"]["floor"]["ack_p99_ms"], found["alone"]["times_measured"]) == (3.0, 2)
+
+
+def test_who_makes_an_attack() -> None:
+    """SPEC P544: pupils those that need a pen, viewers those that need a link."""
+    assert siege.roles("pupil") == ("pupil",)
+    assert siege.roles("exports") == ("stranger", "viewer")
+    assert siege.roles("copies") == ("stranger",)
+
+
 def test_people_draw_what_is_taken_and_their_ground_settles(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """SPEC P404: each first change was refused, and what is refused was waited for as if it were on its way."""
     monkeypatch.setattr(siege, "_attack", lambda *_: None)
@@ -74,7 +110,7 @@ def test_what_there_is_no_time_for_is_listed(tmp_path: Path) -> None:
         "all by a stranger",
         "all by a viewer",
     ]
-    assert set(ATTACKS) >= BY_LINK
+    assert set(siege.ATTACKS) >= BY_LINK
 
 
 def test_time_is_kept_for_all_attacks_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -16,13 +16,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from pydantic import ValidationError
 
 from esker import Stroke, Terrain, contract
 from esker.cli import main as command_line
 from esker.contract import ExportRequest, ModelOptions, PaperOptions, TerrainSettings
 from esker.exporting import formats
 from esker.exporting.ground import Ground
-from esker.exporting.printing import pdf, svg
+from esker.exporting.printing import layout, pdf, svg
 from esker.exporting.printing.contours import contour, steep_cells
 from esker.exporting.printing.drawing import CannotPrint, Clip, Drawing, Text
 from esker.exporting.printing.drawing import Path as Shape
@@ -190,6 +191,51 @@ def test_what_does_not_fit_is_refused(tmp_path: Path) -> None:
     with pytest.raises(CannotPrint):
         terrain.export(tmp_path / "a.svg", level=1, paper=PaperOptions(scale=10))
     assert list(tmp_path.iterdir()) == []
+
+
+def test_ground_that_is_noise_is_refused_before_it_is_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """SPEC X381: a map of it took the one place in which exports are made, for hours and gigabytes."""
+    noise = np.random.default_rng(1).uniform(0, 1000, (257, 257))
+    monkeypatch.setattr(layout, "contour", lambda *_: pytest.fail("it was drawn"))
+    with pytest.raises(CannotPrint, match="too rough"):
+        contour_map(ground_of(noise), PaperOptions(interval_m=4.0), TODAY)
+    monkeypatch.undo()
+    mild = contour_map(cone(257), PaperOptions(interval_m=4.0), TODAY)
+    points = sum(len(line) for shape in shapes(mild) if isinstance(shape, Shape) for line in shape.rings)
+    assert points < layout.MOST_CROSSINGS
+
+
+@pytest.mark.parametrize("size", ["a4", "a3"])
+@pytest.mark.parametrize("scale", [0, 1, 50_000_000])
+@pytest.mark.parametrize("interval", [0.0, 5e-324, 1e-300, 1e-3, 10_000.0])
+@pytest.mark.parametrize("heights", [[[0.0] * 9] * 9, [[k * 4e3 - n * 5e3 for k in range(9)] for n in range(9)]])
+def test_numbers_of_a_map_at_their_ends(
+    tmp_path: Path, size: Any, scale: int, interval: float, heights: list[list[float]]
+) -> None:
+    """SPEC X382: it is drawn, or refused."""
+    try:
+        made = contour_map(ground_of(heights, 3.0), PaperOptions(size=size, scale=scale, interval_m=interval), TODAY)
+    except CannotPrint:
+        return
+    svg.write_drawing(tmp_path / "a.svg", made)
+    pdf.write_drawing(tmp_path / "a.pdf", made)
+    assert "nan" not in (tmp_path / "a.svg").read_text()
+    ElementTree.parse(tmp_path / "a.svg")
+
+
+@pytest.mark.parametrize("width", [10.0, 2000.0])
+@pytest.mark.parametrize("base", [0.2, 200.0])
+@pytest.mark.parametrize("exaggeration", [0.1, 20.0])
+def test_numbers_of_a_solid_at_their_ends(tmp_path: Path, width: float, base: float, exaggeration: float) -> None:
+    """SPEC X382."""
+    options = ModelOptions(width_mm=width, base_mm=base, exaggeration=exaggeration)
+    write_solid(tmp_path / "a.stl", ground_of([[k * 4e3 - n * 5e3 for k in range(9)] for n in range(9)], 3.0), options)
+    made = solid_of(tmp_path / "a.stl")
+    assert np.isfinite(made["corners"]).all()
+    for field, values in (("width_mm", (9.9, 2000.1)), ("base_mm", (0.1, 201)), ("exaggeration", (0.09, 20.1))):
+        for value in (*values, float("nan"), float("inf")):
+            with pytest.raises(ValidationError):
+                ModelOptions.model_validate({field: value})
 
 
 def solid_of(path: Path) -> NDArray[Any]:

@@ -100,7 +100,7 @@ def test_a_client_that_lags_gets_the_list_but_no_cursors() -> None:
     slow.outbox.push("x" * 70_000)
     members.moved(ada, c.Presence(cursor=(1, 2, 3)))
     assert members.pending
-    members.tick()
+    members.tick(0.0)
     assert not members.pending
     slow.outbox.pop()
     assert json.loads(str(slow.outbox.pop() or ""))["type"] == "members"

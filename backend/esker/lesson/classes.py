@@ -324,9 +324,10 @@ class Classes:
                     self.hub.journal.append(copy.terrain, (), None, (Person(agent, OPENED, TEACHER_COLOUR),))
                     await room.perform(op, agent, agent, teacher=True)
                 changed += bool(ops)
-                self.hub.sleep(copy.terrain)
             except (Refusal, Denied) as error:
                 refused = f"Copy {copy.number} could not take it: {error.message}"
+            finally:
+                self.hub.sleep(copy.terrain)
         if refused:
             raise Cannot(409, "refused", refused)
         return changed

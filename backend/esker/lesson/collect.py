@@ -25,7 +25,7 @@ import numpy as np
 
 from esker.document.archive import ArchiveError
 from esker.errors import Cannot, EskerError
-from esker.fairness.shares import Who
+from esker.fairness.shares import Full, Place, Places, Share, Who
 from esker.fairness.turns import Turns
 from esker.lesson import relief
 from esker.lesson.classes import Classes
@@ -36,8 +36,10 @@ from esker.store.classes import Class, Copy, changed_at
 log = logging.getLogger("esker.lesson")
 
 KEPT_SECONDS: Final = 10 * 60.0
-MOST_KEPT: Final = 8
-"""Collections of the whole server that are made or kept."""
+KEPT: Final = Share(8, address=3, network=4, link=2)
+"""Collections of the whole server that are made or kept, of one address, one /48 and one link."""
+MOST_BYTES: Final = 2 << 30
+"""Bytes of one collection; the terrain files of copies hold their elevation grids."""
 SPARE_BYTES: Final = 64 << 20
 PICTURE_LEVEL: Final = 3
 SETTLE_SECONDS: Final = 20.0
@@ -45,6 +47,11 @@ SETTLE_SECONDS: Final = 20.0
 LOOK_SECONDS: Final = 0.02
 STEM: Final = 40
 COLUMNS: Final = ("copy", "names", "joined", "last_changed", "strokes", "score", "score_text", "file")
+BUSY: Final = "Several classes are being collected just now. Try again in a few minutes."
+YOURS: Final = (
+    "Several classes are being collected, or were just now, for your address or link. Try again in ten minutes."
+)
+TOO_LARGE: Final = f"Together the copies are more than {MOST_BYTES >> 30} GiB. Download them one by one."
 FAILED: Final = "The class could not be collected. It is in the server's log."
 
 
@@ -55,6 +62,7 @@ class _Job:
     link: Link
     who: Who
     folder: Path
+    place: Place
     stage: str = "waiting"
     share: float = 0.0
     text: str = ""
@@ -83,6 +91,7 @@ class Collections:
         self._classes, self._hub, self._folder = classes, classes.hub, folder
         self._jobs: dict[str, _Job] = {}
         self._turn = Turns(1)
+        self._places = Places(KEPT)
         shutil.rmtree(folder, ignore_errors=True)
         self._hub.hear_of_ended.append(self._end)
         classes.hear.append(self._drop_deleted)
@@ -92,11 +101,20 @@ class Collections:
         self._forget_old()
         if any(job.lesson.id == lesson.id and not job.over for job in self._jobs.values()):
             raise Cannot(409, "busy", "This class is being collected already. Wait for it.")
-        if len(self._jobs) >= MOST_KEPT:
-            raise Cannot(503, "busy", "Several classes are being collected just now. Try again in a few minutes.")
+        for job in list(self._jobs.values()):
+            if job.lesson.id == lesson.id and job.link.id == link.id:
+                self._forget(job)  # the newer one takes its place
+        try:
+            place = self._places.take(who)
+        except Full as full:
+            raise Cannot(503, "busy", YOURS if full.yours else BUSY) from None
         job_id = secrets.token_urlsafe(9)
-        job = self._jobs[job_id] = _Job(job_id, lesson, link, who, self._folder / job_id)
-        job.folder.mkdir(parents=True)
+        job = self._jobs[job_id] = _Job(job_id, lesson, link, who, self._folder / job_id, place)
+        try:
+            job.folder.mkdir(parents=True)
+        except OSError:
+            self._forget(job)
+            raise
         job.task = asyncio.create_task(self._run(job))
         return job.status()
 
@@ -123,9 +141,7 @@ class Collections:
 
     async def _run(self, job: _Job) -> None:
         try:
-            async with self._turn.turn(job.who):
-                job.stage = "collecting"
-                await self._collect(job)
+            await self._collect(job)
             job.stage, job.share, job.bytes = "done", 1.0, job.path.stat().st_size
         except asyncio.CancelledError:
             job.stage = "cancelled"
@@ -145,7 +161,9 @@ class Collections:
         with zipfile.ZipFile(job.path, "w", zipfile.ZIP_STORED) as archive:
             for n, copy in enumerate(copies):
                 if self._hub.deletion.deleted(copy.terrain) is None:
-                    rows.append(await self._add(job, archive, copy))
+                    async with self._turn.turn(job.who):  # after each copy others have theirs
+                        job.stage = "collecting"
+                        rows.append(await self._add(job, archive, copy))
                 job.share = (n + 1) / len(copies)
             archive.writestr("class.csv", "\ufeff" + _table(rows))
 
@@ -154,15 +172,19 @@ class Collections:
         names = ", ".join(p.name for p in pupils if p.name)
         stem = "-".join(filter(None, (f"{copy.number:02}", _stem(names))))
         room = await self._hub.room(copy.terrain, Who(job.who.address))
-        deadline = time.monotonic() + SETTLE_SECONDS
-        while not (room.settled and not room.scoring.busy) and not room.closed and time.monotonic() < deadline:
-            await asyncio.sleep(LOOK_SECONDS)
-        heights = await room.heights(min(PICTURE_LEVEL, room.info.levels))
-        document, points = room.core.document.to_document(), room.scoring.newest
-        self._hub.sleep(copy.terrain)
+        try:
+            deadline = time.monotonic() + SETTLE_SECONDS
+            while not (room.settled and not room.scoring.busy) and not room.closed and time.monotonic() < deadline:
+                await asyncio.sleep(LOOK_SECONDS)
+            heights = await room.heights(min(PICTURE_LEVEL, room.info.levels))
+            document, points = room.core.document.to_document(), room.scoring.newest
+        finally:
+            self._hub.sleep(copy.terrain)
         packed = await self._hub.packing.run(job.who, self._classes.grids.pack, document)
         try:
             size = packed.stat().st_size
+            if job.path.stat().st_size + size > MOST_BYTES:
+                raise Cannot(409, "too_large", TOO_LARGE)
             self._hub.journal.space.need(size + SPARE_BYTES)
             await self._hub.packing.run(job.who, archive.write, packed, f"{stem}.esker")
         finally:
@@ -205,6 +227,7 @@ class Collections:
         if job.task is not None and not job.over:
             job.task.cancel()
         self._jobs.pop(job.id, None)
+        job.place.release()
         shutil.rmtree(job.folder, ignore_errors=True)
 
     def _end(self, terrain: str, links: Collection[str]) -> None:

@@ -10,7 +10,9 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
-from collections.abc import AsyncIterator
+from collections import Counter
+from collections.abc import AsyncIterator, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -18,8 +20,9 @@ from pydantic import ValidationError
 
 from esker import contract as c
 from esker.contract import CloseCode
-from esker.errors import EskerError
+from esker.errors import Cannot, EskerError
 from esker.fairness.shares import Full, Places, Share, Who
+from esker.fairness.spending import Accounts
 from esker.lesson.classes import Classes
 from esker.session.ground.feed import Stream
 from esker.session.room.core import Denied
@@ -45,6 +48,8 @@ QUIET_SECONDS: Final = 1.0
 LEFT_OUT: Final = {"task": None, "task_pictures": ()}
 """What a wall does not need of the settings of a copy."""
 FOCUS_PER_SECOND: Final = 4.0
+MINE, ALL = 10, 3
+"""Walls of one address take at most one part of so many of the event loop's time, and all walls together."""
 
 
 @dataclass
@@ -88,7 +93,12 @@ class _Copy:
     strokes: int = 0
     online: int = 0
     score: c.Score | None = None
-    notified: c.WallCopy | None = None
+    notified: tuple[object, ...] = ()
+    """What pages were told of it last."""
+
+    def known(self) -> tuple[object, ...]:
+        """Returns what ``facts`` follow from."""
+        return (self.names, self.online, self.last, self.strokes, self.frozen, self.settings, self.score)
 
     def facts(self) -> c.WallCopy:
         """Returns the facts that pages are told of the copy now."""
@@ -120,17 +130,42 @@ class Walls:
         self.classes = classes
         self.places = Places(WALLS)
         self.stale: dict[str, int] = {}
-        """How often something of a class changed: a wall that has seen less asks again."""
+        """How often something of a class changed while it has walls: a wall that has seen less asks again."""
+        self._watched: Counter[str] = Counter()
         classes.hear.append(self._heard)
 
     def _heard(self, lesson: str) -> None:
-        self.stale[lesson] = self.stale.get(lesson, 0) + 1
+        if lesson in self._watched:
+            self.stale[lesson] = self.stale.get(lesson, 0) + 1
+
+    @contextmanager
+    def watching(self, lesson: str, who: Who) -> Iterator[None]:
+        """Holds the place of a wall of a class. Raises Full."""
+        with self.places.take(who):
+            self._watched[lesson] += 1
+            try:
+                yield
+            finally:
+                self._watched[lesson] -= 1
+                if not self._watched[lesson]:
+                    del self._watched[lesson]
+                    self.stale.pop(lesson, None)
+
+    def rest(self, who: Who, spent: float) -> float:
+        """Seconds that a wall rests for after it took ``spent`` seconds of the event loop."""
+        mine = self.places.of("address", who.home)
+        return max(TURN_SECONDS, spent * max(MINE * mine, ALL * len(self.places)))
 
 
 class WallSession:
     """One wall from its handshake to its end."""
 
-    def __init__(self, walls: Walls, transport: Transport, address: str, subprotocol: str | None) -> None:
+    def __init__(
+        self, walls: Walls, transport: Transport, address: str, subprotocol: str | None, accounts: Accounts
+    ) -> None:
+        """``accounts``: what the walls of an address may take by what they send."""
+        self._accounts = accounts
+        transport.charge(accounts.stranger(address), transport.abort)
         self._walls, self._classes, self._hub = walls, walls.classes, walls.classes.hub
         self._transport, self._address, self._subprotocol = transport, address, subprotocol
         self._copies: dict[int, _Copy] = {}
@@ -139,23 +174,33 @@ class WallSession:
         self._notified: c.Wall | None = None
         self._seen, self._looked = -1, float("-inf")
         self._start: c.TerrainSettings | None = None
+        self._who = Who(address)
         self._rousing: set[asyncio.Task[None]] = set()
+        self._over = False
 
     async def run(self, messages: AsyncIterator[str | bytes]) -> None:
         """Serves the wall until either side ends it."""
         try:
             link, lesson = await self._open(messages)
-            with self._walls.places.take(Who(self._address, link.id)):
+            self._who = Who(self._address, link.id)
+            with self._walls.watching(lesson.id, self._who):
+                self._start = (await self._classes.beginning(lesson, self._who)).settings
+                self._hub.door.demand(link)
                 await self._serve(link, lesson, messages)
         except (WallRefused, Denied) as error:
             await self._farewell(error.code, error.message)
         except Full:
             await self._farewell("rate_limited", "Many walls are open from your address. Close some pages.")
+        except Cannot as error:
+            await self._farewell("no_terrain", error.message)
         except (ConnectionError, TimeoutError):
             self._transport.abort()
         finally:
+            self._over = True
             for copy in self._copies.values():
                 self._leave(copy)
+                if copy.waking:
+                    self._hub.sleep(copy.terrain)  # nobody else has it open
 
     async def _open(self, messages: AsyncIterator[str | bytes]) -> tuple[Link, Class]:
         if self._subprotocol != c.SUBPROTOCOL:
@@ -175,23 +220,24 @@ class WallSession:
             lesson = self._classes.owned(link, hello.lesson)
         except EskerError as error:
             raise WallRefused("no_terrain", error.message) from None
-        start = await asyncio.to_thread(self._classes.store.document, lesson.id)
-        self._hub.door.demand(link)
-        self._start = None if start is None else start.settings
+        self._hub.door.count(Who(self._address, link.id), history=False)
+        self._transport.charge(self._accounts.member(self._address), self._transport.abort)
         return link, lesson
 
     async def _serve(self, link: Link, lesson: Class, messages: AsyncIterator[str | bytes]) -> None:
         reader = asyncio.create_task(self._read_all(messages))
         try:
             while not reader.done():
-                now = time.monotonic()
+                now, began = time.monotonic(), time.thread_time()
                 self._hub.door.demand(link)
                 self._look(lesson.id, now)
                 for copy in list(self._copies.values()):
                     self._follow(copy, now)
                 self._wake(now)
-                await asyncio.wait_for(self._send(lesson.id, now), c.STALL_SECONDS)
-                await asyncio.wait({reader}, timeout=TURN_SECONDS)
+                wall = self._news(lesson.id)
+                spent = time.thread_time() - began
+                await asyncio.wait_for(self._send(wall, now), c.STALL_SECONDS)
+                await asyncio.wait({reader}, timeout=self._walls.rest(self._who, spent))
             await reader
         finally:
             reader.cancel()
@@ -285,14 +331,15 @@ class WallSession:
     async def _rouse(self, copy: _Copy) -> None:
         try:
             await self._hub.room(copy.terrain, Who(self._address))
+            if self._over:
+                self._hub.sleep(copy.terrain)
         except EskerError as error:
             log.info("copy %d was not opened for a wall: %s", copy.number, error)
             copy.waking = False
 
     # --- what is sent -------------------------------------------------------------------------------------------
 
-    async def _send(self, lesson: str, now: float) -> None:
-        wall = self._news(lesson)
+    async def _send(self, wall: c.Wall | None, now: float) -> None:
         if wall is not None:
             await self._transport.send_text(wall.model_dump_json(), lambda: None)
         for copy in list(self._copies.values()):
@@ -314,10 +361,9 @@ class WallSession:
         left = max(0.0, found.code_until - self._classes.store.now())
         changed = []
         for copy in self._copies.values():
-            facts = copy.facts()
-            if facts != copy.notified:
-                copy.notified = facts
-                changed.append(facts)
+            if (known := copy.known()) != copy.notified:
+                copy.notified = known
+                changed.append(copy.facts())
         wall = c.Wall(
             lesson=lesson,
             title=found.title,

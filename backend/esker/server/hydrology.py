@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -15,6 +15,7 @@ from esker import grid
 from esker.flow.reaches import UNITS_PER_CELL, Reaches, find_reaches
 from esker.flow.rivers import water_of
 from esker.process import priority
+from esker.session.ground.tilethread import Lane, TileThread
 from esker.synthesis.detailed import DetailedTerrain, site_of
 from esker.tiles.channels import values
 from esker.tiles.codec.rivers import RiverLine, write_rivers
@@ -58,13 +59,19 @@ def snapshot(server: TileServer, level: int) -> Snapshot | None:
 
 
 class Hydrology:
-    """One thread of low priority for the rivers of all terrains. Safe from any thread."""
+    """One thread of low priority for the rivers of all terrains, whose homes have turns: of sixty rooms that one
+    stranger opened one is looked at before the next home has its own. Safe from any thread."""
 
     def __init__(self) -> None:
-        self._thread = ThreadPoolExecutor(1, "rivers", initializer=priority.yield_to_others)
+        self._thread = TileThread("rivers", begin=priority.yield_to_others)
+
+    def lane(self) -> Lane:
+        """Returns a place for the searches of one room."""
+        return self._thread.lane()
 
     def find(
         self,
+        lane: Lane,
         ground: Snapshot,
         settings: c.TerrainSettings,
         span_m: tuple[float, float] | None,
@@ -75,7 +82,7 @@ class Hydrology:
 
         ``span_m``: lowest and highest sample of the elevation layers. Raises RuntimeError after ``close``.
         """
-        return self._thread.submit(_frame_unless, is_wanted, ground, settings, span_m, settled)
+        return lane.submit(_frame_unless, is_wanted, ground, settings, span_m, settled)
 
     def close(self) -> None:
         """Drops what waits, and takes no more."""

@@ -82,6 +82,7 @@ class Rivers:
     def __init__(self, hydrology: Hydrology | None, ground: Ground, loop: asyncio.AbstractEventLoop) -> None:
         """Without ``hydrology`` there are none."""
         self._hydrology, self._ground, self._loop = hydrology, ground, loop
+        self._lane = None if hydrology is None else hydrology.lane()
         self._document: StrokeSet | None = None
         self._followed: tuple[object, ...] = ()
         self._wanted = Wanted()
@@ -89,6 +90,11 @@ class Rivers:
         self._busy = self._closed = self._overtaken = False
         self._last = float("-inf")
         self._timer: asyncio.TimerHandle | None = None
+
+    def works_for(self, home: str) -> None:
+        """From now on searches count for this address."""
+        if self._lane is not None:
+            self._lane.home = home or None
 
     def follow(self, document: StrokeSet) -> None:
         """The document has changed; where a setting of the rivers did, they are looked for anew."""
@@ -142,15 +148,21 @@ class Rivers:
 
     def _read(self, found: Any, settled: bool) -> None:
         document = self._document
-        if found is None or document is None or self._hydrology is None or self._closed or not document.settings.rivers:
+        hydrology, lane = None if self._closed else self._hydrology, self._lane
+        if found is None or document is None or hydrology is None or lane is None or not document.settings.rivers:
             self._busy = False
             self._go_on()
             return
         try:
             span = span_m(tuple(document.layers.values()))
             # A search at rest takes a second: it ends where people go on drawing. Previews are short, and are shown.
-            future = self._hydrology.find(
-                found, document.settings, span, settled, lambda: not (settled and self._overtaken)
+            future = hydrology.find(
+                lane,
+                found,
+                document.settings,
+                span,
+                settled,
+                lambda: not self._closed and not (settled and self._overtaken),
             )
         except RuntimeError:  # the server is stopping
             return

@@ -8,7 +8,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future
 from typing import Any, Final
 
 import numpy as np
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from esker import contract as c
 from esker.document.ops import StrokeSet
 from esker.process import priority
+from esker.session.ground.tilethread import Lane, TileThread
 from esker.tasks.score import Points, score
 
 log = logging.getLogger("esker.tasks")
@@ -27,14 +28,18 @@ FOLLOWED: Final = ("task", "sea_level_m")
 
 
 class Scorer:
-    """One thread of low priority for the scores of all rooms. Safe from any thread."""
+    """One thread of low priority for the scores of all rooms, whose homes have turns. Safe from any thread."""
 
     def __init__(self) -> None:
-        self._thread = ThreadPoolExecutor(1, "scores", initializer=priority.yield_to_others)
+        self._thread = TileThread("scores", begin=priority.yield_to_others)
 
-    def score(self, goal: c.Goal, heights: Heights, settings: c.TerrainSettings) -> Future[Points]:
+    def lane(self) -> Lane:
+        """Returns a place for the scores of one room."""
+        return self._thread.lane()
+
+    def score(self, lane: Lane, goal: c.Goal, heights: Heights, settings: c.TerrainSettings) -> Future[Points]:
         """Begins to count. Raises RuntimeError after ``close``."""
-        return self._thread.submit(score, goal, heights, settings)
+        return lane.submit(score, goal, heights, settings)
 
     def close(self) -> None:
         """Drops what waits, and takes no more."""
@@ -53,11 +58,17 @@ class Scoring:
     ) -> None:
         """``heights``: reads the ground that counts; ``tell``: hears of new scores. Without ``scorer`` none comes."""
         self._scorer, self._heights, self._loop, self._tell = scorer, heights, loop, tell
+        self._lane = None if scorer is None else scorer.lane()
         self._document: StrokeSet | None = None
         self._followed: tuple[object, ...] = ()
         self._settled = self._busy = self._due = self._closed = False
         self.newest: c.Score | None = None
         """The score that everybody was told last; None: nothing was ever scored here."""
+
+    def works_for(self, home: str) -> None:
+        """From now on scores count for this address."""
+        if self._lane is not None:
+            self._lane.home = home or None
 
     def follow(self, document: StrokeSet) -> None:
         """The document has changed; where its task did, it is scored anew."""
@@ -104,12 +115,12 @@ class Scoring:
 
     def _read(self, clock: int, heights: Heights | None) -> None:
         document, goal = self._document, self._goal
-        if heights is None or document is None or goal is None or self._scorer is None:
+        if heights is None or document is None or goal is None or self._scorer is None or self._lane is None:
             self._busy = False
             self._go_on()
             return
-        scorer, settings = self._scorer, document.settings
-        self._after(lambda: scorer.score(goal, heights, settings), lambda found: self._counted(clock, found))
+        scorer, lane, settings = self._scorer, self._lane, document.settings
+        self._after(lambda: scorer.score(lane, goal, heights, settings), lambda found: self._counted(clock, found))
 
     def _counted(self, clock: int, found: Points | None) -> None:
         self._busy = False

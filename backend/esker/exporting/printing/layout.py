@@ -30,6 +30,9 @@ ROUND: Final = (1.0, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 7.5, 10.0)
 SHORTEST_MM: Final = 2.0
 """Shorter contours are specks."""
 MOST_LINES: Final = 400
+MOST_CROSSINGS: Final = 3_000_000
+"""Points of all contours together: of ground that is nothing but noise each sample would have hundreds, and the map
+would be made for hours."""
 INK: Final[Colour] = (0.13, 0.13, 0.14)
 EARTH: Final[Colour] = (0.58, 0.37, 0.20)
 SEA_LINE: Final[Colour] = (0.30, 0.50, 0.66)
@@ -90,6 +93,8 @@ def contour_map(ground: Ground, wanted: PaperOptions, today: datetime.date) -> D
     every = wanted.interval_m or interval_for(high - low)
     if (high - low) / every > MOST_LINES:
         raise CannotPrint(f"An interval of {every:g} m gives more than {MOST_LINES} contours here. Take a larger one.")
+    if _crossings(ground.heights, every) > MOST_CROSSINGS:
+        raise CannotPrint(f"The ground is too rough for contours every {every:g} m. Take more, or fewer samples.")
     title = ground.settings.title or "Terrain"
     made = Drawing(frame.width_mm, frame.height_mm, title)
     labels = Labels(frame.box)
@@ -101,6 +106,11 @@ def contour_map(ground: Ground, wanted: PaperOptions, today: datetime.date) -> D
     made.shapes.append(Path([_box(frame.box)], 0.35, INK, closed=True))
     draw_legend(made, ground, frame.box, frame.scale, every, INDEX_EVERY, today)
     return made
+
+
+def _crossings(heights: NDArray[np.float32], every: float) -> float:
+    """About how many points contours at this interval have together: each is where one crosses an edge of the grid."""
+    return sum(float(np.abs(np.diff(heights, axis=axis)).sum(dtype=np.float64)) for axis in (0, 1)) / every
 
 
 def _box(box: tuple[float, float, float, float]) -> NDArray[np.float64]:

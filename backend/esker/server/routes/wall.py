@@ -28,8 +28,7 @@ def add_wall(app: FastAPI, classes: Classes, front: Front, cluster: Cluster | No
             return
 
         async def here() -> None:
-            transport.charge(accounts.member(address(socket)), transport.abort)
-            await WallSession(walls, transport, address(socket), subprotocol).run(messages(socket))
+            await WallSession(walls, transport, address(socket), subprotocol, accounts).run(messages(socket))
 
         if arrival is None:
             await here()

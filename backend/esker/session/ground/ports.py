@@ -13,6 +13,7 @@ from esker import contract as c
 from esker.contract import CloseCode
 from esker.events import BaseLevel, SolveEvent
 from esker.grid import TileKey
+from esker.session.ground.tilethread import Lane
 from esker.tiles.delivery import RefinedTile
 
 
@@ -87,8 +88,13 @@ class Tiles(Protocol):
 class Hydrology(Protocol):
     """Finds rivers, in a thread of its own (``server.hydrology``)."""
 
+    def lane(self) -> Lane:
+        """Returns a place for the searches of one room; homes have turns."""
+        ...
+
     def find(
         self,
+        lane: Lane,
         ground: Any,
         settings: c.TerrainSettings,
         span_m: tuple[float, float] | None,

@@ -46,8 +46,14 @@ class Lane:
 class TileThread(Executor):
     """One thread. What it is given by itself, and not by a lane, is one room's."""
 
-    def __init__(self, name: str = "tiles", now: Callable[[], float] = time.monotonic) -> None:
-        self._now = now
+    def __init__(
+        self,
+        name: str = "tiles",
+        now: Callable[[], float] = time.monotonic,
+        begin: Callable[[], object] = lambda: None,
+    ) -> None:
+        """``begin``: called first in the thread."""
+        self._now, self._begin = now, begin
         self._changed = threading.Condition()
         self._lanes: dict[Lane, None] = {}
         """Lanes that have work. They, and what follows, need the lock."""
@@ -98,6 +104,7 @@ class TileThread(Executor):
             self._thread.join()
 
     def _run(self) -> None:
+        self._begin()
         while (work := self._next()) is not None:
             future, call, _ = work
             if not future.set_running_or_notify_cancel():

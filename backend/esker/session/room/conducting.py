@@ -21,7 +21,7 @@ from esker import contract as c
 from esker.contract import Role
 from esker.document.ops import Refusal
 from esker.document.takeback import Deeds, sentence
-from esker.fairness.shares import homes
+from esker.fairness.shares import Who, homes
 from esker.session.lesson.rules import NO_CHANGE, NOT_LEADERS, NOT_OWNERS, OWNERS_ONLY, REMOVED
 from esker.session.lesson.state import Removed, State
 from esker.session.room.core import RoomCore
@@ -37,6 +37,9 @@ GRACE_SECONDS: Final = 10.0
 """A conductor whose view all follow, and whose page reloads, goes on showing if they are back within this."""
 MOST_GONE: Final = 200
 """People who left and of whom a room remembers how they came, so that they can be removed."""
+TELL_SECONDS: Final = 0.25
+"""Everybody is told how the lesson stands at most this often, the first time at once; conductors, who waits to be let
+in: a lesson may be switched, and who was removed may knock, hundreds of times a second."""
 UNSAVED: Final = "The server could not save this (is its disk full?). It holds until the server stops."
 BUSY: Final = "What somebody did is being taken back already. Try again in a moment."
 UNREADABLE: Final = "The history could not be read, so nothing was taken back."
@@ -44,10 +47,10 @@ UNREADABLE: Final = "The history could not be read, so nothing was taken back."
 
 @dataclass(frozen=True)
 class Desk:
-    """What a room asks of its server. ``read`` runs work in a thread; ``end_link`` ends a link that a join code made
-    for one device; ``now``: seconds since 1970."""
+    """What a room asks of its server. ``read`` runs work in a thread, for an address; ``end_link`` ends a link that a
+    join code made for one device; ``now``: seconds since 1970."""
 
-    read: Callable[[Callable[[], Deeds]], Awaitable[Deeds]]
+    read: Callable[[Who, Callable[[], Deeds]], Awaitable[Deeds]]
     end_link: Callable[[str], object]
     now: Callable[[], float] = time.time
 
@@ -84,6 +87,15 @@ class Conducting:
         self._gone: OrderedDict[str, _Gone] = OrderedDict()
         self._undoing: asyncio.Task[None] | None = None
         self._grace: asyncio.TimerHandle | None = None
+        self._telling: asyncio.TimerHandle | None = None
+        self._notified_at = float("-inf")
+        self._all = self._some = False
+        """Whether everybody is to be told next, or conductors alone."""
+        self._keeping = False
+        """Whether a state of the lesson is being written."""
+        self._kept_late: list[Member] = []
+        """Who switched since that was begun: the newest state is written after it, once."""
+        self._is_newer = False
         if core.lesson.state.look is not None:
             self._grace = loop.call_later(GRACE_SECONDS, self._end_look)
 
@@ -95,7 +107,7 @@ class Conducting:
         lesson = self._core.lesson
         if lesson.state.animals and member.role != "view" and member.person not in lesson.state.named:
             lesson.state = lesson.with_names()  # so that they are called the same after a restart
-            self._journal.keep_lesson(self._core.document.id, lesson.state.model_dump_json())
+            self._keep(())
         if self._core.look is None and self._core.lesson.state.look == member.person:
             self._stop_grace()
             self._core.look = member.client
@@ -123,10 +135,33 @@ class Conducting:
             self._grace.cancel()
             self._grace = None
 
+    def somebody_waits(self) -> None:
+        """Somebody asks to be let in: conductors are told."""
+        self._some = True
+        self._tell_soon()
+
     def tell(self) -> None:
         """Tells everybody how the lesson stands."""
+        self._all = True
+        self._tell_soon()
+
+    def _tell_soon(self) -> None:
+        if self._telling is None:
+            wait = self._notified_at + TELL_SECONDS - self._loop.time()
+            if wait <= 0:
+                self._tell_now()
+            else:
+                self._telling = self._loop.call_later(wait, self._tell_now)
+
+    def _tell_now(self) -> None:
+        """Tells whom it concerns; where a state is being written that they do not know, once it is."""
+        self._telling = None
+        if self._keeping:
+            return
+        everybody, self._all, self._some, self._notified_at = self._all, False, False, self._loop.time()
         for member in self._core.members:
-            member.outbox.message(self._core.lesson_for(member))
+            if everybody or self._core.lesson.conducts(member):
+                member.outbox.message(self._core.lesson_for(member))
 
     # --- what conductors say ------------------------------------------------------------------------------------
 
@@ -165,16 +200,32 @@ class Conducting:
             self._core.look = None
         self._core.members.switched()
         self._people_changed()
-        future = self._journal.keep_lesson(self._core.document.id, lesson.state.model_dump_json())
-        future.add_done_callback(lambda done: self._loop.call_soon_threadsafe(self._kept, done, by))
+        self._all = True
+        self._keep(() if by is None else (by,))
 
-    def _kept(self, future: Future[None], by: Member | None) -> None:
+    def _keep(self, by: Iterable[Member]) -> None:
+        """Writes how the lesson stands. However often it is switched, one state is being written and the newest waits:
+        people are told when what they switched is written, or something newer."""
+        self._kept_late += by
+        if self._keeping:
+            self._is_newer = True
+            return
+        self._keeping, self._is_newer = True, False
+        asked, self._kept_late = self._kept_late, []
+        future = self._journal.keep_lesson(self._core.document.id, self._core.lesson.state.model_dump_json())
+        future.add_done_callback(lambda done: self._loop.call_soon_threadsafe(self._kept, done, asked))
+
+    def _kept(self, future: Future[None], by: Iterable[Member]) -> None:
+        self._keeping = False
         error = future.exception()
         if error is not None:
             log.error("terrain %s: the state of its lesson was not saved: %s", self._core.document.id, error)
-            if by is not None:
-                by.outbox.message(c.Notice(text=UNSAVED))
-        self.tell()
+            for member in dict.fromkeys(by):
+                member.outbox.message(c.Notice(text=UNSAVED))
+        if self._is_newer:
+            self._keep(())
+        elif self._all or self._some:
+            self._tell_soon()
 
     def _finish_what_is_in_hand(self) -> None:
         """Strokes that are being drawn end as they are. They stay their authors', who may undo them."""
@@ -237,7 +288,8 @@ class Conducting:
         clients = sorted(core.lesson.clients_of(people) | here)
         await self._flush()
         try:
-            deeds = await desk.read(lambda: read_deeds(self._journal, core.document.id, clients))
+            who = Who(by.address, by.link)
+            deeds = await desk.read(who, lambda: read_deeds(self._journal, core.document.id, clients))
         except (DamagedTerrain, Denied) as error:
             log.error("terrain %s: nothing was taken back: %s", core.document.id, error)
             by.outbox.message(c.Notice(text=UNREADABLE))
@@ -259,6 +311,8 @@ class Conducting:
     def close(self) -> None:
         """Stops the timer, and what is being taken back."""
         self._stop_grace()
+        if self._telling is not None:
+            self._telling.cancel()
         if self._undoing is not None:
             self._undoing.cancel()
 

@@ -204,7 +204,7 @@ class Hub:
             claims=self._claims,
             lesson=lesson,
         )
-        desk = Desk(partial(self.read, SERVER), partial(self._end_code_link, terrain))
+        desk = Desk(self.read, partial(self._end_code_link, terrain))
         more = {"tenancy": self._tenancy, "on_lost": lambda: self.lose(terrain)}
         needs = self._needs() | {"desk": desk, "home": who.site} | more
         room = Room(core, journal=self.journal, on_empty=lambda: self._empty(terrain), **needs)

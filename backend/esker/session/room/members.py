@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -26,6 +26,8 @@ COLOURS: Final = (
     "#4a9e8f",
     "#a05252",
 )
+LIST_SECONDS: Final = 0.25
+"""The list of members is told at most this often: in a full room it is twenty kilobytes for each of two hundred."""
 QUIET_BACKLOG_BYTES: Final = 64 * 1024
 """A client with more than this waiting gets no cursors until it catches up: they are worth nothing late."""
 
@@ -71,6 +73,7 @@ class Members:
         self._lesson = lesson or Lesson()
         self._moved: set[str] = set()
         self._listed = False
+        self._listed_at = float("-inf")
 
     def __len__(self) -> int:
         return len(self.by_client)
@@ -141,26 +144,45 @@ class Members:
         """Whether ``tick`` has something to send."""
         return bool(self._moved) or self._listed
 
-    def tick(self) -> None:
-        """Sends the list of members if it changed, and the presences that changed."""
-        listed, moved, self._listed, self._moved = self._listed, self._moved, False, set()
-        members = tuple(self)
-        presences = tuple(m.presence for m in members if m.client in moved and m.presence is not None)
+    def tick(self, now: float) -> None:
+        """Sends the list of members if it changed, at most every LIST_SECONDS, and the presences that changed."""
+        listed = self._listed and now - self._listed_at >= LIST_SECONDS
+        if listed:
+            self._listed, self._listed_at = False, now
+        moved, self._moved = self._moved, set()
+        everybody = tuple(self)
+        leaders, own = self._seen_by_all(everybody)
         texts: dict[object, list[tuple[str, bool]]] = {}
-        for member in members:
-            # All who see everybody are told the same text, made once.
-            shared = None if self._lesson.nameless(member) else "all"
-            key = shared or member
+        for member in everybody:
+            # All who see everybody are told the same text, made once; whom others are hidden from sees a few.
+            hidden = self._lesson.nameless(member)
+            key = member.person if hidden else None
             if key not in texts:
-                texts[key] = self._texts(member, listed, presences)
+                seen = self._in_order(leaders, own[member.person]) if hidden else everybody
+                texts[key] = self._texts(seen, listed, moved)
             for text, always in texts[key]:
                 if always or member.outbox.backlog < QUIET_BACKLOG_BYTES:
                     member.outbox.push(text)
 
-    def _texts(self, reader: Member, listed: bool, presences: tuple[c.MemberPresence, ...]) -> list[tuple[str, bool]]:
-        """What a reader is told: texts, and whether also who is behind needs them."""
-        texts = [(c.Members(members=self.public(reader)).model_dump_json(), True)] if listed else []
-        seen = tuple(each for each in presences if self._lesson.sees(reader, self.by_client[each.client]))
-        if seen:
-            texts.append((c.PresenceBroadcast(members=seen).model_dump_json(), False))
+    def _seen_by_all(self, everybody: Sequence[Member]) -> tuple[dict[int, Member], dict[str, dict[int, Member]]]:
+        """Who leads, and who is the same person, each by the place in the order of joining: who sees nobody else while
+        names are hidden sees these (``Lesson.sees``)."""
+        leaders: dict[int, Member] = {}
+        own: dict[str, dict[int, Member]] = {}
+        for place, member in enumerate(everybody):
+            own.setdefault(member.person, {})[place] = member
+            if self._lesson.conducts(member):
+                leaders[place] = member
+        return leaders, own
+
+    def _in_order(self, leaders: dict[int, Member], own: dict[int, Member]) -> tuple[Member, ...]:
+        both = leaders | own
+        return tuple(both[place] for place in sorted(both))
+
+    def _texts(self, seen: Sequence[Member], listed: bool, moved: Collection[str]) -> list[tuple[str, bool]]:
+        """What somebody is told who sees these members: texts, and whether also who is behind needs them."""
+        texts = [(c.Members(members=tuple(map(self._public, seen))).model_dump_json(), True)] if listed else []
+        presences = tuple(m.presence for m in seen if m.client in moved and m.presence is not None)
+        if presences:
+            texts.append((c.PresenceBroadcast(members=presences).model_dump_json(), False))
         return texts

@@ -22,6 +22,8 @@ MAX_MESSAGES_PER_SECOND: Final = 600
 MESSAGES_BURST: Final = 1_200
 CONDUCTS_PER_SECOND, CONDUCTS_BURST = 5, 30
 """Switches of a lesson, and what is done about people: each may be a commit."""
+RENAMES_PER_SECOND, RENAMES_BURST = 2, 10
+"""New names: each is written down, and told to all."""
 MAX_REFUSED_OPS: Final = 4 * c.OPS_BURST
 """The connection is closed after so many ops in a row were refused for their rate."""
 FITS_CHARACTERS: Final = c.MAX_MESSAGE_BYTES // 4
@@ -92,6 +94,7 @@ class Connection:
         self._presences = TokenBucket(c.MAX_PRESENCE_PER_SECOND, c.MAX_PRESENCE_PER_SECOND)
         self._seeks = TokenBucket(c.MAX_SEEKS_PER_SECOND, c.MAX_SEEKS_PER_SECOND)
         self._views = TokenBucket(c.MAX_VIEWS_PER_SECOND, c.MAX_VIEWS_PER_SECOND)
+        self._renames = TokenBucket(RENAMES_PER_SECOND, RENAMES_BURST)
         self._conducts = TokenBucket(CONDUCTS_PER_SECOND, CONDUCTS_BURST)
         self._messages = TokenBucket(MAX_MESSAGES_PER_SECOND, MESSAGES_BURST)
         self._notices = TokenBucket(1.0, 1.0)
@@ -151,6 +154,9 @@ class Connection:
                     return self._close("malformed", "Only who looks at the past goes to another clock.")
                 if not self._seeks.take(now):
                     return self._notice(f"More than {c.MAX_SEEKS_PER_SECOND} clocks a second.", now)
+            case c.Rename():
+                if not self._renames.take(now):
+                    return self._notice(f"More than {RENAMES_PER_SECOND} new names a second.", now)
             case c.Conduct() | c.People():
                 if not self._conducts.take(now):
                     return self._notice(f"More than {CONDUCTS_PER_SECOND} switches of a lesson a second.", now)

@@ -101,9 +101,11 @@ class Room(ClassRoom):
         )
         hydrology = tiles.hydrology if isinstance(tiles, WateredTiles) else None
         self._rivers = Rivers(hydrology, self._feed, self._loop)
+        self._rivers.works_for(home)
         scorer = tiles.scorer if isinstance(tiles, ScoredTiles) else None
         scored = min(c.TASK_LEVEL, info.levels)
         self.scoring = Scoring(scorer, lambda: self._feed.heights(scored), self._loop, self._tell_score)
+        self.scoring.works_for(home)
         self._layers = Layers(elevation, base_threads, self._loop, self._laid, self._tell, self._slow_changed)
         self._job: Job | None = None
         """The job that was asked for last."""
@@ -159,7 +161,7 @@ class Room(ClassRoom):
             member = self.core.join(hello, role, link, outbox, self.info, address, asked)
         except Denied as denied:
             if denied.code == "removed":
-                self.conducting.tell()  # somebody waits to be let in
+                self.conducting.somebody_waits()
             raise
         outbox.message(self._newest_progress())
         if self.in_class is not None:
@@ -179,6 +181,8 @@ class Room(ClassRoom):
         if home and home != self._home and member.role != "view":
             self._home = self._lane.home = home
             self._worker.move(self._solve_client, home)
+            self._rivers.works_for(home)
+            self.scoring.works_for(home)
 
     def leave(self, guest: Guest) -> None:
         """Lets a client go whose connection ended."""
@@ -241,7 +245,9 @@ class Room(ClassRoom):
     def _presence_tick(self) -> None:
         self._presence_timer = None
         if self.core.members.pending:
-            self.core.members.tick()
+            self.core.members.tick(self._loop.time())
+            if self.core.members.pending:
+                self._presence_soon()
 
     # --- imports ------------------------------------------------------------------------------------------------
 
