@@ -61,10 +61,17 @@ def _memory_given_back() -> Iterator[None]:
 
 
 @pytest.fixture(scope="session")
-def database() -> Iterator[Database]:
+def database_server() -> Iterator[Database]:
     """A PostgreSQL server for the whole run. Where none can be had, tests that need it fail with a sentence."""
     with Database() as made:
         yield made
+
+
+@pytest.fixture
+def database(database_server: Database) -> Iterator[Database]:
+    """What gives a test databases of its own; those that it took are emptied for the next one."""
+    yield database_server
+    database_server.take_back()
 
 
 @pytest.fixture(params=ENGINES)

@@ -55,6 +55,7 @@ class Postgres:
     """One server with its data, in a folder of its own, until ``close``. Raises NoPostgres where it cannot start."""
 
     def __init__(self, **settings: str) -> None:
+        package = _installed()
         self.folder = Path(tempfile.mkdtemp(prefix="esker-pg-", dir="/tmp"))
         self._as = _unprivileged()
         self._settings = SETTINGS | settings
@@ -63,7 +64,7 @@ class Postgres:
         if self._as:
             os.chown(self.folder, self._as["user"], self._as["group"])
         self.folder.chmod(0o755)
-        self._bin = self._reachable(_installed()) / "pginstall" / "bin"
+        self._bin = self._reachable(package) / "pginstall" / "bin"
         self._run("initdb", "-D", self.data, "-U", USER, "-A", "trust", "-E", "UTF8", "--locale=C", "--no-sync")
         self.start()
 

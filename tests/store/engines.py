@@ -7,12 +7,15 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
+import psycopg
+
 from bench.cluster._postgres import Postgres as Server
 from esker.store.engine.leases import Lease
-from esker.store.engine.postgres import migrations
+from esker.store.engine.postgres import dialect, migrations
 from esker.store.engine.postgres.engine import Postgres
 from esker.store.engine.sqlite import Sqlite
 from esker.store.journal import Journal
+from esker.store.upkeep.migrations import FORMAT
 
 ENGINES: Final = ("sqlite", "postgres")
 
@@ -23,6 +26,8 @@ class Database:
     def __init__(self) -> None:
         self.server = Server()
         self._made = self.server.database()
+        self._free: list[str] = []
+        self._given: list[str] = []
         migrations.migrate(self._made, 0.0)
 
     def __enter__(self) -> Database:
@@ -32,8 +37,23 @@ class Database:
         self.server.close()
 
     def new(self) -> str:
-        """A new database of the present format, that is old enough to sweep."""
-        return self.server.database(like=self._made)
+        """An empty database of the present format, that is old enough to sweep."""
+        url = self._free.pop() if self._free else self.server.database(like=self._made)
+        self._given.append(url)
+        return url
+
+    def take_back(self) -> None:
+        """Empties the databases that were given: one of hundreds of files takes long to make and to remove."""
+        tables = ", ".join(f"{dialect.SCHEMA}.{name}" for name in (*dialect.TABLES, "nodes", "leases"))
+        while self._given:
+            url = self._given.pop()
+            with psycopg.connect(url, autocommit=True) as db:
+                db.execute("SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE datname = current_database()"
+                           " AND pid <> pg_backend_pid()")  # fmt: skip
+                db.execute(f"TRUNCATE {tables}".encode())
+                facts = [("format", str(FORMAT)), ("swept_from", "0")]
+                db.cursor().executemany("INSERT INTO esker.server VALUES (%s, %s)", facts)
+            self._free.append(url)
 
 
 class Holding:

@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import signal
-import subprocess
-import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -13,9 +9,9 @@ from concurrent.futures import Future
 from pathlib import Path
 from typing import Any
 
-import psycopg
 import pytest
 
+from bench.cluster._zombie import KINDS, OP, Zombie, written
 from esker import contract as c
 from esker.store.access import Access
 from esker.store.engine.leases import Lease, Node
@@ -25,9 +21,6 @@ from esker.store.engine.postgres.engine import Postgres
 from esker.store.engine.postgres.leases import PostgresLeases
 from esker.store.journal import Journal, Row
 from tests.store.engines import Database, Holding
-from tests.store.zombie_child import OP
-
-ROOT = Path(__file__).parents[2]
 
 
 class Server:
@@ -118,56 +111,6 @@ def test_a_failure_of_one_item_is_its_own(server: Server) -> None:
     assert isinstance(server.journal.create(c.Document(id="t")).exception(), UsedTwice)
 
 
-class Zombie:
-    """Another server, in a process of its own."""
-
-    def __init__(self, url: str) -> None:
-        self._process = subprocess.Popen(
-            [sys.executable, "-m", "tests.store.zombie_child", url],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-            cwd=ROOT,
-            env={**os.environ, "PYTHONPATH": f"{ROOT / 'backend'}{os.pathsep}{ROOT}"},
-        )
-        assert self.hears() == "ready"
-
-    def says(self, line: str) -> None:
-        assert self._process.stdin is not None
-        self._process.stdin.write(f"{line}\n")
-        self._process.stdin.flush()
-
-    def hears(self) -> str:
-        assert self._process.stdout is not None
-        return self._process.stdout.readline().strip()
-
-    def freeze(self) -> None:
-        self._process.send_signal(signal.SIGSTOP)
-
-    def wake(self) -> None:
-        self._process.send_signal(signal.SIGCONT)
-
-    def close(self) -> None:
-        self.wake()
-        self._process.kill()
-        self._process.wait()
-        for stream in (self._process.stdin, self._process.stdout):
-            if stream is not None:
-                stream.close()
-
-
-def written(url: str) -> list[int]:
-    """Rows of each table that a zombie wrote."""
-    questions = (
-        "SELECT count(*) FROM esker.ops WHERE client='zombie'",
-        "SELECT count(*) FROM esker.snapshots WHERE clock > 0",
-        "SELECT count(*) FROM esker.links WHERE name='zombie'",
-        "SELECT count(*) FROM esker.lessons WHERE state='zombie'",
-    )
-    with psycopg.connect(url) as db:
-        return [found[0] for question in questions if (found := db.execute(question).fetchone()) is not None]
-
-
 def test_a_server_that_was_frozen_in_a_commit_writes_nothing_when_it_wakes(
     server: Server, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -175,7 +118,7 @@ def test_a_server_that_was_frozen_in_a_commit_writes_nothing_when_it_wakes(
     monkeypatch.setattr(leases, "STRANDED_SECONDS", 0.1)
     zombie = Zombie(server.url)
     try:
-        for clock, what in enumerate(("append", "snapshot", "link", "lesson"), 1):
+        for clock, what in enumerate(KINDS, 1):
             zombie.says(f"{what} {clock}")
             assert zombie.hears() == "inside"
             zombie.freeze()

