@@ -68,18 +68,21 @@ fn river_bed(p: vec2f, away: f32) -> f32 {
 
 // The bed that the river has cut: its banks fall towards the water, and the ground beside it is wet, further out greener.
 fn river_banks(m: Material, r: River, s: Site) -> Material {
-  if (r.share <= 0.0 || view.look == LOOK_PAPER) { return m; }
+  if (r.share <= 0.0 || r.beyond > 5.0 * r.half + 8.0 || view.look == LOOK_PAPER) { return m; }
   let width = 2.0 * r.half;
-  let wander = (s.fine1.r - 0.5) * 0.8 + (s.fine2.r - 0.5) * 0.6;
+  let lod = max(log2(s.footprint * 12.0), 0.0);
+  let rough = textureSampleLevel(noise, smooth_repeat, s.p.xy / 21.0, lod);
+  let wander = (rough.r - 0.5) * 1.4;
   let reach = max(r.beyond, 0.0) / (0.6 * width + 1.0);
   let cut = (1.0 - smoothstep(0.0, 1.0, reach)) * smoothstep(-0.6 * r.half, 0.1 * r.half, r.beyond);
   let wet = (1.0 - smoothstep(0.1, 0.9, reach + 0.5 * wander)) * r.share;
   let lush = (1.0 - smoothstep(0.3, 2.6, reach + wander)) * r.share * (1.0 - smoothstep(0.5, 0.9, s.steep)) * (1.0 - s.cover.snow);
-  let green = mix(m.albedo, m.albedo * vec3f(0.62, 0.86, 0.50) + vec3f(0.002, 0.012, 0.001), select(0.48, 0.30, view.look == LOOK_DESERT) * lush);
-  var out = soaked(Material(green, m.slope, m.gloss, m.soft), 0.85 * wet);
+  var green = m;
+  green.albedo = mix(m.albedo, m.albedo * vec3f(0.62, 0.86, 0.50) + vec3f(0.002, 0.012, 0.001), select(0.48, 0.30, view.look == LOOK_DESERT) * lush);
+  var out = soaked(green, 0.85 * wet);
   // Stones lie bare where the water stands higher at times.
   let stones = (1.0 - smoothstep(0.05, 0.30, reach + 0.35 * wander)) * r.share;
-  out.albedo = mix(out.albedo, vec3f(0.120, 0.113, 0.102) * (0.6 + 0.8 * s.fine2.g), 0.6 * stones);
+  out.albedo = mix(out.albedo, vec3f(0.120, 0.113, 0.102) * (0.6 + 0.8 * rough.g), 0.6 * stones);
   out.slope += r.out * (0.55 * cut * r.share);
   return out;
 }
