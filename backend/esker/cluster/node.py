@@ -9,19 +9,18 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import socket
 import threading
 import time
 from collections.abc import Awaitable, Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
-from typing import Any, Final, Protocol, TypeVar
-from urllib.parse import urlsplit
+from typing import Any, Final, TypeVar
 
-from esker.cluster.peers import Elsewhere, Peer
+from esker.cluster.peers import Elsewhere, Peer, resolved
 from esker.cluster.rendezvous import chosen, stepped
+from esker.cluster.rooms import Counts, Holding, Rooms
 from esker.cluster.tenure import Phase, Tenure
 from esker.store.engine.leases import (
     LEASE_SECONDS,
@@ -47,52 +46,6 @@ KNOWN_SECONDS: Final = 1.0
 MOST_KNOWN: Final = 10_000
 LIVE_SECONDS: Final = 3 * RENEW_SECONDS
 THREADS: Final = 6
-
-
-class Rooms(Protocol):
-    """The rooms of this process, as a node needs them."""
-
-    def in_use(self, terrain: str) -> bool:
-        """Whether something of a terrain is open or under way here."""
-
-    def lose(self, terrain: str) -> None:
-        """Shuts what is open of a terrain without writing: another node may have it."""
-
-    async def hand_over(self, terrain: str) -> None:
-        """Commits what was ordered, sends everybody on, and shuts what is open of a terrain."""
-
-    def home(self, terrain: str) -> str:
-        """Returns the terrain with which this one moves: that of its class, else itself. Asks the database."""
-
-    def taken(self, terrain: str) -> None:
-        """Forgets what was known of a terrain: another node may have written meanwhile."""
-
-
-@dataclass(frozen=True)
-class Holding:
-    """A terrain that this node has, with those that move with it: a class with its copies, under one lease.
-
-    terrains: those of them that were asked for here. used: when one was last asked for.
-    """
-
-    lease: Lease
-    tenure: Tenure
-    used: float
-    terrains: frozenset[str] = frozenset()
-
-
-@dataclass
-class Counts:
-    """What a node counts."""
-
-    taken: int = 0
-    lost: int = 0
-    released: int = 0
-    fenced: int = 0
-    sockets_passed: int = 0
-    sockets_passing: int = 0
-    requests_passed: int = 0
-    renewals_failed: int = 0
 
 
 class Cluster:
@@ -348,7 +301,7 @@ class Cluster:
             log.warning("the leases of node %s could not be renewed: %s", self.name, error)
             return None
         others = {node.address for node in nodes}
-        new = {each: _resolved(each) for each in others - self._addresses.keys()}
+        new = {each: resolved(each) for each in others - self._addresses.keys()}
         self._addresses = {each: found for each, found in (self._addresses | new).items() if each in others}
         return asked, leases, renewed, nodes
 
@@ -453,12 +406,3 @@ class Cluster:
             tried.add(owner.name)
             raise
         return True
-
-
-def _resolved(address: str) -> frozenset[str]:
-    """Returns the addresses of a node on the network; none where its name is unknown."""
-    host = urlsplit(address).hostname
-    try:
-        return frozenset(str(found[4][0]) for found in socket.getaddrinfo(host, None)) if host else frozenset()
-    except OSError:
-        return frozenset()

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import socket
 import ssl
 import time
 from collections.abc import Awaitable, Callable, Iterable, MutableMapping
@@ -348,3 +349,12 @@ def target_of(scope: Message) -> str:
     path: bytes = scope.get("raw_path") or scope["path"].encode()
     query: bytes = scope.get("query_string", b"")
     return (path + (b"?" + query if query else b"")).decode("latin-1")
+
+
+def resolved(address: str) -> frozenset[str]:
+    """Returns the addresses of a node on the network; none where its name is unknown."""
+    host = urlsplit(address).hostname
+    try:
+        return frozenset(str(found[4][0]) for found in socket.getaddrinfo(host, None)) if host else frozenset()
+    except OSError:
+        return frozenset()

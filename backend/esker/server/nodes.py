@@ -80,7 +80,7 @@ class Load:
 
 
 class Rooms:
-    """The rooms of this process, as its node needs them (``cluster.node.Rooms``)."""
+    """The rooms of this process, as its node needs them (``cluster.rooms.Rooms``)."""
 
     def __init__(self, hub: Hub) -> None:
         self._hub, self._journal = hub, hub.journal
