@@ -100,6 +100,9 @@ fn terrain_fragment(v: TerrainVertex) -> @location(0) vec4f {
     m.gloss = 0.0;
   } else if (view.overlay == OVERLAY_WATERSHED) {
     m.albedo = watershed_tint(m.albedo, v.detail.z);
+  } else if (view.overlay == OVERLAY_DIFFERENCE) {
+    m.albedo = difference_tint(m.albedo, v.detail.z);
+    m.gloss = 0.0;
   } else if (view.overlay == OVERLAY_PATCHES) {
     m.albedo = mix(m.albedo, level_tint(u32(v.layers.z)) * 0.5, 0.7);
   }

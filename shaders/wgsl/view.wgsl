@@ -50,6 +50,7 @@ const OVERLAY_DETAIL: u32 = 4u;
 const OVERLAY_INFLUENCE: u32 = 5u;
 const OVERLAY_PAINTED: u32 = 6u;
 const OVERLAY_WATERSHED: u32 = 7u;
+const OVERLAY_DIFFERENCE: u32 = 8u;
 
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var heights: texture_2d_array<f32>;

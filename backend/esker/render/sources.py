@@ -15,7 +15,8 @@ _COMMON: Final = ("view", "tile", "sky", "noise", "tonemap")
 def terrain(look: str, detail: str) -> Module:
     """The ground in one look, for one of the two amounts of detail."""
     ground = "material", f"stones_{detail}", f"look_{look}"
-    return _module(*_COMMON, f"detail_{detail}", "patch", "lakes", *ground, "rivers", "lines", "overlay", "terrain")
+    lines = "rivers", "lines", "overlay", "difference"
+    return _module(*_COMMON, f"detail_{detail}", "patch", "lakes", *ground, *lines, "terrain")
 
 
 def wall(detail: str) -> Module:

@@ -2,7 +2,7 @@
 
 Heights are whole steps above the lowest. What is kept of a sample is how far it is from the plane through its three
 neighbours to the west and south, in zigzag order (0, -1, 1, -2, ...), all low bytes before all high ones,
-deflated. Twin of ``frontend/src/app/task/target.ts``.
+deflated. Twin of ``frontend/src/app/lesson/task/target.ts``.
 """
 
 from __future__ import annotations

@@ -3,7 +3,16 @@
 import type { ReadonlySignal, Signal } from "@preact/signals-core";
 import type { RiverSet } from "../core/types.ts";
 import type { SyncDoc } from "../doc/sync.ts";
-import type { Member, MemberPresence, Op, Progress, Role, StrokeFields, TerrainFields } from "../generated/contract.ts";
+import type {
+  Member,
+  MemberPresence,
+  Op,
+  Progress,
+  Role,
+  Score,
+  StrokeFields,
+  TerrainFields,
+} from "../generated/contract.ts";
 import type { Connection } from "../net/connection.ts";
 import type { Identity, Store } from "./device/storage.ts";
 import type { History } from "./history/history.ts";
@@ -46,6 +55,8 @@ export interface OpenTerrain {
   /** The server's last sentence about its solver, until somebody has read it. */
   readonly notice: ReadonlySignal<string | null>;
   readonly server: ReadonlySignal<ServerInfo | null>;
+  /** How far the terrain is with its task, as the server last said. */
+  readonly score: ReadonlySignal<Score | null>;
   readonly me: ReadonlySignal<Identity>;
   /** The rivers that the server found last; null before. */
   readonly rivers: ReadonlySignal<RiverSet | null>;

@@ -17,6 +17,7 @@ import type {
   Op,
   Progress,
   Role,
+  Score,
   ServerMessage,
   StrokeFields,
   TerrainFields,
@@ -70,6 +71,8 @@ export class TerrainSession implements OpenTerrain {
   readonly server = signal<ServerInfo | null>(null);
   /** The class whose copy this terrain is, as the server last said; null where it is none. */
   readonly inClass = signal<InClass | null>(null);
+  /** How far the terrain is with its task, as the server last said; null before. */
+  readonly score = signal<Score | null>(null);
   readonly me = signal<Identity>({ name: "", colour: "#888888" });
   readonly stage = signal<Stage | null>(null);
   /** Whether the link allows changes. */
@@ -348,6 +351,9 @@ export class TerrainSession implements OpenTerrain {
         break;
       case "lesson":
         this.lesson.receive(message);
+        break;
+      case "score":
+        this.score.value = (message.points ?? null) === null ? null : message;
         break;
       case "notice":
         this.toasts.show(message.text);

@@ -248,10 +248,19 @@ export interface Scene {
   readonly quality?: QualityMode;
   /** Seconds, for water and the like. */
   readonly time: number;
-  readonly overlay: "none" | "contours" | "slope" | "detail" | PaintedOverlay | "patches" | "influence" | "watershed";
+  readonly overlay:
+    | "none"
+    | "contours"
+    | "slope"
+    | "detail"
+    | PaintedOverlay
+    | "patches"
+    | "influence"
+    | "watershed"
+    | "difference";
   /**
-   * Where the selected stroke is felt, 0..1, for the overlay of that name, or a watershed for its own; null: none is
-   * selected.
+   * Where the selected stroke is felt, 0..1, a watershed, or how far the ground is from a target (`core/difference.ts`),
+   * for the overlays of these names; null: none is selected.
    */
   readonly influence?: ChannelGrid | null;
   /** Rivers of the 3D view; the 2D map draws them among the footprints. */

@@ -31,6 +31,7 @@ const OVERLAYS = {
   wetness: 6,
   erosion: 6,
   watershed: 7,
+  difference: 8,
 } as const;
 
 /** Facts that a frame is drawn with besides the scene. */

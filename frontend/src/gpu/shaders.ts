@@ -11,6 +11,7 @@ import computeSun from "@shaders/wgsl/compute_sun.wgsl?raw";
 import computeSynthesis from "@shaders/wgsl/compute_synthesis.wgsl?raw";
 import detailPlain from "@shaders/wgsl/detail_plain.wgsl?raw";
 import detailRich from "@shaders/wgsl/detail_rich.wgsl?raw";
+import difference from "@shaders/wgsl/difference.wgsl?raw";
 import drops from "@shaders/wgsl/drops.wgsl?raw";
 import ghost from "@shaders/wgsl/ghost.wgsl?raw";
 import hidden from "@shaders/wgsl/hidden.wgsl?raw";
@@ -84,6 +85,7 @@ export function terrainSource(look: Look, detail: Detail): string {
     rivers,
     overlayLines,
     overlay,
+    difference,
     terrain,
   );
 }

@@ -34,6 +34,7 @@ import { Groundwork } from "../layers/groundwork.ts";
 import { riverLines } from "../layers/river-lines.ts";
 import { ShownRivers } from "../layers/shown-rivers.ts";
 import { StillGround } from "../layers/still-ground.ts";
+import { TaskView } from "../lesson/task/task-view.ts";
 import type { OpenTerrain } from "../open-terrain.ts";
 import { gridTransport } from "../server/grid-transport.ts";
 import { Arrival } from "./eye/arrival.ts";
@@ -80,6 +81,8 @@ export class Stage {
   readonly water: WaterTool;
   /** A place on a section that somebody points at, on the ground. */
   readonly marked: ReadonlySignal<Vec3 | null>;
+  /** The task of the terrain, and how far the ground is from it. */
+  readonly task: TaskView;
   readonly defaults: ToolDefaults;
   readonly loop: FrameLoop;
   readonly overlay = signal<Scene["overlay"]>("none");
@@ -181,7 +184,13 @@ export class Stage {
       },
       author: () => session.me.value.name,
     });
-    this.instruments = new Instruments(this.input.ruler, this.tiles);
+    this.task = new TaskView({
+      doc: session.doc.doc,
+      tiles: this.tiles,
+      overlay: this.overlay,
+      conducts: () => session.lesson.state.value.conducts,
+    });
+    this.instruments = new Instruments(this.input.ruler, this.tiles, this.task.asked);
     this.#still = new StillGround(this.tiles.revision, () => this.shown.freeze());
     this.water = new WaterTool({
       sizeM,
@@ -341,6 +350,7 @@ export class Stage {
     this.groundwork.dispose();
     this.instruments.dispose();
     this.water.dispose();
+    this.task.dispose();
     this.input.dispose();
     this.graphics.dispose();
   }
@@ -389,6 +399,8 @@ export class Stage {
         this.water.lines.value;
         this.water.floodVisual.value;
         this.water.shower.raining.value;
+        this.task.lines.value;
+        this.task.difference.value;
         this.groundwork.visual.value;
         this.overlay.value;
         this.quality.mode.value;
@@ -454,6 +466,7 @@ export class Stage {
       footprints: [
         ...this.#rivers.value,
         ...this.groundwork.footprints.value,
+        ...this.task.lines.value,
         ...this.instruments.lines.value,
         ...this.water.lines.value,
       ],
@@ -477,6 +490,11 @@ export class Stage {
   #overlaid(): Pick<Scene, "overlay" | "influence"> {
     const shed = this.water.tint.value;
     if (shed !== null && this.overlay.value === "none") return { overlay: "watershed", influence: shed };
+    // Without a target there is nothing to differ from.
+    if (this.task.differs) {
+      const off = this.task.difference.value;
+      return { overlay: off === null ? "none" : "difference", influence: off };
+    }
     return { overlay: this.overlay.value, influence: this.#influence.value };
   }
 }

@@ -19,7 +19,7 @@ function isPainted(overlay: Scene["overlay"]): overlay is PaintedOverlay {
 
 /** The third component of the texture: influence, or a painted channel as 0.5 + bias / 2; null with other overlays. */
 export function overlayGrid({ overlay, influence, channels }: Scene): ChannelGrid | null {
-  if (overlay === "influence" || overlay === "watershed") return influence ?? null;
+  if (overlay === "influence" || overlay === "watershed" || overlay === "difference") return influence ?? null;
   if (!isPainted(overlay)) return null;
   const grid = channels[overlay];
   const known = shares.get(grid);

@@ -18,6 +18,7 @@ import { assembleBordered, SLOT_TEXELS } from "../atlas/apron.ts";
 import { overlayGrid } from "../atlas/channeltexture.ts";
 import { contourInterval } from "../looks.ts";
 import { DetailPicture, InfluencePicture, PaintedPicture, ShedPicture } from "./detail.ts";
+import { DifferencePicture } from "./difference.ts";
 import { drawDrops } from "./drops.ts";
 import { drawFootprints, MapPlacing } from "./grids.ts";
 import { type MapStyle, shadeTile } from "./shade.ts";
@@ -55,6 +56,7 @@ export class MapRenderer implements SceneRenderer {
   readonly #pictures = new Map<string, Picture>();
   readonly #detail = new DetailPicture();
   readonly #felt = new InfluencePicture();
+  readonly #difference = new DifferencePicture();
   readonly #painted = new PaintedPicture();
   readonly #shed = new ShedPicture();
   readonly #placing = new MapPlacing();
@@ -171,6 +173,7 @@ export class MapRenderer implements SceneRenderer {
 
   #pictureOf(overlay: Scene["overlay"], shares: ChannelGrid): HTMLCanvasElement {
     if (overlay === "watershed") return this.#shed.of(shares);
+    if (overlay === "difference") return this.#difference.of(shares);
     return overlay === "influence" ? this.#felt.of(shares) : this.#painted.of(shares);
   }
 

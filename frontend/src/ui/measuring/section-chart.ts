@@ -9,14 +9,17 @@ import { type Profile, profileAt } from "../../core/measure/profile.ts";
 const rootPx = (): number => Number.parseFloat(getComputedStyle(document.documentElement).fontSize) || 16;
 
 export function sectionChart(
-  instruments: Pick<Instruments, "beforeHeights" | "exaggeration" | "marker">,
+  instruments: Pick<Instruments, "beforeHeights" | "exaggeration" | "marker"> &
+    Partial<Pick<Instruments, "askedHeights">>,
   profile: Profile,
   width: number,
   height: number,
 ): TemplateResult {
   const em = 0.6875 * rootPx();
   const before = instruments.beforeHeights.value;
-  const chart = chartOf(profile, { width, height, em, exaggeration: instruments.exaggeration.value, before });
+  const asked = instruments.askedHeights?.value ?? null;
+  const exaggeration = instruments.exaggeration.value;
+  const chart = chartOf(profile, { width, height, em, exaggeration, before: asked === null ? before : null, asked });
   const move = (e: PointerEvent): void => {
     const box = (e.currentTarget as Element).getBoundingClientRect();
     instruments.marker.value = chart.distanceAt(((e.clientX - box.left) * width) / Math.max(1, box.width));
@@ -37,6 +40,7 @@ export function sectionChart(
   >
     ${axes(chart, em)}
     <path class="ground" d=${chart.area}></path>
+    ${asked ? svg`<path class="high" d=${chart.tooHigh}></path><path class="low" d=${chart.tooLow}></path><path class="asked" d=${chart.asked}></path>` : nothing}
     ${chart.before ? svg`<path class="before" d=${chart.before}></path>` : nothing}
     <path class="crest" d=${chart.line}></path>
     ${chart.corners.slice(1, -1).map((x) => svg`<path class="corner" d="M${x} ${chart.top}V${chart.bottom}"></path>`)}

@@ -31,8 +31,10 @@ import "../panels/overlay.ts";
 import "../panels/stroke-panel.ts";
 import "../panels/terrain-panel.ts";
 import "../water/water-panel.ts";
+import "../task/task-chip.ts";
+import "../task/task-panel.ts";
 
-export type PanelTab = "stroke" | "ground" | "terrain" | "history" | "lesson";
+export type PanelTab = "stroke" | "ground" | "terrain" | "history" | "task" | "lesson";
 export type DialogId = "share" | "profile" | "help" | "about" | "export" | "delete";
 
 /** Handles, cursors and the brush, over the picture. */
@@ -90,10 +92,11 @@ export function toolRail({ input, session }: Stage): TemplateResult {
 }
 
 /** The legend, the progress of the ground, and the ways to look at it. */
-export function foot(stage: Stage): TemplateResult {
+export function foot(stage: Stage, openTask: () => void): TemplateResult {
   const { camera, channels, cursor, graphics, input, levels, quality, quietStrokes, session } = stage;
   return html`<div class="foot">
     <div class="notes">
+      <esk-task-chip class="panel" .view=${stage.task} .score=${session.score} @open=${openTask}></esk-task-chip>
       <esk-legend
         class="panel"
         .overlay=${stage.overlay}
@@ -104,6 +107,7 @@ export function foot(stage: Stage): TemplateResult {
         .selection=${input.selection}
         .choices=${stage.view}
         .automaticM=${stage.contourM}
+        .task=${stage.task}
       ></esk-legend>
       <esk-status-line
         class="panel"
@@ -233,6 +237,15 @@ export function inspector(stage: Stage, tab: PanelTab, browse: () => void): Temp
       .members=${session.members}
       .client=${session.client}
     ></esk-history-panel>`;
+  if (tab === "task")
+    return html`<esk-task-panel
+      .view=${stage.task}
+      .score=${session.score}
+      .lesson=${session.lesson.state}
+      .ruler=${input.ruler}
+      .tiles=${stage.tiles}
+      .edits=${session}
+    ></esk-task-panel>`;
   if (tab === "lesson")
     return html`<esk-lesson-panel
       .lesson=${session.lesson}

@@ -43,10 +43,21 @@ const TABS = [
   { value: "terrain", label: "Terrain" },
   { value: "history", label: "History", title: "What everybody did, and the terrain as it was" },
 ];
-const LEADING = [...TABS, { value: "lesson", label: "Lesson", title: "Lead the lesson: hands off, look here, people" }];
+const TASK = { value: "task", label: "Task", title: "What is asked, and how far one is" };
+const LEADING = [
+  ...TABS,
+  TASK,
+  { value: "lesson", label: "Lesson", title: "Lead the lesson: hands off, look here, people" },
+];
 
 const WIDE = "(min-width: 1000px)";
 const NARROW = "(max-width: 720px)";
+
+/** A task is there for who leads, who may write one, and for all where there is one. */
+function tabsOf({ session, task }: Stage): typeof TABS {
+  if (session.lesson.state.value.conducts) return LEADING;
+  return task.task.value === null ? TABS : [TASK, ...TABS];
+}
 
 /** `/t/{id}`: the picture over the whole window, and calm chrome that floats on it. */
 export class EskTerrain extends SignalElement {
@@ -254,7 +265,7 @@ export class EskTerrain extends SignalElement {
   #chrome(stage: Stage): TemplateResult {
     return html`
       ${overlay(stage)} ${topBar(stage, this.#panel.value !== null, (command) => this.#command(command))}
-      ${toolRail(stage)} ${foot(stage)}
+      ${toolRail(stage)} ${foot(stage, () => this.#toggle("task"))}
       ${this.#hint(stage)} ${this.#keyPen(stage)} ${this.#following(stage)} ${this.#closedBar(stage)} ${this.#offline(stage)} ${this.#graphics(stage)} ${this.#notice(stage)}
       ${this.#importing(stage)} ${lessonBar(stage)}
       <esk-placing-bar
@@ -288,7 +299,7 @@ export class EskTerrain extends SignalElement {
         <header>
           <esk-segmented
             label="Inspector"
-            .segments=${stage.session.lesson.state.value.conducts ? LEADING : TABS}
+            .segments=${tabsOf(stage)}
             .value=${tab}
             @pick=${(e: CustomEvent<PanelTab>) => {
               this.#openedBySelection = false;

@@ -66,12 +66,14 @@ interface CardState {
 export function wallCard(copy: WallCopy, { isChosen, isShown, onPress }: CardState): TemplateResult {
   const name = copyName(copy);
   const last = copy.last === null ? "nothing drawn yet" : ago(Date.now() - 1000 * copy.last);
+  const points = copy.score?.points ?? null;
+  const scored = points === null ? "" : `, ${points} of 100 points`;
   const lines = copy.strokes === 1 ? "1 line" : `${copy.strokes} lines`;
   return html`<li>
       <button
         class="copy"
         aria-pressed=${isChosen ? "true" : "false"}
-        aria-label=${`${name}, ${copy.online > 0 ? "here" : "away"}, ${last}, ${lines}`}
+        aria-label=${`${name}, ${copy.online > 0 ? "here" : "away"}, ${last}, ${lines}${scored}`}
         @click=${onPress}
       >
         <span class="picture"><canvas data-copy=${copy.number} aria-hidden="true"></canvas></span>
@@ -79,6 +81,7 @@ export function wallCard(copy: WallCopy, { isChosen, isShown, onPress }: CardSta
           ${isShown ? html`<span class="badge shown">${icon("eye")} Shown to all</span>` : nothing}
           ${copy.frozen ? html`<span class="badge">${icon("lock")} Frozen</span>` : nothing}
         </span>
+        ${points === null ? nothing : html`<span class="points" title=${copy.score?.text ?? ""} style="--done:${points}%">${points}</span>`}
         <span class="words">
           <span class="name"><i class=${copy.online > 0 ? "dot here" : "dot"}></i><span title=${name}>${name}</span></span>
           <span class="facts">${last} · ${lines}</span>

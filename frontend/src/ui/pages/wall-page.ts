@@ -20,6 +20,7 @@ const SORTS = [
   { value: "name", label: "By name" },
   { value: "last", label: "Drawn last" },
 ];
+const BY_SCORE = { value: "score", label: "By score" };
 const POLL_MS = 400;
 const WORDS_MS = 15_000;
 
@@ -189,7 +190,10 @@ export class EskWall extends SignalElement {
     void this.#tick.value;
     const copies = arrange([...wall.copies.value.values()], this.sorting, this.filter);
     return html`
-      ${this.#head(state)} ${this.#toolbar(wall.copies.value.size)}
+      ${this.#head(state)} ${this.#toolbar(
+        wall.copies.value.size,
+        copies.some((copy) => (copy.score?.points ?? null) !== null),
+      )}
       ${
         wall.copies.value.size === 0
           ? emptyWall(state.code)
@@ -252,13 +256,13 @@ export class EskWall extends SignalElement {
     });
   }
 
-  #toolbar(count: number): TemplateResult {
+  #toolbar(count: number, isScored: boolean): TemplateResult {
     const problem = this.#wall?.problem.value ?? "";
     return html`
       <div class="tools">
         <esk-segmented
           label="Order"
-          .segments=${SORTS}
+          .segments=${isScored ? [...SORTS, BY_SCORE] : SORTS}
           .value=${this.sorting}
           @pick=${(e: CustomEvent<Sorting>) => {
             this.sorting = e.detail;

@@ -149,6 +149,25 @@ export const wallStyles = css`
     background: var(--esk-accent);
     color: #fff;
   }
+  /* The score: a ring that closes with it. */
+  .points {
+    position: absolute;
+    right: 12px;
+    bottom: 12px;
+    display: grid;
+    place-items: center;
+    width: 44px;
+    aspect-ratio: 1;
+    border-radius: 50%;
+    background:
+      radial-gradient(closest-side, var(--esk-panel-solid) 78%, transparent 80%),
+      conic-gradient(var(--esk-accent) var(--done), var(--esk-line-strong) 0);
+    font: 680 0.9375rem / 1 var(--wa-font-family-body);
+    font-variant-numeric: tabular-nums;
+  }
+  .copy:has(.points) .words {
+    padding-right: 62px;
+  }
   .words {
     display: grid;
     gap: 1px;

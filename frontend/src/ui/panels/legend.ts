@@ -1,10 +1,12 @@
 import type { ReadonlySignal } from "@preact/signals-core";
 import { css, html, nothing, type TemplateResult } from "lit";
 import type { ViewChoices } from "../../app/device/view-choices.ts";
+import type { TaskView } from "../../app/lesson/task/task-view.ts";
 import { SUBSTANCES } from "../../app/words/paints.ts";
 import { metres } from "../../app/words/words.ts";
 import type { PaintedOverlay, Scene, Vec3 } from "../../core/types.ts";
 import type { Doc } from "../../doc/document.ts";
+import { TOLERANCES_OFF } from "../../generated/contract.ts";
 import type { ChannelStore } from "../../tiles/detail/channels.ts";
 import { INDEX_EVERY } from "../../tiles/flat.ts";
 import type { ShownTerrain } from "../../tiles/shownterrain.ts";
@@ -33,6 +35,7 @@ export class EskLegend extends SignalElement {
     selection: { attribute: false },
     choices: { attribute: false },
     automaticM: { attribute: false },
+    task: { attribute: false },
   };
   static override styles = [
     shared,
@@ -82,6 +85,9 @@ export class EskLegend extends SignalElement {
       .influence {
         background: linear-gradient(to right, #a7a7a7, #d6c183 45%, #d35a3c);
       }
+      .difference {
+        background: linear-gradient(to right, #2f6fc9, #b9b6ad 40%, #b9b6ad 60%, #d23f36);
+      }
       .painted {
         background: linear-gradient(to right, #b37442, #8d8d8d 50%, #3595b3);
       }
@@ -101,6 +107,9 @@ export class EskLegend extends SignalElement {
   /** Height between the contours that are drawn, metres; 0: none yet. */
   declare automaticM: ReadonlySignal<number>;
 
+  /** The task whose difference is shown. */
+  declare task: TaskView;
+
   protected override render(): TemplateResult | typeof nothing {
     const overlay = this.overlay.value;
     const times = this.choices.exaggeration;
@@ -114,6 +123,7 @@ export class EskLegend extends SignalElement {
     if (overlay === "patches" || overlay === "watershed") return html`<div class="name">${NAMED[overlay]}</div>`;
     if (overlay === "slope") return scale("Steepness", "slope", ["0°", "30°", "60°"]);
     if (overlay === "influence") return this.#influence();
+    if (overlay === "difference") return this.#difference();
     this.channels.revision.value;
     if (overlay !== "detail") return this.#painted(overlay);
     const greatest = this.channels.amplitude.values.reduce((a, b) => Math.max(a, b), 0);
@@ -131,6 +141,22 @@ export class EskLegend extends SignalElement {
       <div class="name">Contours every ${words(every)}</div>
       <div>Each fifth stronger, with its height: every ${words(INDEX_EVERY * every)}</div>
     </div>`;
+  }
+
+  /** How far red and blue reach, and how far the ground under the cursor is from what is asked. */
+  #difference(): TemplateResult {
+    const goal = this.task.task.value?.goal;
+    const tolerance = goal && "tolerance_m" in goal ? goal.tolerance_m : 0;
+    const most = metres(TOLERANCES_OFF * tolerance);
+    const off = this.task.offAt(this.cursor.value);
+    const words =
+      off === null
+        ? nothing
+        : Math.abs(off) <= tolerance
+          ? "as asked"
+          : `${metres(Math.abs(off))} too ${off > 0 ? "high" : "low"}`;
+    return html`${scale("Against the task", "difference", [`−${most}`, "as asked", `+${most}`])}
+      ${words === nothing ? nothing : html`<div class="ends"><span>Here</span><span>${words}</span></div>`}`;
   }
 
   #influence(): TemplateResult {

@@ -64,6 +64,20 @@ export const measurePanelStyles = css`
     stroke-width: 2;
     stroke-linejoin: round;
   }
+  .high {
+    fill: #d23f36;
+    fill-opacity: 0.72;
+  }
+  .low {
+    fill: #2f6fc9;
+    fill-opacity: 0.72;
+  }
+  .asked {
+    fill: none;
+    stroke: var(--esk-text);
+    stroke-width: 1.6;
+    stroke-dasharray: 7 4;
+  }
   .before {
     fill: none;
     stroke: var(--esk-quiet);

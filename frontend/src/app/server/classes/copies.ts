@@ -2,7 +2,7 @@
 
 import type { WallCopy } from "../../../generated/contract.ts";
 
-export type Sorting = "number" | "name" | "last";
+export type Sorting = "number" | "name" | "last" | "score";
 
 /** What a copy is called: by those whose it is, else by its number. */
 export function copyName(copy: Pick<WallCopy, "number" | "names">): string {
@@ -17,6 +17,7 @@ export function arrange(copies: readonly WallCopy[], sorting: Sorting, filter = 
   const by: Record<Sorting, (a: WallCopy, b: WallCopy) => number> = {
     number: () => 0,
     name: (a, b) => copyName(a).localeCompare(copyName(b), undefined, { numeric: true, sensitivity: "base" }),
+    score: (a, b) => (b.score?.points ?? -1) - (a.score?.points ?? -1),
     last: (a, b) => (b.last ?? 0) - (a.last ?? 0),
   };
   return found.sort((a, b) => by[sorting](a, b) || a.number - b.number);

@@ -44,6 +44,8 @@ export class Instruments {
   readonly profile: ReadonlySignal<Profile | Impossible | null>;
   /** Heights of the other moment at the profile's samples; null where they are the same. */
   readonly beforeHeights: ReadonlySignal<Float64Array | null>;
+  /** Heights that a task asks for at the profile's samples; null where it asks for none. */
+  readonly askedHeights: ReadonlySignal<Float64Array | null>;
   readonly area: ReadonlySignal<AreaFigures | Impossible | null>;
   /** The line on the ground. */
   readonly lines: ReadonlySignal<readonly FootprintVisual[]>;
@@ -55,7 +57,12 @@ export class Instruments {
   readonly #ground: Signal<TileGround>;
   readonly #stops: (() => void)[] = [];
 
-  constructor(ruler: Ruler, tiles: TileStore) {
+  /** `asked`: the height that a task asks for at a place. */
+  constructor(
+    ruler: Ruler,
+    tiles: TileStore,
+    asked: ReadonlySignal<((x: number, y: number) => number | null) | null> = signal(null),
+  ) {
     this.ruler = ruler;
     this.#tiles = tiles;
     this.#line = signal(tiles.freeze());
@@ -63,6 +70,7 @@ export class Instruments {
     this.before = this.#before;
     this.profile = computed(() => (ruler.kind.value === "line" ? this.#profile() : null));
     this.beforeHeights = computed(() => this.#beforeHeights());
+    this.askedHeights = computed(() => this.#askedHeights(asked.value));
     this.area = computed(() => (ruler.kind.value === "area" ? this.#area() : null));
     this.lines = computed(() => this.#lines());
     this.marked = computed(() => this.#marked());
@@ -112,6 +120,13 @@ export class Instruments {
     if (profile === null || isImpossible(profile) || before === null) return null;
     const heights = Float64Array.from(profile.x, (x, i) => before.ground.heightAt(x, profile.y[i]!));
     return heights.some((z, i) => z !== profile.height[i]) ? heights : null;
+  }
+
+  #askedHeights(asked: ((x: number, y: number) => number | null) | null): Float64Array | null {
+    const profile = this.profile.value;
+    if (profile === null || isImpossible(profile) || asked === null) return null;
+    const heights = Array.from(profile.x, (x, i) => asked(x, profile.y[i]!));
+    return heights.includes(null) ? null : Float64Array.from(heights as number[]);
   }
 
   #area(): AreaFigures | Impossible {

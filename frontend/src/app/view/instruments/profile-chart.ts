@@ -20,6 +20,10 @@ export interface Chart {
   readonly line: string;
   readonly area: string;
   readonly before: string;
+  /** What a task asks for, and the areas where the ground is higher and lower than that; empty without a task. */
+  readonly asked: string;
+  readonly tooHigh: string;
+  readonly tooLow: string;
   readonly distances: readonly Tick[];
   readonly heights: readonly Tick[];
   /** Words of the axes. */
@@ -41,6 +45,8 @@ export interface ChartOptions {
   /** 0: as much as fills the plot. */
   readonly exaggeration?: number;
   readonly before?: ArrayLike<number> | null;
+  /** Heights that a task asks for at the samples. */
+  readonly asked?: ArrayLike<number> | null;
 }
 
 /** Exaggerations of a section that a person may choose; 0 fills the plot. */
@@ -51,11 +57,11 @@ const LEAST_RELIEF = 1 / 400;
 
 /** The drawing of a profile. */
 export function chartOf(profile: Profile, options: ChartOptions): Chart {
-  const { width, height, em = 11, exaggeration = 0, before = null } = options;
+  const { width, height, em = 11, exaggeration = 0, before = null, asked = null } = options;
   const [left, top, bottom] = [4.6 * em, 0.9 * em, height - 2.7 * em];
   const free = Math.max(10, width - 1.6 * em - left);
   const tall = Math.max(10, bottom - top);
-  const { low, span } = rangeOf(profile, before);
+  const { low, span } = rangeOf(profile, before, asked);
   const length = profile.lengthM;
   // Pixels a metre, along and up. A factor that does not fit makes the section shorter, never wrong.
   const filled = tall / span;
@@ -78,6 +84,9 @@ export function chartOf(profile: Profile, options: ChartOptions): Chart {
     line,
     area: `${line}L${right.toFixed(1)} ${bottom.toFixed(1)}L${left.toFixed(1)} ${bottom.toFixed(1)}Z`,
     before: before === null ? "" : path(before),
+    asked: asked === null ? "" : path(asked),
+    tooHigh: between(profile, asked, 1, xOf, yOf),
+    tooLow: between(profile, asked, -1, xOf, yOf),
     distances: ticks(0, length, (right - left) / (6 * em), unit).map((v) => ({
       at: xOf(v),
       text: numberWords(v / unit),
@@ -92,12 +101,42 @@ export function chartOf(profile: Profile, options: ChartOptions): Chart {
   };
 }
 
-function rangeOf(profile: Profile, before: ArrayLike<number> | null): { readonly low: number; readonly span: number } {
-  let [low, high] = [profile.min.m, profile.max.m];
-  for (let i = 0; i < (before?.length ?? 0); i++) {
-    low = Math.min(low, before![i]!);
-    high = Math.max(high, before![i]!);
+/** The areas where the ground is above (`sign` 1) or below what is asked, as path data. */
+function between(
+  { distance, height }: Profile,
+  asked: ArrayLike<number> | null,
+  sign: 1 | -1,
+  xOf: (d: number) => number,
+  yOf: (z: number) => number,
+): string {
+  let out = "";
+  const at = (d: number, z: number): string => `${xOf(d).toFixed(1)} ${yOf(z).toFixed(1)}`;
+  for (let i = 0; asked !== null && i + 1 < distance.length; i += 1) {
+    const [a, b] = [sign * (height[i]! - asked[i]!), sign * (height[i + 1]! - asked[i + 1]!)];
+    if (a <= 0 && b <= 0) continue;
+    // Where the two cross the area has a corner.
+    const [from, to] = [a < 0 ? a / (a - b) : 0, b < 0 ? a / (a - b) : 1];
+    const [d, g, t] = [distance, height, asked].map((v) => (u: number) => v[i]! + (v[i + 1]! - v[i]!) * u) as [
+      (u: number) => number,
+      (u: number) => number,
+      (u: number) => number,
+    ];
+    out += `M${at(d(from), g(from))}L${at(d(to), g(to))}L${at(d(to), t(to))}L${at(d(from), t(from))}Z`;
   }
+  return out;
+}
+
+function rangeOf(
+  profile: Profile,
+  before: ArrayLike<number> | null,
+  asked: ArrayLike<number> | null,
+): { readonly low: number; readonly span: number } {
+  let [low, high] = [profile.min.m, profile.max.m];
+  for (const other of [before, asked])
+    for (let i = 0; i < (other?.length ?? 0); i++) {
+      low = Math.min(low, other![i]!);
+      high = Math.max(high, other![i]!);
+    }
   const least = profile.lengthM * LEAST_RELIEF;
   const grow = Math.max(0, (least - (high - low)) / 2);
   const span = (high - low + 2 * grow) * (1 + 2 * HEADROOM);

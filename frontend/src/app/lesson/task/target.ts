@@ -4,23 +4,18 @@
  * Twin of `backend/esker/tasks/target.py`; `tests/vectors/targets.json` holds what both read alike.
  */
 
+import type { Heights } from "../../../core/difference.ts";
 import {
   MAX_TARGET_CHARACTERS,
   MIN_TARGET_STEP_M,
   TASK_LEVEL,
   type Target,
   TILE_CELLS,
-} from "../../generated/contract.ts";
+} from "../../../generated/contract.ts";
 
 const FINEST_STEPS = 2048;
 const COARSEST_STEPS = 256;
 const MOST_STEPS = 0xffff;
-
-/** A square of heights in metres, row 0 south. */
-export interface Heights {
-  readonly side: number;
-  readonly data: Float32Array;
-}
 
 /** A text that is no target, or ground that none can be made of; the message is for a person. */
 export class BadTarget extends Error {}
