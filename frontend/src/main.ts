@@ -20,6 +20,9 @@ async function show(): Promise<void> {
   } else if (target.page === "privacy") {
     const { privacyPage } = await import("./ui/pages/privacy.ts");
     app.replaceChildren(privacyPage());
+  } else if (target.page === "lesson") {
+    const { lessonPage } = await import("./ui/pages/lesson-page.ts");
+    app.replaceChildren(lessonPage(target.id));
   } else if (target.page === "join") {
     const { joinPage } = await import("./ui/pages/join-page.ts");
     app.replaceChildren(joinPage(target.code));

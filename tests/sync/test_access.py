@@ -57,6 +57,21 @@ def test_starting_terrains(server: LiveServer) -> None:
     assert (status, error["code"]) == (404, "no_template")
 
 
+def test_lessons_have_sheets_and_begin_with_their_tasks(server: LiveServer) -> None:
+    """SPEC L132."""
+    status, listed = server.http("GET", "/api/lessons")
+    assert (status, len(listed)) == (200, 6)
+    for lesson in listed:
+        status, plan = server.http("GET", f"/api/lessons/{lesson['id']}")
+        assert (status, plan["title"], plan["minutes"]) == (200, lesson["title"], lesson["minutes"])
+        status, made = server.http("POST", "/api/terrains", {"template": lesson["id"]})
+        assert status == 201
+        document = server.http("GET", f"/api/terrains/{made['id']}/document", secret=made["secret"])[1]
+        assert document["settings"]["task"]["text"] == plan["task"]
+    status, error = server.http("GET", "/api/lessons/alchemy")
+    assert (status, error["code"]) == (404, "no_lesson")
+
+
 def test_an_archive_goes_out_and_comes_in(server: LiveServer) -> None:
     terrain, secret = server.create()
     peer = server.join(terrain, secret)

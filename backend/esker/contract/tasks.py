@@ -28,6 +28,9 @@ MIN_TARGET_STEP_M: Final = 1e-4
 MIN_TOLERANCE_M: Final = 0.01
 TOLERANCES_OFF: Final = 5.0
 """Ground that is off by so many tolerances counts nothing; within one it counts whole, in between linearly."""
+RING_SHARE: Final = 1.0 / 90.0
+"""The ring around a point that a task names, as a share of the domain's side: what counts there is the best of its
+samples, for nobody draws to the sample."""
 MAX_GRADE: Final = 10.0
 MIN_AMOUNT: Final = 1.0
 MAX_AMOUNT: Final = 1e15

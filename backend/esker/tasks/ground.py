@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from esker.contract import QUANTA_PER_CELL
+from esker.contract import QUANTA_PER_CELL, RING_SHARE
 from esker.flow.pools import pool, sea
 from esker.flow.rivers import water_of
 from esker.flow.water import Water, quanta, sea_quanta
@@ -50,6 +50,17 @@ class Ground:
         col, row = (min(max(round(v / self.cell_m), 0), n - 1) for v in point)
         return row * n + col
 
+    def ring(self, point: tuple[float, float]) -> NDArray[np.int64]:
+        """The samples in the ring around a place; at least the nearest."""
+        n = len(self.heights)
+        reach = int(RING_SHARE * self.size_m / self.cell_m)
+        row, col = divmod(self.index(point), n)
+        rows, cols = np.mgrid[
+            max(row - reach, 0) : min(row + reach, n - 1) + 1, max(col - reach, 0) : min(col + reach, n - 1) + 1
+        ]
+        near = (rows - row) ** 2 + (cols - col) ** 2 <= reach * reach
+        return np.asarray((rows * n + cols)[near], dtype=np.int64)
+
     def along(self, points: Floats) -> Floats:
         """Heights at (k, 2) places, bilinear; beyond the border those at it."""
         n = len(self.heights)
@@ -79,9 +90,12 @@ class Ground:
         return np.concatenate(grades), np.concatenate(lengths)
 
     def held(self, point: tuple[float, float], level_m: float) -> tuple[float, float]:
-        """Cubic metres of water that stand around a place, not above ``level_m`` nor above where they run over; and the
-        height at which they stand."""
-        index = self.index(point)
+        """Cubic metres of water around the lowest ground in a ring, and the height at which it stands.
+
+        That is no higher than ``level_m``, and than where it would run over.
+        """
+        ring = self.ring(point)
+        index = int(ring[np.argmin(self.steps.ravel()[ring])])
         top = min(sea_quanta(level_m, self.cell_m), int(self.water.filled.ravel()[index]))
         wet = pool(self.steps, index, top)
         step = self.cell_m / QUANTA_PER_CELL
@@ -94,6 +108,6 @@ class Ground:
         return float(under.size - under.sum()) / under.size * self.size_m**2
 
     def watershed(self, point: tuple[float, float]) -> float:
-        """Square metres whose rain runs through a place."""
+        """Square metres whose rain runs through the ring around a place, by the way that most of it takes."""
         area = self.water.area.ravel()
-        return float(area[self.index(point)]) / area.size * self.size_m**2
+        return float(area[self.ring(point)].max()) / area.size * self.size_m**2

@@ -57,8 +57,10 @@ def _nearness(goal: c.TerrainGoal | c.ContoursGoal, ground: Ground) -> Points:
     wanted = decode(target)
     skip = (len(wanted) - 1) // (len(ground.heights) - 1) if len(wanted) > len(ground.heights) else 1
     step = (len(ground.heights) - 1) // (len(wanted) - 1) if len(ground.heights) > len(wanted) else 1
-    off = np.abs(ground.heights[::step, ::step].astype(np.float64) - wanted[::skip, ::skip])
-    return _within(np.maximum(off - target.step_m / 2, 0), goal.tolerance_m, "the ground", "the target")
+    wanted = wanted[::skip, ::skip].astype(np.float64)
+    off = np.abs(ground.heights[::step, ::step] - wanted)
+    shaped = np.abs(wanted - np.median(wanted)) > goal.tolerance_m
+    return _within(np.maximum(off - target.step_m / 2, 0), goal.tolerance_m, "the ground", "the target", shaped)
 
 
 def _profile(goal: c.ProfileGoal, ground: Ground) -> Points:
@@ -68,15 +70,25 @@ def _profile(goal: c.ProfileGoal, ground: Ground) -> Points:
     return _within(off, goal.tolerance_m, "the line", "the profile")
 
 
-def _within(off: NDArray[Any], tolerance: float, what: str, whose: str) -> Points:
-    """Points for differences: within the tolerance ground counts whole, off by TOLERANCES_OFF of them nothing."""
+def _within(
+    off: NDArray[Any], tolerance: float, what: str, whose: str, shaped: NDArray[np.bool_] | None = None
+) -> Points:
+    """Points for differences: within the tolerance ground counts whole, off by TOLERANCES_OFF of them nothing.
+
+    ``shaped``: where the target stands out. The plain around it is given for nothing, so it gives no points; what is
+    wrong there costs some. A target that is level everywhere is shaped everywhere.
+    """
     counted = np.clip((c.TOLERANCES_OFF * tolerance - off) / ((c.TOLERANCES_OFF - 1) * tolerance), 0, 1)
-    points = _whole(float(counted.mean()))
-    near = math.floor(100 * float((off <= tolerance).mean()) + SLACK)
+    if shaped is None or not shaped.any():
+        shaped = np.ones(off.shape, np.bool_)
+    spoilt = float((1 - counted[~shaped]).sum())
+    points = _whole(float(counted[shaped].sum()) / (float(shaped.sum()) + spoilt))
+    near = math.floor(100 * float((off[shaped] <= tolerance).mean()) + SLACK)
+    where = what if shaped.all() else f"{what} that is to be shaped"
     return Points(
         points,
-        f"{points} of 100: {_share(near)} of {what} is within {_metres(tolerance)} of {whose}; "
-        f"the mean difference is {_metres(float(off.mean()))}.",
+        f"{points} of 100: {_share(near)} of {where} is within {_metres(tolerance)} of {whose}; "
+        f"the mean difference is {_metres(float(off[shaped].mean()))}.",
     )
 
 

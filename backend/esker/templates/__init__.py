@@ -1,7 +1,8 @@
-"""The starting terrains: five stroke documents, drawn by ``draw.py``, and two of real ground, cut out by ``real.py``.
+"""The starting terrains: five stroke documents, drawn by ``draw.py``, two of real ground, cut out by ``real.py``, and
+six lessons with their tasks and plans, written by ``teaching.py``.
 
 They are real input for benchmarks and tests too. ``catalogue()`` lists them, ``load(id)`` gives one. It may know
-``api``, ``contract``, ``document``, ``importing``, ``patchwork`` and ``resources``.
+``api``, ``contract``, ``document``, ``importing``, ``lesson``, ``patchwork``, ``resources`` and ``tasks``.
 """
 
 from __future__ import annotations
@@ -16,6 +17,8 @@ from esker.contract import Document
 from esker.patchwork.raster import rasters
 from esker.patchwork.raster.rasters import Raster
 from esker.templates import survey
+from esker.templates.plans import Plan as Plan
+from esker.templates.plans import plans as plans
 
 FOLDER = Path(__file__).parent
 ORDER = ("figure-six", "alpine-ridge", "canyon", "volcanic-island", "archipelago")
@@ -62,9 +65,15 @@ def catalogue() -> tuple[Template, ...]:
     return tuple(_read(FOLDER / f"{name}.json") for name in (*ORDER, *REAL))
 
 
+@cache
+def lessons() -> tuple[Template, ...]:
+    """All lessons, in the order of the landing page."""
+    return tuple(_read(FOLDER / "lessons" / f"{name}.json") for name in plans())
+
+
 def load(template_id: str) -> Template:
-    """One starting terrain. Raises KeyError for an unknown id."""
-    for template in catalogue():
+    """One starting terrain or lesson. Raises KeyError for an unknown id."""
+    for template in (*catalogue(), *lessons()):
         if template.id == template_id:
             return template
     raise KeyError(template_id)

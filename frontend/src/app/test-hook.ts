@@ -64,6 +64,8 @@ export interface PageView {
   rivers(): { clock: number; settled: boolean; lines: number[][][] } | null;
   /** What the water tool found at its place; null while it is put away, or has not looked yet. */
   water(): WaterFigures | null;
+  /** How far the terrain is with its task; null: nothing is scored. */
+  score(): { points: number; text: string } | null;
   title(): string;
   role(): string | null;
   members(): string[];
@@ -168,6 +170,10 @@ export function installTestHook(session: TerrainSession): () => void {
       return { clock: found.clock, settled: found.settled, lines };
     },
     water: () => waterFigures(session),
+    score: () => {
+      const found = session.score.peek();
+      return found === null ? null : { points: found.points ?? 0, text: found.text ?? "" };
+    },
     title: () => doc()?.settings.title ?? "",
     role: () => session.role.peek(),
     members: () => session.members.peek().map((m) => m.name),

@@ -252,6 +252,8 @@ export const MIN_TOLERANCE_M = 0.01 as const;
 
 export const TOLERANCES_OFF = 5.0 as const;
 
+export const RING_SHARE = 0.011111111111111112 as const;
+
 export const MAX_GRADE = 10.0 as const;
 
 export const MIN_AMOUNT = 1.0 as const;

@@ -73,6 +73,7 @@ const SERVER_TYPES: ReadonlySet<string> = new Set<ServerMessage["type"]>([
   "lesson",
   "notice",
   "class",
+  "score",
 ]);
 
 /** After these codes the same page would only be refused again (contract, WS_CLOSE). */

@@ -1,7 +1,7 @@
 import { readFileSync } from "node:fs";
 import { describe, expect, it } from "vitest";
-import type { Heights } from "../../src/core/difference.ts";
 import { BadTarget, decode, encode } from "../../src/app/lesson/task/target.ts";
+import type { Heights } from "../../src/core/difference.ts";
 import { MAX_TARGET_CHARACTERS, type Target } from "../../src/generated/contract.ts";
 
 interface Case {

@@ -13,7 +13,10 @@ const assign = vi.fn();
 
 beforeEach(() => {
   localStorage.clear();
-  answers = { "GET /api/templates": { body: [{ id: "canyon", title: "Canyon", description: "A river." }] } };
+  answers = {
+    "GET /api/templates": { body: [{ id: "canyon", title: "Canyon", description: "A river." }] },
+    "GET /api/lessons": { body: [{ id: "dam-a-valley", title: "Dam a valley", description: "Hold.", minutes: 45 }] },
+  };
   asked = [];
   assign.mockReset();
   vi.spyOn(window.location, "assign").mockImplementation(assign);
@@ -96,6 +99,14 @@ describe("the landing page", () => {
     card.click();
     await vi.waitFor(() => expect(assign).toHaveBeenCalledWith("/t/new1#s%2F1"));
     expect(asked.at(-1)!.init.body).toBe('{"template":"canyon"}');
+  });
+
+  it("shows lessons, each with its plan (SPEC L132)", async () => {
+    const element = await landing();
+    await vi.waitFor(() => expect(element.renderRoot.querySelector("a.plan")).not.toBeNull());
+    const plan = one<HTMLAnchorElement>(element, "a.plan");
+    expect(plan.getAttribute("href")).toBe("/lessons/dam-a-valley");
+    expect(plan.textContent).toContain("45 minutes");
   });
 
   it("says what the server said when it refuses, and lets one try again", async () => {

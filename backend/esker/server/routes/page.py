@@ -61,6 +61,10 @@ def add_page(app: FastAPI, hub: Hub, page: Path, data: Path, pictures: Pictures)
     async def privacy() -> Response:
         return index()
 
+    @app.api_route("/lessons/{lesson}", methods=["GET", "HEAD"], include_in_schema=False)
+    async def lesson() -> Response:
+        return index()
+
     @app.api_route("/server", methods=["GET", "HEAD"], include_in_schema=False)
     async def keeper() -> Response:
         return index()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any, Final
 
@@ -42,6 +43,21 @@ def add_terrains(app: FastAPI, hub: Hub, grids: GridStore) -> None:
     @app.get("/api/templates")
     async def list_templates() -> list[dict[str, str]]:
         return [{"id": t.id, "title": t.title, "description": t.description} for t in templates.catalogue()]
+
+    @app.get("/api/lessons")
+    async def list_lessons() -> list[dict[str, Any]]:
+        found = templates.plans()
+        return [
+            {"id": t.id, "title": t.title, "description": t.description, "minutes": found[t.id].minutes}
+            for t in templates.lessons()
+        ]
+
+    @app.get("/api/lessons/{lesson}")
+    async def lesson_plan(lesson: str) -> dict[str, Any]:
+        found = templates.plans().get(lesson)
+        if found is None:
+            raise Cannot(404, "no_lesson", "There is no such lesson.")
+        return {"id": lesson, **asdict(found)}
 
     @app.post("/api/terrains", status_code=201)
     async def create(request: Request, body: NewTerrain) -> dict[str, str]:

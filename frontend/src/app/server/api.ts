@@ -4,6 +4,24 @@ import type { TemplateInfo } from "../../core/types.ts";
 import type { ImportAnswers, ImportStatus, Role } from "../../generated/contract.ts";
 import type { HistoryPage } from "../history/history.ts";
 
+/** A lesson of the gallery. */
+export interface LessonInfo extends TemplateInfo {
+  readonly minutes: number;
+}
+
+/** The page of a lesson for its teacher. */
+export interface LessonPlan extends LessonInfo {
+  readonly ages: string;
+  readonly goal: string;
+  /** What pupils read. */
+  readonly task: string;
+  readonly before: readonly string[];
+  readonly steps: readonly { readonly minutes: number; readonly what: string }[];
+  readonly ask: readonly { readonly question: string; readonly answer: string }[];
+  /** What of the terrain is real, and what is not. */
+  readonly truth: string;
+}
+
 /** A refusal or failure with a sentence for a person. */
 export class ApiError extends Error {
   readonly code: string;
@@ -105,6 +123,10 @@ export async function json<T>(method: Method, path: string, secret?: string, bod
 
 export const api = {
   templates: (): Promise<TemplateInfo[]> => json("GET", "/api/templates"),
+
+  lessons: (): Promise<LessonInfo[]> => json("GET", "/api/lessons"),
+
+  lesson: (id: string): Promise<LessonPlan> => json("GET", `/api/lessons/${id}`),
 
   create: (template?: string): Promise<OpenedTerrain> =>
     json("POST", "/api/terrains", undefined, template ? { template } : {}),

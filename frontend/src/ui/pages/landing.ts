@@ -1,5 +1,5 @@
 import { html, LitElement, nothing, svg, type TemplateResult } from "lit";
-import { ApiError, api, type OpenedTerrain } from "../../app/server/api.ts";
+import { ApiError, api, type LessonInfo, type OpenedTerrain } from "../../app/server/api.ts";
 import type { TemplateInfo } from "../../core/types.ts";
 import { type ImportStatus, MAX_GRID_BYTES } from "../../generated/contract.ts";
 import "../controls/drop-zone.ts";
@@ -26,6 +26,7 @@ export class EskLanding extends LitElement {
   static override styles = [shared, landingStyles];
   static override properties = {
     templates: { state: true },
+    lessons: { state: true },
     recents: { state: true },
     busy: { state: true },
     problem: { state: true },
@@ -35,6 +36,7 @@ export class EskLanding extends LitElement {
   };
 
   declare templates: readonly TemplateInfo[] | null;
+  declare lessons: readonly LessonInfo[];
   declare recents: readonly RecentTerrain[];
   declare busy: string;
   declare problem: string;
@@ -50,6 +52,7 @@ export class EskLanding extends LitElement {
   constructor() {
     super();
     this.templates = null;
+    this.lessons = [];
     this.recents = recentTerrains(this.#store);
     this.busy = "";
     this.problem = "";
@@ -112,6 +115,8 @@ export class EskLanding extends LitElement {
       this.templates = [];
       this.templateProblem = sentence(error);
     }
+    // Where the terrains came and these do not, the page goes without.
+    this.lessons = await api.lessons().catch(() => []);
   }
 
   async #open(what: string, get: () => Promise<OpenedTerrain>): Promise<void> {
@@ -185,7 +190,7 @@ export class EskLanding extends LitElement {
     return html`
       ${this.#hero()}
       <main>
-        ${this.recents.length > 0 ? this.#recentSection() : nothing} ${this.#templateSection()}
+        ${this.recents.length > 0 ? this.#recentSection() : nothing} ${this.#templateSection()} ${this.#lessonSection()}
       </main>
       <esk-drop-zone
         lead="Drop it: a new terrain"
@@ -307,7 +312,24 @@ export class EskLanding extends LitElement {
     `;
   }
 
-  #card(template: TemplateInfo): TemplateResult {
+  #lessonSection(): TemplateResult | typeof nothing {
+    if (this.lessons.length === 0) return nothing;
+    return html`
+      <section aria-labelledby="lessons-title">
+        <h2 id="lessons-title">Start a lesson</h2>
+        <ul class="cards">
+          ${this.lessons.map((lesson) =>
+            this.#card(
+              lesson,
+              html`<a class="plan" href=${`/lessons/${lesson.id}`}>For teachers: ${lesson.minutes} minutes, steps, questions</a>`,
+            ),
+          )}
+        </ul>
+      </section>
+    `;
+  }
+
+  #card(template: TemplateInfo, more: TemplateResult | typeof nothing = nothing): TemplateResult {
     const busy = this.busy === template.id;
     return html`
       <li>
@@ -323,6 +345,7 @@ export class EskLanding extends LitElement {
           <strong>${busy ? "Making a copy…" : template.title}</strong>
           <span class="quiet">${template.description}</span>
         </button>
+        ${more}
       </li>
     `;
   }

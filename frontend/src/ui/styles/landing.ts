@@ -240,6 +240,20 @@ export const landingStyles = css`
   .card:disabled {
     cursor: progress;
   }
+  li:has(.plan) {
+    display: grid;
+    grid-template-rows: 1fr auto;
+    gap: 6px;
+  }
+  .plan {
+    display: grid;
+    align-items: center;
+    min-height: 40px;
+    padding: 0 14px;
+    color: var(--esk-accent-text);
+    font-size: 0.8125rem;
+    font-weight: 550;
+  }
   .card.ghost {
     height: 232px;
     opacity: 0.5;

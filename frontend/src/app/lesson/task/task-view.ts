@@ -5,7 +5,7 @@ import { type ContourLine, contourLines } from "../../../core/contour-lines.ts";
 import { differenceGrid, type Heights, targetAt } from "../../../core/difference.ts";
 import type { ChannelGrid, FootprintVisual, Rgba, Scene } from "../../../core/types.ts";
 import type { Doc } from "../../../doc/document.ts";
-import type { Target, Task } from "../../../generated/contract.ts";
+import { RING_SHARE, type Target, type Task } from "../../../generated/contract.ts";
 import { drape } from "../../../input/picking.ts";
 import type { TileGround } from "../../../tiles/ground.ts";
 import type { TileStore } from "../../../tiles/store.ts";
@@ -179,7 +179,7 @@ export class TaskView {
     if (goal.type === "profile") return [onGround("asked-line", [...goal.first, ...goal.last], MARK, true)];
     if (goal.type === "slope") return [onGround("asked-path", goal.path.flat(), MARK, true)];
     if (goal.type === "volume" || goal.type === "watershed")
-      return [onGround("asked-point", ring(goal.point, this.sizeM / 90), MARK, true)];
+      return [onGround("asked-point", ring(goal.point, this.sizeM * RING_SHARE), MARK, true)];
     return [];
   }
 }
