@@ -8,7 +8,7 @@ export interface ContourLine {
   readonly points: Float64Array;
 }
 
-/** So many levels are drawn at most: the interval is made larger where there would be more. */
+/** The most levels that are drawn: the interval is made larger where there would be more. */
 export const MOST_LEVELS = 60;
 
 /** The contours at multiples of `everyM`. */
@@ -22,7 +22,7 @@ export function contourLines(heights: Heights, sizeM: number, everyM: number): C
   return out;
 }
 
-/** Of each crossed edge of the lattice, the one or two edges to which the line goes on. */
+/** The edges to which a line goes on from each crossed edge of the lattice: one or two. */
 type Crossings = Map<number, number[]>;
 
 function linesAt(heights: Heights, sizeM: number, level: number): ContourLine[] {
