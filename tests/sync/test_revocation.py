@@ -271,7 +271,8 @@ def test_a_download_under_way_is_cut_off(tmp_path: Path, monkeypatch: pytest.Mon
         if not lives[0]:
             raise Denied("revoked", "gone")
 
-    hub = cast(Any, SimpleNamespace(demand=demand, access=SimpleNamespace(alive=lambda _: lives[0])))
+    door, access = SimpleNamespace(demand=demand), SimpleNamespace(alive=lambda _: lives[0])
+    hub = cast(Any, SimpleNamespace(door=door, access=access))
     sent: list[Any] = []
 
     async def send_part(message: Any) -> None:
