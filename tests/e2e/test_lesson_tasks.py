@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from tests.e2e.conftest import Server, Visitor, Visitors, serving
-from tests.e2e.hands import arch, draw, on_screen, wait, wait_settled
+from tests.e2e.hands import Pixel, arch, draw, on_screen, wait, wait_settled
 from tests.e2e.test_everyone import NO_WEBGPU, Fingers
 
 
@@ -45,9 +45,15 @@ def arrive(visitor: Visitor, server: Server, code: str, name: str) -> Visitor:
     return visitor
 
 
+def mountain(visitor: Visitor, height: float) -> list[Pixel]:
+    """A silhouette whose top stands so many metres high, whatever the window."""
+    middle, top = on_screen(visitor, 2050, 2050), on_screen(visitor, 2050, 2050, height)
+    return arch(on_screen(visitor, 900, 2000), on_screen(visitor, 3200, 2100), middle[1] - top[1])
+
+
 def write_the_task(teacher: Visitor) -> None:
     """Draws the target, takes it, undoes it, and sets the task."""
-    draw(teacher, "b", arch(on_screen(teacher, 900, 2000), on_screen(teacher, 3200, 2100), 110))
+    draw(teacher, "b", mountain(teacher, 600))
     wait_settled(teacher)
     press(teacher, "Inspector")
     tab(teacher, "Task")
@@ -88,7 +94,7 @@ def test_a_whole_lesson(visitors: Visitors, server: Server) -> None:
     press(ada, f"Task: Build this mountain, {begun} of 100 points", "esk-task-chip")
     ada.page.locator("esk-task-panel wa-switch", has_text="Red and blue").click()
     ada.shot("task-1-blue")
-    draw(ada, "b", arch(on_screen(ada, 900, 2000), on_screen(ada, 3200, 2100), 95))
+    draw(ada, "b", mountain(ada, 520))
     wait(ada, "begun => window.esker.score().points > begun", begun)
     wait_settled(ada)
     ada.shot("task-2-difference")

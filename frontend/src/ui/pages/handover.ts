@@ -94,9 +94,9 @@ export function toolRail({ input, session }: Stage): TemplateResult {
 /** The legend, the progress of the ground, and the ways to look at it. */
 export function foot(stage: Stage, openTask: () => void): TemplateResult {
   const { camera, channels, cursor, graphics, input, levels, quality, quietStrokes, session } = stage;
-  return html`<div class="foot">
+  return html`<esk-task-chip class="panel" .view=${stage.task} .score=${session.score} @open=${openTask}></esk-task-chip>
+  <div class="foot">
     <div class="notes">
-      <esk-task-chip class="panel" .view=${stage.task} .score=${session.score} @open=${openTask}></esk-task-chip>
       <esk-legend
         class="panel"
         .overlay=${stage.overlay}

@@ -295,7 +295,7 @@ export class EskTerrain extends SignalElement {
 
   #side(stage: Stage, tab: PanelTab): TemplateResult {
     return html`
-      <aside class="side panel ${stage.session.lesson.state.value.conducts ? "leads" : ""}" aria-label="Inspector">
+      <aside class="side panel ${tabsOf(stage).length > TABS.length ? "leads" : ""}" aria-label="Inspector">
         <header>
           <esk-segmented
             label="Inspector"

@@ -178,6 +178,17 @@ export const terrainPageStyles = css`
   .notice .icon {
     color: var(--esk-accent-text);
   }
+  /* Above the tools, where no hint comes. */
+  esk-task-chip {
+    position: absolute;
+    left: var(--edge);
+    top: 66px;
+  }
+  @media (max-width: 720px) {
+    esk-task-chip {
+      top: 122px;
+    }
+  }
   .notes {
     min-width: 0;
     display: grid;

@@ -185,12 +185,12 @@ export class EskTaskForm extends SignalElement {
       return html`<div class="two">${number("At most", "%", 100 * n.grade, 0.1, 100 * MAX_GRADE, (v) => draft.set({ grade: v / 100 }))}</div>`;
     if (kind === "watershed") return html`<div class="two">${area}</div>`;
     return html`<div class="two">${area} ${level}</div>
-      <wa-switch size="small" .checked=${live(n.dry)} @change=${() => draft.set({ dry: !n.dry })}>Land behind dykes counts</wa-switch>`;
+      <wa-switch size="small" .checked=${live(n.dry)} @change=${(e: Event) => draft.set({ dry: (e.target as HTMLInputElement).checked })}>Land behind dykes counts</wa-switch>`;
   }
 
   #differs(draft: TaskDraft): TemplateResult {
-    return html`<wa-switch size="small" .checked=${live(draft.difference.value)} @change=${() => {
-      draft.difference.value = !draft.difference.peek();
+    return html`<wa-switch size="small" .checked=${live(draft.difference.value)} @change=${(e: Event) => {
+      draft.difference.value = (e.target as HTMLInputElement).checked;
     }}>Pupils may see red and blue</wa-switch>`;
   }
 

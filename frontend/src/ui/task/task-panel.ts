@@ -119,11 +119,11 @@ export class EskTaskPanel extends SignalElement {
     if (!differs && !contours && goal.type !== "profile") return nothing;
     return html`<section class="group" aria-label="What is shown">
       <div class="switches">
-        ${differs ? toggle("Red and blue", "Red is too high, blue too low", view.differs, () => view.differ(!view.differs)) : nothing}
+        ${differs ? toggle("Red and blue", "Red is too high, blue too low", view.differs, (on) => view.differ(on)) : nothing}
         ${
           contours
-            ? toggle("Contours on the ground", "", view.contours.value, () => {
-                view.contours.value = !view.contours.value;
+            ? toggle("Contours on the ground", "", view.contours.value, (on) => {
+                view.contours.value = on;
               })
             : nothing
         }
@@ -143,8 +143,8 @@ export class EskTaskPanel extends SignalElement {
   }
 }
 
-function toggle(label: string, about: string, on: boolean, change: () => void): TemplateResult {
-  return html`<wa-switch size="small" title=${about} .checked=${live(on)} @change=${change}>${label}</wa-switch>`;
+function toggle(label: string, about: string, on: boolean, change: (on: boolean) => void): TemplateResult {
+  return html`<wa-switch size="small" title=${about} .checked=${live(on)} @change=${(e: Event) => change((e.target as HTMLInputElement).checked)}>${label}</wa-switch>`;
 }
 
 customElements.define("esk-task-panel", EskTaskPanel);
