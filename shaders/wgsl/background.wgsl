@@ -38,24 +38,52 @@ fn sky_with_sun(dir: vec3f) -> vec3f {
 fn plane_albedo() -> vec3f {
   switch (view.look) {
     case LOOK_ALPINE: { return vec3f(0.56, 0.59, 0.63); }
-    case LOOK_DESERT: { return vec3f(0.47, 0.345, 0.215); }
+    case LOOK_DESERT: { return vec3f(0.44, 0.315, 0.195); }
     case LOOK_PAPER: { return vec3f(0.50, 0.455, 0.385); }
-    default: { return vec3f(0.186, 0.222, 0.140); }
+    default: { return vec3f(0.098, 0.126, 0.060); }
   }
 }
 
-// Far country: open land with woods (bare ground where nothing grows), fields near by, a haze of them further out.
-fn country(p: vec2f, footprint: f32) -> vec3f {
-  let texel = log2(max(footprint, 1.0e-3) * 256.0 / view.size);
-  let broad = textureSampleLevel(noise, smooth_repeat, turned(p, vec2f(0.917, -0.399)) / (view.size * 3.1), clamp(texel - 1.6, 0.0, 8.0));
-  let fine = textureSampleLevel(noise, smooth_repeat, turned(p, vec2f(0.602, 0.799)) / (view.size * 0.37), clamp(texel + 1.43, 0.0, 8.0));
-  let open = plane_albedo() * (0.84 + 0.26 * broad.r + 0.20 * (fine.r - 0.5));
-  let wood = smoothstep(0.50, 0.62, broad.g * 0.40 + fine.g * 0.48 + fine.r * 0.12);
+struct Country {
+  albedo: vec3f,
+  slope: vec2f,   // of its hills
+};
+
+// A layer of noise over the country, blurred as far as a pixel reaches. `wide`: in sides of the domain.
+fn country_noise(p: vec2f, footprint: f32, wide: f32, turn: vec2f) -> vec4f {
+  let scale = view.size * wide;
+  let n = textureSampleLevel(noise, smooth_repeat, turned(p, turn) / scale, clamp(log2(max(footprint, 1.0e-3) * 256.0 / scale), 0.0, 8.0));
+  let g = n.ba - 0.5;
+  return vec4f(n.rg, vec2f(g.x * turn.x + g.y * turn.y, g.y * turn.x - g.x * turn.y) + 0.5);
+}
+
+// Far country: rolling land with woods in its folds, meadows and fields, snow or dunes. The layers are bent by the broadest, so
+// that none is seen to repeat.
+fn country(p: vec2f, footprint: f32, away: f32) -> Country {
+  let broad = country_noise(p, footprint, 3.7, vec2f(0.917, -0.399));
+  let bent = p + (broad.rg - 0.5) * (0.30 * view.size);
+  let hills = country_noise(bent, footprint, 1.13, vec2f(0.602, 0.799));
+  let folds = country_noise(bent.yx + (hills.rg - 0.5) * (0.06 * view.size), footprint, 0.31, vec2f(0.829, 0.559));
+  // It is level beside the block, whatever lies there.
+  let rise = smoothstep(0.03 * view.size, 0.9 * view.size, away);
+  var slope = (noise_slope(broad) * 0.05 + noise_slope(hills) * 0.085 + noise_slope(folds).yx * 0.05) * rise;
+  let trees = country_noise(bent, footprint, 0.083, vec2f(0.669, -0.743));
+  let wood = smoothstep(0.46, 0.58, hills.g * 0.34 + folds.r * 0.34 + broad.r * 0.16 + trees.r * 0.16);
+  let open = plane_albedo() * (0.80 + 0.34 * hills.r + 0.30 * (folds.g - 0.3));
   switch (view.look) {
-    case LOOK_ALPINE: { return mix(open, vec3f(0.16, 0.18, 0.19), wood * 0.55); }
-    case LOOK_DESERT: { return mix(open, open * vec3f(0.66, 0.58, 0.54), wood * 0.6); }
-    case LOOK_PAPER: { return plane_albedo(); }
-    default: { return mix(open, vec3f(0.070, 0.102, 0.056), wood * 0.46); }
+    case LOOK_ALPINE: { return Country(mix(open, vec3f(0.085, 0.098, 0.100), wood * 0.72), slope); }
+    case LOOK_DESERT: {
+      // Dunes, and pavements of dark stone.
+      let dunes = country_noise(bent * vec2f(1.0, 0.42), footprint, 0.12, vec2f(0.669, 0.743));
+      slope += noise_slope(dunes) * 0.07;
+      return Country(mix(open, open * vec3f(0.62, 0.53, 0.50), wood * 0.55), slope);
+    }
+    case LOOK_PAPER: { return Country(plane_albedo(), vec2f(0.0)); }
+    default: {
+      let dry = smoothstep(0.42, 0.62, folds.r * 0.5 + broad.g * 0.5);
+      let meadows = mix(open, vec3f(0.205, 0.178, 0.088) * (0.8 + 0.4 * hills.r), 0.38 * dry);
+      return Country(mix(meadows, vec3f(0.034, 0.052, 0.028) * (0.75 + 0.5 * folds.g), wood * 0.88), slope);
+    }
   }
 }
 
@@ -67,9 +95,12 @@ fn ground_plane(p: vec3f, dir: vec3f, footprint: f32) -> vec3f {
   let reach = tall * length(view.sun.xy) / max(view.sun.z, 0.12);
   let toward = p.xy + normalize(view.sun.xy + vec2f(1.0e-5)) * min(reach, view.size) * 0.5;
   let shadow = smoothstep(0.0, 0.5 * min(reach, view.size) + 1.0, outside_domain(toward));
-  let sun = sun_light() * max(view.sun.z, 0.0) / 3.14159265 * mix(0.45, 1.0, shadow);
+  let land = country(p.xy, footprint, away);
+  let n = normalize(vec3f(-land.slope, 1.0));
+  let beam = sun_light() * (mix(0.45, 1.0, shadow) / 3.14159265);
+  let sun = beam * max(view.sun.z, 0.0);
   let sky = ambient_light(vec3f(0.0, 0.0, 1.0));
-  var colour = country(p.xy, footprint) * (sun + sky) * max(shade, 0.0);
+  var colour = land.albedo * (beam * max(dot(n, view.sun.xyz), 0.0) + sky) * max(shade, 0.0);
   if (view.look != LOOK_PAPER) {
     // Morning mist lies in the lowlands while the sun is low; it starts a way off the block.
     let drift = textureSampleLevel(noise, smooth_repeat, turned(p.xy, vec2f(0.829, 0.559)) / (view.size * 7.9), clamp(log2(max(footprint, 1.0e-3) * 256.0 / (view.size * 7.9)), 0.0, 8.0));

@@ -17,9 +17,6 @@ struct SunList {
   jobs: array<Job, 1024>,
 };
 
-const NO_SLOT: u32 = 0xffffffffu;
-const PLACES: u32 = 4096u;
-const INDEX_MASK: u32 = (1u << u32(MAX_SYNTHESIS_LEVEL)) - 1u;
 // Fewer on software adapters (gpu/atlas/tilecompute.ts).
 override SUN_STEPS: i32 = 60;
 override SUN_GROWTH: f32 = 0.1;
@@ -30,17 +27,6 @@ override SKY_STEPS: i32 = 6;
 @group(0) @binding(1) var heights: texture_2d_array<f32>;
 @group(0) @binding(2) var<storage, read> pages: array<vec2u, PLACES>;  // by hash, see gpu/atlas/pagetable.ts
 @group(0) @binding(3) var light_out: texture_storage_2d_array<rgba8unorm, write>;
-
-fn page(level: u32, tile: vec2u) -> u32 {
-  let column = tile.x | (level << u32(MAX_SYNTHESIS_LEVEL));
-  var place = ((column * 0x9e3779b1u) ^ (tile.y * 0x85ebca77u)) >> 20u;
-  var entry = pages[place];
-  while (entry.x != NO_SLOT && (entry.x != column || (entry.y & INDEX_MASK) != tile.y)) {
-    place = (place + 1u) % PLACES;
-    entry = pages[place];
-  }
-  return select(entry.y >> u32(MAX_SYNTHESIS_LEVEL), NO_SLOT, entry.x == NO_SLOT);
-}
 
 // Where a march begins: a sample on the lattice of its level. Places are told by whole samples and metres from there:
 // a share of the domain in float32 could not tell the cells of fine levels apart.

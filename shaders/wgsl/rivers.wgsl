@@ -83,7 +83,7 @@ fn river_banks(m: Material, r: River, s: Site) -> Material {
   // Stones lie bare where the water stands higher at times.
   let stones = (1.0 - smoothstep(0.05, 0.30, reach + 0.35 * wander)) * r.share;
   out.albedo = mix(out.albedo, vec3f(0.120, 0.113, 0.102) * (0.6 + 0.8 * rough.g), 0.6 * stones);
-  out.slope += r.out * (0.55 * cut * r.share);
+  out.relief += vec3f(r.out * (0.55 * cut * r.share), 0.0);
   return out;
 }
 

@@ -46,37 +46,6 @@ fn cover_of(surface: Surface) -> Attributes {
   return Attributes(a.x, a.y, a.z, a.w, b.x, b.y, b.z);
 }
 
-// Sun, sky and the far ground on a rough surface.
-fn shade(m: Material, gradient: vec2f, surface: Surface, dir: vec3f) -> vec3f {
-  // Slopes are lit as steep as they are seen.
-  let n = normalize(vec3f(-(gradient + m.slope) * view.exaggeration, 1.0));
-  let broad = normalize(vec3f(-gradient * view.exaggeration, 1.0));
-  // Facing the sun counts for the fine relief; whether the sun is up at all for the broad one. Snow and leaves let light
-  // round the edge.
-  let turned_to = dot(n, view.sun.xyz);
-  let facing = max((turned_to + m.soft * 0.5) / (1.0 + m.soft * 0.5), max(turned_to, 0.0)) * smoothstep(-0.10, 0.14, dot(broad, view.sun.xyz));
-  let hollow = clamp(1.0 - max(surface.curvature, 0.0) * 0.35, 0.55, 1.0);
-  let open = surface.sky * hollow;
-  let sun = sun_light() * (max(facing, 0.0) * surface.sun / 3.14159265);
-  // Light that the ground passes on to itself takes its colour (Jimenez et al., "Practical Real-Time Strategies for
-  // Accurate Indirect Occlusion", 2016): hollows in snow stay bright, those in woods go dark.
-  let a = 2.0404 * m.albedo - vec3f(0.3324);
-  let b = -4.7951 * m.albedo + vec3f(0.6417);
-  let c = 2.7552 * m.albedo + vec3f(0.6903);
-  let lit = max(vec3f(open), ((open * a + b) * open + c) * open);
-  // The lit land around adds to what comes from a clear sky.
-  let sky = ambient_light(n) * lit * 1.35;
-  // From the sunlit slopes around, strongest where little sky is seen.
-  let bounce = sun_light() * (0.32 * max(view.sun.z, 0.0) / 3.14159265) * (1.0 - open) * (m.albedo * 0.5 + vec3f(0.12));
-  var colour = m.albedo * (sun + sky + bounce);
-  if (m.gloss > 0.0) {
-    let half_way = normalize(view.sun.xyz - dir);
-    let sheen = pow(max(dot(n, half_way), 0.0), 24.0) * 0.10 + pow(max(dot(dir, view.sun.xyz), 0.0), 6.0) * 0.05;
-    colour += sun_light() * surface.sun * sheen * m.gloss * max(facing, 0.0);
-  }
-  return colour;
-}
-
 @fragment
 fn terrain_fragment(v: TerrainVertex) -> @location(0) vec4f {
   let f = Footprint(dpdx(v.relative), dpdy(v.relative));

@@ -31,6 +31,7 @@ struct View {
   amplitude: f32,        // metres of noise amplitude that the value 1 of `channels` stands for
   relief: f32,           // metres of elevation that count as 1, for stone and plants
   shore: f32,            // and for the sea's shores
+  shade: f32,            // how far hollows and joints go dark, 0..1
   look: u32,
   overlay: u32,
   cursor_count: u32,

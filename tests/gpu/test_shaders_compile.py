@@ -35,7 +35,7 @@ def modules() -> dict[str, list[Path]]:
                     chosen = joined(parts, **variant)
                     names = [name for place, name in variant.items() if place in parts]
                     found["-".join([chosen[-1].stem, *names])] = chosen
-    assert len(found) == 1 + 8 + 4 + 12 + 3
+    assert len(found) == 1 + 8 + 4 + 15 + 3
     return found
 
 

@@ -51,7 +51,7 @@ def sunlight(atlas: TinyAtlas, slots: dict[Tile, int], high: float, sun: tuple[f
         (READ, atlas.buffer(pages)),
         (store("rgba8unorm"), atlas.view(atlas.light)),
     ]
-    atlas.run(source("tile", "compute_sun"), "compute_sun", bindings, len(jobs))
+    atlas.run(source("tile", "pages", "compute_sun"), "compute_sun", bindings, len(jobs))
 
 
 def sun_vector(azimuth_deg: float, elevation_deg: float) -> tuple[float, float, float, float]:

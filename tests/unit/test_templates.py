@@ -21,10 +21,10 @@ def test_drawing_again_changes_nothing() -> None:
         )
 
 
-def test_there_are_seven_with_words() -> None:
+def test_there_are_nine_with_words() -> None:
     catalogue = templates.catalogue()
-    assert len(catalogue) == 7
-    assert len({t.id for t in catalogue}) == 7
+    assert len(catalogue) == 9
+    assert len({t.id for t in catalogue}) == 9
     assert all(t.title and t.description for t in catalogue)
     with pytest.raises(KeyError):
         templates.load("atlantis")

@@ -66,6 +66,7 @@ def _parser() -> argparse.ArgumentParser:
                    metavar="N", help=f"finest level refined in view (default {DEFAULT_REFINED_LEVEL})")  # fmt: skip
     p.add_argument("--detail", type=float, metavar="X", help="strength of the detail, 0..4")
     p.add_argument("--plain", action="store_true", help="as the page draws on adapters that are no GPU: faster")
+    p.add_argument("--bare", action="store_true", help="without trees, rocks and tufts")
     p.add_argument("--device", help="part of an OpenCL device's name, or 'numpy': what solves")
     p.add_argument("-q", "--quiet", action="store_true", help="no progress on standard error")
     return p
@@ -123,7 +124,14 @@ def _draw(options: argparse.Namespace, say: Says) -> None:
 
     def picture(view: str, progress: Callable[[float], None]) -> Image.Image:
         camera = camera_of(view, stage.surface, document.settings, *options.size, land=stage.land)
-        scene = Scene(document.settings, camera, options.tau, overlay=options.overlay, ground_m=span_m(document.layers))
+        scene = Scene(
+            document.settings,
+            camera,
+            options.tau,
+            overlay=options.overlay,
+            ground_m=span_m(document.layers),
+            instances=not options.bare and not options.plain,
+        )
         made = reference.draw(stage.surface, scene, stage.channels, progress)
         if made.tau_px > options.tau * 1.001:
             say.line(f"the picture needs too many tiles: screen error {made.tau_px:.2f} instead of {options.tau:g} px")

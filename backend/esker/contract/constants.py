@@ -132,6 +132,18 @@ NO_LAKE: Final = -1.0e9
 DEFAULT_LAKES_FRACTION: Final = 1.0 / 1024.0
 """Least depth of a basin that fills, in sides of the domain, where a person says no other."""
 
+# --- trees, rocks and tufts (docs/renderer.md, "Instances") -------------------------------------------------------
+
+TREE_NEAR_M: Final = 130.0
+"""Trees nearer than this are meshes, further ones boards that turn to the eye."""
+SOIL_M: Final = 8.0
+"""What grows is read on the level whose samples are about so far apart: none comes or goes as finer tiles arrive."""
+MOST_NEAR_TREES: Final = 8192
+MOST_FAR_TREES: Final = 40960
+MOST_ROCKS: Final = 8192
+MOST_TUFTS: Final = 16384
+"""Instances of one sort that a picture has room for."""
+
 # --- rivers (docs/water.md) ---------------------------------------------------------------------------------------
 
 RIVER_AREA_SHARE: Final = 1.0 / 16.0

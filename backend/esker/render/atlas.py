@@ -51,6 +51,8 @@ class Atlas:
         for tile, slot in self.slots.items():
             self._upload(slot, surface.slot(*tile))
         self._context = context
+        self.pages = context.buffer(page_table(self.slots).tobytes())
+        """Slots by tile, for shaders."""
 
     @property
     def textures(self) -> dict[str, moderngl.TextureArray]:
@@ -61,7 +63,6 @@ class Atlas:
     def compute(self, normals: Compute, sun: Compute, size_m: float, high: float, direction: Sequence[float]) -> None:
         """Gradients, then sun and sky visibility of all tiles."""
         jobs = np.array([(slot, *tile) for tile, slot in self.slots.items()], dtype=np.uint32)
-        pages = self._context.buffer(page_table(self.slots).tobytes())
         under: dict[str, ArrayLike] = {"high": high, "sun": [*direction, PENUMBRA]}
         passes: list[tuple[Compute, Module, dict[str, ArrayLike], dict[str, Textured]]] = [
             (normals, sources.normals(), {}, {"slopes_out": self.slopes}),
@@ -74,7 +75,7 @@ class Atlas:
                 data = bytearray(layout.pack({"size": size_m, "count": len(some), **head}))
                 at = layout.offsets["jobs"]
                 data[at : at + some.nbytes] = some.tobytes()
-                buffers = {"list": self._context.buffer(bytes(data)), "pages": pages}
+                buffers = {"list": self._context.buffer(bytes(data)), "pages": self.pages}
                 nearest = self._context.sampler(filter=(moderngl.NEAREST, moderngl.NEAREST))
                 resources = Resources(dict(self.textures), {"nearest": nearest}, buffers, images)
                 compute.run(resources, (GROUPS, GROUPS, len(some)))

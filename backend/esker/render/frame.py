@@ -39,7 +39,7 @@ LOOKS: Final[dict[str, LookFigures]] = {
 @dataclass(frozen=True)
 class Scene:
     """All that one picture shows. ``tau_px``: screen-error bound; ``time``: seconds, for waves; ``ground_m``:
-    lowest and highest sample of the elevation layers, None without any."""
+    lowest and highest sample of the elevation layers, None without any; ``instances``: with trees, rocks and tufts."""
 
     settings: TerrainSettings
     camera: Camera
@@ -47,6 +47,7 @@ class Scene:
     time: float = 12.0
     overlay: Overlay = "none"
     ground_m: tuple[float, float] | None = None
+    instances: bool = False
 
 
 class Rect(NamedTuple):
@@ -125,6 +126,7 @@ def view_values(
         "amplitude": amplitude,
         "relief": relief_m(settings.size_m, lat, 0.0 if scene.ground_m is None else scene.ground_m[1] - zero),
         "shore": shore_m(settings.size_m, lat),
+        "shade": 1.0,
         "overlay": OVERLAYS[scene.overlay],
     }
 

@@ -132,12 +132,13 @@ class Draw:
         records: moderngl.Buffer | None = None,
         layout: str = "",
         count: int,
+        vertices: int = 6 * PATCH_CELLS,
     ) -> None:
-        """Draws ``count`` patches, or instances, of ``records`` with ``layout``, or vertices."""
+        """Draws ``count`` patches, or instances of ``vertices``, of ``records`` with ``layout``, or vertices."""
         resources.bind(self.bindings)
         if FRAME in self.program:
             self.program[FRAME].value = frame  # type: ignore[union-attr]
-        names = ("a_0", "a_1")[: len(layout.removesuffix("/i").split())]
+        names = ("a_0", "a_1", "a_2")[: len(layout.removesuffix("/i").split())]
         attributes = (layout, *names)
         if records is None:
             self._context.vertex_array(self.program, []).render(moderngl.TRIANGLES, vertices=count)
@@ -149,7 +150,7 @@ class Draw:
                 array.render(moderngl.PATCHES, vertices=min(step, count - first), first=first)
         else:
             array = self._context.vertex_array(self.program, [(records, *attributes)])
-            array.render(moderngl.TRIANGLES, vertices=6 * PATCH_CELLS, instances=count)
+            array.render(moderngl.TRIANGLES, vertices=vertices, instances=count)
 
 
 class Compute:

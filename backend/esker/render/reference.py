@@ -16,6 +16,7 @@ from esker.render.atlas import MAX_SLOTS, PLAIN_MARCH, Atlas
 from esker.render.camera import eye_projection, part
 from esker.render.device import depth_buffer, half_depth, open_context
 from esker.render.frame import Detail, Rect, Scene, base_height, sun_direction, view_values
+from esker.render.instances import Instances
 from esker.render.layout import StructLayout
 from esker.render.programs import Compute, Draw, Resources
 from esker.render.rivers import river_map
@@ -75,6 +76,7 @@ class Reference:
         self._sky = [Compute(self.context, sources.sky(), entry) for entry in ("bake_sky", "bake_ambient")]
         self._draws: dict[tuple[str, str], Draw] = {}
         self._fixed = self._samplers()
+        self._instances: Instances | None = None
         self._noise, self._stones = (self._tiling(levels()) for levels in (noise_mipmaps, stone_mipmaps))
 
     @property
@@ -195,7 +197,7 @@ class Reference:
             "lake_map": self._lake_map(lakes),
             "river_map": self._river_map(rivers),
         }
-        return Resources(textures, self._fixed, {"skylight": ambient}), amplitude
+        return Resources(textures, self._fixed, {"skylight": ambient, "pages": atlas.pages}), amplitude
 
     def _lake_map(self, lakes: Lakes | None) -> moderngl.Texture:
         texels = np.zeros((2, 2, 2), dtype=np.float32) if lakes is None else lake_texture(lakes)
@@ -292,6 +294,8 @@ class Reference:
         run("terrain", records.all, records.count)
         if bare:
             return
+        if scene.instances:
+            self._plant(resources, frame, records, scene)
         run("wall", records.walls, records.wall_count, layout="4u4 1u4 /i")
         if sea:
             run("open_sea", None, 24)
@@ -302,6 +306,13 @@ class Reference:
         run("water", records.water, records.water_count, layout="4u4 4f4", writes=False)
         self.context.disable(moderngl.BLEND)
         target.depth_mask = True
+
+    def _plant(self, resources: Resources, frame: tuple[float, float], records: _Records, scene: Scene) -> None:
+        """Trees, rocks and tufts on the ground that was drawn."""
+        if self._instances is None:
+            self._instances = Instances(self.context, half_depth=self._half_depth)
+        found = self._instances.find(resources, records.all, records.count, scene.settings.size_m)
+        self._instances.draw(resources, frame, found)
 
 
 class _Records:

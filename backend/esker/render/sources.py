@@ -9,24 +9,40 @@ from esker.resources import SHADERS
 from esker.wgsl.parse import parse
 from esker.wgsl.tree import Constant, Literal, Module
 
-_COMMON: Final = ("view", "tile", "sky", "noise", "tonemap")
+_COMMON: Final = ("view", "tile", "sky", "material/noise", "tonemap")
+_GROUND: Final = tuple(f"material/{name}" for name in ("site", "rock", "growth", "snow", "wet"))
 
 
 def terrain(look: str, detail: str) -> Module:
     """The ground in one look, for one of the two amounts of detail."""
-    ground = "material", f"stones_{detail}", f"look_{look}"
-    lines = "rivers", "lines", "overlay", "difference"
-    return _module(*_COMMON, f"detail_{detail}", "patch", "lakes", *ground, *lines, "terrain")
+    near = tuple(f"material/{name}" for name in (f"stones_{detail}", f"look_{look}", "shade"))
+    over = "rivers", "lines", "overlay", "difference", "terrain"
+    return _module(*_COMMON, _detail(detail), "patch", "lakes", *_GROUND, *near, *over)
 
 
 def wall(detail: str) -> Module:
     """The sides of the block."""
-    return _module(*_COMMON, f"detail_{detail}", "patch", "wall")
+    return _module(*_COMMON, _detail(detail), "patch", "wall")
 
 
 def background(detail: str) -> Module:
     """Sea, sky and what lies around."""
-    return _module(*_COMMON, f"detail_{detail}", "patch", "lines", "overlay", "lakes", "water", "background")
+    return _module(*_COMMON, _detail(detail), "patch", "lines", "overlay", "lakes", "water", "background")
+
+
+def _detail(detail: str) -> str:
+    return f"material/detail_{detail}"
+
+
+def scatter() -> Module:
+    """Where trees, rocks and tufts of a picture stand."""
+    stands = "instances/stands", "instances/scatter"
+    return _module(*_COMMON, _detail("plain"), "patch", "lakes", "pages", *stands)
+
+
+def instances() -> Module:
+    """Trees, rocks and tufts."""
+    return _module(*_COMMON, _detail("plain"), "lines", "overlay", "instances/instances")
 
 
 def normals() -> Module:
@@ -36,7 +52,7 @@ def normals() -> Module:
 
 def sun() -> Module:
     """Sun and sky visibility of tiles."""
-    return _module("tile", "compute_sun")
+    return _module("tile", "pages", "compute_sun")
 
 
 def sky() -> Module:

@@ -22,7 +22,7 @@ STONES_LEAN: Final = 0.16
 Floats = NDArray[np.float64]
 
 
-def _hash(x: NDArray[np.uint32], y: NDArray[np.uint32], seed: int) -> NDArray[np.uint32]:
+def lattice_hash(x: NDArray[np.uint32], y: NDArray[np.uint32], seed: int) -> NDArray[np.uint32]:
     h = (x * np.uint32(0x27D4EB2D)) ^ (y * np.uint32(0x165667B1)) ^ np.uint32((seed * 0x9E3779B1) & 0xFFFFFFFF)
     h = (h ^ (h >> np.uint32(15))) * np.uint32(0x85EBCA6B)
     h = (h ^ (h >> np.uint32(13))) * np.uint32(0xC2B2AE35)
@@ -32,7 +32,7 @@ def _hash(x: NDArray[np.uint32], y: NDArray[np.uint32], seed: int) -> NDArray[np
 def _octave(period: int, seed: int) -> Floats:
     """Gradient noise (Perlin 2002) on a periodic lattice: (NOISE_SIZE, NOISE_SIZE)."""
     i = np.arange(period, dtype=np.uint32)
-    angle = _hash(i[None, :], i[:, None], seed) / 2**32 * 2 * np.pi
+    angle = lattice_hash(i[None, :], i[:, None], seed) / 2**32 * 2 * np.pi
     gx, gy = (f(angle).astype(np.float32).astype(np.float64) for f in (np.cos, np.sin))
     at = np.arange(NOISE_SIZE) / (NOISE_SIZE / period)
     whole = np.floor(at).astype(np.int64)
@@ -86,7 +86,8 @@ def _cells() -> tuple[Floats, Floats, Floats, Floats]:
     """How far in from its stone's edge each texel is, 0..1, its stone's own number and lean (Worley 1996)."""
     i = np.arange(STONES_PERIOD, dtype=np.uint32)
     east, north, numbers = (
-        (_hash(i[None, :], i[:, None], STONES_SEED + k) / 2**32).astype(np.float32).astype(np.float64) for k in range(3)
+        (lattice_hash(i[None, :], i[:, None], STONES_SEED + k) / 2**32).astype(np.float32).astype(np.float64)
+        for k in range(3)
     )
     at = np.arange(STONES_SIZE) * (STONES_PERIOD / STONES_SIZE)
     whole = np.floor(at).astype(np.int64)

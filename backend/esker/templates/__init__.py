@@ -1,4 +1,4 @@
-"""The starting terrains: five stroke documents, drawn by ``draw.py``, two of real ground, cut out by ``real.py``, and
+"""The starting terrains: seven stroke documents, drawn by ``draw.py``, two of real ground, cut out by ``real.py``, and
 six lessons with their tasks and plans, written by ``teaching.py``.
 
 They are real input for benchmarks and tests too. ``catalogue()`` lists them, ``load(id)`` gives one. It may know
@@ -22,7 +22,9 @@ from esker.templates.plans import plans as plans
 
 FOLDER = Path(__file__).parent
 ORDER = ("figure-six", "alpine-ridge", "canyon", "volcanic-island", "archipelago")
-"""Those that are drawn."""
+"""Those that are drawn, and scenes of the gallery too."""
+LOWLANDS = ("delta", "badland")
+"""Those that are drawn and show what water does."""
 REAL = ("rainier", "helens")
 """Those of real ground."""
 
@@ -62,7 +64,7 @@ def _rasters(template_id: str) -> dict[str, Raster]:
 @cache
 def catalogue() -> tuple[Template, ...]:
     """All starting terrains, in the order of the landing page."""
-    return tuple(_read(FOLDER / f"{name}.json") for name in (*ORDER, *REAL))
+    return tuple(_read(FOLDER / f"{name}.json") for name in (*ORDER, *LOWLANDS, *REAL))
 
 
 @cache

@@ -1,4 +1,4 @@
-"""Draws the five starting terrains: ``python -m esker.templates.draw`` rewrites the JSON files beside this one.
+"""Draws seven of the starting terrains: ``python -m esker.templates.draw`` rewrites the JSON files beside this one.
 
 A test checks that drawing again changes nothing (SPEC H6). Heights and distances are metres, x east, y north.
 """
@@ -10,8 +10,8 @@ import math
 
 import numpy as np
 
-from esker.contract import BORN_EROSION, BORN_HOLD, DEFAULT_RIVERS, TerrainSettings
-from esker.templates import FOLDER
+from esker.contract import BORN_EROSION, BORN_HOLD, DEFAULT_RIVERS, MIN_EROSION_SCALE, TerrainSettings
+from esker.templates import FOLDER, lowlands
 from esker.templates.pen import Pen, smooth_path
 
 
@@ -177,6 +177,21 @@ def archipelago() -> dict[str, object]:
     return template(pen, "Archipelago", words, settings)
 
 
+def delta() -> dict[str, object]:
+    """A delta (``lowlands.delta``)."""
+    words = "A river parts on a plain and builds its arms out into the sea."
+    return template(lowlands.delta(), "Delta", words, lowlands.delta_settings())
+
+
+def badland() -> dict[str, object]:
+    """A badland (``lowlands.badland``), with narrower and deeper gullies than other new terrains have."""
+    words = "Clay hills cut to ribs and gullies by rain, under a tableland that still stands."
+    made = template(lowlands.badland(), "Badland", words, lowlands.badland_settings())
+    settings = made["document"]["settings"]  # type: ignore[index]
+    settings.update(erosion=1.7, erosion_scale=MIN_EROSION_SCALE, hold=0.5)
+    return made
+
+
 def template(pen: Pen, title: str, description: str, settings: TerrainSettings) -> dict[str, object]:
     """The JSON value of one file: like all new terrains, with gullies and rivers."""
     settings = settings.model_copy(update={"erosion": BORN_EROSION, "hold": BORN_HOLD, "rivers": DEFAULT_RIVERS})
@@ -185,8 +200,8 @@ def template(pen: Pen, title: str, description: str, settings: TerrainSettings) 
 
 
 def files() -> dict[str, str]:
-    """File name -> text, for all five."""
-    drawn = (figure_six(), alpine_ridge(), canyon(), volcanic_island(), archipelago())
+    """File name -> text, for all seven."""
+    drawn = (figure_six(), alpine_ridge(), canyon(), volcanic_island(), archipelago(), delta(), badland())
     return {f"{t['id']}.json": json.dumps(t, separators=(",", ":")) + "\n" for t in drawn}
 
 

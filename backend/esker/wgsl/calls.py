@@ -23,6 +23,7 @@ from esker.wgsl.types import (
     width,
 )
 
+_ATOMIC = ("atomicAdd", "atomicMin", "atomicMax", "atomicOr", "atomicAnd")
 _SCALAR_NAMES = ("f32", "i32", "u32", "bool")
 
 
@@ -127,6 +128,8 @@ class Calls:
             return "barrier()", "void"
         if name == "storageBarrier":
             return "memoryBarrierBuffer()", "void"
+        if name in _ATOMIC:
+            return self._atomic(e)
         kinds = [self._in.expression(a)[1] for a in e.args]
         scalar = common(kinds[:2] if name == "select" else kinds) if kinds else ""
         if name in FLOAT_ONLY and abstract(scalar):
@@ -153,6 +156,14 @@ class Calls:
         if name in SAME:
             return f"{SAME[name]}({', '.join(args)})", kind
         raise WgslError(line, f"the function {name!r} is outside the subset")
+
+    def _atomic(self, e: Call) -> tuple[str, Type]:
+        """An operation on one integer of a buffer, which gives what stood there before."""
+        place = e.args[0]
+        if not isinstance(place, Unary) or place.op != "&" or len(e.args) != 2:
+            raise WgslError(e.line, f"{e.callee.name} takes a pointer and one value")
+        text, kind = self._in.expression(place.operand)
+        return f"{e.callee.name}({text}, {self._in.value(e.args[1], kind)})", kind
 
     def _widest(self, kinds: list[Type], scalar: str) -> Type:
         wide = max((k for k in kinds), key=width, default="void")

@@ -1,7 +1,7 @@
 """Reads the WGSL subset of ``shaders/wgsl`` into a tree (WebGPU Shading Language, W3C, sections 3 to 11).
 
-What the subset leaves out is refused with its line: pointers but for ``&`` in arrayLength, atomics, texture parameters,
-templates of the user's own, ``continuing``, fall-through, 16-bit types.
+What the subset leaves out is refused with its line: pointers but for ``&`` in arrayLength and atomics, texture
+parameters, templates of the user's own, ``continuing``, fall-through, 16-bit types.
 """
 
 from __future__ import annotations
@@ -218,8 +218,14 @@ class _Parser:
     def _type(self) -> TypeRef:
         line = self._next.line
         name = self._word()
-        if name in ("ptr", "atomic", "f16"):
+        if name in ("ptr", "f16"):
             raise WgslError(line, f"{name!r} is outside the subset")
+        if name == "atomic":  # in GLSL any integer of a buffer is one
+            self._expect("<")
+            held = self._type()
+            self._split()
+            self._expect(">")
+            return held
         return TypeRef(name, self._template() if self._sees("<") else ())
 
     def _template(self) -> tuple[TypeRef | Expr, ...]:
@@ -230,11 +236,15 @@ class _Parser:
                 args.append(self._primary())
             else:
                 args.append(self._type())
-            if self._sees(">>"):  # two lists end here
-                token = self._next
-                self._tokens[self._at : self._at + 1] = [_Token("sign", ">", token.line)] * 2
+            self._split()
             self._take(",")
         return tuple(args)
+
+    def _split(self) -> None:
+        """Two lists of types may end in one token."""
+        if self._sees(">>"):
+            token = self._next
+            self._tokens[self._at : self._at + 1] = [_Token("sign", ">", token.line)] * 2
 
     # --- statements
 

@@ -163,6 +163,8 @@ export interface StrokeVisual {
   readonly hovered: boolean;
   /** Under way: drawn by somebody at this moment. */
   readonly live: boolean;
+  /** Nobody draws it, points at it or has it selected: a thin, faint line. */
+  readonly calm?: boolean;
 }
 
 /** The plane that is being drawn on, and the shadow of the stroke on the frozen ground. */
@@ -225,6 +227,16 @@ export interface FloodVisual {
 /** Quality settings of a picture: `automatic` holds the frame rate, the others hold their screen-error bound. */
 export type QualityMode = "automatic" | "fast" | "balanced" | "fine";
 
+/** What of the ground's surface is drawn: choices of the device. Null: what suits the adapter. */
+export interface SurfaceChoice {
+  /** Stones, blades and joints where the eye is near; without them the ground is as it is from afar. */
+  readonly materials: boolean | null;
+  /** Hollows and joints go dark. */
+  readonly shade: boolean;
+  /** Trees, rocks and tufts. */
+  readonly instances: boolean | null;
+}
+
 /** Overlays of what paint adds to a channel, or takes from it. */
 export type PaintedOverlay = "snow" | "forest" | "grass" | "wetness" | "erosion";
 
@@ -246,6 +258,8 @@ export interface Scene {
   readonly tauPx: number;
   /** `automatic` where it is left out. */
   readonly quality?: QualityMode;
+  /** All that suits the adapter where it is left out. */
+  readonly surface?: SurfaceChoice;
   /** Seconds, for water and the like. */
   readonly time: number;
   readonly overlay:
@@ -293,6 +307,8 @@ export interface SceneRenderer {
   readonly kind: "webgpu" | "map";
   /** Short words for the status line: adapter or "2D map". */
   readonly description: string;
+  /** True where the picture is drawn by a processor, not by a graphics device. */
+  readonly software: boolean;
   /** Draws one frame; cheap when nothing changed. */
   render(scene: Scene): FrameStats;
   /** Resolves to a reason when the device is lost. */

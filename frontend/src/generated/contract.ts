@@ -134,6 +134,18 @@ export const NO_LAKE = -1000000000.0 as const;
 
 export const DEFAULT_LAKES_FRACTION = 0.0009765625 as const;
 
+export const TREE_NEAR_M = 130.0 as const;
+
+export const SOIL_M = 8.0 as const;
+
+export const MOST_NEAR_TREES = 8192 as const;
+
+export const MOST_FAR_TREES = 40960 as const;
+
+export const MOST_ROCKS = 8192 as const;
+
+export const MOST_TUFTS = 16384 as const;
+
 export const RIVER_AREA_SHARE = 0.0625 as const;
 
 export const MAX_RIVERS = 4.0 as const;

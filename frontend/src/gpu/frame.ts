@@ -73,7 +73,7 @@ export class FrameBindings {
   readonly #device: GPUDevice;
   readonly #sky: SkyTables;
   readonly #noise: GPUTexture;
-  readonly #stones: GPUTexture;
+  #stones: GPUTexture;
   readonly #guardPx: number;
 
   constructor(
@@ -89,7 +89,7 @@ export class FrameBindings {
     this.#noise = noise;
     this.#stones = stones;
     this.#guardPx = guardPx;
-    const visibility = GPUShaderStage.VERTEX | GPUShaderStage.FRAGMENT;
+    const visibility = GPUShaderStage.VERTEX | GPUShaderStage.FRAGMENT | GPUShaderStage.COMPUTE;
     const texture = (
       binding: number,
       sampleType: GPUTextureSampleType,
@@ -162,6 +162,13 @@ export class FrameBindings {
     });
   }
 
+  /** From now on materials read this texture of stones. */
+  useStones(stones: GPUTexture): void {
+    this.#stones.destroy();
+    this.#stones = stones;
+    if (this.#atlas !== null) this.attach(this.#atlas);
+  }
+
   /** The view uniform, for passes that bind nothing else of a frame. */
   get view(): GPUBuffer {
     return this.#uniform;
@@ -220,6 +227,7 @@ export class FrameBindings {
     w.set("amplitude", this.#channels.fullScale);
     w.set("relief", reliefM({ ...climate, size_m: size }));
     w.set("shore", shoreM(size, settings.place));
+    w.set("shade", scene.surface?.shade === false ? 0 : 1);
     w.set("overlay", OVERLAYS[scene.overlay]);
     this.#writeCursors(scene);
     this.#device.queue.writeBuffer(this.#uniform, 0, w.buffer);

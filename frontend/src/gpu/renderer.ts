@@ -29,6 +29,7 @@ import { SkyTables } from "./passes/sky.ts";
 import { createStonesTexture } from "./passes/stones.ts";
 import { type Quality, QualityControl } from "./quality.ts";
 import { samePicture } from "./scenediff.ts";
+import { SurfaceParts } from "./surface.ts";
 import { createNoiseTexture } from "./synthesis/noise.ts";
 import { Target } from "./target.ts";
 
@@ -76,6 +77,7 @@ interface World {
 export class GpuRenderer implements SceneRenderer {
   readonly kind = "webgpu";
   readonly description: string;
+  readonly software: boolean;
   readonly lost: Promise<string>;
   /** Ground finer than what is held is made where somebody looks. Measurements against a grid end with the grid. */
   endless = true;
@@ -93,12 +95,11 @@ export class GpuRenderer implements SceneRenderer {
   #entrance = 1;
   #lastQuality: Quality | null = null;
   readonly #lakes = new LakeWatch();
+  readonly #surface: SurfaceParts;
   /** Highest ground of the last cut, metres. */
   #high = 0;
   /** Held tiles were asked for that are not in the atlas yet. */
   #tilesDue = false;
-  /** The shader of the scene's look is still being compiled. */
-  #lookDue = false;
   /** On a software adapter: all tiles and light of the picture at rest are there. */
   #ready = false;
   /** Batches of light marched, and those that the last picture shows. */
@@ -115,12 +116,14 @@ export class GpuRenderer implements SceneRenderer {
   readonly #gpu: Gpu;
   readonly #passes: Passes;
 
-  private constructor(canvas: HTMLCanvasElement, gpu: Gpu, passes: Passes) {
+  private constructor(canvas: HTMLCanvasElement, gpu: Gpu, passes: Passes, context: PassContext) {
     this.#canvas = canvas;
     this.#gpu = gpu;
     this.#passes = passes;
     this.description = gpu.description;
+    this.software = gpu.software;
     this.#quality = new QualityControl(gpu.software);
+    this.#surface = new SurfaceParts(context, passes.frame, gpu.software);
     this.picture = new Picture(passes, passes.hidden);
     this.lost = gpu.device.lost.then((info) => (this.#destroyed ? "closed" : info.message || info.reason));
   }
@@ -161,20 +164,8 @@ export class GpuRenderer implements SceneRenderer {
         gpu.core ? HiddenPatches.create(device, frame.view, samples, INDEX_COUNT) : null,
       ]);
     const compute = { fill, sun, taking };
-    return new GpuRenderer(canvas, gpu, {
-      sky,
-      frame,
-      target,
-      ...compute,
-      background,
-      patches,
-      ribbons,
-      drops,
-      ghost,
-      placing,
-      labels,
-      hidden,
-    });
+    const drawn = { background, patches, ribbons, drops, ghost, placing, labels, hidden };
+    return new GpuRenderer(canvas, gpu, { sky, frame, target, ...compute, ...drawn }, context);
   }
 
   render(scene: Scene): FrameStats {
@@ -211,14 +202,14 @@ export class GpuRenderer implements SceneRenderer {
       filled ||
       told ||
       this.#tilesDue ||
-      this.#lookDue ||
+      this.#surface.due ||
       this.#lightDrawn !== this.#lightMarched ||
       !sameQuality(quality, this.#lastQuality);
     if (!moved && !waves && !due && !world.light.pending)
       return this.#report({ busy: this.#quality.pending || this.#passes.fill.pending || this.#lakes.busy, uploads: 0 });
     this.#remember(scene, quality);
     this.#draw(scene, world, quality, { began, moved });
-    const coming = this.#tilesDue || this.#lookDue || world.light.pending || this.#passes.fill.pending;
+    const coming = this.#tilesDue || this.#surface.due || world.light.pending || this.#passes.fill.pending;
     const busy = waves || fading || this.#quality.pending || coming || this.#lakes.busy;
     return this.#report({ busy });
   }
@@ -227,6 +218,7 @@ export class GpuRenderer implements SceneRenderer {
     if (this.#destroyed) return;
     this.#destroyed = true;
     this.#world?.atlas.destroy();
+    this.#surface.destroy();
     for (const part of Object.values(this.#passes)) if (part !== null && "destroy" in part) part.destroy();
     this.#gpu.device.destroy();
   }
@@ -286,8 +278,7 @@ export class GpuRenderer implements SceneRenderer {
     const { cut, uploads, selectMs } = this.#prepare(encoder, scene, world, quality, how.moved);
     const { lakes, heights } = this.#lakes;
     // Sky, haze and exposure change with the ground: they would show another place while its shader is made.
-    const look = this.#passes.patches.useLook(scene.settings.look);
-    this.#lookDue = look !== scene.settings.look;
+    const { look } = this.#surface.dress(scene, this.#passes.patches);
     this.#passes.frame.update(scene, { width, height, low: cut.minHeight, high: cut.maxHeight, lakes, look });
     this.#passes.patches.update(cut, { sizeM: scene.tiles.sizeM, seaM: scene.settings.sea_level_m, lakes, heights });
     const unit = quality.scale * pixelRatio();
@@ -297,6 +288,7 @@ export class GpuRenderer implements SceneRenderer {
     this.#passes.placing.update(scene.placing ?? null);
     this.#passes.ghost.update(scene.ghost);
     this.#passes.labels.update(scene, cut.maxHeight - cut.minHeight, unit, quality.scale);
+    this.picture.instances = this.#surface.plant(encoder, scene, world.atlas, this.#passes.patches);
     const nodes = world.selection.tree.capacity * 16;
     this.picture.encode(encoder, scene, cut, nodes, { canvas: context.getCurrentTexture(), width, height });
     device.queue.submit([encoder.finish()]);

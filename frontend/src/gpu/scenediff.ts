@@ -30,6 +30,7 @@ function sameStroke(a: StrokeVisual, b: StrokeVisual): boolean {
     a.selected === b.selected &&
     a.hovered === b.hovered &&
     a.live === b.live &&
+    a.calm === b.calm &&
     sameNumbers(a.colour, b.colour) &&
     sameNumbers(a.points, b.points)
   );
@@ -56,6 +57,10 @@ function sameGhost(a: GhostVisual | null, b: GhostVisual | null): boolean {
       sameNumbers(a.colour, b.colour) &&
       a.corners.every((corner, i) => sameNumbers(corner, b.corners[i]!)))
   );
+}
+
+function sameSurface(a: Scene["surface"], b: Scene["surface"]): boolean {
+  return a === b || (a?.materials === b?.materials && a?.shade === b?.shade && a?.instances === b?.instances);
 }
 
 function sameSettings(a: Scene["settings"], b: Scene["settings"]): boolean {
@@ -90,6 +95,7 @@ export function samePicture(a: Scene, stampA: number, b: Scene, stampB: number):
     a.showStrokes === b.showStrokes &&
     a.contourM === b.contourM &&
     a.lineScale === b.lineScale &&
+    sameSurface(a.surface, b.surface) &&
     sameCamera(a.camera, b.camera) &&
     sameSettings(a.settings, b.settings) &&
     sameGhost(a.ghost, b.ghost) &&

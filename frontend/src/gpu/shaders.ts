@@ -9,8 +9,6 @@ import computeNormals from "@shaders/wgsl/compute_normals.wgsl?raw";
 import computeSky from "@shaders/wgsl/compute_sky.wgsl?raw";
 import computeSun from "@shaders/wgsl/compute_sun.wgsl?raw";
 import computeSynthesis from "@shaders/wgsl/compute_synthesis.wgsl?raw";
-import detailPlain from "@shaders/wgsl/detail_plain.wgsl?raw";
-import detailRich from "@shaders/wgsl/detail_rich.wgsl?raw";
 import difference from "@shaders/wgsl/difference.wgsl?raw";
 import drops from "@shaders/wgsl/drops.wgsl?raw";
 import ghost from "@shaders/wgsl/ghost.wgsl?raw";
@@ -18,16 +16,29 @@ import hidden from "@shaders/wgsl/hidden.wgsl?raw";
 import hiddenBase from "@shaders/wgsl/hidden_base.wgsl?raw";
 import hiddenDepth from "@shaders/wgsl/hidden_depth.wgsl?raw";
 import hiddenSamples from "@shaders/wgsl/hidden_depth_samples.wgsl?raw";
+import instances from "@shaders/wgsl/instances/instances.wgsl?raw";
+import scatter from "@shaders/wgsl/instances/scatter.wgsl?raw";
+import stands from "@shaders/wgsl/instances/stands.wgsl?raw";
 import label from "@shaders/wgsl/label.wgsl?raw";
 import lakes from "@shaders/wgsl/lakes.wgsl?raw";
 import overlayLines from "@shaders/wgsl/lines.wgsl?raw";
-import lookAlpine from "@shaders/wgsl/look_alpine.wgsl?raw";
-import lookDesert from "@shaders/wgsl/look_desert.wgsl?raw";
-import lookNatural from "@shaders/wgsl/look_natural.wgsl?raw";
-import lookPaper from "@shaders/wgsl/look_paper.wgsl?raw";
-import material from "@shaders/wgsl/material.wgsl?raw";
-import noise from "@shaders/wgsl/noise.wgsl?raw";
+import detailPlain from "@shaders/wgsl/material/detail_plain.wgsl?raw";
+import detailRich from "@shaders/wgsl/material/detail_rich.wgsl?raw";
+import growth from "@shaders/wgsl/material/growth.wgsl?raw";
+import lookAlpine from "@shaders/wgsl/material/look_alpine.wgsl?raw";
+import lookDesert from "@shaders/wgsl/material/look_desert.wgsl?raw";
+import lookNatural from "@shaders/wgsl/material/look_natural.wgsl?raw";
+import lookPaper from "@shaders/wgsl/material/look_paper.wgsl?raw";
+import noise from "@shaders/wgsl/material/noise.wgsl?raw";
+import rock from "@shaders/wgsl/material/rock.wgsl?raw";
+import shade from "@shaders/wgsl/material/shade.wgsl?raw";
+import site from "@shaders/wgsl/material/site.wgsl?raw";
+import snow from "@shaders/wgsl/material/snow.wgsl?raw";
+import stonesPlain from "@shaders/wgsl/material/stones_plain.wgsl?raw";
+import stonesRich from "@shaders/wgsl/material/stones_rich.wgsl?raw";
+import wet from "@shaders/wgsl/material/wet.wgsl?raw";
 import overlay from "@shaders/wgsl/overlay.wgsl?raw";
+import pages from "@shaders/wgsl/pages.wgsl?raw";
 import patch from "@shaders/wgsl/patch.wgsl?raw";
 import placing from "@shaders/wgsl/placing.wgsl?raw";
 import ribbon from "@shaders/wgsl/ribbon.wgsl?raw";
@@ -36,8 +47,6 @@ import ruleLandscape from "@shaders/wgsl/rule_landscape.wgsl?raw";
 import rulePlain from "@shaders/wgsl/rule_plain.wgsl?raw";
 import ruleSmooth from "@shaders/wgsl/rule_smooth.wgsl?raw";
 import sky from "@shaders/wgsl/sky.wgsl?raw";
-import stonesPlain from "@shaders/wgsl/stones_plain.wgsl?raw";
-import stonesRich from "@shaders/wgsl/stones_rich.wgsl?raw";
 import synthGullies from "@shaders/wgsl/synth_gullies.wgsl?raw";
 import synthHash from "@shaders/wgsl/synth_hash.wgsl?raw";
 import synthInterpolate from "@shaders/wgsl/synth_interpolate.wgsl?raw";
@@ -79,9 +88,14 @@ export function terrainSource(look: Look, detail: Detail): string {
     DETAILS[detail],
     patch,
     lakes,
-    material,
+    site,
+    rock,
+    growth,
+    snow,
+    wet,
     STONES[detail],
     LOOKS[look],
+    shade,
     rivers,
     overlayLines,
     overlay,
@@ -104,7 +118,9 @@ export const SOURCES = {
   placing: join(contract, view, overlayLines, placing),
   label: join(contract, view, label),
   normals: join(contract, tile, computeNormals),
-  sun: join(contract, tile, computeSun),
+  sun: join(contract, tile, pages, computeSun),
+  scatter: join(common, detailPlain, patch, lakes, pages, stands, scatter),
+  instances: join(common, detailPlain, overlayLines, overlay, instances),
   light: join(contract, tile, computeLight),
   sky: join(atmosphere, computeSky),
   bounds: join(contract, tile, computeBounds),

@@ -10,6 +10,7 @@ class FakeRenderer implements SceneRenderer {
   lose: (reason: string) => void = () => {};
   destroyed = false;
   readonly description: string;
+  readonly software = false;
 
   constructor(
     readonly kind: SceneRenderer["kind"],

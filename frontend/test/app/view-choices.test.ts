@@ -1,4 +1,4 @@
-// Choices of the device (SPEC N20, N27, N32).
+// Choices of the device (SPEC N20, N27, N32, U635).
 import { describe, expect, it } from "vitest";
 import { ViewChoices } from "../../src/app/device/view-choices.ts";
 import { headingDeg } from "../../src/ui/bars/compass.ts";
@@ -37,6 +37,23 @@ describe("how this device shows terrains", () => {
     expect(choices.exaggeration).toBe(5);
     choices.choose({ exaggeration: Number.NaN });
     expect(choices.exaggeration).toBe(1);
+  });
+
+  it("U635: of the ground and of lines is remembered, and left to the adapter where nobody chose", () => {
+    const store = memory();
+    const one = new ViewChoices(store);
+    expect(one.surface).toEqual({ materials: null, shade: true, instances: null });
+    expect(one.quietLines).toBe(true);
+    one.choose({ instances: false, materials: true });
+    one.choose({ shade: false, quietLines: false });
+    const two = new ViewChoices(store);
+    expect(two.surface).toEqual({ materials: true, shade: false, instances: false });
+    expect(two.quietLines).toBe(false);
+    const damaged = new ViewChoices(
+      memory({ "esker.view": '{"materials":1,"instances":"no","shade":0,"quietLines":7}' }),
+    );
+    expect(damaged.surface).toEqual({ materials: null, shade: true, instances: null });
+    expect(damaged.quietLines).toBe(true);
   });
 
   it("holds for the page where the device keeps nothing", () => {

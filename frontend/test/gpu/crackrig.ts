@@ -323,7 +323,7 @@ export async function picture(rig: Rig, world: World, scene: Scene, tau: number,
   if (full) {
     lightUp(rig, world, encoder, scene.tiles.sizeM, cut.top);
     rig.patches.update(cut);
-    while (rig.patches.useLook(scene.settings.look) !== scene.settings.look)
+    while (rig.patches.dress({ look: scene.settings.look, detail: "plain" }).look !== scene.settings.look)
       await new Promise((done) => setTimeout(done, 10));
     const pixels = await rig.full.draw(encoder, rig.depth, (pass) => {
       pass.setBindGroup(0, rig.frame.bindGroup);

@@ -9,6 +9,7 @@ import type {
   Scene,
   SceneRenderer,
   StrokeVisual,
+  SurfaceChoice,
   TerrainSettings,
   TileView,
   Vec3,
@@ -74,6 +75,8 @@ interface Shot {
   print?: boolean;
   /** Draw as on a real GPU: all detail, multisampled. */
   rich?: boolean;
+  /** What of the surface is drawn; what suits the adapter where it is left out. */
+  surface?: SurfaceChoice;
   /** Paint over the whole domain: values of channels, -1..1. */
   paint?: Partial<Record<"snow" | "grass" | "forest" | "wetness", number>>;
   tau?: number;
@@ -155,6 +158,7 @@ function scene(shot: Shot, width: number, height: number): Scene {
     ghost: demo.ghost,
     cursors: demo.cursors,
     tauPx: shot.tau ?? 1.5,
+    ...(shot.surface === undefined ? {} : { surface: shot.surface }),
     time: shot.time ?? 12,
     overlay: shot.overlay ?? "none",
     showStrokes: true,

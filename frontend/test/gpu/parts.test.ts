@@ -9,8 +9,9 @@ import { baseHeight, sunDirection } from "../../src/gpu/frame.ts";
 import { StructWriter, structLayout } from "../../src/gpu/layout.ts";
 import { contourInterval } from "../../src/gpu/looks.ts";
 import { hillshade, shadeTile } from "../../src/gpu/map/shade.ts";
+import { soilLevel } from "../../src/gpu/passes/instances.ts";
 import { PITCH, patchIndices } from "../../src/gpu/passes/patches.ts";
-import { RibbonBuilder } from "../../src/gpu/passes/ribbons.ts";
+import { RibbonBuilder, strokeStyle } from "../../src/gpu/passes/ribbons.ts";
 import { STONES_SIZE, stoneTexels } from "../../src/gpu/passes/stones.ts";
 import { QualityControl } from "../../src/gpu/quality.ts";
 import { samePicture } from "../../src/gpu/scenediff.ts";
@@ -389,5 +390,27 @@ describe("opening a device", () => {
     await expect(openGpu(canvas)).rejects.toThrow(/no graphics device/);
     expect(asked).toEqual(["core", "compatibility"]);
     vi.unstubAllGlobals();
+  });
+});
+
+describe("up close", () => {
+  it("U636: calm lines are hairlines of which nothing shows behind hills", () => {
+    const line: StrokeVisual = {
+      id: "a",
+      kind: "profile",
+      points: new Float32Array(6),
+      colour: [1, 1, 1, 0.2],
+      selected: false,
+      hovered: false,
+      live: false,
+    };
+    const [calm, clear] = [strokeStyle({ ...line, calm: true }, 1), strokeStyle(line, 1)];
+    expect(calm.halfWidthPx).toBeLessThan(clear.halfWidthPx);
+    expect([calm.hiddenOpacity, clear.hiddenOpacity > 0]).toEqual([0, true]);
+    expect(strokeStyle({ ...line, hovered: true }, 1).halfWidthPx).toBeGreaterThan(clear.halfWidthPx);
+  });
+
+  it("R613: what grows is read on the level whose samples are about eight metres apart", () => {
+    expect([512, 4096, 4097, 65536, 1].map(soilLevel)).toEqual([0, 3, 3, 7, 0]);
   });
 });

@@ -26,6 +26,8 @@ VIEWS: Final = {
     "canyon": "orbit:150,27,3100,target:2048,1950,60",
     "volcanic-island": "orbit:165,13,2900,target:2048,2048,150",
     "archipelago": "orbit:160,17,3100,target:2048,1950,20",
+    "delta": "orbit:172,20,3300,target:2060,2050,10",
+    "badland": "orbit:168,16,2700,target:2000,1750,90",
     "rainier": "orbit:335,8,19000,target:56000,11500,2300",
     "helens": "orbit:352,20,2050,target:1480,1050,2130",
 }
@@ -40,7 +42,9 @@ def main(names: list[str]) -> int:
         settings = stage.document.settings
         camera = camera_of(VIEWS[name], stage.surface, settings, *(OVERSAMPLED * n for n in SIZE))
         made = reference.draw(
-            stage.surface, Scene(settings, camera, ground_m=span_m(stage.document.layers)), stage.channels
+            stage.surface,
+            Scene(settings, camera, ground_m=span_m(stage.document.layers), instances=True),
+            stage.channels,
         )
         path = OUT / f"{name}.webp"
         Image.fromarray(made.pixels).resize(SIZE, Image.Resampling.LANCZOS).save(path, quality=84, method=6)

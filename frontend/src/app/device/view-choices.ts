@@ -5,6 +5,7 @@
 
 import { type ReadonlySignal, signal } from "@preact/signals-core";
 import { MOST_EXAGGERATION } from "../../core/camera/lens.ts";
+import type { SurfaceChoice } from "../../core/types.ts";
 import { CONTOUR_STEPS } from "../view/instruments/contour-steps.ts";
 import type { Store } from "./storage.ts";
 
@@ -16,9 +17,24 @@ interface Kept {
   readonly exaggeration: number;
   readonly contourM: number;
   readonly projector: boolean;
+  /** Stones, blades and joints close by; null: where the adapter draws them easily. */
+  readonly materials: boolean | null;
+  readonly shade: boolean;
+  /** Trees, rocks and tufts; null: where the adapter draws them easily. */
+  readonly instances: boolean | null;
+  /** Lines of finished strokes are thin and faint until somebody draws or points at them. */
+  readonly quietLines: boolean;
 }
 
-const PLAIN: Kept = { exaggeration: 1, contourM: 0, projector: false };
+const PLAIN: Kept = {
+  exaggeration: 1,
+  contourM: 0,
+  projector: false,
+  materials: null,
+  shade: true,
+  instances: null,
+  quietLines: true,
+};
 
 export class ViewChoices {
   readonly #store: Store;
@@ -46,6 +62,15 @@ export class ViewChoices {
   /** Large letters and thick lines, for a room. */
   get projector(): boolean {
     return this.#kept.value.projector;
+  }
+
+  get surface(): SurfaceChoice {
+    const { materials, shade, instances } = this.#kept.value;
+    return { materials, shade, instances };
+  }
+
+  get quietLines(): boolean {
+    return this.#kept.value.quietLines;
   }
 
   get lineScale(): number {
@@ -79,6 +104,10 @@ function checked(found: Partial<Record<keyof Kept, unknown>>): Kept {
     exaggeration: Number.isFinite(times) ? Math.min(MOST_EXAGGERATION, Math.max(1, times)) : PLAIN.exaggeration,
     contourM: step ?? PLAIN.contourM,
     projector: found.projector === true,
+    materials: typeof found.materials === "boolean" ? found.materials : PLAIN.materials,
+    shade: found.shade !== false,
+    instances: typeof found.instances === "boolean" ? found.instances : PLAIN.instances,
+    quietLines: found.quietLines !== false,
   };
 }
 

@@ -11,6 +11,8 @@ import { createMapRenderer, createRenderer, NoWebGpu } from "../../gpu/index.ts"
 export interface RendererInfo {
   readonly kind: SceneRenderer["kind"];
   readonly description: string;
+  /** Pictures are drawn by a processor: what costs much is off unless somebody asks for it. */
+  readonly software: boolean;
 }
 
 /** Notices of the page about the graphics device. */
@@ -152,7 +154,7 @@ export class Graphics {
       return;
     }
     this.#renderer = renderer;
-    this.info.value = { kind: renderer.kind, description: renderer.description };
+    this.info.value = { kind: renderer.kind, description: renderer.description, software: renderer.software };
     void renderer.lost.then((reason) => this.#lost(renderer, reason));
     this.#options.onOpened();
   }

@@ -60,7 +60,9 @@ function paintedLine(stroke: Stroke, ground: Ground, near: boolean): Float32Arra
 }
 
 /** How strongly finished strokes show that nobody points at: the land comes first. */
-const CALM_ALPHA = { select: 0.35, draw: 0.18 } as const;
+const CALM_ALPHA = { select: 0.2, draw: 0.12 } as const;
+/** How strongly they show for people who chose lines that are easily seen. */
+const CLEAR_ALPHA = { select: 0.5, draw: 0.3 } as const;
 /** Share of the domain's size by which a line may leave it and still be seen. */
 const OUTSIDE = 0.02;
 
@@ -73,6 +75,8 @@ export interface Marks {
   readonly drawing: string | null;
   /** Nobody has asked for strokes yet: only those show that are selected, pointed at or under way. */
   readonly quiet?: boolean;
+  /** Finished strokes are easily seen too: a choice of the device. */
+  readonly clear?: boolean;
 }
 
 /** Returns the person who draws each stroke at this moment, as colours by stroke id. */
@@ -133,7 +137,7 @@ export function strokeVisuals(doc: Doc, marks: Marks, people: People, ground: Gr
       : stroke.paint
         ? paintColour(stroke.paint)
         : strokeColour(stroke.kind, sinks, stroke.course?.use);
-    const alpha = calm ? calmAlpha(marks.tool, stroke) : 1;
+    const alpha = calm ? calmAlpha(marks, stroke) : 1;
     out.push({
       id: stroke.id,
       kind: stroke.kind,
@@ -142,14 +146,15 @@ export function strokeVisuals(doc: Doc, marks: Marks, people: People, ground: Gr
       selected,
       hovered,
       live: author !== undefined,
+      calm: calm && marks.clear !== true,
     });
   }
   return out;
 }
 
-function calmAlpha(tool: Marks["tool"], stroke: Stroke): number {
+function calmAlpha({ tool, clear }: Marks, stroke: Stroke): number {
   const looked = tool === "paint" ? stroke.paint !== null : tool === "select";
-  return CALM_ALPHA[looked ? "select" : "draw"];
+  return (clear ? CLEAR_ALPHA : CALM_ALPHA)[looked ? "select" : "draw"];
 }
 
 /** Rings on the ground where the others point. */

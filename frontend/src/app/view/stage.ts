@@ -252,6 +252,7 @@ export class Stage {
       hovered: hovered.value,
       drawing: drawing.value,
       quiet: this.quietStrokes.quiet.value,
+      clear: !this.view.quietLines,
     };
     // Lines of paint lie on the ground and move with it.
     if (hasPaint(doc)) this.tiles.revision.value;
@@ -473,6 +474,7 @@ export class Stage {
       placing: this.groundwork.visual.value,
       tauPx: TAU_PX[quality],
       quality,
+      surface: this.view.surface,
       time: this.#calm.matches ? 0 : timeS,
       ...this.#overlaid(),
       drops,

@@ -51,6 +51,7 @@ interface Frame {
 export class MapRenderer implements SceneRenderer {
   readonly kind = "map";
   readonly description = "2D map";
+  readonly software = false;
   readonly lost: Promise<string> = new Promise(() => {});
   readonly #context: CanvasRenderingContext2D;
   readonly #pictures = new Map<string, Picture>();

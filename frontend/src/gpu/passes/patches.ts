@@ -123,6 +123,12 @@ function groundOf(look: Look, detail: Detail): PassOptions {
   };
 }
 
+/** What the ground wears: materials of a look, with stones and blades close by or as they are from afar. */
+export interface Clothes {
+  readonly look: Look;
+  readonly detail: Detail;
+}
+
 /** The cut on the device, drawn by the ground, water and wall pipelines. */
 export class PatchPasses {
   readonly #records: GrowingBuffer;
@@ -135,10 +141,10 @@ export class PatchPasses {
   #wallRecords = new Uint32Array(WALL_WORDS * 256);
   #wallCount = 0;
   #count = 0;
-  readonly #looks = new Map<Look, GPURenderPipeline>();
-  readonly #coming = new Set<Look>();
+  readonly #looks = new Map<string, GPURenderPipeline>();
+  readonly #coming = new Set<string>();
   #terrain: GPURenderPipeline | null = null;
-  #look: Look | null = null;
+  #shown: Clothes | null = null;
   #recordBuffer: GPUBuffer | null = null;
   #wallBuffer: GPUBuffer | null = null;
 
@@ -187,29 +193,29 @@ export class PatchPasses {
   }
 
   /**
-   * Makes the ground's pipeline of a look the current one. The first is made at once; a later one in the background, while
-   * the last look goes on. Returns the look that is drawn.
+   * Makes the ground's pipeline of a look and detail the current one. The first is made at once; a later one in the
+   * background, while the last one goes on. Returns what is drawn.
    */
-  useLook(look: Look): Look {
-    const ready = this.#looks.get(look);
+  dress(wanted: Clothes): Clothes {
+    const { look, detail } = wanted;
+    const key = `${look} ${detail}`;
+    const ready = this.#looks.get(key);
     if (ready !== undefined) {
       this.#terrain = ready;
-      this.#look = look;
-    } else if (this.#look === null) {
-      this.#terrain = this.#context.device.createRenderPipeline(
-        describePass(this.#context, groundOf(look, this.#context.detail)),
-      );
-      this.#looks.set(look, this.#terrain);
-      this.#look = look;
-    } else if (!this.#coming.has(look)) {
-      this.#coming.add(look);
-      createPass(this.#context, groundOf(look, this.#context.detail)).then(
-        (pipeline) => this.#looks.set(look, pipeline),
+      this.#shown = wanted;
+    } else if (this.#shown === null) {
+      this.#terrain = this.#context.device.createRenderPipeline(describePass(this.#context, groundOf(look, detail)));
+      this.#looks.set(key, this.#terrain);
+      this.#shown = wanted;
+    } else if (!this.#coming.has(key)) {
+      this.#coming.add(key);
+      createPass(this.#context, groundOf(look, detail)).then(
+        (pipeline) => this.#looks.set(key, pipeline),
         // A lost device: the renderer's `lost` tells.
-        () => this.#coming.delete(look),
+        () => this.#coming.delete(key),
       );
     }
-    return this.#look;
+    return this.#shown;
   }
 
   /** Uploads the cut and the water on it. */
@@ -244,6 +250,11 @@ export class PatchPasses {
     pass.setPipeline(this.#wall);
     pass.setVertexBuffer(0, this.#wallBuffer);
     pass.draw(WALL_VERTICES, this.#wallCount);
+  }
+
+  /** The patches of the cut, for kernels. */
+  get records(): { readonly buffer: GPUBuffer | null; readonly count: number } {
+    return { buffer: this.#recordBuffer, count: this.#count };
   }
 
   get triangles(): number {

@@ -8,6 +8,7 @@ import type { BackgroundPass } from "./background.ts";
 import type { DropPass } from "./drops.ts";
 import type { GhostPass } from "./ghostplane.ts";
 import type { HiddenPatches } from "./hidden.ts";
+import type { InstancePass } from "./instances.ts";
 import type { LabelPass } from "./labels.ts";
 import type { PatchPasses } from "./patches.ts";
 import type { PlacingPass } from "./placing.ts";
@@ -65,6 +66,8 @@ export class Picture {
   readonly #choice = new HiddenChoice();
   #told: (() => Promise<{ total: number; drawn: number }>) | null = null;
 
+  /** Trees, rocks and tufts, where they are drawn. */
+  instances: InstancePass | null = null;
   readonly #passes: Passes;
   readonly #hidden: HiddenPatches | null;
 
@@ -126,6 +129,7 @@ export class Picture {
   #rest(pass: GPURenderPassEncoder, scene: Scene): void {
     const { frame, background, patches, ribbons, drops, ghost, placing, labels } = this.#passes;
     patches.drawWalls(pass);
+    this.instances?.draw(pass);
     const sea = scene.settings.sea_level_m !== null;
     frame.narrow(pass);
     background.draw(pass, sea);

@@ -65,7 +65,7 @@ export function describePass(context: PassContext, options: PassOptions): GPURen
   };
 }
 
-/** A vertex buffer that grows; contents are written whole. */
+/** A vertex buffer that grows, which kernels may read too; contents are written whole. */
 export class GrowingBuffer {
   #buffer: GPUBuffer | null = null;
 
@@ -85,7 +85,7 @@ export class GrowingBuffer {
       this.#buffer = this.#device.createBuffer({
         label: this.#label,
         size: 2 ** Math.ceil(Math.log2(bytes)),
-        usage: GPUBufferUsage.VERTEX | GPUBufferUsage.COPY_DST,
+        usage: GPUBufferUsage.VERTEX | GPUBufferUsage.STORAGE | GPUBufferUsage.COPY_DST,
       });
     }
     if (words > 0)

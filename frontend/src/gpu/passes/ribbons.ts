@@ -69,17 +69,17 @@ export class RibbonBuilder {
   }
 }
 
-/** How a stroke is drawn. Selected: brighter, wider, with a halo; under way: wider. `scale`: device pixels per unit. */
+/** How a stroke is drawn. Selected: brighter, wider, with a halo; under way: wider; calm: a hairline, nothing of it through hills. `scale`: device pixels per unit. */
 export function strokeStyle(stroke: StrokeVisual, scale: number): RibbonStyle {
   const lift = stroke.selected ? 0.35 : stroke.hovered ? 0.2 : 0;
   const [r, g, b, a] = stroke.colour;
   const brighter = (v: number): number => v + (1 - v) * lift;
-  const width = stroke.selected || stroke.live ? 2 : stroke.hovered ? 1.7 : 1.15;
+  const width = stroke.selected || stroke.live ? 2 : stroke.hovered ? 1.7 : stroke.calm ? 0.7 : 1.15;
   return {
     colour: [brighter(r), brighter(g), brighter(b), lift > 0 || stroke.live ? a : 0.88 * a],
     halfWidthPx: width * scale,
     haloPx: (stroke.selected ? 7 : stroke.hovered ? 4 : 0) * scale,
-    hiddenOpacity: stroke.selected || stroke.live ? 0.6 : 0.32,
+    hiddenOpacity: stroke.selected || stroke.live ? 0.6 : stroke.calm ? 0 : 0.32,
   };
 }
 

@@ -1,5 +1,5 @@
 /**
- * The tiling texture of stones that near ground is made of (shaders/wgsl/stones_rich.wgsl): cells of scattered points
+ * The tiling texture of stones that near ground is made of (shaders/wgsl/material/stones_rich.wgsl): cells of scattered points
  * after Worley, "A Cellular Texture Basis Function" (1996), with integer hashes, so it is the same everywhere.
  */
 

@@ -1,5 +1,5 @@
 /**
- * The tiling noise texture that all materials read (shaders/wgsl/noise.wgsl). Gradient noise after Perlin, "Improving
+ * The tiling noise texture that all materials read (shaders/wgsl/material/noise.wgsl). Gradient noise after Perlin, "Improving
  * Noise" (2002), on a periodic lattice with an integer hash, so it is the same everywhere.
  */
 

@@ -168,7 +168,7 @@ export class EskViewBar extends SignalElement {
         <wa-dropdown-item type="checkbox" value="strokes" .checked=${live(showStrokes.value && !quiet.value)}>Show strokes</wa-dropdown-item>
         ${flat ? null : this.#qualities(quality.value)}
       </wa-dropdown>
-      <esk-view-options .choices=${this.choices}></esk-view-options>
+      <esk-view-options .choices=${this.choices} .renderer=${this.renderer}></esk-view-options>
     `;
   }
 }

@@ -1,6 +1,8 @@
 import "@awesome.me/webawesome/dist/components/switch/switch.js";
+import type { ReadonlySignal } from "@preact/signals-core";
 import { css, html, type TemplateResult } from "lit";
 import type { ViewChoices } from "../../app/device/view-choices.ts";
+import type { RendererInfo } from "../../app/view/graphics.ts";
 import { contourSteps } from "../../app/view/instruments/contour-steps.ts";
 import { MOST_EXAGGERATION } from "../../core/camera/lens.ts";
 import { icon } from "../controls/icons.ts";
@@ -9,7 +11,11 @@ import { shared } from "../styles/shared.ts";
 
 /** How this device shows terrains: heights, contours, large letters. A button, and a card over it. */
 export class EskViewOptions extends SignalElement {
-  static override properties = { choices: { attribute: false }, open: { type: Boolean, state: true } };
+  static override properties = {
+    choices: { attribute: false },
+    renderer: { attribute: false },
+    open: { type: Boolean, state: true },
+  };
   static override styles = [
     shared,
     css`
@@ -51,6 +57,17 @@ export class EskViewOptions extends SignalElement {
         padding: 0 8px;
         border-radius: 8px;
       }
+      fieldset {
+        display: grid;
+        gap: 8px;
+        margin: 0;
+        padding: 0;
+        border: 0;
+      }
+      legend {
+        padding: 0 0 6px;
+        font-weight: 550;
+      }
       small {
         color: var(--esk-quiet);
       }
@@ -64,6 +81,7 @@ export class EskViewOptions extends SignalElement {
   ];
 
   declare choices: ViewChoices;
+  declare renderer: ReadonlySignal<RendererInfo | null>;
   declare open: boolean;
   readonly #away = (e: Event): void => {
     if (this.open && !e.composedPath().includes(this)) this.open = false;
@@ -92,12 +110,13 @@ export class EskViewOptions extends SignalElement {
   }
 
   protected override render(): TemplateResult {
-    const { exaggeration, contourM, projector } = this.choices.choices.value;
-    const changed = exaggeration !== 1 || contourM !== 0 || projector;
+    const { exaggeration, contourM, projector, materials, shade, instances, quietLines } = this.choices.choices.value;
+    const surface = materials !== null || !shade || instances !== null || !quietLines;
+    const changed = exaggeration !== 1 || contourM !== 0 || projector || surface;
     return html`<button
         class="icon-btn small"
         aria-label="View on this device"
-        title="View on this device: heights, contours, projector"
+        title="View on this device: heights, contours, ground, lines, projector"
         aria-expanded=${this.open}
         aria-pressed=${changed}
         @click=${() => {
@@ -109,9 +128,29 @@ export class EskViewOptions extends SignalElement {
       ${this.open ? this.#card() : null}`;
   }
 
+  #switch(label: string, on: boolean, choose: (on: boolean) => void): TemplateResult {
+    return html`<wa-switch size="s" ?checked=${on} @change=${(e: Event) => choose((e.target as HTMLInputElement).checked)}
+      >${label}</wa-switch
+    >`;
+  }
+
+  /** What of the ground is drawn. What nobody chose is on where the adapter draws it easily. */
+  #ground(): TemplateResult {
+    const { choices } = this;
+    const { materials, shade, instances } = choices.choices.value;
+    const able = this.renderer.value?.software !== true;
+    return html`<fieldset>
+      <legend>Ground</legend>
+      ${this.#switch("Stones and blades close by", materials ?? able, (on) => choices.choose({ materials: on }))}
+      ${this.#switch("Shade in hollows and joints", shade, (on) => choices.choose({ shade: on }))}
+      ${this.#switch("Trees, rocks and tufts", instances ?? able, (on) => choices.choose({ instances: on }))}
+      ${able ? null : html`<small>This device draws without a graphics card: what costs much is off.</small>`}
+    </fieldset>`;
+  }
+
   #card(): TemplateResult {
     const { choices } = this;
-    const { exaggeration, contourM, projector } = choices.choices.value;
+    const { exaggeration, contourM, projector, quietLines } = choices.choices.value;
     return html`<div class="card panel" role="dialog" aria-label="View on this device" @keydown=${this.#key}>
       <label>
         <span>Heights drawn <output>× ${exaggeration}</output></span>
@@ -130,6 +169,8 @@ export class EskViewOptions extends SignalElement {
           ${contourSteps().map((s) => html`<option value=${s.value} ?selected=${s.value === contourM}>${s.label}</option>`)}
         </select>
       </label>
+      ${this.renderer.value?.kind === "map" ? null : this.#ground()}
+      ${this.#switch("Quiet lines: faint until you draw or point", quietLines, (on) => choices.choose({ quietLines: on }))}
       <wa-switch size="s" ?checked=${projector} @change=${(e: Event) => choices.choose({ projector: (e.target as HTMLInputElement).checked })}
         >For a projector: large letters, thick lines</wa-switch
       >

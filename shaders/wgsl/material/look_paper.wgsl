@@ -1,6 +1,6 @@
 // A teaching model of stacked card. One look_*.wgsl is part of the terrain module.
 fn ground_material(s: Site) -> Material {
-  let grain = 0.98 + 0.04 * (s.fine2.r - 0.5) + 0.03 * (s.fine3.r - 0.5);
+  let grain = 0.98 + 0.03 * (s.fine2.r - 0.5) + 0.05 * (s.wide.r - 0.5) + 0.09 * (s.near.r - 0.5);
   // Each contour is the edge of a sheet: a soft shade at its foot, a light rim at its top.
   let z = s.p.z / view.contour - 0.01;
   let up = fract(z);
@@ -9,5 +9,5 @@ fn ground_material(s: Site) -> Material {
   let edge = seen * flat * (0.10 * smoothstep(0.12, 0.0, up) - 0.17 * smoothstep(0.55, 1.0, up));
   // Sheets alternate by a hair, as cut from different rolls.
   let roll = 1.0 + 0.018 * seen * cos(6.2831853 * (floor(z) * 0.381966));
-  return Material(vec3f(0.80, 0.715, 0.570) * grain * roll * (1.0 + edge), fine_slope(s, 0.02), 0.0, 0.35);
+  return Material(vec3f(0.80, 0.715, 0.570) * grain * roll * (1.0 + edge), fine_relief(s, 0.06), 0.0, 0.35, 1.0, 0.5);
 }

@@ -3,6 +3,6 @@ fn broken(m: Material, s: Site, amount: f32) -> Material { return m; }
 
 fn heaped(m: Material, s: Site, amount: f32) -> Material { return m; }
 
-fn tufted(m: Material, s: Site, stone: vec3f) -> Material { return m; }
+fn tufted(m: Material, s: Site, dry: f32) -> Material { return m; }
 
 fn crowned(m: Material, s: Site) -> Material { return m; }
