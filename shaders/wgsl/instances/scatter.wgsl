@@ -143,7 +143,9 @@ fn plant(plot: Plot, cell: vec2i, kind: u32) {
   if (kind == KIND_TREE) {
     // Meshes close by, impostors further off; between them one fades into the other.
     let far = smoothstep(0.8 * turn.near, turn.near, away);
-    if (far < 1.0) { put(0u, a, b, vec4f(ground.gradient, ground.soil.snow, 1.0 - far)); }
+    // A crown around the eye would hide all else.
+    let clear = smoothstep(0.30, 0.55, away / size);
+    if (far < 1.0 && clear > 0.0) { put(0u, a, b, vec4f(ground.gradient, ground.soil.snow, (1.0 - far) * clear)); }
     if (far > 0.0) { put(1u, a, b, vec4f(ground.gradient, ground.soil.snow, far)); }
   } else {
     put(kind + 1u, a, b, vec4f(ground.gradient, ground.soil.snow, ground.soil.grass));
