@@ -16,7 +16,7 @@ from esker.templates import draw, survey
 
 def test_drawing_again_changes_nothing() -> None:
     for name, text in draw.files().items():
-        assert (templates.FOLDER / name).read_text(encoding="utf-8") == text, (
+        assert (templates.DRAWN / name).read_text(encoding="utf-8") == text, (
             f"{name}: run python -m esker.templates.draw"
         )
 

@@ -21,6 +21,7 @@ from esker.templates.plans import Plan as Plan
 from esker.templates.plans import plans as plans
 
 FOLDER = Path(__file__).parent
+DRAWN = FOLDER / "drawn"
 ORDER = ("figure-six", "alpine-ridge", "canyon", "volcanic-island", "archipelago")
 """Those that are drawn, and scenes of the gallery too."""
 LOWLANDS = ("delta", "badland")
@@ -64,7 +65,8 @@ def _rasters(template_id: str) -> dict[str, Raster]:
 @cache
 def catalogue() -> tuple[Template, ...]:
     """All starting terrains, in the order of the landing page."""
-    return tuple(_read(FOLDER / f"{name}.json") for name in (*ORDER, *LOWLANDS, *REAL))
+    drawn = (DRAWN / f"{name}.json" for name in (*ORDER, *LOWLANDS))
+    return tuple(_read(path) for path in (*drawn, *(FOLDER / f"{name}.json" for name in REAL)))
 
 
 @cache

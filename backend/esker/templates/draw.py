@@ -1,4 +1,4 @@
-"""Draws seven of the starting terrains: ``python -m esker.templates.draw`` rewrites the JSON files beside this one.
+"""Draws seven of the starting terrains: ``python -m esker.templates.draw`` rewrites the JSON files in ``drawn/``.
 
 A test checks that drawing again changes nothing (SPEC H6). Heights and distances are metres, x east, y north.
 """
@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from esker.contract import BORN_EROSION, BORN_HOLD, DEFAULT_RIVERS, MIN_EROSION_SCALE, TerrainSettings
-from esker.templates import FOLDER, lowlands
+from esker.templates import DRAWN, lowlands
 from esker.templates.pen import Pen, smooth_path
 
 
@@ -207,4 +207,4 @@ def files() -> dict[str, str]:
 
 if __name__ == "__main__":
     for name, text in files().items():
-        (FOLDER / name).write_text(text, encoding="utf-8")
+        (DRAWN / name).write_text(text, encoding="utf-8")
