@@ -23,6 +23,7 @@ from esker.server import run
 from esker.server.settings import Settings
 from esker.session.room import core
 from esker.store import journal
+from esker.store.engine import sqlite
 from esker.store.grids import GridStore
 from esker.store.space import Space
 from esker.store.upkeep import care, compaction, deletion, migrations
@@ -74,8 +75,8 @@ def hurry() -> None:
         return end(self, terrain)
 
     folds._stretch, folds._end = begun, ended
-    mine: Any = journal
-    mine.write_backup = marked("backup", write_backup)
+    engine: Any = sqlite
+    engine.write_backup = marked("backup", write_backup)
     store: Any = GridStore
     store.keep = marked("import", GridStore.keep)
     removes: Any = deletion.Deletion
