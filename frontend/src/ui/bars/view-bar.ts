@@ -49,6 +49,20 @@ export class EskViewBar extends SignalElement {
       esk-segmented {
         margin-right: 2px;
       }
+      @media (max-width: 460px) {
+        :host {
+          gap: 0;
+          padding: 2px;
+        }
+        esk-segmented {
+          margin-right: 0;
+        }
+      }
+      @media (max-width: 380px) {
+        .icon-btn.small {
+          width: 36px;
+        }
+      }
       .heading {
         display: block;
         padding: 2px 12px 4px;

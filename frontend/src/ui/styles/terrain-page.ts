@@ -72,12 +72,13 @@ export const terrainPageStyles = css`
     flex: 1;
     min-width: 0;
   }
-  /* Five tabs and the cross. */
+  /* Six tabs and the cross. */
   .side.leads {
-    width: 356px;
+    width: 364px;
   }
   .side.leads header esk-segmented {
-    --segment-pad: 3px;
+    --segment-pad: 2px;
+    --segment-gap: 0;
   }
   .scroll {
     overflow-y: auto;
@@ -352,6 +353,10 @@ export const terrainPageStyles = css`
       }
       .side header esk-segmented {
         --segment-pad: 3px;
+      }
+      .side.leads header {
+        padding-left: 4px;
+        gap: 0;
       }
       .side.leads header esk-segmented {
         --segment-pad: 1px;
