@@ -26,8 +26,7 @@ class Balancer:
                 if far is None:
                     near.close()
                     continue
-                for ends in ((near, far), (far, near)):
-                    threading.Thread(target=_pass, args=ends, daemon=True).start()
+                threading.Thread(target=_joined, args=(near, far), daemon=True).start()
 
     def _reached(self) -> socket.socket | None:
         for port in self._ports:
@@ -38,6 +37,15 @@ class Balancer:
     def close(self) -> None:
         """Accepts nobody more."""
         self._listener.close()
+
+
+def _joined(near: socket.socket, far: socket.socket) -> None:
+    """Passes bytes both ways until both ends are done, and closes both."""
+    with near, far:
+        back = threading.Thread(target=_pass, args=(far, near), daemon=True)
+        back.start()
+        _pass(near, far)
+        back.join()
 
 
 def _pass(source: socket.socket, sink: socket.socket) -> None:
