@@ -1,8 +1,11 @@
-"""A task from a teacher to three pupils, one by touch, one without WebGPU (SPEC L120)."""
+"""A whole lesson: a teacher and three pupils, one by touch, one without WebGPU (SPEC L120)."""
 
 from __future__ import annotations
 
+import csv
+import io
 import json
+import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -10,7 +13,7 @@ import pytest
 
 from tests.e2e.conftest import Server, Visitor, Visitors, serving
 from tests.e2e.hands import Pixel, arch, draw, on_screen, wait, wait_settled
-from tests.e2e.test_everyone import NO_WEBGPU
+from tests.e2e.test_everyone import NO_WEBGPU, Fingers
 
 
 @pytest.fixture
@@ -70,7 +73,7 @@ def write_the_task(teacher: Visitor) -> None:
     wait(teacher, "() => (window.esker.score()?.points ?? -1) >= 0")
 
 
-def test_a_task_reaches_a_class(visitors: Visitors, server: Server) -> None:
+def test_a_whole_lesson(visitors: Visitors, server: Server) -> None:
     terrain, secret = server.create(title="One mountain")
     teacher = visitors(1100, 720, seen=True)
     teacher.open(f"/t/{terrain}#{secret}")
@@ -79,17 +82,86 @@ def test_a_task_reaches_a_class(visitors: Visitors, server: Server) -> None:
     assert 0 <= begun < 100
 
     made = json.loads(server.request("POST", f"/api/terrains/{terrain}/classes", {}, secret))
+    wall = visitors(1100, 720, seen=True)
+    wall.page.goto(f"{server.url}/wall/{terrain}/{made['id']}#{secret}")
     ada = arrive(visitors(900, 640, seen=True), server, made["code"], "Ada")
-    arrive(visitors(390, 780, has_touch=True, is_mobile=True), server, made["code"], "Ben")
+    ben = arrive(visitors(390, 780, has_touch=True, is_mobile=True), server, made["code"], "Ben")
     cleo = visitors(720, 540)
     cleo.context.add_init_script(NO_WEBGPU)
     arrive(cleo, server, made["code"], "Cleo")
 
-    # The task is in every copy, and what Ada draws is scored.
-    for pupil in (ada, cleo):
-        wait(pupil, "begun => window.esker.score()?.points === begun", begun)
+    # Ada draws what is asked, by the difference; Ben by touch, somewhere else; Cleo on the map.
     press(ada, f"Task: Build this mountain, {begun} of 100 points", "esk-task-chip")
-    ada.page.locator("esk-task-panel").get_by_text("Look at red and blue, then draw again.").wait_for()
-    ada.shot("task-panel")
+    differs = ada.page.locator("esk-task-panel wa-switch", has_text="Red and blue")
+    differs.click(position={"x": 14, "y": 12})  # the knob: the row is wider than what is hit
+    assert differs.evaluate("e => e.checked")
+    ada.shot("task-1-blue")
     draw(ada, "b", mountain(ada, 520))
-    wait(ada, "begun => window.esker.score().points !== begun", begun)
+    wait(ada, "begun => window.esker.score().points > begun", begun)
+    wait_settled(ada)
+    ada.shot("task-2-difference")
+    fingers = Fingers(ben)
+    ben.page.get_by_role("radio", name="Mountain").tap()
+    line = arch(on_screen(ben, 1200, 800), on_screen(ben, 2800, 900), 60)
+    fingers("touchStart", line[0])
+    for at in line[1:]:
+        fingers("touchMove", at)
+    fingers("touchEnd")
+    wait(ben, "() => window.esker.strokes().length === 1 && window.esker.pending() === 0")
+    draw(cleo, "m", arch(on_screen(cleo, 1000, 1500), on_screen(cleo, 2600, 1700), 40))
+
+    # The wall: names, ground and scores of all.
+    page = wall.page.locator("esk-wall")
+    for name in ("Ada", "Ben", "Cleo"):
+        page.get_by_role("button", name=f"{name}, here").wait_for()
+    page.get_by_role("radio", name="By score").click()
+    best = page.locator("li .name").first
+    wait(wall, FIRST, "Ada")
+    assert "Ada" in best.inner_text()
+    wall.shot("task-3-wall")
+
+    # Hands off and look here, in a pupil's copy that the teacher opened.
+    page.get_by_role("button", name="Ada, here").click()
+    with wall.page.context.expect_page() as opened:
+        press(wall, "Open", "esk-wall")
+    lead = Visitor(wall.context, opened.value, server.url)
+    wait(lead, "() => window.esker !== undefined && window.esker.ready()")
+    press(lead, "Inspector")
+    tab(lead, "Lesson")
+    for switch, says in (("Hands off", "Hands off: drawing is paused"), ("Look here", "is showing")):
+        lead.page.locator("esk-lesson-panel wa-switch", has_text=switch).click()
+        ada.page.locator("esk-lesson-bar", has_text=says).wait_for()
+    assert ada.page.get_by_role("radio", name="Mountain").is_disabled()
+    lead.page.close()
+
+    # Show to all, put together, collect.
+    own = ben.page.url
+    press(wall, "Show to all", "esk-wall")
+    wait(ben, "own => location.href !== own && window.esker?.strokes().length === 1", own)
+    press(wall, "Stop showing", "esk-wall")
+    wait(ben, "own => location.href === own && window.esker !== undefined", own)
+    for name in ("Ben", "Cleo"):
+        page.get_by_role("button", name=f"{name}, here").click()
+    with wall.page.context.expect_page() as opened:
+        press(wall, "Put together", "esk-wall")
+    opened.value.wait_for_url("**/t/**")
+    path, _, fragment = opened.value.url.partition("#")
+    together = json.loads(server.request("GET", f"/api/terrains/{path.rsplit('/', 1)[1]}/document", None, fragment))
+    assert len(together["strokes"]) == 3
+    opened.value.close()
+    with wall.page.expect_download() as file:
+        press(wall, "Collect", "esk-wall")
+    with zipfile.ZipFile(io.BytesIO(Path(file.value.path()).read_bytes())) as collected:
+        rows = {
+            row["names"]: row for row in csv.DictReader(io.StringIO(collected.read("class.csv").decode("utf-8-sig")))
+        }
+    assert int(rows["Ada"]["score"]) > begun
+    assert all(row["score_text"].startswith(f"{row['score']} of 100: ") for row in rows.values())
+    assert [each.errors for each in (teacher, ada, ben, cleo, wall)] == [[], [], [], [], []]
+
+
+FIRST = """name => {
+  const root = document.querySelector('esk-wall').shadowRoot;
+  const first = root.querySelector('li');
+  return first?.textContent.includes(name) && root.querySelectorAll('.points').length === 3;
+}"""

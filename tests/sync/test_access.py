@@ -46,7 +46,7 @@ def test_a_new_terrain_over_http(server: LiveServer) -> None:
 def test_starting_terrains(server: LiveServer) -> None:
     status, listed = server.http("GET", "/api/templates")
     assert status == 200
-    assert len(listed) == 7
+    assert len(listed) == 9
     for template in listed:
         assert set(template) == {"id", "title", "description"}
         status, made = server.http("POST", "/api/terrains", {"template": template["id"]})
