@@ -69,7 +69,7 @@ FORMATS: Final[dict[ExportFormat, Format]] = {
     "glb": Format(
         (".glb",), _plain(write_glb), "model/gltf-binary", 58.5, covers=True, most=contract.EXPORT_MESH_SAMPLES
     ),
-    "masks": Format((".zip",), _plain(write_masks), "application/zip", 2.1, covers=True),
+    "masks": Format((".zip",), _plain(write_masks), "application/zip", 4.2, covers=True),
     "map_pdf": Format(
         (".pdf",), _map(pdf.write_drawing), "application/pdf", 200.0, covers=True, most=contract.EXPORT_MAP_SAMPLES
     ),
