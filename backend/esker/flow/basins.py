@@ -81,12 +81,12 @@ def find_passes(z: Ints, basin: Ints, count: int, passes: Wide) -> int:
     for r in range(rows):
         for c in range(cols):
             i = r * cols + c
-            own = np.int64(basin[i])  # without numba a product of 32 bits would overflow
+            own = int(basin[i])  # without numba a product of 32 bits would overflow
             for k in range(3):
                 if (k == 0 and c == cols - 1) or (k > 0 and r == rows - 1) or (k == 2 and c == 0):
                     continue
                 j = i + steps[k]
-                other = np.int64(basin[j])
+                other = int(basin[j])
                 if other == own:
                     continue
                 height = max(heights[i], heights[j])
