@@ -57,7 +57,7 @@ class Database:
 
 
 class Holding:
-    """Which terrains a server has, as a test says."""
+    """The terrains that a test says a server owns."""
 
     def __init__(self) -> None:
         self.leases: dict[str, Lease] = {}

@@ -36,7 +36,7 @@ class Journal(Protocol):
 
 
 class Tenancy(Protocol):
-    """Which terrains this server has, where several share a database. A server that is alone has none."""
+    """The terrains that this server owns, where several share a database. A server that is alone has no such list."""
 
     async def hold(self, terrain: str) -> None:
         """Returns when this server has a terrain. Raises EskerError where another one has it."""

@@ -51,7 +51,7 @@ function boundary(inside: Uint8Array, rows: number, cols: number): Map<number, n
   return ends;
 }
 
-/** Which of two ways on turns left: its place in the list. */
+/** The place in the list of that one of two ways on which turns left. */
 function turn(at: number, came: number, next: readonly number[], wide: number): number {
   const step = (from: number, to: number): [number, number] => [
     (to % wide) - (from % wide),

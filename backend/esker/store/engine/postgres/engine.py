@@ -57,7 +57,7 @@ NOBODYS: Final = -1
 
 
 class Holder(Protocol):
-    """Which terrains this server has."""
+    """The terrains that this server owns."""
 
     def right(self, terrain: str) -> tuple[str, int] | None:
         """The name and the epoch of the lease under which this server writes for a terrain; None where it has none."""
