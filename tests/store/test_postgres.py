@@ -19,10 +19,10 @@ from bench.cluster._postgres import Postgres as DatabaseServer
 from esker import contract as c
 from esker.document.wire import op_json
 from esker.store.access import Access
-from esker.store.engine.ports import BadDatabase, Unknown, Unreachable, Unwritable
+from esker.store.engine.ports import BadDatabase, Unknown, Unreachable, Unwritable, UsedTwice
 from esker.store.engine.postgres import engine as engine_module
 from esker.store.engine.postgres import migrations
-from esker.store.engine.postgres.connections import place_of
+from esker.store.engine.postgres.connections import Writing, place_of
 from esker.store.engine.postgres.engine import Postgres
 from esker.store.journal import Journal, Row
 from esker.store.upkeep.migrations import FORMAT
@@ -187,6 +187,31 @@ def test_many_rooms_share_two_round_trips(database: Database, tmp_path: Path) ->
         found = db.execute("SELECT count(DISTINCT xmin::text) FROM esker.ops").fetchone()
     assert found is not None
     assert found[0] <= 2
+    journal.close()
+
+
+def test_a_refusal_that_arrives_before_the_commit_is_asked_for(
+    database: Database, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """SPEC J1: one id used twice fails alone, however early the database says so."""
+    journal = opened(database.new(), tmp_path)
+    journal.create(c.Document(id="t")).result()
+    journal.append("t", rows(1)).result()
+    flush = Writing.flush
+
+    def slow(writing: Writing) -> None:
+        flush(writing)
+        time.sleep(0.05)
+
+    monkeypatch.setattr(Writing, "flush", slow)
+    gate = threading.Event()
+    journal.submit(lambda _: gate.wait(60))
+    twice, good = journal.append("t", rows(1)), journal.append("t", rows(2))
+    gate.set()
+    with pytest.raises(UsedTwice):
+        twice.result()
+    good.result()
+    assert journal.engine.writable
     journal.close()
 
 

@@ -268,22 +268,29 @@ class Attempt:
             writing = Writing(db, pipeline, not self._careful)
             for item in self._batch:
                 self.outcomes.append(self._one(writing, pipeline, item, held))
+            self._end(db, writing, pipeline)
+        return self.outcomes
+
+    def _end(self, db: Database, writing: Writing, pipeline: psycopg.Pipeline) -> None:
+        """Commits.
+
+        What a statement before was refused for may come up in any call here: as soon as its answer has arrived.
+        """
+        try:
             writing.flush()
             self.sent = True
             done = db.execute("COMMIT")
-            try:
-                pipeline.sync()
-            except psycopg.OperationalError:
-                if not db.closed:  # the server refused a statement, and said so
-                    self.sent = False
-                raise
-            except psycopg.Error as error:
+            pipeline.sync()
+        except psycopg.OperationalError:
+            if not db.closed:  # the server refused a statement, and said so
                 self.sent = False
-                raise _Again from error
-            if done.statusmessage != "COMMIT":
-                self.sent = False
-                raise _Again
-        return self.outcomes
+            raise
+        except psycopg.Error as error:
+            self.sent = False
+            raise _Again from error
+        if done.statusmessage != "COMMIT":
+            self.sent = False
+            raise _Again
 
     def _one(
         self, writing: Writing, pipeline: psycopg.Pipeline, item: Item, held: set[tuple[Any, ...]]
