@@ -23,6 +23,12 @@ async function show(): Promise<void> {
   } else if (target.page === "lesson") {
     const { lessonPage } = await import("./ui/pages/lesson-page.ts");
     app.replaceChildren(lessonPage(target.id));
+  } else if (target.page === "room") {
+    const { roomPage } = await import("./ui/room/room-page.ts");
+    app.replaceChildren(roomPage(target.code));
+  } else if (target.page === "help") {
+    const { helpPage } = await import("./ui/room/help-pages.ts");
+    app.replaceChildren(helpPage(target.topic, window.location.host));
   } else if (target.page === "join") {
     const { joinPage } = await import("./ui/pages/join-page.ts");
     app.replaceChildren(joinPage(target.code));

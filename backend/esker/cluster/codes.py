@@ -30,7 +30,7 @@ class StoredCodes:
         """``now``: the date of the database."""
         self._journal, self._now = journal, now
 
-    def make(self, terrain: str, role: Role, link: str) -> str:
+    def make(self, terrain: str, role: Role, link: str, seconds: float = CODE_SECONDS) -> str:
         def write(db: Connection) -> str:
             now = self._now()
             db.execute("DELETE FROM codes WHERE expires<=?", (now,))
@@ -39,7 +39,7 @@ class StoredCodes:
             for row in own[: max(0, len(own) + 1 - MAX_CODES)]:
                 db.execute("DELETE FROM codes WHERE hash=?", (row[0],))
             code = drawn(code_length(live + 1))
-            values = (hashed(code), terrain, role, link, now + CODE_SECONDS, now + CODE_LIFE_SECONDS)
+            values = (hashed(code), terrain, role, link, now + seconds, now + CODE_LIFE_SECONDS)
             db.execute("INSERT INTO codes VALUES (?,?,?,?,?,?)", values)
             return code
 
@@ -49,28 +49,30 @@ class StoredCodes:
         def write(db: Connection) -> float | None:
             now, digest = self._now(), hashed(code)
             row = db.execute(
-                "SELECT until FROM codes WHERE hash=? AND terrain=? AND link=? AND expires>?",
+                "SELECT until, expires FROM codes WHERE hash=? AND terrain=? AND link=? AND expires>?",
                 (digest, terrain, link, now),
             ).fetchone()
             if row is None:
                 return None
-            expires = min(now + CODE_SECONDS, float(row[0]))
+            expires = max(float(row[1]), min(now + CODE_SECONDS, float(row[0])))
             db.execute("UPDATE codes SET expires=? WHERE hash=?", (expires, digest))
             return expires - now
 
         return self._journal.submit(write, terrain).result()
 
     def open(self, code: str) -> JoinCode | None:
+        now = self._now()
         row = (
             self._journal.reader()
             .execute(
-                "SELECT codes.terrain, codes.role, codes.link FROM codes JOIN links ON links.id = codes.link"
+                "SELECT codes.terrain, codes.role, codes.link, codes.expires FROM codes"
+                " JOIN links ON links.id = codes.link"
                 " WHERE codes.hash=? AND codes.expires>? AND links.revoked IS NULL",
-                (hashed(code), self._now()),
+                (hashed(code), now),
             )
             .fetchone()
         )
-        return None if row is None else JoinCode(*row)
+        return None if row is None else JoinCode(*row[:3], float(row[3]) - now)
 
     def drop(self, link: str) -> None:
         def write(db: Connection) -> None:

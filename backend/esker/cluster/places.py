@@ -48,6 +48,8 @@ def about(method: str, path: str) -> About | None:
             return About(terrain=terrain, changes=changes)
         case ["api", "join"] if changes:
             return About(is_code=True, changes=True)
+        case ["api", "room"] if changes:
+            return About(is_code=True)
         case _:
             return None
 

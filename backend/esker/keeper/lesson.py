@@ -14,6 +14,7 @@ from esker import contract as c
 from esker.document.birth import new_document
 from esker.keeper.private import Content, Lesson, Private
 from esker.session.room.hub import Hub
+from esker.store.access import CODE_LIFE_SECONDS
 from esker.store.kept import Kept, kept_one
 
 EDIT_NAME: Final = "Shown at the server's start"
@@ -53,17 +54,28 @@ async def _living(hub: Hub, terrain: str, secret: str, role: c.Role, name: str) 
     return made
 
 
-def greeting(content: Content, kept: Kept, data: Path, *, private: bool, lan: str | None = None) -> str:
+def first_code(hub: Hub, content: Content) -> str | None:
+    """A join code of the lesson's link to draw, for the projector: it lives for a day at school, and ends with the
+    link."""
+    assert content.lesson is not None, "a lesson was opened"
+    link = hub.access.check(content.lesson.terrain, content.lesson.edit)
+    return None if link is None else hub.access.make_code(link.terrain, "edit", link.id, CODE_LIFE_SECONDS)
+
+
+def greeting(
+    content: Content, kept: Kept, data: Path, *, private: bool, lan: str | None = None, code: str | None = None
+) -> str:
     """Returns what a start prints.
 
     ``private``: only whoever sits at this computer reads it (a terminal), so secrets may stand in it. ``lan``: where
-    the certificate can be fetched, when others on the network come in too.
+    the certificate can be fetched, when others on the network come in too. ``code``: a join code for the projector.
     """
     assert content.lesson is not None, "a lesson was opened"
     base, lesson = content.base, content.lesson
     lines = ["", f"  Esker is ready: {base}", f"  Terrain:        {_words(kept)}"]
     if lan:
         lines.append(f"  To have no warning, trust this certificate once on each device: {lan}")
+        lines.append(f"  What the warning means: {base}/help/warning   School devices: {base}/help/devices")
     if not private:
         lines += ["  Its links are secrets and stand in no log: `esker link` prints them on this computer."]
         lines += [f"  (They are kept in {data / 'private.json'}.)", "", ""]
@@ -73,6 +85,8 @@ def greeting(content: Content, kept: Kept, data: Path, *, private: bool, lan: st
     lines += ["  A new terrain:  esker serve --new, or “New terrain” on the start page. All terrains: esker list", ""]
     lines += ["  PRIVATE, for you alone (not for the projector):", f"    you own it:      {own}"]
     lines += [f"    all terrains:    {base}/server#{content.key}", ""]
+    if code:
+        lines += [f"  For the projector (the code {code}, and how many are in):", f"    {base}/room#{code}", ""]
     lines += ["  For everybody (can draw):", f"    {everybody}", ""]
     return "\n".join(lines) + (f"\n{_qr(everybody)}\n" if lan else "\n")
 

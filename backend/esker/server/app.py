@@ -8,7 +8,7 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Final
 
-from fastapi import FastAPI
+from fastapi import FastAPI, Request
 
 from esker.cluster.passing import Entrance, Passing
 from esker.fairness.shares import Places, Rate, Rates, Share
@@ -35,6 +35,7 @@ from esker.server.routes.socket import add_socket
 from esker.server.routes.terrains import add_terrains
 from esker.server.routes.wall import add_wall
 from esker.server.upload import AT_ONCE
+from esker.server.wire import tls
 from esker.server.wire.bodies import Bodies
 from esker.server.wire.descriptors import watch
 from esker.server.wire.front import Forwarded, Front, Gate
@@ -133,7 +134,13 @@ def create_app(
     if gauges is not None:
         add_metrics(app, gauges)
     add_history(app, hub, grids)
-    add_links(app, hub)
+
+    def warned(request: Request) -> bool:
+        """Whether somebody came to the certificate that ``--lan`` made."""
+        own = data / tls.FOLDER / tls.CA_FILE
+        return request.url.scheme == "https" and front.origin is None and own.is_file()
+
+    add_links(app, hub, warned)
     add_keeper(app, hub, key)
     add_socket(app, hub, front, cluster)
     add_previews(app, hub, pictures)

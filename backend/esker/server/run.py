@@ -21,7 +21,7 @@ from esker.exporting import run as exporting
 from esker.importing import run as importing
 from esker.jobs import Imports
 from esker.jobs.exports import Exports, Plant
-from esker.keeper.lesson import greeting, open_lesson
+from esker.keeper.lesson import first_code, greeting, open_lesson
 from esker.keeper.private import Key, Private
 from esker.process import confinement, system
 from esker.render.pictures.previews import Previews
@@ -435,5 +435,6 @@ async def _announce(hub: Hub, private: Private, base: str, settings: Settings) -
         sys.stdout.write(f"\n  Esker is ready: {base}\n\n")
     else:
         lan = f"{base}/{CA_FILE}" if settings.lan else None
-        sys.stdout.write(greeting(content, kept, settings.data, private=sys.stdout.isatty(), lan=lan))
+        code = first_code(hub, content) if settings.lan and sys.stdout.isatty() else None
+        sys.stdout.write(greeting(content, kept, settings.data, private=sys.stdout.isatty(), lan=lan, code=code))
     sys.stdout.flush()

@@ -60,6 +60,8 @@ class JoinCode:
     terrain: str
     role: Role
     link: str
+    seconds: float = field(default=0.0, compare=False)
+    """For how long it still opens that."""
 
 
 @dataclass(frozen=True)
@@ -98,8 +100,8 @@ class Codes(Protocol):
 
     is_slow: bool
 
-    def make(self, terrain: str, role: Role, link: str) -> str:
-        """Makes a code. Raises store.engine.ports.Unwritable, Moved."""
+    def make(self, terrain: str, role: Role, link: str, seconds: float = CODE_SECONDS) -> str:
+        """Makes a code. ``seconds``: for how long it lives. Raises store.engine.ports.Unwritable, Moved."""
 
     def prolong(self, terrain: str, code: str, link: str) -> float | None:
         """Lets a code live longer; returns for how many seconds, None where there is none of this link."""
@@ -121,7 +123,7 @@ class OwnCodes:
         self._ticks = ticks
         self._codes: dict[bytes, _Code] = {}
 
-    def make(self, terrain: str, role: Role, link: str) -> str:
+    def make(self, terrain: str, role: Role, link: str, seconds: float = CODE_SECONDS) -> str:
         self._forget_old()
         length = code_length(len(self._codes) + 1)
         own = [digest for digest, code in self._codes.items() if code.link == link]
@@ -131,7 +133,7 @@ class OwnCodes:
             code = drawn(length)
             if hashed(code) not in self._codes:
                 now = self._ticks()
-                self._codes[hashed(code)] = _Code(terrain, role, link, now + CODE_SECONDS, now + CODE_LIFE_SECONDS)
+                self._codes[hashed(code)] = _Code(terrain, role, link, now + seconds, now + CODE_LIFE_SECONDS)
                 return code
 
     def prolong(self, terrain: str, code: str, link: str) -> float | None:
@@ -141,13 +143,16 @@ class OwnCodes:
         if found is None or (found.terrain, found.link) != (terrain, link):
             return None
         now = self._ticks()
-        self._codes[digest] = longer = replace(found, expires=min(now + CODE_SECONDS, found.until))
+        expires = max(found.expires, min(now + CODE_SECONDS, found.until))
+        self._codes[digest] = longer = replace(found, expires=expires)
         return longer.expires - now
 
     def open(self, code: str) -> JoinCode | None:
         self._forget_old()
         found = self._codes.get(hashed(code))
-        return None if found is None else JoinCode(found.terrain, found.role, found.link)
+        if found is None:
+            return None
+        return JoinCode(found.terrain, found.role, found.link, found.expires - self._ticks())
 
     def drop(self, link: str) -> None:
         self._codes = {k: v for k, v in self._codes.items() if v.link != link}
@@ -282,12 +287,13 @@ class Access:
             if db.execute("UPDATE links SET revoked=? WHERE id=? AND revoked IS NULL", (now, each)).rowcount
         ]
 
-    def make_code(self, terrain: str, role: Role, link: str) -> str:
+    def make_code(self, terrain: str, role: Role, link: str, seconds: float = CODE_SECONDS) -> str:
         """A join code that opens the terrain in this role for fifteen minutes, as often as it is typed.
 
-        ``link``: the id of the link by which it is made; when that ends, so do its codes.
+        ``link``: the id of the link by which it is made; when that ends, so do its codes. ``seconds``: for how long
+        else it lives.
         """
-        return self.codes.make(terrain, role, link)
+        return self.codes.make(terrain, role, link, seconds)
 
     def prolong_code(self, terrain: str, code: str, link: str) -> float | None:
         """The code lives for another fifteen minutes from now; returns for how many seconds it does live.

@@ -140,10 +140,9 @@ describe("a join code (SPEC U342)", () => {
     await press("Prolong");
     expect(prolong).toHaveBeenCalledWith("t", "old", "K7M2QX");
     expect(share.renderRoot.textContent).toMatch(/Valid for 1[45] more minutes/);
-    await press("Show it large");
-    expect(share.renderRoot.querySelector(".projected")!.textContent).toContain(
-      `Open ${window.location.origin} and type`,
-    );
+    const large = [...share.renderRoot.querySelectorAll("a")].find((a) => a.textContent!.includes("Show it large"))!;
+    expect(large.getAttribute("href")).toBe("/room#K7M2QX");
+    expect(large.target).toBe("_blank");
     expect(window.location.origin).toMatch(/^https?:\/\//);
   });
 

@@ -12,17 +12,21 @@ from pydantic import StringConstraints
 from esker import contract as c
 from esker.contract import Role
 from esker.errors import Cannot
+from esker.fairness.shares import Rate, Rates
 from esker.lesson.classes import Classes
-from esker.server.routes.answers import AnyLink, OwnerLink, bad_code, guess, limited
+from esker.server.routes.answers import AnyLink, OwnerLink, asker, bad_code, guess, limited
 from esker.server.routes.classes import asked_in
 from esker.session.room.hub import Hub
 from esker.store.access import CODE_SECONDS, JOINED_BY_CODE, Ended, Link, OwnLink, SecretTaken, TooManyLinks
 from esker.store.access import JoinCode as OpenedCode
 from esker.store.classes import Class
+from esker.store.kept import kept_one
 
 T = TypeVar("T")
 
 RENEWED_AFTER: Final = 1.0
+ROOM_ASKS: Final = (2.0, 60)
+"""What projectors ask about the codes that they show, by address: rate a second, burst."""
 
 
 class NewLink(c.Wire):
@@ -48,15 +52,16 @@ class Replacement(c.Wire):
 
 
 class JoinCode(c.Wire):
-    """Body of POST /api/join."""
+    """Body of POST /api/join and POST /api/room."""
 
     code: Annotated[str, StringConstraints(min_length=1, max_length=20)]
 
 
-def add_links(app: FastAPI, hub: Hub) -> None:
-    """Adds the routes."""
+def add_links(app: FastAPI, hub: Hub, warned: Callable[[Request], bool] = lambda _: False) -> None:
+    """Adds the routes. ``warned``: whether a browser that asks so has warned of this server's certificate."""
     access = hub.access
     _add_codes(app, hub)
+    _add_room(app, hub, warned)
 
     @app.get("/api/terrains/{terrain}/links")
     async def list_links(terrain: str, link: OwnerLink) -> list[dict[str, Any]]:
@@ -167,3 +172,35 @@ def _add_codes(app: FastAPI, hub: Hub) -> None:
         except Ended:  # the link that made the code ended in this very moment
             raise bad_code() from None
         return {"id": found.terrain, "secret": secret, "role": found.role}
+
+
+def _add_room(app: FastAPI, hub: Hub, warned: Callable[[Request], bool]) -> None:
+    """What the projector's page says of the code that it shows. It names no link and no person: whoever has the code
+    could come in by it (docs/decisions/0069-the-projector.md)."""
+    app.state.room_asks = Rates(Rate(*ROOM_ASKS))
+
+    @app.post("/api/room")
+    async def room(request: Request, body: JoinCode) -> dict[str, Any]:
+        limited(request, app.state.room_asks, "questions about codes came")
+        classes: Classes = app.state.classes
+        found = guess(request, lambda: hub.access.open_code(body.code) or classes.by_code(body.code), again=True)
+        facts: dict[str, Any]
+        if isinstance(found, Class):
+            terrains = [copy.terrain for copy in classes.store.copies(found.id)]
+            facts = {"kind": "class", "terrain": None, "role": "edit", "title": found.title}
+            facts["expires_s"] = found.code_until - classes.store.now()
+        else:
+            assert isinstance(found, OpenedCode)
+            if hub.deletion.deleted(found.terrain) is not None:
+                raise bad_code()
+            terrains = [found.terrain]
+            kept = await hub.read(asker(request), kept_one, hub.journal, found.terrain)
+            facts = {"kind": "terrain", "terrain": found.terrain, "role": found.role}
+            facts |= {"title": "" if kept is None else kept.title, "expires_s": found.seconds}
+        return facts | {"here": sum(_pupils(hub, each) for each in terrains), "warned": warned(request)}
+
+
+def _pupils(hub: Hub, terrain: str) -> int:
+    """How many people are in a terrain who do not own it."""
+    room = hub.open_room(terrain)
+    return 0 if room is None else len({member.person for member in room.core.members if member.role != "owner"})

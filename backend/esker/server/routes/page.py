@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Final
 
 from fastapi import FastAPI, Query, Request, Response
 from fastapi.responses import FileResponse, HTMLResponse
@@ -18,6 +18,9 @@ from esker.server.routes.answers import answer
 from esker.server.routes.previews import Pictures, card_of
 from esker.server.wire.tls import CA_FILE, FOLDER
 from esker.session.room.hub import Hub
+
+HELP: Final = frozenset({"warning", "devices"})
+"""Pages in words: what a browser says of a certificate, and how it is made to say nothing."""
 
 
 class _Files(StaticFiles):
@@ -59,6 +62,16 @@ def add_page(app: FastAPI, hub: Hub, page: Path, data: Path, pictures: Pictures)
 
     @app.api_route("/privacy", methods=["GET", "HEAD"], include_in_schema=False)
     async def privacy() -> Response:
+        return index()
+
+    @app.api_route("/room", methods=["GET", "HEAD"], include_in_schema=False)
+    async def room() -> Response:
+        return index()
+
+    @app.api_route("/help/{topic}", methods=["GET", "HEAD"], include_in_schema=False)
+    async def helping(topic: str) -> Response:
+        if topic not in HELP:
+            raise Cannot(404, "not_found", "There is no such page.")
         return index()
 
     @app.api_route("/lessons/{lesson}", methods=["GET", "HEAD"], include_in_schema=False)

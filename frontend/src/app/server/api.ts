@@ -70,6 +70,20 @@ export interface ClassDoor {
   readonly groups: readonly { readonly number: number; readonly names: readonly string[] }[];
 }
 
+/** What the projector is told of a code. */
+export interface RoomFacts {
+  readonly kind: "class" | "terrain";
+  /** The terrain that the code opens; null for a class, whose devices have copies. */
+  readonly terrain: string | null;
+  readonly role: Role;
+  readonly title: string;
+  /** How many people are in, without owners. */
+  readonly here: number;
+  readonly expires_s: number;
+  /** Whether browsers warn of this server's certificate. */
+  readonly warned: boolean;
+}
+
 export interface JoinCode {
   readonly code: string;
   readonly expires_s: number;
@@ -135,6 +149,9 @@ export const api = {
 
   /** A terrain; or the class whose code it is, which asks for a name first. */
   join: (code: string): Promise<OpenedTerrain | ClassDoor> => json("POST", "/api/join", undefined, { code }),
+
+  /** The code stands in the body, so that no log has it. */
+  room: (code: string): Promise<RoomFacts> => json("POST", "/api/room", undefined, { code }),
 
   /** Answers only to a living secret. */
   about: (id: string, secret: string): Promise<{ readonly id: string; readonly role: Role }> =>

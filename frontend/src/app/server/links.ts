@@ -23,6 +23,16 @@ export function wallPath(id: string, lesson: string, secret: string): string {
   return `/wall/${encodeURIComponent(id)}/${encodeURIComponent(lesson)}#${encodeURIComponent(secret)}`;
 }
 
+/** What the picture of a code holds: the page on which a name is asked for, or the terrain. */
+export function joinLink(origin: string, code: string): string {
+  return `${origin}/join#${encodeURIComponent(code)}`;
+}
+
+/** The projector's page of a code. */
+export function roomPath(code: string): string {
+  return `/room#${encodeURIComponent(code)}`;
+}
+
 /**
  * The whole link, to copy or to show as a QR code. `preview`: the token by which programs that unfold links may see the
  * terrain's picture; it opens nothing else.

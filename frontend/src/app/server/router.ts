@@ -5,6 +5,8 @@ export type Route =
   | { readonly page: "server"; readonly key: string }
   | { readonly page: "privacy" }
   | { readonly page: "lesson"; readonly id: string }
+  | { readonly page: "room"; readonly code: string }
+  | { readonly page: "help"; readonly topic: "warning" | "devices" }
   | { readonly page: "join"; readonly code: string }
   | { readonly page: "wall"; readonly id: string; readonly lesson: string; readonly secret: string }
   | { readonly page: "missing"; readonly path: string };
@@ -20,6 +22,9 @@ export function route(url: URL): Route {
   if (match?.[1]) return { page: "terrain", id: match[1], secret: decode(url.hash.slice(1)) };
   if (/^\/server\/?$/.test(url.pathname)) return { page: "server", key: decode(url.hash.slice(1)) };
   if (/^\/privacy\/?$/.test(url.pathname)) return { page: "privacy" };
+  if (/^\/room\/?$/.test(url.pathname)) return { page: "room", code: decode(url.hash.slice(1)) };
+  if (/^\/help\/warning\/?$/.test(url.pathname)) return { page: "help", topic: "warning" };
+  if (/^\/help\/devices\/?$/.test(url.pathname)) return { page: "help", topic: "devices" };
   const lesson = LESSON.exec(url.pathname);
   if (lesson?.[1]) return { page: "lesson", id: lesson[1] };
   if (/^\/join\/?$/.test(url.pathname)) return { page: "join", code: decode(url.hash.slice(1)) };

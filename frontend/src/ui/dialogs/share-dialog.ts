@@ -4,7 +4,7 @@ import "@awesome.me/webawesome/dist/components/qr-code/qr-code.js";
 import "@awesome.me/webawesome/dist/components/switch/switch.js";
 import { html, nothing, type TemplateResult } from "lit";
 import { type AccessLink, ApiError, api, type JoinCode, type Preview } from "../../app/server/api.ts";
-import { terrainLink } from "../../app/server/links.ts";
+import { roomPath, terrainLink } from "../../app/server/links.ts";
 import { icon } from "../controls/icons.ts";
 import "../controls/segmented.ts";
 import {
@@ -52,7 +52,6 @@ export class EskShare extends SignalElement {
     preview: { state: true },
     problem: { state: true },
     busy: { state: true },
-    large: { state: true },
   };
   static override styles = [shared, shareStyles];
 
@@ -66,8 +65,6 @@ export class EskShare extends SignalElement {
   declare preview: Preview | null;
   declare problem: string;
   declare busy: boolean;
-  /** The code fills the window, for a projector. */
-  declare large: boolean;
 
   #clock: ReturnType<typeof setInterval> | undefined;
 
@@ -81,7 +78,6 @@ export class EskShare extends SignalElement {
     this.preview = null;
     this.problem = "";
     this.busy = false;
-    this.large = false;
   }
 
   protected override willUpdate(changed: Map<PropertyKey, unknown>): void {
@@ -91,7 +87,6 @@ export class EskShare extends SignalElement {
   #opened(): void {
     const { terrain } = this;
     this.made = madeLinks(terrain.store, terrain.id);
-    this.large = false;
     this.problem = "";
     this.tab = terrain.role.value === "view" ? "view" : "edit";
     void this.#try(async () => {
@@ -163,7 +158,6 @@ export class EskShare extends SignalElement {
   #tick(): void {
     if (this.code && this.code.ends <= Date.now()) {
       this.#setCode(null);
-      this.large = false;
       this.problem = "The code has ended. Make a new one.";
     } else if (this.open) this.requestUpdate();
   }
@@ -205,7 +199,6 @@ export class EskShare extends SignalElement {
   }
 
   protected override render(): TemplateResult {
-    if (this.large && this.code) return this.#projected(this.code);
     const role = this.terrain.role.value;
     const tabs: Tab[] = role === "owner" ? ["edit", "view", "owner"] : role === "edit" ? ["edit"] : ["view"];
     return html`
@@ -244,29 +237,6 @@ export class EskShare extends SignalElement {
     `;
   }
 
-  /** Readable from the last row: the code, where to type it, and the link as a QR code where there is one. */
-  #projected(code: Shown): TemplateResult {
-    const { origin } = window.location;
-    const secret = this.#secret;
-    return html`
-      <wa-dialog class="large" label="Join this terrain" light-dismiss ?open=${this.open} @wa-after-hide=${this.#hidden}>
-        <div class="projected">
-          <div class="words">
-            <p>Open <strong>${origin}</strong> and type</p>
-            <p class="letters">${code.code.slice(0, 3)} ${code.code.slice(3)}</p>
-            <p class="left">${left(code)} ${this.#prolongButton(code)}</p>
-          </div>
-          ${
-            secret === null
-              ? nothing
-              : html`<div class="qr"><wa-qr-code .value=${terrainLink(origin, this.terrain.id, secret)} label="QR code of the link" size="320"></wa-qr-code></div>`
-          }
-        </div>
-        <button class="btn outline" @click=${() => this.#enlarge(false)}>Back</button>
-      </wa-dialog>
-    `;
-  }
-
   #prolongButton(code: Shown): TemplateResult {
     return html`<button
       class="btn outline"
@@ -276,10 +246,6 @@ export class EskShare extends SignalElement {
     >
       ${icon("rotate")} Prolong
     </button>`;
-  }
-
-  #enlarge(large: boolean): void {
-    this.large = large;
   }
 
   #link(): TemplateResult {
@@ -318,7 +284,7 @@ export class EskShare extends SignalElement {
                 </span>
                 <span class="acts">
                   ${this.#prolongButton(code)}
-                  <button class="btn outline" @click=${() => this.#enlarge(true)}>${icon("monitor")} Show it large</button>
+                  <a class="btn outline" href=${roomPath(code.code)} target="_blank">${icon("monitor")} Show it large</a>
                   <wa-copy-button .value=${code.code} copy-label="Copy the code"></wa-copy-button>
                 </span>`
             : html`<span class="quiet">For a classroom: a short code to type instead of the link.</span>

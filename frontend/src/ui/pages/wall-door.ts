@@ -3,16 +3,18 @@
 import "@awesome.me/webawesome/dist/components/qr-code/qr-code.js";
 import { html, nothing, type TemplateResult } from "lit";
 import { codeWords } from "../../app/server/classes/copies.ts";
+import { joinLink, roomPath } from "../../app/server/links.ts";
 import { icon } from "../controls/icons.ts";
 
 /** Before anybody is here the way in fills the page. */
 export function emptyWall(code: string | null): TemplateResult {
   if (code === null) return html`<div class="empty"><p>The door is closed, and nobody is in.</p></div>`;
   return html`<div class="empty">
-      <p class="where">Open <strong>${window.location.host}</strong> and type</p>
+      <p class="where">Open <strong>${window.location.origin}</strong> and type</p>
       <p class="letters">${codeWords(code)}</p>
-      <div class="qr"><wa-qr-code .value=${joinLink(code)} label="QR code to join" size="220"></wa-qr-code></div>
+      <div class="qr"><wa-qr-code .value=${joinLink(window.location.origin, code)} label="QR code to join" size="220"></wa-qr-code></div>
       <p>Nobody is here yet.</p>
+      <p><a class="btn outline" href=${roomPath(code)} target="_blank">${icon("monitor")} On the projector</a></p>
       <p class="quiet">Each device that types the code gets its own copy, and it appears here.</p>
     </div>`;
 }
@@ -29,17 +31,15 @@ interface DoorState {
 export function openDoor({ code, busy, hasPicture, onClose }: DoorState): TemplateResult {
   return html`<div class="door">
               <div>
-                <small>Open <strong>${window.location.host}</strong> and type</small>
+                <small>Open <strong>${window.location.origin}</strong> and type</small>
                 <span class="letters" aria-label=${`Code ${code}`}>${codeWords(code)}</span>
               </div>
-              ${hasPicture ? html`<div class="qr"><wa-qr-code .value=${joinLink(code)} label="QR code to join" size="104"></wa-qr-code></div>` : nothing}
+              ${hasPicture ? html`<div class="qr"><wa-qr-code .value=${joinLink(window.location.origin, code)} label="QR code to join" size="104"></wa-qr-code></div>` : nothing}
+              <a class="icon-btn" href=${roomPath(code)} target="_blank" title="On the projector, without the wall" aria-label="On the projector">
+                ${icon("monitor")}
+              </a>
               <button class="icon-btn" title="Close the door: who is in stays in" aria-label="Close the door" ?disabled=${busy} @click=${onClose}>
                 ${icon("xmark")}
               </button>
             </div>`;
-}
-
-/** What the picture of the code holds: the page on which a name is asked for. */
-function joinLink(code: string): string {
-  return `${window.location.origin}/join#${code}`;
 }

@@ -67,43 +67,6 @@ export const shareStyles = css`
     align-items: center;
     gap: 4px;
   }
-  wa-dialog.large {
-    --width: min(96vw, 1500px);
-  }
-  .projected {
-    display: flex;
-    flex-wrap: wrap;
-    align-items: center;
-    justify-content: space-evenly;
-    gap: 4vmin;
-    min-height: 60vh;
-    text-align: center;
-  }
-  .projected .words {
-    font-size: clamp(1.25rem, 3.4vmin, 2.6rem);
-  }
-  .projected .letters {
-    font-size: clamp(3rem, 11vw, 11rem);
-    font-weight: 720;
-    letter-spacing: 0.06em;
-    line-height: 1.15;
-    white-space: nowrap;
-  }
-  .projected .left {
-    display: flex;
-    flex-wrap: wrap;
-    align-items: center;
-    justify-content: center;
-    gap: 0.6em;
-    font-size: 1rem;
-  }
-  .projected strong {
-    overflow-wrap: anywhere;
-  }
-  .projected .qr {
-    width: auto;
-    margin: 0;
-  }
   .code strong {
     display: block;
     white-space: nowrap;
