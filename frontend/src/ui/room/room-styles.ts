@@ -108,7 +108,7 @@ export const roomStyles = css`
     margin: 0;
   }
   .here {
-    font-size: clamp(1.5rem, 6.4vh, 5rem);
+    font-size: clamp(1.5rem, min(6.4vh, 6.4vw), 5rem);
     line-height: 1.1;
   }
   .here strong {
