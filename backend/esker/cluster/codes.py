@@ -72,7 +72,10 @@ class StoredCodes:
             )
             .fetchone()
         )
-        return None if row is None else JoinCode(*row[:3], float(row[3]) - now)
+        if row is None:
+            return None
+        terrain, role, link, expires = row
+        return JoinCode(terrain, role, link, float(expires) - now)
 
     def drop(self, link: str) -> None:
         def write(db: Connection) -> None:
