@@ -1,11 +1,17 @@
-// Rivers on the ground (docs/water.md): `river_map` holds, for each cell of a lattice over the domain, the pieces of rivers that
+// Rivers on the ground (docs/water.md): `river_map` holds, for each cell of lattices over the domain, the pieces of rivers that
 // reach into it (frontend/src/tiles/water/rivermap.ts). The ground around a place finds the piece that is nearest, and
-// with it a bed, wet banks, greener ground and the water itself.
-const RIVER_CELLS: i32 = 128;    // of the lattice, along a side
+// with it a bed, wet banks, greener ground and the water itself. Where pixels are larger a coarser lattice is read, whose
+// pieces reach further: a thin river is drawn wider there.
+const RIVER_CELLS: i32 = 128;    // of the finest lattice, along a side; each further one has half as many
+const RIVER_LATTICES: i32 = 5;
 const RIVER_COLUMNS: i32 = 256;  // texels in a row of the map
+const RIVER_REACH: f32 = 0.25;   // pieces are listed so many cells beyond their banks
 const FAR_RIVER: f32 = 1.0e6;
-// Half the least width of a river, pixels.
-const LEAST_HALF_PX: f32 = 1.05;
+// Half the least width of a river, and half of how softly its edge ends, pixels.
+const LEAST_HALF_PX: f32 = 0.9;
+const SOFT_PX: f32 = 0.6;
+// A river that is drawn wider than it is shows this power of its share of that width.
+const THIN_POWER: f32 = 0.25;
 // Metres of depth at a width of 2.7 m, a little more than by the formula: what is not seen is not cut.
 const BED_SHARE: f32 = 0.55;
 const FAR_BED: f32 = 1500.0;
@@ -19,23 +25,43 @@ struct River {
   out: vec2f,      // away from its middle
   share: f32,      // how far it is shown while rivers change
   pixel: f32,      // metres that a pixel covers across the river
+  cover: f32,      // how much of the pixel its water covers
+};
+
+struct RiverList {
+  first: i32,      // texel of its first piece
+  count: i32,
+  reach: f32,      // metres beyond their banks to which its pieces are whole
 };
 
 fn river_texel(k: i32) -> vec4f {
   return textureLoad(river_map, vec2i(k % RIVER_COLUMNS, k / RIVER_COLUMNS), 0);
 }
 
-// The river whose water is nearest to a place; thin ones are drawn wider, so that they are seen.
+// The pieces near a place, of the finest lattice in which they reach as far as pixels of `pixel` metres ask.
+fn river_list(p: vec2f, pixel: f32) -> RiverList {
+  var cells = RIVER_CELLS;
+  var first = 0;
+  for (var k = 1; k < RIVER_LATTICES; k += 1) {
+    if ((LEAST_HALF_PX + SOFT_PX) * pixel <= RIVER_REACH * view.size / f32(cells)) { break; }
+    first += cells * cells;
+    cells = cells / 2;
+  }
+  let cell = clamp(vec2i(p / view.size * f32(cells)), vec2i(0), vec2i(cells - 1));
+  let list = river_texel(first + cell.y * cells + cell.x);
+  return RiverList(i32(list.x), i32(list.y), RIVER_REACH * view.size / f32(cells));
+}
+
+// The river that covers most of a place, else the one whose water is nearest. Of rivers that fade into each other the one that
+// is seen more counts, so that a line stays whole.
 fn river_near(p: vec2f, f: Footprint) -> River {
-  var r = River(FAR_RIVER, 1.0, 0.0, 0.0, vec2f(1.0, 0.0), vec2f(0.0, 1.0), 0.0, 1.0);
+  var r = River(FAR_RIVER, 1.0, 0.0, 0.0, vec2f(1.0, 0.0), vec2f(0.0, 1.0), 0.0, 1.0, 0.0);
   if (view.has_rivers < 0.5) { return r; }
-  let cell = clamp(vec2i(p / view.size * f32(RIVER_CELLS)), vec2i(0), vec2i(RIVER_CELLS - 1));
-  let list = river_texel(cell.y * RIVER_CELLS + cell.x);
-  let first = i32(list.x);
-  let count = i32(list.y);
-  for (var k = 0; k < count; k += 1) {
-    let ends = river_texel(first + 2 * k);
-    let more = river_texel(first + 2 * k + 1);
+  let list = river_list(p, length(vec2f(length(f.dx.xy), length(f.dy.xy))));
+  let widest = list.reach * (LEAST_HALF_PX / (LEAST_HALF_PX + SOFT_PX));
+  for (var k = 0; k < list.count; k += 1) {
+    let ends = river_texel(list.first + 2 * k);
+    let more = river_texel(list.first + 2 * k + 1);
     let run = ends.zw - ends.xy;
     let length_m = max(length(run), 1.0e-4);
     let dir = run / length_m;
@@ -43,11 +69,14 @@ fn river_near(p: vec2f, f: Footprint) -> River {
     let offset = p - (ends.xy + dir * t);
     let away = length(offset);
     let left = vec2f(-dir.y, dir.x);
-    let pixel = length(vec2f(dot(f.dx.xy, left), dot(f.dy.xy, left)));
-    let half = max(mix(more.x, more.y, t / length_m), min(LEAST_HALF_PX * pixel, 0.25 * view.size / f32(RIVER_CELLS)));
-    if (away - half < r.beyond) {
+    let pixel = min(length(vec2f(dot(f.dx.xy, left), dot(f.dy.xy, left))), widest / LEAST_HALF_PX);
+    let half = mix(more.x, more.y, t / length_m);
+    let drawn = max(half, LEAST_HALF_PX * pixel);
+    let soft = max(SOFT_PX * pixel, 0.12 * half);
+    let cover = (1.0 - smoothstep(-soft, soft, away - drawn)) * pow(half / drawn, THIN_POWER) * more.w;
+    if (cover > r.cover + 1.0e-3 || (cover >= r.cover - 1.0e-3 && away - half < r.beyond)) {
       let out = select(left, offset / max(away, 1.0e-4), away > 1.0e-3);
-      r = River(away - half, half, more.z + t, dot(offset, left), dir, out, more.w, pixel);
+      r = River(away - half, half, more.z + t, dot(offset, left), dir, out, more.w, pixel, cover);
     }
   }
   return r;
@@ -89,9 +118,7 @@ fn river_banks(m: Material, r: River, s: Site) -> Material {
 
 // How much of the pixel the water covers: it ends in lakes and the sea, of which `above` is the height.
 fn river_cover(r: River, above: f32) -> f32 {
-  let soft = max(0.6 * r.pixel, 0.12 * r.half);
-  let open = 1.0 - smoothstep(-soft, soft, r.beyond);
-  return open * r.share * smoothstep(-0.4, 0.3, above);
+  return r.cover * smoothstep(-0.4, 0.3, above);
 }
 
 // The water of a river over lit ground: sky on ripples that run with it, a bed seen through it, white where it is steep.

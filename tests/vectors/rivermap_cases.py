@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from esker.flow.rivers import River
-from esker.render.rivers import CELLS, COLUMNS, river_map
+from esker.render.rivers import CELLS, COLUMNS, LATTICES, river_map
 
 SIZE_M = 4096.0
 LEVEL = 2
@@ -34,7 +34,7 @@ def _case(
     cells = []
     if found is not None:
         texels = found.reshape(-1, 4)
-        for k in range(CELLS * CELLS):
+        for k in range(sum((CELLS >> j) ** 2 for j in range(LATTICES))):
             first, count = (int(v) for v in texels[k, :2])
             if count:
                 pieces = texels[first : first + 2 * count].reshape(-1, 8)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Iterator, Sequence
 from typing import Final, NamedTuple
@@ -15,12 +14,16 @@ from esker.flow.rivers import River
 Floats = NDArray[np.float64]
 
 CELLS: Final = 128
+LATTICES: Final = 5
 COLUMNS: Final = 256
-"""RIVER_CELLS and RIVER_COLUMNS of rivers.wgsl."""
+"""RIVER_CELLS, RIVER_LATTICES and RIVER_COLUMNS of rivers.wgsl."""
 WIDTH_M: Final = 2.7
 WIDTH_POWER: Final = 0.352
 BANK_M: Final = 4.0
 BANK_WIDTHS: Final = 3.0
+REACH_CELLS: Final = 0.25
+LEAST_CELLS: Final = 1 / 12
+"""Pieces of all lattices but the finest are at least so many cells long."""
 MOST_IN_CELL: Final = 96
 MOST_PIECES: Final = 40_000
 
@@ -38,16 +41,19 @@ class Piece(NamedTuple):
     share: float
 
 
+class _Line(NamedTuple):
+    """A river as it is drawn: its points, metres; metres down the river and half the width at each."""
+
+    points: list[tuple[float, float]]
+    along: list[float]
+    half: list[float]
+
+
 def river_map(rivers: Sequence[River], size_m: float, wetness: float) -> NDArray[np.float32] | None:
     """The texels, (rows, COLUMNS, 4) float32; None without any river."""
-    cells: list[list[Piece]] = [[] for _ in range(CELLS * CELLS)]
-    pieces = 0
-    for river in rivers:
-        for piece in _pieces(river, wetness):
-            for cell in _cells(piece, size_m):
-                if len(cells[cell]) < MOST_IN_CELL and pieces < MOST_PIECES:
-                    cells[cell].append(piece)
-                    pieces += 1
+    lines = [_line(river, wetness) for river in rivers]
+    cells = [found for k in range(LATTICES) for found in _lattice(lines, size_m, k)]
+    pieces = sum(len(found) for found in cells)
     if not pieces:
         return None
     texels = np.zeros((-(-(len(cells) + 2 * pieces) // COLUMNS) * COLUMNS, 4), np.float32)
@@ -60,18 +66,43 @@ def river_map(rivers: Sequence[River], size_m: float, wetness: float) -> NDArray
     return texels.reshape(-1, COLUMNS, 4)
 
 
+def _lattice(lines: Sequence[_Line], size_m: float, lattice: int) -> list[list[Piece]]:
+    """What the cells of one lattice hold, row by row from the south."""
+    side = CELLS >> lattice
+    cell_m = size_m / side
+    cells: list[list[Piece]] = [[] for _ in range(side * side)]
+    left = MOST_PIECES >> lattice
+    for line in lines:
+        for piece in _pieces(line, LEAST_CELLS * cell_m if lattice else 0.0):
+            for cell in _cells(piece, side, cell_m):
+                if len(cells[cell]) < MOST_IN_CELL and left:
+                    cells[cell].append(piece)
+                    left -= 1
+    return cells
+
+
 def _half_width(area_m2: float, wetness: float) -> float:
     return float(0.5 * WIDTH_M * (wetness * area_m2 / 1e6) ** WIDTH_POWER)
 
 
-def _pieces(river: River, wetness: float) -> Iterator[Piece]:
+def _line(river: River, wetness: float) -> _Line:
     points = _rounded(river.points)
     along = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))))
     head, end = (math.log(area) for area in river.area_m2)
     shares = along / max(along[-1], 1e-6)
     half = [_half_width(math.exp(head + (end - head) * share), wetness) for share in shares]
-    for k, ((ax, ay), (bx, by)) in enumerate(itertools.pairwise(points.tolist())):
-        yield Piece(ax, ay, bx, by, half[k], half[k + 1], float(along[k]), 1.0)
+    return _Line([(float(x), float(y)) for x, y in points], along.tolist(), half)
+
+
+def _pieces(line: _Line, least_m: float) -> Iterator[Piece]:
+    """Points nearer than ``least_m`` to the one before are left out, but for the last."""
+    a = 0
+    for b in range(1, len(line.points)):
+        (ax, ay), (bx, by) = line.points[a], line.points[b]
+        if b < len(line.points) - 1 and math.hypot(bx - ax, by - ay) < least_m:
+            continue
+        yield Piece(ax, ay, bx, by, line.half[a], line.half[b], line.along[a], 1.0)
+        a = b
 
 
 def _rounded(points: Floats) -> Floats:
@@ -84,14 +115,13 @@ def _rounded(points: Floats) -> Floats:
     return np.concatenate((points[:1], cut, points[-1:]))
 
 
-def _cells(piece: Piece, size_m: float) -> Iterator[int]:
-    """The cells of the lattice that a piece with its banks may reach."""
-    cell_m = size_m / CELLS
+def _cells(piece: Piece, side: int, cell_m: float) -> Iterator[int]:
+    """The cells of a lattice of ``side`` times ``side`` that a piece with its banks may reach."""
     half = max(piece.half_a, piece.half_b)
-    reach = half + BANK_M + 2 * BANK_WIDTHS * half + 0.25 * cell_m
+    reach = half + BANK_M + 2 * BANK_WIDTHS * half + REACH_CELLS * cell_m
 
     def at(v: float) -> int:
-        return min(CELLS - 1, max(0, math.floor(v / cell_m)))
+        return min(side - 1, max(0, math.floor(v / cell_m)))
 
     ax, ay, bx, by = piece[:4]
     for y in range(at(min(ay, by) - reach), at(max(ay, by) + reach) + 1):
@@ -99,4 +129,4 @@ def _cells(piece: Piece, size_m: float) -> Iterator[int]:
             px, py, dx, dy = (x + 0.5) * cell_m - ax, (y + 0.5) * cell_m - ay, bx - ax, by - ay
             t = min(1.0, max(0.0, (px * dx + py * dy) / max(dx * dx + dy * dy, 1e-12)))
             if math.hypot(px - t * dx, py - t * dy) <= reach + math.sqrt(0.5) * cell_m:
-                yield y * CELLS + x
+                yield y * side + x

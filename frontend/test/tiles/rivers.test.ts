@@ -4,7 +4,7 @@ import { readFileSync } from "node:fs";
 import { describe, expect, it } from "vitest";
 import { ShownRivers } from "../../src/app/layers/shown-rivers.ts";
 import type { RiverLine, RiverMap, RiverSet } from "../../src/core/types.ts";
-import { RIVER_CELLS, RIVER_COLUMNS, riverMap } from "../../src/tiles/water/rivermap.ts";
+import { RIVER_CELLS, RIVER_COLUMNS, RIVER_LATTICES, riverMap } from "../../src/tiles/water/rivermap.ts";
 
 interface Case {
   name: string;
@@ -26,10 +26,14 @@ const lineOf = (cells: number[], areasM2: readonly [number, number]): RiverLine 
   into: null,
 });
 
+/** Cells of all lattices, the finest first. */
+const CELLS = Array.from({ length: RIVER_LATTICES }, (_, k) => (RIVER_CELLS >> k) ** 2);
+const ALL_CELLS = CELLS.reduce((sum, n) => sum + n);
+
 /** Pieces of eight numbers by their cell. */
 function piecesOf(map: RiverMap | null): [number, number[][]][] {
   const out: [number, number[][]][] = [];
-  for (let k = 0; map !== null && k < RIVER_CELLS * RIVER_CELLS; k += 1) {
+  for (let k = 0; map !== null && k < ALL_CELLS; k += 1) {
     const [first, count] = [map.texels[4 * k]!, map.texels[4 * k + 1]!];
     const pieces = Array.from({ length: count }, (_, i) => [
       ...map.texels.subarray(4 * first + 8 * i, 4 * first + 8 * i + 8),
@@ -64,7 +68,14 @@ describe("the map of rivers", () => {
     }));
     const map = riverMap(many, 4096, 1)!;
     expect(map.texels.length).toBe(4 * RIVER_COLUMNS * map.rows);
-    expect(map.rows).toBeLessThan(512);
+    expect(map.rows).toBeLessThan(1024);
+    const counts = piecesOf(map).map(([cell, pieces]) => [cell, pieces.length] as const);
+    let first = 0;
+    for (const cells of CELLS) {
+      const inside = counts.filter(([cell]) => cell >= first && cell < first + cells);
+      expect(inside.length, "every lattice has room").toBeGreaterThan(0);
+      first += cells;
+    }
   });
 });
 

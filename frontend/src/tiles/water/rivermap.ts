@@ -1,24 +1,29 @@
 /**
- * Rivers as shaders read them (shaders/wgsl/rivers.wgsl): for each cell of a lattice over the domain the pieces of rivers that reach
- * into it, all in the texels of one texture (twin of `backend/esker/render/rivers.py`).
+ * Rivers as shaders read them (shaders/wgsl/rivers.wgsl): for each cell of lattices over the domain the pieces of rivers that reach
+ * into it, all in the texels of one texture (twin of `backend/esker/render/rivers.py`). Coarser lattices are for what is far away:
+ * their pieces are longer, and reach further beyond their banks.
  */
 
 import type { RiverLine, RiverMap } from "../../core/types.ts";
 import { TILE_CELLS } from "../../generated/contract.ts";
 
-/** Cells of the lattice along a side, and texels in a row: RIVER_CELLS and RIVER_COLUMNS of rivers.wgsl. */
+/** Cells of the finest lattice along a side, each further one has half as many; and texels in a row: as in rivers.wgsl. */
 export const RIVER_CELLS = 128;
+export const RIVER_LATTICES = 5;
 export const RIVER_COLUMNS = 256;
 const TEXEL = 4;
 /** Bankfull width of a river by the area that drains through it (Bieger et al. 2015): metres, km². */
 const WIDTH_M = 2.7;
 const WIDTH_POWER = 0.352;
-/** Banks reach so far beyond the water: metres, and widths. Half a cell more has the rivers that are drawn wider than they are. */
+/** Banks reach so far beyond the water: metres, and widths. So many cells more have the rivers that are drawn wider than they are. */
 const BANK_M = 4;
 const BANK_WIDTHS = 3;
-/** Pieces that one cell holds at most, and all cells together. */
+const REACH_CELLS = 0.25;
+/** Pieces of all lattices but the finest are at least so many cells long. */
+const LEAST_CELLS = 1 / 12;
+/** Pieces that one cell holds at most, and all cells of the finest lattice together; each further one has half as many. */
 const MOST_IN_CELL = 96;
-export const MOST_PIECES = 40_000;
+const MOST_PIECES = 40_000;
 
 /** A river of one level that is shown so far, 0..1. */
 export interface ShownRiver {
@@ -34,22 +39,13 @@ export function halfWidthM(areaM2: number, wetness: number): number {
 
 /** The map of rivers; null without any. */
 export function riverMap(rivers: readonly ShownRiver[], sizeM: number, wetness: number): RiverMap | null {
-  const cells: number[][] = Array.from({ length: RIVER_CELLS * RIVER_CELLS }, () => []);
-  let pieces = 0;
-  for (const river of rivers) {
-    if (river.share <= 0) continue;
-    for (const piece of piecesOf(river, sizeM, wetness)) {
-      for (const cell of cellsOf(piece, sizeM)) {
-        const list = cells[cell]!;
-        if (list.length >= 2 * TEXEL * MOST_IN_CELL || pieces >= MOST_PIECES) continue;
-        list.push(...piece);
-        pieces += 1;
-      }
-    }
-  }
-  if (pieces === 0) return null;
+  const lines = rivers.filter((river) => river.share > 0).map((river) => lineOf(river, sizeM, wetness));
+  const cells: number[][] = [];
+  for (let k = 0; k < RIVER_LATTICES; k += 1) cells.push(...latticeOf(lines, sizeM, k));
+  const numbers = cells.reduce((sum, list) => sum + list.length, 0);
+  if (numbers === 0) return null;
   const first = cells.length;
-  const rows = Math.ceil((first + 2 * pieces) / RIVER_COLUMNS);
+  const rows = Math.ceil((first + numbers / TEXEL) / RIVER_COLUMNS);
   const texels = new Float32Array(TEXEL * rows * RIVER_COLUMNS);
   let at = first;
   cells.forEach((list, k) => {
@@ -61,22 +57,59 @@ export function riverMap(rivers: readonly ShownRiver[], sizeM: number, wetness: 
   return { texels, rows };
 }
 
-/** Eight numbers each: both ends in metres; half the width at both, metres down the river, share. */
-function piecesOf({ line, level, share }: ShownRiver, sizeM: number, wetness: number): number[][] {
+/** What the cells of one lattice hold, row by row from the south. */
+function latticeOf(lines: readonly Line[], sizeM: number, lattice: number): number[][] {
+  const side = RIVER_CELLS >> lattice;
+  const cellM = sizeM / side;
+  const cells: number[][] = Array.from({ length: side * side }, () => []);
+  let left = MOST_PIECES >> lattice;
+  for (const line of lines) {
+    for (const piece of piecesOf(line, lattice === 0 ? 0 : LEAST_CELLS * cellM)) {
+      for (const cell of cellsOf(piece, side, cellM)) {
+        const list = cells[cell]!;
+        if (list.length >= 2 * TEXEL * MOST_IN_CELL || left === 0) continue;
+        list.push(...piece);
+        left -= 1;
+      }
+    }
+  }
+  return cells;
+}
+
+/** A river as it is drawn: its points, metres; metres down the river and half the width at each. */
+interface Line {
+  readonly points: Float64Array;
+  readonly along: Float64Array;
+  readonly half: Float64Array;
+  readonly share: number;
+}
+
+function lineOf({ line, level, share }: ShownRiver, sizeM: number, wetness: number): Line {
   const cellM = sizeM / (TILE_CELLS << level);
-  const points = rounded(line.cells);
+  const points = rounded(line.cells).map((v) => cellM * v);
   const n = points.length / 2;
   const along = new Float64Array(n);
   for (let i = 1; i < n; i += 1)
-    along[i] =
-      along[i - 1]! + cellM * Math.hypot(points[2 * i]! - points[2 * i - 2]!, points[2 * i + 1]! - points[2 * i - 1]!);
+    along[i] = along[i - 1]! + Math.hypot(points[2 * i]! - points[2 * i - 2]!, points[2 * i + 1]! - points[2 * i - 1]!);
   const length = Math.max(along[n - 1]!, 1e-6);
   const [head, end] = line.areasM2.map(Math.log) as [number, number];
-  const half = (i: number): number => halfWidthM(Math.exp(head + ((end - head) * along[i]!) / length), wetness);
+  const half = along.map((at) => halfWidthM(Math.exp(head + ((end - head) * at) / length), wetness));
+  return { points, along, half, share };
+}
+
+/**
+ * Eight numbers each: both ends in metres; half the width at both, metres down the river, share. Points nearer than `leastM` to the one
+ * before are left out, but for the last.
+ */
+function piecesOf({ points, along, half, share }: Line, leastM: number): number[][] {
   const out = [];
-  for (let i = 1; i < n; i += 1) {
-    const [ax, ay, bx, by] = [points[2 * i - 2]!, points[2 * i - 1]!, points[2 * i]!, points[2 * i + 1]!];
-    out.push([cellM * ax, cellM * ay, cellM * bx, cellM * by, half(i - 1), half(i), along[i - 1]!, share]);
+  const n = along.length;
+  let a = 0;
+  for (let b = 1; b < n; b += 1) {
+    const [ax, ay, bx, by] = [points[2 * a]!, points[2 * a + 1]!, points[2 * b]!, points[2 * b + 1]!];
+    if (b < n - 1 && Math.hypot(bx - ax, by - ay) < leastM) continue;
+    out.push([ax, ay, bx, by, half[a]!, half[b]!, along[a]!, share]);
+    a = b;
   }
   return out;
 }
@@ -93,17 +126,16 @@ function rounded(cells: Float32Array): Float64Array {
   return Float64Array.from(out);
 }
 
-/** The cells of the lattice that a piece with its banks may reach. */
-function cellsOf([ax, ay, bx, by, ha, hb]: readonly number[], sizeM: number): number[] {
-  const cellM = sizeM / RIVER_CELLS;
+/** The cells of a lattice of `side` times `side` that a piece with its banks may reach. */
+function cellsOf([ax, ay, bx, by, ha, hb]: readonly number[], side: number, cellM: number): number[] {
   const half = Math.max(ha!, hb!);
-  const reach = half + BANK_M + 2 * BANK_WIDTHS * half + 0.25 * cellM;
-  const at = (v: number): number => Math.min(RIVER_CELLS - 1, Math.max(0, Math.floor(v / cellM)));
+  const reach = half + BANK_M + 2 * BANK_WIDTHS * half + REACH_CELLS * cellM;
+  const at = (v: number): number => Math.min(side - 1, Math.max(0, Math.floor(v / cellM)));
   const out = [];
   for (let y = at(Math.min(ay!, by!) - reach); y <= at(Math.max(ay!, by!) + reach); y += 1)
     for (let x = at(Math.min(ax!, bx!) - reach); x <= at(Math.max(ax!, bx!) + reach); x += 1)
       if (isNear([ax!, ay!, bx!, by!], (x + 0.5) * cellM, (y + 0.5) * cellM, reach + Math.SQRT1_2 * cellM))
-        out.push(y * RIVER_CELLS + x);
+        out.push(y * side + x);
   return out;
 }
 
