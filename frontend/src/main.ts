@@ -1,6 +1,7 @@
-/** The page's start: theme, then the page that the address means. The landing page never loads the 3D view. */
+/** The page's start: theme, language, then the page that the address means. The landing page never loads the 3D view. */
 
 import "./ui/styles/theme.css";
+import { startLanguage } from "./app/device/language.ts";
 import { startTheme } from "./app/device/theme.ts";
 import { route } from "./app/server/router.ts";
 
@@ -45,4 +46,4 @@ startTheme();
 // A link pasted over an open terrain changes only the fragment, which loads nothing by itself.
 window.addEventListener("hashchange", () => window.location.reload());
 window.addEventListener("popstate", () => void show());
-void show();
+void startLanguage().then(show);

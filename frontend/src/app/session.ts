@@ -3,6 +3,7 @@
  * the stage on which it is seen (stage.ts). The page's components read its signals and call its methods.
  */
 
+import { msg } from "@lit/localize";
 import { computed, effect, type ReadonlySignal, signal } from "@preact/signals-core";
 import type { DecodedFrame, RiverSet } from "../core/types.ts";
 import { type Doc, Refusal } from "../doc/document.ts";
@@ -147,12 +148,13 @@ export class TerrainSession implements OpenTerrain {
   /** Applies an op at once and sends it; a refusal becomes a toast. True when it was applied. */
   submit(op: Op, gesture?: string): boolean {
     if (this.historyView.active.peek()) {
-      this.toasts.show("This is how the terrain was. Go back to now to change it.", "warn");
+      this.toasts.show(msg("This is how the terrain was. Go back to now to change it."), "warn");
       return false;
     }
     if (!this.canEdit.value) {
       if (this.mayEdit.value) this.toasts.show(HANDS_OFF, "warn");
-      else this.toasts.show("This link lets you look, not draw. Ask for an edit link to change the terrain.", "warn");
+      else
+        this.toasts.show(msg("This link lets you look, not draw. Ask for an edit link to change the terrain."), "warn");
       return false;
     }
     const refusal = this.doc.submit(op, gesture);
@@ -169,7 +171,7 @@ export class TerrainSession implements OpenTerrain {
       return;
     }
     const run = (): void => void this.submit({ type: "stroke.restore", stroke });
-    this.toasts.show(this.#gone.words(stroke), "warn", { label: "Restore", run });
+    this.toasts.show(this.#gone.words(stroke), "warn", { label: msg("Restore"), run });
   }
 
   /** Changes fields of a stroke; one gesture is one step of undo. */
@@ -253,7 +255,7 @@ export class TerrainSession implements OpenTerrain {
       },
       ended: (why) => this.toasts.show(why, "warn"),
       // The server counts the tiles of now as held: only a new connection sends them all again.
-      back: () => this.connection.reconnect("Back to now."),
+      back: () => this.connection.reconnect(msg("Back to now.")),
     });
   }
 
@@ -291,7 +293,7 @@ export class TerrainSession implements OpenTerrain {
         const doc = this.doc.doc.value;
         const role = this.role.value;
         if (!doc || !role || this.historyView.active.value) return;
-        document.title = `${doc.settings.title || "Untitled terrain"} · Esker`;
+        document.title = `${doc.settings.title || msg("Untitled terrain")} · Esker`;
       }),
       effect(() => {
         const title = this.doc.doc.value?.settings.title;

@@ -4,6 +4,9 @@
  * order: about a millimetre where terrains reach (Karney, "Transverse Mercator with an accuracy of a few nanometers", J. Geodesy 85, 2011).
  */
 
+import { msg } from "@lit/localize";
+import { fixed } from "./language.ts";
+
 const A_M = 6_378_137;
 const F = 1 / 298.257223563;
 const N = F / (2 - F);
@@ -52,7 +55,7 @@ export function lonLatOf(
 
 /** A place in words: "46.50123° N, 8.25010° E". */
 export function lonLatWords({ latDeg, lonDeg }: LonLat): string {
-  const ns = latDeg < 0 ? "S" : "N";
-  const ew = lonDeg < 0 ? "W" : "E";
-  return `${Math.abs(latDeg).toFixed(5)}° ${ns}, ${Math.abs(lonDeg).toFixed(5)}° ${ew}`;
+  const ns = latDeg < 0 ? msg("S") : msg("N");
+  const ew = lonDeg < 0 ? msg("W") : msg("E");
+  return `${fixed(Math.abs(latDeg), 5)}° ${ns}, ${fixed(Math.abs(lonDeg), 5)}° ${ew}`;
 }

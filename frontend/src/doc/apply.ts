@@ -4,6 +4,7 @@
  * Twin of `backend/esker/document/ops.py`; `tests/vectors/ops.json` holds the cases that both languages read.
  */
 
+import { msg, str } from "@lit/localize";
 import { plainOp } from "../core/plain.ts";
 import {
   type AppendPoints,
@@ -100,13 +101,13 @@ class Editor {
     const stroke = this.strokes.get(id);
     if (stroke !== undefined) return stroke;
     if (this.deleted.has(id))
-      throw new Refusal("deleted_stroke", "This stroke was deleted. Restore it before you change it.");
-    throw new Refusal("unknown_stroke", "There is no such stroke in this terrain.");
+      throw new Refusal("deleted_stroke", msg("This stroke was deleted. Restore it before you change it."));
+    throw new Refusal("unknown_stroke", msg("There is no such stroke in this terrain."));
   }
 
   #editable(id: string): Stroke {
     const stroke = this.#live(id);
-    if (stroke.locked) throw new Refusal("locked_stroke", "This stroke is locked. Unlock it to change it.");
+    if (stroke.locked) throw new Refusal("locked_stroke", msg("This stroke is locked. Unlock it to change it."));
     return stroke;
   }
 
@@ -117,33 +118,33 @@ class Editor {
 
   #check(stroke: Stroke): void {
     if (stroke.curve.length > MAX_POINTS_PER_STROKE)
-      throw new Refusal("too_many_points", `A stroke holds at most ${MAX_POINTS_PER_STROKE} points.`);
+      throw new Refusal("too_many_points", msg(str`A stroke holds at most ${MAX_POINTS_PER_STROKE} points.`));
     const bound = DOMAIN_MARGIN * this.settings.size_m;
     const outside = (v: number): boolean => !(Math.abs(v) <= bound);
     if (stroke.first.some(outside) || stroke.last.some(outside))
-      throw new Refusal("out_of_domain", "An anchor lies farther than ten times the terrain from its corner.");
+      throw new Refusal("out_of_domain", msg("An anchor lies farther than ten times the terrain from its corner."));
     const wrong = misfit(stroke);
     if (wrong !== null) throw new Refusal("bad_field", wrong);
     if (worldPoints(stroke).some(outside))
-      throw new Refusal("out_of_domain", "A point lies farther than ten times the terrain from its corner.");
+      throw new Refusal("out_of_domain", msg("A point lies farther than ten times the terrain from its corner."));
   }
 
   #begin(stroke: Stroke): void {
     if (this.strokes.has(stroke.id) || this.deleted.has(stroke.id))
-      throw new Refusal("duplicate_stroke", "A stroke with this id exists already.");
+      throw new Refusal("duplicate_stroke", msg("A stroke with this id exists already."));
     this.#checkRoom();
     this.#put(stroke);
   }
 
   #checkRoom(): void {
     if (this.strokes.size >= MAX_STROKES)
-      throw new Refusal("too_many_strokes", `A terrain holds at most ${MAX_STROKES} strokes.`);
+      throw new Refusal("too_many_strokes", msg(str`A terrain holds at most ${MAX_STROKES} strokes.`));
   }
 
   #append(op: AppendPoints): void {
     const old = this.#editable(op.stroke);
     if (op.start > old.curve.length)
-      throw new Refusal("bad_index", "The points do not continue the stroke that the server holds.");
+      throw new Refusal("bad_index", msg("The points do not continue the stroke that the server holds."));
     const curve = op.start === 0 ? op.points : [...old.curve.slice(0, op.start), ...op.points];
     this.#put({ ...old, curve, last: op.last });
   }
@@ -152,7 +153,7 @@ class Editor {
     const old = this.#live(op.stroke);
     const update = changed(op.fields, NULLABLE_STROKE_FIELDS);
     if (old.locked && Object.keys(update).some((name) => name !== "locked"))
-      throw new Refusal("locked_stroke", "This stroke is locked. Unlock it to change it.");
+      throw new Refusal("locked_stroke", msg("This stroke is locked. Unlock it to change it."));
     const next: Stroke = { ...old, ...(update as Partial<Stroke>) };
     this.#put({ ...next, left: fullFlank(next.left), right: fullFlank(next.right), course: fullCourse(next.course) });
   }
@@ -172,9 +173,9 @@ class Editor {
   }
 
   #restore(id: string): void {
-    if (this.strokes.has(id)) throw new Refusal("duplicate_stroke", "This stroke is not deleted.");
+    if (this.strokes.has(id)) throw new Refusal("duplicate_stroke", msg("This stroke is not deleted."));
     const stroke = this.deleted.get(id);
-    if (stroke === undefined) throw new Refusal("unknown_stroke", "There is no such deleted stroke to restore.");
+    if (stroke === undefined) throw new Refusal("unknown_stroke", msg("There is no such deleted stroke to restore."));
     this.#checkRoom();
     this.#writable().deleted.delete(id);
     this.#put(stroke);

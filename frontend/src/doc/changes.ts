@@ -1,5 +1,6 @@
 /** The changes of an op, field by field, which undo remembers (`undo.ts`). Pure. */
 
+import { msg } from "@lit/localize";
 import type { Layer, Op, SetTerrain, SimpleOp, Stroke, TerrainSettings } from "../generated/contract.ts";
 import type { Doc } from "./document.ts";
 
@@ -10,35 +11,35 @@ export type Item = Stroke | Layer;
 
 /** The undoable fields of a stroke in the order in which they are restored, with the word a person reads. */
 export const STROKE_WORDS = {
-  first: "start",
-  last: "end",
-  curve: "line",
-  left: "left flank",
-  right: "right flank",
-  plateau_radius_m: "plateau radius",
-  amplitude_m: "noise amplitude",
-  roughness: "roughness",
-  yields: "yielding",
-  paint: "paint",
-  course: "course",
-  locked: "lock",
-  hidden: "visibility",
-  label: "label",
+  first: msg("start"),
+  last: msg("end"),
+  curve: msg("line"),
+  left: msg("left flank"),
+  right: msg("right flank"),
+  plateau_radius_m: msg("plateau radius"),
+  amplitude_m: msg("noise amplitude"),
+  roughness: msg("roughness"),
+  yields: msg("yielding"),
+  paint: msg("paint"),
+  course: msg("course"),
+  locked: msg("lock"),
+  hidden: msg("visibility"),
+  label: msg("label"),
 } as const;
 
 export const LAYER_WORDS = {
-  name: "name",
-  anchor: "place",
-  rotation_deg: "rotation",
-  spacing_m: "spacing",
-  scale: "vertical scale",
-  lift_m: "lift",
-  accuracy_m: "accuracy",
-  priority: "order",
-  hidden: "visibility",
-  outline: "outline",
-  source: "source",
-  licence: "licence",
+  name: msg("name"),
+  anchor: msg("place"),
+  rotation_deg: msg("rotation"),
+  spacing_m: msg("spacing"),
+  scale: msg("vertical scale"),
+  lift_m: msg("lift"),
+  accuracy_m: msg("accuracy"),
+  priority: msg("order"),
+  hidden: msg("visibility"),
+  outline: msg("outline"),
+  source: msg("source"),
+  licence: msg("licence"),
 } as const;
 
 export const WORDS: { readonly [kind in Kind]: { readonly [field: string]: string } } = {
@@ -47,25 +48,25 @@ export const WORDS: { readonly [kind in Kind]: { readonly [field: string]: strin
 };
 
 export const TERRAIN_WORDS = {
-  title: "title",
-  reach_m: "reach",
-  border: "border",
-  sea_level_m: "sea level",
-  lakes_m: "lakes",
-  rivers: "rivers",
-  wetness: "wetness",
-  seed: "seed",
-  look: "look",
-  detail: "detail",
-  rule: "rule",
-  erosion: "erosion",
-  erosion_scale: "size of the gullies",
-  hold: "hold of the crests",
-  sun_azimuth_deg: "direction of the sun",
-  sun_elevation_deg: "height of the sun",
-  place: "place on Earth",
-  task: "task",
-  task_pictures: "pictures of the task",
+  title: msg("title"),
+  reach_m: msg("reach"),
+  border: msg("border"),
+  sea_level_m: msg("sea level"),
+  lakes_m: msg("lakes"),
+  rivers: msg("rivers"),
+  wetness: msg("wetness"),
+  seed: msg("seed"),
+  look: msg("look"),
+  detail: msg("detail"),
+  rule: msg("rule"),
+  erosion: msg("erosion"),
+  erosion_scale: msg("size of the gullies"),
+  hold: msg("hold of the crests"),
+  sun_azimuth_deg: msg("direction of the sun"),
+  sun_elevation_deg: msg("height of the sun"),
+  place: msg("place on Earth"),
+  task: msg("task"),
+  task_pictures: msg("pictures of the task"),
 } as const;
 
 /** One step's changes of one stroke or layer. `content` is the item as I left it when it came to life or died. */

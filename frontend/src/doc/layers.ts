@@ -4,6 +4,7 @@
  * Twin of `backend/esker/document/layers.py`; `tests/vectors/ops.json` holds the cases that both languages read.
  */
 
+import { msg, str } from "@lit/localize";
 import {
   type AddLayer,
   type DeleteLayer,
@@ -88,8 +89,8 @@ export class LayerEditor {
     const layer = this.layers.get(id);
     if (layer !== undefined) return layer;
     if (this.deleted.has(id))
-      throw new Refusal("deleted_layer", "This layer was deleted. Restore it before you change it.");
-    throw new Refusal("unknown_layer", "There is no such elevation layer in this terrain.");
+      throw new Refusal("deleted_layer", msg("This layer was deleted. Restore it before you change it."));
+    throw new Refusal("unknown_layer", msg("There is no such elevation layer in this terrain."));
   }
 
   /** Heights that the quanta of the finest tiles could not hold are refused. */
@@ -99,10 +100,9 @@ export class LayerEditor {
     const farthest = Math.max(...[low_m, high_m].map((z) => Math.abs(layer.scale * z + layer.lift_m)));
     if (farthest > bound) {
       const needed = Math.ceil(farthest / LAYER_HEIGHT_MARGIN);
-      const sentence =
-        `Heights of this layer would reach ${farthest.toFixed(0)} metres from zero; a terrain ` +
-        `${this.#sizeM.toFixed(0)} metres wide holds ${bound.toFixed(0)}. Lower it, or make a terrain of at least ` +
-        `${needed.toFixed(0)} metres.`;
+      const sentence = msg(
+        str`Heights of this layer would reach ${farthest.toFixed(0)} metres from zero; a terrain ${this.#sizeM.toFixed(0)} metres wide holds ${bound.toFixed(0)}. Lower it, or make a terrain of at least ${needed.toFixed(0)} metres.`,
+      );
       throw new Refusal("out_of_domain", sentence);
     }
     this.#writable().layers.set(layer.id, layer);
@@ -110,12 +110,12 @@ export class LayerEditor {
 
   #checkRoom(): void {
     if (this.layers.size >= MAX_LAYERS)
-      throw new Refusal("too_many_layers", `A terrain holds at most ${MAX_LAYERS} elevation layers.`);
+      throw new Refusal("too_many_layers", msg(str`A terrain holds at most ${MAX_LAYERS} elevation layers.`));
   }
 
   #add(layer: Layer): void {
     if (this.layers.has(layer.id) || this.deleted.has(layer.id))
-      throw new Refusal("duplicate_layer", "A layer with this id exists already.");
+      throw new Refusal("duplicate_layer", msg("A layer with this id exists already."));
     this.#checkRoom();
     this.#put(layer);
   }
@@ -132,9 +132,9 @@ export class LayerEditor {
   }
 
   #restore(id: string): void {
-    if (this.layers.has(id)) throw new Refusal("duplicate_layer", "This layer is not deleted.");
+    if (this.layers.has(id)) throw new Refusal("duplicate_layer", msg("This layer is not deleted."));
     const layer = this.deleted.get(id);
-    if (layer === undefined) throw new Refusal("unknown_layer", "There is no such deleted layer to restore.");
+    if (layer === undefined) throw new Refusal("unknown_layer", msg("There is no such deleted layer to restore."));
     this.#checkRoom();
     this.#writable().deleted.delete(id);
     this.#put(layer);

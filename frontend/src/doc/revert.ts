@@ -1,5 +1,6 @@
 /** Taking one change of a stroke or a layer back in the present document: the inner half of `undo.ts`. */
 
+import { msg, str } from "@lit/localize";
 import {
   type LayerFields,
   MAX_OPS_PER_GROUP,
@@ -14,6 +15,8 @@ import type { Doc } from "./document.ts";
 
 /** A longer curve is restored by appends, since one message of 64 KiB does not hold it. */
 const LARGE_CURVE_POINTS = 1024;
+
+const KINDS: Readonly<Record<Kind, string>> = { stroke: msg("stroke"), layer: msg("layer") };
 
 /**
  * Takes back one change. Strokes and layers share this: ops that do it are appended to `ops`, sentences about the rest
@@ -49,7 +52,9 @@ abstract class Reverter {
     else if (before === "live" && after === "deleted") this.#bringBack();
     else if (before === "live" && after === "live") {
       if (this.item === null || this.#state !== "live")
-        this.skipped.push(`Somebody else has deleted this ${this.#kind} since; your change of it was not undone.`);
+        this.skipped.push(
+          msg(str`Somebody else has deleted this ${KINDS[this.#kind]} since; your change of it was not undone.`),
+        );
       else this.putBack();
     }
     // Anything else was made and taken away within one step: nothing is left of it.
@@ -58,21 +63,21 @@ abstract class Reverter {
   #takeAway(): void {
     const { item, change } = this;
     if (item === null || this.#state !== "live") {
-      this.skipped.push(`This ${this.#kind} is deleted already.`);
+      this.skipped.push(msg(str`This ${KINDS[this.#kind]} is deleted already.`));
       return;
     }
     const content = change.content;
     const names = Object.keys(WORDS[this.#kind]);
     if (content === null || names.some((name) => !same(fieldOf(item, name), fieldOf(content, name)))) {
-      this.skipped.push(`Somebody else has changed this ${this.#kind} since; it was kept.`);
+      this.skipped.push(msg(str`Somebody else has changed this ${KINDS[this.#kind]} since; it was kept.`));
       return;
     }
     this.remove(change.before === "deleted" && change.fields.size > 0);
   }
 
   #bringBack(): void {
-    if (this.item === null) this.skipped.push(`This ${this.#kind} can no longer be restored.`);
-    else if (this.#state === "live") this.skipped.push(`This ${this.#kind} is back already.`);
+    if (this.item === null) this.skipped.push(msg(str`This ${KINDS[this.#kind]} can no longer be restored.`));
+    else if (this.#state === "live") this.skipped.push(msg(str`This ${KINDS[this.#kind]} is back already.`));
     else {
       this.restore();
       this.putBack();
@@ -86,7 +91,10 @@ abstract class Reverter {
       const change = this.change.fields.get(name);
       if (change === undefined) continue;
       if (same(fieldOf(item, name), change[1])) update[name] = change[0];
-      else this.skipped.push(`Somebody else has changed the ${word} of this ${this.#kind} since; that was kept.`);
+      else
+        this.skipped.push(
+          msg(str`Somebody else has changed the ${word} of this ${KINDS[this.#kind]} since; that was kept.`),
+        );
     }
     return update;
   }
@@ -139,7 +147,7 @@ export class StrokeReverter extends Reverter {
     const update: StrokeFields = this.restorable(stroke);
     if (stroke.locked && Object.keys(update).length > 0) {
       if (update.locked === undefined) {
-        this.skipped.push("Somebody else has locked this stroke since; it was kept.");
+        this.skipped.push(msg("Somebody else has locked this stroke since; it was kept."));
         return true;
       }
       this.#set({ locked: update.locked });

@@ -1,5 +1,6 @@
 /** Strokes as geometry: frames, world points, bounds (DESIGN 4). Twin of `backend/esker/document/strokes.py`. Pure. */
 
+import { msg, str } from "@lit/localize";
 import { type Flank, MAX_COURSE_POINTS, type Stroke } from "../generated/contract.ts";
 
 /** An anchor: x, y, z in metres. */
@@ -68,14 +69,14 @@ export function levelCurve(points: ArrayLike<number>, first: Anchor, last: Ancho
 /** What is wrong with the fields of a stroke of its kind, for a person; null when nothing is. */
 export function misfit(stroke: Stroke): string | null {
   if ((stroke.kind === "paint") !== (stroke.paint !== null))
-    return "A paint stroke needs 'paint' (channel, value, radius), and only a paint stroke.";
+    return msg("A paint stroke needs 'paint' (channel, value, radius), and only a paint stroke.");
   if ((stroke.kind === "course") !== (stroke.course !== null))
-    return "A course needs 'course' (use, heights), and only a course.";
+    return msg("A course needs 'course' (use, heights), and only a course.");
   if (stroke.course === null) return null;
-  if (stroke.curve.length > MAX_COURSE_POINTS) return `A course holds at most ${MAX_COURSE_POINTS} points.`;
+  if (stroke.curve.length > MAX_COURSE_POINTS) return msg(str`A course holds at most ${MAX_COURSE_POINTS} points.`);
   const { rises } = stroke.course;
   if (stroke.course.use === "river" && rises.some((rise, i) => i > 0 && rise > rises[i - 1]!))
-    return "A river never rises along its way.";
+    return msg("A river never rises along its way.");
   return null;
 }
 

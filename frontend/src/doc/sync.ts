@@ -6,6 +6,7 @@
  * `outgoing()` to the socket and messages back, and the clock is injected.
  */
 
+import { msg, str } from "@lit/localize";
 import { type ReadonlySignal, signal } from "@preact/signals-core";
 import { checkOp } from "../core/wire.ts";
 import {
@@ -137,8 +138,9 @@ export class SyncDoc {
    */
   submit(op: Op, gesture?: string): Refusal | null {
     const before = this.#present;
-    if (before === null) return new Refusal("unavailable", "The terrain is still loading.");
-    if (this.#past !== null) return new Refusal("view_only", "This is the past: go back to now to change the terrain.");
+    if (before === null) return new Refusal("unavailable", msg("The terrain is still loading."));
+    if (this.#past !== null)
+      return new Refusal("view_only", msg("This is the past: go back to now to change the terrain."));
     const refusal = this.#enqueue(op, gesture ?? null, (id) => {
       this.#undo.record(before, op, this.#present!, gesture ?? null, id);
     });
@@ -268,8 +270,8 @@ export class SyncDoc {
 
   #enqueue(op: Op, gesture: string | null, record: (id: string) => void): Refusal | null {
     const wrong = checkOp(op);
-    if (wrong !== null) return new Refusal("malformed", `This cannot be done: ${wrong}.`);
-    if (sizeOf(op) > MESSAGE_BYTES) return new Refusal("too_large", "This change is too large for one message.");
+    if (wrong !== null) return new Refusal("malformed", msg(str`This cannot be done: ${wrong}.`));
+    if (sizeOf(op) > MESSAGE_BYTES) return new Refusal("too_large", msg("This change is too large for one message."));
     try {
       this.#present = apply(this.#present!, op);
     } catch (error) {

@@ -6,6 +6,7 @@
  * has changed it since it is kept and reported. Twin of `backend/esker/document/undo.py` (`tests/vectors/undo.json`).
  */
 
+import { msg, str } from "@lit/localize";
 import type { Op, SetTerrain, SimpleOp, TerrainSettings } from "../generated/contract.ts";
 import { apply, type Doc, Refusal } from "./apply.ts";
 import { type Changes, changes, isEmpty, merge, same, TERRAIN_WORDS } from "./changes.ts";
@@ -36,7 +37,7 @@ export function plan(done: Changes, present: Doc): UndoPlan {
     const change = done.terrain.get(name);
     if (change === undefined) continue;
     if (same(present.settings[name as keyof TerrainSettings], change[1])) fields[name] = change[0];
-    else skipped.push(`Somebody else has changed the ${word} of the terrain since; that was kept.`);
+    else skipped.push(msg(str`Somebody else has changed the ${word} of the terrain since; that was kept.`));
   }
   if (Object.keys(fields).length > 0) ops.push({ type: "terrain.set", fields: fields as SetTerrain["fields"] });
   return { ops: grouped(ops), skipped };

@@ -1,5 +1,7 @@
 /** Asking for a WebGPU device, with a reason a person can read when there is none. */
 
+import { msg, str } from "@lit/localize";
+
 /** No WebGPU here; `message` says why, in words for the page. */
 export class NoWebGpu extends Error {
   override readonly name = "NoWebGpu";
@@ -26,10 +28,10 @@ const SOFTWARE = /swiftshader|llvmpipe|lavapipe|software|basic render/i;
 
 async function requestAdapter(): Promise<{ adapter: GPUAdapter; core: boolean }> {
   if (!globalThis.isSecureContext) {
-    throw new NoWebGpu("The 3D view needs a secure page: open this terrain over https or on localhost.");
+    throw new NoWebGpu(msg("The 3D view needs a secure page: open this terrain over https or on localhost."));
   }
   const gpu = navigator.gpu as GPU | undefined;
-  if (gpu === undefined) throw new NoWebGpu("This browser has no WebGPU; the map view is shown instead.");
+  if (gpu === undefined) throw new NoWebGpu(msg("This browser has no WebGPU; the map view is shown instead."));
   // Full WebGPU where it exists; else what older devices offer. Some browsers refuse the unknown option.
   for (const featureLevel of ["core", "compatibility"]) {
     try {
@@ -40,7 +42,7 @@ async function requestAdapter(): Promise<{ adapter: GPUAdapter; core: boolean }>
       if (adapter !== null) return { adapter, core: true };
     }
   }
-  throw new NoWebGpu("WebGPU found no graphics device it can use; the map view is shown instead.");
+  throw new NoWebGpu(msg("WebGPU found no graphics device it can use; the map view is shown instead."));
 }
 
 /** Device and canvas context. Throws `NoWebGpu`. */
@@ -50,10 +52,10 @@ export async function openGpu(canvas: HTMLCanvasElement): Promise<Gpu> {
   try {
     device = await adapter.requestDevice({ label: "esker" });
   } catch (error) {
-    throw new NoWebGpu(`The graphics device could not be opened (${String(error)}).`);
+    throw new NoWebGpu(msg(str`The graphics device could not be opened (${String(error)}).`));
   }
   const context = canvas.getContext("webgpu");
-  if (context === null) throw new NoWebGpu("The canvas cannot show WebGPU.");
+  if (context === null) throw new NoWebGpu(msg("The canvas cannot show WebGPU."));
   const format = navigator.gpu.getPreferredCanvasFormat();
   context.configure({
     device,

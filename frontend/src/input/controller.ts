@@ -5,6 +5,7 @@
  * camera. A second finger, or Esc, ends it. Events come in CSS pixels and become device pixels here, at the DOM's edge.
  */
 
+import { msg, str } from "@lit/localize";
 import { computed, type ReadonlySignal, type Signal, signal } from "@preact/signals-core";
 import type { Camera } from "../core/camera/camera.ts";
 import type { GhostVisual, Ground, Vec3 } from "../core/types.ts";
@@ -63,9 +64,9 @@ interface Main {
 /** CSS pixels a pointer may tremble within a click. */
 const CLICK_PX = 4;
 const FLUSH: Readonly<Record<Exclude<ToolId, "select" | "paint" | "course">, string>> = {
-  mountain: "This line lies on the ground. Draw it up into the air, or drag its middle handle up.",
-  crevice: "This line lies on the ground. Draw it as a hollow, or drag its middle handle down.",
-  plateau: "This plateau lies level with the ground. Drag its handle up to raise it.",
+  mountain: msg("This line lies on the ground. Draw it up into the air, or drag its middle handle up."),
+  crevice: msg("This line lies on the ground. Draw it as a hollow, or drag its middle handle down."),
+  plateau: msg("This plateau lies level with the ground. Drag its handle up to raise it."),
 };
 
 export class InputController {
@@ -353,7 +354,7 @@ export class InputController {
     if (activity.kind === "draw") this.#strokes.cancel();
     if (activity.kind === "refused" && this.ruler.kind.value !== null) this.#o.onMessage(activity.notice);
     if (activity.kind === "measure" && !this.ruler.add(activity.from))
-      this.#o.onMessage(`A line has at most ${MOST_POINTS} points.`);
+      this.#o.onMessage(msg(str`A line has at most ${MOST_POINTS} points.`));
     if (activity.kind === "redraw") this.#oversketch.cancel();
     if (activity.kind === "drag") this.#handleSet.cancel();
     if (e.button !== 0 || activity.kind === "drag" || activity.kind === "navigate") return;

@@ -3,6 +3,7 @@
  * pointer moves.
  */
 
+import { msg } from "@lit/localize";
 import type { ReadonlySignal } from "@preact/signals-core";
 import type { Camera } from "../core/camera/camera.ts";
 import type { Ground, Vec3 } from "../core/types.ts";
@@ -70,9 +71,9 @@ const PICKS: Readonly<Record<ToolId, PickOrder>> = {
   paint: ["paint"],
   course: ["land"],
 };
-const VIEW_ONLY = "This link lets you look, not draw. Ask for an edit link to change the terrain.";
-const LOCKED = "This stroke is locked. Unlock it to change it.";
-const OFF_LAND = "Begin the line on the land.";
+const VIEW_ONLY = msg("This link lets you look, not draw. Ask for an edit link to change the terrain.");
+const LOCKED = msg("This stroke is locked. Unlock it to change it.");
+const OFF_LAND = msg("Begin the line on the land.");
 
 export class PointerActions {
   readonly #c: PressContext;

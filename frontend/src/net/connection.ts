@@ -3,6 +3,7 @@
  * and reconnecting with jittered backoff. It knows nothing of documents or tiles; the owner connects it to both.
  */
 
+import { msg, str } from "@lit/localize";
 import { type ReadonlySignal, signal } from "@preact/signals-core";
 import type { DecodedFrame } from "../core/types.ts";
 import { checkClientMessage } from "../core/wire.ts";
@@ -42,21 +43,21 @@ const WELCOME_WITHIN_MS = 10_000;
 const CROWDED_BYTES = 256 * 1024;
 
 const SENTENCES: Readonly<Record<CloseCode, string>> = {
-  bad_protocol: "The server speaks another version of Esker. Reload this page.",
-  bad_hello: "The server did not understand this page. Reload it.",
-  bad_secret: "This link is not valid. Ask for a new one.",
-  revoked: "This link has been revoked. Ask for a new one.",
-  no_terrain: "There is no such terrain on this server.",
-  room_full: "This terrain is full at the moment. Try again later.",
-  too_large: "This page sent a message that is too large. Reload it.",
-  malformed: "The server did not understand this page. Reload it.",
-  slow_client: "The connection was too slow to keep up.",
-  rate_limited: "This page sent too much at once.",
-  removed: "You were sent out of this terrain. Ask whoever leads it to let you in.",
-  bad_origin: "This page does not come from the server that it talks to.",
-  server_error: "The server had a problem.",
-  shutting_down: "The server is restarting.",
-  moved: "This terrain moves to another server.",
+  bad_protocol: msg("The server speaks another version of Esker. Reload this page."),
+  bad_hello: msg("The server did not understand this page. Reload it."),
+  bad_secret: msg("This link is not valid. Ask for a new one."),
+  revoked: msg("This link has been revoked. Ask for a new one."),
+  no_terrain: msg("There is no such terrain on this server."),
+  room_full: msg("This terrain is full at the moment. Try again later."),
+  too_large: msg("This page sent a message that is too large. Reload it."),
+  malformed: msg("The server did not understand this page. Reload it."),
+  slow_client: msg("The connection was too slow to keep up."),
+  rate_limited: msg("This page sent too much at once."),
+  removed: msg("You were sent out of this terrain. Ask whoever leads it to let you in."),
+  bad_origin: msg("This page does not come from the server that it talks to."),
+  server_error: msg("The server had a problem."),
+  shutting_down: msg("The server is restarting."),
+  moved: msg("This terrain moves to another server."),
 };
 
 const SERVER_TYPES: ReadonlySet<string> = new Set<ServerMessage["type"]>([
@@ -137,7 +138,7 @@ export class Connection {
   }
 
   /** Drops the present socket and connects anew, as after a document that diverged. */
-  reconnect(reason = "The connection is being renewed."): void {
+  reconnect(reason = msg("The connection is being renewed.")): void {
     if (this.#state.value === "closed") return;
     this.#detach();
     this.#reconnecting(reason);
@@ -158,7 +159,7 @@ export class Connection {
     try {
       socket = new WebSocket(this.#options.url, SUBPROTOCOL);
     } catch (error) {
-      this.#finish(`This address cannot be reached: ${error instanceof Error ? error.message : String(error)}`);
+      this.#finish(msg(str`This address cannot be reached: ${error instanceof Error ? error.message : String(error)}`));
       return;
     }
     socket.binaryType = "arraybuffer";
@@ -225,13 +226,13 @@ export class Connection {
     const now = performance.now();
     if (this.#state.value === "online") {
       if (this.#askedAt !== null && now - this.#askedAt > SILENCE_MS && now - this.#heardAt > SILENCE_MS) {
-        this.reconnect("The connection went silent.");
+        this.reconnect(msg("The connection went silent."));
         return;
       }
       this.#ping();
     } else if (now - this.#heardAt > WELCOME_WITHIN_MS) {
       this.#detach();
-      this.#reconnecting("The server does not answer.");
+      this.#reconnecting(msg("The server does not answer."));
       this.#schedule(this.#backoff());
     }
   }
@@ -241,11 +242,11 @@ export class Connection {
     const sentence = this.#lastWords ?? (name === undefined ? null : SENTENCES[name]);
     this.#detach();
     if (isFinal(code)) {
-      this.#finish(sentence ?? `The server closed the connection (${code}).`);
+      this.#finish(sentence ?? msg(str`The server closed the connection (${code}).`));
       return;
     }
     this.#reconnecting(
-      sentence ?? (this.#attempt === 0 ? "The connection was lost." : "The server cannot be reached."),
+      sentence ?? (this.#attempt === 0 ? msg("The connection was lost.") : msg("The server cannot be reached.")),
     );
     // Nothing is wrong: the terrain is elsewhere in a moment. Whoever comes back to where it still moves waits longer.
     const moved = code === WS_CLOSE.moved && this.#attempt === 0;
@@ -258,7 +259,7 @@ export class Connection {
     if (this.#socket === null) return;
     console.warn(`Connection reset: ${what}`);
     this.#detach();
-    this.#reconnecting("The connection was disturbed.");
+    this.#reconnecting(msg("The connection was disturbed."));
     this.#schedule(this.#backoff());
   }
 

@@ -3,6 +3,7 @@
  * for as long as the words and the next line leaves room. Pure: from held tiles and a camera to a short list.
  */
 
+import { fixed } from "../core/language.ts";
 import type { CameraState, Tile, TileView } from "../core/types.ts";
 import { TILE_CELLS, TILE_SAMPLES } from "../generated/contract.ts";
 import { flatSlope, INDEX_EVERY } from "./flat.ts";
@@ -45,7 +46,7 @@ interface Candidate extends ContourLabel {
 export function heightText(z: number, everyM: number): string {
   let digits = 0;
   while (digits < 6 && Math.abs(everyM * 10 ** digits - Math.round(everyM * 10 ** digits)) > 1e-6) digits += 1;
-  const text = (z === 0 ? 0 : z).toFixed(digits);
+  const text = fixed(z, digits);
   return `${text.startsWith("-") ? `−${text.slice(1)}` : text} m`;
 }
 

@@ -1,5 +1,6 @@
 /** How finely this device draws: a choice of this browser, not of the terrain. */
 
+import { msg } from "@lit/localize";
 import { type ReadonlySignal, signal } from "@preact/signals-core";
 import type { QualityMode } from "../../core/types.ts";
 import { DEFAULT_TAU_PX } from "../../generated/contract.ts";
@@ -17,10 +18,10 @@ export const TAU_PX: Readonly<Record<QualityMode, number>> = {
 
 /** The choices in the order of the menu. */
 export const QUALITIES: readonly { readonly value: QualityMode; readonly label: string; readonly title: string }[] = [
-  { value: "automatic", label: "Automatic", title: "As fine as this device can draw smoothly" },
-  { value: "fast", label: "Fast", title: "Coarser ground, lower resolution while the view moves" },
-  { value: "balanced", label: "Balanced", title: "Some detail, whatever the frame rate" },
-  { value: "fine", label: "Fine", title: "The finest ground at full resolution, whatever the frame rate" },
+  { value: "automatic", label: msg("Automatic"), title: msg("As fine as this device can draw smoothly") },
+  { value: "fast", label: msg("Fast"), title: msg("Coarser ground, lower resolution while the view moves") },
+  { value: "balanced", label: msg("Balanced"), title: msg("Some detail, whatever the frame rate") },
+  { value: "fine", label: msg("Fine"), title: msg("The finest ground at full resolution, whatever the frame rate") },
 ];
 
 export class QualityChoice {

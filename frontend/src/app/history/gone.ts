@@ -1,5 +1,6 @@
 /** Strokes that others deleted: who did, and the way back, for whoever had one in hand. */
 
+import { msg, str } from "@lit/localize";
 import type { Member, Op, OpsBroadcast } from "../../generated/contract.ts";
 import { memberName } from "../device/names.ts";
 
@@ -15,7 +16,7 @@ export class GoneStrokes {
       for (const stroke of deletedBy(op)) {
         const member = members.find((m) => m.client === author);
         this.#by.delete(stroke);
-        this.#by.set(stroke, author === me ? "You" : member ? memberName(member) : "Somebody who has left");
+        this.#by.set(stroke, author === me ? msg("You") : member ? memberName(member) : msg("Somebody who has left"));
       }
     for (const stroke of this.#by.keys()) {
       if (this.#by.size <= MOST) break;
@@ -25,7 +26,7 @@ export class GoneStrokes {
 
   /** "Ana deleted this stroke." */
   words(stroke: string): string {
-    return `${this.#by.get(stroke) ?? "Somebody"} deleted this stroke.`;
+    return msg(str`${this.#by.get(stroke) ?? msg("Somebody")} deleted this stroke.`);
   }
 }
 

@@ -1,5 +1,6 @@
 /** Showing earlier states one by one: a click on the list, the slider, a time lapse, a copy. */
 
+import { msg } from "@lit/localize";
 import { type ReadonlySignal, signal } from "@preact/signals-core";
 import { ApiError, api } from "../server/api.ts";
 import { terrainPath } from "../server/links.ts";
@@ -77,7 +78,7 @@ export class TimeLapse {
       const { id, secret } = await api.fork(terrain.id, terrain.secret, clock);
       window.location.assign(terrainPath(id, secret));
     } catch (error) {
-      terrain.toasts.show(error instanceof ApiError ? error.message : "The copy failed. Try again.", "warn");
+      terrain.toasts.show(error instanceof ApiError ? error.message : msg("The copy failed. Try again."), "warn");
     } finally {
       this.copying.value = false;
     }

@@ -3,7 +3,9 @@
  * DOM: what carries requests to the server and what saves the file are given to it.
  */
 
+import { msg, str } from "@lit/localize";
 import { type ReadonlySignal, signal } from "@preact/signals-core";
+import { fixed, plain } from "../../core/language.ts";
 import {
   EXPORT_LEVELS,
   EXPORT_MAP_SAMPLES,
@@ -217,7 +219,7 @@ export class Exporter {
 
   #fail(error: unknown): void {
     clearTimeout(this.#timer);
-    this.#problem.value = error instanceof ApiError ? error.message : "Something went wrong. Export again.";
+    this.#problem.value = error instanceof ApiError ? error.message : msg("Something went wrong. Export again.");
     this.#phase.value = "failed";
   }
 
@@ -260,17 +262,17 @@ export class Exporter {
 
 /** The work as a person reads it. */
 export function exportWords(phase: ExportPhase, status: ExportStatus | null): string {
-  if (phase === "load") return "Downloading the file…";
+  if (phase === "load") return msg("Downloading the file…");
   const per = ` ${Math.round(100 * (status?.share ?? 0))} %`;
   switch (status?.stage) {
     case "solving":
-      return `Computing the ground…${per}`;
+      return msg(str`Computing the ground…${per}`);
     case "detail":
-      return `Adding the fine detail…${per}`;
+      return msg(str`Adding the fine detail…${per}`);
     case "writing":
-      return `Writing the file…${per}`;
+      return msg(str`Writing the file…${per}`);
     default:
-      return status?.text || "Waiting for the server…";
+      return status?.text || msg("Waiting for the server…");
   }
 }
 
@@ -278,15 +280,15 @@ export function exportWords(phase: ExportPhase, status: ExportStatus | null): st
 export function bytesWords(bytes: number): string {
   if (bytes < 1e6) return `${Math.max(1, Math.round(bytes / 1e3))} kB`;
   const mega = bytes / 1e6;
-  return `${mega < 10 ? mega.toFixed(1) : mega.toFixed(0)} MB`;
+  return `${fixed(mega, mega < 10 ? 1 : 0)} MB`;
 }
 
 /** A wait in seconds, roughly. */
 export function waitWords(seconds: number): string {
-  if (seconds < 8) return "a few seconds";
-  if (seconds < 55) return `${Math.round(seconds / 5) * 5} seconds`;
+  if (seconds < 8) return msg("a few seconds");
+  if (seconds < 55) return msg(str`${Math.round(seconds / 5) * 5} seconds`);
   const minutes = Math.round(seconds / 60);
-  return minutes <= 1 ? "a minute" : `${minutes} minutes`;
+  return minutes <= 1 ? msg("a minute") : msg(str`${minutes} minutes`);
 }
 
 /** How engines are to be set so that a heightmap of 16 bits has its true size: see docs/exporting.md. */
@@ -294,10 +296,10 @@ export function engineWords({ low_m, high_m, spacing_m }: ExportStatus, samples:
   const across = trim(spacing_m * 100, 4);
   const width = trim(spacing_m * (samples - 1), 2);
   return [
-    `0 is ${trim(low_m, 3)} m, 65535 is ${trim(high_m, 3)} m; north is up`,
-    `Unreal: scale ${across}, ${across}, ${trim((100 * (high_m - low_m) * 128) / 65535, 4)}`,
-    `Unity: width and length ${width}, height ${trim(high_m - low_m, 3)}, position y ${trim(low_m, 3)}`,
+    msg(str`0 is ${trim(low_m, 3)} m, 65535 is ${trim(high_m, 3)} m; north is up`),
+    msg(str`Unreal: scale ${across}, ${across}, ${trim((100 * (high_m - low_m) * 128) / 65535, 4)}`),
+    msg(str`Unity: width and length ${width}, height ${trim(high_m - low_m, 3)}, position y ${trim(low_m, 3)}`),
   ];
 }
 
-const trim = (x: number, digits: number): string => String(Number(x.toFixed(digits)));
+const trim = (x: number, digits: number): string => plain(Number(x.toFixed(digits)));

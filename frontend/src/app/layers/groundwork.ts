@@ -3,6 +3,7 @@
  * what of it is drawn on the ground.
  */
 
+import { msg, str } from "@lit/localize";
 import { computed, effect, type ReadonlySignal, type Signal, signal } from "@preact/signals-core";
 import type { Camera } from "../../core/camera/camera.ts";
 import { cornersOf, type Point, rounded } from "../../core/lattice.ts";
@@ -43,7 +44,7 @@ export interface GroundworkOptions {
 /** A grid without a size begins as large as the terrain; one that comes on top of others as large as this share of it. */
 const LATER_SHARE = 0.4;
 
-export const VIEW_ONLY = "This link lets you look, not change. Ask for an edit link to bring in real ground.";
+export const VIEW_ONLY = msg("This link lets you look, not change. Ask for an edit link to bring in real ground.");
 
 const NONE: readonly FootprintVisual[] = [];
 
@@ -139,7 +140,9 @@ export class Groundwork {
       return;
     }
     this.asking.value += 1;
-    this.#o.say(left.length === 1 ? "One question about the file first." : "A few questions about the file first.");
+    this.#o.say(
+      left.length === 1 ? msg("One question about the file first.") : msg("A few questions about the file first."),
+    );
   }
 
   /** Sends the answers, with the place where the grid is laid by hand. */
@@ -177,7 +180,7 @@ export class Groundwork {
       },
       () => {
         placing.value = null;
-        say(`“${layerName(layer)}” stays here.`);
+        say(msg(str`“${layerName(layer)}” stays here.`));
       },
     );
   }
@@ -218,15 +221,15 @@ export class Groundwork {
     const arriving = this.#arriving.peek();
     if (arriving === null || progress === null || !progress.settled || progress.clock < arriving.clock) return;
     this.#arriving.value = null;
-    this.#o.say(`${arriving.file} is part of the ground now.`);
+    this.#o.say(msg(str`${arriving.file} is part of the ground now.`));
   }
 
   /** A sentence about my import that is on its way, until its ground is there; null without one. */
   get onItsWay(): string | null {
     const job = this.imports.jobs.value.find((j) => j.phase === "upload" || j.phase === "work");
-    if (job) return `${job.file} is on its way, ${Math.round(100 * job.share)} %`;
+    if (job) return msg(str`${job.file} is on its way, ${Math.round(100 * job.share)} %`);
     const arriving = this.#arriving.value;
-    return arriving && `The ground of ${arriving.file} is on its way…`;
+    return arriving && msg(str`The ground of ${arriving.file} is on its way…`);
   }
 
   /** A file that is to be laid by hand takes the pointer, until it is placed or its import is over. */
@@ -263,7 +266,7 @@ export class Groundwork {
       () => this.#place(current()),
       () => {
         this.imports.cancel(job.key);
-        this.#o.say(`${job.file} was not laid. Drop it again to begin anew.`);
+        this.#o.say(msg(str`${job.file} was not laid. Drop it again to begin anew.`));
       },
     );
   }

@@ -1,5 +1,6 @@
 /** The questions of an import as the page understands them (`backend/esker/importing/questions.py`). Pure. */
 
+import { msg, str } from "@lit/localize";
 import type { ImportQuestion } from "../../generated/contract.ts";
 
 /** Asked of a grid that says nothing of where it lies or how large it is. */
@@ -66,19 +67,19 @@ export function reliefRange(sideM: number): string {
 
 const WORDS: Readonly<Record<string, Readonly<Record<string, string>>>> = {
   place: {
-    middle: "I lay it on the terrain by hand",
-    stop: "Do not bring it in",
-    "EPSG:4326": "Degrees of latitude and longitude (EPSG:4326)",
+    middle: msg("I lay it on the terrain by hand"),
+    stop: msg("Do not bring it in"),
+    "EPSG:4326": msg("Degrees of latitude and longitude (EPSG:4326)"),
   },
-  imagery: { elevation: "Take it as elevation", stop: "Do not bring it in" },
-  nodata: { none: "No, they are heights" },
-  height: { shift: "Yes, shift all its heights", stop: "Do not bring it in" },
+  imagery: { elevation: msg("Take it as elevation"), stop: msg("Do not bring it in") },
+  nodata: { none: msg("No, they are heights") },
+  height: { shift: msg("Yes, shift all its heights"), stop: msg("Do not bring it in") },
 };
 
 /** An option as a person reads it. */
 export function optionWords(question: string, option: string): string {
   const words = WORDS[question]?.[option];
   if (words !== undefined) return words;
-  if (question === "nodata") return `Yes, leave out ${option}`;
-  return option.length > 0 ? option[0]!.toUpperCase() + option.slice(1) : "Nothing";
+  if (question === "nodata") return msg(str`Yes, leave out ${option}`);
+  return option.length > 0 ? option[0]!.toUpperCase() + option.slice(1) : msg("Nothing");
 }

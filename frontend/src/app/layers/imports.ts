@@ -3,6 +3,7 @@
  * other, as the server takes them. Knows no DOM; what carries it to the server is given.
  */
 
+import { msg, str } from "@lit/localize";
 import { type ReadonlySignal, signal } from "@preact/signals-core";
 import { ENDED_IMPORT, type ImportAnswers, type ImportStatus, MAX_GRID_BYTES } from "../../generated/contract.ts";
 import { ApiError } from "../server/api.ts";
@@ -78,8 +79,12 @@ export class Imports {
     for (const file of files) {
       const key = this.#begin(file, file.name, file.size, "waiting");
       if (file.size > MAX_GRID_BYTES)
-        this.#end(key, "refused", `This file is larger than ${MAX_GRID_BYTES >> 20} MB. Cut it, or make it coarser.`);
-      else if (file.size === 0) this.#end(key, "refused", "This file is empty.");
+        this.#end(
+          key,
+          "refused",
+          msg(str`This file is larger than ${MAX_GRID_BYTES >> 20} MB. Cut it, or make it coarser.`),
+        );
+      else if (file.size === 0) this.#end(key, "refused", msg("This file is empty."));
     }
     this.#startNext();
   }
@@ -94,7 +99,7 @@ export class Imports {
   /** Sends answers. A sentence when the server does not take them, else null. */
   async answer(key: number, answers: ImportAnswers): Promise<string | null> {
     const id = this.#job(key)?.status?.id;
-    if (id === undefined) return "This import is over.";
+    if (id === undefined) return msg("This import is over.");
     try {
       const status = await this.#transport.answer(id, answers);
       // A poll that was under way must not bring the question back.
@@ -194,7 +199,8 @@ export class Imports {
     if (status.stage === "done") {
       this.#end(key, "done", "");
       this.#onDone(this.#job(key)!);
-    } else if (status.stage === "refused") this.#end(key, "refused", problem || "The server could not use this file.");
+    } else if (status.stage === "refused")
+      this.#end(key, "refused", problem || msg("The server could not use this file."));
     else if (status.stage === "cancelled") this.#end(key, "cancelled", status.text);
     else {
       clearTimeout(running.timer);
@@ -229,5 +235,5 @@ function phaseOf({ stage }: ImportStatus): ImportPhase {
 }
 
 function sentence(error: unknown): string {
-  return error instanceof ApiError ? error.message : "Something went wrong. Drop the file again.";
+  return error instanceof ApiError ? error.message : msg("Something went wrong. Drop the file again.");
 }

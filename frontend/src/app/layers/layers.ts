@@ -1,5 +1,7 @@
 /** Elevation layers as the page orders, names and colours them. Pure. */
 
+import { msg, str } from "@lit/localize";
+import { fixed, grouped, significant } from "../../core/language.ts";
 import { extentOf } from "../../core/lattice.ts";
 import type { ImportReport, Layer, SimpleOp } from "../../generated/contract.ts";
 import { metres } from "../words/words.ts";
@@ -47,17 +49,17 @@ export function reorderOps(ordered: readonly Layer[], id: string, to: number): S
 
 /** The name that people see. */
 export function layerName(layer: Layer): string {
-  return layer.name || layer.facts.file || "Elevation grid";
+  return layer.name || layer.facts.file || msg("Elevation grid");
 }
 
 /** A height in whole metres with a real minus. */
 export const wholeMetres = (m: number): string => `${m < 0 ? "−" : ""}${Math.abs(Math.round(m))} m`;
 
-const count = (n: number): string => n.toLocaleString("en").replaceAll(",", " ");
+const count = (n: number): string => grouped(n);
 
 /** Spacing in words; anisotropic ones with both numbers. */
 export function spacingWords([sx, sy]: readonly [number, number]): string {
-  const one = (v: number): string => Number(v.toPrecision(3)).toString();
+  const one = (v: number): string => significant(v, 3);
   return Math.abs(sx - sy) < 0.01 * sx ? `${one(sx)} m` : `${one(sx)} × ${one(sy)} m`;
 }
 
@@ -69,13 +71,13 @@ export function layerFacts(layer: Layer): Row[] {
   const [wide, tall] = extentOf(facts, layer);
   const heights = [facts.low_m, facts.high_m].map((h) => layer.scale * h + layer.lift_m).sort((a, b) => a - b);
   return [
-    ["Samples", `${count(facts.cols)} × ${count(facts.rows)}`],
-    ["Spacing", spacingWords(layer.spacing_m)],
-    ["On the ground", `${metres(wide)} × ${metres(tall)}`],
-    ["Heights", `${wholeMetres(heights[0]!)} to ${wholeMetres(heights[1]!)}`],
-    ...(facts.valid < 0.9995 ? [["With data", percent(facts.valid)] as const] : []),
-    ...(facts.file ? [["File", facts.file] as const] : []),
-    ...(facts.crs ? [["Map projection", facts.crs] as const] : []),
+    [msg("Samples"), `${count(facts.cols)} × ${count(facts.rows)}`],
+    [msg("Spacing"), spacingWords(layer.spacing_m)],
+    [msg("On the ground"), `${metres(wide)} × ${metres(tall)}`],
+    [msg("Heights"), msg(str`${wholeMetres(heights[0]!)} to ${wholeMetres(heights[1]!)}`)],
+    ...(facts.valid < 0.9995 ? [[msg("With data"), percent(facts.valid)] as const] : []),
+    ...(facts.file ? [[msg("File"), facts.file] as const] : []),
+    ...(facts.crs ? [[msg("Map projection"), facts.crs] as const] : []),
   ];
 }
 
@@ -85,37 +87,37 @@ export function reportFacts(report: ImportReport): Row[] {
   const put = (what: string, how: string | null): void => {
     if (how) rows.push([what, how]);
   };
-  put("Format", [report.format, report.dtype].filter(Boolean).join(", "));
-  put("Samples", report.cols > 0 ? `${count(report.cols)} × ${count(report.rows)}` : null);
-  put("Spacing", report.spacing_m && spacingWords(report.spacing_m));
+  put(msg("Format"), [report.format, report.dtype].filter(Boolean).join(", "));
+  put(msg("Samples"), report.cols > 0 ? `${count(report.cols)} × ${count(report.rows)}` : null);
+  put(msg("Spacing"), report.spacing_m && spacingWords(report.spacing_m));
   put(
-    "On the ground",
+    msg("On the ground"),
     report.width_m === null || report.height_m === null
       ? null
       : `${metres(report.width_m)} × ${metres(report.height_m)}`,
   );
-  put("Turned", Math.abs(report.rotation_deg) > 0.05 ? `${report.rotation_deg.toFixed(1)}°` : null);
-  put("Map projection", report.crs);
-  put("Middle", report.at && placeWords(report.at));
+  put(msg("Turned"), Math.abs(report.rotation_deg) > 0.05 ? `${fixed(report.rotation_deg, 1)}°` : null);
+  put(msg("Map projection"), report.crs);
+  put(msg("Middle"), report.at && placeWords(report.at));
   put(
-    "Heights",
+    msg("Heights"),
     report.low_m === null || report.high_m === null
       ? null
-      : `${wholeMetres(report.low_m)} to ${wholeMetres(report.high_m)}`,
+      : msg(str`${wholeMetres(report.low_m)} to ${wholeMetres(report.high_m)}`),
   );
-  put("With data", report.valid !== null && report.valid < 0.9995 ? percent(report.valid) : null);
+  put(msg("With data"), report.valid !== null && report.valid < 0.9995 ? percent(report.valid) : null);
   return rows;
 }
 
 /** "46.19° N, 122.19° W". */
 export function placeWords([lat, lon]: readonly [number, number]): string {
-  const part = (v: number, plus: string, minus: string): string => `${Math.abs(v).toFixed(2)}° ${v < 0 ? minus : plus}`;
-  return `${part(lat, "N", "S")}, ${part(lon, "E", "W")}`;
+  const part = (v: number, plus: string, minus: string): string => `${fixed(Math.abs(v), 2)}° ${v < 0 ? minus : plus}`;
+  return `${part(lat, msg("N"), msg("S"))}, ${part(lon, msg("E"), msg("W"))}`;
 }
 
 /** A share as per cent that never claims all or nothing falsely. */
 export function percent(share: number): string {
-  if (share > 0.99 && share < 1) return "over 99 %";
-  if (share > 0 && share < 0.01) return "under 1 %";
+  if (share > 0.99 && share < 1) return msg("over 99 %");
+  if (share > 0 && share < 0.01) return msg("under 1 %");
   return `${Math.round(100 * share)} %`;
 }

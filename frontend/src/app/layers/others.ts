@@ -1,5 +1,6 @@
 /** Elevation files that other people bring in at this moment, for everybody to see. */
 
+import { msg, str } from "@lit/localize";
 import { type ReadonlySignal, signal } from "@preact/signals-core";
 import { ENDED_IMPORT, type Importing } from "../../generated/contract.ts";
 
@@ -54,8 +55,8 @@ export class OtherImports {
 
 /** "Ana is bringing in rainier.tif, 45 %". */
 export function importingWords({ author, file, status }: Importing): string {
-  const who = author || "Somebody";
-  if (status.stage === "done") return `${who} has brought in ${file}`;
-  if (status.stage === "question") return `${who} is placing ${file}`;
-  return `${who} is bringing in ${file}, ${Math.round(100 * status.share)} %`;
+  const who = author || msg("Somebody");
+  if (status.stage === "done") return msg(str`${who} has brought in ${file}`);
+  if (status.stage === "question") return msg(str`${who} is placing ${file}`);
+  return msg(str`${who} is bringing in ${file}, ${Math.round(100 * status.share)} %`);
 }

@@ -1,5 +1,8 @@
 /** Scales of maps and models, as the server will make them (backend/esker/exporting/printing/layout.py). */
 
+import { msg, str } from "@lit/localize";
+import { counted } from "../../core/language.ts";
+
 /** The room that a map has on paper, millimetres: its shorter side counts, as terrains are square. */
 const FREE_MM = { a4: 170, a3: 257 } as const;
 /** Scales are one of these times a power of ten. */
@@ -20,5 +23,5 @@ export function scalesFor(sizeM: number, paper: keyof typeof FREE_MM): readonly 
 export function solidWords(widthMm: number, sizeM: number): string {
   const scale = (1000 * sizeM) / widthMm;
   const rounded = Number(scale.toPrecision(3));
-  return `That is a scale of about 1 : ${rounded.toLocaleString("en")}. The file is in millimetres, watertight, with z up.`;
+  return msg(str`That is a scale of about 1 : ${counted(rounded)}. The file is in millimetres, watertight, with z up.`);
 }

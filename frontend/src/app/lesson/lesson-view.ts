@@ -1,5 +1,6 @@
 /** The lesson of an open terrain as this page knows it: how it stands, what a conductor says, and whose view mine follows. */
 
+import { msg } from "@lit/localize";
 import { computed, effect, type ReadonlySignal, signal } from "@preact/signals-core";
 import type { SyncDoc } from "../../doc/sync.ts";
 import type { ClientMessage, Conduct, Lesson, Member, Op, People } from "../../generated/contract.ts";
@@ -32,7 +33,7 @@ const UNCHANGED: Conduct = {
   held: null,
 };
 
-export const HANDS_OFF = "Hands off: drawing is paused for now.";
+export const HANDS_OFF = msg("Hands off: drawing is paused for now.");
 
 /** The terrain of which it is the lesson. */
 export interface LessonHost {
@@ -73,7 +74,7 @@ export class LessonView {
       const { look } = this.state.value;
       if (look === null || look === host.client) return null;
       const member = host.members.value.find((m) => m.client === look);
-      return member ? memberName(member) : "Somebody";
+      return member ? memberName(member) : msg("Somebody");
     });
     this.#stop = effect(() => {
       const doc = host.doc.doc.value;

@@ -1,5 +1,6 @@
 /** The server's JSON interface (docs/protocol.md). Secrets travel in the Authorization header only. */
 
+import { msg, str } from "@lit/localize";
 import type { TemplateInfo } from "../../core/types.ts";
 import type { ImportAnswers, ImportStatus, Role } from "../../generated/contract.ts";
 import type { HistoryPage } from "../history/history.ts";
@@ -114,7 +115,7 @@ export async function request(method: Method, path: string, secret?: string, bod
   try {
     response = await fetch(path, init);
   } catch {
-    throw new ApiError("unreachable", "The server does not answer. Check the connection and try again.");
+    throw new ApiError("unreachable", msg("The server does not answer. Check the connection and try again."));
   }
   if (!response.ok) throw readRefusal(response.status, await response.text());
   return response;
@@ -128,7 +129,7 @@ export function readRefusal(status: number, text: string): ApiError {
   } catch {
     // The answer is no JSON: a proxy gave it. The status says enough.
   }
-  return new ApiError(String(status), `The server refused (${status}). Try again in a moment.`);
+  return new ApiError(String(status), msg(str`The server refused (${status}). Try again in a moment.`));
 }
 
 export async function json<T>(method: Method, path: string, secret?: string, body?: unknown): Promise<T> {

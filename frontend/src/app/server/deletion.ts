@@ -1,4 +1,6 @@
+import { msg, str } from "@lit/localize";
 import { type ReadonlySignal, signal } from "@preact/signals-core";
+import { region } from "../../core/language.ts";
 import { ApiError, api } from "./api.ts";
 
 /** A terrain that was deleted: until when it can be brought back (seconds since 1970), and whether by this link. */
@@ -49,7 +51,7 @@ export class Deletion {
 }
 
 /** "until Monday, 30 November": the day after which a terrain is gone. */
-export function untilDay(deleted: Deleted, locale?: string): string {
+export function untilDay(deleted: Deleted, locale: string = region()): string {
   const day = new Date(deleted.until * 1000);
-  return `until ${day.toLocaleDateString(locale, { weekday: "long", day: "numeric", month: "long" })}`;
+  return msg(str`until ${day.toLocaleDateString(locale, { weekday: "long", day: "numeric", month: "long" })}`);
 }

@@ -1,5 +1,6 @@
 /** Building and reading the links that people share (DESIGN 13). */
 
+import { msg, str } from "@lit/localize";
 import { route } from "./router.ts";
 
 export interface TerrainLink {
@@ -47,28 +48,28 @@ export function readJoinInput(text: string, origin: string): JoinInput {
   const trimmed = text.trim();
   const code = trimmed.replace(/[\s-]/g, "").toUpperCase();
   if (/^[A-Z0-9]{6,9}$/.test(code)) return { kind: "code", code };
-  if (trimmed === "") return { kind: "unreadable", message: "Type the code or paste the link." };
+  if (trimmed === "") return { kind: "unreadable", message: msg("Type the code or paste the link.") };
   let url: URL;
   try {
     url = new URL(trimmed, origin);
   } catch {
-    return { kind: "unreadable", message: "This is neither a code nor a link." };
+    return { kind: "unreadable", message: msg("This is neither a code nor a link.") };
   }
   const target = route(url);
   if (target.page === "join" && url.origin === origin && target.code !== "") return { kind: "code", code: target.code };
   if (target.page !== "terrain") {
-    return { kind: "unreadable", message: "This is neither a code nor a link to a terrain." };
+    return { kind: "unreadable", message: msg("This is neither a code nor a link to a terrain.") };
   }
   if (url.origin !== origin) {
     return {
       kind: "unreadable",
-      message: `This link belongs to another server (${url.host}). Open it in its own tab.`,
+      message: msg(str`This link belongs to another server (${url.host}). Open it in its own tab.`),
     };
   }
   if (target.secret === "") {
     return {
       kind: "unreadable",
-      message: "The part after # is missing. Copy the whole link, including what follows #.",
+      message: msg("The part after # is missing. Copy the whole link, including what follows #."),
     };
   }
   return { kind: "link", id: target.id, secret: target.secret };

@@ -1,5 +1,6 @@
 /** Sending a large file with real progress: `fetch` does not tell how much has left. */
 
+import { msg } from "@lit/localize";
 import { ApiError, readRefusal } from "./api.ts";
 
 export interface Upload {
@@ -19,7 +20,7 @@ export function upload<T>({ path, secret, ticket, file, onShare, signal }: Uploa
     const request = new XMLHttpRequest();
     const cancelled = (): void => {
       request.abort();
-      reject(new ApiError("cancelled", "The upload was cancelled."));
+      reject(new ApiError("cancelled", msg("The upload was cancelled.")));
     };
     if (signal.aborted) {
       cancelled();
@@ -46,7 +47,9 @@ export function upload<T>({ path, secret, ticket, file, onShare, signal }: Uploa
     );
     request.addEventListener("error", () =>
       settle(() =>
-        reject(new ApiError("unreachable", "The upload was cut off. Check the connection and drop the file again.")),
+        reject(
+          new ApiError("unreachable", msg("The upload was cut off. Check the connection and drop the file again.")),
+        ),
       ),
     );
     request.open("POST", path);

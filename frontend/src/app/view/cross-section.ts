@@ -6,6 +6,7 @@
  * scale is that of the profile; an extent that ends outside the picture has its knob at the picture's edge.
  */
 
+import { msg } from "@lit/localize";
 import { type Flank, MAX_SLOPE_DEG } from "../../generated/contract.ts";
 
 export interface Section {
@@ -237,7 +238,7 @@ export function knobs(section: Section, frame: Frame): Knob[] {
         y: frame.baseY - flankShare(flank, relief, t) * relief * frame.pxPerM,
         value: flank.slope_deg,
         unit: "°",
-        label: `Slope ${side}`,
+        label: side === "left" ? msg("Slope left") : msg("Slope right"),
         beyond: false,
       });
     }
@@ -247,7 +248,7 @@ export function knobs(section: Section, frame: Frame): Knob[] {
       y: frame.baseY,
       value: flank.extent_m,
       unit: "m",
-      label: `Extent ${side}`,
+      label: side === "left" ? msg("Extent left") : msg("Extent right"),
       beyond: (edge + flank.extent_m) * frame.pxPerM > edgePx(frame) + 0.5,
     });
   }
@@ -257,7 +258,7 @@ export function knobs(section: Section, frame: Frame): Knob[] {
     y: frame.crestY,
     value: section.plateauRadiusM,
     unit: "m",
-    label: "Plateau radius",
+    label: msg("Plateau radius"),
     beyond: false,
   });
   return out;

@@ -4,6 +4,7 @@
  * live outside of it, so a new one goes on where the last one ended.
  */
 
+import { msg, str } from "@lit/localize";
 import { type ReadonlySignal, signal } from "@preact/signals-core";
 import type { CameraState, SceneRenderer } from "../../core/types.ts";
 import { createMapRenderer, createRenderer, NoWebGpu } from "../../gpu/index.ts";
@@ -72,7 +73,7 @@ export class Graphics {
   async open(): Promise<void> {
     const reason = await this.#openView(console.error);
     if (reason === null || this.#disposed) return;
-    this.#options.say(`${reason} You can draw on the map too.`);
+    this.#options.say(msg(str`${reason} You can draw on the map too.`));
     this.#openMap(reason);
   }
 
@@ -80,9 +81,9 @@ export class Graphics {
   async retry(): Promise<void> {
     if (this.#opening || this.#renderer?.kind !== "map") return;
     this.#losses = [];
-    this.#tell("Opening the 3D view …");
+    this.#tell(msg("Opening the 3D view …"));
     this.#close();
-    if (await this.#reopen()) this.#tell("The 3D view is open again.", NOTICE_MS);
+    if (await this.#reopen()) this.#tell(msg("The 3D view is open again."), NOTICE_MS);
   }
 
   dismiss(): void {
@@ -122,7 +123,7 @@ export class Graphics {
     } catch (error) {
       if (error instanceof NoWebGpu) return error.message;
       report(error);
-      return "The 3D view could not start.";
+      return msg("The 3D view could not start.");
     } finally {
       this.#opening = false;
     }
@@ -166,11 +167,11 @@ export class Graphics {
     const now = this.#now();
     this.#losses = [...this.#losses.filter((at) => now - at < LOSS_WINDOW_MS), now];
     if (this.#losses.length > MOST_LOSSES) {
-      this.#standIn("The graphics device was lost again and again.");
+      this.#standIn(msg("The graphics device was lost again and again."));
       return;
     }
-    this.#tell("The graphics device was lost. Opening the 3D view again …");
-    if (await this.#reopen()) this.#tell("The graphics device was lost; the 3D view is open again.", NOTICE_MS);
+    this.#tell(msg("The graphics device was lost. Opening the 3D view again …"));
+    if (await this.#reopen()) this.#tell(msg("The graphics device was lost; the 3D view is open again."), NOTICE_MS);
   }
 
   /** Opens another 3D view where one was before; the map when there is none to be had. */
@@ -188,12 +189,12 @@ export class Graphics {
       this.#modeBefore = null;
       return true;
     }
-    this.#standIn(reason ?? "The 3D view could not start.");
+    this.#standIn(reason ?? msg("The 3D view could not start."));
     return false;
   }
 
   #standIn(reason: string): void {
     this.#openMap(reason);
-    this.#tell(`${reason} The map is shown instead; you can draw on it too.`, undefined, true);
+    this.#tell(msg(str`${reason} The map is shown instead; you can draw on it too.`), undefined, true);
   }
 }

@@ -1,5 +1,6 @@
 /** The sun as a point on a dial: direction is the compass, distance from the rim is the height above the horizon. */
 
+import { msg, str } from "@lit/localize";
 import { compass } from "../words/words.ts";
 
 export interface SunPosition {
@@ -28,10 +29,16 @@ export function sunAt(x: number, y: number, radius: number, before: SunPosition)
 
 /** The sun in words: "Low morning light from the south-east". */
 export function sunWords({ azimuthDeg, elevationDeg }: SunPosition): string {
-  const from = `from the ${compass(azimuthDeg)}`;
-  if (elevationDeg < 4) return `On the horizon, ${from}`;
+  const from = msg(str`from the ${compass(azimuthDeg)}`);
+  if (elevationDeg < 4) return msg(str`On the horizon, ${from}`);
   const east = azimuthDeg > 0 && azimuthDeg < 180;
-  const day =
-    elevationDeg > 50 ? "High midday" : `${elevationDeg < 18 ? "Low" : "Soft"} ${east ? "morning" : "evening"}`;
-  return `${day} light ${from}, ${Math.round(elevationDeg)}° high`;
+  const high = Math.round(elevationDeg);
+  if (elevationDeg > 50) return msg(str`High midday light ${from}, ${high}° high`);
+  if (elevationDeg < 18)
+    return east
+      ? msg(str`Low morning light ${from}, ${high}° high`)
+      : msg(str`Low evening light ${from}, ${high}° high`);
+  return east
+    ? msg(str`Soft morning light ${from}, ${high}° high`)
+    : msg(str`Soft evening light ${from}, ${high}° high`);
 }

@@ -1,5 +1,7 @@
 /** What is to be known of a river, a road or a ridge, in words. Pure. */
 
+import { msg } from "@lit/localize";
+import { fixed } from "../../core/language.ts";
 import { earthwork } from "../../core/measure/earthwork.ts";
 import type { Ground } from "../../core/types.ts";
 import { worldPoints } from "../../doc/strokes.ts";
@@ -26,11 +28,11 @@ export function courseFacts(stroke: Stroke, ground: Ground | null = null): Cours
   const change = line.at(-1)! - line[2]!;
   const grade = steepest(line);
   return [
-    { name: "Length", text: metres(arcs(line).at(-1)!), over: false },
-    { name: change > 0 ? "Rises by" : "Falls by", text: metres(Math.abs(change)), over: false },
+    { name: msg("Length"), text: metres(arcs(line).at(-1)!), over: false },
+    { name: change > 0 ? msg("Rises by") : msg("Falls by"), text: metres(Math.abs(change)), over: false },
     {
-      name: "Steepest grade",
-      text: `${(100 * grade).toFixed(1)} %`,
+      name: msg("Steepest grade"),
+      text: `${fixed(100 * grade, 1)} %`,
       over: course.use === "road" && grade > SLACK * course.grade,
     },
     ...(ground === null ? [] : earthworkFacts(stroke, line, ground)),
@@ -48,10 +50,10 @@ function earthworkFacts(stroke: Stroke, line: ArrayLike<number>, ground: Ground)
   const { cutM3, fillM3 } = earthwork(line, reach, Math.max(SECTION_M, width / 2), (x, y) => ground.heightAt(x, y));
   const balance = cutM3 - fillM3;
   return [
-    { name: "Cut", text: volumeWords(cutM3), over: false },
-    { name: "Fill", text: volumeWords(fillM3), over: false },
+    { name: msg("Cut"), text: volumeWords(cutM3), over: false },
+    { name: msg("Fill"), text: volumeWords(fillM3), over: false },
     {
-      name: balance >= 0 ? "Left over" : "To be brought",
+      name: balance >= 0 ? msg("Left over") : msg("To be brought"),
       text: volumeWords(Math.abs(balance)),
       over: false,
     },

@@ -2,6 +2,7 @@
  * Hints for a newcomer at the foot of the picture, one sentence at a time; null where hands are busy or know better.
  */
 
+import { msg } from "@lit/localize";
 import { redraws } from "../../input/sketch/oversketch.ts";
 import { flag } from "../device/storage.ts";
 import type { Stage } from "../view/stage.ts";
@@ -27,17 +28,17 @@ export function hintWords(stage: Stage, busy: boolean): string | null {
     return null;
   const map = camera.state.value.mode === "map";
   if (map && !busy && STRAIGHTENED.includes(input.tool.value) && !flag(session.store, DRAWN_ON_MAP))
-    return "Draw a ridge on the map. From above a curved line becomes a straight one, between its ends.";
+    return msg("Draw a ridge on the map. From above a curved line becomes a straight one, between its ends.");
   if (doc.strokes.size === 1) {
     const stroke = doc.strokes.get(input.selection.value ?? "");
     const knows = flag(session.store, DRAWN_ON);
     if (knows || stroke === undefined || !redraws(input.tool.value, stroke)) return null;
     return map
-      ? "Draw another line, or shape this one with Select."
-      : "Now draw over the line to change it, or draw another one beside it.";
+      ? msg("Draw another line, or shape this one with Select.")
+      : msg("Now draw over the line to change it, or draw another one beside it.");
   }
   if (doc.strokes.size > 0 || doc.layers.size > 0 || busy) return null;
-  if (input.tool.value === "select") return "An empty land. Pick a tool and draw a line.";
-  if (flag(session.store, DRAWN)) return "An empty land. Draw a line.";
-  return "Draw a line across the land — the ground rises to meet it.";
+  if (input.tool.value === "select") return msg("An empty land. Pick a tool and draw a line.");
+  if (flag(session.store, DRAWN)) return msg("An empty land. Draw a line.");
+  return msg("Draw a line across the land — the ground rises to meet it.");
 }

@@ -1,19 +1,21 @@
 /** Keys as people read them: in tooltips, in the help dialog, in the user guide. */
 
+import { msg } from "@lit/localize";
+
 export interface KeyedAction {
   readonly title: string;
   readonly keys: readonly string[];
 }
 
 const NAMES: Readonly<Record<string, string>> = {
-  " ": "Space",
-  Space: "Space",
+  " ": msg("Space"),
+  Space: msg("Space"),
   ArrowUp: "↑",
   ArrowDown: "↓",
   ArrowLeft: "←",
   ArrowRight: "→",
-  Delete: "Del",
-  Escape: "Esc",
+  Delete: msg("Del"),
+  Escape: msg("Esc"),
   Backspace: "Backspace",
 };
 

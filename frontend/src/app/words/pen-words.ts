@@ -1,5 +1,7 @@
 /** Measures of a stroke under way, in words for beside the pen. Pure. */
 
+import { msg, str } from "@lit/localize";
+import { fixed, midSentence } from "../../core/language.ts";
 import { worldPoints } from "../../doc/strokes.ts";
 import type { Stroke } from "../../generated/contract.ts";
 import { reliefOf } from "../view/scene.ts";
@@ -12,14 +14,18 @@ export function penWords(stroke: Stroke): string | null {
   if (stroke.curve.length < 2) return null;
   const line = worldPoints(stroke);
   if (stroke.paint !== null)
-    return `${paintName(stroke.paint)}, ${metres(2 * stroke.paint.radius_m)} wide, ${metres(alongOf(line))} long`;
+    return msg(
+      str`${paintName(stroke.paint)}, ${metres(2 * stroke.paint.radius_m)} wide, ${metres(alongOf(line))} long`,
+    );
   if (stroke.course !== null) {
-    const facts = courseFacts(stroke).map(({ name, text }) => `${name.toLowerCase()} ${text}`);
+    const facts = courseFacts(stroke).map(({ name, text }) => `${midSentence(name)} ${text}`);
     return facts.length === 0 ? null : facts.join(", ");
   }
-  if (stroke.kind === "level") return `at ${height(stroke.first[2])}, ${metres(alongOf(line))} round`;
+  if (stroke.kind === "level") return msg(str`at ${height(stroke.first[2])}, ${metres(alongOf(line))} round`);
   const relief = reliefOf(stroke);
-  return `${Math.abs(relief).toFixed(0)} m ${relief < 0 ? "deep" : "high"}, ${metres(spanOf(line))} long`;
+  return relief < 0
+    ? msg(str`${fixed(-relief)} m deep, ${metres(spanOf(line))} long`)
+    : msg(str`${fixed(relief)} m high, ${metres(spanOf(line))} long`);
 }
 
 /** Length of a line on the map, metres. */

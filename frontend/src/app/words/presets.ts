@@ -1,5 +1,6 @@
 /** Cross-sections by name (DESIGN 12): starting points for the flanks of any stroke. */
 
+import { msg } from "@lit/localize";
 import type { Flank } from "../../generated/contract.ts";
 
 export interface SectionFields {
@@ -37,11 +38,11 @@ function extent(sizeM: number, share: number): number {
 }
 
 export const PRESETS: readonly Preset[] = [
-  { id: "ridge", title: "Ridge", sense: "up", section: both(38, 1 / 2, "concave") },
-  { id: "hill", title: "Hill", sense: "up", section: both(18, 1 / 3, "convex", 1 / 128) },
+  { id: "ridge", title: msg("Ridge"), sense: "up", section: both(38, 1 / 2, "concave") },
+  { id: "hill", title: msg("Hill"), sense: "up", section: both(18, 1 / 3, "convex", 1 / 128) },
   {
     id: "cliff",
-    title: "Cliff",
+    title: msg("Cliff"),
     sense: "up",
     section: (sizeM) => ({
       left: flank(76, extent(sizeM, 1 / 4), "straight"),
@@ -49,11 +50,11 @@ export const PRESETS: readonly Preset[] = [
       plateau_radius_m: 0,
     }),
   },
-  { id: "plateau", title: "Plateau", sense: "up", section: both(42, 1 / 4, "concave", 1 / 32) },
-  { id: "valley", title: "Valley", sense: "down", section: both(24, 1 / 3, "concave", 1 / 128) },
-  { id: "canyon", title: "Canyon", sense: "down", section: both(70, 1 / 6, "straight", 1 / 96) },
-  { id: "riverbed", title: "Riverbed", sense: "down", section: both(14, 1 / 24, "convex", 1 / 256) },
-  { id: "crack", title: "Crack", sense: "down", section: both(80, 1 / 24, "straight") },
+  { id: "plateau", title: msg("Plateau"), sense: "up", section: both(42, 1 / 4, "concave", 1 / 32) },
+  { id: "valley", title: msg("Valley"), sense: "down", section: both(24, 1 / 3, "concave", 1 / 128) },
+  { id: "canyon", title: msg("Canyon"), sense: "down", section: both(70, 1 / 6, "straight", 1 / 96) },
+  { id: "riverbed", title: msg("Riverbed"), sense: "down", section: both(14, 1 / 24, "convex", 1 / 256) },
+  { id: "crack", title: msg("Crack"), sense: "down", section: both(80, 1 / 24, "straight") },
 ];
 
 /** The presets with those that suit the stroke first. */

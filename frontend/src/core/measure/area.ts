@@ -4,6 +4,7 @@
  * them that lies inside, which is clipped exactly. On planes all figures are exact but for rounding.
  */
 
+import { msg } from "@lit/localize";
 import { areaM2, crossesItself, type Impossible, lengthM, type Place } from "./places.ts";
 import { NO_HEIGHT, NO_PLACE } from "./profile.ts";
 
@@ -42,9 +43,9 @@ const MOST_CELLS = 256;
 /** A cell in which a surface changes sides is summed by so many parts a side. */
 const PARTS = 6;
 
-export const TWO_POINTS = "An area needs three points. Click on the land once more, or draw its outline.";
-export const CROSSES = "This outline crosses itself. Move a point so that it does not.";
-export const NO_AREA = "This outline encloses nothing. Move a point.";
+export const TWO_POINTS = msg("An area needs three points. Click on the land once more, or draw its outline.");
+export const CROSSES = msg("This outline crosses itself. Move a point so that it does not.");
+export const NO_AREA = msg("This outline encloses nothing. Move a point.");
 
 /** The figures of an area, or why there are none. */
 export function measureArea(

@@ -4,6 +4,7 @@
  * gain, loss and the extremes are off by what a cell bends.
  */
 
+import { msg } from "@lit/localize";
 import { type Impossible, lengthM, type Place } from "./places.ts";
 
 /** A place on a profile: metres along the line, and what is there. */
@@ -35,10 +36,10 @@ export interface Profile {
 
 const MOST_SAMPLES = 2000;
 
-export const ONE_POINT = "A line needs two points. Click on the land once more, or draw a line.";
-export const NO_LENGTH = "All points of this line lie at one place. Move one of them.";
-export const NO_PLACE = "A point of this line has no place.";
-export const NO_HEIGHT = "The ground under this line has not come yet.";
+export const ONE_POINT = msg("A line needs two points. Click on the land once more, or draw a line.");
+export const NO_LENGTH = msg("All points of this line lie at one place. Move one of them.");
+export const NO_PLACE = msg("A point of this line has no place.");
+export const NO_HEIGHT = msg("The ground under this line has not come yet.");
 
 /** The profile along a line, or why there is none. */
 export function profileOf(

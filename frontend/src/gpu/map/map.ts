@@ -1,5 +1,6 @@
 /** The map: a relief as if printed on a 2D canvas, for browsers without WebGPU (DESIGN 9). Same scenes, same tiles. */
 
+import { fixed } from "../../core/language.ts";
 import type {
   CameraState,
   ChannelGrid,
@@ -328,7 +329,7 @@ function drawGrid(context: CanvasRenderingContext2D, frame: Frame, sizeM: number
   context.font = "11px system-ui, sans-serif";
   for (let k = 0; k <= 4; k += 1) {
     const m = (sizeM * k) / 4;
-    const text = sizeM >= 2000 ? `${(m / 1000).toFixed(1)} km` : `${Math.round(m)} m`;
+    const text = sizeM >= 2000 ? `${fixed(m / 1000, 1)} km` : `${Math.round(m)} m`;
     context.textAlign = "center";
     context.textBaseline = "top";
     const wide = context.measureText(text).width;

@@ -1,5 +1,6 @@
 /** Keys of the brush: they change the selected paint, else what the brush will paint next. */
 
+import { msg } from "@lit/localize";
 import type { Paint } from "../../generated/contract.ts";
 import { brushRadius, PAINT_CHANNELS } from "../tools/painttool.ts";
 import type { ActionContext, Put } from "./action.ts";
@@ -29,13 +30,13 @@ export function brushActions(c: ActionContext, edits: StrokeActions, put: Put): 
     ...paint,
     radius_m: brushRadius(paint.radius_m * factor, c.ground().sizeM),
   });
-  put("brush-smaller", "Smaller brush", ["["], () => change(resized(1 / RADIUS_STEP)), enabled);
-  put("brush-larger", "Larger brush", ["]"], () => change(resized(RADIUS_STEP)), enabled);
-  put("brush-weaker", "Weaker brush", ["{"], () => change((p) => stronger(p, -1)), enabled);
-  put("brush-stronger", "Stronger brush", ["}"], () => change((p) => stronger(p, 1)), enabled);
+  put("brush-smaller", msg("Smaller brush"), ["["], () => change(resized(1 / RADIUS_STEP)), enabled);
+  put("brush-larger", msg("Larger brush"), ["]"], () => change(resized(RADIUS_STEP)), enabled);
+  put("brush-weaker", msg("Weaker brush"), ["{"], () => change((p) => stronger(p, -1)), enabled);
+  put("brush-stronger", msg("Stronger brush"), ["}"], () => change((p) => stronger(p, 1)), enabled);
   put(
     "brush-channel",
-    "Next paint: snow, forest, meadow, wetness, roughness, amplitude, gullies",
+    msg("Next paint: snow, forest, meadow, wetness, roughness, amplitude, gullies"),
     ["u"],
     () =>
       change((p) => {
@@ -46,7 +47,7 @@ export function brushActions(c: ActionContext, edits: StrokeActions, put: Put): 
   );
   put(
     "brush-opposite",
-    "Paint adds, or takes away",
+    msg("Paint adds, or takes away"),
     ["Shift+u"],
     () => change((p) => ({ ...p, value: -p.value })),
     enabled,

@@ -4,6 +4,7 @@
  * movement ends it. The rays are those of the view in which the line was begun.
  */
 
+import { msg, str } from "@lit/localize";
 import { effect, type ReadonlySignal, signal, untracked } from "@preact/signals-core";
 import type { Camera } from "../../core/camera/camera.ts";
 import { clamp } from "../../core/math.ts";
@@ -49,14 +50,16 @@ const ARROWS: Readonly<Record<string, Pixel>> = {
 /** Keys that keep their meaning while a line is under way. */
 const FREE: ReadonlySet<string> = new Set(["Tab", "Shift", "Control", "Alt", "Meta", "?"]);
 
-const READY = "Arrow keys move the pen. Enter begins the line, Esc puts the pen away.";
-const BEGUN = "Begun. Move the pen into the air or along the ground; Enter sets the next point.";
-const UNDER_WAY = "Enter sets the next point; Enter again ends the line. Backspace takes a point back, Esc all of it.";
-const MEASURING = "Arrow keys move the pen, Enter sets a point, Backspace takes the last one back, Esc ends.";
-const MANY_POINTS = "A line has no room for more points.";
-const MOVE_FIRST = "Move the pen with the arrow keys first.";
-const OFF_GROUND = "Begin the line on the land.";
-const BUSY = "A line is under way: Enter twice ends it, Esc gives it up.";
+const READY = msg("Arrow keys move the pen. Enter begins the line, Esc puts the pen away.");
+const BEGUN = msg("Begun. Move the pen into the air or along the ground; Enter sets the next point.");
+const UNDER_WAY = msg(
+  "Enter sets the next point; Enter again ends the line. Backspace takes a point back, Esc all of it.",
+);
+const MEASURING = msg("Arrow keys move the pen, Enter sets a point, Backspace takes the last one back, Esc ends.");
+const MANY_POINTS = msg("A line has no room for more points.");
+const MOVE_FIRST = msg("Move the pen with the arrow keys first.");
+const OFF_GROUND = msg("Begin the line on the land.");
+const BUSY = msg("A line is under way: Enter twice ends it, Esc gives it up.");
 
 export class KeyPen {
   readonly #c: KeyPenContext;
@@ -177,7 +180,7 @@ export class KeyPen {
       return;
     }
     this.#visual.value = { at, points: [...points, at] };
-    this.#words.value = `Point ${points.length + 1} is set. ${UNDER_WAY}`;
+    this.#words.value = msg(str`Point ${points.length + 1} is set. ${UNDER_WAY}`);
   }
 
   get #measures(): boolean {
@@ -188,7 +191,7 @@ export class KeyPen {
     const hit = this.#c.hit(...at);
     if (hit === null) this.#c.onMessage(OFF_GROUND);
     else if (!this.#c.ruler.add(hit)) this.#c.onMessage(MANY_POINTS);
-    else this.#words.value = `Point ${this.#c.ruler.points.peek().length} is set. ${MEASURING}`;
+    else this.#words.value = msg(str`Point ${this.#c.ruler.points.peek().length} is set. ${MEASURING}`);
   }
 
   #begin(at: Pixel): void {
@@ -216,7 +219,7 @@ export class KeyPen {
       return;
     }
     this.#place(left.at(-1)!, left);
-    this.#words.value = `Back at point ${left.length}.`;
+    this.#words.value = msg(str`Back at point ${left.length}.`);
     this.#redraw();
   }
 
@@ -225,7 +228,7 @@ export class KeyPen {
       this.hide();
       return;
     }
-    this.#words.value = `The line is given up. ${READY}`;
+    this.#words.value = msg(str`The line is given up. ${READY}`);
   }
 
   #redraw(): void {
@@ -251,7 +254,7 @@ export class KeyPen {
     const made = points.length > 1 ? strokes.finish() : strokes.touch();
     this.hide();
     if (made === null) return;
-    this.#words.value = "The line is drawn.";
+    this.#words.value = msg("The line is drawn.");
     this.#c.onDrawn(made);
   }
 

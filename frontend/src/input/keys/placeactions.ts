@@ -1,5 +1,6 @@
 /** Keys for the elevation grid that is being placed: place it, move it, turn it. */
 
+import { msg } from "@lit/localize";
 import { moved, rounded, turned } from "../../core/lattice.ts";
 import { type ActionContext, GESTURE_MS, type Put } from "./action.ts";
 
@@ -26,13 +27,13 @@ export function placeActions(
   };
   put(
     "set-point",
-    "Draw with the arrow keys: shows the pen, sets points (or places a grid)",
+    msg("Draw with the arrow keys: shows the pen, sets points (or places a grid)"),
     ["Enter"],
     () => (c.placing.value === null ? c.keyPen.show() : c.placing.value.finish()),
     () => usable() || (c.placing.value === null && c.keyPen.usable()),
   );
-  put("turn-grid-left", "Turn the grid left", ["<"], () => turn(TURN_DEG), usable);
-  put("turn-grid-right", "Turn the grid right", [">"], () => turn(-TURN_DEG), usable);
+  put("turn-grid-left", msg("Turn the grid left"), ["<"], () => turn(TURN_DEG), usable);
+  put("turn-grid-right", msg("Turn the grid right"), [">"], () => turn(-TURN_DEG), usable);
   return (right, away) => {
     const placing = c.placing.value;
     if (placing === null || !c.canEdit()) return false;

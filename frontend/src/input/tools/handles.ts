@@ -1,5 +1,6 @@
 /** The handles of a stroke: where they are and what dragging one does (DESIGN 12). Pure. */
 
+import { msg, str } from "@lit/localize";
 import type { Ground, Vec3 } from "../../core/types.ts";
 import type { Flank, Paint, Stroke } from "../../generated/contract.ts";
 import { MAX_SLOPE_DEG } from "../../generated/contract.ts";
@@ -130,7 +131,7 @@ export function handlesOf(stroke: Stroke, ground: Ground, active: HandleKind | n
   const put = (kind: HandleKind, position: Vec3, label: string): void => {
     out.push({ id: `${stroke.id}/${kind}`, kind, position, label, active: kind === active });
   };
-  put("move", movePoint(stroke, ground), "Move");
+  put("move", movePoint(stroke, ground), msg("Move"));
   for (const [kind, side] of [
     ["left", 1],
     ["right", -1],
@@ -143,11 +144,15 @@ export function handlesOf(stroke: Stroke, ground: Ground, active: HandleKind | n
     const [x, y] = across(section, side * (stroke.plateau_radius_m + foot));
     const slope = flank.slope_deg === null ? "" : `${Math.round(flank.slope_deg)}° · `;
     const width = `${Math.round(foot)} m`;
-    put(kind, [x, y, ground.heightAt(x, y)], `${kind === "left" ? "Left" : "Right"} flank · ${slope}${width}`);
+    put(
+      kind,
+      [x, y, ground.heightAt(x, y)],
+      kind === "left" ? msg(str`Left flank · ${slope}${width}`) : msg(str`Right flank · ${slope}${width}`),
+    );
   }
-  put("first", stroke.first, "Start");
-  put("last", stroke.kind === "level" ? [stroke.last[0], stroke.last[1], stroke.first[2]] : stroke.last, "End");
-  put("crest", section.crest, `Height ${Math.round(crestHeight(stroke))} m`);
+  put("first", stroke.first, msg("Start"));
+  put("last", stroke.kind === "level" ? [stroke.last[0], stroke.last[1], stroke.first[2]] : stroke.last, msg("End"));
+  put("crest", section.crest, msg(str`Height ${Math.round(crestHeight(stroke))} m`));
   return out;
 }
 
@@ -165,9 +170,11 @@ function paintHandles(stroke: Stroke, paint: Paint, ground: Ground, active: Hand
   const { first, last } = stroke;
   const dab = Math.hypot(last[0] - first[0], last[1] - first[1]) < SHORT * paint.radius_m;
   return [
-    handle("move", across(section, 0), "Move"),
-    handle("radius", across(section, paint.radius_m), `Radius ${Math.round(paint.radius_m)} m`),
-    ...(dab ? [] : [handle("first", [first[0], first[1]], "Start"), handle("last", [last[0], last[1]], "End")]),
+    handle("move", across(section, 0), msg("Move")),
+    handle("radius", across(section, paint.radius_m), msg(str`Radius ${Math.round(paint.radius_m)} m`)),
+    ...(dab
+      ? []
+      : [handle("first", [first[0], first[1]], msg("Start")), handle("last", [last[0], last[1]], msg("End"))]),
   ];
 }
 
@@ -188,9 +195,9 @@ function courseHandles(stroke: Stroke, active: HandleKind | null): HandleVisual[
   const bankM = stroke.left?.extent_m ?? 0;
   const [ex, ey] = across(section, stroke.plateau_radius_m + bankM);
   return [
-    handle("move", middleOf(points).crest, "Move"),
-    ...(bankM > 0 ? [handle("radius", [ex, ey, section.crest[2]], `Banks ${Math.round(bankM)} m`)] : []),
-    ...[...shown].map((i) => handle(`vertex-${i}`, at(i), `${Math.round(at(i)[2])} m · Alt: height`)),
+    handle("move", middleOf(points).crest, msg("Move")),
+    ...(bankM > 0 ? [handle("radius", [ex, ey, section.crest[2]], msg(str`Banks ${Math.round(bankM)} m`))] : []),
+    ...[...shown].map((i) => handle(`vertex-${i}`, at(i), msg(str`${Math.round(at(i)[2])} m · Alt: height`))),
   ];
 }
 

@@ -1,8 +1,10 @@
 /** The handles of an elevation grid that is being placed on the ground, and what dragging one does. Pure. */
 
+import { msg, str } from "@lit/localize";
 import type { ReadonlySignal } from "@preact/signals-core";
 import type { Camera } from "../../core/camera/camera.ts";
 import { along, rayPlane } from "../../core/geometry.ts";
+import { fixed } from "../../core/language.ts";
 import {
   centreOf,
   covers,
@@ -47,7 +49,12 @@ export interface GridHandle {
 }
 
 const CORNERS = ["grid-0", "grid-1", "grid-2", "grid-3"] as const;
-const CORNER_NAMES = ["South-west corner", "South-east corner", "North-east corner", "North-west corner"] as const;
+const CORNER_NAMES = [
+  msg("South-west corner"),
+  msg("South-east corner"),
+  msg("North-east corner"),
+  msg("North-west corner"),
+] as const;
 /** How far beyond the north edge the turning handle stands, and how high the lifting one, as shares of the diagonal. */
 const TURN_OUT = 0.09;
 const LIFT_LEAST = 0.1;
@@ -83,19 +90,19 @@ export function gridHandles(
     put(CORNERS[i]!, onGround(latticePoint(place, u, v)), `${CORNER_NAMES[i]} · ${lengths(wide, tall)}`);
   const beyond = (TURN_OUT * diagonal) / place.spacing_m[1];
   const turnAt = latticePoint(place, (placing.cols - 1) / 2, placing.rows - 1 + beyond);
-  put("grid-turn", onGround(turnAt), `Turned ${place.rotation_deg.toFixed(1)}°`);
+  put("grid-turn", onGround(turnAt), msg(str`Turned ${fixed(place.rotation_deg, 1)}°`));
   const centre = onGround(centreOf(placing, place));
-  put("grid-move", centre, "Move");
+  put("grid-move", centre, msg("Move"));
   if (map) return out;
   const rise = clamp(topOf(placing, place) - centre[2], LIFT_LEAST * diagonal, LIFT_MOST * diagonal);
   const lift = `${place.lift_m < 0 ? "−" : "+"}${Math.round(Math.abs(place.lift_m))} m`;
-  put("grid-lift", [centre[0], centre[1], centre[2] + rise], `Lift ${lift}`);
+  put("grid-lift", [centre[0], centre[1], centre[2] + rise], msg(str`Lift ${lift}`));
   return out;
 }
 
 function lengths(wide: number, tall: number): string {
   const km = Math.max(wide, tall) >= 2000;
-  const text = (m: number): string => (km ? (m / 1000).toFixed(2) : m.toFixed(m < 20 ? 1 : 0));
+  const text = (m: number): string => (km ? fixed(m / 1000, 2) : fixed(m, m < 20 ? 1 : 0));
   return `${text(wide)} × ${text(tall)} ${km ? "km" : "m"}`;
 }
 

@@ -3,6 +3,7 @@
  * go, taken by their handles. It changes no document and belongs to this page alone. While it is open it has the pointer, as a grid that is being placed has.
  */
 
+import { msg, str } from "@lit/localize";
 import { type ReadonlySignal, signal } from "@preact/signals-core";
 import { type Place, simplified } from "../../core/measure/places.ts";
 import type { Ground, Vec3 } from "../../core/types.ts";
@@ -142,7 +143,7 @@ export class Ruler {
     return this.#points.value.map(([x, y], i) => ({
       kind: "ruler",
       position: [x, y, ground.heightAt(x, y)],
-      label: this.#kind.value === "water" ? "Where the drop falls" : `Point ${i + 1}`,
+      label: this.#kind.value === "water" ? msg("Where the drop falls") : msg(str`Point ${i + 1}`),
       active: i === active,
     }));
   }

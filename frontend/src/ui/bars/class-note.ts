@@ -1,3 +1,4 @@
+import { msg, str } from "@lit/localize";
 import { effect, type ReadonlySignal } from "@preact/signals-core";
 import { css, html, nothing, type TemplateResult } from "lit";
 import { Following } from "../../app/server/classes/following.ts";
@@ -73,16 +74,16 @@ export class EskClassNote extends SignalElement {
     const show = following.invitation.value;
     if (show !== null)
       return html`<div class="note panel" role="alert">
-        ${icon("eye")}<span>Your teacher shows the terrain of ${show.name}. Your page goes there.</span>
-        <button class="btn primary" @click=${() => following.go()}>Look now</button>
+        ${icon("eye")}<span>${msg(str`Your teacher shows the terrain of ${show.name}. Your page goes there.`)}</span>
+        <button class="btn primary" @click=${() => following.go()}>${msg("Look now")}</button>
       </div>`;
     if (following.away.value)
       return html`<div class="note panel" role="status">
-        ${icon("eye")}<span>You look at the terrain of ${told.show?.name ?? "somebody else"}. Yours waits for you.</span>
+        ${icon("eye")}<span>${msg(str`You look at the terrain of ${told.show?.name ?? msg("somebody else")}. Yours waits for you.`)}</span>
       </div>`;
     if (told.frozen)
       return html`<div class="note panel" role="status">
-        ${icon("lock")}<span>Your teacher has frozen your terrain: nobody draws for now.</span>
+        ${icon("lock")}<span>${msg("Your teacher has frozen your terrain: nobody draws for now.")}</span>
       </div>`;
     return nothing;
   }

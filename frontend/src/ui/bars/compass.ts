@@ -1,5 +1,6 @@
 /** A needle that points north in the picture; pressed, it turns the view until north is up. */
 
+import { msg, str } from "@lit/localize";
 import { html, svg, type TemplateResult } from "lit";
 import { compass as pointOf } from "../../app/words/words.ts";
 import type { CameraState } from "../../core/types.ts";
@@ -15,7 +16,7 @@ export function compassButton(camera: CameraState, title: string, press: () => v
   const north = heading < 0.5 || heading > 359.5;
   return html`<button
     class="icon-btn small compass"
-    aria-label=${north ? "North is up" : `Looking ${pointOf(heading)}. Turn the view north`}
+    aria-label=${north ? msg("North is up") : msg(str`Looking ${pointOf(heading)}. Turn the view north`)}
     title=${title}
     @click=${press}
   >

@@ -1,3 +1,4 @@
+import { msg, str } from "@lit/localize";
 import type { ReadonlySignal } from "@preact/signals-core";
 import { html, nothing, type TemplateResult } from "lit";
 import type { History } from "../../app/history/history.ts";
@@ -6,6 +7,7 @@ import type { HistoryView } from "../../app/history/history-view.ts";
 import { SPEEDS } from "../../app/history/pace.ts";
 import type { TimeLapse } from "../../app/history/timelapse.ts";
 import { ago } from "../../app/words/words.ts";
+import { whoDid } from "../../core/language.ts";
 import { icon } from "../controls/icons.ts";
 import { SignalElement } from "../controls/signal-element.ts";
 import { historyViewBarStyles } from "../styles/history-view-bar.ts";
@@ -38,22 +40,22 @@ export class EskHistoryViewBar extends SignalElement {
     const clock = this.historyView.wanted.value;
     if (clock === null) return nothing;
     return html`
-      <section class="panel bar" aria-label="The terrain as it was">
+      <section class="panel bar" aria-label=${msg("The terrain as it was")}>
         <div class="row head">
           ${icon("clock")}
           <div class="says" role="status">
-            <strong>As it was</strong>
+            <strong>${msg("As it was")}</strong>
             <span title=${this.#words(clock)}>${this.#what(clock)}</span>
           </div>
           <button
             class="btn outline"
             ?disabled=${!mayEdit.value || timeLapse.copying.value}
-            title=${mayEdit.value ? "A new terrain of your own that begins here" : "This link lets you look, not copy."}
+            title=${mayEdit.value ? msg("A new terrain of your own that begins here") : msg("This link lets you look, not copy.")}
             @click=${() => void timeLapse.copy()}
           >
-            ${icon("copy")} Make a copy
+            ${icon("copy")} ${msg("Make a copy")}
           </button>
-          <button class="btn primary" @click=${() => timeLapse.leave()}>Back to now</button>
+          <button class="btn primary" @click=${() => timeLapse.leave()}>${msg("Back to now")}</button>
         </div>
         ${this.#time(clock)}
       </section>
@@ -64,15 +66,15 @@ export class EskHistoryViewBar extends SignalElement {
     const { timeLapse } = this;
     const playing = timeLapse.playing.value;
     const newest = this.newest.value;
-    const label = playing ? "Pause" : "Play";
+    const label = playing ? msg("Pause") : msg("Play");
     return html`<div class="row">
       <button class="icon-btn small" aria-label=${label} title=${label} @click=${() => (playing ? timeLapse.pause() : timeLapse.play())}>
         ${icon(playing ? "pause" : "play")}
       </button>
       <input
         type="range"
-        aria-label="Moment of the history"
-        aria-valuetext=${`${clock} of ${newest}: ${this.#words(clock)}`}
+        aria-label=${msg("Moment of the history")}
+        aria-valuetext=${msg(str`${clock} of ${newest}: ${this.#words(clock)}`)}
         min="0"
         max=${newest}
         .value=${String(clock)}
@@ -81,8 +83,8 @@ export class EskHistoryViewBar extends SignalElement {
       />
       <button
         class="btn speed"
-        aria-label=${`Speed ${timeLapse.speed.value}, change it`}
-        title="Speed of the time lapse"
+        aria-label=${msg(str`Speed ${timeLapse.speed.value}, change it`)}
+        title=${msg("Speed of the time lapse")}
         @click=${() => {
           const at = SPEEDS.indexOf(timeLapse.speed.value as (typeof SPEEDS)[number]);
           timeLapse.speed.value = SPEEDS[(at + 1) % SPEEDS.length]!;
@@ -102,12 +104,12 @@ export class EskHistoryViewBar extends SignalElement {
 
   #words(clock: number): string {
     const { history, client } = this;
-    if (clock === 0) return "at the beginning";
+    if (clock === 0) return msg("at the beginning");
     const entry = entryAt(history.entries.value, clock);
-    if (entry === null) return `step ${clock}`;
-    const name = entry.author === client ? "you" : history.nameOf(entry.author);
-    const verb = entry.last > clock ? "while" : "after";
-    return `${verb} ${name} ${entry.text}`;
+    if (entry === null) return msg(str`step ${clock}`);
+    const name = entry.author === client ? msg("you") : history.nameOf(entry.author);
+    const what = whoDid(name, entry.text);
+    return entry.last > clock ? msg(str`while ${what}`) : msg(str`after ${what}`);
   }
 }
 

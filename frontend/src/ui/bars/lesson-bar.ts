@@ -1,3 +1,4 @@
+import { msg, str } from "@lit/localize";
 import type { ReadonlySignal } from "@preact/signals-core";
 import { css, html, nothing, type TemplateResult } from "lit";
 import type { LessonView } from "../../app/lesson/lesson-view.ts";
@@ -80,18 +81,22 @@ export class EskLessonBar extends SignalElement {
     if (look === this.client)
       return say(
         "eye",
-        "Everybody sees your view.",
-        button("Stop", () => lesson.conduct({ look: false })),
+        msg("Everybody sees your view."),
+        button(msg("Stop"), () => lesson.conduct({ look: false })),
       );
     const name = lesson.shower.value;
     if (name === null) return nothing;
     if (lesson.leader.value === null)
       return say(
         "eye",
-        `${name} is showing.`,
-        button("Look along", () => lesson.lookAway(false)),
+        msg(str`${name} is showing.`),
+        button(msg("Look along"), () => lesson.lookAway(false)),
       );
-    return say("eye", `${name} is showing.`, held ? nothing : button("Look away", () => lesson.lookAway(true)));
+    return say(
+      "eye",
+      msg(str`${name} is showing.`),
+      held ? nothing : button(msg("Look away"), () => lesson.lookAway(true)),
+    );
   }
 
   #hands(): TemplateResult | typeof nothing {
@@ -100,12 +105,12 @@ export class EskLessonBar extends SignalElement {
     if (conducts)
       return say(
         "lock",
-        "Hands off: only who leads draws.",
-        button("Let draw", () => this.lesson.conduct({ hands_off: false })),
+        msg("Hands off: only who leads draws."),
+        button(msg("Let draw"), () => this.lesson.conduct({ hands_off: false })),
       );
-    if (draws) return say("pen", "Hands off for the others. You have a pen.");
-    const kept = this.lesson.drafts.list.value.length > 0 ? " Your line is kept for you." : "";
-    return say("lock", `Hands off: drawing is paused for now.${kept}`, nothing, "off");
+    if (draws) return say("pen", msg("Hands off for the others. You have a pen."));
+    const kept = this.lesson.drafts.list.value.length > 0 ? ` ${msg("Your line is kept for you.")}` : "";
+    return say("lock", msg(str`Hands off: drawing is paused for now.${kept}`), nothing, "off");
   }
 
   #kept(): TemplateResult | typeof nothing {
@@ -113,12 +118,14 @@ export class EskLessonBar extends SignalElement {
     const count = lesson.drafts.list.value.length;
     if (count === 0 || !lesson.state.value.draws || !this.mayEdit.value) return nothing;
     const words =
-      count === 1 ? "Your line from before the pause is still here." : `${count} lines of yours are still here.`;
+      count === 1
+        ? msg("Your line from before the pause is still here.")
+        : msg(str`${count} lines of yours are still here.`);
     return say(
       "sketch",
       words,
-      html`${button("Put it back", () => lesson.putBack(), "primary")}
-        ${button("Let it go", () => lesson.drafts.drop())}`,
+      html`${button(msg("Put it back"), () => lesson.putBack(), "primary")}
+        ${button(msg("Let it go"), () => lesson.drafts.drop())}`,
     );
   }
 }

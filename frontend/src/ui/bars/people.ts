@@ -1,3 +1,4 @@
+import { msg, str } from "@lit/localize";
 import "@awesome.me/webawesome/dist/components/dropdown/dropdown.js";
 import "@awesome.me/webawesome/dist/components/dropdown-item/dropdown-item.js";
 import type { ReadonlySignal } from "@preact/signals-core";
@@ -125,8 +126,8 @@ export class EskPeople extends SignalElement {
       <button
         class="avatar"
         style=${colours(this.people.value.myColour)}
-        title=${`${me.name} (you): change name and colour`}
-        aria-label=${`${me.name}, you: change name and colour`}
+        title=${msg(str`${me.name} (you): change name and colour`)}
+        aria-label=${msg(str`${me.name}, you: change name and colour`)}
         @click=${() => this.dispatchEvent(new CustomEvent("profile"))}
       >
         ${initials(me.name) || icon("user")}
@@ -141,7 +142,7 @@ export class EskPeople extends SignalElement {
     const named = others.map((m) => ({ ...m, shown: memberName(m) })).sort((a, b) => a.shown.localeCompare(b.shown));
     const follow = (e: CustomEvent<{ item: { value: string } }>): void => this.#follow(e.detail.item.value);
     return html`<wa-dropdown placement="bottom-end" @wa-select=${follow}>
-      <button slot="trigger" class="btn more" aria-label=${`Everybody here: ${others.length + 1} people`} title="Everybody here">
+      <button slot="trigger" class="btn more" aria-label=${msg(str`Everybody here: ${others.length + 1} people`)} title=${msg("Everybody here")}>
         +${hidden}
       </button>
       ${named.map(
@@ -160,7 +161,7 @@ export class EskPeople extends SignalElement {
 
   #other(member: Member, followed: boolean): TemplateResult {
     const name = memberName(member);
-    const label = followed ? `Stop following ${name}` : `Follow ${name}`;
+    const label = followed ? msg(str`Stop following ${name}`) : msg(str`Follow ${name}`);
     return html`<button
       class="avatar other ${followed ? "followed" : ""}"
       style=${colours(member.colour)}

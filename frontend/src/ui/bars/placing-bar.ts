@@ -1,3 +1,4 @@
+import { msg } from "@lit/localize";
 import type { ReadonlySignal } from "@preact/signals-core";
 import { css, html, nothing, type TemplateResult } from "lit";
 import { LayerPlacing } from "../../app/layers/placing.ts";
@@ -99,18 +100,18 @@ export class EskPlacingBar extends SignalElement {
     const placing = this.placing.value;
     if (placing === null) return nothing;
     const layer = placing instanceof LayerPlacing;
-    return html`<div class="panel" role="group" aria-label="The grid in hand">
+    return html`<div class="panel" role="group" aria-label=${msg("The grid in hand")}>
       <span class="what" role="status">
         ${icon("select")}
         <span>
-          Drag the grid where it belongs.
-          <span class="keys">Enter ${layer ? "leaves it, Esc puts it back" : "places it, Esc gives it up"}.</span>
+          ${msg("Drag the grid where it belongs.")}
+          <span class="keys">${layer ? msg("Enter leaves it, Esc puts it back.") : msg("Enter places it, Esc gives it up.")}</span>
         </span>
       </span>
       <span class="row">
-        <button class="btn outline" @click=${() => this.dispatchEvent(new CustomEvent("numbers"))}>Numbers</button>
-        <button class="btn outline" @click=${() => placing.cancel()}>${layer ? "Put it back" : "Cancel"}</button>
-        <button class="btn primary" @click=${() => placing.finish()}>${layer ? "Leave it here" : "Place it"}</button>
+        <button class="btn outline" @click=${() => this.dispatchEvent(new CustomEvent("numbers"))}>${msg("Numbers")}</button>
+        <button class="btn outline" @click=${() => placing.cancel()}>${layer ? msg("Put it back") : msg("Cancel")}</button>
+        <button class="btn primary" @click=${() => placing.finish()}>${layer ? msg("Leave it here") : msg("Place it")}</button>
       </span>
     </div>`;
   }

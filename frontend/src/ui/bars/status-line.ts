@@ -1,8 +1,10 @@
+import { msg, str } from "@lit/localize";
 import type { ReadonlySignal } from "@preact/signals-core";
 import { css, html, nothing, type TemplateResult } from "lit";
 import type { Graphics } from "../../app/view/graphics.ts";
 import { height, metres, roundBelow } from "../../app/words/words.ts";
 import type { Camera } from "../../core/camera/camera.ts";
+import { fixed } from "../../core/language.ts";
 import { lonLatOf, lonLatWords } from "../../core/lonlat.ts";
 import type { Vec3 } from "../../core/types.ts";
 import type { Doc } from "../../doc/document.ts";
@@ -14,15 +16,15 @@ import { shared } from "../styles/shared.ts";
 const BAR_PX = 96;
 const NARROW_BAR_PX = 52;
 
-const tiles = (n: number): string => (n === 1 ? "1 tile" : `${n} tiles`);
+const tiles = (n: number): string => (n === 1 ? msg("1 tile") : msg(str`${n} tiles`));
 
 /** How far the solver is, in words for the tooltip. */
 export function progressText(progress: Progress | null, levels: number): string {
-  if (!progress) return `Waiting for the ground: ${levels + 1} levels of detail`;
+  if (!progress) return msg(str`Waiting for the ground: ${levels + 1} levels of detail`);
   if (progress.settled && progress.refining > 0)
-    return `Refining ${tiles(progress.refining)} where somebody looks closely`;
-  if (progress.settled) return `Settled: all ${levels + 1} levels of detail are final`;
-  return `Settling: level ${progress.level} of ${progress.of}`;
+    return msg(str`Refining ${tiles(progress.refining)} where somebody looks closely`);
+  if (progress.settled) return msg(str`Settled: all ${levels + 1} levels of detail are final`);
+  return msg(str`Settling: level ${progress.level} of ${progress.of}`);
 }
 
 /** Height under the cursor, scale, levels of detail, and what draws the picture. */
@@ -149,9 +151,9 @@ export class EskStatusLine extends SignalElement {
     const { graphics } = this;
     const point = this.cursor.value;
     return html`
-      <span class="height" title="Height of the ground under the cursor">${point ? height(point[2]) : "–"}</span>
+      <span class="height" title=${msg("Height of the ground under the cursor")}>${point ? height(point[2]) : "–"}</span>
       ${this.#place(point)}
-      ${this.baseBuilding.value ? html`<span class="building" role="status">Laying the real ground…</span>` : nothing}
+      ${this.baseBuilding.value ? html`<span class="building" role="status">${msg("Laying the real ground…")}</span>` : nothing}
       ${this.#scale()} ${this.#levels(this.progress.value, this.levels)}
       <span class="renderer" title=${graphics.reason.value ?? ""}>${graphics.info.value?.description ?? nothing}</span>
     `;
@@ -162,9 +164,9 @@ export class EskStatusLine extends SignalElement {
     const settings = this.doc.value?.settings;
     if (!point || !settings) return nothing;
     const [x, y] = point;
-    const metric = `${x.toFixed(0)} E, ${y.toFixed(0)} N m`;
+    const metric = msg(str`${fixed(x)} E, ${fixed(y)} N m`);
     const words = settings.place ? lonLatWords(lonLatOf(settings.place, settings.size_m, x, y)) : metric;
-    return html`<span class="place" title=${`Under the cursor: ${metric} from the south-western corner`}>${words}</span>`;
+    return html`<span class="place" title=${msg(str`Under the cursor: ${metric} from the south-western corner`)}>${words}</span>`;
   }
 
   #scale(): TemplateResult | typeof nothing {
@@ -173,7 +175,7 @@ export class EskStatusLine extends SignalElement {
     const cssPixel = camera.metresPerPixelAt(state.target) * Math.min(window.devicePixelRatio, 2);
     const length = roundBelow((window.innerWidth < 480 ? NARROW_BAR_PX : BAR_PX) * cssPixel);
     if (length === 0) return nothing;
-    return html`<span class="scale" title="Scale at the centre of the view">
+    return html`<span class="scale" title=${msg("Scale at the centre of the view")}>
       <span class="bar" style=${`width:${Math.round(length / cssPixel)}px`}></span>${metres(length)}
     </span>`;
   }
@@ -188,7 +190,7 @@ export class EskStatusLine extends SignalElement {
         return html`<span class="dot ${done ? "done" : ""}"></span>`;
       })}
       ${settled && refining === 0 ? icon("check") : nothing}
-      ${settled && refining > 0 ? html`<span class="refining">refining ${refining}</span>` : nothing}
+      ${settled && refining > 0 ? html`<span class="refining">${msg(str`refining ${refining}`)}</span>` : nothing}
     </span>`;
   }
 }

@@ -1,3 +1,4 @@
+import { msg } from "@lit/localize";
 import type { ReadonlySignal } from "@preact/signals-core";
 import { css, html, nothing, type TemplateResult } from "lit";
 import { keyText } from "../../app/words/keys.ts";
@@ -7,12 +8,12 @@ import { SignalElement } from "../controls/signal-element.ts";
 import { shared } from "../styles/shared.ts";
 
 const TOOLS: readonly { readonly id: ToolId; readonly icon: string; readonly label: string }[] = [
-  { id: "select", icon: "select", label: "Select" },
-  { id: "mountain", icon: "mountain", label: "Mountain" },
-  { id: "crevice", icon: "crevice", label: "Crevice" },
-  { id: "plateau", icon: "plateau", label: "Plateau" },
-  { id: "course", icon: "river", label: "River, road or ridge" },
-  { id: "paint", icon: "brush", label: "Paint" },
+  { id: "select", icon: "select", label: msg("Select") },
+  { id: "mountain", icon: "mountain", label: msg("Mountain") },
+  { id: "crevice", icon: "crevice", label: msg("Crevice") },
+  { id: "plateau", icon: "plateau", label: msg("Plateau") },
+  { id: "course", icon: "river", label: msg("River, road or ridge") },
+  { id: "paint", icon: "brush", label: msg("Paint") },
 ];
 
 /** The tools, then undo and redo. Vertical at the left; a row at the bottom of a narrow window. */
@@ -129,7 +130,7 @@ export class EskTools extends SignalElement {
   protected override render(): TemplateResult {
     const editable = this.canEdit.value;
     return html`
-      <div role="radiogroup" aria-label="Tool" @keydown=${this.#key}>
+      <div role="radiogroup" aria-label=${msg("Tool")} @keydown=${this.#key}>
         ${TOOLS.map((t) => {
           const on = this.tool.value === t.id;
           return html`
@@ -149,8 +150,8 @@ export class EskTools extends SignalElement {
         })}
       </div>
       <hr />
-      ${this.#history("undo", "Undo", this.canUndo.value && editable)}
-      ${this.#history("redo", "Redo", this.canRedo.value && editable)}
+      ${this.#history("undo", msg("Undo"), this.canUndo.value && editable)}
+      ${this.#history("redo", msg("Redo"), this.canRedo.value && editable)}
       ${this.#coarse.matches && editable ? this.#finger() : nothing}
     `;
   }
@@ -158,7 +159,7 @@ export class EskTools extends SignalElement {
   /** On a touch screen: does one finger draw, or move the view? */
   #finger(): TemplateResult {
     const draws = this.fingerDraws.value;
-    const label = draws ? "One finger draws. Let it move the view" : "One finger moves the view. Let it draw";
+    const label = draws ? msg("One finger draws. Let it move the view") : msg("One finger moves the view. Let it draw");
     return html`<button
       class="icon-btn"
       aria-label=${label}

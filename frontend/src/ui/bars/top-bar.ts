@@ -1,3 +1,4 @@
+import { msg } from "@lit/localize";
 import "@awesome.me/webawesome/dist/components/dropdown/dropdown.js";
 import "@awesome.me/webawesome/dist/components/dropdown-item/dropdown-item.js";
 import type { ReadonlySignal } from "@preact/signals-core";
@@ -29,9 +30,9 @@ export type PageCommand =
   | "lesson";
 
 const THEMES: readonly { readonly value: ThemeChoice; readonly label: string }[] = [
-  { value: "system", label: "Colours like the system" },
-  { value: "light", label: "Light" },
-  { value: "dark", label: "Dark" },
+  { value: "system", label: msg("Colours like the system") },
+  { value: "light", label: msg("Light") },
+  { value: "dark", label: msg("Dark") },
 ];
 
 /** Title, saved state, sharing, menu; people in the slot `people`. Fires `command`, and `retitle` with a new title. */
@@ -214,12 +215,12 @@ export class EskTopBar extends SignalElement {
     const title = this.doc.value?.settings.title ?? "";
     return html`
       <div class="panel left">
-        <a class="home" href="/" title="All terrains" aria-label="Start page"><img src="/favicon.svg" alt="" width="24" height="24" /></a>
+        <a class="home" href="/" title=${msg("All terrains")} aria-label=${msg("Start page")}><img src="/favicon.svg" alt="" width="24" height="24" /></a>
         <input
           class="field title"
-          aria-label="Title of the terrain"
+          aria-label=${msg("Title of the terrain")}
           maxlength="80"
-          placeholder="Untitled terrain"
+          placeholder=${msg("Untitled terrain")}
           .value=${title}
           ?disabled=${!this.canEdit.value}
           @change=${this.#retitle}
@@ -229,13 +230,13 @@ export class EskTopBar extends SignalElement {
       </div>
       <div class="panel right">
         <slot name="people"></slot>
-        <button class="btn primary share" aria-label="Share" @click=${() => this.#command("share")}>
-          ${icon("share")} <span>Share</span>
+        <button class="btn primary share" aria-label=${msg("Share")} @click=${() => this.#command("share")}>
+          ${icon("share")} <span>${msg("Share")}</span>
         </button>
         <button
           class="icon-btn small"
-          aria-label="Inspector"
-          title=${keyText("Inspector", this.actions.get("inspector"))}
+          aria-label=${msg("Inspector")}
+          title=${keyText(msg("Inspector"), this.actions.get("inspector"))}
           aria-pressed=${this.panelOpen}
           @click=${() => this.#command("panel")}
         >
@@ -256,18 +257,18 @@ export class EskTopBar extends SignalElement {
   #more(): TemplateResult {
     return html`
       <wa-dropdown placement="bottom-end" @wa-select=${this.#menu}>
-        <button slot="trigger" class="icon-btn small" aria-label="More" title="More">${icon("ellipsis")}</button>
-        <wa-dropdown-item value="add-ground" ?disabled=${!this.canEdit.value}>Add real ground…</wa-dropdown-item>
-        <wa-dropdown-item value="layers">Layers of real ground</wa-dropdown-item>
-        <wa-dropdown-item value="history">History</wa-dropdown-item>
-        ${this.lesson.value.conducts ? html`<wa-dropdown-item value="lesson">Lead the lesson</wa-dropdown-item>` : nothing}
-        <wa-dropdown-item value="export">Export for other programs…</wa-dropdown-item>
-        <wa-dropdown-item value="download">Download a copy (.esker)</wa-dropdown-item>
-        <wa-dropdown-item value="help">Keys and help</wa-dropdown-item>
-        <wa-dropdown-item value="about">About this terrain</wa-dropdown-item>
+        <button slot="trigger" class="icon-btn small" aria-label=${msg("More")} title=${msg("More")}>${icon("ellipsis")}</button>
+        <wa-dropdown-item value="add-ground" ?disabled=${!this.canEdit.value}>${msg("Add real ground…")}</wa-dropdown-item>
+        <wa-dropdown-item value="layers">${msg("Layers of real ground")}</wa-dropdown-item>
+        <wa-dropdown-item value="history">${msg("History")}</wa-dropdown-item>
+        ${this.lesson.value.conducts ? html`<wa-dropdown-item value="lesson">${msg("Lead the lesson")}</wa-dropdown-item>` : nothing}
+        <wa-dropdown-item value="export">${msg("Export for other programs…")}</wa-dropdown-item>
+        <wa-dropdown-item value="download">${msg("Download a copy (.esker)")}</wa-dropdown-item>
+        <wa-dropdown-item value="help">${msg("Keys and help")}</wa-dropdown-item>
+        <wa-dropdown-item value="about">${msg("About this terrain")}</wa-dropdown-item>
         ${
           this.myRole.value === "owner"
-            ? html`<wa-dropdown-item value="delete">Delete this terrain…</wa-dropdown-item>`
+            ? html`<wa-dropdown-item value="delete">${msg("Delete this terrain…")}</wa-dropdown-item>`
             : nothing
         }
         ${THEMES.map(

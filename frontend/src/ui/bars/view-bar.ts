@@ -1,3 +1,5 @@
+import { msg, str } from "@lit/localize";
+import { fixed } from "../../core/language.ts";
 import "@awesome.me/webawesome/dist/components/divider/divider.js";
 import "@awesome.me/webawesome/dist/components/dropdown/dropdown.js";
 import "@awesome.me/webawesome/dist/components/dropdown-item/dropdown-item.js";
@@ -109,11 +111,11 @@ export class EskViewBar extends SignalElement {
     const coarsened = this.coarsenedPx.value;
     return html`
       <wa-divider></wa-divider>
-      <small class="heading">Quality</small>
+      <small class="heading">${msg("Quality")}</small>
       ${
         coarsened === null
           ? null
-          : html`<small class="heading" role="status">This view is held to ${coarsened.toFixed(1)} px: no room for finer ground</small>`
+          : html`<small class="heading" role="status">${msg(str`This view is held to ${fixed(coarsened, 1)} px: no room for finer ground`)}</small>`
       }
       ${QUALITIES.map(
         (q) => html`
@@ -127,9 +129,9 @@ export class EskViewBar extends SignalElement {
     const { actions, overlay, showStrokes, quiet, quality, renderer } = this;
     const flat = renderer.value?.kind === "map";
     const modes = [
-      { value: "orbit", label: "Orbit", icon: "orbit", title: keyText("Orbit", actions.get("camera-orbit")) },
-      { value: "fly", label: "Fly", icon: "fly", title: keyText("Fly", actions.get("camera-fly")) },
-      { value: "map", label: "Map", icon: "map", title: keyText("Map", actions.get("camera-map")) },
+      { value: "orbit", label: msg("Orbit"), icon: "orbit", title: keyText(msg("Orbit"), actions.get("camera-orbit")) },
+      { value: "fly", label: msg("Fly"), icon: "fly", title: keyText(msg("Fly"), actions.get("camera-fly")) },
+      { value: "map", label: msg("Map"), icon: "map", title: keyText(msg("Map"), actions.get("camera-map")) },
     ];
     return html`
       ${
@@ -137,25 +139,25 @@ export class EskViewBar extends SignalElement {
           ? null
           : html`<esk-segmented
               compact
-              label="Camera"
+              label=${msg("Camera")}
               .segments=${modes}
               .value=${this.view.value.mode}
               @pick=${(e: CustomEvent<string>) => this.#run(`camera-${e.detail}`)}
             ></esk-segmented>`
       }
-      ${compassButton(this.view.value, keyText("North up", actions.get("north")), () => this.#run("north"))}
+      ${compassButton(this.view.value, keyText(msg("North up"), actions.get("north")), () => this.#run("north"))}
       <button
         class="icon-btn small"
-        aria-label="See the whole terrain"
-        title=${keyText("See the whole terrain", actions.get("home"))}
+        aria-label=${msg("See the whole terrain")}
+        title=${keyText(msg("See the whole terrain"), actions.get("home"))}
         @click=${() => this.#run("home")}
       >
         ${icon("frame")}
       </button>
       <button
         class="icon-btn small"
-        aria-label="Measure"
-        title=${keyText("Measure: profile, distance, area, volume", actions.get("measure-line"))}
+        aria-label=${msg("Measure")}
+        title=${keyText(msg("Measure: profile, distance, area, volume"), actions.get("measure-line"))}
         aria-pressed=${this.measuring.value !== null && this.measuring.value !== "water"}
         @click=${() => this.#run(this.measuring.value === "area" ? "measure-area" : "measure-line")}
       >
@@ -163,15 +165,15 @@ export class EskViewBar extends SignalElement {
       </button>
       <button
         class="icon-btn small"
-        aria-label="Water"
-        title=${keyText("Water: a drop's way, rain, floods, the sea", actions.get("water"))}
+        aria-label=${msg("Water")}
+        title=${keyText(msg("Water: a drop's way, rain, floods, the sea"), actions.get("water"))}
         aria-pressed=${this.measuring.value === "water"}
         @click=${() => this.#run("water")}
       >
         ${icon("drop")}
       </button>
       <wa-dropdown placement="top-end" @wa-select=${this.#overlay}>
-        <button slot="trigger" class="icon-btn small" aria-label="Overlays" title="Overlays" aria-pressed=${overlay.value !== "none"}>
+        <button slot="trigger" class="icon-btn small" aria-label=${msg("Overlays")} title=${msg("Overlays")} aria-pressed=${overlay.value !== "none"}>
           ${icon("layers")}
         </button>
         ${OVERLAYS.map(
@@ -179,7 +181,7 @@ export class EskViewBar extends SignalElement {
             <wa-dropdown-item type="checkbox" value=${o.value} .checked=${live(overlay.value === o.value)}>${o.label}</wa-dropdown-item>
           `,
         )}
-        <wa-dropdown-item type="checkbox" value="strokes" .checked=${live(showStrokes.value && !quiet.value)}>Show strokes</wa-dropdown-item>
+        <wa-dropdown-item type="checkbox" value="strokes" .checked=${live(showStrokes.value && !quiet.value)}>${msg("Show strokes")}</wa-dropdown-item>
         ${flat ? null : this.#qualities(quality.value)}
       </wa-dropdown>
       <esk-view-options .choices=${this.choices} .renderer=${this.renderer}></esk-view-options>

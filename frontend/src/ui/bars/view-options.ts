@@ -1,3 +1,4 @@
+import { msg } from "@lit/localize";
 import "@awesome.me/webawesome/dist/components/switch/switch.js";
 import type { ReadonlySignal } from "@preact/signals-core";
 import { css, html, type TemplateResult } from "lit";
@@ -6,6 +7,7 @@ import type { RendererInfo } from "../../app/view/graphics.ts";
 import { contourSteps } from "../../app/view/instruments/contour-steps.ts";
 import { MOST_EXAGGERATION } from "../../core/camera/lens.ts";
 import { icon } from "../controls/icons.ts";
+import { languageChoice } from "../controls/language-choice.ts";
 import { SignalElement } from "../controls/signal-element.ts";
 import { shared } from "../styles/shared.ts";
 
@@ -115,8 +117,8 @@ export class EskViewOptions extends SignalElement {
     const changed = exaggeration !== 1 || contourM !== 0 || projector || surface;
     return html`<button
         class="icon-btn small"
-        aria-label="View on this device"
-        title="View on this device: heights, contours, ground, lines, projector"
+        aria-label=${msg("View on this device")}
+        title=${msg("View on this device: heights, contours, ground, lines, projector")}
         aria-expanded=${this.open}
         aria-pressed=${changed}
         @click=${() => {
@@ -140,20 +142,20 @@ export class EskViewOptions extends SignalElement {
     const { materials, shade, instances } = choices.choices.value;
     const able = this.renderer.value?.software !== true;
     return html`<fieldset>
-      <legend>Ground</legend>
-      ${this.#switch("Stones and blades close by", materials ?? able, (on) => choices.choose({ materials: on }))}
-      ${this.#switch("Shade in hollows and joints", shade, (on) => choices.choose({ shade: on }))}
-      ${this.#switch("Trees, rocks and tufts", instances ?? able, (on) => choices.choose({ instances: on }))}
-      ${able ? null : html`<small>This device draws without a graphics card: what costs much is off.</small>`}
+      <legend>${msg("Ground")}</legend>
+      ${this.#switch(msg("Stones and blades close by"), materials ?? able, (on) => choices.choose({ materials: on }))}
+      ${this.#switch(msg("Shade in hollows and joints"), shade, (on) => choices.choose({ shade: on }))}
+      ${this.#switch(msg("Trees, rocks and tufts"), instances ?? able, (on) => choices.choose({ instances: on }))}
+      ${able ? null : html`<small>${msg("This device draws without a graphics card: what costs much is off.")}</small>`}
     </fieldset>`;
   }
 
   #card(): TemplateResult {
     const { choices } = this;
     const { exaggeration, contourM, projector, quietLines } = choices.choices.value;
-    return html`<div class="card panel" role="dialog" aria-label="View on this device" @keydown=${this.#key}>
+    return html`<div class="card panel" role="dialog" aria-label=${msg("View on this device")} @keydown=${this.#key}>
       <label>
-        <span>Heights drawn <output>× ${exaggeration}</output></span>
+        <span>${msg("Heights drawn")} <output>× ${exaggeration}</output></span>
         <input
           type="range"
           min="1"
@@ -164,17 +166,21 @@ export class EskViewOptions extends SignalElement {
         />
       </label>
       <label>
-        <span>Contours</span>
+        <span>${msg("Contours")}</span>
         <select class="field" @change=${(e: Event) => choices.choose({ contourM: Number((e.target as HTMLSelectElement).value) })}>
           ${contourSteps().map((s) => html`<option value=${s.value} ?selected=${s.value === contourM}>${s.label}</option>`)}
         </select>
       </label>
       ${this.renderer.value?.kind === "map" ? null : this.#ground()}
-      ${this.#switch("Quiet lines: faint until you draw or point", quietLines, (on) => choices.choose({ quietLines: on }))}
+      ${this.#switch(msg("Quiet lines: faint until you draw or point"), quietLines, (on) => choices.choose({ quietLines: on }))}
       <wa-switch size="s" ?checked=${projector} @change=${(e: Event) => choices.choose({ projector: (e.target as HTMLInputElement).checked })}
-        >For a projector: large letters, thick lines</wa-switch
+        >${msg("For a projector: large letters, thick lines")}</wa-switch
       >
-      <small>For this device only: others see the land as they choose.</small>
+      <label>
+        <span>${msg("Language")}</span>
+        ${languageChoice()}
+      </label>
+      <small>${msg("For this device only: others see the land as they choose.")}</small>
     </div>`;
   }
 }

@@ -1,3 +1,4 @@
+import { msg, str } from "@lit/localize";
 import "@awesome.me/webawesome/dist/components/slider/slider.js";
 import type WaSlider from "@awesome.me/webawesome/dist/components/slider/slider.js";
 import { css, html, LitElement, type TemplateResult } from "lit";
@@ -161,7 +162,7 @@ export class EskRange extends LitElement {
       <span class="number">
         <input
           type="number"
-          aria-label=${`${this.of ? `${this.label} ${this.of}` : this.label}, in ${UNITS[this.unit] ?? this.unit}`}
+          aria-label=${msg(str`${this.of ? `${this.label} ${this.of}` : this.label}, in ${UNITS[this.unit] ?? this.unit}`)}
           min=${this.min}
           max=${this.max}
           step="any"
@@ -176,6 +177,6 @@ export class EskRange extends LitElement {
   }
 }
 
-const UNITS: Record<string, string> = { m: "metres", "°": "degrees", "%": "per cent" };
+const UNITS: Record<string, string> = { m: msg("metres"), "°": msg("degrees"), "%": msg("per cent") };
 
 customElements.define("esk-range", EskRange);

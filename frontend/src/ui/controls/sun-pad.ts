@@ -1,3 +1,4 @@
+import { msg } from "@lit/localize";
 import { css, html, LitElement, svg, type TemplateResult } from "lit";
 import { type SunPosition, sunAt, sunOnDial, sunWords } from "../../app/view/sun.ts";
 import { shared } from "../styles/shared.ts";
@@ -120,7 +121,7 @@ export class EskSunPad extends LitElement {
         viewBox="0 0 ${BOX} ${BOX}"
         role="slider"
         tabindex=${this.disabled ? -1 : 0}
-        aria-label="Sun: arrows left and right turn it, up and down raise it"
+        aria-label=${msg("Sun: arrows left and right turn it, up and down raise it")}
         aria-valuemin="0"
         aria-valuemax="90"
         aria-valuenow=${Math.round(this.elevationDeg)}

@@ -1,3 +1,4 @@
+import { msg, str } from "@lit/localize";
 import { css, html, type TemplateResult } from "lit";
 import type { ToastList } from "../../app/toasts.ts";
 import { shared } from "../styles/shared.ts";
@@ -59,7 +60,7 @@ export class EskToasts extends SignalElement {
           <div class="toast panel ${t.tone}">
             <span class="mark">${icon(t.tone === "warn" ? "warning" : "info")}</span>
             <span>${t.text}</span>
-            ${t.times > 1 ? html`<span class="times" aria-label=${`${t.times} times`}>×${t.times}</span>` : null}
+            ${t.times > 1 ? html`<span class="times" aria-label=${msg(str`${t.times} times`)}>×${t.times}</span>` : null}
             ${
               t.act
                 ? html`<button
@@ -73,7 +74,7 @@ export class EskToasts extends SignalElement {
                   </button>`
                 : null
             }
-            <button class="icon-btn small" aria-label="Dismiss" @click=${() => this.toasts.dismiss(t.id)}>
+            <button class="icon-btn small" aria-label=${msg("Dismiss")} @click=${() => this.toasts.dismiss(t.id)}>
               ${icon("xmark")}
             </button>
           </div>

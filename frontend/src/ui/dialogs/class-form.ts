@@ -1,3 +1,4 @@
+import { msg, str } from "@lit/localize";
 import { css, html, LitElement, nothing, type TemplateResult } from "lit";
 import { ApiError } from "../../app/server/api.ts";
 import { type ClassInfo, classApi } from "../../app/server/classes/class-api.ts";
@@ -7,7 +8,10 @@ import { MAX_TOGETHER } from "../../generated/contract.ts";
 import { icon } from "../controls/icons.ts";
 import { shared } from "../styles/shared.ts";
 
-const EACH = ["One copy each", "Two share a copy", "Three share a copy", "Four share a copy"].slice(0, MAX_TOGETHER);
+const EACH = [msg("One copy each"), msg("Two share a copy"), msg("Three share a copy"), msg("Four share a copy")].slice(
+  0,
+  MAX_TOGETHER,
+);
 
 /** A copy for everyone: makes a class of a terrain, and leads to the walls of those there are. */
 export class EskClassForm extends LitElement {
@@ -78,10 +82,17 @@ export class EskClassForm extends LitElement {
     try {
       await what();
     } catch (error) {
-      this.problem = error instanceof ApiError ? error.message : "Something went wrong. Close this and try again.";
+      this.problem = error instanceof ApiError ? error.message : msg("Something went wrong. Close this and try again.");
     } finally {
       this.busy = false;
     }
+  }
+
+  #wallWords({ pupils, created }: ClassInfo): string {
+    const when = ago(Date.now() - 1000 * created);
+    return pupils === 1
+      ? msg(str`To the wall · 1 device · made ${when}`)
+      : msg(str`To the wall · ${pupils} devices · made ${when}`);
   }
 
   #make(): Promise<void> {
@@ -94,19 +105,19 @@ export class EskClassForm extends LitElement {
 
   protected override render(): TemplateResult {
     return html`
-      <strong>A copy for everyone</strong>
-      <p class="quiet">Each device that types one code draws on a copy of this terrain as it is now. You see all of them on a wall.</p>
+      <strong>${msg("A copy for everyone")}</strong>
+      <p class="quiet">${msg("Each device that types one code draws on a copy of this terrain as it is now. You see all of them on a wall.")}</p>
       <div class="row">
         <select
           class="field"
-          aria-label="Copies"
+          aria-label=${msg("Copies")}
           @change=${(e: Event) => {
             this.together = Number((e.target as HTMLSelectElement).value);
           }}
         >
           ${EACH.map((words, k) => html`<option value=${k + 1} ?selected=${this.together === k + 1}>${words}</option>`)}
         </select>
-        <button class="btn outline" ?disabled=${this.busy} @click=${() => this.#make()}>${icon("plus")} Make a class</button>
+        <button class="btn outline" ?disabled=${this.busy} @click=${() => this.#make()}>${icon("plus")} ${msg("Make a class")}</button>
       </div>
       <p class="problem" role="alert">${this.problem}</p>
       ${
@@ -116,7 +127,7 @@ export class EskClassForm extends LitElement {
               ${this.classes.map(
                 (each) => html`<li>
                   <a class="btn outline" href=${wallPath(this.terrain, each.id, this.secret)}>
-                    ${icon("map")} To the wall · ${each.pupils} ${each.pupils === 1 ? "device" : "devices"} · made ${ago(Date.now() - 1000 * each.created)}
+                    ${icon("map")} ${this.#wallWords(each)}
                   </a>
                 </li>`,
               )}

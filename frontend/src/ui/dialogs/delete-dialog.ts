@@ -1,3 +1,4 @@
+import { msg, str } from "@lit/localize";
 import "@awesome.me/webawesome/dist/components/dialog/dialog.js";
 import { html, nothing, type TemplateResult } from "lit";
 import type { OpenTerrain } from "../../app/open-terrain.ts";
@@ -9,7 +10,7 @@ type Deletable = Pick<OpenTerrain, "doc" | "members" | "deletion" | "toasts">;
 
 /** Asks an owner before the terrain is deleted for everybody. `remove` deletes it. */
 export function deleteDialog(session: Deletable, open: boolean, close: () => void): TemplateResult {
-  const title = session.doc.doc.value?.settings.title || "Untitled terrain";
+  const title = session.doc.doc.value?.settings.title || msg("Untitled terrain");
   const others = session.members.value.length - 1;
   const remove = async (event: Event): Promise<void> => {
     const button = event.currentTarget as HTMLButtonElement;
@@ -17,18 +18,21 @@ export function deleteDialog(session: Deletable, open: boolean, close: () => voi
     try {
       await session.deletion.delete();
     } catch (error) {
-      session.toasts.show(error instanceof ApiError ? error.message : "Deleting failed. Try again.", "warn");
+      session.toasts.show(error instanceof ApiError ? error.message : msg("Deleting failed. Try again."), "warn");
     } finally {
       button.disabled = false;
       close();
     }
   };
-  const here = others > 0 ? ` ${others === 1 ? "One other person is" : `${others} others are`} in it now.` : "";
-  return html`<wa-dialog label="Delete “${title}”?" light-dismiss ?open=${open} @wa-after-hide=${close}>
-    <p>It closes for everybody, and no link opens it any more.${here}</p>
-    <p>For seven days you can bring it back with this link. After that it is gone, with its history.</p>
-    <button slot="footer" class="btn outline" autofocus @click=${close}>Keep it</button>
-    <button slot="footer" class="btn danger" @click=${remove}>Delete this terrain</button>
+  const here =
+    others > 0
+      ? ` ${others === 1 ? msg("One other person is in it now.") : msg(str`${others} others are in it now.`)}`
+      : "";
+  return html`<wa-dialog label=${msg(str`Delete “${title}”?`)} light-dismiss ?open=${open} @wa-after-hide=${close}>
+    <p>${msg(str`It closes for everybody, and no link opens it any more.${here}`)}</p>
+    <p>${msg("For seven days you can bring it back with this link. After that it is gone, with its history.")}</p>
+    <button slot="footer" class="btn outline" autofocus @click=${close}>${msg("Keep it")}</button>
+    <button slot="footer" class="btn danger" @click=${remove}>${msg("Delete this terrain")}</button>
   </wa-dialog>`;
 }
 
@@ -43,10 +47,10 @@ export function bringBack(session: Pick<OpenTerrain, "deletion" | "toasts">): Te
       await session.deletion.bringBack();
       window.location.reload();
     } catch (error) {
-      session.toasts.show(error instanceof ApiError ? error.message : "That failed. Try again.", "warn");
+      session.toasts.show(error instanceof ApiError ? error.message : msg("That failed. Try again."), "warn");
       button.disabled = false;
     }
   };
-  return html`<span class="until">You can bring it back ${untilDay(deleted)}.</span>
-    <button class="btn primary" @click=${back}>Bring it back</button>`;
+  return html`<span class="until">${msg(str`You can bring it back ${untilDay(deleted)}.`)}</span>
+    <button class="btn primary" @click=${back}>${msg("Bring it back")}</button>`;
 }

@@ -1,3 +1,5 @@
+import { msg, str } from "@lit/localize";
+import { fixed, plain } from "../../core/language.ts";
 import "@awesome.me/webawesome/dist/components/dialog/dialog.js";
 import "@awesome.me/webawesome/dist/components/switch/switch.js";
 import { html, nothing, type TemplateResult } from "lit";
@@ -33,38 +35,38 @@ interface Card {
 const CARDS: readonly Card[] = [
   {
     value: "png16",
-    label: "Heightmap",
+    label: msg("Heightmap"),
     suffix: ".png",
-    says: "16 bits. Unreal, Unity, Godot, Blender, World Machine.",
+    says: msg("16 bits. Unreal, Unity, Godot, Blender, World Machine."),
   },
   {
     value: "r16",
-    label: "Raw heightmap",
+    label: msg("Raw heightmap"),
     suffix: ".r16",
-    says: "16 bits and a note of their range, in one zip. Unity, Unreal.",
+    says: msg("16 bits and a note of their range, in one zip. Unity, Unreal."),
   },
-  { value: "geotiff", label: "GeoTIFF", suffix: ".tif", says: "Heights in metres. QGIS, ArcGIS, GDAL." },
-  { value: "glb", label: "Mesh", suffix: ".glb", says: "Triangles with colours. Blender, Godot, three.js." },
+  { value: "geotiff", label: "GeoTIFF", suffix: ".tif", says: msg("Heights in metres. QGIS, ArcGIS, GDAL.") },
+  { value: "glb", label: msg("Mesh"), suffix: ".glb", says: msg("Triangles with colours. Blender, Godot, three.js.") },
   {
     value: "masks",
-    label: "Masks",
+    label: msg("Masks"),
     suffix: ".zip",
-    says: "Snow, grass, forest, wetness and water, as pictures for splat maps.",
+    says: msg("Snow, grass, forest, wetness and water, as pictures for splat maps."),
   },
   {
     value: "map_pdf",
-    label: "Contour map",
+    label: msg("Contour map"),
     suffix: ".pdf",
-    says: "To scale, for printing: contours with heights, grid, legend.",
+    says: msg("To scale, for printing: contours with heights, grid, legend."),
   },
   {
     value: "map_svg",
-    label: "Contour map",
+    label: msg("Contour map"),
     suffix: ".svg",
-    says: "The same, to be drawn on in Inkscape or Illustrator.",
+    says: msg("The same, to be drawn on in Inkscape or Illustrator."),
   },
-  { value: "stl", label: "3D print", suffix: ".stl", says: "A closed solid in millimetres, for printers." },
-  { value: "npy", label: "Array", suffix: ".npy", says: "Heights in metres, row 0 south. NumPy." },
+  { value: "stl", label: msg("3D print"), suffix: ".stl", says: msg("A closed solid in millimetres, for printers.") },
+  { value: "npy", label: msg("Array"), suffix: ".npy", says: msg("Heights in metres, row 0 south. NumPy.") },
 ];
 
 /** Takes the terrain to other programs: kind of file, samples, detail; then progress, and the file is saved. */
@@ -121,7 +123,7 @@ export class EskExport extends SignalElement {
     const url = URL.createObjectURL(blob);
     Object.assign(document.createElement("a"), { href: url, download: name }).click();
     setTimeout(() => URL.revokeObjectURL(url), 10_000);
-    if (!this.open) this.terrain.toasts.show(`The export is done: ${name}.`);
+    if (!this.open) this.terrain.toasts.show(msg(str`The export is done: ${name}.`));
   }
 
   protected override render(): TemplateResult {
@@ -130,7 +132,7 @@ export class EskExport extends SignalElement {
     const exporter = this.#made();
     const phase = exporter.phase.value;
     return html`
-      <wa-dialog label="Export" light-dismiss ?open=${this.open} @wa-after-hide=${this.#hidden}>
+      <wa-dialog label=${msg("Export")} light-dismiss ?open=${this.open} @wa-after-hide=${this.#hidden}>
         ${phase === "choose" ? this.#choose(exporter) : this.#state(exporter)}
       </wa-dialog>
     `;
@@ -147,8 +149,8 @@ export class EskExport extends SignalElement {
           void exporter.begin();
         }}
       >
-        ${isHistory ? html`<p class="note">This exports the terrain as it was, as it is shown now.</p>` : nothing}
-        <fieldset aria-label="Kind of file">
+        ${isHistory ? html`<p class="note">${msg("This exports the terrain as it was, as it is shown now.")}</p>` : nothing}
+        <fieldset aria-label=${msg("Kind of file")}>
           ${CARDS.map(
             (card) => html`<label class="card">
               <input
@@ -164,7 +166,7 @@ export class EskExport extends SignalElement {
           )}
         </fieldset>
         <label class="row">
-          Samples a side
+          ${msg("Samples a side")}
           <select
             class="field"
             @change=${(e: Event) => exporter.choose({ samples: Number((e.target as HTMLSelectElement).value) })}
@@ -177,23 +179,23 @@ export class EskExport extends SignalElement {
         ${isMap(format) || format === "stl" ? printChoice(exporter, this.sizeM) : nothing}
         ${
           covers
-            ? html`<p class="note">Masks come from the detail: what the page shows on the ground.</p>
+            ? html`<p class="note">${msg("Masks come from the detail: what the page shows on the ground.")}</p>
                 <wa-switch
                   size="s"
                   ?checked=${weights}
                   @change=${(e: Event) => exporter.choose({ weights: (e.target as HTMLInputElement).checked })}
-                  >They sum to one, with a mask for bare ground</wa-switch
+                  >${msg("They sum to one, with a mask for bare ground")}</wa-switch
                 >`
             : html`<wa-switch
                 size="s"
                 ?checked=${detail}
                 @change=${(e: Event) => exporter.choose({ detail: (e.target as HTMLInputElement).checked })}
-                >With the fine detail that the page shows</wa-switch
+                >${msg("With the fine detail that the page shows")}</wa-switch
               >`
         }
         <div class="end">
           <span class="quiet" role="status">${this.#costs(exporter)}</span>
-          <button class="btn primary">${icon("download")} Export</button>
+          <button class="btn primary">${icon("download")} ${msg("Export")}</button>
         </div>
       </form>
     `;
@@ -201,14 +203,14 @@ export class EskExport extends SignalElement {
 
   #sizeWords(n: number): string {
     const spacing = this.sizeM / (n - 1);
-    const every = spacing < 10 ? spacing.toFixed(2) : spacing.toFixed(1);
-    return `${n} × ${n}, one every ${every} m${ofUnreal(n) ? " (Unreal landscape)" : ""}`;
+    const every = fixed(spacing, spacing < 10 ? 2 : 1);
+    return msg(str`${n} × ${n}, one every ${every} m`) + (ofUnreal(n) ? ` ${msg("(Unreal landscape)")}` : "");
   }
 
   #costs(exporter: Exporter): string {
     const found = exporter.estimate.value;
     if (found === null) return "";
-    return `About ${bytesWords(found.bytes)}, ready in ${waitWords(found.seconds)}.`;
+    return msg(str`About ${bytesWords(found.bytes)}, ready in ${waitWords(found.seconds)}.`);
   }
 
   #state(exporter: Exporter): TemplateResult {
@@ -218,8 +220,8 @@ export class EskExport extends SignalElement {
       return html`<div class="state">
         <p class="problem" role="alert">${exporter.problem.value}</p>
         <div class="end"><div class="buttons">
-          <button class="btn outline" @click=${() => exporter.again()}>Change it</button>
-          <button class="btn primary" @click=${() => exporter.begin()}>Export again</button>
+          <button class="btn outline" @click=${() => exporter.again()}>${msg("Change it")}</button>
+          <button class="btn primary" @click=${() => exporter.begin()}>${msg("Export again")}</button>
         </div></div>
       </div>`;
     if (phase === "done") return this.#done(exporter);
@@ -227,9 +229,9 @@ export class EskExport extends SignalElement {
     return html`<div class="state" tabindex="-1">
       <p class="says" role="status">${words}</p>
       <progress max="1" .value=${status?.share ?? 0} aria-label=${words}></progress>
-      <p class="note">You can close this and go on: the file is saved when it is there. Drawing goes first.</p>
+      <p class="note">${msg("You can close this and go on: the file is saved when it is there. Drawing goes first.")}</p>
       <div class="end"><div class="buttons">
-        <button class="btn outline" @click=${() => exporter.cancel()}>Cancel the export</button>
+        <button class="btn outline" @click=${() => exporter.cancel()}>${msg("Cancel the export")}</button>
       </div></div>
     </div>`;
   }
@@ -242,15 +244,19 @@ export class EskExport extends SignalElement {
     const lines =
       format === "png16" || format === "r16"
         ? engineWords(status, samples)
-        : [`Heights from ${status.low_m.toFixed(2)} to ${status.high_m.toFixed(2)} m, one every ${status.spacing_m} m`];
+        : [
+            msg(
+              str`Heights from ${fixed(status.low_m, 2)} to ${fixed(status.high_m, 2)} m, one every ${plain(status.spacing_m)} m`,
+            ),
+          ];
     return html`<div class="state">
-      <p class="came" role="status">${icon("check")}<span>Saved <strong>${file.name}</strong>, ${bytesWords(file.blob.size)}.</span></p>
+      <p class="came" role="status">${icon("check")}<span>${msg(html`Saved <strong>${file.name}</strong>, ${bytesWords(file.blob.size)}.`)}</span></p>
       <ul>
         ${lines.map((line) => html`<li>${line}</li>`)}
       </ul>
       <div class="end"><div class="buttons">
-        <button class="btn outline" @click=${() => exporter.save()}>Save it again</button>
-        <button class="btn primary" @click=${() => exporter.again()}>Export another</button>
+        <button class="btn outline" @click=${() => exporter.save()}>${msg("Save it again")}</button>
+        <button class="btn primary" @click=${() => exporter.again()}>${msg("Export another")}</button>
       </div></div>
     </div>`;
   }

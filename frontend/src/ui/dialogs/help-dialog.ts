@@ -1,3 +1,4 @@
+import { msg } from "@lit/localize";
 import "@awesome.me/webawesome/dist/components/dialog/dialog.js";
 import { css, html, type TemplateResult } from "lit";
 import { type KeyedAction, keyParts } from "../../app/words/keys.ts";
@@ -6,18 +7,21 @@ import { shared } from "../styles/shared.ts";
 
 /** Gestures of pointers. Keys come from the actions themselves. */
 const POINTERS: readonly { readonly what: string; readonly how: string }[] = [
-  { what: "Draw, or use the chosen tool", how: "Left button, pen or one finger" },
-  { what: "Redraw a part of the selected line", how: "Begin on it with the tool that drew it (Alt: a new line)" },
-  { what: "Paint the opposite", how: "Alt with the brush, or the other end of a pen" },
+  { what: msg("Draw, or use the chosen tool"), how: msg("Left button, pen or one finger") },
   {
-    what: "Draw with the keys",
-    how: "Enter shows the pen and sets points, arrows move it (Shift: finely), Enter again ends",
+    what: msg("Redraw a part of the selected line"),
+    how: msg("Begin on it with the tool that drew it (Alt: a new line)"),
   },
-  { what: "Orbit", how: "Right button; left button on empty ground with Select" },
-  { what: "Pan", how: "Middle button, Shift + right button, Space + left button, or two fingers" },
-  { what: "Zoom", how: "Wheel, or two fingers" },
-  { what: "Fly there", how: "Double click" },
-  { what: "Bring in real ground", how: "Drop elevation files anywhere on the page" },
+  { what: msg("Paint the opposite"), how: msg("Alt with the brush, or the other end of a pen") },
+  {
+    what: msg("Draw with the keys"),
+    how: msg("Enter shows the pen and sets points, arrows move it (Shift: finely), Enter again ends"),
+  },
+  { what: msg("Orbit"), how: msg("Right button; left button on empty ground with Select") },
+  { what: msg("Pan"), how: msg("Middle button, Shift + right button, Space + left button, or two fingers") },
+  { what: msg("Zoom"), how: msg("Wheel, or two fingers") },
+  { what: msg("Fly there"), how: msg("Double click") },
+  { what: msg("Bring in real ground"), how: msg("Drop elevation files anywhere on the page") },
 ];
 
 /** The help dialog: every action with its keys. */
@@ -81,13 +85,13 @@ export class EskHelp extends SignalElement {
 
   protected override render(): TemplateResult {
     return html`
-      <wa-dialog label="Keys and help" light-dismiss ?open=${this.open} @wa-after-hide=${this.#closed}>
+      <wa-dialog label=${msg("Keys and help")} light-dismiss ?open=${this.open} @wa-after-hide=${this.#closed}>
         <div class="columns">
-          <h3>Mouse, pen and touch</h3>
+          <h3>${msg("Mouse, pen and touch")}</h3>
           <dl>
             ${POINTERS.map((p) => html`<div class="pair"><dt>${p.what}</dt><dd>${p.how}</dd></div>`)}
           </dl>
-          <h3>Keys</h3>
+          <h3>${msg("Keys")}</h3>
           <dl>
             ${[...this.actions.values()].map(
               (a) =>
@@ -106,7 +110,7 @@ export class EskHelp extends SignalElement {
 
 function keyCombination(combination: string, or: boolean): TemplateResult {
   const parts = keyParts(combination);
-  return html`${or ? " or " : ""}${parts.map((p, i) => html`${i > 0 ? "+" : ""}<kbd>${p}</kbd>`)}`;
+  return html`${or ? ` ${msg("or")} ` : ""}${parts.map((p, i) => html`${i > 0 ? "+" : ""}<kbd>${p}</kbd>`)}`;
 }
 
 customElements.define("esk-help", EskHelp);

@@ -1,9 +1,11 @@
 /** What only things for the hand have a choice of: paper, scale and contours of a map; size, base and heights of a solid. */
 
+import { msg, str } from "@lit/localize";
 import { html, type TemplateResult } from "lit";
 import { type Exporter, isMap } from "../../app/layers/exports.ts";
 import { scalesFor, solidWords } from "../../app/layers/print-sizes.ts";
 import { contourSteps } from "../../app/view/instruments/contour-steps.ts";
+import { counted } from "../../core/language.ts";
 
 /** The part of the export's form for contour maps and solids. */
 export function printChoice(exporter: Exporter, sizeM: number): TemplateResult {
@@ -16,7 +18,7 @@ function paperChoice(exporter: Exporter, sizeM: number): TemplateResult {
   const choose = (fields: Partial<typeof paper>): void => exporter.choose({ paper: { ...paper, ...fields } });
   return html`<div class="pair">
     <label class="row">
-      Paper
+      ${msg("Paper")}
       <select
         class="field"
         @change=${(e: Event) => choose({ size: (e.target as HTMLSelectElement).value as "a4" | "a3", scale: 0 })}
@@ -26,16 +28,16 @@ function paperChoice(exporter: Exporter, sizeM: number): TemplateResult {
       </select>
     </label>
     <label class="row">
-      Scale
+      ${msg("Scale")}
       <select class="field" @change=${(e: Event) => choose({ scale: Number((e.target as HTMLSelectElement).value) })}>
-        <option value="0" ?selected=${paper.scale === 0}>1 : ${scales[0]!.toLocaleString("en")}, the largest that fits</option>
+        <option value="0" ?selected=${paper.scale === 0}>${msg(str`1 : ${counted(scales[0]!)}, the largest that fits`)}</option>
         ${scales
           .slice(1)
-          .map((n) => html`<option value=${n} ?selected=${n === paper.scale}>1 : ${n.toLocaleString("en")}</option>`)}
+          .map((n) => html`<option value=${n} ?selected=${n === paper.scale}>1 : ${counted(n)}</option>`)}
       </select>
     </label>
     <label class="row">
-      Contours
+      ${msg("Contours")}
       <select
         class="field"
         @change=${(e: Event) => choose({ interval_m: Number((e.target as HTMLSelectElement).value) })}
@@ -68,8 +70,8 @@ function modelChoice(exporter: Exporter, sizeM: number): TemplateResult {
       />
     </label>`;
   return html`<div class="pair">
-      ${field("Longer side, mm", "width_mm", 10, 2000, 1)} ${field("Base under the lowest point, mm", "base_mm", 0.2, 200, 0.1)}
-      ${field("Heights times", "exaggeration", 0.1, 20, 0.1)}
+      ${field(msg("Longer side, mm"), "width_mm", 10, 2000, 1)} ${field(msg("Base under the lowest point, mm"), "base_mm", 0.2, 200, 0.1)}
+      ${field(msg("Heights times"), "exaggeration", 0.1, 20, 0.1)}
     </div>
     <p class="note">${solidWords(model.width_mm, sizeM)}</p>`;
 }

@@ -1,3 +1,4 @@
+import { msg, str } from "@lit/localize";
 import "@awesome.me/webawesome/dist/components/dialog/dialog.js";
 import type { ReadonlySignal } from "@preact/signals-core";
 import { css, html, type TemplateResult } from "lit";
@@ -68,20 +69,20 @@ export class EskProfile extends SignalElement {
   protected override render(): TemplateResult {
     const me = this.me.value;
     return html`
-      <wa-dialog label="You" light-dismiss ?open=${this.open} @wa-after-hide=${() => this.dispatchEvent(new CustomEvent("close"))}>
+      <wa-dialog label=${msg("You")} light-dismiss ?open=${this.open} @wa-after-hide=${() => this.dispatchEvent(new CustomEvent("close"))}>
         <form @submit=${this.#save}>
           <label>
-            Name
+            ${msg("Name")}
             <input id="name" class="field" maxlength="80" autocomplete="nickname" placeholder=${friendlyName(this.client)} .value=${me.name} autofocus />
           </label>
-          <div class="colours" role="radiogroup" aria-label="Colour">
+          <div class="colours" role="radiogroup" aria-label=${msg("Colour")}>
             ${MEMBER_COLOURS.map(
               (c) => html`<button
                 type="button"
                 class="colour"
                 role="radio"
                 aria-checked=${c === me.colour}
-                aria-label=${`Colour ${c}`}
+                aria-label=${msg(str`Colour ${c}`)}
                 style=${`background:${c};color:${inkOn(c)}`}
                 @click=${() => this.#rename({ name: me.name, colour: c })}
               >
@@ -89,8 +90,8 @@ export class EskProfile extends SignalElement {
               </button>`,
             )}
           </div>
-          <p class="quiet">The others see this name and colour at your cursor. It is kept on this device only.</p>
-          <div class="end"><button class="btn primary">Done</button></div>
+          <p class="quiet">${msg("The others see this name and colour at your cursor. It is kept on this device only.")}</p>
+          <div class="end"><button class="btn primary">${msg("Done")}</button></div>
         </form>
       </wa-dialog>
     `;

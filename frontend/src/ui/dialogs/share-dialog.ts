@@ -1,3 +1,4 @@
+import { msg, str } from "@lit/localize";
 import "@awesome.me/webawesome/dist/components/copy-button/copy-button.js";
 import "@awesome.me/webawesome/dist/components/dialog/dialog.js";
 import "@awesome.me/webawesome/dist/components/qr-code/qr-code.js";
@@ -25,9 +26,12 @@ import { shared } from "../styles/shared.ts";
 type Tab = "edit" | "view" | "owner";
 
 const WORDS: Readonly<Record<Tab, { readonly label: string; readonly says: string }>> = {
-  edit: { label: "Can draw", says: "Everybody with this link draws along." },
-  view: { label: "Can look", says: "Everybody with this link watches, and changes nothing." },
-  owner: { label: "Owner", says: "This link can do everything, also revoke the others. Keep it to yourself." },
+  edit: { label: msg("Can draw"), says: msg("Everybody with this link draws along.") },
+  view: { label: msg("Can look"), says: msg("Everybody with this link watches, and changes nothing.") },
+  owner: {
+    label: msg("Owner"),
+    says: msg("This link can do everything, also revoke the others. Keep it to yourself."),
+  },
 };
 
 /** A join code with the time when it ends, in milliseconds of this device's clock. */
@@ -117,7 +121,7 @@ export class EskShare extends SignalElement {
     try {
       await what();
     } catch (error) {
-      this.problem = error instanceof ApiError ? error.message : "Something went wrong. Close this and try again.";
+      this.problem = error instanceof ApiError ? error.message : msg("Something went wrong. Close this and try again.");
     } finally {
       this.busy = false;
     }
@@ -132,7 +136,7 @@ export class EskShare extends SignalElement {
 
   async #make(role: ShareRole): Promise<void> {
     const { terrain } = this;
-    const name = role === "edit" ? "Shared for drawing" : "Shared for looking";
+    const name = role === "edit" ? msg("Shared for drawing") : msg("Shared for looking");
     const link = await api.addLink(terrain.id, terrain.secret, role, name);
     this.made = rememberLink(terrain.store, terrain.id, role, { link: link.id, secret: link.secret });
     await this.#loadLinks();
@@ -158,7 +162,7 @@ export class EskShare extends SignalElement {
   #tick(): void {
     if (this.code && this.code.ends <= Date.now()) {
       this.#setCode(null);
-      this.problem = "The code has ended. Make a new one.";
+      this.problem = msg("The code has ended. Make a new one.");
     } else if (this.open) this.requestUpdate();
   }
 
@@ -189,7 +193,7 @@ export class EskShare extends SignalElement {
       this.tab = link.role;
     }
     await this.#loadLinks();
-    terrain.toasts.show("The old link no longer works. The new one is shown here.");
+    terrain.toasts.show(msg("The old link no longer works. The new one is shown here."));
   }
 
   async #revoke(link: AccessLink): Promise<void> {
@@ -202,11 +206,11 @@ export class EskShare extends SignalElement {
     const role = this.terrain.role.value;
     const tabs: Tab[] = role === "owner" ? ["edit", "view", "owner"] : role === "edit" ? ["edit"] : ["view"];
     return html`
-      <wa-dialog label="Share this terrain" light-dismiss ?open=${this.open} @wa-after-hide=${this.#hidden}>
+      <wa-dialog label=${msg("Share this terrain")} light-dismiss ?open=${this.open} @wa-after-hide=${this.#hidden}>
         ${
           tabs.length > 1
             ? html`<esk-segmented
-                label="Kind of link"
+                label=${msg("Kind of link")}
                 .segments=${tabs.map((t) => ({ value: t, label: WORDS[t].label }))}
                 .value=${this.tab}
                 @pick=${(e: CustomEvent<Tab>) => {
@@ -240,11 +244,11 @@ export class EskShare extends SignalElement {
   #prolongButton(code: Shown): TemplateResult {
     return html`<button
       class="btn outline"
-      title="Fifteen minutes from now, for ten hours at most"
+      title=${msg("Fifteen minutes from now, for ten hours at most")}
       ?disabled=${this.busy}
       @click=${() => this.#try(() => this.#prolong(code))}
     >
-      ${icon("rotate")} Prolong
+      ${icon("rotate")} ${msg("Prolong")}
     </button>`;
   }
 
@@ -253,7 +257,7 @@ export class EskShare extends SignalElement {
     const tab = this.tab;
     if (secret === null && tab !== "owner") {
       return html`<button class="btn primary make" ?disabled=${this.busy} @click=${() => this.#try(() => this.#make(tab))}>
-        ${icon("link")} Make a link
+        ${icon("link")} ${msg("Make a link")}
       </button>`;
     }
     const { preview } = this;
@@ -261,13 +265,13 @@ export class EskShare extends SignalElement {
     const link = terrainLink(window.location.origin, this.terrain.id, secret ?? "", token);
     return html`
       <div class="link">
-        <input class="field" readonly aria-label="Link" .value=${link} @focus=${(e: Event) => (e.target as HTMLInputElement).select()} />
-        <wa-copy-button .value=${link} copy-label="Copy the link"></wa-copy-button>
+        <input class="field" readonly aria-label=${msg("Link")} .value=${link} @focus=${(e: Event) => (e.target as HTMLInputElement).select()} />
+        <wa-copy-button .value=${link} copy-label=${msg("Copy the link")}></wa-copy-button>
       </div>
       ${
         tab === "owner"
           ? nothing
-          : html`<div class="qr"><wa-qr-code .value=${link} label="QR code of the link" size="168"></wa-qr-code></div>`
+          : html`<div class="qr"><wa-qr-code .value=${link} label=${msg("QR code of the link")} size="168"></wa-qr-code></div>`
       }
     `;
   }
@@ -280,16 +284,16 @@ export class EskShare extends SignalElement {
           code
             ? html`<span>
                   <strong>${code.code.slice(0, 3)} ${code.code.slice(3)}</strong>
-                  <span class="quiet">${left(code)} Type it at ${window.location.origin}.</span>
+                  <span class="quiet">${msg(str`${left(code)} Type it at ${window.location.origin}.`)}</span>
                 </span>
                 <span class="acts">
                   ${this.#prolongButton(code)}
-                  <a class="btn outline" href=${roomPath(code.code)} target="_blank">${icon("monitor")} Show it large</a>
-                  <wa-copy-button .value=${code.code} copy-label="Copy the code"></wa-copy-button>
+                  <a class="btn outline" href=${roomPath(code.code)} target="_blank">${icon("monitor")} ${msg("Show it large")}</a>
+                  <wa-copy-button .value=${code.code} copy-label=${msg("Copy the code")}></wa-copy-button>
                 </span>`
-            : html`<span class="quiet">For a classroom: a short code to type instead of the link.</span>
+            : html`<span class="quiet">${msg("For a classroom: a short code to type instead of the link.")}</span>
                 <button class="btn outline" ?disabled=${this.busy} @click=${() => this.#try(() => this.#makeCode(tab))}>
-                  ${icon("key")} Show a code
+                  ${icon("key")} ${msg("Show a code")}
                 </button>`
         }
       </div>
@@ -303,7 +307,7 @@ export class EskShare extends SignalElement {
         ?checked=${preview.shown}
         ?disabled=${this.busy}
         @change=${(e: Event) => this.#try(() => this.#showPreview((e.target as HTMLInputElement).checked))}
-        >Links show a picture of the terrain where they are pasted</wa-switch
+        >${msg("Links show a picture of the terrain where they are pasted")}</wa-switch
       >
     `;
   }
@@ -316,9 +320,9 @@ export class EskShare extends SignalElement {
 /** How long a code lives on, in words. */
 function left(code: Shown): string {
   const seconds = Math.max(0, Math.round((code.ends - Date.now()) / 1000));
-  if (seconds < 60) return `Valid for ${seconds} more seconds.`;
+  if (seconds < 60) return msg(str`Valid for ${seconds} more seconds.`);
   const minutes = Math.floor(seconds / 60);
-  return `Valid for ${minutes} more ${minutes === 1 ? "minute" : "minutes"}.`;
+  return minutes === 1 ? msg("Valid for 1 more minute.") : msg(str`Valid for ${minutes} more minutes.`);
 }
 
 /** Says whether a secret no longer opens the terrain. */

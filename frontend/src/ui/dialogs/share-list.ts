@@ -1,3 +1,4 @@
+import { msg, str } from "@lit/localize";
 import { html, LitElement, nothing, type TemplateResult } from "lit";
 import type { AccessLink } from "../../app/server/api.ts";
 import { icon } from "../controls/icons.ts";
@@ -50,7 +51,7 @@ export class EskShareList extends LitElement {
           if ((e.target as HTMLDetailsElement).open) this.dispatchEvent(new CustomEvent("reload"));
         }}
       >
-        <summary>Links of this terrain (${alive.length})</summary>
+        <summary>${msg(str`Links of this terrain (${alive.length})`)}</summary>
         <ul>
           ${alive.map((l) => (this.asked?.link === l.id ? this.#question(l, this.asked.act) : this.#row(l)))}
         </ul>
@@ -63,11 +64,11 @@ export class EskShareList extends LitElement {
     return html`
       <li>
         <span class="name">${name}</span>
-        <span class="quiet">${this.words(l)}${l.own ? ", yours" : ""}</span>
+        <span class="quiet">${this.words(l)}${l.own ? msg(", yours") : ""}</span>
         <button
           class="icon-btn small"
-          title="Replace by a new link…"
-          aria-label=${`Replace ${name} by a new link`}
+          title=${msg("Replace by a new link…")}
+          aria-label=${msg(str`Replace ${name} by a new link`)}
           ?disabled=${this.disabled}
           @click=${() => this.#ask(l, "replace")}
         >
@@ -78,8 +79,8 @@ export class EskShareList extends LitElement {
             ? nothing
             : html`<button
                 class="icon-btn small"
-                title="Revoke…"
-                aria-label=${`Revoke ${name}`}
+                title=${msg("Revoke…")}
+                aria-label=${msg(str`Revoke ${name}`)}
                 ?disabled=${this.disabled}
                 @click=${() => this.#ask(l, "revoke")}
               >
@@ -93,11 +94,11 @@ export class EskShareList extends LitElement {
   #question(l: AccessLink, act: Act): TemplateResult {
     const last = l.role === "owner" && this.links.filter((each) => each.role === "owner" && !each.revoked).length === 1;
     return html`
-      <li class="asks" role="alertdialog" aria-label=${`${act === "replace" ? "Replace" : "Revoke"} ${l.name || this.words(l)}?`}>
+      <li class="asks" role="alertdialog" aria-label=${act === "replace" ? msg(str`Replace ${l.name || this.words(l)}?`) : msg(str`Revoke ${l.name || this.words(l)}?`)}>
         <p>${question(l, act, last)}</p>
-        <button class="btn outline keep" @click=${() => this.#answer(l, null)}>Keep it</button>
+        <button class="btn outline keep" @click=${() => this.#answer(l, null)}>${msg("Keep it")}</button>
         <button class="btn primary yes" ?disabled=${this.disabled} @click=${() => this.#answer(l, act)}>
-          ${act === "replace" ? "Replace it" : "Revoke it"}
+          ${act === "replace" ? msg("Replace it") : msg("Revoke it")}
         </button>
       </li>
     `;
@@ -106,13 +107,16 @@ export class EskShareList extends LitElement {
 
 /** Returns the question that tells what a button will do before it does it. */
 export function question(link: AccessLink, act: Act, lastOwner: boolean): string {
-  const name = link.name === "" ? "this link" : `“${link.name}”`;
-  if (act === "revoke") return `Revoke ${name}? Whoever came by it is sent away, and so are those whom they let in.`;
+  const name = link.name === "" ? msg("this link") : msg(str`“${link.name}”`);
+  if (act === "revoke")
+    return msg(str`Revoke ${name}? Whoever came by it is sent away, and so are those whom they let in.`);
   if (link.own) {
-    const only = lastOwner ? " It is the only one that owns this terrain." : "";
-    return `Replace ${name}, by which you came in?${only} This page keeps the new one; all others who use the old one are shut out.`;
+    const only = lastOwner ? ` ${msg("It is the only one that owns this terrain.")}` : "";
+    return msg(
+      str`Replace ${name}, by which you came in?${only} This page keeps the new one; all others who use the old one are shut out.`,
+    );
   }
-  return `Replace ${name}? Whoever came by the old one is sent away and needs the new one.`;
+  return msg(str`Replace ${name}? Whoever came by the old one is sent away and needs the new one.`);
 }
 
 customElements.define("esk-share-list", EskShareList);

@@ -1,3 +1,4 @@
+import { msg, str } from "@lit/localize";
 import type { ReadonlySignal } from "@preact/signals-core";
 import { html, nothing, type TemplateResult } from "lit";
 import { type Instruments, SINCE_BEGAN } from "../../app/view/instruments/instruments.ts";
@@ -18,8 +19,8 @@ import { pointFields } from "./measure-points.ts";
 import { sectionChart } from "./section-chart.ts";
 
 const KINDS = [
-  { value: "line", label: "Profile" },
-  { value: "area", label: "Area" },
+  { value: "line", label: msg("Profile") },
+  { value: "area", label: msg("Area") },
 ];
 /** Half the height of the panel is the section; on small windows it is less. */
 const CHART_PX = 156;
@@ -79,25 +80,25 @@ export class EskMeasure extends SignalElement {
     return html`<header>
       <esk-segmented
         compact
-        label="What is measured"
+        label=${msg("What is measured")}
         .segments=${KINDS}
         .value=${kind}
         @pick=${(e: CustomEvent<RulerKind>) => ruler.open(e.detail)}
       ></esk-segmented>
       <span class="space"></span>
       ${files ? this.#files(profile) : nothing}
-      <button class="icon-btn small" aria-label="Take the last point back" title="Take the last point back (Backspace)" ?disabled=${none} @click=${() => ruler.removeLast()}>
+      <button class="icon-btn small" aria-label=${msg("Take the last point back")} title=${msg("Take the last point back (Backspace)")} ?disabled=${none} @click=${() => ruler.removeLast()}>
         ${icon("undo")}
       </button>
-      <button class="icon-btn small" aria-label="Begin anew" title="Begin anew" ?disabled=${none} @click=${() => ruler.clear()}>${icon("trash")}</button>
-      <button class="icon-btn small" aria-label="Stop measuring" title="Stop measuring (Esc)" @click=${() => ruler.close()}>${icon("xmark")}</button>
+      <button class="icon-btn small" aria-label=${msg("Begin anew")} title=${msg("Begin anew")} ?disabled=${none} @click=${() => ruler.clear()}>${icon("trash")}</button>
+      <button class="icon-btn small" aria-label=${msg("Stop measuring")} title=${msg("Stop measuring (Esc)")} @click=${() => ruler.close()}>${icon("xmark")}</button>
     </header>`;
   }
 
   #files(profile: Profile): TemplateResult {
     const { instruments } = this;
     const before = instruments.beforeHeights.value;
-    const title = `${this.heading.value || "Terrain"}, profile`;
+    const title = msg(str`${this.heading.value || msg("Terrain")}, profile`);
     const exaggeration = instruments.exaggeration.value;
     return html`<button class="btn quiet" @click=${() => this.#save("csv", "text/csv", profileCsv(profile, before))}>${icon("download")} CSV</button>
       <button class="btn quiet" @click=${() => this.#save("svg", "image/svg+xml", profileSvg(profile, title, { exaggeration, before }))}>${icon("download")} SVG</button>`;
@@ -114,25 +115,25 @@ export class EskMeasure extends SignalElement {
     const found = instruments.profile.value;
     const points = instruments.ruler.points.value;
     if (points.length === 0)
-      return html`<div class="body plain"><p class="empty">Draw a line over the land, or click its points one by one. Enter shows a pen for the arrow keys.</p></div>`;
+      return html`<div class="body plain"><p class="empty">${msg("Draw a line over the land, or click its points one by one. Enter shows a pen for the arrow keys.")}</p></div>`;
     if (found === null || isImpossible(found))
       return html`<div class="body plain"><p class="problem" role="status">${found?.problem}</p>${this.#points()}</div>`;
     const height = window.innerHeight < 620 || window.innerWidth < 721 ? SMALL_CHART_PX : CHART_PX;
     return html`<div class="body">
       <div class="plot">${sectionChart(instruments, found, this.#width, height)}</div>
-      <dl aria-label="Figures of the profile">
-        ${row("Length", lengthWords(found.lengthM))} ${row("Along the ground", lengthWords(found.surfaceM))}
-        ${row("Lowest", heightWords(found.min.m))} ${row("Highest", heightWords(found.max.m))}
-        ${row("Climb", heightWords(found.gainM))} ${row("Descent", heightWords(found.lossM))}
-        ${row("Steepest", slopeWords(Math.abs(found.steepest.m)))} ${row("End to end", slopeWords(found.overall))}
+      <dl aria-label=${msg("Figures of the profile")}>
+        ${row(msg("Length"), lengthWords(found.lengthM))} ${row(msg("Along the ground"), lengthWords(found.surfaceM))}
+        ${row(msg("Lowest"), heightWords(found.min.m))} ${row(msg("Highest"), heightWords(found.max.m))}
+        ${row(msg("Climb"), heightWords(found.gainM))} ${row(msg("Descent"), heightWords(found.lossM))}
+        ${row(msg("Steepest"), slopeWords(Math.abs(found.steepest.m)))} ${row(msg("End to end"), slopeWords(found.overall))}
       </dl>
       <div class="foot">
         <label>
-          Heights
-          <select class="field" aria-label="Vertical exaggeration of the section" @change=${this.#exaggerate}>
+          ${msg("Heights")}
+          <select class="field" aria-label=${msg("Vertical exaggeration of the section")} @change=${this.#exaggerate}>
             ${SECTION_EXAGGERATIONS.map(
               (k) =>
-                html`<option value=${k} ?selected=${k === instruments.exaggeration.value}>${k === 0 ? "fill" : `× ${k}`}</option>`,
+                html`<option value=${k} ?selected=${k === instruments.exaggeration.value}>${k === 0 ? msg("fill") : `× ${k}`}</option>`,
             )}
           </select>
         </label>
@@ -150,14 +151,14 @@ export class EskMeasure extends SignalElement {
     const { instruments } = this;
     const found = instruments.area.value;
     if (instruments.ruler.points.value.length === 0)
-      return html`<div class="body plain"><p class="empty">Draw an outline on the land, or click its corners one by one. Enter shows a pen for the arrow keys.</p></div>`;
+      return html`<div class="body plain"><p class="empty">${msg("Draw an outline on the land, or click its corners one by one. Enter shows a pen for the arrow keys.")}</p></div>`;
     if (found === null || isImpossible(found))
       return html`<div class="body plain"><p class="problem" role="status">${found?.problem}</p>${this.#points()}</div>`;
     return html`<div class="body plain">
-      <dl class="wide" aria-label="Figures of the area">${this.#areaRows(found)}</dl>
+      <dl class="wide" aria-label=${msg("Figures of the area")}>${this.#areaRows(found)}</dl>
       <div class="foot">
         <esk-number
-          label="Level for volumes"
+          label=${msg("Level for volumes")}
           unit="m"
           .min=${-100_000}
           .max=${100_000}
@@ -175,15 +176,15 @@ export class EskMeasure extends SignalElement {
 
   #areaRows(found: AreaFigures): TemplateResult {
     const level = heightWords(this.instruments.levelM.value);
-    return html`${row("Area", areaWords(found.areaM2))} ${row("Along the ground", areaWords(found.surfaceM2))}
-      ${row("Around", lengthWords(found.perimeterM))} ${row("Mean slope", slopeWords(found.meanSlope))}
-      ${row("Lowest", heightWords(found.minM))} ${row("Highest", heightWords(found.maxM))}
-      ${row("Mean height", heightWords(found.meanM))} ${row("Cells summed", lengthWords(found.cellM))}
-      ${row(`Ground above ${level}`, volumeWords(found.aboveM3))} ${row(`Room below ${level}`, volumeWords(found.belowM3))}
+    return html`${row(msg("Area"), areaWords(found.areaM2))} ${row(msg("Along the ground"), areaWords(found.surfaceM2))}
+      ${row(msg("Around"), lengthWords(found.perimeterM))} ${row(msg("Mean slope"), slopeWords(found.meanSlope))}
+      ${row(msg("Lowest"), heightWords(found.minM))} ${row(msg("Highest"), heightWords(found.maxM))}
+      ${row(msg("Mean height"), heightWords(found.meanM))} ${row(msg("Cells summed"), lengthWords(found.cellM))}
+      ${row(msg(str`Ground above ${level}`), volumeWords(found.aboveM3))} ${row(msg(str`Room below ${level}`), volumeWords(found.belowM3))}
       ${
         found.risenM3 === null
           ? nothing
-          : html`${row("Heaped up", volumeWords(found.risenM3), "rise")} ${row("Dug out", volumeWords(found.sunkenM3 ?? 0), "rise")}`
+          : html`${row(msg("Heaped up"), volumeWords(found.risenM3), "rise")} ${row(msg("Dug out"), volumeWords(found.sunkenM3 ?? 0), "rise")}`
       }`;
   }
 
@@ -191,11 +192,11 @@ export class EskMeasure extends SignalElement {
   #compared(): TemplateResult {
     const { instruments } = this;
     const clock = this.historyClock.value;
-    const words = clock === null ? "since you pressed Compare" : `since step ${clock} of the history`;
-    return html`<button class="btn outline" title="Keeps the ground that is shown, to see what changes from it" @click=${() => instruments.keep(words)}>
-        ${clock === null ? "Compare from now on" : "Compare with this moment"}
+    const words = clock === null ? msg("since you pressed Compare") : msg(str`since step ${clock} of the history`);
+    return html`<button class="btn outline" title=${msg("Keeps the ground that is shown, to see what changes from it")} @click=${() => instruments.keep(words)}>
+        ${clock === null ? msg("Compare from now on") : msg("Compare with this moment")}
       </button>
-      <span class="small-text">Change: ${instruments.before.value?.words ?? SINCE_BEGAN}. Ground without its fine detail.</span>`;
+      <span class="small-text">${msg(str`Change: ${instruments.before.value?.words ?? SINCE_BEGAN}. Ground without its fine detail.`)}</span>`;
   }
 
   #points(): TemplateResult | typeof nothing {

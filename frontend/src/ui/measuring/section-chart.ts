@@ -1,9 +1,11 @@
 /** The section along a line, with axes; a pointer on it marks the place on the ground. */
 
+import { msg, str } from "@lit/localize";
 import { html, nothing, svg, type TemplateResult } from "lit";
 import type { Instruments } from "../../app/view/instruments/instruments.ts";
 import { type Chart, chartOf } from "../../app/view/instruments/profile-chart.ts";
 import { heightWords, lengthWords } from "../../app/view/instruments/words.ts";
+import { fixed } from "../../core/language.ts";
 import { type Profile, profileAt } from "../../core/measure/profile.ts";
 
 const rootPx = (): number => Number.parseFloat(getComputedStyle(document.documentElement).fontSize) || 16;
@@ -27,7 +29,9 @@ export function sectionChart(
   const leave = (): void => {
     instruments.marker.value = null;
   };
-  const says = `Section of ${lengthWords(profile.lengthM)} from ${heightWords(profile.height[0]!)} to ${heightWords(profile.height.at(-1)!)}, lowest ${heightWords(profile.min.m)}, highest ${heightWords(profile.max.m)}.`;
+  const says = msg(
+    str`Section of ${lengthWords(profile.lengthM)} from ${heightWords(profile.height[0]!)} to ${heightWords(profile.height.at(-1)!)}, lowest ${heightWords(profile.min.m)}, highest ${heightWords(profile.max.m)}.`,
+  );
   return html`<svg
     class="chart"
     role="img"
@@ -54,8 +58,8 @@ function axes(chart: Chart, em: number): unknown {
     ${chart.heights.map((t) => svg`<path class="grid" d="M${left} ${t.at}H${right}"></path><text x=${left - 6} y=${t.at + 0.35 * em} text-anchor="end">${t.text}</text>`)}
     ${chart.distances.map((t) => svg`<path class="axis" d="M${t.at} ${bottom}v4"></path><text x=${t.at} y=${bottom + 1.35 * em} text-anchor="middle">${t.text}</text>`)}
     <path class="axis" d="M${left} ${top}V${bottom}H${right}"></path>
-    <text x=${right} y=${bottom + 2.45 * em} text-anchor="end">distance, ${chart.distanceUnit}</text>
-    <text x=${left} y=${bottom + 2.45 * em}>height in m, drawn × ${chart.exaggeration.toFixed(1)}</text>`;
+    <text x=${right} y=${bottom + 2.45 * em} text-anchor="end">${msg(str`distance, ${chart.distanceUnit}`)}</text>
+    <text x=${left} y=${bottom + 2.45 * em}>${msg(str`height in m, drawn × ${fixed(chart.exaggeration, 1)}`)}</text>`;
 }
 
 function marker(chart: Chart, profile: Profile, at: number | null): unknown {

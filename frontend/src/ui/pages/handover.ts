@@ -3,6 +3,7 @@
  * and what it may do.
  */
 
+import { msg } from "@lit/localize";
 import { computed, type ReadonlySignal } from "@preact/signals-core";
 import { html, nothing, type TemplateResult } from "lit";
 import type { Identity } from "../../app/device/storage.ts";
@@ -169,7 +170,7 @@ export function measurePanel(stage: Stage, beside: boolean): TemplateResult | ty
   return html`<esk-measure
     class="panel"
     role="region"
-    aria-label="Measuring"
+    aria-label=${msg("Measuring")}
     .instruments=${stage.instruments}
     .sizeM=${stage.sizeM}
     .heading=${headingOf(stage)}
@@ -183,7 +184,7 @@ function waterPanel(stage: Stage, beside: boolean): TemplateResult {
   return html`<esk-water
     class="panel"
     role="region"
-    aria-label="Water"
+    aria-label=${msg("Water")}
     .water=${water}
     .doc=${session.doc.doc}
     .canEdit=${session.canEdit}

@@ -1,3 +1,4 @@
+import { msg, str } from "@lit/localize";
 import { html, LitElement, nothing, type TemplateResult } from "lit";
 import { newSecret } from "../../app/device/share-links.ts";
 import { deviceStore, identity, rememberIdentity } from "../../app/device/storage.ts";
@@ -6,6 +7,7 @@ import { classApi } from "../../app/server/classes/class-api.ts";
 import { forgetSeat, type KeptSeat, keepSeat, keptSeats, seatIn } from "../../app/server/classes/seats.ts";
 import { terrainPath } from "../../app/server/links.ts";
 import { MAX_NAME_LENGTH } from "../../generated/contract.ts";
+import { languageChoice } from "../controls/language-choice.ts";
 import { shared } from "../styles/shared.ts";
 import { joinStyles } from "./wall-styles.ts";
 
@@ -41,7 +43,7 @@ export class EskJoin extends LitElement {
 
   override connectedCallback(): void {
     super.connectedCallback();
-    document.title = "Join a class · Esker";
+    document.title = msg("Join a class · Esker");
     void this.#knock();
   }
 
@@ -58,9 +60,10 @@ export class EskJoin extends LitElement {
     try {
       await what();
     } catch (error) {
-      this.problem = error instanceof ApiError ? error.message : "Something went wrong. Reload the page and try again.";
+      this.problem =
+        error instanceof ApiError ? error.message : msg("Something went wrong. Reload the page and try again.");
       if (error instanceof ApiError && error.code === "rate_limited") {
-        this.problem = "Many come in at once. You are next in a moment.";
+        this.problem = msg("Many come in at once. You are next in a moment.");
         this.#again = setTimeout(() => void this.#try(what), AGAIN_MS);
         return;
       }
@@ -128,19 +131,20 @@ export class EskJoin extends LitElement {
     const { door, seat } = this;
     return html`<main class="panel">
       <a class="brand" href="/"><img src="/favicon.svg" alt="" width="28" height="28" />Esker</a>
-      <h1>${door?.title || seat?.title || "Join a class"}</h1>
+      <h1>${door?.title || seat?.title || msg("Join a class")}</h1>
       ${seat ? this.#welcomeBack(seat) : door ? this.#form(door) : nothing}
       <p class="problem" role="alert">${this.problem}</p>
-      ${!door && !seat && this.problem ? html`<a class="btn outline" href="/">Type the code again</a>` : nothing}
-      ${!door && !seat && !this.problem ? html`<p role="status">Looking…</p>` : nothing}
+      ${!door && !seat && this.problem ? html`<a class="btn outline" href="/">${msg("Type the code again")}</a>` : nothing}
+      ${!door && !seat && !this.problem ? html`<p role="status">${msg("Looking…")}</p>` : nothing}
+      <footer>${languageChoice()}</footer>
     </main>`;
   }
 
   #welcomeBack(seat: KeptSeat): TemplateResult {
     return html`<div class="choices">
-      <p>This device has a terrain in this class already.</p>
+      <p>${msg("This device has a terrain in this class already.")}</p>
       <button class="btn primary big" ?disabled=${this.busy} @click=${() => this.#back(seat)}>
-        ${seat.name ? `Go on as ${seat.name}` : "Go on"}
+        ${seat.name ? msg(str`Go on as ${seat.name}`) : msg("Go on")}
       </button>
       ${
         this.door
@@ -150,7 +154,7 @@ export class EskJoin extends LitElement {
                 this.seat = null;
               }}
             >
-              I am somebody else
+              ${msg("I am somebody else")}
             </button>`
           : nothing
       }
@@ -160,26 +164,26 @@ export class EskJoin extends LitElement {
   #form(door: ClassDoor): TemplateResult {
     return html`<form @submit=${this.#come}>
       <label>
-        What are you called?
+        ${msg("What are you called?")}
         <input class="field" name="name" maxlength=${MAX_NAME_LENGTH} autocomplete="off" autofocus />
       </label>
       ${
         door.together > 1
           ? html`<fieldset>
-              <legend>Who do you work with?</legend>
-              <label><input type="radio" name="group" value="" checked /> Whoever has room</label>
+              <legend>${msg("Who do you work with?")}</legend>
+              <label><input type="radio" name="group" value="" checked /> ${msg("Whoever has room")}</label>
               ${door.groups.map(
                 (group) => html`<label>
                   <input type="radio" name="group" value=${group.number} />
-                  With ${group.names.filter(Boolean).join(", ") || `group ${group.number}`}
+                  ${msg(str`With ${group.names.filter(Boolean).join(", ") || msg(str`group ${group.number}`)}`)}
                 </label>`,
               )}
-              <label><input type="radio" name="group" value="0" /> A new group</label>
+              <label><input type="radio" name="group" value="0" /> ${msg("A new group")}</label>
             </fieldset>`
           : nothing
       }
-      <button class="btn primary big" ?disabled=${this.busy}>${this.busy ? "Making your terrain…" : "Start"}</button>
-      <p class="quiet">A first name or a nickname will do, or none. Your teacher and your group see it.</p>
+      <button class="btn primary big" ?disabled=${this.busy}>${this.busy ? msg("Making your terrain…") : msg("Start")}</button>
+      <p class="quiet">${msg("A first name or a nickname will do, or none. Your teacher and your group see it.")}</p>
     </form>`;
   }
 }

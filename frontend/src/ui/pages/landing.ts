@@ -1,3 +1,4 @@
+import { msg, str } from "@lit/localize";
 import { html, LitElement, nothing, svg, type TemplateResult } from "lit";
 import { ApiError, api, type LessonInfo, type OpenedTerrain } from "../../app/server/api.ts";
 import type { TemplateInfo } from "../../core/types.ts";
@@ -17,6 +18,7 @@ import { readJoinInput, terrainPath } from "../../app/server/links.ts";
 import { upload } from "../../app/server/upload.ts";
 import { ago } from "../../app/words/words.ts";
 import { icon } from "../controls/icons.ts";
+import { languageChoice } from "../controls/language-choice.ts";
 import { landingStyles } from "../styles/landing.ts";
 import { shared } from "../styles/shared.ts";
 import { type Layer, penRidge, ridgeLayers, seedOf } from "./ridges.ts";
@@ -90,7 +92,7 @@ export class EskLanding extends LitElement {
     if (file.size > MAX_GRID_BYTES)
       throw new ApiError(
         "too_large",
-        `“${file.name}” is larger than ${MAX_GRID_BYTES >> 20} MB. Cut it, or make it coarser.`,
+        msg(str`“${file.name}” is larger than ${MAX_GRID_BYTES >> 20} MB. Cut it, or make it coarser.`),
       );
     this.#abort = new AbortController();
     this.sent = 0;
@@ -193,15 +195,16 @@ export class EskLanding extends LitElement {
         ${this.recents.length > 0 ? this.#recentSection() : nothing} ${this.#templateSection()} ${this.#lessonSection()}
       </main>
       <esk-drop-zone
-        lead="Drop it: a new terrain"
-        detail="A file with heights becomes a terrain of its size and place. An .esker file opens as it was."
+        lead=${msg("Drop it: a new terrain")}
+        detail=${msg("A file with heights becomes a terrain of its size and place. An .esker file opens as it was.")}
         @files=${(e: CustomEvent<File[]>) => e.detail[0] && this.#take(e.detail[0])}
       ></esk-drop-zone>
       <footer>
-        <span>A terrain is its strokes: nothing is ever baked.</span>
-        <span>Everything stays on this server. No account, no tracking.</span>
-        <a href="/privacy">What is known of people</a>
-        <a href="/licences.txt">Licences and sources</a>
+        <span>${msg("A terrain is its strokes: nothing is ever baked.")}</span>
+        <span>${msg("Everything stays on this server. No account, no tracking.")}</span>
+        <a href="/privacy">${msg("What is known of people")}</a>
+        <a href="/licences.txt">${msg("Licences and sources")}</a>
+        ${languageChoice()}
       </footer>
     `;
   }
@@ -212,23 +215,23 @@ export class EskLanding extends LitElement {
         ${heroPicture()}
         <nav>
           <span class="brand"><img src="/favicon.svg" alt="" width="28" height="28" />Esker</span>
-          <button class="icon-btn" aria-label="Switch between dark and light" @click=${toggleTheme}>
+          <button class="icon-btn" aria-label=${msg("Switch between dark and light")} @click=${toggleTheme}>
             ${icon("moon")}
           </button>
         </nav>
         <div class="pitch">
-          <h1>Sketch a landscape together.</h1>
-          <p>Draw a line across the land and the ground rises to meet it, for everybody who has the link.</p>
+          <h1>${msg("Sketch a landscape together.")}</h1>
+          <p>${msg("Draw a line across the land and the ground rises to meet it, for everybody who has the link.")}</p>
           <div class="start">
             <button class="btn primary big" ?disabled=${this.busy !== ""} @click=${() => this.#open("new", () => api.create())}>
-              ${icon("plus")} ${this.busy === "new" ? "Making a terrain…" : "New terrain"}
+              ${icon("plus")} ${this.busy === "new" ? msg("Making a terrain…") : msg("New terrain")}
             </button>
             <form class="join" @submit=${this.#join}>
-              <label class="visually-hidden" for="join">Join code or link</label>
+              <label class="visually-hidden" for="join">${msg("Join code or link")}</label>
               <input
                 id="join"
                 class="field"
-                placeholder="Join code or link"
+                placeholder=${msg("Join code or link")}
                 autocomplete="off"
                 autocapitalize="characters"
                 spellcheck="false"
@@ -237,7 +240,7 @@ export class EskLanding extends LitElement {
                   this.problem = "";
                 }}
               />
-              <button class="btn solid" ?disabled=${this.busy !== ""}>${this.busy === "join" ? "Joining…" : "Join"}</button>
+              <button class="btn solid" ?disabled=${this.busy !== ""}>${this.busy === "join" ? msg("Joining…") : msg("Join")}</button>
             </form>
           </div>
           <p id="problem" class="problem" role="alert">${this.problem}${this.waiting ? this.#waiting(this.waiting) : nothing}</p>
@@ -245,29 +248,29 @@ export class EskLanding extends LitElement {
             ${icon("upload")} <span>${this.#fileWords()}</span>
             <input class="visually-hidden" type="file" ?disabled=${this.busy !== ""} @change=${this.#openFile} />
           </label>
-          ${this.busy === "grid" ? html`<button class="btn outline" @click=${() => this.#abort?.abort()}>Cancel</button>` : nothing}
-          ${serverKey(this.#store) ? html`<a class="kept" href=${`/server#${serverKey(this.#store)}`}>All terrains of this server</a>` : nothing}
+          ${this.busy === "grid" ? html`<button class="btn outline" @click=${() => this.#abort?.abort()}>${msg("Cancel")}</button>` : nothing}
+          ${serverKey(this.#store) ? html`<a class="kept" href=${`/server#${serverKey(this.#store)}`}>${msg("All terrains of this server")}</a>` : nothing}
         </div>
       </header>
     `;
   }
 
   #waiting(waiting: StartedImport): TemplateResult {
-    return html` <span>It is ${waiting.file}.</span>
-      <button class="btn outline" @click=${() => window.location.assign(terrainPath(waiting.terrain, waiting.secret))}>Go there</button>
-      <button class="btn outline" @click=${() => this.#giveUp(waiting)}>Cancel it</button>`;
+    return html` <span>${msg(str`It is ${waiting.file}.`)}</span>
+      <button class="btn outline" @click=${() => window.location.assign(terrainPath(waiting.terrain, waiting.secret))}>${msg("Go there")}</button>
+      <button class="btn outline" @click=${() => this.#giveUp(waiting)}>${msg("Cancel it")}</button>`;
   }
 
   #fileWords(): string {
-    if (this.busy === "file") return "Opening the file…";
-    if (this.busy !== "grid") return "Open a file: real ground (GeoTIFF, HGT, ASC, PNG…) or .esker";
-    return this.sent < 1 ? `Uploading, ${Math.round(100 * this.sent)} %` : "Looking at the file…";
+    if (this.busy === "file") return msg("Opening the file…");
+    if (this.busy !== "grid") return msg("Open a file: real ground (GeoTIFF, HGT, ASC, PNG…) or .esker");
+    return this.sent < 1 ? msg(str`Uploading, ${Math.round(100 * this.sent)} %`) : msg("Looking at the file…");
   }
 
   #recentSection(): TemplateResult {
     return html`
       <section aria-labelledby="recent-title">
-        <h2 id="recent-title">Recent on this device</h2>
+        <h2 id="recent-title">${msg("Recent on this device")}</h2>
         <ul class="recents">
           ${this.recents.map(
             (r) => html`
@@ -275,14 +278,14 @@ export class EskLanding extends LitElement {
                 <a class="recent" href=${terrainPath(r.id, r.secret)}>
                   <span class="thumb">${ridgePicture(r.id)}</span>
                   <span class="words">
-                    <strong>${r.title || "Untitled terrain"}</strong>
+                    <strong>${r.title || msg("Untitled terrain")}</strong>
                     <span class="quiet">${ROLE_WORDS[r.role]} · ${ago(Date.now() - r.opened)}</span>
                   </span>
                 </a>
                 <button
                   class="icon-btn small"
-                  title="Remove from this list"
-                  aria-label=${`Remove ${r.title || "Untitled terrain"} from this list`}
+                  title=${msg("Remove from this list")}
+                  aria-label=${msg(str`Remove ${r.title || msg("Untitled terrain")} from this list`)}
                   @click=${() => this.#forget(r.id)}
                 >
                   ${icon("xmark")}
@@ -299,7 +302,7 @@ export class EskLanding extends LitElement {
     if (this.templates !== null && this.templates.length === 0 && !this.templateProblem) return nothing;
     return html`
       <section aria-labelledby="templates-title">
-        <h2 id="templates-title">Start from a terrain</h2>
+        <h2 id="templates-title">${msg("Start from a terrain")}</h2>
         ${this.templateProblem ? html`<p class="quiet">${this.templateProblem}</p>` : nothing}
         <ul class="cards">
           ${
@@ -316,12 +319,12 @@ export class EskLanding extends LitElement {
     if (this.lessons.length === 0) return nothing;
     return html`
       <section aria-labelledby="lessons-title">
-        <h2 id="lessons-title">Start a lesson</h2>
+        <h2 id="lessons-title">${msg("Start a lesson")}</h2>
         <ul class="cards">
           ${this.lessons.map((lesson) =>
             this.#card(
               lesson,
-              html`<a class="plan" href=${`/lessons/${lesson.id}`}>For teachers: ${lesson.minutes} minutes, steps, questions</a>`,
+              html`<a class="plan" href=${`/lessons/${lesson.id}`}>${msg(str`For teachers: ${lesson.minutes} minutes, steps, questions`)}</a>`,
             ),
           )}
         </ul>
@@ -342,7 +345,7 @@ export class EskLanding extends LitElement {
             ${ridgePicture(template.id)}
             <img src=${`/templates/${template.id}.webp`} alt="" loading="lazy" @error=${hideImage} />
           </span>
-          <strong>${busy ? "Making a copy…" : template.title}</strong>
+          <strong>${busy ? msg("Making a copy…") : template.title}</strong>
           <span class="quiet">${template.description}</span>
         </button>
         ${more}
@@ -351,10 +354,10 @@ export class EskLanding extends LitElement {
   }
 }
 
-const ROLE_WORDS = { owner: "Yours", edit: "You can draw", view: "View only" } as const;
+const ROLE_WORDS = { owner: msg("Yours"), edit: msg("You can draw"), view: msg("View only") } as const;
 
 function sentence(error: unknown): string {
-  return error instanceof ApiError ? error.message : "Something went wrong. Reload the page and try again.";
+  return error instanceof ApiError ? error.message : msg("Something went wrong. Reload the page and try again.");
 }
 
 function hideImage(event: Event): void {

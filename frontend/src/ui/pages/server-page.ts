@@ -1,3 +1,4 @@
+import { msg, str } from "@lit/localize";
 import { html, LitElement, nothing, type TemplateResult } from "lit";
 import { deviceStore, keepServerKey, serverKey } from "../../app/device/storage.ts";
 import { ApiError, api, type KeptTerrain } from "../../app/server/api.ts";
@@ -34,8 +35,9 @@ export class EskServer extends LitElement {
 
   override connectedCallback(): void {
     super.connectedCallback();
-    document.title = "Terrains of this server · Esker";
-    if (this.key === "") this.problem = "This link is incomplete: the part after # is missing. `esker link` prints it.";
+    document.title = msg("Terrains of this server · Esker");
+    if (this.key === "")
+      this.problem = msg("This link is incomplete: the part after # is missing. `esker link` prints it.");
     else void this.#more();
   }
 
@@ -45,7 +47,8 @@ export class EskServer extends LitElement {
     try {
       await what();
     } catch (error) {
-      this.problem = error instanceof ApiError ? error.message : "Something went wrong. Reload the page and try again.";
+      this.problem =
+        error instanceof ApiError ? error.message : msg("Something went wrong. Reload the page and try again.");
       const dead = error instanceof ApiError && error.code === "not_keeper" && serverKey(deviceStore()) === this.key;
       if (dead) keepServerKey(deviceStore(), null);
     } finally {
@@ -77,21 +80,20 @@ export class EskServer extends LitElement {
     return html`
       <main>
         <a class="brand" href="/"><img src="/favicon.svg" alt="" width="28" height="28" />Esker</a>
-        <h1>Terrains of this server</h1>
+        <h1>${msg("Terrains of this server")}</h1>
         <p class="quiet">
-          Only you see this list: its link stands in a private file on the server's computer. Opening a terrain makes an owner
-          link to it. Do not put this page on the projector.
+          ${msg("Only you see this list: its link stands in a private file on the server's computer. Opening a terrain makes an owner link to it. Do not put this page on the projector.")}
         </p>
         <p class="problem" role="alert">${this.problem}</p>
-        ${terrains === null && !this.problem ? html`<p role="status">Looking…</p>` : nothing}
-        ${terrains?.length === 0 ? html`<p>There is no terrain yet. <a href="/">Make one</a>.</p>` : nothing}
+        ${terrains === null && !this.problem ? html`<p role="status">${msg("Looking…")}</p>` : nothing}
+        ${terrains?.length === 0 ? html`<p>${msg(html`There is no terrain yet. <a href="/">Make one</a>.`)}</p>` : nothing}
         <ul>
           ${terrains?.map((t) => this.#row(t))}
         </ul>
         ${
           terrains !== null && terrains.length < this.total
             ? html`<button class="btn outline" ?disabled=${this.busy} @click=${() => this.#more()}>
-                Show more (${this.total - terrains.length})
+                ${msg(str`Show more (${this.total - terrains.length})`)}
               </button>`
             : nothing
         }
@@ -100,17 +102,17 @@ export class EskServer extends LitElement {
   }
 
   #row(t: KeptTerrain): TemplateResult {
-    const title = t.title || "Untitled terrain";
+    const title = t.title || msg("Untitled terrain");
     const facts = [
       ago(Date.now() - 1000 * t.changed),
-      t.clock === 1 ? "1 change" : `${t.clock} changes`,
-      t.links === 1 ? "1 link" : `${t.links} links`,
-      t.here === 0 ? "" : t.here === 1 ? "1 person here now" : `${t.here} people here now`,
+      t.clock === 1 ? msg("1 change") : msg(str`${t.clock} changes`),
+      t.links === 1 ? msg("1 link") : msg(str`${t.links} links`),
+      t.here === 0 ? "" : t.here === 1 ? msg("1 person here now") : msg(str`${t.here} people here now`),
     ];
     return html`<li>
       <span class="words"><strong>${title}</strong><span class="quiet">${facts.filter(Boolean).join(" · ")}</span></span>
-      <button class="btn outline" aria-label=${`Open ${title} as its owner`} ?disabled=${this.busy} @click=${() => this.#open(t.id)}>
-        Open
+      <button class="btn outline" aria-label=${msg(str`Open ${title} as its owner`)} ?disabled=${this.busy} @click=${() => this.#open(t.id)}>
+        ${msg("Open")}
       </button>
     </li>`;
   }

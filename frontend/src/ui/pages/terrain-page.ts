@@ -1,3 +1,4 @@
+import { msg, str } from "@lit/localize";
 import { effect, signal } from "@preact/signals-core";
 import { html, nothing, type TemplateResult } from "lit";
 import { ApiError, api } from "../../app/server/api.ts";
@@ -38,16 +39,16 @@ import {
 } from "./handover.ts";
 
 const TABS = [
-  { value: "stroke", label: "Stroke" },
-  { value: "ground", label: "Ground", title: "Real ground: layers of elevation" },
-  { value: "terrain", label: "Terrain" },
-  { value: "history", label: "History", title: "What everybody did, and the terrain as it was" },
+  { value: "stroke", label: msg("Stroke") },
+  { value: "ground", label: msg("Ground"), title: msg("Real ground: layers of elevation") },
+  { value: "terrain", label: msg("Terrain") },
+  { value: "history", label: msg("History"), title: msg("What everybody did, and the terrain as it was") },
 ];
-const TASK = { value: "task", label: "Task", title: "What is asked, and how far one is" };
+const TASK = { value: "task", label: msg("Task"), title: msg("What is asked, and how far one is") };
 const LEADING = [
   ...TABS,
   TASK,
-  { value: "lesson", label: "Lesson", title: "Lead the lesson: hands off, look here, people" },
+  { value: "lesson", label: msg("Lesson"), title: msg("Lead the lesson: hands off, look here, people") },
 ];
 
 const WIDE = "(min-width: 1000px)";
@@ -220,7 +221,7 @@ export class EskTerrain extends SignalElement {
       Object.assign(document.createElement("a"), { href: url, download: `${name}.esker` }).click();
       setTimeout(() => URL.revokeObjectURL(url), 10_000);
     } catch (error) {
-      session.toasts.show(error instanceof ApiError ? error.message : "The download failed. Try again.", "warn");
+      session.toasts.show(error instanceof ApiError ? error.message : msg("The download failed. Try again."), "warn");
     }
   }
 
@@ -232,7 +233,7 @@ export class EskTerrain extends SignalElement {
         class="viewport"
         tabindex="0"
         role="application"
-        aria-label="Terrain. Enter draws with the arrow keys, question mark lists all keys."
+        aria-label=${msg("Terrain. Enter draws with the arrow keys, question mark lists all keys.")}
       ></div>
       ${stage ? this.#chrome(stage) : this.#veil(session)}
       ${session ? html`<esk-class-note .told=${session.inClass} .standing=${session.role} .state=${session.connection.state} .terrain=${session.id} .secret=${session.secret}></esk-class-note>` : nothing}
@@ -243,19 +244,21 @@ export class EskTerrain extends SignalElement {
   #veil(session: TerrainSession | null): TemplateResult {
     const closed = !this.secret || session?.connection.state.value === "closed";
     const reason = this.secret
-      ? (session?.connection.reason.value ?? "The connection was closed.")
-      : "This link is incomplete: the part after # is missing. Ask for the whole link.";
+      ? (session?.connection.reason.value ?? msg("The connection was closed."))
+      : msg("This link is incomplete: the part after # is missing. Ask for the whole link.");
     const waiting =
-      session?.connection.state.value === "reconnecting" ? session.connection.reason.value : "Opening the terrain…";
+      session?.connection.state.value === "reconnecting"
+        ? session.connection.reason.value
+        : msg("Opening the terrain…");
     return html`
       <div class="veil" role="status">
         <img src="/favicon.svg" alt="" width="52" height="52" class=${closed ? "" : "breathing"} />
         ${
           closed
-            ? html`<h1>This terrain cannot be opened.</h1>
+            ? html`<h1>${msg("This terrain cannot be opened.")}</h1>
                 <p>${reason}</p>
                 ${session ? bringBack(session) : nothing}
-                <a class="btn outline" href="/">Go to the start page</a>`
+                <a class="btn outline" href="/">${msg("Go to the start page")}</a>`
             : html`<p>${waiting}</p>`
         }
       </div>
@@ -295,10 +298,10 @@ export class EskTerrain extends SignalElement {
 
   #side(stage: Stage, tab: PanelTab): TemplateResult {
     return html`
-      <aside class="side panel ${tabsOf(stage).length > TABS.length ? "leads" : ""}" aria-label="Inspector">
+      <aside class="side panel ${tabsOf(stage).length > TABS.length ? "leads" : ""}" aria-label=${msg("Inspector")}>
         <header>
           <esk-segmented
-            label="Inspector"
+            label=${msg("Inspector")}
             .segments=${tabsOf(stage)}
             .value=${tab}
             @pick=${(e: CustomEvent<PanelTab>) => {
@@ -306,7 +309,7 @@ export class EskTerrain extends SignalElement {
               this.#panel.value = e.detail;
             }}
           ></esk-segmented>
-          <button class="icon-btn small" aria-label="Close the inspector" @click=${() => this.#togglePanel()}>${icon("xmark")}</button>
+          <button class="icon-btn small" aria-label=${msg("Close the inspector")} @click=${() => this.#togglePanel()}>${icon("xmark")}</button>
         </header>
         <div class="scroll">
           ${inspector(stage, tab, () => this.#browse())}
@@ -320,8 +323,8 @@ export class EskTerrain extends SignalElement {
     const edit = stage.session.canEdit.value;
     return html`
       <esk-drop-zone
-        lead=${edit ? "Drop it: real ground" : "You can look here, not change"}
-        detail=${edit ? "GeoTIFF, HGT, Esri ASCII, IMG, DTED, 16-bit PNG, RAW, NPY. Everybody here sees it appear." : VIEW_ONLY}
+        lead=${edit ? msg("Drop it: real ground") : msg("You can look here, not change")}
+        detail=${edit ? msg("GeoTIFF, HGT, Esri ASCII, IMG, DTED, 16-bit PNG, RAW, NPY. Everybody here sees it appear.") : VIEW_ONLY}
         @files=${(e: CustomEvent<File[]>) => this.#bring(stage, e.detail)}
       ></esk-drop-zone>
       <input
@@ -366,7 +369,7 @@ export class EskTerrain extends SignalElement {
     const leader = stage.session.members.value.find((m) => m.client === stage.following.value);
     if (!leader || stage.session.lesson.leader.value !== null) return nothing;
     return html`<div class="hint panel" style="border-color:${leader.colour}">
-      ${icon("eye")}<span>Following ${memberName(leader)}. Move the view to stop.</span>
+      ${icon("eye")}<span>${msg(str`Following ${memberName(leader)}. Move the view to stop.`)}</span>
     </div>`;
   }
 
@@ -377,7 +380,7 @@ export class EskTerrain extends SignalElement {
     return html`<div class="closed panel" role="alert">
       ${icon("warning")}<span>${status.value.detail}</span>
       ${bringBack(stage.session)}
-      <button class="btn outline" @click=${() => window.location.reload()}>Reload</button>
+      <button class="btn outline" @click=${() => window.location.reload()}>${msg("Reload")}</button>
     </div>`;
   }
 
@@ -386,7 +389,7 @@ export class EskTerrain extends SignalElement {
     const { connection, status } = stage.session;
     if (connection.state.value !== "reconnecting") return nothing;
     return html`<div class="closed notice offline panel" role="status">
-      ${icon("cloud-off")}<span><strong>${status.value.text}.</strong> The server makes the ground: it stays as it is until the connection is back.</span>
+      ${icon("cloud-off")}<span>${msg(html`<strong>${status.value.text}.</strong> The server makes the ground: it stays as it is until the connection is back.`)}</span>
     </div>`;
   }
 
@@ -397,8 +400,8 @@ export class EskTerrain extends SignalElement {
     if (notice === null || session.connection.state.value === "closed") return nothing;
     return html`<div class="closed notice panel" role="status">
       ${icon("info")}<span>${notice.text}</span>
-      ${notice.retry ? html`<button class="btn outline" @click=${() => graphics.retry()}>Try the 3D view again</button>` : nothing}
-      <button class="icon-btn small" aria-label="Dismiss" @click=${() => graphics.dismiss()}>${icon("xmark")}</button>
+      ${notice.retry ? html`<button class="btn outline" @click=${() => graphics.retry()}>${msg("Try the 3D view again")}</button>` : nothing}
+      <button class="icon-btn small" aria-label=${msg("Dismiss")} @click=${() => graphics.dismiss()}>${icon("xmark")}</button>
     </div>`;
   }
 
@@ -410,7 +413,7 @@ export class EskTerrain extends SignalElement {
     if (stage.graphics.notice.value !== null) return nothing;
     return html`<div class="closed notice panel" role="status">
       ${icon("info")}<span>${notice.value}</span>
-      <button class="icon-btn small" aria-label="Dismiss" @click=${() => stage.session.dismissNotice()}>${icon("xmark")}</button>
+      <button class="icon-btn small" aria-label=${msg("Dismiss")} @click=${() => stage.session.dismissNotice()}>${icon("xmark")}</button>
     </div>`;
   }
 }

@@ -1,5 +1,6 @@
 /** The cards of the wall: one for each copy, its ground drawn as relief from its coarsest tiles. */
 
+import { msg, str } from "@lit/localize";
 import { html, nothing, type TemplateResult } from "lit";
 import { copyName } from "../../app/server/classes/copies.ts";
 import type { WallConnection } from "../../app/server/classes/wall.ts";
@@ -65,21 +66,21 @@ interface CardState {
 
 export function wallCard(copy: WallCopy, { isChosen, isShown, onPress }: CardState): TemplateResult {
   const name = copyName(copy);
-  const last = copy.last === null ? "nothing drawn yet" : ago(Date.now() - 1000 * copy.last);
+  const last = copy.last === null ? msg("nothing drawn yet") : ago(Date.now() - 1000 * copy.last);
   const points = copy.score?.points ?? null;
-  const scored = points === null ? "" : `, ${points} of 100 points`;
-  const lines = copy.strokes === 1 ? "1 line" : `${copy.strokes} lines`;
+  const scored = points === null ? "" : `, ${msg(str`${points} of 100 points`)}`;
+  const lines = copy.strokes === 1 ? msg("1 line") : msg(str`${copy.strokes} lines`);
   return html`<li>
       <button
         class="copy"
         aria-pressed=${isChosen ? "true" : "false"}
-        aria-label=${`${name}, ${copy.online > 0 ? "here" : "away"}, ${last}, ${lines}${scored}`}
+        aria-label=${`${name}, ${copy.online > 0 ? msg("here") : msg("away")}, ${last}, ${lines}${scored}`}
         @click=${onPress}
       >
         <span class="picture"><canvas data-copy=${copy.number} aria-hidden="true"></canvas></span>
         <span class="badges">
-          ${isShown ? html`<span class="badge shown">${icon("eye")} Shown to all</span>` : nothing}
-          ${copy.frozen ? html`<span class="badge">${icon("lock")} Frozen</span>` : nothing}
+          ${isShown ? html`<span class="badge shown">${icon("eye")} ${msg("Shown to all")}</span>` : nothing}
+          ${copy.frozen ? html`<span class="badge">${icon("lock")} ${msg("Frozen")}</span>` : nothing}
         </span>
         ${points === null ? nothing : html`<span class="points" title=${copy.score?.text ?? ""} style="--done:${points}%">${points}</span>`}
         <span class="words">

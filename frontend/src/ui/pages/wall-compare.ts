@@ -1,3 +1,4 @@
+import { msg } from "@lit/localize";
 import { effect } from "@preact/signals-core";
 import { html, type TemplateResult } from "lit";
 import { copyName } from "../../app/server/classes/copies.ts";
@@ -134,13 +135,13 @@ export class EskWallCompare extends SignalElement {
     const copies = this.wall.copies.value;
     return html`
       <header>
-        <p>Drag to move, wheel or pinch to come closer: both follow.</p>
-        <button class="btn outline" @click=${() => this.#close()}>${icon("xmark")} Back to the wall</button>
+        <p>${msg("Drag to move, wheel or pinch to come closer: both follow.")}</p>
+        <button class="btn outline" @click=${() => this.#close()}>${icon("xmark")} ${msg("Back to the wall")}</button>
       </header>
       <div
         class="pair"
         tabindex="0"
-        aria-label="Two copies side by side. Arrow keys move, plus and minus come closer, Escape closes."
+        aria-label=${msg("Two copies side by side. Arrow keys move, plus and minus come closer, Escape closes.")}
         @wheel=${this.#wheel}
         @pointerdown=${this.#down}
         @pointermove=${this.#drag}

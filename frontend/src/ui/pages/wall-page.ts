@@ -1,3 +1,4 @@
+import { msg, str } from "@lit/localize";
 import { effect, signal } from "@preact/signals-core";
 import { html, nothing, type TemplateResult } from "lit";
 import { ApiError } from "../../app/server/api.ts";
@@ -16,11 +17,11 @@ import { emptyWall, openDoor } from "./wall-door.ts";
 import { wallStyles } from "./wall-styles.ts";
 
 const SORTS = [
-  { value: "number", label: "As they came" },
-  { value: "name", label: "By name" },
-  { value: "last", label: "Drawn last" },
+  { value: "number", label: msg("As they came") },
+  { value: "name", label: msg("By name") },
+  { value: "last", label: msg("Drawn last") },
 ];
-const BY_SCORE = { value: "score", label: "By score" };
+const BY_SCORE = { value: "score", label: msg("By score") };
 const POLL_MS = 400;
 const WORDS_MS = 15_000;
 
@@ -79,7 +80,7 @@ export class EskWall extends SignalElement {
 
   override connectedCallback(): void {
     super.connectedCallback();
-    document.title = "The wall · Esker";
+    document.title = msg("The wall · Esker");
     const { terrain, secret, lesson } = this;
     const scheme = window.location.protocol === "https:" ? "wss" : "ws";
     const wall = new WallConnection({
@@ -123,7 +124,7 @@ export class EskWall extends SignalElement {
     try {
       this.done = await what(this.#orders);
     } catch (error) {
-      this.problem = error instanceof ApiError ? error.message : "Something went wrong. Try again.";
+      this.problem = error instanceof ApiError ? error.message : msg("Something went wrong. Try again.");
     } finally {
       this.busy = false;
     }
@@ -172,12 +173,12 @@ export class EskWall extends SignalElement {
         job = await orders.collected(job.id);
       }
       this.collecting = null;
-      if (job.stage !== "done") throw new ApiError("failed", job.text || "The class could not be collected.");
+      if (job.stage !== "done") throw new ApiError("failed", job.text || msg("The class could not be collected."));
       const url = URL.createObjectURL(await orders.file(job.id));
       const name = `${this.#wall?.state.peek()?.title || "class"}.zip`;
       Object.assign(document.createElement("a"), { href: url, download: name }).click();
       setTimeout(() => URL.revokeObjectURL(url), 10_000);
-      return "The class is collected: a file and a picture of each copy, and a table.";
+      return msg("The class is collected: a file and a picture of each copy, and a table.");
     });
     this.collecting = null;
   }
@@ -208,12 +209,12 @@ export class EskWall extends SignalElement {
     const problem = wall.problem.value;
     return html`<div class="empty alone">
       <img src="/favicon.svg" alt="" width="52" height="52" />
-      <p role="status">${problem ?? "Opening the wall…"}</p>
+      <p role="status">${problem ?? msg("Opening the wall…")}</p>
       <p class="problem" role="alert">${this.problem}</p>
       ${
         wall.over.value
-          ? html`<button class="btn outline" @click=${() => this.#bringBack()}>Bring a deleted class back</button>
-              <a class="btn" href=${terrainPath(this.terrain, this.secret)}>Go to the terrain</a>`
+          ? html`<button class="btn outline" @click=${() => this.#bringBack()}>${msg("Bring a deleted class back")}</button>
+              <a class="btn" href=${terrainPath(this.terrain, this.secret)}>${msg("Go to the terrain")}</a>`
           : nothing
       }
     </div>`;
@@ -231,12 +232,12 @@ export class EskWall extends SignalElement {
     const here = [...(this.#wall?.copies.value.values() ?? [])].reduce((sum, copy) => sum + copy.online, 0);
     return html`<header>
       <div class="title">
-        <h1>${state.title || "Untitled terrain"}</h1>
-        <p class="quiet">${state.pupils === 0 ? "The wall of this class" : `${here} of ${state.pupils} ${state.pupils === 1 ? "device is" : "devices are"} here`}</p>
+        <h1>${state.title || msg("Untitled terrain")}</h1>
+        <p class="quiet">${state.pupils === 0 ? msg("The wall of this class") : state.pupils === 1 ? msg(str`${here} of 1 device is here`) : msg(str`${here} of ${state.pupils} devices are here`)}</p>
       </div>
       ${
         state.code === null
-          ? html`<button class="btn outline" ?disabled=${this.busy} @click=${() => this.#door(true)}>${icon("unlock")} Let more people in</button>`
+          ? html`<button class="btn outline" ?disabled=${this.busy} @click=${() => this.#door(true)}>${icon("unlock")} ${msg("Let more people in")}</button>`
           : state.pupils === 0
             ? nothing
             : openDoor({
@@ -252,7 +253,7 @@ export class EskWall extends SignalElement {
   #door(open: boolean): Promise<void> {
     return this.#do(async (orders) => {
       await orders.door(open);
-      return open ? "" : "The door is closed. Who is in stays in.";
+      return open ? "" : msg("The door is closed. Who is in stays in.");
     });
   }
 
@@ -261,7 +262,7 @@ export class EskWall extends SignalElement {
     return html`
       <div class="tools">
         <esk-segmented
-          label="Order"
+          label=${msg("Order")}
           .segments=${isScored ? [...SORTS, BY_SCORE] : SORTS}
           .value=${this.sorting}
           @pick=${(e: CustomEvent<Sorting>) => {
@@ -271,8 +272,8 @@ export class EskWall extends SignalElement {
         <input
           class="field"
           type="search"
-          placeholder="Find a name"
-          aria-label="Find a name"
+          placeholder=${msg("Find a name")}
+          aria-label=${msg("Find a name")}
           .value=${this.filter}
           @input=${(e: Event) => {
             this.filter = (e.target as HTMLInputElement).value;
@@ -280,10 +281,10 @@ export class EskWall extends SignalElement {
         />
         <span class="grow"></span>
         <button class="btn outline" ?disabled=${this.busy || count === 0} @click=${() => this.#push()}>
-          ${icon("share")} Send my additions
+          ${icon("share")} ${msg("Send my additions")}
         </button>
         <button class="btn outline" ?disabled=${this.busy || count === 0} @click=${() => this.#collect()}>
-          ${icon("download")} ${this.collecting ? `Collecting, ${Math.round(100 * this.collecting.share)} %` : "Collect"}
+          ${icon("download")} ${this.collecting ? msg(str`Collecting, ${Math.round(100 * this.collecting.share)} %`) : msg("Collect")}
         </button>
         <button
           class="btn outline"
@@ -292,7 +293,7 @@ export class EskWall extends SignalElement {
             this.asking = "delete";
           }}
         >
-          ${icon("trash")} Delete this class
+          ${icon("trash")} ${msg("Delete this class")}
         </button>
       </div>
       ${problem || this.problem ? html`<p class="notice problem" role="alert">${this.problem || problem}</p>` : nothing}
@@ -304,17 +305,19 @@ export class EskWall extends SignalElement {
   #push(): Promise<void> {
     return this.#do(async (orders) => {
       const { changed } = await orders.push();
-      if (changed === 0) return "There is nothing new in your terrain.";
-      return `Your additions are in ${changed === 1 ? "one copy" : `${changed} copies`}. What pupils changed stayed as they have it.`;
+      if (changed === 0) return msg("There is nothing new in your terrain.");
+      return changed === 1
+        ? msg("Your additions are in one copy. What pupils changed stayed as they have it.")
+        : msg(str`Your additions are in ${changed} copies. What pupils changed stayed as they have it.`);
     });
   }
 
   #confirmDelete(count: number): TemplateResult {
-    return html`<div class="notice" role="alertdialog" aria-label="Delete this class">
-      <span>Delete this class with ${count === 1 ? "its copy" : `its ${count} copies`}, all names and links? Within a week it can be brought back; at once, never.</span>
-      <button class="btn danger" @click=${() => this.#delete(false)}>Delete</button>
-      <button class="btn danger" @click=${() => this.#delete(true)}>Delete at once</button>
-      <button class="btn outline" @click=${this.#neverMind}>Keep it</button>
+    return html`<div class="notice" role="alertdialog" aria-label=${msg("Delete this class")}>
+      <span>${count === 1 ? msg("Delete this class with its copy, all names and links? Within a week it can be brought back; at once, never.") : msg(str`Delete this class with its ${count} copies, all names and links? Within a week it can be brought back; at once, never.`)}</span>
+      <button class="btn danger" @click=${() => this.#delete(false)}>${msg("Delete")}</button>
+      <button class="btn danger" @click=${() => this.#delete(true)}>${msg("Delete at once")}</button>
+      <button class="btn outline" @click=${this.#neverMind}>${msg("Keep it")}</button>
     </div>`;
   }
 
@@ -347,22 +350,22 @@ export class EskWall extends SignalElement {
       ${
         shown === null
           ? nothing
-          : html`<button class="btn primary" ?disabled=${this.busy} @click=${() => this.#show(null)}>${icon("eye-slash")} Stop showing</button>`
+          : html`<button class="btn primary" ?disabled=${this.busy} @click=${() => this.#show(null)}>${icon("eye-slash")} ${msg("Stop showing")}</button>`
       }
       ${
         numbers.length === 0
           ? nothing
-          : html`<span class="count">${numbers.length === 1 ? copyName(copies!.get(one!)!) : `${numbers.length} copies`}</span>
-              ${button("Open", "arrow-right", () => single && this.#open((o) => o.open(one), ""), single)}
-              ${button("Show to all", "eye", () => single && this.#show(one), single)}
-              ${button("Compare", "swap", () => this.#compare(numbers), numbers.length === MAX_COMPARED)}
-              ${button("Put together", "layers", () => this.#open((o) => o.together(numbers), "The new terrain is open in a page of its own."), numbers.length > 1)}
-              ${button(frozen ? "Let them go on" : "Freeze", frozen ? "unlock" : "lock", () => this.#freeze(numbers, !frozen))}
+          : html`<span class="count">${numbers.length === 1 ? copyName(copies!.get(one!)!) : msg(str`${numbers.length} copies`)}</span>
+              ${button(msg("Open"), "arrow-right", () => single && this.#open((o) => o.open(one), ""), single)}
+              ${button(msg("Show to all"), "eye", () => single && this.#show(one), single)}
+              ${button(msg("Compare"), "swap", () => this.#compare(numbers), numbers.length === MAX_COMPARED)}
+              ${button(msg("Put together"), "layers", () => this.#open((o) => o.together(numbers), msg("The new terrain is open in a page of its own.")), numbers.length > 1)}
+              ${button(frozen ? msg("Let them go on") : msg("Freeze"), frozen ? "unlock" : "lock", () => this.#freeze(numbers, !frozen))}
               ${
                 this.asking === "restart"
-                  ? html`<button class="btn danger" @click=${() => this.#restart(numbers)}>Yes, start again</button>
-                      <button class="btn outline" @click=${this.#neverMind}>No</button>`
-                  : button("Start again", "rotate", () => {
+                  ? html`<button class="btn danger" @click=${() => this.#restart(numbers)}>${msg("Yes, start again")}</button>
+                      <button class="btn outline" @click=${this.#neverMind}>${msg("No")}</button>`
+                  : button(msg("Start again"), "rotate", () => {
                       this.asking = "restart";
                     })
               }
@@ -372,7 +375,7 @@ export class EskWall extends SignalElement {
                   this.chosen = new Set();
                 }}
               >
-                Choose none
+                ${msg("Choose none")}
               </button>`
       }
       ${
@@ -383,7 +386,7 @@ export class EskWall extends SignalElement {
                 this.chosen = new Set(copies.keys());
               }}
             >
-              Choose all
+              ${msg("Choose all")}
             </button>`
           : nothing
       }
@@ -408,8 +411,8 @@ export class EskWall extends SignalElement {
     return this.#do(async (orders) => {
       const { changed } = await orders.restart(numbers);
       return changed === 0
-        ? "They were as they began already."
-        : "They are as they were at the beginning. What was drawn stays in their history.";
+        ? msg("They were as they began already.")
+        : msg("They are as they were at the beginning. What was drawn stays in their history.");
     });
   }
 

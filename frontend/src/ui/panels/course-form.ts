@@ -1,3 +1,4 @@
+import { msg } from "@lit/localize";
 import { css, html, LitElement, nothing, type TemplateResult } from "lit";
 import { COURSE_WORDS } from "../../app/words/kind-word.ts";
 import type { Course } from "../../generated/contract.ts";
@@ -11,6 +12,9 @@ export interface CourseChange {
   readonly style: CourseStyle;
   readonly settled: boolean;
 }
+
+/** Words that say of what a measure is, for people who hear a field away from its heading. */
+const OF = { river: msg("of the river"), road: msg("of the road"), ridge: msg("of the ridge") } as const;
 
 const USES = (Object.entries(COURSE_WORDS) as [Course["use"], string][]).map(([value, label]) => ({ value, label }));
 
@@ -74,15 +78,15 @@ export class EskCourseForm extends LitElement {
     const size = this.sizeM;
     return html`
       <esk-segmented
-        label="River, road or ridge"
+        label=${msg("River, road or ridge")}
         .segments=${USES}
         .value=${use}
         ?disabled=${this.disabled}
         @pick=${(e: CustomEvent<Course["use"]>) => this.#emit({ use: e.detail }, true)}
       ></esk-segmented>
-      ${this.#metres("Width", "widthM", size / 4096, size / 32)}
-      ${use === "road" ? this.#grade(grade) : this.#metres(use === "ridge" ? "Height" : "Depth", "depthM", 0, size / 16)}
-      ${this.#metres("Banks", "bankM", 0, size / 8)}
+      ${this.#metres(msg("Width"), "widthM", size / 4096, size / 32)}
+      ${use === "road" ? this.#grade(grade) : this.#metres(use === "ridge" ? msg("Height") : msg("Depth"), "depthM", 0, size / 16)}
+      ${this.#metres(msg("Banks"), "bankM", 0, size / 8)}
       ${
         this.facts.length === 0
           ? nothing
@@ -100,7 +104,7 @@ export class EskCourseForm extends LitElement {
     const set = (e: CustomEvent<number>, settled: boolean): void => this.#emit({ [name]: e.detail }, settled);
     return html`<esk-range
       label=${label}
-      of=${`of the ${this.value.use}`}
+      of=${OF[this.value.use]}
       unit="m"
       min=${min}
       max=${max}
@@ -115,8 +119,8 @@ export class EskCourseForm extends LitElement {
   #grade(grade: number): TemplateResult {
     const set = (e: CustomEvent<number>, settled: boolean): void => this.#emit({ grade: e.detail / 100 }, settled);
     return html`<esk-range
-      label="Steepest grade"
-      of="of the road"
+      label=${msg("Steepest grade")}
+      of=${OF.road}
       unit="%"
       min="1"
       max="40"

@@ -1,3 +1,4 @@
+import { msg } from "@lit/localize";
 import { css, html, LitElement, type TemplateResult } from "lit";
 import type { Stroke } from "../../generated/contract.ts";
 import "../controls/range-field.ts";
@@ -58,10 +59,10 @@ export class EskDetailForm extends LitElement {
     const { amplitude_m: amplitude, roughness } = this.fields;
     const share = (percent: number): number => Math.min(1, Math.max(0, percent / 100));
     return html`
-      <h3>Detail</h3>
-      <p>How broken the ground is around this stroke.</p>
+      <h3>${msg("Detail")}</h3>
+      <p>${msg("How broken the ground is around this stroke.")}</p>
       <esk-range
-        label="Amplitude"
+        label=${msg("Amplitude")}
         unit="m"
         min="0"
         max=${this.sizeM / 64}
@@ -72,7 +73,7 @@ export class EskDetailForm extends LitElement {
         @settle=${(e: CustomEvent<number>) => this.#emit({ amplitude_m: e.detail }, true)}
       ></esk-range>
       <esk-range
-        label="Roughness"
+        label=${msg("Roughness")}
         unit="%"
         min="0"
         max="100"

@@ -1,3 +1,4 @@
+import { msg } from "@lit/localize";
 import type { ReadonlySignal } from "@preact/signals-core";
 import { effect } from "@preact/signals-core";
 import { html, nothing, type TemplateResult } from "lit";
@@ -7,6 +8,7 @@ import { type HistoryEntry, keyOf } from "../../app/history/history.ts";
 import type { HistoryView } from "../../app/history/history-view.ts";
 import type { TimeLapse } from "../../app/history/timelapse.ts";
 import { ago } from "../../app/words/words.ts";
+import { region } from "../../core/language.ts";
 import type { Member } from "../../generated/contract.ts";
 import { icon } from "../controls/icons.ts";
 import { SignalElement } from "../controls/signal-element.ts";
@@ -85,17 +87,17 @@ export class EskHistoryPanel extends SignalElement {
     const state = history.state.value;
     if (state === "failed" && entries.length === 0) return this.#failed();
     if (state === "waiting" && entries.length === 0)
-      return html`<p class="lead" role="status">Reading the history…</p>`;
+      return html`<p class="lead" role="status">${msg("Reading the history…")}</p>`;
     if (entries.length === 0) return this.#empty();
     return html`
       ${this.#now(historyView.active.value)}
-      <ol class="entries" aria-label="What people did, newest first">
+      <ol class="entries" aria-label=${msg("What people did, newest first")}>
         ${repeat(entries, keyOf, (entry) => this.#entry(entry))}
       </ol>
       ${
         history.more.value
-          ? html`<button class="btn outline" @click=${() => void history.earlier()}>Show earlier</button>`
-          : html`<p class="lead end">${history.first.value > 0 ? "The list begins here. The slider goes back to the beginning." : "This is where the terrain began."}</p>`
+          ? html`<button class="btn outline" @click=${() => void history.earlier()}>${msg("Show earlier")}</button>`
+          : html`<p class="lead end">${history.first.value > 0 ? msg("The list begins here. The slider goes back to the beginning.") : msg("This is where the terrain began.")}</p>`
       }
     `;
   }
@@ -103,16 +105,16 @@ export class EskHistoryPanel extends SignalElement {
   #empty(): TemplateResult {
     return html`<div class="empty">
       ${icon("clock")}
-      <p>Nothing has happened here yet. Everything that anybody draws, paints, changes or takes back will be listed here.</p>
-      <p>A click on an entry shows the terrain as it was then. Nothing is ever lost.</p>
+      <p>${msg("Nothing has happened here yet. Everything that anybody draws, paints, changes or takes back will be listed here.")}</p>
+      <p>${msg("A click on an entry shows the terrain as it was then. Nothing is ever lost.")}</p>
     </div>`;
   }
 
   #failed(): TemplateResult {
     return html`<div class="empty">
       ${icon("warning")}
-      <p>The history could not be read.</p>
-      <button class="btn outline" @click=${() => this.history.retry()}>Try again</button>
+      <p>${msg("The history could not be read.")}</p>
+      <button class="btn outline" @click=${() => this.history.retry()}>${msg("Try again")}</button>
     </div>`;
   }
 
@@ -122,7 +124,7 @@ export class EskHistoryPanel extends SignalElement {
         class="btn ${isHistory ? "outline" : "primary"}"
         @click=${() => (isHistory ? this.historyView.leave() : this.timeLapse.play())}
       >
-        ${icon(isHistory ? "arrow-right" : "play")} ${isHistory ? "Back to now" : "Watch it come to be"}
+        ${icon(isHistory ? "arrow-right" : "play")} ${isHistory ? msg("Back to now") : msg("Watch it come to be")}
       </button>
     </div>`;
   }
@@ -132,14 +134,14 @@ export class EskHistoryPanel extends SignalElement {
     const shown = historyView.wanted.value;
     const chosen = shown !== null && shown === entry.last;
     const later = shown !== null && entry.first > shown;
-    const name = entry.author === client ? "You" : history.nameOf(entry.author);
+    const name = entry.author === client ? msg("You") : history.nameOf(entry.author);
     const colour = this.#colour(entry.author);
     const when = entry.at === null ? "" : ago(Math.max(0, Date.now() - entry.at * 1000));
     return html`<li>
       <button
         class="btn item ${later ? "later" : ""}"
         aria-pressed=${chosen}
-        title=${entry.at === null ? nothing : new Date(entry.at * 1000).toLocaleString()}
+        title=${entry.at === null ? nothing : new Date(entry.at * 1000).toLocaleString(region())}
         @click=${() => this.timeLapse.show(entry.last)}
       >
         <span class="mark" style=${`--who:${colour}`}>${icon(entry.turn || (ICONS[entry.action] ?? "pen"))}</span>

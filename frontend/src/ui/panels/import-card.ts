@@ -1,3 +1,4 @@
+import { msg, str } from "@lit/localize";
 import { html, nothing, type TemplateResult } from "lit";
 import { live } from "lit/directives/live.js";
 import {
@@ -25,11 +26,11 @@ import { progressStyles } from "../styles/progress.ts";
 import { shared } from "../styles/shared.ts";
 
 const STAGES: Readonly<Record<string, string>> = {
-  upload: "Receiving",
-  reading: "Reading the heights",
-  mipmaps: "Making coarser levels",
-  errors: "Measuring how far each patch is right",
-  saving: "Saving",
+  upload: msg("Receiving"),
+  reading: msg("Reading the heights"),
+  mipmaps: msg("Making coarser levels"),
+  errors: msg("Measuring how far each patch is right"),
+  saving: msg("Saving"),
 };
 
 /** Returns the stage of an import in words, with how far it is. */
@@ -37,21 +38,21 @@ export function jobWords(job: ImportJob): string {
   const percent = `${Math.round(100 * job.share)}\u00a0%`;
   switch (job.phase) {
     case "waiting":
-      return "Waits for the file before it";
+      return msg("Waits for the file before it");
     case "upload":
-      return `Uploading, ${percent} of ${bytes(job.bytes)}`;
+      return msg(str`Uploading, ${percent} of ${bytes(job.bytes)}`);
     case "work":
-      return `${STAGES[job.status?.stage ?? "reading"] ?? "Working"}, ${percent}`;
+      return `${STAGES[job.status?.stage ?? "reading"] ?? msg("Working")}, ${percent}`;
     case "question":
-      return "Needs an answer from you";
+      return msg("Needs an answer from you");
     case "done":
-      return "Part of the ground now";
+      return msg("Part of the ground now");
     case "refused":
-      return "Cannot be used";
+      return msg("Cannot be used");
     case "cancelled":
-      return "Cancelled. Nothing was added";
+      return msg("Cancelled. Nothing was added");
     case "failed":
-      return "Did not arrive";
+      return msg("Did not arrive");
   }
 }
 
@@ -78,13 +79,13 @@ export class EskImportCard extends SignalElement {
     const over = isOver(job.phase);
     const tone = job.phase === "refused" || job.phase === "failed" ? "bad" : job.phase === "done" ? "ok" : "";
     return html`
-      <article class=${tone} aria-label=${`File ${job.file}`}>
+      <article class=${tone} aria-label=${msg(str`File ${job.file}`)}>
         <header>
           <strong title=${job.file}>${job.file}</strong>
           <button
             class="icon-btn small"
-            aria-label=${over ? `Close the card of ${job.file}` : `Cancel ${job.file}`}
-            title=${over ? "Close" : "Cancel"}
+            aria-label=${over ? msg(str`Close the card of ${job.file}`) : msg(str`Cancel ${job.file}`)}
+            title=${over ? msg("Close") : msg("Cancel")}
             @click=${() => (over ? imports.dismiss(job.key) : imports.cancel(job.key))}
           >
             ${icon("xmark")}
@@ -119,7 +120,7 @@ export class EskImportCard extends SignalElement {
       ${
         facts.length > 0
           ? html`<details ?open=${open}>
-              <summary>What it is</summary>
+              <summary>${msg("What it is")}</summary>
               <dl>${facts.map(([what, how]) => html`<dt>${what}</dt><dd>${how}</dd>`)}</dl>
             </details>`
           : nothing
@@ -140,7 +141,7 @@ export class EskImportCard extends SignalElement {
         ${
           byHand
             ? html`<p class="note">
-                  ${icon("info")}<span>Drag the grid and its handles on the ground. Nobody else sees it yet.</span>
+                  ${icon("info")}<span>${msg("Drag the grid and its handles on the ground. Nobody else sees it yet.")}</span>
                 </p>
                 <esk-placement-form
                   .shape=${placing}
@@ -151,8 +152,8 @@ export class EskImportCard extends SignalElement {
             : nothing
         }
         <div class="row">
-          <button class="btn outline" type="button" @click=${() => groundwork.imports.cancel(this.job.key)}>Cancel</button>
-          <button class="btn primary" type="submit">${byHand ? "Place it here" : "Go on"}</button>
+          <button class="btn outline" type="button" @click=${() => groundwork.imports.cancel(this.job.key)}>${msg("Cancel")}</button>
+          <button class="btn primary" type="submit">${byHand ? msg("Place it here") : msg("Go on")}</button>
         </div>
       </form>
     `;
@@ -169,8 +170,8 @@ export class EskImportCard extends SignalElement {
     return html`<fieldset>
       <legend>${rangeWords(text)}</legend>
       <div class="two">
-        ${field("Lowest", low, (v) => `${v}..${Math.max(v, high)}`)}
-        ${field("Highest", high, (v) => `${Math.min(v, low)}..${v}`)}
+        ${field(msg("Lowest"), low, (v) => `${v}..${Math.max(v, high)}`)}
+        ${field(msg("Highest"), high, (v) => `${Math.min(v, low)}..${v}`)}
       </div>
     </fieldset>`;
   }
@@ -179,13 +180,13 @@ export class EskImportCard extends SignalElement {
   #otherSystem(question: ImportQuestion, answer: string, set: (value: string) => void): TemplateResult {
     const own = question.options.includes(answer) ? "" : answer;
     return html`<label class="choice other">
-      <span>Or</span>
+      <span>${msg("Or")}</span>
       <input
         class="field"
         placeholder="EPSG:32610"
         autocomplete="off"
         spellcheck="false"
-        aria-label="Another coordinate system, as an EPSG code"
+        aria-label=${msg("Another coordinate system, as an EPSG code")}
         .value=${live(own)}
         @change=${(e: Event) => set((e.target as HTMLInputElement).value.trim() || question.default)}
         @keydown=${(e: Event) => e.stopPropagation()}
@@ -228,8 +229,8 @@ export class EskImportCard extends SignalElement {
 }
 
 function whatToDo(problem: string | null): string {
-  if (listsFormats(problem ?? "")) return "Nothing was added. Save it in one of these formats and drop it again.";
-  return "Nothing was added. Mend the file and drop it again, or drop another one.";
+  if (listsFormats(problem ?? "")) return msg("Nothing was added. Save it in one of these formats and drop it again.");
+  return msg("Nothing was added. Mend the file and drop it again, or drop another one.");
 }
 
 customElements.define("esk-import-card", EskImportCard);

@@ -1,3 +1,4 @@
+import { msg, str } from "@lit/localize";
 import { css, html, nothing, type TemplateResult } from "lit";
 import { layerFacts } from "../../app/layers/layers.ts";
 import type { GridPlace } from "../../core/lattice.ts";
@@ -97,19 +98,19 @@ export class EskLayerForm extends SignalElement {
     const inHand = this.placing.value?.id === layer.id;
     return html`
       <div class="row">
-        <button class="btn outline" @click=${() => groundwork.reveal(layer)}>${icon("frame")} Look at it</button>
+        <button class="btn outline" @click=${() => groundwork.reveal(layer)}>${icon("frame")} ${msg("Look at it")}</button>
         <button
           class="btn ${inHand ? "primary" : "outline"}"
           aria-pressed=${inHand}
           ?disabled=${disabled}
           @click=${() => groundwork.togglePlacing(layer)}
         >
-          ${icon("select")} ${inHand ? "Leave it here" : "Move it"}
+          ${icon("select")} ${inHand ? msg("Leave it here") : msg("Move it")}
         </button>
       </div>
       ${
         inHand
-          ? html`<p class="lead">Drag it, its corners, or the knobs that turn and lift it. Everybody sees it move. Enter leaves it, Esc puts it back.</p>
+          ? html`<p class="lead">${msg("Drag it, its corners, or the knobs that turn and lift it. Everybody sees it move. Enter leaves it, Esc puts it back.")}</p>
             <esk-placement-form
               .shape=${layer.facts}
               .place=${layer}
@@ -120,7 +121,7 @@ export class EskLayerForm extends SignalElement {
           : nothing
       }
       <esk-number
-        label="Accuracy: heights are right within"
+        label=${msg("Accuracy: heights are right within")}
         unit="m"
         .value=${layer.accuracy_m}
         min="0"
@@ -130,7 +131,7 @@ export class EskLayerForm extends SignalElement {
         @number=${(e: CustomEvent<number>) => this.#set({ accuracy_m: e.detail })}
       ></esk-number>
       <esk-range
-        label="Outline"
+        label=${msg("Outline")}
         unit="%"
         min="0"
         max="100"
@@ -140,13 +141,13 @@ export class EskLayerForm extends SignalElement {
         @value=${(e: CustomEvent<number>) => this.#set({ outline: share(e.detail) }, false)}
         @settle=${(e: CustomEvent<number>) => this.#set({ outline: share(e.detail) })}
       ></esk-range>
-      ${this.#text("Name", "name", disabled, layer.facts.file || "Elevation grid")} ${this.#text("Source", "source", disabled, "Who measured it, when")}
-      ${this.#text("Licence", "licence", disabled, "How it may be used")}
+      ${this.#text(msg("Name"), "name", disabled, layer.facts.file || msg("Elevation grid"))} ${this.#text(msg("Source"), "source", disabled, msg("Who measured it, when"))}
+      ${this.#text(msg("Licence"), "licence", disabled, msg("How it may be used"))}
       <details>
-        <summary>What it is</summary>
+        <summary>${msg("What it is")}</summary>
         <dl>${layerFacts(layer).map(([what, how]) => html`<dt>${what}</dt><dd>${how}</dd>`)}</dl>
       </details>
-      ${layer.author ? html`<p class="quiet">Brought in by ${layer.author}</p>` : nothing}
+      ${layer.author ? html`<p class="quiet">${msg(str`Brought in by ${layer.author}`)}</p>` : nothing}
     `;
   }
 

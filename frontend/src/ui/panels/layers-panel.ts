@@ -1,3 +1,4 @@
+import { msg, str } from "@lit/localize";
 import { html, nothing, type TemplateResult } from "lit";
 import { repeat } from "lit/directives/repeat.js";
 import { type Layer, MAX_LAYERS } from "../../generated/contract.ts";
@@ -75,30 +76,31 @@ export class EskLayersPanel extends SignalElement {
   }
 
   #adding(layers: number): TemplateResult {
-    if (!this.canEdit.value) return html`<p class="lead">This link lets you look at the layers, not change them.</p>`;
+    if (!this.canEdit.value)
+      return html`<p class="lead">${msg("This link lets you look at the layers, not change them.")}</p>`;
     if (layers >= MAX_LAYERS)
-      return html`<p class="lead">A terrain holds ${MAX_LAYERS} layers. Delete one to bring in another.</p>`;
+      return html`<p class="lead">${msg(str`A terrain holds ${MAX_LAYERS} layers. Delete one to bring in another.`)}</p>`;
     return html`<button
       class="btn primary add"
-      title=${keyText("Add real ground", this.actions.get("add-ground"))}
+      title=${keyText(msg("Add real ground"), this.actions.get("add-ground"))}
       @click=${() => this.dispatchEvent(new CustomEvent("browse"))}
     >
-      ${icon("plus")} Add real ground…
+      ${icon("plus")} ${msg("Add real ground…")}
     </button>`;
   }
 
   #empty(): TemplateResult {
     return html`<div class="empty">
       ${icon("landscape")}
-      <p>No real ground yet. Drop a file with heights anywhere on this page: GeoTIFF, HGT, Esri ASCII, IMG, DTED, 16-bit PNG, RAW or NPY.</p>
-      <p>Sketch on it as on any land. A finer grid, or one turned by any angle, melts into what lies there.</p>
+      <p>${msg("No real ground yet. Drop a file with heights anywhere on this page: GeoTIFF, HGT, Esri ASCII, IMG, DTED, 16-bit PNG, RAW or NPY.")}</p>
+      <p>${msg("Sketch on it as on any land. A finer grid, or one turned by any angle, melts into what lies there.")}</p>
     </div>`;
   }
 
   #list(layers: readonly Layer[]): TemplateResult {
     return html`
-      ${layers.length > 1 ? html`<p class="lead">Where layers disagree, the upper one is believed.</p>` : nothing}
-      <ol class="layers" aria-label="Layers, the most believed first">
+      ${layers.length > 1 ? html`<p class="lead">${msg("Where layers disagree, the upper one is believed.")}</p>` : nothing}
+      <ol class="layers" aria-label=${msg("Layers, the most believed first")}>
         ${repeat(
           layers,
           (l) => l.id,
@@ -136,10 +138,13 @@ export class EskLayersPanel extends SignalElement {
             <span class="swatch" style=${`background:${layerColour(layer.id)}`}></span>
             <span class="label">${name}</span>
           </button>
-          ${this.#icon(layer.hidden ? "eye-slash" : "eye", layer.hidden ? `Show ${name}` : `Hide ${name}`, edit, () =>
-            edits.submit({ type: "layer.set", layer: layer.id, fields: { hidden: !layer.hidden } }),
+          ${this.#icon(
+            layer.hidden ? "eye-slash" : "eye",
+            layer.hidden ? msg(str`Show ${name}`) : msg(str`Hide ${name}`),
+            edit,
+            () => edits.submit({ type: "layer.set", layer: layer.id, fields: { hidden: !layer.hidden } }),
           )}
-          ${this.#icon("trash", `Delete ${name}`, edit, () => edits.submit({ type: "layer.delete", layer: layer.id }))}
+          ${this.#icon("trash", msg(str`Delete ${name}`), edit, () => edits.submit({ type: "layer.delete", layer: layer.id }))}
         </div>
         ${
           open
@@ -164,11 +169,11 @@ export class EskLayersPanel extends SignalElement {
   }
 
   #order(layer: Layer, index: number, layers: readonly Layer[], name: string): TemplateResult {
-    const label = `Order of ${name}: place ${index + 1} of ${layers.length}. Drag, or use the arrow keys`;
+    const label = msg(str`Order of ${name}: place ${index + 1} of ${layers.length}. Drag, or use the arrow keys`);
     return html`<button
       class="order"
       aria-label=${label}
-      title="Drag to change the order"
+      title=${msg("Drag to change the order")}
       @keydown=${(e: KeyboardEvent) => this.#key(e, layer.id, index, layers)}
       @pointerdown=${(e: PointerEvent) => this.#grab(e, layer.id, index)}
       @pointermove=${(e: PointerEvent) => this.#pull(e)}

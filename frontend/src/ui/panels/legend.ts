@@ -1,9 +1,11 @@
+import { msg, str } from "@lit/localize";
 import type { ReadonlySignal } from "@preact/signals-core";
 import { css, html, nothing, type TemplateResult } from "lit";
 import type { ViewChoices } from "../../app/device/view-choices.ts";
 import type { TaskView } from "../../app/lesson/task/task-view.ts";
 import { SUBSTANCES } from "../../app/words/paints.ts";
 import { metres } from "../../app/words/words.ts";
+import { midSentence, significant } from "../../core/language.ts";
 import type { PaintedOverlay, Scene, Vec3 } from "../../core/types.ts";
 import type { Doc } from "../../doc/document.ts";
 import { TOLERANCES_OFF } from "../../generated/contract.ts";
@@ -15,13 +17,13 @@ import { shared } from "../styles/shared.ts";
 
 /** The words under the ends of a scale. */
 export function amplitudeEnds(greatestM: number): [string, string] {
-  return ["0", greatestM > 0 ? metres(greatestM) : "none yet"];
+  return ["0", greatestM > 0 ? metres(greatestM) : msg("none yet")];
 }
 
 /** Overlays without a scale: the key that goes through them all should say which it has come to. */
 const NAMED = {
-  patches: "Levels of detail, a colour each",
-  watershed: "All ground that drains through the place",
+  patches: msg("Levels of detail, a colour each"),
+  watershed: msg("All ground that drains through the place"),
 } as const;
 
 /** The meaning of an overlay's colours. */
@@ -114,32 +116,32 @@ export class EskLegend extends SignalElement {
     const overlay = this.overlay.value;
     const times = this.choices.exaggeration;
     this.toggleAttribute("hidden", overlay === "none" && times === 1);
-    const heights = times === 1 ? nothing : html`<div class="name">Heights drawn × ${times}</div>`;
+    const heights = times === 1 ? nothing : html`<div class="name">${msg(str`Heights drawn × ${times}`)}</div>`;
     return html`${overlay === "none" ? nothing : this.#overlay(overlay)}${heights}`;
   }
 
   #overlay(overlay: Exclude<Scene["overlay"], "none">): TemplateResult {
     if (overlay === "contours") return this.#contours();
     if (overlay === "patches" || overlay === "watershed") return html`<div class="name">${NAMED[overlay]}</div>`;
-    if (overlay === "slope") return scale("Steepness", "slope", ["0°", "30°", "60°"]);
+    if (overlay === "slope") return scale(msg("Steepness"), "slope", ["0°", "30°", "60°"]);
     if (overlay === "influence") return this.#influence();
     if (overlay === "difference") return this.#difference();
     this.channels.revision.value;
     if (overlay !== "detail") return this.#painted(overlay);
     const greatest = this.channels.amplitude.values.reduce((a, b) => Math.max(a, b), 0);
     return html`
-      ${scale("Roughness", "roughness", ["smooth", "rough"])} ${scale("Amplitude", "amplitude", amplitudeEnds(greatest))}
+      ${scale(msg("Roughness"), "roughness", [msg("smooth"), msg("rough")])} ${scale(msg("Amplitude"), "amplitude", amplitudeEnds(greatest))}
       ${this.#here()}
     `;
   }
 
   #contours(): TemplateResult {
     const every = this.automaticM.value;
-    if (every === 0) return html`<div class="name">Contour lines</div>`;
-    const words = (m: number): string => `${Number(m.toPrecision(6))} m`;
+    if (every === 0) return html`<div class="name">${msg("Contour lines")}</div>`;
+    const words = (m: number): string => `${significant(m, 6)} m`;
     return html`<div>
-      <div class="name">Contours every ${words(every)}</div>
-      <div>Each fifth stronger, with its height: every ${words(INDEX_EVERY * every)}</div>
+      <div class="name">${msg(str`Contours every ${words(every)}`)}</div>
+      <div>${msg(str`Each fifth stronger, with its height: every ${words(INDEX_EVERY * every)}`)}</div>
     </div>`;
   }
 
@@ -153,22 +155,24 @@ export class EskLegend extends SignalElement {
       off === null
         ? nothing
         : Math.abs(off) <= tolerance
-          ? "as asked"
-          : `${metres(Math.abs(off))} too ${off > 0 ? "high" : "low"}`;
-    return html`${scale("Against the task", "difference", [`−${most}`, "as asked", `+${most}`])}
-      ${words === nothing ? nothing : html`<div class="ends"><span>Here</span><span>${words}</span></div>`}`;
+          ? msg("as asked")
+          : off > 0
+            ? msg(str`${metres(off)} too high`)
+            : msg(str`${metres(-off)} too low`);
+    return html`${scale(msg("Against the task"), "difference", [`−${most}`, msg("as asked"), `+${most}`])}
+      ${words === nothing ? nothing : html`<div class="ends"><span>${msg("Here")}</span><span>${words}</span></div>`}`;
   }
 
   #influence(): TemplateResult {
     const chosen = this.doc.value?.strokes.has(this.selection.value ?? "") === true;
-    if (!chosen) return html`<div class="name">Select a stroke to see where it is felt.</div>`;
-    return scale("Felt from the selected stroke", "influence", ["far", "its flanks", "its line"]);
+    if (!chosen) return html`<div class="name">${msg("Select a stroke to see where it is felt.")}</div>`;
+    return scale(msg("Felt from the selected stroke"), "influence", [msg("far"), msg("its flanks"), msg("its line")]);
   }
 
   /** Words for the paint of a channel under the cursor, and for how much of the channel there is in the end. */
   #painted(channel: PaintedOverlay): TemplateResult {
-    const name = `Painted ${SUBSTANCES[channel].title.toLowerCase()}`;
-    return html`${scale(name, "painted", ["less", "as it grows", "more"])} ${this.#share(channel)}`;
+    const name = msg(str`Painted ${midSentence(SUBSTANCES[channel].title)}`);
+    return html`${scale(name, "painted", [msg("less"), msg("as it grows"), msg("more")])} ${this.#share(channel)}`;
   }
 
   #share(channel: PaintedOverlay): TemplateResult | typeof nothing {
@@ -176,12 +180,12 @@ export class EskLegend extends SignalElement {
     const found = at && this.ground.attributesAt(at[0], at[1]);
     if (!at || !found) return nothing;
     const bias = Math.round(100 * this.channels.valueAt(channel, at[0], at[1]));
-    const paint = html`<div class="ends"><span>Paint here</span><span>${signed(bias)} %</span></div>`;
+    const paint = html`<div class="ends"><span>${msg("Paint here")}</span><span>${signed(bias)} %</span></div>`;
     if (channel === "erosion") return paint;
     const share = Math.round(100 * found[channel === "wetness" ? "wet" : channel]);
     return html`<div>
       ${paint}
-      <div class="ends"><span>${SUBSTANCES[channel].title} here</span><span>${share} %</span></div>
+      <div class="ends"><span>${msg(str`${SUBSTANCES[channel].title} here`)}</span><span>${share} %</span></div>
     </div>`;
   }
 
@@ -192,14 +196,14 @@ export class EskLegend extends SignalElement {
     const { channels } = this;
     const amplitude = metres(channels.amplitudeAt(at[0], at[1]));
     const roughness = Math.round(100 * channels.roughnessAt(at[0], at[1]));
-    return html`<div class="ends"><span>Here</span><span>${amplitude}, ${roughness} % rough</span></div>`;
+    return html`<div class="ends"><span>${msg("Here")}</span><span>${msg(str`${amplitude}, ${roughness} % rough`)}</span></div>`;
   }
 }
 
 const signed = (v: number): string => (v > 0 ? `+${v}` : v < 0 ? `−${-v}` : "0");
 
 function scale(name: string, kind: string, ends: readonly string[]): TemplateResult {
-  return html`<div class="scale" role="img" aria-label=${`${name}: ${ends.join(" to ")}`}>
+  return html`<div class="scale" role="img" aria-label=${`${name}: ${ends.join(` ${msg("to")} `)}`}>
     <span class="name">${name}</span>
     <span class="bar ${kind}"></span>
     <span class="ends">${ends.map((end) => html`<span>${end}</span>`)}</span>

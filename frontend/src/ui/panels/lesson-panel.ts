@@ -1,3 +1,4 @@
+import { msg, str } from "@lit/localize";
 import "@awesome.me/webawesome/dist/components/dropdown/dropdown.js";
 import "@awesome.me/webawesome/dist/components/dropdown-item/dropdown-item.js";
 import "@awesome.me/webawesome/dist/components/switch/switch.js";
@@ -15,9 +16,9 @@ import { panelStyles } from "../styles/panel.ts";
 import { shared } from "../styles/shared.ts";
 
 const NAMES = [
-  { value: "", label: "Own", title: "People are called as they call themselves" },
-  { value: "en", label: "Animals", title: "Fox, Heron, Otter: typed names are neither shown nor kept" },
-  { value: "de", label: "Tiere", title: "Fuchs, Reiher, Otter: typed names are neither shown nor kept" },
+  { value: "", label: msg("Own"), title: msg("People are called as they call themselves") },
+  { value: "en", label: msg("Animals"), title: msg("Fox, Heron, Otter: typed names are neither shown nor kept") },
+  { value: "de", label: "Tiere", title: msg("Fuchs, Reiher, Otter: typed names are neither shown nor kept") },
 ];
 
 /** A person with one or more pages open. */
@@ -44,26 +45,26 @@ export class EskLessonPanel extends SignalElement {
   protected override render(): TemplateResult {
     const state = this.lesson.state.value;
     if (!state.conducts)
-      return html`<div class="empty">${icon("user")}<p>Whoever leads this terrain finds the lesson here.</p></div>`;
+      return html`<div class="empty">${icon("user")}<p>${msg("Whoever leads this terrain finds the lesson here.")}</p></div>`;
     return html`${this.#switches(state)} ${this.#names(state)} ${this.#here(state)} ${this.#outside(state)}`;
   }
 
   #switches(state: Lesson): TemplateResult {
     const { lesson, client } = this;
     const shows = state.look === client;
-    return html`<section class="group switches" aria-label="Switches">
-      ${toggle("Look here", "Every view follows mine", shows, () => lesson.conduct({ look: !shows }))}
+    return html`<section class="group switches" aria-label=${msg("Switches")}>
+      ${toggle(msg("Look here"), msg("Every view follows mine"), shows, () => lesson.conduct({ look: !shows }))}
       ${
         shows
           ? html`<div class="inner">
-              ${toggle("Nobody looks away", "", state.held, () => lesson.conduct({ held: !state.held }))}
+              ${toggle(msg("Nobody looks away"), "", state.held, () => lesson.conduct({ held: !state.held }))}
             </div>`
           : nothing
       }
-      ${toggle("Hands off", "Nobody draws but who leads, or has a pen", state.hands_off, () =>
+      ${toggle(msg("Hands off"), msg("Nobody draws but who leads, or has a pen"), state.hands_off, () =>
         lesson.conduct({ hands_off: !state.hands_off }),
       )}
-      ${toggle("Protect", "What I drew, and the settings, stay as they are", state.protect, () =>
+      ${toggle(msg("Protect"), msg("What I drew, and the settings, stay as they are"), state.protect, () =>
         lesson.conduct({ protect: !state.protect }),
       )}
     </section>`;
@@ -71,18 +72,18 @@ export class EskLessonPanel extends SignalElement {
 
   #names(state: Lesson): TemplateResult {
     const { lesson } = this;
-    return html`<section class="group" aria-label="Names">
-      <h3>Names</h3>
+    return html`<section class="group" aria-label=${msg("Names")}>
+      <h3>${msg("Names")}</h3>
       <esk-segmented
-        label="Names"
+        label=${msg("Names")}
         .segments=${NAMES}
         .value=${state.animals}
         @pick=${(e: CustomEvent<Lesson["animals"]>) => lesson.conduct({ animals: e.detail })}
       ></esk-segmented>
       <div class="switches">
-        ${toggle("Hide names", "Others see neither names nor pointers", state.hide, () => lesson.conduct({ hide: !state.hide }))}
+        ${toggle(msg("Hide names"), msg("Others see neither names nor pointers"), state.hide, () => lesson.conduct({ hide: !state.hide }))}
       </div>
-      <a class="quietly" href="/privacy" target="_blank">What is known of people here</a>
+      <a class="quietly" href="/privacy" target="_blank">${msg("What is known of people here")}</a>
     </section>`;
   }
 
@@ -90,13 +91,13 @@ export class EskLessonPanel extends SignalElement {
     const people = this.#people();
     const pupils = people.filter(({ member }) => !member.conducts);
     const everybody = pupils.map(({ person }) => person);
-    return html`<section class="group" aria-label="People">
-      <h3>${people.length === 1 ? "Nobody else is here yet" : `${people.length} people are here`}</h3>
+    return html`<section class="group" aria-label=${msg("People")}>
+      <h3>${people.length === 1 ? msg("Nobody else is here yet") : msg(str`${people.length} people are here`)}</h3>
       ${
         pupils.length > 1 && state.hands_off
           ? html`<div class="all">
-              <button class="btn outline" @click=${() => this.lesson.about("pen", everybody)}>A pen for all</button>
-              <button class="btn outline" @click=${() => this.lesson.about("no_pen", everybody)}>No pens</button>
+              <button class="btn outline" @click=${() => this.lesson.about("pen", everybody)}>${msg("A pen for all")}</button>
+              <button class="btn outline" @click=${() => this.lesson.about("no_pen", everybody)}>${msg("No pens")}</button>
             </div>`
           : nothing
       }
@@ -123,15 +124,15 @@ export class EskLessonPanel extends SignalElement {
   #person({ person, member }: Person): TemplateResult {
     const name = memberName(member);
     const mine = member.client === this.client;
-    const pen = `${member.pen ? "Take the pen from" : "Give a pen to"} ${name}`;
+    const pen = member.pen ? msg(str`Take the pen from ${name}`) : msg(str`Give a pen to ${name}`);
     const role = mine
-      ? "you"
+      ? msg("you")
       : member.role === "owner"
-        ? "owner"
+        ? msg("owner")
         : member.conducts
-          ? "leads"
+          ? msg("leads")
           : member.role === "view"
-            ? "looks"
+            ? msg("looks")
             : "";
     return html`<li data-person=${person}>
       <span class="spot" style=${`background:${member.colour}`}></span>
@@ -159,33 +160,33 @@ export class EskLessonPanel extends SignalElement {
       this.lesson.about(e.detail.item.value, [person]);
     const removable = member.role !== "owner" && (owner || !member.conducts);
     return html`<wa-dropdown placement="bottom-end" @wa-select=${select}>
-      <button slot="trigger" class="icon-btn" aria-label=${`More about ${name}`} title=${`More about ${name}`}>${icon("ellipsis")}</button>
-      <wa-dropdown-item value="undo">Undo all of ${name}</wa-dropdown-item>
+      <button slot="trigger" class="icon-btn" aria-label=${msg(str`More about ${name}`)} title=${msg(str`More about ${name}`)}>${icon("ellipsis")}</button>
+      <wa-dropdown-item value="undo">${msg(str`Undo all of ${name}`)}</wa-dropdown-item>
       ${
         owner && member.role === "edit"
           ? html`<wa-dropdown-item value=${member.conducts ? "no_conductor" : "conductor"}>
-              ${member.conducts ? "Leads no more" : "Leads too"}
+              ${member.conducts ? msg("Leads no more") : msg("Leads too")}
             </wa-dropdown-item>`
           : nothing
       }
-      ${removable ? html`<wa-dropdown-item value="remove" variant="danger">Send out ${name}</wa-dropdown-item>` : nothing}
+      ${removable ? html`<wa-dropdown-item value="remove" variant="danger">${msg(str`Send out ${name}`)}</wa-dropdown-item>` : nothing}
     </wa-dropdown>`;
   }
 
   /** Who was sent out, and who waits at the door. */
   #outside(state: Lesson): TemplateResult | typeof nothing {
     const rows = [
-      ...state.waiting.map((each) => ({ ...each, word: "waits to be let in" })),
-      ...state.removed.map((each) => ({ ...each, word: "sent out" })),
+      ...state.waiting.map((each) => ({ ...each, word: msg("waits to be let in") })),
+      ...state.removed.map((each) => ({ ...each, word: msg("sent out") })),
     ];
     if (rows.length === 0) return nothing;
-    return html`<section class="group" aria-label="Outside">
-      <h3>Outside</h3>
+    return html`<section class="group" aria-label=${msg("Outside")}>
+      <h3>${msg("Outside")}</h3>
       <ul>
         ${rows.map(
           (each) => html`<li data-person=${each.person}>
-            <span class="who">${each.name || "Somebody"} <small>${each.word}</small></span>
-            <button class="btn outline" @click=${() => this.lesson.about("let_in", [each.person])}>Let in</button>
+            <span class="who">${each.name || msg("Somebody")} <small>${each.word}</small></span>
+            <button class="btn outline" @click=${() => this.lesson.about("let_in", [each.person])}>${msg("Let in")}</button>
           </li>`,
         )}
       </ul>

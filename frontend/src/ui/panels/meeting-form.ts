@@ -1,3 +1,4 @@
+import { msg, str } from "@lit/localize";
 import { css, html, LitElement, nothing, type TemplateResult } from "lit";
 import { shared } from "../styles/shared.ts";
 import "../controls/range-field.ts";
@@ -101,10 +102,10 @@ export class EskMeetingForm extends LitElement {
   protected override render(): TemplateResult {
     const share = (percent: number): number => Math.min(1, Math.max(0, percent / 100));
     return html`
-      <h3>Where strokes meet</h3>
-      ${this.rows.length === 0 ? html`<p>No other stroke crosses this one.</p>` : html`<ul>${this.rows.map((row) => this.#row(row))}</ul>`}
+      <h3>${msg("Where strokes meet")}</h3>
+      ${this.rows.length === 0 ? html`<p>${msg("No other stroke crosses this one.")}</p>` : html`<ul>${this.rows.map((row) => this.#row(row))}</ul>`}
       <esk-range
-        label="Yields to others"
+        label=${msg("Yields to others")}
         unit="%"
         min="0"
         max="100"
@@ -114,7 +115,7 @@ export class EskMeetingForm extends LitElement {
         @value=${(e: CustomEvent<number>) => this.#emit(null, share(e.detail), false)}
         @settle=${(e: CustomEvent<number>) => this.#emit(null, share(e.detail), true)}
       ></esk-range>
-      <p>${this.yields === 0 ? "Counts as much as any other stroke." : this.yields === 1 ? "Gives way to every other stroke." : "Counts less than other strokes."}</p>
+      <p>${this.yields === 0 ? msg("Counts as much as any other stroke.") : this.yields === 1 ? msg("Gives way to every other stroke.") : msg("Counts less than other strokes.")}</p>
     `;
   }
 
@@ -127,15 +128,15 @@ export class EskMeetingForm extends LitElement {
             ? html`<button
                 class="btn outline"
                 aria-pressed=${row.yields}
-                aria-label=${`${row.name} yields`}
+                aria-label=${msg(str`${row.name} yields`)}
                 ?disabled=${row.locked}
                 @click=${() => this.#emit(row.id, row.yields ? 0 : 1, true)}
               >
-                ${row.yields ? "Yields" : "Let it yield"}
+                ${row.yields ? msg("Yields") : msg("Let it yield")}
               </button>`
             : nothing
         }
-        <small>at ${height(row.theirs)}, this one at ${height(row.mine)}</small>
+        <small>${msg(str`at ${height(row.theirs)}, this one at ${height(row.mine)}`)}</small>
       </li>
     `;
   }

@@ -1,3 +1,4 @@
+import { msg, str } from "@lit/localize";
 import type { ReadonlySignal } from "@preact/signals-core";
 import { css, html, nothing, svg, type TemplateResult } from "lit";
 import { getStroke } from "perfect-freehand";
@@ -316,7 +317,7 @@ export class EskOverlay extends SignalElement {
       if (!at) return [];
       const place = `transform:translate(${at.x + 9}px,${at.y - 24}px)`;
       return [
-        html`<span class="name holds" style=${`background:${member.colour};color:${inkOn(member.colour)};${place}`}>${memberName(member)} holds this</span>`,
+        html`<span class="name holds" style=${`background:${member.colour};color:${inkOn(member.colour)};${place}`}>${msg(str`${memberName(member)} holds this`)}</span>`,
       ];
     });
   }

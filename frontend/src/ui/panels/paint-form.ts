@@ -1,3 +1,4 @@
+import { msg } from "@lit/localize";
 import { css, html, LitElement, type TemplateResult } from "lit";
 import { paintWords, SUBSTANCES } from "../../app/words/paints.ts";
 import type { Paint, PaintChannel } from "../../generated/contract.ts";
@@ -13,8 +14,8 @@ export interface PaintChange {
 }
 
 const WAYS = [
-  { value: "add", label: "Add", title: "More of it (Shift+U)" },
-  { value: "remove", label: "Remove", title: "Less of it (Shift+U)" },
+  { value: "add", label: msg("Add"), title: msg("More of it (Shift+U)") },
+  { value: "remove", label: msg("Remove"), title: msg("Less of it (Shift+U)") },
 ];
 
 /** The paint of a brush: channel, more or less of it, how strongly, how wide. Fires `change`. */
@@ -112,11 +113,11 @@ export class EskPaintForm extends LitElement {
     const [least, most] = radiusRange(this.sizeM);
     const size = (e: CustomEvent<number>, settled: boolean): void => this.#emit({ radius_m: e.detail }, settled);
     return html`
-      <div class="channels" role="radiogroup" aria-label="Paint" @keydown=${this.#key}>
+      <div class="channels" role="radiogroup" aria-label=${msg("Paint")} @keydown=${this.#key}>
         ${PAINT_CHANNELS.map((channel) => this.#channel(channel))}
       </div>
       <esk-segmented
-        label="Add or remove"
+        label=${msg("Add or remove")}
         .segments=${WAYS}
         .value=${value < 0 ? "remove" : "add"}
         ?disabled=${this.disabled}
@@ -124,8 +125,8 @@ export class EskPaintForm extends LitElement {
       ></esk-segmented>
       <p>${paintWords(this.paint)}</p>
       <esk-range
-        label="Strength"
-        of="of the paint"
+        label=${msg("Strength")}
+        of=${msg("of the paint")}
         unit="%"
         min="5"
         max="100"
@@ -136,8 +137,8 @@ export class EskPaintForm extends LitElement {
         @settle=${(e: CustomEvent<number>) => this.#strength(e.detail, true)}
       ></esk-range>
       <esk-range
-        label="Radius"
-        of="of the brush"
+        label=${msg("Radius")}
+        of=${msg("of the brush")}
         unit="m"
         log
         min=${least}

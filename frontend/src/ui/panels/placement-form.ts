@@ -1,3 +1,4 @@
+import { msg } from "@lit/localize";
 import { css, html, type TemplateResult } from "lit";
 import {
   centreOf,
@@ -111,22 +112,22 @@ export class EskPlacementForm extends SignalElement {
     const steps = [MIN_GRID_SPACING_M, MAX_GRID_SPACING_M] as const;
     return html`
       <div class="two">
-        ${field("Middle, east", "m", x, [-far, far], 1, (v) => this.#centre(0, v))}
-        ${field("Middle, north", "m", y, [-far, far], 1, (v) => this.#centre(1, v))}
-        ${field("Width", "m", wide, [steps[0], steps[1] * shape.cols], 1, (v) => this.#widen(v))}
-        ${field("Turned", "°", place.rotation_deg, [-360, 360], 2, (v) => this.#emit(turned(shape, place, v)))}
+        ${field(msg("Middle, east"), "m", x, [-far, far], 1, (v) => this.#centre(0, v))}
+        ${field(msg("Middle, north"), "m", y, [-far, far], 1, (v) => this.#centre(1, v))}
+        ${field(msg("Width"), "m", wide, [steps[0], steps[1] * shape.cols], 1, (v) => this.#widen(v))}
+        ${field(msg("Turned"), "°", place.rotation_deg, [-360, 360], 2, (v) => this.#emit(turned(shape, place, v)))}
         ${
           sx === sy
-            ? field("Spacing", "m", sx, steps, 3, (v) => this.#space(0, v))
-            : html`${field("Spacing, along", "m", sx, steps, 3, (v) => this.#space(0, v))}
-              ${field("Spacing, across", "m", sy, steps, 3, (v) => this.#space(1, v))}`
+            ? field(msg("Spacing"), "m", sx, steps, 3, (v) => this.#space(0, v))
+            : html`${field(msg("Spacing, along"), "m", sx, steps, 3, (v) => this.#space(0, v))}
+              ${field(msg("Spacing, across"), "m", sy, steps, 3, (v) => this.#space(1, v))}`
         }
-        ${field("Heights", "×", place.scale, [-MAX_VERTICAL_SCALE, MAX_VERTICAL_SCALE], 4, (v) => this.#emit({ ...place, scale: v }))}
-        ${field("Lift", "m", place.lift_m, [-far, far], 1, (v) => this.#emit({ ...place, lift_m: v }))}
+        ${field(msg("Heights"), "×", place.scale, [-MAX_VERTICAL_SCALE, MAX_VERTICAL_SCALE], 4, (v) => this.#emit({ ...place, scale: v }))}
+        ${field(msg("Lift"), "m", place.lift_m, [-far, far], 1, (v) => this.#emit({ ...place, lift_m: v }))}
       </div>
       <div class="row">
-        <button class="btn outline" ?disabled=${disabled} @click=${() => this.#emit(fitted(shape, place, sizeM))}>Fit to the terrain</button>
-        <button class="btn outline" ?disabled=${disabled} @click=${() => this.#emit(turned(shape, place, 0))}>North up</button>
+        <button class="btn outline" ?disabled=${disabled} @click=${() => this.#emit(fitted(shape, place, sizeM))}>${msg("Fit to the terrain")}</button>
+        <button class="btn outline" ?disabled=${disabled} @click=${() => this.#emit(turned(shape, place, 0))}>${msg("North up")}</button>
       </div>
     `;
   }

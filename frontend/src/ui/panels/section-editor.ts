@@ -1,3 +1,4 @@
+import { msg } from "@lit/localize";
 import { css, html, LitElement, svg, type TemplateResult } from "lit";
 import {
   drag,
@@ -195,7 +196,7 @@ export class EskSection extends LitElement {
     const frame = this.frame ?? fitFrame(this.section, WIDTH, HEIGHT);
     const paths = outline(this.section, frame);
     return html`
-      <svg viewBox="0 0 ${WIDTH} ${HEIGHT}" role="group" aria-label="Cross-section, seen along the stroke">
+      <svg viewBox="0 0 ${WIDTH} ${HEIGHT}" role="group" aria-label=${msg("Cross-section, seen along the stroke")}>
         ${svg`<line class="ground" x1="0" x2=${WIDTH} y1=${frame.baseY} y2=${frame.baseY}></line>
         <path class="land" d=${paths.land}></path>
         <path class="firm" d=${paths.firm}></path>

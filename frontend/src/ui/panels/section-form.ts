@@ -1,3 +1,5 @@
+import { msg } from "@lit/localize";
+import { midSentence } from "../../core/language.ts";
 import "@awesome.me/webawesome/dist/components/switch/switch.js";
 import { css, html, LitElement, nothing, type TemplateResult } from "lit";
 import { live } from "lit/directives/live.js";
@@ -12,9 +14,9 @@ import "../controls/segmented.ts";
 import { shared } from "../styles/shared.ts";
 
 const SHAPES = [
-  { value: "concave", label: "Soft foot", title: "Concave: the slope eases out at its foot" },
-  { value: "straight", label: "Straight", title: "One slope from crest to foot" },
-  { value: "convex", label: "Rounded", title: "Convex: gentle at the crest, steeper below" },
+  { value: "concave", label: msg("Soft foot"), title: msg("Concave: the slope eases out at its foot") },
+  { value: "straight", label: msg("Straight"), title: msg("One slope from crest to foot") },
+  { value: "convex", label: msg("Rounded"), title: msg("Convex: gentle at the crest, steeper below") },
 ];
 
 /** The event `change` carries the new fields, and whether the gesture is over. */
@@ -141,14 +143,14 @@ export class EskSectionForm extends LitElement {
         @section=${(e: CustomEvent<Section>) => this.#dragged(e.detail, false)}
         @settle=${(e: CustomEvent<Section>) => this.#dragged(e.detail, true)}
       ></esk-section>
-      <div class="presets" role="group" aria-label="Presets">
+      <div class="presets" role="group" aria-label=${msg("Presets")}>
         ${presetsFor(this.sense).map(
           (p) =>
             html`<button class="btn" ?disabled=${this.disabled} @click=${() => this.#preset(p)}>${p.title}</button>`,
         )}
       </div>
       <esk-range
-        label="Plateau radius"
+        label=${msg("Plateau radius")}
         unit="m"
         min="0"
         max=${this.sizeM / 8}
@@ -158,7 +160,7 @@ export class EskSectionForm extends LitElement {
         @value=${(e: CustomEvent<number>) => this.#emit({ plateau_radius_m: e.detail }, false)}
         @settle=${(e: CustomEvent<number>) => this.#emit({ plateau_radius_m: e.detail }, true)}
       ></esk-range>
-      ${this.#linked ? this.#side("left", "Both sides") : [this.#side("left", "Left side"), this.#side("right", "Right side")]}
+      ${this.#linked ? this.#side("left", msg("Both sides")) : [this.#side("left", msg("Left side")), this.#side("right", msg("Right side"))]}
     `;
   }
 
@@ -180,16 +182,16 @@ export class EskSectionForm extends LitElement {
           .checked=${live(flank !== null)}
           ?disabled=${this.disabled}
           @change=${(e: Event) => this.#toggle(side, (e.target as HTMLInputElement).checked)}
-          >Flank<span class="visually-hidden">: ${title.toLowerCase()}</span></wa-switch
+          >${msg("Flank")}<span class="visually-hidden">: ${midSentence(title)}</span></wa-switch
         >
-        ${flank ? this.#flankFields(side, flank) : html`<span class="quiet">The land flows freely from the crest.</span>`}
+        ${flank ? this.#flankFields(side, flank) : html`<span class="quiet">${msg("The land flows freely from the crest.")}</span>`}
       </div>
     `;
   }
 
   #linkButton(): TemplateResult {
     const on = this.#linked;
-    const label = on ? "Shape each side by itself" : "Shape both sides alike";
+    const label = on ? msg("Shape each side by itself") : msg("Shape both sides alike");
     return html`<button
       class="icon-btn small"
       aria-pressed=${on}
@@ -209,7 +211,11 @@ export class EskSectionForm extends LitElement {
 
   /** Returns the words that say whose slope or extent it is. */
   #of(side: Side): string {
-    return this.#linked ? "of both flanks" : `of the ${side} flank`;
+    return this.#linked
+      ? msg("of both flanks")
+      : side === "left"
+        ? msg("of the left flank")
+        : msg("of the right flank");
   }
 
   #flankFields(side: Side, flank: Flank): TemplateResult {
@@ -219,13 +225,13 @@ export class EskSectionForm extends LitElement {
         .checked=${live(flank.slope_deg === null)}
         ?disabled=${this.disabled}
         @change=${(e: Event) => this.#flank(side, { slope_deg: (e.target as HTMLInputElement).checked ? null : DEFAULT_SLOPE_DEG }, true)}
-        >Slope finds itself<span class="visually-hidden"> ${this.#of(side)}</span></wa-switch
+        >${msg("Slope finds itself")}<span class="visually-hidden"> ${this.#of(side)}</span></wa-switch
       >
       ${
         flank.slope_deg === null
           ? nothing
           : html`<esk-range
-              label="Slope"
+              label=${msg("Slope")}
               .of=${this.#of(side)}
               unit="°"
               min="0"
@@ -238,7 +244,7 @@ export class EskSectionForm extends LitElement {
             ></esk-range>`
       }
       <esk-range
-        label="Extent"
+        label=${msg("Extent")}
         .of=${this.#of(side)}
         unit="m"
         log
@@ -250,7 +256,7 @@ export class EskSectionForm extends LitElement {
         @settle=${(e: CustomEvent<number>) => this.#flank(side, { extent_m: e.detail }, true)}
       ></esk-range>
       <esk-segmented
-        label="Shape of the flank"
+        label=${msg("Shape of the flank")}
         .segments=${SHAPES}
         .value=${flank.shape}
         ?disabled=${this.disabled}

@@ -1,3 +1,4 @@
+import { msg, str } from "@lit/localize";
 import { html, nothing, type TemplateResult } from "lit";
 import type { Paint, Stroke, StrokeFields } from "../../generated/contract.ts";
 import type { DrawToolId } from "../../input/defaults.ts";
@@ -31,13 +32,15 @@ import { panelStyles } from "../styles/panel.ts";
 import { shared } from "../styles/shared.ts";
 
 const LISTED = 200;
-const PAINT_BY_MOUSE = "Draw on the ground to paint. Alt, or the other end of a pen, does the opposite.";
-const PAINT_BY_HAND = "Draw on the ground to paint. Remove takes it away again, and so does the other end of a pen.";
+const PAINT_BY_MOUSE = msg("Draw on the ground to paint. Alt, or the other end of a pen, does the opposite.");
+const PAINT_BY_HAND = msg(
+  "Draw on the ground to paint. Remove takes it away again, and so does the other end of a pen.",
+);
 
 const COURSE_LEADS = {
-  river: "Draw along the ground. The bed runs down from its higher end and never rises.",
-  road: "Draw along the ground. The road cuts and fills so that it is nowhere steeper than this.",
-  ridge: "Draw along the ground, in 3D or on the map. It rises along the line.",
+  river: msg("Draw along the ground. The bed runs down from its higher end and never rises."),
+  road: msg("Draw along the ground. The road cuts and fills so that it is nowhere steeper than this."),
+  ridge: msg("Draw along the ground, in 3D or on the map. It rises along the line."),
 } as const;
 
 /** The measures of a drawn course. */
@@ -124,7 +127,7 @@ export class EskStrokePanel extends SignalElement {
         ${swatch(stroke)}
         <input
           class="field name"
-          aria-label="Name of the stroke"
+          aria-label=${msg("Name of the stroke")}
           maxlength="80"
           placeholder=${kindWord(stroke)}
           .value=${stroke.label}
@@ -134,7 +137,7 @@ export class EskStrokePanel extends SignalElement {
         />
       </div>
       ${this.#buttons(stroke, disabled)}
-      ${stroke.locked ? html`<p class="note">${icon("lock")} Locked. Unlock it to change it.</p>` : nothing}
+      ${stroke.locked ? html`<p class="note">${icon("lock")} ${msg("Locked. Unlock it to change it.")}</p>` : nothing}
       ${
         stroke.paint !== null
           ? this.#paint(stroke, stroke.paint, disabled)
@@ -142,7 +145,7 @@ export class EskStrokePanel extends SignalElement {
             ? this.#course(stroke, disabled)
             : this.#section(stroke, disabled)
       }
-      ${stroke.author ? html`<p class="quiet small">Drawn by ${stroke.author}</p>` : nothing}
+      ${stroke.author ? html`<p class="quiet small">${msg(str`Drawn by ${stroke.author}`)}</p>` : nothing}
     `;
   }
 
@@ -259,27 +262,31 @@ export class EskStrokePanel extends SignalElement {
     const { edits, actions } = this;
     const edit = this.canEdit.value;
     return html`
-      <div class="row" role="toolbar" aria-label="Stroke">
-        ${iconButton("frame", "Look at it", true, false, () => actions.get("frame-selection")?.run())}
-        ${iconButton("copy", "Duplicate", edit, false, () => actions.get("duplicate")?.run())}
+      <div class="row" role="toolbar" aria-label=${msg("Stroke")}>
+        ${iconButton("frame", msg("Look at it"), true, false, () => actions.get("frame-selection")?.run())}
+        ${iconButton("copy", msg("Duplicate"), edit, false, () => actions.get("duplicate")?.run())}
         ${
           stroke.paint !== null
             ? nothing
-            : iconButton("swap", "Swap left and right", !disabled, false, () =>
+            : iconButton("swap", msg("Swap left and right"), !disabled, false, () =>
                 edits.setStroke(stroke.id, { left: stroke.right, right: stroke.left }),
               )
         }
         ${iconButton(
           stroke.hidden ? "eye-slash" : "eye",
-          stroke.hidden ? "Show" : "Hide",
+          stroke.hidden ? msg("Show") : msg("Hide"),
           !disabled,
           stroke.hidden,
           () => edits.setStroke(stroke.id, { hidden: !stroke.hidden }),
         )}
-        ${iconButton(stroke.locked ? "lock" : "unlock", stroke.locked ? "Unlock" : "Lock", edit, stroke.locked, () =>
-          edits.setStroke(stroke.id, { locked: !stroke.locked }),
+        ${iconButton(
+          stroke.locked ? "lock" : "unlock",
+          stroke.locked ? msg("Unlock") : msg("Lock"),
+          edit,
+          stroke.locked,
+          () => edits.setStroke(stroke.id, { locked: !stroke.locked }),
         )}
-        ${iconButton("trash", "Delete", !disabled, false, () => actions.get("delete")?.run())}
+        ${iconButton("trash", msg("Delete"), !disabled, false, () => actions.get("delete")?.run())}
       </div>
     `;
   }
@@ -293,7 +300,7 @@ export class EskStrokePanel extends SignalElement {
     };
     const down = tool === "crevice";
     return html`
-      <p class="lead">New ${tool === "plateau" ? "plateaux" : tool === "crevice" ? "crevices" : "mountains"} get this cross-section.</p>
+      <p class="lead">${tool === "plateau" ? msg("New plateaux get this cross-section.") : tool === "crevice" ? msg("New crevices get this cross-section.") : msg("New mountains get this cross-section.")}</p>
       <esk-section-form
         style=${tool === "plateau" ? "--land: var(--esk-plateau)" : ""}
         .fields=${{ left, right, plateau_radius_m }}
@@ -308,15 +315,15 @@ export class EskStrokePanel extends SignalElement {
 
   #list(strokes: Stroke[]): TemplateResult {
     if (strokes.length === 0) {
-      return html`<div class="empty">${icon("sketch")}<p>No strokes yet. Pick a tool and draw a line across the land.</p></div>`;
+      return html`<div class="empty">${icon("sketch")}<p>${msg("No strokes yet. Pick a tool and draw a line across the land.")}</p></div>`;
     }
     const wanted = this.filter.trim().toLowerCase();
     const found = strokes.filter((s) => `${s.label} ${kindWord(s)} ${s.author}`.toLowerCase().includes(wanted));
     return html`
-      <p class="lead">${strokes.length === 1 ? "One stroke makes" : `${strokes.length} strokes make`} this terrain. Select one to shape it.</p>
+      <p class="lead">${strokes.length === 1 ? msg("One stroke makes this terrain. Select one to shape it.") : msg(str`${strokes.length} strokes make this terrain. Select one to shape it.`)}</p>
       ${
         strokes.length > 8
-          ? html`<input class="field" type="search" placeholder="Find a stroke" aria-label="Find a stroke" .value=${this.filter}
+          ? html`<input class="field" type="search" placeholder=${msg("Find a stroke")} aria-label=${msg("Find a stroke")} .value=${this.filter}
               @input=${(e: Event) => {
                 this.filter = (e.target as HTMLInputElement).value;
               }} @keydown=${(e: Event) => e.stopPropagation()} />`
@@ -328,7 +335,7 @@ export class EskStrokePanel extends SignalElement {
           .reverse()
           .map((s) => this.#item(s))}
       </ul>
-      ${found.length > LISTED ? html`<p class="quiet small">The newest ${LISTED} are listed. Search to find others.</p>` : nothing}
+      ${found.length > LISTED ? html`<p class="quiet small">${msg(str`The newest ${LISTED} are listed. Search to find others.`)}</p>` : nothing}
     `;
   }
 

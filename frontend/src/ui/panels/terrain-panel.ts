@@ -1,3 +1,4 @@
+import { msg } from "@lit/localize";
 import "@awesome.me/webawesome/dist/components/switch/switch.js";
 import { html, nothing, type TemplateResult } from "lit";
 import { live } from "lit/directives/live.js";
@@ -31,60 +32,60 @@ import { type SunPosition, sunWords } from "../../app/view/sun.ts";
 const NO_HEIGHTS = new Float32Array(0);
 
 const LOOKS = [
-  { value: "natural", label: "Natural" },
-  { value: "alpine", label: "Alpine" },
-  { value: "desert", label: "Desert" },
-  { value: "paper", label: "Paper" },
+  { value: "natural", label: msg("Natural") },
+  { value: "alpine", label: msg("Alpine") },
+  { value: "desert", label: msg("Desert") },
+  { value: "paper", label: msg("Paper") },
 ];
 
 const BORDERS = [
-  { value: "free", label: "Free", title: "The land runs on past the border" },
-  { value: "pinned", label: "Pinned", title: "The border stays at the base height" },
+  { value: "free", label: msg("Free"), title: msg("The land runs on past the border") },
+  { value: "pinned", label: msg("Pinned"), title: msg("The border stays at the base height") },
 ];
 
 const BORDER_WORDS: Readonly<Record<Border, string>> = {
-  free: "The ground may rise and fall at the border of the terrain.",
-  pinned: "The ground at the border of the terrain stays at height zero.",
+  free: msg("The ground may rise and fall at the border of the terrain."),
+  pinned: msg("The ground at the border of the terrain stays at height zero."),
 };
 
 const RULES = [
   {
     value: "landscape",
-    label: "Landscape",
-    title: "Crags and meadows that know slope and height, down to a centimetre",
+    label: msg("Landscape"),
+    title: msg("Crags and meadows that know slope and height, down to a centimetre"),
   },
-  { value: "smooth", label: "Smooth", title: "Soft ground without noise" },
-  { value: "plain", label: "Plain", title: "The strokes' own ground, nothing added" },
+  { value: "smooth", label: msg("Smooth"), title: msg("Soft ground without noise") },
+  { value: "plain", label: msg("Plain"), title: msg("The strokes' own ground, nothing added") },
 ];
 
 const RULE_WORDS: Readonly<Record<Rule, string>> = {
-  landscape: "Rough on steep faces, calm in valleys, on down to a centimetre.",
-  smooth: "No noise; ground between the solved samples is a soft curve.",
-  plain: "What the strokes make, and nothing else.",
+  landscape: msg("Rough on steep faces, calm in valleys, on down to a centimetre."),
+  smooth: msg("No noise; ground between the solved samples is a soft curve."),
+  plain: msg("What the strokes make, and nothing else."),
 };
 
 /** Returns in words how a strength of the detail looks. */
 export function detailWords(detail: number): string {
-  if (detail === 0) return "None: only strokes with an amplitude of their own are broken.";
-  if (detail < 0.7) return "Gentle: old, worn hills.";
-  if (detail <= 1.4) return "Natural.";
-  if (detail <= 2.5) return "Rugged: broken rock, steep gullies.";
-  return "Wild: the ground bristles.";
+  if (detail === 0) return msg("None: only strokes with an amplitude of their own are broken.");
+  if (detail < 0.7) return msg("Gentle: old, worn hills.");
+  if (detail <= 1.4) return msg("Natural.");
+  if (detail <= 2.5) return msg("Rugged: broken rock, steep gullies.");
+  return msg("Wild: the ground bristles.");
 }
 
 /** What a strength of the erosion looks like. */
 export function erosionWords(erosion: number): string {
-  if (erosion === 0) return "None: flanks are as smooth as they are drawn, but for what is painted.";
-  if (erosion < 0.6) return "Young: shallow rills on steep flanks.";
-  if (erosion <= 1.3) return "Natural: gullies that branch and join.";
-  return "Old: deep gullies between sharp ridges.";
+  if (erosion === 0) return msg("None: flanks are as smooth as they are drawn, but for what is painted.");
+  if (erosion < 0.6) return msg("Young: shallow rills on steep flanks.");
+  if (erosion <= 1.3) return msg("Natural: gullies that branch and join.");
+  return msg("Old: deep gullies between sharp ridges.");
 }
 
 /** What a hold of the crests does. */
 export function holdWords(hold: number): string {
-  if (hold >= 0.95) return "Drawn crests keep their height.";
-  if (hold > 0.3) return "Drawn crests are notched a little.";
-  return "Gullies cut through drawn crests: wilder, and less exact.";
+  if (hold >= 0.95) return msg("Drawn crests keep their height.");
+  if (hold > 0.3) return msg("Drawn crests are notched a little.");
+  return msg("Gullies cut through drawn crests: wilder, and less exact.");
 }
 
 const hundredth = (v: number): number => Math.round(v) / 100;
@@ -121,9 +122,9 @@ export class EskTerrainPanel extends SignalElement {
     const disabled = !this.canEdit.value;
     return html`
       <div class="group">
-        <h3>Look</h3>
+        <h3>${msg("Look")}</h3>
         <esk-segmented
-          label="Look"
+          label=${msg("Look")}
           .segments=${LOOKS}
           .value=${settings.look}
           ?disabled=${disabled}
@@ -132,9 +133,9 @@ export class EskTerrainPanel extends SignalElement {
       </div>
       ${this.#detail(settings, disabled)} ${this.#erosion(settings, disabled)} ${this.#sun(settings, disabled)} ${this.#sea(settings, disabled)} ${this.#lakes(settings, disabled)} ${this.#rivers(settings, disabled)} ${this.#reach(settings, disabled)}
       <div class="group">
-        <h3>Border</h3>
+        <h3>${msg("Border")}</h3>
         <esk-segmented
-          label="Border"
+          label=${msg("Border")}
           .segments=${BORDERS}
           .value=${settings.border}
           ?disabled=${disabled}
@@ -148,9 +149,9 @@ export class EskTerrainPanel extends SignalElement {
   #detail({ rule, detail }: TerrainSettings, disabled: boolean): TemplateResult {
     return html`
       <div class="group">
-        <h3>Detail</h3>
+        <h3>${msg("Detail")}</h3>
         <esk-segmented
-          label="Rule of the detail"
+          label=${msg("Rule of the detail")}
           .segments=${RULES}
           .value=${rule}
           ?disabled=${disabled}
@@ -160,8 +161,8 @@ export class EskTerrainPanel extends SignalElement {
         ${
           rule === "landscape"
             ? html`<esk-range
-                  label="Strength"
-                  of="of the detail"
+                  label=${msg("Strength")}
+                  of=${msg("of the detail")}
                   unit="×"
                   min="0"
                   max=${MAX_DETAIL}
@@ -183,10 +184,10 @@ export class EskTerrainPanel extends SignalElement {
     if (rule !== "landscape") return nothing;
     return html`
       <div class="group">
-        <h3>Erosion</h3>
+        <h3>${msg("Erosion")}</h3>
         <esk-range
-          label="Strength"
-          of="of the erosion"
+          label=${msg("Strength")}
+          of=${msg("of the erosion")}
           unit="×"
           min="0"
           max=${MAX_EROSION}
@@ -198,8 +199,8 @@ export class EskTerrainPanel extends SignalElement {
         ></esk-range>
         <p class="lead">${erosionWords(erosion)}</p>
         <esk-range
-          label="Size"
-          of="of the gullies"
+          label=${msg("Size")}
+          of=${msg("of the gullies")}
           unit="cells"
           min=${MIN_EROSION_SCALE}
           max=${MAX_EROSION_SCALE}
@@ -210,8 +211,8 @@ export class EskTerrainPanel extends SignalElement {
           @settle=${(e: CustomEvent<number>) => this.#set({ erosion_scale: tenth(e.detail) })}
         ></esk-range>
         <esk-range
-          label="Hold"
-          of="of the crests"
+          label=${msg("Hold")}
+          of=${msg("of the crests")}
           unit="%"
           min="0"
           max="100"
@@ -232,7 +233,7 @@ export class EskTerrainPanel extends SignalElement {
       this.#set({ sun_azimuth_deg: e.detail.azimuthDeg, sun_elevation_deg: e.detail.elevationDeg }, settled);
     return html`
       <div class="group">
-        <h3>Sun</h3>
+        <h3>${msg("Sun")}</h3>
         <esk-sun-pad
           .azimuthDeg=${azimuth}
           .elevationDeg=${elevation}
@@ -260,13 +261,13 @@ export class EskTerrainPanel extends SignalElement {
           .checked=${live(level !== null)}
           ?disabled=${disabled}
           @change=${(e: Event) => turn((e.target as HTMLInputElement).checked)}
-          >Sea</wa-switch
+          >${msg("Sea")}</wa-switch
         >
         ${
           level === null
             ? nothing
             : html`<esk-range
-                label="Sea level"
+                label=${msg("Sea level")}
                 unit="m"
                 min=${lowest}
                 max=${highest}
@@ -290,14 +291,14 @@ export class EskTerrainPanel extends SignalElement {
           .checked=${live(least !== null)}
           ?disabled=${disabled}
           @change=${(e: Event) => this.#set({ lakes_m: (e.target as HTMLInputElement).checked ? standard : null })}
-          >Lakes</wa-switch
+          >${msg("Lakes")}</wa-switch
         >
         ${
           least === null
-            ? html`<p class="lead">Basins stay dry.</p>`
+            ? html`<p class="lead">${msg("Basins stay dry.")}</p>`
             : html`<esk-range
-                  label="From a depth of"
-                  of="for lakes"
+                  label=${msg("From a depth of")}
+                  of=${msg("for lakes")}
                   unit="m"
                   log
                   min=${standard / 8}
@@ -307,7 +308,7 @@ export class EskTerrainPanel extends SignalElement {
                   @value=${(e: CustomEvent<number>) => this.#set({ lakes_m: e.detail }, false)}
                   @settle=${(e: CustomEvent<number>) => this.#set({ lakes_m: e.detail })}
                 ></esk-range>
-                <p class="lead">Basins fill to their brim. Draw a dam across a valley, or a crater.</p>`
+                <p class="lead">${msg("Basins fill to their brim. Draw a dam across a valley, or a crater.")}</p>`
         }
       </div>
     `;
@@ -321,14 +322,14 @@ export class EskTerrainPanel extends SignalElement {
           .checked=${live(rivers > 0)}
           ?disabled=${disabled}
           @change=${(e: Event) => this.#set({ rivers: (e.target as HTMLInputElement).checked ? DEFAULT_RIVERS : 0 })}
-          >Rivers</wa-switch
+          >${msg("Rivers")}</wa-switch
         >
         ${
           rivers === 0
-            ? html`<p class="lead">Water stands, and does not run.</p>`
+            ? html`<p class="lead">${msg("Water stands, and does not run.")}</p>`
             : html`<esk-range
-                  label="How many"
-                  of="of the rivers"
+                  label=${msg("How many")}
+                  of=${msg("of the rivers")}
                   log
                   min=${MAX_RIVERS / 32}
                   max=${MAX_RIVERS}
@@ -338,8 +339,8 @@ export class EskTerrainPanel extends SignalElement {
                   @settle=${(e: CustomEvent<number>) => this.#set({ rivers: e.detail })}
                 ></esk-range>
                 <esk-range
-                  label="Wetness"
-                  of="of the rivers"
+                  label=${msg("Wetness")}
+                  of=${msg("of the rivers")}
                   log
                   min=${MIN_WETNESS}
                   max=${MAX_WETNESS}
@@ -348,7 +349,7 @@ export class EskTerrainPanel extends SignalElement {
                   @value=${(e: CustomEvent<number>) => this.#set({ wetness: e.detail }, false)}
                   @settle=${(e: CustomEvent<number>) => this.#set({ wetness: e.detail })}
                 ></esk-range>
-                <p class="lead">Water runs down from where enough of it has gathered, through lakes, to the sea or the border.</p>`
+                <p class="lead">${msg("Water runs down from where enough of it has gathered, through lakes, to the sea or the border.")}</p>`
         }
       </div>
     `;
@@ -358,21 +359,21 @@ export class EskTerrainPanel extends SignalElement {
     const { reach_m: reach, size_m: size } = settings;
     return html`
       <div class="group">
-        <h3>Reach</h3>
+        <h3>${msg("Reach")}</h3>
         <wa-switch
           size="s"
           .checked=${live(reach === null)}
           ?disabled=${disabled}
           @change=${(e: Event) =>
             this.#set({ reach_m: (e.target as HTMLInputElement).checked ? null : size * DEFAULT_REACH_FRACTION })}
-          >Unlimited<span class="visually-hidden"> reach</span></wa-switch
+          >${msg("Unlimited")}<span class="visually-hidden"> ${msg("reach")}</span></wa-switch
         >
         ${
           reach === null
-            ? html`<p class="lead">Every stroke moves the whole terrain, as on a rubber sheet.</p>`
+            ? html`<p class="lead">${msg("Every stroke moves the whole terrain, as on a rubber sheet.")}</p>`
             : html`<esk-range
-                label="Distance"
-                of="that strokes reach"
+                label=${msg("Distance")}
+                of=${msg("that strokes reach")}
                 unit="m"
                 log
                 min=${size / 256}
@@ -382,7 +383,7 @@ export class EskTerrainPanel extends SignalElement {
                 @value=${(e: CustomEvent<number>) => this.#set({ reach_m: e.detail }, false)}
                 @settle=${(e: CustomEvent<number>) => this.#set({ reach_m: e.detail })}
               ></esk-range>
-              <p class="lead">Beyond its flanks a stroke moves the ground about this far.</p>`
+              <p class="lead">${msg("Beyond its flanks a stroke moves the ground about this far.")}</p>`
         }
       </div>
     `;

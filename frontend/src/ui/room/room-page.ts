@@ -1,3 +1,4 @@
+import { msg, str } from "@lit/localize";
 import "@awesome.me/webawesome/dist/components/qr-code/qr-code.js";
 import { html, LitElement, nothing, type TemplateResult } from "lit";
 import { deviceStore, type RecentTerrain, recentTerrains } from "../../app/device/storage.ts";
@@ -47,7 +48,7 @@ export class EskRoom extends LitElement {
 
   override connectedCallback(): void {
     super.connectedCallback();
-    document.title = "For the projector · Esker";
+    document.title = msg("For the projector · Esker");
     this.looking = this.code !== "";
     if (this.looking) void this.#look();
   }
@@ -68,10 +69,10 @@ export class EskRoom extends LitElement {
       const refused = error instanceof ApiError && error.code === "bad_code";
       if (refused) this.facts = null;
       this.problem = refused
-        ? `The code ${codeWords(this.code)} has ended, or was never one.`
+        ? msg(str`The code ${codeWords(this.code)} has ended, or was never one.`)
         : error instanceof ApiError
           ? error.message
-          : "Something went wrong. Reload the page.";
+          : msg("Something went wrong. Reload the page.");
       if (refused) return;
     } finally {
       this.looking = false;
@@ -96,7 +97,7 @@ export class EskRoom extends LitElement {
       const { code } = await api.code(of.id, of.secret, "edit");
       window.location.assign(roomPath(code));
     } catch (error) {
-      this.problem = error instanceof ApiError ? error.message : "Something went wrong. Try again.";
+      this.problem = error instanceof ApiError ? error.message : msg("Something went wrong. Try again.");
     } finally {
       this.busy = false;
     }
@@ -116,37 +117,40 @@ export class EskRoom extends LitElement {
     const { origin } = window.location;
     const { here } = facts;
     const doing =
-      facts.kind === "class" ? "for a copy of your own" : facts.role === "view" ? "to watch" : "to draw along";
+      facts.kind === "class"
+        ? msg("for a copy of your own")
+        : facts.role === "view"
+          ? msg("to watch")
+          : msg("to draw along");
     return html`<main class="running">
       <header>
         <h1>${facts.title || "Esker"}</h1>
         <button class="btn outline fill" @click=${() => document.documentElement.requestFullscreen?.()}>
-          ${icon("monitor")} Fill the screen
+          ${icon("monitor")} ${msg("Fill the screen")}
         </button>
       </header>
-      <section class="way" aria-label="The way in">
+      <section class="way" aria-label=${msg("The way in")}>
         <div class="words">
-          <p>Open</p>
+          <p>${msg("Open", { id: "open-address" })}</p>
           <p class="address" style=${`--letters: ${origin.length}`}>${origin}</p>
-          <p>and type, ${doing},</p>
-          <p class="code" style=${`--letters: ${codeWords(this.code).length}`} aria-label=${`Code ${[...this.code].join(" ")}`}>
+          <p>${msg(str`and type, ${doing},`)}</p>
+          <p class="code" style=${`--letters: ${codeWords(this.code).length}`} aria-label=${msg(str`Code ${[...this.code].join(" ")}`)}>
             ${codeWords(this.code)}
           </p>
         </div>
         <figure>
-          <wa-qr-code .value=${joinLink(origin, this.code)} label=${`QR code: ${origin}, code ${this.code}`} size="560" error-correction="M"></wa-qr-code>
-          <figcaption>or scan</figcaption>
+          <wa-qr-code .value=${joinLink(origin, this.code)} label=${msg(str`QR code: ${origin}, code ${this.code}`)} size="560" error-correction="M"></wa-qr-code>
+          <figcaption>${msg("or scan")}</figcaption>
         </figure>
       </section>
       <footer>
         <p class="here" role="status">
-          ${here === 0 ? "Nobody is in yet" : html`<strong>${here}</strong> ${here === 1 ? "is in" : "are in"}`}
+          ${here === 0 ? msg("Nobody is in yet") : html`<strong>${here}</strong> ${here === 1 ? msg("is in") : msg("are in")}`}
         </p>
         ${
           facts.warned
             ? html`<p class="warned">
-                The browser warns you? Here that is expected. <b>Advanced</b>, then <b>Proceed</b>; on iPads <b>Show Details</b>, then
-                <b>visit this website</b>. <a href="/help/warning">Why</a>
+                ${msg(html`The browser warns you? Here that is expected. <b>Advanced</b>, then <b>Proceed</b>; on iPads <b>Show Details</b>, then <b>visit this website</b>. <a href="/help/warning">Why</a>`)}
               </p>`
             : nothing
         }
@@ -159,34 +163,33 @@ export class EskRoom extends LitElement {
     const own = recentTerrains(this.#store)
       .filter((each) => each.role === "owner")
       .slice(0, MOST_OFFERED);
-    if (this.looking) return html`<main class="still"><p role="status">Looking…</p></main>`;
+    if (this.looking) return html`<main class="still"><p role="status">${msg("Looking…")}</p></main>`;
     return html`<main class="still">
       <a class="brand" href="/"><img src="/favicon.svg" alt="" width="28" height="28" />Esker</a>
-      <h1>For the projector</h1>
+      <h1>${msg("For the projector")}</h1>
       <p class="problem" role="alert">${this.problem}</p>
       <p>
-        This page shows a class the way in, and no link of yours. No code is running here: open your terrain, press <b>Share</b>, then
-        <b>Show a code</b>, or <b>Make a class</b> for a copy each. Then type that code here.
+        ${msg(html`This page shows a class the way in, and no link of yours. No code is running here: open your terrain, press <b>Share</b>, then <b>Show a code</b>, or <b>Make a class</b> for a copy each. Then type that code here.`)}
       </p>
       <form @submit=${this.#typed}>
-        <label>Code <input class="field" name="code" autocomplete="off" autocapitalize="characters" maxlength="20" required /></label>
-        <button class="btn primary">Show it</button>
+        <label>${msg("Code")} <input class="field" name="code" autocomplete="off" autocapitalize="characters" maxlength="20" required /></label>
+        <button class="btn primary">${msg("Show it")}</button>
       </form>
       ${
         own.length === 0
           ? nothing
-          : html`<p>Or make a code of a terrain that this device owns:</p>
+          : html`<p>${msg("Or make a code of a terrain that this device owns:")}</p>
               <ul>
                 ${own.map(
                   (each) => html`<li>
                     <button class="btn outline" ?disabled=${this.busy} @click=${() => this.#make(each)}>
-                      ${icon("key")} ${each.title || "Untitled terrain"}
+                      ${icon("key")} ${each.title || msg("Untitled terrain")}
                     </button>
                   </li>`,
                 )}
               </ul>`
       }
-      <p class="quiet"><a href="/help/warning">The browser's warning</a> · <a href="/help/devices">School devices</a></p>
+      <p class="quiet"><a href="/help/warning">${msg("The browser's warning")}</a> · <a href="/help/devices">${msg("School devices")}</a></p>
     </main>`;
   }
 }

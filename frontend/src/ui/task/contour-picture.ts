@@ -1,5 +1,6 @@
 /** A contour map as it would be printed: brown lines, each fifth stronger and with its height. */
 
+import { msg, str } from "@lit/localize";
 import { html, svg, type TemplateResult } from "lit";
 import type { ContourLine } from "../../core/contour-lines.ts";
 
@@ -14,7 +15,7 @@ export function contourPicture(lines: readonly ContourLine[], sizeM: number, eve
     Array.from({ length: points.length / 2 }, (_, i) => `${i === 0 ? "M" : "L"}${at(points, i)}`).join(""),
   );
   const named = lines.filter((line) => strong(line) && line.points.length > 40);
-  return html`<svg class="contour-map" viewBox="0 0 ${SIDE} ${SIDE}" role="img" aria-label="The contour map, north up, lines ${everyM} metres apart">
+  return html`<svg class="contour-map" viewBox="0 0 ${SIDE} ${SIDE}" role="img" aria-label=${msg(str`The contour map, north up, lines ${everyM} metres apart`)}>
     ${lines.map((line, i) => svg`<path class=${strong(line) ? "index" : ""} d=${paths[i]!}></path>`)}
     ${named.map((line) => {
       const [x, y] = at(line.points, Math.floor(line.points.length / 4))

@@ -1,3 +1,4 @@
+import { msg, str } from "@lit/localize";
 import type { ReadonlySignal } from "@preact/signals-core";
 import { css, html, nothing, type TemplateResult } from "lit";
 import type { TaskView } from "../../app/lesson/task/task-view.ts";
@@ -69,11 +70,11 @@ export class EskTaskChip extends SignalElement {
     if (task === null) return nothing;
     const points = this.score.value?.points ?? null;
     return html`<button
-      title=${this.score.value?.text || "What is asked"}
-      aria-label=${`Task: ${task.title}${points === null ? "" : `, ${points} of 100 points`}`}
+      title=${this.score.value?.text || msg("What is asked")}
+      aria-label=${points === null ? msg(str`Task: ${task.title}`) : msg(str`Task: ${task.title}, ${points} of 100 points`)}
       @click=${() => this.dispatchEvent(new CustomEvent("open"))}
     >
-      ${icon("star")}<span class="name">${task.title || "The task"}</span>
+      ${icon("star")}<span class="name">${task.title || msg("The task")}</span>
       ${points === null ? nothing : html`<b>${points}</b><i style="--done:${points}%"></i>`}
     </button>`;
   }

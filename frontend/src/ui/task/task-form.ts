@@ -1,3 +1,4 @@
+import { msg, str } from "@lit/localize";
 import "@awesome.me/webawesome/dist/components/switch/switch.js";
 import { signal } from "@preact/signals-core";
 import { html, nothing, type TemplateResult } from "lit";
@@ -28,8 +29,13 @@ import { shared } from "../styles/shared.ts";
 import { taskStyles } from "./styles.ts";
 
 const KM2 = 1e6;
+const CHOICES = {
+  line: { take: msg("Take this line"), choose: msg("Choose the line"), another: msg("Choose another line") },
+  path: { take: msg("Take this path"), choose: msg("Choose the path"), another: msg("Choose another path") },
+  point: { take: msg("Take this point"), choose: msg("Choose the point"), another: msg("Choose another point") },
+} as const;
 const PLACES: Readonly<
-  Partial<Record<GoalType, { readonly what: string; readonly least: number; readonly most: number }>>
+  Partial<Record<GoalType, { readonly what: keyof typeof CHOICES; readonly least: number; readonly most: number }>>
 > = {
   profile: { what: "line", least: 2, most: 2 },
   slope: { what: "path", least: 2, most: MAX_TASK_LINE },
@@ -73,13 +79,13 @@ export class EskTaskForm extends SignalElement {
       <section class="group">
         ${draft.wrong.value === null ? nothing : html`<p class="wrong" role="alert">${draft.wrong.value}</p>`}
         <div class="buttons">
-          <button class="btn primary" @click=${() => this.#set(draft)}>${icon("check")} Set the task</button>
-          <button class="btn outline" @click=${() => this.#done()}>Cancel</button>
+          <button class="btn primary" @click=${() => this.#set(draft)}>${icon("check")} ${msg("Set the task")}</button>
+          <button class="btn outline" @click=${() => this.#done()}>${msg("Cancel")}</button>
         </div>
         <div class="buttons">
-          <button class="btn quiet" @click=${() => this.#save(draft)}>${icon("download")} Save as a file</button>
-          <button class="btn quiet" @click=${() => this.renderRoot.querySelector<HTMLInputElement>("#open")?.click()}>${icon("upload")} Open a file</button>
-          ${this.view.task.value === null ? nothing : html`<button class="btn quiet" @click=${() => this.#remove()}>${icon("trash")} No task</button>`}
+          <button class="btn quiet" @click=${() => this.#save(draft)}>${icon("download")} ${msg("Save as a file")}</button>
+          <button class="btn quiet" @click=${() => this.renderRoot.querySelector<HTMLInputElement>("#open")?.click()}>${icon("upload")} ${msg("Open a file")}</button>
+          ${this.view.task.value === null ? nothing : html`<button class="btn quiet" @click=${() => this.#remove()}>${icon("trash")} ${msg("No task")}</button>`}
         </div>
         <input id="open" class="visually-hidden" type="file" accept=".eskertask,application/json" tabindex="-1" aria-hidden="true" @change=${(e: Event) => void this.#open(draft, e)} />
       </section>
@@ -88,15 +94,15 @@ export class EskTaskForm extends SignalElement {
 
   #words(draft: TaskDraft): TemplateResult {
     return html`
-      <h3>What is asked</h3>
-      <label class="field-label">Title
+      <h3>${msg("What is asked")}</h3>
+      <label class="field-label">${msg("Title")}
         <input class="field" name="title" maxlength=${MAX_NAME_LENGTH} .value=${live(draft.title.value)} @input=${(
           e: Event,
         ) => {
           draft.title.value = (e.target as HTMLInputElement).value;
         }} @keydown=${keep} />
       </label>
-      <label class="field-label">Text
+      <label class="field-label">${msg("Text")}
         <textarea class="field" name="text" maxlength=${MAX_TASK_TEXT} .value=${live(draft.text.value)} @input=${(
           e: Event,
         ) => {
@@ -104,12 +110,12 @@ export class EskTaskForm extends SignalElement {
         }} @keydown=${keep}></textarea>
       </label>
       ${draft.pictures.value.map(
-        (picture, i) => html`<div class="thumb"><img src=${pictureUrl(picture)} alt="Picture ${i + 1}" />
-          <button class="btn quiet" @click=${() => draft.dropPicture(i)}>Take it out</button></div>`,
+        (picture, i) => html`<div class="thumb"><img src=${pictureUrl(picture)} alt=${msg(str`Picture ${i + 1}`)} />
+          <button class="btn quiet" @click=${() => draft.dropPicture(i)}>${msg("Take it out")}</button></div>`,
       )}
       ${
         draft.pictures.value.length < MAX_TASK_PICTURES
-          ? html`<label class="btn outline">${icon("plus")} A picture
+          ? html`<label class="btn outline">${icon("plus")} ${msg("A picture")}
               <input class="visually-hidden" type="file" accept="image/*" @change=${(e: Event) => {
                 const field = e.target as HTMLInputElement;
                 const file = field.files?.[0];
@@ -124,8 +130,8 @@ export class EskTaskForm extends SignalElement {
   #goal(draft: TaskDraft): TemplateResult {
     const kind = draft.kind.value;
     return html`
-      <h3>The goal</h3>
-      <label class="field-label">Goal
+      <h3>${msg("The goal")}</h3>
+      <label class="field-label">${msg("Goal")}
         <select class="field" name="goal" @change=${(e: Event) => {
           draft.kind.value = (e.target as HTMLSelectElement).value as GoalType;
         }}>
@@ -143,11 +149,11 @@ export class EskTaskForm extends SignalElement {
     const { what, least, most } = wanted;
     const chosen = this.ruler.points.value.length;
     if (this.#choosing.value)
-      return html`<div class="note">Set ${least === 1 ? "a point" : "points"} on the ground: click, tap, or use the arrow keys and Enter.</div>
-        <button class="btn primary" ?disabled=${chosen < least} @click=${() => this.#chosen(draft, most)}>${icon("check")} Take this ${what}</button>`;
+      return html`<div class="note">${least === 1 ? msg("Set a point on the ground: click, tap, or use the arrow keys and Enter.") : msg("Set points on the ground: click, tap, or use the arrow keys and Enter.")}</div>
+        <button class="btn primary" ?disabled=${chosen < least} @click=${() => this.#chosen(draft, most)}>${icon("check")} ${CHOICES[what].take}</button>`;
     const known = draft.places.value;
-    return html`<button class="btn outline" @click=${() => this.#choose()}>${icon("ruler")} ${known.length < least ? `Choose the ${what}` : `Choose another ${what}`}</button>
-      ${known.length < least ? nothing : html`<p class="lead">${known.length === 1 ? `At ${known[0]!.map(Math.round).join(", ")} m.` : `${known.length} points, from ${known[0]!.map(Math.round).join(", ")} m to ${known.at(-1)!.map(Math.round).join(", ")} m.`}</p>`}`;
+    return html`<button class="btn outline" @click=${() => this.#choose()}>${icon("ruler")} ${known.length < least ? CHOICES[what].choose : CHOICES[what].another}</button>
+      ${known.length < least ? nothing : html`<p class="lead">${known.length === 1 ? msg(str`At ${known[0]!.map(Math.round).join(", ")} m.`) : msg(str`${known.length} points, from ${known[0]!.map(Math.round).join(", ")} m to ${known.at(-1)!.map(Math.round).join(", ")} m.`)}</p>`}`;
   }
 
   #choose(): void {
@@ -168,41 +174,42 @@ export class EskTaskForm extends SignalElement {
     const n = draft.numbers.value;
     const size = this.view.sizeM;
     if (kind === "none") return nothing;
-    const tolerance = number("Counts whole within", "m", n.toleranceM, MIN_TOLERANCE_M, size, (toleranceM) =>
+    const tolerance = number(msg("Counts whole within"), "m", n.toleranceM, MIN_TOLERANCE_M, size, (toleranceM) =>
       draft.set({ toleranceM }),
     );
-    const level = number("Level", "m", n.levelM, -10 * size, 10 * size, (levelM) => draft.set({ levelM }));
-    const area = number("At least", "km²", n.amount / KM2, MIN_AMOUNT / KM2, MAX_AMOUNT / KM2, (v) =>
+    const level = number(msg("Level"), "m", n.levelM, -10 * size, 10 * size, (levelM) => draft.set({ levelM }));
+    const area = number(msg("At least"), "km²", n.amount / KM2, MIN_AMOUNT / KM2, MAX_AMOUNT / KM2, (v) =>
       draft.set({ amount: v * KM2 }),
     );
     if (kind === "terrain" || kind === "profile")
       return html`<div class="two">${tolerance}</div>${this.#differs(draft)}`;
     if (kind === "contours")
-      return html`<div class="two">${tolerance} ${number("Contours every", "m", n.intervalM, MIN_TOLERANCE_M, size, (intervalM) => draft.set({ intervalM }))}</div>${this.#differs(draft)}`;
+      return html`<div class="two">${tolerance} ${number(msg("Contours every"), "m", n.intervalM, MIN_TOLERANCE_M, size, (intervalM) => draft.set({ intervalM }))}</div>${this.#differs(draft)}`;
     if (kind === "volume")
-      return html`<div class="two">${number("At least", "million m³", n.amount / 1e6, 1e-6, MAX_AMOUNT / 1e6, (v) => draft.set({ amount: v * 1e6 }))} ${number("No higher than", "m", n.levelM, -10 * size, 10 * size, (levelM) => draft.set({ levelM }))}</div>`;
+      return html`<div class="two">${number(msg("At least"), msg("million m³"), n.amount / 1e6, 1e-6, MAX_AMOUNT / 1e6, (v) => draft.set({ amount: v * 1e6 }))} ${number(msg("No higher than"), "m", n.levelM, -10 * size, 10 * size, (levelM) => draft.set({ levelM }))}</div>`;
     if (kind === "slope")
-      return html`<div class="two">${number("At most", "%", 100 * n.grade, 0.1, 100 * MAX_GRADE, (v) => draft.set({ grade: v / 100 }))}</div>`;
+      return html`<div class="two">${number(msg("At most"), "%", 100 * n.grade, 0.1, 100 * MAX_GRADE, (v) => draft.set({ grade: v / 100 }))}</div>`;
     if (kind === "watershed") return html`<div class="two">${area}</div>`;
     return html`<div class="two">${area} ${level}</div>
-      <wa-switch size="small" .checked=${live(n.dry)} @change=${(e: Event) => draft.set({ dry: (e.target as HTMLInputElement).checked })}>Land behind dykes counts</wa-switch>`;
+      <wa-switch size="small" .checked=${live(n.dry)} @change=${(e: Event) => draft.set({ dry: (e.target as HTMLInputElement).checked })}>${msg("Land behind dykes counts")}</wa-switch>`;
   }
 
   #differs(draft: TaskDraft): TemplateResult {
     return html`<wa-switch size="small" .checked=${live(draft.difference.value)} @change=${(e: Event) => {
       draft.difference.value = (e.target as HTMLInputElement).checked;
-    }}>Pupils may see red and blue</wa-switch>`;
+    }}>${msg("Pupils may see red and blue")}</wa-switch>`;
   }
 
   #take(draft: TaskDraft): TemplateResult | typeof nothing {
     const kind = draft.kind.value;
     if (kind !== "terrain" && kind !== "contours" && kind !== "profile") return nothing;
     const taken = draft.taken;
-    const what = kind === "profile" ? "the ground on this line" : "this terrain";
+    const use =
+      kind === "profile" ? msg("Use the ground on this line as the profile") : msg("Use this terrain as the target");
     return html`<button class="btn ${taken ? "outline" : "primary"}" name="take" @click=${() => void draft.take(() => scoredGround(this.tiles.freeze(), this.tiles.solved))}>
-        ${icon("landscape")} ${taken ? "Use it anew, as it is now" : `Use ${what} as the ${kind === "profile" ? "profile" : "target"}`}
+        ${icon("landscape")} ${taken ? msg("Use it anew, as it is now") : use}
       </button>
-      <p class="lead">${taken ? "Taken. Now bring the ground to where pupils shall begin: undo or delete, then set the task." : "What the ground is at this moment is what is asked for. Your lines are not in the task."}</p>`;
+      <p class="lead">${taken ? msg("Taken. Now bring the ground to where pupils shall begin: undo or delete, then set the task.") : msg("What the ground is at this moment is what is asked for. Your lines are not in the task.")}</p>`;
   }
 
   #set(draft: TaskDraft): void {

@@ -1,3 +1,4 @@
+import { msg } from "@lit/localize";
 import "@awesome.me/webawesome/dist/components/switch/switch.js";
 import type { ReadonlySignal } from "@preact/signals-core";
 import { signal } from "@preact/signals-core";
@@ -64,12 +65,12 @@ export class EskTaskPanel extends SignalElement {
         this.#writing.value = true;
       }}
     >
-      ${icon("sketch")} ${task === null ? "Write a task" : "Change the task"}
+      ${icon("sketch")} ${task === null ? msg("Write a task") : msg("Change the task")}
     </button>`;
     if (task === null)
       return html`<div class="empty">
         ${icon("star")}
-        <p>${leads ? "Ask a class for something: a target, a profile, a dam that holds. Everybody sees how far they are." : "This terrain has no task."}</p>
+        <p>${leads ? msg("Ask a class for something: a target, a profile, a dam that holds. Everybody sees how far they are.") : msg("This terrain has no task.")}</p>
         ${leads ? write : nothing}
       </div>`;
     return html`${this.#told(task)} ${this.#score()} ${this.#shown(task)} ${leads ? html`<div class="group">${write}</div>` : nothing}`;
@@ -79,12 +80,12 @@ export class EskTaskPanel extends SignalElement {
     const { view } = this;
     const wrong = view.broken.value;
     return html`<section class="text">
-      <h2>${task.title || "The task"}</h2>
+      <h2>${task.title || msg("The task")}</h2>
       ${task.text
         .split("\n")
         .filter((line) => line.trim() !== "")
         .map((line) => html`<p>${line}</p>`)}
-      <div class="pictures">${view.pictures.value.map((picture) => html`<img src=${this.#url(picture)} alt="Picture of the task" />`)}</div>
+      <div class="pictures">${view.pictures.value.map((picture) => html`<img src=${this.#url(picture)} alt=${msg("Picture of the task")} />`)}</div>
       ${task.goal ? html`<p class="goal">${goalWords(task.goal)}</p>` : nothing}
       ${task.goal?.type === "contours" ? contourPicture(view.contourMap.value, view.sizeM, task.goal.interval_m) : nothing}
       ${wrong === null ? nothing : html`<p class="wrong" role="alert">${wrong}</p>`}
@@ -101,11 +102,11 @@ export class EskTaskPanel extends SignalElement {
     const score = this.score.value;
     if (!this.view.task.value?.goal) return nothing;
     const points = score?.points ?? null;
-    return html`<section class="group" aria-label="Score">
+    return html`<section class="group" aria-label=${msg("Score")}>
       <div class="score" role="status">
-        <span class="points">${points ?? "–"} <small>of 100</small></span>
+        <span class="points">${points ?? "–"} <small>${msg("of 100")}</small></span>
         <span class="bar"><i style="width:${points ?? 0}%"></i></span>
-        <span class="why">${score?.text.replace(/^\d+ of 100: /, "").replace(/^./, (first) => first.toUpperCase()) ?? "It is counted when the ground has come to rest."}</span>
+        <span class="why">${score?.text.replace(/^\d+ of 100: /, "").replace(/^./, (first) => first.toUpperCase()) ?? msg("It is counted when the ground has come to rest.")}</span>
       </div>
     </section>`;
   }
@@ -117,12 +118,12 @@ export class EskTaskPanel extends SignalElement {
     const differs = view.target.value !== null && view.mayDiffer.value;
     const contours = goal.type === "contours" && view.target.value !== null;
     if (!differs && !contours && goal.type !== "profile") return nothing;
-    return html`<section class="group" aria-label="What is shown">
+    return html`<section class="group" aria-label=${msg("What is shown")}>
       <div class="switches">
-        ${differs ? toggle("Red and blue", "Red is too high, blue too low", view.differs, (on) => view.differ(on)) : nothing}
+        ${differs ? toggle(msg("Red and blue"), msg("Red is too high, blue too low"), view.differs, (on) => view.differ(on)) : nothing}
         ${
           contours
-            ? toggle("Contours on the ground", "", view.contours.value, (on) => {
+            ? toggle(msg("Contours on the ground"), "", view.contours.value, (on) => {
                 view.contours.value = on;
               })
             : nothing
@@ -130,7 +131,7 @@ export class EskTaskPanel extends SignalElement {
       </div>
       ${
         goal.type === "profile"
-          ? html`<button class="btn outline" @click=${() => this.#measure([goal.first, goal.last])}>${icon("ruler")} Show the profile</button>`
+          ? html`<button class="btn outline" @click=${() => this.#measure([goal.first, goal.last])}>${icon("ruler")} ${msg("Show the profile")}</button>`
           : nothing
       }
     </section>`;

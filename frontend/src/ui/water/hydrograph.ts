@@ -1,5 +1,6 @@
 /** What a gauge shows: rain that falls, and the water that passes, over time. */
 
+import { msg, str } from "@lit/localize";
 import { html, svg, type TemplateResult } from "lit";
 import { flowWords, hourWords } from "../../app/view/water/words.ts";
 import type { Gauge, Rainfall } from "../../tiles/water/gauge.ts";
@@ -15,7 +16,9 @@ export function hydrograph(gauge: Gauge, { hours }: Rainfall, width: number, hei
   const y = (q: number): number => bottom - ((bottom - top) * q) / most;
   const points = Array.from(gauge.seconds, (s, k) => `${x(s).toFixed(1)} ${y(gauge.flow[k]!).toFixed(1)}`);
   const line = `M${points.join("L")}`;
-  const says = `Gauge: ${flowWords(gauge.peak.flow)} at most, ${hourWords(gauge.peak.seconds)} after the rain began.`;
+  const says = msg(
+    str`Gauge: ${flowWords(gauge.peak.flow)} at most, ${hourWords(gauge.peak.seconds)} after the rain began.`,
+  );
   return html`<svg class="chart" role="img" aria-label=${says} viewBox="0 0 ${width} ${height}" height=${height}>
     <path class="rain" d="M${x(0)} ${top}H${x(Math.min(3600 * hours, end))}V${bottom}H${x(0)}Z"></path>
     ${[0, 0.5, 1].map(

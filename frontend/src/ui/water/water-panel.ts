@@ -1,3 +1,4 @@
+import { msg, str } from "@lit/localize";
 import type { ReadonlySignal } from "@preact/signals-core";
 import { html, nothing, type TemplateResult } from "lit";
 import type { OpenTerrain } from "../../app/open-terrain.ts";
@@ -5,6 +6,7 @@ import { areaWords, heightWords, lengthWords, slopeWords, volumeWords } from "..
 import { seaSpan, seaStart } from "../../app/view/sea.ts";
 import type { WaterTool, WaterView } from "../../app/view/water/water-tool.ts";
 import { endWords, floodWords, flowWords, hourWords } from "../../app/view/water/words.ts";
+import { fixed, plain } from "../../core/language.ts";
 import type { Doc } from "../../doc/document.ts";
 import type { TileStore } from "../../tiles/store.ts";
 import { icon } from "../controls/icons.ts";
@@ -19,18 +21,18 @@ import { hydrograph } from "./hydrograph.ts";
 import { waterStyles } from "./water-styles.ts";
 
 const VIEWS: readonly { readonly value: WaterView; readonly label: string; readonly title: string }[] = [
-  { value: "drop", label: "Drop", title: "Where a drop of rain runs to, and all ground that drains there" },
-  { value: "rain", label: "Rain", title: "Rain over all of it, or under a cloud" },
-  { value: "flood", label: "Flood", title: "How high a lake stands after so much water" },
-  { value: "sea", label: "Sea", title: "What the sea covers" },
+  { value: "drop", label: msg("Drop"), title: msg("Where a drop of rain runs to, and all ground that drains there") },
+  { value: "rain", label: msg("Rain"), title: msg("Rain over all of it, or under a cloud") },
+  { value: "flood", label: msg("Flood"), title: msg("How high a lake stands after so much water") },
+  { value: "sea", label: msg("Sea"), title: msg("What the sea covers") },
 ];
 const WAYS = [
-  { value: "rain", label: "By rain" },
-  { value: "volume", label: "By volume" },
+  { value: "rain", label: msg("By rain") },
+  { value: "volume", label: msg("By volume") },
 ];
 const WHERE = [
-  { value: "all", label: "Everywhere" },
-  { value: "here", label: "Under a cloud" },
+  { value: "all", label: msg("Everywhere") },
+  { value: "here", label: msg("Under a cloud") },
 ];
 const CHART_PX = 150;
 const SMALL_CHART_PX = 108;
@@ -85,7 +87,7 @@ export class EskWater extends SignalElement {
     return html`<header>
         <esk-segmented
           compact
-          label="What water does"
+          label=${msg("What water does")}
           .segments=${VIEWS}
           .value=${view}
           @pick=${(e: CustomEvent<WaterView>) => {
@@ -93,8 +95,8 @@ export class EskWater extends SignalElement {
           }}
         ></esk-segmented>
         <span class="space"></span>
-        <button class="icon-btn small" aria-label="Take the place back" title="Take the place back (Backspace)" ?disabled=${this.water.ruler.points.value.length === 0} @click=${() => this.water.ruler.clear()}>${icon("undo")}</button>
-        <button class="icon-btn small" aria-label="Put the water away" title="Put the water away (Esc)" @click=${() => this.water.ruler.close()}>${icon("xmark")}</button>
+        <button class="icon-btn small" aria-label=${msg("Take the place back")} title=${msg("Take the place back (Backspace)")} ?disabled=${this.water.ruler.points.value.length === 0} @click=${() => this.water.ruler.clear()}>${icon("undo")}</button>
+        <button class="icon-btn small" aria-label=${msg("Put the water away")} title=${msg("Put the water away (Esc)")} @click=${() => this.water.ruler.close()}>${icon("xmark")}</button>
       </header>
       ${body.call(this)}`;
   }
@@ -103,14 +105,14 @@ export class EskWater extends SignalElement {
   #ask(words: string): TemplateResult | null {
     const { found, ruler } = this.water;
     if (found.value === null)
-      return html`<div class="body plain"><p class="empty" role="status">Looking where water runs…</p></div>`;
+      return html`<div class="body plain"><p class="empty" role="status">${msg("Looking where water runs…")}</p></div>`;
     if (ruler.points.value.length > 0) return null;
-    return html`<div class="body plain"><p class="empty">${words} Enter shows a pen for the arrow keys.</p></div>`;
+    return html`<div class="body plain"><p class="empty">${msg(str`${words} Enter shows a pen for the arrow keys.`)}</p></div>`;
   }
 
   #drop(): TemplateResult {
     const { way, shed, profile } = this.water;
-    const ask = this.#ask("Click on the land, or drag over it: a drop falls there, and runs.");
+    const ask = this.#ask(msg("Click on the land, or drag over it: a drop falls there, and runs."));
     const [path, found, area] = [way.value, profile.value, shed.value];
     if (ask !== null || path === null || area === null) return ask ?? html``;
     const small = window.innerHeight < 620 || window.innerWidth < 721;
@@ -118,13 +120,13 @@ export class EskWater extends SignalElement {
       <div class="plot">
         ${
           found === null
-            ? html`<p class="empty">The drop leaves the land right here.</p>`
+            ? html`<p class="empty">${msg("The drop leaves the land right here.")}</p>`
             : sectionChart(this.water, found, this.#width, small ? SMALL_CHART_PX : CHART_PX)
         }
       </div>
-      <dl aria-label="Where the drop runs">
-        ${found === null ? nothing : html`${row("Way", lengthWords(found.lengthM))} ${row("Falls by", heightWords(found.height[0]! - found.height.at(-1)!))} ${row("Mean slope", slopeWords(Math.abs(found.overall)))}`}
-        ${row("Runs", endWords(path))} ${row("Watershed", areaWords(area.areaM2))} ${this.#peak()}
+      <dl aria-label=${msg("Where the drop runs")}>
+        ${found === null ? nothing : html`${row(msg("Way"), lengthWords(found.lengthM))} ${row(msg("Falls by"), heightWords(found.height[0]! - found.height.at(-1)!))} ${row(msg("Mean slope"), slopeWords(Math.abs(found.overall)))}`}
+        ${row(msg("Runs"), endWords(path))} ${row(msg("Watershed"), areaWords(area.areaM2))} ${this.#peak()}
       </dl>
     </div>`;
   }
@@ -137,7 +139,7 @@ export class EskWater extends SignalElement {
       <div class="controls">
         <esk-segmented
           compact
-          label="Where rain falls"
+          label=${msg("Where rain falls")}
           .segments=${WHERE}
           .value=${shower.everywhere.value ? "all" : "here"}
           @pick=${(e: CustomEvent<string>) => {
@@ -148,8 +150,8 @@ export class EskWater extends SignalElement {
           shower.everywhere.value
             ? nothing
             : html`<esk-range
-                label="Radius of the cloud"
-                of="of the rain"
+                label=${msg("Radius of the cloud")}
+                of=${msg("of the rain")}
                 unit="m"
                 min=${this.sizeM / 128}
                 max=${this.sizeM / 2}
@@ -165,8 +167,10 @@ export class EskWater extends SignalElement {
         }
         <p class="empty">${
           here
-            ? "The gauge stands at your place; click elsewhere to move it, and the cloud."
-            : "Drops run down, gather in rivers and rest in lakes. Click on the land to set a gauge, or to move the cloud."
+            ? msg("The gauge stands at your place; click elsewhere to move it, and the cloud.")
+            : msg(
+                "Drops run down, gather in rivers and rest in lakes. Click on the land to set a gauge, or to move the cloud.",
+              )
         }</p>
       </div>
       ${here ? this.#gauge() : html`<div class="plot">${this.#rainfall()}</div>`}
@@ -179,8 +183,8 @@ export class EskWater extends SignalElement {
       rainfall.value = { ...rainfall.value, ...fields };
     };
     return html`<div class="row">
-      <esk-number label="Rain" unit="mm/h" .min=${0.1} .max=${500} .digits=${1} .value=${rainfall.value.mmPerHour} @number=${(e: CustomEvent<number>) => set({ mmPerHour: e.detail })}></esk-number>
-      <esk-number label="for" unit="h" .min=${0.1} .max=${240} .digits=${1} .value=${rainfall.value.hours} @number=${(e: CustomEvent<number>) => set({ hours: e.detail })}></esk-number>
+      <esk-number label=${msg("Rain")} unit="mm/h" .min=${0.1} .max=${500} .digits=${1} .value=${rainfall.value.mmPerHour} @number=${(e: CustomEvent<number>) => set({ mmPerHour: e.detail })}></esk-number>
+      <esk-number label=${msg("for")} unit="h" .min=${0.1} .max=${240} .digits=${1} .value=${rainfall.value.hours} @number=${(e: CustomEvent<number>) => set({ hours: e.detail })}></esk-number>
     </div>`;
   }
 
@@ -189,7 +193,7 @@ export class EskWater extends SignalElement {
     const gauge = this.water.gauge.value;
     if (gauge === null) return nothing;
     const { mmPerHour, hours } = this.water.rainfall.value;
-    return row(`After ${hours} h of ${mmPerHour} mm/h`, flowWords(gauge.peak.flow));
+    return row(msg(str`After ${plain(hours)} h of ${plain(mmPerHour)} mm/h`), flowWords(gauge.peak.flow));
   }
 
   /** The gauge at the place, with the rain that it is asked about. */
@@ -197,19 +201,19 @@ export class EskWater extends SignalElement {
     const gauge = this.water.gauge.value;
     if (gauge === null) return nothing;
     return html`<div class="gauge plot">
-      <h4>Gauge: ${flowWords(gauge.peak.flow)} at most, ${hourWords(gauge.peak.seconds)} after rain begins; ${flowWords(gauge.endless)} if it does not end</h4>
+      <h4>${msg(str`Gauge: ${flowWords(gauge.peak.flow)} at most, ${hourWords(gauge.peak.seconds)} after rain begins; ${flowWords(gauge.endless)} if it does not end`)}</h4>
       ${hydrograph(gauge, this.water.rainfall.value, this.#width, GAUGE_PX)} ${this.#rainfall()}
     </div>`;
   }
 
   #flood(): TemplateResult {
     const { amount, flood } = this.water;
-    const ask = this.#ask("Click into a hollow or on the slope above it: water is poured out there.");
+    const ask = this.#ask(msg("Click into a hollow or on the slope above it: water is poured out there."));
     const found = flood.value;
     const controls = html`<div class="controls">
       <esk-segmented
         compact
-        label="How much water"
+        label=${msg("How much water")}
         .segments=${WAYS}
         .value=${amount.value.by}
         @pick=${(e: CustomEvent<"rain" | "volume">) => {
@@ -224,16 +228,16 @@ export class EskWater extends SignalElement {
       ${controls}
       <div>
         <p role="status">${floodWords(found)}</p>
-        <dl aria-label="Figures of the flood">
-          ${row("Poured out", volumeWords(found.pouredM3))} ${row("Watershed", areaWords(found.shedM2))}
+        <dl aria-label=${msg("Figures of the flood")}>
+          ${row(msg("Poured out"), volumeWords(found.pouredM3))} ${row(msg("Watershed"), areaWords(found.shedM2))}
           ${
             lake === undefined
               ? nothing
-              : html`${row("Level", heightWords(lake.levelM))} ${row("Depth", lengthWords(lake.depthM))}
-                ${row("Volume", volumeWords(lake.volumeM3))} ${row("Area", areaWords(lake.areaM2))}`
+              : html`${row(msg("Level"), heightWords(lake.levelM))} ${row(msg("Depth"), lengthWords(lake.depthM))}
+                ${row(msg("Volume"), volumeWords(lake.volumeM3))} ${row(msg("Area"), areaWords(lake.areaM2))}`
           }
-          ${found.lakes.length > 1 ? row("Lakes", String(found.lakes.length)) : nothing}
-          ${row("Runs off", volumeWords(found.runsOffM3))}
+          ${found.lakes.length > 1 ? row(msg("Lakes"), String(found.lakes.length)) : nothing}
+          ${row(msg("Runs off"), volumeWords(found.runsOffM3))}
         </dl>
       </div>
     </div>`;
@@ -245,8 +249,8 @@ export class EskWater extends SignalElement {
       amount.value = { ...amount.value, mm: e.detail };
     };
     return html`<esk-range
-      label="Rain on the watershed"
-      of="on the watershed"
+      label=${msg("Rain on the watershed")}
+      of=${msg("on the watershed")}
       unit="mm"
       min="1"
       max="2000"
@@ -265,8 +269,8 @@ export class EskWater extends SignalElement {
     };
     const most = Math.max(1, this.sizeM ** 3 / 1e9);
     return html`<esk-range
-      label="Water"
-      of="poured out"
+      label=${msg("Water")}
+      of=${msg("poured out")}
       unit="Mm³"
       min=${most / 1e5}
       max=${most}
@@ -293,14 +297,14 @@ export class EskWater extends SignalElement {
             ?disabled=${disabled}
             @change=${(e: Event) => this.#set((e.target as HTMLInputElement).checked ? seaStart(heights, this.sizeM) : null)}
           />
-          Sea
+          ${msg("Sea")}
         </label>
         ${
           level === null
             ? nothing
             : html`<esk-range
-                label="Level of the sea"
-                of="of the sea"
+                label=${msg("Level of the sea")}
+                of=${msg("of the sea")}
                 unit="m"
                 min=${lowest}
                 max=${highest}
@@ -311,13 +315,13 @@ export class EskWater extends SignalElement {
                 @settle=${(e: CustomEvent<number>) => this.#set(e.detail)}
               ></esk-range>`
         }
-        ${disabled ? html`<p class="empty">The level is a setting of the terrain: an edit link changes it.</p>` : nothing}
+        ${disabled ? html`<p class="empty">${msg("The level is a setting of the terrain: an edit link changes it.")}</p>` : nothing}
       </div>
       <div role="status">
         ${
           sea === null
-            ? html`<p class="empty">There is no sea. Everybody here sees it come.</p>`
-            : html`<div class="large">${areaWords(sea.areaM2)}</div><p class="empty">${(100 * sea.share).toFixed(1)} % of the land lies under the sea.</p>`
+            ? html`<p class="empty">${msg("There is no sea. Everybody here sees it come.")}</p>`
+            : html`<div class="large">${areaWords(sea.areaM2)}</div><p class="empty">${msg(str`${fixed(100 * sea.share, 1)} % of the land lies under the sea.`)}</p>`
         }
       </div>
     </div>`;

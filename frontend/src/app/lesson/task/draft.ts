@@ -1,5 +1,6 @@
 /** A task while a teacher writes it: what stands in the form, and what of it the server may be sent. */
 
+import { msg, str } from "@lit/localize";
 import { type ReadonlySignal, type Signal, signal } from "@preact/signals-core";
 import type { Heights } from "../../../core/difference.ts";
 import { targetAt } from "../../../core/difference.ts";
@@ -18,10 +19,10 @@ const NEW: Task = { title: "", text: "", goal: null, difference: true };
 
 /** What a goal still lacks, as a sentence. */
 export const LACKS = {
-  target: "Press *Use this terrain as the target* first: what the ground is now is what is asked for.",
-  line: "Choose the line on the ground first.",
-  path: "Choose the path on the ground first.",
-  point: "Choose the point on the ground first.",
+  target: msg("Press *Use this terrain as the target* first: what the ground is now is what is asked for."),
+  line: msg("Choose the line on the ground first."),
+  path: msg("Choose the path on the ground first."),
+  point: msg("Choose the point on the ground first."),
 } as const;
 
 /** Numbers of a goal that a person types. */
@@ -111,7 +112,7 @@ export class TaskDraft {
   async addPicture(file: Blob): Promise<void> {
     await this.#trying(async () => {
       if (this.pictures.peek().length >= MAX_TASK_PICTURES)
-        throw new Error(`A task has at most ${MAX_TASK_PICTURES} pictures.`);
+        throw new Error(msg(str`A task has at most ${MAX_TASK_PICTURES} pictures.`));
       this.pictures.value = [...this.pictures.peek(), await smallPicture(file)];
     });
   }

@@ -1,5 +1,6 @@
 /** Pictures of a task: from a file to a small WebP or PNG in base64, and back to an address that the page shows. */
 
+import { msg } from "@lit/localize";
 import { MAX_PICTURE_CHARACTERS } from "../../../generated/contract.ts";
 
 /** Sides and qualities that are tried until a picture is small enough. */
@@ -7,8 +8,8 @@ const SIDES = [640, 480, 360, 240] as const;
 const QUALITIES = [0.8, 0.6] as const;
 const MAX_FILE_BYTES = 32 * 1024 * 1024;
 
-export const NO_PICTURE = "This file is no picture that the browser can read.";
-export const TOO_LARGE = "This picture is too large. Take one of 32 MB at most.";
+export const NO_PICTURE = msg("This file is no picture that the browser can read.");
+export const TOO_LARGE = msg("This picture is too large. Take one of 32 MB at most.");
 
 const pngStart = "iVBORw0KGgo";
 
@@ -37,7 +38,7 @@ export async function smallPicture(file: Blob): Promise<string> {
   } finally {
     bitmap.close();
   }
-  throw new Error("This picture does not become small enough. Take a plainer one.");
+  throw new Error(msg("This picture does not become small enough. Take a plainer one."));
 }
 
 async function encoded(bitmap: ImageBitmap, side: number, quality: number): Promise<string> {

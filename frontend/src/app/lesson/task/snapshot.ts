@@ -1,10 +1,11 @@
 /** The ground as it is scored: the exact samples of the level of tasks, from the tiles that the page holds. Pure. */
 
+import { msg } from "@lit/localize";
 import type { Heights } from "../../../core/difference.ts";
 import { TASK_LEVEL, TILE_CELLS, TILE_SAMPLES } from "../../../generated/contract.ts";
 import type { TileGround } from "../../../tiles/ground.ts";
 
-export const NOT_YET = "The ground is still on its way. Try again in a moment.";
+export const NOT_YET = msg("The ground is still on its way. Try again in a moment.");
 
 /** The heights of the finest level up to that of tasks; throws an Error with a sentence while tiles of it are missing. */
 export function scoredGround(ground: TileGround, solved: number): Heights {

@@ -4,6 +4,7 @@
  * Twin of `backend/esker/tasks/target.py`; `tests/vectors/targets.json` holds what both read alike.
  */
 
+import { msg } from "@lit/localize";
 import type { Heights } from "../../../core/difference.ts";
 import {
   MAX_TARGET_CHARACTERS,
@@ -27,7 +28,7 @@ export async function encode(heights: Heights, sizeM: number): Promise<Target> {
   let level = 0;
   while (level < TASK_LEVEL && sideOf(level) !== heights.side) level += 1;
   if (sideOf(level) !== heights.side || heights.data.some((z) => !Number.isFinite(z)))
-    throw new BadTarget("A target is made of ground that has been solved. Wait a moment and try again.");
+    throw new BadTarget(msg("A target is made of ground that has been solved. Wait a moment and try again."));
   let data = heights.data;
   const low = data.reduce((a, b) => Math.min(a, b), Number.POSITIVE_INFINITY);
   const high = data.reduce((a, b) => Math.max(a, b), Number.NEGATIVE_INFINITY);
@@ -36,7 +37,7 @@ export async function encode(heights: Heights, sizeM: number): Promise<Target> {
     const text = base64(await through(packed(data, sideOf(level), low, step), new CompressionStream("deflate")));
     if (text.length <= MAX_TARGET_CHARACTERS) return { size_m: sizeM, level, low_m: low, step_m: step, data: text };
     if (steps > COARSEST_STEPS) steps /= 2;
-    else if (level === 0) throw new BadTarget("This ground is too rough to be a target.");
+    else if (level === 0) throw new BadTarget(msg("This ground is too rough to be a target."));
     else {
       data = everySecond(data, sideOf(level));
       level -= 1;
@@ -70,7 +71,7 @@ function packed(data: Float32Array, side: number, low: number, step: number): Ui
 export async function decode(target: Target): Promise<Heights> {
   const side = sideOf(target.level);
   const bytes = await unpacked(target.data, 2 * side * side);
-  if (bytes === null) throw new BadTarget("The target of this task is damaged.");
+  if (bytes === null) throw new BadTarget(msg("The target of this task is damaged."));
   const k = new Int32Array(side * side);
   const data = new Float32Array(side * side);
   for (let row = 0, i = 0; row < side; row++)

@@ -1,5 +1,7 @@
 /** A task as a file that teachers pass on (docs/tasks.md). Pure. */
 
+import { msg, str } from "@lit/localize";
+import { plain } from "../../../core/language.ts";
 import { checkOp } from "../../../core/wire.ts";
 import type { Task } from "../../../generated/contract.ts";
 import { targetOf } from "./task-view.ts";
@@ -19,7 +21,7 @@ export function writeTask({ task, pictures }: TaskFile, sizeM: number): string {
 
 /** The task in a file, for a terrain so wide. Throws an Error with a sentence. */
 export function readTask(text: string, sizeM: number): TaskFile {
-  const wrong = new Error("This is not a task of Esker, or it is damaged.");
+  const wrong = new Error(msg("This is not a task of Esker, or it is damaged."));
   if (text.length > MAX_FILE_CHARACTERS) throw wrong;
   let found: unknown;
   try {
@@ -30,7 +32,7 @@ export function readTask(text: string, sizeM: number): TaskFile {
   if (typeof found !== "object" || found === null || !("format" in found) || found.format !== FORMAT) throw wrong;
   const { version, task, pictures } = found as { version?: unknown; task?: unknown; pictures?: unknown };
   if (typeof version === "number" && version > VERSION)
-    throw new Error("This task was made by a newer Esker. Update, then open it again.");
+    throw new Error(msg("This task was made by a newer Esker. Update, then open it again."));
   if (typeof task !== "object" || task === null) throw wrong;
   const fields = { task, task_pictures: pictures ?? [] };
   if (checkOp({ type: "terrain.set", fields }) !== null) throw wrong;
@@ -38,7 +40,9 @@ export function readTask(text: string, sizeM: number): TaskFile {
   const target = targetOf(whole.goal);
   if (target !== null && target.size_m !== sizeM)
     throw new Error(
-      `This task was made for a terrain ${target.size_m / 1000} km wide; this one is ${sizeM / 1000} km wide.`,
+      msg(
+        str`This task was made for a terrain ${plain(target.size_m / 1000)} km wide; this one is ${plain(sizeM / 1000)} km wide.`,
+      ),
     );
   return { task: whole, pictures: fields.task_pictures as string[] };
 }

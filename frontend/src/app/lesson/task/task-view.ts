@@ -1,5 +1,6 @@
 /** The task of an open terrain as this page shows it: its target, how far the ground is from that, lines on the ground, the score. */
 
+import { msg } from "@lit/localize";
 import { computed, effect, type ReadonlySignal, type Signal, signal } from "@preact/signals-core";
 import { type ContourLine, contourLines } from "../../../core/contour-lines.ts";
 import { differenceGrid, type Heights, targetAt } from "../../../core/difference.ts";
@@ -127,7 +128,7 @@ export class TaskView {
     this.#target.value = null;
     if (target === null) return;
     if (target.size_m !== this.sizeM) {
-      this.broken.value = "This task was made for a terrain of another size.";
+      this.broken.value = msg("This task was made for a terrain of another size.");
       return;
     }
     try {

@@ -1,5 +1,6 @@
 /** In which order the copies of a wall stand, and what they are called. */
 
+import { msg, str } from "@lit/localize";
 import type { WallCopy } from "../../../generated/contract.ts";
 
 export type Sorting = "number" | "name" | "last" | "score";
@@ -7,7 +8,7 @@ export type Sorting = "number" | "name" | "last" | "score";
 /** What a copy is called: by those whose it is, else by its number. */
 export function copyName(copy: Pick<WallCopy, "number" | "names">): string {
   const names = copy.names.filter((name) => name !== "");
-  return names.length === 0 ? `Copy ${copy.number}` : names.join(", ");
+  return names.length === 0 ? msg(str`Copy ${copy.number}`) : names.join(", ");
 }
 
 /** The copies whose name has what was typed in it, in order. Where two are alike the one that came first comes first. */

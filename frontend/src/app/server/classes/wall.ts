@@ -1,5 +1,6 @@
 /** A wall: what the server tells of the copies of a class, and the ground of each, through one socket. */
 
+import { msg } from "@lit/localize";
 import { type ReadonlySignal, signal } from "@preact/signals-core";
 import {
   PROTOCOL_VERSION,
@@ -178,11 +179,11 @@ export class WallConnection {
   #closed(code: number): void {
     const final = [WS_CLOSE.bad_protocol, WS_CLOSE.bad_secret, WS_CLOSE.revoked, WS_CLOSE.no_terrain] as number[];
     if (final.includes(code)) {
-      this.#problem.value ??= "This wall was closed.";
+      this.#problem.value ??= msg("This wall was closed.");
       this.#over.value = true;
       return;
     }
-    this.#problem.value ??= "The connection was lost. The wall comes back by itself.";
+    this.#problem.value ??= msg("The connection was lost. The wall comes back by itself.");
     const wait = RETRY_MS[Math.min(this.#tries, RETRY_MS.length - 1)]!;
     this.#tries += 1;
     this.#timer = setTimeout(() => this.#open(), wait * (0.75 + 0.5 * Math.random()));

@@ -3,6 +3,7 @@
  * the synthesised detail: at each place those of the finest tile that this page holds.
  */
 
+import { msg } from "@lit/localize";
 import { computed, effect, type ReadonlySignal, type Signal, signal } from "@preact/signals-core";
 import { type AreaFigures, measureArea } from "../../../core/measure/area.ts";
 import { type Impossible, isImpossible, type Place } from "../../../core/measure/places.ts";
@@ -29,7 +30,7 @@ const AREA_HERTZ = 3;
 /** Points of the shown line lie at most this share of the domain apart. */
 const SHOWN_STEP = 1 / 256;
 
-export const SINCE_BEGAN = "since measuring began";
+export const SINCE_BEGAN = msg("since measuring began");
 
 export class Instruments {
   readonly ruler: Ruler;

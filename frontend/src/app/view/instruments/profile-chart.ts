@@ -1,5 +1,6 @@
 /** A profile as a drawing: where its lines, ticks and words stand, in pixels from the top left. Pure; the panel and the SVG share it. */
 
+import { plain } from "../../../core/language.ts";
 import type { Profile } from "../../../core/measure/profile.ts";
 import { roundBelow } from "../../words/words.ts";
 
@@ -159,6 +160,5 @@ const leading = (x: number): number => 10 ** Math.floor(Math.log10(x));
 
 /** A number with a true minus and no digits that say nothing. */
 export function numberWords(v: number): string {
-  const text = String(Number(v.toFixed(3)));
-  return text === "-0" ? "0" : text.replace("-", "−");
+  return plain(Number(v.toFixed(3)) + 0).replace("-", "−");
 }

@@ -1,5 +1,7 @@
 /** A profile as files: numbers for spreadsheets, and a drawing. */
 
+import { msg, str } from "@lit/localize";
+import { fixed } from "../../../core/language.ts";
 import type { Profile } from "../../../core/measure/profile.ts";
 import { chartOf } from "./profile-chart.ts";
 import { slopeWords } from "./words.ts";
@@ -39,10 +41,12 @@ export function profileSvg(
     `<path d="M${chart.left} ${chart.top}V${chart.bottom}H${chart.right.toFixed(1)}" fill="none" stroke="#22303b"/>`,
     ...chart.heights.map((t) => text(chart.left - 7, t.at + 4, t.text, ' text-anchor="end"')),
     ...chart.distances.map((t) => text(t.at, chart.bottom + 18, t.text, ' text-anchor="middle"')),
-    text(chart.right, chart.bottom + 34, `distance, ${chart.distanceUnit}`, ' text-anchor="end"'),
-    text(chart.left - 40, chart.top - 4, "height, m"),
+    text(chart.right, chart.bottom + 34, msg(str`distance, ${chart.distanceUnit}`), ' text-anchor="end"'),
+    text(chart.left - 40, chart.top - 4, msg("height, m")),
   ];
-  const facts = `${(profile.lengthM / 1000).toFixed(2)} km, ${profile.min.m.toFixed(1)} to ${profile.max.m.toFixed(1)} m, up ${profile.gainM.toFixed(1)} m, down ${profile.lossM.toFixed(1)} m, steepest ${slopeWords(profile.steepest.m)}, heights × ${chart.exaggeration.toFixed(1)}`;
+  const facts = msg(
+    str`${fixed(profile.lengthM / 1000, 2)} km, ${fixed(profile.min.m, 1)} to ${fixed(profile.max.m, 1)} m, up ${fixed(profile.gainM, 1)} m, down ${fixed(profile.lossM, 1)} m, steepest ${slopeWords(profile.steepest.m)}, heights × ${fixed(chart.exaggeration, 1)}`,
+  );
   return `<svg xmlns="http://www.w3.org/2000/svg" width="${width}" height="${plot + 70}" viewBox="0 -44 ${width} ${plot + 70}" font-family="Helvetica, Arial, sans-serif" font-size="13" fill="#22303b">
 <title>${escaped(title)}</title>
 <rect x="0" y="-44" width="${width}" height="${plot + 70}" fill="#fff"/>

@@ -1,9 +1,10 @@
 /** Measured numbers with their units, with as many digits as help. */
 
+import { msg, str } from "@lit/localize";
+import { fixed, grouped } from "../../../core/language.ts";
 import { height } from "../../words/words.ts";
 
-const group = (v: number, digits: number): string =>
-  v.toLocaleString("en", { minimumFractionDigits: digits, maximumFractionDigits: digits }).replaceAll(",", " ");
+const group = grouped;
 
 /** A length: "12.4 m", "1 234 m", "12.35 km". */
 export function lengthWords(m: number): string {
@@ -21,7 +22,7 @@ export function areaWords(m2: number): string {
 /** A volume: cubic metres, then millions of them. */
 export function volumeWords(m3: number): string {
   if (m3 >= 1e9) return `${group(m3 / 1e9, 3)} km³`;
-  if (m3 >= 1e6) return `${group(m3 / 1e6, 2)} million m³`;
+  if (m3 >= 1e6) return msg(str`${group(m3 / 1e6, 2)} million m³`);
   return `${group(m3, m3 < 100 ? 1 : 0)} m³`;
 }
 
@@ -29,7 +30,7 @@ export function volumeWords(m3: number): string {
 export function slopeWords(rise: number): string {
   const degrees = (Math.atan(Math.abs(rise)) * 180) / Math.PI;
   const sign = rise < 0 && degrees >= 0.05 ? "−" : "";
-  return `${sign}${degrees.toFixed(1)}° (${sign}${(100 * Math.abs(rise)).toFixed(Math.abs(rise) < 0.1 ? 1 : 0)} %)`;
+  return `${sign}${fixed(degrees, 1)}° (${sign}${fixed(100 * Math.abs(rise), Math.abs(rise) < 0.1 ? 1 : 0)} %)`;
 }
 
 export const heightWords = (m: number): string => height(m).replace("-", "−");

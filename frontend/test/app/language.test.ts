@@ -1,0 +1,70 @@
+// @vitest-environment happy-dom
+// The language of the page (SPEC U645, U650).
+import { existsSync, readFileSync } from "node:fs";
+import { dirname, join, resolve } from "node:path";
+import { msg, str } from "@lit/localize";
+import { afterEach, describe, expect, it } from "vitest";
+import { fitting } from "../../src/app/device/language.ts";
+import { ago, height, metres } from "../../src/app/words/words.ts";
+import { counted, fixed, grouped, midSentence, plain, speak, whoDid } from "../../src/core/language.ts";
+
+const SRC = resolve(import.meta.dirname, "../../src");
+
+describe("the language of the page (SPEC U645)", () => {
+  afterEach(() => speak("en"));
+
+  it("is the browser's where the page has it, else English, or what was chosen", () => {
+    expect(fitting(["de-AT", "en-US"], null)).toEqual({ code: "de", tag: "de-AT" });
+    expect(fitting(["fr-CH", "de-CH", "en"], null)).toEqual({ code: "de", tag: "de-CH" });
+    expect(fitting(["fr", "it"], null)).toEqual({ code: "en", tag: "en" });
+    expect(fitting([], null)).toEqual({ code: "en", tag: "en" });
+    expect(fitting(["de-DE", "en-GB"], "en")).toEqual({ code: "en", tag: "en-GB" });
+    expect(fitting(["en-US"], "de")).toEqual({ code: "de", tag: "de" });
+    expect(fitting(["en-US"], "kl")).toEqual({ code: "en", tag: "en-US" });
+    expect(fitting(["de_broken tag", "de"], null)).toEqual({ code: "de", tag: "de" });
+  });
+
+  it("says words, numbers and units", async () => {
+    expect(msg("New terrain")).toBe("New terrain");
+    expect([metres(8.4), height(-0.04), ago(3_600_000)]).toEqual(["8.4 m", "0.0 m", "an hour ago"]);
+    expect([counted(25_000), grouped(1250.4, 1), plain(0.125)]).toEqual(["25,000", "1 250.4", "0.125"]);
+    expect([midSentence("Snow"), whoDid("Ada", "drew")]).toEqual(["snow", "Ada drew"]);
+    await speak("de", "de-DE");
+    expect(msg("New terrain")).toBe("Neues Gelände");
+    expect(msg(str`Every ${5} m`)).toBe("Alle 5 m");
+    expect([metres(8.4), height(-12.5), ago(3_600_000)]).toEqual(["8,4 m", "-12,5 m", "vor einer Stunde"]);
+    expect([counted(25_000), grouped(1250.4, 1), plain(0.125)]).toEqual(["25.000", "1 250,4", "0,125"]);
+    expect([fixed(2.5), fixed(0.0004, 2), fixed(-0.0004, 2)]).toEqual(["3", "0,00", "0,00"]);
+    expect([midSentence("Schnee"), whoDid("Ada", "Berg")]).toEqual(["Schnee", "Ada: Berg"]);
+    await speak("de", "de-CH");
+    expect(fixed(1.5, 1)).toBe("1.5");
+  });
+});
+
+/** Modules that a file loads at once: static imports of values, followed through the sources. */
+function loaded(entry: string, seen = new Set<string>()): Set<string> {
+  seen.add(entry);
+  for (const match of readFileSync(entry, "utf8").matchAll(
+    /^(?:import|export)\s+(?!type\b)(?:[^"';]*?from\s+)?"(\.[^"]+\.ts)"/gm,
+  )) {
+    const path = resolve(dirname(entry), match[1]!);
+    if (!seen.has(path) && existsSync(path)) loaded(path, seen);
+  }
+  return seen;
+}
+
+describe("what is loaded before the language (SPEC U650)", () => {
+  const speaking = (entry: string): string[] =>
+    [...loaded(join(SRC, entry))].filter((path) => /\bmsg\(/.test(readFileSync(path, "utf8")));
+
+  it("says nothing, so that words may stand in constants", () => {
+    expect(speaking("main.ts")).toEqual([]);
+    expect(speaking("ui/pages/landing.ts").length).toBeGreaterThan(1);
+  });
+
+  it("is no catalogue: English pages load none", () => {
+    const all = [...loaded(join(SRC, "main.ts")), ...loaded(join(SRC, "ui/pages/terrain-page.ts"))];
+    expect(all.filter((path) => path.endsWith("locales/de.ts"))).toEqual([]);
+    expect(all.some((path) => path.endsWith("locales/codes.ts"))).toBe(true);
+  });
+});
