@@ -8,7 +8,7 @@ import pytest
 
 from esker import contract as c
 from esker.document.history.activity import ActivityLog, Entry, JournalEntry
-from esker.document.history.words import sentence
+from esker.document.history.words import facts, sentence
 from esker.document.ops import StrokeSet
 from esker.document.sync import SyncDoc
 from esker.document.wire import op_json
@@ -108,6 +108,27 @@ def test_what_is_said_of_each_op(op: c.Op, says: str) -> None:
     t = Told_(strokes=(stroke("a"), stroke("b")))
     t.does("ana", op)
     assert t.says() == [f"ana {says}"]
+
+
+def test_the_facts_of_an_entry_are_what_its_sentence_says() -> None:
+    """U652."""
+    t = Told_(strokes=(stroke("a"), stroke("b")))
+    t.does("ana", *drawn("c"))
+    t.does("ben", label("a", "Mesa"))
+    t.does("ana", c.Group(ops=(c.DeleteStroke(stroke="a"), c.DeleteStroke(stroke="b"))))
+    t.does("ben", c.AddLayer(layer=LAYER))
+    t.does("ana", c.SetTerrain(fields=c.TerrainFields(sea_level_m=3.0, look="desert")))
+    strokes, layers = t.now.deleted | t.now.strokes, t.now.layers
+    empty = {"kind": "stroke", "count": 1, "noun": "", "label": "", "paint": ""}
+    found = [(entry.action, facts(entry, strokes, layers)) for entry in t.entries()]
+    assert found == [
+        ("draw", empty | {"noun": "mountain"}),
+        ("name", empty | {"noun": "mountain", "label": "Mesa"}),
+        ("delete", empty | {"count": 2}),
+        ("layer", empty | {"kind": "layer", "label": "crater-2004"}),
+        ("settings", empty | {"kind": "terrain", "fields": ["look", "sea_level_m"]}),
+    ]
+    assert facts(t.entries()[0], {}, {}) == empty, "what the terrain does not know any more has no name"
 
 
 def test_what_the_undo_of_the_clients_does_is_told_as_such() -> None:

@@ -42,6 +42,7 @@ import { type Status, status } from "./status.ts";
 import { ToastList } from "./toasts.ts";
 import type { People } from "./view/scene.ts";
 import { Stage } from "./view/stage.ts";
+import { refusalWords } from "./words/refusals.ts";
 
 export class TerrainSession implements OpenTerrain {
   readonly id: string;
@@ -167,7 +168,7 @@ export class TerrainSession implements OpenTerrain {
     if (refusal.code === "hands_off" && !this.lesson.state.peek().draws) return; // the bar says so, and keeps the line
     const stroke = strokeOf(op);
     if (refusal.code !== "deleted_stroke" || stroke === null) {
-      this.toasts.show(refusal.message, "warn");
+      this.toasts.show(refusalWords(refusal.code, refusal.message), "warn");
       return;
     }
     const run = (): void => void this.submit({ type: "stroke.restore", stroke });
@@ -378,7 +379,7 @@ export class TerrainSession implements OpenTerrain {
 
   #error(message: ErrorMessage): void {
     this.lesson.keepTicket(message.ticket);
-    if (!message.fatal) this.toasts.show(message.message, "warn");
+    if (!message.fatal) this.toasts.show(refusalWords(message.code, message.message), "warn");
     else if (message.code === "bad_secret" || message.code === "revoked") this.#kept.ended(message.code);
     else if (message.code === "no_terrain")
       void this.deletion.ask().then((restorable) => {

@@ -5,6 +5,7 @@
 
 import { msg, str } from "@lit/localize";
 import { type ReadonlySignal, signal } from "@preact/signals-core";
+import { language } from "../core/language.ts";
 import type { DecodedFrame } from "../core/types.ts";
 import { checkClientMessage } from "../core/wire.ts";
 import type { ClientMessage, CloseCode, Hello, ServerMessage } from "../generated/contract.ts";
@@ -239,7 +240,9 @@ export class Connection {
 
   #closed(code: number): void {
     const name = (Object.keys(WS_CLOSE) as CloseCode[]).find((key) => WS_CLOSE[key] === code);
-    const sentence = this.#lastWords ?? (name === undefined ? null : SENTENCES[name]);
+    const ours = name === undefined ? null : SENTENCES[name];
+    // The server's own words know more, and are English.
+    const sentence = language() === "en" ? (this.#lastWords ?? ours) : (ours ?? this.#lastWords);
     this.#detach();
     if (isFinal(code)) {
       this.#finish(sentence ?? msg(str`The server closed the connection (${code}).`));

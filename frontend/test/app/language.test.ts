@@ -5,6 +5,9 @@ import { dirname, join, resolve } from "node:path";
 import { msg, str } from "@lit/localize";
 import { afterEach, describe, expect, it } from "vitest";
 import { fitting } from "../../src/app/device/language.ts";
+import { historyWords } from "../../src/app/history/history-words.ts";
+import { readRefusal } from "../../src/app/server/api.ts";
+import { refusalWords } from "../../src/app/words/refusals.ts";
 import { ago, height, metres } from "../../src/app/words/words.ts";
 import { counted, fixed, grouped, midSentence, plain, speak, whoDid } from "../../src/core/language.ts";
 
@@ -38,6 +41,52 @@ describe("the language of the page (SPEC U645)", () => {
     expect([midSentence("Schnee"), whoDid("Ada", "Berg")]).toEqual(["Schnee", "Ada: Berg"]);
     await speak("de", "de-CH");
     expect(fixed(1.5, 1)).toBe("1.5");
+  });
+});
+
+describe("what the server says (SPEC U651, U652)", () => {
+  afterEach(() => speak("en"));
+
+  it("is said by its code in another language; its own sentence where the page has none, and in English", async () => {
+    expect(refusalWords("busy", "Another file of yours is still being brought in.")).toMatch(/^Another file/);
+    await speak("de");
+    expect(refusalWords("busy", "Another file of yours is still being brought in.")).toMatch(/^Der Server ist/);
+    expect(refusalWords("malformed", "Say which copy is to be opened.")).toBe("Say which copy is to be opened.");
+    expect(readRefusal(404, '{"code": "no_link", "message": "There is no such link."}').message).toMatch(
+      /^Diesen Link/,
+    );
+    expect(readRefusal(502, "<html>").message).toBe("Der Server hat abgelehnt (502). Versuche es gleich noch einmal.");
+  });
+
+  it("of the history becomes words from its facts", async () => {
+    const facts = { kind: "stroke", count: 1, noun: "mountain", label: "", paint: "" };
+    const entry = {
+      first: 1,
+      last: 2,
+      at: null,
+      author: "a",
+      action: "draw",
+      turn: "" as const,
+      text: "drew a mountain",
+      facts,
+    };
+    expect(historyWords(entry)).toBe("drew a mountain");
+    await speak("de");
+    expect(historyWords(entry)).toBe("Berg gezeichnet");
+    expect(historyWords({ ...entry, turn: "undo" })).toBe("zurückgenommen: Berg gezeichnet");
+    expect(historyWords({ ...entry, action: "hide", turn: "undo" })).toBe("wieder: Berg gezeigt");
+    expect(historyWords({ ...entry, action: "move", facts: { ...facts, noun: "plateau", label: "Mesa" } })).toBe(
+      "Plateau „Mesa“ verschoben",
+    );
+    expect(historyWords({ ...entry, action: "delete", facts: { ...facts, count: 3 } })).toBe("3 Linien gelöscht");
+    expect(historyWords({ ...entry, action: "paint", facts: { ...facts, paint: "snow" } })).toMatch(/ gemalt$/);
+    // Words in constants keep the language in which they were loaded: English here, German in a German page.
+    const fields = ["look", "sea_level_m"];
+    expect(historyWords({ ...entry, action: "settings", facts: { ...facts, kind: "terrain", fields } })).toMatch(
+      /^\S.* und \S.* geändert$/,
+    );
+    const { facts: _, ...bare } = entry;
+    expect(historyWords(bare), "an older server").toBe("drew a mountain");
   });
 });
 

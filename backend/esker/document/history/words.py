@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Final
+from typing import Any, Final
 
 from esker import contract as c
 from esker.document.changes import TERRAIN_WORDS
@@ -50,6 +50,28 @@ def sentence(entry: Entry, strokes: Mapping[str, c.Stroke], layers: Mapping[str,
     if entry.turn:
         return f"{'undid' if entry.turn == 'undo' else 'redid'} {doing} {what}"
     return f"{done} {what}"
+
+
+def facts(entry: Entry, strokes: Mapping[str, c.Stroke], layers: Mapping[str, c.Layer]) -> dict[str, Any]:
+    """Returns what the sentence is made of, for pages of another language (docs/decisions/0068-two-languages.md).
+
+    ``noun``: what a single stroke is; ``label``: the name of a single stroke or layer; ``paint``: the channel of a
+    paint stroke. They are empty where the terrain does not know the thing any more.
+    """
+    found: dict[str, Any] = {"kind": entry.kind, "count": len(entry.subjects), "noun": "", "label": "", "paint": ""}
+    if entry.action == "settings":
+        return found | {"fields": sorted(entry.fields)}
+    if len(entry.subjects) == 1:
+        stroke, layer = strokes.get(entry.subjects[0]), layers.get(entry.subjects[0])
+        if stroke is not None:
+            found |= {
+                "noun": _noun(stroke),
+                "label": stroke.label,
+                "paint": stroke.paint.channel if stroke.paint else "",
+            }
+        elif layer is not None:
+            found |= {"label": layer.name or layer.facts.file}
+    return found
 
 
 def _settings(entry: Entry) -> str:

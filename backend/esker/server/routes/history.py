@@ -10,7 +10,7 @@ from typing import Annotated, Any, Final
 from fastapi import FastAPI, Query, Request, Response
 
 from esker import contract as c
-from esker.document.history.words import sentence
+from esker.document.history.words import facts, sentence
 from esker.document.ops import StrokeSet
 from esker.document.wire import document_json
 from esker.errors import Cannot
@@ -113,6 +113,7 @@ def _answer(page: Page, document: StrokeSet) -> dict[str, Any]:
                 "action": entry.action,
                 "turn": entry.turn,
                 "text": sentence(entry, strokes, layers),
+                "facts": facts(entry, strokes, layers),
             }
             for entry in page.entries
         ],

@@ -3,6 +3,16 @@
 import { signal } from "@preact/signals-core";
 import { friendlyName } from "../device/names.ts";
 
+/** What an entry's sentence is made of (`facts` in backend/esker/document/history/words.py). */
+export interface HistoryFacts {
+  readonly kind: string;
+  readonly count: number;
+  readonly noun: string;
+  readonly label: string;
+  readonly paint: string;
+  readonly fields?: readonly string[];
+}
+
 /** One thing that somebody did, from clock `first` to `last`. `at`: seconds since 1970, where the time is known. */
 export interface HistoryEntry {
   readonly first: number;
@@ -12,6 +22,7 @@ export interface HistoryEntry {
   readonly action: string;
   readonly turn: "" | "undo" | "redo";
   readonly text: string;
+  readonly facts?: HistoryFacts;
 }
 
 export interface HistoryPerson {

@@ -4,6 +4,7 @@ import { msg, str } from "@lit/localize";
 import type { TemplateInfo } from "../../core/types.ts";
 import type { ImportAnswers, ImportStatus, Role } from "../../generated/contract.ts";
 import type { HistoryPage } from "../history/history.ts";
+import { refusalWords } from "../words/refusals.ts";
 
 /** A lesson of the gallery. */
 export interface LessonInfo extends TemplateInfo {
@@ -125,7 +126,8 @@ export async function request(method: Method, path: string, secret?: string, bod
 export function readRefusal(status: number, text: string): ApiError {
   try {
     const { code, message, ...facts } = JSON.parse(text) as { code?: unknown; message?: unknown };
-    if (typeof message === "string") return new ApiError(String(code ?? status), message, facts);
+    if (typeof message === "string")
+      return new ApiError(String(code ?? status), refusalWords(String(code), message), facts);
   } catch {
     // The answer is no JSON: a proxy gave it. The status says enough.
   }

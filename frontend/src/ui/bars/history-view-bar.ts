@@ -4,6 +4,7 @@ import { html, nothing, type TemplateResult } from "lit";
 import type { History } from "../../app/history/history.ts";
 import { entryAt } from "../../app/history/history.ts";
 import type { HistoryView } from "../../app/history/history-view.ts";
+import { historyWords } from "../../app/history/history-words.ts";
 import { SPEEDS } from "../../app/history/pace.ts";
 import type { TimeLapse } from "../../app/history/timelapse.ts";
 import { ago } from "../../app/words/words.ts";
@@ -108,7 +109,7 @@ export class EskHistoryViewBar extends SignalElement {
     const entry = entryAt(history.entries.value, clock);
     if (entry === null) return msg(str`step ${clock}`);
     const name = entry.author === client ? msg("you") : history.nameOf(entry.author);
-    const what = whoDid(name, entry.text);
+    const what = whoDid(name, historyWords(entry));
     return entry.last > clock ? msg(str`while ${what}`) : msg(str`after ${what}`);
   }
 }

@@ -52,6 +52,7 @@ export class EskViewOptions extends SignalElement {
       }
       input[type="range"] {
         width: 100%;
+        margin: 0;
         accent-color: var(--esk-accent);
       }
       .field {

@@ -6,9 +6,10 @@ import { repeat } from "lit/directives/repeat.js";
 import type { History } from "../../app/history/history.ts";
 import { type HistoryEntry, keyOf } from "../../app/history/history.ts";
 import type { HistoryView } from "../../app/history/history-view.ts";
+import { historyWords } from "../../app/history/history-words.ts";
 import type { TimeLapse } from "../../app/history/timelapse.ts";
 import { ago } from "../../app/words/words.ts";
-import { region } from "../../core/language.ts";
+import { language, region } from "../../core/language.ts";
 import type { Member } from "../../generated/contract.ts";
 import { icon } from "../controls/icons.ts";
 import { SignalElement } from "../controls/signal-element.ts";
@@ -145,7 +146,7 @@ export class EskHistoryPanel extends SignalElement {
         @click=${() => this.timeLapse.show(entry.last)}
       >
         <span class="mark" style=${`--who:${colour}`}>${icon(entry.turn || (ICONS[entry.action] ?? "pen"))}</span>
-        <span class="what"><b>${name}</b> ${entry.text}</span>
+        <span class="what"><b>${language() === "en" ? name : `${name}:`}</b> ${historyWords(entry)}</span>
         <span class="when">${when}</span>
       </button>
     </li>`;

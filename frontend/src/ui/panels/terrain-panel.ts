@@ -201,7 +201,7 @@ export class EskTerrainPanel extends SignalElement {
         <esk-range
           label=${msg("Size")}
           of=${msg("of the gullies")}
-          unit="cells"
+          unit=${msg("cells")}
           min=${MIN_EROSION_SCALE}
           max=${MAX_EROSION_SCALE}
           step="1"

@@ -57,7 +57,7 @@ export const shareStyles = css`
     align-items: center;
     justify-content: space-between;
     gap: 12px;
-    margin-top: 16px;
+    margin: 16px 0 14px;
     padding-top: 14px;
     border-top: 1px solid var(--esk-line);
     font-size: 0.8125rem;

@@ -80,6 +80,15 @@ export const terrainPageStyles = css`
     --segment-pad: 2px;
     --segment-gap: 0;
   }
+  /* German words are longer. */
+  @media (min-width: 721px) {
+    .side.leads:lang(de) {
+      width: 400px;
+    }
+    .side.leads header esk-segmented:lang(de) {
+      --segment-basis: auto;
+    }
+  }
   .scroll {
     overflow-y: auto;
     padding: 6px 16px 18px;
