@@ -270,6 +270,7 @@ class Visitors:
         if slow_screen:
             context.add_init_script(SLOW_SCREEN)
         visitor = Visitor(context, context.new_page(), self.server.url)
+        draw_politely()  # the graphics process of a browser that was just launched may be there only now
         visitor.watch()
         self.made.append(visitor)
         return visitor
