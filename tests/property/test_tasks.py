@@ -22,6 +22,16 @@ SIZE = 4096.0
 SETTINGS = c.TerrainSettings()
 seeds = st.integers(0, 2**32 - 1)
 tolerances = st.floats(c.MIN_TOLERANCE_M, 200)
+FIGURES = {
+    "terrain": {4},
+    "contours": {4},
+    "profile": {4},
+    "volume": {2, 4},
+    "slope": {3},
+    "area": {3},
+    "watershed": {2},
+}
+"""How many numbers the sentence of each goal has."""
 
 
 def land(seed: int, side: int = SIDE, high: float = 400.0) -> NDArray[np.float32]:
@@ -63,7 +73,8 @@ def test_every_ground_has_whole_points_and_a_sentence(seed: int, other: int, tol
         assert 0 <= found.points <= 100
         assert found.text.startswith(f"{found.points} of 100: ")
         assert "nan" not in found.text
-        c.Score(clock=0, points=found.points, text=found.text)
+        c.Score(clock=0, points=found.points, text=found.text, figures=found.figures)
+        assert len(found.figures) in FIGURES[goal.type], "SPEC U653"
 
 
 @given(seeds, tolerances)

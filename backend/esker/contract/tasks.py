@@ -186,3 +186,5 @@ class Score(Wire):
     clock: Annotated[int, Field(ge=0)]
     points: Annotated[int, Field(ge=0, le=100)] | None = None
     text: Line = ""
+    figures: Annotated[tuple[float, ...], Field(max_length=4)] = ()
+    """Numbers of the sentence, for pages of another language; which ones, the goal says (docs/tasks.md)."""

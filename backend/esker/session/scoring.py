@@ -125,7 +125,7 @@ class Scoring:
     def _counted(self, clock: int, found: Points | None) -> None:
         self._busy = False
         if found is not None and self._goal is not None:
-            self._note(c.Score(clock=clock, points=found.points, text=found.text))
+            self._note(c.Score(clock=clock, points=found.points, text=found.text, figures=found.figures))
         self._go_on()
 
     def _note(self, score: c.Score) -> None:

@@ -30,14 +30,16 @@ class Points:
 
     points: int
     text: str
+    figures: tuple[float, ...] = ()
+    """What the sentence says in numbers (docs/tasks.md); empty where it has none."""
 
 
 def score(goal: c.Goal, heights: NDArray[Any], settings: c.TerrainSettings) -> Points:
     """The points of settled heights of TASK_LEVEL or a coarser level, metres, row 0 south.
 
     >>> ramp = np.linspace(0, 100, 65)[None, :].repeat(65, axis=0)
-    >>> score(c.AreaGoal(level_m=50, at_least_m2=16e6), ramp, c.TerrainSettings())
-    Points(points=53, text='53 of 100: 8.52 km² of the 16 km² asked for are above 50 m.')
+    >>> score(c.AreaGoal(level_m=50, at_least_m2=16e6), ramp, c.TerrainSettings()).text
+    '53 of 100: 8.52 km² of the 16 km² asked for are above 50 m.'
     """
     if not np.isfinite(heights).all():
         return Points(0, "0 of 100: the ground has no heights yet.")
@@ -84,11 +86,14 @@ def _within(
     spoilt = float((1 - counted[~shaped]).sum())
     points = _whole(float(counted[shaped].sum()) / (float(shaped.sum()) + spoilt))
     near = math.floor(100 * float((off[shaped] <= tolerance).mean()) + SLACK)
-    where = what if shaped.all() else f"{what} that is to be shaped"
+    partly = not shaped.all()
+    where = f"{what} that is to be shaped" if partly else what
+    mean = float(off[shaped].mean())
     return Points(
         points,
         f"{points} of 100: {_share(near)} of {where} is within {_metres(tolerance)} of {whose}; "
-        f"the mean difference is {_metres(float(off[shaped].mean()))}.",
+        f"the mean difference is {_metres(mean)}.",
+        (near, tolerance, mean, float(partly)),
     )
 
 
@@ -96,12 +101,13 @@ def _volume(goal: c.VolumeGoal, ground: Ground) -> Points:
     held, level = ground.held(goal.point, goal.level_m)
     points = _whole(held / goal.at_least_m3)
     if held <= 0:
-        return Points(points, f"{points} of 100: no water stays at the point; it runs away.")
+        return Points(points, f"{points} of 100: no water stays at the point; it runs away.", (0.0, goal.at_least_m3))
     over = "where it would run over" if level < goal.level_m - 0.5 else "as high as it may"
     return Points(
         points,
         f"{points} of 100: the lake holds {_volume_text(held)} of the {_volume_text(goal.at_least_m3)} asked for. "
         f"It stands at {_metres(level)}, {over}.",
+        (held, goal.at_least_m3, level, float(level < goal.level_m - 0.5)),
     )
 
 
@@ -113,10 +119,12 @@ def _slope(goal: c.SlopeGoal, ground: Ground) -> Points:
     counted = np.clip(1 + EVEN - grades / goal.at_most, 0, 1)
     points = _whole(float((counted * lengths).sum() / lengths.sum()))
     fine = math.floor(100 * float(lengths[grades <= goal.at_most * EVEN].sum() / lengths.sum()) + SLACK)
+    steepest = float(grades.max())
     return Points(
         points,
         f"{points} of 100: {_share(fine)} of the path is no steeper than {100 * goal.at_most:.3g} %; "
-        f"the steepest place has {100 * float(grades.max()):.3g} %.",
+        f"the steepest place has {100 * steepest:.3g} %.",
+        (fine, goal.at_most, steepest),
     )
 
 
@@ -125,7 +133,11 @@ def _area(goal: c.AreaGoal, ground: Ground) -> Points:
     points = _whole(found / goal.at_least_m2)
     where = f"stay dry with the sea at {_metres(goal.level_m)}" if goal.dry else f"are above {_metres(goal.level_m)}"
     asked = _area_text(goal.at_least_m2)
-    return Points(points, f"{points} of 100: {_area_text(found)} of the {asked} asked for {where}.")
+    return Points(
+        points,
+        f"{points} of 100: {_area_text(found)} of the {asked} asked for {where}.",
+        (found, goal.at_least_m2, goal.level_m),
+    )
 
 
 def _watershed(goal: c.WatershedGoal, ground: Ground) -> Points:
@@ -133,7 +145,7 @@ def _watershed(goal: c.WatershedGoal, ground: Ground) -> Points:
     points = _whole(found / goal.at_least_m2)
     asked = _area_text(goal.at_least_m2)
     rain = f"rain from {_area_text(found)} of the {asked} asked for runs through the point"
-    return Points(points, f"{points} of 100: {rain}.")
+    return Points(points, f"{points} of 100: {rain}.", (found, goal.at_least_m2))
 
 
 MEASURES: Final[dict[type, Callable[[Any, Ground], Points]]] = {

@@ -860,6 +860,7 @@ export interface Score {
   clock: number;
   points: number | null;
   text: string;
+  figures: number[];
 }
 
 export interface Flank {

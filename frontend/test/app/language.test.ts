@@ -6,6 +6,8 @@ import { msg, str } from "@lit/localize";
 import { afterEach, describe, expect, it } from "vitest";
 import { fitting } from "../../src/app/device/language.ts";
 import { historyWords } from "../../src/app/history/history-words.ts";
+import { scoreWords } from "../../src/app/lesson/task/score-words.ts";
+import type { Goal } from "../../src/app/lesson/task/words.ts";
 import { readRefusal } from "../../src/app/server/api.ts";
 import { refusalWords } from "../../src/app/words/refusals.ts";
 import { ago, height, metres } from "../../src/app/words/words.ts";
@@ -87,6 +89,29 @@ describe("what the server says (SPEC U651, U652)", () => {
     );
     const { facts: _, ...bare } = entry;
     expect(historyWords(bare), "an older server").toBe("drew a mountain");
+  });
+});
+
+describe("why so many points (SPEC U653)", () => {
+  afterEach(() => speak("en"));
+  const area = { type: "area", level_m: 50, at_least_m2: 16e6, dry: false } as const;
+  const score = { text: "53 of 100: 8.52 km² of the 16 km² asked for are above 50 m.", figures: [8_519_680, 16e6, 50] };
+
+  it("is worded from the figures in German, and as the server says in English or without figures", async () => {
+    expect(scoreWords(area, score)).toBe("8.52 km² of the 16 km² asked for are above 50 m.");
+    await speak("de");
+    expect(scoreWords(area, score)).toBe("8,52 km² von verlangten 16 km² liegen über 50 m.");
+    expect(scoreWords({ ...area, dry: true }, score)).toMatch(/ bleiben trocken, wenn das Meer auf 50 m steht\.$/);
+    expect(scoreWords(area, { ...score, figures: [] })).toBe("8.52 km² of the 16 km² asked for are above 50 m.");
+    const slope: Goal = { type: "slope", path: [], at_most: 0.1 };
+    expect(scoreWords(slope, { text: "", figures: [80, 0.1, 0.253] })).toBe(
+      "80 % des Weges sind nicht steiler als 10 %; die steilste Stelle hat 25,3 %.",
+    );
+    const volume: Goal = { type: "volume", point: [0, 0], level_m: 9, at_least_m3: 2e6 };
+    expect(scoreWords(volume, { text: "", figures: [0, 2e6] })).toBe("Am Punkt bleibt kein Wasser; es läuft weg.");
+    expect(scoreWords(volume, { text: "", figures: [1.5e6, 2e6, 7.5, 1] })).toBe(
+      "Der See hält 1,5 Mio. m³ von verlangten 2 Mio. m³. Er steht auf 7,5 m, dort liefe er über.",
+    );
   });
 });
 

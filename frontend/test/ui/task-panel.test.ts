@@ -56,7 +56,7 @@ afterEach(() => document.body.replaceChildren());
 
 it("tells pupils what is asked and how far they are, and lets them write nothing", async () => {
   const text = "62 of 100: 2.5 km² of the 4 km² asked for stay dry with the sea at 8.0 m.";
-  const { made } = await panel(TASK, false, { type: "score", clock: 3, points: 62, text });
+  const { made } = await panel(TASK, false, { type: "score", clock: 3, points: 62, text, figures: [] });
   const said = words(made);
   for (const part of ["Keep dry", "One.", "Two <b>.", "Keep 4 km² dry", "62 of 100", "2.5 km² of the 4 km²"])
     expect(said).toContain(part);

@@ -1,6 +1,7 @@
 import { msg, str } from "@lit/localize";
 import type { ReadonlySignal } from "@preact/signals-core";
 import { css, html, nothing, type TemplateResult } from "lit";
+import { scoreWords } from "../../app/lesson/task/score-words.ts";
 import type { TaskView } from "../../app/lesson/task/task-view.ts";
 import type { Score } from "../../generated/contract.ts";
 import { icon } from "../controls/icons.ts";
@@ -68,9 +69,10 @@ export class EskTaskChip extends SignalElement {
     const task = this.view.task.value;
     this.toggleAttribute("hidden", task === null);
     if (task === null) return nothing;
-    const points = this.score.value?.points ?? null;
+    const score = this.score.value;
+    const points = score?.points ?? null;
     return html`<button
-      title=${this.score.value?.text || msg("What is asked")}
+      title=${score?.text ? scoreWords(task.goal, score) : msg("What is asked")}
       aria-label=${points === null ? msg(str`Task: ${task.title}`) : msg(str`Task: ${task.title}, ${points} of 100 points`)}
       @click=${() => this.dispatchEvent(new CustomEvent("open"))}
     >

@@ -5,6 +5,7 @@ import { signal } from "@preact/signals-core";
 import { html, nothing, type TemplateResult } from "lit";
 import { live } from "lit/directives/live.js";
 import { pictureUrl } from "../../app/lesson/task/pictures.ts";
+import { scoreWords } from "../../app/lesson/task/score-words.ts";
 import type { TaskView } from "../../app/lesson/task/task-view.ts";
 import { goalWords } from "../../app/lesson/task/words.ts";
 import type { OpenTerrain } from "../../app/open-terrain.ts";
@@ -106,7 +107,7 @@ export class EskTaskPanel extends SignalElement {
       <div class="score" role="status">
         <span class="points">${points ?? "–"} <small>${msg("of 100")}</small></span>
         <span class="bar"><i style="width:${points ?? 0}%"></i></span>
-        <span class="why">${score?.text.replace(/^\d+ of 100: /, "").replace(/^./, (first) => first.toUpperCase()) ?? msg("It is counted when the ground has come to rest.")}</span>
+        <span class="why">${score ? scoreWords(this.view.task.value.goal, score) : msg("It is counted when the ground has come to rest.")}</span>
       </div>
     </section>`;
   }

@@ -25,6 +25,8 @@ export const areaWords = (m2: number): string => (m2 >= 1e5 ? `${number(m2 / 1e6
 export const volumeWords = (m3: number): string =>
   m3 >= 1e6 ? msg(str`${number(m3 / 1e6)} million m³`) : `${counted(Math.round(m3))} m³`;
 
+export const percentWords = (share: number): string => `${number(100 * share)} %`;
+
 /** The goal as a sentence for who draws. */
 export function goalWords(goal: Goal): string {
   switch (goal.type) {
