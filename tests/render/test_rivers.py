@@ -79,7 +79,7 @@ def test_beds_leave_no_gap_between_patches(drawer: Reference, surface: Surface) 
 
 
 def test_a_thin_river_has_no_gaps_where_pixels_are_long(drawer: Reference) -> None:
-    """SPEC R650: seen from the side at a low angle a river across a plain is one line, though a pixel reaches fifty metres."""
+    """SPEC R650: at a low angle a river across a plain is one line, though a pixel reaches fifty metres."""
     at = np.linspace(0, SIZE, grid.samples(4))
     plain = (0.02 * np.abs(at[None, :] - 2048) + 0.012 * at[:, None]).astype(np.float32)
     levels = [plain[:: 1 << 4 - level, :: 1 << 4 - level] for level in range(5)]
