@@ -30,6 +30,14 @@ def test_there_are_nine_with_words() -> None:
         templates.load("atlantis")
 
 
+def test_the_page_knows_the_words_of_all() -> None:
+    """SPEC U654: a page in another language has these very sentences in its catalogue, lessons too."""
+    page = (Path(__file__).parents[2] / "frontend/src/app/words/gallery.ts").read_text(encoding="utf-8")
+    shown = [*templates.catalogue(), *templates.lessons()]
+    assert [t.title for t in shown if f'msg("{t.title}")' not in page] == []
+    assert [t.description for t in shown if f'"{t.description}"' not in page] == []
+
+
 @pytest.mark.parametrize("template", templates.catalogue(), ids=lambda t: t.id)
 def test_every_stroke_applies_as_an_op(template: templates.Template) -> None:
     """A starting terrain could have been drawn by a person: every stroke passes the checks that ops pass."""

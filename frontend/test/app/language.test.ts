@@ -9,6 +9,7 @@ import { historyWords } from "../../src/app/history/history-words.ts";
 import { scoreWords } from "../../src/app/lesson/task/score-words.ts";
 import type { Goal } from "../../src/app/lesson/task/words.ts";
 import { readRefusal } from "../../src/app/server/api.ts";
+import { galleryWords } from "../../src/app/words/gallery.ts";
 import { refusalWords } from "../../src/app/words/refusals.ts";
 import { ago, height, metres } from "../../src/app/words/words.ts";
 import { counted, fixed, grouped, midSentence, plain, speak, whoDid } from "../../src/core/language.ts";
@@ -112,6 +113,18 @@ describe("why so many points (SPEC U653)", () => {
     expect(scoreWords(volume, { text: "", figures: [1.5e6, 2e6, 7.5, 1] })).toBe(
       "Der See hält 1,5 Mio. m³ von verlangten 2 Mio. m³. Er steht auf 7,5 m, dort liefe er über.",
     );
+  });
+});
+
+describe("the gallery (SPEC U654)", () => {
+  afterEach(() => speak("en"));
+  const delta = { id: "delta", title: "Delta!", description: "Arms." };
+
+  it("has its words in German, and the server's in English or where the page has none", async () => {
+    expect(galleryWords(delta)).toEqual({ title: "Delta!", description: "Arms." });
+    await speak("de");
+    expect(galleryWords(delta).description).toMatch(/^Ein Fluss teilt sich/);
+    expect(galleryWords({ ...delta, id: "mine" })).toEqual({ title: "Delta!", description: "Arms." });
   });
 });
 

@@ -16,6 +16,7 @@ import {
 import { chooseTheme, themeChoice } from "../../app/device/theme.ts";
 import { readJoinInput, terrainPath } from "../../app/server/links.ts";
 import { upload } from "../../app/server/upload.ts";
+import { galleryWords } from "../../app/words/gallery.ts";
 import { ago } from "../../app/words/words.ts";
 import { icon } from "../controls/icons.ts";
 import { languageChoice } from "../controls/language-choice.ts";
@@ -334,6 +335,7 @@ export class EskLanding extends LitElement {
 
   #card(template: TemplateInfo, more: TemplateResult | typeof nothing = nothing): TemplateResult {
     const busy = this.busy === template.id;
+    const { title, description } = galleryWords(template);
     return html`
       <li>
         <button
@@ -345,8 +347,8 @@ export class EskLanding extends LitElement {
             ${ridgePicture(template.id)}
             <img src=${`/templates/${template.id}.webp`} alt="" loading="lazy" @error=${hideImage} />
           </span>
-          <strong>${busy ? msg("Making a copy…") : template.title}</strong>
-          <span class="quiet">${template.description}</span>
+          <strong>${busy ? msg("Making a copy…") : title}</strong>
+          <span class="quiet">${description}</span>
         </button>
         ${more}
       </li>
