@@ -24,6 +24,7 @@ const LEAST_CELLS = 1 / 12;
 /** Pieces that one cell holds at most, and all cells of the finest lattice together; each further one has half as many. */
 const MOST_IN_CELL = 96;
 const MOST_PIECES = 40_000;
+const ALL_CELLS = Array.from({ length: RIVER_LATTICES }, (_, k) => (RIVER_CELLS >> k) ** 2).reduce((sum, n) => sum + n);
 
 /** A river of one level that is shown so far, 0..1. */
 export interface ShownRiver {
@@ -39,41 +40,80 @@ export function halfWidthM(areaM2: number, wetness: number): number {
 
 /** The map of rivers; null without any. */
 export function riverMap(rivers: readonly ShownRiver[], sizeM: number, wetness: number): RiverMap | null {
-  const lines = rivers.filter((river) => river.share > 0).map((river) => lineOf(river, sizeM, wetness));
-  const cells: number[][] = [];
-  for (let k = 0; k < RIVER_LATTICES; k += 1) cells.push(...latticeOf(lines, sizeM, k));
-  const numbers = cells.reduce((sum, list) => sum + list.length, 0);
-  if (numbers === 0) return null;
-  const first = cells.length;
-  const rows = Math.ceil((first + numbers / TEXEL) / RIVER_COLUMNS);
+  const shown = rivers.filter((river) => river.share > 0).map((river) => placed(river, sizeM, wetness));
+  const counts = new Int32Array(ALL_CELLS);
+  let pieces = 0;
+  eachPiece(shown, counts, () => {
+    pieces += 1;
+  });
+  if (pieces === 0) return null;
+  const rows = Math.ceil((ALL_CELLS + 2 * pieces) / RIVER_COLUMNS);
   const texels = new Float32Array(TEXEL * rows * RIVER_COLUMNS);
-  let at = first;
-  cells.forEach((list, k) => {
+  let at = ALL_CELLS;
+  counts.forEach((count, k) => {
     texels[TEXEL * k] = at;
-    texels[TEXEL * k + 1] = list.length / (2 * TEXEL);
-    texels.set(list, TEXEL * at);
-    at += list.length / TEXEL;
+    texels[TEXEL * k + 1] = count;
+    at += 2 * count;
+  });
+  eachPiece(shown, new Int32Array(ALL_CELLS), (piece, share, cell, k) => {
+    const to = TEXEL * (texels[TEXEL * cell]! + 2 * k);
+    texels.set(piece, to);
+    texels[to + piece.length] = share;
   });
   return { texels, rows };
 }
 
-/** What the cells of one lattice hold, row by row from the south. */
-function latticeOf(lines: readonly Line[], sizeM: number, lattice: number): number[][] {
-  const side = RIVER_CELLS >> lattice;
-  const cellM = sizeM / side;
-  const cells: number[][] = Array.from({ length: side * side }, () => []);
-  let left = MOST_PIECES >> lattice;
-  for (const line of lines) {
-    for (const piece of piecesOf(line, lattice === 0 ? 0 : LEAST_CELLS * cellM)) {
-      for (const cell of cellsOf(piece, side, cellM)) {
-        const list = cells[cell]!;
-        if (list.length >= 2 * TEXEL * MOST_IN_CELL || left === 0) continue;
-        list.push(...piece);
-        left -= 1;
+/** Calls `take` for each piece in each cell that has room for it, with how many that cell has already; `counts` begins with zeros. */
+function eachPiece(
+  rivers: readonly Placed[],
+  counts: Int32Array,
+  take: (piece: Piece, share: number, cell: number, k: number) => void,
+): void {
+  let first = 0;
+  for (let lattice = 0; lattice < RIVER_LATTICES; lattice += 1) {
+    let left = MOST_PIECES >> lattice;
+    for (const { lattices, share } of rivers) {
+      for (const [piece, cells] of lattices[lattice]!) {
+        for (const cell of cells) {
+          const k = counts[first + cell]!;
+          if (k === MOST_IN_CELL || left === 0) continue;
+          take(piece, share, first + cell, k);
+          counts[first + cell] = k + 1;
+          left -= 1;
+        }
       }
     }
+    first += (RIVER_CELLS >> lattice) ** 2;
   }
-  return cells;
+}
+
+/** Both ends in metres; half the width at both, metres down the river. */
+type Piece = readonly [number, number, number, number, number, number, number];
+
+/** A river's pieces in each lattice, with the cells that they reach; and how far it is shown. */
+interface Placed {
+  readonly lattices: readonly (readonly (readonly [Piece, readonly number[]])[])[];
+  readonly share: number;
+}
+
+/** Where rivers lie, by their line: while one fades only its share changes. */
+const places = new WeakMap<RiverLine, { readonly key: string; readonly lattices: Placed["lattices"] }>();
+
+function placed(river: ShownRiver, sizeM: number, wetness: number): Placed {
+  const key = `${river.level} ${sizeM} ${wetness}`;
+  let found = places.get(river.line);
+  if (found?.key !== key) {
+    const line = lineOf(river, sizeM, wetness);
+    const lattices = Array.from({ length: RIVER_LATTICES }, (_, k) => {
+      const side = RIVER_CELLS >> k;
+      const cellM = sizeM / side;
+      const pieces = piecesOf(line, k === 0 ? 0 : LEAST_CELLS * cellM);
+      return pieces.map((piece) => [piece, cellsOf(piece, side, cellM)] as const);
+    });
+    found = { key, lattices };
+    places.set(river.line, found);
+  }
+  return { lattices: found.lattices, share: river.share };
 }
 
 /** A river as it is drawn: its points, metres; metres down the river and half the width at each. */
@@ -81,10 +121,9 @@ interface Line {
   readonly points: Float64Array;
   readonly along: Float64Array;
   readonly half: Float64Array;
-  readonly share: number;
 }
 
-function lineOf({ line, level, share }: ShownRiver, sizeM: number, wetness: number): Line {
+function lineOf({ line, level }: ShownRiver, sizeM: number, wetness: number): Line {
   const cellM = sizeM / (TILE_CELLS << level);
   const points = rounded(line.cells).map((v) => cellM * v);
   const n = points.length / 2;
@@ -94,21 +133,18 @@ function lineOf({ line, level, share }: ShownRiver, sizeM: number, wetness: numb
   const length = Math.max(along[n - 1]!, 1e-6);
   const [head, end] = line.areasM2.map(Math.log) as [number, number];
   const half = along.map((at) => halfWidthM(Math.exp(head + ((end - head) * at) / length), wetness));
-  return { points, along, half, share };
+  return { points, along, half };
 }
 
-/**
- * Eight numbers each: both ends in metres; half the width at both, metres down the river, share. Points nearer than `leastM` to the one
- * before are left out, but for the last.
- */
-function piecesOf({ points, along, half, share }: Line, leastM: number): number[][] {
-  const out = [];
+/** Points nearer than `leastM` to the one before are left out, but for the last. */
+function piecesOf({ points, along, half }: Line, leastM: number): Piece[] {
+  const out: Piece[] = [];
   const n = along.length;
   let a = 0;
   for (let b = 1; b < n; b += 1) {
     const [ax, ay, bx, by] = [points[2 * a]!, points[2 * a + 1]!, points[2 * b]!, points[2 * b + 1]!];
     if (b < n - 1 && Math.hypot(bx - ax, by - ay) < leastM) continue;
-    out.push([ax, ay, bx, by, half[a]!, half[b]!, along[a]!, share]);
+    out.push([ax, ay, bx, by, half[a]!, half[b]!, along[a]!]);
     a = b;
   }
   return out;
@@ -127,14 +163,14 @@ function rounded(cells: Float32Array): Float64Array {
 }
 
 /** The cells of a lattice of `side` times `side` that a piece with its banks may reach. */
-function cellsOf([ax, ay, bx, by, ha, hb]: readonly number[], side: number, cellM: number): number[] {
-  const half = Math.max(ha!, hb!);
+function cellsOf([ax, ay, bx, by, ha, hb]: Piece, side: number, cellM: number): number[] {
+  const half = Math.max(ha, hb);
   const reach = half + BANK_M + 2 * BANK_WIDTHS * half + REACH_CELLS * cellM;
   const at = (v: number): number => Math.min(side - 1, Math.max(0, Math.floor(v / cellM)));
   const out = [];
-  for (let y = at(Math.min(ay!, by!) - reach); y <= at(Math.max(ay!, by!) + reach); y += 1)
-    for (let x = at(Math.min(ax!, bx!) - reach); x <= at(Math.max(ax!, bx!) + reach); x += 1)
-      if (isNear([ax!, ay!, bx!, by!], (x + 0.5) * cellM, (y + 0.5) * cellM, reach + Math.SQRT1_2 * cellM))
+  for (let y = at(Math.min(ay, by) - reach); y <= at(Math.max(ay, by) + reach); y += 1)
+    for (let x = at(Math.min(ax, bx) - reach); x <= at(Math.max(ax, bx) + reach); x += 1)
+      if (isNear([ax, ay, bx, by], (x + 0.5) * cellM, (y + 0.5) * cellM, reach + Math.SQRT1_2 * cellM))
         out.push(y * side + x);
   return out;
 }
