@@ -17,6 +17,7 @@ import pytest
 from bench.cluster import _postgres
 from bench.cluster._postgres import Postgres as DatabaseServer
 from esker import contract as c
+from esker.cli import main
 from esker.document.wire import op_json
 from esker.store.access import Access
 from esker.store.engine.ports import BadDatabase, Unknown, Unreachable, Unwritable, UsedTwice
@@ -227,6 +228,38 @@ def test_a_newer_database_is_refused_and_left_alone(database: Database) -> None:
         Postgres(url, Holding())
     with psycopg.connect(url, autocommit=True) as db:
         assert db.execute("SELECT value FROM esker.server WHERE key='format'").fetchone() == (str(FORMAT + 1),)
+
+
+def test_list_and_link_know_a_shared_database(
+    database: Database, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """SPEC P630: beside a server that holds the terrain's lease; a database of another format stays as it is."""
+    url = database.new()
+    journal = opened(url, tmp_path / "server")
+    journal.create(c.Document(id="tor", settings=c.TerrainSettings(title="Tor"))).result()
+    with psycopg.connect(url, autocommit=True) as db:
+        db.execute("UPDATE esker.leases SET node='other', epoch=7, until=now() + interval '1 hour'")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("ESKER_DATABASE", url)
+    monkeypatch.setenv("ESKER_PUBLIC_URL", "https://esker.example.org")
+    assert main.main(["list"]) == 0
+    assert "Tor" in capsys.readouterr().out
+    assert main.main(["link", "tor", "--role", "view"]) == 0
+    link = capsys.readouterr().out.strip()
+    assert link.startswith("https://esker.example.org/t/tor#")
+    found = Access(journal).check("tor", link.split("#")[1])
+    assert found is not None
+    assert found.role == "view"
+    assert main.main(["link", "nowhere"]) == 1
+    assert "nowhere" in capsys.readouterr().err
+    journal.close()
+    for number, said in ((FORMAT + 1, "newer"), (FORMAT - 1, "start the server once")):
+        with psycopg.connect(url, autocommit=True) as db:
+            db.execute("UPDATE esker.server SET value=%s WHERE key='format'", (str(number),))
+        assert main.main(["list"]) == 1
+        assert said in capsys.readouterr().err
+    assert main.main(["list", "--data", str(tmp_path / "none")]) == 1
+    assert "no server has kept anything there" in capsys.readouterr().err
 
 
 def test_servers_that_start_at_once_make_one_database(database: Database) -> None:

@@ -13,6 +13,7 @@ from esker.contract import Role
 from esker.keeper.private import Private
 from esker.server.settings import BadSetting, from_environment
 from esker.store.access import Access, TooManyLinks
+from esker.store.engine.ports import BadDatabase, Unreachable
 from esker.store.kept import Visit, all_kept, count_kept, kept_one
 
 LINK_NAME: Final = "Made at the server's computer"
@@ -32,10 +33,12 @@ def main(argv: list[str]) -> int:
         )
     parsed = parser.parse_args(arguments)
     try:
-        data = from_environment(data=parsed.data).data
-        with Visit(data) as visit:
-            return _RUN[command](visit, Private(data), parsed)
-    except (FileNotFoundError, BadSetting, KeyError, ValueError) as error:
+        settings = from_environment(data=parsed.data)
+        # A folder that is named says which server is meant, as one whose database is a file.
+        database = "" if parsed.data is not None else settings.database
+        with Visit(settings.data, database) as visit:
+            return _RUN[command](visit, Private(settings.data), parsed, settings.public_url or "")
+    except (FileNotFoundError, BadSetting, KeyError, ValueError, BadDatabase, Unreachable) as error:
         message = str(error.args[0])
     except TooManyLinks:
         message = "This terrain has too many links. Revoke some on its page."
@@ -45,7 +48,7 @@ def main(argv: list[str]) -> int:
     return 1
 
 
-def _list(visit: Visit, private: Private, parsed: argparse.Namespace) -> int:  # noqa: ARG001
+def _list(visit: Visit, private: Private, parsed: argparse.Namespace, public_url: str) -> int:  # noqa: ARG001
     content = private.read()
     shown = content.lesson.terrain if content is not None and content.lesson is not None else ""
     total = count_kept(visit)
@@ -60,9 +63,9 @@ def _list(visit: Visit, private: Private, parsed: argparse.Namespace) -> int:  #
     return 0
 
 
-def _link(visit: Visit, private: Private, parsed: argparse.Namespace) -> int:
+def _link(visit: Visit, private: Private, parsed: argparse.Namespace, public_url: str) -> int:
     content = private.read()
-    base = content.base if content is not None else ""
+    base = content.base if content is not None else public_url.rstrip("/")
     if parsed.terrain is None and parsed.role is None:
         if content is None or content.lesson is None:
             raise KeyError("No server has started on this data folder yet. `esker list` names its terrains.")
@@ -82,8 +85,9 @@ def _link(visit: Visit, private: Private, parsed: argparse.Namespace) -> int:
 
 _WORDS: Final = {
     "list": "Lists the terrains that the server of a data folder keeps, the last changed first: id, when it was "
-    "changed, number of changes, title. The server may be running.",
+    "changed, number of changes, title. The server may be running. Where ESKER_DATABASE names a shared database and "
+    "--data nothing, those of all its servers.",
     "link": "Prints the private links of the terrain that the server's start printed; with TERRAIN or --role it makes "
     "a new link to a terrain. Whoever may read the data folder may open everything in it.",
 }
-_RUN: Final[dict[str, Callable[[Visit, Private, argparse.Namespace], int]]] = {"list": _list, "link": _link}
+_RUN: Final[dict[str, Callable[[Visit, Private, argparse.Namespace, str], int]]] = {"list": _list, "link": _link}

@@ -7,12 +7,13 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from contextlib import closing
 from pathlib import Path
-from typing import Any, Final, NamedTuple, TypeVar
+from typing import Any, Final, NamedTuple, Protocol, TypeVar
 
-from esker.store.engine.ports import Connection, Reads
+from esker.store.engine.ports import BadDatabase, Connection, Reads
 from esker.store.engine.sqlite import connect
 from esker.store.upkeep.inspection import DATABASE_NAME
 from esker.store.upkeep.migrations import FORMAT
+from esker.store.upkeep.place import NO_DRIVER
 
 T = TypeVar("T")
 MOST: Final = 100
@@ -53,8 +54,57 @@ class Visit:
     []
     """
 
+    def __init__(self, data: Path, database: str = "") -> None:
+        """``database``: the url of a shared one; empty: the file in ``data``.
+
+        Raises FileNotFoundError where nothing was kept yet, ValueError where the format is another one; of a shared
+        database BadDatabase and Unreachable.
+        """
+        self._store: Store = _shared(database) if database else _File(data)
+
+    def __enter__(self) -> Visit:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._store.close()
+
+    def reader(self) -> Connection:
+        """What statements are read by."""
+        return self._store.reader()
+
+    def submit(self, write: Callable[[Connection], T], terrain: str | None = None) -> Future[T]:  # noqa: ARG002
+        """Runs ``write`` in a transaction. The future holds what it returned or raised.
+
+        No lease fences it, whoever has the terrain: a new link is read by all servers, and takes nothing from one.
+        """
+        return self._store.submit(write)
+
+
+class Store(Protocol):
+    """What a visit needs of an engine."""
+
+    def reader(self) -> Connection:
+        """What this thread reads by."""
+
+    def submit(self, write: Callable[[Connection], T], terrain: str | None = None) -> Future[T]:
+        """Runs ``write`` in a transaction."""
+
+    def close(self) -> None:
+        """Ends every connection."""
+
+
+def _shared(database: str) -> Store:
+    try:
+        from esker.store.engine.postgres.visiting import visited
+    except ImportError:
+        raise BadDatabase(NO_DRIVER) from None
+    return visited(database)
+
+
+class _File:
+    """The database file of a data folder."""
+
     def __init__(self, data: Path) -> None:
-        """Raises FileNotFoundError where nothing was kept yet, ValueError where the format is another one."""
         path = data / DATABASE_NAME
         if not path.is_file():
             raise FileNotFoundError(f"There is no {DATABASE_NAME} in {data}: no server has kept anything there.")
@@ -65,18 +115,14 @@ class Visit:
             older = "an older Esker: start the server once" if found < FORMAT else "a newer Esker"
             raise ValueError(f"{path} is of {older} (format {found}, not {FORMAT}).")
 
-    def __enter__(self) -> Visit:
-        return self
-
-    def __exit__(self, *_: object) -> None:
+    def close(self) -> None:
         self._db.close()
 
     def reader(self) -> Connection:
-        """The connection."""
         return self._db
 
     def submit(self, write: Callable[[Connection], T], terrain: str | None = None) -> Future[T]:  # noqa: ARG002
-        """Runs ``write`` in a transaction of its own, now. The future is done, with what it returned or raised."""
+        """Runs ``write`` now: the future is done."""
         future: Future[T] = Future()
         try:
             self._db.execute("BEGIN IMMEDIATE")
