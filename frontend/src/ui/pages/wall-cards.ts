@@ -2,6 +2,7 @@
 
 import { msg, str } from "@lit/localize";
 import { html, nothing, type TemplateResult } from "lit";
+import { repeat } from "lit/directives/repeat.js";
 import { copyName } from "../../app/server/classes/copies.ts";
 import type { WallConnection } from "../../app/server/classes/wall.ts";
 import { ago } from "../../app/words/words.ts";
@@ -57,14 +58,27 @@ export function cardWidth(count: number): number {
   return count <= 6 ? 360 : count <= 15 ? 270 : 210;
 }
 
-interface CardState {
+export interface CardState {
   readonly isChosen: boolean;
   /** Whether the whole class is shown this copy. */
   readonly isShown: boolean;
   readonly onPress: () => void;
 }
 
-export function wallCard(copy: WallCopy, { isChosen, isShown, onPress }: CardState): TemplateResult {
+/** Cards in their order. Each keeps its canvas when the order changes: what was drawn on it goes along. */
+export function wallCards(
+  copies: readonly WallCopy[],
+  width: number,
+  stateOf: (copy: WallCopy) => CardState,
+): TemplateResult {
+  return html`<ul style=${`--card: ${width}px`}>${repeat(
+    copies,
+    (copy) => copy.number,
+    (copy) => wallCard(copy, stateOf(copy)),
+  )}</ul>`;
+}
+
+function wallCard(copy: WallCopy, { isChosen, isShown, onPress }: CardState): TemplateResult {
   const name = copyName(copy);
   const last = copy.last === null ? msg("nothing drawn yet") : ago(Date.now() - 1000 * copy.last);
   const points = copy.score?.points ?? null;

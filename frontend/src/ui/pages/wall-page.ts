@@ -11,7 +11,7 @@ import { icon } from "../controls/icons.ts";
 import "../controls/segmented.ts";
 import { SignalElement } from "../controls/signal-element.ts";
 import { shared } from "../styles/shared.ts";
-import { CardPainter, cardWidth, wallCard } from "./wall-cards.ts";
+import { CardPainter, type CardState, cardWidth, wallCards } from "./wall-cards.ts";
 import "./wall-compare.ts";
 import { emptyWall, openDoor } from "./wall-door.ts";
 import { wallStyles } from "./wall-styles.ts";
@@ -198,7 +198,7 @@ export class EskWall extends SignalElement {
       ${
         wall.copies.value.size === 0
           ? emptyWall(state.code)
-          : html`<ul style=${`--card: ${cardWidth(wall.copies.value.size)}px`}>${copies.map((copy) => this.#card(copy, state.show === copy.number))}</ul>`
+          : wallCards(copies, cardWidth(wall.copies.value.size), (copy) => this.#cardState(copy, state.show))
       }
       ${this.#actions(state.show)}
       ${this.comparing === null ? nothing : this.#compared(this.comparing)}
@@ -332,9 +332,12 @@ export class EskWall extends SignalElement {
     });
   }
 
-  #card(copy: WallCopy, isShown: boolean): TemplateResult {
-    const { number } = copy;
-    return wallCard(copy, { isShown, isChosen: this.chosen.has(number), onPress: () => this.#toggle(number) });
+  #cardState({ number }: WallCopy, shown: number | null): CardState {
+    return {
+      isShown: shown === number,
+      isChosen: this.chosen.has(number),
+      onPress: () => this.#toggle(number),
+    };
   }
 
   #actions(shown: number | null): TemplateResult | typeof nothing {
