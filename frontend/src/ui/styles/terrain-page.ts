@@ -123,6 +123,22 @@ export const terrainPageStyles = css`
   :is(esk-measure, esk-water)[beside] {
     right: calc(var(--edge) + 340px);
   }
+  /* The inspector is wider with six tabs, and under a finger. */
+  @media (min-width: 721px) {
+    .side.leads ~ :is(esk-measure, esk-water)[beside],
+    :is(esk-measure, esk-water)[beside]:has(~ .side.leads) {
+      right: calc(var(--edge) + 376px);
+    }
+    .side.leads ~ :is(esk-measure, esk-water)[beside]:lang(de),
+    :is(esk-measure, esk-water)[beside]:lang(de):has(~ .side.leads) {
+      right: calc(var(--edge) + 412px);
+    }
+  }
+  @media (pointer: coarse) and (min-width: 721px) {
+    :is(esk-measure, esk-water)[beside] {
+      right: calc(var(--edge) + 364px);
+    }
+  }
   .hint,
   .closed {
     position: absolute;
