@@ -37,7 +37,8 @@ def main(argv: list[str]) -> int:
         # A folder that is named says which server is meant, as one whose database is a file.
         database = "" if parsed.data is not None else settings.database
         with Visit(settings.data, database) as visit:
-            return _RUN[command](visit, Private(settings.data), parsed, settings.public_url or "")
+            parsed.public_url = settings.public_url or ""
+            return _RUN[command](visit, Private(settings.data), parsed)
     except (FileNotFoundError, BadSetting, KeyError, ValueError, BadDatabase, Unreachable) as error:
         message = str(error.args[0])
     except TooManyLinks:
@@ -48,7 +49,7 @@ def main(argv: list[str]) -> int:
     return 1
 
 
-def _list(visit: Visit, private: Private, parsed: argparse.Namespace, public_url: str) -> int:  # noqa: ARG001
+def _list(visit: Visit, private: Private, parsed: argparse.Namespace) -> int:  # noqa: ARG001
     content = private.read()
     shown = content.lesson.terrain if content is not None and content.lesson is not None else ""
     total = count_kept(visit)
@@ -63,9 +64,9 @@ def _list(visit: Visit, private: Private, parsed: argparse.Namespace, public_url
     return 0
 
 
-def _link(visit: Visit, private: Private, parsed: argparse.Namespace, public_url: str) -> int:
+def _link(visit: Visit, private: Private, parsed: argparse.Namespace) -> int:
     content = private.read()
-    base = content.base if content is not None else public_url.rstrip("/")
+    base = content.base if content is not None else parsed.public_url.rstrip("/")
     if parsed.terrain is None and parsed.role is None:
         if content is None or content.lesson is None:
             raise KeyError("No server has started on this data folder yet. `esker list` names its terrains.")
@@ -90,4 +91,4 @@ _WORDS: Final = {
     "link": "Prints the private links of the terrain that the server's start printed; with TERRAIN or --role it makes "
     "a new link to a terrain. Whoever may read the data folder may open everything in it.",
 }
-_RUN: Final[dict[str, Callable[[Visit, Private, argparse.Namespace, str], int]]] = {"list": _list, "link": _link}
+_RUN: Final[dict[str, Callable[[Visit, Private, argparse.Namespace], int]]] = {"list": _list, "link": _link}

@@ -9,7 +9,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any, Final, NamedTuple, Protocol, TypeVar
 
-from esker.store.engine.ports import BadDatabase, Connection, Reads
+from esker.store.engine.ports import BadDatabase, Connection, Database, Reads
 from esker.store.engine.sqlite import connect
 from esker.store.upkeep.inspection import DATABASE_NAME
 from esker.store.upkeep.migrations import FORMAT
@@ -80,14 +80,8 @@ class Visit:
         return self._store.submit(write)
 
 
-class Store(Protocol):
+class Store(Database, Protocol):
     """What a visit needs of an engine."""
-
-    def reader(self) -> Connection:
-        """What this thread reads by."""
-
-    def submit(self, write: Callable[[Connection], T], terrain: str | None = None) -> Future[T]:
-        """Runs ``write`` in a transaction."""
 
     def close(self) -> None:
         """Ends every connection."""

@@ -1,4 +1,4 @@
-/** Which language the page speaks: the browser's until somebody chooses, then that one, remembered by the device. */
+/** The page speaks the browser's language until somebody chooses one; the device remembers the choice. */
 
 import { type Language, speak } from "../../core/language.ts";
 import { deviceStore, type Store } from "./storage.ts";

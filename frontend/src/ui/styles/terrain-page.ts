@@ -125,11 +125,9 @@ export const terrainPageStyles = css`
   }
   /* The inspector is wider with six tabs, and under a finger. */
   @media (min-width: 721px) {
-    .side.leads ~ :is(esk-measure, esk-water)[beside],
     :is(esk-measure, esk-water)[beside]:has(~ .side.leads) {
       right: calc(var(--edge) + 376px);
     }
-    .side.leads ~ :is(esk-measure, esk-water)[beside]:lang(de),
     :is(esk-measure, esk-water)[beside]:lang(de):has(~ .side.leads) {
       right: calc(var(--edge) + 412px);
     }

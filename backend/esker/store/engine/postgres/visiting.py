@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Final
-
 from esker.store.engine.ports import BadDatabase
 from esker.store.engine.postgres import migrations
 from esker.store.engine.postgres.connections import connect, place_of
@@ -29,13 +27,11 @@ def visited(url: str) -> Postgres:
     """
     with connect(url) as db:
         found = migrations.format_of(db)
-    if found != FORMAT:
-        raise BadDatabase(_OTHER[(found > FORMAT) - (found < FORMAT) if found else 0].format(place_of(url)))
+    place = place_of(url)
+    if found == 0:
+        raise BadDatabase(f"No server has kept anything in the database {place}.")
+    if found < FORMAT:
+        raise BadDatabase(f"The database {place} is of an older Esker: start the server once.")
+    if found > FORMAT:
+        raise BadDatabase(f"The database {place} is of a newer Esker.")
     return Postgres(url, _Nobody())
-
-
-_OTHER: Final = {
-    0: "No server has kept anything in the database {}.",
-    -1: "The database {} is of an older Esker: start the server once.",
-    1: "The database {} is of a newer Esker.",
-}
