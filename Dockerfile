@@ -1,5 +1,5 @@
 # The page is built once with Node; the server image holds Python, PoCL (from its wheel) and the built page only.
-FROM node:22-bookworm-slim AS page
+FROM node:22-bookworm-slim@sha256:43ac6c60b8f89723f746e8a92ce91abd5017e627ce1ddfe4238355d3a30b772c AS page
 WORKDIR /esker/frontend
 COPY frontend/package.json frontend/package-lock.json frontend/.npmrc ./
 # Exactly what is locked, or nothing. Without the linter, which nothing here runs: the lock file lacks its programs for
@@ -11,7 +11,7 @@ COPY frontend ./
 # Not `npm run build`: that checks types, those of tests too, whose vectors are not here. `make check` does.
 RUN npx --no-install vite build
 
-FROM python:3.11-slim-bookworm
+FROM python:3.11-slim-bookworm@sha256:a36c24f9cbdf4fd0f52d67f0823eeac19c2028c637cecc392d97f980d4fec56b
 # What the wheels leave to the system: libexpat for rasterio; OpenGL on the processor for pictures of terrains.
 RUN apt-get update \
     && apt-get install -y --no-install-recommends libegl1 libexpat1 libgl1-mesa-dri \
