@@ -141,9 +141,15 @@ class Postgres:
 
     def signal(self, number: int) -> None:
         """Sends a signal to the server and all its processes."""
+        import psutil
+
         assert self._process is not None
-        with suppress(ProcessLookupError):
-            os.killpg(self._process.pid, number)
+        with suppress(psutil.NoSuchProcess):
+            server = psutil.Process(self._process.pid)
+            server.send_signal(number)  # first, so that no process is born meanwhile
+            for child in server.children():  # each is the leader of a group of its own
+                with suppress(psutil.NoSuchProcess):
+                    child.send_signal(number)
 
     def kill(self) -> None:
         """Kills the server as a power cut would, but for what the system had already."""

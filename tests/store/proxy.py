@@ -1,4 +1,4 @@
-"""A proxy in front of a Unix socket that cuts connections where a test says."""
+"""A proxy in front of a socket that cuts connections, or swallows what they carry, where a test says."""
 
 from __future__ import annotations
 
@@ -10,11 +10,17 @@ from pathlib import Path
 
 
 class Proxy:
-    """Passes bytes on in both directions. After ``cut_at`` was sent nothing comes back and the connection ends."""
+    """Passes bytes on in both directions. After ``cut_at`` was sent nothing comes back and the connection ends; after
+    ``hush_at`` it stays and carries nothing more."""
 
     def __init__(self, folder: Path, server: Path) -> None:
         """``folder``: where the socket of the proxy lies; ``server``: the socket behind it."""
         self.cut_at: bytes | None = None
+        self.hush_at: bytes | None = None
+        self.is_deaf = False
+        """Whether every connection, old and new, is open and carries nothing. What is on its way then is lost, so no
+        connection that was open comes back to itself."""
+        self._deafened: set[socket.socket] = set()
         self.is_open = True
         """Whether new connections are let through."""
         self.cuts = 0
@@ -44,6 +50,8 @@ class Proxy:
     def _out(self, near: socket.socket, far: socket.socket) -> None:
         with suppress(OSError):
             while data := near.recv(65536):
+                if self._is_swallowed(near, data):
+                    continue
                 cut = self.cut_at is not None and self.cut_at in data
                 if cut:
                     self.cuts += 1
@@ -63,7 +71,14 @@ class Proxy:
     def _back(self, near: socket.socket, far: socket.socket) -> None:
         with suppress(OSError):
             while data := far.recv(65536):
-                near.sendall(data)
+                if not self._is_swallowed(near, b""):
+                    near.sendall(data)
+
+    def _is_swallowed(self, near: socket.socket, data: bytes) -> bool:
+        """Returns whether a connection carries nothing any more."""
+        if self.is_deaf or (self.hush_at is not None and self.hush_at in data):
+            self._deafened.add(near)
+        return near in self._deafened
 
     def cut(self) -> None:
         """Ends every connection, and lets nobody through until ``is_open`` is set again."""

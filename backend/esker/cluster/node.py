@@ -272,7 +272,10 @@ class Cluster:
         found = self._homes.get(terrain)
         if found is None:
             assert self._rooms is not None
-            found = await self._ask(self._rooms.home, terrain)
+            try:
+                found = await self._ask(self._rooms.home, terrain)
+            except Unreachable as error:
+                raise Elsewhere(f"This node does not reach its database: {error}") from None
             if len(self._homes) >= MOST_KNOWN:
                 self._homes.clear()
             self._homes[terrain] = found

@@ -28,12 +28,14 @@ from esker.cluster.peers import (
 )
 from esker.cluster.relay import Relay
 from esker.cluster.signing import NotSigned, Opening, Sessions, Visit
+from esker.store.engine.leases import Unreachable
 
 log = logging.getLogger("esker.cluster")
 
 PASSED: Final = "esker.passed"
 """What the scope of a request has under this name that another node passed on: its ``Visit``."""
 MOST_OPENING: Final = 1024
+SILENT: Final = "The database of this server does not answer at the moment. Try again in a moment."
 AGAIN: Final = "This terrain is on its way to another server. Try again in a moment."
 
 
@@ -117,6 +119,10 @@ class Passing:
         except Elsewhere as error:
             log.info("%s %s was not passed on: %s", scope["method"], scope["path"], error)
             await _answer(scope, send, 503, "moved", AGAIN, [(MOVED_HEADER, b"1"), (b"retry-after", b"1")])
+            return
+        except Unreachable as error:
+            log.warning("%s %s: %s", scope["method"], scope["path"], error)
+            await _answer(scope, send, 503, "unavailable", SILENT, [(b"retry-after", b"5")])
             return
         except Lost as error:
             await _answer(scope, send, error.status, error.code, error.message, [])

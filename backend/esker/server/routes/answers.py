@@ -23,16 +23,18 @@ from esker.session.room.door import Deleted
 from esker.session.room.hub import Hub
 from esker.session.room.replicas import viewing
 from esker.store.access import Link
-from esker.store.engine.ports import Moved, Unknown, Unwritable
+from esker.store.engine.ports import Moved, Unknown, Unreachable, Unwritable
 
 log = logging.getLogger("esker.server")
 T = TypeVar("T")
 
 FULL: Final = "The server has no room for this (is its disk full?). Nothing was changed."
 UNWRITABLE: Final = "The server cannot save anything at the moment. Nothing was changed; try again later."
+SILENT: Final = "The server's database does not answer at the moment. Nothing was changed; try again in a moment."
 MOVED: Final = "This terrain is just being moved to another server. Try again in a moment."
 UNKNOWN: Final = "The database went away meanwhile: nobody knows whether this was done. Look first."
 AGAIN_SECONDS: Final = 30
+SILENT_AGAIN_SECONDS: Final = 5
 NO_ROOM: Final = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG})
 
 
@@ -90,6 +92,11 @@ def add_errors(app: FastAPI) -> None:
         if error.full:
             return answer(507, "storage", FULL, AGAIN_SECONDS)
         return answer(503, "unavailable", UNWRITABLE, AGAIN_SECONDS)
+
+    @app.exception_handler(Unreachable)
+    async def unreachable(request: Request, error: Unreachable) -> JSONResponse:
+        log.warning("%s %s: %s", request.method, _path(request), error)
+        return answer(503, "unavailable", SILENT, SILENT_AGAIN_SECONDS)
 
     @app.exception_handler(Moved)
     async def moved(request: Request, error: Moved) -> JSONResponse:

@@ -27,8 +27,8 @@ def add_health(app: FastAPI, hub: Hub, cluster: Cluster | None = None) -> None:
         refused."""
         state = _state(hub) | _node(cluster)
         # A node that nobody is sent to writes nothing, so its last commit says nothing: its renewals do.
-        looked_at = ("journal", "disk") if cluster is None else ("disk", "node")
-        reasons = [name for name in looked_at if state[name] != "ok"]
+        looked_at = ("journal", "database", "disk") if cluster is None else ("database", "disk", "node")
+        reasons = [name for name in looked_at if state.get(name, "ok") != "ok"]
         return JSONResponse({"ready": not reasons, "reasons": reasons} | state, 503 if reasons else 200)
 
 
@@ -41,11 +41,13 @@ def _node(cluster: Cluster | None) -> dict[str, Any]:
 
 
 def _state(hub: Hub) -> dict[str, Any]:
-    """Returns the state of the journal and the disk, what waits, and the number of open rooms. Nothing of it says
-    anything about anybody's terrain."""
+    """Returns the state of the journal and the disk, what waits, and the number of open rooms; of a database
+    elsewhere, whether it answers. Nothing of it says anything about anybody's terrain, and nothing is asked for it."""
     journal = hub.journal
+    shared = {} if journal.engine.is_local else {"database": "ok" if journal.engine.answers else "does not answer"}
     return {
         "journal": "ok" if journal.writable else "cannot be written",
+        **shared,
         "disk": "low" if journal.space.low else "ok",
         "waiting": journal.waiting,
         "rooms": hub.open_rooms,

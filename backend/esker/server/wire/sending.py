@@ -13,6 +13,7 @@ from starlette.background import BackgroundTask
 from esker.session.room.core import Denied
 from esker.session.room.hub import Hub
 from esker.store.access import Link
+from esker.store.engine.ports import Unreachable
 
 ASK_SECONDS: Final = 0.25
 """Seconds between two looks at whether the link still lives, while a file is being sent."""
@@ -46,7 +47,11 @@ class Sent(FileResponse):
             now = time.monotonic()
             if now - asked >= ASK_SECONDS:
                 asked = now
-                if not self._hub.access.alive(self._link):
+                try:
+                    alive = self._hub.access.alive(self._link)
+                except Unreachable:  # nobody can say whether the link was revoked meanwhile
+                    alive = False
+                if not alive:
                     raise _Cut
             await send(message)
 

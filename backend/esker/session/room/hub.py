@@ -37,6 +37,7 @@ from esker.session.room.room import Guest, Room
 from esker.store import timestamps
 from esker.store.access import JOINED_BY_CODE, Access, Link
 from esker.store.claims import Claims
+from esker.store.engine.ports import Unreachable
 from esker.store.journal import DamagedTerrain, Journal
 from esker.store.lessons import read_makers, read_state
 from esker.store.upkeep.deletion import Deletion
@@ -403,7 +404,10 @@ class Hub:
 
         Some may open other terrains: a teacher's to the copies of a class.
         """
-        others = self.access.elsewhere(terrain, links)
+        try:
+            others = self.access.elsewhere(terrain, links)
+        except Unreachable:  # they are revoked: who came in by them here goes at once, elsewhere when they ask again
+            others = {}
         for where in {terrain, *others.values()}:
             ended = [link for link in links if others.get(link, terrain) == where]
             for link in ended:

@@ -16,6 +16,7 @@ from esker.session.room.core import Denied
 from esker.session.room.hub import Hub
 from esker.session.room.outbox import SLOW, Long, Outbox
 from esker.session.room.room import Guest, Room
+from esker.store.engine.ports import Unreachable
 
 log = logging.getLogger("esker.socket")
 
@@ -23,6 +24,7 @@ WATCH_SECONDS: Final = 0.5
 GOODBYE_SECONDS: Final = 0.8
 """A closing connection has this time to accept the reason."""
 BROKE: Final = "This connection asked for more work than people's drawing takes."
+SILENT: Final = "The server's database does not answer at the moment. Your page comes back by itself."
 REASON_BYTES: Final = 123
 """Most bytes that a close frame holds for its reason (RFC 6455, 5.5)."""
 
@@ -144,23 +146,28 @@ class Session:
                         await self._handle(event)
         except ConnectionError:
             raise
-        except Exception:
-            self._failed()
+        except Exception as error:
+            self._failed(error)
 
     def _read(self, message: str | bytes) -> None:
         """Takes a message of a member, as it is read: only a hello needs a task to wait in."""
         try:
             for event in self._events(message):
                 self._do(event)
-        except Exception:
-            self._failed()
+        except Exception as error:
+            self._failed(error)
 
     def _events(self, message: str | bytes) -> list[protocol.Event]:
         if isinstance(message, str):
             return self._protocol.text(message, self._now())
         return self._protocol.binary(message)
 
-    def _failed(self) -> None:
+    def _failed(self, error: Exception) -> None:
+        """Closes the connection: what came by it could not be done."""
+        if isinstance(error, Unreachable):
+            log.warning("a message from %s could not be handled: %s", self._address, error)
+            self.outbox.close("server_error", SILENT)
+            return
         log.exception("a message from %s could not be handled", self._address)
         self.outbox.close("server_error", "The server failed to handle a message. Your page will come back.")
 

@@ -106,6 +106,11 @@ class Engine(Database, Protocol):
     """Whether it lies on the disk of the data folder, and takes of its room."""
     writable: bool
     """Whether the last commit could be written."""
+
+    @property
+    def answers(self) -> bool:
+        """Whether the database answered when it was asked last. While it does not, reads raise Unreachable."""
+
     hear_of_again: Callable[[], object]
     """Called in the writer's thread before items are run again that were run before in vain."""
 

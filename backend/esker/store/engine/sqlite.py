@@ -48,7 +48,7 @@ class Sqlite:
         self._open_readers: list[sqlite3.Connection] = []
         self._queue: queue.SimpleQueue[Item | None] = queue.SimpleQueue()
         self._closed = False
-        self.is_local = self.writable = True
+        self.is_local = self.writable = self.answers = True
         self.hear_of_again: Callable[[], object] = lambda: None
         self._thread = threading.Thread(target=self._write_all, name="journal", daemon=True)
         self._thread.start()

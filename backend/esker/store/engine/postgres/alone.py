@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable
 from typing import Final
 
-from esker.store.engine.leases import LEASE_SECONDS, RENEW_SECONDS, Lease, Leases
+from esker.store.engine.leases import LEASE_SECONDS, RENEW_SECONDS, SILENT_SECONDS, Lease, Leases
 from esker.store.engine.lock import InUse
 from esker.store.engine.ports import Unreachable
 from esker.store.engine.postgres import migrations
@@ -40,6 +40,7 @@ class Alone:
         """
         self._leases, self._name = leases, name
         self._lease = self._taken(where, time.monotonic() + PATIENCE_SECONDS)
+        self._heard = time.monotonic()
         self._lost = lost
         self._stop, self._lock = threading.Event(), threading.Lock()
         self._thread = threading.Thread(target=self._renew_all, name="lease", daemon=True)
@@ -72,6 +73,11 @@ class Alone:
         log.warning("a write for terrain %s was refused: the lease of this server had ended", terrain)
         self._renew()
 
+    @property
+    def age(self) -> float:
+        """Seconds since the newest renewal was sent that was answered."""
+        return time.monotonic() - self._heard
+
     def _renew_all(self) -> None:
         while not self._stop.wait(RENEW_SECONDS):
             self._renew()
@@ -79,8 +85,11 @@ class Alone:
     def _renew(self) -> None:
         """Prolongs the lease. One that has ended is taken again where nobody had the database in between."""
         with self._lock:
+            asked = time.monotonic()
             try:
-                if self._leases.renew([self._lease], LEASE_SECONDS):
+                renewed = self._leases.renew([self._lease], LEASE_SECONDS)
+                self._heard = asked
+                if renewed:
                     return
                 found = self._leases.take(WHOLE, self._name, LEASE_SECONDS)
             except Unreachable as error:
@@ -118,6 +127,11 @@ class LoneEngine(Postgres):
             self._leases.close()
             raise
         super().__init__(url, self._alone)
+
+    @property
+    def answers(self) -> bool:
+        """Whether the database answered whoever read last, and whoever renewed the lease."""
+        return super().answers and self._alone.age < SILENT_SECONDS
 
     def close(self) -> None:
         super().close()

@@ -7,6 +7,7 @@ harm. Names and passwords never stand in a message of ours.
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from typing import Any, Final
@@ -17,9 +18,17 @@ from psycopg_pool import ConnectionPool, PoolTimeout
 
 from esker.store.engine.ports import BadDatabase, Connection, Unreachable
 from esker.store.engine.postgres.dialect import of_many, translated
+from esker.store.engine.postgres.patience import LOOP_SECONDS, SILENT_SECONDS, Patient, Silent, Watch, is_in_loop
 
 CONNECT_SECONDS: Final = 3
 POOL_SECONDS: Final = 5.0
+ASKING_SECONDS: Final = 1.0
+"""Whoever asks a silent database for a word waits so long for it."""
+RECONNECT_SECONDS: Final = 1.5
+"""A pool that cannot connect tries for so long, and again when somebody wants a connection: with longer pauses it would
+find a database late that is there again."""
+LOOP_CONNECTIONS: Final = 2
+"""The event loop reads by one at a time; the other stands for one that was lost."""
 ROWS_AT_ONCE: Final = 256
 """Rows of one INSERT. Statements of more would be planned anew for every count."""
 PATIENCE: Final = {
@@ -60,16 +69,26 @@ def parameters(url: str) -> dict[str, Any]:
 def connect(url: str) -> Database:
     """One connection. Raises Unreachable."""
     try:
-        return psycopg.connect(**parameters(url))
+        return Patient.connect(**parameters(url))
     except psycopg.OperationalError as error:
         raise Unreachable(f"the database {place_of(url)} does not answer ({first_line(error)})") from None
 
 
-def pool(url: str, name: str, most: int, *, checked: bool = False) -> ConnectionPool[Database]:
-    """Connections that are shared by threads. ``checked``: whether each is asked for a word before it is given out."""
+def pool(
+    url: str, name: str, most: int, *, checked: bool = False, patience: float = SILENT_SECONDS
+) -> ConnectionPool[Patient]:
+    """Connections that are shared by threads. ``checked``: whether each is asked for a word before it is given out;
+    ``patience``: seconds that each waits for a database that says nothing."""
     more = parameters(url)
+
+    def configure(db: Patient) -> None:
+        db.patience = patience
+
     return ConnectionPool(
         more.pop("conninfo"),
+        connection_class=Patient,
+        configure=configure,
+        reconnect_timeout=RECONNECT_SECONDS,
         kwargs=more,
         min_size=1,
         max_size=most,
@@ -191,25 +210,38 @@ class Coming:
 
 
 class Reading:
-    """Reads by statements of their own, each by a connection of the pool."""
+    """Reads by statements of their own, each by a connection of a pool."""
 
     IntegrityError: type[Exception] = psycopg.IntegrityError
 
-    def __init__(self, connections: ConnectionPool[Database]) -> None:
-        self._pool = connections
+    def __init__(self, connections: ConnectionPool[Patient], watch: Watch, seconds: float) -> None:
+        """``seconds``: for how long a connection of the pool is waited for."""
+        self._pool, self._watch, self._seconds = connections, watch, seconds
 
     def execute(self, sql: str, values: Sequence[Any] = (), /) -> Found:
-        """Raises Unreachable."""
+        """Raises Unreachable; at once where the database is known to say nothing."""
+        self._watch.demand()
         try:
-            return self._once(sql, values)
-        except Unreachable:  # the connection may be one of before the database was started again, and so may others
-            with reached():
-                self._pool.check()
-            return self._once(sql, values)
+            return self.asked(sql, values, self._seconds)
+        except Unreachable as error:
+            if isinstance(error.__cause__, Silent | PoolTimeout):
+                self._watch.fell_silent()
+            raise
 
-    def _once(self, sql: str, values: Sequence[Any]) -> Found:
-        with reached(), self._pool.connection() as db:
-            return run(db, sql, values)
+    def asked(self, sql: str, values: Sequence[Any], seconds: float) -> Found:
+        """Asks, whether the database answers or not. Raises Unreachable."""
+        end = time.monotonic() + seconds
+        with reached():
+            for _ in range(self._pool.max_size):
+                try:
+                    with self._pool.connection(max(0.05, end - time.monotonic())) as db:
+                        return run(db, sql, values)
+                except psycopg.OperationalError as error:
+                    # One of before the database was started again tells nothing, and so may others of the pool.
+                    if isinstance(error, Silent | PoolTimeout) or not db.closed:
+                        raise
+            with self._pool.connection(max(0.05, end - time.monotonic())) as db:
+                return run(db, sql, values)
 
     def executemany(self, _sql: str, _rows: Iterable[Sequence[Any]], /) -> None:
         raise TypeError("a connection that reads writes nothing")
@@ -232,17 +264,30 @@ class Pinned:
 
 
 class Readers:
-    """The connections that read, for any thread."""
+    """The connections that read: those for threads, and those of the event loop, which waits for no thread."""
 
     def __init__(self, url: str, most: int) -> None:
         self._pool = pool(url, "readers", most)
-        self._free = Reading(self._pool)
+        self._own = pool(url, "loop", LOOP_CONNECTIONS, patience=ASKING_SECONDS)
+        self._watch = Watch(self._ask)
+        self._free = Reading(self._pool, self._watch, POOL_SECONDS)
+        self._quick = Reading(self._own, self._watch, LOOP_SECONDS)
         self._pinned = threading.local()
+
+    def _ask(self) -> None:
+        self._quick.asked("SELECT 1", (), ASKING_SECONDS)
+
+    @property
+    def answers(self) -> bool:
+        """Whether the database answered whoever read last."""
+        return self._watch.answers
 
     def reader(self) -> Connection:
         """What this thread reads by."""
         pinned: Pinned | None = getattr(self._pinned, "db", None)
-        return self._free if pinned is None else pinned
+        if pinned is not None:
+            return pinned
+        return self._quick if is_in_loop() else self._free
 
     @contextmanager
     def at_one_moment(self) -> Iterator[Connection]:
@@ -250,17 +295,26 @@ class Readers:
         if getattr(self._pinned, "db", None) is not None:
             yield self._pinned.db
             return
+        self._watch.demand()
         with reached(), ExitStack() as stack:
-            try:
-                db = self._begin(stack)
-            except psycopg.OperationalError:
-                self._pool.check()
-                db = self._begin(stack)
-            self._pinned.db = Pinned(db)
+            self._pinned.db = Pinned(self._begun(stack))
             try:
                 yield self._pinned.db
             finally:
                 self._pinned.db = None
+
+    def _begun(self, stack: ExitStack) -> Database:
+        """A connection in a transaction, whichever of the pool lives. Raises psycopg.OperationalError."""
+        for _ in range(self._pool.max_size):
+            try:
+                return self._begin(stack)
+            except Silent:
+                self._watch.fell_silent()
+                raise
+            except psycopg.OperationalError as error:
+                if isinstance(error, PoolTimeout):
+                    raise
+        return self._begin(stack)
 
     def _begin(self, stack: ExitStack) -> Database:
         """A connection in a transaction, until the stack is left."""
@@ -273,7 +327,9 @@ class Readers:
 
     def close(self) -> None:
         """Closes the connections."""
+        self._watch.close()
         self._pool.close()
+        self._own.close()
 
 
 def _storable(values: Sequence[Any]) -> Sequence[Any]:

@@ -112,6 +112,11 @@ class Postgres:
     def waiting(self) -> int:
         return self._queue.qsize()
 
+    @property
+    def answers(self) -> bool:
+        """Whether the database answered whoever read last."""
+        return self._readers.answers
+
     def _write_all(self) -> None:
         while True:
             item = self._queue.get()

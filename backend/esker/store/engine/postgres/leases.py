@@ -12,6 +12,9 @@ from esker.store.engine.ports import Unreachable
 from esker.store.engine.postgres.connections import Database, pool, reached
 
 CONNECTIONS: Final = 6
+PATIENCE_SECONDS: Final = 4.5
+"""A database that says nothing for so long is given up: longer than the locks of ``_WAIT`` are waited for, and shorter
+than a lease lives."""
 STRANDED_SECONDS: Final = 1.0
 """Whoever takes a terrain waits so long for a transaction of a server whose lease has ended, and ends it then."""
 _WAIT: Final = "SELECT set_config('lock_timeout', '4s', true), pg_backend_pid()"
@@ -46,7 +49,7 @@ class PostgresLeases:
     """``Leases`` by a few connections of their own: neither a slow query nor a long commit keeps a renewal waiting."""
 
     def __init__(self, url: str) -> None:
-        self._pool = pool(url, "leases", CONNECTIONS, checked=True)
+        self._pool = pool(url, "leases", CONNECTIONS, checked=True, patience=PATIENCE_SECONDS)
 
     def register(self, node: Node, seconds: float) -> None:
         with self._connection() as db:
