@@ -126,3 +126,16 @@ def on_screen(visitor: Visitor, x: float, y: float, z: float | None = None) -> P
     """Window pixel of a point of the world; on the ground when no height is given."""
     at = visitor.js("([x, y, z]) => window.esker.project(x, y, z ?? window.esker.heightAt(x, y))", [x, y, z])
     return float(at["x"]), float(at["y"])
+
+
+APART = """([one, other]) => {
+  const root = document.querySelector("esk-terrain").shadowRoot;
+  const [a, b] = [one, other].map((each) => root.querySelector(each)?.getBoundingClientRect());
+  if (!a?.width || !b?.width) return false;
+  return a.right <= b.left || b.right <= a.left || a.bottom <= b.top || b.bottom <= a.top;
+}"""
+
+
+def wait_apart(visitor: Visitor, one: str, other: str) -> None:
+    """Waits until two parts of the page are shown and neither lies on the other; by their selectors."""
+    wait(visitor, APART, [one, other])

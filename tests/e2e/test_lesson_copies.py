@@ -1,14 +1,16 @@
-"""A teacher and two pupils in real browsers: code, copies, wall, put together, collect (SPEC E60, L75)."""
+"""A teacher and two pupils in real browsers: code, copies, wall, compare, collect, projector (SPEC E60, L75)."""
 
 from __future__ import annotations
 
 import io
 import json
+import time
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from PIL import Image
 
 from tests.e2e.conftest import Server, Visitor, Visitors, serving
 from tests.e2e.hands import arch, draw, on_screen, wait, wait_settled
@@ -51,10 +53,68 @@ def _many(page: Visitor, number: int) -> None:
     wait(page, f"() => (({CARD})({number}) ?? 0) > 40")
 
 
+def _pictures(page: Visitor) -> list[bytes]:
+    """The two pictures of a comparison as they are on the screen."""
+    figures = page.page.locator("esk-wall-compare .picture")
+    return [figures.nth(k).screenshot() for k in (0, 1)]
+
+
+def _both_change(page: Visitor, seen: list[bytes]) -> list[bytes]:
+    """Waits until both pictures are others than those seen, and show land: what they are then."""
+    ends = time.monotonic() + 60
+    while time.monotonic() < ends:
+        now = _pictures(page)
+        colours = [Image.open(io.BytesIO(each)).convert("RGB").getcolors(40) for each in now]
+        if all(a != b for a, b in zip(now, seen, strict=True)) and colours == [None, None]:
+            return now
+        time.sleep(0.3)
+    raise AssertionError("one of the two pictures stayed as it was")
+
+
+def _compare(teacher: Visitor) -> None:
+    """Two copies in 3D: a drag on one moves both, and the difference is on both."""
+    _press(teacher, "esk-wall", "Compare")
+    compared = teacher.page.locator("esk-wall-compare")
+    compared.get_by_text("Ben", exact=True).wait_for()
+    seen = _both_change(teacher, [b"", b""])
+    assert seen[0] != seen[1]
+    box = compared.locator(".picture").first.bounding_box()
+    assert box is not None
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    teacher.page.mouse.move(x, y)
+    teacher.page.mouse.down()
+    teacher.page.mouse.move(x + 160, y - 30, steps=3)
+    teacher.page.mouse.up()
+    seen = _both_change(teacher, seen)
+    teacher.shot("2-compare")
+    compared.get_by_role("radio", name="Difference").click()
+    compared.get_by_text("higher than the other").wait_for()
+    _both_change(teacher, seen)
+    teacher.shot("2-compare-difference")
+    assert teacher.errors == []
+    _press(teacher, "esk-wall-compare", "Back to the wall")
+    wait(teacher, "() => window.__compared === null")
+
+
+def _the_projector(page: Visitor, server: Server, code: str, one: Visitor) -> None:
+    """SPEC U670: address, code, its picture and how many are in, also when one goes."""
+    page.page.goto(f"{server.url}/room#{code}")
+    room = page.page.locator("esk-room")
+    room.get_by_role("heading", name="Build a mountain").wait_for()
+    assert room.locator(".address").inner_text() == server.url
+    assert "".join(room.locator(".code").inner_text().split()) == code
+    assert room.locator("wa-qr-code").evaluate("e => e.value") == f"{server.url}/join#{code}"
+    room.get_by_text("2 are in", exact=True).wait_for()
+    page.shot("4-projector")
+    one.page.goto("about:blank")
+    room.get_by_text("1 is in", exact=True).wait_for()
+
+
 def test_a_lesson_with_copies(visitors: Visitors, server: Server) -> None:
+    """SPEC E60, L156, L157."""
     terrain, secret = server.create(title="Build a mountain")
     made = json.loads(server.request("POST", f"/api/terrains/{terrain}/classes", {}, secret))
-    teacher = visitors()
+    teacher = visitors(seen=True)
     teacher.page.goto(f"{server.url}/wall/{terrain}/{made['id']}#{secret}")
     teacher.page.locator("esk-wall").get_by_text("Nobody is here yet.").wait_for()
     code = made["code"]
@@ -87,10 +147,7 @@ def test_a_lesson_with_copies(visitors: Visitors, server: Server) -> None:
     together = path.rsplit("/", 1)[1]
     document = json.loads(server.request("GET", f"/api/terrains/{together}/document", None, fragment))
     assert len(document["strokes"]) == 2
-    _press(teacher, "esk-wall", "Compare")
-    wall.locator("esk-wall-compare figcaption").first.wait_for()
-    teacher.shot("2-compare")
-    _press(teacher, "esk-wall-compare", "Back to the wall")
+    _compare(teacher)
     with teacher.page.expect_download() as file:
         _press(teacher, "esk-wall", "Collect")
     with zipfile.ZipFile(io.BytesIO(Path(file.value.path()).read_bytes())) as collected:
@@ -98,6 +155,7 @@ def test_a_lesson_with_copies(visitors: Visitors, server: Server) -> None:
     teacher.page.set_viewport_size({"width": 720, "height": 900})
     teacher.shot("3-narrow")
     wait_settled(ada)
+    _the_projector(teacher, server, code, ben)
 
 
 def test_everybody_looks_and_comes_back(visitors: Visitors, server: Server) -> None:

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from tests.e2e.conftest import Server, Visitor, Visitors, serving
-from tests.e2e.hands import Pixel, arch, draw, on_screen, wait, wait_settled
+from tests.e2e.hands import Pixel, arch, draw, on_screen, wait, wait_apart, wait_settled
 from tests.e2e.test_everyone import NO_WEBGPU, Fingers
 
 
@@ -74,12 +74,16 @@ def write_the_task(teacher: Visitor) -> None:
 
 
 def test_a_whole_lesson(visitors: Visitors, server: Server) -> None:
+    """SPEC L120, U690, U691."""
     terrain, secret = server.create(title="One mountain")
     teacher = visitors(1100, 720, seen=True)
     teacher.open(f"/t/{terrain}#{secret}")
     write_the_task(teacher)
     begun = points(teacher)
     assert 0 <= begun < 100
+    teacher.page.keyboard.press("y")
+    wait_apart(teacher, "esk-measure", "aside.side.leads")
+    teacher.page.keyboard.press("y")
 
     made = json.loads(server.request("POST", f"/api/terrains/{terrain}/classes", {}, secret))
     wall = visitors(1100, 720, seen=True)
@@ -95,6 +99,10 @@ def test_a_whole_lesson(visitors: Visitors, server: Server) -> None:
     differs = ada.page.locator("esk-task-panel wa-switch", has_text="Red and blue")
     differs.click(position={"x": 14, "y": 12})  # the knob: the row is wider than what is hit
     assert differs.evaluate("e => e.checked")
+    for width in (1100, 900):
+        ada.page.set_viewport_size({"width": width, "height": 640})
+        wait_apart(ada, ".hint", "esk-legend")
+        wait_apart(ada, ".hint", "aside.side")
     ada.shot("task-1-blue")
     draw(ada, "b", mountain(ada, 520))
     wait(ada, "begun => window.esker.score().points > begun", begun)

@@ -50,6 +50,35 @@ def test_hands_off_holds_against_who_ignores_it(server: LiveServer) -> None:
     assert set(strokes(server, room)) == {"s-anne", "s-teacher", "s-ben", "s-more"}
 
 
+def test_a_group_has_its_pens_by_one_order(tmp_path: Path) -> None:
+    """SPEC L160: whoever of it is away too, over reloads and a restart; nobody puts themself into a group."""
+    with LiveServer(tmp_path) as server:
+        room = a_class(server, "group")
+        cho = server.join(room.terrain, room.edit, "group-c", name="Cho")
+        room.teacher.say("conduct", hands_off=True)
+        lesson(cho, hands_off=True)
+        cho.close()
+        people(room.anne, "pen", room.anne, cho)
+        assert "Only whoever leads" in room.anne.wait("notice")["text"]
+        people(room.teacher, "pen", room.ben, cho)
+        lesson(room.ben, draws=True)
+        back = server.join(room.terrain, room.edit, "group-c2", ticket=cho.welcome["ticket"])
+        assert back.welcome["lesson"]["draws"] is True
+        assert answer(back, "group-c2:0", stroke("s-cho"))["type"] == "ack"
+        assert answer(room.anne, "group-a:0", stroke("s-anne"))["code"] == "hands_off"
+    with LiveServer(tmp_path) as server:
+        ben, cho = (
+            server.join(room.terrain, room.edit, client, ticket=peer.welcome["ticket"])
+            for client, peer in (("group-b3", room.ben), ("group-c3", back))
+        )
+        teacher = server.join(room.terrain, room.owner, "group-t3", ticket=room.teacher.welcome["ticket"])
+        assert [peer.welcome["lesson"]["draws"] for peer in (ben, cho)] == [True, True]
+        people(teacher, "no_pen", ben, cho)
+        for peer, client in ((ben, "group-b3"), (cho, "group-c3")):
+            lesson(peer, draws=False)
+            assert answer(peer, f"{client}:0", stroke(f"s-{client}"))["code"] == "hands_off"
+
+
 def test_a_stroke_in_hand_ends_as_it_is(server: LiveServer) -> None:
     """SPEC L3: by an op in its author's name, so that it stays theirs to undo."""
     room = a_class(server, "hand")

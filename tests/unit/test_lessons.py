@@ -46,6 +46,47 @@ def test_a_sheet_is_whole(name: str) -> None:
     assert all(each["question"].endswith("?") and each["answer"] for each in plan.ask)
 
 
+@pytest.mark.parametrize("name", list(templates.plans()))
+def test_a_plan_is_the_same_in_german(name: str) -> None:
+    """SPEC L162: each part has its translation, minutes are the same, and nothing is left in English."""
+    english, german = templates.plans()[name], templates.plans("de")[name]
+    assert list(templates.plans("de")) == list(templates.plans())
+    assert german.minutes == english.minutes
+    assert [step["minutes"] for step in german.steps] == [step["minutes"] for step in english.steps]
+    for one, other in ((english.before, german.before), (english.ask, german.ask)):
+        assert len(one) == len(other)
+    assert english.task.count("\n\n") == german.task.count("\n\n")
+    assert not sentences(english) & sentences(german)
+
+
+def sentences(plan: templates.Plan) -> set[str]:
+    """Everything that a plan says."""
+    parts = [plan.title, plan.description, plan.ages, plan.goal, *plan.task.split("\n\n"), *plan.before, plan.truth]
+    return {*parts, *(step["what"] for step in plan.steps), *(text for each in plan.ask for text in each.values())}
+
+
+@pytest.mark.parametrize("name", list(templates.plans()))
+def test_a_lesson_begins_in_the_language_of_the_page(name: str) -> None:
+    """SPEC L163: title and task; ground, goal and everything else are the same."""
+    english, german = templates.document(name), templates.document(name, "de")
+    plan = templates.plans("de")[name]
+    assert english == templates.load(name).document
+    assert german.settings.task is not None
+    assert (german.settings.title, german.settings.task.title, german.settings.task.text) == (
+        plan.title, plan.title, plan.task,
+    )  # fmt: skip
+    back = {"title": english.settings.title, "task": english.settings.task}
+    assert german.model_copy(update={"settings": german.settings.model_copy(update=back)}) == english
+    assert german.settings.task.goal == getattr(english.settings.task, "goal", None)
+
+
+def test_a_starting_terrain_without_a_lesson_has_one_language() -> None:
+    """SPEC L163."""
+    assert templates.document("canyon", "de") == templates.load("canyon").document
+    with pytest.raises(KeyError):
+        templates.document("none", "de")
+
+
 @pytest.mark.parametrize("lesson", DRAWN, ids=lambda lesson: str(lesson.id))
 def test_a_lesson_can_be_solved(lesson: teaching.Lesson) -> None:
     """SPEC L130: with far fewer points before than after."""

@@ -91,19 +91,16 @@ def _container_questions(opened: Opened, answers: Mapping[str, str]) -> list[c.I
     asked: list[c.ImportQuestion] = []
     source = opened.source
     if opened.types:
-        text = "It has no header. Of which type are its samples?"
-        _ask(asked, answers, c.ImportQuestion(id="type", text=text, options=opened.types, default=opened.types[0]))
+        _ask(asked, answers, questions.type_question(opened.types))
     if opened.shapes:
-        text = "It has no header. How many columns and rows has it?"
-        _ask(asked, answers, c.ImportQuestion(id="shape", text=text, options=opened.shapes, default=opened.shapes[0]))
+        _ask(asked, answers, questions.shape_question(opened.shapes))
     if source.bands > 1:
         _ask(asked, answers, questions.band_question(source.bands))
     if source.eight_bit and not source.colour and _ask(asked, answers, questions.IMAGERY) == STOP:
         raise ImportRefused("It was said to be a picture, not elevation.")
     if not source.row_order_known:
-        text = "It does not say whether its first row is the northern or the southern one."
         orders = questions.ROW_ORDERS
-        answer = _ask(asked, answers, c.ImportQuestion(id="rows", text=text, options=orders, default=orders[0]))
+        answer = _ask(asked, answers, questions.ROWS)
         if answer not in orders:
             raise ImportRefused(f"{answer[:40]!r} is no order of rows; there are: {', '.join(orders)}.")
     return asked
@@ -122,9 +119,7 @@ def _first_scan(source: Source, answers: Mapping[str, str], asked: list[c.Import
     if not likely:
         raise ImportRefused("It is a picture in colours, and neither Terrarium nor Mapbox heights are coded in them.")
     likely.sort(key=lambda e: found[e].steps / max(found[e].high - found[e].low, 1e-9))
-    text = "It has three colours. In which code do they hold heights?"
-    options: tuple[str, ...] = colours.ENCODINGS
-    answer = _ask(asked, answers, c.ImportQuestion(id="encoding", text=text, options=options, default=likely[0]))
+    answer = _ask(asked, answers, questions.encoding_question(colours.ENCODINGS, likely[0]))
     for encoding in colours.ENCODINGS:
         if answer == encoding:
             set_encoding(source, encoding)

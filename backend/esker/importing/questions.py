@@ -152,6 +152,34 @@ IMAGERY: Final = c.ImportQuestion(
 )
 
 
+def type_question(types: tuple[str, ...]) -> c.ImportQuestion:
+    """Asks of which type the samples of a file without a header are."""
+    return c.ImportQuestion(
+        id="type", text="It has no header. Of which type are its samples?", options=types, default=types[0]
+    )
+
+
+def shape_question(shapes: tuple[str, ...]) -> c.ImportQuestion:
+    """Asks how many columns and rows a file without a header has."""
+    return c.ImportQuestion(
+        id="shape", text="It has no header. How many columns and rows has it?", options=shapes, default=shapes[0]
+    )
+
+
+ROWS: Final = c.ImportQuestion(
+    id="rows",
+    text="It does not say whether its first row is the northern or the southern one.",
+    options=ROW_ORDERS,
+    default=ROW_ORDERS[0],
+)
+
+
+def encoding_question(encodings: tuple[str, ...], likely: str) -> c.ImportQuestion:
+    """Asks in which code three colours hold heights."""
+    text = "It has three colours. In which code do they hold heights?"
+    return c.ImportQuestion(id="encoding", text=text, options=encodings, default=likely)
+
+
 def band_question(bands: int) -> c.ImportQuestion:
     """Asks which of several bands holds the elevation."""
     return c.ImportQuestion(

@@ -17,6 +17,7 @@ from esker.contract import Document
 from esker.patchwork.raster import rasters
 from esker.patchwork.raster.rasters import Raster
 from esker.templates import survey
+from esker.templates.plans import Language as Language
 from esker.templates.plans import Plan as Plan
 from esker.templates.plans import plans as plans
 
@@ -73,6 +74,19 @@ def catalogue() -> tuple[Template, ...]:
 def lessons() -> tuple[Template, ...]:
     """All lessons, in the order of the landing page."""
     return tuple(_read(FOLDER / "lessons" / f"{name}.json") for name in plans())
+
+
+def document(template_id: str, language: Language = "en") -> Document:
+    """What a new terrain starts from. A lesson has its title and what pupils read in a language.
+
+    Raises KeyError for an unknown id.
+    """
+    found = load(template_id).document
+    plan, task = plans(language).get(template_id), found.settings.task
+    if plan is None or task is None:
+        return found
+    words = {"title": plan.title, "task": task.model_copy(update={"title": plan.title, "text": plan.task})}
+    return found.model_copy(update={"settings": found.settings.model_copy(update=words)})
 
 
 def load(template_id: str) -> Template:

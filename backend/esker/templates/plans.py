@@ -1,4 +1,5 @@
-"""The words of the six lessons: what pupils read, and a plan for the teacher each (``lessons/plans.json``)."""
+"""The words of the six lessons: what pupils read, and a plan for the teacher each (``lessons/plans.json``, and
+``lessons/plans.LANGUAGE.json`` for other languages, decision 74)."""
 
 from __future__ import annotations
 
@@ -6,9 +7,11 @@ import json
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 FOLDER: Final = Path(__file__).parent / "lessons"
+Language = Literal["en", "de"]
+"""Languages that the plans are written in."""
 
 
 @dataclass(frozen=True)
@@ -32,9 +35,10 @@ class Plan:
 
 
 @cache
-def plans() -> dict[str, Plan]:
-    """All plans by the ids of their lessons, in the order of the gallery."""
-    data = json.loads((FOLDER / "plans.json").read_text(encoding="utf-8"))
+def plans(language: Language = "en") -> dict[str, Plan]:
+    """All plans in a language by the ids of their lessons, in the order of the gallery."""
+    name = "plans.json" if language == "en" else f"plans.{language}.json"
+    data = json.loads((FOLDER / name).read_text(encoding="utf-8"))
     return {name: Plan(**{key: _fixed(value) for key, value in fields.items()}) for name, fields in data.items()}
 
 

@@ -147,7 +147,7 @@ export function installTestHook(session: TerrainSession): () => void {
       })),
     importing: () => (stage()?.groundwork.others.list.peek() ?? []).map(importingWords),
     handles: () =>
-      (stage()?.input.handles.peek() ?? []).map(({ kind, position }) => ({ kind, ...stage()!.toWindow(position) })),
+      (stage()?.input.handles.peek() ?? []).map(({ kind, position }) => ({ kind, ...stage()!.box.toWindow(position) })),
     placing: () => {
       const placing = stage()?.input.placing.peek();
       return placing ? { id: placing.id, ...placeOf(placing.place.peek()) } : null;
@@ -188,7 +188,7 @@ export function installTestHook(session: TerrainSession): () => void {
       const { mode, eye, target, fovDeg, orthoHeight, width, height } = state;
       return { mode, eye, target, fovDeg, orthoHeight, width, height };
     },
-    project: (x, y, z) => stage()?.toWindow([x, y, z]) ?? null,
+    project: (x, y, z) => stage()?.box.toWindow([x, y, z]) ?? null,
     seams: () => greatestStep(session),
     tiles: () => ({ held: stage()?.tiles.size ?? 0, exact: count(session), levels: byLevel(session) }),
     stats: () => stage()?.stats.peek() ?? null,

@@ -98,7 +98,7 @@ describe("the landing page", () => {
     expect(card.textContent).toContain("Canyon");
     card.click();
     await vi.waitFor(() => expect(assign).toHaveBeenCalledWith("/t/new1#s%2F1"));
-    expect(asked.at(-1)!.init.body).toBe('{"template":"canyon"}');
+    expect(asked.at(-1)!.init.body).toBe('{"template":"canyon","language":"en"}');
   });
 
   it("shows lessons, each with its plan (SPEC L132)", async () => {

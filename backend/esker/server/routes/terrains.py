@@ -30,11 +30,12 @@ MAX_IMPORT_BYTES: Final = c.MAX_GRID_BYTES
 
 
 class NewTerrain(c.Wire):
-    """Body of POST /api/terrains."""
+    """Body of POST /api/terrains. ``language``: of what pupils read in a lesson."""
 
     title: c.Name | None = None
     template: c.Id | None = None
     size_m: Annotated[float, Field(ge=c.MIN_SIZE_M, le=c.MAX_SIZE_M)] | None = None
+    language: templates.Language = "en"
 
 
 def add_terrains(app: FastAPI, hub: Hub, grids: GridStore) -> None:
@@ -53,8 +54,8 @@ def add_terrains(app: FastAPI, hub: Hub, grids: GridStore) -> None:
         ]
 
     @app.get("/api/lessons/{lesson}")
-    async def lesson_plan(lesson: str) -> dict[str, Any]:
-        found = templates.plans().get(lesson)
+    async def lesson_plan(lesson: str, language: str = "en") -> dict[str, Any]:
+        found = templates.plans("de" if language == "de" else "en").get(lesson)
         if found is None:
             raise Cannot(404, "no_lesson", "There is no such lesson.")
         return {"id": lesson, **asdict(found)}
@@ -117,7 +118,7 @@ def _new_document(body: NewTerrain) -> c.Document:
         document = new_document(body.size_m or c.DEFAULT_SIZE_M)
     else:
         try:
-            document = templates.load(body.template).document
+            document = templates.document(body.template, body.language)
         except KeyError:
             raise Cannot(404, "no_template", "There is no such starting terrain.") from None
         if body.size_m is not None and body.size_m != document.settings.size_m:

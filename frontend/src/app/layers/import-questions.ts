@@ -73,6 +73,8 @@ const WORDS: Readonly<Record<string, Readonly<Record<string, string>>>> = {
   },
   imagery: { elevation: msg("Take it as elevation"), stop: msg("Do not bring it in") },
   nodata: { none: msg("No, they are heights") },
+  unit: { feet: msg("Feet"), metres: msg("Metres") },
+  rows: { "north first": msg("The northern row first"), "south first": msg("The southern row first") },
   height: { shift: msg("Yes, shift all its heights"), stop: msg("Do not bring it in") },
 };
 

@@ -7,6 +7,7 @@ import type { ClientMessage, Conduct, Lesson, Member, Op, People } from "../../g
 import { memberName } from "../device/names.ts";
 import type { Store } from "../device/storage.ts";
 import { Drafts } from "./drafts.ts";
+import { Groups } from "./groups.ts";
 
 /** How a lesson stands where nobody leads. */
 export const NOBODY_LEADS: Lesson = {
@@ -49,6 +50,8 @@ export interface LessonHost {
 export class LessonView {
   readonly state = signal<Lesson>(NOBODY_LEADS);
   readonly drafts: Drafts;
+  /** People whose pens are given together, where this page leads. */
+  readonly groups: Groups;
   /** I look away from what is shown, where that is allowed. */
   readonly away = signal(false);
   /** The client whose view mine follows, because a conductor shows. */
@@ -66,6 +69,7 @@ export class LessonView {
     this.#lift = lift;
     this.#key = `esker.ticket.${host.id}`;
     this.drafts = new Drafts(host.store, host.id);
+    this.groups = new Groups(host.store, host.id, (action, people) => this.about(action, people));
     this.leader = computed(() => {
       const { look, held } = this.state.value;
       return look === null || look === host.client || (this.away.value && !held) ? null : look;
@@ -107,6 +111,12 @@ export class LessonView {
 
   about(action: People["action"], people: readonly string[]): void {
     this.#o.connection.send({ type: "people", action, people: [...people] });
+  }
+
+  /** Gives pens to everybody who is here, or takes them: the groups with them. */
+  pensForAll(pen: boolean, people: readonly string[]): void {
+    this.about(pen ? "pen" : "no_pen", people);
+    this.groups.allHave(pen);
   }
 
   lookAway(away: boolean): void {

@@ -1,6 +1,7 @@
 /** The server's JSON interface (docs/protocol.md). Secrets travel in the Authorization header only. */
 
 import { msg, str } from "@lit/localize";
+import { language } from "../../core/language.ts";
 import type { TemplateInfo } from "../../core/types.ts";
 import type { ImportAnswers, ImportStatus, Role } from "../../generated/contract.ts";
 import type { HistoryPage } from "../history/history.ts";
@@ -143,10 +144,10 @@ export const api = {
 
   lessons: (): Promise<LessonInfo[]> => json("GET", "/api/lessons"),
 
-  lesson: (id: string): Promise<LessonPlan> => json("GET", `/api/lessons/${id}`),
+  lesson: (id: string): Promise<LessonPlan> => json("GET", `/api/lessons/${id}?language=${language()}`),
 
   create: (template?: string): Promise<OpenedTerrain> =>
-    json("POST", "/api/terrains", undefined, template ? { template } : {}),
+    json("POST", "/api/terrains", undefined, template ? { template, language: language() } : {}),
 
   open: (file: Blob): Promise<OpenedTerrain> => json("POST", "/api/terrains/import", undefined, file),
 

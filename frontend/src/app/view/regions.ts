@@ -39,3 +39,13 @@ export function deepFocus(): Element | null {
   while (active?.shadowRoot?.activeElement) active = active.shadowRoot.activeElement;
   return active;
 }
+
+/** A press on the picture takes the keys, until what it returns is called: drawing prevents the default of the pointer, so a field that had them would keep them. */
+export function takesKeys(picture: HTMLElement): () => void {
+  const take = (): void => {
+    const active = deepFocus();
+    if (active instanceof HTMLElement && active !== document.body) active.blur();
+  };
+  picture.addEventListener("pointerdown", take);
+  return () => picture.removeEventListener("pointerdown", take);
+}

@@ -172,3 +172,9 @@ export function cursorOf(people: People, client: string): Vec3 | null {
   if (client === people.me) return null;
   return people.presences.get(client)?.cursor ?? null;
 }
+
+/** Whether the document has lines of paint. */
+export function hasPaint(doc: Doc | null): boolean {
+  for (const stroke of doc?.strokes.values() ?? []) if (stroke.paint !== null) return true;
+  return false;
+}

@@ -2,7 +2,6 @@
 
 import { computed, effect, type ReadonlySignal, signal } from "@preact/signals-core";
 import { Camera } from "../../core/camera/camera.ts";
-import type { Land } from "../../core/camera/state.ts";
 import { isGround } from "../../core/streams.ts";
 import type {
   ChannelGrid,
@@ -15,12 +14,11 @@ import type {
   StrokeVisual,
   Vec3,
 } from "../../core/types.ts";
-import type { Doc } from "../../doc/document.ts";
 import { strokeInfluence } from "../../doc/influence.ts";
 import { spanOf } from "../../doc/layers.ts";
 import { type Meeting, meetings } from "../../doc/meetings.ts";
 import type { MemberPresence } from "../../generated/contract.ts";
-import { MAX_REFINED_TILES, TILE_SAMPLES } from "../../generated/contract.ts";
+import { MAX_REFINED_TILES } from "../../generated/contract.ts";
 import { InputController } from "../../input/controller.ts";
 import { type ToolDefaults, toolDefaults } from "../../input/defaults.ts";
 import { ChannelStore } from "../../tiles/detail/channels.ts";
@@ -38,16 +36,16 @@ import { TaskView } from "../lesson/task/task-view.ts";
 import type { OpenTerrain } from "../open-terrain.ts";
 import { gridTransport } from "../server/grid-transport.ts";
 import { Arrival } from "./eye/arrival.ts";
-import { coveredEdges } from "./eye/covered.ts";
 import { Following } from "./eye/following.ts";
-import { landOf } from "./eye/land.ts";
+import { landOfTiles } from "./eye/land.ts";
+import { PictureBox } from "./eye/picture-box.ts";
 import { FrameLoop } from "./frame-loop.ts";
 import { FreshTiles } from "./fresh-tiles.ts";
 import { Graphics } from "./graphics.ts";
 import { Instruments } from "./instruments/instruments.ts";
 import { QuietStrokes } from "./quiet-strokes.ts";
-import { deepFocus } from "./regions.ts";
-import { cursorVisuals, strokeVisuals } from "./scene.ts";
+import { takesKeys } from "./regions.ts";
+import { cursorVisuals, hasPaint, strokeVisuals } from "./scene.ts";
 import { otherDrops } from "./water/others.ts";
 import { WaterTool } from "./water/water-tool.ts";
 
@@ -61,9 +59,6 @@ export interface StageOptions {
   /** The element that fills the window: holds the canvas, takes the pointer and the keys. */
   readonly viewport: HTMLElement;
 }
-
-/** How long a view at home takes to go along when the inspector opens. */
-const COVER_MS = 260;
 
 export class Stage {
   readonly session: OpenTerrain;
@@ -92,6 +87,8 @@ export class Stage {
   readonly quietStrokes = new QuietStrokes();
   readonly cursor = signal<Vec3 | null>(null);
   readonly graphics: Graphics;
+  /** Where the picture lies in the window. */
+  readonly box: PictureBox;
   readonly quality: QualityChoice;
   /** How this device shows terrains. */
   readonly view: ViewChoices;
@@ -121,8 +118,6 @@ export class Stage {
   readonly #follows: Following;
   readonly #arrival: Arrival;
   #disposed = false;
-  /** Finds what floats on the picture. */
-  #find: ((selector: string) => Element | null) | null = null;
 
   constructor({ session, sizeM, levels, finest, viewport }: StageOptions) {
     this.session = session;
@@ -132,7 +127,7 @@ export class Stage {
     this.#viewport = viewport;
     this.camera = new Camera(sizeM);
     this.camera.calm = this.#calm.matches;
-    this.camera.landNow = () => this.#land();
+    this.camera.landNow = () => landOfTiles(this.tiles);
     this.#follows = new Following({
       session,
       camera: this.camera,
@@ -153,6 +148,12 @@ export class Stage {
     };
     this.defaults = toolDefaults(sizeM);
     this.loop = new FrameLoop((dt, time) => this.#draw(dt, time));
+    this.box = new PictureBox({
+      viewport,
+      camera: this.camera,
+      isDrawn: () => this.loop.frames > 0,
+      redraw: () => this.loop.invalidate(),
+    });
     this.quality = new QualityChoice(session.store);
     this.view = new ViewChoices(session.store);
     this.camera.exaggerate(this.view.exaggeration);
@@ -294,14 +295,6 @@ export class Stage {
     });
   }
 
-  /** Where a world point is in the window: CSS pixels. */
-  toWindow(point: Vec3): { x: number; y: number; visible: boolean } {
-    const p = this.camera.project(point);
-    const box = this.#viewport.getBoundingClientRect();
-    const ratio = this.camera.state.peek().width / Math.max(1, box.width);
-    return { x: box.left + p.x / ratio, y: box.top + p.y / ratio, visible: p.visible };
-  }
-
   /** Follows a person's view until I move the camera myself; the same person again stops it. */
   follow(client: string | null): void {
     this.#follows.toggle(client);
@@ -310,25 +303,6 @@ export class Stage {
   /** New presences have come: the view goes along with the person that is followed. */
   followed(changed: readonly MemberPresence[]): void {
     this.#follows.moved(changed);
-  }
-
-  /** Says what floats on the picture, found by its selector. `follow`: a view that is still at home goes along. */
-  cover(find: (selector: string) => Element | null, follow: boolean): void {
-    this.#find = find;
-    const box = (selector: string): DOMRect | null => find(selector)?.getBoundingClientRect() ?? null;
-    const picture = this.#viewport.getBoundingClientRect();
-    if (picture.width === 0) return;
-    const chrome = {
-      top: box("esk-top-bar"),
-      tools: box("esk-tools"),
-      foot: box("esk-measure") ?? box("esk-water") ?? box("esk-view-bar"),
-      side: box("aside.side"),
-    };
-    const edges = coveredEdges(picture, chrome);
-    const ratio = this.camera.state.peek().width / picture.width;
-    const scaled = Object.fromEntries(Object.entries(edges).map(([edge, px]) => [edge, px * ratio]));
-    this.camera.inset({ ...edges, ...scaled }, follow, this.loop.frames > 0 ? COVER_MS : 0);
-    this.loop.invalidate();
   }
 
   /** Shows all strokes, or none; those that are still quiet are shown. */
@@ -359,14 +333,7 @@ export class Stage {
   /** Redraws on every change that a frame shows, and tells the server where I look. */
   #watch(): void {
     const { session, input } = this;
-    // Drawing prevents the default of the pointer, so a field that had the keys would keep them.
-    const takeKeys = (): void => {
-      const active = deepFocus();
-      if (active instanceof HTMLElement && active !== document.body) active.blur();
-    };
-    this.#viewport.addEventListener("pointerdown", takeKeys);
-    this.#stops.push(() => this.#viewport.removeEventListener("pointerdown", takeKeys));
-    this.#stops.push(...this.#follows.watch(this.#viewport));
+    this.#stops.push(takesKeys(this.#viewport), ...this.#follows.watch(this.#viewport));
     this.#stops.push(
       effect(() => {
         this.camera.state.value;
@@ -414,33 +381,10 @@ export class Stage {
       effect(() => {
         this.tiles.revision.value;
         const isDrawing = this.input.drawing.value !== null;
-        this.#arrival.follow(this.#land(), isDrawing, (land) => this.camera.stand(land));
+        this.#arrival.follow(landOfTiles(this.tiles), isDrawing, (land) => this.camera.stand(land));
       }),
     );
-    this.#watchSize();
-  }
-
-  /** How the land lies now; null before it has come. */
-  #land(): Land | null {
-    const heights = this.tiles.tile(0, 0, 0)?.heights;
-    return heights === undefined ? null : landOf(heights, TILE_SAMPLES, this.sizeM);
-  }
-
-  #watchSize(): void {
-    const resize = (): void => {
-      const canvas = this.#viewport.querySelector("canvas");
-      const ratio = Math.min(window.devicePixelRatio, 2);
-      const width = Math.max(1, Math.round(this.#viewport.clientWidth * ratio));
-      const height = Math.max(1, Math.round(this.#viewport.clientHeight * ratio));
-      if (canvas && (canvas.width !== width || canvas.height !== height)) Object.assign(canvas, { width, height });
-      this.camera.resize(width, height);
-      if (this.#find !== null) this.cover(this.#find, true);
-      this.loop.invalidate();
-    };
-    const observer = new ResizeObserver(resize);
-    observer.observe(this.#viewport);
-    this.#stops.push(() => observer.disconnect());
-    resize();
+    this.#stops.push(this.box.watch());
   }
 
   #draw(dtS: number, timeS: number): boolean {
@@ -499,9 +443,4 @@ export class Stage {
     }
     return { overlay: this.overlay.value, influence: this.#influence.value };
   }
-}
-
-function hasPaint(doc: Doc | null): boolean {
-  for (const stroke of doc?.strokes.values() ?? []) if (stroke.paint !== null) return true;
-  return false;
 }

@@ -26,7 +26,7 @@ import "../dialogs/share-dialog.ts";
 import "../panels/history-panel.ts";
 import "../panels/layers-panel.ts";
 import "../panels/legend.ts";
-import "../panels/lesson-panel.ts";
+import "../lesson/lesson-panel.ts";
 import "../measuring/measure-panel.ts";
 import "../panels/overlay.ts";
 import "../panels/stroke-panel.ts";

@@ -20,6 +20,7 @@ import { Room } from "../../app/view/make-room.ts";
 import { deepFocus, nextRegion } from "../../app/view/regions.ts";
 import type { Stage } from "../../app/view/stage.ts";
 import { SignalElement } from "../controls/signal-element.ts";
+import { sentenceStyles } from "../styles/sentences.ts";
 import { shared } from "../styles/shared.ts";
 import { terrainPageStyles } from "../styles/terrain-page.ts";
 import "../controls/toasts.ts";
@@ -62,7 +63,7 @@ function tabsOf({ session, task }: Stage): typeof TABS {
 
 /** `/t/{id}`: the picture over the whole window, and calm chrome that floats on it. */
 export class EskTerrain extends SignalElement {
-  static override styles = [shared, terrainPageStyles];
+  static override styles = [shared, terrainPageStyles, sentenceStyles];
   terrain = "";
   secret = "";
   readonly #session = signal<TerrainSession | null>(null);
@@ -161,13 +162,13 @@ export class EskTerrain extends SignalElement {
     if (!stage || !side || !window.matchMedia(WIDE).matches || stage.input.inputMode.peek() !== "idle") return;
     const ratio = stage.camera.state.peek().width / Math.max(1, this.clientWidth);
     this.#room ??= new Room(stage.camera);
-    this.#room.make(stage.input.handles.peek(), (p) => stage.toWindow(p), side, ratio);
+    this.#room.make(stage.input.handles.peek(), (p) => stage.box.toWindow(p), side, ratio);
   }
 
   /** Home is the whole land beside what covers the picture. An inspector that a selection opened does not move the view. */
   #tellCovered(): void {
     const stage = this.#session.peek()?.stage.peek();
-    if (stage) stage.cover((selector) => this.renderRoot.querySelector(selector), !this.#openedBySelection);
+    if (stage) stage.box.cover((selector) => this.renderRoot.querySelector(selector), !this.#openedBySelection);
   }
 
   #togglePanel(): void {

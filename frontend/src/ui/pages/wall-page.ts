@@ -12,7 +12,6 @@ import "../controls/segmented.ts";
 import { SignalElement } from "../controls/signal-element.ts";
 import { shared } from "../styles/shared.ts";
 import { CardPainter, type CardState, cardWidth, wallCards } from "./wall-cards.ts";
-import "./wall-compare.ts";
 import { emptyWall, openDoor } from "./wall-door.ts";
 import { wallStyles } from "./wall-styles.ts";
 
@@ -160,6 +159,8 @@ export class EskWall extends SignalElement {
   }
 
   #compare(numbers: readonly number[]): void {
+    // The 3D view is loaded with the first comparison: a wall that only hangs there needs none.
+    void import("./wall-compare.ts");
     this.comparing = numbers;
     this.#wall?.focus(numbers);
   }

@@ -17,6 +17,7 @@ import { icon } from "../controls/icons.ts";
 import "./placement-form.ts";
 import type { ReadonlySignal } from "@preact/signals-core";
 import type { Groundwork } from "../../app/layers/groundwork.ts";
+import { questionWords } from "../../app/words/question-words.ts";
 import { bytes } from "../../app/words/words.ts";
 import type { Placing } from "../../input/tools/placement.ts";
 import { SignalElement } from "../controls/signal-element.ts";
@@ -203,10 +204,10 @@ export class EskImportCard extends SignalElement {
     const set = (value: string): void => this.groundwork.setAnswer(this.job, question.id, value);
     const name = `${this.job.key}-${question.id}`;
     if (heightRange(answer) !== null && heightRange(question.default) !== null)
-      return this.#range(question.text, heightRange(answer)!, set);
+      return this.#range(questionWords(question), heightRange(answer)!, set);
     if (question.options.length > 0)
       return html`<fieldset>
-        <legend>${question.text}</legend>
+        <legend>${questionWords(question)}</legend>
         ${question.options.map(
           (option) => html`<label class="choice">
             <input type="radio" name=${name} .checked=${live(option === answer)} @change=${() => set(option)} />
@@ -216,7 +217,7 @@ export class EskImportCard extends SignalElement {
         ${namesSystem(question) ? this.#otherSystem(question, answer, set) : nothing}
       </fieldset>`;
     return html`<label class="typed">
-      <span>${question.text}</span>
+      <span>${questionWords(question)}</span>
       <input
         class="field"
         autocomplete="off"

@@ -137,71 +137,6 @@ export const terrainPageStyles = css`
       right: calc(var(--edge) + 364px);
     }
   }
-  .hint,
-  .closed {
-    position: absolute;
-    left: 50%;
-    bottom: 64px;
-    transform: translateX(-50%);
-    display: flex;
-    align-items: center;
-    gap: 10px;
-    max-width: calc(100% - 2 * var(--edge));
-    padding: 11px 18px 11px 14px;
-    font-weight: 500;
-    pointer-events: none;
-  }
-  .hint {
-    width: max-content;
-  }
-  .hint .icon {
-    color: var(--esk-accent-text);
-  }
-  .closed {
-    bottom: auto;
-    top: 74px;
-    width: max-content;
-  }
-  .closed button {
-    pointer-events: auto;
-  }
-  .closed .icon {
-    color: var(--esk-bad);
-  }
-  .importing {
-    position: absolute;
-    left: 50%;
-    top: 74px;
-    transform: translateX(-50%);
-    display: flex;
-    align-items: center;
-    gap: 10px;
-    width: max-content;
-    max-width: calc(100% - 2 * var(--edge));
-    padding: 8px 16px 8px 12px;
-    font-size: 0.8125rem;
-    font-variant-numeric: tabular-nums;
-    pointer-events: none;
-  }
-  esk-lesson-bar {
-    position: absolute;
-    left: 50%;
-    top: 70px;
-    width: max-content;
-    max-width: calc(100% - 2 * var(--edge));
-    transform: translateX(-50%);
-  }
-  /* Below sentences that stand in its place. */
-  .closed ~ esk-lesson-bar,
-  .importing ~ esk-lesson-bar {
-    top: 128px;
-  }
-  .importing .icon {
-    color: var(--esk-accent-text);
-  }
-  .notice .icon {
-    color: var(--esk-accent-text);
-  }
   /* Above the tools, where no hint comes. */
   esk-task-chip {
     position: absolute;
@@ -228,14 +163,6 @@ export const terrainPageStyles = css`
     .notes esk-legend {
       margin-left: 60px;
     }
-  }
-  esk-toasts {
-    position: absolute;
-    left: 50%;
-    bottom: 116px;
-    width: max-content;
-    max-width: calc(100% - 2 * var(--edge));
-    transform: translateX(-50%);
   }
   .veil {
     position: absolute;
@@ -277,17 +204,6 @@ export const terrainPageStyles = css`
     margin: 0;
     text-align: right;
     overflow-wrap: anywhere;
-  }
-  /* Sentences stand beside the inspector, not under it. */
-  @media (min-width: 721px) {
-    :host([drawer]) .hint,
-    :host([drawer]) .closed,
-    :host([drawer]) .importing,
-    :host([drawer]) esk-lesson-bar,
-    :host([drawer]) esk-toasts {
-      left: calc((100% - 340px) / 2);
-      max-width: calc(100% - 340px - 2 * var(--edge));
-    }
   }
   @media (max-width: 720px) {
     :host {
@@ -354,11 +270,7 @@ export const terrainPageStyles = css`
         right: calc(var(--beside) - var(--esk-radius));
         bottom: 0;
       }
-      :host([drawer]) esk-tools,
-      :host([drawer]) .hint,
-      :host([drawer]) .closed,
-      :host([drawer]) .importing,
-      :host([drawer]) esk-toasts {
+      :host([drawer]) esk-tools {
         left: calc((100% - var(--beside)) / 2);
         max-width: calc(100% - var(--beside) - 2 * var(--edge));
       }
@@ -426,28 +338,6 @@ export const terrainPageStyles = css`
       esk-tools:has(~ :is(esk-measure, esk-water)) {
         display: none;
       }
-    }
-    .hint,
-    esk-toasts {
-      bottom: calc(132px + var(--drawer) + env(safe-area-inset-bottom));
-      width: max-content;
-    }
-    /* Over the tools it would lie on the land, for which the drawer leaves little: above the land is mist and sky. */
-    :host([drawer]) .hint {
-      bottom: auto;
-      top: 66px;
-    }
-    /* Sentences that matter more have that place. */
-    :host([drawer]) .hint:has(~ .closed, ~ .importing, ~ esk-lesson-bar[speaks]) {
-      bottom: calc(var(--drawer) + var(--edge) + 62px);
-      top: auto;
-    }
-    .hint {
-      font-size: 0.8125rem;
-      padding: 9px 14px 9px 12px;
-    }
-    esk-toasts {
-      bottom: calc(188px + var(--drawer) + env(safe-area-inset-bottom));
     }
   }
 `;

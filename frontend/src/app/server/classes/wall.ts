@@ -93,8 +93,9 @@ export class WallConnection {
     return this.#codeEnds;
   }
 
+  /** The ground of a copy, empty until it has come; undefined where there is no such copy. */
   ground(number: number): TileStore | undefined {
-    return this.#grounds.get(number)?.store;
+    return this.#groundOf(number)?.store;
   }
 
   /** Takes the copies whose ground has changed. */
@@ -158,13 +159,8 @@ export class WallConnection {
   #frame(data: ArrayBuffer): void {
     const view = new DataView(data);
     const number = view.getUint16(WALL_HEADER.number.offset, true);
-    const size = this.#copies.peek().get(number)?.settings.size_m;
-    if (size === undefined) return;
-    let ground = this.#grounds.get(number);
-    if (ground === undefined) {
-      ground = new CopyGround(size);
-      this.#grounds.set(number, ground);
-    }
+    const ground = this.#groundOf(number);
+    if (ground === undefined) return;
     if (view.getUint8(WALL_HEADER.fresh.offset) === 1) ground.clear();
     try {
       ground.apply(data.slice(WALL_HEADER.size));
@@ -174,6 +170,15 @@ export class WallConnection {
       return;
     }
     this.#changed.value = new Set([...this.#changed.peek(), number]);
+  }
+
+  #groundOf(number: number): CopyGround | undefined {
+    const known = this.#grounds.get(number);
+    const sizeM = this.#copies.peek().get(number)?.settings.size_m;
+    if (known !== undefined || sizeM === undefined) return known;
+    const ground = new CopyGround(sizeM);
+    this.#grounds.set(number, ground);
+    return ground;
   }
 
   #closed(code: number): void {

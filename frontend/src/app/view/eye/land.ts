@@ -1,7 +1,8 @@
 /** How high the land lies, for the view of the whole of it. Pure. */
 
 import type { Land } from "../../../core/camera/state.ts";
-import type { Vec3 } from "../../../core/types.ts";
+import type { TileView, Vec3 } from "../../../core/types.ts";
+import { TILE_SAMPLES } from "../../../generated/contract.ts";
 
 /** Heights are told in steps of this share of the side, so that a view at home does not tremble while the ground arrives. */
 const STEPS = 128;
@@ -24,4 +25,10 @@ export function landOf(heights: ArrayLike<number>, samples: number, sizeM: numbe
       summits.set(block, [col * spacing, row * spacing, step * Math.ceil(h / step)]);
   });
   return { groundM, lowM, peaks: [...summits.values()] };
+}
+
+/** How the land of tiles lies now; null before it has come. */
+export function landOfTiles(tiles: Pick<TileView, "sizeM" | "tile">): Land | null {
+  const heights = tiles.tile(0, 0, 0)?.heights;
+  return heights === undefined ? null : landOf(heights, TILE_SAMPLES, tiles.sizeM);
 }

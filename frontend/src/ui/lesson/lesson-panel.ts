@@ -11,9 +11,10 @@ import type { Lesson, Member, People, Role } from "../../generated/contract.ts";
 import { icon } from "../controls/icons.ts";
 import "../controls/segmented.ts";
 import { SignalElement } from "../controls/signal-element.ts";
-import { lessonPanelStyles } from "../styles/lesson-panel.ts";
 import { panelStyles } from "../styles/panel.ts";
 import { shared } from "../styles/shared.ts";
+import { lessonPanelStyles } from "./styles.ts";
+import "./lesson-groups.ts";
 
 const NAMES = [
   { value: "", label: msg("Own"), title: msg("People are called as they call themselves") },
@@ -96,15 +97,19 @@ export class EskLessonPanel extends SignalElement {
       ${
         pupils.length > 1 && state.hands_off
           ? html`<div class="all">
-              <button class="btn outline" @click=${() => this.lesson.about("pen", everybody)}>${msg("A pen for all")}</button>
-              <button class="btn outline" @click=${() => this.lesson.about("no_pen", everybody)}>${msg("No pens")}</button>
+              <button class="btn outline" @click=${() => this.lesson.pensForAll(true, everybody)}>${msg("A pen for all")}</button>
+              <button class="btn outline" @click=${() => this.lesson.pensForAll(false, everybody)}>${msg("No pens")}</button>
             </div>`
           : nothing
       }
       <ul>
         ${people.map((each) => this.#person(each))}
       </ul>
-    </section>`;
+    </section>
+    <esk-lesson-groups
+      .groups=${this.lesson.groups}
+      .pupils=${pupils.map(({ member }) => member).filter(({ role }) => role === "edit")}
+    ></esk-lesson-groups>`;
   }
 
   #people(): Person[] {

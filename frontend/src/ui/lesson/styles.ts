@@ -61,6 +61,42 @@ export const lessonPanelStyles = css`
     width: 40px;
     height: 40px;
   }
+  /* A group's name opens who is in it. */
+  .fold {
+    appearance: none;
+    min-height: 40px;
+    padding: 0;
+    border: 0;
+    background: none;
+    color: inherit;
+    font: inherit;
+    text-align: start;
+    cursor: pointer;
+  }
+  li.inside {
+    display: grid;
+    gap: 2px;
+    padding: 4px 6px 8px 18px;
+  }
+  li.inside:hover {
+    background: none;
+  }
+  .inside .field {
+    min-height: 40px;
+    margin-bottom: 4px;
+  }
+  .inside label {
+    display: flex;
+    align-items: center;
+    gap: 8px;
+    min-height: 40px;
+    cursor: pointer;
+  }
+  .inside input[type="checkbox"] {
+    width: 18px;
+    height: 18px;
+    accent-color: var(--esk-accent);
+  }
   .pen[aria-pressed="true"] {
     color: var(--esk-accent-text);
   }
