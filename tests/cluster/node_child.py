@@ -13,6 +13,7 @@ from pathlib import Path
 from esker.process import system
 from esker.server.run import Assembly
 from esker.server.settings import from_environment
+from tests.cluster.processes import LINE
 from tests.sync.harness import PlainSolver
 
 
@@ -22,8 +23,9 @@ def main() -> None:
         real, wrong = time.time, 3600.0 * float(hours[0])
         time.time = lambda: real() + wrong
     folder = Path(data)
+    line = f"http://127.0.0.1:{os.environ.get(LINE, port)}"
     settings = from_environment(
-        data=folder, port=int(port), node=name, advertise=f"http://127.0.0.1:{port}", page=folder / "none", level=1,
+        data=folder, port=int(port), node=name, advertise=line, page=folder / "none", level=1,
         database=url, log_level="info", metrics="127.0.0.1",
     )  # fmt: skip
     import logging

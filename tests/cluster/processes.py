@@ -11,7 +11,7 @@ import threading
 import time
 import urllib.error
 import urllib.request
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -21,6 +21,7 @@ from tests.browser import free_port
 
 ROOT = Path(__file__).resolve().parents[2]
 KEY = "the key that the nodes of these tests have together"
+LINE = "ESKER_TEST_LINE"
 PATIENCE = 90.0
 
 
@@ -28,8 +29,11 @@ class NodeProcess:
     """One node, which can be frozen, killed, stopped and started again."""
 
     def __init__(self, name: str, url: str, folder: Path, hours: float = 0.0) -> None:
+        """``hours``: by how many the clock of its machine is wrong."""
         self.name, self.url, self.folder, self.hours = name, url, folder, hours
         self.port = free_port()
+        self.line = self.port
+        """The port at which the other nodes reach it."""
         self.process: subprocess.Popen[bytes] | None = None
         folder.mkdir(parents=True, exist_ok=True)
 
@@ -43,7 +47,7 @@ class NodeProcess:
             self.process = subprocess.Popen(
                 [*map(str, command), *([str(self.hours)] if self.hours else [])],
                 cwd=ROOT,
-                env={**os.environ, "ESKER_CLUSTER_KEY": KEY},
+                env={**os.environ, "ESKER_CLUSTER_KEY": KEY, LINE: str(self.line)},
                 stdout=log,
                 stderr=log,
             )
@@ -136,6 +140,10 @@ class Artist:
         self.live = LiveTerrain(f"{door}/t/{terrain}#{secret}", name=name, timeout=PATIENCE)
         self._stop = threading.Event()
         self.drawn = 0
+        self.pause = 0.02
+        """Seconds between two operations."""
+        self.waited = 0.0
+        """The longest time without an acknowledgement while it drew."""
         self._thread = threading.Thread(target=self._draw, daemon=True)
 
     @property
@@ -160,9 +168,13 @@ class Artist:
         self._thread.start()
 
     def _draw(self) -> None:
-        while not self._stop.wait(0.02):
+        last, since = 0, time.monotonic()
+        while not self._stop.wait(self.pause):
             self.live.set_terrain(title=f"{self._name} {self.drawn}")
             self.drawn += 1
+            if (saved := self.saved) > last:
+                last, since = saved, time.monotonic()
+            self.waited = max(self.waited, time.monotonic() - since)
 
     def rest(self) -> None:
         """Draws no more, and waits until all is saved."""
@@ -173,3 +185,37 @@ class Artist:
     def close(self) -> None:
         self._stop.set()
         self.live.close()
+
+
+def made(node: NodeProcess) -> tuple[str, str]:
+    """A new terrain: its id and the secret of its owner's link."""
+    found = json.loads(node.request("POST", "/api/terrains", b"{}"))
+    return found["id"], found["secret"]
+
+
+def drawing(*doors: Sequence[NodeProcess]) -> tuple[list[Artist], str, str]:
+    """A terrain on which somebody draws through each of these doors; what else they say stands for later."""
+    terrain, secret = made(doors[0][0])
+    artists = [Artist(door[0].base, terrain, secret, f"p{n}") for n, door in enumerate(doors)]
+    for each in artists:
+        each.begin()
+    gone_on(artists)
+    return artists, terrain, secret
+
+
+def gone_on(artists: Sequence[Artist], count: int = 25) -> None:
+    """Waits until everybody has had so much more acknowledged."""
+    before = [each.saved for each in artists]
+    until(lambda: all(each.saved >= had + count for each, had in zip(artists, before, strict=True)))
+
+
+def all_is_there(artists: Sequence[Artist]) -> None:
+    """Everybody rests: each of their operations is in the journal once, and all see the same."""
+    for each in artists:
+        each.rest()
+    total = sum(each.drawn for each in artists)
+    until(lambda: all(each.live.clock >= total for each in artists))
+    assert {each.live.clock for each in artists} == {total}
+    assert len({each.live.document.model_dump_json() for each in artists}) == 1
+    for each in artists:
+        each.close()

@@ -10,43 +10,19 @@ import signal
 from collections.abc import Sequence
 from pathlib import Path
 
-from tests.cluster.processes import Artist, NodeProcess, nodes, running, until
+from tests.cluster.processes import (
+    Artist,
+    NodeProcess,
+    all_is_there,
+    drawing,
+    gone_on,
+    made,
+    nodes,
+    running,
+    until,
+)
 from tests.store.engines import Database
 from tests.store.proxy import Proxy
-
-
-def made(node: NodeProcess) -> tuple[str, str]:
-    """A new terrain: its id and the secret of its owner's link."""
-    found = json.loads(node.request("POST", "/api/terrains", b"{}"))
-    return found["id"], found["secret"]
-
-
-def drawing(*doors: Sequence[NodeProcess]) -> tuple[list[Artist], str, str]:
-    """A terrain on which somebody draws through each of these doors; what else they say stands for later."""
-    terrain, secret = made(doors[0][0])
-    artists = [Artist(door[0].base, terrain, secret, f"p{n}") for n, door in enumerate(doors)]
-    for each in artists:
-        each.begin()
-    gone_on(artists)
-    return artists, terrain, secret
-
-
-def gone_on(artists: Sequence[Artist], count: int = 25) -> None:
-    """Waits until everybody has had so much more acknowledged."""
-    before = [each.saved for each in artists]
-    until(lambda: all(each.saved >= had + count for each, had in zip(artists, before, strict=True)))
-
-
-def all_is_there(artists: Sequence[Artist]) -> None:
-    """Everybody rests: each of their operations is in the journal once, and all see the same."""
-    for each in artists:
-        each.rest()
-    total = sum(each.drawn for each in artists)
-    until(lambda: all(each.live.clock >= total for each in artists))
-    assert {each.live.clock for each in artists} == {total}
-    assert len({each.live.document.model_dump_json() for each in artists}) == 1
-    for each in artists:
-        each.close()
 
 
 def owner_of(some: Sequence[NodeProcess]) -> NodeProcess:

@@ -13,8 +13,9 @@ class Proxy:
     """Passes bytes on in both directions. After ``cut_at`` was sent nothing comes back and the connection ends; after
     ``hush_at`` it stays and carries nothing more."""
 
-    def __init__(self, folder: Path, server: Path) -> None:
-        """``folder``: where the socket of the proxy lies; ``server``: the socket behind it."""
+    def __init__(self, folder: Path | None, server: Path | int) -> None:
+        """``folder``: where the socket of the proxy lies, None for a port of this machine (``port``); ``server``: the
+        socket behind it, or its port."""
         self.cut_at: bytes | None = None
         self.hush_at: bytes | None = None
         self.is_deaf = False
@@ -26,10 +27,14 @@ class Proxy:
         self.cuts = 0
         self._ends: list[socket.socket] = []
         self._server = server
-        self._listener = socket.socket(socket.AF_UNIX)
-        folder.mkdir()
-        self._listener.bind(os.fspath(folder / server.name))
-        self._listener.listen()
+        if folder is None or isinstance(server, int):
+            self._listener = socket.create_server(("127.0.0.1", 0))
+            self.port = int(self._listener.getsockname()[1])
+        else:
+            self._listener = socket.socket(socket.AF_UNIX)
+            folder.mkdir()
+            self._listener.bind(os.fspath(folder / server.name))
+            self._listener.listen()
         threading.Thread(target=self._accept, daemon=True).start()
 
     def _accept(self) -> None:
@@ -41,11 +46,26 @@ class Proxy:
             if not self.is_open:
                 near.close()
                 continue
-            far = socket.socket(socket.AF_UNIX)
-            far.connect(os.fspath(self._server))
+            try:
+                far = self._behind()
+            except OSError:  # as where nobody listens
+                near.close()
+                continue
             self._ends += [near, far]
             threading.Thread(target=self._out, args=(near, far), daemon=True).start()
             threading.Thread(target=self._back, args=(near, far), daemon=True).start()
+
+    def _behind(self) -> socket.socket:
+        """A connection to the server. Raises OSError."""
+        if isinstance(self._server, int):
+            return socket.create_connection(("127.0.0.1", self._server))
+        far = socket.socket(socket.AF_UNIX)
+        try:
+            far.connect(os.fspath(self._server))
+        except OSError:
+            far.close()
+            raise
+        return far
 
     def _out(self, near: socket.socket, far: socket.socket) -> None:
         with suppress(OSError):
