@@ -14,7 +14,8 @@ from esker.cli import main
 from esker.contract import TerrainSettings
 from esker.keeper.lesson import greeting, open_lesson
 from esker.keeper.private import Content, Lesson, Private
-from esker.session.room.hub import Hub, _fresh_id
+from esker.session.births import fresh_id
+from esker.session.room.hub import Hub
 from esker.store import kept
 from esker.store.access import CODE_LIFE_SECONDS, CODE_SECONDS, Access
 from tests.sync.harness import LiveServer
@@ -106,7 +107,7 @@ def test_no_terrain_s_id_looks_like_an_option(monkeypatch: pytest.MonkeyPatch) -
     """SPEC P344: of sixty-four terrains one could not be named to `esker link`."""
     drawn = iter(["-fpPkLzwr82f", "--PkLzwr82f", "fpPkLzwr82f-"])
     monkeypatch.setattr(secrets, "token_urlsafe", lambda _: next(drawn))
-    assert _fresh_id() == "fpPkLzwr82f-"
+    assert fresh_id() == "fpPkLzwr82f-"
 
 
 def test_list_and_link_beside_a_running_server(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

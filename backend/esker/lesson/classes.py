@@ -22,8 +22,9 @@ from esker.errors import Cannot
 from esker.fairness.shares import Who
 from esker.fairness.turns import SERVER, Turns
 from esker.lesson import merge
+from esker.session.births import born_as
 from esker.session.room.core import Denied
-from esker.session.room.hub import Hub, born_as
+from esker.session.room.hub import Hub
 from esker.session.room.room import Room
 from esker.store.access import Ended, Link, SecretTaken, TooManyLinks
 from esker.store.classes import Class, ClassStore, Copy, NoPlace, Pupil, TooManyClasses

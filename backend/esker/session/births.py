@@ -8,6 +8,7 @@ whoever asks for it a few bytes, and the server as many as the terrain has.
 from __future__ import annotations
 
 import asyncio
+import secrets
 import time
 from collections.abc import Callable
 from typing import Any, Final
@@ -62,3 +63,15 @@ class Births:
         if not self.rates.take(Who(who.address), self._now(), len(text)):
             raise Cannot(429, "rate_limited", TOO_MUCH)
         return text
+
+
+def born_as(document: c.Document) -> c.Document:
+    """The document of a terrain that begins as ``document``, under an id of its own."""
+    return document.model_copy(update={"id": fresh_id(), "clock": 0})
+
+
+def fresh_id() -> str:
+    """Returns an id that no terrain has: 72 random bits. It may stand in a command, so it begins with no dash."""
+    while (made := secrets.token_urlsafe(9)).startswith("-"):
+        pass
+    return made

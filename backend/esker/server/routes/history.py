@@ -50,7 +50,7 @@ def add_history(app: FastAPI, hub: Hub, grids: GridStore) -> None:
         document = await hub.strokes(terrain, None, who)
         page = await hub.read(who, activity_logs.page, terrain, before, limit)
         hub.door.demand(link)
-        lesson = hub.lesson_of(terrain).state
+        lesson = hub.lessons.of(terrain).state
         if link.role != "owner" and (lesson.hide or lesson.animals or link.role == "view"):
             room = hub.open_room(terrain)
             here = {} if room is None or lesson.hide else {m.client: m.name for m in room.core.members}
@@ -65,7 +65,7 @@ def add_history(app: FastAPI, hub: Hub, grids: GridStore) -> None:
         document = await hub.document(terrain, at, who)
         still = None if at is None else things(await hub.strokes(terrain, None, who))
         # This runs in a thread, stroke by stroke: the framework would encode the document in the event loop, at once.
-        text = await hub.read(who, document_json, shown(document, link, hub.lesson_of(terrain), still))
+        text = await hub.read(who, document_json, shown(document, link, hub.lessons.of(terrain), still))
         hub.door.demand(link)
         return Response(text, media_type="application/json")
 

@@ -75,8 +75,8 @@ def _add_uploads(app: FastAPI, hub: Hub, imports: Imports) -> None:
     ) -> c.ImportStatus:
         limited(request, app.state.imports, "files came")
         person = f"{link.id} {client or address(request)}"
-        caller = hub.caller(link, request.headers.get(TICKET_HEADER), address(request))
-        if not hub.lesson_of(terrain).draws(caller):
+        caller = hub.lessons.caller(link, request.headers.get(TICKET_HEADER), address(request))
+        if not hub.lessons.of(terrain).draws(caller):
             raise Cannot(403, "hands_off", HANDS_OFF)
         return await imports.upload(
             name,

@@ -90,7 +90,7 @@ def add_terrains(app: FastAPI, hub: Hub, grids: GridStore) -> None:
 
     @app.get("/api/terrains/{terrain}/archive")
     async def download(request: Request, terrain: str, link: AnyLink) -> Response:
-        document = shown(await hub.document(terrain, None, asker(request, link)), link, hub.lesson_of(terrain))
+        document = shown(await hub.document(terrain, None, asker(request, link)), link, hub.lessons.of(terrain))
         try:
             path = await hub.packing.run(asker(request, link), grids.pack, document)
         except (archive.ArchiveError, RasterError) as error:

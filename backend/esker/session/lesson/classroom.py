@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from esker import contract as c
 from esker.session.ground.feed import Stream, TileFeed
 from esker.session.ground.ports import FrameOutlet
+from esker.session.progress import GroundProgress
 from esker.session.room.core import RoomCore
 
 FROZEN: Final = "Your teacher has frozen this terrain. What you draw now is not kept."
@@ -23,7 +24,7 @@ class ClassRoom:
     in_class: c.InClass | None = None
     """What its members are told of the class whose copy this is."""
     _feed: TileFeed
-    _progress: c.Progress
+    _progress: GroundProgress
 
     @property
     def frozen(self) -> bool:

@@ -19,6 +19,7 @@ from esker.document.ops import StrokeSet
 from esker.fairness.shares import Place, Places, Share, Who
 from esker.session.lesson.rules import Lesson
 from esker.session.lesson.state import State
+from esker.session.progress import GroundProgress
 from esker.session.room import protocol
 from esker.session.room.core import Denied, RoomCore, RoomInfo
 from esker.session.room.members import Member
@@ -26,7 +27,7 @@ from esker.session.room.outbox import Long, Outbox
 from esker.session.room.ports import Journal
 from esker.session.room.replicas import viewing
 from esker.session.room.replicas.earlier import EarlierReplica
-from esker.session.room.room import PROGRESS_TICK, Guest, Room
+from esker.session.room.room import Guest, Room
 from esker.store.claims import Claims
 from esker.store.journal import DamagedTerrain, Loaded, Row, replay
 
@@ -152,8 +153,20 @@ class HistoryReader:
             del self._waypoints[1::2]
 
 
+class HistoryProgress(GroundProgress):
+    """The progress of an earlier clock: by the journal's clock, not by the one that only rises."""
+
+    def note(self, progress: c.Progress) -> None:
+        super().note(progress.model_copy(update={"clock": self._core.document.clock}))
+
+    def newest(self) -> c.Progress:
+        return self._newest
+
+
 class HistoryRoom(Room):
     """The room of one person who looks at an earlier clock."""
+
+    progress_kind = HistoryProgress
 
     def __init__(
         self,
@@ -244,15 +257,8 @@ class HistoryRoom(Room):
             outbox.push(f'{{"type":"ordered","ops":[{",".join(texts)}]}}')
         else:
             outbox.push(self._history_core.welcome(guest.member, self.info), counted=False)
-        self._note_progress(self._progress.model_copy(update={"settled": False}))
+        self._progress.unsettled()
         self._ordered()
-
-    def _note_progress(self, progress: c.Progress, delay: float = PROGRESS_TICK) -> None:
-        """JournalEntry by the journal's clock, not by the one that only rises."""
-        super()._note_progress(progress.model_copy(update={"clock": self.core.document.clock}), delay)
-
-    def _newest_progress(self) -> c.Progress:
-        return self._progress
 
     def _level_taken(self, clock: int, level: int, settled: bool) -> None:
         super()._level_taken(clock, level, settled and clock >= self.core.geometry_clock)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import secrets
 import time
 from collections.abc import Callable, Collection
 from concurrent.futures import ThreadPoolExecutor
@@ -15,31 +14,27 @@ from typing import Any, Final, ParamSpec, TypeVar
 from esker import contract as c
 from esker.document.ops import Limits, StrokeSet
 from esker.errors import EskerError
-from esker.fairness.shares import Full, Share, Who, homes
+from esker.fairness.shares import Full, Share, Who
 from esker.fairness.turns import SERVER, FairThreads
 from esker.process import memory
-from esker.session.births import Births
+from esker.session.births import Births, born_as
 from esker.session.ground.ports import Elevation, Tiles
 from esker.session.ground.tilethread import TileThread
 from esker.session.ground.worker import Worker
-from esker.session.lesson import state as lesson_state
-from esker.session.lesson.rules import Hand, Lesson
 from esker.session.room.conducting import Desk
 from esker.session.room.core import Denied, RoomCore, RoomInfo
 from esker.session.room.door import Door
-from esker.session.room.entry import Caller, caller_of
 from esker.session.room.history_view import HistoryCore, HistoryRoom, HistoryRooms, Present
+from esker.session.room.lessons import Lessons
 from esker.session.room.limits import history_rates
 from esker.session.room.openrooms import ClosedRooms, OpenRooms
 from esker.session.room.outbox import Outbox, Waiting
 from esker.session.room.ports import Meter, Tenancy
 from esker.session.room.room import Guest, Room
-from esker.store import timestamps
 from esker.store.access import JOINED_BY_CODE, Access, Link
 from esker.store.claims import Claims
 from esker.store.engine.ports import Unreachable
 from esker.store.journal import DamagedTerrain, Journal
-from esker.store.lessons import read_makers, read_state
 from esker.store.upkeep.deletion import Deletion
 
 log = logging.getLogger("esker.hub")
@@ -111,6 +106,7 @@ class Hub:
         self.class_of: Callable[[str], c.InClass | None] = lambda _: None
         """Returns what members of a terrain are told of the class whose copy it is."""
         self._claims = claims or Claims()
+        self.lessons = Lessons(journal, self._claims, self.open_room)
         self._history_rooms = HistoryRooms(journal, self._history_room, claims=self._claims)
 
     @property
@@ -130,8 +126,8 @@ class Hub:
         if hello.at is not None:
             present = partial(self.strokes, hello.terrain, None, who) if link.role == "view" else None
             read = partial(self.read, who)
-            self.caller(link, hello.ticket, address)
-            hide = link.role != "owner" and self.lesson_of(hello.terrain).state.hide
+            self.lessons.caller(link, hello.ticket, address)
+            hide = link.role != "owner" and self.lessons.of(hello.terrain).state.hide
             return await self._history_rooms.enter(
                 hello, who, outbox, lambda: self.door.demand(link), read, present, hide
             )
@@ -191,7 +187,7 @@ class Hub:
                 await self._tenancy.hold(terrain)
             except EskerError as error:
                 raise Denied("moved", error.message) from None
-        loaded, lesson = await self.read(who, lambda: (self.journal.load(terrain), self._lesson(terrain)))
+        loaded, lesson = await self.read(who, lambda: (self.journal.load(terrain), self.lessons.load(terrain)))
         if loaded is None or self.deletion.deleted(terrain) is not None:
             return None
         if self._tenancy is not None and not self._tenancy.may_acknowledge(terrain):
@@ -211,28 +207,6 @@ class Hub:
         room = Room(core, journal=self.journal, on_empty=lambda: self._empty(terrain), **needs)
         room.in_class = self.class_of(terrain)
         return room
-
-    def _lesson(self, terrain: str) -> Lesson:
-        """The lesson of a terrain as the database has it."""
-        db = self.journal.reader()
-        state = lesson_state.read(read_state(db, terrain), terrain)
-        people = timestamps.read_people(db, terrain).values()
-        return Lesson(state, read_makers(db, terrain), {p.client: Hand(p.person, p.conducts) for p in people})
-
-    def lesson_of(self, terrain: str) -> Lesson:
-        """The lesson of a terrain, whether its room is open or not; of one that is not, without who made what."""
-        room = self.open_room(terrain)
-        if room is not None:
-            return room.core.lesson
-        return Lesson(lesson_state.read(read_state(self.journal.reader(), terrain), terrain))
-
-    def caller(self, link: Link, ticket: str | None, address: str) -> Caller:
-        """Who asks beside a room, by a link and with a ticket. Raises Denied (removed)."""
-        caller = caller_of(self._claims, link.terrain, link.role, ticket)
-        kept_out = self.lesson_of(link.terrain).door(caller, caller.since, homes(address)[0])
-        if kept_out is not None:
-            raise Denied("removed", kept_out, caller.ticket)
-        return caller
 
     def _end_code_link(self, terrain: str, link: str) -> None:
         """Ends a link that a join code made: it is one device's alone."""
@@ -463,15 +437,3 @@ class Hub:
         self._base_threads.shutdown(wait=False, cancel_futures=True)
         self.reading.shutdown()
         self.packing.shutdown()
-
-
-def born_as(document: c.Document) -> c.Document:
-    """The document of a terrain that begins as ``document``, under an id of its own."""
-    return document.model_copy(update={"id": _fresh_id(), "clock": 0})
-
-
-def _fresh_id() -> str:
-    """Returns an id that no terrain has: 72 random bits. It may stand in a command, so it begins with no dash."""
-    while (made := secrets.token_urlsafe(9)).startswith("-"):
-        pass
-    return made

@@ -23,6 +23,7 @@ from esker.session.ground.ports import Elevation, ScoredTiles, Tiles, WateredTil
 from esker.session.ground.tilethread import TileThread
 from esker.session.ground.worker import Job, Worker
 from esker.session.lesson.classroom import FROZEN, ClassRoom
+from esker.session.progress import GroundProgress
 from esker.session.rivers import Rivers
 from esker.session.room import protocol
 from esker.session.room.conducting import Conducting, Desk
@@ -41,8 +42,6 @@ log = logging.getLogger("esker.room")
 
 TICK: Final = c.TICK_MS / 1000
 PRESENCE_TICK: Final = 1 / c.PRESENCE_HZ
-PROGRESS_TICK: Final = 0.1
-CLOCK_TICK: Final = 0.25
 DOUBT_TICK: Final = 0.1
 """What is durable waits so long, again and again, while it is not certain whose the terrain is."""
 
@@ -56,6 +55,8 @@ class Guest:
 
 class Room(ClassRoom):
     """Wires one ``RoomCore`` to the journal, the solver and the clock."""
+
+    progress_kind = GroundProgress
 
     def __init__(
         self,
@@ -107,6 +108,7 @@ class Room(ClassRoom):
         self.scoring = Scoring(scorer, lambda: self._feed.heights(scored), self._loop, self._tell_score)
         self.scoring.works_for(home)
         self._layers = Layers(elevation, base_threads, self._loop, self._laid, self._tell, self._slow_changed)
+        self._progress = self.progress_kind(core, self._layers, info.levels, self._loop)
         self._job: Job | None = None
         """The job that was asked for last."""
         self._tick_timer: asyncio.TimerHandle | None = None
@@ -114,12 +116,8 @@ class Room(ClassRoom):
         self._presence_timer: asyncio.TimerHandle | None = None
         self._solve_due = False
         self._requested_clock = -1
-        self._progress = c.Progress(clock=core.head.clock, level=0, of=info.levels, settled=False)
-        self._progress_timer: asyncio.TimerHandle | None = None
-        self._note = ""
         self._called: dict[str, Person] = {}
         """Authors of ops as the journal knows them."""
-        self._refining = 0
         self._encoder = Encoder(core)
         self._tenancy, self._meter, self._on_lost = tenancy, meter, on_lost
         self._ordered_at: float | None = None
@@ -163,7 +161,7 @@ class Room(ClassRoom):
             if denied.code == "removed":
                 self.conducting.somebody_waits()
             raise
-        outbox.message(self._newest_progress())
+        outbox.message(self._progress.newest())
         if self.in_class is not None:
             outbox.message(self.in_class)
         if self.scoring.newest is not None:
@@ -287,8 +285,7 @@ class Room(ClassRoom):
                 self._solve_due = True
                 self._loop.call_soon(self._solve)
         elif self._progress.settled:
-            # Only the clock changes, and the members see that from the ops: there is no hurry.
-            self._progress_soon(CLOCK_TICK)
+            self._progress.clock_changed()
         if self._meter is not None and self._ordered_at is None:
             self._ordered_at = self._loop.time()
         self._tick_soon()
@@ -392,26 +389,13 @@ class Room(ClassRoom):
 
     def _slow_changed(self) -> None:
         """Tells people that a base takes long, or takes no longer."""
-        self._note_progress(self._progress)
+        self._progress.again()
 
     def _level_taken(self, clock: int, level: int, settled: bool) -> None:
-        """Tells people that a level became tiles.
-
-        An op that does not touch the ground leaves an older solve as good as new.
-        """
+        """Takes a level that became tiles."""
         self._rivers.level_taken(level, settled)
         self.scoring.level_taken(settled)
-        if clock >= self.core.geometry_clock:
-            clock = self.core.head.clock
-        self._note_progress(
-            c.Progress(
-                clock=clock,
-                level=level,
-                of=self.info.levels,
-                settled=settled,
-                refining=self._refining if settled else 0,
-            )
-        )
+        self._progress.level_taken(clock, level, settled)
 
     def _tell_score(self, score: c.Score) -> None:
         for member in self.core.members:
@@ -421,31 +405,7 @@ class Room(ClassRoom):
         """Takes the number of refined tiles that are wanted. ``more``: the solver does not know of all of them yet."""
         if more and not self.closed:
             self._worker.nudge(self._solve_client)
-        self._refining = count
-        if self._progress.settled and count != self._progress.refining:
-            self._note_progress(self._progress.model_copy(update={"refining": count}))
-
-    def _note_progress(self, progress: c.Progress, delay: float = PROGRESS_TICK) -> None:
-        self._progress = progress
-        self._progress_soon(delay)
-
-    def _progress_soon(self, delay: float) -> None:
-        if self._progress_timer is None and not self.closed:
-            self._progress_timer = self._loop.call_later(delay, self._send_progress)
-
-    def _newest_progress(self) -> c.Progress:
-        """Returns the newest progress. Settled ground is settled for every clock since at which none of it changed."""
-        progress, head = self._progress, self.core.head
-        if progress.settled and self.core.geometry_clock <= progress.clock < head.clock and self._layers.current(head):
-            self._progress = progress.model_copy(update={"clock": head.clock})
-        return self._progress.model_copy(update={"laying": self._layers.slow})
-
-    def _send_progress(self) -> None:
-        self._progress_timer = None
-        text = self._newest_progress().model_copy(update={"note": self._note}).model_dump_json()
-        self._note = ""
-        for member in self.core.members:
-            member.outbox.push(text)
+        self._progress.refining(count)
 
     def _solve_failed(self, note: str) -> None:
         """Takes a sentence about the solver, that something went wrong, or right again.
@@ -455,9 +415,7 @@ class Room(ClassRoom):
         self._loop.call_soon_threadsafe(self._tell, note)
 
     def _tell(self, note: str) -> None:
-        """Sends the note with the next progress, whatever that is: no level may hide it."""
-        self._note = note
-        self._note_progress(self._progress)
+        self._progress.tell(note)
 
     # --- the end ------------------------------------------------------------------------------------------------
 
@@ -482,7 +440,8 @@ class Room(ClassRoom):
         self._rivers.close()
         self.scoring.close()
         self.conducting.close()
+        self._progress.close()
         self._worker.remove(self._solve_client)
-        for timer in (self._tick_timer, self._presence_timer, self._progress_timer):
+        for timer in (self._tick_timer, self._presence_timer):
             if timer is not None:
                 timer.cancel()
