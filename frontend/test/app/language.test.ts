@@ -54,6 +54,9 @@ describe("what the server says (SPEC U651, U652)", () => {
     expect(refusalWords("busy", "Another file of yours is still being brought in.")).toMatch(/^Another file/);
     await speak("de");
     expect(refusalWords("busy", "Another file of yours is still being brought in.")).toMatch(/^Der Server ist/);
+    expect(refusalWords("no_seat", "This class is over. Ask your teacher.")).toBe(
+      "Diese Klasse ist vorbei. Frag deine Lehrkraft.",
+    );
     expect(refusalWords("malformed", "Say which copy is to be opened.")).toBe("Say which copy is to be opened.");
     expect(readRefusal(404, '{"code": "no_link", "message": "There is no such link."}').message).toMatch(
       /^Diesen Link/,
