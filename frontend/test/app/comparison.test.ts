@@ -71,7 +71,7 @@ function side(heightM: number) {
   });
   viewport.getBoundingClientRect = () => new DOMRect(0, 0, SIDE_PX.width, SIDE_PX.height);
   document.body.append(viewport);
-  return { tiles, settings: signal({ ...SETTINGS, size_m: SIZE_M }), viewport };
+  return { tiles, settings: signal({ ...SETTINGS, size_m: SIZE_M, detail: 1, erosion: 0.5 }), viewport };
 }
 
 let frames: FrameRequestCallback[] = [];
@@ -150,7 +150,11 @@ describe("a comparison of two copies", () => {
   it("shows each copy's own ground without made-up detail, and takes no pen (L156)", async () => {
     const { comparison, sides, last } = await stand(100, 300);
     expect(last().map((scene) => scene.tiles)).toEqual(sides.map(({ tiles }) => tiles));
-    for (const scene of last()) expect([scene.strokes, scene.ghost]).toEqual([[], null]);
+    for (const { strokes, ghost, settings } of last())
+      expect([strokes, ghost, settings.detail, settings.erosion]).toEqual([[], null, 0, 0]);
+    sides[1].settings.value = { ...sides[1].settings.value, look: "paper" };
+    frame();
+    expect(last().map(({ settings }) => settings.look)).toEqual(["natural", "paper"]);
     comparison.dispose();
   });
 

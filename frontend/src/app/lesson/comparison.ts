@@ -1,6 +1,6 @@
 /**
  * Two copies of a class side by side under one camera. Each side has a renderer of its own on the tiles that the wall holds of
- * its copy, so there is nothing that could be changed. Synthesised detail is left out: what is seen is what was drawn.
+ * its copy, so there is nothing that could be changed. Synthesised detail and gullies are left out: what is seen is what was drawn.
  */
 
 import { computed, effect, type ReadonlySignal, signal } from "@preact/signals-core";
@@ -50,6 +50,8 @@ export class Comparison {
   readonly reason: ReadonlySignal<string | null>;
   readonly difference: ReadonlySignal<Difference | null>;
   readonly #sides: readonly [ComparedSide, ComparedSide];
+  /** Settings of each side without what is made up. */
+  readonly #settings: readonly ReadonlySignal<TerrainSettings>[];
   readonly #view: ViewChoices;
   readonly #graphics: readonly [Graphics, Graphics];
   readonly #channels: ChannelStore;
@@ -64,6 +66,7 @@ export class Comparison {
   constructor(sides: readonly [ComparedSide, ComparedSide], view: ViewChoices) {
     const [left, right] = sides;
     this.#sides = sides;
+    this.#settings = sides.map(({ settings }) => computed(() => ({ ...settings.value, detail: 0, erosion: 0 })));
     this.#view = view;
     this.camera = new Camera(left.tiles.sizeM);
     this.camera.calm = this.#calm.matches;
@@ -146,14 +149,14 @@ export class Comparison {
   #draw(dtS: number, timeS: number): boolean {
     let again = this.camera.update(dtS, this.#floor);
     const overlay = this.overlay.peek();
-    for (const [k, { tiles, settings }] of this.#sides.entries()) {
+    for (const [k, { tiles }] of this.#sides.entries()) {
       const { renderer } = this.#graphics[k as 0 | 1];
       if (renderer === null) continue;
       const stats = renderer.render({
         camera: this.camera.state.peek(),
         tiles,
         channels: this.#channels,
-        settings: settings.peek(),
+        settings: this.#settings[k]!.peek(),
         strokes: [],
         ghost: null,
         cursors: [],

@@ -77,7 +77,7 @@ export class EskLessonGroups extends SignalElement {
 
   #count({ people }: Group): string {
     const here = this.pupils.filter((member) => people.includes(member.person)).length;
-    return here === people.length ? String(here) : msg(str`${here} of ${people.length} here`);
+    return here === people.length ? msg(str`${here} here`) : msg(str`${here} of ${people.length} here`);
   }
 
   #remove(at: number): void {

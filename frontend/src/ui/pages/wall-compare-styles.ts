@@ -26,6 +26,7 @@ export const compareStyles = css`
   }
   footer p {
     margin: 0;
+    text-wrap: balance;
   }
   .grow {
     flex: 1;

@@ -1,12 +1,11 @@
 import { msg, str } from "@lit/localize";
-import { computed, type ReadonlySignal, signal } from "@preact/signals-core";
+import { computed, signal } from "@preact/signals-core";
 import { html, nothing, type TemplateResult } from "lit";
 import { deviceStore } from "../../app/device/storage.ts";
 import { ViewChoices } from "../../app/device/view-choices.ts";
 import { type ComparedOverlay, type ComparedSide, Comparison } from "../../app/lesson/comparison.ts";
 import { copyName } from "../../app/server/classes/copies.ts";
 import type { WallConnection } from "../../app/server/classes/wall.ts";
-import type { TerrainSettings } from "../../generated/contract.ts";
 import { icon } from "../controls/icons.ts";
 import "../controls/segmented.ts";
 import { SignalElement } from "../controls/signal-element.ts";
@@ -65,7 +64,8 @@ export class EskWallCompare extends SignalElement {
     const tiles = this.wall.ground(number);
     const copy = this.wall.copies.peek().get(number);
     if (tiles === undefined || copy === undefined) return null;
-    return { tiles, settings: plainSettings(this.wall, number, copy.settings), viewport };
+    const settings = computed(() => this.wall.copies.value.get(number)?.settings ?? copy.settings);
+    return { tiles, settings, viewport };
   }
 
   readonly #key = (event: KeyboardEvent): void => {
@@ -144,12 +144,6 @@ export class EskWallCompare extends SignalElement {
       ${reason.value === null ? nothing : html`<p role="status">${reason.value}</p>`}
     </footer>`;
   }
-}
-
-/** The settings of a copy, without synthesised detail; the same object until they change. */
-function plainSettings(wall: WallConnection, number: number, first: TerrainSettings): ReadonlySignal<TerrainSettings> {
-  const newest = computed(() => wall.copies.value.get(number)?.settings ?? first);
-  return computed(() => ({ ...newest.value, detail: 0 }));
 }
 
 function metres(value: number): string {
