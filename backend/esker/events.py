@@ -57,9 +57,13 @@ class Settled(Level):
 
 @dataclass(frozen=True)
 class ChannelLevel(Level):
-    """A channel other than the heights, final; the same array as last time if nothing of it changed."""
+    """A channel other than the heights, final; the same array as last time if nothing of it changed.
+
+    more: the next event is at hand, so that nobody waits for it: it comes with the same turn.
+    """
 
     of: Channel
+    more: bool = False
 
     @property
     def channel(self) -> Channel:

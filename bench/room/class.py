@@ -3,8 +3,9 @@
 A server process of its own; this process plays the pupils and the wall. Thirty devices come in by one code at once.
 Then each draws ``--strokes`` strokes a minute as a pen does, its appends ten times a second, out of step with the
 others. An acknowledgement is timed from the sending of an op, a coarse tile from the sending of an append to the first
-frame of level 0 that has its clock, the wall from the sending to its first frame with that clock. In the end the class
-is collected. The server's processor time and memory are those of its process and its children.
+frame of level 0 that has its clock, the wall from the sending to its first frame with that clock. The end of a stroke
+changes no ground, so no frame need follow it: it is timed for its acknowledgement alone. In the end the class is
+collected. The server's processor time and memory are those of its process and its children.
 """
 
 from __future__ import annotations
@@ -62,7 +63,8 @@ class _Pupil:
     terrain: str
     secret: str
     times: _Times
-    sent: dict[str, float] = field(default_factory=dict)
+    sent: dict[str, tuple[float, bool]] = field(default_factory=dict)
+    """By op, when it was sent, and whether it changes the ground."""
     appended: dict[int, float] = field(default_factory=dict)
     unseen: dict[int, float] = field(default_factory=dict)
     """By clock, when an append was sent: until the wall has shown it."""
@@ -89,9 +91,10 @@ class _Pupil:
                 raise RuntimeError(f"{self.client}: {answer['message']}")
             if answer["type"] == "ack":
                 for op_id, clock in zip(answer["ids"], answer["clocks"], strict=True):
-                    at = self.sent.pop(op_id)
+                    at, draws = self.sent.pop(op_id)
                     self.times.ack.append(now - at)
-                    self.appended[clock] = self.unseen[clock] = at
+                    if draws:
+                        self.appended[clock] = self.unseen[clock] = at
 
     def _seen(self, waiting: dict[int, float], clock: int, into: list[float], now: float) -> None:
         into.extend(max(0.0, now - waiting.pop(k)) for k in [k for k in waiting if k <= clock])
@@ -127,7 +130,7 @@ class _Pupil:
     async def _send(self, ws: ClientConnection, op: dict[str, Any]) -> None:
         self.count += 1
         op_id = f"{self.client}:{self.count}"
-        self.sent[op_id] = time.perf_counter()
+        self.sent[op_id] = time.perf_counter(), op["type"] != "stroke.finish"
         await ws.send(json.dumps({"type": "ops", "ops": [{"id": op_id, "op": op}]}))
 
 

@@ -20,7 +20,7 @@ from esker.server.hydrology import Hydrology, Snapshot, snapshot
 from esker.session import rivers as session_rivers
 from esker.session.ground.feed import TileFeed
 from esker.session.ground.tilethread import TileThread
-from esker.session.rivers import EVERY_SECONDS, Look, Rivers, Wanted, next_look
+from esker.session.rivers import EVERY_SECONDS, QUIET_SECONDS, REST_SHARE, Gate, Look, Pace, Rivers, Wanted, next_look
 from esker.tiles.codec.rivers import is_rivers, read_rivers
 from esker.tiles.delivery import ClientTiles, TileServer
 from esker.tiles.watcher import Watcher
@@ -50,10 +50,42 @@ def test_when_rivers_are_looked_for(
     assert waits == (None if wait is None else pytest.approx(wait))
 
 
+def test_searches_of_all_rooms_pass_one_at_a_time_with_a_pause_behind_each() -> None:
+    """SPEC S586: whoever has waited longest is next, and who closes gives the place back."""
+    gate = Gate(4)
+    assert gate.wait("a", 10.0) == 0
+    gate.enter("a", 10.0)
+    assert gate.wait("b", 10.0) > 0
+    assert gate.wait("c", 10.0) > 0
+    gate.leave("a", 10.5)
+    assert gate.wait("b", 10.5) == pytest.approx(3 * 0.5)
+    assert gate.wait("c", 12.0) > 0, "it came behind another one"
+    assert gate.wait("b", 12.0) == 0
+    gate.leave("b", 12.0)
+    assert gate.wait("d", 12.0) > 0
+    assert gate.wait("d", 13.0) == 0, "who does not come back holds nobody up"
+
+
+def test_searches_at_rest_pause_only_while_anybody_draws() -> None:
+    """SPEC S587."""
+    pace = Pace()
+    pace.enter("a", REST, 100.0)
+    pace.leave("a", 101.0)
+    assert pace.wait("b", REST, 101.0) == 0, "nobody draws"
+    pace.enter("c", PREVIEW, 101.0)
+    pace.leave("c", 101.1)
+    assert pace.wait("b", REST, 101.1) == pytest.approx(QUIET_SECONDS - 0.1)
+    pace.enter("c", PREVIEW, 103.0)
+    assert pace.wait("b", REST, 103.5) == pytest.approx(QUIET_SECONDS - 0.5)
+    pace.enter("c", PREVIEW, 105.9)
+    assert pace.wait("b", REST, 101.0 + REST_SHARE - 1) == 0, "the pause is over, however much is drawn"
+
+
 class Searches:
     """A hydrology and a ground whose answers a test gives by hand."""
 
     def __init__(self) -> None:
+        self.pace = Pace()
         self.levels: list[int] = []
         self.settled: list[bool] = []
         self.answers: list[Future[bytes | None]] = []
@@ -100,6 +132,8 @@ def now(monkeypatch: pytest.MonkeyPatch) -> None:
     """While somebody draws, rivers may be looked for at once."""
     monkeypatch.setattr(session_rivers, "EVERY_SECONDS", 0.0)
     monkeypatch.setattr(session_rivers, "REST_SECONDS", 0.0)
+    monkeypatch.setattr(session_rivers, "SHARE", 1)
+    monkeypatch.setattr(session_rivers, "REST_SHARE", 1)
 
 
 def test_one_search_runs_at_a_time_and_the_newest_ground_is_next(now: None) -> None:

@@ -68,6 +68,12 @@ def kernels(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> 
     return made
 
 
+@pytest.fixture
+def heavy(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No strokes are so few that they are rasterised again."""
+    monkeypatch.setattr(parking, "LIGHT", -1.0)
+
+
 def sets(room: str) -> list[list[Stroke]]:
     """What is drawn in a room, one after the other."""
     first = of_room(room)
@@ -86,9 +92,15 @@ def alone(solver: Solver, room: str, settings: TerrainSettings, base: Base | Non
 @pytest.mark.parametrize("settings", [SETTINGS, PINNED], ids=["free", "pinned"])
 @pytest.mark.parametrize("base", [None, hills()], ids=["flat", "hills"])
 def test_solves_that_take_each_others_memory_at_every_pause_give_the_bits_of_solves_alone(
-    kernels: Solver, settings: TerrainSettings, base: Base | None, basis: bool
+    kernels: Solver,
+    settings: TerrainSettings,
+    base: Base | None,
+    basis: bool,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """SPEC S500: previews, previews from the ground before, settled levels, gradients."""
+    """SPEC S500, S581: previews, previews from the ground before, settled levels, gradients. In half of the cases
+    constraints are copied, in the others they are rasterised again."""
+    monkeypatch.setattr(parking, "LIGHT", parking.LIGHT if basis == (settings is PINNED) else -1.0)
     expected = {room: alone(Solver(kernels.device_name), room, settings, base, basis) for room in ROOMS[:2]}
     solver, got = one_arena(kernels), {room: list[Any]() for room in ROOMS[:2]}
 
@@ -127,8 +139,8 @@ def test_what_was_in_the_memory_before_does_not_matter(kernels: Solver) -> None:
     assert np.array_equal(kernels.solve(moved, SETTINGS, 2)[2], Solver().solve(moved, SETTINGS, 2)[2])
 
 
-def test_the_strokes_of_a_parked_workspace_are_not_rasterised_again(
-    kernels: Solver, monkeypatch: pytest.MonkeyPatch
+def test_many_strokes_of_a_parked_workspace_are_not_rasterised_again(
+    kernels: Solver, monkeypatch: pytest.MonkeyPatch, heavy: None
 ) -> None:
     """SPEC S501."""
     solver = one_arena(kernels)
@@ -162,7 +174,27 @@ def test_few_have_memory_and_the_least_recent_that_rests_gives_it(kernels: Solve
     running.close()
 
 
-def test_a_workspace_at_rest_that_was_given_out_keeps_the_constraints_alone(kernels: Solver) -> None:
+def test_a_workspace_at_rest_with_few_strokes_keeps_nothing(kernels: Solver) -> None:
+    """SPEC S581: what is rasterised again as quickly as it is copied is not copied, nor are kept sums of a stroke that
+    is drawn no longer; in the middle of a solve all is."""
+    solver = one_arena(kernels)
+    for _ in solver.steps(of_room("a"), SETTINGS, 3, basis=True):
+        pass
+    solver.solve(of_room("b"), SETTINGS, 3)
+    parked = next(w for w in on_device(solver) if w.is_parked and w.top == 3)
+    assert parked.bytes == 0
+    assert parked.packer.shared_ids(of_room("a")) == len(of_room("a")), "it is known again"
+    steps = solver.steps(of_room("a"), SETTINGS, 3)
+    while not isinstance(event := next(steps), Level) or event.level < 3:
+        pass
+    solver.solve(of_room("b"), SETTINGS, 3)
+    [amid] = [w for w in solver._pool._made if isinstance(w, DeviceWorkspace) and w.in_progress]
+    assert amid.is_parked
+    assert amid.bytes > 0.1 * grid.arena_bytes(3)
+    steps.close()
+
+
+def test_a_workspace_at_rest_that_was_given_out_keeps_the_constraints_alone(kernels: Solver, heavy: None) -> None:
     """SPEC S503: a quarter of what it solves with; in the middle of a solve, and with a ground of its own, half."""
     solver = one_arena(kernels)
     whole = grid.arena_bytes(3)

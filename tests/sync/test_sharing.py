@@ -212,7 +212,7 @@ def test_the_finest_preview_has_time_to_be_sent() -> None:
 def test_a_newer_job_shows_its_coarsest_level_while_a_pass_goes_on() -> None:
     """SPEC P92: once for each job, and not before the pass has shown its own; then its pass begins without it."""
     ground, _ = machine.next(Ground(2), does.Requested(Job(1, (), SETTINGS)), 0.0)
-    ground = replace(ground, shown=replace(ground.shown, finest_at=0.0, lead={0: 0.1, 1: 0.05}))
+    ground = replace(ground, shown=replace(ground.shown, finest_at=-1.0, lead={0: 0.1, 1: 0.05}))
     ground, _ = machine.next(ground, does.Turn(begins=True), 0.0)
     ground, _ = machine.next(ground, does.Opened(previews_early=True), 0.0)
     newer = Job(2, (), SETTINGS)
@@ -234,6 +234,34 @@ def test_a_newer_job_shows_its_coarsest_level_while_a_pass_goes_on() -> None:
     assert not states.early_preview_is_due(ground), "the pass has not gone on since the last"
     ground = replace(ground, early=Early(newer.number, made=True))
     assert states.early_preview_is_due(ground), "its coarsest level is out"
+
+
+def test_who_saw_a_finest_preview_a_moment_ago_waits_for_the_settling_of_others() -> None:
+    """SPEC S583: after PACE the pass comes before settling again; the coarsest preview always does."""
+    ground, _ = machine.next(Ground(2), does.Requested(Job(1, (), SETTINGS)), 0.0)
+    ground, _ = machine.next(ground, does.Turn(begins=True), 0.0)
+    ground = replace(ground, shown=replace(ground.shown, finest_at=0.0))
+    assert states.stage(ground, 0.01) == states.COARSE
+    ground, _ = machine.next(ground, Preview(0, FLAT), 0.01)
+    assert states.stage(ground, 0.9 * states.PACE) == states.SETTLE
+    assert states.stage(ground, 1.1 * states.PACE) == states.FINER
+
+
+def test_a_coarsest_preview_comes_before_others_that_had_less_time() -> None:
+    """SPEC S584: up to AHEAD_COARSE; where its last one took long it waits from AHEAD on."""
+    desk = Desk()
+    quiet, draws = desk.room(), desk.room()
+    desk.ask(quiet)
+    desk.until(quiet, "2")
+    desk.ask(draws)
+    had = desk.tally.rooms[draws]
+    amid, beyond, slow = 0.9 * schedule.AHEAD_COARSE, 1.1 * schedule.AHEAD_COARSE, 2 * schedule.QUICK
+    for seconds, took, first in ((amid, 0.01, draws), (beyond, 0.01, quiet), (amid, slow, quiet)):
+        time = replace(had.time, seconds=desk.tally.rooms[quiet].time.seconds + seconds, is_busy=True)
+        tally = desk.tally.noted(draws, time=time, coarsest_s=took)
+        homes = {**tally.homes, draws: replace(tally.homes[draws], time=time)}
+        tally = replace(tally, homes=homes)
+        assert schedule.choose(desk.grounds, desk.now, tally)[0] == first
 
 
 def test_a_pass_that_waits_for_its_turn_is_made_of_the_newest_strokes() -> None:

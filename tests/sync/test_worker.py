@@ -43,6 +43,7 @@ JOB = Job(1, (), SETTINGS, heights_rev=1, paint_rev=1, number=1)
 DRAWN = Job(2, (), SETTINGS, heights_rev=2, paint_rev=1, number=2)
 PAINTED = Job(3, (), SETTINGS, heights_rev=1, paint_rev=2, number=3)
 SNOW = ChannelLevel(0, FLAT, c.Channel.SNOW)
+AT_HAND = ChannelLevel(0, FLAT, c.Channel.SNOW, more=True)
 GROUND = BaseLevel(0, FLAT, c.Channel.BASE)
 SOON = Shown(lead={0: 0.1, 1: 0.05}, finest_at=NOW - 0.1)
 SETTLED = Shown(heights=((1, 0), TOP), clock=1)
@@ -103,6 +104,7 @@ TABLE: list[tuple[Ground, Event, State, tuple[Effect, ...]]] = [
     (ground(Previewing(JOB), shown=SOON), MIDDLE, Previewing(JOB, 1, {1: NOW}), shows(MIDDLE, shown=False)),
     (ground(Previewing(JOB)), FINEST, Settling(JOB), shows(FINEST, wait=0.020)),
     (ground(Previewing(JOB)), SNOW, Previewing(JOB), shows(SNOW)),
+    (ground(Previewing(JOB)), AT_HAND, Previewing(JOB), (*shows(AT_HAND), does.Step())),
     (ground(Previewing(JOB)), EXACT, Previewing(JOB), shows(EXACT)),
     # an early preview of a newer job
     (ground(EARLY, DRAWN), does.Turn(begins=False), EARLY, (does.PreviewEarly(DRAWN),)),

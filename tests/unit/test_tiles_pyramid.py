@@ -216,6 +216,43 @@ def test_clients_share_coded_tiles() -> None:
     assert server.cache.bytes < sum(len(p) for p in plans[:half])
 
 
+def test_earlier_states_of_levels_are_kept_only_while_somebody_holds_tiles_of_them() -> None:
+    """SPEC S588: a client that is behind is told of its tiles as a change; when all have the newest nothing is kept."""
+    from esker.tiles.delivery import ClientTiles
+
+    server = TileServer(SIZE_M, LEVELS)
+    quick, slow = ClientTiles(server), ClientTiles(server)
+
+    def put(clock: int) -> None:
+        for level in range(LEVELS + 1):
+            server.put_level(clock, level, heights(level, level) + np.float32(clock), True)
+
+    def served(client: ClientTiles) -> int:
+        size = 0
+        while (plan := client.plan()) is not None:
+            size += len(plan.encode())
+            client.commit(plan)
+        return size
+
+    def earlier() -> list[int]:
+        return [len(server.pyramid.states(level)) - 1 for level in range(LEVELS + 1)]
+
+    put(1)
+    whole = served(quick), served(slow)
+    assert server.forget_earlier([quick, slow]) == 0
+    put(2)
+    put(3)
+    served(quick)
+    assert earlier() == [2] * (LEVELS + 1)
+    assert server.forget_earlier([quick, slow]) == LEVELS + 1
+    assert earlier() == [1] * (LEVELS + 1), "the states that the slow one has"
+    assert served(slow) < 0.2 * whole[1], "told as a change"
+    server.forget_earlier([quick, slow])
+    assert earlier() == [0] * (LEVELS + 1)
+    put(4)
+    assert server.forget_earlier([]) == LEVELS + 1, "nobody is there"
+
+
 def test_a_pyramid_knows_where_its_ground_last_changed() -> None:
     pyramid = Pyramid(SIZE_M, 2)
     for level in range(3):

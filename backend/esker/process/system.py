@@ -47,6 +47,8 @@ LOCKED_BYTE: Final = 1 << 30
 """Byte that is locked on Windows. It lies beyond what the file holds, since nobody else can read a locked byte
 there."""
 PR_SET_PDEATHSIG: Final = 1
+M_ARENA_MAX: Final = -8
+HEAPS: Final = 2
 ORPHANED: Final = 9
 """Exit status of a child whose parent has ended."""
 TYPES: Final = {
@@ -132,6 +134,14 @@ def memory_bytes() -> int:
 def resident_bytes() -> int:
     """The memory that this process takes."""
     return int(psutil.Process().memory_info().rss)
+
+
+def share_heaps() -> bool:
+    """Has all threads take memory from two heaps, where the GNU C library would give each of them one of its own: what
+    one thread frees serves the others. Returns whether the system has such heaps. Call it before there are threads."""
+    with suppress(OSError, AttributeError, TypeError):
+        return bool(ctypes.CDLL(None).mallopt(M_ARENA_MAX, HEAPS))
+    return False
 
 
 def give_memory_back() -> None:

@@ -16,6 +16,7 @@ from esker.flow.reaches import UNITS_PER_CELL, Reaches, find_reaches
 from esker.flow.rivers import water_of
 from esker.process import priority
 from esker.session.ground.tilethread import Lane, TileThread
+from esker.session.rivers import Pace
 from esker.synthesis.detailed import DetailedTerrain, site_of
 from esker.tiles.channels import values
 from esker.tiles.codec.rivers import RiverLine, write_rivers
@@ -63,6 +64,7 @@ class Hydrology:
     stranger opened one is looked at before the next home has its own. Safe from any thread."""
 
     def __init__(self) -> None:
+        self.pace = Pace()
         self._thread = TileThread("rivers", begin=priority.yield_to_others)
 
     def lane(self) -> Lane:

@@ -422,6 +422,7 @@ def _config(app: Any, exempt: Callable[[str], bool], context: ssl.SSLContext | N
     config.load()
     config.ssl = context
     files = system.raise_open_files()
+    system.share_heaps()
     bounded(config, Connections(files - max(files // 4, min(OWN_FILES, files // 2)), exempt))
     return config
 

@@ -25,8 +25,16 @@ REST_LEVEL: Final = 4
 """The level whose samples count at rest, or the finest that is solved as a whole."""
 EVERY_SECONDS: Final = 0.25
 """While somebody draws they are looked for at most this often."""
+SHARE: Final = 4
+"""Searches while somebody draws take one part of so many of the time, those of all rooms together."""
 REST_SECONDS: Final = 0.6
 """Ground that has been final for so long is at rest: small terrains settle between two strokes."""
+REST_SHARE: Final = 6
+"""Searches at rest, a second each, take one part of so many of the time in which anybody on the server draws."""
+GATE_SECONDS: Final = 0.1
+"""Whoever stands in line looks so often whether it is the turn."""
+QUIET_SECONDS: Final = 2.0
+"""After so long without a search for somebody who draws nobody draws."""
 FOLLOWED: Final = ("rivers", "sea_level_m", "seed", "look", "detail", "rule", "place")
 """Settings that rivers follow from beside the ground. Width follows from ``wetness`` where they are drawn."""
 
@@ -58,6 +66,71 @@ class Wanted:
 
     preview: bool = False
     rest_at: float | None = None
+
+
+class Gate:
+    """Lets the searches of all rooms of a server through one after another, with a pause behind each that is as long as
+    the search times ``share`` less one. Whoever has waited longest is next. Call it from the event loop's thread."""
+
+    def __init__(self, share: int) -> None:
+        self._share = share
+        self._line: dict[object, float] = {}
+        """Who waits, and when each comes back to ask."""
+        self._inside: object = None
+        self._since = 0.0
+        self._until = float("-inf")
+
+    def wait(self, who: object, now: float, pause_until: float = float("inf")) -> float:
+        """Returns 0 where a room may begin, which ``enter`` says then; else for how many seconds it has to wait at
+        least. It stands in line from now on. ``pause_until``: when the pause ends however long it is."""
+        left = min(self._until, pause_until) - now
+        if self._inside is not None or left > 0:
+            wait = GATE_SECONDS if self._inside is not None else left
+        else:
+            gone = [other for other, due in self._line.items() if due < now - GATE_SECONDS and other is not who]
+            for other in gone:  # it did not come back: nothing is wanted there any more
+                del self._line[other]
+            wait = 0.0 if next(iter(self._line), who) is who else GATE_SECONDS
+        self._line[who] = now + wait
+        return wait
+
+    def enter(self, who: object, now: float) -> None:
+        """A room begins."""
+        self._line.pop(who, None)
+        self._inside, self._since = who, now
+
+    def leave(self, who: object, now: float) -> None:
+        """A room has ended, or waits no more."""
+        self._line.pop(who, None)
+        if self._inside is who:
+            self._inside, self._until = None, now + (now - self._since) * (self._share - 1)
+
+
+class Pace:
+    """How often rivers are looked for on a server: while somebody draws, and at rest."""
+
+    def __init__(self) -> None:
+        self.previews, self.rests = Gate(SHARE), Gate(REST_SHARE)
+        self._drawn = float("-inf")
+
+    def wait(self, who: object, look: Look, now: float) -> float:
+        """See ``Gate.wait``. Where nobody draws, searches at rest follow each other without a pause."""
+        if look.settled:
+            return self.rests.wait(who, now, self._drawn + QUIET_SECONDS)
+        return self.previews.wait(who, now)
+
+    def enter(self, who: object, look: Look, now: float) -> None:
+        """A search begins."""
+        if look.settled:
+            self.rests.enter(who, now)
+        else:
+            self._drawn = now
+            self.previews.enter(who, now)
+
+    def leave(self, who: object, now: float) -> None:
+        """A search has ended, or none is to be made."""
+        self.rests.leave(who, now)
+        self.previews.leave(who, now)
 
 
 def next_look(wanted: Wanted, busy: bool, now: float, last: float) -> tuple[Look | None, float | None]:
@@ -129,19 +202,24 @@ class Rivers:
     def close(self) -> None:
         """Looks for no more."""
         self._closed = True
+        self._ended()
         if self._timer is not None:
             self._timer.cancel()
 
     def _go_on(self) -> None:
         if self._hydrology is None or self._closed:
             return
-        look, wait = next_look(self._wanted, self._busy, self._loop.time(), self._last)
+        now, pace = self._loop.time(), self._hydrology.pace
+        look, wait = next_look(self._wanted, self._busy, now, self._last)
+        if look is not None and (later := pace.wait(self, look, now)) > 0:
+            look, wait = None, later
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
         if look is not None:
             self._wanted = Wanted() if look.settled else replace(self._wanted, preview=False)
-            self._busy, self._last, self._overtaken = True, self._loop.time(), False
+            self._busy, self._last, self._overtaken = True, now, False
+            pace.enter(self, look, now)
             self._ground.snapshot(look.level, lambda found: self._read(found, look.settled))
         elif wait is not None:
             self._timer = self._loop.call_later(wait, self._go_on)
@@ -150,7 +228,7 @@ class Rivers:
         document = self._document
         hydrology, lane = None if self._closed else self._hydrology, self._lane
         if found is None or document is None or hydrology is None or lane is None or not document.settings.rivers:
-            self._busy = False
+            self._ended()
             self._go_on()
             return
         try:
@@ -165,6 +243,7 @@ class Rivers:
                 lambda: not self._closed and not (settled and self._overtaken),
             )
         except RuntimeError:  # the server is stopping
+            self._ended()
             return
         future.add_done_callback(lambda done: self._call(self._found, done))
 
@@ -172,8 +251,14 @@ class Rivers:
         if not self._loop.is_closed():
             self._loop.call_soon_threadsafe(callback, *args)
 
-    def _found(self, future: Future[bytes | None]) -> None:
+    def _ended(self) -> None:
+        """No search is on its way any more."""
+        if self._hydrology is not None:
+            self._hydrology.pace.leave(self, self._loop.time())
         self._busy = False
+
+    def _found(self, future: Future[bytes | None]) -> None:
+        self._ended()
         if future.cancelled() or self._closed:
             return
         error = future.exception()

@@ -382,8 +382,10 @@ class Solver:
                 continue
             channel, levels = found
             for coarser, samples in enumerate(levels):
-                yield ChannelLevel(coarser, samples, channel)
-            yield PAUSE
+                yield ChannelLevel(coarser, samples, channel, more=True)
+            if any(layer.channel == channel for layer in asked):  # nothing was computed for the others
+                yield PAUSE
+        yield PAUSE
 
     def _far_field(self, top: int) -> FarField:
         level = channel_level(top)
@@ -400,7 +402,7 @@ class Solver:
                 break
             yield PAUSE
         for level, samples in enumerate(levels):
-            yield ChannelLevel(level, samples, Channel.FAR)
+            yield ChannelLevel(level, samples, Channel.FAR, more=True)
         yield PAUSE
 
 

@@ -183,6 +183,19 @@ class TileServer:
         quanta = offset.samples if base is None else total(offset.samples, base.samples)
         return np.asarray(quanta * np.float32(grid.quantum(level, self.pyramid.size_m)), dtype=np.float32)
 
+    def forget_earlier(self, clients: Sequence[ClientTiles]) -> int:
+        """Forgets the states of levels from which no client's tiles can be told as a change; returns how many. A state
+        of the finest level is 4 MiB, and most clients have the newest a moment after it came."""
+        count = 0
+        for channel, pyramid in ((Channel.HEIGHT, self.pyramid), (Channel.BASE, self.base), *self.channels.items()):
+            ledgers = [client.ledger(channel) for client in clients]
+            count += pyramid.forget_earlier(
+                lambda level, versions, newer, ledgers=ledgers: any(  # type: ignore[misc]
+                    ledger.holds(level, versions, newer) for ledger in ledgers
+                )
+            )
+        return count
+
     def requests(self, clients: Sequence[ClientTiles]) -> tuple[tuple[TileKey, ...], int]:
         """The tiles to refine next for all clients together, coarse before fine, then by screen error.
 
@@ -237,6 +250,12 @@ class ClientTiles:
         if view != self._view:
             self._view = view
             self._view_changed = True
+
+    def ledger(self, channel: Channel) -> Ledger:
+        """Returns what the client holds of the levels of a channel that are solved as a whole."""
+        if channel == Channel.HEIGHT:
+            return self._heights
+        return self._base if channel == Channel.BASE else self._channels[channel]
 
     def held(self, channel: Channel = Channel.HEIGHT) -> dict[TileKey, int]:
         """Returns the versions that the client holds once it has applied every committed frame."""

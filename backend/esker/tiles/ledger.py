@@ -69,6 +69,18 @@ class Ledger:
             for y, x in np.argwhere(versions > 0)
         }
 
+    def holds(self, level: int, versions: Counts, newer: Counts) -> bool:
+        """Returns whether the client has a tile of ``level``, or the children of one, as it was with ``versions``
+        and is not with the ``newer`` ones (``Pyramid.forget_earlier``)."""
+        other = versions != newer
+        if (other & (self.versions[level] == versions)).any():
+            return True
+        if level == self.levels:
+            return False
+        under = (other.repeat(2, axis=0).repeat(2, axis=1), versions.repeat(2, axis=0).repeat(2, axis=1))
+        children = (self.versions[level + 1] > 0) & (self._bases[level + 1] == under[1])
+        return bool((under[0] & children).any())
+
     def newest(self, key: TileKey) -> TileState | None:
         """Returns the tile as the client holds it, when that is the newest there is."""
         level = self._pyramid.level(key.level)

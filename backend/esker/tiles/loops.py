@@ -19,14 +19,14 @@ Floats = NDArray[np.float32]
 
 
 @kernel
-def steadied(heights: Floats, before: Floats, correction: Floats, out: Floats) -> None:
+def steadied(heights: Floats, settled: Floats, correction: Floats, out: Floats) -> None:
     """Computes ``stabiliser.steadied`` of whole levels, (n, n) float32 each."""
     rows, cols = heights.shape
     for r in range(rows):
         for k in range(cols):
             h = heights[r, k]
             c = correction[r, k]
-            left = max(abs(c) - abs(h - before[r, k]), np.float32(0))
+            left = max(abs(c) - abs(h - (settled[r, k] - c)), np.float32(0))
             out[r, k] = np.copysign(left, c) + h
 
 

@@ -7,6 +7,7 @@ int32 in quanta ``q_l = s_l / 256``, ``[row, col]``, row 0 south.
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import ClassVar, Final
@@ -187,6 +188,26 @@ class Pyramid:
         """Returns the level as it is and as it was before the last few changes, newest first."""
         newest = self._levels[level]
         return [] if newest is None else [newest, *self._earlier[level]]
+
+    def forget_earlier(self, is_held: Callable[[int, Counts, Counts], bool]) -> int:
+        """Forgets earlier states of levels that serve nobody; returns how many.
+
+        ``is_held(level, versions, newer)``: whether somebody holds a tile of a state with these ``versions`` that no
+        state with the ``newer`` ones has.
+        """
+        count = 0
+        for level, earlier in enumerate(self._earlier):
+            newest = self._levels[level]
+            if newest is None or not earlier:
+                continue
+            kept, newer = [], newest.versions
+            for state in earlier:
+                if is_held(level, state.versions, newer):
+                    kept.append(state)
+                    newer = state.versions
+            count += len(earlier) - len(kept)
+            self._earlier[level] = deque(kept, maxlen=earlier.maxlen)
+        return count
 
     def level(self, level: int) -> Level | None:
         """Returns the level as it is now, None before it first came."""

@@ -8,7 +8,8 @@ its settled heights ``s0``, a new preview ``p1`` is shown as
     p1 + sign(b) * max(|b| - |p1 - p0|, 0),    b = s0 - p0
 
 which is the settled ground where the preview has not changed, and the new preview where it changed by more than the
-correction is worth. The rule is local to a sample, so neighbouring tiles agree on shared edges.
+correction is worth. The rule is local to a sample, so neighbouring tiles agree on shared edges. Of the three ``s0``,
+which others hold too, and ``b`` are kept; ``p0`` is their difference, to a rounding.
 """
 
 from __future__ import annotations
@@ -26,18 +27,25 @@ class Steadier:
 
     def __init__(self) -> None:
         self._preview: tuple[int, Heights] | None = None
+        """The last preview and its clock, until its settled heights come."""
         self._reference: tuple[Heights, Heights] | None = None
+        """The settled heights, and what they differ by from their preview."""
+        self._settled = -1
+        """The clock of the reference."""
 
     def settled(self, clock: int, heights: Heights) -> None:
         """Says that the level is final for ``clock``.
 
         Its preview, if it was one of the same clock, becomes the reference.
         """
-        if self._preview is None or self._preview[0] != clock:
+        if self._preview is not None and self._preview[0] == clock:
+            self._reference = (heights, heights - self._preview[1])
+        elif self._reference is not None and self._settled == clock:
+            before, correction = self._reference
+            self._reference = (heights, heights - (before - correction))
+        else:
             self._reference = None
-            return
-        preview = self._preview[1]
-        self._reference = (preview, heights - preview)
+        self._preview, self._settled = None, clock
 
     def note(self, clock: int, heights: Heights) -> None:
         """Remembers a preview that is not shown: the settled heights of its clock will be compared with it."""
@@ -58,9 +66,9 @@ class Steadier:
         return out
 
 
-def steadied(heights: Heights, before: Heights, correction: Heights) -> Heights:
-    """Returns what to show for a preview: the rule above for ``p1``, ``p0`` and ``b``. Twin of ``loops.steadied``."""
-    moved = heights - before
+def steadied(heights: Heights, settled: Heights, correction: Heights) -> Heights:
+    """Returns what to show for a preview: the rule above for ``p1``, ``s0`` and ``b``. Twin of ``loops.steadied``."""
+    moved = heights - (settled - correction)
     np.abs(moved, out=moved)
     left = np.abs(correction)
     left -= moved

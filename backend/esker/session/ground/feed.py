@@ -45,6 +45,8 @@ BATCH_TILES: Final = 16
 """A batch of so many refined tiles is taken without waiting for more."""
 BATCH_SHARE: Final = 0.25
 """Taking tiles, and working out the requests of a room full of people, takes at most this share of the time."""
+FORGET_SECONDS: Final = 1.0
+"""Earlier states of levels are let go so long after something was taken or sent: by then clients have the newest."""
 REQUESTS_SECONDS: Final = 0.05
 """While cameras move, requests are worked out at most this often."""
 
@@ -114,6 +116,7 @@ class TileFeed:
         self._rest_until = 0.0
         """Time of the loop from which on the next batch may be taken."""
         self._requests_timer: asyncio.TimerHandle | None = None
+        self._forget_timer: asyncio.TimerHandle | None = None
 
     def add(self, outbox: FrameOutlet, top: int | None = None) -> Stream:
         """A new client; or, with ``top``, somebody who watches the levels up to it."""
@@ -319,6 +322,12 @@ class TileFeed:
             self._requests = requests
         self._call(self._on_requests, count, look)
 
+    def _forget_earlier(self) -> None:
+        try:
+            self._server.forget_earlier(list(self._clients.values()))
+        except Exception:
+            log.exception("earlier states of levels could not be let go")
+
     def _forget(self, stream: Stream) -> None:
         if self._clients.pop(stream, None) is not None:
             self._publish(False)
@@ -357,7 +366,16 @@ class TileFeed:
 
     def _level_taken(self, clock: int, level: int, settled: bool) -> None:
         self._wake_all()
+        self._forget_soon()
         self._on_level(clock, level, settled)
+
+    def _forget_soon(self) -> None:
+        if self._forget_timer is None:
+            self._forget_timer = self._loop.call_later(FORGET_SECONDS, self._forget_due)
+
+    def _forget_due(self) -> None:
+        self._forget_timer = None
+        self._submit(self._forget_earlier)
 
     def _wake_all(self) -> None:
         for stream in self._streams:
@@ -401,6 +419,8 @@ class TileFeed:
     def _all_made(self, stream: Stream, some: bool) -> None:
         stream.busy = False
         stream.hungry |= some
+        if some:
+            self._forget_soon()
         if not stream.hungry and stream.rivers is not None:
             frame, stream.rivers = stream.rivers, None
             self._frame_made(stream, frame)

@@ -267,7 +267,7 @@ def _solved(ground: Ground, event: Event, now: float) -> Result:
             return ground, (does.Deliver(job, event), does.GiveBack())
         case ChannelLevel():
             after, effects = _channel(ground, job, event)
-            return after, (*effects, does.GiveBack())
+            return after, (*effects, does.GiveBack(), *((does.Step(),) if event.more else ()))
         case Settled():
             return ground, (does.Deliver(job, event), does.GiveBack())
         case Preview(level):

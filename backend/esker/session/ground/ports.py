@@ -74,6 +74,8 @@ class TileServer(Protocol):
 
     def requests(self, clients: Sequence[Any]) -> tuple[tuple[TileKey, ...], int]: ...
 
+    def forget_earlier(self, clients: Sequence[Any]) -> int: ...
+
 
 class Tiles(Protocol):
     """Makes the two above. ``watcher``: a client that is sent all levels up to ``top`` and nothing else."""
@@ -86,7 +88,10 @@ class Tiles(Protocol):
 
 
 class Hydrology(Protocol):
-    """Finds rivers, in a thread of its own (``server.hydrology``)."""
+    """Finds rivers, in a thread of its own (``server.hydrology``). pace: see ``session.rivers.Pace``."""
+
+    @property
+    def pace(self) -> Any: ...
 
     def lane(self) -> Lane:
         """Returns a place for the searches of one room; homes have turns."""

@@ -3,11 +3,12 @@ refinement, in this order; in turn within each, a slice at a time. Finer preview
 so is settling, the smallest terrains first: interleaved, all of them would come late.
 
 That order is among rooms that have had about as much time as each other. A room that has had ``AHEAD`` more than one
-that waits comes behind it, whatever it waits for: however much work a room makes, it takes its share and no more. Idle
-time is not saved up: a room that comes back begins level with those that are busy. Rooms of one address share what one
-or two rooms have (``tally.py``).
+that waits comes behind it, for a coarsest preview ``AHEAD_COARSE`` more: however much work a room makes, it takes its
+share and no more. Idle time is not saved up: a room that comes back begins level with those that are busy. Rooms of one
+address share what one or two rooms have (``tally.py``).
 
-A lower class that has waited for ``PATIENCE`` gets a slice all the same, so nothing starves. A solve in progress holds
+A lower class that has waited for ``PATIENCE`` gets a slice all the same, the solve that was begun first, so nothing
+starves. A solve in progress holds
 memory, so only so many may be in progress as fit the budget: a room that waits for its coarse preview ends the settling
 solve that began last, which starts again later.
 
@@ -28,8 +29,13 @@ from esker.session.ground import states
 from esker.session.ground.states import COARSE, FINER, REFINE, SETTLE, Ground, Previewing
 from esker.session.ground.tally import PATIENCE, Room, Tally, Used
 
-AHEAD: Final = 0.500
-"""Seconds of the solver by which a room may be ahead of one that waits: a few passes of an ordinary terrain."""
+AHEAD: Final = 1.0
+"""Seconds of the solver by which a room may be ahead of one that waits: what a stroke of some seconds takes. Whoever
+was held back behind a shorter stroke kept the memory of a solve meanwhile."""
+AHEAD_COARSE: Final = 2.0
+"""The same for coarsest previews that take no longer than ``QUICK``: a stroke is seen as it is drawn even where thirty
+rooms wait to settle. Who changes all the time comes to this bound once, and is held to it."""
+QUICK: Final = 0.05
 BUDGET, BUDGET_SHARE = 1 << 30, 12
 """Bytes for solves in progress, of all rooms together."""
 
@@ -53,14 +59,40 @@ def choose(grounds: Grounds[Room], now: float, tally: Tally[Room]) -> tuple[Room
     tally = tally.levelled(waiting)
     if not staged:
         return None, tally
-    rooms, level = tally.rooms, tally.within(waiting, AHEAD)
-    staged = [(stage, room) for stage, room in staged if room in level]  # who has had more than its share waits
+    rooms = tally.rooms
+    level, nearly = tally.within(waiting, AHEAD), tally.within(waiting, AHEAD_COARSE)
+    staged = [
+        (stage, room)
+        for stage, room in staged
+        if room in (nearly if _is_quick(stage, grounds[room], rooms[room]) else level)
+    ]
     stage, best = min(staged, key=lambda s: (s[0], *_order(s[0], grounds[s[1]], rooms[s[1]])))
-    late = [room for other, room in staged if other > stage and now - rooms[room].ran_at > PATIENCE]
+    late = [(other, room) for other, room in staged if other > stage and now - rooms[room].ran_at > PATIENCE]
     if not late or now <= tally.favour.after:
         return best, replace(tally, favour=replace(tally.favour, room=None))
-    best = min(late, key=lambda room: rooms[room].turn)
+    best = _favoured(late, grounds, rooms)
     return best, replace(tally, favour=replace(tally.favour, room=best))
+
+
+def _is_quick(stage: int, ground: Ground, had: Used) -> bool:
+    """Returns whether the room waits for a coarsest preview, and its last one was made in a moment."""
+    return _is_coarsest(stage, ground) and had.coarsest_s <= QUICK
+
+
+def _is_coarsest(stage: int | None, ground: Ground) -> bool:
+    """Returns whether the room waits for a coarsest preview: channels have that class too, and may take long."""
+    return stage == COARSE and not ground.channels.making and not states.starts_channels_beside(ground)
+
+
+def _favoured(late: Sequence[tuple[int, Room]], grounds: Grounds[Room], rooms: Mapping[Room, Used]) -> Room:
+    """Returns the room that has a slice out of turn: of the class and the size of the one that has had none for
+    longest, the solve that was begun first. Slices that went round would finish none of them, and each would have its
+    memory restored for every slice."""
+    stage, longest = min(late, key=lambda found: rooms[found[1]].turn)
+    if stage not in (FINER, SETTLE):
+        return longest
+    like = [room for other, room in late if other == stage and grounds[room].top == grounds[longest].top]
+    return min(like, key=lambda room: rooms[room].began)
 
 
 def begin(
@@ -72,7 +104,8 @@ def begin(
     """
     ground = grounds[room]
     tally = replace(tally, turns=tally.turns + 1)
-    tally = tally.noted(room, turn=tally.turns, ran_at=now)
+    is_coarsest = _is_coarsest(states.stage(ground, now), ground)
+    tally = tally.noted(room, turn=tally.turns, ran_at=now, is_coarsest=is_coarsest)
     may = not ground.channels.making or _may_begin(room, COARSE, grounds, now, tally, _solving(grounds))
     if not states.starts(ground, now) or not may:
         return False, (), tally

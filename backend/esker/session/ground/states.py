@@ -15,6 +15,9 @@ from esker.session.ground.jobs import Attempt, Job
 
 FINEST_WITHIN: Final = 0.150
 """Drawing without a pause must not starve the fine levels: a preview pass goes on whose finest level is this old."""
+PACE: Final = 0.500
+"""Who saw a finest preview within this time is shown the next one behind the settling of others: where many rooms draw,
+passes would fill all time, and rooms amid a solve, which hold memory, would pile up."""
 FINISH: Final = 0.300
 """A pass that should end within this time is not left, and early previews of newer jobs are made during it."""
 
@@ -241,14 +244,16 @@ def stage(ground: Ground, now: float) -> int | None:
     if ground.channels.making or starts_channels_beside(ground):
         return COARSE
     if is_overtaken(ground):
-        return FINER
+        return SETTLE if now - ground.shown.finest_at < PACE else FINER
     if wanted is not None and starts(ground, now):
         return SETTLE if wanted.job.number == ground.shown.previewed else COARSE
     if early_preview_is_due(ground):
         return COARSE
     match state:
+        case Previewing(reached=-1):
+            return COARSE
         case Previewing():
-            return FINER if state.reached >= 0 else COARSE
+            return SETTLE if now - ground.shown.finest_at < PACE else FINER
         case Settling() | ChannelsOnly():
             return SETTLE
         case Refining():

@@ -39,8 +39,9 @@ class Used:
 
     turn: number of its last slice, where slices of all rooms are counted. began: number of the slice at which its solve
     began. ran_at: when it had its last slice, or began to wait. is_spared: its solve has made room for another one
-    already, and is not made to a second time. home: for whom its work is done; None: for this room alone. time: is
-    compared with that of others of its home.
+    already, and is not made to a second time. home: for whom its work is done; None: for this room alone. is_coarsest:
+    whether its last slice was for a coarsest preview; coarsest_s: what the last such one took. time: is compared with
+    that of others of its home.
     """
 
     turn: int = 0
@@ -48,6 +49,8 @@ class Used:
     ran_at: float = 0.0
     is_spared: bool = False
     home: Hashable = None
+    is_coarsest: bool = False
+    coarsest_s: float = 0.0
     time: Time = field(default_factory=Time)
 
 
@@ -130,7 +133,9 @@ class Tally(Generic[Room]):
         home = self.homes[key]
         busy = sum(other.time.is_busy and self.home_of(name) == key for name, other in self.rooms.items())
         paid = home.time.seconds + took / min(max(busy, 1), HOME_ROOMS)
-        tally = self.noted(room, time=replace(had.time, seconds=had.time.seconds + took), ran_at=now)
+        coarsest_s = took if had.is_coarsest else had.coarsest_s
+        time = replace(had.time, seconds=had.time.seconds + took)
+        tally = self.noted(room, time=time, ran_at=now, coarsest_s=coarsest_s)
         tally = replace(tally, homes={**tally.homes, key: replace(home, time=replace(home.time, seconds=paid))})
         if room is not self.favour.room:
             return tally

@@ -144,6 +144,15 @@ class Packer:
         self.order = list(meeting)
         return _tables(self.level, settings, list(meeting.values()), box), window
 
+    def is_light(self, most: float) -> bool:
+        """Returns whether a bin of the last set has ``most`` strokes on average, or fewer."""
+        left = most * bins(grid.samples(self.level)) ** 2
+        for _, packed in self._packed.values():
+            left -= 0 if packed is None else int((packed.window.spans[:, 1] - packed.window.spans[:, 0]).sum())
+            if left < 0:
+                return False
+        return True
+
     def unrastered(self) -> None:
         """Says that packed strokes are in no raster any more: the next window is all of them."""
         self._rastered = False

@@ -17,7 +17,7 @@ from esker.solve.constraints.constraints import Packer
 from esker.solve.constraints.kept_sums import KeptSums
 from esker.solve.constraints.tables import RASTER_BINS, Tables, Window
 from esker.solve.constraints.tables import bins as bins_of
-from esker.solve.opencl import raster
+from esker.solve.opencl import parking, raster
 from esker.solve.opencl.fields import Shape, SystemMemory, rectangle
 from esker.solve.opencl.parking import Parked, Saved, Spares, copied, restored
 from esker.solve.opencl.queue import Queue
@@ -150,7 +150,13 @@ class DeviceWorkspace(ABC, Generic[S]):
         saved, queue = self._saved(), self._queue
         self.gradient.flush()
         self.height.flush()
-        parked = Parked(copied(queue, saved.constraints, spares))
+        if not self.in_progress and self._kept is not None:
+            self._kept.clear()  # a stroke is drawn no longer
+        if not self.in_progress and self.packer.is_light(parking.LIGHT):
+            self.packer.unrastered()
+            parked = Parked([])
+        else:
+            parked = Parked(copied(queue, saved.constraints, spares))
         if self._at_rest is not None:
             parked.at_rest = self._at_rest
         elif self.in_progress or self.solved_for is not None:
@@ -168,10 +174,9 @@ class DeviceWorkspace(ABC, Generic[S]):
         self._resident(arena)
         self.gradient.borrow(arena.gradient)
         self.height.borrow(arena.height)
-        if not parked.constraints:
-            return
         saved = self._saved()
-        restored(self._queue, parked.constraints, saved.constraints)
+        if parked.constraints:
+            restored(self._queue, parked.constraints, saved.constraints)
         if parked.at_rest is not None:
             heights, gradient = parked.at_rest
             self.height.put("u", self.top, heights[None])
@@ -179,8 +184,9 @@ class DeviceWorkspace(ABC, Generic[S]):
         for copies, buffers in ((parked.ground, saved.ground), (parked.progress, saved.progress)):
             if copies is not None:
                 restored(self._queue, copies, buffers)
-        for system in (self.gradient, self.height):
-            system.coarsen(self._screening)
+        if parked.constraints:
+            for system in (self.gradient, self.height):
+                system.coarsen(self._screening)
         if self.in_progress:
             self.guide(self.top)
         parked.released(spares)

@@ -21,6 +21,11 @@ SPARE_BYTES: Final = 64 << 20
 for every four kilobytes, as much time as the copy itself."""
 
 
+LIGHT: Final = 4.0
+"""Strokes of a bin, on average, up to which they are rasterised again rather than their constraints copied: it takes
+about as long, and holds nothing."""
+
+
 @dataclass(frozen=True)
 class Saved:
     """Buffers by name that a workspace saves, of its kind always the same ones in the same order.
@@ -36,7 +41,8 @@ class Saved:
 
 @dataclass
 class Parked:
-    """The copies. ground and progress are None where a workspace had none that counts, or where ``at_rest`` has it.
+    """The copies. constraints are none where they are to be made again; ground and progress are None where a workspace
+    had none that counts, or where ``at_rest`` has it.
 
     at_rest: heights and gradient of the finest level as they were given out, which other holders share.
     """
