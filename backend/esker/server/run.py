@@ -356,6 +356,7 @@ def serve(settings: Settings, door: FrontDoor, room: WaitingRoom, stopping: Stop
         room.tell(step.said, step.done, step.of)
 
     stopping.check()
+    system.share_heaps()
     assembly = Assembly(settings, door=door, tell=tell)
     try:
         server = assembly.server()
@@ -422,7 +423,6 @@ def _config(app: Any, exempt: Callable[[str], bool], context: ssl.SSLContext | N
     config.load()
     config.ssl = context
     files = system.raise_open_files()
-    system.share_heaps()
     bounded(config, Connections(files - max(files // 4, min(OWN_FILES, files // 2)), exempt))
     return config
 
