@@ -257,8 +257,8 @@ def test_a_coarsest_preview_comes_before_others_that_had_less_time() -> None:
     had = desk.tally.rooms[draws]
     amid, beyond, slow = 0.9 * schedule.AHEAD_COARSE, 1.1 * schedule.AHEAD_COARSE, 2 * schedule.QUICK
     for seconds, took, first in ((amid, 0.01, draws), (beyond, 0.01, quiet), (amid, slow, quiet)):
-        time = replace(had.time, seconds=desk.tally.rooms[quiet].time.seconds + seconds, is_busy=True)
-        tally = desk.tally.noted(draws, time=time, coarsest_s=took)
+        time = replace(had.time, seconds=desk.tally.rooms[quiet].time.seconds + seconds, is_busy=True, coarsest_s=took)
+        tally = desk.tally.noted(draws, time=time)
         homes = {**tally.homes, draws: replace(tally.homes[draws], time=time)}
         tally = replace(tally, homes=homes)
         assert schedule.choose(desk.grounds, desk.now, tally)[0] == first

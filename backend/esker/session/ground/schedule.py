@@ -76,7 +76,7 @@ def choose(grounds: Grounds[Room], now: float, tally: Tally[Room]) -> tuple[Room
 
 def _is_quick(stage: int, ground: Ground, had: Used) -> bool:
     """Returns whether the room waits for a coarsest preview, and its last one was made in a moment."""
-    return _is_coarsest(stage, ground) and had.coarsest_s <= QUICK
+    return _is_coarsest(stage, ground) and had.time.coarsest_s <= QUICK
 
 
 def _is_coarsest(stage: int | None, ground: Ground) -> bool:
@@ -104,8 +104,8 @@ def begin(
     """
     ground = grounds[room]
     tally = replace(tally, turns=tally.turns + 1)
-    is_coarsest = _is_coarsest(states.stage(ground, now), ground)
-    tally = tally.noted(room, turn=tally.turns, ran_at=now, is_coarsest=is_coarsest)
+    time = replace(tally.rooms[room].time, is_coarsest=_is_coarsest(states.stage(ground, now), ground))
+    tally = tally.noted(room, turn=tally.turns, ran_at=now, time=time)
     may = not ground.channels.making or _may_begin(room, COARSE, grounds, now, tally, _solving(grounds))
     if not states.starts(ground, now) or not may:
         return False, (), tally

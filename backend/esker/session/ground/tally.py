@@ -23,14 +23,23 @@ Room = TypeVar("Room", bound=Hashable)
 @dataclass(frozen=True)
 class Time:
     """Time that was used. seconds: how long, when it is compared with that of others that are busy. is_busy: whether
-    there was something to do when the tally was last levelled."""
+    there was something to do when the tally was last levelled. is_coarsest: whether the last slice was for a coarsest
+    preview; coarsest_s: what the last such one took."""
 
     seconds: float = 0.0
     is_busy: bool = False
+    is_coarsest: bool = False
+    coarsest_s: float = 0.0
 
     def levelled(self, is_busy: bool, least: float) -> Time:
         """The time of who is busy, or is not: who comes begins with the least of those who were."""
-        return Time(max(self.seconds, least) if is_busy and not self.is_busy else self.seconds, is_busy)
+        comes = is_busy and not self.is_busy
+        return replace(self, seconds=max(self.seconds, least) if comes else self.seconds, is_busy=is_busy)
+
+    def ended(self, took: float) -> Time:
+        """The time after a slice."""
+        coarsest_s = took if self.is_coarsest else self.coarsest_s
+        return replace(self, seconds=self.seconds + took, coarsest_s=coarsest_s)
 
 
 @dataclass(frozen=True)
@@ -39,9 +48,8 @@ class Used:
 
     turn: number of its last slice, where slices of all rooms are counted. began: number of the slice at which its solve
     began. ran_at: when it had its last slice, or began to wait. is_spared: its solve has made room for another one
-    already, and is not made to a second time. home: for whom its work is done; None: for this room alone. is_coarsest:
-    whether its last slice was for a coarsest preview; coarsest_s: what the last such one took. time: is compared with
-    that of others of its home.
+    already, and is not made to a second time. home: for whom its work is done; None: for this room alone. time: is
+    compared with that of others of its home.
     """
 
     turn: int = 0
@@ -49,8 +57,6 @@ class Used:
     ran_at: float = 0.0
     is_spared: bool = False
     home: Hashable = None
-    is_coarsest: bool = False
-    coarsest_s: float = 0.0
     time: Time = field(default_factory=Time)
 
 
@@ -133,9 +139,7 @@ class Tally(Generic[Room]):
         home = self.homes[key]
         busy = sum(other.time.is_busy and self.home_of(name) == key for name, other in self.rooms.items())
         paid = home.time.seconds + took / min(max(busy, 1), HOME_ROOMS)
-        coarsest_s = took if had.is_coarsest else had.coarsest_s
-        time = replace(had.time, seconds=had.time.seconds + took)
-        tally = self.noted(room, time=time, ran_at=now, coarsest_s=coarsest_s)
+        tally = self.noted(room, time=had.time.ended(took), ran_at=now)
         tally = replace(tally, homes={**tally.homes, key: replace(home, time=replace(home.time, seconds=paid))})
         if room is not self.favour.room:
             return tally
