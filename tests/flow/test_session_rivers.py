@@ -77,7 +77,11 @@ def test_searches_at_rest_pause_only_while_anybody_draws() -> None:
     assert pace.wait("b", REST, 101.1) == pytest.approx(QUIET_SECONDS - 0.1)
     pace.enter("c", PREVIEW, 103.0)
     assert pace.wait("b", REST, 103.5) == pytest.approx(QUIET_SECONDS - 0.5)
-    pace.enter("c", PREVIEW, 105.9)
+    pace.leave("c", 103.6)
+    for tenths in range(1036, 1100, 5):
+        pace.wait("d", PREVIEW, tenths / 10)
+        assert pace.wait("b", REST, tenths / 10) > 0, "who waits for a search draws, too"
+    pace.wait("d", PREVIEW, 101.0 + REST_SHARE - 1)
     assert pace.wait("b", REST, 101.0 + REST_SHARE - 1) == 0, "the pause is over, however much is drawn"
 
 

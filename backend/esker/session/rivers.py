@@ -29,7 +29,7 @@ SHARE: Final = 4
 """Searches while somebody draws take one part of so many of the time, those of all rooms together."""
 REST_SECONDS: Final = 0.6
 """Ground that has been final for so long is at rest: small terrains settle between two strokes."""
-REST_SHARE: Final = 6
+REST_SHARE: Final = 10
 """Searches at rest, a second each, take one part of so many of the time in which anybody on the server draws."""
 GATE_SECONDS: Final = 0.1
 """Whoever stands in line looks so often whether it is the turn."""
@@ -70,10 +70,11 @@ class Wanted:
 
 class Gate:
     """Lets the searches of all rooms of a server through one after another, with a pause behind each that is as long as
-    the search times ``share`` less one. Whoever has waited longest is next. Call it from the event loop's thread."""
+    the search times ``share`` less one, and ``most`` seconds at most. Whoever has waited longest is next. Call it from
+    the event loop's thread."""
 
-    def __init__(self, share: int) -> None:
-        self._share = share
+    def __init__(self, share: int, most: float = float("inf")) -> None:
+        self._share, self._most = share, most
         self._line: dict[object, float] = {}
         """Who waits, and when each comes back to ask."""
         self._inside: object = None
@@ -103,20 +104,21 @@ class Gate:
         """A room has ended, or waits no more."""
         self._line.pop(who, None)
         if self._inside is who:
-            self._inside, self._until = None, now + (now - self._since) * (self._share - 1)
+            self._inside, self._until = None, now + min((now - self._since) * (self._share - 1), self._most)
 
 
 class Pace:
     """How often rivers are looked for on a server: while somebody draws, and at rest."""
 
     def __init__(self) -> None:
-        self.previews, self.rests = Gate(SHARE), Gate(REST_SHARE)
+        self.previews, self.rests = Gate(SHARE, QUIET_SECONDS / 2), Gate(REST_SHARE)
         self._drawn = float("-inf")
 
     def wait(self, who: object, look: Look, now: float) -> float:
         """See ``Gate.wait``. Where nobody draws, searches at rest follow each other without a pause."""
         if look.settled:
             return self.rests.wait(who, now, self._drawn + QUIET_SECONDS)
+        self._drawn = now  # who waits for a search draws, too
         return self.previews.wait(who, now)
 
     def enter(self, who: object, look: Look, now: float) -> None:
