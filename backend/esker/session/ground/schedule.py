@@ -33,8 +33,9 @@ AHEAD: Final = 1.0
 """Seconds of the solver by which a room may be ahead of one that waits: what a stroke of some seconds takes. Whoever
 was held back behind a shorter stroke kept the memory of a solve meanwhile."""
 AHEAD_COARSE: Final = 2.0
-"""Seconds by which it may be ahead with coarsest previews, if they take no longer than ``QUICK``: a stroke is seen as it
-is drawn even where thirty rooms wait to settle. Who changes all the time comes to this bound once, and is held to it."""
+"""Seconds by which it may be ahead with coarsest previews, if they take no longer than ``QUICK``: a stroke is seen as
+it is drawn even where thirty rooms wait to settle. Who changes all the time comes to this bound once, and is held to
+it."""
 QUICK: Final = 0.05
 BUDGET, BUDGET_SHARE = 1 << 30, 12
 """Bytes for solves in progress, of all rooms together."""
