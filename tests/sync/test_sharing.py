@@ -217,7 +217,7 @@ def test_a_newer_job_shows_its_coarsest_level_while_a_pass_goes_on() -> None:
     ground, _ = machine.next(ground, does.Opened(previews_early=True), 0.0)
     newer = Job(2, (), SETTINGS)
     ground, _ = machine.next(ground, does.Requested(newer), 0.01)
-    assert not states.early_preview_is_due(ground), "the first level of the pass comes as soon"
+    assert not states.early_preview_is_due(ground, 0.01), "the first level of the pass comes as soon"
     ground, _ = machine.next(ground, Preview(0, FLAT), 0.01)
     assert states.stage(ground, 0.01) == states.COARSE
     ground, effects = machine.next(ground, does.Turn(begins=False), 0.01)
@@ -231,9 +231,10 @@ def test_a_newer_job_shows_its_coarsest_level_while_a_pass_goes_on() -> None:
     assert effects[1] == does.OpenSolve(newer, 2, coarsest=False, base=False)
     ground, _ = machine.next(ground, does.Requested(Job(3, (), SETTINGS)), 0.03)
     ground = replace(ground, state=Previewing(newer, reached=0, previews_early=True))
-    assert not states.early_preview_is_due(ground), "the pass has not gone on since the last"
+    assert not states.early_preview_is_due(ground, 0.03), "the pass has not gone on since the last"
+    assert states.early_preview_is_due(ground, 0.03 + states.EARLY_EVERY), "SPEC S590: it waits for others"
     ground = replace(ground, early=Early(newer.number, made=True))
-    assert states.early_preview_is_due(ground), "its coarsest level is out"
+    assert states.early_preview_is_due(ground, 0.03), "its coarsest level is out"
 
 
 def test_who_saw_a_finest_preview_a_moment_ago_waits_for_the_settling_of_others() -> None:

@@ -50,12 +50,12 @@ def next(ground: Ground, event: Event, now: float) -> Result:
             begun, first = _begin(ground, now) if begins else (ground, ())
             if any(isinstance(effect, does.OpenSolve) for effect in first):
                 return begun, first  # the solver says what the first slice is when the solve is open
-            after, then = _slice(begun)
+            after, then = _slice(begun, now)
             return after, (*first, *then)
         case does.Opened(previews_early):
             if isinstance(ground.state, Previewing):
                 ground = replace(ground, state=replace(ground.state, previews_early=previews_early))
-            return _slice(ground)
+            return _slice(ground, now)
         case Preview() | Settled() | ChannelLevel() | Pause() | Done():
             return _solved(ground, event, now)
         case does.Beside(inner):
@@ -208,14 +208,14 @@ def _looking(ground: Ground, looking: bool) -> State:
 # --- a slice --------------------------------------------------------------------------------------------------------
 
 
-def _slice(ground: Ground) -> Result:
+def _slice(ground: Ground, now: float) -> Result:
     """Chooses what the room does with its turn."""
     if states.channels_are_next(ground):
         return _slice_beside(ground)
-    if states.early_preview_is_due(ground):
+    if states.early_preview_is_due(ground, now):
         assert ground.jobs.wanted is not None
         job = ground.jobs.wanted.job
-        return replace(ground, early=Early(job.number, solved_since=False)), (does.PreviewEarly(job),)
+        return replace(ground, early=Early(job.number, solved_since=False, at=now)), (does.PreviewEarly(job),)
     if isinstance(ground.state, Previewing | Settling | ChannelsOnly):
         channels = replace(ground.channels, solved_since=True)
         early, state = replace(ground.early, solved_since=True), ground.state

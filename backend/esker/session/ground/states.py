@@ -15,6 +15,8 @@ from esker.session.ground.jobs import Attempt, Job
 
 FINEST_WITHIN: Final = 0.150
 """Drawing without a pause must not starve the fine levels: a preview pass goes on whose finest level is this old."""
+EARLY_EVERY: Final = 0.100
+"""Early previews of a room whose pass does not go on come at most this often."""
 PACE: Final = 0.500
 """Who saw a finest preview within this time is shown the next one behind the settling of others: where many rooms draw,
 passes would fill all time, and rooms amid a solve, which hold memory, would pile up."""
@@ -126,12 +128,14 @@ class Early:
     """The early preview: the coarsest level of a newer job, made while the pass of an older one goes on.
 
     number: of the job that had the last one, made: unless it could not be. solved_since: whether the pass has gone on
-    since: early previews without end would keep all rooms, this one too, from finer levels.
+    since: early previews without end would keep all rooms, this one too, from finer levels. at: when it was made, as
+    who draws is shown the newest strokes ``EARLY_EVERY`` even where the pass waits for others.
     """
 
     number: int = -1
     made: bool = False
     solved_since: bool = True
+    at: float = -math.inf
 
 
 @dataclass(frozen=True)
@@ -202,12 +206,12 @@ def channels_are_next(ground: Ground) -> bool:
     return going_on or starts_channels_beside(ground)
 
 
-def early_preview_is_due(ground: Ground) -> bool:
+def early_preview_is_due(ground: Ground, now: float) -> bool:
     """Returns whether the coarsest preview of the newest job is to be had while the pass of an older one goes on."""
     wanted, state, early = ground.jobs.wanted, ground.state, ground.early
     if wanted is None or not isinstance(state, Previewing) or not state.previews_early:
         return False
-    if wanted.job.number == early.number or not early.solved_since:
+    if wanted.job.number == early.number or not (early.solved_since or now - early.at >= EARLY_EVERY):
         return False
     return state.reached >= 0 and wanted.job.layers_rev == state.job.layers_rev
 
@@ -247,7 +251,7 @@ def stage(ground: Ground, now: float) -> int | None:
         return SETTLE if now - ground.shown.finest_at < PACE else FINER
     if wanted is not None and starts(ground, now):
         return SETTLE if wanted.job.number == ground.shown.previewed else COARSE
-    if early_preview_is_due(ground):
+    if early_preview_is_due(ground, now):
         return COARSE
     match state:
         case Previewing(reached=-1):
