@@ -12,8 +12,8 @@ from esker.contract import fractal
 from esker.synthesis.interpolate import B_SPLINE, Window, upsampled
 from esker.synthesis.kernels import Kernels
 from esker.synthesis.rules import gullies
-from esker.synthesis.site import Site
-from esker.synthesis.subdivide import Samples, chain, detail, root, subdivide
+from esker.synthesis.site import Ground, Site
+from esker.synthesis.subdivide import Samples, chain, detail, relief, root, subdivide
 from tests.synthesis.sites import channels, everywhere, heights, hill, plane, rms, same
 
 WINDOW = Window(4, 300, 420, 330, 460)
@@ -36,6 +36,28 @@ def test_sine_and_arc_tangent_are_those_of_the_books() -> None:
     assert abs(np.diff(found)).max() < 3e-4
     ends = gullies.profile(np.array([0.0, 1.0]))
     assert ends == pytest.approx([fractal.GULLY_MIDDLE, -fractal.GULLY_MOST])
+
+
+@pytest.mark.parametrize("cyclic", [False, True])
+@pytest.mark.parametrize("scale", [1.0, 3.0])
+def test_the_compiled_octave_is_the_twins_to_the_bit(cyclic: bool, scale: float) -> None:
+    """SPEC F560: on slopes of every direction, level ground, and where there is no gully."""
+    site, random = worn(cyclic=cyclic, erosion_scale=scale), np.random.default_rng(3)
+    slope_x, slope_y, where = random.normal(size=(3, *WINDOW.shape))
+    slope_x[::7], slope_y[::7], where[:, ::5] = 0, 0, 0
+    ground = Ground(4, np.zeros(WINDOW.shape), slope_x, slope_y, np.zeros(WINDOW.shape), np.zeros(WINDOW.shape))
+    found = gullies.octave(site, ground, WINDOW, where)
+    assert np.array_equal(found, gullies.octave_reference(site, ground, WINDOW, where))
+    assert np.ptp(found) > 0.5
+
+
+@pytest.mark.parametrize("rule", ["landscape", "smooth", "plain"])
+@pytest.mark.parametrize("fields", [{}, {"erosion": 0.0}, {"ground_m": (0.0, 900.0)}, {"cyclic": True}])
+def test_heights_alone_are_those_beside_all_channels(rule: str, fields: dict[str, Any]) -> None:
+    """SPEC F561: what heights do not follow from may be left out, on solved levels and below them."""
+    site = hill(channels=channels(), rule=rule, **{"erosion": 1.0, **fields})
+    for window in (WINDOW, Window(1, -2, 60, 4, 131), Window(0, -2, 67, -2, 67)):
+        assert np.array_equal(relief(site, window), detail(site, window).state.d)
 
 
 def test_ground_without_gullies_keeps_its_bits() -> None:

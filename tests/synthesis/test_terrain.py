@@ -152,6 +152,21 @@ def test_memory_is_bounded_by_bands(monkeypatch: pytest.MonkeyPatch, terrain: Te
     assert all(np.array_equal(made.attributes[name], again.attributes[name]) for name in made.attributes)
 
 
+def test_heights_alone_are_those_of_the_window(monkeypatch: pytest.MonkeyPatch, terrain: Terrain) -> None:
+    """SPEC F561: to the bit, in bands, on a solved level and on one that nobody solved; the same slices are refused."""
+    monkeypatch.setattr(detailed, "BAND_SAMPLES", 1 << 12)
+    made = DetailedTerrain(site_of(terrain.settings, terrain.heights(2), {}))
+    shares: list[float] = []
+    for level in (2, 4):
+        rows, cols = slice(40, 190), slice(7, 90)
+        alone = made.heights(level, rows, cols, shares.append)
+        assert np.array_equal(alone, made.window(level, rows, cols).heights)
+    assert shares[-1] == 1
+    assert len(shares) > 4
+    with pytest.raises(ValueError, match="level 2 has samples"):
+        made.heights(2, slice(0, 300), slice(0, 3))
+
+
 def test_what_changes_is_made_anew(terrain: Terrain) -> None:
     other = Terrain.from_document(terrain.document)
     other.settings = other.settings.model_copy(update={"rule": "plain", "look": "alpine"})

@@ -8,7 +8,7 @@ from esker import contract as c
 from esker.document.ops import StrokeSet
 from esker.session.lesson import names
 from esker.session.lesson.rules import REMOVED, WAIT, Hand, Lesson
-from esker.session.lesson.state import MOST, Removed, State, read, with_people
+from esker.session.lesson.state import MOST, Removed, State, read, with_people, without
 from esker.session.room import protocol
 from esker.session.room.core import MOST_AGAINST, RoomCore, RoomInfo
 from esker.session.room.entry import Caller
@@ -47,6 +47,31 @@ def test_the_door() -> None:
     lesson.state = lesson.turned(c.People(action="let_in", people=("new", "ben")))
     assert lesson.door(pupil("new"), None, "192.0.2.7") is None
     assert lesson.door(pupil("ben"), 500, "192.0.2.7") is None
+
+
+class Compared(str):
+    """An id that counts with how many others it is compared."""
+
+    count = 0
+
+    def __eq__(self, other: object) -> bool:
+        Compared.count += 1
+        return str.__eq__(self, other)
+
+    __hash__ = str.__hash__
+
+
+def test_switches_about_people_compare_nobody_with_everybody() -> None:
+    """SPEC P640: two hundred people and a thousand who are known were 200,000 comparisons in the event loop."""
+    known = tuple(Compared(f"k{n}") for n in range(MOST))
+    people = tuple(Compared(f"k{n}") for n in range(900, 1_100))
+    Compared.count = 0
+    assert len(with_people(known, people)) == MOST
+    assert without(known, people) == known[:900]
+    lesson = Lesson(State(removed=tuple(Removed(person=each, name="", address="", at=0) for each in known)))
+    lesson.state = lesson.turned(c.People.model_construct(action="let_in", people=people))
+    assert len(lesson.state.removed) == 900
+    assert Compared.count < 5 * MOST
 
 
 def test_what_nobody_is_known_to_have_brought_is_protected() -> None:

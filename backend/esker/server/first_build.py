@@ -151,10 +151,12 @@ def _blend(device: Any) -> None:
 def loops() -> dict[str, Any]:
     """Compiles the loops that every server runs."""
     from esker.flow import warming
+    from esker.synthesis.rules import octave
     from esker.tiles.pyramid import warm
 
     warm()
     warming.warm()
+    octave.warm()
     return {"loops": True}
 
 
@@ -165,9 +167,10 @@ def have_loops(stopped: threading.Event, begun: threading.Event) -> None:
     """
     from esker import compiled
     from esker.flow import warming
+    from esker.synthesis.rules import octave
     from esker.tiles import pyramid
 
-    rooms = (Path(pyramid.__file__).parent, Path(warming.__file__).parent)
+    rooms = tuple(Path(module.__file__).parent for module in (pyramid, warming, octave))
     files = [Path(compiled.__file__), *(path for room in rooms for path in sorted(room.rglob("*.py")))]
     texts = [path.read_bytes() for path in files]
     content = hashlib.sha256(b"".join([version("numba").encode(), pyramid.__file__.encode(), *texts])).hexdigest()

@@ -126,7 +126,7 @@ def frame_of(
     """
     every = slice(0, grid.samples(ground.level))
     site = site_of(settings, ground.heights, ground.channels, ground_m=span_m)
-    heights = DetailedTerrain(site).window(ground.level, every, every, progress).heights
+    heights = DetailedTerrain(site).heights(ground.level, every, every, progress)
     water = water_of(heights, settings.size_m, settings.sea_level_m)
     many = settings.rivers
     while True:

@@ -6,7 +6,7 @@ refined where the caller can refine it, and interpolated beyond (docs/synthesis.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, Protocol
 
@@ -160,26 +160,40 @@ class DetailedTerrain:
 
         Raises ValueError for a level beyond ``subdivide.finest_level``, and for slices outside of the level.
         """
+        shape = rows.stop - rows.start, cols.stop - cols.start
+        heights = np.empty(shape, dtype=np.float32)
+        attributes = {name: np.empty(shape, dtype=np.float32) for name in NAMES.values()}
+        for at, window in self._bands(level, rows, cols, progress):
+            state = self._maker.detail(self.site, window).state
+            heights[at] = self.base(window) + state.d
+            for field, name in NAMES.items():
+                attributes[name][at] = getattr(state, field)
+        return Detail(heights, attributes)
+
+    def heights(self, level: int, rows: slice, cols: slice, progress: Callable[[float], None] | None = None) -> Grid:
+        """The heights of ``window`` alone, by the twin: what they do not follow from is not made. Raises as it does."""
+        heights = np.empty((rows.stop - rows.start, cols.stop - cols.start), dtype=np.float32)
+        for at, window in self._bands(level, rows, cols, progress):
+            heights[at] = self.base(window) + subdivide.relief(self.site, window)
+        return heights
+
+    def _bands(
+        self, level: int, rows: slice, cols: slice, progress: Callable[[float], None] | None
+    ) -> Iterator[tuple[slice, Window]]:
+        """A rectangle in parts of BAND_SAMPLES at most: where each lies in it, and its window."""
         most = subdivide.finest_level(self.site.size_m)
         if not 0 <= level <= most:
             raise ValueError(f"level must be 0..{most} for a terrain of {self.site.size_m:g} m, not {level}")
         n = grid.samples(level)
         if not (0 <= rows.start < rows.stop <= n and 0 <= cols.start < cols.stop <= n):
             raise ValueError(f"level {level} has samples 0..{n - 1}, not all of rows {rows}, columns {cols}")
-        shape = rows.stop - rows.start, cols.stop - cols.start
-        heights = np.empty(shape, dtype=np.float32)
-        attributes = {name: np.empty(shape, dtype=np.float32) for name in NAMES.values()}
-        band = max(1, BAND_SAMPLES // shape[1])
-        for start in range(0, shape[0], band):
-            stop = min(start + band, shape[0])
-            window = Window(level, rows.start + start, rows.start + stop, cols.start, cols.stop)
-            state = self._maker.detail(self.site, window).state
-            heights[start:stop] = self.base(window) + state.d
-            for field, name in NAMES.items():
-                attributes[name][start:stop] = getattr(state, field)
+        count = rows.stop - rows.start
+        band = max(1, BAND_SAMPLES // (cols.stop - cols.start))
+        for start in range(0, count, band):
+            stop = min(start + band, count)
+            yield slice(start, stop), Window(level, rows.start + start, rows.start + stop, cols.start, cols.stop)
             if progress is not None:
-                progress(stop / shape[0])
-        return Detail(heights, attributes)
+                progress(stop / count)
 
     def base(self, window: Window) -> Grid:
         """Heights without detail: float32, metres."""

@@ -78,19 +78,28 @@ FOUR_POINT: Final[Taps] = ((0, 1, 0, 0), (-1 / 16, 9 / 16, 9 / 16, -1 / 16))
 def along_x(z: Array, taps: Taps, parent: Window, child: Window) -> Array:
     """Values of the rows of ``parent`` at the columns of ``child``. ``z``: (rows, columns) of ``parent``."""
     out = np.empty((z.shape[0], child.shape[1]), dtype=z.dtype)
-    for odd in (0, 1):
-        first = child.c0 + ((child.c0 ^ odd) & 1)
-        count = max(0, (child.c1 - first + 1) // 2)
-        start = (first >> 1) - 1 - parent.c0
-        parts = [w * z[:, start + k : start + k + count] for k, w in enumerate(taps[odd]) if w != 0]
-        out[:, first - child.c0 :: 2] = sum(parts[1:], parts[0])
+    for odd, weights in enumerate(taps):
+        to, start, count = _places(odd, parent.c0, child.c0, child.c1)
+        parts = [w * z[:, start + k : start + k + count] for k, w in enumerate(weights) if w != 0]
+        out[:, to::2] = sum(parts[1:], parts[0])
     return out
 
 
 def along_y(z: Array, taps: Taps, parent: Window, child: Window) -> Array:
     """Interpolates along columns, as ``along_x`` does along rows. ``z``: (rows of ``parent``, any)."""
-    across = Window(parent.level, 0, z.shape[1], parent.r0, parent.r1)
-    return along_x(z.T, taps, across, Window(child.level, 0, z.shape[1], child.r0, child.r1)).T
+    out = np.empty((child.shape[0], z.shape[1]), dtype=z.dtype)
+    for odd, weights in enumerate(taps):
+        to, start, count = _places(odd, parent.r0, child.r0, child.r1)
+        parts = [w * z[start + k : start + k + count] for k, w in enumerate(weights) if w != 0]
+        out[to::2] = sum(parts[1:], parts[0])
+    return out
+
+
+def _places(odd: int, parent: int, first: int, stop: int) -> tuple[int, int, int]:
+    """Where the even or odd ones of children ``first`` to ``stop`` begin, where p - 1 of their first parent lies among
+    samples that begin at ``parent``, and how many there are."""
+    at = first + ((first ^ odd) & 1)
+    return at - first, (at >> 1) - 1 - parent, max(0, (stop - at + 1) // 2)
 
 
 def upsampled(z: Array, taps: Taps, parent: Window, child: Window) -> Array:

@@ -29,6 +29,14 @@ class State(NamedTuple):
     foam: Array
 
 
+class Relief(NamedTuple):
+    """The part of a state that heights follow from: detail, smoothness and snow. Arrays of one shape, as in State."""
+
+    d: Array
+    h: Array
+    snow: Array
+
+
 def unorm16(x: Array) -> NDArray[np.uint32]:
     """0..1 to 0..65535, to the nearest; outside of it, clamped; NaN to 0."""
     safe = np.nan_to_num(x, nan=0.0, posinf=1.0, neginf=0.0)
@@ -58,3 +66,10 @@ def unpack(words: NDArray[np.uint32], dtype: DTypeLike = np.float64) -> State:
 def stored(state: State) -> State:
     """The state as it is after being stored: what the next level sees."""
     return unpack(pack(state), state.d.dtype)
+
+
+def stored_relief(relief: Relief) -> Relief:
+    """``stored`` of the part that heights follow from, with the same bits."""
+    dtype = relief.d.dtype
+    h, snow = (unorm16(x).astype(dtype) / UNORM for x in (relief.h / H_SCALE, relief.snow))
+    return Relief(relief.d.astype(np.float32).astype(dtype), h * H_SCALE, snow)

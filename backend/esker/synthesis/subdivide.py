@@ -23,9 +23,10 @@ from esker.synthesis.interpolate import (
     upsampled,
 )
 from esker.synthesis.rules import RULES
-from esker.synthesis.rules.targets import targets
+from esker.synthesis.rules.landscape import landscape_relief
+from esker.synthesis.rules.targets import lie, relief_targets, targets
 from esker.synthesis.site import BORDER, Ground, Site
-from esker.synthesis.state import Array, State, stored
+from esker.synthesis.state import Array, Relief, State, stored, stored_relief
 
 
 class Samples(NamedTuple):
@@ -48,6 +49,14 @@ def root(site: Site, window: Window | None = None) -> Samples:
     where indices are clamped.
     """
     window = window or whole(0)
+    ground = _root_ground(site, window)
+    mid, t = ground.height, targets(site, ground)
+    before = State(np.zeros_like(mid), np.full_like(mid, fractal.SMOOTHNESS), *t[1:])
+    state = RULES[site.rule](site, ground, before, window, site.biases(window))
+    return Samples(window, mid, stored(state))
+
+
+def _root_ground(site: Site, window: Window) -> Ground:
     near = Window(0, window.r0 - 1, window.r1 + 1, window.c0 - 1, window.c1 + 1)
     if site.cyclic:
         z = site.guide(near)
@@ -60,11 +69,7 @@ def root(site: Site, window: Window | None = None) -> Samples:
     gx = (z[1:-1, 2:] - z[1:-1, :-2]) / (2 * s)
     gy = (z[2:, 1:-1] - z[:-2, 1:-1]) / (2 * s)
     c = (z[1:-1, :-2] - 2 * mid + z[1:-1, 2:]) / s + (z[:-2, 1:-1] - 2 * mid + z[2:, 1:-1]) / s
-    ground = Ground(0, mid, gx, gy, np.clip(fractal.CONCAVITY_SCALE * c, -1, 1), np.sqrt(gx * gx + gy * gy))
-    t = targets(site, ground)
-    before = State(np.zeros_like(mid), np.full_like(mid, fractal.SMOOTHNESS), *t[1:])
-    state = RULES[site.rule](site, ground, before, window, site.biases(window))
-    return Samples(window, mid, stored(state))
+    return Ground(0, mid, gx, gy, np.clip(fractal.CONCAVITY_SCALE * c, -1, 1), np.sqrt(gx * gx + gy * gy))
 
 
 def subdivide(parent: Samples, window: Window, site: Site) -> Samples:
@@ -75,12 +80,15 @@ def subdivide(parent: Samples, window: Window, site: Site) -> Samples:
     if window.level != parent.window.level + 1:
         raise ValueError(f"level {window.level} is not made from level {parent.window.level}")
     window.parent().within(parent.window)
-    solved = window.level <= site.solved
-    guide = site.guide(window) if solved else interpolated(parent.guide, parent.window, window)
-    ground = _ground(parent, window, site)
+    guide = _guide(parent.guide, parent.window, window, site)
+    ground = _ground(parent.guide, parent.state.d, parent.window, window, site)
     before = State(*(upsampled(x, B_SPLINE, parent.window, window) for x in parent.state))
     state = RULES[site.rule](site, ground, before, window, site.biases(window))
     return Samples(window, guide, stored(state))
+
+
+def _guide(above: Array, at: Window, window: Window, site: Site) -> Array:
+    return site.guide(window) if window.level <= site.solved else interpolated(above, at, window)
 
 
 def interpolated(z: Array, parent: Window, child: Window, rule: str = "landscape") -> Array:
@@ -90,16 +98,16 @@ def interpolated(z: Array, parent: Window, child: Window, rule: str = "landscape
     return along_y(across, taps, parent, child).astype(np.float32).astype(z.dtype)
 
 
-def _ground(parent: Samples, window: Window, site: Site) -> Ground:
-    at, s = parent.window, site.spacing(parent.window.level)
-    z = parent.guide + parent.state.d
+def _ground(guide: Array, d: Array, at: Window, window: Window, site: Site) -> Ground:
+    """The ground of ``window`` from its parent's guide and detail in ``at``."""
+    z, s = guide + d, site.spacing(at.level)
     b, d, l2 = (along_x(z, taps, at, window) for taps in (B_SPLINE, DERIVATIVE, SECOND))
     height = along_y(b, B_SPLINE, at, window)
     gx = along_y(d, B_SPLINE, at, window) / s
     gy = along_y(b, DERIVATIVE, at, window) / s
     c = (along_y(l2, B_SPLINE, at, window) + along_y(b, SECOND, at, window)) / s
-    guide_x = along_y(along_x(parent.guide, DERIVATIVE, at, window), B_SPLINE, at, window) / s
-    guide_y = along_y(along_x(parent.guide, B_SPLINE, at, window), DERIVATIVE, at, window) / s
+    guide_x = along_y(along_x(guide, DERIVATIVE, at, window), B_SPLINE, at, window) / s
+    guide_y = along_y(along_x(guide, B_SPLINE, at, window), DERIVATIVE, at, window) / s
     steep = np.sqrt(guide_x * guide_x + guide_y * guide_y)
     return Ground(window.level, height, gx, gy, np.clip(fractal.CONCAVITY_SCALE * c, -1, 1), steep)
 
@@ -132,3 +140,22 @@ def detail(site: Site, window: Window) -> Samples:
     for w in rest:
         samples = subdivide(samples, w, site)
     return samples
+
+
+def relief(site: Site, window: Window) -> Array:
+    """The detail d of a window, metres: that of ``detail`` to the bit, without the channels that heights do not follow
+    from, for half of the time. Its memory is that of a few windows."""
+    if site.rule != "landscape":
+        return np.zeros(window.shape, dtype=site.dtype)
+    at, *rest = chain(window)
+    ground = _root_ground(site, at)
+    guide = ground.height
+    snow = relief_targets(site, ground, lie(site, ground))[1]
+    before = Relief(np.zeros_like(guide), np.full_like(guide, fractal.SMOOTHNESS), snow)
+    state = stored_relief(landscape_relief(site, ground, before, at, site.biases(at)))
+    for w in rest:
+        ground = _ground(guide, state.d, at, w, site)
+        before = Relief(*(upsampled(x, B_SPLINE, at, w) for x in state))
+        state = stored_relief(landscape_relief(site, ground, before, w, site.biases(w)))
+        guide, at = _guide(guide, at, w, site), w
+    return state.d

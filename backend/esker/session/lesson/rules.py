@@ -239,7 +239,8 @@ class Lesson:
             case "let_in":
                 for person in people:
                     self.waiting.pop(person, None)
-                removed = tuple(each for each in state.removed if each.person not in people)
+                inside = frozenset(people)
+                removed = tuple(each for each in state.removed if each.person not in inside)
                 return self._named({"removed": removed, "let_in": with_people(state.let_in, people)})
         return state
 
@@ -247,12 +248,12 @@ class Lesson:
         """The state after these people were removed."""
         new = tuple(out)
         people = tuple(each.person for each in new)
-        state = self.state
+        state, outside = self.state, frozenset(people)
         for person in people:
             self.waiting.pop(person, None)
         return self._named(
             {
-                "removed": (*(each for each in state.removed if each.person not in people), *new)[-MOST:],
+                "removed": (*(each for each in state.removed if each.person not in outside), *new)[-MOST:],
                 "pens": without(state.pens, people),
                 "conductors": without(state.conductors, people),
                 "let_in": without(state.let_in, people),

@@ -56,9 +56,11 @@ def read(text: str | None, terrain: str) -> State:
 
 def with_people(known: tuple[str, ...], people: tuple[str, ...]) -> tuple[str, ...]:
     """People with more of them; the first are forgotten where they would be too many."""
-    return (*(each for each in known if each not in people), *dict.fromkeys(people))[-MOST:]
+    last = dict.fromkeys(people)
+    return (*(each for each in known if each not in last), *last)[-MOST:]
 
 
 def without(known: tuple[str, ...], people: tuple[str, ...]) -> tuple[str, ...]:
     """People but for some of them."""
-    return tuple(each for each in known if each not in people)
+    gone = frozenset(people)
+    return tuple(each for each in known if each not in gone)

@@ -10,12 +10,14 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from esker import grid
 from esker.contract import MAX_EROSION
 from esker.contract import fractal as f
 from esker.synthesis import hash as noise
 from esker.synthesis.interpolate import Window
+from esker.synthesis.rules import octave as loop
 from esker.synthesis.rules.targets import smoothstep
 from esker.synthesis.site import Biases, Ground, Site
 from esker.synthesis.state import Array
@@ -71,26 +73,57 @@ def depth(site: Site, ground: Ground, worn: Wear) -> Array:
     return size
 
 
+class Lattice(NamedTuple):
+    """Pivots about a window. ``row``, ``v``: cell and place in it of its rows; ``col``, ``u``: of its columns;
+    ``east``, ``north``: where the pivots of cells lie, from one before the first cell to one behind the last."""
+
+    row: NDArray[np.int64]
+    v: Array
+    col: NDArray[np.int64]
+    u: Array
+    east: Array
+    north: Array
+
+
+def lattice(site: Site, window: Window) -> Lattice:
+    """The pivots about a window, and where its samples lie among them."""
+    side = site.gully_side
+    j, i = window.rows // side, window.cols // side
+    v, u = ((a - side * b).astype(site.dtype) * (1.0 / side) for a, b in ((window.rows, j), (window.cols, i)))
+    east, north = _pivots(site, window.level, (int(j.min()), int(j.max())), (int(i.min()), int(i.max())))
+    return Lattice(j - j.min(), v, i - i.min(), u, east, north)
+
+
 def octave(site: Site, ground: Ground, window: Window, where: Array) -> Array:
-    """The octave of a window's level for a depth of 1: -0.55 in beds to 0.45 on ridges. 0 where ``where`` is 0."""
+    """The octave of a window's level for a depth of 1: -0.55 in beds to 0.45 on ridges. 0 where ``where`` is 0.
+
+    In double precision whatever the site's is: there it is ``octave_reference`` to the bit.
+    """
+    at, out = lattice(site, window), np.empty(window.shape)
+    wide = [np.ascontiguousarray(a, dtype=np.float64) for a in (where, ground.slope_x, ground.slope_y)]
+    v, u, east, north = (a.astype(np.float64) for a in (at.v, at.u, at.east, at.north))
+    loop.fill(out, *wide, at.row, v, at.col, u, east, north, loop.SINE, loop.ARC, loop.SHAPE)
+    octave: Array = out.astype(site.dtype)
+    return octave
+
+
+def octave_reference(site: Site, ground: Ground, window: Window, where: Array) -> Array:
+    """The twin of ``octave`` in NumPy, in the site's precision."""
     out = np.zeros_like(ground.height)
     at = np.nonzero(where)
     if not len(at[0]):
         return out
-    level, side = window.level, site.gully_side
-    j, i = window.rows // side, window.cols // side
-    v, u = ((a - side * b).astype(site.dtype) * (1.0 / side) for a, b in ((window.rows, j), (window.cols, i)))
+    there = lattice(site, window)
     gx, gy = ground.slope_x[at], ground.slope_y[at]
     turn = 1 / np.sqrt(gx * gx + gy * gy + f.GULLY_TURN**2)
     nx, ny = -gy * turn, gx * turn
-    east, north = _pivots(site, level, (int(j.min()), int(j.max())), (int(i.min()), int(i.max())))
-    row, col = (j - j.min())[at[0]], (i - i.min())[at[1]]
-    u, v = u[at[1]], v[at[0]]
+    row, col = there.row[at[0]], there.col[at[1]]
+    u, v = there.u[at[1]], there.v[at[0]]
     cosine, sine, weights = (np.zeros_like(gx) for _ in range(3))
     for dj in (-1, 0, 1):
         for di in (-1, 0, 1):
             pivot = row + (dj + 1), col + (di + 1)
-            qx, qy = u - (di + east[pivot]), v - (dj + north[pivot])
+            qx, qy = u - (di + there.east[pivot]), v - (dj + there.north[pivot])
             w = np.maximum(0, 1 - (qx * qx + qy * qy))
             s, c = turned(f.GULLY_CELL * (qx * nx + qy * ny))
             cosine += w * w * c

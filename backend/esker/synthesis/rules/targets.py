@@ -29,15 +29,23 @@ def smoothstep(interval: tuple[float, float], x: Array) -> Array:
     return t * t * (3 - 2 * t)
 
 
-def targets(site: Site, ground: Ground) -> Targets:
-    """Paper 1, section 4: smoother in valleys and low down, rougher where steep; plants and snow by height, slope."""
-    look = site.look_rule
-    sea = site.sea_level_m
-    above_sea = ground.height - site.zero_m
-    e = above_sea / site.relief_m
+class Lie(NamedTuple):
+    """How a sample lies: its height above the sea as a share of the relief, and its slope."""
+
+    elevation: Array
+    slope: Array
+
+
+def lie(site: Site, ground: Ground) -> Lie:
+    """Elevation and slope at each sample."""
     t2 = ground.slope_x * ground.slope_x + ground.slope_y * ground.slope_y
-    t, v = np.sqrt(t2), ground.concavity
-    north = -ground.slope_y / np.sqrt(1 + t2)
+    return Lie((ground.height - site.zero_m) / site.relief_m, np.sqrt(t2))
+
+
+def relief_targets(site: Site, ground: Ground, lies: Lie) -> tuple[Array, Array]:
+    """h* and snow* at each sample: what heights follow from."""
+    (e, t), v = lies, ground.concavity
+    north = -ground.slope_y / np.sqrt(1 + (ground.slope_x * ground.slope_x + ground.slope_y * ground.slope_y))
     h = (
         f.SMOOTHNESS
         + f.SMOOTHNESS_FLAT * (1 - smoothstep(f.SMOOTHNESS_FLAT_SLOPE, t))
@@ -45,9 +53,15 @@ def targets(site: Site, ground: Ground) -> Targets:
         + f.SMOOTHNESS_VALLEY * smoothstep(f.SMOOTHNESS_VALLEY_CONCAVITY, v)
         + f.SMOOTHNESS_LOW * (1 - smoothstep(f.SMOOTHNESS_LOW_ELEVATION, e))
     )
-    line = look.snow_line - f.SNOW_NORTH * north - f.SNOW_VALLEY * v
-    above = e - line
-    snow = smoothstep(f.SNOW_EDGE, above) * (1 - smoothstep(f.SNOW_SLOPE, t))
+    line = site.look_rule.snow_line - f.SNOW_NORTH * north - f.SNOW_VALLEY * v
+    return h, smoothstep(f.SNOW_EDGE, e - line) * (1 - smoothstep(f.SNOW_SLOPE, t))
+
+
+def targets(site: Site, ground: Ground) -> Targets:
+    """Paper 1, section 4: smoother in valleys and low down, rougher where steep; plants and snow by height, slope."""
+    look, lies = site.look_rule, lie(site, ground)
+    (e, t), v = lies, ground.concavity
+    h, snow = relief_targets(site, ground, lies)
     bare, tree = 1 - snow, look.tree_line
     grass = (
         look.plants
@@ -63,8 +77,8 @@ def targets(site: Site, ground: Ground) -> Targets:
         * bare
     )
     wet = f.WET_VALLEY * smoothstep(f.WET_CONCAVITY, v) * (1 - smoothstep(f.WET_SLOPE, t))
-    if sea is not None:
-        wet = np.maximum(wet, 1 - smoothstep(f.WET_SHORE, above_sea / site.shore_m))
+    if site.sea_level_m is not None:
+        wet = np.maximum(wet, 1 - smoothstep(f.WET_SHORE, (ground.height - site.zero_m) / site.shore_m))
     return Targets(h, snow, wet, grass, forest, np.full_like(e, f.FOAM))
 
 
