@@ -1,4 +1,4 @@
 """The detail that grows on solved ground: the server's twin of the page's fractal, in NumPy and OpenCL.
 
-It may know ``contract``, ``flow``, ``grid`` and ``resources``.
+It may know ``compiled``, ``contract``, ``flow``, ``grid`` and ``resources``.
 """
