@@ -170,7 +170,7 @@ def have_loops(stopped: threading.Event, begun: threading.Event) -> None:
     from esker.synthesis.rules import octave
     from esker.tiles import pyramid
 
-    rooms = tuple(Path(module.__file__).parent for module in (pyramid, warming, octave))
+    rooms = tuple(Path(file).parent for file in (pyramid.__file__, warming.__file__, octave.__file__))
     files = [Path(compiled.__file__), *(path for room in rooms for path in sorted(room.rglob("*.py")))]
     texts = [path.read_bytes() for path in files]
     content = hashlib.sha256(b"".join([version("numba").encode(), pyramid.__file__.encode(), *texts])).hexdigest()

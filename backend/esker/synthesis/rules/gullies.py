@@ -100,9 +100,9 @@ def octave(site: Site, ground: Ground, window: Window, where: Array) -> Array:
     In double precision whatever the site's is: there it is ``octave_reference`` to the bit.
     """
     at, out = lattice(site, window), np.empty(window.shape)
-    wide = [np.ascontiguousarray(a, dtype=np.float64) for a in (where, ground.slope_x, ground.slope_y)]
+    marks, slope_x, slope_y = (np.ascontiguousarray(a, np.float64) for a in (where, ground.slope_x, ground.slope_y))
     v, u, east, north = (a.astype(np.float64) for a in (at.v, at.u, at.east, at.north))
-    loop.fill(out, *wide, at.row, v, at.col, u, east, north, loop.SINE, loop.ARC, loop.SHAPE)
+    loop.fill(out, marks, slope_x, slope_y, at.row, v, at.col, u, east, north, loop.SINE, loop.ARC, loop.SHAPE)
     octave: Array = out.astype(site.dtype)
     return octave
 
