@@ -86,7 +86,7 @@ export const sentenceStyles = css`
       max-width: calc(100% - 340px - 2 * var(--edge));
     }
   }
-  /* A hint stands beside the legend, not over it; where too little is left beside both the inspector and the legend, above. */
+  /* A hint stands beside the legend. Where the inspector leaves too little beside it, the hint stands above, under the task. */
   @media (min-width: 721px) {
     :host {
       --legend: 246px;
@@ -108,7 +108,7 @@ export const sentenceStyles = css`
   @media (min-width: 721px) and (max-width: 960px) {
     :host([drawer]) .foot:has(esk-legend:not([hidden])) ~ .hint {
       bottom: auto;
-      top: 74px;
+      top: 122px;
       left: calc((100% - 340px) / 2);
       max-width: calc(100% - 340px - 2 * var(--edge));
     }
