@@ -1,4 +1,4 @@
-"""Figures of README and of docs/ (solver, refinement, patchwork, importing, renderer) from the committed results.
+"""Figures of README and of several pages of docs/ from the committed results.
 
 ``python -m bench.report [--check]``.
 """
@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from bench.cluster import _table
 from bench.ground import _importing, _patchwork, _patchwork_cover, _refine
 from bench.picture import _render
 from bench.solver import _solver
@@ -25,6 +26,7 @@ PATCHWORK = ROOT / "docs" / "patchwork.md"
 IMPORTING = ROOT / "docs" / "importing.md"
 RENDERER = ROOT / "docs" / "renderer.md"
 SECURITY = ROOT / "docs" / "security.md"
+OPERATIONS = ROOT / "docs" / "operations.md"
 BEGIN, END = "<!-- figures: written by `python -m bench.report` -->", "<!-- end of figures -->"
 
 
@@ -131,6 +133,8 @@ def documents() -> dict[Path, str]:
     out[PATCHWORK] = _patchwork_cover.document(page, result("patchwork_cover"))
     out[IMPORTING] = _importing.document(IMPORTING.read_text(encoding="utf-8"), result("importing"))
     out[SECURITY] = _siege_table.document(SECURITY.read_text(encoding="utf-8"), result("siege"))
+    servers = result("cluster"), result("cluster_simulation")
+    out[OPERATIONS] = _table.document(OPERATIONS.read_text(encoding="utf-8"), *servers)
     drawn = (result(name) for name in ("render", "cracks", "flight"))
     out[RENDERER] = _render.document(RENDERER.read_text(encoding="utf-8"), *drawn)
     return out

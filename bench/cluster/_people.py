@@ -20,6 +20,8 @@ LOST: Final = (OSError, ConnectionClosed, InvalidHandshake, InvalidMessage, Time
 FIRST_SECONDS, MOST_SECONDS = 0.4, 15.0
 """Delays of the page before it comes back (``frontend/src/net/connection.ts``)."""
 POINTS, STROKE_POINTS = 4, 64
+OTHERS: Final = ('{"type":"ordered"', '{"type":"presences"')
+"""What others do is received and not read: sixty clients in one process would read it sixty times."""
 
 
 @dataclass
@@ -96,6 +98,8 @@ class Person:
             more = {"token": self._token, "ticket": self._ticket}
             await socket.send(json.dumps(hello | {key: value for key, value in more.items() if value}))
             async for message in socket:
+                if isinstance(message, str) and message.startswith(OTHERS):
+                    continue
                 if isinstance(message, bytes):
                     await socket.send(f'{{"type":"credit","bytes":{len(message)}}}')
                 else:

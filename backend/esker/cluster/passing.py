@@ -95,7 +95,7 @@ class Passing:
     """Passes requests on to the node that has the terrain."""
 
     def __init__(self, app: Any, cluster: Cluster, terrain_of: TerrainOf) -> None:
-        """``terrain_of``: asks the database for the terrain of a class, a seat or a code; empty for none."""
+        """``terrain_of``: asks the database for the terrain of a class, a picture, a seat or a code; empty for none."""
         self.app, self._cluster, self._terrain_of = app, cluster, terrain_of
 
     async def __call__(self, scope: Message, receive: Receive, send: Send) -> None:

@@ -14,13 +14,14 @@ _MOST_ID: Final = 64
 
 @dataclass(frozen=True)
 class About:
-    """What a request is about: a terrain, a class, the seat of a device, or what a join code opens.
+    """What a request is about: a terrain, a class, a picture's token, the seat of a device, or what a join code opens.
 
     changes: it may change something, so that only the owner does it.
     """
 
     terrain: str = ""
     lesson: str = ""
+    picture: str = ""
     is_seat: bool = False
     is_code: bool = False
     changes: bool = False
@@ -30,7 +31,7 @@ def about(method: str, path: str) -> About | None:
     """Returns what a request is about; None for one that every node answers by itself.
 
     >>> about("GET", "/api/terrains/abc/links")
-    About(terrain='abc', lesson='', is_seat=False, is_code=False, changes=False)
+    About(terrain='abc', lesson='', picture='', is_seat=False, is_code=False, changes=False)
     >>> about("POST", "/api/join").is_code
     True
     >>> about("GET", "/assets/x.js"), about("POST", "/api/terrains"), about("POST", "/api/terrains/import")
@@ -46,6 +47,8 @@ def about(method: str, path: str) -> About | None:
             return About(is_seat=True, changes=changes)
         case ["api", "server", "terrains", terrain, *_] if _is_id(terrain):
             return About(terrain=terrain, changes=changes)
+        case ["preview", name] if name.endswith(".jpg") and _is_id(name.removesuffix(".jpg")):
+            return About(picture=name.removesuffix(".jpg"))
         case ["api", "join"] if changes:
             return About(is_code=True, changes=True)
         case ["api", "room"] if changes:

@@ -22,9 +22,11 @@ from esker.exporting import formats, wire
 from esker.exporting.run import FAILED, ExportFailed, Progress
 from esker.fairness.shares import RANK, Place, Places, Share, Who
 from esker.fairness.turns import Turns
+from esker.jobs.kept import KeptExports
 from esker.session.room.hub import Hub
 from esker.session.room.replicas.viewing import shown
 from esker.store.access import Link
+from esker.store.engine.made import Made
 
 log = logging.getLogger("esker.exporting")
 
@@ -42,6 +44,7 @@ SPARE_BYTES: Final = 64 << 20
 STEM: Final = 48
 OVER: Final = frozenset({"done", "failed", "cancelled"})
 WAITING: Final = "Waiting for its turn."
+GONE: Final = "This export is not on the server any more. Export again."
 BUSY: Final = "Many exports are being made just now. Try again in a few minutes."
 BUSY_SHARE: Final = "Several exports for your address or link are being made. Wait for them."
 PACE: Final = (0.3, 30.0)
@@ -73,10 +76,11 @@ class Job:
 
     id: str
     terrain: str
-    link: Link
+    link: str
+    """The id of the link by which it was asked for."""
     person: str
     """The person, of whom one export at a time is taken."""
-    wanted: ExportRequest
+    media: str
     folder: Path
     status: ExportStatus
     place: Place
@@ -85,6 +89,8 @@ class Job:
     """A place among those that the terrain has."""
     task: asyncio.Task[None] | None = None
     ended: float = 0.0
+    is_shared: bool = False
+    """Whether other servers have what was made, too."""
 
     @property
     def over(self) -> bool:
@@ -114,14 +120,15 @@ class Exports:
         plant: Plant = Plant(),  # noqa: B008  (immutable)
         *,
         fetch: Callable[[c.Document], object] = lambda _: None,
+        made: Made | None = None,
         now: Callable[[], float] = time.monotonic,
         kept_seconds: float = KEPT_SECONDS,
         kept_bytes: int = KEPT_BYTES,
     ) -> None:
         """``folder``: for what is made; what an earlier server left there is removed. ``grids``: where the rasters of
-        layers lie, by digest; ``fetch`` brings those of a document there. ``maker``: ``run.make``, or another for
-        tests. Raises OSError."""
-        self._fetch = fetch
+        layers lie, by digest; ``fetch`` brings those of a document there. ``made``: where several servers have what
+        they made. ``maker``: ``run.make``, or another for tests. Raises OSError."""
+        self._fetch, self._kept = fetch, KeptExports(Made() if made is None else made, hub.journal.now)
         self._hub, self._folder, self._grids, self._maker, self._plant = hub, folder, grids, maker, plant
         self._now, self._kept_seconds, self._kept_bytes = now, kept_seconds, kept_bytes
         self._jobs: dict[str, Job] = {}
@@ -160,8 +167,9 @@ class Exports:
             raise
         status = ExportStatus(id=job_id, stage="waiting", text=WAITING if self._turn.locked() else "")
         place, seat = self._places.take(who), self._in(terrain).take(_in_terrain(who, link))
-        job = self._jobs[job_id] = Job(job_id, terrain, link, person, wanted, folder, status, place, seat)
-        job.task = asyncio.create_task(self._run(job, self._task(job, document)))
+        media = formats.FORMATS[wanted.format].media
+        job = self._jobs[job_id] = Job(job_id, terrain, link.id, person, media, folder, status, place, seat)
+        job.task = asyncio.create_task(self._run(job, self._task(job, document, wanted), formats.estimate(wanted)))
         job.task.add_done_callback(lambda _: job.release())  # also where it was cancelled before it began
         return job.status
 
@@ -172,29 +180,35 @@ class Exports:
         plain = formats.estimate(wanted)
         return plain.model_copy(update={"seconds": round(plain.seconds * self._pace, 1)})
 
-    def status(self, terrain: str, job_id: str, link: Link) -> ExportStatus:
+    async def status(self, terrain: str, job_id: str, link: Link) -> ExportStatus:
         """Where an export stands. Raises Cannot."""
-        return self._own(terrain, job_id, link).status
+        return (await self._own(terrain, job_id, link)).status
 
     async def cancel(self, terrain: str, job_id: str, link: Link) -> None:
         """Stops an export, or removes its file. Harmless when it is over. Raises Cannot."""
-        job = self._own(terrain, job_id, link)
+        job = await self._own(terrain, job_id, link)
         if job.task is not None and not job.task.done():
             job.task.cancel()
             await asyncio.gather(job.task, return_exceptions=True)
         self._forget(job)
 
-    def file(self, terrain: str, job_id: str, link: Link) -> Finished:
+    async def file(self, terrain: str, job_id: str, link: Link) -> Finished:
         """What an export made. Raises Cannot: there is none (yet)."""
-        job = self._own(terrain, job_id, link)
+        job = await self._own(terrain, job_id, link)
         if job.status.stage != "done":
             raise Cannot(409, "not_done", "This export is not done.")
-        return Finished(job.folder / job.status.file, job.status.file, formats.FORMATS[job.wanted.format].media)
+        path = job.folder / job.status.file
+        if not path.exists():  # another server made it
+            job.folder.mkdir(parents=True, exist_ok=True)
+            if not await self._kept.fetch(terrain, job_id, path):
+                self._forget(job)
+                raise Cannot(404, "no_export", GONE)
+        return Finished(path, job.status.file, job.media)
 
     def end(self, terrain: str, links: Collection[str]) -> None:
         """Links were revoked: what is being made for them ends, and what was made is removed."""
         for job in list(self._jobs.values()):
-            if job.terrain == terrain and job.link.id in links:
+            if job.terrain == terrain and job.link in links:
                 if job.task is not None and not job.task.done():
                     job.task.cancel()
                     job.task.add_done_callback(partial(self._forget_late, job))
@@ -208,8 +222,7 @@ class Exports:
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
-        for job in list(self._jobs.values()):
-            self._forget(job)
+        self._jobs.clear()  # what other servers have too is there for them
         shutil.rmtree(self._folder, ignore_errors=True)
 
     # --- the work -----------------------------------------------------------------------------------------------
@@ -230,22 +243,22 @@ class Exports:
             del self._in_room[other]
         return self._in_room.setdefault(terrain, Places(OPEN_IN_ROOM))
 
-    def _task(self, job: Job, document: c.Document) -> wire.Task:
+    def _task(self, job: Job, document: c.Document, wanted: ExportRequest) -> wire.Task:
         plant = self._plant
         stem = re.sub(r"[\W_]+", "-", document.settings.title)[:STEM].strip("-").lower() or "terrain"
         return wire.Task(
             document=document.model_copy(update={"deleted": (), "deleted_layers": ()}),
-            wanted=job.wanted,
+            wanted=wanted,
             grids=str(self._grids.resolve()),
             folder=str(job.folder.resolve()),
-            name=f"{stem}-{job.wanted.samples}",
+            name=f"{stem}-{wanted.samples}",
             device=plant.device,
             threads=plant.threads,
             global_level=plant.level,
             refined_level=plant.refine,
         )
 
-    async def _run(self, job: Job, task: wire.Task) -> None:
+    async def _run(self, job: Job, task: wire.Task, plain: ExportEstimate) -> None:
         try:
             async with self._turn.turn(job.place.who):
                 started = self._now()
@@ -253,9 +266,12 @@ class Exports:
                 made = await self._maker(task, lambda stage, share: job.at(stage, share=share))
             fields = made.model_dump(exclude={"type"})
             job.at("done", share=1.0, **fields)
+            job.is_shared = await self._kept.keep(
+                job.terrain, job.folder / job.status.file, job.status, job.link, job.media, self._kept_seconds
+            )
             took = self._now() - started
             low, high = PACE
-            pace = min(max(took / formats.estimate(job.wanted).seconds, low), high)
+            pace = min(max(took / plain.seconds, low), high)
             self._pace = 0.5 * (self._pace + pace)
             log.info("export %s of %s in %.1f s", made.file, job.terrain, took)
         except asyncio.CancelledError:
@@ -295,9 +311,9 @@ class Exports:
             self._forget(going)
 
     def has(self, terrain: str) -> bool:
-        """Returns whether something of a terrain is under way, or can still be asked about."""
+        """Returns whether something of a terrain is under way, or can still be asked about here alone."""
         self._forget_old()
-        return any(job.terrain == terrain for job in self._jobs.values())
+        return any(job.terrain == terrain and not job.is_shared for job in self._jobs.values())
 
     def _forget_late(self, job: Job, _: object) -> None:
         self._forget(job)
@@ -305,14 +321,30 @@ class Exports:
     def _forget(self, job: Job) -> None:
         self._jobs.pop(job.id, None)
         shutil.rmtree(job.folder, ignore_errors=True)
+        if job.is_shared:
+            self._kept.drop(job.terrain, job.id)
 
-    def _own(self, terrain: str, job_id: str, link: Link) -> Job:
-        job = self._jobs.get(job_id)
+    async def _own(self, terrain: str, job_id: str, link: Link) -> Job:
+        job = self._jobs.get(job_id) or await self._made_elsewhere(terrain, job_id)
         if job is None or job.terrain != terrain:
-            raise Cannot(404, "no_export", "This export is not on the server any more. Export again.")
-        if job.link.id != link.id and link.role != "owner":
+            raise Cannot(404, "no_export", GONE)
+        if job.link != link.id and link.role != "owner":
             raise Cannot(403, "not_allowed", "Only who began an export, or an owner of the terrain, may do this.")
         return job
+
+    async def _made_elsewhere(self, terrain: str, job_id: str) -> Job | None:
+        """Takes an export over that another server made, while the link by which it was asked for lives."""
+        found = await self._kept.find(terrain, job_id)
+        if found is None or self._closing:
+            return None
+        export, left = found
+        if not any(each.id == export.link and each.revoked is None for each in self._hub.access.links(terrain)):
+            self._kept.drop(terrain, job_id)
+            return None
+        place, seat = (Places(Share(1)).take(Who("")) for _ in range(2))  # it takes nobody's place
+        job = Job(job_id, terrain, export.link, "", export.media, self._folder / job_id, export.status, place, seat)
+        job.is_shared, job.ended = True, self._now() - self._kept_seconds + left
+        return self._jobs.setdefault(job_id, job)
 
 
 def _in_terrain(who: Who, link: Link) -> Who:

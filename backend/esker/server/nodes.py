@@ -27,6 +27,7 @@ from esker.store.classes import ClassStore
 from esker.store.engine.leases import Unreachable
 from esker.store.engine.ports import BadDatabase, Database
 from esker.store.journal import Journal
+from esker.store.previews import PreviewTokens
 
 log = logging.getLogger("esker.cluster")
 
@@ -84,7 +85,7 @@ class Rooms:
 
     def __init__(self, hub: Hub) -> None:
         self._hub, self._journal = hub, hub.journal
-        self._classes = ClassStore(hub.journal)
+        self._classes, self._tokens = ClassStore(hub.journal), PreviewTokens(hub.journal)
         self.jobs: list[Jobs] = []
 
     def in_use(self, terrain: str) -> bool:
@@ -110,12 +111,14 @@ class Rooms:
         return home or terrain
 
     async def terrain_of(self, about: About, scope: Message, body: bytes) -> str:
-        """Returns the terrain that a request is about which names none: by its class, seat or join code."""
+        """Returns the terrain that a request is about which names none: by its class, picture, seat or join code."""
         return await asyncio.to_thread(self._terrain_of, about, dict(scope["headers"]), body)
 
     def _terrain_of(self, about: About, fields: dict[bytes, bytes], body: bytes) -> str:
         if about.lesson:
             return self._classes.home(about.lesson) or ""
+        if about.picture:
+            return self._tokens.terrain(about.picture) or ""
         if about.is_seat:
             secret = fields.get(b"authorization", b"").decode("latin-1").partition(" ")[2].strip()
             pupil = self._classes.seated(secret) if 0 < len(secret) <= 128 else None

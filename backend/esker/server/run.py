@@ -230,7 +230,7 @@ class Assembly:
         if self._gauges is not None:
             self._gauges.hub, self._gauges.worker = self.hub, self._worker
             self._gauges.cluster = None if member is None else member.cluster
-        self._care = Care(self._journal, self.hub.deletion, self._grids)
+        self._care = Care(self._journal, self.hub.deletion, self._grids, made=self._storing.made)
 
     def _join(self) -> tuple[Engine, Callable[[], float]]:
         """The database of this server as one of several, and the date that they have together. Raises CannotServe."""
@@ -263,12 +263,15 @@ class Assembly:
     def server(self, announce: bool = True) -> _Server:
         """Returns the HTTP server, to be run with ``run``."""
         assert self._journal is not None, "an assembly is open until it is closed"
+        assert self._storing is not None
+        made = self._storing.made
         pictures = Pictures(
             Previews(
                 self.settings.data / "previews",
                 self.settings.device,
                 grids=self.settings.data / FOLDER,
                 fetch=self._grids.fetch_all,
+                made=made,
             ),
             PreviewTokens(self._journal),
             self.settings.public_url.rstrip("/") if self.settings.public_url else None,
@@ -277,7 +280,9 @@ class Assembly:
         settings = self.settings
         plant = Plant(settings.device, settings.threads, settings.level, settings.refine)
         folder, fetch = self._grids.folder, self._grids.fetch_all
-        self.exports = Exports(self.hub, settings.data / "exports", folder, exporting.make, plant, fetch=fetch)
+        self.exports = Exports(
+            self.hub, settings.data / "exports", folder, exporting.make, plant, fetch=fetch, made=made
+        )
         if self.member is not None:
             self.private.write(self.private.open().model_copy(update={"key": self.member.keeper}))
         key = Key(self.private.open().key)

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from esker.server.settings import Settings
 from esker.server.starting import CannotServe
 from esker.store.engine.lock import DataLock, InUse
+from esker.store.engine.made import PATIENCE_SECONDS, Made
 from esker.store.engine.objects import NoObjects, Objects
 from esker.store.engine.ports import BadDatabase, Engine, Unreachable
 from esker.store.grids import GridStore
@@ -51,6 +52,7 @@ class Storing:
             refuse_half_moved(self.journal)
             objects = Objects(settings.blobs) if settings.blobs else None
             self.grids = GridStore(settings.data, self.space, objects)
+            self.made = Made(Objects(settings.blobs, PATIENCE_SECONDS) if settings.blobs else None)
             self.grids.sweep(self.journal.grids(), forgotten=self.journal.may_sweep())
         except (InUse, BadDatabase, Unreachable, CannotMove, NoObjects) as error:
             self.close()

@@ -2,7 +2,8 @@
 
 Drawing takes seconds of all that a core can do and runs a graphics driver: neither may touch the rooms, so a child
 process does it, at the lowest priority, one picture at a time. A picture belongs to the clock of its document. While a
-newer one is being drawn, or too soon after the last, the old one is served.
+newer one is being drawn, or too soon after the last, the old one is served. Where several servers have a store of
+objects together, what one of them drew the others do not draw again.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from esker.fairness.shares import OWNER, Full, Places, Share, Who
 from esker.process import interrupt, system
 from esker.process.bounds import Bounds
 from esker.process.child_process import ORPHANED
+from esker.store.engine.made import PREVIEWS, Made
 
 log = logging.getLogger("esker.previews")
 
@@ -46,6 +48,7 @@ KEPT: Final = 500
 IDLE_SECONDS: Final = 90.0
 """After this long without work the drawing process ends and gives its memory back."""
 NICENESS: Final = 15
+NO_PICTURES: Final = "This server cannot draw pictures."
 FILE_BYTES: Final = 256 << 20
 OPEN_FILES: Final = 1_024
 
@@ -71,13 +74,15 @@ class Previews:
         *,
         grids: Path | None = None,
         fetch: Callable[[Document], object] = lambda _: None,
+        made: Made | None = None,
         painter: Painter | None = None,
         executor: Callable[[], Executor] | None = None,
         now: Callable[[], float] = time.monotonic,
     ) -> None:
         """``folder``: where pictures are kept, made when needed. ``grids``: where the rasters of elevation layers lie,
-        by digest; ``fetch`` brings those of a document there. ``painter``, ``executor``, ``now``: others, for tests."""
-        self._fetch = fetch
+        by digest; ``fetch`` brings those of a document there. ``made``: where all servers have their pictures.
+        ``painter``, ``executor``, ``now``: others, for tests."""
+        self._fetch, self._made = fetch, Made() if made is None else made
         self._folder, self._device, self._now = folder, device, now
         self._painter = painter or partial(paint, grids=grids)
         self._new_executor = executor or DrawingProcess
@@ -109,8 +114,8 @@ class Previews:
         if held is not None and (_clock(held) == document.clock or self._soon(document.id)):
             os.utime(held)
             return held
-        if not self.available:
-            raise CannotDraw("This server cannot draw pictures.")
+        if not self.available and not self._made.is_shared:
+            raise CannotDraw(NO_PICTURES)
         task = self._coming.get(document.id)
         if task is None:
             try:
@@ -135,10 +140,12 @@ class Previews:
             log.debug("no picture ahead of time: %s", error)
 
     def forget(self, terrain: str) -> None:
-        """Removes the pictures of a terrain from the disk."""
+        """Removes the pictures of a terrain from the disk, and from where all servers have them."""
         for path in self._of(terrain):
             path.unlink(missing_ok=True)
         self._drawn.pop(terrain, None)
+        if self._made.is_shared:
+            asyncio.get_running_loop().run_in_executor(None, self._made.remove_all, f"{PREVIEWS}{terrain}/")
 
     async def close(self) -> None:
         """Ends the drawing process."""
@@ -158,6 +165,10 @@ class Previews:
             log.debug("no picture of %s: %s", terrain, task.exception())
 
     async def _draw(self, document: Document) -> Path:
+        if self._made.is_shared and (drawn := await asyncio.to_thread(self._drawn_by_others, document)) is not None:
+            return drawn
+        if not self.available:
+            raise CannotDraw(NO_PICTURES)
         async with self._turn:
             started = self._now()
             await asyncio.to_thread(self._fetch, document)
@@ -195,19 +206,40 @@ class Previews:
             self._executor.shutdown(wait=False, cancel_futures=True)
             self._executor = None
 
+    def _drawn_by_others(self, document: Document) -> Path | None:
+        """Brings the picture of a document here where another server drew it."""
+        self._folder.mkdir(parents=True, exist_ok=True)
+        path = self._folder / f"{document.id}-{document.clock}.jpg"
+        if not self._made.fetch(_name(path), path):
+            return None
+        self._tidy(path)
+        return path
+
     def _keep(self, document: Document, data: bytes) -> Path:
         self._folder.mkdir(parents=True, exist_ok=True)
         path = self._folder / f"{document.id}-{document.clock}.jpg"
         part = path.with_suffix(".part")
         part.write_bytes(data)
         part.replace(path)
-        for old in self._of(document.id):
+        self._made.give(_name(path), path)
+        self._made.remove(*(_name(old) for old in self._of(document.id) if old != path))
+        self._tidy(path)
+        return path
+
+    def _tidy(self, path: Path) -> None:
+        """Removes what the picture at ``path`` stands for now, and those that nobody asked for."""
+        for old in self._of(path.stem.rsplit("-", 1)[0]):
             if old != path:
                 old.unlink(missing_ok=True)
         pictures = sorted(self._folder.glob("*.jpg"), key=lambda p: p.stat().st_mtime)
         for old in pictures[:-KEPT]:
             old.unlink(missing_ok=True)
-        return path
+
+
+def _name(path: Path) -> str:
+    """The name under which all servers have a picture."""
+    terrain, _, clock = path.stem.rpartition("-")
+    return f"{PREVIEWS}{terrain}/{clock}.jpg"
 
 
 def _clock(path: Path) -> int:

@@ -38,11 +38,11 @@ def add_exports(app: FastAPI, hub: Hub, exports: Exports) -> None:
 
     @app.get(f"{path}/{{job}}")
     async def status(terrain: str, job: str, link: AnyLink) -> c.ExportStatus:
-        return exports.status(terrain, job, link)
+        return await exports.status(terrain, job, link)
 
     @app.get(f"{path}/{{job}}/file")
     async def file(terrain: str, job: str, link: AnyLink) -> Response:
-        found = exports.file(terrain, job, link)
+        found = await exports.file(terrain, job, link)
         return Sent(hub, link, found.path, found.media, found.name)
 
     @app.delete(f"{path}/{{job}}", status_code=204)

@@ -89,7 +89,8 @@ async def _draw_ahead(hub: Hub, pictures: Pictures, terrain: str, who: Who) -> c
         document = await hub.document(terrain, None, who)
     except Denied:
         return None
-    pictures.previews.begin(document, who)
+    if hub.is_here(terrain):  # elsewhere the picture is asked for, and drawn
+        pictures.previews.begin(document, who)
     return document
 
 

@@ -352,6 +352,10 @@ class Hub:
         if self._tenancy is not None:
             await self._tenancy.hold(terrain)
 
+    def is_here(self, terrain: str) -> bool:
+        """Returns whether this server has a terrain, as one that is alone has all."""
+        return self._tenancy is None or self._tenancy.may_acknowledge(terrain)
+
     def in_use(self, terrain: str) -> bool:
         """Returns whether a room of a terrain is open, of its history too."""
         return terrain in self._rooms or self._history_rooms.has(terrain)

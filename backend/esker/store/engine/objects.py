@@ -15,6 +15,7 @@ from typing import Any, Final
 NO_DRIVER: Final = "ESKER_BLOBS needs obstore, which a plain installation does not bring: pip install 'esker[cluster]'."
 AT_ONCE_BYTES: Final = 32 << 20
 """A larger file is sent in parts."""
+PATIENCE_SECONDS: Final = 20.0
 REFRESH_SECONDS: Final = 86_400.0
 """A file that is stored again after so long counts as new: whoever sweeps looks at its age."""
 
@@ -30,8 +31,11 @@ class NoSuchObject(NoObjects):
 class Objects:
     """Files under ``s3://bucket/prefix``. Blocking; safe from any thread."""
 
-    def __init__(self, url: str) -> None:
-        """Asks nothing yet. Raises NoObjects for what is no such address, or without its driver."""
+    def __init__(self, url: str, patience: float = PATIENCE_SECONDS) -> None:
+        """Asks nothing yet. ``patience``: seconds for which something is tried again.
+
+        Raises NoObjects for what is no such address, or without its driver.
+        """
         try:
             import obstore
             from obstore.exceptions import BaseError
@@ -46,7 +50,7 @@ class Objects:
             self._store = S3Store.from_url(
                 url,
                 client_options={"allow_http": True, "connect_timeout": "3s", "timeout": "120s"},
-                retry_config={"max_retries": 3, "retry_timeout": timedelta(seconds=20)},
+                retry_config={"max_retries": 3, "retry_timeout": timedelta(seconds=patience)},
             )
         except BaseError as error:
             raise NoObjects(f"{url} cannot be used as a store of grids ({_plain(error)}).") from None

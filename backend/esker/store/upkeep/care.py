@@ -12,6 +12,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
+from esker.store.engine.made import Made
 from esker.store.grids import GridStore
 from esker.store.journal import Journal
 from esker.store.upkeep.compaction import Compaction
@@ -44,9 +45,12 @@ class Care:
         deletion: Deletion,
         grids: GridStore,
         *,
+        made: Made | None = None,
         seconds: float = CARE_SECONDS,
         full_seconds: float = FULL_SECONDS,
     ) -> None:
+        """``made``: what servers made for all of them."""
+        self._made = Made() if made is None else made
         self._journal, self._deletion, self._grids = journal, deletion, grids
         self._seconds, self._full_seconds = seconds, full_seconds
         self._compaction = Compaction(journal, pause=self._pause)
@@ -73,6 +77,7 @@ class Care:
             (self._remove, "deleted terrains could not be removed"),
             (self._fold, "old histories could not be folded"),
             (self._sweep, "forgotten grids could not be removed"),
+            (self._made.throw_old, "old exports and pictures could not be removed"),
         ):
             if not self._stopped.is_set():
                 _do(work, failure)
