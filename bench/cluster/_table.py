@@ -28,9 +28,9 @@ def figures(result: dict[str, Any]) -> str:
         f"`esker bench cluster --json` on {machine['cpu']} ({machine['cores']} cores), "
         f"load {machine['load_before']} before. {result['note']} {scene['clients']} clients append "
         f"{scene['ops_per_s_each']:g} times a second each for "
-        f"{scene['seconds']:g} s.",
+        f"{scene['seconds']:g} s; on one terrain where there is one server, else on six, some at nodes that pass them on.",
         "",
-        "| | acknowledged, p50 / p99 | acknowledged of due | processors: servers | database |",
+        "| | acknowledged, p50 / p99 | operations, refused | processors: servers | database |",
         "|---|---|---|---|---|",
     ]
     names = {"sqlite": "1 server, SQLite"} | {
@@ -40,7 +40,7 @@ def figures(result: dict[str, Any]) -> str:
         found = result[key]
         acks = found["ack_ms"]
         lines.append(
-            f"| {name} | {acks['p50']:,.0f} / {acks['p99']:,.0f} ms | {found['acknowledged']:,} of {found['due']:,} "
+            f"| {name} | {acks['p50']:,.0f} / {acks['p99']:,.0f} ms | {found['acknowledged']:,}, {found['refused']} "
             f"| {found['cores_of_servers']:.2f} | {found['cores'].get('database', 0.0):.2f} |"
         )
     alone, sixty = result["forwarding"]["alone_ms"], result["forwarding"]["cores_for_passing_on"]
@@ -57,8 +57,8 @@ def figures(result: dict[str, Any]) -> str:
         f"| {_met(appends['fenced_per_s'] >= AIMS['fenced'])} |",
         _back("killed", kill, AIMS["kill"]),
         _back("stopped", drain, AIMS["drain"]),
-        f"| passing on ≤ {AIMS['passing_ms']:.0f} ms | {alone['added_p50']:.2f} ms (p50 {alone['at_owner']['p50']:.1f} "
-        f"→ {alone['passed_on']['p50']:.1f}) | {_met(alone['added_p50'] <= AIMS['passing_ms'])} |",
+        f"| passing on ≤ {AIMS['passing_ms']:.0f} ms | {alone['added_p50']:.1f} ms for one client "
+        f"(p50 {alone['at_owner']['p50']:.1f} → {alone['passed_on']['p50']:.1f}) | {_met(alone['added_p50'] <= AIMS['passing_ms'])} |",
         f"| passing on ≤ {AIMS['passing_cores']:g} of a processor | {sixty:.2f} "
         f"| {_met(sixty <= AIMS['passing_cores'])} |",
     ]
