@@ -70,7 +70,7 @@ def _back(how: str, found: dict[str, Any], aim: float) -> str:
     last, median = found["seconds"]["last"], found["seconds"]["median"]
     return (
         f"| clients of a node that is {how} back ≤ {aim:g} s | {found['came_back']} of {found['clients']}, "
-        f"the last after {last:.1f} s, half after {median:.1f}; {found['lost']} operations lost | {_met(last <= aim)} |"
+        f"the last after {last:.2f} s, half after {median:.2f}; {found['lost']} operations lost | {_met(last <= aim)} |"
     )
 
 
