@@ -14,6 +14,7 @@ import pytest
 
 from bench.cluster._objects import ObjectServer
 from esker.document.birth import new_document
+from esker.jobs.exports import Exports
 from esker.render.pictures.previews import Previews
 from esker.store.engine import made as made_module
 from esker.store.engine.made import EXPORTS, Made
@@ -40,12 +41,19 @@ def until(holds: Any) -> Any:
     return found
 
 
+def exports_of(live: LiveServer) -> Exports:
+    """What a server exports."""
+    found = live.assembly.exports
+    assert found is not None
+    return found
+
+
 def exported(live: LiveServer, terrain: str, secret: str) -> str:
     """The path of an export that is done, and that others have."""
     job = live.http("POST", f"/api/terrains/{terrain}/exports", WANTED, secret)[1]["id"]
     path = f"/api/terrains/{terrain}/exports/{job}"
     until(lambda: live.http("GET", path, secret=secret)[1]["stage"] == "done")
-    until(lambda: live.assembly.exports._jobs[job].is_shared)
+    until(lambda: exports_of(live)._jobs[job].is_shared)
     return path
 
 
@@ -59,7 +67,7 @@ def test_an_export_is_found_on_another_server(
         terrain, owner = one.create()
         link = one.http("POST", f"/api/terrains/{terrain}/links", {"role": "view"}, owner)[1]
         stays, late, revoked = (exported(one, terrain, secret) for secret in (owner, owner, link["secret"]))
-        assert not one.assembly.exports.has(terrain), "the terrain may move: nothing is lost with this server"
+        assert not exports_of(one).has(terrain), "the terrain may move: nothing is lost with this server"
     with LiveServer(tmp_path / "b", database=url, blobs=blobs) as other:
         status, found = other.http("GET", stays, secret=owner)
         assert (status, found["stage"], found["file"]) == (200, "done", "a.npy")
@@ -67,13 +75,13 @@ def test_an_export_is_found_on_another_server(
             assert other.raw("GET", f"{stays}/file", secret=owner) == (200, CONTENT, "application/octet-stream")
         assert other.http("GET", f"{stays}x", secret=owner)[0] == 404
         assert other.http("GET", revoked, secret=link["secret"])[0] == 200
-        other.assembly.exports._jobs.clear()
+        exports_of(other)._jobs.clear()
         other.http("DELETE", f"/api/terrains/{terrain}/links/{link['id']}", secret=owner)
         assert other.http("GET", revoked, secret=owner)[0] == 404, "it was made for a link that has ended"
-        date = other.assembly.exports._kept._date
-        other.assembly.exports._kept._date = lambda: date() + 700.0
+        date = exports_of(other)._kept._date
+        exports_of(other)._kept._date = lambda: date() + 700.0
         assert other.http("GET", late, secret=owner)[0] == 404
-        other.assembly.exports._kept._date = date
+        exports_of(other)._kept._date = date
         assert other.http("DELETE", late, secret=owner)[0] == 204
         objects = Objects(blobs)
         until(lambda: {name.split("/")[2] for name, _ in objects.ages(EXPORTS)} == {stays.rsplit("/", 1)[1]})

@@ -10,6 +10,7 @@ import logging
 import tempfile
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -71,11 +72,16 @@ class Made:
     def remove(self, *names: str) -> None:
         """Removes files."""
         for name in names:
-            self._tried("removed", name, lambda objects, name=name: objects.delete(name))
+            self._tried("removed", name, partial(Objects.delete, name=name))
 
     def remove_all(self, folder: str) -> None:
         """Removes everything below a name that ends with a slash."""
-        self._tried("removed", folder, lambda objects: [objects.delete(name) for name, _ in objects.ages(folder)])
+
+        def work(objects: Objects) -> None:
+            for name in [name for name, _ in objects.ages(folder)]:
+                objects.delete(name)
+
+        self._tried("removed", folder, work)
 
     def throw_old(self) -> None:
         """Removes what is too old to be asked for. Raises NoObjects."""
