@@ -23,7 +23,7 @@ ROOMS := tests/sync
 HOLDING := $(shell env --block-signal=INT true 2>/dev/null && echo env --block-signal=INT)
 SOURCES := $(shell find frontend/src shaders frontend/public -type f 2>/dev/null)
 
-.PHONY: run test test-levels test-people test-drawn test-rooms test-solved test-rest test-page pictures wheel audit check check-python check-page format generate lock setup browser clean
+.PHONY: run test test-long test-levels test-people test-drawn test-rooms test-solved test-rest test-page pictures wheel audit check check-python check-page format generate lock setup browser clean
 
 run: setup frontend/dist/index.html ## set up, build, start the server, print the link of a terrain
 	@exec $(HOLDING) $(BIN)/python -m esker serve $(ARGS)
@@ -67,6 +67,10 @@ test-levels: setup ## the tests of what is computed, compiled for narrower proce
 	ESKER_EVERY_LEVEL=1 $(BIN)/python -m pytest -o cache_dir=.pytest_cache/levels tests/solver/test_every_level.py
 	for level in $(LEVELS); do echo "ESKER_CPU_LEVEL=$$level"; \
 	  ESKER_CPU_LEVEL=$$level $(BIN)/python -m pytest -o cache_dir=.pytest_cache/levels $(COMPUTED); done
+
+# What `make test` has in a short form: as many rooms, clients and take-overs as the issue of several servers names.
+test-long: $(STAMPS)/dev ## the long forms of tests with several servers and a full disk: before a release
+	ESKER_LONG=1 $(BIN)/python -m pytest -o cache_dir=.pytest_cache/long tests/cluster tests/store/test_full_disk.py
 
 test-page:
 	$(call told,page); $(NPM) test
