@@ -110,7 +110,8 @@ describe("words of grids", () => {
     expect(handAnswers(place("middle"))).toBe(false);
     expect(listsFormats("It is in no format that can be read. There are: GeoTIFF or COG")).toBe(true);
     expect(listsFormats("It is empty.")).toBe(false);
-    expect(optionWords("rows", "north first")).toBe("North first");
+    expect(optionWords("rows", "north first")).toBe("The northern row first");
+    expect(optionWords("rows", "east first")).toBe("East first");
   });
 });
 
