@@ -49,10 +49,24 @@ def test_no_point_lies_farther_than_the_reach(stroke: c.Stroke) -> None:
     assert box is not None
     points = world_points(stroke)
     assert np.abs(points).max() <= reach(stroke, box)
-    corners = [(u, v) for u in (box.u0, box.u1) for v in (box.v0, box.v1)]
-    widest = np.abs(world_points(stroke.model_copy(update={"curve": tuple(corners)}))).max()
-    sides = 2 * max(map(abs, (*stroke.first, *stroke.last)))
-    assert reach(stroke, box) <= (2 * widest + 8 * sides) * 1.001, "nor is it out of all proportion"
+    mirrored = [(u, v) for u in _both(box.u0, box.u1) for v in _both(box.v0, box.v1)]
+    widest = np.abs(world_points(stroke.model_copy(update={"curve": tuple(mirrored)}))).max()
+    assert reach(stroke, box) <= max(widest, abs(stroke.first[2])) * 1.001, "nor is it out of all proportion"
+
+
+def _both(low: float, high: float) -> tuple[float, float]:
+    """The end of a range that is farther from zero, on both sides of zero."""
+    far = max(abs(low), abs(high))
+    return far, -far
+
+
+def test_a_stroke_whose_parts_outweigh_each_other() -> None:
+    """Its point is low only because the fall of its anchors takes away what its curve rises; the reach adds both."""
+    stroke = c.Stroke(id="s", kind="profile", first=(0, 0, 0), last=(0, 0, -875), curve=((9, 9287),))
+    box = curve_box(stroke.curve)
+    assert box is not None
+    assert np.abs(world_points(stroke)).max() == 1412
+    assert reach(stroke, box) == pytest.approx(9 * 875 + 9287)
 
 
 @given(st.lists(point, max_size=12), st.lists(point, max_size=5))
