@@ -20,7 +20,18 @@ from esker.server.hydrology import Hydrology, Snapshot, snapshot
 from esker.session import rivers as session_rivers
 from esker.session.ground.feed import TileFeed
 from esker.session.ground.tilethread import TileThread
-from esker.session.rivers import EVERY_SECONDS, QUIET_SECONDS, REST_SHARE, Gate, Look, Pace, Rivers, Wanted, next_look
+from esker.session.rivers import (
+    EVERY_SECONDS,
+    GATE_SECONDS,
+    QUIET_SECONDS,
+    REST_SHARE,
+    Gate,
+    Look,
+    Pace,
+    Rivers,
+    Wanted,
+    next_look,
+)
 from esker.tiles.codec.rivers import is_rivers, read_rivers
 from esker.tiles.delivery import ClientTiles, TileServer
 from esker.tiles.watcher import Watcher
@@ -53,36 +64,58 @@ def test_when_rivers_are_looked_for(
 def test_searches_of_all_rooms_pass_one_at_a_time_with_a_pause_behind_each() -> None:
     """SPEC S586: whoever has waited longest is next, and who closes gives the place back."""
     gate = Gate(4)
-    assert gate.wait("a", 10.0) == 0
-    gate.enter("a", 10.0)
-    assert gate.wait("b", 10.0) > 0
-    assert gate.wait("c", 10.0) > 0
+    assert gate.wait("a", None, 10.0) == 0
+    gate.enter("a", None, 10.0)
+    assert gate.wait("b", None, 10.0) > 0
+    assert gate.wait("c", None, 10.0) > 0
     gate.leave("a", 10.5)
-    assert gate.wait("b", 10.5) == pytest.approx(3 * 0.5)
-    assert gate.wait("c", 12.0) > 0, "it came behind another one"
-    assert gate.wait("b", 12.0) == 0
+    assert gate.wait("b", None, 10.5) == pytest.approx(3 * 0.5)
+    assert gate.wait("c", None, 12.0) > 0, "it came behind another one"
+    assert gate.wait("b", None, 12.0) == 0
     gate.leave("b", 12.0)
-    assert gate.wait("d", 12.0) > 0
-    assert gate.wait("d", 13.0) == 0, "who does not come back holds nobody up"
+    assert gate.wait("d", None, 12.0) > 0
+    assert gate.wait("d", None, 13.0) == 0, "who does not come back holds nobody up"
+
+
+def test_homes_have_turns_at_the_gate() -> None:
+    """SPEC S586: sixty rooms of one home stood before the room of another, which now waits for one search at most. Of a
+    home whoever has waited longest is next."""
+    gate, now, rooms = Gate(1), 0.0, [f"s{k}" for k in range(60)]
+    gate.enter("s", "stranger", now)
+    for room in rooms:
+        assert gate.wait(room, "stranger", now) > 0
+    assert gate.wait("mine", "me", now) > 0
+    gate.leave("s", now)
+    order: list[str] = []
+    waiting = dict.fromkeys(rooms, "stranger") | {"mine": "me"}
+    while waiting:
+        now += GATE_SECONDS / 2
+        began = [room for room, home in waiting.items() if gate.wait(room, home, now) == 0]
+        assert len(began) == 1
+        gate.enter(began[0], waiting.pop(began[0]), now)
+        gate.leave(began[0], now)
+        order += began
+    assert order.index("mine") <= 1
+    assert [room for room in order if room != "mine"] == rooms
 
 
 def test_searches_at_rest_pause_only_while_anybody_draws() -> None:
     """SPEC S587."""
     pace = Pace()
-    pace.enter("a", REST, 100.0)
+    pace.enter("a", None, REST, 100.0)
     pace.leave("a", 101.0)
-    assert pace.wait("b", REST, 101.0) == 0, "nobody draws"
-    pace.enter("c", PREVIEW, 101.0)
+    assert pace.wait("b", None, REST, 101.0) == 0, "nobody draws"
+    pace.enter("c", None, PREVIEW, 101.0)
     pace.leave("c", 101.1)
-    assert pace.wait("b", REST, 101.1) == pytest.approx(QUIET_SECONDS - 0.1)
-    pace.enter("c", PREVIEW, 103.0)
-    assert pace.wait("b", REST, 103.5) == pytest.approx(QUIET_SECONDS - 0.5)
+    assert pace.wait("b", None, REST, 101.1) == pytest.approx(QUIET_SECONDS - 0.1)
+    pace.enter("c", None, PREVIEW, 103.0)
+    assert pace.wait("b", None, REST, 103.5) == pytest.approx(QUIET_SECONDS - 0.5)
     pace.leave("c", 103.6)
     for tenths in range(1036, 1100, 5):
-        pace.wait("d", PREVIEW, tenths / 10)
-        assert pace.wait("b", REST, tenths / 10) > 0, "who waits for a search draws, too"
-    pace.wait("d", PREVIEW, 101.0 + REST_SHARE - 1)
-    assert pace.wait("b", REST, 101.0 + REST_SHARE - 1) == 0, "the pause is over, however much is drawn"
+        pace.wait("d", None, PREVIEW, tenths / 10)
+        assert pace.wait("b", None, REST, tenths / 10) > 0, "who waits for a search draws, too"
+    pace.wait("d", None, PREVIEW, 101.0 + REST_SHARE - 1)
+    assert pace.wait("b", None, REST, 101.0 + REST_SHARE - 1) == 0, "the pause is over, however much is drawn"
 
 
 class Searches:

@@ -7,6 +7,7 @@ from concurrent.futures import CancelledError
 
 import pytest
 
+from esker.fairness.rounds import Rounds
 from esker.session.ground.tilethread import Lane, TileThread
 
 
@@ -110,3 +111,16 @@ def test_frames_of_who_has_levels_wait_for_these() -> None:
     held.now = 1.0
     lane.first(held.log.append, "l")
     assert held.done() == ["l", "f"]
+
+
+def test_who_had_a_turn_longest_ago_is_next_and_only_so_many_are_remembered() -> None:
+    """SPEC P641."""
+    rounds = Rounds(most=3)
+    for key in "abca":
+        rounds.took(key)
+    assert sorted("abcd", key=rounds.last) == ["d", "b", "c", "a"]
+    for k in range(100):
+        rounds.took(k)
+    assert len(rounds) == 3
+    assert rounds.last("a") == 0
+    assert rounds.last(99) > rounds.last(98) > 0

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from typing import Any, Final, Protocol
 
 from esker.document.layers import span_m
 from esker.document.ops import StrokeSet
+from esker.fairness.rounds import Rounds
 from esker.session.ground.ports import Hydrology
 
 log = logging.getLogger("esker.rivers")
@@ -68,36 +69,50 @@ class Wanted:
     rest_at: float | None = None
 
 
+@dataclass(frozen=True)
+class _Place:
+    """A room's place in the line: the address that it searches for, and when it comes back to ask."""
+
+    home: Hashable
+    due: float
+
+
 class Gate:
     """Lets the searches of all rooms of a server through one after another, with a pause behind each that is as long as
-    the search times ``share`` less one, and ``most`` seconds at most. Whoever has waited longest is next. Call it from
-    the event loop's thread."""
+    the search times ``share`` less one, and ``most`` seconds at most. Homes (addresses) have turns, and of the rooms of
+    a home the one that has waited longest is next: however many rooms one home has, another home's room waits for one
+    search of it. A room without a home is its own. Call it from the event loop's thread."""
 
     def __init__(self, share: int, most: float = float("inf")) -> None:
         self._share, self._most = share, most
-        self._line: dict[object, float] = {}
-        """Who waits, and when each comes back to ask."""
+        self._line: dict[object, _Place] = {}
+        """Who waits, whoever came first at the front."""
+        self._rounds = Rounds()
         self._inside: object = None
         self._since = 0.0
         self._until = float("-inf")
 
-    def wait(self, who: object, now: float, pause_until: float = float("inf")) -> float:
+    def wait(self, who: object, home: Hashable, now: float, pause_until: float = float("inf")) -> float:
         """Returns 0 where a room may begin, which ``enter`` says then; else for how many seconds it has to wait at
         least. It stands in line from now on. ``pause_until``: when the pause ends however long it is."""
         left = min(self._until, pause_until) - now
+        self._line[who] = _Place(who if home is None else home, now)
         if self._inside is not None or left > 0:
             wait = GATE_SECONDS if self._inside is not None else left
         else:
-            gone = [other for other, due in self._line.items() if due < now - GATE_SECONDS and other is not who]
-            for other in gone:  # it did not come back: nothing is wanted there any more
-                del self._line[other]
-            wait = 0.0 if next(iter(self._line), who) is who else GATE_SECONDS
-        self._line[who] = now + wait
+            wait = 0.0 if self._next(now) is who else GATE_SECONDS
+        self._line[who] = replace(self._line[who], due=now + wait)
         return wait
 
-    def enter(self, who: object, now: float) -> None:
-        """A room begins."""
+    def _next(self, now: float) -> object:
+        """Returns whose turn it is of those in line. Who did not come back wants nothing any more and is forgotten."""
+        self._line = {who: place for who, place in self._line.items() if place.due >= now - GATE_SECONDS}
+        return min(self._line, key=lambda who: self._rounds.last(self._line[who].home))
+
+    def enter(self, who: object, home: Hashable, now: float) -> None:
+        """A room begins: this is its home's turn."""
         self._line.pop(who, None)
+        self._rounds.took(who if home is None else home)
         self._inside, self._since = who, now
 
     def leave(self, who: object, now: float) -> None:
@@ -114,20 +129,20 @@ class Pace:
         self.previews, self.rests = Gate(SHARE, QUIET_SECONDS / 2), Gate(REST_SHARE)
         self._drawn = float("-inf")
 
-    def wait(self, who: object, look: Look, now: float) -> float:
+    def wait(self, who: object, home: Hashable, look: Look, now: float) -> float:
         """See ``Gate.wait``. Where nobody draws, searches at rest follow each other without a pause."""
         if look.settled:
-            return self.rests.wait(who, now, self._drawn + QUIET_SECONDS)
+            return self.rests.wait(who, home, now, self._drawn + QUIET_SECONDS)
         self._drawn = now  # who waits for a search draws, too
-        return self.previews.wait(who, now)
+        return self.previews.wait(who, home, now)
 
-    def enter(self, who: object, look: Look, now: float) -> None:
+    def enter(self, who: object, home: Hashable, look: Look, now: float) -> None:
         """A search begins."""
         if look.settled:
-            self.rests.enter(who, now)
+            self.rests.enter(who, home, now)
         else:
             self._drawn = now
-            self.previews.enter(who, now)
+            self.previews.enter(who, home, now)
 
     def leave(self, who: object, now: float) -> None:
         """A search has ended, or none is to be made."""
@@ -171,6 +186,9 @@ class Rivers:
         if self._lane is not None:
             self._lane.home = home or None
 
+    def _home(self) -> Hashable:
+        return None if self._lane is None else self._lane.home
+
     def follow(self, document: StrokeSet) -> None:
         """The document has changed; where a setting of the rivers did, they are looked for anew."""
         self._document = document
@@ -213,7 +231,7 @@ class Rivers:
             return
         now, pace = self._loop.time(), self._hydrology.pace
         look, wait = next_look(self._wanted, self._busy, now, self._last)
-        if look is not None and (later := pace.wait(self, look, now)) > 0:
+        if look is not None and (later := pace.wait(self, self._home(), look, now)) > 0:
             look, wait = None, later
         if self._timer is not None:
             self._timer.cancel()
@@ -221,7 +239,7 @@ class Rivers:
         if look is not None:
             self._wanted = Wanted() if look.settled else replace(self._wanted, preview=False)
             self._busy, self._last, self._overtaken = True, now, False
-            pace.enter(self, look, now)
+            pace.enter(self, self._home(), look, now)
             self._ground.snapshot(look.level, lambda found: self._read(found, look.settled))
         elif wait is not None:
             self._timer = self._loop.call_later(wait, self._go_on)

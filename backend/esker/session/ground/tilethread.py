@@ -16,9 +16,10 @@ from collections.abc import Callable, Hashable
 from concurrent.futures import Executor, Future
 from typing import Any, Final
 
+from esker.fairness.rounds import Rounds
+
 PATIENCE: Final = 0.1
-MOST_HOMES: Final = 4_096
-"""The thread remembers so many homes; those that had a turn longest ago are forgotten."""
+"""Frames that have waited for so many seconds are late."""
 
 _Work = tuple[Future[Any], Callable[[], Any], float]
 
@@ -57,9 +58,7 @@ class TileThread(Executor):
         self._changed = threading.Condition()
         self._lanes: dict[Lane, None] = {}
         """Lanes that have work. They, and what follows, need the lock."""
-        self._turns = 0
-        self._homes: dict[Hashable, int] = {}
-        """Numbers of the last turns of homes, the oldest first."""
+        self._rounds = Rounds()
         self._was_late = self._closed = False
         self._own = Lane(self)
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
@@ -123,12 +122,7 @@ class TileThread(Executor):
                     return None
                 self._changed.wait()
             lane = self._chosen()
-            self._turns += 1
-            home = _home(lane)
-            self._homes.pop(home, None)
-            self._homes[home] = lane.turn = self._turns
-            while len(self._homes) > MOST_HOMES:
-                del self._homes[next(iter(self._homes))]
+            lane.turn = self._rounds.took(_home(lane))
             work = (lane.frames if self._was_late or not lane.levels else lane.levels).popleft()
             if not lane.levels and not lane.frames:
                 del self._lanes[lane]
@@ -144,7 +138,7 @@ class TileThread(Executor):
         late = [] if self._was_late or not levels else [lane for lane in self._lanes if _home(lane) not in homes]
         late = [lane for lane in late if lane.frames[0][2] <= since]
         self._was_late = bool(late)
-        return min(late or levels or self._lanes, key=lambda lane: (self._homes.get(_home(lane), 0), lane.turn))
+        return min(late or levels or self._lanes, key=lambda lane: (self._rounds.last(_home(lane)), lane.turn))
 
 
 def _home(lane: Lane) -> Hashable:
