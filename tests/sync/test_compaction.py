@@ -6,6 +6,7 @@ import itertools
 import json
 import os
 import random
+import shutil
 import signal
 import subprocess
 import sys
@@ -279,51 +280,74 @@ def test_a_silent_operation_changes_nothing_but_the_clock() -> None:
 
 ROOT = Path(__file__).resolve().parents[2]
 KILLS = 12
+MOST_LIVES = 20 * KILLS
+"""Lives after which the test gives up: kills did not strike where they were meant to."""
+MOST_SAID = 6
+LONGEST = 0.005
+"""Seconds from what was said to the kill, at most: about as long as a stretch takes."""
 
 
 def test_killed_while_folding(tmp_path: Path) -> None:
     """SPEC J393: each stretch is as it was or folded, and who writes meanwhile loses nothing."""
     done = session(7, 1_500, BIRTH)
-    journal = Journal(tmp_path)
+    journal = Journal(tmp_path / "stored")
     for birth in (BIRTH, c.Document(id="u")):
         journal.create(birth).result()
     _stored(journal, done)
     journal.close()
-    rng = random.Random(5)
-    acked: set[int] = set()
-    folded = within = 0
+    lives = folded = within = said = 0
     command = [sys.executable, "-m", "tests.sync.fold_child"]
     with subprocess.Popen(
         command, cwd=ROOT, text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE
     ) as zygote:
-        for _ in range(KILLS):
-            said = _killed(zygote, f"{tmp_path} {max(acked, default=-1) + 1000}\n", rng.uniform(0, 0.03))
-            acked |= {int(word) for word in said if word.isdigit()}
-            folded += "fold" in said
-            within += _as_it_was_or_folded(tmp_path, done, acked)
+        while lives < KILLS or min(folded, within) <= KILLS / 4 or said <= KILLS:
+            assert lives < MOST_LIVES, (folded, within, said)
+            data = shutil.copytree(tmp_path / "stored", tmp_path / str(lives))
+            found = _folded_by_lives(zygote, data, done, lives)
+            lives, folded, within, said = (a + b for a, b in zip((lives, folded, within, said), found, strict=True))
         assert zygote.stdin is not None
         zygote.stdin.close()
-    assert folded > KILLS / 4
-    assert within > KILLS / 4, "kills struck between the first stretch and the last"
-    assert len(acked) > KILLS
-    journal = Journal(tmp_path)
+
+
+def _folded_by_lives(
+    zygote: subprocess.Popen[str], data: Path, done: list[Done], seed: int
+) -> tuple[int, int, int, int]:
+    """Kills lives over one journal until it is folded.
+
+    Returns how many there were, how many had folded something, how many were killed between the first stretch and the
+    last, and how many ops were acknowledged meanwhile.
+    """
+    rng = random.Random(5 + seed)
+    acked: set[int] = set()
+    folded = within = 0
+    for lives in range(1, KILLS + 1):
+        line = f"{data} {max(acked, default=-1) + 1000}\n"
+        said = _killed(zygote, line, rng.randint(1, MOST_SAID), rng.uniform(0, LONGEST))
+        acked |= {int(word) for word in said if word.isdigit()}
+        folded += "fold" in said
+        is_within, is_whole = _as_it_was_or_folded(data, done, acked)
+        within += is_within
+        if is_whole:
+            break
+    journal = Journal(data)
     _folding(journal).terrain("t")
     loaded = journal.load("t")
     assert loaded is not None
     assert loaded.document.to_document() == done[-1].after.to_document()
     journal.close()
+    return lives, folded, within, len(acked)
 
 
-def _killed(zygote: subprocess.Popen[str], line: str, seconds: float) -> list[str]:
-    """One life; what it said."""
+def _killed(zygote: subprocess.Popen[str], line: str, count: int, seconds: float) -> list[str]:
+    """One life, killed so long after so many lines; what it said."""
     assert zygote.stdin is not None
     assert zygote.stdout is not None
     assert zygote.stderr is not None
     zygote.stdin.write(line)
     zygote.stdin.flush()
     child = int(zygote.stderr.readline())
-    said = [zygote.stdout.readline().rstrip("\n")]
-    assert said != ["gone"], "a life ended by itself: run tests/sync/fold_child.py to see why"
+    said = [zygote.stdout.readline().rstrip("\n") for _ in range(count)]
+    assert "gone" not in said, "a life ended by itself: run tests/sync/fold_child.py to see why"
     time.sleep(seconds)
     os.kill(child, signal.SIGKILL)
     # The last line may be cut in two by the kill: then nobody has read it.
@@ -332,8 +356,8 @@ def _killed(zygote: subprocess.Popen[str], line: str, seconds: float) -> list[st
     return said
 
 
-def _as_it_was_or_folded(data: Path, done: list[Done], acked: set[int]) -> bool:
-    """Checks what a kill left; whether folding had begun and was not at its end."""
+def _as_it_was_or_folded(data: Path, done: list[Done], acked: set[int]) -> tuple[bool, bool]:
+    """Checks what a kill left; whether folding had begun and was not at its end, and whether it was."""
     journal = Journal(data)
     try:
         loaded = journal.load("t")
@@ -348,6 +372,6 @@ def _as_it_was_or_folded(data: Path, done: list[Done], acked: set[int]) -> bool:
         assert acked <= {row.counter for row in journal.rows("u", 0)}
         newest = journal.reader().execute("SELECT max(clock) FROM snapshots WHERE terrain='t'").fetchone()[0]
         upto = journal.reader().execute("SELECT coalesce(max(last), 0) FROM folds").fetchone()[0]
-        return bool(0 < upto < newest)
+        return 0 < upto < newest, upto == newest
     finally:
         journal.close()
