@@ -1,11 +1,27 @@
-"""Tests of this folder may be coroutines: each runs in an event loop of its own, the one that servers have."""
+"""Two nodes for all tests of this folder, and tests that are coroutines: each runs in an event loop of its own, the one
+that servers have."""
 
 from __future__ import annotations
 
 import inspect
+from collections.abc import Iterator
 
 import pytest
 import uvloop
+
+from tests.cluster.pair import Pair
+from tests.cluster.processes import running
+
+
+@pytest.fixture(scope="package")
+def pair(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Pair]:
+    """Two nodes that take people. Whoever ends one starts it again."""
+    both = Pair(tmp_path_factory.mktemp("pair"))
+    try:
+        with running(both.nodes):
+            yield both
+    finally:
+        both.close()
 
 
 def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> bool | None:

@@ -319,8 +319,9 @@ def _folded_by_lives(
     """
     rng = random.Random(5 + seed)
     acked: set[int] = set()
-    folded = within = 0
-    for lives in range(1, KILLS + 1):
+    lives = folded = within = 0
+    while lives < KILLS:
+        lives += 1
         line = f"{data} {max(acked, default=-1) + 1000}\n"
         said = _killed(zygote, line, rng.randint(1, MOST_SAID), rng.uniform(0, LONGEST))
         acked |= {int(word) for word in said if word.isdigit()}

@@ -187,6 +187,8 @@ def test_a_member_is_heard_without_a_task_until_it_leaves() -> None:
 
 @pytest.mark.parametrize(("said", "code"), [(b"\x00", "malformed"), ('{"type":"rename","name":"x"}', "server_error")])
 def test_who_is_heard_without_a_task_is_closed_like_everybody(said: str | bytes, code: str) -> None:
+    """SPEC H561: and has the time of a farewell to read it."""
+
     async def run() -> None:
         call = Call()
         await call.greet()
@@ -197,7 +199,12 @@ def test_who_is_heard_without_a_task_is_closed_like_everybody(said: str | bytes,
         assert json.loads(error)["code"] == code
         assert str(closed).startswith(f"close {c.WS_CLOSE[code]}")
         await asyncio.wait_for(call.task, 60)
-        assert call.wire.gone
+        assert not call.hall.inside
+        assert not call.wire.gone, "the farewell may still be on its way"
+        deadline = asyncio.get_running_loop().time() + 60
+        while not call.wire.gone:
+            assert asyncio.get_running_loop().time() < deadline
+            await asyncio.sleep(0.01)
 
     asyncio.run(run())
 

@@ -95,6 +95,7 @@ class Session:
         self._room: Room | None = None
         self._guest: Guest | None = None
         self._sending_since: float | None = None
+        self._has_said_farewell = False
         transport.charge(self._accounts.stranger(address), self._broke)
 
     async def run(self, messages: AsyncIterator[str | bytes]) -> None:
@@ -113,9 +114,9 @@ class Session:
             if self._room is not None and self._guest is not None:
                 self._room.leave(self._guest)
                 self._guest = None  # messages that are still read belong to nobody
-            if self._end is not None:
+            # What was written as a farewell may still be on its way: then the timer drops the connection.
+            if self._end is not None and not self._has_said_farewell:
                 self._end.cancel()
-            if self.outbox.closing is not None:
                 self._transport.abort()
             self.outbox.drop()
             for error in results:
@@ -231,6 +232,7 @@ class Session:
         text = c.ErrorMessage(code=code, message=reason, fatal=True, ticket=self.outbox.ticket).model_dump_json()
         await self._transport.send_text(text, self._went_on)
         await self._transport.close(c.WS_CLOSE[code], reason.encode()[:REASON_BYTES].decode(errors="ignore"))
+        self._has_said_farewell = True
 
     async def _watch(self) -> None:
         """Ends connections that never say hello, and clients that do not read."""

@@ -93,6 +93,7 @@ class Sqlite:
         outcomes: list[tuple[Future[Any], Any, Exception | None]] = []
         # Every statement gives the interpreter's lock away and waits for it, so an item that is alone has no savepoint.
         alone = len(batch) == 1
+        changes = db.total_changes
         try:
             db.execute("BEGIN IMMEDIATE")
             for write, future in batch:
@@ -110,7 +111,11 @@ class Sqlite:
             if not alone or outcomes[0][2] is None:
                 db.execute("COMMIT")
             # A statement that finds the disk full may end alone, and leave the transaction to the others of its batch.
-            self.writable = not any(isinstance(failure, sqlite3.OperationalError) for _, _, failure in outcomes)
+            # A batch that found nothing to change is no sign that there is room again.
+            if any(isinstance(failure, sqlite3.OperationalError) for _, _, failure in outcomes):
+                self.writable = False
+            elif db.total_changes > changes:
+                self.writable = True
         except sqlite3.Error as error:  # nothing of this batch is durable
             if db.in_transaction:
                 db.execute("ROLLBACK")
