@@ -53,7 +53,9 @@ class Pair:
     def owners_of(self, terrain: str) -> list[str]:
         """The names of the nodes that have a lease of this terrain which lives."""
         with psycopg.connect(self.url) as db:
-            rows = db.execute("SELECT node FROM esker.leases WHERE terrain=%s AND until > clock_timestamp()", (terrain,))
+            rows = db.execute(
+                "SELECT node FROM esker.leases WHERE terrain=%s AND until > clock_timestamp()", (terrain,)
+            )
             return [str(name) for (name,) in rows.fetchall()]
 
     def close(self) -> None:

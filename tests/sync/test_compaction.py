@@ -322,7 +322,7 @@ def _folded_by_lives(
     lives = folded = within = 0
     while lives < KILLS:
         lives += 1
-        line = f"{data} {max(acked, default=-1) + 1000}\n"
+        line = f"{data} {1_000_000 * lives}\n"
         said = _killed(zygote, line, rng.randint(1, MOST_SAID), rng.uniform(0, LONGEST))
         acked |= {int(word) for word in said if word.isdigit()}
         folded += "fold" in said

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import logging
+import os
 import random
 from pathlib import Path
 from typing import Any
@@ -17,6 +19,10 @@ from esker.fairness.shares import Rates
 from tests.sync.harness import LiveServer
 from tests.sync.test_classes import Pupil, Teacher
 
+MADE_BY_PROCESSES = ("/api/terrains/import", "/api/terrains/from-grid")
+"""Routes that begin a process for each body, which takes as much as a hundred other requests."""
+MOST_PROCESSES = 250 if os.environ.get("ESKER_LONG") else 3
+"""Requests to each of these routes, by each role."""
 FINE = {200, 201, 202, 204, 400, 401, 403, 404, 405, 409, 410, 411, 413, 415, 421, 422, 429, 503, 507}
 
 
@@ -60,7 +66,16 @@ def test_hostile_requests_are_answered_and_break_nothing(
         secret = {"owner": teacher.secret, "pupil": ada.seat, "viewer": look["secret"], "stranger": None}[role]
         known = {"terrain": terrain, "lesson": teacher.made["id"], "code": teacher.made["code"], "seat": "s" * 40}
         requests = Requests(random.Random(len(role)), routes_of(app), known)
-        answers = [server.raw(*next(requests), secret) for _ in range(250)]
+        left = dict.fromkeys(MADE_BY_PROCESSES, MOST_PROCESSES)
+        answers = []
+        for method, path, body in itertools.islice(requests, 250):
+            route = path.partition("?")[0]
+            if left.get(route) == 0:
+                continue
+            if route in left:
+                left[route] -= 1
+            answers.append(server.raw(method, path, body, secret))
+        assert all(left[name] < MOST_PROCESSES for name in MADE_BY_PROCESSES)
         assert {status for status, _, _ in answers} <= FINE
         for status, content, kind in answers:
             if status >= 400:
