@@ -69,8 +69,8 @@ test-levels: setup ## the tests of what is computed, compiled for narrower proce
 	  ESKER_CPU_LEVEL=$$level $(BIN)/python -m pytest -o cache_dir=.pytest_cache/levels $(COMPUTED); done
 
 # What `make test` has in a short form: as many rooms, clients and take-overs as the issue of several servers names.
-test-long: $(STAMPS)/dev ## the long forms of tests with several servers and a full disk: before a release
-	ESKER_LONG=1 $(BIN)/python -m pytest -o cache_dir=.pytest_cache/long tests/cluster tests/store/test_full_disk.py
+test-long: $(STAMPS)/dev ## the long forms of tests with several servers, a full disk and strangers: before a release
+	ESKER_LONG=1 $(BIN)/python -m pytest -o cache_dir=.pytest_cache/long tests/cluster tests/store/test_full_disk.py tests/sync/test_hostile_requests.py
 
 test-page:
 	$(call told,page); $(NPM) test
