@@ -142,7 +142,7 @@ class Packer:
         self._settings, self._packed, self._base = _settings_key(settings), new, base
         meeting = {key: p for key, (_, p) in new.items() if p is not None and _meet(p, window)}
         self.order = list(meeting)
-        return _tables(self.level, settings, list(meeting.values()), box), window
+        return _tables(self.level, _settings_key(settings), list(meeting.values()), box), window
 
     def is_light(self, most: float) -> bool:
         """Returns whether a bin of the last set has ``most`` strokes on average, or fewer."""
@@ -156,6 +156,18 @@ class Packer:
     def unrastered(self) -> None:
         """Says that packed strokes are in no raster any more: the next window is all of them."""
         self._rastered = False
+
+    def again(self) -> tuple[Tables, Window, Base | None]:
+        """Returns the tables and the window of the last set, as if nothing of it were in a raster, and its base.
+
+        Raises RuntimeError where there is no last set.
+        """
+        if self._settings is None:
+            raise RuntimeError("no strokes were packed yet")
+        box = whole(self.level)
+        meeting = {key: p for key, (_, p) in self._packed.items() if p is not None}
+        self._rastered, self.earliest, self.order = True, None, list(meeting)
+        return _tables(self.level, self._settings, list(meeting.values()), box), everything(box), self._base
 
     def forget(self) -> None:
         """Make the next set a fresh one."""
@@ -233,16 +245,16 @@ def _earliest(old: dict[str, tuple[Stroke, Packed | None]], new: dict[str, tuple
     return min(differ, default=None)
 
 
-def _tables(level: int, settings: TerrainSettings, packed: list[Packed], box: BinBox) -> Tables:
-    reach = settings.reach_m
+def _tables(level: int, settings: SettingsKey, packed: list[Packed], box: BinBox) -> Tables:
+    size_m, reach, border, edition = settings
     return Tables(
         level=level,
-        size_m=settings.size_m,
+        size_m=size_m,
         box=box,
         reach_m=reach,
-        exit_length_m=min(reach or math.inf, settings.size_m * DEFAULT_REACH_FRACTION),
-        pinned=settings.border == "pinned",
-        edition=settings.edition,
+        exit_length_m=min(reach or math.inf, size_m * DEFAULT_REACH_FRACTION),
+        pinned=border == "pinned",
+        edition=edition,
         **join(packed, box),
     )
 
@@ -312,7 +324,7 @@ class WindowPacker:
         for k in self._near(level, box):
             packed.append(pack_one(self._shapes[k], s, box))
             yield
-        return _tables(level, self._settings, [p for p in packed if p is not None], box)
+        return _tables(level, _settings_key(self._settings), [p for p in packed if p is not None], box)
 
     @property
     def grounds(self) -> dict[str, BaseUnderStroke]:

@@ -152,7 +152,7 @@ class DeviceWorkspace(ABC, Generic[S]):
         self.height.flush()
         if not self.in_progress and self._kept is not None:
             self._kept.clear()  # a stroke is drawn no longer
-        if not self.in_progress and self.packer.is_light(parking.LIGHT):
+        if self.packer.is_light(parking.LIGHT):
             self.packer.unrastered()
             parked = Parked([])
         else:
@@ -177,6 +177,8 @@ class DeviceWorkspace(ABC, Generic[S]):
         saved = self._saved()
         if parked.constraints:
             restored(self._queue, parked.constraints, saved.constraints)
+        elif self.in_progress:
+            self._rasterise_again()
         if parked.at_rest is not None:
             heights, gradient = parked.at_rest
             self.height.put("u", self.top, heights[None])
@@ -245,6 +247,13 @@ class DeviceWorkspace(ABC, Generic[S]):
             d, f = (self.height.fields[name, self.top] for name in ("d", "s"))
             self._over.add(d, f, tables.spacing_m, rows)
         self.height.coarsen(tables.screening, rows)
+
+    def _rasterise_again(self) -> None:
+        """Makes the constraints of the last set, of which none are in this memory."""
+        if self._kept is not None:
+            self._kept.clear()
+        for _ in self._rasterising(*self.packer.again()):
+            pass
 
     def warm(self, heights: NDArray[np.float32]) -> None:
         """Start the height step from these heights of the finest level instead of from coarser levels."""

@@ -41,7 +41,7 @@ class Saved:
 
 @dataclass
 class Parked:
-    """The copies. constraints are none where they are to be made again; ground and progress are None where a workspace
+    """The copies. constraints are empty where they are to be made again; ground and progress are None where a workspace
     had none that counts, or where ``at_rest`` has it.
 
     at_rest: heights and gradient of the finest level as they were given out, which other holders share.
