@@ -16,7 +16,7 @@ from esker import contract as c
 from esker.events import Preview, Settled
 from esker.grid import TileKey
 from esker.tiles.decoder import FrameDecoder
-from tests.sync.harness import LiveServer, PlainSolver, height_level, set_op, sleeping_member, stroke
+from tests.sync.harness import PATIENCE, LiveServer, PlainSolver, height_level, set_op, sleeping_member, stroke
 
 
 def _clock(frame: bytes) -> int:
@@ -76,42 +76,46 @@ def test_without_credit_the_window_closes(tmp_path: Path) -> None:
                 elif json.loads(message)["type"] == "pong":
                     return
 
+        def had() -> int:
+            return sum(map(len, modest.frames))
+
         reader = threading.Thread(target=read)
         reader.start()
         count = 0
-        while count < 25 or (sum(map(len, modest.frames)) < 2.5 * window and count < 200):
+        while count < 25 or had() < 2.5 * window:
+            assert count < 1_000, "the scene must be big enough to matter"
+            before, deadline = had(), time.monotonic() + PATIENCE
             greedy.ops((f"g:{count}", stroke(f"s{count}")))
-            count += 1  # on a busy machine more of them share a solve
-            time.sleep(0.08)
-        time.sleep(0.5)
+            greedy.wait("ack")
+            count += 1
+            while had() == before:
+                assert time.monotonic() < deadline, "the ground of a change does not come"
+                time.sleep(0.005)
         modest.say("ping", t=0)
-        reader.join(10)
-        greedy.say("ping", t=0)
-        while greedy.next()["type"] != "pong":
-            pass
-        deadline = time.monotonic() + 20
+        reader.join(PATIENCE)
+        assert not reader.is_alive()
+        deadline = time.monotonic() + PATIENCE
         while sum(map(len, greedy.frames)) < window and time.monotonic() < deadline:
             greedy.say("ping", t=0)  # a pong passes frames that wait for a reader
             greedy.wait("pong")
-            time.sleep(0.1)
+            time.sleep(0.01)
         greedy.say("ping", t=0)
         greedy.wait("pong")
         sent = sum(map(len, greedy.frames))
         biggest = max(map(len, greedy.frames))
-        assert sum(map(len, modest.frames)) > 1.5 * window, "the scene must be big enough to matter"
         assert window <= sent <= window + biggest
         ops = [o["id"] for m in greedy.seen if m["type"] == "ordered" for o in m["ops"]]
         assert ops == [f"g:{i}" for i in range(count)]
         # Credit opens the window, and what comes is the newest ground.
-        before = len(greedy.frames)
+        frames = len(greedy.frames)
         greedy.say("credit", bytes=sent)
-        deadline = time.monotonic() + 60
-        while len(greedy.frames) == before:
+        deadline = time.monotonic() + PATIENCE
+        while len(greedy.frames) == frames:
             assert time.monotonic() < deadline
             greedy.say("ping", t=0)
             greedy.wait("pong")
             time.sleep(0.01)
-        assert _clock(greedy.frames[before]) == count
+        assert _clock(greedy.frames[frames]) == count
         greedy.close()
         modest.close()
 
