@@ -1,14 +1,22 @@
-"""Compiled loops are kept for the text that they were compiled from (SPEC PW59)."""
+"""Compiled loops are kept for the text and for the arguments that they were compiled for (SPEC PW59, H562)."""
 
 from __future__ import annotations
 
+import itertools
 import os
 import shutil
 import subprocess
 import sys
+import threading
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
+
+import pytest
+from numba.core.caching import IndexDataCacheFile
 
 from esker import compiled
+from esker.compiled import LoopFiles
 from esker.patchwork import jit
 
 INNER = "from esker.patchwork.jit import kernel\n\n\n@kernel\ndef inner(x: float) -> float:\n    return x + {}\n"
@@ -47,3 +55,99 @@ def test_a_change_in_another_file_is_compiled_anew(tmp_path: Path) -> None:
         said.append(float(ran.stdout))
     assert said == [2.0, 21.0]
     assert len(list((room / "__pycache__").glob("compiled-*"))) == 1
+
+
+NUMBA_S: Any = IndexDataCacheFile
+Kept = Callable[[Any], Any]
+"""What keeps code in files that numba reads and writes."""
+
+
+def kept(folder: Path, stamp: str = "now") -> LoopFiles:
+    return LoopFiles(NUMBA_S(str(folder), "loop", stamp))
+
+
+class Turns:
+    """Two processes that keep a function at the same time, step by step in a given order."""
+
+    def __init__(self, folder: Path, keep: Kept, order: tuple[str, ...]) -> None:
+        self._folder, self._keep, self._order, self._at = folder, keep, order, 0
+        self._changed = threading.Condition()
+        self._done: set[str] = set()
+        self.wrong: list[str] = []
+
+    def run(self) -> None:
+        threads = [threading.Thread(target=self._save, args=(key,)) for key in "ab"]
+        for each in threads:
+            each.start()
+        for each in threads:
+            each.join()
+        self._look()
+
+    def _save(self, key: str) -> None:
+        files = NUMBA_S(str(self._folder), "loop", "now")
+        for name in ("_load_index", "_save_index", "_save_data"):
+            setattr(files, name, self._stepped(key, getattr(files, name)))
+        self._keep(files).save(key, f"code for {key}")
+        with self._changed:
+            self._done.add(key)
+            self._changed.notify_all()
+
+    def _stepped(self, key: str, work: Callable[..., Any]) -> Callable[..., Any]:
+        def step(*arguments: Any) -> Any:
+            with self._changed:
+                self._changed.wait_for(lambda: self._is_due(key), 60)
+                done = work(*arguments)
+                self._at += 1
+                self._changed.notify_all()
+            self._look()
+            return done
+
+        return step
+
+    def _is_due(self, key: str) -> bool:
+        """Whether it is the turn of this one; the order is over when either has no step left."""
+        return self._at >= len(self._order) or self._order[self._at] == key or self._order[self._at] in self._done
+
+    def _look(self) -> None:
+        """What a third process finds: the code for what it asks for, or none."""
+        for key in "ab":
+            if (found := kept(self._folder).load(key)) not in (None, f"code for {key}"):
+                self.wrong.append(f"{found} for {key}")
+
+
+ORDERS = sorted(set(itertools.permutations("aaabbb")))
+
+
+@pytest.mark.parametrize("order", ORDERS, ids="".join)
+def test_whoever_looks_finds_the_code_for_its_own_arguments(tmp_path: Path, order: tuple[str, ...]) -> None:
+    """SPEC H562: whatever two processes do meanwhile that compile the function for other arguments."""
+    turns = Turns(tmp_path, LoopFiles, order)
+    turns.run()
+    assert turns.wrong == []
+
+
+def test_numba_s_own_files_give_one_name_to_two_codes(tmp_path: Path) -> None:
+    """SPEC H562: the reason for files of our own; they may go when this no longer holds."""
+    wrong = []
+    for order in ORDERS:
+        folder = tmp_path / "".join(order)
+        folder.mkdir()
+        turns = Turns(folder, lambda files: files, order)
+        turns.run()
+        wrong += turns.wrong
+    assert wrong
+
+
+def test_a_loop_of_an_earlier_source_is_neither_found_nor_left(tmp_path: Path) -> None:
+    """SPEC H562."""
+    for stamp in ("before", "now"):
+        for key in "ab":
+            kept(tmp_path, stamp).save(key, f"{stamp} {key}")
+    assert [kept(tmp_path).load(key) for key in "ab"] == ["now a", "now b"]
+    assert kept(tmp_path, "before").load("a") is None
+    assert len(list(tmp_path.glob("loop.*.nbc"))) == 2
+
+
+def test_a_kernel_is_kept_in_these_files() -> None:
+    made: Any = jit.kernel(lambda x: x)
+    assert isinstance(made._cache._cache_file, LoopFiles)
