@@ -170,8 +170,9 @@ class Artist:
     def _draw(self) -> None:
         last, since = 0, time.monotonic()
         while not self._stop.wait(self.pause):
-            self.live.set_terrain(title=f"{self._name} {self.drawn}")
-            self.drawn += 1
+            with self.live._connection.changed:  # else one would seem to be unsaved that is not counted yet
+                self.live.set_terrain(title=f"{self._name} {self.drawn}")
+                self.drawn += 1
             if (saved := self.saved) > last:
                 last, since = saved, time.monotonic()
             self.waited = max(self.waited, time.monotonic() - since)

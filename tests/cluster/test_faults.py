@@ -11,7 +11,7 @@ import signal
 import time
 
 from tests.cluster.pair import Pair
-from tests.cluster.processes import Artist, all_is_there, gone_on, made
+from tests.cluster.processes import Artist, all_is_there, gone_on, made, until
 
 ROOMS, PEOPLE = (20, 10) if os.environ.get("ESKER_LONG") else (3, 2)
 """Terrains of the rolling restart, and how many draw on each."""
@@ -54,7 +54,7 @@ def test_the_line_between_the_nodes_is_cut(pair: Pair) -> None:
     near, far = artists if pair.at(owner) == 0 else artists[::-1]
     line = pair.private[pair.at(owner)]
     line.cut()
-    gone_on([near])
+    until(lambda: not far.live._connection.is_online)
     waiting = far.saved
     gone_on([near])
     assert far.saved == waiting
