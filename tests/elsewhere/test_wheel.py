@@ -84,6 +84,7 @@ def test_the_wheel_holds_the_page_the_shaders_the_scenes_and_the_licences(wheel:
     assert not [path for path in there if path.startswith("tests") or path.endswith(".pyc")]
 
 
+@pytest.mark.timeout(1200)
 def test_an_environment_with_the_wheel_serves_from_any_folder(python: Path, tmp_path: Path) -> None:
     """SPEC H164."""
     where = "from esker import resources; print(resources.__file__, resources.CHECKOUT)"
@@ -132,7 +133,7 @@ def _picture(link: str) -> None:
         f"{base}/api/terrains/{terrain}/preview", headers={"Authorization": f"Bearer {secret}"}
     )
     told = json.loads(urllib.request.urlopen(request, timeout=30).read())
-    for _ in range(10):  # each waits for the picture for 20 seconds
+    for _ in range(40):  # each waits for the picture for 20 seconds, and it is drawn when nothing else is to be done
         try:
             data = urllib.request.urlopen(f"{base}/preview/{told['token']}.jpg", timeout=60).read()
         except urllib.error.HTTPError as error:
