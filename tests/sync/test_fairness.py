@@ -23,6 +23,7 @@ import pytest
 
 from esker import contract as c
 from esker.fairness.shares import Full, Rate, Rates, Who
+from esker.render.pictures.previews import CannotDraw, Previews
 from esker.server.wire import descriptors
 from esker.server.wire.http import Connections
 from esker.session.room import history_view
@@ -237,10 +238,14 @@ def test_what_is_read_for_a_picture_counts_for_who_asks(live: LiveServer, monkey
         asked.append(who.address)
         return await run(who, work, *args, **more)
 
+    async def undrawn(*_: Any) -> Path:
+        raise CannotDraw("what counts is read before anything is drawn")
+
     monkeypatch.setattr(live.assembly.hub.reading, "run", noted)
+    monkeypatch.setattr(Previews, "_draw", undrawn)
     terrain, secret = live.create()
     token = ask(live, STRANGER, "GET", f"/api/terrains/{terrain}/preview", None, secret)[1]["token"]
-    ask(live, STRANGER, "GET", f"/preview/{token}.jpg")
+    assert ask(live, STRANGER, "GET", f"/preview/{token}.jpg")[1]["code"] == "no_pictures"
     assert asked
     assert set(asked) == {STRANGER}
 
