@@ -6,7 +6,7 @@ import tempfile
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from concurrent.futures import Future
 from pathlib import Path
 from typing import Any, Final
@@ -16,7 +16,7 @@ import psycopg
 from bench.cluster._postgres import Postgres as Server
 from esker import contract as c
 from esker.document.wire import op_json
-from esker.store.engine.leases import Lease
+from esker.store.engine.leases import Lease, Node
 from esker.store.engine.postgres.engine import Postgres
 from esker.store.engine.postgres.leases import PostgresLeases
 from esker.store.journal import Journal, Row
@@ -24,6 +24,8 @@ from esker.store.journal import Journal, Row
 ROOMS: Final = 64
 AHEAD: Final = 512
 """Appends that wait for their commit at a time."""
+TAKES: Final = 1_000
+"""Leases that are taken one by one, and by one statement."""
 OP: Final = op_json(c.AppendPoints(stroke="s", start=0, points=((0.1, 1.0),) * 4, last=(0.0, 0.0, 0.0)))
 
 
@@ -64,28 +66,32 @@ def measure(server: Server, seconds: float) -> dict[str, Any]:
         for future in waiting:
             future.result()
         fenced = count / (time.perf_counter() - began)
-        took, held = _takes(leases)
+        names = [f"taken-{n}" for n in range(TAKES)]
+        held = _leased(leases.take(name, "bench", 600.0) for name in names)
+        leases.release(held)
+        took = _timed(lambda: held.extend(_leased(leases.take(name, "bench", 600.0) for name in names)))
+        leases.release(held)
+        together = _timed(lambda: held.extend(_leased(leases.take_all(names, "bench", 600.0).values())))
+        held = held[-TAKES:]
         renewals = [_timed(lambda: leases.renew(held, 600.0)) for _ in range(9)]
         journal.close()
         leases.close()
     return {
         "rooms": ROOMS,
         "fenced_per_s": round(fenced),
-        "takes_per_s": round(len(held) / took),
+        "takes_per_s": round(TAKES / took),
+        "take_1000_ms": round(together * 1000, 2),
         "renew_1000_ms": round(sorted(renewals)[4] * 1000, 2),
         "inserts_one_commit_each_per_s": round(_inserts(url, seconds / 2, 1)),
         "inserts_256_a_commit_per_s": round(_inserts(url, seconds / 2, 256)),
     }
 
 
-def _takes(leases: PostgresLeases, count: int = 1_000) -> tuple[float, list[Lease]]:
-    """The seconds in which one connection takes so many leases, and the leases."""
-    began, held = time.perf_counter(), []
-    for n in range(count):
-        found = leases.take(f"taken-{n}", "bench", 600.0)
-        assert isinstance(found, Lease)
-        held.append(found)
-    return time.perf_counter() - began, held
+def _leased(found: Iterable[Lease | Node]) -> list[Lease]:
+    """What was taken, which must be all."""
+    taken = [each for each in found if isinstance(each, Lease)]
+    assert len(taken) == TAKES
+    return taken
 
 
 def _timed(work: Callable[[], object]) -> float:

@@ -1,13 +1,16 @@
 """A thousand nodes and a hundred thousand terrains, by arithmetic.
 
 Scores are those of ``cluster/rendezvous.py`` with another hash, which NumPy computes for all pairs at once. What a take
-of a lease and the opening of a terrain cost is read from the last measured ``cluster.json``. The database takes leases
-one after the other; a node opens terrains on its processors; nothing else is in anybody's way.
+of leases and the opening of a terrain cost is read from the last measured ``cluster.json``. The database does one
+statement after the other; a node has one on its way, and takes by the next one all that was asked of it meanwhile; it
+opens terrains on its processors; nothing else is in anybody's way.
 """
 
 from __future__ import annotations
 
 import heapq
+import math
+from collections import deque
 from collections.abc import Iterator
 from typing import Any, Final
 
@@ -54,6 +57,7 @@ def measured() -> dict[str, float]:
     found = result("cluster")
     return {
         "takes_per_s": found["appends"]["takes_per_s"],
+        "take_1000_ms": found["appends"]["take_1000_ms"],
         "open_s": found["openings"]["median_ms"] / 1000,
         "renew_1000_ms": found["appends"]["renew_1000_ms"],
     }
@@ -130,17 +134,46 @@ def failed(owners: Whole, count: int, costs: dict[str, float], random: np.random
 
 
 def _opened(arrivals: Iterator[tuple[float, int]], costs: dict[str, float]) -> list[float]:
-    """When each is open: a queue at the database, then one at the node's processors."""
-    free = 0.0
+    """When each is open, in order of arrival: a queue at the database, then one at the node's processors."""
+    coming = sorted(arrivals)
+    taken = _taken(coming, costs)
     cores: dict[int, list[float]] = {}
-    done = []
-    for at, node in sorted(arrivals):
-        free = max(free, at) + 1.0 / costs["takes_per_s"]
-        heap = cores.setdefault(node, [0.0] * CORES)
-        end = max(heap[0], free) + costs["open_s"]
-        heapq.heapreplace(heap, end)
-        done.append(end)
+    done = [0.0] * len(coming)
+    for n in sorted(range(len(coming)), key=taken.__getitem__):
+        heap = cores.setdefault(coming[n][1], [0.0] * CORES)
+        done[n] = max(heap[0], taken[n]) + costs["open_s"]
+        heapq.heapreplace(heap, done[n])
     return done
+
+
+def _statement(terrains: int, costs: dict[str, float]) -> float:
+    """Seconds for which a statement keeps the database: what one terrain costs, and for each further one a thousandth
+    of what a thousand cost together."""
+    return 1.0 / costs["takes_per_s"] + (terrains - 1) * costs["take_1000_ms"] / 1e6
+
+
+def _taken(coming: list[tuple[float, int]], costs: dict[str, float]) -> list[float]:
+    """When the lease of each is taken."""
+    taken, free = [0.0] * len(coming), 0.0
+    queue: deque[tuple[float, int, list[int]]] = deque()
+    """Statements by the time at which they were sent, with their node and what they take."""
+    asked: dict[int, list[int]] = {}
+    """What the next statement takes, of each node that has one on its way."""
+    for n, (at, node) in enumerate([*coming, (math.inf, -1)]):
+        while queue and (end := max(free, queue[0][0]) + _statement(len(queue[0][2]), costs)) <= at:
+            _, sender, some = queue.popleft()
+            free = end
+            for each in some:
+                taken[each] = end
+            if gathered := asked.pop(sender):
+                queue.append((end, sender, gathered))
+                asked[sender] = []
+        if node in asked:
+            asked[node].append(n)
+        elif node >= 0:
+            queue.append((at, node, [n]))
+            asked[node] = []
+    return taken
 
 
 def restarted(owners: Whole, costs: dict[str, float]) -> dict[str, Any]:
@@ -149,8 +182,8 @@ def restarted(owners: Whole, costs: dict[str, float]) -> dict[str, Any]:
     most = int(counts.max())
     return {
         "moves_for_each_terrain": 2,
-        "seconds_to_give_away_one_node": round(most * ACTIVE / costs["takes_per_s"], 2),
-        "takes_in_all": int(2 * TERRAINS * ACTIVE),
+        "seconds_to_give_away_one_node": round(_statement(round(most * ACTIVE), costs), 3),
+        "terrains_taken_in_all": int(2 * TERRAINS * ACTIVE),
     }
 
 

@@ -10,7 +10,7 @@ import pytest
 import uvloop
 
 from tests.cluster.pair import Pair
-from tests.cluster.processes import running
+from tests.cluster.processes import Artist, running
 
 
 @pytest.fixture(scope="package")
@@ -22,6 +22,14 @@ def pair(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Pair]:
             yield both
     finally:
         both.close()
+
+
+@pytest.fixture(autouse=True)
+def nobody_draws_on() -> Iterator[None]:
+    """Ends whoever still draws when a test has ended, as after one that failed."""
+    yield
+    while Artist.everybody:
+        Artist.everybody.pop().close()
 
 
 def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> bool | None:

@@ -14,7 +14,7 @@ import urllib.request
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from esker.api.live.client import LiveTerrain
 from tests.browser import free_port
@@ -134,6 +134,9 @@ def until(holds: Callable[[], Any], what: str = "it did not come") -> Any:
 class Artist:
     """Somebody who draws without a pause, and comes back wherever a balancer would bring them."""
 
+    everybody: ClassVar[list[Artist]] = []
+    """Those of the test that runs. Whoever draws on after it failed would make the next ones fail."""
+
     def __init__(self, door: str, terrain: str, secret: str, name: str) -> None:
         """``door``: the base of a node."""
         self._name = name
@@ -145,6 +148,7 @@ class Artist:
         self.waited = 0.0
         """The longest time without an acknowledgement while it drew."""
         self._thread = threading.Thread(target=self._draw, daemon=True)
+        self.everybody.append(self)
 
     @property
     def saved(self) -> int:

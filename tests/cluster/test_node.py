@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable, Collection
 from contextlib import asynccontextmanager
+from itertools import chain
 
 import pytest
 
@@ -34,10 +35,22 @@ class Cut(OwnLeases):
             raise Unreachable("the line is cut")
         return super().renew(*arguments)  # type: ignore[arg-type]
 
-    def take(self, *arguments: object) -> Lease | Node:
+    def __init__(self, now: Callable[[], float]) -> None:
+        super().__init__(now)
+        self.statements = list[list[str]]()
+        """The terrains of each statement that takes or releases."""
+        self.held_up = set[str]()
+        """Terrains for which a statement would wait."""
+
+    def take_all(self, terrains: Collection[str], node: str, seconds: float) -> dict[str, Lease | Node]:
         if self.cut:
             raise Unreachable("the line is cut")
-        return super().take(*arguments)  # type: ignore[arg-type]
+        self.statements.append(sorted(terrains))
+        return super().take_all([each for each in terrains if each not in self.held_up], node, seconds)
+
+    def release(self, leases: Collection[Lease]) -> None:
+        self.statements.append(sorted(lease.terrain for lease in leases))
+        super().release(leases)
 
     def owner(self, terrain: str) -> Node | None:
         if self.cut:
@@ -224,3 +237,33 @@ async def test_two_that_come_at_once_take_a_terrain_once() -> None:
         await asyncio.gather(*(s.node.hold("lake") for _ in range(20)))
         assert s.node.counts.taken == 1
         assert s.leases.take("lake", "a", LEASE_SECONDS) == Lease("lake", "a", 2)
+
+
+async def test_a_crowd_of_terrains_is_taken_and_released_by_a_few_statements() -> None:
+    """SPEC P660: all that is asked for while one statement is on its way makes up the next one."""
+    async with scene() as s:
+        names = [f"t{n:02}" for n in range(40)]
+        await asyncio.gather(*(s.node.hold(name) for name in names))
+        assert len(s.leases.statements) <= 3
+        assert sorted(chain(*s.leases.statements)) == names
+        assert set(s.node.held) == set(names)
+        s.leases.statements.clear()
+        await s.node.drain()
+        assert len(s.leases.statements) <= 3
+        assert sorted(chain(*s.leases.statements)) == names
+        assert all(s.leases.owner(name) is None for name in names)
+
+
+async def test_in_a_crowd_each_is_told_of_its_own_terrain() -> None:
+    """SPEC P660, P579: one that another node has, one that is held up, and one that is free."""
+    async with scene() as s:
+        s.leases.take("theirs", "b", 60)
+        s.leases.held_up = {"slow"}
+        found = await asyncio.gather(*map(s.node.hold, ("free", "theirs", "slow")), return_exceptions=True)
+        assert [type(each) for each in found] == [type(None), Elsewhere, type(None)]
+        assert set(s.node.held) == {"free", "slow"}
+        s.leases.cut = True
+        found = await asyncio.gather(*map(s.node.hold, ("hill", "vale")), return_exceptions=True)
+        assert [type(each) for each in found] == [Elsewhere, Elsewhere]
+        s.leases.cut = False
+        await s.node.hold("hill")

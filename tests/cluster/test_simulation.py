@@ -22,7 +22,15 @@ def test_terrains_of_the_simulation_move_as_those_of_nodes(monkeypatch: pytest.M
 
 
 def test_terrains_wait_for_the_database_and_for_their_node() -> None:
-    costs = {"takes_per_s": 10.0, "open_s": 1.0}
+    costs = {"takes_per_s": 10.0, "open_s": 1.0, "take_1000_ms": 0.0}
     assert _simulation._opened(iter([(0.0, 1), (0.0, 2)]), costs) == pytest.approx([1.1, 1.2])
     many = _simulation._opened(iter([(0.0, 1)] * (_simulation.CORES + 1)), costs)
     assert many[-1] == pytest.approx(2.1)
+
+
+def test_a_crowd_of_one_node_is_taken_by_a_few_statements() -> None:
+    """SPEC P660: what comes while a statement is on its way goes by the next one, which costs more by a thousandth of a
+    thousand for each."""
+    costs = {"takes_per_s": 10.0, "open_s": 0.0, "take_1000_ms": 10_000.0}
+    coming = [(0.0, 1), (0.01, 1), (0.02, 2), (0.03, 1), (0.04, 1)]
+    assert _simulation._taken(coming, costs) == pytest.approx([0.1, 0.32, 0.2, 0.32, 0.32])

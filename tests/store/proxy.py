@@ -52,6 +52,8 @@ class Proxy:
                 near.close()
                 continue
             self._ends += [near, far]
+            if not self.is_open:  # it was cut meanwhile
+                self.cut()
             threading.Thread(target=self._out, args=(near, far), daemon=True).start()
             threading.Thread(target=self._back, args=(near, far), daemon=True).start()
 

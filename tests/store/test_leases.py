@@ -1,8 +1,9 @@
-"""Leases of terrains, in memory and in a database (SPEC J460 to J463)."""
+"""Leases of terrains, in memory and in a database (SPEC J460 to J463, J565)."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 
 import psycopg
 import pytest
@@ -109,3 +110,60 @@ def test_nodes_are_live_as_long_as_they_said(kept: Kept) -> None:
     kept.leases.withdraw("a")
     assert kept.leases.nodes() == ()
     assert kept.leases.owner("lake") == Node("a", "", 0.0)
+
+
+def test_many_are_taken_at_once_each_for_itself(kept: Kept) -> None:
+    """SPEC J565: released ones, own ones, ended ones, and those that another node has."""
+    taken(kept, "ended", "b")
+    kept.wait(6.0)
+    kept.leases.release([taken(kept, "free", "b")])
+    taken(kept, "own", "a")
+    taken(kept, "theirs", "b")
+    found = kept.leases.take_all(["theirs", "own", "free", "ended"], "a", 6.0)
+    assert found == {
+        "theirs": B,
+        "own": Lease("own", "a", 2),
+        "free": Lease("free", "a", 2),
+        "ended": Lease("ended", "a", 2),
+    }
+    assert kept.leases.take_all([], "a", 6.0) == {}
+    kept.leases.release([each for each in found.values() if isinstance(each, Lease)])
+    again = kept.leases.take_all(["free", "ended"], "b", 6.0)
+    assert again == {"free": Lease("free", "b", 3), "ended": Lease("ended", "b", 3)}
+
+
+def test_one_terrain_that_is_held_up_holds_up_no_other(database: Database) -> None:
+    """SPEC J565: a commit that does not end has locked the row of one; it is left out, and the others are taken."""
+    kept = Kept(database.new())
+    assert kept._url is not None
+    for terrain in ("lake", "hill"):
+        taken(kept, terrain, "b")
+    kept.wait(6.0)
+    with psycopg.connect(kept._url) as db:
+        db.execute("SELECT 1 FROM esker.leases WHERE terrain='lake' FOR SHARE")
+        found = kept.leases.take_all(["lake", "hill"], "a", 6.0)
+        assert found == {"hill": Lease("hill", "a", 2)}
+        db.rollback()
+        assert kept.leases.take_all(["lake"], "a", 6.0) == {"lake": Lease("lake", "a", 2)}
+    kept.close()
+
+
+def test_nodes_that_want_the_same_at_once_get_each_terrain_once(database: Database) -> None:
+    """SPEC J460, J565: whatever the order in which they name them, nobody waits for ever and nothing has two owners."""
+    kept = Kept(database.new())
+    names = [f"t{n}" for n in range(60)]
+    kept.leases.release([taken(kept, name, "a") for name in names])
+
+    def take(node: str) -> dict[str, Lease | Node]:
+        return kept.leases.take_all(names if node == "a" else names[::-1], node, 60.0)
+
+    with ThreadPoolExecutor(4) as threads:
+        found = list(threads.map(take, "abab"))
+    for name in names:
+        owner = kept.leases.owner(name)
+        assert owner is not None
+        answers = [each[name] for each in found if name in each]
+        leases = {lease.epoch: lease.node for lease in answers if isinstance(lease, Lease)}
+        assert len(leases) == sum(isinstance(each, Lease) for each in answers) > 0
+        assert set(leases.values()) == {owner.name}
+    kept.close()

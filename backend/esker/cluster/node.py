@@ -22,6 +22,7 @@ from esker.cluster.peers import Elsewhere, Peer, resolved
 from esker.cluster.rendezvous import chosen, stepped
 from esker.cluster.rooms import Counts, Holding, Rooms
 from esker.cluster.tenure import Phase, Tenure
+from esker.cluster.together import Together
 from esker.store.engine.leases import (
     LEASE_SECONDS,
     RENEW_SECONDS,
@@ -70,6 +71,7 @@ class Cluster:
         self._of: dict[str, str] = {}
         """Homes of the terrains that were asked for here, while this node has them."""
         self._taking: dict[str, asyncio.Task[None]] = {}
+        self._takes, self._releases = Together(self._take_all), Together(self._release_all)
         self._nodes: tuple[Node, ...] = ()
         self._addresses: dict[str, frozenset[str]] = {}
         """Addresses of nodes on the network, by what they advertise."""
@@ -111,8 +113,11 @@ class Cluster:
             log.warning("node %s could not be withdrawn: %s", self.name, error)
         await asyncio.gather(*self._taking.values(), return_exceptions=True)
         log.info("node %s gives %d terrains away", self.name, len(self._held))
+        releasing = []
         for home in list(self._held):
             await self._give(home)
+            releasing.append(asyncio.create_task(self._release(home)))
+        await asyncio.gather(*releasing)
 
     async def _give(self, home: str) -> None:
         assert self._rooms is not None
@@ -121,7 +126,6 @@ class Cluster:
             return
         for terrain in sorted(found.terrains, key=lambda terrain: terrain == home):  # a class goes after its copies
             await self._rooms.hand_over(terrain)
-        await self._release(home)
 
     async def _release(self, home: str) -> None:
         found = self._forget(home)
@@ -129,9 +133,13 @@ class Cluster:
             return
         self.counts.released += 1
         try:
-            await self._ask(self._leases.release, [found.lease])
+            await self._releases.answer(found.lease)
         except Unreachable as error:
             log.warning("the lease of %s ends by itself: %s", home, error)
+
+    async def _release_all(self, leases: list[Lease]) -> dict[Lease, None]:
+        await self._ask(self._leases.release, leases)
+        return {}
 
     def _forget(self, home: str) -> Holding | None:
         found = self._held.get(home)
@@ -232,19 +240,29 @@ class Cluster:
 
     async def _take(self, home: str) -> None:
         self._demand_database()
-        asked = self._now()
         try:
-            answer = await self._ask(self._leases.take, home, self.name, LEASE_SECONDS)
+            asked, answer = await self._takes.answer(home) or await self._take_alone(home)
         except Unreachable as error:
             raise Elsewhere(f"This node does not reach its database: {error}") from None
         if isinstance(answer, Node):
             self._note(home, answer)
             raise Elsewhere(f"Node {answer.name} has this terrain.")
         if self.draining:
-            await self._ask(self._leases.release, [answer])
+            await self._releases.answer(answer)
             raise Elsewhere("This node is being stopped.")
         self.counts.taken += 1
         self._held = {**self._held, home: Holding(answer, Tenure(asked), self._now())}
+
+    async def _take_all(self, homes: list[str]) -> dict[str, tuple[float, Lease | Node]]:
+        """Each with the time before it was asked for, from which its tenure counts."""
+        asked = self._now()
+        found = await self._ask(self._leases.take_all, homes, self.name, LEASE_SECONDS)
+        return {home: (asked, answer) for home, answer in found.items()}
+
+    async def _take_alone(self, home: str) -> tuple[float, Lease | Node]:
+        """What others hold up is waited for, beside all other takes."""
+        asked = self._now()
+        return asked, await self._ask(self._leases.take, home, self.name, LEASE_SECONDS)
 
     def _demand_database(self) -> None:
         """Raises Elsewhere at once where the database has not answered for long: everybody would wait for it."""

@@ -69,6 +69,10 @@ class Leases(Protocol):
         out. A node that holds a lease does not take it again.
         """
 
+    def take_all(self, terrains: Collection[str], node: str, seconds: float) -> dict[str, Lease | Node]:
+        """Takes many terrains at once, each as ``take`` does. One that the store would have to wait for, or that it
+        does not know, is left out: ``take`` takes it, and keeps nobody else waiting."""
+
     def renew(self, leases: Collection[Lease], seconds: float) -> frozenset[str]:
         """Lets leases live for ``seconds`` from now; returns the terrains of those that are held still.
 
@@ -123,6 +127,9 @@ class OwnLeases:
             made = Lease(terrain, node, held.epoch + 1)
             self._leases[terrain] = made, now + seconds
             return made
+
+    def take_all(self, terrains: Collection[str], node: str, seconds: float) -> dict[str, Lease | Node]:
+        return {terrain: self.take(terrain, node, seconds) for terrain in terrains}
 
     def renew(self, leases: Collection[Lease], seconds: float) -> frozenset[str]:
         with self._lock:

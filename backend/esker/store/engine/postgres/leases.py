@@ -22,11 +22,20 @@ _TAKE: Final = """
 UPDATE esker.leases SET node = $2, epoch = epoch + 1, until = clock_timestamp() + make_interval(secs => $3)
 WHERE terrain = $1 AND (until <= clock_timestamp() OR node = $2) RETURNING epoch
 """
-"""No upsert: that would lock the row of whoever has the terrain, and wait for their commits."""
+"""Waits for a commit under a lease that has ended. No upsert: that would lock the row of whoever has the terrain, and
+wait for their commits."""
 _FIRST: Final = """
 INSERT INTO esker.leases VALUES ($1, $2, 1, clock_timestamp() + make_interval(secs => $3))
 ON CONFLICT DO NOTHING RETURNING epoch
 """
+_TAKE_ALL: Final = """
+WITH free AS (
+  SELECT terrain FROM esker.leases WHERE terrain = ANY($1::text[]) AND (until <= clock_timestamp() OR node = $2)
+  ORDER BY terrain FOR NO KEY UPDATE SKIP LOCKED)
+UPDATE esker.leases l SET node = $2, epoch = epoch + 1, until = clock_timestamp() + make_interval(secs => $3)
+FROM free WHERE l.terrain = free.terrain RETURNING l.terrain, l.epoch
+"""
+"""Waits for no row that anybody has locked: one frozen server would hold up all terrains of the statement."""
 _RENEW: Final = """
 WITH held AS (
   SELECT l.terrain FROM esker.leases l JOIN unnest($1::text[], $2::bigint[]) AS w(terrain, epoch)
@@ -39,9 +48,9 @@ _END: Final = """
 SELECT pg_terminate_backend(blocker) FROM unnest(pg_blocking_pids($1)) AS blocker
 WHERE EXISTS (SELECT 1 FROM esker.leases WHERE terrain = $2 AND until <= clock_timestamp())
 """
-_OWNER: Final = """
-SELECT l.node, n.address, n.weight FROM esker.leases l
-LEFT JOIN esker.nodes n ON n.name = l.node WHERE l.terrain = $1 AND l.until > clock_timestamp()
+_OWNERS: Final = """
+SELECT l.terrain, l.node, n.address, n.weight FROM esker.leases l
+LEFT JOIN esker.nodes n ON n.name = l.node WHERE l.terrain = ANY($1::text[]) AND l.until > clock_timestamp()
 """
 
 
@@ -71,16 +80,23 @@ class PostgresLeases:
 
     def take(self, terrain: str, node: str, seconds: float) -> Lease | Node:
         for _ in range(3):
+            found = self.take_all([terrain], node, seconds)
+            if terrain in found:
+                return found[terrain]
             with self._connection() as db, self._unblocked(db, terrain):
                 row = db.execute(_TAKE, (terrain, node, float(seconds))).fetchone()
-            if row is None and (holder := self.owner(terrain)) is not None:
-                return holder
             if row is None:
                 with self._connection() as db:
                     row = db.execute(_FIRST, (terrain, node, float(seconds))).fetchone()
             if row is not None:
                 return Lease(terrain, node, int(row[0]))
         return Node("", "", 0.0)  # it changes hands faster than it can be asked for
+
+    def take_all(self, terrains: Collection[str], node: str, seconds: float) -> dict[str, Lease | Node]:
+        with self._connection() as db:
+            rows = db.execute(_TAKE_ALL, (sorted(terrains), node, float(seconds))).fetchall()
+        taken = {str(terrain): Lease(str(terrain), node, int(epoch)) for terrain, epoch in rows}
+        return {**taken, **self._owners([terrain for terrain in terrains if terrain not in taken])}
 
     def renew(self, leases: Collection[Lease], seconds: float) -> frozenset[str]:
         if not leases:
@@ -97,9 +113,17 @@ class PostgresLeases:
                 db.execute(_RENEW.format(until="'-infinity'"), _columns(leases))
 
     def owner(self, terrain: str) -> Node | None:
+        return self._owners([terrain]).get(terrain)
+
+    def _owners(self, terrains: list[str]) -> dict[str, Node]:
+        if not terrains:
+            return {}
         with self._connection() as db:
-            row = db.execute(_OWNER, (terrain,)).fetchone()
-            return None if row is None else Node(str(row[0]), row[1] or "", float(row[2] or 0.0))
+            rows = db.execute(_OWNERS, (terrains,)).fetchall()
+        return {
+            str(terrain): Node(str(name), address or "", float(weight or 0.0))
+            for terrain, name, address, weight in rows
+        }
 
     def close(self) -> None:
         """Closes the connections."""
