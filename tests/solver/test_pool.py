@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from types import SimpleNamespace
 from typing import Any
 
@@ -13,7 +14,7 @@ from esker.api.terrain import Stroke as Make
 from esker.contract import Channel, Stroke, TerrainSettings
 from esker.events import Done, Level
 from esker.solve.constraints.packing import Shape, pack_one
-from esker.solve.pool.pool import PACKED, SPARE_SECONDS, best_packed
+from esker.solve.pool.pool import PACKED, SPARE_SECONDS, TRIM_SECONDS, best_packed
 from esker.solve.solver import Solver
 from tests.solver.bases import hills
 from tests.solver.scenes import PINNED, SCENES, SETTINGS, mixed
@@ -82,6 +83,22 @@ def test_the_bound_holds_at_every_moment_with_solves_in_progress(solver: Solver)
         steps.close()
     assert most <= 4 * grid.solve_bytes(1)
     assert solver._pool.held == sum(w.bytes for w in solver._pool.idle) + solver._pool.residency.bytes
+
+
+def test_what_solves_freed_goes_back_to_the_system_while_others_follow(
+    solver: Solver, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """SPEC S591: now and then while there are solves, and not again while there are none."""
+    given: list[float] = []
+    now = time.monotonic()
+    monkeypatch.setattr("esker.solve.pool.pool.system.give_memory_back", lambda: given.append(now))
+    for seconds in (0.5 * TRIM_SECONDS, TRIM_SECONDS, 1.5 * TRIM_SECONDS, 2 * TRIM_SECONDS, 3 * TRIM_SECONDS):
+        if seconds < 2.5 * TRIM_SECONDS:
+            solver.solve(mixed(3, 4), SETTINGS, 1)
+        for workspace in solver._pool.idle:
+            solver._pool.since[workspace] = now + seconds  # none rests so long that it goes
+        solver._pool.tidy(now + seconds)
+    assert len(given) == 2
 
 
 def test_who_comes_back_is_rasterised_and_not_packed_again(solver: Solver, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -26,7 +26,7 @@ REST_LEVEL: Final = 4
 """The level whose samples count at rest, or the finest that is solved as a whole."""
 EVERY_SECONDS: Final = 0.25
 """While somebody draws they are looked for at most this often."""
-SHARE: Final = 4
+SHARE: Final = 5
 """Searches while somebody draws take one part of so many of the time, those of all rooms together."""
 REST_SECONDS: Final = 0.6
 """Ground that has been final for so long is at rest: small terrains settle between two strokes."""

@@ -34,8 +34,8 @@ __all__ = ["Client", "Job", "Worker"]
 
 IDLE_CHECK: Final = 1.0
 """The thread looks this often at failures that may be tried again, when nothing else wakes it."""
-TIDY_EVERY: Final = 30.0
-"""The thread looks this often at what the solver keeps of rooms that have gone, on a server that is never idle."""
+TIDY_EVERY: Final = 5.0
+"""The thread looks this often at what the solver keeps that nobody uses, on a server that is never idle."""
 
 
 class Worker:

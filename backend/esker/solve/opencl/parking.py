@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from esker.solve.opencl.queue import Queue
 
-SPARE_BYTES: Final = 64 << 20
+SPARE_BYTES: Final = 32 << 20
 """Host memory of workspaces that came back which is kept for those that are parked next: new memory costs a page fault
 for every four kilobytes, as much time as the copy itself."""
 

@@ -33,6 +33,9 @@ what there is: a room whose workspace was given to another one has all its strok
 SHARE = 8
 SPARE_SECONDS = 20.0
 """How long a workspace is kept that nobody uses: who has rested for longer waits once for the raster."""
+TRIM_SECONDS = 5.0
+"""While solves follow each other, memory that they freed is returned to the system this often: the C library keeps it,
+and some seconds of previews leave a hundred megabytes."""
 PACKED = 16
 """Rooms whose packed strokes are kept after their workspace went, some kilobytes a stroke."""
 PACKED_SECONDS = 300.0
@@ -91,6 +94,8 @@ class WorkspacePool:
         self.since: weakref.WeakKeyDictionary[Workspace, float] = weakref.WeakKeyDictionary()
         self._made: weakref.WeakSet[Workspace] = weakref.WeakSet()
         self._packed: list[Packed] = []
+        self._leases, self._trimmed = 0, time.monotonic()
+        """Leases since memory was last returned to the system, and when that was."""
 
     def leased(
         self,
@@ -106,6 +111,7 @@ class WorkspacePool:
         OutOfDeviceMemoryError.
         """
         workspace = lease.workspace = self.take(job, top, device)
+        self._leases += 1
         keep = True
         try:
             yield from self._resident(workspace, work(workspace))
@@ -206,13 +212,16 @@ class WorkspacePool:
         del self._packed[:-PACKED]
 
     def tidy(self, now: float) -> int:
-        """Gives back the memory of workspaces that have been idle for SPARE_SECONDS; returns how many there were."""
+        """Gives back the memory of workspaces that have been idle for SPARE_SECONDS, and now and then what solves freed;
+        returns how many workspaces there were."""
         count = 0
         while (late := next((w for w in self.idle if self.since[w] <= now - SPARE_SECONDS), None)) is not None:
             self._drop(late, now)
             count += 1
         if count:
             self.residency.clear()
+        if count or (self._leases and now - self._trimmed >= TRIM_SECONDS):
+            self._leases, self._trimmed = 0, now
             system.give_memory_back()
         self._packed = [kept for kept in self._packed if kept.since > now - PACKED_SECONDS]
         return count

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from esker.solve.opencl.device_workspace import Arena, DeviceWorkspace
     from esker.solve.opencl.workspaces import OnDevice
 
-SHARE: Final = 4
+SHARE: Final = 8
 """Arenas of all kinds take up to this part of the bound of a solver's workspaces, but there is one of each kind."""
 
 Kind = tuple[int, bool]
