@@ -72,7 +72,7 @@ class _Pupil:
     unseen: dict[int, float] = field(default_factory=dict)
     """By clock, when an append was sent: until the wall has shown it."""
     unseen_fine: dict[int, float] = field(default_factory=dict)
-    """The same, until the wall has shown it in its finest level."""
+    """By clock, when an append was sent: until the wall has shown it in its finest level."""
     count: int = 0
     ready: asyncio.Event = field(default_factory=asyncio.Event)
 
