@@ -212,8 +212,8 @@ class WorkspacePool:
         del self._packed[:-PACKED]
 
     def tidy(self, now: float) -> int:
-        """Gives back the memory of workspaces that have been idle for SPARE_SECONDS, and now and then what solves freed;
-        returns how many workspaces there were."""
+        """Gives back the memory of workspaces that have been idle for SPARE_SECONDS, and now and then what solves
+        freed. Returns how many workspaces there were."""
         count = 0
         while (late := next((w for w in self.idle if self.since[w] <= now - SPARE_SECONDS), None)) is not None:
             self._drop(late, now)
