@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from tests.e2e.conftest import Server, Visitor, Visitors, serving
-from tests.e2e.hands import Pixel, arch, draw, on_screen, wait, wait_apart, wait_settled
+from tests.e2e.hands import Pixel, arch, draw, on_screen, wait, wait_apart, wait_settled, wait_still
 from tests.e2e.test_everyone import NO_WEBGPU, Fingers
 
 
@@ -105,6 +105,7 @@ def test_a_whole_lesson(visitors: Visitors, server: Server) -> None:
         wait_apart(ada, ".hint", "aside.side")
         wait_apart(ada, ".hint", "esk-task-chip")
     ada.shot("task-1-blue")
+    wait_still(ada)  # the view makes room in the narrower window
     draw(ada, "b", mountain(ada, 520))
     wait(ada, "begun => window.esker.score().points > begun", begun)
     wait_settled(ada)
