@@ -18,12 +18,16 @@ TRIES: Final = 8
 
 
 def kernel(function: F) -> F:
-    """The compiled form of a function. It is compiled at its first call, and kept on disk where a disk allows it."""
+    """The compiled form of a function. It is compiled at its first call, and kept on disk where a disk allows it.
+
+    Numba compiles nothing where ``NUMBA_DISABLE_JIT`` says so: the function itself is returned then.
+    """
     try:
-        made = numba.njit(cache=True, **OPTIONS)(function)
+        made: Any = numba.njit(cache=True, **OPTIONS)(function)
     except RuntimeError:  # no place on this machine to keep compiled code in
         return cast(F, numba.njit(**OPTIONS)(function))
-    made._cache._cache_file = LoopFiles(made._cache._cache_file)
+    if made is not function:  # it is the function itself where numba is told not to compile
+        made._cache._cache_file = LoopFiles(made._cache._cache_file)
     return cast(F, made)
 
 

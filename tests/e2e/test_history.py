@@ -56,6 +56,7 @@ def test_two_people_look_back(visitors: Visitors, server: Server, tmp_path: Path
 
     first = draw(ada, "b", arch(on_screen(ada, 900, 900), on_screen(ada, 2300, 1000), 90))
     drawn = ada.js("() => window.esker.clock()")
+    wait_settled(ada, ben)  # what Ada drew hides none of the place any more
     draw(ben, "p", ellipse(on_screen(ben, 3000, 2600), 36, 9))
     wait(ada, "() => window.esker.history().length === 2")
     says = ada.js(HISTORY)

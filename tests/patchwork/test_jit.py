@@ -151,3 +151,15 @@ def test_a_loop_of_an_earlier_source_is_neither_found_nor_left(tmp_path: Path) -
 def test_a_kernel_is_kept_in_these_files() -> None:
     made: Any = jit.kernel(lambda x: x)
     assert isinstance(made._cache._cache_file, LoopFiles)
+
+
+def test_a_function_stays_itself_where_numba_is_told_not_to_compile() -> None:
+    """Whoever debugs sets `NUMBA_DISABLE_JIT`, and everything is to run all the same."""
+    ran = subprocess.run(
+        [sys.executable, "-c", "from esker import compiled; print(compiled.kernel(lambda x: x + 1)(2))"],
+        env=os.environ | {"NUMBA_DISABLE_JIT": "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert ran.stdout.strip() == "3", ran.stderr

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -193,6 +194,7 @@ def test_a_wall_that_says_nonsense_is_closed(teacher: Teacher) -> None:
         wall.ws.send(nonsense)
         assert wall.closed() == c.WS_CLOSE["malformed"]
     wall = _wall(teacher)
-    for _ in range(100):
-        wall.say("focus", numbers=[])
+    with suppress(ConnectionClosed):  # the server closes before the last of them where it is quick
+        for _ in range(100):
+            wall.say("focus", numbers=[])
     assert wall.closed() == c.WS_CLOSE["rate_limited"]

@@ -24,7 +24,7 @@ import {
   stroke,
   strokes,
 } from "./hands.ts";
-import { FLAT, SIZE, SLOPE } from "./scene.ts";
+import { FLAT, groundOf, SIZE, SLOPE } from "./scene.ts";
 
 openForEach();
 
@@ -263,6 +263,23 @@ describe("drawing", () => {
     for (const s of strokes()) expect(Math.abs(s.first[1] - 1700)).toBeLessThan(15);
     expect(messages).toEqual([]);
     expect(c.state.value).toBe(before);
+  });
+
+  it("a line that begins on the face where the land is cut off begins at the border right above (SPEC I312)", () => {
+    // What somebody else draws may lift the border between the pen and the place it aims at.
+    const high = groundOf((_x, y) => 700 - y / 10);
+    input.dispose();
+    open("orbit", { freeze: () => high, ground: () => high });
+    c.goTo([180, -3000, 1040], [2400, 1740, -450], 0);
+    stroke([
+      [2060, 0, 640],
+      [2048, 1700, 900],
+      [2700, 1700, 530],
+    ]);
+    expect(messages).toEqual([]);
+    const [x, y] = only().first;
+    expect(Math.abs(x - 2060)).toBeLessThan(15);
+    expect(y).toBeCloseTo(SIZE / 1000, 0);
   });
 
   it("a stroke that somebody deletes under the pen ends with a message", () => {

@@ -1,8 +1,9 @@
-/** A line that begins beside the land: at the border where that is near, else not at all. Pure. */
+/** A line that begins beside the land, or on the face where the land is cut off: at the border where that is near, else not at all. Pure. */
 
 import type { Camera } from "../../core/camera/camera.ts";
+import { along } from "../../core/geometry.ts";
 import { clamp } from "../../core/math.ts";
-import type { Ground } from "../../core/types.ts";
+import type { Ground, Ray, Vec3 } from "../../core/types.ts";
 import { groundBeyond } from "./profileend.ts";
 import type { Sample } from "./sketch.ts";
 
@@ -15,7 +16,9 @@ const INSIDE = 1 / 1000;
 export function beginOnLand(camera: Camera, ground: Ground, sample: Sample, reachPx: number): Sample | null {
   if (ground.raycast(sample.ray) !== null) return sample;
   const { sizeM } = ground;
-  const beyond = groundBeyond(sample.ray, ground, ground.heightAt(sizeM / 2, sizeM / 2), sizeM * INSIDE);
+  const beyond =
+    onCutFace(sample.ray, ground) ??
+    groundBeyond(sample.ray, ground, ground.heightAt(sizeM / 2, sizeM / 2), sizeM * INSIDE);
   if (beyond === null) return null;
   const inside = (v: number): number => clamp(v, sizeM * INSIDE, sizeM * (1 - INSIDE));
   const [x, y] = [inside(beyond[0]), inside(beyond[1])];
@@ -23,4 +26,20 @@ export function beginOnLand(camera: Camera, ground: Ground, sample: Sample, reac
   if (!at.visible || Math.hypot(at.x - sample.x, at.y - sample.y) > reachPx) return null;
   const ray = camera.ray(at.x, at.y);
   return ground.raycast(ray) === null ? null : { ...sample, x: at.x, y: at.y, ray };
+}
+
+/** Where a ray meets the face at which the land is cut off, below its border; null where the ray misses it. */
+function onCutFace({ origin, dir }: Ray, ground: Ground): Vec3 | null {
+  const { sizeM } = ground;
+  let from = 0;
+  let to = Number.POSITIVE_INFINITY;
+  for (const axis of [0, 1] as const) {
+    const a = -origin[axis] / dir[axis];
+    const b = (sizeM - origin[axis]) / dir[axis];
+    from = Math.max(from, Math.min(a, b));
+    to = Math.min(to, Math.max(a, b));
+  }
+  if (from <= 0 || !(from < to)) return null;
+  const met = along({ origin, dir }, from);
+  return met[2] < ground.heightAt(met[0], met[1]) ? met : null;
 }
