@@ -122,7 +122,7 @@ def test_an_unchanged_level_keeps_its_samples_and_versions_but_is_newer() -> Non
     after = pyramid.level(2)
     assert before is not None
     assert after is not None
-    assert after.samples is before.samples
+    assert after.stored is before.stored
     assert after.stamp > before.stamp
     assert after.changed == before.changed
     assert after.clock == 5
@@ -251,6 +251,48 @@ def test_earlier_states_of_levels_are_kept_only_while_somebody_holds_tiles_of_th
     assert earlier() == [0] * (LEVELS + 1)
     put(4)
     assert server.forget_earlier([]) == LEVELS + 1, "nobody is there"
+
+
+@pytest.mark.parametrize("amplitude", [1, 900], ids=["fits in 16 bits", "does not fit everywhere"])
+def test_levels_that_rest_take_half_of_the_memory_and_say_the_same(amplitude: int) -> None:
+    """SPEC S592: previews and settled levels, in bursts with rests between, give the bytes that they give without."""
+    from esker.tiles.delivery import ClientTiles
+
+    servers = [TileServer(SIZE_M, 3), TileServer(SIZE_M, 3)]
+    clients = [ClientTiles(server) for server in servers]
+
+    def said(client: ClientTiles) -> bytes:
+        frames = b""
+        while (plan := client.plan()) is not None:
+            frames += plan.encode()
+            client.commit(plan)
+        return frames
+
+    for clock, settled in enumerate((True, False, False, True, False), start=1):
+        for level in range(4):
+            ground = heights(level, level) * np.float32(amplitude) + np.float32(500 + clock)
+            for server in servers:
+                server.put_level(clock, level, ground.copy(), settled)
+            assert said(clients[0]) == said(clients[1])
+        servers[0].pyramid.narrow()
+        stored = [state.stored.dtype for level in range(4) for state in servers[0].pyramid.states(level)[:1]]
+        assert stored[3] == (np.int16 if amplitude == 1 else np.int32)
+        assert stored[0] == np.int32, "what is small stays"
+        assert np.array_equal(*(server.heights(3) for server in servers))
+    assert (servers[0].pyramid.bounds().low == servers[1].pyramid.bounds().low).all()
+
+
+def test_a_level_at_rest_is_known_to_be_the_one_that_its_children_followed() -> None:
+    """SPEC S592: else every first preview after a rest would look for what had moved."""
+    pyramid = Pyramid(SIZE_M, 3)
+    for level in range(4):
+        pyramid.settle(1, level, heights(level, level))
+    pyramid.narrow()
+    assert pyramid._parents[3] is not None
+    now = pyramid.level(2)
+    assert now is not None
+    assert now.stored.dtype == np.int16
+    assert pyramid._parents[3].stored is now.stored
 
 
 def test_a_pyramid_knows_where_its_ground_last_changed() -> None:

@@ -185,7 +185,8 @@ class TileServer:
 
     def forget_earlier(self, clients: Sequence[ClientTiles]) -> int:
         """Forgets the states of levels from which no client's tiles can be told as a change; returns how many. A state
-        of the finest level is 4 MiB, and most clients have the newest a moment after it came."""
+        of the finest level is 4 MiB, and most clients have the newest a moment after it came. What is left is stored in
+        half of the memory until the next put."""
         count = 0
         for channel, pyramid in ((Channel.HEIGHT, self.pyramid), (Channel.BASE, self.base), *self.channels.items()):
             ledgers = [client.ledger(channel) for client in clients]
@@ -194,6 +195,7 @@ class TileServer:
                     ledger.holds(level, versions, newer) for ledger in ledgers
                 )
             )
+            pyramid.narrow()
         return count
 
     def requests(self, clients: Sequence[ClientTiles]) -> tuple[tuple[TileKey, ...], int]:

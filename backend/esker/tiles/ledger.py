@@ -28,9 +28,9 @@ SPARE_TILES: Final = 32
 
 
 def state_of(level: Level, key: TileKey) -> TileState:
-    """Returns a tile of a level, its samples as a view."""
+    """Returns a tile of a level, its samples as a view where they are stored as they are."""
     r, c = 64 * key.y, 64 * key.x
-    return TileState(int(level.versions[key.y, key.x]), level.samples[r : r + 65, c : c + 65])
+    return TileState(int(level.versions[key.y, key.x]), level.window(slice(r, r + 65), slice(c, c + 65)))
 
 
 class Ledger:

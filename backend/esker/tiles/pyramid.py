@@ -10,7 +10,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import ClassVar, Final
+from typing import ClassVar, Final, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,10 @@ from esker.tiles.stabiliser import Steadier
 BLOCK_CELLS: Final = 4
 """Changes are remembered per block of this many cells. What a changed sample moves on finer levels, through the
 prediction's stencil of three samples a level, ends less than one block away."""
+
+NARROW: Final = np.iinfo(np.int16)
+NARROW_LEVEL: Final = 2
+"""Coarser levels take so little that they are left as they are."""
 
 Counts = NDArray[np.uint32]
 Mask = NDArray[np.bool_]
@@ -44,21 +48,51 @@ afresh."""
 class Level:
     """One level at one moment.
 
-    ``samples``: (N_l, N_l) int32, read-only. ``versions``: (2^l, 2^l) uint32, the stamp at which each tile last
-    changed. ``stamp``: when the level was last put, changed or not; ``changed``: the newest of ``versions``.
+    ``stored``: (N_l, N_l) int32, read-only, or int16 where the level rests (``narrowed``). ``versions``: (2^l, 2^l)
+    uint32, the stamp at which each tile last changed. ``stamp``: when the level was last put, changed or not;
+    ``changed``: the newest of ``versions``.
     """
 
     level: int
-    samples: Ints
+    stored: Ints | NDArray[np.int16]
     versions: Counts
     stamp: int
     changed: int
     clock: int
     settled: bool
+    zero: int = 0
+    """What is added to samples that are stored in 16 bits."""
+
+    @property
+    def samples(self) -> Ints:
+        """All samples, read-only: a copy where they are stored narrowed."""
+        return self.window(slice(None), slice(None))
 
     def window(self, rows: slice, cols: slice) -> Ints:
-        """Returns some of the samples, as a view."""
-        return self.samples[rows, cols]
+        """Returns some of the samples: a view, or a copy where they are stored narrowed."""
+        part = self.stored[rows, cols]
+        if part.dtype == np.int32:
+            return cast(Ints, part)
+        whole = part.astype(np.int32)
+        whole += np.int32(self.zero)
+        whole.flags.writeable = False
+        return whole
+
+    def narrowed(self) -> Level:
+        """Returns the level with its samples stored in half of the memory; itself where they do not fit.
+
+        At level 4, 16 bits hold a quarter of the domain's side from the lowest sample to the highest.
+        """
+        if self.stored.dtype == np.int16:
+            return self
+        low, high = int(self.stored.min()), int(self.stored.max())
+        if high - low > NARROW.max - NARROW.min:
+            return self
+        zero = low - NARROW.min
+        stored = np.empty(self.stored.shape, dtype=np.int16)
+        np.subtract(self.stored, np.int32(zero), out=stored, casting="unsafe")
+        stored.flags.writeable = False
+        return replace(self, stored=stored, zero=zero)
 
 
 def quantise(
@@ -95,15 +129,15 @@ def follow_parents(samples: Ints, then: Level | None, now: Level | None, ratio: 
     parent tile moves its own four children. On an edge that two parents share both say the same, as the prediction
     there depends on the samples of that edge alone.
     """
-    if then is None or now is None or then.samples is now.samples:
+    if then is None or now is None or then.stored is now.stored:
         return samples
     moved = np.argwhere(then.versions != now.versions)
     if not 0 < len(moved) <= FOLLOW_TILES:
         return samples
-    out = samples.copy()
+    out, before, after = samples.copy(), then.samples, now.samples
 
     def follow(tiles: NDArray[np.int64]) -> None:
-        loops.followed(samples, then.samples, now.samples, tiles, TILE_CELLS, 9 - ratio, SAMPLE_LIMIT, out)
+        loops.followed(samples, before, after, tiles, TILE_CELLS, 9 - ratio, SAMPLE_LIMIT, out)
 
     coding.both(follow, *np.array_split(moved, 2))
     return out
@@ -209,6 +243,22 @@ class Pyramid:
             self._earlier[level] = deque(kept, maxlen=earlier.maxlen)
         return count
 
+    def narrow(self) -> None:
+        """Stores all levels in less memory, for when nobody draws: the next put of a level widens it again."""
+        found: dict[int, Level] = {}
+
+        def narrowed(state: Level) -> Level:
+            # A level and what its children remember of it stay one array: that is how they are known to be the same.
+            now = found.get(id(state.stored)) or found.setdefault(id(state.stored), state.narrowed())
+            return state if now.stored is state.stored else replace(state, stored=now.stored, zero=now.zero)
+
+        for level in range(NARROW_LEVEL, self.levels + 1):
+            if (state := self._levels[level]) is not None:
+                self._levels[level] = narrowed(state)
+            self._earlier[level] = deque(map(narrowed, self._earlier[level]), maxlen=self._earlier[level].maxlen)
+            if level < self.levels and (parent := self._parents[level + 1]) is not None:
+                self._parents[level + 1] = narrowed(parent)
+
     def level(self, level: int) -> Level | None:
         """Returns the level as it is now, None before it first came."""
         return self._levels[level]
@@ -311,10 +361,11 @@ class Pyramid:
         Returns how many tiles changed.
         """
         old = self._levels[level]
+        before = None if old is None else old.samples
         parent = self._levels[level - 1] if level else None
         kept = None
-        if old is not None and not settled:
-            kept = follow_parents(old.samples, self._parents[level], parent, self.ratio)
+        if before is not None and not settled:
+            kept = follow_parents(before, self._parents[level], parent, self.ratio)
         self._parents[level] = parent
         step = max(1, self.preview_step >> (self.top - level))
         if kept is None:
@@ -324,7 +375,7 @@ class Pyramid:
             scale = np.float32(1.0 / grid.quantum(level, self.size_m))
             loops.quantised(heights, kept, scale, step, np.float32(SAMPLE_LIMIT), samples)
         stamp = self.stamp + 1
-        changed = self._touch(level, None if old is None else old.samples, samples, stamp)
+        changed = self._touch(level, before, samples, stamp)
         count = int(np.count_nonzero(changed))
         if old is not None and not count:
             self._levels[level] = replace(old, stamp=stamp, clock=clock, settled=settled)
