@@ -278,7 +278,9 @@ def test_levels_that_rest_take_half_of_the_memory_and_say_the_same(amplitude: in
         stored = [state.stored.dtype for level in range(4) for state in servers[0].pyramid.states(level)[:1]]
         assert stored[3] == (np.int16 if amplitude == 1 else np.int32)
         assert stored[0] == np.int32, "what is small stays"
-        assert np.array_equal(*(server.heights(3) for server in servers))
+        narrow, wide = (server.heights(3) for server in servers)
+        assert narrow is not None
+        assert np.array_equal(narrow, wide)  # type: ignore[arg-type]
     assert (servers[0].pyramid.bounds().low == servers[1].pyramid.bounds().low).all()
 
 

@@ -1,6 +1,6 @@
 """Compiles, in a process of its own, what a server runs.
 
-``python -m esker.server.first_build kernels | driver | loops`` is that process.
+``python -m esker.server.first_build kernels | driver | loops [tiles | rivers]`` is that process.
 A compiler that hangs, takes all memory or aborts then harms nobody (``solve.prepare`` starts this and bounds it). What
 is compiled is kept on disk by PoCL and by numba, and whoever starts this process only loads it.
 
@@ -17,6 +17,7 @@ import logging
 import os
 import sys
 import threading
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from importlib.metadata import version
@@ -34,6 +35,8 @@ from esker.process.child_process import end_with_parent
 from esker.solve.opencl import prepare, proof
 from esker.solve.opencl.pocl import cpu, home
 
+TILES: Final = "tiles"
+RIVERS: Final = "rivers"
 SCENE_LEVEL: Final = 2
 ROWS: Final = "1-1-1-goffs0-smallgrid"
 """The name that PoCL gives the shape of the launches of row-wise kernels."""
@@ -148,43 +151,64 @@ def _blend(device: Any) -> None:
         blend_device.program(device, smooth).run(device.queue, pack, constants, found, (1, 1))
 
 
-def loops() -> dict[str, Any]:
-    """Compiles the loops that every server runs."""
-    from esker.flow import warming
-    from esker.synthesis.rules import octave
-    from esker.tiles.pyramid import warm
-
-    warm()
-    warming.warm()
-    octave.warm()
-    return {"loops": True}
+def loops(what: str = TILES) -> dict[str, Any]:
+    """Compiles the loops of tiles, which every server runs before anybody draws, or those of its rivers."""
+    for warm in _parts(what):
+        warm()
+    return {"loops": what}
 
 
-def have_loops(stopped: threading.Event, begun: threading.Event) -> None:
-    """Compiles the loops in a child process, unless one has done so, then loads them into this process.
-
-    ``begun`` is set before they are compiled.
-    """
-    from esker import compiled
+def _parts(what: str) -> list[Callable[[], None]]:
+    """Returns what runs the loops. Raises KeyError for something else."""
     from esker.flow import warming
     from esker.synthesis.rules import octave
     from esker.tiles import pyramid
 
-    rooms = tuple(Path(file).parent for file in (pyramid.__file__, warming.__file__, octave.__file__))
-    files = [Path(compiled.__file__), *(path for room in rooms for path in sorted(room.rglob("*.py")))]
-    texts = [path.read_bytes() for path in files]
-    content = hashlib.sha256(b"".join([version("numba").encode(), pyramid.__file__.encode(), *texts])).hexdigest()
-    record = home.root() / f"loops-{content[:16]}"
+    parts: dict[str, list[Callable[[], None]]] = {TILES: [pyramid.warm], RIVERS: [warming.warm, octave.warm]}
+    return parts[what]
+
+
+def have_loops(stopped: threading.Event, begun: threading.Event) -> None:
+    """Compiles the loops of tiles in a child process, unless one has done so, then loads them into this process.
+
+    ``begun`` is set before they are compiled.
+    """
+    if _compiled(TILES, stopped, begun.set):
+        loops(TILES)
+
+
+def have_river_loops(stopped: threading.Event) -> None:
+    """Compiles the loops of rivers in a child process, unless one has done so.
+
+    Nobody waits for these to draw: a server is ready without them, and its first rivers come after.
+    """
+    _compiled(RIVERS, stopped, lambda: None)
+
+
+def _compiled(what: str, stopped: threading.Event, begins: Callable[[], None]) -> bool:
+    """Compiles loops in a child process unless one has; False where it was stopped on the way."""
+    record = home.root() / f"loops-{what}-{_content(what)}"
+    if record.exists():
+        return True
+    begins()
     try:
-        if not record.exists():
-            begun.set()
-            if "failed" not in prepare.bounded(["loops"], stopped=stopped):
-                with suppress(OSError):
-                    record.parent.mkdir(parents=True, exist_ok=True)
-                    record.touch()
+        if "failed" not in prepare.bounded(["loops", what], stopped=stopped):
+            with suppress(OSError):
+                record.parent.mkdir(parents=True, exist_ok=True)
+                record.touch()
     except prepare.Stopped:
-        return
-    pyramid.warm()
+        return False
+    return True
+
+
+def _content(what: str) -> str:
+    """Returns a digest of the sources of loops, where they lie, and what compiles them."""
+    from esker import compiled
+
+    rooms = {Path(sys.modules[warm.__module__].__file__ or "").parent for warm in _parts(what)}
+    files = [Path(compiled.__file__), *(path for room in sorted(rooms) for path in sorted(room.rglob("*.py")))]
+    known = [version("numba").encode(), compiled.__file__.encode(), *(path.read_bytes() for path in files)]
+    return hashlib.sha256(b"".join(known)).hexdigest()[:16]
 
 
 def main(arguments: list[str]) -> int:
@@ -195,7 +219,7 @@ def main(arguments: list[str]) -> int:
     prepare.THIS_IS_THE_CHILD = True
     try:
         if arguments[:1] == ["loops"]:
-            done = loops()
+            done = loops(*arguments[1:])
         else:
             given = json.loads(arguments[1])
             done = driver(**given) if arguments[0] == "driver" else kernels(**given)

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+import threading
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,9 +65,15 @@ class Hydrology:
     """One thread of low priority for the rivers of all terrains, whose homes have turns: of sixty rooms that one
     stranger opened one is looked at before the next home has its own. Safe from any thread."""
 
-    def __init__(self) -> None:
+    def __init__(self, prepare: Callable[[threading.Event], None] = lambda _: None) -> None:
+        """``prepare``: called in the thread before the first search; it ends when its event is set (``close``)."""
         self.pace = Pace()
-        self._thread = TileThread("rivers", begin=priority.yield_to_others)
+        self._closed = threading.Event()
+        self._thread = TileThread("rivers", begin=partial(self._begin, prepare))
+
+    def _begin(self, prepare: Callable[[threading.Event], None]) -> None:
+        priority.yield_to_others()
+        prepare(self._closed)
 
     def lane(self) -> Lane:
         """Returns a place for the searches of one room."""
@@ -88,6 +96,7 @@ class Hydrology:
 
     def close(self) -> None:
         """Drops what waits, and takes no more."""
+        self._closed.set()
         self._thread.shutdown(wait=False, cancel_futures=True)
 
 

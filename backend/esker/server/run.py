@@ -91,7 +91,7 @@ class _Tiles:
     """``session.ground.ports.Tiles`` and ``WateredTiles`` by the real tiles."""
 
     def __init__(self) -> None:
-        self.hydrology = Hydrology()
+        self.hydrology = Hydrology(first_build.have_river_loops)
         self.scorer = Scorer()
 
     def snapshot(self, server: Any, level: int) -> Snapshot | None:
