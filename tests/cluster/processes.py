@@ -63,10 +63,10 @@ class NodeProcess:
                         return
             except (urllib.error.URLError, OSError):
                 time.sleep(0.05)
-        raise AssertionError(self.log())
+        raise AssertionError(self.log()[-6000:])
 
     def log(self) -> str:
-        return (self.folder / "log").read_text(errors="replace")[-6000:]
+        return (self.folder / "log").read_text(errors="replace")
 
     def tell(self, number: int) -> None:
         assert self.process is not None
