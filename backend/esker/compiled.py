@@ -26,7 +26,7 @@ def kernel(function: F) -> F:
         made: Any = numba.njit(cache=True, **OPTIONS)(function)
     except RuntimeError:  # no place on this machine to keep compiled code in
         return cast(F, numba.njit(**OPTIONS)(function))
-    if made is not function:  # it is the function itself where numba is told not to compile
+    if made is not function:
         made._cache._cache_file = LoopFiles(made._cache._cache_file)
     return cast(F, made)
 

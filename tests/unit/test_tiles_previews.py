@@ -14,7 +14,8 @@ from esker.contract import View
 from esker.tiles.codec.frame import read_frame
 from esker.tiles.codec.payload import SAMPLE_LIMIT, follow, predict
 from esker.tiles.delivery import ClientTiles, TileServer
-from esker.tiles.pyramid import PREVIEW_STEP, Level, Pyramid, follow_parents, moved_along
+from esker.tiles.pyramid import PREVIEW_STEP, Level, Pyramid, follow_parents
+from esker.tiles.stabiliser import moved_along
 
 SIZE_M = 1024.0
 LEVELS = 3

@@ -12,6 +12,7 @@ from esker.grid import TileKey
 from esker.tiles.codec.frame import TileRecord
 from esker.tiles.codec.payload import SAMPLE_LIMIT
 from esker.tiles.delivery import TileServer
+from esker.tiles.ledger import state_of
 from esker.tiles.plans import EncodedTiles
 from esker.tiles.pyramid import Pyramid, quantise
 
@@ -280,7 +281,8 @@ def test_levels_that_rest_take_half_of_the_memory_and_say_the_same(amplitude: in
         assert stored[0] == np.int32, "what is small stays"
         narrow, wide = (server.heights(3) for server in servers)
         assert narrow is not None
-        assert np.array_equal(narrow, wide)  # type: ignore[arg-type]
+        assert wide is not None
+        assert np.array_equal(narrow, wide)
     assert (servers[0].pyramid.bounds().low == servers[1].pyramid.bounds().low).all()
 
 
@@ -295,6 +297,22 @@ def test_a_level_at_rest_is_known_to_be_the_one_that_its_children_followed() -> 
     assert now is not None
     assert now.stored.dtype == np.int16
     assert pyramid._parents[3].stored is now.stored
+
+
+@pytest.mark.parametrize("rests", [False, True])
+def test_all_clients_hold_one_copy_of_a_tile_that_others_are_refined_from(rests: bool) -> None:
+    """SPEC S592: a tile of a level at rest is made anew whenever somebody asks for it."""
+    server = TileServer(SIZE_M, LEVELS, LEVELS + 1)
+    for level in range(LEVELS + 1):
+        server.put_level(1, level, heights(level, level), True)
+    if rests:
+        server.pyramid.narrow()
+    level, key = server.pyramid.level(LEVELS), TileKey(LEVELS, 1, 2)
+    assert level is not None
+    first, second = (server.refined.kept(key, state_of(level, key)) for _ in range(2))
+    assert first is second
+    assert first.samples.base is None, "it keeps no whole level"
+    assert np.array_equal(first.samples, level.samples[128:193, 64:129])
 
 
 def test_a_pyramid_knows_where_its_ground_last_changed() -> None:

@@ -21,7 +21,7 @@ from esker.tiles import loops
 from esker.tiles.bounds import Bounds, SubPatches, dilate, nest
 from esker.tiles.codec import coding, entropy
 from esker.tiles.codec.payload import SAMPLE_LIMIT, Ints, predict
-from esker.tiles.stabiliser import Steadier
+from esker.tiles.stabiliser import Steadier, moved_along
 
 BLOCK_CELLS: Final = 4
 """Changes are remembered per block of this many cells. What a changed sample moves on finer levels, through the
@@ -140,41 +140,6 @@ def follow_parents(samples: Ints, then: Level | None, now: Level | None, ratio: 
         loops.followed(samples, before, after, tiles, TILE_CELLS, 9 - ratio, SAMPLE_LIMIT, out)
 
     coding.both(follow, *np.array_split(moved, 2))
-    return out
-
-
-def moved_along(heights: NDArray[np.float32], then: Ints, now: Ints, quantum: float) -> NDArray[np.float32]:
-    """Heights of level l, (N_l, N_l), metres, moved by what level 0 has moved, interpolated as the prediction of
-    tiles interpolates, each level from the one above; the same array if nowhere.
-
-    ``then``, ``now``: level 0, (65, 65) in quanta of ``quantum`` metres.
-    """
-    change = now - then
-    rows, cols = np.flatnonzero(change.any(axis=1)), np.flatnonzero(change.any(axis=0))
-    if not rows.size:
-        return heights
-    # what a sample moves ends less than three cells from it; the prediction needs four samples a side
-    window = tuple(slice(max(0, int(v[0]) - 4), min(TILE_CELLS, int(v[-1]) + 4) + 1) for v in (rows, cols))
-    move = change[window].astype(np.float32) * np.float32(quantum)
-    step = 1
-    while TILE_CELLS * step + 1 < heights.shape[0]:
-        for _ in range(2):
-            move = _between(move).T
-        step *= 2
-    out = heights.copy()
-    out[tuple(slice(w.start * step, (w.stop - 1) * step + 1) for w in window)] += move
-    return out
-
-
-def _between(a: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Upsamples rows, (m, n) -> (m, 2n - 1): the four-point rule (-1, 9, 9, -1)/16, linear beside the ends."""
-    out = np.empty((a.shape[0], 2 * a.shape[1] - 1), dtype=np.float32)
-    out[:, ::2] = a
-    odd = out[:, 1::2]
-    np.add(a[:, :-1], a[:, 1:], out=odd)
-    odd *= np.float32(0.5)
-    odd[:, 1:-1] *= np.float32(1.125)
-    odd[:, 1:-1] -= (a[:, :-3] + a[:, 3:]) * np.float32(1 / 16)
     return out
 
 

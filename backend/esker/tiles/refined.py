@@ -119,13 +119,14 @@ class RefinedTiles:
         return found if found is not None and self.active and found.epoch == self.epoch else None
 
     def kept(self, key: TileKey, state: TileState) -> TileState:
-        """Returns the tile with samples of its own, since they may be a view of a whole level: one copy for all
-        clients."""
-        if state.samples.base is None:
+        """Returns the tile with samples of its own, one copy for all clients. Those of a whole level may be a view of
+        it, or made for whoever asked."""
+        if key.level > self.levels:
             return state
         found = self._bases.get((key, state.version))
         if found is None:
-            found = self._bases[key, state.version] = TileState(state.version, state.samples.copy())
+            own = state.samples if state.samples.base is None else state.samples.copy()
+            found = self._bases[key, state.version] = TileState(state.version, own)
         return found
 
     def suspend(self) -> None:

@@ -10,6 +10,8 @@ its settled heights ``s0``, a new preview ``p1`` is shown as
 which is the settled ground where the preview has not changed, and the new preview where it changed by more than the
 correction is worth. The rule is local to a sample, so neighbouring tiles agree on shared edges. Of the three ``s0``,
 which others hold too, and ``b`` are kept; ``p0`` is their difference, to a rounding.
+
+While strokes go on, a finest preview is of older ones than the coarsest level shows by then: ``moved_along``.
 """
 
 from __future__ import annotations
@@ -17,7 +19,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from esker.contract import TILE_CELLS
 from esker.tiles import loops
+from esker.tiles.codec.payload import Ints
 
 Heights = NDArray[np.float32]
 
@@ -76,3 +80,38 @@ def steadied(heights: Heights, settled: Heights, correction: Heights) -> Heights
     np.copysign(left, correction, out=left)
     left += heights
     return left
+
+
+def moved_along(heights: NDArray[np.float32], then: Ints, now: Ints, quantum: float) -> NDArray[np.float32]:
+    """Heights of level l, (N_l, N_l), metres, moved by what level 0 has moved, interpolated as the prediction of
+    tiles interpolates, each level from the one above; the same array if nowhere.
+
+    ``then``, ``now``: level 0, (65, 65) in quanta of ``quantum`` metres.
+    """
+    change = now - then
+    rows, cols = np.flatnonzero(change.any(axis=1)), np.flatnonzero(change.any(axis=0))
+    if not rows.size:
+        return heights
+    # what a sample moves ends less than three cells from it; the prediction needs four samples a side
+    window = tuple(slice(max(0, int(v[0]) - 4), min(TILE_CELLS, int(v[-1]) + 4) + 1) for v in (rows, cols))
+    move = change[window].astype(np.float32) * np.float32(quantum)
+    step = 1
+    while TILE_CELLS * step + 1 < heights.shape[0]:
+        for _ in range(2):
+            move = _between(move).T
+        step *= 2
+    out = heights.copy()
+    out[tuple(slice(w.start * step, (w.stop - 1) * step + 1) for w in window)] += move
+    return out
+
+
+def _between(a: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Upsamples rows, (m, n) -> (m, 2n - 1): the four-point rule (-1, 9, 9, -1)/16, linear beside the ends."""
+    out = np.empty((a.shape[0], 2 * a.shape[1] - 1), dtype=np.float32)
+    out[:, ::2] = a
+    odd = out[:, 1::2]
+    np.add(a[:, :-1], a[:, 1:], out=odd)
+    odd *= np.float32(0.5)
+    odd[:, 1:-1] *= np.float32(1.125)
+    odd[:, 1:-1] -= (a[:, :-3] + a[:, 3:]) * np.float32(1 / 16)
+    return out
