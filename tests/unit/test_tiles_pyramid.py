@@ -307,12 +307,12 @@ def test_all_clients_hold_one_copy_of_a_tile_that_others_are_refined_from(rests:
         server.put_level(1, level, heights(level, level), True)
     if rests:
         server.pyramid.narrow()
-    level, key = server.pyramid.level(LEVELS), TileKey(LEVELS, 1, 2)
-    assert level is not None
-    first, second = (server.refined.kept(key, state_of(level, key)) for _ in range(2))
+    finest, key = server.pyramid.level(LEVELS), TileKey(LEVELS, 1, 2)
+    assert finest is not None
+    first, second = (server.refined.kept(key, state_of(finest, key)) for _ in range(2))
     assert first is second
     assert first.samples.base is None, "it keeps no whole level"
-    assert np.array_equal(first.samples, level.samples[128:193, 64:129])
+    assert np.array_equal(first.samples, finest.samples[128:193, 64:129])
 
 
 def test_a_pyramid_knows_where_its_ground_last_changed() -> None:
