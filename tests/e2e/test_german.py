@@ -5,7 +5,8 @@ from __future__ import annotations
 from playwright.sync_api import Locator
 
 from tests.e2e.conftest import Server, Visitor, Visitors
-from tests.e2e.test_phone import bars_apart
+from tests.e2e.hands import wait
+from tests.e2e.test_phone import apart, bars_apart, box
 
 BARS = ("esk-top-bar .left", "esk-top-bar .right", "esk-tools", "esk-status-line", "esk-view-bar")
 SIZES = ((1366, 768), (720, 900), (390, 844))
@@ -83,3 +84,28 @@ def test_german_fits_in_windows_of_three_widths(visitors: Visitors, server: Serv
     page.get_by_role("combobox", name="Sprache der Seite").select_option("en")
     button("New terrain").wait_for()
     assert visitor.js("() => document.documentElement.lang") == "en"
+
+
+def test_a_hint_lies_on_no_bar(visitors: Visitors, server: Server) -> None:
+    """SPEC U690: with the widest inspector, that of whoever leads in German."""
+    terrain, secret = server.create(title="Leer")
+    visitor = visitors(1100, 700, locale="de-DE", reduced_motion="reduce")
+    visitor.open(f"/t/{terrain}#{secret}")
+    keys = visitor.page.keyboard
+    keys.press("b")
+    shown = "shown => document.querySelector('esk-terrain').renderRoot.querySelector('esk-legend').hidden !== shown"
+    for legend in (False, True):
+        if legend:
+            keys.press("x")
+        wait(visitor, shown, legend)
+        for closed in (False, True):
+            keys.press("i")
+            visitor.page.locator("aside.side").wait_for(state="hidden" if closed else "visible")
+            bars = ["esk-tools", *(["esk-legend"] if legend else []), *([] if closed else ["aside.side"])]
+            for width in (721, 900, 960, 1041, 1280):
+                for height in (480, 540, 640, 760):
+                    visitor.page.set_viewport_size({"width": width, "height": height})
+                    hint = box(visitor, "esk-terrain .hint")
+                    on = [bar for bar in bars if not apart(hint, box(visitor, bar))]
+                    assert on == [], (width, height, legend, closed, hint)
+    assert visitor.errors == []

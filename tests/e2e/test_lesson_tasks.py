@@ -103,6 +103,7 @@ def test_a_whole_lesson(visitors: Visitors, server: Server) -> None:
         ada.page.set_viewport_size({"width": width, "height": 640})
         wait_apart(ada, ".hint", "esk-legend")
         wait_apart(ada, ".hint", "aside.side")
+        wait_apart(ada, ".hint", "esk-tools")
         wait_apart(ada, ".hint", "esk-task-chip")
     ada.shot("task-1-blue")
     wait_still(ada)  # the view makes room in the narrower window

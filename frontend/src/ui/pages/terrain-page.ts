@@ -61,6 +61,9 @@ function tabsOf({ session, task }: Stage): typeof TABS {
   return task.task.value === null ? TABS : [TASK, ...TABS];
 }
 
+/** Whether the inspector has more tabs than for a terrain without a lesson. */
+const isWide = (stage: Stage): boolean => tabsOf(stage).length > TABS.length;
+
 /** `/t/{id}`: the picture over the whole window, and calm chrome that floats on it. */
 export class EskTerrain extends SignalElement {
   static override styles = [shared, terrainPageStyles, sentenceStyles];
@@ -124,7 +127,9 @@ export class EskTerrain extends SignalElement {
           this.#panel.value = null;
       }),
       effect(() => {
+        const stage = session.stage.value;
         this.toggleAttribute("drawer", this.#panel.value !== null);
+        this.toggleAttribute("leads", stage !== null && isWide(stage));
       }),
       effect(() => {
         if ((session.stage.value?.groundwork.asking.value ?? 0) > 0) this.#panel.value = "ground";
@@ -299,7 +304,7 @@ export class EskTerrain extends SignalElement {
 
   #side(stage: Stage, tab: PanelTab): TemplateResult {
     return html`
-      <aside class="side panel ${tabsOf(stage).length > TABS.length ? "leads" : ""}" aria-label=${msg("Inspector")}>
+      <aside class="side panel ${isWide(stage) ? "leads" : ""}" aria-label=${msg("Inspector")}>
         <header>
           <esk-segmented
             label=${msg("Inspector")}

@@ -75,15 +75,29 @@ export const sentenceStyles = css`
     max-width: calc(100% - 2 * var(--edge));
     transform: translateX(-50%);
   }
-  /* Sentences stand beside the inspector, not under it. */
+  /* Sentences stand between the tools and the inspector, on neither. */
   @media (min-width: 721px) {
-    :host([drawer]) .hint,
-    :host([drawer]) .closed,
-    :host([drawer]) .importing,
-    :host([drawer]) esk-lesson-bar,
-    :host([drawer]) esk-toasts {
-      left: calc((100% - 340px) / 2);
-      max-width: calc(100% - 340px - 2 * var(--edge));
+    :host {
+      --rail: 62px;
+      --before: var(--rail);
+      --beyond: var(--rail);
+    }
+    :host([drawer]) {
+      --beyond: calc(var(--inspector) + var(--edge));
+    }
+    .hint,
+    .closed,
+    .importing,
+    esk-lesson-bar,
+    esk-toasts {
+      left: calc((100% + var(--before) - var(--beyond)) / 2);
+      max-width: calc(100% - var(--before) - var(--beyond) - 2 * var(--edge));
+    }
+  }
+  /* Two columns of tools. */
+  @media (max-height: 500px) and (min-width: 721px) {
+    :host {
+      --rail: 106px;
     }
   }
   /* A hint stands beside the legend. Where the inspector leaves too little beside it, the hint stands above, under the task. */
@@ -92,12 +106,10 @@ export const sentenceStyles = css`
       --legend: 246px;
     }
     .foot:has(esk-legend:not([hidden])) ~ .hint {
-      left: calc((100% + var(--legend)) / 2);
-      max-width: calc(100% - var(--legend) - 2 * var(--edge));
+      --before: var(--legend);
     }
-    :host([drawer]) .foot:has(esk-legend:not([hidden])) ~ .hint {
-      left: calc((100% - 340px + var(--legend)) / 2);
-      max-width: calc(100% - 340px - var(--legend) - 2 * var(--edge));
+    :host(:not([drawer])) .foot:has(esk-legend:not([hidden])) ~ .hint {
+      --beyond: 0px;
     }
   }
   @media (max-height: 700px) and (min-width: 721px) {
@@ -105,12 +117,11 @@ export const sentenceStyles = css`
       --legend: 306px;
     }
   }
-  @media (min-width: 721px) and (max-width: 960px) {
+  @media (min-width: 721px) and (max-width: 1040px) {
     :host([drawer]) .foot:has(esk-legend:not([hidden])) ~ .hint {
+      --before: var(--rail);
       bottom: auto;
       top: 122px;
-      left: calc((100% - 340px) / 2);
-      max-width: calc(100% - 340px - 2 * var(--edge));
     }
     /* Sentences that matter more have that place. */
     :host([drawer]) .foot:has(esk-legend:not([hidden])) ~ .hint:has(~ .closed, ~ .importing, ~ esk-lesson-bar[speaks]) {

@@ -7,6 +7,21 @@ export const terrainPageStyles = css`
     overflow: hidden;
     background: var(--esk-bg);
     --edge: 12px;
+    --inspector: 328px;
+  }
+  /* Four tabs and a cross that fingers hit. */
+  @media (pointer: coarse) {
+    :host {
+      --inspector: 352px;
+    }
+  }
+  /* Six tabs and the cross. */
+  :host([leads]) {
+    --inspector: 364px;
+  }
+  /* German words are longer. */
+  :host([leads]:lang(de)) {
+    --inspector: 400px;
   }
   .viewport {
     position: absolute;
@@ -49,7 +64,7 @@ export const terrainPageStyles = css`
     position: absolute;
     top: calc(var(--edge) + 60px);
     right: var(--edge);
-    width: 328px;
+    width: var(--inspector);
     max-height: calc(100% - 2 * var(--edge) - 60px - 54px);
     display: flex;
     flex-direction: column;
@@ -72,19 +87,11 @@ export const terrainPageStyles = css`
     flex: 1;
     min-width: 0;
   }
-  /* Six tabs and the cross. */
-  .side.leads {
-    width: 364px;
-  }
   .side.leads header esk-segmented {
     --segment-pad: 2px;
     --segment-gap: 0;
   }
-  /* German words are longer. */
   @media (min-width: 721px) {
-    .side.leads:lang(de) {
-      width: 400px;
-    }
     .side.leads header esk-segmented:lang(de) {
       --segment-basis: auto;
     }
@@ -93,12 +100,6 @@ export const terrainPageStyles = css`
     overflow-y: auto;
     padding: 6px 16px 18px;
     scrollbar-width: thin;
-  }
-  /* Four tabs and a cross that fingers hit. */
-  @media (pointer: coarse) and (min-width: 721px) {
-    .side {
-      width: 352px;
-    }
   }
   :is(esk-measure, esk-water) {
     position: absolute;
@@ -121,21 +122,7 @@ export const terrainPageStyles = css`
     display: none;
   }
   :is(esk-measure, esk-water)[beside] {
-    right: calc(var(--edge) + 340px);
-  }
-  /* The inspector is wider with six tabs, and under a finger. */
-  @media (min-width: 721px) {
-    :is(esk-measure, esk-water)[beside]:has(~ .side.leads) {
-      right: calc(var(--edge) + 376px);
-    }
-    :is(esk-measure, esk-water)[beside]:lang(de):has(~ .side.leads) {
-      right: calc(var(--edge) + 412px);
-    }
-  }
-  @media (pointer: coarse) and (min-width: 721px) {
-    :is(esk-measure, esk-water)[beside] {
-      right: calc(var(--edge) + 364px);
-    }
+    right: calc(2 * var(--edge) + var(--inspector));
   }
   /* Above the tools, where no hint comes. */
   esk-task-chip {
@@ -241,8 +228,7 @@ export const terrainPageStyles = css`
       gap: 6px;
       bottom: calc(var(--edge) + 62px + env(safe-area-inset-bottom));
     }
-    .side,
-    .side.leads {
+    .side {
       top: auto;
       left: 0;
       right: 0;
@@ -298,8 +284,7 @@ export const terrainPageStyles = css`
         --segment-gap: 0;
         --segment-size: 0.75rem;
       }
-      .side,
-      .side.leads {
+      .side {
         top: calc(var(--edge) + 52px);
         left: auto;
         width: var(--beside);
