@@ -1,9 +1,9 @@
 """The one source of every constant, wire format and shared struct (DESIGN 2, 3, 4, 6).
 
-Nothing here does I/O. It may know ``resources``. ``contract/emit.py`` turns this room into the committed TypeScript,
-WGSL, OpenCL and GLSL files; a test regenerates them and compares. Change a number here, run ``make generate``, commit
-both. Import names from ``esker.contract``, not from its modules, which stand here in the order in which generated
-files have them.
+Nothing here does I/O. It may know ``errors`` and ``resources``. ``contract/emit.py`` turns this room into the committed
+TypeScript, WGSL, OpenCL and GLSL files; a test regenerates them and compares. Change a number here, run ``make
+generate``, commit both. Import names from ``esker.contract``, not from its modules, which stand here in the order in
+which generated files have them.
 
 Conventions (DESIGN 3): metres, seconds, degrees at the interface; x east, y north, z up; little-endian.
 """

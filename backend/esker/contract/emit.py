@@ -151,6 +151,7 @@ def _unions() -> Iterable[str]:
         "ExportFormat",
         "RejectCode",
         "CloseCode",
+        "AnswerCode",
     ):
         values = contract.__dict__[name].__args__
         yield f"export type {name} =\n" + "\n".join(f'  | "{v}"' for v in values) + ";"

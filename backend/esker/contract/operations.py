@@ -9,6 +9,7 @@ from pydantic import Field
 from esker.contract.constants import MAX_OPS_PER_GROUP, MAX_POINTS_PER_APPEND, MAX_POINTS_PER_STROKE
 from esker.contract.document import Layer, LayerFields, Stroke, StrokeFields, TerrainFields
 from esker.contract.values import Clock, CurvePoint, Id, Name, OpId, Vec3, Which, Wire
+from esker.errors import AnswerCode as AnswerCode
 
 # --- operations (DESIGN 4) --------------------------------------------------------------------------------------
 

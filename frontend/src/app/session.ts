@@ -101,7 +101,7 @@ export class TerrainSession implements OpenTerrain {
     this.#viewport = viewport;
     this.me.value = identity(this.store, Math.random, this.client);
     this.doc = new SyncDoc(this.client);
-    this.doc.onRefused((refusal) => this.refused(refusal, refusal.op));
+    this.doc.onRefused(({ code, message, op }) => this.refused({ code, message: refusalWords(code, message) }, op));
     this.doc.onDiverged(() => this.connection.reconnect());
     const scheme = window.location.protocol === "https:" ? "wss" : "ws";
     const url = `${scheme}://${window.location.host}/ws?terrain=${id}`; // a balancer brings a terrain to one server by it
@@ -163,12 +163,12 @@ export class TerrainSession implements OpenTerrain {
     return refusal === null;
   }
 
-  /** Says why; where the stroke was deleted, by whom, with the way back. */
+  /** Says why, in the page's language already; where the stroke was deleted, by whom, with the way back. */
   refused(refusal: { readonly code: string; readonly message: string }, op: Op | undefined): void {
     if (refusal.code === "hands_off" && !this.lesson.state.peek().draws) return; // the bar says so, and keeps the line
     const stroke = strokeOf(op);
     if (refusal.code !== "deleted_stroke" || stroke === null) {
-      this.toasts.show(refusalWords(refusal.code, refusal.message), "warn");
+      this.toasts.show(refusal.message, "warn");
       return;
     }
     const run = (): void => void this.submit({ type: "stroke.restore", stroke });

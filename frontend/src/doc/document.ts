@@ -1,5 +1,6 @@
 /** The document as the page holds it: an immutable value. Maps keep the order in which strokes came. */
 
+import { msg, str } from "@lit/localize";
 import {
   type Course,
   DEFAULT_COURSE_GRADE,
@@ -104,7 +105,7 @@ export function changed(fields: object, nullable: readonly string[]): Record<str
   const update: Record<string, unknown> = {};
   for (const [name, value] of Object.entries(fields)) {
     if (value === undefined) continue;
-    if (value === null && !nullable.includes(name)) throw new Refusal("bad_field", `'${name}' needs a value.`);
+    if (value === null && !nullable.includes(name)) throw new Refusal("bad_field", msg(str`'${name}' needs a value.`));
     update[name] = value;
   }
   return update;

@@ -50,14 +50,16 @@ describe("the language of the page (SPEC U645)", () => {
 describe("what the server says (SPEC U651, U652)", () => {
   afterEach(() => speak("en"));
 
-  it("is said by its code in another language; its own sentence where the page has none, and in English", async () => {
+  it("is said by its code in another language; in the server's sentence where that carries facts, and in English", async () => {
     expect(refusalWords("busy", "Another file of yours is still being brought in.")).toMatch(/^Another file/);
     await speak("de");
     expect(refusalWords("busy", "Another file of yours is still being brought in.")).toMatch(/^Der Server ist/);
     expect(refusalWords("no_seat", "This class is over. Ask your teacher.")).toBe(
       "Diese Klasse ist vorbei. Frag deine Lehrkraft.",
     );
-    expect(refusalWords("malformed", "Say which copy is to be opened.")).toBe("Say which copy is to be opened.");
+    expect(refusalWords("malformed", "title: Field required.")).toMatch(/^Der Server hat nicht verstanden/);
+    expect(refusalWords("refused", "The picture has 8 bits.")).toBe("The picture has 8 bits.");
+    expect(refusalWords("of-a-newer-server", "No.")).toBe("No.");
     expect(readRefusal(404, '{"code": "no_link", "message": "There is no such link."}').message).toMatch(
       /^Diesen Link/,
     );

@@ -66,6 +66,7 @@ vi.mock("../../src/app/view/stage.ts", () => ({ Stage: FakeStage }));
 const { TerrainSession } = await import("../../src/app/session.ts");
 const { recentTerrains } = await import("../../src/app/device/storage.ts");
 const { fullStroke } = await import("../../src/doc/document.ts");
+const { speak } = await import("../../src/core/language.ts");
 
 function welcome(role: Role = "owner", change: Partial<Welcome> = {}): Welcome {
   return welcomeOf({
@@ -165,6 +166,21 @@ describe("a session", () => {
     say({ type: "reject", id: envelope!.id, code: "too_many_strokes", message: "A terrain holds at most 5 strokes." });
     expect(session.doc.doc.value!.strokes.size).toBe(0);
     expect(session.toasts.list.value.map((t) => t.text)).toEqual(["A terrain holds at most 5 strokes."]);
+  });
+
+  it("says what the server refused by its code, and what the page refused in its own words (SPEC U651)", async () => {
+    await speak("de");
+    say(welcome());
+    session.submit({ type: "stroke.begin", stroke: line });
+    await settle();
+    const [envelope] = server().of("ops")[0]!.ops;
+    say({ type: "reject", id: envelope!.id, code: "too_many_strokes", message: "A terrain holds at most 5 strokes." });
+    expect(session.submit({ type: "stroke.restore", stroke: "s9" })).toBe(false);
+    await speak("en");
+    expect(session.toasts.list.value.map((t) => t.text)).toEqual([
+      "Dieses Gelände hat so viele Linien, wie es fasst.",
+      "Es gibt keine solche gelöschte Linie, die man wiederherstellen könnte.",
+    ]);
   });
 
   it("keeps what is unconfirmed over a cut and sends it again", async () => {

@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 import logging
 import time
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from typing import Annotated, Final, TypeVar
 from urllib.parse import quote
 
@@ -16,7 +16,7 @@ from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 
 from esker import contract as c
-from esker.errors import Cannot, EskerError
+from esker.errors import AnswerCode, Cannot, EskerError
 from esker.fairness.shares import Full, Rates, Who
 from esker.session.lesson.rules import Lesson
 from esker.session.room.door import Deleted
@@ -38,10 +38,14 @@ SILENT_AGAIN_SECONDS: Final = 5
 NO_ROOM: Final = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG})
 
 
-def answer(status: int, code: str, message: str, again: int | None = None) -> JSONResponse:
+def answer(status: int, code: AnswerCode, message: str, again: int | None = None) -> JSONResponse:
     """A refusal as JSON. ``again``: seconds after which it may be asked again."""
     headers = None if again is None else {"Retry-After": str(again)}
     return JSONResponse({"code": code, "message": message}, status_code=status, headers=headers)
+
+
+HTTP_CODES: Final[Mapping[int, AnswerCode]] = {404: "not_found", 405: "not_allowed", 413: "too_large"}
+HTTP_SENTENCES: Final = {404: "There is nothing at this address.", 405: "This address does not do that."}
 
 
 def add_errors(app: FastAPI) -> None:
@@ -49,7 +53,7 @@ def add_errors(app: FastAPI) -> None:
 
     @app.exception_handler(EskerError)
     async def refused(_: Request, error: EskerError) -> JSONResponse:
-        return answer(error.status, error.code, error.message)
+        return JSONResponse({"code": error.code, "message": error.message}, status_code=error.status)
 
     @app.exception_handler(Deleted)
     async def deleted(_: Request, error: Deleted) -> JSONResponse:
@@ -70,9 +74,8 @@ def add_errors(app: FastAPI) -> None:
 
     @app.exception_handler(HTTPException)
     async def http(_: Request, error: HTTPException) -> JSONResponse:
-        code = {404: "not_found", 405: "not_allowed", 413: "too_large"}.get(error.status_code, "error")
-        sentence = {404: "There is nothing at this address.", 405: "This address does not do that."}
-        return answer(error.status_code, code, sentence.get(error.status_code, str(error.detail)))
+        status = error.status_code
+        return answer(status, HTTP_CODES.get(status, "error"), HTTP_SENTENCES.get(status, str(error.detail)))
 
     @app.exception_handler(ClientDisconnect)
     async def cut_off(request: Request, _: ClientDisconnect) -> JSONResponse:

@@ -16,6 +16,8 @@ from ipaddress import IPv4Network, IPv6Network, ip_address, ip_network
 from typing import Any, Final
 from urllib.parse import urlsplit
 
+from esker.errors import AnswerCode
+
 CHANGES_NOTHING: Final = frozenset({"GET", "HEAD", "OPTIONS"})
 OWN_SITE: Final = frozenset({"same-origin", "none"})
 WRONG_HOST: Final = (
@@ -89,7 +91,7 @@ class Front:
     strict: bool = False
     """Whether browsers are told to come by HTTPS only (Strict-Transport-Security)."""
 
-    def against(self, scope: Any) -> tuple[int, str, str] | None:
+    def against(self, scope: Any) -> tuple[int, AnswerCode, str] | None:
         """Returns status, code and sentence of what stands against a change that this request asks for; None:
         nothing."""
         found: dict[bytes, bytes] = dict(scope["headers"])

@@ -3,6 +3,7 @@
 import { msg } from "@lit/localize";
 import { type ReadonlySignal, signal } from "@preact/signals-core";
 import {
+  type ErrorMessage,
   PROTOCOL_VERSION,
   SUBPROTOCOL,
   WALL_CLOSE_LEVEL,
@@ -14,6 +15,7 @@ import {
 } from "../../../generated/contract.ts";
 import { FrameDecoder } from "../../../net/decode.ts";
 import { TileStore } from "../../../tiles/store.ts";
+import { refusalWords } from "../../words/refusals.ts";
 
 const RETRY_MS = [500, 1000, 2000, 5000] as const;
 
@@ -132,8 +134,8 @@ export class WallConnection {
         this.#frame(data);
         return;
       }
-      const message = JSON.parse(data) as Wall | { type: "error"; message: string };
-      if (message.type === "error") this.#problem.value = message.message;
+      const message = JSON.parse(data) as Wall | ErrorMessage;
+      if (message.type === "error") this.#problem.value = refusalWords(message.code, message.message);
       else if (message.type === "wall") {
         this.#receive(message, !told);
         told = true;
